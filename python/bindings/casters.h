@@ -1,0 +1,63 @@
+#pragma once
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/complex.h>
+#include <nanobind/stl/function.h>
+#include <nanobind/stl/map.h>
+#include <nanobind/stl/optional.h>
+#include <nanobind/stl/pair.h>
+#include <nanobind/stl/shared_ptr.h>
+#include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
+#include <nanobind/stl/vector.h>
+
+#include "petsc.h"
+
+namespace nb = nanobind;
+
+namespace fretwave::python {
+
+/// petsc4py objects in and out. A plain caster for Vec would strip the pointer, hence the struct. Borrowed on the way in, one reference more out.
+template <class T>
+struct Petsc {
+  T object = nullptr;
+};
+
+bool from_petsc4py(PyObject*, Vec*);
+bool from_petsc4py(PyObject*, Mat*);
+bool from_petsc4py(PyObject*, SNES*);
+PyObject* to_petsc4py(Vec);
+PyObject* to_petsc4py(Mat);
+PyObject* to_petsc4py(SNES);
+void import_petsc4py_module();
+
+using Array = nb::ndarray<nb::numpy, double>;
+
+/// A numpy array that owns a copy of the data.
+inline Array numpy_copy(double const* data, std::vector<size_t> const& shape) {
+  size_t n = 1;
+  for (size_t s : shape) n *= s;
+  double* copy = new double[n ? n : 1];
+  std::copy_n(data, n, copy);
+  nb::capsule owner(copy, [](void* p) noexcept { delete[] static_cast<double*>(p); });
+  return Array(copy, shape.size(), shape.data(), owner);
+}
+
+void bind_contact(nb::module_&);
+void bind_model(nb::module_&);
+void bind_hb(nb::module_&);
+void bind_solve(nb::module_&);
+void bind_transient(nb::module_&);
+
+}  // namespace fretwave::python
+
+namespace nanobind::detail {
+
+template <class T>
+struct type_caster<fretwave::python::Petsc<T>> {
+  NB_TYPE_CASTER(fretwave::python::Petsc<T>, const_name("petsc4py.PETSc.Object"))
+  bool from_python(handle source, uint8_t, cleanup_list*) noexcept { return fretwave::python::from_petsc4py(source.ptr(), &value.object); }
+  static handle from_cpp(fretwave::python::Petsc<T> source, rv_policy, cleanup_list*) noexcept { return fretwave::python::to_petsc4py(source.object); }
+};
+
+}  // namespace nanobind::detail

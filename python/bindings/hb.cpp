@@ -1,0 +1,74 @@
+#include "casters.h"
+#include "hb/forced_response.h"
+#include "hb/nonlinear_mode.h"
+
+namespace fretwave::python {
+
+namespace {
+
+nb::dict contact_summary(hb::ContactSummary const& s) {
+  const double samples = std::max(1.0, s.stick + s.slip + s.open);
+  nb::dict out;
+  out["stick"] = s.stick / samples, out["slip"] = s.slip / samples, out["open"] = s.open / samples;
+  out["error_estimate"] = s.total > 0 ? std::sqrt(s.truncated / s.total) : 0.0;
+  out["aliasing"] = s.retained > 0 ? std::sqrt(s.aliased / s.retained) : 0.0;
+  out["work"] = s.work;
+  return out;
+}
+
+/// This rank's samples, one (u, v, f) a contact, each samples x components x pairs.
+nb::list contact_periods(hb::HarmonicProblem& problem, Petsc<Vec> y) {
+  nb::list out;
+  const auto periods = problem.contact_periods(y.object);
+  for (size_t k = 0; k < periods.size(); ++k) {
+    auto const& law = *problem.model().contacts()[k].law;
+    const std::vector<size_t> shape = {size_t(problem.harmonics().samples()), size_t(law.components()), size_t(law.pairs())};
+    out.append(nb::make_tuple(numpy_copy(periods[k].u.data(), shape), numpy_copy(periods[k].v.data(), shape), numpy_copy(periods[k].f.data(), shape)));
+  }
+  return out;
+}
+
+}  // namespace
+
+void bind_hb(nb::module_& m) {
+  using namespace hb;
+  nb::class_<Harmonics>(m, "Harmonics")
+      .def(nb::init<std::vector<int>, int>())
+      .def_prop_ro("orders", &Harmonics::orders)
+      .def_prop_ro("samples", &Harmonics::samples)
+      .def_prop_ro("block_size", &Harmonics::block_size)
+      .def_prop_ro("odd_only", &Harmonics::odd_only);
+  nb::class_<HarmonicProblem, solve::Problem>(m, "HarmonicProblem")
+      .def("coefficients", [](HarmonicProblem& p, Petsc<Vec> y) {
+        VecHandle Q = p.coefficients(y.object);
+        return nb::steal(to_petsc4py(Q));
+      })
+      .def("summary", [](HarmonicProblem& p, Petsc<Vec> y) { return contact_summary(p.summarise(y.object)); })
+      .def("contact_periods", contact_periods)
+      .def("exponents", [](HarmonicProblem& p, Petsc<Vec> y) { return p.exponents(y.object).s; });
+  nb::enum_<Method>(m, "Method").value("CNM", Method::CNM).value("EPMC", Method::EPMC);
+  nb::class_<NonlinearMode, HarmonicProblem>(m, "NonlinearMode")
+      .def("__init__",
+           [](NonlinearMode* self, model::Model const& model, Harmonics const& h, Method method, int dof, double omega, Petsc<Vec> shape) {
+             new (self) NonlinearMode(model, h, method, dof, omega, shape.object);
+           },
+           nb::keep_alive<1, 2>())
+      .def("initial", [](NonlinearMode& p, double a) { return nb::steal(to_petsc4py(p.initial(a))); })
+      .def("state", [](NonlinearMode& p, Petsc<Vec> y) {
+        const auto s = p.state(y.object);
+        return nb::make_tuple(s.amplitude, s.omega, s.omega0, s.beta, s.zeta);
+      });
+  nb::class_<ForcedResponse, HarmonicProblem>(m, "ForcedResponse")
+      .def("__init__",
+           [](ForcedResponse* self, model::Model const& model, Harmonics const& h, int dof, Petsc<Vec> P, double level, double omega, Petsc<Vec> shape) {
+             new (self) ForcedResponse(model, h, dof, P.object, level, omega, shape.object);
+           },
+           nb::keep_alive<1, 2>())
+      .def("initial", [](ForcedResponse& p, double omega) { return nb::steal(to_petsc4py(p.initial(omega))); })
+      .def("state", [](ForcedResponse& p, Petsc<Vec> y) {
+        const auto s = p.state(y.object);
+        return nb::make_tuple(s.level, s.omega, s.amplitude, s.phase);
+      });
+}
+
+}  // namespace fretwave::python

@@ -1,0 +1,52 @@
+#include <slepcsys.h>
+
+#include "casters.h"
+#include "error.h"
+
+namespace fretwave::python {
+
+namespace {
+
+/// C++ errors become the package's own: fretwave.errors.InputError and FretwaveError.
+void translate(std::exception_ptr const& pointer, void*) {
+  const auto raise = [](char const* name, nb::object error) {
+    PyErr_SetObject(nb::module_::import_("fretwave.errors").attr(name).ptr(), error.ptr());
+  };
+  const auto text = [](std::string const& s) -> nb::object { return s.empty() ? nb::none() : nb::object(nb::cast(s)); };
+  try {
+    std::rethrow_exception(pointer);
+  } catch (InputError const& e) {
+    nb::object type = nb::module_::import_("fretwave.errors").attr("InputError");
+    raise("InputError", type(e.what(), nb::none(), text(e.measured), text(e.expected), text(e.fix)));
+  } catch (PetscFailure const& e) {
+    nb::object type = nb::module_::import_("fretwave.errors").attr("FretwaveError");
+    raise("FretwaveError", type(e.what()));
+  }
+}
+
+/// Options given but read by nothing: most often misspelt.
+std::vector<std::string> unused_options() {
+  PetscInt n;
+  char **names, **values;
+  check(PetscOptionsLeftGet(nullptr, &n, &names, &values));
+  std::vector<std::string> out(names, names + n);
+  check(PetscOptionsLeftRestore(nullptr, &n, &names, &values));
+  return out;
+}
+
+}  // namespace
+
+NB_MODULE(_core, m) {
+  import_petsc4py_module();  // initialises PETSc
+  check(SlepcInitializeNoArguments());
+  nb::register_exception_translator(translate);
+  m.doc() = "C++ core of fretwave; use the package's own classes";
+  m.def("unused_options", unused_options, "PETSc options that were set and that nothing has read.");
+  bind_contact(m);
+  bind_model(m);
+  bind_solve(m);
+  bind_hb(m);
+  bind_transient(m);
+}
+
+}  // namespace fretwave::python

@@ -1,0 +1,68 @@
+#include "casters.h"
+#include "solve/continuation.h"
+
+namespace fretwave::python {
+
+namespace {
+
+nb::object to_python(std::optional<solve::Point> const& p) {
+  if (!p) return nb::none();
+  nb::dict out;
+  out["index"] = p->index, out["y"] = Petsc<Vec>{p->y}, out["tangent"] = Petsc<Vec>{p->tangent};
+  out["parameter"] = p->parameter, out["step"] = p->step, out["event"] = p->event, out["wall_s"] = p->wall;
+  out["newton"] = p->outcome.newton, out["linear"] = p->outcome.linear, out["residual"] = p->outcome.residual;
+  return out;
+}
+
+}  // namespace
+
+void bind_solve(nb::module_& m) {
+  using namespace solve;
+  nb::class_<Problem>(m, "Problem")
+      .def("unknowns", [](Problem& p) { return nb::steal(to_petsc4py(p.unknowns())); })
+      .def("equations", [](Problem& p) { return nb::steal(to_petsc4py(p.equations())); })
+      .def("residual", [](Problem& p, Petsc<Vec> y, Petsc<Vec> r) { p.residual(y.object, r.object); })
+      .def("product", [](Problem& p, Petsc<Vec> y, Petsc<Vec> dy, Petsc<Vec> dr) { p.product(y.object, dy.object, dr.object); })
+      .def("jacobian", [](Problem& p, Petsc<Vec> y) { return nb::steal(to_petsc4py(assemble(p, y.object))); })
+      .def("parameter_entry", &Problem::parameter_entry)
+      .def("parameter_value", &Problem::parameter_value);
+  nb::class_<StepControl>(m, "StepControl")
+      .def(nb::init<>())
+      .def_rw("initial", &StepControl::initial)
+      .def_rw("minimum", &StepControl::minimum)
+      .def_rw("maximum", &StepControl::maximum)
+      .def_rw("target_newton", &StepControl::target_newton)
+      .def_rw("max_angle", &StepControl::max_angle)
+      .def_rw("max_points", &StepControl::max_points);
+  nb::class_<Bordered>(m, "Bordered")
+      .def("close", [](Bordered& b, Petsc<Vec> row, double value) { b.close(row.object, value); })
+      .def("residual", [](Bordered& b, Petsc<Vec> y, Petsc<Vec> g) { b.residual(y.object, g.object); })
+      .def("product", [](Bordered& b, Petsc<Vec> y, Petsc<Vec> dy, Petsc<Vec> dg) { b.product(y.object, dy.object, dg.object); })
+      .def("jacobian", [](Bordered& b, Petsc<Vec> y) {
+        MatHandle J = b.matrix();
+        b.assemble(y.object, J);
+        return nb::steal(to_petsc4py(J));
+      });
+  nb::class_<Newton>(m, "Newton")
+      .def(nb::init<Problem&, std::string const&>(), nb::keep_alive<1, 2>())
+      .def_prop_ro("system", &Newton::system, nb::rv_policy::reference_internal)
+      .def_prop_ro("snes", [](Newton& n) { return nb::steal(to_petsc4py(n.snes())); })
+      .def("solve", [](Newton& n, Petsc<Vec> y) {
+        const Outcome o = n.solve(y.object);
+        return nb::make_tuple(o.converged, o.newton, o.linear, o.residual, o.reason);
+      });
+  nb::class_<Continuation>(m, "Continuation")
+      .def(nb::init<Problem&, std::string const&, double, double, StepControl, std::vector<double>>(), nb::keep_alive<1, 2>())
+      .def("start", [](Continuation& c, Petsc<Vec> y, bool upwards) { return to_python(c.start(y.object, upwards)); })
+      .def("restore", [](Continuation& c, Petsc<Vec> y, Petsc<Vec> t, double step, int index, int emitted) { c.restore(y.object, t.object, step, index, emitted); })
+      .def("next", [](Continuation& c) { return to_python(c.next()); })
+      .def_prop_ro("reason", &Continuation::reason)
+      .def_prop_ro("converged", &Continuation::converged)
+      .def_prop_ro("snes", [](Continuation& c) { return nb::steal(to_petsc4py(c.newton().snes())); })
+      .def("anchor", [](Continuation& c) {
+        auto const& a = c.anchor();
+        return nb::make_tuple(Petsc<Vec>{a.y}, Petsc<Vec>{a.tangent}, a.step, a.index, c.emitted());
+      });
+}
+
+}  // namespace fretwave::python

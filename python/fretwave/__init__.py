@@ -1,0 +1,57 @@
+"""fretwave: nonlinear dynamics of bladed disks with friction contact, in parallel."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from .errors import FretwaveError, InputError, NotConverged
+
+if TYPE_CHECKING:
+    from .continuation import Continuation, Point, StepControl
+    from .laws import LawInfo, ParameterInfo, PythonLaw, laws
+    from .model import Contact, Model
+    from .modes import LinearMode, linear_modes
+    from .problems import ForcedResponse, Harmonics, NonlinearMode, choose_harmonics
+    from .transient import Transient
+
+#: Where each public name lives; loaded when first used, so that `fretwave --help` starts without PETSc.
+_HOMES = {
+    "continuation": ("Continuation", "Point", "StepControl"),
+    "laws": ("LawInfo", "ParameterInfo", "PythonLaw", "laws"),
+    "model": ("Contact", "Model"),
+    "modes": ("LinearMode", "linear_modes"),
+    "problems": ("ForcedResponse", "Harmonics", "NonlinearMode", "choose_harmonics"),
+    "transient": ("Transient",),
+}
+_HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
+
+__all__ = [
+    "Contact",
+    "Continuation",
+    "ForcedResponse",
+    "FretwaveError",
+    "Harmonics",
+    "InputError",
+    "LawInfo",
+    "LinearMode",
+    "Model",
+    "NonlinearMode",
+    "NotConverged",
+    "ParameterInfo",
+    "Point",
+    "PythonLaw",
+    "StepControl",
+    "Transient",
+    "choose_harmonics",
+    "laws",
+    "linear_modes",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME_OF:
+        raise AttributeError(f"module 'fretwave' has no attribute '{name}'")
+    value = getattr(import_module(f".{_HOME_OF[name]}", __name__), name)
+    globals()[name] = value  # `laws` is a module and a function of the same name: the function is the public one
+    return value

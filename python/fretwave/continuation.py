@@ -1,0 +1,165 @@
+"""Branches: pseudo-arclength continuation as a generator of points."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from petsc4py import PETSc
+
+from . import _core
+from .errors import InputError
+from .problems import HarmonicProblem
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class StepControl:
+    """Arclength steps; 0.1 is about a tenth of the motion's own size, or of log amplitude.
+
+    Attributes
+    ----------
+    target_newton : steps grow below this many iterations and shrink above
+    max_angle : largest turn [rad] of the branch in one step; longer steps are halved
+    """
+
+    initial: float = 0.05
+    minimum: float = 1e-9
+    maximum: float = 0.3
+    target_newton: int = 4
+    max_angle: float = 0.6
+    max_points: int = 5000
+
+    def core(self) -> Any:
+        """The compiled twin."""
+        steps = _core.StepControl()
+        for name, value in vars(self).items():
+            setattr(steps, name, value)
+        return steps
+
+
+@dataclass
+class Point:
+    """A converged point of a branch. `y` and `tangent` are the caller's to keep or destroy.
+
+    Attributes
+    ----------
+    parameter : amplitude (modes) or omega (forced response)
+    event : "", start, stop, report, fold, zero_damping or peak_damping
+    step : arclength from the last regular point
+    wall_s : seconds since the point before
+    """
+
+    index: int
+    y: PETSc.Vec
+    tangent: PETSc.Vec
+    parameter: float
+    step: float
+    event: str
+    newton: int
+    linear: int
+    residual: float
+    wall_s: float
+
+
+class Continuation:
+    """Follows a problem's branch from y0 until its parameter leaves (low, high). Collective.
+
+    Parameters
+    ----------
+    y0 : Vec
+        First guess; Newton runs at its parameter.
+    stop : (low, high)
+        The last point lies on the value the branch reaches.
+    report_at : parameter values at which points are located
+    upwards : the parameter grows at first
+    """
+
+    def __init__(
+        self,
+        problem: HarmonicProblem,
+        y0: PETSc.Vec,
+        stop: tuple[float, float],
+        steps: StepControl | None = None,
+        report_at: Sequence[float] = (),
+        upwards: bool | None = None,
+    ) -> None:
+        low, high = stop
+        if not low < high:
+            raise InputError("the range of the branch is empty", None, f"({low}, {high})", "low < high", "order the two stop values")
+        self.problem, self._y0 = problem, y0
+        self._core = _core.Continuation(problem.core, problem.prefix, low, high, (steps or StepControl()).core(), list(report_at))
+        if upwards is None:
+            start = self._parameter(y0)
+            upwards = start < 0.5 * (low + high)
+        self._upwards, self._restored = upwards, False
+
+    def _parameter(self, y: PETSc.Vec) -> float:
+        last = self.problem.model.comm.size - 1
+        local = y.getArray(readonly=True)
+        return float(self.problem.core.parameter_value(self.problem.model.comm.bcast(local[-1] if len(local) else 0.0, root=last)))
+
+    def __iter__(self) -> Iterator[Point]:
+        point = self._core.next() if self._restored else self._core.start(self._y0, self._upwards)
+        while point is not None:
+            yield Point(**point)
+            point = self._core.next()
+
+    @property
+    def converged(self) -> bool:
+        """The branch ended as asked."""
+        return bool(self._core.converged)
+
+    @property
+    def reason(self) -> str:
+        """Why the branch ended."""
+        return str(self._core.reason)
+
+    @property
+    def snes(self) -> PETSc.SNES:
+        """The corrector, to look into or to set options on."""
+        return self._core.snes
+
+    def snapshot(self) -> dict[str, Any] | None:
+        """All that `restore` needs to go on bit for bit; on rank 0. Collective."""
+        y, tangent, step, index, emitted = self._core.anchor()
+        parts = [self.problem.model.comm.gather(v.getArray(readonly=True).copy()) for v in (y, tangent)]
+        if self.problem.model.comm.rank:
+            return None
+        whole = [np.concatenate(p) for p in parts if p is not None]
+        return {"y": whole[0], "tangent": whole[1], "step": step, "index": index, "emitted": emitted}
+
+    @classmethod
+    def restore(
+        cls,
+        problem: HarmonicProblem,
+        snapshot: dict[str, Any] | None,
+        stop: tuple[float, float],
+        steps: StepControl | None = None,
+        report_at: Sequence[float] = (),
+    ) -> Continuation:
+        """Goes on after the snapshot's point, on any number of ranks; `snapshot` is needed on rank 0 only. Collective."""
+        snapshot = problem.model.comm.bcast(snapshot)
+        assert snapshot is not None
+        y, tangent = (cls._scatter(problem, np.asarray(snapshot[name])) for name in ("y", "tangent"))
+        branch = cls(problem, y, stop, steps, report_at, upwards=True)
+        branch._core.restore(y, tangent, float(snapshot["step"]), int(snapshot["index"]), int(snapshot["emitted"]))
+        branch._restored = True
+        return branch
+
+    @staticmethod
+    def _scatter(problem: HarmonicProblem, whole: Array) -> PETSc.Vec:
+        v = problem.core.unknowns()
+        if v.getSize() != len(whole):
+            raise InputError("the saved state is of another problem", None, len(whole), v.getSize(), "resume with the same case")
+        begin, end = v.getOwnershipRange()
+        v.setArray(whole[begin:end])
+        return v
+
+    def destroy(self) -> None:
+        """Free the solver. Collective."""
+        self._core = None

@@ -1,0 +1,59 @@
+"""Linear modes: the asymptotes of every backbone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _core
+from .errors import InputError
+from .model import Model
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class LinearMode:
+    """A linear mode, lambda = -beta + i omega.
+
+    Attributes
+    ----------
+    omega, beta : float [1/s]
+    shape : (n_dof,) real part of the mode shape, on every rank (unit modal mass when undamped)
+    imaginary : (n_dof,)
+    """
+
+    omega: float
+    beta: float
+    shape: Array
+    imaginary: Array
+
+    @property
+    def zeta(self) -> float:
+        """Modal damping ratio beta / |lambda|."""
+        return self.beta / float(np.hypot(self.beta, self.omega)) if self.omega else 0.0
+
+    @property
+    def frequency_hz(self) -> float:
+        """omega / 2 pi [Hz]."""
+        return self.omega / (2 * np.pi)
+
+
+def linear_modes(model: Model, count: int = 6, contact: str = "stuck") -> list[LinearMode]:
+    """Lowest linear modes, by SLEPc. Collective.
+
+    Parameters
+    ----------
+    contact : {"stuck", "free", "linearised"}
+        Closed contact without slip; no contact force; the laws' tangents at rest (damped, with C).
+    """
+    if contact not in ("stuck", "free", "linearised"):
+        raise InputError("unknown state of contact", None, contact, "stuck, free or linearised", 'use contact="stuck"')
+    found = _core.linear_modes(model.core, count, getattr(_core.ContactState, contact))
+    return [LinearMode(omega, beta, _whole(model, re), _whole(model, im)) for omega, beta, re, im in found]
+
+
+def _whole(model: Model, vec: object) -> Array:
+    return np.concatenate(model.comm.allgather(vec.getArray(readonly=True).copy()))  # type: ignore[attr-defined]

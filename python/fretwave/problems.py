@@ -1,0 +1,230 @@
+"""Nonlinear modes and forced response by harmonic balance: the problems that continuation follows."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from petsc4py import PETSc
+
+from . import _core
+from .errors import InputError
+from .model import Model
+from .modes import LinearMode
+
+Array = npt.NDArray[np.float64]
+
+
+class Harmonics:
+    """The retained harmonics and the number of time samples of a period.
+
+    Parameters
+    ----------
+    orders : ascending, with 1 among them (0 is the mean)
+    samples : even, at least 2 max(orders) + 2
+    """
+
+    def __init__(self, orders: Sequence[int], samples: int) -> None:
+        self.core = _core.Harmonics(list(orders), samples)
+        self.orders: tuple[int, ...] = tuple(self.core.orders)
+        self.samples: int = samples
+        self.block_size: int = self.core.block_size
+        self.labels = [label for n in self.orders for label in (["0"] if n == 0 else [f"{n}c", f"{n}s"])]
+        self.left_out: list[str] = []
+
+
+def choose_harmonics(model: Model, highest: int, samples: int | None = None, retain: str = "auto") -> Harmonics:
+    """Retained set up to `highest`: only what the model needs, unless told otherwise.
+
+    Parameters
+    ----------
+    samples : default: the power of two from 16 `highest` up, 64 at least.
+    retain : {"auto", "odd", "all"}
+        auto keeps odd harmonics only when every law is odd and nothing preloads the contact.
+    """
+    if highest < 1:
+        raise InputError("the highest harmonic is below 1", None, highest, ">= 1", "give H = 1 or more")
+    odd = retain == "odd" or (retain == "auto" and model.odd)
+    harmonics = Harmonics(
+        [n for n in range(highest + 1) if n % 2 or not odd], samples or max(64, 1 << (16 * highest - 1).bit_length())
+    )
+    if odd:
+        harmonics.left_out.append("even harmonics and the mean (the contact laws are odd, there is no preload)")
+    return harmonics
+
+
+class HarmonicProblem:
+    """N equations in N + 1 unknowns y: scaled harmonic coefficients, then scalars, the continuation parameter last."""
+
+    def __init__(self, model: Model, harmonics: Harmonics, prefix: str, core: Any) -> None:
+        self.model, self.harmonics, self.prefix, self.core = model, harmonics, prefix, core
+
+    def residual(self, y: PETSc.Vec) -> PETSc.Vec:
+        """r(y), dimensionless, N entries. Collective."""
+        r = self.core.equations()
+        self.core.residual(y, r)
+        return r
+
+    def jacobian(self, y: PETSc.Vec) -> PETSc.Mat:
+        """dr/dy assembled, N x (N + 1) AIJ. Collective."""
+        return self.core.jacobian(y)
+
+    def jacobian_product(self, y: PETSc.Vec, dy: PETSc.Vec) -> PETSc.Vec:
+        """dr/dy dy, matrix-free. Collective."""
+        r = self.core.equations()
+        self.core.product(y, dy, r)
+        return r
+
+    def coefficients(self, y: PETSc.Vec) -> Array | None:
+        """Harmonic coefficients Q (n_dof, m) in physical units, columns `harmonics.labels`, on rank 0. Collective."""
+        parts = self.model.comm.gather(self.core.coefficients(y).getArray(readonly=True).copy())
+        return None if parts is None else np.concatenate(parts).reshape(-1, self.harmonics.block_size)
+
+    def diagnostics(self, y: PETSc.Vec) -> dict[str, float]:
+        """Contact of this motion. Collective.
+
+        Returns
+        -------
+        dict
+            stick, slip, open : shares of all pair-samples; error_estimate : share (2-norm) of the contact force outside
+            the retained harmonics; aliasing : relative change of the retained force coefficients on doubled samples;
+            work : energy dissipated by contact in a period.
+        """
+        return dict(self.core.summary(y))
+
+    def contact_period(self, y: PETSc.Vec) -> list[dict[str, Array | None]]:
+        """Relative displacement u, velocity v and force f (n_samples, components, n_pairs) per contact, on rank 0. Collective."""
+        return [
+            {name: self.model.gather_pairs(k, samples) for name, samples in zip("uvf", period)}
+            for k, period in enumerate(self.core.contact_periods(y))
+        ]
+
+    def dof_period(self, y: PETSc.Vec, n: int = 256) -> dict[str, Array] | None:
+        """Displacement x and velocity v (n, n_dof) over one period, on rank 0. Collective."""
+        Q, s = self.coefficients(y), self.core.exponents(y)
+        if Q is None:
+            return None
+        tau = 2 * np.pi * np.arange(n) / n
+        x, v = np.zeros((n, len(Q))), np.zeros((n, len(Q)))
+        column = 0
+        for order, exponent in zip(self.harmonics.orders, s):
+            q = Q[:, column] - (1j * Q[:, column + 1] if order else 0)
+            column += 2 if order else 1
+            wave = np.exp(1j * order * tau)[:, None] * q
+            x += wave.real
+            v += (exponent * wave).real
+        return {"x": x, "v": v}
+
+    def state(self, y: PETSc.Vec) -> dict[str, float]:
+        """What a table of the branch says of this point. Collective."""
+        raise NotImplementedError
+
+    def destroy(self) -> None:
+        """Free the solver's vectors. Collective."""
+        self.core = None
+
+    def __enter__(self) -> HarmonicProblem:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.destroy()
+
+
+class NonlinearMode(HarmonicProblem):
+    """A nonlinear mode, frequency and damping over the modal amplitude. Collective.
+
+    Parameters
+    ----------
+    method : {"CNM", "EPMC"}
+        Complex nonlinear mode (Laxalde et al. 2008), or extended periodic motion concept (Krack 2015).
+    dof : int
+        The fundamental coefficient of this dof is (a, 0).
+    start : LinearMode
+        Where the branch begins; scales the unknowns.
+    prefix : str
+        Of the PETSc options.
+    """
+
+    def __init__(
+        self, model: Model, harmonics: Harmonics, method: str = "CNM", dof: int = 0, start: LinearMode | None = None, prefix: str = "mode_"
+    ) -> None:
+        if method not in ("CNM", "EPMC"):
+            raise InputError("unknown method", None, method, "CNM or EPMC", 'use method="CNM"')
+        if start is None:
+            from .modes import linear_modes
+
+            start = linear_modes(model, 1)[0]
+        self.method, self.dof, self.start = method, dof, start
+        shape = model.vector(start.shape)
+        core = _core.NonlinearMode(model.core, harmonics.core, getattr(_core.Method, method), dof, start.omega, shape)
+        super().__init__(model, harmonics, prefix, core)
+
+    def initial(self, amplitude: float) -> PETSc.Vec:
+        """The linear mode at this amplitude. Collective."""
+        return self.core.initial(amplitude)
+
+    def state(self, y: PETSc.Vec) -> dict[str, float]:
+        amplitude, omega, omega0, beta, zeta = self.core.state(y)
+        return {
+            "amplitude": amplitude,
+            "omega": omega,
+            "omega0": omega0,
+            "frequency_hz": omega / (2 * np.pi),
+            "beta": beta,
+            "zeta": zeta,
+        }
+
+
+class ForcedResponse(HarmonicProblem):
+    """Steady response to a periodic force over its frequency. Collective.
+
+    Parameters
+    ----------
+    force : dict
+        Order n -> complex (n_dof,), p(t) = level Re sum P_n e^{i n w t}.
+    dof : int
+        Observed.
+    reference : LinearMode
+        Scales the unknowns.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        harmonics: Harmonics,
+        force: Mapping[int, npt.NDArray[Any]],
+        level: float,
+        dof: int,
+        reference: LinearMode,
+        prefix: str = "forced_",
+    ) -> None:
+        self.dof, self.level, self.reference = dof, level, reference
+        shape, P = model.vector(reference.shape), self._blocks(model, harmonics, force)
+        core = _core.ForcedResponse(model.core, harmonics.core, dof, P, level, reference.omega, shape)
+        super().__init__(model, harmonics, prefix, core)
+
+    @staticmethod
+    def _blocks(model: Model, harmonics: Harmonics, force: Mapping[int, npt.NDArray[Any]]) -> PETSc.Vec:
+        blocks = np.zeros((model.n_dof, harmonics.block_size))
+        for order, P in force.items():
+            if order not in harmonics.orders:
+                raise InputError(
+                    "the force has a harmonic that is not retained", None, order, str(harmonics.orders), "retain it: retain = \"all\""
+                )
+            values = np.asarray(P, dtype=complex)
+            column = harmonics.labels.index(f"{order}c" if order else "0")
+            blocks[:, column] = values.real
+            if order:
+                blocks[:, column + 1] = -values.imag
+        local = model.distribute(blocks).ravel().copy()
+        return PETSc.Vec().createWithArray(local, comm=model.comm)
+
+    def initial(self, omega: float) -> PETSc.Vec:
+        """Zero motion at this angular frequency: Newton's first step is the linear response. Collective."""
+        return self.core.initial(omega)
+
+    def state(self, y: PETSc.Vec) -> dict[str, float]:
+        level, omega, amplitude, phase = self.core.state(y)
+        return {"level": level, "omega": omega, "frequency_hz": omega / (2 * np.pi), "amplitude": amplitude, "phase": phase}

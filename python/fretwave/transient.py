@@ -1,0 +1,62 @@
+"""Direct time integration of the unreduced equations with PETSc TS, for verification."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _core
+from .errors import InputError
+from .model import Model
+
+Array = npt.NDArray[np.float64]
+
+
+class Transient:
+    """M x'' + C x' + K x + B^T f = level Re sum P_n e^{i n w t} from given initial conditions. Collective.
+
+    Runge-Kutta 5(4) with step control by default; other explicit types by the option ``-transient_ts_rk_type``.
+    For contact laws that depend on the present motion only.
+
+    Parameters
+    ----------
+    force : dict, optional
+        Order n -> complex (n_dof,).
+    omega : float [rad/s], needed with a force
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        force: Mapping[int, npt.NDArray[Any]] | None = None,
+        level: float = 1.0,
+        omega: float | None = None,
+        prefix: str = "transient_",
+    ) -> None:
+        if force and not omega:
+            raise InputError("a force needs its frequency", None, omega, "omega > 0", "give omega")
+        self.model = model
+        parts = [
+            (order, model.vector(level * np.real(P)), model.vector(-level * np.imag(P))) for order, P in (force or {}).items()
+        ]
+        self._core = _core.Transient(model.core, parts, float(omega or 0.0), prefix)
+
+    def run(
+        self, x0: Array, v0: Array, t_end: float, dt_out: float, rtol: float = 1e-8, limit: float = float("inf")
+    ) -> dict[str, Any]:
+        """Integrate to `t_end`, or until |x| of any dof exceeds `limit`. Collective.
+
+        Returns
+        -------
+        dict
+            t (n,), x and v (n, n_dof) every `dt_out`; steps; finished (False when stopped by `limit`); reason. On every rank.
+        """
+        t, x, v, steps, finished, reason = self._core.run(
+            self.model.vector(x0), self.model.vector(v0), t_end, dt_out, rtol, limit
+        )
+        gather = self.model.comm.allgather
+        whole = {name: np.concatenate(gather(local), axis=1) for name, local in (("x", x), ("v", v))}
+        return {"t": t, **whole, "steps": steps, "finished": finished, "reason": reason}

@@ -1,0 +1,38 @@
+#pragma once
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "contact/law.h"
+
+namespace fretwave::contact {
+
+/// One parameter of a law: the only place of its unit, bound and meaning.
+struct Parameter {
+  std::string name, unit, doc;
+  double lower = 0;
+  bool strict = false;  ///< value must be above, not at, the bound
+  std::optional<double> standard = {};
+};
+
+/// One value per pair for each parameter name.
+using Parameters = std::map<std::string, std::vector<double>>;
+
+struct Entry {
+  std::string name, doc;
+  int components;
+  std::vector<Parameter> parameters;
+  std::function<std::unique_ptr<Law>(Parameters const&)> make;
+};
+
+/// All laws known by name. A new law is its own file and one line here.
+std::span<Entry const> laws();
+
+/// Law by name for the pairs the parameters are given for; InputError for an unknown name or a value out of bounds.
+std::unique_ptr<Law> make_law(std::string const& name, Parameters const&);
+
+}  // namespace fretwave::contact

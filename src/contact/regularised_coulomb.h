@@ -1,0 +1,24 @@
+#pragma once
+#include "contact/registry.h"
+
+namespace fretwave::contact {
+
+/// Regularised Coulomb friction with constant normal load, f = mu N tanh(v / eps) (Laxalde et al. 2008, eq. 2b).
+class RegularisedCoulomb : public Law {
+ public:
+  RegularisedCoulomb(std::vector<double> friction_limit, std::vector<double> regularisation_velocity);
+  int components() const override { return 1; }
+  int pairs() const override { return int(limit_.size()); }
+  bool uses_displacement() const override { return false; }
+  bool odd() const override { return true; }
+  void force(Motion const&, double* f, Record&) const override;
+  /// A sample slips where |v| > 2 eps, i.e. where the force has reached 96 % of mu N.
+  void diagnose(Motion const&, double const* f, Diagnosis&) const override;
+
+ private:
+  std::vector<double> limit_, velocity_;
+};
+
+Entry regularised_coulomb_entry();
+
+}  // namespace fretwave::contact

@@ -1,0 +1,51 @@
+#pragma once
+#include "contact/law.h"
+#include "hb/harmonics.h"
+
+namespace fretwave::hb {
+
+/// Contact quality of one motion: energies for the truncated share, and what the law diagnoses.
+struct ContactSummary {
+  double stick = 0, slip = 0, open = 0;           ///< pair-samples
+  double truncated = 0, total = 0;                ///< force energy outside the retained orders, and in all
+  double aliased = 0, retained = 0;               ///< squared change of the coefficients on doubled samples, and their square
+  double work = 0;                                ///< dissipated energy per period [J]
+};
+
+/// Time samples of a period: samples x components x pairs.
+struct ContactPeriod {
+  std::vector<double> u, v, f;
+};
+
+/// Alternating frequency-time for the contact pairs of this rank: harmonic blocks of relative displacement in, of force out.
+/// Blocks are (pairs x components) x block size. Never communicates.
+class Aft {
+ public:
+  Aft(Harmonics const&, std::shared_ptr<contact::Law const>);
+  int columns() const { return columns_; }
+
+  /// F(U, s) and its linearisation for what follows.
+  void force(double const* U, Exponents const&, double* F);
+  /// dF for dU and dV, the harmonic blocks of the velocity's perturbation.
+  void product(double const* dU, double const* dV, double* dF);
+  /// Dense dF/dU of each pair, pairs x (components m) x (components m), with the velocity's share through s.
+  void blocks(Exponents const&, double* D);
+
+  ContactSummary summarise(double const* U, Exponents const&);
+  ContactPeriod period(double const* U, Exponents const&) const;
+
+ private:
+  contact::Motion motion(double omega) const;
+  void mirror(std::vector<double>& samples, double sign, int columns) const;
+  void toeplitz_hankel(std::vector<double> const& tangent, std::vector<double>& T) const;
+
+  Harmonics harmonics_;
+  std::shared_ptr<contact::Law const> law_;
+  int pairs_, columns_, law_samples_;  ///< law_samples: half a period when half-wave symmetric
+  FourierTransform transform_;
+  FourierTransform tangent_transform_;
+  contact::Record record_;
+  std::vector<double> velocity_, u_, v_, f_, du_, dv_, df_;
+};
+
+}  // namespace fretwave::hb

@@ -1,0 +1,100 @@
+#include "hb/dynamic_stiffness.h"
+
+#include <cmath>
+
+namespace fretwave::hb {
+
+DynamicStiffness::DynamicStiffness(model::Model const& model, Harmonics const& h) : model_(model), harmonics_(h) {
+  for (auto const& term : model.terms()) {
+    blocked_.emplace_back();
+    check(MatCreateMAIJ(term.A, h.block_size(), blocked_.back().out()));
+  }
+  work_ = make_vector(model.comm(), model.local_dofs() * h.block_size());
+}
+
+complex DynamicStiffness::phase(model::Term const& term, int n) const { return std::polar(1.0, -term.phase * n * model_.theta()); }
+
+// Laxalde et al. 2008, eq. 7 in complex form: (K + s C + s^2 M) q; EPMC (Krack 2015) replaces C by C - g M, g = 2 zeta w0.
+std::vector<complex> DynamicStiffness::coefficients(model::Term const& term, Exponents const& e) const {
+  std::vector<complex> c(harmonics_.count());
+  for (int i = 0; i < harmonics_.count(); ++i) {
+    const complex s = e.s[i];
+    c[i] = (term.order == 0 ? 1.0 : term.order == 1 ? s : s * s - e.inertia_damping * s) * phase(term, harmonics_.orders()[i]);
+  }
+  return c;
+}
+
+std::vector<complex> DynamicStiffness::coefficient_derivatives(model::Term const& term, Exponents const& e, Exponents const& change) const {
+  std::vector<complex> c(harmonics_.count());
+  for (int i = 0; i < harmonics_.count(); ++i) {
+    const complex s = e.s[i], ds = change.s[i];
+    const complex d = term.order == 0 ? 0.0 : term.order == 1 ? ds : (2.0 * s - e.inertia_damping) * ds - change.inertia_damping * s;
+    c[i] = d * phase(term, harmonics_.orders()[i]);
+  }
+  return c;
+}
+
+void DynamicStiffness::accumulate(std::vector<complex> const& c, Mat A, Vec x, Vec y) {
+  {
+    ReadArray in(x);
+    WriteArray out(work_);
+    multiply(harmonics_, c, in.data(), out.data(), int(model_.local_dofs()));
+  }
+  check(MatMultAdd(A, work_, y, y));
+}
+
+void DynamicStiffness::multiply_add(Exponents const& e, Vec x, Vec y) {
+  for (size_t j = 0; j < blocked_.size(); ++j) accumulate(coefficients(model_.terms()[j], e), blocked_[j], x, y);
+}
+
+void DynamicStiffness::derivative_multiply_add(Exponents const& e, Exponents const& change, Vec x, Vec y) {
+  for (size_t j = 0; j < blocked_.size(); ++j)
+    if (model_.terms()[j].order > 0) accumulate(coefficient_derivatives(model_.terms()[j], e, change), blocked_[j], x, y);
+}
+
+std::vector<DynamicStiffness::Entry> DynamicStiffness::entries(Mat A) const {
+  std::vector<Entry> out;
+  PetscInt begin, end;
+  check(MatGetOwnershipRange(A, &begin, &end));
+  for (PetscInt row = begin; row < end; ++row) {
+    PetscInt n;
+    PetscInt const* cols;
+    PetscScalar const* vals;
+    check(MatGetRow(A, row, &n, &cols, &vals));
+    for (PetscInt k = 0; k < n; ++k) out.push_back({row, cols[k], vals[k]});
+    check(MatRestoreRow(A, row, &n, &cols, &vals));
+  }
+  return out;
+}
+
+void DynamicStiffness::pattern(std::vector<PetscInt>& rows, std::vector<PetscInt>& cols) const {
+  entries_.clear();
+  const PetscInt m = harmonics_.block_size();
+  const auto place = [&](PetscInt row, PetscInt col) { rows.push_back(row), cols.push_back(col); };
+  for (auto const& term : model_.terms()) {
+    entries_.push_back(entries(term.A));
+    for (auto const& entry : entries_.back())
+      for (int i = 0; i < harmonics_.count(); ++i) {
+        const PetscInt row = entry.row * m + harmonics_.offset(i), col = entry.col * m + harmonics_.offset(i);
+        place(row, col);
+        if (harmonics_.orders()[i] == 0) continue;
+        place(row, col + 1), place(row + 1, col), place(row + 1, col + 1);
+      }
+  }
+}
+
+double* DynamicStiffness::values(Exponents const& e, double scale, double* v) const {
+  for (size_t j = 0; j < entries_.size(); ++j) {
+    const auto c = coefficients(model_.terms()[j], e);
+    for (auto const& entry : entries_[j])
+      for (int i = 0; i < harmonics_.count(); ++i) {
+        const complex a = scale * entry.value * c[i];
+        *v++ = a.real();
+        if (harmonics_.orders()[i] == 0) continue;
+        *v++ = a.imag(), *v++ = -a.imag(), *v++ = a.real();
+      }
+  }
+  return v;
+}
+
+}  // namespace fretwave::hb

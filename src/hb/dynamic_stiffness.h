@@ -1,0 +1,41 @@
+#pragma once
+#include <optional>
+
+#include "hb/harmonics.h"
+#include "model/model.h"
+
+namespace fretwave::hb {
+
+/// Z = sum over the linear terms of A (x) c_n, c_n = s_n^p e^{-i k n theta}; with inertia damping g the mass takes s^2 - g s.
+class DynamicStiffness {
+ public:
+  DynamicStiffness(model::Model const&, Harmonics const&);
+  /// y += Z x on harmonic-block vectors. Collective.
+  void multiply_add(Exponents const&, Vec x, Vec y);
+  /// y += dZ x for a change (ds, dg) of the exponents. Collective.
+  void derivative_multiply_add(Exponents const&, Exponents const& change, Vec x, Vec y);
+  /// c_n of one term.
+  std::vector<complex> coefficients(model::Term const&, Exponents const&) const;
+  std::vector<complex> coefficient_derivatives(model::Term const&, Exponents const&, Exponents const& change) const;
+
+  /// Places of the entries in the harmonic-block matrix (this rank's rows), and their values in the same order, scaled.
+  void pattern(std::vector<PetscInt>& rows, std::vector<PetscInt>& cols) const;
+  double* values(Exponents const&, double scale, double* v) const;
+
+ private:
+  struct Entry {
+    PetscInt row, col;
+    double value;
+  };
+  complex phase(model::Term const&, int n) const;
+  void accumulate(std::vector<complex> const& c, Mat A, Vec x, Vec y);
+  std::vector<Entry> entries(Mat A) const;
+
+  model::Model const& model_;
+  Harmonics harmonics_;
+  std::vector<MatHandle> blocked_;  ///< A (x) I_m
+  mutable std::vector<std::vector<Entry>> entries_;
+  VecHandle work_;
+};
+
+}  // namespace fretwave::hb

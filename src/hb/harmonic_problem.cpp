@@ -1,0 +1,160 @@
+#include "hb/harmonic_problem.h"
+
+#include <algorithm>
+
+#include "error.h"
+
+namespace fretwave::hb {
+
+namespace {
+
+/// y += f x for exponents.
+void add(Exponents& y, double f, Exponents const& x) {
+  for (size_t i = 0; i < y.s.size(); ++i) y.s[i] += f * x.s[i];
+  y.inertia_damping += f * x.inertia_damping;
+}
+
+}  // namespace
+
+HarmonicProblem::HarmonicProblem(model::Model const& model, Harmonics const& h, int scalars, PetscInt dof, double reference_stiffness)
+    : residual_(model, h), scalars_(scalars), dof_(dof), local_block_(model.local_dofs() * h.block_size()), stiffness_(reference_stiffness) {
+  if (dof < 0 || dof >= model.dofs())
+    throw InputError("the chosen dof does not exist", std::to_string(dof), "0 to " + std::to_string(model.dofs() - 1), "choose a dof of the model");
+  q_ = residual_.vector();
+  for (auto* v : {&Q_, &dQ_, &R_, &dR_, &excitation_}) *v = like(q_);
+  check(VecSet(excitation_, 0));
+  last_ = unknowns();
+}
+
+bool HarmonicProblem::owns_dof() const { return dof_ >= model().first_dof() && dof_ < model().first_dof() + model().local_dofs(); }
+
+std::vector<double> HarmonicProblem::scalars(Vec y) {
+  std::vector<double> z(scalars_ + 2, 0.0);
+  ReadArray in(y);
+  if (last_rank()) std::copy_n(in.data() + local_block_, scalars_, z.begin());
+  if (owns_dof()) std::copy_n(in.data() + (dof_ - model().first_dof()) * harmonics().block_size() + harmonics().offset(harmonics().fundamental()), 2, z.begin() + scalars_);
+  MPI_Allreduce(MPI_IN_PLACE, z.data(), int(z.size()), MPI_DOUBLE, MPI_SUM, comm());
+  return z;
+}
+
+void HarmonicProblem::unpack(Vec y) {
+  z_ = scalars(y);
+  motion_ = motion(z_);
+  {
+    ReadArray in(y);
+    std::copy_n(in.data(), local_block_, WriteArray(q_).data());
+  }
+  check(VecCopy(q_, Q_));
+  check(VecScale(Q_, motion_.amplitude));
+}
+
+void HarmonicProblem::residual(Vec y, Vec r) {
+  unpack(y);
+  residual_.evaluate(Q_, motion_.exponents, R_);
+  check(VecAXPY(R_, -1, excitation_));
+  check(VecScale(R_, 1 / (stiffness_ * motion_.amplitude)));
+  check(VecCopy(y, last_));
+  linearised_ = true;
+  WriteArray out(r);
+  ReadArray in(R_);
+  std::copy_n(in.data(), local_block_, out.data());
+  if (!last_rank() || !normalised()) return;
+  out[local_block_] = z_[scalars_] - 1;
+  out[local_block_ + 1] = z_[scalars_ + 1];
+}
+
+/// Line searches evaluate elsewhere: the point of linearisation is y, whatever was evaluated last.
+void HarmonicProblem::linearise(Vec y) {
+  PetscBool same = PETSC_FALSE;
+  if (linearised_) check(VecEqual(y, last_, &same));
+  if (same) return;
+  VecHandle unused = equations();
+  residual(y, unused);
+}
+
+// Q = a q: dQ = a (dq + q dlog a); r = R / (k a): dr = dR / (k a) - r dlog a
+void HarmonicProblem::product(Vec y, Vec dy, Vec dr) {
+  linearise(y);
+  const auto dz = scalars(dy);
+  Exponents de{std::vector<complex>(harmonics().count()), 0};
+  double dlog = 0;
+  for (int j = 0; j < scalars_; ++j) {
+    add(de, dz[j], motion_.dexponents[j]);
+    dlog += dz[j] * motion_.dlog_amplitude[j];
+  }
+  {
+    ReadArray in(dy);
+    std::copy_n(in.data(), local_block_, WriteArray(dQ_).data());
+  }
+  check(VecAXPBY(dQ_, motion_.amplitude * dlog, motion_.amplitude, q_));
+  residual_.product(dQ_, &de, dR_);
+  check(VecAXPBY(dR_, -dlog, 1 / (stiffness_ * motion_.amplitude), R_));
+  WriteArray out(dr);
+  ReadArray in(dR_);
+  std::copy_n(in.data(), local_block_, out.data());
+  if (!last_rank() || !normalised()) return;
+  out[local_block_] = dz[scalars_];
+  out[local_block_ + 1] = dz[scalars_ + 1];
+}
+
+void HarmonicProblem::pattern(std::vector<PetscInt>& rows, std::vector<PetscInt>& cols) {
+  residual_.pattern(rows, cols);
+  const PetscInt first = model().first_dof() * harmonics().block_size(), all = model().dofs() * harmonics().block_size();
+  for (int j = 0; j < scalars_; ++j)
+    for (PetscInt i = 0; i < local_block_; ++i) rows.push_back(first + i), cols.push_back(all + j);
+  if (!normalised() || !owns_dof()) return;
+  for (int j = 0; j < 2; ++j) rows.push_back(all + j), cols.push_back(dof_ * harmonics().block_size() + harmonics().offset(harmonics().fundamental()) + j);
+}
+
+void HarmonicProblem::column(int j, double* v) {
+  const double dlog = motion_.dlog_amplitude[j];
+  check(VecCopy(Q_, dQ_));
+  check(VecScale(dQ_, dlog));
+  residual_.product(dlog ? Vec(dQ_) : nullptr, &motion_.dexponents[j], dR_);
+  check(VecAXPBY(dR_, -dlog, 1 / (stiffness_ * motion_.amplitude), R_));
+  ReadArray in(dR_);
+  std::copy_n(in.data(), local_block_, v);
+}
+
+void HarmonicProblem::values(Vec y, std::span<double> v) {
+  linearise(y);
+  double* next = residual_.values(1 / stiffness_, v.data());
+  for (int j = 0; j < scalars_; ++j, next += local_block_) column(j, next);
+  if (normalised() && owns_dof()) next[0] = next[1] = 1;
+}
+
+/// Motion counts relative to its own size, so that a step is a share of it whatever the mesh.
+void HarmonicProblem::metric(Vec y, Vec weights) {
+  ReadArray in(y);
+  double square = 0;
+  for (PetscInt i = 0; i < local_block_; ++i) square += in[i] * in[i];
+  MPI_Allreduce(MPI_IN_PLACE, &square, 1, MPI_DOUBLE, MPI_SUM, comm());
+  WriteArray out(weights);
+  std::fill_n(out.data(), local_block_, 1 / square);
+  if (last_rank())
+    for (int j = 0; j < scalars_; ++j) out[local_block_ + j] = metric_weight(j);
+}
+
+VecHandle HarmonicProblem::pack(Vec q, std::vector<double> const& z) const {
+  VecHandle y = unknowns();
+  WriteArray out(y);
+  ReadArray in(q);
+  std::copy_n(in.data(), local_block_, out.data());
+  if (last_rank()) std::copy_n(z.begin(), scalars_, out.data() + local_block_);
+  return y;
+}
+
+VecHandle HarmonicProblem::coefficients(Vec y) {
+  VecHandle Q = residual_.vector();
+  const auto m = motion(scalars(y));
+  ReadArray in(y);
+  WriteArray out(Q);
+  for (PetscInt i = 0; i < local_block_; ++i) out[i] = m.amplitude * in[i];
+  return Q;
+}
+
+ContactSummary HarmonicProblem::summarise(Vec y) { return residual_.summarise(coefficients(y), exponents(y)); }
+
+std::vector<ContactPeriod> HarmonicProblem::contact_periods(Vec y) { return residual_.periods(coefficients(y), exponents(y)); }
+
+}  // namespace fretwave::hb

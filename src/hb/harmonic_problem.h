@@ -1,0 +1,65 @@
+#pragma once
+#include <optional>
+
+#include "hb/residual.h"
+#include "solve/problem.h"
+
+namespace fretwave::hb {
+
+/// What a variant's scalar unknowns z mean: motion Q = a q, exponents s_n, and their derivatives by each scalar.
+struct ScaledMotion {
+  double amplitude = 1;                ///< a
+  Exponents exponents;                 ///< s_n
+  std::vector<double> dlog_amplitude;  ///< d log a / dz_j
+  std::vector<Exponents> dexponents;   ///< d s_n / dz_j
+};
+
+/// y = (q, z): scaled harmonic blocks q = Q / a, then the scalars z on the last rank; z's last entry is the continuation parameter.
+/// Rows (R(a q, s(z)) - P) / (k_ref a), then, on the last rank, q_dof = (1, 0) in the fundamental if there are three scalars (DESIGN fact 4).
+class HarmonicProblem : public solve::Problem {
+ public:
+  HarmonicProblem(model::Model const&, Harmonics const&, int scalars, PetscInt dof, double reference_stiffness);
+  MPI_Comm comm() const override { return residual_.model().comm(); }
+  PetscInt local_equations() const override { return local_block_ + (last_rank() ? scalars_ - 1 : 0); }
+  void residual(Vec y, Vec r) override;
+  void product(Vec y, Vec dy, Vec dr) override;
+  void pattern(std::vector<PetscInt>& rows, std::vector<PetscInt>& cols) override;
+  void values(Vec y, std::span<double> v) override;
+  void metric(Vec y, Vec weights) override;
+
+  Harmonics const& harmonics() const { return residual_.harmonics(); }
+  model::Model const& model() const { return residual_.model(); }
+  PetscInt dof() const { return dof_; }
+  /// Physical coefficients Q = a q as harmonic blocks. Collective.
+  VecHandle coefficients(Vec y);
+  /// (scalars z, fundamental coefficients of the chosen dof in q): on every rank. Collective.
+  std::vector<double> scalars(Vec y);
+  /// Contact of the motion at y, summed over ranks. Collective.
+  ContactSummary summarise(Vec y);
+  std::vector<ContactPeriod> contact_periods(Vec y);
+  Exponents exponents(Vec y) { return motion(scalars(y)).exponents; }
+
+ protected:
+  virtual ScaledMotion motion(std::vector<double> const& z) const = 0;
+  virtual double metric_weight(int /*scalar*/) const { return 1; }
+  Vec excitation() { return excitation_; }  ///< P, zero unless a variant sets it
+  VecHandle pack(Vec q, std::vector<double> const& z) const;
+
+ private:
+  bool normalised() const { return scalars_ > 1; }
+  bool owns_dof() const;
+  void linearise(Vec y);
+  void unpack(Vec y);
+  void column(int j, double* v);
+
+  Residual residual_;
+  int scalars_;
+  PetscInt dof_, local_block_;
+  double stiffness_;
+  VecHandle q_, Q_, dQ_, R_, dR_, excitation_, last_;
+  bool linearised_ = false;
+  std::vector<double> z_;
+  ScaledMotion motion_;
+};
+
+}  // namespace fretwave::hb

@@ -1,0 +1,40 @@
+#pragma once
+#include "hb/harmonic_problem.h"
+
+namespace fretwave::hb {
+
+/// Which exponents the motion of a mode has; all results say which one it is (DESIGN section 1).
+enum class Method {
+  CNM,  ///< complex nonlinear mode, s_n = n (-beta + i w) (Laxalde et al. 2008, eq. 4)
+  EPMC  ///< extended periodic motion concept, s_n = i n w0, damping C - 2 zeta w0 M (Krack 2015)
+};
+
+struct ModalState {
+  double amplitude, omega, omega0, beta, zeta;
+};
+
+/// A family of decaying motions over the modal amplitude a: y = (Q/a, beta/w_ref, w/w_ref, log a), w = w0 for EPMC.
+class NonlinearMode : public HarmonicProblem {
+ public:
+  /// Started from a linear mode (angular frequency, shape), normalised on `dof`. Collective.
+  NonlinearMode(model::Model const&, Harmonics const&, Method, PetscInt dof, double omega, Vec shape);
+  /// The linear mode at amplitude a. Collective.
+  VecHandle initial(double amplitude);
+  ModalState state(Vec y);
+  Method method() const { return method_; }
+
+  double parameter_value(double entry) const override;
+  double parameter_entry(double value) const override;
+  std::vector<solve::TestFunction> tests(Vec y, Vec tangent) override;
+
+ private:
+  ScaledMotion motion(std::vector<double> const& z) const override;
+  Method method_;
+  double omega_reference_;
+  VecHandle shape_;
+};
+
+/// phi^T M phi w^2 / phi^T phi: the inertia force per displacement that force rows are measured in [N/m]. Collective.
+double reference_stiffness(model::Model const&, double omega, Vec shape);
+
+}  // namespace fretwave::hb

@@ -1,0 +1,55 @@
+#pragma once
+#include "hb/aft.h"
+#include "hb/dynamic_stiffness.h"
+
+namespace fretwave::hb {
+
+/// R(Q, s) = Z(s) Q + B^T F(B Q, s B Q) and its exact derivatives: one for all variants, which differ in what s is (DESIGN section 1).
+/// Vectors hold harmonic blocks of `block_size` per dof.
+class Residual {
+ public:
+  Residual(model::Model const&, Harmonics const&);
+  model::Model const& model() const { return model_; }
+  Harmonics const& harmonics() const { return harmonics_; }
+  VecHandle vector() const { return make_vector(model_.comm(), model_.local_dofs() * harmonics_.block_size()); }
+
+  /// R at (Q, e), which becomes the point of linearisation. Collective.
+  void evaluate(Vec Q, Exponents const& e, Vec R);
+  /// dR for (dQ, de) at the last evaluated point; dQ or de may be null. Collective.
+  void product(Vec dQ, Exponents const* de, Vec dR);
+
+  /// Entries of dR/dQ: global places on this rank, and values in the same order times `scale` at the last evaluated point.
+  void pattern(std::vector<PetscInt>& rows, std::vector<PetscInt>& cols);
+  double* values(double scale, double* v);
+
+  /// Contact of the motion (Q, e), summed over all ranks and contacts. Collective.
+  ContactSummary summarise(Vec Q, Exponents const& e);
+  /// This rank's contact samples, one per contact.
+  std::vector<ContactPeriod> periods(Vec Q, Exponents const& e);
+
+ private:
+  struct Group {
+    model::Contact const* contact;
+    MatHandle B;  ///< B (x) I_m
+    Aft aft;
+    VecHandle U, F;
+    std::vector<double> dV;
+    struct Place {
+      int pair, row, col;
+      double value;
+    };
+    std::vector<Place> places;
+  };
+  VecHandle relative_motion(Group&, Vec Q) const;
+  void contact_product(Group&, Vec dQ, Exponents const* de, Vec dR);
+  void contact_pattern(Group&, std::vector<PetscInt>& rows, std::vector<PetscInt>& cols);
+
+  model::Model const& model_;
+  Harmonics harmonics_;
+  DynamicStiffness stiffness_;
+  std::vector<Group> groups_;
+  VecHandle Q_;  ///< copy of the last evaluated point (the callers' vectors are not ours to keep)
+  Exponents e_;
+};
+
+}  // namespace fretwave::hb

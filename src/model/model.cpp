@@ -1,0 +1,63 @@
+#include "model/model.h"
+
+#include <algorithm>
+
+#include "error.h"
+
+namespace fretwave::model {
+
+namespace {
+
+void check_term(Term const& term, PetscInt local, PetscInt global) {
+  PetscInt rows, cols, local_rows, local_cols;
+  check(MatGetSize(term.A, &rows, &cols));
+  check(MatGetLocalSize(term.A, &local_rows, &local_cols));
+  if (rows != global || cols != global || local_rows != local || local_cols != local)
+    throw InputError("a linear term does not have the size or the row layout of the first one", std::to_string(rows) + " x " + std::to_string(cols),
+                     std::to_string(global) + " x " + std::to_string(global), "build all matrices with the same row distribution");
+}
+
+void check_contact(Contact const& contact, PetscInt local, PetscInt global) {
+  PetscInt rows, cols, local_rows, local_cols;
+  check(MatGetSize(contact.B, &rows, &cols));
+  check(MatGetLocalSize(contact.B, &local_rows, &local_cols));
+  const PetscInt expected = PetscInt(contact.law->components()) * contact.law->pairs();
+  if (cols != global || local_cols != local || local_rows != expected)
+    throw InputError("contact '" + contact.name + "': B does not fit the model or the law's pairs",
+                     std::to_string(local_rows) + " local rows, " + std::to_string(cols) + " columns",
+                     std::to_string(expected) + " local rows, " + std::to_string(global) + " columns",
+                     "give B one row per pair and component, one column per dof");
+}
+
+}  // namespace
+
+Model::Model(std::vector<Term> terms, std::vector<Contact> contacts, double theta)
+    : terms_(std::move(terms)), contacts_(std::move(contacts)), theta_(theta) {
+  if (terms_.empty()) throw InputError("a model needs at least one linear term", "none", "K and M", "give the stiffness and mass matrices");
+  check(PetscObjectGetComm(reinterpret_cast<PetscObject>(Mat(terms_[0].A)), &comm_));
+  check(MatGetSize(terms_[0].A, &global_, nullptr));
+  check(MatGetLocalSize(terms_[0].A, &local_, nullptr));
+  check(MatGetOwnershipRange(terms_[0].A, &first_, nullptr));
+  for (auto const& term : terms_) check_term(term, local_, global_);
+  for (auto const& contact : contacts_) check_contact(contact, local_, global_);
+}
+
+MatHandle Model::sum(int order) const {
+  MatHandle total;
+  for (auto const& term : terms_) {
+    if (term.order != order || term.phase != 0) continue;
+    if (!total)
+      check(MatDuplicate(term.A, MAT_COPY_VALUES, total.out()));
+    else
+      check(MatAXPY(total, 1.0, term.A, DIFFERENT_NONZERO_PATTERN));
+  }
+  return total;
+}
+
+VecHandle Model::displacement() const { return make_vector(comm_, local_); }
+
+bool Model::odd() const {
+  return std::all_of(contacts_.begin(), contacts_.end(), [](Contact const& c) { return c.law->odd(); });
+}
+
+}  // namespace fretwave::model

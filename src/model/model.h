@@ -1,0 +1,55 @@
+#pragma once
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "contact/law.h"
+#include "petsc.h"
+
+/// Structures: linear terms, contact, linear modes.
+namespace fretwave::model {
+
+/// One linear term: sparse A (n_dof x n_dof) on the p-th time derivative, with spatial phase k (DESIGN section 3):
+/// Z_n = sum s_n^p e^{-i k n theta} A.
+struct Term {
+  MatHandle A;
+  int order = 0;
+  int phase = 0;
+};
+
+/// Contact pairs of one law. B maps displacements to relative displacements u = B x, rows pair by pair on the rank that owns the pair.
+struct Contact {
+  std::string name;
+  MatHandle B;
+  std::shared_ptr<contact::Law const> law;
+};
+
+/// M x'' + C x' + K x + B^T f(B x, B x') = 0, distributed over `comm`.
+class Model {
+ public:
+  /// Collective. Terms share one row layout; each contact has its law's pairs as local rows of B. InputError otherwise.
+  Model(std::vector<Term> terms, std::vector<Contact> contacts, double theta = 0);
+  Model(Model const&) = delete;
+  MPI_Comm comm() const { return comm_; }
+  PetscInt local_dofs() const { return local_; }
+  PetscInt dofs() const { return global_; }
+  PetscInt first_dof() const { return first_; }
+  double theta() const { return theta_; }
+  std::vector<Term> const& terms() const { return terms_; }
+  std::vector<Contact> const& contacts() const { return contacts_; }
+  /// Sum of all terms of one order with no phase; empty handle if there is none.
+  MatHandle sum(int order) const;
+  /// A vector of one entry per dof.
+  VecHandle displacement() const;
+  /// All laws are odd: without preload the motion may keep odd harmonics only.
+  bool odd() const;
+
+ private:
+  std::vector<Term> terms_;
+  std::vector<Contact> contacts_;
+  MPI_Comm comm_ = MPI_COMM_NULL;
+  PetscInt local_ = 0, global_ = 0, first_ = 0;
+  double theta_ = 0;
+};
+
+}  // namespace fretwave::model

@@ -1,0 +1,40 @@
+#pragma once
+#include <exception>
+#include <string>
+
+#include "solve/bordered.h"
+
+namespace fretwave::solve {
+
+struct Outcome {
+  bool converged = false;
+  int newton = 0, linear = 0;
+  double residual = 0;
+  std::string reason;  ///< PETSc's converged or diverged reason
+};
+
+/// SNES on a bordered problem. PETSc options apply under the prefix; ours are only its defaults.
+class Newton {
+ public:
+  Newton(Problem&, std::string const& prefix);
+  Newton(Newton const&) = delete;
+  Bordered& system() { return bordered_; }
+  SNES snes() const { return snes_; }
+  /// Solves from y, in place; y is the last iterate when it does not converge. Collective.
+  Outcome solve(Vec y);
+  /// Tangent at y: J t = 0, row . t = 1 with the closing row. Collective.
+  bool tangent(Vec y, Vec t);
+
+ private:
+  static PetscErrorCode form_function(SNES, Vec, Vec, void*);
+  static PetscErrorCode form_jacobian(SNES, Vec, Mat, Mat, void*);
+  void defaults();
+
+  Bordered bordered_;
+  MatHandle J_;
+  SnesHandle snes_;
+  VecHandle right_side_;
+  std::exception_ptr exception_;
+};
+
+}  // namespace fretwave::solve

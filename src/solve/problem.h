@@ -1,0 +1,53 @@
+#pragma once
+#include <span>
+#include <string>
+#include <vector>
+
+#include "petsc.h"
+
+/// Newton and continuation; knows neither harmonics nor contact.
+namespace fretwave::solve {
+
+/// A scalar whose change of sign along a branch is an event to be located.
+struct TestFunction {
+  std::string name;
+  double value;
+  bool falling_only = false;  ///< an event only where it goes from positive to negative (a maximum)
+};
+
+/// N equations in N + 1 unknowns y = (u, p): the parameter p is the last entry of y, on the last rank.
+/// A rank's part of y is its part of the residual, and one entry more on the last rank.
+class Problem {
+ public:
+  Problem() = default;
+  Problem(Problem const&) = delete;
+  virtual ~Problem() = default;
+  virtual MPI_Comm comm() const = 0;
+  virtual PetscInt local_equations() const = 0;
+
+  /// r(y). Collective.
+  virtual void residual(Vec y, Vec r) = 0;
+  /// dr = J(y) dy, J is N x (N + 1). Collective.
+  virtual void product(Vec y, Vec dy, Vec dr) = 0;
+  /// Global places of J's entries contributed by this rank, and their values in the same order (places may repeat: values add).
+  virtual void pattern(std::vector<PetscInt>& rows, std::vector<PetscInt>& cols) = 0;
+  virtual void values(Vec y, std::span<double> v) = 0;
+
+  /// Diagonal weights of the arclength's inner product at y.
+  virtual void metric(Vec y, Vec weights) = 0;
+  /// Event functions at a point of the branch with its unit tangent. Collective.
+  virtual std::vector<TestFunction> tests(Vec /*y*/, Vec /*tangent*/) { return {}; }
+  /// What users call the parameter (an amplitude, a frequency) from the entry of y, and back.
+  virtual double parameter_value(double entry) const = 0;
+  virtual double parameter_entry(double value) const = 0;
+
+  bool last_rank() const { return comm_rank(comm()) == comm_size(comm()) - 1; }
+  VecHandle equations() const { return make_vector(comm(), local_equations()); }
+  VecHandle unknowns() const { return make_vector(comm(), local_equations() + (last_rank() ? 1 : 0)); }
+};
+
+/// Last entry of a vector, on every rank. Collective.
+double last_entry(Vec y);
+void set_last_entry(Vec y, double value);
+
+}  // namespace fretwave::solve
