@@ -101,12 +101,40 @@ MatHandle saddle(Mat A, Mat G, double scale) {
   return whole;
 }
 
-/// The dofs' part of an eigenvector of the saddle point problem.
-VecHandle dofs_of(Model const& model, Vec whole) {
+/// Matrices of an eigenproblem; a small one is held whole by each rank, which all solve the same: cheaper than to share it, and
+/// the Krylov space of a tiny problem, once exhausted, would end at another step on another rank.
+struct Operators {
+  std::vector<MatHandle> matrices;
+  PetscInt offset = 0;  ///< where this rank's rows begin in its part of a vector
+  Mat operator[](int k) const { return matrices[k]; }
+  MPI_Comm comm() const {
+    MPI_Comm comm;
+    check(PetscObjectGetComm(reinterpret_cast<PetscObject>(Mat(matrices[0])), &comm));
+    return comm;
+  }
+};
+
+constexpr PetscInt small = 500;
+
+Operators operators(MPI_Comm comm, std::vector<MatHandle> matrices) {
+  PetscInt rows, first;
+  check(MatGetSize(matrices[0], &rows, nullptr));
+  check(MatGetOwnershipRange(matrices[0], &first, nullptr));
+  if (comm_size(comm) == 1 || rows > small) return {std::move(matrices), 0};
+  Operators out{{}, first};
+  for (auto const& A : matrices) {
+    out.matrices.emplace_back();
+    check(MatCreateRedundantMatrix(A, comm_size(comm), PETSC_COMM_SELF, MAT_INITIAL_MATRIX, out.matrices.back().out()));
+  }
+  return out;
+}
+
+/// This rank's dofs of an eigenvector; those of the constraints stand behind them.
+VecHandle dofs_of(Model const& model, Operators const& operators, Vec whole) {
   VecHandle part = model.displacement();
   ReadArray in(whole);
   WriteArray out(part);
-  std::copy_n(in.data(), model.local_dofs(), out.data());
+  std::copy_n(in.data() + operators.offset, model.local_dofs(), out.data());
   return part;
 }
 
@@ -141,13 +169,16 @@ std::vector<LinearMode> undamped(Model const& model, int count, bool stuck) {
     G = rigid_rows(model);
   }
   const double scale = trace_ratio(model, K, M);
-  MatHandle A = saddle(K, G, scale), B = saddle(M, G, 0);
+  std::vector<MatHandle> pair;
+  pair.push_back(saddle(K, G, scale));
+  pair.push_back(saddle(M, G, 0));
+  const Operators AB = operators(model.comm(), std::move(pair));
   const PetscInt wanted = std::min<PetscInt>(count, model.dofs() - rigid_count(G));
   if (wanted < 1) throw InputError("the stuck contact leaves no degree of freedom", "0", ">= 1", "use contact = \"free\"");
   EpsHandle eps;
-  check(EPSCreate(model.comm(), eps.out()));
+  check(EPSCreate(AB.comm(), eps.out()));
   check(EPSSetOptionsPrefix(eps, "modes_"));
-  check(EPSSetOperators(eps, A, B));
+  check(EPSSetOperators(eps, AB[0], AB[1]));
   check(EPSSetProblemType(eps, EPS_GHEP));
   check(EPSSetDimensions(eps, wanted, PETSC_DEFAULT, PETSC_DEFAULT));
   check(EPSSetTolerances(eps, tolerance, 1000));
@@ -163,11 +194,11 @@ std::vector<LinearMode> undamped(Model const& model, int count, bool stuck) {
   check(EPSGetConverged(eps, &converged));
   std::vector<LinearMode> modes;
   VecHandle x;
-  check(MatCreateVecs(A, x.out(), nullptr));
+  check(MatCreateVecs(AB[0], x.out(), nullptr));
   for (PetscInt k = 0; k < std::min(converged, wanted); ++k) {
     double value;
     check(EPSGetEigenpair(eps, k, &value, nullptr, x, nullptr));
-    LinearMode mode{std::sqrt(std::max(value, 0.0)), 0, dofs_of(model, x), model.displacement()};
+    LinearMode mode{std::sqrt(std::max(value, 0.0)), 0, dofs_of(model, AB, x), model.displacement()};
     VecHandle Mx = like(mode.shape);
     double mass;
     check(MatMult(M, mode.shape, Mx));
@@ -212,11 +243,14 @@ std::vector<LinearMode> damped(Model const& model, int count) {
     add_contact(K, contact, [&](int c, int i) { return rest.stiffness[size_t(i) * d + c]; });
     add_contact(C, contact, [&](int c, int i) { return rest.damping[size_t(i) * d + c]; });
   }
+  std::vector<MatHandle> matrices;
+  for (auto* A : {&K, &C, &M}) matrices.push_back(std::move(*A));
+  const Operators terms = operators(model.comm(), std::move(matrices));
   PepHandle pep;
-  Mat terms[3] = {K, C, M};
-  check(PEPCreate(model.comm(), pep.out()));
+  Mat raw[3] = {terms[0], terms[1], terms[2]};
+  check(PEPCreate(terms.comm(), pep.out()));
   check(PEPSetOptionsPrefix(pep, "modes_"));
-  check(PEPSetOperators(pep, 3, terms));
+  check(PEPSetOperators(pep, 3, raw));
   check(PEPSetProblemType(pep, PEP_GENERAL));
   check(PEPSetType(pep, PEPTOAR));
   check(PEPSetScale(pep, PEP_SCALE_SCALAR, PETSC_DECIDE, nullptr, nullptr, PETSC_DECIDE, PETSC_DECIDE));
@@ -232,13 +266,13 @@ std::vector<LinearMode> damped(Model const& model, int count) {
   PetscInt converged;
   check(PEPGetConverged(pep, &converged));
   std::vector<LinearMode> modes;
+  VecHandle x, y;
+  check(MatCreateVecs(terms[0], x.out(), y.out()));
   for (PetscInt k = 0; k < converged; ++k) {
     double re, im;
-    LinearMode mode{0, 0, model.displacement(), model.displacement()};
-    check(PEPGetEigenpair(pep, k, &re, &im, mode.shape, mode.imaginary));
-    if (!(im > 1e-9 * std::hypot(re, im))) continue;
-    mode.omega = im, mode.beta = -re;
-    modes.push_back(std::move(mode));
+    check(PEPGetEigenpair(pep, k, &re, &im, x, y));
+    if (!(im > 1e-9 * std::hypot(re, im))) continue;  // the conjugate, or an overdamped motion
+    modes.push_back({im, -re, dofs_of(model, terms, x), dofs_of(model, terms, y)});
   }
   return modes;
 }

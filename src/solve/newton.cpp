@@ -2,6 +2,10 @@
 
 namespace fretwave::solve {
 
+namespace {
+constexpr PetscInt redundant_limit = 2000;
+}
+
 Newton::Newton(Problem& problem, std::string const& prefix) : bordered_(problem) {
   VecHandle y = problem.unknowns();
   right_side_ = like(y);
@@ -26,7 +30,17 @@ void Newton::defaults() {
   check(KSPGetPC(ksp, &pc));
   check(PCSetType(pc, PCLU));
   check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(Mat(J_)), MATSEQDENSE, &dense));
-  if (!dense) check(PCFactorSetMatSolverType(pc, MATSOLVERMUMPS));
+  if (dense) return;
+  PetscInt rows;
+  check(MatGetSize(J_, &rows, nullptr));
+  if (comm_size(bordered_.problem().comm()) > 1 && rows <= redundant_limit) {
+    // too small to share: every rank factorises the whole matrix
+    check(PCSetType(pc, PCREDUNDANT));
+    check(PCRedundantGetKSP(pc, &ksp));
+    check(KSPGetPC(ksp, &pc));
+    check(PCSetType(pc, PCLU));
+  }
+  check(PCFactorSetMatSolverType(pc, MATSOLVERMUMPS));
 }
 
 PetscErrorCode Newton::form_function(SNES, Vec y, Vec g, void* context) {
