@@ -16,6 +16,9 @@ from .problems import HarmonicProblem
 
 Array = npt.NDArray[np.float64]
 
+#: Relative change of the force's harmonics on doubled samples above which a failure is put down to sampling.
+ALIASING_LIMIT = 1e-3
+
 
 @dataclass(frozen=True)
 class StepControl:
@@ -96,7 +99,7 @@ class Continuation:
         if upwards is None:
             start = self._parameter(y0)
             upwards = start < 0.5 * (low + high)
-        self._upwards, self._restored = upwards, False
+        self._upwards, self._restored, self._advice = upwards, False, ""
 
     def _parameter(self, y: PETSc.Vec) -> float:
         last = self.problem.model.comm.size - 1
@@ -106,8 +109,20 @@ class Continuation:
     def __iter__(self) -> Iterator[Point]:
         point = self._core.next() if self._restored else self._core.start(self._y0, self._upwards)
         while point is not None:
+            last = point["y"]
             yield Point(**point)
             point = self._core.next()
+            if point is None and not self.converged:
+                self._advise(last)
+
+    def _advise(self, y: PETSc.Vec) -> None:
+        """Why a branch breaks off is most often a force that changes within a sample."""
+        aliasing = self.problem.diagnostics(y)["aliasing"]
+        if aliasing > ALIASING_LIMIT:
+            self._advice = (
+                f"; the contact force is poorly resolved in time (its harmonics change by {100 * aliasing:.2g} % on doubled"
+                f" samples): try samples = {4 * self.problem.harmonics.samples}, or a smoother law"
+            )
 
     @property
     def converged(self) -> bool:
@@ -117,7 +132,7 @@ class Continuation:
     @property
     def reason(self) -> str:
         """Why the branch ended."""
-        return str(self._core.reason)
+        return str(self._core.reason) + self._advice
 
     @property
     def snes(self) -> PETSc.SNES:

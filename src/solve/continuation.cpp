@@ -109,6 +109,14 @@ void Continuation::prepare_row() {
   anchor_tests_ = tests(anchor_.y, anchor_.tangent);
 }
 
+/// How far the corrector moved from the tangent's prediction.
+double Continuation::deviation(Vec y, double length) const {
+  VecHandle moved = like(y);
+  check(VecWAXPY(moved, -1, anchor_.y, y));
+  check(VecAXPY(moved, -length, anchor_.tangent));
+  return weighted_norm(weights_, moved);
+}
+
 /// One accepted step from the anchor; halves the length on failure or when the branch turns too much.
 std::optional<Continuation::Trial> Continuation::step(double& length, double& angle, double& next_length) {
   std::string why = "the branch turns too sharply";
@@ -123,6 +131,10 @@ std::optional<Continuation::Trial> Continuation::step(double& length, double& an
     check(VecDot(row_, trial.tangent, &along));
     angle = std::acos(std::clamp(along, -1.0, 1.0));
     if (angle > steps_.max_angle && length > 16 * steps_.minimum) continue;
+    if (deviation(trial.y, length) > length) {
+      why = "the corrector lands on another branch";
+      continue;
+    }
     const double by_newton = std::exp2((steps_.target_newton - trial.outcome.newton) / 2.0);
     const double by_angle = 0.5 * steps_.max_angle / std::max(angle, 1e-12);
     next_length = std::min(steps_.maximum, length * std::clamp(std::min(by_newton, by_angle), 0.4, 2.0));
@@ -220,7 +232,7 @@ std::optional<Point> Continuation::next() {
       prepare_row();
     }
     if (anchor_.index >= steps_.max_points) {
-      finish("largest number of points", true);
+      finish("largest number of points", false);
       return {};
     }
     make_batch();

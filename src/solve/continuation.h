@@ -56,6 +56,7 @@ class Continuation {
   };
   bool correct(Trial&, Vec row, double value);
   std::optional<Trial> step(double& length, double& angle, double& next_length);
+  double deviation(Vec y, double length) const;
   void make_batch();
   void locate_events(Trial const& end, double length);
   void locate(TestFunction const& before, size_t which, Trial const& end, double length);
