@@ -20,7 +20,7 @@ Aft::Aft(Harmonics const& h, std::shared_ptr<contact::Law const> law)
       pairs_(law_->pairs()),
       columns_(law_->components() * pairs_),
       law_samples_(h.odd_only() && law_->odd() ? h.samples() / 2 : h.samples()),
-      transform_(h, columns_),
+      transform_(h, columns_, law_->components()),
       tangent_transform_(h, tangent_columns(*law_)),
       velocity_(size_t(columns_) * h.block_size()) {
   const size_t n = size_t(h.samples()) * columns_;
