@@ -7,9 +7,10 @@
 /// Contact laws: pure C++, no PETSc, no MPI, no Fourier.
 namespace fretwave::contact {
 
-/// One period of relative motion of all pairs on this rank. Arrays are samples x components x pairs, pairs innermost (DESIGN fact 7).
+/// One period of relative motion of all pairs on this rank. Arrays are samples x components x pairs, pairs
+/// innermost (DESIGN fact 7).
 struct Motion {
-  int samples = 0;           ///< samples held here (half a period when the motion is half-wave symmetric)
+  int samples = 0;  ///< samples held here (half a period when the motion is half-wave symmetric)
   int components = 0, pairs = 0;
   double const* u = nullptr;  ///< relative displacement [m]; null if the law ignores it
   double const* v = nullptr;  ///< relative velocity [m/s]; null if the law ignores it
@@ -19,7 +20,8 @@ struct Motion {
 
 /// What a force evaluation leaves for its linearisation.
 struct Record {
-  std::vector<double> df_du, df_dv;  ///< instantaneous tangents, samples x components x components x pairs; empty if zero
+  std::vector<double> df_du,
+      df_dv;  ///< instantaneous tangents, samples x components x components x pairs; empty if zero
 };
 
 enum class Status : std::uint8_t { stick, slip, open };
@@ -42,7 +44,9 @@ class Law {
   /// f(-u, -v) = -f(u, v): the motion may keep odd harmonics only.
   virtual bool odd() const { return false; }
   /// Stiffness of the closed, stuck contact [N/m]; infinite means no relative motion at all.
-  virtual double stuck_stiffness(int /*component*/, int /*pair*/) const { return std::numeric_limits<double>::infinity(); }
+  virtual double stuck_stiffness(int /*component*/, int /*pair*/) const {
+    return std::numeric_limits<double>::infinity();
+  }
 
   /// Force on the pairs, and what its linearisation needs.
   virtual void force(Motion const&, double* f, Record&) const = 0;

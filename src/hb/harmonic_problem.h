@@ -6,7 +6,8 @@
 
 namespace fretwave::hb {
 
-/// What a variant's scalar unknowns z mean: motion Q = a q, exponents s_n, and their derivatives by each scalar.
+/// What a variant's scalar unknowns z mean: motion Q = a q, exponents s_n, and their derivatives by each
+/// scalar.
 struct ScaledMotion {
   double amplitude = 1;                ///< a
   Exponents exponents;                 ///< s_n
@@ -14,11 +15,13 @@ struct ScaledMotion {
   std::vector<Exponents> dexponents;   ///< d s_n / dz_j
 };
 
-/// y = (q, z): scaled harmonic blocks q = Q / a, then the scalars z on the last rank; z's last entry is the continuation parameter.
-/// Rows (R(a q, s(z)) - P) / (k_ref a), then, on the last rank, q_dof = (1, 0) in the fundamental if there are three scalars (DESIGN fact 4).
+/// y = (q, z): scaled harmonic blocks q = Q / a, then the scalars z on the last rank; z's last entry is the
+/// continuation parameter. Rows (R(a q, s(z)) - P) / (k_ref a), then, on the last rank, q_dof = (1, 0) in the
+/// fundamental if there are three scalars (DESIGN fact 4).
 class HarmonicProblem : public solve::Problem {
  public:
-  HarmonicProblem(model::Model const&, Harmonics const&, int scalars, PetscInt dof, double reference_stiffness);
+  HarmonicProblem(model::Model const&, Harmonics const&, int scalars, PetscInt dof,
+                  double reference_stiffness);
   MPI_Comm comm() const override { return residual_.model().comm(); }
   PetscInt local_equations() const override { return local_block_ + (last_rank() ? scalars_ - 1 : 0); }
   void residual(Vec y, Vec r) override;

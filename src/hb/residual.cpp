@@ -2,9 +2,11 @@
 
 namespace fretwave::hb {
 
-Residual::Residual(model::Model const& model, Harmonics const& h) : model_(model), harmonics_(h), stiffness_(model, h), Q_(vector()) {
+Residual::Residual(model::Model const& model, Harmonics const& h)
+    : model_(model), harmonics_(h), stiffness_(model, h), Q_(vector()) {
   for (auto const& contact : model.contacts()) {
-    groups_.push_back({.contact = &contact, .B = {}, .aft = Aft(h, contact.law), .U = {}, .F = {}, .dV = {}, .places = {}});
+    groups_.push_back(
+        {.contact = &contact, .B = {}, .aft = Aft(h, contact.law), .U = {}, .F = {}, .dV = {}, .places = {}});
     Group& group = groups_.back();
     check(MatCreateMAIJ(contact.B, h.block_size(), group.B.out()));
     group.U = make_vector(model.comm(), group.aft.columns() * h.block_size());
