@@ -43,9 +43,7 @@ def problems(path: Path, *overrides: str, quick: bool = False) -> list[FretwaveE
 
 
 def line_of(path: Path, text: str) -> int:
-    return next(
-        n for n, line in enumerate(path.read_text().splitlines(), 1) if text in line
-    )
+    return next(n for n, line in enumerate(path.read_text().splitlines(), 1) if text in line)
 
 
 def test_committed_case_is_read() -> None:
@@ -55,9 +53,7 @@ def test_committed_case_is_read() -> None:
     assert np.array_equal(case.K.toarray(), [[640.0, -40.0], [-40.0, 40.0]])
     assert case.C is None
     assert list(case.analyses)[:3] == ["mode", "mode_epmc", "flutter"]
-    assert case.damping_with(case.analyses["flutter"].dampers)[
-        0, 0
-    ] == -2 * 0.02 * np.sqrt(640.0)
+    assert case.damping_with(case.analyses["flutter"].dampers)[0, 0] == -2 * 0.02 * np.sqrt(640.0)
     assert np.array_equal(case.contacts[0].rows.toarray(), [[0.0, 1.0]])
     assert case.notes == []
 
@@ -193,10 +189,7 @@ def test_all_errors_at_once_in_the_order_of_the_file(write) -> None:
     ):
         assert said in text
     assert "is missing" not in text
-    lines = [
-        int(str(p.where).split("case.toml:")[1].split(" ")[0])
-        for p in caught.value.problems
-    ]
+    lines = [int(str(p.where).split("case.toml:")[1].split(" ")[0]) for p in caught.value.problems]
     assert lines == sorted(lines)
     assert "did you mean `observe`?" in text
 
@@ -211,9 +204,7 @@ def test_errors_in_references(write) -> None:
         ("frequency = [3.2, 4.6]", "frequency = [4.6, 3.2]"),
     )
     found = {problem.what: problem for problem in problems(path)}
-    assert "did you mean `mode_epmc`?" in str(
-        found["forced.backbone[1] is no mode analysis of this case"].fix
-    )
+    assert "did you mean `mode_epmc`?" in str(found["forced.backbone[1] is no mode analysis of this case"].fix)
     assert "limit_cycle.mode is no mode analysis of this case" in found
     assert "2 H + 2 = 44" in str(found["mode.samples is too small"].expected)
     assert found["mode.report_at[1] is outside the branch"].measured == "17.0"
@@ -259,10 +250,7 @@ def test_overrides_address_by_name() -> None:
 
 
 def test_set_wins_over_quick() -> None:
-    assert (
-        load_case(CASE, ["mode.harmonics=5"], quick=True).resolved["mode.harmonics"]
-        == 5
-    )
+    assert load_case(CASE, ["mode.harmonics=5"], quick=True).resolved["mode.harmonics"] == 5
 
 
 def test_changed_keys_are_named() -> None:

@@ -44,10 +44,7 @@ WRONG = {
 
 
 def fingerprint(folder: Path) -> dict[str, str]:
-    return {
-        path.name: hashlib.sha256(path.read_bytes()).hexdigest()
-        for path in folder.iterdir()
-    }
+    return {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in folder.iterdir()}
 
 
 @pytest.fixture(autouse=True)
@@ -68,9 +65,7 @@ def test_wrong_input_overwrites_nothing(earlier: Path, wrong: str, capfd) -> Non
     before = fingerprint(earlier)
     overrides = [] if "amplitude" in wrong else RANGE
     if "harmonics" in wrong:
-        code = main(
-            ["run", str(CASE), "--out", str(earlier), "--only", "mode", "--set", wrong]
-        )
+        code = main(["run", str(CASE), "--out", str(earlier), "--only", "mode", "--set", wrong])
     else:
         code = main(
             [
@@ -116,12 +111,7 @@ def test_right_option_is_used_and_taken_back(tmp_path: Path) -> None:
     from petsc4py import PETSc
 
     options = ["--petsc", "-snes_max_it 30 -snes_atol 1e-12"]
-    assert (
-        main(
-            ["run", str(CASE), "--out", str(tmp_path / "run"), *SHORT, *RANGE, *options]
-        )
-        == 0
-    )
+    assert main(["run", str(CASE), "--out", str(tmp_path / "run"), *SHORT, *RANGE, *options]) == 0
     assert not PETSc.Options().hasName("mode_snes_max_it")
 
 
@@ -166,10 +156,7 @@ def test_not_converged_keeps_what_was_found(tmp_path: Path, capfd) -> None:
     assert "'mode' stopped early" in text
     assert "  try: " in text
     assert len((folder / "mode.csv").read_text().splitlines()) == 5
-    assert (
-        json.loads((folder / "run.json").read_text())["analyses"]["mode"]["status"]
-        == "stopped"
-    )
+    assert json.loads((folder / "run.json").read_text())["analyses"]["mode"]["status"] == "stopped"
 
 
 @pytest.mark.parametrize(
@@ -189,9 +176,7 @@ def test_not_converged_keeps_what_was_found(tmp_path: Path, capfd) -> None:
         (["check", str(CASE), "--set", "mode.harmonics=0"], "mode.harmonics"),
     ],
 )
-def test_wrong_command_lines(
-    arguments: list[str], said: str, capfd, tmp_path: Path, monkeypatch
-) -> None:
+def test_wrong_command_lines(arguments: list[str], said: str, capfd, tmp_path: Path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     assert main(arguments) == 2
     assert said in capfd.readouterr().err

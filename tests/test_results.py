@@ -21,16 +21,12 @@ LABELS = ["1c", "1s", "3c", "3s"]
 def row(index: int) -> dict[str, float | int | str]:
     """Numbers with all their digits."""
     values: dict[str, float | int | str] = {name: (index + 1) / 3.0 for name in MODE}
-    values.update(
-        point=index, newton=3, linear=3, event="report" if index % 3 == 0 else ""
-    )
+    values.update(point=index, newton=3, linear=3, event="report" if index % 3 == 0 else "")
     return values
 
 
 def writer(folder: Path, name: str = "mode", **options: object) -> AnalysisWriter:
-    return AnalysisWriter(
-        folder, name, MODE, {"type": "mode"}, ["m1", "m2"], LABELS, **options
-    )  # type: ignore[arg-type]
+    return AnalysisWriter(folder, name, MODE, {"type": "mode"}, ["m1", "m2"], LABELS, **options)  # type: ignore[arg-type]
 
 
 def fill(table: AnalysisWriter, count: int) -> None:
@@ -151,9 +147,7 @@ def test_going_on_gives_the_same_files(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("spoilt", ["checksum", "rows"])
-def test_the_older_state_is_used_when_the_newer_is_spoilt(
-    tmp_path: Path, spoilt: str
-) -> None:
+def test_the_older_state_is_used_when_the_newer_is_spoilt(tmp_path: Path, spoilt: str) -> None:
     """A kill in the middle of a write: a half-written state, or a state whose row is not in the table yet."""
     table = writer(tmp_path)
     fill(table, 6)
@@ -162,9 +156,7 @@ def test_the_older_state_is_used_when_the_newer_is_spoilt(
         if spoilt == "rows":
             file["mode/points/zeta"].resize(5, axis=0)
         else:
-            newer = max(
-                ("state_0", "state_1"), key=lambda name: file["mode"][name]["header"][0]
-            )
+            newer = max(("state_0", "state_1"), key=lambda name: file["mode"][name]["header"][0])
             file["mode"][newer]["y"][2] = 17.0
     table = writer(tmp_path)
     state = table.go_on()

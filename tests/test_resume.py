@@ -29,9 +29,7 @@ SETTINGS = {
     "forced.backbone": "['mode']",
     "forced.time_points": "0",
 }
-OVERRIDES = [
-    word for key, value in SETTINGS.items() for word in ("--set", f"{key}={value}")
-]
+OVERRIDES = [word for key, value in SETTINGS.items() for word in ("--set", f"{key}={value}")]
 #: Differences between rank counts come from the order of additions; amplified near folds.
 RANK_TOLERANCE = 1e-9
 
@@ -41,16 +39,12 @@ def command(*arguments: str) -> list[str]:
 
 
 def start(folder: Path) -> list[str]:
-    return command(
-        "run", str(CASE), "--out", str(folder), "--only", "mode,forced", *OVERRIDES
-    )
+    return command("run", str(CASE), "--out", str(folder), "--only", "mode,forced", *OVERRIDES)
 
 
 def kill_at(arguments: list[str], table: Path, lines: int) -> int:
     """Start a process, kill -9 when a table has this many lines; returns how many it had after the kill."""
-    with subprocess.Popen(
-        arguments, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-    ) as process:
+    with subprocess.Popen(arguments, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
         deadline = time.monotonic() + 60
         while not (table.exists() and len(table.read_text().splitlines()) >= lines):
             assert process.poll() is None, "the run ended before it could be killed"
@@ -67,9 +61,7 @@ def rows(folder: Path, name: str) -> list[dict[str, str]]:
 
 
 def without_time(table: list[dict[str, str]]) -> list[dict[str, str]]:
-    return [
-        {key: value for key, value in row.items() if key != "wall_s"} for row in table
-    ]
+    return [{key: value for key, value in row.items() if key != "wall_s"} for row in table]
 
 
 @pytest.fixture(scope="module")
@@ -84,23 +76,15 @@ def resumed(whole: Path, tmp_path_factory) -> Path:
     """Killed in the middle of the mode, resumed, killed in the second level, resumed."""
     folder = tmp_path_factory.mktemp("resumed")
     halfway = len(rows(whole, "mode")) // 2
-    assert kill_at(start(folder), folder / "mode.csv", halfway) < len(
-        rows(whole, "mode")
-    )
+    assert kill_at(start(folder), folder / "mode.csv", halfway) < len(rows(whole, "mode"))
     late = sum(row["level"] == "2.0" for row in rows(whole, "forced")) + 20
-    assert kill_at(command("resume", str(folder)), folder / "forced.csv", late) < len(
-        rows(whole, "forced")
-    )
-    subprocess.run(
-        command("resume", str(folder)), check=True, stdout=subprocess.DEVNULL
-    )
+    assert kill_at(command("resume", str(folder)), folder / "forced.csv", late) < len(rows(whole, "forced"))
+    subprocess.run(command("resume", str(folder)), check=True, stdout=subprocess.DEVNULL)
     return folder
 
 
 @pytest.mark.parametrize("name", ["mode", "forced"])
-def test_joined_tables_are_the_uninterrupted_ones(
-    whole: Path, resumed: Path, name: str
-) -> None:
+def test_joined_tables_are_the_uninterrupted_ones(whole: Path, resumed: Path, name: str) -> None:
     assert without_time(rows(resumed, name)) == without_time(rows(whole, name))
 
 
@@ -108,14 +92,8 @@ def test_joined_results_are_the_uninterrupted_ones(whole: Path, resumed: Path) -
     compared = []
 
     def compare(path: str, one: object) -> None:
-        if (
-            isinstance(one, h5py.Dataset)
-            and "/state_" not in path
-            and not path.endswith("wall_s")
-        ):
-            assert np.array_equal(
-                one[()], two[path][()], equal_nan=one.dtype.kind == "f"
-            ), path
+        if isinstance(one, h5py.Dataset) and "/state_" not in path and not path.endswith("wall_s"):
+            assert np.array_equal(one[()], two[path][()], equal_nan=one.dtype.kind == "f"), path
             compared.append(path)
 
     with (
@@ -127,9 +105,7 @@ def test_joined_results_are_the_uninterrupted_ones(whole: Path, resumed: Path) -
             one, other = dict(first[name].attrs), dict(two[name].attrs)
             assert one.pop("run_id") != other.pop("run_id")
             assert one == other
-    assert {"mode/coefficients", "mode/contact_damper/f", "forced/points/phase"} <= set(
-        compared
-    )
+    assert {"mode/coefficients", "mode/contact_damper/f", "forced/points/phase"} <= set(compared)
 
 
 def test_record_tells_of_a_finished_run(resumed: Path) -> None:
@@ -153,16 +129,12 @@ def test_resuming_on_two_ranks(whole: Path, tmp_path: Path, launch) -> None:
     expected = rows(whole, "mode")
     arguments = [*start(tmp_path), "--only", "mode"]
     kill_at(arguments, tmp_path / "mode.csv", len(expected) - 40)
-    done = launch(
-        2, "-m", "fretwave", "resume", str(tmp_path), "--no-plots", timeout=120
-    )
+    done = launch(2, "-m", "fretwave", "resume", str(tmp_path), "--no-plots", timeout=120)
     assert done.returncode == 0, done.stderr
     found = rows(tmp_path, "mode")
     assert [row["event"] for row in found] == [row["event"] for row in expected]
     for name in ("amplitude", "omega", "zeta"):
-        one, two = (
-            np.array([float(row[name]) for row in table]) for table in (expected, found)
-        )
+        one, two = (np.array([float(row[name]) for row in table]) for table in (expected, found))
         assert np.allclose(one, two, rtol=RANK_TOLERANCE, atol=0.0), name
 
 
@@ -178,16 +150,9 @@ def test_changed_case_is_refused(tmp_path: Path, launch) -> None:
         "mode",
         "--no-plots",
     ]
-    assert (
-        launch(
-            1, "-m", "fretwave", "run", str(case), "--out", str(folder), *short
-        ).returncode
-        == 0
-    )
+    assert launch(1, "-m", "fretwave", "run", str(case), "--out", str(folder), *short).returncode == 0
     before = {path.name: path.read_bytes() for path in folder.iterdir()}
-    case.write_text(
-        CASE.read_text().replace("friction_limit = 5.0", "friction_limit = 4.0")
-    )
+    case.write_text(CASE.read_text().replace("friction_limit = 5.0", "friction_limit = 4.0"))
     done = launch(1, "-m", "fretwave", "resume", str(folder))
     assert done.returncode == 2
     assert "contact.damper.friction_limit: 5.0 then, 4.0 now" in done.stderr
@@ -207,11 +172,6 @@ def test_resume_without_the_case_file_uses_the_copy(tmp_path: Path, launch) -> N
         "mode",
         "--no-plots",
     ]
-    assert (
-        launch(
-            1, "-m", "fretwave", "run", str(case), "--out", str(folder), *short
-        ).returncode
-        == 0
-    )
+    assert launch(1, "-m", "fretwave", "run", str(case), "--out", str(folder), *short).returncode == 0
     case.unlink()
     assert launch(1, "-m", "fretwave", "resume", str(folder)).returncode == 0

@@ -1,0 +1,84 @@
+"""Amplitude, frequency and damping of every cycle of a measured or integrated free motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.interpolate import CubicHermiteSpline
+
+Array = npt.NDArray[np.float64]
+
+#: samples of a cycle in the projection on its fundamental; the trapezoidal rule is spectrally accurate there
+PROJECTION_SAMPLES = 128
+#: the decay rate enters the projection it is computed from; each pass gains about two digits
+PASSES = 4
+
+
+@dataclass(frozen=True)
+class Cycles:
+    """One entry per full cycle.
+
+    Attributes
+    ----------
+    time : (n,) middle of the cycle [s]
+    amplitude : (n,) fundamental amplitude at that time, unit of the signal
+    omega : (n,) damped angular frequency, 2 pi over the time between upward zero crossings [rad/s]
+    zeta : (n,) damping ratio from the logarithmic decrement over the neighbouring cycles
+    """
+
+    time: Array
+    amplitude: Array
+    omega: Array
+    zeta: Array
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+
+def extract(t: Array, x: Array, v: Array) -> Cycles:
+    """Cycle by cycle values of a signal `x` with its velocity `v`, sampled at times `t`.
+
+    The amplitude is that of the fundamental: x e^{beta (t - t_mid)} is projected on the cycle's own
+    frequency, which is exact for a e^{-beta t} cos(omega t) and comparable with a modal amplitude.
+    """
+    signal = CubicHermiteSpline(t, x, v)
+    bounds = upward_crossings(signal)
+    if len(bounds) < 5:
+        return Cycles(*(np.empty(0) for _ in range(4)))
+    middle = 0.5 * (bounds[1:] + bounds[:-1])
+    omega = 2.0 * np.pi / np.diff(bounds)
+    beta = np.zeros_like(omega)
+    for _ in range(PASSES):
+        amplitude = _fundamental(signal, bounds, beta)
+        beta = -np.gradient(np.log(amplitude), middle, edge_order=2)
+    return Cycles(middle, amplitude, omega, beta / np.hypot(beta, omega))
+
+
+def upward_crossings(signal: CubicHermiteSpline) -> Array:
+    """Times at which the signal passes zero upwards [s]."""
+    roots = np.unique(signal.roots(discontinuity=False, extrapolate=False))
+    roots = roots[np.isfinite(roots)]
+    return np.asarray(roots[signal(roots, 1) > 0.0], dtype=float)
+
+
+def peaks(t: Array, x: Array, v: Array) -> tuple[Array, Array]:
+    """Times and values of all extrema (v = 0) of the signal, by its cubic Hermite interpolant."""
+    signal = CubicHermiteSpline(t, x, v)
+    times = np.unique(signal.derivative().roots(discontinuity=False, extrapolate=False))
+    times = times[np.isfinite(times)]
+    return times, np.asarray(signal(times), dtype=float)
+
+
+def _fundamental(signal: CubicHermiteSpline, bounds: Array, beta: Array) -> Array:
+    phase = np.arange(PROJECTION_SAMPLES) / PROJECTION_SAMPLES
+    length = np.diff(bounds)[:, None]
+    times = bounds[:-1, None] + phase * length
+    steady = signal(times) * np.exp(beta[:, None] * (phase - 0.5) * length)
+    return np.asarray(np.abs(steady @ np.exp(-2j * np.pi * phase)) * 2.0 / PROJECTION_SAMPLES, dtype=float)
+
+
+def harmonic_amplitude(x: Array) -> float:
+    """Amplitude of the fundamental of one period, given without its last point (n samples)."""
+    return float(2.0 * np.abs(np.fft.rfft(x)[1]) / len(x))

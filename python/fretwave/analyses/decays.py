@@ -1,0 +1,145 @@
+"""Tables and verdicts of time integrations: cycles beside the mode, endings beside the predicted limit cycles."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from ..errors import InputError
+from .cycles import Cycles
+from .mode_curve import Crossing, ModeCurve
+
+Array = npt.NDArray[np.float64]
+
+#: a start diverges when it exceeds this many times the larger of itself and the largest predicted limit cycle
+DIVERGED = 2.0
+#: a motion has settled when the amplitude of its last cycles varies by less than this
+SETTLED = 1e-3
+LAST_CYCLES = 10
+#: largest relative change of a damping ratio from one cycle to the next of a motion that is called slow
+SLOW = 0.2
+
+
+@dataclass(frozen=True)
+class Ending:
+    """Where a start ended: the mean of its last cycles, or the last one of a motion that diverges."""
+
+    text: str
+    amplitude: float
+    omega: float
+
+
+def mode_state(
+    table: Mapping[str, Array], coefficients: Array, amplitude: float, method: str
+) -> tuple[Array, float, float]:
+    """Harmonic coefficients (n_dof, m), beta and omega of the motion at an amplitude of a finished branch.
+
+    CNM motions decay; EPMC motions are periodic with omega0, so beta is 0 there. Linear in log a between the two
+    neighbouring points of the last sheet, the one a decay from above meets; the fundamental of the normalised dof
+    is exact.
+    """
+    level, wanted = np.log(table["amplitude"]), np.log(amplitude)
+    between = np.flatnonzero((level[:-1] - wanted) * (level[1:] - wanted) <= 0.0)
+    if not len(between):
+        raise _outside(amplitude, table["amplitude"])
+    pair = [int(between[-1]), int(between[-1]) + 1]
+    weights = np.interp(wanted, *np.array(sorted(zip(level[pair], [0.0, 1.0]))).T) * np.array([-1.0, 1.0]) + [1.0, 0.0]
+    scaled = coefficients[pair] / table["amplitude"][pair, None, None]
+    decays = method == "CNM"
+    beta = float(weights @ table["beta"][pair]) if decays else 0.0
+    omega = float(weights @ table["omega" if decays else "omega0"][pair])
+    return amplitude * np.tensordot(weights, scaled, axes=1), beta, omega
+
+
+def _outside(amplitude: float, branch: Array) -> InputError:
+    return InputError(
+        "a start lies outside the mode's branch",
+        measured=f"amplitude {amplitude:g}",
+        expected=f"between {branch.min():g} and {branch.max():g}",
+        fix="change the start's amplitude, or widen the amplitude range of the mode analysis",
+    )
+
+
+def decay_rows(start: int, cycles: Cycles, mode: ModeCurve) -> list[dict[str, float | int]]:
+    """Table rows of one decay: each cycle beside the mode at the same amplitude."""
+    rows: list[dict[str, float | int]] = []
+    for i in range(len(cycles)):
+        value = mode.at(float(cycles.amplitude[i]), falling=bool(cycles.zeta[i] >= 0.0))
+        rows.append(
+            {
+                "start": start,
+                "cycle": i + 1,
+                "time": float(cycles.time[i]),
+                "amplitude": float(cycles.amplitude[i]),
+                "omega": float(cycles.omega[i]),
+                "zeta": float(cycles.zeta[i]),
+                "omega_mode": value.omega,
+                "zeta_mode": value.zeta,
+                "sheets": value.sheets,
+            }
+        )
+    return rows
+
+
+def cycle_rows(start: int, cycles: Cycles) -> list[dict[str, float | int]]:
+    """Table rows of one start towards a limit cycle."""
+    return [
+        {
+            "start": start,
+            "cycle": i + 1,
+            "time": float(cycles.time[i]),
+            "amplitude": float(cycles.amplitude[i]),
+            "frequency_hz": float(cycles.omega[i]) / (2.0 * np.pi),
+        }
+        for i in range(len(cycles))
+    ]
+
+
+def divergence_factor(start: float, crossings: Sequence[Crossing]) -> float:
+    """Multiple of its start at which a motion counts as diverging."""
+    return DIVERGED * max([start, *(crossing.amplitude for crossing in crossings)]) / start
+
+
+def ending(cycles: Cycles, diverged: bool) -> Ending:
+    """What became of a start."""
+    if not len(cycles):
+        return Ending("diverges" if diverged else "not settled", np.nan, np.nan)
+    last = slice(-LAST_CYCLES, None)
+    amplitude, omega = cycles.amplitude[last], cycles.omega[last]
+    if diverged:
+        return Ending("diverges", float(amplitude[-1]), float(omega[-1]))
+    spread = np.ptp(amplitude) / amplitude.mean()
+    return Ending("limit cycle" if spread < SETTLED else "not settled", float(amplitude.mean()), float(omega.mean()))
+
+
+def compare(found: Ending, crossings: Sequence[Crossing]) -> dict[str, float]:
+    """Relative differences from the predicted stable limit cycle that lies nearest; nan when there is none."""
+    stable = [crossing for crossing in crossings if crossing.stable]
+    if not stable or found.text == "diverges" or not np.isfinite(found.amplitude):
+        return {"predicted": np.nan, "amplitude_difference": np.nan, "frequency_difference": np.nan}
+    nearest = min(stable, key=lambda crossing: abs(np.log(crossing.amplitude / found.amplitude)))
+    return {
+        "predicted": nearest.amplitude,
+        "amplitude_difference": found.amplitude / nearest.amplitude - 1.0,
+        "frequency_difference": found.omega / nearest.omega - 1.0,
+    }
+
+
+def largest_differences(rows: Sequence[Mapping[str, float | int]]) -> tuple[float, float]:
+    """Largest relative difference of omega and absolute one of zeta from the mode, over the slow cycles.
+
+    A mode describes motions whose amplitude changes slowly. A cycle counts when the mode is unique at its amplitude
+    and neither damping ratio changes by more than `SLOW` to the cycles before and after it; first and last do not.
+    """
+    slow = [row for before, row, after in zip(rows, rows[1:], rows[2:]) if _is_slow(before, row, after)]
+    omega = [abs(row["omega"] / row["omega_mode"] - 1.0) for row in slow]
+    zeta = [abs(row["zeta"] - row["zeta_mode"]) for row in slow]
+    return max(omega, default=np.nan), max(zeta, default=np.nan)
+
+
+def _is_slow(*rows: Mapping[str, float | int]) -> bool:
+    change = max(abs(row[key] / rows[1][key] - 1.0) for key in ("zeta", "zeta_mode") for row in rows)
+    return len({row["start"] for row in rows}) == 1 and rows[1]["sheets"] == 1 and change < SLOW

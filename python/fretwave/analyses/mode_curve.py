@@ -1,0 +1,108 @@
+"""A mode's frequency and damping as functions of amplitude, read off a branch that may fold."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.interpolate import PchipInterpolator
+
+Array = npt.NDArray[np.float64]
+
+#: weights of (log amplitude, relative frequency, damping ratio) in the length along the curve: all of order one
+LENGTH_WEIGHTS = (1.0, 10.0, 20.0)
+
+
+@dataclass(frozen=True)
+class ModeValue:
+    """Modal values at one amplitude; `sheets` counts the solutions there: 3 between two folds, 0 off the branch."""
+
+    amplitude: float
+    omega: float
+    omega0: float
+    zeta: float
+    sheets: int
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """Zero of the damping: a limit cycle, stable where damping grows with amplitude."""
+
+    amplitude: float
+    omega: float
+    stable: bool
+
+
+class ModeCurve:
+    """Log a, omega, omega0, zeta as piecewise cubics of the length along the branch.
+
+    A fold is an ordinary place of such a curve, so no sheet has to be cut out beforehand. The cubics keep the
+    monotonicity of the points: a smooth spline rings at the abrupt onset of slip and invents solutions there.
+    """
+
+    def __init__(self, amplitude: Array, omega: Array, omega0: Array, zeta: Array) -> None:
+        values = np.column_stack([np.log(amplitude), omega, omega0, zeta])
+        length = _length(values)
+        keep = np.concatenate([[True], np.diff(length) > 1e-12 * length[-1]])
+        self._curve = PchipInterpolator(length[keep], values[keep], axis=0)
+        self._log_amplitude = PchipInterpolator(length[keep], values[keep, 0])
+        self._zeta = PchipInterpolator(length[keep], values[keep, 3])
+
+    @classmethod
+    def from_table(cls, table: Mapping[str, Array]) -> ModeCurve:
+        """From the columns of a mode's branch table."""
+        return cls(*(np.asarray(table[name], dtype=float) for name in ("amplitude", "omega", "omega0", "zeta")))
+
+    def sampled(self, count: int = 2000) -> dict[str, Array]:
+        """Columns amplitude, omega, omega0, zeta, frequency_hz at even lengths along the curve, for drawing."""
+        x = self._curve.x
+        fine = np.unique(np.concatenate([np.linspace(x[0], x[-1], count), x]))
+        values = self._curve(fine)
+        names = ("amplitude", "omega", "omega0", "zeta")
+        columns = dict(zip(names, (np.exp(values[:, 0]), *values[:, 1:].T)))
+        return {**columns, "frequency_hz": columns["omega"] / (2.0 * np.pi)}
+
+    def all_at(self, amplitude: float) -> list[ModeValue]:
+        """Every solution at an amplitude, in the order of the branch."""
+        roots = np.unique(self._log_amplitude.solve(np.log(amplitude), discontinuity=False, extrapolate=False))
+        points = self._curve(roots[np.isfinite(roots)])
+        return [ModeValue(amplitude, float(p[1]), float(p[2]), float(p[3]), len(points)) for p in points]
+
+    def at(self, amplitude: float, falling: bool = True) -> ModeValue:
+        """The solution that a slowly falling (or growing) amplitude follows: the last (first) sheet it meets."""
+        values = self.all_at(amplitude)
+        if not values:
+            return ModeValue(amplitude, np.nan, np.nan, np.nan, 0)
+        return values[-1 if falling else 0]
+
+    def amplitudes_at(self, zeta: float) -> list[float]:
+        """Amplitudes at which the mode has a damping ratio."""
+        roots = np.unique(self._zeta.solve(zeta, discontinuity=False, extrapolate=False))
+        return [float(a) for a in np.exp(self._log_amplitude(roots[np.isfinite(roots)]))]
+
+    def crossings(self) -> list[Crossing]:
+        """Zeros of the damping ratio in the order of the branch."""
+        roots = np.unique(self._zeta.roots(discontinuity=False, extrapolate=False))
+        return [self._crossing(s) for s in roots[np.isfinite(roots)]]
+
+    def _crossing(self, length: float) -> Crossing:
+        log_amplitude, omega = self._curve(length)[:2]
+        slope = self._zeta(length, 1) / self._log_amplitude(length, 1)
+        return Crossing(float(np.exp(log_amplitude)), float(omega), bool(slope > 0.0))
+
+
+def fold_interval(amplitude: Array) -> tuple[float, float] | None:
+    """Smallest and largest amplitude at which the branch turns round; None when it never does."""
+    steps = np.diff(amplitude)
+    turns = np.flatnonzero(np.sign(steps[1:]) * np.sign(steps[:-1]) < 0) + 1
+    if not len(turns):
+        return None
+    return float(amplitude[turns].min()), float(amplitude[turns].max())
+
+
+def _length(values: Array) -> Array:
+    scaled = np.column_stack([values[:, 0], values[:, 1] / np.abs(values[:, 1]).max(), values[:, 3]])
+    steps = np.linalg.norm(np.diff(scaled, axis=0) * LENGTH_WEIGHTS, axis=1)
+    return np.concatenate([[0.0], np.cumsum(steps)])

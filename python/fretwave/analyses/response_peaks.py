@@ -1,0 +1,110 @@
+"""Peaks of frequency responses and their distance from the backbones of modes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.interpolate import PchipInterpolator
+
+from .mode_curve import ModeCurve
+
+Array = npt.NDArray[np.float64]
+
+#: share of the largest amplitude above which a point counts as near the peak; below it a response may not slip at all,
+#: and a motion without damping takes thousands of periods to become steady
+TOP = 0.9
+
+
+@dataclass(frozen=True)
+class Peak:
+    """A place of a response curve: excitation frequency [rad/s] and fundamental amplitude; nan where there is none."""
+
+    omega: float
+    amplitude: float
+
+
+NOWHERE = Peak(np.nan, np.nan)
+
+
+def amplitude_peak(omega: Array, amplitude: Array) -> Peak:
+    """Largest amplitude; none at the ends of the range.
+
+    1/a^2, which is almost a parabola of the frequency at a resonance, is drawn through the three points around the
+    largest one. Across the top of a response the frequency never turns round, even where the curve folds.
+    """
+    top = int(np.argmax(amplitude))
+    if top in (0, len(amplitude) - 1):
+        return NOWHERE
+    offset = omega[top - 1 : top + 2] - omega[top]
+    curve = np.polyfit(offset, amplitude[top - 1 : top + 2] ** -2.0, 2)
+    place = -0.5 * curve[1] / curve[0]
+    return Peak(float(omega[top] + place), float(np.polyval(curve, place) ** -0.5))
+
+
+def quadrature(omega: Array, amplitude: Array, phase: Array) -> Peak:
+    """Where the response stands at a right angle to the force; the place nearest to the largest amplitude."""
+    length = curve_length(omega, amplitude)
+    cosine = PchipInterpolator(length, np.cos(phase))
+    roots = np.unique(cosine.roots(discontinuity=False, extrapolate=False))
+    if not len(roots):
+        return NOWHERE
+    place = roots[np.argmin(np.abs(roots - length[np.argmax(amplitude)]))]
+    values = PchipInterpolator(length, np.column_stack([omega, amplitude]))(place)
+    return Peak(float(values[0]), float(values[1]))
+
+
+def distance(peak: Peak, mode: ModeCurve, undamped: bool) -> float:
+    """(omega of the peak - omega of the mode at the same amplitude) / omega of the mode; the nearest sheet counts.
+
+    Parameters
+    ----------
+    undamped : compare with omega0 (meant for quadrature) instead of the damped omega (meant for the largest amplitude)
+    """
+    if not np.isfinite(peak.amplitude):
+        return float("nan")
+    values = [v.omega0 if undamped else v.omega for v in mode.all_at(peak.amplitude)]
+    differences = [(peak.omega - omega) / omega for omega in values]
+    return min(differences, key=abs, default=float("nan"))
+
+
+def peak_table(forced: Mapping[str, Array], modes: Mapping[str, ModeCurve]) -> dict[str, Array]:
+    """Columns of `<forced>_peaks.csv`, one row per level, from the columns of the forced analysis.
+
+    `distance_<mode>` is at the largest amplitude against omega, `quadrature_distance_<mode>` at phase quadrature
+    against omega0, both relative and at the same amplitude (:func:`distance`).
+    """
+    levels = np.unique(forced["level"])
+    rows = [{key: value[forced["level"] == level] for key, value in forced.items()} for level in levels]
+    peaks = [amplitude_peak(row["omega"], row["amplitude"]) for row in rows]
+    turns = [quadrature(row["omega"], row["amplitude"], row["phase"]) for row in rows]
+    table = {"level": levels, **_columns("", peaks), **_columns("quadrature_", turns)}
+    for name, mode in modes.items():
+        table[f"distance_{name}"] = np.array([distance(peak, mode, False) for peak in peaks])
+        table[f"quadrature_distance_{name}"] = np.array([distance(turn, mode, True) for turn in turns])
+    return table
+
+
+def points_around_peak(amplitude: Array, omega: Array, count: int) -> list[int]:
+    """`count` points of a response between the frequencies of `TOP` times its peak, the peak among them."""
+    top = int(np.argmax(amplitude))
+    high = np.flatnonzero(amplitude >= TOP * amplitude[top])
+    wanted = np.linspace(omega[high].min(), omega[high].max(), count)
+    chosen = {int(high[np.argmin(np.abs(omega[high] - value))]) for value in wanted}
+    nearest = min(chosen, key=lambda i: abs(float(omega[i] - omega[top])))
+    return sorted(chosen - {nearest} | {top})
+
+
+def _columns(prefix: str, peaks: list[Peak]) -> dict[str, Array]:
+    return {
+        f"{prefix}frequency_hz": np.array([peak.omega for peak in peaks]) / (2.0 * np.pi),
+        f"{prefix}amplitude": np.array([peak.amplitude for peak in peaks]),
+    }
+
+
+def curve_length(omega: Array, amplitude: Array) -> Array:
+    """Length along a response up to each point, both axes scaled by their range."""
+    steps = np.hypot(np.diff(omega) / np.ptp(omega), np.diff(amplitude) / np.ptp(amplitude))
+    return np.concatenate([[0.0], np.cumsum(steps)])

@@ -1,0 +1,52 @@
+"""Pictures of a finished or running run, from its results alone; imported (with matplotlib) only on demand."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, cast
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from .data import Run
+
+    Family = Callable[[Run], Iterator[tuple[str, Figure]]]
+
+FAMILIES = ("trajectories", "backbone", "phase_planes", "limit_cycles", "forced", "free_decay", "study")
+
+
+def plot_run(run_folder: str | Path, only: Sequence[str] | None = None) -> list[Path]:
+    """Make every picture that the results allow; nothing is solved.
+
+    Parameters
+    ----------
+    run_folder : folder with results.h5 and the analyses' tables
+    only : names of analyses or of picture families; None for all
+
+    Returns
+    -------
+    The PNG files written, `<analysis>_<picture>.png` in the run folder.
+    """
+    from . import style
+    from .data import Run
+
+    run = Run(run_folder)
+    written = []
+    with style.rules():
+        for family in FAMILIES:
+            for name, figure in _family(family)(run):
+                if only is None or family in only or _of_analysis(name, run, only):
+                    written.append(style.save(figure, run.folder / f"{name}.png"))
+    return written
+
+
+def _family(name: str) -> Family:
+    return cast("Family", import_module(f"{__name__}.{name}").figures)
+
+
+def _of_analysis(picture: str, run: Run, only: Sequence[str]) -> bool:
+    """The longest analysis name that the picture's name starts with is the analysis it shows."""
+    owners = [name for name in (*run.analyses, *run.tables()) if picture == name or picture.startswith(name + "_")]
+    return bool(owners) and max(owners, key=len) in only

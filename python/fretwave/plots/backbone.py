@@ -1,0 +1,186 @@
+"""Frequency and damping against amplitude: the backbone (paper's figure 3), and under negative damping (figure 5)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from . import style
+from .data import Analysis, Run, Table
+
+#: analyses belong in one picture when their stuck asymptotes agree to this relative difference
+SAME_MODE = 1e-6
+#: half width of the close-up of the folds, in widths of the interval between them
+CLOSE_UP = 2.5
+LINES = ("-", (0, (5, 1.5)), (0, (1, 1)))
+
+
+def figures(run: Run) -> Iterator[tuple[str, Figure]]:
+    """One picture per linear mode with all methods in it, and one per analysis whose damping changes sign."""
+    modes = run.of_kind("mode")
+    flutter = [mode for mode in modes if _unstable(mode)]
+    for group in _same_mode([mode for mode in modes if mode not in flutter]):
+        yield f"{group[0].name}_backbone", draw(group)
+    for mode in flutter:
+        yield f"{mode.name}_backbone", draw([mode], _shifted(run, mode))
+
+
+def draw(modes: Sequence[Analysis], shifted: Mapping[str, Table] | None = None) -> Figure:
+    """Frequency above damping, over a common logarithmic amplitude axis."""
+    figure, (upper, lower) = style.new_figure(6.6, rows=2, sharex=True)
+    _curves(upper, modes, "frequency_hz")
+    _curves(lower, modes, "zeta")
+    _asymptotes(upper, modes[0])
+    for (method, table), line in zip((shifted or {}).items(), ("--", ":")):
+        look = {"linestyle": line, "color": style.ORANGE, "linewidth": 1.4, "zorder": 1.5}
+        name = f"{method} without dampers, damping added afterwards"
+        lower.plot(table["amplitude"], 100.0 * table["zeta_shifted"], label=name, **look)
+    if any(_unstable(mode) for mode in modes):
+        _limit_cycles(upper, lower, modes[0])
+    for mode, colour in zip(modes, style.PALETTE):
+        _peak(lower, mode, colour)
+    _close_up(upper, modes, "frequency_hz", (0.60, 0.34, 0.34, 0.46))
+    _close_up(lower, modes, "zeta", (0.72, 0.44, 0.26, 0.50))
+    _finish(figure, upper, lower, modes)
+    return figure
+
+
+def _curves(axes: Axes, modes: Sequence[Analysis], column: str) -> None:
+    """Every mode's curve, and the folds of the first."""
+    factor = 100.0 if column == "zeta" else 1.0
+    for mode, colour, line in zip(modes, style.PALETTE, LINES):
+        curve = mode.curve().sampled()
+        axes.plot(curve["amplitude"], factor * curve[column], color=colour, linestyle=line, label=_name(mode))
+    points = modes[0].met("fold")
+    if points:
+        amplitude, values = modes[0].columns["amplitude"][points], factor * modes[0].columns[column][points]
+        axes.plot(amplitude, values, "D", color=style.INK, markersize=4.5, label="fold in amplitude", zorder=5)
+
+
+def _close_up(axes: Axes, modes: Sequence[Analysis], column: str, place: tuple[float, ...]) -> None:
+    """Inset around the folds, which are too narrow to be seen on the whole axis."""
+    folds = modes[0].columns["amplitude"][modes[0].met("fold")]
+    if len(folds) < 2:
+        return
+    low, high = folds.min(), folds.max()
+    width = CLOSE_UP * (high - low)
+    inset = axes.inset_axes(place)
+    _curves(inset, modes, column)
+    curve = modes[0].curve().sampled()
+    near = (curve["amplitude"] > low - width) & (curve["amplitude"] < high + width)
+    values = curve[column][near] * (100.0 if column == "zeta" else 1.0)
+    inset.set_xlim(low - width, high + width)
+    inset.set_ylim(values.min() - 0.1 * np.ptp(values), values.max() + 0.15 * np.ptp(values))
+    inset.tick_params(labelsize=8.5)
+    inset.locator_params(nbins=4)
+    inset.set_title("around the folds", fontsize=9.5)
+
+
+def _asymptotes(axes: Axes, mode: Analysis) -> None:
+    """Linear frequencies with the contact stuck (dashed) and without it (dash-dotted)."""
+    for key, name, line in (("stuck", "stuck", "--"), ("free", "free", "-.")):
+        omega = mode.asymptote(key)
+        if omega is None:
+            continue
+        frequency = omega / (2.0 * np.pi)
+        axes.axhline(frequency, color=style.GREY, linestyle=line, linewidth=1.2, zorder=1)
+        above = frequency >= np.mean(mode.columns["frequency_hz"])
+        axes.annotate(
+            f"{name} {frequency:.4g} Hz",
+            (1.0 if above else 0.0, frequency),
+            (-4 if above else 4, -4 if above else 4),
+            xycoords=("axes fraction", "data"),
+            textcoords="offset points",
+            ha="right" if above else "left",
+            va="top" if above else "bottom",
+            color=style.GREY,
+            fontsize=10,
+        )
+
+
+def _peak(axes: Axes, mode: Analysis, colour: str) -> None:
+    point = _peak_point(mode)
+    peak = [mode.columns["amplitude"][point]], [100.0 * mode.columns["zeta"][point]]
+    axes.plot(*peak, "*", color=colour, markeredgecolor=style.INK, markersize=12, zorder=6)
+
+
+def _peak_point(mode: Analysis) -> int:
+    """Point of largest damping: the located one when there is one."""
+    zeta = mode.columns["zeta"]
+    return max(mode.met("peak_damping") or range(len(zeta)), key=lambda i: float(zeta[i]))
+
+
+def _name(mode: Analysis) -> str:
+    """Method, harmonics and the peak's numbers."""
+    point = _peak_point(mode)
+    zeta, amplitude = 100.0 * mode.columns["zeta"][point], mode.columns["amplitude"][point]
+    return f"{mode.method()}, {_harmonics(mode)}: peak ζ {zeta:.3g} % at {amplitude:.3g} {mode.unit('amplitude')}"
+
+
+def _limit_cycles(upper: Axes, lower: Axes, mode: Analysis) -> None:
+    """Zeros of the damping: filled where damping grows with amplitude (stable), open where it falls."""
+    lower.axhline(0.0, color=style.INK, linewidth=1.0, zorder=2)
+    low, high = lower.get_ylim()
+    lower.axhspan(low, 0.0, color=style.RED, alpha=0.07, zorder=0)
+    lower.set_ylim(low, high)
+    for crossing in mode.curve().crossings():
+        face = style.GREEN if crossing.stable else "white"
+        look = {"marker": "o", "markersize": 8, "markerfacecolor": face, "markeredgecolor": style.INK, "zorder": 6}
+        kind = "stable limit cycle (attractor)" if crossing.stable else "unstable limit cycle"
+        upper.plot([crossing.amplitude], [crossing.omega / (2.0 * np.pi)], linestyle="", label=kind, **look)
+        lower.plot([crossing.amplitude], [0.0], linestyle="", label=kind, **look)
+        text = f"a = {style.number(crossing.amplitude)} {mode.unit('amplitude')}"
+        # beside a falling curve there is room above the zero line, beside a rising one below it
+        place = (9, -14) if crossing.stable else (9, 7)
+        lower.annotate(text, (crossing.amplitude, 0.0), place, textcoords="offset points", fontsize=10)
+
+
+def _finish(figure: Figure, upper: Axes, lower: Axes, modes: Sequence[Analysis]) -> None:
+    mode = modes[0]
+    amplitude = np.concatenate([m.columns["amplitude"] for m in modes])
+    dof = mode.dofs[mode.normalised_dof()] if mode.dofs else ""
+    style.log_amplitude(lower, amplitude)
+    upper.set_ylabel(style.label("Frequency ω/2π", "Hz"))
+    lower.set_ylabel(style.label("Damping ratio ζ", "%"))
+    lower.set_xlabel(style.label(f"Modal amplitude of {dof}".rstrip(" of"), mode.unit("amplitude")))
+    style.legend_outside(figure, lower, columns=2)
+
+
+def _harmonics(mode: Analysis) -> str:
+    orders = [int(label.rstrip("cs")) for label in mode.labels]
+    return f"H = {max(orders)}" if orders else ""
+
+
+def _shifted(run: Run, mode: Analysis) -> dict[str, Table]:
+    """Modes with the linear damping added afterwards, by method, as kept by the analysis of the limit cycles."""
+    tables = {}
+    for motions, of in run.compared("limit_cycle"):
+        for twin in run.of_kind("mode") if of is mode else ():
+            table = run.table(f"{motions.name}_shifted_{twin.name}")
+            if table is not None:
+                tables[twin.method()] = table
+    return tables
+
+
+def _unstable(mode: Analysis) -> bool:
+    return bool((mode.columns["zeta"] < 0.0).any())
+
+
+def _same_mode(modes: Sequence[Analysis]) -> list[list[Analysis]]:
+    groups: list[list[Analysis]] = []
+    for mode in modes:
+        match = [group for group in groups if _close(group[0].asymptote("stuck"), mode.asymptote("stuck"))]
+        if match:
+            match[0].append(mode)
+        else:
+            groups.append([mode])
+    return groups
+
+
+def _close(one: float | None, other: float | None) -> bool:
+    if one is None or other is None:
+        return one is other
+    return abs(one - other) <= SAME_MODE * abs(one)

@@ -1,0 +1,108 @@
+"""Amplitude in time from low, intermediate and high starts, with the predicted limit cycles (paper's figure 6)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ..harmonic_motion import motion
+from . import style
+from .data import Analysis, Run, Table
+
+#: top of the axes, in largest starts or predictions; what goes beyond has left the picture
+HEIGHT = 4.0
+NAMES = {1: ("start",), 2: ("low start", "high start"), 3: ("low start", "intermediate start", "high start")}
+
+
+def figures(run: Run) -> Iterator[tuple[str, Figure]]:
+    """Per limit-cycle analysis the envelopes, and the phase planes when the motion was kept."""
+    for motions, mode in run.compared("limit_cycle"):
+        yield f"{motions.name}_envelopes", envelopes(mode, motions)
+        if all(len(motions.history(start)) for start, _ in motions.starts()):
+            yield f"{motions.name}_phase_planes", phase_planes(mode, motions)
+
+
+def envelopes(mode: Analysis, motions: Analysis) -> Figure:
+    """Fundamental amplitude of every cycle against time, all starts on one axes."""
+    figure, axes = style.new_figure(4.6)
+    table, starts, unit = motions.columns, motions.starts(), mode.unit("amplitude")
+    for (number, start), colour, name in zip(starts, style.PALETTE, _names(len(starts))):
+        rows = table["start"] == number
+        time, amplitude = table["time"][rows], table["amplitude"][rows]
+        axes.plot(time, amplitude, color=colour, label=f"{name}, a = {start:g} {unit}")
+        if time[-1] < 0.9 * table["time"].max():
+            axes.plot(time[-1:], amplitude[-1:], "^", color=colour)
+            end = time[-1], amplitude[-1]
+            axes.annotate("diverges, stopped", end, (8, 0), textcoords="offset points", va="center")
+    _predicted(axes, mode)
+    axes.set(yscale="log", xlim=(0.0, _settled(table)), ylim=_visible(mode, motions))
+    axes.set_xlabel(style.label("Time", "s"))
+    dof = mode.dofs[mode.normalised_dof()] if mode.dofs else ""
+    axes.set_ylabel(style.label(f"Amplitude of {dof} per cycle", mode.unit("amplitude")))
+    style.plain_numbers(axes.yaxis)
+    style.legend_outside(figure, axes, columns=3)
+    return figure
+
+
+def _visible(mode: Analysis, motions: Analysis) -> tuple[float, float]:
+    """Amplitudes shown: everything, but not far beyond the starts and predictions."""
+    amplitude = motions.columns["amplitude"]
+    largest = [crossing.amplitude for crossing in mode.curve().crossings()] + [start for _, start in motions.starts()]
+    return 0.7 * float(amplitude.min()), min(HEIGHT * max(largest), 1.4 * float(amplitude.max()))
+
+
+def _settled(table: Table) -> float:
+    """Time shown: half as long again as the slowest start needs to come within 2 % of where it ends."""
+    last = 0.0
+    for start in np.unique(table["start"]):
+        rows = table["start"] == start
+        amplitude, time = table["amplitude"][rows], table["time"][rows]
+        away = np.flatnonzero(np.abs(amplitude / amplitude[-1] - 1.0) > 0.02)
+        last = max(last, float(time[away[-1]]) if len(away) else 0.0)
+    return min(1.5 * last, float(table["time"].max())) or float(table["time"].max())
+
+
+def _predicted(axes: Axes, mode: Analysis) -> None:
+    for crossing in mode.curve().crossings():
+        kind = "stable" if crossing.stable else "unstable"
+        name = f"predicted, {kind}, a = {style.number(crossing.amplitude)} {mode.unit('amplitude')}"
+        axes.axhline(crossing.amplitude, color=style.INK, linestyle="--" if crossing.stable else ":", label=name)
+
+
+def phase_planes(mode: Analysis, motions: Analysis) -> Figure:
+    """Velocity against displacement of the normalised dof, one axes per start, with the predicted limit cycle."""
+    starts = motions.starts()
+    figure, axes = style.new_figure(3.6, columns=len(starts), squeeze=False)
+    orbits = predicted_orbits(mode)
+    for (number, start), plane, colour, name in zip(starts, axes[0], style.PALETTE, _names(len(starts))):
+        _, x, v = motions.history(number)
+        plane.plot(x, v, color=colour, linewidth=0.5)
+        for kind, x, v in orbits:
+            line = "--" if kind == "stable" else ":"
+            plane.plot(x, v, color=style.INK, linestyle=line, label=f"predicted {kind} limit cycle")
+        plane.set_title(f"{name}, a = {start:g} {mode.unit('amplitude')}")
+        plane.set_xlabel(style.label("Displacement", mode.unit("amplitude")))
+    axes[0, 0].set_ylabel(style.label("Velocity", f"{mode.unit('amplitude')}/s"))
+    axes[0, 0].plot([], [], color=style.GREY, linewidth=0.8, label="time integration")
+    style.legend_outside(figure, axes[0, 0], columns=3)
+    return figure
+
+
+def predicted_orbits(mode: Analysis) -> list[tuple[str, style.Array, style.Array]]:
+    """Closed orbits of the normalised dof at the zeros of the damping, from the nearest point scaled to the zero."""
+    orbits = []
+    for crossing in mode.curve().crossings() if mode.labels else []:
+        away = np.abs(mode.columns["amplitude"] / crossing.amplitude - 1.0) + np.abs(mode.columns["zeta"])
+        point = int(np.argmin(away))
+        coefficients = mode.coefficients([point])[0] * crossing.amplitude / mode.columns["amplitude"][point]
+        x, v = motion(mode.labels, coefficients, 0.0, crossing.omega)
+        dof = mode.normalised_dof()
+        orbits.append(("stable" if crossing.stable else "unstable", x[:, dof], v[:, dof]))
+    return orbits
+
+
+def _names(count: int) -> tuple[str, ...]:
+    return NAMES.get(count, tuple(f"start {i + 1}" for i in range(count)))

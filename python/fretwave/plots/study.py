@@ -1,0 +1,53 @@
+"""Error against run time of a study, double logarithmic."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from . import style
+from .data import Run, Table
+
+SWEEPS = {"harmonics": ("H", "o-"), "samples": ("$N_t$", "s--"), "tolerance": ("tol", "^:")}
+ERRORS = {"zeta_error": "Damping: largest error / peak ζ", "omega_error": "Frequency: largest relative error"}
+#: an error of exactly zero cannot stand on a logarithmic axis
+FLOOR = 1e-16
+
+
+def figures(run: Run) -> Iterator[tuple[str, Figure]]:
+    """The picture of `study.csv`, when there is one."""
+    table = run.table("study")
+    if table is not None:
+        yield "study", draw(table)
+
+
+def draw(table: Table) -> Figure:
+    """One axes per error, one line per swept setting; the reference run is left out."""
+    figure, axes = style.new_figure(4.8, columns=len(ERRORS))
+    for plane, (column, title) in zip(axes, ERRORS.items()):
+        for (sweep, (symbol, line)), colour in zip(SWEEPS.items(), style.PALETTE):
+            _sweep(plane, table, sweep, symbol, column, line, colour)
+        plane.set(xscale="log", yscale="log", title=title)
+        plane.set_xlabel(style.label("Run time of the branch", "s"))
+        style.plain_numbers(plane.xaxis, table["wall_s"])
+    axes[0].set_ylabel("Error against the finest run")
+    axes[0].plot([], [], "o-", color=style.GREY, alpha=0.35, label="error estimate of the run")
+    style.legend_outside(figure, axes[0], columns=4)
+    return figure
+
+
+def _sweep(axes: Axes, table: Table, sweep: str, symbol: str, column: str, line: str, colour: str) -> None:
+    rows = np.flatnonzero((table["sweep"] == sweep) & (table["reference"] == 0.0))
+    if not len(rows):
+        return
+    time, error = table["wall_s"][rows], np.maximum(table[column][rows], FLOOR)
+    axes.plot(time, error, line, color=colour, label=f"{sweep} ({symbol})")
+    if column == "zeta_error":
+        axes.plot(time, table["error_estimate"][rows], line, color=colour, alpha=0.35)
+    for row, x, y in zip(rows, time, error):
+        value = table[sweep][row]
+        text = f"{value:.0e}" if sweep == "tolerance" else f"{value:g}"
+        axes.annotate(text, (x, y), (4, 4), textcoords="offset points", fontsize=9, color=colour)

@@ -1,0 +1,111 @@
+"""Look of all pictures: readable at the width of a README, colour-blind-safe, units in every label."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import AbstractContextManager
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+import numpy.typing as npt
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+Array = npt.NDArray[Any]
+
+#: Okabe and Ito's palette: distinguishable under every common colour-vision deficiency
+BLUE, ORANGE, GREEN, RED, SKY, PURPLE = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#56B4E9", "#CC79A7"
+PALETTE = (BLUE, ORANGE, GREEN, RED, PURPLE, SKY)
+GREY = "#666666"
+INK = "#222222"
+
+WIDTH = 8.0  # [inch]; with DPI 130 about 1040 pixels, a README shows 800 to 900
+DPI = 130
+
+RULES: dict[str, Any] = {
+    "font.size": 11.0,
+    "axes.titlesize": 11.5,
+    "axes.labelsize": 11.0,
+    "legend.fontsize": 9.5,
+    "xtick.labelsize": 10.0,
+    "ytick.labelsize": 10.0,
+    "axes.grid": True,
+    "grid.color": "#dddddd",
+    "grid.linewidth": 0.6,
+    "axes.axisbelow": True,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.edgecolor": GREY,
+    "axes.titlelocation": "left",
+    "lines.linewidth": 1.8,
+    "legend.frameon": True,
+    "legend.framealpha": 0.9,
+    "legend.edgecolor": "none",
+    "axes.formatter.useoffset": False,
+}
+
+
+def rules() -> AbstractContextManager[None]:
+    """Matplotlib settings of all pictures, for a `with` block."""
+    context: AbstractContextManager[None] = matplotlib.rc_context(RULES)
+    return context
+
+
+def new_figure(height: float, rows: int = 1, columns: int = 1, **options: Any) -> tuple[Figure, Any]:
+    """A figure of README width and its axes, as from `subplots`; no window and no global state."""
+    figure = Figure(figsize=(WIDTH, height), dpi=DPI, layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure, figure.subplots(rows, columns, **options)
+
+
+def save(figure: Figure, path: Path) -> Path:
+    """Write a PNG."""
+    figure.savefig(path, dpi=DPI)
+    return path
+
+
+def label(text: str, unit: str = "") -> str:
+    """Axis label with its unit: "Amplitude of m1 [m]"; no bracket for a pure number."""
+    return f"{text} [{unit}]" if unit and unit not in ("1", "-") else text
+
+
+def shades(count: int) -> list[Any]:
+    """Colours of an ordered family (amplitudes, levels): dark to light, equal steps in lightness."""
+    colours = matplotlib.colormaps["viridis"](np.linspace(0.0, 0.88, max(count, 1)))
+    return [tuple(colour) for colour in colours]
+
+
+def number(value: float, digits: int = 3) -> str:
+    """Short plain number: 0.134, 25.3, 1.2e-05."""
+    return f"{value:.{digits}g}"
+
+
+def log_amplitude(axes: Axes, values: Array | Sequence[float]) -> None:
+    """Logarithmic amplitude axis with plain numbers at 1, 2, 5 of each decade, fitted to the values."""
+    low, high = float(np.min(values)), float(np.max(values))
+    axes.set_xscale("log")
+    axes.set_xlim(low, high)
+    plain_numbers(axes.xaxis)
+
+
+def plain_numbers(axis: Axis, values: Array | Sequence[float] = (1.0, 10.0)) -> None:
+    """Ticks of a logarithmic axis at 1, 2, 5 of each decade (closer within one), as 0.05 and not as a power."""
+    short = np.max(values) < 8.0 * np.min(values)
+    axis.set_major_locator(LogLocator(base=10.0, subs=(1.0, 1.5, 2.0, 3.0, 4.0, 6.0) if short else (1.0, 2.0, 5.0)))
+    axis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def legend_outside(figure: Figure, axes: Axes, columns: int = 4, title: str | None = None) -> None:
+    """One legend above the axes, where it cannot cover a curve; every name once."""
+    handles, names = axes.get_legend_handles_labels()
+    entries = dict(zip(reversed(names), reversed(handles)))
+    names = list(dict.fromkeys(names))
+    legend = figure.legend([entries[n] for n in names], names, loc="upper center", ncols=columns, title=title)
+    height = legend.get_window_extent(figure.canvas.get_renderer()).height / figure.bbox.height
+    figure.get_layout_engine().set(rect=(0.0, 0.0, 1.0, 0.99 - height))

@@ -1,0 +1,62 @@
+"""Closed trajectories of a mode in the plane of two dofs, at several amplitudes (paper's figure 2)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from . import style
+from .data import Analysis, Run, motion_of
+
+CURVES = 7
+
+
+def figures(run: Run) -> Iterator[tuple[str, Figure]]:
+    """One picture per mode analysis of a model with at least two dofs."""
+    for mode in run.of_kind("mode"):
+        if mode.labels and len(mode.dofs) > 1:
+            yield f"{mode.name}_trajectories", draw(mode)
+
+
+def draw(mode: Analysis) -> Figure:
+    """Left as they are, right divided by the amplitude, which shows curvature and opening at every level."""
+    points = spread(mode, CURVES)
+    across, up = mode.normalised_dof(), other_dof(mode)
+    figure, (left, right) = style.new_figure(4.3, columns=2)
+    for point, colour in zip(points, style.shades(len(points))):
+        amplitude = mode.columns["amplitude"][point]
+        x, _ = motion_of(mode, point)
+        name = f"{style.number(amplitude)} {mode.unit('amplitude')}".strip()
+        left.plot(x[:, across], x[:, up], color=colour, label=name)
+        right.plot(x[:, across] / amplitude, x[:, up] / amplitude, color=colour)
+    unit = mode.unit("amplitude")
+    left.set(xlabel=style.label(f"Displacement of {mode.dofs[across]}", unit))
+    left.set(ylabel=style.label(f"Displacement of {mode.dofs[up]}", unit))
+    right.set(xlabel=f"{mode.dofs[across]} / modal amplitude", ylabel=f"{mode.dofs[up]} / modal amplitude")
+    style.legend_outside(figure, left, columns=CURVES, title=f"Modal amplitude, {mode.method()}")
+    return figure
+
+
+def other_dof(mode: Analysis) -> int:
+    """The dof whose motion differs most from the normalised one: where the contact is felt."""
+    across = mode.normalised_dof()
+    x, _ = motion_of(mode, int(np.argmax(mode.columns["zeta"])))
+    reference = x[:, across]
+    share = x.T @ reference / (reference @ reference)
+    rest = np.linalg.norm(x - np.outer(reference, share), axis=0)
+    rest[across] = -1.0
+    return int(np.argmax(rest))
+
+
+def spread(mode: Analysis, count: int) -> list[int]:
+    """Points at `count` amplitudes: reported ones when there are enough, else even in log amplitude."""
+    amplitude = mode.columns["amplitude"]
+    reported = mode.met("report")
+    pool = np.array(reported if len(reported) >= 3 else range(len(mode)))
+    if len(pool) <= count:
+        return sorted(pool.tolist(), key=lambda i: float(amplitude[i]))
+    wanted = np.linspace(np.log(amplitude[pool].min()), np.log(amplitude[pool].max()), count)
+    nearest = [int(pool[np.argmin(np.abs(np.log(amplitude[pool]) - value))]) for value in wanted]
+    return sorted(set(nearest), key=lambda i: float(amplitude[i]))

@@ -1,0 +1,214 @@
+"""``fretwave study``: error against run time of a mode analysis over harmonics, samples and tolerance."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+
+from .analyses.branch import step_control
+from .casefile import Case, load_case
+from .console import Console
+from .errors import EXIT_DONE, InputError, NotConverged
+from .parallel import on_first_rank
+from .petsc_options import AnalysisOptions
+from .run import build_model
+from .schema import ModeAnalysis
+from .study_plan import Outcome, Plan, Settings, Study, common_amplitudes
+from .study_report import markdown, write_csv
+
+#: each branch is solved this often; its time is that of the fastest, which other work on the machine disturbs least
+REPEATS = 3
+#: amplitudes at which runs are compared
+COUNT = 24
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Run a study; returns the exit code. Collective."""
+    from .cli import _world
+
+    options = _parser().parse_args(arguments)
+    comm = _world()
+    case = on_first_rank(comm, lambda: load_case(options.case, options.overrides))
+    analysis, plan = _analysis(case, options.analysis), _plan(case, options)
+    console = Console(comm.rank == 0, lambda line: None)
+    study = Study(plan, common_amplitudes(min(analysis.amplitude), max(analysis.amplitude), COUNT))
+    console.line(f"study of '{analysis.name}': {len(plan.sweeps())} runs, the finest is {_text(plan.reference)}")
+    with build_model(case, analysis.dampers, comm) as model:
+        solver = _Solver(case, analysis, model, study, options.repeats)
+        study.run(solver.solve, lambda sweep, settings: console.line(_progress(study, sweep, settings)))
+    if not study.table():
+        raise _no_reference(study)
+    folder = options.out or Path("runs") / f"{case.name}_study"
+    on_first_rank(comm, lambda: _write(study, folder, console))
+    return EXIT_DONE
+
+
+class _Solver:
+    """Solves the whole branch of one analysis at any settings."""
+
+    def __init__(self, case: Case, analysis: ModeAnalysis, model: Any, study: Study, repeats: int) -> None:
+        import fretwave
+
+        self.case, self.analysis, self.model, self.study, self.repeats = case, analysis, model, study, repeats
+        self.start = fretwave.linear_modes(model, count=analysis.linear_mode, contact="stuck")[-1]
+
+    def solve(self, settings: Settings) -> Outcome | str:
+        """The branch's values at the study's amplitudes, or why it has none. Collective."""
+        tried = [self._once(settings)]
+        while len(tried) < self.repeats and not isinstance(tried[0], str):
+            tried.append(self._once(settings))
+        first = tried[0]
+        if isinstance(first, str):
+            return first
+        return replace(first, wall_s=min(run.wall_s for run in tried if isinstance(run, Outcome)))
+
+    def _once(self, settings: Settings) -> Outcome | str:
+        import fretwave
+
+        analysis = self.analysis
+        harmonics = fretwave.choose_harmonics(self.model, settings.harmonics, settings.samples, analysis.retain)
+        options = AnalysisOptions("study_", [analysis.petsc, f"-snes_atol {settings.tolerance!r}"])
+        with options.inserted():
+            problem = fretwave.NonlinearMode(
+                self.model,
+                harmonics,
+                method=analysis.method,
+                dof=self.case.dof(analysis.normalise),
+                start=self.start,
+                prefix="study_",
+            )
+            try:
+                return self._follow(problem)
+            finally:
+                problem.destroy()
+
+    def _follow(self, problem: Any) -> Outcome | str:
+        """Only the time spent between points counts: diagnostics are not part of the solution."""
+        import fretwave
+
+        low, high = self.analysis.amplitude
+        rows, newton, wall = [], 0, 0.0
+        began = time.perf_counter()
+        branch = fretwave.Continuation(
+            problem,
+            problem.initial(low),
+            stop=(low, high),
+            steps=step_control(self.analysis.step),
+            report_at=[float(a) for a in self.study.amplitudes],
+        )
+        for point in branch:
+            wall += time.perf_counter() - began
+            newton += point.newton
+            rows.append(_row(problem, point))
+            began = time.perf_counter()
+        converged, reason = branch.converged, branch.reason
+        branch.destroy()
+        return _outcome(rows, newton, wall) if converged else str(reason)
+
+
+def _row(problem: Any, point: Any) -> dict[str, Any]:
+    state = problem.state(point.y)
+    reported = "report" in point.event
+    estimate = problem.diagnostics(point.y)["error_estimate"] if reported else np.nan
+    return {**{key: state[key] for key in ("amplitude", "omega", "zeta")}, "estimate": estimate, "reported": reported}
+
+
+def _outcome(rows: list[dict[str, Any]], newton: int, wall: float) -> Outcome:
+    reported = [row for row in rows if row["reported"]]
+    top = max(rows, key=lambda row: float(row["zeta"]))
+    amplitude, omega, zeta, estimate = (
+        np.array([row[key] for row in reported]) for key in ("amplitude", "omega", "zeta", "estimate")
+    )
+    return Outcome(amplitude, omega, zeta, estimate, top["zeta"], top["amplitude"], len(rows), newton, wall)
+
+
+def _write(study: Study, folder: Path, console: Console) -> None:
+    from .plots import plot_run
+
+    folder.mkdir(parents=True, exist_ok=True)
+    rows, notes = study.table(), _notes(study)
+    write_csv(rows, folder / "study.csv")
+    (folder / "study.md").write_text(markdown(rows, notes), encoding="utf-8")
+    pictures = plot_run(folder, ["study"])
+    for line in markdown(rows, notes).splitlines():
+        console.line(line)
+    console.line(f"written: {', '.join(str(path) for path in (folder / 'study.csv', folder / 'study.md', *pictures))}")
+
+
+def _notes(study: Study) -> list[str]:
+    notes = [f"Compared at {len(study.compared)} of {len(study.amplitudes)} amplitudes."]
+    if len(study.left_out):
+        places = ", ".join(f"{a:.4g}" for a in study.left_out)
+        notes.append(f"Left out, because some run has no or several solutions there: {places}.")
+    notes += [f"No whole branch with {_text(settings)}: {reason}." for settings, reason in study.failures.items()]
+    return notes
+
+
+def _progress(study: Study, sweep: str, settings: Settings) -> str:
+    run = study.outcomes.get(settings)
+    if run is None:
+        return f"{sweep}: {_text(settings)}: {study.failures[settings]}"
+    cost = f"{run.points} points, {run.newton} Newton iterations, {run.wall_s:.3f} s"
+    return f"{sweep}: {_text(settings)}: {cost}, peak zeta {100 * run.peak_zeta:.4f} % at {run.peak_amplitude:.4g}"
+
+
+def _text(settings: Settings) -> str:
+    return f"H = {settings.harmonics}, N_t = {settings.samples}, tolerance {settings.tolerance:.0e}"
+
+
+def _no_reference(study: Study) -> NotConverged:
+    finest = study.plan.reference
+    return NotConverged(
+        "the finest run of the study found no whole branch, so there is nothing to measure errors against",
+        where=_text(finest),
+        measured=study.failures.get(finest, "not run: fewer than two samples per period of the highest harmonic"),
+        fix="choose a less strict finest setting, for example --tolerance 1e-4,1e-8",
+    )
+
+
+def _analysis(case: Case, name: str | None) -> ModeAnalysis:
+    modes = [name for name, analysis in case.analyses.items() if isinstance(analysis, ModeAnalysis)]
+    chosen = name or next(iter(modes), None)
+    if chosen not in modes:
+        fix = f"--analysis {modes[0]}" if modes else "add an [[analysis]] of type mode to the case"
+        raise InputError("a study needs a mode analysis", "--analysis", name, ", ".join(modes) or None, fix)
+    return cast(ModeAnalysis, case.analyses[str(chosen)])
+
+
+def _plan(case: Case, options: argparse.Namespace) -> Plan:
+    """Sweeps of the command line, else of the case's table [study], else the defaults."""
+    table = getattr(case, "study", None)
+    plan = Plan()
+    for name in ("harmonics", "samples", "tolerance"):
+        values = getattr(options, name) or getattr(table, name, None)
+        plan = replace(plan, **{name: tuple(values)}) if values else plan
+    return plan
+
+
+def _list(kind: type) -> Any:
+    def parse(text: str) -> list[Any]:
+        return [kind(part) for part in text.split(",")]
+
+    parse.__name__ = f"list of {kind.__name__}"
+    return parse
+
+
+def _parser() -> argparse.ArgumentParser:
+    from .cli import _Parser
+
+    parser = _Parser(prog="fretwave study", description=__doc__)
+    parser.add_argument("case", type=Path, metavar="CASE", help="case file (TOML)")
+    parser.add_argument("--analysis", metavar="NAME", help="mode analysis to study (default: the first)")
+    parser.add_argument("--set", action="append", default=[], dest="overrides", metavar="KEY=VALUE", help="as for run")
+    parser.add_argument("--harmonics", type=_list(int), metavar="H,...", help="highest harmonics to sweep")
+    parser.add_argument("--samples", type=_list(int), metavar="N,...", help="time samples to sweep")
+    parser.add_argument("--tolerance", type=_list(float), metavar="T,...", help="Newton tolerances to sweep")
+    parser.add_argument("--repeats", type=int, default=REPEATS, help="times each branch is solved (default 3)")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="folder (default runs/<case>_study)")
+    return parser

@@ -1,0 +1,158 @@
+"""What a study runs and how its errors are measured; knows neither cases nor solvers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+#: a reported point belongs to an amplitude when it is this near; a loose Newton tolerance lets it miss by about itself
+MATCH = 1e-2
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Numerical settings of one run; `tolerance` is the norm of the dimensionless residual at which Newton stops."""
+
+    harmonics: int
+    samples: int
+    tolerance: float
+
+    def possible(self) -> bool:
+        """At least two samples per period of the highest harmonic."""
+        return self.samples > 2 * self.harmonics
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What one run found.
+
+    Attributes
+    ----------
+    amplitude, omega, zeta, error_estimate : (n,) at the reported points, in the order of the branch
+    peak_zeta, peak_amplitude : largest damping ratio and where it is
+    wall_s : time of the whole branch [s]
+    """
+
+    amplitude: Array
+    omega: Array
+    zeta: Array
+    error_estimate: Array
+    peak_zeta: float
+    peak_amplitude: float
+    points: int
+    newton: int
+    wall_s: float
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Sweeps of one setting at a time, the others at their finest: the common reference is the finest of all."""
+
+    harmonics: Sequence[int] = (1, 3, 7, 21, 41)
+    samples: Sequence[int] = (64, 128, 256, 512, 1024, 2048)
+    tolerance: Sequence[float] = (1e-3, 1e-4, 1e-6, 1e-8, 1e-10)
+
+    @property
+    def reference(self) -> Settings:
+        """The finest settings."""
+        return Settings(max(self.harmonics), max(self.samples), min(self.tolerance))
+
+    def sweeps(self) -> list[tuple[str, Settings]]:
+        """(name of the swept setting, settings) of every row of the table, coarse to fine."""
+        finest = self.reference
+        rows = [("harmonics", Settings(h, finest.samples, finest.tolerance)) for h in sorted(self.harmonics)]
+        rows += [("samples", Settings(finest.harmonics, n, finest.tolerance)) for n in sorted(self.samples)]
+        rows += [("tolerance", Settings(finest.harmonics, finest.samples, t)) for t in sorted(self.tolerance)[::-1]]
+        return [(name, settings) for name, settings in rows if settings.possible()]
+
+
+@dataclass
+class Study:
+    """Outcomes of a plan and the table made of them.
+
+    Attributes
+    ----------
+    amplitudes : at which runs are compared
+    left_out : amplitudes of these at which some run has several solutions (between two folds) or none
+    failures : settings that found no whole branch, and why
+    """
+
+    plan: Plan
+    amplitudes: Array
+    outcomes: dict[Settings, Outcome] = field(default_factory=dict)
+    failures: dict[Settings, str] = field(default_factory=dict)
+
+    def run(self, solve: Callable[[Settings], Outcome | str], report: Callable[[str, Settings], None]) -> None:
+        """Solve every setting once; `solve` returns the reason as text when there is no whole branch."""
+        for sweep, settings in self.plan.sweeps():
+            if settings in self.outcomes or settings in self.failures:
+                continue
+            found = solve(settings)
+            if isinstance(found, str):
+                self.failures[settings] = found
+            else:
+                self.outcomes[settings] = found
+            report(sweep, settings)
+
+    @property
+    def left_out(self) -> Array:
+        """Amplitudes that cannot be compared: a run meets them several times, or never."""
+        return np.array([a for a in self.amplitudes if a not in self.compared])
+
+    @property
+    def compared(self) -> Array:
+        """Amplitudes that every run meets exactly once."""
+        met = [[len(_at(run, a)) == 1 for a in self.amplitudes] for run in self.outcomes.values()]
+        return self.amplitudes[np.all(met, axis=0)] if met else self.amplitudes[:0]
+
+    def table(self) -> list[dict[str, float | int | str]]:
+        """One row per run and sweep; empty when the reference itself failed."""
+        reference = self.outcomes.get(self.plan.reference)
+        if reference is None:
+            return []
+        rows = self.plan.sweeps()
+        return [self._row(sweep, settings, reference) for sweep, settings in rows if settings in self.outcomes]
+
+    def _row(self, sweep: str, settings: Settings, reference: Outcome) -> dict[str, float | int | str]:
+        run = self.outcomes[settings]
+        omega, zeta, estimate = _values(run, self.compared)
+        omega_true, zeta_true, _ = _values(reference, self.compared)
+        return {
+            "sweep": sweep,
+            "harmonics": settings.harmonics,
+            "samples": settings.samples,
+            "tolerance": settings.tolerance,
+            "points": run.points,
+            "newton": run.newton,
+            "wall_s": run.wall_s,
+            "omega_error": _largest(np.abs(omega / omega_true - 1.0)),
+            "zeta_error": _largest(np.abs(zeta - zeta_true)) / abs(reference.peak_zeta),
+            "peak_zeta": run.peak_zeta,
+            "peak_amplitude": run.peak_amplitude,
+            "peak_zeta_error": abs(run.peak_zeta / reference.peak_zeta - 1.0),
+            "error_estimate": _largest(estimate),
+            "reference": int(settings == self.plan.reference),
+        }
+
+
+def common_amplitudes(first: float, last: float, count: int) -> Array:
+    """Even in log amplitude, strictly inside the branch."""
+    return np.geomspace(first, last, count + 2)[1:-1]
+
+
+def _at(run: Outcome, amplitude: float) -> npt.NDArray[np.intp]:
+    return np.flatnonzero(np.abs(run.amplitude / amplitude - 1.0) < MATCH)
+
+
+def _values(run: Outcome, amplitudes: Iterable[float]) -> tuple[Array, Array, Array]:
+    rows = [int(_at(run, a)[0]) for a in amplitudes]
+    return run.omega[rows], run.zeta[rows], run.error_estimate[rows]
+
+
+def _largest(values: Array) -> float:
+    return float(values.max()) if len(values) else float("nan")

@@ -1,0 +1,55 @@
+"""A study's table as CSV, as Markdown and on the terminal."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+Row = Mapping[str, "float | int | str"]
+
+#: heading of the printed table -> how a row fills it
+PRINTED = {
+    "sweep": "{sweep}",
+    "H": "{harmonics}",
+    "N_t": "{samples}",
+    "tolerance": "{tolerance:.0e}",
+    "points": "{points}",
+    "Newton": "{newton}",
+    "time [s]": "{wall_s:.3f}",
+    "peak zeta": "{peak_zeta:.6f}",
+    "error of peak": "{peak_zeta_error:.1e}",
+    "error of zeta": "{zeta_error:.1e}",
+    "error of omega": "{omega_error:.1e}",
+    "estimate": "{error_estimate:.1e}",
+}
+
+LEGEND = (
+    "Errors are against the finest run (marked): of peak zeta relative; of zeta the largest over the amplitudes that "
+    "all runs meet exactly once, divided by the peak; of omega the largest relative one over the same. The estimate is "
+    "the largest error_estimate there: the share of the contact force outside the retained harmonics."
+)
+
+
+def write_csv(rows: Sequence[Row], path: Path) -> Path:
+    """All columns, full digits."""
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(rows)
+    return path
+
+
+def markdown(rows: Sequence[Row], notes: Sequence[str] = ()) -> str:
+    """Aligned Markdown table with its legend; readable as plain text too."""
+    body = [[form.format(**row) for form in PRINTED.values()] for row in rows]
+    for cells, row in zip(body, rows):
+        cells[0] += " (finest)" if row["reference"] else ""
+    widths = [max(len(line[i]) for line in (list(PRINTED), *body)) for i in range(len(PRINTED))]
+    lines = [_line(PRINTED, widths), "|" + "|".join("-" * (width + 1) + ":" for width in widths) + "|"]
+    lines += [_line(cells, widths) for cells in body]
+    return "\n".join([*lines, "", LEGEND, *notes, ""])
+
+
+def _line(cells: Sequence[str] | Mapping[str, str], widths: Sequence[int]) -> str:
+    return "|" + "|".join(f" {cell:>{width}} " for cell, width in zip(cells, widths)) + "|"
