@@ -20,6 +20,7 @@ struct Motion {
 /// What a force evaluation leaves for its linearisation.
 struct Record {
   std::vector<double> df_du, df_dv;  ///< instantaneous tangents, samples x components x components x pairs; empty if zero
+  std::vector<double> march;         ///< a hereditary law's own flags and directions along its march
 };
 
 enum class Status : std::uint8_t { stick, slip, open };
@@ -39,9 +40,13 @@ class Law {
   virtual int pairs() const = 0;
   virtual bool uses_displacement() const { return true; }
   virtual bool uses_velocity() const { return true; }
+  /// The force depends on the path. Such a law marches two periods from its rest state and is read on the second (DESIGN fact 3).
+  virtual bool hereditary() const { return false; }
+  /// The static state the dynamics start from: relative displacement components x pairs, reached from zero in one step.
+  virtual void rest(double const* /*u*/) {}
   /// f(-u, -v) = -f(u, v): the motion may keep odd harmonics only.
   virtual bool odd() const { return false; }
-  /// Stiffness of the closed, stuck contact [N/m]; infinite means no relative motion at all.
+  /// Stiffness of the contact when stuck in its rest state [N/m] (0 for a pair that is open there); infinite means no relative motion at all.
   virtual double stuck_stiffness(int /*component*/, int /*pair*/) const { return std::numeric_limits<double>::infinity(); }
 
   /// Force on the pairs, and what its linearisation needs.

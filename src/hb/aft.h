@@ -37,6 +37,7 @@ class Aft {
  private:
   contact::Motion motion(double omega) const;
   void mirror(std::vector<double>& samples, double sign, int columns) const;
+  void columnwise(Exponents const&, double* D);
   void toeplitz_hankel(std::vector<double> const& tangent, std::vector<double>& T) const;
 
   Harmonics harmonics_;

@@ -21,8 +21,9 @@ HarmonicProblem::HarmonicProblem(model::Model const& model, Harmonics const& h, 
   if (dof < 0 || dof >= model.dofs())
     throw InputError("the chosen dof does not exist", std::to_string(dof), "0 to " + std::to_string(model.dofs() - 1), "choose a dof of the model");
   q_ = residual_.vector();
-  for (auto* v : {&Q_, &dQ_, &R_, &dR_, &excitation_}) *v = like(q_);
+  for (auto* v : {&Q_, &dQ_, &R_, &dR_, &excitation_, &static_}) *v = like(q_);
   check(VecSet(excitation_, 0));
+  check(VecSet(static_, 0));
   last_ = unknowns();
 }
 
@@ -44,8 +45,21 @@ void HarmonicProblem::unpack(Vec y) {
     ReadArray in(y);
     std::copy_n(in.data(), local_block_, WriteArray(q_).data());
   }
-  check(VecCopy(q_, Q_));
-  check(VecScale(Q_, motion_.amplitude));
+  check(VecWAXPY(Q_, motion_.amplitude, q_, static_));
+}
+
+void HarmonicProblem::add_mean(Vec per_dof, Vec blocks) {
+  ReadArray in(per_dof);
+  WriteArray out(blocks);
+  for (PetscInt i = 0; i < model().local_dofs(); ++i) out[i * harmonics().block_size()] += in[i];
+}
+
+void HarmonicProblem::preload(Vec x, Vec P) {
+  if (harmonics().orders()[0] != 0)
+    throw InputError("a preloaded structure moves about a mean that is not retained", "lowest harmonic " + std::to_string(harmonics().orders()[0]), "harmonic 0 retained", "retain all harmonics");
+  add_mean(x, static_);
+  add_mean(P, excitation_);
+  linearised_ = false;
 }
 
 void HarmonicProblem::residual(Vec y, Vec r) {
@@ -72,7 +86,7 @@ void HarmonicProblem::linearise(Vec y) {
   residual(y, unused);
 }
 
-// Q = a q: dQ = a (dq + q dlog a); r = R / (k a): dr = dR / (k a) - r dlog a
+// Q = Q_static + a q: dQ = a (dq + q dlog a); r = R / (k a): dr = dR / (k a) - r dlog a
 void HarmonicProblem::product(Vec y, Vec dy, Vec dr) {
   linearise(y);
   const auto dz = scalars(dy);
@@ -108,8 +122,8 @@ void HarmonicProblem::pattern(std::vector<PetscInt>& rows, std::vector<PetscInt>
 
 void HarmonicProblem::column(int j, double* v) {
   const double dlog = motion_.dlog_amplitude[j];
-  check(VecCopy(Q_, dQ_));
-  check(VecScale(dQ_, dlog));
+  check(VecCopy(q_, dQ_));
+  check(VecScale(dQ_, dlog * motion_.amplitude));
   residual_.product(dlog ? Vec(dQ_) : nullptr, &motion_.dexponents[j], dR_);
   check(VecAXPBY(dR_, -dlog, 1 / (stiffness_ * motion_.amplitude), R_));
   ReadArray in(dR_);
@@ -147,9 +161,9 @@ VecHandle HarmonicProblem::pack(Vec q, std::vector<double> const& z) const {
 VecHandle HarmonicProblem::coefficients(Vec y) {
   VecHandle Q = residual_.vector();
   const auto m = motion(scalars(y));
-  ReadArray in(y);
+  ReadArray in(y), rest(static_);
   WriteArray out(Q);
-  for (PetscInt i = 0; i < local_block_; ++i) out[i] = m.amplitude * in[i];
+  for (PetscInt i = 0; i < local_block_; ++i) out[i] = rest[i] + m.amplitude * in[i];
   return Q;
 }
 

@@ -14,7 +14,7 @@ struct ScaledMotion {
   std::vector<Exponents> dexponents;   ///< d s_n / dz_j
 };
 
-/// y = (q, z): scaled harmonic blocks q = Q / a, then the scalars z on the last rank; z's last entry is the continuation parameter.
+/// y = (q, z): scaled harmonic blocks q = (Q - Q_static) / a, then the scalars z on the last rank; z's last entry is the continuation parameter.
 /// Rows (R(a q, s(z)) - P) / (k_ref a), then, on the last rank, q_dof = (1, 0) in the fundamental if there are three scalars (DESIGN fact 4).
 class HarmonicProblem : public solve::Problem {
  public:
@@ -30,7 +30,9 @@ class HarmonicProblem : public solve::Problem {
   Harmonics const& harmonics() const { return residual_.harmonics(); }
   model::Model const& model() const { return residual_.model(); }
   PetscInt dof() const { return dof_; }
-  /// Physical coefficients Q = a q as harmonic blocks. Collective.
+  /// Dynamics about a static state x under the static load P: Q = (x, 0, ...) + a q. The mean is retained then. Collective.
+  void preload(Vec x, Vec P);
+  /// Physical coefficients Q as harmonic blocks. Collective.
   VecHandle coefficients(Vec y);
   /// (scalars z, fundamental coefficients of the chosen dof in q): on every rank. Collective.
   std::vector<double> scalars(Vec y);
@@ -51,12 +53,13 @@ class HarmonicProblem : public solve::Problem {
   void linearise(Vec y);
   void unpack(Vec y);
   void column(int j, double* v);
+  void add_mean(Vec per_dof, Vec blocks);
 
   Residual residual_;
   int scalars_;
   PetscInt dof_, local_block_;
   double stiffness_;
-  VecHandle q_, Q_, dQ_, R_, dR_, excitation_, last_;
+  VecHandle q_, Q_, dQ_, R_, dR_, excitation_, static_, last_;
   bool linearised_ = false;
   std::vector<double> z_;
   ScaledMotion motion_;

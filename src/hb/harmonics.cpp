@@ -43,8 +43,10 @@ void multiply(Harmonics const& h, std::vector<complex> const& s, double const* x
     }
 }
 
-FourierTransform::FourierTransform(Harmonics const& h, int columns) : harmonics_(h), columns_(columns), rows_(h.samples() / 2 + 1) {
+FourierTransform::FourierTransform(Harmonics const& h, int columns, int components) : harmonics_(h), columns_(columns), rows_(h.samples() / 2 + 1) {
   if (columns == 0) return;
+  const int pairs = columns / components;
+  for (int c = 0; c < columns; ++c) block_.push_back(size_t(c % pairs * components + c / pairs) * h.block_size());
   int n = h.samples();
   time_.reset(fftw_alloc_real(size_t(n) * columns));
   spectrum_.reset(fftw_alloc_complex(size_t(rows_) * columns));
@@ -59,13 +61,12 @@ void FourierTransform::to_time(double const* blocks, double* samples) const {
   if (columns_ == 0) return;
   auto* spectrum = reinterpret_cast<complex*>(spectrum_.get());
   std::fill_n(spectrum, size_t(rows_) * columns_, complex(0));
-  const int m = harmonics_.block_size();
   for (int i = 0; i < harmonics_.count(); ++i) {
     const int n = harmonics_.orders()[i];
     complex* row = spectrum + size_t(n) * columns_;
     double const* x = blocks + harmonics_.offset(i);
     // x(t) = Re sum q_n e^{i n tau}: half of q_n at +n, the other half is implied by the real output.
-    for (int c = 0; c < columns_; ++c) row[c] = n ? 0.5 * complex(x[size_t(c) * m], -x[size_t(c) * m + 1]) : complex(x[size_t(c) * m]);
+    for (int c = 0; c < columns_; ++c) row[c] = n ? 0.5 * complex(x[block_[c]], -x[block_[c] + 1]) : complex(x[block_[c]]);
   }
   fftw_execute_dft_c2r(backward_.get(), spectrum_.get(), samples);
 }
@@ -73,7 +74,6 @@ void FourierTransform::to_time(double const* blocks, double* samples) const {
 void FourierTransform::to_harmonics(double const* samples, double* blocks) const {
   if (columns_ == 0) return;
   fftw_execute_dft_r2c(forward_.get(), const_cast<double*>(samples), spectrum_.get());
-  const int m = harmonics_.block_size();
   const double scale = 1.0 / harmonics_.samples();
   for (int i = 0; i < harmonics_.count(); ++i) {
     const int n = harmonics_.orders()[i];
@@ -81,8 +81,8 @@ void FourierTransform::to_harmonics(double const* samples, double* blocks) const
     double* f = blocks + harmonics_.offset(i);
     // Laxalde et al. 2008, eq. 9a-c
     for (int c = 0; c < columns_; ++c) {
-      f[size_t(c) * m] = (n ? 2 : 1) * scale * row[c].real();
-      if (n) f[size_t(c) * m + 1] = -2 * scale * row[c].imag();
+      f[block_[c]] = (n ? 2 : 1) * scale * row[c].real();
+      if (n) f[block_[c] + 1] = -2 * scale * row[c].imag();
     }
   }
 }

@@ -42,10 +42,10 @@ struct Exponents {
 /// y = s x on harmonic blocks: columns x block size, real (cos, sin) pairs.
 void multiply(Harmonics const&, std::vector<complex> const& s, double const* x, double* y, int columns);
 
-/// Batched FFT between harmonic blocks (columns x block size) and time samples (samples x columns, columns innermost).
+/// Batched FFT between harmonic blocks (pairs x components x block size) and time samples (samples x components x pairs, pairs innermost).
 class FourierTransform {
  public:
-  FourierTransform(Harmonics const&, int columns);
+  FourierTransform(Harmonics const&, int columns, int components = 1);
   void to_time(double const* blocks, double* samples) const;
   /// Coefficients of sampled columns; overwrites nothing of `samples`.
   void to_harmonics(double const* samples, double* blocks) const;
@@ -63,6 +63,7 @@ class FourierTransform {
   };
   Harmonics harmonics_;
   int columns_, rows_;
+  std::vector<size_t> block_;  ///< where a time column's harmonic block begins
   std::unique_ptr<double, FreeMemory> time_;
   std::unique_ptr<fftw_complex, FreeMemory> spectrum_;
   std::unique_ptr<std::remove_pointer_t<fftw_plan>, FreePlan> backward_, forward_;
