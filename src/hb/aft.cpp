@@ -10,7 +10,7 @@ namespace {
 int tangent_columns(contact::Law const& law) { return law.components() * law.components() * law.pairs(); }
 
 /// The fundamental's Im s: the angular frequency that turns sample numbers into time.
-double angular_frequency(Harmonics const& h, Exponents const& e) { return e.s[h.fundamental()].imag(); }
+double angular_frequency(Harmonics const& h, Exponents const& e) { return h.fundamental() < 0 ? 1.0 : e.s[h.fundamental()].imag(); }
 
 }  // namespace
 

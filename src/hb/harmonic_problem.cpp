@@ -33,7 +33,8 @@ std::vector<double> HarmonicProblem::scalars(Vec y) {
   std::vector<double> z(scalars_ + 2, 0.0);
   ReadArray in(y);
   if (last_rank()) std::copy_n(in.data() + local_block_, scalars_, z.begin());
-  if (owns_dof()) std::copy_n(in.data() + (dof_ - model().first_dof()) * harmonics().block_size() + harmonics().offset(harmonics().fundamental()), 2, z.begin() + scalars_);
+  if (owns_dof() && harmonics().fundamental() >= 0)
+    std::copy_n(in.data() + (dof_ - model().first_dof()) * harmonics().block_size() + harmonics().offset(harmonics().fundamental()), 2, z.begin() + scalars_);
   MPI_Allreduce(MPI_IN_PLACE, z.data(), int(z.size()), MPI_DOUBLE, MPI_SUM, comm());
   return z;
 }
@@ -65,7 +66,7 @@ void HarmonicProblem::preload(Vec x, Vec P) {
 void HarmonicProblem::residual(Vec y, Vec r) {
   unpack(y);
   residual_.evaluate(Q_, motion_.exponents, R_);
-  check(VecAXPY(R_, -1, excitation_));
+  check(VecAXPY(R_, -motion_.load, excitation_));
   check(VecScale(R_, 1 / (stiffness_ * motion_.amplitude)));
   check(VecCopy(y, last_));
   linearised_ = true;
@@ -91,10 +92,11 @@ void HarmonicProblem::product(Vec y, Vec dy, Vec dr) {
   linearise(y);
   const auto dz = scalars(dy);
   Exponents de{std::vector<complex>(harmonics().count()), 0};
-  double dlog = 0;
+  double dlog = 0, load = 0;
   for (int j = 0; j < scalars_; ++j) {
     add(de, dz[j], motion_.dexponents[j]);
     dlog += dz[j] * motion_.dlog_amplitude[j];
+    load += dz[j] * dload(j);
   }
   {
     ReadArray in(dy);
@@ -102,6 +104,7 @@ void HarmonicProblem::product(Vec y, Vec dy, Vec dr) {
   }
   check(VecAXPBY(dQ_, motion_.amplitude * dlog, motion_.amplitude, q_));
   residual_.product(dQ_, &de, dR_);
+  check(VecAXPY(dR_, -load, excitation_));
   check(VecAXPBY(dR_, -dlog, 1 / (stiffness_ * motion_.amplitude), R_));
   WriteArray out(dr);
   ReadArray in(dR_);
@@ -125,6 +128,7 @@ void HarmonicProblem::column(int j, double* v) {
   check(VecCopy(q_, dQ_));
   check(VecScale(dQ_, dlog * motion_.amplitude));
   residual_.product(dlog ? Vec(dQ_) : nullptr, &motion_.dexponents[j], dR_);
+  check(VecAXPY(dR_, -dload(j), excitation_));
   check(VecAXPBY(dR_, -dlog, 1 / (stiffness_ * motion_.amplitude), R_));
   ReadArray in(dR_);
   std::copy_n(in.data(), local_block_, v);

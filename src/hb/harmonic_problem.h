@@ -12,6 +12,8 @@ struct ScaledMotion {
   Exponents exponents;                 ///< s_n
   std::vector<double> dlog_amplitude;  ///< d log a / dz_j
   std::vector<Exponents> dexponents;   ///< d s_n / dz_j
+  double load = 1;                     ///< factor on the excitation P
+  std::vector<double> dload = {};      ///< d load / dz_j; empty if constant
 };
 
 /// y = (q, z): scaled harmonic blocks q = (Q - Q_static) / a, then the scalars z on the last rank; z's last entry is the continuation parameter.
@@ -38,6 +40,8 @@ class HarmonicProblem : public solve::Problem {
   std::vector<double> scalars(Vec y);
   /// Contact of the motion at y, summed over ranks. Collective.
   ContactSummary summarise(Vec y);
+  /// The laws start their march from the static state at y. Collective.
+  void settle(Vec y) { residual_.settle(coefficients(y)); }
   std::vector<ContactPeriod> contact_periods(Vec y);
   Exponents exponents(Vec y) { return motion(scalars(y)).exponents; }
 
@@ -54,6 +58,7 @@ class HarmonicProblem : public solve::Problem {
   void unpack(Vec y);
   void column(int j, double* v);
   void add_mean(Vec per_dof, Vec blocks);
+  double dload(int j) const { return motion_.dload.empty() ? 0 : motion_.dload[j]; }
 
   Residual residual_;
   int scalars_;

@@ -124,6 +124,19 @@ ContactSummary Residual::summarise(Vec Q, Exponents const& e) {
   return {sums[0], sums[1], sums[2], sums[3], sums[4], sums[5], sums[6], sums[7]};
 }
 
+void Residual::settle(Vec Q) {
+  for (Group& group : groups_) {
+    contact::Law& law = *group.contact->law;
+    const int d = law.components(), n = law.pairs();
+    VecHandle U = relative_motion(group, Q);
+    ReadArray blocks(U);
+    std::vector<double> u(size_t(d) * n);
+    for (int i = 0; i < n; ++i)
+      for (int c = 0; c < d; ++c) u[size_t(c) * n + i] = blocks[(i * d + c) * harmonics_.block_size()];
+    law.rest(u.data());
+  }
+}
+
 std::vector<ContactPeriod> Residual::periods(Vec Q, Exponents const& e) {
   std::vector<ContactPeriod> out;
   for (Group& group : groups_) {

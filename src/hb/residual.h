@@ -24,6 +24,8 @@ class Residual {
 
   /// Contact of the motion (Q, e), summed over all ranks and contacts. Collective.
   ContactSummary summarise(Vec Q, Exponents const& e);
+  /// The laws take the mean relative displacement of Q as their rest state. Collective.
+  void settle(Vec Q);
   /// This rank's contact samples, one per contact.
   std::vector<ContactPeriod> periods(Vec Q, Exponents const& e);
 
