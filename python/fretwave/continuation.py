@@ -98,7 +98,7 @@ class Continuation:
         self._core = _core.Continuation(problem.core, problem.prefix, low, high, (steps or StepControl()).core(), list(report_at))
         if upwards is None:
             start = self._parameter(y0)
-            upwards = start < 0.5 * (low + high)
+            upwards = bool(start < 0.5 * (low + high))
         self._upwards, self._restored, self._advice = upwards, False, ""
 
     def _parameter(self, y: PETSc.Vec) -> float:

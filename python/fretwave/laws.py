@@ -82,7 +82,9 @@ class PythonLaw:
 
     def _evaluate(self, u: Array, v: Array) -> tuple[Array, Array, Array]:
         """What the compiled core calls."""
-        return (
-            np.ascontiguousarray(self.force(u, v), dtype=float),
-            *(np.ascontiguousarray(t, dtype=float) for t in self.tangent(u, v)),
-        )
+        f, (df_du, df_dv) = self.force(u, v), self.tangent(u, v)
+        return _contiguous(f), _contiguous(df_du), _contiguous(df_dv)
+
+
+def _contiguous(values: Array) -> Array:
+    return np.ascontiguousarray(values, dtype=float)

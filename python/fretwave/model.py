@@ -12,11 +12,14 @@ import scipy.sparse as sp
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from . import _core
+from . import _core, parallel
 from .errors import InputError
 from .laws import PythonLaw, laws
 
 Array = npt.NDArray[np.float64]
+
+if MPI.COMM_WORLD.size > 1:
+    parallel.install()  # in scripts too: one rank's exception ends all ranks, with one message
 
 
 @dataclass

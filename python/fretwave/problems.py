@@ -46,6 +46,8 @@ def choose_harmonics(model: Model, highest: int, samples: int | None = None, ret
     """
     if highest < 1:
         raise InputError("the highest harmonic is below 1", None, highest, ">= 1", "give H = 1 or more")
+    if retain not in ("auto", "odd", "all"):
+        raise InputError("unknown choice of harmonics", None, retain, "auto, odd or all", 'use retain="auto"')
     odd = retain == "odd" or (retain == "auto" and model.odd)
     harmonics = Harmonics(
         [n for n in range(highest + 1) if n % 2 or not odd], samples or max(64, 1 << (16 * highest - 1).bit_length())

@@ -1,0 +1,95 @@
+"""What the continuation analyses share: rows of their tables, state, and lines of progress."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from ..results import AnalysisWriter
+from ..schema import StepSection
+
+#: Events at which the contact's motion over a period is kept.
+PLAIN_EVENTS = ("", "step")
+
+
+def step_control(step: StepSection) -> Any:
+    """The case's step control for the continuation."""
+    import fretwave
+
+    return fretwave.StepControl(**step.model_dump())
+
+
+def record(
+    writer: AnalysisWriter, problem: Any, point: Any, snapshot: Mapping[str, Any] | None, extra: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Write one continuation point. Collective.
+
+    Returns
+    -------
+    dict
+        The row as written.
+    """
+    state, diagnostics = problem.state(point.y), problem.diagnostics(point.y)
+    row = {
+        **state,
+        **diagnostics,
+        "point": writer.rows,
+        "residual": point.residual,
+        "newton": point.newton,
+        "linear": point.linear,
+        "wall_s": point.wall_s,
+        "event": point.event,
+    }
+    motions = None
+    if point.event not in PLAIN_EVENTS:
+        periods = problem.contact_period(point.y)
+        names = [contact.name for contact in problem.model.contacts]
+        motions = dict(zip(names, periods)) if writer.active else None
+    kept = None if snapshot is None else {**snapshot, **{f"own_{key}": value for key, value in extra.items()}}
+    writer.append(row, problem.coefficients(point.y), motions, kept)
+    return row
+
+
+def points_of(branch: Any) -> Iterator[Any]:
+    """Points of a branch; their vectors are freed a point later, for the branch may look back at its last one."""
+    before = None
+    for point in branch:
+        yield point
+        _free(before)
+        before = point
+    _free(before)
+
+
+def _free(point: Any) -> None:
+    if point is not None:
+        point.y.destroy()
+        point.tangent.destroy()
+
+
+def split_state(state: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """The solver's snapshot and the analysis' own entries of a kept state."""
+    plain = {key: value.item() if np.ndim(value) == 0 else value for key, value in state.items()}
+    own = {key[len("own_") :]: value for key, value in plain.items() if key.startswith("own_")}
+    return {key: value for key, value in plain.items() if not key.startswith("own_")}, own
+
+
+def open_branch(
+    comm: Any, writer: AnalysisWriter, resuming: bool
+) -> tuple[dict[str, Any] | None, dict[str, Any], bool]:
+    """Snapshot (rank 0), own entries (every rank) and whether there is a state to go on from. Collective."""
+    state = writer.go_on() if resuming and writer.active else None
+    snapshot, own = split_state(state) if state is not None else (None, {})
+    found, writer.rows, writer.reported, own = comm.bcast((state is not None, writer.rows, writer.reported, own))
+    return snapshot, own, found
+
+
+def finished_table(writer: AnalysisWriter) -> dict[str, Any]:
+    """Columns written so far (writing rank; empty elsewhere or without rows)."""
+    if not writer.active or not writer.rows:
+        return {}
+    points = writer.group["points"]
+    table = {column.name: points[column.name][()] for column in writer.columns}
+    table["event"] = np.array([text.decode() for text in table["event"]])
+    return table

@@ -1,0 +1,159 @@
+"""``type = "forced"``: frequency responses at several excitation levels, and their peaks against backbones."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from ..columns import FORCED
+from ..schema import ForcedAnalysis
+from .branch import finished_table, open_branch, points_of, record, step_control
+from .context import AnalysisContext, Outcome
+from .forced_time import time_points
+from .mode_curve import ModeCurve
+from .response_peaks import peak_table
+
+
+def run_forced(context: AnalysisContext) -> Outcome:
+    """Follow the response of every level over the frequency range. Collective."""
+    import fretwave
+
+    analysis = context.analysis
+    assert isinstance(analysis, ForcedAnalysis)
+    reference = context.linear_mode("stuck", analysis.linear_mode)[analysis.linear_mode - 1]
+    harmonics = fretwave.choose_harmonics(context.model, analysis.harmonics, analysis.samples, analysis.retain)
+    left_out = [] if analysis.time_points else ["check by time integration (time_points = 0)"]
+    context.leave_out([*harmonics.left_out, *_missing_backbones(context), *left_out])
+    writer = context.writer(FORCED, labels=harmonics.labels, samples=harmonics.samples, stuck_omega=reference.omega)
+    try:
+        return _all_levels(context, analysis, harmonics, reference, writer)
+    finally:
+        writer.abandon()
+
+
+def _all_levels(
+    context: AnalysisContext, analysis: ForcedAnalysis, harmonics: Any, reference: Any, writer: Any
+) -> Outcome:
+    snapshot, own, found = open_branch(context.comm, writer, context.resuming)
+    first = int(own.get("level_number", 0))
+    reasons = []
+    with context.console.progress(context.name):
+        for number in range(first, len(analysis.levels)):
+            problem = _problem(context, analysis, harmonics, reference, analysis.levels[number])
+            go_on = found and number == first
+            reasons.append(_one_level(context, analysis, problem, writer, number, snapshot, go_on))
+            problem.destroy()
+    stopped = [reason for reason in reasons if reason]
+    reason = "; ".join(stopped) or "stop value reached"
+    table = finished_table(writer)
+    writer.close("stopped" if stopped else "done", reason, events="[]")
+    summary = _peaks(context, analysis, table)
+    if analysis.time_points and writer.rows:
+        summary += time_points(context, table, analysis.time_points)
+    goal = f"{analysis.frequency[1]:g} Hz at every level"
+    return Outcome(writer.rows, reason, not stopped, summary, goal)
+
+
+def _problem(context: AnalysisContext, analysis: ForcedAnalysis, harmonics: Any, reference: Any, level: float) -> Any:
+    import fretwave
+
+    force = np.zeros(len(context.case.dofs), dtype=complex)
+    for dof, amplitude in analysis.force.items():
+        force[context.case.dof(dof)] = amplitude
+    return fretwave.ForcedResponse(
+        context.model,
+        harmonics,
+        force={1: force},
+        level=level,
+        dof=context.case.dof(analysis.observe),
+        reference=reference,
+        prefix=context.prefix,
+    )
+
+
+def _one_level(
+    context: AnalysisContext,
+    analysis: ForcedAnalysis,
+    problem: Any,
+    writer: Any,
+    number: int,
+    snapshot: Any,
+    go_on: bool,
+) -> str:
+    """Follow one response; returns why it stopped early, or nothing."""
+    import fretwave
+
+    low, high = (2.0 * math.pi * hertz for hertz in analysis.frequency)
+    report_at = [2.0 * math.pi * hertz for hertz in analysis.report_at]
+    settings = {"stop": (low, high), "steps": step_control(analysis.step), "report_at": report_at}
+    if go_on:
+        branch = fretwave.Continuation.restore(problem, snapshot, **settings)
+    else:
+        branch = fretwave.Continuation(problem, problem.initial(low), **settings)
+    for point in points_of(branch):
+        row = record(writer, problem, point, branch.snapshot(), {"level_number": number})
+        share = (number + (row["omega"] - low) / (high - low)) / len(analysis.levels)
+        context.console.point(point_line(context.name, row), _short(row), share, _notable(row["event"]))
+    stopped = "" if branch.converged else f"level {analysis.levels[number]:g}: {branch.reason}"
+    branch.destroy()
+    return stopped
+
+
+def _notable(event: str) -> bool:
+    return bool(event) and event not in ("start", "stop")
+
+
+def point_line(name: str, row: dict[str, Any]) -> str:
+    """One plain line of progress."""
+    return (
+        f"{name} {row['point']:4d}  level {row['level']:6.4g}  f {row['frequency_hz']:9.5g} Hz"
+        f"  a {row['amplitude']:9.4g} m  phase {math.degrees(row['phase']):7.2f} deg"
+        f"  stick {100 * row['stick']:3.0f} %  error {row['error_estimate']:.1e}"
+        f"  newton {row['newton']:2d}  {row['wall_s']:.3f} s"
+        + (f"  {row['event'].replace('_', ' ')}" if row["event"] else "")
+    )
+
+
+def _short(row: dict[str, Any]) -> str:
+    return f"point {row['point']}: level {row['level']:g}, {row['frequency_hz']:.5g} Hz, a {row['amplitude']:.4g} m"
+
+
+def _backbones(analysis: ForcedAnalysis) -> list[str]:
+    return [analysis.backbone] if isinstance(analysis.backbone, str) else list(analysis.backbone)
+
+
+def _missing_backbones(context: AnalysisContext) -> list[str]:
+    """Backbones that have no results to compare with (another selection by --only)."""
+    analysis = context.analysis
+    assert isinstance(analysis, ForcedAnalysis)
+    missing = [name for name in _backbones(analysis) if not context.has_results(name)]
+    return [f"distance of the peaks from '{name}' (no results of it in this folder)" for name in missing]
+
+
+def _peaks(context: AnalysisContext, analysis: ForcedAnalysis, table: dict[str, Any]) -> list[str]:
+    """Write the peaks of all levels with their distance from the backbones; a line for each level."""
+    curves = {
+        name: ModeCurve.from_table(context.table(name)) for name in _backbones(analysis) if context.has_results(name)
+    }
+    if not table:
+        return []
+    peaks = peak_table({key: table[key] for key in ("level", "omega", "amplitude", "phase")}, curves)
+    context.write_table("peaks", peaks)
+    lines = [
+        f"{context.name}: {len(table['level'])} points, {len(peaks['level'])} levels,"
+        f" error estimate up to {table['error_estimate'].max():.1e}, {table['wall_s'].sum():.2f} s"
+    ]
+    for row in range(len(peaks["level"])):
+        lines.append(_peak_line(context.name, {key: float(value[row]) for key, value in peaks.items()}, list(curves)))
+    return lines
+
+
+def _peak_line(name: str, peak: dict[str, float], curves: list[str]) -> str:
+    text = f"{name}: level {peak['level']:g}: "
+    if not math.isfinite(peak["amplitude"]):
+        return text + "no peak within the frequency range"
+    text += f"peak a = {peak['amplitude']:.4g} m at {peak['frequency_hz']:.5g} Hz"
+    distances = [f"{100 * peak[f'distance_{curve}']:+.3f} % from {curve}" for curve in curves]
+    return text + (", frequency " + ", ".join(distances) if distances else "")

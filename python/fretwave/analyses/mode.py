@@ -1,0 +1,146 @@
+"""``type = "mode"``: a nonlinear mode over its amplitude, with folds and limit cycles."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+import numpy as np
+
+from ..columns import MODE
+from ..schema import ModeAnalysis
+from .branch import finished_table, open_branch, points_of, record, step_control
+from .context import AnalysisContext, Outcome
+
+
+def run_mode(context: AnalysisContext) -> Outcome:
+    """Continue the mode from its first to its last amplitude. Collective."""
+    import fretwave
+
+    analysis = context.analysis
+    assert isinstance(analysis, ModeAnalysis)
+    stuck = context.linear_mode("stuck", analysis.linear_mode)[analysis.linear_mode - 1]
+    free_omega = _free_omega(context, stuck)
+    harmonics = fretwave.choose_harmonics(context.model, analysis.harmonics, analysis.samples, analysis.retain)
+    context.leave_out(harmonics.left_out)
+    dof = context.case.dof(analysis.normalise)
+    problem = fretwave.NonlinearMode(
+        context.model, harmonics, method=analysis.method, dof=dof, start=stuck, prefix=context.prefix
+    )
+    writer = context.writer(
+        MODE,
+        labels=harmonics.labels,
+        samples=harmonics.samples,
+        stuck_omega=stuck.omega,
+        free_omega=free_omega,
+    )
+    try:
+        return _follow(context, analysis, problem, writer)
+    finally:
+        writer.abandon()
+        problem.destroy()
+
+
+def _follow(context: AnalysisContext, analysis: ModeAnalysis, problem: Any, writer: Any) -> Outcome:
+    import fretwave
+
+    low, high = analysis.amplitude
+    settings = {"stop": (low, high), "steps": step_control(analysis.step), "report_at": analysis.report_at}
+    snapshot, _, found = open_branch(context.comm, writer, context.resuming)
+    if found:
+        branch = fretwave.Continuation.restore(problem, snapshot, **settings)
+    else:
+        branch = fretwave.Continuation(problem, problem.initial(low), **settings)
+    with context.console.progress(context.name):
+        for point in points_of(branch):
+            row = record(writer, problem, point, branch.snapshot(), {})
+            share = math.log(row["amplitude"] / low) / math.log(high / low)
+            context.console.point(point_line(context.name, row), _short(row), share, notable=bool(row["event"]))
+    outcome = _finish(context, writer, branch)
+    outcome.goal = f"amplitude {high:g} m"
+    branch.destroy()
+    return outcome
+
+
+def _finish(context: AnalysisContext, writer: Any, branch: Any) -> Outcome:
+    table = finished_table(writer)
+    summary = summarise(context.name, table) if table else []
+    events = json.dumps(limit_cycles(table)) if table else "[]"
+    writer.close("done" if branch.converged else "stopped", branch.reason, events=events)
+    return Outcome(writer.rows, branch.reason, branch.converged, summary)
+
+
+def _free_omega(context: AnalysisContext, stuck: Any) -> float | None:
+    """Frequency of the mode without contact force whose shape is most like the stuck one's."""
+    if not context.case.contacts:
+        return None
+    count = min(context.model.n_dof, context.analysis.linear_mode + 2)  # type: ignore[attr-defined]
+    modes = context.linear_mode("free", count)
+    M = context.case.M
+    likeness = [abs(m.shape @ (M @ stuck.shape)) / math.sqrt(m.shape @ (M @ m.shape)) for m in modes]
+    return float(modes[int(np.argmax(likeness))].omega) if modes else None
+
+
+def point_line(name: str, row: dict[str, Any]) -> str:
+    """One plain line of progress."""
+    return (
+        f"{name} {row['point']:4d}  a {row['amplitude']:9.4g} m  f {row['frequency_hz']:9.5g} Hz"
+        f"  zeta {_percent(row['zeta'], 4):>8} %  stick {100 * row['stick']:3.0f} %"
+        f"  error {row['error_estimate']:.1e}  newton {row['newton']:2d}  {row['wall_s']:.3f} s"
+        + (f"  {row['event'].replace('_', ' ')}" if row["event"] else "")
+    )
+
+
+def _short(row: dict[str, Any]) -> str:
+    text = f"point {row['point']}: a {row['amplitude']:.4g} m, {row['frequency_hz']:.5g} Hz"
+    return f"{text}, zeta {_percent(row['zeta'], 3)} %"
+
+
+def _percent(value: float, digits: int) -> str:
+    """A share in percent; rounding leaves no negative zero."""
+    return f"{round(100 * value, digits) + 0.0:.{digits}f}"
+
+
+def limit_cycles(table: dict[str, Any]) -> list[dict[str, Any]]:
+    """Zero crossings of the damping, each a limit cycle.
+
+    Damping that rises through zero with amplitude draws motions to the cycle from both sides (stable);
+    falling, it drives them away (unstable). At the end of a branch the slope is not known (None).
+    """
+    cycles = []
+    for point in np.flatnonzero(["zero_damping" in event.split() for event in table["event"]]):
+        around = [int(point) - 1, int(point) + 1]
+        known = around[0] >= 0 and around[1] < len(table["zeta"])
+        zeta, amplitude = table["zeta"], table["amplitude"]
+        slope = np.diff(zeta[around])[0] * np.diff(amplitude[around])[0] if known else 0.0
+        cycles.append(
+            {
+                "point": int(point),
+                "event": "zero_damping",
+                "amplitude": float(amplitude[point]),
+                "frequency_hz": float(table["frequency_hz"][point]),
+                "stable": bool(slope > 0) if slope else None,
+            }
+        )
+    return cycles
+
+
+def summarise(name: str, table: dict[str, Any]) -> list[str]:
+    """The branch in a line, and a line for each limit cycle."""
+    amplitude, zeta = table["amplitude"], table["zeta"]
+    top = int(np.argmax(zeta))
+    folds = sum("fold" in event.split() for event in table["event"])
+    lines = [
+        f"{name}: {len(zeta)} points, a {amplitude[0]:.4g} to {amplitude[-1]:.4g} m,"
+        f" largest damping {100 * zeta[top]:.4g} % at a = {amplitude[top]:.4g} m,"
+        f" {folds} fold{'s' * (folds != 1)},"
+        f" error estimate up to {table['error_estimate'].max():.1e}, {table['wall_s'].sum():.2f} s"
+    ]
+    words = {True: "stable (damping rises)", False: "unstable (damping falls)", None: "stability unknown (branch end)"}
+    for cycle in limit_cycles(table):
+        lines.append(
+            f"{name}: limit cycle at a = {cycle['amplitude']:.5g} m, {cycle['frequency_hz']:.5g} Hz: "
+            + words[cycle["stable"]]
+        )
+    return lines

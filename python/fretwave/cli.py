@@ -1,0 +1,167 @@
+"""The command ``fretwave``. Heavy modules are imported by the sub-command that needs them."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NoReturn
+
+from .errors import EXIT_DONE, InputError
+from .parallel import guarded, install, launched_rank
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Entry point; returns the exit code: 0 done, 2 bad input, 3 did not converge, 1 anything else."""
+    install()
+    return guarded(lambda: _dispatch(sys.argv[1:] if arguments is None else list(arguments)))
+
+
+def _dispatch(arguments: list[str]) -> int:
+    if arguments[:1] == ["doctor"]:
+        from . import doctor
+
+        return doctor.main(arguments[1:])
+    if arguments[:1] == ["study"]:
+        from . import study
+
+        return int(study.main(arguments[1:]))
+    options = parser().parse_args(_joined_petsc(arguments))
+    code: int = options.command(options)
+    return code
+
+
+def _joined_petsc(arguments: list[str]) -> list[str]:
+    """``--petsc -snes_monitor`` as one word: argparse takes a value with a leading dash for an option."""
+    if "--petsc" not in arguments[:-1]:
+        return arguments
+    place = arguments.index("--petsc")
+    return [*arguments[:place], f"--petsc={arguments[place + 1]}", *arguments[place + 2 :]]
+
+
+class _Parser(argparse.ArgumentParser):
+    """Errors in the form of all others; under mpirun only the first rank prints."""
+
+    def error(self, message: str) -> NoReturn:
+        raise InputError(
+            f"the command line is wrong: {message}", where=self.prog, fix=f"`{self.prog} --help` lists what there is"
+        )
+
+    def _print_message(self, message: str, file: Any = None) -> None:
+        if launched_rank() == 0:
+            super()._print_message(message, file)
+
+
+def parser() -> argparse.ArgumentParser:
+    """The command line with all sub-commands."""
+    top = _Parser(
+        prog="fretwave",
+        description="Nonlinear modes, forced response and limit cycles of structures with friction contact.",
+        epilog="exit codes: 0 done, 2 bad input, 3 did not converge (what was found is kept), 1 anything else",
+    )
+    commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True, parser_class=_Parser)
+    _add_run(commands)
+    check = commands.add_parser("check", help="check a case and say what would run")
+    _add_case(check, optional=True)
+    check.add_argument("--keys", action="store_true", help="list all keys of case files instead")
+    check.set_defaults(command=_check)
+    resume = commands.add_parser("resume", help="go on with a run that was cut off, on any number of ranks")
+    resume.add_argument("folder", type=Path, metavar="RUNDIR", help="folder of the run")
+    resume.add_argument("--no-plots", action="store_true", help="make no pictures")
+    resume.set_defaults(command=_resume)
+    show = commands.add_parser("show", help="show the results of a run")
+    show.add_argument("folder", type=Path, metavar="RUNDIR", help="folder of the run")
+    show.set_defaults(command=_show)
+    plot = commands.add_parser("plot", help="make the pictures of a run again")
+    plot.add_argument("folder", type=Path, metavar="RUNDIR", help="folder of the run")
+    plot.add_argument("--only", type=_names, default=[], metavar="NAME,...", help="analyses or kinds of picture")
+    plot.set_defaults(command=_plot)
+    commands.add_parser("study", help="error against run time of a case over harmonics, samples and tolerance")
+    commands.add_parser("doctor", help="what is installed, whether it fits together, and what to do about it")
+    return top
+
+
+def _names(text: str) -> list[str]:
+    return [name.strip() for name in text.split(",") if name.strip()]
+
+
+def _add_case(command: argparse.ArgumentParser, optional: bool = False) -> None:
+    count = "?" if optional else None
+    command.add_argument("case", type=Path, metavar="CASE", nargs=count, help="case file (TOML)")
+    command.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        dest="overrides",
+        help="override a value: mode.harmonics=7, contact.damper.friction_limit=3, 'model.M=[[1.0]]'",
+    )
+    command.add_argument("--only", type=_names, default=[], metavar="NAME,...", help="only these analyses")
+    command.add_argument("--quick", action="store_true", help="the short form: overrides of the table [quick]")
+
+
+def _add_run(commands: Any) -> None:
+    run = commands.add_parser("run", help="run the analyses of a case")
+    _add_case(run)
+    run.add_argument("--out", type=Path, metavar="DIR", help="run folder (default runs/<case>)")
+    run.add_argument("--no-plots", action="store_true", help="make no pictures")
+    run.add_argument("--petsc", default="", metavar="OPTIONS", help='PETSc options: "-snes_rtol 1e-10"')
+    run.set_defaults(command=_run)
+
+
+def _world() -> Any:
+    """MPI with PETSc started on it; collective, so it comes before anything one rank could fail in alone."""
+    from mpi4py import MPI
+
+    import fretwave._core  # noqa: F401
+
+    return MPI.COMM_WORLD
+
+
+def _run(options: argparse.Namespace) -> int:
+    comm = _world()
+    from .run import RunOptions, run_case
+
+    chosen = RunOptions(
+        options.out, options.overrides, options.only, options.quick, not options.no_plots, options.petsc
+    )
+    return run_case(options.case, chosen, comm)
+
+
+def _resume(options: argparse.Namespace) -> int:
+    comm = _world()
+    from .run import resume_run
+
+    return resume_run(options.folder, comm, not options.no_plots)
+
+
+def _check(options: argparse.Namespace) -> int:
+    if options.keys:
+        from .keys import key_lines
+
+        print("\n".join(key_lines()))
+        return EXIT_DONE
+    if options.case is None:
+        raise InputError("no case is given", "fretwave check", fix="`fretwave check cases/two_dof/case.toml`")
+    comm = _world()
+    from .check import check_case
+
+    return check_case(options.case, options.overrides, options.only, options.quick, comm)
+
+
+def _show(options: argparse.Namespace) -> int:
+    from .show import show_run
+
+    show_run(options.folder)
+    return EXIT_DONE
+
+
+def _plot(options: argparse.Namespace) -> int:
+    from .console import Console
+    from .results import open_results
+    from .run import plot
+
+    open_results(options.folder / "results.h5").close()
+    plot(options.folder, Console(True), options.only or None)
+    return EXIT_DONE

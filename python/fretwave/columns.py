@@ -1,0 +1,97 @@
+"""Columns of the result tables: unit, long name and kind, said once."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Union
+
+import numpy as np
+
+Value = Union[float, int, str]
+
+#: Longest event text kept in results.h5.
+EVENT_LENGTH = 48
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column of a table.
+
+    Attributes
+    ----------
+    kind : str
+        ``f`` number, ``i`` integer, ``s`` text.
+    """
+
+    name: str
+    unit: str
+    long_name: str
+    kind: str = "f"
+
+    @property
+    def dtype(self) -> Any:
+        """Type of the column in results.h5."""
+        return {"f": "f8", "i": "i8", "s": f"S{EVENT_LENGTH}"}[self.kind]
+
+    def text(self, value: Value) -> str:
+        """The value as the CSV has it: shortest text that gives the same number back."""
+        if self.kind == "i":
+            return str(int(value))
+        return str(value) if self.kind == "s" else repr(float(value))
+
+    def stored(self, value: Value) -> Any:
+        """The value as results.h5 has it."""
+        return np.array(str(value).encode()[:EVENT_LENGTH] if self.kind == "s" else value, self.dtype)
+
+    def loaded(self, value: Any) -> Value:
+        """The inverse of `stored`."""
+        plain: Value = value.decode() if self.kind == "s" else value.item()
+        return plain
+
+
+_ALL = (
+    Column("point", "1", "number of the point on its branch", "i"),
+    Column("level", "1", "factor on the excitation force"),
+    Column("start", "1", "number of the start", "i"),
+    Column("cycle", "1", "number of the cycle", "i"),
+    Column("time", "s", "time in the middle of the cycle"),
+    Column("amplitude", "m", "fundamental amplitude of the observed dof"),
+    Column("omega", "rad/s", "angular frequency, Im lambda"),
+    Column("omega0", "rad/s", "modulus of lambda"),
+    Column("omega_mode", "rad/s", "angular frequency of the mode at this amplitude"),
+    Column("frequency_hz", "Hz", "frequency, omega / 2 pi"),
+    Column("phase", "rad", "phase of the fundamental against the force"),
+    Column("beta", "1/s", "decay rate, - Re lambda"),
+    Column("zeta", "1", "modal damping ratio"),
+    Column("zeta_mode", "1", "damping ratio of the mode at this amplitude"),
+    Column("stick", "1", "share of contact pairs and samples that stick"),
+    Column("slip", "1", "share of contact pairs and samples that slip"),
+    Column("open", "1", "share of contact pairs and samples without contact"),
+    Column("error_estimate", "1", "share of the contact force outside the retained harmonics"),
+    Column("residual", "1", "norm of the scaled residual"),
+    Column("newton", "1", "Newton iterations", "i"),
+    Column("linear", "1", "linear iterations", "i"),
+    Column("wall_s", "s", "wall time of the point"),
+    Column("event", "", "what was met at the point", "s"),
+)
+COLUMNS = {column.name: column for column in _ALL}
+
+_SHARED = ("stick", "slip", "open", "error_estimate", "residual", "newton", "linear", "wall_s", "event")
+MODE = ("point", "amplitude", "omega", "omega0", "frequency_hz", "beta", "zeta", *_SHARED)
+FORCED = ("point", "level", "omega", "frequency_hz", "amplitude", "phase", *_SHARED)
+
+
+def columns_named(names: Sequence[str | Column]) -> list[Column]:
+    """Columns by name; an analysis may bring columns of its own."""
+    return [name if isinstance(name, Column) else COLUMNS[name] for name in names]
+
+
+def csv_line(columns: Sequence[Column], row: Mapping[str, Value]) -> str:
+    """One line of a table."""
+    return ",".join(column.text(row[column.name]) for column in columns) + "\n"
+
+
+def csv_header(columns: Sequence[Column]) -> str:
+    """First line of a table."""
+    return ",".join(column.name for column in columns) + "\n"

@@ -1,0 +1,42 @@
+"""``fretwave check --keys``: every key of a case file with its default, unit and meaning."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from typing import Any
+
+from pydantic import BaseModel
+
+from .schema import ANALYSES, AnalysisSection, ContactSection, Damper, ModelSection, StepSection
+from .validation import describe
+
+
+def key_lines() -> Iterator[str]:
+    """The reference, section by section; keys that all analyses share are said once."""
+    sections: dict[str, type[BaseModel]] = {
+        "[model]": ModelSection,
+        "[[contact]] (and the parameters of its law)": ContactSection,
+        "[[analysis]]": AnalysisSection,
+    }
+    for title, section in sections.items():
+        yield title
+        yield from _section(section)
+    for kind, analysis in ANALYSES.items():
+        yield f'[[analysis]] with type = "{kind}"'
+        yield from _section(analysis, without=set(AnalysisSection.model_fields))
+    for title, nested in (("step = { ... }", StepSection), ("dampers = [{ ... }]", Damper)):
+        yield title
+        yield from _section(nested)
+
+
+def _section(section: type[BaseModel], without: Collection[str] = ()) -> Iterator[str]:
+    for name, field in section.model_fields.items():
+        if name not in without:
+            yield f"  {name:<18} {_default(field):<12} {describe(field)}"
+
+
+def _default(field: Any) -> str:
+    if field.is_required():
+        return "required"
+    value = field.get_default(call_default_factory=True)
+    return "-" if value in (None, "", []) or isinstance(value, BaseModel) else str(value)

@@ -1,0 +1,260 @@
+"""Matrices of a case: inline rows or files, checked for shape, finite entries, symmetry and definiteness."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Union
+
+import numpy as np
+import scipy.io
+import scipy.sparse
+import scipy.sparse.linalg
+
+from .errors import FretwaveError, InputError
+from .source import Source, display, nearest
+
+#: Largest entry of A - A^T over the largest entry of A that still counts as rounding.
+SYMMETRY_TOLERANCE = 1e-10
+#: Eigenvalues of the diagonally scaled matrix below this (over the largest) count as zero.
+SINGULAR_TOLERANCE = 1e-13
+#: Up to this size definiteness is decided by a dense eigenvalue problem.
+DENSE_LIMIT = 600
+
+_NAMES = {"M": "mass matrix", "K": "stiffness matrix", "C": "damping matrix"}
+
+
+@dataclass
+class Matrix:
+    """One matrix of the model.
+
+    Attributes
+    ----------
+    letter : str
+        M, K or C.
+    values : (n, n) sparse CSR
+    where : str
+        Where the case gives it.
+    digest : str
+        Content hash when it comes from a file, else "".
+    """
+
+    letter: str
+    values: Any
+    where: str
+    digest: str = ""
+
+    @property
+    def name(self) -> str:
+        return _NAMES[self.letter]
+
+    @property
+    def size(self) -> int:
+        return int(self.values.shape[0])
+
+
+def load(
+    letter: str, given: Union[str, list[list[float]]], source: Source, found: list[FretwaveError]
+) -> Matrix | None:
+    """A matrix of ``[model]``, square with finite entries; None (and an entry in `found`) otherwise."""
+    where = source.where(("model", letter))
+    try:
+        if isinstance(given, str):
+            path = source.path.parent / given
+            matrix = Matrix(letter, _read(path, letter, where), f"{where}, {display(path)}")
+            matrix.digest = "sha256:" + hashlib.sha256(path.read_bytes()).hexdigest()
+        else:
+            matrix = Matrix(letter, _from_rows(letter, given, source), where)
+        _check_entries(matrix)
+        _check_square(matrix)
+    except InputError as problem:
+        found.append(problem)
+        return None
+    return matrix
+
+
+def _from_rows(letter: str, rows: list[list[float]], source: Source) -> Any:
+    lengths = [len(row) for row in rows]
+    if len(set(lengths)) != 1 or not lengths[0]:
+        odd = next((i for i, length in enumerate(lengths) if length != lengths[0]), 0)
+        raise InputError(
+            f"the rows of the {_NAMES[letter]} differ in length",
+            where=source.where(("model", letter, odd)),
+            measured=f"row {odd} has {lengths[odd] if lengths else 0} entries",
+            expected=f"{len(rows)} entries in each of the {len(rows)} rows",
+            fix="complete the row",
+        )
+    return scipy.sparse.csr_matrix(np.array(rows, dtype=float))
+
+
+def _read(path: Path, letter: str, where: str) -> Any:
+    if not path.exists():
+        folder = path.parent
+        names = sorted(entry.name for entry in folder.iterdir()) if folder.is_dir() else []
+        raise InputError(
+            f"the file of the {_NAMES[letter]} does not exist",
+            where=where,
+            measured=display(path),
+            expected="a .npz or .mtx file, path relative to the case file",
+            fix=nearest(path.name, names) or "check the path",
+        )
+    try:
+        values = _read_known(path, letter)
+    except (OSError, ValueError, KeyError) as error:
+        raise InputError(
+            f"the file of the {_NAMES[letter]} cannot be read",
+            where=where,
+            measured=f"{display(path)}: {error}",
+            expected=f".npz of scipy.sparse.save_npz, .npz of numpy.savez with an array '{letter}', or .mtx",
+            fix=f"write it with scipy.sparse.save_npz('{path.name}', {letter})",
+        ) from None
+    if np.iscomplexobj(values):
+        raise InputError(
+            f"the {_NAMES[letter]} is complex",
+            where=f"{where}, {display(path)}",
+            expected="real entries",
+            fix="put the imaginary part of a loss factor into C",
+        )
+    return scipy.sparse.csr_matrix(values, dtype=float)
+
+
+def _read_known(path: Path, letter: str) -> Any:
+    if path.suffix == ".mtx":
+        return scipy.io.mmread(str(path))
+    if path.suffix != ".npz":
+        raise ValueError(f"unknown file type '{path.suffix}'")
+    with np.load(path) as archive:
+        if "format" not in archive.files:
+            return archive[letter]
+    return scipy.sparse.load_npz(path)
+
+
+def _check_square(matrix: Matrix) -> None:
+    rows, columns = matrix.values.shape
+    if rows != columns:
+        raise InputError(
+            f"the {matrix.name} is not square",
+            where=matrix.where,
+            measured=f"{rows} x {columns}",
+            expected="n x n",
+            fix="give one row and one column for each dof",
+        )
+
+
+def _check_entries(matrix: Matrix) -> None:
+    entries = matrix.values.tocoo()
+    bad = np.flatnonzero(~np.isfinite(entries.data))
+    if len(bad):
+        row, column = int(entries.row[bad[0]]), int(entries.col[bad[0]])
+        raise InputError(
+            f"the {matrix.name} has an entry that is not a number",
+            where=matrix.where,
+            measured=f"{matrix.letter}[{row}][{column}] = {entries.data[bad[0]]}"
+            + (f", and {len(bad) - 1} more" if len(bad) > 1 else ""),
+            expected="finite entries",
+            fix="look at what wrote this entry",
+        )
+
+
+def check_symmetric(matrix: Matrix, dofs: Sequence[str]) -> InputError | None:
+    """Measured asymmetry and the worst pair of entries."""
+    difference = (matrix.values - matrix.values.T).tocoo()
+    scale = abs(matrix.values).max()
+    if not difference.nnz or abs(difference.data).max() <= SYMMETRY_TOLERANCE * scale:
+        return None
+    worst = int(np.argmax(abs(difference.data)))
+    i, j = sorted((int(difference.row[worst]), int(difference.col[worst])))
+    letter = matrix.letter
+    return InputError(
+        f"the {matrix.name} is not symmetric",
+        where=matrix.where,
+        measured=f"{letter}[{i}][{j}] = {matrix.values[i, j]:g} and {letter}[{j}][{i}] = {matrix.values[j, i]:g}"
+        f" (dofs {dofs[i]}, {dofs[j]}); largest difference {abs(difference.data[worst]) / scale:.3g}"
+        " of the largest entry",
+        expected=f"{letter} = transpose of {letter} within {SYMMETRY_TOLERANCE:g} of the largest entry",
+        fix=f"correct the entry, or use ({letter} + transpose)/2 if this is rounding",
+    )
+
+
+def check_mass(matrix: Matrix, dofs: Sequence[str]) -> InputError | None:
+    """Mass must be positive for every motion: a positive diagonal first, then the smallest eigenvalue."""
+    diagonal = matrix.values.diagonal()
+    worst = int(np.argmin(diagonal))
+    fix = "give every dof a mass, or remove massless dofs by static condensation"
+    if diagonal[worst] <= 0:
+        kind = "negative" if diagonal[worst] < 0 else "zero"
+        return InputError(
+            f"the mass matrix has a {kind} diagonal entry",
+            where=matrix.where,
+            measured=f"M[{worst}][{worst}] = {diagonal[worst]:g} (dof {dofs[worst]})",
+            expected="> 0 for every dof",
+            fix="correct the sign" if diagonal[worst] < 0 else fix,
+        )
+    smallest, shape = smallest_eigenvalue(matrix.values)
+    if smallest > SINGULAR_TOLERANCE:
+        return None
+    dof = int(np.argmax(abs(shape)))
+    return InputError(
+        "the mass matrix is singular" if smallest > -1e-10 else "the mass matrix is not positive definite",
+        where=matrix.where,
+        measured=f"smallest eigenvalue {smallest:.3g} of the largest, in a motion led by dof {dofs[dof]}",
+        expected="all eigenvalues > 0",
+        fix=fix,
+    )
+
+
+def check_stiffness(matrix: Matrix, dofs: Sequence[str], contact_rows: Any) -> tuple[InputError | None, str | None]:
+    """Stiffness with the contact stuck must be positive definite.
+
+    Returns
+    -------
+    problem : InputError or None
+    note : str or None
+        Said when only the contact holds the structure.
+    """
+    free, _ = smallest_eigenvalue(matrix.values)
+    if free > SINGULAR_TOLERANCE:
+        return None, None
+    # Stuck contact holds relative motion; any stiffness of the matrix' own size shows whether that is enough.
+    stiffness = max(abs(matrix.values).max(), np.finfo(float).tiny)
+    stuck, shape = smallest_eigenvalue(matrix.values + stiffness * (contact_rows.T @ contact_rows))
+    if stuck > SINGULAR_TOLERANCE:
+        kind = "singular" if free > -1e-10 else "not positive definite"
+        return None, f"K is {kind} without contact: no free asymptote, contact alone holds the structure"
+    dof = int(np.argmax(abs(shape)))
+    indefinite = stuck < -1e-10
+    return (
+        InputError(
+            "the stiffness matrix is negative for some motion"
+            if indefinite
+            else "the stiffness matrix is singular, also with the contact stuck",
+            where=matrix.where,
+            measured=f"smallest eigenvalue {stuck:.3g} of the largest, in a motion led by dof {dofs[dof]}",
+            expected="all eigenvalues of K with stuck contact > 0",
+            fix="the structure is statically unstable: check the signs"
+            if indefinite
+            else f"hold the structure (a spring to ground at {dofs[dof]}), or add a contact that does",
+        ),
+        None,
+    )
+
+
+def smallest_eigenvalue(values: Any) -> tuple[float, Any]:
+    """Smallest eigenvalue of D^-1/2 A D^-1/2, D the size of A's diagonal, over the largest; and its vector.
+
+    The scaling makes the answer independent of units. Large matrices are judged by their diagonal and,
+    if that is positive, taken to be definite: the factorisation of the run reports otherwise.
+    """
+    diagonal = np.asarray(values.diagonal())
+    size = np.sqrt(np.where(diagonal == 0, 1.0, abs(diagonal)))
+    if values.shape[0] > DENSE_LIMIT:
+        lowest = int(np.argmin(diagonal))
+        unit = np.zeros(values.shape[0])
+        unit[lowest] = 1.0
+        return float(np.sign(diagonal[lowest])), unit
+    scaled = values.toarray() / size[:, None] / size
+    eigenvalues, vectors = np.linalg.eigh(scaled)
+    largest = max(abs(eigenvalues).max(), np.finfo(float).tiny)
+    return float(eigenvalues[0] / largest), vectors[:, 0]

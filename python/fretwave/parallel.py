@@ -1,0 +1,167 @@
+"""One message and a quick end on all ranks, whatever goes wrong on any of them.
+
+Open MPI hangs when one rank raises (or calls ``sys.exit``) and the others wait in a collective. Every
+entry point therefore runs inside :func:`guarded`, and scripts get the same through ``sys.excepthook``.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+import traceback
+from collections.abc import Callable
+from types import TracebackType
+from typing import Any, TypeVar
+
+from .errors import EXIT_OTHER, FretwaveError, exit_code_of
+
+Result = TypeVar("Result")
+
+#: How long a failed rank waits for the others to fail too before it ends them [s].
+AGREEMENT_WAIT = 1.0
+#: Head start of the lower rank, so that one message is printed when several but not all fail [s].
+RANK_DELAY = 0.25
+
+
+def world() -> Any:
+    """``MPI.COMM_WORLD``, or None where MPI is not running (so that ``--help`` never starts it)."""
+    module = sys.modules.get("mpi4py.MPI")
+    if module is None or not module.Is_initialized() or module.Is_finalized():
+        return None
+    return module.COMM_WORLD
+
+
+def launched_rank() -> int:
+    """This process's rank as its launcher says, 0 without one: known before MPI is started."""
+    names = ("OMPI_COMM_WORLD_RANK", "PMI_RANK", "PMIX_RANK", "SLURM_PROCID")
+    return int(next((os.environ[name] for name in names if name in os.environ), "0"))
+
+
+def all_ranks_failed(comm: Any) -> bool:
+    """True when every rank gets here within `AGREEMENT_WAIT` seconds.
+
+    A barrier on the world would match a barrier of ranks that are well, so a private message ring is
+    used: rank 0 hears from all and answers.
+    """
+    tag = 32001
+    others = range(1, comm.size)
+    if comm.rank:
+        comm.isend(None, dest=0, tag=tag)
+        answers = [comm.irecv(source=0, tag=tag)]
+    else:
+        answers = [comm.irecv(source=rank, tag=tag) for rank in others]
+    complete = _wait(answers, AGREEMENT_WAIT + RANK_DELAY * bool(comm.rank))
+    if complete and comm.rank == 0:
+        for request in [comm.isend(None, dest=rank, tag=tag) for rank in others]:
+            request.wait()
+    return complete
+
+
+def _wait(requests: list[Any], seconds: float) -> bool:
+    deadline = time.monotonic() + seconds
+    waiting = list(requests)
+    while waiting and time.monotonic() < deadline:
+        waiting = [request for request in waiting if not request.test()[0]]
+        time.sleep(0.002)
+    return not waiting
+
+
+def describe(error: BaseException, rank: int | None = None) -> str:
+    """The message for an exception; an unexpected one brings its traceback."""
+    if isinstance(error, FretwaveError):
+        text = error.render()
+        return text if rank is None else f"{text}\n  {'rank:':<10}{rank}"
+    if isinstance(error, OSError) and error.filename is not None:
+        return (
+            f"error: {error.strerror}\n  where:    {error.filename}\n  fix:      check the disk and who may write there"
+        )
+    if isinstance(error, KeyboardInterrupt):
+        return "interrupted: finished points are kept; `fretwave resume RUNDIR` goes on from there"
+    place = "" if rank is None else f" on rank {rank}"
+    trace = "".join(traceback.format_exception(type(error), error, error.__traceback__))
+    return (
+        f"{trace}error: {type(error).__name__}{place}: {error}\n"
+        "  fix:      this is a defect of fretwave or of a law given to it; report it with the lines above"
+    )
+
+
+def end_all_ranks(error: BaseException) -> int:
+    """Print one message, end the other ranks if they have not failed too, return the exit code."""
+    comm = world()
+    code = exit_code_of(error)
+    if comm is None or comm.size == 1:
+        # Before MPI runs only the command line can be wrong, and it is the same on all ranks.
+        if launched_rank() == 0 or comm is not None or not isinstance(error, FretwaveError):
+            _print(describe(error))
+        return code
+    if all_ranks_failed(comm):
+        if comm.rank == 0:
+            _print(describe(error))
+        return code
+    time.sleep(RANK_DELAY * comm.rank)
+    _print(describe(error, comm.rank))
+    comm.Abort(code)
+    return code
+
+
+def _print(text: str) -> None:
+    sys.stdout.flush()
+    print(text, file=sys.stderr, flush=True)
+
+
+def _lone_exit(exit_: SystemExit) -> int:
+    """Exit of one rank alone: the others must not wait for it."""
+    code = exit_.code if isinstance(exit_.code, int) else EXIT_OTHER * bool(exit_.code)
+    comm = world()
+    if comm is None or comm.size == 1 or all_ranks_failed(comm):
+        if isinstance(exit_.code, str) and (comm is None or comm.rank == 0):
+            _print(exit_.code)
+        return code
+    time.sleep(RANK_DELAY * comm.rank)
+    _print(f"error: rank {comm.rank} left (exit code {code}) while other ranks went on")
+    comm.Abort(code or EXIT_OTHER)
+    return code
+
+
+def guarded(main: Callable[[], int]) -> int:
+    """Run an entry point; no exception and no lone exit leaves another rank waiting.
+
+    Returns
+    -------
+    int
+        The exit code of the process.
+    """
+    try:
+        return main()
+    except SystemExit as exit_:
+        return _lone_exit(exit_)
+    except BaseException as error:
+        return end_all_ranks(error)
+
+
+def _excepthook(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+    end_all_ranks(error.with_traceback(trace))
+
+
+def install() -> None:
+    """Make uncaught exceptions of scripts end all ranks with one message."""
+    sys.excepthook = _excepthook
+
+
+def on_first_rank(comm: Any, work: Callable[[], Result]) -> Result:
+    """Do `work` on rank 0 and give its result, or its FretwaveError, to every rank. Collective.
+
+    What only one rank reads (case file, matrices, earlier results) cannot differ between ranks then.
+    """
+    outcome: tuple[FretwaveError | None, Any] = (None, None)
+    if comm.rank == 0:
+        try:
+            outcome = (None, work())
+        except FretwaveError as error:
+            outcome = (error, None)
+    problem, result = comm.bcast(outcome, root=0)
+    if problem is not None:
+        raise problem
+    answer: Result = result
+    return answer

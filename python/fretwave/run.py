@@ -1,0 +1,332 @@
+"""Run the analyses of a case: order, models, run folder, exit code."""
+
+from __future__ import annotations
+
+import importlib
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from . import checks
+from .analyses.context import AnalysisContext, Outcome, belongs, describe_analysis
+from .casefile import Case, changed_keys, load_case
+from .console import Console
+from .errors import EXIT_DONE, InputError, NotConverged
+from .parallel import on_first_rank
+from .petsc_options import AnalysisOptions
+from .results import open_results
+from .runfolder import CASE_COPY, RunFolder, new_record, peak_memory_mb, read_record
+from .schema import AnalysisSection, ForcedAnalysis, TransientSection
+from .source import display
+
+#: Module and function of each kind of analysis, imported when one is run.
+DISPATCH = {
+    "mode": ("mode", "run_mode"),
+    "forced": ("forced", "run_forced"),
+    "free_decay": ("transient", "run_free_decay"),
+    "limit_cycle": ("transient", "run_limit_cycle"),
+}
+
+
+@dataclass
+class RunOptions:
+    """What the command line says besides the case.
+
+    Attributes
+    ----------
+    only : list of str
+        Analyses to run; empty for all.
+    petsc : str
+        PETSc options for every analysis.
+    """
+
+    out: Path | None = None
+    overrides: list[str] = field(default_factory=list)
+    only: list[str] = field(default_factory=list)
+    quick: bool = False
+    plots: bool = True
+    petsc: str = ""
+
+
+def run_case(path: Path, options: RunOptions, comm: Any) -> int:
+    """Run a case from its start; returns the exit code. Collective."""
+    case = on_first_rank(comm, lambda: load_case(path, options.overrides, options.quick))
+    folder = options.out or Path("runs") / case.name
+    given = {
+        "path": str(path.resolve()),
+        "overrides": options.overrides,
+        "quick": options.quick,
+        "only": options.only,
+        "petsc": options.petsc,
+        "digest": case.digest,
+        "resolved": case.resolved,
+    }
+    record = comm.bcast(new_record(given, comm.size) if comm.rank == 0 else None)
+    return _Runner(case, options, folder, record, comm).run()
+
+
+def resume_run(folder: Path, comm: Any, plots: bool = True) -> int:
+    """Go on with a run that was cut off; returns the exit code. Collective.
+
+    Raises
+    ------
+    InputError
+        The folder holds no run, or its case has changed since.
+    """
+    case, record = on_first_rank(comm, lambda: _reload(folder))
+    given = record["case"]
+    options = RunOptions(folder, given["overrides"], given["only"], given["quick"], plots, given["petsc"])
+    record["ranks"], record["status"] = comm.size, "running"
+    return _Runner(case, options, folder, record, comm, resuming=True).run()
+
+
+def _reload(folder: Path) -> tuple[Case, dict[str, Any]]:
+    record = read_record(folder)
+    given = record["case"]
+    path = Path(given["path"])
+    text = None if path.exists() else (folder / CASE_COPY).read_text(encoding="utf-8")
+    case = load_case(path, given["overrides"], given["quick"], text=text)
+    changed = changed_keys(given["resolved"], case.resolved)
+    if changed:
+        raise InputError(
+            "the case has changed since this run",
+            where=display(path),
+            measured="; ".join(changed[:5]) + (f"; and {len(changed) - 5} more" if len(changed) > 5 else ""),
+            expected=f"the case as kept in {display(folder / CASE_COPY)}",
+            fix=f"change it back, or start anew with `fretwave run {display(path)}`",
+        )
+    return case, record
+
+
+class _Runner:
+    """One run of some analyses of a case."""
+
+    def __init__(
+        self,
+        case: Case,
+        options: RunOptions,
+        folder: Path,
+        record: dict[str, Any],
+        comm: Any,
+        resuming: bool = False,
+    ) -> None:
+        self.case, self.options, self.comm, self.resuming = case, options, comm, resuming
+        active = comm.rank == 0
+        self.folder = RunFolder(folder, record, case.text, active, resuming)
+        self.console = Console(active, self.folder.log)
+        self.failures: list[NotConverged] = []
+        if resuming:
+            self.folder.start()
+
+    def run(self) -> int:
+        names = in_order(self.case, checks.choose(list(self.case.analyses), self.options.only))
+        on_first_rank(self.comm, lambda: self._check_needs(names))
+        self.folder.record["selected"] = names
+        self._greet(names)
+        for name in names:
+            if not (self.resuming and self._is_done(name)):
+                self._run_one(self.case.analyses[name])
+        self._finish()
+        if self.failures:
+            raise self.failures[0] if len(self.failures) == 1 else _joined(self.failures)
+        return EXIT_DONE
+
+    def _greet(self, names: Sequence[str]) -> None:
+        ranks = f"{self.comm.size} rank{'s' * (self.comm.size > 1)}"
+        verb = "resumed" if self.resuming else "run"
+        title = f": {self.case.title}" if self.case.title else ""
+        self.console.line(f"{self.case.name}{title}")
+        self.console.line(
+            f"{verb} on {ranks}, {len(self.case.dofs)} dofs, results in {display(self.folder.path)}: {', '.join(names)}"
+        )
+        for note in self.case.notes:
+            self.console.line(f"note: {note}")
+        others = [name for name in self.case.analyses if name not in names]
+        if others:
+            self.console.line(f"left out by --only: {', '.join(others)}")
+
+    def _check_needs(self, names: Sequence[str]) -> None:
+        """Time integration needs the results of its mode: from this run, or kept in the folder."""
+        for name in names:
+            mode = getattr(self.case.analyses[name], "mode", None)
+            if mode is None or mode in names or self._kept(mode):
+                continue
+            raise InputError(
+                f"'{name}' needs the results of '{mode}'",
+                where="--only",
+                measured=f"no results of '{mode}' for this case in {display(self.folder.path)}",
+                fix=f"--only {mode},{name}",
+            )
+
+    def _kept(self, name: str) -> bool:
+        path = self.folder.path / "results.h5"
+        if not path.exists():
+            return False
+        with open_results(path) as file:
+            return name in file and belongs(file[name], self.case, name)
+
+    def _is_done(self, name: str) -> bool:
+        def look() -> str | None:
+            path = self.folder.path / "results.h5"
+            if not path.exists():
+                return None
+            with open_results(path) as file:
+                mine = name in file and file[name].attrs.get("run_id") == self.folder.record["run_id"]
+                return str(file[name].attrs.get("status")) if mine else None
+
+        status = on_first_rank(self.comm, look)
+        if status in ("done", "stopped"):
+            self.console.line(f"{name}: already {status}")
+        return status in ("done", "stopped")
+
+    def _is_begun(self, name: str) -> bool:
+        def look() -> bool:
+            path = self.folder.path / "results.h5"
+            if not path.exists():
+                return False
+            with open_results(path) as file:
+                return name in file and file[name].attrs.get("run_id") == self.folder.record["run_id"]
+
+        return self.resuming and on_first_rank(self.comm, look)
+
+    def _run_one(self, analysis: AnalysisSection) -> None:
+        import fretwave
+
+        began = time.perf_counter()
+        prefix = analysis.name.replace("-", "_") + "_"
+        options = AnalysisOptions(prefix, [self.options.petsc, analysis.petsc])
+
+        def before_first() -> None:
+            options.check_used(fretwave._core.unused_options, f"analysis '{analysis.name}'")
+            self.folder.start()
+
+        with _model(self.case, self._dampers(analysis), self.comm) as model, options.inserted():
+            context = AnalysisContext(
+                model,
+                self.case,
+                analysis,
+                self.comm,
+                self.folder.path,
+                self.console,
+                resuming=self._is_begun(analysis.name),
+                before_first=before_first,
+                attributes=describe_analysis(analysis, self.case.resolved, self.folder.record["run_id"]),
+            )
+            module, function = DISPATCH[analysis.type]
+            outcome = getattr(importlib.import_module(f".analyses.{module}", __package__), function)(context)
+        self._note(analysis.name, context, outcome, time.perf_counter() - began)
+
+    def _dampers(self, analysis: AnalysisSection) -> list[Any]:
+        """The analysis' dampers; a time integration without any takes those of its mode."""
+        if isinstance(analysis, TransientSection) and not analysis.dampers:
+            return list(self.case.analyses[analysis.mode].dampers)
+        return list(analysis.dampers)
+
+    def _note(self, name: str, context: AnalysisContext, outcome: Outcome, seconds: float) -> None:
+        """Print the outcome and keep it in run.json."""
+        for line in outcome.summary:
+            self.console.line(line)
+        memory = peak_memory_mb(self.comm)
+        self.folder.record["analyses"][name] = {
+            "status": "done" if outcome.converged else "stopped",
+            "reason": outcome.reason,
+            "points": outcome.points,
+            "wall_s": round(seconds, 3),
+            "peak_memory_mb": memory,
+            "left_out": context.left_out,
+        }
+        self.folder.save()
+        if not outcome.converged:
+            self.failures.append(_not_converged(name, outcome))
+
+    def _finish(self) -> None:
+        self.folder.record["status"] = "stopped" if self.failures else "done"
+        self.folder.record["peak_memory_mb"] = peak_memory_mb(self.comm)
+        if self.options.plots and self.folder.started and self.comm.rank == 0:
+            plot(self.folder.path, self.console)
+        self.folder.close()
+
+
+def plot(folder: Path, console: Console, only: Sequence[str] | None = None) -> int:
+    """Make the pictures of a run folder; returns how many."""
+    from .plots import plot_run
+
+    files = plot_run(folder, only)
+    console.line(f"{len(files)} picture{'s' * (len(files) != 1)} in {display(folder)}")
+    return len(files)
+
+
+def in_order(case: Case, names: Sequence[str]) -> list[str]:
+    """Analyses in the order of the file, but after those whose results they need."""
+    ordered: list[str] = []
+
+    def place(name: str) -> None:
+        if name in ordered or name not in names:
+            return
+        for needed in needs(case.analyses[name]):
+            place(needed)
+        ordered.append(name)
+
+    for name in names:
+        place(name)
+    return ordered
+
+
+def needs(analysis: AnalysisSection) -> list[str]:
+    """Names of the analyses whose results this one reads."""
+    if isinstance(analysis, TransientSection):
+        return [analysis.mode]
+    if isinstance(analysis, ForcedAnalysis):
+        return [analysis.backbone] if isinstance(analysis.backbone, str) else list(analysis.backbone)
+    return []
+
+
+@contextmanager
+def _model(case: Case, dampers: Sequence[Any], comm: Any) -> Iterator[Any]:
+    """The model of a case with dampers added. Collective."""
+    with build_model(case, dampers, comm) as model:
+        yield model
+
+
+def build_model(case: Case, dampers: Sequence[Any], comm: Any) -> Any:
+    """``fretwave.Model`` of a case. Collective."""
+    import fretwave
+
+    contacts = [
+        fretwave.Contact(contact.law, contact.rows, contact.parameters, name=contact.name) for contact in case.contacts
+    ]
+    return fretwave.Model(case.M, case.K, C=case.damping_with(dampers), contacts=contacts, comm=comm)
+
+
+def _not_converged(name: str, outcome: Outcome) -> NotConverged:
+    kept = f"{outcome.points} points are kept" if outcome.points else "nothing was solved, no results written"
+    place = f"after point {outcome.points - 1}" if outcome.points else "first point"
+    return NotConverged(
+        f"'{name}' stopped early; {kept}",
+        where=f"analysis '{name}', {place}",
+        measured=outcome.reason,
+        expected=outcome.goal or None,
+        fix=_advice(name, outcome.reason),
+    )
+
+
+def _advice(name: str, reason: str) -> str:
+    """What most often helps against a reason to stop."""
+    if "number of points" in reason:
+        return f"--set {name}.step.max_points=20000, or longer steps (step.maximum)"
+    if "at the start" in reason:
+        return (
+            "another start (amplitude or frequency) where the motion is nearly linear; --petsc -snes_monitor shows why"
+        )
+    return (
+        f"more samples, or shorter steps (--set {name}.step.minimum=1e-11); --petsc -snes_monitor shows Newton's steps"
+    )
+
+
+def _joined(failures: Sequence[NotConverged]) -> NotConverged:
+    first = failures[0]
+    names = "; ".join(failure.what for failure in failures)
+    return NotConverged(names, first.where, first.measured, first.expected, first.fix)

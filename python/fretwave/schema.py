@@ -1,0 +1,174 @@
+"""What may stand in a case file: every key with its one-line doc, unit and default.
+
+The models below are the only place where keys, defaults and plain bounds are written. Checks that need
+matrices or other entries are in :mod:`fretwave.checks`.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, Optional, Union
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+
+Dof = Annotated[str, BeforeValidator(lambda value: str(value) if type(value) is int else value)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Matrix = Union[str, list[list[float]]]
+Numbers = Union[float, list[float]]
+
+
+def key(doc: str, unit: str | None = None, example: str | None = None, **rules: Any) -> Any:
+    """A field with its doc, unit and a line of TOML that shows it."""
+    extra: dict[str, Any] = {"unit": unit, "example": example}
+    return Field(description=doc, json_schema_extra=extra, **rules)
+
+
+class Section(BaseModel):
+    """A table of the case file: no unknown keys, no silent conversion of types."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+
+class ModelSection(Section):
+    """``[model]``: matrices and names of the degrees of freedom."""
+
+    dofs: Optional[list[Dof]] = key(
+        "names of the dofs, in the order of the matrices", example='["m1", "m2"]', default=None
+    )
+    M: Matrix = key("mass matrix, rows or a .npz/.mtx file", "kg", "[[1.0, 0.0], [0.0, 0.02]]")
+    K: Matrix = key("stiffness matrix, rows or a .npz/.mtx file", "N/m", "[[2.0, -1.0], [-1.0, 1.0]]")
+    C: Optional[Matrix] = key(
+        "damping matrix, rows or a .npz/.mtx file", "N s/m", "[[0.1, 0.0], [0.0, 0.1]]", default=None
+    )
+
+
+class ContactSection(BaseModel):
+    """``[[contact]]``: pairs that share a contact law; the law's parameters are further keys."""
+
+    model_config = ConfigDict(extra="allow", strict=True)
+
+    name: str = key("name of the contact", example='"damper"', default="contact", pattern=r"^[A-Za-z]\w*$")
+    law: str = key("contact law", example='"regularised_coulomb"')
+    pairs: list[Union[Dof, list[Dof]]] = key(
+        "contact pairs: a dof against ground, or [first, second] for second minus first",
+        example='["m2"] or [["m1", "m2"]]',
+        min_length=1,
+    )
+
+
+class StepSection(Section):
+    """Step control of the continuation."""
+
+    initial: Positive = key("length of the first arclength step", "-", "0.05", default=0.05)
+    minimum: Positive = key("shortest step before the branch is given up", "-", "1e-9", default=1e-9)
+    maximum: Positive = key("longest step", "-", "0.3", default=0.3)
+    target_newton: int = key("Newton iterations the step aims at", example="4", default=4, ge=1)
+    max_angle: Positive = key("largest turn of the branch in one step", "rad", "0.6", default=0.6, le=3.2)
+    max_points: int = key("largest number of points of the branch", example="5000", default=5000, ge=2)
+
+
+class Damper(Section):
+    """A viscous damper from one dof to ground, added in one analysis."""
+
+    dof: Dof = key("dof the damper acts on", example='"m1"')
+    c: float = key("damper constant, negative to destabilise", "N s/m", "-1.0", allow_inf_nan=False)
+
+
+class AnalysisSection(Section):
+    """What every ``[[analysis]]`` has."""
+
+    name: str = key("unique name; results go to <name>.csv", example='"mode"', pattern=r"^[A-Za-z][\w-]*$")
+    type: str = key("kind of analysis", example='"mode"')
+    dampers: list[Damper] = key(
+        "viscous dampers to ground added in this analysis",
+        example='[{ dof = "m1", c = -1.0 }]',
+        default_factory=list,
+    )
+    petsc: str = key("PETSc options of this analysis", example='"-snes_rtol 1e-9"', default="")
+
+
+class HarmonicSection(AnalysisSection):
+    """Keys of the analyses in the frequency domain."""
+
+    harmonics: int = key("highest harmonic", example="21", ge=1)
+    retain: Literal["auto", "odd", "all"] = key(
+        "which harmonics up to the highest are kept", example='"auto"', default="auto"
+    )
+    samples: Optional[int] = key("time samples of a period in the contact law", example="1024", default=None, ge=4)
+    linear_mode: int = key("linear mode to start from, 1 is the lowest", example="1", default=1, ge=1)
+    step: StepSection = key("step control", example="{ initial = 0.05, maximum = 0.3 }", default_factory=StepSection)
+
+
+class ModeAnalysis(HarmonicSection):
+    """``type = "mode"``: a nonlinear mode over its amplitude."""
+
+    type: Literal["mode"]
+    method: Literal["CNM", "EPMC"] = key(
+        "complex nonlinear mode (decaying) or extended periodic motion", example='"CNM"', default="CNM"
+    )
+    normalise: Dof = key("dof whose fundamental harmonic is the modal amplitude", example='"m1"')
+    amplitude: list[Positive] = key("first and last modal amplitude", "m", "[0.02, 3.0]", min_length=2, max_length=2)
+    report_at: list[Positive] = key(
+        "amplitudes at which the motion of a period is kept", "m", "[0.1, 0.5]", default_factory=list
+    )
+
+
+class ForcedAnalysis(HarmonicSection):
+    """``type = "forced"``: frequency responses at several excitation levels."""
+
+    type: Literal["forced"]
+    backbone: Union[str, list[str]] = key(
+        "mode analyses whose backbones the peaks are compared with",
+        example='["mode"]',
+        default_factory=list,
+    )
+    force: dict[Dof, float] = key(
+        "force amplitude of each excited dof, cosine at harmonic 1", "N", "{ m1 = 1.0 }", min_length=1
+    )
+    levels: list[Positive] = key("factors on the force", "-", "[1.0, 2.0]", min_length=1)
+    frequency: list[Positive] = key(
+        "first and last excitation frequency", "Hz", "[3.0, 5.0]", min_length=2, max_length=2
+    )
+    observe: Dof = key("dof whose fundamental harmonic is reported", example='"m1"')
+    report_at: list[Positive] = key(
+        "frequencies at which the motion of a period is kept", "Hz", "[3.9]", default_factory=list
+    )
+    time_points: int = key("points of each response that are checked by time integration", example="4", default=0, ge=0)
+
+
+class TransientSection(AnalysisSection):
+    """Keys of the analyses by direct time integration."""
+
+    mode: str = key("mode analysis to start from and compare with", example='"mode"')
+    amplitude: list[Positive] = key("start amplitudes", "m", "[0.05, 0.3, 2.5]", min_length=1)
+    periods: int = key("vibration periods to integrate", example="30", ge=1)
+    samples_per_period: int = key("output samples of a period", example="64", default=64, ge=8)
+    tolerance: Positive = key("relative tolerance of the time integration", "-", "1e-8", default=1e-8, lt=1)
+
+
+class FreeDecayAnalysis(TransientSection):
+    """``type = "free_decay"``: decay and frequency of each cycle against the mode."""
+
+    type: Literal["free_decay"]
+
+
+class LimitCycleAnalysis(TransientSection):
+    """``type = "limit_cycle"``: where starts at several amplitudes end up."""
+
+    type: Literal["limit_cycle"]
+
+
+ANALYSES: dict[str, type[AnalysisSection]] = {
+    "mode": ModeAnalysis,
+    "forced": ForcedAnalysis,
+    "free_decay": FreeDecayAnalysis,
+    "limit_cycle": LimitCycleAnalysis,
+}
+
+#: Top-level keys; analyses cannot bear these names, or ``--set`` could not tell them apart.
+TOP_LEVEL = {
+    "title": "one line that says what the case is",
+    "model": "matrices and names of the degrees of freedom",
+    "contact": "contact pairs that share a law ([[contact]], any number)",
+    "analysis": "what to compute ([[analysis]], at least one)",
+    "quick": "overrides used by --quick, addressed as --set does",
+}
