@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "error.h"
+#include "hb/harmonic_pc.h"
 
 namespace fretwave::hb {
 
@@ -139,6 +140,24 @@ void HarmonicProblem::values(Vec y, std::span<double> v) {
   double* next = residual_.values(1 / stiffness_, v.data());
   for (int j = 0; j < scalars_; ++j, next += local_block_) column(j, next);
   if (normalised() && owns_dof()) next[0] = next[1] = 1;
+}
+
+VecHandle HarmonicProblem::scalar_column(Vec y, int j) {
+  linearise(y);
+  VecHandle out = like(q_);
+  column(j, WriteArray(out).data());
+  return out;
+}
+
+void HarmonicProblem::mean_contact(Vec y, std::vector<double>& K, std::vector<double>& C) {
+  linearise(y);
+  residual_.mean_contact(K, C);
+}
+
+std::unique_ptr<solve::Preconditioner> HarmonicProblem::preconditioner() {
+  constexpr PetscInt largest_dense = 3000;  // dofs: a complex factor of 144 MB a harmonic
+  if (harmonics().fundamental() < 0 || model().dofs() > largest_dense) return nullptr;
+  return std::make_unique<HarmonicPreconditioner>(*this);
 }
 
 /// Motion counts relative to its own size, so that a step is a share of it whatever the mesh.

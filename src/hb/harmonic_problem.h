@@ -40,6 +40,14 @@ class HarmonicProblem : public solve::Problem {
   std::vector<double> scalars(Vec y);
   /// Contact of the motion at y, summed over ranks. Collective.
   ContactSummary summarise(Vec y);
+  int scalar_count() const { return scalars_; }
+  double stiffness_scale() const { return stiffness_; }
+  DynamicStiffness const& stiffness() const { return residual_.stiffness(); }
+  /// Column dr/dz_j at y, on the harmonic rows. Collective.
+  VecHandle scalar_column(Vec y, int j);
+  /// Dense B^T (period-averaged tangent) B at y. Collective.
+  void mean_contact(Vec y, std::vector<double>& K, std::vector<double>& C);
+  std::unique_ptr<solve::Preconditioner> preconditioner() override;
   /// The laws start their march from the static state at y. Collective.
   void settle(Vec y) { residual_.settle(coefficients(y)); }
   std::vector<ContactPeriod> contact_periods(Vec y);
