@@ -7,6 +7,7 @@ namespace fretwave::solve {
 
 namespace {
 
+constexpr double kink_length = 1e-4;  // a turn that is left in so short a step is a kink (a sample changes state), not curvature
 constexpr double test_noise = 1e-11;  // a test function closer to zero than this has no sign
 
 VecHandle copy(Vec v) {
@@ -130,8 +131,9 @@ std::optional<Continuation::Trial> Continuation::step(double& length, double& an
     double along;
     check(VecDot(row_, trial.tangent, &along));
     angle = std::acos(std::clamp(along, -1.0, 1.0));
-    if (angle > steps_.max_angle && length > 16 * steps_.minimum) continue;
-    if (deviation(trial.y, length) > length) {
+    const bool may_shorten = length > std::max(kink_length, 16 * steps_.minimum);
+    if (angle > steps_.max_angle && may_shorten) continue;
+    if (may_shorten && deviation(trial.y, length) > length) {
       why = "the corrector lands on another branch";
       continue;
     }
