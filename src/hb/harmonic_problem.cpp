@@ -22,9 +22,10 @@ HarmonicProblem::HarmonicProblem(model::Model const& model, Harmonics const& h, 
   if (dof < 0 || dof >= model.dofs())
     throw InputError("the chosen dof does not exist", std::to_string(dof), "0 to " + std::to_string(model.dofs() - 1), "choose a dof of the model");
   q_ = residual_.vector();
-  for (auto* v : {&Q_, &dQ_, &R_, &dR_, &excitation_, &static_}) *v = like(q_);
+  for (auto* v : {&Q_, &dQ_, &R_, &dR_, &excitation_, &static_, &static_load_}) *v = like(q_);
   check(VecSet(excitation_, 0));
   check(VecSet(static_, 0));
+  check(VecSet(static_load_, 0));
   last_ = unknowns();
 }
 
@@ -60,14 +61,14 @@ void HarmonicProblem::preload(Vec x, Vec P) {
   if (harmonics().orders()[0] != 0)
     throw InputError("a preloaded structure moves about a mean that is not retained", "lowest harmonic " + std::to_string(harmonics().orders()[0]), "harmonic 0 retained", "retain all harmonics");
   add_mean(x, static_);
-  add_mean(P, excitation_);
+  add_mean(P, static_load_);
   linearised_ = false;
 }
 
 void HarmonicProblem::residual(Vec y, Vec r) {
   unpack(y);
   residual_.evaluate(Q_, motion_.exponents, R_);
-  check(VecAXPY(R_, -motion_.load, excitation_));
+  check(VecAXPBYPCZ(R_, -motion_.load, -1, 1, excitation_, static_load_));
   check(VecScale(R_, 1 / (stiffness_ * motion_.amplitude)));
   check(VecCopy(y, last_));
   linearised_ = true;

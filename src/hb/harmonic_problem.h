@@ -72,7 +72,7 @@ class HarmonicProblem : public solve::Problem {
   int scalars_;
   PetscInt dof_, local_block_;
   double stiffness_;
-  VecHandle q_, Q_, dQ_, R_, dR_, excitation_, static_, last_;
+  VecHandle q_, Q_, dQ_, R_, dR_, excitation_, static_, static_load_, last_;
   bool linearised_ = false;
   std::vector<double> z_;
   ScaledMotion motion_;
