@@ -1,8 +1,8 @@
 #pragma once
 #include <petscsnes.h>
 
-#include <span>
 #include <source_location>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -18,8 +18,9 @@ inline void check(PetscErrorCode code, std::source_location where = std::source_
   if (code) [[unlikely]] {
     const char* text = nullptr;
     (void)PetscErrorMessage(code, &text, nullptr);
-    throw PetscFailure(std::string("PETSc error ") + std::to_string(int(code)) + (text ? std::string(": ") + text : "") +
-                       " (called from " + where.file_name() + ":" + std::to_string(where.line()) + ")");
+    throw PetscFailure(std::string("PETSc error ") + std::to_string(int(code)) +
+                       (text ? std::string(": ") + text : "") + " (called from " + where.file_name() + ":" +
+                       std::to_string(where.line()) + ")");
   }
 }
 

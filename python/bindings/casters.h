@@ -17,7 +17,8 @@ namespace nb = nanobind;
 
 namespace fretwave::python {
 
-/// petsc4py objects in and out. A plain caster for Vec would strip the pointer, hence the struct. Borrowed on the way in, one reference more out.
+/// petsc4py objects in and out. A plain caster for Vec would strip the pointer, hence the struct. Borrowed on
+/// the way in, one reference more out.
 template <class T>
 struct Petsc {
   T object = nullptr;
@@ -56,8 +57,12 @@ namespace nanobind::detail {
 template <class T>
 struct type_caster<fretwave::python::Petsc<T>> {
   NB_TYPE_CASTER(fretwave::python::Petsc<T>, const_name("petsc4py.PETSc.Object"))
-  bool from_python(handle source, uint8_t, cleanup_list*) noexcept { return fretwave::python::from_petsc4py(source.ptr(), &value.object); }
-  static handle from_cpp(fretwave::python::Petsc<T> source, rv_policy, cleanup_list*) noexcept { return fretwave::python::to_petsc4py(source.object); }
+  bool from_python(handle source, uint8_t, cleanup_list*) noexcept {
+    return fretwave::python::from_petsc4py(source.ptr(), &value.object);
+  }
+  static handle from_cpp(fretwave::python::Petsc<T> source, rv_policy, cleanup_list*) noexcept {
+    return fretwave::python::to_petsc4py(source.object);
+  }
 };
 
 }  // namespace nanobind::detail

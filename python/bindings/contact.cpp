@@ -5,7 +5,8 @@ namespace fretwave::python {
 
 namespace {
 
-/// A law written in Python, for prototypes: calls object._evaluate(u, v) -> (f, df_du, df_dv) with arrays (samples, components, pairs).
+/// A law written in Python, for prototypes: calls object._evaluate(u, v) -> (f, df_du, df_dv) with arrays
+/// (samples, components, pairs).
 class PythonLaw : public contact::Law {
  public:
   PythonLaw(nb::object law, int pairs) : law_(std::move(law)), pairs_(pairs) {
@@ -19,8 +20,10 @@ class PythonLaw : public contact::Law {
   double stuck_stiffness(int, int) const override { return stuck_stiffness_; }
 
   void force(contact::Motion const& motion, double* f, contact::Record& record) const override {
-    const std::vector<size_t> shape = {size_t(motion.samples), size_t(motion.components), size_t(motion.pairs)};
-    nb::tuple out = nb::cast<nb::tuple>(law_.attr("_evaluate")(numpy_copy(motion.u, shape), numpy_copy(motion.v, shape)));
+    const std::vector<size_t> shape = {size_t(motion.samples), size_t(motion.components),
+                                       size_t(motion.pairs)};
+    nb::tuple out =
+        nb::cast<nb::tuple>(law_.attr("_evaluate")(numpy_copy(motion.u, shape), numpy_copy(motion.v, shape)));
     const auto take = [&](nb::handle from, size_t size, double* to) {
       auto array = nb::cast<nb::ndarray<double const, nb::c_contig, nb::device::cpu>>(from);
       if (array.size() != size) throw nb::value_error("a law in Python returned an array of the wrong size");
@@ -50,7 +53,8 @@ nb::list law_table() {
   for (auto const& entry : contact::laws()) {
     nb::list parameters;
     for (auto const& p : entry.parameters)
-      parameters.append(nb::make_tuple(p.name, p.unit, p.doc, p.lower, p.strict, p.standard ? nb::object(nb::cast(*p.standard)) : nb::none()));
+      parameters.append(nb::make_tuple(p.name, p.unit, p.doc, p.lower, p.strict,
+                                       p.standard ? nb::object(nb::cast(*p.standard)) : nb::none()));
     out.append(nb::make_tuple(entry.name, entry.doc, entry.components, parameters));
   }
   return out;
@@ -59,10 +63,17 @@ nb::list law_table() {
 }  // namespace
 
 void bind_contact(nb::module_& m) {
-  nb::class_<contact::Law>(m, "Law").def_prop_ro("components", &contact::Law::components).def_prop_ro("odd", &contact::Law::odd).def_prop_ro("pairs", &contact::Law::pairs);
+  nb::class_<contact::Law>(m, "Law")
+      .def_prop_ro("components", &contact::Law::components)
+      .def_prop_ro("odd", &contact::Law::odd)
+      .def_prop_ro("pairs", &contact::Law::pairs);
   m.def("law_table", law_table);
-  m.def("make_law", [](std::string const& name, contact::Parameters const& p) { return std::shared_ptr<contact::Law>(contact::make_law(name, p)); });
-  m.def("python_law", [](nb::object law, int pairs) { return std::shared_ptr<contact::Law>(std::make_shared<PythonLaw>(std::move(law), pairs)); });
+  m.def("make_law", [](std::string const& name, contact::Parameters const& p) {
+    return std::shared_ptr<contact::Law>(contact::make_law(name, p));
+  });
+  m.def("python_law", [](nb::object law, int pairs) {
+    return std::shared_ptr<contact::Law>(std::make_shared<PythonLaw>(std::move(law), pairs));
+  });
 }
 
 }  // namespace fretwave::python

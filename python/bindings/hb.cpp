@@ -23,8 +23,10 @@ nb::list contact_periods(hb::HarmonicProblem& problem, Petsc<Vec> y) {
   const auto periods = problem.contact_periods(y.object);
   for (size_t k = 0; k < periods.size(); ++k) {
     auto const& law = *problem.model().contacts()[k].law;
-    const std::vector<size_t> shape = {size_t(problem.harmonics().samples()), size_t(law.components()), size_t(law.pairs())};
-    out.append(nb::make_tuple(numpy_copy(periods[k].u.data(), shape), numpy_copy(periods[k].v.data(), shape), numpy_copy(periods[k].f.data(), shape)));
+    const std::vector<size_t> shape = {size_t(problem.harmonics().samples()), size_t(law.components()),
+                                       size_t(law.pairs())};
+    out.append(nb::make_tuple(numpy_copy(periods[k].u.data(), shape), numpy_copy(periods[k].v.data(), shape),
+                              numpy_copy(periods[k].f.data(), shape)));
   }
   return out;
 }
@@ -40,10 +42,11 @@ void bind_hb(nb::module_& m) {
       .def_prop_ro("block_size", &Harmonics::block_size)
       .def_prop_ro("odd_only", &Harmonics::odd_only);
   nb::class_<HarmonicProblem, solve::Problem>(m, "HarmonicProblem")
-      .def("coefficients", [](HarmonicProblem& p, Petsc<Vec> y) {
-        VecHandle Q = p.coefficients(y.object);
-        return nb::steal(to_petsc4py(Q));
-      })
+      .def("coefficients",
+           [](HarmonicProblem& p, Petsc<Vec> y) {
+             VecHandle Q = p.coefficients(y.object);
+             return nb::steal(to_petsc4py(Q));
+           })
       .def("summary", [](HarmonicProblem& p, Petsc<Vec> y) { return contact_summary(p.summarise(y.object)); })
       .def("contact_periods", contact_periods)
       .def("preload", [](HarmonicProblem& p, Petsc<Vec> x, Petsc<Vec> P) { p.preload(x.object, P.object); })
@@ -51,30 +54,35 @@ void bind_hb(nb::module_& m) {
       .def("exponents", [](HarmonicProblem& p, Petsc<Vec> y) { return p.exponents(y.object).s; });
   nb::enum_<Method>(m, "Method").value("CNM", Method::CNM).value("EPMC", Method::EPMC);
   nb::class_<NonlinearMode, HarmonicProblem>(m, "NonlinearMode")
-      .def("__init__",
-           [](NonlinearMode* self, model::Model const& model, Harmonics const& h, Method method, int dof, double omega, Petsc<Vec> shape) {
-             new (self) NonlinearMode(model, h, method, dof, omega, shape.object);
-           },
-           nb::keep_alive<1, 2>())
+      .def(
+          "__init__",
+          [](NonlinearMode* self, model::Model const& model, Harmonics const& h, Method method, int dof,
+             double omega,
+             Petsc<Vec> shape) { new (self) NonlinearMode(model, h, method, dof, omega, shape.object); },
+          nb::keep_alive<1, 2>())
       .def("initial", [](NonlinearMode& p, double a) { return nb::steal(to_petsc4py(p.initial(a))); })
       .def("state", [](NonlinearMode& p, Petsc<Vec> y) {
         const auto s = p.state(y.object);
         return nb::make_tuple(s.amplitude, s.omega, s.omega0, s.beta, s.zeta);
       });
   nb::class_<StaticPreload, HarmonicProblem>(m, "StaticPreload")
-      .def("__init__",
-           [](StaticPreload* self, model::Model const& model, Petsc<Vec> P, double size, double stiffness) {
-             new (self) StaticPreload(model, P.object, size, stiffness);
-           },
-           nb::keep_alive<1, 2>())
+      .def(
+          "__init__",
+          [](StaticPreload* self, model::Model const& model, Petsc<Vec> P, double size, double stiffness) {
+            new (self) StaticPreload(model, P.object, size, stiffness);
+          },
+          nb::keep_alive<1, 2>())
       .def("initial", [](StaticPreload& p) { return nb::steal(to_petsc4py(p.initial())); });
   nb::class_<ForcedResponse, HarmonicProblem>(m, "ForcedResponse")
-      .def("__init__",
-           [](ForcedResponse* self, model::Model const& model, Harmonics const& h, int dof, Petsc<Vec> P, double level, double omega, Petsc<Vec> shape) {
-             new (self) ForcedResponse(model, h, dof, P.object, level, omega, shape.object);
-           },
-           nb::keep_alive<1, 2>())
-      .def("initial", [](ForcedResponse& p, double omega) { return nb::steal(to_petsc4py(p.initial(omega))); })
+      .def(
+          "__init__",
+          [](ForcedResponse* self, model::Model const& model, Harmonics const& h, int dof, Petsc<Vec> P,
+             double level, double omega, Petsc<Vec> shape) {
+            new (self) ForcedResponse(model, h, dof, P.object, level, omega, shape.object);
+          },
+          nb::keep_alive<1, 2>())
+      .def("initial",
+           [](ForcedResponse& p, double omega) { return nb::steal(to_petsc4py(p.initial(omega))); })
       .def("state", [](ForcedResponse& p, Petsc<Vec> y) {
         const auto s = p.state(y.object);
         return nb::make_tuple(s.level, s.omega, s.amplitude, s.phase);

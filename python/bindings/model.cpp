@@ -14,8 +14,10 @@ void bind_model(nb::module_& m) {
            [](Model* self, Terms const& terms, Contacts const& contacts, double theta) {
              std::vector<model::Term> linear;
              std::vector<model::Contact> groups;
-             for (auto const& [A, order, phase] : terms) linear.push_back({MatHandle::share(A.object), order, phase});
-             for (auto const& [name, B, law] : contacts) groups.push_back({name, MatHandle::share(B.object), law});
+             for (auto const& [A, order, phase] : terms)
+               linear.push_back({MatHandle::share(A.object), order, phase});
+             for (auto const& [name, B, law] : contacts)
+               groups.push_back({name, MatHandle::share(B.object), law});
              new (self) Model(std::move(linear), std::move(groups), theta);
            })
       .def_prop_ro("dofs", &Model::dofs)

@@ -12,7 +12,9 @@ void translate(std::exception_ptr const& pointer, void*) {
   const auto raise = [](char const* name, nb::object error) {
     PyErr_SetObject(nb::module_::import_("fretwave.errors").attr(name).ptr(), error.ptr());
   };
-  const auto text = [](std::string const& s) -> nb::object { return s.empty() ? nb::none() : nb::object(nb::cast(s)); };
+  const auto text = [](std::string const& s) -> nb::object {
+    return s.empty() ? nb::none() : nb::object(nb::cast(s));
+  };
   try {
     std::rethrow_exception(pointer);
   } catch (InputError const& e) {

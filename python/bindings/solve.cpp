@@ -22,7 +22,8 @@ void bind_solve(nb::module_& m) {
       .def("unknowns", [](Problem& p) { return nb::steal(to_petsc4py(p.unknowns())); })
       .def("equations", [](Problem& p) { return nb::steal(to_petsc4py(p.equations())); })
       .def("residual", [](Problem& p, Petsc<Vec> y, Petsc<Vec> r) { p.residual(y.object, r.object); })
-      .def("product", [](Problem& p, Petsc<Vec> y, Petsc<Vec> dy, Petsc<Vec> dr) { p.product(y.object, dy.object, dr.object); })
+      .def("product", [](Problem& p, Petsc<Vec> y, Petsc<Vec> dy,
+                         Petsc<Vec> dr) { p.product(y.object, dy.object, dr.object); })
       .def("jacobian", [](Problem& p, Petsc<Vec> y) { return nb::steal(to_petsc4py(assemble(p, y.object))); })
       .def("parameter_entry", &Problem::parameter_entry)
       .def("parameter_value", &Problem::parameter_value);
@@ -37,7 +38,8 @@ void bind_solve(nb::module_& m) {
   nb::class_<Bordered>(m, "Bordered")
       .def("close", [](Bordered& b, Petsc<Vec> row, double value) { b.close(row.object, value); })
       .def("residual", [](Bordered& b, Petsc<Vec> y, Petsc<Vec> g) { b.residual(y.object, g.object); })
-      .def("product", [](Bordered& b, Petsc<Vec> y, Petsc<Vec> dy, Petsc<Vec> dg) { b.product(y.object, dy.object, dg.object); })
+      .def("product", [](Bordered& b, Petsc<Vec> y, Petsc<Vec> dy,
+                         Petsc<Vec> dg) { b.product(y.object, dy.object, dg.object); })
       .def("jacobian", [](Bordered& b, Petsc<Vec> y) {
         MatHandle J = b.matrix();
         b.assemble(y.object, J);
@@ -53,9 +55,12 @@ void bind_solve(nb::module_& m) {
         return nb::make_tuple(o.converged, o.newton, o.linear, o.residual, o.reason);
       });
   nb::class_<Continuation>(m, "Continuation")
-      .def(nb::init<Problem&, std::string const&, double, double, StepControl, std::vector<double>>(), nb::keep_alive<1, 2>())
-      .def("start", [](Continuation& c, Petsc<Vec> y, bool upwards) { return to_python(c.start(y.object, upwards)); })
-      .def("restore", [](Continuation& c, Petsc<Vec> y, Petsc<Vec> t, double step, int index, int emitted) { c.restore(y.object, t.object, step, index, emitted); })
+      .def(nb::init<Problem&, std::string const&, double, double, StepControl, std::vector<double>>(),
+           nb::keep_alive<1, 2>())
+      .def("start",
+           [](Continuation& c, Petsc<Vec> y, bool upwards) { return to_python(c.start(y.object, upwards)); })
+      .def("restore", [](Continuation& c, Petsc<Vec> y, Petsc<Vec> t, double step, int index,
+                         int emitted) { c.restore(y.object, t.object, step, index, emitted); })
       .def("next", [](Continuation& c) { return to_python(c.next()); })
       .def_prop_ro("reason", &Continuation::reason)
       .def_prop_ro("converged", &Continuation::converged)

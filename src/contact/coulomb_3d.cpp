@@ -7,8 +7,8 @@ namespace fretwave::contact {
 
 namespace {
 
-/// Arrays of the march's record, each 2 samples x pairs: closed; per tangent the factor s on the elastic trial force
-/// (1 stick, < 1 slip) and the slip direction e (0 when stuck or open).
+/// Arrays of the march's record, each 2 samples x pairs: closed; per tangent the factor s on the elastic
+/// trial force (1 stick, < 1 slip) and the slip direction e (0 when stuck or open).
 constexpr int record_arrays = 5;
 
 struct Places {
@@ -17,7 +17,8 @@ struct Places {
 
 Places places(double* march, size_t steps_x_pairs, size_t at) {
   march += at;
-  return {march, march + steps_x_pairs, march + 2 * steps_x_pairs, march + 3 * steps_x_pairs, march + 4 * steps_x_pairs};
+  return {march, march + steps_x_pairs, march + 2 * steps_x_pairs, march + 3 * steps_x_pairs,
+          march + 4 * steps_x_pairs};
 }
 
 /// Trial force to slip-limited force: factor s and direction e.
@@ -33,8 +34,10 @@ inline Slip limit_alone(double trial, double limit) {
 }  // namespace
 
 template <bool Coupled>
-Coulomb3d<Coupled>::Coulomb3d(Coulomb3dParameters p) : p_(std::move(p)), slider_(2 * p_.gap.size(), 0.0), closed_(p_.gap.size()) {
-  for (size_t i = 0; i < closed_.size(); ++i) closed_[i] = p_.normal_load[i] - p_.normal_stiffness[i] * p_.gap[i] > 0;
+Coulomb3d<Coupled>::Coulomb3d(Coulomb3dParameters p)
+    : p_(std::move(p)), slider_(2 * p_.gap.size(), 0.0), closed_(p_.gap.size()) {
+  for (size_t i = 0; i < closed_.size(); ++i)
+    closed_[i] = p_.normal_load[i] - p_.normal_stiffness[i] * p_.gap[i] > 0;
 }
 
 template <bool Coupled>
@@ -52,7 +55,8 @@ void Coulomb3d<Coupled>::rest(double const* u) {
   force({.samples = 1, .components = 3, .pairs = n, .u = u, .v = nullptr, .step = 0}, f.data(), record);
   for (int i = 0; i < n; ++i) {
     closed_[i] = f[i] > 0;
-    for (int c = 0; c < 2; ++c) slider_[c * n + i] = u[(c + 1) * n + i] - f[(c + 1) * n + i] / p_.tangential_stiffness[i];
+    for (int c = 0; c < 2; ++c)
+      slider_[c * n + i] = u[(c + 1) * n + i] - f[(c + 1) * n + i] / p_.tangential_stiffness[i];
   }
 }
 
@@ -62,7 +66,8 @@ void Coulomb3d<Coupled>::force(Motion const& motion, double* f, Record& record) 
   const size_t all = size_t(2) * motion.samples * n;
   std::vector<double> slider = slider_;
   record.march.resize(record_arrays * all);
-  double const *kn = p_.normal_stiffness.data(), *kt = p_.tangential_stiffness.data(), *mu = p_.friction_coefficient.data();
+  double const *kn = p_.normal_stiffness.data(), *kt = p_.tangential_stiffness.data(),
+               *mu = p_.friction_coefficient.data();
   double const *load = p_.normal_load.data(), *gap = p_.gap.data();
   double *w1 = slider.data(), *w2 = slider.data() + n;
   for (int step = 0; step < 2 * motion.samples; ++step) {
@@ -98,14 +103,16 @@ void Coulomb3d<Coupled>::force(Motion const& motion, double* f, Record& record) 
   }
 }
 
-/// dN = kn du_n where closed; trial dT = kt (du_t - dw). Coupled: dT = s (I - e e^T) trial + mu e dN; alone: dT = s trial + mu e dN.
-/// Where it slips dw = du - dT/kt, where it sticks dw stays.
+/// dN = kn du_n where closed; trial dT = kt (du_t - dw). Coupled: dT = s (I - e e^T) trial + mu e dN; alone:
+/// dT = s trial + mu e dN. Where it slips dw = du - dT/kt, where it sticks dw stays.
 template <bool Coupled>
-void Coulomb3d<Coupled>::product(Motion const& motion, Record const& record, double const* du_all, double const*, double* df) const {
+void Coulomb3d<Coupled>::product(Motion const& motion, Record const& record, double const* du_all,
+                                 double const*, double* df) const {
   const int n = motion.pairs;
   const size_t all = size_t(2) * motion.samples * n;
   std::vector<double> slider(2 * size_t(n), 0.0);
-  double const *kn = p_.normal_stiffness.data(), *kt = p_.tangential_stiffness.data(), *mu = p_.friction_coefficient.data();
+  double const *kn = p_.normal_stiffness.data(), *kt = p_.tangential_stiffness.data(),
+               *mu = p_.friction_coefficient.data();
   double *dw1 = slider.data(), *dw2 = slider.data() + n;
   for (int step = 0; step < 2 * motion.samples; ++step) {
     double const* du = du_all + size_t(step % motion.samples) * 3 * n;
@@ -127,19 +134,22 @@ void Coulomb3d<Coupled>::product(Motion const& motion, Record const& record, dou
 
 /// The instantaneous tangents of `product`, with dw = 0, over the second period.
 template <bool Coupled>
-void Coulomb3d<Coupled>::mean_tangent(Motion const& motion, Record const& record, double* df_du, double*) const {
+void Coulomb3d<Coupled>::mean_tangent(Motion const& motion, Record const& record, double* df_du,
+                                      double*) const {
   const int n = motion.pairs;
   const size_t all = size_t(2) * motion.samples * n;
   for (int step = motion.samples; step < 2 * motion.samples; ++step) {
     const Places r = places(const_cast<double*>(record.march.data()), all, size_t(step) * n);
     for (int i = 0; i < n; ++i) {
-      const double kn = r.closed[i] * p_.normal_stiffness[i] / motion.samples, kt = p_.tangential_stiffness[i] / motion.samples;
+      const double kn = r.closed[i] * p_.normal_stiffness[i] / motion.samples,
+                   kt = p_.tangential_stiffness[i] / motion.samples;
       const double mu = p_.friction_coefficient[i], s[2] = {r.s1[i], r.s2[i]}, e[2] = {r.e1[i], r.e2[i]};
       df_du[i] += kn;
       for (int row = 0; row < 2; ++row) {
         df_du[(row + 1) * 3 * n + i] += mu * e[row] * kn;
         for (int col = 0; col < 2; ++col)
-          df_du[((row + 1) * 3 + col + 1) * n + i] += s[row] * kt * ((row == col) - (Coupled ? e[row] * e[col] : 0.0));
+          df_du[((row + 1) * 3 + col + 1) * n + i] +=
+              s[row] * kt * ((row == col) - (Coupled ? e[row] * e[col] : 0.0));
       }
     }
   }
@@ -149,7 +159,8 @@ template <bool Coupled>
 void Coulomb3d<Coupled>::diagnose(Motion const& motion, double const* f, Diagnosis& out) const {
   const int n = motion.pairs, samples = motion.samples;
   for (int t = 0; t < samples; ++t) {
-    double const *u = motion.u + size_t(t) * 3 * n, *before = motion.u + size_t(t ? t - 1 : samples - 1) * 3 * n;
+    double const *u = motion.u + size_t(t) * 3 * n,
+                 *before = motion.u + size_t(t ? t - 1 : samples - 1) * 3 * n;
     double const *now = f + size_t(t) * 3 * n, *then = f + size_t(t ? t - 1 : samples - 1) * 3 * n;
     for (int i = 0; i < n; ++i) {
       const double kt = p_.tangential_stiffness[i], limit = p_.friction_coefficient[i] * now[i];
@@ -176,22 +187,36 @@ namespace {
 
 template <bool Coupled>
 Entry entry(std::string name, std::string doc) {
-  return {.name = std::move(name),
-          .doc = std::move(doc),
-          .components = 3,
-          .parameters = {{.name = "normal_stiffness", .unit = "N/m", .doc = "kn", .lower = 0, .strict = true},
-                         {.name = "tangential_stiffness", .unit = "N/m", .doc = "kt", .lower = 0, .strict = true},
-                         {.name = "friction_coefficient", .unit = "-", .doc = "mu", .lower = 0},
-                         {.name = "normal_load", .unit = "N", .doc = "N0, contact force at zero relative displacement and gap", .lower = 0, .standard = 0.0},
-                         {.name = "gap", .unit = "m", .doc = "initial gap; negative is an interference", .lower = -std::numeric_limits<double>::max(), .standard = 0.0}},
-          .make = [](Parameters const& p) {
-            return std::make_unique<Coulomb3d<Coupled>>(Coulomb3dParameters{p.at("normal_stiffness"), p.at("tangential_stiffness"), p.at("friction_coefficient"), p.at("normal_load"), p.at("gap")});
-          }};
+  return {
+      .name = std::move(name),
+      .doc = std::move(doc),
+      .components = 3,
+      .parameters = {{.name = "normal_stiffness", .unit = "N/m", .doc = "kn", .lower = 0, .strict = true},
+                     {.name = "tangential_stiffness", .unit = "N/m", .doc = "kt", .lower = 0, .strict = true},
+                     {.name = "friction_coefficient", .unit = "-", .doc = "mu", .lower = 0},
+                     {.name = "normal_load",
+                      .unit = "N",
+                      .doc = "N0, contact force at zero relative displacement and gap",
+                      .lower = 0,
+                      .standard = 0.0},
+                     {.name = "gap",
+                      .unit = "m",
+                      .doc = "initial gap; negative is an interference",
+                      .lower = -std::numeric_limits<double>::max(),
+                      .standard = 0.0}},
+      .make = [](Parameters const& p) {
+        return std::make_unique<Coulomb3d<Coupled>>(
+            Coulomb3dParameters{p.at("normal_stiffness"), p.at("tangential_stiffness"),
+                                p.at("friction_coefficient"), p.at("normal_load"), p.at("gap")});
+      }};
 }
 
 }  // namespace
 
-Entry coulomb_3d_entry() { return entry<true>("coulomb_3d", "elastic Coulomb contact with variable normal load and lift-off, circular slip limit"); }
+Entry coulomb_3d_entry() {
+  return entry<true>("coulomb_3d",
+                     "elastic Coulomb contact with variable normal load and lift-off, circular slip limit");
+}
 Entry coulomb_3d_uncoupled_entry() {
   return entry<false>("coulomb_3d_uncoupled", "as coulomb_3d, with each tangent limited by itself");
 }

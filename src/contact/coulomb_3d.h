@@ -10,7 +10,8 @@ struct Coulomb3dParameters {
 
 /// Elastic Coulomb contact in three dimensions: components (normal, tangent, tangent), u_n > 0 closes.
 ///   N = max(0, N0 + kn (u_n - gap)),  T = kt (u_t - w),  |T| <= mu N,  T = w' free when open.
-/// Circular slip limit over both tangents, or each tangent limited by itself (Coupled = false), as some other codes do.
+/// Circular slip limit over both tangents, or each tangent limited by itself (Coupled = false), as some other
+/// codes do.
 template <bool Coupled>
 class Coulomb3d : public Law {
  public:

@@ -9,7 +9,8 @@ Jenkins::Jenkins(std::vector<double> stiffness, std::vector<double> friction_lim
     : stiffness_(std::move(stiffness)), limit_(std::move(friction_limit)), slider_(stiffness_.size(), 0.0) {}
 
 void Jenkins::rest(double const* u) {
-  for (size_t i = 0; i < slider_.size(); ++i) slider_[i] = u[i] - std::clamp(stiffness_[i] * u[i], -limit_[i], limit_[i]) / stiffness_[i];
+  for (size_t i = 0; i < slider_.size(); ++i)
+    slider_[i] = u[i] - std::clamp(stiffness_[i] * u[i], -limit_[i], limit_[i]) / stiffness_[i];
 }
 
 bool Jenkins::odd() const {
@@ -40,7 +41,8 @@ void Jenkins::force(Motion const& motion, double* f, Record& record) const {
 }
 
 /// Stick: df = k (du - dw); slip: df = 0 and dw = du.
-void Jenkins::product(Motion const& motion, Record const& record, double const* du_all, double const*, double* df) const {
+void Jenkins::product(Motion const& motion, Record const& record, double const* du_all, double const*,
+                      double* df) const {
   const int n = motion.pairs;
   std::vector<double> slider(n, 0.0);
   double const* k = stiffness_.data();
@@ -59,7 +61,8 @@ void Jenkins::product(Motion const& motion, Record const& record, double const* 
 
 void Jenkins::mean_tangent(Motion const& motion, Record const& record, double* df_du, double*) const {
   double const* second = record.march.data() + motion.size();
-  for (size_t k = 0; k < motion.size(); ++k) df_du[k % motion.pairs] += second[k] * stiffness_[k % motion.pairs] / motion.samples;
+  for (size_t k = 0; k < motion.size(); ++k)
+    df_du[k % motion.pairs] += second[k] * stiffness_[k % motion.pairs] / motion.samples;
 }
 
 void Jenkins::diagnose(Motion const& motion, double const* f, Diagnosis& out) const {
@@ -83,9 +86,15 @@ Entry jenkins_entry() {
   return {.name = "jenkins",
           .doc = "elastic Coulomb slider with constant normal load",
           .components = 1,
-          .parameters = {{.name = "tangential_stiffness", .unit = "N/m", .doc = "kt of the elastic part", .lower = 0, .strict = true},
+          .parameters = {{.name = "tangential_stiffness",
+                          .unit = "N/m",
+                          .doc = "kt of the elastic part",
+                          .lower = 0,
+                          .strict = true},
                          {.name = "friction_limit", .unit = "N", .doc = "sliding force mu N", .lower = 0}},
-          .make = [](Parameters const& p) { return std::make_unique<Jenkins>(p.at("tangential_stiffness"), p.at("friction_limit")); }};
+          .make = [](Parameters const& p) {
+            return std::make_unique<Jenkins>(p.at("tangential_stiffness"), p.at("friction_limit"));
+          }};
 }
 
 }  // namespace fretwave::contact

@@ -3,7 +3,8 @@
 
 namespace fretwave::contact {
 
-/// Elastic Coulomb slider with constant normal load (Jenkins element): f = kt (u - w), |f| <= R, the slider w moves when it slips.
+/// Elastic Coulomb slider with constant normal load (Jenkins element): f = kt (u - w), |f| <= R, the slider w
+/// moves when it slips.
 class Jenkins : public Law {
  public:
   Jenkins(std::vector<double> stiffness, std::vector<double> friction_limit);

@@ -8,7 +8,8 @@ namespace fretwave::contact {
 namespace {
 
 /// df += G dx with G samples x components x components x pairs.
-void add_tangent_product(Motion const& motion, std::vector<double> const& tangent, double const* dx, double* df) {
+void add_tangent_product(Motion const& motion, std::vector<double> const& tangent, double const* dx,
+                         double* df) {
   const int d = motion.components, n = motion.pairs;
   for (int t = 0; t < motion.samples; ++t)
     for (int row = 0; row < d; ++row)
@@ -23,7 +24,8 @@ void add_tangent_product(Motion const& motion, std::vector<double> const& tangen
 
 }  // namespace
 
-void Law::product(Motion const& motion, Record const& record, double const* du, double const* dv, double* df) const {
+void Law::product(Motion const& motion, Record const& record, double const* du, double const* dv,
+                  double* df) const {
   std::fill_n(df, motion.size(), 0.0);
   if (du && !record.df_du.empty()) add_tangent_product(motion, record.df_du, du, df);
   if (dv && !record.df_dv.empty()) add_tangent_product(motion, record.df_dv, dv, df);
@@ -41,7 +43,8 @@ void Law::mean_tangent(Motion const& motion, Record const& record, double* df_du
 void add_work(Motion const& motion, double const* f, std::vector<double>& work) {
   if (!motion.v) return;
   for (int row = 0; row < motion.samples * motion.components; ++row)
-    for (int i = 0; i < motion.pairs; ++i) work[i] += f[size_t(row) * motion.pairs + i] * motion.v[size_t(row) * motion.pairs + i] * motion.step;
+    for (int i = 0; i < motion.pairs; ++i)
+      work[i] += f[size_t(row) * motion.pairs + i] * motion.v[size_t(row) * motion.pairs + i] * motion.step;
 }
 
 }  // namespace fretwave::contact

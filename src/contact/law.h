@@ -7,9 +7,10 @@
 /// Contact laws: pure C++, no PETSc, no MPI, no Fourier.
 namespace fretwave::contact {
 
-/// One period of relative motion of all pairs on this rank. Arrays are samples x components x pairs, pairs innermost (DESIGN fact 7).
+/// One period of relative motion of all pairs on this rank. Arrays are samples x components x pairs, pairs
+/// innermost (DESIGN fact 7).
 struct Motion {
-  int samples = 0;           ///< samples held here (half a period when the motion is half-wave symmetric)
+  int samples = 0;  ///< samples held here (half a period when the motion is half-wave symmetric)
   int components = 0, pairs = 0;
   double const* u = nullptr;  ///< relative displacement [m]; null if the law ignores it
   double const* v = nullptr;  ///< relative velocity [m/s]; null if the law ignores it
@@ -19,8 +20,9 @@ struct Motion {
 
 /// What a force evaluation leaves for its linearisation.
 struct Record {
-  std::vector<double> df_du, df_dv;  ///< instantaneous tangents, samples x components x components x pairs; empty if zero
-  std::vector<double> march;         ///< a hereditary law's own flags and directions along its march
+  std::vector<double> df_du,
+      df_dv;  ///< instantaneous tangents, samples x components x components x pairs; empty if zero
+  std::vector<double> march;  ///< a hereditary law's own flags and directions along its march
 };
 
 enum class Status : std::uint8_t { stick, slip, open };
@@ -40,20 +42,26 @@ class Law {
   virtual int pairs() const = 0;
   virtual bool uses_displacement() const { return true; }
   virtual bool uses_velocity() const { return true; }
-  /// The force depends on the path. Such a law marches two periods from its rest state and is read on the second (DESIGN fact 3).
+  /// The force depends on the path. Such a law marches two periods from its rest state and is read on the
+  /// second (DESIGN fact 3).
   virtual bool hereditary() const { return false; }
-  /// The static state the dynamics start from: relative displacement components x pairs, reached from zero in one step.
+  /// The static state the dynamics start from: relative displacement components x pairs, reached from zero in
+  /// one step.
   virtual void rest(double const* /*u*/) {}
   /// f(-u, -v) = -f(u, v): the motion may keep odd harmonics only.
   virtual bool odd() const { return false; }
-  /// Stiffness of the contact when stuck in its rest state [N/m] (0 for a pair that is open there); infinite means no relative motion at all.
-  virtual double stuck_stiffness(int /*component*/, int /*pair*/) const { return std::numeric_limits<double>::infinity(); }
+  /// Stiffness of the contact when stuck in its rest state [N/m] (0 for a pair that is open there); infinite
+  /// means no relative motion at all.
+  virtual double stuck_stiffness(int /*component*/, int /*pair*/) const {
+    return std::numeric_limits<double>::infinity();
+  }
 
   /// Force on the pairs, and what its linearisation needs.
   virtual void force(Motion const&, double* f, Record&) const = 0;
   /// Linearised force for a motion perturbed by (du, dv); null where the law ignores it.
   virtual void product(Motion const&, Record const&, double const* du, double const* dv, double* df) const;
-  /// Tangents averaged over the period, components x components x pairs each, added to what is there: for preconditioning.
+  /// Tangents averaged over the period, components x components x pairs each, added to what is there: for
+  /// preconditioning.
   virtual void mean_tangent(Motion const&, Record const&, double* df_du, double* df_dv) const;
   virtual void diagnose(Motion const&, double const* f, Diagnosis&) const = 0;
 };

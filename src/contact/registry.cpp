@@ -26,9 +26,10 @@ void check_values(Entry const& entry, Parameters const& values) {
     auto const& given = values.at(p.name);
     for (size_t i = 0; i < given.size(); ++i)
       if (!std::isfinite(given[i]) || given[i] < p.lower || (p.strict && given[i] == p.lower))
-        throw InputError("law '" + entry.name + "', pair " + std::to_string(i) + ": '" + p.name + "' is out of bounds",
-                         std::to_string(given[i]), (p.strict ? "> " : ">= ") + std::to_string(p.lower) + " " + p.unit,
-                         "give a value within the bound");
+        throw InputError(
+            "law '" + entry.name + "', pair " + std::to_string(i) + ": '" + p.name + "' is out of bounds",
+            std::to_string(given[i]), (p.strict ? "> " : ">= ") + std::to_string(p.lower) + " " + p.unit,
+            "give a value within the bound");
   }
 }
 

@@ -32,7 +32,8 @@ struct Entry {
 /// All laws known by name. A new law is its own file and one line here.
 std::span<Entry const> laws();
 
-/// Law by name for the pairs the parameters are given for; InputError for an unknown name or a value out of bounds.
+/// Law by name for the pairs the parameters are given for; InputError for an unknown name or a value out of
+/// bounds.
 std::unique_ptr<Law> make_law(std::string const& name, Parameters const&);
 
 }  // namespace fretwave::contact

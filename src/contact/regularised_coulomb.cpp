@@ -4,7 +4,8 @@
 
 namespace fretwave::contact {
 
-RegularisedCoulomb::RegularisedCoulomb(std::vector<double> friction_limit, std::vector<double> regularisation_velocity)
+RegularisedCoulomb::RegularisedCoulomb(std::vector<double> friction_limit,
+                                       std::vector<double> regularisation_velocity)
     : limit_(std::move(friction_limit)), velocity_(std::move(regularisation_velocity)) {}
 
 void RegularisedCoulomb::force(Motion const& motion, double* f, Record& record) const {
@@ -36,9 +37,14 @@ Entry regularised_coulomb_entry() {
           .doc = "mu N tanh(v/eps): Coulomb friction with constant normal load, regularised by a velocity",
           .components = 1,
           .parameters = {{.name = "friction_limit", .unit = "N", .doc = "sliding force mu N", .lower = 0},
-                         {.name = "regularisation_velocity", .unit = "m/s", .doc = "eps; smaller is closer to Coulomb", .lower = 0, .strict = true}},
+                         {.name = "regularisation_velocity",
+                          .unit = "m/s",
+                          .doc = "eps; smaller is closer to Coulomb",
+                          .lower = 0,
+                          .strict = true}},
           .make = [](Parameters const& p) {
-            return std::make_unique<RegularisedCoulomb>(p.at("friction_limit"), p.at("regularisation_velocity"));
+            return std::make_unique<RegularisedCoulomb>(p.at("friction_limit"),
+                                                        p.at("regularisation_velocity"));
           }};
 }
 

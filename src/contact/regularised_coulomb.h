@@ -3,7 +3,8 @@
 
 namespace fretwave::contact {
 
-/// Regularised Coulomb friction with constant normal load, f = mu N tanh(v / eps) (Laxalde et al. 2008, eq. 2b).
+/// Regularised Coulomb friction with constant normal load, f = mu N tanh(v / eps) (Laxalde et al. 2008, eq.
+/// 2b).
 class RegularisedCoulomb : public Law {
  public:
   RegularisedCoulomb(std::vector<double> friction_limit, std::vector<double> regularisation_velocity);

@@ -10,7 +10,9 @@ namespace {
 int tangent_columns(contact::Law const& law) { return law.components() * law.components() * law.pairs(); }
 
 /// The fundamental's Im s: the angular frequency that turns sample numbers into time.
-double angular_frequency(Harmonics const& h, Exponents const& e) { return h.fundamental() < 0 ? 1.0 : e.s[h.fundamental()].imag(); }
+double angular_frequency(Harmonics const& h, Exponents const& e) {
+  return h.fundamental() < 0 ? 1.0 : e.s[h.fundamental()].imag();
+}
 
 }  // namespace
 
@@ -61,14 +63,17 @@ void Aft::product(double const* dU, double const* dV, double* dF) {
   if (columns_ == 0) return;
   if (law_->uses_displacement()) transform_.to_time(dU, du_.data());
   if (law_->uses_velocity()) transform_.to_time(dV, dv_.data());
-  law_->product(motion(1), record_, du_.empty() ? nullptr : du_.data(), dv_.empty() ? nullptr : dv_.data(), df_.data());
+  law_->product(motion(1), record_, du_.empty() ? nullptr : du_.data(), dv_.empty() ? nullptr : dv_.data(),
+                df_.data());
   mirror(df_, -1, columns_);
   transform_.to_harmonics(df_.data(), dF);
 }
 
-/// T[pair][row][col] (m x m each): f_n = 2 G_n x_0 + sum_k G_{n-k} x_k + G_{n+k} conj(x_k) for f(t) = g(t) x(t), from the FFT of g alone.
+/// T[pair][row][col] (m x m each): f_n = 2 G_n x_0 + sum_k G_{n-k} x_k + G_{n+k} conj(x_k) for f(t) = g(t)
+/// x(t), from the FFT of g alone.
 void Aft::toeplitz_hankel(std::vector<double> const& tangent, std::vector<double>& T) const {
-  const int m = harmonics_.block_size(), d = law_->components(), columns = d * d * pairs_, N = harmonics_.samples();
+  const int m = harmonics_.block_size(), d = law_->components(), columns = d * d * pairs_,
+            N = harmonics_.samples();
   std::vector<double> samples(size_t(N) * columns), unused(size_t(columns) * m);
   std::copy_n(tangent.data(), size_t(law_samples_) * columns, samples.data());
   mirror(samples, +1, columns);
@@ -170,7 +175,9 @@ namespace {
 
 void count(contact::Diagnosis const& diagnosis, ContactSummary& summary) {
   for (auto s : diagnosis.status)
-    (s == contact::Status::stick ? summary.stick : s == contact::Status::slip ? summary.slip : summary.open) += 1;
+    (s == contact::Status::stick  ? summary.stick
+     : s == contact::Status::slip ? summary.slip
+                                  : summary.open) += 1;
   for (double w : diagnosis.work) summary.work += w;
 }
 
@@ -187,7 +194,8 @@ ContactSummary Aft::summarise(double const* U, Exponents const& e) {
 
   contact::Motion whole = motion(angular_frequency(harmonics_, e));
   whole.samples = harmonics_.samples(), whole.u = now.u.data(), whole.v = now.v.data();
-  contact::Diagnosis diagnosis{std::vector<contact::Status>(size_t(whole.samples) * pairs_), std::vector<double>(pairs_), std::vector<double>(pairs_)};
+  contact::Diagnosis diagnosis{std::vector<contact::Status>(size_t(whole.samples) * pairs_),
+                               std::vector<double>(pairs_), std::vector<double>(pairs_)};
   law_->diagnose(whole, now.f.data(), diagnosis);
   count(diagnosis, summary);
 

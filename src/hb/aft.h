@@ -6,10 +6,11 @@ namespace fretwave::hb {
 
 /// Contact quality of one motion: energies for the truncated share, and what the law diagnoses.
 struct ContactSummary {
-  double stick = 0, slip = 0, open = 0;           ///< pair-samples
-  double truncated = 0, total = 0;                ///< force energy outside the retained orders, and in all
-  double aliased = 0, retained = 0;               ///< squared change of the coefficients on doubled samples, and their square
-  double work = 0;                                ///< dissipated energy per period [J]
+  double stick = 0, slip = 0, open = 0;  ///< pair-samples
+  double truncated = 0, total = 0;       ///< force energy outside the retained orders, and in all
+  double aliased = 0,
+         retained = 0;  ///< squared change of the coefficients on doubled samples, and their square
+  double work = 0;      ///< dissipated energy per period [J]
 };
 
 /// Time samples of a period: samples x components x pairs.
@@ -17,8 +18,8 @@ struct ContactPeriod {
   std::vector<double> u, v, f;
 };
 
-/// Alternating frequency-time for the contact pairs of this rank: harmonic blocks of relative displacement in, of force out.
-/// Blocks are (pairs x components) x block size. Never communicates.
+/// Alternating frequency-time for the contact pairs of this rank: harmonic blocks of relative displacement
+/// in, of force out. Blocks are (pairs x components) x block size. Never communicates.
 class Aft {
  public:
   Aft(Harmonics const&, std::shared_ptr<contact::Law const>);

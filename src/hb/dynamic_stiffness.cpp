@@ -4,7 +4,8 @@
 
 namespace fretwave::hb {
 
-DynamicStiffness::DynamicStiffness(model::Model const& model, Harmonics const& h) : model_(model), harmonics_(h) {
+DynamicStiffness::DynamicStiffness(model::Model const& model, Harmonics const& h)
+    : model_(model), harmonics_(h) {
   for (auto const& term : model.terms()) {
     blocked_.emplace_back();
     check(MatCreateMAIJ(term.A, h.block_size(), blocked_.back().out()));
@@ -12,23 +13,32 @@ DynamicStiffness::DynamicStiffness(model::Model const& model, Harmonics const& h
   work_ = make_vector(model.comm(), model.local_dofs() * h.block_size());
 }
 
-complex DynamicStiffness::phase(model::Term const& term, int n) const { return std::polar(1.0, -term.phase * n * model_.theta()); }
+complex DynamicStiffness::phase(model::Term const& term, int n) const {
+  return std::polar(1.0, -term.phase * n * model_.theta());
+}
 
-// Laxalde et al. 2008, eq. 7 in complex form: (K + s C + s^2 M) q; EPMC (Krack 2015) replaces C by C - g M, g = 2 zeta w0.
+// Laxalde et al. 2008, eq. 7 in complex form: (K + s C + s^2 M) q; EPMC (Krack 2015) replaces C by C - g M, g
+// = 2 zeta w0.
 std::vector<complex> DynamicStiffness::coefficients(model::Term const& term, Exponents const& e) const {
   std::vector<complex> c(harmonics_.count());
   for (int i = 0; i < harmonics_.count(); ++i) {
     const complex s = e.s[i];
-    c[i] = (term.order == 0 ? 1.0 : term.order == 1 ? s : s * s - e.inertia_damping * s) * phase(term, harmonics_.orders()[i]);
+    c[i] = (term.order == 0   ? 1.0
+            : term.order == 1 ? s
+                              : s * s - e.inertia_damping * s) *
+           phase(term, harmonics_.orders()[i]);
   }
   return c;
 }
 
-std::vector<complex> DynamicStiffness::coefficient_derivatives(model::Term const& term, Exponents const& e, Exponents const& change) const {
+std::vector<complex> DynamicStiffness::coefficient_derivatives(model::Term const& term, Exponents const& e,
+                                                               Exponents const& change) const {
   std::vector<complex> c(harmonics_.count());
   for (int i = 0; i < harmonics_.count(); ++i) {
     const complex s = e.s[i], ds = change.s[i];
-    const complex d = term.order == 0 ? 0.0 : term.order == 1 ? ds : (2.0 * s - e.inertia_damping) * ds - change.inertia_damping * s;
+    const complex d = term.order == 0   ? 0.0
+                      : term.order == 1 ? ds
+                                        : (2.0 * s - e.inertia_damping) * ds - change.inertia_damping * s;
     c[i] = d * phase(term, harmonics_.orders()[i]);
   }
   return c;
@@ -44,12 +54,14 @@ void DynamicStiffness::accumulate(std::vector<complex> const& c, Mat A, Vec x, V
 }
 
 void DynamicStiffness::multiply_add(Exponents const& e, Vec x, Vec y) {
-  for (size_t j = 0; j < blocked_.size(); ++j) accumulate(coefficients(model_.terms()[j], e), blocked_[j], x, y);
+  for (size_t j = 0; j < blocked_.size(); ++j)
+    accumulate(coefficients(model_.terms()[j], e), blocked_[j], x, y);
 }
 
 void DynamicStiffness::derivative_multiply_add(Exponents const& e, Exponents const& change, Vec x, Vec y) {
   for (size_t j = 0; j < blocked_.size(); ++j)
-    if (model_.terms()[j].order > 0) accumulate(coefficient_derivatives(model_.terms()[j], e, change), blocked_[j], x, y);
+    if (model_.terms()[j].order > 0)
+      accumulate(coefficient_derivatives(model_.terms()[j], e, change), blocked_[j], x, y);
 }
 
 std::vector<DynamicStiffness::Entry> DynamicStiffness::entries(Mat A) const {

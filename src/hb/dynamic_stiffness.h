@@ -6,7 +6,8 @@
 
 namespace fretwave::hb {
 
-/// Z = sum over the linear terms of A (x) c_n, c_n = s_n^p e^{-i k n theta}; with inertia damping g the mass takes s^2 - g s.
+/// Z = sum over the linear terms of A (x) c_n, c_n = s_n^p e^{-i k n theta}; with inertia damping g the mass
+/// takes s^2 - g s.
 class DynamicStiffness {
  public:
   DynamicStiffness(model::Model const&, Harmonics const&);
@@ -16,9 +17,11 @@ class DynamicStiffness {
   void derivative_multiply_add(Exponents const&, Exponents const& change, Vec x, Vec y);
   /// c_n of one term.
   std::vector<complex> coefficients(model::Term const&, Exponents const&) const;
-  std::vector<complex> coefficient_derivatives(model::Term const&, Exponents const&, Exponents const& change) const;
+  std::vector<complex> coefficient_derivatives(model::Term const&, Exponents const&,
+                                               Exponents const& change) const;
 
-  /// Places of the entries in the harmonic-block matrix (this rank's rows), and their values in the same order, scaled.
+  /// Places of the entries in the harmonic-block matrix (this rank's rows), and their values in the same
+  /// order, scaled.
   void pattern(std::vector<PetscInt>& rows, std::vector<PetscInt>& cols) const;
   double* values(Exponents const&, double scale, double* v) const;
 

@@ -7,11 +7,14 @@ struct ForcedState {
   double level, omega, amplitude, phase;
 };
 
-/// Steady response to a periodic excitation, s_n = i n w: y = (Q/a_ref, w/w_ref), w the continuation parameter.
+/// Steady response to a periodic excitation, s_n = i n w: y = (Q/a_ref, w/w_ref), w the continuation
+/// parameter.
 class ForcedResponse : public HarmonicProblem {
  public:
-  /// P: excitation as harmonic blocks at level 1; `omega`, `shape`: the linear mode that scales the unknowns. Collective.
-  ForcedResponse(model::Model const&, Harmonics const&, PetscInt dof, Vec P, double level, double omega, Vec shape);
+  /// P: excitation as harmonic blocks at level 1; `omega`, `shape`: the linear mode that scales the unknowns.
+  /// Collective.
+  ForcedResponse(model::Model const&, Harmonics const&, PetscInt dof, Vec P, double level, double omega,
+                 Vec shape);
   /// Zero motion at angular frequency w: Newton's first step is then the linear response. Collective.
   VecHandle initial(double omega);
   /// Amplitude and phase of the observed dof's fundamental, x = A cos(w t + phase).

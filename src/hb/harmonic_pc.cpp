@@ -6,9 +6,11 @@
 
 extern "C" {
 void zgetrf_(int const*, int const*, std::complex<double>*, int const*, int*, int*);
-void zgetrs_(char const*, int const*, int const*, std::complex<double> const*, int const*, int const*, std::complex<double>*, int const*, int*);
+void zgetrs_(char const*, int const*, int const*, std::complex<double> const*, int const*, int const*,
+             std::complex<double>*, int const*, int*);
 void dgetrf_(int const*, int const*, double*, int const*, int*, int*);
-void dgetrs_(char const*, int const*, int const*, double const*, int const*, int const*, double*, int const*, int*);
+void dgetrs_(char const*, int const*, int const*, double const*, int const*, int const*, double*, int const*,
+             int*);
 }
 
 namespace fretwave::hb {
@@ -36,7 +38,10 @@ std::vector<double> whole(Mat A) {
 }
 
 void need(int info, char const* what) {
-  if (info != 0) throw InputError(std::string("the preconditioner's ") + what + " is singular", "LAPACK info " + std::to_string(info), "0", "check the model for free motions at this harmonic");
+  if (info != 0)
+    throw InputError(std::string("the preconditioner's ") + what + " is singular",
+                     "LAPACK info " + std::to_string(info), "0",
+                     "check the model for free motions at this harmonic");
 }
 
 }  // namespace
@@ -58,7 +63,8 @@ std::vector<double> HarmonicPreconditioner::gather(Vec v) const {
   for (int r = 1; r < size_; ++r) starts[r] = starts[r - 1] + counts[r - 1];
   std::vector<double> all(size_t(starts.back() + counts.back()));
   ReadArray in(v);
-  MPI_Allgatherv(in.data(), local, MPI_DOUBLE, all.data(), counts.data(), starts.data(), MPI_DOUBLE, problem_.comm());
+  MPI_Allgatherv(in.data(), local, MPI_DOUBLE, all.data(), counts.data(), starts.data(), MPI_DOUBLE,
+                 problem_.comm());
   return all;
 }
 
@@ -101,7 +107,8 @@ void HarmonicPreconditioner::factorise_fundamental(Exponents const& e, Vec y, Ve
     }
   for (int i = 0; i < n_; ++i)
     for (int part = 0; part < 2; ++part) {
-      for (int j = 0; j < scalars_; ++j) at(part * n_ + i, 2 * n_ + j) = columns[j][size_t(i) * m_ + offset + part];
+      for (int j = 0; j < scalars_; ++j)
+        at(part * n_ + i, 2 * n_ + j) = columns[j][size_t(i) * m_ + offset + part];
       at(size - 1, part * n_ + i) = closing[size_t(i) * m_ + offset + part];
     }
   for (int j = 0; j < scalars_; ++j) at(size - 1, 2 * n_ + j) = closing[size_t(n_) * m_ + j];
@@ -125,7 +132,8 @@ void HarmonicPreconditioner::solve(Factor const& factor, double const* x, double
   const int offset = problem_.harmonics().offset(factor.harmonic), one = 1;
   const bool mean = problem_.harmonics().orders()[factor.harmonic] == 0;
   std::vector<complex> b(n_);
-  for (int i = 0; i < n_; ++i) b[i] = complex(x[size_t(i) * m_ + offset], mean ? 0 : -x[size_t(i) * m_ + offset + 1]);
+  for (int i = 0; i < n_; ++i)
+    b[i] = complex(x[size_t(i) * m_ + offset], mean ? 0 : -x[size_t(i) * m_ + offset + 1]);
   int info;
   zgetrs_("N", &n_, &one, factor.lu.data(), &n_, factor.pivots.data(), b.data(), &n_, &info);
   for (int i = 0; i < n_; ++i) {
@@ -135,7 +143,8 @@ void HarmonicPreconditioner::solve(Factor const& factor, double const* x, double
 }
 
 void HarmonicPreconditioner::solve_fundamental(double const* x, double* z) {
-  const int offset = problem_.harmonics().offset(problem_.harmonics().fundamental()), size = 2 * n_ + scalars_, one = 1;
+  const int offset = problem_.harmonics().offset(problem_.harmonics().fundamental()),
+            size = 2 * n_ + scalars_, one = 1;
   std::vector<double> b(size);
   for (int i = 0; i < n_; ++i)
     for (int part = 0; part < 2; ++part) b[part * n_ + i] = x[size_t(i) * m_ + offset + part];
@@ -152,7 +161,8 @@ void HarmonicPreconditioner::apply(Vec x, Vec z) {
   std::vector<double> out(in.size(), 0.0);
   for (auto const& factor : factors_) solve(factor, in.data(), out.data());
   if (mine(problem_.harmonics().fundamental())) solve_fundamental(in.data(), out.data());
-  if (size_ > 1) MPI_Allreduce(MPI_IN_PLACE, out.data(), int(out.size()), MPI_DOUBLE, MPI_SUM, problem_.comm());
+  if (size_ > 1)
+    MPI_Allreduce(MPI_IN_PLACE, out.data(), int(out.size()), MPI_DOUBLE, MPI_SUM, problem_.comm());
   PetscInt begin;
   check(VecGetOwnershipRange(z, &begin, nullptr));
   WriteArray local(z);

@@ -4,9 +4,10 @@
 
 namespace fretwave::hb {
 
-/// One block per harmonic, Z_n + period-averaged contact tangent, in complex form; the fundamental's block is factorised with the
-/// scalars' columns, the normalisation and the closing row, without which it is singular at an eigenvalue (DESIGN fact 5).
-/// Dense (LAPACK), for reduced models: every rank factorises its share of the harmonics.
+/// One block per harmonic, Z_n + period-averaged contact tangent, in complex form; the fundamental's block is
+/// factorised with the scalars' columns, the normalisation and the closing row, without which it is singular
+/// at an eigenvalue (DESIGN fact 5). Dense (LAPACK), for reduced models: every rank factorises its share of
+/// the harmonics.
 class HarmonicPreconditioner : public solve::Preconditioner {
  public:
   explicit HarmonicPreconditioner(HarmonicProblem&);

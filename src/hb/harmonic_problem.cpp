@@ -17,10 +17,16 @@ void add(Exponents& y, double f, Exponents const& x) {
 
 }  // namespace
 
-HarmonicProblem::HarmonicProblem(model::Model const& model, Harmonics const& h, int scalars, PetscInt dof, double reference_stiffness)
-    : residual_(model, h), scalars_(scalars), dof_(dof), local_block_(model.local_dofs() * h.block_size()), stiffness_(reference_stiffness) {
+HarmonicProblem::HarmonicProblem(model::Model const& model, Harmonics const& h, int scalars, PetscInt dof,
+                                 double reference_stiffness)
+    : residual_(model, h),
+      scalars_(scalars),
+      dof_(dof),
+      local_block_(model.local_dofs() * h.block_size()),
+      stiffness_(reference_stiffness) {
   if (dof < 0 || dof >= model.dofs())
-    throw InputError("the chosen dof does not exist", std::to_string(dof), "0 to " + std::to_string(model.dofs() - 1), "choose a dof of the model");
+    throw InputError("the chosen dof does not exist", std::to_string(dof),
+                     "0 to " + std::to_string(model.dofs() - 1), "choose a dof of the model");
   q_ = residual_.vector();
   for (auto* v : {&Q_, &dQ_, &R_, &dR_, &excitation_, &static_, &static_load_}) *v = like(q_);
   check(VecSet(excitation_, 0));
@@ -29,14 +35,18 @@ HarmonicProblem::HarmonicProblem(model::Model const& model, Harmonics const& h, 
   last_ = unknowns();
 }
 
-bool HarmonicProblem::owns_dof() const { return dof_ >= model().first_dof() && dof_ < model().first_dof() + model().local_dofs(); }
+bool HarmonicProblem::owns_dof() const {
+  return dof_ >= model().first_dof() && dof_ < model().first_dof() + model().local_dofs();
+}
 
 std::vector<double> HarmonicProblem::scalars(Vec y) {
   std::vector<double> z(scalars_ + 2, 0.0);
   ReadArray in(y);
   if (last_rank()) std::copy_n(in.data() + local_block_, scalars_, z.begin());
   if (owns_dof() && harmonics().fundamental() >= 0)
-    std::copy_n(in.data() + (dof_ - model().first_dof()) * harmonics().block_size() + harmonics().offset(harmonics().fundamental()), 2, z.begin() + scalars_);
+    std::copy_n(in.data() + (dof_ - model().first_dof()) * harmonics().block_size() +
+                    harmonics().offset(harmonics().fundamental()),
+                2, z.begin() + scalars_);
   MPI_Allreduce(MPI_IN_PLACE, z.data(), int(z.size()), MPI_DOUBLE, MPI_SUM, comm());
   return z;
 }
@@ -59,7 +69,9 @@ void HarmonicProblem::add_mean(Vec per_dof, Vec blocks) {
 
 void HarmonicProblem::preload(Vec x, Vec P) {
   if (harmonics().orders()[0] != 0)
-    throw InputError("a preloaded structure moves about a mean that is not retained", "lowest harmonic " + std::to_string(harmonics().orders()[0]), "harmonic 0 retained", "retain all harmonics");
+    throw InputError("a preloaded structure moves about a mean that is not retained",
+                     "lowest harmonic " + std::to_string(harmonics().orders()[0]), "harmonic 0 retained",
+                     "retain all harmonics");
   add_mean(x, static_);
   add_mean(P, static_load_);
   linearised_ = false;
@@ -118,11 +130,14 @@ void HarmonicProblem::product(Vec y, Vec dy, Vec dr) {
 
 void HarmonicProblem::pattern(std::vector<PetscInt>& rows, std::vector<PetscInt>& cols) {
   residual_.pattern(rows, cols);
-  const PetscInt first = model().first_dof() * harmonics().block_size(), all = model().dofs() * harmonics().block_size();
+  const PetscInt first = model().first_dof() * harmonics().block_size(),
+                 all = model().dofs() * harmonics().block_size();
   for (int j = 0; j < scalars_; ++j)
     for (PetscInt i = 0; i < local_block_; ++i) rows.push_back(first + i), cols.push_back(all + j);
   if (!normalised() || !owns_dof()) return;
-  for (int j = 0; j < 2; ++j) rows.push_back(all + j), cols.push_back(dof_ * harmonics().block_size() + harmonics().offset(harmonics().fundamental()) + j);
+  for (int j = 0; j < 2; ++j)
+    rows.push_back(all + j),
+        cols.push_back(dof_ * harmonics().block_size() + harmonics().offset(harmonics().fundamental()) + j);
 }
 
 void HarmonicProblem::column(int j, double* v) {
@@ -191,8 +206,12 @@ VecHandle HarmonicProblem::coefficients(Vec y) {
   return Q;
 }
 
-ContactSummary HarmonicProblem::summarise(Vec y) { return residual_.summarise(coefficients(y), exponents(y)); }
+ContactSummary HarmonicProblem::summarise(Vec y) {
+  return residual_.summarise(coefficients(y), exponents(y));
+}
 
-std::vector<ContactPeriod> HarmonicProblem::contact_periods(Vec y) { return residual_.periods(coefficients(y), exponents(y)); }
+std::vector<ContactPeriod> HarmonicProblem::contact_periods(Vec y) {
+  return residual_.periods(coefficients(y), exponents(y));
+}
 
 }  // namespace fretwave::hb

@@ -6,7 +6,8 @@
 
 namespace fretwave::hb {
 
-/// What a variant's scalar unknowns z mean: motion Q = a q, exponents s_n, and their derivatives by each scalar.
+/// What a variant's scalar unknowns z mean: motion Q = a q, exponents s_n, and their derivatives by each
+/// scalar.
 struct ScaledMotion {
   double amplitude = 1;                ///< a
   Exponents exponents;                 ///< s_n
@@ -16,11 +17,13 @@ struct ScaledMotion {
   std::vector<double> dload = {};      ///< d load / dz_j; empty if constant
 };
 
-/// y = (q, z): scaled harmonic blocks q = (Q - Q_static) / a, then the scalars z on the last rank; z's last entry is the continuation parameter.
-/// Rows (R(a q, s(z)) - P) / (k_ref a), then, on the last rank, q_dof = (1, 0) in the fundamental if there are three scalars (DESIGN fact 4).
+/// y = (q, z): scaled harmonic blocks q = (Q - Q_static) / a, then the scalars z on the last rank; z's last
+/// entry is the continuation parameter. Rows (R(a q, s(z)) - P) / (k_ref a), then, on the last rank, q_dof =
+/// (1, 0) in the fundamental if there are three scalars (DESIGN fact 4).
 class HarmonicProblem : public solve::Problem {
  public:
-  HarmonicProblem(model::Model const&, Harmonics const&, int scalars, PetscInt dof, double reference_stiffness);
+  HarmonicProblem(model::Model const&, Harmonics const&, int scalars, PetscInt dof,
+                  double reference_stiffness);
   MPI_Comm comm() const override { return residual_.model().comm(); }
   PetscInt local_equations() const override { return local_block_ + (last_rank() ? scalars_ - 1 : 0); }
   void residual(Vec y, Vec r) override;
@@ -32,7 +35,8 @@ class HarmonicProblem : public solve::Problem {
   Harmonics const& harmonics() const { return residual_.harmonics(); }
   model::Model const& model() const { return residual_.model(); }
   PetscInt dof() const { return dof_; }
-  /// Dynamics about a static state x under the static load P: Q = (x, 0, ...) + a q. The mean is retained then. Collective.
+  /// Dynamics about a static state x under the static load P: Q = (x, 0, ...) + a q. The mean is retained
+  /// then. Collective.
   void preload(Vec x, Vec P);
   /// Physical coefficients Q as harmonic blocks. Collective.
   VecHandle coefficients(Vec y);

@@ -15,14 +15,16 @@ using complex = std::complex<double>;
 /// A dof's coefficients stand together as a block [Q0, Qc1, Qs1, ...] restricted to the retained set.
 class Harmonics {
  public:
-  /// Retained orders, ascending, each once, with 1 among them (or 0 alone: statics); samples >= 2 max + 2, even.
+  /// Retained orders, ascending, each once, with 1 among them (or 0 alone: statics); samples >= 2 max + 2,
+  /// even.
   Harmonics(std::vector<int> orders, int samples);
   std::vector<int> const& orders() const { return orders_; }
   int count() const { return int(orders_.size()); }
   int highest() const { return orders_.back(); }
   int samples() const { return samples_; }
   int block_size() const { return block_size_; }
-  /// Place of the cosine (or mean) coefficient of the i-th retained order in the block; the sine stands behind it.
+  /// Place of the cosine (or mean) coefficient of the i-th retained order in the block; the sine stands
+  /// behind it.
   int offset(int i) const { return offsets_[i]; }
   /// Place of order 1 among the orders; -1 in statics.
   int fundamental() const { return fundamental_; }
@@ -34,7 +36,8 @@ class Harmonics {
   int samples_, block_size_ = 0, fundamental_ = -1;
 };
 
-/// Values of s_n at one point, q_n = Qc_n - i Qs_n and dx/dt <-> s_n q_n; `inertia_damping` g subtracts g s_n M (EPMC, g = 2 zeta w0).
+/// Values of s_n at one point, q_n = Qc_n - i Qs_n and dx/dt <-> s_n q_n; `inertia_damping` g subtracts g s_n
+/// M (EPMC, g = 2 zeta w0).
 struct Exponents {
   std::vector<complex> s;  ///< one per retained order
   double inertia_damping = 0;
@@ -43,7 +46,8 @@ struct Exponents {
 /// y = s x on harmonic blocks: columns x block size, real (cos, sin) pairs.
 void multiply(Harmonics const&, std::vector<complex> const& s, double const* x, double* y, int columns);
 
-/// Batched FFT between harmonic blocks (pairs x components x block size) and time samples (samples x components x pairs, pairs innermost).
+/// Batched FFT between harmonic blocks (pairs x components x block size) and time samples (samples x
+/// components x pairs, pairs innermost).
 class FourierTransform {
  public:
   FourierTransform(Harmonics const&, int columns, int components = 1);

@@ -13,13 +13,18 @@ double reference_stiffness(model::Model const& model, double omega, Vec shape) {
   check(VecDot(shape, Mx, &modal_mass));
   check(VecDot(shape, shape, &square));
   if (!(modal_mass > 0) || !(omega > 0))
-    throw InputError("the starting mode has no modal mass or no frequency", std::to_string(modal_mass) + ", " + std::to_string(omega) + " rad/s", "both > 0",
+    throw InputError("the starting mode has no modal mass or no frequency",
+                     std::to_string(modal_mass) + ", " + std::to_string(omega) + " rad/s", "both > 0",
                      "start from an elastic mode of the model");
   return omega * omega * modal_mass / square;
 }
 
-NonlinearMode::NonlinearMode(model::Model const& model, Harmonics const& h, Method method, PetscInt dof, double omega, Vec shape)
-    : HarmonicProblem(model, h, 3, dof, reference_stiffness(model, omega, shape)), method_(method), omega_reference_(omega), shape_(like(shape)) {
+NonlinearMode::NonlinearMode(model::Model const& model, Harmonics const& h, Method method, PetscInt dof,
+                             double omega, Vec shape)
+    : HarmonicProblem(model, h, 3, dof, reference_stiffness(model, omega, shape)),
+      method_(method),
+      omega_reference_(omega),
+      shape_(like(shape)) {
   check(VecCopy(shape, shape_));
   double at_dof = 0;
   PetscInt begin, end;
@@ -29,19 +34,23 @@ NonlinearMode::NonlinearMode(model::Model const& model, Harmonics const& h, Meth
   double largest;
   check(VecNorm(shape_, NORM_INFINITY, &largest));
   if (std::abs(at_dof) < 1e-10 * largest)
-    throw InputError("the normalised dof does not move in the starting mode", std::to_string(at_dof / largest) + " of the largest displacement", "> 1e-10",
+    throw InputError("the normalised dof does not move in the starting mode",
+                     std::to_string(at_dof / largest) + " of the largest displacement", "> 1e-10",
                      "normalise on a dof that takes part in the mode");
   check(VecScale(shape_, 1 / at_dof));
 }
 
 VecHandle NonlinearMode::initial(double amplitude) {
-  if (!(amplitude > 0)) throw InputError("modal amplitude is not positive", std::to_string(amplitude), "> 0", "start at a small positive amplitude");
+  if (!(amplitude > 0))
+    throw InputError("modal amplitude is not positive", std::to_string(amplitude), "> 0",
+                     "start at a small positive amplitude");
   const PetscInt m = harmonics().block_size();
   VecHandle q = make_vector(comm(), model().local_dofs() * m);
   {
     WriteArray out(q);
     ReadArray phi(shape_);
-    for (PetscInt i = 0; i < model().local_dofs(); ++i) out[i * m + harmonics().offset(harmonics().fundamental())] = phi[i];
+    for (PetscInt i = 0; i < model().local_dofs(); ++i)
+      out[i * m + harmonics().offset(harmonics().fundamental())] = phi[i];
   }
   return pack(q, {0.0, 1.0, std::log(amplitude)});
 }
@@ -79,7 +88,8 @@ double NonlinearMode::parameter_entry(double value) const { return std::log(valu
 
 std::vector<solve::TestFunction> NonlinearMode::tests(Vec y, Vec tangent) {
   const auto z = scalars(y), dz = scalars(tangent);
-  // zeta = beta/w0 grows with beta/w in both variants: its change along the branch has the sign of w dbeta - beta dw
+  // zeta = beta/w0 grows with beta/w in both variants: its change along the branch has the sign of w dbeta -
+  // beta dw
   return {{"zero_damping", z[0]}, {"peak_damping", z[1] * dz[0] - z[0] * dz[1], true}};
 }
 

@@ -13,7 +13,8 @@ struct ModalState {
   double amplitude, omega, omega0, beta, zeta;
 };
 
-/// A family of decaying motions over the modal amplitude a: y = (Q/a, beta/w_ref, w/w_ref, log a), w = w0 for EPMC.
+/// A family of decaying motions over the modal amplitude a: y = (Q/a, beta/w_ref, w/w_ref, log a), w = w0 for
+/// EPMC.
 class NonlinearMode : public HarmonicProblem {
  public:
   /// Started from a linear mode (angular frequency, shape), normalised on `dof`. Collective.
@@ -34,7 +35,8 @@ class NonlinearMode : public HarmonicProblem {
   VecHandle shape_;
 };
 
-/// phi^T M phi w^2 / phi^T phi: the inertia force per displacement that force rows are measured in [N/m]. Collective.
+/// phi^T M phi w^2 / phi^T phi: the inertia force per displacement that force rows are measured in [N/m].
+/// Collective.
 double reference_stiffness(model::Model const&, double omega, Vec shape);
 
 }  // namespace fretwave::hb

@@ -2,9 +2,17 @@
 
 namespace fretwave::hb {
 
-Residual::Residual(model::Model const& model, Harmonics const& h) : model_(model), harmonics_(h), stiffness_(model, h), Q_(vector()) {
+Residual::Residual(model::Model const& model, Harmonics const& h)
+    : model_(model), harmonics_(h), stiffness_(model, h), Q_(vector()) {
   for (auto const& contact : model.contacts()) {
-    groups_.push_back({.contact = &contact, .B = {}, .aft = Aft(h, contact.law), .U = {}, .F = {}, .dV = {}, .places = {}, .weights = {}});
+    groups_.push_back({.contact = &contact,
+                       .B = {},
+                       .aft = Aft(h, contact.law),
+                       .U = {},
+                       .F = {},
+                       .dV = {},
+                       .places = {},
+                       .weights = {}});
     Group& group = groups_.back();
     check(MatCreateMAIJ(contact.B, h.block_size(), group.B.out()));
     group.U = make_vector(model.comm(), group.aft.columns() * h.block_size());
@@ -76,9 +84,11 @@ void Residual::contact_pattern(Group& group, std::vector<PetscInt>& rows, std::v
     while (last < weights.size() && weights[last].pair == weights[first].pair) ++last;
     for (size_t a = first; a < last; ++a)
       for (size_t b = first; b < last; ++b) {
-        group.places.push_back({weights[a].pair, weights[a].component, weights[b].component, weights[a].value * weights[b].value});
+        group.places.push_back({weights[a].pair, weights[a].component, weights[b].component,
+                                weights[a].value * weights[b].value});
         for (PetscInt i = 0; i < m; ++i)
-          for (PetscInt j = 0; j < m; ++j) rows.push_back(weights[a].dof * m + i), cols.push_back(weights[b].dof * m + j);
+          for (PetscInt j = 0; j < m; ++j)
+            rows.push_back(weights[a].dof * m + i), cols.push_back(weights[b].dof * m + j);
       }
   }
 }

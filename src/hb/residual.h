@@ -4,26 +4,30 @@
 
 namespace fretwave::hb {
 
-/// R(Q, s) = Z(s) Q + B^T F(B Q, s B Q) and its exact derivatives: one for all variants, which differ in what s is (DESIGN section 1).
-/// Vectors hold harmonic blocks of `block_size` per dof.
+/// R(Q, s) = Z(s) Q + B^T F(B Q, s B Q) and its exact derivatives: one for all variants, which differ in what
+/// s is (DESIGN section 1). Vectors hold harmonic blocks of `block_size` per dof.
 class Residual {
  public:
   Residual(model::Model const&, Harmonics const&);
   model::Model const& model() const { return model_; }
   Harmonics const& harmonics() const { return harmonics_; }
-  VecHandle vector() const { return make_vector(model_.comm(), model_.local_dofs() * harmonics_.block_size()); }
+  VecHandle vector() const {
+    return make_vector(model_.comm(), model_.local_dofs() * harmonics_.block_size());
+  }
 
   /// R at (Q, e), which becomes the point of linearisation. Collective.
   void evaluate(Vec Q, Exponents const& e, Vec R);
   /// dR for (dQ, de) at the last evaluated point; dQ or de may be null. Collective.
   void product(Vec dQ, Exponents const* de, Vec dR);
 
-  /// Entries of dR/dQ: global places on this rank, and values in the same order times `scale` at the last evaluated point.
+  /// Entries of dR/dQ: global places on this rank, and values in the same order times `scale` at the last
+  /// evaluated point.
   void pattern(std::vector<PetscInt>& rows, std::vector<PetscInt>& cols);
   double* values(double scale, double* v);
 
   DynamicStiffness const& stiffness() const { return stiffness_; }
-  /// B^T (mean tangent) B at the last evaluated point, dense n_dof x n_dof, whole on every rank: stiffness and damping. Collective.
+  /// B^T (mean tangent) B at the last evaluated point, dense n_dof x n_dof, whole on every rank: stiffness
+  /// and damping. Collective.
   void mean_contact(std::vector<double>& K, std::vector<double>& C);
 
   /// Contact of the motion (Q, e), summed over all ranks and contacts. Collective.

@@ -14,7 +14,12 @@ VecHandle StaticPreload::initial() {
 }
 
 ScaledMotion StaticPreload::motion(std::vector<double> const& z) const {
-  return {.amplitude = size_, .exponents = {{0}, 0}, .dlog_amplitude = {0}, .dexponents = {{{0}, 0}}, .load = z[0], .dload = {1}};
+  return {.amplitude = size_,
+          .exponents = {{0}, 0},
+          .dlog_amplitude = {0},
+          .dexponents = {{{0}, 0}},
+          .load = z[0],
+          .dload = {1}};
 }
 
 }  // namespace fretwave::hb

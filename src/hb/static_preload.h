@@ -3,10 +3,12 @@
 
 namespace fretwave::hb {
 
-/// Static equilibrium K x + B^T f(B x) = p P over the load factor p: harmonic 0 alone, y = (x / size, p). The contact starts untouched.
+/// Static equilibrium K x + B^T f(B x) = p P over the load factor p: harmonic 0 alone, y = (x / size, p). The
+/// contact starts untouched.
 class StaticPreload : public HarmonicProblem {
  public:
-  /// P: load per dof at factor 1; `size`: reference displacement, `stiffness`: reference stiffness. Collective.
+  /// P: load per dof at factor 1; `size`: reference displacement, `stiffness`: reference stiffness.
+  /// Collective.
   StaticPreload(model::Model const&, Vec P, double size, double stiffness);
   VecHandle initial();
   double parameter_value(double entry) const override { return entry; }

@@ -13,8 +13,10 @@ void check_term(Term const& term, PetscInt local, PetscInt global) {
   check(MatGetSize(term.A, &rows, &cols));
   check(MatGetLocalSize(term.A, &local_rows, &local_cols));
   if (rows != global || cols != global || local_rows != local || local_cols != local)
-    throw InputError("a linear term does not have the size or the row layout of the first one", std::to_string(rows) + " x " + std::to_string(cols),
-                     std::to_string(global) + " x " + std::to_string(global), "build all matrices with the same row distribution");
+    throw InputError("a linear term does not have the size or the row layout of the first one",
+                     std::to_string(rows) + " x " + std::to_string(cols),
+                     std::to_string(global) + " x " + std::to_string(global),
+                     "build all matrices with the same row distribution");
 }
 
 void check_contact(Contact const& contact, PetscInt local, PetscInt global) {
@@ -33,7 +35,9 @@ void check_contact(Contact const& contact, PetscInt local, PetscInt global) {
 
 Model::Model(std::vector<Term> terms, std::vector<Contact> contacts, double theta)
     : terms_(std::move(terms)), contacts_(std::move(contacts)), theta_(theta) {
-  if (terms_.empty()) throw InputError("a model needs at least one linear term", "none", "K and M", "give the stiffness and mass matrices");
+  if (terms_.empty())
+    throw InputError("a model needs at least one linear term", "none", "K and M",
+                     "give the stiffness and mass matrices");
   check(PetscObjectGetComm(reinterpret_cast<PetscObject>(Mat(terms_[0].A)), &comm_));
   check(MatGetSize(terms_[0].A, &global_, nullptr));
   check(MatGetLocalSize(terms_[0].A, &local_, nullptr));

@@ -9,15 +9,16 @@
 /// Structures: linear terms, contact, linear modes.
 namespace fretwave::model {
 
-/// One linear term: sparse A (n_dof x n_dof) on the p-th time derivative, with spatial phase k (DESIGN section 3):
-/// Z_n = sum s_n^p e^{-i k n theta} A.
+/// One linear term: sparse A (n_dof x n_dof) on the p-th time derivative, with spatial phase k (DESIGN
+/// section 3): Z_n = sum s_n^p e^{-i k n theta} A.
 struct Term {
   MatHandle A;
   int order = 0;
   int phase = 0;
 };
 
-/// Contact pairs of one law. B maps displacements to relative displacements u = B x, rows pair by pair on the rank that owns the pair.
+/// Contact pairs of one law. B maps displacements to relative displacements u = B x, rows pair by pair on the
+/// rank that owns the pair.
 struct Contact {
   std::string name;
   MatHandle B;
@@ -27,7 +28,8 @@ struct Contact {
 /// M x'' + C x' + K x + B^T f(B x, B x') = 0, distributed over `comm`.
 class Model {
  public:
-  /// Collective. Terms share one row layout; each contact has its law's pairs as local rows of B. InputError otherwise.
+  /// Collective. Terms share one row layout; each contact has its law's pairs as local rows of B. InputError
+  /// otherwise.
   Model(std::vector<Term> terms, std::vector<Contact> contacts, double theta = 0);
   Model(Model const&) = delete;
   MPI_Comm comm() const { return comm_; }

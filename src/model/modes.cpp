@@ -53,7 +53,8 @@ void add_contact(Mat sum, Contact const& contact, Entry entry) {
   check(MatAXPY(sum, 1, congruence(contact.B, diagonal), DIFFERENT_NONZERO_PATTERN));
 }
 
-/// Rows of B on which a stuck contact allows no motion at all, one matrix for all contacts (empty handle if none).
+/// Rows of B on which a stuck contact allows no motion at all, one matrix for all contacts (empty handle if
+/// none).
 MatHandle rigid_rows(Model const& model) {
   std::vector<MatHandle> parts;
   for (auto const& contact : model.contacts()) {
@@ -67,7 +68,8 @@ MatHandle rigid_rows(Model const& model) {
     MPI_Allreduce(MPI_IN_PLACE, &all, 1, MPIU_INT, MPI_SUM, model.comm());
     if (all == 0) continue;
     IsHandle rows_set, cols_set;
-    check(ISCreateGeneral(model.comm(), PetscInt(rows.size()), rows.data(), PETSC_COPY_VALUES, rows_set.out()));
+    check(
+        ISCreateGeneral(model.comm(), PetscInt(rows.size()), rows.data(), PETSC_COPY_VALUES, rows_set.out()));
     check(ISCreateStride(model.comm(), model.local_dofs(), model.first_dof(), 1, cols_set.out()));
     parts.emplace_back();
     check(MatCreateSubMatrix(contact.B, rows_set, cols_set, MAT_INITIAL_MATRIX, parts.back().out()));
@@ -101,8 +103,9 @@ MatHandle saddle(Mat A, Mat G, double scale) {
   return whole;
 }
 
-/// Matrices of an eigenproblem; a small one is held whole by each rank, which all solve the same: cheaper than to share it, and
-/// the Krylov space of a tiny problem, once exhausted, would end at another step on another rank.
+/// Matrices of an eigenproblem; a small one is held whole by each rank, which all solve the same: cheaper
+/// than to share it, and the Krylov space of a tiny problem, once exhausted, would end at another step on
+/// another rank.
 struct Operators {
   std::vector<MatHandle> matrices;
   PetscInt offset = 0;  ///< where this rank's rows begin in its part of a vector
@@ -124,7 +127,8 @@ Operators operators(MPI_Comm comm, std::vector<MatHandle> matrices) {
   Operators out{{}, first};
   for (auto const& A : matrices) {
     out.matrices.emplace_back();
-    check(MatCreateRedundantMatrix(A, comm_size(comm), PETSC_COMM_SELF, MAT_INITIAL_MATRIX, out.matrices.back().out()));
+    check(MatCreateRedundantMatrix(A, comm_size(comm), PETSC_COMM_SELF, MAT_INITIAL_MATRIX,
+                                   out.matrices.back().out()));
   }
   return out;
 }
@@ -150,7 +154,9 @@ double trace_ratio(Model const& model, Mat K, Mat M) {
 
 MatHandle required(Model const& model, int order, char const* name) {
   MatHandle A = model.sum(order);
-  if (!A) throw InputError(std::string("the model has no ") + name + " term", "none", "one at least", "give all of K and M");
+  if (!A)
+    throw InputError(std::string("the model has no ") + name + " term", "none", "one at least",
+                     "give all of K and M");
   return A;
 }
 
@@ -165,7 +171,8 @@ std::vector<LinearMode> undamped(Model const& model, int count, bool stuck) {
   MatHandle K = required(model, 0, "stiffness"), M = required(model, 2, "mass"), G;
   if (stuck) {
     for (auto const& contact : model.contacts())
-      add_contact(K, contact, [&](int component, int pair) { return contact.law->stuck_stiffness(component, pair); });
+      add_contact(K, contact,
+                  [&](int component, int pair) { return contact.law->stuck_stiffness(component, pair); });
     G = rigid_rows(model);
   }
   const double scale = trace_ratio(model, K, M);
@@ -174,7 +181,8 @@ std::vector<LinearMode> undamped(Model const& model, int count, bool stuck) {
   pair.push_back(saddle(M, G, 0));
   const Operators AB = operators(model.comm(), std::move(pair));
   const PetscInt wanted = std::min<PetscInt>(count, model.dofs() - rigid_count(G));
-  if (wanted < 1) throw InputError("the stuck contact leaves no degree of freedom", "0", ">= 1", "use contact = \"free\"");
+  if (wanted < 1)
+    throw InputError("the stuck contact leaves no degree of freedom", "0", ">= 1", "use contact = \"free\"");
   EpsHandle eps;
   check(EPSCreate(AB.comm(), eps.out()));
   check(EPSSetOptionsPrefix(eps, "modes_"));
@@ -219,7 +227,8 @@ RestTangent rest_tangent(contact::Law const& law) {
   const int d = law.components(), n = law.pairs();
   std::vector<double> zero(size_t(d) * n), f(size_t(d) * n);
   contact::Record record;
-  law.force({.samples = 1, .components = d, .pairs = n, .u = zero.data(), .v = zero.data(), .step = 1}, f.data(), record);
+  law.force({.samples = 1, .components = d, .pairs = n, .u = zero.data(), .v = zero.data(), .step = 1},
+            f.data(), record);
   RestTangent out{zero, zero};
   for (int c = 0; c < d; ++c)
     for (int i = 0; i < n; ++i) {
@@ -254,7 +263,8 @@ std::vector<LinearMode> damped(Model const& model, int count) {
   check(PEPSetProblemType(pep, PEP_GENERAL));
   check(PEPSetType(pep, PEPTOAR));
   check(PEPSetScale(pep, PEP_SCALE_SCALAR, PETSC_DECIDE, nullptr, nullptr, PETSC_DECIDE, PETSC_DECIDE));
-  check(PEPSetDimensions(pep, std::min<PetscInt>(2 * count + 4, 2 * model.dofs()), PETSC_DEFAULT, PETSC_DEFAULT));
+  check(PEPSetDimensions(pep, std::min<PetscInt>(2 * count + 4, 2 * model.dofs()), PETSC_DEFAULT,
+                         PETSC_DEFAULT));
   check(PEPSetTolerances(pep, tolerance, 1000));
   check(PEPSetWhichEigenpairs(pep, PEP_TARGET_MAGNITUDE));
   check(PEPSetTarget(pep, 0));
@@ -280,7 +290,8 @@ std::vector<LinearMode> damped(Model const& model, int count) {
 }  // namespace
 
 std::vector<LinearMode> linear_modes(Model const& model, int count, ContactState state) {
-  auto modes = state == ContactState::linearised ? damped(model, count) : undamped(model, count, state == ContactState::stuck);
+  auto modes = state == ContactState::linearised ? damped(model, count)
+                                                 : undamped(model, count, state == ContactState::stuck);
   std::sort(modes.begin(), modes.end(), [](auto const& a, auto const& b) { return a.omega < b.omega; });
   if (modes.size() > size_t(count)) modes.resize(size_t(count));
   return modes;

@@ -6,14 +6,15 @@ namespace fretwave::model {
 /// What the contact does in a linear mode: closed and stuck, absent, or the law's tangent at rest.
 enum class ContactState { stuck, free, linearised };
 
-/// A linear mode lambda = -beta + i omega with its shape's real and imaginary parts (unit modal mass when undamped).
+/// A linear mode lambda = -beta + i omega with its shape's real and imaginary parts (unit modal mass when
+/// undamped).
 struct LinearMode {
   double omega = 0, beta = 0;
   VecHandle shape, imaginary;
 };
 
-/// Lowest modes, ascending in omega, by SLEPc with shift-invert: K - w^2 M for stuck and free contact (no damping),
-/// the quadratic problem with C for linearised contact. At most `count`. Collective.
+/// Lowest modes, ascending in omega, by SLEPc with shift-invert: K - w^2 M for stuck and free contact (no
+/// damping), the quadratic problem with C for linearised contact. At most `count`. Collective.
 std::vector<LinearMode> linear_modes(Model const&, int count, ContactState);
 
 }  // namespace fretwave::model

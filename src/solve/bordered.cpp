@@ -6,9 +6,11 @@ namespace fretwave::solve {
 
 namespace {
 
-constexpr PetscInt dense_limit = 600;  // LAPACK's LU of 600 unknowns: some 5 ms; above, MUMPS and sparsity win
+constexpr PetscInt dense_limit =
+    600;  // LAPACK's LU of 600 unknowns: some 5 ms; above, MUMPS and sparsity win
 
-MatHandle coo_matrix(MPI_Comm comm, PetscInt rows, PetscInt cols, std::vector<PetscInt>& i, std::vector<PetscInt>& j) {
+MatHandle coo_matrix(MPI_Comm comm, PetscInt rows, PetscInt cols, std::vector<PetscInt>& i,
+                     std::vector<PetscInt>& j) {
   MatHandle A;
   check(MatCreate(comm, A.out()));
   check(MatSetSizes(A, rows, cols, PETSC_DETERMINE, PETSC_DETERMINE));
@@ -37,7 +39,8 @@ void set_last_entry(Vec y, double value) {
   if (comm_rank(comm) == comm_size(comm) - 1) out[local_size(y) - 1] = value;
 }
 
-Bordered::Bordered(Problem& problem) : problem_(problem), row_(problem.unknowns()), equations_(problem.equations()) {}
+Bordered::Bordered(Problem& problem)
+    : problem_(problem), row_(problem.unknowns()), equations_(problem.equations()) {}
 
 void Bordered::close(Vec row, double value) {
   check(VecCopy(row, row_));

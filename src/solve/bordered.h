@@ -3,7 +3,8 @@
 
 namespace fretwave::solve {
 
-/// A problem closed to a square system by one linear row, row . y = value: a fixed parameter or a pseudo-arclength.
+/// A problem closed to a square system by one linear row, row . y = value: a fixed parameter or a
+/// pseudo-arclength.
 class Bordered {
  public:
   explicit Bordered(Problem&);
@@ -14,7 +15,8 @@ class Bordered {
   Vec row() const { return row_; }
   void residual(Vec y, Vec g);
   void product(Vec y, Vec dy, Vec dg);
-  /// Matrix for the direct route: dense on one rank when small (LAPACK pivots, no symbolic cost), AIJ otherwise.
+  /// Matrix for the direct route: dense on one rank when small (LAPACK pivots, no symbolic cost), AIJ
+  /// otherwise.
   MatHandle matrix();
   void assemble(Vec y, Mat J);
 

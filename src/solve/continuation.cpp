@@ -7,7 +7,8 @@ namespace fretwave::solve {
 
 namespace {
 
-constexpr double kink_length = 1e-4;  // a turn that is left in so short a step is a kink (a sample changes state), not curvature
+constexpr double kink_length =
+    1e-4;  // a turn that is left in so short a step is a kink (a sample changes state), not curvature
 constexpr double test_noise = 1e-11;  // a test function closer to zero than this has no sign
 
 VecHandle copy(Vec v) {
@@ -32,8 +33,14 @@ bool crosses(TestFunction const& before, TestFunction const& after) {
 
 }  // namespace
 
-Continuation::Continuation(Problem& problem, std::string const& prefix, double low, double high, StepControl steps, std::vector<double> report_at)
-    : problem_(problem), newton_(problem, prefix), low_(low), high_(high), steps_(steps), report_at_(std::move(report_at)) {
+Continuation::Continuation(Problem& problem, std::string const& prefix, double low, double high,
+                           StepControl steps, std::vector<double> report_at)
+    : problem_(problem),
+      newton_(problem, prefix),
+      low_(low),
+      high_(high),
+      steps_(steps),
+      report_at_(std::move(report_at)) {
   row_ = problem.unknowns();
   weights_ = like(row_);
   parameter_row_ = like(row_);
@@ -149,7 +156,8 @@ std::optional<Continuation::Trial> Continuation::step(double& length, double& an
 /// Cubic Hermite interpolation between the anchor and the end of the step.
 void Continuation::interpolate(Trial const& end, double length, double at, Vec y) const {
   const double x = at / length;
-  const double h00 = (1 + 2 * x) * (1 - x) * (1 - x), h10 = x * (1 - x) * (1 - x), h01 = x * x * (3 - 2 * x), h11 = x * x * (x - 1);
+  const double h00 = (1 + 2 * x) * (1 - x) * (1 - x), h10 = x * (1 - x) * (1 - x), h01 = x * x * (3 - 2 * x),
+               h11 = x * x * (x - 1);
   Vec parts[4] = {anchor_.y, anchor_.tangent, end.y, end.tangent};
   const double factors[4] = {h00, h10 * length, h01, h11 * length};
   check(VecSet(y, 0));
@@ -195,7 +203,8 @@ void Continuation::locate(TestFunction const& before, size_t which, Trial const&
 void Continuation::locate_events(Trial const& end, double length) {
   for (size_t k = 0; k < anchor_tests_.size(); ++k)
     if (crosses(anchor_tests_[k], end.tests[k])) locate(anchor_tests_[k], k, end, length);
-  const double from = problem_.parameter_value(last_entry(anchor_.y)), to = problem_.parameter_value(last_entry(end.y));
+  const double from = problem_.parameter_value(last_entry(anchor_.y)),
+               to = problem_.parameter_value(last_entry(end.y));
   for (double value : report_at_)
     if ((from < value) != (to < value) && from != value) reach(value, "report", end, length);
 }
@@ -215,10 +224,13 @@ void Continuation::make_batch() {
     reach(reached <= low_ ? low_ : high_, "stop", *end, length);
   else
     emit(std::move(*end), length, "");
-  std::stable_sort(batch_.begin(), batch_.end(), [](auto const& x, auto const& y) { return x.first < y.first; });
-  const auto stop = std::find_if(batch_.begin(), batch_.end(), [](auto const& x) { return x.second.event == "stop"; });
+  std::stable_sort(batch_.begin(), batch_.end(),
+                   [](auto const& x, auto const& y) { return x.first < y.first; });
+  const auto stop =
+      std::find_if(batch_.begin(), batch_.end(), [](auto const& x) { return x.second.event == "stop"; });
   if (stop != batch_.end()) batch_.erase(stop + 1, batch_.end());
-  if (stop_after_batch_ && stop == batch_.end()) finish("the stop value is not reached: the corrector fails there", false);
+  if (stop_after_batch_ && stop == batch_.end())
+    finish("the stop value is not reached: the corrector fails there", false);
   after_.index = anchor_.index + int(batch_.size());
 }
 

@@ -7,11 +7,12 @@
 
 namespace fretwave::solve {
 
-/// How long the arclength steps are. The weighted norm of the unknowns is about 1, so a step of 0.1 is a tenth of it.
+/// How long the arclength steps are. The weighted norm of the unknowns is about 1, so a step of 0.1 is a
+/// tenth of it.
 struct StepControl {
   double initial = 0.05, minimum = 1e-9, maximum = 0.3;
-  int target_newton = 4;    ///< longer steps below, shorter above
-  double max_angle = 0.6;   ///< [rad] between neighbouring tangents; a step that turns more is halved
+  int target_newton = 4;   ///< longer steps below, shorter above
+  double max_angle = 0.6;  ///< [rad] between neighbouring tangents; a step that turns more is halved
   int max_points = 5000;
 };
 
@@ -24,10 +25,12 @@ struct Point {
   double wall = 0;    ///< seconds since the point before
 };
 
-/// Pseudo-arclength continuation of a problem's branch: tangent predictor, SNES corrector on the bordered system (Keller 1977).
+/// Pseudo-arclength continuation of a problem's branch: tangent predictor, SNES corrector on the bordered
+/// system (Keller 1977).
 class Continuation {
  public:
-  Continuation(Problem&, std::string const& prefix, double low, double high, StepControl, std::vector<double> report_at);
+  Continuation(Problem&, std::string const& prefix, double low, double high, StepControl,
+               std::vector<double> report_at);
   Continuation(Continuation const&) = delete;
   /// Newton at the parameter of y0, or the last state of an earlier run (anchor, tangent, ...). Collective.
   std::optional<Point> start(Vec y0, bool upwards);
@@ -39,7 +42,8 @@ class Continuation {
   bool converged() const { return converged_; }
   Newton& newton() { return newton_; }
 
-  /// What `restore` needs to go on bit for bit: the last anchor, and how many points of the step after it were handed out.
+  /// What `restore` needs to go on bit for bit: the last anchor, and how many points of the step after it
+  /// were handed out.
   struct Anchor {
     VecHandle y, tangent;
     double step = 0;

@@ -7,8 +7,9 @@ namespace fretwave::solve {
 namespace {
 
 constexpr PetscInt redundant_limit = 2000;  // unknowns: below, every rank factorises the whole matrix
-constexpr PetscInt krylov_limit = 1500;     // unknowns: above, the Krylov route where the problem has a preconditioner
-constexpr int patience = 25;                // Krylov iterations of one step that make the preconditioner stale
+constexpr PetscInt krylov_limit =
+    1500;                     // unknowns: above, the Krylov route where the problem has a preconditioner
+constexpr int patience = 25;  // Krylov iterations of one step that make the preconditioner stale
 
 /// Runs a callback's body; PETSc must not see a C++ exception.
 template <class Body>
@@ -48,9 +49,12 @@ void Newton::choose_route(std::string const& prefix) {
   check(PetscOptionsGetString(nullptr, prefix.c_str(), "-route", given, sizeof given, &set));
   const std::string wish = set ? given : "auto";
   if (wish != "auto" && wish != "direct" && wish != "krylov")
-    throw InputError("unknown route of the corrector", wish, "auto, direct or krylov", "give -route krylov, or leave it out");
-  if (wish == "krylov" || (wish == "auto" && unknowns > krylov_limit)) preconditioner_ = bordered_.problem().preconditioner();
-  route_ = std::string(preconditioner_ ? "krylov" : "direct") + " (" + (set ? "asked for" : std::to_string(unknowns) + " unknowns") + ")";
+    throw InputError("unknown route of the corrector", wish, "auto, direct or krylov",
+                     "give -route krylov, or leave it out");
+  if (wish == "krylov" || (wish == "auto" && unknowns > krylov_limit))
+    preconditioner_ = bordered_.problem().preconditioner();
+  route_ = std::string(preconditioner_ ? "krylov" : "direct") + " (" +
+           (set ? "asked for" : std::to_string(unknowns) + " unknowns") + ")";
 }
 
 void Newton::use_direct() {
@@ -79,7 +83,8 @@ void Newton::use_krylov() {
   KSP ksp;
   PC pc;
   const PetscInt local = local_size(point_);
-  check(MatCreateShell(bordered_.problem().comm(), local, local, PETSC_DETERMINE, PETSC_DETERMINE, this, J_.out()));
+  check(MatCreateShell(bordered_.problem().comm(), local, local, PETSC_DETERMINE, PETSC_DETERMINE, this,
+                       J_.out()));
   check(MatShellSetOperation(J_, MATOP_MULT, reinterpret_cast<void (*)(void)>(shell_product)));
   check(SNESGetKSP(snes_, &ksp));
   check(KSPSetType(ksp, KSPFGMRES));

@@ -13,9 +13,9 @@ struct Outcome {
   std::string reason;  ///< PETSc's converged or diverged reason
 };
 
-/// SNES on a bordered problem. Two routes to the same corrector (DESIGN section 4), chosen by size or by -<prefix>route:
-/// direct (assembled, LU) and krylov (matrix-free product, the problem's own preconditioner, rebuilt when iterations rise).
-/// PETSc options apply under the prefix; ours are only its defaults.
+/// SNES on a bordered problem. Two routes to the same corrector (DESIGN section 4), chosen by size or by
+/// -<prefix>route: direct (assembled, LU) and krylov (matrix-free product, the problem's own preconditioner,
+/// rebuilt when iterations rise). PETSc options apply under the prefix; ours are only its defaults.
 class Newton {
  public:
   Newton(Problem&, std::string const& prefix);

@@ -30,7 +30,8 @@ class Problem {
   virtual void residual(Vec y, Vec r) = 0;
   /// dr = J(y) dy, J is N x (N + 1). Collective.
   virtual void product(Vec y, Vec dy, Vec dr) = 0;
-  /// Global places of J's entries contributed by this rank, and their values in the same order (places may repeat: values add).
+  /// Global places of J's entries contributed by this rank, and their values in the same order (places may
+  /// repeat: values add).
   virtual void pattern(std::vector<PetscInt>& rows, std::vector<PetscInt>& cols) = 0;
   virtual void values(Vec y, std::span<double> v) = 0;
 

@@ -9,8 +9,14 @@ namespace fretwave::transient {
 
 using TsHandle = Handle<TS, TSDestroy>;
 
-Transient::Transient(model::Model const& model, std::vector<Excitation> excitation, double omega, std::string const& prefix)
-    : model_(model), excitation_(std::move(excitation)), omega_(omega), prefix_(prefix), K_(model.sum(0)), C_(model.sum(1)) {
+Transient::Transient(model::Model const& model, std::vector<Excitation> excitation, double omega,
+                     std::string const& prefix)
+    : model_(model),
+      excitation_(std::move(excitation)),
+      omega_(omega),
+      prefix_(prefix),
+      K_(model.sum(0)),
+      C_(model.sum(1)) {
   for (auto* v : {&x_, &v_, &force_, &acceleration_}) *v = model.displacement();
   PC pc;
   check(KSPCreate(model.comm(), mass_.out()));
@@ -34,13 +40,16 @@ void Transient::contact_force(model::Contact const& contact, Vec force) {
   const int d = contact.law->components(), n = contact.law->pairs();
   const auto transpose = [d, n](double const* in, std::vector<double>& out, bool pairs_innermost) {
     for (int c = 0; c < d; ++c)
-      for (int i = 0; i < n; ++i) pairs_innermost ? out[size_t(c) * n + i] = in[size_t(i) * d + c] : out[size_t(i) * d + c] = in[size_t(c) * n + i];
+      for (int i = 0; i < n; ++i)
+        pairs_innermost ? out[size_t(c) * n + i] = in[size_t(i) * d + c]
+                        : out[size_t(i) * d + c] = in[size_t(c) * n + i];
   };
   std::vector<double> uu(size_t(d) * n), vv(uu.size()), ff(uu.size()), rows(uu.size());
   transpose(ReadArray(u).data(), uu, true);
   transpose(ReadArray(v).data(), vv, true);
   contact::Record record;
-  contact.law->force({.samples = 1, .components = d, .pairs = n, .u = uu.data(), .v = vv.data(), .step = 0}, ff.data(), record);
+  contact.law->force({.samples = 1, .components = d, .pairs = n, .u = uu.data(), .v = vv.data(), .step = 0},
+                     ff.data(), record);
   transpose(ff.data(), rows, false);
   {
     WriteArray out(f);
@@ -115,7 +124,10 @@ void Transient::record(TS ts, double t, Vec state) {
 }
 
 History Transient::run(Vec x0, Vec v0, double t_end, double dt_out, double tolerance, double limit) {
-  if (!(dt_out > 0) || !(t_end > 0)) throw InputError("time integration needs a positive duration and sampling interval", std::to_string(t_end) + ", " + std::to_string(dt_out), "> 0", "give t_end and dt_out above 0");
+  if (!(dt_out > 0) || !(t_end > 0))
+    throw InputError("time integration needs a positive duration and sampling interval",
+                     std::to_string(t_end) + ", " + std::to_string(dt_out), "> 0",
+                     "give t_end and dt_out above 0");
   history_ = {};
   next_ = 0, interval_ = dt_out, limit_ = limit;
   exception_ = nullptr;

@@ -10,7 +10,8 @@
 /// Direct time integration of the unreduced equations, for verification.
 namespace fretwave::transient {
 
-/// One line of the excitation: Re(P e^{i n w t}) as cosine and sine parts, p(t) = P_c cos(n w t) + P_s sin(n w t).
+/// One line of the excitation: Re(P e^{i n w t}) as cosine and sine parts, p(t) = P_c cos(n w t) + P_s sin(n
+/// w t).
 struct Excitation {
   int order;
   VecHandle cosine, sine;
@@ -24,13 +25,15 @@ struct History {
   std::string reason;
 };
 
-/// M x'' + C x' + K x + B^T f = p(t) as a first-order system for PETSc TS (prefix transient_; default: Runge-Kutta 5(4) of
-/// Dormand and Prince with step control). Only for laws that depend on the present state alone.
+/// M x'' + C x' + K x + B^T f = p(t) as a first-order system for PETSc TS (prefix transient_; default:
+/// Runge-Kutta 5(4) of Dormand and Prince with step control). Only for laws that depend on the present state
+/// alone.
 class Transient {
  public:
   Transient(model::Model const&, std::vector<Excitation> excitation, double omega, std::string const& prefix);
   Transient(Transient const&) = delete;
-  /// From (x0, v0) to t_end, sampled every dt_out by the method's own interpolation; stops early when |x| exceeds `limit`. Collective.
+  /// From (x0, v0) to t_end, sampled every dt_out by the method's own interpolation; stops early when |x|
+  /// exceeds `limit`. Collective.
   History run(Vec x0, Vec v0, double t_end, double dt_out, double tolerance, double limit);
 
  private:
