@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 from .errors import FretwaveError, InputError, NotConverged
 
 if TYPE_CHECKING:
+    from .contact_laws import LawInfo, ParameterInfo, PythonLaw, laws
     from .continuation import Continuation, Point, StepControl
-    from .laws import LawInfo, ParameterInfo, PythonLaw, laws
     from .model import Contact, Model
     from .modes import LinearMode, linear_modes
     from .problems import ForcedResponse, Harmonics, NonlinearMode, choose_harmonics
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 #: Where each public name lives; loaded when first used, so that `fretwave --help` starts without PETSc.
 _HOMES = {
     "continuation": ("Continuation", "Point", "StepControl"),
-    "laws": ("LawInfo", "ParameterInfo", "PythonLaw", "laws"),
+    "contact_laws": ("LawInfo", "ParameterInfo", "PythonLaw", "laws"),
     "model": ("Contact", "Model"),
     "modes": ("LinearMode", "linear_modes"),
     "problems": ("ForcedResponse", "Harmonics", "NonlinearMode", "choose_harmonics"),
@@ -53,5 +53,5 @@ def __getattr__(name: str) -> Any:
     if name not in _HOME_OF:
         raise AttributeError(f"module 'fretwave' has no attribute '{name}'")
     value = getattr(import_module(f".{_HOME_OF[name]}", __name__), name)
-    globals()[name] = value  # `laws` is a module and a function of the same name: the function is the public one
+    globals()[name] = value
     return value

@@ -93,9 +93,13 @@ class Continuation:
     ) -> None:
         low, high = stop
         if not low < high:
-            raise InputError("the range of the branch is empty", None, f"({low}, {high})", "low < high", "order the two stop values")
+            raise InputError(
+                "the range of the branch is empty", None, f"({low}, {high})", "low < high", "order the two stop values"
+            )
         self.problem, self._y0 = problem, y0
-        self._core = _core.Continuation(problem.core, problem.prefix, low, high, (steps or StepControl()).core(), list(report_at))
+        self._core = _core.Continuation(
+            problem.core, problem.prefix, low, high, (steps or StepControl()).core(), list(report_at)
+        )
         if upwards is None:
             start = self._parameter(y0)
             upwards = bool(start < 0.5 * (low + high))
@@ -104,7 +108,11 @@ class Continuation:
     def _parameter(self, y: PETSc.Vec) -> float:
         last = self.problem.model.comm.size - 1
         local = y.getArray(readonly=True)
-        return float(self.problem.core.parameter_value(self.problem.model.comm.bcast(local[-1] if len(local) else 0.0, root=last)))
+        return float(
+            self.problem.core.parameter_value(
+                self.problem.model.comm.bcast(local[-1] if len(local) else 0.0, root=last)
+            )
+        )
 
     def __iter__(self) -> Iterator[Point]:
         point = self._core.next() if self._restored else self._core.start(self._y0, self._upwards)
@@ -116,12 +124,12 @@ class Continuation:
                 self._advise(last)
 
     def _advise(self, y: PETSc.Vec) -> None:
-        """Why a branch breaks off is most often a force that changes within a sample."""
+        """A branch that breaks off often does so at a force that changes within a sample."""
         aliasing = self.problem.diagnostics(y)["aliasing"]
         if aliasing > ALIASING_LIMIT:
             self._advice = (
-                f"; the contact force is poorly resolved in time (its harmonics change by {100 * aliasing:.2g} % on doubled"
-                f" samples): try samples = {4 * self.problem.harmonics.samples}, or a smoother law"
+                f"; the contact force may be poorly resolved in time (its harmonics change by {100 * aliasing:.2g} % on"
+                f" doubled samples): if so, samples = {4 * self.problem.harmonics.samples} or a smoother law helps"
             )
 
     @property
@@ -157,7 +165,7 @@ class Continuation:
         steps: StepControl | None = None,
         report_at: Sequence[float] = (),
     ) -> Continuation:
-        """Goes on after the snapshot's point, on any number of ranks; `snapshot` is needed on rank 0 only. Collective."""
+        """Goes on after the snapshot's point, on any number of ranks; rank 0 alone needs the snapshot. Collective."""
         snapshot = problem.model.comm.bcast(snapshot)
         assert snapshot is not None
         y, tangent = (cls._scatter(problem, np.asarray(snapshot[name])) for name in ("y", "tangent"))
@@ -170,7 +178,9 @@ class Continuation:
     def _scatter(problem: HarmonicProblem, whole: Array) -> PETSc.Vec:
         v = problem.core.unknowns()
         if v.getSize() != len(whole):
-            raise InputError("the saved state is of another problem", None, len(whole), v.getSize(), "resume with the same case")
+            raise InputError(
+                "the saved state is of another problem", None, len(whole), v.getSize(), "resume with the same case"
+            )
         begin, end = v.getOwnershipRange()
         v.setArray(whole[begin:end])
         return v

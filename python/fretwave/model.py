@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -13,8 +14,8 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from . import _core, parallel
+from .contact_laws import PythonLaw, laws
 from .errors import InputError
-from .laws import PythonLaw, laws
 
 Array = npt.NDArray[np.float64]
 
@@ -55,14 +56,18 @@ class Contact:
     def core_law(self, pairs: npt.NDArray[np.intp], n_pairs: int) -> Any:
         """The compiled law with the parameters of these pairs."""
         if isinstance(self.law, PythonLaw):
-            return _core.python_law(self.law, len(pairs))
+            local = copy(self.law)
+            local.pairs = pairs
+            return _core.python_law(local, len(pairs))
         return _core.make_law(self.law, {k: v[pairs].tolist() for k, v in self._values(n_pairs).items()})
 
     def _values(self, n_pairs: int) -> dict[str, Array]:
         known = {p.name: p.default for p in laws()[str(self.law)].parameters}
         for name in self.parameters:
             if name not in known:
-                raise InputError("unknown law parameter", f"contact '{self.name}'", name, ", ".join(known), "remove or rename it")
+                raise InputError(
+                    "unknown law parameter", f"contact '{self.name}'", name, ", ".join(known), "remove or rename it"
+                )
         values = {}
         for name, default in known.items():
             value = self.parameters.get(name, default)
@@ -108,7 +113,9 @@ class Model:
             return A
         rows = sp.csr_matrix(A, dtype=float)
         if rows.shape[0] != rows.shape[1]:
-            raise InputError("a matrix of the model is not square", None, f"{rows.shape}", "n x n", "give a square matrix")
+            raise InputError(
+                "a matrix of the model is not square", None, f"{rows.shape}", "n x n", "give a square matrix"
+            )
         begin, end = self._rows(rows.shape[0])
         local = rows[begin:end]
         size = (end - begin, rows.shape[0])
@@ -127,11 +134,17 @@ class Model:
         B, d = sp.csr_matrix(contact.B, dtype=float), contact.components
         if B.shape[1] != self.n_dof or B.shape[0] % d:
             raise InputError(
-                "B does not fit the model", f"contact '{contact.name}'", f"{B.shape}", f"(n_pairs * {d}, {self.n_dof})", "give B as u = B x"
+                "B does not fit the model",
+                f"contact '{contact.name}'",
+                f"{B.shape}",
+                f"(n_pairs * {d}, {self.n_dof})",
+                "give B as u = B x",
             )
         begin, end = self._matrices[0].getOwnershipRange()
         n_pairs = B.shape[0] // d
-        first = np.array([B.indices[B.indptr[d * i]] if B.indptr[d * (i + 1)] > B.indptr[d * i] else 0 for i in range(n_pairs)])
+        first = np.array(
+            [B.indices[B.indptr[d * i]] if B.indptr[d * (i + 1)] > B.indptr[d * i] else 0 for i in range(n_pairs)]
+        )
         pairs = np.nonzero((first >= begin) & (first < end))[0]
         self._pairs.append(pairs)
         local = B[(pairs[:, None] * d + np.arange(d)).ravel()] if len(pairs) else B[:0]

@@ -101,7 +101,10 @@ class HarmonicProblem:
         return dict(self.core.summary(y))
 
     def contact_period(self, y: PETSc.Vec) -> list[dict[str, Array | None]]:
-        """Relative displacement u, velocity v and force f (n_samples, components, n_pairs) per contact, on rank 0. Collective."""
+        """Relative displacement u, velocity v and force f of each contact over one period, on rank 0. Collective.
+
+        Each is (n_samples, components, n_pairs).
+        """
         return [
             {name: self.model.gather_pairs(k, samples) for name, samples in zip("uvf", period)}
             for k, period in enumerate(self.core.contact_periods(y))
@@ -154,7 +157,13 @@ class NonlinearMode(HarmonicProblem):
     """
 
     def __init__(
-        self, model: Model, harmonics: Harmonics, method: str = "CNM", dof: int = 0, start: LinearMode | None = None, prefix: str = "mode_"
+        self,
+        model: Model,
+        harmonics: Harmonics,
+        method: str = "CNM",
+        dof: int = 0,
+        start: LinearMode | None = None,
+        prefix: str = "mode_",
     ) -> None:
         if method not in ("CNM", "EPMC"):
             raise InputError("unknown method", None, method, "CNM or EPMC", 'use method="CNM"')
@@ -217,7 +226,11 @@ class ForcedResponse(HarmonicProblem):
         for order, P in force.items():
             if order not in harmonics.orders:
                 raise InputError(
-                    "the force has a harmonic that is not retained", None, order, str(harmonics.orders), "retain it: retain = \"all\""
+                    "the force has a harmonic that is not retained",
+                    None,
+                    order,
+                    str(harmonics.orders),
+                    'retain it: retain = "all"',
                 )
             values = np.asarray(P, dtype=complex)
             column = harmonics.labels.index(f"{order}c" if order else "0")
@@ -233,4 +246,10 @@ class ForcedResponse(HarmonicProblem):
 
     def state(self, y: PETSc.Vec) -> dict[str, float]:
         level, omega, amplitude, phase = self.core.state(y)
-        return {"level": level, "omega": omega, "frequency_hz": omega / (2 * np.pi), "amplitude": amplitude, "phase": phase}
+        return {
+            "level": level,
+            "omega": omega,
+            "frequency_hz": omega / (2 * np.pi),
+            "amplitude": amplitude,
+            "phase": phase,
+        }

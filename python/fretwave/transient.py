@@ -40,7 +40,8 @@ class Transient:
             raise InputError("a force needs its frequency", None, omega, "omega > 0", "give omega")
         self.model = model
         parts = [
-            (order, model.vector(level * np.real(P)), model.vector(-level * np.imag(P))) for order, P in (force or {}).items()
+            (order, model.vector(level * np.real(P)), model.vector(-level * np.imag(P)))
+            for order, P in (force or {}).items()
         ]
         self._core = _core.Transient(model.core, parts, float(omega or 0.0), prefix)
 
@@ -52,7 +53,8 @@ class Transient:
         Returns
         -------
         dict
-            t (n,), x and v (n, n_dof) every `dt_out`; steps; finished (False when stopped by `limit`); reason. On every rank.
+            t (n,), x and v (n, n_dof) every `dt_out`; steps; finished (False when stopped by `limit`); reason.
+            On every rank.
         """
         t, x, v, steps, finished, reason = self._core.run(
             self.model.vector(x0), self.model.vector(v0), t_end, dt_out, rtol, limit

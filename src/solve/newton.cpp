@@ -75,6 +75,8 @@ void Newton::use_direct() {
     check(PCRedundantGetKSP(pc, &ksp));
     check(KSPGetPC(ksp, &pc));
     check(PCSetType(pc, PCLU));
+    check(PCFactorSetMatSolverType(pc, MATSOLVERKLU));  // serial, pivots, quick to set up
+    return;
   }
   check(PCFactorSetMatSolverType(pc, MATSOLVERMUMPS));
 }

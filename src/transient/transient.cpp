@@ -25,8 +25,8 @@ Transient::Transient(model::Model const& model, std::vector<Excitation> excitati
   check(KSPSetOperators(mass_, M, M));
   check(KSPSetType(mass_, KSPPREONLY));
   check(KSPGetPC(mass_, &pc));
-  check(PCSetType(pc, PCLU));
-  if (comm_size(model.comm()) > 1) check(PCFactorSetMatSolverType(pc, MATSOLVERMUMPS));
+  check(PCSetType(
+      pc, comm_size(model.comm()) > 1 ? PCREDUNDANT : PCLU));  // M is positive definite: no pivots needed
   check(KSPSetFromOptions(mass_));
   check(KSPSetUp(mass_));
 }
@@ -92,12 +92,14 @@ PetscErrorCode Transient::right_side(TS, PetscReal t, Vec state, Vec rate, void*
   return PetscErrorCode(0);
 }
 
-PetscErrorCode Transient::monitor(TS ts, PetscInt, PetscReal t, Vec state, void* context) {
-  auto& self = *static_cast<Transient*>(context);
+PetscErrorCode Transient::after_step(TS ts) {
+  Transient* self;
+  PetscErrorCode code = TSGetApplicationContext(ts, &self);
+  if (code) return code;
   try {
-    self.record(ts, t, state);
+    self->record(ts);
   } catch (...) {
-    self.exception_ = std::current_exception();
+    self->exception_ = std::current_exception();
     return PETSC_ERR_USER;
   }
   return PetscErrorCode(0);
@@ -111,11 +113,15 @@ void Transient::sample(double t, Vec state) {
   history_.v.emplace_back(in.data() + n, in.data() + 2 * n);
 }
 
-void Transient::record(TS ts, double t, Vec state) {
-  if (next_ == 0) sample(t, state), next_ = interval_;
-  for (; next_ <= t * (1 + 1e-14); next_ = interval_ * double(history_.t.size())) {
-    check(TSInterpolate(ts, std::min(next_, t), interpolated_));
-    sample(next_, interpolated_);
+/// Samples up to the step's end, by the method's own interpolation; ends the run where the motion exceeds the
+/// limit.
+void Transient::record(TS ts) {
+  double t;
+  check(TSGetTime(ts, &t));
+  for (double next = interval_ * double(history_.t.size()); next <= std::min(t, end_) * (1 + 1e-14);
+       next = interval_ * double(history_.t.size())) {
+    check(TSInterpolate(ts, std::min(next, t), interpolated_));
+    sample(next, interpolated_);
   }
   double largest = 0;
   for (double x : history_.x.back()) largest = std::max(largest, std::abs(x));
@@ -129,7 +135,7 @@ History Transient::run(Vec x0, Vec v0, double t_end, double dt_out, double toler
                      std::to_string(t_end) + ", " + std::to_string(dt_out), "> 0",
                      "give t_end and dt_out above 0");
   history_ = {};
-  next_ = 0, interval_ = dt_out, limit_ = limit;
+  interval_ = dt_out, end_ = t_end, limit_ = limit;
   exception_ = nullptr;
   const PetscInt n = model_.local_dofs();
   VecHandle state = make_vector(model_.comm(), 2 * n);
@@ -150,7 +156,8 @@ History Transient::run(Vec x0, Vec v0, double t_end, double dt_out, double toler
   check(TSSetType(ts, TSRK));
   check(TSRKSetType(ts, TSRK5DP));
   check(TSSetRHSFunction(ts, nullptr, right_side, this));
-  check(TSMonitorSet(ts, monitor, this, nullptr));
+  check(TSSetApplicationContext(ts, this));
+  check(TSSetPostStep(ts, after_step));
   check(TSSetMaxTime(ts, t_end));
   check(TSSetMaxSteps(ts, PETSC_MAX_INT));
   check(TSSetExactFinalTime(ts, TS_EXACTFINALTIME_STEPOVER));
@@ -159,6 +166,7 @@ History Transient::run(Vec x0, Vec v0, double t_end, double dt_out, double toler
   check(TSGetAdapt(ts, &adapt));
   check(TSAdaptSetType(adapt, TSADAPTBASIC));
   check(TSSetFromOptions(ts));
+  sample(0, state);
   const PetscErrorCode code = TSSolve(ts, state);
   if (exception_) std::rethrow_exception(exception_);
   check(code);

@@ -38,10 +38,10 @@ class Transient {
 
  private:
   static PetscErrorCode right_side(TS, PetscReal, Vec, Vec, void*);
-  static PetscErrorCode monitor(TS, PetscInt, PetscReal, Vec, void*);
+  static PetscErrorCode after_step(TS);
   void rate(double t, Vec state, Vec rate);
   void contact_force(model::Contact const&, Vec force);
-  void record(TS, double t, Vec state);
+  void record(TS);
   void sample(double t, Vec state);
 
   model::Model const& model_;
@@ -53,7 +53,7 @@ class Transient {
   VecHandle x_, v_, force_, acceleration_, interpolated_;
   std::exception_ptr exception_;
   History history_;
-  double next_ = 0, interval_ = 0, limit_ = 0;
+  double interval_ = 0, end_ = 0, limit_ = 0;
 };
 
 }  // namespace fretwave::transient

@@ -45,8 +45,8 @@ def laws() -> dict[str, LawInfo]:
 class PythonLaw:
     """A contact law for prototypes: the force depends on the present relative displacement and velocity only.
 
-    Subclasses give ``force(u, v)``, and ``tangent(u, v)`` when they can: without it the tangent is a central difference,
-    which limits Newton's accuracy to about 1e-9. Arrays are (n_samples, components, n_pairs).
+    Subclasses give ``force(u, v)``, and ``tangent(u, v)`` when they can: without it the tangent is a central difference
+    and Newton is accurate to about 1e-9. Arrays are (n_samples, components, n_pairs).
 
     Attributes
     ----------
@@ -56,11 +56,14 @@ class PythonLaw:
         f(-u, -v) = -f(u, v): even harmonics may be left out.
     stuck_stiffness : float
         Stiffness of the closed contact [N/m] in stuck linear modes; infinite means no relative motion.
+    pairs : array of int
+        Which pairs (rows of B) the arrays hold, on this rank; set by the model.
     """
 
     components: int = 1
     odd: bool = False
     stuck_stiffness: float = float("inf")
+    pairs: npt.NDArray[np.intp]
 
     def force(self, u: Array, v: Array) -> Array:
         """Contact force, shape of `u`, in the direction of +u (it resists the motion)."""

@@ -1,0 +1,164 @@
+"""Small models, contact laws in Python and vector helpers that the core's tests share."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from petsc4py import PETSc
+
+import fretwave as fw
+
+
+class LinearLaw(fw.PythonLaw):
+    """f = k u + c v on one component."""
+
+    odd = True
+
+    def __init__(self, k: float, c: float) -> None:
+        self.k, self.c = k, c
+
+    def force(self, u, v):
+        return self.k * u + self.c * v
+
+    def tangent(self, u, v):
+        return np.full_like(u, self.k)[:, None], np.full_like(v, self.c)[:, None]
+
+
+class CubicLaw(fw.PythonLaw):
+    """f = g u^3."""
+
+    odd = True
+
+    def __init__(self, g: float = 1.0) -> None:
+        self.g = g
+
+    def force(self, u, v):
+        return self.g * u**3
+
+    def tangent(self, u, v):
+        return (3 * self.g * u**2)[:, None], np.zeros_like(v)[:, None]
+
+
+class UnilateralLaw(fw.PythonLaw):
+    """f = k max(u, 0): zero gap, no tension."""
+
+    def __init__(self, k: float) -> None:
+        self.k = k
+
+    def force(self, u, v):
+        return self.k * np.maximum(u, 0)
+
+    def tangent(self, u, v):
+        return (self.k * (u > 0))[:, None], np.zeros_like(v)[:, None]
+
+
+class TanhLaw(fw.PythonLaw):
+    """R tanh(v / eps), written again in Python; `odd` false forces whole periods."""
+
+    odd = True
+
+    def __init__(self, limit: float, velocity: float) -> None:
+        self.limit, self.velocity = limit, velocity
+
+    def force(self, u, v):
+        return self.limit * np.tanh(v / self.velocity)
+
+    def tangent(self, u, v):
+        slope = self.limit / self.velocity * (1 - np.tanh(v / self.velocity) ** 2)
+        return np.zeros_like(u)[:, None], slope[:, None]
+
+
+class CoupledLaw(fw.PythonLaw):
+    """f = G u + c (1 + |u|^2) v with a full, unsymmetric G: couples all three components and both arguments."""
+
+    components = 3
+    G = np.array([[3.0, 0.4, -0.7], [0.1, 2.0, 0.5], [0.9, -0.3, 1.0]])
+    c = 0.2
+
+    def force(self, u, v):
+        return np.einsum("ij,tjp->tip", self.G, u) + self.c * (1 + self._square(u)) * v
+
+    def tangent(self, u, v):
+        identity = np.eye(3)[None, :, :, None]
+        by_u = self.G[None, :, :, None] + 2 * self.c * v[:, :, None] * u[:, None]
+        return by_u, self.c * (1 + self._square(u))[:, None] * identity
+
+    @staticmethod
+    def _square(u):
+        return (u**2).sum(axis=1, keepdims=True)
+
+
+def friction(B, limit: Any = 5.0, velocity: Any = 0.05, name: str = "damper") -> fw.Contact:
+    """Regularised Coulomb contact."""
+    return fw.Contact("regularised_coulomb", B, {"friction_limit": limit, "regularisation_velocity": velocity}, name)
+
+
+def single_dof(comm, m=1.0, k=1.0, c=None, law=None) -> fw.Model:
+    """One mass on a spring to ground, with a contact law on it or without."""
+    contacts = [] if law is None else [law if isinstance(law, fw.Contact) else fw.Contact(law, [[1.0]])]
+    return fw.Model([[m]], [[k]], None if c is None else [[c]], contacts, comm)
+
+
+def oscillator(two_dof, comm, C=None, law=None, **changes) -> fw.Model:
+    """The paper's two-dof oscillator with its friction damper, or another law in its place."""
+    contact = fw.Contact(law or two_dof.law, two_dof.B, {} if law else {**two_dof.parameters, **changes})
+    return fw.Model(two_dof.M, two_dof.K, C, [contact], comm)
+
+
+def chain(n: int, k: float = 1.0, ground: float = 0.0) -> np.ndarray:
+    """Stiffness of n masses in a row between two walls."""
+    return (2 * k + ground) * np.eye(n) - k * np.eye(n, k=1) - k * np.eye(n, k=-1)
+
+
+def whole(vec: PETSc.Vec) -> np.ndarray:
+    """All entries of a distributed vector, on every rank. Collective."""
+    return np.concatenate(vec.getComm().tompi4py().allgather(vec.getArray(readonly=True).copy()))
+
+
+def filled(vec: PETSc.Vec, values: np.ndarray) -> PETSc.Vec:
+    """`vec` with the entries of an array that every rank has whole."""
+    vec.setArray(values[slice(*vec.getOwnershipRange())])
+    return vec
+
+
+def unknowns(problem: fw.problems.HarmonicProblem, values: np.ndarray) -> PETSc.Vec:
+    """y of a problem from an array that every rank has whole. Collective."""
+    return filled(problem.core.unknowns(), values)
+
+
+def dense(A: PETSc.Mat) -> np.ndarray:
+    """A distributed matrix as an array, on every rank. Collective."""
+    begin, end = A.getOwnershipRange()
+    local = np.zeros((end - begin, A.getSize()[1]))
+    for row in range(begin, end):
+        columns, values = A.getRow(row)
+        local[row - begin, columns] = values
+    return np.concatenate(A.getComm().tompi4py().allgather(local))
+
+
+def everywhere(problem: fw.problems.HarmonicProblem, value: Any) -> Any:
+    """What a problem gives on rank 0 only, on every rank. Collective."""
+    return problem.model.comm.bcast(value)
+
+
+def mode_problem(model, orders, samples, method="CNM", dof=0, start="free", number=0, prefix="mode_"):
+    """A nonlinear mode started from a linear one."""
+    linear = fw.linear_modes(model, number + 1, start)[number]
+    return fw.NonlinearMode(model, fw.Harmonics(orders, samples), method, dof, linear, prefix)
+
+
+def solve_at(problem, amplitude: float) -> PETSc.Vec:
+    """The point of a branch at this parameter, from the problem's own first guess. Collective."""
+    branch = fw.Continuation(problem, problem.initial(amplitude), (0.5 * amplitude, 2 * amplitude))
+    point = next(iter(branch), None)
+    assert point is not None, branch.reason
+    return point.y
+
+
+def states(problem, start: float, stop, report_at, **steps) -> list[dict[str, float]]:
+    """States at the reported parameters of a branch. Collective."""
+    branch = fw.Continuation(problem, problem.initial(start), stop, fw.StepControl(**steps), report_at)
+    found = [problem.state(p.y) for p in branch if p.event == "report"]
+    assert branch.converged, branch.reason
+    return found
