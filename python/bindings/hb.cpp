@@ -1,6 +1,7 @@
 #include "casters.h"
 #include "hb/forced_response.h"
 #include "hb/nonlinear_mode.h"
+#include "hb/static_preload.h"
 
 namespace fretwave::python {
 
@@ -48,6 +49,8 @@ void bind_hb(nb::module_& m) {
            })
       .def("summary", [](HarmonicProblem& p, Petsc<Vec> y) { return contact_summary(p.summarise(y.object)); })
       .def("contact_periods", contact_periods)
+      .def("preload", [](HarmonicProblem& p, Petsc<Vec> x, Petsc<Vec> P) { p.preload(x.object, P.object); })
+      .def("settle", [](HarmonicProblem& p, Petsc<Vec> y) { p.settle(y.object); })
       .def("exponents", [](HarmonicProblem& p, Petsc<Vec> y) { return p.exponents(y.object).s; });
   nb::enum_<Method>(m, "Method").value("CNM", Method::CNM).value("EPMC", Method::EPMC);
   nb::class_<NonlinearMode, HarmonicProblem>(m, "NonlinearMode")
@@ -62,6 +65,14 @@ void bind_hb(nb::module_& m) {
         const auto s = p.state(y.object);
         return nb::make_tuple(s.amplitude, s.omega, s.omega0, s.beta, s.zeta);
       });
+  nb::class_<StaticPreload, HarmonicProblem>(m, "StaticPreload")
+      .def(
+          "__init__",
+          [](StaticPreload* self, model::Model const& model, Petsc<Vec> P, double size, double stiffness) {
+            new (self) StaticPreload(model, P.object, size, stiffness);
+          },
+          nb::keep_alive<1, 2>())
+      .def("initial", [](StaticPreload& p) { return nb::steal(to_petsc4py(p.initial())); });
   nb::class_<ForcedResponse, HarmonicProblem>(m, "ForcedResponse")
       .def(
           "__init__",

@@ -48,6 +48,7 @@ void bind_solve(nb::module_& m) {
   nb::class_<Newton>(m, "Newton")
       .def(nb::init<Problem&, std::string const&>(), nb::keep_alive<1, 2>())
       .def_prop_ro("system", &Newton::system, nb::rv_policy::reference_internal)
+      .def_prop_ro("route", &Newton::route)
       .def_prop_ro("snes", [](Newton& n) { return nb::steal(to_petsc4py(n.snes())); })
       .def("solve", [](Newton& n, Petsc<Vec> y) {
         const Outcome o = n.solve(y.object);
@@ -63,6 +64,7 @@ void bind_solve(nb::module_& m) {
       .def("next", [](Continuation& c) { return to_python(c.next()); })
       .def_prop_ro("reason", &Continuation::reason)
       .def_prop_ro("converged", &Continuation::converged)
+      .def_prop_ro("route", [](Continuation& c) { return c.newton().route(); })
       .def_prop_ro("snes", [](Continuation& c) { return nb::steal(to_petsc4py(c.newton().snes())); })
       .def("anchor", [](Continuation& c) {
         auto const& a = c.anchor();

@@ -63,6 +63,10 @@ class HarmonicProblem:
     def __init__(self, model: Model, harmonics: Harmonics, prefix: str, core: Any) -> None:
         self.model, self.harmonics, self.prefix, self.core = model, harmonics, prefix, core
 
+    def preload(self, displacement: Array, load: Array) -> None:
+        """Dynamics about a static state (n_dof,) under the static load it balances; harmonic 0 is retained then. Collective."""
+        self.core.preload(self.model.vector(displacement), self.model.vector(load))
+
     def residual(self, y: PETSc.Vec) -> PETSc.Vec:
         """r(y), dimensionless, N entries. Collective."""
         r = self.core.equations()

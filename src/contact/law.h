@@ -22,6 +22,7 @@ struct Motion {
 struct Record {
   std::vector<double> df_du,
       df_dv;  ///< instantaneous tangents, samples x components x components x pairs; empty if zero
+  std::vector<double> march;  ///< a hereditary law's own flags and directions along its march
 };
 
 enum class Status : std::uint8_t { stick, slip, open };
@@ -41,9 +42,16 @@ class Law {
   virtual int pairs() const = 0;
   virtual bool uses_displacement() const { return true; }
   virtual bool uses_velocity() const { return true; }
+  /// The force depends on the path. Such a law marches two periods from its rest state and is read on the
+  /// second (DESIGN fact 3).
+  virtual bool hereditary() const { return false; }
+  /// The static state the dynamics start from: relative displacement components x pairs, reached from zero in
+  /// one step.
+  virtual void rest(double const* /*u*/) {}
   /// f(-u, -v) = -f(u, v): the motion may keep odd harmonics only.
   virtual bool odd() const { return false; }
-  /// Stiffness of the closed, stuck contact [N/m]; infinite means no relative motion at all.
+  /// Stiffness of the contact when stuck in its rest state [N/m] (0 for a pair that is open there); infinite
+  /// means no relative motion at all.
   virtual double stuck_stiffness(int /*component*/, int /*pair*/) const {
     return std::numeric_limits<double>::infinity();
   }
@@ -52,6 +60,9 @@ class Law {
   virtual void force(Motion const&, double* f, Record&) const = 0;
   /// Linearised force for a motion perturbed by (du, dv); null where the law ignores it.
   virtual void product(Motion const&, Record const&, double const* du, double const* dv, double* df) const;
+  /// Tangents averaged over the period, components x components x pairs each, added to what is there: for
+  /// preconditioning.
+  virtual void mean_tangent(Motion const&, Record const&, double* df_du, double* df_dv) const;
   virtual void diagnose(Motion const&, double const* f, Diagnosis&) const = 0;
 };
 

@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "contact/coulomb_3d.h"
+#include "contact/jenkins.h"
 #include "contact/regularised_coulomb.h"
 #include "error.h"
 
@@ -10,6 +12,9 @@ namespace fretwave::contact {
 std::span<Entry const> laws() {
   static std::vector<Entry> const entries = {
       regularised_coulomb_entry(),
+      jenkins_entry(),
+      coulomb_3d_entry(),
+      coulomb_3d_uncoupled_entry(),
   };
   return entries;
 }

@@ -10,7 +10,9 @@ namespace {
 int tangent_columns(contact::Law const& law) { return law.components() * law.components() * law.pairs(); }
 
 /// The fundamental's Im s: the angular frequency that turns sample numbers into time.
-double angular_frequency(Harmonics const& h, Exponents const& e) { return e.s[h.fundamental()].imag(); }
+double angular_frequency(Harmonics const& h, Exponents const& e) {
+  return h.fundamental() < 0 ? 1.0 : e.s[h.fundamental()].imag();
+}
 
 }  // namespace
 
@@ -19,9 +21,9 @@ Aft::Aft(Harmonics const& h, std::shared_ptr<contact::Law const> law)
       law_(std::move(law)),
       pairs_(law_->pairs()),
       columns_(law_->components() * pairs_),
-      law_samples_(h.odd_only() && law_->odd() ? h.samples() / 2 : h.samples()),
+      law_samples_(h.odd_only() && law_->odd() && !law_->hereditary() ? h.samples() / 2 : h.samples()),
       transform_(h, columns_, law_->components()),
-      tangent_transform_(h, tangent_columns(*law_)),
+      tangent_transform_(h, law_->hereditary() ? 0 : tangent_columns(*law_)),
       velocity_(size_t(columns_) * h.block_size()) {
   const size_t n = size_t(h.samples()) * columns_;
   for (auto* samples : {&f_, &df_}) samples->resize(n);
@@ -105,11 +107,27 @@ void Aft::toeplitz_hankel(std::vector<double> const& tangent, std::vector<double
   }
 }
 
+/// Column by column for a law with memory: one linearised march for each coefficient, of all pairs at once.
+void Aft::columnwise(Exponents const& e, double* D) {
+  const size_t m = harmonics_.block_size(), d = law_->components(), ld = d * m;
+  std::vector<double> dU(size_t(columns_) * m), dV(dU.size()), dF(dU.size());
+  for (size_t col = 0; col < ld; ++col) {
+    for (int pair = 0; pair < pairs_; ++pair) dU[pair * ld + col] = 1;
+    multiply(harmonics_, e.s, dU.data(), dV.data(), columns_);
+    product(dU.data(), dV.data(), dF.data());
+    for (int pair = 0; pair < pairs_; ++pair) {
+      dU[pair * ld + col] = 0;
+      for (size_t row = 0; row < ld; ++row) D[(pair * ld + row) * ld + col] = dF[pair * ld + row];
+    }
+  }
+}
+
 void Aft::blocks(Exponents const& e, double* D) {
   if (columns_ == 0) return;
   const int m = harmonics_.block_size(), d = law_->components();
   const size_t size = size_t(pairs_) * d * m * d * m;
   std::fill_n(D, size, 0.0);
+  if (law_->hereditary()) return columnwise(e, D);
   std::vector<double> T(size);
   if (!record_.df_du.empty()) {
     toeplitz_hankel(record_.df_du, T);
@@ -130,6 +148,12 @@ void Aft::blocks(Exponents const& e, double* D) {
         D[k] += a * T[k] - b * T[k + 1];
         D[k + 1] += b * T[k] + a * T[k + 1];
       }
+}
+
+void Aft::mean_tangent(std::vector<double>& df_du, std::vector<double>& df_dv) const {
+  const size_t size = size_t(law_->components()) * columns_;
+  df_du.assign(size, 0.0), df_dv.assign(size, 0.0);
+  if (columns_) law_->mean_tangent(motion(1), record_, df_du.data(), df_dv.data());
 }
 
 ContactPeriod Aft::period(double const* U, Exponents const& e) const {

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "error.h"
+#include "hb/harmonic_pc.h"
 
 namespace fretwave::hb {
 
@@ -27,8 +28,10 @@ HarmonicProblem::HarmonicProblem(model::Model const& model, Harmonics const& h, 
     throw InputError("the chosen dof does not exist", std::to_string(dof),
                      "0 to " + std::to_string(model.dofs() - 1), "choose a dof of the model");
   q_ = residual_.vector();
-  for (auto* v : {&Q_, &dQ_, &R_, &dR_, &excitation_}) *v = like(q_);
+  for (auto* v : {&Q_, &dQ_, &R_, &dR_, &excitation_, &static_, &static_load_}) *v = like(q_);
   check(VecSet(excitation_, 0));
+  check(VecSet(static_, 0));
+  check(VecSet(static_load_, 0));
   last_ = unknowns();
 }
 
@@ -40,7 +43,7 @@ std::vector<double> HarmonicProblem::scalars(Vec y) {
   std::vector<double> z(scalars_ + 2, 0.0);
   ReadArray in(y);
   if (last_rank()) std::copy_n(in.data() + local_block_, scalars_, z.begin());
-  if (owns_dof())
+  if (owns_dof() && harmonics().fundamental() >= 0)
     std::copy_n(in.data() + (dof_ - model().first_dof()) * harmonics().block_size() +
                     harmonics().offset(harmonics().fundamental()),
                 2, z.begin() + scalars_);
@@ -55,14 +58,29 @@ void HarmonicProblem::unpack(Vec y) {
     ReadArray in(y);
     std::copy_n(in.data(), local_block_, WriteArray(q_).data());
   }
-  check(VecCopy(q_, Q_));
-  check(VecScale(Q_, motion_.amplitude));
+  check(VecWAXPY(Q_, motion_.amplitude, q_, static_));
+}
+
+void HarmonicProblem::add_mean(Vec per_dof, Vec blocks) {
+  ReadArray in(per_dof);
+  WriteArray out(blocks);
+  for (PetscInt i = 0; i < model().local_dofs(); ++i) out[i * harmonics().block_size()] += in[i];
+}
+
+void HarmonicProblem::preload(Vec x, Vec P) {
+  if (harmonics().orders()[0] != 0)
+    throw InputError("a preloaded structure moves about a mean that is not retained",
+                     "lowest harmonic " + std::to_string(harmonics().orders()[0]), "harmonic 0 retained",
+                     "retain all harmonics");
+  add_mean(x, static_);
+  add_mean(P, static_load_);
+  linearised_ = false;
 }
 
 void HarmonicProblem::residual(Vec y, Vec r) {
   unpack(y);
   residual_.evaluate(Q_, motion_.exponents, R_);
-  check(VecAXPY(R_, -1, excitation_));
+  check(VecAXPBYPCZ(R_, -motion_.load, -1, 1, excitation_, static_load_));
   check(VecScale(R_, 1 / (stiffness_ * motion_.amplitude)));
   check(VecCopy(y, last_));
   linearised_ = true;
@@ -83,15 +101,16 @@ void HarmonicProblem::linearise(Vec y) {
   residual(y, unused);
 }
 
-// Q = a q: dQ = a (dq + q dlog a); r = R / (k a): dr = dR / (k a) - r dlog a
+// Q = Q_static + a q: dQ = a (dq + q dlog a); r = R / (k a): dr = dR / (k a) - r dlog a
 void HarmonicProblem::product(Vec y, Vec dy, Vec dr) {
   linearise(y);
   const auto dz = scalars(dy);
   Exponents de{std::vector<complex>(harmonics().count()), 0};
-  double dlog = 0;
+  double dlog = 0, load = 0;
   for (int j = 0; j < scalars_; ++j) {
     add(de, dz[j], motion_.dexponents[j]);
     dlog += dz[j] * motion_.dlog_amplitude[j];
+    load += dz[j] * dload(j);
   }
   {
     ReadArray in(dy);
@@ -99,6 +118,7 @@ void HarmonicProblem::product(Vec y, Vec dy, Vec dr) {
   }
   check(VecAXPBY(dQ_, motion_.amplitude * dlog, motion_.amplitude, q_));
   residual_.product(dQ_, &de, dR_);
+  check(VecAXPY(dR_, -load, excitation_));
   check(VecAXPBY(dR_, -dlog, 1 / (stiffness_ * motion_.amplitude), R_));
   WriteArray out(dr);
   ReadArray in(dR_);
@@ -122,9 +142,10 @@ void HarmonicProblem::pattern(std::vector<PetscInt>& rows, std::vector<PetscInt>
 
 void HarmonicProblem::column(int j, double* v) {
   const double dlog = motion_.dlog_amplitude[j];
-  check(VecCopy(Q_, dQ_));
-  check(VecScale(dQ_, dlog));
+  check(VecCopy(q_, dQ_));
+  check(VecScale(dQ_, dlog * motion_.amplitude));
   residual_.product(dlog ? Vec(dQ_) : nullptr, &motion_.dexponents[j], dR_);
+  check(VecAXPY(dR_, -dload(j), excitation_));
   check(VecAXPBY(dR_, -dlog, 1 / (stiffness_ * motion_.amplitude), R_));
   ReadArray in(dR_);
   std::copy_n(in.data(), local_block_, v);
@@ -135,6 +156,24 @@ void HarmonicProblem::values(Vec y, std::span<double> v) {
   double* next = residual_.values(1 / stiffness_, v.data());
   for (int j = 0; j < scalars_; ++j, next += local_block_) column(j, next);
   if (normalised() && owns_dof()) next[0] = next[1] = 1;
+}
+
+VecHandle HarmonicProblem::scalar_column(Vec y, int j) {
+  linearise(y);
+  VecHandle out = like(q_);
+  column(j, WriteArray(out).data());
+  return out;
+}
+
+void HarmonicProblem::mean_contact(Vec y, std::vector<double>& K, std::vector<double>& C) {
+  linearise(y);
+  residual_.mean_contact(K, C);
+}
+
+std::unique_ptr<solve::Preconditioner> HarmonicProblem::preconditioner() {
+  constexpr PetscInt largest_dense = 3000;  // dofs: a complex factor of 144 MB a harmonic
+  if (harmonics().fundamental() < 0 || model().dofs() > largest_dense) return nullptr;
+  return std::make_unique<HarmonicPreconditioner>(*this);
 }
 
 /// Motion counts relative to its own size, so that a step is a share of it whatever the mesh.
@@ -161,9 +200,9 @@ VecHandle HarmonicProblem::pack(Vec q, std::vector<double> const& z) const {
 VecHandle HarmonicProblem::coefficients(Vec y) {
   VecHandle Q = residual_.vector();
   const auto m = motion(scalars(y));
-  ReadArray in(y);
+  ReadArray in(y), rest(static_);
   WriteArray out(Q);
-  for (PetscInt i = 0; i < local_block_; ++i) out[i] = m.amplitude * in[i];
+  for (PetscInt i = 0; i < local_block_; ++i) out[i] = rest[i] + m.amplitude * in[i];
   return Q;
 }
 

@@ -13,11 +13,13 @@ struct ScaledMotion {
   Exponents exponents;                 ///< s_n
   std::vector<double> dlog_amplitude;  ///< d log a / dz_j
   std::vector<Exponents> dexponents;   ///< d s_n / dz_j
+  double load = 1;                     ///< factor on the excitation P
+  std::vector<double> dload = {};      ///< d load / dz_j; empty if constant
 };
 
-/// y = (q, z): scaled harmonic blocks q = Q / a, then the scalars z on the last rank; z's last entry is the
-/// continuation parameter. Rows (R(a q, s(z)) - P) / (k_ref a), then, on the last rank, q_dof = (1, 0) in the
-/// fundamental if there are three scalars (DESIGN fact 4).
+/// y = (q, z): scaled harmonic blocks q = (Q - Q_static) / a, then the scalars z on the last rank; z's last
+/// entry is the continuation parameter. Rows (R(a q, s(z)) - P) / (k_ref a), then, on the last rank, q_dof =
+/// (1, 0) in the fundamental if there are three scalars (DESIGN fact 4).
 class HarmonicProblem : public solve::Problem {
  public:
   HarmonicProblem(model::Model const&, Harmonics const&, int scalars, PetscInt dof,
@@ -33,12 +35,25 @@ class HarmonicProblem : public solve::Problem {
   Harmonics const& harmonics() const { return residual_.harmonics(); }
   model::Model const& model() const { return residual_.model(); }
   PetscInt dof() const { return dof_; }
-  /// Physical coefficients Q = a q as harmonic blocks. Collective.
+  /// Dynamics about a static state x under the static load P: Q = (x, 0, ...) + a q. The mean is retained
+  /// then. Collective.
+  void preload(Vec x, Vec P);
+  /// Physical coefficients Q as harmonic blocks. Collective.
   VecHandle coefficients(Vec y);
   /// (scalars z, fundamental coefficients of the chosen dof in q): on every rank. Collective.
   std::vector<double> scalars(Vec y);
   /// Contact of the motion at y, summed over ranks. Collective.
   ContactSummary summarise(Vec y);
+  int scalar_count() const { return scalars_; }
+  double stiffness_scale() const { return stiffness_; }
+  DynamicStiffness const& stiffness() const { return residual_.stiffness(); }
+  /// Column dr/dz_j at y, on the harmonic rows. Collective.
+  VecHandle scalar_column(Vec y, int j);
+  /// Dense B^T (period-averaged tangent) B at y. Collective.
+  void mean_contact(Vec y, std::vector<double>& K, std::vector<double>& C);
+  std::unique_ptr<solve::Preconditioner> preconditioner() override;
+  /// The laws start their march from the static state at y. Collective.
+  void settle(Vec y) { residual_.settle(coefficients(y)); }
   std::vector<ContactPeriod> contact_periods(Vec y);
   Exponents exponents(Vec y) { return motion(scalars(y)).exponents; }
 
@@ -54,12 +69,14 @@ class HarmonicProblem : public solve::Problem {
   void linearise(Vec y);
   void unpack(Vec y);
   void column(int j, double* v);
+  void add_mean(Vec per_dof, Vec blocks);
+  double dload(int j) const { return motion_.dload.empty() ? 0 : motion_.dload[j]; }
 
   Residual residual_;
   int scalars_;
   PetscInt dof_, local_block_;
   double stiffness_;
-  VecHandle q_, Q_, dQ_, R_, dR_, excitation_, last_;
+  VecHandle q_, Q_, dQ_, R_, dR_, excitation_, static_, static_load_, last_;
   bool linearised_ = false;
   std::vector<double> z_;
   ScaledMotion motion_;

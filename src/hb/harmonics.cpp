@@ -11,14 +11,15 @@ Harmonics::Harmonics(std::vector<int> orders, int samples) : orders_(std::move(o
   const bool ascending =
       std::adjacent_find(orders_.begin(), orders_.end(), std::greater_equal<int>()) == orders_.end();
   const auto one = std::find(orders_.begin(), orders_.end(), 1);
-  if (!ascending || one == orders_.end() || orders_.front() < 0)
+  const bool statics = orders_ == std::vector<int>{0};
+  if (!ascending || orders_.empty() || (one == orders_.end() && !statics) || orders_.front() < 0)
     throw InputError("retained harmonics are not usable", std::to_string(orders_.size()) + " orders",
                      "ascending orders >= 0, each once, with 1 among them", "give for example 0, 1, 2, 3");
   if (samples_ < 2 * highest() + 2 || samples_ % 2)
     throw InputError("too few time samples, or an odd number of them", std::to_string(samples_),
                      "an even number >= " + std::to_string(2 * highest() + 2),
                      "give samples = a power of two above 4 H");
-  fundamental_ = int(one - orders_.begin());
+  if (!statics) fundamental_ = int(one - orders_.begin());
   for (int n : orders_) {
     offsets_.push_back(block_size_);
     block_size_ += n ? 2 : 1;

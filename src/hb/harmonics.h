@@ -15,7 +15,8 @@ using complex = std::complex<double>;
 /// A dof's coefficients stand together as a block [Q0, Qc1, Qs1, ...] restricted to the retained set.
 class Harmonics {
  public:
-  /// Retained orders, ascending, each once, with 1 among them; samples >= 2 max + 2, even.
+  /// Retained orders, ascending, each once, with 1 among them (or 0 alone: statics); samples >= 2 max + 2,
+  /// even.
   Harmonics(std::vector<int> orders, int samples);
   std::vector<int> const& orders() const { return orders_; }
   int count() const { return int(orders_.size()); }
@@ -25,6 +26,7 @@ class Harmonics {
   /// Place of the cosine (or mean) coefficient of the i-th retained order in the block; the sine stands
   /// behind it.
   int offset(int i) const { return offsets_[i]; }
+  /// Place of order 1 among the orders; -1 in statics.
   int fundamental() const { return fundamental_; }
   /// Only odd orders: half-wave symmetric motion, x(t + T/2) = -x(t).
   bool odd_only() const;

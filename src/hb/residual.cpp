@@ -5,13 +5,20 @@ namespace fretwave::hb {
 Residual::Residual(model::Model const& model, Harmonics const& h)
     : model_(model), harmonics_(h), stiffness_(model, h), Q_(vector()) {
   for (auto const& contact : model.contacts()) {
-    groups_.push_back(
-        {.contact = &contact, .B = {}, .aft = Aft(h, contact.law), .U = {}, .F = {}, .dV = {}, .places = {}});
+    groups_.push_back({.contact = &contact,
+                       .B = {},
+                       .aft = Aft(h, contact.law),
+                       .U = {},
+                       .F = {},
+                       .dV = {},
+                       .places = {},
+                       .weights = {}});
     Group& group = groups_.back();
     check(MatCreateMAIJ(contact.B, h.block_size(), group.B.out()));
     group.U = make_vector(model.comm(), group.aft.columns() * h.block_size());
     group.F = like(group.U);
     group.dV.resize(size_t(group.aft.columns()) * h.block_size());
+    find_weights(group);
   }
 }
 
@@ -55,33 +62,58 @@ void Residual::contact_product(Group& group, Vec dQ, Exponents const* de, Vec dR
   check(MatMultTransposeAdd(group.B, dF, dR, dR));
 }
 
-void Residual::contact_pattern(Group& group, std::vector<PetscInt>& rows, std::vector<PetscInt>& cols) {
-  const PetscInt m = harmonics_.block_size();
+/// Entries of this rank's rows of B.
+void Residual::find_weights(Group& group) {
   const int d = group.contact->law->components();
   PetscInt begin;
   check(MatGetOwnershipRange(group.contact->B, &begin, nullptr));
-  for (int pair = 0; pair < group.contact->law->pairs(); ++pair) {
-    struct Weight {
-      int component;
-      PetscInt dof;
-      double value;
-    };
-    std::vector<Weight> weights;
-    for (int c = 0; c < d; ++c) {
-      PetscInt n;
-      PetscInt const* js;
-      PetscScalar const* vals;
-      check(MatGetRow(group.contact->B, begin + pair * d + c, &n, &js, &vals));
-      for (PetscInt k = 0; k < n; ++k) weights.push_back({c, js[k], vals[k]});
-      check(MatRestoreRow(group.contact->B, begin + pair * d + c, &n, &js, &vals));
-    }
-    for (auto const& a : weights)
-      for (auto const& b : weights) {
-        group.places.push_back({pair, a.component, b.component, a.value * b.value});
+  for (int row = 0; row < group.aft.columns(); ++row) {
+    PetscInt n;
+    PetscInt const* dofs;
+    PetscScalar const* values;
+    check(MatGetRow(group.contact->B, begin + row, &n, &dofs, &values));
+    for (PetscInt k = 0; k < n; ++k) group.weights.push_back({row / d, row % d, dofs[k], values[k]});
+    check(MatRestoreRow(group.contact->B, begin + row, &n, &dofs, &values));
+  }
+}
+
+void Residual::contact_pattern(Group& group, std::vector<PetscInt>& rows, std::vector<PetscInt>& cols) {
+  const PetscInt m = harmonics_.block_size();
+  auto const& weights = group.weights;
+  for (size_t first = 0, last = 0; first < weights.size(); first = last) {
+    while (last < weights.size() && weights[last].pair == weights[first].pair) ++last;
+    for (size_t a = first; a < last; ++a)
+      for (size_t b = first; b < last; ++b) {
+        group.places.push_back({weights[a].pair, weights[a].component, weights[b].component,
+                                weights[a].value * weights[b].value});
         for (PetscInt i = 0; i < m; ++i)
-          for (PetscInt j = 0; j < m; ++j) rows.push_back(a.dof * m + i), cols.push_back(b.dof * m + j);
+          for (PetscInt j = 0; j < m; ++j)
+            rows.push_back(weights[a].dof * m + i), cols.push_back(weights[b].dof * m + j);
       }
   }
+}
+
+void Residual::mean_contact(std::vector<double>& K, std::vector<double>& C) {
+  const size_t n = size_t(model_.dofs());
+  K.assign(n * n, 0.0), C.assign(n * n, 0.0);
+  std::vector<double> df_du, df_dv;
+  for (Group& group : groups_) {
+    group.aft.mean_tangent(df_du, df_dv);
+    const size_t d = group.contact->law->components(), pairs = group.contact->law->pairs();
+    auto const& weights = group.weights;
+    for (size_t first = 0, last = 0; first < weights.size(); first = last) {
+      while (last < weights.size() && weights[last].pair == weights[first].pair) ++last;
+      for (size_t a = first; a < last; ++a)
+        for (size_t b = first; b < last; ++b) {
+          const size_t tangent = (weights[a].component * d + weights[b].component) * pairs + weights[a].pair;
+          const size_t entry = size_t(weights[b].dof) * n + weights[a].dof;
+          const double weight = weights[a].value * weights[b].value;
+          K[entry] += weight * df_du[tangent], C[entry] += weight * df_dv[tangent];
+        }
+    }
+  }
+  MPI_Allreduce(MPI_IN_PLACE, K.data(), int(K.size()), MPI_DOUBLE, MPI_SUM, model_.comm());
+  MPI_Allreduce(MPI_IN_PLACE, C.data(), int(C.size()), MPI_DOUBLE, MPI_SUM, model_.comm());
 }
 
 void Residual::pattern(std::vector<PetscInt>& rows, std::vector<PetscInt>& cols) {
@@ -124,6 +156,19 @@ ContactSummary Residual::summarise(Vec Q, Exponents const& e) {
   }
   MPI_Allreduce(MPI_IN_PLACE, sums, 8, MPI_DOUBLE, MPI_SUM, model_.comm());
   return {sums[0], sums[1], sums[2], sums[3], sums[4], sums[5], sums[6], sums[7]};
+}
+
+void Residual::settle(Vec Q) {
+  for (Group& group : groups_) {
+    contact::Law& law = *group.contact->law;
+    const int d = law.components(), n = law.pairs();
+    VecHandle U = relative_motion(group, Q);
+    ReadArray blocks(U);
+    std::vector<double> u(size_t(d) * n);
+    for (int i = 0; i < n; ++i)
+      for (int c = 0; c < d; ++c) u[size_t(c) * n + i] = blocks[(i * d + c) * harmonics_.block_size()];
+    law.rest(u.data());
+  }
 }
 
 std::vector<ContactPeriod> Residual::periods(Vec Q, Exponents const& e) {

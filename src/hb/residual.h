@@ -25,8 +25,15 @@ class Residual {
   void pattern(std::vector<PetscInt>& rows, std::vector<PetscInt>& cols);
   double* values(double scale, double* v);
 
+  DynamicStiffness const& stiffness() const { return stiffness_; }
+  /// B^T (mean tangent) B at the last evaluated point, dense n_dof x n_dof, whole on every rank: stiffness
+  /// and damping. Collective.
+  void mean_contact(std::vector<double>& K, std::vector<double>& C);
+
   /// Contact of the motion (Q, e), summed over all ranks and contacts. Collective.
   ContactSummary summarise(Vec Q, Exponents const& e);
+  /// The laws take the mean relative displacement of Q as their rest state. Collective.
+  void settle(Vec Q);
   /// This rank's contact samples, one per contact.
   std::vector<ContactPeriod> periods(Vec Q, Exponents const& e);
 
@@ -37,14 +44,21 @@ class Residual {
     Aft aft;
     VecHandle U, F;
     std::vector<double> dV;
+    struct Weight {
+      int pair, component;
+      PetscInt dof;
+      double value;
+    };
     struct Place {
       int pair, row, col;
       double value;
     };
     std::vector<Place> places;
+    std::vector<Weight> weights;
   };
   VecHandle relative_motion(Group&, Vec Q) const;
   void contact_product(Group&, Vec dQ, Exponents const* de, Vec dR);
+  void find_weights(Group&);
   void contact_pattern(Group&, std::vector<PetscInt>& rows, std::vector<PetscInt>& cols);
 
   model::Model const& model_;

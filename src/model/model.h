@@ -22,7 +22,7 @@ struct Term {
 struct Contact {
   std::string name;
   MatHandle B;
-  std::shared_ptr<contact::Law const> law;
+  std::shared_ptr<contact::Law> law;
 };
 
 /// M x'' + C x' + K x + B^T f(B x, B x') = 0, distributed over `comm`.

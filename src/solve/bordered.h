@@ -12,6 +12,7 @@ class Bordered {
   Problem& problem() const { return problem_; }
   /// The closing row; the vector is copied.
   void close(Vec row, double value);
+  Vec row() const { return row_; }
   void residual(Vec y, Vec g);
   void product(Vec y, Vec dy, Vec dg);
   /// Matrix for the direct route: dense on one rank when small (LAPACK pivots, no symbolic cost), AIJ

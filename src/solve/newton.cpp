@@ -1,40 +1,76 @@
 #include "solve/newton.h"
 
+#include "error.h"
+
 namespace fretwave::solve {
 
 namespace {
-constexpr PetscInt redundant_limit = 2000;
+
+constexpr PetscInt redundant_limit = 2000;  // unknowns: below, every rank factorises the whole matrix
+constexpr PetscInt krylov_limit =
+    1500;                     // unknowns: above, the Krylov route where the problem has a preconditioner
+constexpr int patience = 25;  // Krylov iterations of one step that make the preconditioner stale
+
+/// Runs a callback's body; PETSc must not see a C++ exception.
+template <class Body>
+PetscErrorCode guarded(std::exception_ptr& exception, Body body) {
+  try {
+    body();
+  } catch (...) {
+    exception = std::current_exception();
+    return PETSC_ERR_USER;
+  }
+  return PetscErrorCode(0);
 }
+
+}  // namespace
 
 Newton::Newton(Problem& problem, std::string const& prefix) : bordered_(problem) {
   VecHandle y = problem.unknowns();
   right_side_ = like(y);
-  J_ = bordered_.matrix();
+  point_ = like(y);
   check(SNESCreate(problem.comm(), snes_.out()));
   check(SNESSetOptionsPrefix(snes_, prefix.c_str()));
   check(SNESSetFunction(snes_, nullptr, form_function, this));
+  // The residual is dimensionless (DESIGN fact 4), so one absolute tolerance serves every case.
+  check(SNESSetTolerances(snes_, 1e-10, 1e-50, 0, 25, 1000));
+  choose_route(prefix);
+  preconditioner_ ? use_krylov() : use_direct();
   check(SNESSetJacobian(snes_, J_, J_, form_jacobian, this));
   check(SNESSetSolution(snes_, y));
-  defaults();
   check(SNESSetFromOptions(snes_));
 }
 
-/// The residual is dimensionless (DESIGN fact 4), so one absolute tolerance serves every case.
-void Newton::defaults() {
+void Newton::choose_route(std::string const& prefix) {
+  PetscInt unknowns;
+  char given[32] = "";
+  PetscBool set;
+  check(VecGetSize(point_, &unknowns));
+  check(PetscOptionsGetString(nullptr, prefix.c_str(), "-route", given, sizeof given, &set));
+  const std::string wish = set ? given : "auto";
+  if (wish != "auto" && wish != "direct" && wish != "krylov")
+    throw InputError("unknown route of the corrector", wish, "auto, direct or krylov",
+                     "give -route krylov, or leave it out");
+  if (wish == "krylov" || (wish == "auto" && unknowns > krylov_limit))
+    preconditioner_ = bordered_.problem().preconditioner();
+  route_ = std::string(preconditioner_ ? "krylov" : "direct") + " (" +
+           (set ? "asked for" : std::to_string(unknowns) + " unknowns") + ")";
+}
+
+void Newton::use_direct() {
   KSP ksp;
   PC pc;
   PetscBool dense;
-  check(SNESSetTolerances(snes_, 1e-10, 1e-50, 0, 25, 1000));
+  PetscInt rows;
+  J_ = bordered_.matrix();
   check(SNESGetKSP(snes_, &ksp));
   check(KSPSetType(ksp, KSPPREONLY));
   check(KSPGetPC(ksp, &pc));
   check(PCSetType(pc, PCLU));
   check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(Mat(J_)), MATSEQDENSE, &dense));
   if (dense) return;
-  PetscInt rows;
   check(MatGetSize(J_, &rows, nullptr));
   if (comm_size(bordered_.problem().comm()) > 1 && rows <= redundant_limit) {
-    // too small to share: every rank factorises the whole matrix
     check(PCSetType(pc, PCREDUNDANT));
     check(PCRedundantGetKSP(pc, &ksp));
     check(KSPGetPC(ksp, &pc));
@@ -45,26 +81,61 @@ void Newton::defaults() {
   check(PCFactorSetMatSolverType(pc, MATSOLVERMUMPS));
 }
 
-PetscErrorCode Newton::form_function(SNES, Vec y, Vec g, void* context) {
-  auto& newton = *static_cast<Newton*>(context);
-  try {
-    newton.bordered_.residual(y, g);
-  } catch (...) {
-    newton.exception_ = std::current_exception();
-    return PETSC_ERR_USER;
-  }
-  return PetscErrorCode(0);
+void Newton::use_krylov() {
+  KSP ksp;
+  PC pc;
+  const PetscInt local = local_size(point_);
+  check(MatCreateShell(bordered_.problem().comm(), local, local, PETSC_DETERMINE, PETSC_DETERMINE, this,
+                       J_.out()));
+  check(MatShellSetOperation(J_, MATOP_MULT, reinterpret_cast<void (*)(void)>(shell_product)));
+  check(SNESGetKSP(snes_, &ksp));
+  check(KSPSetType(ksp, KSPFGMRES));
+  check(KSPGMRESSetRestart(ksp, 100));
+  check(KSPSetTolerances(ksp, 1e-6, 1e-13, PETSC_DEFAULT, 200));
+  check(KSPGetPC(ksp, &pc));
+  check(PCSetType(pc, PCSHELL));
+  check(PCShellSetContext(pc, this));
+  check(PCShellSetApply(pc, shell_precondition));
 }
 
-PetscErrorCode Newton::form_jacobian(SNES, Vec y, Mat, Mat J, void* context) {
+PetscErrorCode Newton::form_function(SNES, Vec y, Vec g, void* context) {
   auto& newton = *static_cast<Newton*>(context);
-  try {
-    newton.bordered_.assemble(y, J);
-  } catch (...) {
-    newton.exception_ = std::current_exception();
-    return PETSC_ERR_USER;
+  return guarded(newton.exception_, [&] { newton.bordered_.residual(y, g); });
+}
+
+PetscErrorCode Newton::form_jacobian(SNES, Vec y, Mat, Mat, void* context) {
+  auto& newton = *static_cast<Newton*>(context);
+  return guarded(newton.exception_, [&] { newton.linearise(y); });
+}
+
+PetscErrorCode Newton::shell_product(Mat J, Vec x, Vec y) {
+  Newton* newton;
+  PetscErrorCode code = MatShellGetContext(J, &newton);
+  if (code) return code;
+  return guarded(newton->exception_, [&] { newton->bordered_.product(newton->point_, x, y); });
+}
+
+PetscErrorCode Newton::shell_precondition(PC pc, Vec x, Vec y) {
+  Newton* newton;
+  PetscErrorCode code = PCShellGetContext(pc, &newton);
+  if (code) return code;
+  return guarded(newton->exception_, [&] { newton->preconditioner_->apply(x, y); });
+}
+
+void Newton::linearise(Vec y) {
+  if (!preconditioner_) return bordered_.assemble(y, J_);
+  PetscInt before = 0;
+  KSP ksp;
+  check(SNESGetKSP(snes_, &ksp));
+  check(KSPGetIterationNumber(ksp, &before));
+  check(VecCopy(y, point_));
+  if (stale_ || before > patience) {
+    preconditioner_->build(point_, bordered_.row());
+    stale_ = false;
+    ++builds_;
   }
-  return PetscErrorCode(0);
+  check(MatAssemblyBegin(J_, MAT_FINAL_ASSEMBLY));
+  check(MatAssemblyEnd(J_, MAT_FINAL_ASSEMBLY));
 }
 
 Outcome Newton::solve(Vec y) {
@@ -81,18 +152,21 @@ Outcome Newton::solve(Vec y) {
   check(SNESGetIterationNumber(snes_, &newton));
   check(SNESGetLinearSolveIterations(snes_, &linear));
   check(SNESGetFunctionNorm(snes_, &norm));
+  if (reason < 0) stale_ = true;
   return {reason > 0, int(newton), int(linear), norm, text};
 }
 
 bool Newton::tangent(Vec y, Vec t) {
-  bordered_.assemble(y, J_);
+  linearise(y);
   check(VecSet(right_side_, 0));
   set_last_entry(right_side_, 1);
   KSP ksp;
   KSPConvergedReason reason;
   check(SNESGetKSP(snes_, &ksp));
   check(KSPSetOperators(ksp, J_, J_));
-  check(KSPSolve(ksp, right_side_, t));
+  const PetscErrorCode code = KSPSolve(ksp, right_side_, t);
+  if (exception_) std::rethrow_exception(exception_);
+  check(code);
   check(KSPGetConvergedReason(ksp, &reason));
   return reason > 0;
 }

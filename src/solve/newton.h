@@ -13,13 +13,17 @@ struct Outcome {
   std::string reason;  ///< PETSc's converged or diverged reason
 };
 
-/// SNES on a bordered problem. PETSc options apply under the prefix; ours are only its defaults.
+/// SNES on a bordered problem. Two routes to the same corrector (DESIGN section 4), chosen by size or by
+/// -<prefix>route: direct (assembled, LU) and krylov (matrix-free product, the problem's own preconditioner,
+/// rebuilt when iterations rise). PETSc options apply under the prefix; ours are only its defaults.
 class Newton {
  public:
   Newton(Problem&, std::string const& prefix);
   Newton(Newton const&) = delete;
   Bordered& system() { return bordered_; }
   SNES snes() const { return snes_; }
+  /// "direct" or "krylov", with the reason of the choice.
+  std::string const& route() const { return route_; }
   /// Solves from y, in place; y is the last iterate when it does not converge. Collective.
   Outcome solve(Vec y);
   /// Tangent at y: J t = 0, row . t = 1 with the closing row. Collective.
@@ -28,12 +32,21 @@ class Newton {
  private:
   static PetscErrorCode form_function(SNES, Vec, Vec, void*);
   static PetscErrorCode form_jacobian(SNES, Vec, Mat, Mat, void*);
-  void defaults();
+  static PetscErrorCode shell_product(Mat, Vec, Vec);
+  static PetscErrorCode shell_precondition(PC, Vec, Vec);
+  void choose_route(std::string const& prefix);
+  void use_direct();
+  void use_krylov();
+  void linearise(Vec y);
 
   Bordered bordered_;
   MatHandle J_;
   SnesHandle snes_;
-  VecHandle right_side_;
+  VecHandle right_side_, point_;
+  std::unique_ptr<Preconditioner> preconditioner_;
+  bool stale_ = true;
+  int builds_ = 0;
+  std::string route_;
   std::exception_ptr exception_;
 };
 

@@ -1,9 +1,10 @@
 #pragma once
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
 
-#include "petsc.h"
+#include "solve/preconditioner.h"
 
 /// Newton and continuation; knows neither harmonics nor contact.
 namespace fretwave::solve {
@@ -33,6 +34,9 @@ class Problem {
   /// repeat: values add).
   virtual void pattern(std::vector<PetscInt>& rows, std::vector<PetscInt>& cols) = 0;
   virtual void values(Vec y, std::span<double> v) = 0;
+
+  /// For the Krylov route; none: the direct route only.
+  virtual std::unique_ptr<Preconditioner> preconditioner() { return nullptr; }
 
   /// Diagonal weights of the arclength's inner product at y.
   virtual void metric(Vec y, Vec weights) = 0;

@@ -1,0 +1,38 @@
+#pragma once
+#include "contact/registry.h"
+
+namespace fretwave::contact {
+
+/// Parameters of the 3-D law, one value per pair.
+struct Coulomb3dParameters {
+  std::vector<double> normal_stiffness, tangential_stiffness, friction_coefficient, normal_load, gap;
+};
+
+/// Elastic Coulomb contact in three dimensions: components (normal, tangent, tangent), u_n > 0 closes.
+///   N = max(0, N0 + kn (u_n - gap)),  T = kt (u_t - w),  |T| <= mu N,  T = w' free when open.
+/// Circular slip limit over both tangents, or each tangent limited by itself (Coupled = false), as some other
+/// codes do.
+template <bool Coupled>
+class Coulomb3d : public Law {
+ public:
+  explicit Coulomb3d(Coulomb3dParameters);
+  int components() const override { return 3; }
+  int pairs() const override { return int(p_.gap.size()); }
+  bool uses_velocity() const override { return false; }
+  bool hereditary() const override { return true; }
+  void rest(double const* u) override;
+  double stuck_stiffness(int component, int pair) const override;
+  void force(Motion const&, double* f, Record&) const override;
+  void product(Motion const&, Record const&, double const* du, double const* dv, double* df) const override;
+  void mean_tangent(Motion const&, Record const&, double* df_du, double* df_dv) const override;
+  void diagnose(Motion const&, double const* f, Diagnosis&) const override;
+
+ private:
+  Coulomb3dParameters p_;
+  std::vector<double> slider_, closed_;  ///< at rest: w (2 x pairs), 1 where closed
+};
+
+Entry coulomb_3d_entry();
+Entry coulomb_3d_uncoupled_entry();
+
+}  // namespace fretwave::contact

@@ -1,0 +1,29 @@
+#pragma once
+#include "contact/registry.h"
+
+namespace fretwave::contact {
+
+/// Elastic Coulomb slider with constant normal load (Jenkins element): f = kt (u - w), |f| <= R, the slider w
+/// moves when it slips.
+class Jenkins : public Law {
+ public:
+  Jenkins(std::vector<double> stiffness, std::vector<double> friction_limit);
+  int components() const override { return 1; }
+  int pairs() const override { return int(stiffness_.size()); }
+  bool uses_velocity() const override { return false; }
+  bool hereditary() const override { return true; }
+  void rest(double const* u) override;
+  bool odd() const override;
+  double stuck_stiffness(int, int pair) const override { return stiffness_[pair]; }
+  void force(Motion const&, double* f, Record&) const override;
+  void product(Motion const&, Record const&, double const* du, double const* dv, double* df) const override;
+  void mean_tangent(Motion const&, Record const&, double* df_du, double* df_dv) const override;
+  void diagnose(Motion const&, double const* f, Diagnosis&) const override;
+
+ private:
+  std::vector<double> stiffness_, limit_, slider_;  ///< slider_: w at rest
+};
+
+Entry jenkins_entry();
+
+}  // namespace fretwave::contact

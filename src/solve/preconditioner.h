@@ -1,0 +1,15 @@
+#pragma once
+#include "petsc.h"
+
+namespace fretwave::solve {
+
+/// Approximate inverse of a bordered system, for the Krylov route.
+class Preconditioner {
+ public:
+  virtual ~Preconditioner() = default;
+  /// Factorise at y with the closing row. Collective.
+  virtual void build(Vec y, Vec row) = 0;
+  virtual void apply(Vec x, Vec z) = 0;
+};
+
+}  // namespace fretwave::solve
