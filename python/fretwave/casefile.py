@@ -14,7 +14,7 @@ import scipy.sparse
 from . import checks, matrices
 from .contacts import ContactSpec, read_contacts
 from .errors import CaseErrors, FretwaveError, InputError
-from .schema import AnalysisSection, ModelSection
+from .schema import AnalysisSection, ModelSection, StudySection
 from .source import Source
 from .validation import toml, validate
 
@@ -38,6 +38,8 @@ class Case:
         What a user should know although nothing is wrong.
     has_quick : bool
         The case has a short form.
+    study : StudySection
+        What ``fretwave study`` sweeps.
     """
 
     path: Path
@@ -52,6 +54,7 @@ class Case:
     resolved: dict[str, Any]
     notes: list[str] = field(default_factory=list)
     has_quick: bool = False
+    study: StudySection = field(default_factory=StudySection)
 
     @property
     def name(self) -> str:
@@ -141,11 +144,16 @@ def _build(source: Source, laws: Mapping[str, Any], found: list[FretwaveError]) 
     loaded = _load_matrices(section, source, found) if section else {}
     dofs = _dof_names(section, loaded, source, found) if section else None
     contacts = read_contacts(source, dofs, laws, found)
+    study = (
+        validate(StudySection, source, ("study",), found)
+        if isinstance(source.data.get("study"), dict)
+        else StudySection()
+    )
     checks.check_analyses(source, analyses, dofs, found)
     notes: list[str] = []
     if dofs is not None:
         _check_physics(loaded, dofs, contacts, notes, found)
-    if found or section is None or dofs is None:
+    if found or section is None or dofs is None or study is None:
         return None
     return Case(
         path=source.path,
@@ -160,6 +168,7 @@ def _build(source: Source, laws: Mapping[str, Any], found: list[FretwaveError]) 
         resolved=_resolve(dofs, loaded, section, contacts, analyses),
         notes=notes,
         has_quick="quick" in source.data,
+        study=study,
     )
 
 

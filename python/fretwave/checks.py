@@ -42,8 +42,14 @@ def check_top_level(source: Source, found: Found) -> None:
     for key in source.data:
         if key not in TOP_LEVEL:
             found.append(unknown_key(source, (key,), list(TOP_LEVEL)))
-    shapes = {"model": dict, "contact": list, "analysis": list, "quick": dict, "title": str}
-    writing = {"model": "[model]", "contact": "[[contact]]", "analysis": "[[analysis]]", "quick": "[quick]"}
+    shapes = {"model": dict, "contact": list, "analysis": list, "quick": dict, "study": dict, "title": str}
+    writing = {
+        "model": "[model]",
+        "contact": "[[contact]]",
+        "analysis": "[[analysis]]",
+        "quick": "[quick]",
+        "study": "[study]",
+    }
     for key, shape in shapes.items():
         value = source.data.get(key)
         bad = value is not None and not isinstance(value, shape)

@@ -7,7 +7,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from .schema import ANALYSES, AnalysisSection, ContactSection, Damper, ModelSection, StepSection
+from .schema import ANALYSES, AnalysisSection, ContactSection, Damper, ModelSection, StepSection, StudySection
 from .validation import describe
 
 
@@ -24,7 +24,7 @@ def key_lines() -> Iterator[str]:
     for kind, analysis in ANALYSES.items():
         yield f'[[analysis]] with type = "{kind}"'
         yield from _section(analysis, without=set(AnalysisSection.model_fields))
-    for title, nested in (("step = { ... }", StepSection), ("dampers = [{ ... }]", Damper)):
+    for title, nested in (("step = { ... }", StepSection), ("dampers = [{ ... }]", Damper), ("[study]", StudySection)):
         yield title
         yield from _section(nested)
 

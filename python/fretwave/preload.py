@@ -13,7 +13,7 @@ from .continuation import Continuation, StepControl
 from .errors import NotConverged
 from .model import Model
 from .modes import LinearMode
-from .problems import Harmonics, HarmonicProblem
+from .problems import HarmonicProblem, Harmonics
 
 Array = npt.NDArray[np.float64]
 
@@ -70,7 +70,9 @@ def balanced(model: Model, reference: LinearMode) -> Preload:
 
 
 def static_preload(model: Model, load: Array, reference: LinearMode, steps: StepControl | None = None) -> Preload:
-    """Static equilibrium under `load` and the normal loads given pair by pair, by continuation in the load factor. Collective.
+    """Static equilibrium under `load` and the normal loads given pair by pair. Collective.
+
+    By continuation in the load factor.
 
     Raises
     ------
@@ -79,7 +81,9 @@ def static_preload(model: Model, load: Array, reference: LinearMode, steps: Step
     """
     rest = balanced(model, reference)
     problem = StaticPreload(model, np.asarray(load, dtype=float), reference, rest.load)
-    branch = Continuation(problem, problem.core.initial(), (-1.0, 1.0), steps or StepControl(initial=0.1, maximum=0.5), upwards=True)
+    branch = Continuation(
+        problem, problem.core.initial(), (-1.0, 1.0), steps or StepControl(initial=0.1, maximum=0.5), upwards=True
+    )
     reached = 0.0
     for point in branch:
         y, reached = point.y, point.parameter

@@ -64,7 +64,10 @@ class HarmonicProblem:
         self.model, self.harmonics, self.prefix, self.core = model, harmonics, prefix, core
 
     def preload(self, displacement: Array, load: Array) -> None:
-        """Dynamics about a static state (n_dof,) under the static load it balances; harmonic 0 is retained then. Collective."""
+        """Dynamics about a static state (n_dof,) under the static load it balances. Collective.
+
+        Harmonic 0 must be retained.
+        """
         self.core.preload(self.model.vector(displacement), self.model.vector(load))
 
     def residual(self, y: PETSc.Vec) -> PETSc.Vec:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 from collections.abc import Callable, Mapping, Sequence
 from inspect import signature
 from pathlib import Path
@@ -310,12 +311,11 @@ def _copy_without(path: Path, name: str) -> Any:
         old = open_results(path, "r+" if large else "r")
         if large and name not in old:
             return old
-        fresh = h5py.File(_temporary(path), "w")
-        for other in old:
-            if other != name:
-                old.copy(other, fresh)
-        fresh.attrs.update(old.attrs)
         old.close()
+        shutil.copyfile(path, _temporary(path))  # group by group would lose the dimension scales
+        fresh = open_results(_temporary(path), "r+")
+        if name in fresh:
+            del fresh[name]
         return fresh
     return h5py.File(_temporary(path), "w")
 

@@ -142,7 +142,7 @@ class TransientSection(AnalysisSection):
     amplitude: list[Positive] = key("start amplitudes", "m", "[0.05, 0.3, 2.5]", min_length=1)
     periods: int = key("vibration periods to integrate", example="30", ge=1)
     samples_per_period: int = key("output samples of a period", example="64", default=64, ge=8)
-    tolerance: Positive = key("relative tolerance of the time integration", "-", "1e-8", default=1e-8, lt=1)
+    tolerance: Positive = key("relative tolerance of the time integration", "-", "1e-10", default=1e-10, lt=1)
 
 
 class FreeDecayAnalysis(TransientSection):
@@ -164,6 +164,19 @@ ANALYSES: dict[str, type[AnalysisSection]] = {
     "limit_cycle": LimitCycleAnalysis,
 }
 
+
+class StudySection(Section):
+    """``[study]``: sweeps of ``fretwave study``, each with the others at their finest."""
+
+    harmonics: Optional[list[int]] = key("highest harmonics", example="[1, 3, 7, 21, 41]", default=None, min_length=2)
+    samples: Optional[list[int]] = key(
+        "time samples of a period", example="[128, 512, 2048]", default=None, min_length=2
+    )
+    tolerance: Optional[list[Positive]] = key(
+        "residual norms at which Newton stops", "-", "[1e-4, 1e-7, 1e-10]", default=None, min_length=2
+    )
+
+
 #: Top-level keys; analyses cannot bear these names, or ``--set`` could not tell them apart.
 TOP_LEVEL = {
     "title": "one line that says what the case is",
@@ -171,4 +184,5 @@ TOP_LEVEL = {
     "contact": "contact pairs that share a law ([[contact]], any number)",
     "analysis": "what to compute ([[analysis]], at least one)",
     "quick": "overrides used by --quick, addressed as --set does",
+    "study": "what fretwave study sweeps",
 }

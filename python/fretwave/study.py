@@ -183,10 +183,9 @@ def _analysis(case: Case, name: str | None) -> ModeAnalysis:
 
 def _plan(case: Case, options: argparse.Namespace) -> Plan:
     """Sweeps of the command line, else of the case's table [study], else the defaults."""
-    table = getattr(case, "study", None)
     plan = Plan()
     for name in ("harmonics", "samples", "tolerance"):
-        values = getattr(options, name) or getattr(table, name, None)
+        values = getattr(options, name) or getattr(case.study, name)
         plan = replace(plan, **{name: tuple(values)}) if values else plan
     return plan
 
