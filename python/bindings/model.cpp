@@ -2,8 +2,58 @@
 
 #include "casters.h"
 #include "model/modes.h"
+#include "model/reduction.h"
 
 namespace fretwave::python {
+
+namespace {
+
+using Rows = nb::ndarray<double const, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+
+/// Column by column in C++, row by row in numpy.
+nb::object square(std::vector<double> const& A, size_t n) {
+  if (A.empty()) return nb::none();
+  return nb::cast(numpy_copy(A.data(), {n, n})).attr("T");
+}
+
+std::span<double const> entries(Rows const& rows, PetscInt expected) {
+  if (rows.shape(0) != size_t(expected)) throw nb::value_error("an array has the wrong number of rows");
+  return {rows.data(), rows.size()};
+}
+
+void bind_reduction(nb::module_& m) {
+  using model::Reduction;
+  nb::class_<Reduction>(m, "Reduction")
+      .def("__init__",
+           [](Reduction* self, Petsc<Mat> K, Petsc<Mat> M, std::optional<Petsc<Mat>> C, std::vector<PetscInt> kept,
+              PetscInt count, double highest_omega) {
+             new (self) Reduction(K.object, M.object, C ? C->object : nullptr, std::move(kept), {count, highest_omega});
+           })
+      .def_prop_ro("K", [](Reduction const& r) { return square(r.K(), size_t(r.size())); })
+      .def_prop_ro("M", [](Reduction const& r) { return square(r.M(), size_t(r.size())); })
+      .def_prop_ro("C", [](Reduction const& r) { return square(r.C(), size_t(r.size())); })
+      .def_prop_ro("component_omega", &Reduction::component_omega)
+      .def_prop_ro("times",
+                   [](Reduction const& r) {
+                     nb::dict out;
+                     out["factorisation"] = r.times().factorisation;
+                     out["constraint_modes"] = r.times().constraint_modes;
+                     out["component_modes"] = r.times().component_modes;
+                     out["projection"] = r.times().projection;
+                     return out;
+                   })
+      .def("expand",
+           [](Reduction const& r, Rows x) {
+             const auto full = r.expand(entries(x, r.size()), PetscInt(x.shape(1)));
+             return numpy_copy(full.data(), {size_t(r.local_dofs()), x.shape(1)});
+           })
+      .def("project", [](Reduction const& r, Rows f) {
+        const auto reduced = r.project(entries(f, r.local_dofs()), PetscInt(f.shape(1)));
+        return numpy_copy(reduced.data(), {size_t(r.size()), f.shape(1)});
+      });
+}
+
+}  // namespace
 
 void bind_model(nb::module_& m) {
   using model::Model;
@@ -34,6 +84,7 @@ void bind_model(nb::module_& m) {
       out.append(nb::make_tuple(mode.omega, mode.beta, Petsc<Vec>{mode.shape}, Petsc<Vec>{mode.imaginary}));
     return out;
   });
+  bind_reduction(m);
 }
 
 }  // namespace fretwave::python

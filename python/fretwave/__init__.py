@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from .model import Contact, Model
     from .modes import LinearMode, linear_modes
     from .problems import ForcedResponse, Harmonics, NonlinearMode, choose_harmonics
+    from .reduction import FrequencyError, Reduction, reduce
     from .transient import Transient
 
 #: Where each public name lives; loaded when first used, so that `fretwave --help` starts without PETSc.
@@ -22,6 +23,7 @@ _HOMES = {
     "model": ("Contact", "Model"),
     "modes": ("LinearMode", "linear_modes"),
     "problems": ("ForcedResponse", "Harmonics", "NonlinearMode", "choose_harmonics"),
+    "reduction": ("FrequencyError", "Reduction", "reduce"),
     "transient": ("Transient",),
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
@@ -30,6 +32,7 @@ __all__ = [
     "Contact",
     "Continuation",
     "ForcedResponse",
+    "FrequencyError",
     "FretwaveError",
     "Harmonics",
     "InputError",
@@ -41,11 +44,13 @@ __all__ = [
     "ParameterInfo",
     "Point",
     "PythonLaw",
+    "Reduction",
     "StepControl",
     "Transient",
     "choose_harmonics",
     "laws",
     "linear_modes",
+    "reduce",
 ]
 
 

@@ -1,0 +1,44 @@
+#pragma once
+#include <vector>
+
+#include "petsc.h"
+
+namespace fretwave::model {
+
+/// Which component modes to keep: the `count` lowest, or all up to `highest_omega` [rad/s] where that is
+/// positive.
+struct ComponentModes {
+  PetscInt count = 10;
+  double highest_omega = 0;
+};
+
+/// A mode with the kept dofs held: K_ii phi = omega^2 M_ii phi, unit modal mass.
+struct ComponentMode {
+  double omega = 0;
+  VecHandle shape;  ///< over the internal dofs
+};
+
+/// The component with its kept dofs held: K_ii, M_ii and the one factorisation of K_ii.
+class FixedInterface {
+ public:
+  /// Factorises. K and M symmetric; K_ii must be positive definite (InputError otherwise). Collective.
+  FixedInterface(Mat K, Mat M, IS internal);
+  PetscInt dofs() const;
+  PetscInt local_dofs() const;
+  /// X = K_ii^-1 B for dense B. Collective.
+  void solve(Mat B, Mat X) const;
+  /// Lowest modes, ascending; the same on every number of ranks, double modes included. Takes the
+  /// factorisation: no solve after this. Collective.
+  std::vector<ComponentMode> modes(ComponentModes);
+
+ private:
+  PetscInt count_below(double omega) const;
+  std::vector<ComponentMode> krylov_modes(PetscInt count);
+  std::vector<ComponentMode> all_modes() const;
+
+  MPI_Comm comm_ = MPI_COMM_NULL;
+  MatHandle K_, M_;
+  KspHandle ksp_;
+};
+
+}  // namespace fretwave::model

@@ -1,0 +1,194 @@
+#include "model/reduction.h"
+
+#include <petscblaslapack.h>
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include "model/reduction_input.h"
+
+namespace fretwave::model {
+
+namespace {
+
+constexpr PetscInt panel = 64;  // right-hand sides at a time: bounds the memory beside T
+
+struct Columns {
+  double const* data;
+  PetscInt lead;
+};
+
+/// C (m x n) = op(A) op(B) over k, column by column; size = {m, n, k}.
+void multiply(char const* op_a, char const* op_b, std::array<PetscInt, 3> size, Columns A, Columns B,
+              double* C, PetscInt lead) {
+  std::array<PetscBLASInt, 6> n;
+  const PetscInt in[6] = {size[0], size[1], size[2], A.lead, B.lead, lead};
+  for (int i = 0; i < 6; ++i) check(PetscBLASIntCast(i < 3 ? in[i] : std::max<PetscInt>(in[i], 1), &n[i]));
+  const double one = 1, zero = 0;
+  BLASgemm_(op_a, op_b, &n[0], &n[1], &n[2], &one, A.data, &n[3], B.data, &n[4], &zero, C, &n[5]);
+}
+
+void add_over_ranks(MPI_Comm comm, std::vector<double>& values) {
+  MPI_Allreduce(MPI_IN_PLACE, values.data(), int(values.size()), MPI_DOUBLE, MPI_SUM, comm);
+}
+
+/// This rank's rows of a dense matrix, column by column, for the guard's lifetime.
+class DenseArray {
+ public:
+  explicit DenseArray(Mat A) : A_(A) {
+    check(MatDenseGetLDA(A, &lead_));
+    check(MatDenseGetArray(A, &data_));
+  }
+  ~DenseArray() { (void)MatDenseRestoreArray(A_, &data_); }
+  DenseArray(DenseArray const&) = delete;
+  double* column(PetscInt j) const { return data_ + size_t(j) * size_t(lead_); }
+  PetscInt lead() const { return lead_; }
+
+ private:
+  Mat A_;
+  double* data_ = nullptr;
+  PetscInt lead_ = 0;
+};
+
+/// Rows of the internal dofs of a panel.
+void take_rows(Mat from, Mat to, std::vector<PetscInt> const& internal, PetscInt first) {
+  PetscInt columns;
+  check(MatGetSize(from, nullptr, &columns));
+  DenseArray in(from), out(to);
+  for (PetscInt j = 0; j < columns; ++j)
+    for (size_t i = 0; i < internal.size(); ++i) out.column(j)[i] = in.column(j)[internal[i] - first];
+}
+
+/// This rank's dofs that are not kept.
+std::vector<PetscInt> internal_dofs(std::vector<PetscInt> kept, PetscInt first, PetscInt local) {
+  std::sort(kept.begin(), kept.end());
+  std::vector<PetscInt> internal;
+  for (PetscInt dof = first; dof < first + local; ++dof)
+    if (!std::binary_search(kept.begin(), kept.end(), dof)) internal.push_back(dof);
+  return internal;
+}
+
+/// Lower triangle from the upper one.
+void mirror(std::vector<double>& A, size_t n) {
+  for (size_t j = 0; j < n; ++j)
+    for (size_t i = 0; i < j; ++i) A[j + i * n] = A[i + j * n];
+}
+
+/// What the theory says of the modal columns: no stiffness coupling, diag(omega^2), unit modal mass; rounding
+/// removed.
+void impose_modal_block(std::vector<double>& K, std::vector<double>& M, size_t kept,
+                        std::vector<double> const& omega) {
+  const size_t n = kept + omega.size();
+  for (size_t j = kept; j < n; ++j)
+    for (size_t i = 0; i < n; ++i) {
+      const double square = omega[j - kept] * omega[j - kept];
+      K[i + j * n] = K[j + i * n] = i == j ? square : 0;
+      if (i >= kept) M[i + j * n] = i == j;
+    }
+}
+
+}  // namespace
+
+Reduction::Reduction(Mat K, Mat M, Mat C, std::vector<PetscInt> kept, ComponentModes wanted)
+    : kept_(std::move(kept)) {
+  check(PetscObjectGetComm(reinterpret_cast<PetscObject>(K), &comm_));
+  check(MatGetSize(K, &global_, nullptr));
+  check(MatGetLocalSize(K, &local_, nullptr));
+  check(MatGetOwnershipRange(K, &first_, nullptr));
+  check_reduction_input(K, M, C, kept_, wanted);
+
+  double clock = MPI_Wtime();
+  const auto lap = [&clock] { return MPI_Wtime() - std::exchange(clock, MPI_Wtime()); };
+  const auto internal = internal_dofs(kept_, first_, local_);
+  IsHandle set;
+  check(ISCreateGeneral(comm_, PetscInt(internal.size()), internal.data(), PETSC_COPY_VALUES, set.out()));
+  FixedInterface component(K, M, set);
+  times_.factorisation = lap();
+  // the eigensolver takes over the factorisation and frees it at its end: constraint modes come first
+  T_.reserve(size_t(local_) * (kept_.size() + (wanted.highest_omega > 0 ? 0 : size_t(wanted.count))));
+  place_constraint_modes(K, component, internal);
+  times_.constraint_modes = lap();
+  place_component_modes(component.modes(wanted), internal);
+  times_.component_modes = lap();
+  K_ = congruence(K, PetscInt(kept_.size()), true);
+  M_ = congruence(M, size(), true);
+  if (C) C_ = congruence(C, size(), false);
+  impose_modal_block(K_, M_, kept_.size(), component_omega_);
+  times_.projection = lap();
+}
+
+/// Columns of T as a dense matrix, without copy.
+MatHandle Reduction::columns(PetscInt begin, PetscInt end) {
+  MatHandle view;
+  check(MatCreateDense(comm_, local_, PETSC_DECIDE, global_, end - begin, column(begin), view.out()));
+  return view;
+}
+
+void Reduction::place_component_modes(std::vector<ComponentMode> const& modes,
+                                      std::vector<PetscInt> const& internal) {
+  T_.resize(size_t(local_) * (kept_.size() + modes.size()));
+  for (size_t j = 0; j < modes.size(); ++j) {
+    component_omega_.push_back(modes[j].omega);
+    ReadArray shape(modes[j].shape);
+    double* out = column(PetscInt(kept_.size() + j));
+    for (size_t i = 0; i < internal.size(); ++i) out[internal[i] - first_] = shape[PetscInt(i)];
+  }
+}
+
+/// Unit displacement of one kept dof, the others held, and the static response inside: -K_ii^-1 K_ib, panel
+/// by panel.
+void Reduction::place_constraint_modes(Mat K, FixedInterface const& component,
+                                       std::vector<PetscInt> const& internal) {
+  const PetscInt kept = PetscInt(kept_.size());
+  T_.resize(size_t(local_) * kept_.size());
+  for (PetscInt j = 0; j < kept; ++j)
+    if (kept_[j] >= first_ && kept_[j] < first_ + local_) column(j)[kept_[j] - first_] = 1;
+  for (PetscInt begin = 0; begin < kept; begin += panel) {
+    const PetscInt end = std::min(begin + panel, kept);
+    MatHandle forces, B, X;
+    check(MatMatMult(K, columns(begin, end), MAT_INITIAL_MATRIX, PETSC_DEFAULT, forces.out()));
+    check(MatCreateDense(comm_, component.local_dofs(), PETSC_DECIDE, component.dofs(), end - begin, nullptr,
+                         B.out()));
+    check(MatDuplicate(B, MAT_DO_NOT_COPY_VALUES, X.out()));
+    take_rows(forces, B, internal, first_);
+    component.solve(B, X);
+    DenseArray solution(X);
+    for (PetscInt j = begin; j < end; ++j)
+      for (size_t i = 0; i < internal.size(); ++i)
+        column(j)[internal[i] - first_] = -solution.column(j - begin)[i];
+  }
+}
+
+/// T^T A T over the first n columns of T, whole on every rank.
+std::vector<double> Reduction::congruence(Mat A, PetscInt n, bool symmetric) {
+  std::vector<double> out(size_t(size()) * size_t(size()));
+  for (PetscInt begin = 0; begin < n; begin += panel) {
+    const PetscInt end = std::min(begin + panel, n);
+    MatHandle product;
+    check(MatMatMult(A, columns(begin, end), MAT_INITIAL_MATRIX, PETSC_DEFAULT, product.out()));
+    DenseArray AT(product);
+    multiply("T", "N", {symmetric ? end : n, end - begin, local_}, {T_.data(), local_},
+             {AT.column(0), AT.lead()}, out.data() + size_t(begin) * size_t(size()), size());
+  }
+  add_over_ranks(comm_, out);
+  if (symmetric) mirror(out, size_t(size()));
+  return out;
+}
+
+std::vector<double> Reduction::expand(std::span<double const> reduced, PetscInt count) const {
+  std::vector<double> full(size_t(local_) * size_t(count));
+  multiply("N", "T", {count, local_, size()}, {reduced.data(), count}, {T_.data(), local_}, full.data(),
+           count);
+  return full;
+}
+
+std::vector<double> Reduction::project(std::span<double const> forces, PetscInt count) const {
+  std::vector<double> reduced(size_t(size()) * size_t(count));
+  multiply("N", "N", {count, size(), local_}, {forces.data(), count}, {T_.data(), local_}, reduced.data(),
+           count);
+  add_over_ranks(comm_, reduced);
+  return reduced;
+}
+
+}  // namespace fretwave::model
