@@ -25,9 +25,10 @@ void bind_reduction(nb::module_& m) {
   using model::Reduction;
   nb::class_<Reduction>(m, "Reduction")
       .def("__init__",
-           [](Reduction* self, Petsc<Mat> K, Petsc<Mat> M, std::optional<Petsc<Mat>> C, std::vector<PetscInt> kept,
-              PetscInt count, double highest_omega) {
-             new (self) Reduction(K.object, M.object, C ? C->object : nullptr, std::move(kept), {count, highest_omega});
+           [](Reduction* self, Petsc<Mat> K, Petsc<Mat> M, std::optional<Petsc<Mat>> C,
+              std::vector<PetscInt> kept, PetscInt count, double highest_omega) {
+             new (self) Reduction(K.object, M.object, C ? C->object : nullptr, std::move(kept),
+                                  {count, highest_omega});
            })
       .def_prop_ro("K", [](Reduction const& r) { return square(r.K(), size_t(r.size())); })
       .def_prop_ro("M", [](Reduction const& r) { return square(r.M(), size_t(r.size())); })
