@@ -199,7 +199,7 @@ def test_errors_in_references(write) -> None:
         ('backbone = ["mode", "mode_epmc"]', 'backbone = ["mode", "mode_empc"]'),
         ('mode = "flutter"', 'mode = "forced"'),
         ("samples = 1024", "samples = 32"),
-        ("report_at = [0.1, 0.17, 0.5, 2.0]", "report_at = [0.1, 17.0]"),
+        ("report_at = [0.05, 0.13, 0.14, 0.17, 0.25, 0.5, 2.0]", "report_at = [0.1, 17.0]"),
         ('dampers = [{ dof = "m1"', 'dampers = [{ dof = "m9"'),
         ("frequency = [3.2, 4.6]", "frequency = [4.6, 3.2]"),
     )

@@ -2,13 +2,38 @@
 
 #include <cmath>
 
+extern "C" void dgemm_(char const*, char const*, int const*, int const*, int const*, double const*,
+                       double const*, int const*, double const*, int const*, double const*, double*,
+                       int const*);
+
 namespace fretwave::hb {
+
+namespace {
+
+constexpr double dense_share = 0.25;  // of nonzero entries from which a dense product is the faster one
+
+bool is_dense(Mat A) {
+  MatInfo info;
+  PetscInt n;
+  check(MatGetSize(A, &n, nullptr));
+  check(MatGetInfo(A, MAT_GLOBAL_SUM, &info));
+  return n > 16 && info.nz_used > dense_share * double(n) * double(n);
+}
+
+}  // namespace
 
 DynamicStiffness::DynamicStiffness(model::Model const& model, Harmonics const& h)
     : model_(model), harmonics_(h) {
   for (auto const& term : model.terms()) {
     blocked_.emplace_back();
-    check(MatCreateMAIJ(term.A, h.block_size(), blocked_.back().out()));
+    if (!is_dense(term.A)) {
+      check(MatCreateMAIJ(term.A, h.block_size(), blocked_.back().sparse.out()));
+      continue;
+    }
+    const PetscInt local = model.local_dofs();
+    blocked_.back().dense.assign(size_t(local) * model.dofs(), 0.0);
+    for (auto const& entry : entries(term.A))
+      blocked_.back().dense[size_t(entry.col) * local + (entry.row - model.first_dof())] = entry.value;
   }
   work_ = make_vector(model.comm(), model.local_dofs() * h.block_size());
 }
@@ -44,13 +69,37 @@ std::vector<complex> DynamicStiffness::coefficient_derivatives(model::Term const
   return c;
 }
 
-void DynamicStiffness::accumulate(std::vector<complex> const& c, Mat A, Vec x, Vec y) {
+/// All ranks' entries of a harmonic-block vector.
+std::vector<double> DynamicStiffness::gathered(Vec x) const {
+  const int ranks = comm_size(model_.comm());
+  int local = int(local_size(x));
+  std::vector<int> counts(ranks), starts(ranks, 0);
+  MPI_Allgather(&local, 1, MPI_INT, counts.data(), 1, MPI_INT, model_.comm());
+  for (int r = 1; r < ranks; ++r) starts[r] = starts[r - 1] + counts[r - 1];
+  std::vector<double> all(size_t(starts.back() + counts.back()));
+  ReadArray in(x);
+  MPI_Allgatherv(in.data(), local, MPI_DOUBLE, all.data(), counts.data(), starts.data(), MPI_DOUBLE,
+                 model_.comm());
+  return all;
+}
+
+/// y += A (c x): with blocks innermost, Y^T (m x local) += X^T (m x all) A^T.
+void DynamicStiffness::accumulate(std::vector<complex> const& c, Blocked const& A, Vec x, Vec y) {
   {
     ReadArray in(x);
     WriteArray out(work_);
     multiply(harmonics_, c, in.data(), out.data(), int(model_.local_dofs()));
   }
-  check(MatMultAdd(A, work_, y, y));
+  if (A.sparse) {
+    check(MatMultAdd(A.sparse, work_, y, y));
+    return;
+  }
+  const int m = harmonics_.block_size(), local = int(model_.local_dofs()), all = int(model_.dofs());
+  const auto X = gathered(work_);
+  if (local == 0) return;
+  WriteArray Y(y);
+  const double one = 1;
+  dgemm_("N", "T", &m, &local, &all, &one, X.data(), &m, A.dense.data(), &local, &one, Y.data(), &m);
 }
 
 void DynamicStiffness::multiply_add(Exponents const& e, Vec x, Vec y) {

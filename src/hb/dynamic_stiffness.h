@@ -30,13 +30,20 @@ class DynamicStiffness {
     PetscInt row, col;
     double value;
   };
+  /// A (x) I_m: PETSc's blocked product of a sparse matrix, or this rank's dense rows for a product of
+  /// LAPACK's.
+  struct Blocked {
+    MatHandle sparse;
+    std::vector<double> dense;  ///< local rows x all dofs, column-major
+  };
   complex phase(model::Term const&, int n) const;
-  void accumulate(std::vector<complex> const& c, Mat A, Vec x, Vec y);
+  void accumulate(std::vector<complex> const& c, Blocked const&, Vec x, Vec y);
+  std::vector<double> gathered(Vec x) const;
   std::vector<Entry> entries(Mat A) const;
 
   model::Model const& model_;
   Harmonics harmonics_;
-  std::vector<MatHandle> blocked_;  ///< A (x) I_m
+  std::vector<Blocked> blocked_;
   mutable std::vector<std::vector<Entry>> entries_;
   VecHandle work_;
 };
