@@ -1,0 +1,26 @@
+"""Finite elements for the cases: structured hexahedra, elastic matrices, contact surfaces."""
+
+from __future__ import annotations
+
+from .elasticity import TITANIUM, Material, MatrixReport, assemble, centrifugal_load, check_matrices, rigid_modes
+from .interface import ContactPatch, contact_patch, nodal_areas, relative_rows, tangent_frames
+from .mesh import Block, Mesh, Quality, join
+
+__all__ = [
+    "TITANIUM",
+    "Block",
+    "ContactPatch",
+    "Material",
+    "MatrixReport",
+    "Mesh",
+    "Quality",
+    "assemble",
+    "centrifugal_load",
+    "check_matrices",
+    "contact_patch",
+    "join",
+    "nodal_areas",
+    "relative_rows",
+    "rigid_modes",
+    "tangent_frames",
+]
