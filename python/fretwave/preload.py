@@ -65,8 +65,8 @@ def balanced(model: Model, reference: LinearMode) -> Preload:
     """Normal loads given pair by pair are in balance as they are: no displacement, the load is B^T f(0). Collective."""
     problem = StaticPreload(model, np.zeros(model.n_dof), reference)
     y = problem.core.initial()
-    contact = _whole(model, problem.residual(y)) * problem.force_scale
-    return _settled(problem, y, contact)
+    problem.core.settle(y)  # sliders of a state solved before must not act on this one
+    return _settled(problem, y, np.zeros(model.n_dof))
 
 
 def static_preload(model: Model, load: Array, reference: LinearMode, steps: StepControl | None = None) -> Preload:
@@ -99,7 +99,11 @@ def static_preload(model: Model, load: Array, reference: LinearMode, steps: Step
 
 
 def _settled(problem: StaticPreload, y: PETSc.Vec, load: Array) -> Preload:
-    """The laws take the state at y as theirs."""
+    """The laws take the state at y as theirs; the load is what the state balances, Newton's rest included.
+
+    That rest, small beside the load, would be large beside the forces of a small motion.
+    """
+    load = load + _whole(problem.model, problem.residual(y)) * problem.force_scale
     contact = problem.diagnostics(y)
     problem.core.settle(y)
     blocks = _whole(problem.model, problem.core.coefficients(y))

@@ -27,7 +27,7 @@ struct Slip {
 };
 
 inline Slip limit_alone(double trial, double limit) {
-  const bool stick = std::abs(trial) <= limit;
+  const bool stick = std::abs(trial) <= limit && limit > 0;
   return {stick ? 1.0 : 0.0, stick ? 0.0 : std::copysign(1.0, trial)};
 }
 
@@ -82,8 +82,8 @@ void Coulomb3d<Coupled>::force(Motion const& motion, double* f, Record& record) 
       double force1, force2;
       if constexpr (Coupled) {
         const double size = std::sqrt(trial1 * trial1 + trial2 * trial2);
-        const bool stick = size <= limit;
-        const double inverse = stick ? 0.0 : 1 / size, s = stick ? 1.0 : limit * inverse;
+        const bool stick = size <= limit && limit > 0;  // without friction nothing sticks
+        const double inverse = stick || size == 0 ? 0.0 : 1 / size, s = stick ? 1.0 : limit * inverse;
         r.s1[i] = s, r.s2[i] = s;
         r.e1[i] = trial1 * inverse, r.e2[i] = trial2 * inverse;
         force1 = s * trial1, force2 = s * trial2;

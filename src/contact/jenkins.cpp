@@ -32,7 +32,7 @@ void Jenkins::force(Motion const& motion, double* f, Record& record) const {
     for (int i = 0; i < n; ++i) {
       const double trial = k[i] * (u[i] - w[i]);
       const double force = std::min(std::max(trial, -limit[i]), limit[i]);
-      const bool sticks = force == trial;
+      const bool sticks = force == trial && limit[i] > 0;  // without friction nothing sticks
       w[i] = sticks ? w[i] : u[i] - force / k[i];
       stick[i] = sticks ? 1.0 : 0.0;
       out[i] = force;
@@ -71,7 +71,7 @@ void Jenkins::diagnose(Motion const& motion, double const* f, Diagnosis& out) co
     const int before = t ? t - 1 : motion.samples - 1;
     for (int i = 0; i < n; ++i) {
       const size_t now = size_t(t) * n + i, then = size_t(before) * n + i;
-      const bool slips = std::abs(f[now]) >= limit_[i];
+      const bool slips = std::abs(f[now]) >= limit_[i] * (1 - 1e-12);
       out.status[now] = slips ? Status::slip : Status::stick;
       if (!slips) continue;
       // the slider w = u - f/k moves under the force of the slip's end

@@ -80,7 +80,10 @@ bool Continuation::correct(Trial& trial, Vec row, double value) {
   if (!trial.outcome.converged) return false;
   trial.tangent = like(trial.y);
   if (row != Vec(row_)) newton_.system().close(row_, row_value_);
-  if (!newton_.tangent(trial.y, trial.tangent)) return false;
+  if (!newton_.tangent(trial.y, trial.tangent)) {
+    trial.outcome.reason = "the linear solve for the tangent fails";
+    return false;
+  }
   VecHandle weights = like(trial.y);
   problem_.metric(trial.y, weights);
   check(VecScale(trial.tangent, 1 / weighted_norm(weights, trial.tangent)));
@@ -182,7 +185,7 @@ void Continuation::locate(TestFunction const& before, size_t which, Trial const&
   double a = 0, b = length, fa = before.value, fb = end.tests[which].value;
   std::optional<std::pair<double, Trial>> best;
   int side = 0;
-  for (int iteration = 0; iteration < 30 && std::abs(b - a) > 1e-10 * length; ++iteration) {
+  for (int iteration = 0; iteration < 12 && std::abs(b - a) > 1e-10 * length; ++iteration) {
     const double at = (a * fb - b * fa) / (fb - fa);
     Trial trial{.y = like(end.y), .tangent = {}, .outcome = {}, .tests = {}};
     interpolate(end, length, at, trial.y);

@@ -8,7 +8,7 @@ namespace {
 
 constexpr PetscInt redundant_limit = 2000;  // unknowns: below, every rank factorises the whole matrix
 constexpr PetscInt krylov_limit =
-    1500;                     // unknowns: above, the Krylov route where the problem has a preconditioner
+    4000;                     // unknowns: above, the Krylov route where the problem has a preconditioner
 constexpr int patience = 25;  // Krylov iterations of one step that make the preconditioner stale
 
 /// Runs a callback's body; PETSc must not see a C++ exception.
@@ -79,6 +79,13 @@ void Newton::use_direct() {
     return;
   }
   check(PCFactorSetMatSolverType(pc, MATSOLVERMUMPS));
+  // Pivoting of nearly dense harmonic blocks outgrows MUMPS' own estimate of its workspace (+35 %), which
+  // ends in a failed step.
+  Mat factor;
+  check(KSPSetOperators(ksp, J_, J_));
+  check(PCFactorSetUpMatSolverType(pc));
+  check(PCFactorGetMatrix(pc, &factor));
+  check(MatMumpsSetIcntl(factor, 14, 200));
 }
 
 void Newton::use_krylov() {

@@ -1,4 +1,4 @@
-"""Measure the Craig-Bampton reduction of a bar of 33,033 dofs: `mpirun -n 2 python tests/measure_reduction.py`.
+"""Measure the Craig-Bampton reduction of a bar of 33,033 dofs: `python cases/blade_root/reduction_benchmark.py`.
 
 A bar held at 2 x 24 nodes near its root, as by two flanks, and observed at one dof of the tip: 145 kept dofs.
 """
@@ -7,17 +7,20 @@ from __future__ import annotations
 
 import argparse
 import gc
+import sys
 import time
 from pathlib import Path
 
 import numpy as np
 import scipy.sparse as sp
-from hexahedra import Bar, bar
 from mpi4py import MPI
 from petsc4py import PETSc
 
 from fretwave.model import Model
 from fretwave.reduction import reduce
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
+from hexahedra import Bar, bar  # noqa: E402
 
 
 def flank_dofs(model: Bar, per_flank: int) -> np.ndarray:
