@@ -29,14 +29,15 @@ LAW = {"normal_stiffness": 2.0, "tangential_stiffness": 1.5, "friction_coefficie
 #: Doubles that a march moves for a pair and a sample of the period: two periods of 3 displacements in, 3 forces out
 #: and 5 entries of the record (written by the force, read by the product).
 TRAFFIC = 2 * (3 + 3 + 5) * 8
-#: Functions that perf names, and what they do.
+#: Libraries and functions that perf names, and what they do.
 PARTS = {
     "march, force": r"Coulomb3d.*::force",
     "march, product": r"Coulomb3d.*::product",
-    "Fourier transforms": r"fftw|FourierTransform|\b[nrht][1-9]\w*_\d+\b|hc2|r2cf|r2cb|\bapply\b",
-    "dense algebra (BLAS, LAPACK)": r"gemm|gemv|trsm|trsv|getr|laswp|axpy|dot|scal|_k_|kernel_|nrm2|copy_",
-    "PETSc": r"^Vec|^Mat|^KSP|^SNES|^PC|Petsc",
-    "dynamic stiffness, residual, preconditioner": r"fretwave::hb|fretwave::solve|fretwave::model",
+    "march, tangents": r"Coulomb3d",
+    "Fourier transforms": r"libfftw|FourierTransform",
+    "dense algebra (BLAS, LAPACK)": r"libopenblas|libblas|liblapack",
+    "PETSc": r"libpetsc",
+    "residual, preconditioner": r"fretwave::",
 }
 
 
@@ -68,7 +69,7 @@ def limits() -> tuple[float, float]:
 
 
 def pairs_alone(pairs: int, samples: int, highest: int = 3) -> tuple[Any, PETSc.Vec, PETSc.Vec]:
-    """Pairs on a mass each: a problem that is contact and transforms only, and a motion that sticks, slips and opens."""
+    """Pairs on a mass each: contact and transforms only, and a motion that sticks, slips and opens."""
     n = 3 * pairs
     unit = sp.identity(n, format="csr")
     model = fw.Model(unit, unit, None, [fw.Contact("coulomb_3d", unit, LAW)])
@@ -81,6 +82,12 @@ def pairs_alone(pairs: int, samples: int, highest: int = 3) -> tuple[Any, PETSc.
     return problem, y, dy
 
 
+def both_products(problem: Any, y: PETSc.Vec, dy: PETSc.Vec) -> tuple[float, float]:
+    """Seconds of a residual and of a Jacobian product."""
+    r = problem.core.equations()
+    return fastest(lambda: problem.core.residual(y, r)), fastest(lambda: problem.core.product(y, dy, r))
+
+
 def march(options: argparse.Namespace) -> None:
     """Residual and Jacobian product of pairs alone: transforms, march, transforms; per pair and sample of a period."""
     bandwidth, flops = limits()
@@ -91,11 +98,7 @@ def march(options: argparse.Namespace) -> None:
     for pairs in PAIRS:
         for samples in SAMPLES:
             problem, y, dy = pairs_alone(pairs, samples)
-            r = problem.core.equations()
-            whole, product = (
-                1e9 * fastest(run) / (pairs * samples)
-                for run in (lambda: problem.core.residual(y, r), lambda: problem.core.product(y, dy, r))
-            )
+            whole, product = (1e9 * seconds / (pairs * samples) for seconds in both_products(problem, y, dy))
             shares = problem.diagnostics(y)
             status = "/".join(f"{shares[k]:.2f}" for k in ("stick", "slip", "open"))
             print(f"{pairs:8d} {samples:8d} {whole:10.1f} {product:10.1f}   {status}")
@@ -122,10 +125,21 @@ def shares_of(arguments: list[str]) -> tuple[dict[str, float], str] | None:
         done = subprocess.run(command, capture_output=True, text=True)
         if done.returncode:
             return None
-        listing = ["perf", "report", "-i", data, "--stdio", "--no-children", "-F", "overhead,symbol", "-w", "0,400"]
+        listing = [
+            "perf",
+            "report",
+            "-i",
+            data,
+            "--stdio",
+            "--no-children",
+            "-F",
+            "overhead,dso,symbol",
+            "-w",
+            "0,0,400",
+        ]
         report = subprocess.run(listing, capture_output=True, text=True).stdout
     shares = dict.fromkeys([*PARTS, "all else (Python, start, system)"], 0.0)
-    for share, name in re.findall(r"^\s*([\d.]+)%\s+\[.\]\s+(.*)$", report, re.M):
+    for share, name in re.findall(r"^\s*([\d.]+)%\s+(.*)$", report, re.M):
         part = next((part for part, pattern in PARTS.items() if re.search(pattern, name)), list(shares)[-1])
         shares[part] += float(share) / 100
     return shares, done.stdout
@@ -145,76 +159,119 @@ def march_alone(options: argparse.Namespace) -> None:
         print(f"{pairs:8d} pairs: force {force:.1f}, product {product:.1f} of {float(printed):.1f} for both in all")
 
 
-def synthetic(pairs: int = 120, component_modes: int = 150) -> tuple[Any, int]:
-    """Dense reduced model of a blade held by contact at its root: 3 dofs a pair, then component modes.
+def brick(size: Any, young: float = 1.1e11, poisson: float = 0.3) -> tuple[Any, Any]:
+    """Mass per density and stiffness (24 x 24) of a trilinear hexahedron of this size [m], titanium."""
+    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
+    lame, shear = young * poisson / (1 + poisson) / (1 - 2 * poisson), young / 2 / (1 + poisson)
+    D = np.diag([lame + 2 * shear] * 3 + [shear] * 3)
+    D[:3, :3] += lame * (1 - np.eye(3))
+    M, K, volume = np.zeros((24, 24)), np.zeros((24, 24)), np.prod(size) / 8
+    for point in corners / np.sqrt(3):
+        factors = (1 + corners * point) / 2
+        N = factors.prod(axis=1)
+        grad = np.stack([corners[:, i] / 2 * np.delete(factors, i, 1).prod(axis=1) * 2 / size[i] for i in range(3)])
+        S = np.zeros((6, 24))
+        for i in range(3):
+            S[i, i::3] = grad[i]
+        for row, (i, j) in enumerate([(0, 1), (1, 2), (0, 2)], 3):
+            S[row, i::3], S[row, j::3] = grad[j], grad[i]
+        shape = np.kron(N[None], np.eye(3))
+        M, K = M + volume * shape.T @ shape, K + volume * S.T @ D @ S
+    return M, K
 
-    A chain of stations on an elastic foundation at its root is condensed on the root (Craig-Bampton form), so that the
-    first mode bends the blade and loads the root's pairs.
+
+def blade() -> tuple[Any, Any, Any]:
+    """M, K and node numbers (17, 3, 6) of a plate: ten rows of nodes in the root, seven outside."""
+    nodes = np.arange(17 * 3 * 6).reshape(17, 3, 6)
+    M, K = np.zeros((2, 3 * nodes.size, 3 * nodes.size))
+    parts = {long: brick(np.array([0.012 if long else 0.003, 0.004, 0.006])) for long in (False, True)}
+    for i, j, k in np.ndindex(16, 2, 5):
+        m, stiffness = parts[i >= 9]
+        dofs = (3 * nodes[i : i + 2, j : j + 2, k : k + 2].ravel()[:, None] + np.arange(3)).ravel()
+        M[np.ix_(dofs, dofs)] += 4400 * m
+        K[np.ix_(dofs, dofs)] += stiffness
+    return M, K, nodes
+
+
+def synthetic() -> tuple[Any, int]:
+    """510 dense dofs: 120 contact nodes on the two flanks of a plate's root, its tip, 147 component modes.
+
+    A stop on the innermost row of nodes holds the mean along the flanks, which contact alone would leave free in slip.
     """
-    rng, n_root = np.random.default_rng(1), 3 * pairs
-    where = np.column_stack([rng.uniform(-1, 1, pairs), rng.choice([-1.0, 1.0], pairs), rng.uniform(-1, 1, pairs)])
-    distance = np.linalg.norm(where[:, None] - where[None], axis=2)
-    link = 0.05 * np.exp(-((distance / 0.4) ** 2))  # elastic root: neighbours pull on each other in all directions
-    K_root = np.kron(np.diag(link.sum(1)) - link, np.eye(3))
-    omega = 1.0 * np.arange(1, component_modes + 1) ** 1.5  # fixed-interface modes
-    rigid = np.vstack([np.hstack([np.eye(3), _cross(p)]) for p in where])  # root motion of a rigid root
-    share = rng.standard_normal((6, component_modes)) / np.arange(1, component_modes + 1)
-    share[:, 0] = [0.0, 1.0, 0.1, 0.05, 0.0, 1.5]  # the first mode pulls across and turns the root
-    coupling = rigid @ la.solve(rigid.T @ rigid, share)
-    M = la.block_diag(rigid @ la.solve(rigid.T @ rigid, la.solve(rigid.T @ rigid, rigid.T)) * 3, np.eye(component_modes))
-    M[:n_root, :n_root] += 1e-4 * np.eye(n_root)
-    M[:n_root, n_root:], M[n_root:, :n_root] = coupling, coupling.T
-    K = la.block_diag(K_root + 0.02 * np.eye(n_root), np.diag(omega**2))
-    normal = where[:, 1]
-    B = sp.lil_matrix((n_root, n_root + component_modes))
-    for i in range(pairs):  # normal across (y, towards its flank), tangents along x and z
-        B[3 * i, 3 * i + 1], B[3 * i + 1, 3 * i], B[3 * i + 2, 3 * i + 2] = normal[i], 1.0, 1.0
-    parameters = {"normal_stiffness": 0.2, "tangential_stiffness": 0.15, "friction_coefficient": 0.4}
-    load = rng.uniform(0.5, 1.5, pairs)
-    model = fw.Model(M, K, None, [fw.Contact("coulomb_3d", B.tocsr(), {**parameters, "normal_load": load})])
-    return model, n_root
-
-
-def _cross(p: Any) -> Any:
-    x, y, z = p
-    return np.array([[0, z, -y], [-z, 0, x], [y, -x, 0]])
+    M, K, nodes = blade()
+    flanks = np.concatenate([nodes[:10, 0].ravel(), nodes[:10, 2].ravel()])
+    kept = (3 * np.append(flanks, nodes[-1, 1, 3])[:, None] + np.arange(3)).ravel()
+    stop = (3 * nodes[0, 1][:, None] + [0, 2]).ravel()
+    K[stop, stop] += 2e7
+    inner = np.setdiff1d(np.arange(len(K)), kept)
+    static = -la.solve(K[np.ix_(inner, inner)], K[np.ix_(inner, kept)], assume_a="pos")
+    modes = la.eigh(K[np.ix_(inner, inner)], M[np.ix_(inner, inner)])[1][:, : 510 - len(kept)]
+    T = np.zeros((len(K), 510))
+    T[kept, : len(kept)] = np.eye(len(kept))
+    T[inner] = np.hstack([static, modes])
+    B = sp.lil_matrix((360, 510))
+    for i in range(120):  # normal across the plate, tangents along the blade and along the root
+        B[3 * i, 3 * i + 1], B[3 * i + 1, 3 * i], B[3 * i + 2, 3 * i + 2] = (-1.0 if i < 60 else 1.0), 1.0, 1.0
+    law = {"normal_stiffness": 2e6, "tangential_stiffness": 1.5e6, "friction_coefficient": 0.3, "normal_load": 50.0}
+    return fw.Model(T.T @ M @ T, T.T @ K @ T, None, [fw.Contact("coulomb_3d", B.tocsr(), law)]), 361
 
 
 def point(options: argparse.Namespace) -> None:
-    """Time per point of the synthetic model's branch, by the Krylov route."""
+    """Time per point of the synthetic model's branch, and where it goes."""
     model, dof = synthetic()
-    began = time.process_time()
     first = fw.linear_modes(model, 1, "stuck")[0]
-    print(f"synthetic model: {model.n_dof} dofs, dense, 120 pairs; stuck mode {first.omega:.4f} rad/s, "
-          f"{time.process_time() - began:.2f} s")
     rest = balanced(model, first)
+    print(f"synthetic model: {model.n_dof} dofs, dense, 120 pairs; stuck mode {first.omega / 2 / np.pi:.2f} Hz")
     for highest in options.harmonics:
         branch_cost(model, dof, first, rest, highest, options)
+        if options.shares:
+            report_shares(highest, options)
 
 
 def branch_cost(model: Any, dof: int, first: Any, rest: Any, highest: int, options: argparse.Namespace) -> None:
+    """One branch from stick to slip and lift-off: time and iterations of its regular points in slip."""
     PETSc.Options()["kernel_route"] = options.route
     problem = fw.NonlinearMode(model, fw.Harmonics(range(highest + 1), options.samples), "CNM", dof, first, "kernel_")
     problem.preload(rest.displacement, rest.load)
+    rows = followed(problem, options)
+    regular = [row for row in rows if row["slip"] > 0 and row["event"] == ""]
+    newton, linear = (sum(row[k] for row in regular) for k in ("newton", "linear"))
+    seconds = [row["seconds"] for row in regular]
+    print(f"H = {highest}, N_t = {options.samples}, {options.route}: {len(regular)} points in slip (to "
+          f"{max(r['slip'] for r in rows):.2f} slip, {max(r['open'] for r in rows):.2f} open), median "
+          f"{np.median(seconds):.3f} s a point ({min(seconds):.3f} to {max(seconds):.3f}), {newton / len(regular):.1f} "
+          f"Newton steps a point, {linear / newton:.1f} GMRES iterations a step, "
+          f"residual <= {max(r['residual'] for r in rows):.0e}")  # fmt: skip
+
+
+def followed(problem: Any, options: argparse.Namespace) -> list[dict[str, Any]]:
+    """Points of the branch with the processor time of each."""
     steps = fw.StepControl(initial=0.1, max_points=options.points)
-    branch = fw.Continuation(problem, problem.initial(options.start), (options.start, 1e3 * options.start), steps)
-    rows, points = [], iter(branch)
+    branch = fw.Continuation(problem, problem.initial(options.start), (options.start, 100 * options.start), steps)
+    rows: list[dict[str, Any]] = []
+    points = iter(branch)
     while True:
         began = time.process_time()
         p = next(points, None)
-        spent = time.process_time() - began
+        seconds = time.process_time() - began
         if p is None:
-            break
-        contact = problem.diagnostics(p.y)
-        rows.append((p.parameter, contact["slip"], contact["open"], p.newton, p.linear, spent, p.residual))
+            return rows
+        names = ("parameter", "event", "newton", "linear", "residual")
+        row = {**{name: getattr(p, name) for name in names}, **problem.diagnostics(p.y), "seconds": seconds}
+        rows.append(row)
         if options.verbose:
-            print("   a {:.3e} slip {:.3f} open {:.3f} newton {} GMRES {} {:.3f} s residual {:.1e}".format(*rows[-1]))
-    moving = [row for row in rows[1:] if row[1] > 0]
-    total, newton, linear = (sum(row[k] for row in moving) for k in (5, 3, 4))
-    print(f"H = {highest}, N_t = {options.samples}, {options.route}: {len(moving)} points in slip "
-          f"(to {max(row[1] for row in rows):.2f} slip, {max(row[2] for row in rows):.2f} open), "
-          f"{total / max(1, len(moving)):.3f} s a point, {newton / max(1, len(moving)):.1f} Newton a point, "
-          f"{linear / max(1, newton):.1f} GMRES a Newton step; {branch.reason}")
+            print("   a {parameter:.3e} slip {slip:.3f} open {open:.3f} newton {newton} GMRES {linear} "
+                  "{seconds:.3f} s {event}".format(**row))  # fmt: skip
+
+
+def report_shares(highest: int, options: argparse.Namespace) -> None:
+    """The same branch under perf, in a process of its own."""
+    found = shares_of(["point", "--no-shares", "--harmonics", str(highest), "--route", options.route])
+    if found is None:
+        print("   perf is not available here")
+        return
+    for part, share in sorted(found[0].items(), key=lambda item: -item[1]):
+        print(f"   {100 * share:5.1f} %  {part}")
 
 
 def main() -> None:
@@ -224,9 +281,10 @@ def main() -> None:
     parser.add_argument("--pairs", type=int, default=768)
     parser.add_argument("--samples", type=int, default=128)
     parser.add_argument("--harmonics", type=int, nargs="+", default=[3, 15])
-    parser.add_argument("--points", type=int, default=25)
-    parser.add_argument("--start", type=float, default=0.5)
+    parser.add_argument("--points", type=int, default=30)
+    parser.add_argument("--start", type=float, default=1e-4)
     parser.add_argument("--route", default="krylov", choices=["krylov", "direct"])
+    parser.add_argument("--no-shares", dest="shares", action="store_false", help="without perf")
     parser.add_argument("--verbose", action="store_true")
     options = parser.parse_args()
     if options.workload:
