@@ -33,7 +33,7 @@ MAPS = """\
         (doctor.check_one_mpi(["libmpi.so.40"], "Open MPI"), doctor.check_one_mpi(["a", "b"], "Open MPI")),
         (doctor.check_numpy("1.24.2", {}), doctor.check_numpy("2.1.0", {"h5py": "numpy.dtype size changed"})),
         (doctor.check_extension("", ["libfftw3.so.3"]), doctor.check_extension("No module", [])),
-        (doctor.check_launch("2\n2\n"), doctor.check_launch("1\n1\n")),
+        (doctor.check_launch("2\n"), doctor.check_launch("1\n1\n")),
     ],
 )
 def test_check_tells_well_from_ill(well: doctor.Check, ill: doctor.Check) -> None:

@@ -21,7 +21,7 @@ FLANK = np.radians(55)  #: between the blade's axis and a flank's normal
 #: Share of the root's stiffness beside the contact (bolt, axial stop). Without it the mean is held by friction alone.
 SUPPORT = 0.3
 TIP = 6 * ELEMENTS + 1  #: displacement across the thickness
-AMPLITUDES = [1.5e-3, 2.2e-3, 2.5e-3, 2.8e-3, 3.5e-3, 6e-3, 1.2e-2]
+AMPLITUDES = [1.5e-3, 2.2e-3, 2.35e-3, 2.5e-3, 2.8e-3, 3.5e-3, 6e-3, 1.2e-2]
 
 
 def bending(h, stiffness, mass, sign):

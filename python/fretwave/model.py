@@ -155,7 +155,7 @@ class Model:
 
     @property
     def odd(self) -> bool:
-        """All laws are odd: without preload, even harmonics may be left out."""
+        """All laws are odd: without preload, even harmonics may be left out. Collective."""
         return bool(self.core.odd)
 
     def distribute(self, values: npt.NDArray[Any]) -> npt.NDArray[Any]:

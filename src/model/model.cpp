@@ -61,7 +61,9 @@ MatHandle Model::sum(int order) const {
 VecHandle Model::displacement() const { return make_vector(comm_, local_); }
 
 bool Model::odd() const {
-  return std::all_of(contacts_.begin(), contacts_.end(), [](Contact const& c) { return c.law->odd(); });
+  int odd = std::all_of(contacts_.begin(), contacts_.end(), [](Contact const& c) { return c.law->odd(); });
+  MPI_Allreduce(MPI_IN_PLACE, &odd, 1, MPI_INT, MPI_LAND, comm_);  // a rank sees its own pairs only
+  return odd;
 }
 
 }  // namespace fretwave::model

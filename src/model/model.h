@@ -43,7 +43,7 @@ class Model {
   MatHandle sum(int order) const;
   /// A vector of one entry per dof.
   VecHandle displacement() const;
-  /// All laws are odd: without preload the motion may keep odd harmonics only.
+  /// All laws are odd: without preload the motion may keep odd harmonics only. Collective.
   bool odd() const;
 
  private:
