@@ -114,6 +114,9 @@ def _world() -> Any:
     """MPI with PETSc started on it; collective, so it comes before anything one rank could fail in alone."""
     from mpi4py import MPI
 
+    from .doctor import check_runtime
+
+    check_runtime()
     import fretwave._core  # noqa: F401
 
     return MPI.COMM_WORLD
