@@ -69,17 +69,17 @@ std::vector<complex> DynamicStiffness::coefficient_derivatives(model::Term const
   return c;
 }
 
-/// All ranks' entries of a harmonic-block vector.
-std::vector<double> DynamicStiffness::gathered(Vec x) const {
-  const int ranks = comm_size(model_.comm());
+std::vector<double> gathered(Vec x) {
+  MPI_Comm comm;
+  check(PetscObjectGetComm(reinterpret_cast<PetscObject>(x), &comm));
+  const int ranks = comm_size(comm);
   int local = int(local_size(x));
   std::vector<int> counts(ranks), starts(ranks, 0);
-  MPI_Allgather(&local, 1, MPI_INT, counts.data(), 1, MPI_INT, model_.comm());
+  MPI_Allgather(&local, 1, MPI_INT, counts.data(), 1, MPI_INT, comm);
   for (int r = 1; r < ranks; ++r) starts[r] = starts[r - 1] + counts[r - 1];
   std::vector<double> all(size_t(starts.back() + counts.back()));
   ReadArray in(x);
-  MPI_Allgatherv(in.data(), local, MPI_DOUBLE, all.data(), counts.data(), starts.data(), MPI_DOUBLE,
-                 model_.comm());
+  MPI_Allgatherv(in.data(), local, MPI_DOUBLE, all.data(), counts.data(), starts.data(), MPI_DOUBLE, comm);
   return all;
 }
 

@@ -1,10 +1,11 @@
 #pragma once
-#include <optional>
-
 #include "hb/harmonics.h"
 #include "model/model.h"
 
 namespace fretwave::hb {
+
+/// All ranks' entries of a vector, on every rank. Collective.
+std::vector<double> gathered(Vec);
 
 /// Z = sum over the linear terms of A (x) c_n, c_n = s_n^p e^{-i k n theta}; with inertia damping g the mass
 /// takes s^2 - g s.
@@ -38,7 +39,6 @@ class DynamicStiffness {
   };
   complex phase(model::Term const&, int n) const;
   void accumulate(std::vector<complex> const& c, Blocked const&, Vec x, Vec y);
-  std::vector<double> gathered(Vec x) const;
   std::vector<Entry> entries(Mat A) const;
 
   model::Model const& model_;

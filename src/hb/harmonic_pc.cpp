@@ -56,18 +56,6 @@ HarmonicPreconditioner::HarmonicPreconditioner(HarmonicProblem& problem)
   for (auto const& term : problem.model().terms()) terms_.push_back(whole(term.A));
 }
 
-std::vector<double> HarmonicPreconditioner::gather(Vec v) const {
-  int local = int(local_size(v));
-  std::vector<int> counts(size_), starts(size_, 0);
-  MPI_Allgather(&local, 1, MPI_INT, counts.data(), 1, MPI_INT, problem_.comm());
-  for (int r = 1; r < size_; ++r) starts[r] = starts[r - 1] + counts[r - 1];
-  std::vector<double> all(size_t(starts.back() + counts.back()));
-  ReadArray in(v);
-  MPI_Allgatherv(in.data(), local, MPI_DOUBLE, all.data(), counts.data(), starts.data(), MPI_DOUBLE,
-                 problem_.comm());
-  return all;
-}
-
 /// (Z_n + B^T (K_mean + s_n C_mean) B) / k_ref
 std::vector<complex> HarmonicPreconditioner::block(int harmonic, Exponents const& e) const {
   std::vector<complex> A(size_t(n_) * n_);
@@ -94,8 +82,8 @@ void HarmonicPreconditioner::factorise_fundamental(Exponents const& e, Vec y, Ve
   Harmonics const& h = problem_.harmonics();
   const int first = h.fundamental(), offset = h.offset(first), size = 2 * n_ + scalars_;
   std::vector<std::vector<double>> columns;
-  for (int j = 0; j < scalars_; ++j) columns.push_back(gather(problem_.scalar_column(y, j)));
-  const auto closing = gather(row);
+  for (int j = 0; j < scalars_; ++j) columns.push_back(gathered(problem_.scalar_column(y, j)));
+  const auto closing = gathered(row);
   if (!mine(first)) return;
   fundamental_.assign(size_t(size) * size, 0.0);
   const auto at = [&](int i, int j) -> double& { return fundamental_[size_t(j) * size + i]; };
@@ -157,7 +145,7 @@ void HarmonicPreconditioner::solve_fundamental(double const* x, double* z) {
 }
 
 void HarmonicPreconditioner::apply(Vec x, Vec z) {
-  const auto in = gather(x);
+  const auto in = gathered(x);
   std::vector<double> out(in.size(), 0.0);
   for (auto const& factor : factors_) solve(factor, in.data(), out.data());
   if (mine(problem_.harmonics().fundamental())) solve_fundamental(in.data(), out.data());

@@ -26,7 +26,6 @@ class HarmonicPreconditioner : public solve::Preconditioner {
   void factorise_fundamental(Exponents const&, Vec y, Vec row);
   void solve(Factor const&, double const* x, double* z);
   void solve_fundamental(double const* x, double* z);
-  std::vector<double> gather(Vec) const;
 
   HarmonicProblem& problem_;
   int n_, m_, scalars_, rank_, size_;
