@@ -93,27 +93,15 @@ void Residual::contact_pattern(Group& group, std::vector<PetscInt>& rows, std::v
   }
 }
 
-void Residual::mean_contact(std::vector<double>& K, std::vector<double>& C) {
-  const size_t n = size_t(model_.dofs());
-  K.assign(n * n, 0.0), C.assign(n * n, 0.0);
-  std::vector<double> df_du, df_dv;
+std::vector<PairTangents> Residual::pair_tangents() {
+  std::vector<PairTangents> out;
   for (Group& group : groups_) {
-    group.aft.mean_tangent(df_du, df_dv);
-    const size_t d = group.contact->law->components(), pairs = group.contact->law->pairs();
-    auto const& weights = group.weights;
-    for (size_t first = 0, last = 0; first < weights.size(); first = last) {
-      while (last < weights.size() && weights[last].pair == weights[first].pair) ++last;
-      for (size_t a = first; a < last; ++a)
-        for (size_t b = first; b < last; ++b) {
-          const size_t tangent = (weights[a].component * d + weights[b].component) * pairs + weights[a].pair;
-          const size_t entry = size_t(weights[b].dof) * n + weights[a].dof;
-          const double weight = weights[a].value * weights[b].value;
-          K[entry] += weight * df_du[tangent], C[entry] += weight * df_dv[tangent];
-        }
-    }
+    const int d = group.contact->law->components(), pairs = group.contact->law->pairs();
+    const size_t ld = size_t(d) * harmonics_.block_size();
+    out.push_back({pairs, d, group.weights, std::vector<double>(pairs * ld * ld)});
+    group.aft.blocks(e_, out.back().D.data());
   }
-  MPI_Allreduce(MPI_IN_PLACE, K.data(), int(K.size()), MPI_DOUBLE, MPI_SUM, model_.comm());
-  MPI_Allreduce(MPI_IN_PLACE, C.data(), int(C.size()), MPI_DOUBLE, MPI_SUM, model_.comm());
+  return out;
 }
 
 void Residual::pattern(std::vector<PetscInt>& rows, std::vector<PetscInt>& cols) {
@@ -127,12 +115,11 @@ void Residual::pattern(std::vector<PetscInt>& rows, std::vector<PetscInt>& cols)
 double* Residual::values(double scale, double* v) {
   v = stiffness_.values(e_, scale, v);
   const size_t m = harmonics_.block_size();
-  for (Group& group : groups_) {
-    const size_t d = group.contact->law->components(), ld = d * m;
-    std::vector<double> D(group.contact->law->pairs() * ld * ld);
-    group.aft.blocks(e_, D.data());
-    for (auto const& place : group.places) {  // B^T (dF/dU) B
-      double const* block = D.data() + (place.pair * ld + place.row * m) * ld + place.col * m;
+  const auto tangents = pair_tangents();
+  for (size_t g = 0; g < groups_.size(); ++g) {
+    const size_t ld = tangents[g].components * m;
+    for (auto const& place : groups_[g].places) {  // B^T (dF/dU) B
+      double const* block = tangents[g].D.data() + (place.pair * ld + place.row * m) * ld + place.col * m;
       for (size_t i = 0; i < m; ++i)
         for (size_t j = 0; j < m; ++j) *v++ = scale * place.value * block[i * ld + j];
     }

@@ -4,6 +4,20 @@
 
 namespace fretwave::hb {
 
+/// An entry of the contact map B: row `component` of a pair on this rank.
+struct Weight {
+  int pair, component;
+  PetscInt dof;
+  double value;
+};
+
+/// Linearised contact of this rank's pairs of one contact: dense dF/dU of each, row-major.
+struct PairTangents {
+  int pairs, components;
+  std::vector<Weight> const& weights;  ///< pair by pair
+  std::vector<double> D;               ///< pairs x (components m) x (components m)
+};
+
 /// R(Q, s) = Z(s) Q + B^T F(B Q, s B Q) and its exact derivatives: one for all variants, which differ in what
 /// s is (DESIGN section 1). Vectors hold harmonic blocks of `block_size` per dof.
 class Residual {
@@ -26,9 +40,8 @@ class Residual {
   double* values(double scale, double* v);
 
   DynamicStiffness const& stiffness() const { return stiffness_; }
-  /// B^T (mean tangent) B at the last evaluated point, dense n_dof x n_dof, whole on every rank: stiffness
-  /// and damping. Collective.
-  void mean_contact(std::vector<double>& K, std::vector<double>& C);
+  /// Linearised contact at the last evaluated point, one per contact.
+  std::vector<PairTangents> pair_tangents();
 
   /// Contact of the motion (Q, e), summed over all ranks and contacts. Collective.
   ContactSummary summarise(Vec Q, Exponents const& e);
@@ -44,11 +57,6 @@ class Residual {
     Aft aft;
     VecHandle U, F;
     std::vector<double> dV;
-    struct Weight {
-      int pair, component;
-      PetscInt dof;
-      double value;
-    };
     struct Place {
       int pair, row, col;
       double value;
