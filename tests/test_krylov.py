@@ -176,7 +176,7 @@ def test_iterations_stay_below_25_up_to_30_percent_slip(krylov, comm):
 
 
 def test_a_contact_far_stiffer_than_the_structure(comm):
-    """30 times the contact stiffness, all pairs on one rigid root, slip up to 60 %: averaged tangents alone stagnate."""
+    """30 times the contact stiffness, all pairs on one rigid root, slip to 60 %: averaged tangents stagnate."""
     stiff = {key: 30 * ROOT[key] for key in ("normal_stiffness", "tangential_stiffness")}
     model = blade(comm, **stiff)
     points = branch(mode(model, *preloaded(model), "krylov", highest=7), (1.5e-3, 2.6e-3), ())
