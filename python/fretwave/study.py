@@ -17,6 +17,7 @@ from .console import Console
 from .errors import EXIT_DONE, InputError, NotConverged
 from .parallel import on_first_rank
 from .petsc_options import AnalysisOptions
+from .reduced import reduce_case
 from .run import build_model
 from .schema import ModeAnalysis
 from .study_plan import Outcome, Plan, Settings, Study, common_amplitudes
@@ -39,6 +40,7 @@ def main(arguments: Sequence[str]) -> int:
     console = Console(comm.rank == 0, lambda line: None)
     study = Study(plan, common_amplitudes(min(analysis.amplitude), max(analysis.amplitude), COUNT))
     console.line(f"study of '{analysis.name}': {len(plan.sweeps())} runs, the finest is {_text(plan.reference)}")
+    case = reduce_case(case, comm)
     with build_model(case, analysis.dampers, comm) as model:
         solver = _Solver(case, analysis, model, study, options.repeats)
         study.run(solver.solve, lambda sweep, settings: console.line(_progress(study, sweep, settings)))
