@@ -30,7 +30,7 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -38,6 +38,9 @@ import scipy.sparse as sp
 
 from .errors import InputError
 from .source import display, nearest
+
+if TYPE_CHECKING:
+    from .built import BuiltModel
 
 Array = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
@@ -122,6 +125,25 @@ class FileModel:
     @property
     def size(self) -> int:
         return int(self.M.shape[0])
+
+    def built(self) -> BuiltModel:
+        """As a builder gives it: contacts by name, and the dofs a reduction keeps."""
+        from .built import BuiltContact, BuiltModel
+
+        contacts = {
+            name: BuiltContact(c.B, 3, areas=c.areas, points=c.positions, frames=c.frames)
+            for name, c in self.contacts.items()
+        }
+        kept = {self.names[dof]: int(dof) for dof in (() if self.kept is None else self.kept)}
+        return BuiltModel(self.M, self.K, self.C, kept, contacts, coordinates=self._grid())
+
+    def _grid(self) -> Array | None:
+        """Coordinates when every node has three dofs and they stand node by node, as pictures want it."""
+        if self.coordinates is None or self.node is None or self.direction is None or self.node_numbers is None:
+            return None
+        whole = np.array_equal(self.node, np.repeat(self.node_numbers, 3))
+        whole = whole and np.array_equal(self.direction, np.tile([1, 2, 3], len(self.node_numbers)))
+        return self.coordinates if whole else None
 
 
 def dof_name(node: int, direction: int) -> str:

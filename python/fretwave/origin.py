@@ -1,4 +1,4 @@
-"""Where a model comes from: matrices in the case, or a builder in Python."""
+"""Where a model comes from: matrices in the case, a builder in Python, or a model file."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 import scipy.sparse
 
-from . import matrices
+from . import matrices, model_file
 from .built import BuiltModel, builder_digest, run_builder
 from .errors import FretwaveError, InputError
 from .matrices import Matrix
@@ -48,7 +48,7 @@ class Origin:
 
 def load_origin(section: ModelSection, source: Source, found: Found) -> Origin | None:
     """The model of ``[model]``, from the one source that it names; None when something is wrong."""
-    ways = {"builder": section.builder is not None}
+    ways = {"builder": section.builder is not None, "file": section.file is not None}
     given = [way for way, is_given in ways.items() if is_given]
     inline = [letter for letter in ("M", "K", "C", "dofs") if getattr(section, letter) is not None]
     if given and (inline or len(given) > 1):
@@ -57,12 +57,16 @@ def load_origin(section: ModelSection, source: Source, found: Found) -> Origin |
             InputError(
                 f"the model comes from several places: {', '.join(more)}",
                 where=source.where(("model", more[1])),
-                expected="matrices M and K, or a builder",
+                expected="matrices M and K, or a builder, or a model file",
                 fix=f"remove {' and '.join(more[1:])}",
             )
         )
         return None
-    return _from_builder(section, source, found) if given else _from_matrices(section, source, found)
+    if section.options and section.builder is None:
+        problem = "there are options but no builder"
+        found.append(InputError(problem, source.where(("model", "options")), fix='add `builder = "model.py"`'))
+    readers = {"builder": _from_builder, "file": _from_file}
+    return readers.get(given[0] if given else "", _from_matrices)(section, source, found)
 
 
 def _from_builder(section: ModelSection, source: Source, found: Found) -> Origin | None:
@@ -82,11 +86,27 @@ def _from_builder(section: ModelSection, source: Source, found: Found) -> Origin
     return Origin(loaded, dofs, built, resolved)
 
 
+def _from_file(section: ModelSection, source: Source, found: Found) -> Origin | None:
+    assert section.file is not None
+    where = source.where(("model", "file"))
+    path = source.path.parent / section.file
+    try:
+        model = model_file.read(path)
+    except InputError as error:
+        place = f"{where}, {error.where}"
+        found.append(InputError(error.what, place, error.measured, error.expected, error.fix))
+        return None
+    loaded = {
+        letter: Matrix(letter, getattr(model, letter), f"{where}, {letter}")
+        for letter in ("M", "K", "C")
+        if getattr(model, letter) is not None
+    }
+    resolved = {"model.file": f"{section.file} {model_file.digest(path)[:16]}"}
+    return Origin(loaded, model.names, model.built(), resolved)
+
+
 def _from_matrices(section: ModelSection, source: Source, found: Found) -> Origin | None:
     loaded = {}
-    if section.options:
-        problem = "there are options but no builder"
-        found.append(InputError(problem, source.where(("model", "options")), fix='add `builder = "model.py"`'))
     for letter in ("M", "K", "C"):
         given = getattr(section, letter)
         if given is None:

@@ -44,6 +44,11 @@ class ModelSection(Section):
     builder: Optional[str] = key(
         "Python file whose build(**options) gives the model, in place of matrices", example='"model.py"', default=None
     )
+    file: Optional[str] = key(
+        "model file of `fretwave import`, in place of matrices; it brings names of dofs and contacts",
+        example='"blade.h5"',
+        default=None,
+    )
     options: dict[str, Any] = key("options of the builder", example="{ speed_rpm = 2000 }", default_factory=dict)
     stiffness_damping: float = key("C grows by this times K", "s", "2e-6", default=0.0, ge=0, allow_inf_nan=False)
     mass_damping: float = key("C grows by this times M", "1/s", "0.1", default=0.0, ge=0, allow_inf_nan=False)

@@ -43,13 +43,10 @@ def rigid_motions(model: FileModel) -> Array | None:
         return None
     x = model.coordinates - model.coordinates.mean(axis=0)
     motions = np.zeros((model.size, 6))
-    for dof, (node, direction) in enumerate(zip(place, model.direction)):
-        axis = (direction - 1) % 3
-        if direction > 3:
-            motions[dof, 3 + axis] = 1.0
-        else:
-            motions[dof, axis] = 1.0
-            motions[dof, 3:] = np.cross(np.eye(3), x[node])[:, axis]
+    motions[np.arange(model.size), model.direction - 1] = 1.0
+    moved = np.flatnonzero(model.direction <= 3)
+    turned = np.cross(np.eye(3), x[place[moved], None])  # (dof, axis of rotation, direction)
+    motions[moved, 3:] = turned[np.arange(len(moved)), :, model.direction[moved] - 1]
     return motions
 
 
@@ -85,11 +82,12 @@ def check(model: FileModel, symmetry: dict[str, str], notes: Sequence[str], mode
     for letter, said in symmetry.items():
         report.lines.append(f"{letter}: {getattr(model, letter).nnz} entries, {said}")
     report.lines.extend(notes)
+    motions = rigid_motions(model)
     _contacts(model, report)
-    _mass(model, report)
+    _mass(model, motions, report)
     _stiffness(model, report)
-    _frequencies(model, modes, comm, report)
-    _units(model, report)
+    _frequencies(model, motions, modes, comm, report)
+    _units(model, motions, report)
     return report
 
 
@@ -99,13 +97,12 @@ def _contacts(model: FileModel, report: Report) -> None:
         report.lines.append(f"contact '{contact.name}': {contact.pairs} pairs, {area}")
 
 
-def _mass(model: FileModel, report: Report) -> None:
+def _mass(model: FileModel, motions: Array | None, report: Report) -> None:
     diagonal = model.M.diagonal()
     for wrong, kind in ((diagonal < 0, "negative"), (diagonal == 0, "no")):
         if wrong.any():
             first = model.names[int(np.argmax(wrong))]
             report.warnings.append(f"{wrong.sum()} dofs have {kind} mass, the first is {first}: M must be positive")
-    motions = rigid_motions(model)
     if motions is None:
         report.lines.append("mass of the body: not known without coordinates and a table of dofs")
         return
@@ -132,11 +129,10 @@ def _stiffness(model: FileModel, report: Report) -> None:
             report.warnings.append(f"{wrong.sum()} dofs have {kind} stiffness, the first is {first}")
 
 
-def _frequencies(model: FileModel, modes: int, comm: Any, report: Report) -> None:
+def _frequencies(model: FileModel, motions: Array | None, modes: int, comm: Any, report: Report) -> None:
     from ..model import Model
     from ..modes import linear_modes
 
-    motions = rigid_motions(model)
     expected, bodies = (6, 1) if motions is None else expected_rigid(model, motions)
     with Model(model.M, model.K, comm=comm) as whole:
         found = linear_modes(whole, expected + modes, "free")
@@ -159,9 +155,8 @@ def _frequencies(model: FileModel, modes: int, comm: Any, report: Report) -> Non
     report.lines.append("first frequencies [1/time]: " + ", ".join(f"{value:.6g}" for value in elastic))
 
 
-def _units(model: FileModel, report: Report) -> None:
+def _units(model: FileModel, motions: Array | None, report: Report) -> None:
     """Speed of sound and density as far as the mesh shows them; metals have about 5000 m/s and 2700 to 8900 kg/m^3."""
-    motions = rigid_motions(model)
     if motions is None or model.coordinates is None:
         return
     size = np.ptp(model.coordinates, axis=0)
