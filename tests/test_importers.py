@@ -221,6 +221,16 @@ def test_matrices_that_calculix_wrote(tmp_path: Path, capfd) -> None:
 CALCULIX_HZ = [8099.358, 13332.14, 14782.41, 34664.54]
 
 
+@pytest.mark.ranks(1, 2)
+def test_import_on_any_number_of_ranks(comm, shared_tmp: Path, capfd) -> None:
+    """Rank 0 reads and writes; the frequencies are computed together, and one rank speaks."""
+    parts = ["--mass", str(DATA / "block.mas"), "--stiffness", str(DATA / "block.sti")]
+    assert main(["import", str(shared_tmp / "m.h5"), *parts]) == 0
+    comm.barrier()
+    assert model_file.read(shared_tmp / "m.h5").size == 24
+    assert capfd.readouterr().out.count("8099.36, 13332.1, 14782.4, 34664.5") == (comm.rank == 0)
+
+
 def test_report_of_a_free_body(held: Held, tmp_path: Path, capfd) -> None:
     bar = held.bar
     text = report_of(tmp_path, bar.M, bar.K, bar.nodes, capfd)

@@ -1,7 +1,8 @@
 """The native model file: matrices, names, nodes and contact maps in one HDF5 file.
 
 Written by ``fretwave import`` (or `write`), read by ``[model] file = "blade.h5"``. One rank reads and writes it with
-serial h5py calls; `fretwave.Model` distributes the rows. Numbers are little-endian float64 and int64, indices from 0.
+serial h5py calls; `fretwave.Model` distributes the rows. Numbers are float64 and int64 (indices of CSR: int32 or int64,
+from 0).
 
 =========================  ===================================================================================
 place                      content
@@ -222,7 +223,8 @@ def _write_sparse(group: Any, matrix: Any) -> None:
     rows = sp.csr_matrix(matrix, dtype=float)
     rows.sort_indices()
     group.attrs["shape"] = np.array(rows.shape, dtype="<i8")
-    _write_arrays(group, {"data": rows.data, "indices": rows.indices, "indptr": rows.indptr})
+    for key in ("data", "indices", "indptr"):
+        group[key] = getattr(rows, key)
 
 
 def read(path: str | Path) -> FileModel:
