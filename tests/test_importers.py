@@ -275,10 +275,13 @@ def test_report_warns_of_what_cannot_be(held: Held, tmp_path: Path, capfd) -> No
     assert "warning: units" in report_of(tmp_path, 1e3 * bar.M, bar.K, bar.nodes, capfd)
     cut[-1] = 0
     text = report_of(tmp_path, bar.M, sp.diags(cut) @ bar.K @ sp.diags(cut), bar.nodes, capfd)
-    assert "warning: 1 dofs have no stiffness, the first is n24z" in text
+    assert "warning: 1 dof with no stiffness, the first is n24z" in text
     text = report_of(tmp_path, sp.diags(1 - 2 * (cut == 0)) @ bar.M.multiply(sp.eye(len(cut))), bar.K, bar.nodes, capfd)
-    assert "warning: 1 dofs have negative mass, the first is n24z" in text
+    assert "warning: 1 dof with negative mass, the first is n24z" in text
     assert "the mass differs along x, y and z" in text
+    loose = report_of(tmp_path, *(sp.diags(cut) @ A @ sp.diags(cut) for A in (bar.M, bar.K)), bar.nodes, capfd)
+    assert "warning: 1 dof with no mass" in loose and "warning: the frequencies cannot be computed" in loose
+    assert model_file.read(tmp_path / "m.h5").size == len(cut)
     K = bar.K - sp.diags(1e-3 * bar.K.diagonal().max() * (cut == 0))
     assert "warning: K is negative for a motion" in report_of(tmp_path, bar.M, K, bar.nodes, capfd)
 
@@ -308,7 +311,7 @@ def test_abaqus_leaves_out_what_it_held(tmp_path: Path) -> None:
     assert found.names == ["n2x", "n-1x"]
     np.testing.assert_array_equal(found.matrices["K"].toarray(), [[3.0, -2.0], [-2.0, 5.0]])
     np.testing.assert_array_equal(found.matrices["M"].toarray(), [[1.0, 0.0], [0.0, 2.0]])
-    assert found.notes == ["1 dofs held by a penalty on the diagonal of K are left out"]
+    assert found.notes == ["left out: 1 dof held by a penalty on the diagonal of K"]
 
 
 def test_abaqus_dofs_without_mass_are_said(tmp_path: Path) -> None:
@@ -316,7 +319,7 @@ def test_abaqus_dofs_without_mass_are_said(tmp_path: Path) -> None:
     (tmp_path / "M.mtx").write_text("2,1, 2,1, 1.0\n")
     found = assemble({letter: read_matrix(str(tmp_path / f"{letter}.mtx"), letter) for letter in "MK"})
     assert found.matrices["M"].shape == (2, 2)
-    assert found.notes == ["1 dofs have no entry in M, the first is n1x"]
+    assert found.notes == ["1 dof without an entry in M, the first is n1x"]
 
 
 DECK = """*HEADING
@@ -547,3 +550,65 @@ def test_matlab_files_are_told_apart_by_what_they_begin_with(held: Held, tmp_pat
         path = Path(write(tmp_path, held.K, "K", held.labels).removesuffix(":A"))
         renamed = path.rename(tmp_path / "matrix.data")
         assert read_matrix(str(renamed) + (":A" if write is write_v5 else ""), "K").kind == kind
+
+
+def test_damping_names_and_tables(held: Held, tmp_path: Path, capfd) -> None:
+    """C beside M and K; a table of dofs as CSV; coordinates as CSV; a note on units; what was read."""
+    C = sp.tril(1e-6 * held.K).tocsr()
+    parts = [write_npz(tmp_path, A, letter, held.labels) for letter, A in (("M", held.M), ("K", held.K), ("C", C))]
+    np.savetxt(tmp_path / "dofs.csv", held.labels, fmt="%d", delimiter=",")
+    numbers = np.arange(1, len(held.bar.nodes) + 1)
+    np.savetxt(
+        tmp_path / "nodes.csv",
+        np.column_stack([numbers, held.bar.nodes]),
+        delimiter=", ",
+        header="node, x, y, z",
+        comments="",
+    )
+    command = ["import", str(tmp_path / "m.h5"), "--mass", parts[0], "--stiffness", parts[1], "--damping", parts[2]]
+    tables = ["--dofs", str(tmp_path / "dofs.csv"), "--coordinates", str(tmp_path / "nodes.csv")]
+    assert main([*command, *tables, "--units", "kg, N, m", "--name", "tip=24z", "--name", "side=n24y"]) == 0
+    model = model_file.read(tmp_path / "m.h5")
+    assert abs(model.C - 1e-6 * held.K).max() == 0
+    assert model.names[-3:] == ["n24x", "side", "tip"] and sorted(model.kept) == [52, 53]
+    assert model.units == "kg, N, m"
+    assert [(s.role, s.path) for s in model.sources][2:4] == [("damping", "C.npz"), ("coordinates", "nodes.csv")]
+    assert model.sources[0].bytes == (tmp_path / "M.npz").stat().st_size and len(model.sources[0].sha256) == 64
+    np.testing.assert_array_equal(model.coordinates, held.bar.nodes)
+    assert "C: " in capfd.readouterr().out
+
+
+WRONG_OPTIONS = {
+    "short table": (["--dofs", "short.csv"], "the table of dofs does not fit"),
+    "no table": (["--dofs", "nowhere.dof"], "does not exist"),
+    "wrong table": (["--dofs", "wrong.dof"], "this is no table of dofs"),
+    "no coordinates": (["--coordinates", "nowhere.csv"], "does not exist"),
+    "nodes and dofs": (["--coordinates", "two.csv"], "which dof belongs to which node"),
+    "sets without nodes": (["--pairs", "A", "B", "--normal", "0,0,1"], "the matrices do not"),
+    "table of pairs": (["--dofs", "good.csv", "--pairs", "pairs.csv"], "pairs.csv:2"),
+    "pairs that are held": (["--dofs", "good.csv", "--pairs", "held.csv"], "cannot move"),
+    "a name twice": (["--name", "a=0", "--name", "a=1"], "cannot be named"),
+}
+
+
+@pytest.mark.parametrize("wrong", WRONG_OPTIONS)
+def test_wrong_options(held: Held, wrong: str, tmp_path: Path, capfd, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for letter, A in (("M", held.M), ("K", held.K)):
+        write_npz(tmp_path, A, letter, held.labels)
+    np.savetxt("good.csv", held.labels, fmt="%d", delimiter=",")
+    texts = {"short.csv": "1,1\n", "wrong.dof": "1.x\n", "two.csv": "1,0,0,0\n2,1,0,0\n"}
+    texts |= {"pairs.csv": "node_a,node_b,nx,ny,nz,area\n1,0,0,0\n", "held.csv": "1,2,0,0,1\n"}
+    for name, text in texts.items():
+        Path(name).write_text(text)
+    arguments, said = WRONG_OPTIONS[wrong]
+    assert main(["import", "m.h5", "--mass", "M.npz", "--stiffness", "K.npz", *arguments]) == 2
+    text = capfd.readouterr().err
+    assert said in text and "where:" in text and not Path("m.h5").exists()
+
+
+def test_nothing_is_overwritten(held: Held, tmp_path: Path, capfd) -> None:
+    given = [write_npz(tmp_path, A, letter, held.labels) for letter, A in (("M", held.M), ("K", held.K))]
+    for out, said in ((given[0], "would replace one of the matrices"), (str(tmp_path / "no" / "m.h5"), "folder")):
+        assert main(["import", out, "--mass", given[0], "--stiffness", given[1]]) == 2
+        assert said in capfd.readouterr().err

@@ -179,8 +179,13 @@ def _union(labelled: dict[str, Entries], notes: list[str]) -> IntArray:
             entries.held = held
         if len(absent):
             example = dof_name(*(int(part) for part in union[absent[0]]))
-            notes.append(f"{len(absent)} dofs have no entry in {letter}, the first is {example}")
+            notes.append(f"{counted(len(absent), 'dof')} without an entry in {letter}, the first is {example}")
     return union
+
+
+def counted(number: int, word: str) -> str:
+    """``1 dof``, ``2 dofs``."""
+    return f"{number} {word}{'s' * (number != 1)}"
 
 
 def sorted_labels(labels: IntArray) -> IntArray:
@@ -195,7 +200,7 @@ def _leave_out_held(found: Assembled, given: dict[str, Entries]) -> None:
     if not held or not np.any(held):
         return
     free = np.flatnonzero(~np.any(held, axis=0))
-    found.notes.append(f"{len(held[0]) - len(free)} dofs held by a penalty on the diagonal of K are left out")
+    found.notes.append(f"left out: {counted(len(held[0]) - len(free), 'dof')} held by a penalty on the diagonal of K")
     found.matrices = {letter: matrix[free][:, free] for letter, matrix in found.matrices.items()}
     found.labels = None if found.labels is None else found.labels[free]
 

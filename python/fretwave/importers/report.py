@@ -10,7 +10,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy.sparse.csgraph import connected_components
 
+from ..errors import FretwaveError
 from ..model_file import FileModel
+from .entries import counted
 
 Array = npt.NDArray[np.float64]
 
@@ -85,7 +87,7 @@ def check(model: FileModel, symmetry: dict[str, str], notes: Sequence[str], mode
     motions = rigid_motions(model)
     _contacts(model, report)
     _mass(model, motions, report)
-    _stiffness(model, report)
+    _diagonal(model, model.K.diagonal(), "stiffness", report)
     _frequencies(model, motions, modes, comm, report)
     _units(model, motions, report)
     return report
@@ -94,15 +96,13 @@ def check(model: FileModel, symmetry: dict[str, str], notes: Sequence[str], mode
 def _contacts(model: FileModel, report: Report) -> None:
     for contact in model.contacts.values():
         area = "areas not given" if contact.areas is None else f"area {contact.areas.sum():.6g} in all"
-        report.lines.append(f"contact '{contact.name}': {contact.pairs} pairs, {area}")
+        report.lines.append(f"contact '{contact.name}': {counted(contact.pairs, 'pair')}, {area}")
 
 
 def _mass(model: FileModel, motions: Array | None, report: Report) -> None:
     diagonal = model.M.diagonal()
-    for wrong, kind in ((diagonal < 0, "negative"), (diagonal == 0, "no")):
-        if wrong.any():
-            first = model.names[int(np.argmax(wrong))]
-            report.warnings.append(f"{wrong.sum()} dofs have {kind} mass, the first is {first}: M must be positive")
+    report.lines.append(f"M: diagonal {diagonal.min():.4g} to {diagonal.max():.4g}")
+    _diagonal(model, diagonal, "mass", report)
     if motions is None:
         report.lines.append("mass of the body: not known without coordinates and a table of dofs")
         return
@@ -121,12 +121,12 @@ def _masses(model: FileModel, motions: Array) -> Array:
     return np.asarray(np.einsum("ik,ik->k", motions[:, :3], model.M @ motions[:, :3]))
 
 
-def _stiffness(model: FileModel, report: Report) -> None:
-    diagonal = model.K.diagonal()
+def _diagonal(model: FileModel, diagonal: Array, quantity: str, report: Report) -> None:
+    """Mass and stiffness of every dof are above zero."""
     for wrong, kind in ((diagonal < 0, "negative"), (diagonal == 0, "no")):
         if wrong.any():
             first = model.names[int(np.argmax(wrong))]
-            report.warnings.append(f"{wrong.sum()} dofs have {kind} stiffness, the first is {first}")
+            report.warnings.append(f"{counted(int(wrong.sum()), 'dof')} with {kind} {quantity}, the first is {first}")
 
 
 def _frequencies(model: FileModel, motions: Array | None, modes: int, comm: Any, report: Report) -> None:
@@ -134,8 +134,14 @@ def _frequencies(model: FileModel, motions: Array | None, modes: int, comm: Any,
     from ..modes import linear_modes
 
     expected, bodies = (6, 1) if motions is None else expected_rigid(model, motions)
-    with Model(model.M, model.K, comm=comm) as whole:
-        found = linear_modes(whole, expected + modes, "free")
+    try:
+        with Model(model.M, model.K, comm=comm) as whole:
+            found = linear_modes(whole, expected + modes, "free")
+    except FretwaveError as error:
+        report.warnings.append(
+            f"the frequencies cannot be computed ({error.what}): is M positive, and is no dof loose?"
+        )
+        return
     scale = model.K.diagonal().sum() / model.M.diagonal().sum()
     squares = np.array([mode.shape @ (model.K @ mode.shape) / (mode.shape @ (model.M @ mode.shape)) for mode in found])
     rigid = int(np.sum(abs(squares) < RIGID * scale))
@@ -146,7 +152,7 @@ def _frequencies(model: FileModel, motions: Array | None, modes: int, comm: Any,
     report.lines.append(f"rigid modes: {rigid} found, {said}")
     if motions is not None and rigid != expected:
         report.warnings.append(
-            f"K has {rigid} rigid modes, the nodes and what holds them let expect {expected}: "
+            f"K has {counted(rigid, 'rigid mode')}, the nodes and what holds them let expect {expected}: "
             + ("a mechanism or a loose part" if rigid > expected else "K does not leave a rigid motion free of force")
         )
     if (squares < -RIGID * scale).any():

@@ -14,19 +14,22 @@ from .entries import Entries
 Array = npt.NDArray[np.float64]
 
 
+COMMENTS = ("*", "#", "%")
+
+
 def first_data_line(head: bytes) -> str:
     """The first line that is no comment and no keyword."""
     lines = head.decode("utf-8", errors="replace").splitlines()
-    return next((line for line in lines if line.strip() and not line.lstrip().startswith(("*", "%", "#"))), "")
+    return next((line for line in lines if line.strip() and not line.lstrip().startswith(COMMENTS)), "")
 
 
 def columns_of(path: Path, width: int) -> Array:
-    """(n_lines, width) numbers, separated by blanks or commas; lines that begin with ``*`` are comments."""
-    with path.open(encoding="utf-8", errors="replace") as file:
-        begin = file.read(65536)
-    comma = "," in first_data_line(begin.encode())
+    """(n_lines, width) numbers, separated by blanks or commas, after comments and one heading at most."""
+    with path.open("rb") as file:
+        first = first_data_line(file.read(65536))
+    skip = int(first.strip()[:1].isalpha())  # a heading stands in the first line
     try:
-        table = np.loadtxt(path, delimiter="," if comma else None, comments=["*", "#", "%"], ndmin=2)
+        table = np.loadtxt(path, delimiter="," if "," in first else None, comments=COMMENTS, ndmin=2, skiprows=skip)
     except ValueError as error:
         fix = "is the file complete, and of one matrix?"
         raise InputError(f"the file is no table of {width} columns", display(path), error, None, fix) from None
