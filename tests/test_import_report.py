@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import scipy.linalg
 import scipy.sparse as sp
-from matrix_files import Held, write_npz
+from matrix_files import Held, write_coordinate, write_npz
 
 from fretwave import model_file
 from fretwave.cli import main
@@ -103,7 +103,22 @@ def test_damping_names_and_tables(held: Held, tmp_path: Path, capfd) -> None:
     assert "C: " in capfd.readouterr().out
 
 
+def test_held_dofs_keep_the_numbering_of_the_others(held: Held, tmp_path: Path) -> None:
+    """Abaqus' coordinate format has no labels, but held dofs: rows stand node by node before those are left out."""
+    K, bar = held.bar.K.tolil(), held.bar
+    ends = bar.layer(0.0)
+    K[ends, ends] = 1e36
+    given = [write_coordinate(tmp_path, sp.csr_matrix(A), name, held.labels) for name, A in (("M", bar.M), ("K", K))]
+    np.savez(tmp_path / "nodes.npz", coordinates=bar.nodes)
+    command = ["import", str(tmp_path / "m.h5"), "--mass", given[0], "--stiffness", given[1]]
+    assert main([*command, "--coordinates", str(tmp_path / "nodes.npz")]) == 0
+    model = model_file.read(tmp_path / "m.h5")
+    np.testing.assert_array_equal(np.column_stack([model.node, model.direction]), held.labels)
+    assert abs(model.K - held.K).max() <= 1e-15 * abs(held.K).max()
+
+
 WRONG_OPTIONS = {
+    "a dof twice": (["--dofs", "twice.csv"], "stands twice in the table"),
     "short table": (["--dofs", "short.csv"], "the table of dofs does not fit"),
     "no table": (["--dofs", "nowhere.dof"], "does not exist"),
     "wrong table": (["--dofs", "wrong.dof"], "this is no table of dofs"),
@@ -122,6 +137,7 @@ def test_wrong_options(held: Held, wrong: str, tmp_path: Path, capfd, monkeypatc
     for letter, A in (("M", held.M), ("K", held.K)):
         write_npz(tmp_path, A, letter, held.labels)
     np.savetxt("good.csv", held.labels, fmt="%d", delimiter=",")
+    np.savetxt("twice.csv", np.vstack([held.labels[:-1], held.labels[:1]]), fmt="%d", delimiter=",")
     texts = {"short.csv": "1,1\n", "wrong.dof": "1.x\n", "two.csv": "1,0,0,0\n2,1,0,0\n"}
     texts |= {"pairs.csv": "node_a,node_b,nx,ny,nz,area\n1,0,0,0\n", "held.csv": "1,2,0,0,1\n"}
     for name, text in texts.items():

@@ -87,19 +87,31 @@ def _labels(options: argparse.Namespace, found: Assembled, nodes: Nodes | None) 
     """Node and direction of each dof: from --dofs, the matrices, or node by node as the coordinates stand."""
     if options.dofs:
         labels = _read_table(options.dofs)
-        if len(labels) != found.size:
+        where = display(options.dofs)
+        if len(labels) != found.given_size:
             fix = "give one line for each row of the matrices"
-            measured, expected = f"{len(labels)} dofs", f"{found.size}, the size of the matrices"
-            raise InputError("the table of dofs does not fit", display(options.dofs), measured, expected, fix)
-        return labels
-    if found.labels is not None or nodes is None:
+            measured, expected = f"{len(labels)} dofs", f"{found.given_size}, the size of the matrices"
+            raise InputError("the table of dofs does not fit", where, measured, expected, fix)
+        different, count = np.unique(labels, axis=0, return_counts=True)
+        if count.max() > 1:
+            node, direction = different[np.argmax(count)]
+            measured, fix = f"node {node}, direction {direction}", "correct the table"
+            raise InputError("a dof stands twice in the table", where, measured, "each dof once", fix)
+    elif found.labels is not None or nodes is None:
         return found.labels
-    per_node, rest = divmod(found.size, len(nodes.numbers))
+    else:
+        labels = _node_by_node(found, nodes)
+    return labels if found.rows is None else labels[found.rows]
+
+
+def _node_by_node(found: Assembled, nodes: Nodes) -> npt.NDArray[np.int64]:
+    """Three or six dofs for each node, in the order of the coordinates."""
+    per_node, rest = divmod(found.given_size, len(nodes.numbers))
     if rest or per_node not in (3, 6):
         raise InputError(
             "which dof belongs to which node is not known",
             nodes.where,
-            f"{found.size} dofs, {len(nodes.numbers)} nodes",
+            f"{found.given_size} dofs, {len(nodes.numbers)} nodes",
             "3 or 6 dofs for each node, or a table",
             "give --dofs FILE with a line `node,direction` for each row of the matrices",
         )

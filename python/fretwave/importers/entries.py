@@ -73,12 +73,18 @@ class Assembled:
     symmetry : dict
         What was found of each matrix and done about it, by letter.
     notes : list of str
+    rows : (n_dof,) or None
+        Rows of the files that are left, when dofs held by a penalty are not.
+    given_size : int
+        Rows of the files.
     """
 
     matrices: dict[str, sp.csr_matrix]
     labels: IntArray | None
     symmetry: dict[str, str]
     notes: list[str] = field(default_factory=list)
+    rows: IntArray | None = None
+    given_size: int = 0
 
     @property
     def size(self) -> int:
@@ -115,6 +121,7 @@ def assemble(given: dict[str, Entries], symmetric: str = "auto") -> Assembled:
         matrix = sp.csr_matrix((entries.values.astype(float), (entries.rows, entries.columns)), shape=entries.shape)
         matrix.eliminate_zeros()
         found.matrices[letter] = matrix
+    found.given_size = found.size
     _leave_out_held(found, given)
     for letter, entries in given.items():
         matrix, said = _both_triangles(letter, found.matrices[letter], entries, symmetric, found.names)
@@ -201,6 +208,7 @@ def _leave_out_held(found: Assembled, given: dict[str, Entries]) -> None:
         return
     free = np.flatnonzero(~np.any(held, axis=0))
     found.notes.append(f"left out: {counted(len(held[0]) - len(free), 'dof')} held by a penalty on the diagonal of K")
+    found.rows = free
     found.matrices = {letter: matrix[free][:, free] for letter, matrix in found.matrices.items()}
     found.labels = None if found.labels is None else found.labels[free]
 
