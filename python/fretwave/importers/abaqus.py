@@ -15,7 +15,7 @@ import scipy.sparse as sp
 
 from ..errors import InputError
 from ..source import display
-from .entries import Array, Entries, IntArray, sorted_labels
+from .entries import Array, Entries, IntArray, order_of
 from .text import columns_of, first_data_line, triplets
 
 #: A diagonal entry from here on is Abaqus' penalty 1e36 on a held dof.
@@ -61,19 +61,20 @@ def _labelled(table: Array, where: str) -> Entries:
             "node, dof, node, dof, entry",
             "export with *MATRIX OUTPUT, FORMAT=MATRIX INPUT",
         )
-    ends = numbers.reshape(-1, 2)
-    labels = sorted_labels(ends)
-    places = _place(ends, labels).reshape(-1, 2)
-    rows, columns = _one_triangle(places[:, 0], places[:, 1], len(labels))
+    labels, places = _numbered(numbers.reshape(-1, 2))
+    rows, columns = _one_triangle(places[::2], places[1::2], len(labels))
     return Entries(rows, columns, table[:, 4], (len(labels),) * 2, where, "Abaqus, matrix input", labels)
 
 
-def _place(ends: IntArray, labels: IntArray) -> IntArray:
-    """Number of each (node, direction) in the table."""
-    order = np.lexsort((labels[:, 1], labels[:, 0]))
-    span = int(max(ends[:, 1].max(), labels[:, 1].max())) + 1
-    keys = labels[order, 0] * span + labels[order, 1]
-    return np.asarray(order[np.searchsorted(keys, ends[:, 0] * span + ends[:, 1])], dtype=np.int64)
+def _numbered(ends: IntArray) -> tuple[IntArray, IntArray]:
+    """Different (node, dof) by `order_of`, and the number of each end among them."""
+    span = int(ends[:, 1].max()) + 1
+    keys, inverse = np.unique(ends[:, 0] * span + ends[:, 1], return_inverse=True)
+    found = np.column_stack([keys // span, keys % span])
+    order = order_of(found)
+    number = np.empty(len(order), dtype=np.int64)
+    number[order] = np.arange(len(order))
+    return found[order], number[inverse]
 
 
 def _one_triangle(rows: IntArray, columns: IntArray, size: int) -> tuple[IntArray, IntArray]:

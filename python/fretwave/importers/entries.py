@@ -171,8 +171,9 @@ def _one_numbering(given: dict[str, Entries], notes: list[str]) -> IntArray | No
 
 def _union(labelled: dict[str, Entries], notes: list[str]) -> IntArray:
     """Rows of all matrices by (node, direction); a dof absent from one matrix has no entries there."""
-    tables = [entries.labels for entries in labelled.values()]
-    union = sorted_labels(np.concatenate(tables))  # type: ignore[arg-type]
+    tables = [entries.labels for entries in labelled.values() if entries.labels is not None]
+    union: IntArray = np.unique(np.concatenate(tables), axis=0)
+    union = union[order_of(union)]
     place = {tuple(label): number for number, label in enumerate(union.tolist())}
     for letter, entries in labelled.items():
         assert entries.labels is not None
@@ -195,11 +196,9 @@ def counted(number: int, word: str) -> str:
     return f"{number} {word}{'s' * (number != 1)}"
 
 
-def sorted_labels(labels: IntArray) -> IntArray:
-    """Different labels by node and direction, internal nodes (negative numbers) last."""
-    different = np.unique(labels, axis=0)
-    order = np.lexsort((different[:, 1], abs(different[:, 0]), different[:, 0] < 0))
-    return np.asarray(different[order])
+def order_of(labels: IntArray) -> IntArray:
+    """By node and direction, internal nodes (negative numbers) last."""
+    return np.asarray(np.lexsort((labels[:, 1], abs(labels[:, 0]), labels[:, 0] < 0)))
 
 
 def _leave_out_held(found: Assembled, given: dict[str, Entries]) -> None:
