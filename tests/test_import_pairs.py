@@ -129,6 +129,16 @@ def test_pairs_from_a_table(tmp_path: Path) -> None:
     assert model.names[int(model.kept[0])] == "tip" and int(model.kept[0]) == 22
 
 
+def test_pairs_with_ground(tmp_path: Path) -> None:
+    two = Two()
+    assert main([*two.write(tmp_path), "--pairs", "wall=LEFT", "ground", "--normal", "1,0,0"]) == 0
+    wall = model_file.read(tmp_path / "m.h5").contacts["wall"]
+    moved = np.arange(3.0 * len(two.nodes)).reshape(-1, 3)
+    u = (wall.B @ moved.ravel()).reshape(-1, 3)
+    np.testing.assert_allclose(u[:, 0], moved[wall.nodes[:, 0] - 1, 0])
+    np.testing.assert_array_equal(wall.nodes[:, 1], 0)
+
+
 WRONG_PAIRS = {
     "set": (["--pairs", "LEFT", "RIHGT", "--normal", "1,0,0"], "did you mean `RIGHT`?"),
     "normal": (["--pairs", "LEFT", "RIGHT"], "--normal X,Y,Z"),

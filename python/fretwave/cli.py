@@ -131,7 +131,7 @@ def _add_import(commands: Any) -> None:
         action="append",
         default=[],
         metavar="[NAME=]SET",
-        help="contact: two sets of coincident nodes, or one CSV of node_a,node_b,nx,ny,nz,area",
+        help="contact: two sets of coincident nodes, SET GROUND, or one CSV of node_a,node_b,nx,ny,nz,area",
     )
     add.add_argument("--normal", metavar="X,Y,Z", help="from the first set to the second")
     add.add_argument("--tangent", metavar="X,Y,Z", help="first tangent (default: the axis most across the normals)")

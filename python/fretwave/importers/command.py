@@ -159,7 +159,7 @@ def _contacts(
         name, first = (name, first) if equals else ("contact" if not number else f"contact_{number + 1}", words[0])
         where = f"--pairs {' '.join(words)}"
         if not name.isidentifier() or name in seen or len(words) > 2:
-            expected = "[NAME=]SET_A SET_B or [NAME=]FILE.csv, each with its own name"
+            expected = "[NAME=]SET_A SET_B, [NAME=]SET GROUND or [NAME=]FILE.csv, each with its own name"
             raise InputError("contact pairs are not given so", where, None, expected, "--pairs root=BLADE DISK")
         if labels is None:
             fix = "give --dofs FILE or --coordinates FILE"

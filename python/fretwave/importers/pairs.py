@@ -26,6 +26,8 @@ IntArray = npt.NDArray[np.int64]
 
 #: Nodes of a pair are this close, over the diagonal of the mesh, unless told.
 TOLERANCE = 1e-6
+#: The second set of pairs with ground.
+GROUND = "GROUND"
 #: Unmatched nodes that a message names.
 SHOWN = 8
 
@@ -50,7 +52,7 @@ class Pairs:
 
 
 def match(nodes: Nodes, first: str, second: str, normal: Array | None, tolerance: float | None = None) -> Pairs:
-    """Pairs of coincident nodes of two sets.
+    """Pairs of coincident nodes of two sets, or of one set with ``GROUND``.
 
     Parameters
     ----------
@@ -66,6 +68,9 @@ def match(nodes: Nodes, first: str, second: str, normal: Array | None, tolerance
     if normal is None:
         fix = "give --normal X,Y,Z, from the first body to the second, or a CSV of pairs with normals"
         raise InputError("the pairs have no normal", where, None, "a direction", fix)
+    if second.upper() == GROUND and GROUND not in nodes.sets:
+        a = nodes.node_set(first)
+        return Pairs(np.column_stack([a, np.zeros_like(a)]), np.broadcast_to(normal, (len(a), 3)), where)
     a, b = nodes.node_set(first), nodes.node_set(second)
     xa, xb = (nodes.coordinates[nodes.places(numbers)] for numbers in (a, b))
     reach = TOLERANCE * float(np.linalg.norm(np.ptp(nodes.coordinates, axis=0))) if tolerance is None else tolerance
