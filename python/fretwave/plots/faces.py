@@ -18,6 +18,8 @@ MAPS = 4
 #: diameter of a pair's disc [pt], and margin around the pairs over their extent
 DISC = 13.0
 MARGIN = 0.22
+#: smaller shares than this are too thin to draw
+SEEN = 0.005
 #: a sample slips when its tangential force is this near to the limit
 AT_LIMIT = 1e-6
 STATUS = {"stick": style.BLUE, "slip": style.ORANGE, "open": "#dddddd"}
@@ -121,9 +123,10 @@ def _shares(axes: Axes, mode: Analysis, points: Sequence[int]) -> None:
 def _pies(axes: Axes, places: Array, shares: Array) -> None:
     """One disc per pair, cut into its shares, of one size on paper whatever the scale of the axes."""
     for place, parts in zip(MM * places, shares.T):
-        ends = 2 * np.pi * np.concatenate([[0.0], np.cumsum(parts)])
+        parts = np.where(parts < SEEN, 0.0, parts)
+        ends = 2 * np.pi * np.concatenate([[0.0], np.cumsum(parts / parts.sum())])
         for begin, end, colour in zip(ends, ends[1:], STATUS.values()):
-            if end - begin > 1e-9:
+            if end > begin:
                 angle = np.linspace(begin, end, 2 + int(24 * (end - begin)))
                 arc = np.column_stack([np.sin(angle), np.cos(angle)])
                 outline = arc if end - begin > 6.28 else np.vstack([[0.0, 0.0], arc])

@@ -52,9 +52,7 @@ def _limits(axes: Axes, mode: Analysis, contact: str, pair: int) -> None:
         limit = mode.pairs(contact)["friction_coefficient"][pair] * normal
         for sign in (1.0, -1.0):
             axes.plot(normal, sign * limit, color=style.GREY, linestyle="--", linewidth=1.0, zorder=1)
-        axes.annotate(
-            "friction limit", (normal[1], limit[1]), (-4, -3), textcoords="offset points", ha="right", va="top"
-        )
+        axes.annotate("dashed: friction limit", (0.03, 0.05), xycoords="axes fraction", fontsize=9.5)
 
 
 def busiest(mode: Analysis, contact: str, point: int) -> dict[str, int]:
