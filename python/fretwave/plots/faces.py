@@ -11,7 +11,6 @@ from matplotlib.lines import Line2D
 
 from . import style
 from .data import Analysis, Array, Run
-from .trajectories import spread
 
 #: amplitudes of a map
 MAPS = 4
@@ -68,7 +67,7 @@ def draw_load(static: Analysis, contact: str, table: dict[str, Array]) -> Figure
 
 def draw_map(mode: Analysis, contact: str) -> Figure:
     """Shares of the period that each pair sticks, slips and is open, at several amplitudes, below the shares of all."""
-    points = [p for p in spread(mode, MAPS + 2) if p in mode.reported][-MAPS:]
+    points = chosen_points(mode)
     pairs = mode.pairs(contact)
     names = list(dict.fromkeys(pairs["face"]))
     figure, _ = style.new_figure(3.6 + 1.25 * len(points))
@@ -86,6 +85,13 @@ def draw_map(mode: Analysis, contact: str) -> Figure:
     figure.supxlabel("Along the face [mm]; each disc is one contact pair, cut by its shares of a period", fontsize=10)
     figure.supylabel("Up the face [mm]", fontsize=10, y=0.36)
     return figure
+
+
+def chosen_points(mode: Analysis) -> list[int]:
+    """Kept points at which not all pairs stick, even in number; the largest amplitude is among them."""
+    moving = [p for p in mode.reported if mode.columns["stick"][p] < 1] or mode.reported
+    moving = sorted(moving, key=lambda p: float(mode.columns["amplitude"][p]))
+    return [moving[i] for i in np.unique(np.linspace(0, len(moving) - 1, MAPS).round().astype(int))]
 
 
 def status_shares(f: Array, friction: Array) -> Array:

@@ -13,6 +13,7 @@ from .data import Analysis, Run
 from .phase_planes import amplitude_name, kept_points
 
 UM = 1e6
+LEGEND_COLUMNS = 6
 
 
 def figures(run: Run) -> Iterator[tuple[str, Figure]]:
@@ -41,7 +42,7 @@ def draw(mode: Analysis, contact: str) -> Figure:
         _limits(lower, mode, contact, pair)
     for first in axes[:, 0]:
         first.set_ylabel(style.label("Friction force", "N"))
-    style.legend_outside(figure, axes[0, 0], columns=len(points), title=f"Modal amplitude, {mode.method()}")
+    style.legend_outside(figure, axes[0, 0], columns=LEGEND_COLUMNS, title=f"Modal amplitude, {mode.method()}")
     return figure
 
 
