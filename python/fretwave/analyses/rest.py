@@ -84,15 +84,20 @@ def start_mode(context: AnalysisContext, linear_mode: int) -> tuple[Any, Any]:
     return context.linear_mode("stuck", linear_mode)[linear_mode - 1], rest
 
 
-def retained(context: AnalysisContext) -> Any:
-    """Harmonics of an analysis in the frequency domain: with a preload the even ones too, unless told otherwise."""
+def retained(context: AnalysisContext, highest: int | None = None, samples: int | None = None) -> Any:
+    """Harmonics of an analysis in the frequency domain: with a preload the even ones too, unless told otherwise.
+
+    Parameters
+    ----------
+    highest, samples : in place of the analysis' own
+    """
     import fretwave
 
     analysis: Any = context.analysis
     retain = analysis.retain
     if retain == "auto" and context.case.preload_of(analysis) is not None:
         retain = "all"
-    return fretwave.choose_harmonics(context.model, analysis.harmonics, analysis.samples, retain)
+    return fretwave.choose_harmonics(context.model, highest or analysis.harmonics, samples or analysis.samples, retain)
 
 
 def keep_pairs(context: AnalysisContext, writer: Any) -> None:
