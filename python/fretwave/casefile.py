@@ -178,10 +178,11 @@ def _build(source: Source, laws: Mapping[str, Any], found: list[FretwaveError]) 
     contacts = read_contacts(source, dofs, laws, found, built.contacts if built else {})
     keep = kept_dofs(origin.named, contacts, analyses, origin.dofs) if origin and reduction else []
     checks.check_analyses(source, analyses, [origin.dofs[k] for k in keep] if origin and keep else dofs, found)
-    checks.check_preloads(source, analyses, built.loads if built else {}, found)
+    checks.check_preloads(source, analyses, built.loads if built else () if origin else None, found)
     notes: list[str] = []
     if origin is not None:
-        check_physics(origin, [contact.rows for contact in contacts], notes, found)
+        complete = len(contacts) == len(source.entries("contact"))
+        check_physics(origin, [contact.rows for contact in contacts] if complete else None, notes, found)
     if found or section is None or origin is None:
         return None
     loaded = {letter: matrix.values for letter, matrix in origin.matrices.items()}

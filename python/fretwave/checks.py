@@ -128,11 +128,13 @@ def check_analyses(
             report.mode(("mode",), analysis.mode, modes)
 
 
-def check_preloads(source: Source, analyses: dict[int, AnalysisSection], loads: Iterable[str], found: Found) -> None:
-    """Loads must come with the model; time integration starts at rest without any."""
+def check_preloads(
+    source: Source, analyses: dict[int, AnalysisSection], loads: Iterable[str] | None, found: Found
+) -> None:
+    """Loads must come with the model (None: it is not known); time integration starts at rest without any."""
     places = [("preload",), *(("analysis", number, "preload") for number in analyses)]
-    known = list(loads)
-    for place in places:
+    known = list(loads or ())
+    for place in places if loads is not None else ():
         given = at(source.data, (*place, "loads"))
         for index, name in enumerate(given if isinstance(given, list) else []):
             if name not in known:

@@ -150,12 +150,12 @@ def _dof_names(section: ModelSection, loaded: dict[str, Matrix], source: Source,
     return named if named is not None else [str(number) for number in range(size)]
 
 
-def check_physics(origin: Origin, rows: Sequence[Any], notes: list[str], found: Found) -> None:
+def check_physics(origin: Origin, rows: Sequence[Any] | None, notes: list[str], found: Found) -> None:
     """Symmetry, positive mass, and a structure that is held once the contact sticks.
 
     Parameters
     ----------
-    rows : B of every contact.
+    rows : B of every contact; None when some are wrong, and what holds the structure is not known.
     """
     loaded, dofs = origin.matrices, origin.dofs
     for letter in ("M", "K"):
@@ -165,7 +165,7 @@ def check_physics(origin: Origin, rows: Sequence[Any], notes: list[str], found: 
         problem = matrices.check_symmetric(matrix, dofs)
         if problem is None and letter == "M":
             problem = matrices.check_mass(matrix, dofs)
-        elif problem is None:
+        elif problem is None and rows is not None:
             stacked = scipy.sparse.vstack(rows) if rows else scipy.sparse.csr_matrix((0, len(dofs)))
             problem, note = matrices.check_stiffness(matrix, dofs, stacked)
             notes.extend([note] if note else [])

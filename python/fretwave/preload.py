@@ -92,13 +92,13 @@ def static_preload(
 ) -> Preload:
     """Static equilibrium under `load` and the normal loads given pair by pair. Collective.
 
-    By continuation in the load factor from the unloaded state. A structure that only the contact holds has no stiffness
-    there while its pairs just touch: then from a small load with the contact closed.
+    By continuation in the load factor, from the unloaded state.
 
     Parameters
     ----------
     closed : (n_dof,), optional
-        Displacement under the full load with all pairs closed, a guess.
+        Displacement under the full load with all pairs closed: start from a small share of it. For pairs that just
+        touch when unloaded: a structure that they alone hold has no stiffness there.
 
     Raises
     ------
@@ -109,15 +109,12 @@ def static_preload(
     rest = balanced(model, reference)
     problem = StaticPreload(model, load, reference, rest.load)
     control = steps or StepControl(initial=0.1, maximum=0.5)
-    starts = [problem.core.initial()]
-    if closed is not None:
-        starts.append(problem.at(FIRST_FACTOR * closed, FIRST_FACTOR))
-    for start in starts:
-        y, reached, branch = None, 0.0, Continuation(problem, start, (-1.0, 1.0), control, upwards=True)
-        for point in branch:
-            y, reached = point.y, point.parameter
-        if branch.converged:
-            return _settled(problem, y, rest.load + load)
+    start = problem.core.initial() if closed is None else problem.at(FIRST_FACTOR * closed, FIRST_FACTOR)
+    y, reached, branch = None, 0.0, Continuation(problem, start, (-1.0, 1.0), control, upwards=True)
+    for point in branch:
+        y, reached = point.y, point.parameter
+    if branch.converged:
+        return _settled(problem, y, rest.load + load)
     raise NotConverged(
         "no static equilibrium under the full load",
         None,

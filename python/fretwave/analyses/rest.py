@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import scipy.sparse.linalg
 
+from ..contacts import ContactSpec
+from ..schema import PreloadSection
 from .asymptotes import closed_stiffness
 from .context import AnalysisContext
 
@@ -39,9 +42,20 @@ def rest_state(context: AnalysisContext, factor: float = 1.0) -> Any:
     if section is None or not section.loads:
         return balanced(context.model, reference)
     load = factor * np.sum([context.case.loads[name] for name in section.loads], axis=0)
-    stuck = context.case.K + closed_stiffness(context, tangential=True)
-    closed = scipy.sparse.linalg.spsolve(stuck.tocsc(), load)
+    closed = None
+    if just_touching(context.case.contacts, section):
+        stuck = context.case.K + closed_stiffness(context, tangential=True)
+        closed = scipy.sparse.linalg.spsolve(stuck.tocsc(), load)
     return static_preload(context.model, load, reference, closed=closed)
+
+
+def just_touching(contacts: Sequence[ContactSpec], section: PreloadSection) -> bool:
+    """Pairs in three dimensions without a gap and without a load of their own."""
+    return any(contact.components == 3 for contact in contacts) and all(
+        (not section.pair_loads or not np.any(contact.parameters.get("normal_load", 0.0)))
+        and not np.any(contact.parameters.get("gap", 0.0))
+        for contact in contacts
+    )
 
 
 def closed_mode(context: AnalysisContext) -> Any:
@@ -70,15 +84,20 @@ def start_mode(context: AnalysisContext, linear_mode: int) -> tuple[Any, Any]:
     return context.linear_mode("stuck", linear_mode)[linear_mode - 1], rest
 
 
-def retained(context: AnalysisContext) -> Any:
-    """Harmonics of an analysis in the frequency domain: with a preload the even ones too, unless told otherwise."""
+def retained(context: AnalysisContext, highest: int | None = None, samples: int | None = None) -> Any:
+    """Harmonics of an analysis in the frequency domain: with a preload the even ones too, unless told otherwise.
+
+    Parameters
+    ----------
+    highest, samples : in place of the analysis' own
+    """
     import fretwave
 
     analysis: Any = context.analysis
     retain = analysis.retain
     if retain == "auto" and context.case.preload_of(analysis) is not None:
         retain = "all"
-    return fretwave.choose_harmonics(context.model, analysis.harmonics, analysis.samples, retain)
+    return fretwave.choose_harmonics(context.model, highest or analysis.harmonics, samples or analysis.samples, retain)
 
 
 def keep_pairs(context: AnalysisContext, writer: Any) -> None:
