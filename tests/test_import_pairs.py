@@ -143,6 +143,7 @@ WRONG_PAIRS = {
     "set": (["--pairs", "LEFT", "RIHGT", "--normal", "1,0,0"], "did you mean `RIGHT`?"),
     "normal": (["--pairs", "LEFT", "RIGHT"], "--normal X,Y,Z"),
     "direction": (["--pairs", "LEFT", "RIGHT", "--normal", "1,0"], "x,y,z"),
+    "both": (["--pairs", "LEFT", "LEFT", "--normal", "1,0,0"], "in both sets"),
     "file": (["--pairs", "nowhere.csv"], "does not exist"),
     "three": (["--pairs", "LEFT", "RIGHT", "MORE"], "[NAME=]SET_A SET_B"),
     "twice": (["--pairs", "a=LEFT", "RIGHT", "--pairs", "a=LEFT", "RIGHT", "--normal", "1,0,0"], "own name"),

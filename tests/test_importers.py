@@ -100,6 +100,14 @@ def test_triangles(held: Held, side: str, asked: str, tmp_path: Path) -> None:
     assert found.symmetry["K"].startswith(side)
 
 
+@pytest.mark.parametrize("asked", ["auto", "lower", "upper"])
+def test_a_triangle_in_an_order_of_its_own(held: Held, asked: str, tmp_path: Path) -> None:
+    """A triangle by Abaqus' numbering lies on both sides of the diagonal of ours."""
+    found = assemble({"K": read_matrix(EXACT["Abaqus, matrix input"](tmp_path, held.K, "K", held.labels), "K")}, asked)
+    assert (found.matrices["K"] != held.K).nnz == 0
+    assert found.symmetry["K"] == "one triangle, mirrored"
+
+
 def test_a_diagonal_mass_is_no_triangle(tmp_path: Path) -> None:
     entries = read_matrix(write_npz(tmp_path, sp.eye(4, format="csr"), "M", np.zeros(0)), "M")
     entries_k = read_matrix(write_npz(tmp_path, sp.eye(4, format="csr"), "K", np.zeros(0)), "K")
@@ -198,10 +206,13 @@ def test_wrong_matrices(wrong: str, tmp_path: Path, capfd) -> None:
     assert not (tmp_path / "m.h5").exists()
 
 
-@pytest.mark.parametrize(("asked", "said"), [("lower", "6 in the other"), ("full", "1 stray")])
-def test_asked_for_another_triangle(asked: str, said: str, tmp_path: Path, held: Held) -> None:
+@pytest.mark.parametrize(
+    ("asked", "corner", "said"),
+    [("lower", 0, "6 in the other"), ("full", 1, "1 stray"), ("full", 0, "none in the other")],
+)
+def test_asked_for_another_triangle(asked: str, corner: float, said: str, tmp_path: Path, held: Held) -> None:
     A = np.triu(np.ones((4, 4)))
-    A[3, 0] = 1 if asked == "full" else 0
+    A[3, 0] = corner
     given = {"K": read_matrix(write_npz(tmp_path, sp.csr_matrix(A), "K", held.labels), "K")}
     with pytest.raises(fw.InputError, match=said):
         assemble(given, asked)

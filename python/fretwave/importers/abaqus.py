@@ -62,8 +62,11 @@ def _labelled(table: Array, where: str) -> Entries:
             "export with *MATRIX OUTPUT, FORMAT=MATRIX INPUT",
         )
     labels, places = _numbered(numbers.reshape(-1, 2))
-    rows, columns = _one_triangle(places[::2], places[1::2], len(labels))
-    return Entries(rows, columns, table[:, 4], (len(labels),) * 2, where, "Abaqus, matrix input", labels)
+    rows, columns, shape = places[::2], places[1::2], (len(labels),) * 2
+    half = _is_half(rows, columns, shape)
+    if half:
+        rows, columns = np.maximum(rows, columns), np.minimum(rows, columns)
+    return Entries(rows, columns, table[:, 4], shape, where, "Abaqus, matrix input", labels, half=half)
 
 
 def _numbered(ends: IntArray) -> tuple[IntArray, IntArray]:
@@ -77,13 +80,9 @@ def _numbered(ends: IntArray) -> tuple[IntArray, IntArray]:
     return found[order], number[inverse]
 
 
-def _one_triangle(rows: IntArray, columns: IntArray, size: int) -> tuple[IntArray, IntArray]:
-    """A triangle in Abaqus' order of the dofs is none in ours: an entry without mirror image goes to the lower one."""
-    ones = np.ones(len(rows), dtype=np.int8)
-    pattern = sp.csr_matrix((ones, (rows, columns)), shape=(size, size))
-    pattern.data[:] = 1
-    off = rows != columns
-    both = pattern.multiply(pattern.T).nnz > np.count_nonzero(pattern.diagonal())
-    if both or not off.any():
-        return rows, columns
-    return np.maximum(rows, columns), np.minimum(rows, columns)
+def _is_half(rows: IntArray, columns: IntArray, shape: tuple[int, int]) -> bool:
+    """No entry beside the diagonal has a mirror image: a triangle in Abaqus' order of the dofs, which is not ours."""
+    pattern = sp.csr_matrix((np.ones(len(rows)), (rows, columns)), shape=shape)
+    pattern.data[:] = 1.0
+    mirrored = pattern.multiply(pattern.T).nnz - np.count_nonzero(pattern.diagonal())
+    return bool(mirrored == 0 and (rows != columns).any())

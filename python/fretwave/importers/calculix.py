@@ -2,8 +2,9 @@
 
 Layout (G. Dhondt, CalculiX CrunchiX User's Manual, keyword *FREQUENCY; its routine matrixstorage.c): one entry a line,
 "row column value", indices from 1, row <= column (the upper triangle with the diagonal), 14 digits; ``job.dof`` has one
-line "node.direction" for each row. Dofs that are held or depend on others by an equation are no rows. With cyclic
-symmetry the Hermitian matrices of one nodal diameter are stored as [[R, -I], [I, R]] of twice the size.
+line "node.direction" for each row. Dofs that are held or depend on others by an equation are no rows. At nodes with
+*TRANSFORM the directions may be local, which no file says: leave *TRANSFORM out. With cyclic symmetry the Hermitian
+matrices of one nodal diameter are stored as [[R, -I], [I, R]] of twice the size.
 """
 
 from __future__ import annotations

@@ -40,6 +40,8 @@ class Entries:
         What the reader did to get both triangles, "" for nothing.
     held : (n_dof,) bool or None
         Dofs that the code held by a penalty, to be left out.
+    half : bool
+        One triangle in the code's own order of the dofs, moved to the lower one of ours.
     """
 
     rows: IntArray
@@ -51,6 +53,7 @@ class Entries:
     labels: IntArray | None = None
     mirrored: str = ""
     held: npt.NDArray[np.bool_] | None = None
+    half: bool = False
 
     @classmethod
     def of(cls, matrix: Any, where: str, kind: str, mirrored: str = "") -> Entries:
@@ -216,6 +219,11 @@ def _both_triangles(
     letter: str, A: sp.csr_matrix, entries: Entries, symmetric: str, names: Sequence[str]
 ) -> tuple[sp.csr_matrix, str]:
     counts = {"lower": sp.tril(A, -1).nnz, "upper": sp.triu(A, 1).nnz}
+    if entries.half and symmetric != "full":
+        return _mirror(A), "one triangle, mirrored"
+    if symmetric == "full" and any(counts.values()) and not all(counts.values()):
+        measured = f"{max(counts.values())} entries in one triangle, none in the other"
+        raise InputError(f"{letter} is not full", entries.where, measured, "both triangles", "use --symmetric auto")
     if symmetric in counts:
         other = "upper" if symmetric == "lower" else "lower"
         if counts[other]:

@@ -72,6 +72,10 @@ def match(nodes: Nodes, first: str, second: str, normal: Array | None, tolerance
         a = nodes.node_set(first)
         return Pairs(np.column_stack([a, np.zeros_like(a)]), np.broadcast_to(normal, (len(a), 3)), where)
     a, b = nodes.node_set(first), nodes.node_set(second)
+    both = np.intersect1d(a, b)
+    if len(both):
+        measured = f"{len(both)} nodes, the first is {both[0]}"
+        raise InputError("a node is in both sets", where, measured, "two nodes at one place", "split the mesh there")
     xa, xb = (nodes.coordinates[nodes.places(numbers)] for numbers in (a, b))
     reach = TOLERANCE * float(np.linalg.norm(np.ptp(nodes.coordinates, axis=0))) if tolerance is None else tolerance
     distance, partner = cKDTree(xb).query(xa)
