@@ -57,8 +57,9 @@ void bind_hb(nb::module_& m) {
       .def(
           "__init__",
           [](NonlinearMode* self, model::Model const& model, Harmonics const& h, Method method, int dof,
-             double omega,
-             Petsc<Vec> shape) { new (self) NonlinearMode(model, h, method, dof, omega, shape.object); },
+             double omega, Petsc<Vec> shape, Petsc<Vec> imaginary) {
+            new (self) NonlinearMode(model, h, method, dof, omega, shape.object, imaginary.object);
+          },
           nb::keep_alive<1, 2>())
       .def("initial", [](NonlinearMode& p, double a) { return nb::steal(to_petsc4py(p.initial(a))); })
       .def("state", [](NonlinearMode& p, Petsc<Vec> y) {

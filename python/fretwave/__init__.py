@@ -10,6 +10,8 @@ from .errors import FretwaveError, InputError, NotConverged
 if TYPE_CHECKING:
     from .contact_laws import LawInfo, ParameterInfo, PythonLaw, laws
     from .continuation import Continuation, Point, StepControl
+    from .cyclic import Sector
+    from .faces import match_faces
     from .model import Contact, Model
     from .modes import LinearMode, linear_modes
     from .problems import ForcedResponse, Harmonics, NonlinearMode, choose_harmonics
@@ -19,6 +21,8 @@ if TYPE_CHECKING:
 #: Where each public name lives; loaded when first used, so that `fretwave --help` starts without PETSc.
 _HOMES = {
     "continuation": ("Continuation", "Point", "StepControl"),
+    "cyclic": ("Sector",),
+    "faces": ("match_faces",),
     "contact_laws": ("LawInfo", "ParameterInfo", "PythonLaw", "laws"),
     "model": ("Contact", "Model"),
     "modes": ("LinearMode", "linear_modes"),
@@ -45,11 +49,13 @@ __all__ = [
     "Point",
     "PythonLaw",
     "Reduction",
+    "Sector",
     "StepControl",
     "Transient",
     "choose_harmonics",
     "laws",
     "linear_modes",
+    "match_faces",
     "reduce",
 ]
 

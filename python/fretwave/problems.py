@@ -175,8 +175,8 @@ class NonlinearMode(HarmonicProblem):
 
             start = linear_modes(model, 1)[0]
         self.method, self.dof, self.start = method, dof, start
-        shape = model.vector(start.shape)
-        core = _core.NonlinearMode(model.core, harmonics.core, getattr(_core.Method, method), dof, start.omega, shape)
+        shape = (model.vector(start.shape), model.vector(start.imaginary))
+        core = _core.NonlinearMode(model.core, harmonics.core, getattr(_core.Method, method), dof, start.omega, *shape)
         super().__init__(model, harmonics, prefix, core)
 
     def initial(self, amplitude: float) -> PETSc.Vec:

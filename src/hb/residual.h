@@ -26,9 +26,12 @@ class Residual {
   double* values(double scale, double* v);
 
   DynamicStiffness const& stiffness() const { return stiffness_; }
-  /// B^T (mean tangent) B at the last evaluated point, dense n_dof x n_dof, whole on every rank: stiffness
-  /// and damping. Collective.
-  void mean_contact(std::vector<double>& K, std::vector<double>& C);
+  /// B^H (mean tangent) B at the last evaluated point, dense n_dof x n_dof, whole on every rank: stiffness
+  /// and damping of one spatial phase, to be multiplied by e^{-i phase n theta} like a linear term.
+  /// Collective.
+  void mean_contact(std::vector<double>& K, std::vector<double>& C, int phase = 0);
+  /// Phases for which there is a mean contact, ascending.
+  std::vector<int> contact_phases() const;
 
   /// Contact of the motion (Q, e), summed over all ranks and contacts. Collective.
   ContactSummary summarise(Vec Q, Exponents const& e);
@@ -38,9 +41,16 @@ class Residual {
   std::vector<ContactPeriod> periods(Vec Q, Exponents const& e);
 
  private:
+  /// A contact's map to the sector `phase` places ahead.
+  struct Map {
+    int phase;
+    Mat rows;                     ///< B_k
+    MatHandle B;                  ///< B_k (x) I_m
+    std::vector<complex> factor;  ///< e^{-i k n theta} per retained order; empty for k = 0
+  };
   struct Group {
     model::Contact const* contact;
-    MatHandle B;  ///< B (x) I_m
+    std::vector<Map> maps;
     Aft aft;
     VecHandle U, F;
     std::vector<double> dV;
@@ -48,17 +58,26 @@ class Residual {
       int pair, component;
       PetscInt dof;
       double value;
+      int map;
     };
     struct Place {
       int pair, row, col;
       double value;
+      int row_map, col_map;
     };
     std::vector<Place> places;
     std::vector<Weight> weights;
+    /// Runs body(a, b) for any two weights of the same pair.
+    template <class Body>
+    void each_couple(Body body) const;
   };
-  VecHandle relative_motion(Group&, Vec Q) const;
+  Map make_map(Mat B, int phase) const;
+  void relative_motion(Group const&, Vec Q, Vec U) const;
+  VecHandle relative_motion(Group const&, Vec Q) const;
+  void add_force(Group const&, Vec F, Vec R) const;
   void contact_product(Group&, Vec dQ, Exponents const* de, Vec dR);
   void find_weights(Group&);
+  void turn(Map const& row, Map const& col, std::vector<double>& block) const;
   void contact_pattern(Group&, std::vector<PetscInt>& rows, std::vector<PetscInt>& cols);
 
   model::Model const& model_;
