@@ -5,7 +5,9 @@
 #include <span>
 #include <stdexcept>
 #include <string>
+#include <type_traits>
 #include <utility>
+#include <vector>
 
 namespace fretwave {
 
@@ -123,6 +125,26 @@ inline int comm_size(MPI_Comm comm) {
   int size;
   MPI_Comm_size(comm, &size);
   return size;
+}
+
+/// All ranks' items in rank order, on every rank. Collective.
+template <class T>
+std::vector<T> gathered(std::span<T const> mine, MPI_Comm comm) {
+  static_assert(std::is_trivially_copyable_v<T>);
+  const int ranks = comm_size(comm), bytes = int(mine.size_bytes());
+  std::vector<int> counts(ranks), starts(ranks, 0);
+  MPI_Allgather(&bytes, 1, MPI_INT, counts.data(), 1, MPI_INT, comm);
+  for (int r = 1; r < ranks; ++r) starts[r] = starts[r - 1] + counts[r - 1];
+  std::vector<T> all(size_t(starts.back() + counts.back()) / sizeof(T));
+  MPI_Allgatherv(mine.data(), bytes, MPI_BYTE, all.data(), counts.data(), starts.data(), MPI_BYTE, comm);
+  return all;
+}
+
+/// A vector whole on every rank. Collective.
+inline std::vector<double> gathered(Vec x) {
+  MPI_Comm comm;
+  check(PetscObjectGetComm(reinterpret_cast<PetscObject>(x), &comm));
+  return gathered(ReadArray(x).span(), comm);
 }
 
 }  // namespace fretwave

@@ -74,10 +74,10 @@ def root_map(n):
 def blade(comm, **changes):
     """30 dofs, 6 pairs in 3-D contact."""
     M, K = beam()
-    B, parameters = root_map(len(K)), {**ROOT, **changes}
-    kn, kt = parameters["normal_stiffness"], parameters["tangential_stiffness"]
+    B = root_map(len(K))
+    kn, kt = ROOT["normal_stiffness"], ROOT["tangential_stiffness"]
     K += SUPPORT * (B.T * np.tile([kn, kt, kt], 6)) @ B
-    return fw.Model(M, K, None, [fw.Contact("coulomb_3d", B, parameters, "root")], comm)
+    return fw.Model(M, K, None, [fw.Contact("coulomb_3d", B, {**ROOT, **changes}, "root")], comm)
 
 
 def preloaded(model):
@@ -173,6 +173,15 @@ def test_iterations_stay_below_25_up_to_30_percent_slip(krylov, comm):
             print(f"slip {share:.1f}: {min(counts):.1f} to {max(counts):.1f} GMRES iterations per Newton step")
     partial = [p["linear"] / p["newton"] for p in moving if p["slip"] <= 0.3]
     assert partial and max(partial) <= 25
+
+
+def test_a_contact_far_stiffer_than_the_structure(comm):
+    """30 times the contact stiffness, all pairs on one rigid root, slip to 60 %: averaged tangents stagnate."""
+    stiff = {key: 30 * ROOT[key] for key in ("normal_stiffness", "tangential_stiffness")}
+    model = blade(comm, **stiff)
+    points = branch(mode(model, *preloaded(model), "krylov", highest=7), (1.5e-3, 2.6e-3), ())
+    partial = [p["linear"] / p["newton"] for p in points if p["newton"] and p["slip"] > 0.1]
+    assert partial and max(partial) <= 45
 
 
 def test_stuck_asymptote_is_the_linear_mode(krylov, case):

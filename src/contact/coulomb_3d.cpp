@@ -132,29 +132,6 @@ void Coulomb3d<Coupled>::product(Motion const& motion, Record const& record, dou
   }
 }
 
-/// The instantaneous tangents of `product`, with dw = 0, over the second period.
-template <bool Coupled>
-void Coulomb3d<Coupled>::mean_tangent(Motion const& motion, Record const& record, double* df_du,
-                                      double*) const {
-  const int n = motion.pairs;
-  const size_t all = size_t(2) * motion.samples * n;
-  for (int step = motion.samples; step < 2 * motion.samples; ++step) {
-    const Places r = places(const_cast<double*>(record.march.data()), all, size_t(step) * n);
-    for (int i = 0; i < n; ++i) {
-      const double kn = r.closed[i] * p_.normal_stiffness[i] / motion.samples,
-                   kt = p_.tangential_stiffness[i] / motion.samples;
-      const double mu = p_.friction_coefficient[i], s[2] = {r.s1[i], r.s2[i]}, e[2] = {r.e1[i], r.e2[i]};
-      df_du[i] += kn;
-      for (int row = 0; row < 2; ++row) {
-        df_du[(row + 1) * 3 * n + i] += mu * e[row] * kn;
-        for (int col = 0; col < 2; ++col)
-          df_du[((row + 1) * 3 + col + 1) * n + i] +=
-              s[row] * kt * ((row == col) - (Coupled ? e[row] * e[col] : 0.0));
-      }
-    }
-  }
-}
-
 template <bool Coupled>
 void Coulomb3d<Coupled>::diagnose(Motion const& motion, double const* f, Diagnosis& out) const {
   const int n = motion.pairs, samples = motion.samples;

@@ -24,7 +24,6 @@ class Coulomb3d : public Law {
   double stuck_stiffness(int component, int pair) const override;
   void force(Motion const&, double* f, Record&) const override;
   void product(Motion const&, Record const&, double const* du, double const* dv, double* df) const override;
-  void mean_tangent(Motion const&, Record const&, double* df_du, double* df_dv) const override;
   void diagnose(Motion const&, double const* f, Diagnosis&) const override;
 
  private:

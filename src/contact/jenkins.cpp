@@ -59,12 +59,6 @@ void Jenkins::product(Motion const& motion, Record const& record, double const* 
   }
 }
 
-void Jenkins::mean_tangent(Motion const& motion, Record const& record, double* df_du, double*) const {
-  double const* second = record.march.data() + motion.size();
-  for (size_t k = 0; k < motion.size(); ++k)
-    df_du[k % motion.pairs] += second[k] * stiffness_[k % motion.pairs] / motion.samples;
-}
-
 void Jenkins::diagnose(Motion const& motion, double const* f, Diagnosis& out) const {
   const int n = motion.pairs;
   for (int t = 0; t < motion.samples; ++t) {

@@ -17,7 +17,6 @@ class Jenkins : public Law {
   double stuck_stiffness(int, int pair) const override { return stiffness_[pair]; }
   void force(Motion const&, double* f, Record&) const override;
   void product(Motion const&, Record const&, double const* du, double const* dv, double* df) const override;
-  void mean_tangent(Motion const&, Record const&, double* df_du, double* df_dv) const override;
   void diagnose(Motion const&, double const* f, Diagnosis&) const override;
 
  private:

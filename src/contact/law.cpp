@@ -31,15 +31,6 @@ void Law::product(Motion const& motion, Record const& record, double const* du, 
   if (dv && !record.df_dv.empty()) add_tangent_product(motion, record.df_dv, dv, df);
 }
 
-void Law::mean_tangent(Motion const& motion, Record const& record, double* df_du, double* df_dv) const {
-  const size_t size = size_t(motion.components) * motion.components * motion.pairs;
-  const auto average = [&](std::vector<double> const& tangent, double* mean) {
-    for (size_t k = 0; k < tangent.size(); ++k) mean[k % size] += tangent[k] / motion.samples;
-  };
-  average(record.df_du, df_du);
-  average(record.df_dv, df_dv);
-}
-
 void add_work(Motion const& motion, double const* f, std::vector<double>& work) {
   if (!motion.v) return;
   for (int row = 0; row < motion.samples * motion.components; ++row)

@@ -60,9 +60,6 @@ class Law {
   virtual void force(Motion const&, double* f, Record&) const = 0;
   /// Linearised force for a motion perturbed by (du, dv); null where the law ignores it.
   virtual void product(Motion const&, Record const&, double const* du, double const* dv, double* df) const;
-  /// Tangents averaged over the period, components x components x pairs each, added to what is there: for
-  /// preconditioning.
-  virtual void mean_tangent(Motion const&, Record const&, double* df_du, double* df_dv) const;
   virtual void diagnose(Motion const&, double const* f, Diagnosis&) const = 0;
 };
 

@@ -150,12 +150,6 @@ void Aft::blocks(Exponents const& e, double* D) {
       }
 }
 
-void Aft::mean_tangent(std::vector<double>& df_du, std::vector<double>& df_dv) const {
-  const size_t size = size_t(law_->components()) * columns_;
-  df_du.assign(size, 0.0), df_dv.assign(size, 0.0);
-  if (columns_) law_->mean_tangent(motion(1), record_, df_du.data(), df_dv.data());
-}
-
 ContactPeriod Aft::period(double const* U, Exponents const& e) const {
   ContactPeriod out;
   for (auto* samples : {&out.u, &out.v, &out.f}) samples->resize(f_.size());

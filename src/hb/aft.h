@@ -32,9 +32,6 @@ class Aft {
   /// Dense dF/dU of each pair, pairs x (components m) x (components m), with the velocity's share through s.
   void blocks(Exponents const&, double* D);
 
-  /// Period-averaged tangents of each pair at the last force, components x components x pairs.
-  void mean_tangent(std::vector<double>& df_du, std::vector<double>& df_dv) const;
-
   ContactSummary summarise(double const* U, Exponents const&);
   ContactPeriod period(double const* U, Exponents const&) const;
 

@@ -69,20 +69,6 @@ std::vector<complex> DynamicStiffness::coefficient_derivatives(model::Term const
   return c;
 }
 
-std::vector<double> gathered(Vec x) {
-  MPI_Comm comm;
-  check(PetscObjectGetComm(reinterpret_cast<PetscObject>(x), &comm));
-  const int ranks = comm_size(comm);
-  int local = int(local_size(x));
-  std::vector<int> counts(ranks), starts(ranks, 0);
-  MPI_Allgather(&local, 1, MPI_INT, counts.data(), 1, MPI_INT, comm);
-  for (int r = 1; r < ranks; ++r) starts[r] = starts[r - 1] + counts[r - 1];
-  std::vector<double> all(size_t(starts.back() + counts.back()));
-  ReadArray in(x);
-  MPI_Allgatherv(in.data(), local, MPI_DOUBLE, all.data(), counts.data(), starts.data(), MPI_DOUBLE, comm);
-  return all;
-}
-
 /// y += A (c x): with blocks innermost, Y^T (m x local) += X^T (m x all) A^T.
 void DynamicStiffness::accumulate(std::vector<complex> const& c, Blocked const& A, Vec x, Vec y) {
   {

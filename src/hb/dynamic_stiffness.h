@@ -4,9 +4,6 @@
 
 namespace fretwave::hb {
 
-/// All ranks' entries of a vector, on every rank. Collective.
-std::vector<double> gathered(Vec);
-
 /// Z = sum over the linear terms of A (x) c_n, c_n = s_n^p e^{-i k n theta}; with inertia damping g the mass
 /// takes s^2 - g s.
 class DynamicStiffness {

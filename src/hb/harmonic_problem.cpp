@@ -165,9 +165,9 @@ VecHandle HarmonicProblem::scalar_column(Vec y, int j) {
   return out;
 }
 
-void HarmonicProblem::mean_contact(Vec y, std::vector<double>& K, std::vector<double>& C) {
+std::vector<PairTangents> HarmonicProblem::pair_tangents(Vec y) {
   linearise(y);
-  residual_.mean_contact(K, C);
+  return residual_.pair_tangents();
 }
 
 std::unique_ptr<solve::Preconditioner> HarmonicProblem::preconditioner() {

@@ -49,8 +49,8 @@ class HarmonicProblem : public solve::Problem {
   DynamicStiffness const& stiffness() const { return residual_.stiffness(); }
   /// Column dr/dz_j at y, on the harmonic rows. Collective.
   VecHandle scalar_column(Vec y, int j);
-  /// Dense B^T (period-averaged tangent) B at y. Collective.
-  void mean_contact(Vec y, std::vector<double>& K, std::vector<double>& C);
+  /// Linearised contact of this rank's pairs at y. Collective.
+  std::vector<PairTangents> pair_tangents(Vec y);
   std::unique_ptr<solve::Preconditioner> preconditioner() override;
   /// The laws start their march from the static state at y. Collective.
   void settle(Vec y) { residual_.settle(coefficients(y)); }

@@ -1,7 +1,6 @@
 #include "hb/residual.h"
 
 #include <algorithm>
-#include <set>
 
 namespace fretwave::hb {
 
@@ -27,11 +26,16 @@ Residual::Residual(model::Model const& model, Harmonics const& h)
 }
 
 Residual::Map Residual::make_map(Mat B, int phase) const {
-  Map map{phase, B, {}, {}};
+  Map map{phase, B, {}, factors(phase)};
   check(MatCreateMAIJ(B, harmonics_.block_size(), map.B.out()));
-  if (phase != 0)
-    for (int n : harmonics_.orders()) map.factor.push_back(std::polar(1.0, -phase * n * model_.theta()));
   return map;
+}
+
+/// e^{-i k n theta} per retained order.
+std::vector<complex> Residual::factors(int phase) const {
+  std::vector<complex> out;
+  for (int n : harmonics_.orders()) out.push_back(std::polar(1.0, -phase * n * model_.theta()));
+  return out;
 }
 
 namespace {
@@ -116,8 +120,7 @@ void Residual::contact_product(Group& group, Vec dQ, Exponents const* de, Vec dR
 /// Entries of this rank's rows of all maps, pair by pair.
 void Residual::find_weights(Group& group) {
   const int d = group.contact->law->components();
-  for (int map = 0; map < int(group.maps.size()); ++map) {
-    const Mat B = group.maps[map].rows;
+  for (auto const& [phase, B, blocked, factor] : group.maps) {
     PetscInt begin;
     check(MatGetOwnershipRange(B, &begin, nullptr));
     for (int row = 0; row < group.aft.columns(); ++row) {
@@ -125,7 +128,7 @@ void Residual::find_weights(Group& group) {
       PetscInt const* dofs;
       PetscScalar const* values;
       check(MatGetRow(B, begin + row, &n, &dofs, &values));
-      for (PetscInt k = 0; k < n; ++k) group.weights.push_back({row / d, row % d, dofs[k], values[k], map});
+      for (PetscInt k = 0; k < n; ++k) group.weights.push_back({row / d, row % d, dofs[k], values[k], phase});
       check(MatRestoreRow(B, begin + row, &n, &dofs, &values));
     }
   }
@@ -145,36 +148,21 @@ void Residual::Group::each_couple(Body body) const {
 void Residual::contact_pattern(Group& group, std::vector<PetscInt>& rows, std::vector<PetscInt>& cols) {
   const PetscInt m = harmonics_.block_size();
   group.each_couple([&](auto const& a, auto const& b) {
-    group.places.push_back({a.pair, a.component, b.component, a.value * b.value, a.map, b.map});
+    group.places.push_back({a.pair, a.component, b.component, a.value * b.value, a.phase, b.phase});
     for (PetscInt i = 0; i < m; ++i)
       for (PetscInt j = 0; j < m; ++j) rows.push_back(a.dof * m + i), cols.push_back(b.dof * m + j);
   });
 }
 
-std::vector<int> Residual::contact_phases() const {
-  std::set<int> phases;
-  for (Group const& group : groups_)
-    for (Map const& row : group.maps)
-      for (Map const& col : group.maps) phases.insert(col.phase - row.phase);
-  return {phases.begin(), phases.end()};
-}
-
-void Residual::mean_contact(std::vector<double>& K, std::vector<double>& C, int phase) {
-  const size_t n = size_t(model_.dofs());
-  K.assign(n * n, 0.0), C.assign(n * n, 0.0);
-  std::vector<double> df_du, df_dv;
+std::vector<PairTangents> Residual::pair_tangents() {
+  std::vector<PairTangents> out;
   for (Group& group : groups_) {
-    group.aft.mean_tangent(df_du, df_dv);
-    const size_t d = group.contact->law->components(), pairs = group.contact->law->pairs();
-    group.each_couple([&](auto const& a, auto const& b) {
-      if (group.maps[b.map].phase - group.maps[a.map].phase != phase) return;
-      const size_t tangent = (a.component * d + b.component) * pairs + a.pair,
-                   entry = size_t(b.dof) * n + a.dof;
-      K[entry] += a.value * b.value * df_du[tangent], C[entry] += a.value * b.value * df_dv[tangent];
-    });
+    const int d = group.contact->law->components(), pairs = group.contact->law->pairs();
+    const size_t ld = size_t(d) * harmonics_.block_size();
+    out.push_back({pairs, d, group.weights, std::vector<double>(pairs * ld * ld)});
+    group.aft.blocks(e_, out.back().D.data());
   }
-  MPI_Allreduce(MPI_IN_PLACE, K.data(), int(K.size()), MPI_DOUBLE, MPI_SUM, model_.comm());
-  MPI_Allreduce(MPI_IN_PLACE, C.data(), int(C.size()), MPI_DOUBLE, MPI_SUM, model_.comm());
+  return out;
 }
 
 void Residual::pattern(std::vector<PetscInt>& rows, std::vector<PetscInt>& cols) {
@@ -186,37 +174,32 @@ void Residual::pattern(std::vector<PetscInt>& rows, std::vector<PetscInt>& cols)
 }
 
 /// P_row^H D P_col of an m x m block, P the phase factors: rows and columns are harmonic blocks themselves.
-void Residual::turn(Map const& row, Map const& col, std::vector<double>& block) const {
+void Residual::turn(int row_phase, int col_phase, std::vector<double>& block) const {
   const int m = harmonics_.block_size();
   std::vector<double> work(block.size());
-  const auto transpose = [&](std::vector<double> const& in, std::vector<double>& out) {
+  const auto transpose = [m](std::vector<double> const& in, std::vector<double>& out) {
     for (int i = 0; i < m; ++i)
       for (int j = 0; j < m; ++j) out[size_t(j) * m + i] = in[size_t(i) * m + j];
   };
-  if (!col.factor.empty()) {  // a row of D P is P^T d = conj(factor) d
-    multiply(harmonics_, conjugate(col.factor), block.data(), work.data(), m);
-    block.swap(work);
-  }
-  if (row.factor.empty()) return;
-  transpose(block, work);
-  multiply(harmonics_, conjugate(row.factor), work.data(), block.data(), m);
-  work = block;
+  // a row d of D becomes P^T d, which is the factor's conjugate times d
+  multiply(harmonics_, conjugate(factors(col_phase)), block.data(), work.data(), m);
+  transpose(work, block);
+  multiply(harmonics_, conjugate(factors(row_phase)), block.data(), work.data(), m);
   transpose(work, block);
 }
 
 double* Residual::values(double scale, double* v) {
   v = stiffness_.values(e_, scale, v);
   const size_t m = harmonics_.block_size();
+  const auto tangents = pair_tangents();
   std::vector<double> block(m * m);
-  for (Group& group : groups_) {
-    const size_t d = group.contact->law->components(), ld = d * m;
-    std::vector<double> D(group.contact->law->pairs() * ld * ld);
-    group.aft.blocks(e_, D.data());
-    for (auto const& place : group.places) {  // B^H (dF/dU) B
-      double const* from = D.data() + (place.pair * ld + place.row * m) * ld + place.col * m;
+  for (size_t g = 0; g < groups_.size(); ++g) {
+    const size_t ld = tangents[g].components * m;
+    for (auto const& place : groups_[g].places) {  // B^H (dF/dU) B
+      double const* from = tangents[g].D.data() + (place.pair * ld + place.row * m) * ld + place.col * m;
       for (size_t i = 0; i < m; ++i)
         for (size_t j = 0; j < m; ++j) block[i * m + j] = scale * place.value * from[i * ld + j];
-      if (place.row_map || place.col_map) turn(group.maps[place.row_map], group.maps[place.col_map], block);
+      if (place.row_phase || place.col_phase) turn(place.row_phase, place.col_phase, block);
       v = std::copy(block.begin(), block.end(), v);
     }
   }

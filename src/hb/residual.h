@@ -4,6 +4,22 @@
 
 namespace fretwave::hb {
 
+/// An entry of the contact map B: row `component` of a pair on this rank. Times e^{-i phase n theta} for
+/// harmonic n where the dof is that of another sector.
+struct Weight {
+  int pair, component;
+  PetscInt dof;
+  double value;
+  int phase = 0;
+};
+
+/// Linearised contact of this rank's pairs of one contact: dense dF/dU of each, row-major.
+struct PairTangents {
+  int pairs, components;
+  std::vector<Weight> const& weights;  ///< pair by pair
+  std::vector<double> D;               ///< pairs x (components m) x (components m)
+};
+
 /// R(Q, s) = Z(s) Q + B^T F(B Q, s B Q) and its exact derivatives: one for all variants, which differ in what
 /// s is (DESIGN section 1). Vectors hold harmonic blocks of `block_size` per dof.
 class Residual {
@@ -26,12 +42,8 @@ class Residual {
   double* values(double scale, double* v);
 
   DynamicStiffness const& stiffness() const { return stiffness_; }
-  /// B^H (mean tangent) B at the last evaluated point, dense n_dof x n_dof, whole on every rank: stiffness
-  /// and damping of one spatial phase, to be multiplied by e^{-i phase n theta} like a linear term.
-  /// Collective.
-  void mean_contact(std::vector<double>& K, std::vector<double>& C, int phase = 0);
-  /// Phases for which there is a mean contact, ascending.
-  std::vector<int> contact_phases() const;
+  /// Linearised contact at the last evaluated point, one per contact.
+  std::vector<PairTangents> pair_tangents();
 
   /// Contact of the motion (Q, e), summed over all ranks and contacts. Collective.
   ContactSummary summarise(Vec Q, Exponents const& e);
@@ -46,7 +58,7 @@ class Residual {
     int phase;
     Mat rows;                     ///< B_k
     MatHandle B;                  ///< B_k (x) I_m
-    std::vector<complex> factor;  ///< e^{-i k n theta} per retained order; empty for k = 0
+    std::vector<complex> factor;  ///< e^{-i k n theta} per retained order
   };
   struct Group {
     model::Contact const* contact;
@@ -54,16 +66,10 @@ class Residual {
     Aft aft;
     VecHandle U, F;
     std::vector<double> dV;
-    struct Weight {
-      int pair, component;
-      PetscInt dof;
-      double value;
-      int map;
-    };
     struct Place {
       int pair, row, col;
       double value;
-      int row_map, col_map;
+      int row_phase, col_phase;
     };
     std::vector<Place> places;
     std::vector<Weight> weights;
@@ -77,7 +83,8 @@ class Residual {
   void add_force(Group const&, Vec F, Vec R) const;
   void contact_product(Group&, Vec dQ, Exponents const* de, Vec dR);
   void find_weights(Group&);
-  void turn(Map const& row, Map const& col, std::vector<double>& block) const;
+  void turn(int row_phase, int col_phase, std::vector<double>& block) const;
+  std::vector<complex> factors(int phase) const;
   void contact_pattern(Group&, std::vector<PetscInt>& rows, std::vector<PetscInt>& cols);
 
   model::Model const& model_;

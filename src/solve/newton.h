@@ -30,6 +30,8 @@ class Newton {
   bool tangent(Vec y, Vec t);
 
  private:
+  static PetscErrorCode converged(SNES, PetscInt iteration, PetscReal unknowns, PetscReal step,
+                                  PetscReal residual, SNESConvergedReason*, void*);
   static PetscErrorCode form_function(SNES, Vec, Vec, void*);
   static PetscErrorCode form_jacobian(SNES, Vec, Mat, Mat, void*);
   static PetscErrorCode shell_product(Mat, Vec, Vec);

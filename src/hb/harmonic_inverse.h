@@ -1,0 +1,37 @@
+#pragma once
+#include "hb/harmonics.h"
+
+namespace fretwave::hb {
+
+/// Real form of a complex factor a on a (cos, sin) pair: (ar + i ai)(qc - i qs) = rc - i rs.
+struct Rotation {
+  double cc = 0, cs = 0, sc = 0, ss = 0;  ///< rc = cc qc + cs qs, rs = sc qc + ss qs
+  static Rotation of(complex a) { return {a.real(), a.imag(), -a.imag(), a.real()}; }
+  /// The complex factor nearest to it.
+  complex nearest() const { return {(cc + ss) / 2, (cs - sc) / 2}; }
+};
+
+/// Inverse of one harmonic's dense block; acts on that harmonic's coefficients of harmonic-block vectors.
+/// Explicit, because it multiplies single vectors often and its entries are asked for (a triangular solve of
+/// one vector is three times slower).
+class HarmonicInverse {
+ public:
+  virtual ~HarmonicInverse() = default;
+  /// z = A^-1 x on this harmonic's entries; `x`, `z` are whole bordered vectors.
+  virtual void apply(double const* x, double* z) const = 0;
+  /// Entry (i, j) of the inverse.
+  virtual Rotation entry(int i, int j) const = 0;
+};
+
+/// Where a harmonic stands in a bordered vector of n dofs with blocks of m, then the scalars.
+struct Place {
+  int dofs, block, offset;
+  bool mean;
+};
+
+/// Inverse of the n x n block A (column-major). `InputError` if singular.
+std::unique_ptr<HarmonicInverse> invert(Place, std::vector<complex> A);
+/// Inverse of the real block over (qc, qs, scalars), (2 n + scalars) squared, column-major.
+std::unique_ptr<HarmonicInverse> invert_bordered(Place, std::vector<double> A, int scalars);
+
+}  // namespace fretwave::hb
