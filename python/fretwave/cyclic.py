@@ -29,6 +29,7 @@ import scipy.sparse as sp
 from .errors import InputError
 from .faces import rotation
 from .model import Contact, Model, by_sector
+from .modes import LinearMode
 
 Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.intp]
@@ -122,6 +123,11 @@ class Sector:
         """Complex amplitudes (N, n_dof) of harmonic `order` in all sectors from those of sector 0, (n_dof,)."""
         turns = np.arange(self.sectors) * order * nodal_diameter % self.sectors
         return np.asarray(np.exp(-2j * np.pi * turns / self.sectors)[:, None] * np.asarray(q, dtype=complex))
+
+    def around(self, mode: LinearMode, nodal_diameter: int) -> LinearMode:
+        """A wave of one sector as a mode of the wheel (unit modal mass of the wheel when undamped)."""
+        phi = self.wave(mode.shape + 1j * mode.imaginary, nodal_diameter).ravel() / np.sqrt(self.sectors)
+        return LinearMode(mode.omega, mode.beta, phi.real.copy(), phi.imag.copy())
 
     def expand(self, q: npt.ArrayLike, nodal_diameter: int, order: int = 1) -> npt.NDArray[np.complex128]:
         """Complex amplitudes (n_full,) of harmonic `order` on the dofs with both faces, from those (n_dof,)."""
