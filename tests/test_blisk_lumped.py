@@ -130,3 +130,18 @@ def test_forward_and_backward_waves_are_alike_without_rotation(case, comm):
         problem, _ = wave(case, comm, (1, 3), diameters=diameters)
         found.append(list(problem.state(reported(problem, 1e-4, [3e-4])[0]).values()))
     assert found[1] == pytest.approx(found[0], rel=1e-9) and found[2] == pytest.approx(found[0], rel=1e-9)
+
+
+def test_the_full_wheel_follows_the_branch_of_one_sector(case, comm):
+    """Issue 4: 24 sectors, 96 dofs, omega and beta to 1e-8 (1e-11 here) from stick to slip; the unfolding vanishes."""
+    sector, h, reports = case.sector(), fw.Harmonics((1, 3), 480), [1e-4, 2.1e-4, 3e-4, 1e-3]
+    with sector.model(DIAMETERS, comm) as model, sector.wheel(comm) as wheel:
+        stuck = fw.linear_modes(model, FAMILY)[-1]
+        start = sector.around(stuck, DIAMETERS)
+        one = fw.NonlinearMode(model, h, "CNM", 0, stuck)
+        around = fw.NonlinearMode(wheel, h, "CNM", 0, start, "wheel_", start.shape - 1j * start.imaginary)
+        for a, b in zip(*(reported(problem, 5e-5, reports) for problem in (one, around))):
+            expected, found = one.state(a), around.state(b)
+            for key in ("omega", "beta"):
+                assert found[key] == pytest.approx(expected[key], abs=1e-11 * expected["omega"])
+            assert np.abs(around.unfolding(b)).max() < 1e-12
