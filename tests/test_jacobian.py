@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from core_models import CoupledLaw, LinearLaw, chain, dense, friction, unknowns, whole
+from cyclic_models import rich_sector
 
 import fretwave as fw
 
@@ -49,11 +50,17 @@ def three_components(comm, pairs):
     return fw.Model(np.eye(3), chain(3), 0.02 * chain(3), [contact], comm), [0, 1, 2]
 
 
+def sector_of_a_wheel(comm):
+    """A travelling wave: phases in every linear term and in contacts that reach sectors ahead and behind."""
+    return rich_sector().model(2, comm), [0, 1, 2]
+
+
 MODELS = {
     "two dampers": two_dampers,
     "mean and even": mean_and_even,
     "three components": lambda comm: three_components(comm, 1),
     "three components, two pairs": lambda comm: three_components(comm, 2),
+    "sector of a wheel": sector_of_a_wheel,
 }
 
 

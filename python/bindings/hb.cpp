@@ -50,6 +50,8 @@ void bind_hb(nb::module_& m) {
       .def("summary", [](HarmonicProblem& p, Petsc<Vec> y) { return contact_summary(p.summarise(y.object)); })
       .def("contact_periods", contact_periods)
       .def("preload", [](HarmonicProblem& p, Petsc<Vec> x, Petsc<Vec> P) { p.preload(x.object, P.object); })
+      .def("unfold", [](HarmonicProblem& p, Petsc<Vec> re, Petsc<Vec> im) { p.unfold(re.object, im.object); })
+      .def("unfolding", [](HarmonicProblem& p, Petsc<Vec> y) { return p.unfolding(y.object); })
       .def("settle", [](HarmonicProblem& p, Petsc<Vec> y) { p.settle(y.object); })
       .def("exponents", [](HarmonicProblem& p, Petsc<Vec> y) { return p.exponents(y.object).s; });
   nb::enum_<Method>(m, "Method").value("CNM", Method::CNM).value("EPMC", Method::EPMC);
@@ -57,8 +59,9 @@ void bind_hb(nb::module_& m) {
       .def(
           "__init__",
           [](NonlinearMode* self, model::Model const& model, Harmonics const& h, Method method, int dof,
-             double omega,
-             Petsc<Vec> shape) { new (self) NonlinearMode(model, h, method, dof, omega, shape.object); },
+             double omega, Petsc<Vec> shape, Petsc<Vec> imaginary) {
+            new (self) NonlinearMode(model, h, method, dof, omega, shape.object, imaginary.object);
+          },
           nb::keep_alive<1, 2>())
       .def("initial", [](NonlinearMode& p, double a) { return nb::steal(to_petsc4py(p.initial(a))); })
       .def("state", [](NonlinearMode& p, Petsc<Vec> y) {

@@ -59,7 +59,8 @@ void bind_reduction(nb::module_& m) {
 void bind_model(nb::module_& m) {
   using model::Model;
   using Terms = std::vector<std::tuple<Petsc<Mat>, int, int>>;
-  using Contacts = std::vector<std::tuple<std::string, Petsc<Mat>, std::shared_ptr<contact::Law>>>;
+  using Maps = std::vector<std::tuple<Petsc<Mat>, int>>;  // B of the own sector first
+  using Contacts = std::vector<std::tuple<std::string, Maps, std::shared_ptr<contact::Law>>>;
   nb::class_<Model>(m, "Model")
       .def("__init__",
            [](Model* self, Terms const& terms, Contacts const& contacts, double theta) {
@@ -67,13 +68,19 @@ void bind_model(nb::module_& m) {
              std::vector<model::Contact> groups;
              for (auto const& [A, order, phase] : terms)
                linear.push_back({MatHandle::share(A.object), order, phase});
-             for (auto const& [name, B, law] : contacts)
-               groups.push_back({name, MatHandle::share(B.object), law});
+             for (auto const& [name, maps, law] : contacts) {
+               groups.push_back({name, MatHandle::share(std::get<0>(maps.at(0)).object), law});
+               for (size_t k = 1; k < maps.size(); ++k)
+                 groups.back().ahead.push_back(
+                     {MatHandle::share(std::get<0>(maps[k]).object), std::get<1>(maps[k])});
+             }
              new (self) Model(std::move(linear), std::move(groups), theta);
            })
       .def_prop_ro("dofs", &Model::dofs)
       .def_prop_ro("local_dofs", &Model::local_dofs)
       .def_prop_ro("first_dof", &Model::first_dof)
+      .def_prop_ro("theta", &Model::theta)
+      .def_prop_ro("travelling", &Model::travelling)
       .def_prop_ro("odd", &Model::odd);
   nb::enum_<model::ContactState>(m, "ContactState")
       .value("stuck", model::ContactState::stuck)

@@ -11,6 +11,8 @@ if TYPE_CHECKING:
     from .built import BuiltContact, BuiltModel
     from .contact_laws import LawInfo, ParameterInfo, PythonLaw, laws
     from .continuation import Continuation, Point, StepControl
+    from .cyclic import Sector
+    from .faces import match_faces
     from .model import Contact, Model
     from .modes import LinearMode, linear_modes
     from .problems import ForcedResponse, Harmonics, NonlinearMode, choose_harmonics
@@ -21,6 +23,8 @@ if TYPE_CHECKING:
 _HOMES = {
     "built": ("BuiltContact", "BuiltModel"),
     "continuation": ("Continuation", "Point", "StepControl"),
+    "cyclic": ("Sector",),
+    "faces": ("match_faces",),
     "contact_laws": ("LawInfo", "ParameterInfo", "PythonLaw", "laws"),
     "model": ("Contact", "Model"),
     "modes": ("LinearMode", "linear_modes"),
@@ -49,11 +53,13 @@ __all__ = [
     "Point",
     "PythonLaw",
     "Reduction",
+    "Sector",
     "StepControl",
     "Transient",
     "choose_harmonics",
     "laws",
     "linear_modes",
+    "match_faces",
     "reduce",
 ]
 

@@ -23,6 +23,17 @@ if MPI.COMM_WORLD.size > 1:
     parallel.install()  # in scripts too: one rank's exception ends all ranks, with one message
 
 
+def by_sector(given: Any) -> Mapping[int, Any]:
+    """{k: matrix on the sector k places ahead}, the own sector first; a plain matrix stands for {0: matrix}."""
+    if given is None:
+        return {}
+    if not isinstance(given, Mapping):
+        return {0: given}
+    if 0 not in given:
+        raise InputError("the own sector's matrix is missing", None, sorted(given), "0 among them", "give {0: ...}")
+    return {k: given[k] for k in sorted(given, key=lambda k: (k != 0, k))}
+
+
 @dataclass
 class Contact:
     """Contact pairs of one law.
@@ -31,8 +42,9 @@ class Contact:
     ----------
     law : str or PythonLaw
         Name of a compiled law (see `fretwave.laws`), or a law written in Python.
-    B : (n_pairs * components, n_dof) sparse or dense
+    B : (n_pairs * components, n_dof) sparse or dense, or dict
         Relative displacement u = B x, rows pair by pair (normal, tangent, tangent for three components).
+        On a sector {0: B_0, 1: B_1}: u = B_0 x_j + B_1 x_{j+1} reaches the next sector's dofs.
     parameters : dict
         The law's parameters, a number or one per pair.
     """
@@ -88,25 +100,42 @@ class Model:
 
     Parameters
     ----------
-    M, K, C : (n_dof, n_dof)
+    M, K, C : (n_dof, n_dof) or dict
         SciPy sparse or dense matrices, the same on every rank, or distributed petsc4py matrices of one row layout.
-        Any consistent set of units.
+        Any consistent set of units. Of one sector of a wheel {0: K_0, 1: K_1, -1: K_1.T}: K_k acts on the dofs of the
+        sector k places ahead; `fretwave.Sector` makes them.
     contacts : sequence of Contact
     comm : mpi4py communicator, optional
         Default: of the petsc4py matrices, or COMM_WORLD.
+    sectors : int
+        Number of sectors of the wheel that matrices given as dict belong to.
+    nodal_diameter : int
+        Of the wave, in the convention of `fretwave.cyclic`: x_{j+1}(t) = x_j(t - theta / omega) with
+        theta = 2 pi nodal_diameter / sectors.
     """
 
-    def __init__(self, M: Any, K: Any, C: Any = None, contacts: Sequence[Contact] = (), comm: Any = None) -> None:
+    def __init__(
+        self,
+        M: Any,
+        K: Any,
+        C: Any = None,
+        contacts: Sequence[Contact] = (),
+        comm: Any = None,
+        sectors: int = 1,
+        nodal_diameter: int = 0,
+    ) -> None:
+        terms = [(A, order, k) for order, given in enumerate((K, C, M)) for k, A in by_sector(given).items()]
+        first = terms[0][0]
         if comm is None:
-            comm = K.getComm().tompi4py() if isinstance(K, PETSc.Mat) else MPI.COMM_WORLD
-        self.comm = comm
-        terms = [(matrix, order) for order, matrix in enumerate((K, C, M)) if matrix is not None]
-        self._matrices = [self._matrix(matrix) for matrix, _ in terms]
+            comm = first.getComm().tompi4py() if isinstance(first, PETSc.Mat) else MPI.COMM_WORLD
+        self.comm, self.sectors, self.nodal_diameter = comm, sectors, nodal_diameter
+        self._matrices = [self._matrix(matrix) for matrix, *_ in terms]
         self.contacts = list(contacts)
         self.n_dof: int = self._matrices[0].getSize()[1]
         self._pairs: list[npt.NDArray[np.intp]] = []
         groups = [self._group(contact) for contact in self.contacts]
-        self.core = _core.Model([(A, order, 0) for A, (_, order) in zip(self._matrices, terms)], groups, 0.0)
+        theta = 2 * np.pi * nodal_diameter / sectors
+        self.core = _core.Model([(A, *term[1:]) for A, term in zip(self._matrices, terms)], groups, theta)
 
     def _matrix(self, A: Any) -> PETSc.Mat:
         if isinstance(A, PETSc.Mat):
@@ -129,29 +158,42 @@ class Model:
         local = [n // size + (r < n % size) for r in range(size)]
         return sum(local[:rank]), sum(local[: rank + 1])
 
-    def _group(self, contact: Contact) -> tuple[str, PETSc.Mat, Any]:
+    def _group(self, contact: Contact) -> tuple[str, list[tuple[PETSc.Mat, int]], Any]:
         """The contact's pairs on the rank that owns the pair's first dof."""
-        B, d = sp.csr_matrix(contact.B, dtype=float), contact.components
-        if B.shape[1] != self.n_dof or B.shape[0] % d:
-            raise InputError(
-                "B does not fit the model",
-                f"contact '{contact.name}'",
-                f"{B.shape}",
-                f"(n_pairs * {d}, {self.n_dof})",
-                "give B as u = B x",
-            )
+        maps, d = {k: sp.csr_matrix(B, dtype=float) for k, B in by_sector(contact.B).items()}, contact.components
+        n_rows = maps[0].shape[0]
+        for B in maps.values():
+            if B.shape != (n_rows, self.n_dof) or n_rows % d:
+                raise InputError(
+                    "B does not fit the model",
+                    f"contact '{contact.name}'",
+                    f"{B.shape}",
+                    f"(n_pairs * {d}, {self.n_dof})",
+                    "give B as u = B x",
+                )
         begin, end = self._matrices[0].getOwnershipRange()
-        n_pairs = B.shape[0] // d
-        first = np.array(
-            [B.indices[B.indptr[d * i]] if B.indptr[d * (i + 1)] > B.indptr[d * i] else 0 for i in range(n_pairs)]
-        )
-        pairs = np.nonzero((first >= begin) & (first < end))[0]
+        n_pairs = n_rows // d
+        pairs = np.nonzero((self._first_dofs(maps, d) >= begin) & (self._first_dofs(maps, d) < end))[0]
         self._pairs.append(pairs)
-        local = B[(pairs[:, None] * d + np.arange(d)).ravel()] if len(pairs) else B[:0]
+        rows = (pairs[:, None] * d + np.arange(d)).ravel()
+        return contact.name, [(self._rows_of(B, rows), k) for k, B in maps.items()], contact.core_law(pairs, n_pairs)
+
+    @staticmethod
+    def _first_dofs(maps: Mapping[int, sp.csr_matrix], d: int) -> npt.NDArray[np.intp]:
+        """The first dof that each pair's first row touches, in its own sector if it does."""
+        first = np.zeros(maps[0].shape[0] // d, dtype=np.intp)
+        for B in reversed(list(maps.values())):
+            filled = np.diff(B.indptr)[::d] > 0
+            first[filled] = B.indices[B.indptr[:-1][::d][filled]]
+        return first
+
+    def _rows_of(self, B: sp.csr_matrix, rows: npt.NDArray[np.intp]) -> PETSc.Mat:
+        begin, end = self._matrices[0].getOwnershipRange()
+        local = B[rows] if len(rows) else B[:0]
         size = ((local.shape[0], PETSc.DETERMINE), (end - begin, self.n_dof))
         mat = PETSc.Mat().createAIJ(size, csr=(local.indptr, local.indices, local.data), comm=self.comm)
         mat.assemble()
-        return contact.name, mat, contact.core_law(pairs, n_pairs)
+        return mat
 
     @property
     def odd(self) -> bool:

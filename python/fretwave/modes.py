@@ -23,6 +23,7 @@ class LinearMode:
     omega, beta : float [1/s]
     shape : (n_dof,) real part of the mode shape, on every rank (unit modal mass when undamped)
     imaginary : (n_dof,)
+        x(t) = Re (shape + i imaginary) e^{lambda t}. Of a travelling wave on one sector, the largest entry is real.
     """
 
     omega: float
@@ -48,11 +49,24 @@ def linear_modes(model: Model, count: int = 6, contact: str = "stuck") -> list[L
     ----------
     contact : {"stuck", "free", "linearised"}
         Closed contact without slip; no contact force; the laws' tangents at rest (damped, with C).
+
+    Notes
+    -----
+    Of one sector: the waves of the model's nodal diameter (`fretwave.cyclic` says which way they run).
     """
     if contact not in ("stuck", "free", "linearised"):
         raise InputError("unknown state of contact", None, contact, "stuck, free or linearised", 'use contact="stuck"')
     found = _core.linear_modes(model.core, count, getattr(_core.ContactState, contact))
-    return [LinearMode(omega, beta, _whole(model, re), _whole(model, im)) for omega, beta, re, im in found]
+    shapes = [_whole(model, re) + 1j * _whole(model, im) for _, _, re, im in found]
+    if model.core.travelling:
+        shapes = [_aligned(phi) for phi in shapes]
+    return [LinearMode(mode[0], mode[1], phi.real.copy(), phi.imag.copy()) for mode, phi in zip(found, shapes)]
+
+
+def _aligned(phi: npt.NDArray[np.complex128]) -> npt.NDArray[np.complex128]:
+    """The same shape with its largest entry real and positive."""
+    largest = phi[np.argmax(np.abs(phi) > (1 - 1e-6) * np.abs(phi).max())]
+    return np.asarray(phi * (abs(largest) / largest))
 
 
 def _whole(model: Model, vec: object) -> Array:

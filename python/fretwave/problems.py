@@ -157,6 +157,10 @@ class NonlinearMode(HarmonicProblem):
         Where the branch begins; scales the unknowns.
     prefix : str
         Of the PETSc options.
+    avoid : (n_dof,) complex, optional
+        On a tuned wheel, where modes come in pairs and the equations lose rank at small amplitude: the other mode of
+        the pair, for a travelling wave the conjugate of the start's shape. The fundamental's component on it is kept
+        at zero by a force that comes out as zero (`unfolding`). Direct route only.
     """
 
     def __init__(
@@ -167,6 +171,7 @@ class NonlinearMode(HarmonicProblem):
         dof: int = 0,
         start: LinearMode | None = None,
         prefix: str = "mode_",
+        avoid: npt.NDArray[np.complex128] | None = None,
     ) -> None:
         if method not in ("CNM", "EPMC"):
             raise InputError("unknown method", None, method, "CNM or EPMC", 'use method="CNM"')
@@ -175,13 +180,19 @@ class NonlinearMode(HarmonicProblem):
 
             start = linear_modes(model, 1)[0]
         self.method, self.dof, self.start = method, dof, start
-        shape = model.vector(start.shape)
-        core = _core.NonlinearMode(model.core, harmonics.core, getattr(_core.Method, method), dof, start.omega, shape)
+        shape = (model.vector(start.shape), model.vector(start.imaginary))
+        core = _core.NonlinearMode(model.core, harmonics.core, getattr(_core.Method, method), dof, start.omega, *shape)
+        if avoid is not None:
+            core.unfold(model.vector(np.real(avoid)), model.vector(np.imag(avoid)))
         super().__init__(model, harmonics, prefix, core)
 
     def initial(self, amplitude: float) -> PETSc.Vec:
         """The linear mode at this amplitude. Collective."""
         return self.core.initial(amplitude)
+
+    def unfolding(self, y: PETSc.Vec) -> Array:
+        """The force along the avoided mode (2,), dimensionless; empty without `avoid`. Collective."""
+        return np.asarray(self.core.unfolding(y))
 
     def state(self, y: PETSc.Vec) -> dict[str, float]:
         amplitude, omega, omega0, beta, zeta = self.core.state(y)

@@ -38,6 +38,14 @@ class Transient:
     ) -> None:
         if force and not omega:
             raise InputError("a force needs its frequency", None, omega, "omega > 0", "give omega")
+        if model.sectors > 1:
+            raise InputError(
+                "one sector with a wave has no equations in time",
+                None,
+                f"a sector of {model.sectors}",
+                "a model of the whole structure",
+                "integrate the wheel: sector.wheel()",
+            )
         self.model = model
         parts = [
             (order, model.vector(level * np.real(P)), model.vector(-level * np.imag(P)))

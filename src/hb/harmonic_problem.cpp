@@ -40,9 +40,12 @@ bool HarmonicProblem::owns_dof() const {
 }
 
 std::vector<double> HarmonicProblem::scalars(Vec y) {
-  std::vector<double> z(scalars_ + 2, 0.0);
+  std::vector<double> z(scalars_ + 2 + unfoldings(), 0.0);
   ReadArray in(y);
-  if (last_rank()) std::copy_n(in.data() + local_block_, scalars_, z.begin());
+  if (last_rank()) {
+    std::copy_n(in.data() + local_block_, unfoldings(), z.begin() + scalars_ + 2);
+    std::copy_n(in.data() + local_block_ + unfoldings(), scalars_, z.begin());
+  }
   if (owns_dof() && harmonics().fundamental() >= 0)
     std::copy_n(in.data() + (dof_ - model().first_dof()) * harmonics().block_size() +
                     harmonics().offset(harmonics().fundamental()),
@@ -84,12 +87,65 @@ void HarmonicProblem::residual(Vec y, Vec r) {
   check(VecScale(R_, 1 / (stiffness_ * motion_.amplitude)));
   check(VecCopy(y, last_));
   linearised_ = true;
+  const auto along = components(q_);
   WriteArray out(r);
   ReadArray in(R_);
   std::copy_n(in.data(), local_block_, out.data());
+  border(z_, along, out.data());
+  if (last_rank() && normalised()) out[local_block_] -= 1;
+}
+
+void HarmonicProblem::unfold(Vec re, Vec im) {
+  const MatHandle M = model().sum(2);
+  const PetscInt m = harmonics().block_size(), cosine = harmonics().offset(harmonics().fundamental());
+  VecHandle Mre = like(re), Mim = like(im);
+  check(MatMult(M, re, Mre));
+  check(MatMult(M, im, Mim));
+  // (tau_c - i tau_s) M phi as (cos, sin); with the same vectors, Re and -Im of phi^H M q_1, which is (cos,
+  // sin)
+  const ReadArray a(Mre), b(Mim);
+  unfold_.clear();
+  for (int part = 0; part < 2; ++part) {
+    VecHandle g = like(q_);
+    {
+      WriteArray out(g);
+      for (PetscInt i = 0; i < model().local_dofs(); ++i) {
+        out[i * m + cosine] = part ? b[i] : a[i];
+        out[i * m + cosine + 1] = part ? a[i] : -b[i];
+      }
+    }
+    check(VecNormalize(g, nullptr));
+    unfold_.push_back(std::move(g));
+  }
+  last_ = unknowns();
+  linearised_ = false;
+}
+
+std::vector<double> HarmonicProblem::unfolding(Vec y) {
+  const auto z = scalars(y);
+  return {z.begin() + scalars_ + 2, z.end()};
+}
+
+/// Of q along the unfolding's vectors.
+std::vector<double> HarmonicProblem::components(Vec q) const {
+  std::vector<double> along;
+  for (auto const& g : unfold_) {
+    along.push_back(0);
+    check(VecDot(g, q, &along.back()));
+  }
+  return along;
+}
+
+/// Adds the unfolding's force and sets the rows beside the harmonic ones, all of them linear: (q_dof, along).
+void HarmonicProblem::border(std::vector<double> const& z, std::vector<double> const& along,
+                             double* r) const {
+  for (int j = 0; j < unfoldings(); ++j) {
+    const ReadArray g(unfold_[j]);
+    for (PetscInt i = 0; i < local_block_; ++i) r[i] += z[scalars_ + 2 + j] * g[i];
+  }
   if (!last_rank() || !normalised()) return;
-  out[local_block_] = z_[scalars_] - 1;
-  out[local_block_ + 1] = z_[scalars_ + 1];
+  std::copy_n(z.begin() + scalars_, 2, r + local_block_);
+  std::copy(along.begin(), along.end(), r + local_block_ + 2);
 }
 
 /// Line searches evaluate elsewhere: the point of linearisation is y, whatever was evaluated last.
@@ -116,6 +172,7 @@ void HarmonicProblem::product(Vec y, Vec dy, Vec dr) {
     ReadArray in(dy);
     std::copy_n(in.data(), local_block_, WriteArray(dQ_).data());
   }
+  const auto along = components(dQ_);
   check(VecAXPBY(dQ_, motion_.amplitude * dlog, motion_.amplitude, q_));
   residual_.product(dQ_, &de, dR_);
   check(VecAXPY(dR_, -load, excitation_));
@@ -123,17 +180,17 @@ void HarmonicProblem::product(Vec y, Vec dy, Vec dr) {
   WriteArray out(dr);
   ReadArray in(dR_);
   std::copy_n(in.data(), local_block_, out.data());
-  if (!last_rank() || !normalised()) return;
-  out[local_block_] = dz[scalars_];
-  out[local_block_ + 1] = dz[scalars_ + 1];
+  border(dz, along, out.data());
 }
 
 void HarmonicProblem::pattern(std::vector<PetscInt>& rows, std::vector<PetscInt>& cols) {
   residual_.pattern(rows, cols);
   const PetscInt first = model().first_dof() * harmonics().block_size(),
                  all = model().dofs() * harmonics().block_size();
-  for (int j = 0; j < scalars_; ++j)
+  for (int j = 0; j < unfoldings() + scalars_; ++j)
     for (PetscInt i = 0; i < local_block_; ++i) rows.push_back(first + i), cols.push_back(all + j);
+  for (int j = 0; j < unfoldings(); ++j)
+    for (PetscInt i = 0; i < local_block_; ++i) rows.push_back(all + 2 + j), cols.push_back(first + i);
   if (!normalised() || !owns_dof()) return;
   for (int j = 0; j < 2; ++j)
     rows.push_back(all + j),
@@ -154,7 +211,9 @@ void HarmonicProblem::column(int j, double* v) {
 void HarmonicProblem::values(Vec y, std::span<double> v) {
   linearise(y);
   double* next = residual_.values(1 / stiffness_, v.data());
+  for (auto const& g : unfold_) next = std::copy_n(ReadArray(g).data(), local_block_, next);
   for (int j = 0; j < scalars_; ++j, next += local_block_) column(j, next);
+  for (auto const& g : unfold_) next = std::copy_n(ReadArray(g).data(), local_block_, next);
   if (normalised() && owns_dof()) next[0] = next[1] = 1;
 }
 
@@ -172,7 +231,7 @@ std::vector<PairTangents> HarmonicProblem::pair_tangents(Vec y) {
 
 std::unique_ptr<solve::Preconditioner> HarmonicProblem::preconditioner() {
   constexpr PetscInt largest_dense = 3000;  // dofs: a complex factor of 144 MB a harmonic
-  if (harmonics().fundamental() < 0 || model().dofs() > largest_dense) return nullptr;
+  if (harmonics().fundamental() < 0 || model().dofs() > largest_dense || unfoldings()) return nullptr;
   return std::make_unique<HarmonicPreconditioner>(*this);
 }
 
@@ -184,8 +243,9 @@ void HarmonicProblem::metric(Vec y, Vec weights) {
   MPI_Allreduce(MPI_IN_PLACE, &square, 1, MPI_DOUBLE, MPI_SUM, comm());
   WriteArray out(weights);
   std::fill_n(out.data(), local_block_, 1 / square);
-  if (last_rank())
-    for (int j = 0; j < scalars_; ++j) out[local_block_ + j] = metric_weight(j);
+  if (!last_rank()) return;
+  std::fill_n(out.data() + local_block_, unfoldings(), 1.0);
+  for (int j = 0; j < scalars_; ++j) out[local_block_ + unfoldings() + j] = metric_weight(j);
 }
 
 VecHandle HarmonicProblem::pack(Vec q, std::vector<double> const& z) const {
@@ -193,7 +253,9 @@ VecHandle HarmonicProblem::pack(Vec q, std::vector<double> const& z) const {
   WriteArray out(y);
   ReadArray in(q);
   std::copy_n(in.data(), local_block_, out.data());
-  if (last_rank()) std::copy_n(z.begin(), scalars_, out.data() + local_block_);
+  if (!last_rank()) return y;
+  std::fill_n(out.data() + local_block_, unfoldings(), 0.0);
+  std::copy_n(z.begin(), scalars_, out.data() + local_block_ + unfoldings());
   return y;
 }
 

@@ -17,15 +17,18 @@ struct ScaledMotion {
   std::vector<double> dload = {};      ///< d load / dz_j; empty if constant
 };
 
-/// y = (q, z): scaled harmonic blocks q = (Q - Q_static) / a, then the scalars z on the last rank; z's last
-/// entry is the continuation parameter. Rows (R(a q, s(z)) - P) / (k_ref a), then, on the last rank, q_dof =
-/// (1, 0) in the fundamental if there are three scalars (DESIGN fact 4).
+/// y = (q, tau, z): scaled harmonic blocks q = (Q - Q_static) / a, then on the last rank the unfolding tau,
+/// if any, and the scalars z; z's last entry is the continuation parameter. Rows (R(a q, s(z)) - P) / (k_ref
+/// a), then, on the last rank, q_dof = (1, 0) in the fundamental if there are three scalars (DESIGN fact 4),
+/// and the unfolding's.
 class HarmonicProblem : public solve::Problem {
  public:
   HarmonicProblem(model::Model const&, Harmonics const&, int scalars, PetscInt dof,
                   double reference_stiffness);
   MPI_Comm comm() const override { return residual_.model().comm(); }
-  PetscInt local_equations() const override { return local_block_ + (last_rank() ? scalars_ - 1 : 0); }
+  PetscInt local_equations() const override {
+    return local_block_ + (last_rank() ? unfoldings() + scalars_ - 1 : 0);
+  }
   void residual(Vec y, Vec r) override;
   void product(Vec y, Vec dy, Vec dr) override;
   void pattern(std::vector<PetscInt>& rows, std::vector<PetscInt>& cols) override;
@@ -38,9 +41,15 @@ class HarmonicProblem : public solve::Problem {
   /// Dynamics about a static state x under the static load P: Q = (x, 0, ...) + a q. The mean is retained
   /// then. Collective.
   void preload(Vec x, Vec P);
+  /// Unfolds the double mode of a tuned wheel (DESIGN fact 6): a fundamental force along M phi with two
+  /// unknown amplitudes tau, and two rows that keep the fundamental's component phi^H M q_1 at zero; phi = re
+  /// + i im is the linear mode that the motion shall not turn into. Before a solver is made. Collective.
+  void unfold(Vec re, Vec im);
+  /// tau, as shares of the inertia force k_ref a of a unit motion; none if not unfolded. Collective.
+  std::vector<double> unfolding(Vec y);
   /// Physical coefficients Q as harmonic blocks. Collective.
   VecHandle coefficients(Vec y);
-  /// (scalars z, fundamental coefficients of the chosen dof in q): on every rank. Collective.
+  /// (scalars z, fundamental coefficients of the chosen dof in q, tau): on every rank. Collective.
   std::vector<double> scalars(Vec y);
   /// Contact of the motion at y, summed over ranks. Collective.
   ContactSummary summarise(Vec y);
@@ -65,6 +74,9 @@ class HarmonicProblem : public solve::Problem {
 
  private:
   bool normalised() const { return scalars_ > 1; }
+  int unfoldings() const { return int(unfold_.size()); }
+  std::vector<double> components(Vec q) const;
+  void border(std::vector<double> const& z, std::vector<double> const& along, double* r) const;
   bool owns_dof() const;
   void linearise(Vec y);
   void unpack(Vec y);
@@ -77,6 +89,7 @@ class HarmonicProblem : public solve::Problem {
   PetscInt dof_, local_block_;
   double stiffness_;
   VecHandle q_, Q_, dQ_, R_, dR_, excitation_, static_, static_load_, last_;
+  std::vector<VecHandle> unfold_;  ///< M phi on the fundamental, real and imaginary part, unit length
   bool linearised_ = false;
   std::vector<double> z_;
   ScaledMotion motion_;

@@ -1,17 +1,24 @@
 #include "hb/nonlinear_mode.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "error.h"
 
 namespace fretwave::hb {
 
-double reference_stiffness(model::Model const& model, double omega, Vec shape) {
-  VecHandle Mx = like(shape);
-  double modal_mass, square;
-  check(MatMult(model.sum(2), shape, Mx));
-  check(VecDot(shape, Mx, &modal_mass));
-  check(VecDot(shape, shape, &square));
+double reference_stiffness(model::Model const& model, double omega, Vec shape, Vec imaginary) {
+  const MatHandle M = model.sum(2);
+  double modal_mass = 0, square = 0;
+  for (Vec part : {shape, imaginary}) {
+    if (!part) continue;
+    VecHandle Mx = like(part);
+    double mass, length;
+    check(MatMult(M, part, Mx));
+    check(VecDot(part, Mx, &mass));
+    check(VecDot(part, part, &length));
+    modal_mass += mass, square += length;
+  }
   if (!(modal_mass > 0) || !(omega > 0))
     throw InputError("the starting mode has no modal mass or no frequency",
                      std::to_string(modal_mass) + ", " + std::to_string(omega) + " rad/s", "both > 0",
@@ -20,37 +27,43 @@ double reference_stiffness(model::Model const& model, double omega, Vec shape) {
 }
 
 NonlinearMode::NonlinearMode(model::Model const& model, Harmonics const& h, Method method, PetscInt dof,
-                             double omega, Vec shape)
-    : HarmonicProblem(model, h, 3, dof, reference_stiffness(model, omega, shape)),
+                             double omega, Vec shape, Vec imaginary)
+    : HarmonicProblem(model, h, 3, dof, reference_stiffness(model, omega, shape, imaginary)),
       method_(method),
       omega_reference_(omega),
-      shape_(like(shape)) {
-  check(VecCopy(shape, shape_));
-  double at_dof = 0;
+      shape_(like(shape)),
+      imaginary_(like(shape)) {
+  double at_dof[2] = {};
   PetscInt begin, end;
-  check(VecGetOwnershipRange(shape_, &begin, &end));
-  if (dof >= begin && dof < end) at_dof = ReadArray(shape_)[dof - begin];
-  MPI_Allreduce(MPI_IN_PLACE, &at_dof, 1, MPI_DOUBLE, MPI_SUM, comm());
-  double largest;
-  check(VecNorm(shape_, NORM_INFINITY, &largest));
-  if (std::abs(at_dof) < 1e-10 * largest)
+  check(VecGetOwnershipRange(shape, &begin, &end));
+  if (dof >= begin && dof < end)
+    at_dof[0] = ReadArray(shape)[dof - begin], at_dof[1] = ReadArray(imaginary)[dof - begin];
+  MPI_Allreduce(MPI_IN_PLACE, at_dof, 2, MPI_DOUBLE, MPI_SUM, comm());
+  double largest, largest_imaginary;
+  check(VecNorm(shape, NORM_INFINITY, &largest));
+  check(VecNorm(imaginary, NORM_INFINITY, &largest_imaginary));
+  largest = std::max(largest, largest_imaginary);
+  const complex normal(at_dof[0], at_dof[1]);
+  if (std::abs(normal) < 1e-10 * largest)
     throw InputError("the normalised dof does not move in the starting mode",
-                     std::to_string(at_dof / largest) + " of the largest displacement", "> 1e-10",
+                     std::to_string(std::abs(normal) / largest) + " of the largest displacement", "> 1e-10",
                      "normalise on a dof that takes part in the mode");
-  check(VecScale(shape_, 1 / at_dof));
+  const complex scale = 1.0 / normal;
+  check(VecAXPBYPCZ(shape_, scale.real(), -scale.imag(), 0, shape, imaginary));
+  check(VecAXPBYPCZ(imaginary_, scale.imag(), scale.real(), 0, shape, imaginary));
 }
 
 VecHandle NonlinearMode::initial(double amplitude) {
   if (!(amplitude > 0))
     throw InputError("modal amplitude is not positive", std::to_string(amplitude), "> 0",
                      "start at a small positive amplitude");
-  const PetscInt m = harmonics().block_size();
+  const PetscInt m = harmonics().block_size(), fundamental = harmonics().offset(harmonics().fundamental());
   VecHandle q = make_vector(comm(), model().local_dofs() * m);
   {
     WriteArray out(q);
-    ReadArray phi(shape_);
-    for (PetscInt i = 0; i < model().local_dofs(); ++i)
-      out[i * m + harmonics().offset(harmonics().fundamental())] = phi[i];
+    ReadArray re(shape_), im(imaginary_);
+    for (PetscInt i = 0; i < model().local_dofs(); ++i)  // q_1 = Qc - i Qs
+      out[i * m + fundamental] = re[i], out[i * m + fundamental + 1] = -im[i];
   }
   return pack(q, {0.0, 1.0, std::log(amplitude)});
 }

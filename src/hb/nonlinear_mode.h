@@ -17,8 +17,10 @@ struct ModalState {
 /// EPMC.
 class NonlinearMode : public HarmonicProblem {
  public:
-  /// Started from a linear mode (angular frequency, shape), normalised on `dof`. Collective.
-  NonlinearMode(model::Model const&, Harmonics const&, Method, PetscInt dof, double omega, Vec shape);
+  /// Started from a linear mode, angular frequency and complex shape (real and imaginary part), normalised on
+  /// `dof`. Collective.
+  NonlinearMode(model::Model const&, Harmonics const&, Method, PetscInt dof, double omega, Vec shape,
+                Vec imaginary);
   /// The linear mode at amplitude a. Collective.
   VecHandle initial(double amplitude);
   ModalState state(Vec y);
@@ -32,11 +34,11 @@ class NonlinearMode : public HarmonicProblem {
   ScaledMotion motion(std::vector<double> const& z) const override;
   Method method_;
   double omega_reference_;
-  VecHandle shape_;
+  VecHandle shape_, imaginary_;
 };
 
-/// phi^T M phi w^2 / phi^T phi: the inertia force per displacement that force rows are measured in [N/m].
-/// Collective.
-double reference_stiffness(model::Model const&, double omega, Vec shape);
+/// phi^H M phi w^2 / phi^H phi: the inertia force per displacement that force rows are measured in [N/m]; of
+/// a sector's mass its own part alone. `imaginary` may be null. Collective.
+double reference_stiffness(model::Model const&, double omega, Vec shape, Vec imaginary = nullptr);
 
 }  // namespace fretwave::hb

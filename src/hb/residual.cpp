@@ -1,12 +1,14 @@
 #include "hb/residual.h"
 
+#include <algorithm>
+
 namespace fretwave::hb {
 
 Residual::Residual(model::Model const& model, Harmonics const& h)
     : model_(model), harmonics_(h), stiffness_(model, h), Q_(vector()) {
   for (auto const& contact : model.contacts()) {
     groups_.push_back({.contact = &contact,
-                       .B = {},
+                       .maps = {},
                        .aft = Aft(h, contact.law),
                        .U = {},
                        .F = {},
@@ -14,12 +16,65 @@ Residual::Residual(model::Model const& model, Harmonics const& h)
                        .places = {},
                        .weights = {}});
     Group& group = groups_.back();
-    check(MatCreateMAIJ(contact.B, h.block_size(), group.B.out()));
+    group.maps.push_back(make_map(contact.B, 0));
+    for (auto const& map : contact.ahead) group.maps.push_back(make_map(map.B, map.phase));
     group.U = make_vector(model.comm(), group.aft.columns() * h.block_size());
     group.F = like(group.U);
     group.dV.resize(size_t(group.aft.columns()) * h.block_size());
     find_weights(group);
   }
+}
+
+Residual::Map Residual::make_map(Mat B, int phase) const {
+  Map map{phase, B, {}, factors(phase)};
+  check(MatCreateMAIJ(B, harmonics_.block_size(), map.B.out()));
+  return map;
+}
+
+/// e^{-i k n theta} per retained order.
+std::vector<complex> Residual::factors(int phase) const {
+  std::vector<complex> out;
+  for (int n : harmonics_.orders()) out.push_back(std::polar(1.0, -phase * n * model_.theta()));
+  return out;
+}
+
+namespace {
+
+std::vector<complex> conjugate(std::vector<complex> factor) {
+  for (complex& c : factor) c = std::conj(c);
+  return factor;
+}
+
+/// A harmonic-block vector with each order multiplied by its factor.
+VecHandle multiplied(Harmonics const& h, std::vector<complex> const& factor, Vec x) {
+  VecHandle y = like(x);
+  multiply(h, factor, ReadArray(x).data(), WriteArray(y).data(), int(local_size(x)) / h.block_size());
+  return y;
+}
+
+}  // namespace
+
+/// U = sum_k B_k e^{-i k n theta} Q: x_{j+k} lags x_j by k theta in each period of harmonic 1.
+void Residual::relative_motion(Group const& group, Vec Q, Vec U) const {
+  check(MatMult(group.maps[0].B, Q, U));
+  for (size_t k = 1; k < group.maps.size(); ++k)
+    check(MatMultAdd(group.maps[k].B, multiplied(harmonics_, group.maps[k].factor, Q), U, U));
+}
+
+/// A vector of its own: group.U stays the point of linearisation.
+VecHandle Residual::relative_motion(Group const& group, Vec Q) const {
+  VecHandle U = like(group.U);
+  relative_motion(group, Q, U);
+  return U;
+}
+
+/// R += sum_k B_k^T e^{+i k n theta} F: the force of the pair k places behind, which reaches into this
+/// sector.
+void Residual::add_force(Group const& group, Vec F, Vec R) const {
+  check(MatMultTransposeAdd(group.maps[0].B, F, R, R));
+  for (size_t k = 1; k < group.maps.size(); ++k)
+    check(MatMultTransposeAdd(group.maps[k].B, multiplied(harmonics_, conjugate(group.maps[k].factor), F), R,
+                              R));
 }
 
 void Residual::evaluate(Vec Q, Exponents const& e, Vec R) {
@@ -28,9 +83,9 @@ void Residual::evaluate(Vec Q, Exponents const& e, Vec R) {
   check(VecSet(R, 0));
   stiffness_.multiply_add(e, Q_, R);
   for (Group& group : groups_) {
-    check(MatMult(group.B, Q_, group.U));
+    relative_motion(group, Q_, group.U);
     group.aft.force(ReadArray(group.U).data(), e, WriteArray(group.F).data());
-    check(MatMultTransposeAdd(group.B, group.F, R, R));
+    add_force(group, group.F, R);
   }
 }
 
@@ -46,7 +101,7 @@ void Residual::contact_product(Group& group, Vec dQ, Exponents const* de, Vec dR
   const int columns = group.aft.columns();
   VecHandle dU = like(group.U), dF = like(group.F);
   if (dQ)
-    check(MatMult(group.B, dQ, dU));
+    relative_motion(group, dQ, dU);
   else
     check(VecSet(dU, 0));
   {
@@ -59,38 +114,44 @@ void Residual::contact_product(Group& group, Vec dQ, Exponents const* de, Vec dR
     }
     group.aft.product(dU_array.data(), group.dV.data(), WriteArray(dF).data());
   }
-  check(MatMultTransposeAdd(group.B, dF, dR, dR));
+  add_force(group, dF, dR);
 }
 
-/// Entries of this rank's rows of B.
+/// Entries of this rank's rows of all maps, pair by pair.
 void Residual::find_weights(Group& group) {
   const int d = group.contact->law->components();
-  PetscInt begin;
-  check(MatGetOwnershipRange(group.contact->B, &begin, nullptr));
-  for (int row = 0; row < group.aft.columns(); ++row) {
-    PetscInt n;
-    PetscInt const* dofs;
-    PetscScalar const* values;
-    check(MatGetRow(group.contact->B, begin + row, &n, &dofs, &values));
-    for (PetscInt k = 0; k < n; ++k) group.weights.push_back({row / d, row % d, dofs[k], values[k]});
-    check(MatRestoreRow(group.contact->B, begin + row, &n, &dofs, &values));
+  for (auto const& [phase, B, blocked, factor] : group.maps) {
+    PetscInt begin;
+    check(MatGetOwnershipRange(B, &begin, nullptr));
+    for (int row = 0; row < group.aft.columns(); ++row) {
+      PetscInt n;
+      PetscInt const* dofs;
+      PetscScalar const* values;
+      check(MatGetRow(B, begin + row, &n, &dofs, &values));
+      for (PetscInt k = 0; k < n; ++k) group.weights.push_back({row / d, row % d, dofs[k], values[k], phase});
+      check(MatRestoreRow(B, begin + row, &n, &dofs, &values));
+    }
+  }
+  std::stable_sort(group.weights.begin(), group.weights.end(),
+                   [](auto const& a, auto const& b) { return a.pair < b.pair; });
+}
+
+template <class Body>
+void Residual::Group::each_couple(Body body) const {
+  for (size_t first = 0, last = 0; first < weights.size(); first = last) {
+    while (last < weights.size() && weights[last].pair == weights[first].pair) ++last;
+    for (size_t a = first; a < last; ++a)
+      for (size_t b = first; b < last; ++b) body(weights[a], weights[b]);
   }
 }
 
 void Residual::contact_pattern(Group& group, std::vector<PetscInt>& rows, std::vector<PetscInt>& cols) {
   const PetscInt m = harmonics_.block_size();
-  auto const& weights = group.weights;
-  for (size_t first = 0, last = 0; first < weights.size(); first = last) {
-    while (last < weights.size() && weights[last].pair == weights[first].pair) ++last;
-    for (size_t a = first; a < last; ++a)
-      for (size_t b = first; b < last; ++b) {
-        group.places.push_back({weights[a].pair, weights[a].component, weights[b].component,
-                                weights[a].value * weights[b].value});
-        for (PetscInt i = 0; i < m; ++i)
-          for (PetscInt j = 0; j < m; ++j)
-            rows.push_back(weights[a].dof * m + i), cols.push_back(weights[b].dof * m + j);
-      }
-  }
+  group.each_couple([&](auto const& a, auto const& b) {
+    group.places.push_back({a.pair, a.component, b.component, a.value * b.value, a.phase, b.phase});
+    for (PetscInt i = 0; i < m; ++i)
+      for (PetscInt j = 0; j < m; ++j) rows.push_back(a.dof * m + i), cols.push_back(b.dof * m + j);
+  });
 }
 
 std::vector<PairTangents> Residual::pair_tangents() {
@@ -112,26 +173,37 @@ void Residual::pattern(std::vector<PetscInt>& rows, std::vector<PetscInt>& cols)
   }
 }
 
+/// P_row^H D P_col of an m x m block, P the phase factors: rows and columns are harmonic blocks themselves.
+void Residual::turn(int row_phase, int col_phase, std::vector<double>& block) const {
+  const int m = harmonics_.block_size();
+  std::vector<double> work(block.size());
+  const auto transpose = [m](std::vector<double> const& in, std::vector<double>& out) {
+    for (int i = 0; i < m; ++i)
+      for (int j = 0; j < m; ++j) out[size_t(j) * m + i] = in[size_t(i) * m + j];
+  };
+  // a row d of D becomes P^T d, which is the factor's conjugate times d
+  multiply(harmonics_, conjugate(factors(col_phase)), block.data(), work.data(), m);
+  transpose(work, block);
+  multiply(harmonics_, conjugate(factors(row_phase)), block.data(), work.data(), m);
+  transpose(work, block);
+}
+
 double* Residual::values(double scale, double* v) {
   v = stiffness_.values(e_, scale, v);
   const size_t m = harmonics_.block_size();
   const auto tangents = pair_tangents();
+  std::vector<double> block(m * m);
   for (size_t g = 0; g < groups_.size(); ++g) {
     const size_t ld = tangents[g].components * m;
-    for (auto const& place : groups_[g].places) {  // B^T (dF/dU) B
-      double const* block = tangents[g].D.data() + (place.pair * ld + place.row * m) * ld + place.col * m;
+    for (auto const& place : groups_[g].places) {  // B^H (dF/dU) B
+      double const* from = tangents[g].D.data() + (place.pair * ld + place.row * m) * ld + place.col * m;
       for (size_t i = 0; i < m; ++i)
-        for (size_t j = 0; j < m; ++j) *v++ = scale * place.value * block[i * ld + j];
+        for (size_t j = 0; j < m; ++j) block[i * m + j] = scale * place.value * from[i * ld + j];
+      if (place.row_phase || place.col_phase) turn(place.row_phase, place.col_phase, block);
+      v = std::copy(block.begin(), block.end(), v);
     }
   }
   return v;
-}
-
-/// A vector of its own: group.U stays the point of linearisation.
-VecHandle Residual::relative_motion(Group& group, Vec Q) const {
-  VecHandle U = like(group.U);
-  check(MatMult(group.B, Q, U));
-  return U;
 }
 
 ContactSummary Residual::summarise(Vec Q, Exponents const& e) {

@@ -4,11 +4,13 @@
 
 namespace fretwave::hb {
 
-/// An entry of the contact map B: row `component` of a pair on this rank.
+/// An entry of the contact map B: row `component` of a pair on this rank. Times e^{-i phase n theta} for
+/// harmonic n where the dof is that of another sector.
 struct Weight {
   int pair, component;
   PetscInt dof;
   double value;
+  int phase = 0;
 };
 
 /// Linearised contact of this rank's pairs of one contact: dense dF/dU of each, row-major.
@@ -51,22 +53,38 @@ class Residual {
   std::vector<ContactPeriod> periods(Vec Q, Exponents const& e);
 
  private:
+  /// A contact's map to the sector `phase` places ahead.
+  struct Map {
+    int phase;
+    Mat rows;                     ///< B_k
+    MatHandle B;                  ///< B_k (x) I_m
+    std::vector<complex> factor;  ///< e^{-i k n theta} per retained order
+  };
   struct Group {
     model::Contact const* contact;
-    MatHandle B;  ///< B (x) I_m
+    std::vector<Map> maps;
     Aft aft;
     VecHandle U, F;
     std::vector<double> dV;
     struct Place {
       int pair, row, col;
       double value;
+      int row_phase, col_phase;
     };
     std::vector<Place> places;
     std::vector<Weight> weights;
+    /// Runs body(a, b) for any two weights of the same pair.
+    template <class Body>
+    void each_couple(Body body) const;
   };
-  VecHandle relative_motion(Group&, Vec Q) const;
+  Map make_map(Mat B, int phase) const;
+  void relative_motion(Group const&, Vec Q, Vec U) const;
+  VecHandle relative_motion(Group const&, Vec Q) const;
+  void add_force(Group const&, Vec F, Vec R) const;
   void contact_product(Group&, Vec dQ, Exponents const* de, Vec dR);
   void find_weights(Group&);
+  void turn(int row_phase, int col_phase, std::vector<double>& block) const;
+  std::vector<complex> factors(int phase) const;
   void contact_pattern(Group&, std::vector<PetscInt>& rows, std::vector<PetscInt>& cols);
 
   model::Model const& model_;

@@ -1,6 +1,7 @@
 #include "model/model.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "error.h"
 
@@ -19,10 +20,10 @@ void check_term(Term const& term, PetscInt local, PetscInt global) {
                      "build all matrices with the same row distribution");
 }
 
-void check_contact(Contact const& contact, PetscInt local, PetscInt global) {
+void check_map(Contact const& contact, Mat B, PetscInt local, PetscInt global) {
   PetscInt rows, cols, local_rows, local_cols;
-  check(MatGetSize(contact.B, &rows, &cols));
-  check(MatGetLocalSize(contact.B, &local_rows, &local_cols));
+  check(MatGetSize(B, &rows, &cols));
+  check(MatGetLocalSize(B, &local_rows, &local_cols));
   const PetscInt expected = PetscInt(contact.law->components()) * contact.law->pairs();
   if (cols != global || local_cols != local || local_rows != expected)
     throw InputError("contact '" + contact.name + "': B does not fit the model or the law's pairs",
@@ -43,7 +44,10 @@ Model::Model(std::vector<Term> terms, std::vector<Contact> contacts, double thet
   check(MatGetLocalSize(terms_[0].A, &local_, nullptr));
   check(MatGetOwnershipRange(terms_[0].A, &first_, nullptr));
   for (auto const& term : terms_) check_term(term, local_, global_);
-  for (auto const& contact : contacts_) check_contact(contact, local_, global_);
+  for (auto const& contact : contacts_) {
+    check_map(contact, contact.B, local_, global_);
+    for (auto const& map : contact.ahead) check_map(contact, map.B, local_, global_);
+  }
 }
 
 MatHandle Model::sum(int order) const {
@@ -59,6 +63,14 @@ MatHandle Model::sum(int order) const {
 }
 
 VecHandle Model::displacement() const { return make_vector(comm_, local_); }
+
+bool Model::travelling() const {
+  const auto turns = [this](auto const& part) { return std::abs(std::sin(part.phase * theta_)) > 1e-12; };
+  return std::any_of(terms_.begin(), terms_.end(), turns) ||
+         std::any_of(contacts_.begin(), contacts_.end(), [&](Contact const& contact) {
+           return std::any_of(contact.ahead.begin(), contact.ahead.end(), turns);
+         });
+}
 
 bool Model::odd() const {
   int odd = std::all_of(contacts_.begin(), contacts_.end(), [](Contact const& c) { return c.law->odd(); });

@@ -17,12 +17,20 @@ struct Term {
   int phase = 0;
 };
 
+/// What the sector `phase` places ahead adds to the relative displacement: sum over k of B_k e^{-i k n theta}
+/// x.
+struct PhasedMap {
+  MatHandle B;
+  int phase = 0;
+};
+
 /// Contact pairs of one law. B maps displacements to relative displacements u = B x, rows pair by pair on the
-/// rank that owns the pair.
+/// rank that owns the pair; pairs that reach into other sectors of a wheel add the maps in `ahead`.
 struct Contact {
   std::string name;
   MatHandle B;
   std::shared_ptr<contact::Law> law;
+  std::vector<PhasedMap> ahead = {};
 };
 
 /// M x'' + C x' + K x + B^T f(B x, B x') = 0, distributed over `comm`.
@@ -36,6 +44,7 @@ class Model {
   PetscInt local_dofs() const { return local_; }
   PetscInt dofs() const { return global_; }
   PetscInt first_dof() const { return first_; }
+  /// Angle between the motions of neighbouring sectors at harmonic 1, 2 pi ND / N (DESIGN section 3).
   double theta() const { return theta_; }
   std::vector<Term> const& terms() const { return terms_; }
   std::vector<Contact> const& contacts() const { return contacts_; }
@@ -43,6 +52,8 @@ class Model {
   MatHandle sum(int order) const;
   /// A vector of one entry per dof.
   VecHandle displacement() const;
+  /// A phase makes the fundamental's equations complex: a travelling wave, whose mode shapes are complex.
+  bool travelling() const;
   /// All laws are odd: without preload the motion may keep odd harmonics only. Collective.
   bool odd() const;
 

@@ -5,13 +5,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
+#include <functional>
 
 #include "error.h"
+#include "model/phases.h"
 
 namespace fretwave::model {
 
 namespace {
 
+using namespace std::complex_literals;
 using EpsHandle = Handle<EPS, EPSDestroy>;
 using PepHandle = Handle<PEP, PEPDestroy>;
 
@@ -28,18 +32,18 @@ void use_mumps(ST st) {
   check(PCFactorSetMatSolverType(pc, MATSOLVERMUMPS));
 }
 
-/// B^T D B for D diagonal by contact rows.
-MatHandle congruence(Mat B, Vec diagonal) {
+/// A^T D B for D diagonal by contact rows.
+MatHandle congruence(Mat A, Vec diagonal, Mat B) {
   MatHandle DB, product;
   check(MatDuplicate(B, MAT_COPY_VALUES, DB.out()));
   check(MatDiagonalScale(DB, diagonal, nullptr));
-  check(MatTransposeMatMult(B, DB, MAT_INITIAL_MATRIX, PETSC_DEFAULT, product.out()));
+  check(MatTransposeMatMult(A, DB, MAT_INITIAL_MATRIX, PETSC_DEFAULT, product.out()));
   return product;
 }
 
-/// sum += B^T D B with one stiffness or damping per contact row; rows that are not finite count as zero.
+/// sum += B^H D B with one stiffness or damping per contact row; rows that are not finite count as zero.
 template <class Entry>
-void add_contact(Mat sum, Contact const& contact, Entry entry) {
+void add_contact(std::vector<PhasedMap>& sum, Contact const& contact, Entry entry) {
   VecHandle diagonal;
   check(MatCreateVecs(contact.B, nullptr, diagonal.out()));
   {
@@ -50,29 +54,43 @@ void add_contact(Mat sum, Contact const& contact, Entry entry) {
       d[row] = std::isfinite(value) ? value : 0;
     }
   }
-  check(MatAXPY(sum, 1, congruence(contact.B, diagonal), DIFFERENT_NONZERO_PATTERN));
+  const auto maps = maps_of(contact);
+  for (auto const& [A, behind] : maps)
+    for (auto const& [B, ahead] : maps) sum.push_back({congruence(A, diagonal, B), ahead - behind});
 }
 
-/// Rows of B on which a stuck contact allows no motion at all, one matrix for all contacts (empty handle if
-/// none).
-MatHandle rigid_rows(Model const& model) {
+/// This rank's rows of B on which a stuck contact allows no motion at all.
+std::vector<PetscInt> rigid_rows(Contact const& contact) {
+  PetscInt begin;
+  check(MatGetOwnershipRange(contact.B, &begin, nullptr));
+  std::vector<PetscInt> rows;
+  const int d = contact.law->components();
+  for (int row = 0; row < d * contact.law->pairs(); ++row)
+    if (std::isinf(contact.law->stuck_stiffness(row % d, row / d))) rows.push_back(begin + row);
+  return rows;
+}
+
+/// Those rows of B in real form.
+MatHandle rigid_map(Model const& model, Contact const& contact, std::vector<PetscInt> const& rows) {
+  IsHandle rows_set, cols_set;
+  check(ISCreateGeneral(model.comm(), PetscInt(rows.size()), rows.data(), PETSC_COPY_VALUES, rows_set.out()));
+  check(ISCreateStride(model.comm(), model.local_dofs(), model.first_dof(), 1, cols_set.out()));
+  std::vector<PhasedMap> parts;
+  for (auto const& [B, phase] : maps_of(contact)) {
+    parts.push_back({{}, phase});
+    check(MatCreateSubMatrix(B, rows_set, cols_set, MAT_INITIAL_MATRIX, parts.back().B.out()));
+  }
+  return real_form(parts, model.theta(), model.travelling());
+}
+
+/// One matrix of the rigid rows of all contacts (empty handle if none).
+MatHandle rigid_constraints(Model const& model) {
   std::vector<MatHandle> parts;
   for (auto const& contact : model.contacts()) {
-    PetscInt begin;
-    check(MatGetOwnershipRange(contact.B, &begin, nullptr));
-    std::vector<PetscInt> rows;
-    const int d = contact.law->components();
-    for (int row = 0; row < d * contact.law->pairs(); ++row)
-      if (std::isinf(contact.law->stuck_stiffness(row % d, row / d))) rows.push_back(begin + row);
+    const auto rows = rigid_rows(contact);
     PetscInt all = PetscInt(rows.size());
     MPI_Allreduce(MPI_IN_PLACE, &all, 1, MPIU_INT, MPI_SUM, model.comm());
-    if (all == 0) continue;
-    IsHandle rows_set, cols_set;
-    check(
-        ISCreateGeneral(model.comm(), PetscInt(rows.size()), rows.data(), PETSC_COPY_VALUES, rows_set.out()));
-    check(ISCreateStride(model.comm(), model.local_dofs(), model.first_dof(), 1, cols_set.out()));
-    parts.emplace_back();
-    check(MatCreateSubMatrix(contact.B, rows_set, cols_set, MAT_INITIAL_MATRIX, parts.back().out()));
+    if (all > 0) parts.push_back(rigid_map(model, contact, rows));
   }
   if (parts.size() <= 1) return parts.empty() ? MatHandle() : std::move(parts[0]);
   std::vector<Mat> raw(parts.begin(), parts.end());
@@ -133,18 +151,28 @@ Operators operators(MPI_Comm comm, std::vector<MatHandle> matrices) {
   return out;
 }
 
-/// This rank's dofs of an eigenvector; those of the constraints stand behind them.
-VecHandle dofs_of(Model const& model, Operators const& operators, Vec whole) {
-  VecHandle part = model.displacement();
-  ReadArray in(whole);
-  WriteArray out(part);
-  std::copy_n(in.data() + operators.offset, model.local_dofs(), out.data());
-  return part;
+/// This rank's dofs of an eigenvector re + i im (im may be null), behind which the constraints stand; of a
+/// travelling wave in real form (x, y) the shape x + i y.
+void take_shape(Model const& model, Operators const& operators, Vec re, Vec im, LinearMode& mode) {
+  mode.shape = model.displacement(), mode.imaginary = model.displacement();
+  WriteArray shape(mode.shape), imaginary(mode.imaginary);
+  const auto place = [&](Vec part, std::complex<double> unit) {
+    ReadArray in(part);
+    const int width = model.travelling() ? 2 : 1;
+    for (PetscInt i = 0; i < model.local_dofs(); ++i)
+      for (int k = 0; k < width; ++k) {
+        const std::complex<double> value = in[operators.offset + width * i + k] * unit * (k ? 1i : 1.0 + 0i);
+        shape[i] += value.real(), imaginary[i] += value.imag();
+      }
+  };
+  place(re, 1.0);
+  if (im) place(im, 1i);
 }
 
-double trace_ratio(Model const& model, Mat K, Mat M) {
-  VecHandle d = model.displacement();
+double trace_ratio(Mat K, Mat M) {
+  VecHandle d;
   double k, m;
+  check(MatCreateVecs(K, d.out(), nullptr));
   check(MatGetDiagonal(K, d));
   check(VecSum(d, &k));
   check(MatGetDiagonal(M, d));
@@ -152,35 +180,69 @@ double trace_ratio(Model const& model, Mat K, Mat M) {
   return k / m;
 }
 
-MatHandle required(Model const& model, int order, char const* name) {
-  MatHandle A = model.sum(order);
-  if (!A)
+std::vector<PhasedMap> required(Model const& model, int order, char const* name) {
+  auto parts = terms_of(model, order);
+  if (parts.empty())
     throw InputError(std::string("the model has no ") + name + " term", "none", "one at least",
                      "give all of K and M");
-  return A;
+  return parts;
 }
 
-PetscInt rigid_count(Mat G) {
+PetscInt rows_of(Mat G) {
   PetscInt n = 0;
   if (G) check(MatGetSize(G, &n, nullptr));
   return n;
 }
 
-/// (K + B^T kt B) phi = w^2 M phi, with B phi = 0 where the stuck contact is rigid.
+/// i x in real form: (re, im) -> (-im, re).
+VecHandle turned(Vec x) {
+  VecHandle y = like(x);
+  ReadArray in(x);
+  WriteArray out(y);
+  for (PetscInt i = 0; i < local_size(x); i += 2) out[i] = -in[i + 1], out[i + 1] = in[i];
+  return y;
+}
+
+/// Makes x M-orthonormal, in the complex sense, to the modes found; false if it is one of them times a
+/// complex number.
+bool orthonormalise(Mat M, std::vector<VecHandle> const& found, bool travelling, Vec x) {
+  VecHandle Mx = like(x);
+  double before, share, after;
+  check(MatMult(M, x, Mx));
+  check(VecDot(x, Mx, &before));
+  for (size_t k = 0; travelling && k < found.size(); ++k) {
+    const VecHandle other = turned(found[k]);
+    for (Vec basis : {Vec(found[k]), Vec(other)}) {
+      check(VecDot(basis, Mx, &share));
+      check(VecAXPY(x, -share, basis));
+    }
+  }
+  check(MatMult(M, x, Mx));
+  check(VecDot(x, Mx, &after));
+  if (after < 1e-4 * before) return false;
+  check(VecScale(x, 1 / std::sqrt(after)));
+  return true;
+}
+
+/// (K + B^H kt B) phi = w^2 M phi, with B phi = 0 where the stuck contact is rigid.
 std::vector<LinearMode> undamped(Model const& model, int count, bool stuck) {
-  MatHandle K = required(model, 0, "stiffness"), M = required(model, 2, "mass"), G;
+  const bool travelling = model.travelling();
+  const int copies = travelling ? 2 : 1;
+  auto stiffness = required(model, 0, "stiffness");
+  MatHandle M = real_form(required(model, 2, "mass"), model.theta(), travelling), G;
   if (stuck) {
     for (auto const& contact : model.contacts())
-      add_contact(K, contact,
+      add_contact(stiffness, contact,
                   [&](int component, int pair) { return contact.law->stuck_stiffness(component, pair); });
-    G = rigid_rows(model);
+    G = rigid_constraints(model);
   }
-  const double scale = trace_ratio(model, K, M);
+  MatHandle K = real_form(stiffness, model.theta(), travelling);
+  const double scale = trace_ratio(K, M);
   std::vector<MatHandle> pair;
   pair.push_back(saddle(K, G, scale));
   pair.push_back(saddle(M, G, 0));
   const Operators AB = operators(model.comm(), std::move(pair));
-  const PetscInt wanted = std::min<PetscInt>(count, model.dofs() - rigid_count(G));
+  const PetscInt wanted = std::min<PetscInt>(count, model.dofs() - rows_of(G) / copies);
   if (wanted < 1)
     throw InputError("the stuck contact leaves no degree of freedom", "0", ">= 1", "use contact = \"free\"");
   EpsHandle eps;
@@ -188,7 +250,7 @@ std::vector<LinearMode> undamped(Model const& model, int count, bool stuck) {
   check(EPSSetOptionsPrefix(eps, "modes_"));
   check(EPSSetOperators(eps, AB[0], AB[1]));
   check(EPSSetProblemType(eps, EPS_GHEP));
-  check(EPSSetDimensions(eps, wanted, PETSC_DEFAULT, PETSC_DEFAULT));
+  check(EPSSetDimensions(eps, copies * wanted, PETSC_DEFAULT, PETSC_DEFAULT));
   check(EPSSetTolerances(eps, tolerance, 1000));
   check(EPSSetWhichEigenpairs(eps, EPS_TARGET_MAGNITUDE));
   // a little below zero: K may be singular (rigid motions), K - target M is not
@@ -201,19 +263,16 @@ std::vector<LinearMode> undamped(Model const& model, int count, bool stuck) {
   PetscInt converged;
   check(EPSGetConverged(eps, &converged));
   std::vector<LinearMode> modes;
-  VecHandle x;
-  check(MatCreateVecs(AB[0], x.out(), nullptr));
-  for (PetscInt k = 0; k < std::min(converged, wanted); ++k) {
+  std::vector<VecHandle> found;
+  for (PetscInt k = 0; k < converged && PetscInt(modes.size()) < wanted; ++k) {
     double value;
+    VecHandle x;
+    check(MatCreateVecs(AB[0], x.out(), nullptr));
     check(EPSGetEigenpair(eps, k, &value, nullptr, x, nullptr));
-    LinearMode mode{std::sqrt(std::max(value, 0.0)), 0, dofs_of(model, AB, x), model.displacement()};
-    VecHandle Mx = like(mode.shape);
-    double mass;
-    check(MatMult(M, mode.shape, Mx));
-    check(VecDot(mode.shape, Mx, &mass));
-    check(VecScale(mode.shape, 1 / std::sqrt(mass)));
-    check(VecSet(mode.imaginary, 0));
-    modes.push_back(std::move(mode));
+    if (!orthonormalise(AB[1], found, travelling, x)) continue;
+    modes.push_back({std::sqrt(std::max(value, 0.0)), 0, {}, {}});
+    take_shape(model, AB, x, nullptr, modes.back());
+    found.push_back(std::move(x));
   }
   return modes;
 }
@@ -239,21 +298,49 @@ RestTangent rest_tangent(contact::Law const& law) {
   return out;
 }
 
+/// A shape that no found mode of the same lambda has, up to a complex factor: in real form every eigenvalue
+/// comes again with i times its shape, and that of the wave running the other way with no shape at all.
+bool is_new(LinearMode& mode, std::vector<LinearMode> const& found) {
+  const std::complex<double> lambda(-mode.beta, mode.omega);
+  const auto dot = [](Vec a, Vec b) {
+    double value;
+    check(VecDot(a, b, &value));
+    return value;
+  };
+  const auto square = [&](LinearMode const& m) {
+    return dot(m.shape, m.shape) + dot(m.imaginary, m.imaginary);
+  };
+  if (square(mode) < 1e-4) return false;  // of an eigenvector of unit length
+  for (auto const& other : found) {
+    if (std::abs(std::complex<double>(-other.beta, other.omega) - lambda) > 1e-7 * std::abs(lambda)) continue;
+    const double size = square(other);
+    const double re = (dot(other.shape, mode.shape) + dot(other.imaginary, mode.imaginary)) / size,
+                 im = (dot(other.shape, mode.imaginary) - dot(other.imaginary, mode.shape)) / size;
+    check(VecAXPBYPCZ(mode.shape, -re, im, 1, other.shape, other.imaginary));
+    check(VecAXPBYPCZ(mode.imaginary, -im, -re, 1, other.shape, other.imaginary));
+  }
+  return square(mode) > 1e-4;
+}
+
 /// (K + s C + s^2 M) phi = 0 with the contact's tangents at rest; oscillating modes only.
 std::vector<LinearMode> damped(Model const& model, int count) {
-  MatHandle K = required(model, 0, "stiffness"), M = required(model, 2, "mass"), C = model.sum(1);
-  if (!C) {
-    check(MatDuplicate(K, MAT_DO_NOT_COPY_VALUES, C.out()));
-    check(MatZeroEntries(C));
-  }
+  const bool travelling = model.travelling();
+  const int copies = travelling ? 2 : 1;
+  auto stiffness = required(model, 0, "stiffness"), damping = terms_of(model, 1);
   for (auto const& contact : model.contacts()) {
     const RestTangent rest = rest_tangent(*contact.law);
     const int d = contact.law->components();
-    add_contact(K, contact, [&](int c, int i) { return rest.stiffness[size_t(i) * d + c]; });
-    add_contact(C, contact, [&](int c, int i) { return rest.damping[size_t(i) * d + c]; });
+    add_contact(stiffness, contact, [&](int c, int i) { return rest.stiffness[size_t(i) * d + c]; });
+    add_contact(damping, contact, [&](int c, int i) { return rest.damping[size_t(i) * d + c]; });
   }
   std::vector<MatHandle> matrices;
-  for (auto* A : {&K, &C, &M}) matrices.push_back(std::move(*A));
+  for (auto const& parts : {std::cref(stiffness), std::cref(damping)})
+    matrices.push_back(real_form(parts.get(), model.theta(), travelling));
+  matrices.push_back(real_form(required(model, 2, "mass"), model.theta(), travelling));
+  if (!matrices[1]) {
+    check(MatDuplicate(matrices[0], MAT_DO_NOT_COPY_VALUES, matrices[1].out()));
+    check(MatZeroEntries(matrices[1]));
+  }
   const Operators terms = operators(model.comm(), std::move(matrices));
   PepHandle pep;
   Mat raw[3] = {terms[0], terms[1], terms[2]};
@@ -263,7 +350,7 @@ std::vector<LinearMode> damped(Model const& model, int count) {
   check(PEPSetProblemType(pep, PEP_GENERAL));
   check(PEPSetType(pep, PEPTOAR));
   check(PEPSetScale(pep, PEP_SCALE_SCALAR, PETSC_DECIDE, nullptr, nullptr, PETSC_DECIDE, PETSC_DECIDE));
-  check(PEPSetDimensions(pep, std::min<PetscInt>(2 * count + 4, 2 * model.dofs()), PETSC_DEFAULT,
+  check(PEPSetDimensions(pep, copies * std::min<PetscInt>(2 * count + 4, 2 * model.dofs()), PETSC_DEFAULT,
                          PETSC_DEFAULT));
   check(PEPSetTolerances(pep, tolerance, 1000));
   check(PEPSetWhichEigenpairs(pep, PEP_TARGET_MAGNITUDE));
@@ -282,7 +369,9 @@ std::vector<LinearMode> damped(Model const& model, int count) {
     double re, im;
     check(PEPGetEigenpair(pep, k, &re, &im, x, y));
     if (!(im > 1e-9 * std::hypot(re, im))) continue;  // the conjugate, or an overdamped motion
-    modes.push_back({im, -re, dofs_of(model, terms, x), dofs_of(model, terms, y)});
+    LinearMode mode{im, -re, {}, {}};
+    take_shape(model, terms, x, y, mode);
+    if (!travelling || is_new(mode, modes)) modes.push_back(std::move(mode));
   }
   return modes;
 }

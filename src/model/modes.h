@@ -14,7 +14,8 @@ struct LinearMode {
 };
 
 /// Lowest modes, ascending in omega, by SLEPc with shift-invert: K - w^2 M for stuck and free contact (no
-/// damping), the quadratic problem with C for linearised contact. At most `count`. Collective.
+/// damping), the quadratic problem with C for linearised contact. At most `count`. Of a sector the waves with
+/// its nodal diameter, x_j = shape e^{-i j theta}. Collective.
 std::vector<LinearMode> linear_modes(Model const&, int count, ContactState);
 
 }  // namespace fretwave::model

@@ -1,0 +1,126 @@
+"""A travelling wave of the lumped blisk over its amplitude, for several friction coefficients, on one sector.
+
+    .venv/bin/python cases/blisk_lumped/waves.py --nodal-diameter 4 --out runs/blisk_lumped
+
+Writes wave.csv and wave.png into --out. With mpirun, every rank count gives the same table.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import fretwave as fw
+import model as case
+
+#: Friction coefficients of the sweep, over a factor 25.
+FRICTION = (0.06, 0.13, 0.3, 0.67, 1.5)
+#: Time samples of a period: a multiple of the sectors, so that all see the slider's kinks between the same samples.
+SAMPLES = 20 * case.SECTORS
+COLUMNS = (
+    "friction",
+    "amplitude",
+    "omega",
+    "omega0",
+    "frequency_hz",
+    "beta",
+    "zeta",
+    "stick",
+    "slip",
+    "error_estimate",
+)
+
+
+def branch(model: fw.Model, options: case.Options, arguments: argparse.Namespace) -> list[dict[str, Any]]:
+    """Points from stick to full slip; amplitudes are those of the disk [m]."""
+    stuck = fw.linear_modes(model, arguments.family)[-1]
+    harmonics = fw.choose_harmonics(model, arguments.harmonics, SAMPLES)
+    mode = fw.NonlinearMode(model, harmonics, arguments.method, case.DOFS.index("disk"), stuck)
+    first = 0.1 * case.slip_threshold(options, stuck.omega, arguments.nodal_diameter)
+    points = fw.Continuation(mode, mode.initial(first), (first, 500 * first), fw.StepControl(maximum=0.15))
+    table = []
+    for point in points:
+        row = {"friction": options.friction, **mode.state(point.y), **mode.diagnostics(point.y)}
+        table.append({key: row[key] for key in COLUMNS})
+    if not points.converged:
+        raise fw.NotConverged(f"the branch of mu = {options.friction} stopped early", measured=points.reason)
+    return table
+
+
+def summary(table: list[dict[str, Any]]) -> str:
+    """Threshold, lowest frequency and largest damping of one branch."""
+    peak = max(table, key=lambda row: row["zeta"])
+    lowest = min(table, key=lambda row: row["frequency_hz"])
+    onset = next(row for row in table if row["slip"] > 0)
+    return (
+        f"mu {peak['friction']:.2f}: slip from a = {onset['amplitude']:.3e} m; "
+        f"lowest {lowest['frequency_hz']:.2f} Hz at {lowest['amplitude']:.3e} m; "
+        f"largest zeta {100 * peak['zeta']:.4f} % at {peak['amplitude']:.3e} m; last {table[-1]['frequency_hz']:.2f} Hz"
+    )
+
+
+def draw(tables: list[list[dict[str, Any]]], stuck: fw.LinearMode, free_hz: float, path: Path) -> None:
+    """Frequency and damping over amplitude, and over amplitude per friction coefficient where all curves are one."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot as plt
+
+    figure, axes = plt.subplots(2, 2, sharey="row", figsize=(10, 6.5), constrained_layout=True)
+    styles = ("-", "--", "-.", ":", (0, (4, 1, 1, 1, 1, 1)))
+    for number, table in enumerate(tables):
+        mu = table[0]["friction"]
+        for column, scale in enumerate((1e3, 1e3 / mu)):
+            x = scale * np.array([row["amplitude"] for row in table])
+            look = {"color": plt.cm.viridis(number / len(tables)), "linestyle": styles[number] if column else "-"}
+            axes[0, column].plot(x, [row["frequency_hz"] for row in table], label=f"$\\mu$ = {mu:g}", **look)
+            axes[1, column].plot(x, [100 * row["zeta"] for row in table], **look)
+    for column, label in enumerate(("amplitude of the disk [mm]", "amplitude of the disk / $\\mu$ [mm]")):
+        axes[1, column].set(xscale="log", xlabel=label)
+        axes[0, column].set(xscale="log")
+        axes[0, column].axhline(stuck.frequency_hz, color="0.5", lw=0.8, ls=":")
+        axes[0, column].axhline(free_hz, color="0.5", lw=0.8, ls=":")
+    left = axes[0, 0].get_xlim()[0]
+    axes[0, 0].annotate("stuck", (left, stuck.frequency_hz), xytext=(6, 4), textcoords="offset points", color="0.4")
+    axes[0, 0].annotate("free", (left, free_hz), xytext=(6, -12), textcoords="offset points", color="0.4")
+    axes[0, 0].set_ylabel("frequency [Hz]")
+    axes[1, 0].set_ylabel("damping ratio [%]")
+    axes[0, 0].legend(loc="center left", frameon=False)
+    figure.savefig(path, dpi=130)
+
+
+def main() -> None:
+    """Follow the branches, write the table, draw."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--nodal-diameter", type=int, default=4, help="negative: backward wave")
+    parser.add_argument("--family", type=int, default=3, help="which stuck mode of that nodal diameter, 1 the lowest")
+    parser.add_argument("--method", choices=("CNM", "EPMC"), default="CNM")
+    parser.add_argument("--harmonics", type=int, default=9)
+    parser.add_argument("--out", type=Path, default=Path("runs/blisk_lumped"))
+    arguments = parser.parse_args()
+    tables = []
+    for friction in FRICTION:
+        options = case.Options(friction=friction)
+        with case.sector(friction=friction).model(arguments.nodal_diameter) as model:
+            tables.append(branch(model, options, arguments))
+            stuck, free = (fw.linear_modes(model, 4, state) for state in ("stuck", "free"))
+            first = model.comm.rank == 0
+        if first:
+            print(summary(tables[-1]), flush=True)
+    elastic = [mode for mode in free if abs(mode.shape[3]) < 0.5 * max(abs(mode.shape))]  # without the ring's own wave
+    if first:
+        arguments.out.mkdir(parents=True, exist_ok=True)
+        with (arguments.out / "wave.csv").open("w", newline="") as file:
+            writer = csv.DictWriter(file, COLUMNS)
+            writer.writeheader()
+            writer.writerows(row for table in tables for row in table)
+        number = arguments.family - 1
+        draw(tables, stuck[number], elastic[number].frequency_hz, arguments.out / "wave.png")
+
+
+if __name__ == "__main__":
+    main()

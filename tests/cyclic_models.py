@@ -1,0 +1,58 @@
+"""Sectors of small wheels that the cyclic tests share."""
+
+from __future__ import annotations
+
+import numpy as np
+from core_models import CoupledLaw, LinearLaw
+
+import fretwave as fw
+
+#: Lumped blisk of Laxalde et al. 2007 [kg, N/m]: disk, blade root, blade tip.
+SECTORS = 24
+MASSES = [1.2, 0.35, 0.25]
+GROUND, NEIGHBOUR, BLADE_1, BLADE_2 = 6e5, 5e7, 1e6, 2e6
+
+
+class MixedLaw(LinearLaw):
+    """f = k u + c v + 0.3 u^2 + u^2 v: even and odd in turn, uses both arguments."""
+
+    odd = False
+
+    def force(self, u, v):
+        return self.k * u + self.c * v + 0.3 * u**2 + u**2 * v
+
+    def tangent(self, u, v):
+        return (self.k + 0.6 * u + 2 * u * v)[:, None], (self.c + u**2)[:, None]
+
+
+def blisk_stiffness(nodal_diameter: int, sectors: int = SECTORS) -> np.ndarray:
+    """Closed form of REFERENCE: the stiffness that a wave of this many nodal diameters sees."""
+    disk = GROUND + BLADE_1 + 4 * NEIGHBOUR * np.sin(np.pi * nodal_diameter / sectors) ** 2
+    return np.array([[disk, -BLADE_1, 0], [-BLADE_1, BLADE_1 + BLADE_2, -BLADE_2], [0, -BLADE_2, BLADE_2]])
+
+
+def lumped_blisk(sectors: int = SECTORS, contacts=()) -> fw.Sector:
+    """Disk masses tied to their neighbours, blades of two masses."""
+    tie = NEIGHBOUR * np.diag([1.0, 0.0, 0.0])
+    return fw.Sector(np.diag(MASSES), {0: blisk_stiffness(0) + 2 * tie, 1: -tie, -1: -tie}, sectors, None, contacts)
+
+
+def jenkins_chain(sectors: int, k=1.0, kt=1.0, limit=1.0) -> fw.Sector:
+    """Equal masses on ground springs, Jenkins elements between neighbours."""
+    between = fw.Contact(
+        "jenkins", {0: [[-1.0]], 1: [[1.0]]}, {"tangential_stiffness": kt, "friction_limit": limit}, "between"
+    )
+    return fw.Sector([[1.0]], [[k]], sectors, None, [between])
+
+
+def rich_sector(sectors: int = 7) -> fw.Sector:
+    """Three dofs, all terms coupled to both neighbours, gyroscopic damping, contacts of 1 and 3 components ahead."""
+    rng = np.random.default_rng(11)
+    tie = {name: scale * rng.standard_normal((3, 3)) for name, scale in (("M", 0.05), ("K", 0.4), ("C", 0.1))}
+    own = {"M": np.diag([1.0, 0.5, 2.0]), "K": 4 * np.eye(3) + np.ones((3, 3)), "C": 0.1 * np.eye(3)}
+    terms = {name: {0: own[name], 1: tie[name], -1: tie[name].T} for name in "MKC"}
+    terms["C"][-1] = -tie["C"].T  # forward and backward waves differ
+    ahead = {0: [[-1.0, 0, 0], [0, 1, 0]], 1: [[1.0, 0, 0], [0, 0, -0.5]]}
+    scalar = fw.Contact(MixedLaw(0.8, 0.1), ahead, name="mixed")
+    B = {k: 0.5 * rng.standard_normal((3, 3)) for k in (0, 1, -2)}
+    return fw.Sector(terms["M"], terms["K"], sectors, terms["C"], [scalar, fw.Contact(CoupledLaw(), B, name="coupled")])

@@ -1,0 +1,121 @@
+"""The full tuned wheel: the same branch as one sector, its double modes unfolded by a force that vanishes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from core_models import dense, filled, unknowns, whole
+from cyclic_models import lumped_blisk, rich_sector
+from test_jacobian import difference
+
+import fretwave as fw
+
+SECTORS, DIAMETERS = 6, 2
+ORDERS, SAMPLES = [1, 3, 5], 240  #: a multiple of the sectors: all see the kinks between the same samples
+REPORTS = [2e-5, 1e-4, 1.3e-4, 1e-3]  #: stick, slip onset, near the largest damping, slip
+
+
+def rubbing_blisk() -> fw.Sector:
+    """Tips that rub on those of the next blades, rims that rub on the ground."""
+    ahead = {0: [[0, 0, -1.0]], 1: [[0, 0, 1.0]]}
+    shroud = fw.Contact("jenkins", ahead, {"tangential_stiffness": 1e5, "friction_limit": 10.0}, "shroud")
+    rim = fw.Contact("jenkins", [[1.0, 0, 0]], {"tangential_stiffness": 5e5, "friction_limit": 2.0}, "rim")
+    return lumped_blisk(SECTORS, [shroud, rim])
+
+
+def unfolded(wheel, start, method="CNM", prefix="mode_"):
+    """The wheel's mode in the direction of `start`, the counter-rotating wave avoided."""
+    counter = start.shape - 1j * start.imaginary
+    return fw.NonlinearMode(wheel, fw.Harmonics(ORDERS, SAMPLES), method, 2, start, prefix, counter)
+
+
+def reported(problem):
+    branch = fw.Continuation(problem, problem.initial(1e-5), (1e-5, 1e-2), report_at=REPORTS)
+    points = [p for p in branch if p.event == "report"]
+    assert branch.converged and len(points) == len(REPORTS), branch.reason
+    return points
+
+
+@pytest.mark.ranks(1, 2, 3)
+@pytest.mark.parametrize("method", ["CNM", "EPMC"])
+def test_the_wheel_follows_the_branch_of_its_sector(comm, method):
+    """Issue 4: omega and beta to 1e-8 along the branch (1e-12 here); DESIGN fact 6: tau at rounding."""
+    sector = rubbing_blisk()
+    with sector.model(DIAMETERS, comm) as model, sector.wheel(comm) as wheel:
+        stuck = fw.linear_modes(model, 1)[0]
+        one = fw.NonlinearMode(model, fw.Harmonics(ORDERS, SAMPLES), method, 2, stuck)
+        around = unfolded(wheel, sector.around(stuck, DIAMETERS), method)
+        for a, b in zip(reported(one), reported(around)):
+            expected, found = one.state(a.y), around.state(b.y)
+            assert found["omega"] == pytest.approx(expected["omega"], rel=1e-12)
+            assert found["beta"] == pytest.approx(expected["beta"], abs=1e-12 * expected["omega"])
+            assert np.abs(around.unfolding(b.y)).max() < 1e-13
+        assert max(one.state(p.y)["zeta"] for p in reported(one)) > 0.01
+
+
+def test_a_wave_of_the_sector_starts_the_wheel(comm):
+    """Unit modal mass of the wheel, the sector's frequency, and no component on the wave running the other way."""
+    sector = rubbing_blisk()
+    with sector.model(DIAMETERS, comm) as model, sector.wheel(comm) as wheel:
+        around = sector.around(fw.linear_modes(model, 1)[0], DIAMETERS)
+        pair = fw.linear_modes(wheel, 6)
+    phi = around.shape + 1j * around.imaginary
+    M = np.kron(np.eye(SECTORS), sector.M)
+    assert phi.conj() @ M @ phi == pytest.approx(1.0, rel=1e-12)
+    assert phi @ M @ phi == pytest.approx(0.0, abs=1e-12)
+    assert sum(abs(mode.omega / around.omega - 1) < 1e-9 for mode in pair) == 2
+
+
+@pytest.mark.ranks(1)
+def test_unfolding_keeps_the_equations_of_a_double_mode_regular(comm):
+    """DESIGN fact 6: rank 2 is lost at small amplitude without it; with it the conditioning does not depend on it."""
+    sector = rubbing_blisk()
+    with sector.model(DIAMETERS, comm) as model, sector.wheel(comm) as wheel:
+        start = sector.around(fw.linear_modes(model, 1)[0], DIAMETERS)
+        plain = fw.NonlinearMode(wheel, fw.Harmonics(ORDERS, SAMPLES), "CNM", 2, start)
+        for amplitude in (1e-6, 1e-5):
+            for problem, defect in ((plain, 2), (unfolded(wheel, start), 0)):
+                sizes = np.linalg.svd(dense(problem.jacobian(problem.initial(amplitude))), compute_uv=False)
+                assert np.count_nonzero(sizes < 1e-12 * sizes[0]) == defect
+                assert sizes[len(sizes) - 1 - defect] > 1e-5 * sizes[0]
+
+
+def unfolded_problem(comm):
+    """A small wheel with all kinds of terms and contacts, and a random point of it."""
+    wheel = rich_sector(3).wheel(comm)
+    rng = np.random.default_rng(5)
+    shape, imaginary, *counter = rng.standard_normal((4, 9))
+    start = fw.LinearMode(1.3, 0.0, shape, imaginary)
+    problem = fw.NonlinearMode(wheel, fw.Harmonics([0, 1, 2], 32), "CNM", 1, start, avoid=counter[0] + 1j * counter[1])
+    return problem, np.concatenate([0.3 * rng.standard_normal(45), [0.2, -0.3], [0.06, 1.1, -0.4]])
+
+
+@pytest.mark.ranks(1, 2, 3)
+def test_unfolded_jacobian_is_the_derivative_of_the_residual(comm):
+    problem, y = unfolded_problem(comm)
+    J = dense(problem.jacobian(unknowns(problem, y)))
+    assert J.shape == (49, 50)
+    residual = lambda v: whole(problem.residual(unknowns(problem, v)))  # noqa: E731
+    expected = np.column_stack([difference(residual, y, e) for e in np.eye(50)])
+    assert np.allclose(J, expected, rtol=0, atol=1e-9 * np.abs(expected).max())
+    dy = np.random.default_rng(6).standard_normal(50)
+    product = whole(problem.jacobian_product(unknowns(problem, y), unknowns(problem, dy)))
+    assert np.allclose(product, J @ dy, rtol=0, atol=1e-12 * np.abs(J @ dy).max())
+
+
+def test_the_rows_are_the_component_on_the_avoided_mode(comm):
+    """phi^H M q_1 of the motion as (cos, sin), in the convention q_1 = Qc - i Qs."""
+    sector = rubbing_blisk()
+    with sector.model(DIAMETERS, comm) as model, sector.wheel(comm) as wheel:
+        start = sector.around(fw.linear_modes(model, 1)[0], DIAMETERS)
+        problem = unfolded(wheel, start)
+        counter, M = start.shape - 1j * start.imaginary, np.kron(np.eye(SECTORS), sector.M)
+        y = whole(problem.initial(1e-5))
+        Q = np.zeros((18, 6))
+        Q[:, 0], Q[:, 1] = np.random.default_rng(1).standard_normal((2, 18))
+        y[:108] = Q.ravel()
+        r = whole(problem.residual(filled(problem.core.unknowns(), y)))
+        length = np.linalg.norm(M @ np.column_stack([counter.real, counter.imag]))
+        assert complex(r[-2], -r[-1]) * length == pytest.approx(
+            counter.conj() @ M @ (Q[:, 0] - 1j * Q[:, 1]), rel=1e-10
+        )
