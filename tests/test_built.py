@@ -5,12 +5,14 @@ from __future__ import annotations
 import csv
 import json
 import shutil
+import subprocess
 import sys
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
+from test_resume import command, kill_at, rows, without_time
 
 from fretwave.casefile import load_case
 from fretwave.cli import main
@@ -268,15 +270,28 @@ def test_two_ranks_give_the_same(run: Path, launch, tmp_path: Path) -> None:
             assert np.abs(two / one - 1).max() < RANK_TOLERANCE
 
 
-def test_a_changed_builder_is_a_changed_case(write, tmp_path: Path) -> None:
+def test_a_changed_builder_is_a_changed_case(write, tmp_path: Path, capsys) -> None:
     path, out = write(), tmp_path / "run"
     assert call("run", str(path), "--only", "static", "--out", str(out), "--set", "model.options.weight=10") == 0
     assert column(out, "static", "normal_force")[-2:].sum() == pytest.approx(10.0, rel=1e-10)
     assert call("resume", str(out)) == 0
     write(("AREA = 4e6, 2e-4", "AREA = 5e6, 2e-4"))
-    with pytest.raises(InputError) as caught:
-        from fretwave.run import _reload
+    capsys.readouterr()
+    assert call("resume", str(out)) == 2
+    said = capsys.readouterr().err
+    assert "the case has changed" in said and "model.builder: " in said
 
-        _reload(out)
-    assert "the case has changed" in caught.value.what
-    assert "model.builder" in str(caught.value.measured)
+
+def test_a_killed_run_goes_on_with_its_options(write, tmp_path: Path) -> None:
+    """The model is built again with the options of the command line, and the preload solved again."""
+    path = write(
+        ("report_at = [1e-6, 1.8e-6, 2.1e-6]", "report_at = [1e-6]\nstep = { initial = 0.005, maximum = 0.01 }")
+    )
+    weight = ("--set", "model.options.weight=29")
+    start = [command("run", str(path), "--out", str(tmp_path / name), *weight) for name in ("whole", "killed")]
+    subprocess.run(start[0], check=True, stdout=subprocess.DEVNULL)
+    expected = rows(tmp_path / "whole", "mode")
+    assert kill_at(start[1], tmp_path / "killed" / "mode.csv", len(expected) // 2) < len(expected)
+    subprocess.run(command("resume", str(tmp_path / "killed")), check=True, stdout=subprocess.DEVNULL)
+    for name in ("static", "mode"):
+        assert without_time(rows(tmp_path / "killed", name)) == without_time(rows(tmp_path / "whole", name))
