@@ -203,3 +203,17 @@ def test_case_goes_from_stick_to_slip(tmp_path):
     assert np.all(np.diff(slipping) < 0) and np.all(np.diff(points["zeta"][~stick]) > 0)
     assert sliding < slipping[-1] < stuck
     assert len(report["relative"]) == 3 and 0 < report["relative"][0] < 1e-5
+
+
+def test_rotation_stiffens_the_bending():
+    """omega^2 = omega_0^2 + B Omega^2, B = 1.193 + 1.570 R / L - 1 for a uniform cantilever on a hub of radius R that bends
+    in the plane of rotation (Putter and Manor, J. Sound Vib. 56, 1978); this one is tapered, twisted and on a neck."""
+    squares, speeds = [], np.array([0.0, 2000.0, 4000.0])
+    for speed in speeds:
+        turning = model.blade(cache=None, stiffening=True, speed_rpm=speed, **COARSE)
+        squares.append(model.stuck_modes(turning, 1)[0][0] ** 2)
+    southwell = (np.array(squares[1:]) - squares[0]) / (speeds[1:] / 60) ** 2
+    o = model.Options()
+    hub = o.foot_radius + model.tip_height(o) - o.aerofoil_length
+    assert southwell[0] == pytest.approx(0.193 + 1.570 * hub / o.aerofoil_length, rel=0.15)
+    assert southwell[1] == pytest.approx(southwell[0], rel=0.02)
