@@ -206,8 +206,9 @@ def test_case_goes_from_stick_to_slip(tmp_path):
 
 
 def test_rotation_stiffens_the_bending():
-    """omega^2 = omega_0^2 + B Omega^2, B = 1.193 + 1.570 R / L - 1 for a uniform cantilever on a hub of radius R that bends
-    in the plane of rotation (Putter and Manor, J. Sound Vib. 56, 1978); this one is tapered, twisted and on a neck."""
+    """omega^2 = omega_0^2 + B Omega^2, B = 1.193 + 1.570 R / L - 1 for a uniform cantilever on a hub of radius R that
+    bends in the plane of rotation (Putter and Manor, J. Sound Vib. 56, 1978); this one is tapered, twisted, on a neck.
+    """
     squares, speeds = [], np.array([0.0, 2000.0, 4000.0])
     for speed in speeds:
         turning = model.blade(cache=None, stiffening=True, speed_rpm=speed, **COARSE)
