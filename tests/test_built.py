@@ -295,3 +295,31 @@ def test_a_killed_run_goes_on_with_its_options(write, tmp_path: Path) -> None:
     subprocess.run(command("resume", str(tmp_path / "killed")), check=True, stdout=subprocess.DEVNULL)
     for name in ("static", "mode"):
         assert without_time(rows(tmp_path / "killed", name)) == without_time(rows(tmp_path / "whole", name))
+
+
+def test_nothing_holds_a_lifted_chain(write, tmp_path: Path, capsys) -> None:
+    """Pulled upwards there is no static state: exit code 3, with the reason and what to do."""
+    arguments = ("run", str(write()), "--only", "static", "--no-plots", "--out", str(tmp_path / "run"))
+    lifted = ("--set", "model.options.weight=-30", "--set", "contact.pads.normal_load=0")
+    assert call(*arguments, *lifted) == 3
+    said = capsys.readouterr().err
+    assert "'static' stopped early" in said and "hold the structure where contact alone cannot" in said
+
+
+def test_a_mode_needs_a_held_structure(write, tmp_path: Path, capsys) -> None:
+    arguments = ("run", str(write()), "--only", "mode", "--no-plots", "--out", str(tmp_path / "run"))
+    assert call(*arguments, "--set", "preload.pair_loads=false") == 2
+    said = capsys.readouterr().err
+    assert "linear mode 1 is a rigid motion" in said and "100 % of the pairs open at rest" in said
+    assert not (tmp_path / "run").exists()
+
+
+def test_weight_or_equal_pair_loads_give_the_same_threshold(write, tmp_path: Path) -> None:
+    """The weight presses both pads almost alike (14.5 and 15.5 N for 15 and 15)."""
+    found = []
+    for name, preload in (("given", ()), ("solved", ("preload.pair_loads=false", 'preload.loads=["weight"]'))):
+        words = [word for setting in preload for word in ("--set", setting)]
+        assert call("run", str(write()), "--only", "mode", "--no-plots", "--out", str(tmp_path / name), *words) == 0
+        stick, amplitude = (column(tmp_path / name, "mode", key) for key in ("stick", "amplitude"))
+        found.append(amplitude[stick == 1].max())
+    assert found[1] == pytest.approx(found[0], rel=0.1)

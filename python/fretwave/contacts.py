@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -46,6 +46,18 @@ class ContactSpec:
     def n_pairs(self) -> int:
         """Number of pairs."""
         return int(self.rows.shape[0]) // self.components
+
+
+def closed_contacts(contacts: Sequence[ContactSpec]) -> list[ContactSpec]:
+    """The same contacts with every pair closed at rest, whatever its load and gap."""
+    closing = {"normal_load": 1.0, "gap": 0.0}
+    return [
+        replace(
+            contact,
+            parameters={**contact.parameters, **{k: v for k, v in closing.items() if k in contact.parameters}},
+        )
+        for contact in contacts
+    ]
 
 
 def read_contacts(

@@ -229,7 +229,8 @@ class _Runner:
             try:
                 outcome = getattr(importlib.import_module(f".analyses.{module}", __package__), function)(context)
             except NotConverged as error:  # before its first point: there was no static state to start from
-                outcome = Outcome(0, f"{error.what}: {error.measured}", False, goal=str(error.expected))
+                reason = f"{error.what}: {error.measured}"
+                outcome = Outcome(0, reason, False, goal=str(error.expected), advice=error.fix or "")
         self._note(analysis.name, context, outcome, time.perf_counter() - began)
 
     def _dampers(self, analysis: AnalysisSection) -> list[Any]:
@@ -322,7 +323,7 @@ def _not_converged(name: str, outcome: Outcome) -> NotConverged:
         where=f"analysis '{name}', {place}",
         measured=outcome.reason,
         expected=outcome.goal or None,
-        fix=_advice(name, outcome.reason),
+        fix=outcome.advice or _advice(name, outcome.reason),
     )
 
 
