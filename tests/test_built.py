@@ -169,6 +169,8 @@ def test_wrong_options(write, override: str, what: str, fix: str | None) -> None
         ([("per_area = 2e10", "per_area = 2e10\ntangential_stiffness = 1e6")], "given twice", None),
         ([("per_area = 2e10", "per_ara = 2e10")], "unknown key 'tangential_stiffness_per_ara'", None),
         ([('loads = ["weight"]', 'loads = ["wait"]')], "is no load of the model", "wait"),
+        ([("modes = 6", "modes = 6\nup_to_hz = 400.0")], "is given beside modes", "400"),
+        ([('preload = { pair_loads = false, loads = ["weight"] }\n', "")], "has no load to act on", "[0.5, 1.0]"),
         ([('normalise = "tip"', 'normalise = "top"')], "unknown dof 'top'", None),
     ],
 )
@@ -246,6 +248,13 @@ def test_reduction_is_reported(run: Path) -> None:
 def test_pictures_show_the_pairs(run: Path) -> None:
     names = {"mode_map_pads.png", "mode_hysteresis_pads.png", "static_load_pads.png", "mode_backbone.png"}
     assert names <= {path.name for path in run.glob("*.png")}
+
+
+def test_component_modes_up_to_a_frequency(write, tmp_path: Path) -> None:
+    arguments = ("run", str(write(("modes = 6", "up_to_hz = 500.0"))), "--only", "static", "--no-plots")
+    assert call(*arguments, "--out", str(tmp_path / "run")) == 0
+    report = json.loads((tmp_path / "run" / "run.json").read_text())["reduction"]
+    assert 0 < report["component_modes"] < 12 and report["highest_component_hz"] < 500.0
 
 
 def test_all_component_modes_change_nothing(write, tmp_path: Path) -> None:
