@@ -31,12 +31,12 @@ model = load("model")
 
 @pytest.fixture(scope="module")
 def blade():
-    return model.build(cache=None, **COARSE)
+    return model.blade(cache=None, **COARSE)
 
 
 @pytest.fixture(scope="module")
 def elastic():
-    return model.build(cache=None, slot="elastic", lug_cells=1, **COARSE)
+    return model.blade(cache=None, slot="elastic", lug_cells=1, **COARSE)
 
 
 def stiffness_of_normals(blade):
@@ -94,7 +94,7 @@ def test_b_measures_translation_in_the_local_frames(blade, elastic):
 
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 def test_normal_loads_balance_the_centrifugal_force(friction):
-    blade = model.build(cache=None, order=1, flank_cells=8, axial_cells=12, seating_friction=friction)
+    blade = model.blade(cache=None, order=1, flank_cells=8, axial_cells=12, seating_friction=friction)
     normal, _, upward = np.moveaxis(blade["contact_frames"], 1, 0)
     slope = upward * np.sign(upward[:, 2:])
     radial = blade["normal_loads"] * (normal[:, 2] + friction * slope[:, 2])
@@ -120,12 +120,12 @@ def test_first_bending_sticks_higher_than_it_slides_and_converges_with_the_mesh(
     assert abs(shapes[blade["observation_dof"], 0]) > 0.95 * abs(shapes[:, 0]).max()
     sliding, _ = model.stuck_modes(dict(blade, tangential_stiffness=0 * blade["tangential_stiffness"]), 1)
     assert 0.9 * frequencies[0] < sliding[0] < 0.995 * frequencies[0]
-    finer = model.build(cache=None, axial_cells=6, thickness_cells=2, radial_cells=(3, 1, 1, 3, 16))
+    finer = model.blade(cache=None, axial_cells=6, thickness_cells=2, radial_cells=(3, 1, 1, 3, 16))
     assert model.stuck_modes(finer, 1)[0][0] == pytest.approx(frequencies[0], rel=5e-3)
 
 
 def test_a_straight_symmetric_blade_loads_both_flanks_alike():
-    straight = model.build(cache=None, camber=(0.0, 0.0), stagger=(0.0, 0.0), **COARSE)
+    straight = model.blade(cache=None, camber=(0.0, 0.0), stagger=(0.0, 0.0), **COARSE)
     _, shapes = model.stuck_modes(straight, 1)
     u = (straight["B"] @ shapes[:, 0]).reshape(2, 6, 4, 3)
     left, right = u[0], u[1, :, ::-1]
@@ -139,19 +139,19 @@ def test_a_straight_symmetric_blade_loads_both_flanks_alike():
 def test_an_elastic_slot_is_softer_and_the_mean_over_a_cell_stiffer_than_its_node(blade, elastic):
     stuck = model.stuck_modes(blade, 1)[0][0]
     assert 0.97 * stuck < model.stuck_modes(elastic, 1)[0][0] < stuck
-    mean = model.build(cache=None, average=True, **COARSE)
+    mean = model.blade(cache=None, average=True, **COARSE)
     assert stuck < model.stuck_modes(mean, 1)[0][0] < 1.01 * stuck
     assert mean["B"].shape[0] == 144 and len(mean["keep_dofs"]) > 145
 
 
 def test_builds_are_cached_by_their_options(tmp_path, monkeypatch):
     options = dict(order=1, axial_cells=12, flank_cells=8)
-    first = model.build(cache=tmp_path, **options)
+    first = model.blade(cache=tmp_path, **options)
     monkeypatch.setattr(model, "compute", lambda _: pytest.fail("built twice"))
-    again = model.build(cache=tmp_path, **options)
+    again = model.blade(cache=tmp_path, **options)
     assert set(again) == set(first) and (again["K"] != first["K"]).nnz == 0
     with pytest.raises(pytest.fail.Exception):
-        model.build(cache=tmp_path, **options, flank_angle=45.0)
+        model.blade(cache=tmp_path, **options, flank_angle=45.0)
 
 
 @pytest.mark.parametrize(
@@ -166,7 +166,7 @@ def test_builds_are_cached_by_their_options(tmp_path, monkeypatch):
 )
 def test_options_that_cannot_be_built_are_refused(options, words):
     with pytest.raises(InputError, match=words) as caught:
-        model.build(cache=None, **{**COARSE, **options})
+        model.blade(cache=None, **{**COARSE, **options})
     assert caught.value.fix
 
 

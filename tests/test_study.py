@@ -101,3 +101,14 @@ def test_study_of_the_two_dof_case_shows_that_harmonics_pay(tmp_path):
         assert float(rows[0]["peak_zeta_error"]) == pytest.approx(0.40, abs=0.03)
         assert float(rows[1]["peak_zeta_error"]) == pytest.approx(0.08, abs=0.03)
         assert (folder / "study.png").exists()
+
+
+def test_component_modes_are_swept_like_any_setting():
+    plan = Plan(harmonics=(1, 3), samples=(64,), tolerance=(1e-10,), component_modes=(8, 2))
+    assert plan.reference == Settings(3, 64, 1e-10, 8)
+    swept = [settings for sweep, settings in plan.sweeps() if sweep == "component_modes"]
+    assert swept == [Settings(3, 64, 1e-10, 2), Settings(3, 64, 1e-10, 8)]
+    study = Study(plan, common_amplitudes(0.1, 1.0, 5))
+    study.run(solve, lambda sweep, settings: None)
+    assert "| modes " in markdown(study.table())
+    assert "modes" not in markdown(run_study()[0].table())

@@ -15,7 +15,6 @@ from matplotlib.collections import PolyCollection
 Array = npt.NDArray[np.float64]
 MM = 1e3  #: per metre
 FLANK_COLOURS = ("#d1495b", "#00798c")  #: left, right
-FLANK_NAMES = ("left flank (y < 0)", "right flank (y > 0)")
 #: Azimuth and elevation of the eye [degrees]: the blade's right side, the left flank, the right flank.
 BLADE, LEFT, RIGHT = (55.0, 18.0), (-60.0, 32.0), (60.0, 32.0)
 
@@ -39,7 +38,7 @@ def plot_mesh(model: dict[str, Any]) -> plt.Figure:
         compass(axes, camera)
         if flank == 0:
             mark_stop(axes, model, camera)
-        axes.set_title(f"{FLANK_NAMES[flank]}: {np.sum(model['flank'] == flank)} contact pairs", fontsize=10)
+        axes.set_title(f"{model['flank_names'][flank]}: {np.sum(model['flank'] == flank)} contact pairs", fontsize=10)
     return figure
 
 
@@ -70,7 +69,7 @@ def plot_bending(model: dict[str, Any], frequency: float, shape: Array) -> plt.F
 def plot_flank(axes: Any, model: dict[str, Any], relative: Array, flank: int, limit: float) -> Any:
     """Normal (colour) and tangential (arrows) displacement [um] of one flank's pairs."""
     mine = model["flank"] == flank
-    x, up = flank_position(model)[mine].T
+    x, up = MM * model["flank_positions"][mine].T
     # The second tangent points up one flank and down the other.
     upward = np.sign(model["contact_frames"][mine, 2, 2])
     u = relative[mine]
@@ -79,17 +78,8 @@ def plot_flank(axes: Any, model: dict[str, Any], relative: Array, flank: int, li
     arrows = axes.quiver(x, up, u[:, 1], u[:, 2] * upward, angles="xy", scale_units="xy", scale=reach / 3, width=0.004)
     axes.quiverkey(arrows, 0.6, 1.12, reach, f"tangential, {reach:.3f} µm", labelpos="E", fontproperties={"size": 8})
     axes.set(xlabel="axial position [mm]", ylabel="up the flank [mm]", aspect="equal", xlim=(-26, 26), ylim=(-3, 12))
-    axes.set_title(FLANK_NAMES[flank], fontsize=10, loc="left")
+    axes.set_title(model["flank_names"][flank], fontsize=10, loc="left")
     return dots
-
-
-def flank_position(model: dict[str, Any]) -> Array:
-    """Contact points (n_pairs, 2) on their flank [mm]: along the axis, and up the flank from its lower edge."""
-    points = model["contact_points"]
-    slope = abs(model["contact_frames"][:, 2, 2])
-    height = (points[:, 2] - points[:, 2].min()) / slope
-    spacing = np.diff(np.unique(np.round(height, 9)))[0]
-    return np.asarray(np.column_stack([points[:, 0], height + spacing / 2]) * MM)
 
 
 def root_faces(model: dict[str, Any]) -> npt.NDArray[np.bool_]:
@@ -178,10 +168,10 @@ def compass(axes: Any, camera: tuple[float, float], place: tuple[float, float] =
 
 def main(folder: Path) -> None:
     """Build, solve and draw the default blade."""
-    from model import build, stuck_modes
+    from model import blade, stuck_modes
 
     plt.switch_backend("Agg")
-    model = build()
+    model = blade()
     frequencies, shapes = stuck_modes(model)
     folder.mkdir(parents=True, exist_ok=True)
     plot_mesh(model).savefig(folder / "mesh.png", dpi=150)

@@ -15,12 +15,13 @@ import numpy.typing as npt
 import scipy.sparse as sp
 from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
-from fretwave import fe
+from fretwave import BuiltContact, BuiltModel, fe
 from fretwave.errors import InputError
 from fretwave.fe.cache import cached, default_folder, model_key
 
 Array = npt.NDArray[np.float64]
 FLANKS = ("shoulder_left", "shoulder_right")
+FLANK_NAMES = ("left flank (y < 0)", "right flank (y > 0)")
 
 
 @dataclass(frozen=True)
@@ -85,7 +86,31 @@ class Options:
         return self.foot_radius, lower, lower + self.flank_length * sin(self.angle)
 
 
-def build(cache: Union[Path, str, None] = "default", **options: Any) -> dict[str, Any]:
+def build(**options: Any) -> BuiltModel:
+    """The blade for a case file; options are the fields of `Options`."""
+    b = blade(**options)
+    law = {name: b[name] for name in ("normal_stiffness", "tangential_stiffness")}
+    root = BuiltContact(
+        B=b["B"],
+        parameters={**law, "normal_load": b["normal_loads"]},
+        areas=b["areas"],
+        points=b["contact_points"],
+        frames=b["contact_frames"],
+        faces=b["flank_names"][b["flank"]].tolist(),
+        positions=b["flank_positions"],
+    )
+    return BuiltModel(
+        M=b["M"],
+        K=b["K"],
+        dofs={"tip": b["observation_dof"]},
+        contacts={"root": root},
+        loads={"centrifugal": b["centrifugal_load"]},
+        coordinates=b["coordinates"],
+        hexahedra=b["hexahedra"],
+    )
+
+
+def blade(cache: Union[Path, str, None] = "default", **options: Any) -> dict[str, Any]:
     """Matrices and contact pairs of the blade, SI, dof = 3 * node + axis.
 
     Parameters
@@ -101,8 +126,9 @@ def build(cache: Union[Path, str, None] = "default", **options: Any) -> dict[str
         M, K : (n_dof, n_dof) CSR, K with axial stop (and elastic slot) and without contact;
         B : (3 n_pairs, n_dof) CSR, rows (normal, axial tangent, tangent across) pair by pair, u_n > 0 closes;
         coordinates (n_nodes, 3); hexahedra (n, 27 or 8) in VTK's order; boundary_faces (n, m, m);
-        contact_nodes, opposite_nodes (-1 if rigid), flank (0 left, 1 right), areas, normal_loads, normal_stiffness,
-        tangential_stiffness: (n_pairs,); contact_points (n_pairs, 3); contact_frames (n_pairs, 3, 3);
+        contact_nodes, opposite_nodes (-1 if rigid), flank (0 left, 1 right; flank_names), areas, normal_loads,
+        normal_stiffness, tangential_stiffness: (n_pairs,); contact_points (n_pairs, 3); flank_positions (n_pairs, 2);
+        contact_frames (n_pairs, 3, 3);
         observation_dof: y at the trailing-edge tip; keep_dofs: contact and observation; stop_nodes;
         centrifugal_load (n_dof,) [N]; mass, volume, worst_jacobian, rigid_residual: of the blade alone, whose nodes
         come first (blade_nodes of them).
@@ -164,6 +190,7 @@ def add_contact(model: dict[str, Any], blade: fe.Mesh, o: Options) -> dict[str, 
     if o.slot == "elastic":
         weights = add_slot(model, weights, o)
     B = fe.relative_rows(weights, model["contact_frames"])
+    model |= dict(flank_names=np.array(FLANK_NAMES), flank_positions=flank_positions(model))
     return model | dict(B=B, keep_dofs=np.union1d(np.unique(B.indices), [model["observation_dof"]]))
 
 
@@ -287,6 +314,15 @@ def contact_pairs(blade: fe.Mesh, o: Options) -> dict[str, Any]:
         normal_stiffness=o.normal_stiffness * areas,
         tangential_stiffness=o.tangential_stiffness * areas,
     )
+
+
+def flank_positions(model: dict[str, Any]) -> Array:
+    """Contact points (n_pairs, 2) on their flank [m]: along the axis, and up the flank from its lower edge."""
+    points = model["contact_points"]
+    slope = abs(model["contact_frames"][:, 2, 2])
+    height = (points[:, 2] - points[:, 2].min()) / slope
+    spacing = np.diff(np.unique(np.round(height, 9)))[0]
+    return np.asarray(np.column_stack([points[:, 0], height + spacing / 2]))
 
 
 def axial_stop(blade: fe.Mesh, o: Options) -> sp.csr_matrix:

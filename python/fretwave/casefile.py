@@ -7,16 +7,21 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import scipy.sparse
 
-from . import checks, matrices
+from . import checks
+from .built import BuiltModel
 from .contacts import ContactSpec, read_contacts
-from .errors import CaseErrors, FretwaveError, InputError
-from .schema import AnalysisSection, ModelSection, StudySection
+from .errors import CaseErrors, FretwaveError
+from .origin import Origin, check_physics, load_origin
+from .reduced import ReductionReport, kept_dofs
+from .schema import AnalysisSection, ModelSection, PreloadSection, ReductionSection, Section, StudySection
 from .source import Source
 from .validation import toml, validate
+
+Table = TypeVar("Table", bound=Section)
 
 
 @dataclass
@@ -30,6 +35,18 @@ class Case:
     dofs : list of str
         Names of the dofs, in the order of the matrices.
     M, K, C : (n_dof, n_dof) sparse CSR [kg], [N/m], [N s/m]; C may be None
+    damping : (float, float)
+        Shares of K [s] and M [1/s] that are added to C.
+    loads : dict
+        Static loads (n_dof,) [N] by name.
+    built : BuiltModel
+        What came with a built model, in its own dofs.
+    reduction : ReductionSection
+        How to reduce, None for not at all.
+    reduced : ReductionReport
+        What a reduction did; None for the model as given.
+    preload : PreloadSection
+        The static state of all analyses without one of their own; None for none.
     analyses : dict
         Validated analyses by name, in the order of the file.
     resolved : dict
@@ -55,6 +72,13 @@ class Case:
     notes: list[str] = field(default_factory=list)
     has_quick: bool = False
     study: StudySection = field(default_factory=StudySection)
+    damping: tuple[float, float] = (0.0, 0.0)
+    loads: dict[str, Any] = field(default_factory=dict)
+    built: BuiltModel | None = None
+    reduction: ReductionSection | None = None
+    keep: list[int] = field(default_factory=list)
+    reduced: ReductionReport | None = None
+    preload: PreloadSection | None = None
 
     @property
     def name(self) -> str:
@@ -71,13 +95,18 @@ class Case:
         return self.dofs.index(name)
 
     def damping_with(self, dampers: Sequence[Any]) -> Any:
-        """C with viscous dampers to ground added, None when there is no damping at all."""
-        if not dampers:
-            return self.C
-        added = scipy.sparse.lil_matrix(self.M.shape)
-        for damper in dampers:
-            added[self.dof(damper.dof), self.dof(damper.dof)] += damper.c
-        return added.tocsr() if self.C is None else (self.C + added).tocsr()
+        """C with its shares of K and M and viscous dampers to ground, None when there is no damping at all."""
+        parts = [] if self.C is None else [self.C]
+        parts += [share * matrix for share, matrix in zip(self.damping, (self.K, self.M)) if share]
+        if dampers:
+            places = [self.dof(damper.dof) for damper in dampers]
+            values = [damper.c for damper in dampers]
+            parts.append(scipy.sparse.csr_matrix((values, (places, places)), shape=self.M.shape))
+        return sum(parts[1:], parts[0]).tocsr() if parts else None
+
+    def preload_of(self, analysis: AnalysisSection) -> PreloadSection | None:
+        """The preload of an analysis: its own, or that of the case."""
+        return getattr(analysis, "preload", None) or self.preload
 
 
 def load_case(
@@ -139,115 +168,72 @@ def _in_file_order(found: list[FretwaveError]) -> list[FretwaveError]:
 def _build(source: Source, laws: Mapping[str, Any], found: list[FretwaveError]) -> Case | None:
     checks.check_top_level(source, found)
     analyses = checks.read_analyses(source, found)
-    has_model = isinstance(source.data.get("model"), dict)
-    section = validate(ModelSection, source, ("model",), found) if has_model else None
-    loaded = _load_matrices(section, source, found) if section else {}
-    dofs = _dof_names(section, loaded, source, found) if section else None
-    contacts = read_contacts(source, dofs, laws, found)
-    study = (
-        validate(StudySection, source, ("study",), found)
-        if isinstance(source.data.get("study"), dict)
-        else StudySection()
-    )
-    checks.check_analyses(source, analyses, dofs, found)
+    section = _table(ModelSection, "model", source, found)
+    reduction = _table(ReductionSection, "reduction", source, found)
+    preload = _table(PreloadSection, "preload", source, found)
+    study = _table(StudySection, "study", source, found)
+    origin = load_origin(section, source, found) if section else None
+    dofs = origin.dofs if origin else None
+    built = origin.built if origin else None
+    contacts = read_contacts(source, dofs, laws, found, built.contacts if built else {})
+    keep = kept_dofs(origin.named, contacts, analyses, origin.dofs) if origin and reduction else []
+    checks.check_analyses(source, analyses, [origin.dofs[k] for k in keep] if origin and keep else dofs, found)
+    checks.check_preloads(source, analyses, built.loads if built else () if origin else None, found)
     notes: list[str] = []
-    if dofs is not None:
-        _check_physics(loaded, dofs, contacts, notes, found)
-    if found or section is None or dofs is None or study is None:
+    if origin is not None:
+        complete = len(contacts) == len(source.entries("contact"))
+        check_physics(origin, [contact.rows for contact in contacts] if complete else None, notes, found)
+    if found or section is None or origin is None:
         return None
+    loaded = {letter: matrix.values for letter, matrix in origin.matrices.items()}
     return Case(
         path=source.path,
         text=source.text,
         title=str(source.data.get("title", "")),
-        dofs=dofs,
-        M=loaded["M"].values,
-        K=loaded["K"].values,
-        C=loaded["C"].values if "C" in loaded else None,
+        dofs=origin.dofs,
+        M=loaded["M"],
+        K=loaded["K"],
+        C=loaded.get("C"),
         contacts=contacts,
         analyses={analysis.name: analysis for analysis in analyses.values()},
-        resolved=_resolve(dofs, loaded, section, contacts, analyses),
-        notes=notes,
+        resolved=_resolve(origin, section, contacts, analyses, {"reduction": reduction, "preload": preload}),
+        notes=[*notes, *_unused_contacts(built, contacts)],
         has_quick="quick" in source.data,
-        study=study,
+        study=study or StudySection(),
+        damping=(section.stiffness_damping, section.mass_damping),
+        loads=dict(built.loads) if built else {},
+        built=built,
+        reduction=reduction,
+        keep=keep,
+        preload=preload,
     )
 
 
-def _load_matrices(section: ModelSection, source: Source, found: list[FretwaveError]) -> dict[str, matrices.Matrix]:
-    loaded = {}
-    for letter in ("M", "K", "C"):
-        given = getattr(section, letter)
-        matrix = matrices.load(letter, given, source, found) if given is not None else None
-        if matrix is not None:
-            loaded[letter] = matrix
-    return loaded
+def _table(kind: type[Table], name: str, source: Source, found: list[FretwaveError]) -> Table | None:
+    """The validated table of this name, None when there is none or something is wrong with it."""
+    return validate(kind, source, (name,), found) if isinstance(source.data.get(name), dict) else None
 
 
-def _dof_names(
-    section: ModelSection,
-    loaded: dict[str, matrices.Matrix],
-    source: Source,
-    found: list[FretwaveError],
-) -> list[str] | None:
-    """Names of the dofs once names and matrices agree in number; None when they do not."""
-    named = section.dofs
-    if named is not None and len(set(named)) != len(named):
-        twice = next(name for name in named if named.count(name) > 1)
-        where = source.where(("model", "dofs"))
-        found.append(InputError(f"two dofs have the name '{twice}'", where, toml(named), "unique names", "rename one"))
-        return None
-    if named is None and "M" not in loaded:
-        return None
-    size = len(named) if named is not None else loaded["M"].size
-    told = f"model.dofs names {size} dofs" if named is not None else f"the mass matrix is {size} x {size}"
-    wrong = [matrix for matrix in loaded.values() if matrix.size != size]
-    for matrix in wrong:
-        found.append(
-            InputError(
-                f"the {matrix.name} has the wrong size",
-                where=matrix.where,
-                measured=f"{matrix.size} x {matrix.size}",
-                expected=f"{size} x {size}: {told}",
-                fix="all matrices need one row and one column for each dof",
-            )
-        )
-        del loaded[matrix.letter]
-    return named if named is not None else [str(number) for number in range(size)]
-
-
-def _check_physics(
-    loaded: dict[str, matrices.Matrix],
-    dofs: list[str],
-    contacts: list[ContactSpec],
-    notes: list[str],
-    found: list[FretwaveError],
-) -> None:
-    for letter in ("M", "K"):
-        matrix = loaded.get(letter)
-        if matrix is None:
-            continue
-        problem = matrices.check_symmetric(matrix, dofs)
-        if problem is None and letter == "M":
-            problem = matrices.check_mass(matrix, dofs)
-        elif problem is None:
-            rows = [contact.rows for contact in contacts]
-            stacked = scipy.sparse.vstack(rows) if rows else scipy.sparse.csr_matrix((0, len(dofs)))
-            problem, note = matrices.check_stiffness(matrix, dofs, stacked)
-            notes.extend([note] if note else [])
-        if problem is not None:
-            found.append(problem)
+def _unused_contacts(built: BuiltModel | None, contacts: Sequence[ContactSpec]) -> list[str]:
+    used = [contact.name for contact in contacts]
+    unused = [name for name in (built.contacts if built else {}) if name not in used]
+    return [f"the builder's contact '{name}' is not used: no [[contact]] has this name" for name in unused]
 
 
 def _resolve(
-    dofs: list[str],
-    loaded: dict[str, matrices.Matrix],
+    origin: Origin,
     section: ModelSection,
     contacts: list[ContactSpec],
     analyses: dict[int, AnalysisSection],
+    tables: dict[str, Any],
 ) -> dict[str, Any]:
     """All values that decide the results, flat, under the addresses that ``--set`` uses."""
-    resolved: dict[str, Any] = {"model.dofs": dofs}
-    for letter, matrix in loaded.items():
-        resolved[f"model.{letter}"] = matrix.digest or getattr(section, letter)
+    resolved = dict(origin.resolved)
+    damping = {key: getattr(section, key) for key in ("stiffness_damping", "mass_damping")}
+    resolved.update({f"model.{key}": value for key, value in damping.items() if value})
+    for name, table in tables.items():
+        given = table.model_dump(mode="json") if table else {}
+        resolved.update({f"{name}.{key}": value for key, value in given.items()})
     for contact in contacts:
         values = {"law": contact.law, "pairs": contact.pairs}
         values.update({key: _plain(value) for key, value in contact.parameters.items()})

@@ -10,12 +10,14 @@ from . import checks
 from .casefile import Case, load_case
 from .errors import EXIT_DONE
 from .parallel import on_first_rank
+from .reduced import reduce_case
 from .run import build_model, in_order
 from .schema import (
     AnalysisSection,
     ForcedAnalysis,
     HarmonicSection,
     ModeAnalysis,
+    StaticAnalysis,
     TransientSection,
 )
 from .source import display
@@ -31,6 +33,7 @@ def check_case(path: Path, overrides: Sequence[str], only: Sequence[str], quick:
     """
     case = on_first_rank(comm, lambda: _load(path, overrides, quick))
     names = in_order(case, checks.choose(list(case.analyses), only))
+    case = reduce_case(case, comm)
     with build_model(case, (), comm) as model:
         described = {name: describe(case.analyses[name], model) for name in names}
     if comm.rank == 0:
@@ -50,9 +53,10 @@ def _report(case: Case, described: dict[str, list[str]]) -> list[str]:
     shown = ", ".join(case.dofs[:8]) + (", ..." if len(case.dofs) > 8 else "")
     lines.append(f"  {len(case.dofs)} dofs: {shown}")
     for contact in case.contacts:
-        count = len(contact.pairs)
+        count = contact.n_pairs
         values = ", ".join(f"{key} = {_short(value)}" for key, value in contact.parameters.items())
         lines.append(f"  contact '{contact.name}': {contact.law}, {count} contact pair{'s' * (count != 1)}, {values}")
+    lines.extend([f"  {case.reduced.line()}"] if case.reduced else [])
     lines.extend(f"  note: {note}" for note in case.notes)
     for name, texts in described.items():
         lines.append(f"  {name}: {texts[0]}")
@@ -93,6 +97,8 @@ def _headline(analysis: AnalysisSection) -> str:
         low, high = analysis.frequency
         levels = ", ".join(f"{level:g}" for level in analysis.levels)
         return f"forced response of {analysis.observe}, {low:g} to {high:g} Hz, levels {levels}"
+    if isinstance(analysis, StaticAnalysis):
+        return f"static state at load factors {', '.join(f'{factor:g}' for factor in analysis.factors)}"
     assert isinstance(analysis, TransientSection)
     kind = analysis.type.replace("_", " ")
     starts = ", ".join(f"{amplitude:g}" for amplitude in analysis.amplitude)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 from .contacts import check_dof
@@ -42,14 +42,9 @@ def check_top_level(source: Source, found: Found) -> None:
     for key in source.data:
         if key not in TOP_LEVEL:
             found.append(unknown_key(source, (key,), list(TOP_LEVEL)))
-    shapes = {"model": dict, "contact": list, "analysis": list, "quick": dict, "study": dict, "title": str}
-    writing = {
-        "model": "[model]",
-        "contact": "[[contact]]",
-        "analysis": "[[analysis]]",
-        "quick": "[quick]",
-        "study": "[study]",
-    }
+    tables = dict.fromkeys(("model", "reduction", "preload", "quick", "study"), dict)
+    shapes = {**tables, "contact": list, "analysis": list, "title": str}
+    writing = {**{name: f"[{name}]" for name in tables}, "contact": "[[contact]]", "analysis": "[[analysis]]"}
     for key, shape in shapes.items():
         value = source.data.get(key)
         bad = value is not None and not isinstance(value, shape)
@@ -131,6 +126,31 @@ def check_analyses(
             _check_forced(report, analysis, dofs, modes)
         if isinstance(analysis, TransientSection):
             report.mode(("mode",), analysis.mode, modes)
+
+
+def check_preloads(
+    source: Source, analyses: dict[int, AnalysisSection], loads: Iterable[str] | None, found: Found
+) -> None:
+    """Loads must come with the model (None: it is not known); time integration starts at rest without any."""
+    places = [("preload",), *(("analysis", number, "preload") for number in analyses)]
+    known = list(loads or ())
+    for place in places if loads is not None else ():
+        given = at(source.data, (*place, "loads"))
+        for index, name in enumerate(given if isinstance(given, list) else []):
+            if name not in known:
+                fix = nearest(str(name), known) or "loads come with a model that is built"
+                _Reporter(source, place, found).wrong(
+                    ("loads", index), "is no load of the model", f"one of {', '.join(known) or '(there is none)'}", fix
+                )
+    if at(source.data, ("preload",)) is None:
+        return
+    for number, analysis in analyses.items():
+        if isinstance(analysis, TransientSection) or getattr(analysis, "time_points", False):
+            key = "type" if isinstance(analysis, TransientSection) else "time_points"
+            fix = "remove the analysis, or [preload]" if key == "type" else "write `time_points = 0`"
+            _Reporter(source, ("analysis", number), found).wrong(
+                (key,), "needs time integration, which does not know a preload", "analyses of harmonic balance", fix
+            )
 
 
 class _Reporter:

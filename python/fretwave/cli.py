@@ -77,6 +77,7 @@ def parser() -> argparse.ArgumentParser:
     plot.add_argument("folder", type=Path, metavar="RUNDIR", help="folder of the run")
     plot.add_argument("--only", type=_names, default=[], metavar="NAME,...", help="analyses or kinds of picture")
     plot.set_defaults(command=_plot)
+    _add_import(commands)
     commands.add_parser("study", help="error against run time of a case over harmonics, samples and tolerance")
     commands.add_parser("doctor", help="what is installed, whether it fits together, and what to do about it")
     return top
@@ -108,6 +109,37 @@ def _add_run(commands: Any) -> None:
     run.add_argument("--no-plots", action="store_true", help="make no pictures")
     run.add_argument("--petsc", default="", metavar="OPTIONS", help='PETSc options: "-snes_rtol 1e-10"')
     run.set_defaults(command=_run)
+
+
+def _add_import(commands: Any) -> None:
+    add = commands.add_parser(
+        "import",
+        help="bring matrices of a finite-element code into one model file",
+        description="Matrices: NumPy .npz, Matrix Market, MATLAB .mat (5 to 7.3), PETSc binary, CalculiX .sti/.mas,"
+        ' Abaqus .mtx; FILE:NAME picks a variable. In a case: [model] file = "OUT.h5".',
+    )
+    add.add_argument("out", type=Path, metavar="OUT.h5", help="model file to write")
+    add.add_argument("--mass", required=True, metavar="FILE", help="mass matrix")
+    add.add_argument("--stiffness", required=True, metavar="FILE", help="stiffness matrix")
+    add.add_argument("--damping", metavar="FILE", help="viscous damping matrix")
+    add.add_argument("--symmetric", choices=("auto", "lower", "upper", "full"), default="auto", help="what files hold")
+    add.add_argument("--dofs", type=Path, metavar="FILE", help="node and direction of each row (.dof, or CSV)")
+    add.add_argument("--coordinates", type=Path, metavar="FILE", help="nodes and sets: CSV, .npz or input deck")
+    add.add_argument(
+        "--pairs",
+        nargs="+",
+        action="append",
+        default=[],
+        metavar="[NAME=]SET",
+        help="contact: two sets of coincident nodes, SET GROUND, or one CSV of node_a,node_b,nx,ny,nz,area",
+    )
+    add.add_argument("--normal", metavar="X,Y,Z", help="from the first set to the second")
+    add.add_argument("--tangent", metavar="X,Y,Z", help="first tangent (default: the axis most across the normals)")
+    add.add_argument("--tolerance", type=float, metavar="LENGTH", help="largest distance of two nodes of a pair")
+    add.add_argument("--name", action="append", default=[], metavar="NAME=DOF", help="name a dof: tip=n17y; it is kept")
+    add.add_argument("--units", default="", metavar="TEXT", help='a note, for example "kg, N, m"')
+    add.add_argument("--modes", type=int, default=6, metavar="N", help="frequencies to report (default 6)")
+    add.set_defaults(command=_import)
 
 
 def _world() -> Any:
@@ -151,6 +183,13 @@ def _check(options: argparse.Namespace) -> int:
     from .check import check_case
 
     return check_case(options.case, options.overrides, options.only, options.quick, comm)
+
+
+def _import(options: argparse.Namespace) -> int:
+    comm = _world()
+    from .importers.command import import_model
+
+    return import_model(options, comm)
 
 
 def _show(options: argparse.Namespace) -> int:

@@ -17,6 +17,9 @@ from .problems import HarmonicProblem, Harmonics
 
 Array = npt.NDArray[np.float64]
 
+#: Load factor at which a structure held by contact alone starts.
+FIRST_FACTOR = 1e-2
+
 
 @dataclass(frozen=True)
 class Preload:
@@ -27,6 +30,9 @@ class Preload:
     displacement : (n_dof,) on every rank
     load : (n_dof,) the static load it balances, contact included
     stick, slip, open : shares of the pairs
+    imbalance : what the solver left of the load, relative to it
+    contacts : list of dict, on rank 0
+        Relative displacement u and force f (components, n_pairs) of each contact.
     """
 
     displacement: Array
@@ -34,6 +40,8 @@ class Preload:
     stick: float
     slip: float
     open: float
+    imbalance: float = 0.0
+    contacts: list[dict[str, Array]] | None = None
 
 
 class StaticPreload(HarmonicProblem):
@@ -51,7 +59,7 @@ class StaticPreload(HarmonicProblem):
     ) -> None:
         stiffness = reference.omega**2 / float(np.sum(reference.shape**2))
         size = (float(np.linalg.norm(load)) or stiffness) / stiffness
-        self.force_scale = stiffness * size
+        self.force_scale, self.size = stiffness * size, size
         core = _core.StaticPreload(model.core, model.vector(load), size, stiffness)
         if constant is not None:
             core.preload(model.vector(np.zeros(model.n_dof)), model.vector(constant))
@@ -59,6 +67,16 @@ class StaticPreload(HarmonicProblem):
 
     def state(self, y: PETSc.Vec) -> dict[str, float]:
         return {}
+
+    def at(self, displacement: Array, factor: float) -> PETSc.Vec:
+        """Unknowns of a displacement (n_dof,) given whole on every rank, at a load factor. Collective."""
+        y = self.core.initial()
+        local = y.getArray().copy()
+        n = self.model.core.local_dofs
+        local[:n] = self.model.distribute(displacement) / self.size
+        local[n:] = factor  # the last rank's last entry
+        y.setArray(local)
+        return y
 
 
 def balanced(model: Model, reference: LinearMode) -> Preload:
@@ -69,33 +87,41 @@ def balanced(model: Model, reference: LinearMode) -> Preload:
     return _settled(problem, y, np.zeros(model.n_dof))
 
 
-def static_preload(model: Model, load: Array, reference: LinearMode, steps: StepControl | None = None) -> Preload:
+def static_preload(
+    model: Model, load: Array, reference: LinearMode, steps: StepControl | None = None, closed: Array | None = None
+) -> Preload:
     """Static equilibrium under `load` and the normal loads given pair by pair. Collective.
 
-    By continuation in the load factor.
+    By continuation in the load factor, from the unloaded state.
+
+    Parameters
+    ----------
+    closed : (n_dof,), optional
+        Displacement under the full load with all pairs closed: start from a small share of it. For pairs that just
+        touch when unloaded: a structure that they alone hold has no stiffness there.
 
     Raises
     ------
     NotConverged
         With the load factor that was reached.
     """
+    load = np.asarray(load, dtype=float)
     rest = balanced(model, reference)
-    problem = StaticPreload(model, np.asarray(load, dtype=float), reference, rest.load)
-    branch = Continuation(
-        problem, problem.core.initial(), (-1.0, 1.0), steps or StepControl(initial=0.1, maximum=0.5), upwards=True
-    )
-    reached = 0.0
+    problem = StaticPreload(model, load, reference, rest.load)
+    control = steps or StepControl(initial=0.1, maximum=0.5)
+    start = problem.core.initial() if closed is None else problem.at(FIRST_FACTOR * closed, FIRST_FACTOR)
+    y, reached, branch = None, 0.0, Continuation(problem, start, (-1.0, 1.0), control, upwards=True)
     for point in branch:
         y, reached = point.y, point.parameter
-    if not branch.converged:
-        raise NotConverged(
-            "no static equilibrium under the full load",
-            None,
-            f"load factor {reached:.4g}: {branch.reason}",
-            "1",
-            "hold the structure where contact alone cannot (an axial stop), or lower the load",
-        )
-    return _settled(problem, y, rest.load + np.asarray(load, dtype=float))
+    if branch.converged:
+        return _settled(problem, y, rest.load + load)
+    raise NotConverged(
+        "no static equilibrium under the full load",
+        None,
+        f"load factor {reached:.4g}: {branch.reason}",
+        "1",
+        "hold the structure where contact alone cannot (an axial stop), or lower the load",
+    )
 
 
 def _settled(problem: StaticPreload, y: PETSc.Vec, load: Array) -> Preload:
@@ -103,11 +129,17 @@ def _settled(problem: StaticPreload, y: PETSc.Vec, load: Array) -> Preload:
 
     That rest, small beside the load, would be large beside the forces of a small motion.
     """
-    load = load + _whole(problem.model, problem.residual(y)) * problem.force_scale
+    rest = _whole(problem.model, problem.residual(y)) * problem.force_scale
+    size = float(np.linalg.norm(load)) or float(np.linalg.norm(load + rest)) or 1.0
+    load = load + rest
     contact = problem.diagnostics(y)
+    periods = problem.contact_period(y)
+    on_first = problem.model.comm.rank == 0
+    contacts = [{key: np.asarray(c[key])[0] for key in "uf"} for c in periods] if on_first else None
     problem.core.settle(y)
     blocks = _whole(problem.model, problem.core.coefficients(y))
-    return Preload(blocks, load, contact["stick"], contact["slip"], contact["open"])
+    imbalance = float(np.linalg.norm(rest)) / size
+    return Preload(blocks, load, contact["stick"], contact["slip"], contact["open"], imbalance, contacts)
 
 
 def _whole(model: Model, v: PETSc.Vec) -> Array:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import importlib
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -17,13 +16,15 @@ from .console import Console
 from .errors import EXIT_DONE, InputError, NotConverged
 from .parallel import on_first_rank
 from .petsc_options import AnalysisOptions
+from .reduced import reduce_case
 from .results import open_results
 from .runfolder import CASE_COPY, RunFolder, new_record, peak_memory_mb, read_record
-from .schema import AnalysisSection, ForcedAnalysis, TransientSection
+from .schema import AnalysisSection, ForcedAnalysis, PreloadSection, TransientSection
 from .source import display
 
 #: Module and function of each kind of analysis, imported when one is run.
 DISPATCH = {
+    "static": ("static", "run_static"),
     "mode": ("mode", "run_mode"),
     "forced": ("forced", "run_forced"),
     "free_decay": ("transient", "run_free_decay"),
@@ -126,6 +127,7 @@ class _Runner:
         on_first_rank(self.comm, lambda: self._check_needs(names))
         self.folder.record["selected"] = names
         self._greet(names)
+        self._reduce()
         for name in names:
             if not (self.resuming and self._is_done(name)):
                 self._run_one(self.case.analyses[name])
@@ -147,6 +149,13 @@ class _Runner:
         others = [name for name in self.case.analyses if name not in names]
         if others:
             self.console.line(f"left out by --only: {', '.join(others)}")
+
+    def _reduce(self) -> None:
+        """Solve on the reduced model from here on, when the case asks for one; its error is kept."""
+        self.case = reduce_case(self.case, self.comm)
+        if self.case.reduced is not None:
+            self.console.line(self.case.reduced.line())
+            self.folder.record["reduction"] = self.case.reduced.plain()
 
     def _check_needs(self, names: Sequence[str]) -> None:
         """Time integration needs the results of its mode: from this run, or kept in the folder."""
@@ -203,7 +212,8 @@ class _Runner:
             options.check_used(fretwave._core.unused_options, f"analysis '{analysis.name}'")
             self.folder.start()
 
-        with _model(self.case, self._dampers(analysis), self.comm) as model, options.inserted():
+        preload = self.case.preload_of(analysis)
+        with build_model(self.case, self._dampers(analysis), self.comm, preload) as model, options.inserted():
             context = AnalysisContext(
                 model,
                 self.case,
@@ -213,10 +223,13 @@ class _Runner:
                 self.console,
                 resuming=self._is_begun(analysis.name),
                 before_first=before_first,
-                attributes=describe_analysis(analysis, self.case.resolved, self.folder.record["run_id"]),
+                attributes=describe_analysis(analysis, self.case, self.folder.record["run_id"]),
             )
             module, function = DISPATCH[analysis.type]
-            outcome = getattr(importlib.import_module(f".analyses.{module}", __package__), function)(context)
+            try:
+                outcome = getattr(importlib.import_module(f".analyses.{module}", __package__), function)(context)
+            except NotConverged as error:  # before its first point: there was no static state to start from
+                outcome = Outcome(0, f"{error.what}: {error.measured}", False, goal=str(error.expected))
         self._note(analysis.name, context, outcome, time.perf_counter() - began)
 
     def _dampers(self, analysis: AnalysisSection) -> list[Any]:
@@ -284,19 +297,19 @@ def needs(analysis: AnalysisSection) -> list[str]:
     return []
 
 
-@contextmanager
-def _model(case: Case, dampers: Sequence[Any], comm: Any) -> Iterator[Any]:
-    """The model of a case with dampers added. Collective."""
-    with build_model(case, dampers, comm) as model:
-        yield model
-
-
-def build_model(case: Case, dampers: Sequence[Any], comm: Any) -> Any:
-    """``fretwave.Model`` of a case. Collective."""
+def build_model(case: Case, dampers: Sequence[Any], comm: Any, preload: PreloadSection | None = None) -> Any:
+    """``fretwave.Model`` of a case; a preload without pair loads sets the pairs' normal loads to zero. Collective."""
     import fretwave
 
+    without = {"normal_load": 0.0} if preload is not None and not preload.pair_loads else {}
     contacts = [
-        fretwave.Contact(contact.law, contact.rows, contact.parameters, name=contact.name) for contact in case.contacts
+        fretwave.Contact(
+            contact.law,
+            contact.rows,
+            {**contact.parameters, **{key: value for key, value in without.items() if key in contact.parameters}},
+            name=contact.name,
+        )
+        for contact in case.contacts
     ]
     return fretwave.Model(case.M, case.K, C=case.damping_with(dampers), contacts=contacts, comm=comm)
 

@@ -29,16 +29,48 @@ class Section(BaseModel):
 
 
 class ModelSection(Section):
-    """``[model]``: matrices and names of the degrees of freedom."""
+    """``[model]``: matrices and names of the degrees of freedom, or what makes them."""
 
     dofs: Optional[list[Dof]] = key(
         "names of the dofs, in the order of the matrices", example='["m1", "m2"]', default=None
     )
-    M: Matrix = key("mass matrix, rows or a .npz/.mtx file", "kg", "[[1.0, 0.0], [0.0, 0.02]]")
-    K: Matrix = key("stiffness matrix, rows or a .npz/.mtx file", "N/m", "[[2.0, -1.0], [-1.0, 1.0]]")
+    M: Optional[Matrix] = key("mass matrix, rows or a .npz/.mtx file", "kg", "[[1.0, 0.0], [0.0, 0.02]]", default=None)
+    K: Optional[Matrix] = key(
+        "stiffness matrix, rows or a .npz/.mtx file", "N/m", "[[2.0, -1.0], [-1.0, 1.0]]", default=None
+    )
     C: Optional[Matrix] = key(
         "damping matrix, rows or a .npz/.mtx file", "N s/m", "[[0.1, 0.0], [0.0, 0.1]]", default=None
     )
+    builder: Optional[str] = key(
+        "Python file whose build(**options) gives the model, in place of matrices", example='"model.py"', default=None
+    )
+    file: Optional[str] = key(
+        "model file of `fretwave import`, in place of matrices; it brings names of dofs and contacts",
+        example='"blade.h5"',
+        default=None,
+    )
+    options: dict[str, Any] = key("options of the builder", example="{ speed_rpm = 2000 }", default_factory=dict)
+    stiffness_damping: float = key("C grows by this times K", "s", "2e-6", default=0.0, ge=0, allow_inf_nan=False)
+    mass_damping: float = key("C grows by this times M", "1/s", "0.1", default=0.0, ge=0, allow_inf_nan=False)
+
+
+class ReductionSection(Section):
+    """``[reduction]``: Craig-Bampton; kept are the dofs of contacts and those that the case or its builder names."""
+
+    modes: Optional[int] = key("number of component modes (10 unless told)", example="10", default=None, ge=0)
+    up_to_hz: Optional[Positive] = key("instead of modes: all component modes up to here", "Hz", "5000.0", default=None)
+    compare: int = key("linear modes compared with the unreduced model, 0 for none", example="5", default=5, ge=0)
+
+
+class PreloadSection(Section):
+    """``[preload]``: the static state that the dynamics move about."""
+
+    pair_loads: bool = key(
+        "normal loads given pair by pair act, balanced as they are; false sets them to zero",
+        example="true",
+        default=True,
+    )
+    loads: list[str] = key("static loads of the model that act", example='["centrifugal"]', default_factory=list)
 
 
 class ContactSection(BaseModel):
@@ -48,9 +80,10 @@ class ContactSection(BaseModel):
 
     name: str = key("name of the contact", example='"damper"', default="contact", pattern=r"^[A-Za-z]\w*$")
     law: str = key("contact law", example='"regularised_coulomb"')
-    pairs: list[Union[Dof, list[Dof]]] = key(
-        "contact pairs: a dof against ground, or [first, second] for second minus first",
+    pairs: Optional[list[Union[Dof, list[Dof]]]] = key(
+        "contact pairs: a dof against ground, or [first, second] for second minus first; a builder brings its own",
         example='["m2"] or [["m1", "m2"]]',
+        default=None,
         min_length=1,
     )
 
@@ -96,6 +129,7 @@ class HarmonicSection(AnalysisSection):
     samples: Optional[int] = key("time samples of a period in the contact law", example="1024", default=None, ge=4)
     linear_mode: int = key("linear mode to start from, 1 is the lowest", example="1", default=1, ge=1)
     step: StepSection = key("step control", example="{ initial = 0.05, maximum = 0.3 }", default_factory=StepSection)
+    preload: Optional[PreloadSection] = key("in place of [preload]", example="{ pair_loads = true }", default=None)
 
 
 class ModeAnalysis(HarmonicSection):
@@ -109,6 +143,16 @@ class ModeAnalysis(HarmonicSection):
     amplitude: list[Positive] = key("first and last modal amplitude", "m", "[0.02, 3.0]", min_length=2, max_length=2)
     report_at: list[Positive] = key(
         "amplitudes at which the motion of a period is kept", "m", "[0.1, 0.5]", default_factory=list
+    )
+
+
+class StaticAnalysis(AnalysisSection):
+    """``type = "static"``: the static state under the preload, pair by pair."""
+
+    type: Literal["static"]
+    factors: list[Positive] = key("factors on the loads of the preload", "-", "[0.5, 1.0]", default=[1.0], min_length=1)
+    preload: Optional[PreloadSection] = key(
+        "in place of [preload]", example='{ loads = ["centrifugal"] }', default=None
     )
 
 
@@ -158,6 +202,7 @@ class LimitCycleAnalysis(TransientSection):
 
 
 ANALYSES: dict[str, type[AnalysisSection]] = {
+    "static": StaticAnalysis,
     "mode": ModeAnalysis,
     "forced": ForcedAnalysis,
     "free_decay": FreeDecayAnalysis,
@@ -172,6 +217,9 @@ class StudySection(Section):
     samples: Optional[list[int]] = key(
         "time samples of a period", example="[128, 512, 2048]", default=None, min_length=2
     )
+    component_modes: Optional[list[int]] = key(
+        "numbers of component modes, for a reduced model", example="[2, 5, 10, 20]", default=None, min_length=2
+    )
     tolerance: Optional[list[Positive]] = key(
         "residual norms at which Newton stops", "-", "[1e-4, 1e-7, 1e-10]", default=None, min_length=2
     )
@@ -180,7 +228,9 @@ class StudySection(Section):
 #: Top-level keys; analyses cannot bear these names, or ``--set`` could not tell them apart.
 TOP_LEVEL = {
     "title": "one line that says what the case is",
-    "model": "matrices and names of the degrees of freedom",
+    "model": "matrices and names of the degrees of freedom, or what makes them",
+    "reduction": "Craig-Bampton reduction",
+    "preload": "the static state that the dynamics move about",
     "contact": "contact pairs that share a law ([[contact]], any number)",
     "analysis": "what to compute ([[analysis]], at least one)",
     "quick": "overrides used by --quick, addressed as --set does",

@@ -1,4 +1,4 @@
-"""``fretwave study``: error against run time of a mode analysis over harmonics, samples and tolerance."""
+"""``fretwave study``: error against run time of a mode analysis over harmonics, samples, tolerance, modes."""
 
 from __future__ import annotations
 
@@ -12,11 +12,14 @@ from typing import Any, cast
 import numpy as np
 
 from .analyses.branch import step_control
+from .analyses.context import AnalysisContext
+from .analyses.rest import retained, start_mode
 from .casefile import Case, load_case
 from .console import Console
 from .errors import EXIT_DONE, InputError, NotConverged
 from .parallel import on_first_rank
 from .petsc_options import AnalysisOptions
+from .reduced import reduce_case
 from .run import build_model
 from .schema import ModeAnalysis
 from .study_plan import Outcome, Plan, Settings, Study, common_amplitudes
@@ -39,9 +42,8 @@ def main(arguments: Sequence[str]) -> int:
     console = Console(comm.rank == 0, lambda line: None)
     study = Study(plan, common_amplitudes(min(analysis.amplitude), max(analysis.amplitude), COUNT))
     console.line(f"study of '{analysis.name}': {len(plan.sweeps())} runs, the finest is {_text(plan.reference)}")
-    with build_model(case, analysis.dampers, comm) as model:
-        solver = _Solver(case, analysis, model, study, options.repeats)
-        study.run(solver.solve, lambda sweep, settings: console.line(_progress(study, sweep, settings)))
+    solver = _Solver(case, analysis, comm, console, study, options.repeats)
+    study.run(solver.solve, lambda sweep, settings: console.line(_progress(study, sweep, settings)))
     if not study.table():
         raise _no_reference(study)
     folder = options.out or Path("runs") / f"{case.name}_study"
@@ -52,11 +54,21 @@ def main(arguments: Sequence[str]) -> int:
 class _Solver:
     """Solves the whole branch of one analysis at any settings."""
 
-    def __init__(self, case: Case, analysis: ModeAnalysis, model: Any, study: Study, repeats: int) -> None:
-        import fretwave
+    def __init__(self, case: Case, analysis: ModeAnalysis, comm: Any, console: Console, study: Study, repeats: int):
+        self.case, self.analysis, self.comm, self.console = case, analysis, comm, console
+        self.study, self.repeats = study, repeats
+        self._parts: tuple[int | None, AnalysisContext, Any, Any] | None = None
 
-        self.case, self.analysis, self.model, self.study, self.repeats = case, analysis, model, study, repeats
-        self.start = fretwave.linear_modes(model, count=analysis.linear_mode, contact="stuck")[-1]
+    def _model(self, component_modes: int | None) -> tuple[AnalysisContext, Any, Any]:
+        """Context, start and rest state with this many component modes; the last one is kept. Collective."""
+        if self._parts is None or self._parts[0] != component_modes:
+            if self._parts is not None:
+                self._parts[1].model.destroy()
+            case = reduce_case(self.case, self.comm, component_modes)
+            model = build_model(case, self.analysis.dampers, self.comm, case.preload_of(self.analysis))
+            context = AnalysisContext(model, case, self.analysis, self.comm, Path(), self.console)
+            self._parts = (component_modes, context, *start_mode(context, self.analysis.linear_mode))
+        return self._parts[1:]
 
     def solve(self, settings: Settings) -> Outcome | str:
         """The branch's values at the study's amplitudes, or why it has none. Collective."""
@@ -72,17 +84,20 @@ class _Solver:
         import fretwave
 
         analysis = self.analysis
-        harmonics = fretwave.choose_harmonics(self.model, settings.harmonics, settings.samples, analysis.retain)
+        context, start, rest = self._model(settings.component_modes)
+        harmonics = retained(context, settings.harmonics, settings.samples)
         options = AnalysisOptions("study_", [analysis.petsc, f"-snes_atol {settings.tolerance!r}"])
         with options.inserted():
             problem = fretwave.NonlinearMode(
-                self.model,
+                context.model,
                 harmonics,
                 method=analysis.method,
-                dof=self.case.dof(analysis.normalise),
-                start=self.start,
+                dof=context.case.dof(analysis.normalise),
+                start=start,
                 prefix="study_",
             )
+            if rest is not None:
+                problem.preload(rest.displacement, rest.load)
             try:
                 return self._follow(problem)
             finally:
@@ -159,7 +174,8 @@ def _progress(study: Study, sweep: str, settings: Settings) -> str:
 
 
 def _text(settings: Settings) -> str:
-    return f"H = {settings.harmonics}, N_t = {settings.samples}, tolerance {settings.tolerance:.0e}"
+    modes = "" if settings.component_modes is None else f", {settings.component_modes} component modes"
+    return f"H = {settings.harmonics}, N_t = {settings.samples}, tolerance {settings.tolerance:.0e}{modes}"
 
 
 def _no_reference(study: Study) -> NotConverged:
@@ -184,8 +200,15 @@ def _analysis(case: Case, name: str | None) -> ModeAnalysis:
 def _plan(case: Case, options: argparse.Namespace) -> Plan:
     """Sweeps of the command line, else of the case's table [study], else the defaults."""
     plan = Plan()
-    for name in ("harmonics", "samples", "tolerance"):
+    for name in ("harmonics", "samples", "tolerance", "component_modes"):
         values = getattr(options, name) or getattr(case.study, name)
+        if name == "component_modes" and values and case.reduction is None:
+            raise InputError(
+                "the case is not reduced: there are no component modes to sweep",
+                "study.component_modes",
+                expected="a table [reduction]",
+                fix="add [reduction], or leave component_modes out",
+            )
         plan = replace(plan, **{name: tuple(values)}) if values else plan
     return plan
 
@@ -208,6 +231,9 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--harmonics", type=_list(int), metavar="H,...", help="highest harmonics to sweep")
     parser.add_argument("--samples", type=_list(int), metavar="N,...", help="time samples to sweep")
     parser.add_argument("--tolerance", type=_list(float), metavar="T,...", help="Newton tolerances to sweep")
+    parser.add_argument(
+        "--component-modes", type=_list(int), metavar="N,...", help="numbers of component modes to sweep"
+    )
     parser.add_argument("--repeats", type=int, default=REPEATS, help="times each branch is solved (default 3)")
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder (default runs/<case>_study)")
     return parser

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -16,11 +17,15 @@ MATCH = 1e-2
 
 @dataclass(frozen=True)
 class Settings:
-    """Numerical settings of one run; `tolerance` is the norm of the dimensionless residual at which Newton stops."""
+    """Numerical settings of one run; `tolerance` is the norm of the dimensionless residual at which Newton stops.
+
+    `component_modes` of a reduced model, None for the model as the case has it.
+    """
 
     harmonics: int
     samples: int
     tolerance: float
+    component_modes: int | None = None
 
     def possible(self) -> bool:
         """At least two samples per period of the highest harmonic."""
@@ -56,18 +61,20 @@ class Plan:
     harmonics: Sequence[int] = (1, 3, 7, 21, 41)
     samples: Sequence[int] = (64, 128, 256, 512, 1024, 2048)
     tolerance: Sequence[float] = (1e-3, 1e-4, 1e-6, 1e-8, 1e-10)
+    component_modes: Sequence[int] = ()
 
     @property
     def reference(self) -> Settings:
         """The finest settings."""
-        return Settings(max(self.harmonics), max(self.samples), min(self.tolerance))
+        most = max(self.component_modes) if self.component_modes else None
+        return Settings(max(self.harmonics), max(self.samples), min(self.tolerance), most)
 
     def sweeps(self) -> list[tuple[str, Settings]]:
         """(name of the swept setting, settings) of every row of the table, coarse to fine."""
         finest = self.reference
-        rows = [("harmonics", Settings(h, finest.samples, finest.tolerance)) for h in sorted(self.harmonics)]
-        rows += [("samples", Settings(finest.harmonics, n, finest.tolerance)) for n in sorted(self.samples)]
-        rows += [("tolerance", Settings(finest.harmonics, finest.samples, t)) for t in sorted(self.tolerance)[::-1]]
+        values: dict[str, Sequence[Any]] = {"harmonics": sorted(self.harmonics), "samples": sorted(self.samples)}
+        values |= {"tolerance": sorted(self.tolerance)[::-1], "component_modes": sorted(self.component_modes)}
+        rows = [(name, replace(finest, **{name: value})) for name, swept in values.items() for value in swept]
         return [(name, settings) for name, settings in rows if settings.possible()]
 
 
@@ -136,6 +143,7 @@ class Study:
             "peak_amplitude": run.peak_amplitude,
             "peak_zeta_error": abs(run.peak_zeta / reference.peak_zeta - 1.0),
             "error_estimate": _largest(estimate),
+            "component_modes": -1 if settings.component_modes is None else settings.component_modes,
             "reference": int(settings == self.plan.reference),
         }
 

@@ -14,6 +14,7 @@ PRINTED = {
     "H": "{harmonics}",
     "N_t": "{samples}",
     "tolerance": "{tolerance:.0e}",
+    "modes": "{component_modes}",
     "points": "{points}",
     "Newton": "{newton}",
     "time [s]": "{wall_s:.3f}",
@@ -42,11 +43,13 @@ def write_csv(rows: Sequence[Row], path: Path) -> Path:
 
 def markdown(rows: Sequence[Row], notes: Sequence[str] = ()) -> str:
     """Aligned Markdown table with its legend; readable as plain text too."""
-    body = [[form.format(**row) for form in PRINTED.values()] for row in rows]
+    reduced = any(row["component_modes"] != -1 for row in rows)
+    shown = {name: form for name, form in PRINTED.items() if name != "modes" or reduced}
+    body = [[form.format(**row) for form in shown.values()] for row in rows]
     for cells, row in zip(body, rows):
         cells[0] += " (finest)" if row["reference"] else ""
-    widths = [max(len(line[i]) for line in (list(PRINTED), *body)) for i in range(len(PRINTED))]
-    lines = [_line(PRINTED, widths), "|" + "|".join("-" * (width + 1) + ":" for width in widths) + "|"]
+    widths = [max(len(line[i]) for line in (list(shown), *body)) for i in range(len(shown))]
+    lines = [_line(shown, widths), "|" + "|".join("-" * (width + 1) + ":" for width in widths) + "|"]
     lines += [_line(cells, widths) for cells in body]
     return "\n".join([*lines, "", LEGEND, *notes, ""])
 

@@ -126,6 +126,11 @@ def _problem(kind: type[BaseModel], source: Source, path: KeyPath, inside: KeyPa
     )
 
 
+def missing_key(kind: type[BaseModel], source: Source, path: KeyPath, key: str) -> InputError:
+    """The problem of a key that this section needs in the present case."""
+    return _missing(kind, source, path, (key,), key)
+
+
 def _missing(kind: type[BaseModel], source: Source, path: KeyPath, inside: KeyPath, key: str) -> InputError:
     name, field, _ = field_of(kind, inside)
     holder = (*path, *inside[:-1])

@@ -193,13 +193,21 @@ def _columns(group: Any) -> dict[str, Any]:
     return table
 
 
-def describe_analysis(analysis: AnalysisSection, resolved: Mapping[str, Any], run_id: str) -> dict[str, Any]:
+#: Tables of the case that decide the results of every analysis.
+_COMMON = ("model", "contact", "reduction", "preload")
+
+
+def describe_analysis(analysis: AnalysisSection, case: Case, run_id: str) -> dict[str, Any]:
     """Attributes every group has: the analysis' own keys, and the values that decided its results."""
-    keys = analysis.model_dump(exclude={"name", "dampers", "petsc", "step", "force"})
+    keys = analysis.model_dump(exclude={"name", "dampers", "petsc", "step", "force", "preload"})
     plain = {key: value for key, value in keys.items() if value is not None and not isinstance(value, dict)}
     shown = {key: json.dumps(value) if isinstance(value, list) else value for key, value in plain.items()}
-    mine = {key: value for key, value in resolved.items() if key.split(".")[0] in ("model", "contact", analysis.name)}
-    return {**shown, "run_id": run_id, "case": json.dumps(mine)}
+    reduction = {"reduction": json.dumps(case.reduced.plain())} if case.reduced else {}
+    return {**shown, **reduction, "run_id": run_id, "case": json.dumps(_deciding(case, analysis.name))}
+
+
+def _deciding(case: Case, name: str) -> dict[str, Any]:
+    return {key: value for key, value in case.resolved.items() if key.split(".")[0] in (*_COMMON, name)}
 
 
 def belongs(group: Any, case: Case, name: str) -> bool:
@@ -208,5 +216,5 @@ def belongs(group: Any, case: Case, name: str) -> bool:
         stored = json.loads(group.attrs["case"])
     except (KeyError, ValueError):
         return False
-    mine = {key: value for key, value in case.resolved.items() if key.split(".")[0] in ("model", "contact", name)}
-    return bool(stored == mine and len(group["points"]["event" if "event" in group["points"] else "amplitude"]))
+    points = group["points"]
+    return bool(stored == _deciding(case, name) and len(next(iter(points.values()))))

@@ -14,27 +14,26 @@ from .context import AnalysisContext, Outcome
 from .forced_time import time_points
 from .mode_curve import ModeCurve
 from .response_peaks import peak_table
+from .rest import retained, start_mode
 
 
 def run_forced(context: AnalysisContext) -> Outcome:
     """Follow the response of every level over the frequency range. Collective."""
-    import fretwave
-
     analysis = context.analysis
     assert isinstance(analysis, ForcedAnalysis)
-    reference = context.linear_mode("stuck", analysis.linear_mode)[analysis.linear_mode - 1]
-    harmonics = fretwave.choose_harmonics(context.model, analysis.harmonics, analysis.samples, analysis.retain)
+    reference, rest = start_mode(context, analysis.linear_mode)
+    harmonics = retained(context)
     left_out = [] if analysis.time_points else ["check by time integration (time_points = 0)"]
     context.leave_out([*harmonics.left_out, *_missing_backbones(context), *left_out])
     writer = context.writer(FORCED, labels=harmonics.labels, samples=harmonics.samples, stuck_omega=reference.omega)
     try:
-        return _all_levels(context, analysis, harmonics, reference, writer)
+        return _all_levels(context, analysis, harmonics, reference, writer, rest)
     finally:
         writer.abandon()
 
 
 def _all_levels(
-    context: AnalysisContext, analysis: ForcedAnalysis, harmonics: Any, reference: Any, writer: Any
+    context: AnalysisContext, analysis: ForcedAnalysis, harmonics: Any, reference: Any, writer: Any, rest: Any
 ) -> Outcome:
     snapshot, own, found = open_branch(context.comm, writer, context.resuming)
     first = int(own.get("level_number", 0))
@@ -42,6 +41,8 @@ def _all_levels(
     with context.console.progress(context.name):
         for number in range(first, len(analysis.levels)):
             problem = _problem(context, analysis, harmonics, reference, analysis.levels[number])
+            if rest is not None:
+                problem.preload(rest.displacement, rest.load)
             go_on = found and number == first
             reasons.append(_one_level(context, analysis, problem, writer, number, snapshot, go_on))
             problem.destroy()

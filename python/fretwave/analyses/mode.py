@@ -10,8 +10,10 @@ import numpy as np
 
 from ..columns import MODE
 from ..schema import ModeAnalysis
+from .asymptotes import asymptote_line, other_asymptote
 from .branch import finished_table, open_branch, points_of, record, step_control
 from .context import AnalysisContext, Outcome
+from .rest import keep_pairs, retained, start_mode
 
 
 def run_mode(context: AnalysisContext) -> Outcome:
@@ -20,20 +22,19 @@ def run_mode(context: AnalysisContext) -> Outcome:
 
     analysis = context.analysis
     assert isinstance(analysis, ModeAnalysis)
-    stuck = context.linear_mode("stuck", analysis.linear_mode)[analysis.linear_mode - 1]
-    free_omega = _free_omega(context, stuck)
-    harmonics = fretwave.choose_harmonics(context.model, analysis.harmonics, analysis.samples, analysis.retain)
+    stuck, rest = start_mode(context, analysis.linear_mode)
+    asymptotes = other_asymptote(context, stuck)
+    context.console.line(asymptote_line(context.name, stuck.omega, asymptotes))
+    harmonics = retained(context)
     context.leave_out(harmonics.left_out)
     dof = context.case.dof(analysis.normalise)
     problem = fretwave.NonlinearMode(
         context.model, harmonics, method=analysis.method, dof=dof, start=stuck, prefix=context.prefix
     )
+    if rest is not None:
+        problem.preload(rest.displacement, rest.load)
     writer = context.writer(
-        MODE,
-        labels=harmonics.labels,
-        samples=harmonics.samples,
-        stuck_omega=stuck.omega,
-        free_omega=free_omega,
+        MODE, labels=harmonics.labels, samples=harmonics.samples, stuck_omega=stuck.omega, **asymptotes
     )
     try:
         return _follow(context, analysis, problem, writer)
@@ -67,19 +68,10 @@ def _finish(context: AnalysisContext, writer: Any, branch: Any) -> Outcome:
     table = finished_table(writer)
     summary = summarise(context.name, table) if table else []
     events = json.dumps(limit_cycles(table)) if table else "[]"
+    if table:
+        keep_pairs(context, writer)
     writer.close("done" if branch.converged else "stopped", branch.reason, events=events)
     return Outcome(writer.rows, branch.reason, branch.converged, summary)
-
-
-def _free_omega(context: AnalysisContext, stuck: Any) -> float | None:
-    """Frequency of the mode without contact force whose shape is most like the stuck one's."""
-    if not context.case.contacts:
-        return None
-    count = min(context.model.n_dof, context.analysis.linear_mode + 2)  # type: ignore[attr-defined]
-    modes = context.linear_mode("free", count)
-    M = context.case.M
-    likeness = [abs(m.shape @ (M @ stuck.shape)) / math.sqrt(m.shape @ (M @ m.shape)) for m in modes]
-    return float(modes[int(np.argmax(likeness))].omega) if modes else None
 
 
 def point_line(name: str, row: dict[str, Any]) -> str:

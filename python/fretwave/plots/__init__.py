@@ -14,7 +14,17 @@ if TYPE_CHECKING:
 
     Family = Callable[[Run], Iterator[tuple[str, Figure]]]
 
-FAMILIES = ("trajectories", "backbone", "phase_planes", "limit_cycles", "forced", "free_decay", "study")
+FAMILIES = (
+    "trajectories",
+    "backbone",
+    "phase_planes",
+    "loops",
+    "faces",
+    "limit_cycles",
+    "forced",
+    "free_decay",
+    "study",
+)
 
 
 def plot_run(run_folder: str | Path, only: Sequence[str] | None = None) -> list[Path]:

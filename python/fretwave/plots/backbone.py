@@ -13,6 +13,8 @@ from .data import Analysis, Run, Table
 
 #: analyses belong in one picture when their stuck asymptotes agree to this relative difference
 SAME_MODE = 1e-6
+#: an asymptote is drawn up to this many heights of the axis below it
+FAR = 1.0
 #: half width of the close-up of the folds, in widths of the interval between them
 CLOSE_UP = 2.5
 LINES = ("-", (0, (5, 1.5)), (0, (1, 1)))
@@ -80,12 +82,16 @@ def _close_up(axes: Axes, modes: Sequence[Analysis], column: str, place: tuple[f
 
 
 def _asymptotes(axes: Axes, mode: Analysis) -> None:
-    """Linear frequencies with the contact stuck (dashed) and without it (dash-dotted)."""
-    for key, name, line in (("stuck", "stuck", "--"), ("free", "free", "-.")):
+    """Linear frequencies with the contact stuck (dashed), and free or sliding (dash-dotted)."""
+    for key, name, line in (("stuck", "stuck", "--"), ("free", "free", "-."), ("sliding", "closed and sliding", "-.")):
         omega = mode.asymptote(key)
         if omega is None:
             continue
         frequency = omega / (2.0 * np.pi)
+        low, high = axes.get_ylim()
+        if frequency < low - FAR * (high - low):
+            _below(axes, f"{name} {frequency:.4g} Hz")
+            continue
         axes.axhline(frequency, color=style.GREY, linestyle=line, linewidth=1.2, zorder=1)
         above = frequency >= np.mean(mode.columns["frequency_hz"])
         axes.annotate(
@@ -101,8 +107,18 @@ def _asymptotes(axes: Axes, mode: Analysis) -> None:
         )
 
 
+def _below(axes: Axes, text: str) -> None:
+    """A value too far below the axis for a line."""
+    box = {"xycoords": "axes fraction", "textcoords": "offset points", "color": style.GREY, "fontsize": 10}
+    arrow = {"arrowstyle": "->", "color": style.GREY}
+    axes.annotate("", (0.025, 0.02), (0, 32), arrowprops=arrow, **box)
+    axes.annotate(f"to {text}", (0.04, 0.06), (0, 0), **box)
+
+
 def _peak(axes: Axes, mode: Analysis, colour: str) -> None:
     point = _peak_point(mode)
+    if not _is_peak(mode, point):
+        return
     peak = [mode.columns["amplitude"][point]], [100.0 * mode.columns["zeta"][point]]
     axes.plot(*peak, "*", color=colour, markeredgecolor=style.INK, markersize=12, zorder=6)
 
@@ -113,11 +129,17 @@ def _peak_point(mode: Analysis) -> int:
     return max(mode.met("peak_damping") or range(len(zeta)), key=lambda i: float(zeta[i]))
 
 
+def _is_peak(mode: Analysis, point: int) -> bool:
+    """Not where the branch ends with damping still growing."""
+    return 0 < point < len(mode) - 1
+
+
 def _name(mode: Analysis) -> str:
     """Method, harmonics and the peak's numbers."""
     point = _peak_point(mode)
     zeta, amplitude = 100.0 * mode.columns["zeta"][point], mode.columns["amplitude"][point]
-    return f"{mode.method()}, {_harmonics(mode)}: peak ζ {zeta:.3g} % at {amplitude:.3g} {mode.unit('amplitude')}"
+    word = "peak" if _is_peak(mode, point) else "up to"
+    return f"{mode.method()}, {_harmonics(mode)}: {word} ζ {zeta:.3g} % at {amplitude:.3g} {mode.unit('amplitude')}"
 
 
 def _limit_cycles(upper: Axes, lower: Axes, mode: Analysis) -> None:

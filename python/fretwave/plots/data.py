@@ -61,6 +61,23 @@ class Analysis:
             group = file[self.name]["contact_" + contact]
             return {key: np.asarray(group[key][row], dtype=float) for key in ("u", "v", "f")}
 
+    def components(self, contact: str) -> int:
+        """Relative displacements of a pair: 1, or 3 with the normal one first."""
+        with h5py.File(self.path, "r") as file:
+            return int(file[self.name]["contact_" + contact]["u"].shape[2])
+
+    def placed(self) -> list[str]:
+        """Contacts whose pairs have known places."""
+        with h5py.File(self.path, "r") as file:
+            return [key[len("pairs_") :] for key in file[self.name] if key.startswith("pairs_")]
+
+    def pairs(self, contact: str) -> Table:
+        """Of each pair of a contact: position (n_pairs, 2) on its face [m], face, friction_coefficient."""
+        with h5py.File(self.path, "r") as file:
+            group = file[self.name]["pairs_" + contact]
+            table = {key: group[key][()] for key in group}
+        return {**table, "face": np.array(_texts(table["face"]))}
+
     def met(self, event: str) -> list[int]:
         """Points at which an event happened."""
         return [i for i, text in enumerate(self.events) if event in text.split()]

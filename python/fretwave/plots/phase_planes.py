@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from . import style
 from .data import Analysis, Run, motion_of
-from .trajectories import other_dof, spread
+from .trajectories import FEW_DOFS, other_dof, spread
 
 CURVES = 7
 
@@ -22,13 +22,13 @@ def figures(run: Run) -> Iterator[tuple[str, Figure]]:
             continue
         yield f"{mode.name}_phase_planes", planes(mode)
         for contact in mode.contacts:
-            if mode.reported:
+            if mode.reported and mode.components(contact) == 1:
                 yield f"{mode.name}_hysteresis_{contact}", loops(mode, contact)
 
 
 def planes(mode: Analysis) -> Figure:
     """Velocity against displacement, a column per dof: as they are, and below divided by a and a omega."""
-    dofs = [mode.normalised_dof(), other_dof(mode)] if len(mode.dofs) > 1 else [0]
+    dofs = [mode.normalised_dof(), other_dof(mode)] if 1 < len(mode.dofs) <= FEW_DOFS else [mode.normalised_dof()]
     points = spread(mode, CURVES)
     figure, axes = style.new_figure(7.2, rows=2, columns=len(dofs), squeeze=False)
     for dof, (upper, lower) in zip(dofs, axes.T):
@@ -41,7 +41,7 @@ def _plane(upper: Axes, lower: Axes, mode: Analysis, points: Sequence[int], dof:
     for point, colour in zip(points, style.shades(len(points))):
         x, v = motion_of(mode, point)
         a, omega = mode.columns["amplitude"][point], mode.columns["omega"][point]
-        upper.plot(x[:, dof], v[:, dof], color=colour, label=_amplitude(mode, point))
+        upper.plot(x[:, dof], v[:, dof], color=colour, label=amplitude_name(mode, point))
         lower.plot(x[:, dof] / a, v[:, dof] / (a * omega), color=colour)
     unit, name = mode.unit("amplitude"), mode.dofs[dof]
     upper.set_xlabel(style.label(f"Displacement of {name}", unit))
@@ -51,12 +51,12 @@ def _plane(upper: Axes, lower: Axes, mode: Analysis, points: Sequence[int], dof:
 
 def loops(mode: Analysis, contact: str) -> Figure:
     """Force against relative displacement of the pair that dissipates most: as it is, and both scaled to one."""
-    points = _kept(mode)
+    points = kept_points(mode)
     pair = _busiest(mode, contact, points[-1])
     figure, (left, right) = style.new_figure(4.3, columns=2)
     for point, colour in zip(points, style.shades(len(points))):
         u, f = _closed(mode, contact, point, pair)
-        left.plot(u, f, color=colour, label=_amplitude(mode, point))
+        left.plot(u, f, color=colour, label=amplitude_name(mode, point))
         right.plot(u / np.abs(u).max(), f / max(np.abs(f).max(), 1e-300), color=colour)
     left.set_xlabel(style.label("Relative displacement", mode.unit("amplitude")))
     left.set_ylabel(style.label("Contact force", "N"))
@@ -66,11 +66,12 @@ def loops(mode: Analysis, contact: str) -> Figure:
     return figure
 
 
-def _amplitude(mode: Analysis, point: int) -> str:
+def amplitude_name(mode: Analysis, point: int) -> str:
+    """The point's amplitude with its unit."""
     return f"{style.number(mode.columns['amplitude'][point])} {mode.unit('amplitude')}".strip()
 
 
-def _kept(mode: Analysis) -> list[int]:
+def kept_points(mode: Analysis) -> list[int]:
     """Points whose loops were kept, thinned to a readable number."""
     wanted = [p for p in spread(mode, CURVES) if p in mode.reported]
     if len(wanted) >= 3:

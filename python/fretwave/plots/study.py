@@ -11,7 +11,12 @@ from matplotlib.figure import Figure
 from . import style
 from .data import Run, Table
 
-SWEEPS = {"harmonics": ("H", "o-"), "samples": ("$N_t$", "s--"), "tolerance": ("tol", "^:")}
+SWEEPS = {
+    "harmonics": ("H", "o-"),
+    "samples": ("$N_t$", "s--"),
+    "tolerance": ("tol", "^:"),
+    "component_modes": ("modes", "v-."),
+}
 ERRORS = {"zeta_error": "Damping: largest error / peak ζ", "omega_error": "Frequency: largest relative error"}
 #: an error of exactly zero cannot stand on a logarithmic axis
 FLOOR = 1e-16
@@ -44,7 +49,7 @@ def _sweep(axes: Axes, table: Table, sweep: str, symbol: str, column: str, line:
     if not len(rows):
         return
     time, error = table["wall_s"][rows], np.maximum(table[column][rows], FLOOR)
-    axes.plot(time, error, line, color=colour, label=f"{sweep} ({symbol})")
+    axes.plot(time, error, line, color=colour, label=f"{sweep.replace('_', ' ')} ({symbol})")
     if column == "zeta_error":
         axes.plot(time, table["error_estimate"][rows], line, color=colour, alpha=0.35)
     for row, x, y in zip(rows, time, error):

@@ -11,12 +11,14 @@ from . import style
 from .data import Analysis, Run, motion_of
 
 CURVES = 7
+#: up to this number a reader knows each dof by its name
+FEW_DOFS = 12
 
 
 def figures(run: Run) -> Iterator[tuple[str, Figure]]:
-    """One picture per mode analysis of a model with at least two dofs."""
+    """One picture per mode analysis of a model with at least two dofs, and few."""
     for mode in run.of_kind("mode"):
-        if mode.labels and len(mode.dofs) > 1:
+        if mode.labels and 1 < len(mode.dofs) <= FEW_DOFS:
             yield f"{mode.name}_trajectories", draw(mode)
 
 

@@ -1,0 +1,115 @@
+"""The static state that the dynamics of an analysis move about."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import scipy.sparse.linalg
+
+from ..contacts import ContactSpec
+from ..schema import PreloadSection
+from .asymptotes import closed_stiffness
+from .context import AnalysisContext
+
+
+def rest_state(context: AnalysisContext, factor: float = 1.0) -> Any:
+    """Solve the preload of an analysis; the contact laws take it as their rest state. Collective.
+
+    Parameters
+    ----------
+    factor : float
+        On the loads; the pairs' own normal loads are as given.
+
+    Returns
+    -------
+    Preload or None
+        None when there is no preload.
+
+    Raises
+    ------
+    NotConverged
+        There is no static equilibrium.
+    """
+    from ..preload import balanced, static_preload
+
+    section = context.case.preload_of(context.analysis)
+    if section is None and context.analysis.type != "static":
+        return None
+    reference = closed_mode(context)
+    if section is None or not section.loads:
+        return balanced(context.model, reference)
+    load = factor * np.sum([context.case.loads[name] for name in section.loads], axis=0)
+    closed = None
+    if just_touching(context.case.contacts, section):
+        stuck = context.case.K + closed_stiffness(context, tangential=True)
+        closed = scipy.sparse.linalg.spsolve(stuck.tocsc(), load)
+    return static_preload(context.model, load, reference, closed=closed)
+
+
+def just_touching(contacts: Sequence[ContactSpec], section: PreloadSection) -> bool:
+    """Pairs in three dimensions without a gap and without a load of their own."""
+    return any(contact.components == 3 for contact in contacts) and all(
+        (not section.pair_loads or not np.any(contact.parameters.get("normal_load", 0.0)))
+        and not np.any(contact.parameters.get("gap", 0.0))
+        for contact in contacts
+    )
+
+
+def closed_mode(context: AnalysisContext) -> Any:
+    """Lowest linear mode with every pair stuck, also those that do not touch before the load: a scale. Collective."""
+    import fretwave
+
+    from ..run import build_model
+
+    contacts = []
+    for contact in context.case.contacts:
+        closing = {"normal_load": 1.0, "gap": 0.0}
+        known = {key: value for key, value in closing.items() if key in contact.parameters}
+        contacts.append(replace(contact, parameters={**contact.parameters, **known}))
+    with build_model(replace(context.case, contacts=contacts), (), context.comm) as model:
+        return fretwave.linear_modes(model, 1)[0]
+
+
+def start_mode(context: AnalysisContext, linear_mode: int) -> tuple[Any, Any]:
+    """The linear mode with the contact as it is at rest, stuck, and the rest state (or None). Collective."""
+    rest = rest_state(context)
+    if rest is not None:
+        context.console.line(
+            f"{context.name}: at rest {100 * rest.stick:.3g} % of the pairs stick, {100 * rest.slip:.3g} % slip,"
+            f" {100 * rest.open:.3g} % are open"
+        )
+    return context.linear_mode("stuck", linear_mode)[linear_mode - 1], rest
+
+
+def retained(context: AnalysisContext, highest: int | None = None, samples: int | None = None) -> Any:
+    """Harmonics of an analysis in the frequency domain: with a preload the even ones too, unless told otherwise.
+
+    Parameters
+    ----------
+    highest, samples : in place of the analysis' own
+    """
+    import fretwave
+
+    analysis: Any = context.analysis
+    retain = analysis.retain
+    if retain == "auto" and context.case.preload_of(analysis) is not None:
+        retain = "all"
+    return fretwave.choose_harmonics(context.model, highest or analysis.harmonics, samples or analysis.samples, retain)
+
+
+def keep_pairs(context: AnalysisContext, writer: Any) -> None:
+    """Keep with the results where the contact pairs are, for the pictures."""
+    built = context.case.built.contacts if context.case.built else {}
+    for contact in context.case.contacts:
+        given = built.get(contact.name)
+        if given is None or given.positions is None:
+            continue
+        faces = list(given.faces) if given.faces is not None else [contact.name] * given.n_pairs
+        friction = np.broadcast_to(contact.parameters.get("friction_coefficient", np.nan), (given.n_pairs,))
+        place = f"pairs_{contact.name}"
+        writer.dataset(f"{place}/position", given.positions, units="m", long_name="place on the face")
+        writer.dataset(f"{place}/face", np.array([str(face).encode() for face in faces]))
+        writer.dataset(f"{place}/friction_coefficient", friction, units="1")

@@ -1,0 +1,243 @@
+"""Models built by Python: what a builder gives back, and how it is called."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import inspect
+import traceback
+import typing
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields, is_dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import Any, Optional
+
+import numpy as np
+import numpy.typing as npt
+import scipy.sparse as sp
+from pydantic import TypeAdapter, ValidationError
+
+from .errors import FretwaveError, InputError
+from .source import Source, display, nearest
+from .validation import at, toml
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass
+class BuiltContact:
+    """Contact pairs of a built model; the case file names their law.
+
+    Attributes
+    ----------
+    B : (components * n_pairs, n_dof) sparse
+        u = B x, rows pair by pair: normal (> 0 closes) and two tangents, or one tangent alone.
+    components : int
+        Rows of B for each pair.
+    parameters : dict
+        Law parameters used where the case gives none: numbers or (n_pairs,).
+    areas : (n_pairs,), optional
+        Area a pair stands for [m^2], for parameters given per area.
+    points : (n_pairs, 3), optional
+        Places [m].
+    frames : (n_pairs, 3, 3), optional
+        Rows: directions of normal and tangents in space, for the resultant of the contact forces.
+    faces : sequence of str, optional
+        Name of the face that each pair lies on: a picture has one panel for each.
+    positions : (n_pairs, 2), optional
+        Places on the face [m], for pictures.
+    """
+
+    B: Any
+    components: int = 3
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    areas: Optional[Array] = None
+    points: Optional[Array] = None
+    frames: Optional[Array] = None
+    faces: Optional[Sequence[str]] = None
+    positions: Optional[Array] = None
+
+    @property
+    def n_pairs(self) -> int:
+        """Number of pairs."""
+        return int(self.B.shape[0]) // self.components
+
+
+@dataclass
+class BuiltModel:
+    """What the function ``build(**options)`` of a builder returns.
+
+    Attributes
+    ----------
+    M, K, C : (n_dof, n_dof) sparse [kg], [N/m], [N s/m]
+        Without contact; C may be None.
+    dofs : dict
+        Dof numbers by the names that the case file may use (observation dofs); kept by a reduction.
+    contacts : dict
+        Contacts by the names that ``[[contact]]`` takes up.
+    loads : dict
+        Static loads (n_dof,) [N] by the names that ``[preload]`` takes up.
+    coordinates : (n_nodes, 3), optional
+        Nodes [m], with dof = 3 * node + axis, for pictures and resultants.
+    hexahedra : (n_cells, 8 or 27), optional
+        Nodes of the cells in VTK's order, for pictures.
+    """
+
+    M: Any
+    K: Any
+    C: Any = None
+    dofs: Mapping[str, int] = field(default_factory=dict)
+    contacts: Mapping[str, BuiltContact] = field(default_factory=dict)
+    loads: Mapping[str, Array] = field(default_factory=dict)
+    coordinates: Optional[Array] = None
+    hexahedra: Optional[npt.NDArray[np.intp]] = None
+
+    def complaint(self) -> str | None:
+        """What is inconsistent, None when nothing is."""
+        n = self.M.shape[0]
+        sizes = {"M": self.M, "K": self.K, **({} if self.C is None else {"C": self.C})}
+        for name, matrix in sizes.items():
+            if matrix.shape != (n, n):
+                return f"{name} is {matrix.shape[0]} x {matrix.shape[1]}, M is {n} x {n}"
+        for name, number in self.dofs.items():
+            if not 0 <= number < n:
+                return f"dof '{name}' has the number {number} of {n}"
+        for name, load in self.loads.items():
+            if np.shape(load) != (n,):
+                return f"load '{name}' has the shape {np.shape(load)}, not ({n},)"
+        if self.coordinates is not None and np.shape(self.coordinates) != (n // 3, 3):
+            return f"coordinates have the shape {np.shape(self.coordinates)}, not ({n // 3}, 3)"
+        return next((text for text in (_wrong(c, name, n) for name, c in self.contacts.items()) if text), None)
+
+
+def _wrong(contact: BuiltContact, name: str, n_dof: int) -> str | None:
+    rows, columns = contact.B.shape
+    if columns != n_dof or rows % contact.components or not rows:
+        return f"B of contact '{name}' is {rows} x {columns}, not {contact.components} n_pairs x {n_dof}"
+    n = contact.n_pairs
+    shapes = {"areas": (n,), "points": (n, 3), "frames": (n, 3, 3), "faces": (n,), "positions": (n, 2)}
+    given = {key: getattr(contact, key) for key in shapes if getattr(contact, key) is not None}
+    for key, value in given.items():
+        if np.shape(value) != shapes[key]:
+            return f"{key} of contact '{name}' have the shape {np.shape(value)}, not {shapes[key]}"
+    for key, value in contact.parameters.items():
+        if np.shape(value) not in ((), (n,)):
+            return f"parameter {key} of contact '{name}' has the shape {np.shape(value)}, not ({n},)"
+    return None
+
+
+def run_builder(
+    given: str, options: Mapping[str, Any], source: Source, found: list[FretwaveError]
+) -> BuiltModel | None:
+    """Call a builder; what is wrong is appended to `found`, with the builder's own file and line where it is there."""
+    path = source.path.parent / given
+    before = len(found)
+    try:
+        module = _import(path, source)
+        function = getattr(module, "build", None)
+        if not callable(function):
+            raise InputError(
+                "the builder has no function build",
+                display(path),
+                fix="define `def build(**options)` returning fretwave.BuiltModel",
+            )
+        chosen = _checked(module, function, options, source, found)
+        built = function(**chosen) if len(found) == before else None
+    except Exception as error:
+        found.append(_blame(error, path, source))
+        return None
+    return _consistent(built, path, found) if len(found) == before else None
+
+
+def builder_digest(given: str, source: Source) -> str:
+    """Hash of the builder's text: a changed builder is a changed case."""
+    return hashlib.sha256((source.path.parent / given).read_bytes()).hexdigest()[:16]
+
+
+def _import(path: Path, source: Source) -> ModuleType:
+    where = source.where(("model", "builder"))
+    if path.suffix != ".py" or not path.is_file():
+        folder = path.parent
+        files = sorted(entry.name for entry in folder.glob("*.py")) if folder.is_dir() else []
+        near = nearest(path.name, files) or (f"there is {', '.join(files)}" if files else "check the path")
+        raise InputError("there is no such builder", where, display(path), "a Python file beside the case", near)
+    spec = importlib.util.spec_from_file_location(f"fretwave_builder_{path.stem}", path)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def known_options(module: ModuleType, function: Any) -> dict[str, Any] | None:
+    """Options of a builder with their types: arguments of build; for ``**options`` the fields of `Options`.
+
+    None when any option is taken.
+    """
+    parameters = inspect.signature(function).parameters.values()
+    hints = typing.get_type_hints(function)
+    known = {p.name: hints.get(p.name, Any) for p in parameters if p.kind in (p.KEYWORD_ONLY, p.POSITIONAL_OR_KEYWORD)}
+    if not any(p.kind == p.VAR_KEYWORD for p in parameters):
+        return known
+    table = getattr(module, "Options", None)
+    if table is None or not is_dataclass(table):
+        return None
+    hints = typing.get_type_hints(table)
+    return {f.name: hints[f.name] for f in fields(table)}
+
+
+def _checked(
+    module: ModuleType, function: Any, options: Mapping[str, Any], source: Source, found: list[FretwaveError]
+) -> dict[str, Any]:
+    """Options of known names, converted to the types that the builder says."""
+    known = known_options(module, function)
+    if known is None:
+        return dict(options)
+    values = {}
+    for name, value in options.items():
+        path = ("model", "options", name)
+        if name not in known:
+            problem = f"unknown option '{name}' of the builder"
+            fix = nearest(name, list(known)) or "remove the option"
+            found.append(
+                InputError(problem, source.where(path), f"{name} = {toml(value)}", f"one of {', '.join(known)}", fix)
+            )
+            continue
+        try:
+            values[name] = TypeAdapter(known[name]).validate_python(value)
+        except ValidationError as error:
+            rule = "; ".join(sorted({item["msg"] for item in error.errors(include_url=False)}))
+            measured = toml(at(source.data, path))
+            found.append(InputError(f"the option '{name}' has a wrong value", source.where(path), measured, rule))
+    return values
+
+
+def _blame(error: Exception, path: Path, source: Source) -> InputError:
+    """An exception of the builder as bad input, with the builder's line that raised it or led to it."""
+    frames = [f for f in traceback.extract_tb(error.__traceback__) if Path(f.filename) == path]
+    where = f"{display(path)}:{frames[-1].lineno}" if frames else source.where(("model", "builder"))
+    if isinstance(error, SyntaxError):
+        where = f"{display(path)}:{error.lineno}"
+    if isinstance(error, FretwaveError):
+        place = error.where if error.where and not frames else where
+        return InputError(error.what, place, error.measured, error.expected, error.fix)
+    what = f"the builder failed: {type(error).__name__}: {error}"
+    return InputError(what, where, fix="correct the builder, or the options in [model.options]")
+
+
+def _consistent(built: Any, path: Path, found: list[FretwaveError]) -> BuiltModel | None:
+    if not isinstance(built, BuiltModel):
+        problem: str | None = f"it returned {type(built).__name__}"
+    else:
+        built.M, built.K = (sp.csr_matrix(A, dtype=float) for A in (built.M, built.K))
+        built.C = None if built.C is None else sp.csr_matrix(built.C, dtype=float)
+        for contact in built.contacts.values():
+            contact.B = sp.csr_matrix(contact.B, dtype=float)
+        problem = built.complaint()
+    if problem is None:
+        return typing.cast(BuiltModel, built)
+    expected = "fretwave.BuiltModel with matrices, contacts and loads that fit each other"
+    found.append(
+        InputError("the builder gave no usable model", display(path), problem, expected, "correct the builder")
+    )
+    return None

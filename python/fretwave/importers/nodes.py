@@ -1,0 +1,212 @@
+"""Node coordinates and node sets: CSV, NPZ, or the ``*NODE`` and ``*NSET`` of an Abaqus or CalculiX input deck.
+
+CSV: lines "node, x, y, z". NPZ: ``coordinates`` (n_nodes, 3), optionally ``nodes`` (n_nodes,) with their numbers (1, 2,
+... otherwise); every other array of whole numbers is a node set of its name.
+Deck (SIMULIA, Abaqus Keywords Reference, *NODE, *NSET, *INCLUDE; G. Dhondt, CalculiX CrunchiX User's Manual): names and
+keywords in any case; ``*NSET, GENERATE`` gives first, last, step; a set may name other sets.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from ..errors import InputError
+from ..source import display, nearest
+from .text import columns_of
+
+Array = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+
+
+@dataclass
+class Nodes:
+    """Nodes of a mesh.
+
+    Attributes
+    ----------
+    numbers : (n_nodes,)
+    coordinates : (n_nodes, 3)
+    sets : dict
+        Node numbers by the set's name in capitals.
+    where : str
+        The file, as a user would name it.
+    """
+
+    numbers: IntArray
+    coordinates: Array
+    where: str
+    sets: dict[str, IntArray] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        different, count = np.unique(self.numbers, return_counts=True)
+        if len(different) != len(self.numbers):
+            twice = int(different[count > 1][0])
+            fix = "give one flat list of nodes (write the deck without parts and instances)"
+            raise InputError("a node number stands twice", self.where, twice, "each node once", fix)
+        if self.coordinates.shape != (len(self.numbers), 3) or not np.isfinite(self.coordinates).all():
+            raise InputError(
+                "the coordinates are not usable",
+                self.where,
+                f"shape {self.coordinates.shape}, {len(self.numbers)} nodes",
+                "three finite numbers for each node",
+                "write node, x, y, z",
+            )
+
+    def places(self, numbers: IntArray) -> IntArray:
+        """Rows of nodes by number.
+
+        Raises
+        ------
+        InputError
+            A node is not there.
+        """
+        order = np.argsort(self.numbers)
+        found = np.clip(np.searchsorted(self.numbers[order], numbers), 0, len(order) - 1)
+        rows = order[found]
+        missing = self.numbers[rows] != numbers
+        if missing.any():
+            fix = "give the coordinates of all nodes of the pairs"
+            measured = f"{missing.sum()} of {len(numbers)} nodes, the first is {numbers[missing][0]}"
+            raise InputError("a node has no coordinates", self.where, measured, "all nodes of the pairs", fix)
+        return np.asarray(rows, dtype=np.int64)
+
+    def node_set(self, name: str) -> IntArray:
+        """Node numbers of a set."""
+        if name.upper() not in self.sets:
+            known = sorted(self.sets)
+            raise InputError(
+                f"there is no node set '{name}'",
+                self.where,
+                None,
+                f"one of {', '.join(known)}" if known else "a file with node sets (*NSET, or arrays in a .npz)",
+                nearest(name.upper(), known) or "check the name",
+            )
+        return self.sets[name.upper()]
+
+
+def read_nodes(path: Path) -> Nodes:
+    """Coordinates and sets from a file of any of the forms."""
+    if not path.is_file():
+        raise InputError("the file of coordinates does not exist", display(path), fix="check the path")
+    with path.open("rb") as file:
+        head = file.read(4096)
+    if head.startswith(b"PK\x03\x04"):
+        return _from_npz(path)
+    if head.lstrip().startswith(b"*"):
+        return Deck(path).nodes()
+    table = columns_of(path, 4)
+    return Nodes(table[:, 0].astype(np.int64), table[:, 1:], display(path))
+
+
+def _from_npz(path: Path) -> Nodes:
+    where = display(path)
+    with np.load(path) as archive:
+        if "coordinates" not in archive.files:
+            measured = f"it holds {', '.join(archive.files)}"
+            raise InputError("there are no coordinates", where, measured, "an array 'coordinates' (n_nodes, 3)")
+        coordinates = np.atleast_2d(np.asarray(archive["coordinates"], dtype=float))
+        numbers = archive["nodes"] if "nodes" in archive.files else np.arange(1, len(coordinates) + 1)
+        others = {name.upper(): archive[name] for name in archive.files if name not in ("coordinates", "nodes")}
+    sets = {name: values.ravel().astype(np.int64) for name, values in others.items() if values.dtype.kind in "iu"}
+    return Nodes(numbers.astype(np.int64), coordinates, where, sets)
+
+
+class Deck:
+    """The nodes and node sets of an input deck; every other keyword is passed over."""
+
+    def __init__(self, path: Path) -> None:
+        self.where = display(path)
+        self.rows: list[tuple[int, float, float, float]] = []
+        self.members: dict[str, list[int | str]] = {}
+        for keyword, options, data in _blocks(path):
+            if keyword == "NODE":
+                self._add_nodes(options, data)
+            elif keyword == "NSET":
+                self._add_set(options, data)
+            elif keyword == "INSTANCE" and data:
+                fix = "write the deck flat (Abaqus/CAE: do not use parts and assemblies in input files)"
+                raise InputError("an instance is moved", f"{self.where}:{data[0][0]}", data[0][1], "no movement", fix)
+
+    def _add_nodes(self, options: dict[str, str], data: list[tuple[int, str]]) -> None:
+        if options.get("SYSTEM", "R").upper() != "R":
+            fix = "write rectangular coordinates"
+            raise InputError("coordinates are not rectangular", self.where, f"SYSTEM={options['SYSTEM']}", "R", fix)
+        before = len(self.rows)
+        for line, text in data:
+            words = [word.strip() for word in text.split(",") if word.strip()]
+            try:
+                x, y, z = [float(word) for word in words[1:4]] + [0.0] * (4 - len(words[:4]))
+                self.rows.append((int(words[0]), x, y, z))
+            except ValueError:
+                fix = "correct the line"
+                raise InputError("this is no node", f"{self.where}:{line}", text, "node, x, y, z", fix) from None
+        if "NSET" in options:
+            self.members.setdefault(options["NSET"].upper(), []).extend(row[0] for row in self.rows[before:])
+
+    def _add_set(self, options: dict[str, str], data: list[tuple[int, str]]) -> None:
+        members = self.members.setdefault(options.get("NSET", "").upper(), [])
+        for line, text in data:
+            words = [word.strip() for word in text.split(",") if word.strip()]
+            try:
+                if "GENERATE" in options:
+                    first, last, *step = (int(word) for word in words)
+                    members.extend(range(first, last + 1, *step))
+                else:
+                    members.extend(int(word) if word.lstrip("-").isdigit() else word.upper() for word in words)
+            except ValueError:
+                expected = "first, last, step" if "GENERATE" in options else "node numbers or names of sets"
+                fix = "correct the line"
+                raise InputError("this is no node set", f"{self.where}:{line}", text, expected, fix) from None
+
+    def _expand(self, name: str, above: tuple[str, ...] = ()) -> list[int]:
+        if name not in self.members or name in above:
+            known = ", ".join(sorted(self.members))
+            raise InputError(f"a node set names '{name}', which is none", self.where, None, f"one of {known}")
+        found: list[int] = []
+        for member in self.members[name]:
+            found.extend([member] if isinstance(member, int) else self._expand(member, (*above, name)))
+        return found
+
+    def nodes(self) -> Nodes:
+        """What the deck holds."""
+        if not self.rows:
+            raise InputError("the deck has no nodes", self.where, None, "*NODE", "give the deck with the mesh")
+        table = np.array([row[1:] for row in self.rows])
+        numbers = np.array([row[0] for row in self.rows], dtype=np.int64)
+        sets = {name: np.unique(np.array(self._expand(name), dtype=np.int64)) for name in self.members}
+        return Nodes(numbers, table, self.where, sets)
+
+
+def _blocks(path: Path) -> Iterator[tuple[str, dict[str, str], list[tuple[int, str]]]]:
+    """Keyword, options and data lines (number, text) of each block; ``*INCLUDE`` is followed."""
+    keyword, options, data = "", dict[str, str](), list[tuple[int, str]]()
+    lines = iter(enumerate(path.read_text(encoding="utf-8", errors="replace").splitlines(), 1))
+    for number, line in lines:
+        text = line.strip()
+        if not text or text.startswith("**"):
+            continue
+        if not text.startswith("*"):
+            data.append((number, text))
+            continue
+        while text.endswith(","):  # a keyword line goes on
+            text += next(lines, (0, ""))[1].strip() or " "
+        yield keyword, options, data
+        keyword, options, data = *_keyword(text), []
+        if keyword == "INCLUDE":
+            included = path.parent / options.get("INPUT", "")
+            if not included.is_file():
+                fix = "put the file beside the deck"
+                raise InputError("an included file does not exist", f"{display(path)}:{number}", text, None, fix)
+            yield from _blocks(included)
+    yield keyword, options, data
+
+
+def _keyword(text: str) -> tuple[str, dict[str, str]]:
+    words = [word.strip() for word in text[1:].split(",")]
+    pairs = [word.partition("=") for word in words[1:] if word]
+    return words[0].upper(), {name.strip().upper(): value.strip() for name, _, value in pairs}

@@ -1,0 +1,182 @@
+"""The check report of an import: is this the model that was meant?"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.sparse.csgraph import connected_components
+
+from ..errors import FretwaveError
+from ..model_file import FileModel
+from .entries import counted
+
+Array = npt.NDArray[np.float64]
+
+#: omega^2 of a rigid motion is rounding: below this share of trace K / trace M.
+RIGID = 1e-12
+#: Energy of a rigid motion of one body, over that of its stiffest dof, below which nothing holds the body.
+UNHELD = 1e-10
+#: Masses along x, y and z may differ by this share before it is said.
+MASS_SPREAD = 1e-6
+
+
+@dataclass
+class Report:
+    """Lines of what was found, and warnings: what is likely to be wrong."""
+
+    lines: list[str] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+
+    def text(self) -> str:
+        return "\n".join([*self.lines, *(f"warning: {warning}" for warning in self.warnings)])
+
+
+def rigid_motions(model: FileModel) -> Array | None:
+    """Translations along and rotations about x, y, z (n_dof, 6), None without coordinates of all nodes."""
+    if model.node is None or model.direction is None or model.coordinates is None or model.node_numbers is None:
+        return None
+    order = np.argsort(model.node_numbers)
+    place = order[np.clip(np.searchsorted(model.node_numbers[order], model.node), 0, len(order) - 1)]
+    if (model.node_numbers[place] != model.node).any() or model.direction.min() < 1 or model.direction.max() > 6:
+        return None
+    x = model.coordinates - model.coordinates.mean(axis=0)
+    motions = np.zeros((model.size, 6))
+    motions[np.arange(model.size), model.direction - 1] = 1.0
+    moved = np.flatnonzero(model.direction <= 3)
+    turned = np.cross(np.eye(3), x[place[moved], None])  # (dof, axis of rotation, direction)
+    motions[moved, 3:] = turned[np.arange(len(moved)), :, model.direction[moved] - 1]
+    return motions
+
+
+def expected_rigid(model: FileModel, motions: Array) -> tuple[int, int]:
+    """Rigid modes that the geometry allows, and the number of separate bodies (what K joins)."""
+    count, body = connected_components(model.K, directed=False)
+    largest = float(abs(model.K.diagonal()).max())
+    free = 0
+    for number in range(count):
+        dofs = np.flatnonzero(body == number)
+        Q, size, _ = np.linalg.svd(motions[dofs], full_matrices=False)
+        Q = Q[:, size > 1e-9 * size.max(initial=1e-300)]
+        energy = np.linalg.eigvalsh(Q.T @ (model.K[dofs][:, dofs] @ Q))
+        free += int(np.sum(abs(energy) < UNHELD * largest))
+    return free, int(count)
+
+
+def check(model: FileModel, symmetry: dict[str, str], notes: Sequence[str], modes: int, comm: Any) -> Report:
+    """Everything that can be said without a law of contact. Collective.
+
+    Parameters
+    ----------
+    symmetry : dict
+        What was found of each matrix, by letter.
+    notes : sequence of str
+        What the import did.
+    modes : int
+        Frequencies to show beside the rigid modes.
+    """
+    report = Report()
+    nodes = "" if model.node is None else f" at {len(np.unique(model.node))} nodes"
+    report.lines.append(f"{model.size} dofs{nodes}")
+    for letter, said in symmetry.items():
+        report.lines.append(f"{letter}: {getattr(model, letter).nnz} entries, {said}")
+    report.lines.extend(notes)
+    motions = rigid_motions(model)
+    _contacts(model, report)
+    _mass(model, motions, report)
+    _diagonal(model, model.K.diagonal(), "stiffness", report)
+    _frequencies(model, motions, modes, comm, report)
+    _units(model, motions, report)
+    return report
+
+
+def _contacts(model: FileModel, report: Report) -> None:
+    for contact in model.contacts.values():
+        area = "areas not given" if contact.areas is None else f"area {contact.areas.sum():.6g} in all"
+        report.lines.append(f"contact '{contact.name}': {counted(contact.pairs, 'pair')}, {area}")
+
+
+def _mass(model: FileModel, motions: Array | None, report: Report) -> None:
+    diagonal = model.M.diagonal()
+    report.lines.append(f"M: diagonal {diagonal.min():.4g} to {diagonal.max():.4g}")
+    _diagonal(model, diagonal, "mass", report)
+    if motions is None:
+        report.lines.append("mass of the body: not known without coordinates and a table of dofs")
+        return
+    masses = _masses(model, motions)
+    absent = len(np.setdiff1d(model.node_numbers, model.node))  # type: ignore[arg-type]
+    held = f" (without the {absent} nodes that have no dof)" if absent else ""
+    report.lines.append("mass: " + ", ".join(f"{m:.6g} along {a}" for m, a in zip(masses, "xyz")) + held)
+    if np.ptp(masses) > MASS_SPREAD * masses.max():
+        report.warnings.append(
+            "the mass differs along x, y and z: dofs are held or missing, or M has entries that belong elsewhere"
+        )
+
+
+def _masses(model: FileModel, motions: Array) -> Array:
+    """t^T M t of the three translations."""
+    return np.asarray(np.einsum("ik,ik->k", motions[:, :3], model.M @ motions[:, :3]))
+
+
+def _diagonal(model: FileModel, diagonal: Array, quantity: str, report: Report) -> None:
+    """Mass and stiffness of every dof are above zero."""
+    for wrong, kind in ((diagonal < 0, "negative"), (diagonal == 0, "no")):
+        if wrong.any():
+            first = model.names[int(np.argmax(wrong))]
+            report.warnings.append(f"{counted(int(wrong.sum()), 'dof')} with {kind} {quantity}, the first is {first}")
+
+
+def _frequencies(model: FileModel, motions: Array | None, modes: int, comm: Any, report: Report) -> None:
+    from ..model import Model
+    from ..modes import linear_modes
+
+    expected, bodies = (6, 1) if motions is None else expected_rigid(model, motions)
+    try:
+        with Model(model.M, model.K, comm=comm) as whole:
+            found = linear_modes(whole, expected + modes, "free")
+    except FretwaveError as error:
+        report.warnings.append(
+            f"the frequencies cannot be computed ({error.what}): is M positive, and is no dof loose?"
+        )
+        return
+    scale = model.K.diagonal().sum() / model.M.diagonal().sum()
+    squares = np.array([mode.shape @ (model.K @ mode.shape) / (mode.shape @ (model.M @ mode.shape)) for mode in found])
+    rigid = int(np.sum(abs(squares) < RIGID * scale))
+    if motions is None:
+        said = "0 or 6 are usual for one body"
+    else:
+        said = f"expected {expected}" + (f" ({bodies} bodies, each joined by K)" if bodies > 1 else "")
+    report.lines.append(f"rigid modes: {rigid} found, {said}")
+    if motions is not None and rigid != expected:
+        report.warnings.append(
+            f"K has {counted(rigid, 'rigid mode')}, the nodes and what holds them let expect {expected}: "
+            + ("a mechanism or a loose part" if rigid > expected else "K does not leave a rigid motion free of force")
+        )
+    if (squares < -RIGID * scale).any():
+        report.warnings.append(f"K is negative for a motion: omega^2 = {squares.min():.4g}")
+    elastic = np.sqrt(squares[squares >= RIGID * scale])[:modes] / (2 * np.pi)
+    report.lines.append("first frequencies [1/time]: " + ", ".join(f"{value:.6g}" for value in elastic))
+
+
+def _units(model: FileModel, motions: Array | None, report: Report) -> None:
+    """Speed of sound and density as far as the mesh shows them; metals have about 5000 m/s and 2700 to 8900 kg/m^3."""
+    if motions is None or model.coordinates is None:
+        return
+    size = np.ptp(model.coordinates, axis=0)
+    if (size <= 0).any():
+        return
+    edge = float(np.cbrt(size.prod() / len(model.coordinates)))
+    translational = model.direction <= 3  # type: ignore[operator]
+    stiff, heavy = (A.diagonal()[translational].sum() for A in (model.K, model.M))
+    speed = edge * float(np.sqrt(stiff / heavy))
+    density = _masses(model, motions).max() / float(size.prod())
+    known = {"SI (m, kg, s)": (5e3, 4e3), "mm, t, s": (5e6, 4e-9), "mm, g, ms": (5e3, 4e-3), "mm, kg, ms": (5e3, 4e-6)}
+    fits = [name for name, (c, rho) in known.items() if c / 10 < speed < 10 * c and rho / 100 < density < 5 * rho]
+    guess = f"speed of sound about {speed:.1e}, density at least {density:.1e}"
+    if fits:
+        report.lines.append(f"units: like {' or '.join(fits)} for a metal ({guess})")
+    else:
+        report.warnings.append(f"units: no consistent set that is usual for a metal ({guess}): is M in the units of K?")

@@ -1,0 +1,58 @@
+"""Columns of numbers in text files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from ..errors import InputError
+from ..source import display
+from .entries import Entries
+
+Array = npt.NDArray[np.float64]
+
+
+COMMENTS = ("*", "#", "%")
+
+
+def first_data_line(head: bytes) -> str:
+    """The first line that is no comment and no keyword."""
+    lines = head.decode("utf-8", errors="replace").splitlines()
+    return next((line for line in lines if line.strip() and not line.lstrip().startswith(COMMENTS)), "")
+
+
+def columns_of(path: Path, width: int) -> Array:
+    """(n_lines, width) numbers, separated by blanks or commas, after comments and one heading at most."""
+    with path.open("rb") as file:
+        head = file.read(65536)
+    first = first_data_line(head)
+    skip = int(first.strip()[:1].isalpha())  # a heading stands in the first line
+    mark = head.lstrip()[:1].decode("utf-8", "replace")
+    # One mark of comments is looked for in C, several line by line in Python: five times slower.
+    comments, delimiter = mark if mark in COMMENTS else "*", "," if "," in first else None
+    try:
+        table = np.loadtxt(path, ndmin=2, skiprows=skip, comments=comments, delimiter=delimiter)
+    except ValueError as error:
+        fix = "is the file complete, and of one matrix?"
+        raise InputError(f"the file is no table of {width} columns", display(path), error, None, fix) from None
+    if table.shape[1] != width or not len(table):
+        measured = f"{len(table)} lines of {table.shape[1]} columns"
+        raise InputError(
+            "the file is no table of numbers", display(path), measured, f"{width} columns", "check the file"
+        )
+    return np.asarray(table)
+
+
+def triplets(table: Array, where: str, kind: str) -> Entries:
+    """Entries of lines "row column value", indices from 1; the largest index is the size."""
+    places = table[:, :2].astype(np.int64) - 1
+    wrong = (places + 1 != table[:, :2]).any(axis=1) | (places < 0).any(axis=1)
+    if wrong.any():
+        line = int(np.flatnonzero(wrong)[0])
+        measured = f"entry {line + 1}: {table[line, 0]:g} {table[line, 1]:g}"
+        fix = "export again; internal dofs of Abaqus need FORMAT=MATRIX INPUT"
+        raise InputError("a row or column is not a number from 1 on", where, measured, "1, 2, ...", fix)
+    size = int(places.max()) + 1
+    return Entries(places[:, 0], places[:, 1], table[:, 2], (size, size), where, kind)

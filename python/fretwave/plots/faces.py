@@ -1,0 +1,148 @@
+"""Contact pairs drawn where they lie on their faces: normal load at rest, and stick, slip and open in a mode."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from . import style
+from .data import Analysis, Array, Run
+
+#: amplitudes of a map
+MAPS = 4
+#: diameter of a pair's disc [pt], and margin around the pairs over their extent
+DISC = 13.0
+MARGIN = 0.22
+#: smaller shares than this are too thin to draw
+SEEN = 0.005
+#: a sample slips when its tangential force is this near to the limit
+AT_LIMIT = 1e-6
+STATUS = {"stick": style.BLUE, "slip": style.ORANGE, "open": "#dddddd"}
+MM = 1e3
+
+
+def figures(run: Run) -> Iterator[tuple[str, Figure]]:
+    """For contacts with known places: loads of a static analysis, maps of a mode."""
+    for static in run.of_kind("static"):
+        table = run.table(static.name)
+        for contact in static.placed() if table is not None else ():
+            yield f"{static.name}_load_{contact}", draw_load(static, contact, table or {})
+    for mode in run.of_kind("mode"):
+        for contact in mode.placed():
+            if contact in mode.contacts and mode.reported:
+                yield f"{mode.name}_map_{contact}", draw_map(mode, contact)
+
+
+def draw_load(static: Analysis, contact: str, table: dict[str, Array]) -> Figure:
+    """Normal force of every pair at the largest load factor; the shape of the mark tells its status."""
+    rows = (table["contact"] == contact) & (table["factor"] == table["factor"].max())
+    force, status = table["normal_force"][rows], table["status"][rows]
+    pairs = static.pairs(contact)
+    names = list(dict.fromkeys(pairs["face"]))
+    figure, panels = style.new_figure(1.2 + 1.9 * len(names), rows=len(names), sharex=True, squeeze=False)
+    marks = {"stick": "s", "slip": "o", "open": "x"}
+    for name, axes in zip(names, panels[:, 0]):
+        mine = pairs["face"] == name
+        for word, mark in marks.items():
+            here = mine & (status == word)
+            look = {"vmin": 0.0, "vmax": force.max(), "cmap": "viridis", "marker": mark, "s": 130}
+            dots = axes.scatter(*(MM * pairs["position"][here].T), c=force[here], **look)
+        for place, value in zip(pairs["position"][mine], force[mine]):
+            axes.annotate(f"{value:.0f}", MM * place, (0, 8), textcoords="offset points", fontsize=8, ha="center")
+        _face(axes, name, pairs["position"])
+        axes.set_ylabel("Up the face [mm]")
+    panels[-1, 0].set_xlabel("Along the face [mm]")
+    figure.colorbar(dots, ax=panels, label=style.label("Normal force", "N"), shrink=0.8)
+    counts = ", ".join(f"{int((status == word).sum())} {word}" for word in marks)
+    text = (
+        f"Contact {contact} at rest, load factor {table['factor'].max():g}: normal forces {force.sum():.4g} N; {counts}"
+    )
+    figure.suptitle(text, fontsize=11.5)
+    return figure
+
+
+def draw_map(mode: Analysis, contact: str) -> Figure:
+    """Shares of the period that each pair sticks, slips and is open, at several amplitudes, below the shares of all."""
+    points = chosen_points(mode)
+    pairs = mode.pairs(contact)
+    names = list(dict.fromkeys(pairs["face"]))
+    figure, _ = style.new_figure(3.6 + 1.25 * len(points))
+    figure.clear()
+    grid = figure.add_gridspec(1 + len(points), len(names), height_ratios=[1.9, *(1.0 for _ in points)])
+    _shares(figure.add_subplot(grid[0, :]), mode, points)
+    for row, point in enumerate(points):
+        shares = status_shares(mode.loop(contact, point)["f"], pairs["friction_coefficient"])
+        for column, name in enumerate(names):
+            axes = figure.add_subplot(grid[1 + row, column])
+            mine = pairs["face"] == name
+            _pies(axes, pairs["position"][mine], shares[:, mine])
+            _face(axes, f"{name}, {MM * mode.columns['amplitude'][point]:.3g} mm", pairs["position"])
+            axes.tick_params(labelbottom=row == len(points) - 1, labelleft=column == 0)
+    figure.supxlabel("Along the face [mm]; each disc is one contact pair, cut by its shares of a period", fontsize=10)
+    figure.supylabel("Up the face [mm]", fontsize=10, y=0.36)
+    return figure
+
+
+def chosen_points(mode: Analysis) -> list[int]:
+    """Kept points at which not all pairs stick, even in number; the largest amplitude is among them."""
+    moving = [p for p in mode.reported if mode.columns["stick"][p] < 1] or mode.reported
+    moving = sorted(moving, key=lambda p: float(mode.columns["amplitude"][p]))
+    return [moving[i] for i in np.unique(np.linspace(0, len(moving) - 1, MAPS).round().astype(int))]
+
+
+def status_shares(f: Array, friction: Array) -> Array:
+    """Shares (3, n_pairs) of the samples that stick, slip and are open.
+
+    Parameters
+    ----------
+    f : (n_samples, 3, n_pairs)
+        Normal force and both tangential ones.
+    friction : (n_pairs,)
+    """
+    is_open = f[:, 0] <= 0
+    slips = ~is_open & (np.hypot(f[:, 1], f[:, 2]) >= (1 - AT_LIMIT) * friction * f[:, 0])
+    shares = [~is_open & ~slips, slips, is_open]
+    return np.array([share.mean(axis=0) for share in shares])
+
+
+def _shares(axes: Axes, mode: Analysis, points: Sequence[int]) -> None:
+    """Stick, slip and open of all pairs over the amplitude."""
+    amplitude = MM * mode.columns["amplitude"]
+    order = np.argsort(amplitude)
+    values = [100 * mode.columns[word][order] for word in STATUS]
+    axes.stackplot(amplitude[order], *values, colors=STATUS.values(), alpha=0.85)
+    for point in points:
+        axes.axvline(amplitude[point], color=style.INK, linewidth=0.8, linestyle=":")
+    axes.set(xlim=(amplitude.min(), amplitude.max()), ylim=(0, 100), ylabel="Share of time [%]")
+    axes.set_xlabel(
+        f"Modal amplitude of {mode.dofs[mode.normalised_dof()]} [mm], {mode.method()}; dotted: the maps below"
+    )
+    axes.grid(False)
+    handles = [Line2D([], [], marker="o", linestyle="", color=colour, label=word) for word, colour in STATUS.items()]
+    axes.legend(handles=handles, loc="lower left", ncols=3)
+
+
+def _pies(axes: Axes, places: Array, shares: Array) -> None:
+    """One disc per pair, cut into its shares, of one size on paper whatever the scale of the axes."""
+    for place, parts in zip(MM * places, shares.T):
+        parts = np.where(parts < SEEN, 0.0, parts)
+        ends = 2 * np.pi * np.concatenate([[0.0], np.cumsum(parts / parts.sum())])
+        for begin, end, colour in zip(ends, ends[1:], STATUS.values()):
+            if end > begin:
+                angle = np.linspace(begin, end, 2 + int(24 * (end - begin)))
+                arc = np.column_stack([np.sin(angle), np.cos(angle)])
+                outline = arc if end - begin > 6.28 else np.vstack([[0.0, 0.0], arc])
+                axes.plot(*place, marker=outline, markersize=DISC, color=colour, markeredgewidth=0, clip_on=False)
+        axes.plot(*place, "o", markersize=DISC, markerfacecolor="none", markeredgecolor=style.GREY, markeredgewidth=0.6)
+
+
+def _face(axes: Axes, title: str, places: Array) -> None:
+    low, high = MM * places.min(axis=0), MM * places.max(axis=0)
+    reach = MARGIN * np.where(high > low, high - low, max(*(high - low), 1.0))
+    axes.set(xlim=(low[0] - reach[0], high[0] + reach[0]), ylim=(low[1] - reach[1], high[1] + reach[1]))
+    axes.set_title(title, fontsize=10)
+    axes.grid(False)

@@ -1,0 +1,153 @@
+"""The reduction that a case asks for: which dofs are kept, the reduced case, and its error."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from .contacts import ContactSpec
+from .schema import AnalysisSection, ForcedAnalysis, ModeAnalysis
+
+if TYPE_CHECKING:
+    from .casefile import Case
+
+
+@dataclass(frozen=True)
+class ReductionReport:
+    """What a reduction did.
+
+    Attributes
+    ----------
+    unreduced, kept, component_modes : int
+        Dofs before, kept among them, and modes added.
+    highest_component_hz : float
+        Frequency of the last component mode.
+    full_hz, reduced_hz : list of float
+        Lowest linear frequencies with stuck contact, without and with reduction.
+    relative : list of float
+        reduced / full - 1.
+    wall_s : float
+        Of the reduction; `compare_wall_s` that of the comparison.
+    """
+
+    unreduced: int
+    kept: int
+    component_modes: int
+    highest_component_hz: float
+    full_hz: list[float]
+    reduced_hz: list[float]
+    relative: list[float]
+    wall_s: float
+    compare_wall_s: float
+
+    def plain(self) -> dict[str, Any]:
+        """For run.json and results.h5."""
+        return asdict(self)
+
+    def line(self) -> str:
+        """One line for the log."""
+        text = (
+            f"reduction: {self.unreduced} dofs to {self.kept} kept and {self.component_modes} component modes"
+            f" (up to {self.highest_component_hz:.4g} Hz), {self.wall_s:.1f} s"
+        )
+        if self.relative:
+            worst = max(self.relative, key=abs)
+            text += (
+                f"; the lowest {len(self.relative)} frequencies with stuck contact, {self.full_hz[0]:.6g} to"
+                f" {self.full_hz[-1]:.6g} Hz, are off by {self.relative[0]:.1e} (first) to {worst:.1e} (worst)"
+            )
+        return text
+
+
+def kept_dofs(
+    named: Mapping[str, int],
+    contacts: Sequence[ContactSpec],
+    analyses: Mapping[int, AnalysisSection],
+    dofs: Sequence[str],
+) -> list[int]:
+    """Numbers of the dofs that a reduction keeps: of contacts, and those named by the model or an analysis."""
+    asked = {name for analysis in analyses.values() for name in _names(analysis)}
+    numbers = {k for k, name in enumerate(dofs) if name in asked} | set(named.values())
+    return sorted(numbers.union(*(np.unique(contact.rows.indices).tolist() for contact in contacts)))
+
+
+def _names(analysis: AnalysisSection) -> Iterable[str]:
+    yield from (damper.dof for damper in analysis.dampers)
+    if isinstance(analysis, ModeAnalysis):
+        yield analysis.normalise
+    if isinstance(analysis, ForcedAnalysis):
+        yield analysis.observe
+        yield from analysis.force
+
+
+def reduce_case(case: Case, comm: Any, modes: int | None = None) -> Case:
+    """The case on its reduced matrices, itself when it asks for no reduction. Collective.
+
+    Parameters
+    ----------
+    modes : int, optional
+        Component modes, in place of the case's.
+    """
+    if case.reduction is None:
+        return case
+    from .reduction import reduce
+
+    began = time.perf_counter()
+    chosen = (
+        {"modes": case.reduction.modes, "highest_hz": case.reduction.up_to_hz} if modes is None else {"modes": modes}
+    )
+    with reduce(case.M, case.K, case.C, keep=np.array(case.keep), comm=comm, **chosen) as reduction:
+        small = _on(case, reduction)
+        wall = time.perf_counter() - began
+    return replace(small, reduced=_report(case, small, reduction.component_hz, wall, comm))
+
+
+def _on(case: Case, reduction: Any) -> Case:
+    """Matrices, contacts and loads in the reduced coordinates."""
+    component_modes = reduction.size - len(case.keep)
+    names = [case.dofs[k] for k in case.keep] + [f"component_{k + 1}" for k in range(component_modes)]
+    padding = sp.csr_matrix
+    contacts = [
+        replace(c, rows=sp.hstack([c.rows[:, case.keep], padding((c.rows.shape[0], component_modes))]).tocsr())
+        for c in case.contacts
+    ]
+    return replace(
+        case,
+        dofs=names,
+        M=sp.csr_matrix(reduction.M),
+        K=sp.csr_matrix(reduction.K),
+        C=None if reduction.C is None else sp.csr_matrix(reduction.C),
+        contacts=contacts,
+        loads={name: reduction.project(load) for name, load in case.loads.items()},
+    )
+
+
+def _report(case: Case, small: Case, component_hz: Any, wall: float, comm: Any) -> ReductionReport:
+    began = time.perf_counter()
+    assert case.reduction is not None
+    count = min(case.reduction.compare, len(small.dofs))
+    full, reduced = ([], []) if not count else (_stuck_hz(which, count, comm) for which in (case, small))
+    return ReductionReport(
+        unreduced=len(case.dofs),
+        kept=len(case.keep),
+        component_modes=len(small.dofs) - len(case.keep),
+        highest_component_hz=float(component_hz[-1]) if len(component_hz) else 0.0,
+        full_hz=full,
+        reduced_hz=reduced,
+        relative=[r / f - 1 for f, r in zip(full, reduced)],
+        wall_s=round(wall, 3),
+        compare_wall_s=round(time.perf_counter() - began, 3),
+    )
+
+
+def _stuck_hz(case: Case, count: int, comm: Any) -> list[float]:
+    from .modes import linear_modes
+    from .run import build_model
+
+    with build_model(replace(case, C=None, damping=(0.0, 0.0)), (), comm) as model:
+        return [float(mode.frequency_hz) for mode in linear_modes(model, count, "stuck")]
