@@ -30,10 +30,9 @@ DynamicStiffness::DynamicStiffness(model::Model const& model, Harmonics const& h
       check(MatCreateMAIJ(term.A, h.block_size(), blocked_.back().sparse.out()));
       continue;
     }
-    const PetscInt local = model.local_dofs();
-    blocked_.back().dense.assign(size_t(local) * model.dofs(), 0.0);
+    blocked_.back().dense.assign(size_t(model.local_dofs()) * model.dofs(), 0.0);
     for (auto const& entry : entries(term.A))
-      blocked_.back().dense[size_t(entry.col) * local + (entry.row - model.first_dof())] = entry.value;
+      blocked_.back().dense[size_t(entry.row - model.first_dof()) * model.dofs() + entry.col] = entry.value;
   }
   work_ = make_vector(model.comm(), model.local_dofs() * h.block_size());
 }
@@ -85,7 +84,7 @@ void DynamicStiffness::accumulate(std::vector<complex> const& c, Blocked const& 
   if (local == 0) return;
   WriteArray Y(y);
   const double one = 1;
-  dgemm_("N", "T", &m, &local, &all, &one, X.data(), &m, A.dense.data(), &local, &one, Y.data(), &m);
+  dgemm_("N", "N", &m, &local, &all, &one, X.data(), &m, A.dense.data(), &all, &one, Y.data(), &m);
 }
 
 void DynamicStiffness::multiply_add(Exponents const& e, Vec x, Vec y) {

@@ -32,7 +32,7 @@ class DynamicStiffness {
   /// LAPACK's.
   struct Blocked {
     MatHandle sparse;
-    std::vector<double> dense;  ///< local rows x all dofs, column-major
+    std::vector<double> dense;  ///< local rows x all dofs, row-major
   };
   complex phase(model::Term const&, int n) const;
   void accumulate(std::vector<complex> const& c, Blocked const&, Vec x, Vec y);

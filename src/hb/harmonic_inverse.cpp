@@ -8,13 +8,13 @@ extern "C" {
 void zgetrf_(int const*, int const*, std::complex<double>*, int const*, int*, int*);
 void zgetri_(int const*, std::complex<double>*, int const*, int const*, std::complex<double>*, int const*,
              int*);
-void zgemv_(char const*, int const*, int const*, std::complex<double> const*, std::complex<double> const*,
-            int const*, std::complex<double> const*, int const*, std::complex<double> const*,
-            std::complex<double>*, int const*);
+void cgemv_(char const*, int const*, int const*, std::complex<float> const*, std::complex<float> const*,
+            int const*, std::complex<float> const*, int const*, std::complex<float> const*,
+            std::complex<float>*, int const*);
 void dgetrf_(int const*, int const*, double*, int const*, int*, int*);
 void dgetri_(int const*, double*, int const*, int const*, double*, int const*, int*);
-void dgemv_(char const*, int const*, int const*, double const*, double const*, int const*, double const*,
-            int const*, double const*, double*, int const*);
+void sgemv_(char const*, int const*, int const*, float const*, float const*, int const*, float const*,
+            int const*, float const*, float*, int const*);
 }
 
 namespace fretwave::hb {
@@ -28,8 +28,11 @@ void need(int info) {
                      "check the model for free motions at this harmonic");
 }
 
-template <class T, auto Factorise, auto Invert>
-void invert_in_place(std::vector<T>& A, int n) {
+using scomplex = std::complex<float>;
+
+/// The inverse, rounded to single precision.
+template <class Single, class T, auto Factorise, auto Invert>
+std::vector<Single> inverse_of(std::vector<T> A, int n) {
   std::vector<int> pivots(n);
   const int work_size = 64 * n;
   std::vector<T> work(work_size);
@@ -38,23 +41,23 @@ void invert_in_place(std::vector<T>& A, int n) {
   need(info);
   Invert(&n, A.data(), &n, pivots.data(), work.data(), &work_size, &info);
   need(info);
+  return {A.begin(), A.end()};
 }
 
 class ComplexInverse : public HarmonicInverse {
  public:
-  ComplexInverse(Place place, std::vector<complex> A) : at_(place), inverse_(std::move(A)) {
-    invert_in_place<complex, zgetrf_, zgetri_>(inverse_, at_.dofs);
-  }
+  ComplexInverse(Place place, std::vector<complex> A)
+      : at_(place), inverse_(inverse_of<scomplex, complex, zgetrf_, zgetri_>(std::move(A), place.dofs)) {}
 
   void apply(double const* x, double* z) const override {
     const int n = at_.dofs, step = 1;
-    const complex one = 1, zero = 0;
-    std::vector<complex> in(n), out(n);
+    const scomplex one = 1, zero = 0;
+    std::vector<scomplex> in(n), out(n);
     for (int i = 0; i < n; ++i) {
       double const* block = x + size_t(i) * at_.block + at_.offset;
-      in[i] = {block[0], at_.mean ? 0 : -block[1]};
+      in[i] = {float(block[0]), at_.mean ? 0 : -float(block[1])};
     }
-    zgemv_("N", &n, &n, &one, inverse_.data(), &n, in.data(), &step, &zero, out.data(), &step);
+    cgemv_("N", &n, &n, &one, inverse_.data(), &n, in.data(), &step, &zero, out.data(), &step);
     for (int i = 0; i < n; ++i) {
       double* block = z + size_t(i) * at_.block + at_.offset;
       block[0] = out[i].real();
@@ -63,31 +66,32 @@ class ComplexInverse : public HarmonicInverse {
   }
 
   Rotation entry(int i, int j) const override {
-    const complex a = inverse_[size_t(j) * at_.dofs + i];
+    const scomplex a = inverse_[size_t(j) * at_.dofs + i];
     return at_.mean ? Rotation{.cc = a.real()} : Rotation::of(a);
   }
 
  private:
   Place at_;
-  std::vector<complex> inverse_;
+  std::vector<scomplex> inverse_;
 };
 
 class BorderedInverse : public HarmonicInverse {
  public:
   BorderedInverse(Place place, std::vector<double> A, int scalars)
-      : at_(place), scalars_(scalars), size_(2 * place.dofs + scalars), inverse_(std::move(A)) {
-    invert_in_place<double, dgetrf_, dgetri_>(inverse_, size_);
-  }
+      : at_(place),
+        scalars_(scalars),
+        size_(2 * place.dofs + scalars),
+        inverse_(inverse_of<float, double, dgetrf_, dgetri_>(std::move(A), size_)) {}
 
   void apply(double const* x, double* z) const override {
     const int n = at_.dofs, step = 1;
-    const double one = 1, zero = 0;
+    const float one = 1, zero = 0;
     const size_t scalars_at = size_t(n) * at_.block;
-    std::vector<double> in(size_), out(size_);
+    std::vector<float> in(size_), out(size_);
     for (int i = 0; i < n; ++i)
       for (int part = 0; part < 2; ++part) in[part * n + i] = x[size_t(i) * at_.block + at_.offset + part];
     std::copy_n(x + scalars_at, scalars_, in.begin() + 2 * n);
-    dgemv_("N", &size_, &size_, &one, inverse_.data(), &size_, in.data(), &step, &zero, out.data(), &step);
+    sgemv_("N", &size_, &size_, &one, inverse_.data(), &size_, in.data(), &step, &zero, out.data(), &step);
     for (int i = 0; i < n; ++i)
       for (int part = 0; part < 2; ++part) z[size_t(i) * at_.block + at_.offset + part] = out[part * n + i];
     std::copy_n(out.begin() + 2 * n, scalars_, z + scalars_at);
@@ -102,7 +106,7 @@ class BorderedInverse : public HarmonicInverse {
  private:
   Place at_;
   int scalars_, size_;
-  std::vector<double> inverse_;
+  std::vector<float> inverse_;
 };
 
 }  // namespace

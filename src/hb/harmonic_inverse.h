@@ -6,14 +6,18 @@ namespace fretwave::hb {
 /// Real form of a complex factor a on a (cos, sin) pair: (ar + i ai)(qc - i qs) = rc - i rs.
 struct Rotation {
   double cc = 0, cs = 0, sc = 0, ss = 0;  ///< rc = cc qc + cs qs, rs = sc qc + ss qs
-  static Rotation of(complex a) { return {a.real(), a.imag(), -a.imag(), a.real()}; }
+  template <class T>
+  static Rotation of(std::complex<T> a) {
+    return {a.real(), a.imag(), -a.imag(), a.real()};
+  }
   /// The complex factor nearest to it.
   complex nearest() const { return {(cc + ss) / 2, (cs - sc) / 2}; }
 };
 
 /// Inverse of one harmonic's dense block; acts on that harmonic's coefficients of harmonic-block vectors.
 /// Explicit, because it multiplies single vectors often and its entries are asked for (a triangular solve of
-/// one vector is three times slower).
+/// one vector is three times slower); kept in single precision, because reading it is what an application
+/// costs.
 class HarmonicInverse {
  public:
   virtual ~HarmonicInverse() = default;

@@ -15,6 +15,8 @@ class HarmonicPreconditioner : public solve::Preconditioner {
   explicit HarmonicPreconditioner(HarmonicProblem&);
   void build(Vec y, Vec row) override;
   void apply(Vec x, Vec z) override;
+  /// 8 n^3 flops a harmonic at the speed of matrix products, against 8 n^2 read from memory.
+  double build_cost() const override { return n_ / 10.0; }
 
  private:
   /// A pair of any rank: its rows of B and where its per-harmonic blocks begin.

@@ -103,7 +103,7 @@ std::vector<solve::TestFunction> NonlinearMode::tests(Vec y, Vec tangent) {
   const auto z = scalars(y), dz = scalars(tangent);
   // zeta = beta/w0 grows with beta/w in both variants: its change along the branch has the sign of w dbeta -
   // beta dw
-  return {{"zero_damping", z[0]}, {"peak_damping", z[1] * dz[0] - z[0] * dz[1], true}};
+  return {{"zero_damping", z[0]}, {"peak_damping", z[1] * dz[0] - z[0] * dz[1], true, true}};
 }
 
 }  // namespace fretwave::hb

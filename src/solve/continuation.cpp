@@ -17,6 +17,12 @@ VecHandle copy(Vec v) {
   return w;
 }
 
+VecHandle zero_like(Vec v) {
+  VecHandle w = like(v);
+  check(VecSet(w, 0));
+  return w;
+}
+
 double weighted_norm(Vec weights, Vec t) {
   VecHandle wt = like(t);
   double square;
@@ -69,7 +75,7 @@ Point Continuation::point(Trial&& trial, std::string event, double step) {
 /// Events of the problem, and the fold: the tangent's parameter entry changes sign.
 std::vector<TestFunction> Continuation::tests(Vec y, Vec tangent) {
   auto all = problem_.tests(y, tangent);
-  all.push_back({"fold", last_entry(tangent)});
+  all.push_back({"fold", last_entry(tangent), false, true});
   return all;
 }
 
@@ -78,7 +84,7 @@ bool Continuation::correct(Trial& trial, Vec row, double value) {
   newton_.system().close(row, value);
   trial.outcome = newton_.solve(trial.y);
   if (!trial.outcome.converged) return false;
-  trial.tangent = like(trial.y);
+  trial.tangent = anchor_.tangent ? copy(anchor_.tangent) : zero_like(trial.y);
   if (row != Vec(row_)) newton_.system().close(row_, row_value_);
   if (!newton_.tangent(trial.y, trial.tangent)) {
     trial.outcome.reason = "the linear solve for the tangent fails";
@@ -180,18 +186,21 @@ void Continuation::reach(double value, std::string const& event, Trial const& en
   if (correct(trial, parameter_row_, target)) emit(std::move(trial), at, event);
 }
 
-/// Root of a test function on the step by the Illinois form of regula falsi in arclength.
+/// Root of a test function on the step by the Illinois form of regula falsi in arclength. Where flags of
+/// sampled contact make the function jump it can only bisect: eight trials are enough then for an extremum.
 void Continuation::locate(TestFunction const& before, size_t which, Trial const& end, double length) {
   double a = 0, b = length, fa = before.value, fb = end.tests[which].value;
+  const double precision = (before.extremum ? 1e-6 : 1e-9) * length;
+  const int trials = before.extremum ? 8 : 12;
   std::optional<std::pair<double, Trial>> best;
   int side = 0;
-  for (int iteration = 0; iteration < 12 && std::abs(b - a) > 1e-10 * length; ++iteration) {
+  for (int iteration = 0; iteration < trials && std::abs(b - a) > precision; ++iteration) {
     const double at = (a * fb - b * fa) / (fb - fa);
     Trial trial{.y = like(end.y), .tangent = {}, .outcome = {}, .tests = {}};
     interpolate(end, length, at, trial.y);
     if (!correct(trial, row_, row_value_ + at)) break;
     const double f = trial.tests[which].value;
-    const bool done = std::abs(f) < 1e-12 || (best && std::abs(at - best->first) < 1e-9 * length);
+    const bool done = std::abs(f) < 1e-12 || (best && std::abs(at - best->first) < precision);
     best = {at, std::move(trial)};
     if (done) break;
     const int now = (f > 0) == (fb > 0) ? +1 : -1;

@@ -1,5 +1,7 @@
 #include "solve/newton.h"
 
+#include <algorithm>
+
 #include "error.h"
 
 namespace fretwave::solve {
@@ -10,7 +12,6 @@ constexpr PetscInt redundant_limit = 2000;  // unknowns: below, every rank facto
 constexpr PetscInt krylov_limit =
     4000;  // unknowns: above, the Krylov route where the problem has a preconditioner
 constexpr double smallest_step = 1e-13;  // of a Newton step, relative to the unknowns: rounding
-constexpr int patience = 25;             // Krylov iterations of one step that make the preconditioner stale
 
 /// Runs a callback's body; PETSc must not see a C++ exception.
 template <class Body>
@@ -146,17 +147,26 @@ PetscErrorCode Newton::shell_precondition(PC pc, Vec x, Vec y) {
   return guarded(newton->exception_, [&] { newton->preconditioner_->apply(x, y); });
 }
 
-void Newton::linearise(Vec y) {
-  if (!preconditioner_) return bordered_.assemble(y, J_);
-  PetscInt before = 0;
+/// The preconditioner is stale once the iterations beyond those just after it was built have cost as much as
+/// building.
+void Newton::count_iterations() {
+  PetscInt iterations = 0;
   KSP ksp;
   check(SNESGetKSP(snes_, &ksp));
-  check(KSPGetIterationNumber(ksp, &before));
+  check(KSPGetIterationNumber(ksp, &iterations));
+  if (fresh_ < 0) fresh_ = int(iterations);
+  excess_ += std::max(0, int(iterations) - fresh_);
+  stale_ = excess_ > preconditioner_->build_cost();
+}
+
+void Newton::linearise(Vec y) {
+  if (!preconditioner_) return bordered_.assemble(y, J_);
   check(VecCopy(y, point_));
-  if (stale_ || before > patience) {
+  if (!stale_) count_iterations();
+  if (stale_) {
     preconditioner_->build(point_, bordered_.row());
     stale_ = false;
-    ++builds_;
+    fresh_ = -1, excess_ = 0;
   }
   check(MatAssemblyBegin(J_, MAT_FINAL_ASSEMBLY));
   check(MatAssemblyEnd(J_, MAT_FINAL_ASSEMBLY));
@@ -188,7 +198,9 @@ bool Newton::tangent(Vec y, Vec t) {
   KSPConvergedReason reason;
   check(SNESGetKSP(snes_, &ksp));
   check(KSPSetOperators(ksp, J_, J_));
+  check(KSPSetInitialGuessNonzero(ksp, preconditioner_ ? PETSC_TRUE : PETSC_FALSE));
   const PetscErrorCode code = KSPSolve(ksp, right_side_, t);
+  check(KSPSetInitialGuessNonzero(ksp, PETSC_FALSE));
   if (exception_) std::rethrow_exception(exception_);
   check(code);
   check(KSPGetConvergedReason(ksp, &reason));

@@ -26,7 +26,8 @@ class Newton {
   std::string const& route() const { return route_; }
   /// Solves from y, in place; y is the last iterate when it does not converge. Collective.
   Outcome solve(Vec y);
-  /// Tangent at y: J t = 0, row . t = 1 with the closing row. Collective.
+  /// Tangent at y: J t = 0, row . t = 1 with the closing row. t holds a guess (zero, or the last tangent),
+  /// from which the Krylov route starts. Collective.
   bool tangent(Vec y, Vec t);
 
  private:
@@ -40,6 +41,7 @@ class Newton {
   void use_direct();
   void use_krylov();
   void linearise(Vec y);
+  void count_iterations();
 
   Bordered bordered_;
   MatHandle J_;
@@ -47,7 +49,8 @@ class Newton {
   VecHandle right_side_, point_;
   std::unique_ptr<Preconditioner> preconditioner_;
   bool stale_ = true;
-  int builds_ = 0;
+  int fresh_ = -1;  ///< Krylov iterations of the first solve after a build; -1: none yet
+  int excess_ = 0;  ///< iterations beyond that, of all solves since
   std::string route_;
   std::exception_ptr exception_;
 };

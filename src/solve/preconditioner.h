@@ -10,6 +10,8 @@ class Preconditioner {
   /// Factorise at y with the closing row. Collective.
   virtual void build(Vec y, Vec row) = 0;
   virtual void apply(Vec x, Vec z) = 0;
+  /// What building costs, in Krylov iterations.
+  virtual double build_cost() const = 0;
 };
 
 }  // namespace fretwave::solve

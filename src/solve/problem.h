@@ -14,6 +14,8 @@ struct TestFunction {
   std::string name;
   double value;
   bool falling_only = false;  ///< an event only where it goes from positive to negative (a maximum)
+  /// Some quantity is stationary there (a fold, a peak): misplacing the event changes it by the square only.
+  bool extremum = false;
 };
 
 /// N equations in N + 1 unknowns y = (u, p): the parameter p is the last entry of y, on the last rank.
