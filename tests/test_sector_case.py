@@ -75,6 +75,7 @@ def test_matrices_of_the_case_are_tied_by_the_names_of_the_faces(write):
     assert case.contacts[0].rows.toarray().tolist() == [[0, 0, -1]]
     assert {k: B.toarray().tolist() for k, B in case.neighbours.contacts["shroud"].items()} == {1: [[1, 0, 0]]}
     assert case.resolved["model.sectors"] == 24 and case.resolved["model.high"] == ["next"]
+    assert case.resolved["model.low"] == ["disk"]
 
 
 def test_model_of_the_case_is_that_of_the_sector(write, tmp_path, comm):

@@ -69,7 +69,7 @@ def tie(
         key = "high" if section.high else "sectors" if section.sectors else "builder"
         found.append(InputError(error.what, source.where(("model", key)), error.measured, error.expected, error.fix))
         return origin, contacts, None
-    return _folded(origin, contacts, sector, np.setdiff1d(np.arange(len(origin.dofs)), faces[1]))
+    return _folded(origin, contacts, sector, *faces)
 
 
 def _wrong(source: Source, key: str, what: str, fix: str, found: Found) -> None:
@@ -104,10 +104,11 @@ def _sector(origin: Origin, contacts: Sequence[ContactSpec], faces: Sequence[Any
 
 
 def _folded(
-    origin: Origin, contacts: Sequence[ContactSpec], sector: Sector, kept: Any
+    origin: Origin, contacts: Sequence[ContactSpec], sector: Sector, low: Any, high: Any
 ) -> tuple[Origin, list[ContactSpec], Neighbours]:
     from .model import by_sector
 
+    kept = np.setdiff1d(np.arange(len(origin.dofs)), high)
     parts = {letter: by_sector(getattr(sector, letter)) for letter in origin.matrices}
     rows = {contact.name: by_sector(contact.B) for contact in sector.contacts}
     own = {letter: replace(origin.matrices[letter], values=sp.csr_matrix(part[0])) for letter, part in parts.items()}
@@ -123,7 +124,7 @@ def _folded(
     resolved = {
         **origin.resolved,
         "model.sectors": sector.sectors,
-        "model.high": [origin.dofs[k] for k in range(len(origin.dofs)) if k not in set(kept.tolist())],
+        **{f"model.{name}": [origin.dofs[k] for k in face] for name, face in (("low", low), ("high", high))},
     }
     tied = Origin(own, [origin.dofs[k] for k in kept], built, resolved)
     return tied, [replace(c, rows=sp.csr_matrix(rows[c.name][0])) for c in contacts], neighbours
