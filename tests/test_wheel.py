@@ -7,6 +7,7 @@ import pytest
 import scipy.linalg
 from core_models import dense, filled, unknowns, whole
 from cyclic_models import MASSES, NEIGHBOUR, lumped_blisk, rich_sector
+from petsc4py import PETSc
 from test_jacobian import difference
 
 import fretwave as fw
@@ -171,3 +172,38 @@ def test_changes_that_do_not_fit_are_refused(comm):
     for changes in ({"K": deviations(0.1)[:-1]}, {"K": [np.eye(2)] * SECTORS}, {"Q": deviations(0.1)}):
         with pytest.raises(fw.InputError, match="do not fit its sectors"):
             rubbing_blisk().wheel(comm, changes)
+
+
+@pytest.mark.ranks(1, 2, 3)
+@pytest.mark.parametrize("method", ["CNM", "EPMC"])
+def test_the_krylov_route_finds_the_same_branch(comm, method):
+    """The tuned wheel's blocks by nodal diameters precondition a tuned and a mistuned wheel."""
+    sector = rubbing_blisk()
+    rng = np.random.default_rng(3)
+    mistuned = {"K": [0.02 * e * np.asarray(sector.K[0]) for e in rng.standard_normal(SECTORS)]}
+    with sector.model(DIAMETERS, comm) as model:
+        start = sector.around(fw.linear_modes(model, 1)[0], DIAMETERS)
+    for changes in (None, mistuned):
+        with sector.wheel(comm, changes=changes) as wheel:
+            found = {}
+            for route in ("direct", "krylov"):
+                PETSc.Options()[f"{route}_route"] = route
+                problem = (
+                    unfolded(wheel, start, method, f"{route}_")
+                    if changes is None
+                    else mode_of(wheel, method, f"{route}_")
+                )
+                points = reported(problem)
+                found[route] = [problem.state(p.y) for p in points]
+                if route == "krylov":
+                    assert max(p.linear / max(1, p.newton) for p in points) < 40
+            for direct, krylov in zip(found["direct"], found["krylov"]):
+                assert krylov["omega"] == pytest.approx(direct["omega"], rel=1e-9)
+                assert krylov["beta"] == pytest.approx(direct["beta"], rel=1e-9, abs=1e-9 * direct["omega"])
+
+
+def mode_of(wheel, method, prefix):
+    """The lowest mode of a mistuned wheel, which is not double."""
+    first = fw.linear_modes(wheel, 1)[0]
+    dof = int(np.argmax(np.abs(first.shape)))
+    return fw.NonlinearMode(wheel, fw.Harmonics(ORDERS, SAMPLES), method, dof, first, prefix)

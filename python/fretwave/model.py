@@ -138,7 +138,9 @@ class Model:
         self._pairs: list[npt.NDArray[np.intp]] = []
         groups = [self._group(contact) for contact in self.contacts]
         theta = 2 * np.pi * nodal_diameter / sectors
-        self.core = _core.Model([(A, *term[1:]) for A, term in zip(self._matrices, terms)], groups, theta)
+        self.core = _core.Model(
+            [(A, *term[1:]) for A, term in zip(self._matrices, terms)], groups, theta, unit if unit > 1 else 0
+        )
 
     def _matrix(self, A: Any) -> PETSc.Mat:
         if isinstance(A, PETSc.Mat):
