@@ -69,18 +69,8 @@ def closed_mode(context: AnalysisContext) -> Any:
 
     from ..run import build_model
 
-<<<<<<< HEAD
-    contacts = closed_contacts(context.case.contacts)
-    with build_model(replace(context.case, contacts=contacts), (), context.comm) as model:
-=======
-    contacts = []
-    for contact in context.case.contacts:
-        closing = {"normal_load": 1.0, "gap": 0.0}
-        known = {key: value for key, value in closing.items() if key in contact.parameters}
-        contacts.append(replace(contact, parameters={**contact.parameters, **known}))
-    case, diameters = replace(context.case, contacts=contacts), nodal_diameter(context.analysis)
-    with build_model(case, (), context.comm, nodal_diameter=diameters) as model:
->>>>>>> E
+    case = replace(context.case, contacts=closed_contacts(context.case.contacts))
+    with build_model(case, (), context.comm, nodal_diameter=nodal_diameter(context.analysis)) as model:
         return fretwave.linear_modes(model, 1)[0]
 
 
