@@ -230,3 +230,25 @@ def test_bad_inputs_are_refused(two_dof, comm):
     for attempt in attempts:
         with pytest.raises(fw.InputError):
             attempt()
+
+
+@pytest.mark.ranks(1, 2)
+def test_a_singular_start_is_a_failed_step_not_a_failed_run(comm):
+    """The second mass is free: harmonic 0 of its motion is undetermined."""
+    spring = fw.Contact(SmallCubic(), [[1.0, 0.0]])
+    model = fw.Model(np.eye(2), np.diag([1.0, 0.0]), contacts=[spring], comm=comm)
+    start = fw.LinearMode(1.0, 0.0, np.array([1.0, 0.0]), np.zeros(2))
+    problem = fw.NonlinearMode(model, fw.Harmonics([0, 1], 16), "CNM", 0, start)
+    branch = fw.Continuation(problem, problem.initial(0.1), (0.1, 1.0))
+    assert list(branch) == []
+    assert not branch.converged and "no solution at the start" in branch.reason
+
+
+class SmallCubic(fw.PythonLaw):
+    odd, stuck_stiffness = True, 0.0
+
+    def force(self, u, v):
+        return 1e-3 * u**3
+
+    def tangent(self, u, v):
+        return (3e-3 * u**2)[:, None], np.zeros_like(v)[:, None]

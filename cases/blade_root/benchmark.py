@@ -122,7 +122,7 @@ def pairs(options: argparse.Namespace) -> None:
 
     found = []
     for count in GRIDS:
-        arguments = ["pairs", "--only", str(count), "--stop", str(options.stop), "--samples", str(options.samples)]
+        arguments = ["pairs", "--only", str(count), *sys.argv[2:]]
         text = subprocess.run([sys.executable, __file__, *arguments], check=True, stdout=subprocess.PIPE, text=True)
         say(text.stdout.rstrip())
         found.append([float(word) for word in text.stdout.splitlines()[-1].split()])

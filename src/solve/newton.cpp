@@ -25,6 +25,10 @@ PetscErrorCode guarded(std::exception_ptr& exception, Body body) {
   return PetscErrorCode(0);
 }
 
+/// A factorisation that met a zero pivot: the step fails, not the run. (LAPACK's through PETSc; KLU's is an
+/// error of its library.)
+bool singular(PetscErrorCode code) { return code == PETSC_ERR_MAT_LU_ZRPVT || code == PETSC_ERR_LIB; }
+
 }  // namespace
 
 Newton::Newton(Problem& problem, std::string const& prefix) : bordered_(problem) {
@@ -176,6 +180,7 @@ Outcome Newton::solve(Vec y) {
   exception_ = nullptr;
   const PetscErrorCode code = SNESSolve(snes_, nullptr, y);
   if (exception_) std::rethrow_exception(exception_);
+  if (singular(code)) return {.reason = "the Jacobian is singular"};
   check(code);
   SNESConvergedReason reason;
   PetscInt newton, linear;
@@ -202,6 +207,7 @@ bool Newton::tangent(Vec y, Vec t) {
   const PetscErrorCode code = KSPSolve(ksp, right_side_, t);
   check(KSPSetInitialGuessNonzero(ksp, PETSC_FALSE));
   if (exception_) std::rethrow_exception(exception_);
+  if (singular(code)) return false;
   check(code);
   check(KSPGetConvergedReason(ksp, &reason));
   return reason > 0;
