@@ -275,8 +275,8 @@ def test_a_changed_builder_is_a_changed_case(write, tmp_path: Path) -> None:
     assert call("resume", str(out)) == 0
     write(("AREA = 4e6, 2e-4", "AREA = 5e6, 2e-4"))
     with pytest.raises(InputError) as caught:
-        from fretwave.run import _reload
+        from fretwave.run import reload_case
 
-        _reload(out)
+        reload_case(out)
     assert "the case has changed" in caught.value.what
     assert "model.builder" in str(caught.value.measured)

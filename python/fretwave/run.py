@@ -13,6 +13,7 @@ from . import checks
 from .analyses.context import AnalysisContext, Outcome, belongs, describe_analysis
 from .casefile import Case, changed_keys, load_case
 from .console import Console
+from .contacts import ContactSpec
 from .errors import EXIT_DONE, InputError, NotConverged
 from .parallel import on_first_rank
 from .petsc_options import AnalysisOptions
@@ -77,14 +78,21 @@ def resume_run(folder: Path, comm: Any, plots: bool = True) -> int:
     InputError
         The folder holds no run, or its case has changed since.
     """
-    case, record = on_first_rank(comm, lambda: _reload(folder))
+    case, record = on_first_rank(comm, lambda: reload_case(folder))
     given = record["case"]
     options = RunOptions(folder, given["overrides"], given["only"], given["quick"], plots, given["petsc"])
     record["ranks"], record["status"] = comm.size, "running"
     return _Runner(case, options, folder, record, comm, resuming=True).run()
 
 
-def _reload(folder: Path) -> tuple[Case, dict[str, Any]]:
+def reload_case(folder: Path) -> tuple[Case, dict[str, Any]]:
+    """The case of a run and its record. One rank only.
+
+    Raises
+    ------
+    InputError
+        The folder holds no run, or its case has changed since.
+    """
     record = read_record(folder)
     given = record["case"]
     path = Path(given["path"])
@@ -301,17 +309,17 @@ def build_model(case: Case, dampers: Sequence[Any], comm: Any, preload: PreloadS
     """``fretwave.Model`` of a case; a preload without pair loads sets the pairs' normal loads to zero. Collective."""
     import fretwave
 
-    without = {"normal_load": 0.0} if preload is not None and not preload.pair_loads else {}
     contacts = [
-        fretwave.Contact(
-            contact.law,
-            contact.rows,
-            {**contact.parameters, **{key: value for key, value in without.items() if key in contact.parameters}},
-            name=contact.name,
-        )
+        fretwave.Contact(contact.law, contact.rows, acting_parameters(contact, preload), name=contact.name)
         for contact in case.contacts
     ]
     return fretwave.Model(case.M, case.K, C=case.damping_with(dampers), contacts=contacts, comm=comm)
+
+
+def acting_parameters(contact: ContactSpec, preload: PreloadSection | None) -> dict[str, Any]:
+    """Parameters of a contact's law under a preload, which may take the place of the pairs' own loads."""
+    replaced = preload is not None and not preload.pair_loads and "normal_load" in contact.parameters
+    return {**contact.parameters, "normal_load": 0.0} if replaced else dict(contact.parameters)
 
 
 def _not_converged(name: str, outcome: Outcome) -> NotConverged:

@@ -81,6 +81,7 @@ def start_mode(context: AnalysisContext, linear_mode: int) -> tuple[Any, Any]:
             f"{context.name}: at rest {100 * rest.stick:.3g} % of the pairs stick, {100 * rest.slip:.3g} % slip,"
             f" {100 * rest.open:.3g} % are open"
         )
+        context.arrays["rest_displacement"] = rest.displacement
     return context.linear_mode("stuck", linear_mode)[linear_mode - 1], rest
 
 
