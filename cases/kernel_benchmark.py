@@ -24,15 +24,17 @@ from petsc4py import PETSc
 import fretwave as fw
 from fretwave.preload import balanced
 
-PAIRS, SAMPLES = (48, 192, 768, 5000), (128, 256)
-LAW = {"normal_stiffness": 2.0, "tangential_stiffness": 1.5, "friction_coefficient": 0.4, "normal_load": 1.0}
-#: Doubles that a march moves for a pair and a sample of the period: two periods of 3 displacements in, 3 forces out
-#: and 5 entries of the record (written by the force, read by the product).
-TRAFFIC = 2 * (3 + 3 + 5) * 8
+PAIRS, SAMPLES, HARMONICS = (48, 192, 768, 3072), 128, 7
+LAW = {"normal_stiffness": 2.0, "tangential_stiffness": 1.5, "friction_coefficient": 0.4}
+#: Normal loads under the same motion: every pair sticks; slips on a curved path; slips and lifts off.
+LOADS = {"stick": 100.0, "slip": 4.0, "lift-off": 1.0}
+#: Doubles that leave the caches for a pair and a sample: the record, written by the force and read by the product
+#: (displacements and forces live in tiles). All of it in one pass would be 3 displacements and 3 forces more.
+TRAFFIC, ONE_PASS = 3 * 8, (3 + 3 + 3) * 8
 #: Libraries and functions that perf names, and what they do.
 PARTS = {
-    "march, force": r"Coulomb3d.*::force",
-    "march, product": r"Coulomb3d.*::product",
+    "march, force": r"march_coupled|SliderClosure|shoot|farthest|Coulomb3d.*::(force|close)",
+    "march, product": r"linear_coupled|Coulomb3d.*::(linearised|product)",
     "march, tangents": r"Coulomb3d",
     "Fourier transforms": r"libfftw|FourierTransform",
     "dense algebra (BLAS, LAPACK)": r"libopenblas|libblas|liblapack",
@@ -55,53 +57,57 @@ def timed(run: Callable[[], Any]) -> float:
     return time.process_time() - began
 
 
-def limits() -> tuple[float, float]:
-    """Memory bandwidth of b + s c on arrays far beyond the caches [B/s], and flops of dgemm [1/s]."""
-    n, size = 8_000_000, 800
+def limits() -> tuple[float, float, float]:
+    """Memory bandwidth of b + s c far beyond the caches [B/s], flops of dgemm [1/s], 1 / sqrt(x) in the cache [1/s]."""
+    n, size, few = 8_000_000, 800, 4096
     a, b, c = (np.ones(n) for _ in range(3))
     A, B = np.ones((2, size, size))
+    x, y = np.ones((2, few))
 
     def triad() -> None:
         np.multiply(c, 3.0, out=a)
         np.add(a, b, out=a)
 
-    return 5 * 8 * n / fastest(triad, 3), 2 * size**3 / fastest(lambda: A @ B, 3)
+    def direction() -> None:
+        np.sqrt(x, out=y)
+        np.divide(1.0, y, out=y)
+
+    return 5 * 8 * n / fastest(triad, 3), 2 * size**3 / fastest(lambda: A @ B, 3), few / fastest(direction, 3)
 
 
-def pairs_alone(pairs: int, samples: int, highest: int = 3) -> tuple[Any, PETSc.Vec, PETSc.Vec]:
-    """Pairs on a mass each: contact and transforms only, and motion that sticks, slips and opens."""
-    n = 3 * pairs
+def pairs_alone(pairs: int, samples: int, load: float) -> tuple[Any, PETSc.Vec, PETSc.Vec]:
+    """Pairs on a mass each: contact and transforms only, and a motion of the first four orders."""
+    n, m = 3 * pairs, 2 * HARMONICS + 1
     unit = sp.identity(n, format="csr")
-    model = fw.Model(unit, unit, None, [fw.Contact("coulomb_3d", unit, LAW)])
+    model = fw.Model(unit, unit, None, [fw.Contact("coulomb_3d", unit, {**LAW, "normal_load": load})])
     start = fw.LinearMode(1.0, 0.0, np.ones(n), np.zeros(n))
-    problem = fw.NonlinearMode(model, fw.Harmonics(range(highest + 1), samples), "EPMC", 0, start)
+    problem = fw.NonlinearMode(model, fw.Harmonics(range(HARMONICS + 1), samples), "EPMC", 0, start)
     y, dy = (problem.core.unknowns() for _ in range(2))
-    size, rng = y.getSize() - 3, np.random.default_rng(0)
-    y.setArray(np.concatenate([0.5 * rng.standard_normal(size), [0, 1, 0]]))
-    dy.setArray(np.concatenate([rng.standard_normal(size), [0, 0, 0]]))
+    rng = np.random.default_rng(0)
+    motion = np.where(np.arange(m) < 7, 0.5, 0.0) * rng.standard_normal((n, m))
+    y.setArray(np.concatenate([motion.ravel(), [0, 1, 0]]))
+    dy.setArray(np.concatenate([rng.standard_normal(n * m), [0, 0, 0]]))
     return problem, y, dy
 
 
-def both_products(problem: Any, y: PETSc.Vec, dy: PETSc.Vec) -> tuple[float, float]:
-    """Seconds of a residual and of a Jacobian product."""
-    r = problem.core.equations()
-    return fastest(lambda: problem.core.residual(y, r)), fastest(lambda: problem.core.product(y, dy, r))
-
-
 def march(options: argparse.Namespace) -> None:
-    """Residual and Jacobian product of pairs alone: transforms, march, transforms; per pair and sample of a period."""
-    bandwidth, flops = limits()
-    print(f"machine: triad {1e-9 * bandwidth:.1f} GB/s, dgemm {1e-9 * flops:.1f} Gflop/s (one core, as it is now)")
-    print(f"limit by memory: {1e9 * TRAFFIC / bandwidth:.1f} ns ({TRAFFIC} B a pair and sample, nothing in the caches)")
-    print("ns per pair and sample of the period (the law marches two periods):")
-    print("   pairs  samples   residual    product   stick/slip/open")
-    for pairs in PAIRS:
-        for samples in SAMPLES:
-            problem, y, dy = pairs_alone(pairs, samples)
-            residual, product = (1e9 * t / (pairs * samples) for t in evaluation_times(problem, y, dy))
-            shares = problem.diagnostics(y)
-            status = "/".join(f"{shares[k]:.2f}" for k in ("stick", "slip", "open"))
-            print(f"{pairs:8d} {samples:8d} {residual:10.1f} {product:10.1f}   {status}")
+    """Residual and Jacobian product of pairs alone, and inside them the march and the transforms."""
+    bandwidth, flops, directions = limits()
+    m = 2 * HARMONICS + 1
+    print(f"machine: triad {1e-9 * bandwidth:.1f} GB/s, dgemm {1e-9 * flops:.1f} Gflop/s, "
+          f"1/sqrt(x) {1e-9 * directions:.2f} G/s (one core, as it is now)")  # fmt: skip
+    print(f"limits a pair and sample: memory {1e9 * TRAFFIC / bandwidth:.1f} ns for the record alone ({TRAFFIC} B; "
+          f"{1e9 * ONE_PASS / bandwidth:.1f} ns if nothing were tiled), slip directions {1e9 / directions:.1f} ns a "
+          f"march, transforms {1e9 * 12 * m / flops:.1f} ns ({12 * m} flops, H = {HARMONICS})")  # fmt: skip
+    print(f"ns per pair and sample of the period (N_t = {SAMPLES}); the march alone by perf:")
+    print("   pairs  motion      residual  product   force  d force  transforms   stick/slip/open")
+    for name, load in LOADS.items():
+        for pairs in PAIRS:
+            problem, y, dy = pairs_alone(pairs, SAMPLES, load)
+            times = (1e9 * t / (pairs * SAMPLES) for t in evaluation_times(problem, y, dy))
+            status = "/".join(f"{problem.diagnostics(y)[k]:.2f}" for k in ("stick", "slip", "open"))
+            inside = "  ".join(f"{part:7.1f}" for part in march_alone(pairs, load)) or "(no perf)"
+            print(f"{pairs:8d}  {name:10s}" + "".join(f"{t:10.1f}" for t in times) + f"{inside}   {status}", flush=True)
 
 
 def evaluation_times(problem: Any, y: PETSc.Vec, dy: PETSc.Vec) -> tuple[float, float]:
@@ -112,8 +118,8 @@ def evaluation_times(problem: Any, y: PETSc.Vec, dy: PETSc.Vec) -> tuple[float, 
 
 def workload(options: argparse.Namespace) -> None:
     """What `perf` looks into: one size of pairs, residuals and products in turn."""
-    problem, y, dy = pairs_alone(options.pairs, options.samples)
-    r, calls = problem.core.equations(), max(1, int(2e7 / (options.pairs * options.samples)))
+    problem, y, dy = pairs_alone(options.pairs, options.samples, options.load)
+    r, calls = problem.core.equations(), max(1, int(3e7 / (options.pairs * options.samples)))
     began = time.process_time()
     for _ in range(calls):
         problem.core.residual(y, r)
@@ -151,18 +157,15 @@ def shares_of(arguments: list[str]) -> tuple[dict[str, float], str] | None:
     return shares, done.stdout
 
 
-def march_alone(options: argparse.Namespace) -> None:
-    """The march inside residual and product, by perf."""
-    print("of which the march alone, by perf (ns per pair and sample of the period):")
-    for pairs in PAIRS:
-        found = shares_of(["--workload", "--pairs", str(pairs), "--samples", "128"])
-        if found is None:
-            print("   perf is not available here")
-            return
-        shares, printed = found
-        busy = 1 - shares["all else (Python, start, system)"]
-        force, product = (shares[part] / busy * float(printed) for part in ("march, force", "march, product"))
-        print(f"{pairs:8d} pairs: force {force:.1f}, product {product:.1f} of {float(printed):.1f} for both in all")
+def march_alone(pairs: int, load: float) -> list[float]:
+    """[ns] of the law's force, of its linearisation and of a pair of transforms; nothing without perf."""
+    found = shares_of(["--workload", "--pairs", str(pairs), "--samples", str(SAMPLES), "--load", str(load)])
+    if found is None:
+        return []
+    shares, printed = found
+    scale = float(printed) / (1 - shares["all else (Python, start, system)"])
+    transforms = (shares["Fourier transforms"] + shares["dense algebra (BLAS, LAPACK)"]) / 2  # of force and product
+    return [scale * share for share in (shares["march, force"], shares["march, product"], transforms)]
 
 
 def brick(size: Any, young: float = 1.1e11, poisson: float = 0.3) -> tuple[Any, Any]:
@@ -286,6 +289,7 @@ def main() -> None:
     parser.add_argument("--workload", action="store_true", help=argparse.SUPPRESS)
     parser.add_argument("--pairs", type=int, default=768)
     parser.add_argument("--samples", type=int, default=128)
+    parser.add_argument("--load", type=float, default=1.0, help=argparse.SUPPRESS)
     parser.add_argument("--harmonics", type=int, nargs="+", default=[3, 15])
     parser.add_argument("--points", type=int, default=30)
     parser.add_argument("--start", type=float, default=1e-4)
@@ -297,7 +301,6 @@ def main() -> None:
         return workload(options)
     if options.what != "point":
         march(options)
-        march_alone(options)
     if options.what != "march":
         point(options)
 

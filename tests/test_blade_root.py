@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import importlib.util
+import json
+import sys
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 from scipy.sparse.linalg import splu
 
 from fretwave import fe
+from fretwave.cli import main
 from fretwave.errors import InputError
 
 pytestmark = pytest.mark.ranks(1)
@@ -177,3 +181,40 @@ def test_pictures_are_drawn(blade, elastic, tmp_path):
     figures.plot_mesh(elastic).savefig(tmp_path / "mesh.png", dpi=50)
     figures.plot_bending(blade, frequencies[0], shapes[:, 0]).savefig(tmp_path / "bending.png", dpi=50)
     assert all((tmp_path / name).stat().st_size > 5000 for name in ("mesh.png", "bending.png"))
+
+
+def test_case_goes_from_stick_to_slip(tmp_path):
+    """Constant at the stuck frequency, then a threshold, falling frequency and rising damping."""
+    settings = ("model.stiffness_damping=0", "mode.amplitude=[3e-4, 9e-4]", "mode.report_at=[]", "reduction.compare=3")
+    words = [word for setting in settings for word in ("--set", setting)]
+    hook = sys.excepthook
+    arguments = ["run", str(FOLDER / "case.toml"), "--quick", "--only", "mode", "--out", str(tmp_path), "--no-plots"]
+    assert main([*arguments, *words]) == 0
+    sys.excepthook = hook
+    with h5py.File(tmp_path / "results.h5") as file:
+        points = {name: data[()] for name, data in file["mode"]["points"].items()}
+        stuck, sliding = (file["mode"].attrs[f"{name}_omega"] for name in ("stuck", "sliding"))
+        report = json.loads(file["mode"].attrs["reduction"])
+    stick = points["stick"] == 1
+    assert stick[0] and not stick[-1]
+    assert np.abs(points["omega"][stick] / stuck - 1).max() < 1e-8
+    assert np.abs(points["zeta"][stick]).max() < 1e-8
+    slipping = points["omega"][~stick]
+    assert np.all(np.diff(slipping) < 0) and np.all(np.diff(points["zeta"][~stick]) > 0)
+    assert sliding < slipping[-1] < stuck
+    assert len(report["relative"]) == 3 and 0 < report["relative"][0] < 1e-5
+
+
+def test_rotation_stiffens_the_bending():
+    """omega^2 = omega_0^2 + B Omega^2, B = 1.193 + 1.570 R / L - 1 for a uniform cantilever on a hub of radius R that
+    bends in the plane of rotation (Putter and Manor, J. Sound Vib. 56, 1978); this one is tapered, twisted, on a neck.
+    """
+    squares, speeds = [], np.array([0.0, 2000.0, 4000.0])
+    for speed in speeds:
+        turning = model.blade(cache=None, stiffening=True, speed_rpm=speed, **COARSE)
+        squares.append(model.stuck_modes(turning, 1)[0][0] ** 2)
+    southwell = (np.array(squares[1:]) - squares[0]) / (speeds[1:] / 60) ** 2
+    o = model.Options()
+    hub = o.foot_radius + model.tip_height(o) - o.aerofoil_length
+    assert southwell[0] == pytest.approx(0.193 + 1.570 * hub / o.aerofoil_length, rel=0.15)
+    assert southwell[1] == pytest.approx(southwell[0], rel=0.02)

@@ -5,12 +5,14 @@ from __future__ import annotations
 import csv
 import json
 import shutil
+import subprocess
 import sys
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
+from test_resume import command, kill_at, rows, without_time
 
 from fretwave.casefile import load_case
 from fretwave.cli import main
@@ -167,6 +169,8 @@ def test_wrong_options(write, override: str, what: str, fix: str | None) -> None
         ([("per_area = 2e10", "per_area = 2e10\ntangential_stiffness = 1e6")], "given twice", None),
         ([("per_area = 2e10", "per_ara = 2e10")], "unknown key 'tangential_stiffness_per_ara'", None),
         ([('loads = ["weight"]', 'loads = ["wait"]')], "is no load of the model", "wait"),
+        ([("modes = 6", "modes = 6\nup_to_hz = 400.0")], "is given beside modes", "400"),
+        ([('preload = { pair_loads = false, loads = ["weight"] }\n', "")], "has no load to act on", "[0.5, 1.0]"),
         ([('normalise = "tip"', 'normalise = "top"')], "unknown dof 'top'", None),
     ],
 )
@@ -246,6 +250,13 @@ def test_pictures_show_the_pairs(run: Path) -> None:
     assert names <= {path.name for path in run.glob("*.png")}
 
 
+def test_component_modes_up_to_a_frequency(write, tmp_path: Path) -> None:
+    arguments = ("run", str(write(("modes = 6", "up_to_hz = 500.0"))), "--only", "static", "--no-plots")
+    assert call(*arguments, "--out", str(tmp_path / "run")) == 0
+    report = json.loads((tmp_path / "run" / "run.json").read_text())["reduction"]
+    assert 0 < report["component_modes"] < 12 and report["highest_component_hz"] < 500.0
+
+
 def test_all_component_modes_change_nothing(write, tmp_path: Path) -> None:
     path, out = write(), [tmp_path / "whole", tmp_path / "reduced"]
     whole = write(("[reduction]\nmodes = 6\n", "")).read_text()
@@ -268,15 +279,56 @@ def test_two_ranks_give_the_same(run: Path, launch, tmp_path: Path) -> None:
             assert np.abs(two / one - 1).max() < RANK_TOLERANCE
 
 
-def test_a_changed_builder_is_a_changed_case(write, tmp_path: Path) -> None:
+def test_a_changed_builder_is_a_changed_case(write, tmp_path: Path, capsys) -> None:
     path, out = write(), tmp_path / "run"
     assert call("run", str(path), "--only", "static", "--out", str(out), "--set", "model.options.weight=10") == 0
     assert column(out, "static", "normal_force")[-2:].sum() == pytest.approx(10.0, rel=1e-10)
     assert call("resume", str(out)) == 0
     write(("AREA = 4e6, 2e-4", "AREA = 5e6, 2e-4"))
-    with pytest.raises(InputError) as caught:
-        from fretwave.run import reload_case
+    capsys.readouterr()
+    assert call("resume", str(out)) == 2
+    said = capsys.readouterr().err
+    assert "the case has changed" in said and "model.builder: " in said
 
-        reload_case(out)
-    assert "the case has changed" in caught.value.what
-    assert "model.builder" in str(caught.value.measured)
+
+def test_a_killed_run_goes_on_with_its_options(write, tmp_path: Path) -> None:
+    """The model is built again with the options of the command line, and the preload solved again."""
+    path = write(
+        ("report_at = [1e-6, 1.8e-6, 2.1e-6]", "report_at = [1e-6]\nstep = { initial = 0.005, maximum = 0.01 }")
+    )
+    weight = ("--set", "model.options.weight=29")
+    start = [command("run", str(path), "--out", str(tmp_path / name), *weight) for name in ("whole", "killed")]
+    subprocess.run(start[0], check=True, stdout=subprocess.DEVNULL)
+    expected = rows(tmp_path / "whole", "mode")
+    assert kill_at(start[1], tmp_path / "killed" / "mode.csv", len(expected) // 2) < len(expected)
+    subprocess.run(command("resume", str(tmp_path / "killed")), check=True, stdout=subprocess.DEVNULL)
+    for name in ("static", "mode"):
+        assert without_time(rows(tmp_path / "killed", name)) == without_time(rows(tmp_path / "whole", name))
+
+
+def test_nothing_holds_a_lifted_chain(write, tmp_path: Path, capsys) -> None:
+    """Pulled upwards there is no static state: exit code 3, with the reason and what to do."""
+    arguments = ("run", str(write()), "--only", "static", "--no-plots", "--out", str(tmp_path / "run"))
+    lifted = ("--set", "model.options.weight=-30", "--set", "contact.pads.normal_load=0")
+    assert call(*arguments, *lifted) == 3
+    said = capsys.readouterr().err
+    assert "'static' stopped early" in said and "hold the structure where contact alone cannot" in said
+
+
+def test_a_mode_needs_a_held_structure(write, tmp_path: Path, capsys) -> None:
+    arguments = ("run", str(write()), "--only", "mode", "--no-plots", "--out", str(tmp_path / "run"))
+    assert call(*arguments, "--set", "preload.pair_loads=false") == 2
+    said = capsys.readouterr().err
+    assert "linear mode 1 is a rigid motion" in said and "100 % of the pairs open at rest" in said
+    assert not (tmp_path / "run").exists()
+
+
+def test_weight_or_equal_pair_loads_give_the_same_threshold(write, tmp_path: Path) -> None:
+    """The weight presses both pads almost alike (14.5 and 15.5 N for 15 and 15)."""
+    found = []
+    for name, preload in (("given", ()), ("solved", ("preload.pair_loads=false", 'preload.loads=["weight"]'))):
+        words = [word for setting in preload for word in ("--set", setting)]
+        assert call("run", str(write()), "--only", "mode", "--no-plots", "--out", str(tmp_path / name), *words) == 0
+        stick, amplitude = (column(tmp_path / name, "mode", key) for key in ("stick", "amplitude"))
+        found.append(amplitude[stick == 1].max())
+    assert found[1] == pytest.approx(found[0], rel=0.1)

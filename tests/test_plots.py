@@ -8,7 +8,17 @@ import numpy as np
 import pytest
 
 from fretwave.columns import FORCED, MODE
-from fretwave.plots import backbone, forced, free_decay, limit_cycles, phase_planes, plot_run, style, trajectories
+from fretwave.plots import (
+    backbone,
+    faces,
+    forced,
+    free_decay,
+    limit_cycles,
+    phase_planes,
+    plot_run,
+    style,
+    trajectories,
+)
 from fretwave.plots import study as study_picture
 from fretwave.plots.data import Run
 from fretwave.results import AnalysisWriter
@@ -205,3 +215,11 @@ def test_legends_lie_above_the_axes(run):
             figure.draw_without_rendering()
             bottom = figure.legends[0].get_window_extent().y0
             assert all(axes.get_window_extent().y1 <= bottom for axes in figure.axes)
+
+
+def test_shares_of_stick_slip_and_open_are_read_off_the_forces():
+    normal = np.array([[2.0, 1.0, 0.0, 0.0], [4.0, 4.0, 4.0, 4.0]]).T
+    tangents = np.array([[0.8, 0.5, 0.0, 0.0], [0.0, 1.0, -2.0, 2.0]]).T
+    f = np.stack([normal, 0.6 * tangents, 0.8 * tangents], axis=1)
+    shares = faces.status_shares(f, np.array([0.5, 0.5]))
+    assert np.array_equal(shares.T, [[0.25, 0.25, 0.5], [0.5, 0.5, 0.0]])

@@ -54,6 +54,7 @@ class Options:
     normal_stiffness: float = 5e13  #: of the contact, per area [N/m^3]
     tangential_stiffness: float = 4e13  #: [N/m^3]
     speed_rpm: float = 1500.0  #: gives the normal loads; 0 for none
+    stiffening: bool = False  #: stress stiffening and spin softening at speed_rpm, without Coriolis forces
     seating_friction: float = 0.0  #: friction coefficient while the blade seats itself
     youngs_modulus: float = 114e9  #: Ti-6Al-4V [Pa]
     poisson_ratio: float = 0.33
@@ -172,7 +173,18 @@ def compute(o: Options) -> dict[str, Any]:
     model |= dict(coordinates=blade.nodes, hexahedra=blade.vtk_cells, boundary_faces=blade.boundary_faces)
     model |= dict(mass=report.mass, volume=report.volume, rigid_residual=report.rigid_residual)
     model |= dict(worst_jacobian=worst.ratio, observation_dof=observed_dof(blade), blade_nodes=len(blade.nodes))
-    return add_contact(model, blade, o)
+    model = add_contact(model, blade, o)
+    return add_rotation(model, blade, o) if o.stiffening else model
+
+
+def add_rotation(model: dict[str, Any], blade: fe.Mesh, o: Options) -> dict[str, Any]:
+    """The blade's stiffness in steady rotation, from the stress of the centrifugal load with stuck contact."""
+    factor = factorised(stuck_stiffness(model).tocsc())
+    displacement = factor.solve(model["centrifugal_load"])[: blade.n_dof]
+    softening = fe.spin_softening(model["M"][: blade.n_dof, : blade.n_dof], o.speed_rpm * np.pi / 30, (1, 0, 0))
+    extra = (fe.stress_stiffness(blade, o.material, displacement) + softening).tocsr()
+    extra.resize(model["K"].shape)
+    return model | dict(K=(model["K"] + extra).tocsr())
 
 
 def observed_dof(blade: fe.Mesh) -> int:
@@ -376,7 +388,12 @@ def stuck_stiffness(model: dict[str, Any]) -> sp.csr_matrix:
 def stuck_modes(model: dict[str, Any], count: int = 6) -> tuple[Array, Array]:
     """Lowest frequencies (count,) [Hz] and mass-normalised shapes (n_dof, count) with stuck contact."""
     K = stuck_stiffness(model).tocsc()
-    factor = splu(K, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=dict(SymmetricMode=True))
+    factor = factorised(K)
     inverse = LinearOperator(K.shape, matvec=factor.solve, dtype=float)
     squares, shapes = eigsh(K, k=count, M=model["M"], sigma=0.0, OPinv=inverse)
     return np.sqrt(squares) / 2 / np.pi, shapes
+
+
+def factorised(K: sp.csc_matrix) -> Any:
+    """Sparse factors of a symmetric positive definite matrix."""
+    return splu(K, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=dict(SymmetricMode=True))

@@ -13,6 +13,7 @@ import scipy.sparse
 
 from . import checks
 from .built import BuiltModel
+from .checks_rest import check_preloads, check_reduction
 from .contacts import ContactSpec, read_contacts
 from .errors import CaseErrors, FretwaveError
 from .origin import Origin, check_physics, load_origin
@@ -178,7 +179,8 @@ def _build(source: Source, laws: Mapping[str, Any], found: list[FretwaveError]) 
     contacts = read_contacts(source, dofs, laws, found, built.contacts if built else {})
     keep = kept_dofs(origin.named, contacts, analyses, origin.dofs) if origin and reduction else []
     checks.check_analyses(source, analyses, [origin.dofs[k] for k in keep] if origin and keep else dofs, found)
-    checks.check_preloads(source, analyses, built.loads if built else () if origin else None, found)
+    check_reduction(source, reduction, found)
+    check_preloads(source, preload, analyses, built.loads if built else () if origin else None, found)
     notes: list[str] = []
     if origin is not None:
         complete = len(contacts) == len(source.entries("contact"))

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from . import checks
 from .casefile import Case, load_case
 from .errors import EXIT_DONE
@@ -65,7 +67,9 @@ def _report(case: Case, described: dict[str, list[str]]) -> list[str]:
 
 
 def _short(value: Any) -> str:
-    return f"{value:g}" if isinstance(value, float) else f"{value.min():g} to {value.max():g}"
+    if isinstance(value, float) or value.min() == value.max():
+        return f"{np.max(value):g}"
+    return f"{value.min():g} to {value.max():g}"
 
 
 def describe(analysis: AnalysisSection, model: Any) -> list[str]:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
-from .contacts import check_dof
 from .errors import FretwaveError, InputError
+from .reporter import Reporter
 from .schema import (
     ANALYSES,
     TOP_LEVEL,
@@ -17,7 +17,7 @@ from .schema import (
     TransientSection,
 )
 from .source import Source, nearest
-from .validation import at, toml, unknown_key, validate
+from .validation import toml, unknown_key, validate
 
 Found = list[FretwaveError]
 
@@ -113,7 +113,7 @@ def check_analyses(
     """Everything about the analyses that involves more than one key."""
     modes = [str(entry.get("name")) for entry in source.entries("analysis") if entry.get("type") == "mode"]
     for number, analysis in analyses.items():
-        report = _Reporter(source, ("analysis", number), found)
+        report = Reporter(source, ("analysis", number), found)
         for index, damper in enumerate(analysis.dampers):
             report.dof(("dampers", index, "dof"), damper.dof, dofs)
         _check_petsc(report, analysis)
@@ -128,62 +128,7 @@ def check_analyses(
             report.mode(("mode",), analysis.mode, modes)
 
 
-def check_preloads(
-    source: Source, analyses: dict[int, AnalysisSection], loads: Iterable[str] | None, found: Found
-) -> None:
-    """Loads must come with the model (None: it is not known); time integration starts at rest without any."""
-    places = [("preload",), *(("analysis", number, "preload") for number in analyses)]
-    known = list(loads or ())
-    for place in places if loads is not None else ():
-        given = at(source.data, (*place, "loads"))
-        for index, name in enumerate(given if isinstance(given, list) else []):
-            if name not in known:
-                fix = nearest(str(name), known) or "loads come with a model that is built"
-                _Reporter(source, place, found).wrong(
-                    ("loads", index), "is no load of the model", f"one of {', '.join(known) or '(there is none)'}", fix
-                )
-    if at(source.data, ("preload",)) is None:
-        return
-    for number, analysis in analyses.items():
-        if isinstance(analysis, TransientSection) or getattr(analysis, "time_points", False):
-            key = "type" if isinstance(analysis, TransientSection) else "time_points"
-            fix = "remove the analysis, or [preload]" if key == "type" else "write `time_points = 0`"
-            _Reporter(source, ("analysis", number), found).wrong(
-                (key,), "needs time integration, which does not know a preload", "analyses of harmonic balance", fix
-            )
-
-
-class _Reporter:
-    """Appends problems of one analysis."""
-
-    def __init__(self, source: Source, path: tuple[Any, ...], found: Found) -> None:
-        self.source, self.path, self.found = source, path, found
-
-    def wrong(self, inside: tuple[Any, ...], what: str, expected: str, fix: str) -> None:
-        path = (*self.path, *inside)
-        measured = at(self.source.data, path)
-        self.found.append(
-            InputError(
-                f"{self.source.name(path)} {what}",
-                self.source.where(path),
-                None if measured is None else toml(measured),
-                expected,
-                fix,
-            )
-        )
-
-    def dof(self, inside: tuple[Any, ...], dof: str, dofs: Sequence[str] | None) -> None:
-        check_dof(self.source, (*self.path, *inside), dof, dofs, self.found)
-
-    def mode(self, inside: tuple[Any, ...], name: str, modes: list[str]) -> None:
-        if name not in modes:
-            near = nearest(name, modes) or "add such an analysis, or name another"
-            self.wrong(
-                inside, "is no mode analysis of this case", f"one of {', '.join(modes) or '(there is none)'}", near
-            )
-
-
-def _check_harmonics(report: _Reporter, analysis: HarmonicSection, dofs: Sequence[str] | None) -> None:
+def _check_harmonics(report: Reporter, analysis: HarmonicSection, dofs: Sequence[str] | None) -> None:
     least = 2 * analysis.harmonics + 2
     if analysis.samples is not None and analysis.samples % 2:
         report.wrong(("samples",), "is odd", "an even number", f"write `samples = {analysis.samples + 1}`")
@@ -213,7 +158,7 @@ def _samples(harmonics: int) -> int:
     return int(2 ** max(6, (8 * harmonics).bit_length()))
 
 
-def _check_range(report: _Reporter, key: str, ends: list[float], inside: list[float]) -> None:
+def _check_range(report: Reporter, key: str, ends: list[float], inside: list[float]) -> None:
     if not ends[0] < ends[1]:
         report.wrong(
             (key,), "is not a range", "first value < last value", f"write `{key} = [{min(ends)}, {2 * max(ends)}]`"
@@ -229,7 +174,7 @@ def _check_range(report: _Reporter, key: str, ends: list[float], inside: list[fl
             )
 
 
-def _check_forced(report: _Reporter, analysis: ForcedAnalysis, dofs: Sequence[str] | None, modes: list[str]) -> None:
+def _check_forced(report: Reporter, analysis: ForcedAnalysis, dofs: Sequence[str] | None, modes: list[str]) -> None:
     _check_range(report, "frequency", analysis.frequency, analysis.report_at)
     report.dof(("observe",), analysis.observe, dofs)
     for dof in analysis.force:
@@ -243,7 +188,7 @@ def _check_forced(report: _Reporter, analysis: ForcedAnalysis, dofs: Sequence[st
         report.mode(("backbone", index) if listed else ("backbone",), name, modes)
 
 
-def _check_petsc(report: _Reporter, analysis: AnalysisSection) -> None:
+def _check_petsc(report: Reporter, analysis: AnalysisSection) -> None:
     words = analysis.petsc.split()
     if words and not words[0].startswith("-"):
         report.wrong(

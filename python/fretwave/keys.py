@@ -7,7 +7,17 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from .schema import ANALYSES, AnalysisSection, ContactSection, Damper, ModelSection, StepSection, StudySection
+from .schema import (
+    ANALYSES,
+    AnalysisSection,
+    ContactSection,
+    Damper,
+    ModelSection,
+    PreloadSection,
+    ReductionSection,
+    StepSection,
+    StudySection,
+)
 from .validation import describe
 
 
@@ -15,6 +25,8 @@ def key_lines() -> Iterator[str]:
     """The reference, section by section; keys that all analyses share are said once."""
     sections: dict[str, type[BaseModel]] = {
         "[model]": ModelSection,
+        "[reduction]": ReductionSection,
+        "[preload]": PreloadSection,
         "[[contact]] (and the parameters of its law)": ContactSection,
         "[[analysis]]": AnalysisSection,
     }

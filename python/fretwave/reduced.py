@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import scipy.sparse as sp
 
-from .contacts import ContactSpec
+from .contacts import ContactSpec, closed_contacts
 from .schema import AnalysisSection, ForcedAnalysis, ModeAnalysis, ReductionSection
 
 if TYPE_CHECKING:
@@ -143,7 +143,7 @@ def _report(case: Case, small: Case, component_hz: Any, wall: float, comm: Any) 
         highest_component_hz=float(component_hz[-1]) if len(component_hz) else 0.0,
         full_hz=full,
         reduced_hz=reduced,
-        relative=[r / f - 1 for f, r in zip(full, reduced)],
+        relative=[r / f - 1 if f else 0.0 for f, r in zip(full, reduced)],
         wall_s=round(wall, 3),
         compare_wall_s=round(time.perf_counter() - began, 3),
     )
@@ -153,5 +153,6 @@ def _stuck_hz(case: Case, count: int, comm: Any) -> list[float]:
     from .modes import linear_modes
     from .run import build_model
 
-    with build_model(replace(case, C=None, damping=(0.0, 0.0)), (), comm) as model:
+    plain = replace(case, C=None, damping=(0.0, 0.0), contacts=closed_contacts(case.contacts))
+    with build_model(plain, (), comm) as model:
         return [float(mode.frequency_hz) for mode in linear_modes(model, count, "stuck")]

@@ -22,6 +22,7 @@ from .results import open_results
 from .runfolder import CASE_COPY, RunFolder, new_record, peak_memory_mb, read_record
 from .schema import AnalysisSection, ForcedAnalysis, PreloadSection, TransientSection
 from .source import display
+from .stopped import joined, not_converged
 
 #: Module and function of each kind of analysis, imported when one is run.
 DISPATCH = {
@@ -141,7 +142,7 @@ class _Runner:
                 self._run_one(self.case.analyses[name])
         self._finish()
         if self.failures:
-            raise self.failures[0] if len(self.failures) == 1 else _joined(self.failures)
+            raise self.failures[0] if len(self.failures) == 1 else joined(self.failures)
         return EXIT_DONE
 
     def _greet(self, names: Sequence[str]) -> None:
@@ -237,7 +238,8 @@ class _Runner:
             try:
                 outcome = getattr(importlib.import_module(f".analyses.{module}", __package__), function)(context)
             except NotConverged as error:  # before its first point: there was no static state to start from
-                outcome = Outcome(0, f"{error.what}: {error.measured}", False, goal=str(error.expected))
+                reason = f"{error.what}: {error.measured}"
+                outcome = Outcome(0, reason, False, goal=str(error.expected), advice=error.fix or "")
         self._note(analysis.name, context, outcome, time.perf_counter() - began)
 
     def _dampers(self, analysis: AnalysisSection) -> list[Any]:
@@ -261,7 +263,7 @@ class _Runner:
         }
         self.folder.save()
         if not outcome.converged:
-            self.failures.append(_not_converged(name, outcome))
+            self.failures.append(not_converged(name, outcome))
 
     def _finish(self) -> None:
         self.folder.record["status"] = "stopped" if self.failures else "done"
@@ -320,34 +322,3 @@ def acting_parameters(contact: ContactSpec, preload: PreloadSection | None) -> d
     """Parameters of a contact's law under a preload, which may take the place of the pairs' own loads."""
     replaced = preload is not None and not preload.pair_loads and "normal_load" in contact.parameters
     return {**contact.parameters, "normal_load": 0.0} if replaced else dict(contact.parameters)
-
-
-def _not_converged(name: str, outcome: Outcome) -> NotConverged:
-    kept = f"{outcome.points} points are kept" if outcome.points else "nothing was solved, no results written"
-    place = f"after point {outcome.points - 1}" if outcome.points else "first point"
-    return NotConverged(
-        f"'{name}' stopped early; {kept}",
-        where=f"analysis '{name}', {place}",
-        measured=outcome.reason,
-        expected=outcome.goal or None,
-        fix=_advice(name, outcome.reason),
-    )
-
-
-def _advice(name: str, reason: str) -> str:
-    """What most often helps against a reason to stop."""
-    if "number of points" in reason:
-        return f"--set {name}.step.max_points=20000, or longer steps (step.maximum)"
-    if "at the start" in reason:
-        return (
-            "another start (amplitude or frequency) where the motion is nearly linear; --petsc -snes_monitor shows why"
-        )
-    return (
-        f"more samples, or shorter steps (--set {name}.step.minimum=1e-11); --petsc -snes_monitor shows Newton's steps"
-    )
-
-
-def _joined(failures: Sequence[NotConverged]) -> NotConverged:
-    first = failures[0]
-    names = "; ".join(failure.what for failure in failures)
-    return NotConverged(names, first.where, first.measured, first.expected, first.fix)

@@ -3,41 +3,17 @@
 #include <algorithm>
 #include <cmath>
 
+#include "contact/slider_closure.h"
+
 namespace fretwave::contact {
-
-namespace {
-
-/// Arrays of the march's record, each 2 samples x pairs: closed; per tangent the factor s on the elastic
-/// trial force (1 stick, < 1 slip) and the slip direction e (0 when stuck or open).
-constexpr int record_arrays = 5;
-
-struct Places {
-  double *closed, *s1, *s2, *e1, *e2;
-};
-
-Places places(double* march, size_t steps_x_pairs, size_t at) {
-  march += at;
-  return {march, march + steps_x_pairs, march + 2 * steps_x_pairs, march + 3 * steps_x_pairs,
-          march + 4 * steps_x_pairs};
-}
-
-/// Trial force to slip-limited force: factor s and direction e.
-struct Slip {
-  double s, e;
-};
-
-inline Slip limit_alone(double trial, double limit) {
-  const bool stick = std::abs(trial) <= limit && limit > 0;
-  return {stick ? 1.0 : 0.0, stick ? 0.0 : std::copysign(1.0, trial)};
-}
-
-}  // namespace
 
 template <bool Coupled>
 Coulomb3d<Coupled>::Coulomb3d(Coulomb3dParameters p)
-    : p_(std::move(p)), slider_(2 * p_.gap.size(), 0.0), closed_(p_.gap.size()) {
-  for (size_t i = 0; i < closed_.size(); ++i)
+    : p_(std::move(p)), reach_(p_.gap.size()), slider_(2 * p_.gap.size(), 0.0), closed_(p_.gap.size()) {
+  for (size_t i = 0; i < closed_.size(); ++i) {
+    reach_[i] = p_.friction_coefficient[i] / p_.tangential_stiffness[i];
     closed_[i] = p_.normal_load[i] - p_.normal_stiffness[i] * p_.gap[i] > 0;
+  }
 }
 
 template <bool Coupled>
@@ -45,91 +21,138 @@ double Coulomb3d<Coupled>::stuck_stiffness(int component, int pair) const {
   return closed_[pair] * (component ? p_.tangential_stiffness[pair] : p_.normal_stiffness[pair]);
 }
 
+template <bool Coupled>
+PairConstants Coulomb3d<Coupled>::constants(int first) const {
+  return {p_.normal_stiffness.data() + first, p_.tangential_stiffness.data() + first, reach_.data() + first,
+          p_.normal_load.data() + first, p_.gap.data() + first};
+}
+
 /// One step of the march from a slider at zero.
 template <bool Coupled>
 void Coulomb3d<Coupled>::rest(double const* u) {
   const int n = pairs();
   std::fill(slider_.begin(), slider_.end(), 0.0);
-  std::vector<double> f(3 * size_t(n));
-  Record record;
-  force({.samples = 1, .components = 3, .pairs = n, .u = u, .v = nullptr, .step = 0}, f.data(), record);
-  for (int i = 0; i < n; ++i) {
-    closed_[i] = f[i] > 0;
-    for (int c = 0; c < 2; ++c)
-      slider_[c * n + i] = u[(c + 1) * n + i] - f[(c + 1) * n + i] / p_.tangential_stiffness[i];
-  }
+  std::vector<double> f(3 * size_t(n)), record(record_arrays * size_t(n));
+  march<Coupled>(constants(0), 1, n, u, slider_.data(), f.data(), record.data());
+  for (int i = 0; i < n; ++i) closed_[i] = f[i] > 0;
 }
 
 template <bool Coupled>
 void Coulomb3d<Coupled>::force(Motion const& motion, double* f, Record& record) const {
+  const int n = motion.pairs, samples = motion.samples;
+  const PairConstants p = constants(motion.first);
+  std::vector<double> w(2 * size_t(n));
+  for (int i = 0; i < 2 * n; ++i) w[i] = slider_[(i < n ? 0 : pairs() - n) + motion.first + i];
+  const std::vector<double> rest = w;
+  record.march.resize(size_t(record_arrays) * samples * n);
+  record.start.assign(n, {}), record.unclosed = 0;
+  march<Coupled>(p, samples, n, motion.u, w.data(), f, record.march.data());
+  if (w == rest) return;
+  if constexpr (Coupled)
+    close(motion, rest, f, w, record);
+  else
+    last_slip(motion, record);
+  const std::vector<double> closed = w;
+  march<Coupled>(p, samples, n, motion.u, w.data(), f, record.march.data());
+  for (int i = 0; i < 2 * n; ++i) record.unclosed = std::max(record.unclosed, std::abs(w[i] - closed[i]));
+}
+
+/// A tangent by itself forgets all before its last slip: w = u - e R there, and one period closes it.
+template <bool Coupled>
+void Coulomb3d<Coupled>::last_slip(Motion const& motion, Record& record) const {
   const int n = motion.pairs;
-  const size_t all = size_t(2) * motion.samples * n;
-  std::vector<double> slider = slider_;
-  record.march.resize(record_arrays * all);
-  double const *kn = p_.normal_stiffness.data(), *kt = p_.tangential_stiffness.data(),
-               *mu = p_.friction_coefficient.data();
-  double const *load = p_.normal_load.data(), *gap = p_.gap.data();
-  double *w1 = slider.data(), *w2 = slider.data() + n;
-  for (int step = 0; step < 2 * motion.samples; ++step) {
-    double const* u = motion.u + size_t(step % motion.samples) * 3 * n;
-    double* out = f + size_t(step % motion.samples) * 3 * n;
-    const Places r = places(record.march.data(), all, size_t(step) * n);
-#pragma omp simd
-    for (int i = 0; i < n; ++i) {
-      const double elastic = load[i] + kn[i] * (u[i] - gap[i]);
-      const double normal = elastic > 0 ? elastic : 0.0, limit = mu[i] * normal;
-      const double trial1 = kt[i] * (u[n + i] - w1[i]), trial2 = kt[i] * (u[2 * n + i] - w2[i]);
-      double force1, force2;
-      if constexpr (Coupled) {
-        const double size = std::sqrt(trial1 * trial1 + trial2 * trial2);
-        const bool stick = size <= limit && limit > 0;  // without friction nothing sticks
-        const double inverse = stick || size == 0 ? 0.0 : 1 / size, s = stick ? 1.0 : limit * inverse;
-        r.s1[i] = s, r.s2[i] = s;
-        r.e1[i] = trial1 * inverse, r.e2[i] = trial2 * inverse;
-        force1 = s * trial1, force2 = s * trial2;
-        w1[i] = stick ? w1[i] : u[n + i] - force1 / kt[i];
-        w2[i] = stick ? w2[i] : u[2 * n + i] - force2 / kt[i];
-      } else {
-        const Slip a = limit_alone(trial1, limit), b = limit_alone(trial2, limit);
-        r.s1[i] = a.s, r.s2[i] = b.s;
-        r.e1[i] = a.e, r.e2[i] = b.e;
-        force1 = a.s * trial1 + a.e * limit, force2 = b.s * trial2 + b.e * limit;
-        w1[i] = a.s * w1[i] + (1 - a.s) * (u[n + i] - force1 / kt[i]);
-        w2[i] = b.s * w2[i] + (1 - b.s) * (u[2 * n + i] - force2 / kt[i]);
+  double const *r = record.march.data(), *kn = p_.normal_stiffness.data() + motion.first;
+  for (int t = 0; t < motion.samples; ++t, r += record_arrays * n)
+    for (int i = 0; i < n; ++i)
+      for (int c = 0; c < 2; ++c) {
+        const double code = r[(c + 1) * n + i];
+        if (code == 2) continue;
+        SliderStart& start = record.start[i];
+        start.sample[c] = t;
+        start.gain[c][c][0] = -code * reach_[motion.first + i] * r[i] * kn[i];
+        start.gain[c][c][c + 1] = 1;
       }
-      r.closed[i] = elastic > 0 ? 1.0 : 0.0;
-      out[i] = normal, out[n + i] = force1, out[2 * n + i] = force2;
+}
+
+/// Periodic sliders of the pairs whose slider w left its rest; one that opens forgets all before, and is
+/// closed.
+template <bool Coupled>
+void Coulomb3d<Coupled>::close(Motion const& motion, std::vector<double> const& rest, double const* f,
+                               std::vector<double>& w, Record& record) const {
+  const int n = motion.pairs;
+  std::vector<double> least(n, std::numeric_limits<double>::infinity());
+  for (int t = 0; t < motion.samples; ++t)
+    for (int i = 0; i < n; ++i) least[i] = std::min(least[i], f[size_t(t) * 3 * n + i]);
+  std::vector<int> chosen;
+  for (int i = 0; i < n; ++i) {
+    if (w[i] == rest[i] && w[n + i] == rest[n + i]) continue;
+    if (least[i] * reach_[motion.first + i] > 0)
+      chosen.push_back(i);
+    else
+      for (int c = 0; c < 2; ++c) record.start[i].periodic[c][c] = 1;
+  }
+  if (chosen.empty()) return;
+  const int k = int(chosen.size());
+  SliderClosure closure(motion.samples, k);
+  for (int t = 0; t < motion.samples; ++t) {
+    double* disc = closure.disc(t);
+    double const *u = motion.u + size_t(t) * 3 * n, *now = f + size_t(t) * 3 * n;
+    for (int j = 0; j < k; ++j) {
+      const int i = chosen[j];
+      disc[j] = u[n + i], disc[k + j] = u[2 * n + i], disc[2 * k + j] = reach_[motion.first + i] * now[i];
     }
+  }
+  std::vector<double> closed(2 * size_t(k));
+  std::vector<SliderStart> starts(k);
+  for (int j = 0; j < 2 * k; ++j) {
+    const int i = j < k ? chosen[j] : n + chosen[j - k];
+    closure.rest[j] = rest[i], closure.first[j] = w[i];
+    if (j < k) closure.slope[j] = reach_[motion.first + i] * p_.normal_stiffness[motion.first + i];
+  }
+  closure.close(closed, starts);
+  for (int j = 0; j < k; ++j) {
+    w[chosen[j]] = closed[j], w[n + chosen[j]] = closed[k + j];
+    record.start[chosen[j]] = starts[j];
   }
 }
 
-/// dN = kn du_n where closed; trial dT = kt (du_t - dw). Coupled: dT = s (I - e e^T) trial + mu e dN; alone:
-/// dT = s trial + mu e dN. Where it slips dw = du - dT/kt, where it sticks dw stays.
+/// dw at the period's start, then the march of the closed period; `pair` as in linear_march.
 template <bool Coupled>
-void Coulomb3d<Coupled>::product(Motion const& motion, Record const& record, double const* du_all,
-                                 double const*, double* df) const {
-  const int n = motion.pairs;
-  const size_t all = size_t(2) * motion.samples * n;
-  std::vector<double> slider(2 * size_t(n), 0.0);
-  double const *kn = p_.normal_stiffness.data(), *kt = p_.tangential_stiffness.data(),
-               *mu = p_.friction_coefficient.data();
-  double *dw1 = slider.data(), *dw2 = slider.data() + n;
-  for (int step = 0; step < 2 * motion.samples; ++step) {
-    double const* du = du_all + size_t(step % motion.samples) * 3 * n;
-    double* out = df + size_t(step % motion.samples) * 3 * n;
-    const Places r = places(const_cast<double*>(record.march.data()), all, size_t(step) * n);
-#pragma omp simd
-    for (int i = 0; i < n; ++i) {
-      const double dN = r.closed[i] * kn[i] * du[i];
-      const double trial1 = kt[i] * (du[n + i] - dw1[i]), trial2 = kt[i] * (du[2 * n + i] - dw2[i]);
-      const double along = Coupled ? r.e1[i] * trial1 + r.e2[i] * trial2 : 0.0;
-      const double dT1 = r.s1[i] * (trial1 - r.e1[i] * along) + mu[i] * r.e1[i] * dN;
-      const double dT2 = r.s2[i] * (trial2 - r.e2[i] * along) + mu[i] * r.e2[i] * dN;
-      dw1[i] = r.s1[i] == 1.0 ? dw1[i] : du[n + i] - dT1 / kt[i];
-      dw2[i] = r.s2[i] == 1.0 ? dw2[i] : du[2 * n + i] - dT2 / kt[i];
-      out[i] = dN, out[n + i] = dT1, out[2 * n + i] = dT2;
+void Coulomb3d<Coupled>::linearised(Motion const& motion, Record const& record, int pair, int n,
+                                    double const* du, double* df) const {
+  const PairConstants p = constants(motion.first);
+  std::vector<double> dw(2 * size_t(n), 0.0);
+  const auto start = [&](int i) -> SliderStart const& { return record.start[pair < 0 ? i : pair]; };
+  bool periodic = false;
+  for (int i = 0; i < (pair < 0 ? n : 1); ++i)
+    periodic = periodic || std::any_of(&start(i).periodic[0][0], &start(i).periodic[0][0] + 4,
+                                       [](double x) { return x != 0; });
+  if (periodic)
+    linear_march<Coupled>(p, motion.samples, motion.pairs, pair, n, record.march.data(), du, dw.data(),
+                          nullptr);
+  for (int i = 0; i < n; ++i) {
+    SliderStart const& s = start(i);
+    const double b[2] = {dw[i], dw[n + i]};
+    for (int row = 0; row < 2; ++row) {
+      double sum = s.periodic[row][0] * b[0] + s.periodic[row][1] * b[1];
+      for (int k = 0; k < 2; ++k)
+        for (int c = 0; c < 3; ++c) sum += s.gain[k][row][c] * du[(size_t(s.sample[k]) * 3 + c) * n + i];
+      dw[row * n + i] = sum;
     }
   }
+  linear_march<Coupled>(p, motion.samples, motion.pairs, pair, n, record.march.data(), du, dw.data(), df);
+}
+
+template <bool Coupled>
+void Coulomb3d<Coupled>::product(Motion const& motion, Record const& record, double const* du, double const*,
+                                 double* df) const {
+  linearised(motion, record, -1, motion.pairs, du, df);
+}
+
+template <bool Coupled>
+void Coulomb3d<Coupled>::pair_product(Motion const& motion, Record const& record, int pair, int columns,
+                                      double const* du, double* df) const {
+  linearised(motion, record, pair, columns, du, df);
 }
 
 template <bool Coupled>
@@ -152,7 +175,8 @@ void Coulomb3d<Coupled>::diagnose(Motion const& motion, double const* f, Diagnos
       out.status[size_t(t) * n + i] = open ? Status::open : slips ? Status::slip : Status::stick;
       if (!slips) continue;
       out.slip_path[i] += std::sqrt(path);
-      out.work[i] += now[n + i] * moved[0] + now[2 * n + i] * moved[1];
+      // never negative: the slider moves along the force, by rounding only where it just touches the limit
+      out.work[i] += std::max(0.0, now[n + i] * moved[0] + now[2 * n + i] * moved[1]);
     }
   }
 }

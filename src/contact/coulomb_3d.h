@@ -1,4 +1,5 @@
 #pragma once
+#include "contact/coulomb_march.h"
 #include "contact/registry.h"
 
 namespace fretwave::contact {
@@ -24,10 +25,19 @@ class Coulomb3d : public Law {
   double stuck_stiffness(int component, int pair) const override;
   void force(Motion const&, double* f, Record&) const override;
   void product(Motion const&, Record const&, double const* du, double const* dv, double* df) const override;
+  void pair_product(Motion const&, Record const&, int pair, int columns, double const* du,
+                    double* df) const override;
   void diagnose(Motion const&, double const* f, Diagnosis&) const override;
 
  private:
+  PairConstants constants(int first) const;
+  void last_slip(Motion const&, Record&) const;
+  void close(Motion const&, std::vector<double> const& rest, double const* f, std::vector<double>& w,
+             Record&) const;
+  void linearised(Motion const&, Record const&, int pair, int n, double const* du, double* df) const;
+
   Coulomb3dParameters p_;
+  std::vector<double> reach_;            ///< mu / kt [m/N]
   std::vector<double> slider_, closed_;  ///< at rest: w (2 x pairs), 1 where closed
 };
 

@@ -17,9 +17,13 @@ class Jenkins : public Law {
   double stuck_stiffness(int, int pair) const override { return stiffness_[pair]; }
   void force(Motion const&, double* f, Record&) const override;
   void product(Motion const&, Record const&, double const* du, double const* dv, double* df) const override;
+  void pair_product(Motion const&, Record const&, int pair, int columns, double const* du,
+                    double* df) const override;
   void diagnose(Motion const&, double const* f, Diagnosis&) const override;
 
  private:
+  void linearised(Motion const&, Record const&, int pair, int n, double const* du, double* df) const;
+
   std::vector<double> stiffness_, limit_, slider_;  ///< slider_: w at rest
 };
 

@@ -12,17 +12,28 @@ namespace fretwave::contact {
 struct Motion {
   int samples = 0;  ///< samples held here (half a period when the motion is half-wave symmetric)
   int components = 0, pairs = 0;
+  int first =
+      0;  ///< of the law's pairs, the one that stands first here (hereditary laws are marched in tiles)
   double const* u = nullptr;  ///< relative displacement [m]; null if the law ignores it
   double const* v = nullptr;  ///< relative velocity [m/s]; null if the law ignores it
   double step = 0;            ///< time between samples [s]
   std::size_t size() const { return std::size_t(samples) * components * pairs; }
 };
 
+/// How a slider at the start of the period follows a perturbation x of the motion: gain x(sample), twice, and
+/// periodic b with b the slider's end after a linearised period from zero.
+struct SliderStart {
+  int sample[2] = {0, 0};
+  double gain[2][2][3] = {}, periodic[2][2] = {};
+};
+
 /// What a force evaluation leaves for its linearisation.
 struct Record {
   std::vector<double> df_du,
       df_dv;  ///< instantaneous tangents, samples x components x components x pairs; empty if zero
-  std::vector<double> march;  ///< a hereditary law's own flags and directions along its march
+  std::vector<double> march;       ///< a hereditary law's own flags and directions along its closed period
+  std::vector<SliderStart> start;  ///< of its pairs
+  double unclosed = 0;             ///< largest |w(T) - w(0)| of a slider in that period [m]
 };
 
 enum class Status : std::uint8_t { stick, slip, open };
@@ -42,8 +53,9 @@ class Law {
   virtual int pairs() const = 0;
   virtual bool uses_displacement() const { return true; }
   virtual bool uses_velocity() const { return true; }
-  /// The force depends on the path. Such a law marches two periods from its rest state and is read on the
-  /// second (DESIGN fact 3).
+  /// The force depends on the path of the displacement (never on the velocity). Such a law is read on a
+  /// period that its sliders close, of all such the one nearest to the rest state: DESIGN fact 3 without the
+  /// transient.
   virtual bool hereditary() const { return false; }
   /// The static state the dynamics start from: relative displacement components x pairs, reached from zero in
   /// one step.
@@ -58,8 +70,13 @@ class Law {
 
   /// Force on the pairs, and what its linearisation needs.
   virtual void force(Motion const&, double* f, Record&) const = 0;
-  /// Linearised force for a motion perturbed by (du, dv); null where the law ignores it.
+  /// Linearised force for a motion perturbed by (du, dv), null where the law ignores it. Of the motion only
+  /// the sizes are read here and in what follows but `diagnose`: the rest is in the record.
   virtual void product(Motion const&, Record const&, double const* du, double const* dv, double* df) const;
+  /// A hereditary law's linearised force on one pair under many perturbations: samples x components x
+  /// columns.
+  virtual void pair_product(Motion const&, Record const&, int /*pair*/, int /*columns*/, double const* /*du*/,
+                            double* /*df*/) const {}
   virtual void diagnose(Motion const&, double const* f, Diagnosis&) const = 0;
 };
 

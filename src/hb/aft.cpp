@@ -3,6 +3,10 @@
 #include <algorithm>
 #include <numbers>
 
+extern "C" void dgemm_(char const*, char const*, int const*, int const*, int const*, double const*,
+                       double const*, int const*, double const*, int const*, double const*, double*,
+                       int const*);
+
 namespace fretwave::hb {
 
 namespace {
@@ -22,19 +26,30 @@ Aft::Aft(Harmonics const& h, std::shared_ptr<contact::Law const> law)
       pairs_(law_->pairs()),
       columns_(law_->components() * pairs_),
       law_samples_(h.odd_only() && law_->odd() && !law_->hereditary() ? h.samples() / 2 : h.samples()),
-      transform_(h, columns_, law_->components()),
-      tangent_transform_(h, law_->hereditary() ? 0 : tangent_columns(*law_)),
-      velocity_(size_t(columns_) * h.block_size()) {
-  const size_t n = size_t(h.samples()) * columns_;
-  for (auto* samples : {&f_, &df_}) samples->resize(n);
-  if (law_->uses_displacement()) u_.resize(n), du_.resize(n);
-  if (law_->uses_velocity()) v_.resize(n), dv_.resize(n);
+      tiles_(tiles(*law_, h.samples())),
+      transform_(h, law_->components() * tiles_.front().pairs, law_->components()),
+      last_transform_(h, law_->components() * tiles_.back().pairs, law_->components()),
+      tangent_transform_(h, law_->hereditary() ? 0 : tangent_columns(*law_)) {
+  const size_t columns = law_->components() * tiles_.front().pairs, n = h.samples() * columns;
+  f_.resize(n);
+  if (law_->uses_displacement()) u_.resize(n);
+  if (law_->uses_velocity()) v_.resize(n), velocity_.resize(columns * h.block_size());
 }
 
-contact::Motion Aft::motion(double omega) const {
+/// Only a law with memory is cut: it goes over its samples twice and keeps a record.
+std::vector<Aft::Tile> Aft::tiles(contact::Law const& law, int samples) {
+  const int pairs = law.pairs(), size = law.hereditary() ? (samples <= 128 ? 64 : 32) : std::max(1, pairs);
+  std::vector<Tile> out;
+  for (int first = 0; first == 0 || first < pairs; first += size)
+    out.push_back({first, std::min(size, pairs - first), {}});
+  return out;
+}
+
+contact::Motion Aft::motion(Tile const& tile, double omega) const {
   return {.samples = law_samples_,
           .components = law_->components(),
-          .pairs = pairs_,
+          .pairs = tile.pairs,
+          .first = tile.first,
           .u = u_.empty() ? nullptr : u_.data(),
           .v = v_.empty() ? nullptr : v_.data(),
           .step = 2 * std::numbers::pi / (omega * harmonics_.samples())};
@@ -49,24 +64,31 @@ void Aft::mirror(std::vector<double>& samples, double sign, int columns) const {
 
 void Aft::force(double const* U, Exponents const& e, double* F) {
   if (columns_ == 0) return;
-  if (law_->uses_displacement()) transform_.to_time(U, u_.data());
-  if (law_->uses_velocity()) {
-    multiply(harmonics_, e.s, U, velocity_.data(), columns_);
-    transform_.to_time(velocity_.data(), v_.data());
+  for (Tile& tile : tiles_) {
+    const int columns = tile.pairs * law_->components();
+    const size_t at = size_t(tile.first) * law_->components() * harmonics_.block_size();
+    if (law_->uses_displacement()) transform(tile).to_time(U + at, u_.data());
+    if (law_->uses_velocity()) {
+      multiply(harmonics_, e.s, U + at, velocity_.data(), columns);
+      transform(tile).to_time(velocity_.data(), v_.data());
+    }
+    law_->force(motion(tile, angular_frequency(harmonics_, e)), f_.data(), tile.record);
+    mirror(f_, -1, columns);
+    transform(tile).to_harmonics(f_.data(), F + at);
   }
-  law_->force(motion(angular_frequency(harmonics_, e)), f_.data(), record_);
-  mirror(f_, -1, columns_);
-  transform_.to_harmonics(f_.data(), F);
 }
 
 void Aft::product(double const* dU, double const* dV, double* dF) {
   if (columns_ == 0) return;
-  if (law_->uses_displacement()) transform_.to_time(dU, du_.data());
-  if (law_->uses_velocity()) transform_.to_time(dV, dv_.data());
-  law_->product(motion(1), record_, du_.empty() ? nullptr : du_.data(), dv_.empty() ? nullptr : dv_.data(),
-                df_.data());
-  mirror(df_, -1, columns_);
-  transform_.to_harmonics(df_.data(), dF);
+  for (Tile const& tile : tiles_) {
+    const size_t at = size_t(tile.first) * law_->components() * harmonics_.block_size();
+    if (law_->uses_displacement()) transform(tile).to_time(dU + at, u_.data());
+    if (law_->uses_velocity()) transform(tile).to_time(dV + at, v_.data());
+    const contact::Motion motion = this->motion(tile, 1);
+    law_->product(motion, tile.record, motion.u, motion.v, f_.data());
+    mirror(f_, -1, tile.pairs * law_->components());
+    transform(tile).to_harmonics(f_.data(), dF + at);
+  }
 }
 
 /// T[pair][row][col] (m x m each): f_n = 2 G_n x_0 + sum_k G_{n-k} x_k + G_{n+k} conj(x_k) for f(t) = g(t)
@@ -74,15 +96,15 @@ void Aft::product(double const* dU, double const* dV, double* dF) {
 void Aft::toeplitz_hankel(std::vector<double> const& tangent, std::vector<double>& T) const {
   const int m = harmonics_.block_size(), d = law_->components(), columns = d * d * pairs_,
             N = harmonics_.samples();
-  std::vector<double> samples(size_t(N) * columns), unused(size_t(columns) * m);
+  std::vector<double> samples(size_t(N) * columns);
   std::copy_n(tangent.data(), size_t(law_samples_) * columns, samples.data());
   mirror(samples, +1, columns);
-  tangent_transform_.to_harmonics(samples.data(), unused.data());
+  complex const* spectrum = tangent_transform_.spectrum(samples.data());
   const double scale = 1.0 / N;
   for (int c = 0; c < columns; ++c) {
     const auto G = [&](int k) {  // periodic in N, conjugate symmetric
       k = ((k % N) + N) % N;
-      const complex g = tangent_transform_.spectrum()[size_t(k <= N / 2 ? k : N - k) * columns + c] * scale;
+      const complex g = spectrum[size_t(k <= N / 2 ? k : N - k) * columns + c] * scale;
       return k <= N / 2 ? g : std::conj(g);
     };
     const int pair = c % pairs_, row = c / pairs_ / d, col = (c / pairs_) % d;
@@ -107,34 +129,39 @@ void Aft::toeplitz_hankel(std::vector<double> const& tangent, std::vector<double
   }
 }
 
-/// Column by column for a law with memory: one linearised march for each coefficient, of all pairs at once.
-void Aft::columnwise(Exponents const& e, double* D) {
-  const size_t m = harmonics_.block_size(), d = law_->components(), ld = d * m;
-  std::vector<double> dU(size_t(columns_) * m), dV(dU.size()), dF(dU.size());
-  for (size_t col = 0; col < ld; ++col) {
-    for (int pair = 0; pair < pairs_; ++pair) dU[pair * ld + col] = 1;
-    multiply(harmonics_, e.s, dU.data(), dV.data(), columns_);
-    product(dU.data(), dV.data(), dF.data());
-    for (int pair = 0; pair < pairs_; ++pair) {
-      dU[pair * ld + col] = 0;
-      for (size_t row = 0; row < ld; ++row) D[(pair * ld + row) * ld + col] = dF[pair * ld + row];
+/// For a law with memory: the linearised march of a pair for all its coefficients at once, columns innermost.
+void Aft::by_columns(double* D) const {
+  const int m = harmonics_.block_size(), d = law_->components(), ld = d * m, N = harmonics_.samples(),
+            row = d * ld;
+  const double one = 1, zero = 0;
+  std::vector<double> du(size_t(N) * row), df(du.size());
+  for (int t = 0; t < N; ++t)
+    for (int c = 0; c < d; ++c)
+      std::copy_n(transform_.synthesis().data() + size_t(t) * m, m,
+                  du.data() + size_t(t) * row + c * ld + c * m);
+  for (Tile const& tile : tiles_)
+    for (int i = 0; i < tile.pairs; ++i, D += size_t(ld) * ld) {
+      law_->pair_product(motion(tile, 1), tile.record, i, ld, du.data(), df.data());
+      for (int c = 0; c < d; ++c)  // rows of component c: analysis^T df, in columns
+        dgemm_("N", "T", &ld, &m, &N, &one, df.data() + c * ld, &row, transform_.analysis().data(), &m, &zero,
+               D + size_t(c) * m * ld, &ld);
     }
-  }
 }
 
 void Aft::blocks(Exponents const& e, double* D) {
   if (columns_ == 0) return;
   const int m = harmonics_.block_size(), d = law_->components();
   const size_t size = size_t(pairs_) * d * m * d * m;
+  if (law_->hereditary()) return by_columns(D);
   std::fill_n(D, size, 0.0);
-  if (law_->hereditary()) return columnwise(e, D);
   std::vector<double> T(size);
-  if (!record_.df_du.empty()) {
-    toeplitz_hankel(record_.df_du, T);
+  contact::Record const& record = tiles_.front().record;
+  if (!record.df_du.empty()) {
+    toeplitz_hankel(record.df_du, T);
     std::copy(T.begin(), T.end(), D);
   }
-  if (record_.df_dv.empty()) return;
-  toeplitz_hankel(record_.df_dv, T);
+  if (record.df_dv.empty()) return;
+  toeplitz_hankel(record.df_dv, T);
   // D += T S: columns of the velocity's block recombined by the 2x2 of s_k
   for (size_t row = 0; row < size_t(pairs_) * d * m; ++row)
     for (int col = 0; col < d; ++col)
@@ -150,28 +177,33 @@ void Aft::blocks(Exponents const& e, double* D) {
       }
 }
 
+/// All pairs at once over the whole period.
+contact::Motion Aft::whole(ContactPeriod const& period, Exponents const& e) const {
+  contact::Motion motion = this->motion({0, pairs_, {}}, angular_frequency(harmonics_, e));
+  motion.samples = harmonics_.samples();
+  motion.u = period.u.data(), motion.v = period.v.data();
+  return motion;
+}
+
 ContactPeriod Aft::period(double const* U, Exponents const& e) const {
   ContactPeriod out;
-  for (auto* samples : {&out.u, &out.v, &out.f}) samples->resize(f_.size());
+  for (auto* samples : {&out.u, &out.v, &out.f}) samples->resize(size_t(harmonics_.samples()) * columns_);
   std::vector<double> V(size_t(columns_) * harmonics_.block_size());
   multiply(harmonics_, e.s, U, V.data(), columns_);
-  transform_.to_time(U, out.u.data());
-  transform_.to_time(V.data(), out.v.data());
-  contact::Motion whole = motion(angular_frequency(harmonics_, e));
-  whole.samples = harmonics_.samples();
-  whole.u = out.u.data(), whole.v = out.v.data();
+  const FourierTransform transform(harmonics_, columns_, law_->components());
+  transform.to_time(U, out.u.data());
+  transform.to_time(V.data(), out.v.data());
   contact::Record record;
-  if (columns_) law_->force(whole, out.f.data(), record);
+  if (columns_) law_->force(whole(out, e), out.f.data(), record);
+  out.unclosed = record.unclosed;
   return out;
 }
 
 namespace {
 
 void count(contact::Diagnosis const& diagnosis, ContactSummary& summary) {
-  for (auto s : diagnosis.status)
-    (s == contact::Status::stick  ? summary.stick
-     : s == contact::Status::slip ? summary.slip
-                                  : summary.open) += 1;
+  double* shares[] = {&summary.stick, &summary.slip, &summary.open};
+  for (auto s : diagnosis.status) *shares[int(s)] += 1;
   for (double w : diagnosis.work) summary.work += w;
 }
 
@@ -183,11 +215,12 @@ ContactSummary Aft::summarise(double const* U, Exponents const& e) {
   const size_t n = size_t(columns_) * harmonics_.block_size();
   std::vector<double> F(n), finer(n);
   const ContactPeriod now = period(U, e);
-  transform_.to_harmonics(now.f.data(), F.data());
-  std::tie(summary.truncated, summary.total) = transform_.truncated_energy();
+  const FourierTransform transform(harmonics_, columns_, law_->components());
+  transform.to_harmonics(now.f.data(), F.data());
+  std::tie(summary.truncated, summary.total) = transform.truncated_energy(now.f.data(), F.data());
+  summary.unclosed = now.unclosed;
 
-  contact::Motion whole = motion(angular_frequency(harmonics_, e));
-  whole.samples = harmonics_.samples(), whole.u = now.u.data(), whole.v = now.v.data();
+  const contact::Motion whole = this->whole(now, e);
   contact::Diagnosis diagnosis{std::vector<contact::Status>(size_t(whole.samples) * pairs_),
                                std::vector<double>(pairs_), std::vector<double>(pairs_)};
   law_->diagnose(whole, now.f.data(), diagnosis);

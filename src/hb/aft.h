@@ -11,11 +11,13 @@ struct ContactSummary {
   double aliased = 0,
          retained = 0;  ///< squared change of the coefficients on doubled samples, and their square
   double work = 0;      ///< dissipated energy per period [J]
+  double unclosed = 0;  ///< largest |w(T) - w(0)| of a slider [m]
 };
 
 /// Time samples of a period: samples x components x pairs.
 struct ContactPeriod {
   std::vector<double> u, v, f;
+  double unclosed = 0;  ///< as in ContactSummary
 };
 
 /// Alternating frequency-time for the contact pairs of this rank: harmonic blocks of relative displacement
@@ -36,18 +38,27 @@ class Aft {
   ContactPeriod period(double const* U, Exponents const&) const;
 
  private:
-  contact::Motion motion(double omega) const;
+  /// Pairs whose time samples fit the cache, and the record of their last force.
+  struct Tile {
+    int first, pairs;
+    contact::Record record;
+  };
+  static std::vector<Tile> tiles(contact::Law const&, int samples);
+  contact::Motion motion(Tile const&, double omega) const;
+  contact::Motion whole(ContactPeriod const&, Exponents const&) const;
+  FourierTransform const& transform(Tile const& tile) const {
+    return tile.pairs == tiles_.front().pairs ? transform_ : last_transform_;
+  }
   void mirror(std::vector<double>& samples, double sign, int columns) const;
-  void columnwise(Exponents const&, double* D);
+  void by_columns(double* D) const;
   void toeplitz_hankel(std::vector<double> const& tangent, std::vector<double>& T) const;
 
   Harmonics harmonics_;
   std::shared_ptr<contact::Law const> law_;
   int pairs_, columns_, law_samples_;  ///< law_samples: half a period when half-wave symmetric
-  FourierTransform transform_;
-  FourierTransform tangent_transform_;
-  contact::Record record_;
-  std::vector<double> velocity_, u_, v_, f_, du_, dv_, df_;
+  std::vector<Tile> tiles_;            ///< of one size but for the last
+  FourierTransform transform_, last_transform_, tangent_transform_;
+  std::vector<double> velocity_, u_, v_, f_;
 };
 
 }  // namespace fretwave::hb

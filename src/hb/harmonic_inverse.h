@@ -10,6 +10,17 @@ struct Rotation {
   static Rotation of(std::complex<T> a) {
     return {a.real(), a.imag(), -a.imag(), a.real()};
   }
+  /// left * this * right.
+  Rotation between(complex left, complex right) const {
+    const auto times = [](Rotation const& a, Rotation const& b) {
+      return Rotation{a.cc * b.cc + a.cs * b.sc, a.cc * b.cs + a.cs * b.ss, a.sc * b.cc + a.ss * b.sc,
+                      a.sc * b.cs + a.ss * b.ss};
+    };
+    return times(times(of(left), *this), of(right));
+  }
+  void add(double weight, Rotation const& r) {
+    cc += weight * r.cc, cs += weight * r.cs, sc += weight * r.sc, ss += weight * r.ss;
+  }
   /// The complex factor nearest to it.
   complex nearest() const { return {(cc + ss) / 2, (cs - sc) / 2}; }
 };

@@ -55,7 +55,10 @@ std::vector<Rotation> HarmonicPreconditioner::gather_contact(std::vector<PairTan
   std::vector<Rotation> tangents;
   int first = first_pair_;
   for (auto const& contact : contacts) {
-    for (Weight w : contact.weights) weights.push_back({first + w.pair, w.component, w.dof, w.value});
+    for (Weight w : contact.weights) {
+      w.pair += first;
+      weights.push_back(w);
+    }
     const size_t ld = size_t(contact.components) * m_;
     for (int p = 0; p < contact.pairs; ++p) {
       const auto own = harmonic_tangents(problem_.harmonics(), contact.components, &contact.D[p * ld * ld]);
@@ -87,23 +90,40 @@ std::vector<complex> HarmonicPreconditioner::structure(int harmonic, Exponents c
   return A;
 }
 
-/// visit(dof, dof, weight, index of the per-harmonic block) for all entries of B^T (.) B.
+/// e^{-i k n theta}, which another sector's displacement carries (DESIGN section 3).
+complex HarmonicPreconditioner::phase(Weight const& w, int harmonic) const {
+  return std::polar(1.0, -w.phase * problem_.harmonics().orders()[harmonic] * problem_.model().theta());
+}
+
+/// visit(row's weight, column's weight, index of their component's per-harmonic block) for all entries of
+/// B^H (.) B.
 template <class Visit>
 void HarmonicPreconditioner::for_contact(int harmonic, Visit visit) const {
   for (Pair const& pair : pairs_)
     for (size_t a = pair.first_weight; a < pair.end_weight; ++a)
       for (size_t b = pair.first_weight; b < pair.end_weight; ++b)
-        visit(weights_[a].dof, weights_[b].dof, weights_[a].value * weights_[b].value,
+        visit(weights_[a], weights_[b],
               pair.first_block +
                   (size_t(harmonic) * pair.components + weights_[a].component) * pair.components +
                   weights_[b].component);
 }
 
+/// Contact's part of B^H (harmonic's tangents) B, entry by entry: add(row, col, value).
+template <class Add>
+void HarmonicPreconditioner::add_contact(int harmonic, Add add) const {
+  for_contact(harmonic, [&](Weight const& a, Weight const& b, size_t k) {
+    Rotation r;
+    r.add(a.value * b.value, tangents_[k]);
+    if (a.phase || b.phase) r = r.between(std::conj(phase(a, harmonic)), phase(b, harmonic));
+    add(a.dof, b.dof, r);
+  });
+}
+
 std::vector<complex> HarmonicPreconditioner::block(int harmonic, Exponents const& e) const {
   auto A = structure(harmonic, e);
   const bool mean = problem_.harmonics().orders()[harmonic] == 0;
-  for_contact(harmonic, [&](PetscInt i, PetscInt j, double weight, size_t k) {
-    A[size_t(j) * n_ + i] += weight * (mean ? tangents_[k].cc : tangents_[k].nearest());
+  add_contact(harmonic, [&](PetscInt i, PetscInt j, Rotation const& r) {
+    A[size_t(j) * n_ + i] += mean ? r.cc : r.nearest();
   });
   return A;
 }
@@ -114,15 +134,13 @@ std::vector<double> HarmonicPreconditioner::bordered_block(Exponents const& e, V
   const int first = h.fundamental(), offset = h.offset(first), size = 2 * n_ + scalars_;
   std::vector<double> F(size_t(size) * size, 0.0);
   const auto at = [&](int i, int j) -> double& { return F[size_t(j) * size + i]; };
-  const auto add = [&](int i, int j, double weight, Rotation const& r) {
-    at(i, j) += weight * r.cc, at(i, n_ + j) += weight * r.cs;
-    at(n_ + i, j) += weight * r.sc, at(n_ + i, n_ + j) += weight * r.ss;
+  const auto add = [&](PetscInt i, PetscInt j, Rotation const& r) {
+    at(i, j) += r.cc, at(i, n_ + j) += r.cs, at(n_ + i, j) += r.sc, at(n_ + i, n_ + j) += r.ss;
   };
   const auto A = structure(first, e);
   for (int j = 0; j < n_; ++j)
-    for (int i = 0; i < n_; ++i) add(i, j, 1, Rotation::of(A[size_t(j) * n_ + i]));
-  for_contact(first,
-              [&](PetscInt i, PetscInt j, double weight, size_t k) { add(i, j, weight, tangents_[k]); });
+    for (int i = 0; i < n_; ++i) add(i, j, Rotation::of(A[size_t(j) * n_ + i]));
+  add_contact(first, add);
   const auto closing = gathered(row);
   for (int j = 0; j < scalars_; ++j) {
     const auto column = gathered(problem_.scalar_column(y, j));
@@ -138,14 +156,15 @@ std::vector<double> HarmonicPreconditioner::bordered_block(Exponents const& e, V
   return F;
 }
 
-/// Per-harmonic blocks of B P^-1 B^T of all pairs.
+/// Per-harmonic blocks of B P^-1 B^H of all pairs.
 std::vector<Rotation> HarmonicPreconditioner::compliance() const {
   std::vector<Rotation> G(tangents_.size());
   for (int i = 0; i < problem_.harmonics().count(); ++i) {
     if (!mine(i)) continue;
-    for_contact(i, [&](PetscInt row, PetscInt col, double weight, size_t k) {
-      const Rotation g = inverses_[i]->entry(int(row), int(col));
-      G[k].cc += weight * g.cc, G[k].cs += weight * g.cs, G[k].sc += weight * g.sc, G[k].ss += weight * g.ss;
+    for_contact(i, [&](Weight const& row, Weight const& col, size_t k) {
+      Rotation g = inverses_[i]->entry(int(row.dof), int(col.dof));
+      if (row.phase || col.phase) g = g.between(phase(row, i), std::conj(phase(col, i)));
+      G[k].add(row.value * col.value, g);
     });
   }
   sum_over_ranks(&G[0].cc, 4 * G.size(), problem_.comm());
@@ -194,19 +213,32 @@ std::vector<double> HarmonicPreconditioner::solve(std::vector<double> const& x) 
   return z;
 }
 
-/// B^T E B y
+/// to += weight (phase) from, harmonic blocks.
+void HarmonicPreconditioner::add_turned(Weight const& w, bool conjugate, double const* from,
+                                        double* to) const {
+  if (!w.phase) {
+    for (int k = 0; k < m_; ++k) to[k] += w.value * from[k];
+    return;
+  }
+  Harmonics const& h = problem_.harmonics();
+  std::vector<complex> factor(h.count());
+  for (int i = 0; i < h.count(); ++i)
+    factor[i] = w.value * (conjugate ? std::conj(phase(w, i)) : phase(w, i));
+  std::vector<double> turned(m_);
+  multiply(h, factor, from, turned.data(), 1);
+  for (int k = 0; k < m_; ++k) to[k] += turned[k];
+}
+
+/// B^H E B y
 std::vector<double> HarmonicPreconditioner::correction(std::vector<double> const& y) const {
   std::vector<double> out(y.size(), 0.0), u, f;
   for (size_t p = 0; p < corrections_.size(); ++p) {
     Pair const& pair = pairs_[first_pair_ + p];
+    const auto weights = std::span(weights_).subspan(pair.first_weight, pair.end_weight - pair.first_weight);
     u.assign(corrections_[p].size(), 0.0), f.resize(u.size());
-    for (size_t w = pair.first_weight; w < pair.end_weight; ++w)
-      for (int k = 0; k < m_; ++k)
-        u[weights_[w].component * m_ + k] += weights_[w].value * y[weights_[w].dof * m_ + k];
+    for (Weight const& w : weights) add_turned(w, false, &y[w.dof * m_], &u[w.component * m_]);
     corrections_[p].apply(u.data(), f.data());
-    for (size_t w = pair.first_weight; w < pair.end_weight; ++w)
-      for (int k = 0; k < m_; ++k)
-        out[weights_[w].dof * m_ + k] += weights_[w].value * f[weights_[w].component * m_ + k];
+    for (Weight const& w : weights) add_turned(w, true, &f[w.component * m_], &out[w.dof * m_]);
   }
   sum_over_ranks(out.data(), out.size(), problem_.comm());
   return out;

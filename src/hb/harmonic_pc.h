@@ -29,8 +29,12 @@ class HarmonicPreconditioner : public solve::Preconditioner {
   std::vector<complex> structure(int harmonic, Exponents const&) const;
   std::vector<complex> block(int harmonic, Exponents const&) const;
   std::vector<double> bordered_block(Exponents const&, Vec y, Vec row) const;
+  complex phase(Weight const&, int harmonic) const;
   template <class Visit>
   void for_contact(int harmonic, Visit) const;
+  template <class Add>
+  void add_contact(int harmonic, Add) const;
+  void add_turned(Weight const&, bool conjugate, double const* from, double* to) const;
   std::vector<Rotation> compliance() const;
   void correct_pairs(std::vector<PairTangents>&&);
   std::vector<double> solve(std::vector<double> const& x) const;

@@ -46,18 +46,21 @@ struct Exponents {
 /// y = s x on harmonic blocks: columns x block size, real (cos, sin) pairs.
 void multiply(Harmonics const&, std::vector<complex> const& s, double const* x, double* y, int columns);
 
-/// Batched FFT between harmonic blocks (pairs x components x block size) and time samples (samples x
-/// components x pairs, pairs innermost).
+/// Between harmonic blocks (pairs x components x block size) and time samples (samples x components x pairs,
+/// pairs innermost): by a table of cosines and sines for few harmonics, by FFT for many.
 class FourierTransform {
  public:
   FourierTransform(Harmonics const&, int columns, int components = 1);
   void to_time(double const* blocks, double* samples) const;
   /// Coefficients of sampled columns; overwrites nothing of `samples`.
   void to_harmonics(double const* samples, double* blocks) const;
-  /// Energy outside the retained orders and in all orders, of the last to_harmonics, summed over the columns.
-  std::pair<double, double> truncated_energy() const;
-  /// One-sided complex spectrum of the last to_harmonics: (samples/2 + 1) x columns, unnormalised.
-  complex const* spectrum() const { return reinterpret_cast<complex const*>(spectrum_.get()); }
+  /// Sums of squares over the samples: what the retained orders leave, and all.
+  std::pair<double, double> truncated_energy(double const* samples, double const* blocks) const;
+  /// One-sided complex spectrum: (samples/2 + 1) x columns, unnormalised.
+  complex const* spectrum(double const* samples) const;
+  /// 1, cos n tau, sin n tau, and the same as weights of to_harmonics: samples x block size.
+  std::vector<double> const& synthesis() const { return synthesis_; }
+  std::vector<double> const& analysis() const { return analysis_; }
 
  private:
   struct FreePlan {
@@ -66,12 +69,24 @@ class FourierTransform {
   struct FreeMemory {
     void operator()(void* p) const { fftw_free(p); }
   };
+  /// Tables of the even or the odd orders over half a period, samples/2 x places.
+  struct Half {
+    std::vector<size_t> places;  ///< in the harmonic block
+    std::vector<double> synthesis, analysis;
+  };
+  void by_halves(double const* blocks, double* samples) const;
+  void from_halves(double const* samples, double* blocks) const;
+  void plan() const;
+
   Harmonics harmonics_;
   int columns_, rows_;
+  bool table_;
   std::vector<size_t> block_;  ///< where a time column's harmonic block begins
-  std::unique_ptr<double, FreeMemory> time_;
-  std::unique_ptr<fftw_complex, FreeMemory> spectrum_;
-  std::unique_ptr<std::remove_pointer_t<fftw_plan>, FreePlan> backward_, forward_;
+  std::vector<double> synthesis_, analysis_;
+  Half halves_[2];
+  mutable std::vector<double> packed_, sums_, middle_;
+  mutable std::unique_ptr<fftw_complex, FreeMemory> spectrum_;  ///< only if asked for, as the plans
+  mutable std::unique_ptr<std::remove_pointer_t<fftw_plan>, FreePlan> backward_, forward_;
 };
 
 }  // namespace fretwave::hb

@@ -37,6 +37,8 @@ class Outcome:
         Lines to print.
     goal : str
         What it was to reach, for the message when it did not.
+    advice : str
+        What to do when it did not; empty for what usually helps.
     """
 
     points: int
@@ -44,6 +46,7 @@ class Outcome:
     converged: bool
     summary: list[str] = field(default_factory=list)
     goal: str = ""
+    advice: str = ""
 
 
 @dataclass

@@ -9,10 +9,14 @@ from typing import Any
 import numpy as np
 import scipy.sparse.linalg
 
-from ..contacts import ContactSpec
+from ..contacts import ContactSpec, closed_contacts
+from ..errors import InputError
 from ..schema import PreloadSection
 from .asymptotes import closed_stiffness
 from .context import AnalysisContext
+
+#: A mode below this share of the first frequency with closed contact is a rigid motion.
+RIGID = 1e-6
 
 
 def rest_state(context: AnalysisContext, factor: float = 1.0) -> Any:
@@ -64,11 +68,7 @@ def closed_mode(context: AnalysisContext) -> Any:
 
     from ..run import build_model
 
-    contacts = []
-    for contact in context.case.contacts:
-        closing = {"normal_load": 1.0, "gap": 0.0}
-        known = {key: value for key, value in closing.items() if key in contact.parameters}
-        contacts.append(replace(contact, parameters={**contact.parameters, **known}))
+    contacts = closed_contacts(context.case.contacts)
     with build_model(replace(context.case, contacts=contacts), (), context.comm) as model:
         return fretwave.linear_modes(model, 1)[0]
 
@@ -82,7 +82,18 @@ def start_mode(context: AnalysisContext, linear_mode: int) -> tuple[Any, Any]:
             f" {100 * rest.open:.3g} % are open"
         )
         context.arrays["rest_displacement"] = rest.displacement
-    return context.linear_mode("stuck", linear_mode)[linear_mode - 1], rest
+    modes = context.linear_mode("stuck", linear_mode)
+    start = modes[linear_mode - 1]
+    if start.omega <= RIGID * closed_mode(context).omega:
+        is_open = 1.0 if rest is None else rest.open
+        raise InputError(
+            f"linear mode {linear_mode} is a rigid motion: nothing holds the structure at rest",
+            where=f"analysis '{context.name}'",
+            measured=f"{start.frequency_hz:.3g} Hz, {100 * is_open:.3g} % of the pairs open at rest",
+            expected="an elastic mode",
+            fix="load the contact (normal_load, or [preload] loads), hold the structure, or take a higher linear_mode",
+        )
+    return start, rest
 
 
 def retained(context: AnalysisContext, highest: int | None = None, samples: int | None = None) -> Any:

@@ -51,7 +51,8 @@ def run_static(context: AnalysisContext) -> Outcome:
     if writer.rows:
         keep_pairs(context, writer)
     writer.close("done" if failure is None else "stopped", reason)
-    return Outcome(writer.rows, reason, failure is None, summary, goal="a static state at every load factor")
+    advice = failure.fix or "" if failure is not None else ""
+    return Outcome(writer.rows, reason, failure is None, summary, "a static state at every load factor", advice)
 
 
 def section_loads(context: AnalysisContext) -> list[str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from .elasticity import TITANIUM, Material, MatrixReport, assemble, centrifugal_load, check_matrices, rigid_modes
 from .interface import ContactPatch, contact_patch, nodal_areas, relative_rows, tangent_frames
 from .mesh import Block, Mesh, Quality, join
+from .prestress import spin_softening, stress_stiffness, stresses
 
 __all__ = [
     "TITANIUM",
@@ -22,5 +23,8 @@ __all__ = [
     "nodal_areas",
     "relative_rows",
     "rigid_modes",
+    "spin_softening",
+    "stress_stiffness",
+    "stresses",
     "tangent_frames",
 ]

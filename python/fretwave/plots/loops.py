@@ -13,7 +13,7 @@ from .data import Analysis, Run
 from .phase_planes import amplitude_name, kept_points
 
 UM = 1e6
-LEGEND_COLUMNS = 6
+LEGEND_COLUMNS = 4
 
 
 def figures(run: Run) -> Iterator[tuple[str, Figure]]:

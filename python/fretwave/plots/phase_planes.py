@@ -16,11 +16,12 @@ CURVES = 7
 
 
 def figures(run: Run) -> Iterator[tuple[str, Figure]]:
-    """Per mode analysis one picture of the planes and one of the loops of each contact."""
+    """Per mode analysis one picture of the planes (of a model with few dofs) and one of the loops of each contact."""
     for mode in run.of_kind("mode"):
         if not mode.labels:
             continue
-        yield f"{mode.name}_phase_planes", planes(mode)
+        if len(mode.dofs) <= FEW_DOFS:
+            yield f"{mode.name}_phase_planes", planes(mode)
         for contact in mode.contacts:
             if mode.reported and mode.components(contact) == 1:
                 yield f"{mode.name}_hysteresis_{contact}", loops(mode, contact)
@@ -28,7 +29,7 @@ def figures(run: Run) -> Iterator[tuple[str, Figure]]:
 
 def planes(mode: Analysis) -> Figure:
     """Velocity against displacement, a column per dof: as they are, and below divided by a and a omega."""
-    dofs = [mode.normalised_dof(), other_dof(mode)] if 1 < len(mode.dofs) <= FEW_DOFS else [mode.normalised_dof()]
+    dofs = [mode.normalised_dof(), other_dof(mode)] if len(mode.dofs) > 1 else [0]
     points = spread(mode, CURVES)
     figure, axes = style.new_figure(7.2, rows=2, columns=len(dofs), squeeze=False)
     for dof, (upper, lower) in zip(dofs, axes.T):
