@@ -6,10 +6,12 @@ import csv
 import shutil
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import h5py
 import numpy as np
 import pytest
+import scipy.sparse as sp
 
 import fretwave as fw
 from fretwave import fe
@@ -18,7 +20,8 @@ from fretwave.cli import main
 from fretwave.contact_history import OPEN, SLIP, STICK, ContactHistory
 from fretwave.errors import InputError
 from fretwave.fe.mesh import VTK_LATTICE
-from fretwave.vtkhdf import TRIQUADRATIC_HEXAHEDRON, VERTEX, GridFile, linear_cells
+from fretwave.view import mesh_of
+from fretwave.vtkhdf import HEXAHEDRON, TRIQUADRATIC_HEXAHEDRON, VERTEX, GridFile, linear_cells
 
 pytestmark = pytest.mark.ranks(1)
 
@@ -328,6 +331,38 @@ def test_a_model_without_nodes_is_refused(tmp_path: Path, capfd) -> None:
     assert call("run", str(tmp_path / "case.toml"), "--only", "mode", "--out", str(tmp_path / "run"), "--no-plots") == 0
     assert call("view", str(tmp_path / "run")) == 2
     assert "it has no nodes" in capfd.readouterr().err
+
+
+def test_another_model_is_not_expanded(run: Path, tmp_path: Path, monkeypatch, capfd) -> None:
+    """What a builder reads beside its own text is not in the case: the reduction gives it away."""
+    text = BUILDER.read_text().replace(
+        "STIFFNESS, AREA = 4e6,", "import os\n\nSTIFFNESS, AREA = float(os.environ['K']),"
+    )
+    (tmp_path / "model.py").write_text(text)
+    (tmp_path / "case.toml").write_text(TEXT)
+    monkeypatch.setenv("K", "4e6")
+    assert call("run", str(tmp_path / "case.toml"), "--only", "mode", "--out", str(tmp_path / "run"), "--no-plots") == 0
+    assert call("view", str(tmp_path / "run")) == 0
+    monkeypatch.setenv("K", "4.001e6")
+    assert call("view", str(tmp_path / "run")) == 2
+    assert "no longer that of the run" in capfd.readouterr().err
+
+
+def test_cells_of_a_built_model(skewed: fe.Mesh) -> None:
+    """Triquadratic as they are or cut in eight; without cells the nodes are points."""
+    n, cells = skewed.n_dof, skewed.vtk_cells
+    model = fw.BuiltModel(sp.identity(n, format="csr"), sp.identity(n, format="csr"), coordinates=skewed.nodes)
+    case = SimpleNamespace(built=model, path=Path("case.toml"))
+    assert (mesh_of(case)[1][0].shape, mesh_of(case)[1][1]) == ((n // 3, 1), VERTEX)
+    model.hexahedra = cells
+    assert model.complaint() is None and mesh_of(case)[1][1] == TRIQUADRATIC_HEXAHEDRON
+    assert (mesh_of(case, linear=True)[1][0].shape, mesh_of(case, linear=True)[1][1]) == ((16, 8), HEXAHEDRON)
+    model.hexahedra = cells[:, :8]
+    assert model.complaint() is None and mesh_of(case, linear=True)[1][1] == HEXAHEDRON
+    model.hexahedra = cells[:, :20]
+    assert "(2, 20), not (n_cells, 8 or 27)" in model.complaint()
+    model.hexahedra = cells + 1
+    assert f"nodes 1 to {n // 3} of {n // 3}" in model.complaint()
 
 
 # Histories of contacts

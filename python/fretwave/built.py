@@ -108,6 +108,11 @@ class BuiltModel:
                 return f"load '{name}' has the shape {np.shape(load)}, not ({n},)"
         if self.coordinates is not None and np.shape(self.coordinates) != (n // 3, 3):
             return f"coordinates have the shape {np.shape(self.coordinates)}, not ({n // 3}, 3)"
+        cells = self.hexahedra
+        if cells is not None and (np.ndim(cells) != 2 or np.shape(cells)[1] not in (8, 27)):
+            return f"hexahedra have the shape {np.shape(cells)}, not (n_cells, 8 or 27)"
+        if cells is not None and (self.coordinates is None or not 0 <= np.min(cells) <= np.max(cells) < n // 3):
+            return f"hexahedra have the nodes {np.min(cells)} to {np.max(cells)} of {n // 3} with coordinates"
         return next((text for text in (_wrong(c, name, n) for name, c in self.contacts.items()) if text), None)
 
 

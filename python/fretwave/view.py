@@ -38,6 +38,8 @@ IntArray = npt.NDArray[np.intp]
 SHOWN_HARMONICS = 3
 #: Largest displacement as drawn, as a share of the model's size, where no scale is given.
 DRAWN = 0.1
+#: Relative difference of a frequency that rounding explains.
+SAME = 1e-6
 STATUS = {"stick": STICK, "slip": SLIP, "open": OPEN}
 
 
@@ -130,9 +132,19 @@ def expand(case: Case, choice: Choice, nodes: Array) -> Shape:
     columns = np.column_stack([choice.rest, np.moveaxis(choice.coefficients, 1, 0).reshape(n, -1)])
     if case.reduction is not None:
         with reduction_of(case, case.reduction, MPI.COMM_SELF) as reduction:
+            _check_same(choice, reduction, case)
             columns = reduction.expand(columns)
     whole = columns[:, 1:].reshape(len(nodes), 3, n_points, m)
     return Shape(nodes, columns[:, 0].reshape(-1, 3), np.moveaxis(whole, 2, 0), choice.basis())
+
+
+def _check_same(choice: Choice, reduction: Any, case: Case) -> None:
+    """The last component mode tells whether this is the run's model: a builder may read what a case cannot tell."""
+    then, now = choice.highest_component_hz, reduction.component_hz[-1:].sum()
+    if reduction.size != len(choice.rest) or abs(now - then) > SAME * then:
+        found = f"{reduction.size} coordinates, highest component mode {now:.9g} Hz"
+        expected = f"{len(choice.rest)} coordinates, {then:.9g} Hz, as in the run"
+        raise InputError("the model is no longer that of the run", display(case.path), found, expected, "run it again")
 
 
 def write_grid(path: Path, shape: Shape, cells: tuple[IntArray, int], choice: Choice, scale: float) -> None:

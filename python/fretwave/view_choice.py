@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -83,6 +84,7 @@ class Choice:
         Numbers of the contacts' samples at which the motion is shown.
     phases : (n_phases,) [rad]
     contacts : histories per point, by the contact's name
+    highest_component_hz : of the run's reduction, 0 without component modes
     """
 
     name: str
@@ -95,6 +97,7 @@ class Choice:
     samples: IntArray
     phases: Array
     contacts: dict[str, list[ContactHistory]]
+    highest_component_hz: float = 0.0
 
     @property
     def times(self) -> Array:
@@ -144,6 +147,7 @@ def read_choice(file: Any, folder: Path, case: Case, options: ViewOptions) -> Ch
         samples=samples,
         phases=2 * np.pi * samples / count,
         contacts=_contacts(group, case, name, rows),
+        highest_component_hz=json.loads(group.attrs.get("reduction", "{}")).get("highest_component_hz", 0.0),
     )
 
 

@@ -32,7 +32,8 @@ _CORNERS = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1
 class GridFile:
     """An unstructured grid over steps; the file takes its place when all is written (``with``).
 
-    First every part by `part`, then fields. Arrays may come in pieces: no more than a piece is in memory at once.
+    First every part by `part`, then fields, whose arrays may come in pieces: no more than a part, or a piece, is in
+    memory at once. A wheel is its sectors one after the other, turned as they are written.
 
     Parameters
     ----------
