@@ -86,8 +86,13 @@ def resume_run(folder: Path, comm: Any, plots: bool = True) -> int:
     return _Runner(case, options, folder, record, comm, resuming=True).run()
 
 
-def reload_case(folder: Path) -> tuple[Case, dict[str, Any]]:
+def reload_case(folder: Path, kept: bool = False) -> tuple[Case, dict[str, Any]]:
     """The case of a run and its record. One rank only.
+
+    Parameters
+    ----------
+    kept : bool
+        Read the copy in the folder, as the run did: then only the model can have changed.
 
     Raises
     ------
@@ -97,7 +102,7 @@ def reload_case(folder: Path) -> tuple[Case, dict[str, Any]]:
     record = read_record(folder)
     given = record["case"]
     path = Path(given["path"])
-    text = None if path.exists() else (folder / CASE_COPY).read_text(encoding="utf-8")
+    text = None if path.exists() and not kept else (folder / CASE_COPY).read_text(encoding="utf-8")
     case = load_case(path, given["overrides"], given["quick"], text=text)
     changed = changed_keys(given["resolved"], case.resolved)
     if changed:

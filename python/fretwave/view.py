@@ -29,7 +29,7 @@ from .results import open_results
 from .run import reload_case
 from .source import display
 from .view_choice import Choice, ViewOptions, read_choice
-from .vtkhdf import HEXAHEDRON, TRIQUADRATIC_HEXAHEDRON, VERTEX, GridFile, linear_cells
+from .vtkhdf import HEXAHEDRON, QUADRATIC_HEXAHEDRON, TRIQUADRATIC_HEXAHEDRON, VERTEX, GridFile, linear_cells
 
 Array = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.intp]
@@ -80,7 +80,7 @@ def view_run(folder: Path, options: ViewOptions, say: Callable[[str], None] = pr
     InputError
         The folder holds no run, its case has changed, the model has no nodes, or there is no such analysis or point.
     """
-    case, _ = reload_case(folder)
+    case, _ = reload_case(folder, kept=True)
     nodes, cells = mesh_of(case, options.linear)
     with open_results(folder / "results.h5") as file:
         choice = read_choice(file, folder, case, options)
@@ -121,7 +121,10 @@ def mesh_of(case: Case, linear: bool = False) -> tuple[Array, tuple[IntArray, in
         return built.coordinates, (np.arange(len(built.coordinates))[:, None], VERTEX)
     if cells.shape[1] == 27 and linear:
         return built.coordinates, (linear_cells(cells, VTK_LATTICE), HEXAHEDRON)
-    return built.coordinates, (cells, {8: HEXAHEDRON, 27: TRIQUADRATIC_HEXAHEDRON}[cells.shape[1]])
+    return built.coordinates, (
+        cells,
+        {8: HEXAHEDRON, 20: QUADRATIC_HEXAHEDRON, 27: TRIQUADRATIC_HEXAHEDRON}[cells.shape[1]],
+    )
 
 
 def expand(case: Case, choice: Choice, nodes: Array) -> Shape:
@@ -134,6 +137,8 @@ def expand(case: Case, choice: Choice, nodes: Array) -> Shape:
         with reduction_of(case, case.reduction, MPI.COMM_SELF) as reduction:
             _check_same(choice, reduction, case)
             columns = reduction.expand(columns)
+    if case.built is not None and case.built.displacements is not None:  # held dofs, -1, read the row of zeros
+        columns = np.vstack([columns, np.zeros(columns.shape[1])])[case.built.displacements.ravel()]
     whole = columns[:, 1:].reshape(len(nodes), 3, n_points, m)
     return Shape(nodes, columns[:, 0].reshape(-1, 3), np.moveaxis(whole, 2, 0), choice.basis())
 

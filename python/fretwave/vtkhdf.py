@@ -20,11 +20,11 @@ from .errors import InputError
 from .source import display
 
 #: VTK's numbers of cell types by name (vtkCellType.h).
-VERTEX, HEXAHEDRON, TRIQUADRATIC_HEXAHEDRON = 1, 12, 29
+VERTEX, HEXAHEDRON, QUADRATIC_HEXAHEDRON, TRIQUADRATIC_HEXAHEDRON = 1, 12, 25, 29
 #: The lowest version with steps: any reader of a later 2.x takes it.
 VERSION = (2, 0)
-#: Rows of one HDF5 chunk: some 100 kB of vectors, so that a step is read without its neighbours.
-CHUNK_ROWS = 4096
+#: Rows of one HDF5 chunk: a step of a small grid, some 100 kB of vectors of a large one.
+CHUNK_ROWS = (256, 4096)
 #: Corners of a hexahedron in VTK's order on the lattice {0, 1}^3.
 _CORNERS = ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1))
 
@@ -112,7 +112,8 @@ class GridFile:
         data, rows = None, 0
         for piece in pieces:
             if data is None:
-                data = self._table(self._root["PointData"], name, piece.shape[1] if piece.ndim == 2 else 0, dtype)
+                columns = piece.shape[1] if piece.ndim == 2 else 0
+                data = self._table(self._root["PointData"], name, columns, dtype, self.n_points)
             _append(data, piece)
             rows += len(piece)
         shown = np.zeros(self.steps, dtype="i8") if of_step is None else np.asarray(of_step, dtype="i8")
@@ -139,10 +140,11 @@ class GridFile:
             self._unfinished.unlink(missing_ok=True)
 
     @staticmethod
-    def _table(group: Any, name: str, columns: int, dtype: str) -> Any:
-        """An empty dataset that grows by rows; `columns` 0 for one number a row."""
+    def _table(group: Any, name: str, columns: int, dtype: str, rows: int = 0) -> Any:
+        """An empty dataset that grows, often by so many rows; `columns` 0 for one number a row."""
         tail = (columns,) if columns else ()
-        return group.create_dataset(name, (0, *tail), dtype, maxshape=(None, *tail), chunks=(CHUNK_ROWS, *tail))
+        chunk = min(max(rows, CHUNK_ROWS[0]), CHUNK_ROWS[1])
+        return group.create_dataset(name, (0, *tail), dtype, maxshape=(None, *tail), chunks=(chunk, *tail))
 
 
 def linear_cells(triquadratic: npt.NDArray[Any], lattice: Sequence[tuple[int, int, int]]) -> npt.NDArray[np.int64]:
