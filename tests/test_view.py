@@ -65,6 +65,16 @@ samples = 128
 normalise = "tip"
 amplitude = [2e-7, 2.2e-6]
 report_at = [1e-6, 2e-6]
+
+[[analysis]]
+name = "forced"
+type = "forced"
+harmonics = 3
+samples = 64
+observe = "tip"
+force = { tip = 0.05 }
+frequency = [205.0, 220.0]
+levels = [1.0]
 """
 METHODS = ["mode", "periodic"]
 #: Newton's rest, relative to the largest force of the fundamental.
@@ -303,10 +313,27 @@ def test_points_follow_each_other_on_one_grid(run: Path, tmp_path: Path, capfd) 
         assert found["warp"] == pytest.approx(100 * moved, rel=1e-6, abs=1e-12)
 
 
+def test_every_solved_point_can_be_shown(run: Path, tmp_path: Path, capfd) -> None:
+    """Without its contacts where their motion is not kept; a forced response at its peak."""
+    out = tmp_path / "any.vtkhdf"
+    assert call("view", str(run), "--out", str(out)) == 0
+    assert out.with_name("any_contact.vtkhdf").exists()
+    assert call("view", str(run), "--point", "1", "--out", str(out)) == 0
+    assert "not kept at point 1" in capfd.readouterr().out
+    assert read_step(out, 0)["point"] == 1 and not out.with_name("any_contact.vtkhdf").exists()
+    assert call("view", str(run), "--analysis", "forced", "--out", str(out)) == 0
+    with h5py.File(run / "results.h5") as file:
+        amplitude = file["forced/points/amplitude"][()]
+    peak, found = int(np.argmax(amplitude)), read_step(out, 5)
+    assert 0 < peak < len(amplitude) - 1 and found["point"] == peak
+    q = found["harmonic_1_real"] + 1j * found["harmonic_1_imag"]
+    assert abs(q[-1, 1]) == pytest.approx(amplitude[peak], rel=1e-9)
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["--point", "1"], "point is not kept"),
+        (["--point", "999"], "there is no such point"),
         (["--amplitude", "3e-6"], "does not reach"),
         (["--analysis", "modes"], "did you mean `mode`?"),
         (["--scale", "large"], "the scale is no number"),

@@ -144,7 +144,7 @@ def _add_import(commands: Any) -> None:
     add.add_argument("--damping", metavar="FILE", help="viscous damping matrix")
     add.add_argument("--symmetric", choices=("auto", "lower", "upper", "full"), default="auto", help="what files hold")
     add.add_argument("--dofs", type=Path, metavar="FILE", help="node and direction of each row (.dof, or CSV)")
-    add.add_argument("--coordinates", type=Path, metavar="FILE", help="nodes and sets: CSV, .npz or input deck")
+    add.add_argument("--coordinates", type=Path, metavar="FILE", help="nodes, sets and cells: CSV, .npz or input deck")
     add.add_argument(
         "--pairs",
         nargs="+",

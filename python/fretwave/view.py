@@ -95,13 +95,14 @@ def view_run(folder: Path, options: ViewOptions, say: Callable[[str], None] = pr
     for name in choice.contacts:
         if name not in placed:
             say(f"contact '{name}' is not shown: the model has no places of its pairs")
-    written = [out]
+    pairs = out.with_name(f"{out.stem}_contact{out.suffix}")
     if placed:
-        written.append(out.with_name(f"{out.stem}_contact{out.suffix}"))
-        write_pairs(written[1], shape, placed, choice, scale)
-        say(f"{display(written[1])}: {sum(contact.n_pairs for contact in placed.values())} contact pairs")
+        write_pairs(pairs, shape, placed, choice, scale)
+        say(f"{display(pairs)}: {sum(contact.n_pairs for contact in placed.values())} contact pairs")
+    else:
+        pairs.unlink(missing_ok=True)  # of another point
     say(f"ParaView (5.12 or later): 'Warp By Vector' with the field warp draws displacements {scale:g} times as large")
-    return written
+    return [out, pairs] if placed else [out]
 
 
 def mesh_of(case: Case, linear: bool = False) -> tuple[Array, tuple[IntArray, int]]:

@@ -83,7 +83,8 @@ class Choice:
     samples : (n_phases,)
         Numbers of the contacts' samples at which the motion is shown.
     phases : (n_phases,) [rad]
-    contacts : histories per point, by the contact's name
+    contacts : histories per point, by the contact's name; none unless every point keeps them
+    without : points that do not keep the motion of their contacts
     highest_component_hz : of the run's reduction, 0 without component modes
     """
 
@@ -97,6 +98,7 @@ class Choice:
     samples: IntArray
     phases: Array
     contacts: dict[str, list[ContactHistory]]
+    without: list[int]
     highest_component_hz: float = 0.0
 
     @property
@@ -119,6 +121,9 @@ class Choice:
         for row, (point, asked) in enumerate(zip(self.points, self.asked)):
             amplitude, frequency = self.states["amplitude"][row], self.states["frequency_hz"][row]
             yield f"{self.name}: point {point}, amplitude {amplitude:.6g} m, {frequency:.6g} Hz{asked}"
+        if self.without:
+            numbers = ", ".join(str(point) for point in self.without)
+            yield f"{self.name}: no contact pairs are shown: their motion is not kept at point {numbers}"
 
 
 def read_choice(file: Any, folder: Path, case: Case, options: ViewOptions) -> Choice:
@@ -131,11 +136,14 @@ def read_choice(file: Any, folder: Path, case: Case, options: ViewOptions) -> Ch
     """
     group = file[_analysis(file, folder, case, options.analysis)]
     name = group.name.strip("/")
-    kept = _kept(group)
-    chosen = _points(group, kept, options, f"analysis '{name}' in {display(folder)}")
+    held = _held(group)
+    # A mode is shown where its contacts are kept; a response is sought at its peaks, where they are not.
+    offered = held if group.attrs["type"] == "mode" and len(held) else np.arange(len(group["coefficients"]))
+    chosen = _points(group, offered, options, f"analysis '{name}' in {display(folder)}")
     count = int(group.attrs["samples"])
     samples = np.unique(np.arange(options.phases) * count // options.phases)
     rows = [row for row, _ in chosen]
+    without = [row for row in rows if row not in held]
     return Choice(
         name=name,
         points=rows,
@@ -146,7 +154,8 @@ def read_choice(file: Any, folder: Path, case: Case, options: ViewOptions) -> Ch
         rest=group["rest_displacement"][()] if "rest_displacement" in group else np.zeros(len(group["dof"])),
         samples=samples,
         phases=2 * np.pi * samples / count,
-        contacts=_contacts(group, case, name, rows),
+        contacts={} if without else _contacts(group, case, name, rows),
+        without=without,
         highest_component_hz=json.loads(group.attrs.get("reduction", "{}")).get("highest_component_hz", 0.0),
     )
 
@@ -167,19 +176,24 @@ def _analysis(file: Any, folder: Path, case: Case, asked: str | None) -> str:
     )
 
 
-def _kept(group: Any) -> IntArray:
+def _held(group: Any) -> IntArray:
     """Points of which all is kept: where there are contacts, those at which their motion is."""
     with_contacts = any(name.startswith("contact_") for name in group)
     return np.asarray(group["reported"][()] if with_contacts else np.arange(len(group["coefficients"])), dtype=np.intp)
 
 
 def _points(group: Any, kept: IntArray, options: ViewOptions, where: str) -> list[tuple[int, str]]:
-    """Numbers of points, each with a word on what was asked for; without a wish that of the largest amplitude."""
+    """Numbers of points, each with a word on what was asked for; without a wish that of the largest amplitude.
+
+    Parameters
+    ----------
+    kept : points that an amplitude may choose
+    """
     amplitude = group["points/amplitude"][()]
     for point in options.points:
-        if point not in kept:
-            near = kept[np.argsort(np.abs(kept - point))[0]]
-            raise _not_kept("this point is not kept with its contacts", where, f"point {point}", kept, amplitude, near)
+        if not 0 <= point < len(amplitude):
+            near = kept[np.argmin(np.abs(kept - point))]
+            raise _not_kept("there is no such point", where, f"point {point}", kept, amplitude, near)
     chosen = [(int(point), "") for point in options.points]
     for asked in options.amplitudes:
         near = kept[np.argmin(np.abs(amplitude[kept] - asked))]
@@ -195,8 +209,8 @@ def _not_kept(what: str, where: str, measured: str, kept: IntArray, amplitude: A
     begin = max(0, min(place - NAMED // 2, len(kept) - NAMED))
     named = ", ".join(f"{point} ({amplitude[point]:.4g} m)" for point in kept[begin : begin + NAMED])
     more = f" ({len(kept)} in all)" if len(kept) > NAMED else ""
-    expected = f"one of the points {named}{more}"
-    return InputError(what, where, measured, expected, f"--point {near}, or `report_at` in the case keeps others")
+    expected = f"a point from 0 to {len(amplitude) - 1}, best one of {named}{more}"
+    return InputError(what, where, measured, expected, f"--point {near}")
 
 
 def _contacts(group: Any, case: Case, name: str, rows: Sequence[int]) -> dict[str, list[ContactHistory]]:
