@@ -111,13 +111,22 @@ def test_slope_of_the_damping_decides_also_on_a_falling_branch() -> None:
 def test_same_numbers_on_two_ranks(run: Path, tmp_path: Path, launch) -> None:
     done = launch(2, "-m", "fretwave", *ARGUMENTS, "--out", str(tmp_path), timeout=300)
     assert done.returncode == 0, done.stderr
-    for name, keys in {
-        "mode": ("amplitude", "omega", "omega0"),
-        "mode_epmc": ("amplitude", "omega", "zeta"),
-        "forced": ("omega", "amplitude"),
-    }.items():
+    for name, keys in {"mode": ("omega", "omega0"), "mode_epmc": ("omega", "zeta"), "forced": ("amplitude",)}.items():
+        assert len(column(run, name, "point")) == len(column(tmp_path, name, "point"))
         for key in keys:
-            assert np.allclose(column(run, name, key), column(tmp_path, name, key), rtol=RANK_TOLERANCE, atol=0), key
+            one, two = (at_given(folder, name, key) for folder in (run, tmp_path))
+            assert len(one) >= 2
+            assert np.allclose(one, two, rtol=RANK_TOLERANCE, atol=0), key
+
+
+def at_given(folder: Path, name: str, key: str) -> np.ndarray:
+    """A column at the amplitudes or frequencies that the case asks for.
+
+    Points between them lie where steps of arclength happen to end: rounding moves them along the branch.
+    """
+    with open(folder / f"{name}.csv", newline="") as file:
+        rows = csv.DictReader(file)
+        return np.array([float(row[key]) for row in rows if row["event"] in ("start", "report", "stop")])
 
 
 def test_rerun_of_one_analysis_keeps_the_others(run: Path) -> None:

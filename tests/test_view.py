@@ -392,7 +392,7 @@ def test_cells_of_a_built_model(skewed: fe.Mesh) -> None:
     """Triquadratic as they are or cut in eight; without cells the nodes are points."""
     n, cells = skewed.n_dof, skewed.vtk_cells
     model = fw.BuiltModel(sp.identity(n, format="csr"), sp.identity(n, format="csr"), coordinates=skewed.nodes)
-    case = SimpleNamespace(built=model, path=Path("case.toml"))
+    case = SimpleNamespace(built=model, neighbours=None, path=Path("case.toml"))
     assert (mesh_of(case)[1][0].shape, mesh_of(case)[1][1]) == ((n // 3, 1), VERTEX)
     model.hexahedra = cells
     assert model.complaint() is None and mesh_of(case)[1][1] == TRIQUADRATIC_HEXAHEDRON
@@ -403,6 +403,9 @@ def test_cells_of_a_built_model(skewed: fe.Mesh) -> None:
     assert "(2, 19), not (n_cells, 8, 20 or 27)" in model.complaint()
     model.hexahedra = cells + 1
     assert f"nodes 1 to {n // 3} of {n // 3}" in model.complaint()
+    case.neighbours = SimpleNamespace(sectors=24)
+    with pytest.raises(InputError, match="sectors of wheels"):
+        mesh_of(case)
 
 
 IMPORTED = """

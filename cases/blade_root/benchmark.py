@@ -138,9 +138,11 @@ def one_grid(options: argparse.Namespace) -> None:
     seconds, newton, gmres = cost(rows)
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
     slip = max(row["slip"] for row in rows)
-    print(f"{options.only} pairs: {case.reduced.unreduced} dofs reduced to {model.n_dof} in {ready:.1f} s; {len(rows)} points "
-          f"to {100 * slip:.0f} % slip, {seconds:.2f} s a point in slip, {newton:.1f} Newton steps, at most {gmres:.1f} GMRES "
-          f"iterations a step, peak memory {memory:.2f} GB")  # fmt: skip
+    print(
+        f"{options.only} pairs: {case.reduced.unreduced} dofs reduced to {model.n_dof} in {ready:.1f} s;"
+        f" {len(rows)} points to {100 * slip:.0f} % slip, {seconds:.2f} s a point in slip, {newton:.1f} Newton steps,"
+        f" at most {gmres:.1f} GMRES a step, peak memory {memory:.2f} GB"
+    )
     print(options.only, seconds, memory)
 
 
@@ -151,7 +153,7 @@ def ranks(options: argparse.Namespace) -> None:
     began = time.perf_counter()
     rows = branch(model, dof, "krylov", 7, options)
     wall = COMM.allreduce(time.perf_counter() - began, MPI.MAX)
-    say(f"{COMM.size} ranks: {len(rows)} points, {wall:.2f} s wall, {cost(rows)[0]:.3f} s processor time a point in slip")
+    say(f"{COMM.size} ranks: {len(rows)} points, {wall:.2f} s wall, {cost(rows)[0]:.3f} s processor time a point")
     for amplitude, row in reported(rows).items():
         say(f"  a {amplitude:.6g}  omega {row['omega']:.14g}  beta {row['beta']:.14g}")
 

@@ -63,7 +63,7 @@ void bind_model(nb::module_& m) {
   using Contacts = std::vector<std::tuple<std::string, Maps, std::shared_ptr<contact::Law>>>;
   nb::class_<Model>(m, "Model")
       .def("__init__",
-           [](Model* self, Terms const& terms, Contacts const& contacts, double theta) {
+           [](Model* self, Terms const& terms, Contacts const& contacts, double theta, PetscInt unit) {
              std::vector<model::Term> linear;
              std::vector<model::Contact> groups;
              for (auto const& [A, order, phase] : terms)
@@ -74,7 +74,7 @@ void bind_model(nb::module_& m) {
                  groups.back().ahead.push_back(
                      {MatHandle::share(std::get<0>(maps[k]).object), std::get<1>(maps[k])});
              }
-             new (self) Model(std::move(linear), std::move(groups), theta);
+             new (self) Model(std::move(linear), std::move(groups), theta, unit);
            })
       .def_prop_ro("dofs", &Model::dofs)
       .def_prop_ro("local_dofs", &Model::local_dofs)

@@ -108,6 +108,9 @@ def view_run(folder: Path, options: ViewOptions, say: Callable[[str], None] = pr
 def mesh_of(case: Case, linear: bool = False) -> tuple[Array, tuple[IntArray, int]]:
     """Nodes (n_nodes, 3), and cells (n_cells, m) with VTK's number of their kind; points where there are no cells."""
     built = case.built
+    if case.neighbours is not None:
+        found, fix = f"a sector of {case.neighbours.sectors}", "`fretwave plot` draws its curves"
+        raise InputError("sectors of wheels cannot be viewed yet", display(case.path), found, "a whole structure", fix)
     if built is None or built.coordinates is None:
         matrices = "only matrices" if built is None else "no coordinates of nodes with three displacements each"
         raise InputError(

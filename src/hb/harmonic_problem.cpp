@@ -4,6 +4,7 @@
 
 #include "error.h"
 #include "hb/harmonic_pc.h"
+#include "hb/wheel_pc.h"
 
 namespace fretwave::hb {
 
@@ -231,7 +232,9 @@ std::vector<PairTangents> HarmonicProblem::pair_tangents(Vec y) {
 
 std::unique_ptr<solve::Preconditioner> HarmonicProblem::preconditioner() {
   constexpr PetscInt largest_dense = 3000;  // dofs: a complex factor of 144 MB a harmonic
-  if (harmonics().fundamental() < 0 || model().dofs() > largest_dense || unfoldings()) return nullptr;
+  if (harmonics().fundamental() < 0) return nullptr;
+  if (model().unit()) return std::make_unique<WheelPreconditioner>(*this);
+  if (model().dofs() > largest_dense || unfoldings()) return nullptr;
   return std::make_unique<HarmonicPreconditioner>(*this);
 }
 

@@ -47,6 +47,8 @@ class HarmonicProblem : public solve::Problem {
   void unfold(Vec re, Vec im);
   /// tau, as shares of the inertia force k_ref a of a unit motion; none if not unfolded. Collective.
   std::vector<double> unfolding(Vec y);
+  /// M phi on the fundamental, real and imaginary part, of unit length; none if not unfolded.
+  std::vector<VecHandle> const& unfolding_vectors() const { return unfold_; }
   /// Physical coefficients Q as harmonic blocks. Collective.
   VecHandle coefficients(Vec y);
   /// (scalars z, fundamental coefficients of the chosen dof in q, tau): on every rank. Collective.
@@ -89,7 +91,7 @@ class HarmonicProblem : public solve::Problem {
   PetscInt dof_, local_block_;
   double stiffness_;
   VecHandle q_, Q_, dQ_, R_, dR_, excitation_, static_, static_load_, last_;
-  std::vector<VecHandle> unfold_;  ///< M phi on the fundamental, real and imaginary part, unit length
+  std::vector<VecHandle> unfold_;
   bool linearised_ = false;
   std::vector<double> z_;
   ScaledMotion motion_;

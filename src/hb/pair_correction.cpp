@@ -28,7 +28,7 @@ void for_entries(Harmonics const& h, int d, Rotation const* blocks, Visit visit)
 
 }  // namespace
 
-std::vector<Rotation> harmonic_tangents(Harmonics const& h, int d, double const* D) {
+std::vector<Rotation> harmonic_tangents(Harmonics const& h, int d, double const* D, bool real_fundamental) {
   const size_t m = h.block_size(), ld = d * m;
   std::vector<Rotation> out;
   for (int i = 0; i < h.count(); ++i)
@@ -40,7 +40,7 @@ std::vector<Rotation> harmonic_tangents(Harmonics const& h, int d, double const*
           continue;
         }
         const Rotation exact{at[0], at[1], at[ld], at[ld + 1]};
-        out.push_back(i == h.fundamental() ? exact : Rotation::of(exact.nearest()));
+        out.push_back(real_fundamental && i == h.fundamental() ? exact : Rotation::of(exact.nearest()));
       }
   return out;
 }

@@ -5,8 +5,10 @@
 namespace fretwave::hb {
 
 /// What harmonic blocks hold of one pair's linearised contact: per harmonic, component row and column, the
-/// coupling of the harmonic with itself. The fundamental's is exact, the others' the nearest complex factor.
-std::vector<Rotation> harmonic_tangents(Harmonics const&, int components, double const* D);
+/// coupling of the harmonic with itself: the nearest complex factor, or the fundamental's real 2x2 block as
+/// it is.
+std::vector<Rotation> harmonic_tangents(Harmonics const&, int components, double const* D,
+                                        bool real_fundamental);
 
 /// The rest, D - (harmonic tangents), is eliminated pair by pair by Woodbury's formula with the compliance G
 /// of the pair alone: J^-1 ~ P^-1 - P^-1 B^T E B P^-1, E = dD (I + G dD)^-1. Without it slipping pairs, whose

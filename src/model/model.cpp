@@ -34,8 +34,8 @@ void check_map(Contact const& contact, Mat B, PetscInt local, PetscInt global) {
 
 }  // namespace
 
-Model::Model(std::vector<Term> terms, std::vector<Contact> contacts, double theta)
-    : terms_(std::move(terms)), contacts_(std::move(contacts)), theta_(theta) {
+Model::Model(std::vector<Term> terms, std::vector<Contact> contacts, double theta, PetscInt unit)
+    : terms_(std::move(terms)), contacts_(std::move(contacts)), unit_(unit), theta_(theta) {
   if (terms_.empty())
     throw InputError("a model needs at least one linear term", "none", "K and M",
                      "give the stiffness and mass matrices");

@@ -38,7 +38,7 @@ class Model {
  public:
   /// Collective. Terms share one row layout; each contact has its law's pairs as local rows of B. InputError
   /// otherwise.
-  Model(std::vector<Term> terms, std::vector<Contact> contacts, double theta = 0);
+  Model(std::vector<Term> terms, std::vector<Contact> contacts, double theta = 0, PetscInt unit = 0);
   Model(Model const&) = delete;
   MPI_Comm comm() const { return comm_; }
   PetscInt local_dofs() const { return local_; }
@@ -46,6 +46,8 @@ class Model {
   PetscInt first_dof() const { return first_; }
   /// Angle between the motions of neighbouring sectors at harmonic 1, 2 pi ND / N (DESIGN section 3).
   double theta() const { return theta_; }
+  /// Dofs of one sector of a whole wheel, whose sectors follow one another; 0: not a wheel.
+  PetscInt unit() const { return unit_; }
   std::vector<Term> const& terms() const { return terms_; }
   std::vector<Contact> const& contacts() const { return contacts_; }
   /// Sum of all terms of one order with no phase; empty handle if there is none.
@@ -61,7 +63,7 @@ class Model {
   std::vector<Term> terms_;
   std::vector<Contact> contacts_;
   MPI_Comm comm_ = MPI_COMM_NULL;
-  PetscInt local_ = 0, global_ = 0, first_ = 0;
+  PetscInt local_ = 0, global_ = 0, first_ = 0, unit_ = 0;
   double theta_ = 0;
 };
 
