@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -58,6 +59,24 @@ def test_what_goes_in_comes_out(path: Path) -> None:
     assert (was.contacts["root"].B != found.contacts["root"].B).nnz == 0
     assert (found.names, found.units, found.sources) == (was.names, was.units, was.sources)
     assert not path.with_name("bar.h5.unfinished").exists()
+
+
+@pytest.mark.ranks(1)
+def test_grid_of_a_model_with_held_nodes(tmp_path: Path) -> None:
+    """Without the dofs of node 1, and rows in another order: each node's own dofs are found, -1 for the held ones."""
+    whole = model_of_a_bar()
+    rows = np.random.default_rng(3).permutation(np.arange(3, whole.size))
+    parts = dict(node=whole.node[rows], direction=whole.direction[rows], node_numbers=whole.node_numbers)
+    cells = np.array([[0, 4, 6, 2, 1, 5, 7, 3]])
+    names = [whole.names[row] for row in rows]
+    kept = FileModel(whole.M[rows][:, rows], whole.K[rows][:, rows], None, names, **parts, coordinates=BAR.nodes)
+    model_file.write(tmp_path / "m.h5", replace(kept, hexahedra=cells))
+    built = model_file.read(tmp_path / "m.h5").built()
+    assert built.complaint() is None and built.hexahedra.tolist() == cells.tolist()
+    assert built.displacements[0].tolist() == [-1, -1, -1]
+    np.testing.assert_array_equal(rows[built.displacements[1:]], np.arange(3, whole.size).reshape(-1, 3))
+    with pytest.raises(fw.InputError, match="a node of a cell does not exist"):
+        model_file.write(tmp_path / "m.h5", replace(kept, hexahedra=cells + len(BAR.nodes)))
 
 
 @pytest.mark.ranks(1)

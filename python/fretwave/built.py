@@ -79,8 +79,10 @@ class BuiltModel:
     loads : dict
         Static loads (n_dof,) [N] by the names that ``[preload]`` takes up.
     coordinates : (n_nodes, 3), optional
-        Nodes [m], with dof = 3 * node + axis, for pictures and resultants.
-    hexahedra : (n_cells, 8 or 27), optional
+        Nodes [m], for pictures and resultants.
+    displacements : (n_nodes, 3), optional
+        Dof of each node along x, y and z, -1 where it is held; without it 3 * node + axis.
+    hexahedra : (n_cells, 8, 20 or 27), optional
         Nodes of the cells in VTK's order, for pictures.
     sectors : int, optional
         The model is one sector of a wheel of this many.
@@ -97,6 +99,7 @@ class BuiltModel:
     contacts: Mapping[str, BuiltContact] = field(default_factory=dict)
     loads: Mapping[str, Array] = field(default_factory=dict)
     coordinates: Optional[Array] = None
+    displacements: Optional[npt.NDArray[np.intp]] = None
     hexahedra: Optional[npt.NDArray[np.intp]] = None
     sectors: Optional[int] = None
     low: Optional[npt.NDArray[np.intp]] = None
@@ -116,9 +119,27 @@ class BuiltModel:
         for name, load in self.loads.items():
             if np.shape(load) != (n,):
                 return f"load '{name}' has the shape {np.shape(load)}, not ({n},)"
-        if self.coordinates is not None and np.shape(self.coordinates) != (n // 3, 3):
-            return f"coordinates have the shape {np.shape(self.coordinates)}, not ({n // 3}, 3)"
-        return next((text for text in (_wrong(c, name, n) for name, c in self.contacts.items()) if text), None)
+        return self._wrong_grid() or next(
+            (text for text in (_wrong(c, name, n) for name, c in self.contacts.items()) if text), None
+        )
+
+    def _wrong_grid(self) -> str | None:
+        """What does not fit in nodes and cells."""
+        if self.coordinates is None:
+            return None if self.hexahedra is None else "there are hexahedra, but no coordinates"
+        given = self.displacements
+        n = self.M.shape[0] // 3 if given is None else len(given)
+        if np.shape(self.coordinates) != (n, 3):
+            return f"coordinates have the shape {np.shape(self.coordinates)}, not ({n}, 3)"
+        if given is not None and (np.shape(given) != (n, 3) or np.max(given) >= self.M.shape[0]):
+            return f"displacements have the shape {np.shape(given)} and the largest dof {np.max(given)}"
+        cells = self.hexahedra
+        if cells is None:
+            return None
+        if np.ndim(cells) != 2 or np.shape(cells)[1] not in (8, 20, 27):
+            return f"hexahedra have the shape {np.shape(cells)}, not (n_cells, 8, 20 or 27)"
+        outside = not 0 <= np.min(cells) <= np.max(cells) < n
+        return f"hexahedra have the nodes {np.min(cells)} to {np.max(cells)} of {n}" if outside else None
 
 
 def _wrong(contact: BuiltContact, name: str, n_dof: int) -> str | None:

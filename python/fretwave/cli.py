@@ -77,6 +77,7 @@ def parser() -> argparse.ArgumentParser:
     plot.add_argument("folder", type=Path, metavar="RUNDIR", help="folder of the run")
     plot.add_argument("--only", type=_names, default=[], metavar="NAME,...", help="analyses or kinds of picture")
     plot.set_defaults(command=_plot)
+    _add_view(commands)
     _add_import(commands)
     commands.add_parser("study", help="error against run time of a case over harmonics, samples and tolerance")
     commands.add_parser("doctor", help="what is installed, whether it fits together, and what to do about it")
@@ -111,6 +112,25 @@ def _add_run(commands: Any) -> None:
     run.set_defaults(command=_run)
 
 
+def _add_view(commands: Any) -> None:
+    view = commands.add_parser(
+        "view",
+        help="write the motion over a period and the contact pairs for ParaView",
+        description="Writes <analysis>.vtkhdf, the mesh with its displacement at phases of the period, and"
+        " <analysis>_contact.vtkhdf, the contact pairs with forces, status and work. Several points follow each other.",
+    )
+    view.add_argument("folder", type=Path, metavar="RUNDIR", help="folder of the run")
+    view.add_argument("--analysis", metavar="NAME", help="mode or forced response (default: the first)")
+    which = view.add_mutually_exclusive_group()
+    which.add_argument("--point", type=int, nargs="+", default=[], metavar="N", help="points of the branch")
+    which.add_argument("--amplitude", type=float, nargs="+", default=[], metavar="A", help="nearest kept points [m]")
+    view.add_argument("--phases", type=int, default=32, metavar="N", help="steps of a period (default 32)")
+    view.add_argument("--scale", default="auto", metavar="X", help="enlargement in the field warp (default auto)")
+    view.add_argument("--linear", action="store_true", help="eight linear hexahedra for each triquadratic one")
+    view.add_argument("--out", type=Path, metavar="FILE.vtkhdf", help="file to write (default: in the run folder)")
+    view.set_defaults(command=_view)
+
+
 def _add_import(commands: Any) -> None:
     add = commands.add_parser(
         "import",
@@ -124,7 +144,7 @@ def _add_import(commands: Any) -> None:
     add.add_argument("--damping", metavar="FILE", help="viscous damping matrix")
     add.add_argument("--symmetric", choices=("auto", "lower", "upper", "full"), default="auto", help="what files hold")
     add.add_argument("--dofs", type=Path, metavar="FILE", help="node and direction of each row (.dof, or CSV)")
-    add.add_argument("--coordinates", type=Path, metavar="FILE", help="nodes and sets: CSV, .npz or input deck")
+    add.add_argument("--coordinates", type=Path, metavar="FILE", help="nodes, sets and cells: CSV, .npz or input deck")
     add.add_argument(
         "--pairs",
         nargs="+",
@@ -190,6 +210,25 @@ def _import(options: argparse.Namespace) -> int:
     from .importers.command import import_model
 
     return import_model(options, comm)
+
+
+def _view(options: argparse.Namespace) -> int:
+    comm = _world()
+    from .parallel import on_first_rank
+    from .view import view_run
+    from .view_choice import ViewOptions
+
+    chosen = ViewOptions.checked(
+        options.scale,
+        options.phases,
+        analysis=options.analysis,
+        points=options.point,
+        amplitudes=options.amplitude,
+        linear=options.linear,
+        out=options.out,
+    )
+    on_first_rank(comm, lambda: view_run(options.folder, chosen))
+    return EXIT_DONE
 
 
 def _show(options: argparse.Namespace) -> int:

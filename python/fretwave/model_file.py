@@ -16,6 +16,7 @@ place                      content
 ``/dofs/kept``             (n,) dofs that a reduction shall keep beside those of the contacts, optional
 ``/nodes/number``          (n_nodes,) node numbers, optional
 ``/nodes/coordinates``     (n_nodes, 3), optional, with ``number``
+``/cells/hexahedra``       (n_cells, 8 or 20) places in ``/nodes``, in the order of C3D8 and C3D20 (and VTK), optional
 ``/contacts/<name>/B``     CSR group as the matrices, (3 n_pairs, n_dof): u = B x, rows (normal, tangent, tangent) pair
                            by pair, u_n > 0 closes the contact
 ``/contacts/<name>/...``   ``positions`` (n_pairs, 3), ``areas`` (n_pairs,), ``frames`` (n_pairs, 3, 3) with rows normal
@@ -107,6 +108,8 @@ class FileModel:
     kept : (n,) or None
         Dofs a reduction shall keep beside those of the contacts.
     node_numbers, coordinates : (n_nodes,), (n_nodes, 3) or None
+    hexahedra : (n_cells, 8 or 20) or None
+        Rows of the nodes of each cell.
     contacts : dict of ContactMap by name
     """
 
@@ -119,6 +122,7 @@ class FileModel:
     kept: IntArray | None = None
     node_numbers: IntArray | None = None
     coordinates: Array | None = None
+    hexahedra: IntArray | None = None
     contacts: dict[str, ContactMap] = field(default_factory=dict)
     units: str = ""
     sources: list[SourceFile] = field(default_factory=list)
@@ -136,15 +140,21 @@ class FileModel:
             for name, c in self.contacts.items()
         }
         kept = {self.names[dof]: int(dof) for dof in (() if self.kept is None else self.kept)}
-        return BuiltModel(self.M, self.K, self.C, kept, contacts, coordinates=self._grid())
+        grid: dict[str, Any] = {}
+        if self.coordinates is not None and self.node is not None:
+            grid = dict(coordinates=self.coordinates, displacements=self._displacements(), hexahedra=self.hexahedra)
+        return BuiltModel(self.M, self.K, self.C, kept, contacts, **grid)
 
-    def _grid(self) -> Array | None:
-        """Coordinates when every node has three dofs and they stand node by node, as pictures want it."""
-        if self.coordinates is None or self.node is None or self.direction is None or self.node_numbers is None:
-            return None
-        whole = np.array_equal(self.node, np.repeat(self.node_numbers, 3))
-        whole = whole and np.array_equal(self.direction, np.tile([1, 2, 3], len(self.node_numbers)))
-        return self.coordinates if whole else None
+    def _displacements(self) -> IntArray:
+        """Dof (n_nodes, 3) of each node along x, y and z, -1 where the matrices have none: it is held."""
+        assert self.node is not None and self.direction is not None and self.node_numbers is not None
+        order = np.argsort(self.node_numbers)
+        place = np.clip(np.searchsorted(self.node_numbers, self.node, sorter=order), 0, len(order) - 1)
+        rows, dofs = order[place], np.arange(self.size)
+        shown = (self.node_numbers[rows] == self.node) & (self.direction <= 3)
+        found = np.full((len(order), 3), -1, dtype=np.int64)
+        found[rows[shown], self.direction[shown] - 1] = dofs[shown]
+        return found
 
 
 def dof_name(node: int, direction: int) -> str:
@@ -195,7 +205,7 @@ def _write_parts(file: Any, model: FileModel) -> None:
         if getattr(model, letter) is not None:
             _write_sparse(file.create_group(letter), getattr(model, letter))
     file["dofs/name"] = np.array([name.encode() for name in model.names])
-    _write_arrays(file, dict(zip(_TABLES, _tables(model))))
+    _write_arrays(file, {table: getattr(model, name) for table, name in zip(_TABLES, _ARRAYS)})
     for name, contact in model.contacts.items():
         _write_sparse(file.create_group(f"contacts/{name}/B"), contact.B)
         _write_arrays(file[f"contacts/{name}"], {key: getattr(contact, key) for key in _PAIR_ARRAYS})
@@ -205,11 +215,8 @@ def _write_parts(file: Any, model: FileModel) -> None:
 
 
 _PAIR_ARRAYS = ("positions", "areas", "frames", "nodes")
-_TABLES = ("dofs/node", "dofs/direction", "dofs/kept", "nodes/number", "nodes/coordinates")
-
-
-def _tables(model: FileModel) -> list[Any]:
-    return [model.node, model.direction, model.kept, model.node_numbers, model.coordinates]
+_ARRAYS = ("node", "direction", "kept", "node_numbers", "coordinates", "hexahedra")
+_TABLES = ("dofs/node", "dofs/direction", "dofs/kept", "nodes/number", "nodes/coordinates", "cells/hexahedra")
 
 
 def _write_arrays(group: Any, arrays: Mapping[str, Any]) -> None:
@@ -287,7 +294,7 @@ def _read_parts(file: Any) -> FileModel:
     return FileModel(
         **matrices,
         names=[name.decode() for name in file["dofs/name"][()]],
-        **dict(zip(("node", "direction", "kept", "node_numbers", "coordinates"), (_array(file, t) for t in _TABLES))),
+        **dict(zip(_ARRAYS, (_array(file, table) for table in _TABLES))),
         contacts={name: _read_contact(name, group) for name, group in file.get("contacts", {}).items()},
         units=str(file.attrs.get("units", "")),
         sources=[SourceFile(a.decode(), b.decode(), int(c), d.decode()) for a, b, c, d in zip(*columns)],
@@ -323,6 +330,9 @@ def _check(model: FileModel, where: str) -> None:
     for name, values, length in _lengths(model):
         if values is not None and len(values) != length:
             raise wrong(f"{name} does not fit", f"{len(values)} values", length)
+    cells, nodes = model.hexahedra, 0 if model.node_numbers is None else len(model.node_numbers)
+    if cells is not None and cells.size and not 0 <= cells.min() <= cells.max() < nodes:
+        raise wrong("a node of a cell does not exist", f"{cells.min()} to {cells.max()}", f"0 to {nodes - 1}")
     if model.kept is not None and len(model.kept) and not 0 <= min(model.kept) <= max(model.kept) < n:
         raise wrong("a kept dof does not exist", f"{min(model.kept)} to {max(model.kept)}", f"0 to {n - 1}")
 

@@ -11,10 +11,11 @@ import numpy as np
 import scipy.sparse as sp
 
 from .contacts import ContactSpec, closed_contacts
-from .schema import AnalysisSection, ForcedAnalysis, ModeAnalysis
+from .schema import AnalysisSection, ForcedAnalysis, ModeAnalysis, ReductionSection
 
 if TYPE_CHECKING:
     from .casefile import Case
+    from .reduction import Reduction
 
 
 @dataclass(frozen=True)
@@ -95,19 +96,22 @@ def reduce_case(case: Case, comm: Any, modes: int | None = None) -> Case:
     """
     if case.reduction is None:
         return case
-    from .reduction import reduce
-
     began = time.perf_counter()
-    chosen = (
-        {"modes": case.reduction.modes, "highest_hz": case.reduction.up_to_hz} if modes is None else {"modes": modes}
-    )
-    with reduce(case.M, case.K, case.C, keep=np.array(case.keep), comm=comm, **chosen) as reduction:
+    with reduction_of(case, case.reduction, comm, modes) as reduction:
         small = _on(case, reduction)
         wall = time.perf_counter() - began
     return replace(small, reduced=_report(case, small, reduction.component_hz, wall, comm))
 
 
-def _on(case: Case, reduction: Any) -> Case:
+def reduction_of(case: Case, section: ReductionSection, comm: Any, modes: int | None = None) -> Reduction:
+    """The reduction that a section asks for; the same whenever and on whatever ranks it is made. Collective."""
+    from .reduction import reduce
+
+    chosen = {"modes": section.modes, "highest_hz": section.up_to_hz} if modes is None else {"modes": modes}
+    return reduce(case.M, case.K, case.C, keep=np.array(case.keep), comm=comm, **chosen)
+
+
+def _on(case: Case, reduction: Reduction) -> Case:
     """Matrices, contacts and loads in the reduced coordinates."""
     component_modes = reduction.size - len(case.keep)
     names = [case.dofs[k] for k in case.keep] + [f"component_{k + 1}" for k in range(component_modes)]

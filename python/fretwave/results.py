@@ -52,6 +52,8 @@ class AnalysisWriter:
         Called on every rank before the first row is written; may raise.
     file_attributes : mapping, optional
         Attributes of results.h5 itself.
+    arrays : mapping, optional
+        Arrays [m] of the group that are there from the first row on.
     """
 
     def __init__(
@@ -65,6 +67,7 @@ class AnalysisWriter:
         active: bool = True,
         before_first: Callable[[], None] = lambda: None,
         file_attributes: Mapping[str, Any] | None = None,
+        arrays: Mapping[str, Any] | None = None,
     ) -> None:
         self.folder, self.name, self.active = folder, name, active
         self.columns = columns_named(columns)
@@ -74,7 +77,7 @@ class AnalysisWriter:
         self._sequence = 0
         self._dofs, self._labels = list(dofs), list(labels)
         self._before_first = before_first
-        self._file_attributes = dict(file_attributes or {})
+        self._file_attributes, self._arrays = dict(file_attributes or {}), dict(arrays or {})
         self._file: Any = None
         self._table: Any = None
         self._data: list[tuple[Column, Any]] = []
@@ -172,6 +175,8 @@ class AnalysisWriter:
         for column in self.columns[1:]:
             points[column.name].dims[0].attach_scale(points[self.columns[0].name])
         self._create_coefficients(group)
+        for name, values in self._arrays.items():
+            group.create_dataset(name, data=values).attrs["units"] = "m"
         group.create_dataset("reported", (0,), "i8", maxshape=(None,), chunks=(CHUNK_ROWS,))
         self._table = _temporary(self.folder / f"{self.name}.csv").open("w", encoding="utf-8")
         self._table.write(csv_header(self.columns) + csv_line(self.columns, row))

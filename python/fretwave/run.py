@@ -13,6 +13,7 @@ from . import checks
 from .analyses.context import AnalysisContext, Outcome, belongs, describe_analysis
 from .casefile import Case, changed_keys, load_case
 from .console import Console
+from .contacts import ContactSpec
 from .errors import EXIT_DONE, InputError, NotConverged
 from .parallel import on_first_rank
 from .petsc_options import AnalysisOptions
@@ -79,18 +80,30 @@ def resume_run(folder: Path, comm: Any, plots: bool = True) -> int:
     InputError
         The folder holds no run, or its case has changed since.
     """
-    case, record = on_first_rank(comm, lambda: _reload(folder))
+    case, record = on_first_rank(comm, lambda: reload_case(folder))
     given = record["case"]
     options = RunOptions(folder, given["overrides"], given["only"], given["quick"], plots, given["petsc"])
     record["ranks"], record["status"] = comm.size, "running"
     return _Runner(case, options, folder, record, comm, resuming=True).run()
 
 
-def _reload(folder: Path) -> tuple[Case, dict[str, Any]]:
+def reload_case(folder: Path, kept: bool = False) -> tuple[Case, dict[str, Any]]:
+    """The case of a run and its record. One rank only.
+
+    Parameters
+    ----------
+    kept : bool
+        Read the copy in the folder, as the run did: then only the model can have changed.
+
+    Raises
+    ------
+    InputError
+        The folder holds no run, or its case has changed since.
+    """
     record = read_record(folder)
     given = record["case"]
     path = Path(given["path"])
-    text = None if path.exists() else (folder / CASE_COPY).read_text(encoding="utf-8")
+    text = None if path.exists() and not kept else (folder / CASE_COPY).read_text(encoding="utf-8")
     case = load_case(path, given["overrides"], given["quick"], text=text)
     changed = changed_keys(given["resolved"], case.resolved)
     if changed:
@@ -315,12 +328,11 @@ def build_model(
     import fretwave
 
     neighbours = case.neighbours
-    without = {"normal_load": 0.0} if preload is not None and not preload.pair_loads else {}
     contacts = [
         fretwave.Contact(
             contact.law,
             contact.rows if neighbours is None else neighbours.rows(contact),
-            {**contact.parameters, **{key: value for key, value in without.items() if key in contact.parameters}},
+            acting_parameters(contact, preload),
             name=contact.name,
         )
         for contact in case.contacts
@@ -330,3 +342,9 @@ def build_model(
         return fretwave.Model(M, K, C, contacts, comm)
     M, K, C = neighbours.with_own("M", M), neighbours.with_own("K", K), case.ahead_damping(C)
     return fretwave.Model(M, K, C, contacts, comm, neighbours.sectors, nodal_diameter)
+
+
+def acting_parameters(contact: ContactSpec, preload: PreloadSection | None) -> dict[str, Any]:
+    """Parameters of a contact's law under a preload, which may take the place of the pairs' own loads."""
+    replaced = preload is not None and not preload.pair_loads and "normal_load" in contact.parameters
+    return {**contact.parameters, "normal_load": 0.0} if replaced else dict(contact.parameters)

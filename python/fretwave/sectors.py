@@ -117,7 +117,7 @@ def _folded(
         place = {int(old): new for new, old in enumerate(kept)}
         loads = {name: sum(T.T @ load for T in sector.ties.values()) for name, load in built.loads.items()}
         named = {name: place[number] for name, number in built.dofs.items() if number in place}
-        built = replace(built, dofs=named, loads=loads, coordinates=None, hexahedra=None)
+        built = replace(built, dofs=named, loads=loads, coordinates=None, displacements=None, hexahedra=None)
     neighbours = Neighbours(
         sector.sectors, *({name: _without_own(part) for name, part in given.items()} for given in (parts, rows))
     )

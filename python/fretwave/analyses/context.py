@@ -69,6 +69,8 @@ class AnalysisContext:
         Put on the group of the results.
     left_out : list of str
         What this analysis does not compute, and why; filled by :meth:`leave_out`.
+    arrays : dict
+        Arrays [m] put into the group of the results.
     """
 
     model: Any
@@ -81,6 +83,7 @@ class AnalysisContext:
     before_first: Callable[[], None] = lambda: None
     attributes: dict[str, Any] = field(default_factory=dict)
     left_out: list[str] = field(default_factory=list)
+    arrays: dict[str, Any] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
@@ -125,6 +128,7 @@ class AnalysisContext:
             active=self.comm.rank == 0,
             before_first=self.before_first,
             file_attributes={"title": self.case.title},
+            arrays=self.arrays,
         )
 
     def table(self, name: str) -> dict[str, Any]:

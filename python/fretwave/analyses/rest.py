@@ -82,6 +82,7 @@ def start_mode(context: AnalysisContext, linear_mode: int) -> tuple[Any, Any]:
             f"{context.name}: at rest {100 * rest.stick:.3g} % of the pairs stick, {100 * rest.slip:.3g} % slip,"
             f" {100 * rest.open:.3g} % are open"
         )
+        context.arrays["rest_displacement"] = rest.displacement
     modes = context.linear_mode("stuck", linear_mode)
     start = modes[linear_mode - 1]
     if start.omega <= RIGID * closed_mode(context).omega:

@@ -131,7 +131,7 @@ def _resultant(context: AnalysisContext, spec: ContactSpec, f: Any) -> list[str]
     built = context.case.built
     frames = built.contacts[spec.name].frames if built and spec.name in built.contacts else None
     names = section_loads(context)
-    if frames is None or built is None or built.coordinates is None or not names:
+    if frames is None or built is None or built.displacements is not None or not names:
         return []
     total = np.einsum("kcx,ck->x", frames, f)
     loads = np.sum([built.loads[name] for name in names], axis=0).reshape(-1, 3).sum(axis=0)

@@ -27,8 +27,8 @@ MERGE_SHARE = 1e-3
 #: Smallest Jacobian of an element over its largest that `Mesh.check_quality` accepts.
 JACOBIAN_RATIO = 0.05
 
-# Positions of VTK's hexahedron (first 8) and triquadratic hexahedron on the lattice {0, 1, 2}^3.
-_VTK = (
+#: Positions of the nodes of VTK's triquadratic hexahedron on the lattice {0, 1, 2}^3; the first 8 are the hexahedron.
+VTK_LATTICE = (
     [(0, 0, 0), (2, 0, 0), (2, 2, 0), (0, 2, 0), (0, 0, 2), (2, 0, 2), (2, 2, 2), (0, 2, 2)]
     + [(1, 0, 0), (2, 1, 0), (1, 2, 0), (0, 1, 0), (1, 0, 2), (2, 1, 2), (1, 2, 2), (0, 1, 2)]
     + [(0, 0, 1), (2, 0, 1), (2, 2, 1), (0, 2, 1)]
@@ -100,7 +100,7 @@ class Mesh:
     @property
     def vtk_cells(self) -> IntArray:
         """Node numbers (n_cells, 8 or 27) in VTK's order: hexahedron or triquadratic hexahedron."""
-        order = np.array(_VTK if self.order == 2 else _VTK[:8]) * self.order // 2
+        order = np.array(VTK_LATTICE if self.order == 2 else VTK_LATTICE[:8]) * self.order // 2
         return self.cells[:, order[:, 0], order[:, 1], order[:, 2]]
 
     def jacobians(self, points: Sequence[Array] | None = None) -> Array:

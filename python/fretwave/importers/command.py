@@ -57,6 +57,8 @@ def read_parts(options: argparse.Namespace) -> tuple[FileModel, Assembled]:
         model.node, model.direction = labels[:, 0], labels[:, 1]
     if nodes is not None:
         model.node_numbers, model.coordinates = nodes.numbers, nodes.coordinates
+        if nodes.hexahedra is not None:
+            model.hexahedra = nodes.places(nodes.hexahedra.ravel()).reshape(nodes.hexahedra.shape)
     _name_dofs(model, options.name)
     model.contacts = {contact.name: contact for contact in _contacts(options, labels, nodes)}
     model.sources = _sources(options)

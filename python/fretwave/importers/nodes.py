@@ -3,11 +3,13 @@
 CSV: lines "node, x, y, z". NPZ: ``coordinates`` (n_nodes, 3), optionally ``nodes`` (n_nodes,) with their numbers (1, 2,
 ... otherwise); every other array of whole numbers is a node set of its name.
 Deck (SIMULIA, Abaqus Keywords Reference, *NODE, *NSET, *INCLUDE; G. Dhondt, CalculiX CrunchiX User's Manual): names and
-keywords in any case; ``*NSET, GENERATE`` gives first, last, step; a set may name other sets.
+keywords in any case; ``*NSET, GENERATE`` gives first, last, step; a set may name other sets. ``*ELEMENT`` of types C3D8
+and C3D20 gives the cells, for pictures alone.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -23,6 +25,10 @@ Array = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 
 
+#: Solid elements of Abaqus and CalculiX with 8 or 20 nodes: C3D8, C3D8R, C3D8I, C3D20, C3D20R, ...
+_HEXAHEDRON = re.compile(r"C3D(8|20)[A-Z]*", re.IGNORECASE)
+
+
 @dataclass
 class Nodes:
     """Nodes of a mesh.
@@ -35,12 +41,15 @@ class Nodes:
         Node numbers by the set's name in capitals.
     where : str
         The file, as a user would name it.
+    hexahedra : (n_cells, 8 or 20) or None
+        Node numbers of cells with 8 or 20 nodes, in the order of C3D8 and C3D20.
     """
 
     numbers: IntArray
     coordinates: Array
     where: str
     sets: dict[str, IntArray] = field(default_factory=dict)
+    hexahedra: IntArray | None = None
 
     def __post_init__(self) -> None:
         different, count = np.unique(self.numbers, return_counts=True)
@@ -117,17 +126,20 @@ def _from_npz(path: Path) -> Nodes:
 
 
 class Deck:
-    """The nodes and node sets of an input deck; every other keyword is passed over."""
+    """Nodes, node sets and hexahedra of an input deck; every other keyword is passed over."""
 
     def __init__(self, path: Path) -> None:
         self.where = display(path)
         self.rows: list[tuple[int, float, float, float]] = []
         self.members: dict[str, list[int | str]] = {}
+        self.cells: list[IntArray] = []
         for keyword, options, data in _blocks(path):
             if keyword == "NODE":
                 self._add_nodes(options, data)
             elif keyword == "NSET":
                 self._add_set(options, data)
+            elif keyword == "ELEMENT" and (solid := _HEXAHEDRON.fullmatch(options.get("TYPE", ""))):
+                self._add_cells(int(solid.group(1)), data)
             elif keyword == "INSTANCE" and data:
                 fix = "write the deck flat (Abaqus/CAE: do not use parts and assemblies in input files)"
                 raise InputError("an instance is moved", f"{self.where}:{data[0][0]}", data[0][1], "no movement", fix)
@@ -163,6 +175,23 @@ class Deck:
                 fix = "correct the line"
                 raise InputError("this is no node set", f"{self.where}:{line}", text, expected, fix) from None
 
+    def _add_cells(self, nodes: int, data: list[tuple[int, str]]) -> None:
+        """Element number and nodes; an element may go over several lines."""
+        words = [(line, word.strip()) for line, text in data for word in text.split(",") if word.strip()]
+        wrong = next((line for line, word in words if not word.isdigit()), None)
+        if wrong is None and len(words) % (1 + nodes):
+            wrong = data[-1][0]
+        if wrong is not None:
+            expected = f"element, {nodes} nodes"
+            raise InputError("this is no element", f"{self.where}:{wrong}", None, expected, "correct the line")
+        table = np.array([int(word) for _, word in words], dtype=np.int64).reshape(-1, 1 + nodes)
+        self.cells.append(table[:, 1:])
+
+    def _hexahedra(self) -> IntArray | None:
+        """All of them with as many nodes as the smallest has: the corners come first."""
+        count = min((cells.shape[1] for cells in self.cells), default=0)
+        return np.concatenate([cells[:, :count] for cells in self.cells]) if count else None
+
     def _expand(self, name: str, above: tuple[str, ...] = ()) -> list[int]:
         if name not in self.members or name in above:
             known = ", ".join(sorted(self.members))
@@ -179,7 +208,7 @@ class Deck:
         table = np.array([row[1:] for row in self.rows])
         numbers = np.array([row[0] for row in self.rows], dtype=np.int64)
         sets = {name: np.unique(np.array(self._expand(name), dtype=np.int64)) for name in self.members}
-        return Nodes(numbers, table, self.where, sets)
+        return Nodes(numbers, table, self.where, sets, self._hexahedra())
 
 
 def _blocks(path: Path) -> Iterator[tuple[str, dict[str, str], list[tuple[int, str]]]]:

@@ -1,0 +1,229 @@
+"""What ``fretwave view`` shows of a run: the analysis, the points of its branch and the phases of the period."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from .analyses.context import belongs
+from .casefile import Case
+from .contact_history import ContactHistory
+from .errors import InputError
+from .run import acting_parameters
+from .source import display, nearest
+
+Array = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.intp]
+
+#: Columns of the branch that go with a picture.
+SHOWN = ("point", "amplitude", "frequency_hz", "zeta", "level", "stick", "slip", "open")
+#: Points named in a message.
+NAMED = 12
+
+
+@dataclass(frozen=True)
+class ViewOptions:
+    """What the command line says besides the run folder.
+
+    Attributes
+    ----------
+    points : numbers of points of the branch
+    amplitudes : modal amplitudes [m]; the nearest kept points are shown
+    phases : number of steps of a period
+    scale : factor on the displacement in the field ``warp``; None chooses one
+    linear : eight linear hexahedra in place of a triquadratic one
+    """
+
+    analysis: str | None = None
+    points: Sequence[int] = ()
+    amplitudes: Sequence[float] = ()
+    phases: int = 32
+    scale: float | None = None
+    linear: bool = False
+    out: Path | None = None
+
+    @classmethod
+    def checked(cls, scale: str, phases: int, **others: Any) -> ViewOptions:
+        """From the words of the command line.
+
+        Raises
+        ------
+        InputError
+            The scale is neither ``auto`` nor a number, or there are no phases.
+        """
+        if phases < 1:
+            raise InputError("a period has no phases", "--phases", phases, ">= 1", "--phases 32")
+        try:
+            factor = None if scale == "auto" else float(scale)
+        except ValueError:
+            factor = np.nan
+        if factor is not None and not np.isfinite(factor):
+            raise InputError("the scale is no number", "--scale", scale, "auto or a number", "--scale auto")
+        return cls(scale=factor, phases=phases, **others)
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Points of one analysis with all that is kept of them.
+
+    Attributes
+    ----------
+    points : numbers on the branch
+    asked : what the command line said of each, "" for nothing
+    states : columns of the branch at these points, by name
+    coefficients : (n_points, n_coordinates, m) [m], as solved
+    labels : of the m columns
+    rest : (n_coordinates,) displacement at rest [m]
+    samples : (n_phases,)
+        Numbers of the contacts' samples at which the motion is shown.
+    phases : (n_phases,) [rad]
+    contacts : histories per point, by the contact's name; none unless every point keeps them
+    without : points that do not keep the motion of their contacts
+    highest_component_hz : of the run's reduction, 0 without component modes
+    """
+
+    name: str
+    points: list[int]
+    asked: list[str]
+    states: dict[str, Array]
+    coefficients: Array
+    labels: list[str]
+    rest: Array
+    samples: IntArray
+    phases: Array
+    contacts: dict[str, list[ContactHistory]]
+    without: list[int]
+    highest_component_hz: float = 0.0
+
+    @property
+    def times(self) -> Array:
+        """Of all steps, in periods."""
+        return np.concatenate([number + self.phases / (2 * np.pi) for number in range(len(self.points))])
+
+    @property
+    def point_of_step(self) -> IntArray:
+        """(n_steps,) place in `points`."""
+        return np.repeat(np.arange(len(self.points)), len(self.phases))
+
+    def basis(self) -> Array:
+        """Value (n_phases, m) of each column's function of time: x = sum Qc_n cos n tau + Qs_n sin n tau."""
+        waves = [(np.sin if text.endswith("s") else np.cos, int(text.rstrip("cs"))) for text in self.labels]
+        return np.column_stack([wave(order * self.phases) for wave, order in waves])
+
+    def lines(self) -> Iterator[str]:
+        """Which points are shown, each in a line."""
+        for row, (point, asked) in enumerate(zip(self.points, self.asked)):
+            amplitude, frequency = self.states["amplitude"][row], self.states["frequency_hz"][row]
+            yield f"{self.name}: point {point}, amplitude {amplitude:.6g} m, {frequency:.6g} Hz{asked}"
+        if self.without:
+            numbers = ", ".join(str(point) for point in self.without)
+            yield f"{self.name}: no contact pairs are shown: their motion is not kept at point {numbers}"
+
+
+def read_choice(file: Any, folder: Path, case: Case, options: ViewOptions) -> Choice:
+    """Read what is asked for from an open results.h5.
+
+    Raises
+    ------
+    InputError
+        There is no such analysis, or it keeps no such point.
+    """
+    group = file[_analysis(file, folder, case, options.analysis)]
+    name = group.name.strip("/")
+    held = _held(group)
+    # A mode is shown where its contacts are kept; a response is sought at its peaks, where they are not.
+    offered = held if group.attrs["type"] == "mode" and len(held) else np.arange(len(group["coefficients"]))
+    chosen = _points(group, offered, options, f"analysis '{name}' in {display(folder)}")
+    count = int(group.attrs["samples"])
+    samples = np.unique(np.arange(options.phases) * count // options.phases)
+    rows = [row for row, _ in chosen]
+    without = [row for row in rows if row not in held]
+    return Choice(
+        name=name,
+        points=rows,
+        asked=[asked for _, asked in chosen],
+        states={key: group["points"][key][()][rows].astype(float) for key in SHOWN if key in group["points"]},
+        coefficients=np.stack([group["coefficients"][row] for row in rows]),
+        labels=[text.decode() for text in group["harmonic"][()]],
+        rest=group["rest_displacement"][()] if "rest_displacement" in group else np.zeros(len(group["dof"])),
+        samples=samples,
+        phases=2 * np.pi * samples / count,
+        contacts={} if without else _contacts(group, case, name, rows),
+        without=without,
+        highest_component_hz=json.loads(group.attrs.get("reduction", "{}")).get("highest_component_hz", 0.0),
+    )
+
+
+def _analysis(file: Any, folder: Path, case: Case, asked: str | None) -> str:
+    """Name of the analysis asked for, or of the first that has a motion: in the order of the case."""
+    found = [name for name in case.analyses if name in file and "coefficients" in file[name]]
+    found = [name for name in found if belongs(file[name], case, name)]
+    if found and asked in (None, *found):
+        return asked or found[0]
+    listed = ", ".join(found) or "none"
+    raise InputError(
+        "there is no motion to show" if asked is None else f"'{asked}' has no motion to show",
+        display(folder),
+        f"analyses with harmonic coefficients: {listed}",
+        "a mode or forced response of this run",
+        (nearest(asked, found) if asked else None) or (f"--analysis {found[0]}" if found else "run such an analysis"),
+    )
+
+
+def _held(group: Any) -> IntArray:
+    """Points of which all is kept: where there are contacts, those at which their motion is."""
+    with_contacts = any(name.startswith("contact_") for name in group)
+    return np.asarray(group["reported"][()] if with_contacts else np.arange(len(group["coefficients"])), dtype=np.intp)
+
+
+def _points(group: Any, kept: IntArray, options: ViewOptions, where: str) -> list[tuple[int, str]]:
+    """Numbers of points, each with a word on what was asked for; without a wish that of the largest amplitude.
+
+    Parameters
+    ----------
+    kept : points that an amplitude may choose
+    """
+    amplitude = group["points/amplitude"][()]
+    for point in options.points:
+        if not 0 <= point < len(amplitude):
+            near = kept[np.argmin(np.abs(kept - point))]
+            raise _not_kept("there is no such point", where, f"point {point}", kept, amplitude, near)
+    chosen = [(int(point), "") for point in options.points]
+    for asked in options.amplitudes:
+        near = kept[np.argmin(np.abs(amplitude[kept] - asked))]
+        if not amplitude.min() <= asked <= amplitude.max():
+            raise _not_kept("the branch does not reach this amplitude", where, f"{asked:g} m", kept, amplitude, near)
+        chosen.append((int(near), f", the kept point nearest to {asked:g} m"))
+    return chosen or [(int(kept[np.argmax(amplitude[kept])]), ", the kept point of the largest amplitude")]
+
+
+def _not_kept(what: str, where: str, measured: str, kept: IntArray, amplitude: Array, near: int) -> InputError:
+    """Names the kept points around the nearest one."""
+    place = int(np.flatnonzero(kept == near)[0])
+    begin = max(0, min(place - NAMED // 2, len(kept) - NAMED))
+    named = ", ".join(f"{point} ({amplitude[point]:.4g} m)" for point in kept[begin : begin + NAMED])
+    more = f" ({len(kept)} in all)" if len(kept) > NAMED else ""
+    expected = f"a point from 0 to {len(amplitude) - 1}, best one of {named}{more}"
+    return InputError(what, where, measured, expected, f"--point {near}")
+
+
+def _contacts(group: Any, case: Case, name: str, rows: Sequence[int]) -> dict[str, list[ContactHistory]]:
+    """Histories of all contacts at some points."""
+    reported = group["reported"][()].tolist()
+    preload = case.preload_of(case.analyses[name])
+    found = {}
+    for contact in case.contacts:
+        place = f"contact_{contact.name}"
+        if place in group:
+            values = acting_parameters(contact, preload)
+            at = [reported.index(row) for row in rows]
+            found[contact.name] = [
+                ContactHistory(contact.law, values, *(group[place][key][row] for key in "uvf")) for row in at
+            ]
+    return found
