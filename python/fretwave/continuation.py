@@ -106,13 +106,13 @@ class Continuation:
         self._upwards, self._restored, self._advice = upwards, False, ""
 
     def _parameter(self, y: PETSc.Vec) -> float:
-        last = self.problem.model.comm.size - 1
+        return float(self.problem.core.parameter_value(self.last_entry(y)))
+
+    def last_entry(self, y: PETSc.Vec) -> float:
+        """The parameter's entry of unknowns or a tangent, on every rank. Collective."""
+        comm = self.problem.model.comm
         local = y.getArray(readonly=True)
-        return float(
-            self.problem.core.parameter_value(
-                self.problem.model.comm.bcast(local[-1] if len(local) else 0.0, root=last)
-            )
-        )
+        return float(comm.bcast(local[-1] if len(local) else 0.0, root=comm.size - 1))
 
     def __iter__(self) -> Iterator[Point]:
         point = self._core.next() if self._restored else self._core.start(self._y0, self._upwards)

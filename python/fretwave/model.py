@@ -74,15 +74,15 @@ class Contact:
         return _core.make_law(self.law, {k: v[pairs].tolist() for k, v in self._values(n_pairs).items()})
 
     def _values(self, n_pairs: int) -> dict[str, Array]:
-        known = {p.name: p.default for p in laws()[str(self.law)].parameters}
+        known = {p.name: p for p in laws()[str(self.law)].parameters}
         for name in self.parameters:
             if name not in known:
                 raise InputError(
                     "unknown law parameter", f"contact '{self.name}'", name, ", ".join(known), "remove or rename it"
                 )
         values = {}
-        for name, default in known.items():
-            value = self.parameters.get(name, default)
+        for name, parameter in known.items():
+            value = self.parameters.get(name, parameter.default)
             if value is None or np.size(value) not in (1, n_pairs):
                 raise InputError(
                     f"law parameter '{name}' is missing or of the wrong length",
@@ -92,7 +92,22 @@ class Contact:
                     "give one number, or one per pair",
                 )
             values[name] = np.broadcast_to(np.asarray(value, dtype=float).ravel(), (n_pairs,))
+            self._check_bound(parameter, values[name])
         return values
+
+    def _check_bound(self, parameter: Any, values: Array) -> None:
+        """Here and not in the core, which knows a rank's own numbers of the pairs."""
+        low, sign = parameter.lower, ">" if parameter.strict else ">="
+        good = np.isfinite(values) & ((values > low) if parameter.strict else (values >= low))
+        if not good.all():
+            pair = int(np.argmin(good))
+            raise InputError(
+                f"law parameter '{parameter.name}' is out of bounds",
+                f"contact '{self.name}', pair {pair}",
+                f"{values[pair]:g}",
+                f"a number {sign} {low:g} {parameter.unit}" if low > -1e300 else f"a number [{parameter.unit}]",
+                "give a value within the bound; leave out pairs that stand for no area",
+            )
 
 
 class Model:

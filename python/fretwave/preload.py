@@ -21,6 +21,10 @@ Array = npt.NDArray[np.float64]
 FIRST_FACTOR = 1e-2
 
 
+#: A tangent with less load than this (displacement and load are of one size) is a motion that nothing holds.
+UNHELD = 1e-10
+
+
 @dataclass(frozen=True)
 class Preload:
     """A solved static state; the model's laws have it as their rest state.
@@ -111,14 +115,18 @@ def static_preload(
     control = steps or StepControl(initial=0.1, maximum=0.5)
     start = problem.core.initial() if closed is None else problem.at(FIRST_FACTOR * closed, FIRST_FACTOR)
     y, reached, branch = None, 0.0, Continuation(problem, start, (-1.0, 1.0), control, upwards=True)
+    reason = ""
     for point in branch:
         y, reached = point.y, point.parameter
+        if point.event in ("", "start") and abs(branch.last_entry(point.tangent)) < UNHELD:
+            reason = "the structure moves without load: nothing holds it in some direction"
+            break
     if branch.converged:
         return _settled(problem, y, rest.load + load)
     raise NotConverged(
         "no static equilibrium under the full load",
         None,
-        f"load factor {reached:.4g}: {branch.reason}",
+        f"load factor {reached:.4g}: {reason or branch.reason}",
         "1",
         "hold the structure where contact alone cannot (an axial stop), or lower the load",
     )

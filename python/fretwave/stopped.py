@@ -25,6 +25,8 @@ def _advice(name: str, reason: str) -> str:
     """What most often helps against a reason to stop."""
     if "number of points" in reason:
         return f"--set {name}.step.max_points=20000, or longer steps (step.maximum)"
+    if "linear solve" in reason or "LINEAR_SOLVE" in reason:
+        return f"the direct route (--petsc '-{name.replace('-', '_')}_route direct'), or more samples"
     if "at the start" in reason:
         return (
             "another start (amplitude or frequency) where the motion is nearly linear; --petsc -snes_monitor shows why"
@@ -38,4 +40,5 @@ def joined(failures: Sequence[NotConverged]) -> NotConverged:
     """One message for several analyses."""
     first = failures[0]
     names = "; ".join(failure.what for failure in failures)
-    return NotConverged(names, first.where, first.measured, first.expected, first.fix)
+    reasons = "; ".join(f"{failure.where}: {failure.measured}" for failure in failures)
+    return NotConverged(names, None, reasons, first.expected, first.fix)

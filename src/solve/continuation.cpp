@@ -241,6 +241,10 @@ void Continuation::make_batch() {
   const auto stop =
       std::find_if(batch_.begin(), batch_.end(), [](auto const& x) { return x.second.event == "stop"; });
   if (stop != batch_.end()) batch_.erase(stop + 1, batch_.end());
+  if (stop_after_batch_ && stop == batch_.end() && length / 2 >= steps_.minimum) {
+    anchor_.step = length / 2;  // a long step's interpolation is too far from the branch
+    return make_batch();
+  }
   if (stop_after_batch_ && stop == batch_.end())
     finish("the stop value is not reached: the corrector fails there", false);
   after_.index = anchor_.index + int(batch_.size());

@@ -12,6 +12,8 @@ constexpr PetscInt redundant_limit = 2000;  // unknowns: below, every rank facto
 constexpr PetscInt krylov_limit =
     4000;  // unknowns: above, the Krylov route where the problem has a preconditioner
 constexpr double smallest_step = 1e-13;  // of a Newton step, relative to the unknowns: rounding
+constexpr double stagnant_step = 1e-8;   // the same, of a step that the residual does not follow any more
+constexpr double stagnant_residual = 1e-5;
 
 /// Runs a callback's body; PETSc must not see a C++ exception.
 template <class Body>
@@ -40,7 +42,7 @@ Newton::Newton(Problem& problem, std::string const& prefix) : bordered_(problem)
   check(SNESSetFunction(snes_, nullptr, form_function, this));
   // The residual is dimensionless (DESIGN fact 4), so one absolute tolerance serves every case.
   check(SNESSetTolerances(snes_, 1e-10, 1e-50, 0, 25, 1000));
-  check(SNESSetConvergenceTest(snes_, converged, nullptr, nullptr));
+  check(SNESSetConvergenceTest(snes_, converged, this, nullptr));
   choose_route(prefix);
   preconditioner_ ? use_krylov() : use_direct();
   check(SNESSetJacobian(snes_, J_, J_, form_jacobian, this));
@@ -112,19 +114,36 @@ void Newton::use_krylov() {
   check(PCShellSetApply(pc, shell_precondition));
 }
 
-/// PETSc's test, and: a full step at rounding level ends the iteration, for the residual cannot fall further.
-/// It stays above the tolerance where forces cancel that are 1e6 times those measured with (a stiff contact
-/// under preload at a small amplitude); the point's residual says so.
+/// PETSc's test, and: Newton's step is the error of the unknowns. A full one at rounding level ends the
+/// iteration, and a small one under which a small residual no longer halves: it cannot fall further where
+/// forces cancel that are far above those measured with (a stiff contact, or a preload beside a small
+/// amplitude). The point's residual says so.
 PetscErrorCode Newton::converged(SNES snes, PetscInt iteration, PetscReal unknowns, PetscReal step,
-                                 PetscReal residual, SNESConvergedReason* reason, void*) {
+                                 PetscReal residual, SNESConvergedReason* reason, void* context) {
   PetscErrorCode code = SNESConvergedDefault(snes, iteration, unknowns, step, residual, reason, nullptr);
-  if (code || *reason || iteration == 0 || step > smallest_step * unknowns) return code;
+  double& before = static_cast<Newton*>(context)->residual_before_;
+  const bool stagnates = residual > 0.5 * before && residual < stagnant_residual;
+  before = residual;
+  unknowns = std::max(unknowns, 1.0);
+  if (code || *reason || iteration == 0 || step > stagnant_step * unknowns) return code;
   SNESLineSearch search;
   PetscReal fraction;
   code = SNESGetLineSearch(snes, &search);
   if (!code) code = SNESLineSearchGetLambda(search, &fraction);
-  if (!code && fraction == 1) *reason = SNES_CONVERGED_SNORM_RELATIVE;
+  if (!code && (stagnates || (fraction == 1 && step <= smallest_step * unknowns)))
+    *reason = SNES_CONVERGED_SNORM_RELATIVE;
   return code;
+}
+
+/// The line search found nothing lower along a step this small: rounding, as in `converged`.
+bool Newton::at_rounding(Vec y) {
+  Vec step;
+  double length, unknowns, residual;
+  check(SNESGetSolutionUpdate(snes_, &step));
+  check(SNESGetFunctionNorm(snes_, &residual));
+  check(VecNorm(step, NORM_2, &length));
+  check(VecNorm(y, NORM_2, &unknowns));
+  return length <= stagnant_step * std::max(unknowns, 1.0) && residual < stagnant_residual;
 }
 
 PetscErrorCode Newton::form_function(SNES, Vec y, Vec g, void* context) {
@@ -191,6 +210,7 @@ Outcome Newton::solve(Vec y) {
   check(SNESGetIterationNumber(snes_, &newton));
   check(SNESGetLinearSolveIterations(snes_, &linear));
   check(SNESGetFunctionNorm(snes_, &norm));
+  if (reason == SNES_DIVERGED_LINE_SEARCH && at_rounding(y)) reason = SNES_CONVERGED_SNORM_RELATIVE;
   if (reason < 0) stale_ = true;
   return {reason > 0, int(newton), int(linear), norm, text};
 }

@@ -42,6 +42,7 @@ class Newton {
   void use_krylov();
   void linearise(Vec y);
   void count_iterations();
+  bool at_rounding(Vec y);
 
   Bordered bordered_;
   MatHandle J_;
@@ -49,8 +50,9 @@ class Newton {
   VecHandle right_side_, point_;
   std::unique_ptr<Preconditioner> preconditioner_;
   bool stale_ = true;
-  int fresh_ = -1;  ///< Krylov iterations of the first solve after a build; -1: none yet
-  int excess_ = 0;  ///< iterations beyond that, of all solves since
+  int fresh_ = -1;              ///< Krylov iterations of the first solve after a build; -1: none yet
+  int excess_ = 0;              ///< iterations beyond that, of all solves since
+  double residual_before_ = 0;  ///< at the iteration before
   std::string route_;
   std::exception_ptr exception_;
 };
