@@ -212,6 +212,10 @@ std::vector<double> HarmonicPreconditioner::correction(std::vector<double> const
   return out;
 }
 
+std::string HarmonicPreconditioner::describe() const {
+  return std::to_string(problem_.harmonics().count()) + " dense blocks of " + std::to_string(n_) + " dofs";
+}
+
 void HarmonicPreconditioner::apply(Vec x, Vec z) {
   auto y = solve(gathered(x));
   if (!pairs_.empty()) {

@@ -17,6 +17,7 @@ class HarmonicPreconditioner : public solve::Preconditioner {
   void apply(Vec x, Vec z) override;
   /// 8 n^3 flops a harmonic at the speed of matrix products, against 8 n^2 read from memory.
   double build_cost() const override { return n_ / 10.0; }
+  std::string describe() const override;
 
  private:
   /// A pair of any rank: its rows of B and where its per-harmonic blocks begin.

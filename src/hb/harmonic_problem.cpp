@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "error.h"
+#include "hb/condensed_pc.h"
 #include "hb/harmonic_pc.h"
 
 namespace fretwave::hb {
@@ -170,9 +171,11 @@ std::vector<PairTangents> HarmonicProblem::pair_tangents(Vec y) {
   return residual_.pair_tangents();
 }
 
-std::unique_ptr<solve::Preconditioner> HarmonicProblem::preconditioner() {
-  constexpr PetscInt largest_dense = 3000;  // dofs: a complex factor of 144 MB a harmonic
-  if (harmonics().fundamental() < 0 || model().dofs() > largest_dense) return nullptr;
+std::unique_ptr<solve::Preconditioner> HarmonicProblem::preconditioner(std::string const& blocks) {
+  constexpr PetscInt largest_dense = 1000;  // dofs
+  if (harmonics().fundamental() < 0) return nullptr;
+  if (blocks == "sparse" || (blocks == "auto" && model().dofs() > largest_dense))
+    return std::make_unique<CondensedPreconditioner>(*this);
   return std::make_unique<HarmonicPreconditioner>(*this);
 }
 

@@ -51,7 +51,7 @@ class HarmonicProblem : public solve::Problem {
   VecHandle scalar_column(Vec y, int j);
   /// Linearised contact of this rank's pairs at y. Collective.
   std::vector<PairTangents> pair_tangents(Vec y);
-  std::unique_ptr<solve::Preconditioner> preconditioner() override;
+  std::unique_ptr<solve::Preconditioner> preconditioner(std::string const& blocks) override;
   /// The laws start their march from the static state at y. Collective.
   void settle(Vec y) { residual_.settle(coefficients(y)); }
   std::vector<ContactPeriod> contact_periods(Vec y);

@@ -25,6 +25,17 @@ PetscErrorCode guarded(std::exception_ptr& exception, Body body) {
   return PetscErrorCode(0);
 }
 
+/// What the option says: one of two, or auto.
+std::string choice(std::string const& prefix, char const* option, char const* meaning, std::string const& one,
+                   std::string const& other) {
+  char given[32] = "auto";
+  check(PetscOptionsGetString(nullptr, prefix.c_str(), option, given, sizeof given, nullptr));
+  if (given != std::string("auto") && given != one && given != other)
+    throw InputError(std::string("unknown ") + meaning, given, "auto, " + one + " or " + other,
+                     std::string("give ") + option + " " + other + ", or leave it out");
+  return given;
+}
+
 }  // namespace
 
 Newton::Newton(Problem& problem, std::string const& prefix) : bordered_(problem) {
@@ -46,18 +57,17 @@ Newton::Newton(Problem& problem, std::string const& prefix) : bordered_(problem)
 
 void Newton::choose_route(std::string const& prefix) {
   PetscInt unknowns;
-  char given[32] = "";
-  PetscBool set;
   check(VecGetSize(point_, &unknowns));
-  check(PetscOptionsGetString(nullptr, prefix.c_str(), "-route", given, sizeof given, &set));
-  const std::string wish = set ? given : "auto";
-  if (wish != "auto" && wish != "direct" && wish != "krylov")
-    throw InputError("unknown route of the corrector", wish, "auto, direct or krylov",
-                     "give -route krylov, or leave it out");
+  const std::string wish = choice(prefix, "-route", "route of the corrector", "direct", "krylov");
+  const std::string blocks = choice(prefix, "-blocks", "kind of preconditioner", "dense", "sparse");
   if (wish == "krylov" || (wish == "auto" && unknowns > krylov_limit))
-    preconditioner_ = bordered_.problem().preconditioner();
+    preconditioner_ = bordered_.problem().preconditioner(blocks);
   route_ = std::string(preconditioner_ ? "krylov" : "direct") + " (" +
-           (set ? "asked for" : std::to_string(unknowns) + " unknowns") + ")";
+           (wish == "auto" ? std::to_string(unknowns) + " unknowns" : "asked for") + ")";
+}
+
+std::string Newton::route() const {
+  return route_ + (preconditioner_ ? ", " + preconditioner_->describe() : "");
 }
 
 void Newton::use_direct() {

@@ -23,7 +23,7 @@ class Newton {
   Bordered& system() { return bordered_; }
   SNES snes() const { return snes_; }
   /// "direct" or "krylov", with the reason of the choice.
-  std::string const& route() const { return route_; }
+  std::string route() const;
   /// Solves from y, in place; y is the last iterate when it does not converge. Collective.
   Outcome solve(Vec y);
   /// Tangent at y: J t = 0, row . t = 1 with the closing row. t holds a guess (zero, or the last tangent),

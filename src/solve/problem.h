@@ -37,8 +37,9 @@ class Problem {
   virtual void pattern(std::vector<PetscInt>& rows, std::vector<PetscInt>& cols) = 0;
   virtual void values(Vec y, std::span<double> v) = 0;
 
-  /// For the Krylov route; none: the direct route only.
-  virtual std::unique_ptr<Preconditioner> preconditioner() { return nullptr; }
+  /// For the Krylov route; none: the direct route only. `blocks`: dense, sparse or auto, for problems that
+  /// have both.
+  virtual std::unique_ptr<Preconditioner> preconditioner(std::string const& /*blocks*/) { return nullptr; }
 
   /// Diagonal weights of the arclength's inner product at y.
   virtual void metric(Vec y, Vec weights) = 0;
