@@ -93,6 +93,11 @@ void HarmonicProblem::residual(Vec y, Vec r) {
   out[local_block_ + 1] = z_[scalars_ + 1];
 }
 
+double HarmonicProblem::rounding(Vec y) {
+  linearise(y);
+  return stiffness().rounding(motion_.exponents, Q_) / (stiffness_ * motion_.amplitude);
+}
+
 /// Line searches evaluate elsewhere: the point of linearisation is y, whatever was evaluated last.
 void HarmonicProblem::linearise(Vec y) {
   PetscBool same = PETSC_FALSE;

@@ -27,6 +27,7 @@ class HarmonicProblem : public solve::Problem {
   MPI_Comm comm() const override { return residual_.model().comm(); }
   PetscInt local_equations() const override { return local_block_ + (last_rank() ? scalars_ - 1 : 0); }
   void residual(Vec y, Vec r) override;
+  double rounding(Vec y) override;
   void product(Vec y, Vec dy, Vec dr) override;
   void pattern(std::vector<PetscInt>& rows, std::vector<PetscInt>& cols) override;
   void values(Vec y, std::span<double> v) override;

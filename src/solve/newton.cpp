@@ -47,7 +47,7 @@ Newton::Newton(Problem& problem, std::string const& prefix) : bordered_(problem)
   check(SNESSetFunction(snes_, nullptr, form_function, this));
   // The residual is dimensionless (DESIGN fact 4), so one absolute tolerance serves every case.
   check(SNESSetTolerances(snes_, 1e-10, 1e-50, 0, 25, 1000));
-  check(SNESSetConvergenceTest(snes_, converged, nullptr, nullptr));
+  check(SNESSetConvergenceTest(snes_, converged, this, nullptr));
   choose_route(prefix);
   preconditioner_ ? use_krylov() : use_direct();
   check(SNESSetJacobian(snes_, J_, J_, form_jacobian, this));
@@ -118,13 +118,22 @@ void Newton::use_krylov() {
   check(PCShellSetApply(pc, shell_precondition));
 }
 
-/// PETSc's test, and: a full step at rounding level ends the iteration, for the residual cannot fall further.
-/// It stays above the tolerance where forces cancel that are 1e6 times those measured with (a stiff contact
-/// under preload at a small amplitude); the point's residual says so.
+/// PETSc's test, and: a residual or a full step at rounding level ends the iteration, for the residual cannot
+/// fall further. It stays above the tolerance where forces cancel that are 1e6 times those measured with (a
+/// stiff contact under preload at a small amplitude, the element forces of a fine mesh); the point's residual
+/// says so.
 PetscErrorCode Newton::converged(SNES snes, PetscInt iteration, PetscReal unknowns, PetscReal step,
-                                 PetscReal residual, SNESConvergedReason* reason, void*) {
+                                 PetscReal residual, SNESConvergedReason* reason, void* context) {
   PetscErrorCode code = SNESConvergedDefault(snes, iteration, unknowns, step, residual, reason, nullptr);
-  if (code || *reason || iteration == 0 || step > smallest_step * unknowns) return code;
+  if (code || *reason || iteration == 0) return code;
+  auto& newton = *static_cast<Newton*>(context);
+  Vec y;
+  code = SNESGetSolution(snes, &y);
+  if (!code)
+    code = guarded(newton.exception_, [&] {
+      if (residual <= newton.bordered_.problem().rounding(y)) *reason = SNES_CONVERGED_FNORM_ABS;
+    });
+  if (code || *reason || step > smallest_step * unknowns) return code;
   SNESLineSearch search;
   PetscReal fraction;
   code = SNESGetLineSearch(snes, &search);
@@ -158,15 +167,22 @@ PetscErrorCode Newton::shell_precondition(PC pc, Vec x, Vec y) {
 }
 
 /// The preconditioner is stale once the iterations beyond those just after it was built have cost as much as
-/// building.
+/// building; at once, if even its first reuse cost more the last time.
 void Newton::count_iterations() {
   PetscInt iterations = 0;
   KSP ksp;
   check(SNESGetKSP(snes_, &ksp));
   check(KSPGetIterationNumber(ksp, &iterations));
-  if (fresh_ < 0) fresh_ = int(iterations);
+  const double cost = preconditioner_->build_cost();
+  if (fresh_ < 0) {
+    fresh_ = int(iterations);
+    stale_ = first_reuse_ > cost;
+    first_reuse_ /= 2;
+    return;
+  }
+  if (excess_ == 0) first_reuse_ = std::max(0, int(iterations) - fresh_);
   excess_ += std::max(0, int(iterations) - fresh_);
-  stale_ = excess_ > preconditioner_->build_cost();
+  stale_ = excess_ > cost;
 }
 
 void Newton::linearise(Vec y) {

@@ -49,8 +49,10 @@ class Newton {
   VecHandle right_side_, point_;
   std::unique_ptr<Preconditioner> preconditioner_;
   bool stale_ = true;
-  int fresh_ = -1;  ///< Krylov iterations of the first solve after a build; -1: none yet
-  int excess_ = 0;  ///< iterations beyond that, of all solves since
+  int fresh_ = -1;          ///< Krylov iterations of the first solve after a build; -1: none yet
+  int excess_ = 0;          ///< iterations beyond that, of all solves since
+  double first_reuse_ = 0;  ///< iterations beyond it that the first reuse cost when it was last tried, halved
+                            ///< at every build since
   std::string route_;
   std::exception_ptr exception_;
 };

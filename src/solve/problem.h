@@ -30,6 +30,8 @@ class Problem {
 
   /// r(y). Collective.
   virtual void residual(Vec y, Vec r) = 0;
+  /// Rounding error to expect in r(y): Newton stops there. Collective.
+  virtual double rounding(Vec /*y*/) { return 0; }
   /// dr = J(y) dy, J is N x (N + 1). Collective.
   virtual void product(Vec y, Vec dy, Vec dr) = 0;
   /// Global places of J's entries contributed by this rank, and their values in the same order (places may
