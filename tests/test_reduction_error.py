@@ -54,12 +54,19 @@ def test_estimate_is_the_true_difference(block, comm, method):
     for modes in (1, 3):
         with fw.reduce(M, K, C, keep=keep, modes=modes, comm=comm) as reduction:
             Br = np.hstack([B[:, keep], np.zeros((len(B), modes))])
-            small = mode(
-                reduction.M, reduction.K, reduction.C, Br, int(np.searchsorted(keep, tip)), comm, method, "small_"
-            )
+            at = int(np.searchsorted(keep, tip))
+            small = mode(reduction.M, reduction.K, reduction.C, Br, at, comm, method, "small_")
             y = solve_at(small, AMPLITUDE)
             found, estimate = small.state(y), nonlinear_error(reduction, small, y)
         for key in ("omega", "beta", "zeta"):
             difference = true[key] - found[key]
-            print(method, modes, key, difference / true[key], getattr(estimate, key) / difference)
             assert 0.5 * abs(difference) <= abs(getattr(estimate, key)) <= 2 * abs(difference), key
+
+
+def test_a_problem_on_other_dofs_is_refused(block, comm):
+    M, K, C, B, tip = block
+    full = mode(M, K, C, B, tip, comm, "CNM", "full_")
+    keep = np.union1d(np.flatnonzero(np.abs(B).sum(axis=0)), [tip])
+    with fw.reduce(M, K, C, keep=keep, modes=1, comm=comm) as reduction:
+        with pytest.raises(InputError, match="reduced coordinates"):
+            nonlinear_error(reduction, full, full.initial(AMPLITUDE))

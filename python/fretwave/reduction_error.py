@@ -83,7 +83,7 @@ def nonlinear_error(
     interior = _Interior(reduction)
     step, residual, forces = np.zeros_like(Q), 0.0, 0.0
     for column, order, factors in _harmonics(problem, y):
-        x = X[:, column] - (1j * X[:, column + 1] if order else 0)
+        x: Complex = X[:, column] - 1j * (X[:, column + 1] if order else np.zeros(len(X)))
         r = interior.restrict(interior.product(factors, x) - (0 if order else full.distribute(P)))
         z = interior.product(factors, interior.correction(factors, r, order))
         residual += _square(comm, r)
@@ -216,7 +216,8 @@ class _Solver:
         """This rank's internal rows."""
         self.b.setArray(rows)
         self.ksp.solve(self.b, self.x)
-        return self.x.getArray(readonly=True).copy()
+        solution: Array = self.x.getArray(readonly=True).copy()
+        return solution
 
     def destroy(self) -> None:
         for thing in (self.ksp, self.Z, self.x, self.b):
