@@ -67,6 +67,6 @@ def test_a_problem_on_other_dofs_is_refused(block, comm):
     M, K, C, B, tip = block
     full = mode(M, K, C, B, tip, comm, "CNM", "full_")
     keep = np.union1d(np.flatnonzero(np.abs(B).sum(axis=0)), [tip])
-    with fw.reduce(M, K, C, keep=keep, modes=1, comm=comm) as reduction:
-        with pytest.raises(InputError, match="reduced coordinates"):
-            nonlinear_error(reduction, full, full.initial(AMPLITUDE))
+    reduction = fw.reduce(M, K, C, keep=keep, modes=1, comm=comm)
+    with reduction, pytest.raises(InputError, match="reduced coordinates"):
+        nonlinear_error(reduction, full, full.initial(AMPLITUDE))
