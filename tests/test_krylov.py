@@ -119,7 +119,7 @@ def krylov(case):
 def test_the_option_chooses_the_route(case):
     for route in ("direct", "krylov"):
         newton = fw._core.Newton(mode(*case, route).core, f"{route}_")
-        assert newton.route == f"{route} (asked for)"
+        assert newton.route.startswith(f"{route} (asked for)")
 
 
 @pytest.mark.ranks(1)

@@ -52,6 +52,8 @@ void bind_hb(nb::module_& m) {
       .def("preload", [](HarmonicProblem& p, Petsc<Vec> x, Petsc<Vec> P) { p.preload(x.object, P.object); })
       .def("unfold", [](HarmonicProblem& p, Petsc<Vec> re, Petsc<Vec> im) { p.unfold(re.object, im.object); })
       .def("unfolding", [](HarmonicProblem& p, Petsc<Vec> y) { return p.unfolding(y.object); })
+      .def_prop_ro("stiffness_scale", &HarmonicProblem::stiffness_scale)
+      .def("rounding", [](HarmonicProblem& p, Petsc<Vec> y) { return p.rounding(y.object); })
       .def("settle", [](HarmonicProblem& p, Petsc<Vec> y) { p.settle(y.object); })
       .def("exponents", [](HarmonicProblem& p, Petsc<Vec> y) { return p.exponents(y.object).s; });
   nb::enum_<Method>(m, "Method").value("CNM", Method::CNM).value("EPMC", Method::EPMC);

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from .modes import LinearMode, linear_modes
     from .problems import ForcedResponse, Harmonics, NonlinearMode, choose_harmonics
     from .reduction import FrequencyError, Reduction, reduce
+    from .reduction_error import NonlinearError, nonlinear_error
     from .transient import Transient
 
 #: Where each public name lives; loaded when first used, so that `fretwave --help` starts without PETSc.
@@ -30,6 +31,7 @@ _HOMES = {
     "modes": ("LinearMode", "linear_modes"),
     "problems": ("ForcedResponse", "Harmonics", "NonlinearMode", "choose_harmonics"),
     "reduction": ("FrequencyError", "Reduction", "reduce"),
+    "reduction_error": ("NonlinearError", "nonlinear_error"),
     "transient": ("Transient",),
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
@@ -47,6 +49,7 @@ __all__ = [
     "LawInfo",
     "LinearMode",
     "Model",
+    "NonlinearError",
     "NonlinearMode",
     "NotConverged",
     "ParameterInfo",
@@ -60,6 +63,7 @@ __all__ = [
     "laws",
     "linear_modes",
     "match_faces",
+    "nonlinear_error",
     "reduce",
 ]
 

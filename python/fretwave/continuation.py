@@ -143,6 +143,11 @@ class Continuation:
         return str(self._core.reason) + self._advice
 
     @property
+    def route(self) -> str:
+        """How linear systems are solved, why so, and the memory of the Krylov route's factors."""
+        return str(self._core.route)
+
+    @property
     def snes(self) -> PETSc.SNES:
         """The corrector, to look into or to set options on."""
         return self._core.snes

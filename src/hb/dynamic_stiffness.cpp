@@ -1,6 +1,7 @@
 #include "hb/dynamic_stiffness.h"
 
 #include <cmath>
+#include <limits>
 
 extern "C" void dgemm_(char const*, char const*, int const*, int const*, int const*, double const*,
                        double const*, int const*, double const*, int const*, double const*, double*,
@@ -25,6 +26,9 @@ bool is_dense(Mat A) {
 DynamicStiffness::DynamicStiffness(model::Model const& model, Harmonics const& h)
     : model_(model), harmonics_(h) {
   for (auto const& term : model.terms()) {
+    row_sums_.emplace_back(model.local_dofs(), 0.0);
+    for (auto const& entry : entries(term.A))
+      row_sums_.back()[entry.row - model.first_dof()] += std::abs(entry.value);
     blocked_.emplace_back();
     if (!is_dense(term.A)) {
       check(MatCreateMAIJ(term.A, h.block_size(), blocked_.back().sparse.out()));
@@ -96,6 +100,23 @@ void DynamicStiffness::derivative_multiply_add(Exponents const& e, Exponents con
   for (size_t j = 0; j < blocked_.size(); ++j)
     if (model_.terms()[j].order > 0)
       accumulate(coefficient_derivatives(model_.terms()[j], e, change), blocked_[j], x, y);
+}
+
+double DynamicStiffness::rounding(Exponents const& e, Vec x) const {
+  const int m = harmonics_.block_size();
+  ReadArray in(x);
+  double square = 0;
+  for (int i = 0; i < harmonics_.count(); ++i)
+    for (size_t j = 0; j < row_sums_.size(); ++j) {
+      const double c = std::norm(coefficients(model_.terms()[j], e)[i]);
+      for (PetscInt dof = 0; dof < model_.local_dofs(); ++dof) {
+        double const* q = in.data() + dof * m + harmonics_.offset(i);
+        const double motion = q[0] * q[0] + (harmonics_.orders()[i] ? q[1] * q[1] : 0);
+        square += c * row_sums_[j][dof] * row_sums_[j][dof] * motion;
+      }
+    }
+  MPI_Allreduce(MPI_IN_PLACE, &square, 1, MPI_DOUBLE, MPI_SUM, model_.comm());
+  return std::numeric_limits<double>::epsilon() * std::sqrt(square);
 }
 
 std::vector<DynamicStiffness::Entry> DynamicStiffness::entries(Mat A) const {

@@ -13,6 +13,9 @@ class DynamicStiffness {
   void multiply_add(Exponents const&, Vec x, Vec y);
   /// y += dZ x for a change (ds, dg) of the exponents. Collective.
   void derivative_multiply_add(Exponents const&, Exponents const& change, Vec x, Vec y);
+  /// Rounding error to expect in Z x: eps sum |A| |c_n| |x|, with each dof's neighbours moving as itself;
+  /// norm over all rows. Collective.
+  double rounding(Exponents const&, Vec x) const;
   /// c_n of one term.
   std::vector<complex> coefficients(model::Term const&, Exponents const&) const;
   std::vector<complex> coefficient_derivatives(model::Term const&, Exponents const&,
@@ -41,6 +44,7 @@ class DynamicStiffness {
   model::Model const& model_;
   Harmonics harmonics_;
   std::vector<Blocked> blocked_;
+  std::vector<std::vector<double>> row_sums_;  ///< of |A|, one per term
   mutable std::vector<std::vector<Entry>> entries_;
   VecHandle work_;
 };

@@ -88,4 +88,8 @@ std::unique_ptr<HarmonicInverse> HarmonicPreconditioner::inverse(int harmonic, E
   return invert(place(harmonic), block(harmonic, e));
 }
 
+std::string HarmonicPreconditioner::describe() const {
+  return std::to_string(problem_.harmonics().count()) + " dense blocks of " + std::to_string(n_) + " dofs";
+}
+
 }  // namespace fretwave::hb

@@ -9,6 +9,7 @@ class HarmonicPreconditioner : public PairwisePreconditioner {
   explicit HarmonicPreconditioner(HarmonicProblem&);
   /// 8 n^3 flops a harmonic at the speed of matrix products, against 8 n^2 read from memory.
   double build_cost() const override { return n_ / 10.0; }
+  std::string describe() const override;
 
  private:
   void prepare(Exponents const&, Vec y, Vec row) override;

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "error.h"
+#include "hb/condensed_pc.h"
 #include "hb/harmonic_pc.h"
 #include "hb/wheel_pc.h"
 
@@ -14,6 +15,20 @@ namespace {
 void add(Exponents& y, double f, Exponents const& x) {
   for (size_t i = 0; i < y.s.size(); ++i) y.s[i] += f * x.s[i];
   y.inertia_damping += f * x.inertia_damping;
+}
+
+/// Dense blocks are for reduced models. They are inverted in single precision, which the element stiffness of
+/// a fine mesh, 1e8 times that of its first mode, outdoes; and 3000 dofs take 144 MB a harmonic.
+bool suits_dense(model::Model const& model) {
+  constexpr double always = 200, largest = 3000, share = 0.25;  // dofs, dofs, of nonzero entries
+  const double n = double(model.dofs());
+  double entries = 0;
+  for (auto const& term : model.terms()) {
+    MatInfo info;
+    check(MatGetInfo(term.A, MAT_GLOBAL_SUM, &info));
+    entries = std::max(entries, info.nz_used);
+  }
+  return n <= always || (n <= largest && entries > share * n * n);
 }
 
 }  // namespace
@@ -149,6 +164,11 @@ void HarmonicProblem::border(std::vector<double> const& z, std::vector<double> c
   std::copy(along.begin(), along.end(), r + local_block_ + 2);
 }
 
+double HarmonicProblem::rounding(Vec y) {
+  linearise(y);
+  return residual_.rounding() / (stiffness_ * motion_.amplitude);
+}
+
 /// Line searches evaluate elsewhere: the point of linearisation is y, whatever was evaluated last.
 void HarmonicProblem::linearise(Vec y) {
   PetscBool same = PETSC_FALSE;
@@ -230,11 +250,14 @@ std::vector<PairTangents> HarmonicProblem::pair_tangents(Vec y) {
   return residual_.pair_tangents();
 }
 
-std::unique_ptr<solve::Preconditioner> HarmonicProblem::preconditioner() {
-  constexpr PetscInt largest_dense = 3000;  // dofs: a complex factor of 144 MB a harmonic
+std::unique_ptr<solve::Preconditioner> HarmonicProblem::preconditioner(std::string const& blocks) {
   if (harmonics().fundamental() < 0) return nullptr;
   if (model().unit()) return std::make_unique<WheelPreconditioner>(*this);
-  if (model().dofs() > largest_dense || unfoldings()) return nullptr;
+  if (unfoldings()) return nullptr;
+  const bool phased = std::any_of(model().contacts().begin(), model().contacts().end(),
+                                  [](auto const& contact) { return !contact.ahead.empty(); });
+  if (!phased && (blocks == "sparse" || (blocks == "auto" && !suits_dense(model()))))
+    return std::make_unique<CondensedPreconditioner>(*this);
   return std::make_unique<HarmonicPreconditioner>(*this);
 }
 

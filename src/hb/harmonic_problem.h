@@ -30,6 +30,7 @@ class HarmonicProblem : public solve::Problem {
     return local_block_ + (last_rank() ? unfoldings() + scalars_ - 1 : 0);
   }
   void residual(Vec y, Vec r) override;
+  double rounding(Vec y) override;
   void product(Vec y, Vec dy, Vec dr) override;
   void pattern(std::vector<PetscInt>& rows, std::vector<PetscInt>& cols) override;
   void values(Vec y, std::span<double> v) override;
@@ -62,7 +63,7 @@ class HarmonicProblem : public solve::Problem {
   VecHandle scalar_column(Vec y, int j);
   /// Linearised contact of this rank's pairs at y. Collective.
   std::vector<PairTangents> pair_tangents(Vec y);
-  std::unique_ptr<solve::Preconditioner> preconditioner() override;
+  std::unique_ptr<solve::Preconditioner> preconditioner(std::string const& blocks) override;
   /// The laws start their march from the static state at y. Collective.
   void settle(Vec y) { residual_.settle(coefficients(y)); }
   std::vector<ContactPeriod> contact_periods(Vec y);

@@ -1,6 +1,8 @@
 #include "hb/residual.h"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
 namespace fretwave::hb {
 
@@ -152,6 +154,35 @@ void Residual::contact_pattern(Group& group, std::vector<PetscInt>& rows, std::v
     for (PetscInt i = 0; i < m; ++i)
       for (PetscInt j = 0; j < m; ++j) rows.push_back(a.dof * m + i), cols.push_back(b.dof * m + j);
   });
+}
+
+double Residual::rounding() const {
+  const int m = harmonics_.block_size();
+  ReadArray Q(Q_);
+  const auto size = [m](double const* block) {
+    double square = 0;
+    for (int k = 0; k < m; ++k) square += block[k] * block[k];
+    return std::sqrt(square);
+  };
+  double square = 0;
+  for (Group const& group : groups_) {
+    contact::Law const& law = *group.contact->law;
+    ReadArray F(group.F);
+    std::vector<double> motion(group.aft.columns(), 0.0);
+    for (Weight const& w : group.weights) {
+      const PetscInt dof = w.dof - model_.first_dof();  // those of other ranks are left out: an estimate
+      if (dof >= 0 && dof < model_.local_dofs())
+        motion[size_t(w.pair) * law.components() + w.component] +=
+            std::abs(w.value) * size(&Q.data()[dof * m]);
+    }
+    for (size_t row = 0; row < motion.size(); ++row) {
+      const double k = law.stuck_stiffness(int(row % law.components()), int(row / law.components()));
+      const double force = size(&F.data()[row * m]) + (std::isfinite(k) ? k * motion[row] : 0);
+      square += force * force;
+    }
+  }
+  MPI_Allreduce(MPI_IN_PLACE, &square, 1, MPI_DOUBLE, MPI_SUM, model_.comm());
+  return std::hypot(stiffness_.rounding(e_, Q_), std::numeric_limits<double>::epsilon() * std::sqrt(square));
 }
 
 std::vector<PairTangents> Residual::pair_tangents() {

@@ -41,6 +41,10 @@ class Residual {
   void pattern(std::vector<PetscInt>& rows, std::vector<PetscInt>& cols);
   double* values(double scale, double* v);
 
+  /// Rounding to expect in R at the last evaluated point: of its linear terms, and of contact forces that
+  /// stiff pairs take from small differences of displacements. Collective.
+  double rounding() const;
+
   DynamicStiffness const& stiffness() const { return stiffness_; }
   /// Linearised contact at the last evaluated point, one per contact.
   std::vector<PairTangents> pair_tangents();

@@ -10,6 +10,9 @@ class WheelPreconditioner : public PairwisePreconditioner {
  public:
   explicit WheelPreconditioner(HarmonicProblem&);
   double build_cost() const override { return unit_ / 10.0; }
+  std::string describe() const override {
+    return std::to_string(sectors_) + " nodal diameters of " + std::to_string(unit_) + " dofs";
+  }
 
  private:
   using Blocks = std::map<int, std::vector<double>>;  ///< by sectors ahead, column-major

@@ -23,7 +23,7 @@ class Newton {
   Bordered& system() { return bordered_; }
   SNES snes() const { return snes_; }
   /// "direct" or "krylov", with the reason of the choice.
-  std::string const& route() const { return route_; }
+  std::string route() const;
   /// Solves from y, in place; y is the last iterate when it does not converge. Collective.
   Outcome solve(Vec y);
   /// Tangent at y: J t = 0, row . t = 1 with the closing row. t holds a guess (zero, or the last tangent),
@@ -50,8 +50,10 @@ class Newton {
   VecHandle right_side_, point_;
   std::unique_ptr<Preconditioner> preconditioner_;
   bool stale_ = true;
-  int fresh_ = -1;              ///< Krylov iterations of the first solve after a build; -1: none yet
-  int excess_ = 0;              ///< iterations beyond that, of all solves since
+  int fresh_ = -1;          ///< Krylov iterations of the first solve after a build; -1: none yet
+  int excess_ = 0;          ///< iterations beyond that, of all solves since
+  double first_reuse_ = 0;  ///< iterations beyond it that the first reuse cost when it was last tried, halved
+                            ///< at every build since
   double residual_before_ = 0;  ///< at the iteration before
   std::string route_;
   std::exception_ptr exception_;

@@ -1,4 +1,6 @@
 #pragma once
+#include <string>
+
 #include "petsc.h"
 
 namespace fretwave::solve {
@@ -12,6 +14,8 @@ class Preconditioner {
   virtual void apply(Vec x, Vec z) = 0;
   /// What building costs, in Krylov iterations.
   virtual double build_cost() const = 0;
+  /// One line for the log, with its memory once it is built.
+  virtual std::string describe() const = 0;
 };
 
 }  // namespace fretwave::solve

@@ -30,6 +30,8 @@ class Problem {
 
   /// r(y). Collective.
   virtual void residual(Vec y, Vec r) = 0;
+  /// Rounding error to expect in r(y): Newton stops there. Collective.
+  virtual double rounding(Vec /*y*/) { return 0; }
   /// dr = J(y) dy, J is N x (N + 1). Collective.
   virtual void product(Vec y, Vec dy, Vec dr) = 0;
   /// Global places of J's entries contributed by this rank, and their values in the same order (places may
@@ -37,8 +39,9 @@ class Problem {
   virtual void pattern(std::vector<PetscInt>& rows, std::vector<PetscInt>& cols) = 0;
   virtual void values(Vec y, std::span<double> v) = 0;
 
-  /// For the Krylov route; none: the direct route only.
-  virtual std::unique_ptr<Preconditioner> preconditioner() { return nullptr; }
+  /// For the Krylov route; none: the direct route only. `blocks`: dense, sparse or auto, for problems that
+  /// have both.
+  virtual std::unique_ptr<Preconditioner> preconditioner(std::string const& /*blocks*/) { return nullptr; }
 
   /// Diagonal weights of the arclength's inner product at y.
   virtual void metric(Vec y, Vec weights) = 0;

@@ -67,6 +67,7 @@ def _follow(context: AnalysisContext, analysis: ModeAnalysis, problem: Any, writ
 def _finish(context: AnalysisContext, writer: Any, branch: Any) -> Outcome:
     table = finished_table(writer)
     summary = summarise(context.name, table) if table else []
+    summary.append(f"linear systems: {branch.route}")
     events = json.dumps(limit_cycles(table)) if table else "[]"
     if table:
         keep_pairs(context, writer)
