@@ -245,6 +245,23 @@ def test_reduction_is_reported(run: Path) -> None:
     assert "reduction: 18 dofs to 6 kept and 6 component modes" in (run / "run.log").read_text()
 
 
+def test_error_at_an_amplitude_is_the_difference_to_the_unreduced_model(write, tmp_path: Path) -> None:
+    """Issue 3: estimated at one nonlinear point, in partial slip; within a factor 2 of the true change."""
+    out = [tmp_path / "whole", tmp_path / "reduced"]
+    omega = []
+    for folder, text in zip(out, ("", "[reduction]\nmodes = 8\nerror_at = 2.1e-6\n")):
+        changed = write(("[reduction]\nmodes = 6\n", text))
+        assert call("run", str(changed), "--only", "mode", "--no-plots", "--out", str(folder)) == 0
+        amplitude, found = column(folder, "mode", "amplitude"), column(folder, "mode", "omega")
+        omega.append(float(found[np.argmin(np.abs(amplitude - 2.1e-6))]))
+    estimate = json.loads((out[1] / "run.json").read_text())["analyses"]["mode"]["reduction_error"]
+    assert estimate["amplitude"] == pytest.approx(2.1e-6)
+    change = omega[0] - omega[1]
+    assert abs(change) > 1e-7 * omega[0]
+    assert 0.5 < estimate["omega"] / change < 2
+    assert "the unreduced model would change omega" in (out[1] / "run.log").read_text()
+
+
 def test_pictures_show_the_pairs(run: Path) -> None:
     names = {"mode_map_pads.png", "mode_hysteresis_pads.png", "static_load_pads.png", "mode_backbone.png"}
     assert names <= {path.name for path in run.glob("*.png")}

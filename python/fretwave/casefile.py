@@ -47,6 +47,8 @@ class Case:
         How to reduce, None for not at all.
     reduced : ReductionReport
         What a reduction did; None for the model as given.
+    unreduced : Case
+        The case before its reduction, where the reduction's error is asked for.
     preload : PreloadSection
         The static state of all analyses without one of their own; None for none.
     neighbours : Neighbours
@@ -82,6 +84,7 @@ class Case:
     reduction: ReductionSection | None = None
     keep: list[int] = field(default_factory=list)
     reduced: ReductionReport | None = None
+    unreduced: Case | None = None
     preload: PreloadSection | None = None
     neighbours: Neighbours | None = None
 

@@ -100,7 +100,28 @@ def reduce_case(case: Case, comm: Any, modes: int | None = None) -> Case:
     with reduction_of(case, case.reduction, comm, modes) as reduction:
         small = _on(case, reduction)
         wall = time.perf_counter() - began
-    return replace(small, reduced=_report(case, small, reduction.component_hz, wall, comm))
+    kept = case if case.reduction.error_at is not None else None
+    return replace(small, reduced=_report(case, small, reduction.component_hz, wall, comm), unreduced=kept)
+
+
+def nonlinear_error_at(case: Case, analysis: ModeAnalysis, problem: Any, y: Any) -> Any:
+    """Estimate of what the unreduced model would change at a point of a mode; the reduction is made again. Collective.
+
+    Returns
+    -------
+    fretwave.NonlinearError
+    """
+    from .reduction import reduce
+    from .reduction_error import nonlinear_error
+
+    full = case.unreduced
+    assert full is not None and case.reduced is not None
+    preload = full.preload_of(analysis)
+    loads = [full.loads[name] for name in preload.loads] if preload is not None else []
+    C = full.damping_with(analysis.dampers)
+    modes = case.reduced.component_modes
+    with reduce(full.M, full.K, C, keep=np.array(full.keep), comm=problem.model.comm, modes=modes) as reduction:
+        return nonlinear_error(reduction, problem, y, np.sum(loads, axis=0) if loads else None)
 
 
 def reduction_of(case: Case, section: ReductionSection, comm: Any, modes: int | None = None) -> Reduction:

@@ -269,6 +269,7 @@ class _Runner:
             "wall_s": round(seconds, 3),
             "peak_memory_mb": memory,
             "left_out": context.left_out,
+            **context.entry,
         }
         self.folder.save()
         if not outcome.converged:

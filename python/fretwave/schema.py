@@ -67,6 +67,9 @@ class ReductionSection(Section):
     modes: Optional[int] = key("number of component modes (10 unless told)", example="10", default=None, ge=0)
     up_to_hz: Optional[Positive] = key("instead of modes: all component modes up to here", "Hz", "5000.0", default=None)
     compare: int = key("linear modes compared with the unreduced model, 0 for none", example="5", default=5, ge=0)
+    error_at: Optional[Positive] = key(
+        "amplitude at which each mode's error against the unreduced model is estimated", "m", "1e-3", default=None
+    )
 
 
 class PreloadSection(Section):

@@ -71,6 +71,8 @@ class AnalysisContext:
         What this analysis does not compute, and why; filled by :meth:`leave_out`.
     arrays : dict
         Arrays [m] put into the group of the results.
+    entry : dict
+        What else run.json says of the analysis.
     """
 
     model: Any
@@ -84,6 +86,7 @@ class AnalysisContext:
     attributes: dict[str, Any] = field(default_factory=dict)
     left_out: list[str] = field(default_factory=list)
     arrays: dict[str, Any] = field(default_factory=dict)
+    entry: dict[str, Any] = field(default_factory=dict)
 
     @property
     def name(self) -> str:

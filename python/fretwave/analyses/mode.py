@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
 from typing import Any
@@ -47,7 +48,10 @@ def _follow(context: AnalysisContext, analysis: ModeAnalysis, problem: Any, writ
     import fretwave
 
     low, high = analysis.amplitude
-    settings = {"stop": (low, high), "steps": step_control(analysis.step), "report_at": analysis.report_at}
+    reduction = context.case.reduction
+    error_at = reduction.error_at if reduction is not None and context.case.unreduced is not None else None
+    reports = sorted({*analysis.report_at, *([] if error_at is None else [error_at])})
+    settings = {"stop": (low, high), "steps": step_control(analysis.step), "report_at": reports}
     snapshot, _, found = open_branch(context.comm, writer, context.resuming)
     if found:
         branch = fretwave.Continuation.restore(problem, snapshot, **settings)
@@ -56,12 +60,28 @@ def _follow(context: AnalysisContext, analysis: ModeAnalysis, problem: Any, writ
     with context.console.progress(context.name):
         for point in points_of(branch):
             row = record(writer, problem, point, branch.snapshot(), {})
+            if error_at is not None and math.isclose(row["amplitude"], error_at, rel_tol=1e-9):
+                context.console.line(_reduction_error(context, problem, point, row))
             share = math.log(row["amplitude"] / low) / math.log(high / low)
             context.console.point(point_line(context.name, row), _short(row), share, notable=bool(row["event"]))
     outcome = _finish(context, writer, branch)
     outcome.goal = f"amplitude {high:g} m"
     branch.destroy()
     return outcome
+
+
+def _reduction_error(context: AnalysisContext, problem: Any, point: Any, row: dict[str, Any]) -> str:
+    """What the unreduced model would change at this point, for the log and run.json. Collective."""
+    from ..reduced import nonlinear_error_at
+
+    assert isinstance(context.analysis, ModeAnalysis)
+    error = nonlinear_error_at(context.case, context.analysis, problem, point.y)
+    context.entry["reduction_error"] = {"amplitude": row["amplitude"], **dataclasses.asdict(error)}
+    return (
+        f"{context.name}: at {row['amplitude']:.4g} m the unreduced model would change omega by"
+        f" {error.omega / row['omega']:+.1e} of itself and zeta by {100 * error.zeta:+.1e} %"
+        f" (estimated, {error.wall_s:.1f} s)"
+    )
 
 
 def _finish(context: AnalysisContext, writer: Any, branch: Any) -> Outcome:
