@@ -119,9 +119,9 @@ def test_dense_and_sparse_blocks_find_the_same_mode(comm):
 @pytest.mark.ranks(1)
 def test_unknown_blocks_are_refused(comm):
     model, tip = solid(comm, SMALL)
-    problem = mode(model, tip, "wrong_", blocks="thick")
+    problem = mode(model, tip, "thick_", blocks="thick")
     with pytest.raises(fw.InputError, match="(?s)preconditioner.*thick"):
-        fw._core.Newton(problem.core, "wrong_")
+        fw._core.Newton(problem.core, "thick_")
 
 
 def test_forced_response_has_no_normalisation(comm):

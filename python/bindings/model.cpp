@@ -62,20 +62,22 @@ void bind_model(nb::module_& m) {
   using Maps = std::vector<std::tuple<Petsc<Mat>, int>>;  // B of the own sector first
   using Contacts = std::vector<std::tuple<std::string, Maps, std::shared_ptr<contact::Law>>>;
   nb::class_<Model>(m, "Model")
-      .def("__init__",
-           [](Model* self, Terms const& terms, Contacts const& contacts, double theta, PetscInt unit) {
-             std::vector<model::Term> linear;
-             std::vector<model::Contact> groups;
-             for (auto const& [A, order, phase] : terms)
-               linear.push_back({MatHandle::share(A.object), order, phase});
-             for (auto const& [name, maps, law] : contacts) {
-               groups.push_back({name, MatHandle::share(std::get<0>(maps.at(0)).object), law});
-               for (size_t k = 1; k < maps.size(); ++k)
-                 groups.back().ahead.push_back(
-                     {MatHandle::share(std::get<0>(maps[k]).object), std::get<1>(maps[k])});
-             }
-             new (self) Model(std::move(linear), std::move(groups), theta, unit);
-           })
+      .def(
+          "__init__",
+          [](Model* self, Terms const& terms, Contacts const& contacts, double theta, PetscInt unit) {
+            std::vector<model::Term> linear;
+            std::vector<model::Contact> groups;
+            for (auto const& [A, order, phase] : terms)
+              linear.push_back({MatHandle::share(A.object), order, phase});
+            for (auto const& [name, maps, law] : contacts) {
+              groups.push_back({name, MatHandle::share(std::get<0>(maps.at(0)).object), law});
+              for (size_t k = 1; k < maps.size(); ++k)
+                groups.back().ahead.push_back(
+                    {MatHandle::share(std::get<0>(maps[k]).object), std::get<1>(maps[k])});
+            }
+            new (self) Model(std::move(linear), std::move(groups), theta, unit);
+          },
+          nb::arg("terms"), nb::arg("contacts"), nb::arg("theta") = 0.0, nb::arg("unit") = 0)
       .def_prop_ro("dofs", &Model::dofs)
       .def_prop_ro("local_dofs", &Model::local_dofs)
       .def_prop_ro("first_dof", &Model::first_dof)
