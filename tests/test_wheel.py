@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import scipy.linalg
 from core_models import dense, filled, unknowns, whole
-from cyclic_models import lumped_blisk, rich_sector
+from cyclic_models import MASSES, NEIGHBOUR, lumped_blisk, rich_sector
 from test_jacobian import difference
 
 import fretwave as fw
@@ -119,3 +120,54 @@ def test_the_rows_are_the_component_on_the_avoided_mode(comm):
         assert complex(r[-2], -r[-1]) * length == pytest.approx(
             counter.conj() @ M @ (Q[:, 0] - 1j * Q[:, 1]), rel=1e-10
         )
+
+
+@pytest.mark.ranks(1, 2, 3, 4)
+def test_ranks_take_whole_sectors_with_their_contact(comm):
+    with rubbing_blisk().wheel(comm) as wheel:
+        begin, end = wheel.core.first_dof, wheel.core.first_dof + wheel.core.local_dofs
+        assert begin % 3 == 0 == end % 3
+        shroud, rim = wheel._pairs  # the shroud's last pair touches sector 0, whose dofs come first
+        assert np.array_equal(rim, np.arange(begin // 3, end // 3))
+        assert set(shroud) - {SECTORS - 1} == set(rim) - {SECTORS - 1}
+
+
+def deviations(share, seed=2) -> list[np.ndarray]:
+    """Random shares of the outer blade stiffness, the same for a seed."""
+    delta = share * np.random.default_rng(seed).uniform(-1, 1, SECTORS)
+    return [d * 2e6 * np.array([[0, 0, 0], [0, 1, -1], [0, -1, 1.0]]) for d in delta]
+
+
+def test_modes_of_a_mistuned_wheel_are_those_of_its_matrices(comm):
+    """Linear limit, from a dense eigenproblem assembled apart; double modes split."""
+    changes = deviations(0.02)
+    K = np.kron(np.eye(SECTORS), rubbing_blisk().K[0])
+    for j in range(SECTORS):
+        for other in (j - 1, j + 1):
+            K[3 * j, 3 * (other % SECTORS)] -= NEIGHBOUR
+        K[3 * j : 3 * j + 3, 3 * j : 3 * j + 3] += changes[j]
+    expected = np.sqrt(scipy.linalg.eigvalsh(K, np.kron(np.eye(SECTORS), np.diag(MASSES))))
+    with rubbing_blisk().wheel(comm, {"K": changes}) as wheel:
+        found = [mode.omega for mode in fw.linear_modes(wheel, 18, "free")]
+    assert found == pytest.approx(list(expected), rel=1e-10)
+    assert min(np.diff(found) / found[:-1]) > 1e-9
+
+
+def test_mistuned_modes_tend_to_the_tuned_ones(comm):
+    """Issue 4: linearly in the deviation (first-order perturbation of the frequencies)."""
+    with rubbing_blisk().wheel(comm) as wheel:
+        tuned = np.array([mode.omega for mode in fw.linear_modes(wheel, 12)])
+    distance = []
+    for share in (1e-3, 1e-4, 1e-5):
+        with rubbing_blisk().wheel(comm, {"K": deviations(share)}) as wheel:
+            mistuned = np.array([mode.omega for mode in fw.linear_modes(wheel, 12)])
+        distance.append(np.abs(mistuned / tuned - 1).max())
+    assert distance[0] / distance[1] == pytest.approx(10, rel=0.02)
+    assert distance[1] / distance[2] == pytest.approx(10, rel=0.02)
+
+
+@pytest.mark.ranks(1)
+def test_changes_that_do_not_fit_are_refused(comm):
+    for changes in ({"K": deviations(0.1)[:-1]}, {"K": [np.eye(2)] * SECTORS}, {"Q": deviations(0.1)}):
+        with pytest.raises(fw.InputError, match="do not fit its sectors"):
+            rubbing_blisk().wheel(comm, changes)

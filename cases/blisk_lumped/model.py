@@ -91,6 +91,29 @@ def sector(**options: float) -> fw.Sector:
     return fw.Sector(M, {0: K + 2 * ties, 1: -ties, -1: -ties}, SECTORS, None, [groove])
 
 
+def build(**options: float) -> fw.BuiltModel:
+    """The sector for the case file: with the disk and the ring of the next one as its high face.
+
+    A face's dof belongs to both sectors; its mass and ground spring are given once, on the low face.
+    """
+    one = sector(**options)
+    M, K = np.zeros((6, 6)), np.zeros((6, 6))
+    M[:4, :4], K[:4, :4] = one.M, one.K[0] + 2 * one.K[1]
+    for low, high in ((0, 4), (3, 5)):
+        K[np.ix_([low, high], [low, high])] += one.K[1][low, low] * np.array([[-1, 1], [1, -1]])
+    groove = one.contacts[0]
+    contact = fw.BuiltContact(np.hstack([groove.B, np.zeros((1, 2))]), 1, groove.parameters)
+    return fw.BuiltModel(
+        M,
+        K,
+        dofs={name: number for number, name in enumerate([*DOFS, "next_disk", "next_ring"])},
+        contacts={"groove": contact},
+        sectors=SECTORS,
+        low=np.array([0, 3]),
+        high=np.array([4, 5]),
+    )
+
+
 def ring_stiffness(options: Options, omega: float, nodal_diameter: int) -> float:
     """k_r - m_r omega^2 of the ring in a wave [N/m]: negative where its inertia outweighs its stiffness."""
     bending = 4 * options.ring_coupling * np.sin(np.pi * nodal_diameter / SECTORS) ** 2

@@ -2,7 +2,7 @@
 
     .venv/bin/python cases/blisk_lumped/waves.py --nodal-diameter 4 --out runs/blisk_lumped
 
-Writes wave.csv and wave.png into --out. With mpirun, every rank count gives the same table.
+Writes wave.csv, wave.png and wheel.png into --out. With mpirun, every rank count gives the same table.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ COLUMNS = (
 
 
 def branch(model: fw.Model, options: case.Options, arguments: argparse.Namespace) -> list[dict[str, Any]]:
-    """Points from stick to full slip; amplitudes are those of the disk [m]."""
+    """Points from stick to full slip; amplitudes are those of the disk [m]. `q` is the fundamental of all dofs."""
     stuck = fw.linear_modes(model, arguments.family)[-1]
     harmonics = fw.choose_harmonics(model, arguments.harmonics, SAMPLES)
     mode = fw.NonlinearMode(model, harmonics, arguments.method, case.DOFS.index("disk"), stuck)
@@ -45,7 +45,8 @@ def branch(model: fw.Model, options: case.Options, arguments: argparse.Namespace
     table = []
     for point in points:
         row = {"friction": options.friction, **mode.state(point.y), **mode.diagnostics(point.y)}
-        table.append({key: row[key] for key in COLUMNS})
+        Q = model.comm.bcast(mode.coefficients(point.y))
+        table.append({**{key: row[key] for key in COLUMNS}, "q": Q[:, 0] - 1j * Q[:, 1]})
     if not points.converged:
         raise fw.NotConverged(f"the branch of mu = {options.friction} stopped early", measured=points.reason)
     return table
@@ -93,6 +94,31 @@ def draw(tables: list[list[dict[str, Any]]], stuck: fw.LinearMode, free_hz: floa
     figure.savefig(path, dpi=130)
 
 
+def draw_wheel(table: list[dict[str, Any]], nodal_diameter: int, path: Path) -> None:
+    """Disk and ring around the wheel at one instant: stuck, at the largest damping, and sliding."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot as plt
+
+    peak = int(np.argmax([row["zeta"] for row in table]))
+    angle = 2 * np.pi * np.arange(case.SECTORS + 1) / case.SECTORS
+    figure, axes = plt.subplots(1, 3, figsize=(11, 4.2), subplot_kw={"projection": "polar"}, constrained_layout=True)
+    for axis, number, title in zip(axes, (0, peak, -1), ("stuck", "largest damping", "sliding")):
+        row = table[number]
+        around = case.sector().wave(row["q"], nodal_diameter).real / row["amplitude"]
+        for name, look in (("disk", "-o"), ("ring", "--s")):
+            motion = np.append(around[:, case.DOFS.index(name)], around[0, case.DOFS.index(name)])
+            axis.plot(angle, 3 + motion, look, ms=3.5, lw=1.2, label=name)
+        axis.plot(np.linspace(0, 2 * np.pi, 200), np.full(200, 3.0), color="0.6", lw=0.8)
+        axis.set(ylim=(0, 4.4), yticks=[], xticks=angle[:-1:6], title=f"{title}, {row['frequency_hz']:.2f} Hz")
+        axis.set_xticklabels([f"sector {j}" for j in range(0, case.SECTORS, 6)], fontsize=8)
+        axis.tick_params(pad=8)
+        axis.grid(False)
+    axes[0].legend(loc="center", frameon=False)
+    figure.savefig(path, dpi=130)
+
+
 def main() -> None:
     """Follow the branches, write the table, draw."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -115,11 +141,12 @@ def main() -> None:
     if first:
         arguments.out.mkdir(parents=True, exist_ok=True)
         with (arguments.out / "wave.csv").open("w", newline="") as file:
-            writer = csv.DictWriter(file, COLUMNS)
+            writer = csv.DictWriter(file, COLUMNS, extrasaction="ignore")
             writer.writeheader()
             writer.writerows(row for table in tables for row in table)
         number = arguments.family - 1
         draw(tables, stuck[number], elastic[number].frequency_hz, arguments.out / "wave.png")
+        draw_wheel(tables[-1], arguments.nodal_diameter, arguments.out / "wheel.png")
 
 
 if __name__ == "__main__":

@@ -82,6 +82,12 @@ class BuiltModel:
         Nodes [m], with dof = 3 * node + axis, for pictures and resultants.
     hexahedra : (n_cells, 8 or 27), optional
         Nodes of the cells in VTK's order, for pictures.
+    sectors : int, optional
+        The model is one sector of a wheel of this many.
+    low, high : (n_face,), optional
+        Matching dofs of a sector's two faces (`fretwave.match_faces` finds nodes that match).
+    axis : {"x", "y", "z"}, optional
+        Dofs of the faces are triples of Cartesian components, and the wheel lies about this axis.
     """
 
     M: Any
@@ -92,6 +98,10 @@ class BuiltModel:
     loads: Mapping[str, Array] = field(default_factory=dict)
     coordinates: Optional[Array] = None
     hexahedra: Optional[npt.NDArray[np.intp]] = None
+    sectors: Optional[int] = None
+    low: Optional[npt.NDArray[np.intp]] = None
+    high: Optional[npt.NDArray[np.intp]] = None
+    axis: Optional[str] = None
 
     def complaint(self) -> str | None:
         """What is inconsistent, None when nothing is."""

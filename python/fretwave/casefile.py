@@ -19,6 +19,7 @@ from .errors import CaseErrors, FretwaveError
 from .origin import Origin, check_physics, load_origin
 from .reduced import ReductionReport, kept_dofs
 from .schema import AnalysisSection, ModelSection, PreloadSection, ReductionSection, Section, StudySection
+from .sectors import Neighbours, check_waves, tie
 from .source import Source
 from .validation import toml, validate
 
@@ -48,6 +49,8 @@ class Case:
         What a reduction did; None for the model as given.
     preload : PreloadSection
         The static state of all analyses without one of their own; None for none.
+    neighbours : Neighbours
+        What ties a sector of a wheel to the next ones; None for a whole structure.
     analyses : dict
         Validated analyses by name, in the order of the file.
     resolved : dict
@@ -80,6 +83,7 @@ class Case:
     keep: list[int] = field(default_factory=list)
     reduced: ReductionReport | None = None
     preload: PreloadSection | None = None
+    neighbours: Neighbours | None = None
 
     @property
     def name(self) -> str:
@@ -104,6 +108,17 @@ class Case:
             values = [damper.c for damper in dampers]
             parts.append(scipy.sparse.csr_matrix((values, (places, places)), shape=self.M.shape))
         return sum(parts[1:], parts[0]).tocsr() if parts else None
+
+    def ahead_damping(self, own: Any) -> dict[int, Any] | None:
+        """C of a sector with its parts on other sectors; `own` is what `damping_with` gives."""
+        if self.neighbours is None or own is None:
+            return None if own is None else {0: own}
+        shares = zip("CKM", (1.0, *self.damping))
+        total = {0: own}
+        for letter, share in shares:
+            for k, part in self.neighbours.terms.get(letter, {}).items() if share else ():
+                total[k] = total[k] + share * part if k in total else share * part
+        return total
 
     def preload_of(self, analysis: AnalysisSection) -> PreloadSection | None:
         """The preload of an analysis: its own, or that of the case."""
@@ -177,6 +192,11 @@ def _build(source: Source, laws: Mapping[str, Any], found: list[FretwaveError]) 
     dofs = origin.dofs if origin else None
     built = origin.built if origin else None
     contacts = read_contacts(source, dofs, laws, found, built.contacts if built else {})
+    neighbours = None
+    if section and origin:
+        origin, contacts, neighbours = tie(section, source, origin, contacts, found)
+        dofs, built = origin.dofs, origin.built
+        check_waves(source, analyses, neighbours, reduction is not None, found)
     keep = kept_dofs(origin.named, contacts, analyses, origin.dofs) if origin and reduction else []
     checks.check_analyses(source, analyses, [origin.dofs[k] for k in keep] if origin and keep else dofs, found)
     check_reduction(source, reduction, found)
@@ -208,6 +228,7 @@ def _build(source: Source, laws: Mapping[str, Any], found: list[FretwaveError]) 
         reduction=reduction,
         keep=keep,
         preload=preload,
+        neighbours=neighbours,
     )
 
 

@@ -87,6 +87,8 @@ def describe(analysis: AnalysisSection, model: Any) -> list[str]:
             f"harmonics {_orders(harmonics.orders)}, {harmonics.samples} samples a period,"
             f" {model.n_dof} x {harmonics.block_size} = {model.n_dof * harmonics.block_size} coefficients"
         )
+        if analysis.nodal_diameter is not None:
+            lines.append(f"a wave of {analysis.nodal_diameter} nodal diameters on one sector of {model.sectors}")
         if harmonics.left_out:
             lines.append("left out: " + "; ".join(harmonics.left_out))
     return lines

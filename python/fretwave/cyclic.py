@@ -111,13 +111,24 @@ class Sector:
         """The equations of one sector in a wave of this many nodal diameters (negative: backward). Collective."""
         return Model(self.M, self.K, self.C, self.contacts, comm, self.sectors, nodal_diameter)
 
-    def wheel(self, comm: Any = None) -> Model:
-        """The whole wheel, sector after sector, N n_dof dofs. Collective."""
-        matrices = [None if A is None else self._around(A) for A in (self.M, self.K, self.C)]
+    def wheel(self, comm: Any = None, changes: Mapping[str, Sequence[Any]] | None = None) -> Model:
+        """The whole wheel, sector after sector, N n_dof dofs; ranks take whole sectors. Collective.
+
+        Parameters
+        ----------
+        changes : {"K": N matrices (n_dof, n_dof), ...}, optional
+            Added to a term of each sector in turn: a mistuned wheel.
+        """
+        terms = {letter: getattr(self, letter) for letter in "MKC"}
+        around = {letter: self._around(A) for letter, A in terms.items() if A is not None}
+        for letter, own in (changes or {}).items():
+            _check_changes(letter, own, self.sectors, self.n_dof)
+            added = sp.csr_matrix(sp.block_diag([sp.csr_matrix(A) for A in own]))
+            around[letter] = around[letter] + added if letter in around else added
         contacts = [
             replace(contact, B=self._around(contact.B), parameters=self._repeated(contact)) for contact in self.contacts
         ]
-        return Model(matrices[0], matrices[1], matrices[2], contacts, comm)
+        return Model(around["M"], around["K"], around.get("C"), contacts, comm, unit=self.n_dof)
 
     def wave(self, q: npt.ArrayLike, nodal_diameter: int, order: int = 1) -> npt.NDArray[np.complex128]:
         """Complex amplitudes (N, n_dof) of harmonic `order` in all sectors from those of sector 0, (n_dof,)."""
@@ -181,6 +192,18 @@ def check_balanced(parts: Parts, name: str) -> None:
 def _row_count(contact: Contact) -> int:
     """Rows of a contact's B."""
     return int(np.shape(by_sector(contact.B)[0])[0])
+
+
+def _check_changes(letter: str, own: Sequence[Any], sectors: int, n_dof: int) -> None:
+    shapes = {np.shape(A) for A in own}
+    if letter not in "MKC" or len(own) != sectors or shapes != {(n_dof, n_dof)}:
+        raise InputError(
+            "the changes of a mistuned wheel do not fit its sectors",
+            letter,
+            f"{len(own)} matrices of {', '.join(map(str, shapes))}",
+            f"M, K or C: {sectors} matrices of ({n_dof}, {n_dof})",
+            "give one matrix for each sector",
+        )
 
 
 def _indices(name: str, dofs: npt.ArrayLike) -> Indices:

@@ -112,6 +112,8 @@ class Model:
     nodal_diameter : int
         Of the wave, in the convention of `fretwave.cyclic`: x_{j+1}(t) = x_j(t - theta / omega) with
         theta = 2 pi nodal_diameter / sectors.
+    unit : int
+        Ranks take whole groups of this many dofs of matrices given whole: a wheel is cut between its sectors.
     """
 
     def __init__(
@@ -123,12 +125,13 @@ class Model:
         comm: Any = None,
         sectors: int = 1,
         nodal_diameter: int = 0,
+        unit: int = 1,
     ) -> None:
         terms = [(A, order, k) for order, given in enumerate((K, C, M)) for k, A in by_sector(given).items()]
         first = terms[0][0]
         if comm is None:
             comm = first.getComm().tompi4py() if isinstance(first, PETSc.Mat) else MPI.COMM_WORLD
-        self.comm, self.sectors, self.nodal_diameter = comm, sectors, nodal_diameter
+        self.comm, self.sectors, self.nodal_diameter, self._unit = comm, sectors, nodal_diameter, unit
         self._matrices = [self._matrix(matrix) for matrix, *_ in terms]
         self.contacts = list(contacts)
         self.n_dof: int = self._matrices[0].getSize()[1]
@@ -153,9 +156,9 @@ class Model:
         return mat
 
     def _rows(self, n: int) -> tuple[int, int]:
-        """PETSc's own split of n rows."""
-        size, rank = self.comm.size, self.comm.rank
-        local = [n // size + (r < n % size) for r in range(size)]
+        """PETSc's own split of n rows, in whole units."""
+        size, rank, units = self.comm.size, self.comm.rank, n // self._unit
+        local = [self._unit * (units // size + (r < units % size)) for r in range(size)]
         return sum(local[:rank]), sum(local[: rank + 1])
 
     def _group(self, contact: Contact) -> tuple[str, list[tuple[PETSc.Mat, int]], Any]:

@@ -20,6 +20,7 @@ from .reduced import reduce_case
 from .results import open_results
 from .runfolder import CASE_COPY, RunFolder, new_record, peak_memory_mb, read_record
 from .schema import AnalysisSection, ForcedAnalysis, PreloadSection, TransientSection
+from .sectors import nodal_diameter
 from .source import display
 from .stopped import joined, not_converged
 
@@ -145,6 +146,8 @@ class _Runner:
         self.console.line(
             f"{verb} on {ranks}, {len(self.case.dofs)} dofs, results in {display(self.folder.path)}: {', '.join(names)}"
         )
+        if self.case.neighbours is not None:
+            self.console.line(f"one of {self.case.neighbours.sectors} sectors of a wheel")
         for note in self.case.notes:
             self.console.line(f"note: {note}")
         others = [name for name in self.case.analyses if name not in names]
@@ -214,7 +217,8 @@ class _Runner:
             self.folder.start()
 
         preload = self.case.preload_of(analysis)
-        with build_model(self.case, self._dampers(analysis), self.comm, preload) as model, options.inserted():
+        built = build_model(self.case, self._dampers(analysis), self.comm, preload, nodal_diameter(analysis))
+        with built as model, options.inserted():
             context = AnalysisContext(
                 model,
                 self.case,
@@ -299,18 +303,30 @@ def needs(analysis: AnalysisSection) -> list[str]:
     return []
 
 
-def build_model(case: Case, dampers: Sequence[Any], comm: Any, preload: PreloadSection | None = None) -> Any:
-    """``fretwave.Model`` of a case; a preload without pair loads sets the pairs' normal loads to zero. Collective."""
+def build_model(
+    case: Case, dampers: Sequence[Any], comm: Any, preload: PreloadSection | None = None, nodal_diameter: int = 0
+) -> Any:
+    """``fretwave.Model`` of a case; a preload without pair loads sets the pairs' normal loads to zero. Collective.
+
+    Parameters
+    ----------
+    nodal_diameter : of the wave, where the case is a sector of a wheel
+    """
     import fretwave
 
+    neighbours = case.neighbours
     without = {"normal_load": 0.0} if preload is not None and not preload.pair_loads else {}
     contacts = [
         fretwave.Contact(
             contact.law,
-            contact.rows,
+            contact.rows if neighbours is None else neighbours.rows(contact),
             {**contact.parameters, **{key: value for key, value in without.items() if key in contact.parameters}},
             name=contact.name,
         )
         for contact in case.contacts
     ]
-    return fretwave.Model(case.M, case.K, C=case.damping_with(dampers), contacts=contacts, comm=comm)
+    M, K, C = case.M, case.K, case.damping_with(dampers)
+    if neighbours is None:
+        return fretwave.Model(M, K, C, contacts, comm)
+    M, K, C = neighbours.with_own("M", M), neighbours.with_own("K", K), case.ahead_damping(C)
+    return fretwave.Model(M, K, C, contacts, comm, neighbours.sectors, nodal_diameter)

@@ -50,6 +50,13 @@ class ModelSection(Section):
         default=None,
     )
     options: dict[str, Any] = key("options of the builder", example="{ speed_rpm = 2000 }", default_factory=dict)
+    sectors: Optional[int] = key(
+        "the model is one of this many equal sectors of a wheel", example="24", default=None, ge=2
+    )
+    low: Optional[list[Dof]] = key("dofs of the sector's low face", example='["rim_0"]', default=None, min_length=1)
+    high: Optional[list[Dof]] = key(
+        "dofs of its high face, which move like the low face of the next sector", example='["rim_1"]', default=None
+    )
     stiffness_damping: float = key("C grows by this times K", "s", "2e-6", default=0.0, ge=0, allow_inf_nan=False)
     mass_damping: float = key("C grows by this times M", "1/s", "0.1", default=0.0, ge=0, allow_inf_nan=False)
 
@@ -128,6 +135,9 @@ class HarmonicSection(AnalysisSection):
     )
     samples: Optional[int] = key("time samples of a period in the contact law", example="1024", default=None, ge=4)
     linear_mode: int = key("linear mode to start from, 1 is the lowest", example="1", default=1, ge=1)
+    nodal_diameter: Optional[int] = key(
+        "nodal diameters of the wave on a sector, negative for a backward wave", example="4", default=None
+    )
     step: StepSection = key("step control", example="{ initial = 0.05, maximum = 0.3 }", default_factory=StepSection)
     preload: Optional[PreloadSection] = key("in place of [preload]", example="{ pair_loads = true }", default=None)
 

@@ -22,6 +22,7 @@ from .petsc_options import AnalysisOptions
 from .reduced import reduce_case
 from .run import build_model
 from .schema import ModeAnalysis
+from .sectors import nodal_diameter
 from .study_plan import Outcome, Plan, Settings, Study, common_amplitudes
 from .study_report import markdown, write_csv
 
@@ -65,7 +66,8 @@ class _Solver:
             if self._parts is not None:
                 self._parts[1].model.destroy()
             case = reduce_case(self.case, self.comm, component_modes)
-            model = build_model(case, self.analysis.dampers, self.comm, case.preload_of(self.analysis))
+            preload, diameters = case.preload_of(self.analysis), nodal_diameter(self.analysis)
+            model = build_model(case, self.analysis.dampers, self.comm, preload, diameters)
             context = AnalysisContext(model, case, self.analysis, self.comm, Path(), self.console)
             self._parts = (component_modes, context, *start_mode(context, self.analysis.linear_mode))
         return self._parts[1:]

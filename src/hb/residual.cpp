@@ -174,33 +174,32 @@ void Residual::pattern(std::vector<PetscInt>& rows, std::vector<PetscInt>& cols)
 }
 
 /// P_row^H D P_col of an m x m block, P the phase factors: rows and columns are harmonic blocks themselves.
-void Residual::turn(int row_phase, int col_phase, std::vector<double>& block) const {
+void Residual::turn(int row_phase, int col_phase, double* block) const {
   const int m = harmonics_.block_size();
-  std::vector<double> work(block.size());
-  const auto transpose = [m](std::vector<double> const& in, std::vector<double>& out) {
+  std::vector<double> work(size_t(m) * m);
+  const auto transpose = [m](double const* in, double* out) {
     for (int i = 0; i < m; ++i)
       for (int j = 0; j < m; ++j) out[size_t(j) * m + i] = in[size_t(i) * m + j];
   };
   // a row d of D becomes P^T d, which is the factor's conjugate times d
-  multiply(harmonics_, conjugate(factors(col_phase)), block.data(), work.data(), m);
-  transpose(work, block);
-  multiply(harmonics_, conjugate(factors(row_phase)), block.data(), work.data(), m);
-  transpose(work, block);
+  multiply(harmonics_, conjugate(factors(col_phase)), block, work.data(), m);
+  transpose(work.data(), block);
+  multiply(harmonics_, conjugate(factors(row_phase)), block, work.data(), m);
+  transpose(work.data(), block);
 }
 
 double* Residual::values(double scale, double* v) {
   v = stiffness_.values(e_, scale, v);
   const size_t m = harmonics_.block_size();
   const auto tangents = pair_tangents();
-  std::vector<double> block(m * m);
   for (size_t g = 0; g < groups_.size(); ++g) {
     const size_t ld = tangents[g].components * m;
     for (auto const& place : groups_[g].places) {  // B^H (dF/dU) B
       double const* from = tangents[g].D.data() + (place.pair * ld + place.row * m) * ld + place.col * m;
       for (size_t i = 0; i < m; ++i)
-        for (size_t j = 0; j < m; ++j) block[i * m + j] = scale * place.value * from[i * ld + j];
-      if (place.row_phase || place.col_phase) turn(place.row_phase, place.col_phase, block);
-      v = std::copy(block.begin(), block.end(), v);
+        for (size_t j = 0; j < m; ++j) v[i * m + j] = scale * place.value * from[i * ld + j];
+      if (place.row_phase || place.col_phase) turn(place.row_phase, place.col_phase, v);
+      v += m * m;
     }
   }
   return v;

@@ -83,7 +83,7 @@ class Residual {
   void add_force(Group const&, Vec F, Vec R) const;
   void contact_product(Group&, Vec dQ, Exponents const* de, Vec dR);
   void find_weights(Group&);
-  void turn(int row_phase, int col_phase, std::vector<double>& block) const;
+  void turn(int row_phase, int col_phase, double* block) const;
   std::vector<complex> factors(int phase) const;
   void contact_pattern(Group&, std::vector<PetscInt>& rows, std::vector<PetscInt>& cols);
 

@@ -12,6 +12,7 @@ import scipy.sparse.linalg
 from ..contacts import ContactSpec, closed_contacts
 from ..errors import InputError
 from ..schema import PreloadSection
+from ..sectors import nodal_diameter
 from .asymptotes import closed_stiffness
 from .context import AnalysisContext
 
@@ -47,7 +48,7 @@ def rest_state(context: AnalysisContext, factor: float = 1.0) -> Any:
         return balanced(context.model, reference)
     load = factor * np.sum([context.case.loads[name] for name in section.loads], axis=0)
     closed = None
-    if just_touching(context.case.contacts, section):
+    if context.case.neighbours is None and just_touching(context.case.contacts, section):
         stuck = context.case.K + closed_stiffness(context, tangential=True)
         closed = scipy.sparse.linalg.spsolve(stuck.tocsc(), load)
     return static_preload(context.model, load, reference, closed=closed)
@@ -68,8 +69,8 @@ def closed_mode(context: AnalysisContext) -> Any:
 
     from ..run import build_model
 
-    contacts = closed_contacts(context.case.contacts)
-    with build_model(replace(context.case, contacts=contacts), (), context.comm) as model:
+    case = replace(context.case, contacts=closed_contacts(context.case.contacts))
+    with build_model(case, (), context.comm, nodal_diameter=nodal_diameter(context.analysis)) as model:
         return fretwave.linear_modes(model, 1)[0]
 
 
