@@ -38,6 +38,8 @@ class Options:
     ring_height: float = 0.006  #: radial; its width is that of the column "ring"
     ring_hold: float = 62.8  #: soft foundation of the ring, as its own frequency on it [rad/s]
     speed_rpm: float = 3000.0  #: gives the normal loads
+    friction: float = 0.3  #: coefficient of friction
+    normal: str = "constant"  #: load on the pairs; or "variable", with lift-off (law coulomb_3d)
     normal_stiffness: float = 5e13  #: of the contact, per area [N/m^3]
     tangential_stiffness: float = 4e13  #: [N/m^3]
     youngs_modulus: float = 114e9  #: of the blisk (Ti-6Al-4V) [Pa]
@@ -52,7 +54,7 @@ class Options:
     radial_cells: tuple[int, int, int] = (9, 2, 2)  #: web, lip, rim
     span_cells: int = 12
     ring_cells: int = 2
-    interface_diameters: tuple[int, ...] = (0, 4, 8, 12, 16)  #: whose waves give the interface modes
+    interface_diameters: tuple[int, ...] = (4, 12, 16)  #: whose waves give the interface modes
     interface_waves: int = 10  #: of each, stuck and sliding
     interface_tolerance: float = 1e-5  #: singular values kept, over the largest
     component_modes: int = 30
@@ -94,7 +96,9 @@ def ring_blocks(o: Options) -> list[fe.Block]:
     return cut(o, "", ["ring"], (o.groove_radius - o.ring_height, o.groove_radius), o.ring_cells)
 
 
-def cut(o: Options, layer: str, columns: list[str] | tuple[str, ...], radii: tuple[float, float], cells: int) -> list[fe.Block]:
+def cut(
+    o: Options, layer: str, columns: list[str] | tuple[str, ...], radii: tuple[float, float], cells: int
+) -> list[fe.Block]:
     """A layer between two radii: for each column along the axis three blocks along the circumference."""
     blocks = []
     for name in columns:
@@ -142,7 +146,10 @@ def aerofoil(o: Options, name: str) -> Callable[[Array], Array]:
 
 def low_and_high(mesh: fe.Mesh) -> tuple[Indices, Indices]:
     """Nodes of a sector's two faces: on the outer sides of the columns left and right."""
-    ends = [[mesh.block_side(n, 0, e).ravel() for n in mesh.lattice if n.endswith(s)] for s, e in (("left", 0), ("right", 1))]
+    ends = [
+        [mesh.block_side(n, 0, e).ravel() for n in mesh.lattice if n.endswith(s)]
+        for s, e in (("left", 0), ("right", 1))
+    ]
     return np.unique(np.concatenate(ends[0])), np.unique(np.concatenate(ends[1]))
 
 

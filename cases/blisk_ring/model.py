@@ -8,7 +8,7 @@ Geometry is in `geometry.py`; here are matrices, contact pairs and the reduction
 from __future__ import annotations
 
 import sys
-from dataclasses import asdict, fields
+from dataclasses import asdict, fields, replace
 from pathlib import Path
 from typing import Any, Union
 
@@ -33,18 +33,10 @@ COLUMNS = ("left", "middle", "right")
 def build(**options: Any) -> fw.BuiltModel:
     """The reduced sector for a case file; options are the fields of `geometry.Options`."""
     o, r = checked_options(options), reduced(**options)
-    groove = fw.BuiltContact(
-        B=r["B"],
-        parameters=contact_parameters(o, r),
-        areas=r["areas"],
-        points=r["points"],
-        frames=r["frames"],
-        faces=["groove"] * len(r["areas"]),
-        positions=r["positions"],
-    )
+    K, groove = groove_contact(o, r)
     return fw.BuiltModel(
         M=r["M"],
-        K=r["K"],
+        K=K,
         dofs={"tip": int(r["tip"])},
         contacts={"groove": groove},
         sectors=o.blades,
@@ -53,17 +45,39 @@ def build(**options: Any) -> fw.BuiltModel:
     )
 
 
+def groove_contact(o: Options, model: dict[str, Any]) -> tuple[sp.csr_matrix, fw.BuiltContact]:
+    """K and the pairs for the chosen law.
+
+    With constant normal load the pairs stay closed on their normal stiffness, which K then has, and each tangent is a
+    Jenkins slider of limit mu N: a motion of other mu or N is the same motion scaled by mu N.
+    """
+    parameters, n = contact_parameters(o, model), len(model["areas"])
+    if o.normal == "variable":
+        given = {**parameters, "friction_coefficient": o.friction}
+        where = {key: model[key] for key in ("areas", "points", "frames", "positions")}
+        return model["K"], fw.BuiltContact(model["B"], 3, given, faces=["groove"] * n, **where)
+    tangents = np.arange(3 * n) % 3 > 0
+    given = {
+        "tangential_stiffness": np.repeat(parameters["tangential_stiffness"], 2),
+        "friction_limit": o.friction * np.repeat(parameters["normal_load"], 2),
+    }
+    return stiffened(o, model, False), fw.BuiltContact(model["B"][tangents], 1, given)
+
+
 def checked_options(options: dict[str, Any]) -> Options:
     """Options with known names."""
     known = [field.name for field in fields(Options)]
     for name in options:
         if name not in known:
             raise InputError("unknown option of the blisk", None, name, ", ".join(known), "remove or rename it")
-    return Options(**options)
+    chosen = Options(**options)
+    if chosen.normal not in ("constant", "variable"):
+        raise InputError("unknown normal load", None, chosen.normal, "constant or variable", "change normal")
+    return chosen
 
 
 def contact_parameters(o: Options, model: dict[str, Any]) -> dict[str, Array]:
-    """Of the law coulomb_3d but friction; the ring's centrifugal force m r Omega^2 is spread over the groove by area."""
+    """Stiffness and normal load of the pairs; the ring's centrifugal force m r Omega^2 is spread over the groove by area."""
     share = model["areas"] / model["areas"].sum()
     return {
         "normal_stiffness": o.normal_stiffness * model["areas"],
@@ -88,7 +102,9 @@ def full(**options: Any) -> dict[str, Any]:
     disk, ring = fe.join(disk_blocks(o), o.order), fe.join(ring_blocks(o), o.order)
     worst = [mesh.check_quality().ratio for mesh in (disk, ring)]
     parts = [fe.assemble(mesh, material) for mesh, material in ((disk, o.material), (ring, o.ring_material))]
-    reports = [fe.check_matrices(*given, *part) for given, part in zip(((disk, o.material), (ring, o.ring_material)), parts)]
+    reports = [
+        fe.check_matrices(*given, *part) for given, part in zip(((disk, o.material), (ring, o.ring_material)), parts)
+    ]
     nodes = np.concatenate([disk.nodes, ring.nodes])
     (M_disk, K_disk), (M_ring, K_ring) = parts
     K = sp.block_diag([K_disk, K_ring + o.ring_hold**2 * M_ring])
@@ -108,7 +124,9 @@ def full(**options: Any) -> dict[str, Any]:
         coordinates=nodes,
         hexahedra=np.concatenate([disk.vtk_cells, len(disk.nodes) + ring.vtk_cells]),
         disk_nodes=len(disk.nodes),
-        blade_nodes=np.unique(np.concatenate([disk.lattice[name].ravel() for name in disk.lattice if name.startswith("blade")])),
+        blade_nodes=np.unique(
+            np.concatenate([disk.lattice[name].ravel() for name in disk.lattice if name.startswith("blade")])
+        ),
         blade_root=rooted(disk),
         blade_lines=blade_lines(disk),
         ring_mass=reports[1].mass,
@@ -199,7 +217,7 @@ def reduced(cache: Union[Path, str, None] = "default", **options: Any) -> dict[s
         return compute(o)
     folder = default_folder() if cache == "default" else Path(cache)
     here = Path(__file__)
-    key = model_key(asdict(o), [here, here.with_name("geometry.py")])
+    key = model_key(asdict(replace(o, speed_rpm=0.0, friction=0.0, normal="")), [here, here.with_name("geometry.py")])
     return cached(folder / f"blisk_ring_{key}.npz", lambda: compute(o))
 
 
