@@ -77,7 +77,7 @@ def checked_options(options: dict[str, Any]) -> Options:
 
 
 def contact_parameters(o: Options, model: dict[str, Any]) -> dict[str, Array]:
-    """Stiffness and normal load of the pairs; the ring's centrifugal force m r Omega^2 is spread over the groove by area."""
+    """Stiffness and normal load of the pairs: the ring's centrifugal force m r Omega^2 is spread by area."""
     share = model["areas"] / model["areas"].sum()
     return {
         "normal_stiffness": o.normal_stiffness * model["areas"],
@@ -95,7 +95,7 @@ def full(**options: Any) -> dict[str, Any]:
         M, K : (n_dof, n_dof) CSR, without contact, both faces free; B : (3 n_pairs, n_dof), rows (normal, axial,
         circumferential) of ring minus groove pair by pair, u_n > 0 closes; low, high : (n_face,) matching dofs;
         areas, points, frames, positions of the pairs; tip : dof; free : (n_free,) nodes of the mesh that are not held;
-        coordinates (n_nodes, 3) and hexahedra of the whole mesh; disk_nodes, blade_nodes, blade_root;
+        coordinates (n_nodes, 3), hexahedra and boundary_faces of the whole mesh; disk_nodes, blade_nodes, blade_root;
         ring_mass [kg], ring_radius [m]; mass, rigid_residual : (disk with blade, ring).
     """
     o = checked_options(options)
@@ -123,6 +123,7 @@ def full(**options: Any) -> dict[str, Any]:
         free=free,
         coordinates=nodes,
         hexahedra=np.concatenate([disk.vtk_cells, len(disk.nodes) + ring.vtk_cells]),
+        boundary_faces=np.concatenate([disk.boundary_faces, len(disk.nodes) + ring.boundary_faces]),
         disk_nodes=len(disk.nodes),
         blade_nodes=np.unique(
             np.concatenate([disk.lattice[name].ravel() for name in disk.lattice if name.startswith("blade")])
@@ -288,7 +289,15 @@ def second_bending(o: Options, model: dict[str, Any]) -> tuple[float, Array, Any
 
 
 def likeness(model: dict[str, Any], wave: Array, shape: Array, dofs: Any) -> float:
-    """Share of the wave's kinetic energy (n_dof complex, both faces) that moves the blade like the held blade's mode."""
+    """Share of a wave's kinetic energy that moves the blade like the held blade's mode.
+
+    Parameters
+    ----------
+    wave : (n_dof,) complex
+        On the unreduced sector with both faces.
+    shape, dofs
+        As `second_bending` gives them.
+    """
     M = model["M"]
     along = shape @ (M[dofs][:, dofs] @ wave[dofs])
     return float(abs(along) ** 2 / (shape @ (M[dofs][:, dofs] @ shape)) / (wave.conj() @ (M @ wave)).real)
