@@ -26,11 +26,11 @@ def quads(model: dict[str, Any]) -> Array:
     return np.stack([faces[:, 0, 0], faces[:, -1, 0], faces[:, -1, -1], faces[:, 0, -1]], axis=1)
 
 
-def show(axes: Any, points: Array, elevation: float, azimuth: float) -> None:
+def show(axes: Any, points: Array, elevation: float, azimuth: float, zoom: float = 1.3) -> None:
     """Equal scales around the points, no frame."""
     middle, half = (points.max(axis=0) + points.min(axis=0)) / 2, np.ptp(points, axis=0) / 2
     axes.set(**{f"{name}lim": (c - h, c + h) for name, c, h in zip("xyz", middle, half)})
-    axes.set_box_aspect(half)
+    axes.set_box_aspect(half, zoom=zoom)
     axes.view_init(elevation, azimuth)
     axes.set_axis_off()
 
@@ -38,25 +38,25 @@ def show(axes: Any, points: Array, elevation: float, azimuth: float) -> None:
 def mesh(model: dict[str, Any], path: Path) -> None:
     """The sector, and its section at the groove with ring and contact pairs."""
     figure = plt.figure(figsize=(10, 5.2), constrained_layout=True)
-    nodes, faces = model["coordinates"], quads(model)
+    nodes, faces = upright(model["coordinates"]), quads(model)
     colours = np.where((faces >= model["disk_nodes"]).all(axis=1), RING, DISK)
     axes = figure.add_subplot(1, 2, 1, projection="3d")
     axes.add_collection3d(Poly3DCollection(nodes[faces], facecolors=colours, edgecolors="0.25", linewidths=0.25))
-    show(axes, nodes, 20, -60)
+    show(axes, nodes, 15, 215, 1.0)
     axes.set_title(f"sector, {model['M'].shape[0]:,} dofs", fontsize=10)
-    rim = faces[(np.hypot(*nodes[faces][:, :, :2].mean(axis=1).T) < nodes_rim(model)) & (colours == RING)]
+    ring, points = faces[colours == RING], upright(model["points"])
     axes = figure.add_subplot(1, 2, 2, projection="3d")
-    axes.add_collection3d(Poly3DCollection(nodes[rim], facecolors=RING, edgecolors="0.25", linewidths=0.4, alpha=0.35))
-    axes.scatter(*model["points"].T, color="k", s=14, depthshade=False)
-    show(axes, np.concatenate([nodes[np.unique(rim)], model["points"]]), 35, -20)
-    axes.set_title(f"ring with {len(model['areas'])} contact pairs on its outer side", fontsize=10)
+    axes.add_collection3d(Poly3DCollection(nodes[ring], facecolors=RING, edgecolors="0.25", linewidths=0.4, alpha=0.35))
+    axes.scatter(*points.T, color="k", s=14, depthshade=False)
+    show(axes, nodes[np.unique(ring)], 35, 35, 1.0)
+    axes.set_title(f"ring with {len(points)} contact pairs on its outer side", fontsize=10)
     figure.savefig(path, dpi=130)
     plt.close(figure)
 
 
-def nodes_rim(model: dict[str, Any]) -> float:
-    """A radius above the ring [m]."""
-    return float(np.hypot(*model["points"][:, :2].T).max() * 1.001)
+def upright(points: Array) -> Array:
+    """Coordinates (n, 3) with the radius upwards: z, -y, x."""
+    return np.column_stack([points[:, 2], -points[:, 1], points[:, 0]])
 
 
 def shape(o: Any, model: dict[str, Any], wave: Array, frequency: float, path: Path) -> None:
@@ -77,7 +77,7 @@ def shape(o: Any, model: dict[str, Any], wave: Array, frequency: float, path: Pa
     collection.set_array(shade)
     collection.set_clim(-1, 1)
     axes.add_collection3d(collection)
-    show(axes, np.concatenate(polygons).reshape(-1, 3), 55, -70)
+    show(axes, np.concatenate(polygons).reshape(-1, 3), 55, -70, 1.5)
     axes.set_title(f"second bending at 4 nodal diameters, stuck ring, {frequency:.1f} Hz", fontsize=10)
     figure.colorbar(collection, ax=axes, shrink=0.6, label="axial displacement, 1 at the blade's observed tip")
     figure.savefig(path, dpi=130)
@@ -94,7 +94,7 @@ def families(table: Array, exact: dict[int, Array], path: Path) -> None:
         label = "unreduced" if number == 0 else None
         axes.plot([diameters] * len(values), values / 1e3, "x", ms=8, color="#d1495b", label=label)
     axes.set(xlabel="nodal diameters", ylabel="frequency [kHz]", ylim=(0, None), xticks=range(0, len(table), 2))
-    axes.legend(frameon=False, loc="lower right")
+    axes.legend(frameon=False, loc="upper left")
     figure.savefig(path, dpi=130)
     plt.close(figure)
 
