@@ -113,6 +113,8 @@ def sweep(tables: list[list[dict[str, float]]], stuck_hz: float, sliding_hz: flo
         axes[1, column].set(xscale="log", xlabel=label, ylim=(0, None))
         for value in (stuck_hz, sliding_hz):
             axes[0, column].axhline(value, color="0.5", lw=0.8, ls=":")
+    bottom, top = axes[0, 0].get_ylim()
+    axes[0, 0].set_ylim(bottom, top + 0.08 * (top - bottom))  # room for a label above the upper line
     right = axes[0, 0].get_xlim()[1]
     place = {"xytext": (-4, 4), "textcoords": "offset points", "color": "0.4", "ha": "right"}
     axes[0, 0].annotate("ring stuck", (right, stuck_hz), **{**place, "xytext": (-4, -12)})
