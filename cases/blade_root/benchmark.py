@@ -108,7 +108,8 @@ def routes(options: argparse.Namespace) -> None:
         couples = [(a, b) for a, b in zip(*found.values()) if abs(a["amplitude"] / b["amplitude"] - 1) < 1e-9]
         apart = [max(abs(b[key] / a[key] - 1) for a, b in couples) for key in ("omega", "beta")]
         say(
-            f"       apart at {len(couples)} of {len(found['direct'])} points: omega {apart[0]:.1e}, beta {apart[1]:.1e}"
+            f"       apart at {len(couples)} of {len(found['direct'])} points:"
+            f" omega {apart[0]:.1e}, beta {apart[1]:.1e}"
         )
     for route, seconds in times.items():
         say(f"{route}: time ~ H^{exponent(options.harmonics, seconds):.2f}")
