@@ -127,6 +127,21 @@ inline int comm_size(MPI_Comm comm) {
   return size;
 }
 
+/// visit(row, col, value) for the entries of this rank's rows.
+template <class Visit>
+void for_entries(Mat A, Visit visit) {
+  PetscInt begin, end;
+  check(MatGetOwnershipRange(A, &begin, &end));
+  for (PetscInt row = begin; row < end; ++row) {
+    PetscInt count;
+    PetscInt const* cols;
+    PetscScalar const* values;
+    check(MatGetRow(A, row, &count, &cols, &values));
+    for (PetscInt k = 0; k < count; ++k) visit(row, cols[k], values[k]);
+    check(MatRestoreRow(A, row, &count, &cols, &values));
+  }
+}
+
 /// All ranks' items in rank order, on every rank. Collective.
 template <class T>
 std::vector<T> gathered(std::span<T const> mine, MPI_Comm comm) {

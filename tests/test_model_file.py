@@ -34,10 +34,10 @@ def model_of_a_bar() -> FileModel:
     names = [dof_name(*(int(part) for part in label)) for label in zip(*table)]
     names[-1] = "tip"
     pairs = np.column_stack([end[::3] // 3 + 1, np.zeros(len(end) // 3, dtype=int)])
-    root = ContactMap("root", B, BAR.nodes[pairs[:, 0] - 1], np.full(len(pairs), 5e-5), frames.copy(), pairs)
+    flank = ContactMap("flank", B, BAR.nodes[pairs[:, 0] - 1], np.full(len(pairs), 5e-5), frames.copy(), pairs)
     sources = [SourceFile("mass", "m.mtx", 12, "ab"), SourceFile("stiffness", "k.mtx", 34, "cd")]
     C = 1e-6 * BAR.K
-    parts = dict(kept=np.array([len(names) - 1]), node_numbers=nodes, coordinates=BAR.nodes, contacts={"root": root})
+    parts = dict(kept=np.array([len(names) - 1]), node_numbers=nodes, coordinates=BAR.nodes, contacts={"flank": flank})
     return FileModel(BAR.M, BAR.K, C, names, *table, **parts, units="kg, N, m", sources=sources)
 
 
@@ -55,8 +55,8 @@ def test_what_goes_in_comes_out(path: Path) -> None:
     for key in ("node", "direction", "kept", "node_numbers", "coordinates"):
         np.testing.assert_array_equal(getattr(was, key), getattr(found, key))
     for key in ("positions", "areas", "frames", "nodes"):
-        np.testing.assert_array_equal(getattr(was.contacts["root"], key), getattr(found.contacts["root"], key))
-    assert (was.contacts["root"].B != found.contacts["root"].B).nnz == 0
+        np.testing.assert_array_equal(getattr(was.contacts["flank"], key), getattr(found.contacts["flank"], key))
+    assert (was.contacts["flank"].B != found.contacts["flank"].B).nnz == 0
     assert (found.names, found.units, found.sources) == (was.names, was.units, was.sources)
     assert not path.with_name("bar.h5.unfinished").exists()
 
@@ -92,9 +92,9 @@ def test_modes_on_any_number_of_ranks(comm, path: Path) -> None:
     found = on_first_rank(comm, lambda: model_file.read(path))
     stiffness = {"normal_stiffness": 3e8, "tangential_stiffness": 2e8}
     law = {**stiffness, "friction_coefficient": 0.5, "normal_load": 100.0}
-    contact = fw.Contact("coulomb_3d", found.contacts["root"].B, law, name="root")
-    springs = np.tile([3e8, 2e8, 2e8], found.contacts["root"].pairs)
-    stuck = BAR.K + found.contacts["root"].B.T @ sp.diags(springs) @ found.contacts["root"].B
+    contact = fw.Contact("coulomb_3d", found.contacts["flank"].B, law, name="flank")
+    springs = np.tile([3e8, 2e8, 2e8], found.contacts["flank"].pairs)
+    stuck = BAR.K + found.contacts["flank"].B.T @ sp.diags(springs) @ found.contacts["flank"].B
     with fw.Model(found.M, found.K, contacts=[contact], comm=comm) as model:
         modes = fw.linear_modes(model, 12, "stuck")
     exact = np.sqrt(scipy.linalg.eigh(stuck.toarray(), BAR.M.toarray(), eigvals_only=True)[:12])
@@ -128,7 +128,7 @@ WRONG = {
     "names": (put("dofs/name", np.array([b"a", b"a"])), "1 different names"),
     "table": (put("dofs/node", np.arange(3)), "dofs/node does not fit"),
     "kept": (put("dofs/kept", np.array([999])), "a kept dof does not exist"),
-    "areas": (put("contacts/root/areas", np.ones(3)), "contacts/root/areas does not fit"),
+    "areas": (put("contacts/flank/areas", np.ones(3)), "contacts/flank/areas does not fit"),
     "size": (lambda file: file["C"].attrs.update(shape=[3, 3]), "damaged"),
     "later version": (lambda file: file.attrs.update(format_version=2), "later version"),
     "another format": (lambda file: file.attrs.update(format="other"), "format 'other'"),
@@ -170,7 +170,7 @@ file = "bar.h5"
 modes = 8
 [preload]
 [[contact]]
-name = "root"
+name = "flank"
 law = "coulomb_3d"
 normal_stiffness_per_area = 6e12
 tangential_stiffness = 2e8
@@ -194,7 +194,7 @@ def test_case_from_a_model_file(path: Path) -> None:
     case = load_case(case_file)
     assert case.dof("tip") == len(case.dofs) - 1 and case.dof("n1x") == 0
     assert (case.K != BAR.K).nnz == 0 and case.C is not None
-    assert (case.contacts[0].rows != model_of_a_bar().contacts["root"].B).nnz == 0
+    assert (case.contacts[0].rows != model_of_a_bar().contacts["flank"].B).nnz == 0
     np.testing.assert_allclose(case.contacts[0].parameters["normal_stiffness"], 6e12 * 5e-5)
     assert case.resolved["model.file"].startswith("bar.h5 ")
 
@@ -207,7 +207,7 @@ def test_case_from_a_model_file(path: Path) -> None:
         ('"bar.h5"', '"bar.h5"\nbuilder = "model.py"', "several places: builder, file"),
         ('"bar.h5"', '"bar.h5"\nM = [[1.0]]', "several places: file, M"),
         ('"bar.h5"', '"bar.h5"\noptions = { a = 1 }', "options but no builder"),
-        ('"root"', '"rot"', "did you mean `root`?"),
+        ('"flank"', '"flak"', "did you mean `flank`?"),
         ('"tip"', '"n1w"', "unknown dof 'n1w'"),
     ],
 )
@@ -227,7 +227,7 @@ def test_run_from_a_model_file(comm, path: Path) -> None:
     assert main(["run", str(folder / "case.toml"), "--out", str(folder / "run"), "--no-plots"]) == 0
     with (folder / "run" / "mode.csv").open() as file:
         rows = list(csv.DictReader(file))
-    found = model_of_a_bar().contacts["root"].B
+    found = model_of_a_bar().contacts["flank"].B
     stuck = BAR.K + found.T @ sp.diags(np.tile([3e8, 2e8, 2e8], found.shape[0] // 3)) @ found
     exact = np.sqrt(scipy.linalg.eigh(stuck.toarray(), BAR.M.toarray(), eigvals_only=True)[0])
     assert len(rows) >= 2

@@ -3,9 +3,7 @@
 #include <algorithm>
 #include <numbers>
 
-extern "C" void dgemm_(char const*, char const*, int const*, int const*, int const*, double const*,
-                       double const*, int const*, double const*, int const*, double const*, double*,
-                       int const*);
+#include "lapack.h"
 
 namespace fretwave::hb {
 

@@ -4,12 +4,7 @@
 #include <cstdio>
 
 #include "error.h"
-
-extern "C" {
-void dgetrf_(int const*, int const*, double*, int const*, int*, int*);
-void dgetrs_(char const*, int const*, int const*, double const*, int const*, int const*, double*, int const*,
-             int*);
-}
+#include "lapack.h"
 
 namespace fretwave::hb {
 
@@ -44,7 +39,7 @@ bool CondensedPreconditioner::moved(Exponents const& e) const {
 void CondensedPreconditioner::factorise(Exponents e, std::vector<PairTangents> const& contacts) {
   made_at_ = e;
   if (scalars_ > 1) e.s[problem_.harmonics().fundamental()] *= 1 + shift;
-  factors_.factorise(e, rows_, contacts);
+  factors_.factorise(e, contacts);
   G_.clear();
   for (int i = 0; i < problem_.harmonics().count(); ++i) G_.push_back(factors_.compliance(i, rows_));
 }

@@ -4,17 +4,7 @@
 #include <numbers>
 
 #include "error.h"
-
-extern "C" {
-void zgetrf_(int const*, int const*, std::complex<double>*, int const*, int*, int*);
-void zgetri_(int const*, std::complex<double>*, int const*, int const*, std::complex<double>*, int const*,
-             int*);
-void dgetrf_(int const*, int const*, double*, int const*, int*, int*);
-void dgetri_(int const*, double*, int const*, int const*, double*, int const*, int*);
-void cgemv_(char const*, int const*, int const*, std::complex<float> const*, std::complex<float> const*,
-            int const*, std::complex<float> const*, int const*, std::complex<float> const*,
-            std::complex<float>*, int const*);
-}
+#include "lapack.h"
 
 namespace fretwave::hb {
 
@@ -44,20 +34,15 @@ double along(std::vector<complex> const& row, std::vector<complex> const& q) {
 CyclicInverse::CyclicInverse(Place place, int sectors, std::map<int, std::vector<complex>> const& blocks)
     : at_(place), sectors_(sectors), n_(place.dofs / sectors) {
   const size_t square = size_t(n_) * n_;
-  const int work_size = 64 * n_;
   inverses_.resize(square * sectors);
-  std::vector<complex> P(square), work(work_size);
-  std::vector<int> pivots(n_);
+  std::vector<complex> P(square);
   for (int d = 0; d < sectors; ++d) {
     std::fill(P.begin(), P.end(), 0);
     for (auto const& [k, A] : blocks) {
       const complex t = turn(k, d, sectors);
       for (size_t i = 0; i < square; ++i) P[i] += t * A[i];
     }
-    int info;
-    zgetrf_(&n_, &n_, P.data(), &n_, pivots.data(), &info);
-    need(info, "a nodal diameter's block");
-    zgetri_(&n_, P.data(), &n_, pivots.data(), work.data(), &work_size, &info);
+    need(lapack::invert(P, n_), "a nodal diameter's block");
     std::copy(P.begin(), P.end(), inverses_.begin() + d * square);
   }
   std::vector<complex> x(place.dofs);
@@ -67,23 +52,6 @@ CyclicInverse::CyclicInverse(Place place, int sectors, std::map<int, std::vector
                               FFTW_ESTIMATE | FFTW_UNALIGNED);
   };
   forward_.reset(plan(FFTW_FORWARD)), backward_.reset(plan(FFTW_BACKWARD));
-}
-
-std::vector<complex> CyclicInverse::harmonic(double const* x) const {
-  std::vector<complex> q(at_.dofs);
-  for (int i = 0; i < at_.dofs; ++i) {
-    double const* block = x + size_t(i) * at_.block + at_.offset;
-    q[i] = {block[0], at_.mean ? 0 : -block[1]};
-  }
-  return q;
-}
-
-void CyclicInverse::scatter(std::vector<complex> const& q, double* z) const {
-  for (int i = 0; i < at_.dofs; ++i) {
-    double* block = z + size_t(i) * at_.block + at_.offset;
-    block[0] = q[i].real();
-    if (!at_.mean) block[1] = -q[i].imag();
-  }
 }
 
 std::vector<complex> CyclicInverse::solve(std::vector<complex> x, bool adjoint) const {
@@ -103,7 +71,7 @@ std::vector<complex> CyclicInverse::solve(std::vector<complex> x, bool adjoint) 
   return x;
 }
 
-void CyclicInverse::apply(double const* x, double* z) const { scatter(solve(harmonic(x)), z); }
+void CyclicInverse::apply(double const* x, double* z) const { at_.scatter(solve(at_.gather(x)), z); }
 
 complex CyclicInverse::inverse_entry(int i, int j) const {
   const int apart = ((i / n_ - j / n_) % sectors_ + sectors_) % sectors_;
@@ -128,19 +96,14 @@ BorderedCyclicInverse::BorderedCyclicInverse(std::unique_ptr<CyclicInverse> inne
     : inner_(std::move(inner)), rows_(std::move(rows)), inverse_S_(std::move(S)), scalars_at_(scalars_at) {
   for (auto const& column : columns) AC_.push_back(inner_->solve(column));
   for (auto const& row : rows_) AR_.push_back(inner_->solve(row, true));
-  const int size = int(columns.size()), work_size = 64 * size;
+  const int size = int(columns.size());
   for (int j = 0; j < size; ++j)
     for (int i = 0; i < size; ++i) inverse_S_[j * size + i] -= along(rows_[i], AC_[j]);
-  std::vector<int> pivots(size);
-  std::vector<double> work(work_size);
-  int info;
-  dgetrf_(&size, &size, inverse_S_.data(), &size, pivots.data(), &info);
-  need(info, "the border");
-  dgetri_(&size, inverse_S_.data(), &size, pivots.data(), work.data(), &work_size, &info);
+  need(lapack::invert(inverse_S_, size), "the border");
 }
 
 void BorderedCyclicInverse::apply(double const* x, double* z) const {
-  auto q = inner_->solve(inner_->harmonic(x));
+  auto q = inner_->solve(inner_->place().gather(x));
   const size_t size = rows_.size();
   std::vector<double> rest(size);
   for (size_t i = 0; i < size; ++i) rest[i] = x[scalars_at_ + i] - along(rows_[i], q);
@@ -150,7 +113,7 @@ void BorderedCyclicInverse::apply(double const* x, double* z) const {
     z[scalars_at_ + j] = scalar;
     for (size_t k = 0; k < q.size(); ++k) q[k] -= scalar * AC_[j][k];
   }
-  inner_->scatter(q, z);
+  inner_->place().scatter(q, z);
 }
 
 /// Answer at dof i to a unit cosine (1) or sine (-i) force at dof j.

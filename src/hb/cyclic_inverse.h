@@ -16,8 +16,7 @@ class CyclicInverse : public HarmonicInverse {
   void apply(double const* x, double* z) const override;
   Rotation entry(int i, int j) const override;
 
-  std::vector<complex> harmonic(double const* x) const;  ///< q = qc - i qs of a whole vector, all dofs
-  void scatter(std::vector<complex> const& q, double* z) const;
+  Place const& place() const { return at_; }
   /// A^-1 x, or A^-H x.
   std::vector<complex> solve(std::vector<complex> x, bool adjoint = false) const;
   complex inverse_entry(int i, int j) const;

@@ -3,9 +3,7 @@
 #include <cmath>
 #include <limits>
 
-extern "C" void dgemm_(char const*, char const*, int const*, int const*, int const*, double const*,
-                       double const*, int const*, double const*, int const*, double const*, double*,
-                       int const*);
+#include "lapack.h"
 
 namespace fretwave::hb {
 
@@ -121,16 +119,7 @@ double DynamicStiffness::rounding(Exponents const& e, Vec x) const {
 
 std::vector<DynamicStiffness::Entry> DynamicStiffness::entries(Mat A) const {
   std::vector<Entry> out;
-  PetscInt begin, end;
-  check(MatGetOwnershipRange(A, &begin, &end));
-  for (PetscInt row = begin; row < end; ++row) {
-    PetscInt n;
-    PetscInt const* cols;
-    PetscScalar const* vals;
-    check(MatGetRow(A, row, &n, &cols, &vals));
-    for (PetscInt k = 0; k < n; ++k) out.push_back({row, cols[k], vals[k]});
-    check(MatRestoreRow(A, row, &n, &cols, &vals));
-  }
+  for_entries(A, [&](PetscInt row, PetscInt col, double value) { out.push_back({row, col, value}); });
   return out;
 }
 

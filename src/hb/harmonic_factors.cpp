@@ -59,7 +59,7 @@ void HarmonicFactors::find_terms() {
 }
 
 /// B^T (.) B of this rank's pairs, behind the terms' slots.
-void HarmonicFactors::find_contact(ContactRows const&, std::vector<PairTangents> const& contacts) {
+void HarmonicFactors::find_contact(std::vector<PairTangents> const& contacts) {
   const size_t harmonics = problem_.harmonics().count();
   size_t pairs_before = 0;
   for (auto const& contact : contacts) {
@@ -113,11 +113,10 @@ std::vector<complex> HarmonicFactors::values(int harmonic, Exponents const& e) c
   return v;
 }
 
-void HarmonicFactors::factorise(Exponents const& e, ContactRows const& rows,
-                                std::vector<PairTangents> const& contacts) {
+void HarmonicFactors::factorise(Exponents const& e, std::vector<PairTangents> const& contacts) {
   average(contacts);
   if (factors_.empty()) {
-    find_contact(rows, contacts);
+    find_contact(contacts);
     for (int i = 0; i < problem_.harmonics().count(); ++i)
       factors_.emplace_back(problem_.comm(), pattern_, i > 0 ? &factors_[0] : nullptr);
   }

@@ -12,8 +12,8 @@ namespace fretwave::hb {
 class HarmonicFactors {
  public:
   explicit HarmonicFactors(HarmonicProblem&);
-  /// Tangents as of `ContactRows::tangents`. Collective.
-  void factorise(Exponents const&, ContactRows const&, std::vector<PairTangents> const&);
+  /// At the exponents and the tangents of this rank's pairs. Collective.
+  void factorise(Exponents const&, std::vector<PairTangents> const&);
   /// x = A^-1 x or A^-T x for columns of harmonic blocks, whole on rank 0 with leading dimension `ld`.
   /// Collective.
   void solve(double* x, int columns, size_t ld, bool transposed = false);
@@ -36,7 +36,7 @@ class HarmonicFactors {
     double weight;
   };
   void find_terms();
-  void find_contact(ContactRows const&, std::vector<PairTangents> const&);
+  void find_contact(std::vector<PairTangents> const&);
   void average(std::vector<PairTangents> const&);
   std::vector<complex> values(int harmonic, Exponents const&) const;
 

@@ -3,19 +3,7 @@
 #include <algorithm>
 
 #include "error.h"
-
-extern "C" {
-void zgetrf_(int const*, int const*, std::complex<double>*, int const*, int*, int*);
-void zgetri_(int const*, std::complex<double>*, int const*, int const*, std::complex<double>*, int const*,
-             int*);
-void cgemv_(char const*, int const*, int const*, std::complex<float> const*, std::complex<float> const*,
-            int const*, std::complex<float> const*, int const*, std::complex<float> const*,
-            std::complex<float>*, int const*);
-void dgetrf_(int const*, int const*, double*, int const*, int*, int*);
-void dgetri_(int const*, double*, int const*, int const*, double*, int const*, int*);
-void sgemv_(char const*, int const*, int const*, float const*, float const*, int const*, float const*,
-            int const*, float const*, float*, int const*);
-}
+#include "lapack.h"
 
 namespace fretwave::hb {
 
@@ -31,38 +19,24 @@ void need(int info) {
 using scomplex = std::complex<float>;
 
 /// The inverse, rounded to single precision.
-template <class Single, class T, auto Factorise, auto Invert>
+template <class Single, class T>
 std::vector<Single> inverse_of(std::vector<T> A, int n) {
-  std::vector<int> pivots(n);
-  const int work_size = 64 * n;
-  std::vector<T> work(work_size);
-  int info;
-  Factorise(&n, &n, A.data(), &n, pivots.data(), &info);
-  need(info);
-  Invert(&n, A.data(), &n, pivots.data(), work.data(), &work_size, &info);
-  need(info);
+  need(lapack::invert(A, n));
   return {A.begin(), A.end()};
 }
 
 class ComplexInverse : public HarmonicInverse {
  public:
   ComplexInverse(Place place, std::vector<complex> A)
-      : at_(place), inverse_(inverse_of<scomplex, complex, zgetrf_, zgetri_>(std::move(A), place.dofs)) {}
+      : at_(place), inverse_(inverse_of<scomplex>(std::move(A), place.dofs)) {}
 
   void apply(double const* x, double* z) const override {
     const int n = at_.dofs, step = 1;
     const scomplex one = 1, zero = 0;
-    std::vector<scomplex> in(n), out(n);
-    for (int i = 0; i < n; ++i) {
-      double const* block = x + size_t(i) * at_.block + at_.offset;
-      in[i] = {float(block[0]), at_.mean ? 0 : -float(block[1])};
-    }
+    const auto in = at_.gather<float>(x);
+    std::vector<scomplex> out(n);
     cgemv_("N", &n, &n, &one, inverse_.data(), &n, in.data(), &step, &zero, out.data(), &step);
-    for (int i = 0; i < n; ++i) {
-      double* block = z + size_t(i) * at_.block + at_.offset;
-      block[0] = out[i].real();
-      if (!at_.mean) block[1] = -out[i].imag();
-    }
+    at_.scatter(out, z);
   }
 
   Rotation entry(int i, int j) const override {
@@ -81,7 +55,7 @@ class BorderedInverse : public HarmonicInverse {
       : at_(place),
         scalars_(scalars),
         size_(2 * place.dofs + scalars),
-        inverse_(inverse_of<float, double, dgetrf_, dgetri_>(std::move(A), size_)) {}
+        inverse_(inverse_of<float>(std::move(A), size_)) {}
 
   void apply(double const* x, double* z) const override {
     const int n = at_.dofs, step = 1;

@@ -25,6 +25,30 @@ struct Rotation {
   complex nearest() const { return {(cc + ss) / 2, (cs - sc) / 2}; }
 };
 
+/// Where a harmonic stands in a bordered vector of n dofs with blocks of m, then the scalars.
+struct Place {
+  int dofs, block, offset;
+  bool mean;
+  /// Its coefficients q = qc - i qs of all dofs.
+  template <class T = double>
+  std::vector<std::complex<T>> gather(double const* x) const {
+    std::vector<std::complex<T>> q(dofs);
+    for (int i = 0; i < dofs; ++i) {
+      double const* at = x + size_t(i) * block + offset;
+      q[i] = {T(at[0]), mean ? T(0) : -T(at[1])};
+    }
+    return q;
+  }
+  template <class T>
+  void scatter(std::vector<std::complex<T>> const& q, double* z) const {
+    for (int i = 0; i < dofs; ++i) {
+      double* at = z + size_t(i) * block + offset;
+      at[0] = q[i].real();
+      if (!mean) at[1] = -q[i].imag();
+    }
+  }
+};
+
 /// Inverse of one harmonic's dense block; acts on that harmonic's coefficients of harmonic-block vectors.
 /// Explicit, because it multiplies single vectors often and its entries are asked for (a triangular solve of
 /// one vector is three times slower); kept in single precision, because reading it is what an application
@@ -36,12 +60,6 @@ class HarmonicInverse {
   virtual void apply(double const* x, double* z) const = 0;
   /// Entry (i, j) of the inverse.
   virtual Rotation entry(int i, int j) const = 0;
-};
-
-/// Where a harmonic stands in a bordered vector of n dofs with blocks of m, then the scalars.
-struct Place {
-  int dofs, block, offset;
-  bool mean;
 };
 
 /// Inverse of the n x n block A (column-major). `InputError` if singular.

@@ -7,19 +7,11 @@ namespace {
 /// A distributed matrix whole and dense (column-major) on every rank.
 std::vector<double> whole(Mat A) {
   MPI_Comm comm;
-  PetscInt n, begin, end;
+  PetscInt n;
   check(PetscObjectGetComm(reinterpret_cast<PetscObject>(A), &comm));
   check(MatGetSize(A, &n, nullptr));
-  check(MatGetOwnershipRange(A, &begin, &end));
   std::vector<double> dense(size_t(n) * n, 0.0);
-  for (PetscInt row = begin; row < end; ++row) {
-    PetscInt count;
-    PetscInt const* cols;
-    PetscScalar const* values;
-    check(MatGetRow(A, row, &count, &cols, &values));
-    for (PetscInt k = 0; k < count; ++k) dense[size_t(cols[k]) * n + row] = values[k];
-    check(MatRestoreRow(A, row, &count, &cols, &values));
-  }
+  for_entries(A, [&](PetscInt row, PetscInt col, double value) { dense[size_t(col) * n + row] = value; });
   MPI_Allreduce(MPI_IN_PLACE, dense.data(), int(dense.size()), MPI_DOUBLE, MPI_SUM, comm);
   return dense;
 }

@@ -7,10 +7,7 @@
 
 #include "contact/vectorise.h"
 #include "error.h"
-
-extern "C" void dgemm_(char const*, char const*, int const*, int const*, int const*, double const*,
-                       double const*, int const*, double const*, int const*, double const*, double*,
-                       int const*);
+#include "lapack.h"
 
 namespace fretwave::hb {
 

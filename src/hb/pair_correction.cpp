@@ -2,11 +2,7 @@
 
 #include <algorithm>
 
-extern "C" {
-void dgesv_(int const*, int const*, double*, int const*, int*, double*, int const*, int*);
-void dgemv_(char const*, int const*, int const*, double const*, double const*, int const*, double const*,
-            int const*, double const*, double*, int const*);
-}
+#include "lapack.h"
 
 namespace fretwave::hb {
 

@@ -125,14 +125,10 @@ void Residual::find_weights(Group& group) {
   for (auto const& [phase, B, blocked, factor] : group.maps) {
     PetscInt begin;
     check(MatGetOwnershipRange(B, &begin, nullptr));
-    for (int row = 0; row < group.aft.columns(); ++row) {
-      PetscInt n;
-      PetscInt const* dofs;
-      PetscScalar const* values;
-      check(MatGetRow(B, begin + row, &n, &dofs, &values));
-      for (PetscInt k = 0; k < n; ++k) group.weights.push_back({row / d, row % d, dofs[k], values[k], phase});
-      check(MatRestoreRow(B, begin + row, &n, &dofs, &values));
-    }
+    for_entries(B, [&](PetscInt row, PetscInt dof, double value) {
+      const int own = int(row - begin);
+      group.weights.push_back({own / d, own % d, dof, value, phase});
+    });
   }
   std::stable_sort(group.weights.begin(), group.weights.end(),
                    [](auto const& a, auto const& b) { return a.pair < b.pair; });

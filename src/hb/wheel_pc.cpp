@@ -18,20 +18,11 @@ WheelPreconditioner::WheelPreconditioner(HarmonicProblem& problem)
 /// A_k: mean over the sectors of the block that acts on the sector k places ahead. Collective.
 WheelPreconditioner::Blocks WheelPreconditioner::average(Mat A) const {
   Blocks mine, all;
-  PetscInt begin, end;
-  check(MatGetOwnershipRange(A, &begin, &end));
-  for (PetscInt row = begin; row < end; ++row) {
-    PetscInt count;
-    PetscInt const* cols;
-    PetscScalar const* values;
-    check(MatGetRow(A, row, &count, &cols, &values));
-    for (PetscInt c = 0; c < count; ++c) {
-      auto& block = mine[int(cols[c] / unit_ - row / unit_ + sectors_) % sectors_];
-      block.resize(size_t(unit_) * unit_);
-      block[size_t(cols[c] % unit_) * unit_ + row % unit_] += values[c] / sectors_;
-    }
-    check(MatRestoreRow(A, row, &count, &cols, &values));
-  }
+  for_entries(A, [&](PetscInt row, PetscInt col, double value) {
+    auto& block = mine[int(col / unit_ - row / unit_ + sectors_) % sectors_];
+    block.resize(size_t(unit_) * unit_);
+    block[size_t(col % unit_) * unit_ + row % unit_] += value / sectors_;
+  });
   std::vector<int> ahead;
   for (auto const& [k, block] : mine) ahead.push_back(k);
   for (int k : gathered(std::span<int const>(ahead), problem_.comm())) all.try_emplace(k);
@@ -43,27 +34,22 @@ WheelPreconditioner::Blocks WheelPreconditioner::average(Mat A) const {
   return all;
 }
 
-std::vector<complex> WheelPreconditioner::fundamental_of(std::vector<double> const& x) const {
-  const int offset = problem_.harmonics().offset(problem_.harmonics().fundamental());
-  std::vector<complex> q(n_);
-  for (int i = 0; i < n_; ++i) q[i] = {x[size_t(i) * m_ + offset], -x[size_t(i) * m_ + offset + 1]};
-  return q;
-}
-
 /// The border: columns of the unfolding and of the scalars; rows of the normalisation, the unfolding and the
 /// closing.
 void WheelPreconditioner::prepare(Exponents const&, Vec y, Vec row) {
+  const Place fundamental = place(problem_.harmonics().fundamental());
   columns_.clear(), rows_.clear();
-  for (auto const& g : problem_.unfolding_vectors()) columns_.push_back(fundamental_of(gathered(g)));
+  for (auto const& g : problem_.unfolding_vectors())
+    columns_.push_back(fundamental.gather(gathered(g).data()));
   for (int part = 0; part < scalars_ - 1; ++part) {
     rows_.emplace_back(n_);
     rows_.back()[problem_.dof()] = part ? complex(0, -1) : 1;
   }
   rows_.insert(rows_.end(), columns_.begin(), columns_.end());
   for (int j = 0; j < scalars_; ++j)
-    columns_.push_back(fundamental_of(gathered(problem_.scalar_column(y, j))));
+    columns_.push_back(fundamental.gather(gathered(problem_.scalar_column(y, j)).data()));
   const auto closing = gathered(row);
-  rows_.push_back(fundamental_of(closing));
+  rows_.push_back(fundamental.gather(closing.data()));
   const size_t size = rows_.size();
   corner_.assign(size * size, 0.0);
   for (size_t j = 0; j < size; ++j) corner_[j * size + size - 1] = closing[size_t(n_) * m_ + j];

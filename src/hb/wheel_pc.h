@@ -21,7 +21,6 @@ class WheelPreconditioner : public PairwisePreconditioner {
   bool real_fundamental() const override { return false; }
   Blocks average(Mat A) const;
   std::unique_ptr<CyclicInverse> cyclic(int harmonic, Exponents const&) const;
-  std::vector<complex> fundamental_of(std::vector<double> const& x) const;
 
   int unit_, sectors_;
   std::vector<Blocks> terms_;

@@ -27,21 +27,13 @@ struct Triplets {
 
   void add(Mat A, double angle) {
     const double c = std::cos(angle), s = std::sin(angle);
-    PetscInt begin, end;
-    check(MatGetOwnershipRange(A, &begin, &end));
-    for (PetscInt row = begin; row < end; ++row) {
-      PetscInt n;
-      PetscInt const* dofs;
-      PetscScalar const* entries;
-      check(MatGetRow(A, row, &n, &dofs, &entries));
-      for (PetscInt k = 0; k < n; ++k)
-        for (int i = 0; i < 2; ++i)
-          for (int j = 0; j < 2; ++j) {
-            rows.push_back(2 * row + i), cols.push_back(2 * dofs[k] + j);
-            values.push_back(entries[k] * (i == j ? c : i < j ? s : -s));
-          }
-      check(MatRestoreRow(A, row, &n, &dofs, &entries));
-    }
+    for_entries(A, [&](PetscInt row, PetscInt col, double value) {
+      for (int i = 0; i < 2; ++i)
+        for (int j = 0; j < 2; ++j) {
+          rows.push_back(2 * row + i), cols.push_back(2 * col + j);
+          values.push_back(value * (i == j ? c : i < j ? s : -s));
+        }
+    });
   }
 };
 

@@ -1,0 +1,52 @@
+#pragma once
+#include <complex>
+#include <vector>
+
+/// The BLAS and LAPACK routines in use, and the inverse made of two of them.
+extern "C" {
+void dgemm_(char const*, char const*, int const*, int const*, int const*, double const*, double const*,
+            int const*, double const*, int const*, double const*, double*, int const*);
+void dgemv_(char const*, int const*, int const*, double const*, double const*, int const*, double const*,
+            int const*, double const*, double*, int const*);
+void sgemv_(char const*, int const*, int const*, float const*, float const*, int const*, float const*,
+            int const*, float const*, float*, int const*);
+void cgemv_(char const*, int const*, int const*, std::complex<float> const*, std::complex<float> const*,
+            int const*, std::complex<float> const*, int const*, std::complex<float> const*,
+            std::complex<float>*, int const*);
+void dgesv_(int const*, int const*, double*, int const*, int*, double*, int const*, int*);
+void dgetrf_(int const*, int const*, double*, int const*, int*, int*);
+void dgetrs_(char const*, int const*, int const*, double const*, int const*, int const*, double*, int const*,
+             int*);
+void dgetri_(int const*, double*, int const*, int const*, double*, int const*, int*);
+void zgetrf_(int const*, int const*, std::complex<double>*, int const*, int*, int*);
+void zgetri_(int const*, std::complex<double>*, int const*, int const*, std::complex<double>*, int const*,
+             int*);
+}
+
+namespace fretwave::lapack {
+
+inline void factorise(int const* n, double* A, int* pivots, int* info) { dgetrf_(n, n, A, n, pivots, info); }
+inline void factorise(int const* n, std::complex<double>* A, int* pivots, int* info) {
+  zgetrf_(n, n, A, n, pivots, info);
+}
+inline void invert(int const* n, double* A, int const* pivots, double* work, int const* size, int* info) {
+  dgetri_(n, A, n, pivots, work, size, info);
+}
+inline void invert(int const* n, std::complex<double>* A, int const* pivots, std::complex<double>* work,
+                   int const* size, int* info) {
+  zgetri_(n, A, n, pivots, work, size, info);
+}
+
+/// A := A^-1, n x n, column-major. Returns LAPACK's info, 0 if A is regular.
+template <class T>
+int invert(std::vector<T>& A, int n) {
+  const int work_size = 64 * n;
+  std::vector<int> pivots(n);
+  std::vector<T> work(work_size);
+  int info;
+  factorise(&n, A.data(), pivots.data(), &info);
+  if (info == 0) invert(&n, A.data(), pivots.data(), work.data(), &work_size, &info);
+  return info;
+}
+
+}  // namespace fretwave::lapack
