@@ -12,13 +12,22 @@ from typing import Any, TypeVar
 import scipy.sparse
 
 from . import checks
+from .aerodynamics_case import check_aerodynamics
 from .built import BuiltModel
 from .checks_rest import check_preloads, check_reduction
 from .contacts import ContactSpec, read_contacts
 from .errors import CaseErrors, FretwaveError
 from .origin import Origin, check_physics, load_origin
 from .reduced import ReductionReport, kept_dofs
-from .schema import AnalysisSection, ModelSection, PreloadSection, ReductionSection, Section, StudySection
+from .schema import (
+    AerodynamicsSection,
+    AnalysisSection,
+    ModelSection,
+    PreloadSection,
+    ReductionSection,
+    Section,
+    StudySection,
+)
 from .sectors import Neighbours, check_waves, tie
 from .source import Source
 from .validation import toml, validate
@@ -53,6 +62,8 @@ class Case:
         The static state of all analyses without one of their own; None for none.
     neighbours : Neighbours
         What ties a sector of a wheel to the next ones; None for a whole structure.
+    aerodynamics : AerodynamicsSection
+        Forces of the flow on a sector's blades; None for none.
     analyses : dict
         Validated analyses by name, in the order of the file.
     resolved : dict
@@ -87,6 +98,7 @@ class Case:
     unreduced: Case | None = None
     preload: PreloadSection | None = None
     neighbours: Neighbours | None = None
+    aerodynamics: AerodynamicsSection | None = None
 
     @property
     def name(self) -> str:
@@ -190,6 +202,7 @@ def _build(source: Source, laws: Mapping[str, Any], found: list[FretwaveError]) 
     section = _table(ModelSection, "model", source, found)
     reduction = _table(ReductionSection, "reduction", source, found)
     preload = _table(PreloadSection, "preload", source, found)
+    flow = _table(AerodynamicsSection, "aerodynamics", source, found)
     study = _table(StudySection, "study", source, found)
     origin = load_origin(section, source, found) if section else None
     dofs = origin.dofs if origin else None
@@ -200,6 +213,8 @@ def _build(source: Source, laws: Mapping[str, Any], found: list[FretwaveError]) 
         origin, contacts, neighbours = tie(section, source, origin, contacts, found)
         dofs, built = origin.dofs, origin.built
         check_waves(source, analyses, neighbours, reduction is not None, found)
+    if origin:
+        check_aerodynamics(source, flow, analyses, neighbours.sectors if neighbours else None, origin.dofs, found)
     keep = kept_dofs(origin.named, contacts, analyses, origin.dofs) if origin and reduction else []
     checks.check_analyses(source, analyses, [origin.dofs[k] for k in keep] if origin and keep else dofs, found)
     check_reduction(source, reduction, found)
@@ -211,6 +226,7 @@ def _build(source: Source, laws: Mapping[str, Any], found: list[FretwaveError]) 
     if found or section is None or origin is None:
         return None
     loaded = {letter: matrix.values for letter, matrix in origin.matrices.items()}
+    tables = {"reduction": reduction, "preload": preload, "aerodynamics": flow}
     return Case(
         path=source.path,
         text=source.text,
@@ -221,7 +237,7 @@ def _build(source: Source, laws: Mapping[str, Any], found: list[FretwaveError]) 
         C=loaded.get("C"),
         contacts=contacts,
         analyses={analysis.name: analysis for analysis in analyses.values()},
-        resolved=_resolve(origin, section, contacts, analyses, {"reduction": reduction, "preload": preload}),
+        resolved=_resolve(origin, section, contacts, analyses, tables),
         notes=[*notes, *_unused_contacts(built, contacts)],
         has_quick="quick" in source.data,
         study=study or StudySection(),
@@ -232,6 +248,7 @@ def _build(source: Source, laws: Mapping[str, Any], found: list[FretwaveError]) 
         keep=keep,
         preload=preload,
         neighbours=neighbours,
+        aerodynamics=flow,
     )
 
 

@@ -52,6 +52,7 @@ class Column:
 
 _ALL = (
     Column("point", "1", "number of the point on its branch", "i"),
+    Column("nodal_diameter", "1", "nodal diameters of the wave, negative for a backward one", "i"),
     Column("level", "1", "factor on the excitation force"),
     Column("start", "1", "number of the start", "i"),
     Column("cycle", "1", "number of the cycle", "i"),
@@ -79,6 +80,7 @@ COLUMNS = {column.name: column for column in _ALL}
 
 _SHARED = ("stick", "slip", "open", "error_estimate", "residual", "newton", "linear", "wall_s", "event")
 MODE = ("point", "amplitude", "omega", "omega0", "frequency_hz", "beta", "zeta", *_SHARED)
+FLUTTER = ("point", "nodal_diameter", *MODE[1:])
 FORCED = ("point", "level", "omega", "frequency_hz", "amplitude", "phase", *_SHARED)
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from . import checks
+from .aerodynamics_case import added_terms
 from .analyses.context import AnalysisContext, Outcome, belongs, describe_analysis
 from .casefile import Case, changed_keys, load_case
 from .console import Console
@@ -30,6 +31,7 @@ DISPATCH = {
     "static": ("static", "run_static"),
     "mode": ("mode", "run_mode"),
     "forced": ("forced", "run_forced"),
+    "flutter": ("flutter", "run_flutter"),
     "free_decay": ("transient", "run_free_decay"),
     "limit_cycle": ("transient", "run_limit_cycle"),
 }
@@ -230,7 +232,8 @@ class _Runner:
             self.folder.start()
 
         preload = self.case.preload_of(analysis)
-        built = build_model(self.case, self._dampers(analysis), self.comm, preload, nodal_diameter(analysis))
+        flow = getattr(analysis, "aerodynamics", False)
+        built = build_model(self.case, self._dampers(analysis), self.comm, preload, nodal_diameter(analysis), flow)
         with built as model, options.inserted():
             context = AnalysisContext(
                 model,
@@ -318,15 +321,23 @@ def needs(analysis: AnalysisSection) -> list[str]:
 
 
 def build_model(
-    case: Case, dampers: Sequence[Any], comm: Any, preload: PreloadSection | None = None, nodal_diameter: int = 0
+    case: Case,
+    dampers: Sequence[Any],
+    comm: Any,
+    preload: PreloadSection | None = None,
+    nodal_diameter: int = 0,
+    aerodynamics: bool = False,
 ) -> Any:
     """``fretwave.Model`` of a case; a preload without pair loads sets the pairs' normal loads to zero. Collective.
 
     Parameters
     ----------
     nodal_diameter : of the wave, where the case is a sector of a wheel
+    aerodynamics : the forces of the flow act
     """
     import fretwave
+
+    from .aerodynamics import with_terms
 
     neighbours = case.neighbours
     contacts = [
@@ -342,6 +353,9 @@ def build_model(
     if neighbours is None:
         return fretwave.Model(M, K, C, contacts, comm)
     M, K, C = neighbours.with_own("M", M), neighbours.with_own("K", K), case.ahead_damping(C)
+    if aerodynamics:
+        added = added_terms(case)
+        K, C = with_terms(K, added["K"]), with_terms(C, added["C"])
     return fretwave.Model(M, K, C, contacts, comm, neighbours.sectors, nodal_diameter)
 
 

@@ -22,9 +22,19 @@ def step_control(step: StepSection) -> Any:
 
 
 def record(
-    writer: AnalysisWriter, problem: Any, point: Any, snapshot: Mapping[str, Any] | None, extra: Mapping[str, Any]
+    writer: AnalysisWriter,
+    problem: Any,
+    point: Any,
+    snapshot: Mapping[str, Any] | None,
+    extra: Mapping[str, Any],
+    columns: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
     """Write one continuation point. Collective.
+
+    Parameters
+    ----------
+    extra : the analysis' own part of the state to go on from
+    columns : values of its own columns
 
     Returns
     -------
@@ -35,6 +45,7 @@ def record(
     row = {
         **state,
         **diagnostics,
+        **(columns or {}),
         "point": writer.rows,
         "residual": point.residual,
         "newton": point.newton,
