@@ -26,7 +26,7 @@ def kappa(a: float) -> complex:
 def crossings(flow: Aerodynamics, nodal_diameter: int) -> list[tuple[float, float]]:
     """(a, omega) at which a wave of the chain with one harmonic has no damping: both parts of its equation are zero.
 
-    k + 4 s^2 kappa(2 a s) - omega^2 - sum (Re L_k + i omega / omega_ref Im L_k) e^{-i k theta} = 0, s = |sin(theta / 2)|.
+    k + 4 s^2 kappa(2 a s) - omega^2 - sum (Re L_k + i omega / omega_ref Im L_k) e^{-i k theta} = 0, s = |sin theta/2|.
     """
     theta = 2 * np.pi * nodal_diameter / SECTORS
     s = abs(np.sin(theta / 2))

@@ -10,13 +10,13 @@ L_k the influence coefficient of the blade k places ahead. In a wave of ND nodal
     L(theta) = sum_k L_k e^{-i k theta},        L_k = 1/N sum_theta L(theta) e^{i k theta},
 
 the travelling-wave coefficient (Hanamura, Tanaka & Yamaguchi 1980; Crawley 1988). In a period the flow works
-pi Im L |q|^2 on the blade: Im L > 0 feeds the vibration. L_k holds at one frequency omega, where i x is x' / omega, so that
+pi Im L |q|^2 on the blade: Im L > 0 feeds the vibration. L_k holds at one frequency omega, where i x is x' / omega, so
 
     -L_k q  =  (-Re L_k) x + (-Im L_k / omega) x':
 
-one term in K and one in C for each k, of real matrices, like any other coupling between sectors, valid for a wave on one
-sector and for a wheel of any mistuning. They are not reciprocal (L_-k is not L_k): the flow is not at rest, and it may
-feed a forward wave and damp the backward one. Higher harmonics, and the mean, feel the same springs and dampers.
+one term in K and one in C for each k, of real matrices, like any other coupling between sectors, valid for a wave on
+one sector and for a wheel of any mistuning. They are not reciprocal (L_-k is not L_k): the flow is not at rest, and it
+may feed a forward wave and damp the backward one. Higher harmonics, and the mean, feel the same springs and dampers.
 
 References
 ----------

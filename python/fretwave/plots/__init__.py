@@ -22,6 +22,7 @@ FAMILIES = (
     "faces",
     "limit_cycles",
     "forced",
+    "flutter",
     "free_decay",
     "study",
 )
