@@ -12,15 +12,22 @@ from .schema import AerodynamicsSection, AnalysisSection, FlutterAnalysis
 from .source import Source
 
 if TYPE_CHECKING:
-    from .aerodynamics import Aerodynamics, Term
+    from .aerodynamics import Aerodynamics
     from .casefile import Case
 
 
-def added_terms(case: Case) -> dict[str, Term]:
-    """{"K": {k: ...}, "C": {k: ...}} that the flow adds to the sector of a case; nothing without [aerodynamics]."""
-    if case.aerodynamics is None or case.neighbours is None:
-        return {}
-    return _flow(case, case.aerodynamics, case.neighbours.sectors).terms(case.neighbours.with_own("M", case.M))
+def with_flow(case: Case, K: Any, C: Any) -> tuple[Any, Any]:
+    """K and C of a sector, or of the wheel that a case was put on, with what the flow adds to them."""
+    from .aerodynamics import with_terms
+    from .cyclic import around
+
+    sector = case if case.wheel is None else case.wheel.sector
+    assert sector.aerodynamics is not None and sector.neighbours is not None
+    number = sector.neighbours.sectors
+    added = _flow(sector, sector.aerodynamics, number).terms(sector.neighbours.with_own("M", sector.M))
+    if case.wheel is not None:
+        added = {letter: {0: around(with_terms(None, parts), number)} for letter, parts in added.items() if parts}
+    return with_terms(K, added.get("K", {})), with_terms(C, added.get("C", {}))
 
 
 def _flow(case: Case, section: AerodynamicsSection, sectors: int) -> Aerodynamics:

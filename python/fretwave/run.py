@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from . import checks
-from .aerodynamics_case import added_terms
+from .aerodynamics_case import with_flow
 from .analyses.context import AnalysisContext, Outcome, belongs, describe_analysis
 from .casefile import Case, changed_keys, load_case
 from .console import Console
@@ -25,6 +25,7 @@ from .schema import AnalysisSection, ForcedAnalysis, PreloadSection, TransientSe
 from .sectors import nodal_diameter
 from .source import display
 from .stopped import joined, not_converged
+from .wheel import on_wheel
 
 #: Module and function of each kind of analysis, imported when one is run.
 DISPATCH = {
@@ -231,13 +232,13 @@ class _Runner:
             options.check_used(fretwave._core.unused_options, f"analysis '{analysis.name}'")
             self.folder.start()
 
-        preload = self.case.preload_of(analysis)
-        flow = getattr(analysis, "aerodynamics", False)
-        built = build_model(self.case, self._dampers(analysis), self.comm, preload, nodal_diameter(analysis), flow)
+        case = on_wheel(self.case, analysis)
+        preload, flow = case.preload_of(analysis), getattr(analysis, "aerodynamics", False)
+        built = build_model(case, self._dampers(analysis), self.comm, preload, nodal_diameter(analysis), flow)
         with built as model, options.inserted():
             context = AnalysisContext(
                 model,
-                self.case,
+                case,
                 analysis,
                 self.comm,
                 self.folder.path,
@@ -332,12 +333,10 @@ def build_model(
 
     Parameters
     ----------
-    nodal_diameter : of the wave, where the case is a sector of a wheel
+    nodal_diameter : of the wave, where the case is a sector of a wheel (that of `on_wheel` has all of them)
     aerodynamics : the forces of the flow act
     """
     import fretwave
-
-    from .aerodynamics import with_terms
 
     neighbours = case.neighbours
     contacts = [
@@ -351,11 +350,10 @@ def build_model(
     ]
     M, K, C = case.M, case.K, case.damping_with(dampers)
     if neighbours is None:
-        return fretwave.Model(M, K, C, contacts, comm)
+        K, C = with_flow(case, K, C) if aerodynamics else (K, C)
+        return fretwave.Model(M, K, C, contacts, comm, unit=case.wheel.unit if case.wheel else 1)
     M, K, C = neighbours.with_own("M", M), neighbours.with_own("K", K), case.ahead_damping(C)
-    if aerodynamics:
-        added = added_terms(case)
-        K, C = with_terms(K, added["K"]), with_terms(C, added["C"])
+    K, C = with_flow(case, K, C) if aerodynamics else (K, C)
     return fretwave.Model(M, K, C, contacts, comm, neighbours.sectors, nodal_diameter)
 
 

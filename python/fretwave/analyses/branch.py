@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -27,14 +27,14 @@ def record(
     point: Any,
     snapshot: Mapping[str, Any] | None,
     extra: Mapping[str, Any],
-    columns: Mapping[str, Any] | None = None,
+    describe: Callable[[Any, Any, Any], Mapping[str, Any]] | None = None,
 ) -> dict[str, Any]:
     """Write one continuation point. Collective.
 
     Parameters
     ----------
     extra : the analysis' own part of the state to go on from
-    columns : values of its own columns
+    describe : further columns from problem, y and (on the writing rank) coefficients (n_dof, m). Collective
 
     Returns
     -------
@@ -45,7 +45,6 @@ def record(
     row = {
         **state,
         **diagnostics,
-        **(columns or {}),
         "point": writer.rows,
         "residual": point.residual,
         "newton": point.newton,
@@ -59,7 +58,10 @@ def record(
         names = [contact.name for contact in problem.model.contacts]
         motions = dict(zip(names, periods)) if writer.active else None
     kept = None if snapshot is None else {**snapshot, **{f"own_{key}": value for key, value in extra.items()}}
-    writer.append(row, problem.coefficients(point.y), motions, kept)
+    coefficients = problem.coefficients(point.y)
+    if describe is not None:
+        row.update(describe(problem, point.y, coefficients))
+    writer.append(row, coefficients, motions, kept)
     return row
 
 

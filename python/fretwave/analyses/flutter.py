@@ -79,12 +79,15 @@ class _Wave:
             problem = self._problem(replace(self.context, model=model, analysis=analysis))
             branch = self._branch(problem, snapshot, go_on)
             for point in points_of(branch):
-                columns = {"nodal_diameter": self.diameter}
-                self._say(record(writer, problem, point, branch.snapshot(), {"wave_number": self.number}, columns))
+                own = {"wave_number": self.number}
+                self._say(record(writer, problem, point, branch.snapshot(), own, self._column))
             stopped = "" if branch.converged else f"nodal diameter {self.diameter}: {branch.reason}"
             branch.destroy()
             problem.destroy()
         return stopped
+
+    def _column(self, *_: Any) -> dict[str, int]:
+        return {"nodal_diameter": self.diameter}
 
     def _problem(self, context: AnalysisContext) -> Any:
         """Started from the mode of the structure alone; the flow bends it little."""
