@@ -16,6 +16,7 @@ from .aerodynamics_case import check_aerodynamics
 from .built import BuiltModel
 from .checks_rest import check_preloads, check_reduction
 from .contacts import ContactSpec, read_contacts
+from .engine_order import fold_engine_orders
 from .errors import CaseErrors, FretwaveError
 from .origin import Origin, check_physics, load_origin
 from .reduced import ReductionReport, kept_dofs
@@ -222,6 +223,7 @@ def _build(source: Source, laws: Mapping[str, Any], found: list[FretwaveError]) 
     if section and origin:
         origin, contacts, neighbours = tie(section, source, origin, contacts, found)
         dofs, built = origin.dofs, origin.built
+        fold_engine_orders(source, analyses, neighbours.sectors if neighbours else None, found)
         check_waves(source, analyses, neighbours, reduction is not None, found)
     if origin:
         check_aerodynamics(source, flow, analyses, neighbours.sectors if neighbours else None, origin.dofs, found)

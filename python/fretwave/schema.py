@@ -251,7 +251,16 @@ class ForcedAnalysis(HarmonicSection):
         default_factory=list,
     )
     force: dict[Dof, float] = key(
-        "force amplitude of each excited dof, cosine at harmonic 1", "N", "{ m1 = 1.0 }", min_length=1
+        "force amplitude of each excited dof, cosine at harmonic 1, delayed from sector to sector of a wheel",
+        "N",
+        "{ m1 = 1.0 }",
+        min_length=1,
+    )
+    engine_order: Optional[int] = key(
+        "order of the excitation of a wheel, in place of nodal_diameter; negative where the rotor turns with the "
+        "sectors' numbers",
+        example="4",
+        default=None,
     )
     levels: list[Positive] = key("factors on the force", "-", "[1.0, 2.0]", min_length=1)
     frequency: list[Positive] = key(

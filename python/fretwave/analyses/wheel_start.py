@@ -73,19 +73,20 @@ def _on_wheel(context: AnalysisContext) -> Start:
 
 
 @contextmanager
-def _sector(context: AnalysisContext) -> Iterator[AnalysisContext]:
+def tuned_sector(context: AnalysisContext) -> Iterator[AnalysisContext]:
     """The same analysis of the tuned sector alone. Collective."""
     from ..run import build_model
 
+    flow = getattr(context.analysis, "aerodynamics", False)
     case, diameters = context.case.wheel.sector, context.analysis.nodal_diameter or 0
     preload = case.preload_of(context.analysis)
-    with build_model(case, context.analysis.dampers, context.comm, preload, diameters) as model:
+    with build_model(case, context.analysis.dampers, context.comm, preload, diameters, flow) as model:
         yield replace(context, model=model, case=case, arrays={})
 
 
 def _tuned(context: AnalysisContext) -> tuple[LinearMode, dict[str, float]]:
     """Linear mode of the tuned sector in the wave that the analysis names, and its other asymptote. Collective."""
-    with _sector(context) as sector:
+    with tuned_sector(context) as sector:
         stuck, _ = start_mode(sector, context.analysis.linear_mode)
         return stuck, other_asymptote(sector, stuck)
 

@@ -22,6 +22,7 @@ FAMILIES = (
     "faces",
     "limit_cycles",
     "forced",
+    "forced_blades",
     "flutter",
     "free_decay",
     "study",
