@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from cyclic_models import jenkins_chain
+import scipy.linalg
+from cyclic_models import jenkins_chain, rich_sector
 from scipy.optimize import brentq
 
 import fretwave as fw
@@ -78,3 +79,69 @@ def test_limit_cycles_of_the_chain_are_those_of_the_closed_form(method, comm):
         assert [(s["amplitude"], s["omega"]) for s in found] == [pytest.approx(pair, rel=1e-5) for pair in expected]
         cycles[diameters] = (len(found), np.sign(zeta[0]))
     assert cycles == {1: (2, -1), -1: (0, 1), 2: (1, 1), -2: (0, 1)}
+
+
+def test_limit_cycle_of_one_sector_is_that_of_the_whole_wheel(comm):
+    """Unfolded from the wave that runs the other way, which the flow damps."""
+    sector = replace(jenkins_chain(SECTORS), aerodynamics=flow_of_chain())
+    alone, _ = located(sector.model(1, comm), comm)
+    start = fw.linear_modes(jenkins_chain(SECTORS).model(1, comm), 1)[0]
+    around = sector.around(start, 1)
+    whole, _ = located(sector.wheel(comm), comm, start=around, avoid=around.shape - 1j * around.imaginary)
+    assert len(alone) == len(whole) == 2
+    for one, all_sectors in zip(alone, whole):
+        for key in ("amplitude", "omega"):
+            # samples are a multiple of the sectors: all see the slider's kinks between the same ones
+            assert all_sectors[key] == pytest.approx(one[key], rel=1e-8), key
+
+
+def eigenvalues(M: np.ndarray, K: np.ndarray, C: np.ndarray) -> np.ndarray:
+    """s of (K + s C + s^2 M) q = 0."""
+    zero, one = np.zeros_like(M), np.eye(len(M))
+    return np.linalg.eigvals(np.block([[zero, one], [-np.linalg.solve(M, K), -np.linalg.solve(M, C)]]))
+
+
+@pytest.mark.parametrize("dof", [None, 1])
+def test_flow_on_a_wheel_is_the_sum_over_its_blades(dof, comm):
+    """Damped modes of a mistuned wheel against a dense eigenproblem with the force on each blade written out."""
+    sectors, omega, rng = 5, 1.3, np.random.default_rng(5)
+    flow = Aerodynamics({0: -0.02 - 0.09j, 1: 0.05 + 0.02j, -1: 0.01 - 0.03j, 2: 0.004 + 0.01j}, omega, dof)
+    plain = replace(rich_sector(sectors), contacts=())
+    changes = {"K": [np.diag(0.2 * rng.standard_normal(3)) for _ in range(sectors)]}
+    M, K, C = (plain._around(getattr(plain, letter)).toarray() for letter in "MKC")
+    K = K + scipy.linalg.block_diag(*changes["K"])
+    force = np.zeros_like(M, dtype=complex)
+    for j in range(sectors):
+        for k, L in flow.influence.items():
+            rows, there = slice(3 * j, 3 * j + 3), (j + k) % sectors
+            if dof is None:
+                force[rows] += L * M[3 * there : 3 * there + 3]
+            else:
+                force[3 * j + dof, 3 * there + dof] += L
+    expected = eigenvalues(M, K - force.real, C - force.imag / omega)
+    with replace(plain, aerodynamics=flow).wheel(comm, changes) as model:
+        for mode in fw.linear_modes(model, 4, "linearised"):
+            assert abs(expected - complex(-mode.beta, mode.omega)).min() < 1e-8 * mode.omega
+
+
+@pytest.mark.parametrize("sectors", [5, 6])
+def test_damping_by_nodal_diameter_comes_back_from_its_influence_coefficients(sectors, comm):
+    ratios = {d: 1e-4 * d - 2e-4 for d in range(-((sectors - 1) // 2), sectors // 2 + 1)}
+    for d, ratio in ratios.items():
+        assert Aerodynamics.from_damping(ratios, sectors, 1.9).wave(d, sectors) == pytest.approx(-2j * ratio * 1.9**2)
+    plain = fw.Sector([[2.0]], {0: [[3.0]], 1: [[-1.0]], -1: [[-1.0]]}, sectors)
+    for d in (0, 1, -2):
+        omega = np.sqrt((1 + 4 * np.sin(np.pi * d / sectors) ** 2) / 2)
+        flow = Aerodynamics.from_damping(ratios, sectors, omega)
+        with replace(plain, aerodynamics=flow).model(d, comm) as model:
+            mode = fw.linear_modes(model, 1, "linearised")[0]
+        assert mode.zeta == pytest.approx(ratios[d], rel=1e-3)  # to second order in the ratio
+        assert mode.omega == pytest.approx(omega, rel=1e-6)
+
+
+@pytest.mark.ranks(1)
+def test_what_is_wrong_with_influence_coefficients_is_said():
+    with pytest.raises(fw.InputError, match="need a frequency"):
+        Aerodynamics({0: 1j}, 0.0)
+    with pytest.raises(fw.InputError, match="no such dof"):
+        Aerodynamics({0: 1j}, 1.0, dof=1).terms(np.eye(1))

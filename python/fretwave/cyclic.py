@@ -73,7 +73,7 @@ class Sector:
     @property
     def n_dof(self) -> int:
         """Dofs of one sector."""
-        return int(by_sector(self.M)[0].shape[1])
+        return int(np.shape(by_sector(self.M)[0])[1])
 
     @classmethod
     def from_faces(
