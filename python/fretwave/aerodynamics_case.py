@@ -109,6 +109,8 @@ def _check_flutter(
         number = analysis.nodal_diameter
         fix = f"write `nodal_diameters = [{number}]`"
         report.wrong(("nodal_diameter",), "is one wave; flutter looks at several", "nodal_diameters", fix)
+    if analysis.wheel:
+        report.wrong(("wheel",), "is for modes; flutter follows waves on one sector", "one sector", "remove the key")
     half = sectors // 2
     for index, diameters in enumerate(analysis.nodal_diameters or []):
         if abs(diameters) > half:
