@@ -47,8 +47,7 @@ type = "flutter"
 normalise = "mass"
 harmonics = 1
 samples = 960
-amplitude = [0.05, 100.0]
-step = {{ maximum = 0.15 }}
+amplitude = [0.2, 100.0]
 """
 
 
@@ -101,8 +100,9 @@ def test_every_wave_has_the_limit_cycles_of_the_closed_form(write, shared_tmp, c
 def test_wave_on_the_whole_wheel_from_the_case_file(write, shared_tmp, comm):
     """A mode with `aerodynamics` on all sectors meets the limit cycles of the flutter analysis."""
     mode = '[[analysis]]\nname = "wheel"\ntype = "mode"\nwheel = true\naerodynamics = true\nnodal_diameter = 1\n'
-    keys = 'normalise = "mass"\nharmonics = 1\nsamples = 960\namplitude = [0.05, 100.0]\nstep = { maximum = 0.15 }\n\n'
-    path = write(("[[analysis]]", mode + keys + "[[analysis]]"))
+    keys = 'normalise = "mass"\nharmonics = 1\nsamples = 960\namplitude = [0.5, 20.0]\n\n'
+    alone = ("amplitude = [0.2, 100.0]", "nodal_diameters = [1]\namplitude = [0.5, 20.0]")
+    path = write(alone, ("[[analysis]]", mode + keys + "[[analysis]]"))
     out = shared_tmp / "wheel"
     assert run_case(path, RunOptions(out=out, plots=False), comm) == 0
     whole = [row for row in table(out, "wheel") if "zero_damping" in row["event"]]

@@ -93,7 +93,12 @@ def words(wave: Mapping[str, Any]) -> str:
         "stable below": f"decays below, {cycles}; {peak}",
     }[wave["verdict"]]
     stuck = f"{wave['frequency_hz']:.5g} Hz, {100 * wave['zeta']:+.3g} % at the smallest amplitude"
-    return f"ND {wave['nodal_diameter']:+d}, {stuck}: {fate}"
+    return f"ND {signed(wave['nodal_diameter'])}, {stuck}: {fate}"
+
+
+def signed(diameters: int) -> str:
+    """Nodal diameters with the sign that tells forward from backward."""
+    return f"{diameters:+d}" if diameters else "0"
 
 
 def _cycle(cycle: Mapping[str, Any]) -> str:

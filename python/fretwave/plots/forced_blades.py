@@ -49,7 +49,7 @@ def _curves(axes: Axes, forced: Analysis, tuned: Table) -> None:
     points = np.flatnonzero(forced.columns["level"] == level)
     unit = int(forced.attributes["sector_dofs"])
     c, s = (forced.labels.index(label) for label in ("1c", "1s"))
-    q = forced.coefficients(points)[:, forced.normalised_dof() % unit :: unit]
+    q = forced.coefficients(list(points))[:, forced.normalised_dof() % unit :: unit]
     amplitude, frequency = np.hypot(q[:, :, c], q[:, :, s]), forced.columns["frequency_hz"][points]
     most = int(np.argmax(amplitude.max(axis=0)))
     for j, blade in enumerate(amplitude.T):
