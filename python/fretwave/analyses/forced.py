@@ -14,7 +14,7 @@ from .forced_time import time_points
 from .mode_curve import ModeCurve
 from .response_peaks import peak_table
 from .rest import retained
-from .wheel_peaks import blade_by_blade
+from .wheel_peaks import blade_amplitudes, blade_by_blade
 
 
 def run_forced(context: AnalysisContext) -> Outcome:
@@ -60,8 +60,9 @@ def _all_levels(context: AnalysisContext, analysis: ForcedAnalysis, excitation: 
     reason = "; ".join(stopped) or "stop value reached"
     table = finished_table(writer)
     wheel = context.case.wheel is not None and writer.rows > 0
-    summary = blade_by_blade(excitation, table, writer) if wheel else _peaks(context, analysis, table)
+    blades = blade_amplitudes(excitation, writer) if wheel and writer.active else None
     writer.close("stopped" if stopped else "done", reason, events="[]")
+    summary = blade_by_blade(excitation, table, blades) if wheel else _peaks(context, analysis, table)
     if analysis.time_points and writer.rows:
         summary += time_points(context, table, analysis.time_points)
     goal = f"{analysis.frequency[1]:g} Hz at every level"

@@ -8,7 +8,7 @@ modes, one degree of freedom a blade and no friction it is at most (1 + sqrt(N))
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Optional
 
 import numpy as np
 import numpy.typing as npt
@@ -20,14 +20,19 @@ from .response_peaks import NOWHERE, Peak, amplitude_peak
 Array = npt.NDArray[np.float64]
 
 
-def blade_by_blade(excitation: Excitation, table: Mapping[str, Array], writer: Any) -> list[str]:
-    """Write the peaks of all blades and of the tuned wheel; a line for each level. Collective."""
+def blade_by_blade(excitation: Excitation, table: Mapping[str, Array], amplitudes: Optional[Array]) -> list[str]:
+    """Write the peaks of all blades and of the tuned wheel; a line for each level. Collective.
+
+    Parameters
+    ----------
+    table, amplitudes : of the finished analysis, (points, N); on other ranks than the writing one None
+    """
     context = excitation.context
     with tuned_excitation(context, excitation.harmonics) as sector:
         tuned = tuned_responses(sector)
-    if not writer.active:
+    if amplitudes is None:
         return []
-    peaks, blades = blade_tables(table, blade_amplitudes(excitation, writer), tuned)
+    peaks, blades = blade_tables(table, amplitudes, tuned)
     for suffix, columns in (("peaks", peaks), ("blades", blades), ("tuned", tuned)):
         context.write_table(suffix, columns)
     rows = [{key: float(values[k]) for key, values in peaks.items()} for k in range(len(peaks["level"]))]
