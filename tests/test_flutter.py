@@ -14,7 +14,9 @@ from cyclic_models import chain_crossings
 import fretwave as fw
 from fretwave.analyses.flutter_waves import describe_waves, verdict, words
 from fretwave.casefile import load_case
+from fretwave.check import check_case
 from fretwave.errors import CaseErrors
+from fretwave.keys import key_lines
 from fretwave.run import RunOptions, run_case
 
 SECTORS, OMEGA = 5, 1.7
@@ -143,6 +145,14 @@ def test_a_limit_cycle_on_a_branch_that_runs_back_names_its_folds():
     (cycle,) = wave["limit_cycles"]
     assert cycle["folds"] == [1.0, 1.2] and cycle["stable"] is False and wave["verdict"] == "bounded"
     assert "runs back between 1 and 1.2 m" in words(wave)
+
+
+@pytest.mark.ranks(1)
+def test_check_and_the_list_of_keys_know_flutter(write, capsys, comm):
+    assert check_case(write(("harmonics = 1", "harmonics = 1\nnodal_diameters = [-1, 2]")), (), (), False, comm) == 0
+    assert "flutter (CNM), nodal diameters -1, 2, linear mode 1, a = 0.2 to 100 m" in capsys.readouterr().out
+    keys = "\n".join(key_lines())
+    assert "[aerodynamics]" in keys and "engine_order" in keys and "nodal_diameters" in keys
 
 
 #: (text in the case, its replacement, what is said)

@@ -15,6 +15,7 @@ from . import checks
 from .aerodynamics_case import check_aerodynamics
 from .built import BuiltModel
 from .checks_rest import check_preloads, check_reduction
+from .checks_wheel import check_wheels
 from .contacts import ContactSpec, read_contacts
 from .engine_order import fold_engine_orders
 from .errors import CaseErrors, FretwaveError
@@ -225,9 +226,11 @@ def _build(source: Source, laws: Mapping[str, Any], found: list[FretwaveError]) 
         dofs, built = origin.dofs, origin.built
         fold_engine_orders(source, analyses, neighbours.sectors if neighbours else None, found)
         check_waves(source, analyses, neighbours, reduction is not None, found)
+        check_wheels(source, analyses, neighbours, dofs, found)
     if origin:
         check_aerodynamics(source, flow, analyses, neighbours.sectors if neighbours else None, origin.dofs, found)
-    keep = kept_dofs(origin.named, contacts, analyses, origin.dofs) if origin and reduction else []
+    blade = {flow.dof: origin.dofs.index(flow.dof)} if flow and origin and flow.dof in origin.dofs else {}
+    keep = kept_dofs({**origin.named, **blade}, contacts, analyses, origin.dofs) if origin and reduction else []
     checks.check_analyses(source, analyses, [origin.dofs[k] for k in keep] if origin and keep else dofs, found)
     check_reduction(source, reduction, found)
     check_preloads(source, preload, analyses, built.loads if built else () if origin else None, found)

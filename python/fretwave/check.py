@@ -16,6 +16,7 @@ from .reduced import reduce_case
 from .run import build_model, in_order
 from .schema import (
     AnalysisSection,
+    FlutterAnalysis,
     ForcedAnalysis,
     HarmonicSection,
     ModeAnalysis,
@@ -83,15 +84,26 @@ def describe(analysis: AnalysisSection, model: Any) -> list[str]:
         import fretwave
 
         harmonics = fretwave.choose_harmonics(model, analysis.harmonics, analysis.samples, analysis.retain)
+        n_dof = model.n_dof * (model.sectors if analysis.wheel else 1)
         lines.append(
             f"harmonics {_orders(harmonics.orders)}, {harmonics.samples} samples a period,"
-            f" {model.n_dof} x {harmonics.block_size} = {model.n_dof * harmonics.block_size} coefficients"
+            f" {n_dof} x {harmonics.block_size} = {n_dof * harmonics.block_size} coefficients"
         )
-        if analysis.nodal_diameter is not None:
-            lines.append(f"a wave of {analysis.nodal_diameter} nodal diameters on one sector of {model.sectors}")
+        if analysis.nodal_diameter is not None or analysis.wheel:
+            lines.append(_wave_line(analysis, model.sectors))
         if harmonics.left_out:
             lines.append("left out: " + "; ".join(harmonics.left_out))
     return lines
+
+
+def _wave_line(analysis: HarmonicSection, sectors: int) -> str:
+    place = f"all {sectors} sectors" if analysis.wheel else f"one sector of {sectors}"
+    if analysis.mistuning is not None:
+        place = f"{place}, their '{analysis.mistuning.of}' stiffness mistuned"
+    if analysis.nodal_diameter is None:
+        return place
+    wave = "standing wave" if getattr(analysis, "wave", "") == "standing" else "wave"
+    return f"a {wave} of {analysis.nodal_diameter} nodal diameters on {place}"
 
 
 def _headline(analysis: AnalysisSection) -> str:
@@ -99,10 +111,15 @@ def _headline(analysis: AnalysisSection) -> str:
         low, high = analysis.amplitude
         start = f"nonlinear mode ({analysis.method}) from linear mode {analysis.linear_mode}"
         return f"{start}, a = {low:g} to {high:g} m of {analysis.normalise}"
+    if isinstance(analysis, FlutterAnalysis):
+        low, high = analysis.amplitude
+        named = ", ".join(map(str, analysis.nodal_diameters or [])) or "all"
+        return f"flutter ({analysis.method}), nodal diameters {named}, linear mode {analysis.linear_mode}, a = {low:g} to {high:g} m"
     if isinstance(analysis, ForcedAnalysis):
         low, high = analysis.frequency
         levels = ", ".join(f"{level:g}" for level in analysis.levels)
-        return f"forced response of {analysis.observe}, {low:g} to {high:g} Hz, levels {levels}"
+        order = f" to engine order {analysis.engine_order}" if analysis.engine_order else ""
+        return f"forced response of {analysis.observe}{order}, {low:g} to {high:g} Hz, levels {levels}"
     if isinstance(analysis, StaticAnalysis):
         return f"static state at load factors {', '.join(f'{factor:g}' for factor in analysis.factors)}"
     assert isinstance(analysis, TransientSection)

@@ -25,6 +25,7 @@ from .schema import ModeAnalysis
 from .sectors import nodal_diameter
 from .study_plan import Outcome, Plan, Settings, Study, common_amplitudes
 from .study_report import markdown, write_csv
+from .wheel import on_wheel
 
 #: each branch is solved this often; its time is that of the fastest, which other work on the machine disturbs least
 REPEATS = 3
@@ -65,7 +66,7 @@ class _Solver:
         if self._parts is None or self._parts[0] != component_modes:
             if self._parts is not None:
                 self._parts[1].model.destroy()
-            case = reduce_case(self.case, self.comm, component_modes)
+            case = on_wheel(reduce_case(self.case, self.comm, component_modes), self.analysis)
             preload, diameters = case.preload_of(self.analysis), nodal_diameter(self.analysis)
             model = build_model(case, self.analysis.dampers, self.comm, preload, diameters, self.analysis.aerodynamics)
             context = AnalysisContext(model, case, self.analysis, self.comm, Path(), self.console)
