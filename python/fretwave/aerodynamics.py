@@ -26,6 +26,7 @@ in cascade, Bull. JSME 23, 1980. Crawley, E. F., in AGARD-AG-298 vol. 2, ch. 19,
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Optional
@@ -76,29 +77,32 @@ class Aerodynamics:
         for nodal_diameter, ratio in ratios.items():
             wave[nodal_diameter % sectors] = -2j * ratio * omega**2
         parts = np.fft.ifft(wave)  # 1/N sum_d L(theta_d) e^{+2 pi i k d / N}
-        nearest = {k - sectors if 2 * k > sectors else k: complex(parts[k]) for k in range(sectors)}
-        largest = max(map(abs, nearest.values()))
-        return cls({k: L for k, L in nearest.items() if abs(L) > NOTHING * largest}, omega)
+        largest = np.abs(parts).max()
+        kept = [k for k in range(sectors) if abs(parts[k]) > NOTHING * largest]
+        return cls({nearest(k, sectors): complex(parts[k]) for k in kept}, omega)
 
     def wave(self, nodal_diameter: int, sectors: int) -> complex:
         """L(theta) of a wave, [N/m] at a dof, [1/s^2] modal."""
         theta = 2 * np.pi * nodal_diameter / sectors
         return complex(sum(L * np.exp(-1j * k * theta) for k, L in self.influence.items()))
 
-    def terms(self, M: Any) -> dict[str, Term]:
+    def terms(self, M: Any, period: int | None = None) -> dict[str, Term]:
         """{"K": {k: (n_dof, n_dof)}, "C": {k: ...}} to be added to those of a sector.
 
         Parameters
         ----------
         M : (n_dof, n_dof) or {k: ...}
             Mass of the sector.
+        period : int, optional
+            Of one wave: blades so many places apart move alike in all its harmonics, and their terms are one.
         """
         added: dict[str, Term] = {"K": {}, "C": {}}
         for k, L in self.influence.items():
             for ahead, shape in self._shape(M).items():
+                place = k + ahead if period is None else nearest(k + ahead, period)
                 for letter, value in (("K", -L.real), ("C", -L.imag / self.omega)):
                     if value:
-                        add_to(added[letter], k + ahead, value * shape)
+                        add_to(added[letter], place, value * shape)
         return added
 
     def _shape(self, M: Any) -> Term:
@@ -110,6 +114,17 @@ class Aerodynamics:
         if not 0 <= self.dof < n:
             raise InputError("no such dof for aerodynamic forces", None, self.dof, f"0 .. {n - 1}", "name a dof")
         return {0: sp.csr_matrix(([1.0], ([self.dof], [self.dof])), (n, n))}
+
+
+def nearest(k: int, period: int) -> int:
+    """The same place -period/2 < k <= period/2."""
+    k %= period
+    return k - period if 2 * k > period else k
+
+
+def period_of(nodal_diameter: int, sectors: int) -> int:
+    """Sectors after which a wave repeats itself in phase, in every harmonic."""
+    return sectors // math.gcd(nodal_diameter, sectors)
 
 
 def add_to(parts: Term, k: int, matrix: sp.csr_matrix) -> None:

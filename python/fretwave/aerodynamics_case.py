@@ -16,15 +16,16 @@ if TYPE_CHECKING:
     from .casefile import Case
 
 
-def with_flow(case: Case, K: Any, C: Any) -> tuple[Any, Any]:
-    """K and C of a sector, or of the wheel that a case was put on, with what the flow adds to them."""
-    from .aerodynamics import with_terms
+def with_flow(case: Case, K: Any, C: Any, nodal_diameter: int) -> tuple[Any, Any]:
+    """K and C of a sector in a wave, or of the wheel that a case was put on, with what the flow adds to them."""
+    from .aerodynamics import period_of, with_terms
     from .cyclic import around
 
     sector = case if case.wheel is None else case.wheel.sector
     assert sector.aerodynamics is not None and sector.neighbours is not None
     number = sector.neighbours.sectors
-    added = _flow(sector, sector.aerodynamics, number).terms(sector.neighbours.with_own("M", sector.M))
+    period = period_of(nodal_diameter, number) if case.wheel is None else None
+    added = _flow(sector, sector.aerodynamics, number).terms(sector.neighbours.with_own("M", sector.M), period)
     if case.wheel is not None:
         added = {letter: {0: around(with_terms(None, parts), number)} for letter, parts in added.items() if parts}
     return with_terms(K, added.get("K", {})), with_terms(C, added.get("C", {}))

@@ -114,7 +114,8 @@ def _headline(analysis: AnalysisSection) -> str:
     if isinstance(analysis, FlutterAnalysis):
         low, high = analysis.amplitude
         named = ", ".join(map(str, analysis.nodal_diameters or [])) or "all"
-        return f"flutter ({analysis.method}), nodal diameters {named}, linear mode {analysis.linear_mode}, a = {low:g} to {high:g} m"
+        start = f"flutter ({analysis.method}), nodal diameters {named}, linear mode {analysis.linear_mode}"
+        return f"{start}, a = {low:g} to {high:g} m of {analysis.normalise}"
     if isinstance(analysis, ForcedAnalysis):
         low, high = analysis.frequency
         levels = ", ".join(f"{level:g}" for level in analysis.levels)

@@ -26,7 +26,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
 
-from .aerodynamics import Aerodynamics, with_terms
+from .aerodynamics import Aerodynamics, period_of, with_terms
 from .errors import InputError
 from .faces import rotation
 from .model import Contact, Model, by_sector
@@ -113,7 +113,7 @@ class Sector:
 
     def model(self, nodal_diameter: int, comm: Any = None) -> Model:
         """The equations of one sector in a wave of this many nodal diameters (negative: backward). Collective."""
-        terms = self._terms()
+        terms = self._terms(period_of(nodal_diameter, self.sectors))
         return Model(terms["M"], terms["K"], terms["C"], self.contacts, comm, self.sectors, nodal_diameter)
 
     def wheel(self, comm: Any = None, changes: Mapping[str, Sequence[Any]] | None = None) -> Model:
@@ -134,10 +134,10 @@ class Sector:
         ]
         return Model(around["M"], around["K"], around.get("C"), contacts, comm, unit=self.n_dof)
 
-    def _terms(self) -> dict[str, Any]:
+    def _terms(self, period: int | None = None) -> dict[str, Any]:
         """M, K and C with what the flow adds."""
         terms = {letter: getattr(self, letter) for letter in "MKC"}
-        added = self.aerodynamics.terms(self.M) if self.aerodynamics else {}
+        added = self.aerodynamics.terms(self.M, period) if self.aerodynamics else {}
         return {letter: with_terms(A, added.get(letter, {})) for letter, A in terms.items()}
 
     def wave(self, q: npt.ArrayLike, nodal_diameter: int, order: int = 1) -> npt.NDArray[np.complex128]:

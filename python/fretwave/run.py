@@ -350,10 +350,10 @@ def build_model(
     ]
     M, K, C = case.M, case.K, case.damping_with(dampers)
     if neighbours is None:
-        K, C = with_flow(case, K, C) if aerodynamics else (K, C)
+        K, C = with_flow(case, K, C, nodal_diameter) if aerodynamics else (K, C)
         return fretwave.Model(M, K, C, contacts, comm, unit=case.wheel.unit if case.wheel else 1)
     M, K, C = neighbours.with_own("M", M), neighbours.with_own("K", K), case.ahead_damping(C)
-    K, C = with_flow(case, K, C) if aerodynamics else (K, C)
+    K, C = with_flow(case, K, C, nodal_diameter) if aerodynamics else (K, C)
     return fretwave.Model(M, K, C, contacts, comm, neighbours.sectors, nodal_diameter)
 
 
