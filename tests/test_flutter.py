@@ -12,12 +12,15 @@ import pytest
 from cyclic_models import chain_crossings
 
 import fretwave as fw
+from fretwave.analyses import flutter
 from fretwave.analyses.flutter_waves import describe_waves, verdict, words
 from fretwave.casefile import load_case
 from fretwave.check import check_case
 from fretwave.errors import CaseErrors
 from fretwave.keys import key_lines
-from fretwave.run import RunOptions, run_case
+from fretwave.plots import flutter as pictures
+from fretwave.plots.data import Run
+from fretwave.run import RunOptions, resume_run, run_case
 
 SECTORS, OMEGA = 5, 1.7
 INFLUENCE = {0: 0.02 - 0.06j, 1: -0.1 + 0.02j, -1: 0.12 + 0.05j, 2: 0.01 - 0.005j}
@@ -113,6 +116,48 @@ def test_wave_on_the_whole_wheel_from_the_case_file(write, shared_tmp, comm):
     for one, other in zip(whole, alone):
         for key in ("amplitude", "frequency_hz"):
             assert float(one[key]) == pytest.approx(float(other[key]), rel=1e-8)
+
+
+@pytest.mark.ranks(1)
+def test_an_interrupted_run_goes_on_in_the_wave_where_it_was(write, tmp_path, comm, monkeypatch):
+    """Same points, same limit cycles as without the interruption in the third wave."""
+    path = write(("amplitude = [0.2, 100.0]", "amplitude = [0.5, 10.0]"))
+    assert run_case(path, RunOptions(out=tmp_path / "whole", plots=False), comm) == 0
+    write_row = flutter.record
+
+    def interrupted(writer, *arguments):
+        if writer.rows == 40:
+            raise KeyboardInterrupt
+        return write_row(writer, *arguments)
+
+    monkeypatch.setattr(flutter, "record", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        run_case(path, RunOptions(out=tmp_path / "joined", plots=False), comm)
+    assert int(table(tmp_path / "joined", "flutter")[-1]["nodal_diameter"]) == 0
+    monkeypatch.setattr(flutter, "record", write_row)
+    assert resume_run(tmp_path / "joined", comm, plots=False) == 0
+    for name in ("flutter", "flutter_waves", "flutter_crossings"):
+        rows = [
+            [{k: v for k, v in row.items() if k != "wall_s"} for row in table(tmp_path / folder, name)]
+            for folder in ("whole", "joined")
+        ]
+        assert rows[0] == rows[1], name
+
+
+@pytest.mark.ranks(1)
+def test_pictures_show_every_wave(write, tmp_path, comm):
+    out = tmp_path / "run"
+    changes = [("amplitude = [0.2, 100.0]", "amplitude = [0.5, 10.0]")]
+    assert run_case(write(*changes), RunOptions(out=out), comm) == 0
+    assert {path.name for path in out.glob("*.png")} == {"flutter_damping.png", "flutter_limits.png"}
+    (run,) = Run(out).of_kind("flutter")
+    upper = pictures.damping(run).axes[0]
+    assert {"ND -2", "ND 0", "ND +1", "stable limit cycle"} <= set(upper.get_legend_handles_labels()[1])
+    amplitude, zeta = pictures.wave(run, 1)
+    spans = pictures.spans(amplitude, zeta)
+    assert [sign for *_, sign in spans] == [-1, 1, -1]
+    cycles = [cycle["amplitude"] for cycle in run.attributes["events"] if cycle["nodal_diameter"] == 1]
+    assert [high for _, high, _ in spans[:2]] == pytest.approx(cycles, rel=1e-12)
 
 
 @pytest.mark.ranks(1)
