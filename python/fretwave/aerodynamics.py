@@ -34,6 +34,7 @@ from typing import Any, Optional
 import numpy as np
 import scipy.sparse as sp
 
+from .engine_order import folded
 from .errors import InputError
 from .model import by_sector
 
@@ -79,7 +80,7 @@ class Aerodynamics:
         parts = np.fft.ifft(wave)  # 1/N sum_d L(theta_d) e^{+2 pi i k d / N}
         largest = np.abs(parts).max()
         kept = [k for k in range(sectors) if abs(parts[k]) > NOTHING * largest]
-        return cls({nearest(k, sectors): complex(parts[k]) for k in kept}, omega)
+        return cls({folded(k, sectors): complex(parts[k]) for k in kept}, omega)
 
     def wave(self, nodal_diameter: int, sectors: int) -> complex:
         """L(theta) of a wave, [N/m] at a dof, [1/s^2] modal."""
@@ -99,7 +100,7 @@ class Aerodynamics:
         added: dict[str, Term] = {"K": {}, "C": {}}
         for k, L in self.influence.items():
             for ahead, shape in self._shape(M).items():
-                place = k + ahead if period is None else nearest(k + ahead, period)
+                place = k + ahead if period is None else folded(k + ahead, period)
                 for letter, value in (("K", -L.real), ("C", -L.imag / self.omega)):
                     if value:
                         add_to(added[letter], place, value * shape)
@@ -114,12 +115,6 @@ class Aerodynamics:
         if not 0 <= self.dof < n:
             raise InputError("no such dof for aerodynamic forces", None, self.dof, f"0 .. {n - 1}", "name a dof")
         return {0: sp.csr_matrix(([1.0], ([self.dof], [self.dof])), (n, n))}
-
-
-def nearest(k: int, period: int) -> int:
-    """The same place -period/2 < k <= period/2."""
-    k %= period
-    return k - period if 2 * k > period else k
 
 
 def period_of(nodal_diameter: int, sectors: int) -> int:

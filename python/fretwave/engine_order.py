@@ -17,9 +17,9 @@ from .schema import AnalysisSection, ForcedAnalysis
 from .source import Source
 
 
-def folded(order: int, sectors: int) -> int:
-    """Nodal diameters -N/2 < ND <= N/2 of the wave that an engine order drives, negative for a backward wave."""
-    index = order % sectors
+def folded(index: int, sectors: int) -> int:
+    """Nodal diameters -N/2 < ND <= N/2 of the wave with this spatial index, negative for a backward wave."""
+    index %= sectors
     return index - sectors if 2 * index > sectors else index
 
 

@@ -20,6 +20,7 @@ from ..runfolder import replace_text
 from ..schema import AnalysisSection
 from ..sectors import nodal_diameter
 from ..source import display
+from ..wheel import Wheel
 
 
 @dataclass
@@ -92,6 +93,12 @@ class AnalysisContext:
     @property
     def name(self) -> str:
         return self.analysis.name
+
+    @property
+    def wheel(self) -> Wheel:
+        """Of an analysis of a whole wheel."""
+        assert self.case.wheel is not None
+        return self.case.wheel
 
     @property
     def prefix(self) -> str:

@@ -21,7 +21,7 @@ from ..columns import FLUTTER
 from ..schema import FlutterAnalysis
 from .branch import finished_table, open_branch, points_of, record, step_control
 from .context import AnalysisContext, Outcome
-from .flutter_waves import STABLE, describe_waves, signed, words
+from .flutter_waves import STABLE, describe_waves, with_sign, words
 from .mode import point_line
 from .rest import retained, start_mode
 
@@ -113,7 +113,7 @@ class _Wave:
     def _say(self, row: Mapping[str, Any]) -> None:
         low, high = self.analysis.amplitude
         share = (self.number + math.log(row["amplitude"] / low) / math.log(high / low)) / self.count
-        line = point_line(f"{self.context.name} ND {signed(self.diameter):>3}", dict(row))
+        line = point_line(f"{self.context.name} ND {with_sign(self.diameter):>3}", dict(row))
         self.context.console.point(line, line, share, notable=row["event"] not in ("", "start", "stop"))
 
 

@@ -93,10 +93,10 @@ def words(wave: Mapping[str, Any]) -> str:
         "stable below": f"decays below, {cycles}; {peak}",
     }[wave["verdict"]]
     stuck = f"{wave['frequency_hz']:.5g} Hz, {100 * wave['zeta']:+.3g} % at the smallest amplitude"
-    return f"ND {signed(wave['nodal_diameter'])}, {stuck}: {fate}"
+    return f"ND {with_sign(wave['nodal_diameter'])}, {stuck}: {fate}"
 
 
-def signed(diameters: int) -> str:
+def with_sign(diameters: int) -> str:
     """Nodal diameters with the sign that tells forward from backward."""
     return f"{diameters:+d}" if diameters else "0"
 

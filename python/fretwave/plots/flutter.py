@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..analyses.flutter_waves import signed
+from ..analyses.flutter_waves import with_sign
 from . import style
 from .data import Analysis, Run
 
@@ -41,7 +41,7 @@ def damping(flutter: Analysis) -> Figure:
     for diameter, colour in zip(found, style.shades(len(found))):
         amplitude, zeta = wave(flutter, diameter)
         axes.plot(
-            amplitude, zeta, color=colour, linestyle="-" if diameter >= 0 else "--", label=f"ND {signed(diameter)}"
+            amplitude, zeta, color=colour, linestyle="-" if diameter >= 0 else "--", label=f"ND {with_sign(diameter)}"
         )
     axes.axhline(0.0, color=style.INK, linewidth=1.0)
     _cycles(axes, flutter, lambda cycle: (cycle["amplitude"], 0.0))
@@ -75,7 +75,7 @@ def limits(flutter: Analysis) -> Figure:
     _cycles(axes, flutter, lambda cycle: (found.index(cycle["nodal_diameter"]), cycle["amplitude"]))
     axes.set_yscale("log")
     axes.set_ylim(flutter.columns["amplitude"].min(), flutter.columns["amplitude"].max())
-    axes.set_xticks(range(len(found)), [signed(diameter) for diameter in found])
+    axes.set_xticks(range(len(found)), [with_sign(diameter) for diameter in found])
     axes.set_xlabel("Nodal diameters, negative for backward waves")
     axes.set_ylabel(_amplitude(flutter))
     style.plain_numbers(axes.yaxis)
