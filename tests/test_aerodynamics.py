@@ -20,10 +20,10 @@ def flow_of_chain() -> Aerodynamics:
     return Aerodynamics({0: 0.02 - 0.06j, 1: -0.1 + 0.02j, -1: 0.12 + 0.05j, 2: 0.01 - 0.005j}, 1.7)
 
 
-def located(model: fw.Model, comm, method: str = "CNM", start=None, avoid=None) -> tuple[list, list]:
+def located(model: fw.Model, comm, method: str = "CNM", start=None, avoid=None, orders=(1,)) -> tuple[list, list]:
     """Zeros of the damping of a branch from stick to slip, and its damping."""
     start = start or fw.linear_modes(jenkins_chain(SECTORS).model(model.nodal_diameter, comm), 1)[0]
-    problem = fw.NonlinearMode(model, fw.Harmonics([1], 960), method, 0, start, avoid=avoid)
+    problem = fw.NonlinearMode(model, fw.Harmonics(orders, 960), method, 0, start, avoid=avoid)
     branch = fw.Continuation(problem, problem.initial(0.05), (0.05, 100.0), fw.StepControl(maximum=0.1))
     found, damping = [], []
     for point in branch:
@@ -128,3 +128,40 @@ def test_what_is_wrong_with_influence_coefficients_is_said():
         Aerodynamics({0: 1j}, 0.0)
     with pytest.raises(fw.InputError, match="no such dof"):
         Aerodynamics({0: 1j}, 1.0, dof=1).terms(np.eye(1))
+
+
+def integrated(flow: Aerodynamics, start: float, omega: float, periods: int, steps: int = 400) -> np.ndarray:
+    """Fundamental amplitude of mass 0 in each period of the wheel of 5 masses, by central differences (kt = R = 1).
+
+    Started as the wave of 1 nodal diameter; sliders between the masses slip where their force reaches the limit.
+    """
+    step, j = 2 * np.pi / omega / steps, np.arange(SECTORS)
+    K, C = np.eye(SECTORS), np.zeros((SECTORS, SECTORS))
+    for k, L in flow.influence.items():
+        K[j, (j + k) % SECTORS] -= L.real
+        C[j, (j + k) % SECTORS] -= L.imag / flow.omega
+    phase = -2 * np.pi * j / SECTORS
+    x, v, slider = start * np.cos(phase), -start * omega * np.sin(phase), np.zeros(SECTORS)
+    motion = np.empty((periods, steps))
+    for n in range(periods * steps):
+        motion[n // steps, n % steps] = x[0]
+        reach = np.roll(x, -1) - x
+        force = np.clip(reach - slider, -1, 1)
+        slider = reach - force
+        v = v + step * (force - np.roll(force, 1) - K @ x - C @ v)
+        x = x + step * v
+    return np.abs(2 / steps * motion @ np.exp(-2j * np.pi * np.arange(steps) / steps))
+
+
+@pytest.mark.ranks(1)
+def test_motions_of_the_wheel_in_time_go_to_the_stable_limit_cycle(comm):
+    """From both sides to the first one, away from the second, the wave running as the convention says."""
+    flow = flow_of_chain()
+    sector = replace(jenkins_chain(SECTORS), aerodynamics=flow)
+    (stable, unstable), _ = located(sector.model(1, comm), comm, orders=(1, 3, 5, 7, 9))
+    for factor in (0.8, 1.5):
+        amplitude = integrated(flow, factor * stable["amplitude"], stable["omega"], 16)
+        assert amplitude[-1] == pytest.approx(stable["amplitude"], rel=1e-3)
+    for factor, sign in ((0.9, -1), (1.1, +1)):
+        amplitude = integrated(flow, factor * unstable["amplitude"], unstable["omega"], 3)
+        assert (sign * np.diff(amplitude) > 0).all()
