@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from .errors import FretwaveError, InputError, NotConverged
 
 if TYPE_CHECKING:
+    from .aerodynamics import Aerodynamics
     from .built import BuiltContact, BuiltModel
     from .contact_laws import LawInfo, ParameterInfo, PythonLaw, laws
     from .continuation import Continuation, Point, StepControl
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 
 #: Where each public name lives; loaded when first used, so that `fretwave --help` starts without PETSc.
 _HOMES = {
+    "aerodynamics": ("Aerodynamics",),
     "built": ("BuiltContact", "BuiltModel"),
     "continuation": ("Continuation", "Point", "StepControl"),
     "cyclic": ("Sector",),
@@ -37,6 +39,7 @@ _HOMES = {
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 
 __all__ = [
+    "Aerodynamics",
     "BuiltContact",
     "BuiltModel",
     "Contact",

@@ -12,14 +12,24 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import scipy.sparse
 
 from . import checks
+from .aerodynamics_case import check_aerodynamics
 from .built import BuiltModel
 from .checks_rest import check_preloads, check_reduction
 from .checks_wheel import check_wheels
 from .contacts import ContactSpec, read_contacts
+from .engine_order import fold_engine_orders
 from .errors import CaseErrors, FretwaveError
 from .origin import Origin, check_physics, load_origin
 from .reduced import ReductionReport, kept_dofs
-from .schema import AnalysisSection, ModelSection, PreloadSection, ReductionSection, Section, StudySection
+from .schema import (
+    AerodynamicsSection,
+    AnalysisSection,
+    ModelSection,
+    PreloadSection,
+    ReductionSection,
+    Section,
+    StudySection,
+)
 from .sectors import Neighbours, check_waves, tie
 from .source import Source
 from .validation import toml, validate
@@ -57,6 +67,8 @@ class Case:
         The static state of all analyses without one of their own; None for none.
     neighbours : Neighbours
         What ties a sector of a wheel to the next ones; None for a whole structure.
+    aerodynamics : AerodynamicsSection
+        Forces of the flow on a sector's blades; None for none.
     wheel : Wheel
         Of a case put on its whole wheel (`fretwave.wheel.on_wheel`), the sector it is made of.
     analyses : dict
@@ -93,6 +105,7 @@ class Case:
     unreduced: Case | None = None
     preload: PreloadSection | None = None
     neighbours: Neighbours | None = None
+    aerodynamics: AerodynamicsSection | None = None
     wheel: Wheel | None = None
 
     @property
@@ -201,6 +214,7 @@ def _build(source: Source, laws: Mapping[str, Any], found: list[FretwaveError]) 
     section = _table(ModelSection, "model", source, found)
     reduction = _table(ReductionSection, "reduction", source, found)
     preload = _table(PreloadSection, "preload", source, found)
+    flow = _table(AerodynamicsSection, "aerodynamics", source, found)
     study = _table(StudySection, "study", source, found)
     origin = load_origin(section, source, found) if section else None
     dofs = origin.dofs if origin else None
@@ -210,9 +224,13 @@ def _build(source: Source, laws: Mapping[str, Any], found: list[FretwaveError]) 
     if section and origin:
         origin, contacts, neighbours = tie(section, source, origin, contacts, found)
         dofs, built = origin.dofs, origin.built
+        fold_engine_orders(source, analyses, neighbours.sectors if neighbours else None, found)
         check_waves(source, analyses, neighbours, reduction is not None, found)
         check_wheels(source, analyses, neighbours, dofs, found)
-    keep = kept_dofs(origin.named, contacts, analyses, origin.dofs) if origin and reduction else []
+    if origin:
+        check_aerodynamics(source, flow, analyses, neighbours.sectors if neighbours else None, origin.dofs, found)
+    blade = {flow.dof: origin.dofs.index(flow.dof)} if flow and origin and flow.dof in origin.dofs else {}
+    keep = kept_dofs({**origin.named, **blade}, contacts, analyses, origin.dofs) if origin and reduction else []
     checks.check_analyses(source, analyses, [origin.dofs[k] for k in keep] if origin and keep else dofs, found)
     check_reduction(source, reduction, found)
     check_preloads(source, preload, analyses, built.loads if built else () if origin else None, found)
@@ -223,6 +241,7 @@ def _build(source: Source, laws: Mapping[str, Any], found: list[FretwaveError]) 
     if found or section is None or origin is None:
         return None
     loaded = {letter: matrix.values for letter, matrix in origin.matrices.items()}
+    tables = {"reduction": reduction, "preload": preload, "aerodynamics": flow}
     return Case(
         path=source.path,
         text=source.text,
@@ -233,7 +252,7 @@ def _build(source: Source, laws: Mapping[str, Any], found: list[FretwaveError]) 
         C=loaded.get("C"),
         contacts=contacts,
         analyses={analysis.name: analysis for analysis in analyses.values()},
-        resolved=_resolve(origin, section, contacts, analyses, {"reduction": reduction, "preload": preload}),
+        resolved=_resolve(origin, section, contacts, analyses, tables),
         notes=[*notes, *_unused_contacts(built, contacts)],
         has_quick="quick" in source.data,
         study=study or StudySection(),
@@ -244,6 +263,7 @@ def _build(source: Source, laws: Mapping[str, Any], found: list[FretwaveError]) 
         keep=keep,
         preload=preload,
         neighbours=neighbours,
+        aerodynamics=flow,
     )
 
 

@@ -16,6 +16,7 @@ from .reduced import reduce_case
 from .run import build_model, in_order
 from .schema import (
     AnalysisSection,
+    FlutterAnalysis,
     ForcedAnalysis,
     HarmonicSection,
     ModeAnalysis,
@@ -110,10 +111,16 @@ def _headline(analysis: AnalysisSection) -> str:
         low, high = analysis.amplitude
         start = f"nonlinear mode ({analysis.method}) from linear mode {analysis.linear_mode}"
         return f"{start}, a = {low:g} to {high:g} m of {analysis.normalise}"
+    if isinstance(analysis, FlutterAnalysis):
+        low, high = analysis.amplitude
+        named = ", ".join(map(str, analysis.nodal_diameters or [])) or "all"
+        start = f"flutter ({analysis.method}), nodal diameters {named}, linear mode {analysis.linear_mode}"
+        return f"{start}, a = {low:g} to {high:g} m of {analysis.normalise}"
     if isinstance(analysis, ForcedAnalysis):
         low, high = analysis.frequency
         levels = ", ".join(f"{level:g}" for level in analysis.levels)
-        return f"forced response of {analysis.observe}, {low:g} to {high:g} Hz, levels {levels}"
+        order = f" to engine order {analysis.engine_order}" if analysis.engine_order else ""
+        return f"forced response of {analysis.observe}{order}, {low:g} to {high:g} Hz, levels {levels}"
     if isinstance(analysis, StaticAnalysis):
         return f"static state at load factors {', '.join(f'{factor:g}' for factor in analysis.factors)}"
     assert isinstance(analysis, TransientSection)

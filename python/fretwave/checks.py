@@ -11,6 +11,7 @@ from .schema import (
     ANALYSES,
     TOP_LEVEL,
     AnalysisSection,
+    FlutterAnalysis,
     ForcedAnalysis,
     HarmonicSection,
     ModeAnalysis,
@@ -42,7 +43,7 @@ def check_top_level(source: Source, found: Found) -> None:
     for key in source.data:
         if key not in TOP_LEVEL:
             found.append(unknown_key(source, (key,), list(TOP_LEVEL)))
-    tables = dict.fromkeys(("model", "reduction", "preload", "quick", "study"), dict)
+    tables = dict.fromkeys(("model", "reduction", "preload", "aerodynamics", "quick", "study"), dict)
     shapes = {**tables, "contact": list, "analysis": list, "title": str}
     writing = {**{name: f"[{name}]" for name in tables}, "contact": "[[contact]]", "analysis": "[[analysis]]"}
     for key, shape in shapes.items():
@@ -119,7 +120,7 @@ def check_analyses(
         _check_petsc(report, analysis)
         if isinstance(analysis, HarmonicSection):
             _check_harmonics(report, analysis, dofs)
-        if isinstance(analysis, ModeAnalysis):
+        if isinstance(analysis, (ModeAnalysis, FlutterAnalysis)):
             report.dof(("normalise",), analysis.normalise, dofs)
             _check_range(report, "amplitude", analysis.amplitude, analysis.report_at)
         if isinstance(analysis, ForcedAnalysis):

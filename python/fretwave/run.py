@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from . import checks
+from .aerodynamics_case import with_flow
 from .analyses.context import AnalysisContext, Outcome, belongs, describe_analysis
 from .casefile import Case, changed_keys, load_case
 from .console import Console
@@ -31,6 +32,7 @@ DISPATCH = {
     "static": ("static", "run_static"),
     "mode": ("mode", "run_mode"),
     "forced": ("forced", "run_forced"),
+    "flutter": ("flutter", "run_flutter"),
     "free_decay": ("transient", "run_free_decay"),
     "limit_cycle": ("transient", "run_limit_cycle"),
 }
@@ -231,8 +233,8 @@ class _Runner:
             self.folder.start()
 
         case = on_wheel(self.case, analysis)
-        preload = case.preload_of(analysis)
-        built = build_model(case, self._dampers(analysis), self.comm, preload, nodal_diameter(analysis))
+        preload, flow = case.preload_of(analysis), getattr(analysis, "aerodynamics", False)
+        built = build_model(case, self._dampers(analysis), self.comm, preload, nodal_diameter(analysis), flow)
         with built as model, options.inserted(), solver_room(case, analysis, prefix):
             context = AnalysisContext(
                 model,
@@ -320,13 +322,19 @@ def needs(analysis: AnalysisSection) -> list[str]:
 
 
 def build_model(
-    case: Case, dampers: Sequence[Any], comm: Any, preload: PreloadSection | None = None, nodal_diameter: int = 0
+    case: Case,
+    dampers: Sequence[Any],
+    comm: Any,
+    preload: PreloadSection | None = None,
+    nodal_diameter: int = 0,
+    aerodynamics: bool = False,
 ) -> Any:
     """``fretwave.Model`` of a case; a preload without pair loads sets the pairs' normal loads to zero. Collective.
 
     Parameters
     ----------
     nodal_diameter : of the wave, where the case is a sector of a wheel (that of `on_wheel` has all of them)
+    aerodynamics : the forces of the flow act
     """
     import fretwave
 
@@ -342,8 +350,10 @@ def build_model(
     ]
     M, K, C = case.M, case.K, case.damping_with(dampers)
     if neighbours is None:
+        K, C = with_flow(case, K, C, nodal_diameter) if aerodynamics else (K, C)
         return fretwave.Model(M, K, C, contacts, comm, unit=case.wheel.unit if case.wheel else 1)
     M, K, C = neighbours.with_own("M", M), neighbours.with_own("K", K), case.ahead_damping(C)
+    K, C = with_flow(case, K, C, nodal_diameter) if aerodynamics else (K, C)
     return fretwave.Model(M, K, C, contacts, comm, neighbours.sectors, nodal_diameter)
 
 

@@ -83,6 +83,28 @@ class PreloadSection(Section):
     loads: list[str] = key("static loads of the model that act", example='["centrifugal"]', default_factory=list)
 
 
+class AerodynamicsSection(Section):
+    """``[aerodynamics]``: forces of the flow on the vibrating blades, where `aerodynamics = true` and in flutter."""
+
+    frequency: Positive = key("vibration frequency at which they hold", "Hz", "194.3")
+    influence: Optional[dict[str, list[float]]] = key(
+        "complex force on a blade by the unit motion of the blade k places ahead: k = [real, imaginary]",
+        "N/m at a dof, 1/s2 modal",
+        "{ 0 = [0.0, -20.0], 1 = [-8.0, 3.0], -1 = [8.0, 3.0] }",
+        default=None,
+        min_length=1,
+    )
+    dof: Optional[Dof] = key(
+        "dof of `influence`; without it modal: the force on a mode of unit modal mass", example='"tip"', default=None
+    )
+    damping: Optional[dict[str, float]] = key(
+        "in place of influence: modal damping ratio by nodal diameter, negative for backward waves",
+        example="{ 4 = -0.002, -4 = 0.003 }",
+        default=None,
+        min_length=1,
+    )
+
+
 class ContactSection(BaseModel):
     """``[[contact]]``: pairs that share a contact law; the law's parameters are further keys."""
 
@@ -158,6 +180,7 @@ class HarmonicSection(AnalysisSection):
     nodal_diameter: Optional[int] = key(
         "nodal diameters of the wave on a sector, negative for a backward wave", example="4", default=None
     )
+    aerodynamics: bool = key("the forces of [aerodynamics] act", example="true", default=False)
     wheel: bool = key("solve all sectors of the wheel in place of one", example="true", default=False)
     mistuning: Optional[MistuningSection] = key(
         "deviations of the wheel's sectors", example='{ of = "blade", standard_deviation = 0.02 }', default=None
@@ -191,6 +214,23 @@ class ModeAnalysis(HarmonicSection):
     )
 
 
+class FlutterAnalysis(HarmonicSection):
+    """``type = "flutter"``: modes of several nodal diameters with [aerodynamics], and their limit cycles."""
+
+    type: Literal["flutter"]
+    method: Literal["CNM", "EPMC"] = key(
+        "complex nonlinear mode (decaying) or extended periodic motion", example='"CNM"', default="CNM"
+    )
+    normalise: Dof = key("dof whose fundamental harmonic is the modal amplitude", example='"m1"')
+    amplitude: list[Positive] = key("first and last modal amplitude", "m", "[1e-5, 1e-2]", min_length=2, max_length=2)
+    nodal_diameters: Optional[list[int]] = key(
+        "waves looked at, negative for backward ones; all unless told", example="[-4, 3, 4]", default=None, min_length=1
+    )
+    report_at: list[Positive] = key(
+        "amplitudes at which the motion of a period is kept", "m", "[1e-4]", default_factory=list
+    )
+
+
 class StaticAnalysis(AnalysisSection):
     """``type = "static"``: the static state under the preload, pair by pair."""
 
@@ -211,7 +251,16 @@ class ForcedAnalysis(HarmonicSection):
         default_factory=list,
     )
     force: dict[Dof, float] = key(
-        "force amplitude of each excited dof, cosine at harmonic 1", "N", "{ m1 = 1.0 }", min_length=1
+        "force amplitude of each excited dof, cosine at harmonic 1, delayed from sector to sector of a wheel",
+        "N",
+        "{ m1 = 1.0 }",
+        min_length=1,
+    )
+    engine_order: Optional[int] = key(
+        "order of the excitation of a wheel, in place of nodal_diameter; negative where the rotor turns with the "
+        "sectors' numbers",
+        example="4",
+        default=None,
     )
     levels: list[Positive] = key("factors on the force", "-", "[1.0, 2.0]", min_length=1)
     frequency: list[Positive] = key(
@@ -250,6 +299,7 @@ ANALYSES: dict[str, type[AnalysisSection]] = {
     "static": StaticAnalysis,
     "mode": ModeAnalysis,
     "forced": ForcedAnalysis,
+    "flutter": FlutterAnalysis,
     "free_decay": FreeDecayAnalysis,
     "limit_cycle": LimitCycleAnalysis,
 }
@@ -276,6 +326,7 @@ TOP_LEVEL = {
     "model": "matrices and names of the degrees of freedom, or what makes them",
     "reduction": "Craig-Bampton reduction",
     "preload": "the static state that the dynamics move about",
+    "aerodynamics": "forces of the flow on the blades",
     "contact": "contact pairs that share a law ([[contact]], any number)",
     "analysis": "what to compute ([[analysis]], at least one)",
     "quick": "overrides used by --quick, addressed as --set does",

@@ -69,7 +69,7 @@ class _Solver:
                 self._parts[1].model.destroy()
             case = on_wheel(reduce_case(self.case, self.comm, component_modes), self.analysis)
             preload, diameters = case.preload_of(self.analysis), nodal_diameter(self.analysis)
-            model = build_model(case, self.analysis.dampers, self.comm, preload, diameters)
+            model = build_model(case, self.analysis.dampers, self.comm, preload, diameters, self.analysis.aerodynamics)
             context = AnalysisContext(model, case, self.analysis, self.comm, Path(), self.console)
             self._parts = (component_modes, context, start_of(context))
         return self._parts[1:]

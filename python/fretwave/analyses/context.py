@@ -18,6 +18,7 @@ from ..parallel import on_first_rank
 from ..results import AnalysisWriter, open_results
 from ..runfolder import replace_text
 from ..schema import AnalysisSection
+from ..sectors import nodal_diameter
 from ..source import display
 from ..wheel import Wheel
 
@@ -197,10 +198,16 @@ class AnalysisContext:
             return what(file[name])
 
     def linear_mode(self, contact: str, count: int = 1) -> list[Any]:
-        """Linear modes with the contact ``stuck`` or ``free``. Collective."""
+        """Linear modes with the contact ``stuck`` or ``free``, without forces of the flow. Collective."""
         import fretwave
 
-        return cast("list[Any]", fretwave.linear_modes(self.model, count=count, contact=contact))
+        if not getattr(self.analysis, "aerodynamics", False):
+            return cast("list[Any]", fretwave.linear_modes(self.model, count=count, contact=contact))
+        from ..run import build_model
+
+        preload, diameters = self.case.preload_of(self.analysis), nodal_diameter(self.analysis)
+        with build_model(self.case, (), self.comm, preload, diameters) as structure:
+            return cast("list[Any]", fretwave.linear_modes(structure, count=count, contact=contact))
 
 
 def _columns(group: Any) -> dict[str, Any]:
@@ -211,7 +218,7 @@ def _columns(group: Any) -> dict[str, Any]:
 
 
 #: Tables of the case that decide the results of every analysis.
-_COMMON = ("model", "contact", "reduction", "preload")
+_COMMON = ("model", "contact", "reduction", "preload", "aerodynamics")
 
 
 def describe_analysis(analysis: AnalysisSection, case: Case, run_id: str) -> dict[str, Any]:

@@ -23,6 +23,8 @@ FAMILIES = (
     "wheel",
     "limit_cycles",
     "forced",
+    "forced_blades",
+    "flutter",
     "free_decay",
     "study",
 )
