@@ -1,0 +1,60 @@
+"""``type = "sweep"``: another analysis for every value of some keys, on groups of ranks."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from ..casefile import Case
+from ..console import Console
+from ..parallel import on_first_rank
+from ..run import RunOptions, needs
+from ..runfolder import RunFolder
+from ..schema import SweepAnalysis
+from ..source import display
+from ..sweep import Sweep
+from ..sweep_plan import table_overrides, table_plan
+from ..sweep_results import write_summary, write_sweep
+from .context import Outcome
+
+
+def analysis_sweep(case: Case, analysis: SweepAnalysis, options: RunOptions) -> Sweep:
+    """The sweep that an analysis of a case asks for."""
+    wanted: list[str] = []
+
+    def want(name: str) -> None:
+        for needed in needs(case.analyses[name]):
+            want(needed)
+        wanted.append(name)
+
+    want(analysis.of)
+    petsc = f"{options.petsc} {analysis.petsc}".strip()
+    overrides = [*options.overrides, *table_overrides(analysis.overrides)]
+    chosen = replace(options, only=list(dict.fromkeys(wanted)), petsc=petsc, overrides=overrides)
+    where = f"{display(case.path)} ({analysis.name}.over)"
+    return Sweep(case.path, table_plan(analysis.over), chosen, Path(), analysis.groups, case.text, where)
+
+
+def run_sweep(sweep: Sweep, name: str, comm: Any, console: Console, folder: RunFolder, title: str = "") -> Outcome:
+    """Run every value and write the results of all in one group and two tables. Collective."""
+    run_id, of = folder.record["run_id"], sweep.options.only[-1]
+    sweep.folder = folder.path / name
+    console.line(f"{name}: '{of}' with {len(sweep.plan)} values of {', '.join(sweep.plan.keys)}")
+    errors = sweep.run(comm, run_id)
+
+    def finish() -> Outcome:
+        outcomes, branches = sweep.outcomes(run_id, errors), sweep.branches(of, run_id)
+        bad = [k for k, outcome in enumerate(outcomes) if outcome["status"] != "done"]
+        labels = sweep.plan.labels()
+        reason = "; ".join(f"{labels[k]}: {outcomes[k]['reason']}" for k in bad) or "all values done"
+        if branches:
+            attributes = {"run_id": run_id, "status": "stopped" if bad else "done", "reason": reason}
+            rows = write_sweep(folder.path, name, of, sweep.plan, branches, attributes, title)
+            write_summary(folder.path / f"{name}_summary.csv", rows)
+        sweep.forget_others()
+        points = sum(branch.points for branch in branches)
+        advice = next((error.fix for error in errors if error is not None and error.fix), "")
+        return Outcome(points, reason, not bad, goal=f"{len(sweep.plan)} whole branches", advice=advice)
+
+    return on_first_rank(comm, finish)
