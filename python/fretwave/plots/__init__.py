@@ -24,6 +24,7 @@ FAMILIES = (
     "forced",
     "free_decay",
     "study",
+    "sweeps",
 )
 
 
