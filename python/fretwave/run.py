@@ -102,6 +102,10 @@ def reload_case(folder: Path, kept: bool = False) -> tuple[Case, dict[str, Any]]
         The folder holds no run, or its case has changed since.
     """
     record = read_record(folder)
+    if "sweep" in record:
+        one = folder / record.get("values", [{}])[0].get("folder", "values/0000")
+        problem = "this is the folder of a sweep, not of one run"
+        raise InputError(problem, display(folder), expected="the folder of a value", fix=f"give {display(one)}")
     given = record["case"]
     path = Path(given["path"])
     text = None if path.exists() and not kept else (folder / CASE_COPY).read_text(encoding="utf-8")

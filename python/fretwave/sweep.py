@@ -59,6 +59,8 @@ class Sweep:
         Of the case file, when it is not to be read again.
     where : str
         Where the values were given, when not on the command line.
+    places : dict
+        Where the user gave overrides that all values share, when not by ``--set``.
     """
 
     path: Path
@@ -68,6 +70,7 @@ class Sweep:
     n_groups: int | None = None
     text: str | None = None
     where: str | None = None
+    places: dict[str, str] = field(default_factory=dict)
 
     def check(self, comm: Any) -> list[Checked]:
         """Load the case with every value, several at a time. Collective.
@@ -134,26 +137,30 @@ class Sweep:
         return Checked(case.digest, case.resolved, case.title, case.name, case.text, names)
 
     def _problems(self, found: Sequence[Any]) -> list[FretwaveError]:
-        """Each problem once; one that not all values have says with which it comes first."""
+        """Each problem once, with the first of the values that have it."""
         numbers: dict[tuple[Any, ...], list[int]] = {}
         kept: dict[tuple[Any, ...], FretwaveError] = {}
         for number, error in enumerate(found):
             for problem in getattr(error, "problems", [error] if isinstance(error, FretwaveError) else []):
-                own = problem.where in [f"--set {text}" for text in self.plan.overrides()[number]]
-                identity = (problem.what, str(problem.measured), "" if own else problem.where)
-                numbers.setdefault(identity, []).append(number)
-                kept.setdefault(identity, self._placed(problem, own))
+                where, own = self._place(str(problem.where), number)
+                same = (problem.what, str(problem.expected), None if own else (where, str(problem.measured)))
+                numbers.setdefault(same, []).append(number)
+                kept.setdefault(same, InputError(problem.what, where, problem.measured, problem.expected, problem.fix))
         labels = self.plan.labels()
-        for identity, problem in kept.items():
-            if len(numbers[identity]) < len(self.plan) and identity[2]:
-                problem.what = f"with {labels[numbers[identity][0]]}: {problem.what}"
+        for same, problem in kept.items():
+            count = len(numbers[same])
+            if same[2] is None and count > 1:
+                problem.measured = f"{problem.measured}, and with {count - 1} more value{'s' * (count > 2)}"
+            elif same[2] is not None and count < len(self.plan):
+                problem.what = f"with {labels[numbers[same][0]]}: {problem.what}"
         return list(kept.values())
 
-    def _placed(self, problem: FretwaveError, own: bool) -> FretwaveError:
-        """Where the user gave the value."""
-        given = str(problem.where).replace("--set", "--over", 1) if self.where is None else self.where
-        where = given if own else problem.where
-        return InputError(problem.what, where, problem.measured, problem.expected, problem.fix)
+    def _place(self, where: str, number: int) -> tuple[str, bool]:
+        """Where the user gave what a problem is about, and whether that is the value itself."""
+        given = where[len("--set ") :] if where.startswith("--set ") else ""
+        if given in self.plan.overrides()[number]:
+            return self.where or f"--over {given}", True
+        return self.places.get(given, where), False
 
     def _record(self, number: int, run_id: str) -> dict[str, Any] | None:
         """run.json of a value when it is part of this sweep."""

@@ -12,7 +12,7 @@ from ..parallel import on_first_rank
 from ..run import RunOptions, needs
 from ..runfolder import RunFolder
 from ..schema import SweepAnalysis
-from ..source import display
+from ..source import Source
 from ..sweep import Sweep
 from ..sweep_plan import table_overrides, table_plan
 from ..sweep_results import write_summary, write_sweep
@@ -30,10 +30,16 @@ def analysis_sweep(case: Case, analysis: SweepAnalysis, options: RunOptions) -> 
 
     want(analysis.of)
     petsc = f"{options.petsc} {analysis.petsc}".strip()
-    overrides = [*options.overrides, *table_overrides(analysis.overrides)]
-    chosen = replace(options, only=list(dict.fromkeys(wanted)), petsc=petsc, overrides=overrides)
-    where = f"{display(case.path)} ({analysis.name}.over)"
-    return Sweep(case.path, table_plan(analysis.over), chosen, Path(), analysis.groups, case.text, where)
+    own = table_overrides(analysis.overrides)
+    chosen = replace(options, only=list(dict.fromkeys(wanted)), petsc=petsc, overrides=[*options.overrides, *own])
+    over, overrides = (place_of(case, analysis.name, key) for key in ("over", "overrides"))
+    plan, places = table_plan(analysis.over), dict.fromkeys(own, overrides)
+    return Sweep(case.path, plan, chosen, Path(), analysis.groups, case.text, over, places)
+
+
+def place_of(case: Case, name: str, key: str) -> str:
+    """``file:line`` of a key of an analysis."""
+    return Source(case.path, case.text).where(("analysis", list(case.analyses).index(name), key))
 
 
 def run_sweep(sweep: Sweep, name: str, comm: Any, console: Console, folder: RunFolder, title: str = "") -> Outcome:

@@ -82,9 +82,8 @@ class Swept:
             for k, label in enumerate(Plan({name: self.plan.over[name]}).labels()):
                 place = [k if other == key else 0 for other in (0, 1)]
                 look = self.look(int(np.ravel_multi_index(place, self.plan.shape)))
-                entries.append(
-                    (label, {**look, "linestyle": "-"} if key == self.main else {**look, "color": style.GREY})
-                )
+                changed = {"linestyle": "-"} if key == self.main else {"color": style.GREY}
+                entries.append((label, {**look, **changed}))
         return entries
 
 
@@ -193,11 +192,9 @@ def _amplitudes(axes: Axes, x: Any, table: Table, number: int) -> None:
         x, table["stick_until"], table["slip_from"], color=style.SKY, alpha=0.5, label=name("first slip"), linewidth=0
     )
     look = {"linestyle": line, "marker": "o", "markersize": 5}
-    axes.plot(x, table["onset_amplitude"], color=style.BLUE, label=name("at a tenth of the damping's rise"), **look)
-    axes.plot(
-        x, table["amplitude_of_lowest_frequency"], color=style.GREEN, label=name("at the lowest frequency"), **look
-    )
-    axes.plot(x, table["amplitude_of_largest_zeta"], color=style.RED, label=name("at the largest damping"), **look)
+    axes.plot(x, table["onset_amplitude"], color=style.BLUE, label=name("damping sets in"), **look)
+    axes.plot(x, table["amplitude_of_lowest_frequency"], color=style.GREEN, label=name("lowest frequency"), **look)
+    axes.plot(x, table["amplitude_of_largest_zeta"], color=style.RED, label=name("largest damping"), **look)
 
 
 def _one(axes: Axes, x: Any, table: Table, number: int, column: str, coloured: bool = False) -> None:
