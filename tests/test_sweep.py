@@ -151,6 +151,23 @@ def test_a_value_is_the_run_with_that_value_set(case: Path, swept: Path, tmp_pat
     ]
 
 
+def test_friction_lowers_the_threshold_of_the_blisk_and_leaves_its_largest_damping(tmp_path: Path) -> None:
+    """The paper's figure 10, over a factor 25; thresholds are proportional to mu, as normal loads are constant."""
+    blisk = Path(__file__).parents[1] / "cases" / "blisk_lumped" / "case.toml"
+    over = ["--over", "model.options.friction=0.06,0.3,1.5", "--only", "mode", "--quick"]
+    assert fretwave("sweep", blisk, *over, "--out", tmp_path, "--no-plots") == 0
+    mu, onset, zeta, lowest, stuck, last, free = (
+        column(tmp_path / "summary.csv", key)
+        for key in ("model.options.friction", "onset_amplitude", "largest_zeta")
+        + ("lowest_frequency_hz", "stuck_hz", "last_frequency_hz", "free_hz")
+    )
+    assert onset / mu == pytest.approx(np.mean(onset / mu), rel=5e-3)
+    assert np.ptp(zeta) < 0.05 * zeta.min()
+    assert (lowest < stuck - 0.2).all()
+    assert last == pytest.approx(free, rel=1e-4)
+    assert (last > stuck).all()
+
+
 # The result
 
 
