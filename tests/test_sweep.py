@@ -120,6 +120,7 @@ def test_thresholds_are_proportional_to_the_limit_and_the_largest_damping_does_n
     onset = np.interp(0.1 * zeta[top], zeta[:top], fine[:top])
     for row, limit in zip(rows(swept / "summary.csv"), LIMITS):
         found = {key: float(text) for key, text in row.items() if key != "analysis"}
+        assert found["slip_threshold"] == pytest.approx(limit, rel=0.5 * (np.pi / 512) ** 2)
         assert found["stick_until"] <= limit < found["slip_from"] < 1.2 * limit
         assert found["onset_amplitude"] == pytest.approx(limit * onset, rel=5e-3)
         assert found["largest_zeta"] == pytest.approx(zeta[top], abs=2e-5)
@@ -156,11 +157,12 @@ def test_friction_lowers_the_threshold_of_the_blisk_and_leaves_its_largest_dampi
     blisk = Path(__file__).parents[1] / "cases" / "blisk_lumped" / "case.toml"
     over = ["--over", "model.options.friction=0.06,0.3,1.5", "--only", "mode", "--quick"]
     assert fretwave("sweep", blisk, *over, "--out", tmp_path, "--no-plots") == 0
-    mu, onset, zeta, lowest, stuck, last, free = (
+    mu, slip, onset, zeta, lowest, stuck, last, free = (
         column(tmp_path / "summary.csv", key)
-        for key in ("model.options.friction", "onset_amplitude", "largest_zeta")
+        for key in ("model.options.friction", "slip_threshold", "onset_amplitude", "largest_zeta")
         + ("lowest_frequency_hz", "stuck_hz", "last_frequency_hz", "free_hz")
     )
+    assert slip / mu == pytest.approx(1.9054e-4 / 0.3, rel=1e-4)  # test_blisk_lumped
     assert onset / mu == pytest.approx(np.mean(onset / mu), rel=5e-3)
     assert np.ptp(zeta) < 0.05 * zeta.min()
     assert (lowest < stuck - 0.2).all()

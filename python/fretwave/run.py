@@ -311,7 +311,7 @@ def check_sweeps(case: Case, names: Sequence[str], options: RunOptions, comm: An
         if isinstance(analysis, SweepAnalysis):
             from .analyses.sweep import analysis_sweep
 
-            sweeps[name] = analysis_sweep(case, analysis, options)
+            sweeps[name] = analysis_sweep(case, analysis, options, comm.size)
             sweeps[name].check(comm)
     return sweeps
 

@@ -228,7 +228,7 @@ class SweepAnalysis(AnalysisSection):
         "other values of keys for these runs", example="{ mode.amplitude = [1e-6, 1e-2] }", default_factory=dict
     )
     groups: Optional[int] = key(
-        "groups of ranks, each with a value at a time (as many as there are ranks and values unless told)",
+        "most groups of ranks, each with a value at a time (as many as there are ranks and values unless told)",
         example="2",
         default=None,
         ge=1,

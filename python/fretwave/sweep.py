@@ -81,8 +81,12 @@ class Sweep:
             All that is wrong with any of them, each thing once.
         """
         groups.group_count(comm.size, len(self.plan), self.n_groups)
-        numbers = range(len(self.plan))
-        found = groups.run(comm, numbers, lambda k, group: on_first_rank(group, partial(self._checked, k)))
+        try:
+            found: list[Any] = [on_first_rank(comm, lambda: self._checked(0))]  # alone: others find what it caches
+        except FretwaveError as error:
+            found = [error]
+        others = range(1, len(self.plan))
+        found += groups.run(comm, others, lambda k, group: on_first_rank(group, partial(self._checked, k)))
         problems = self._problems(found)
         if problems:
             raise CaseErrors(problems, f"the sweep of {display(self.path)}")

@@ -18,6 +18,7 @@ from .source import display
 from .sweep import Checked, Sweep
 from .sweep_plan import Plan
 from .sweep_results import write_summary, write_sweep
+from .sweep_summary import landmarks
 
 
 def sweep_case(path: Path, options: RunOptions, plan: Plan, n_groups: int | None, comm: Any) -> int:
@@ -84,7 +85,9 @@ def _run_sweep(sweep: Sweep, first: Checked, folder: RunFolder, comm: Any) -> in
     folder.start()
     errors = sweep.run(comm, folder.record["run_id"])
     memory = peak_memory_mb(comm)
-    outcomes = on_first_rank(comm, lambda: _write(sweep, first, folder, errors))
+    outcomes, lines = on_first_rank(comm, lambda: _write(sweep, first, folder, errors))
+    for line in lines:
+        console.line(line)
     bad = [number for number, outcome in enumerate(outcomes) if outcome["status"] != "done"]
     status = {"status": "stopped" if bad else "done", "wall_s": round(time.perf_counter() - began, 3)}
     folder.record.update({**status, "peak_memory_mb": memory, "values": outcomes})
@@ -98,10 +101,10 @@ def _run_sweep(sweep: Sweep, first: Checked, folder: RunFolder, comm: Any) -> in
 
 def _write(
     sweep: Sweep, first: Checked, folder: RunFolder, errors: Sequence[FretwaveError | None]
-) -> list[dict[str, Any]]:
-    """One group, one table for each analysis, one summary of all. One rank only."""
+) -> tuple[list[dict[str, Any]], list[str]]:
+    """One group, one table for each analysis, one summary of all; lines to print. One rank only."""
     run_id = folder.record["run_id"]
-    outcomes, summary = sweep.outcomes(run_id, errors), []
+    outcomes, summary, lines = sweep.outcomes(run_id, errors), [], []
     for name in first.analyses:
         branches = sweep.branches(name, run_id)
         if branches:
@@ -109,12 +112,13 @@ def _write(
             attributes = {"run_id": run_id, "status": "done" if complete else "stopped", "reason": ""}
             rows = write_sweep(folder.path, name, name, sweep.plan, branches, attributes, first.title)
             summary += [{"analysis": name, **row} for row in rows]
+            lines += landmarks(name, sweep.plan, rows)
     if summary:
         lead = [*sweep.plan.keys, "value", "analysis"]
         ordered = [{key: row[key] for key in (*lead, *(k for k in row if k not in lead))} for row in summary]
         write_summary(folder.path / "summary.csv", ordered)
     sweep.forget_others()
-    return outcomes
+    return outcomes, lines
 
 
 def _incomplete(

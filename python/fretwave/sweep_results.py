@@ -47,6 +47,8 @@ class Branch:
         (unit, long name) of each column.
     attributes : dict
         Of the analysis' group.
+    start_forces : dict
+        Of each contact over the period of the first point (n_samples, components, n_pairs) [N], where they are kept.
     """
 
     number: int
@@ -54,6 +56,7 @@ class Branch:
     table: dict[str, Any]
     units: dict[str, tuple[str, str]]
     attributes: dict[str, Any]
+    start_forces: dict[str, Any]
 
     @property
     def points(self) -> int:
@@ -71,7 +74,9 @@ def read_branch(folder: Path, name: str, number: int, run_id: str) -> Branch | N
         table = {key: data[()] for key, data in group["points"].items()}
         units = {key: (data.attrs["units"], data.attrs["long_name"]) for key, data in group["points"].items()}
         order = [key for key in COLUMNS if key in table] + [key for key in table if key not in COLUMNS]
-        return Branch(number, folder, {key: table[key] for key in order}, units, dict(group.attrs))
+        kept = "reported" in group and len(group["reported"]) and group["reported"][0] == 0
+        forces = {key[len("contact_") :]: group[key]["f"][0] for key in group if key.startswith("contact_") and kept}
+        return Branch(number, folder, {key: table[key] for key in order}, units, dict(group.attrs), forces)
 
 
 def write_sweep(
@@ -174,7 +179,7 @@ def _summary(kind: str, plan: Plan, branches: Sequence[Branch]) -> list[dict[str
             chosen = slice(None) if one is None else level == one
             table = {key: values[chosen] for key, values in branch.table.items()}
             head = {**keys, "value": branch.number, **({} if one is None else {"level": float(one)})}
-            rows.append({**head, **summarise(kind, table, branch.attributes)})
+            rows.append({**head, **summarise(kind, table, branch.attributes, branch.start_forces)})
     return rows
 
 

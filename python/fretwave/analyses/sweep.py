@@ -16,11 +16,12 @@ from ..source import Source
 from ..sweep import Sweep
 from ..sweep_plan import table_overrides, table_plan
 from ..sweep_results import write_summary, write_sweep
+from ..sweep_summary import landmarks
 from .context import Outcome
 
 
-def analysis_sweep(case: Case, analysis: SweepAnalysis, options: RunOptions) -> Sweep:
-    """The sweep that an analysis of a case asks for."""
+def analysis_sweep(case: Case, analysis: SweepAnalysis, options: RunOptions, ranks: int = 1) -> Sweep:
+    """The sweep that an analysis of a case asks for; of fewer ranks than groups each is one."""
     wanted: list[str] = []
 
     def want(name: str) -> None:
@@ -34,7 +35,8 @@ def analysis_sweep(case: Case, analysis: SweepAnalysis, options: RunOptions) -> 
     chosen = replace(options, only=list(dict.fromkeys(wanted)), petsc=petsc, overrides=[*options.overrides, *own])
     over, overrides = (place_of(case, analysis.name, key) for key in ("over", "overrides"))
     plan, places = table_plan(analysis.over), dict.fromkeys(own, overrides)
-    return Sweep(case.path, plan, chosen, Path(), analysis.groups, case.text, over, places)
+    count = None if analysis.groups is None else min(analysis.groups, ranks)
+    return Sweep(case.path, plan, chosen, Path(), count, case.text, over, places)
 
 
 def place_of(case: Case, name: str, key: str) -> str:
@@ -59,8 +61,9 @@ def run_sweep(sweep: Sweep, name: str, comm: Any, console: Console, folder: RunF
             rows = write_sweep(folder.path, name, of, sweep.plan, branches, attributes, title)
             write_summary(folder.path / f"{name}_summary.csv", rows)
         sweep.forget_others()
+        lines = landmarks(name, sweep.plan, rows) if branches else []
         points = sum(branch.points for branch in branches)
         advice = next((error.fix for error in errors if error is not None and error.fix), "")
-        return Outcome(points, reason, not bad, goal=f"{len(sweep.plan)} whole branches", advice=advice)
+        return Outcome(points, reason, not bad, lines, f"{len(sweep.plan)} whole branches", advice)
 
     return on_first_rank(comm, finish)

@@ -188,10 +188,8 @@ def _amplitudes(axes: Axes, x: Any, table: Table, number: int) -> None:
     """Where slip begins, where damping sets in and where it is largest."""
     line = LINES[number % len(LINES)]
     name = (lambda text: None) if number else (lambda text: text)
-    axes.fill_between(
-        x, table["stick_until"], table["slip_from"], color=style.SKY, alpha=0.5, label=name("first slip"), linewidth=0
-    )
     look = {"linestyle": line, "marker": "o", "markersize": 5}
+    axes.plot(x, table["slip_threshold"], color=style.INK, label=name("first slip"), **look)
     axes.plot(x, table["onset_amplitude"], color=style.BLUE, label=name("damping sets in"), **look)
     axes.plot(x, table["amplitude_of_lowest_frequency"], color=style.GREEN, label=name("lowest frequency"), **look)
     axes.plot(x, table["amplitude_of_largest_zeta"], color=style.RED, label=name("largest damping"), **look)
