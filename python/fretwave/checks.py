@@ -15,9 +15,11 @@ from .schema import (
     ForcedAnalysis,
     HarmonicSection,
     ModeAnalysis,
+    SweepAnalysis,
     TransientSection,
 )
-from .source import Source, nearest
+from .source import Source, nearest, nested_leaves
+from .sweep_plan import complaint
 from .validation import toml, unknown_key, validate
 
 Found = list[FretwaveError]
@@ -127,6 +129,23 @@ def check_analyses(
             _check_forced(report, analysis, dofs, modes)
         if isinstance(analysis, TransientSection):
             report.mode(("mode",), analysis.mode, modes)
+        if isinstance(analysis, SweepAnalysis):
+            _check_sweep(report, analysis)
+
+
+def _check_sweep(report: Reporter, analysis: SweepAnalysis) -> None:
+    """The values themselves are checked by loading the case with each, before anything runs."""
+    entries = report.source.entries("analysis")
+    swept = [str(entry.get("name")) for entry in entries if entry.get("type") != "sweep"]
+    if analysis.of not in swept:
+        expected = f"one of {', '.join(swept) or '(there is none)'}"
+        report.wrong(("of",), "is no analysis to sweep", expected, nearest(analysis.of, swept) or "choose another")
+    for path, values in nested_leaves(analysis.over):
+        problem = complaint(values)
+        if problem is not None:
+            report.wrong(("over", *path), *problem, "write for example `over = { mode.harmonics = [3, 5, 7] }`")
+    if analysis.dampers:
+        report.wrong(("dampers",), "are not those of the analysis swept", "none", f"give them to '{analysis.of}'")
 
 
 def _check_harmonics(report: Reporter, analysis: HarmonicSection, dofs: Sequence[str] | None) -> None:

@@ -10,7 +10,8 @@ from __future__ import annotations
 import json
 import os
 import shutil
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from inspect import signature
 from pathlib import Path
 from typing import Any
@@ -305,6 +306,20 @@ def _extend(data: Any, row: int, values: Any) -> None:
     if len(data) <= row:
         data.resize(row + 1, axis=0)
     data[row] = values
+
+
+@contextmanager
+def rewritten(path: Path, name: str) -> Iterator[Any]:
+    """results.h5 to write to, without its group `name`; the new file takes the old one's place at the end."""
+    file = _copy_without(path, name)
+    try:
+        yield file
+        file.close()
+        if _temporary(path).exists():
+            os.replace(_temporary(path), path)
+    finally:
+        file.close()
+        _temporary(path).unlink(missing_ok=True)
 
 
 def _copy_without(path: Path, name: str) -> Any:

@@ -295,6 +295,27 @@ class LimitCycleAnalysis(TransientSection):
     type: Literal["limit_cycle"]
 
 
+class SweepAnalysis(AnalysisSection):
+    """``type = "sweep"``: another analysis for every value of some keys of the case."""
+
+    type: Literal["sweep"]
+    of: str = key("analysis to run for every value", example='"mode"')
+    over: dict[str, Any] = key(
+        "values of keys, addressed as --set does; of several keys all combinations",
+        example='{ "model.options.friction" = [0.1, 0.2, 0.5] }',
+        min_length=1,
+    )
+    overrides: dict[str, Any] = key(
+        "other values of keys for these runs", example="{ mode.amplitude = [1e-6, 1e-2] }", default_factory=dict
+    )
+    groups: Optional[int] = key(
+        "most groups of ranks, each with a value at a time (as many as there are ranks and values unless told)",
+        example="2",
+        default=None,
+        ge=1,
+    )
+
+
 ANALYSES: dict[str, type[AnalysisSection]] = {
     "static": StaticAnalysis,
     "mode": ModeAnalysis,
@@ -302,6 +323,7 @@ ANALYSES: dict[str, type[AnalysisSection]] = {
     "flutter": FlutterAnalysis,
     "free_decay": FreeDecayAnalysis,
     "limit_cycle": LimitCycleAnalysis,
+    "sweep": SweepAnalysis,
 }
 
 

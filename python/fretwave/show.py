@@ -104,7 +104,13 @@ def _wave(cycle: Mapping[str, Any]) -> str:
 def _notes(name: str, group: Any) -> list[str]:
     """Limit cycles, and why an analysis is not complete."""
     words = {True: "stable", False: "unstable", None: "stability unknown"}
-    notes = [
+    if group.attrs["type"] == "sweep":
+        from .sweep_summary import read_landmarks
+
+        notes = read_landmarks(name, group)
+    else:
+        notes = []
+    notes += [
         f"{name}: {_wave(cycle)}limit cycle at a = {cycle['amplitude']:.5g} m, {cycle['frequency_hz']:.5g} Hz: "
         + words[cycle["stable"]]
         for cycle in json.loads(group.attrs.get("events", "[]"))

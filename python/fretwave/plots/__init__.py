@@ -27,6 +27,7 @@ FAMILIES = (
     "flutter",
     "free_decay",
     "study",
+    "sweeps",
 )
 
 
