@@ -14,6 +14,8 @@ DOFS = ["disk", "blade", "tip", "ring"]
 #: Masses [kg] of disk, blade and tip; stiffnesses [N/m] of disk to ground, to its neighbours, of blade and tip.
 DISK, BLADE, TIP = 1.2, 0.35, 0.25
 GROUND, NEIGHBOUR, ROOT, AEROFOIL = 6e5, 5e7, 1e6, 2e6
+#: Of the blade alone, between these dofs.
+BLADE_SPRINGS = {(0, 1): ROOT, (1, 2): AEROFOIL}
 
 
 @dataclass(frozen=True)
@@ -79,7 +81,7 @@ def sector(**options: float) -> fw.Sector:
     ties = np.diag([NEIGHBOUR, 0.0, 0.0, chosen.ring_coupling])
     K = np.zeros((4, 4))
     K[0, 0] = GROUND
-    for (first, second), stiffness in {(0, 1): ROOT, (1, 2): AEROFOIL}.items():
+    for (first, second), stiffness in BLADE_SPRINGS.items():
         K[np.ix_([first, second], [first, second])] += stiffness * np.array([[1, -1], [-1, 1]])
     groove = fw.Contact(
         "jenkins",
@@ -101,6 +103,9 @@ def build(**options: float) -> fw.BuiltModel:
     M[:4, :4], K[:4, :4] = one.M, one.K[0] + 2 * one.K[1]
     for low, high in ((0, 4), (3, 5)):
         K[np.ix_([low, high], [low, high])] += one.K[1][low, low] * np.array([[-1, 1], [1, -1]])
+    blade = np.zeros((6, 6))
+    for (first, second), stiffness in BLADE_SPRINGS.items():
+        blade[np.ix_([first, second], [first, second])] += stiffness * np.array([[1, -1], [-1, 1]])
     groove = one.contacts[0]
     contact = fw.BuiltContact(np.hstack([groove.B, np.zeros((1, 2))]), 1, groove.parameters)
     return fw.BuiltModel(
@@ -111,6 +116,7 @@ def build(**options: float) -> fw.BuiltModel:
         sectors=SECTORS,
         low=np.array([0, 3]),
         high=np.array([4, 5]),
+        parts={"blade": blade},
     )
 
 

@@ -90,6 +90,9 @@ class BuiltModel:
         Matching dofs of a sector's two faces (`fretwave.match_faces` finds nodes that match).
     axis : {"x", "y", "z"}, optional
         Dofs of the faces are triples of Cartesian components, and the wheel lies about this axis.
+    parts : dict
+        Shares of K (n_dof, n_dof) by the names that a mistuning may vary: a sector's K grows by its deviation times
+        the share. A blade's own stiffness is what the elements of the blade put into K.
     """
 
     M: Any
@@ -105,11 +108,13 @@ class BuiltModel:
     low: Optional[npt.NDArray[np.intp]] = None
     high: Optional[npt.NDArray[np.intp]] = None
     axis: Optional[str] = None
+    parts: Mapping[str, Any] = field(default_factory=dict)
 
     def complaint(self) -> str | None:
         """What is inconsistent, None when nothing is."""
         n = self.M.shape[0]
         sizes = {"M": self.M, "K": self.K, **({} if self.C is None else {"C": self.C})}
+        sizes.update({f"part '{name}' of K": part for name, part in self.parts.items()})
         for name, matrix in sizes.items():
             if matrix.shape != (n, n):
                 return f"{name} is {matrix.shape[0]} x {matrix.shape[1]}, M is {n} x {n}"
@@ -262,6 +267,7 @@ def _consistent(built: Any, path: Path, found: list[FretwaveError]) -> BuiltMode
     else:
         built.M, built.K = (sp.csr_matrix(A, dtype=float) for A in (built.M, built.K))
         built.C = None if built.C is None else sp.csr_matrix(built.C, dtype=float)
+        built.parts = {name: sp.csr_matrix(part, dtype=float) for name, part in built.parts.items()}
         for contact in built.contacts.values():
             contact.B = sp.csr_matrix(contact.B, dtype=float)
         problem = built.complaint()

@@ -7,7 +7,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import scipy.sparse
 
@@ -22,6 +22,9 @@ from .schema import AnalysisSection, ModelSection, PreloadSection, ReductionSect
 from .sectors import Neighbours, check_waves, tie
 from .source import Source
 from .validation import toml, validate
+
+if TYPE_CHECKING:
+    from .wheel import Wheel
 
 Table = TypeVar("Table", bound=Section)
 
@@ -53,6 +56,8 @@ class Case:
         The static state of all analyses without one of their own; None for none.
     neighbours : Neighbours
         What ties a sector of a wheel to the next ones; None for a whole structure.
+    wheel : Wheel
+        Of a case put on its whole wheel (`fretwave.wheel.on_wheel`), the sector it is made of.
     analyses : dict
         Validated analyses by name, in the order of the file.
     resolved : dict
@@ -87,6 +92,7 @@ class Case:
     unreduced: Case | None = None
     preload: PreloadSection | None = None
     neighbours: Neighbours | None = None
+    wheel: Wheel | None = None
 
     @property
     def name(self) -> str:
@@ -98,17 +104,21 @@ class Case:
         """Hash of everything that decides the results."""
         return hashlib.sha256(json.dumps(self.resolved, sort_keys=True).encode()).hexdigest()
 
-    def dof(self, name: str) -> int:
-        """Index of a dof."""
-        return self.dofs.index(name)
+    def dof(self, name: str, sector: int = 0) -> int:
+        """Index of a dof; on a wheel the case's names are those of a sector's dofs."""
+        return self.dofs.index(name) if self.wheel is None else self.wheel.dof(name, sector)
+
+    def places(self, name: str) -> list[int]:
+        """Indices of a dof in all sectors of a wheel; of a structure or of one sector that of `dof` alone."""
+        return [self.dof(name, j) for j in range(self.wheel.sectors if self.wheel else 1)]
 
     def damping_with(self, dampers: Sequence[Any]) -> Any:
         """C with its shares of K and M and viscous dampers to ground, None when there is no damping at all."""
         parts = [] if self.C is None else [self.C]
         parts += [share * matrix for share, matrix in zip(self.damping, (self.K, self.M)) if share]
         if dampers:
-            places = [self.dof(damper.dof) for damper in dampers]
-            values = [damper.c for damper in dampers]
+            places = [place for damper in dampers for place in self.places(damper.dof)]
+            values = [damper.c for damper in dampers for _ in self.places(damper.dof)]
             parts.append(scipy.sparse.csr_matrix((values, (places, places)), shape=self.M.shape))
         return sum(parts[1:], parts[0]).tocsr() if parts else None
 

@@ -132,13 +132,11 @@ class Sector:
 
     def wave(self, q: npt.ArrayLike, nodal_diameter: int, order: int = 1) -> npt.NDArray[np.complex128]:
         """Complex amplitudes (N, n_dof) of harmonic `order` in all sectors from those of sector 0, (n_dof,)."""
-        turns = np.arange(self.sectors) * order * nodal_diameter % self.sectors
-        return np.asarray(np.exp(-2j * np.pi * turns / self.sectors)[:, None] * np.asarray(q, dtype=complex))
+        return wave(q, nodal_diameter * order, self.sectors)
 
     def around(self, mode: LinearMode, nodal_diameter: int) -> LinearMode:
         """A wave of one sector as a mode of the wheel (unit modal mass of the wheel when undamped)."""
-        phi = self.wave(mode.shape + 1j * mode.imaginary, nodal_diameter).ravel() / np.sqrt(self.sectors)
-        return LinearMode(mode.omega, mode.beta, phi.real.copy(), phi.imag.copy())
+        return wave_mode(mode, nodal_diameter, self.sectors)
 
     def expand(self, q: npt.ArrayLike, nodal_diameter: int, order: int = 1) -> npt.NDArray[np.complex128]:
         """Complex amplitudes (n_full,) of harmonic `order` on the dofs with both faces, from those (n_dof,)."""
@@ -148,14 +146,30 @@ class Sector:
         return np.asarray(sum(np.exp(-1j * k * theta) * (T @ np.asarray(q)) for k, T in self.ties.items()))
 
     def _around(self, given: Any) -> sp.csr_matrix:
-        """Block-circulant matrix of the wheel."""
-        ahead = sp.csr_matrix(np.roll(np.eye(self.sectors), 1, axis=1))  # row j has its 1 in column j + 1
-        behind = sp.csr_matrix(ahead.T)
-        parts = by_sector(given).items()
-        return sp.csr_matrix(sum(sp.kron((ahead if k > 0 else behind) ** abs(k), sp.csr_matrix(A)) for k, A in parts))
+        return around(given, self.sectors)
 
     def _repeated(self, contact: Contact) -> dict[str, Any]:
         return {k: np.tile(v, self.sectors) if np.size(v) > 1 else v for k, v in contact.parameters.items()}
+
+
+def wave(q: npt.ArrayLike, index: int, sectors: int) -> npt.NDArray[np.complex128]:
+    """Complex amplitudes (N, n_dof) in all sectors of a wave with this spatial index, from those of sector 0."""
+    turns = np.arange(sectors) * index % sectors
+    return np.asarray(np.exp(-2j * np.pi * turns / sectors)[:, None] * np.asarray(q, dtype=complex))
+
+
+def wave_mode(mode: LinearMode, nodal_diameter: int, sectors: int) -> LinearMode:
+    """A wave of one sector as a mode of the wheel (unit modal mass of the wheel when undamped)."""
+    phi = wave(mode.shape + 1j * mode.imaginary, nodal_diameter, sectors).ravel() / np.sqrt(sectors)
+    return LinearMode(mode.omega, mode.beta, phi.real.copy(), phi.imag.copy())
+
+
+def around(given: Any, sectors: int) -> sp.csr_matrix:
+    """Block-circulant matrix of the wheel, from the own part of a sector and those on the sectors k places ahead."""
+    ahead = sp.csr_matrix(np.roll(np.eye(sectors), 1, axis=1))  # row j has its 1 in column j + 1
+    behind = sp.csr_matrix(ahead.T)
+    parts = by_sector(given).items()
+    return sp.csr_matrix(sum(sp.kron((ahead if k > 0 else behind) ** abs(k), sp.csr_matrix(A)) for k, A in parts))
 
 
 def combine(left: Parts, middle: Parts, right: Parts, sign: int) -> dict[int, sp.csr_matrix]:

@@ -24,6 +24,7 @@ from .schema import AnalysisSection, ForcedAnalysis, PreloadSection, TransientSe
 from .sectors import nodal_diameter
 from .source import display
 from .stopped import joined, not_converged
+from .wheel import on_wheel
 
 #: Module and function of each kind of analysis, imported when one is run.
 DISPATCH = {
@@ -229,12 +230,13 @@ class _Runner:
             options.check_used(fretwave._core.unused_options, f"analysis '{analysis.name}'")
             self.folder.start()
 
-        preload = self.case.preload_of(analysis)
-        built = build_model(self.case, self._dampers(analysis), self.comm, preload, nodal_diameter(analysis))
+        case = on_wheel(self.case, analysis)
+        preload = case.preload_of(analysis)
+        built = build_model(case, self._dampers(analysis), self.comm, preload, nodal_diameter(analysis))
         with built as model, options.inserted():
             context = AnalysisContext(
                 model,
-                self.case,
+                case,
                 analysis,
                 self.comm,
                 self.folder.path,
@@ -324,7 +326,7 @@ def build_model(
 
     Parameters
     ----------
-    nodal_diameter : of the wave, where the case is a sector of a wheel
+    nodal_diameter : of the wave, where the case is a sector of a wheel (that of `on_wheel` has all of them)
     """
     import fretwave
 
@@ -340,7 +342,7 @@ def build_model(
     ]
     M, K, C = case.M, case.K, case.damping_with(dampers)
     if neighbours is None:
-        return fretwave.Model(M, K, C, contacts, comm)
+        return fretwave.Model(M, K, C, contacts, comm, unit=case.wheel.unit if case.wheel else 1)
     M, K, C = neighbours.with_own("M", M), neighbours.with_own("K", K), case.ahead_damping(C)
     return fretwave.Model(M, K, C, contacts, comm, neighbours.sectors, nodal_diameter)
 

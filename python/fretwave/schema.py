@@ -116,6 +116,22 @@ class Damper(Section):
     c: float = key("damper constant, negative to destabilise", "N s/m", "-1.0", allow_inf_nan=False)
 
 
+class MistuningSection(Section):
+    """Relative deviations of a stiffness from sector to sector: drawn, or given one by one."""
+
+    of: str = key(
+        "part of the stiffness that varies: one of the builder's, or `sector`, all of it", example='"blade"',
+        default="sector",
+    )
+    standard_deviation: Optional[Positive] = key(
+        "of normally distributed deviations, less their mean", "-", "0.02", default=None, lt=0.3
+    )
+    seed: int = key("of the deviations that are drawn", example="1", default=1, ge=0)
+    deviations: Optional[list[Annotated[float, Field(gt=-1, allow_inf_nan=False)]]] = key(
+        "instead, one for each sector", "-", "[0.01, -0.02, 0.005]", default=None, min_length=2
+    )
+
+
 class AnalysisSection(Section):
     """What every ``[[analysis]]`` has."""
 
@@ -141,6 +157,16 @@ class HarmonicSection(AnalysisSection):
     nodal_diameter: Optional[int] = key(
         "nodal diameters of the wave on a sector, negative for a backward wave", example="4", default=None
     )
+    wheel: bool = key("solve all sectors of the wheel in place of one", example="true", default=False)
+    mistuning: Optional[MistuningSection] = key(
+        "deviations of the wheel's sectors", example='{ of = "blade", standard_deviation = 0.02 }', default=None
+    )
+    sector: Optional[int] = key(
+        "sector of the wheel whose dof is normalised or observed (0; of a mistuned mode where it moves most)",
+        example="7",
+        default=None,
+        ge=0,
+    )
     step: StepSection = key("step control", example="{ initial = 0.05, maximum = 0.3 }", default_factory=StepSection)
     preload: Optional[PreloadSection] = key("in place of [preload]", example="{ pair_loads = true }", default=None)
 
@@ -151,6 +177,11 @@ class ModeAnalysis(HarmonicSection):
     type: Literal["mode"]
     method: Literal["CNM", "EPMC"] = key(
         "complex nonlinear mode (decaying) or extended periodic motion", example='"CNM"', default="CNM"
+    )
+    wave: Literal["travelling", "standing"] = key(
+        "of a tuned wheel: a wave that runs around, or one that stands with its crest at `sector`",
+        example='"standing"',
+        default="travelling",
     )
     normalise: Dof = key("dof whose fundamental harmonic is the modal amplitude", example='"m1"')
     amplitude: list[Positive] = key("first and last modal amplitude", "m", "[0.02, 3.0]", min_length=2, max_length=2)

@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 
 Found = list[FretwaveError]
 
+#: The part of K that a mistuning varies unless it names another: all that the sector's own elements put into it.
+WHOLE = "sector"
+
 
 @dataclass(frozen=True)
 class Neighbours:
@@ -32,11 +35,17 @@ class Neighbours:
     terms : {"M": {k: (n_dof, n_dof)}, ...}
         On the dofs of the sector k places ahead, k not 0.
     contacts : {name: {k: (components * n_pairs, n_dof)}}
+    ties : {k: (n_full, n_dof)}
+        As `fretwave.Sector` has them: dofs of the sector with both faces.
+    parts : {name: (n_full, n_full)}
+        Shares of K that a mistuning may vary, on the sector with both faces.
     """
 
     sectors: int
     terms: Mapping[str, Mapping[int, Any]]
     contacts: Mapping[str, Mapping[int, Any]]
+    ties: Mapping[int, Any]
+    parts: Mapping[str, Any]
 
     def with_own(self, letter: str, own: Any) -> dict[int, Any]:
         """The term as `fretwave.Model` takes it."""
@@ -119,7 +128,10 @@ def _folded(
         named = {name: place[number] for name, number in built.dofs.items() if number in place}
         built = replace(built, dofs=named, loads=loads, coordinates=None, displacements=None, hexahedra=None)
     neighbours = Neighbours(
-        sector.sectors, *({name: _without_own(part) for name, part in given.items()} for given in (parts, rows))
+        sector.sectors,
+        *({name: _without_own(part) for name, part in given.items()} for given in (parts, rows)),
+        sector.ties,
+        {**(origin.built.parts if origin.built else {}), WHOLE: origin.matrices["K"].values},
     )
     resolved = {
         **origin.resolved,
@@ -163,7 +175,9 @@ def check_waves(
         if integrates:
             key = "type" if isinstance(analysis, TransientSection) else "time_points"
             wrong(number, key, "integrates in time, which one sector cannot", "harmonic balance", "remove it")
-        elif isinstance(analysis, HarmonicSection) and (given is None or abs(given) > half):
+        elif isinstance(analysis, HarmonicSection) and (
+            abs(given) > half if given is not None else analysis.mistuning is None
+        ):
             what = "says no nodal diameter" if given is None else "has no such nodal diameter"
             expected = f"-{half} .. {half}, negative for backward waves"
             wrong(number, "nodal_diameter", what, expected, "add for example `nodal_diameter = 1`")

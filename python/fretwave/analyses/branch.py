@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -22,9 +22,18 @@ def step_control(step: StepSection) -> Any:
 
 
 def record(
-    writer: AnalysisWriter, problem: Any, point: Any, snapshot: Mapping[str, Any] | None, extra: Mapping[str, Any]
+    writer: AnalysisWriter,
+    problem: Any,
+    point: Any,
+    snapshot: Mapping[str, Any] | None,
+    extra: Mapping[str, Any],
+    describe: Callable[[Any, Any, Any], Mapping[str, Any]] | None = None,
 ) -> dict[str, Any]:
     """Write one continuation point. Collective.
+
+    Parameters
+    ----------
+    describe : further columns from problem, y and (on the writing rank) coefficients (n_dof, m). Collective
 
     Returns
     -------
@@ -48,7 +57,10 @@ def record(
         names = [contact.name for contact in problem.model.contacts]
         motions = dict(zip(names, periods)) if writer.active else None
     kept = None if snapshot is None else {**snapshot, **{f"own_{key}": value for key, value in extra.items()}}
-    writer.append(row, problem.coefficients(point.y), motions, kept)
+    coefficients = problem.coefficients(point.y)
+    if describe is not None:
+        row.update(describe(problem, point.y, coefficients))
+    writer.append(row, coefficients, motions, kept)
     return row
 
 

@@ -11,10 +11,12 @@ import numpy as np
 
 from ..columns import MODE
 from ..schema import ModeAnalysis
-from .asymptotes import asymptote_line, other_asymptote
+from .asymptotes import asymptote_line
 from .branch import finished_table, open_branch, points_of, record, step_control
 from .context import AnalysisContext, Outcome
-from .rest import keep_pairs, retained, start_mode
+from .rest import keep_pairs, retained
+from .wheel_shape import WHEEL, WheelShape
+from .wheel_start import Start, start_of
 
 
 def run_mode(context: AnalysisContext) -> Outcome:
@@ -23,28 +25,31 @@ def run_mode(context: AnalysisContext) -> Outcome:
 
     analysis = context.analysis
     assert isinstance(analysis, ModeAnalysis)
-    stuck, rest = start_mode(context, analysis.linear_mode)
-    asymptotes = other_asymptote(context, stuck)
-    context.console.line(asymptote_line(context.name, stuck.omega, asymptotes))
+    start = start_of(context)
+    context.console.line(asymptote_line(context.name, start.mode.omega, start.asymptotes))
     harmonics = retained(context)
     context.leave_out(harmonics.left_out)
-    dof = context.case.dof(analysis.normalise)
     problem = fretwave.NonlinearMode(
-        context.model, harmonics, method=analysis.method, dof=dof, start=stuck, prefix=context.prefix
+        context.model, harmonics, analysis.method, start.dof, start.mode, context.prefix, start.avoid
     )
-    if rest is not None:
-        problem.preload(rest.displacement, rest.load)
+    if start.rest is not None:
+        problem.preload(start.rest.displacement, start.rest.load)
     writer = context.writer(
-        MODE, labels=harmonics.labels, samples=harmonics.samples, stuck_omega=stuck.omega, **asymptotes
+        [*MODE[:-1], *(WHEEL if context.case.wheel else ()), MODE[-1]],
+        labels=harmonics.labels,
+        samples=harmonics.samples,
+        stuck_omega=start.mode.omega,
+        **start.asymptotes,
+        **start.attributes,
     )
     try:
-        return _follow(context, analysis, problem, writer)
+        return _follow(context, analysis, problem, writer, start)
     finally:
         writer.abandon()
         problem.destroy()
 
 
-def _follow(context: AnalysisContext, analysis: ModeAnalysis, problem: Any, writer: Any) -> Outcome:
+def _follow(context: AnalysisContext, analysis: ModeAnalysis, problem: Any, writer: Any, start: Start) -> Outcome:
     import fretwave
 
     low, high = analysis.amplitude
@@ -57,9 +62,10 @@ def _follow(context: AnalysisContext, analysis: ModeAnalysis, problem: Any, writ
         branch = fretwave.Continuation.restore(problem, snapshot, **settings)
     else:
         branch = fretwave.Continuation(problem, problem.initial(low), **settings)
+    describe = None if context.case.wheel is None else WheelShape(context, start.tuned).row
     with context.console.progress(context.name):
         for point in points_of(branch):
-            row = record(writer, problem, point, branch.snapshot(), {})
+            row = record(writer, problem, point, branch.snapshot(), {}, describe)
             if error_at is not None and math.isclose(row["amplitude"], error_at, rel_tol=1e-9):
                 context.console.line(_reduction_error(context, problem, point, row))
             share = math.log(row["amplitude"] / low) / math.log(high / low)
