@@ -55,7 +55,7 @@ def build(**options: Any) -> fw.BuiltModel:
     B = sp.csr_matrix((np.ones(3 * n), (np.arange(3 * n), contact_dofs(place[under]))), (3 * n, M.shape[0]))
     pads = fw.BuiltContact(
         B=sp.csr_matrix(-B),  # the rim moves down (-z) onto the pads
-        parameters={"normal_stiffness": 2e8, "tangential_stiffness": 1e8, "normal_load": 100.0},
+        parameters={"normal_stiffness": 2e8, "tangential_stiffness": 1e8, "normal_load": 1000.0},
         areas=np.full(n, 1e-4),
         points=mesh.nodes[under],
         frames=np.tile(-np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]]), (n, 1, 1)),

@@ -107,7 +107,8 @@ class SectorReduction:
         count = min(count, small.sector.n_dof)
         full, reduced = self._waves.hz(wanted, count), small.hz(wanted, count)
         found = {wave: self._relative(full[wave], reduced[wave]) for wave in wanted}
-        return [WaveError(d, state, d in self.diameters, *found[d, state]) for d, state in wanted]
+        gave = {d: d in self.diameters if self.diameters else None for d in chosen}
+        return [WaveError(d, state, gave[d], *found[d, state]) for d, state in wanted]
 
     def destroy(self) -> None:
         """Free the component modes; the reduced matrices stay. Collective."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Tuple
+from typing import Any, Optional, Tuple
 
 import numpy as np
 import numpy.typing as npt
@@ -34,8 +34,8 @@ class WaveError:
     nodal_diameter : int
     state : {"stuck", "sliding"}
         All pairs closed; sliding ones without tangential force (free, where the law has no normal direction).
-    gave_interface_modes : bool
-        This nodal diameter did.
+    gave_interface_modes : bool or None
+        This nodal diameter did; None where the faces are whole.
     full_hz, reduced_hz : (count,) [Hz]
     relative : (count,)
         reduced / full - 1, not negative beyond rounding (Rayleigh-Ritz); NaN of rigid motions.
@@ -43,7 +43,7 @@ class WaveError:
 
     nodal_diameter: int
     state: str
-    gave_interface_modes: bool
+    gave_interface_modes: Optional[bool]
     full_hz: Array
     reduced_hz: Array
     relative: Array
@@ -55,11 +55,12 @@ class WaveError:
 
     def line(self) -> str:
         """For a log."""
-        source = "gave interface modes" if self.gave_interface_modes else "gave no interface modes"
+        source = {None: "", True: " (gave interface modes)", False: " (gave no interface modes)"}
         first = next((e for e in self.relative if np.isfinite(e)), 0.0)
         return (
-            f"{self.nodal_diameter} nodal diameters, {self.state} ({source}): {self.full_hz[0]:.6g} to"
-            f" {self.full_hz[-1]:.6g} Hz are off by {first:.1e} (first) to {self.largest:.1e} (worst)"
+            f"{self.nodal_diameter} nodal diameters, {self.state}{source[self.gave_interface_modes]}:"
+            f" {self.full_hz[0]:.6g} to {self.full_hz[-1]:.6g} Hz are off by {first:.1e} (first) to"
+            f" {self.largest:.1e} (worst)"
         )
 
 
