@@ -1,10 +1,11 @@
 """A builder for tests: one finite-element sector of a small bladed disk, held at its bore, rubbing under its rim."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
+from mpi4py import MPI
 
 import fretwave as fw
 from fretwave import fe
@@ -15,11 +16,12 @@ BORE, RIM, TIP, HEIGHT = 0.1, 0.2, 0.26, 0.02
 
 @dataclass(frozen=True)
 class Options:
-    """`on_face`: a pair stands on a face of the sector."""
+    """`on_face`: a pair stands on a face of the sector; `reduced`: by the builder, with all its component modes."""
 
     sectors: int = 6
     order: int = 1
     on_face: bool = False
+    reduced: bool = False
 
 
 def mesh_of(o: Options) -> fe.Mesh:
@@ -39,8 +41,33 @@ def mesh_of(o: Options) -> fe.Mesh:
 
 
 def build(**options: Any) -> fw.BuiltModel:
-    """Dofs 3 * node + axis of the nodes beyond the bore; nodes on it are drawn, and held."""
+    """The sector, or its reduction with the way back to the nodes."""
     o = Options(**options)
+    return reduced(unreduced(o)) if o.reduced else unreduced(o)
+
+
+def reduced(full: fw.BuiltModel) -> fw.BuiltModel:
+    """On the pads, the tip, the faces and 80 component modes: nothing is left out."""
+    pads = full.contacts["pads"]
+    contact = fw.Contact("coulomb_3d", pads.B, {**pads.parameters, "friction_coefficient": 0.1})
+    arguments = (full.M, full.K, full.low, full.high, full.sectors)
+    options = dict(contacts=[contact], keep=[full.dofs["tip"]], axis="z", modes=80, comm=MPI.COMM_SELF)
+    with fw.reduce_sector(*arguments, **options) as reduction:
+        return replace(
+            full,
+            M=reduction.M,
+            K=reduction.K,
+            dofs={"tip": reduction.places[full.dofs["tip"]]},
+            contacts={"pads": replace(pads, B=reduction.contacts[0].B[0])},
+            loads={name: reduction.project(load) for name, load in full.loads.items()},
+            low=reduction.low,
+            high=reduction.high,
+            expansion=reduction.expand(np.eye(reduction.size)),
+        )
+
+
+def unreduced(o: Options) -> fw.BuiltModel:
+    """Dofs 3 * node + axis of the nodes beyond the bore; nodes on it are drawn, and held."""
     mesh = mesh_of(o)
     radius = np.hypot(mesh.nodes[:, 0], mesh.nodes[:, 1])
     free = np.nonzero(radius > BORE * (1 + 1e-9))[0]

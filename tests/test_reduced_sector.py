@@ -5,15 +5,14 @@ from __future__ import annotations
 import csv
 import json
 import shutil
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from command_line import call
 
 import fretwave as fw
 from fretwave.casefile import load_case
-from fretwave.cli import main
 from fretwave.errors import CaseErrors
 from fretwave.reduced import reduce_case
 from fretwave.run import build_model
@@ -65,9 +64,8 @@ def write(folder: Path, *changes: tuple[str, str]) -> Path:
 
 def run(path: Path) -> tuple[list[dict[str, float]], dict]:
     """Table and record of a run."""
-    hook, out = sys.excepthook, path.parent / "run"
-    assert main(["run", str(path), "--out", str(out), "--no-plots"]) == 0
-    sys.excepthook = hook
+    out = path.parent / "run"
+    assert call("run", str(path), "--out", str(out), "--no-plots") == 0
     with (out / "mode.csv").open(newline="") as file:
         rows = [
             {key: float(row[key]) for key in ("amplitude", "omega", "beta", "slip")} for row in csv.DictReader(file)

@@ -93,6 +93,7 @@ def cut_on(cut: CutSector, reduction: SectorReduction) -> CutSector:
             loads={name: reduction.project(load) for name, load in built.loads.items()},
             parts={name: sp.csr_matrix(reduction.project(part @ unit)) for name, part in built.parts.items()},
             axis=None,  # the reduced faces correspond as they are
+            expansion=None,
         )
     rows = [sp.csr_matrix(by_sector(contact.B)[0]) for contact in reduction.contacts]
     return CutSector(

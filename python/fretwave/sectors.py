@@ -44,8 +44,9 @@ class CutSector:
 
     @property
     def axis(self) -> str | None:
-        """Of the wheel, where dofs of the faces are Cartesian components."""
-        return self.origin.built.axis if self.origin.built else None
+        """Of the wheel, where dofs of the faces are Cartesian components: not those that a builder has reduced."""
+        built = self.origin.built
+        return None if built is None or built.expansion is not None else built.axis
 
 
 @dataclass(frozen=True)
