@@ -14,6 +14,7 @@ import scipy.sparse
 from . import checks
 from .built import BuiltModel
 from .checks_rest import check_preloads, check_reduction
+from .checks_wheel import check_wheels
 from .contacts import ContactSpec, read_contacts
 from .errors import CaseErrors, FretwaveError
 from .origin import Origin, check_physics, load_origin
@@ -212,6 +213,7 @@ def _build(source: Source, laws: Mapping[str, Any], found: list[FretwaveError]) 
         origin, contacts, neighbours = tie(section, source, origin, contacts, found)
         dofs, built = origin.dofs, origin.built
         check_waves(source, analyses, neighbours, found)
+        check_wheels(source, analyses, neighbours, dofs, found)
     keep = _kept(origin, contacts, analyses, neighbours) if origin and reduction else {}
     known = set(dofs or ())  # of a sector, dofs of the high face are kept, and left out
     checks.check_analyses(source, analyses, [name for name in keep.values() if name in known] if keep else dofs, found)
