@@ -69,6 +69,10 @@ def solved(folder: Path, variant: str) -> Path:
         text = text.replace("[[contact]]", MODES + "[[contact]]")
     elif variant == "wheel":
         text = text.replace("nodal_diameter = 2", "nodal_diameter = 2\nwheel = true")
+    elif variant == "mistuned":
+        deviations = "mistuning = { deviations = [0.02, -0.01, 0.0, 0.01, -0.03, 0.01] }"
+        text = text.replace("nodal_diameter = 2", f"nodal_diameter = 2\nwheel = true\n{deviations}")
+        text = text.replace("amplitude = [5e-6, 2e-5]\nreport_at = [1e-5]", "amplitude = [5e-6, 5.2e-6]")
     else:
         text = text.replace("mass_damping", variant + "mass_damping")
     (folder / "case.toml").write_text(text)
@@ -100,14 +104,19 @@ def turned_back(vectors: np.ndarray) -> np.ndarray:
     return np.stack([v @ turn for v, turn in zip(vectors, turns)])
 
 
-def test_sectors_hang_together_at_every_time(viewed: Path) -> None:
+def tip_node() -> int:
+    built = build()
+    return int(np.nonzero(built.displacements == built.dofs["tip"])[0][0])
+
+
+def check_faces(path: Path) -> None:
     """The high face of each sector lies and moves with the low face of the next; the bore stays."""
     built = build()
     node = {int(dof): number for number, row in enumerate(built.displacements) for dof in row[:1] if dof >= 0}
     low, high = (np.array([node[int(dof)] for dof in face[::3]]) for face in (built.low, built.high))
     held = built.displacements[:, 0] < 0
     for step in range(PHASES):
-        found = read_step(viewed, step)
+        found = read_step(path, step)
         for name in ("points", "displacement", "rest_displacement", "harmonic_1_real", "harmonic_2_imag"):
             values = by_sector(found[name])
             size = np.abs(values).max()
@@ -115,6 +124,24 @@ def test_sectors_hang_together_at_every_time(viewed: Path) -> None:
             assert np.roll(values[:, low], -1, axis=0) == pytest.approx(values[:, high], rel=0, abs=1e-9 * size)
         assert not by_sector(found["displacement"])[:, held].any()
         assert found["sector"].tolist() == np.repeat(np.arange(SECTORS), len(held)).tolist()
+
+
+def test_sectors_hang_together_at_every_time(viewed: Path) -> None:
+    check_faces(viewed)
+
+
+def test_a_mistuned_wheel_shows_each_sectors_own_motion(tmp_path: Path) -> None:
+    """Tips move as their own coefficients say, and the faces still hang together."""
+    folder = solved(tmp_path, "mistuned")
+    assert call("view", str(folder), "--phases", str(PHASES)) == 0
+    check_faces(folder / "mode.vtkhdf")
+    with h5py.File(folder / "results.h5") as file:
+        names = file["mode/dof"][()].tolist()
+        Q = file["mode/coefficients"][-1, [names.index(f"tip@{j}".encode()) for j in range(SECTORS)]]
+        cosines = [k for k, text in enumerate(file["mode/harmonic"][()]) if not text.endswith(b"s")]
+    tips = by_sector(read_step(folder / "mode.vtkhdf", 0)["displacement"])[:, tip_node(), 2]
+    assert tips == pytest.approx(Q[:, cosines].sum(axis=1), rel=1e-9)
+    assert np.ptp(np.abs(tips)) > 0.1 * np.abs(tips).max()
 
 
 def test_sector_j_repeats_the_motion_of_the_first_with_its_delay(viewed: Path) -> None:
@@ -138,12 +165,10 @@ def test_the_tip_moves_as_solved(viewed: Path) -> None:
         labels = [text.decode() for text in file["mode/harmonic"][()]]
         tip = next(k for k, name in enumerate(names) if name in ("tip", "tip@0"))
         Q = file["mode/coefficients"][-1, tip]
-    built = build()
-    node = int(np.nonzero(built.displacements == built.dofs["tip"])[0][0])
     for step in (0, 5, 17):
         phase = 2 * np.pi * step / PHASES
         sums = [(np.sin if text[-1] == "s" else np.cos)(int(text.rstrip("cs")) * phase) for text in labels]
-        assert read_step(viewed, step)["displacement"][node, 2] == pytest.approx(Q @ sums, rel=1e-9)
+        assert read_step(viewed, step)["displacement"][tip_node(), 2] == pytest.approx(Q @ sums, rel=1e-9)
 
 
 def test_all_variants_show_the_same_motion(viewed: Path, plain: Path, tmp_path: Path) -> None:
@@ -159,6 +184,20 @@ def test_all_variants_show_the_same_motion(viewed: Path, plain: Path, tmp_path: 
     for name in ("points", "normal_force", "tangential_force", "normal", "share_slip", "dissipated_work"):
         size = max(np.abs(pairs[1][name]).max(), 1e-12)
         assert np.abs(pairs[0][name] - pairs[1][name]).max() <= 2 * limit * size
+
+
+def test_points_may_have_nodal_diameters_of_their_own(plain: Path, tmp_path: Path) -> None:
+    """Where the table has such a column: here -2, which turns the wave around."""
+    folder = tmp_path / "run"
+    shutil.copytree(plain, folder)
+    with h5py.File(folder / "results.h5", "a") as file:
+        points = file["mode/points"]
+        points["nodal_diameter"] = np.full(len(points["amplitude"]), -DIAMETERS)
+    assert call("view", str(folder), "--phases", str(PHASES)) == 0
+    tip = [by_sector(read_step(folder / "mode.vtkhdf", s)["displacement"])[:, tip_node(), 2] for s in range(PHASES)]
+    first, second = np.array(tip).T[:2]
+    assert second == pytest.approx(np.roll(first, -DELAY), rel=1e-6, abs=1e-12)
+    assert np.abs(second - np.roll(first, DELAY)).max() > 0.1 * np.abs(first).max()
 
 
 def test_pairs_of_all_sectors_follow_each_other(viewed: Path) -> None:

@@ -89,7 +89,7 @@ class Choice:
     contacts : histories per point, by the contact's name; none unless every point keeps them
     without : points that do not keep the motion of their contacts
     highest_component_hz : of the run's reduction, 0 without component modes
-    nodal_diameter : of the wave on one sector; 0 for a structure
+    diameters : nodal diameters of the wave on one sector, per point; 0 for a structure
     wheel : the coordinates are those of all sectors of a wheel, one after the other
     sample_count : of a period
     """
@@ -106,7 +106,7 @@ class Choice:
     contacts: dict[str, list[ContactHistory]]
     without: list[int]
     highest_component_hz: float = 0.0
-    nodal_diameter: int = 0
+    diameters: Sequence[int] = ()
     wheel: bool = False
     sample_count: int = 1
 
@@ -144,15 +144,15 @@ class Choice:
 
     def whole_delays(self, sectors: int) -> bool:
         """In a wave every sector is whole samples behind the last one."""
-        return self.wheel or self.sample_count * self.nodal_diameter % sectors == 0
+        return self.wheel or all(self.sample_count * n % sectors == 0 for n in self.diameters)
 
     def histories(self, name: str, sector: int, sectors: int) -> list[ContactHistory]:
         """Of a contact in one sector, per point."""
         if self.wheel:
             n = self.contacts[name][0].n_pairs // sectors
             return [history.of_pairs(slice(sector * n, (sector + 1) * n)) for history in self.contacts[name]]
-        shift = self.sample_count * self.nodal_diameter * sector // sectors % self.sample_count
-        return [history.delayed(shift) if shift else history for history in self.contacts[name]]
+        shifts = [self.sample_count * n * sector // sectors for n in self.diameters]
+        return [history.delayed(shift) if shift else history for history, shift in zip(self.contacts[name], shifts)]
 
     def lines(self) -> Iterator[str]:
         """Which points are shown, each in a line."""
@@ -195,10 +195,19 @@ def read_choice(file: Any, folder: Path, case: Case, options: ViewOptions) -> Ch
         contacts={} if without else _contacts(group, case, name, rows),
         without=without,
         highest_component_hz=json.loads(group.attrs.get("reduction", "{}")).get("highest_component_hz", 0.0),
-        nodal_diameter=nodal_diameter(case.analyses[name]) if case.neighbours else 0,
+        diameters=_diameters(group, case, name, rows),
         wheel=case.neighbours is not None and bool(getattr(case.analyses[name], "wheel", False)),
         sample_count=count,
     )
+
+
+def _diameters(group: Any, case: Case, name: str, rows: Sequence[int]) -> list[int]:
+    """Nodal diameters of the points: those of their rows, where an analysis has several, or of the analysis."""
+    if case.neighbours is None:
+        return [0] * len(rows)
+    if "nodal_diameter" in group["points"]:
+        return [int(group["points/nodal_diameter"][row]) for row in rows]
+    return [nodal_diameter(case.analyses[name])] * len(rows)
 
 
 def _analysis(file: Any, folder: Path, case: Case, asked: str | None) -> str:

@@ -140,9 +140,10 @@ class Scene:
         """The wave so many sectors ahead; what is at rest has no delay."""
         if sectors == 0:
             return columns
-        D = self.choice.delay(2 * np.pi * self.choice.nodal_diameter * sectors / self.around)
-        points = columns[..., 1:].reshape(*columns.shape[:-1], -1, len(D)) @ D
-        return np.concatenate([columns[..., :1], points.reshape(*columns.shape[:-1], -1)], axis=-1)
+        D = np.stack([self.choice.delay(2 * np.pi * n * sectors / self.around) for n in self.choice.diameters])
+        points = columns[..., 1:].reshape(*columns.shape[:-1], *D.shape[:2])
+        moved = np.einsum("...pm,pmk->...pk", points, D)
+        return np.concatenate([columns[..., :1], moved.reshape(*columns.shape[:-1], -1)], axis=-1)
 
 
 @contextmanager
