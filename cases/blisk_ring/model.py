@@ -106,8 +106,9 @@ def full(**options: Any) -> dict[str, Any]:
     Returns
     -------
     dict
-        M, K : (n_dof, n_dof) CSR, without contact, both faces free; K_blade : the blade's share of K; B : (3 n_pairs, n_dof), rows (normal, axial,
-        circumferential) of ring minus groove pair by pair, u_n > 0 closes; low, high : (n_face,) matching dofs;
+        M, K : (n_dof, n_dof) CSR, without contact, both faces free; K_blade : the blade's share of K;
+        B : (3 n_pairs, n_dof), rows (normal, axial, circumferential) of ring minus groove pair by pair, u_n > 0 closes;
+        low, high : (n_face,) matching dofs;
         areas, points, frames, positions of the pairs; tip : dof; free : (n_free,) nodes of the mesh that are not held;
         coordinates (n_nodes, 3), hexahedra and boundary_faces of the whole mesh; disk_nodes, blade_nodes, blade_root;
         ring_mass [kg], ring_radius [m]; mass, rigid_residual : (disk with blade, ring).

@@ -151,14 +151,9 @@ def fold(cut: CutSector, number: int) -> tuple[Origin, list[ContactSpec], Neighb
         loads = {name: sum(T.T @ load for T in sector.ties.values()) for name, load in built.loads.items()}
         named = {name: place[number] for name, number in built.dofs.items() if number in place}
         built = replace(built, dofs=named, loads=loads, coordinates=None, displacements=None, hexahedra=None)
-    neighbours = Neighbours(
-        sector.sectors,
-        terms={letter: _without_own(part) for letter, part in parts.items()},
-        contacts={name: _without_own(B) for name, B in rows.items()},
-        ties=sector.ties,
-        parts={**(origin.built.parts if origin.built else {}), WHOLE: origin.matrices["K"].values},
-        cut=cut,
-    )
+    terms, ahead = ({name: _without_own(part) for name, part in given.items()} for given in (parts, rows))
+    varied = {**(origin.built.parts if origin.built else {}), WHOLE: origin.matrices["K"].values}
+    neighbours = Neighbours(sector.sectors, terms, ahead, sector.ties, varied, cut)
     resolved = {
         **origin.resolved,
         "model.sectors": sector.sectors,
