@@ -6,16 +6,15 @@ import csv
 import json
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
+from command_line import call
 from test_resume import command, kill_at, rows, without_time
 
 from fretwave.casefile import load_case
-from fretwave.cli import main
 from fretwave.errors import CaseErrors, InputError
 
 pytestmark = pytest.mark.ranks(1)
@@ -85,14 +84,6 @@ def only_problem(path: Path, *overrides: str) -> InputError:
     problems = all_problems(path, *overrides)
     assert len(problems) == 1, problems
     return problems[0]
-
-
-def call(*arguments: str) -> int:
-    hook = sys.excepthook
-    try:
-        return main(list(arguments))
-    finally:
-        sys.excepthook = hook
 
 
 def table(folder: Path, name: str) -> list[dict[str, str]]:

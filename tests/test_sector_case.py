@@ -118,7 +118,6 @@ WRONG = {
     "no sectors": ("sectors = 24\n", "", "without a number of sectors"),
     "unequal faces": ('low = ["disk"]', 'low = ["disk", "blade"]', "2 low and 1 high dofs"),
     "a face twice": ('low = ["disk"]', 'low = ["next"]', "dof 3 stands 2 times"),
-    "reduction": ("[[contact]]", "[reduction]\nmodes = 1\n\n[[contact]]", "cannot be reduced"),
 }
 
 

@@ -1,27 +1,20 @@
-"""``fretwave view``: the layout of VTKHDF read as its specification says, and the physics of what is in it."""
+"""``fretwave view`` of a structure: the physics of what is in the files, and what is refused."""
 
 from __future__ import annotations
 
 import csv
 import shutil
-import sys
 from pathlib import Path
-from types import SimpleNamespace
 
 import h5py
 import numpy as np
 import pytest
-import scipy.sparse as sp
+from command_line import call
+from vtkhdf_files import read_step
 
-import fretwave as fw
-from fretwave import fe
 from fretwave.casefile import load_case
-from fretwave.cli import main
-from fretwave.contact_history import OPEN, SLIP, STICK, ContactHistory
-from fretwave.errors import InputError
-from fretwave.fe.mesh import VTK_LATTICE
-from fretwave.view import mesh_of
-from fretwave.vtkhdf import HEXAHEDRON, TRIQUADRATIC_HEXAHEDRON, VERTEX, GridFile, linear_cells
+from fretwave.contact_history import OPEN, SLIP, STICK
+from fretwave.vtkhdf import HEXAHEDRON
 
 pytestmark = pytest.mark.ranks(1)
 
@@ -79,118 +72,6 @@ levels = [1.0]
 METHODS = ["mode", "periodic"]
 #: Newton's rest, relative to the largest force of the fundamental.
 BALANCE = 1e-7
-
-
-def call(*arguments: str) -> int:
-    hook = sys.excepthook
-    try:
-        return main(list(arguments))
-    finally:
-        sys.excepthook = hook
-
-
-def read_step(path: Path, step: int) -> dict[str, np.ndarray]:
-    """Points, cells and fields of a step, by the offsets of the specification's section on temporal data."""
-    with h5py.File(path) as file:
-        root, steps = file["VTKHDF"], file["VTKHDF/Steps"]
-        part, parts = steps["PartOffsets"][step], steps["NumberOfParts"][step]
-        n, n_cells, ids = (
-            root[f"NumberOf{name}"][part : part + parts] for name in ("Points", "Cells", "ConnectivityIds")
-        )
-        point, cell, at = (steps[f"{name}Offsets"][step] for name in ("Point", "Cell", "ConnectivityId"))
-        found = {"points": root["Points"][point : point + n.sum()]}
-        found["types"] = root["Types"][cell[0] : cell[0] + n_cells.sum()]
-        found["cells"] = []
-        first, offset, start = 0, cell[0] + part, at[0]
-        for points, cells, length in zip(n, n_cells, ids):
-            cut = root["Offsets"][offset : offset + cells + 1]
-            nodes = root["Connectivity"][start : start + length]
-            found["cells"] += [first + nodes[a:b] for a, b in zip(cut, cut[1:])]
-            first, offset, start = first + points, offset + cells + 1, start + length
-        for name, data in root["PointData"].items():
-            begin = steps[f"PointDataOffsets/{name}"][step]
-            found[name] = data[begin : begin + n.sum()]
-        for name, data in root["FieldData"].items():
-            found[name] = data[steps[f"FieldDataOffsets/{name}"][step]]
-    return found
-
-
-# The writer
-
-
-@pytest.fixture(scope="module")
-def skewed() -> fe.Mesh:
-    """2 x 1 x 1 triquadratic cells under a trilinear map."""
-    corners = np.array(
-        [[0, 0, 0], [2.2, 0, 0.1], [0, 1, 0], [2, 1.3, 0], [0.1, 0, 1], [2, 0.2, 1.4], [0, 1.1, 1], [2, 1, 1]]
-    )
-
-    def place(u: np.ndarray) -> np.ndarray:
-        weights = [(1 - u[:, 0], u[:, 0]), (1 - u[:, 1], u[:, 1]), (1 - u[:, 2], u[:, 2])]
-        return sum(
-            (weights[0][i] * weights[1][j] * weights[2][k])[:, None] * corners[i + 2 * j + 4 * k]
-            for i in (0, 1)
-            for j in (0, 1)
-            for k in (0, 1)
-        )
-
-    return fe.join([fe.Block("skewed", (2, 1, 1), place)], 2)
-
-
-def test_layout_follows_the_specification(tmp_path: Path, skewed: fe.Mesh) -> None:
-    """Attributes, types and sizes; two parts, a field that stays, one that changes, one of two states."""
-    path, n = tmp_path / "two.vtkhdf", len(skewed.nodes)
-    changing = np.arange(3.0 * (n + 2)).reshape(3, n + 2)
-    with GridFile(path, [0.0, 0.5, 1.0]) as grid:
-        grid.part(skewed.nodes, skewed.vtk_cells, TRIQUADRATIC_HEXAHEDRON)
-        grid.part([[0.0, 0, 0], [1, 1, 1]], [[0], [1]], VERTEX)
-        grid.point_field("still", [skewed.nodes, np.zeros((2, 3))])
-        grid.point_field("changing", changing, np.arange(3), "f4")
-        grid.point_field("state", [np.zeros(n + 2), np.ones(n + 2)], [0, 1, 1])
-        grid.field_data("level", [3.0, 4.0, 5.0])
-    with h5py.File(path) as file:
-        root = file["VTKHDF"]
-        assert root.attrs["Version"].tolist() == [2, 0] and root.attrs["Version"].dtype.kind == "i"
-        kind = root.attrs.get_id("Type").get_type()
-        assert root.attrs["Type"] == b"UnstructuredGrid" and not kind.is_variable_str()
-        assert kind.get_cset() == h5py.h5t.CSET_ASCII and kind.get_size() == len("UnstructuredGrid")
-        assert root["Steps"].attrs["NSteps"] == 3 and root["Steps/Values"][()].tolist() == [0, 0.5, 1]
-        assert root["NumberOfPoints"][()].tolist() == [n, 2] and root["NumberOfCells"][()].tolist() == [2, 2]
-        assert root["NumberOfConnectivityIds"][()].tolist() == [54, 2] and len(root["Connectivity"]) == 56
-        assert root["Offsets"][()].tolist() == [0, 27, 54, 0, 1, 2] and root["Points"].shape == (n + 2, 3)
-        assert root["Types"].dtype == np.uint8 and root["Connectivity"].dtype.kind == "i"
-        for name, shape in {"CellOffsets": (3, 1), "ConnectivityIdOffsets": (3, 1), "PointOffsets": (3,)}.items():
-            assert root[f"Steps/{name}"].shape == shape and not root[f"Steps/{name}"][()].any()
-        assert root["PointData/changing"].dtype == np.float32
-    for step in range(3):
-        found = read_step(path, step)
-        assert found["types"].tolist() == [29, 29, 1, 1] and found["cells"][3].tolist() == [n + 1]
-        assert found["changing"].tolist() == changing[step].tolist() and found["level"] == 3.0 + step
-        assert np.all(found["state"] == min(step, 1)) and np.array_equal(found["still"][:n], skewed.nodes)
-
-
-def test_a_failure_leaves_the_old_file(tmp_path: Path, skewed: fe.Mesh) -> None:
-    path = tmp_path / "grid.vtkhdf"
-    path.write_text("old")
-    with pytest.raises(InputError, match="a node that does not exist"), GridFile(path, [0.0]) as grid:
-        grid.part(skewed.nodes[:-1], skewed.vtk_cells, TRIQUADRATIC_HEXAHEDRON)
-    with pytest.raises(ValueError, match="rows"), GridFile(path, [0.0, 1.0]) as grid:
-        grid.part(skewed.nodes, skewed.vtk_cells, TRIQUADRATIC_HEXAHEDRON)
-        grid.point_field("short", [skewed.nodes], [0, 1])
-    assert path.read_text() == "old" and [entry.name for entry in tmp_path.iterdir()] == ["grid.vtkhdf"]
-
-
-def test_linear_cells_fill_the_same_volume(skewed: fe.Mesh) -> None:
-    """Under a trilinear map the eight parts of a cell are exact; each is right-handed at all its corners."""
-    cells = linear_cells(skewed.vtk_cells, VTK_LATTICE)
-    lattice = np.array([0, 1, 3, 2, 4, 5, 7, 6])  # VTK's order to [i, j, k] in C order, reversed axes
-    parts = fe.Mesh(skewed.nodes, cells[:, lattice].reshape(-1, 2, 2, 2).transpose(0, 3, 2, 1), 1, {})
-    assert len(cells) == 16
-    assert parts.jacobians([np.array([0.0, 1.0])] * 3).min() > 0
-    assert parts.volume == pytest.approx(skewed.volume, rel=1e-13)
-
-
-# A run
 
 
 @pytest.fixture(scope="module")
@@ -388,26 +269,6 @@ def test_the_case_as_it_was_run_is_shown(run: Path, tmp_path: Path, capfd) -> No
     assert "model.builder" in capfd.readouterr().err
 
 
-def test_cells_of_a_built_model(skewed: fe.Mesh) -> None:
-    """Triquadratic as they are or cut in eight; without cells the nodes are points."""
-    n, cells = skewed.n_dof, skewed.vtk_cells
-    model = fw.BuiltModel(sp.identity(n, format="csr"), sp.identity(n, format="csr"), coordinates=skewed.nodes)
-    case = SimpleNamespace(built=model, neighbours=None, path=Path("case.toml"))
-    assert (mesh_of(case)[1][0].shape, mesh_of(case)[1][1]) == ((n // 3, 1), VERTEX)
-    model.hexahedra = cells
-    assert model.complaint() is None and mesh_of(case)[1][1] == TRIQUADRATIC_HEXAHEDRON
-    assert (mesh_of(case, linear=True)[1][0].shape, mesh_of(case, linear=True)[1][1]) == ((16, 8), HEXAHEDRON)
-    model.hexahedra = cells[:, :8]
-    assert model.complaint() is None and mesh_of(case, linear=True)[1][1] == HEXAHEDRON
-    model.hexahedra = cells[:, :19]
-    assert "(2, 19), not (n_cells, 8, 20 or 27)" in model.complaint()
-    model.hexahedra = cells + 1
-    assert f"nodes 1 to {n // 3} of {n // 3}" in model.complaint()
-    case.neighbours = SimpleNamespace(sectors=24)
-    with pytest.raises(InputError, match="sectors of wheels"):
-        mesh_of(case)
-
-
 IMPORTED = """
 [model]
 file = "block.h5"
@@ -453,53 +314,3 @@ def test_an_imported_model_brings_its_mesh(tmp_path: Path) -> None:
         names = file["mode/dof"][()].tolist()
         Q = file["mode/coefficients"][-1]
         assert found["displacement"][9, 2] == pytest.approx(Q[names.index(b"n10z"), :2].sum(), rel=1e-12)
-
-
-# Histories of contacts
-
-
-@pytest.mark.parametrize("law", ["regularised_coulomb", "jenkins"])
-def test_status_of_a_law_is_its_own(two_dof, comm, law: str) -> None:
-    """Shares as the law counts them, work as it integrates: for EPMC's periodic motion the same integral."""
-    parameters = {
-        "regularised_coulomb": {"friction_limit": 5.0, "regularisation_velocity": 0.05},
-        "jenkins": {"friction_limit": 5.0, "tangential_stiffness": 40.0},
-    }[law]
-    contact = fw.Contact(law, B=[[0.0, 1.0]], parameters=parameters)
-    model = fw.Model(two_dof.M, two_dof.K, contacts=[contact], comm=comm)
-    start = fw.linear_modes(model, 1, "stuck")[0]
-    problem = fw.NonlinearMode(model, fw.Harmonics(range(1, 16, 2), 2048), method="EPMC", dof=0, start=start)
-    *_, last = fw.Continuation(problem, problem.initial(0.02), (0.02, 0.15 if law == "regularised_coulomb" else 0.4))
-    told = problem.diagnostics(last.y)
-    history = ContactHistory(law, parameters, **problem.contact_period(last.y)[0])
-    for status, word in ((STICK, "stick"), (SLIP, "slip"), (OPEN, "open")):
-        assert history.share(status).mean() == pytest.approx(told[word], abs=1e-14)
-    assert 0.05 < told["slip"] < 0.95
-    # Jenkins' own sum over its slips is of first order in the sample distance.
-    assert history.work.sum() == pytest.approx(told["work"], rel=1e-10 if law == "regularised_coulomb" else 1e-2)
-
-
-def test_gap_is_what_is_missing_to_contact() -> None:
-    """u_n sweeps through contact: N = max(0, N0 + kn (u_n - g)), the gap is g - N0 / kn - u_n where it is open."""
-    u = np.zeros((64, 3, 2))
-    u[:, 0] = 1e-3 * np.cos(2 * np.pi * np.arange(64) / 64)[:, None]
-    kn, load, gap = np.array([2e4, 1e4]), 5.0, np.array([1e-4, 0.0])
-    f = np.zeros_like(u)
-    f[:, 0] = np.maximum(0.0, load + kn * (u[:, 0] - gap))
-    given = {"normal_stiffness": kn, "normal_load": load, "gap": gap, "friction_coefficient": 0.3}
-    history = ContactHistory("coulomb_3d", given, u, np.zeros_like(u), f)
-    missing = gap - load / kn - u[:, 0]
-    assert history.gap == pytest.approx(np.maximum(missing, 0.0), abs=1e-18)
-    assert np.array_equal(history.status == OPEN, missing >= 0) and not np.any(history.status == SLIP)
-    assert np.abs(history.work).max() < 1e-12 * load * 1e-3
-
-
-def test_uncoupled_tangents_slip_one_by_one() -> None:
-    f = np.array([[[10.0], [3.0], [2.9]], [[10.0], [2.0], [2.5]]])
-    history = {
-        law: ContactHistory(law, {"friction_coefficient": 0.3}, 0 * f, 0 * f, f)
-        for law in ("coulomb_3d", "coulomb_3d_uncoupled", "own")
-    }
-    assert history["coulomb_3d"].status.ravel().tolist() == [SLIP, SLIP]
-    assert history["coulomb_3d_uncoupled"].status.ravel().tolist() == [SLIP, STICK]
-    assert history["own"].status is None

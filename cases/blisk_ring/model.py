@@ -42,8 +42,20 @@ def build(**options: Any) -> fw.BuiltModel:
         sectors=o.blades,
         low=r["low"],
         high=r["high"],
+        axis="z",
+        coordinates=r["coordinates"],
+        displacements=displacements(r),
+        hexahedra=r["hexahedra"],
+        expansion=r["expand"],
         parts={"blade": r["K_blade"]},
     )
+
+
+def displacements(model: dict[str, Any]) -> Any:
+    """Dofs (n_nodes, 3) of all nodes in `full`, -1 where the bore holds them."""
+    number = np.full((len(model["coordinates"]), 3), -1)
+    number[model["free"]] = np.arange(3 * len(model["free"])).reshape(-1, 3)
+    return number
 
 
 def groove_contact(o: Options, model: dict[str, Any]) -> tuple[sp.csr_matrix, fw.BuiltContact]:
@@ -62,7 +74,8 @@ def groove_contact(o: Options, model: dict[str, Any]) -> tuple[sp.csr_matrix, fw
         "tangential_stiffness": np.repeat(parameters["tangential_stiffness"], 2),
         "friction_limit": o.friction * np.repeat(parameters["normal_load"], 2),
     }
-    return stiffened(o, model, False), fw.BuiltContact(model["B"][tangents], 1, given)
+    points = np.repeat(model["points"], 2, axis=0)
+    return stiffened(o, model, False), fw.BuiltContact(model["B"][tangents], 1, given, points=points)
 
 
 def checked_options(options: dict[str, Any]) -> Options:

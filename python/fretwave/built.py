@@ -82,6 +82,9 @@ class BuiltModel:
         Nodes [m], for pictures and resultants.
     displacements : (n_nodes, 3), optional
         Dof of each node along x, y and z, -1 where it is held; without it 3 * node + axis.
+    expansion : (n_unreduced, n_dof), optional
+        Of a model that the builder has reduced: dofs of the nodes from the model's own, with which a picture begins.
+        `displacements` then number its rows, and the faces of a sector correspond as they are.
     hexahedra : (n_cells, 8, 20 or 27), optional
         Nodes of the cells in VTK's order, for pictures.
     sectors : int, optional
@@ -103,6 +106,7 @@ class BuiltModel:
     loads: Mapping[str, Array] = field(default_factory=dict)
     coordinates: Optional[Array] = None
     displacements: Optional[npt.NDArray[np.intp]] = None
+    expansion: Optional[Any] = None
     hexahedra: Optional[npt.NDArray[np.intp]] = None
     sectors: Optional[int] = None
     low: Optional[npt.NDArray[np.intp]] = None
@@ -133,10 +137,15 @@ class BuiltModel:
         if self.coordinates is None:
             return None if self.hexahedra is None else "there are hexahedra, but no coordinates"
         given = self.displacements
-        n = self.M.shape[0] // 3 if given is None else len(given)
+        dofs = self.M.shape[0]
+        if self.expansion is not None:
+            if np.shape(self.expansion)[1:] != (dofs,):
+                return f"expansion has the shape {np.shape(self.expansion)}, not (n_unreduced, {dofs})"
+            dofs = np.shape(self.expansion)[0]
+        n = dofs // 3 if given is None else len(given)
         if np.shape(self.coordinates) != (n, 3):
             return f"coordinates have the shape {np.shape(self.coordinates)}, not ({n}, 3)"
-        if given is not None and (np.shape(given) != (n, 3) or np.max(given) >= self.M.shape[0]):
+        if given is not None and (np.shape(given) != (n, 3) or np.max(given) >= dofs):
             return f"displacements have the shape {np.shape(given)} and the largest dof {np.max(given)}"
         cells = self.hexahedra
         if cells is None:

@@ -63,6 +63,8 @@ class Case:
         What a reduction did; None for the model as given.
     unreduced : Case
         The case before its reduction, where the reduction's error is asked for.
+    keep : list of int
+        Dofs that a reduction keeps; of a sector with both its faces.
     preload : PreloadSection
         The static state of all analyses without one of their own; None for none.
     neighbours : Neighbours
@@ -225,14 +227,15 @@ def _build(source: Source, laws: Mapping[str, Any], found: list[FretwaveError]) 
         origin, contacts, neighbours = tie(section, source, origin, contacts, found)
         dofs, built = origin.dofs, origin.built
         fold_engine_orders(source, analyses, neighbours.sectors if neighbours else None, found)
-        check_waves(source, analyses, neighbours, reduction is not None, found)
+        check_waves(source, analyses, neighbours, found)
         check_wheels(source, analyses, neighbours, dofs, found)
     if origin:
         check_aerodynamics(source, flow, analyses, neighbours.sectors if neighbours else None, origin.dofs, found)
-    blade = {flow.dof: origin.dofs.index(flow.dof)} if flow and origin and flow.dof in origin.dofs else {}
-    keep = kept_dofs({**origin.named, **blade}, contacts, analyses, origin.dofs) if origin and reduction else []
-    checks.check_analyses(source, analyses, [origin.dofs[k] for k in keep] if origin and keep else dofs, found)
-    check_reduction(source, reduction, found)
+    blade = flow.dof if flow else None
+    keep = _kept(origin, contacts, analyses, neighbours, blade) if origin and reduction else {}
+    known = set(dofs or ())  # of a sector, dofs of the high face are kept, and left out
+    checks.check_analyses(source, analyses, [name for name in keep.values() if name in known] if keep else dofs, found)
+    check_reduction(source, reduction, analyses, neighbours.sectors if neighbours else None, found)
     check_preloads(source, preload, analyses, built.loads if built else () if origin else None, found)
     notes: list[str] = []
     if origin is not None:
@@ -260,11 +263,30 @@ def _build(source: Source, laws: Mapping[str, Any], found: list[FretwaveError]) 
         loads=dict(built.loads) if built else {},
         built=built,
         reduction=reduction,
-        keep=keep,
+        keep=list(keep),
         preload=preload,
         neighbours=neighbours,
         aerodynamics=flow,
     )
+
+
+def _kept(
+    origin: Origin,
+    contacts: Sequence[ContactSpec],
+    analyses: Mapping[int, AnalysisSection],
+    neighbours: Neighbours | None,
+    blade: str | None,
+) -> dict[int, str]:
+    """Dofs that a reduction keeps, of a sector before its faces were tied, with their names.
+
+    Parameters
+    ----------
+    blade : dof that the flow acts on
+    """
+    if neighbours is not None:
+        origin, contacts = neighbours.cut.origin, neighbours.cut.contacts
+    named = {**origin.named, **({blade: origin.dofs.index(blade)} if blade in origin.dofs else {})}
+    return {k: origin.dofs[k] for k in kept_dofs(named, contacts, analyses, origin.dofs)}
 
 
 def _table(kind: type[Table], name: str, source: Source, found: list[FretwaveError]) -> Table | None:

@@ -62,7 +62,7 @@ def _report(case: Case, described: dict[str, list[str]]) -> list[str]:
         count = contact.n_pairs
         values = ", ".join(f"{key} = {_short(value)}" for key, value in contact.parameters.items())
         lines.append(f"  contact '{contact.name}': {contact.law}, {count} contact pair{'s' * (count != 1)}, {values}")
-    lines.extend([f"  {case.reduced.line()}"] if case.reduced else [])
+    lines.extend(f"  {line}" for line in (case.reduced.lines() if case.reduced else ()))
     lines.extend(f"  note: {note}" for note in case.notes)
     for name, texts in described.items():
         lines.append(f"  {name}: {texts[0]}")

@@ -11,11 +11,40 @@ from .source import Source, nearest
 Analyses = Mapping[int, AnalysisSection]
 
 
-def check_reduction(source: Source, section: ReductionSection | None, found: Found) -> None:
-    """Component modes are chosen in one way."""
-    if section is not None and section.modes is not None and section.up_to_hz is not None:
-        report = Reporter(source, ("reduction",), found)
+def check_reduction(
+    source: Source, section: ReductionSection | None, analyses: Analyses, sectors: int | None, found: Found
+) -> None:
+    """Component modes are chosen in one way; faces are those of a sector, and their waves exist."""
+    if section is None:
+        return
+    report = Reporter(source, ("reduction",), found)
+    if section.modes is not None and section.up_to_hz is not None:
         report.wrong(("up_to_hz",), "is given beside modes", "a number of modes, or a frequency", "remove one of them")
+    if sectors is None:
+        for key in ("interface", "interface_diameters", "compare_diameters"):
+            if key in section.model_fields_set:
+                report.wrong((key,), "is of no sector of a wheel", "a model with sectors", "remove the key")
+        return
+    for key in ("interface_diameters", "compare_diameters"):
+        for index, given in enumerate(getattr(section, key) or ()):
+            if given > sectors // 2:
+                report.wrong((key, index), "is no nodal diameter of the wheel", f"0 to {sectors // 2}", "remove it")
+    if section.error_at is not None:
+        expected = "a whole structure: a sector's error is stated for its linear waves"
+        report.wrong(("error_at",), "is not estimated for a sector", expected, "remove it; see compare_diameters")
+    if section.interface == "modes" and section.interface_diameters is None:
+        shown = sorted(_spatial_indices(analyses, sectors)) or [1]
+        fix = f"interface_diameters = {shown}, those of the first and third harmonic of the analyses"
+        report.wrong(("interface",), "has no waves to come from", "their nodal diameters", fix)
+    if section.interface == "whole" and section.interface_diameters is not None:
+        report.wrong(("interface_diameters",), "has no effect", "interface modes", 'add `interface = "modes"`')
+
+
+def _spatial_indices(analyses: Analyses, sectors: int) -> set[int]:
+    """Nodal diameters of the first and third harmonic of the analyses' waves."""
+    given = [getattr(analysis, "nodal_diameter", None) for analysis in analyses.values()]
+    indices = {n * d % sectors for d in given if d is not None for n in (1, 3)}
+    return {min(index, sectors - index) for index in indices}
 
 
 def check_preloads(

@@ -141,13 +141,15 @@ def _add_view(commands: Any) -> None:
         "view",
         help="write the motion over a period and the contact pairs for ParaView",
         description="Writes <analysis>.vtkhdf, the mesh with its displacement at phases of the period, and"
-        " <analysis>_contact.vtkhdf, the contact pairs with forces, status and work. Several points follow each other.",
+        " <analysis>_contact.vtkhdf, the contact pairs with forces, status and work. Several points follow each other."
+        " Of a sector the whole wheel is written, sector by sector.",
     )
     view.add_argument("folder", type=Path, metavar="RUNDIR", help="folder of the run")
     view.add_argument("--analysis", metavar="NAME", help="mode or forced response (default: the first)")
     which = view.add_mutually_exclusive_group()
     which.add_argument("--point", type=int, nargs="+", default=[], metavar="N", help="points of the branch")
     which.add_argument("--amplitude", type=float, nargs="+", default=[], metavar="A", help="nearest kept points [m]")
+    view.add_argument("--sectors", type=int, nargs="+", default=[], metavar="J", help="of a wheel (default: all)")
     view.add_argument("--phases", type=int, default=32, metavar="N", help="steps of a period (default 32)")
     view.add_argument("--scale", default="auto", metavar="X", help="enlargement in the field warp (default auto)")
     view.add_argument("--linear", action="store_true", help="eight linear hexahedra for each triquadratic one")
@@ -261,6 +263,7 @@ def _view(options: argparse.Namespace) -> int:
         points=options.point,
         amplitudes=options.amplitude,
         linear=options.linear,
+        sectors=options.sectors,
         out=options.out,
     )
     on_first_rank(comm, lambda: view_run(options.folder, chosen))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -41,6 +41,15 @@ class ContactHistory:
     @property
     def is_3d(self) -> bool:
         return bool(self.f.shape[1] == 3)
+
+    def delayed(self, samples: int) -> ContactHistory:
+        """The same motion so many samples later."""
+        u, v, f = (np.roll(values, samples, axis=0) for values in (self.u, self.v, self.f))
+        return replace(self, u=u, v=v, f=f)
+
+    def of_pairs(self, pairs: slice) -> ContactHistory:
+        """Of some pairs alone."""
+        return replace(self, u=self.u[..., pairs], v=self.v[..., pairs], f=self.f[..., pairs])
 
     @property
     def normal_force(self) -> Array:

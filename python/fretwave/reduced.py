@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -34,6 +34,13 @@ class ReductionReport:
         reduced / full - 1.
     wall_s : float
         Of the reduction; `compare_wall_s` that of the comparison.
+    interface : int
+        Coordinates of one face of a sector.
+    waves : list of dict
+        Of a sector: the comparison for each nodal diameter, contact stuck and sliding (`fretwave.WaveError`); that of
+        the first stands above.
+    wave_lines : list of str
+        The same for the log.
     """
 
     unreduced: int
@@ -45,13 +52,26 @@ class ReductionReport:
     relative: list[float]
     wall_s: float
     compare_wall_s: float
+    interface: int = 0
+    waves: list[dict[str, Any]] = field(default_factory=list)
+    wave_lines: list[str] = field(default_factory=list)
 
     def plain(self) -> dict[str, Any]:
         """For run.json and results.h5."""
-        return asdict(self)
+        return {key: value for key, value in asdict(self).items() if key != "wave_lines"}
 
-    def line(self) -> str:
-        """One line for the log."""
+    def lines(self) -> list[str]:
+        """For the log: one line, and one for each wave of a sector that was compared."""
+        if self.interface:
+            text = (
+                f"reduction: {self.unreduced} dofs to {self.kept} kept, {self.interface} of each face and"
+                f" {self.component_modes} component modes (up to {self.highest_component_hz:.4g} Hz),"
+                f" {self.wall_s:.1f} s"
+            )
+            return [text, *(f"reduction: {line}" for line in self.wave_lines)]
+        return [self._line()]
+
+    def _line(self) -> str:
         text = (
             f"reduction: {self.unreduced} dofs to {self.kept} kept and {self.component_modes} component modes"
             f" (up to {self.highest_component_hz:.4g} Hz), {self.wall_s:.1f} s"
@@ -96,6 +116,10 @@ def reduce_case(case: Case, comm: Any, modes: int | None = None) -> Case:
     """
     if case.reduction is None:
         return case
+    if case.neighbours is not None:
+        from .reduced_sector import reduce_sector_case
+
+        return reduce_sector_case(case, comm, modes)
     began = time.perf_counter()
     with reduction_of(case, case.reduction, comm, modes) as reduction:
         small = _on(case, reduction)

@@ -185,7 +185,8 @@ class Runner:
         """Solve on the reduced model from here on, when the case asks for one; its error is kept."""
         self.case = reduce_case(self.case, self.comm)
         if self.case.reduced is not None:
-            self.console.line(self.case.reduced.line())
+            for line in self.case.reduced.lines():
+                self.console.line(line)
             self.folder.record["reduction"] = self.case.reduced.plain()
 
     def _check_needs(self, names: Sequence[str]) -> None:

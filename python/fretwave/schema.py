@@ -67,6 +67,21 @@ class ReductionSection(Section):
     modes: Optional[int] = key("number of component modes (10 unless told)", example="10", default=None, ge=0)
     up_to_hz: Optional[Positive] = key("instead of modes: all component modes up to here", "Hz", "5000.0", default=None)
     compare: int = key("linear modes compared with the unreduced model, 0 for none", example="5", default=5, ge=0)
+    interface: Literal["whole", "modes"] = key(
+        "faces of a sector: kept whole, or moving in modes that waves of the unreduced sector give",
+        example='"modes"',
+        default="whole",
+    )
+    interface_diameters: Optional[list[Annotated[int, Field(ge=0)]]] = key(
+        "nodal diameters of the waves that give interface modes", example="[4, 12]", default=None, min_length=1
+    )
+    interface_waves: int = key("lowest waves of each, stuck and as many sliding", example="10", default=10, ge=1)
+    interface_tolerance: Positive = key(
+        "singular values of interface modes that are kept, over the largest", "-", "1e-5", default=1e-5, lt=1
+    )
+    compare_diameters: Optional[list[Annotated[int, Field(ge=0)]]] = key(
+        "nodal diameters compared (those of the analyses and of the interface modes)", example="[4, 8]", default=None
+    )
     error_at: Optional[Positive] = key(
         "amplitude at which each mode's error against the unreduced model is estimated", "m", "1e-3", default=None
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -26,6 +26,30 @@ WHOLE = "sector"
 
 
 @dataclass(frozen=True)
+class CutSector:
+    """A sector as it was given, both faces free.
+
+    Attributes
+    ----------
+    origin : Origin
+        On all dofs of the sector.
+    contacts : list of ContactSpec
+    low, high : (n_face,) matching dofs
+    """
+
+    origin: Origin
+    contacts: list[ContactSpec]
+    low: Any
+    high: Any
+
+    @property
+    def axis(self) -> str | None:
+        """Of the wheel, where dofs of the faces are Cartesian components: not those that a builder has reduced."""
+        built = self.origin.built
+        return None if built is None or built.expansion is not None else built.axis
+
+
+@dataclass(frozen=True)
 class Neighbours:
     """What ties the sector of a case to the next ones.
 
@@ -39,6 +63,8 @@ class Neighbours:
         As `fretwave.Sector` has them: dofs of the sector with both faces.
     parts : {name: (n_full, n_full)}
         Shares of K that a mistuning may vary, on the sector with both faces.
+    cut : CutSector
+        The sector with both faces.
     """
 
     sectors: int
@@ -46,6 +72,7 @@ class Neighbours:
     contacts: Mapping[str, Mapping[int, Any]]
     ties: Mapping[int, Any]
     parts: Mapping[str, Any]
+    cut: CutSector
 
     def with_own(self, letter: str, own: Any) -> dict[int, Any]:
         """The term as `fretwave.Model` takes it."""
@@ -73,12 +100,11 @@ def tie(
         _wrong(source, "sectors", "needs both faces", 'add `low = ["..."]` and `high = ["..."]`', found)
         return origin, contacts, None
     try:
-        sector = _sector(origin, contacts, faces, number)
+        return fold(CutSector(origin, contacts, *faces), number)
     except InputError as error:
         key = "high" if section.high else "sectors" if section.sectors else "builder"
         found.append(InputError(error.what, source.where(("model", key)), error.measured, error.expected, error.fix))
         return origin, contacts, None
-    return _folded(origin, contacts, sector, *faces)
 
 
 def _wrong(source: Source, key: str, what: str, fix: str, found: Found) -> None:
@@ -101,22 +127,20 @@ def _face(name: str, section: ModelSection, source: Source, origin: Origin, foun
     return np.array([known[dof] for dof in names if dof in known], dtype=np.intp)
 
 
-def _sector(origin: Origin, contacts: Sequence[ContactSpec], faces: Sequence[Any], number: int) -> Sector:
+def _sector(cut: CutSector, number: int) -> Sector:
     from .cyclic import Sector
     from .model import Contact
 
-    loaded = {letter: matrix.values for letter, matrix in origin.matrices.items()}
-    pairs = [Contact(c.law, c.rows, c.parameters, c.name) for c in contacts]
-    axis = origin.built.axis if origin.built else None
-    low, high = faces
-    return Sector.from_faces(loaded["M"], loaded["K"], low, high, number, loaded.get("C"), pairs, axis)
+    loaded = {letter: matrix.values for letter, matrix in cut.origin.matrices.items()}
+    pairs = [Contact(c.law, c.rows, c.parameters, c.name) for c in cut.contacts]
+    return Sector.from_faces(loaded["M"], loaded["K"], cut.low, cut.high, number, loaded.get("C"), pairs, cut.axis)
 
 
-def _folded(
-    origin: Origin, contacts: Sequence[ContactSpec], sector: Sector, low: Any, high: Any
-) -> tuple[Origin, list[ContactSpec], Neighbours]:
+def fold(cut: CutSector, number: int) -> tuple[Origin, list[ContactSpec], Neighbours]:
+    """The high face tied to the low face of the next of so many sectors, and left out."""
     from .model import by_sector
 
+    sector, origin, contacts, low, high = _sector(cut, number), cut.origin, cut.contacts, cut.low, cut.high
     kept = np.setdiff1d(np.arange(len(origin.dofs)), high)
     parts = {letter: by_sector(getattr(sector, letter)) for letter in origin.matrices}
     rows = {contact.name: by_sector(contact.B) for contact in sector.contacts}
@@ -129,7 +153,7 @@ def _folded(
         built = replace(built, dofs=named, loads=loads, coordinates=None, displacements=None, hexahedra=None)
     terms, ahead = ({name: _without_own(part) for name, part in given.items()} for given in (parts, rows))
     varied = {**(origin.built.parts if origin.built else {}), WHOLE: origin.matrices["K"].values}
-    neighbours = Neighbours(sector.sectors, terms, ahead, sector.ties, varied)
+    neighbours = Neighbours(sector.sectors, terms, ahead, sector.ties, varied, cut)
     resolved = {
         **origin.resolved,
         "model.sectors": sector.sectors,
@@ -144,7 +168,7 @@ def _without_own(parts: Mapping[int, Any]) -> dict[int, Any]:
 
 
 def check_waves(
-    source: Source, analyses: Mapping[int, AnalysisSection], neighbours: Neighbours | None, reduced: bool, found: Found
+    source: Source, analyses: Mapping[int, AnalysisSection], neighbours: Neighbours | None, found: Found
 ) -> None:
     """Analyses of a sector say their nodal diameter; no others do; none integrates in time."""
 
@@ -154,10 +178,6 @@ def check_waves(
         text = None if measured is None else f"{key} = {toml(measured)}"
         found.append(InputError(f"{source.name(path[:-1])} {what}", source.where(path), text, expected, fix))
 
-    if neighbours is not None and reduced:
-        where = source.where(("reduction",))
-        fix = "remove [reduction]"
-        found.append(InputError("a sector of a wheel cannot be reduced here", where, expected="the sector", fix=fix))
     for number, analysis in analyses.items():
         given = getattr(analysis, "nodal_diameter", None)
         if neighbours is None:

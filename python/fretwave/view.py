@@ -2,15 +2,12 @@
 
 Two files: the grid at rest with its displacement at phases of the period, and the contact pairs as points. Several
 points of a branch follow each other in time, a period each, on one grid. The displacement leaves out the factor
-e^{-n beta t} of a decaying mode, as the results do. A run does not keep its reduction: it is made again from the case,
-and is the same.
+e^{-n beta t} of a decaying mode, as the results do. A wheel is written sector by sector, one in memory at a time.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from functools import partial
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -21,55 +18,20 @@ from scipy.spatial import cKDTree
 from .built import BuiltContact
 from .casefile import Case
 from .contact_history import OPEN, SLIP, STICK, ContactHistory
-from .errors import InputError
-from .fe.mesh import VTK_LATTICE
 from .harmonic_motion import complex_amplitudes
-from .reduced import reduction_of
 from .results import open_results
 from .run import reload_case
 from .source import display
 from .view_choice import Choice, ViewOptions, read_choice
-from .vtkhdf import HEXAHEDRON, QUADRATIC_HEXAHEDRON, TRIQUADRATIC_HEXAHEDRON, VERTEX, GridFile, linear_cells
+from .view_motion import Scene, Shape, geometry, mesh_of, scene_of
+from .vtkhdf import VERTEX, GridFile
 
 Array = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.intp]
 
 #: Highest harmonic shown as fields of its own.
 SHOWN_HARMONICS = 3
-#: Largest displacement as drawn, as a share of the model's size, where no scale is given.
-DRAWN = 0.1
-#: Relative difference of a frequency that rounding explains.
-SAME = 1e-6
 STATUS = {"stick": STICK, "slip": SLIP, "open": OPEN}
-
-
-@dataclass(frozen=True)
-class Shape:
-    """The motion of all nodes.
-
-    Attributes
-    ----------
-    nodes : (n_nodes, 3) [m]
-    rest : (n_nodes, 3) displacement at rest [m]
-    coefficients : (n_points, n_nodes, 3, m) [m]
-    basis : (n_phases, m)
-        Value of each coefficient's function of time.
-    """
-
-    nodes: Array
-    rest: Array
-    coefficients: Array
-    basis: Array
-
-    def displacements(self, chosen: Any = slice(None)) -> Iterator[Array]:
-        """(n_chosen, 3) of some nodes in all steps, one after the other."""
-        return (values[chosen] @ row for values in self.coefficients for row in self.basis)
-
-    def natural_scale(self) -> float:
-        """Draws the largest displacement from rest as a tenth of the model's size."""
-        size = float(np.linalg.norm(np.ptp(self.nodes, axis=0)))
-        largest = max(float(np.linalg.norm(x - self.rest, axis=1).max()) for x in self.displacements())
-        return float(f"{DRAWN * size / largest:.2g}") if largest > 0 and size > 0 else 1.0
 
 
 def view_run(folder: Path, options: ViewOptions, say: Callable[[str], None] = print) -> list[Path]:
@@ -78,7 +40,8 @@ def view_run(folder: Path, options: ViewOptions, say: Callable[[str], None] = pr
     Raises
     ------
     InputError
-        The folder holds no run, its case has changed, the model has no nodes, or there is no such analysis or point.
+        The folder holds no run, its case has changed, the model has no nodes, or there is no such analysis, point or
+        sector.
     """
     case, _ = reload_case(folder, kept=True)
     nodes, cells = mesh_of(case, options.linear)
@@ -86,143 +49,125 @@ def view_run(folder: Path, options: ViewOptions, say: Callable[[str], None] = pr
         choice = read_choice(file, folder, case, options)
     for line in choice.lines():
         say(line)
-    shape = expand(case, choice, nodes)
-    scale = options.scale if options.scale is not None else shape.natural_scale()
     out = options.out or folder / f"{choice.name}.vtkhdf"
-    write_grid(out, shape, cells, choice, scale)
-    say(f"{display(out)}: {len(nodes)} nodes, {len(cells[0])} cells, {len(choice.times)} steps")
-    placed = _placed(case, choice)
-    for name in choice.contacts:
-        if name not in placed:
-            say(f"contact '{name}' is not shown: the model has no places of its pairs")
     pairs = out.with_name(f"{out.stem}_contact{out.suffix}")
-    if placed:
-        write_pairs(pairs, shape, placed, choice, scale)
-        say(f"{display(pairs)}: {sum(contact.n_pairs for contact in placed.values())} contact pairs")
-    else:
-        pairs.unlink(missing_ok=True)  # of another point
+    with scene_of(case, choice, nodes, options.sectors) as scene:
+        scale = options.scale if options.scale is not None else scene.natural_scale()
+        write_grid(out, scene, cells, scale)
+        say(f"{display(out)}: {_size(scene, len(nodes), 'nodes')}, {len(cells[0])} cells, {len(choice.times)} steps")
+        placed = _placed(case, choice, say)
+        if placed:
+            shown = write_pairs(pairs, scene, placed, scale)
+            count = sum(contact.n_pairs for contact in placed.values())
+            alone = "" if shown == list(scene.sectors) else " (the samples of a period are no multiple of the sectors)"
+            say(f"{display(pairs)}: {f'{len(shown)} times ' * (len(shown) > 1)}{count} contact pairs{alone}")
+        else:
+            pairs.unlink(missing_ok=True)  # of another point
     say(f"ParaView (5.12 or later): 'Warp By Vector' with the field warp draws displacements {scale:g} times as large")
     return [out, pairs] if placed else [out]
 
 
-def mesh_of(case: Case, linear: bool = False) -> tuple[Array, tuple[IntArray, int]]:
-    """Nodes (n_nodes, 3), and cells (n_cells, m) with VTK's number of their kind; points where there are no cells."""
-    built = case.built
-    if case.neighbours is not None:
-        found, fix = f"a sector of {case.neighbours.sectors}", "`fretwave plot` draws its curves"
-        raise InputError("sectors of wheels cannot be viewed yet", display(case.path), found, "a whole structure", fix)
-    if built is None or built.coordinates is None:
-        matrices = "only matrices" if built is None else "no coordinates of nodes with three displacements each"
-        raise InputError(
-            "the model cannot be drawn: it has no nodes",
-            display(case.path),
-            matrices,
-            "a builder that gives coordinates (and hexahedra), or a model file with coordinates",
-            "give BuiltModel its coordinates, or import with --coordinates; `fretwave plot` needs neither",
-        )
-    cells = built.hexahedra
-    if cells is None:
-        return built.coordinates, (np.arange(len(built.coordinates))[:, None], VERTEX)
-    if cells.shape[1] == 27 and linear:
-        return built.coordinates, (linear_cells(cells, VTK_LATTICE), HEXAHEDRON)
-    return built.coordinates, (
-        cells,
-        {8: HEXAHEDRON, 20: QUADRATIC_HEXAHEDRON, 27: TRIQUADRATIC_HEXAHEDRON}[cells.shape[1]],
-    )
+def _size(scene: Scene, count: int, what: str) -> str:
+    sectors = f"{len(scene.sectors)} of {scene.around} sectors, each " if scene.around > 1 else ""
+    return f"{sectors}{count} {what}"
 
 
-def expand(case: Case, choice: Choice, nodes: Array) -> Shape:
-    """Reduced coordinates back to all nodes (x = T x_r); as they are without reduction."""
-    from mpi4py import MPI
-
-    n_points, n, m = choice.coefficients.shape
-    columns = np.column_stack([choice.rest, np.moveaxis(choice.coefficients, 1, 0).reshape(n, -1)])
-    if case.reduction is not None:
-        with reduction_of(case, case.reduction, MPI.COMM_SELF) as reduction:
-            _check_same(choice, reduction, case)
-            columns = reduction.expand(columns)
-    if case.built is not None and case.built.displacements is not None:  # held dofs, -1, read the row of zeros
-        columns = np.vstack([columns, np.zeros(columns.shape[1])])[case.built.displacements.ravel()]
-    whole = columns[:, 1:].reshape(len(nodes), 3, n_points, m)
-    return Shape(nodes, columns[:, 0].reshape(-1, 3), np.moveaxis(whole, 2, 0), choice.basis())
-
-
-def _check_same(choice: Choice, reduction: Any, case: Case) -> None:
-    """The last component mode tells whether this is the run's model: a builder may read what a case cannot tell."""
-    then, now = choice.highest_component_hz, reduction.component_hz[-1:].sum()
-    if reduction.size != len(choice.rest) or abs(now - then) > SAME * then:
-        found = f"{reduction.size} coordinates, highest component mode {now:.9g} Hz"
-        expected = f"{len(choice.rest)} coordinates, {then:.9g} Hz, as in the run"
-        raise InputError("the model is no longer that of the run", display(case.path), found, expected, "run it again")
-
-
-def write_grid(path: Path, shape: Shape, cells: tuple[IntArray, int], choice: Choice, scale: float) -> None:
+def write_grid(path: Path, scene: Scene, cells: tuple[IntArray, int], scale: float) -> None:
     """The grid with its displacement, that at rest, and the complex amplitudes of the lowest harmonics."""
+    choice, labels = scene.choice, scene.choice.labels
     with GridFile(path, choice.times) as grid:
-        grid.part(shape.nodes, *cells)
-        _write_motion(grid, shape, slice(None), scale)
+        for sector in scene.sectors:
+            grid.part(scene.nodes @ scene.turn(sector).T, *cells)
         _write_states(grid, choice)
-        grid.point_field("rest_displacement", [shape.rest])
-        flat = shape.coefficients.reshape(len(shape.coefficients), -1, len(choice.labels))
-        amplitudes = [complex_amplitudes(choice.labels, values) for values in flat]
-        for order in (order for order in amplitudes[0] if order <= SHOWN_HARMONICS):
-            for part in ("real", "imag") if order else ("real",):
-                pieces = [getattr(q[order], part).reshape(-1, 3) for q in amplitudes]
-                grid.point_field(f"harmonic_{order}_{part}" if order else "harmonic_0", pieces, choice.point_of_step)
+        write_motion = _motion(grid, scale)
+        rest = grid.field("rest_displacement", 3)
+        orders = [order for order in choice.orders if order <= SHOWN_HARMONICS]
+        names = [(n, part, f"harmonic_{n}_{part}") for n in orders if n for part in ("real", "imag")]
+        names = [(0, "real", "harmonic_0")] * (0 in orders) + names
+        amplitudes = {name: grid.field(name, 3, choice.point_of_step) for *_, name in names}
+        numbers = grid.field("sector", dtype="i4") if scene.around > 1 else None
+        for part, sector in enumerate(scene.sectors):
+            shape = scene.shape(sector)
+            write_motion(part, shape, slice(None))
+            rest(0, part, shape.rest)
+            for point, values in enumerate(shape.coefficients):
+                q = complex_amplitudes(labels, values.reshape(-1, len(labels)))
+                for order, side, name in names:
+                    amplitudes[name](point, part, getattr(q[order], side).reshape(-1, 3))
+            if numbers is not None:
+                numbers(0, part, np.full(len(shape.nodes), sector))
 
 
-def write_pairs(path: Path, shape: Shape, placed: Mapping[str, BuiltContact], choice: Choice, scale: float) -> None:
-    """Contact pairs as points that move with the node next to them."""
-    places = np.concatenate([np.asarray(contact.points) for contact in placed.values()])
-    _, near = cKDTree(shape.nodes).query(places)
-    with GridFile(path, choice.times) as grid:
-        for contact in placed.values():
-            grid.part(np.asarray(contact.points), np.arange(contact.n_pairs)[:, None], VERTEX)
-        _write_motion(grid, shape, near, scale)
-        _write_states(grid, choice)
-        grid.point_field("contact", [np.full(c.n_pairs, float(k)) for k, c in enumerate(placed.values())])
-        grid.point_field("pair", [np.arange(float(contact.n_pairs)) for contact in placed.values()])
-        _write_statuses(grid, [choice.contacts[name] for name in placed], list(placed.values()), choice)
+def write_pairs(path: Path, scene: Scene, placed: Mapping[str, BuiltContact], scale: float) -> list[int]:
+    """Contact pairs as points that move with the node next to them; returns the sectors whose pairs are shown.
 
-
-def _write_statuses(
-    grid: GridFile, histories: Sequence[Sequence[ContactHistory]], given: Sequence[BuiltContact], choice: Choice
-) -> None:
-    """Of every step: forces, gap, status; of every period: shares of the status, dissipated work.
-
-    Parameters
-    ----------
-    histories : per contact, per point
+    Other sectors of a wave are shown where their delay is a whole number of samples.
     """
-    steps, period = np.arange(len(choice.times)), choice.point_of_step
-    all_points = range(len(choice.points))
-
-    def over_steps(name: str) -> Iterable[Any]:
-        for point in all_points:
-            rows = [getattr(contact[point], name)[choice.samples] for contact in histories]
-            yield from (np.concatenate(parts) for parts in zip(*rows))
-
-    def over_periods(values: Callable[[ContactHistory], Any]) -> Iterable[Any]:
-        return (np.concatenate([values(contact[point]) for contact in histories]) for point in all_points)
-
-    for name in ("normal_force", "tangential_force", "gap"):
-        grid.point_field(name, over_steps(name), steps)
-    if all(contact.frames is not None for contact in given) and all(h.is_3d for c in histories for h in c):
-        frames = np.concatenate([np.asarray(contact.frames) for contact in given])
-        grid.point_field("normal", [frames[:, 0]])
-    grid.point_field("dissipated_work", over_periods(lambda history: history.work), period)
-    if all(history.status is not None for contact in histories for history in contact):
-        grid.point_field("status", over_steps("status"), steps, "i1")
-        for word, number in STATUS.items():
-            grid.point_field(f"share_{word}", over_periods(partial(ContactHistory.share, status=number)), period)
+    choice, contacts = scene.choice, list(placed.values())
+    sectors = list(scene.sectors) if choice.whole_delays(scene.around) else [0]
+    near = [cKDTree(scene.nodes).query(np.asarray(contact.points))[1] for contact in contacts]
+    with GridFile(path, choice.times) as grid:
+        for sector in sectors:
+            for contact in contacts:
+                grid.part(
+                    np.asarray(contact.points) @ scene.turn(sector).T, np.arange(contact.n_pairs)[:, None], VERTEX
+                )
+        _write_states(grid, choice)
+        write_motion, write_pair = _motion(grid, scale), _pair_fields(grid, list(placed), contacts, choice)
+        for place, sector in enumerate(sectors):
+            shape = scene.shape(sector)
+            for number, name in enumerate(placed):
+                part = place * len(placed) + number
+                write_motion(part, shape, near[number])
+                histories = choice.histories(name, sector, scene.around)
+                write_pair(part, number, histories, scene.turn(sector), sector)
+    return sectors
 
 
-def _write_motion(grid: GridFile, shape: Shape, chosen: Any, scale: float) -> None:
-    """True displacement, and the one from rest enlarged for the eye."""
+def _pair_fields(
+    grid: GridFile, names: Sequence[str], contacts: Sequence[BuiltContact], choice: Choice
+) -> Callable[..., None]:
+    """Of every step: forces, gap, status; of every period: shares of the status, dissipated work."""
+    first = [history for name in names for history in choice.contacts[name]]
+    steps, period, samples = np.arange(len(choice.times)), choice.point_of_step, choice.samples
+    fixed = {name: grid.field(name) for name in ("contact", "pair", "sector")}
+    moving = {name: grid.field(name, 0, steps) for name in ("normal_force", "tangential_force", "gap")}
+    over_period = {"dissipated_work": grid.field("dissipated_work", 0, period)}
+    framed = all(contact.frames is not None for contact in contacts) and all(history.is_3d for history in first)
+    normal = grid.field("normal", 3) if framed else None
+    if all(history.status is not None for history in first):
+        moving["status"] = grid.field("status", 0, steps, "i1")
+        over_period.update({f"share_{word}": grid.field(f"share_{word}", 0, period) for word in STATUS})
+
+    def write(part: int, number: int, histories: Sequence[ContactHistory], turn: Array, sector: int) -> None:
+        n = contacts[number].n_pairs
+        for name, values in (("contact", np.full(n, float(number))), ("pair", np.arange(float(n)))):
+            fixed[name](0, part, values)
+        fixed["sector"](0, part, np.full(n, float(sector)))
+        if normal is not None:
+            normal(0, part, np.asarray(contacts[number].frames)[:, 0] @ turn.T)
+        for point, history in enumerate(histories):
+            for name, field in moving.items():
+                for step, values in enumerate(getattr(history, name)[samples]):
+                    field(point * len(samples) + step, part, values)
+            for name, field in over_period.items():
+                word = name[len("share_") :]
+                field(point, part, history.share(STATUS[word]) if word in STATUS else history.work)
+
+    return write
+
+
+def _motion(grid: GridFile, scale: float) -> Callable[[int, Shape, Any], None]:
+    """Writes the true displacement of a part, and the one from rest enlarged for the eye."""
     steps = np.arange(grid.steps)
-    grid.point_field("displacement", shape.displacements(chosen), steps)
-    warps = (scale * (x - shape.rest[chosen]) for x in shape.displacements(chosen))
-    grid.point_field("warp", warps, steps, "f4")
+    true, warp = grid.field("displacement", 3, steps), grid.field("warp", 3, steps, "f4")
+
+    def write(part: int, shape: Shape, chosen: Any) -> None:
+        for step, x in enumerate(shape.displacements(chosen)):
+            true(step, part, x)
+            warp(step, part, scale * (x - shape.rest[chosen]))
+
+    return write
 
 
 def _write_states(grid: GridFile, choice: Choice) -> None:
@@ -231,7 +176,10 @@ def _write_states(grid: GridFile, choice: Choice) -> None:
     grid.field_data("phase", np.tile(choice.phases, len(choice.points)))
 
 
-def _placed(case: Case, choice: Choice) -> dict[str, BuiltContact]:
+def _placed(case: Case, choice: Choice, say: Callable[[str], None]) -> dict[str, BuiltContact]:
     """Contacts with known places of their pairs."""
-    built = case.built.contacts if case.built else {}
+    built = geometry(case).contacts
+    for name in choice.contacts:
+        if name not in built or built[name].points is None:
+            say(f"contact '{name}' is not shown: the model has no places of its pairs")
     return {name: built[name] for name in choice.contacts if name in built and built[name].points is not None}

@@ -16,6 +16,7 @@ from .casefile import Case
 from .contact_history import ContactHistory
 from .errors import InputError
 from .run import acting_parameters
+from .sectors import nodal_diameter
 from .source import display, nearest
 
 Array = npt.NDArray[np.float64]
@@ -38,6 +39,7 @@ class ViewOptions:
     phases : number of steps of a period
     scale : factor on the displacement in the field ``warp``; None chooses one
     linear : eight linear hexahedra in place of a triquadratic one
+    sectors : those shown of a wheel; empty for all
     """
 
     analysis: str | None = None
@@ -46,6 +48,7 @@ class ViewOptions:
     phases: int = 32
     scale: float | None = None
     linear: bool = False
+    sectors: Sequence[int] = ()
     out: Path | None = None
 
     @classmethod
@@ -86,6 +89,9 @@ class Choice:
     contacts : histories per point, by the contact's name; none unless every point keeps them
     without : points that do not keep the motion of their contacts
     highest_component_hz : of the run's reduction, 0 without component modes
+    diameters : nodal diameters of the wave on one sector, per point; 0 for a structure
+    wheel : the coordinates are those of all sectors of a wheel, one after the other
+    sample_count : of a period
     """
 
     name: str
@@ -100,6 +106,9 @@ class Choice:
     contacts: dict[str, list[ContactHistory]]
     without: list[int]
     highest_component_hz: float = 0.0
+    diameters: Sequence[int] = ()
+    wheel: bool = False
+    sample_count: int = 1
 
     @property
     def times(self) -> Array:
@@ -115,6 +124,35 @@ class Choice:
         """Value (n_phases, m) of each column's function of time: x = sum Qc_n cos n tau + Qs_n sin n tau."""
         waves = [(np.sin if text.endswith("s") else np.cos, int(text.rstrip("cs"))) for text in self.labels]
         return np.column_stack([wave(order * self.phases) for wave, order in waves])
+
+    @property
+    def orders(self) -> list[int]:
+        """Harmonics, ascending."""
+        return sorted({int(text.rstrip("cs")) for text in self.labels})
+
+    def delay(self, angle: float) -> Array:
+        """D (m, m): coefficients @ D are those of the motion x(tau - angle).
+
+        Of each harmonic (Qc - i Qs) e^{-i n angle}.
+        """
+        columns = {text: k for k, text in enumerate(self.labels)}
+        D = np.eye(len(self.labels))
+        for n in filter(None, self.orders):
+            both, c, s = [columns[f"{n}c"], columns[f"{n}s"]], np.cos(n * angle), np.sin(n * angle)
+            D[np.ix_(both, both)] = [[c, s], [-s, c]]
+        return D
+
+    def whole_delays(self, sectors: int) -> bool:
+        """In a wave every sector is whole samples behind the last one."""
+        return self.wheel or all(self.sample_count * n % sectors == 0 for n in self.diameters)
+
+    def histories(self, name: str, sector: int, sectors: int) -> list[ContactHistory]:
+        """Of a contact in one sector, per point."""
+        if self.wheel:
+            n = self.contacts[name][0].n_pairs // sectors
+            return [history.of_pairs(slice(sector * n, (sector + 1) * n)) for history in self.contacts[name]]
+        shifts = [self.sample_count * n * sector // sectors for n in self.diameters]
+        return [history.delayed(shift) if shift else history for history, shift in zip(self.contacts[name], shifts)]
 
     def lines(self) -> Iterator[str]:
         """Which points are shown, each in a line."""
@@ -157,7 +195,19 @@ def read_choice(file: Any, folder: Path, case: Case, options: ViewOptions) -> Ch
         contacts={} if without else _contacts(group, case, name, rows),
         without=without,
         highest_component_hz=json.loads(group.attrs.get("reduction", "{}")).get("highest_component_hz", 0.0),
+        diameters=_diameters(group, case, name, rows),
+        wheel=case.neighbours is not None and bool(getattr(case.analyses[name], "wheel", False)),
+        sample_count=count,
     )
+
+
+def _diameters(group: Any, case: Case, name: str, rows: Sequence[int]) -> list[int]:
+    """Nodal diameters of the points: those of their rows, where an analysis has several, or of the analysis."""
+    if case.neighbours is None:
+        return [0] * len(rows)
+    if "nodal_diameter" in group["points"]:
+        return [int(group["points/nodal_diameter"][row]) for row in rows]
+    return [nodal_diameter(case.analyses[name])] * len(rows)
 
 
 def _analysis(file: Any, folder: Path, case: Case, asked: str | None) -> str:

@@ -9,7 +9,7 @@ Plain serial h5py. ParaView reads such files from version 5.12 on (VTK 9.3).
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -56,6 +56,7 @@ class GridFile:
             self._table(self._root, name, 0, "i8")
         for name in ("PointData", "FieldData"):
             self._root.create_group(name, track_order=True)
+        self._missing: dict[str, int] = {}
         self._steps(np.asarray(values, dtype=float))
 
     def _steps(self, values: npt.NDArray[np.float64]) -> None:
@@ -121,6 +122,36 @@ class GridFile:
             raise ValueError(f"field {name}: {rows} rows for {shown.max() + 1} states of {self.n_points} points")
         self._root[f"Steps/PointDataOffsets/{name}"] = shown * self.n_points
 
+    def field(
+        self, name: str, columns: int = 0, of_step: npt.ArrayLike | None = None, dtype: str = "f8"
+    ) -> Callable[[int, int, npt.NDArray[Any]], None]:
+        """A field on the points that is written part by part, in any order, after all parts were added.
+
+        Parameters
+        ----------
+        columns : components of a vector, 0 for a number
+        of_step : (n_steps,) int, optional
+            State that each step shows; default: the first in all.
+
+        Returns
+        -------
+        callable
+            write(state, part, values): values (n,) or (n, columns) on the n points of a part.
+        """
+        shown = np.zeros(self.steps, dtype="i8") if of_step is None else np.asarray(of_step, dtype="i8")
+        data = self._table(self._root["PointData"], name, columns, dtype, self.n_points)
+        data.resize((int(shown.max()) + 1) * self.n_points, axis=0)
+        self._root[f"Steps/PointDataOffsets/{name}"] = shown * self.n_points
+        begins = np.append(0, np.cumsum(self._root["NumberOfPoints"][()]))
+        self._missing[name] = len(data)
+
+        def write(state: int, part: int, values: npt.NDArray[Any]) -> None:
+            start = state * begins[-1] + begins[part]
+            data[start : start + begins[part + 1] - begins[part]] = values
+            self._missing[name] -= len(values)
+
+        return write
+
     def field_data(self, name: str, values: npt.ArrayLike) -> None:
         """A number for each step, beside the grid."""
         self._root[f"FieldData/{name}"] = np.asarray(values, dtype=float)
@@ -130,14 +161,17 @@ class GridFile:
         return self
 
     def __exit__(self, kind: Any, *_: object) -> None:
-        if kind is None:
+        missing = [name for name, rows in self._missing.items() if rows]
+        if kind is None and not missing:
             parts = len(self._root["NumberOfPoints"])
             self._root["Steps/NumberOfParts"] = np.full(self.steps, parts, dtype="i8")
         self._file.close()
-        if kind is None:
+        if kind is None and not missing:
             os.replace(self._unfinished, self.path)
         else:
             self._unfinished.unlink(missing_ok=True)
+        if kind is None and missing:
+            raise ValueError(f"fields not written everywhere: {', '.join(missing)}")
 
     @staticmethod
     def _table(group: Any, name: str, columns: int, dtype: str, rows: int = 0) -> Any:

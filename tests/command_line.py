@@ -1,0 +1,16 @@
+"""The command line as tests call it."""
+
+from __future__ import annotations
+
+import sys
+
+from fretwave.cli import main
+
+
+def call(*arguments: str) -> int:
+    """Exit code of ``fretwave ...``; the hook it sets for uncaught errors is taken back."""
+    hook = sys.excepthook
+    try:
+        return main(list(arguments))
+    finally:
+        sys.excepthook = hook
