@@ -18,7 +18,7 @@ from .contacts import ContactSpec, read_contacts
 from .errors import CaseErrors, FretwaveError
 from .origin import Origin, check_physics, load_origin
 from .reduced import ReductionReport, kept_dofs
-from .schema import AnalysisSection, ModelSection, PreloadSection, ReductionSection, Section, StudySection
+from .schema import AnalysisSection, ModelSection, PreloadSection, ReductionSection, Section, StudySection, WearAnalysis
 from .sectors import Neighbours, check_waves, tie
 from .source import Source
 from .validation import toml, validate
@@ -125,7 +125,16 @@ class Case:
 
     def preload_of(self, analysis: AnalysisSection) -> PreloadSection | None:
         """The preload of an analysis: its own, or that of the case."""
-        return getattr(analysis, "preload", None) or self.preload
+        return getattr(self.settings(analysis), "preload", None) or self.preload
+
+    def settings(self, analysis: AnalysisSection) -> AnalysisSection:
+        """The analysis whose model and harmonics an analysis uses: wear takes those of its mode."""
+        if not isinstance(analysis, WearAnalysis):
+            return analysis
+        mode = self.analyses[analysis.mode]
+        own = {key: getattr(analysis, key) for key in ("harmonics", "samples") if getattr(analysis, key) is not None}
+        dampers = analysis.dampers or mode.dampers
+        return mode.model_copy(update={**own, "name": analysis.name, "dampers": dampers})
 
 
 def load_case(

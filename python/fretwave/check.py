@@ -21,6 +21,7 @@ from .schema import (
     ModeAnalysis,
     StaticAnalysis,
     TransientSection,
+    WearAnalysis,
 )
 from .source import display
 
@@ -105,6 +106,9 @@ def _headline(analysis: AnalysisSection) -> str:
         return f"forced response of {analysis.observe}, {low:g} to {high:g} Hz, levels {levels}"
     if isinstance(analysis, StaticAnalysis):
         return f"static state at load factors {', '.join(f'{factor:g}' for factor in analysis.factors)}"
+    if isinstance(analysis, WearAnalysis):
+        amplitudes = ", ".join(f"{amplitude:g}" for amplitude in analysis.amplitude)
+        return f"wear of '{analysis.mode}' at a = {amplitudes} m over {analysis.cycles:g} normalised cycles"
     assert isinstance(analysis, TransientSection)
     kind = analysis.type.replace("_", " ")
     starts = ", ".join(f"{amplitude:g}" for amplitude in analysis.amplitude)

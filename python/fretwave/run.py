@@ -32,6 +32,7 @@ DISPATCH = {
     "forced": ("forced", "run_forced"),
     "free_decay": ("transient", "run_free_decay"),
     "limit_cycle": ("transient", "run_limit_cycle"),
+    "wear": ("wear", "run_wear"),
 }
 
 
@@ -177,7 +178,8 @@ class _Runner:
     def _check_needs(self, names: Sequence[str]) -> None:
         """Time integration needs the results of its mode: from this run, or kept in the folder."""
         for name in names:
-            mode = getattr(self.case.analyses[name], "mode", None)
+            analysis = self.case.analyses[name]
+            mode = analysis.mode if isinstance(analysis, TransientSection) else None
             if mode is None or mode in names or self._kept(mode):
                 continue
             raise InputError(
@@ -230,7 +232,8 @@ class _Runner:
             self.folder.start()
 
         preload = self.case.preload_of(analysis)
-        built = build_model(self.case, self._dampers(analysis), self.comm, preload, nodal_diameter(analysis))
+        wave = nodal_diameter(self.case.settings(analysis))
+        built = build_model(self.case, self._dampers(analysis), self.comm, preload, wave)
         with built as model, options.inserted():
             context = AnalysisContext(
                 model,
@@ -255,7 +258,7 @@ class _Runner:
         """The analysis' dampers; a time integration without any takes those of its mode."""
         if isinstance(analysis, TransientSection) and not analysis.dampers:
             return list(self.case.analyses[analysis.mode].dampers)
-        return list(analysis.dampers)
+        return list(self.case.settings(analysis).dampers)
 
     def _note(self, name: str, context: AnalysisContext, outcome: Outcome, seconds: float) -> None:
         """Print the outcome and keep it in run.json."""

@@ -9,16 +9,21 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
-#: f(x, stage): the rate at state x; `stage` is its place c in the step (0 begin, 1 end), for a first guess.
-Rate = Callable[[Array, float], Array]
-
 #: Past differences that Anderson's acceleration keeps, and the iterations after which a stage is given up.
 WINDOW, MOST = 8, 40
+
+
+class Rate(Protocol):
+    """The rate at state x; `stage` is its place c in the step (0 begin, 1 end), for a first guess."""
+
+    def __call__(self, x: Array, stage: float) -> Array: ...
 
 
 @dataclass(frozen=True)
@@ -107,7 +112,7 @@ def take(tableau: Tableau, f: Rate, x: Array, rate: Array, h: float, tolerance: 
         known = x + h * sum(a * k for a, k in zip(row, rates))
         own = row[len(rates)]
         if own:
-            x_stage, now = _implicit(lambda at, c=c: f(at, c), known, h * own, rates[-1], tolerance)
+            x_stage, now = _implicit(partial(f, stage=c), known, h * own, rates[-1], tolerance)
         else:
             x_stage, now = known, f(known, c)
         rates.append(now)

@@ -139,7 +139,7 @@ class WornMode:
         return self.problem.core.gap_product(y, self._local(change))
 
     def tangent(self, state: WornState, change: Array) -> PETSc.Vec:
-        """dy for a change of the depths at fixed amplitude, by one solve with the bordered Jacobian; zero if it fails."""
+        """dy for a change of the depths at fixed amplitude: one solve with the bordered Jacobian, zero if it fails."""
         self.wear(state.depth)
         r = self.gap_product(state.y, change)
         b, t = self.problem.core.unknowns(), self.problem.core.unknowns()
@@ -174,7 +174,7 @@ class WearControl:
     Attributes
     ----------
     stepper : name in `fretwave.steppers.STEPPERS`
-    tolerance : largest estimated error of a step in depth, as loss of normal load relative to the mean load at the start
+    tolerance : largest estimated error of a step's depths, as loss of normal load relative to the mean at the start
     pressure_change : largest change of a pair's mean normal force in a step, relative to the same
     first, fixed : length of the first step [cycles]; `fixed` for all steps, without control
     """
@@ -214,6 +214,7 @@ class Wear:
     report_at : cycles that are met exactly
     depth, at, step, load_scale : (n_pairs,), cycles, length, [N]
         To go on from an earlier march's point; by default the surfaces are new.
+    outcome : Newton and linear iterations and residual that y was found with
     """
 
     def __init__(
@@ -227,6 +228,7 @@ class Wear:
         at: float = 0.0,
         step: float | None = None,
         load_scale: float | None = None,
+        outcome: Sequence[Any] = (0, 0, 0.0),
     ) -> None:
         self.mode, self.control, self.cycles = mode, control or WearControl(), cycles
         if self.control.stepper not in STEPPERS:
@@ -236,7 +238,7 @@ class Wear:
         self.eta, self.reason, self.converged = at, "", False
         start = np.zeros(len(mode.areas)) if depth is None else np.asarray(depth, dtype=float)
         mode.wear(start)
-        self.state = mode.measure(y.copy(), start)
+        self.state = mode.measure(y.copy(), start, outcome)
         closed = self.state.load[self.state.load > 0]
         self.load_scale = load_scale or (float(closed.mean()) if len(closed) else 1.0)
         self.depth_scale = self.load_scale / mode.stiffness
@@ -249,7 +251,7 @@ class Wear:
         return 0.1 * self.control.pressure_change / fastest if fastest else self.cycles
 
     def __iter__(self) -> Iterator[WearPoint]:
-        yield WearPoint(self.eta, 0.0, self.state, 0.0, "start", 0, 0)
+        yield WearPoint(self.eta, 0.0, self.state, 0.0, "start", self.state.newton, self.state.linear)
         yield from self.go_on()
 
     def go_on(self) -> Iterator[WearPoint]:
@@ -258,6 +260,8 @@ class Wear:
             point = self._advance()
             if point is None:
                 return
+            if self._finished():
+                point.event = "stop"
             yield point
 
     def _finished(self) -> bool:
@@ -288,10 +292,8 @@ class Wear:
                 continue
             error = float((np.abs(found) / (self.depth_scale + state.depth)).max(initial=0.0))
             change = float(np.abs(state.load - self.state.load).max(initial=0.0)) / self.load_scale
-            share = max(
-                (error / self.control.tolerance) ** (1 / self.tableau.error_order),
-                change / self.control.pressure_change,
-            )
+            by_error = (error / self.control.tolerance) ** (1 / self.tableau.error_order)
+            share = max(by_error, change / self.control.pressure_change)
             if self.control.fixed or share <= 1:
                 tangent.destroy()
                 return self._accept(h, target if meets else self.eta + h, state, error, share)
@@ -316,17 +318,17 @@ class Wear:
         """The error's estimate and the mode at the end; each stage is predicted from the last along the tangent."""
         last, place = self.state, 0.0
 
-        def rate(depth: Array, c: float) -> Array:
+        def rate(x: Array, stage: float) -> Array:
             nonlocal last, place
             guess = last.y.copy()
-            guess.axpy((c - place) * h, tangent)
+            guess.axpy((stage - place) * h, tangent)
             try:
-                now = self.mode.solve(depth, guess)
+                now = self.mode.solve(x, guess)
             finally:
                 guess.destroy()
             if last is not self.state:
                 last.y.destroy()
-            last, place = now, c
+            last, place = now, stage
             self._spent[0] += now.newton
             self._spent[1] += now.linear
             return now.rate
