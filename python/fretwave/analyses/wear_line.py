@@ -71,6 +71,8 @@ def fields(case: Case) -> dict[str, Field]:
         out[f"depth_{name}"] = Field(shape, "m", "worn depth")
         out[f"rate_{name}"] = Field(shape, "m", "growth of the worn depth in a vibration cycle")
         out[f"load_{name}"] = Field(shape, "N", "mean normal force of a period")
+        out[f"slip_{name}"] = Field(shape, "1", "share of the period in slip")
+        out[f"open_{name}"] = Field(shape, "1", "share of the period without contact")
     return out
 
 
@@ -196,7 +198,7 @@ class _Marcher:
         return {
             f"{key}_{name}": getattr(state, key)[part]
             for name, part in zip(names, self.mode.slices)
-            for key in ("depth", "rate", "load")
+            for key in ("depth", "rate", "load", "slip", "open")
         }
 
     def _say(self, row: dict[str, Any]) -> None:
