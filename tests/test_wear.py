@@ -265,6 +265,34 @@ def test_wear_of_a_blade(comm, stepper):
     assert (depths[-1][stuck] == 0).all()
 
 
+def test_damping_rises_and_falls(comm):
+    """The paper's figure 13: less load lets more pairs slip, until there is little left to slip under."""
+    mode, y = worn_blade(comm)
+    states = [mode.problem.state(point.state.y) for point in fw.Wear(mode, y, CYCLES)]
+    zeta, omega = (np.array([state[key] for state in states]) for key in ("zeta", "omega"))
+    top = int(np.argmax(zeta))
+    assert zeta[0] * 1.1 < zeta[top] and zeta[-1] < 0.5 * zeta[top]
+    assert (np.diff(zeta[: top + 1]) > 0).all() and (np.diff(zeta[top:]) < 0).all()
+    assert (np.diff(omega) < 0).all()
+
+
+def test_a_mode_that_ends_says_so(comm):
+    """Towards 10.4 vibrations the branch folds below this amplitude: steps shrink, what was found is kept."""
+    mode, y = worn_blade(comm)
+    march = fw.Wear(mode, y, 20.0, fw.WearControl(tolerance=1e-2, pressure_change=0.5))
+    ends = [point.cycles for point in march]
+    assert not march.converged and "the mode ends here" in march.reason
+    assert 10.0 < ends[-1] < 11.0
+
+
+def test_detours_come_back_to_the_amplitude(comm):
+    """By arclength from an amplitude beside: where the branch does not fold, to the very solution."""
+    mode, y = worn_blade(comm)
+    depth = 2e-5 * np.ones(6)
+    direct, around = mode.solve(depth, y), mode.elsewhere(depth, y)
+    assert np.allclose(whole(around.y), whole(direct.y), rtol=0, atol=1e-9)
+
+
 def test_steppers_agree(comm):
     """Explicit and implicit steps to the same depths."""
     ends = []

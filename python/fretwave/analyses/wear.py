@@ -35,9 +35,9 @@ def run_wear(context: AnalysisContext) -> Outcome:
     starts = on_first_rank(context.comm, lambda: kept.load(0))
     if starts is None:
         starts = _starts(replace(context, analysis=settings), analysis)
+        context.before_first()
         if context.comm.rank == 0:
             kept.save(0, starts)
-    context.before_first()
     lines = [
         Line(number, amplitude, starts[f"y_{number}"], starts[f"outcome_{number}"], folder / f"line_{number:03d}")
         for number, amplitude in enumerate(analysis.amplitude)
