@@ -150,7 +150,8 @@ def _collect(
         for number, amplitude in enumerate(analysis.amplitude)
         if number not in reached
     ]
-    context.fields = fields(context.case)
+    # The run folder is open since the starts were found.
+    context = replace(context, before_first=lambda: None, fields=fields(context.case))
     writer = context.writer(
         columns(context.case),
         labels=next((result["labels"].split() for result in results if isinstance(result, dict)), ()),
