@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from .reduction import FrequencyError, Reduction, reduce
     from .reduction_error import NonlinearError, nonlinear_error
     from .transient import Transient
+    from .wear import Wear, WearControl, WearPoint, WornMode
 
 #: Where each public name lives; loaded when first used, so that `fretwave --help` starts without PETSc.
 _HOMES = {
@@ -39,6 +40,7 @@ _HOMES = {
     "reduction": ("FrequencyError", "Reduction", "reduce"),
     "reduction_error": ("NonlinearError", "nonlinear_error"),
     "transient": ("Transient",),
+    "wear": ("Wear", "WearControl", "WearPoint", "WornMode"),
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 
@@ -68,6 +70,10 @@ __all__ = [
     "StepControl",
     "Transient",
     "WaveError",
+    "Wear",
+    "WearControl",
+    "WearPoint",
+    "WornMode",
     "choose_harmonics",
     "laws",
     "linear_modes",

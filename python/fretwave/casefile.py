@@ -14,7 +14,7 @@ import scipy.sparse
 from . import checks
 from .aerodynamics_case import check_aerodynamics
 from .built import BuiltModel
-from .checks_rest import check_preloads, check_reduction
+from .checks_rest import check_preloads, check_reduction, check_wear
 from .checks_wheel import check_wheels
 from .contacts import ContactSpec, read_contacts
 from .engine_order import fold_engine_orders
@@ -29,6 +29,7 @@ from .schema import (
     ReductionSection,
     Section,
     StudySection,
+    WearAnalysis,
 )
 from .sectors import Neighbours, check_waves, tie
 from .source import Source
@@ -151,7 +152,16 @@ class Case:
 
     def preload_of(self, analysis: AnalysisSection) -> PreloadSection | None:
         """The preload of an analysis: its own, or that of the case."""
-        return getattr(analysis, "preload", None) or self.preload
+        return getattr(self.settings(analysis), "preload", None) or self.preload
+
+    def settings(self, analysis: AnalysisSection) -> AnalysisSection:
+        """The analysis whose model and harmonics an analysis uses: wear takes those of its mode."""
+        if not isinstance(analysis, WearAnalysis):
+            return analysis
+        mode = self.analyses[analysis.mode]
+        own = {key: getattr(analysis, key) for key in ("harmonics", "samples") if getattr(analysis, key) is not None}
+        dampers = analysis.dampers or mode.dampers
+        return mode.model_copy(update={**own, "name": analysis.name, "dampers": dampers})
 
 
 def load_case(
@@ -240,6 +250,8 @@ def _build(source: Source, laws: Mapping[str, Any], found: list[FretwaveError]) 
     notes: list[str] = []
     if origin is not None:
         complete = len(contacts) == len(source.entries("contact"))
+        if complete:
+            check_wear(source, analyses, contacts, built.contacts if built else {}, found)
         check_physics(origin, [contact.rows for contact in contacts] if complete else None, notes, found)
     if found or section is None or origin is None:
         return None

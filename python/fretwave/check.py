@@ -23,6 +23,7 @@ from .schema import (
     StaticAnalysis,
     SweepAnalysis,
     TransientSection,
+    WearAnalysis,
 )
 from .source import display
 from .sweep_plan import table_plan
@@ -130,6 +131,9 @@ def _headline(analysis: AnalysisSection) -> str:
         plan = table_plan(analysis.over)
         over = " x ".join(f"{key} = {', '.join(map(str, values))}" for key, values in plan.over.items())
         return f"'{analysis.of}' for every value of {over}: {len(plan)} branches"
+    if isinstance(analysis, WearAnalysis):
+        amplitudes = ", ".join(f"{amplitude:g}" for amplitude in analysis.amplitude)
+        return f"wear of '{analysis.mode}' at a = {amplitudes} m over {analysis.cycles:g} normalised cycles"
     assert isinstance(analysis, TransientSection)
     kind = analysis.type.replace("_", " ")
     starts = ", ".join(f"{amplitude:g}" for amplitude in analysis.amplitude)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from .errors import FretwaveError, InputError
@@ -17,6 +17,7 @@ from .schema import (
     ModeAnalysis,
     SweepAnalysis,
     TransientSection,
+    WearAnalysis,
 )
 from .source import Source, nearest, nested_leaves
 from .sweep_plan import complaint
@@ -131,6 +132,8 @@ def check_analyses(
             report.mode(("mode",), analysis.mode, modes)
         if isinstance(analysis, SweepAnalysis):
             _check_sweep(report, analysis)
+        if isinstance(analysis, WearAnalysis):
+            _check_wear(report, analysis, modes, {a.name: a for a in analyses.values()})
 
 
 def _check_sweep(report: Reporter, analysis: SweepAnalysis) -> None:
@@ -146,6 +149,23 @@ def _check_sweep(report: Reporter, analysis: SweepAnalysis) -> None:
             report.wrong(("over", *path), *problem, "write for example `over = { mode.harmonics = [3, 5, 7] }`")
     if analysis.dampers:
         report.wrong(("dampers",), "are not those of the analysis swept", "none", f"give them to '{analysis.of}'")
+
+
+def _check_wear(
+    report: Reporter, analysis: WearAnalysis, modes: list[str], analyses: Mapping[str, AnalysisSection]
+) -> None:
+    report.mode(("mode",), analysis.mode, modes)
+    mode = analyses.get(analysis.mode)
+    if isinstance(mode, ModeAnalysis):
+        low, high = mode.amplitude
+        for index, value in enumerate(analysis.amplitude):
+            if not low <= value <= high:
+                where, expected = "is outside the branch of the mode", f"a value within {toml(mode.amplitude)}"
+                report.wrong(("amplitude", index), where, expected, f"move it, or widen {mode.name}.amplitude")
+    for index, value in enumerate(analysis.report_at):
+        if value > analysis.cycles:
+            expected = f"at most cycles = {analysis.cycles:g}"
+            report.wrong(("report_at", index), "is beyond the last cycle", expected, "move it, or raise cycles")
 
 
 def _check_harmonics(report: Reporter, analysis: HarmonicSection, dofs: Sequence[str] | None) -> None:

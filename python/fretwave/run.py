@@ -35,6 +35,7 @@ DISPATCH = {
     "flutter": ("flutter", "run_flutter"),
     "free_decay": ("transient", "run_free_decay"),
     "limit_cycle": ("transient", "run_limit_cycle"),
+    "wear": ("wear", "run_wear"),
 }
 
 
@@ -192,7 +193,8 @@ class Runner:
     def _check_needs(self, names: Sequence[str]) -> None:
         """Time integration needs the results of its mode: from this run, or kept in the folder."""
         for name in names:
-            mode = getattr(self.case.analyses[name], "mode", None)
+            analysis = self.case.analyses[name]
+            mode = analysis.mode if isinstance(analysis, TransientSection) else None
             if mode is None or mode in names or self._kept(mode):
                 continue
             raise InputError(
@@ -246,7 +248,8 @@ class Runner:
 
         case = on_wheel(self.case, analysis)
         preload, flow = case.preload_of(analysis), getattr(analysis, "aerodynamics", False)
-        built = build_model(case, self._dampers(analysis), self.comm, preload, nodal_diameter(analysis), flow)
+        wave = nodal_diameter(case.settings(analysis))
+        built = build_model(case, self._dampers(analysis), self.comm, preload, wave, flow)
         with built as model, options.inserted(), solver_room(case, analysis, prefix):
             context = AnalysisContext(
                 model,
@@ -281,7 +284,7 @@ class Runner:
         """The analysis' dampers; a time integration without any takes those of its mode."""
         if isinstance(analysis, TransientSection) and not analysis.dampers:
             return list(self.case.analyses[analysis.mode].dampers)
-        return list(analysis.dampers)
+        return list(self.case.settings(analysis).dampers)
 
     def _note(self, name: str, outcome: Outcome, seconds: float, entry: Mapping[str, Any] | None = None) -> None:
         """Print the outcome and keep it in run.json, with what else `entry` says."""

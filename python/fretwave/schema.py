@@ -288,6 +288,40 @@ class ForcedAnalysis(HarmonicSection):
     time_points: int = key("points of each response that are checked by time integration", example="4", default=0, ge=0)
 
 
+class WearAnalysis(AnalysisSection):
+    """``type = "wear"``: fretting wear of a mode at fixed amplitudes over wear cycles."""
+
+    type: Literal["wear"]
+    mode: str = key("mode analysis whose settings and branch this one takes", example='"mode"')
+    amplitude: list[Positive] = key(
+        "fixed modal amplitudes, one or a grid, within those of the mode", "m", "[1.2e-3]", min_length=1
+    )
+    cycles: Positive = key("normalised wear cycles to march", "-", "40.0")
+    coefficient: float = key("wear coefficient k_w", "1/Pa", "1e-14", ge=0, allow_inf_nan=False)
+    cycle_unit: Optional[Positive] = key(
+        "vibration cycles in a normalised one (by default: in which sliding 4 mu N0/kt a cycle takes 1/e off the load)",
+        "-",
+        "1e6",
+        default=None,
+    )
+    stepper: Literal["heun", "bogacki_shampine", "trapezoidal", "tr_bdf2"] = key(
+        "step over wear cycles: explicit of order 2 or 3, implicit of order 2 (two)",
+        example='"tr_bdf2"',
+        default="bogacki_shampine",
+    )
+    tolerance: Positive = key(
+        "estimated error of a step, as normal load lost relative to the mean", "-", "1e-4", default=1e-3, lt=1
+    )
+    pressure_change: Positive = key(
+        "largest change of a pair's contact pressure in a step, relative to the mean", "-", "0.1", default=0.2
+    )
+    report_at: list[Positive] = key(
+        "normalised cycles at which the motion of a period is kept", "-", "[10.0, 40.0]", default_factory=list
+    )
+    harmonics: Optional[int] = key("highest harmonic, in place of the mode's", example="5", default=None, ge=1)
+    samples: Optional[int] = key("time samples of a period, in place of the mode's", example="256", default=None, ge=4)
+
+
 class TransientSection(AnalysisSection):
     """Keys of the analyses by direct time integration."""
 
@@ -339,6 +373,7 @@ ANALYSES: dict[str, type[AnalysisSection]] = {
     "free_decay": FreeDecayAnalysis,
     "limit_cycle": LimitCycleAnalysis,
     "sweep": SweepAnalysis,
+    "wear": WearAnalysis,
 }
 
 

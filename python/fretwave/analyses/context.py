@@ -15,9 +15,9 @@ from ..columns import Column
 from ..console import Console
 from ..errors import InputError
 from ..parallel import on_first_rank
-from ..results import AnalysisWriter, open_results
+from ..results import AnalysisWriter, Field, open_results
 from ..runfolder import replace_text
-from ..schema import AnalysisSection
+from ..schema import AnalysisSection, WearAnalysis
 from ..sectors import nodal_diameter
 from ..source import display
 from ..wheel import Wheel
@@ -73,6 +73,8 @@ class AnalysisContext:
         What this analysis does not compute, and why; filled by :meth:`leave_out`.
     arrays : dict
         Arrays [m] put into the group of the results.
+    fields : dict
+        Arrays that every row of the table brings.
     entry : dict
         What else run.json says of the analysis.
     """
@@ -88,6 +90,7 @@ class AnalysisContext:
     attributes: dict[str, Any] = field(default_factory=dict)
     left_out: list[str] = field(default_factory=list)
     arrays: dict[str, Any] = field(default_factory=dict)
+    fields: dict[str, Field] = field(default_factory=dict)
     entry: dict[str, Any] = field(default_factory=dict)
 
     @property
@@ -140,6 +143,7 @@ class AnalysisContext:
             before_first=self.before_first,
             file_attributes={"title": self.case.title},
             arrays=self.arrays,
+            fields=self.fields,
         )
 
     def table(self, name: str) -> dict[str, Any]:
@@ -231,7 +235,9 @@ def describe_analysis(analysis: AnalysisSection, case: Case, run_id: str) -> dic
 
 
 def _deciding(case: Case, name: str) -> dict[str, Any]:
-    return {key: value for key, value in case.resolved.items() if key.split(".")[0] in (*_COMMON, name)}
+    analysis = case.analyses[name]
+    others = (name, analysis.mode) if isinstance(analysis, WearAnalysis) else (name,)
+    return {key: value for key, value in case.resolved.items() if key.split(".")[0] in (*_COMMON, *others)}
 
 
 def belongs(group: Any, case: Case, name: str) -> bool:
