@@ -23,6 +23,8 @@ FAMILIES = (
     "limit_cycles",
     "forced",
     "free_decay",
+    "wear",
+    "wear_pairs",
     "study",
 )
 
