@@ -13,6 +13,7 @@ import numpy.typing as npt
 from petsc4py import PETSc
 
 from . import _core
+from .continuation import Continuation, StepControl
 from .errors import InputError
 from .problems import HarmonicProblem
 from .steppers import STEPPERS, StageFailed, take
@@ -23,6 +24,12 @@ Array = npt.NDArray[np.float64]
 STIFFNESS = "normal_stiffness"
 #: Shortest step as a share of all cycles.
 SHORTEST = 1e-10
+#: A step without a solution is cut to this share of a first step before the mode is taken to end there and to jump.
+LAST_TRY = 1e-2
+#: Changes of log amplitude from which a solution on another sheet is looked for, and points to reach it by.
+DETOURS, DETOUR_POINTS = (1e-3, -1e-3, 1e-2, -1e-2, 3e-2, -3e-2), 40
+#: The corrector's tolerance over that of the branch: depths add up its errors.
+SHARPER = 1e-2
 #: A step grows and shrinks by no more than this, and aims at this share of what is allowed.
 GROWTH, SHRINKING, SAFETY = 3.0, 0.1, 0.85
 
@@ -80,10 +87,11 @@ class WornMode:
             ]
         )
         self._newton = _core.Newton(problem.core, problem.prefix)
+        rtol, atol, stol, most = self._newton.snes.getTolerances()
+        self._newton.snes.setTolerances(rtol, SHARPER * atol, stol, most)
         self._row = problem.core.unknowns()
         self._row.set(0.0)
         self._set_last(self._row, 1.0)
-        self.linear_solves = 0
 
     def _set_last(self, v: PETSc.Vec, value: float) -> None:
         local = v.getArray()
@@ -120,13 +128,56 @@ class WornMode:
         """
         self.wear(depth)
         y = guess.copy()
+        return self.measure(y, depth, self._correct(y))
+
+    def _correct(self, y: PETSc.Vec) -> tuple[int, int, float]:
+        """Newton at the amplitude of y, in place."""
         self._newton.system.close(self._row, self.log_amplitude(y))
         converged, newton, linear, residual, reason = self._newton.solve(y)
-        self.linear_solves += linear
         if not converged:
             y.destroy()
             raise StageFailed(reason)
-        return self.measure(y, depth, (newton, linear, residual))
+        return newton, linear, residual
+
+    def elsewhere(self, depth: Array, guess: PETSc.Vec) -> WornState:
+        """The mode at these depths on whatever sheet is near: by arclength from an amplitude above or below.
+
+        At a fixed amplitude a sheet may end while depths grow, as a branch that folds does in amplitude.
+
+        Raises
+        ------
+        StageFailed
+            None of the detours comes back to the amplitude.
+        """
+        self.wear(depth)
+        target = float(self.problem.core.parameter_value(self.log_amplitude(guess)))
+        for change in DETOURS:
+            y = guess.copy()
+            self._set_last(y, self.log_amplitude(guess) + change)
+            try:
+                self._correct(y)
+            except StageFailed:
+                continue
+            found = self._come_back(y, target, change)
+            y.destroy()
+            if found is not None:
+                return self.measure(found, depth, self._correct(found))
+        raise StageFailed("the mode ends here, and no other sheet of it was found at this amplitude")
+
+    def _come_back(self, y: PETSc.Vec, target: float, change: float) -> PETSc.Vec | None:
+        """The first point of the branch from y that lies on the target amplitude."""
+        length = abs(change)
+        ends = (target * float(np.exp(-2 * length)), target * float(np.exp(2 * length)))
+        steps = StepControl(initial=length / 8, minimum=1e-4 * length, maximum=length, max_points=DETOUR_POINTS)
+        branch = Continuation(self.problem, y, ends, steps, [target], upwards=change < 0)
+        found = None
+        for point in branch:
+            point.tangent.destroy()
+            if point.event == "report":
+                found = point.y
+                break
+        branch.destroy()
+        return found
 
     def log_amplitude(self, y: PETSc.Vec) -> float:
         """The parameter's entry, on every rank."""
@@ -281,14 +332,17 @@ class Wear:
         self._spent = [0, 0]
         target = next(value for value in self.reports if value > self.eta)
         tangent = self.mode.tangent(self.state, self.state.rate)
-        why = ""
+        why, least = "", LAST_TRY * self._first_step()
         while self.step >= SHORTEST * self.cycles:
             meets = self.eta + self.step * (1 + 1e-12) >= target
             h = target - self.eta if meets else self.step
             try:
                 found, state = self._try(h, tangent)
             except StageFailed as failure:
-                why, self.step = str(failure), h / 2
+                if h < least:
+                    tangent.destroy()
+                    return self._jump(h)
+                why, self.step = str(failure), h / 4
                 continue
             error = float((np.abs(found) / (self.depth_scale + state.depth)).max(initial=0.0))
             change = float(np.abs(state.load - self.state.load).max(initial=0.0)) / self.load_scale
@@ -313,6 +367,18 @@ class Wear:
             self.step = max(longer, self.step) if h < self.step else longer
         event = "report" if eta in self.reports else ""
         return WearPoint(eta, h, state, error, event, *self._spent)
+
+    def _jump(self, h: float) -> WearPoint | None:
+        """The sheet ends within a short step h: go on from another one there, as the motion would."""
+        try:
+            state = self.mode.elsewhere(self.state.depth + h * self.state.rate, self.state.y)
+        except StageFailed as failure:
+            self.reason = str(failure)
+            return None
+        self.state.y.destroy()
+        self.state, self.eta = state, self.eta + h
+        self.step = self._first_step()
+        return WearPoint(self.eta, h, state, 0.0, "jump", state.newton, state.linear)
 
     def _try(self, h: float, tangent: PETSc.Vec) -> tuple[Array, WornState]:
         """The error's estimate and the mode at the end; each stage is predicted from the last along the tangent."""
