@@ -30,6 +30,7 @@ from .run import reload_case
 from .source import display
 from .view_choice import Choice, ViewOptions, read_choice
 from .vtkhdf import HEXAHEDRON, QUADRATIC_HEXAHEDRON, TRIQUADRATIC_HEXAHEDRON, VERTEX, GridFile, linear_cells
+from .wear_view import view_wear, worn_analysis
 
 Array = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.intp]
@@ -81,6 +82,9 @@ def view_run(folder: Path, options: ViewOptions, say: Callable[[str], None] = pr
         The folder holds no run, its case has changed, the model has no nodes, or there is no such analysis or point.
     """
     case, _ = reload_case(folder, kept=True)
+    worn = None if options.points else worn_analysis(folder, case, options)
+    if worn is not None:
+        return view_wear(folder, case, worn, options, say)
     nodes, cells = mesh_of(case, options.linear)
     with open_results(folder / "results.h5") as file:
         choice = read_choice(file, folder, case, options)
