@@ -73,7 +73,7 @@ def test_amplitudes_asked_for_are_files_of_their_own(run, tmp_path, capfd):
 
 
 def test_the_motion_of_a_worn_point_counts_its_depth_as_gap(run, tmp_path):
-    """The kept forces are those of the law with the approach less the depth; an open pair at u = 0 is its depth away."""
+    """The kept forces are the law's with the approach less the depth; an open pair at u = 0 is its depth away."""
     table, fields = line_of(run, 2)
     point, depth = int(table["point"][-1]), fields["depth"][-1]
     with h5py.File(run / "results.h5") as file:
