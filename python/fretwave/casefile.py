@@ -13,7 +13,7 @@ import scipy.sparse
 
 from . import checks
 from .built import BuiltModel
-from .checks_rest import check_preloads, check_reduction
+from .checks_rest import check_preloads, check_reduction, check_wear
 from .contacts import ContactSpec, read_contacts
 from .errors import CaseErrors, FretwaveError
 from .origin import Origin, check_physics, load_origin
@@ -216,6 +216,8 @@ def _build(source: Source, laws: Mapping[str, Any], found: list[FretwaveError]) 
     notes: list[str] = []
     if origin is not None:
         complete = len(contacts) == len(source.entries("contact"))
+        if complete:
+            check_wear(source, analyses, contacts, built.contacts if built else {}, found)
         check_physics(origin, [contact.rows for contact in contacts] if complete else None, notes, found)
     if found or section is None or origin is None:
         return None

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
+from .built import BuiltContact
+from .contacts import ContactSpec, wear_areas
+from .errors import InputError
 from .reporter import Found, Reporter
-from .schema import AnalysisSection, PreloadSection, ReductionSection, StaticAnalysis, TransientSection
+from .schema import AnalysisSection, PreloadSection, ReductionSection, StaticAnalysis, TransientSection, WearAnalysis
 from .source import Source, nearest
 
 Analyses = Mapping[int, AnalysisSection]
@@ -16,6 +19,23 @@ def check_reduction(source: Source, section: ReductionSection | None, found: Fou
     if section is not None and section.modes is not None and section.up_to_hz is not None:
         report = Reporter(source, ("reduction",), found)
         report.wrong(("up_to_hz",), "is given beside modes", "a number of modes, or a frequency", "remove one of them")
+
+
+def check_wear(
+    source: Source,
+    analyses: Analyses,
+    contacts: Sequence[ContactSpec],
+    built: Mapping[str, BuiltContact],
+    found: Found,
+) -> None:
+    """Wear needs a contact with a normal direction, and the areas of its pairs."""
+    for number, analysis in analyses.items():
+        if isinstance(analysis, WearAnalysis):
+            try:
+                wear_areas(contacts, built)
+            except InputError as error:
+                where = source.where(("analysis", number, "type"))
+                found.append(InputError(error.what, where, error.where or error.measured, error.expected, error.fix))
 
 
 def check_preloads(

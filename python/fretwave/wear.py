@@ -72,10 +72,7 @@ class WornMode:
         self.problem, self.model, self.coefficient = problem, problem.model, coefficient
         names = [contact.name for contact in self.model.contacts]
         for name in areas:
-            if name not in names:
-                raise InputError(
-                    "there is no such contact", None, name, ", ".join(names), "name a contact of the model"
-                )
+            self._check(name, names)
         self.contacts = [k for k, name in enumerate(names) if name in areas]
         self.areas = np.concatenate([np.asarray(areas[names[k]], dtype=float) for k in self.contacts])
         sizes = [len(areas[names[k]]) for k in self.contacts]
@@ -92,6 +89,14 @@ class WornMode:
         self._row = problem.core.unknowns()
         self._row.set(0.0)
         self._set_last(self._row, 1.0)
+
+    def _check(self, name: str, names: list[str]) -> None:
+        if name not in names:
+            raise InputError("there is no such contact", None, name, ", ".join(names), "name one of these")
+        contact = self.model.contacts[names.index(name)]
+        if STIFFNESS not in contact.parameters:
+            where, fix = f"contact '{name}'", 'use law = "coulomb_3d"'
+            raise InputError("a contact cannot wear", where, contact.law, "a law with a normal direction", fix)
 
     def _set_last(self, v: PETSc.Vec, value: float) -> None:
         local = v.getArray()

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from .. import contacts
 from ..casefile import Case
 from ..columns import COLUMNS, Column
 from ..console import Console
 from ..contact_history import SLIP, ContactHistory
-from ..errors import InputError
 from ..results import AnalysisWriter, Field
 from ..schema import ModeAnalysis, WearAnalysis
 from ..sectors import nodal_diameter
@@ -40,26 +40,8 @@ class Line:
 
 
 def wear_areas(case: Case) -> dict[str, Any]:
-    """Nodal areas (n_pairs,) of the contacts that wear: those whose law has a normal direction.
-
-    Raises
-    ------
-    InputError
-        There are none, or their areas are not known.
-    """
-    found = {}
-    for contact in case.contacts:
-        if "normal_stiffness" not in contact.parameters:
-            continue
-        built = case.built.contacts.get(contact.name) if case.built else None
-        if built is None or built.areas is None:
-            fix = "give BuiltContact its areas"
-            raise InputError("the areas of the pairs are not known", f"contact '{contact.name}'", None, "areas", fix)
-        found[contact.name] = np.asarray(built.areas, dtype=float)
-    if not found:
-        laws = ", ".join(contact.law for contact in case.contacts)
-        raise InputError("no contact can wear", None, laws, "a law with a normal direction", 'use law = "coulomb_3d"')
-    return found
+    """Nodal areas (n_pairs,) [m^2] of the contacts that wear."""
+    return contacts.wear_areas(case.contacts, case.built.contacts if case.built else {})
 
 
 def faces_of(case: Case) -> list[tuple[str, str, Any]]:
