@@ -16,6 +16,7 @@ from scipy.spatial import Delaunay, QhullError
 
 from .built import BuiltContact
 from .casefile import Case
+from .contacts import wear_areas
 from .errors import InputError
 from .results import open_results
 from .schema import WearAnalysis
@@ -69,8 +70,7 @@ def view_wear(folder: Path, case: Case, name: str, options: ViewOptions, say: Ca
 
 def _placed(case: Case, name: str) -> dict[str, BuiltContact]:
     built = case.built.contacts if case.built else {}
-    wearing = [contact.name for contact in case.contacts if "normal_stiffness" in contact.parameters]
-    found = {key: built[key] for key in wearing if key in built and built[key].points is not None}
+    found = {key: built[key] for key in wear_areas(case.contacts, built) if built[key].points is not None}
     if not found:
         fix = "give BuiltContact its points; `fretwave plot` draws histories without them"
         raise InputError("the model has no places of its contact pairs", f"analysis '{name}'", None, "points", fix)
