@@ -117,7 +117,7 @@ def test_stop_rules(comm):
 def worn(contact, q, samples):
     """Integral of N |d slider| of one pair."""
     problem, y = imposed(contact, q, samples=samples)
-    (archard, load) = problem.core.wearing(y)[0]
+    archard, load, _, _ = problem.core.wearing(y)[0]
     return sum(problem.model.comm.allgather(archard.sum())), sum(problem.model.comm.allgather(load.sum()))
 
 

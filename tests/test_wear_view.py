@@ -32,7 +32,7 @@ def line_of(run, number):
     with h5py.File(run / "results.h5") as file:
         group = file["wear"]
         rows = np.flatnonzero(group["points/line"][()] == number)
-        fields = {key: group[f"{key}_pads"][()][rows] for key in ("depth", "rate", "load", "slip")}
+        fields = {key: group[f"{key}_pads"][()][rows] for key in ("depth", "rate", "load", "slip", "open")}
         return {key: data[()][rows] for key, data in group["points"].items() if key != "event"}, fields
 
 
@@ -51,6 +51,7 @@ def test_steps_are_the_points_of_the_largest_amplitude(run, capfd):
         assert found["wear_rate"].tolist() == fields["rate"][step].tolist()
         assert found["mean_pressure"] == pytest.approx(fields["load"][step] / AREA, rel=1e-15)
         assert found["slip_share"].tolist() == fields["slip"][step].tolist()
+        assert found["open_share"].tolist() == fields["open"][step].tolist()
         assert found["warp"] == pytest.approx(-1000 * np.outer(fields["depth"][step], [1, 0, 0]), rel=1e-6)
         for name in ("cycles", "zeta", "frequency_hz"):
             assert found[name] == table[name][step]

@@ -31,12 +31,13 @@ nb::list contact_periods(hb::HarmonicProblem& problem, Petsc<Vec> y) {
   return out;
 }
 
-/// (Archard's integrals, mean normal forces) of this rank's pairs, one a contact.
+/// (Archard's integrals, mean normal forces, shares of slip and of lift-off) of this rank's pairs, one a
+/// contact.
 nb::list wearing(hb::HarmonicProblem& problem, Petsc<Vec> y) {
   nb::list out;
-  for (auto const& [archard, load] : problem.wearing(y.object))
-    out.append(
-        nb::make_tuple(numpy_copy(archard.data(), {archard.size()}), numpy_copy(load.data(), {load.size()})));
+  const auto copy = [](std::vector<double> const& v) { return numpy_copy(v.data(), {v.size()}); };
+  for (auto const& w : problem.wearing(y.object))
+    out.append(nb::make_tuple(copy(w.archard), copy(w.load), copy(w.slip), copy(w.open)));
   return out;
 }
 

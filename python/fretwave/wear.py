@@ -44,12 +44,16 @@ class WornState:
         Worn depth [m] and mean normal force [N] of the pairs of all wearing contacts, one after the other.
     rate : (n_pairs,)
         Growth of the depth in a cycle [m], k_w / I times the integral of |P_N| |d slider| (eq. 13).
+    slip, open : (n_pairs,)
+        Shares of the period.
     """
 
     y: PETSc.Vec
     depth: Array
     rate: Array
     load: Array
+    slip: Array
+    open: Array
     newton: int = 0
     linear: int = 0
     residual: float = 0.0
@@ -117,11 +121,11 @@ class WornMode:
     def measure(self, y: PETSc.Vec, depth: Array, outcome: Sequence[Any] = (0, 0, 0.0)) -> WornState:
         """Rates and loads of a converged motion at these depths."""
         found = self.problem.core.wearing(y)
-        archard, load = (
+        archard, load, slip, opened = (
             np.concatenate([self.model.share_pairs(k, np.asarray(found[k][which])) for k in self.contacts])
-            for which in (0, 1)
+            for which in range(4)
         )
-        return WornState(y, depth, self.coefficient / self.areas * archard, load, *outcome)
+        return WornState(y, depth, self.coefficient / self.areas * archard, load, slip, opened, *outcome)
 
     def solve(self, depth: Array, guess: PETSc.Vec) -> WornState:
         """The mode at these depths and the amplitude of the guess, which is kept.

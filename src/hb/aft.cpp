@@ -230,12 +230,20 @@ contact::Diagnosis Aft::diagnosis(ContactPeriod const& period, Exponents const& 
 }
 
 Wearing Aft::wearing(double const* U, Exponents const& e) const {
-  Wearing out{std::vector<double>(pairs_), std::vector<double>(pairs_)};
+  const std::vector<double> none(pairs_, 0.0);
+  Wearing out{none, none, none, none};
   if (columns_ == 0 || !law_->wears()) return out;
   const ContactPeriod now = period(U, e);
-  out.archard = diagnosis(now, e, true).archard;
+  const contact::Diagnosis found = diagnosis(now, e, true);
+  const double share = 1.0 / harmonics_.samples();
+  out.archard = found.archard;
   for (int t = 0; t < harmonics_.samples(); ++t)
-    for (int i = 0; i < pairs_; ++i) out.load[i] += now.f[size_t(t) * columns_ + i] / harmonics_.samples();
+    for (int i = 0; i < pairs_; ++i) {
+      const auto status = found.status[size_t(t) * pairs_ + i];
+      out.load[i] += share * now.f[size_t(t) * columns_ + i];
+      out.slip[i] += status == contact::Status::slip ? share : 0;
+      out.open[i] += status == contact::Status::open ? share : 0;
+    }
   return out;
 }
 

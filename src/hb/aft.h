@@ -22,8 +22,9 @@ struct ContactPeriod {
 
 /// What wears a contact over a period, per pair.
 struct Wearing {
-  std::vector<double> archard;  ///< integral of N |d slider| [N m]; zero for a law that does not wear
-  std::vector<double> load;     ///< mean normal force [N]
+  std::vector<double> archard;     ///< integral of N |d slider| [N m]; zero for a law that does not wear
+  std::vector<double> load;        ///< mean normal force [N]
+  std::vector<double> slip, open;  ///< shares of the period
 };
 
 /// Alternating frequency-time for the contact pairs of this rank: harmonic blocks of relative displacement

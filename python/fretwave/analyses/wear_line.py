@@ -13,7 +13,6 @@ from .. import contacts
 from ..casefile import Case
 from ..columns import COLUMNS, Column
 from ..console import Console
-from ..contact_history import SLIP, ContactHistory
 from ..results import AnalysisWriter, Field
 from ..schema import ModeAnalysis, WearAnalysis
 from ..sectors import nodal_diameter
@@ -72,7 +71,8 @@ def fields(case: Case) -> dict[str, Field]:
         out[f"depth_{name}"] = Field(shape, "m", "worn depth")
         out[f"rate_{name}"] = Field(shape, "m", "growth of the worn depth in a vibration cycle")
         out[f"load_{name}"] = Field(shape, "N", "mean normal force of a period")
-        out[f"slip_{name}"] = Field(shape, "1", "share of a period in which the pair slips")
+        out[f"slip_{name}"] = Field(shape, "1", "share of the period in slip")
+        out[f"open_{name}"] = Field(shape, "1", "share of the period without contact")
     return out
 
 
@@ -158,8 +158,7 @@ class _Marcher:
     def _record(self, march: Any, point: Any, wall: float) -> dict[str, Any]:
         """One row. Collective."""
         y, state = point.state.y, point.state
-        energy, periods = self.problem.energy(y), self._periods(y)
-        per_contact = {**self._per_contact(state), **self._slip(periods)}
+        energy, per_contact = self.problem.energy(y), self._per_contact(state)
         row = {
             **self.problem.state(y),
             **self.problem.diagnostics(y),
@@ -180,17 +179,17 @@ class _Marcher:
         areas = wear_areas(self.case)
         for number, (_, name, mask) in enumerate(self.faces, 1):
             row[f"worn_{number}"] = float(per_contact[f"depth_{name}"][mask] @ areas[name][mask])
+        motions = None
+        if point.event:
+            names = [contact.name for contact in self.problem.model.contacts]
+            motions = dict(zip(names, self.problem.contact_period(y)))
         parts = self.comm.gather(y.getArray(readonly=True).copy())
         kept = None
         if parts is not None:
             kept = {"y": np.concatenate(parts), "depth": state.depth, "at": point.cycles, "step": march.step}
             kept["load_scale"] = march.load_scale
         self.writer.append(
-            row,
-            self.problem.coefficients(y),
-            periods if point.event and self.writer.active else None,
-            kept,
-            per_contact,
+            row, self.problem.coefficients(y), motions if self.writer.active else None, kept, per_contact
         )
         return row
 
@@ -199,24 +198,7 @@ class _Marcher:
         return {
             f"{key}_{name}": getattr(state, key)[part]
             for name, part in zip(names, self.mode.slices)
-            for key in ("depth", "rate", "load")
-        }
-
-    def _periods(self, y: Any) -> dict[str, Any]:
-        """Motion of each contact over a period, on the first rank. Collective."""
-        names = [contact.name for contact in self.problem.model.contacts]
-        return dict(zip(names, self.problem.contact_period(y)))
-
-    def _slip(self, periods: dict[str, Any]) -> dict[str, Any]:
-        """Share of the period in which each pair slips, on the first rank."""
-        if not self.writer.active:
-            return {}
-        return {
-            f"slip_{name}": ContactHistory(
-                contact.law, contact.parameters, *(np.asarray(periods[name][key]) for key in "uvf")
-            ).share(SLIP)
-            for name, contact in ((contact.name, contact) for contact in self.case.contacts)
-            if f"depth_{name}" in self.writer.fields
+            for key in ("depth", "rate", "load", "slip", "open")
         }
 
     def _say(self, row: dict[str, Any]) -> None:
