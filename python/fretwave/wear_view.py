@@ -30,7 +30,13 @@ IntArray = npt.NDArray[np.intp]
 #: Columns of the table that go with each step.
 SHOWN = ("cycles", "vibrations", "amplitude", "frequency_hz", "zeta", "stick", "slip", "open", "work")
 #: Arrays of the results and what they are called in the picture.
-FIELDS = {"depth": "depth", "rate": "wear_rate", "load": "mean_normal_force", "slip": "slip_share", "open": "open_share"}
+FIELDS = {
+    "depth": "depth",
+    "rate": "wear_rate",
+    "load": "mean_normal_force",
+    "slip": "slip_share",
+    "open": "open_share",
+}
 #: Largest depth as drawn, as a share of the extent of the pairs, where no scale is given.
 DRAWN = 0.1
 #: A triangle with a side longer than the median of the longest sides by this bridges a gap between pairs.
