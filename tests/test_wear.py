@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from core_models import chain, solve_at, unknowns, whole
-from test_coulomb_3d import KN, KT, LAWS, MU, imposed, motion, pair, random_mode
+from test_coulomb_3d import KN, KT, LAWS, MU, STEADY, imposed, motion, pair, random_mode
 from test_krylov import ROOT, blade, mode, preloaded
 
 import fretwave as fw
@@ -138,10 +138,13 @@ def test_integral_under_varying_normal_load(law):
 
 
 def test_what_does_not_slip_does_not_wear():
-    """Stuck under a large motion of the pair; open; without friction it slides all the way under N0."""
+    """Stuck under a large motion of the pair; open; in shakedown, where the slider only touches its limit. Without
+    friction it slides all the way, 4 a under N0."""
     q = motion((0, 0.1), (0, 1.0), (0, 0, 0.5))
     assert worn(pair(normal_load=10.0), q, 64)[0] == 0
-    assert worn(pair(normal_load=0.0, gap=1.0), q, 64)[0] == 0
+    assert worn(pair(normal_load=0.0, gap=2.0), q, 64)[0] == 0
+    for which in ("shakedown on one disc", "shakedown on two discs"):
+        assert worn(pair(), STEADY[which], 64)[0] == 0
     assert worn(pair(friction_coefficient=0.0, normal_load=2.0), motion((0,), (0, 1.0)), 64)[0] == pytest.approx(8.0)
 
 
@@ -263,6 +266,34 @@ def test_wear_of_a_blade(comm, stepper):
     steps = np.diff(depths, axis=0)
     assert (steps >= 0).all() and depths[-1].max() > 0.1 * ROOT["normal_load"] / ROOT["normal_stiffness"]
     assert (depths[-1][stuck] == 0).all()
+
+
+def test_damping_rises_and_falls(comm):
+    """The paper's figure 13: less load lets more pairs slip, until there is little left to slip under."""
+    mode, y = worn_blade(comm)
+    states = [mode.problem.state(point.state.y) for point in fw.Wear(mode, y, CYCLES)]
+    zeta, omega = (np.array([state[key] for state in states]) for key in ("zeta", "omega"))
+    top = int(np.argmax(zeta))
+    assert zeta[0] * 1.1 < zeta[top] and zeta[-1] < 0.5 * zeta[top]
+    assert (np.diff(zeta[: top + 1]) > 0).all() and (np.diff(zeta[top:]) < 0).all()
+    assert (np.diff(omega) < 0).all()
+
+
+def test_a_mode_that_ends_says_so(comm):
+    """Towards 10.4 vibrations the branch folds below this amplitude: steps shrink, what was found is kept."""
+    mode, y = worn_blade(comm)
+    march = fw.Wear(mode, y, 20.0, fw.WearControl(tolerance=1e-2, pressure_change=0.5))
+    ends = [point.cycles for point in march]
+    assert not march.converged and "the mode ends here" in march.reason
+    assert 10.0 < ends[-1] < 11.0
+
+
+def test_detours_come_back_to_the_amplitude(comm):
+    """By arclength from an amplitude beside: where the branch does not fold, to the very solution."""
+    mode, y = worn_blade(comm)
+    depth = 2e-5 * np.ones(6)
+    direct, around = mode.solve(depth, y), mode.elsewhere(depth, y)
+    assert np.allclose(whole(around.y), whole(direct.y), rtol=0, atol=1e-9)
 
 
 def test_steppers_agree(comm):

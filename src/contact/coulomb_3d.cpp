@@ -182,8 +182,11 @@ void Coulomb3d<Coupled>::diagnose(Motion const& motion, double const* f, Diagnos
       }
       const bool open = now[i] <= 0, slips = !open && size >= limit * (1 - 1e-12);
       out.status[size_t(t) * n + i] = open ? Status::open : slips ? Status::slip : Status::stick;
-      // trapezoidal in N, so that a sample that opens takes nothing away at once
-      if (!out.archard.empty() && (open || slips)) out.archard[i] += (now[i] + then[i]) / 2 * std::sqrt(path);
+      // trapezoidal in N, so that a sample that opens takes nothing away at once; a slider in shakedown
+      // touches its limit and moves by the rounding of u, which is no slip
+      const double size_u = std::hypot(u[n + i], u[2 * n + i]) + limit / kt;
+      if (!out.archard.empty() && (open || slips) && std::sqrt(path) > 1e-12 * size_u)
+        out.archard[i] += (now[i] + then[i]) / 2 * std::sqrt(path);
       if (!slips) continue;
       out.slip_path[i] += std::sqrt(path);
       // never negative: the slider moves along the force, by rounding only where it just touches the limit

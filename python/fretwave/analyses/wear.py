@@ -35,9 +35,9 @@ def run_wear(context: AnalysisContext) -> Outcome:
     starts = on_first_rank(context.comm, lambda: kept.load(0))
     if starts is None:
         starts = unworn_starts(replace(context, analysis=settings), analysis)
+        context.before_first()
         if context.comm.rank == 0:
             kept.save(0, starts)
-    context.before_first()
     lines = [
         Line(number, amplitude, starts[f"y_{number}"], starts[f"outcome_{number}"], folder / f"line_{number:03d}")
         for number, amplitude in enumerate(analysis.amplitude)
@@ -150,7 +150,8 @@ def _collect(
         for number, amplitude in enumerate(analysis.amplitude)
         if number not in reached
     ]
-    context.fields = fields(context.case)
+    # The run folder is open since the starts were found.
+    context = replace(context, before_first=lambda: None, fields=fields(context.case))
     writer = context.writer(
         columns(context.case),
         labels=next((result["labels"].split() for result in results if isinstance(result, dict)), ()),
