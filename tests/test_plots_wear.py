@@ -89,14 +89,15 @@ def test_histories_name_the_kinds_that_are_there_and_those_that_are_not(run):
 def test_kinds_follow_the_rate_of_a_pair():
     """Rates of known form: none, exponential decay to 1e-4 and to 0.1, growth that stops and comes back."""
     t = np.linspace(0.0, 1.0, 400)
-    twice = np.exp(-((t - 0.2) ** 2) / 0.005) + 0.5 * np.exp(-((t - 0.7) ** 2) / 0.005)
+    twice = np.exp(-((t - 0.2) ** 2) / 0.005) + 0.5 * np.exp(-((t - 0.7) ** 2) / 0.005)  # of areas 2 to 1
+    slight = np.exp(-((t - 0.2) ** 2) / 0.005) + 0.2 * np.exp(-((t - 0.7) ** 2) / 0.005)
     late = np.exp(-((t - 0.6) ** 2) / 0.01)
-    rate = np.stack([0 * t, np.exp(-9.2 * t), np.exp(-2.3 * t), twice, late], axis=1)
-    depth = np.vstack([np.zeros(5), np.cumsum((rate[1:] + rate[:-1]) / 2 * np.diff(t)[:, None], axis=0)])
+    rate = np.stack([0 * t, np.exp(-9.2 * t), np.exp(-2.3 * t), twice, slight, late], axis=1)
+    depth = np.vstack([np.zeros(6), np.cumsum((rate[1:] + rate[:-1]) / 2 * np.diff(t)[:, None], axis=0)])
     found = wear_lines.kinds(depth, rate)
-    assert found == ["never wears", "stops wearing", "keeps wearing", "wears again", "stops wearing"]
-    assert wear_lines.rise_after_fall(twice) == pytest.approx(0.5, rel=1e-2)
-    assert wear_lines.rise_after_fall(late) == 0.0
+    assert found == ["never wears", "stops wearing", "keeps wearing", "wears again", *(2 * ["stops wearing"])]
+    shares = [wear_lines.second_spell(depth[:, k], rate[:, k]) for k in range(1, 6)]
+    assert shares == pytest.approx([0, 0, 1 / 3, 1 / 6, 0], abs=2e-3)
 
 
 def test_a_line_that_ended_early_while_wearing_is_blank_behind_its_end():

@@ -108,7 +108,9 @@ def draw_volume(wear: Analysis, lines: Sequence[WearLine]) -> Figure:
             volume = MM**3 * line.columns[face]
             text = name if len(lines) == 1 else f"{name}, {amplitude_text(line)}"
             upper.plot(line.cycles, volume, dash, color=colour, label=text)
-            lower.stairs(np.diff(volume) / np.diff(line.cycles), line.cycles, linestyle=dash, color=colour)
+            lower.stairs(
+                np.diff(volume) / np.diff(line.cycles), line.cycles, baseline=None, linestyle=dash, color=colour
+            )
     upper.set_ylabel(style.label("Worn volume", "mm³"))
     lower.set_ylabel("Growth [mm³ per wear cycle]")
     lower.set_xlabel(cycle_label(wear))

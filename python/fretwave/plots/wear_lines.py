@@ -16,16 +16,18 @@ UNITS = ((1.0, "m"), (MM, "mm"), (MICRON, "µm"))
 #: a depth that grows by less than this share over the cycles that were left out stays as it is
 STAYS = 1e-2
 #: shares of the deepest depth, and of a pair's own largest rate, that count as nothing
-UNWORN, STOPPED = 1e-3, 1e-2
-#: rise of a pair's rate after it has fallen, as a share of its largest; and how far it falls first
-AGAIN = 0.2
+UNWORN, STOPPED = 1e-3, 0.05
+#: a second spell begins when the rate at least doubles after a fall below this share of what it was, and counts when
+#: this share of the depth comes from then on
+FALLEN, SECOND = 0.1, 0.2
 
 NEVER, STOPS, COMPLEX, ONWARDS = "never wears", "stops wearing", "wears again", "keeps wearing"
 KINDS = {NEVER: style.GREY, STOPS: style.BLUE, COMPLEX: style.ORANGE, ONWARDS: style.GREEN}
 RULE = (
     f"never wears: under {100 * UNWORN:g} % of the deepest;"
-    f" wears again: the rate rises by over {100 * AGAIN:g} % of its peak after a fall;\n"
-    f"stops: the last rate is under {100 * STOPPED:g} % of its peak; keeps wearing: all others"
+    f"  stops: the last rate is under {100 * STOPPED:g} % of its peak;  keeps wearing: all others;\n"
+    f"wears again: over {100 * SECOND:g} % of the depth comes in a second spell,"
+    f" when the rate at least doubles after it was under {100 * FALLEN:g} % of its peak"
 )
 
 
@@ -104,32 +106,42 @@ def kinds(depth: Array, rate: Array) -> list[str]:
 def _kind(depth: Array, rate: Array, deepest: float) -> str:
     if depth[-1] <= UNWORN * deepest:
         return NEVER
-    peak = float(rate.max())
-    if rise_after_fall(rate) > AGAIN * peak:
+    if second_spell(depth, rate) > SECOND:
         return COMPLEX
-    return STOPS if rate[-1] < STOPPED * peak else ONWARDS
+    return STOPS if rate[-1] < STOPPED * rate.max() else ONWARDS
 
 
-def rise_after_fall(rate: Array) -> float:
-    """Largest rise of a rate (n,) once it has fallen by that share of what it was."""
-    fallen = np.flatnonzero(rate < (1 - AGAIN) * np.maximum.accumulate(rate))
+def second_spell(depth: Array, rate: Array) -> float:
+    """Share of a pair's depth (n,) that comes from the trough on out of which its rate (n,) rises most, 0 without."""
+    fallen = np.flatnonzero(rate < FALLEN * np.maximum.accumulate(rate))
     if not len(fallen):
         return 0.0
     later = rate[fallen[0] :]
-    return float((later - np.minimum.accumulate(later)).max())
+    lowest = np.minimum.accumulate(later)
+    top = int(np.argmax(later - lowest))
+    if later[top] < 2 * lowest[top] or later[top] <= 0:
+        return 0.0
+    trough = fallen[0] + int(np.argmin(later[: top + 1]))
+    return float((depth[-1] - depth[trough]) / depth[-1])
 
 
 def examples(line: WearLine, contact: str) -> dict[str, int]:
-    """A pair of each kind there is: the deepest; of those that wear again the one whose rate rises most."""
+    """A pair of each kind there is: the deepest; of those that wear again the one that does so most."""
     depth, rate = line.depth[contact], line.rate[contact]
     found: dict[str, int] = {}
     words = np.array(kinds(depth, rate))
     for kind in KINDS:
         pairs = np.flatnonzero(words == kind)
         if len(pairs):
-            score = [rise_after_fall(rate[:, p]) if kind == COMPLEX else depth[-1, p] for p in pairs]
+            score = [_second_depth(depth[:, p], rate[:, p]) if kind == COMPLEX else depth[-1, p] for p in pairs]
             found[kind] = int(pairs[int(np.argmax(score))])
     return found
+
+
+def _second_depth(depth: Array, rate: Array) -> float:
+    """The smaller of what a pair's two spells wear off: both can be seen where it is large."""
+    share = second_spell(depth, rate)
+    return float(min(share, 1 - share) * depth[-1])
 
 
 def telling_line(lines: Sequence[WearLine], contact: str) -> WearLine:
