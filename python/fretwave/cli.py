@@ -142,10 +142,11 @@ def _add_view(commands: Any) -> None:
         help="write the motion over a period and the contact pairs for ParaView",
         description="Writes <analysis>.vtkhdf, the mesh with its displacement at phases of the period, and"
         " <analysis>_contact.vtkhdf, the contact pairs with forces, status and work. Several points follow each other."
-        " Of a sector the whole wheel is written, sector by sector.",
+        " Of a sector the whole wheel is written, sector by sector."
+        " Of wear without --point: <analysis>_wear.vtkhdf, the pairs with worn depth and pressure over wear cycles.",
     )
     view.add_argument("folder", type=Path, metavar="RUNDIR", help="folder of the run")
-    view.add_argument("--analysis", metavar="NAME", help="mode or forced response (default: the first)")
+    view.add_argument("--analysis", metavar="NAME", help="mode, forced response or wear (default: the first)")
     which = view.add_mutually_exclusive_group()
     which.add_argument("--point", type=int, nargs="+", default=[], metavar="N", help="points of the branch")
     which.add_argument("--amplitude", type=float, nargs="+", default=[], metavar="A", help="nearest kept points [m]")

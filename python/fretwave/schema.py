@@ -378,7 +378,7 @@ ANALYSES: dict[str, type[AnalysisSection]] = {
 
 
 class StudySection(Section):
-    """``[study]``: sweeps of ``fretwave study``, each with the others at their finest."""
+    """``[study]``: sweeps of ``fretwave study``, each with the others at their finest (of wear: as in the analysis)."""
 
     harmonics: Optional[list[int]] = key("highest harmonics", example="[1, 3, 7, 21, 41]", default=None, min_length=2)
     samples: Optional[list[int]] = key(
@@ -389,6 +389,12 @@ class StudySection(Section):
     )
     tolerance: Optional[list[Positive]] = key(
         "residual norms at which Newton stops", "-", "[1e-4, 1e-7, 1e-10]", default=None, min_length=2
+    )
+    wear_tolerance: Optional[list[Positive]] = key(
+        "tolerances of a step over wear cycles", "-", "[1e-1, 1e-2, 1e-3]", default=None, min_length=2
+    )
+    pressure_change: Optional[list[Positive]] = key(
+        "largest changes of pressure in a step over wear cycles", "-", "[0.4, 0.2, 0.1]", default=None, min_length=2
     )
 
 

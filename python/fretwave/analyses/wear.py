@@ -34,7 +34,7 @@ def run_wear(context: AnalysisContext) -> Outcome:
     kept = groups.Kept(folder, str(context.attributes["run_id"]))
     starts = on_first_rank(context.comm, lambda: kept.load(0))
     if starts is None:
-        starts = _starts(replace(context, analysis=settings), analysis)
+        starts = unworn_starts(replace(context, analysis=settings), analysis)
         context.before_first()
         if context.comm.rank == 0:
             kept.save(0, starts)
@@ -62,7 +62,7 @@ class LineRunner:
         return march_line(self.context, self.settings, self.unit, line, group)
 
 
-def _starts(context: AnalysisContext, analysis: WearAnalysis) -> dict[str, Any]:
+def unworn_starts(context: AnalysisContext, analysis: WearAnalysis) -> dict[str, Any]:
     """Unknowns at each amplitude by its number, from the mode's branch, and the normalised cycle. Collective."""
     import fretwave
 

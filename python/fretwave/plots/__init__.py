@@ -26,6 +26,8 @@ FAMILIES = (
     "forced_blades",
     "flutter",
     "free_decay",
+    "wear",
+    "wear_pairs",
     "study",
     "sweeps",
 )
