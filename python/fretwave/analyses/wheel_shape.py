@@ -154,7 +154,7 @@ def _lines(name: str, points: dict[str, Any], start: Any) -> list[str]:
     if start.avoid is not None:
         force = float(points["unfolding"].max())
         text = f"{name}: force on the avoided mode at most {force:.1e} of the inertia force"
-        held = ": not quite a free motion, this force holds the wave in its place (the sector is no mirror image of itself)"
+        held = ": not quite a free motion, it holds the wave in its place (the sector is no mirror image of itself)"
         lines.append(text + (held if force > HELD else ""))
     return lines
 
