@@ -10,7 +10,7 @@ import h5py
 import numpy as np
 import pytest
 import scipy.linalg
-from core_models import dense, whole
+from core_models import dense, unknowns, whole
 from cyclic_models import BLADE_1, BLADE_2, MASSES, NEIGHBOUR, blisk_stiffness
 from mpi4py import MPI
 from petsc4py import PETSc
@@ -295,6 +295,27 @@ def test_folds_at_one_amplitude_are_explained():
     assert one_by_one(spread) == "" and one_by_one({k: v[:5] for k, v in table.items()}) == ""
 
 
+@pytest.mark.ranks(1)
+def test_pictures_show_the_tables(comm, tmp_path):
+    """Bars of sectors and waves are the numbers of the two tables; a mode that localises gets a second picture."""
+    from fretwave.plots import plot_run
+    from fretwave.plots.data import Run
+    from fretwave.plots.wheel import draw_sectors
+
+    _, out = run(comm, tmp_path, *SHORT, mode=MISTUNED, tuned=WHEEL)
+    names = {path.stem for path in plot_run(out, ["wheel"])}
+    assert names == {"mode_sectors", "mode_localisation", "tuned_sectors"}
+    figure = draw_sectors(Run(out).analyses["mode"])
+    sectors, waves = (table(out / f"mode_{kind}.csv") for kind in ("sectors", "diameters"))
+    left, right = (figure.axes[k].patches for k in (0, 1))
+    first = sectors["sector_amplitude"][sectors["point"] == 0]
+    heights = np.array([bar.get_height() for bar in left])
+    assert heights / heights.max() == pytest.approx(first / first.max(), rel=1e-9)
+    assert heights.max() == pytest.approx(table(out / "mode.csv")["amplification"][0], rel=1e-9)
+    shares = waves["share"][waves["point"] == 0]
+    assert [bar.get_height() for bar in right] == pytest.approx(list(shares), abs=1e-12)
+
+
 #: (keys of the analysis, what is said)
 WRONG = {
     "part": (MISTUNED.replace('"blade"', '"blad"'), r"is no part of the stiffness(?s:.*)did you mean"),
@@ -330,3 +351,26 @@ def test_a_whole_structure_is_no_wheel(tmp_path):
     model.write_text(model.read_text().replace(f"sectors={N}, low=np.array([0]), high=np.array([3]), ", ""))
     with pytest.raises(CaseErrors, match="is of no sector of a wheel"):
         load_case(path)
+
+
+@pytest.mark.ranks(1)
+def test_committed_wheel_lies_on_the_branch_of_its_sector(comm, tmp_path):
+    """Issue 4 on the lumped blisk, at every point from stick to slip: the sector solved from sector 0 of the wheel."""
+    path = Path(__file__).parents[1] / "cases" / "blisk_lumped" / "case.toml"
+    options = RunOptions(tmp_path, ["mode_wheel.amplitude=[1e-4,3e-3]"], ["mode_wheel"], quick=True, plots=False)
+    assert run_case(path, options, comm) == 0
+    wheel, case = table(tmp_path / "mode_wheel.csv"), load_case(path)
+    with h5py.File(tmp_path / "results.h5", "r") as file:
+        coefficients = file["mode_wheel"]["coefficients"][:, : len(case.dofs)]
+    with build_model(case, (), comm, nodal_diameter=4) as model:
+        stuck = fw.linear_modes(model, 3)[2]
+        problem = fw.NonlinearMode(model, fw.Harmonics([1], 480), "CNM", 0, stuck)
+        for a, omega, beta, Q in zip(*(wheel[key] for key in ("amplitude", "omega", "beta")), coefficients):
+            y = np.concatenate([Q.ravel() / a, [beta / stuck.omega, omega / stuck.omega, np.log(a)]])
+            branch = fw.Continuation(problem, unknowns(problem, y), (0.5 * a, 2 * a))
+            state = problem.state(next(iter(branch)).y)
+            assert state["omega"] == pytest.approx(omega, rel=1e-8) and state["amplitude"] == pytest.approx(
+                a, rel=1e-12
+            )
+            assert state["beta"] == pytest.approx(beta, abs=1e-8 * omega)
+    assert len(coefficients) > 20 and wheel["unfolding"].max() < 1e-11 and max(wheel["zeta"]) > 5e-3

@@ -33,8 +33,11 @@ WHEEL = (
     Column("largest_sector", "1", "sector that moves most", "i"),
     Column("diameters", "1", "nodal diameters of the largest wave, negative backward", "i"),
     Column("diameters_share", "1", "share of the largest wave in the sum of squares"),
-    Column("unfolding", "1", "force on the avoided mode of a double one, of the inertia force"),
+    Column("unfolding", "1", "force on the avoided mode of a double one over the inertia force"),
 )
+
+#: A force on the avoided mode above this share of the inertia force is no rounding.
+HELD = 1e-8
 
 
 def wave_content(a: Complex) -> Complex:
@@ -64,15 +67,20 @@ class WheelShape:
         Observed in each sector.
     tuned_amplitude : float
         Of that dof in each sector, in the tuned travelling wave of unit modal mass.
+    mode : LinearMode
+        The problem's start.
     """
 
-    def __init__(self, context: AnalysisContext, dof: str, tuned_amplitude: float) -> None:
+    def __init__(self, context: AnalysisContext, dof: str, tuned_amplitude: float, mode: Any) -> None:
         self.wheel, self.M, self.tuned = context.wheel, context.case.M, tuned_amplitude
         self.dof = self.wheel.sector.dof(dof)
+        phi = mode.shape + 1j * mode.imaginary
+        # what forces are measured in, per displacement (`reference_stiffness` of the core)
+        self.stiffness = mode.omega**2 * np.real(phi.conj() @ (self.M @ phi)) / np.linalg.norm(phi) ** 2
 
     def row(self, problem: Any, y: Any, coefficients: Any) -> dict[str, Any]:
         """Of one point; on ranks without coefficients nothing. Collective."""
-        unfolding = problem.unfolding(y)
+        unfolding, state = problem.unfolding(y), problem.state(y)
         if coefficients is None:
             return {}
         q = complex_amplitudes(problem.harmonics.labels, coefficients)[1]
@@ -80,13 +88,15 @@ class WheelShape:
         content = np.abs(wave_content(a)) ** 2
         share = content / content.sum()
         most = int(np.argmax(np.round(share, 9)))  # of a real shape forward and backward waves have equal shares
+        inertia = self.M @ q
+        held = self.stiffness * state["amplitude"] / (state["omega0"] ** 2 * np.linalg.norm(inertia))
         return {
-            "amplification": float(np.abs(a).max() / (self.tuned * np.sqrt(np.real(q.conj() @ (self.M @ q))))),
+            "amplification": float(np.abs(a).max() / (self.tuned * np.sqrt(np.real(q.conj() @ inertia)))),
             "participation": participation(a),
             "largest_sector": int(np.argmax(np.round(np.abs(a) / np.abs(a).max(), 9))),
             "diameters": signed(most, self.wheel.sectors),
             "diameters_share": float(share[most]),
-            "unfolding": float(np.max(np.abs(unfolding), initial=0.0)),
+            "unfolding": float(held * np.linalg.norm(unfolding)),
         }
 
 
@@ -142,7 +152,10 @@ def _lines(name: str, points: dict[str, Any], start: Any) -> list[str]:
             f" {100 * points['diameters_share'][k]:.3g} % is the wave of {points['diameters'][k]} nodal diameters"
         )
     if start.avoid is not None:
-        lines.append(f"{name}: force on the avoided mode at most {points['unfolding'].max():.1e} of the inertia force")
+        force = float(points["unfolding"].max())
+        text = f"{name}: force on the avoided mode at most {force:.1e} of the inertia force"
+        held = ": not quite a free motion, it holds the wave in its place (the sector is no mirror image of itself)"
+        lines.append(text + (held if force > HELD else ""))
     return lines
 
 
