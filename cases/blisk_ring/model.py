@@ -42,6 +42,7 @@ def build(**options: Any) -> fw.BuiltModel:
         sectors=o.blades,
         low=r["low"],
         high=r["high"],
+        parts={"blade": r["K_blade"]},
     )
 
 
@@ -92,7 +93,7 @@ def full(**options: Any) -> dict[str, Any]:
     Returns
     -------
     dict
-        M, K : (n_dof, n_dof) CSR, without contact, both faces free; B : (3 n_pairs, n_dof), rows (normal, axial,
+        M, K : (n_dof, n_dof) CSR, without contact, both faces free; K_blade : the blade's share of K; B : (3 n_pairs, n_dof), rows (normal, axial,
         circumferential) of ring minus groove pair by pair, u_n > 0 closes; low, high : (n_face,) matching dofs;
         areas, points, frames, positions of the pairs; tip : dof; free : (n_free,) nodes of the mesh that are not held;
         coordinates (n_nodes, 3), hexahedra and boundary_faces of the whole mesh; disk_nodes, blade_nodes, blade_root;
@@ -117,6 +118,7 @@ def full(**options: Any) -> dict[str, Any]:
     return dict(
         M=sp.csr_matrix(sp.block_diag([M_disk, M_ring]).tocsr()[dofs][:, dofs]),
         K=sp.csr_matrix(K.tocsr()[dofs][:, dofs]),
+        K_blade=blade_stiffness(o, disk, len(nodes))[dofs][:, dofs],
         low=dofs_of(place[low]),
         high=dofs_of(place[high]),
         tip=3 * int(place[tip_node(disk)]) + 2,
@@ -137,6 +139,16 @@ def full(**options: Any) -> dict[str, Any]:
         worst_jacobian=min(worst),
         **{**pairs, "B": pairs["B"][:, dofs]},
     )
+
+
+def blade_stiffness(o: Options, disk: fe.Mesh, n_nodes: int) -> sp.csr_matrix:
+    """What the blade's elements put into K (3 n_nodes, 3 n_nodes), before any node is held."""
+    blade = fe.join([block for block in disk_blocks(o) if block.name.startswith("blade")], o.order)
+    number = np.empty(len(blade.nodes), dtype=int)
+    for name, lattice in blade.lattice.items():
+        number[lattice] = disk.lattice[name]
+    K, dofs = fe.assemble(blade, o.material)[1].tocoo(), dofs_of(number)
+    return sp.csr_matrix((K.data, (dofs[K.row], dofs[K.col])), (3 * n_nodes, 3 * n_nodes))
 
 
 def matched_faces(o: Options, disk: fe.Mesh, ring: fe.Mesh, free: Any) -> tuple[Any, Any]:
@@ -234,6 +246,7 @@ def compute(o: Options) -> dict[str, Any]:
     with reduce(M, K, keep=keep, modes=o.component_modes, comm=MPI.COMM_SELF) as reduction:
         small = dict(M=sp.csr_matrix(reduction.M), K=sp.csr_matrix(reduction.K))
         expand = P @ reduction.expand(np.eye(reduction.size))
+        small["K_blade"] = sp.csr_matrix(expand.T @ (model["K_blade"] @ expand))
     pad = sp.csr_matrix((B.shape[0], small["M"].shape[0] - n_kept))
     place = np.full(n, -1)
     place[keep] = np.arange(n_kept)

@@ -14,6 +14,7 @@ import scipy.sparse
 from . import checks
 from .built import BuiltModel
 from .checks_rest import check_preloads, check_reduction
+from .checks_wheel import check_wheels
 from .contacts import ContactSpec, read_contacts
 from .errors import CaseErrors, FretwaveError
 from .origin import Origin, check_physics, load_origin
@@ -210,6 +211,7 @@ def _build(source: Source, laws: Mapping[str, Any], found: list[FretwaveError]) 
         origin, contacts, neighbours = tie(section, source, origin, contacts, found)
         dofs, built = origin.dofs, origin.built
         check_waves(source, analyses, neighbours, reduction is not None, found)
+        check_wheels(source, analyses, neighbours, dofs, found)
     keep = kept_dofs(origin.named, contacts, analyses, origin.dofs) if origin and reduction else []
     checks.check_analyses(source, analyses, [origin.dofs[k] for k in keep] if origin and keep else dofs, found)
     check_reduction(source, reduction, found)

@@ -83,15 +83,26 @@ def describe(analysis: AnalysisSection, model: Any) -> list[str]:
         import fretwave
 
         harmonics = fretwave.choose_harmonics(model, analysis.harmonics, analysis.samples, analysis.retain)
+        n_dof = model.n_dof * (model.sectors if analysis.wheel else 1)
         lines.append(
             f"harmonics {_orders(harmonics.orders)}, {harmonics.samples} samples a period,"
-            f" {model.n_dof} x {harmonics.block_size} = {model.n_dof * harmonics.block_size} coefficients"
+            f" {n_dof} x {harmonics.block_size} = {n_dof * harmonics.block_size} coefficients"
         )
-        if analysis.nodal_diameter is not None:
-            lines.append(f"a wave of {analysis.nodal_diameter} nodal diameters on one sector of {model.sectors}")
+        if analysis.nodal_diameter is not None or analysis.wheel:
+            lines.append(_wave_line(analysis, model.sectors))
         if harmonics.left_out:
             lines.append("left out: " + "; ".join(harmonics.left_out))
     return lines
+
+
+def _wave_line(analysis: HarmonicSection, sectors: int) -> str:
+    place = f"all {sectors} sectors" if analysis.wheel else f"one sector of {sectors}"
+    if analysis.mistuning is not None:
+        place = f"{place}, their '{analysis.mistuning.of}' stiffness mistuned"
+    if analysis.nodal_diameter is None:
+        return place
+    wave = "standing wave" if getattr(analysis, "wave", "") == "standing" else "wave"
+    return f"a {wave} of {analysis.nodal_diameter} nodal diameters on {place}"
 
 
 def _headline(analysis: AnalysisSection) -> str:

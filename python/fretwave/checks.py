@@ -139,7 +139,8 @@ def _check_harmonics(report: Reporter, analysis: HarmonicSection, dofs: Sequence
             f"at least 2 H + 2 = {least} for harmonics = {analysis.harmonics}",
             f"write `samples = {_samples(analysis.harmonics)}`, or leave the key out",
         )
-    if dofs is not None and analysis.linear_mode > len(dofs):
+    by_wave = analysis.mistuning is None or analysis.nodal_diameter is not None  # else of the whole wheel
+    if dofs is not None and by_wave and analysis.linear_mode > len(dofs):
         report.wrong(
             ("linear_mode",), "does not exist", f"1 to {len(dofs)}, the number of dofs", "write `linear_mode = 1`"
         )

@@ -12,6 +12,7 @@ from .schema import (
     AnalysisSection,
     ContactSection,
     Damper,
+    MistuningSection,
     ModelSection,
     PreloadSection,
     ReductionSection,
@@ -36,7 +37,8 @@ def key_lines() -> Iterator[str]:
     for kind, analysis in ANALYSES.items():
         yield f'[[analysis]] with type = "{kind}"'
         yield from _section(analysis, without=set(AnalysisSection.model_fields))
-    for title, nested in (("step = { ... }", StepSection), ("dampers = [{ ... }]", Damper), ("[study]", StudySection)):
+    tables: list[tuple[str, type[BaseModel]]] = [("step = { ... }", StepSection), ("mistuning = { ... }", MistuningSection)]
+    for title, nested in (*tables, ("dampers = [{ ... }]", Damper), ("[study]", StudySection)):
         yield title
         yield from _section(nested)
 

@@ -24,7 +24,7 @@ from .schema import AnalysisSection, ForcedAnalysis, PreloadSection, TransientSe
 from .sectors import nodal_diameter
 from .source import display
 from .stopped import joined, not_converged
-from .wheel import on_wheel
+from .wheel import on_wheel, solver_room
 
 #: Module and function of each kind of analysis, imported when one is run.
 DISPATCH = {
@@ -233,7 +233,7 @@ class _Runner:
         case = on_wheel(self.case, analysis)
         preload = case.preload_of(analysis)
         built = build_model(case, self._dampers(analysis), self.comm, preload, nodal_diameter(analysis))
-        with built as model, options.inserted():
+        with built as model, options.inserted(), solver_room(case, analysis, prefix):
             context = AnalysisContext(
                 model,
                 case,

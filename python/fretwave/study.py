@@ -65,7 +65,7 @@ class _Solver:
         if self._parts is None or self._parts[0] != component_modes:
             if self._parts is not None:
                 self._parts[1].model.destroy()
-            case = reduce_case(self.case, self.comm, component_modes)
+            case = on_wheel(reduce_case(self.case, self.comm, component_modes), self.analysis)
             preload, diameters = case.preload_of(self.analysis), nodal_diameter(self.analysis)
             model = build_model(case, self.analysis.dampers, self.comm, preload, diameters)
             context = AnalysisContext(model, case, self.analysis, self.comm, Path(), self.console)

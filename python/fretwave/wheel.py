@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Optional
 
@@ -16,6 +18,11 @@ if TYPE_CHECKING:
     from .casefile import Case
 
 Array = npt.NDArray[np.float64]
+
+#: Iterations before GMRES restarts on a tuned wheel.
+FIRST_RESTART = 100
+#: A mistuned wheel of fewer coefficients is solved directly.
+DIRECT_UNKNOWNS = 2000
 
 
 @dataclass(frozen=True)
@@ -77,6 +84,32 @@ def on_wheel(case: Case, analysis: Any) -> Case:
         neighbours=None,
         wheel=Wheel(case, n, deviations),
     )
+
+
+@contextmanager
+def solver_room(case: Case, analysis: Any, prefix: str) -> Iterator[None]:
+    """How a mistuned wheel's linear systems are solved, unless PETSc options say otherwise.
+
+    The tuned wheel's operator preconditions the mistuned one. Near a resonance it leaves the modes of a family, whose
+    frequencies lie within the deviations of each other, as 2 N outliers; GMRES must find them all before it restarts.
+    Small systems are cheaper to factorise.
+    """
+    from petsc4py import PETSc
+
+    database: Any = PETSc.Options(prefix)
+    wanted: dict[str, Any] = {}
+    if case.wheel is not None and case.wheel.deviations is not None:
+        direct = len(case.dofs) * (2 * analysis.harmonics + 1) <= DIRECT_UNKNOWNS
+        room = FIRST_RESTART + 4 * case.wheel.sectors
+        wanted = {"route": "direct"} if direct else {"ksp_gmres_restart": room, "ksp_max_it": 2 * room}
+    added = [name for name in wanted if not database.hasName(name)]
+    for name in added:
+        database[name] = wanted[name]
+    try:
+        yield
+    finally:
+        for name in added:
+            database.delValue(name)
 
 
 def deviations_of(mistuning: MistuningSection, sectors: int) -> Array:

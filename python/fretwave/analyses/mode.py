@@ -62,7 +62,8 @@ def _follow(context: AnalysisContext, analysis: ModeAnalysis, problem: Any, writ
         branch = fretwave.Continuation.restore(problem, snapshot, **settings)
     else:
         branch = fretwave.Continuation(problem, problem.initial(low), **settings)
-    describe = None if context.case.wheel is None else WheelShape(context, start.tuned).row
+    on_wheel = context.case.wheel is not None
+    describe = WheelShape(context, analysis.normalise, start.attributes["tuned_amplitude"]).row if on_wheel else None
     with context.console.progress(context.name):
         for point in points_of(branch):
             row = record(writer, problem, point, branch.snapshot(), {}, describe)

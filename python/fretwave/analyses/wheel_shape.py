@@ -56,17 +56,17 @@ class WheelShape:
     Parameters
     ----------
     context
-        Of an analysis on a wheel; its `normalise` names the observed dof of each sector.
-    tuned : LinearMode
-        Of one sector.
+        Of an analysis on a wheel.
+    dof : str
+        Observed in each sector.
+    tuned_amplitude : float
+        Of that dof in each sector, in the tuned travelling wave of unit modal mass.
     """
 
-    def __init__(self, context: AnalysisContext, tuned: Any) -> None:
-        analysis: Any = context.analysis
+    def __init__(self, context: AnalysisContext, dof: str, tuned_amplitude: float) -> None:
         assert context.case.wheel is not None
-        self.wheel, self.M, self.dof = context.case.wheel, context.case.M, context.case.dof(analysis.normalise)
-        # unit modal mass of a sector is 1/sqrt(N) of that in each sector of the wheel
-        self.tuned = abs(tuned.shape[self.dof] + 1j * tuned.imaginary[self.dof]) / np.sqrt(self.wheel.sectors)
+        self.wheel, self.M, self.tuned = context.case.wheel, context.case.M, tuned_amplitude
+        self.dof = self.wheel.sector.dof(dof)
 
     def row(self, problem: Any, y: Any, coefficients: Any) -> dict[str, Any]:
         """Of one point; on ranks without coefficients nothing. Collective."""

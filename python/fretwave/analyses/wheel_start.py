@@ -9,7 +9,9 @@ from typing import Any, Optional
 
 import numpy as np
 import numpy.typing as npt
+import scipy.sparse as sp
 
+from ..cyclic import wave_mode
 from ..modes import LinearMode
 from .asymptotes import other_asymptote
 from .context import AnalysisContext
@@ -19,6 +21,8 @@ Complex = npt.NDArray[np.complex128]
 
 #: Modes of a mistuned wheel whose shares in a tuned wave differ by less are alike in it: the lower one is taken.
 ALIKE = 1e-3
+#: Families of the tuned sector looked through for that of a wheel's mode, beyond its number over N.
+MORE_FAMILIES = 3
 
 
 @dataclass(frozen=True)
@@ -61,15 +65,32 @@ def start_of(context: AnalysisContext) -> Start:
 
 
 def _on_wheel(context: AnalysisContext) -> Start:
-    analysis, wheel = context.analysis, context.case.wheel
-    tuned, asymptotes = _tuned(context)
+    wheel, mistuned = context.case.wheel, context.case.wheel.deviations is not None
     rest = rest_state(context)
+    mode = None
+    if mistuned and context.analysis.nodal_diameter is None:
+        mode = context.linear_mode("stuck", context.analysis.linear_mode)[-1]
+        context = replace(context, analysis=_family(context, mode))
+    tuned, asymptotes = _tuned(context)
+    analysis: Any = context.analysis
     if rest is not None:
         context.arrays["rest_displacement"] = rest.displacement
-    name = analysis.normalise
-    mode, avoid, sector = (_wave if wheel.deviations is None else _mistuned)(context, tuned)
-    attributes = {"normalise": f"{name}@{sector}", "sectors": wheel.sectors, "sector_dofs": wheel.unit}
-    return Start(mode, rest, asymptotes, context.case.dof(name, sector), avoid, tuned, attributes)
+    if mistuned:
+        mode, avoid = mode or _most_alike(context, tuned), None
+        sector = _largest(context, mode) if analysis.sector is None else analysis.sector
+    else:
+        sector = analysis.sector or 0
+        mode, avoid = _wave(context, tuned, sector)
+    dof = context.case.dof(analysis.normalise, sector)
+    attributes = {
+        "normalise": context.case.dofs[dof],
+        "sectors": wheel.sectors,
+        "sector_dofs": wheel.unit,
+        "tuned_omega": tuned.omega,
+        "tuned_amplitude": tuned_amplitude(context, tuned),
+        "deviations": wheel.deviations,
+    }
+    return Start(mode, rest, asymptotes, dof, avoid, tuned, attributes)
 
 
 @contextmanager
@@ -77,59 +98,76 @@ def _sector(context: AnalysisContext) -> Iterator[AnalysisContext]:
     """The same analysis of the tuned sector alone. Collective."""
     from ..run import build_model
 
-    case, diameters = context.case.wheel.sector, context.analysis.nodal_diameter or 0
-    preload = case.preload_of(context.analysis)
-    with build_model(case, context.analysis.dampers, context.comm, preload, diameters) as model:
+    analysis: Any = context.analysis
+    case = context.case.wheel.sector
+    preload = case.preload_of(analysis)
+    with build_model(case, analysis.dampers, context.comm, preload, analysis.nodal_diameter) as model:
         yield replace(context, model=model, case=case, arrays={})
 
 
 def _tuned(context: AnalysisContext) -> tuple[LinearMode, dict[str, float]]:
     """Linear mode of the tuned sector in the wave that the analysis names, and its other asymptote. Collective."""
+    analysis: Any = context.analysis
     with _sector(context) as sector:
-        stuck, _ = start_mode(sector, context.analysis.linear_mode)
+        stuck, _ = start_mode(sector, analysis.linear_mode)
         return stuck, other_asymptote(sector, stuck)
 
 
-def _wave(context: AnalysisContext, tuned: LinearMode) -> tuple[LinearMode, Optional[Complex], int]:
-    """A wave of the tuned wheel, the other of its pair (DESIGN fact 6), and the sector normalised.
+def tuned_amplitude(context: AnalysisContext, tuned: LinearMode) -> float:
+    """Of the normalised dof in each sector of the wheel in the tuned travelling wave of unit modal mass."""
+    dof = context.case.wheel.sector.dof(context.analysis.normalise)
+    return float(abs(tuned.shape[dof] + 1j * tuned.imaginary[dof]) / np.sqrt(context.case.wheel.sectors))
+
+
+def _family(context: AnalysisContext, mode: LinearMode) -> Any:
+    """The analysis with the tuned wave that has the largest share in a mode of the mistuned wheel. Collective.
+
+    Spatial indices n and N - n have equal shares in a real shape: the forward wave is named.
+    """
+    analysis, wheel = context.analysis, context.case.wheel
+    shape = wheel.by_sector(mode.shape)
+    M = sp.csr_matrix(wheel.sector.M)
+    waves = np.fft.ifft(shape, axis=0)[: wheel.sectors // 2 + 1]
+    diameters = int(np.argmax([np.real(c.conj() @ (M @ c)) for c in waves]))
+    named = analysis.model_copy(update={"nodal_diameter": diameters})
+    count = min(wheel.unit, analysis.linear_mode // wheel.sectors + MORE_FAMILIES)
+    with _sector(replace(context, analysis=named)) as sector:
+        modes = sector.linear_mode("stuck", count)
+    shares = [abs((m.shape - 1j * m.imaginary) @ (M @ waves[diameters])) for m in modes]
+    return named.model_copy(update={"linear_mode": 1 + int(np.argmax(shares))})
+
+
+def _wave(context: AnalysisContext, tuned: LinearMode, sector: int) -> tuple[LinearMode, Optional[Complex]]:
+    """A wave of the tuned wheel, and the other of its pair (DESIGN fact 6).
 
     Of a double mode, motions A phi + B conj(phi) with any A and B solve the linear equations. A travelling wave has
     B = 0: it avoids conj(phi). A standing wave A = B e^{i alpha} has its crest somewhere; with phi real at the
     normalised dof, Re(phi) has it there, and avoids Im(phi), the same wave moved by a quarter of its length.
     """
-    from ..cyclic import wave_mode
-
-    analysis, wheel = context.analysis, context.case.wheel
-    sector = analysis.sector or 0
+    analysis: Any = context.analysis
+    wheel = context.case.wheel
     mode = wave_mode(tuned, analysis.nodal_diameter, wheel.sectors)
     if 2 * analysis.nodal_diameter % wheel.sectors == 0:
-        return mode, None, sector
+        return mode, None
     phi = mode.shape + 1j * mode.imaginary
     if analysis.wave == "travelling":
-        return mode, phi.conj(), sector
+        return mode, phi.conj()
     crest = phi[context.case.dof(analysis.normalise, sector)]
     phi *= np.sqrt(2) * abs(crest) / crest
-    return LinearMode(mode.omega, mode.beta, phi.real.copy(), np.zeros(len(phi))), phi.imag + 0j, sector
+    return LinearMode(mode.omega, mode.beta, phi.real.copy(), np.zeros(len(phi))), phi.imag + 0j
 
 
-def _mistuned(context: AnalysisContext, tuned: LinearMode) -> tuple[LinearMode, None, int]:
-    """A mode of the mistuned wheel by its number, or the one most like a tuned wave, and where it moves most."""
-    analysis, case = context.analysis, context.case
-    if analysis.nodal_diameter is None:
-        mode = context.linear_mode("stuck", analysis.linear_mode)[-1]
-    else:
-        mode = _most_alike(context, tuned)
-    blades = case.wheel.by_sector(mode.shape)[:, case.dof(analysis.normalise)]
-    sector = int(np.argmax(np.abs(blades))) if analysis.sector is None else analysis.sector
-    return mode, None, sector
+def _largest(context: AnalysisContext, mode: LinearMode) -> int:
+    """Sector in which the normalised dof moves most."""
+    dof = context.case.wheel.sector.dof(context.analysis.normalise)
+    return int(np.argmax(np.abs(context.case.wheel.by_sector(mode.shape)[:, dof])))
 
 
 def _most_alike(context: AnalysisContext, tuned: LinearMode) -> LinearMode:
     """Of the N modes nearest in frequency the one with the largest share in the tuned pair's plane. Collective."""
-    from ..cyclic import wave_mode
-
+    analysis: Any = context.analysis
     wheel = context.case.wheel
-    wave = wave_mode(tuned, context.analysis.nodal_diameter, wheel.sectors)
+    wave = wave_mode(tuned, analysis.nodal_diameter, wheel.sectors)
     phi, M = wave.shape + 1j * wave.imaginary, context.case.M
     modes = nearest_modes(context, tuned.omega, wheel.sectors)
     shares = np.array([abs(phi.conj() @ (M @ mode.shape)) ** 2 for mode in modes])
