@@ -13,6 +13,8 @@ if TYPE_CHECKING:
     from .contact_laws import LawInfo, ParameterInfo, PythonLaw, laws
     from .continuation import Continuation, Point, StepControl
     from .cyclic import Sector
+    from .cyclic_reduction import SectorReduction, reduce_sector
+    from .cyclic_waves import WaveError
     from .faces import match_faces
     from .model import Contact, Model
     from .modes import LinearMode, linear_modes
@@ -27,6 +29,8 @@ _HOMES = {
     "built": ("BuiltContact", "BuiltModel"),
     "continuation": ("Continuation", "Point", "StepControl"),
     "cyclic": ("Sector",),
+    "cyclic_reduction": ("SectorReduction", "reduce_sector"),
+    "cyclic_waves": ("WaveError",),
     "faces": ("match_faces",),
     "contact_laws": ("LawInfo", "ParameterInfo", "PythonLaw", "laws"),
     "model": ("Contact", "Model"),
@@ -60,14 +64,17 @@ __all__ = [
     "PythonLaw",
     "Reduction",
     "Sector",
+    "SectorReduction",
     "StepControl",
     "Transient",
+    "WaveError",
     "choose_harmonics",
     "laws",
     "linear_modes",
     "match_faces",
     "nonlinear_error",
     "reduce",
+    "reduce_sector",
 ]
 
 

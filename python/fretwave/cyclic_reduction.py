@@ -1,0 +1,294 @@
+"""Reduction of one sector of a wheel: contact and observation dofs, its two faces, and a few component modes.
+
+The faces are kept whole, or move in interface modes: x_low = V a, x_high = R V b with the turn R of
+`Sector.from_faces`. V spans what chosen travelling waves of the unreduced sector do on its low face, with the contact
+stuck and sliding; a wave moves its high face alike, x_high = e^{-i theta} R x_low. So the reduced faces correspond as
+they are, b_j = a_{j+1}, and waves that gave V lose nothing on the faces. Craig-Bampton then reduces the inner dofs.
+
+References
+----------
+Castanier, M. P., Tan, Y.-C., Pierre, C., Characteristic constraint modes for component mode synthesis, AIAA J. 39(6),
+2001 (modes of the whole structure in place of interface dofs).
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import scipy.sparse as sp
+from mpi4py import MPI
+
+from .cyclic import Sector
+from .cyclic_waves import STATES, SectorWaves, WaveError
+from .errors import InputError
+from .faces import rotation
+from .model import Contact, by_sector
+from .reduction import RIGID_SHARE, Reduction, reduce
+
+Array = npt.NDArray[np.float64]
+Indices = npt.NDArray[np.intp]
+INTERFACE_WAVES, INTERFACE_TOLERANCE = 10, 1e-5
+
+
+class SectorReduction:
+    """x = P T x_r of one sector with both faces; made by `reduce_sector`.
+
+    Reduced coordinates: kept dofs in ascending order, low face, high face, component modes.
+
+    Attributes
+    ----------
+    M, K : (n_r, n_r)
+        On every rank, symmetric, both faces free. C or None.
+    low, high : (n_interface,)
+        Matching coordinates of the faces, which correspond as they are.
+    contacts : list of Contact
+        B on the reduced coordinates.
+    places : dict
+        Reduced coordinate of each kept dof that is one: of the high face none when the wheel has an axis.
+    sectors : int
+    diameters : tuple of int
+        Nodal diameters that gave interface modes; empty when the faces are whole.
+    component_hz : (n_modes,) [Hz]
+        With kept dofs and faces held.
+    wall_s : dict
+        interface, total [s].
+    """
+
+    def __init__(self, full: Sector, P: sp.csc_matrix, split: _Split, inner: Reduction, waves: SectorWaves) -> None:
+        self._P, self._inner, self._waves = P, inner, waves
+        self.sectors, self.diameters = full.sectors, waves.diameters
+        self.M, self.K, self.C, self.component_hz = inner.M, inner.K, inner.C, inner.component_hz
+        kept = len(split.kept)
+        self.low: Indices = kept + np.arange(split.n_interface)
+        self.high: Indices = self.low + split.n_interface
+        self.places: dict[int, int] = split.places()
+        self.contacts = [self._on(contact) for contact in waves.contacts]
+        self.wall_s: dict[str, float] = {}
+
+    @property
+    def size(self) -> int:
+        """n_r, both faces included."""
+        return len(self.K)
+
+    @property
+    def n_interface(self) -> int:
+        """Coordinates of one face."""
+        return len(self.low)
+
+    def sector(self) -> Sector:
+        """The reduced sector, its faces tied; its `expand` gives the coordinates with both faces."""
+        M, K, C = (None if A is None else sp.csr_matrix(A) for A in (self.M, self.K, self.C))
+        return Sector.from_faces(M, K, self.low, self.high, self.sectors, C, self.contacts)
+
+    def expand(self, x_r: npt.ArrayLike) -> Array:
+        """Motion of all dofs, (n_dof,) or (n_dof, n), from coordinates (n_r,) or (n_r, n), real. Collective."""
+        return np.asarray(self._P @ self._inner.expand(x_r))
+
+    def project(self, f: npt.ArrayLike) -> Array:
+        """Reduced load (n_r,) or (n_r, n) of forces on all dofs. Collective."""
+        return self._inner.project(self._P.T @ np.asarray(f, dtype=float))
+
+    def error(self, diameters: Iterable[int] | None = None, count: int = 5) -> list[WaveError]:
+        """Error of the lowest waves, stuck and sliding. Collective.
+
+        Parameters
+        ----------
+        diameters : default: those that gave interface modes, and one far from them that gave none
+        count : waves compared of each nodal diameter and state
+        """
+        chosen = self._compared() if diameters is None else [abs(d) for d in diameters]
+        wanted = [(d, state) for d in dict.fromkeys(chosen) for state in STATES]
+        small = SectorWaves(self.sector(), self._waves.comm, ())
+        count = min(count, small.sector.n_dof)
+        full, reduced = self._waves.hz(wanted, count), small.hz(wanted, count)
+        found = {wave: self._relative(full[wave], reduced[wave]) for wave in wanted}
+        return [WaveError(d, state, d in self.diameters, *found[d, state]) for d, state in wanted]
+
+    def destroy(self) -> None:
+        """Free the component modes; the reduced matrices stay. Collective."""
+        self._inner.destroy()
+
+    def __enter__(self) -> SectorReduction:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.destroy()
+
+    def _on(self, contact: Contact) -> Contact:
+        """The contact on reduced coordinates, which contain all that it touches."""
+        keep, more = self._inner.keep, len(self.component_hz)
+
+        def rows(B: Any) -> sp.csr_matrix:
+            moved = (sp.csr_matrix(B, dtype=float) @ self._P).tocsc()[:, keep]
+            return sp.csr_matrix(sp.hstack([moved, sp.csr_matrix((moved.shape[0], more))]))
+
+        return replace(contact, B={k: rows(B) for k, B in by_sector(contact.B).items()})
+
+    def _compared(self) -> list[int]:
+        """Nodal diameters that gave interface modes, and the one farthest from all of them."""
+        used = list(self.diameters)
+        others = [d for d in range(self.sectors // 2 + 1) if d not in used]
+        far = max(others, key=lambda d: min((abs(d - u) for u in used), default=0), default=None)
+        return used if far is None else [*used, far]
+
+    def _relative(self, full: Array, reduced: Array) -> tuple[Array, Array, Array]:
+        reference = self.component_hz[0] if len(self.component_hz) else full[-1]
+        rigid = reduced < RIGID_SHARE * reference
+        return full, reduced, np.where(rigid, np.nan, reduced / np.where(full > 0, full, 1.0) - 1)
+
+
+def reduce_sector(
+    M: Any,
+    K: Any,
+    low: npt.ArrayLike,
+    high: npt.ArrayLike,
+    sectors: int,
+    C: Any = None,
+    contacts: Sequence[Contact] = (),
+    keep: npt.ArrayLike = (),
+    axis: str | None = None,
+    interface_diameters: Sequence[int] | None = None,
+    interface_waves: int = INTERFACE_WAVES,
+    interface_tolerance: float = INTERFACE_TOLERANCE,
+    modes: int | None = None,
+    highest_hz: float | None = None,
+    comm: Any = None,
+) -> SectorReduction:
+    """Reduce a sector cut out of a wheel. Collective.
+
+    Parameters
+    ----------
+    M, K, C : (n_dof, n_dof) sparse or dense
+        Of the sector alone, both faces free, the same on every rank.
+    low, high, sectors, axis
+        As `Sector.from_faces`.
+    contacts : sequence of Contact
+        B on the sector's n_dof dofs. What they touch is kept.
+    keep : (n,) int
+        Observation dofs.
+    interface_diameters : sequence of int, optional
+        Nodal diameters whose waves give the interface modes; without it the faces are kept whole.
+    interface_waves : int
+        Lowest waves of each of them, stuck and as many sliding.
+    interface_tolerance : float
+        Interface modes of singular values above this share of the largest are kept. Face dofs that a contact touches
+        or that are to be kept stay coordinates of their own.
+    modes, highest_hz
+        Component modes, as in `reduce`.
+
+    Raises
+    ------
+    InputError
+        Faces that do not match, no such nodal diameter, or what `reduce` refuses.
+
+    Notes
+    -----
+    Each wave is computed by one rank, waves side by side: the interface modes do not depend on the number of ranks.
+    """
+    start = time.perf_counter()
+    comm = MPI.COMM_WORLD if comm is None else comm
+    diameters = _checked(interface_diameters, sectors, interface_waves)
+    full = Sector.from_faces(M, K, low, high, sectors, C, contacts, axis)
+    waves = SectorWaves(full, comm, diameters, contacts)
+    split = _Split.of(sp.csr_matrix(M).shape[0], np.asarray(low), np.asarray(high), contacts, keep, axis)
+    if interface_diameters is None:
+        V = split.whole()
+    else:
+        motions = waves.on(split.low, interface_waves)
+        V = comm.bcast(split.basis(motions, interface_tolerance) if comm.rank == 0 else None)
+    split.n_interface = V.shape[1]
+    P, kept = split.coordinates(V, sectors, axis)
+    interface = time.perf_counter() - start
+    M_P, K_P, C_P = (None if A is None else sp.csr_matrix(P.T @ sp.csr_matrix(A, dtype=float) @ P) for A in (M, K, C))
+    inner = reduce(M_P, K_P, C_P, kept, modes, highest_hz, comm)
+    found = SectorReduction(full, P, split, inner, waves)
+    found.wall_s = {"interface": interface, "total": time.perf_counter() - start}
+    return found
+
+
+def _checked(diameters: Sequence[int] | None, sectors: int, waves: int) -> tuple[int, ...]:
+    given = tuple(dict.fromkeys(abs(d) for d in diameters or ()))
+    if diameters is not None and (not given or max(given) > sectors // 2 or waves < 1):
+        raise InputError(
+            "there are no such waves for interface modes",
+            None,
+            f"{waves} of each of the nodal diameters {list(diameters)}",
+            f"1 or more, of nodal diameters from 0 to {sectors // 2}",
+            "choose those that the motion has: the wave's, and its multiples by the harmonics",
+        )
+    return given
+
+
+@dataclass
+class _Split:
+    """Dofs of a sector: inner ones, of these the kept ones, and the faces.
+
+    Attributes
+    ----------
+    own : (n,) places in the faces that stay coordinates
+    """
+
+    n: int
+    low: Indices
+    high: Indices
+    inner: Indices
+    kept: Indices
+    own: Indices
+    turned: bool
+    n_interface: int = 0
+
+    @classmethod
+    def of(
+        cls, n: int, low: Indices, high: Indices, contacts: Sequence[Contact], keep: npt.ArrayLike, axis: str | None
+    ) -> _Split:
+        touched = [sp.csr_matrix(B).indices for contact in contacts for B in by_sector(contact.B).values()]
+        wanted = np.unique(np.concatenate([np.asarray(keep, dtype=np.intp).ravel(), *touched]))
+        own = np.nonzero(np.isin(low, wanted) | np.isin(high, wanted))[0]
+        if axis is not None:  # a turn mixes the three components of a node
+            own = (3 * np.unique(own // 3)[:, None] + np.arange(3)).ravel()
+        inner = np.setdiff1d(np.arange(n), np.concatenate([low, high]))
+        return cls(n, low, high, inner, np.intersect1d(wanted, inner), own, axis is not None)
+
+    def whole(self) -> sp.csc_matrix:
+        """V of faces that are kept as they are."""
+        self.own = np.arange(len(self.low))
+        return _unit(self.own, len(self.low))
+
+    def basis(self, motions: Array, tolerance: float) -> sp.csc_matrix:
+        """V (n_face, p): unit vectors of the dofs kept, then orthonormal motions of the others.
+
+        Singular vectors have a sign of their own choice: the largest entry is made positive.
+        """
+        rest = np.setdiff1d(np.arange(len(self.low)), self.own)
+        U, s, _ = np.linalg.svd(motions[rest], full_matrices=False)
+        U = U[:, s > tolerance * s.max(initial=0.0)]
+        U = U * np.sign(U[np.argmax(np.abs(U), axis=0), np.arange(U.shape[1])]) if U.size else U
+        n_face = len(self.low)
+        return sp.csc_matrix(sp.hstack([_unit(self.own, n_face), _unit(rest, n_face) @ sp.csc_matrix(U)]))
+
+    def coordinates(self, V: sp.csc_matrix, sectors: int, axis: str | None) -> tuple[sp.csc_matrix, Indices]:
+        """x = P y, y = (inner dofs, low, high), and which of y are kept: kept dofs, low, high."""
+        turn = np.eye(1) if axis is None else rotation(2 * np.pi / sectors, axis)
+        turned = sp.kron(sp.identity(V.shape[0] // len(turn)), turn) @ V
+        parts = [_unit(self.inner, self.n), _unit(self.low, self.n) @ V, _unit(self.high, self.n) @ turned]
+        faces = len(self.inner) + np.arange(2 * V.shape[1])
+        return sp.csc_matrix(sp.hstack(parts)), np.concatenate([np.searchsorted(self.inner, self.kept), faces])
+
+    def places(self) -> dict[int, int]:
+        """Reduced coordinates of kept dofs."""
+        found = {int(dof): k for k, dof in enumerate(self.kept)}
+        for column, position in enumerate(self.own):
+            found[int(self.low[position])] = len(self.kept) + column
+            if not self.turned:
+                found[int(self.high[position])] = len(self.kept) + self.n_interface + column
+        return found
+
+
+def _unit(places: Indices, n: int) -> sp.csc_matrix:
+    """Unit vectors (n, len(places))."""
+    return sp.csc_matrix((np.ones(len(places)), (places, np.arange(len(places)))), (n, len(places)))
