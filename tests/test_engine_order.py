@@ -126,7 +126,12 @@ def test_force_on_a_sector_is_what_it_meets_in_the_flow(order, comm, tmp_path):
 
 def test_tuned_wheel_answers_like_its_sector(run):
     """In slip, with three harmonics; each sector with the wave's delay."""
-    alone, whole = run("sector"), run("tuned", ("engine_order = 8", "engine_order = 8\nwheel = true"))
+    mode = '[[analysis]]\nname = "mode"\ntype = "mode"\nnodal_diameter = 2\naerodynamics = true\nnormalise = "blade"\n'
+    keys = "harmonics = 3\nsamples = 480\namplitude = [0.2, 2.0]\n\n[[analysis]]"
+    named = ("samples = 480\nforce", 'backbone = "mode"\nsamples = 480\nforce')
+    beside = [("[[analysis]]", mode + keys), named]
+    alone = run("sector", *beside)
+    whole = run("tuned", *beside, ("engine_order = 8", "engine_order = 8\nwheel = true"))
     omega, q, slip = reported(alone)
     omega_whole, q_whole, slip_whole = reported(whole)
     assert len(omega) == 3 and slip.min() > 0.05 and np.allclose(slip, slip_whole, atol=1e-12)
@@ -136,6 +141,8 @@ def test_tuned_wheel_answers_like_its_sector(run):
     assert np.abs(q_whole.reshape(3, SECTORS, 2) - expected).max() < 1e-8 * np.abs(expected).max()
     peaks = table(whole / "forced_peaks.csv")[0]
     assert peaks["amplification"] == pytest.approx(1, abs=1e-6)
+    assert abs(peaks["distance_mode"]) < 0.01  # friction and flow dampen by a few percent
+    assert peaks["distance_mode"] == pytest.approx(table(alone / "forced_peaks.csv")[0]["distance_mode"], abs=1e-6)
     assert peaks["tuned_amplitude"] == pytest.approx(table(alone / "forced_peaks.csv")[0]["amplitude"], rel=1e-9)
     row = table(whole / "forced.csv")[-1]
     assert row["largest_amplitude"] == pytest.approx(row["amplitude"], rel=1e-7)

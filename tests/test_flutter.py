@@ -200,6 +200,13 @@ def test_check_and_the_list_of_keys_know_flutter(write, capsys, comm):
     assert "[aerodynamics]" in keys and "engine_order" in keys and "nodal_diameters" in keys
 
 
+@pytest.mark.ranks(1)
+def test_the_flow_can_be_set_from_the_command_line(write):
+    case = load_case(write(), ["aerodynamics.influence.1=[0.0,0.25]", "aerodynamics.frequency=2"])
+    assert case.aerodynamics.influence["1"] == [0.0, 0.25] and case.aerodynamics.frequency == 2
+    assert case.resolved["aerodynamics.influence"]["-1"] == [INFLUENCE[-1].real, INFLUENCE[-1].imag]
+
+
 #: (text in the case, its replacement, what is said)
 WRONG = {
     "no flow": (TEXT[TEXT.index("[aero") : TEXT.index("[[analysis]]")], "", "needs forces of the flow"),

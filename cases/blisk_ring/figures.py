@@ -115,10 +115,9 @@ def sweep(tables: list[list[dict[str, float]]], stuck_hz: float, sliding_hz: flo
             axes[0, column].axhline(value, color="0.5", lw=0.8, ls=":")
     bottom, top = axes[0, 0].get_ylim()
     axes[0, 0].set_ylim(bottom, top + 0.08 * (top - bottom))  # room for a label above the upper line
-    right = axes[0, 0].get_xlim()[1]
-    place = {"xytext": (-4, 4), "textcoords": "offset points", "color": "0.4", "ha": "right"}
-    axes[0, 0].annotate("ring stuck", (right, stuck_hz), **{**place, "xytext": (-4, -12)})
-    axes[0, 0].annotate("ring slides", (axes[0, 0].get_xlim()[0], sliding_hz), **{**place, "ha": "left"})
+    for text, value in (("ring stuck", stuck_hz), ("ring slides, always closed", sliding_hz)):
+        place = {"xytext": (6, 4), "textcoords": "offset points", "color": "0.4", "ha": "left"}
+        axes[0, 0].annotate(text, (0, value), xycoords=("axes fraction", "data"), **place)
     axes[0, 0].set_ylabel("frequency [Hz]")
     axes[1, 0].set_ylabel("damping ratio [%]")
     axes[1, 1].legend(*axes[0, 0].get_legend_handles_labels(), loc="upper left", frameon=False)

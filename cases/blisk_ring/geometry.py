@@ -24,22 +24,22 @@ class Options:
 
     blades: int = 36
     bore_radius: float = 0.190  #: held there
-    lip_radius: float = 0.240  #: of the rim's lower side
-    groove_radius: float = 0.244  #: of the groove's ceiling
+    lip_radius: float = 0.238  #: of the rim's lower side
+    groove_radius: float = 0.242  #: of the groove's ceiling
     rim_radius: float = 0.250
-    axial: tuple[float, ...] = (-0.018, -0.015, -0.014, -0.008, -0.007, -0.003, 0.003, 0.015, 0.018)  #: of AXIAL
-    span: float = 0.050  #: of the blade
+    axial: tuple[float, ...] = (-0.018, -0.0125, -0.012, -0.004, -0.0035, -0.003, 0.003, 0.015, 0.018)  #: of AXIAL
+    span: float = 0.053  #: of the blade
     hub_thickness: float = 0.0060  #: along the circumference, as tip_thickness
     tip_thickness: float = 0.0030
     tip_chord: float = 0.8  #: along the axis, as a share of the hub's
     edge_thickness: float = 0.4  #: of leading and trailing edge over the section's largest thickness
     stagger: tuple[float, float] = (45.0, 60.0)  #: at hub and tip
     camber: float = 0.002
-    ring_height: float = 0.006  #: radial; its width is that of the column "ring"
-    ring_hold: float = 62.8  #: soft foundation of the ring, as its own frequency on it [rad/s]
+    ring_height: float = 0.008  #: radial; its width is that of the column "ring"
+    ring_hold: float = 3142.0  #: springs that hold the ring along the groove, as its own frequency on them [rad/s]
     speed_rpm: float = 3000.0  #: gives the normal loads
     friction: float = 0.3  #: coefficient of friction
-    normal: str = "constant"  #: load on the pairs; or "variable", with lift-off (law coulomb_3d)
+    normal: str = "variable"  #: load on the pairs, with lift-off (law coulomb_3d); or "constant" (law jenkins)
     normal_stiffness: float = 5e13  #: of the contact, per area [N/m^3]
     tangential_stiffness: float = 4e13  #: [N/m^3]
     youngs_modulus: float = 114e9  #: of the blisk (Ti-6Al-4V) [Pa]
@@ -49,13 +49,13 @@ class Options:
     ring_poisson_ratio: float = 0.3
     ring_density: float = 7800.0
     order: int = 2  #: 2 for hex27, 1 for hex8 (contact then wants an even number of cells)
-    axial_cells: tuple[int, ...] = (1, 1, 3, 1, 2, 2, 4, 1)
+    axial_cells: tuple[int, ...] = (2, 1, 3, 1, 1, 2, 4, 1)
     circumferential_cells: tuple[int, int, int] = (3, 1, 3)
     radial_cells: tuple[int, int, int] = (9, 2, 2)  #: web, lip, rim
     span_cells: int = 12
     ring_cells: int = 2
-    interface_diameters: tuple[int, ...] = (4, 12, 16)  #: whose waves give the interface modes
-    interface_waves: int = 10  #: of each, stuck and sliding
+    interface_diameters: tuple[int, ...] = (0, 4, 18)  #: whose waves give the interface modes
+    interface_waves: int = 7  #: of each, stuck and sliding
     interface_tolerance: float = 1e-5  #: singular values kept, over the largest
     component_modes: int = 30
 

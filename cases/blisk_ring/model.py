@@ -20,8 +20,8 @@ from mpi4py import MPI
 import fretwave as fw
 from fretwave import fe
 from fretwave.errors import InputError
-from fretwave.faces import rotation
 from fretwave.fe.cache import cached, default_folder, model_key
+from fretwave.model import by_sector
 
 sys.path.insert(0, str(Path(__file__).parent))
 from geometry import Options, blade_lines, disk_blocks, low_and_high, ring_blocks, rooted, tip_node  # noqa: E402
@@ -106,9 +106,9 @@ def full(**options: Any) -> dict[str, Any]:
     Returns
     -------
     dict
-        M, K : (n_dof, n_dof) CSR, without contact, both faces free; K_blade : the blade's share of K;
-        B : (3 n_pairs, n_dof), rows (normal, axial, circumferential) of ring minus groove pair by pair, u_n > 0 closes;
-        low, high : (n_face,) matching dofs;
+        M, K : (n_dof, n_dof) CSR, without contact, both faces free; K_blade : the blade's share of K; B : (3 n_pairs,
+        n_dof), rows (normal, axial, circumferential) of ring minus groove pair by pair, u_n > 0 closes; low, high :
+        (n_face,) matching dofs;
         areas, points, frames, positions of the pairs; tip : dof; free : (n_free,) nodes of the mesh that are not held;
         coordinates (n_nodes, 3), hexahedra and boundary_faces of the whole mesh; disk_nodes, blade_nodes, blade_root;
         ring_mass [kg], ring_radius [m]; mass, rigid_residual : (disk with blade, ring).
@@ -122,13 +122,13 @@ def full(**options: Any) -> dict[str, Any]:
     ]
     nodes = np.concatenate([disk.nodes, ring.nodes])
     (M_disk, K_disk), (M_ring, K_ring) = parts
-    K = sp.block_diag([K_disk, K_ring + o.ring_hold**2 * M_ring])
+    pairs = contact_pairs(o, disk, ring)
+    K = sp.block_diag([K_disk, K_ring]) + ring_springs(o, pairs, reports[1].mass)
     free = np.nonzero(np.hypot(nodes[:, 0], nodes[:, 1]) > o.bore_radius * (1 + 1e-9))[0]
     dofs = dofs_of(free)
     low, high = matched_faces(o, disk, ring, free)
     place = np.full(len(nodes), -1)
     place[free] = np.arange(len(free))
-    pairs = contact_pairs(o, disk, ring)
     return dict(
         M=sp.csr_matrix(sp.block_diag([M_disk, M_ring]).tocsr()[dofs][:, dofs]),
         K=sp.csr_matrix(K.tocsr()[dofs][:, dofs]),
@@ -163,6 +163,16 @@ def blade_stiffness(o: Options, disk: fe.Mesh, n_nodes: int) -> sp.csr_matrix:
         number[lattice] = disk.lattice[name]
     K, dofs = fe.assemble(blade, o.material)[1].tocoo(), dofs_of(number)
     return sp.csr_matrix((K.data, (dofs[K.row], dofs[K.col])), (3 * n_nodes, 3 * n_nodes))
+
+
+def ring_springs(o: Options, pairs: dict[str, Any], ring_mass: float) -> sp.csr_matrix:
+    """Springs between ring and groove along both tangents, spread by area, on all dofs.
+
+    They stand for the tabs that keep a ring in its groove. Friction alone does not: where the normal load changes with
+    the motion, a travelling wave drags the ring along, as the rotor of an ultrasonic motor.
+    """
+    k = o.ring_hold**2 * ring_mass * pairs["areas"] / pairs["areas"].sum()
+    return sp.csr_matrix(pairs["B"].T @ sp.diags(np.column_stack([0 * k, k, k]).ravel()) @ pairs["B"])
 
 
 def matched_faces(o: Options, disk: fe.Mesh, ring: fe.Mesh, free: Any) -> tuple[Any, Any]:
@@ -216,23 +226,6 @@ def waves(o: Options, model: dict[str, Any], nodal_diameter: int, count: int, ta
         return fw.linear_modes(linear, count, "free")
 
 
-def interface_modes(o: Options, model: dict[str, Any]) -> Array:
-    """Orthonormal motions (n_face, p) of the low face: those of the lowest waves, stuck and sliding.
-
-    Real and imaginary parts of every wave, of unit length each, by decreasing singular value.
-    """
-    kept = np.setdiff1d(np.arange(model["M"].shape[0]), model["high"])
-    where = np.searchsorted(kept, model["low"])
-    columns = []
-    for diameters in o.interface_diameters:
-        for tangential in (True, False):
-            for mode in waves(o, model, diameters, o.interface_waves, tangential):
-                scale = np.linalg.norm([mode.shape[where], mode.imaginary[where]])
-                columns += [mode.shape[where] / scale, mode.imaginary[where] / scale]
-    U, s, _ = np.linalg.svd(np.column_stack(columns), full_matrices=False)
-    return np.asarray(U[:, s > o.interface_tolerance * s[0]])
-
-
 def reduced(cache: Union[Path, str, None] = "default", **options: Any) -> dict[str, Any]:
     """The sector on contact dofs, tip, amplitudes of interface modes on both faces, and component modes.
 
@@ -249,40 +242,34 @@ def reduced(cache: Union[Path, str, None] = "default", **options: Any) -> dict[s
 
 
 def compute(o: Options) -> dict[str, Any]:
-    """Change of coordinates on the faces, then Craig-Bampton (`fretwave.reduction`)."""
-    from fretwave.reduction import reduce
-
+    """Interface modes and Craig-Bampton (`fretwave.reduce_sector`)."""
     model = full(**asdict(o))
-    V = interface_modes(o, model)
-    P, keep, low, high = change_of_faces(o, model, V)
-    M, K, B = P.T @ model["M"] @ P, P.T @ model["K"] @ P, model["B"] @ P
-    n, n_kept = P.shape[1], len(keep)
-    with reduce(M, K, keep=keep, modes=o.component_modes, comm=MPI.COMM_SELF) as reduction:
-        small = dict(M=sp.csr_matrix(reduction.M), K=sp.csr_matrix(reduction.K))
-        expand = P @ reduction.expand(np.eye(reduction.size))
-        small["K_blade"] = sp.csr_matrix(expand.T @ (model["K_blade"] @ expand))
-    pad = sp.csr_matrix((B.shape[0], small["M"].shape[0] - n_kept))
-    place = np.full(n, -1)
-    place[keep] = np.arange(n_kept)
-    small |= dict(B=sp.csr_matrix(sp.hstack([B.tocsc()[:, keep], pad])), low=place[low], high=place[high])
-    own = np.nonzero(P.tocsr()[model["tip"]].toarray().ravel())[0]
-    return {**model, **small, "tip": int(place[own[0]]), "expand": expand, "unreduced": model["M"].shape[0]}
-
-
-def change_of_faces(o: Options, model: dict[str, Any], V: Array) -> tuple[sp.csc_matrix, Any, Any, Any]:
-    """x = P y: the faces' dofs by V and by V turned; then the coordinates to keep and those of both faces."""
-    n, p = model["M"].shape[0], V.shape[1]
-    inner = np.setdiff1d(np.arange(n), np.concatenate([model["low"], model["high"]]))
-    own = sp.csc_matrix((np.ones(len(inner)), (inner, np.arange(len(inner)))), (n, len(inner)))
-    turned = sp.kron(sp.identity(len(V) // 3), rotation(2 * np.pi / o.blades, "z")) @ V
-    faces = [
-        sp.csc_matrix((W.ravel(), (np.repeat(dofs, p), np.tile(np.arange(p), len(dofs)))), (n, p))
-        for dofs, W in ((model["low"], V), (model["high"], turned))
-    ]
-    P = sp.hstack([own, *faces], format="csc")
-    low = len(inner) + np.arange(p)
-    kept = np.union1d(np.unique(model["B"].indices), [model["tip"]])
-    return P, np.concatenate([np.searchsorted(inner, kept), low, low + p]), low, low + p
+    given = {
+        **contact_parameters(replace(o, speed_rpm=1.0), model),
+        "friction_coefficient": 1.0,
+    }  # only stiffness counts
+    with fw.reduce_sector(
+        model["M"],
+        model["K"],
+        model["low"],
+        model["high"],
+        o.blades,
+        contacts=[fw.Contact("coulomb_3d", model["B"], given)],
+        keep=[model["tip"]],
+        axis="z",
+        interface_diameters=o.interface_diameters,
+        interface_waves=o.interface_waves,
+        interface_tolerance=o.interface_tolerance,
+        modes=o.component_modes,
+        comm=MPI.COMM_SELF,
+    ) as reduction:
+        expand = reduction.expand(np.eye(reduction.size))
+    small = {letter: sp.csr_matrix(getattr(reduction, letter)) for letter in "MK"}
+    small |= dict(
+        B=by_sector(reduction.contacts[0].B)[0], K_blade=sp.csr_matrix(expand.T @ (model["K_blade"] @ expand))
+    )
+    small |= dict(low=reduction.low, high=reduction.high, tip=reduction.places[model["tip"]], expand=expand)
+    return {**model, **small, "unreduced": model["M"].shape[0]}
 
 
 def blade_modes(model: dict[str, Any], count: int = 6) -> tuple[Array, Array, Any]:

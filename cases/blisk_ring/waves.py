@@ -11,6 +11,7 @@ import argparse
 import csv
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 import fretwave as fw
+from fretwave.preload import balanced
 
 sys.path.insert(0, str(Path(__file__).parent))
 import model as case  # noqa: E402
@@ -31,12 +33,12 @@ QUICK: dict[str, Any] = dict(
     ring_cells=1,
 )
 #: Friction coefficients of the sweep, over a factor 25.
-FRICTION = (0.04, 0.09, 0.2, 0.45, 1.0)
+FRICTION = (0.02, 0.05, 0.12, 0.25, 0.5)
 NODAL_DIAMETER = 4
 #: Time samples of a period: a multiple of the sectors, so that all see the kinks between the same samples.
 SAMPLES = 360
 Array = npt.NDArray[np.float64]
-HELD = ("amplitude", "omega", "frequency_hz", "beta", "zeta", "stick", "slip", "error_estimate")
+HELD = ("amplitude", "omega", "frequency_hz", "beta", "zeta", "stick", "slip", "open", "error_estimate")
 
 
 def sector(o: case.Options, r: dict[str, Any]) -> fw.Sector:
@@ -54,7 +56,8 @@ def tip(r: dict[str, Any]) -> int:
 
 def bending(o: case.Options, f: dict[str, Any], r: dict[str, Any], state: str) -> tuple[int, fw.LinearMode, float]:
     """Number, wave and share of the wave of 4 nodal diameters that is most like the blade's second bending."""
-    one, (_, shape, dofs) = sector(o, r), case.second_bending(o, f)
+    constant = replace(o, normal="constant")  # whose free waves are closed and sliding
+    one, (_, shape, dofs) = sector(constant, r), case.second_bending(o, f)
     with one.model(NODAL_DIAMETER) as linear:
         found = fw.linear_modes(linear, 9, state)
     moved = [r["expand"] @ one.expand(mode.shape + 1j * mode.imaginary, NODAL_DIAMETER) for mode in found]
@@ -75,9 +78,13 @@ def families(o: case.Options, r: dict[str, Any], count: int = 7) -> Array:
 def branch(o: case.Options, r: dict[str, Any], stuck: fw.LinearMode, harmonics: int) -> list[dict[str, float]]:
     """Points from stick to slip; the amplitudes, of the tip [m], are multiples of mu."""
     with sector(o, r).model(NODAL_DIAMETER) as model:
-        chosen = fw.choose_harmonics(model, harmonics, SAMPLES)
+        retain = "all" if o.normal == "variable" else "odd"
+        chosen = fw.choose_harmonics(model, harmonics, SAMPLES, retain)
         mode = fw.NonlinearMode(model, chosen, "CNM", tip(r), stuck)
-        first, last = 7e-5 * o.friction, 5e-2 * o.friction
+        if o.normal == "variable":
+            rest = balanced(model, stuck)
+            mode.preload(rest.displacement, rest.load)
+        first, last = 4e-5 * o.friction, 1.8e-3 * o.friction
         points = fw.Continuation(mode, mode.initial(first), (first, last), fw.StepControl(maximum=0.2))
         table = []
         for point in points:
@@ -95,7 +102,8 @@ def summary(table: list[dict[str, float]]) -> str:
     return (
         f"mu {peak['friction']:.2f}: slip from a = {onset['amplitude']:.3e} m, "
         f"lowest {lowest['frequency_hz']:.2f} Hz at {lowest['amplitude']:.3e} m, "
-        f"largest zeta {100 * peak['zeta']:.4f} % at {peak['amplitude']:.3e} m, last {table[-1]['frequency_hz']:.2f} Hz"
+        f"largest zeta {100 * peak['zeta']:.4f} % at {peak['amplitude']:.3e} m, last {table[-1]['frequency_hz']:.2f} Hz, "
+        f"{100 * table[-1]['open']:.0f} % open"
     )
 
 
@@ -103,7 +111,7 @@ def coincide(tables: list[list[dict[str, float]]]) -> tuple[float, float]:
     """Largest distance of the branches over a / mu from the first: relative in omega, and in zeta over its maximum."""
 
     def curve(table: list[dict[str, float]], key: str) -> Array:
-        grid = np.log(np.geomspace(1e-4, 4e-2, 400))
+        grid = np.log(np.geomspace(5e-5, 1.7e-3, 400))
         return np.interp(grid, [np.log(row["amplitude"] / row["friction"]) for row in table], [r[key] for r in table])
 
     found = []
@@ -121,7 +129,7 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="coarse mesh")
     parser.add_argument("--only", default="linear,sweep,mesh")
     parser.add_argument("--compare", default="4", help="nodal diameters compared with the unreduced sector")
-    parser.add_argument("--harmonics", type=int, default=5)
+    parser.add_argument("--harmonics", type=int, default=3)
     parser.add_argument("--out", type=Path, default=Path("runs/blisk_ring_waves"))
     arguments = parser.parse_args()
     parts, options = arguments.only.split(","), QUICK if arguments.quick else {}

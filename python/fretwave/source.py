@@ -159,7 +159,7 @@ class Source:
     def _path(self, parts: Sequence[str], origin: str) -> KeyPath | None:
         """Where an address points; analyses and contacts are addressed by name."""
         kind, rest = ("analysis", parts)
-        if parts[0] in ("title", "model", "reduction", "preload"):
+        if parts[0] in ("title", "model", "reduction", "preload", "aerodynamics"):
             return tuple(parts)
         if parts[0] in ("contact", "analysis") and len(parts) > 1:
             kind, rest = parts[0], parts[1:]

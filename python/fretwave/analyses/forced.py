@@ -62,7 +62,8 @@ def _all_levels(context: AnalysisContext, analysis: ForcedAnalysis, excitation: 
     wheel = context.case.wheel is not None and writer.rows > 0
     blades = blade_amplitudes(excitation, writer) if wheel and writer.active else None
     writer.close("stopped" if stopped else "done", reason, events="[]")
-    summary = blade_by_blade(excitation, table, blades) if wheel else _peaks(context, analysis, table)
+    curves = _curves(context, analysis)
+    summary = blade_by_blade(excitation, table, blades, curves) if wheel else _peaks(context, table, curves)
     if analysis.time_points and writer.rows:
         summary += time_points(context, table, analysis.time_points)
     goal = f"{analysis.frequency[1]:g} Hz at every level"
@@ -116,11 +117,14 @@ def _missing_backbones(context: AnalysisContext) -> list[str]:
     return [f"distance of the peaks from '{name}' (no results of it in this folder)" for name in missing]
 
 
-def _peaks(context: AnalysisContext, analysis: ForcedAnalysis, table: dict[str, Any]) -> list[str]:
+def _curves(context: AnalysisContext, analysis: ForcedAnalysis) -> dict[str, ModeCurve]:
+    """Backbones that have results. Collective."""
+    names = [name for name in _backbones(analysis) if context.has_results(name)]
+    return {name: ModeCurve.from_table(context.table(name)) for name in names}
+
+
+def _peaks(context: AnalysisContext, table: dict[str, Any], curves: dict[str, ModeCurve]) -> list[str]:
     """Write the peaks of all levels with their distance from the backbones; a line for each level."""
-    curves = {
-        name: ModeCurve.from_table(context.table(name)) for name in _backbones(analysis) if context.has_results(name)
-    }
     if not table:
         return []
     peaks = peak_table({key: table[key] for key in ("level", "omega", "amplitude", "phase")}, curves)

@@ -15,17 +15,21 @@ import numpy.typing as npt
 
 from .branch import points_of
 from .excitation import Excitation, tuned_excitation
-from .response_peaks import NOWHERE, Peak, amplitude_peak
+from .mode_curve import ModeCurve
+from .response_peaks import NOWHERE, Peak, amplitude_peak, distance
 
 Array = npt.NDArray[np.float64]
 
 
-def blade_by_blade(excitation: Excitation, table: Mapping[str, Array], amplitudes: Optional[Array]) -> list[str]:
+def blade_by_blade(
+    excitation: Excitation, table: Mapping[str, Array], amplitudes: Optional[Array], curves: Mapping[str, ModeCurve]
+) -> list[str]:
     """Write the peaks of all blades and of the tuned wheel; a line for each level. Collective.
 
     Parameters
     ----------
     table, amplitudes : of the finished analysis, (points, N); on other ranks than the writing one None
+    curves : backbones that the largest peaks are compared with
     """
     context = excitation.context
     with tuned_excitation(context, excitation.harmonics) as sector:
@@ -33,6 +37,9 @@ def blade_by_blade(excitation: Excitation, table: Mapping[str, Array], amplitude
     if amplitudes is None:
         return []
     peaks, blades = blade_tables(table, amplitudes, tuned)
+    largest = [Peak(2 * np.pi * f, a) for f, a in zip(peaks["frequency_hz"], peaks["amplitude"])]
+    for name, curve in curves.items():
+        peaks[f"distance_{name}"] = np.array([distance(peak, curve, undamped=False) for peak in largest])
     for suffix, columns in (("peaks", peaks), ("blades", blades), ("tuned", tuned)):
         context.write_table(suffix, columns)
     rows = [{key: float(values[k]) for key, values in peaks.items()} for k in range(len(peaks["level"]))]
