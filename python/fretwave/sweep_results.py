@@ -49,7 +49,7 @@ class Branch:
     attributes : dict
         Of the analysis' group.
     start_forces : dict
-        Of each contact over the period of the first point (n_samples, components, n_pairs) [N], where they are kept.
+        By row that starts a branch: of each contact over its period (n_samples, components, n_pairs) [N], where kept.
     """
 
     number: int
@@ -57,7 +57,7 @@ class Branch:
     table: dict[str, Any]
     units: dict[str, tuple[str, str]]
     attributes: dict[str, Any]
-    start_forces: dict[str, Any]
+    start_forces: dict[int, dict[str, Any]]
 
     @property
     def points(self) -> int:
@@ -75,9 +75,16 @@ def read_branch(folder: Path, name: str, number: int, run_id: str) -> Branch | N
         table = {key: data[()] for key, data in group["points"].items()}
         units = {key: (data.attrs["units"], data.attrs["long_name"]) for key, data in group["points"].items()}
         order = [key for key in COLUMNS if key in table] + [key for key in table if key not in COLUMNS]
-        kept = "reported" in group and len(group["reported"]) and group["reported"][0] == 0
-        forces = {key[len("contact_") :]: group[key]["f"][0] for key in group if key.startswith("contact_") and kept}
-        return Branch(number, folder, {key: table[key] for key in order}, units, dict(group.attrs), forces)
+        ordered = {key: table[key] for key in order}
+        return Branch(number, folder, ordered, units, dict(group.attrs), _start_forces(group, table))
+
+
+def _start_forces(group: Any, table: Mapping[str, Any]) -> dict[int, dict[str, Any]]:
+    """Forces of the contacts at rows with the event `start`."""
+    contacts = [key for key in group if key.startswith("contact_")]
+    reported = group["reported"][()] if "reported" in group else ()
+    starts = [(k, int(row)) for k, row in enumerate(reported) if b"start" in table["event"][row].split()]
+    return {row: {key[len("contact_") :]: group[key]["f"][k] for key in contacts} for k, row in starts}
 
 
 def write_sweep(
@@ -180,7 +187,7 @@ def _summary(kind: str, plan: Plan, branches: Sequence[Branch]) -> list[dict[str
             chosen = np.full(branch.points, True) if part is None else column == part
             table = {key: values[chosen] for key, values in branch.table.items()}
             head = {**keys, "value": branch.number, **({} if part is None else {split: part.item()})}
-            forces = branch.start_forces if chosen[0] else {}
+            forces = branch.start_forces.get(int(np.argmax(chosen)), {})
             rows.append({**head, **summarise(kind, table, branch.attributes, forces)})
     return rows
 
