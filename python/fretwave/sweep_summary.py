@@ -35,7 +35,7 @@ MODE = (
     Column("largest_zeta", "1", "largest modal damping ratio"),
     Column("amplitude_of_largest_zeta", "m", "amplitude of the largest damping"),
     Column("lowest_frequency_hz", "Hz", "lowest frequency of the branch"),
-    Column("amplitude_of_lowest_frequency", "m", "amplitude of the lowest frequency"),
+    Column("amplitude_of_lowest_frequency", "m", "amplitude of the lowest frequency, nan at an end of the branch"),
     Column("last_frequency_hz", "Hz", "frequency at the end of the branch"),
     Column("stable_limit_cycle", "m", "smallest amplitude at which damping rises through zero"),
     Column("unstable_limit_cycle", "m", "smallest amplitude at which damping falls through zero"),
@@ -95,7 +95,7 @@ def _mode(table: Table, attributes: Mapping[str, Any], forces: Mapping[str, Any]
         "largest_zeta": float(zeta[top]),
         "amplitude_of_largest_zeta": float(amplitude[top]),
         "lowest_frequency_hz": float(frequency[low]),
-        "amplitude_of_lowest_frequency": float(amplitude[low]),
+        "amplitude_of_lowest_frequency": float(amplitude[low]) if 0 < low < len(zeta) - 1 else np.nan,
         "last_frequency_hz": float(frequency[-1]),
         **_limit_cycles(table),
     }

@@ -200,9 +200,8 @@ def _amplitudes(axes: Axes, x: Any, table: Table, number: int) -> None:
     look = {"linestyle": line, "marker": "o", "markersize": 5}
     axes.plot(x, table["slip_threshold"], color=style.INK, label=name("first slip"), **look)
     axes.plot(x, table["onset_amplitude"], color=style.BLUE, label=name("damping sets in"), **look)
-    rises = table["lowest_frequency_hz"] < table["last_frequency_hz"]
-    if rises.any():
-        lowest = np.where(rises, table["amplitude_of_lowest_frequency"], np.nan)
+    lowest = table["amplitude_of_lowest_frequency"]
+    if np.isfinite(lowest).any():
         axes.plot(x, lowest, color=style.GREEN, label=name("lowest frequency"), **look)
     axes.plot(x, table["amplitude_of_largest_zeta"], color=style.RED, label=name("largest damping"), **look)
     for word, face in (("stable", style.PURPLE), ("unstable", "white")):
