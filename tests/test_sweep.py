@@ -131,10 +131,24 @@ def test_thresholds_are_proportional_to_the_limit_and_the_largest_damping_does_n
         assert found["free_hz"] == pytest.approx(1 / (2 * np.pi), rel=1e-9)
 
 
+def test_limit_cycles_over_the_value(case: Path, tmp_path: Path) -> None:
+    """A destabilising damper c: zeta is zero where ki = c w0; both cycles are proportional to the limit."""
+    damper = ["--set", "mode.dampers=[{ dof = 'x', c = -0.1 }]", "--only", "mode", "--no-plots"]
+    assert fretwave("sweep", case, *OVER, *damper, "--out", tmp_path) == 0
+    a = np.geomspace(1.0, 60.0, 20001)
+    th = np.arccos(1 - 2 / a)
+    net = 4 / (np.pi * a) * (1 - 1 / a) - 0.1 * np.sqrt(1 + (th - np.sin(2 * th) / 2) / np.pi)
+    stable, unstable = a[np.flatnonzero(np.diff(np.sign(net)))]
+    assert column(tmp_path / "summary.csv", "stable_limit_cycle") / LIMITS == pytest.approx(stable, rel=2e-3)
+    found = column(tmp_path / "summary.csv", "unstable_limit_cycle")
+    assert found[:2] / LIMITS[:2] == pytest.approx(unstable, rel=2e-3)
+    assert np.isnan(found[2]) == (5 * unstable > 60)
+
+
 def test_onset_is_where_a_tenth_of_the_rise_is_reached() -> None:
     a = np.geomspace(1.0, 100.0, 400)
     table = {"amplitude": a, "zeta": 0.01 + 0.02 * np.log10(a), "omega": a * 0 + 1, "omega0": a * 0 + 1}
-    table |= {"frequency_hz": a * 0 + 1, "slip": (a > 2) * 0.5, "newton": a * 0 + 3}
+    table |= {"frequency_hz": a * 0 + 1, "slip": (a > 2) * 0.5, "newton": a * 0 + 3, "event": [""] * 400}
     found = summarise("mode", table, {})
     assert found["onset_amplitude"] == pytest.approx(10**0.2, rel=1e-3)
     assert found["stick_until"] <= 2 < found["slip_from"]

@@ -4,7 +4,8 @@
 
     <name>/points/...           one after the other, the branches of all values: `value`, the keys, then the columns
     <name>/over/<key>           values of a key: dimension scale (n,)
-    <name>/summary/<quantity>   (n_1, n_2, ..., [n_levels]), dimensions as in `over`; nan where there is no branch
+    <name>/summary/<quantity>   (n_1, n_2, ..., [n_branches]), dimensions as in `over`; nan where there is no branch.
+                                The last one is there for tables of several branches: levels, nodal diameters
     <name>/values/0003/...      all that is kept of the value with this number: coefficients, motions of the contacts
 """
 
@@ -24,7 +25,7 @@ from .columns import COLUMNS, Column
 from .results import open_results, rewritten
 from .runfolder import replace_text
 from .sweep_plan import Plan
-from .sweep_summary import columns_of, summarise
+from .sweep_summary import SPLIT, columns_of, summarise
 from .validation import toml
 
 #: State of the solver: a finished branch has no use for it.
@@ -48,7 +49,7 @@ class Branch:
     attributes : dict
         Of the analysis' group.
     start_forces : dict
-        Of each contact over the period of the first point (n_samples, components, n_pairs) [N], where they are kept.
+        By row that starts a branch: of each contact over its period (n_samples, components, n_pairs) [N], where kept.
     """
 
     number: int
@@ -56,7 +57,7 @@ class Branch:
     table: dict[str, Any]
     units: dict[str, tuple[str, str]]
     attributes: dict[str, Any]
-    start_forces: dict[str, Any]
+    start_forces: dict[int, dict[str, Any]]
 
     @property
     def points(self) -> int:
@@ -74,9 +75,16 @@ def read_branch(folder: Path, name: str, number: int, run_id: str) -> Branch | N
         table = {key: data[()] for key, data in group["points"].items()}
         units = {key: (data.attrs["units"], data.attrs["long_name"]) for key, data in group["points"].items()}
         order = [key for key in COLUMNS if key in table] + [key for key in table if key not in COLUMNS]
-        kept = "reported" in group and len(group["reported"]) and group["reported"][0] == 0
-        forces = {key[len("contact_") :]: group[key]["f"][0] for key in group if key.startswith("contact_") and kept}
-        return Branch(number, folder, {key: table[key] for key in order}, units, dict(group.attrs), forces)
+        ordered = {key: table[key] for key in order}
+        return Branch(number, folder, ordered, units, dict(group.attrs), _start_forces(group, table))
+
+
+def _start_forces(group: Any, table: Mapping[str, Any]) -> dict[int, dict[str, Any]]:
+    """Forces of the contacts at rows with the event `start`."""
+    contacts = [key for key in group if key.startswith("contact_")]
+    reported = group["reported"][()] if "reported" in group else ()
+    starts = [(k, int(row)) for k, row in enumerate(reported) if b"start" in table["event"][row].split()]
+    return {row: {key[len("contact_") :]: group[key]["f"][k] for key in contacts} for k, row in starts}
 
 
 def write_sweep(
@@ -104,7 +112,7 @@ def write_sweep(
     Returns
     -------
     list of dict
-        The rows of the summary: the keys, the level of a forced response, and what is said of each branch.
+        The rows of the summary: the keys, which branch of the value's table, and what is said of it.
     """
     kind = str(branches[0].attributes["type"]) if branches else ""
     points = _points(plan, branches)
@@ -170,16 +178,17 @@ def _points(plan: Plan, branches: Sequence[Branch]) -> list[tuple[Column, Any]]:
 
 
 def _summary(kind: str, plan: Plan, branches: Sequence[Branch]) -> list[dict[str, Any]]:
-    """A row for each branch, for a forced response one for each level."""
-    rows = []
+    """A row for each branch; a table of a value has one, or one for each level or nodal diameter."""
+    rows, split = [], SPLIT.get(kind, "")
     for branch in branches:
         keys = {key: _plain(_key_column(plan, key)[branch.number]) for key in plan.keys}
-        level = branch.table.get("level")
-        for one in [None] if level is None else np.unique(level):
-            chosen = slice(None) if one is None else level == one
+        column = branch.table.get(split)
+        for part in [None] if column is None else np.unique(column):
+            chosen = np.full(branch.points, True) if part is None else column == part
             table = {key: values[chosen] for key, values in branch.table.items()}
-            head = {**keys, "value": branch.number, **({} if one is None else {"level": float(one)})}
-            rows.append({**head, **summarise(kind, table, branch.attributes, branch.start_forces)})
+            head = {**keys, "value": branch.number, **({} if part is None else {split: part.item()})}
+            forces = branch.start_forces.get(int(np.argmax(chosen)), {})
+            rows.append({**head, **summarise(kind, table, branch.attributes, forces)})
     return rows
 
 
@@ -206,17 +215,17 @@ def _write_over(group: Any, plan: Plan) -> list[Any]:
 
 
 def _write_summary(group: Any, kind: str, plan: Plan, rows: Sequence[Mapping[str, Any]], scales: Sequence[Any]) -> None:
-    levels = sorted({row["level"] for row in rows if "level" in row})
-    scales = list(scales)
-    if levels:
-        scales.append(group.create_dataset("level", data=levels))
-        scales[-1].make_scale("level")
-    shape = (*plan.shape, *([len(levels)] if levels else []))
+    split, scales = SPLIT.get(kind, ""), list(scales)
+    parts = sorted({row[split] for row in rows if split in row})
+    if parts:
+        scales.append(group.create_dataset(split, data=parts))
+        scales[-1].make_scale(split)
+    shape = (*plan.shape, *([len(parts)] if parts else []))
     for column in columns_of(kind) if rows else ():
         values = np.full(shape, np.nan)
         for row in rows:
             place = np.unravel_index(row["value"], plan.shape)
-            values[(*place, *([levels.index(row["level"])] if levels else []))] = row[column.name]
+            values[(*place, *([parts.index(row[split])] if parts else []))] = row[column.name]
         data = group.create_dataset(column.name, data=values)
         data.attrs.update({"units": column.unit, "long_name": column.long_name})
         for dimension, scale in zip(data.dims, scales):

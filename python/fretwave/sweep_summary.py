@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from .analyses.mode import limit_cycles
 from .analyses.mode_curve import ModeCurve
 from .columns import Column
 from .slip_threshold import slip_threshold
@@ -34,8 +35,10 @@ MODE = (
     Column("largest_zeta", "1", "largest modal damping ratio"),
     Column("amplitude_of_largest_zeta", "m", "amplitude of the largest damping"),
     Column("lowest_frequency_hz", "Hz", "lowest frequency of the branch"),
-    Column("amplitude_of_lowest_frequency", "m", "amplitude of the lowest frequency"),
+    Column("amplitude_of_lowest_frequency", "m", "amplitude of the lowest frequency, nan at an end of the branch"),
     Column("last_frequency_hz", "Hz", "frequency at the end of the branch"),
+    Column("stable_limit_cycle", "m", "smallest amplitude at which damping rises through zero"),
+    Column("unstable_limit_cycle", "m", "smallest amplitude at which damping falls through zero"),
 )
 FORCED = (
     *COMMON,
@@ -43,12 +46,15 @@ FORCED = (
     Column("frequency_of_largest_amplitude", "Hz", "frequency of the largest amplitude"),
 )
 
+#: Column whose values tell the branches of one table apart.
+SPLIT = {"forced": "level", "flutter": "nodal_diameter"}
+
 Table = Mapping[str, Any]
 
 
 def columns_of(kind: str) -> tuple[Column, ...]:
-    """What is said of each value of a sweep of this kind of analysis."""
-    return {"mode": MODE, "forced": FORCED}.get(kind, COMMON)
+    """What is said of each branch in a sweep of this kind of analysis."""
+    return {"mode": MODE, "flutter": MODE, "forced": FORCED}.get(kind, COMMON)
 
 
 def summarise(
@@ -68,7 +74,7 @@ def summarise(
         "newton": int(np.sum(table.get("newton", 0))),
         "wall_s": float(np.sum(table.get("wall_s", 0.0))),
     }
-    if kind == "mode":
+    if columns_of(kind) is MODE:
         return {**common, **_mode(table, attributes, start_forces or {})}
     return {**common, **_forced(table)} if kind == "forced" else common
 
@@ -89,8 +95,18 @@ def _mode(table: Table, attributes: Mapping[str, Any], forces: Mapping[str, Any]
         "largest_zeta": float(zeta[top]),
         "amplitude_of_largest_zeta": float(amplitude[top]),
         "lowest_frequency_hz": float(frequency[low]),
-        "amplitude_of_lowest_frequency": float(amplitude[low]),
+        "amplitude_of_lowest_frequency": float(amplitude[low]) if 0 < low < len(zeta) - 1 else np.nan,
         "last_frequency_hz": float(frequency[-1]),
+        **_limit_cycles(table),
+    }
+
+
+def _limit_cycles(table: Table) -> dict[str, float]:
+    events = [text.decode() if isinstance(text, bytes) else str(text) for text in table.get("event", ())]
+    cycles = limit_cycles({**table, "event": events})
+    return {
+        f"{word}_limit_cycle": min((c["amplitude"] for c in cycles if c["stable"] is stable), default=np.nan)
+        for word, stable in (("stable", True), ("unstable", False))
     }
 
 
@@ -113,24 +129,26 @@ def _forced(table: Table) -> dict[str, float]:
 def landmarks(name: str, plan: Plan, rows: Sequence[Mapping[str, Any]]) -> list[str]:
     """A line for each row of a sweep's summary, for the terminal."""
     labels = plan.labels()
-    return [f"{name}: {labels[row['value']]}{_level(row)}: {_landmark(row)}" for row in rows]
+    return [f"{name}: {labels[row['value']]}{_part(row)}: {_landmark(row)}" for row in rows]
 
 
 def read_landmarks(name: str, group: Any) -> list[str]:
     """The same from a sweep's group in results.h5."""
     plan = Plan(json.loads(group.attrs["over"]))
     data = {key: values[()] for key, values in group["summary"].items()}
-    levels = data.pop("level", [None])
+    split = SPLIT.get(str(group.attrs["of_type"]), "")
+    parts = [{split: part} for part in data.pop(split)] if split in data else [{}]
     rows = []
-    for place in product(range(len(plan)), range(len(levels))):
-        row = {key: float(values.reshape(len(plan), -1)[place]) for key, values in data.items()}
+    for number, (k, part) in product(range(len(plan)), enumerate(parts)):
+        row = {key: float(values.reshape(len(plan), -1)[number, k]) for key, values in data.items()}
         if not math.isnan(row["points"]):
-            rows.append({"value": place[0], "level": levels[place[1]], **row})
+            rows.append({"value": number, **part, **row})
     return landmarks(name, plan, rows)
 
 
-def _level(row: Mapping[str, Any]) -> str:
-    return "" if row.get("level") is None else f", level {row['level']:g}"
+def _part(row: Mapping[str, Any]) -> str:
+    """Which of a value's branches a row is of."""
+    return "".join(f", {column.replace('_', ' ')} {row[column]:g}" for column in SPLIT.values() if column in row)
 
 
 def _landmark(row: Mapping[str, Any]) -> str:
@@ -138,7 +156,11 @@ def _landmark(row: Mapping[str, Any]) -> str:
         starts = next((row[key] for key in ("slip_threshold", "slip_from") if math.isfinite(row[key])), None)
         slip = "no slip" if starts is None else f"slip from {starts:.4g} m"
         top = f"largest zeta {100 * row['largest_zeta']:.4g} % at {row['amplitude_of_largest_zeta']:.4g} m"
-        return f"{slip}, {top}, lowest {row['lowest_frequency_hz']:.6g} Hz"
+        words = [slip, top, f"lowest {row['lowest_frequency_hz']:.6g} Hz"]
+        for word in ("stable", "unstable"):
+            amplitude = row[f"{word}_limit_cycle"]
+            words += [] if math.isnan(amplitude) else [f"{word} limit cycle at {amplitude:.4g} m"]
+        return ", ".join(words)
     if "largest_amplitude" in row:
         return f"largest {row['largest_amplitude']:.4g} m at {row['frequency_of_largest_amplitude']:.6g} Hz"
     return f"{row['points']:.0f} points"

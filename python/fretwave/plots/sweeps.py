@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
+from itertools import product
 from typing import Any
 
 import h5py
@@ -16,6 +17,7 @@ from matplotlib.figure import Figure
 
 from ..analyses.mode_curve import ModeCurve
 from ..sweep_plan import Plan, short_names
+from ..sweep_summary import SPLIT
 from . import style
 from .data import Analysis, Run, Table
 from .forced import smooth
@@ -24,6 +26,8 @@ from .forced import smooth
 NAMED = 10
 #: values that differ by more than this factor stand on a logarithmic axis
 LINEAR_UP_TO = 8.0
+#: damping below zero by more than rounding
+TINY = 1e-9
 #: asymptotes are common to all branches when they agree to this relative difference
 SAME = 1e-6
 LINES = ("-", (0, (5, 1.5)), (0, (1, 1)), "-.")
@@ -35,47 +39,55 @@ class Swept:
 
     Attributes
     ----------
-    branches : number of the value -> columns of its branch
-    summary : quantity -> (n_1, n_2, ..., [n_levels])
-    levels : of a forced response
+    branches : (number of the value, place in `parts`, columns)
+    summary : quantity -> (n_1, n_2, ..., [n_parts])
+    split, parts : what tells the branches of one value apart, and its values: levels, nodal diameters
     """
 
     analysis: Analysis
     plan: Plan
-    branches: dict[int, Table]
+    branches: list[tuple[int, int, Table]]
     summary: Table
-    levels: list[float]
+    split: str
+    parts: list[float]
 
     @classmethod
     def of(cls, analysis: Analysis) -> Swept:
-        value = analysis.columns["value"]
-        branches = {int(k): {n: c[value == k] for n, c in analysis.columns.items()} for k in np.unique(value)}
         with h5py.File(analysis.path, "r") as file:
             summary = {key: np.asarray(data[()], dtype=float) for key, data in file[analysis.name]["summary"].items()}
-        levels = [float(level) for level in summary.pop("level", ())]
-        return cls(analysis, Plan(analysis.attributes["over"]), branches, summary, levels)
+        split = SPLIT.get(str(analysis.attributes["of_type"]), "")
+        parts = [float(part) for part in summary.pop(split, ())]
+        plan, branches = Plan(analysis.attributes["over"]), []
+        for number, (place, part) in product(range(len(plan)), enumerate(parts or [np.nan])):
+            rows = (analysis.columns["value"] == number) & (analysis.columns[split] == part if parts else True)
+            if rows.any():
+                branches.append((number, place, {name: column[rows] for name, column in analysis.columns.items()}))
+        return cls(analysis, plan, branches, summary, split, parts)
 
     @property
     def main(self) -> int:
         """The key with most values: shown by colour, or on an axis."""
         return int(np.argmax(self.plan.shape))
 
-    def look(self, number: int) -> dict[str, Any]:
+    def look(self, number: int, part: int = 0) -> dict[str, Any]:
         """Colour and line of a branch; with two keys a colour for each value of one, a line for each of the other."""
         if not self.crossed():
-            return {"color": style.shades(len(self.plan))[number], "linestyle": "-"}
+            return {"color": style.shades(len(self.plan))[number], "linestyle": LINES[part % len(LINES)]}
         place = np.unravel_index(number, self.plan.shape)
         colours = style.shades(self.plan.shape[self.main])
         return {"color": colours[place[self.main]], "linestyle": LINES[place[1 - self.main]]}
 
     def crossed(self) -> bool:
         """Two keys, few enough of one's values for as many lines."""
-        return len(self.plan.keys) == 2 and min(self.plan.shape) <= len(LINES) and not self.levels
+        return len(self.plan.keys) == 2 and min(self.plan.shape) <= len(LINES) and not self.parts
 
     def names(self) -> list[tuple[str, dict[str, Any]]]:
         """Entries of the legend with their looks."""
         if not self.crossed():
-            return [(label, self.look(number)) for number, label in enumerate(self.plan.labels())]
+            entries = [(label, self.look(number)) for number, label in enumerate(self.plan.labels())]
+            names = [f"{self.split.replace('_', ' ')} {part:g}" for part in self.parts]
+            lines = [{"color": style.GREY, "linestyle": LINES[part % len(LINES)]} for part in range(len(names))]
+            return [*entries, *zip(names, lines)] if len(names) > 1 else entries
         entries = []
         for key in (self.main, 1 - self.main):
             name = self.plan.keys[key]
@@ -91,7 +103,7 @@ def figures(run: Run) -> Iterator[tuple[str, Figure]]:
     """All branches, and quantities over the value, of every sweep of modes or forced responses."""
     for analysis in run.of_kind("sweep"):
         swept, kind = Swept.of(analysis), analysis.attributes["of_type"]
-        if kind == "mode":
+        if kind in ("mode", "flutter"):
             yield f"{analysis.name}_backbones", backbones(swept)
             yield f"{analysis.name}_summary", overview(swept, MODE_PANELS)
         elif kind == "forced":
@@ -102,10 +114,12 @@ def figures(run: Run) -> Iterator[tuple[str, Figure]]:
 def backbones(swept: Swept) -> Figure:
     """Frequency above damping, over a common logarithmic amplitude axis."""
     figure, (upper, lower) = style.new_figure(6.6, rows=2, sharex=True)
-    for number, table in swept.branches.items():
+    for number, part, table in swept.branches:
         curve = ModeCurve.from_table(table).sampled()
-        upper.plot(curve["amplitude"], curve["frequency_hz"], **swept.look(number))
-        lower.plot(curve["amplitude"], 100.0 * curve["zeta"], **swept.look(number))
+        upper.plot(curve["amplitude"], curve["frequency_hz"], **swept.look(number, part))
+        lower.plot(curve["amplitude"], 100.0 * curve["zeta"], **swept.look(number, part))
+    if (swept.analysis.columns["zeta"] < -TINY).any():
+        lower.axhline(0.0, color=style.INK, linewidth=1.0, zorder=1)
     _asymptotes(upper, swept)
     style.log_amplitude(lower, swept.analysis.columns["amplitude"])
     upper.set_ylabel(style.label("Frequency ω/2π", "Hz"))
@@ -119,13 +133,8 @@ def backbones(swept: Swept) -> Figure:
 def responses(swept: Swept) -> Figure:
     """Amplitude over frequency, a line style for each level."""
     figure, axes = style.new_figure(5.0)
-    for number, table in swept.branches.items():
-        for level, line in zip(swept.levels, LINES):
-            rows = table["level"] == level
-            curve = smooth(table["frequency_hz"][rows], table["amplitude"][rows])
-            axes.plot(*curve, **{**swept.look(number), "linestyle": line})
-    for level, line in zip(swept.levels, LINES) if len(swept.levels) > 1 else ():
-        axes.plot([], [], color=style.GREY, linestyle=line, label=f"level {level:g}")
+    for number, part, table in swept.branches:
+        axes.plot(*smooth(table["frequency_hz"], table["amplitude"]), **swept.look(number, part))
     peaks = swept.summary["largest_amplitude"]
     if np.nanmax(peaks) > LINEAR_UP_TO * np.nanmin(peaks):
         axes.set_yscale("log")
@@ -163,15 +172,15 @@ def _asymptotes(axes: Axes, swept: Swept) -> None:
 def _name(figure: Figure, axes: list[Axes], swept: Swept) -> None:
     """A legend of the values; of many, a colour bar."""
     names = swept.names()
-    if len(names) <= NAMED:
+    if len(swept.plan) <= NAMED or swept.crossed():
         for label, look in names:
             axes[0].plot([], [], label=label, **look)
         _legend(figure, axes[0])
         return
-    norm = BoundaryNorm(np.arange(len(names) + 1) - 0.5, len(names))
-    colours = ListedColormap([look["color"] for _, look in names])
+    norm = BoundaryNorm(np.arange(len(swept.plan) + 1) - 0.5, len(swept.plan))
+    colours = ListedColormap(style.shades(len(swept.plan)))
     bar = figure.colorbar(ScalarMappable(norm, colours), ax=axes)
-    shown = np.unique(np.linspace(0, len(names) - 1, NAMED).astype(int))
+    shown = np.unique(np.linspace(0, len(swept.plan) - 1, NAMED).astype(int))
     values = [", ".join(f"{value}" for value in combination.values()) for combination in swept.plan.values()]
     bar.set_ticks(shown, labels=[values[number] for number in shown])
     bar.set_label(", ".join(short_names(swept.plan.keys).values()).replace("_", " "))
@@ -191,8 +200,15 @@ def _amplitudes(axes: Axes, x: Any, table: Table, number: int) -> None:
     look = {"linestyle": line, "marker": "o", "markersize": 5}
     axes.plot(x, table["slip_threshold"], color=style.INK, label=name("first slip"), **look)
     axes.plot(x, table["onset_amplitude"], color=style.BLUE, label=name("damping sets in"), **look)
-    axes.plot(x, table["amplitude_of_lowest_frequency"], color=style.GREEN, label=name("lowest frequency"), **look)
+    lowest = table["amplitude_of_lowest_frequency"]
+    if np.isfinite(lowest).any():
+        axes.plot(x, lowest, color=style.GREEN, label=name("lowest frequency"), **look)
     axes.plot(x, table["amplitude_of_largest_zeta"], color=style.RED, label=name("largest damping"), **look)
+    for word, face in (("stable", style.PURPLE), ("unstable", "white")):
+        cycle = table[f"{word}_limit_cycle"]
+        if np.isfinite(cycle).any():
+            more = {"color": style.PURPLE, "markerfacecolor": face, "label": name(f"{word} limit cycle")}
+            axes.plot(x, cycle, **more, **look)
 
 
 def _one(axes: Axes, x: Any, table: Table, number: int, column: str, coloured: bool = False) -> None:
@@ -240,8 +256,8 @@ def overview(swept: Swept, panels: Any) -> Figure:
 def _others(swept: Swept) -> list[str]:
     """Names of the lines: the other keys' values, and the levels."""
     over = {key: values for key, values in swept.plan.over.items() if key != swept.plan.keys[swept.main]}
-    if swept.levels:
-        over["level"] = swept.levels
+    if swept.parts:
+        over[swept.split] = swept.parts
     return Plan(over).labels() if over else [""]
 
 
