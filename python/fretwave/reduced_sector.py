@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import scipy.sparse as sp
 
-from .contacts import closed_contacts
 from .cyclic_waves import WaveError
 from .reduced import ReductionReport
 from .schema import ReductionSection
@@ -64,7 +63,7 @@ def sector_reduction_of(case: Case, comm: Any, modes: int | None = None) -> Sect
         cut.high,
         neighbours.sectors,
         loaded.get("C"),
-        contacts=[Contact(c.law, c.rows, c.parameters, c.name) for c in closed_contacts(cut.contacts)],
+        contacts=[Contact(c.law, c.rows, c.parameters, c.name) for c in cut.contacts],
         keep=np.array(case.keep, dtype=np.intp),
         axis=cut.axis,
         interface_diameters=section.interface_diameters if section.interface == "modes" else None,
