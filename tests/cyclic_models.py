@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from core_models import CoupledLaw, LinearLaw
+from scipy.optimize import brentq
 
 import fretwave as fw
 
@@ -43,6 +44,38 @@ def jenkins_chain(sectors: int, k=1.0, kt=1.0, limit=1.0) -> fw.Sector:
         "jenkins", {0: [[-1.0]], 1: [[1.0]]}, {"tangential_stiffness": kt, "friction_limit": limit}, "between"
     )
     return fw.Sector([[1.0]], [[k]], sectors, None, [between])
+
+
+def kappa(a: float) -> complex:
+    """REFERENCE: complex stiffness of a Jenkins element (kt = R = 1) at relative amplitude a."""
+    if a <= 1:
+        return 1.0 + 0j
+    th = np.arccos(1 - 2 / a)
+    return complex((th - np.sin(2 * th) / 2) / np.pi, 4 / (np.pi * a) * (1 - 1 / a))
+
+
+def chain_crossings(flow: fw.Aerodynamics, nodal_diameter: int, sectors: int) -> list[tuple[float, float]]:
+    """(a, omega) at which a wave of `jenkins_chain` with one harmonic and the flow has no damping.
+
+    k + 4 s^2 kappa(2 a s) - omega^2 - sum (Re L_k + i omega / omega_ref Im L_k) e^{-i k theta} = 0, s = |sin theta/2|.
+    """
+    theta = 2 * np.pi * nodal_diameter / sectors
+    s = abs(np.sin(theta / 2))
+    waves = [sum(part(L) * np.exp(-1j * k * theta) for k, L in flow.influence.items()) for part in (np.real, np.imag)]
+
+    def equation(a: float, omega: float) -> complex:
+        return 1 + 4 * s**2 * kappa(2 * a * s) - omega**2 - waves[0] - 1j * omega / flow.omega * waves[1]
+
+    def omega_at(a: float) -> float:
+        return brentq(lambda omega: equation(a, omega).real, 1e-3, 10, xtol=1e-15)
+
+    def work(a: float) -> float:
+        return equation(a, omega_at(a)).imag
+
+    grid = np.geomspace(0.5 / s * 1.0001, 500 / s, 400)
+    changes = np.flatnonzero(np.diff(np.sign([work(a) for a in grid])))
+    places = [brentq(work, grid[i], grid[i + 1], xtol=1e-14) for i in changes]
+    return [(a, omega_at(a)) for a in places]
 
 
 def rich_sector(sectors: int = 7) -> fw.Sector:

@@ -31,6 +31,23 @@ nb::list contact_periods(hb::HarmonicProblem& problem, Petsc<Vec> y) {
   return out;
 }
 
+/// (Archard's integrals, mean normal forces, shares of slip and of lift-off) of this rank's pairs, one a
+/// contact.
+nb::list wearing(hb::HarmonicProblem& problem, Petsc<Vec> y) {
+  nb::list out;
+  const auto copy = [](std::vector<double> const& v) { return numpy_copy(v.data(), {v.size()}); };
+  for (auto const& w : problem.wearing(y.object))
+    out.append(nb::make_tuple(copy(w.archard), copy(w.load), copy(w.slip), copy(w.open)));
+  return out;
+}
+
+nb::dict energy(hb::HarmonicProblem& problem, Petsc<Vec> y) {
+  const auto e = problem.energy(y.object);
+  nb::dict out;
+  out["contact"] = e.contact, out["damping"] = e.damping, out["modal"] = e.modal, out["stored"] = e.stored;
+  return out;
+}
+
 }  // namespace
 
 void bind_hb(nb::module_& m) {
@@ -49,6 +66,14 @@ void bind_hb(nb::module_& m) {
            })
       .def("summary", [](HarmonicProblem& p, Petsc<Vec> y) { return contact_summary(p.summarise(y.object)); })
       .def("contact_periods", contact_periods)
+      .def("wear", &HarmonicProblem::wear)
+      .def("wearing", wearing)
+      .def("gap_product",
+           [](HarmonicProblem& p, Petsc<Vec> y, PerContact const& dgap) {
+             VecHandle r = p.gap_product(y.object, dgap);
+             return nb::steal(to_petsc4py(r));
+           })
+      .def("energy", energy)
       .def("preload", [](HarmonicProblem& p, Petsc<Vec> x, Petsc<Vec> P) { p.preload(x.object, P.object); })
       .def("unfold", [](HarmonicProblem& p, Petsc<Vec> re, Petsc<Vec> im) { p.unfold(re.object, im.object); })
       .def("unfolding", [](HarmonicProblem& p, Petsc<Vec> y) { return p.unfolding(y.object); })

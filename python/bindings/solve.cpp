@@ -50,9 +50,13 @@ void bind_solve(nb::module_& m) {
       .def_prop_ro("system", &Newton::system, nb::rv_policy::reference_internal)
       .def_prop_ro("route", &Newton::route)
       .def_prop_ro("snes", [](Newton& n) { return nb::steal(to_petsc4py(n.snes())); })
-      .def("solve", [](Newton& n, Petsc<Vec> y) {
-        const Outcome o = n.solve(y.object);
-        return nb::make_tuple(o.converged, o.newton, o.linear, o.residual, o.reason);
+      .def("solve",
+           [](Newton& n, Petsc<Vec> y) {
+             const Outcome o = n.solve(y.object);
+             return nb::make_tuple(o.converged, o.newton, o.linear, o.residual, o.reason);
+           })
+      .def("linear", [](Newton& n, Petsc<Vec> y, Petsc<Vec> b, Petsc<Vec> x) {
+        return n.linear(y.object, b.object, x.object);
       });
   nb::class_<Continuation>(m, "Continuation")
       .def(nb::init<Problem&, std::string const&, double, double, StepControl, std::vector<double>>(),

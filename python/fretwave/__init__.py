@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from .errors import FretwaveError, InputError, NotConverged
 
 if TYPE_CHECKING:
+    from .aerodynamics import Aerodynamics
     from .built import BuiltContact, BuiltModel
     from .contact_laws import LawInfo, ParameterInfo, PythonLaw, laws
     from .continuation import Continuation, Point, StepControl
@@ -21,9 +22,11 @@ if TYPE_CHECKING:
     from .reduction import FrequencyError, Reduction, reduce
     from .reduction_error import NonlinearError, nonlinear_error
     from .transient import Transient
+    from .wear import Wear, WearControl, WearPoint, WornMode
 
 #: Where each public name lives; loaded when first used, so that `fretwave --help` starts without PETSc.
 _HOMES = {
+    "aerodynamics": ("Aerodynamics",),
     "built": ("BuiltContact", "BuiltModel"),
     "continuation": ("Continuation", "Point", "StepControl"),
     "cyclic": ("Sector",),
@@ -37,10 +40,12 @@ _HOMES = {
     "reduction": ("FrequencyError", "Reduction", "reduce"),
     "reduction_error": ("NonlinearError", "nonlinear_error"),
     "transient": ("Transient",),
+    "wear": ("Wear", "WearControl", "WearPoint", "WornMode"),
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 
 __all__ = [
+    "Aerodynamics",
     "BuiltContact",
     "BuiltModel",
     "Contact",
@@ -65,6 +70,10 @@ __all__ = [
     "StepControl",
     "Transient",
     "WaveError",
+    "Wear",
+    "WearControl",
+    "WearPoint",
+    "WornMode",
     "choose_harmonics",
     "laws",
     "linear_modes",

@@ -12,14 +12,25 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import scipy.sparse
 
 from . import checks
+from .aerodynamics_case import check_aerodynamics
 from .built import BuiltModel
-from .checks_rest import check_preloads, check_reduction
+from .checks_rest import check_preloads, check_reduction, check_wear
 from .checks_wheel import check_wheels
 from .contacts import ContactSpec, read_contacts
+from .engine_order import fold_engine_orders
 from .errors import CaseErrors, FretwaveError
 from .origin import Origin, check_physics, load_origin
 from .reduced import ReductionReport, kept_dofs
-from .schema import AnalysisSection, ModelSection, PreloadSection, ReductionSection, Section, StudySection
+from .schema import (
+    AerodynamicsSection,
+    AnalysisSection,
+    ModelSection,
+    PreloadSection,
+    ReductionSection,
+    Section,
+    StudySection,
+    WearAnalysis,
+)
 from .sectors import Neighbours, check_waves, tie
 from .source import Source
 from .validation import toml, validate
@@ -59,6 +70,8 @@ class Case:
         The static state of all analyses without one of their own; None for none.
     neighbours : Neighbours
         What ties a sector of a wheel to the next ones; None for a whole structure.
+    aerodynamics : AerodynamicsSection
+        Forces of the flow on a sector's blades; None for none.
     wheel : Wheel
         Of a case put on its whole wheel (`fretwave.wheel.on_wheel`), the sector it is made of.
     analyses : dict
@@ -95,6 +108,7 @@ class Case:
     unreduced: Case | None = None
     preload: PreloadSection | None = None
     neighbours: Neighbours | None = None
+    aerodynamics: AerodynamicsSection | None = None
     wheel: Wheel | None = None
 
     @property
@@ -138,7 +152,16 @@ class Case:
 
     def preload_of(self, analysis: AnalysisSection) -> PreloadSection | None:
         """The preload of an analysis: its own, or that of the case."""
-        return getattr(analysis, "preload", None) or self.preload
+        return getattr(self.settings(analysis), "preload", None) or self.preload
+
+    def settings(self, analysis: AnalysisSection) -> AnalysisSection:
+        """The analysis whose model and harmonics an analysis uses: wear takes those of its mode."""
+        if not isinstance(analysis, WearAnalysis):
+            return analysis
+        mode = self.analyses[analysis.mode]
+        own = {key: getattr(analysis, key) for key in ("harmonics", "samples") if getattr(analysis, key) is not None}
+        dampers = analysis.dampers or mode.dampers
+        return mode.model_copy(update={**own, "name": analysis.name, "dampers": dampers})
 
 
 def load_case(
@@ -203,6 +226,7 @@ def _build(source: Source, laws: Mapping[str, Any], found: list[FretwaveError]) 
     section = _table(ModelSection, "model", source, found)
     reduction = _table(ReductionSection, "reduction", source, found)
     preload = _table(PreloadSection, "preload", source, found)
+    flow = _table(AerodynamicsSection, "aerodynamics", source, found)
     study = _table(StudySection, "study", source, found)
     origin = load_origin(section, source, found) if section else None
     dofs = origin.dofs if origin else None
@@ -212,9 +236,13 @@ def _build(source: Source, laws: Mapping[str, Any], found: list[FretwaveError]) 
     if section and origin:
         origin, contacts, neighbours = tie(section, source, origin, contacts, found)
         dofs, built = origin.dofs, origin.built
+        fold_engine_orders(source, analyses, neighbours.sectors if neighbours else None, found)
         check_waves(source, analyses, neighbours, found)
         check_wheels(source, analyses, neighbours, dofs, found)
-    keep = _kept(origin, contacts, analyses, neighbours) if origin and reduction else {}
+    if origin:
+        check_aerodynamics(source, flow, analyses, neighbours.sectors if neighbours else None, origin.dofs, found)
+    blade = flow.dof if flow else None
+    keep = _kept(origin, contacts, analyses, neighbours, blade) if origin and reduction else {}
     known = set(dofs or ())  # of a sector, dofs of the high face are kept, and left out
     checks.check_analyses(source, analyses, [name for name in keep.values() if name in known] if keep else dofs, found)
     check_reduction(source, reduction, analyses, neighbours.sectors if neighbours else None, found)
@@ -222,10 +250,13 @@ def _build(source: Source, laws: Mapping[str, Any], found: list[FretwaveError]) 
     notes: list[str] = []
     if origin is not None:
         complete = len(contacts) == len(source.entries("contact"))
+        if complete:
+            check_wear(source, analyses, contacts, built.contacts if built else {}, found)
         check_physics(origin, [contact.rows for contact in contacts] if complete else None, notes, found)
     if found or section is None or origin is None:
         return None
     loaded = {letter: matrix.values for letter, matrix in origin.matrices.items()}
+    tables = {"reduction": reduction, "preload": preload, "aerodynamics": flow}
     return Case(
         path=source.path,
         text=source.text,
@@ -236,7 +267,7 @@ def _build(source: Source, laws: Mapping[str, Any], found: list[FretwaveError]) 
         C=loaded.get("C"),
         contacts=contacts,
         analyses={analysis.name: analysis for analysis in analyses.values()},
-        resolved=_resolve(origin, section, contacts, analyses, {"reduction": reduction, "preload": preload}),
+        resolved=_resolve(origin, section, contacts, analyses, tables),
         notes=[*notes, *_unused_contacts(built, contacts)],
         has_quick="quick" in source.data,
         study=study or StudySection(),
@@ -247,6 +278,7 @@ def _build(source: Source, laws: Mapping[str, Any], found: list[FretwaveError]) 
         keep=list(keep),
         preload=preload,
         neighbours=neighbours,
+        aerodynamics=flow,
     )
 
 
@@ -255,11 +287,18 @@ def _kept(
     contacts: Sequence[ContactSpec],
     analyses: Mapping[int, AnalysisSection],
     neighbours: Neighbours | None,
+    blade: str | None,
 ) -> dict[int, str]:
-    """Dofs that a reduction keeps, of a sector before its faces were tied, with their names."""
+    """Dofs that a reduction keeps, of a sector before its faces were tied, with their names.
+
+    Parameters
+    ----------
+    blade : dof that the flow acts on
+    """
     if neighbours is not None:
         origin, contacts = neighbours.cut.origin, neighbours.cut.contacts
-    return {k: origin.dofs[k] for k in kept_dofs(origin.named, contacts, analyses, origin.dofs)}
+    named = {**origin.named, **({blade: origin.dofs.index(blade)} if blade in origin.dofs else {})}
+    return {k: origin.dofs[k] for k in kept_dofs(named, contacts, analyses, origin.dofs)}
 
 
 def _table(kind: type[Table], name: str, source: Source, found: list[FretwaveError]) -> Table | None:

@@ -13,16 +13,20 @@ from .casefile import Case, load_case
 from .errors import EXIT_DONE
 from .parallel import on_first_rank
 from .reduced import reduce_case
-from .run import build_model, in_order
+from .run import RunOptions, build_model, check_sweeps, in_order
 from .schema import (
     AnalysisSection,
+    FlutterAnalysis,
     ForcedAnalysis,
     HarmonicSection,
     ModeAnalysis,
     StaticAnalysis,
+    SweepAnalysis,
     TransientSection,
+    WearAnalysis,
 )
 from .source import display
+from .sweep_plan import table_plan
 
 
 def check_case(path: Path, overrides: Sequence[str], only: Sequence[str], quick: bool, comm: Any) -> int:
@@ -35,6 +39,7 @@ def check_case(path: Path, overrides: Sequence[str], only: Sequence[str], quick:
     """
     case = on_first_rank(comm, lambda: _load(path, overrides, quick))
     names = in_order(case, checks.choose(list(case.analyses), only))
+    check_sweeps(case, names, RunOptions(overrides=list(overrides), quick=quick), comm)
     case = reduce_case(case, comm)
     with build_model(case, (), comm) as model:
         described = {name: describe(case.analyses[name], model) for name in names}
@@ -110,12 +115,25 @@ def _headline(analysis: AnalysisSection) -> str:
         low, high = analysis.amplitude
         start = f"nonlinear mode ({analysis.method}) from linear mode {analysis.linear_mode}"
         return f"{start}, a = {low:g} to {high:g} m of {analysis.normalise}"
+    if isinstance(analysis, FlutterAnalysis):
+        low, high = analysis.amplitude
+        named = ", ".join(map(str, analysis.nodal_diameters or [])) or "all"
+        start = f"flutter ({analysis.method}), nodal diameters {named}, linear mode {analysis.linear_mode}"
+        return f"{start}, a = {low:g} to {high:g} m of {analysis.normalise}"
     if isinstance(analysis, ForcedAnalysis):
         low, high = analysis.frequency
         levels = ", ".join(f"{level:g}" for level in analysis.levels)
-        return f"forced response of {analysis.observe}, {low:g} to {high:g} Hz, levels {levels}"
+        order = f" to engine order {analysis.engine_order}" if analysis.engine_order else ""
+        return f"forced response of {analysis.observe}{order}, {low:g} to {high:g} Hz, levels {levels}"
     if isinstance(analysis, StaticAnalysis):
         return f"static state at load factors {', '.join(f'{factor:g}' for factor in analysis.factors)}"
+    if isinstance(analysis, SweepAnalysis):
+        plan = table_plan(analysis.over)
+        over = " x ".join(f"{key} = {', '.join(map(str, values))}" for key, values in plan.over.items())
+        return f"'{analysis.of}' for every value of {over}: {len(plan)} branches"
+    if isinstance(analysis, WearAnalysis):
+        amplitudes = ", ".join(f"{amplitude:g}" for amplitude in analysis.amplitude)
+        return f"wear of '{analysis.mode}' at a = {amplitudes} m over {analysis.cycles:g} normalised cycles"
     assert isinstance(analysis, TransientSection)
     kind = analysis.type.replace("_", " ")
     starts = ", ".join(f"{amplitude:g}" for amplitude in analysis.amplitude)

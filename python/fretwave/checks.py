@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from .errors import FretwaveError, InputError
@@ -11,12 +11,16 @@ from .schema import (
     ANALYSES,
     TOP_LEVEL,
     AnalysisSection,
+    FlutterAnalysis,
     ForcedAnalysis,
     HarmonicSection,
     ModeAnalysis,
+    SweepAnalysis,
     TransientSection,
+    WearAnalysis,
 )
-from .source import Source, nearest
+from .source import Source, nearest, nested_leaves
+from .sweep_plan import complaint
 from .validation import toml, unknown_key, validate
 
 Found = list[FretwaveError]
@@ -42,7 +46,7 @@ def check_top_level(source: Source, found: Found) -> None:
     for key in source.data:
         if key not in TOP_LEVEL:
             found.append(unknown_key(source, (key,), list(TOP_LEVEL)))
-    tables = dict.fromkeys(("model", "reduction", "preload", "quick", "study"), dict)
+    tables = dict.fromkeys(("model", "reduction", "preload", "aerodynamics", "quick", "study"), dict)
     shapes = {**tables, "contact": list, "analysis": list, "title": str}
     writing = {**{name: f"[{name}]" for name in tables}, "contact": "[[contact]]", "analysis": "[[analysis]]"}
     for key, shape in shapes.items():
@@ -119,13 +123,49 @@ def check_analyses(
         _check_petsc(report, analysis)
         if isinstance(analysis, HarmonicSection):
             _check_harmonics(report, analysis, dofs)
-        if isinstance(analysis, ModeAnalysis):
+        if isinstance(analysis, (ModeAnalysis, FlutterAnalysis)):
             report.dof(("normalise",), analysis.normalise, dofs)
             _check_range(report, "amplitude", analysis.amplitude, analysis.report_at)
         if isinstance(analysis, ForcedAnalysis):
             _check_forced(report, analysis, dofs, modes)
         if isinstance(analysis, TransientSection):
             report.mode(("mode",), analysis.mode, modes)
+        if isinstance(analysis, SweepAnalysis):
+            _check_sweep(report, analysis)
+        if isinstance(analysis, WearAnalysis):
+            _check_wear(report, analysis, modes, {a.name: a for a in analyses.values()})
+
+
+def _check_sweep(report: Reporter, analysis: SweepAnalysis) -> None:
+    """The values themselves are checked by loading the case with each, before anything runs."""
+    entries = report.source.entries("analysis")
+    swept = [str(entry.get("name")) for entry in entries if entry.get("type") != "sweep"]
+    if analysis.of not in swept:
+        expected = f"one of {', '.join(swept) or '(there is none)'}"
+        report.wrong(("of",), "is no analysis to sweep", expected, nearest(analysis.of, swept) or "choose another")
+    for path, values in nested_leaves(analysis.over):
+        problem = complaint(values)
+        if problem is not None:
+            report.wrong(("over", *path), *problem, "write for example `over = { mode.harmonics = [3, 5, 7] }`")
+    if analysis.dampers:
+        report.wrong(("dampers",), "are not those of the analysis swept", "none", f"give them to '{analysis.of}'")
+
+
+def _check_wear(
+    report: Reporter, analysis: WearAnalysis, modes: list[str], analyses: Mapping[str, AnalysisSection]
+) -> None:
+    report.mode(("mode",), analysis.mode, modes)
+    mode = analyses.get(analysis.mode)
+    if isinstance(mode, ModeAnalysis):
+        low, high = mode.amplitude
+        for index, value in enumerate(analysis.amplitude):
+            if not low <= value <= high:
+                where, expected = "is outside the branch of the mode", f"a value within {toml(mode.amplitude)}"
+                report.wrong(("amplitude", index), where, expected, f"move it, or widen {mode.name}.amplitude")
+    for index, value in enumerate(analysis.report_at):
+        if value > analysis.cycles:
+            expected = f"at most cycles = {analysis.cycles:g}"
+            report.wrong(("report_at", index), "is beyond the last cycle", expected, "move it, or raise cycles")
 
 
 def _check_harmonics(report: Reporter, analysis: HarmonicSection, dofs: Sequence[str] | None) -> None:

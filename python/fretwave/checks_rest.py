@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
+from .built import BuiltContact
+from .contacts import ContactSpec, wear_areas
+from .errors import InputError
 from .reporter import Found, Reporter
-from .schema import AnalysisSection, PreloadSection, ReductionSection, StaticAnalysis, TransientSection
+from .schema import AnalysisSection, PreloadSection, ReductionSection, StaticAnalysis, TransientSection, WearAnalysis
 from .source import Source, nearest
 
 Analyses = Mapping[int, AnalysisSection]
@@ -45,6 +48,23 @@ def _spatial_indices(analyses: Analyses, sectors: int) -> set[int]:
     given = [getattr(analysis, "nodal_diameter", None) for analysis in analyses.values()]
     indices = {n * d % sectors for d in given if d is not None for n in (1, 3)}
     return {min(index, sectors - index) for index in indices}
+
+
+def check_wear(
+    source: Source,
+    analyses: Analyses,
+    contacts: Sequence[ContactSpec],
+    built: Mapping[str, BuiltContact],
+    found: Found,
+) -> None:
+    """Wear needs a contact with a normal direction, and the areas of its pairs."""
+    for number, analysis in analyses.items():
+        if isinstance(analysis, WearAnalysis):
+            try:
+                wear_areas(contacts, built)
+            except InputError as error:
+                where = source.where(("analysis", number, "type"))
+                found.append(InputError(error.what, where, error.where or error.measured, error.expected, error.fix))
 
 
 def check_preloads(

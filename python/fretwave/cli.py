@@ -66,6 +66,7 @@ def parser() -> argparse.ArgumentParser:
     _add_case(check, optional=True)
     check.add_argument("--keys", action="store_true", help="list all keys of case files instead")
     check.set_defaults(command=_check)
+    _add_sweep(commands)
     resume = commands.add_parser("resume", help="go on with a run that was cut off, on any number of ranks")
     resume.add_argument("folder", type=Path, metavar="RUNDIR", help="folder of the run")
     resume.add_argument("--no-plots", action="store_true", help="make no pictures")
@@ -112,16 +113,40 @@ def _add_run(commands: Any) -> None:
     run.set_defaults(command=_run)
 
 
+def _add_sweep(commands: Any) -> None:
+    sweep = commands.add_parser(
+        "sweep",
+        help="run a case for every value of some keys, on groups of ranks",
+        description="Runs the chosen analyses of a case for every value of a key, or every combination of several keys,"
+        " and writes one results.h5 with these dimensions, a table for each analysis led by the keys, and summary.csv."
+        " Under mpirun groups of ranks work side by side. `fretwave resume` goes on with a sweep that was cut off.",
+    )
+    _add_case(sweep)
+    sweep.add_argument(
+        "--over",
+        action="append",
+        default=[],
+        metavar="KEY=V,V,...",
+        help="values of a key, addressed as --set does: model.options.friction=0.1,0.2,0.5; once for each key",
+    )
+    sweep.add_argument("--groups", type=int, metavar="G", help="groups of ranks (default: as many as ranks and values)")
+    sweep.add_argument("--out", type=Path, metavar="DIR", help="folder (default runs/<case>_sweep)")
+    sweep.add_argument("--no-plots", action="store_true", help="make no pictures")
+    sweep.add_argument("--petsc", default="", metavar="OPTIONS", help='PETSc options: "-snes_rtol 1e-10"')
+    sweep.set_defaults(command=_sweep)
+
+
 def _add_view(commands: Any) -> None:
     view = commands.add_parser(
         "view",
         help="write the motion over a period and the contact pairs for ParaView",
         description="Writes <analysis>.vtkhdf, the mesh with its displacement at phases of the period, and"
         " <analysis>_contact.vtkhdf, the contact pairs with forces, status and work. Several points follow each other."
-        " Of a sector the whole wheel is written, sector by sector.",
+        " Of a sector the whole wheel is written, sector by sector."
+        " Of wear without --point: <analysis>_wear.vtkhdf, the pairs with worn depth and pressure over wear cycles.",
     )
     view.add_argument("folder", type=Path, metavar="RUNDIR", help="folder of the run")
-    view.add_argument("--analysis", metavar="NAME", help="mode or forced response (default: the first)")
+    view.add_argument("--analysis", metavar="NAME", help="mode, forced response or wear (default: the first)")
     which = view.add_mutually_exclusive_group()
     which.add_argument("--point", type=int, nargs="+", default=[], metavar="N", help="points of the branch")
     which.add_argument("--amplitude", type=float, nargs="+", default=[], metavar="A", help="nearest kept points [m]")
@@ -180,16 +205,28 @@ def _run(options: argparse.Namespace) -> int:
     comm = _world()
     from .run import RunOptions, run_case
 
-    chosen = RunOptions(
-        options.out, options.overrides, options.only, options.quick, not options.no_plots, options.petsc
-    )
-    return run_case(options.case, chosen, comm)
+    return run_case(options.case, RunOptions.of(options), comm)
+
+
+def _sweep(options: argparse.Namespace) -> int:
+    comm = _world()
+    from .run import RunOptions
+    from .sweep_command import sweep_case
+    from .sweep_plan import plan_of
+
+    return sweep_case(options.case, RunOptions.of(options), plan_of(options.over), options.groups, comm)
 
 
 def _resume(options: argparse.Namespace) -> int:
     comm = _world()
+    from .parallel import on_first_rank
     from .run import resume_run
+    from .runfolder import read_record
+    from .sweep_command import resume_sweep
 
+    record = on_first_rank(comm, lambda: read_record(options.folder))
+    if "sweep" in record:
+        return resume_sweep(options.folder, record, comm, not options.no_plots)
     return resume_run(options.folder, comm, not options.no_plots)
 
 

@@ -52,6 +52,7 @@ class Column:
 
 _ALL = (
     Column("point", "1", "number of the point on its branch", "i"),
+    Column("nodal_diameter", "1", "nodal diameters of the wave, negative for a backward one", "i"),
     Column("level", "1", "factor on the excitation force"),
     Column("start", "1", "number of the start", "i"),
     Column("cycle", "1", "number of the cycle", "i"),
@@ -61,10 +62,20 @@ _ALL = (
     Column("omega0", "rad/s", "modulus of lambda"),
     Column("omega_mode", "rad/s", "angular frequency of the mode at this amplitude"),
     Column("frequency_hz", "Hz", "frequency, omega / 2 pi"),
+    Column("speed_rpm", "rev/min", "speed at which the engine order excites this frequency"),
+    Column("largest_amplitude", "m", "fundamental amplitude of the observed dof in the sector where it is largest"),
+    Column("largest_sector", "1", "sector that moves most", "i"),
     Column("phase", "rad", "phase of the fundamental against the force"),
     Column("beta", "1/s", "decay rate, - Re lambda"),
     Column("zeta", "1", "modal damping ratio"),
     Column("zeta_mode", "1", "damping ratio of the mode at this amplitude"),
+    Column("line", "1", "number of the amplitude", "i"),
+    Column("cycles", "1", "normalised wear cycles"),
+    Column("vibrations", "1", "vibration cycles"),
+    Column("step", "1", "length of the step in normalised wear cycles"),
+    Column("work", "J", "energy that contact dissipates in a period"),
+    Column("energy_error", "1", "imbalance of the period's energy, relative to that released by the decay"),
+    Column("step_error", "1", "estimated error of the step, as normal load relative to the mean"),
     Column("stick", "1", "share of contact pairs and samples that stick"),
     Column("slip", "1", "share of contact pairs and samples that slip"),
     Column("open", "1", "share of contact pairs and samples without contact"),
@@ -79,6 +90,7 @@ COLUMNS = {column.name: column for column in _ALL}
 
 _SHARED = ("stick", "slip", "open", "error_estimate", "residual", "newton", "linear", "wall_s", "event")
 MODE = ("point", "amplitude", "omega", "omega0", "frequency_hz", "beta", "zeta", *_SHARED)
+FLUTTER = ("point", "nodal_diameter", *MODE[1:])
 FORCED = ("point", "level", "omega", "frequency_hz", "amplitude", "phase", *_SHARED)
 
 

@@ -20,6 +20,8 @@ class Console:
         Takes every plain line as well (run.log).
     terminal : bool, optional
         Draw a progress bar; default: whether standard output is a terminal.
+    quiet : bool
+        Print nothing; lines still go to the sink.
     """
 
     def __init__(
@@ -27,8 +29,10 @@ class Console:
         active: bool,
         sink: Callable[[str], None] = lambda line: None,
         terminal: bool | None = None,
+        quiet: bool = False,
     ) -> None:
         self.active = active
+        self.quiet = quiet
         self.sink = sink
         self.terminal = on_terminal() if terminal is None else terminal
         self._progress: Any = None
@@ -39,6 +43,8 @@ class Console:
         if not self.active:
             return
         self.sink(text)
+        if self.quiet:
+            return
         if self._progress is not None:
             self._progress.console.print(text, markup=False, highlight=False, soft_wrap=True)
         else:
@@ -68,7 +74,7 @@ class Console:
     @contextmanager
     def progress(self, name: str) -> Iterator[None]:
         """Draw the bar of one analysis."""
-        if not (self.active and self.terminal):
+        if self.quiet or not (self.active and self.terminal):
             yield
             return
         from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn

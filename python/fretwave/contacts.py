@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
 import scipy.sparse
 
 from .built import BuiltContact
@@ -55,6 +57,31 @@ def closed_contacts(contacts: Sequence[ContactSpec]) -> list[ContactSpec]:
         )
         for contact in contacts
     ]
+
+
+def wear_areas(
+    contacts: Sequence[ContactSpec], built: Mapping[str, BuiltContact]
+) -> dict[str, npt.NDArray[np.float64]]:
+    """Nodal areas (n_pairs,) [m^2] of the contacts that can wear: those whose law has a normal direction.
+
+    Raises
+    ------
+    InputError
+        There are none, or their areas are not known.
+    """
+    found = {}
+    for contact in contacts:
+        if "normal_stiffness" not in contact.parameters:
+            continue
+        given = built.get(contact.name)
+        if given is None or given.areas is None:
+            fix = "give the contact its areas (BuiltContact(areas=...))"
+            raise InputError("the areas of the pairs are not known", f"contact '{contact.name}'", None, "areas", fix)
+        found[contact.name] = np.asarray(given.areas, dtype=float)
+    if not found:
+        laws = ", ".join(contact.law for contact in contacts) or "no contact"
+        raise InputError("no contact can wear", None, laws, "a law with a normal direction", 'use law = "coulomb_3d"')
+    return found
 
 
 def read_contacts(

@@ -26,6 +26,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
 
+from .aerodynamics import Aerodynamics, period_of, with_terms
 from .errors import InputError
 from .faces import rotation
 from .model import Contact, Model, by_sector
@@ -51,6 +52,8 @@ class Sector:
     ties : {k: (n_full, n_dof)}
         Dofs of the sector as it was before its high face was tied to the next one, x_full = sum_k ties[k] x_{j+k};
         {0: identity} where nothing was tied.
+    aerodynamics : Aerodynamics, optional
+        Forces of the flow between the blades; they alone need not be balanced.
     """
 
     M: Any
@@ -59,6 +62,7 @@ class Sector:
     C: Any = None
     contacts: Sequence[Contact] = ()
     ties: Parts = field(default_factory=dict)
+    aerodynamics: Aerodynamics | None = None
 
     def __post_init__(self) -> None:
         if self.sectors < 2:
@@ -69,7 +73,7 @@ class Sector:
     @property
     def n_dof(self) -> int:
         """Dofs of one sector."""
-        return int(by_sector(self.M)[0].shape[1])
+        return int(np.shape(by_sector(self.M)[0])[1])
 
     @classmethod
     def from_faces(
@@ -109,7 +113,8 @@ class Sector:
 
     def model(self, nodal_diameter: int, comm: Any = None) -> Model:
         """The equations of one sector in a wave of this many nodal diameters (negative: backward). Collective."""
-        return Model(self.M, self.K, self.C, self.contacts, comm, self.sectors, nodal_diameter)
+        terms = self._terms(period_of(nodal_diameter, self.sectors))
+        return Model(terms["M"], terms["K"], terms["C"], self.contacts, comm, self.sectors, nodal_diameter)
 
     def wheel(self, comm: Any = None, changes: Mapping[str, Sequence[Any]] | None = None) -> Model:
         """The whole wheel, sector after sector, N n_dof dofs; ranks take whole sectors. Collective.
@@ -119,8 +124,7 @@ class Sector:
         changes : {"K": N matrices (n_dof, n_dof), ...}, optional
             Added to a term of each sector in turn: a mistuned wheel.
         """
-        terms = {letter: getattr(self, letter) for letter in "MKC"}
-        around = {letter: self._around(A) for letter, A in terms.items() if A is not None}
+        around = {letter: self._around(A) for letter, A in self._terms().items() if A is not None}
         for letter, own in (changes or {}).items():
             _check_changes(letter, own, self.sectors, self.n_dof)
             added = sp.csr_matrix(sp.block_diag([sp.csr_matrix(A) for A in own]))
@@ -129,6 +133,12 @@ class Sector:
             replace(contact, B=self._around(contact.B), parameters=self._repeated(contact)) for contact in self.contacts
         ]
         return Model(around["M"], around["K"], around.get("C"), contacts, comm, unit=self.n_dof)
+
+    def _terms(self, period: int | None = None) -> dict[str, Any]:
+        """M, K and C with what the flow adds."""
+        terms = {letter: getattr(self, letter) for letter in "MKC"}
+        added = self.aerodynamics.terms(self.M, period) if self.aerodynamics else {}
+        return {letter: with_terms(A, added.get(letter, {})) for letter, A in terms.items()}
 
     def wave(self, q: npt.ArrayLike, nodal_diameter: int, order: int = 1) -> npt.NDArray[np.complex128]:
         """Complex amplitudes (N, n_dof) of harmonic `order` in all sectors from those of sector 0, (n_dof,)."""

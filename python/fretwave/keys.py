@@ -9,6 +9,7 @@ from pydantic import BaseModel
 
 from .schema import (
     ANALYSES,
+    AerodynamicsSection,
     AnalysisSection,
     ContactSection,
     Damper,
@@ -28,6 +29,7 @@ def key_lines() -> Iterator[str]:
         "[model]": ModelSection,
         "[reduction]": ReductionSection,
         "[preload]": PreloadSection,
+        "[aerodynamics]": AerodynamicsSection,
         "[[contact]] (and the parameters of its law)": ContactSection,
         "[[analysis]]": AnalysisSection,
     }

@@ -239,6 +239,15 @@ class Model:
             whole[..., pairs] = values
         return whole
 
+    def pairs_of(self, which: int) -> npt.NDArray[np.intp]:
+        """Pairs of one contact on this rank, as numbers in the order of B."""
+        return self._pairs[which]
+
+    def share_pairs(self, which: int, local: Array) -> Array:
+        """`gather_pairs`, on every rank. Collective."""
+        whole: Array = self.comm.bcast(self.gather_pairs(which, local))
+        return whole
+
     def destroy(self) -> None:
         """Free the matrices. Collective."""
         self.core = None

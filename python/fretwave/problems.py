@@ -103,6 +103,24 @@ class HarmonicProblem:
         """
         return dict(self.core.summary(y))
 
+    def energy(self, y: PETSc.Vec) -> dict[str, float]:
+        """Where the energy of a period goes [J]. Collective.
+
+        Of each force p the work pi sum_n n Im(q_n^H p_n) on the periodic motion, so that the harmonic equations balance
+        it exactly (q_n^H times their n-th row). With s_n = n (-beta + i w) (CNM) the inertia releases
+        2 pi beta w sum_n n^3 q_n^H M q_n, with s_n = i n w0 and C - 2 zeta w0 M (EPMC)
+        2 pi zeta w0^2 sum_n n^2 q_n^H M q_n; C takes pi w sum_n n^2 q_n^H C q_n.
+
+        Returns
+        -------
+        dict
+            contact, damping : dissipated by contact and by C; modal : released by the decay; error : contact + damping
+            - modal relative to modal (to stored energy where that is below 1e-12 of it).
+        """
+        found = dict(self.core.energy(y))
+        size = max(abs(found["modal"]), 1e-12 * abs(found["stored"])) or 1.0
+        return {**found, "error": (found["contact"] + found["damping"] - found["modal"]) / size}
+
     def contact_period(self, y: PETSc.Vec) -> list[dict[str, Array | None]]:
         """Relative displacement u, velocity v and force f of each contact over one period, on rank 0. Collective.
 

@@ -11,7 +11,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from .contacts import ContactSpec, closed_contacts
-from .schema import AnalysisSection, ForcedAnalysis, ModeAnalysis, ReductionSection
+from .schema import AnalysisSection, FlutterAnalysis, ForcedAnalysis, ModeAnalysis, ReductionSection
 
 if TYPE_CHECKING:
     from .casefile import Case
@@ -99,7 +99,7 @@ def kept_dofs(
 
 def _names(analysis: AnalysisSection) -> Iterable[str]:
     yield from (damper.dof for damper in analysis.dampers)
-    if isinstance(analysis, ModeAnalysis):
+    if isinstance(analysis, (ModeAnalysis, FlutterAnalysis)):
         yield analysis.normalise
     if isinstance(analysis, ForcedAnalysis):
         yield analysis.observe

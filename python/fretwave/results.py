@@ -10,7 +10,9 @@ from __future__ import annotations
 import json
 import os
 import shutil
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
 from inspect import signature
 from pathlib import Path
 from typing import Any
@@ -29,6 +31,15 @@ CHUNK_BYTES = 1 << 20
 COPY_BYTES = 1 << 28
 
 Motion = Mapping[str, Mapping[str, Any]]
+
+
+@dataclass(frozen=True)
+class Field:
+    """An array that every row of a table has."""
+
+    shape: tuple[int, ...]
+    unit: str
+    long_name: str
 
 
 class AnalysisWriter:
@@ -54,6 +65,8 @@ class AnalysisWriter:
         Attributes of results.h5 itself.
     arrays : mapping, optional
         Arrays [m] of the group that are there from the first row on.
+    fields : mapping, optional
+        Arrays that every row brings.
     """
 
     def __init__(
@@ -68,6 +81,7 @@ class AnalysisWriter:
         before_first: Callable[[], None] = lambda: None,
         file_attributes: Mapping[str, Any] | None = None,
         arrays: Mapping[str, Any] | None = None,
+        fields: Mapping[str, Field] | None = None,
     ) -> None:
         self.folder, self.name, self.active = folder, name, active
         self.columns = columns_named(columns)
@@ -78,6 +92,7 @@ class AnalysisWriter:
         self._dofs, self._labels = list(dofs), list(labels)
         self._before_first = before_first
         self._file_attributes, self._arrays = dict(file_attributes or {}), dict(arrays or {})
+        self.fields = dict(fields or {})
         self._file: Any = None
         self._table: Any = None
         self._data: list[tuple[Column, Any]] = []
@@ -95,6 +110,7 @@ class AnalysisWriter:
         coefficients: Any = None,
         motions: Motion | None = None,
         state: State | None = None,
+        fields: Mapping[str, Any] | None = None,
     ) -> None:
         """Add a row and flush it. Collective.
 
@@ -108,6 +124,8 @@ class AnalysisWriter:
             Contact name -> u, v, f over one period, for points that are reported.
         state : mapping, optional
             Arrays from which the analysis can go on after this row.
+        fields : mapping, optional
+            The arrays of the row.
         """
         if self.rows == 0:
             self._before_first()
@@ -118,6 +136,8 @@ class AnalysisWriter:
                 self._table.write(csv_line(self.columns, row))
                 self._table.flush()
             self._write_row(row, coefficients)
+            for name in self.fields:
+                _extend(self.group[name], self.rows, np.asarray((fields or {})[name], dtype=float))
             for contact, motion in (motions or {}).items():
                 self._write_motion(contact, motion)
             if motions:
@@ -175,6 +195,10 @@ class AnalysisWriter:
         for column in self.columns[1:]:
             points[column.name].dims[0].attach_scale(points[self.columns[0].name])
         self._create_coefficients(group)
+        for name, field in self.fields.items():
+            data = group.create_dataset(name, (0, *field.shape), "f8", maxshape=(None, *field.shape))
+            data.attrs.update({"units": field.unit, "long_name": field.long_name})
+            data.dims[0].attach_scale(points[self.columns[0].name])
         for name, values in self._arrays.items():
             group.create_dataset(name, data=values).attrs["units"] = "m"
         group.create_dataset("reported", (0,), "i8", maxshape=(None,), chunks=(CHUNK_ROWS,))
@@ -265,7 +289,7 @@ class AnalysisWriter:
     def _usable(self, group: Any) -> Slot | None:
         """The newest state whose rows are all in the file: HDF5 writes a state at once but rows when flushed."""
         tables = [group["points"][column.name] for column in self.columns]
-        tables += [group["coefficients"]] if "coefficients" in group else []
+        tables += [group[name] for name in ("coefficients", *self.fields) if name in group]
         reported = [group["reported"]]
         reported += [group[name][key] for name in group if name.startswith("contact_") for key in ("u", "v", "f")]
         rows, motions = min(map(len, tables)), min(map(len, reported))
@@ -275,8 +299,9 @@ class AnalysisWriter:
         group = self.group
         for column in self.columns:
             group["points"][column.name].resize(self.rows, axis=0)
-        if "coefficients" in group:
-            group["coefficients"].resize(self.rows, axis=0)
+        for name in ("coefficients", *self.fields):
+            if name in group:
+                group[name].resize(self.rows, axis=0)
         group["reported"].resize(self.reported, axis=0)
         for name in [name for name in group if name.startswith("contact_")]:
             for key in ("u", "v", "f"):
@@ -305,6 +330,20 @@ def _extend(data: Any, row: int, values: Any) -> None:
     if len(data) <= row:
         data.resize(row + 1, axis=0)
     data[row] = values
+
+
+@contextmanager
+def rewritten(path: Path, name: str) -> Iterator[Any]:
+    """results.h5 to write to, without its group `name`; the new file takes the old one's place at the end."""
+    file = _copy_without(path, name)
+    try:
+        yield file
+        file.close()
+        if _temporary(path).exists():
+            os.replace(_temporary(path), path)
+    finally:
+        file.close()
+        _temporary(path).unlink(missing_ok=True)
 
 
 def _copy_without(path: Path, name: str) -> Any:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import importlib
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from . import checks
+from .aerodynamics_case import with_flow
 from .analyses.context import AnalysisContext, Outcome, belongs, describe_analysis
 from .casefile import Case, changed_keys, load_case
 from .console import Console
@@ -20,7 +21,7 @@ from .petsc_options import AnalysisOptions
 from .reduced import reduce_case
 from .results import open_results
 from .runfolder import CASE_COPY, RunFolder, new_record, peak_memory_mb, read_record
-from .schema import AnalysisSection, ForcedAnalysis, PreloadSection, TransientSection
+from .schema import AnalysisSection, ForcedAnalysis, PreloadSection, SweepAnalysis, TransientSection
 from .sectors import nodal_diameter
 from .source import display
 from .stopped import joined, not_converged
@@ -31,8 +32,10 @@ DISPATCH = {
     "static": ("static", "run_static"),
     "mode": ("mode", "run_mode"),
     "forced": ("forced", "run_forced"),
+    "flutter": ("flutter", "run_flutter"),
     "free_decay": ("transient", "run_free_decay"),
     "limit_cycle": ("transient", "run_limit_cycle"),
+    "wear": ("wear", "run_wear"),
 }
 
 
@@ -55,22 +58,23 @@ class RunOptions:
     plots: bool = True
     petsc: str = ""
 
+    @classmethod
+    def of(cls, told: Any) -> RunOptions:
+        """From the command line."""
+        return cls(told.out, told.overrides, told.only, told.quick, not told.no_plots, told.petsc)
+
+    def given(self, path: Path, case: Case) -> dict[str, Any]:
+        """How the case was given, for run.json."""
+        told = {key: getattr(self, key) for key in ("overrides", "quick", "only", "petsc")}
+        return {"path": str(path.resolve()), **told, "digest": case.digest, "resolved": case.resolved}
+
 
 def run_case(path: Path, options: RunOptions, comm: Any) -> int:
     """Run a case from its start; returns the exit code. Collective."""
     case = on_first_rank(comm, lambda: load_case(path, options.overrides, options.quick))
     folder = options.out or Path("runs") / case.name
-    given = {
-        "path": str(path.resolve()),
-        "overrides": options.overrides,
-        "quick": options.quick,
-        "only": options.only,
-        "petsc": options.petsc,
-        "digest": case.digest,
-        "resolved": case.resolved,
-    }
-    record = comm.bcast(new_record(given, comm.size) if comm.rank == 0 else None)
-    return _Runner(case, options, folder, record, comm).run()
+    record = comm.bcast(new_record(options.given(path, case), comm.size) if comm.rank == 0 else None)
+    return Runner(case, options, folder, record, comm).run()
 
 
 def resume_run(folder: Path, comm: Any, plots: bool = True) -> int:
@@ -85,7 +89,7 @@ def resume_run(folder: Path, comm: Any, plots: bool = True) -> int:
     given = record["case"]
     options = RunOptions(folder, given["overrides"], given["only"], given["quick"], plots, given["petsc"])
     record["ranks"], record["status"] = comm.size, "running"
-    return _Runner(case, options, folder, record, comm, resuming=True).run()
+    return Runner(case, options, folder, record, comm, resuming=True).run()
 
 
 def reload_case(folder: Path, kept: bool = False) -> tuple[Case, dict[str, Any]]:
@@ -102,6 +106,10 @@ def reload_case(folder: Path, kept: bool = False) -> tuple[Case, dict[str, Any]]
         The folder holds no run, or its case has changed since.
     """
     record = read_record(folder)
+    if "sweep" in record:
+        one = folder / record.get("values", [{}])[0].get("folder", "values/0000")
+        problem = "this is the folder of a sweep, not of one run"
+        raise InputError(problem, display(folder), expected="the folder of a value", fix=f"give {display(one)}")
     given = record["case"]
     path = Path(given["path"])
     text = None if path.exists() and not kept else (folder / CASE_COPY).read_text(encoding="utf-8")
@@ -118,8 +126,8 @@ def reload_case(folder: Path, kept: bool = False) -> tuple[Case, dict[str, Any]]
     return case, record
 
 
-class _Runner:
-    """One run of some analyses of a case."""
+class Runner:
+    """One run of some analyses of a case; `quiet` when it is part of another that speaks for it."""
 
     def __init__(
         self,
@@ -129,11 +137,12 @@ class _Runner:
         record: dict[str, Any],
         comm: Any,
         resuming: bool = False,
+        quiet: bool = False,
     ) -> None:
         self.case, self.options, self.comm, self.resuming = case, options, comm, resuming
         active = comm.rank == 0
         self.folder = RunFolder(folder, record, case.text, active, resuming)
-        self.console = Console(active, self.folder.log)
+        self.console = Console(active, self.folder.log, quiet=quiet)
         self.failures: list[NotConverged] = []
         if resuming:
             self.folder.start()
@@ -141,11 +150,16 @@ class _Runner:
     def run(self) -> int:
         names = in_order(self.case, checks.choose(list(self.case.analyses), self.options.only))
         on_first_rank(self.comm, lambda: self._check_needs(names))
+        sweeps = check_sweeps(self.case, names, self.options, self.comm)
         self.folder.record["selected"] = names
         self._greet(names)
         self._reduce()
         for name in names:
-            if not (self.resuming and self._is_done(name)):
+            if self.resuming and self._is_done(name):
+                continue
+            if name in sweeps:
+                self._sweep(name, sweeps[name])
+            else:
                 self._run_one(self.case.analyses[name])
         self._finish()
         if self.failures:
@@ -179,7 +193,8 @@ class _Runner:
     def _check_needs(self, names: Sequence[str]) -> None:
         """Time integration needs the results of its mode: from this run, or kept in the folder."""
         for name in names:
-            mode = getattr(self.case.analyses[name], "mode", None)
+            analysis = self.case.analyses[name]
+            mode = analysis.mode if isinstance(analysis, TransientSection) else None
             if mode is None or mode in names or self._kept(mode):
                 continue
             raise InputError(
@@ -232,8 +247,9 @@ class _Runner:
             self.folder.start()
 
         case = on_wheel(self.case, analysis)
-        preload = case.preload_of(analysis)
-        built = build_model(case, self._dampers(analysis), self.comm, preload, nodal_diameter(analysis))
+        preload, flow = case.preload_of(analysis), getattr(analysis, "aerodynamics", False)
+        wave = nodal_diameter(case.settings(analysis))
+        built = build_model(case, self._dampers(analysis), self.comm, preload, wave, flow)
         with built as model, options.inserted(), solver_room(case, analysis, prefix):
             context = AnalysisContext(
                 model,
@@ -252,16 +268,26 @@ class _Runner:
             except NotConverged as error:  # before its first point: there was no static state to start from
                 reason = f"{error.what}: {error.measured}"
                 outcome = Outcome(0, reason, False, goal=str(error.expected), advice=error.fix or "")
-        self._note(analysis.name, context, outcome, time.perf_counter() - began)
+        entry = {"left_out": context.left_out, **context.entry}
+        self._note(analysis.name, outcome, time.perf_counter() - began, entry)
+
+    def _sweep(self, name: str, sweep: Any) -> None:
+        """Run another analysis for every value, on groups of ranks."""
+        from .analyses.sweep import run_sweep
+
+        began = time.perf_counter()
+        self.folder.start()
+        outcome = run_sweep(sweep, name, self.comm, self.console, self.folder, self.case.title)
+        self._note(name, outcome, time.perf_counter() - began)
 
     def _dampers(self, analysis: AnalysisSection) -> list[Any]:
         """The analysis' dampers; a time integration without any takes those of its mode."""
         if isinstance(analysis, TransientSection) and not analysis.dampers:
             return list(self.case.analyses[analysis.mode].dampers)
-        return list(analysis.dampers)
+        return list(self.case.settings(analysis).dampers)
 
-    def _note(self, name: str, context: AnalysisContext, outcome: Outcome, seconds: float) -> None:
-        """Print the outcome and keep it in run.json."""
+    def _note(self, name: str, outcome: Outcome, seconds: float, entry: Mapping[str, Any] | None = None) -> None:
+        """Print the outcome and keep it in run.json, with what else `entry` says."""
         for line in outcome.summary:
             self.console.line(line)
         memory = peak_memory_mb(self.comm)
@@ -271,8 +297,7 @@ class _Runner:
             "points": outcome.points,
             "wall_s": round(seconds, 3),
             "peak_memory_mb": memory,
-            "left_out": context.left_out,
-            **context.entry,
+            **(entry or {}),
         }
         self.folder.save()
         if not outcome.converged:
@@ -284,6 +309,19 @@ class _Runner:
         if self.options.plots and self.folder.started and self.comm.rank == 0:
             plot(self.folder.path, self.console)
         self.folder.close()
+
+
+def check_sweeps(case: Case, names: Sequence[str], options: RunOptions, comm: Any) -> dict[str, Any]:
+    """The sweeps among some analyses, after the case was loaded with each of their values. Collective."""
+    sweeps = {}
+    for name in names:
+        analysis = case.analyses[name]
+        if isinstance(analysis, SweepAnalysis):
+            from .analyses.sweep import analysis_sweep
+
+            sweeps[name] = analysis_sweep(case, analysis, options, comm.size)
+            sweeps[name].check(comm)
+    return sweeps
 
 
 def plot(folder: Path, console: Console, only: Sequence[str] | None = None) -> int:
@@ -321,13 +359,19 @@ def needs(analysis: AnalysisSection) -> list[str]:
 
 
 def build_model(
-    case: Case, dampers: Sequence[Any], comm: Any, preload: PreloadSection | None = None, nodal_diameter: int = 0
+    case: Case,
+    dampers: Sequence[Any],
+    comm: Any,
+    preload: PreloadSection | None = None,
+    nodal_diameter: int = 0,
+    aerodynamics: bool = False,
 ) -> Any:
     """``fretwave.Model`` of a case; a preload without pair loads sets the pairs' normal loads to zero. Collective.
 
     Parameters
     ----------
     nodal_diameter : of the wave, where the case is a sector of a wheel (that of `on_wheel` has all of them)
+    aerodynamics : the forces of the flow act
     """
     import fretwave
 
@@ -343,8 +387,10 @@ def build_model(
     ]
     M, K, C = case.M, case.K, case.damping_with(dampers)
     if neighbours is None:
+        K, C = with_flow(case, K, C, nodal_diameter) if aerodynamics else (K, C)
         return fretwave.Model(M, K, C, contacts, comm, unit=case.wheel.unit if case.wheel else 1)
     M, K, C = neighbours.with_own("M", M), neighbours.with_own("K", K), case.ahead_damping(C)
+    K, C = with_flow(case, K, C, nodal_diameter) if aerodynamics else (K, C)
     return fretwave.Model(M, K, C, contacts, comm, neighbours.sectors, nodal_diameter)
 
 

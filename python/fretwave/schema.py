@@ -98,6 +98,28 @@ class PreloadSection(Section):
     loads: list[str] = key("static loads of the model that act", example='["centrifugal"]', default_factory=list)
 
 
+class AerodynamicsSection(Section):
+    """``[aerodynamics]``: forces of the flow on the vibrating blades, where `aerodynamics = true` and in flutter."""
+
+    frequency: Positive = key("vibration frequency at which they hold", "Hz", "194.3")
+    influence: Optional[dict[str, list[float]]] = key(
+        "complex force on a blade by the unit motion of the blade k places ahead: k = [real, imaginary]",
+        "N/m at a dof, 1/s2 modal",
+        "{ 0 = [0.0, -20.0], 1 = [-8.0, 3.0], -1 = [8.0, 3.0] }",
+        default=None,
+        min_length=1,
+    )
+    dof: Optional[Dof] = key(
+        "dof of `influence`; without it modal: the force on a mode of unit modal mass", example='"tip"', default=None
+    )
+    damping: Optional[dict[str, float]] = key(
+        "in place of influence: modal damping ratio by nodal diameter, negative for backward waves",
+        example="{ 4 = -0.002, -4 = 0.003 }",
+        default=None,
+        min_length=1,
+    )
+
+
 class ContactSection(BaseModel):
     """``[[contact]]``: pairs that share a contact law; the law's parameters are further keys."""
 
@@ -173,6 +195,7 @@ class HarmonicSection(AnalysisSection):
     nodal_diameter: Optional[int] = key(
         "nodal diameters of the wave on a sector, negative for a backward wave", example="4", default=None
     )
+    aerodynamics: bool = key("the forces of [aerodynamics] act", example="true", default=False)
     wheel: bool = key("solve all sectors of the wheel in place of one", example="true", default=False)
     mistuning: Optional[MistuningSection] = key(
         "deviations of the wheel's sectors", example='{ of = "blade", standard_deviation = 0.02 }', default=None
@@ -206,6 +229,23 @@ class ModeAnalysis(HarmonicSection):
     )
 
 
+class FlutterAnalysis(HarmonicSection):
+    """``type = "flutter"``: modes of several nodal diameters with [aerodynamics], and their limit cycles."""
+
+    type: Literal["flutter"]
+    method: Literal["CNM", "EPMC"] = key(
+        "complex nonlinear mode (decaying) or extended periodic motion", example='"CNM"', default="CNM"
+    )
+    normalise: Dof = key("dof whose fundamental harmonic is the modal amplitude", example='"m1"')
+    amplitude: list[Positive] = key("first and last modal amplitude", "m", "[1e-5, 1e-2]", min_length=2, max_length=2)
+    nodal_diameters: Optional[list[int]] = key(
+        "waves looked at, negative for backward ones; all unless told", example="[-4, 3, 4]", default=None, min_length=1
+    )
+    report_at: list[Positive] = key(
+        "amplitudes at which the motion of a period is kept", "m", "[1e-4]", default_factory=list
+    )
+
+
 class StaticAnalysis(AnalysisSection):
     """``type = "static"``: the static state under the preload, pair by pair."""
 
@@ -226,7 +266,16 @@ class ForcedAnalysis(HarmonicSection):
         default_factory=list,
     )
     force: dict[Dof, float] = key(
-        "force amplitude of each excited dof, cosine at harmonic 1", "N", "{ m1 = 1.0 }", min_length=1
+        "force amplitude of each excited dof, cosine at harmonic 1, delayed from sector to sector of a wheel",
+        "N",
+        "{ m1 = 1.0 }",
+        min_length=1,
+    )
+    engine_order: Optional[int] = key(
+        "order of the excitation of a wheel, in place of nodal_diameter; negative where the rotor turns with the "
+        "sectors' numbers",
+        example="4",
+        default=None,
     )
     levels: list[Positive] = key("factors on the force", "-", "[1.0, 2.0]", min_length=1)
     frequency: list[Positive] = key(
@@ -237,6 +286,40 @@ class ForcedAnalysis(HarmonicSection):
         "frequencies at which the motion of a period is kept", "Hz", "[3.9]", default_factory=list
     )
     time_points: int = key("points of each response that are checked by time integration", example="4", default=0, ge=0)
+
+
+class WearAnalysis(AnalysisSection):
+    """``type = "wear"``: fretting wear of a mode at fixed amplitudes over wear cycles."""
+
+    type: Literal["wear"]
+    mode: str = key("mode analysis whose settings and branch this one takes", example='"mode"')
+    amplitude: list[Positive] = key(
+        "fixed modal amplitudes, one or a grid, within those of the mode", "m", "[1.2e-3]", min_length=1
+    )
+    cycles: Positive = key("normalised wear cycles to march", "-", "40.0")
+    coefficient: float = key("wear coefficient k_w", "1/Pa", "1e-14", ge=0, allow_inf_nan=False)
+    cycle_unit: Optional[Positive] = key(
+        "vibration cycles in a normalised one (by default: in which sliding 4 mu N0/kt a cycle takes 1/e off the load)",
+        "-",
+        "1e6",
+        default=None,
+    )
+    stepper: Literal["heun", "bogacki_shampine", "trapezoidal", "tr_bdf2"] = key(
+        "step over wear cycles: explicit of order 2 or 3, implicit of order 2 (two)",
+        example='"tr_bdf2"',
+        default="bogacki_shampine",
+    )
+    tolerance: Positive = key(
+        "estimated error of a step, as normal load lost relative to the mean", "-", "1e-4", default=1e-3, lt=1
+    )
+    pressure_change: Positive = key(
+        "largest change of a pair's contact pressure in a step, relative to the mean", "-", "0.1", default=0.2
+    )
+    report_at: list[Positive] = key(
+        "normalised cycles at which the motion of a period is kept", "-", "[10.0, 40.0]", default_factory=list
+    )
+    harmonics: Optional[int] = key("highest harmonic, in place of the mode's", example="5", default=None, ge=1)
+    samples: Optional[int] = key("time samples of a period, in place of the mode's", example="256", default=None, ge=4)
 
 
 class TransientSection(AnalysisSection):
@@ -261,17 +344,41 @@ class LimitCycleAnalysis(TransientSection):
     type: Literal["limit_cycle"]
 
 
+class SweepAnalysis(AnalysisSection):
+    """``type = "sweep"``: another analysis for every value of some keys of the case."""
+
+    type: Literal["sweep"]
+    of: str = key("analysis to run for every value", example='"mode"')
+    over: dict[str, Any] = key(
+        "values of keys, addressed as --set does; of several keys all combinations",
+        example='{ "model.options.friction" = [0.1, 0.2, 0.5] }',
+        min_length=1,
+    )
+    overrides: dict[str, Any] = key(
+        "other values of keys for these runs", example="{ mode.amplitude = [1e-6, 1e-2] }", default_factory=dict
+    )
+    groups: Optional[int] = key(
+        "most groups of ranks, each with a value at a time (as many as there are ranks and values unless told)",
+        example="2",
+        default=None,
+        ge=1,
+    )
+
+
 ANALYSES: dict[str, type[AnalysisSection]] = {
     "static": StaticAnalysis,
     "mode": ModeAnalysis,
     "forced": ForcedAnalysis,
+    "flutter": FlutterAnalysis,
     "free_decay": FreeDecayAnalysis,
     "limit_cycle": LimitCycleAnalysis,
+    "sweep": SweepAnalysis,
+    "wear": WearAnalysis,
 }
 
 
 class StudySection(Section):
-    """``[study]``: sweeps of ``fretwave study``, each with the others at their finest."""
+    """``[study]``: sweeps of ``fretwave study``, each with the others at their finest (of wear: as in the analysis)."""
 
     harmonics: Optional[list[int]] = key("highest harmonics", example="[1, 3, 7, 21, 41]", default=None, min_length=2)
     samples: Optional[list[int]] = key(
@@ -283,6 +390,12 @@ class StudySection(Section):
     tolerance: Optional[list[Positive]] = key(
         "residual norms at which Newton stops", "-", "[1e-4, 1e-7, 1e-10]", default=None, min_length=2
     )
+    wear_tolerance: Optional[list[Positive]] = key(
+        "tolerances of a step over wear cycles", "-", "[1e-1, 1e-2, 1e-3]", default=None, min_length=2
+    )
+    pressure_change: Optional[list[Positive]] = key(
+        "largest changes of pressure in a step over wear cycles", "-", "[0.4, 0.2, 0.1]", default=None, min_length=2
+    )
 
 
 #: Top-level keys; analyses cannot bear these names, or ``--set`` could not tell them apart.
@@ -291,6 +404,7 @@ TOP_LEVEL = {
     "model": "matrices and names of the degrees of freedom, or what makes them",
     "reduction": "Craig-Bampton reduction",
     "preload": "the static state that the dynamics move about",
+    "aerodynamics": "forces of the flow on the blades",
     "contact": "contact pairs that share a law ([[contact]], any number)",
     "analysis": "what to compute ([[analysis]], at least one)",
     "quick": "overrides used by --quick, addressed as --set does",

@@ -12,7 +12,7 @@ import scipy.sparse as sp
 from .contacts import ContactSpec
 from .errors import FretwaveError, InputError
 from .origin import Origin
-from .schema import AnalysisSection, ForcedAnalysis, HarmonicSection, ModelSection, TransientSection
+from .schema import AnalysisSection, FlutterAnalysis, ForcedAnalysis, HarmonicSection, ModelSection, TransientSection
 from .source import Source, nearest
 from .validation import at, toml
 
@@ -181,7 +181,9 @@ def check_waves(
     for number, analysis in analyses.items():
         given = getattr(analysis, "nodal_diameter", None)
         if neighbours is None:
-            if given is not None:
+            if isinstance(analysis, FlutterAnalysis):
+                wrong(number, "type", "is of a wheel", "a model with sectors", "give [model] its sectors")
+            elif given is not None:
                 fix = "remove the key, or give [model] its sectors"
                 wrong(number, "nodal_diameter", "is of no sector of a wheel", "a model with sectors", fix)
             continue
@@ -192,6 +194,8 @@ def check_waves(
         if integrates:
             key = "type" if isinstance(analysis, TransientSection) else "time_points"
             wrong(number, key, "integrates in time, which one sector cannot", "harmonic balance", "remove it")
+        elif isinstance(analysis, FlutterAnalysis):
+            continue  # has several waves, checked with the aerodynamics
         elif isinstance(analysis, HarmonicSection) and (
             abs(given) > half if given is not None else analysis.mistuning is None
         ):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -96,11 +96,22 @@ def _count(table: dict[str, Any], event: str) -> int:
     return sum(event in text.decode().split() for text in table["event"])
 
 
+def _wave(cycle: Mapping[str, Any]) -> str:
+    """Which of several waves has a limit cycle."""
+    return f"nodal diameter {cycle['nodal_diameter']}, " if "nodal_diameter" in cycle else ""
+
+
 def _notes(name: str, group: Any) -> list[str]:
     """Limit cycles, and why an analysis is not complete."""
     words = {True: "stable", False: "unstable", None: "stability unknown"}
-    notes = [
-        f"{name}: limit cycle at a = {cycle['amplitude']:.5g} m, {cycle['frequency_hz']:.5g} Hz: "
+    if group.attrs["type"] == "sweep":
+        from .sweep_summary import read_landmarks
+
+        notes = read_landmarks(name, group)
+    else:
+        notes = []
+    notes += [
+        f"{name}: {_wave(cycle)}limit cycle at a = {cycle['amplitude']:.5g} m, {cycle['frequency_hz']:.5g} Hz: "
         + words[cycle["stable"]]
         for cycle in json.loads(group.attrs.get("events", "[]"))
     ]

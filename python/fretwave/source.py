@@ -6,7 +6,7 @@ import difflib
 import os
 import re
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,7 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
+TomlError = tomllib.TOMLDecodeError
 _PLAIN_TEXT = re.compile(r"[A-Za-z_./-][^\[\]{}\"'\n]*")
 
 
@@ -103,7 +104,7 @@ class Source:
                 )
             )
             return
-        for path, value in _leaves(quick, ()):
+        for path, value in nested_leaves(quick):
             line = f"{self.label}:{self._locator.line(('quick', *path))} ([quick])"
             self._override(".".join(str(part) for part in path), value, line)
 
@@ -187,10 +188,11 @@ def _step_into(holder: Any, part: str | int, following: str | int) -> Any:
     return None
 
 
-def _leaves(table: dict[str, Any], path: tuple[str, ...]) -> Iterable[tuple[tuple[str, ...], Any]]:
+def nested_leaves(table: Mapping[str, Any], path: tuple[str, ...] = ()) -> Iterable[tuple[tuple[str, ...], Any]]:
+    """Path and value of everything in a table and its tables that is no table itself."""
     for name, value in table.items():
         if isinstance(value, dict):
-            yield from _leaves(value, (*path, name))
+            yield from nested_leaves(value, (*path, name))
         else:
             yield (*path, name), value
 

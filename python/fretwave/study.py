@@ -22,7 +22,7 @@ from .parallel import on_first_rank
 from .petsc_options import AnalysisOptions
 from .reduced import reduce_case
 from .run import build_model
-from .schema import ModeAnalysis
+from .schema import ModeAnalysis, WearAnalysis
 from .sectors import nodal_diameter
 from .study_plan import Outcome, Plan, Settings, Study, common_amplitudes
 from .study_report import markdown, write_csv
@@ -40,9 +40,13 @@ def main(arguments: Sequence[str]) -> int:
 
     options = _parser().parse_args(arguments)
     comm = _world()
-    case = on_first_rank(comm, lambda: load_case(options.case, options.overrides))
-    analysis, plan = _analysis(case, options.analysis), _plan(case, options)
+    case = on_first_rank(comm, lambda: load_case(options.case, options.overrides, options.quick))
     console = Console(comm.rank == 0, lambda line: None)
+    if isinstance(case.analyses.get(options.analysis), WearAnalysis):
+        from .wear_study import study_wear
+
+        return study_wear(case, options, comm, console)
+    analysis, plan = _analysis(case, options.analysis), _plan(case, options)
     study = Study(plan, common_amplitudes(min(analysis.amplitude), max(analysis.amplitude), COUNT))
     console.line(f"study of '{analysis.name}': {len(plan.sweeps())} runs, the finest is {_text(plan.reference)}")
     solver = _Solver(case, analysis, comm, console, study, options.repeats)
@@ -69,7 +73,7 @@ class _Solver:
                 self._parts[1].model.destroy()
             case = on_wheel(reduce_case(self.case, self.comm, component_modes), self.analysis)
             preload, diameters = case.preload_of(self.analysis), nodal_diameter(self.analysis)
-            model = build_model(case, self.analysis.dampers, self.comm, preload, diameters)
+            model = build_model(case, self.analysis.dampers, self.comm, preload, diameters, self.analysis.aerodynamics)
             context = AnalysisContext(model, case, self.analysis, self.comm, Path(), self.console)
             self._parts = (component_modes, context, start_of(context))
         return self._parts[1:]
@@ -231,14 +235,20 @@ def _parser() -> argparse.ArgumentParser:
 
     parser = _Parser(prog="fretwave study", description=__doc__)
     parser.add_argument("case", type=Path, metavar="CASE", help="case file (TOML)")
-    parser.add_argument("--analysis", metavar="NAME", help="mode analysis to study (default: the first)")
+    parser.add_argument("--analysis", metavar="NAME", help="mode or wear to study (default: the first mode)")
     parser.add_argument("--set", action="append", default=[], dest="overrides", metavar="KEY=VALUE", help="as for run")
+    parser.add_argument("--quick", action="store_true", help="the short form of the case")
     parser.add_argument("--harmonics", type=_list(int), metavar="H,...", help="highest harmonics to sweep")
     parser.add_argument("--samples", type=_list(int), metavar="N,...", help="time samples to sweep")
-    parser.add_argument("--tolerance", type=_list(float), metavar="T,...", help="Newton tolerances to sweep")
+    parser.add_argument(
+        "--tolerance", type=_list(float), metavar="T,...", help="tolerances to sweep (of wear: of a step)"
+    )
     parser.add_argument(
         "--component-modes", type=_list(int), metavar="N,...", help="numbers of component modes to sweep"
     )
-    parser.add_argument("--repeats", type=int, default=REPEATS, help="times each branch is solved (default 3)")
+    parser.add_argument(
+        "--pressure-change", type=_list(float), metavar="P,...", help="of wear: largest changes of pressure in a step"
+    )
+    parser.add_argument("--repeats", type=int, default=REPEATS, help="times each run is repeated (default 3)")
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder (default runs/<case>_study)")
     return parser

@@ -41,17 +41,41 @@ def write_csv(rows: Sequence[Row], path: Path) -> Path:
     return path
 
 
-def markdown(rows: Sequence[Row], notes: Sequence[str] = ()) -> str:
+#: the same of a study of wear
+PRINTED_OF_WEAR = {
+    "sweep": "{sweep}",
+    "H": "{harmonics}",
+    "tolerance": "{tolerance:.0e}",
+    "pressure change": "{pressure_change:g}",
+    "steps": "{steps}",
+    "Newton": "{newton}",
+    "time [s]": "{wall_s:.3f}",
+    "frequency [Hz]": "{frequency_hz:.5f}",
+    "zeta [%]": "{zeta_percent:.5f}",
+    "worn [mm^3]": "{worn_mm3:.5f}",
+    "error of omega": "{omega_error:.1e}",
+    "error of zeta": "{zeta_error:.1e}",
+    "error of worn": "{worn_error:.1e}",
+}
+
+LEGEND_OF_WEAR = (
+    "Values are those after the last cycle, errors of them are relative to the finest run of each sweep (marked)."
+)
+
+
+def markdown(
+    rows: Sequence[Row], notes: Sequence[str] = (), printed: Mapping[str, str] = PRINTED, legend: str = LEGEND
+) -> str:
     """Aligned Markdown table with its legend; readable as plain text too."""
-    reduced = any(row["component_modes"] != -1 for row in rows)
-    shown = {name: form for name, form in PRINTED.items() if name != "modes" or reduced}
+    reduced = any(row.get("component_modes", -1) != -1 for row in rows)
+    shown = {name: form for name, form in printed.items() if name != "modes" or reduced}
     body = [[form.format(**row) for form in shown.values()] for row in rows]
     for cells, row in zip(body, rows):
         cells[0] += " (finest)" if row["reference"] else ""
     widths = [max(len(line[i]) for line in (list(shown), *body)) for i in range(len(shown))]
     lines = [_line(shown, widths), "|" + "|".join("-" * (width + 1) + ":" for width in widths) + "|"]
     lines += [_line(cells, widths) for cells in body]
-    return "\n".join([*lines, "", LEGEND, *notes, ""])
+    return "\n".join([*lines, "", legend, *notes, ""])
 
 
 def _line(cells: Sequence[str] | Mapping[str, str], widths: Sequence[int]) -> str:

@@ -25,6 +25,7 @@ from .source import display
 from .view_choice import Choice, ViewOptions, read_choice
 from .view_motion import Scene, Shape, geometry, mesh_of, scene_of
 from .vtkhdf import VERTEX, GridFile
+from .wear_view import view_wear, worn_analysis
 
 Array = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.intp]
@@ -44,6 +45,9 @@ def view_run(folder: Path, options: ViewOptions, say: Callable[[str], None] = pr
         sector.
     """
     case, _ = reload_case(folder, kept=True)
+    worn = None if options.points else worn_analysis(folder, case, options)
+    if worn is not None:
+        return view_wear(folder, case, worn, options, say)
     nodes, cells = mesh_of(case, options.linear)
     with open_results(folder / "results.h5") as file:
         choice = read_choice(file, folder, case, options)

@@ -23,7 +23,7 @@ Array = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.intp]
 
 #: Columns of the branch that go with a picture.
-SHOWN = ("point", "amplitude", "frequency_hz", "zeta", "level", "stick", "slip", "open")
+SHOWN = ("point", "amplitude", "cycles", "frequency_hz", "zeta", "level", "stick", "slip", "open")
 #: Points named in a message.
 NAMED = 12
 
@@ -172,7 +172,7 @@ def read_choice(file: Any, folder: Path, case: Case, options: ViewOptions) -> Ch
     InputError
         There is no such analysis, or it keeps no such point.
     """
-    group = file[_analysis(file, folder, case, options.analysis)]
+    group = file[analysis_name(file, folder, case, options.analysis)]
     name = group.name.strip("/")
     held = _held(group)
     # A mode is shown where its contacts are kept; a response is sought at its peaks, where they are not.
@@ -210,7 +210,7 @@ def _diameters(group: Any, case: Case, name: str, rows: Sequence[int]) -> list[i
     return [nodal_diameter(case.analyses[name])] * len(rows)
 
 
-def _analysis(file: Any, folder: Path, case: Case, asked: str | None) -> str:
+def analysis_name(file: Any, folder: Path, case: Case, asked: str | None) -> str:
     """Name of the analysis asked for, or of the first that has a motion: in the order of the case."""
     found = [name for name in case.analyses if name in file and "coefficients" in file[name]]
     found = [name for name in found if belongs(file[name], case, name)]
@@ -272,8 +272,19 @@ def _contacts(group: Any, case: Case, name: str, rows: Sequence[int]) -> dict[st
         place = f"contact_{contact.name}"
         if place in group:
             values = acting_parameters(contact, preload)
-            at = [reported.index(row) for row in rows]
             found[contact.name] = [
-                ContactHistory(contact.law, values, *(group[place][key][row] for key in "uvf")) for row in at
+                ContactHistory(
+                    contact.law,
+                    _worn(values, group, contact.name, row),
+                    *(group[place][key][reported.index(row)] for key in "uvf"),
+                )
+                for row in rows
             ]
     return found
+
+
+def _worn(values: dict[str, Any], group: Any, contact: str, row: int) -> dict[str, Any]:
+    """Parameters of a law at a point: worn depth is gap."""
+    if f"depth_{contact}" not in group:
+        return values
+    return {**values, "gap": values.get("gap", 0.0) + group[f"depth_{contact}"][row]}

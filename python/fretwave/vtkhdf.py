@@ -20,7 +20,7 @@ from .errors import InputError
 from .source import display
 
 #: VTK's numbers of cell types by name (vtkCellType.h).
-VERTEX, HEXAHEDRON, QUADRATIC_HEXAHEDRON, TRIQUADRATIC_HEXAHEDRON = 1, 12, 25, 29
+VERTEX, TRIANGLE, HEXAHEDRON, QUADRATIC_HEXAHEDRON, TRIQUADRATIC_HEXAHEDRON = 1, 5, 12, 25, 29
 #: The lowest version with steps: any reader of a later 2.x takes it.
 VERSION = (2, 0)
 #: Rows of one HDF5 chunk: a step of a small grid, some 100 kB of vectors of a large one.

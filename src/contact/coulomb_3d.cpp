@@ -9,7 +9,11 @@ namespace fretwave::contact {
 
 template <bool Coupled>
 Coulomb3d<Coupled>::Coulomb3d(Coulomb3dParameters p)
-    : p_(std::move(p)), reach_(p_.gap.size()), slider_(2 * p_.gap.size(), 0.0), closed_(p_.gap.size()) {
+    : p_(std::move(p)),
+      unworn_(p_.gap),
+      reach_(p_.gap.size()),
+      slider_(2 * p_.gap.size(), 0.0),
+      closed_(p_.gap.size()) {
   for (size_t i = 0; i < closed_.size(); ++i) {
     reach_[i] = p_.friction_coefficient[i] / p_.tangential_stiffness[i];
     closed_[i] = p_.normal_load[i] - p_.normal_stiffness[i] * p_.gap[i] > 0;
@@ -35,6 +39,11 @@ void Coulomb3d<Coupled>::rest(double const* u) {
   std::vector<double> f(3 * size_t(n)), record(record_arrays * size_t(n));
   march<Coupled>(constants(0), 1, n, u, slider_.data(), f.data(), record.data());
   for (int i = 0; i < n; ++i) closed_[i] = f[i] > 0;
+}
+
+template <bool Coupled>
+void Coulomb3d<Coupled>::wear(double const* depth) {
+  for (int i = 0; i < pairs(); ++i) p_.gap[i] = unworn_[i] + depth[i];
 }
 
 template <bool Coupled>
@@ -173,6 +182,11 @@ void Coulomb3d<Coupled>::diagnose(Motion const& motion, double const* f, Diagnos
       }
       const bool open = now[i] <= 0, slips = !open && size >= limit * (1 - 1e-12);
       out.status[size_t(t) * n + i] = open ? Status::open : slips ? Status::slip : Status::stick;
+      // trapezoidal in N, so that a sample that opens takes nothing away at once; a slider in shakedown
+      // touches its limit and moves by the rounding of u, which is no slip
+      const double size_u = std::hypot(u[n + i], u[2 * n + i]) + limit / kt;
+      if (!out.archard.empty() && (open || slips) && std::sqrt(path) > 1e-12 * size_u)
+        out.archard[i] += (now[i] + then[i]) / 2 * std::sqrt(path);
       if (!slips) continue;
       out.slip_path[i] += std::sqrt(path);
       // never negative: the slider moves along the force, by rounding only where it just touches the limit

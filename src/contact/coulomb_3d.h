@@ -11,6 +11,7 @@ struct Coulomb3dParameters {
 
 /// Elastic Coulomb contact in three dimensions: components (normal, tangent, tangent), u_n > 0 closes.
 ///   N = max(0, N0 + kn (u_n - gap)),  T = kt (u_t - w),  |T| <= mu N,  T = w' free when open.
+/// Worn depth adds to the gap.
 /// Circular slip limit over both tangents, or each tangent limited by itself (Coupled = false), as some other
 /// codes do.
 template <bool Coupled>
@@ -22,6 +23,8 @@ class Coulomb3d : public Law {
   bool uses_velocity() const override { return false; }
   bool hereditary() const override { return true; }
   void rest(double const* u) override;
+  bool wears() const override { return true; }
+  void wear(double const* depth) override;
   double stuck_stiffness(int component, int pair) const override;
   void force(Motion const&, double* f, Record&) const override;
   void product(Motion const&, Record const&, double const* du, double const* dv, double* df) const override;
@@ -37,6 +40,7 @@ class Coulomb3d : public Law {
   void linearised(Motion const&, Record const&, int pair, int n, double const* du, double* df) const;
 
   Coulomb3dParameters p_;
+  std::vector<double> unworn_;           ///< gap without wear [m]
   std::vector<double> reach_;            ///< mu / kt [m/N]
   std::vector<double> slider_, closed_;  ///< at rest: w (2 x pairs), 1 where closed
 };

@@ -43,6 +43,8 @@ struct Diagnosis {
   std::vector<Status> status;     ///< samples x pairs
   std::vector<double> work;       ///< dissipated energy [J], pairs
   std::vector<double> slip_path;  ///< length of the slider's path [m], pairs
+  /// Archard's integral of N |d slider| [N m], pairs (Laxalde et al. 2008, eq. 13); empty: not asked for.
+  std::vector<double> archard = {};
 };
 
 /// A contact law with its parameters for the pairs of this rank.
@@ -60,6 +62,10 @@ class Law {
   /// The static state the dynamics start from: relative displacement components x pairs, reached from zero in
   /// one step.
   virtual void rest(double const* /*u*/) {}
+  /// Has a normal direction, along which worn depths count as additional gap.
+  virtual bool wears() const { return false; }
+  /// Worn depth of each pair [m], in place of what was set before; the rest state stays as it is.
+  virtual void wear(double const* /*depth*/) {}
   /// f(-u, -v) = -f(u, v): the motion may keep odd harmonics only.
   virtual bool odd() const { return false; }
   /// Stiffness of the contact when stuck in its rest state [N/m] (0 for a pair that is open there); infinite

@@ -89,6 +89,19 @@ void Aft::product(double const* dU, double const* dV, double* dF) {
   }
 }
 
+void Aft::gap_product(double const* dgap, double* dF) {
+  if (columns_ == 0) return;
+  for (Tile const& tile : tiles_) {
+    const int d = law_->components();
+    const contact::Motion motion = this->motion(tile, 1);
+    std::fill_n(u_.data(), motion.size(), 0.0);
+    for (int t = 0; t < motion.samples; ++t)
+      for (int i = 0; i < tile.pairs; ++i) u_[size_t(t) * d * tile.pairs + i] = -dgap[tile.first + i];
+    law_->product(motion, tile.record, motion.u, nullptr, f_.data());
+    transform(tile).to_harmonics(f_.data(), dF + size_t(tile.first) * d * harmonics_.block_size());
+  }
+}
+
 /// T[pair][row][col] (m x m each): f_n = 2 G_n x_0 + sum_k G_{n-k} x_k + G_{n+k} conj(x_k) for f(t) = g(t)
 /// x(t), from the FFT of g alone.
 void Aft::toeplitz_hankel(std::vector<double> const& tangent, std::vector<double>& T) const {
@@ -207,6 +220,33 @@ void count(contact::Diagnosis const& diagnosis, ContactSummary& summary) {
 
 }  // namespace
 
+contact::Diagnosis Aft::diagnosis(ContactPeriod const& period, Exponents const& e, bool archard) const {
+  const contact::Motion whole = this->whole(period, e);
+  contact::Diagnosis out{std::vector<contact::Status>(size_t(whole.samples) * pairs_),
+                         std::vector<double>(pairs_), std::vector<double>(pairs_),
+                         std::vector<double>(archard ? pairs_ : 0)};
+  law_->diagnose(whole, period.f.data(), out);
+  return out;
+}
+
+Wearing Aft::wearing(double const* U, Exponents const& e) const {
+  const std::vector<double> none(pairs_, 0.0);
+  Wearing out{none, none, none, none};
+  if (columns_ == 0 || !law_->wears()) return out;
+  const ContactPeriod now = period(U, e);
+  const contact::Diagnosis found = diagnosis(now, e, true);
+  const double share = 1.0 / harmonics_.samples();
+  out.archard = found.archard;
+  for (int t = 0; t < harmonics_.samples(); ++t)
+    for (int i = 0; i < pairs_; ++i) {
+      const auto status = found.status[size_t(t) * pairs_ + i];
+      out.load[i] += share * now.f[size_t(t) * columns_ + i];
+      out.slip[i] += status == contact::Status::slip ? share : 0;
+      out.open[i] += status == contact::Status::open ? share : 0;
+    }
+  return out;
+}
+
 ContactSummary Aft::summarise(double const* U, Exponents const& e) {
   ContactSummary summary;
   if (columns_ == 0) return summary;
@@ -218,11 +258,7 @@ ContactSummary Aft::summarise(double const* U, Exponents const& e) {
   std::tie(summary.truncated, summary.total) = transform.truncated_energy(now.f.data(), F.data());
   summary.unclosed = now.unclosed;
 
-  const contact::Motion whole = this->whole(now, e);
-  contact::Diagnosis diagnosis{std::vector<contact::Status>(size_t(whole.samples) * pairs_),
-                               std::vector<double>(pairs_), std::vector<double>(pairs_)};
-  law_->diagnose(whole, now.f.data(), diagnosis);
-  count(diagnosis, summary);
+  count(diagnosis(now, e, false), summary);
 
   Aft doubled(Harmonics(harmonics_.orders(), 2 * harmonics_.samples()), law_);
   doubled.force(U, e, finer.data());

@@ -20,6 +20,13 @@ struct ContactPeriod {
   double unclosed = 0;  ///< as in ContactSummary
 };
 
+/// What wears a contact over a period, per pair.
+struct Wearing {
+  std::vector<double> archard;     ///< integral of N |d slider| [N m]; zero for a law that does not wear
+  std::vector<double> load;        ///< mean normal force [N]
+  std::vector<double> slip, open;  ///< shares of the period
+};
+
 /// Alternating frequency-time for the contact pairs of this rank: harmonic blocks of relative displacement
 /// in, of force out. Blocks are (pairs x components) x block size. Never communicates.
 class Aft {
@@ -31,11 +38,15 @@ class Aft {
   void force(double const* U, Exponents const&, double* F);
   /// dF for dU and dV, the harmonic blocks of the velocity's perturbation.
   void product(double const* dU, double const* dV, double* dF);
+  /// dF for gaps that grow by dgap (pairs) [m]: N = kn (u_n - gap) sees them as normal displacements that
+  /// fall.
+  void gap_product(double const* dgap, double* dF);
   /// Dense dF/dU of each pair, pairs x (components m) x (components m), with the velocity's share through s.
   void blocks(Exponents const&, double* D);
 
   ContactSummary summarise(double const* U, Exponents const&);
   ContactPeriod period(double const* U, Exponents const&) const;
+  Wearing wearing(double const* U, Exponents const&) const;
 
  private:
   /// Pairs whose time samples fit the cache, and the record of their last force.
@@ -46,6 +57,7 @@ class Aft {
   static std::vector<Tile> tiles(contact::Law const&, int samples);
   contact::Motion motion(Tile const&, double omega) const;
   contact::Motion whole(ContactPeriod const&, Exponents const&) const;
+  contact::Diagnosis diagnosis(ContactPeriod const&, Exponents const&, bool archard) const;
   FourierTransform const& transform(Tile const& tile) const {
     return tile.pairs == tiles_.front().pairs ? transform_ : last_transform_;
   }

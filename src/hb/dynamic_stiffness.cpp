@@ -89,9 +89,10 @@ void DynamicStiffness::accumulate(std::vector<complex> const& c, Blocked const& 
   dgemm_("N", "N", &m, &local, &all, &one, X.data(), &m, A.dense.data(), &all, &one, Y.data(), &m);
 }
 
-void DynamicStiffness::multiply_add(Exponents const& e, Vec x, Vec y) {
+void DynamicStiffness::multiply_add(Exponents const& e, Vec x, Vec y, int order) {
   for (size_t j = 0; j < blocked_.size(); ++j)
-    accumulate(coefficients(model_.terms()[j], e), blocked_[j], x, y);
+    if (order < 0 || model_.terms()[j].order == order)
+      accumulate(coefficients(model_.terms()[j], e), blocked_[j], x, y);
 }
 
 void DynamicStiffness::derivative_multiply_add(Exponents const& e, Exponents const& change, Vec x, Vec y) {

@@ -9,8 +9,8 @@ namespace fretwave::hb {
 class DynamicStiffness {
  public:
   DynamicStiffness(model::Model const&, Harmonics const&);
-  /// y += Z x on harmonic-block vectors. Collective.
-  void multiply_add(Exponents const&, Vec x, Vec y);
+  /// y += Z x on harmonic-block vectors, of all terms or of those of one order. Collective.
+  void multiply_add(Exponents const&, Vec x, Vec y, int order = -1);
   /// y += dZ x for a change (ds, dg) of the exponents. Collective.
   void derivative_multiply_add(Exponents const&, Exponents const& change, Vec x, Vec y);
   /// Rounding error to expect in Z x: eps sum |A| |c_n| |x|, with each dof's neighbours moving as itself;

@@ -250,6 +250,28 @@ std::vector<PairTangents> HarmonicProblem::pair_tangents(Vec y) {
   return residual_.pair_tangents();
 }
 
+void HarmonicProblem::wear(PerContact const& depth) {
+  residual_.wear(depth);
+  linearised_ = false;
+}
+
+VecHandle HarmonicProblem::gap_product(Vec y, PerContact const& dgap) {
+  linearise(y);
+  residual_.gap_product(dgap, dR_);
+  VecHandle out = equations();
+  check(VecSet(out, 0));
+  ReadArray in(dR_);
+  const double scale = 1 / (stiffness_ * motion_.amplitude);
+  std::transform(in.data(), in.data() + local_block_, WriteArray(out).data(),
+                 [&](double r) { return scale * r; });
+  return out;
+}
+
+EnergyBalance HarmonicProblem::energy(Vec y) {
+  linearise(y);
+  return residual_.energy();
+}
+
 std::unique_ptr<solve::Preconditioner> HarmonicProblem::preconditioner(std::string const& blocks) {
   if (harmonics().fundamental() < 0) return nullptr;
   if (model().unit()) return std::make_unique<WheelPreconditioner>(*this);

@@ -67,6 +67,12 @@ class HarmonicProblem : public solve::Problem {
   /// The laws start their march from the static state at y. Collective.
   void settle(Vec y) { residual_.settle(coefficients(y)); }
   std::vector<ContactPeriod> contact_periods(Vec y);
+  /// Worn depths of this rank's pairs [m], contact by contact, from now on (Residual::wear).
+  void wear(PerContact const& depth);
+  /// dr for gaps that grow by dgap [m], the derivative of r by worn depths. Collective.
+  VecHandle gap_product(Vec y, PerContact const& dgap);
+  std::vector<Wearing> wearing(Vec y) { return residual_.wearing(coefficients(y), exponents(y)); }
+  EnergyBalance energy(Vec y);
   Exponents exponents(Vec y) { return motion(scalars(y)).exponents; }
 
  protected:

@@ -3,6 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
+
+#include "error.h"
 
 namespace fretwave::hb {
 
@@ -117,6 +120,69 @@ void Residual::contact_product(Group& group, Vec dQ, Exponents const* de, Vec dR
     group.aft.product(dU_array.data(), group.dV.data(), WriteArray(dF).data());
   }
   add_force(group, dF, dR);
+}
+
+void Residual::wear(PerContact const& depth) {
+  for (size_t k = 0; k < groups_.size(); ++k) {
+    contact::Law& law = *groups_[k].contact->law;
+    if (!depth[k].empty() && (!law.wears() || int(depth[k].size()) != law.pairs()))
+      throw InputError(
+          "a contact cannot take these worn depths",
+          "contact '" + groups_[k].contact->name + "', " + std::to_string(depth[k].size()) + " depths",
+          law.wears() ? std::to_string(law.pairs()) + " depths" : "a law with a normal direction",
+          "wear contacts with law coulomb_3d");
+    if (!depth[k].empty()) law.wear(depth[k].data());
+  }
+}
+
+void Residual::gap_product(PerContact const& dgap, Vec dR) {
+  check(VecSet(dR, 0));
+  for (size_t k = 0; k < groups_.size(); ++k) {
+    Group& group = groups_[k];
+    if (!group.contact->law->wears()) continue;
+    VecHandle dF = like(group.F);
+    group.aft.gap_product(dgap[k].data(), WriteArray(dF).data());
+    add_force(group, dF, dR);
+  }
+}
+
+std::vector<Wearing> Residual::wearing(Vec Q, Exponents const& e) {
+  std::vector<Wearing> out;
+  for (Group& group : groups_)
+    out.push_back(group.aft.wearing(ReadArray(relative_motion(group, Q)).data(), e));
+  return out;
+}
+
+namespace {
+
+/// pi sum_n n q_n^H p_n of this rank, q_n = Qc_n - i Qs_n: its imaginary part is the work of -p over a
+/// period.
+complex period_product(Harmonics const& h, Vec q, Vec p) {
+  ReadArray a(q), b(p);
+  complex sum = 0;
+  for (PetscInt first = 0; first < local_size(q); first += h.block_size())
+    for (int i = 0; i < h.count(); ++i) {
+      if (h.orders()[i] == 0) continue;
+      const PetscInt k = first + h.offset(i);
+      sum += double(h.orders()[i]) * std::conj(complex(a[k], -a[k + 1])) * complex(b[k], -b[k + 1]);
+    }
+  return std::numbers::pi * sum;
+}
+
+}  // namespace
+
+EnergyBalance Residual::energy() {
+  double sums[4] = {};
+  for (Group& group : groups_) sums[0] += period_product(harmonics_, group.U, group.F).imag();
+  VecHandle p = like(Q_);
+  for (int order = 0; order < 3; ++order) {
+    check(VecSet(p, 0));
+    stiffness_.multiply_add(e_, Q_, p, order);
+    const complex work = period_product(harmonics_, Q_, p);
+    sums[3 - order] = order == 0 ? work.real() : order == 1 ? work.imag() : -work.imag();
+  }
+  MPI_Allreduce(MPI_IN_PLACE, sums, 4, MPI_DOUBLE, MPI_SUM, model_.comm());
+  return {.contact = sums[0], .damping = sums[2], .modal = sums[1], .stored = sums[3]};
 }
 
 /// Entries of this rank's rows of all maps, pair by pair.

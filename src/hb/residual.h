@@ -20,6 +20,17 @@ struct PairTangents {
   std::vector<double> D;               ///< pairs x (components m) x (components m)
 };
 
+/// Where the energy of a period goes [J]: pi sum_n n Im(q_n^H p_n) of each force p.
+struct EnergyBalance {
+  double contact = 0;  ///< dissipated by contact
+  double damping = 0;  ///< dissipated by C
+  double modal = 0;    ///< released by the decay; equals the two in a free motion
+  double stored = 0;   ///< pi sum_n n Re(q_n^H K q_n), to measure small ones with
+};
+
+/// One vector per contact, of this rank's pairs.
+using PerContact = std::vector<std::vector<double>>;
+
 /// R(Q, s) = Z(s) Q + B^T F(B Q, s B Q) and its exact derivatives: one for all variants, which differ in what
 /// s is (DESIGN section 1). Vectors hold harmonic blocks of `block_size` per dof.
 class Residual {
@@ -44,6 +55,17 @@ class Residual {
   /// Rounding to expect in R at the last evaluated point: of its linear terms, and of contact forces that
   /// stiff pairs take from small differences of displacements. Collective.
   double rounding() const;
+
+  /// Of the last evaluated point. Collective.
+  EnergyBalance energy();
+
+  /// Worn depths of the pairs [m], in the laws, which all residuals of the model share; empty for a contact
+  /// that does not wear.
+  void wear(PerContact const& depth);
+  /// dR for gaps that grow, at the last evaluated point. Collective.
+  void gap_product(PerContact const& dgap, Vec dR);
+  /// What wears the contacts in the motion (Q, e). Collective.
+  std::vector<Wearing> wearing(Vec Q, Exponents const& e);
 
   DynamicStiffness const& stiffness() const { return stiffness_; }
   /// Linearised contact at the last evaluated point, one per contact.

@@ -174,10 +174,13 @@ std::optional<Continuation::Trial> Continuation::step(double& length, double& an
       why = "the corrector lands on another branch";
       continue;
     }
-    if (angle > steps_.max_angle) orient_past_kink(trial);
     const double by_newton = std::exp2((steps_.target_newton - trial.outcome.newton) / 2.0);
     const double by_angle = 0.5 * steps_.max_angle / std::max(angle, 1e-12);
     next_length = std::min(steps_.maximum, length * std::clamp(std::min(by_newton, by_angle), 0.4, 2.0));
+    if (angle > steps_.max_angle) {
+      orient_past_kink(trial);
+      next_length = std::min(steps_.maximum, kink_length);  // behind it the branch is smooth again
+    }
     return trial;
   }
   finish("step too small: " + why, false);

@@ -246,15 +246,19 @@ Outcome Newton::solve(Vec y) {
 }
 
 bool Newton::tangent(Vec y, Vec t) {
-  linearise(y);
   check(VecSet(right_side_, 0));
   set_last_entry(right_side_, 1);
+  return linear(y, right_side_, t);
+}
+
+bool Newton::linear(Vec y, Vec b, Vec x) {
+  linearise(y);
   KSP ksp;
   KSPConvergedReason reason;
   check(SNESGetKSP(snes_, &ksp));
   check(KSPSetOperators(ksp, J_, J_));
   check(KSPSetInitialGuessNonzero(ksp, preconditioner_ ? PETSC_TRUE : PETSC_FALSE));
-  const PetscErrorCode code = KSPSolve(ksp, right_side_, t);
+  const PetscErrorCode code = KSPSolve(ksp, b, x);
   check(KSPSetInitialGuessNonzero(ksp, PETSC_FALSE));
   if (exception_) std::rethrow_exception(exception_);
   if (singular(code)) return false;

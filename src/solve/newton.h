@@ -29,6 +29,8 @@ class Newton {
   /// Tangent at y: J t = 0, row . t = 1 with the closing row. t holds a guess (zero, or the last tangent),
   /// from which the Krylov route starts. Collective.
   bool tangent(Vec y, Vec t);
+  /// J x = b at y with the closing row, from x where the Krylov route is taken. Collective.
+  bool linear(Vec y, Vec b, Vec x);
 
  private:
   static PetscErrorCode converged(SNES, PetscInt iteration, PetscReal unknowns, PetscReal step,

@@ -33,6 +33,7 @@ def record(
 
     Parameters
     ----------
+    extra : the analysis' own part of the state to go on from
     describe : further columns from problem, y and (on the writing rank) coefficients (n_dof, m). Collective
 
     Returns

@@ -15,9 +15,10 @@ from ..columns import Column
 from ..console import Console
 from ..errors import InputError
 from ..parallel import on_first_rank
-from ..results import AnalysisWriter, open_results
+from ..results import AnalysisWriter, Field, open_results
 from ..runfolder import replace_text
-from ..schema import AnalysisSection
+from ..schema import AnalysisSection, WearAnalysis
+from ..sectors import nodal_diameter
 from ..source import display
 from ..wheel import Wheel
 
@@ -72,6 +73,8 @@ class AnalysisContext:
         What this analysis does not compute, and why; filled by :meth:`leave_out`.
     arrays : dict
         Arrays [m] put into the group of the results.
+    fields : dict
+        Arrays that every row of the table brings.
     entry : dict
         What else run.json says of the analysis.
     """
@@ -87,6 +90,7 @@ class AnalysisContext:
     attributes: dict[str, Any] = field(default_factory=dict)
     left_out: list[str] = field(default_factory=list)
     arrays: dict[str, Any] = field(default_factory=dict)
+    fields: dict[str, Field] = field(default_factory=dict)
     entry: dict[str, Any] = field(default_factory=dict)
 
     @property
@@ -139,6 +143,7 @@ class AnalysisContext:
             before_first=self.before_first,
             file_attributes={"title": self.case.title},
             arrays=self.arrays,
+            fields=self.fields,
         )
 
     def table(self, name: str) -> dict[str, Any]:
@@ -197,10 +202,16 @@ class AnalysisContext:
             return what(file[name])
 
     def linear_mode(self, contact: str, count: int = 1) -> list[Any]:
-        """Linear modes with the contact ``stuck`` or ``free``. Collective."""
+        """Linear modes with the contact ``stuck`` or ``free``, without forces of the flow. Collective."""
         import fretwave
 
-        return cast("list[Any]", fretwave.linear_modes(self.model, count=count, contact=contact))
+        if not getattr(self.analysis, "aerodynamics", False):
+            return cast("list[Any]", fretwave.linear_modes(self.model, count=count, contact=contact))
+        from ..run import build_model
+
+        preload, diameters = self.case.preload_of(self.analysis), nodal_diameter(self.analysis)
+        with build_model(self.case, (), self.comm, preload, diameters) as structure:
+            return cast("list[Any]", fretwave.linear_modes(structure, count=count, contact=contact))
 
 
 def _columns(group: Any) -> dict[str, Any]:
@@ -211,7 +222,7 @@ def _columns(group: Any) -> dict[str, Any]:
 
 
 #: Tables of the case that decide the results of every analysis.
-_COMMON = ("model", "contact", "reduction", "preload")
+_COMMON = ("model", "contact", "reduction", "preload", "aerodynamics")
 
 
 def describe_analysis(analysis: AnalysisSection, case: Case, run_id: str) -> dict[str, Any]:
@@ -224,7 +235,9 @@ def describe_analysis(analysis: AnalysisSection, case: Case, run_id: str) -> dic
 
 
 def _deciding(case: Case, name: str) -> dict[str, Any]:
-    return {key: value for key, value in case.resolved.items() if key.split(".")[0] in (*_COMMON, name)}
+    analysis = case.analyses[name]
+    others = (name, analysis.mode) if isinstance(analysis, WearAnalysis) else (name,)
+    return {key: value for key, value in case.resolved.items() if key.split(".")[0] in (*_COMMON, *others)}
 
 
 def belongs(group: Any, case: Case, name: str) -> bool:

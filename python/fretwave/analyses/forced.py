@@ -5,100 +5,83 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import numpy as np
-
 from ..columns import FORCED
 from ..schema import ForcedAnalysis
-from .branch import finished_table, open_branch, points_of, record, step_control
+from .branch import finished_table, open_branch, points_of, record
 from .context import AnalysisContext, Outcome
+from .excitation import Excitation, excitation_of
 from .forced_time import time_points
 from .mode_curve import ModeCurve
 from .response_peaks import peak_table
-from .rest import retained, start_mode
+from .rest import retained
+from .wheel_peaks import blade_amplitudes, blade_by_blade
 
 
 def run_forced(context: AnalysisContext) -> Outcome:
     """Follow the response of every level over the frequency range. Collective."""
     analysis = context.analysis
     assert isinstance(analysis, ForcedAnalysis)
-    reference, rest = start_mode(context, analysis.linear_mode)
     harmonics = retained(context)
+    excitation = excitation_of(context, harmonics)
     left_out = [] if analysis.time_points else ["check by time integration (time_points = 0)"]
     context.leave_out([*harmonics.left_out, *_missing_backbones(context), *left_out])
-    writer = context.writer(FORCED, labels=harmonics.labels, samples=harmonics.samples, stuck_omega=reference.omega)
+    writer = context.writer(
+        [*FORCED[:-1], *excitation.columns(), FORCED[-1]],
+        labels=harmonics.labels,
+        samples=harmonics.samples,
+        stuck_omega=excitation.reference.omega,
+        **_attributes(context),
+    )
     try:
-        return _all_levels(context, analysis, harmonics, reference, writer, rest)
+        return _all_levels(context, analysis, excitation, writer)
     finally:
         writer.abandon()
 
 
-def _all_levels(
-    context: AnalysisContext, analysis: ForcedAnalysis, harmonics: Any, reference: Any, writer: Any, rest: Any
-) -> Outcome:
+def _attributes(context: AnalysisContext) -> dict[str, Any]:
+    """Of the results of a wheel."""
+    analysis, wheel = context.analysis, context.case.wheel
+    assert isinstance(analysis, ForcedAnalysis)
+    if wheel is None:
+        return {}
+    observed = f"{analysis.observe}@{analysis.sector or 0}"
+    return {"observe": observed, "sectors": wheel.sectors, "sector_dofs": wheel.unit}
+
+
+def _all_levels(context: AnalysisContext, analysis: ForcedAnalysis, excitation: Excitation, writer: Any) -> Outcome:
     snapshot, own, found = open_branch(context.comm, writer, context.resuming)
     first = int(own.get("level_number", 0))
     reasons = []
     with context.console.progress(context.name):
         for number in range(first, len(analysis.levels)):
-            problem = _problem(context, analysis, harmonics, reference, analysis.levels[number])
-            if rest is not None:
-                problem.preload(rest.displacement, rest.load)
             go_on = found and number == first
-            reasons.append(_one_level(context, analysis, problem, writer, number, snapshot, go_on))
-            problem.destroy()
+            reasons.append(_one_level(excitation, writer, number, snapshot, go_on))
     stopped = [reason for reason in reasons if reason]
     reason = "; ".join(stopped) or "stop value reached"
     table = finished_table(writer)
+    wheel = context.case.wheel is not None and writer.rows > 0
+    blades = blade_amplitudes(excitation, writer) if wheel and writer.active else None
     writer.close("stopped" if stopped else "done", reason, events="[]")
-    summary = _peaks(context, analysis, table)
+    summary = blade_by_blade(excitation, table, blades) if wheel else _peaks(context, analysis, table)
     if analysis.time_points and writer.rows:
         summary += time_points(context, table, analysis.time_points)
     goal = f"{analysis.frequency[1]:g} Hz at every level"
     return Outcome(writer.rows, reason, not stopped, summary, goal)
 
 
-def _problem(context: AnalysisContext, analysis: ForcedAnalysis, harmonics: Any, reference: Any, level: float) -> Any:
-    import fretwave
-
-    force = np.zeros(len(context.case.dofs), dtype=complex)
-    for dof, amplitude in analysis.force.items():
-        force[context.case.dof(dof)] = amplitude
-    return fretwave.ForcedResponse(
-        context.model,
-        harmonics,
-        force={1: force},
-        level=level,
-        dof=context.case.dof(analysis.observe),
-        reference=reference,
-        prefix=context.prefix,
-    )
-
-
-def _one_level(
-    context: AnalysisContext,
-    analysis: ForcedAnalysis,
-    problem: Any,
-    writer: Any,
-    number: int,
-    snapshot: Any,
-    go_on: bool,
-) -> str:
-    """Follow one response; returns why it stopped early, or nothing."""
-    import fretwave
-
+def _one_level(excitation: Excitation, writer: Any, number: int, snapshot: Any, go_on: bool) -> str:
+    """Follow one response; returns why it stopped early, or nothing. Collective."""
+    context, analysis = excitation.context, excitation.analysis
     low, high = (2.0 * math.pi * hertz for hertz in analysis.frequency)
-    report_at = [2.0 * math.pi * hertz for hertz in analysis.report_at]
-    settings = {"stop": (low, high), "steps": step_control(analysis.step), "report_at": report_at}
-    if go_on:
-        branch = fretwave.Continuation.restore(problem, snapshot, **settings)
-    else:
-        branch = fretwave.Continuation(problem, problem.initial(low), **settings)
+    problem = excitation.problem(analysis.levels[number])
+    branch = excitation.branch(problem, snapshot, go_on)
     for point in points_of(branch):
-        row = record(writer, problem, point, branch.snapshot(), {"level_number": number})
+        row = record(writer, problem, point, branch.snapshot(), {"level_number": number}, excitation.row)
         share = (number + (row["omega"] - low) / (high - low)) / len(analysis.levels)
         context.console.point(point_line(context.name, row), _short(row), share, _notable(row["event"]))
     stopped = "" if branch.converged else f"level {analysis.levels[number]:g}: {branch.reason}"
     branch.destroy()
+    problem.destroy()
     return stopped
 
 

@@ -47,6 +47,8 @@ def amplitude_peak(omega: Array, amplitude: Array) -> Peak:
 def quadrature(omega: Array, amplitude: Array, phase: Array) -> Peak:
     """Where the response stands at a right angle to the force; the place nearest to the largest amplitude."""
     length = curve_length(omega, amplitude)
+    moves = np.concatenate([[True], np.diff(length) > 0])  # a point so far out may equal the last one to rounding
+    length, omega, amplitude, phase = length[moves], omega[moves], amplitude[moves], phase[moves]
     cosine = PchipInterpolator(length, np.cos(phase))
     roots = np.unique(cosine.roots(discontinuity=False, extrapolate=False))
     if not len(roots):

@@ -102,8 +102,8 @@ def _sector(context: AnalysisContext) -> Iterator[AnalysisContext]:
 
     analysis: Any = context.analysis
     case = context.wheel.sector
-    preload = case.preload_of(analysis)
-    with build_model(case, analysis.dampers, context.comm, preload, analysis.nodal_diameter) as model:
+    preload, flow = case.preload_of(analysis), analysis.aerodynamics
+    with build_model(case, analysis.dampers, context.comm, preload, analysis.nodal_diameter, flow) as model:
         yield replace(context, model=model, case=case, arrays={})
 
 

@@ -23,8 +23,13 @@ FAMILIES = (
     "wheel",
     "limit_cycles",
     "forced",
+    "forced_blades",
+    "flutter",
     "free_decay",
+    "wear",
+    "wear_pairs",
     "study",
+    "sweeps",
 )
 
 

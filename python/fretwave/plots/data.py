@@ -78,6 +78,21 @@ class Analysis:
             table = {key: group[key][()] for key in group}
         return {**table, "face": np.array(_texts(table["face"]))}
 
+    def worn_contacts(self) -> list[str]:
+        """Contacts whose worn depth is kept."""
+        with h5py.File(self.path, "r") as file:
+            return [key[len("depth_") :] for key in file[self.name] if key.startswith("depth_")]
+
+    def field(self, name: str) -> Array:
+        """An array that every point has, (n_points, ...)."""
+        with h5py.File(self.path, "r") as file:
+            return np.asarray(file[self.name][name], dtype=float)
+
+    def long_name(self, column: str) -> str:
+        """What a column of the table is."""
+        with h5py.File(self.path, "r") as file:
+            return str(_text(file[self.name]["points"][column].attrs["long_name"]))
+
     def met(self, event: str) -> list[int]:
         """Points at which an event happened."""
         return [i for i, text in enumerate(self.events) if event in text.split()]

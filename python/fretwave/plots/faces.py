@@ -53,7 +53,7 @@ def draw_load(static: Analysis, contact: str, table: dict[str, Array]) -> Figure
             dots = axes.scatter(*(MM * pairs["position"][here].T), c=force[here], **look)
         for place, value in zip(pairs["position"][mine], force[mine]):
             axes.annotate(f"{value:.0f}", MM * place, (0, 8), textcoords="offset points", fontsize=8, ha="center")
-        _face(axes, name, pairs["position"])
+        place_face(axes, name, pairs["position"])
         axes.set_ylabel("Up the face [mm]")
     panels[-1, 0].set_xlabel("Along the face [mm]")
     figure.colorbar(dots, ax=panels, label=style.label("Normal force", "N"), shrink=0.8)
@@ -80,7 +80,7 @@ def draw_map(mode: Analysis, contact: str) -> Figure:
             axes = figure.add_subplot(grid[1 + row, column])
             mine = pairs["face"] == name
             _pies(axes, pairs["position"][mine], shares[:, mine])
-            _face(axes, f"{name}, {MM * mode.columns['amplitude'][point]:.3g} mm", pairs["position"])
+            place_face(axes, f"{name}, {MM * mode.columns['amplitude'][point]:.3g} mm", pairs["position"])
             axes.tick_params(labelbottom=row == len(points) - 1, labelleft=column == 0)
     figure.supxlabel("Along the face [mm]; each disc is one contact pair, cut by its shares of a period", fontsize=10)
     figure.supylabel("Up the face [mm]", fontsize=10, y=0.36)
@@ -140,7 +140,8 @@ def _pies(axes: Axes, places: Array, shares: Array) -> None:
         axes.plot(*place, "o", markersize=DISC, markerfacecolor="none", markeredgecolor=style.GREY, markeredgewidth=0.6)
 
 
-def _face(axes: Axes, title: str, places: Array) -> None:
+def place_face(axes: Axes, title: str, places: Array) -> None:
+    """Axes of a face that hold all these places (n_pairs, 2) [m], in millimetres."""
     low, high = MM * places.min(axis=0), MM * places.max(axis=0)
     reach = MARGIN * np.where(high > low, high - low, max(*(high - low), 1.0))
     axes.set(xlim=(low[0] - reach[0], high[0] + reach[0]), ylim=(low[1] - reach[1], high[1] + reach[1]))

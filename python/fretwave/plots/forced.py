@@ -48,7 +48,7 @@ def draw(forced: Analysis, modes: Sequence[Analysis], times: Table | None, peaks
 def _level(axes: Axes, forced: Analysis, times: Table | None, level: float, colour: object, scale: float) -> None:
     rows = forced.columns["level"] == level
     name = f"level {level:g}"
-    frequency, amplitude = smooth(forced.columns["frequency_hz"][rows], forced.columns["amplitude"][rows])
+    frequency, amplitude = smooth(forced.columns["frequency_hz"][rows], _amplitude(forced)[rows])
     axes.plot(frequency, amplitude / scale, color=colour, label=name)
     if times is not None:
         rows = times["level"] == level
@@ -68,9 +68,19 @@ def smooth(frequency: style.Array, amplitude: style.Array) -> tuple[style.Array,
     return tuple(PchipInterpolator(length[keep], points)(fine).T)
 
 
+def _amplitude(forced: Analysis) -> style.Array:
+    """Of the observed dof; of a wheel in the sector where it is largest."""
+    return forced.columns.get("largest_amplitude", forced.columns["amplitude"])
+
+
+def _dof(forced: Analysis) -> str:
+    name = forced.dofs[forced.normalised_dof()] if forced.dofs else ""
+    return f"{name.split('@')[0]}, largest of all sectors" if "largest_amplitude" in forced.columns else name
+
+
 def _finish(figure: Figure, left: Axes, right: Axes, forced: Analysis) -> None:
-    frequency, amplitude = forced.columns["frequency_hz"], forced.columns["amplitude"]
-    unit, dof = forced.unit("amplitude"), forced.dofs[forced.normalised_dof()] if forced.dofs else ""
+    frequency, amplitude = forced.columns["frequency_hz"], _amplitude(forced)
+    unit, dof = forced.unit("amplitude"), _dof(forced)
     for axes in (left, right):
         axes.set_xlim(frequency.min(), frequency.max())
         axes.set_xlabel(style.label("Excitation frequency", "Hz"))
@@ -82,5 +92,5 @@ def _finish(figure: Figure, left: Axes, right: Axes, forced: Analysis) -> None:
         left.set_ylim(0.0, 1.05 * amplitude.max())
         right.set_ylim(bottom=0.0)
     left.set_ylabel(style.label(f"Amplitude of {dof}", unit))
-    right.set_ylabel(style.label(f"Amplitude of {dof} / level", unit))
+    right.set_ylabel(style.label("Amplitude / level", unit))
     style.legend_outside(figure, left, columns=4)

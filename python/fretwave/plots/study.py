@@ -16,8 +16,11 @@ SWEEPS = {
     "samples": ("$N_t$", "s--"),
     "tolerance": ("tol", "^:"),
     "component_modes": ("modes", "v-."),
+    "pressure_change": ("of a step", "s--"),
 }
 ERRORS = {"zeta_error": "Damping: largest error / peak ζ", "omega_error": "Frequency: largest relative error"}
+#: of wear, after the last cycle
+ERRORS_OF_WEAR = {"zeta_error": "Damping", "omega_error": "Frequency", "worn_error": "Worn volume"}
 #: an error of exactly zero cannot stand on a logarithmic axis
 FLOOR = 1e-16
 
@@ -31,15 +34,18 @@ def figures(run: Run) -> Iterator[tuple[str, Figure]]:
 
 def draw(table: Table) -> Figure:
     """One axes per error, one line per swept setting; the reference run is left out."""
-    figure, axes = style.new_figure(4.8, columns=len(ERRORS))
-    for plane, (column, title) in zip(axes, ERRORS.items()):
+    of_wear = "worn_error" in table
+    errors = ERRORS_OF_WEAR if of_wear else ERRORS
+    figure, axes = style.new_figure(4.8, columns=len(errors))
+    for plane, (column, title) in zip(axes, errors.items()):
         for (sweep, (symbol, line)), colour in zip(SWEEPS.items(), style.PALETTE):
             _sweep(plane, table, sweep, symbol, column, line, colour)
         plane.set(xscale="log", yscale="log", title=title)
-        plane.set_xlabel(style.label("Run time of the branch", "s"))
+        plane.set_xlabel(style.label("Run time" if of_wear else "Run time of the branch", "s"))
         style.plain_numbers(plane.xaxis, table["wall_s"])
-    axes[0].set_ylabel("Error against the finest run")
-    axes[0].plot([], [], "o-", color=style.GREY, alpha=0.35, label="error estimate of the run")
+    axes[0].set_ylabel("Relative error of the last cycle" if of_wear else "Error against the finest run")
+    if not of_wear:
+        axes[0].plot([], [], "o-", color=style.GREY, alpha=0.35, label="error estimate of the run")
     style.legend_outside(figure, axes[0], columns=4)
     return figure
 
@@ -50,9 +56,10 @@ def _sweep(axes: Axes, table: Table, sweep: str, symbol: str, column: str, line:
         return
     time, error = table["wall_s"][rows], np.maximum(table[column][rows], FLOOR)
     axes.plot(time, error, line, color=colour, label=f"{sweep.replace('_', ' ')} ({symbol})")
-    if column == "zeta_error":
+    if column == "zeta_error" and "error_estimate" in table:
         axes.plot(time, table["error_estimate"][rows], line, color=colour, alpha=0.35)
     for row, x, y in zip(rows, time, error):
         value = table[sweep][row]
-        text = f"{value:.0e}" if sweep == "tolerance" else f"{value:g}"
-        axes.annotate(text, (x, y), (4, 4), textcoords="offset points", fontsize=9, color=colour)
+        text = f"{value:.0e}".replace("e-0", "e-") if sweep == "tolerance" else f"{value:g}"
+        place = (-4, -12) if sweep == "pressure_change" else (4, 4)
+        axes.annotate(text, (x, y), place, textcoords="offset points", fontsize=9, color=colour)

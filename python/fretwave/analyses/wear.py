@@ -1,0 +1,222 @@
+"""``type = "wear"``: fretting wear of a mode at fixed amplitudes over wear cycles, a line for each amplitude.
+
+The mode's unworn branch gives the starts; the lines are independent of each other and share the ranks in groups. Each
+keeps its own table in a hidden folder, from which it goes on after a kill; all are put together at the end.
+"""
+
+from __future__ import annotations
+
+import math
+import shutil
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+
+from .. import groups
+from ..errors import FretwaveError, NotConverged
+from ..parallel import on_first_rank
+from ..results import AnalysisWriter, open_results
+from ..schema import ModeAnalysis, WearAnalysis
+from .branch import points_of, step_control
+from .context import AnalysisContext, Outcome
+from .rest import keep_pairs, retained, start_mode
+from .wear_line import LINE, Line, columns, fields, wear_areas
+
+
+def run_wear(context: AnalysisContext) -> Outcome:
+    """March all amplitudes. Collective."""
+    analysis = context.analysis
+    assert isinstance(analysis, WearAnalysis)
+    settings = cast(ModeAnalysis, context.case.settings(analysis))
+    folder = context.folder / f".{context.name}_lines"
+    kept = groups.Kept(folder, str(context.attributes["run_id"]))
+    starts = on_first_rank(context.comm, lambda: kept.load(0))
+    if starts is None:
+        starts = unworn_starts(replace(context, analysis=settings), analysis)
+        context.before_first()
+        if context.comm.rank == 0:
+            kept.save(0, starts)
+    lines = [
+        Line(number, amplitude, starts[f"y_{number}"], starts[f"outcome_{number}"], folder / f"line_{number:03d}")
+        for number, amplitude in enumerate(analysis.amplitude)
+        if f"y_{number}" in starts
+    ]
+    unit = float(starts["cycle_unit"])
+    context.console.line(f"{context.name}: a normalised cycle is {unit:.6g} vibration cycles")
+    march = LineRunner(context, settings, unit)
+    results = groups.run(context.comm, lines, march)
+    return _collect(context, analysis, lines, results, unit, folder)
+
+
+class LineRunner:
+    """Does a line on a group of ranks."""
+
+    def __init__(self, context: AnalysisContext, settings: ModeAnalysis, unit: float) -> None:
+        self.context, self.settings, self.unit = context, settings, unit
+
+    def __call__(self, line: Line, group: Any) -> dict[str, Any]:
+        from .wear_line import march_line
+
+        return march_line(self.context, self.settings, self.unit, line, group)
+
+
+def unworn_starts(context: AnalysisContext, analysis: WearAnalysis) -> dict[str, Any]:
+    """Unknowns at each amplitude by its number, from the mode's branch, and the normalised cycle. Collective."""
+    import fretwave
+
+    settings = cast(ModeAnalysis, context.analysis)
+    stuck, rest = start_mode(context, settings.linear_mode)
+    harmonics = retained(context)
+    context.leave_out(harmonics.left_out)
+    problem = fretwave.NonlinearMode(
+        context.model,
+        harmonics,
+        method=settings.method,
+        dof=context.case.dof(settings.normalise),
+        start=stuck,
+        prefix=context.prefix,
+    )
+    if rest is not None:
+        problem.preload(rest.displacement, rest.load)
+    low, high = settings.amplitude
+    branch = fretwave.Continuation(
+        problem, problem.initial(low), (low, high), step_control(settings.step), sorted(analysis.amplitude)
+    )
+    found: dict[str, Any] = {}
+    areas = wear_areas(context.case)
+    with fretwave.WornMode(problem, analysis.coefficient, areas) as mode, context.console.progress(context.name):
+        for point in points_of(branch):
+            if "cycle_unit" not in found:
+                found["cycle_unit"] = analysis.cycle_unit or normal_cycle(
+                    mode, mode.measure(point.y, np.zeros(len(mode.areas))).load
+                )
+            _take(context, analysis, point, found)
+            if len(found) == 1 + 2 * len(analysis.amplitude):
+                break
+    if len(found) < 1 + 2 * len(analysis.amplitude):
+        context.console.line(f"{context.name}: the mode ends early: {branch.reason}")
+    branch.destroy()
+    problem.destroy()
+    if len(found) < 2:
+        raise NotConverged(
+            "the mode reaches none of the amplitudes of wear", None, "no start", analysis.amplitude, "lower amplitudes"
+        )
+    return found
+
+
+def _take(context: AnalysisContext, analysis: WearAnalysis, point: Any, found: dict[str, Any]) -> None:
+    """Keep the unknowns of a point that lies on an amplitude, the first on a branch that folds. Collective."""
+    if point.event == "":
+        return
+    whole = np.concatenate(context.comm.allgather(point.y.getArray(readonly=True).copy()))
+    for number, amplitude in enumerate(analysis.amplitude):
+        if math.isclose(point.parameter, amplitude, rel_tol=1e-9) and f"y_{number}" not in found:
+            found[f"y_{number}"] = whole
+            found[f"outcome_{number}"] = np.array([point.newton, point.linear, point.residual])
+
+
+def normal_cycle(mode: Any, load: Any) -> float:
+    """Vibration cycles in which sliding four stick limits mu N0/kt a cycle takes the share 1/e off a normal load.
+
+    N' = -kn k_w/I N s with s = 4 mu N0/kt, in means over the loaded pairs; 1 where nothing can wear.
+    """
+    contacts = [mode.model.contacts[k] for k in mode.contacts]
+    loaded = load > 0
+
+    def values(name: str) -> Any:
+        parts = [
+            np.broadcast_to(np.asarray(contact.parameters[name], dtype=float), (part.stop - part.start,))
+            for contact, part in zip(contacts, mode.slices)
+        ]
+        return np.concatenate(parts)[loaded]
+
+    if not loaded.any():
+        return 1.0
+    slip = 4 * np.mean(values("friction_coefficient") * load[loaded] / values("tangential_stiffness"))
+    rate = mode.coefficient * np.mean(mode.stiffness[loaded] / mode.areas[loaded]) * slip
+    return float(1 / rate) if rate > 0 else 1.0
+
+
+def _collect(
+    context: AnalysisContext, analysis: WearAnalysis, lines: list[Line], results: list[Any], unit: float, folder: Path
+) -> Outcome:
+    """All lines as one table. Collective."""
+    failures = [f"a = {line.amplitude:g} m: {_why(result)}" for line, result in zip(lines, results) if _why(result)]
+    reached = {line.number for line in lines}
+    failures += [
+        f"a = {amplitude:g} m: not reached by the mode"
+        for number, amplitude in enumerate(analysis.amplitude)
+        if number not in reached
+    ]
+    # The run folder is open since the starts were found.
+    context = replace(context, before_first=lambda: None, fields=fields(context.case))
+    writer = context.writer(
+        columns(context.case),
+        labels=next((result["labels"].split() for result in results if isinstance(result, dict)), ()),
+        cycle_unit=unit,
+        wear_coefficient=analysis.coefficient,
+        **{key: value for key, value in results[0].items() if key in ("samples", "load_scale")}
+        if isinstance(results[0], dict)
+        else {},
+    )
+    try:
+        for line in lines:
+            _copy(context, writer, line)
+        if writer.rows:
+            keep_pairs(context, writer)
+            for name, areas in wear_areas(context.case).items():
+                if f"pairs_{name}/position" in writer.group if writer.active else False:
+                    writer.dataset(f"pairs_{name}/area", areas, units="m2", long_name="nodal area")
+        reason = "; ".join(failures) or "; ".join(sorted({result["reason"] for result in results}))
+        writer.close("stopped" if failures else "done", reason)
+    finally:
+        writer.abandon()
+    if context.comm.rank == 0 and writer.rows:
+        shutil.rmtree(folder, ignore_errors=True)
+    summary = [result["summary"] for result in results if isinstance(result, dict)]
+    goal = f"{analysis.cycles:g} normalised cycles at every amplitude, or wear that stops"
+    return Outcome(writer.rows, reason, not failures, summary, goal)
+
+
+def _why(result: Any) -> str:
+    """Why a line did not end as it should; empty when it did."""
+    if isinstance(result, FretwaveError):
+        return str(result)
+    return "" if result["status"] == "done" else str(result["reason"])
+
+
+def _copy(context: AnalysisContext, writer: AnalysisWriter, line: Line) -> None:
+    """The rows of a line into the table of all. Collective."""
+    active = context.comm.rank == 0
+    path = line.folder / "results.h5"
+    rows = on_first_rank(context.comm, lambda: _rows_of(path))
+    file = open_results(path) if active and rows else None
+    for row in range(rows):
+        if file is None:
+            writer.append({}, None)
+        else:
+            writer.append(*_row(writer, file[LINE], row))
+    if file is not None:
+        file.close()
+
+
+def _rows_of(path: Path) -> int:
+    if not path.exists():
+        return 0
+    with open_results(path) as file:
+        return len(file[LINE]["points"]["point"]) if LINE in file else 0
+
+
+def _row(writer: AnalysisWriter, group: Any, row: int) -> tuple[Any, ...]:
+    """What `AnalysisWriter.append` takes, read back."""
+    values = {column.name: column.loaded(group["points"][column.name][row]) for column in writer.columns}
+    values["point"] = writer.rows
+    reported = np.flatnonzero(group["reported"][()] == row)
+    motions = None
+    if len(reported):
+        names = [name for name in group if name.startswith("contact_")]
+        motions = {name[len("contact_") :]: {k: group[name][k][reported[0]] for k in "uvf"} for name in names}
+    kept = {name: group[name][row] for name in writer.fields}
+    return values, group["coefficients"][row], motions, None, kept

@@ -1,0 +1,227 @@
+"""One line of wear: a mode at one amplitude, marched over wear cycles by a group of ranks."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .. import contacts
+from ..casefile import Case
+from ..columns import COLUMNS, Column
+from ..console import Console
+from ..results import AnalysisWriter, Field
+from ..schema import ModeAnalysis, WearAnalysis
+from ..sectors import nodal_diameter
+from .branch import open_branch
+from .context import AnalysisContext
+from .rest import retained, start_mode
+
+#: Name of a line's table in its own folder.
+LINE = "line"
+SHARED = ("omega", "omega0", "frequency_hz", "beta", "zeta", "stick", "slip", "open", "work", "energy_error")
+SOLVER = ("step_error", "error_estimate", "residual", "newton", "linear", "wall_s", "event")
+
+
+@dataclass(frozen=True)
+class Line:
+    """An amplitude with its unworn unknowns y (all of them, on every rank), how they were found (Newton and linear
+    iterations, residual), and where its table is."""
+
+    number: int
+    amplitude: float
+    y: Any
+    outcome: Any
+    folder: Path
+
+
+def wear_areas(case: Case) -> dict[str, Any]:
+    """Nodal areas (n_pairs,) [m^2] of the contacts that wear."""
+    return contacts.wear_areas(case.contacts, case.built.contacts if case.built else {})
+
+
+def faces_of(case: Case) -> list[tuple[str, str, Any]]:
+    """(name of the face, contact, which of its pairs (n_pairs,) bool) of all faces that wear."""
+    out = []
+    for name, areas in wear_areas(case).items():
+        built = case.built.contacts[name] if case.built else None
+        faces = np.array([name] * len(areas) if built is None or built.faces is None else list(built.faces))
+        out += [(str(face), name, faces == face) for face in dict.fromkeys(faces.tolist())]
+    return out
+
+
+def columns(case: Case) -> list[Column]:
+    """The table: one worn volume for each face."""
+    worn = [
+        Column(f"worn_{number}", "m^3", f"worn volume of {face}")
+        for number, (face, _, _) in enumerate(faces_of(case), 1)
+    ]
+    first = [COLUMNS[name] for name in ("point", "line", "amplitude", "cycles", "vibrations", "step")]
+    return [*first, *(COLUMNS[name] for name in SHARED), *worn, *(COLUMNS[name] for name in SOLVER)]
+
+
+def fields(case: Case) -> dict[str, Field]:
+    """Arrays of each point."""
+    out = {}
+    for name, areas in wear_areas(case).items():
+        shape = (len(areas),)
+        out[f"depth_{name}"] = Field(shape, "m", "worn depth")
+        out[f"rate_{name}"] = Field(shape, "m", "growth of the worn depth in a vibration cycle")
+        out[f"load_{name}"] = Field(shape, "N", "mean normal force of a period")
+        out[f"slip_{name}"] = Field(shape, "1", "share of the period in slip")
+        out[f"open_{name}"] = Field(shape, "1", "share of the period without contact")
+    return out
+
+
+def march_line(context: AnalysisContext, settings: ModeAnalysis, unit: float, line: Line, group: Any) -> dict[str, Any]:
+    """Build the model on the group's ranks and march. Collective on the group.
+
+    Returns
+    -------
+    dict
+        status, reason, summary and what else the common table needs.
+    """
+    import fretwave
+
+    from ..run import build_model
+
+    case, analysis = context.case, context.analysis
+    preload = case.preload_of(analysis)
+    with build_model(case, settings.dampers, group, preload, nodal_diameter(settings)) as model:
+        quiet = Console(False)
+        own = replace(context, model=model, comm=group, analysis=settings, console=quiet, arrays={}, left_out=[])
+        stuck, rest = start_mode(own, settings.linear_mode)
+        dof = case.dof(settings.normalise)
+        problem = fretwave.NonlinearMode(model, retained(own), settings.method, dof, stuck, context.prefix)
+        if rest is not None:
+            problem.preload(rest.displacement, rest.load)
+        with problem:
+            return _Marcher(context, own, problem, unit, line).run()
+
+
+class _Marcher:
+    """Writes the points of a line."""
+
+    def __init__(self, context: AnalysisContext, own: AnalysisContext, problem: Any, unit: float, line: Line) -> None:
+        analysis = context.analysis
+        assert isinstance(analysis, WearAnalysis)
+        self.context, self.own, self.problem, self.unit, self.line = context, own, problem, unit, line
+        self.analysis, self.comm, self.case = analysis, own.comm, own.case
+        self.faces = faces_of(own.case)
+        self.writer = AnalysisWriter(
+            line.folder,
+            LINE,
+            columns(own.case),
+            {"run_id": context.attributes["run_id"]},
+            dofs=own.case.dofs,
+            labels=problem.harmonics.labels,
+            active=self.comm.rank == 0,
+            fields=fields(own.case),
+        )
+
+    def run(self) -> dict[str, Any]:
+        import fretwave
+
+        with fretwave.WornMode(self.problem, self.analysis.coefficient, wear_areas(self.case)) as mode:
+            self.mode = mode
+            march, points = self._open(mode)
+            clock = time.perf_counter()
+            for point in points:
+                row = self._record(march, point, time.perf_counter() - clock)
+                self._say(row)
+                clock = time.perf_counter()
+            return self._close(march)
+
+    def _open(self, mode: Any) -> tuple[Any, Any]:
+        """The march from its start, or from where a killed run left it."""
+        import fretwave
+
+        a, unit = self.analysis, self.unit
+        control = fretwave.WearControl(a.stepper, a.tolerance, a.pressure_change)
+        reports = [unit * value for value in a.report_at]
+        state, _, found = open_branch(self.comm, self.writer, True)
+        state = self.comm.bcast(state)
+        y = self.problem.core.unknowns()
+        begin, end = y.getOwnershipRange()
+        y.setArray(np.asarray(state["y"] if found else self.line.y)[begin:end])
+        newton, linear, residual = self.line.outcome
+        going: dict[str, Any] = {"outcome": (int(newton), int(linear), float(residual))}
+        if found:
+            going = {key: state[key] for key in ("depth", "at", "step", "load_scale")}
+        march = fretwave.Wear(mode, y, unit * a.cycles, control, reports, **going)
+        y.destroy()
+        return march, march.go_on() if found else iter(march)
+
+    def _record(self, march: Any, point: Any, wall: float) -> dict[str, Any]:
+        """One row. Collective."""
+        y, state = point.state.y, point.state
+        energy, per_contact = self.problem.energy(y), self._per_contact(state)
+        row = {
+            **self.problem.state(y),
+            **self.problem.diagnostics(y),
+            "point": self.writer.rows,
+            "line": self.line.number,
+            "cycles": point.cycles / self.unit,
+            "vibrations": point.cycles,
+            "step": point.step / self.unit,
+            "work": energy["contact"],
+            "energy_error": energy["error"],
+            "step_error": point.error,
+            "residual": state.residual,
+            "newton": point.newton,
+            "linear": point.linear,
+            "wall_s": wall,
+            "event": point.event,
+        }
+        areas = wear_areas(self.case)
+        for number, (_, name, mask) in enumerate(self.faces, 1):
+            row[f"worn_{number}"] = float(per_contact[f"depth_{name}"][mask] @ areas[name][mask])
+        motions = None
+        if point.event:
+            names = [contact.name for contact in self.problem.model.contacts]
+            motions = dict(zip(names, self.problem.contact_period(y)))
+        parts = self.comm.gather(y.getArray(readonly=True).copy())
+        kept = None
+        if parts is not None:
+            kept = {"y": np.concatenate(parts), "depth": state.depth, "at": point.cycles, "step": march.step}
+            kept["load_scale"] = march.load_scale
+        self.writer.append(
+            row, self.problem.coefficients(y), motions if self.writer.active else None, kept, per_contact
+        )
+        return row
+
+    def _per_contact(self, state: Any) -> dict[str, Any]:
+        names = [self.problem.model.contacts[k].name for k in self.mode.contacts]
+        return {
+            f"{key}_{name}": getattr(state, key)[part]
+            for name, part in zip(names, self.mode.slices)
+            for key in ("depth", "rate", "load", "slip", "open")
+        }
+
+    def _say(self, row: dict[str, Any]) -> None:
+        if self.comm.rank:
+            return
+        worn = " ".join(f"{row[f'worn_{number}']:.3e}" for number in range(1, len(self.faces) + 1))
+        self.context.console.line(
+            f"{self.context.name} a {row['amplitude']:.4g} m  {row['cycles']:8.4g} cycles"
+            f"  f {row['frequency_hz']:9.6g} Hz  zeta {100 * row['zeta']:7.4f} %"
+            f"  slip {100 * row['slip']:3.0f} %  open {100 * row['open']:3.0f} %"
+            f"  worn {worn} m^3  newton {row['newton']:2d}  {row['wall_s']:.2f} s"
+        )
+
+    def _close(self, march: Any) -> dict[str, Any]:
+        status = "done" if march.converged else "stopped"
+        self.writer.close(status, march.reason)
+        end = march.eta / self.unit
+        return {
+            "status": status,
+            "reason": march.reason,
+            "summary": f"{self.context.name}: a = {self.line.amplitude:g} m: {self.writer.rows} points to {end:.4g}"
+            f" normalised cycles, {march.reason}",
+            "labels": " ".join(self.problem.harmonics.labels),
+            "samples": self.problem.harmonics.samples,
+            "load_scale": march.load_scale,
+        }

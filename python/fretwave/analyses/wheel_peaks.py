@@ -1,0 +1,120 @@
+"""Peaks of a whole wheel's forced response, blade by blade, against the tuned wheel's.
+
+Amplification is the largest peak of any blade over the peak of the tuned wheel under the same force. For one family of
+modes, one degree of freedom a blade and no friction it is at most (1 + sqrt(N)) / 2 (Whitehead, J. Mech. Eng. Sci. 8,
+1966).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Optional
+
+import numpy as np
+import numpy.typing as npt
+
+from .branch import points_of
+from .excitation import Excitation, tuned_excitation
+from .response_peaks import NOWHERE, Peak, amplitude_peak
+
+Array = npt.NDArray[np.float64]
+
+
+def blade_by_blade(excitation: Excitation, table: Mapping[str, Array], amplitudes: Optional[Array]) -> list[str]:
+    """Write the peaks of all blades and of the tuned wheel; a line for each level. Collective.
+
+    Parameters
+    ----------
+    table, amplitudes : of the finished analysis, (points, N); on other ranks than the writing one None
+    """
+    context = excitation.context
+    with tuned_excitation(context, excitation.harmonics) as sector:
+        tuned = tuned_responses(sector)
+    if amplitudes is None:
+        return []
+    peaks, blades = blade_tables(table, amplitudes, tuned)
+    for suffix, columns in (("peaks", peaks), ("blades", blades), ("tuned", tuned)):
+        context.write_table(suffix, columns)
+    rows = [{key: float(values[k]) for key, values in peaks.items()} for k in range(len(peaks["level"]))]
+    context.entry["peaks"] = rows
+    bound = whitehead(context.case.wheel.sectors) if context.case.wheel else np.nan
+    return [f"{context.name}: {_line(row)} (Whitehead's bound {bound:.3f})" for row in rows]
+
+
+def _line(row: Mapping[str, float]) -> str:
+    if not np.isfinite(row["amplitude"]):
+        return f"level {row['level']:g}: no peak within the frequency range"
+    return (
+        f"level {row['level']:g}: largest peak a = {row['amplitude']:.4g} m at {row['frequency_hz']:.5g} Hz in sector"
+        f" {row['sector']:.0f}, {row['amplification']:.4f} times the tuned {row['tuned_amplitude']:.4g} m at"
+        f" {row['tuned_frequency_hz']:.5g} Hz"
+    )
+
+
+def blade_amplitudes(excitation: Excitation, writer: Any) -> Array:
+    """Fundamental amplitudes (points, N) [m] of the observed dof in all sectors (writing rank)."""
+    labels = excitation.harmonics.labels
+    dofs = excitation.context.case.places(excitation.analysis.observe)
+    stored = writer.group["coefficients"][:, dofs[0] : dofs[-1] + 1 : dofs[1] - dofs[0], :]
+    return np.asarray(np.hypot(stored[:, :, labels.index("1c")], stored[:, :, labels.index("1s")]))
+
+
+def tuned_responses(excitation: Excitation) -> dict[str, Array]:
+    """Responses of the tuned sector at every level: columns level, frequency_hz, amplitude. Collective."""
+    rows = []
+    for level in excitation.analysis.levels:
+        problem = excitation.problem(level)
+        branch = excitation.branch(problem)
+        for point in points_of(branch):
+            state = problem.state(point.y)
+            rows.append((level, state["frequency_hz"], state["amplitude"]))
+        branch.destroy()
+        problem.destroy()
+    return dict(zip(("level", "frequency_hz", "amplitude"), np.array(rows).T))
+
+
+def blade_tables(
+    table: Mapping[str, Array], blades: Array, tuned: Mapping[str, Array]
+) -> tuple[dict[str, Array], dict[str, Array]]:
+    """``<name>_peaks.csv``, a row for each level, and ``<name>_blades.csv``, one for each level and sector.
+
+    Parameters
+    ----------
+    table : columns level and omega, (points,)
+    blades : (points, N)
+    """
+    levels = np.unique(table["level"])
+    before = [_peak(tuned, level, 2 * np.pi * tuned["frequency_hz"], tuned["amplitude"]) for level in levels]
+    each = [[_peak(table, level, table["omega"], blade) for blade in blades.T] for level in levels]
+    amplitude = np.array([[peak.amplitude for peak in row] for row in each])
+    frequency = np.array([[peak.omega for peak in row] for row in each]) / (2 * np.pi)
+    tuned_amplitude = np.array([peak.amplitude for peak in before])
+    most = np.array([int(np.argmax(np.nan_to_num(row))) for row in amplitude])
+    rows = np.arange(len(levels))
+    peaks = {
+        "level": levels,
+        "frequency_hz": frequency[rows, most],
+        "amplitude": amplitude[rows, most],
+        "sector": most,
+        "tuned_frequency_hz": np.array([peak.omega for peak in before]) / (2 * np.pi),
+        "tuned_amplitude": tuned_amplitude,
+        "amplification": amplitude[rows, most] / tuned_amplitude,
+    }
+    sectors = blades.shape[1]
+    return peaks, {
+        "level": np.repeat(levels, sectors),
+        "sector": np.tile(np.arange(sectors), len(levels)),
+        "frequency_hz": frequency.ravel(),
+        "amplitude": amplitude.ravel(),
+        "amplification": (amplitude / tuned_amplitude[:, None]).ravel(),
+    }
+
+
+def _peak(table: Mapping[str, Array], level: float, omega: Array, amplitude: Array) -> Peak:
+    rows = table["level"] == level
+    return amplitude_peak(omega[rows], amplitude[rows]) if rows.any() else NOWHERE
+
+
+def whitehead(sectors: int) -> float:
+    """Largest amplification of a linear wheel with one degree of freedom per blade."""
+    return float(1 + np.sqrt(sectors)) / 2

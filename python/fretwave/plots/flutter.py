@@ -1,0 +1,111 @@
+"""Flutter by nodal diameter: total damping over amplitude, and where the motion of each wave grows or decays."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ..analyses.flutter_waves import with_sign
+from . import style
+from .data import Analysis, Run
+
+#: half width of a wave's bar, in distances of neighbouring ones
+HALF = 0.32
+
+
+def figures(run: Run) -> Iterator[tuple[str, Figure]]:
+    """Two pictures per flutter analysis."""
+    for flutter in run.of_kind("flutter"):
+        yield f"{flutter.name}_damping", damping(flutter)
+        yield f"{flutter.name}_limits", limits(flutter)
+
+
+def diameters(flutter: Analysis) -> list[int]:
+    """Nodal diameters that have points, ascending."""
+    return [int(d) for d in np.unique(flutter.columns["nodal_diameter"])]
+
+
+def wave(flutter: Analysis, diameter: int) -> tuple[style.Array, style.Array]:
+    """Amplitude and damping [%] along the branch of a wave."""
+    rows = flutter.columns["nodal_diameter"] == diameter
+    return flutter.columns["amplitude"][rows], 100.0 * flutter.columns["zeta"][rows]
+
+
+def damping(flutter: Analysis) -> Figure:
+    """Total damping of every wave over its amplitude; forward waves solid, backward ones dashed."""
+    figure, axes = style.new_figure(5.2)
+    found = diameters(flutter)
+    for diameter, colour in zip(found, style.shades(len(found))):
+        amplitude, zeta = wave(flutter, diameter)
+        axes.plot(
+            amplitude, zeta, color=colour, linestyle="-" if diameter >= 0 else "--", label=f"ND {with_sign(diameter)}"
+        )
+    axes.axhline(0.0, color=style.INK, linewidth=1.0)
+    _cycles(axes, flutter, lambda cycle: (cycle["amplitude"], 0.0))
+    low, high = axes.get_ylim()
+    if low < 0.0:
+        axes.axhspan(low, 0.0, color=style.RED, alpha=0.07, zorder=0)
+        axes.set_ylim(low, high)
+    style.log_amplitude(axes, flutter.columns["amplitude"])
+    axes.set_xlabel(_amplitude(flutter))
+    axes.set_ylabel(style.label("Damping ratio ζ, friction and flow", "%"))
+    style.legend_outside(figure, axes, columns=5)
+    return figure
+
+
+def limits(flutter: Analysis) -> Figure:
+    """Amplitudes at which each wave grows (red) and decays (blue), and the limit cycles between them."""
+    figure, axes = style.new_figure(4.8)
+    found = diameters(flutter)
+    for place, diameter in enumerate(found):
+        amplitude, zeta = wave(flutter, diameter)
+        for low, high, sign in spans(amplitude, zeta):
+            axes.fill_between(
+                [place - HALF, place + HALF],
+                low,
+                high,
+                color=style.BLUE if sign > 0 else style.RED,
+                alpha=0.25,
+                linewidth=0,
+                label="decays" if sign > 0 else "grows",
+            )
+    _cycles(axes, flutter, lambda cycle: (found.index(cycle["nodal_diameter"]), cycle["amplitude"]))
+    axes.set_yscale("log")
+    axes.set_ylim(flutter.columns["amplitude"].min(), flutter.columns["amplitude"].max())
+    axes.set_xticks(range(len(found)), [with_sign(diameter) for diameter in found])
+    axes.set_xlabel("Nodal diameters, negative for backward waves")
+    axes.set_ylabel(_amplitude(flutter))
+    style.plain_numbers(axes.yaxis)
+    style.legend_outside(figure, axes, columns=5)
+    return figure
+
+
+def spans(amplitude: style.Array, zeta: style.Array) -> list[tuple[float, float, float]]:
+    """Ranges of amplitude between sign changes of the damping along a branch: (low, high, sign)."""
+    signs = np.sign(zeta)
+    signs[np.abs(zeta) < 1e-10] = 0  # located limit cycles belong to both sides
+    ends = np.concatenate([[0], np.flatnonzero(signs == 0), [len(zeta) - 1]])
+    parts = [(i, k) for i, k in zip(ends, ends[1:]) if k > i]
+    return [(float(amplitude[i]), float(amplitude[k]), float(np.sign(zeta[i : k + 1].sum()))) for i, k in parts]
+
+
+def _cycles(axes: Axes, flutter: Analysis, place: object) -> None:
+    """Limit cycles: filled where stable, open where not, grey where the branch runs back between two folds."""
+    kinds = {
+        "stable limit cycle": {"markerfacecolor": style.GREEN},
+        "unstable limit cycle": {"markerfacecolor": "white"},
+        "limit cycle between folds": {"markerfacecolor": style.GREY},
+    }
+    for cycle in flutter.attributes.get("events", []):
+        kind = "limit cycle between folds" if cycle["folds"] else f"{'' if cycle['stable'] else 'un'}stable limit cycle"
+        look = {"marker": "o", "markersize": 7, "markeredgecolor": style.INK, "linestyle": "", "zorder": 6}
+        x, y = place(cycle)  # type: ignore[operator]
+        axes.plot([x], [y], label=kind, **look, **kinds[kind])
+
+
+def _amplitude(flutter: Analysis) -> str:
+    dof = flutter.dofs[flutter.normalised_dof()] if flutter.dofs else ""
+    return style.label(f"Modal amplitude of {dof}".rstrip(" of"), flutter.unit("amplitude"))

@@ -1,0 +1,68 @@
+"""Forced response of a whole wheel: every blade's curve at one level, and its peak against the tuned wheel's."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from ..analyses.wheel_peaks import whitehead
+from . import style
+from .data import Analysis, Run, Table
+
+
+def figures(run: Run) -> Iterator[tuple[str, Figure]]:
+    """One picture per forced analysis of a wheel."""
+    for forced in run.of_kind("forced"):
+        blades, tuned = (run.table(f"{forced.name}_{suffix}") for suffix in ("blades", "tuned"))
+        if blades is not None and tuned is not None:
+            yield f"{forced.name}_blades", draw(forced, blades, tuned)
+
+
+def draw(forced: Analysis, blades: Table, tuned: Table) -> Figure:
+    """Curves of all blades at the first level over the peaks at every level."""
+    figure, (upper, lower) = style.new_figure(7.4, rows=2)
+    _curves(upper, forced, tuned)
+    levels, sectors = np.unique(blades["level"]), np.unique(blades["sector"])
+    for level, colour in zip(levels, style.shades(len(levels))):
+        rows = blades["level"] == level
+        lower.plot(sectors, blades["amplification"][rows], "o-", color=colour, linewidth=1.0, label=f"level {level:g}")
+    lower.axhline(1.0, color=style.GREY, linestyle="--", linewidth=1.2)
+    lower.axhline(whitehead(len(sectors)), color=style.GREY, linestyle=":", linewidth=1.2)
+    for value, text in ((1.0, "tuned wheel"), (whitehead(len(sectors)), "Whitehead's bound (linear, one family)")):
+        place = {"xycoords": ("axes fraction", "data"), "textcoords": "offset points", "color": style.GREY}
+        lower.annotate(text, (0.005, value), (0, 3), fontsize=9.5, **place)
+    lower.set_ylim(bottom=0.0, top=1.12 * max(whitehead(len(sectors)), float(np.nanmax(blades["amplification"]))))
+    lower.xaxis.set_major_locator(MaxNLocator(integer=True, nbins=13))
+    lower.set_xlabel("Sector")
+    lower.set_ylabel("Peak of the blade / tuned peak")
+    lower.legend(loc="upper right", ncols=len(levels))
+    return figure
+
+
+def _curves(axes: Axes, forced: Analysis, tuned: Table) -> None:
+    """Responses of all blades, of the one that moves most, and of the tuned wheel, at the smallest level."""
+    level = forced.columns["level"].min()
+    points = np.flatnonzero(forced.columns["level"] == level)
+    unit = int(forced.attributes["sector_dofs"])
+    c, s = (forced.labels.index(label) for label in ("1c", "1s"))
+    q = forced.coefficients(list(points))[:, forced.normalised_dof() % unit :: unit]
+    amplitude, frequency = np.hypot(q[:, :, c], q[:, :, s]), forced.columns["frequency_hz"][points]
+    most = int(np.argmax(amplitude.max(axis=0)))
+    for j, blade in enumerate(amplitude.T):
+        look = {"color": style.BLUE, "linewidth": 1.8, "zorder": 5} if j == most else {"color": "#bbbbbb"}
+        name = f"sector {j}, which moves most" if j == most else "other sectors"
+        axes.plot(frequency, blade, **{"linewidth": 0.8, **look}, label=name)
+    rows = tuned["level"] == level
+    axes.plot(tuned["frequency_hz"][rows], tuned["amplitude"][rows], "--", color=style.INK, label="tuned wheel")
+    axes.set_xlim(frequency.min(), frequency.max())
+    axes.set_ylim(0.0, None)
+    axes.set_xlabel(style.label("Excitation frequency", "Hz"))
+    dof = forced.dofs[forced.normalised_dof()].split("@")[0] if forced.dofs else ""
+    axes.set_ylabel(style.label(f"Amplitude of {dof}, level {level:g}", forced.unit("amplitude")))
+    handles, names = axes.get_legend_handles_labels()
+    entries = dict(zip(names, handles))
+    axes.legend(list(entries.values()), list(entries), loc="upper right")

@@ -1,0 +1,171 @@
+"""Wear as a modal parameter: frequency, damping and worn volume over amplitude and wear cycles (the paper's figures 13
+and 14): maps and cuts through them for a grid of amplitudes, curves over the cycles for fewer."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import ListedColormap, Normalize
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from . import style
+from .data import Analysis, Array, Run
+from .wear_lines import MM, WearLine, amplitude_label, amplitude_text, amplitudes, cycle_label, power, wears
+
+#: fewer amplitudes than this make no map
+GRID = 3
+#: cycles at which a map is cut, as shares of all
+CUTS = (0.0, 1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0)
+#: columns and levels of a map
+COLUMNS, LEVELS = 240, 14
+MODAL = {"frequency_hz": ("Frequency", "Hz", 1.0), "zeta": ("Damping ratio", "%", 100.0)}
+
+
+def figures(run: Run) -> Iterator[tuple[str, Figure]]:
+    """Modal values and worn volumes of each wear analysis."""
+    for wear, lines in wears(run):
+        many = len(lines) >= GRID
+        yield f"{wear.name}_modal", (draw_modal_map if many else draw_modal)(wear, lines)
+        yield f"{wear.name}_volume", (draw_volume_map if many else draw_volume)(wear, lines)
+
+
+def draw_modal_map(wear: Analysis, lines: Sequence[WearLine]) -> Figure:
+    """Frequency above damping: maps on the left, cuts at some cycles on the right."""
+    figure, axes = style.new_figure(7.4, rows=2, columns=2, sharex="col")
+    cycles, label = np.linspace(0.0, _last(lines), COLUMNS), amplitude_label(wear, amplitudes(lines)[1])
+    for (left, right), (column, (name, unit, factor)) in zip(axes, MODAL.items()):
+        values = np.stack([line.at(factor * line.columns[column], cycles) for line in lines])
+        figure.colorbar(_map(left, cycles, lines, values, _levels(values)), ax=left, pad=0.02)
+        _cuts(right, lines, column, factor)
+        left.set(title=style.label(name, unit), ylabel=label)
+        right.set_title(style.label(name, unit))
+    axes[1, 0].set_xlabel(cycle_label(wear))
+    axes[1, 1].set_xlabel(label)
+    axes[0, 1].legend(title="wear cycles", ncols=2, fontsize=9, loc="best")
+    _heading(figure, wear)
+    return figure
+
+
+def draw_modal(wear: Analysis, lines: Sequence[WearLine]) -> Figure:
+    """Frequency, damping and, for one amplitude, the shares of stick, slip and open over the cycles."""
+    shares = len(lines) == 1
+    figure, axes = style.new_figure(7.6 if shares else 6.0, rows=2 + shares, sharex=True)
+    for plane, (column, (name, unit, factor)) in zip(axes, MODAL.items()):
+        for line, colour in zip(lines, style.PALETTE):
+            values = factor * line.columns[column]
+            plane.plot(line.cycles, values, color=colour, label=amplitude_text(line))
+            top = int(np.argmax(values))
+            if column == "zeta" and 0 < top < len(values) - 1:
+                plane.plot(line.cycles[top], values[top], "o", color=colour)
+                text = f"largest: {values[top]:.3g} % after {line.cycles[top]:.3g}"
+                plane.annotate(text, (line.cycles[top], values[top]), (0, 8), textcoords="offset points", fontsize=10)
+                plane.margins(y=0.18)
+        plane.set_ylabel(style.label(name, unit))
+    if shares:
+        _shares(axes[2], lines[0])
+    axes[0].legend(loc="best")
+    axes[-1].set_xlabel(cycle_label(wear))
+    axes[-1].set_xlim(0.0, _last(lines))
+    _heading(figure, wear)
+    return figure
+
+
+def draw_volume_map(wear: Analysis, lines: Sequence[WearLine]) -> Figure:
+    """Worn volume of every face: maps above, curves over the cycles below, on the same scales."""
+    faces = _faces(wear)
+    figure, axes = style.new_figure(7.2, rows=2, columns=len(faces), sharex=True, sharey="row", squeeze=False)
+    cycles = np.linspace(0.0, _last(lines), COLUMNS)
+    values = {face: np.stack([line.at(MM**3 * line.columns[face], cycles) for line in lines]) for face in faces}
+    levels = _levels(np.stack(list(values.values())))
+    amplitude, unit = amplitudes(lines)
+    scale = ScalarMappable(Normalize(amplitude[0], amplitude[-1]), ListedColormap(style.shades(256)))
+    for (upper, lower), (face, name) in zip(axes.T, faces.items()):
+        filled = _map(upper, cycles, lines, values[face], levels)
+        upper.set_title(name)
+        for line, colour in zip(lines, scale.to_rgba(amplitude)):
+            lower.plot(line.cycles, MM**3 * line.columns[face], color=colour)
+    figure.colorbar(filled, ax=axes[0, :], label=style.label("Worn volume", "mm³"), pad=0.02)
+    bar = figure.colorbar(scale, ax=axes[1, :], label=f"Modal amplitude [{unit}]", pad=0.02)
+    bar.ax.hlines(amplitude, 0, 1, transform=bar.ax.get_yaxis_transform(), color="white")
+    axes[0, 0].set_ylabel(amplitude_label(wear, unit))
+    axes[1, 0].set_ylabel(style.label("Worn volume", "mm³"))
+    figure.supxlabel(cycle_label(wear), fontsize=11)
+    _heading(figure, wear)
+    return figure
+
+
+def draw_volume(wear: Analysis, lines: Sequence[WearLine]) -> Figure:
+    """Worn volume of every face, and how fast it grows."""
+    faces = _faces(wear)
+    figure, (upper, lower) = style.new_figure(6.0, rows=2, sharex=True)
+    for line, dash in zip(lines, ("-", "--")):
+        for (face, name), colour in zip(faces.items(), style.PALETTE):
+            volume = MM**3 * line.columns[face]
+            text = name if len(lines) == 1 else f"{name}, {amplitude_text(line)}"
+            upper.plot(line.cycles, volume, dash, color=colour, label=text)
+            lower.stairs(
+                np.diff(volume) / np.diff(line.cycles), line.cycles, baseline=None, linestyle=dash, color=colour
+            )
+    upper.set_ylabel(style.label("Worn volume", "mm³"))
+    lower.set_ylabel("Growth [mm³ per wear cycle]")
+    lower.set_xlabel(cycle_label(wear))
+    lower.set(xlim=(0.0, _last(lines)))
+    lower.set_ylim(bottom=0.0)
+    upper.legend(loc="best")
+    _heading(figure, wear)
+    return figure
+
+
+def _map(axes: Axes, cycles: Array, lines: Sequence[WearLine], values: Array, levels: Array) -> Any:
+    """Filled contours over cycles and amplitude; thin lines where the amplitudes lie."""
+    amplitude = amplitudes(lines)[0]
+    filled = axes.contourf(cycles, amplitude, values, levels, cmap="viridis")
+    axes.hlines(amplitude, cycles[0], cycles[-1], color="white", linewidth=0.6, alpha=0.7)
+    axes.set_facecolor("#e8e8e8")
+    axes.grid(False)
+    return filled
+
+
+def _cuts(axes: Axes, lines: Sequence[WearLine], column: str, factor: float) -> None:
+    """A curve over the amplitudes for each of some cycles."""
+    cycles = _last(lines) * np.array(CUTS)
+    amplitude = amplitudes(lines)[0]
+    values = np.stack([line.at(factor * line.columns[column], cycles) for line in lines])
+    for cycle, curve, colour in zip(cycles, values.T, style.shades(len(cycles))):
+        axes.plot(amplitude, curve, ".-", color=colour, label=f"{cycle:.3g}")
+
+
+def _shares(axes: Axes, line: WearLine) -> None:
+    words = {"stick": style.BLUE, "slip": style.ORANGE, "open": "#dddddd"}
+    axes.stackplot(
+        line.cycles, *(100 * line.columns[w] for w in words), colors=words.values(), labels=words, alpha=0.85
+    )
+    axes.set(ylim=(0, 100), ylabel="Share of time [%]")
+    axes.legend(loc="upper right", ncols=3)
+    axes.grid(False)
+
+
+def _levels(values: Array) -> Array:
+    low, high = float(np.nanmin(values)), float(np.nanmax(values))
+    return np.asarray(MaxNLocator(LEVELS).tick_values(low, high if high > low else low + 1.0))
+
+
+def _last(lines: Sequence[WearLine]) -> float:
+    return max(float(line.cycles[-1]) for line in lines)
+
+
+def _faces(wear: Analysis) -> dict[str, str]:
+    """Column of the worn volume of each face, and the face's name."""
+    columns = [name for name in wear.columns if name.startswith("worn_")]
+    return {column: wear.long_name(column).replace("worn volume of ", "") for column in columns}
+
+
+def _heading(figure: Figure, wear: Analysis) -> None:
+    coefficient = float(wear.attributes.get("wear_coefficient", np.nan))
+    figure.suptitle(f"Fretting wear ({wear.name}), $k_w$ = {power(coefficient)} 1/Pa", fontsize=11.5)
+    figure.align_ylabels()

@@ -1,0 +1,182 @@
+"""Wear as the pictures read it: a line for each amplitude, and what kind of history each contact pair has."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from . import style
+from .data import Analysis, Array, Run, Table
+
+MM, MICRON = 1e3, 1e6
+#: of amplitudes, from which they are at least 0.1
+UNITS = ((1.0, "m"), (MM, "mm"), (MICRON, "µm"))
+#: a depth that grows by less than this share over the cycles that were left out stays as it is
+STAYS = 1e-2
+#: shares of the deepest depth, and of a pair's own largest rate, that count as nothing
+UNWORN, STOPPED = 1e-3, 0.05
+#: a second spell begins when the rate at least doubles after a fall below this share of what it was, and counts when
+#: this share of the depth comes from then on
+FALLEN, SECOND = 0.1, 0.2
+
+NEVER, STOPS, COMPLEX, ONWARDS = "never wears", "stops wearing", "wears again", "keeps wearing"
+KINDS = {NEVER: style.GREY, STOPS: style.BLUE, COMPLEX: style.ORANGE, ONWARDS: style.GREEN}
+RULE = (
+    f"never wears: under {100 * UNWORN:g} % of the deepest;"
+    f"  stops: the last rate is under {100 * STOPPED:g} % of its peak;  keeps wearing: all others;\n"
+    f"wears again: over {100 * SECOND:g} % of the depth comes in a second spell,"
+    f" when the rate at least doubles after it was under {100 * FALLEN:g} % of its peak"
+)
+
+
+@dataclass(frozen=True)
+class WearLine:
+    """One amplitude of a wear analysis.
+
+    Attributes
+    ----------
+    columns : of its table, (n,) each
+    depth, rate, load : contact -> (n, n_pairs)
+        Worn depth [m], its growth in a vibration cycle [m], mean normal force [N].
+    """
+
+    amplitude: float
+    columns: Table
+    depth: Table
+    rate: Table
+    load: Table
+
+    @property
+    def cycles(self) -> Array:
+        """Normalised wear cycles (n,)."""
+        return self.columns["cycles"]
+
+    def at(self, values: Array, cycles: Array) -> Array:
+        """Values (n,) at other cycles, nan behind an early end."""
+        behind = cycles > self.cycles[-1] * (1 + 1e-9)
+        return np.where(behind, np.nan, np.interp(cycles, self.cycles, values))
+
+
+def lines_of(wear: Analysis) -> list[WearLine]:
+    """All amplitudes, the smallest first; one whose wear has stopped goes on unchanged to the last cycle of all."""
+    numbers = wear.columns["line"].astype(int)
+    contacts = wear.worn_contacts()
+    fields = {key: {name: wear.field(f"{key}_{name}") for name in contacts} for key in ("depth", "rate", "load")}
+    last, unit = float(wear.columns["cycles"].max()), float(wear.attributes["cycle_unit"])
+    found = []
+    for number in np.unique(numbers):
+        rows = np.flatnonzero(numbers == number)
+        left = last - float(wear.columns["cycles"][rows[-1]])
+        held = left > 0 and _stays(fields, rows[-1], unit * left)
+        rows = np.append(rows, rows[-1]) if held else rows
+        columns = {key: values[rows] for key, values in wear.columns.items()}
+        if held:
+            columns["cycles"][-1] = last
+        parts = {key: {name: values[rows] for name, values in table.items()} for key, table in fields.items()}
+        found.append(WearLine(float(columns["amplitude"][0]), columns, **parts))
+    return sorted(found, key=lambda line: line.amplitude)
+
+
+def _stays(fields: dict[str, Table], row: int, vibrations: float) -> bool:
+    """Whether the rates of a row leave the depths as they are over so many vibration cycles."""
+    deepest = max(float(depth[row].max(initial=0.0)) for depth in fields["depth"].values())
+    return all(float(rate[row].max(initial=0.0)) * vibrations <= STAYS * deepest for rate in fields["rate"].values())
+
+
+def wears(run: Run) -> Iterator[tuple[Analysis, list[WearLine]]]:
+    """Wear analyses that have any cycles behind them."""
+    for wear in run.of_kind("wear"):
+        if wear.columns["cycles"].max() > 0:
+            yield wear, lines_of(wear)
+
+
+def kinds(depth: Array, rate: Array) -> list[str]:
+    """Kind of each pair's history, by `RULE`.
+
+    Parameters
+    ----------
+    depth, rate : (n, n_pairs)
+    """
+    deepest = float(depth[-1].max(initial=0.0))
+    return [_kind(d, r, deepest) for d, r in zip(depth.T, rate.T)]
+
+
+def _kind(depth: Array, rate: Array, deepest: float) -> str:
+    if depth[-1] <= UNWORN * deepest:
+        return NEVER
+    if second_spell(depth, rate) > SECOND:
+        return COMPLEX
+    return STOPS if rate[-1] < STOPPED * rate.max() else ONWARDS
+
+
+def second_spell(depth: Array, rate: Array) -> float:
+    """Share of a pair's depth (n,) that comes from the trough on out of which its rate (n,) rises most, 0 without."""
+    fallen = np.flatnonzero(rate < FALLEN * np.maximum.accumulate(rate))
+    if not len(fallen):
+        return 0.0
+    later = rate[fallen[0] :]
+    lowest = np.minimum.accumulate(later)
+    top = int(np.argmax(later - lowest))
+    if later[top] < 2 * lowest[top] or later[top] <= 0:
+        return 0.0
+    trough = fallen[0] + int(np.argmin(later[: top + 1]))
+    return float((depth[-1] - depth[trough]) / depth[-1])
+
+
+def examples(line: WearLine, contact: str) -> dict[str, int]:
+    """A pair of each kind there is: the deepest; of those that wear again the one that does so most."""
+    depth, rate = line.depth[contact], line.rate[contact]
+    found: dict[str, int] = {}
+    words = np.array(kinds(depth, rate))
+    for kind in KINDS:
+        pairs = np.flatnonzero(words == kind)
+        if len(pairs):
+            score = [_second_depth(depth[:, p], rate[:, p]) if kind == COMPLEX else depth[-1, p] for p in pairs]
+            found[kind] = int(pairs[int(np.argmax(score))])
+    return found
+
+
+def _second_depth(depth: Array, rate: Array) -> float:
+    """The smaller of what a pair's two spells wear off: both can be seen where it is large."""
+    share = second_spell(depth, rate)
+    return float(min(share, 1 - share) * depth[-1])
+
+
+def telling_line(lines: Sequence[WearLine], contact: str) -> WearLine:
+    """The line with most kinds of pairs; of several the one of largest amplitude."""
+    return max(lines, key=lambda line: (len(examples(line, contact)), line.amplitude))
+
+
+def amplitudes(lines: Sequence[WearLine]) -> tuple[Array, str]:
+    """Of all lines in a unit that suits the largest, and the unit."""
+    values = np.array([line.amplitude for line in lines])
+    scale, unit = next((scale, unit) for scale, unit in UNITS if values.max() * scale >= 0.1 or scale == UNITS[-1][0])
+    return scale * values, unit
+
+
+def amplitude_text(line: WearLine) -> str:
+    """As "a = 1.2 mm"."""
+    values, unit = amplitudes([line])
+    return f"a = {values[0]:.4g} {unit}"
+
+
+def amplitude_label(wear: Analysis, unit: str) -> str:
+    """Axis label with the dof that the mode normalises."""
+    case = wear.attributes.get("case", {})
+    name = case.get(f"{wear.attributes.get('mode')}.normalise", "") if isinstance(case, dict) else ""
+    return style.label(f"Modal amplitude of {name}" if name else "Modal amplitude", unit)
+
+
+def cycle_label(wear: Analysis) -> str:
+    """Axis label that says how many vibrations a normalised cycle is."""
+    return f"Wear cycles (1 = {power(float(wear.attributes.get('cycle_unit', 1.0)))} vibrations)"
+
+
+def power(value: float) -> str:
+    """A number as 1.36 x 10^7."""
+    digits, exponent = f"{value:.3g}".partition("e")[::2]
+    if not exponent:
+        return digits
+    return rf"{digits} $\times$ 10$^{{{int(exponent)}}}$" if digits != "1" else f"10$^{{{int(exponent)}}}$"
