@@ -50,6 +50,8 @@ class SectorReduction:
         B on the reduced coordinates.
     places : dict
         Reduced coordinate of each kept dof that is one: of the high face none when the wheel has an axis.
+    unreduced : Sector
+        Its faces tied.
     sectors : int
     diameters : tuple of int
         Nodal diameters that gave interface modes; empty when the faces are whole.
@@ -61,7 +63,7 @@ class SectorReduction:
 
     def __init__(self, full: Sector, P: sp.csc_matrix, faces: Interface, inner: Reduction, waves: SectorWaves) -> None:
         self._P, self._inner, self._waves = P, inner, waves
-        self.sectors, self.diameters = full.sectors, waves.diameters
+        self.unreduced, self.sectors, self.diameters = full, full.sectors, waves.diameters
         self.M, self.K, self.C, self.component_hz = inner.M, inner.K, inner.C, inner.component_hz
         self.low: Indices = len(faces.kept) + np.arange(faces.n_interface)
         self.high: Indices = self.low + faces.n_interface
