@@ -32,9 +32,6 @@ def check_reduction(
         for index, given in enumerate(getattr(section, key) or ()):
             if given > sectors // 2:
                 report.wrong((key, index), "is no nodal diameter of the wheel", f"0 to {sectors // 2}", "remove it")
-    if section.error_at is not None:
-        expected = "a whole structure: a sector's error is stated for its linear waves"
-        report.wrong(("error_at",), "is not estimated for a sector", expected, "remove it; see compare_diameters")
     if section.interface == "modes" and section.interface_diameters is None:
         shown = sorted(_spatial_indices(analyses, sectors)) or [1]
         fix = f"interface_diameters = {shown}, those of the first and third harmonic of the analyses"

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -24,9 +24,9 @@ import scipy.sparse as sp
 from mpi4py import MPI
 
 from .cyclic import Sector
+from .cyclic_interface import Interface
 from .cyclic_waves import STATES, SectorWaves, WaveError
 from .errors import InputError
-from .faces import rotation
 from .model import Contact, by_sector
 from .reduction import RIGID_SHARE, Reduction, reduce
 
@@ -50,6 +50,8 @@ class SectorReduction:
         B on the reduced coordinates.
     places : dict
         Reduced coordinate of each kept dof that is one: of the high face none when the wheel has an axis.
+    unreduced : Sector
+        Its faces tied.
     sectors : int
     diameters : tuple of int
         Nodal diameters that gave interface modes; empty when the faces are whole.
@@ -59,14 +61,13 @@ class SectorReduction:
         interface, total [s].
     """
 
-    def __init__(self, full: Sector, P: sp.csc_matrix, split: _Split, inner: Reduction, waves: SectorWaves) -> None:
+    def __init__(self, full: Sector, P: sp.csc_matrix, faces: Interface, inner: Reduction, waves: SectorWaves) -> None:
         self._P, self._inner, self._waves = P, inner, waves
-        self.sectors, self.diameters = full.sectors, waves.diameters
+        self.unreduced, self.sectors, self.diameters = full, full.sectors, waves.diameters
         self.M, self.K, self.C, self.component_hz = inner.M, inner.K, inner.C, inner.component_hz
-        kept = len(split.kept)
-        self.low: Indices = kept + np.arange(split.n_interface)
-        self.high: Indices = self.low + split.n_interface
-        self.places: dict[int, int] = split.places()
+        self.low: Indices = len(faces.kept) + np.arange(faces.n_interface)
+        self.high: Indices = self.low + faces.n_interface
+        self.places: dict[int, int] = faces.places()
         self.contacts = [self._on(contact) for contact in waves.contacts]
         self.wall_s: dict[str, float] = {}
 
@@ -196,19 +197,18 @@ def reduce_sector(
     diameters = _checked(interface_diameters, sectors, interface_waves)
     full = Sector.from_faces(M, K, low, high, sectors, C, contacts, axis)
     waves = SectorWaves(full, comm, diameters, contacts)
-    split = _Split.of(sp.csr_matrix(M).shape[0], np.asarray(low), np.asarray(high), contacts, keep, axis)
+    faces = Interface.of(sp.csr_matrix(M).shape[0], np.asarray(low), np.asarray(high), contacts, keep, axis)
     if interface_diameters is None:
-        V = split.whole()
+        V = faces.whole()
     else:
-        motions = waves.on(split.low, interface_waves)
-        V = comm.bcast(split.basis(motions, interface_tolerance) if comm.rank == 0 else None)
-    split.n_interface = V.shape[1]
-    P, kept = split.coordinates(V, sectors, axis)
-    interface = time.perf_counter() - start
+        motions = waves.on(faces.low, interface_waves)
+        V = comm.bcast(faces.basis(motions, interface_tolerance) if comm.rank == 0 else None)
+    P, kept = faces.coordinates(V, sectors, axis)
+    before = time.perf_counter() - start
     M_P, K_P, C_P = (None if A is None else sp.csr_matrix(P.T @ sp.csr_matrix(A, dtype=float) @ P) for A in (M, K, C))
     inner = reduce(M_P, K_P, C_P, kept, modes, highest_hz, comm)
-    found = SectorReduction(full, P, split, inner, waves)
-    found.wall_s = {"interface": interface, "total": time.perf_counter() - start}
+    found = SectorReduction(full, P, faces, inner, waves)
+    found.wall_s = {"interface": before, "total": time.perf_counter() - start}
     return found
 
 
@@ -223,73 +223,3 @@ def _checked(diameters: Sequence[int] | None, sectors: int, waves: int) -> tuple
             "choose those that the motion has: the wave's, and its multiples by the harmonics",
         )
     return given
-
-
-@dataclass
-class _Split:
-    """Dofs of a sector: inner ones, of these the kept ones, and the faces.
-
-    Attributes
-    ----------
-    own : (n,) places in the faces that stay coordinates
-    """
-
-    n: int
-    low: Indices
-    high: Indices
-    inner: Indices
-    kept: Indices
-    own: Indices
-    turned: bool
-    n_interface: int = 0
-
-    @classmethod
-    def of(
-        cls, n: int, low: Indices, high: Indices, contacts: Sequence[Contact], keep: npt.ArrayLike, axis: str | None
-    ) -> _Split:
-        touched = [sp.csr_matrix(B).indices for contact in contacts for B in by_sector(contact.B).values()]
-        wanted = np.unique(np.concatenate([np.asarray(keep, dtype=np.intp).ravel(), *touched]))
-        own = np.nonzero(np.isin(low, wanted) | np.isin(high, wanted))[0]
-        if axis is not None:  # a turn mixes the three components of a node
-            own = (3 * np.unique(own // 3)[:, None] + np.arange(3)).ravel()
-        inner = np.setdiff1d(np.arange(n), np.concatenate([low, high]))
-        return cls(n, low, high, inner, np.intersect1d(wanted, inner), own, axis is not None)
-
-    def whole(self) -> sp.csc_matrix:
-        """V of faces that are kept as they are."""
-        self.own = np.arange(len(self.low))
-        return _unit(self.own, len(self.low))
-
-    def basis(self, motions: Array, tolerance: float) -> sp.csc_matrix:
-        """V (n_face, p): unit vectors of the dofs kept, then orthonormal motions of the others.
-
-        Singular vectors have a sign of their own choice: the largest entry is made positive.
-        """
-        rest = np.setdiff1d(np.arange(len(self.low)), self.own)
-        U, s, _ = np.linalg.svd(motions[rest], full_matrices=False)
-        U = U[:, s > tolerance * s.max(initial=0.0)]
-        U = U * np.sign(U[np.argmax(np.abs(U), axis=0), np.arange(U.shape[1])]) if U.size else U
-        n_face = len(self.low)
-        return sp.csc_matrix(sp.hstack([_unit(self.own, n_face), _unit(rest, n_face) @ sp.csc_matrix(U)]))
-
-    def coordinates(self, V: sp.csc_matrix, sectors: int, axis: str | None) -> tuple[sp.csc_matrix, Indices]:
-        """x = P y, y = (inner dofs, low, high), and which of y are kept: kept dofs, low, high."""
-        turn = np.eye(1) if axis is None else rotation(2 * np.pi / sectors, axis)
-        turned = sp.kron(sp.identity(V.shape[0] // len(turn)), turn) @ V
-        parts = [_unit(self.inner, self.n), _unit(self.low, self.n) @ V, _unit(self.high, self.n) @ turned]
-        faces = len(self.inner) + np.arange(2 * V.shape[1])
-        return sp.csc_matrix(sp.hstack(parts)), np.concatenate([np.searchsorted(self.inner, self.kept), faces])
-
-    def places(self) -> dict[int, int]:
-        """Reduced coordinates of kept dofs."""
-        found = {int(dof): k for k, dof in enumerate(self.kept)}
-        for column, position in enumerate(self.own):
-            found[int(self.low[position])] = len(self.kept) + column
-            if not self.turned:
-                found[int(self.high[position])] = len(self.kept) + self.n_interface + column
-        return found
-
-
-def _unit(places: Indices, n: int) -> sp.csc_matrix:
-    """Unit vectors (n, len(places))."""
-    return sp.csc_matrix((np.ones(len(places)), (places, np.arange(len(places)))), (n, len(places)))

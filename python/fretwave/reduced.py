@@ -140,6 +140,10 @@ def nonlinear_error_at(case: Case, analysis: ModeAnalysis, problem: Any, y: Any)
 
     full = case.unreduced
     assert full is not None and case.reduced is not None
+    if full.neighbours is not None:
+        from .reduced_sector import wave_error_at
+
+        return wave_error_at(case, analysis, problem, y)
     preload = full.preload_of(analysis)
     loads = [full.loads[name] for name in preload.loads] if preload is not None else []
     C = full.damping_with(analysis.dampers)

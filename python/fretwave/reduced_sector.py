@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import scipy.sparse as sp
 
-from .contacts import closed_contacts
 from .cyclic_waves import WaveError
 from .reduced import ReductionReport
-from .schema import ReductionSection
+from .schema import ModeAnalysis, ReductionSection
 from .sectors import CutSector, fold
 
 if TYPE_CHECKING:
     from .casefile import Case
     from .cyclic_reduction import SectorReduction
+    from .reduction_error import NonlinearError
 
 
 def reduce_sector_case(case: Case, comm: Any, modes: int | None = None) -> Case:
@@ -45,7 +45,22 @@ def reduce_sector_case(case: Case, comm: Any, modes: int | None = None) -> Case:
             loads=dict(origin.built.loads) if origin.built else {},
             neighbours=neighbours,
             reduced=_report(case, reduction, wall),
+            unreduced=case if case.reduction.error_at is not None else None,
         )
+
+
+def wave_error_at(case: Case, analysis: ModeAnalysis, problem: Any, y: Any) -> NonlinearError:
+    """As `fretwave.reduced.nonlinear_error_at`, of a wave on a sector. Collective."""
+    from .sector_error import sector_nonlinear_error
+
+    full = case.unreduced
+    assert full is not None and full.neighbours is not None and case.reduced is not None
+    preload, modes = full.preload_of(analysis), case.reduced.component_modes
+    loads = [full.loads[name] for name in preload.loads] if preload is not None else []
+    C = full.ahead_damping(full.damping_with(analysis.dampers)) or {}
+    terms = (full.neighbours.with_own("K", full.K), C, full.neighbours.with_own("M", full.M))
+    with sector_reduction_of(full, problem.model.comm, modes) as reduction:
+        return sector_nonlinear_error(reduction, terms, problem, y, np.sum(loads, axis=0) if loads else None)
 
 
 def sector_reduction_of(case: Case, comm: Any, modes: int | None = None) -> SectorReduction:
@@ -64,7 +79,7 @@ def sector_reduction_of(case: Case, comm: Any, modes: int | None = None) -> Sect
         cut.high,
         neighbours.sectors,
         loaded.get("C"),
-        contacts=[Contact(c.law, c.rows, c.parameters, c.name) for c in closed_contacts(cut.contacts)],
+        contacts=[Contact(c.law, c.rows, c.parameters, c.name) for c in cut.contacts],
         keep=np.array(case.keep, dtype=np.intp),
         axis=cut.axis,
         interface_diameters=section.interface_diameters if section.interface == "modes" else None,

@@ -54,7 +54,8 @@ def _follow(context: AnalysisContext, analysis: ModeAnalysis, problem: Any, writ
 
     low, high = analysis.amplitude
     reduction = context.case.reduction
-    error_at = reduction.error_at if reduction is not None and context.case.unreduced is not None else None
+    estimated = context.case.unreduced is not None and context.case.wheel is None
+    error_at = reduction.error_at if reduction is not None and estimated else None
     reports = sorted({*analysis.report_at, *([] if error_at is None else [error_at])})
     settings = {"stop": (low, high), "steps": step_control(analysis.step), "report_at": reports}
     snapshot, _, found = open_branch(context.comm, writer, context.resuming)
