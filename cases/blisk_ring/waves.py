@@ -84,7 +84,7 @@ def branch(o: case.Options, r: dict[str, Any], stuck: fw.LinearMode, harmonics: 
         if o.normal == "variable":
             rest = balanced(model, stuck)
             mode.preload(rest.displacement, rest.load)
-        first, last = 4e-5 * o.friction, 1.8e-3 * o.friction
+        first, last = 4e-5 * o.friction, 3e-3 * o.friction
         points = fw.Continuation(mode, mode.initial(first), (first, last), fw.StepControl(maximum=0.2))
         table = []
         for point in points:
@@ -111,7 +111,7 @@ def coincide(tables: list[list[dict[str, float]]]) -> tuple[float, float]:
     """Largest distance of the branches over a / mu from the first: relative in omega, and in zeta over its maximum."""
 
     def curve(table: list[dict[str, float]], key: str) -> Array:
-        grid = np.log(np.geomspace(5e-5, 1.7e-3, 400))
+        grid = np.log(np.geomspace(5e-5, 2.9e-3, 400))
         return np.interp(grid, [np.log(row["amplitude"] / row["friction"]) for row in table], [r[key] for r in table])
 
     found = []
