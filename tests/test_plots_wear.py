@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -104,6 +105,19 @@ def test_a_line_that_ended_early_while_wearing_is_blank_behind_its_end():
     line = wear_lines.WearLine(1.0, {"cycles": np.array([0.0, 1.0, 2.0])}, {}, {}, {})
     found = line.at(np.array([1.0, 2.0, 4.0]), np.array([0.5, 2.0, 2.5]))
     assert found[:2] == pytest.approx([1.5, 4.0]) and np.isnan(found[2])
+
+
+def test_jumps_are_marked(run):
+    analysis = run.analyses["one"]
+    (line,) = wear_lines.lines_of(analysis)
+    assert len(line.jumps) == 0
+    figure = wear.draw_modal(analysis, [replace(line, jumps=np.array([3.0, 5.0]))])
+    names = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+    assert names == ["a = 2.5 µm", wear.JUMP]
+    lines = [replace(line, amplitude=a, jumps=np.full(k, 4.0)) for k, a in enumerate((1e-6, 2e-6, 3e-6))]
+    figure = wear.draw_modal_map(analysis, lines)
+    assert figure._suptitle.get_text().endswith(f"red marks: {wear.JUMP}")
+    assert sum(len(mark.get_xdata()) for mark in figure.axes[0].lines) == 3
 
 
 @pytest.mark.parametrize(

@@ -23,6 +23,7 @@ GRID = 3
 CUTS = (0.0, 1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0)
 #: columns and levels of a map
 COLUMNS, LEVELS = 240, 14
+JUMP = "the mode jumps to another sheet"
 MODAL = {"frequency_hz": ("Frequency", "Hz", 1.0), "zeta": ("Damping ratio", "%", 100.0)}
 
 
@@ -47,7 +48,7 @@ def draw_modal_map(wear: Analysis, lines: Sequence[WearLine]) -> Figure:
     axes[1, 0].set_xlabel(cycle_label(wear))
     axes[1, 1].set_xlabel(label)
     axes[0, 1].legend(title="wear cycles", ncols=2, fontsize=9, loc="best")
-    _heading(figure, wear)
+    _heading(figure, wear, lines)
     return figure
 
 
@@ -65,13 +66,16 @@ def draw_modal(wear: Analysis, lines: Sequence[WearLine]) -> Figure:
                 text = f"largest: {values[top]:.3g} % after {line.cycles[top]:.3g}"
                 plane.annotate(text, (line.cycles[top], values[top]), (0, 8), textcoords="offset points", fontsize=10)
                 plane.margins(y=0.18)
+        for cycle in lines[0].jumps if shares else ():
+            plane.axvline(cycle, color=style.RED, linewidth=1.0, linestyle=":", label=JUMP)
         plane.set_ylabel(style.label(name, unit))
     if shares:
         _shares(axes[2], lines[0])
-    axes[0].legend(loc="best")
+    handles, names = axes[0].get_legend_handles_labels()
+    axes[0].legend(*zip(*dict(zip(names, zip(handles, names))).values()), loc="best")
     axes[-1].set_xlabel(cycle_label(wear))
     axes[-1].set_xlim(0.0, _last(lines))
-    _heading(figure, wear)
+    _heading(figure, wear, lines)
     return figure
 
 
@@ -95,7 +99,7 @@ def draw_volume_map(wear: Analysis, lines: Sequence[WearLine]) -> Figure:
     axes[0, 0].set_ylabel(amplitude_label(wear, unit))
     axes[1, 0].set_ylabel(style.label("Worn volume", "mm³"))
     figure.supxlabel(cycle_label(wear), fontsize=11)
-    _heading(figure, wear)
+    _heading(figure, wear, lines)
     return figure
 
 
@@ -117,7 +121,7 @@ def draw_volume(wear: Analysis, lines: Sequence[WearLine]) -> Figure:
     lower.set(xlim=(0.0, _last(lines)))
     lower.set_ylim(bottom=0.0)
     upper.legend(loc="best")
-    _heading(figure, wear)
+    _heading(figure, wear, lines)
     return figure
 
 
@@ -125,6 +129,8 @@ def _map(axes: Axes, cycles: Array, lines: Sequence[WearLine], values: Array, le
     """Filled contours over cycles and amplitude; thin lines where the amplitudes lie."""
     amplitude = amplitudes(lines)[0]
     filled = axes.contourf(cycles, amplitude, values, levels, cmap="viridis")
+    for value, line in zip(amplitude, lines):
+        axes.plot(line.jumps, np.full(len(line.jumps), value), "|", color=style.RED, markersize=9, markeredgewidth=1.6)
     axes.hlines(amplitude, cycles[0], cycles[-1], color="white", linewidth=0.6, alpha=0.7)
     axes.set_facecolor("#e8e8e8")
     axes.grid(False)
@@ -165,7 +171,8 @@ def _faces(wear: Analysis) -> dict[str, str]:
     return {column: wear.long_name(column).replace("worn volume of ", "") for column in columns}
 
 
-def _heading(figure: Figure, wear: Analysis) -> None:
+def _heading(figure: Figure, wear: Analysis, lines: Sequence[WearLine]) -> None:
     coefficient = float(wear.attributes.get("wear_coefficient", np.nan))
-    figure.suptitle(f"Fretting wear ({wear.name}), $k_w$ = {power(coefficient)} 1/Pa", fontsize=11.5)
+    note = f"; red marks: {JUMP}" if len(lines) >= GRID and any(len(line.jumps) for line in lines) else ""
+    figure.suptitle(f"Fretting wear ({wear.name}), $k_w$ = {power(coefficient)} 1/Pa{note}", fontsize=11.5)
     figure.align_ylabels()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -25,9 +25,9 @@ NEVER, STOPS, COMPLEX, ONWARDS = "never wears", "stops wearing", "wears again", 
 KINDS = {NEVER: style.GREY, STOPS: style.BLUE, COMPLEX: style.ORANGE, ONWARDS: style.GREEN}
 RULE = (
     f"never wears: under {100 * UNWORN:g} % of the deepest;"
-    f"  stops: the last rate is under {100 * STOPPED:g} % of its peak;  keeps wearing: all others;\n"
-    f"wears again: over {100 * SECOND:g} % of the depth comes in a second spell,"
-    f" when the rate at least doubles after it was under {100 * FALLEN:g} % of its peak"
+    f"  stops: the last rate is under {100 * STOPPED:g} % of its peak;\n"
+    f"wears again: over {100 * SECOND:g} % of the depth comes in a second spell, when the rate at least doubles\n"
+    f"after it was under {100 * FALLEN:g} % of its peak;  keeps wearing: all others"
 )
 
 
@@ -40,6 +40,8 @@ class WearLine:
     columns : of its table, (n,) each
     depth, rate, load : contact -> (n, n_pairs)
         Worn depth [m], its growth in a vibration cycle [m], mean normal force [N].
+    jumps : (n_jumps,)
+        Cycles at which the mode went over to another sheet.
     """
 
     amplitude: float
@@ -47,6 +49,7 @@ class WearLine:
     depth: Table
     rate: Table
     load: Table
+    jumps: Array = field(default_factory=lambda: np.empty(0))
 
     @property
     def cycles(self) -> Array:
@@ -74,8 +77,9 @@ def lines_of(wear: Analysis) -> list[WearLine]:
         columns = {key: values[rows] for key, values in wear.columns.items()}
         if held:
             columns["cycles"][-1] = last
+        jumps = np.array([wear.columns["cycles"][row] for row in rows if wear.events[row] == "jump"])
         parts = {key: {name: values[rows] for name, values in table.items()} for key, table in fields.items()}
-        found.append(WearLine(float(columns["amplitude"][0]), columns, **parts))
+        found.append(WearLine(float(columns["amplitude"][0]), columns, **parts, jumps=jumps))
     return sorted(found, key=lambda line: line.amplitude)
 
 
@@ -126,22 +130,25 @@ def second_spell(depth: Array, rate: Array) -> float:
 
 
 def examples(line: WearLine, contact: str) -> dict[str, int]:
-    """A pair of each kind there is: the deepest; of those that wear again the one that does so most."""
+    """A pair of each kind there is, a clear one: of those that stop a deep one with the smallest last rate."""
     depth, rate = line.depth[contact], line.rate[contact]
     found: dict[str, int] = {}
     words = np.array(kinds(depth, rate))
     for kind in KINDS:
         pairs = np.flatnonzero(words == kind)
         if len(pairs):
-            score = [_second_depth(depth[:, p], rate[:, p]) if kind == COMPLEX else depth[-1, p] for p in pairs]
-            found[kind] = int(pairs[int(np.argmax(score))])
+            found[kind] = int(max(pairs, key=lambda pair: _clear(kind, depth[:, pair], rate[:, pair], depth[-1].max())))
     return found
 
 
-def _second_depth(depth: Array, rate: Array) -> float:
-    """The smaller of what a pair's two spells wear off: both can be seen where it is large."""
-    share = second_spell(depth, rate)
-    return float(min(share, 1 - share) * depth[-1])
+def _clear(kind: str, depth: Array, rate: Array, deepest: float) -> float:
+    """How well a pair shows its kind."""
+    if kind == STOPS:
+        return float(min(depth[-1], deepest / 2) / deepest - rate[-1] / rate.max())
+    if kind == COMPLEX:  # both spells are large
+        share = second_spell(depth, rate)
+        return float(min(share, 1 - share) * depth[-1])
+    return float(depth[-1])
 
 
 def telling_line(lines: Sequence[WearLine], contact: str) -> WearLine:
