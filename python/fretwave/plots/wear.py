@@ -130,7 +130,10 @@ def _map(axes: Axes, cycles: Array, lines: Sequence[WearLine], values: Array, le
     amplitude = amplitudes(lines)[0]
     filled = axes.contourf(cycles, amplitude, values, levels, cmap="viridis")
     for value, line in zip(amplitude, lines):
-        axes.plot(line.jumps, np.full(len(line.jumps), value), "|", color=style.RED, markersize=9, markeredgewidth=1.6)
+        if len(line.jumps):
+            axes.plot(
+                line.jumps, np.full(len(line.jumps), value), "|", color=style.RED, markersize=9, markeredgewidth=1.6
+            )
     axes.hlines(amplitude, cycles[0], cycles[-1], color="white", linewidth=0.6, alpha=0.7)
     axes.set_facecolor("#e8e8e8")
     axes.grid(False)
