@@ -73,6 +73,13 @@ def test_volumes_of_faces_are_depth_times_area(run):
     assert np.sum(edges.values * np.diff(edges.edges)) == pytest.approx(1e9 * 2e-4 * depth.sum())
 
 
+def test_the_summary_says_cycles_and_volume(folder, run, capfd):
+    assert call("show", folder) == 0
+    line = next(text for text in capfd.readouterr().out.splitlines() if text.startswith("one"))
+    columns = run.analyses["one"].columns
+    assert "2.5e-06 m, 8 cycles" in line and f"worn {1e9 * columns['worn_1'][-1]:.3g} mm^3" in line
+
+
 def test_histories_name_the_kinds_that_are_there_and_those_that_are_not(run):
     analysis = run.analyses["one"]
     (line,) = wear_lines.lines_of(analysis)
