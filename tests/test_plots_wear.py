@@ -62,6 +62,13 @@ def test_the_map_is_cut_where_its_legend_says(folder, run):
     assert figure.axes[0].get_ylabel() == "Modal amplitude of tip [µm]"
 
 
+def test_volumes_of_wide_range_are_logarithmic():
+    linear, norm = wear._volume_levels(np.array([[0.0, 0.1], [0.0, 2.0]]))
+    assert norm is None and linear[0] == 0.0 and linear[-1] >= 2.0
+    levels, norm = wear._volume_levels(np.array([[0.0, 0.0], [0.0, 0.019], [0.0, 22.3]]))
+    assert norm is not None and levels == pytest.approx([d * 10.0**k for k in range(-2, 2) for d in (1, 2, 5)])
+
+
 def test_volumes_of_faces_are_depth_times_area(run):
     analysis = run.analyses["one"]
     figure = wear.draw_volume(analysis, wear_lines.lines_of(analysis))

@@ -13,8 +13,8 @@ from .data import Analysis, Array, Run, Table
 MM, MICRON = 1e3, 1e6
 #: of amplitudes, from which they are at least 0.1
 UNITS = ((1.0, "m"), (MM, "mm"), (MICRON, "µm"))
-#: a depth that grows by less than this share over the cycles that were left out stays as it is
-STAYS = 1e-2
+#: slack of the rule by which wear has stopped: each amplitude has its own scale of the normal load, the first is kept
+SLACK = 2.0
 #: shares of the deepest depth, and of a pair's own largest rate, that count as nothing
 UNWORN, STOPPED = 1e-3, 0.05
 #: a second spell begins when the rate at least doubles after a fall below this share of what it was, and counts when
@@ -72,7 +72,7 @@ def lines_of(wear: Analysis) -> list[WearLine]:
     for number in np.unique(numbers):
         rows = np.flatnonzero(numbers == number)
         left = last - float(wear.columns["cycles"][rows[-1]])
-        held = left > 0 and _stays(fields, rows[-1], unit * left)
+        held = left > 0 and _has_stopped(wear, fields["rate"], rows[-1], unit * left)
         rows = np.append(rows, rows[-1]) if held else rows
         columns = {key: values[rows] for key, values in wear.columns.items()}
         if held:
@@ -83,10 +83,12 @@ def lines_of(wear: Analysis) -> list[WearLine]:
     return sorted(found, key=lambda line: line.amplitude)
 
 
-def _stays(fields: dict[str, Table], row: int, vibrations: float) -> bool:
-    """Whether the rates of a row leave the depths as they are over so many vibration cycles."""
-    deepest = max(float(depth[row].max(initial=0.0)) for depth in fields["depth"].values())
-    return all(float(rate[row].max(initial=0.0)) * vibrations <= STAYS * deepest for rate in fields["rate"].values())
+def _has_stopped(wear: Analysis, rates: Table, row: int, vibrations: float) -> bool:
+    """The march's own rule: up to the last cycle no pair loses more than the tolerance of the mean normal load."""
+    lost = float(wear.attributes["tolerance"]) * float(wear.attributes["load_scale"])
+    case = wear.attributes["case"]
+    stiffness = {name: np.asarray(case[f"contact.{name}.normal_stiffness"]) for name in rates}
+    return all((stiffness[name] * rate[row] * vibrations <= SLACK * lost).all() for name, rate in rates.items())
 
 
 def wears(run: Run) -> Iterator[tuple[Analysis, list[WearLine]]]:
