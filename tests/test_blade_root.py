@@ -205,6 +205,29 @@ def test_case_goes_from_stick_to_slip(tmp_path):
     assert len(report["relative"]) == 3 and 0 < report["relative"][0] < 1e-5
 
 
+def test_wear_of_the_flanks(tmp_path):
+    """The paper's figures 13 to 16: damping rises, then falls; flanks wear unequally; some pairs never wear, some stop,
+    others go on while the load moves to those that stick."""
+    hook = sys.excepthook
+    arguments = ["run", str(FOLDER / "case.toml"), "--quick", "--only", "wear_profile", "--no-plots"]
+    assert main([*arguments, "--out", str(tmp_path)]) == 0
+    sys.excepthook = hook
+    with h5py.File(tmp_path / "results.h5") as file:
+        wear = file["wear_profile"]
+        points = {name: data[()] for name, data in wear["points"].items()}
+        depth, rate, load = (wear[f"{name}_root"][()] for name in ("depth", "rate", "load"))
+    assert np.abs(points["energy_error"]).max() < 1e-8
+    assert (np.diff(depth, axis=0) >= 0).all() and (np.diff(points["frequency_hz"]) < 0).all()
+    top = int(np.argmax(points["zeta"]))
+    assert 1.08 * points["zeta"][0] < points["zeta"][top] and points["zeta"][-1] < 0.95 * points["zeta"][top]
+    assert points["worn_2"][-1] > 1.1 * points["worn_1"][-1]
+    never = depth[-1] == 0
+    share = rate[-1] / np.maximum(rate.max(axis=0), np.finfo(float).tiny)
+    assert 5 < never.sum() < 24 and (rate[:, never] == 0).all()
+    assert (~never & (share < 0.1)).sum() > 5 and (~never & (share > 0.4)).sum() > 5
+    assert load[-1][never].mean() > 1.5 * load[0].mean() > 3 * load[-1][~never].mean()
+
+
 def test_rotation_stiffens_the_bending():
     """omega^2 = omega_0^2 + B Omega^2, B = 1.193 + 1.570 R / L - 1 for a uniform cantilever on a hub of radius R that
     bends in the plane of rotation (Putter and Manor, J. Sound Vib. 56, 1978); this one is tapered, twisted, on a neck.

@@ -11,6 +11,8 @@ from test_krylov import ROOT, blade, mode, preloaded
 import fretwave as fw
 from fretwave.steppers import STEPPERS
 
+pytestmark = pytest.mark.ranks(1)
+
 #: REFERENCE: one Jenkins node at imposed amplitude, the normal load constant over a period.
 A, B, C, P0 = 1.0, 0.5, 4e-3, 1.5
 
@@ -174,6 +176,7 @@ def test_derivative_by_the_gap_is_exact(law, method):
         assert np.allclose(found, difference, rtol=0, atol=1e-7 * np.abs(found).max())
 
 
+@pytest.mark.ranks(1, 2)
 def test_worn_depth_is_gap(comm):
     """The residual of worn pairs is that of pairs with the gap, and new depths take the place of old ones."""
     q = np.random.default_rng(0).uniform(-1, 1, (3, 7))
@@ -214,6 +217,7 @@ def test_predictor_is_the_tangent(comm, route):
     assert np.allclose((sides[0] - sides[1]) / (2 * step), tangent, rtol=0, atol=2e-4 * np.abs(tangent).max())
 
 
+@pytest.mark.ranks(1, 2)
 @pytest.mark.parametrize("method", ["CNM", "EPMC"])
 def test_energy_of_a_period_is_in_balance(comm, method):
     """Contact takes 2 pi beta w sum n^3 q^H M q (CNM) or 2 pi zeta w0^2 sum n^2 q^H M q (EPMC) less what C takes,
@@ -251,12 +255,12 @@ def test_energy_of_a_period_is_in_balance(comm, method):
         assert contact_work == pytest.approx(balance, rel=1e-8)
 
 
-@pytest.mark.ranks(1, 2, 3)
-@pytest.mark.parametrize("stepper", ["heun", "bogacki_shampine", "tr_bdf2"])
+@pytest.mark.ranks(1, 2)
+@pytest.mark.parametrize("stepper", ["heun", "tr_bdf2"])
 def test_wear_of_a_blade(comm, stepper):
     """Depths never fall, pairs that always stick do not wear, work and release of energy balance all along."""
     mode, y = worn_blade(comm)
-    march = fw.Wear(mode, y, CYCLES, fw.WearControl(stepper, 1e-3))
+    march = fw.Wear(mode, y, CYCLES, fw.WearControl(stepper, 1e-2, pressure_change=0.3))
     depths, stuck = [], np.ones(6, dtype=bool)
     for point in march:
         depths.append(point.state.depth.copy())
