@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -61,6 +62,13 @@ def test_the_map_is_cut_where_its_legend_says(folder, run):
     assert figure.axes[0].get_ylabel() == "Modal amplitude of tip [µm]"
 
 
+def test_volumes_of_wide_range_are_logarithmic():
+    linear, norm = wear._volume_levels(np.array([[0.0, 0.1], [0.0, 2.0]]))
+    assert norm is None and linear[0] == 0.0 and linear[-1] >= 2.0
+    levels, norm = wear._volume_levels(np.array([[0.0, 0.0], [0.0, 0.019], [0.0, 22.3]]))
+    assert norm is not None and levels == pytest.approx([d * 10.0**k for k in range(-2, 2) for d in (1, 2, 5)])
+
+
 def test_volumes_of_faces_are_depth_times_area(run):
     analysis = run.analyses["one"]
     figure = wear.draw_volume(analysis, wear_lines.lines_of(analysis))
@@ -70,6 +78,13 @@ def test_volumes_of_faces_are_depth_times_area(run):
     assert upper.lines[0].get_ydata()[-1] == pytest.approx(1e9 * 2e-4 * depth.sum())
     edges = lower.patches[0].get_data()
     assert np.sum(edges.values * np.diff(edges.edges)) == pytest.approx(1e9 * 2e-4 * depth.sum())
+
+
+def test_the_summary_says_cycles_and_volume(folder, run, capfd):
+    assert call("show", folder) == 0
+    line = next(text for text in capfd.readouterr().out.splitlines() if text.startswith("one"))
+    columns = run.analyses["one"].columns
+    assert "2.5e-06 m, 8 cycles" in line and f"worn {1e9 * columns['worn_1'][-1]:.3g} mm^3" in line
 
 
 def test_histories_name_the_kinds_that_are_there_and_those_that_are_not(run):
@@ -104,6 +119,19 @@ def test_a_line_that_ended_early_while_wearing_is_blank_behind_its_end():
     line = wear_lines.WearLine(1.0, {"cycles": np.array([0.0, 1.0, 2.0])}, {}, {}, {})
     found = line.at(np.array([1.0, 2.0, 4.0]), np.array([0.5, 2.0, 2.5]))
     assert found[:2] == pytest.approx([1.5, 4.0]) and np.isnan(found[2])
+
+
+def test_jumps_are_marked(run):
+    analysis = run.analyses["one"]
+    (line,) = wear_lines.lines_of(analysis)
+    assert len(line.jumps) == 0
+    figure = wear.draw_modal(analysis, [replace(line, jumps=np.array([3.0, 5.0]))])
+    names = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+    assert names == ["a = 2.5 µm", wear.JUMP]
+    lines = [replace(line, amplitude=a, jumps=np.full(k, 4.0)) for k, a in enumerate((1e-6, 2e-6, 3e-6))]
+    figure = wear.draw_modal_map(analysis, lines)
+    assert figure._suptitle.get_text().endswith(f"red marks: {wear.JUMP}")
+    assert sum(len(mark.get_xdata()) for mark in figure.axes[0].lines) == 3
 
 
 @pytest.mark.parametrize(

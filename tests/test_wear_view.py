@@ -40,7 +40,9 @@ def test_steps_are_the_points_of_the_largest_amplitude(run, capfd):
     assert call("view", run, "--analysis", "wear", "--scale", "1000") == 0
     path = run / "wear_wear.vtkhdf"
     table, fields = line_of(run, 2)
-    assert f"amplitude 3e-06 m, {len(table['cycles'])} steps to 8 wear cycles" in capfd.readouterr().out
+    said, (first, *_, last) = capfd.readouterr().out, table["point"].astype(int)
+    assert f"amplitude 3e-06 m, {len(table['cycles'])} steps to 8 wear cycles" in said
+    assert f"with its pairs at the points {first}, " in said and f", {last}\n" in said
     with h5py.File(path) as file:
         assert file["VTKHDF/Steps/Values"][()].tolist() == table["cycles"].tolist()
         assert file["VTKHDF/Steps"].attrs["NSteps"] == len(table["cycles"]) > 5

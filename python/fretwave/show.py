@@ -79,12 +79,19 @@ def describe(name: str, group: Any) -> tuple[str, ...]:
 def _range(table: dict[str, Any]) -> str:
     key, unit = ("frequency_hz", "Hz") if "level" in table else ("amplitude", "m")
     values = table.get(key, np.empty(0))
-    return f"{values.min():.4g} - {values.max():.4g} {unit}" if len(values) else ""
+    if not len(values):
+        return ""
+    one = "cycles" in table and np.ptp(values) <= 1e-9 * values.max()
+    text = f"{values.max():.4g} {unit}" if one else f"{values.min():.4g} - {values.max():.4g} {unit}"
+    return f"{text}, {table['cycles'].max():.4g} cycles" if "cycles" in table else text
 
 
 def _largest(table: dict[str, Any]) -> str:
     if "zeta" in table and "omega0" in table and len(table["zeta"]):
         top = int(np.argmax(table["zeta"]))
+        if "cycles" in table:
+            worn = 1e9 * np.sum([table[name] for name in table if name.startswith("worn_")], axis=0).max()
+            return f"zeta {100 * table['zeta'][top]:.3g} %, {table['cycles'][top]:.3g} cycles; worn {worn:.3g} mm^3"
         return f"zeta {100 * table['zeta'][top]:.3g} %, {table['amplitude'][top]:.4g} m"
     if "level" in table and len(table["amplitude"]):
         top = int(np.argmax(table["amplitude"]))

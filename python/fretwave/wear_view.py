@@ -69,8 +69,10 @@ def view_wear(folder: Path, case: Case, name: str, options: ViewOptions, say: Ca
             amplitude, cycles = (file[name]["points"][key][rows[-1]] for key in ("amplitude", "cycles"))
             say(f"{display(path)}: amplitude {amplitude:.6g} m, {len(rows)} steps to {cycles:.6g} wear cycles")
             say(f"  {sum(contact.n_pairs for contact in placed.values())} contact pairs; warp draws depths x {scale:g}")
+            whole = ", ".join(str(row) for row in file[name]["reported"][()] if row in rows)
+            say(f"  `--point N` shows the motion at a point, with its pairs at the points {whole}")
             written.append(path)
-    say(f"`--point N` shows the motion at a point; ParaView (5.12 or later): time is the wear cycle of {name}")
+    say("ParaView (5.12 or later): time is the wear cycle")
     return written
 
 

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import ListedColormap, Normalize
+from matplotlib.colors import ListedColormap, LogNorm, Normalize
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from . import style
 from .data import Analysis, Array, Run
@@ -23,6 +23,9 @@ GRID = 3
 CUTS = (0.0, 1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0)
 #: columns and levels of a map
 COLUMNS, LEVELS = 240, 14
+#: volumes that differ by more than this go on logarithmic scales, of this range
+WIDE, DECADES = 100.0, 1e3
+JUMP = "the mode jumps to another sheet"
 MODAL = {"frequency_hz": ("Frequency", "Hz", 1.0), "zeta": ("Damping ratio", "%", 100.0)}
 
 
@@ -47,7 +50,7 @@ def draw_modal_map(wear: Analysis, lines: Sequence[WearLine]) -> Figure:
     axes[1, 0].set_xlabel(cycle_label(wear))
     axes[1, 1].set_xlabel(label)
     axes[0, 1].legend(title="wear cycles", ncols=2, fontsize=9, loc="best")
-    _heading(figure, wear)
+    _heading(figure, wear, lines)
     return figure
 
 
@@ -65,13 +68,16 @@ def draw_modal(wear: Analysis, lines: Sequence[WearLine]) -> Figure:
                 text = f"largest: {values[top]:.3g} % after {line.cycles[top]:.3g}"
                 plane.annotate(text, (line.cycles[top], values[top]), (0, 8), textcoords="offset points", fontsize=10)
                 plane.margins(y=0.18)
+        for cycle in lines[0].jumps if shares else ():
+            plane.axvline(cycle, color=style.RED, linewidth=1.0, linestyle=":", label=JUMP)
         plane.set_ylabel(style.label(name, unit))
     if shares:
         _shares(axes[2], lines[0])
-    axes[0].legend(loc="best")
+    handles, names = axes[0].get_legend_handles_labels()
+    axes[0].legend(*zip(*dict(zip(names, zip(handles, names))).values()), loc="best")
     axes[-1].set_xlabel(cycle_label(wear))
     axes[-1].set_xlim(0.0, _last(lines))
-    _heading(figure, wear)
+    _heading(figure, wear, lines)
     return figure
 
 
@@ -81,21 +87,25 @@ def draw_volume_map(wear: Analysis, lines: Sequence[WearLine]) -> Figure:
     figure, axes = style.new_figure(7.2, rows=2, columns=len(faces), sharex=True, sharey="row", squeeze=False)
     cycles = np.linspace(0.0, _last(lines), COLUMNS)
     values = {face: np.stack([line.at(MM**3 * line.columns[face], cycles) for line in lines]) for face in faces}
-    levels = _levels(np.stack(list(values.values())))
+    levels, norm = _volume_levels(np.stack(list(values.values())))
     amplitude, unit = amplitudes(lines)
     scale = ScalarMappable(Normalize(amplitude[0], amplitude[-1]), ListedColormap(style.shades(256)))
     for (upper, lower), (face, name) in zip(axes.T, faces.items()):
-        filled = _map(upper, cycles, lines, values[face], levels)
+        filled = _map(upper, cycles, lines, values[face], levels, norm)
         upper.set_title(name)
         for line, colour in zip(lines, scale.to_rgba(amplitude)):
             lower.plot(line.cycles, MM**3 * line.columns[face], color=colour)
-    figure.colorbar(filled, ax=axes[0, :], label=style.label("Worn volume", "mm³"), pad=0.02)
+    look = {"format": FuncFormatter(lambda x, _: f"{x:g}"), "label": style.label("Worn volume", "mm³"), "pad": 0.02}
+    figure.colorbar(filled, ax=axes[0, :], ticks=None if norm is None else levels, **look)
+    if norm is not None:
+        axes[1, 0].set(yscale="log", ylim=(levels[0], 1.3 * max(volumes.max() for volumes in values.values())))
+        axes[1, 0].yaxis.set_major_formatter(look["format"])
     bar = figure.colorbar(scale, ax=axes[1, :], label=f"Modal amplitude [{unit}]", pad=0.02)
     bar.ax.hlines(amplitude, 0, 1, transform=bar.ax.get_yaxis_transform(), color="white")
     axes[0, 0].set_ylabel(amplitude_label(wear, unit))
     axes[1, 0].set_ylabel(style.label("Worn volume", "mm³"))
     figure.supxlabel(cycle_label(wear), fontsize=11)
-    _heading(figure, wear)
+    _heading(figure, wear, lines)
     return figure
 
 
@@ -117,14 +127,22 @@ def draw_volume(wear: Analysis, lines: Sequence[WearLine]) -> Figure:
     lower.set(xlim=(0.0, _last(lines)))
     lower.set_ylim(bottom=0.0)
     upper.legend(loc="best")
-    _heading(figure, wear)
+    _heading(figure, wear, lines)
     return figure
 
 
-def _map(axes: Axes, cycles: Array, lines: Sequence[WearLine], values: Array, levels: Array) -> Any:
+def _map(
+    axes: Axes, cycles: Array, lines: Sequence[WearLine], values: Array, levels: Array, norm: LogNorm | None = None
+) -> Any:
     """Filled contours over cycles and amplitude; thin lines where the amplitudes lie."""
     amplitude = amplitudes(lines)[0]
-    filled = axes.contourf(cycles, amplitude, values, levels, cmap="viridis")
+    low = np.maximum(values, 0.5 * levels[0]) if norm is not None else values  # no logarithm of zero
+    look = {"cmap": "viridis", "norm": norm, "extend": "neither" if norm is None else "min"}
+    filled = axes.contourf(cycles, amplitude, low, levels, **look)
+    mark = {"color": style.RED, "markersize": 9, "markeredgewidth": 1.6}
+    for value, line in zip(amplitude, lines):
+        if len(line.jumps):
+            axes.plot(line.jumps, np.full(len(line.jumps), value), "|", **mark)
     axes.hlines(amplitude, cycles[0], cycles[-1], color="white", linewidth=0.6, alpha=0.7)
     axes.set_facecolor("#e8e8e8")
     axes.grid(False)
@@ -155,6 +173,17 @@ def _levels(values: Array) -> Array:
     return np.asarray(MaxNLocator(LEVELS).tick_values(low, high if high > low else low + 1.0))
 
 
+def _volume_levels(values: Array) -> tuple[Array, LogNorm | None]:
+    """Levels of a map of volumes (..., n_lines, n_cycles); logarithmic where the last of the lines differ widely."""
+    last = np.nanmax(values, axis=-1)
+    high = float(last.max())
+    if high <= WIDE * float(last[last > 0].min(initial=high)):
+        return _levels(values), None
+    steps = np.outer(10.0 ** np.arange(np.floor(np.log10(high / DECADES)), 20), (1.0, 2.0, 5.0)).ravel()
+    levels = steps[: int(np.argmax(steps >= high)) + 1]
+    return levels, LogNorm(levels[0], levels[-1])
+
+
 def _last(lines: Sequence[WearLine]) -> float:
     return max(float(line.cycles[-1]) for line in lines)
 
@@ -165,7 +194,8 @@ def _faces(wear: Analysis) -> dict[str, str]:
     return {column: wear.long_name(column).replace("worn volume of ", "") for column in columns}
 
 
-def _heading(figure: Figure, wear: Analysis) -> None:
+def _heading(figure: Figure, wear: Analysis, lines: Sequence[WearLine]) -> None:
     coefficient = float(wear.attributes.get("wear_coefficient", np.nan))
-    figure.suptitle(f"Fretting wear ({wear.name}), $k_w$ = {power(coefficient)} 1/Pa", fontsize=11.5)
+    note = f"; red marks: {JUMP}" if len(lines) >= GRID and any(len(line.jumps) for line in lines) else ""
+    figure.suptitle(f"Fretting wear ({wear.name}), $k_w$ = {power(coefficient)} 1/Pa{note}", fontsize=11.5)
     figure.align_ylabels()

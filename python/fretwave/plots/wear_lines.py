@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -13,8 +13,8 @@ from .data import Analysis, Array, Run, Table
 MM, MICRON = 1e3, 1e6
 #: of amplitudes, from which they are at least 0.1
 UNITS = ((1.0, "m"), (MM, "mm"), (MICRON, "µm"))
-#: a depth that grows by less than this share over the cycles that were left out stays as it is
-STAYS = 1e-2
+#: slack of the rule by which wear has stopped: each amplitude has its own scale of the normal load, the first is kept
+SLACK = 2.0
 #: shares of the deepest depth, and of a pair's own largest rate, that count as nothing
 UNWORN, STOPPED = 1e-3, 0.05
 #: a second spell begins when the rate at least doubles after a fall below this share of what it was, and counts when
@@ -25,9 +25,9 @@ NEVER, STOPS, COMPLEX, ONWARDS = "never wears", "stops wearing", "wears again", 
 KINDS = {NEVER: style.GREY, STOPS: style.BLUE, COMPLEX: style.ORANGE, ONWARDS: style.GREEN}
 RULE = (
     f"never wears: under {100 * UNWORN:g} % of the deepest;"
-    f"  stops: the last rate is under {100 * STOPPED:g} % of its peak;  keeps wearing: all others;\n"
-    f"wears again: over {100 * SECOND:g} % of the depth comes in a second spell,"
-    f" when the rate at least doubles after it was under {100 * FALLEN:g} % of its peak"
+    f"  stops: the last rate is under {100 * STOPPED:g} % of its peak;\n"
+    f"wears again: over {100 * SECOND:g} % of the depth comes in a second spell, when the rate at least doubles\n"
+    f"after it was under {100 * FALLEN:g} % of its peak;  keeps wearing: all others"
 )
 
 
@@ -40,6 +40,8 @@ class WearLine:
     columns : of its table, (n,) each
     depth, rate, load : contact -> (n, n_pairs)
         Worn depth [m], its growth in a vibration cycle [m], mean normal force [N].
+    jumps : (n_jumps,)
+        Cycles at which the mode went over to another sheet.
     """
 
     amplitude: float
@@ -47,6 +49,7 @@ class WearLine:
     depth: Table
     rate: Table
     load: Table
+    jumps: Array = field(default_factory=lambda: np.empty(0))
 
     @property
     def cycles(self) -> Array:
@@ -69,20 +72,23 @@ def lines_of(wear: Analysis) -> list[WearLine]:
     for number in np.unique(numbers):
         rows = np.flatnonzero(numbers == number)
         left = last - float(wear.columns["cycles"][rows[-1]])
-        held = left > 0 and _stays(fields, rows[-1], unit * left)
+        held = left > 0 and _has_stopped(wear, fields["rate"], rows[-1], unit * left)
         rows = np.append(rows, rows[-1]) if held else rows
         columns = {key: values[rows] for key, values in wear.columns.items()}
         if held:
             columns["cycles"][-1] = last
+        jumps = np.array([wear.columns["cycles"][row] for row in rows if wear.events[row] == "jump"])
         parts = {key: {name: values[rows] for name, values in table.items()} for key, table in fields.items()}
-        found.append(WearLine(float(columns["amplitude"][0]), columns, **parts))
+        found.append(WearLine(float(columns["amplitude"][0]), columns, **parts, jumps=jumps))
     return sorted(found, key=lambda line: line.amplitude)
 
 
-def _stays(fields: dict[str, Table], row: int, vibrations: float) -> bool:
-    """Whether the rates of a row leave the depths as they are over so many vibration cycles."""
-    deepest = max(float(depth[row].max(initial=0.0)) for depth in fields["depth"].values())
-    return all(float(rate[row].max(initial=0.0)) * vibrations <= STAYS * deepest for rate in fields["rate"].values())
+def _has_stopped(wear: Analysis, rates: Table, row: int, vibrations: float) -> bool:
+    """The march's own rule: up to the last cycle no pair loses more than the tolerance of the mean normal load."""
+    lost = float(wear.attributes["tolerance"]) * float(wear.attributes["load_scale"])
+    case = wear.attributes["case"]
+    stiffness = {name: np.asarray(case[f"contact.{name}.normal_stiffness"]) for name in rates}
+    return all((stiffness[name] * rate[row] * vibrations <= SLACK * lost).all() for name, rate in rates.items())
 
 
 def wears(run: Run) -> Iterator[tuple[Analysis, list[WearLine]]]:
@@ -126,22 +132,25 @@ def second_spell(depth: Array, rate: Array) -> float:
 
 
 def examples(line: WearLine, contact: str) -> dict[str, int]:
-    """A pair of each kind there is: the deepest; of those that wear again the one that does so most."""
+    """A pair of each kind there is, a clear one: of those that stop a deep one with the smallest last rate."""
     depth, rate = line.depth[contact], line.rate[contact]
     found: dict[str, int] = {}
     words = np.array(kinds(depth, rate))
     for kind in KINDS:
         pairs = np.flatnonzero(words == kind)
         if len(pairs):
-            score = [_second_depth(depth[:, p], rate[:, p]) if kind == COMPLEX else depth[-1, p] for p in pairs]
-            found[kind] = int(pairs[int(np.argmax(score))])
+            found[kind] = int(max(pairs, key=lambda pair: _clear(kind, depth[:, pair], rate[:, pair], depth[-1].max())))
     return found
 
 
-def _second_depth(depth: Array, rate: Array) -> float:
-    """The smaller of what a pair's two spells wear off: both can be seen where it is large."""
-    share = second_spell(depth, rate)
-    return float(min(share, 1 - share) * depth[-1])
+def _clear(kind: str, depth: Array, rate: Array, deepest: float) -> float:
+    """How well a pair shows its kind."""
+    if kind == STOPS:
+        return float(min(depth[-1], deepest / 2) / deepest - rate[-1] / rate.max())
+    if kind == COMPLEX:  # both spells are large
+        share = second_spell(depth, rate)
+        return float(min(share, 1 - share) * depth[-1])
+    return float(depth[-1])
 
 
 def telling_line(lines: Sequence[WearLine], contact: str) -> WearLine:
