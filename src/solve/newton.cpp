@@ -245,7 +245,15 @@ Outcome Newton::solve(Vec y) {
   return {reason > 0, int(newton), int(linear), norm, text};
 }
 
+/// Behind a kink of the branch the last tangent can be a guess so bad that GMRES takes it for divergence.
 bool Newton::tangent(Vec y, Vec t) {
+  if (solve_tangent(y, t)) return true;
+  if (!preconditioner_) return false;
+  check(VecSet(t, 0));
+  return solve_tangent(y, t);
+}
+
+bool Newton::solve_tangent(Vec y, Vec t) {
   linearise(y);
   check(VecSet(right_side_, 0));
   set_last_entry(right_side_, 1);

@@ -40,6 +40,7 @@ class Newton {
   void choose_route(std::string const& prefix);
   void use_direct();
   void use_krylov();
+  bool solve_tangent(Vec y, Vec t);
   void linearise(Vec y);
   void count_iterations();
   bool at_rounding(Vec y);
