@@ -251,8 +251,16 @@ bool Newton::tangent(Vec y, Vec t) {
   return linear(y, right_side_, t);
 }
 
+/// Behind a kink of the branch the last tangent can be a guess so bad that GMRES takes it for divergence.
 bool Newton::linear(Vec y, Vec b, Vec x) {
   linearise(y);
+  if (solve_linear(b, x)) return true;
+  if (!preconditioner_) return false;
+  check(VecSet(x, 0));
+  return solve_linear(b, x);
+}
+
+bool Newton::solve_linear(Vec b, Vec x) {
   KSP ksp;
   KSPConvergedReason reason;
   check(SNESGetKSP(snes_, &ksp));

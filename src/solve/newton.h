@@ -42,6 +42,7 @@ class Newton {
   void choose_route(std::string const& prefix);
   void use_direct();
   void use_krylov();
+  bool solve_linear(Vec b, Vec x);
   void linearise(Vec y);
   void count_iterations();
   bool at_rounding(Vec y);
