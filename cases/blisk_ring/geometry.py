@@ -57,7 +57,7 @@ class Options:
     interface_diameters: tuple[int, ...] = (0, 4, 18)  #: whose waves give the interface modes
     interface_waves: int = 7  #: of each, stuck and sliding
     interface_tolerance: float = 1e-5  #: singular values kept, over the largest
-    component_modes: int = 30
+    component_modes: int = 40
 
     @property
     def material(self) -> fe.Material:

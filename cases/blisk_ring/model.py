@@ -242,19 +242,27 @@ def reduced(cache: Union[Path, str, None] = "default", **options: Any) -> dict[s
 
 
 def compute(o: Options) -> dict[str, Any]:
-    """Interface modes and Craig-Bampton (`fretwave.reduce_sector`)."""
+    """Interface modes and Craig-Bampton (`fretwave.reduce_sector`).
+
+    Of the contact only relative displacements are kept, half as many as dofs: the component modes are those of the
+    sector whose ring sticks.
+    """
     model = full(**asdict(o))
+    T = relative_coordinates(model)
+    M, K, B = T.T @ model["M"] @ T, T.T @ model["K"] @ T, sp.csr_matrix(model["B"] @ T)
+    B.data[abs(B.data) < 1e-12] = 0
+    B.eliminate_zeros()
     given = {
         **contact_parameters(replace(o, speed_rpm=1.0), model),
         "friction_coefficient": 1.0,
     }  # only stiffness counts
     with fw.reduce_sector(
-        model["M"],
-        model["K"],
+        M,
+        K,
         model["low"],
         model["high"],
         o.blades,
-        contacts=[fw.Contact("coulomb_3d", model["B"], given)],
+        contacts=[fw.Contact("coulomb_3d", B, given)],
         keep=[model["tip"]],
         axis="z",
         interface_diameters=o.interface_diameters,
@@ -263,13 +271,28 @@ def compute(o: Options) -> dict[str, Any]:
         modes=o.component_modes,
         comm=MPI.COMM_SELF,
     ) as reduction:
-        expand = reduction.expand(np.eye(reduction.size))
+        expand = T @ reduction.expand(np.eye(reduction.size))
     small = {letter: sp.csr_matrix(getattr(reduction, letter)) for letter in "MK"}
     small |= dict(
         B=by_sector(reduction.contacts[0].B)[0], K_blade=sp.csr_matrix(expand.T @ (model["K_blade"] @ expand))
     )
     small |= dict(low=reduction.low, high=reduction.high, tip=reduction.places[model["tip"]], expand=expand)
     return {**model, **small, "unreduced": model["M"].shape[0]}
+
+
+def relative_coordinates(model: dict[str, Any]) -> sp.csr_matrix:
+    """x = T z: in place of the ring's dofs at the pairs their displacements against the groove, in the pairs' frames.
+
+    B x = frame (x_ring - x_groove), node to node, hence x_ring = x_groove + frame^T u.
+    """
+    B = model["B"].tocoo()
+    ring = np.repeat(model["free"] >= model["disk_nodes"], 3)[B.col]
+    mine = sp.csr_matrix((B.data[ring], (B.row[ring], B.col[ring])), B.shape)
+    other = sp.csr_matrix((B.data[~ring], (B.row[~ring], B.col[~ring])), B.shape)
+    contact = np.unique(B.col[ring])
+    unit = sp.csr_matrix((np.ones(len(contact)), (contact, np.arange(len(contact)))), (B.shape[1], len(contact)))
+    own = sp.identity(B.shape[1]) - unit @ unit.T
+    return sp.csr_matrix(own + mine.T @ (unit[:, : B.shape[0]].T - other))
 
 
 def blade_modes(model: dict[str, Any], count: int = 6) -> tuple[Array, Array, Any]:

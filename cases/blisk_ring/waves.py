@@ -102,8 +102,8 @@ def summary(table: list[dict[str, float]]) -> str:
     return (
         f"mu {peak['friction']:.2f}: slip from a = {onset['amplitude']:.3e} m, "
         f"lowest {lowest['frequency_hz']:.2f} Hz at {lowest['amplitude']:.3e} m, "
-        f"largest zeta {100 * peak['zeta']:.4f} % at {peak['amplitude']:.3e} m, last {table[-1]['frequency_hz']:.2f} Hz, "
-        f"{100 * table[-1]['open']:.0f} % open"
+        f"largest zeta {100 * peak['zeta']:.4f} % at {peak['amplitude']:.3e} m, "
+        f"last {table[-1]['frequency_hz']:.2f} Hz, {100 * table[-1]['open']:.0f} % open"
     )
 
 

@@ -284,8 +284,8 @@ std::unique_ptr<solve::Preconditioner> HarmonicProblem::preconditioner(std::stri
 }
 
 /// Motion counts relative to its own size, so that a step is a share of it whatever the mesh. The mean of a
-/// vibration does not count: what little holds a part in place by friction (a ring in its groove) lets it drift
-/// far and turn back wherever a sample changes between stick and slip, while the branch itself goes on.
+/// vibration does not count: what little holds a part in place by friction (a ring in its groove) lets it
+/// drift far and turn back wherever a sample changes between stick and slip, while the branch itself goes on.
 void HarmonicProblem::metric(Vec y, Vec weights) {
   const PetscInt m = harmonics().block_size();
   const PetscInt mean = harmonics().orders()[0] == 0 && m > 1 ? 1 : 0;
