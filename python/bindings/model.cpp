@@ -60,7 +60,8 @@ void bind_model(nb::module_& m) {
   using model::Model;
   using Terms = std::vector<std::tuple<Petsc<Mat>, int, int>>;
   using Maps = std::vector<std::tuple<Petsc<Mat>, int>>;  // B of the own sector first
-  using Contacts = std::vector<std::tuple<std::string, Maps, std::shared_ptr<contact::Law>, std::vector<int>>>;
+  using Contacts =
+      std::vector<std::tuple<std::string, Maps, std::shared_ptr<contact::Law>, std::vector<int>>>;
   nb::class_<Model>(m, "Model")
       .def(
           "__init__",

@@ -28,8 +28,8 @@ void Border::make(Solve solve, std::vector<Local> const& columns, std::vector<Lo
   for (size_t k = 0; k < S.size(); ++k) S[k] -= RAC[k];
   inverse_S_ = std::move(S);
   if (const int info = lapack::invert(inverse_S_, int(rows_.size())))
-    throw InputError("the border of the preconditioner is singular", "LAPACK info " + std::to_string(info), "0",
-                     "start from a mode in which the chosen dof moves");
+    throw InputError("the border of the preconditioner is singular", "LAPACK info " + std::to_string(info),
+                     "0", "start from a mode in which the chosen dof moves");
 }
 
 void Border::apply(double const* x, double* z) const {

@@ -26,10 +26,10 @@ void CyclicInverse::invert(size_t wave, CirculantBlocks<complex> const& blocks) 
     for (size_t i = 0; i < P.size(); ++i) P[i] += t * A[i];
   }
   if (const int info = lapack::invert(P, n_))
-    throw InputError("a nodal diameter's block of the wheel's preconditioner is singular",
-                     "nodal diameter " + std::to_string(waves_[wave].diameter) + ", LAPACK info " +
-                         std::to_string(info),
-                     "0", "check the wheel for free motions at this harmonic");
+    throw InputError(
+        "a nodal diameter's block of the wheel's preconditioner is singular",
+        "nodal diameter " + std::to_string(waves_[wave].diameter) + ", LAPACK info " + std::to_string(info),
+        "0", "check the wheel for free motions at this harmonic");
   std::copy(P.begin(), P.end(), inverses_.begin() + at_[wave]);
 }
 

@@ -14,8 +14,8 @@ using CirculantBlocks = std::map<int, std::vector<T>>;
 
 /// Inverses of block-circulant matrices, one a harmonic, for the waves of this rank: a wave's block is
 /// P_d = sum_k A_k e^{2 pi i k d / N} (Thomas, Int. J. Numer. Methods Eng. 14, 1979). Of matrices with
-/// A_-k = A_k^T, P_{N-d} = P_d^T, half of them are made and kept. In single precision, because reading them is
-/// what an application costs.
+/// A_-k = A_k^T, P_{N-d} = P_d^T, half of them are made and kept. In single precision, because reading them
+/// is what an application costs.
 class CyclicInverse {
  public:
   CyclicInverse(std::vector<Wave> const& waves, int sectors, int n, bool symmetric);

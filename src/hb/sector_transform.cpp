@@ -46,7 +46,7 @@ void SectorTransform::for_runs(int columns_of, int waves_of, Visit visit) const 
 }
 
 std::vector<complex> SectorTransform::exchange(std::vector<complex> const& out, Counts const& sent,
-                                                Counts const& received) const {
+                                               Counts const& received) const {
   if (size_ == 1) return out;
   Counts from(size_, 0), to(size_, 0);
   std::exclusive_scan(sent.begin(), sent.end(), from.begin(), 0);

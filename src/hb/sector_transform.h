@@ -29,7 +29,8 @@ class SectorTransform {
   int first_sector(int rank) const { return first_sector_[rank]; }
   /// This rank's waves. The same for every number of items.
   std::vector<Wave> const& waves() const { return waves_[rank_]; }
-  /// in: own sectors x harmonics x items; returns own waves x items, sum_j x_j e^{-2 pi i j d / N}. Collective.
+  /// in: own sectors x harmonics x items; returns own waves x items, sum_j x_j e^{-2 pi i j d / N}.
+  /// Collective.
   std::vector<complex> to_waves(std::span<complex const> in) const;
   /// Its inverse. Collective.
   std::vector<complex> to_sectors(std::span<complex const> in) const;
@@ -46,7 +47,7 @@ class SectorTransform {
   int local_sectors(int rank) const { return first_sector_[rank + 1] - first_sector_[rank]; }
   std::pair<int, int> common(int columns_of, int harmonic) const;
   std::vector<complex> exchange(std::vector<complex> const& out, Counts const& sent,
-                                 Counts const& received) const;
+                                Counts const& received) const;
   template <class Visit>
   void for_runs(int columns_of, int waves_of, Visit visit) const;
   Counts by_rank(bool waves) const;

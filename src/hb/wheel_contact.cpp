@@ -71,7 +71,8 @@ void WheelContact::find_entries(HarmonicProblem const& problem) {
     });
   }
   std::map<std::array<int, 3>, double> sum;
-  for (Entry const& b : gathered(std::span<Entry const>(mine), comm_)) sum[{b.row, b.ahead, b.dof}] += b.value;
+  for (Entry const& b : gathered(std::span<Entry const>(mine), comm_))
+    sum[{b.row, b.ahead, b.dof}] += b.value;
   for (auto const& [at, value] : sum) entries_.push_back({at[0], at[1], at[2], value});
 }
 

@@ -13,6 +13,10 @@ class WheelContact {
     int row, ahead, dof;  ///< of one sector; the dof is that of the sector `ahead`
     double value;
   };
+  struct Group {
+    size_t first_pair, end_pair;
+    int first_row, rows;
+  };
   /// Collective.
   WheelContact(HarmonicProblem const&, SectorTransform const&);
   int rows() const { return rows_; }
@@ -35,6 +39,10 @@ class WheelContact {
   void eliminate(std::vector<complex> const& G);
   /// f = E u; own sectors x harmonics x rows.
   std::vector<complex> apply(std::vector<complex> const& u) const;
+  /// Pairs that are eliminated together.
+  std::vector<Group> const& groups() const { return groups_; }
+  /// dD of a group in one of this rank's sectors, row-major.
+  std::vector<double> rest(int sector, Group const&) const;
   /// Harmonic coefficients that are eliminated together, at most.
   int largest_group() const;
 
@@ -43,16 +51,11 @@ class WheelContact {
     int first_row, components;
     size_t first_tangent;
   };
-  struct Group {
-    size_t first_pair, end_pair;
-    int first_row, rows;
-  };
   void find_entries(HarmonicProblem const&);
   void find_groups();
   complex tangent(Pair const& p, int harmonic, int r, int c) const {
     return tangents_[p.first_tangent + (size_t(harmonic) * p.components + r) * p.components + c];
   }
-  std::vector<double> rest(int sector, Group const&) const;
   void add_compliance(std::vector<complex> const& G, Group const&, std::vector<double> const& dD,
                       std::vector<double>& T) const;
 
@@ -60,14 +63,14 @@ class WheelContact {
   SectorTransform const& sectors_;
   MPI_Comm comm_;
   int own_sectors_, rows_ = 0;
-  std::vector<size_t> first_pair_;  ///< of each contact, in one sector
+  std::vector<size_t> first_pair_;         ///< of each contact, in one sector
   std::vector<std::vector<int>> numbers_;  ///< this rank's pairs of each contact, as the wheel counts them
   std::vector<Pair> pairs_;
   std::vector<Group> groups_;
   std::vector<Entry> entries_;
   std::vector<complex> tangents_;
   std::vector<std::vector<double>> D_;  ///< own sectors x pairs, row-major
-  std::vector<std::vector<double>> E_;   ///< own sectors x groups, row-major
+  std::vector<std::vector<double>> E_;  ///< own sectors x groups, row-major
 };
 
 }  // namespace fretwave::hb

@@ -3,21 +3,22 @@
 
 #include "hb/border.h"
 #include "hb/cyclic_inverse.h"
-#include "hb/wheel_contact.h"
+#include "hb/travelling_contact.h"
 #include "solve/preconditioner.h"
 
 namespace fretwave::hb {
 
 /// For whole wheels. A holds the harmonic blocks of the tuned wheel (terms and contact tangents averaged over
-/// the sectors), diagonal in waves; what the contact adds, B^T dD B, is eliminated sector by sector,
+/// the sectors), diagonal in waves; what the contact adds, B^T dD B, is eliminated,
 ///
 ///     q = A^-1 (x - B^T E B A^-1 x),  E = dD (I + G dD)^-1,
 ///
-/// with the compliance G that the sector's contact meets when all sectors move in the waves of the present
-/// motion: exact for a travelling wave on a tuned wheel, where one sector stands for all. The scalars come as
-/// a `Border`. A may be of another point of the branch, as in `CondensedPreconditioner`; that of the fundamental
-/// is made beside the point, where it is not singular. A mistuned wheel keeps its differences for the iteration.
-/// Ranks hold whole sectors, and share the waves among them.
+/// about a travelling wave by `TravellingContact`, exactly on a tuned wheel; about other motions sector by
+/// sector, with the compliance G that a sector meets when all move in the waves of the present motion. The
+/// scalars come as a `Border`. A may be of another point of the branch, as in `CondensedPreconditioner`; that
+/// of the fundamental is made beside the point, where it is not singular. A mistuned wheel keeps its
+/// differences for the iteration. Ranks hold whole sectors, and share the waves among them: no vector stands
+/// whole anywhere.
 class WheelPreconditioner : public solve::Preconditioner {
  public:
   /// `InputError` if the contact is not the same in all sectors.
@@ -37,7 +38,9 @@ class WheelPreconditioner : public solve::Preconditioner {
   void factorise(Exponents const&);
   CirculantBlocks<complex> blocks(int harmonic, Exponents const&) const;
   std::vector<double> spectrum(Vec y) const;
-  std::vector<complex> compliance(std::vector<double> const& shares) const;
+  std::vector<complex> compliances() const;
+  std::vector<complex> met(std::vector<double> const& shares) const;
+  void eliminate(Vec y);
   void make_border(Vec y, Vec row);
   std::vector<double> solve(double const* x) const;
   std::vector<complex> gather(double const* x) const;
@@ -55,6 +58,8 @@ class WheelPreconditioner : public solve::Preconditioner {
   std::vector<std::vector<complex>> B_;  ///< of own waves
   std::optional<CyclicInverse> inverse_;
   std::optional<Exponents> made_at_;
+  std::vector<complex> G_;  ///< B A^-1 B^H, own waves x contact rows x contact rows
+  std::optional<TravellingContact> travelling_;
   Border border_;
 };
 
