@@ -19,13 +19,16 @@ using CirculantBlocks = std::map<int, std::vector<T>>;
 class CyclicInverse {
  public:
   CyclicInverse(std::vector<Wave> const& waves, int sectors, int n, bool symmetric);
-  /// blocks(harmonic): A_k; asked for once for each harmonic of this rank. `InputError` if singular.
-  template <class Make>
-  void make(Make blocks) {
-    for (size_t w = 0; w < waves_.size();) {
-      const auto A = blocks(waves_[w].harmonic);
-      for (const int harmonic = waves_[w].harmonic; w < waves_.size() && waves_[w].harmonic == harmonic; ++w)
-        if (!transposed(w)) invert(w, A);
+  /// Of the waves with select(wave); a wave and its mirror are selected together. blocks(harmonic): A_k.
+  /// `InputError` if singular.
+  template <class Select, class Make>
+  void make(Select select, Make blocks) {
+    CirculantBlocks<complex> A;
+    int harmonic = -1;
+    for (size_t w = 0; w < waves_.size(); ++w) {
+      if (transposed(w) || !select(waves_[w])) continue;
+      if (waves_[w].harmonic != harmonic) A = blocks(harmonic = waves_[w].harmonic);
+      invert(w, A);
     }
   }
   /// V x for the leading `columns` entries of x, V the inverse of a wave's block.

@@ -140,14 +140,27 @@ CirculantBlocks<complex> WheelPreconditioner::blocks(int harmonic, Exponents con
   return out;
 }
 
-void WheelPreconditioner::factorise(Exponents const& at) {
-  Exponents e = at;
-  made_at_ = at;
-  if (problem_.scalar_count() > 1) e.s[problem_.harmonics().fundamental()] *= 1 + beside;
-  contact_.average(symmetric());
-  inverse_->make([&](int harmonic) { return blocks(harmonic, e); });
+/// The fundamental's blocks follow each point: where a family of modes is dense, some are nearly singular,
+/// and a small change matters. Those of the waves in the motion are made beside it.
+void WheelPreconditioner::factorise(Exponents const& e, std::vector<double> const& shares) {
+  const int first = problem_.harmonics().fundamental();
+  const auto moving = [&](Wave const& wave) {
+    return problem_.scalar_count() > 1 &&
+           std::max(shares[wave.diameter], shares[(sectors_ - wave.diameter) % sectors_]) > 0;
+  };
+  const auto at = [this](Exponents const& point) {
+    return [this, &point](int harmonic) { return blocks(harmonic, point); };
+  };
+  if (moved(e)) {
+    made_at_ = e;
+    contact_.average(symmetric());
+    inverse_->make([&](Wave const& wave) { return wave.harmonic != first; }, at(e));
+  }
+  Exponents shifted = e;
+  shifted.s[first] *= 1 + beside;
+  inverse_->make([&](Wave const& wave) { return wave.harmonic == first && !moving(wave); }, at(e));
+  inverse_->make([&](Wave const& wave) { return wave.harmonic == first && moving(wave); }, at(shifted));
   G_ = compliances();
-  travelling_.reset();
 }
 
 /// This rank's harmonic blocks as sectors x harmonics x places, q = qc - i qs.
@@ -217,18 +230,16 @@ std::vector<complex> WheelPreconditioner::met(std::vector<double> const& shares)
 }
 
 /// By waves about a travelling wave, sector by sector about any other motion. Collective.
-void WheelPreconditioner::eliminate(Vec y) {
-  const auto shares = spectrum(y);
+void WheelPreconditioner::eliminate(std::vector<double> const& shares) {
   const auto main = std::ranges::max_element(shares);
   if (*main < pure) {
     travelling_.reset();
     return contact_.eliminate(met(shares));
   }
   const int wave = int(main - shares.begin());
-  if (!travelling_ || travelling_->wave() != wave) {
+  if (!travelling_ || travelling_->wave() != wave)
     travelling_.emplace(contact_, problem_.harmonics(), local_sectors_, wave, problem_.comm());
-    travelling_->set_compliance(G_);
-  }
+  travelling_->set_compliance(G_);
   travelling_->eliminate();
 }
 
@@ -303,18 +314,20 @@ void WheelPreconditioner::build(Vec y, Vec row) {
   for (auto& contact : contacts)
     for (double& d : contact.D) d /= problem_.stiffness_scale();
   contact_.take(contacts);
-  if (moved(e)) factorise(e);
-  if (contact_.rows() > 0) eliminate(y);
+  const auto shares = spectrum(y);
+  factorise(e, shares);
+  if (contact_.rows() > 0) eliminate(shares);
   make_border(y, row);
 }
 
 void WheelPreconditioner::apply(Vec x, Vec z) { border_.apply(ReadArray(x).data(), WriteArray(z).data()); }
 
-/// Five applications for the border; the contact's elimination, 16/3 n^3 flops a sector at the speed of
-/// matrix products, against 8 n^2 of an application that are read from memory.
+/// Five applications for the border; the fundamental's inverses (n^3 flops) and the contact's elimination,
+/// 16/3 n^3 flops a sector, at the speed of matrix products, against 8 n^2 of an application that are read
+/// from memory.
 double WheelPreconditioner::build_cost() const {
-  const double size = 2.0 * contact_.largest_group() * harmonics_ / m_;
-  return 6 + 16.0 / 3 * size * size * size / 10 / (8.0 * unit_ * unit_ * harmonics_);
+  const double size = 2.0 * contact_.largest_group() * harmonics_ / m_, n = unit_;
+  return 6 + (4 * n * n * n + 16.0 / 3 * size * size * size) / 10 / (8.0 * n * n * harmonics_);
 }
 
 std::string WheelPreconditioner::describe() const {

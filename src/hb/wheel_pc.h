@@ -15,10 +15,10 @@ namespace fretwave::hb {
 ///
 /// about a travelling wave by `TravellingContact`, exactly on a tuned wheel; about other motions sector by
 /// sector, with the compliance G that a sector meets when all move in the waves of the present motion. The
-/// scalars come as a `Border`. A may be of another point of the branch, as in `CondensedPreconditioner`; that
-/// of the fundamental is made beside the point, where it is not singular. A mistuned wheel keeps its
-/// differences for the iteration. Ranks hold whole sectors, and share the waves among them: no vector stands
-/// whole anywhere.
+/// scalars come as a `Border`. A may be of another point of the branch, as in `CondensedPreconditioner`, but
+/// for the fundamental; there the waves of the motion are made beside the point, where they are not singular.
+/// A mistuned wheel keeps its differences for the iteration. Ranks hold whole sectors, and share the waves
+/// among them: no vector stands whole anywhere.
 class WheelPreconditioner : public solve::Preconditioner {
  public:
   /// `InputError` if the contact is not the same in all sectors.
@@ -35,12 +35,12 @@ class WheelPreconditioner : public solve::Preconditioner {
   void find_order();
   void find_contact_rows();
   bool moved(Exponents const&) const;
-  void factorise(Exponents const&);
+  void factorise(Exponents const&, std::vector<double> const& shares);
   CirculantBlocks<complex> blocks(int harmonic, Exponents const&) const;
   std::vector<double> spectrum(Vec y) const;
   std::vector<complex> compliances() const;
   std::vector<complex> met(std::vector<double> const& shares) const;
-  void eliminate(Vec y);
+  void eliminate(std::vector<double> const& shares);
   void make_border(Vec y, Vec row);
   std::vector<double> solve(double const* x) const;
   std::vector<complex> gather(double const* x) const;
