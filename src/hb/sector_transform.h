@@ -17,10 +17,9 @@ struct Wave {
 inline int share(int total, int part, int parts) { return int(PetscInt64(total) * part / parts); }
 
 /// Discrete Fourier transform over the sectors of a wheel whose ranks hold whole sectors, into waves of which
-/// each rank holds its share, d beside N - d. Two exchanges, between any number of ranks: sectors to columns
-/// (harmonic and item), whose transforms are local, and columns to waves. Harmonics are outermost in both, so
-/// that the second one stays among the few ranks that share a harmonic. Single precision travels, for
-/// preconditioners.
+/// each rank holds its share, d beside N - d, of every harmonic (the fundamental's cost more). Two exchanges,
+/// between any number of ranks: sectors to columns (harmonic and item), whose transforms are local, and
+/// columns to waves.
 class SectorTransform {
  public:
   /// local_sectors: of this rank, in rank order. Collective.
