@@ -1,8 +1,9 @@
 """What a whole wheel costs: time per point and memory over the number of sectors, against one sector, on ranks.
 
     OMP_NUM_THREADS=1 .venv/bin/python cases/wheel_benchmark.py growth
-    OMP_NUM_THREADS=1 .venv/bin/python cases/wheel_benchmark.py one --sectors 144 --cells 3 --harmonics 31
-    OMP_NUM_THREADS=1 mpirun -n 2 .venv/bin/python cases/wheel_benchmark.py one --sectors 36
+    OMP_NUM_THREADS=1 .venv/bin/python cases/wheel_benchmark.py one --sectors 150 --harmonics 15 --samples 128 \\
+        --start 8e-6 --stop 1.05e-5
+    OMP_NUM_THREADS=1 .venv/bin/python cases/wheel_benchmark.py ranks --sectors 36 --start 6e-5 --stop 1e-4
 
 A blisk of hexahedra whose rim rubs on a ground ring in 3-D contact; a travelling wave of N / 6 nodal diameters by the
 whole wheel (unfolded, Krylov) and by one sector. Sectors keep their size: the radius grows with their number. Times are
@@ -12,6 +13,7 @@ processor time of the slowest rank, the same as wall time on an idle machine.
 from __future__ import annotations
 
 import argparse
+import os
 import resource
 import subprocess
 import sys
@@ -142,9 +144,21 @@ def growth(options: argparse.Namespace) -> None:
     say(f"time ~ N^{np.polyfit(sectors, seconds, 1)[0]:.2f}, memory ~ N^{np.polyfit(sectors, memory, 1)[0]:.2f}")
 
 
+def ranks(options: argparse.Namespace) -> None:
+    """The wheel on 1 and 2 ranks: processor time of the slowest rank, and the same answer."""
+    seconds = []
+    for count in (1, 2):
+        command = ["mpirun", "-n", str(count), sys.executable, __file__, "one", *sys.argv[2:]]
+        # the environment as it was before this process called MPI_Init, whose marks would mislead mpirun
+        text = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True, env=dict(os.environ)).stdout
+        say(text.rstrip())
+        seconds.append(float(text.splitlines()[-1].split()[1]))
+    say(f"speed-up on 2 ranks: {seconds[0] / seconds[1]:.2f}")
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=["growth", "one"])
+    parser.add_argument("what", choices=["growth", "one", "ranks"])
     parser.add_argument("--sectors", type=int, default=24)
     parser.add_argument("--cells", type=int, default=2, help="of a third of the sector, each way")
     parser.add_argument("--harmonics", type=int, default=5)
@@ -153,7 +167,7 @@ def main() -> None:
     parser.add_argument("--stop", type=float, default=2e-4, help="[m]")
     parser.add_argument("--verbose", action="store_true")
     options = parser.parse_args()
-    {"growth": growth, "one": one}[options.what](options)
+    {"growth": growth, "one": one, "ranks": ranks}[options.what](options)
 
 
 if __name__ == "__main__":

@@ -14,6 +14,11 @@ void cgemv_(char const*, int const*, int const*, std::complex<float> const*, std
             int const*, std::complex<float> const*, int const*, std::complex<float> const*,
             std::complex<float>*, int const*);
 void dgesv_(int const*, int const*, double*, int const*, int*, double*, int const*, int*);
+void zgesv_(int const*, int const*, std::complex<double>*, int const*, int*, std::complex<double>*,
+            int const*, int*);
+void zgemv_(char const*, int const*, int const*, std::complex<double> const*, std::complex<double> const*,
+            int const*, std::complex<double> const*, int const*, std::complex<double> const*,
+            std::complex<double>*, int const*);
 void dgetrf_(int const*, int const*, double*, int const*, int*, int*);
 void dgetrs_(char const*, int const*, int const*, double const*, int const*, int const*, double*, int const*,
              int*);

@@ -17,12 +17,12 @@ ORDERS, SAMPLES = [1, 3, 5], 240  #: a multiple of the sectors: all see the kink
 REPORTS = [2e-5, 1e-4, 1.3e-4, 1e-3]  #: stick, slip onset, near the largest damping, slip
 
 
-def rubbing_blisk() -> fw.Sector:
+def rubbing_blisk(sectors: int = SECTORS) -> fw.Sector:
     """Tips that rub on those of the next blades, rims that rub on the ground."""
     ahead = {0: [[0, 0, -1.0]], 1: [[0, 0, 1.0]]}
     shroud = fw.Contact("jenkins", ahead, {"tangential_stiffness": 1e5, "friction_limit": 10.0}, "shroud")
     rim = fw.Contact("jenkins", [[1.0, 0, 0]], {"tangential_stiffness": 5e5, "friction_limit": 2.0}, "rim")
-    return lumped_blisk(SECTORS, [shroud, rim])
+    return lumped_blisk(sectors, [shroud, rim])
 
 
 def unfolded(wheel, start, method="CNM", prefix="mode_"):
@@ -174,7 +174,7 @@ def test_changes_that_do_not_fit_are_refused(comm):
             rubbing_blisk().wheel(comm, changes)
 
 
-@pytest.mark.ranks(1, 2, 3)
+@pytest.mark.ranks(1, 2, 3, 4)
 @pytest.mark.parametrize("method", ["CNM", "EPMC"])
 def test_the_krylov_route_finds_the_same_branch(comm, method):
     """The tuned wheel's blocks by nodal diameters precondition a tuned and a mistuned wheel."""
@@ -200,6 +200,22 @@ def test_the_krylov_route_finds_the_same_branch(comm, method):
             for direct, krylov in zip(found["direct"], found["krylov"]):
                 assert krylov["omega"] == pytest.approx(direct["omega"], rel=1e-9)
                 assert krylov["beta"] == pytest.approx(direct["beta"], rel=1e-9, abs=1e-9 * direct["omega"])
+
+
+@pytest.mark.ranks(1, 2)
+def test_iterations_do_not_grow_with_the_number_of_sectors(comm):
+    """About a travelling wave on a tuned wheel the preconditioner is exact, however many modes lie beside."""
+    PETSc.Options()["around_route"] = "krylov"
+    mean = {}
+    for sectors in (6, 24):
+        sector = rubbing_blisk(sectors)
+        with sector.model(sectors // 3, comm) as model, sector.wheel(comm) as wheel:
+            start = sector.around(fw.linear_modes(model, 1)[0], sectors // 3)
+            problem = unfolded(wheel, start, prefix="around_")
+            points = list(fw.Continuation(problem, problem.initial(1e-5), (1e-5, 1e-2)))
+            mean[sectors] = sum(p.linear for p in points) / sum(p.newton for p in points)
+    assert max(mean.values()) < 6
+    assert mean[24] < 1.5 * mean[6]
 
 
 def mode_of(wheel, method, prefix):

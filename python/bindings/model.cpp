@@ -60,7 +60,8 @@ void bind_model(nb::module_& m) {
   using model::Model;
   using Terms = std::vector<std::tuple<Petsc<Mat>, int, int>>;
   using Maps = std::vector<std::tuple<Petsc<Mat>, int>>;  // B of the own sector first
-  using Contacts = std::vector<std::tuple<std::string, Maps, std::shared_ptr<contact::Law>>>;
+  using Contacts =
+      std::vector<std::tuple<std::string, Maps, std::shared_ptr<contact::Law>, std::vector<int>>>;
   nb::class_<Model>(m, "Model")
       .def(
           "__init__",
@@ -69,11 +70,12 @@ void bind_model(nb::module_& m) {
             std::vector<model::Contact> groups;
             for (auto const& [A, order, phase] : terms)
               linear.push_back({MatHandle::share(A.object), order, phase});
-            for (auto const& [name, maps, law] : contacts) {
+            for (auto const& [name, maps, law, numbers] : contacts) {
               groups.push_back({name, MatHandle::share(std::get<0>(maps.at(0)).object), law});
               for (size_t k = 1; k < maps.size(); ++k)
                 groups.back().ahead.push_back(
                     {MatHandle::share(std::get<0>(maps[k]).object), std::get<1>(maps[k])});
+              groups.back().numbers = numbers;
             }
             new (self) Model(std::move(linear), std::move(groups), theta, unit);
           },

@@ -178,7 +178,7 @@ class Model:
         local = [self._unit * (units // size + (r < units % size)) for r in range(size)]
         return sum(local[:rank]), sum(local[: rank + 1])
 
-    def _group(self, contact: Contact) -> tuple[str, list[tuple[PETSc.Mat, int]], Any]:
+    def _group(self, contact: Contact) -> tuple[str, list[tuple[PETSc.Mat, int]], Any, list[int]]:
         """The contact's pairs on the rank that owns the pair's first dof."""
         maps, d = {k: sp.csr_matrix(B, dtype=float) for k, B in by_sector(contact.B).items()}, contact.components
         n_rows = maps[0].shape[0]
@@ -196,7 +196,8 @@ class Model:
         pairs = np.nonzero((self._first_dofs(maps, d) >= begin) & (self._first_dofs(maps, d) < end))[0]
         self._pairs.append(pairs)
         rows = (pairs[:, None] * d + np.arange(d)).ravel()
-        return contact.name, [(self._rows_of(B, rows), k) for k, B in maps.items()], contact.core_law(pairs, n_pairs)
+        parts = [(self._rows_of(B, rows), k) for k, B in maps.items()]
+        return contact.name, parts, contact.core_law(pairs, n_pairs), pairs.tolist()
 
     @staticmethod
     def _first_dofs(maps: Mapping[int, sp.csr_matrix], d: int) -> npt.NDArray[np.intp]:

@@ -1,54 +1,54 @@
 #pragma once
 #include <map>
-#include <unordered_map>
 
-#include "hb/harmonic_inverse.h"
+#include "hb/sector_transform.h"
 
 namespace fretwave::hb {
 
-/// Inverse of a block-circulant matrix, (A x)_j = sum_k A_k x_{j+k} over N sectors of n dofs: with
-/// x_j = sum_d x^_d e^{2 pi i j d / N} the nodal diameters d part, and each has one n x n block
-/// P_d = sum_k A_k e^{2 pi i k d / N} (Thomas, Int. J. Numer. Methods Eng. 14, 1979).
-class CyclicInverse : public HarmonicInverse {
- public:
-  /// blocks: A_k, column-major, by k.
-  CyclicInverse(Place, int sectors, std::map<int, std::vector<complex>> const& blocks);
-  void apply(double const* x, double* z) const override;
-  Rotation entry(int i, int j) const override;
+using scomplex = std::complex<float>;
 
-  Place const& place() const { return at_; }
-  /// A^-1 x, or A^-H x.
-  std::vector<complex> solve(std::vector<complex> x, bool adjoint = false) const;
-  complex inverse_entry(int i, int j) const;
+/// Blocks A_k of a block-circulant matrix by the sectors k ahead, n x n, column-major:
+/// (A x)_j = sum_k A_k x_{j+k}.
+template <class T>
+using CirculantBlocks = std::map<int, std::vector<T>>;
+
+/// Inverses of block-circulant matrices, one a harmonic, for the waves of this rank: a wave's block is
+/// P_d = sum_k A_k e^{2 pi i k d / N} (Thomas, Int. J. Numer. Methods Eng. 14, 1979). Of matrices with
+/// A_-k = A_k^T, P_{N-d} = P_d^T, half of them are made and kept. In single precision, because reading them
+/// is what an application costs.
+class CyclicInverse {
+ public:
+  CyclicInverse(std::vector<Wave> const& waves, int sectors, int n, bool symmetric);
+  /// Of the waves with select(wave); a wave and its mirror are selected together. blocks(harmonic): A_k.
+  /// `InputError` if singular.
+  template <class Select, class Make>
+  void make(Select select, Make blocks) {
+    CirculantBlocks<complex> A;
+    int harmonic = -1;
+    for (size_t w = 0; w < waves_.size(); ++w) {
+      if (transposed(w) || !select(waves_[w])) continue;
+      if (waves_[w].harmonic != harmonic) A = blocks(harmonic = waves_[w].harmonic);
+      invert(w, A);
+    }
+  }
+  /// V x for the leading `columns` entries of x, V the inverse of a wave's block.
+  std::vector<scomplex> multiply(size_t wave, int columns, complex const* x) const;
+  scomplex entry(size_t wave, int i, int j) const {
+    return place(wave)[transposed(wave) ? size_t(i) * n_ + j : size_t(j) * n_ + i];
+  }
+  double megabytes() const { return sizeof(scomplex) * double(inverses_.size()) / 1e6; }
 
  private:
-  struct FreePlan {
-    void operator()(fftw_plan p) const { fftw_destroy_plan(p); }
-  };
-  using Plan = std::unique_ptr<std::remove_pointer_t<fftw_plan>, FreePlan>;
-  Place at_;
+  bool mirrored(size_t wave) const { return waves_[wave].diameter > sectors_ / 2; }
+  bool transposed(size_t wave) const { return symmetric_ && mirrored(wave); }
+  scomplex const* place(size_t wave) const { return inverses_.data() + at_[wave]; }
+  void invert(size_t wave, CirculantBlocks<complex> const&);
+
+  std::vector<Wave> waves_;
   int sectors_, n_;
-  std::vector<std::complex<float>> inverses_;  ///< one n x n block a nodal diameter
-  Plan forward_, backward_;
-  mutable std::unordered_map<size_t, complex> entries_;
-};
-
-/// The circulant inverse with columns C and rows R of scalars beside it, by the Schur complement of the
-/// scalars: z = (S - R A^-1 C)^-1 (x_z - R A^-1 x), q = A^-1 x - A^-1 C z. A is taken beside the point where
-/// it is singular; the border holds the directions in which it nearly is.
-class BorderedCyclicInverse : public HarmonicInverse {
- public:
-  /// columns, rows: per scalar the fundamental's entries as q = qc - i qs; S column-major, rows x columns.
-  BorderedCyclicInverse(std::unique_ptr<CyclicInverse>, std::vector<std::vector<complex>> const& columns,
-                        std::vector<std::vector<complex>> rows, std::vector<double> S, size_t scalars_at);
-  void apply(double const* x, double* z) const override;
-  Rotation entry(int i, int j) const override;
-
- private:
-  std::unique_ptr<CyclicInverse> inner_;
-  std::vector<std::vector<complex>> rows_, AC_, AR_;  ///< R, A^-1 C, A^-H R
-  std::vector<double> inverse_S_;                     ///< of the Schur complement, row-major
-  size_t scalars_at_;
+  bool symmetric_;
+  std::vector<size_t> at_;  ///< a wave's place
+  std::vector<scomplex> inverses_;
 };
 
 }  // namespace fretwave::hb

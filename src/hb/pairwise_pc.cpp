@@ -44,8 +44,8 @@ std::vector<Rotation> PairwisePreconditioner::gather_contact(std::vector<PairTan
     }
     const size_t ld = size_t(contact.components) * m_;
     for (int p = 0; p < contact.pairs; ++p) {
-      const auto own = harmonic_tangents(problem_.harmonics(), contact.components, &contact.D[p * ld * ld],
-                                         real_fundamental());
+      const auto own =
+          harmonic_tangents(problem_.harmonics(), contact.components, &contact.D[p * ld * ld], true);
       tangents.insert(tangents.end(), own.begin(), own.end());
     }
     first += contact.pairs;

@@ -21,8 +21,6 @@ class PairwisePreconditioner : public solve::Preconditioner {
   virtual void prepare(Exponents const&, Vec y, Vec row) = 0;
   /// The fundamental's with the border.
   virtual std::unique_ptr<HarmonicInverse> inverse(int harmonic, Exponents const&) const = 0;
-  /// The fundamental's tangents are kept as real 2x2 blocks, not as their nearest complex factors.
-  virtual bool real_fundamental() const { return true; }
 
   Place place(int harmonic) const;
   bool mine(int harmonic) const { return harmonic % size_ == rank_; }

@@ -1,31 +1,66 @@
 #pragma once
+#include <optional>
+
+#include "hb/border.h"
 #include "hb/cyclic_inverse.h"
-#include "hb/pairwise_pc.h"
+#include "hb/travelling_contact.h"
+#include "solve/preconditioner.h"
 
 namespace fretwave::hb {
 
-/// For whole wheels: the harmonic blocks of the tuned wheel (terms and contact tangents averaged over the
-/// sectors), diagonal in nodal diameters. A mistuned wheel keeps its differences for the iteration.
-class WheelPreconditioner : public PairwisePreconditioner {
+/// For whole wheels. A holds the harmonic blocks of the tuned wheel (terms and contact tangents averaged over
+/// the sectors), diagonal in waves; what the contact adds, B^T dD B, is eliminated,
+///
+///     q = A^-1 (x - B^T E B A^-1 x),  E = dD (I + G dD)^-1,
+///
+/// about a travelling wave by `TravellingContact`, exactly on a tuned wheel; about other motions sector by
+/// sector, with the compliance G that a sector meets when all move in the waves of the present motion. The
+/// scalars come as a `Border`. A may be of another point of the branch, as in `CondensedPreconditioner`, but
+/// for the fundamental; there the waves of the motion are made beside the point, where they are not singular.
+/// A mistuned wheel keeps its differences for the iteration. Ranks hold whole sectors, and share the waves
+/// among them: no vector stands whole anywhere.
+class WheelPreconditioner : public solve::Preconditioner {
  public:
+  /// `InputError` if the contact is not the same in all sectors.
   explicit WheelPreconditioner(HarmonicProblem&);
-  double build_cost() const override { return unit_ / 10.0; }
-  std::string describe() const override {
-    return std::to_string(sectors_) + " nodal diameters of " + std::to_string(unit_) + " dofs";
-  }
+  void build(Vec y, Vec row) override;
+  void apply(Vec x, Vec z) override;
+  double build_cost() const override;
+  std::string describe() const override;
 
  private:
-  using Blocks = std::map<int, std::vector<double>>;  ///< by sectors ahead, column-major
-  void prepare(Exponents const&, Vec y, Vec row) override;
-  std::unique_ptr<HarmonicInverse> inverse(int harmonic, Exponents const&) const override;
-  bool real_fundamental() const override { return false; }
+  using Blocks = CirculantBlocks<double>;
   Blocks average(Mat A) const;
-  std::unique_ptr<CyclicInverse> cyclic(int harmonic, Exponents const&) const;
+  bool symmetric() const;
+  void find_order();
+  void find_contact_rows();
+  bool moved(Exponents const&) const;
+  void factorise(Exponents const&, std::vector<double> const& shares);
+  CirculantBlocks<complex> blocks(int harmonic, Exponents const&) const;
+  std::vector<double> spectrum(Vec y) const;
+  std::vector<complex> compliances() const;
+  std::vector<complex> met(std::vector<double> const& shares) const;
+  void eliminate(std::vector<double> const& shares);
+  void make_border(Vec y, Vec row);
+  std::vector<double> solve(double const* x) const;
+  std::vector<complex> gather(double const* x) const;
+  /// B of a wave, contact rows x contact dofs, row-major.
+  std::vector<complex> rows_of(int diameter) const;
 
-  int unit_, sectors_;
+  HarmonicProblem& problem_;
+  int unit_, sectors_, m_, harmonics_, local_sectors_, contact_dofs_ = 0;
+  SectorTransform dofs_;
+  WheelContact contact_;
+  std::optional<SectorTransform> rows_;
+  std::vector<int> order_;     ///< a sector's dof by its place in the blocks, those in contact first
+  std::vector<int> position_;  ///< its inverse
   std::vector<Blocks> terms_;
-  std::vector<std::vector<complex>> columns_, rows_;
-  std::vector<double> corner_;
+  std::vector<std::vector<complex>> B_;  ///< of own waves
+  std::optional<CyclicInverse> inverse_;
+  std::optional<Exponents> made_at_;
+  std::vector<complex> G_;  ///< B A^-1 B^H, own waves x contact rows x contact rows
+  std::optional<TravellingContact> travelling_;
+  Border border_;
 };
 
 }  // namespace fretwave::hb

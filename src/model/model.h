@@ -31,6 +31,8 @@ struct Contact {
   MatHandle B;
   std::shared_ptr<contact::Law> law;
   std::vector<PhasedMap> ahead = {};
+  /// Of this rank's pairs in the whole model, where a wheel's follow one another sector by sector.
+  std::vector<int> numbers = {};
 };
 
 /// M x'' + C x' + K x + B^T f(B x, B x') = 0, distributed over `comm`.
