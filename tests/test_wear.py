@@ -188,6 +188,31 @@ def test_worn_depth_is_gap(comm):
     assert np.array_equal(whole(worn_problem.residual(y)), whole(expected.residual(z)))
 
 
+@pytest.mark.ranks(1, 2)
+def test_wear_of_a_travelling_wave(comm):
+    """Pairs between sectors: the gap's derivative carries their phase, and the energy of the wave is in balance."""
+    parameters = {"normal_stiffness": KN, "tangential_stiffness": KT, "friction_coefficient": MU, "normal_load": 1.0}
+    between = fw.Contact("coulomb_3d", {0: -np.eye(3), 1: np.eye(3)}, parameters)
+    sector = fw.Sector(np.eye(3), {0: np.diag([1.0, 1.3, 1.6])}, 5, None, [between])
+    model = sector.model(1, comm)
+    start = fw.linear_modes(model, 3, "stuck")[1]
+    dof = int(np.argmax(np.abs(start.shape)))
+    problem = fw.NonlinearMode(model, fw.Harmonics([0, 1, 2, 3], 64), "CNM", dof, start)
+    y = solve_at(problem, 1.0)
+    assert problem.diagnostics(y)["slip"] > 0.05
+    assert abs(problem.energy(y)["error"]) < 1e-9 and problem.energy(y)["contact"] > 0
+    pairs, step = model.pairs_of(0), 1e-7
+
+    def at(depth):
+        problem.core.wear([np.array([depth])[pairs].tolist()])
+        return whole(problem.residual(y))
+
+    difference = (at(step) - at(-step)) / (2 * step)
+    at(0.0)
+    found = whole(problem.core.gap_product(y, [np.ones(1)[pairs].tolist()]))
+    assert np.allclose(found, difference, rtol=0, atol=1e-7 * np.abs(found).max())
+
+
 # ---- a blade on two flanks
 
 

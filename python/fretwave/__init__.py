@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from .reduction import FrequencyError, Reduction, reduce
     from .reduction_error import NonlinearError, nonlinear_error
     from .transient import Transient
-    from .wear import Wear, WearControl, WearPoint, WornMode
+    from .wear import Wear, WearControl, WearPoint
+    from .worn_mode import WornMode
 
 #: Where each public name lives; loaded when first used, so that `fretwave --help` starts without PETSc.
 _HOMES = {
@@ -34,7 +35,8 @@ _HOMES = {
     "reduction": ("FrequencyError", "Reduction", "reduce"),
     "reduction_error": ("NonlinearError", "nonlinear_error"),
     "transient": ("Transient",),
-    "wear": ("Wear", "WearControl", "WearPoint", "WornMode"),
+    "wear": ("Wear", "WearControl", "WearPoint"),
+    "worn_mode": ("WornMode",),
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 

@@ -203,7 +203,7 @@ class WearAnalysis(AnalysisSection):
     cycles: Positive = key("normalised wear cycles to march", "-", "40.0")
     coefficient: float = key("wear coefficient k_w", "1/Pa", "1e-14", ge=0, allow_inf_nan=False)
     cycle_unit: Optional[Positive] = key(
-        "vibration cycles in a normalised one (by default: in which sliding 4 mu N0/kt a cycle takes 1/e off the load)",
+        "vibration cycles in a normalised one (by default: in which sliding 4 mu N0/kt a cycle leaves 1/e of the load)",
         "-",
         "1e6",
         default=None,

@@ -118,7 +118,7 @@ def _take(context: AnalysisContext, analysis: WearAnalysis, point: Any, found: d
 
 
 def normal_cycle(mode: Any, load: Any) -> float:
-    """Vibration cycles in which sliding four stick limits mu N0/kt a cycle takes the share 1/e off a normal load.
+    """Vibration cycles in which sliding four stick limits mu N0/kt a cycle leaves 1/e of a normal load.
 
     N' = -kn k_w/I N s with s = 4 mu N0/kt, in means over the loaded pairs; 1 where nothing can wear.
     """
