@@ -134,6 +134,19 @@ def test_a_killed_run_resumes_exactly(folder: Path, run: Path, tmp_path: Path) -
     assert walls == [row["wall_s"] for row in csv.DictReader(first.splitlines())] and "resumed" in done.stdout
 
 
+def test_an_amplitude_that_the_mode_does_not_reach_leaves_the_others(folder: Path, tmp_path: Path, launch) -> None:
+    """Exit 3, and what was found is kept; without any start nothing is written."""
+    words = ["--set", "mode.step.max_points=8", "--set", "wear.amplitude=[2.5e-7, 2.1e-6]"]
+    done = launch(1, "-m", "fretwave", *arguments(folder, tmp_path / "some", *words))
+    assert done.returncode == 3 and "a = 2.1e-06 m: not reached by the mode" in done.stderr
+    assert {row["line"] for row in rows(tmp_path / "some")} == {"0"}
+    done = launch(
+        1, "-m", "fretwave", *arguments(folder, tmp_path / "none", *words, "--set", "wear.amplitude=[2.1e-6]")
+    )
+    assert done.returncode == 3 and "reaches none of the amplitudes" in done.stderr
+    assert not (tmp_path / "none").exists()
+
+
 BAD = [
     ('mode = "mode"', 'mode = "mod"', "is no mode analysis"),
     ("amplitude = [1.8e-6, 2.1e-6]", "amplitude = [1.8e-6, 2.1e-5]", "outside the branch of the mode"),

@@ -16,7 +16,7 @@ from ..console import Console
 from ..results import AnalysisWriter, Field
 from ..schema import ModeAnalysis, WearAnalysis
 from ..sectors import nodal_diameter
-from .branch import open_branch
+from .branch import finished_table, open_branch
 from .context import AnalysisContext
 from .rest import retained, start_mode
 
@@ -214,14 +214,27 @@ class _Marcher:
 
     def _close(self, march: Any) -> dict[str, Any]:
         status = "done" if march.converged else "stopped"
+        told = _told(finished_table(self.writer))
         self.writer.close(status, march.reason)
         end = march.eta / self.unit
         return {
             "status": status,
             "reason": march.reason,
             "summary": f"{self.context.name}: a = {self.line.amplitude:g} m: {self.writer.rows} points to {end:.4g}"
-            f" normalised cycles, {march.reason}",
+            f" normalised cycles, {march.reason}{told}",
             "labels": " ".join(self.problem.harmonics.labels),
             "samples": self.problem.harmonics.samples,
             "load_scale": march.load_scale,
         }
+
+
+def _told(table: dict[str, Any]) -> str:
+    """The damping over wear, in words."""
+    if not table:
+        return ""
+    zeta, top = 100 * table["zeta"], int(np.argmax(table["zeta"]))
+    jumps = sum("jump" in event.split() for event in table["event"])
+    return (
+        f"; zeta {zeta[0]:.4f} % when new, largest {zeta[top]:.4f} % at {table['cycles'][top]:.3g}, {zeta[-1]:.4f} %"
+        f" at the end" + (f"; {jumps} jump{'s' * (jumps > 1)} to another sheet of the mode" if jumps else "")
+    )
