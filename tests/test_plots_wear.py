@@ -101,6 +101,12 @@ def test_histories_name_the_kinds_that_are_there_and_those_that_are_not(run):
     assert profile.lines[0].get_ydata() == pytest.approx(1e6 * analysis.field("depth_pads")[-1])
 
 
+def test_histories_need_no_places(run):
+    analysis = run.analyses["one"]
+    figure = wear_pairs.draw_histories(analysis, wear_lines.lines_of(analysis)[0], "pads", None)
+    assert [axes.get_ylabel() for axes in figure.axes] == ["Worn depth [µm]", "Mean normal force [N]"]
+
+
 def test_kinds_follow_the_rate_of_a_pair():
     """Rates of known form: none, exponential decay to 1e-4 and to 0.1, growth that stops and comes back."""
     t = np.linspace(0.0, 1.0, 400)

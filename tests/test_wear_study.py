@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import csv
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from mpi4py import MPI
 from wear_case import call, write_case
 
+from fretwave.casefile import load_case
 from fretwave.plots.data import Run
 from fretwave.plots.study import figures
 from fretwave.study_report import LEGEND_OF_WEAR, PRINTED_OF_WEAR, markdown, write_csv
-from fretwave.wear_study import WearOutcome, WearPlan, WearSettings
+from fretwave.wear_study import TOLERANCES, WearOutcome, WearPlan, WearSettings, wear_plan
 
 pytestmark = pytest.mark.ranks(1)
 
@@ -59,6 +61,21 @@ def test_table_and_picture(tmp_path):
     assert name == "study" and [axes.get_title() for axes in figure.axes] == ["Damping", "Frequency", "Worn volume"]
     volume = {line.get_label(): line.get_ydata() for line in figure.axes[2].lines}
     assert volume["tolerance (tol)"] == pytest.approx([(0.1 - 1e-4) / 1.0001, (1e-2 - 1e-4) / 1.0001])
+
+
+def test_sweeps_come_from_the_command_line_or_the_case_or_are_of_the_tolerance(tmp_path):
+    path = write_case(tmp_path)
+    nothing = SimpleNamespace(harmonics=None, tolerance=None, pressure_change=None)
+    given = SimpleNamespace(harmonics=[1, 5], tolerance=None, pressure_change=[0.1, 0.3])
+    case = load_case(path)
+    plan = wear_plan(case, case.analyses["wear"], nothing)
+    assert plan.base == WearSettings(3, 1e-3, 0.2) and plan.tolerance == TOLERANCES and not plan.harmonics
+    path.write_text(path.read_text() + "\n[study]\nharmonics = [1, 3]\nwear_tolerance = [1e-2, 1e-5]\n")
+    case = load_case(path)
+    plan = wear_plan(case, case.analyses["wear"], nothing)
+    assert (plan.harmonics, plan.tolerance, plan.pressure_change) == ((1, 3), (1e-2, 1e-5), ())
+    plan = wear_plan(case, case.analyses["wear"], given)
+    assert (plan.harmonics, plan.tolerance, plan.pressure_change) == ((1, 5), (), (0.1, 0.3))
 
 
 @pytest.mark.ranks(1, 2)

@@ -150,16 +150,15 @@ def _collect(
         for number, amplitude in enumerate(analysis.amplitude)
         if number not in reached
     ]
+    told: dict[str, Any] = next((result for result in results if isinstance(result, dict)), {})
     # The run folder is open since the starts were found.
     context = replace(context, before_first=lambda: None, fields=fields(context.case))
     writer = context.writer(
         columns(context.case),
-        labels=next((result["labels"].split() for result in results if isinstance(result, dict)), ()),
+        labels=str(told.get("labels", "")).split(),
         cycle_unit=unit,
         wear_coefficient=analysis.coefficient,
-        **{key: value for key, value in results[0].items() if key in ("samples", "load_scale")}
-        if isinstance(results[0], dict)
-        else {},
+        **{key: told[key] for key in ("samples", "load_scale") if key in told},
     )
     try:
         for line in lines:

@@ -85,7 +85,7 @@ def lines_of(wear: Analysis) -> list[WearLine]:
 
 def _has_stopped(wear: Analysis, rates: Table, row: int, vibrations: float) -> bool:
     """The march's own rule: up to the last cycle no pair loses more than the tolerance of the mean normal load."""
-    lost = float(wear.attributes["tolerance"]) * float(wear.attributes["load_scale"])
+    lost = float(wear.attributes["tolerance"]) * float(wear.attributes.get("load_scale", 0.0))
     case = wear.attributes["case"]
     stiffness = {name: np.asarray(case[f"contact.{name}.normal_stiffness"]) for name in rates}
     return all((stiffness[name] * rate[row] * vibrations <= SLACK * lost).all() for name, rate in rates.items())
