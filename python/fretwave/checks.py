@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from .errors import FretwaveError, InputError
@@ -133,7 +133,7 @@ def check_analyses(
         if isinstance(analysis, SweepAnalysis):
             _check_sweep(report, analysis)
         if isinstance(analysis, WearAnalysis):
-            _check_wear(report, analysis, modes, {a.name: a for a in analyses.values()})
+            _check_wear(report, analysis, modes)
 
 
 def _check_sweep(report: Reporter, analysis: SweepAnalysis) -> None:
@@ -151,17 +151,8 @@ def _check_sweep(report: Reporter, analysis: SweepAnalysis) -> None:
         report.wrong(("dampers",), "are not those of the analysis swept", "none", f"give them to '{analysis.of}'")
 
 
-def _check_wear(
-    report: Reporter, analysis: WearAnalysis, modes: list[str], analyses: Mapping[str, AnalysisSection]
-) -> None:
+def _check_wear(report: Reporter, analysis: WearAnalysis, modes: list[str]) -> None:
     report.mode(("mode",), analysis.mode, modes)
-    mode = analyses.get(analysis.mode)
-    if isinstance(mode, ModeAnalysis):
-        low, high = mode.amplitude
-        for index, value in enumerate(analysis.amplitude):
-            if not low <= value <= high:
-                where, expected = "is outside the branch of the mode", f"a value within {toml(mode.amplitude)}"
-                report.wrong(("amplitude", index), where, expected, f"move it, or widen {mode.name}.amplitude")
     for index, value in enumerate(analysis.report_at):
         if value > analysis.cycles:
             expected = f"at most cycles = {analysis.cycles:g}"

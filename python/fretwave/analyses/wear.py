@@ -80,7 +80,7 @@ def unworn_starts(context: AnalysisContext, analysis: WearAnalysis) -> dict[str,
     )
     if rest is not None:
         problem.preload(rest.displacement, rest.load)
-    low, high = settings.amplitude
+    low, high = min(settings.amplitude[0], *analysis.amplitude), max(settings.amplitude[1], *analysis.amplitude)
     branch = fretwave.Continuation(
         problem, problem.initial(low), (low, high), step_control(settings.step), sorted(analysis.amplitude)
     )
