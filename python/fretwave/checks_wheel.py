@@ -53,9 +53,13 @@ def _check_on_wheel(report: Reporter, analysis: HarmonicSection, neighbours: Nei
             report.wrong(("wave",), "is of a tuned wheel", "no `wave` beside `mistuning`", fix)
         elif diameters is not None and not 0 < 2 * diameters < n:
             fix = "remove the key: this wave stands still" if 2 * diameters % n == 0 else "give the diameters a plus"
-            report.wrong(("wave",), f"cannot be told apart at nodal_diameter = {diameters}", f"1 to {(n - 1) // 2}", fix)
+            report.wrong(
+                ("wave",), f"cannot be told apart at nodal_diameter = {diameters}", f"1 to {(n - 1) // 2}", fix
+            )
     if analysis.mistuning is not None:
-        _check_mistuning(Reporter(report.source, (*report.path, "mistuning"), report.found), analysis.mistuning, neighbours)
+        _check_mistuning(
+            Reporter(report.source, (*report.path, "mistuning"), report.found), analysis.mistuning, neighbours
+        )
         if diameters is None and n_dof and analysis.linear_mode > n * n_dof:
             expected = f"1 to {n * n_dof}, the number of the wheel's dofs"
             report.wrong(("linear_mode",), "does not exist", expected, "write `linear_mode = 1`")

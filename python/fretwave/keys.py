@@ -37,8 +37,13 @@ def key_lines() -> Iterator[str]:
     for kind, analysis in ANALYSES.items():
         yield f'[[analysis]] with type = "{kind}"'
         yield from _section(analysis, without=set(AnalysisSection.model_fields))
-    tables: list[tuple[str, type[BaseModel]]] = [("step = { ... }", StepSection), ("mistuning = { ... }", MistuningSection)]
-    for title, nested in (*tables, ("dampers = [{ ... }]", Damper), ("[study]", StudySection)):
+    tables: dict[str, type[BaseModel]] = {
+        "step = { ... }": StepSection,
+        "mistuning = { ... }": MistuningSection,
+        "dampers = [{ ... }]": Damper,
+        "[study]": StudySection,
+    }
+    for title, nested in tables.items():
         yield title
         yield from _section(nested)
 

@@ -120,7 +120,8 @@ class MistuningSection(Section):
     """Relative deviations of a stiffness from sector to sector: drawn, or given one by one."""
 
     of: str = key(
-        "part of the stiffness that varies: one of the builder's, or `sector`, all of it", example='"blade"',
+        "part of the stiffness that varies: one of the builder's, or `sector`, all of it",
+        example='"blade"',
         default="sector",
     )
     standard_deviation: Optional[Positive] = key(

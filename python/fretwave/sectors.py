@@ -127,12 +127,9 @@ def _folded(
         loads = {name: sum(T.T @ load for T in sector.ties.values()) for name, load in built.loads.items()}
         named = {name: place[number] for name, number in built.dofs.items() if number in place}
         built = replace(built, dofs=named, loads=loads, coordinates=None, displacements=None, hexahedra=None)
-    neighbours = Neighbours(
-        sector.sectors,
-        *({name: _without_own(part) for name, part in given.items()} for given in (parts, rows)),
-        sector.ties,
-        {**(origin.built.parts if origin.built else {}), WHOLE: origin.matrices["K"].values},
-    )
+    terms, ahead = ({name: _without_own(part) for name, part in given.items()} for given in (parts, rows))
+    varied = {**(origin.built.parts if origin.built else {}), WHOLE: origin.matrices["K"].values}
+    neighbours = Neighbours(sector.sectors, terms, ahead, sector.ties, varied)
     resolved = {
         **origin.resolved,
         "model.sectors": sector.sectors,

@@ -13,7 +13,8 @@ import numpy as np
 
 from .analyses.branch import step_control
 from .analyses.context import AnalysisContext
-from .analyses.rest import retained, start_mode
+from .analyses.rest import retained
+from .analyses.wheel_start import Start, start_of
 from .casefile import Case, load_case
 from .console import Console
 from .errors import EXIT_DONE, InputError, NotConverged
@@ -25,6 +26,7 @@ from .schema import ModeAnalysis
 from .sectors import nodal_diameter
 from .study_plan import Outcome, Plan, Settings, Study, common_amplitudes
 from .study_report import markdown, write_csv
+from .wheel import on_wheel, solver_room
 
 #: each branch is solved this often; its time is that of the fastest, which other work on the machine disturbs least
 REPEATS = 3
@@ -58,10 +60,10 @@ class _Solver:
     def __init__(self, case: Case, analysis: ModeAnalysis, comm: Any, console: Console, study: Study, repeats: int):
         self.case, self.analysis, self.comm, self.console = case, analysis, comm, console
         self.study, self.repeats = study, repeats
-        self._parts: tuple[int | None, AnalysisContext, Any, Any] | None = None
+        self._parts: tuple[int | None, AnalysisContext, Start] | None = None
 
-    def _model(self, component_modes: int | None) -> tuple[AnalysisContext, Any, Any]:
-        """Context, start and rest state with this many component modes; the last one is kept. Collective."""
+    def _model(self, component_modes: int | None) -> tuple[AnalysisContext, Start]:
+        """Context and start with this many component modes; the last one is kept. Collective."""
         if self._parts is None or self._parts[0] != component_modes:
             if self._parts is not None:
                 self._parts[1].model.destroy()
@@ -69,7 +71,7 @@ class _Solver:
             preload, diameters = case.preload_of(self.analysis), nodal_diameter(self.analysis)
             model = build_model(case, self.analysis.dampers, self.comm, preload, diameters)
             context = AnalysisContext(model, case, self.analysis, self.comm, Path(), self.console)
-            self._parts = (component_modes, context, *start_mode(context, self.analysis.linear_mode))
+            self._parts = (component_modes, context, start_of(context))
         return self._parts[1:]
 
     def solve(self, settings: Settings) -> Outcome | str:
@@ -86,20 +88,21 @@ class _Solver:
         import fretwave
 
         analysis = self.analysis
-        context, start, rest = self._model(settings.component_modes)
+        context, start = self._model(settings.component_modes)
         harmonics = retained(context, settings.harmonics, settings.samples)
         options = AnalysisOptions("study_", [analysis.petsc, f"-snes_atol {settings.tolerance!r}"])
-        with options.inserted():
+        with options.inserted(), solver_room(context.case, analysis, "study_"):
             problem = fretwave.NonlinearMode(
                 context.model,
                 harmonics,
                 method=analysis.method,
-                dof=context.case.dof(analysis.normalise),
-                start=start,
+                dof=start.dof,
+                start=start.mode,
                 prefix="study_",
+                avoid=start.avoid,
             )
-            if rest is not None:
-                problem.preload(rest.displacement, rest.load)
+            if start.rest is not None:
+                problem.preload(start.rest.displacement, start.rest.load)
             try:
                 return self._follow(problem)
             finally:

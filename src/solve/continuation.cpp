@@ -134,6 +134,27 @@ double Continuation::deviation(Vec y, double length) const {
   return weighted_norm(weights_, moved);
 }
 
+/// A kink may turn the branch by more than a right angle. The tangent behind it that agrees with the one
+/// before then leads back, where the tangent is the old one; only along the right sign does it stay.
+void Continuation::orient_past_kink(Trial& trial) {
+  VecHandle weights = like(trial.y), row = like(trial.y);
+  problem_.metric(trial.y, weights);
+  check(VecPointwiseMult(row, weights, trial.tangent));
+  double here;
+  check(VecDot(row, trial.y, &here));
+  const auto stays = [&](double length) {
+    Trial probe{.y = copy(trial.y), .tangent = {}, .outcome = {}, .tests = {}};
+    check(VecAXPY(probe.y, length, trial.tangent));
+    double along;
+    if (!correct(probe, row, here + length)) return false;
+    check(VecDot(row, probe.tangent, &along));
+    return std::abs(along) > std::cos(steps_.max_angle);
+  };
+  if (stays(kink_length) || !stays(-kink_length)) return;
+  check(VecScale(trial.tangent, -1));
+  trial.tests = tests(trial.y, trial.tangent);
+}
+
 /// One accepted step from the anchor; halves the length on failure or when the branch turns too much.
 std::optional<Continuation::Trial> Continuation::step(double& length, double& angle, double& next_length) {
   std::string why = "the branch turns too sharply";
@@ -156,6 +177,10 @@ std::optional<Continuation::Trial> Continuation::step(double& length, double& an
     const double by_newton = std::exp2((steps_.target_newton - trial.outcome.newton) / 2.0);
     const double by_angle = 0.5 * steps_.max_angle / std::max(angle, 1e-12);
     next_length = std::min(steps_.maximum, length * std::clamp(std::min(by_newton, by_angle), 0.4, 2.0));
+    if (angle > steps_.max_angle) {
+      orient_past_kink(trial);
+      next_length = std::min(steps_.maximum, kink_length);  // behind it the branch is smooth again
+    }
     return trial;
   }
   finish("step too small: " + why, false);

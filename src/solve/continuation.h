@@ -59,6 +59,7 @@ class Continuation {
     std::vector<TestFunction> tests;
   };
   bool correct(Trial&, Vec row, double value);
+  void orient_past_kink(Trial& trial);
   std::optional<Trial> step(double& length, double& angle, double& next_length);
   double deviation(Vec y, double length) const;
   void make_batch();

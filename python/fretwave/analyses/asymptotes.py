@@ -30,13 +30,13 @@ def other_asymptote(context: AnalysisContext, stuck: Any) -> dict[str, float]:
 
     count = min(context.model.n_dof, context.analysis.linear_mode + MORE_MODES)  # type: ignore[attr-defined]
     if all(contact.components == 1 for contact in context.case.contacts):
-        return {"free_omega": _most_alike(context, context.linear_mode("free", count), stuck)}
+        return {"free_omega": most_alike(context, context.linear_mode("free", count), stuck)}
     if context.case.neighbours is not None:
         context.leave_out(["the closed and sliding asymptote (not computed for a sector of a wheel)"])
         return {}
     K = context.case.K + closed_stiffness(context)
     with fretwave.Model(context.case.M, K, comm=context.comm) as model:
-        return {"sliding_omega": _most_alike(context, fretwave.linear_modes(model, count, contact="free"), stuck)}
+        return {"sliding_omega": most_alike(context, fretwave.linear_modes(model, count, contact="free"), stuck)}
 
 
 def closed_stiffness(context: AnalysisContext, tangential: bool = False) -> Any:
@@ -60,7 +60,7 @@ def asymptote_line(name: str, stuck: float, other: dict[str, float]) -> str:
     return f"{name}: asymptotes: {', '.join(texts)}"
 
 
-def _most_alike(context: AnalysisContext, modes: list[Any], stuck: Any) -> float:
+def most_alike(context: AnalysisContext, modes: list[Any], stuck: Any) -> float:
     M, wanted = context.case.M, stuck.shape + 1j * stuck.imaginary
     shapes = [mode.shape + 1j * mode.imaginary for mode in modes]
     likeness = [abs(phi.conj() @ (M @ wanted)) / math.sqrt((phi.conj() @ (M @ phi)).real) for phi in shapes]

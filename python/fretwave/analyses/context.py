@@ -19,6 +19,7 @@ from ..results import AnalysisWriter, open_results
 from ..runfolder import replace_text
 from ..schema import AnalysisSection
 from ..source import display
+from ..wheel import Wheel
 
 
 @dataclass
@@ -91,6 +92,12 @@ class AnalysisContext:
     @property
     def name(self) -> str:
         return self.analysis.name
+
+    @property
+    def wheel(self) -> Wheel:
+        """Of an analysis of a whole wheel."""
+        assert self.case.wheel is not None
+        return self.case.wheel
 
     @property
     def prefix(self) -> str:

@@ -15,7 +15,7 @@ from .asymptotes import asymptote_line
 from .branch import finished_table, open_branch, points_of, record, step_control
 from .context import AnalysisContext, Outcome
 from .rest import keep_pairs, retained
-from .wheel_shape import WHEEL, WheelShape
+from .wheel_shape import WHEEL, WheelShape, finish_wheel, one_by_one
 from .wheel_start import Start, start_of
 
 
@@ -62,8 +62,10 @@ def _follow(context: AnalysisContext, analysis: ModeAnalysis, problem: Any, writ
         branch = fretwave.Continuation.restore(problem, snapshot, **settings)
     else:
         branch = fretwave.Continuation(problem, problem.initial(low), **settings)
-    on_wheel = context.case.wheel is not None
-    describe = WheelShape(context, analysis.normalise, start.attributes["tuned_amplitude"]).row if on_wheel else None
+    describe = None
+    if context.case.wheel is not None:
+        tuned = start.attributes["tuned_amplitude"]
+        describe = WheelShape(context, analysis.normalise, tuned, start.mode).row
     with context.console.progress(context.name):
         for point in points_of(branch):
             row = record(writer, problem, point, branch.snapshot(), {}, describe)
@@ -71,7 +73,7 @@ def _follow(context: AnalysisContext, analysis: ModeAnalysis, problem: Any, writ
                 context.console.line(_reduction_error(context, problem, point, row))
             share = math.log(row["amplitude"] / low) / math.log(high / low)
             context.console.point(point_line(context.name, row), _short(row), share, notable=bool(row["event"]))
-    outcome = _finish(context, writer, branch)
+    outcome = _finish(context, writer, branch, start)
     outcome.goal = f"amplitude {high:g} m"
     branch.destroy()
     return outcome
@@ -91,15 +93,17 @@ def _reduction_error(context: AnalysisContext, problem: Any, point: Any, row: di
     )
 
 
-def _finish(context: AnalysisContext, writer: Any, branch: Any) -> Outcome:
+def _finish(context: AnalysisContext, writer: Any, branch: Any, start: Start) -> Outcome:
     table = finished_table(writer)
     summary = summarise(context.name, table) if table else []
+    summary += finish_wheel(context, writer, start) if context.case.wheel is not None else []
     summary.append(f"linear systems: {branch.route}")
     events = json.dumps(limit_cycles(table)) if table else "[]"
     if table:
         keep_pairs(context, writer)
     writer.close("done" if branch.converged else "stopped", branch.reason, events=events)
-    return Outcome(writer.rows, branch.reason, branch.converged, summary)
+    advice = one_by_one(table) if table and context.case.wheel is not None and not branch.converged else ""
+    return Outcome(writer.rows, branch.reason, branch.converged, summary, advice=advice)
 
 
 def point_line(name: str, row: dict[str, Any]) -> str:

@@ -13,7 +13,7 @@ import scipy.sparse as sp
 
 from ..cyclic import wave_mode
 from ..modes import LinearMode
-from .asymptotes import other_asymptote
+from .asymptotes import most_alike, other_asymptote
 from .context import AnalysisContext
 from .rest import rest_state, start_mode
 
@@ -65,18 +65,20 @@ def start_of(context: AnalysisContext) -> Start:
 
 
 def _on_wheel(context: AnalysisContext) -> Start:
-    wheel, mistuned = context.case.wheel, context.case.wheel.deviations is not None
+    wheel, mistuned = context.wheel, context.wheel.deviations is not None
+    analysis: Any = context.analysis
     rest = rest_state(context)
     mode = None
-    if mistuned and context.analysis.nodal_diameter is None:
-        mode = context.linear_mode("stuck", context.analysis.linear_mode)[-1]
+    if mistuned and analysis.nodal_diameter is None:
+        mode = context.linear_mode("stuck", analysis.linear_mode)[-1]
         context = replace(context, analysis=_family(context, mode))
     tuned, asymptotes = _tuned(context)
-    analysis: Any = context.analysis
+    analysis = context.analysis
     if rest is not None:
         context.arrays["rest_displacement"] = rest.displacement
     if mistuned:
         mode, avoid = mode or _most_alike(context, tuned), None
+        asymptotes = _free(context, mode)
         sector = _largest(context, mode) if analysis.sector is None else analysis.sector
     else:
         sector = analysis.sector or 0
@@ -99,7 +101,7 @@ def _sector(context: AnalysisContext) -> Iterator[AnalysisContext]:
     from ..run import build_model
 
     analysis: Any = context.analysis
-    case = context.case.wheel.sector
+    case = context.wheel.sector
     preload = case.preload_of(analysis)
     with build_model(case, analysis.dampers, context.comm, preload, analysis.nodal_diameter) as model:
         yield replace(context, model=model, case=case, arrays={})
@@ -115,8 +117,9 @@ def _tuned(context: AnalysisContext) -> tuple[LinearMode, dict[str, float]]:
 
 def tuned_amplitude(context: AnalysisContext, tuned: LinearMode) -> float:
     """Of the normalised dof in each sector of the wheel in the tuned travelling wave of unit modal mass."""
-    dof = context.case.wheel.sector.dof(context.analysis.normalise)
-    return float(abs(tuned.shape[dof] + 1j * tuned.imaginary[dof]) / np.sqrt(context.case.wheel.sectors))
+    analysis: Any = context.analysis
+    dof = context.wheel.sector.dof(analysis.normalise)
+    return float(abs(tuned.shape[dof] + 1j * tuned.imaginary[dof]) / np.sqrt(context.wheel.sectors))
 
 
 def _family(context: AnalysisContext, mode: LinearMode) -> Any:
@@ -124,7 +127,8 @@ def _family(context: AnalysisContext, mode: LinearMode) -> Any:
 
     Spatial indices n and N - n have equal shares in a real shape: the forward wave is named.
     """
-    analysis, wheel = context.analysis, context.case.wheel
+    analysis: Any = context.analysis
+    wheel = context.wheel
     shape = wheel.by_sector(mode.shape)
     M = sp.csr_matrix(wheel.sector.M)
     waves = np.fft.ifft(shape, axis=0)[: wheel.sectors // 2 + 1]
@@ -145,7 +149,7 @@ def _wave(context: AnalysisContext, tuned: LinearMode, sector: int) -> tuple[Lin
     normalised dof, Re(phi) has it there, and avoids Im(phi), the same wave moved by a quarter of its length.
     """
     analysis: Any = context.analysis
-    wheel = context.case.wheel
+    wheel = context.wheel
     mode = wave_mode(tuned, analysis.nodal_diameter, wheel.sectors)
     if 2 * analysis.nodal_diameter % wheel.sectors == 0:
         return mode, None
@@ -159,14 +163,15 @@ def _wave(context: AnalysisContext, tuned: LinearMode, sector: int) -> tuple[Lin
 
 def _largest(context: AnalysisContext, mode: LinearMode) -> int:
     """Sector in which the normalised dof moves most."""
-    dof = context.case.wheel.sector.dof(context.analysis.normalise)
-    return int(np.argmax(np.abs(context.case.wheel.by_sector(mode.shape)[:, dof])))
+    analysis: Any = context.analysis
+    dof = context.wheel.sector.dof(analysis.normalise)
+    return int(np.argmax(np.abs(context.wheel.by_sector(mode.shape)[:, dof])))
 
 
 def _most_alike(context: AnalysisContext, tuned: LinearMode) -> LinearMode:
     """Of the N modes nearest in frequency the one with the largest share in the tuned pair's plane. Collective."""
     analysis: Any = context.analysis
-    wheel = context.case.wheel
+    wheel = context.wheel
     wave = wave_mode(tuned, analysis.nodal_diameter, wheel.sectors)
     phi, M = wave.shape + 1j * wave.imaginary, context.case.M
     modes = nearest_modes(context, tuned.omega, wheel.sectors)
@@ -175,15 +180,23 @@ def _most_alike(context: AnalysisContext, tuned: LinearMode) -> LinearMode:
     return modes[int(alike[0])]
 
 
-def nearest_modes(context: AnalysisContext, omega: float, count: int) -> list[LinearMode]:
-    """Stuck modes nearest to a frequency, by shift-invert there, in ascending order. Collective."""
+def _free(context: AnalysisContext, mode: LinearMode) -> dict[str, float]:
+    """Frequency without contact of the mode most like one of the mistuned wheel. Collective."""
+    if any(contact.components > 1 for contact in context.case.contacts) or not context.case.contacts:
+        return {}
+    free = nearest_modes(context, mode.omega, context.wheel.sectors, "free")
+    return {"free_omega": most_alike(context, free, mode)}
+
+
+def nearest_modes(context: AnalysisContext, omega: float, count: int, contact: str = "stuck") -> list[LinearMode]:
+    """Linear modes nearest to a frequency, by shift-invert there, in ascending order. Collective."""
     from petsc4py import PETSc
 
     options, key = PETSc.Options(), "modes_eps_target"
     given = options.getString(key, "")
     options[key] = (1 - 1e-9) * omega**2  # not on an eigenvalue
     try:
-        return context.linear_mode("stuck", count)
+        return context.linear_mode(contact, count)
     finally:
         options.delValue(key)
         if given:

@@ -20,6 +20,7 @@ FAMILIES = (
     "phase_planes",
     "loops",
     "faces",
+    "wheel",
     "limit_cycles",
     "forced",
     "free_decay",
