@@ -123,7 +123,9 @@ def test_one_line_on_two_ranks(folder: Path, run: Path, tmp_path: Path, launch) 
 
 
 @pytest.mark.parametrize("branch", ["[5e-7, 1e-6]", "[2e-6, 3e-6]"])
-def test_amplitudes_may_lie_outside_the_branch_of_the_mode(folder: Path, run: Path, tmp_path: Path, branch: str) -> None:
+def test_amplitudes_may_lie_outside_the_branch_of_the_mode(
+    folder: Path, run: Path, tmp_path: Path, branch: str
+) -> None:
     """The mode is followed as far as wear needs it."""
     assert main(arguments(folder, tmp_path, "--set", f"mode.amplitude={branch}", "--set", "mode.report_at=[]")) == 0
     expected, found = (float(rows(out)[-1]["worn_1"]) for out in (run, tmp_path))

@@ -293,9 +293,7 @@ class WearAnalysis(AnalysisSection):
 
     type: Literal["wear"]
     mode: str = key("mode analysis whose settings and branch this one takes", example='"mode"')
-    amplitude: list[Positive] = key(
-        "fixed modal amplitudes, one or a grid", "m", "[1.2e-3]", min_length=1
-    )
+    amplitude: list[Positive] = key("fixed modal amplitudes, one or a grid", "m", "[1.2e-3]", min_length=1)
     cycles: Positive = key("normalised wear cycles to march", "-", "40.0")
     coefficient: float = key("wear coefficient k_w", "1/Pa", "1e-14", ge=0, allow_inf_nan=False)
     cycle_unit: Optional[Positive] = key(
