@@ -143,40 +143,45 @@ def _collect(
     context: AnalysisContext, analysis: WearAnalysis, lines: list[Line], results: list[Any], unit: float, folder: Path
 ) -> Outcome:
     """All lines as one table. Collective."""
-    failures = [f"a = {line.amplitude:g} m: {_why(result)}" for line, result in zip(lines, results) if _why(result)]
-    reached = {line.number for line in lines}
-    failures += [
-        f"a = {amplitude:g} m: not reached by the mode"
-        for number, amplitude in enumerate(analysis.amplitude)
-        if number not in reached
-    ]
-    told: dict[str, Any] = next((result for result in results if isinstance(result, dict)), {})
-    # The run folder is open since the starts were found.
-    context = replace(context, before_first=lambda: None, fields=fields(context.case))
-    writer = context.writer(
-        columns(context.case),
-        labels=str(told.get("labels", "")).split(),
-        cycle_unit=unit,
-        wear_coefficient=analysis.coefficient,
-        **{key: told[key] for key in ("samples", "load_scale") if key in told},
-    )
+    marched = [result for result in results if isinstance(result, dict)]
+    failures = _failures(analysis, lines, results)
+    reason = "; ".join(failures or sorted({result["reason"] for result in marched}))
+    writer = _writer(context, analysis, unit, marched[0] if marched else {})
     try:
         for line in lines:
             _copy(context, writer, line)
-        if writer.rows:
+        if writer.rows and writer.active:
             keep_pairs(context, writer)
             for name, areas in wear_areas(context.case).items():
-                if f"pairs_{name}/position" in writer.group if writer.active else False:
-                    writer.dataset(f"pairs_{name}/area", areas, units="m2", long_name="nodal area")
-        reason = "; ".join(failures) or "; ".join(sorted({result["reason"] for result in results}))
+                if f"pairs_{name}" in writer.group:
+                    writer.dataset(f"pairs_{name}/area", areas, units="m^2", long_name="nodal area")
         writer.close("stopped" if failures else "done", reason)
     finally:
         writer.abandon()
     if context.comm.rank == 0 and writer.rows:
         shutil.rmtree(folder, ignore_errors=True)
-    summary = [result["summary"] for result in results if isinstance(result, dict)]
     goal = f"{analysis.cycles:g} normalised cycles at every amplitude, or wear that stops"
-    return Outcome(writer.rows, reason, not failures, summary, goal)
+    return Outcome(writer.rows, reason, not failures, [result["summary"] for result in marched], goal)
+
+
+def _failures(analysis: WearAnalysis, lines: list[Line], results: list[Any]) -> list[str]:
+    """Amplitudes whose line did not end as it should, with the reason."""
+    why = {line.number: _why(result) for line, result in zip(lines, results)}
+    reasons = [why.get(number, "not reached by the mode") for number in range(len(analysis.amplitude))]
+    return [f"a = {amplitude:g} m: {text}" for amplitude, text in zip(analysis.amplitude, reasons) if text]
+
+
+def _writer(context: AnalysisContext, analysis: WearAnalysis, unit: float, marched: dict[str, Any]) -> AnalysisWriter:
+    """The common table. The run folder is open since the starts were found."""
+    context = replace(context, before_first=lambda: None, fields=fields(context.case))
+    return context.writer(
+        columns(context.case),
+        labels=str(marched.get("labels", "")).split(),
+        cycle_unit=unit,
+        wear_coefficient=analysis.coefficient,
+        samples=marched.get("samples"),
+        load_scale=marched.get("load_scale"),
+    )
 
 
 def _why(result: Any) -> str:
