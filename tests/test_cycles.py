@@ -151,3 +151,14 @@ def test_time_points_are_spread_over_the_resonance_and_contain_the_peak():
     assert len(chosen) == 3
     assert int(np.argmax(response["amplitude"])) in chosen
     assert (response["amplitude"][chosen] >= 0.9 * response["amplitude"].max()).all()
+
+
+@pytest.mark.ranks(1)
+def test_undamped_stretch_is_no_limit_cycle():
+    """Damping that is rounding while the contact sticks has no sign; a real change of sign is found."""
+    amplitude, omega = np.geomspace(1e-5, 1e-3, 21), np.full(21, 25.0)
+    zeta = np.where(np.arange(21) < 8, -1e-21 * np.arange(21), 1e-4 * (np.arange(21) - 7.5))
+    assert ModeCurve(amplitude, omega, omega, zeta).crossings() == []
+    zeta[15:] = -1e-4
+    (crossing,) = ModeCurve(amplitude, omega, omega, zeta).crossings()
+    assert amplitude[14] < crossing.amplitude < amplitude[15] and not crossing.stable

@@ -1,4 +1,4 @@
-"""Pictures of the blisk: mesh, mode shape around the wheel, families, and the sweep of friction coefficients."""
+"""Pictures of the blisk: mesh, mode shape around the wheel, and families."""
 
 from __future__ import annotations
 
@@ -16,7 +16,6 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from fretwave.faces import rotation
 
 Array = npt.NDArray[np.float64]
-STYLES = ("-", "--", "-.", ":", (0, (4, 1, 1, 1, 1, 1)))
 DISK, RING = "#8fb3cf", "#d1495b"
 
 
@@ -95,31 +94,5 @@ def families(table: Array, exact: dict[int, Array], path: Path) -> None:
         axes.plot([diameters] * len(values), values / 1e3, "x", ms=8, color="#d1495b", label=label)
     axes.set(xlabel="nodal diameters", ylabel="frequency [kHz]", ylim=(0, None), xticks=range(0, len(table), 2))
     axes.legend(frameon=False, loc="upper left")
-    figure.savefig(path, dpi=130)
-    plt.close(figure)
-
-
-def sweep(tables: list[list[dict[str, float]]], stuck_hz: float, sliding_hz: float, path: Path) -> None:
-    """Frequency and damping over amplitude, and over amplitude per friction coefficient where all curves are one."""
-    figure, axes = plt.subplots(2, 2, sharey="row", sharex="col", figsize=(10, 6.5), constrained_layout=True)
-    for number, table in enumerate(tables):
-        mu = table[0]["friction"]
-        for column, scale in enumerate((1e3, 1e3 / mu)):
-            x = scale * np.array([row["amplitude"] for row in table])
-            look = {"color": plt.cm.viridis(number / len(tables)), "linestyle": STYLES[number] if column else "-"}
-            axes[0, column].plot(x, [row["frequency_hz"] for row in table], label=f"$\\mu$ = {mu:g}", **look)
-            axes[1, column].plot(x, [100 * row["zeta"] for row in table], **look)
-    for column, label in enumerate(("amplitude of the tip [mm]", "amplitude of the tip / $\\mu$ [mm]")):
-        axes[1, column].set(xscale="log", xlabel=label, ylim=(0, None))
-        for value in (stuck_hz, sliding_hz):
-            axes[0, column].axhline(value, color="0.5", lw=0.8, ls=":")
-    bottom, top = axes[0, 0].get_ylim()
-    axes[0, 0].set_ylim(bottom, top + 0.08 * (top - bottom))  # room for a label above the upper line
-    for text, value in (("ring stuck", stuck_hz), ("ring slides, always closed", sliding_hz)):
-        place = {"xytext": (6, 4), "textcoords": "offset points", "color": "0.4", "ha": "left"}
-        axes[0, 0].annotate(text, (0, value), xycoords=("axes fraction", "data"), **place)
-    axes[0, 0].set_ylabel("frequency [Hz]")
-    axes[1, 0].set_ylabel("damping ratio [%]")
-    axes[1, 1].legend(*axes[0, 0].get_legend_handles_labels(), loc="upper left", frameon=False)
     figure.savefig(path, dpi=130)
     plt.close(figure)

@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 
 from .mode import limit_cycles
+from .mode_curve import NO_DAMPING
 
-#: Damping ratios closer to zero than this have no sign: the rounding of a branch.
-NO_DAMPING = 1e-10
 STABLE = {True: "stable", False: "unstable", None: "unknown"}
 
 

@@ -13,6 +13,8 @@ Array = npt.NDArray[np.float64]
 
 #: weights of (log amplitude, relative frequency, damping ratio) in the length along the curve: all of order one
 LENGTH_WEIGHTS = (1.0, 10.0, 20.0)
+#: Damping ratios closer to zero than this have no sign: the rounding of a branch.
+NO_DAMPING = 1e-10
 
 
 @dataclass(frozen=True)
@@ -43,7 +45,7 @@ class ModeCurve:
     """
 
     def __init__(self, amplitude: Array, omega: Array, omega0: Array, zeta: Array) -> None:
-        values = np.column_stack([np.log(amplitude), omega, omega0, zeta])
+        values = np.column_stack([np.log(amplitude), omega, omega0, np.where(np.abs(zeta) > NO_DAMPING, zeta, 0.0)])
         length = _length(values)
         keep = np.concatenate([[True], np.diff(length) > 1e-12 * length[-1]])
         self._curve = PchipInterpolator(length[keep], values[keep], axis=0)
@@ -83,9 +85,17 @@ class ModeCurve:
         return [float(a) for a in np.exp(self._log_amplitude(roots[np.isfinite(roots)]))]
 
     def crossings(self) -> list[Crossing]:
-        """Zeros of the damping ratio in the order of the branch."""
+        """Zeros of the damping ratio in the order of the branch, not where it stays zero."""
         roots = np.unique(self._zeta.roots(discontinuity=False, extrapolate=False))
-        return [self._crossing(s) for s in roots[np.isfinite(roots)]]
+        return [self._crossing(s) for s in roots[np.isfinite(roots)] if self._changes_sign(s)]
+
+    def _changes_sign(self, length: float) -> bool:
+        """Damped on one side and fed on the other; at an end of the branch, one of both."""
+        x = self._zeta.x
+        near = 1e-9 * x[-1]
+        sides = [x[x < length - near][-1:], x[x > length + near][:1]]
+        values = [float(self._zeta(side[0])) for side in sides if len(side)]
+        return all(values) and (len(values) < 2 or values[0] * values[1] < 0)
 
     def _crossing(self, length: float) -> Crossing:
         log_amplitude, omega = self._curve(length)[:2]

@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ..analyses.mode_curve import NO_DAMPING
 from . import style
 from .data import Analysis, Run, Table
 
@@ -188,7 +189,7 @@ def _shifted(run: Run, mode: Analysis) -> dict[str, Table]:
 
 
 def _unstable(mode: Analysis) -> bool:
-    return bool((mode.columns["zeta"] < 0.0).any())
+    return bool((mode.columns["zeta"] < -NO_DAMPING).any())
 
 
 def _same_mode(modes: Sequence[Analysis]) -> list[list[Analysis]]:
