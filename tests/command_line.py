@@ -7,10 +7,10 @@ import sys
 from fretwave.cli import main
 
 
-def call(*arguments: str) -> int:
+def call(*arguments: object) -> int:
     """Exit code of ``fretwave ...``; the hook it sets for uncaught errors is taken back."""
     hook = sys.excepthook
     try:
-        return main(list(arguments))
+        return main([str(argument) for argument in arguments])
     finally:
         sys.excepthook = hook

@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from wear_case import call, write_case
+from command_line import call
+from wear_case import write_case
 
 from fretwave.plots import plot_run, wear, wear_lines, wear_pairs
 from fretwave.plots.data import Run

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import call
+from rubbing_sector import BUILDER, SECTOR
 
 import fretwave as fw
 from fretwave.casefile import load_case
@@ -20,34 +21,8 @@ from fretwave.wheel import on_wheel
 
 pytest.importorskip("skfem")
 
-BUILDER = Path(__file__).parent / "built_sector.py"
 #: All component modes there are, faces whole: nothing is left out.
-TEXT = """
-[model]
-builder = "model.py"
-mass_damping = 2.0
-
-[reduction]
-modes = 80
-
-[[contact]]
-name = "pads"
-law = "coulomb_3d"
-friction_coefficient = 0.1
-
-[preload]
-loads = ["weight"]
-
-[[analysis]]
-name = "mode"
-type = "mode"
-nodal_diameter = 2
-harmonics = 3
-samples = 96
-normalise = "tip"
-amplitude = [5e-6, 2e-5]
-report_at = [1e-5]
-"""
+TEXT = SECTOR + "\n[reduction]\nmodes = 80\n"
 MODES = ("modes = 80", 'modes = 12\ninterface = "modes"\ninterface_diameters = [2, 0]\ninterface_waves = 4')
 
 

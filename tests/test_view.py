@@ -9,6 +9,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from chain_case import BUILDER, CHAIN
 from command_line import call
 from vtkhdf_files import read_step
 
@@ -18,28 +19,9 @@ from fretwave.vtkhdf import HEXAHEDRON
 
 pytestmark = pytest.mark.ranks(1)
 
-BUILDER = Path(__file__).parent / "built_chain.py"
-#: All 12 component modes: the expanded motion solves the unreduced equations.
-TEXT = """
-title = "Chain on two pads"
-
-[model]
-builder = "model.py"
-mass_damping = 2.0
-
-[reduction]
-modes = 12
-
-[preload]
-pair_loads = false
-loads = ["weight"]
-
-[[contact]]
-name = "pads"
-law = "coulomb_3d"
-friction_coefficient = 0.4
-tangential_stiffness_per_area = 2e10
-
+TEXT = (
+    CHAIN
+    + """
 [[analysis]]
 name = "mode"
 type = "mode"
@@ -69,6 +51,7 @@ force = { tip = 0.05 }
 frequency = [205.0, 220.0]
 levels = [1.0]
 """
+)
 METHODS = ["mode", "periodic"]
 #: Newton's rest, relative to the largest force of the fundamental.
 BALANCE = 1e-7

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 from command_line import call
+from rubbing_sector import BUILDER, SECTOR
 from vtkhdf_files import read_step, skewed_mesh
 
 import fretwave as fw
@@ -25,30 +26,6 @@ pytest.importorskip("skfem")
 
 from built_sector import build  # noqa: E402
 
-BUILDER = Path(__file__).parent / "built_sector.py"
-TEXT = """
-[model]
-builder = "model.py"
-mass_damping = 2.0
-
-[[contact]]
-name = "pads"
-law = "coulomb_3d"
-friction_coefficient = 0.1
-
-[preload]
-loads = ["weight"]
-
-[[analysis]]
-name = "mode"
-type = "mode"
-nodal_diameter = 2
-harmonics = 3
-samples = 96
-normalise = "tip"
-amplitude = [5e-6, 2e-5]
-report_at = [1e-5]
-"""
 SECTORS, DIAMETERS, PHASES = 6, 2, 24
 #: From one sector to the next theta = 2 pi 2 / 6 of delay, in steps.
 DELAY = PHASES * DIAMETERS // SECTORS
@@ -64,7 +41,7 @@ VARIANTS = {
 def solved(folder: Path, variant: str) -> Path:
     """A run folder."""
     shutil.copy(BUILDER, folder / "model.py")
-    text = TEXT
+    text = SECTOR
     if variant == MODES:
         text = text.replace("[[contact]]", MODES + "[[contact]]")
     elif variant == "wheel":
@@ -245,7 +222,7 @@ def test_some_sectors(plain: Path, tmp_path: Path, capfd) -> None:
 def test_a_wheel_without_axis_is_refused(tmp_path: Path, capfd) -> None:
     """Its sectors cannot be placed, one of them can be shown."""
     (tmp_path / "model.py").write_text(BUILDER.read_text().replace('        axis="z",\n    )', "    )"))
-    (tmp_path / "case.toml").write_text(TEXT.replace('loads = ["weight"]', ""))
+    (tmp_path / "case.toml").write_text(SECTOR.replace('loads = ["weight"]', ""))
     arguments = ["--set", "mode.amplitude=[5e-6, 5.1e-6]", "--set", "mode.report_at=[]", "--no-plots"]
     assert call("run", str(tmp_path / "case.toml"), "--out", str(tmp_path / "run"), *arguments) == 0
     assert call("view", str(tmp_path / "run")) == 2

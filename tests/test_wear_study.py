@@ -7,8 +7,9 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from command_line import call
 from mpi4py import MPI
-from wear_case import call, write_case
+from wear_case import write_case
 
 from fretwave.casefile import load_case
 from fretwave.plots.data import Run

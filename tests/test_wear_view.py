@@ -8,8 +8,9 @@ import h5py
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from command_line import call
 from test_view import read_step
-from wear_case import call, write_case
+from wear_case import write_case
 
 import fretwave as fw
 from fretwave.vtkhdf import TRIANGLE, VERTEX

@@ -3,32 +3,13 @@
 from __future__ import annotations
 
 import shutil
-import sys
 from pathlib import Path
 
-from fretwave.cli import main
+from chain_case import BUILDER, CHAIN
 
-BUILDER = Path(__file__).parent / "built_chain.py"
-TEXT = """
-title = "Chain on two pads"
-
-[model]
-builder = "model.py"
-mass_damping = 2.0
-
-[reduction]
-modes = 12
-
-[preload]
-pair_loads = false
-loads = ["weight"]
-
-[[contact]]
-name = "pads"
-law = "coulomb_3d"
-friction_coefficient = 0.4
-tangential_stiffness_per_area = 2e10
-
+TEXT = (
+    CHAIN
+    + """
 [[analysis]]
 name = "mode"
 type = "mode"
@@ -54,15 +35,7 @@ amplitude = [2.5e-6]
 cycles = 8.0
 coefficient = 1e-13
 """
-
-
-def call(*arguments: str) -> int:
-    """The command line, without its hook for exceptions left behind."""
-    hook = sys.excepthook
-    try:
-        return main([str(argument) for argument in arguments])
-    finally:
-        sys.excepthook = hook
+)
 
 
 def write_case(folder: Path) -> Path:
