@@ -18,7 +18,7 @@ from petsc4py import PETSc
 import fretwave as fw
 from fretwave.analyses.context import AnalysisContext
 from fretwave.analyses.wheel_shape import one_by_one, participation, signed, wave_content
-from fretwave.analyses.wheel_start import start_of
+from fretwave.analyses.wheel_start import start_of, uneven_samples
 from fretwave.casefile import load_case
 from fretwave.console import Console
 from fretwave.errors import CaseErrors
@@ -285,6 +285,16 @@ def test_measures_of_a_shape():
     assert participation(np.cos(2 * np.pi * j / 12) + 0j) == pytest.approx(2 / 3)
     assert participation((j == 4) + 0j) == pytest.approx(1 / 12)
     assert [signed(k, 6) for k in range(6)] == [0, 1, 2, 3, -2, -1] and signed(3, 5) == -2
+
+
+@pytest.mark.ranks(1)
+@pytest.mark.parametrize(
+    ("samples", "sectors", "diameters", "better"), [(128, 150, 25, 132), (360, 36, 4, None), (64, 7, 2, 70)]
+)
+def test_samples_that_differ_from_sector_to_sector_are_told(samples, sectors, diameters, better):
+    note = uneven_samples(samples, sectors, diameters)
+    assert note is None if better is None else f"samples = {better} " in note
+    assert better is None or uneven_samples(better, sectors, diameters) is None
 
 
 @pytest.mark.ranks(1)

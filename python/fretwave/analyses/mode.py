@@ -16,7 +16,7 @@ from .branch import finished_table, open_branch, points_of, record, step_control
 from .context import AnalysisContext, Outcome
 from .rest import keep_pairs, retained
 from .wheel_shape import WHEEL, WheelShape, finish_wheel, one_by_one
-from .wheel_start import Start, start_of
+from .wheel_start import Start, start_of, uneven_samples
 
 
 def run_mode(context: AnalysisContext) -> Outcome:
@@ -29,6 +29,10 @@ def run_mode(context: AnalysisContext) -> Outcome:
     context.console.line(asymptote_line(context.name, start.mode.omega, start.asymptotes))
     harmonics = retained(context)
     context.leave_out(harmonics.left_out)
+    if start.avoid is not None:
+        note = uneven_samples(harmonics.samples, context.wheel.sectors, analysis.nodal_diameter or 0)
+        if note is not None:
+            context.console.line(f"note: {context.name}: {note}")
     problem = fretwave.NonlinearMode(
         context.model, harmonics, analysis.method, start.dof, start.mode, context.prefix, start.avoid
     )

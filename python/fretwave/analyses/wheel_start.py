@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -159,6 +160,22 @@ def _wave(context: AnalysisContext, tuned: LinearMode, sector: int) -> tuple[Lin
     crest = phi[context.case.dof(analysis.normalise, sector)]
     phi *= np.sqrt(2) * abs(crest) / crest
     return LinearMode(mode.omega, mode.beta, phi.real.copy(), np.zeros(len(phi))), phi.imag + 0j
+
+
+def uneven_samples(samples: int, sectors: int, diameters: int) -> Optional[str]:
+    """What to say when the sectors of a wave see its period at different samples; None when all see the same.
+
+    The delay from one sector to the next, ND/N of a period, must be a whole number of samples. If not, each sector
+    meets the kinks of its contact forces between other samples, and the wheel differs from one sector by aliasing.
+    """
+    if samples * diameters % sectors == 0:
+        return None
+    unit = 2 * sectors // math.gcd(2 * diameters, sectors)  # even, as the number of samples is
+    nearest = unit * -(-samples // unit)
+    return (
+        f"sectors see this wave at different samples: {samples} * {diameters} is no multiple of {sectors}"
+        f" (samples = {nearest} would be the same in all)"
+    )
 
 
 def _largest(context: AnalysisContext, mode: LinearMode) -> int:
