@@ -17,10 +17,11 @@ from petsc4py import PETSc
 
 import fretwave as fw
 from fretwave.analyses.context import AnalysisContext
-from fretwave.analyses.wheel_shape import one_by_one, participation, signed, wave_content
+from fretwave.analyses.wheel_shape import one_by_one, participation, wave_content
 from fretwave.analyses.wheel_start import start_of, uneven_samples
 from fretwave.casefile import load_case
 from fretwave.console import Console
+from fretwave.engine_order import folded
 from fretwave.errors import CaseErrors
 from fretwave.run import RunOptions, build_model, run_case
 from fretwave.schema import MistuningSection
@@ -284,7 +285,7 @@ def test_measures_of_a_shape():
     assert participation(np.exp(1j * j)) == pytest.approx(1.0)
     assert participation(np.cos(2 * np.pi * j / 12) + 0j) == pytest.approx(2 / 3)
     assert participation((j == 4) + 0j) == pytest.approx(1 / 12)
-    assert [signed(k, 6) for k in range(6)] == [0, 1, 2, 3, -2, -1] and signed(3, 5) == -2
+    assert [folded(k, 6) for k in range(6)] == [0, 1, 2, 3, -2, -1] and folded(3, 5) == -2
 
 
 @pytest.mark.ranks(1)

@@ -33,7 +33,6 @@ class WheelPreconditioner : public solve::Preconditioner {
   Blocks average(Mat A) const;
   bool symmetric() const;
   void find_order();
-  void find_contact_rows();
   bool moved(Exponents const&) const;
   void factorise(Exponents const&, std::vector<double> const& shares);
   CirculantBlocks<complex> blocks(int harmonic, Exponents const&) const;

@@ -65,6 +65,25 @@ def record(
     return row
 
 
+def mode_problem(context: Any, harmonics: Any, mode: Any, rest: Any, dof: int | None = None, avoid: Any = None) -> Any:
+    """The nonlinear mode of an analysis about its static state. Collective.
+
+    Parameters
+    ----------
+    mode, rest : linear mode to start from, and static state (or None)
+    dof : normalised; by default the one that the analysis names
+    avoid : as in `fretwave.NonlinearMode`
+    """
+    import fretwave
+
+    analysis = context.analysis
+    number = context.case.dof(analysis.normalise) if dof is None else dof
+    problem = fretwave.NonlinearMode(context.model, harmonics, analysis.method, number, mode, context.prefix, avoid)
+    if rest is not None:
+        problem.preload(rest.displacement, rest.load)
+    return problem
+
+
 def points_of(branch: Any) -> Iterator[Any]:
     """Points of a branch; their vectors are freed a point later, for the branch may look back at its last one."""
     before = None

@@ -17,7 +17,7 @@ from ..schema import ForcedAnalysis
 from .branch import step_control
 from .context import AnalysisContext
 from .rest import rest_state, start_mode
-from .wheel_start import _sector as tuned_sector
+from .wheel_start import tuned_sector
 
 
 @dataclass

@@ -19,7 +19,7 @@ from typing import Any
 from ..aerodynamics_case import diameters_of
 from ..columns import FLUTTER
 from ..schema import FlutterAnalysis
-from .branch import finished_table, open_branch, points_of, record, step_control
+from .branch import finished_table, mode_problem, open_branch, points_of, record, step_control
 from .context import AnalysisContext, Outcome
 from .flutter_waves import STABLE, describe_waves, with_sign, words
 from .mode import point_line
@@ -91,15 +91,8 @@ class _Wave:
 
     def _problem(self, context: AnalysisContext) -> Any:
         """Started from the mode of the structure alone; the flow bends it little."""
-        import fretwave
-
-        analysis = self.analysis
-        start, rest = start_mode(context, analysis.linear_mode)
-        dof = context.case.dof(analysis.normalise)
-        problem = fretwave.NonlinearMode(context.model, self.harmonics, analysis.method, dof, start, context.prefix)
-        if rest is not None:
-            problem.preload(rest.displacement, rest.load)
-        return problem
+        start, rest = start_mode(context, self.analysis.linear_mode)
+        return mode_problem(context, self.harmonics, start, rest)
 
     def _branch(self, problem: Any, snapshot: Any, go_on: bool) -> Any:
         import fretwave

@@ -12,7 +12,7 @@ import numpy as np
 from ..columns import MODE
 from ..schema import ModeAnalysis
 from .asymptotes import asymptote_line
-from .branch import finished_table, open_branch, points_of, record, step_control
+from .branch import finished_table, mode_problem, open_branch, points_of, record, step_control
 from .context import AnalysisContext, Outcome
 from .rest import keep_pairs, retained
 from .wheel_shape import WHEEL, WheelShape, finish_wheel, one_by_one
@@ -21,8 +21,6 @@ from .wheel_start import Start, start_of, uneven_samples
 
 def run_mode(context: AnalysisContext) -> Outcome:
     """Continue the mode from its first to its last amplitude. Collective."""
-    import fretwave
-
     analysis = context.analysis
     assert isinstance(analysis, ModeAnalysis)
     start = start_of(context)
@@ -33,11 +31,7 @@ def run_mode(context: AnalysisContext) -> Outcome:
         note = uneven_samples(harmonics.samples, context.wheel.sectors, analysis.nodal_diameter or 0)
         if note is not None:
             context.console.line(f"note: {context.name}: {note}")
-    problem = fretwave.NonlinearMode(
-        context.model, harmonics, analysis.method, start.dof, start.mode, context.prefix, start.avoid
-    )
-    if start.rest is not None:
-        problem.preload(start.rest.displacement, start.rest.load)
+    problem = mode_problem(context, harmonics, start.mode, start.rest, start.dof, start.avoid)
     writer = context.writer(
         [*MODE[:-1], *(WHEEL if context.case.wheel else ()), MODE[-1]],
         labels=harmonics.labels,

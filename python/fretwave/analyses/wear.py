@@ -19,7 +19,7 @@ from ..errors import FretwaveError, NotConverged
 from ..parallel import on_first_rank
 from ..results import AnalysisWriter, open_results
 from ..schema import ModeAnalysis, WearAnalysis
-from .branch import points_of, step_control
+from .branch import mode_problem, points_of, step_control
 from .context import AnalysisContext, Outcome
 from .rest import keep_pairs, retained, start_mode
 from .wear_line import LINE, Line, columns, fields, wear_areas
@@ -70,16 +70,7 @@ def unworn_starts(context: AnalysisContext, analysis: WearAnalysis) -> dict[str,
     stuck, rest = start_mode(context, settings.linear_mode)
     harmonics = retained(context)
     context.leave_out(harmonics.left_out)
-    problem = fretwave.NonlinearMode(
-        context.model,
-        harmonics,
-        method=settings.method,
-        dof=context.case.dof(settings.normalise),
-        start=stuck,
-        prefix=context.prefix,
-    )
-    if rest is not None:
-        problem.preload(rest.displacement, rest.load)
+    problem = mode_problem(context, harmonics, stuck, rest)
     low, high = min(settings.amplitude[0], *analysis.amplitude), max(settings.amplitude[1], *analysis.amplitude)
     branch = fretwave.Continuation(
         problem, problem.initial(low), (low, high), step_control(settings.step), sorted(analysis.amplitude)

@@ -16,7 +16,7 @@ from ..console import Console
 from ..results import AnalysisWriter, Field
 from ..schema import ModeAnalysis, WearAnalysis
 from ..sectors import nodal_diameter
-from .branch import finished_table, open_branch
+from .branch import finished_table, mode_problem, open_branch
 from .context import AnalysisContext
 from .rest import retained, start_mode
 
@@ -84,8 +84,6 @@ def march_line(context: AnalysisContext, settings: ModeAnalysis, unit: float, li
     dict
         status, reason, summary and what else the common table needs.
     """
-    import fretwave
-
     from ..run import build_model
 
     case, analysis = context.case, context.analysis
@@ -94,11 +92,7 @@ def march_line(context: AnalysisContext, settings: ModeAnalysis, unit: float, li
         quiet = Console(False)
         own = replace(context, model=model, comm=group, analysis=settings, console=quiet, arrays={}, left_out=[])
         stuck, rest = start_mode(own, settings.linear_mode)
-        dof = case.dof(settings.normalise)
-        problem = fretwave.NonlinearMode(model, retained(own), settings.method, dof, stuck, context.prefix)
-        if rest is not None:
-            problem.preload(rest.displacement, rest.load)
-        with problem:
+        with mode_problem(own, retained(own), stuck, rest) as problem:
             return _Marcher(context, own, problem, unit, line).run()
 
 

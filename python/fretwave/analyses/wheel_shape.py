@@ -19,6 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..columns import Column
+from ..engine_order import folded
 from ..harmonic_motion import complex_amplitudes
 from .context import AnalysisContext
 
@@ -43,11 +44,6 @@ HELD = 1e-8
 def wave_content(a: Complex) -> Complex:
     """c_n of n = 0 .. N - 1, of sectors' amplitudes along the last axis."""
     return np.asarray(np.fft.ifft(a))
-
-
-def signed(n: int, sectors: int) -> int:
-    """Nodal diameters of the wave with spatial index n: backward ones negative, N/2 positive."""
-    return n - sectors if 2 * n > sectors else n
 
 
 def participation(a: Complex) -> float:
@@ -94,7 +90,7 @@ class WheelShape:
             "amplification": float(np.abs(a).max() / (self.tuned * np.sqrt(np.real(q.conj() @ inertia)))),
             "participation": participation(a),
             "largest_sector": int(np.argmax(np.round(np.abs(a) / np.abs(a).max(), 9))),
-            "diameters": signed(most, self.wheel.sectors),
+            "diameters": folded(most, self.wheel.sectors),
             "diameters_share": float(share[most]),
             "unfolding": float(held * np.linalg.norm(unfolding)),
         }
@@ -116,7 +112,7 @@ def finish_wheel(context: AnalysisContext, writer: Any, start: Any) -> list[str]
     sector = {"sector": np.tile(np.arange(n), len(where)), "sector_amplitude": np.abs(a).ravel()}
     context.write_table("sectors", {**shared, **sector, "phase": np.angle(a).ravel()})
     content = np.abs(wave_content(a)) ** 2
-    diameters = np.tile([signed(k, n) for k in range(n)], len(where))
+    diameters = np.tile([folded(k, n) for k in range(n)], len(where))
     share = content / content.sum(axis=1, keepdims=True)
     context.write_table("diameters", {**shared, "nodal_diameter": diameters, "share": share.ravel()})
     deviations = context.wheel.deviations

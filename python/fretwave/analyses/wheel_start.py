@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
 
+from ..aerodynamics import period_of
 from ..cyclic import wave_mode
 from ..modes import LinearMode
 from .asymptotes import most_alike, other_asymptote
@@ -97,7 +98,7 @@ def _on_wheel(context: AnalysisContext) -> Start:
 
 
 @contextmanager
-def _sector(context: AnalysisContext) -> Iterator[AnalysisContext]:
+def tuned_sector(context: AnalysisContext) -> Iterator[AnalysisContext]:
     """The same analysis of the tuned sector alone. Collective."""
     from ..run import build_model
 
@@ -111,7 +112,7 @@ def _sector(context: AnalysisContext) -> Iterator[AnalysisContext]:
 def _tuned(context: AnalysisContext) -> tuple[LinearMode, dict[str, float]]:
     """Linear mode of the tuned sector in the wave that the analysis names, and its other asymptote. Collective."""
     analysis: Any = context.analysis
-    with _sector(context) as sector:
+    with tuned_sector(context) as sector:
         stuck, _ = start_mode(sector, analysis.linear_mode)
         return stuck, other_asymptote(sector, stuck)
 
@@ -136,7 +137,7 @@ def _family(context: AnalysisContext, mode: LinearMode) -> Any:
     diameters = int(np.argmax([np.real(c.conj() @ (M @ c)) for c in waves]))
     named = analysis.model_copy(update={"nodal_diameter": diameters})
     count = min(wheel.unit, analysis.linear_mode // wheel.sectors + MORE_FAMILIES)
-    with _sector(replace(context, analysis=named)) as sector:
+    with tuned_sector(replace(context, analysis=named)) as sector:
         modes = sector.linear_mode("stuck", count)
     shares = [abs((m.shape - 1j * m.imaginary) @ (M @ waves[diameters])) for m in modes]
     return named.model_copy(update={"linear_mode": 1 + int(np.argmax(shares))})
@@ -168,9 +169,10 @@ def uneven_samples(samples: int, sectors: int, diameters: int) -> Optional[str]:
     The delay from one sector to the next, ND/N of a period, must be a whole number of samples. If not, each sector
     meets the kinks of its contact forces between other samples, and the wheel differs from one sector by aliasing.
     """
-    if samples * diameters % sectors == 0:
+    period = period_of(diameters, sectors)
+    if samples % period == 0:
         return None
-    unit = 2 * sectors // math.gcd(2 * diameters, sectors)  # even, as the number of samples is
+    unit = math.lcm(2, period)  # even, as the number of samples is
     nearest = unit * -(-samples // unit)
     return (
         f"sectors see this wave at different samples: {samples} * {diameters} is no multiple of {sectors}"

@@ -9,7 +9,8 @@ import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..analyses.wheel_shape import signed, wave_content
+from ..analyses.wheel_shape import wave_content
+from ..engine_order import folded
 from ..harmonic_motion import complex_amplitudes
 from . import style
 from .data import Analysis, Run
@@ -89,7 +90,7 @@ def _sectors(axes: Axes, mode: Analysis, point: int, a: Complex) -> None:
 
 def _waves(axes: Axes, a: Complex) -> None:
     share = np.abs(wave_content(a)) ** 2
-    diameters = np.array([signed(k, len(a)) for k in range(len(a))])
+    diameters = np.array([folded(k, len(a)) for k in range(len(a))])
     axes.bar(diameters, share / share.sum(), color=np.where(diameters < 0, style.ORANGE, style.GREEN), width=0.8)
     axes.grid(axis="x", visible=False)
 
