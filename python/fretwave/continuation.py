@@ -20,21 +20,25 @@ Array = npt.NDArray[np.float64]
 ALIASING_LIMIT = 1e-3
 
 
+#: Of a snapshot: the last anchor and the one before it.
+_VECTORS = ("y", "tangent", "before_y", "before_tangent")
+
+
 @dataclass(frozen=True)
 class StepControl:
     """Arclength steps; 0.1 is about a tenth of the motion's own size, or of log amplitude.
 
     Attributes
     ----------
-    target_newton : steps grow below this many iterations and shrink above
     max_angle : largest turn [rad] of the branch in one step; longer steps are halved
+    max_error : largest distance between the branch and the cubic through its points and tangents; likewise
     """
 
     initial: float = 0.05
     minimum: float = 1e-9
     maximum: float = 0.3
-    target_newton: int = 4
     max_angle: float = 0.6
+    max_error: float = 5e-4
     max_points: int = 5000
 
     def core(self) -> Any:
@@ -104,6 +108,7 @@ class Continuation:
             start = self._parameter(y0)
             upwards = bool(start < 0.5 * (low + high))
         self._upwards, self._restored, self._advice = upwards, False, ""
+        self.repeated: Point | None = None
 
     def _parameter(self, y: PETSc.Vec) -> float:
         return float(self.problem.core.parameter_value(self.last_entry(y)))
@@ -152,14 +157,20 @@ class Continuation:
         """The corrector, to look into or to set options on."""
         return self._core.snes
 
+    @property
+    def missed(self) -> list[str]:
+        """Reports and events that were asked for or seen and could not be had, each with its reason."""
+        return list(self._core.missed)
+
     def snapshot(self) -> dict[str, Any] | None:
-        """All that `restore` needs to go on bit for bit; on rank 0. Collective."""
-        y, tangent, step, index, emitted = self._core.anchor()
-        parts = [self.problem.model.comm.gather(v.getArray(readonly=True).copy()) for v in (y, tangent)]
-        if self.problem.model.comm.rank:
+        """All that `restore` needs to go on; on rank 0. Collective."""
+        state = dict(self._core.anchor())
+        comm = self.problem.model.comm
+        vectors = [name for name in _VECTORS if name in state]
+        parts = {name: comm.gather(state[name].getArray(readonly=True).copy()) for name in vectors}
+        if comm.rank:
             return None
-        whole = [np.concatenate(p) for p in parts if p is not None]
-        return {"y": whole[0], "tangent": whole[1], "step": step, "index": index, "emitted": emitted}
+        return {**state, **{name: np.concatenate(p) for name, p in parts.items() if p is not None}}
 
     @classmethod
     def restore(
@@ -170,12 +181,23 @@ class Continuation:
         steps: StepControl | None = None,
         report_at: Sequence[float] = (),
     ) -> Continuation:
-        """Goes on after the snapshot's point, on any number of ranks; rank 0 alone needs the snapshot. Collective."""
+        """Goes on after the snapshot's point, on any number of ranks; rank 0 alone needs the snapshot. Collective.
+
+        On the same ranks and the direct route the branch is the same bit for bit; elsewhere (another number of ranks,
+        or a preconditioner of another age) to the tolerance of the corrector. `repeated` is the last point handed out
+        before, solved again, to measure that by.
+        """
         snapshot = problem.model.comm.bcast(snapshot)
         assert snapshot is not None
-        y, tangent = (cls._scatter(problem, np.asarray(snapshot[name])) for name in ("y", "tangent"))
-        branch = cls(problem, y, stop, steps, report_at, upwards=True)
-        branch._core.restore(y, tangent, float(snapshot["step"]), int(snapshot["index"]), int(snapshot["emitted"]))
+        vectors = {name: cls._scatter(problem, np.asarray(snapshot[name])) for name in _VECTORS if name in snapshot}
+        upwards, began = bool(snapshot.get("upwards", True)), float(snapshot.get("began", np.nan))
+        branch = cls(problem, vectors["y"], stop, steps, report_at, upwards)
+        before = [vectors[name] for name in _VECTORS[2:] if name in vectors]
+        step, index, emitted = float(snapshot["step"]), int(snapshot["index"]), int(snapshot["emitted"])
+        point = branch._core.restore(
+            [vectors["y"], vectors["tangent"]], before, step, index, emitted, upwards, began
+        )
+        branch.repeated = None if point is None else Point(**point)
         branch._restored = True
         return branch
 

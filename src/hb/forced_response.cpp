@@ -4,8 +4,16 @@
 
 #include "error.h"
 #include "hb/nonlinear_mode.h"
+#include "text.h"
 
 namespace fretwave::hb {
+
+namespace {
+
+// Motion in units of the static deflection at the reference stiffness: a resonance of zeta = 5e-9.
+constexpr double unbounded = 1e8;
+
+}  // namespace
 
 ForcedResponse::ForcedResponse(model::Model const& model, Harmonics const& h, PetscInt dof, Vec P,
                                double level, double omega, Vec shape)
@@ -38,6 +46,27 @@ ScaledMotion ForcedResponse::motion(std::vector<double> const& z) const {
     out.dexponents[0].s.push_back(complex(0, n * omega_reference_));
   }
   return out;
+}
+
+std::string ForcedResponse::parameter_text(double value) const { return short_text(value) + " rad/s"; }
+
+std::string ForcedResponse::impossible(Vec y) {
+  const auto z = scalars(y);
+  if (!std::isfinite(z[0]) || !std::isfinite(z[1]) || !std::isfinite(z[2])) return "the motion is not finite";
+  return z[0] > 0 ? "" : "the frequency falls below zero";
+}
+
+std::string ForcedResponse::beyond(Vec y) {
+  double largest;
+  check(VecNorm(y, NORM_INFINITY, &largest));
+  return largest > unbounded ? "the response grows without bound" : "";
+}
+
+/// a da/ds > 0 before a peak of the observed amplitude a, with a^2 = c^2 + s^2 of its fundamental.
+std::vector<solve::TestFunction> ForcedResponse::tests(Vec y, Vec tangent) {
+  const auto z = scalars(y), dz = scalars(tangent);
+  const double square = z[1] * z[1] + z[2] * z[2];
+  return {{"peak", square > 0 ? (z[1] * dz[1] + z[2] * dz[2]) / square : 0, true, true}};
 }
 
 ForcedState ForcedResponse::state(Vec y) {

@@ -22,6 +22,10 @@ class ForcedResponse : public HarmonicProblem {
 
   double parameter_value(double entry) const override { return entry * omega_reference_; }
   double parameter_entry(double value) const override { return value / omega_reference_; }
+  std::string parameter_text(double value) const override;
+  std::string impossible(Vec y) override;
+  std::string beyond(Vec y) override;
+  std::vector<solve::TestFunction> tests(Vec y, Vec tangent) override;
 
  private:
   ScaledMotion motion(std::vector<double> const& z) const override;

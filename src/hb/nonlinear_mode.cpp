@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "error.h"
+#include "text.h"
 
 namespace fretwave::hb {
 
@@ -98,6 +99,15 @@ ModalState NonlinearMode::state(Vec y) {
 
 double NonlinearMode::parameter_value(double entry) const { return std::exp(entry); }
 double NonlinearMode::parameter_entry(double value) const { return std::log(value); }
+
+std::string NonlinearMode::parameter_text(double value) const { return "amplitude " + short_text(value); }
+
+std::string NonlinearMode::impossible(Vec y) {
+  const auto z = scalars(y);
+  if (!std::isfinite(z[0]) || !std::isfinite(z[1]) || !std::isfinite(std::exp(z[2])))
+    return "frequency, damping or amplitude is not finite";
+  return z[1] > 0 ? "" : "the frequency falls below zero";
+}
 
 std::vector<solve::TestFunction> NonlinearMode::tests(Vec y, Vec tangent) {
   const auto z = scalars(y), dz = scalars(tangent);

@@ -28,6 +28,8 @@ class NonlinearMode : public HarmonicProblem {
 
   double parameter_value(double entry) const override;
   double parameter_entry(double value) const override;
+  std::string parameter_text(double value) const override;
+  std::string impossible(Vec y) override;
   std::vector<solve::TestFunction> tests(Vec y, Vec tangent) override;
 
  private:

@@ -50,6 +50,12 @@ class Problem {
   /// What users call the parameter (an amplitude, a frequency) from the entry of y, and back.
   virtual double parameter_value(double entry) const = 0;
   virtual double parameter_entry(double value) const = 0;
+  /// A value of the parameter in words.
+  virtual std::string parameter_text(double value) const { return std::to_string(value); }
+  /// Why a solution cannot be a point of the branch (a frequency below zero); nothing if it can. Collective.
+  virtual std::string impossible(Vec /*y*/) { return {}; }
+  /// Why the branch leads nowhere from here (it grows without bound); nothing while it does. Collective.
+  virtual std::string beyond(Vec /*y*/) { return {}; }
 
   bool last_rank() const { return comm_rank(comm()) == comm_size(comm()) - 1; }
   VecHandle equations() const { return make_vector(comm(), local_equations()); }
