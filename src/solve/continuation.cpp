@@ -174,7 +174,7 @@ std::optional<Continuation::Trial> Continuation::step(double& length, double& an
       why = "the corrector lands on another branch";
       continue;
     }
-    const double by_newton = std::exp2((steps_.target_newton - trial.outcome.newton) / 2.0);
+    const double by_newton = std::exp2((steps_.target_newton - trial.outcome.effort) / 2.0);
     const double by_angle = 0.5 * steps_.max_angle / std::max(angle, 1e-12);
     next_length = std::min(steps_.maximum, length * std::clamp(std::min(by_newton, by_angle), 0.4, 2.0));
     if (angle > steps_.max_angle) {
