@@ -11,6 +11,7 @@ nb::object to_python(std::optional<solve::Point> const& p) {
   out["index"] = p->index, out["y"] = Petsc<Vec>{p->y}, out["tangent"] = Petsc<Vec>{p->tangent};
   out["parameter"] = p->parameter, out["step"] = p->step, out["event"] = p->event, out["wall_s"] = p->wall;
   out["newton"] = p->outcome.newton, out["linear"] = p->outcome.linear, out["residual"] = p->outcome.residual;
+  out["rounding"] = p->outcome.rounding, out["accepted"] = int(p->outcome.accepted);
   return out;
 }
 

@@ -59,6 +59,8 @@ class Point:
     event : "", start, stop, report, fold, zero_damping or peak_damping
     step : arclength from the last regular point
     wall_s : seconds since the point before
+    rounding : error of the residual that rounding leaves, expected
+    accepted : 1 where the residual is below the tolerance, 0 where rounding let it fall no further
     """
 
     index: int
@@ -71,6 +73,8 @@ class Point:
     linear: int
     residual: float
     wall_s: float
+    rounding: float = 0.0
+    accepted: int = 1
 
 
 class Continuation:

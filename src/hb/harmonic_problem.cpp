@@ -169,6 +169,13 @@ double HarmonicProblem::rounding(Vec y) {
   return residual_.rounding() / (stiffness_ * motion_.amplitude);
 }
 
+bool HarmonicProblem::measure_in(double k) {
+  const bool changes = k != stiffness_;
+  stiffness_ = k;
+  if (changes) linearised_ = false;
+  return changes;
+}
+
 /// Line searches evaluate elsewhere: the point of linearisation is y, whatever was evaluated last.
 void HarmonicProblem::linearise(Vec y) {
   PetscBool same = PETSC_FALSE;

@@ -78,6 +78,8 @@ class HarmonicProblem : public solve::Problem {
  protected:
   virtual ScaledMotion motion(std::vector<double> const& z) const = 0;
   virtual double metric_weight(int /*scalar*/) const { return 1; }
+  /// Force rows are measured in k a from now on; true if that changed them.
+  bool measure_in(double k);
   Vec excitation() { return excitation_; }  ///< P, zero unless a variant sets it
   VecHandle pack(Vec q, std::vector<double> const& z) const;
 

@@ -32,6 +32,10 @@ class Problem {
   virtual void residual(Vec y, Vec r) = 0;
   /// Rounding error to expect in r(y): Newton stops there. Collective.
   virtual double rounding(Vec /*y*/) { return 0; }
+  /// Measures the rows in the forces that act at y from now on; true if that changed them. Collective.
+  virtual bool scale(Vec /*y*/) { return false; }
+  /// Relative change of what is read from y by a small step dy; 0 if nothing is known. Collective.
+  virtual double effect(Vec /*y*/, Vec /*dy*/) { return 0; }
   /// dr = J(y) dy, J is N x (N + 1). Collective.
   virtual void product(Vec y, Vec dy, Vec dr) = 0;
   /// Global places of J's entries contributed by this rank, and their values in the same order (places may

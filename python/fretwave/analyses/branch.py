@@ -50,6 +50,8 @@ def record(
         "newton": point.newton,
         "linear": point.linear,
         "wall_s": point.wall_s,
+        "rounding": point.rounding,
+        "accepted": point.accepted,
         "event": point.event,
     }
     motions = None
