@@ -13,7 +13,7 @@ nb::dict contact_summary(hb::ContactSummary const& s) {
   out["stick"] = s.stick / samples, out["slip"] = s.slip / samples, out["open"] = s.open / samples;
   out["error_estimate"] = s.total > 0 ? std::sqrt(s.truncated / s.total) : 0.0;
   out["aliasing"] = s.retained > 0 ? std::sqrt(s.aliased / s.retained) : 0.0;
-  out["work"] = s.work;
+  out["work"] = s.work, out["unclosed"] = s.unclosed, out["slip_path"] = s.path;
   return out;
 }
 

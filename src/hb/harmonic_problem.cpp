@@ -80,10 +80,10 @@ void HarmonicProblem::unpack(Vec y) {
   check(VecWAXPY(Q_, motion_.amplitude, q_, static_));
 }
 
-void HarmonicProblem::add_mean(Vec per_dof, Vec blocks) {
+void HarmonicProblem::set_mean(Vec per_dof, Vec blocks) {
   ReadArray in(per_dof);
   WriteArray out(blocks);
-  for (PetscInt i = 0; i < model().local_dofs(); ++i) out[i * harmonics().block_size()] += in[i];
+  for (PetscInt i = 0; i < model().local_dofs(); ++i) out[i * harmonics().block_size()] = in[i];
 }
 
 void HarmonicProblem::preload(Vec x, Vec P) {
@@ -91,8 +91,8 @@ void HarmonicProblem::preload(Vec x, Vec P) {
     throw InputError("a preloaded structure moves about a mean that is not retained",
                      "lowest harmonic " + std::to_string(harmonics().orders()[0]), "harmonic 0 retained",
                      "retain all harmonics");
-  add_mean(x, static_);
-  add_mean(P, static_load_);
+  set_mean(x, static_);
+  set_mean(P, static_load_);
   linearised_ = false;
 }
 
@@ -102,7 +102,7 @@ void HarmonicProblem::residual(Vec y, Vec r) {
   check(VecAXPBYPCZ(R_, -motion_.load, -1, 1, excitation_, static_load_));
   check(VecScale(R_, 1 / (stiffness_ * motion_.amplitude)));
   check(VecCopy(y, last_));
-  linearised_ = true;
+  linearised_ = true, contact_version_ = residual_.contact_version();
   const auto along = components(q_);
   WriteArray out(r);
   ReadArray in(R_);
@@ -169,10 +169,11 @@ double HarmonicProblem::rounding(Vec y) {
   return residual_.rounding() / (stiffness_ * motion_.amplitude);
 }
 
-/// Line searches evaluate elsewhere: the point of linearisation is y, whatever was evaluated last.
+/// Line searches evaluate elsewhere: the point of linearisation is y, whatever was evaluated last, and the
+/// laws are as they are now, whichever problem of the model has changed them.
 void HarmonicProblem::linearise(Vec y) {
   PetscBool same = PETSC_FALSE;
-  if (linearised_) check(VecEqual(y, last_, &same));
+  if (linearised_ && contact_version_ == residual_.contact_version()) check(VecEqual(y, last_, &same));
   if (same) return;
   VecHandle unused = equations();
   residual(y, unused);

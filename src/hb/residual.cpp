@@ -131,7 +131,8 @@ void Residual::wear(PerContact const& depth) {
           "contact '" + groups_[k].contact->name + "', " + std::to_string(depth[k].size()) + " depths",
           law.wears() ? std::to_string(law.pairs()) + " depths" : "a law with a normal direction",
           "wear contacts with law coulomb_3d");
-    if (!depth[k].empty()) law.wear(depth[k].data());
+    // on a rank without pairs too: all must agree that linearisations are of other depths
+    law.wear(depth[k].empty() ? nullptr : depth[k].data());
   }
 }
 
@@ -299,14 +300,22 @@ double* Residual::values(double scale, double* v) {
 }
 
 ContactSummary Residual::summarise(Vec Q, Exponents const& e) {
-  double sums[8] = {};
+  double sums[8] = {}, largest[2] = {};
   for (Group& group : groups_) {
     const auto s = group.aft.summarise(ReadArray(relative_motion(group, Q)).data(), e);
     const double parts[8] = {s.stick, s.slip, s.open, s.truncated, s.total, s.aliased, s.retained, s.work};
     for (int i = 0; i < 8; ++i) sums[i] += parts[i];
+    largest[0] = std::max(largest[0], s.unclosed), largest[1] = std::max(largest[1], s.path);
   }
   MPI_Allreduce(MPI_IN_PLACE, sums, 8, MPI_DOUBLE, MPI_SUM, model_.comm());
-  return {sums[0], sums[1], sums[2], sums[3], sums[4], sums[5], sums[6], sums[7]};
+  MPI_Allreduce(MPI_IN_PLACE, largest, 2, MPI_DOUBLE, MPI_MAX, model_.comm());
+  return {sums[0], sums[1], sums[2], sums[3], sums[4], sums[5], sums[6], sums[7], largest[0], largest[1]};
+}
+
+unsigned Residual::contact_version() const {
+  unsigned sum = 0;
+  for (Group const& group : groups_) sum += group.contact->law->version();
+  return sum;
 }
 
 void Residual::settle(Vec Q) {

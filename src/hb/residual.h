@@ -73,6 +73,8 @@ class Residual {
 
   /// Contact of the motion (Q, e), summed over all ranks and contacts. Collective.
   ContactSummary summarise(Vec Q, Exponents const& e);
+  /// Grows with every `settle` and `wear` of any problem that shares the laws; the same on every rank.
+  unsigned contact_version() const;
   /// The laws take the mean relative displacement of Q as their rest state. Collective.
   void settle(Vec Q);
   /// This rank's contact samples, one per contact.
