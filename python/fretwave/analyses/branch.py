@@ -12,8 +12,6 @@ from ..schema import StepSection
 
 #: Events at which the contact's motion over a period is kept.
 PLAIN_EVENTS = ("", "step")
-
-
 #: A slider's distance from where it began its period is rounding below these shares of slip path and amplitude.
 UNCLOSED_OF_PATH, UNCLOSED_OF_AMPLITUDE = 1e-6, 1e-12
 
@@ -54,6 +52,9 @@ def record(
     dict
         The row as written.
     """
+    from .. import _core
+
+    _core.fault_point("record")
     state, diagnostics = problem.state(point.y), problem.diagnostics(point.y)
     row = {
         **state,
