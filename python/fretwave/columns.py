@@ -86,6 +86,7 @@ _ALL = (
     Column("wall_s", "s", "wall time of the point"),
     Column("rounding", "1", "what rounding leaves in the scaled residual, expected"),
     Column("accepted", "1", "1: residual below the tolerance; 0: at rounding, without effect on the result", "i"),
+    Column("unclosed", "m", "largest distance of a slider from where it began its period"),
     Column("event", "", "what was met at the point", "s"),
 )
 COLUMNS = {column.name: column for column in _ALL}
@@ -101,6 +102,7 @@ _SHARED = (
     "wall_s",
     "rounding",
     "accepted",
+    "unclosed",
     "event",
 )
 MODE = ("point", "amplitude", "omega", "omega0", "frequency_hz", "beta", "zeta", *_SHARED)

@@ -19,7 +19,7 @@ from typing import Any
 from ..aerodynamics_case import diameters_of
 from ..columns import FLUTTER
 from ..schema import FlutterAnalysis
-from .branch import finished_table, mode_problem, open_branch, points_of, record, step_control
+from .branch import closure_note, finished_table, mode_problem, open_branch, points_of, record, step_control
 from .context import AnalysisContext, Outcome
 from .flutter_waves import STABLE, describe_waves, with_sign, words
 from .mode import point_line
@@ -107,7 +107,8 @@ class _Wave:
         low, high = self.analysis.amplitude
         share = (self.number + math.log(row["amplitude"] / low) / math.log(high / low)) / self.count
         line = point_line(f"{self.context.name} ND {with_sign(self.diameter):>3}", dict(row))
-        self.context.console.point(line, line, share, notable=row["event"] not in ("", "start", "stop"))
+        notable = row["event"] not in ("", "start", "stop") or bool(closure_note(row))
+        self.context.console.point(line, line, share, notable)
 
 
 def _write(context: AnalysisContext, waves: Sequence[Mapping[str, Any]], cycles: Sequence[Mapping[str, Any]]) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 
 from ..columns import FORCED
 from ..schema import ForcedAnalysis
-from .branch import finished_table, open_branch, points_of, record
+from .branch import closure_note, finished_table, open_branch, points_of, record
 from .context import AnalysisContext, Outcome
 from .excitation import Excitation, excitation_of
 from .forced_time import time_points
@@ -79,7 +79,9 @@ def _one_level(excitation: Excitation, writer: Any, number: int, snapshot: Any, 
     for point in points_of(branch):
         row = record(writer, problem, point, branch.snapshot(), {"level_number": number}, excitation.row)
         share = (number + (row["omega"] - low) / (high - low)) / len(analysis.levels)
-        context.console.point(point_line(context.name, row), _short(row), share, _notable(row["event"]))
+        context.console.point(
+            point_line(context.name, row), _short(row), share, _notable(row["event"]) or bool(closure_note(row))
+        )
     stopped = "" if branch.converged else f"level {analysis.levels[number]:g}: {branch.reason}"
     branch.destroy()
     problem.destroy()
@@ -98,6 +100,7 @@ def point_line(name: str, row: dict[str, Any]) -> str:
         f"  stick {100 * row['stick']:3.0f} %  error {row['error_estimate']:.1e}"
         f"  newton {row['newton']:2d}  {row['wall_s']:.3f} s"
         + (f"  {row['event'].replace('_', ' ')}" if row["event"] else "")
+        + closure_note(row)
     )
 
 
