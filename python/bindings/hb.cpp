@@ -103,6 +103,13 @@ void bind_hb(nb::module_& m) {
           },
           nb::keep_alive<1, 2>())
       .def("initial", [](StaticPreload& p) { return nb::steal(to_petsc4py(p.initial())); });
+  nb::class_<ForcedStart, HarmonicProblem>(m, "ForcedStart")
+      .def(
+          "__init__",
+          [](ForcedStart* self, ForcedResponse& to, Petsc<Vec> y) { new (self) ForcedStart(to, y.object); },
+          nb::keep_alive<1, 2>())
+      .def("initial", [](ForcedStart& p) { return nb::steal(to_petsc4py(p.initial())); })
+      .def("response", [](ForcedStart& p, Petsc<Vec> y) { return nb::steal(to_petsc4py(p.response(y.object))); });
   nb::class_<ForcedResponse, HarmonicProblem>(m, "ForcedResponse")
       .def(
           "__init__",

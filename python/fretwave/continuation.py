@@ -88,6 +88,7 @@ class Continuation:
         The last point lies on the value the branch reaches.
     report_at : parameter values at which points are located
     upwards : the parameter grows at first
+    helped : a start that Newton does not find is looked for on other ways (`started` tells)
     """
 
     def __init__(
@@ -98,6 +99,7 @@ class Continuation:
         steps: StepControl | None = None,
         report_at: Sequence[float] = (),
         upwards: bool | None = None,
+        helped: bool = True,
     ) -> None:
         low, high = stop
         if not low < high:
@@ -113,18 +115,35 @@ class Continuation:
             upwards = bool(start < 0.5 * (low + high))
         self._upwards, self._restored, self._advice = upwards, False, ""
         self.repeated: Point | None = None
+        self.helped, self.started, self._first_reason = helped, "", ""
 
     def _parameter(self, y: PETSc.Vec) -> float:
-        return float(self.problem.core.parameter_value(self.last_entry(y)))
+        return float(self.problem.core.parameter_value(self.problem.last_entry(y)))
 
     def last_entry(self, y: PETSc.Vec) -> float:
         """The parameter's entry of unknowns or a tangent, on every rank. Collective."""
-        comm = self.problem.model.comm
-        local = y.getArray(readonly=True)
-        return float(comm.bcast(local[-1] if len(local) else 0.0, root=comm.size - 1))
+        return self.problem.last_entry(y)
+
+    def _first(self) -> dict[str, Any] | None:
+        """The first point, by another way if Newton does not find it from the first guess."""
+        point = self._core.start(self._y0, self._upwards)
+        if point is not None or not self.helped:
+            return dict(point) if point is not None else None
+        from .starting import starts
+
+        reason = str(self._core.reason)
+        reasons: list[str] = []
+        for how, y in starts(self.problem, self._y0, reasons):
+            point = self._core.start(y, self._upwards)
+            if point is not None:
+                self.started = how
+                return dict(point)
+        self._advice = "".join(f"; {other}" for other in reasons)
+        self._first_reason = reason
+        return None
 
     def __iter__(self) -> Iterator[Point]:
-        point = self._core.next() if self._restored else self._core.start(self._y0, self._upwards)
+        point = self._core.next() if self._restored else self._first()
         while point is not None:
             last = point["y"]
             yield Point(**point)
@@ -149,7 +168,7 @@ class Continuation:
     @property
     def reason(self) -> str:
         """Why the branch ended."""
-        return str(self._core.reason) + self._advice
+        return (self._first_reason or str(self._core.reason)) + self._advice
 
     @property
     def route(self) -> str:

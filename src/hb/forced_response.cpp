@@ -1,12 +1,16 @@
 #include "hb/forced_response.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "error.h"
 #include "hb/nonlinear_mode.h"
+#include "solve/vectors.h"
 #include "text.h"
 
 namespace fretwave::hb {
+
+using solve::dot, solve::last_entry, solve::set_last_entry;
 
 namespace {
 
@@ -73,6 +77,62 @@ ForcedState ForcedResponse::state(Vec y) {
   const auto z = scalars(y);
   const double cosine = amplitude_ * z[1], sine = amplitude_ * z[2];
   return {level_, z[0] * omega_reference_, std::hypot(cosine, sine), std::atan2(-sine, cosine)};
+}
+
+ForcedStart::ForcedStart(ForcedResponse& to, Vec y)
+    : HarmonicProblem(to.model(), to.harmonics(), 1, to.dof(), to.stiffness_scale()),
+      amplitude_(to.reference_amplitude()),
+      frequency_(last_entry(y)),
+      exponents_(to.exponents(y)) {
+  VecHandle left = to.equations();
+  to.residual(y, left);
+  guess_ = like(excitation());
+  {
+    const PetscInt n = local_size(guess_);
+    const ReadArray r(left), q(y);
+    const double force = stiffness_scale() * amplitude_;
+    WriteArray rest(excitation()), guess(guess_);
+    for (PetscInt i = 0; i < n; ++i) rest[i] = force * r[i], guess[i] = q[i];
+  }
+  keep_loads(to);
+}
+
+VecHandle ForcedStart::response(Vec y) const {
+  VecHandle q = like(guess_);
+  {
+    const PetscInt n = local_size(q);
+    const ReadArray in(y);
+    std::copy_n(in.data(), n, WriteArray(q).data());
+  }
+  return pack(q, {frequency_});
+}
+
+ScaledMotion ForcedStart::motion(std::vector<double> const& z) const {
+  Exponents none{std::vector<complex>(harmonics().count()), 0};
+  return {.amplitude = amplitude_,
+          .exponents = exponents_,
+          .dlog_amplitude = {0},
+          .dexponents = {none},
+          .load = 1 - z[0],
+          .dload = {-1}};
+}
+
+std::string ForcedStart::parameter_text(double value) const {
+  return short_text(100 * value) + " % of the way to the start";
+}
+
+std::string ForcedStart::beyond(Vec y) {
+  double largest;
+  check(VecNorm(y, NORM_INFINITY, &largest));
+  return largest > unbounded ? "the response grows without bound" : "";
+}
+
+/// The motion counts relative to its own size, but not below the static deflection.
+void ForcedStart::metric(Vec y, Vec weights) {
+  const double t = last_entry(y);
+  double square = dot(y, y) - t * t;
+  check(VecSet(weights, 1 / std::max(square, 1.0)));
+  set_last_entry(weights, 1);
 }
 
 }  // namespace fretwave::hb

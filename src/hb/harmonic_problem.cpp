@@ -113,6 +113,12 @@ void HarmonicProblem::preload(Vec x, Vec P) {
   linearised_ = false;
 }
 
+void HarmonicProblem::keep_loads(HarmonicProblem const& other) {
+  check(VecCopy(other.static_, static_));
+  check(VecWAXPY(static_load_, 1, other.excitation_, other.static_load_));
+  linearised_ = false;
+}
+
 void HarmonicProblem::residual(Vec y, Vec r) {
   unpack(y);
   residual_.evaluate(Q_, motion_.exponents, R_);

@@ -80,6 +80,8 @@ class HarmonicProblem : public solve::Problem {
   virtual double metric_weight(int /*scalar*/) const { return 1; }
   /// Force rows are measured in k a from now on; true if that changed them.
   bool measure_in(double k);
+  /// The fixed loads of another problem, excitation included; its static state is the rest. Collective.
+  void keep_loads(HarmonicProblem const& other);
   Vec excitation() { return excitation_; }  ///< P, zero unless a variant sets it
   VecHandle pack(Vec q, std::vector<double> const& z) const;
 

@@ -83,6 +83,7 @@ bool Continuation::correct(Trial& trial, Vec row, double value, Vec tangent_row)
 
 std::optional<Point> Continuation::start(Vec y0, bool upwards) {
   Trial trial = at(copy(y0));
+  finished_ = false;  // an earlier start may have failed
   check(VecCopy(parameter_row_, row_));
   row_value_ = last_entry(y0);
   upwards_ = upwards;
