@@ -148,7 +148,7 @@ class Continuation:
             last = point["y"]
             yield Point(**point)
             point = self._core.next()
-            if point is None and not self.converged:
+            if point is None and not self.converged and "without bound" not in self._core.reason:
                 self._advise(last)
 
     def _advise(self, y: PETSc.Vec) -> None:
@@ -179,6 +179,11 @@ class Continuation:
     def snes(self) -> PETSc.SNES:
         """The corrector, to look into or to set options on."""
         return self._core.snes
+
+    @property
+    def anchor(self) -> PETSc.Vec:
+        """Unknowns of the regular point that the branch last started a step from."""
+        return self._core.anchor()["y"]
 
     @property
     def missed(self) -> list[str]:
@@ -217,9 +222,7 @@ class Continuation:
         branch = cls(problem, vectors["y"], stop, steps, report_at, upwards)
         before = [vectors[name] for name in _VECTORS[2:] if name in vectors]
         step, index, emitted = float(snapshot["step"]), int(snapshot["index"]), int(snapshot["emitted"])
-        point = branch._core.restore(
-            [vectors["y"], vectors["tangent"]], before, step, index, emitted, upwards, began
-        )
+        point = branch._core.restore([vectors["y"], vectors["tangent"]], before, step, index, emitted, upwards, began)
         branch.repeated = None if point is None else Point(**point)
         branch._restored = True
         return branch

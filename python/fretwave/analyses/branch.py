@@ -100,6 +100,25 @@ def mode_problem(context: Any, harmonics: Any, mode: Any, rest: Any, dof: int | 
     return problem
 
 
+def tell(context: Any, branch: Any, name: str = "") -> None:
+    """Say how a branch began, how well a resumed one meets its last point, and what it could not have. Collective.
+
+    Kept in run.json too, under `branches`.
+    """
+    name = name or context.name
+    lines = [f"started: {branch.started}"] if branch.started else []
+    if branch.repeated is not None:
+        last = branch.repeated
+        lines.append(
+            f"resumed at {last.parameter:.6g}; its last point is solved again to a residual of {last.residual:.1e}"
+        )
+    lines += [f"missed: {text}" for text in branch.missed]
+    for line in lines:
+        context.console.line(f"{name}: {line}")
+    if lines:
+        context.entry.setdefault("branches", {})[name] = lines
+
+
 def points_of(branch: Any) -> Iterator[Any]:
     """Points of a branch; their vectors are freed a point later, for the branch may look back at its last one."""
     before = None

@@ -19,7 +19,7 @@ from typing import Any
 from ..aerodynamics_case import diameters_of
 from ..columns import FLUTTER
 from ..schema import FlutterAnalysis
-from .branch import closure_note, finished_table, mode_problem, open_branch, points_of, record, step_control
+from .branch import closure_note, finished_table, mode_problem, open_branch, points_of, record, step_control, tell
 from .context import AnalysisContext, Outcome
 from .flutter_waves import STABLE, describe_waves, with_sign, words
 from .mode import point_line
@@ -81,6 +81,7 @@ class _Wave:
             for point in points_of(branch):
                 own = {"wave_number": self.number}
                 self._say(record(writer, problem, point, branch.snapshot(), own, self._column))
+            tell(self.context, branch, f"{self.context.name}: nodal diameter {self.diameter}")
             stopped = "" if branch.converged else f"nodal diameter {self.diameter}: {branch.reason}"
             branch.destroy()
             problem.destroy()

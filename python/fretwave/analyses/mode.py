@@ -12,7 +12,7 @@ import numpy as np
 from ..columns import MODE
 from ..schema import ModeAnalysis
 from .asymptotes import asymptote_line
-from .branch import closure_note, finished_table, mode_problem, open_branch, points_of, record, step_control
+from .branch import closure_note, finished_table, mode_problem, open_branch, points_of, record, step_control, tell
 from .context import AnalysisContext, Outcome
 from .rest import keep_pairs, retained
 from .wheel_shape import WHEEL, WheelShape, finish_wheel, one_by_one
@@ -74,6 +74,7 @@ def _follow(context: AnalysisContext, analysis: ModeAnalysis, problem: Any, writ
             context.console.point(
                 point_line(context.name, row), _short(row), share, bool(row["event"] or closure_note(row))
             )
+    tell(context, branch)
     outcome = _finish(context, writer, branch, start)
     outcome.goal = f"amplitude {high:g} m"
     branch.destroy()
