@@ -27,7 +27,7 @@ CondensedPreconditioner::CondensedPreconditioner(HarmonicProblem& problem)
 }
 
 bool CondensedPreconditioner::moved(Exponents const& e) const {
-  if (made_at_.s.empty()) return true;
+  if (made_at_.s.empty() || made_in_ != problem_.stiffness_scale()) return true;
   double change = std::abs(e.inertia_damping - made_at_.inertia_damping), size = 0;
   for (size_t i = 0; i < e.s.size(); ++i) {
     change = std::max(change, std::abs(e.s[i] - made_at_.s[i]));
@@ -37,7 +37,7 @@ bool CondensedPreconditioner::moved(Exponents const& e) const {
 }
 
 void CondensedPreconditioner::factorise(Exponents e, std::vector<PairTangents> const& contacts) {
-  made_at_ = e;
+  made_at_ = e, made_in_ = problem_.stiffness_scale();
   if (scalars_ > 1) e.s[problem_.harmonics().fundamental()] *= 1 + shift;
   factors_.factorise(e, contacts);
   G_.clear();

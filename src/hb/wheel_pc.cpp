@@ -105,7 +105,7 @@ std::vector<complex> WheelPreconditioner::rows_of(int diameter) const {
 }
 
 bool WheelPreconditioner::moved(Exponents const& e) const {
-  if (!made_at_) return true;
+  if (!made_at_ || made_in_ != problem_.stiffness_scale()) return true;
   double change = std::abs(e.inertia_damping - made_at_->inertia_damping), size = 0;
   for (size_t i = 0; i < e.s.size(); ++i) {
     change = std::max(change, std::abs(e.s[i] - made_at_->s[i]));
@@ -152,7 +152,7 @@ void WheelPreconditioner::factorise(Exponents const& e, std::vector<double> cons
     return [this, &point](int harmonic) { return blocks(harmonic, point); };
   };
   if (moved(e)) {
-    made_at_ = e;
+    made_at_ = e, made_in_ = problem_.stiffness_scale();
     contact_.average(symmetric());
     inverse_->make([&](Wave const& wave) { return wave.harmonic != first; }, at(e));
   }

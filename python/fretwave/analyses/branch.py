@@ -13,6 +13,13 @@ from ..schema import StepSection
 #: Events at which the contact's motion over a period is kept.
 PLAIN_EVENTS = ("", "step")
 
+#: What was done when GMRES failed.
+FALLBACKS = {
+    "rebuilt": "preconditioner rebuilt",
+    "condensed": "condensed contact system factorised",
+    "whole": "whole system factorised",
+}
+
 
 def step_control(step: StepSection) -> Any:
     """The case's step control for the continuation."""
@@ -84,6 +91,21 @@ def mode_problem(context: Any, harmonics: Any, mode: Any, rest: Any, dof: int | 
     if rest is not None:
         problem.preload(rest.displacement, rest.load)
     return problem
+
+
+def tell_fallbacks(context: Any, branch: Any) -> None:
+    """One line of the log on linear solves that failed and how they were solved; counts add up in run.json."""
+    found = branch.fallbacks
+    counts = {key: found[key] for key in ("rebuilt", "condensed", "whole")}
+    if not any(counts.values()):
+        return
+    kept = context.entry.setdefault("linear_fallbacks", dict.fromkeys(counts, 0))
+    for key, count in counts.items():
+        kept[key] += count
+    text = ", ".join(f"{what} {counts[key]} times" for key, what in FALLBACKS.items() if counts[key])
+    context.console.line(f"{context.name}: GMRES failed and was helped: {text}")
+    if found["said"]:
+        context.console.line(f"{context.name}: {found['said']}")
 
 
 def points_of(branch: Any) -> Iterator[Any]:

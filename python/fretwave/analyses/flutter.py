@@ -19,7 +19,7 @@ from typing import Any
 from ..aerodynamics_case import diameters_of
 from ..columns import FLUTTER
 from ..schema import FlutterAnalysis
-from .branch import finished_table, mode_problem, open_branch, points_of, record, step_control
+from .branch import finished_table, mode_problem, open_branch, points_of, record, step_control, tell_fallbacks
 from .context import AnalysisContext, Outcome
 from .flutter_waves import STABLE, describe_waves, with_sign, words
 from .mode import point_line
@@ -82,6 +82,7 @@ class _Wave:
                 own = {"wave_number": self.number}
                 self._say(record(writer, problem, point, branch.snapshot(), own, self._column))
             stopped = "" if branch.converged else f"nodal diameter {self.diameter}: {branch.reason}"
+            tell_fallbacks(self.context, branch)
             branch.destroy()
             problem.destroy()
         return stopped

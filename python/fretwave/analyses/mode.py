@@ -12,7 +12,7 @@ import numpy as np
 from ..columns import MODE
 from ..schema import ModeAnalysis
 from .asymptotes import asymptote_line
-from .branch import finished_table, mode_problem, open_branch, points_of, record, step_control
+from .branch import finished_table, mode_problem, open_branch, points_of, record, step_control, tell_fallbacks
 from .context import AnalysisContext, Outcome
 from .rest import keep_pairs, retained
 from .wheel_shape import WHEEL, WheelShape, finish_wheel, one_by_one
@@ -72,6 +72,7 @@ def _follow(context: AnalysisContext, analysis: ModeAnalysis, problem: Any, writ
                 context.console.line(_reduction_error(context, problem, point, row))
             share = math.log(row["amplitude"] / low) / math.log(high / low)
             context.console.point(point_line(context.name, row), _short(row), share, notable=bool(row["event"]))
+    tell_fallbacks(context, branch)
     outcome = _finish(context, writer, branch, start)
     outcome.goal = f"amplitude {high:g} m"
     branch.destroy()
@@ -111,6 +112,7 @@ def point_line(name: str, row: dict[str, Any]) -> str:
         f"{name} {row['point']:4d}  a {row['amplitude']:9.4g} m  f {row['frequency_hz']:9.5g} Hz"
         f"  zeta {_percent(row['zeta'], 4):>8} %  stick {100 * row['stick']:3.0f} %"
         f"  error {row['error_estimate']:.1e}  newton {row['newton']:2d}  {row['wall_s']:.3f} s"
+        + ("  overdamped" if abs(row["zeta"]) >= 1 else "")
         + (f"  {row['event'].replace('_', ' ')}" if row["event"] else "")
     )
 
