@@ -7,6 +7,7 @@ from typing import Any
 
 from ..columns import FORCED
 from ..schema import ForcedAnalysis
+from ..suspects import suspects
 from .branch import finished_table, open_branch, points_of, record, tell_fallbacks
 from .context import AnalysisContext, Outcome
 from .excitation import Excitation, excitation_of
@@ -81,6 +82,7 @@ def _one_level(excitation: Excitation, writer: Any, number: int, snapshot: Any, 
         share = (number + (row["omega"] - low) / (high - low)) / len(analysis.levels)
         context.console.point(point_line(context.name, row), _short(row), share, _notable(row["event"]))
     stopped = "" if branch.converged else f"level {analysis.levels[number]:g}: {branch.reason}"
+    stopped += "" if branch.converged else suspects(context.model.contacts, problem.core.stiffness_scale)
     tell_fallbacks(context, branch)
     branch.destroy()
     problem.destroy()

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..columns import MODE
 from ..schema import ModeAnalysis
+from ..suspects import suspects
 from .asymptotes import asymptote_line
 from .branch import finished_table, mode_problem, open_branch, points_of, record, step_control, tell_fallbacks
 from .context import AnalysisContext, Outcome
@@ -74,6 +75,8 @@ def _follow(context: AnalysisContext, analysis: ModeAnalysis, problem: Any, writ
             context.console.point(point_line(context.name, row), _short(row), share, notable=bool(row["event"]))
     tell_fallbacks(context, branch)
     outcome = _finish(context, writer, branch, start)
+    if not branch.converged:
+        outcome.reason += suspects(context.model.contacts, problem.core.stiffness_scale)
     outcome.goal = f"amplitude {high:g} m"
     branch.destroy()
     return outcome
