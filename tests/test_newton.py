@@ -136,6 +136,43 @@ def test_a_singular_jacobian_is_a_failed_step_and_no_more(comm, size):
         assert converged, reason
 
 
+@pytest.mark.parametrize("rung, iterations", [("condensed", 4), ("whole", 1)])
+def test_a_linear_solve_that_fails_is_solved_in_a_dearer_way(comm, rung, iterations):
+    """GMRES is cut short, so that the dense blocks, then the condensed system too, are not enough."""
+    model = blade(comm)
+    case = (model, *preloaded(model))
+    _, first, rest = case
+    found = {}
+    for prefix, limit in (("usual_", 200), ("cut_", iterations)):
+        database = PETSc.Options(prefix)
+        database["route"], database["ksp_max_it"] = "krylov", limit
+        problem = fw.NonlinearMode(model, fw.Harmonics(range(6), 128), "CNM", TIP, first, prefix)
+        problem.preload(rest.displacement, rest.load)
+        branch = fw.Continuation(problem, problem.initial(2e-3), (2e-3, 3e-3), report_at=[2.5e-3])
+        points = [(problem.state(p.y), p.event) for p in branch]
+        assert branch.converged, branch.reason
+        found[prefix] = next(state for state, event in points if event == "report"), branch.fallbacks
+    assert not any(found["usual_"][1][key] for key in ("rebuilt", "condensed", "whole"))
+    assert found["cut_"][1]["rebuilt"] and found["cut_"][1][rung] and "factorised" in found["cut_"][1]["said"]
+    for key in ("omega", "zeta"):
+        assert found["cut_"][0][key] == pytest.approx(found["usual_"][0][key], rel=1e-8)
+
+
+def test_a_motion_that_does_not_oscillate_has_no_frequency(comm):
+    """A mass with zeta = 1.5 by its damper, and -1.5: EPMC's omega is 0 there, never nan; omega0 and beta stay."""
+    one = np.eye(1)
+    for damping in (1.5, -1.5, 0.5):
+        contact = fw.Contact("jenkins", one, {"tangential_stiffness": 1e-9, "friction_limit": 1.0})
+        model = fw.Model(one, one, 2 * damping * one, [contact], comm)
+        problem = fw.NonlinearMode(model, fw.Harmonics([1], 16), "EPMC", 0, fw.linear_modes(model, 1)[0])
+        branch = fw.Continuation(problem, problem.initial(0.1), (0.1, 0.2))
+        states = [problem.state(p.y) for p in branch]
+        assert branch.converged, branch.reason
+        for state in states:
+            assert state["zeta"] == pytest.approx(damping) and state["omega0"] == pytest.approx(1)
+            assert state["omega"] == pytest.approx(np.sqrt(max(0, 1 - damping**2)))
+
+
 class BrokenLaw(CubicLaw):
     """A cubic spring whose force is not a number beyond an elongation of 1."""
 

@@ -15,6 +15,12 @@ nb::object to_python(std::optional<solve::Point> const& p) {
   return out;
 }
 
+nb::dict to_python(solve::Fallbacks const& f) {
+  nb::dict out;
+  out["rebuilt"] = f.rebuilt, out["condensed"] = f.condensed, out["whole"] = f.whole, out["said"] = f.said;
+  return out;
+}
+
 }  // namespace
 
 void bind_solve(nb::module_& m) {
@@ -50,6 +56,7 @@ void bind_solve(nb::module_& m) {
       .def(nb::init<Problem&, std::string const&>(), nb::keep_alive<1, 2>())
       .def_prop_ro("system", &Newton::system, nb::rv_policy::reference_internal)
       .def_prop_ro("route", &Newton::route)
+      .def_prop_ro("fallbacks", [](Newton& n) { return to_python(n.fallbacks()); })
       .def_prop_ro("snes", [](Newton& n) { return nb::steal(to_petsc4py(n.snes())); })
       .def("solve",
            [](Newton& n, Petsc<Vec> y) {
@@ -80,6 +87,7 @@ void bind_solve(nb::module_& m) {
       .def_prop_ro("reason", &Continuation::reason)
       .def_prop_ro("converged", &Continuation::converged)
       .def_prop_ro("route", [](Continuation& c) { return c.newton().route(); })
+      .def_prop_ro("fallbacks", [](Continuation& c) { return to_python(c.newton().fallbacks()); })
       .def_prop_ro("snes", [](Continuation& c) { return nb::steal(to_petsc4py(c.newton().snes())); })
       .def_prop_ro("missed", &Continuation::missed)
       .def("anchor", [](Continuation& c) {

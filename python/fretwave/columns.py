@@ -58,7 +58,9 @@ _ALL = (
     Column("cycle", "1", "number of the cycle", "i"),
     Column("time", "s", "time in the middle of the cycle"),
     Column("amplitude", "m", "fundamental amplitude of the observed dof"),
-    Column("omega", "rad/s", "angular frequency, Im lambda"),
+    Column(
+        "omega", "rad/s", "angular frequency, Im lambda; 0 where the motion does not oscillate (EPMC, zeta above 1)"
+    ),
     Column("omega0", "rad/s", "modulus of lambda"),
     Column("omega_mode", "rad/s", "angular frequency of the mode at this amplitude"),
     Column("frequency_hz", "Hz", "frequency, omega / 2 pi"),

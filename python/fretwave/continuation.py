@@ -176,6 +176,18 @@ class Continuation:
         return str(self._core.route)
 
     @property
+    def fallbacks(self) -> dict[str, Any]:
+        """How often a linear solve that failed was tried in a dearer way, and what is to be said of it.
+
+        Returns
+        -------
+        dict
+            rebuilt, condensed, whole : preconditioner built anew at the point, condensed contact system factorised,
+            whole system factorised; said : of the last one, or why it could not be taken.
+        """
+        return dict(self._core.fallbacks)
+
+    @property
     def snes(self) -> PETSc.SNES:
         """The corrector, to look into or to set options on."""
         return self._core.snes

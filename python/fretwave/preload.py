@@ -10,10 +10,11 @@ from petsc4py import PETSc
 
 from . import _core
 from .continuation import Continuation, StepControl
-from .errors import NotConverged
+from .errors import InputError, NotConverged
 from .model import Model
 from .modes import LinearMode
 from .problems import HarmonicProblem, Harmonics
+from .suspects import suspects
 
 Array = npt.NDArray[np.float64]
 
@@ -61,7 +62,15 @@ class StaticPreload(HarmonicProblem):
     def __init__(
         self, model: Model, load: Array, reference: LinearMode, constant: Array | None = None, prefix: str = "static_"
     ) -> None:
-        stiffness = reference.omega**2 / float(np.sum(reference.shape**2))
+        if not reference.omega > 0:
+            raise InputError(
+                "the mode that forces are measured by is a rigid motion: nothing holds the structure at rest",
+                None,
+                f"{reference.omega:g} rad/s{suspects(model.contacts, 1.0) if model.contacts else ''}",
+                "an elastic mode",
+                "load the contact (normal_load), hold the structure, or take a mode with closed contact",
+            )
+        self.stiffness = stiffness = reference.omega**2 / float(np.sum(reference.shape**2))
         size = (float(np.linalg.norm(load)) or stiffness) / stiffness
         self.force_scale, self.size = stiffness * size, size
         core = _core.StaticPreload(model.core, model.vector(load), size, stiffness)
@@ -126,7 +135,7 @@ def static_preload(
     raise NotConverged(
         "no static equilibrium under the full load",
         None,
-        f"load factor {reached:.4g}: {reason or branch.reason}",
+        f"load factor {reached:.4g}: {reason or branch.reason}{suspects(model.contacts, problem.stiffness)}",
         "1",
         "hold the structure where contact alone cannot (an axial stop), or lower the load",
     )

@@ -25,8 +25,14 @@ def _advice(name: str, reason: str) -> str:
     """What most often helps against a reason to stop."""
     if "number of points" in reason:
         return f"--set {name}.step.max_points=20000, or longer steps (step.maximum)"
+    if "does not fit" in reason:
+        return "more memory or ranks, fewer harmonics or component modes, or fewer contact pairs"
+    if "mean position is free" in reason:
+        return "hold the structure where contact alone cannot (a spring, an axial stop), or load its contact more"
     if "linear solve" in reason or "LINEAR_SOLVE" in reason:
-        return f"the direct route (--petsc '-{name.replace('-', '_')}_route direct'), or more samples"
+        return (
+            f"more samples, or another start; --petsc '-ksp_monitor -{name.replace('-', '_')}_snes_monitor' shows why"
+        )
     if "at the start" in reason:
         return (
             "another start (amplitude or frequency) where the motion is nearly linear; --petsc -snes_monitor shows why"

@@ -29,7 +29,7 @@ CondensedPreconditioner::CondensedPreconditioner(HarmonicProblem& problem)
 }
 
 bool CondensedPreconditioner::moved(Exponents const& e) const {
-  if (made_at_.s.empty()) return true;
+  if (made_at_.s.empty() || made_in_ != problem_.stiffness_scale()) return true;
   double change = std::abs(e.inertia_damping - made_at_.inertia_damping), size = 0;
   for (size_t i = 0; i < e.s.size(); ++i) {
     change = std::max(change, std::abs(e.s[i] - made_at_.s[i]));
@@ -45,7 +45,7 @@ void CondensedPreconditioner::factorise(Exponents e, std::vector<PairTangents> c
   factors_.factorise(e, contacts);
   G_.clear();
   for (int i = 0; i < problem_.harmonics().count(); ++i) G_.push_back(factors_.compliance(i, rows_));
-  made_at_ = at;
+  made_at_ = at, made_in_ = problem_.stiffness_scale();
 }
 
 /// dD of all pairs on rank 0.

@@ -44,6 +44,7 @@ class CondensedPreconditioner : public solve::Preconditioner {
   bool first_rank_;
   double build_cost_ = 0;
   Exponents made_at_;
+  double made_in_ = 0;  ///< stiffness that force rows were measured in
   // All that follows on rank 0 only.
   std::vector<std::vector<complex>> G_;  ///< per harmonic
   std::vector<std::vector<double>> dD_;  ///< per pair, row-major

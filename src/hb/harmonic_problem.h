@@ -64,6 +64,9 @@ class HarmonicProblem : public solve::Problem {
   /// Linearised contact of this rank's pairs at y. Collective.
   std::vector<PairTangents> pair_tangents(Vec y);
   std::unique_ptr<solve::Preconditioner> preconditioner(std::string const& blocks) override;
+  std::unique_ptr<solve::Preconditioner> fallback(double& bytes) override;
+  double jacobian_entries() const override;
+  std::string explain(Vec y, Vec dy) override;
   /// The laws start their march from the static state at y. Collective.
   void settle(Vec y) { residual_.settle(coefficients(y)); }
   std::vector<ContactPeriod> contact_periods(Vec y);
@@ -91,6 +94,7 @@ class HarmonicProblem : public solve::Problem {
   std::vector<double> components(Vec q) const;
   void border(std::vector<double> const& z, std::vector<double> const& along, double* r) const;
   bool owns_dof() const;
+  bool condensable() const;
   void linearise(Vec y);
   void unpack(Vec y);
   void column(int j, double* v);
@@ -103,7 +107,7 @@ class HarmonicProblem : public solve::Problem {
   double stiffness_;
   VecHandle q_, Q_, dQ_, R_, dR_, excitation_, static_, static_load_, last_;
   std::vector<VecHandle> unfold_;
-  bool linearised_ = false;
+  bool linearised_ = false, condensed_ = false;
   unsigned contact_version_ = 0;  ///< of the laws at the point of linearisation
   std::vector<double> z_;
   ScaledMotion motion_;

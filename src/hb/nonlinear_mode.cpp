@@ -104,8 +104,9 @@ ModalState NonlinearMode::state(Vec y) {
     const double omega0 = std::hypot(beta, w);
     return {std::exp(z[2]), w, omega0, beta, beta / omega0};
   }
-  const double zeta = beta / w;  // reported as w = w0 sqrt(1 - zeta^2)
-  return {std::exp(z[2]), w * std::sqrt(1 - zeta * zeta), w, beta, zeta};
+  // reported as w = w0 sqrt(1 - zeta^2); above 1 the free motion creeps back: its frequency is zero
+  const double zeta = beta / w;
+  return {std::exp(z[2]), w * std::sqrt(std::max(0.0, (1 - zeta) * (1 + zeta))), w, beta, zeta};
 }
 
 bool NonlinearMode::scale(Vec y) {

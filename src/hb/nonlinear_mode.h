@@ -9,6 +9,7 @@ enum class Method {
   EPMC  ///< extended periodic motion concept, s_n = i n w0, damping C - 2 zeta w0 M (Krack 2015)
 };
 
+/// omega is that of the free decay, 0 where it does not oscillate (EPMC with |zeta| >= 1).
 struct ModalState {
   double amplitude, omega, omega0, beta, zeta;
 };

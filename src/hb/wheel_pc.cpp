@@ -122,7 +122,7 @@ std::vector<complex> WheelPreconditioner::rows_of(int diameter) const {
 }
 
 bool WheelPreconditioner::moved(Exponents const& e) const {
-  if (!made_at_) return true;
+  if (!made_at_ || made_in_ != problem_.stiffness_scale()) return true;
   double change = std::abs(e.inertia_damping - made_at_->inertia_damping), size = 0;
   for (size_t i = 0; i < e.s.size(); ++i) {
     change = std::max(change, std::abs(e.s[i] - made_at_->s[i]));
@@ -180,7 +180,7 @@ void WheelPreconditioner::factorise(Exponents const& e, std::vector<double> cons
     inverse_->make([&](Wave const& wave) { return wave.harmonic == first && moving(wave); }, at(shifted));
     G_ = compliances();
   });
-  made_at_ = all ? e : kept;
+  made_at_ = all ? e : kept, made_in_ = problem_.stiffness_scale();
 }
 
 /// This rank's harmonic blocks as sectors x harmonics x places, q = qc - i qs.

@@ -59,6 +59,7 @@ class WheelPreconditioner : public solve::Preconditioner {
   std::vector<std::vector<complex>> B_;  ///< of own waves
   std::optional<CyclicInverse> inverse_;
   std::optional<Exponents> made_at_;
+  double made_in_ = 0;      ///< stiffness that force rows were measured in
   std::vector<complex> G_;  ///< B A^-1 B^H, own waves x contact rows x contact rows
   std::optional<TravellingContact> travelling_;
   Border border_;

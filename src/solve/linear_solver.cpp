@@ -3,17 +3,20 @@
 #include <algorithm>
 
 #include "error.h"
+#include "solve/direct.h"
+#include "solve/memory.h"
 
 namespace fretwave::solve {
 
 namespace {
 
-constexpr PetscInt redundant_limit = 2000;  // unknowns: below, every rank factorises the whole matrix
 // Unknowns above which the Krylov route is the quicker one where the problem has a preconditioner: on reduced
 // blades of 30 to 155 dofs it took half the time of a direct Newton step at 213 unknowns, a third at 708, a
 // twelfth at 2328.
 constexpr PetscInt krylov_limit = 300;
 constexpr double tangent_tolerance = 1e-10;  // relative; of the tangent's direction
+constexpr double memory_share = 0.7;         // of what is free, for a fallback to take
+constexpr int longest_stay = 256;            // points between two tries at the foot of the ladder
 constexpr double tangent_accepted = 1e-6;    // where rounding lets GMRES go no further
 
 /// What the option says: one of two, or auto.
@@ -46,80 +49,35 @@ bool is_gmres(KSP ksp) {
   return gmres;
 }
 
-bool on_any_rank(bool here, MPI_Comm comm) {
-  int any = here;
-  MPI_Allreduce(MPI_IN_PLACE, &any, 1, MPI_INT, MPI_MAX, comm);
-  return any;
-}
-
 }  // namespace
 
 LinearSolver::LinearSolver(Bordered& bordered, std::string const& prefix, SNES snes)
-    : bordered_(bordered), snes_(snes), point_(bordered.problem().unknowns()) {
-  choose_route(prefix);
-  preconditioner_ ? use_krylov() : use_direct();
+    : bordered_(bordered), prefix_(prefix), snes_(snes), point_(bordered.problem().unknowns()) {
+  choose_route();
+  if (own_) {
+    use_krylov();
+    return;
+  }
+  J_ = bordered_.matrix();
+  use_lu(ksp_of(snes_), J_);
 }
 
-void LinearSolver::choose_route(std::string const& prefix) {
+void LinearSolver::choose_route() {
   PetscInt unknowns;
   check(VecGetSize(point_, &unknowns));
-  const std::string wish = choice(prefix, "-route", "route of the corrector", "direct", "krylov");
-  const std::string blocks = choice(prefix, "-blocks", "kind of preconditioner", "dense", "sparse");
+  const std::string wish = choice(prefix_, "-route", "route of the corrector", "direct", "krylov");
+  const std::string blocks = choice(prefix_, "-blocks", "kind of preconditioner", "dense", "sparse");
   if (wish == "krylov" || (wish == "auto" && unknowns > krylov_limit))
-    preconditioner_ = bordered_.problem().preconditioner(blocks);
-  const bool refused = wish == "krylov" && !preconditioner_;
-  route_ = std::string(preconditioner_ ? "krylov" : "direct") + " (" +
+    own_ = bordered_.problem().preconditioner(blocks);
+  const bool refused = wish == "krylov" && !own_;
+  route_ = std::string(own_ ? "krylov" : "direct") + " (" +
            (refused          ? "krylov asked for, but this problem has no preconditioner"
             : wish == "auto" ? std::to_string(unknowns) + " unknowns"
                              : "asked for") +
            ")";
 }
 
-std::string LinearSolver::route() const {
-  return route_ + (preconditioner_ ? ", " + preconditioner_->describe() : "");
-}
-
-void LinearSolver::use_direct() {
-  KSP ksp = ksp_of(snes_);
-  PC pc;
-  PetscBool dense;
-  PetscInt rows;
-  J_ = bordered_.matrix();
-  check(KSPSetType(ksp, KSPPREONLY));
-  check(KSPGetPC(ksp, &pc));
-  check(PCSetType(pc, PCLU));
-  check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(Mat(J_)), MATSEQDENSE, &dense));
-  if (dense) return;
-  check(MatGetSize(J_, &rows, nullptr));
-  if (comm_size(bordered_.problem().comm()) > 1 && rows <= redundant_limit) {
-    check(PCSetType(pc, PCREDUNDANT));
-    check(PCRedundantGetKSP(pc, &ksp));
-    check(KSPGetPC(ksp, &pc));
-    check(PCSetType(pc, PCLU));
-    check(PCFactorSetMatSolverType(pc, MATSOLVERKLU));  // serial, pivots, quick to set up
-    return;
-  }
-  check(PCFactorSetMatSolverType(pc, MATSOLVERMUMPS));
-  give_mumps_room(ksp);
-}
-
-/// Pivoting of nearly dense harmonic blocks outgrows MUMPS' own estimate of its workspace (+35 %), which ends
-/// in a failed step.
-void LinearSolver::give_mumps_room(KSP ksp) {
-  PC pc;
-  Mat factor;
-  MatSolverType solver = nullptr;
-  PetscBool lu, mumps;
-  check(KSPGetPC(ksp, &pc));
-  check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(pc), PCLU, &lu));
-  if (lu) check(PCFactorGetMatSolverType(pc, &solver));
-  check(PetscStrcmp(solver, MATSOLVERMUMPS, &mumps));
-  if (!mumps) return;
-  check(KSPSetOperators(ksp, J_, J_));
-  check(PCFactorSetUpMatSolverType(pc));
-  check(PCFactorGetMatrix(pc, &factor));
-  check(MatMumpsSetIcntl(factor, 14, 200));
-}
+std::string LinearSolver::route() const { return route_ + (own_ ? ", " + own_->describe() : ""); }
 
 void LinearSolver::use_krylov() {
   KSP ksp = ksp_of(snes_);
@@ -137,14 +95,14 @@ void LinearSolver::use_krylov() {
   check(PCShellSetApply(pc, shell_precondition));
 }
 
-void LinearSolver::make_tangent(std::string const& prefix) {
+void LinearSolver::make_tangent() {
   KSP newton = ksp_of(snes_);
   PC pc;
   PetscInt iterations, restart;
   check(KSPGetPC(newton, &pc));
   check(KSPGetTolerances(newton, nullptr, nullptr, nullptr, &iterations));
   check(KSPCreate(bordered_.problem().comm(), tangent_.out()));
-  check(KSPSetOptionsPrefix(tangent_, (prefix + "tangent_").c_str()));
+  check(KSPSetOptionsPrefix(tangent_, (prefix_ + "tangent_").c_str()));
   check(KSPSetPC(tangent_, pc));
   check(KSPSetType(tangent_, is_direct(newton) ? KSPPREONLY : KSPFGMRES));
   if (is_gmres(newton)) {
@@ -166,7 +124,7 @@ PetscErrorCode LinearSolver::shell_precondition(PC pc, Vec x, Vec y) {
   LinearSolver* solver;
   PetscErrorCode code = PCShellGetContext(pc, &solver);
   if (code) return code;
-  return solver->guard_.run([&] { solver->preconditioner_->apply(x, y); });
+  return solver->guard_.run([&] { solver->preconditioner().apply(x, y); });
 }
 
 /// The preconditioner is stale once the iterations of Newton's solves beyond those just after it was built
@@ -174,7 +132,7 @@ PetscErrorCode LinearSolver::shell_precondition(PC pc, Vec x, Vec y) {
 void LinearSolver::count_iterations() {
   PetscInt iterations = 0;
   check(KSPGetIterationNumber(ksp_of(snes_), &iterations));
-  const double cost = preconditioner_->build_cost();
+  const double cost = preconditioner().build_cost();
   if (fresh_ < 0) {
     fresh_ = int(iterations);
     stale_ = first_reuse_ > cost;
@@ -187,41 +145,81 @@ void LinearSolver::count_iterations() {
 }
 
 bool LinearSolver::linearise(Vec y, bool newton) {
-  if (!preconditioner_) {
+  if (!own_) {
     bordered_.assemble(y, J_);
-    return factorise();
+    if (factorise(ksp_of(snes_), J_)) return true;
+    check(KSPReset(tangent_));
+    return false;
   }
   check(VecCopy(y, point_));
   if (uncounted_ && !stale_) count_iterations();
-  if (stale_) {
-    preconditioner_->build(point_, bordered_.row());
-    stale_ = false;
-    fresh_ = -1, excess_ = 0;
-  }
+  uncounted_ = false;
+  built_here_ = stale_;
+  if (stale_ && !build()) return false;
   uncounted_ = newton;
   check(MatAssemblyBegin(J_, MAT_FINAL_ASSEMBLY));
   check(MatAssemblyEnd(J_, MAT_FINAL_ASSEMBLY));
   return true;
 }
 
-/// Factors of J, here and not inside a solve: the wrappers of LAPACK and KLU raise an error at a zero pivot,
-/// after which nothing but a reset is safe. MUMPS' tells it by PCGetFailedReason.
-bool LinearSolver::factorise() {
-  KSP ksp = ksp_of(snes_);
-  PC pc;
-  PCFailedReason failed = PC_NOERROR;
-  check(KSPSetOperators(ksp, J_, J_));
-  const PetscErrorCode code = KSPSetUp(ksp);
-  const bool singular = code == PETSC_ERR_MAT_LU_ZRPVT || code == PETSC_ERR_LIB;
-  if (!singular) check(code);
-  check(KSPGetPC(ksp, &pc));
-  if (!singular) check(PCGetFailedReason(pc, &failed));
-  if (!on_any_rank(singular || failed != PC_NOERROR, bordered_.problem().comm())) return true;
-  check(KSPReset(ksp));
-  check(KSPReset(tangent_));
-  check(PCSetFailedReason(pc, PC_NOERROR));
-  give_mumps_room(ksp);
+bool LinearSolver::build() {
+  try {
+    preconditioner().build(point_, bordered_.row());
+  } catch (SingularBlock const&) {
+    return false;
+  }
+  if (!preconditioner().failure().empty()) return false;
+  stale_ = false;
+  fresh_ = -1, excess_ = 0;
+  return true;
+}
+
+bool LinearSolver::climb() {
+  if (!own_) return false;
+  stale_ = true, solved_ = 0;
+  if (!built_here_) {
+    ++fallbacks_.rebuilt;
+    return true;
+  }
+  if (rung_ == 0 && take_fallback()) return true;
+  return rung_ < 2 && take_whole();
+}
+
+bool LinearSolver::take_fallback() {
+  double bytes = 0;
+  auto fallback = bordered_.problem().fallback(bytes);
+  if (!fallback || !fits(bytes, "the condensed contact system")) return false;
+  fallback_ = std::move(fallback);
+  rung_ = 1, ++fallbacks_.condensed;
+  fallbacks_.said = "GMRES stalls: the condensed contact system is factorised (" + gigabytes(bytes) + ")";
+  return true;
+}
+
+bool LinearSolver::take_whole() {
+  PetscInt unknowns;
+  check(VecGetSize(point_, &unknowns));
+  const double bytes = WholeFactor::bytes(bordered_.problem(), double(unknowns));
+  if (!fits(bytes, "a factor of the whole system")) return false;
+  fallback_ = std::make_unique<WholeFactor>(bordered_, prefix_);
+  rung_ = 2, ++fallbacks_.whole;
+  fallbacks_.said = "GMRES stalls: all " + std::to_string(unknowns) + " unknowns are factorised (about " +
+                    gigabytes(bytes) + ")";
+  return true;
+}
+
+bool LinearSolver::fits(double bytes, std::string const& what) {
+  const double available = available_bytes(bordered_.problem().comm());
+  if (bytes <= memory_share * available) return true;
+  fallbacks_.said =
+      what + " does not fit: about " + gigabytes(bytes) + ", of " + gigabytes(available) + " free";
   return false;
+}
+
+void LinearSolver::descend() {
+  if (!rung_ || ++solved_ < stay_) return;
+  rung_ = 0, solved_ = 0, stale_ = true;
+  stay_ = std::min(longest_stay, 2 * stay_);
+  fallback_.reset();
 }
 
 double LinearSolver::last_reduction() const {
@@ -238,7 +236,7 @@ double LinearSolver::last_reduction() const {
 /// Behind a kink of the branch the last tangent can be a guess so bad that GMRES takes it for divergence.
 bool LinearSolver::solve(Vec b, Vec x) {
   if (solve_once(b, x)) return true;
-  if (!preconditioner_) return false;
+  if (!own_) return false;
   check(VecSet(x, 0));
   return solve_once(b, x);
 }

@@ -6,19 +6,31 @@
 
 namespace fretwave::solve {
 
+/// How often a linear solve that failed was tried in another way, and what is said of it.
+struct Fallbacks {
+  int rebuilt = 0;    ///< preconditioner built anew at the point
+  int condensed = 0;  ///< the problem's dearer preconditioner taken
+  int whole = 0;      ///< the whole system factorised
+  std::string said;   ///< of the last that was taken, or why there was none left
+};
+
 /// The bordered system linearised at a point, for Newton's steps and for solves beside them (tangents). Two
 /// routes (DESIGN section 4), chosen by size or by -<prefix>route: direct (assembled, LU) and krylov
 /// (matrix-free product, the problem's own preconditioner, rebuilt when iterations rise). PETSc options apply
 /// under the prefix; ours are only its defaults. Solves beside Newton's have a KSP of their own, prefix
 /// <prefix>tangent_, with the same operator and preconditioner: how roughly Newton's steps are solved for is
 /// a matter of cost, a tangent's error is one of the branch.
+///
+/// Where GMRES fails, `climb` goes up a ladder: the preconditioner built anew, the problem's fallback,
+/// factors of the whole system, each if it fits the memory. After a while that grows with each climb the
+/// solver goes back to the foot.
 class LinearSolver {
  public:
   /// Configures the KSP of the SNES, which must outlive this.
   LinearSolver(Bordered&, std::string const& prefix, SNES);
   LinearSolver(LinearSolver const&) = delete;
   /// After SNESSetFromOptions.
-  void make_tangent(std::string const& prefix);
+  void make_tangent();
   Mat jacobian() const { return J_; }
   /// "direct" or "krylov", with the reason of the choice.
   std::string route() const;
@@ -31,30 +43,43 @@ class LinearSolver {
   double last_reduction() const;
   /// The next linearisation builds the preconditioner anew.
   void renew() { stale_ = true; }
+  /// After a failure at the last linearisation: the next one tries another way; false if there is none left.
+  /// Collective.
+  bool climb();
+  /// A point was solved for: back to the foot of the ladder in time.
+  void descend();
+  Fallbacks const& fallbacks() const { return fallbacks_; }
   Guard& guard() { return guard_; }
 
  private:
   static PetscErrorCode shell_product(Mat, Vec, Vec);
   static PetscErrorCode shell_precondition(PC, Vec, Vec);
-  void choose_route(std::string const& prefix);
-  void use_direct();
-  void give_mumps_room(KSP);
+  void choose_route();
   void use_krylov();
-  bool factorise();
+  bool build();
   bool solve_once(Vec b, Vec x);
+  bool take_fallback();
+  bool take_whole();
+  bool fits(double bytes, std::string const& what);
   void count_iterations();
+  Preconditioner& preconditioner() { return fallback_ ? *fallback_ : *own_; }
 
   Bordered& bordered_;
+  std::string prefix_;
   SNES snes_;
   MatHandle J_;
   KspHandle tangent_;
   VecHandle point_;
-  std::unique_ptr<Preconditioner> preconditioner_;
+  std::unique_ptr<Preconditioner> own_, fallback_;
   bool stale_ = true, uncounted_ = false;
   int fresh_ = -1;          ///< Krylov iterations of the first solve after a build; -1: none yet
   int excess_ = 0;          ///< iterations beyond that, of all solves since
   double first_reuse_ = 0;  ///< iterations beyond it that the first reuse cost when it was last tried, halved
                             ///< at every build since
+  bool built_here_ = false;    ///< at the last linearisation
+  int rung_ = 0;               ///< of the ladder; 0: the problem's own preconditioner
+  int stay_ = 8, solved_ = 0;  ///< points to stay up there, and points since
+  Fallbacks fallbacks_;
   std::string route_;
   Guard guard_;
 };

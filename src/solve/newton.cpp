@@ -13,6 +13,7 @@ constexpr double near = 100;             // times the expected rounding of the r
 constexpr double unstepped = 1e-3;       // times the tolerance, for a guess to pass without a step
 constexpr double small_effect = 1e-8;    // on what is read (Problem::effect) of what a step leaves
 constexpr double largest_effect = 1e-6;  // the same, where rounding lets the residual fall no further
+constexpr double far = 1e5;              // length of a step over the residual, where J is nearly singular
 constexpr double exact = 1e-6;  // reduction of the residual that a linear solve as good as exact gives
 constexpr int rescalings = 4;   // of the rows, as the motion that is solved for becomes known
 
@@ -31,7 +32,7 @@ Newton::Newton(Problem& problem, std::string const& prefix) : bordered_(problem)
   check(SNESSetJacobian(snes_, linear_->jacobian(), linear_->jacobian(), form_jacobian, this));
   check(SNESSetSolution(snes_, y));
   check(SNESSetFromOptions(snes_));
-  linear_->make_tangent(prefix);
+  linear_->make_tangent();
 }
 
 /// PETSc's test, but for a guess that passes it: a step's cost buys the digits that a small damping needs.
@@ -126,7 +127,7 @@ Outcome Newton::solve(Vec y) {
   Outcome out;
   if (bordered_.problem().scale(y)) linear_->renew();
   for (int k = 0; k < rescalings; ++k) {
-    const Outcome before = std::exchange(out, solve_scaled(y));
+    const Outcome before = std::exchange(out, solve_persistently(y));
     out.newton += before.newton, out.linear += before.linear, out.effort += before.effort;
     if (!out.converged || !bordered_.problem().scale(y)) return out;
     linear_->renew();
@@ -134,7 +135,35 @@ Outcome Newton::solve(Vec y) {
   return out;
 }
 
-Outcome Newton::solve_scaled(Vec y) {
+/// A linear solve that fails is tried again from the last iterate in dearer ways.
+Outcome Newton::solve_persistently(Vec y) {
+  Outcome out = solve_once(y);
+  while (out.linear_failure && linear_->climb()) {
+    const Outcome before = std::exchange(out, solve_once(y));
+    out.newton += before.newton, out.linear += before.linear, out.effort += before.effort;
+  }
+  if (out.converged) linear_->descend();
+  if (!out.converged && !out.linear_failure) out.reason += explain_step(y);
+  if (out.linear_failure && !linear_->fallbacks().said.empty())
+    out.reason += " (" + linear_->fallbacks().said + ")";
+  return out;
+}
+
+/// Of a step that the residual does not account for: J is nearly singular, and no line search shortens it to
+/// use.
+std::string Newton::explain_step(Vec y) {
+  Vec step;
+  double length, residual;
+  check(SNESGetSolutionUpdate(snes_, &step));
+  if (!step) return {};
+  check(VecNorm(step, NORM_2, &length));
+  check(SNESGetFunctionNorm(snes_, &residual));
+  if (!(length > far * residual)) return {};
+  const std::string why = bordered_.problem().explain(y, step);
+  return why.empty() ? why : " (" + why + ")";
+}
+
+Outcome Newton::solve_once(Vec y) {
   linear_->guard().clear();
   const PetscErrorCode code = SNESSolve(snes_, nullptr, y);
   linear_->guard().rethrow();
@@ -158,7 +187,8 @@ Outcome Newton::solve_scaled(Vec y) {
           singular ? "the Jacobian is singular" : text,
           reason > 0 && below_tolerance(norm, true),
           std::isfinite(norm) ? bordered_.problem().rounding(y) : 0,
-          effort_};
+          effort_,
+          singular || reason == SNES_DIVERGED_LINEAR_SOLVE};
 }
 
 bool Newton::tangent(Vec y, Vec t) {
@@ -167,6 +197,11 @@ bool Newton::tangent(Vec y, Vec t) {
   return linear(y, right_side_, t);
 }
 
-bool Newton::linear(Vec y, Vec b, Vec x) { return linear_->linearise(y, false) && linear_->solve(b, x); }
+bool Newton::linear(Vec y, Vec b, Vec x) {
+  do {
+    if (linear_->linearise(y, false) && linear_->solve(b, x)) return true;
+  } while (linear_->climb());
+  return false;
+}
 
 }  // namespace fretwave::solve

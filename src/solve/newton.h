@@ -15,6 +15,7 @@ struct Outcome {
   /// Newton iterations as exact linear solves would have needed them: a measure of the branch, not of
   /// options.
   double effort = 0;
+  bool linear_failure = false;  ///< the last linear system was not solved, or was singular
 };
 
 /// SNES on a bordered problem, whose linear systems `LinearSolver` solves.
@@ -26,6 +27,7 @@ class Newton {
   SNES snes() const { return snes_; }
   /// "direct" or "krylov", with the reason of the choice.
   std::string route() const { return linear_->route(); }
+  Fallbacks const& fallbacks() const { return linear_->fallbacks(); }
   /// Solves from y, in place; y is the last iterate when it does not converge. Collective.
   Outcome solve(Vec y);
   /// Tangent at y: J t = 0, row . t = 1 with the closing row. t holds a guess (zero, or the last tangent),
@@ -39,7 +41,9 @@ class Newton {
                                   PetscReal residual, SNESConvergedReason*, void*);
   static PetscErrorCode form_function(SNES, Vec, Vec, void*);
   static PetscErrorCode form_jacobian(SNES, Vec, Mat, Mat, void*);
-  Outcome solve_scaled(Vec y);
+  Outcome solve_persistently(Vec y);
+  Outcome solve_once(Vec y);
+  std::string explain_step(Vec y);
   SNESConvergedReason judge(Vec y, double unknowns, double step, double residual, double residual_before);
   bool below_tolerance(double residual, bool started) const;
   bool stuck_at_rounding(Vec y);

@@ -1,6 +1,7 @@
 #pragma once
 #include <string>
 
+#include "error.h"
 #include "petsc.h"
 
 namespace fretwave::solve {
@@ -9,7 +10,8 @@ namespace fretwave::solve {
 class Preconditioner {
  public:
   virtual ~Preconditioner() = default;
-  /// Factorise at y with the closing row. Collective.
+  /// Factorise at y with the closing row; `SingularBlock` on every rank, or a failure, if that cannot be.
+  /// Collective.
   virtual void build(Vec y, Vec row) = 0;
   virtual void apply(Vec x, Vec z) = 0;
   /// Why the last build gave nothing to apply (a singular block), the same on every rank; empty if it did.

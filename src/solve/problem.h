@@ -47,6 +47,15 @@ class Problem {
   /// have both.
   virtual std::unique_ptr<Preconditioner> preconditioner(std::string const& /*blocks*/) { return nullptr; }
 
+  /// A dearer preconditioner for where that one fails, and what building it takes beside its factors [bytes];
+  /// none if there is none or it is in use already.
+  virtual std::unique_ptr<Preconditioner> fallback(double& /*bytes*/) { return nullptr; }
+  /// About how many entries J has; 0 if it is dense.
+  virtual double jacobian_entries() const { return 0; }
+
+  /// Why J is nearly singular at y, where Newton's step is dy; empty if nothing is known. Collective.
+  virtual std::string explain(Vec /*y*/, Vec /*dy*/) { return {}; }
+
   /// Diagonal weights of the arclength's inner product at y.
   virtual void metric(Vec y, Vec weights) = 0;
   /// Event functions at a point of the branch with its unit tangent. Collective.

@@ -25,6 +25,14 @@ def closure_note(row: Mapping[str, Any]) -> str:
     return f"  note: a slider ends {unclosed:.1e} m from where it began ({share})"
 
 
+#: What was done when GMRES failed.
+FALLBACKS = {
+    "rebuilt": "preconditioner rebuilt",
+    "condensed": "condensed contact system factorised",
+    "whole": "whole system factorised",
+}
+
+
 def step_control(step: StepSection) -> Any:
     """The case's step control for the continuation."""
     import fretwave
@@ -117,6 +125,22 @@ def tell(context: Any, branch: Any, name: str = "") -> None:
         context.console.line(f"{name}: {line}")
     if lines:
         context.entry.setdefault("branches", {})[name] = lines
+    tell_fallbacks(context, branch)
+
+
+def tell_fallbacks(context: Any, branch: Any) -> None:
+    """One line of the log on linear solves that failed and how they were solved; counts add up in run.json."""
+    found = branch.fallbacks
+    counts = {key: found[key] for key in ("rebuilt", "condensed", "whole")}
+    if not any(counts.values()):
+        return
+    kept = context.entry.setdefault("linear_fallbacks", dict.fromkeys(counts, 0))
+    for key, count in counts.items():
+        kept[key] += count
+    text = ", ".join(f"{what} {counts[key]} times" for key, what in FALLBACKS.items() if counts[key])
+    context.console.line(f"{context.name}: GMRES failed and was helped: {text}")
+    if found["said"]:
+        context.console.line(f"{context.name}: {found['said']}")
 
 
 def points_of(branch: Any) -> Iterator[Any]:

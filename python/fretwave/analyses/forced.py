@@ -10,6 +10,7 @@ import numpy as np
 from ..columns import FORCED
 from ..harmonic_motion import complex_amplitudes
 from ..schema import ForcedAnalysis
+from ..suspects import suspects
 from .branch import closure_note, finished_table, open_branch, points_of, record, tell
 from .context import AnalysisContext, Outcome
 from .excitation import Excitation, excitation_of
@@ -93,6 +94,8 @@ def _one_level(excitation: Excitation, writer: Any, number: int, snapshot: Any, 
     if "without bound" in stopped:
         most = _bounded(excitation, problem, branch.anchor)
         stopped += f": damping and friction take at most the work of level {most:.4g}"
+    elif stopped:
+        stopped += suspects(context.model.contacts, problem.core.stiffness_scale)
     branch.destroy()
     problem.destroy()
     return stopped

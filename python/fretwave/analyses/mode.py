@@ -11,6 +11,7 @@ import numpy as np
 
 from ..columns import MODE
 from ..schema import ModeAnalysis
+from ..suspects import suspects
 from .asymptotes import asymptote_line
 from .branch import closure_note, finished_table, mode_problem, open_branch, points_of, record, step_control, tell
 from .context import AnalysisContext, Outcome
@@ -76,6 +77,8 @@ def _follow(context: AnalysisContext, analysis: ModeAnalysis, problem: Any, writ
             )
     tell(context, branch)
     outcome = _finish(context, writer, branch, start)
+    if not branch.converged:
+        outcome.reason += suspects(context.model.contacts, problem.core.stiffness_scale)
     outcome.goal = f"amplitude {high:g} m"
     branch.destroy()
     return outcome
@@ -114,6 +117,7 @@ def point_line(name: str, row: dict[str, Any]) -> str:
         f"{name} {row['point']:4d}  a {row['amplitude']:9.4g} m  f {row['frequency_hz']:9.5g} Hz"
         f"  zeta {_percent(row['zeta'], 4):>8} %  stick {100 * row['stick']:3.0f} %"
         f"  error {row['error_estimate']:.1e}  newton {row['newton']:2d}  {row['wall_s']:.3f} s"
+        + ("  overdamped" if abs(row["zeta"]) >= 1 else "")
         + (f"  {row['event'].replace('_', ' ')}" if row["event"] else "")
         + closure_note(row)
     )
