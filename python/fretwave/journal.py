@@ -140,7 +140,7 @@ class Journal:
         """Start anew with the layout and the first row; an earlier journal is replaced by both in one step."""
         self.token = uuid.uuid4().hex
         layout.values["token"] = self.token
-        replace_bytes(self.path, packed(layout) + packed(first), sync=False)
+        replace_bytes(self.path, packed(layout) + packed(first))
         self._open(self.path.stat().st_size)
 
     def go_on(self, size: int, token: str) -> None:

@@ -243,9 +243,11 @@ class AnalysisWriter:
             The journal is damaged.
         """
         path = journal_path(self.folder, self.name)
-        rows = Rows.of(path) if path.exists() else None
-        state = self._journal.state(rows.token, len(rows)) if rows is not None else None
-        if rows is None or state is None:
+        if not path.exists():
+            return None
+        rows = Rows.of(path)
+        state = self._journal.state(rows.token, len(rows))
+        if state is None:
             return None
         kept = rows.first(state[0])
         self.rows, self.reported = len(kept), len(kept.reported)

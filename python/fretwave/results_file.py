@@ -43,13 +43,13 @@ class Rows:
     size: int
 
     @classmethod
-    def of(cls, path: Path) -> Rows | None:
-        """Read a journal through; None when it has no row yet.
+    def of(cls, path: Path) -> Rows:
+        """Read a journal through.
 
         Raises
         ------
         InputError
-            It is damaged in its middle.
+            It is damaged in its middle, or has not even its first row, which is there from its beginning.
         """
         layout: Record | None = None
         places: list[tuple[int, int, int]] = []
@@ -64,7 +64,8 @@ class Rows:
                 reported.append(row)
             row += is_row
         if layout is None or not row:
-            return None
+            size, fix = f"{path.stat().st_size} bytes", "restore it from a copy, or run the case anew"
+            raise InputError("the journal of an analysis is damaged", display(path), size, "a row at least", fix)
         return cls(path, layout, places, reported, places[-1][1])
 
     def __len__(self) -> int:
@@ -109,10 +110,8 @@ def attributes_of(given: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, A
     return plain, arrays
 
 
-def build_group(file: Any, name: str, rows: Rows | None) -> None:
+def build_group(file: Any, name: str, rows: Rows) -> None:
     """Make the group of an analysis from its journal."""
-    if rows is None:
-        raise InputError("the journal of an analysis is gone or damaged", f"'{name}'", fix="run the case anew")
     told_of, arrays = rows.layout.values, rows.layout.arrays
     file.attrs.update(told_of["file_attributes"])
     group = file.create_group(name)
@@ -322,7 +321,7 @@ def open_results(path: Path) -> Results:
 
 
 def _open_all(path: Path) -> Results:
-    journals = {name: rows for name, place in unfinished(path.parent).items() if (rows := Rows.of(place)) is not None}
+    journals = {name: Rows.of(place) for name, place in unfinished(path.parent).items()}
     found = Results(_open_file(path) if path.exists() or not journals else None, {})
     try:
         for name, rows in journals.items():

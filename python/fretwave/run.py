@@ -146,7 +146,13 @@ class Runner:
         self.console = Console(active, self.folder.log, quiet=quiet)
         self.failures: list[NotConverged] = []
         if resuming:
+            on_first_rank(comm, self._check_readable)
             self._start()
+
+    def _check_readable(self) -> None:
+        """Refuse damaged results before anything in the folder is changed."""
+        if has_results(self.folder.path):
+            open_results(self.folder.path / "results.h5").close()
 
     def _start(self) -> None:
         """Collective."""
