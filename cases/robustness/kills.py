@@ -1,6 +1,6 @@
 """Kill runs, sweeps and studies at random times, at writes and within writes; resume; compare with the uninterrupted.
 
-    .venv/bin/python cases/robustness/kills.py [--count 300] [--seed 1] [--out FOLDER]
+.venv/bin/python cases/robustness/kills.py [--count 300] [--seed 1] [--out FOLDER]
 """
 
 from __future__ import annotations

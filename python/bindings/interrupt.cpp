@@ -17,8 +17,8 @@ struct Ending {
   char const* name;
   struct sigaction before;
 };
-std::array<Ending, 4> endings{{{SIGINT, "SIGINT", {}}, {SIGTERM, "SIGTERM", {}}, {SIGHUP, "SIGHUP", {}},
-                               {SIGXCPU, "SIGXCPU", {}}}};
+std::array<Ending, 4> endings{
+    {{SIGINT, "SIGINT", {}}, {SIGTERM, "SIGTERM", {}}, {SIGHUP, "SIGHUP", {}}, {SIGXCPU, "SIGXCPU", {}}}};
 std::array<char, 4096> words;
 size_t length = 0;
 int code = 1;
@@ -33,8 +33,9 @@ void say(char const* text, size_t count) {
   }
 }
 
-/// Says the last words and ends the process. Python would look at a signal only between two points of a branch, hours
-/// later perhaps; files may be left at any instant, for what is written to them is in order and has checksums.
+/// Says the last words and ends the process. Python would look at a signal only between two points of a
+/// branch, hours later perhaps; files may be left at any instant, for what is written to them is in order and
+/// has checksums.
 void end(int number) {
   if (length > 0) {
     say("interrupted by ", 15);
@@ -63,7 +64,8 @@ void end_on_signals(int exit_code) {
     action.sa_handler = end;
     sigfillset(&action.sa_mask);
     sigaction(ending.number, nullptr, &ending.before);
-    if (ending.before.sa_handler != SIG_IGN) sigaction(ending.number, &action, nullptr);  // nohup stays what it is
+    if (ending.before.sa_handler != SIG_IGN)
+      sigaction(ending.number, &action, nullptr);  // nohup stays what it is
   }
   installed = true;
 }
@@ -77,8 +79,10 @@ void restore_signals() {
 }  // namespace
 
 void bind_interrupt(nb::module_& m) {
-  m.def("set_last_words", set_last_words, "What is printed after the name of the signal that ends the process.");
-  m.def("end_on_signals", end_on_signals, "End on SIGINT, SIGTERM, SIGHUP and SIGXCPU at once, with the last words.");
+  m.def("set_last_words", set_last_words,
+        "What is printed after the name of the signal that ends the process.");
+  m.def("end_on_signals", end_on_signals,
+        "End on SIGINT, SIGTERM, SIGHUP and SIGXCPU at once, with the last words.");
   m.def("restore_signals", restore_signals, "Undo `end_on_signals`.");
 }
 

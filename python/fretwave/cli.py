@@ -194,8 +194,10 @@ def _world() -> Any:
     from mpi4py import MPI
 
     from .doctor import check_runtime
+    from .memory import check_room
 
     check_runtime()
+    check_room()
     import fretwave._core  # noqa: F401
 
     return MPI.COMM_WORLD

@@ -76,6 +76,8 @@ def replaced(path: Path, own: bool = False, keep_suffix: bool = False) -> Iterat
     """
     fresh = beside(path, own)
     fresh = fresh.with_name(fresh.name + path.suffix) if keep_suffix else fresh
+    if own:
+        _forget_unfinished(path)
     with told(path):
         try:
             yield fresh
@@ -85,6 +87,14 @@ def replaced(path: Path, own: bool = False, keep_suffix: bool = False) -> Iterat
         finally:
             with suppress(OSError):
                 fresh.unlink()
+
+
+def _forget_unfinished(path: Path) -> None:
+    """Remove what killed processes left beside a file."""
+    for left in path.parent.glob(f".{path.name}.*.new*"):
+        number = left.name[len(path.name) + 2 :].split(".")[0]
+        if number.isdigit() and not Path(f"/proc/{number}").exists():
+            left.unlink(missing_ok=True)
 
 
 def replace_bytes(path: Path, data: bytes, sync: bool = True) -> None:
