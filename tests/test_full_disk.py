@@ -1,4 +1,4 @@
-"""A disk that takes no more ends a run in one message, and it goes on from there (long form: cases/robustness/full_disk.py)."""
+"""A full disk ends a run in one message, and it goes on from there (long form: cases/robustness/full_disk.py)."""
 
 from __future__ import annotations
 

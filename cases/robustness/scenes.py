@@ -40,6 +40,14 @@ SHORT = {
     "free_decay.amplitude": "[0.3]",
 }
 
+SWEEP = """
+[[analysis]]
+name = "limits"
+type = "sweep"
+of = "mode"
+over = { "contact.damper.friction_limit" = [3, 5] }
+"""
+
 
 def overrides(settings: dict[str, str]) -> list[str]:
     """As the command line takes them."""
@@ -62,8 +70,8 @@ def scenes(folder: Path) -> list[Scene]:
     plain = [str(TWO_DOF), *overrides(SHORT)]
     sweep = folder / "sweep.toml"
     text = TWO_DOF.read_text(encoding="utf-8")
-    part = '\n[[analysis]]\nname = "limits"\ntype = "sweep"\nof = "mode"\nover = { "contact.damper.friction_limit" = [3, 5] }\n'
-    sweep.write_text(text.replace("# Error against run time", f"{part}\n# Error against run time"), encoding="utf-8")
+    mark = "# Error against run time"
+    sweep.write_text(text.replace(mark, f"{SWEEP}\n{mark}"), encoding="utf-8")
     return [
         Scene("run", ["run", *plain, "--only", "mode,forced,free_decay", "--no-plots"]),
         Scene("pictures", ["run", *plain, "--only", "mode", "--set", "mode.report_at=[]"]),

@@ -130,11 +130,16 @@ def _is_in_place(descriptor: int, path: Path) -> bool:
 
 def _seize(descriptor: int) -> None:
     """Take the kernel's lock; where the file system knows none, the signs of life must do."""
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError as error:
-        if error.errno in TAKEN:
-            raise BlockingIOError(error.errno, error.strerror) from None
+    for tries in reversed(range(4)):  # one who only looks has it for an instant
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            return
+        except OSError as error:
+            if error.errno not in TAKEN:
+                return
+            if not tries:
+                raise BlockingIOError(error.errno, error.strerror) from None
+            time.sleep(0.05)
 
 
 def _self() -> dict[str, Any]:
