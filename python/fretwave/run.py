@@ -21,7 +21,7 @@ from .parallel import on_first_rank
 from .petsc_options import AnalysisOptions
 from .reduced import reduce_case
 from .results import has_results, open_results
-from .runfolder import CASE_COPY, RunFolder, new_record, peak_memory_mb, read_record
+from .runfolder import CASE_COPY, RunFolder, new_record, peak_memory_mb, read_copy, read_record
 from .schema import AnalysisSection, ForcedAnalysis, PreloadSection, SweepAnalysis, TransientSection
 from .sectors import nodal_diameter
 from .source import display
@@ -113,7 +113,7 @@ def reload_case(folder: Path, kept: bool = False) -> tuple[Case, dict[str, Any]]
         raise InputError(problem, display(folder), expected="the folder of a value", fix=f"give {display(one)}")
     given = record["case"]
     path = Path(given["path"])
-    text = None if path.exists() and not kept else (folder / CASE_COPY).read_text(encoding="utf-8")
+    text = None if path.exists() and not kept else read_copy(folder, record)
     case = load_case(path, given["overrides"], given["quick"], text=text)
     changed = changed_keys(given["resolved"], case.resolved)
     if changed:

@@ -8,6 +8,7 @@ import socket
 import sys
 import time
 import uuid
+import zlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from .errors import InputError
 from .files import replace_text, told, write_all
 from .lock import FolderLock, check_free
 from .record import RECORD, read_record, write_record
+from .source import display
 
 CASE_COPY = "case.toml"
 
@@ -69,6 +71,7 @@ class RunFolder:
         self.started = True
         self._keep_earlier()
         replace_text(self.path / CASE_COPY, self._case_text)
+        self.record["case"]["text_checksum"] = text_checksum(self._case_text.encode("utf-8"))
         self.save()
         with told(self.path / "run.log"):
             self._log = (self.path / "run.log").open("ab" if self._resumed else "wb", buffering=0)
@@ -115,6 +118,31 @@ class RunFolder:
         self._lock.release()
 
 
+def read_copy(folder: Path, record: Mapping[str, Any]) -> str:
+    """Text of the case as the folder keeps it.
+
+    Raises
+    ------
+    InputError
+        It is gone or not what was written.
+    """
+    path, given = folder / CASE_COPY, record["case"].get("text_checksum")
+    try:
+        text = path.read_bytes()
+    except OSError as error:
+        fix = "restore it from a copy, or put the case file back into its place"
+        raise InputError("the copy of the case is gone", display(path), error.strerror, None, fix) from None
+    if given is not None and given != text_checksum(text):
+        fix = "restore it from a copy, or put the case file back into its place"
+        raise InputError("the copy of the case is damaged", display(path), "its checksum is another", given, fix)
+    return text.decode("utf-8", "replace")
+
+
+def text_checksum(text: bytes) -> str:
+    """Of the case's text, kept in run.json."""
+    return f"{zlib.crc32(text):08x}"
+
+
 def new_record(case: Mapping[str, Any], ranks: int) -> dict[str, Any]:
     """run.json at the start of a run.
 
@@ -136,7 +164,7 @@ def new_record(case: Mapping[str, Any], ranks: int) -> dict[str, Any]:
     }
 
 
-__all__ = ["CASE_COPY", "RECORD", "RunFolder", "new_record", "peak_memory_mb", "read_record"]
+__all__ = ["CASE_COPY", "RECORD", "RunFolder", "new_record", "peak_memory_mb", "read_copy", "read_record"]
 
 
 def versions() -> dict[str, str]:

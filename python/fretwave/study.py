@@ -23,7 +23,7 @@ from .parallel import on_first_rank
 from .petsc_options import AnalysisOptions
 from .reduced import reduce_case
 from .run import build_model
-from .runfolder import CASE_COPY
+from .runfolder import read_copy
 from .schema import ModeAnalysis, WearAnalysis
 from .sectors import nodal_diameter
 from .study_folder import StudyFolder
@@ -73,8 +73,8 @@ def _study(
 
 def _load(options: argparse.Namespace, record: dict[str, Any] | None) -> Case:
     """The case; one that is gone from its copy, as a run does."""
-    copy = options.out / CASE_COPY if record is not None and not options.case.exists() else None
-    text = copy.read_text(encoding="utf-8") if copy is not None else None
+    gone = record is not None and not options.case.exists()
+    text = read_copy(options.out, record) if gone and record is not None else None
     return load_case(options.case, options.overrides, options.quick, text=text)
 
 

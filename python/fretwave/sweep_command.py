@@ -14,7 +14,7 @@ from .errors import EXIT_DONE, FretwaveError, InputError, NotConverged
 from .interrupt import say_how_to_go_on
 from .parallel import on_first_rank
 from .run import RunOptions, plot
-from .runfolder import CASE_COPY, RunFolder, new_record, peak_memory_mb
+from .runfolder import CASE_COPY, RunFolder, new_record, peak_memory_mb, read_copy
 from .source import display
 from .sweep import Checked, Sweep
 from .sweep_plan import Plan
@@ -56,7 +56,7 @@ def resume_sweep(folder: Path, record: dict[str, Any], comm: Any, plots: bool = 
     given, asked = record["case"], record["sweep"]
     options = RunOptions(folder, given["overrides"], given["only"], given["quick"], plots, given["petsc"])
     path = Path(given["path"])
-    text = None if path.exists() else on_first_rank(comm, lambda: (folder / CASE_COPY).read_text(encoding="utf-8"))
+    text = None if path.exists() else on_first_rank(comm, lambda: read_copy(folder, record))
     sweep = Sweep(path, Plan(asked["over"]), options, folder / "values", asked["groups"], text)
     if asked["groups"] is not None:
         sweep.n_groups = min(asked["groups"], comm.size)
