@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import shutil
 from pathlib import Path
 
 import h5py
@@ -66,14 +67,45 @@ def test_values_units_and_names_come_back(tmp_path: Path) -> None:
 
 def test_every_row_is_there_before_the_table_is_closed(tmp_path: Path) -> None:
     """A copy of the files after each row is what a kill would leave."""
-    table = writer(tmp_path)
+    table = writer(tmp_path / "run", file_attributes={"title": "a case"})
     for count in range(1, 4):
         fill(table, 1)
-        (tmp_path / "copy.h5").write_bytes((tmp_path / "results.h5").read_bytes())
-        with h5py.File(tmp_path / "copy.h5") as file:
+        copy = tmp_path / f"copy_{count}"
+        shutil.copytree(tmp_path / "run", copy)
+        with open_results(copy / "results.h5") as file:
             assert len(file["mode/points/zeta"]) == count
-        assert len((tmp_path / "mode.csv").read_text().splitlines()) == count + 1
+            assert file["mode"].attrs["status"] == "running"
+            assert file.attrs["title"] == "a case"
+        assert len((copy / "mode.csv").read_text().splitlines()) == count + 1
     table.abandon()
+
+
+def test_a_torn_row_is_left_out_and_all_before_it_are_there(tmp_path: Path) -> None:
+    """Every length that the journal can have after a kill in a write."""
+    table = writer(tmp_path)
+    ends = []
+    for _ in range(4):
+        fill(table, 1)
+        ends.append((tmp_path / ".mode.rows").stat().st_size)
+    table.abandon()
+    whole = (tmp_path / ".mode.rows").read_bytes()
+    for size in range(ends[0], ends[-1], 7):
+        (tmp_path / ".mode.rows").write_bytes(whole[:size])
+        with open_results(tmp_path / "results.h5") as file:
+            assert len(file["mode/points/zeta"]) == sum(end <= size for end in ends)
+
+
+def test_a_journal_damaged_in_its_middle_is_named(tmp_path: Path) -> None:
+    table = writer(tmp_path)
+    fill(table, 4)
+    table.abandon()
+    content = bytearray((tmp_path / ".mode.rows").read_bytes())
+    content[len(content) // 2] ^= 1
+    (tmp_path / ".mode.rows").write_bytes(content)
+    for work in (lambda: open_results(tmp_path / "results.h5"), writer(tmp_path).go_on):
+        with pytest.raises(InputError, match="damaged"):
+            work()
+    assert (tmp_path / ".mode.rows").read_bytes() == content
 
 
 def test_earlier_results_stay_until_the_first_row(tmp_path: Path) -> None:
@@ -146,26 +178,52 @@ def test_going_on_gives_the_same_files(tmp_path: Path) -> None:
             assert np.array_equal(one["mode"][name], two["mode"][name])
 
 
-@pytest.mark.parametrize("spoilt", ["checksum", "rows"])
-def test_the_older_state_is_used_when_the_newer_is_spoilt(tmp_path: Path, spoilt: str) -> None:
-    """A kill in the middle of a write: a half-written state, or a state whose row is not in the table yet."""
+@pytest.mark.parametrize("spoilt", ["state", "rows"])
+def test_the_older_state_is_used_when_the_newer_is_spoilt(tmp_path: Path, spoilt: str, monkeypatch) -> None:
+    """A power failure: a half-written state, or a state whose row is not on the disk."""
+    monkeypatch.setattr("fretwave.journal.SAFE_EVERY", 0.0)
     table = writer(tmp_path)
-    fill(table, 6)
+    fill(table, 5)
+    monkeypatch.setattr("fretwave.journal.SAFE_EVERY", 1e9)
+    fill(table, 1)
     table.abandon()
-    with h5py.File(tmp_path / "results.h5", "r+") as file:
-        if spoilt == "rows":
-            file["mode/points/zeta"].resize(5, axis=0)
-        else:
-            newer = max(("state_0", "state_1"), key=lambda name: file["mode"][name]["header"][0])
-            file["mode"][newer]["y"][2] = 17.0
+    path = tmp_path / (".mode.state" if spoilt == "state" else ".mode.rows")
+    path.write_bytes(path.read_bytes()[:-3])
     table = writer(tmp_path)
     state = table.go_on()
     assert state is not None
     assert (int(state["index"]), table.rows) == (4, 5)
     table.abandon()
-    with h5py.File(tmp_path / "results.h5") as file:
+    with open_results(tmp_path / "results.h5") as file:
         assert {len(file["mode/points"][name]) for name in MODE} == {5}
     assert len((tmp_path / "mode.csv").read_text().splitlines()) == 6
+
+
+def test_rows_that_a_state_needs_and_that_are_gone_are_named(tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.setattr("fretwave.journal.SAFE_EVERY", 0.0)
+    table = writer(tmp_path)
+    fill(table, 6)
+    table.abandon()
+    path = tmp_path / ".mode.rows"
+    path.write_bytes(path.read_bytes()[: 2 * path.stat().st_size // 3])
+    with pytest.raises(InputError, match="rows of an analysis are missing"):
+        writer(tmp_path).go_on()
+
+
+def test_tables_still_to_come_keep_an_analysis_from_being_done(tmp_path: Path) -> None:
+    """Closed but not published is what a kill between the last row and the last table leaves."""
+    table = writer(tmp_path, publish_later=True)
+    fill(table, 6)
+    table.close("done", "stop value reached")
+    assert len(table.group["points/zeta"]) == 6
+    with open_results(tmp_path / "results.h5") as file:
+        assert file["mode"].attrs["status"] == "running"
+    assert not (tmp_path / "results.h5").exists()
+    table.abandon()
+    table.publish()
+    with h5py.File(tmp_path / "results.h5") as file:
+        assert file["mode"].attrs["status"] == "done"
+    assert not list(tmp_path.glob(".mode.*"))
 
 
 def test_nothing_to_go_on_from(tmp_path: Path) -> None:

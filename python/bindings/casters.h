@@ -49,6 +49,7 @@ void bind_model(nb::module_&);
 void bind_hb(nb::module_&);
 void bind_solve(nb::module_&);
 void bind_transient(nb::module_&);
+void bind_interrupt(nb::module_&);
 
 }  // namespace fretwave::python
 

@@ -64,6 +64,7 @@ NB_MODULE(_core, m) {
   bind_solve(m);
   bind_hb(m);
   bind_transient(m);
+  bind_interrupt(m);
 }
 
 }  // namespace fretwave::python

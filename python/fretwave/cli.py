@@ -194,8 +194,10 @@ def _world() -> Any:
     from mpi4py import MPI
 
     from .doctor import check_runtime
+    from .memory import check_room
 
     check_runtime()
+    check_room()
     import fretwave._core  # noqa: F401
 
     return MPI.COMM_WORLD
@@ -203,31 +205,44 @@ def _world() -> Any:
 
 def _run(options: argparse.Namespace) -> int:
     comm = _world()
+    from .interrupt import ending_in_words
     from .run import RunOptions, run_case
 
-    return run_case(options.case, RunOptions.of(options), comm)
+    with ending_in_words(comm):
+        return run_case(options.case, RunOptions.of(options), comm)
 
 
 def _sweep(options: argparse.Namespace) -> int:
     comm = _world()
+    from .interrupt import ending_in_words
     from .run import RunOptions
     from .sweep_command import sweep_case
     from .sweep_plan import plan_of
 
-    return sweep_case(options.case, RunOptions.of(options), plan_of(options.over), options.groups, comm)
+    with ending_in_words(comm):
+        return sweep_case(options.case, RunOptions.of(options), plan_of(options.over), options.groups, comm)
 
 
 def _resume(options: argparse.Namespace) -> int:
     comm = _world()
+    from .interrupt import ending_in_words, say_how_to_go_on
+    from .lock import check_free
     from .parallel import on_first_rank
     from .run import resume_run
     from .runfolder import read_record
     from .sweep_command import resume_sweep
 
     record = on_first_rank(comm, lambda: read_record(options.folder))
-    if "sweep" in record:
-        return resume_sweep(options.folder, record, comm, not options.no_plots)
-    return resume_run(options.folder, comm, not options.no_plots)
+    on_first_rank(comm, lambda: check_free(options.folder))
+    with ending_in_words(comm):
+        say_how_to_go_on(comm, options.folder)
+        if "study" in record:
+            from .study import resume_study
+
+            return resume_study(options.folder, record, comm)
+        if "sweep" in record:
+            return resume_sweep(options.folder, record, comm, not options.no_plots)
+        return resume_run(options.folder, comm, not options.no_plots)
 
 
 def _check(options: argparse.Namespace) -> int:
@@ -283,6 +298,7 @@ def _plot(options: argparse.Namespace) -> int:
     from .results import open_results
     from .run import plot
 
-    open_results(options.folder / "results.h5").close()
+    if not (options.folder / "study.csv").exists():
+        open_results(options.folder / "results.h5").close()
     plot(options.folder, Console(True), options.only or None)
     return EXIT_DONE

@@ -9,7 +9,6 @@ A group takes the next task when it has finished its last one, so that long and 
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -20,6 +19,7 @@ from zipfile import BadZipFile
 import numpy as np
 
 from .errors import FretwaveError, InputError
+from .files import replaced, told
 from .parallel import all_ranks_failed, on_first_rank
 
 Task = TypeVar("Task")
@@ -52,10 +52,10 @@ class Kept:
 
     def save(self, number: int, result: Mapping[str, Any]) -> None:
         """Keep the result of a task. One rank only."""
-        self.folder.mkdir(parents=True, exist_ok=True)
-        partial = self._file(number).with_suffix(".part.npz")
-        np.savez(partial, _digest=self.digest, **result)
-        os.replace(partial, self._file(number))
+        with told(self.folder):
+            self.folder.mkdir(parents=True, exist_ok=True)
+        with replaced(self._file(number), keep_suffix=True) as fresh:
+            np.savez(fresh, _digest=self.digest, **result)
 
     def _file(self, number: int) -> Path:
         return self.folder / f"task_{number:04d}.npz"

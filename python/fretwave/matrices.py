@@ -102,11 +102,11 @@ def _read(path: Path, letter: str, where: str) -> Any:
         )
     try:
         values = _read_known(path, letter)
-    except (OSError, ValueError, KeyError) as error:
+    except Exception as error:  # a damaged file makes the readers of NumPy and SciPy raise anything
         raise InputError(
             f"the file of the {_NAMES[letter]} cannot be read",
             where=where,
-            measured=f"{display(path)}: {error}",
+            measured=f"{display(path)}: {' '.join(str(error).split())}",
             expected=f".npz of scipy.sparse.save_npz, .npz of numpy.savez with an array '{letter}', or .mtx",
             fix=f"write it with scipy.sparse.save_npz('{path.name}', {letter})",
         ) from None
@@ -128,7 +128,10 @@ def _read_known(path: Path, letter: str) -> Any:
     with np.load(path) as archive:
         if "format" not in archive.files:
             return archive[letter]
-    return scipy.sparse.load_npz(path)
+    matrix = scipy.sparse.load_npz(path)
+    if hasattr(matrix, "check_format"):
+        matrix.check_format(full_check=True)  # SciPy's loops trust the indices
+    return matrix
 
 
 def _check_square(matrix: Matrix) -> None:

@@ -39,6 +39,7 @@ import numpy.typing as npt
 import scipy.sparse as sp
 
 from .errors import InputError
+from .files import Unfailing, check_whole, replaced, seal
 from .source import display, nearest
 
 if TYPE_CHECKING:
@@ -184,20 +185,17 @@ def write(path: str | Path, model: FileModel) -> None:
 
     _check(model, str(path))
     path = Path(path)
-    unfinished = path.with_name(path.name + ".unfinished")
-    try:
-        with h5py.File(unfinished, "w") as file:
+    if path.is_dir() or not path.parent.is_dir():
+        measured = "a folder of this name" if path.is_dir() else "no such folder"
+        fix, expected = "choose another place", "a file in a folder that exists"
+        raise InputError("the model file cannot be written", display(path), measured, expected, fix)
+    with replaced(path, own=True) as fresh:
+        raw = Unfailing(fresh)
+        with h5py.File(raw, "w") as file:
             file.attrs.update(format=FORMAT, format_version=VERSION, units=model.units)
             _write_parts(file, model)
-    except OSError as error:
-        raise InputError(
-            "the model file cannot be written",
-            display(path),
-            error,
-            "a folder that exists and can be written",
-            "choose another place",
-        ) from None
-    unfinished.replace(path)
+        raw.close()
+        seal(fresh)
 
 
 def _write_parts(file: Any, model: FileModel) -> None:
@@ -246,7 +244,7 @@ def read(path: str | Path) -> FileModel:
     with _opened(path) as file:
         try:
             model = _read_parts(file)
-        except (KeyError, OSError, ValueError) as error:
+        except (KeyError, OSError, ValueError, TypeError, AttributeError, RuntimeError, OverflowError) as error:
             raise InputError(
                 "the model file is damaged",
                 display(path),
@@ -266,10 +264,11 @@ def _opened(path: Path) -> Any:
         names = sorted(entry.name for entry in path.parent.iterdir()) if path.parent.is_dir() else []
         raise InputError("the model file does not exist", display(path), fix=nearest(path.name, names) or fix)
     try:
+        check_whole(path, "the model file")
         file = h5py.File(path, "r")
-    except OSError as error:
+        kind, version = str(file.attrs.get("format", "none")), int(file.attrs.get("format_version", 0))
+    except (OSError, RuntimeError, ValueError, TypeError) as error:
         raise InputError("this is no model file", display(path), str(error), "an HDF5 file", fix) from None
-    kind, version = str(file.attrs.get("format", "none")), int(file.attrs.get("format_version", 0))
     if kind == FORMAT and version <= VERSION:
         return file
     file.close()
@@ -311,7 +310,9 @@ def _read_contact(name: str, group: Any) -> ContactMap:
 
 def _read_sparse(group: Any) -> sp.csr_matrix:
     parts = tuple(group[key][()] for key in ("data", "indices", "indptr"))
-    return sp.csr_matrix(parts, shape=tuple(int(n) for n in group.attrs["shape"]))
+    matrix = sp.csr_matrix(parts, shape=tuple(int(n) for n in group.attrs["shape"]))
+    matrix.check_format(full_check=True)  # SciPy's loops trust the indices
+    return matrix
 
 
 def _check(model: FileModel, where: str) -> None:

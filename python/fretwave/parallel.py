@@ -15,6 +15,7 @@ from types import TracebackType
 from typing import Any, TypeVar
 
 from .errors import EXIT_OTHER, FretwaveError, exit_code_of
+from .files import file_error
 
 Result = TypeVar("Result")
 
@@ -74,10 +75,11 @@ def describe(error: BaseException, rank: int | None = None, traced: bool = False
     if isinstance(error, FretwaveError):
         text = error.render()
         return text if rank is None else f"{text}\n  {'rank:':<10}{rank}"
-    if isinstance(error, OSError) and error.filename is not None:
-        return (
-            f"error: {error.strerror}\n  where:    {error.filename}\n  fix:      check the disk and who may write there"
-        )
+    if isinstance(error, BrokenPipeError):
+        return "error: nobody reads the output any more\n  fix:      `fretwave resume RUNDIR > FILE` goes on with a run"
+    plain = in_words(error)
+    if plain is not None:
+        return describe(plain, rank)
     if isinstance(error, KeyboardInterrupt):
         return "interrupted: finished points are kept; `fretwave resume RUNDIR` goes on from there"
     place = "" if rank is None else f" on rank {rank}"
@@ -89,6 +91,24 @@ def describe(error: BaseException, rank: int | None = None, traced: bool = False
     if frames:
         text += f"  where:    {os.path.basename(frames[-1].filename)}:{frames[-1].lineno}, {frames[-1].name}\n"
     return f"{text}  fix:      this is a defect of fretwave; report it with what {TRACEBACK}=1 adds to this message"
+
+
+def in_words(error: BaseException) -> FretwaveError | None:
+    """The message of an error that the machine makes, not fretwave: disk, memory, libraries; else None."""
+    if isinstance(error, OSError):
+        return file_error(error)
+    text = " ".join(str(error).split())
+    short = any(words in text.lower() for words in ("out of memory", "cannot allocate memory", "bad_alloc"))
+    if isinstance(error, MemoryError) or short:
+        return FretwaveError(
+            "there is not enough memory",
+            measured=text or None,
+            fix="fewer harmonics or samples, a reduction, or more memory (ulimit -v, the batch system's limit);"
+            " finished points are kept: then `fretwave resume RUNDIR`",
+        )
+    if isinstance(error, ImportError) and "shared object" in text:
+        return FretwaveError("a library cannot be loaded", None, text, None, "`fretwave doctor`; is there memory left?")
+    return None
 
 
 def end_all_ranks(error: BaseException, traced: bool = False) -> int:
@@ -177,6 +197,8 @@ def on_first_rank(comm: Any, work: Callable[[], Result]) -> Result:
             outcome = (None, work())
         except FretwaveError as error:
             outcome = (error, None)
+        except (OSError, MemoryError) as error:
+            outcome = (in_words(error), None)
     problem, result = comm.bcast(outcome, root=0)
     if problem is not None:
         raise problem

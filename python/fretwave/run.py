@@ -16,11 +16,12 @@ from .casefile import Case, changed_keys, load_case
 from .console import Console
 from .contacts import ContactSpec
 from .errors import EXIT_DONE, InputError, NotConverged
+from .interrupt import say_how_to_go_on
 from .parallel import on_first_rank
 from .petsc_options import AnalysisOptions
 from .reduced import reduce_case
-from .results import open_results
-from .runfolder import CASE_COPY, RunFolder, new_record, peak_memory_mb, read_record
+from .results import has_results, open_results
+from .runfolder import CASE_COPY, RunFolder, new_record, peak_memory_mb, read_copy, read_record
 from .schema import AnalysisSection, ForcedAnalysis, PreloadSection, SweepAnalysis, TransientSection
 from .sectors import nodal_diameter
 from .source import display
@@ -112,7 +113,7 @@ def reload_case(folder: Path, kept: bool = False) -> tuple[Case, dict[str, Any]]
         raise InputError(problem, display(folder), expected="the folder of a value", fix=f"give {display(one)}")
     given = record["case"]
     path = Path(given["path"])
-    text = None if path.exists() and not kept else (folder / CASE_COPY).read_text(encoding="utf-8")
+    text = None if path.exists() and not kept else read_copy(folder, record)
     case = load_case(path, given["overrides"], given["quick"], text=text)
     changed = changed_keys(given["resolved"], case.resolved)
     if changed:
@@ -145,9 +146,31 @@ class Runner:
         self.console = Console(active, self.folder.log, quiet=quiet)
         self.failures: list[NotConverged] = []
         if resuming:
-            self.folder.start()
+            on_first_rank(comm, self._check_readable)
+            self._start()
+
+    def _check_readable(self) -> None:
+        """Refuse damaged results before anything in the folder is changed."""
+        if has_results(self.folder.path):
+            open_results(self.folder.path / "results.h5").close()
+
+    def _start(self) -> None:
+        """Collective."""
+        on_first_rank(self.comm, self.folder.start)
+        self.folder.started = True
+        if not self.console.quiet:
+            say_how_to_go_on(self.comm, self.folder.path)
 
     def run(self) -> int:
+        """Do all analyses, keep what was found; returns the exit code. Collective."""
+        try:
+            return self._run()
+        finally:
+            self.folder.leave()
+
+    def _run(self) -> int:
+        if not self.folder.started:
+            on_first_rank(self.comm, self.folder.check_free)
         names = in_order(self.case, checks.choose(list(self.case.analyses), self.options.only))
         on_first_rank(self.comm, lambda: self._check_needs(names))
         sweeps = check_sweeps(self.case, names, self.options, self.comm)
@@ -205,32 +228,32 @@ class Runner:
             )
 
     def _kept(self, name: str) -> bool:
-        path = self.folder.path / "results.h5"
-        if not path.exists():
+        if not has_results(self.folder.path):
             return False
-        with open_results(path) as file:
+        with open_results(self.folder.path / "results.h5") as file:
             return name in file and belongs(file[name], self.case, name)
 
     def _is_done(self, name: str) -> bool:
         def look() -> str | None:
-            path = self.folder.path / "results.h5"
-            if not path.exists():
+            if not has_results(self.folder.path):
                 return None
-            with open_results(path) as file:
+            with open_results(self.folder.path / "results.h5") as file:
                 mine = name in file and file[name].attrs.get("run_id") == self.folder.record["run_id"]
                 return str(file[name].attrs.get("status")) if mine else None
 
-        status = on_first_rank(self.comm, look)
-        if status in ("done", "stopped"):
-            self.console.line(f"{name}: already {status}")
-        return status in ("done", "stopped")
+        status, entry = on_first_rank(self.comm, look), self.folder.record["analyses"].get(name)
+        if status not in ("done", "stopped") or entry is None:
+            return False
+        self.console.line(f"{name}: already {status}")
+        if status == "stopped":
+            self.failures.append(not_converged(name, Outcome(int(entry["points"]), str(entry["reason"]), False)))
+        return True
 
     def _is_begun(self, name: str) -> bool:
         def look() -> bool:
-            path = self.folder.path / "results.h5"
-            if not path.exists():
+            if not has_results(self.folder.path):
                 return False
-            with open_results(path) as file:
+            with open_results(self.folder.path / "results.h5") as file:
                 return name in file and file[name].attrs.get("run_id") == self.folder.record["run_id"]
 
         return self.resuming and on_first_rank(self.comm, look)
@@ -244,7 +267,7 @@ class Runner:
 
         def before_first() -> None:
             options.check_used(fretwave._core.unused_options, f"analysis '{analysis.name}'")
-            self.folder.start()
+            self._start()
 
         case = on_wheel(self.case, analysis)
         preload, flow = case.preload_of(analysis), getattr(analysis, "aerodynamics", False)
@@ -270,13 +293,14 @@ class Runner:
                 outcome = Outcome(0, reason, False, goal=str(error.expected), advice=error.fix or "")
         entry = {"left_out": context.left_out, **context.entry}
         self._note(analysis.name, outcome, time.perf_counter() - began, entry)
+        context.publish()  # last of all: from here on a resumed run leaves the analysis as it is
 
     def _sweep(self, name: str, sweep: Any) -> None:
         """Run another analysis for every value, on groups of ranks."""
         from .analyses.sweep import run_sweep
 
         began = time.perf_counter()
-        self.folder.start()
+        self._start()
         outcome = run_sweep(sweep, name, self.comm, self.console, self.folder, self.case.title)
         self._note(name, outcome, time.perf_counter() - began)
 
@@ -299,16 +323,16 @@ class Runner:
             "peak_memory_mb": memory,
             **(entry or {}),
         }
-        self.folder.save()
+        on_first_rank(self.comm, self.folder.save)
         if not outcome.converged:
             self.failures.append(not_converged(name, outcome))
 
     def _finish(self) -> None:
         self.folder.record["status"] = "stopped" if self.failures else "done"
         self.folder.record["peak_memory_mb"] = peak_memory_mb(self.comm)
-        if self.options.plots and self.folder.started and self.comm.rank == 0:
-            plot(self.folder.path, self.console)
-        self.folder.close()
+        if self.options.plots and self.folder.started:
+            on_first_rank(self.comm, lambda: plot(self.folder.path, self.console))
+        on_first_rank(self.comm, self.folder.close)
 
 
 def check_sweeps(case: Case, names: Sequence[str], options: RunOptions, comm: Any) -> dict[str, Any]:

@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-import json
-import os
 import platform
 import resource
 import socket
 import sys
 import time
 import uuid
+import zlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from .errors import InputError
+from .files import replace_text, told, write_all
+from .lock import FolderLock, check_free
+from .record import RECORD, read_record, write_record
 from .source import display
 
-RECORD = "run.json"
 CASE_COPY = "case.toml"
 
 
@@ -44,28 +45,45 @@ class RunFolder:
         self._waiting: list[str] = []
         self._log: Any = None
         self._resumed = resumed
+        self._lock = FolderLock(path)
         self.started = False
 
+    def check_free(self) -> None:
+        """Refuse a folder that another run has. One rank only."""
+        check_free(self.path)
+
     def start(self) -> None:
-        """Write the record and open the log; called when the first point is there."""
+        """Lock the folder, write the record and open the log; called when the first point is there.
+
+        Raises
+        ------
+        InputError
+            Another run has the folder.
+        FileError
+            It cannot be written.
+        """
         if self.started or not self.active:
             self.started = True
             return
+        with told(self.path):
+            self.path.mkdir(parents=True, exist_ok=True)
+        self._lock.take()
         self.started = True
-        self.path.mkdir(parents=True, exist_ok=True)
         self._keep_earlier()
         replace_text(self.path / CASE_COPY, self._case_text)
+        self.record["case"]["text_checksum"] = text_checksum(self._case_text.encode("utf-8"))
         self.save()
-        self._log = (self.path / "run.log").open("a" if self._resumed else "w", encoding="utf-8")
+        with told(self.path / "run.log"):
+            self._log = (self.path / "run.log").open("ab" if self._resumed else "wb", buffering=0)
         for line in self._waiting:
             self._write(line)
 
     def _keep_earlier(self) -> None:
         """Entries of analyses that this run leaves as they are."""
         try:
-            earlier = json.loads((self.path / RECORD).read_text(encoding="utf-8"))["analyses"]
-        except (OSError, ValueError, KeyError):
-            return
+            earlier = read_record(self.path)["analyses"] if (self.path / RECORD).exists() else {}
+        except InputError:
+            return  # of a damaged record nothing is kept: a new one is written
         kept = {name: entry for name, entry in earlier.items() if self._resumed or name not in self.record["selected"]}
         self.record["analyses"] = {**kept, **self.record["analyses"]}
 
@@ -79,27 +97,50 @@ class RunFolder:
             self._write(line)
 
     def _write(self, line: str) -> None:
-        self._log.write(line + "\n")
-        self._log.flush()
+        with told(self.path / "run.log"):
+            write_all(self._log.fileno(), f"{line}\n".encode())
 
     def save(self) -> None:
         """Write run.json in one step."""
         if self.active and self.started:
-            replace_text(self.path / RECORD, json.dumps(self.record, indent=2) + "\n")
+            write_record(self.path, self.record)
 
     def close(self) -> None:
-        """Write the record a last time and close the log."""
+        """Write the record a last time, close the log and let others into the folder."""
         self.save()
+        self.leave()
+
+    def leave(self) -> None:
+        """Close the log and let others into the folder."""
         if self._log is not None:
             self._log.close()
             self._log = None
+        self._lock.release()
 
 
-def replace_text(path: Path, text: str) -> None:
-    """Write a file in one step: a reader or a kill sees the old text or the new one."""
-    fresh = path.with_name(f".{path.name}.new")
-    fresh.write_text(text, encoding="utf-8")
-    os.replace(fresh, path)
+def read_copy(folder: Path, record: Mapping[str, Any]) -> str:
+    """Text of the case as the folder keeps it.
+
+    Raises
+    ------
+    InputError
+        It is gone or not what was written.
+    """
+    path, given = folder / CASE_COPY, record["case"].get("text_checksum")
+    try:
+        text = path.read_bytes()
+    except OSError as error:
+        fix = "restore it from a copy, or put the case file back into its place"
+        raise InputError("the copy of the case is gone", display(path), error.strerror, None, fix) from None
+    if given is not None and given != text_checksum(text):
+        fix = "restore it from a copy, or put the case file back into its place"
+        raise InputError("the copy of the case is damaged", display(path), "its checksum is another", given, fix)
+    return text.decode("utf-8", "replace")
+
+
+def text_checksum(text: bytes) -> str:
+    """Of the case's text, kept in run.json."""
+    return f"{zlib.crc32(text):08x}"
 
 
 def new_record(case: Mapping[str, Any], ranks: int) -> dict[str, Any]:
@@ -123,29 +164,7 @@ def new_record(case: Mapping[str, Any], ranks: int) -> dict[str, Any]:
     }
 
 
-def read_record(folder: Path) -> dict[str, Any]:
-    """run.json of a run folder.
-
-    Raises
-    ------
-    InputError
-        There is none, or it is damaged.
-    """
-    path = folder / RECORD
-    try:
-        record: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-        return record
-    except FileNotFoundError:
-        inside = sorted(entry.parent for entry in folder.glob(f"*/{RECORD}")) if folder.is_dir() else []
-        raise InputError(
-            "this is not a run folder",
-            where=display(folder),
-            measured="no run.json in it" if folder.is_dir() else "no such folder",
-            expected="the folder of a run, for example runs/two_dof",
-            fix=f"did you mean {display(inside[0])}?" if inside else "start a run with `fretwave run CASE`",
-        ) from None
-    except json.JSONDecodeError as error:
-        raise InputError("run.json is damaged", display(path), error, "JSON", "run the case anew") from None
+__all__ = ["CASE_COPY", "RECORD", "RunFolder", "new_record", "peak_memory_mb", "read_copy", "read_record"]
 
 
 def versions() -> dict[str, str]:

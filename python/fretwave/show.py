@@ -10,8 +10,10 @@ from typing import Any
 import numpy as np
 
 from .console import on_terminal
+from .lock import is_taken
+from .record import RECORD, read_record
 from .results import open_results
-from .runfolder import RECORD, read_record
+from .source import display
 
 HEADINGS = ("analysis", "type", "status", "points", "range", "peak", "folds", "error", "wall")
 
@@ -24,6 +26,10 @@ def show_run(folder: Path) -> None:
     InputError
         The folder has no results.
     """
+    record = read_record(folder) if (folder / RECORD).exists() else {}
+    if "study" in record:
+        _show_study(folder, record)
+        return
     with open_results(folder / "results.h5") as file:
         title = str(file.attrs.get("title", ""))
         names = [name for name in _in_order(folder, list(file)) if "type" in file[name].attrs]
@@ -39,6 +45,16 @@ def show_run(folder: Path) -> None:
         print(note)
 
 
+def _show_study(folder: Path, record: Mapping[str, Any]) -> None:
+    """Its table, or how far it is."""
+    if record["status"] == "done" and (folder / "study.md").exists():
+        print((folder / "study.md").read_text(encoding="utf-8"), end="")
+        return
+    solved = len(list((folder / ".runs").glob("task_????.npz")))
+    goes_on = "it goes on now" if is_taken(folder) else f"`fretwave resume {display(folder)}` goes on with it"
+    print(f"study, not finished: {solved} runs are solved; {goes_on}")
+
+
 def _in_order(folder: Path, names: list[str]) -> list[str]:
     """Analyses in the order of the case."""
     keys = read_record(folder)["case"]["resolved"] if (folder / RECORD).exists() else {}
@@ -52,7 +68,8 @@ def _heading(folder: Path, title: str) -> list[str]:
     record = read_record(folder)
     ranks = f"{record['ranks']} rank{'s' * (record['ranks'] > 1)}"
     started = record["started"][:16].replace("T", " ")
-    status = "not finished" if record["status"] == "running" else record["status"]
+    going = "running now" if is_taken(folder) else "not finished"
+    status = going if record["status"] == "running" else record["status"]
     return [line for line in (title, f"{status}, {ranks}, started {started}") if line]
 
 
@@ -124,7 +141,7 @@ def _notes(name: str, group: Any) -> list[str]:
     ]
     status, reason = str(group.attrs["status"]), str(group.attrs["reason"])
     if status == "running":
-        notes.append(f"{name}: not finished; `fretwave resume` goes on with it")
+        notes.append(f"{name}: not finished; `fretwave resume` goes on with it when it is cut off")
     return [*notes, f"{name}: stopped early: {reason}"] if status == "stopped" else notes
 
 

@@ -18,12 +18,15 @@ from .analyses.wheel_start import Start, start_of
 from .casefile import Case, load_case
 from .console import Console
 from .errors import EXIT_DONE, InputError, NotConverged
+from .files import replace_text
 from .parallel import on_first_rank
 from .petsc_options import AnalysisOptions
 from .reduced import reduce_case
 from .run import build_model
+from .runfolder import read_copy
 from .schema import ModeAnalysis, WearAnalysis
 from .sectors import nodal_diameter
+from .study_folder import StudyFolder
 from .study_plan import Outcome, Plan, Settings, Study, common_amplitudes
 from .study_report import markdown, write_csv
 from .wheel import on_wheel, solver_room
@@ -37,24 +40,59 @@ COUNT = 24
 def main(arguments: Sequence[str]) -> int:
     """Run a study; returns the exit code. Collective."""
     from .cli import _world
+    from .interrupt import ending_in_words
 
     options = _parser().parse_args(arguments)
     comm = _world()
-    case = on_first_rank(comm, lambda: load_case(options.case, options.overrides, options.quick))
-    console = Console(comm.rank == 0, lambda line: None)
-    if isinstance(case.analyses.get(options.analysis), WearAnalysis):
+    with ending_in_words(comm):
+        return _study(options, arguments, comm)
+
+
+def resume_study(folder: Path, record: dict[str, Any], comm: Any) -> int:
+    """Go on with a study that was cut off; returns the exit code. Collective."""
+    arguments = record["study"]["arguments"]
+    options = _parser().parse_args(arguments)
+    options.case, options.out = Path(record["case"]["path"]), folder
+    return _study(options, arguments, comm, record)
+
+
+def _study(
+    options: argparse.Namespace, arguments: Sequence[str], comm: Any, record: dict[str, Any] | None = None
+) -> int:
+    case = on_first_rank(comm, lambda: _load(options, record))
+    analysis = case.analyses.get(options.analysis)
+    chosen = None if isinstance(analysis, WearAnalysis) else _analysis(case, options.analysis)
+    with StudyFolder(case, options, arguments, comm, record) as folder:
+        console = Console(comm.rank == 0, folder.log)
+        if chosen is not None:
+            return _study_mode(case, chosen, options, comm, console, folder)
         from .wear_study import study_wear
 
-        return study_wear(case, options, comm, console)
-    analysis, plan = _analysis(case, options.analysis), _plan(case, options)
+        return study_wear(case, options, comm, console, folder)
+
+
+def _load(options: argparse.Namespace, record: dict[str, Any] | None) -> Case:
+    """The case; one that is gone from its copy, as a run does."""
+    gone = record is not None and not options.case.exists()
+    text = read_copy(options.out, record) if gone and record is not None else None
+    return load_case(options.case, options.overrides, options.quick, text=text)
+
+
+def _study_mode(
+    case: Case, analysis: ModeAnalysis, options: argparse.Namespace, comm: Any, console: Console, folder: StudyFolder
+) -> int:
+    plan = _plan(case, options)
     study = Study(plan, common_amplitudes(min(analysis.amplitude), max(analysis.amplitude), COUNT))
     console.line(f"study of '{analysis.name}': {len(plan.sweeps())} runs, the finest is {_text(plan.reference)}")
     solver = _Solver(case, analysis, comm, console, study, options.repeats)
-    study.run(solver.solve, lambda sweep, settings: console.line(_progress(study, sweep, settings)))
+    numbers = {settings: k for k, settings in enumerate(dict.fromkeys(settings for _, settings in plan.sweeps()))}
+    study.run(
+        lambda settings: folder.solved(numbers[settings], Outcome, lambda: solver.solve(settings)),
+        lambda sweep, settings: console.line(_progress(study, sweep, settings)),
+    )
     if not study.table():
         raise _no_reference(study)
-    folder = options.out or Path("runs") / f"{case.name}_study"
-    on_first_rank(comm, lambda: _write(study, folder, console))
+    folder.finish(lambda path: _write(study, path, console))
     return EXIT_DONE
 
 
@@ -155,10 +193,9 @@ def _outcome(rows: list[dict[str, Any]], newton: int, wall: float) -> Outcome:
 def _write(study: Study, folder: Path, console: Console) -> None:
     from .plots import plot_run
 
-    folder.mkdir(parents=True, exist_ok=True)
     rows, notes = study.table(), _notes(study)
     write_csv(rows, folder / "study.csv")
-    (folder / "study.md").write_text(markdown(rows, notes), encoding="utf-8")
+    replace_text(folder / "study.md", markdown(rows, notes))
     pictures = plot_run(folder, ["study"])
     for line in markdown(rows, notes).splitlines():
         console.line(line)

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Mapping, Sequence
+from io import StringIO
 from pathlib import Path
+
+from .files import replace_text
 
 Row = Mapping[str, "float | int | str"]
 
@@ -34,10 +37,11 @@ LEGEND = (
 
 def write_csv(rows: Sequence[Row], path: Path) -> Path:
     """All columns, full digits."""
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
+    text = StringIO()
+    writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    replace_text(path, text.getvalue())
     return path
 
 

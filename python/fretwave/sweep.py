@@ -168,10 +168,8 @@ class Sweep:
 
     def _record(self, number: int, run_id: str) -> dict[str, Any] | None:
         """run.json of a value when it is part of this sweep."""
-        try:
-            record = read_record(self.value_folder(number))
-        except InputError:
-            return None
+        folder = self.value_folder(number)
+        record = read_record(folder) if (folder / RECORD).exists() else {}
         return record if record.get("part_of") == run_id else None
 
     def _run_value(self, number: int, group: Any, run_id: str) -> FretwaveError | None:

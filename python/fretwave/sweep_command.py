@@ -11,9 +11,10 @@ from . import groups
 from .casefile import changed_keys
 from .console import Console
 from .errors import EXIT_DONE, FretwaveError, InputError, NotConverged
+from .interrupt import say_how_to_go_on
 from .parallel import on_first_rank
 from .run import RunOptions, plot
-from .runfolder import CASE_COPY, RunFolder, new_record, peak_memory_mb
+from .runfolder import CASE_COPY, RunFolder, new_record, peak_memory_mb, read_copy
 from .source import display
 from .sweep import Checked, Sweep
 from .sweep_plan import Plan
@@ -55,7 +56,7 @@ def resume_sweep(folder: Path, record: dict[str, Any], comm: Any, plots: bool = 
     given, asked = record["case"], record["sweep"]
     options = RunOptions(folder, given["overrides"], given["only"], given["quick"], plots, given["petsc"])
     path = Path(given["path"])
-    text = None if path.exists() else on_first_rank(comm, lambda: (folder / CASE_COPY).read_text(encoding="utf-8"))
+    text = None if path.exists() else on_first_rank(comm, lambda: read_copy(folder, record))
     sweep = Sweep(path, Plan(asked["over"]), options, folder / "values", asked["groups"], text)
     if asked["groups"] is not None:
         sweep.n_groups = min(asked["groups"], comm.size)
@@ -75,14 +76,24 @@ def resume_sweep(folder: Path, record: dict[str, Any], comm: Any, plots: bool = 
 
 def _run_sweep(sweep: Sweep, first: Checked, folder: RunFolder, comm: Any) -> int:
     """Run, put together, draw, and say what did not come to its end."""
-    console, began = Console(comm.rank == 0, folder.log), time.perf_counter()
+    console = Console(comm.rank == 0, folder.log)
+    on_first_rank(comm, folder.check_free)
     folder.record["selected"] = first.analyses
     console.line(f"{first.name}{': ' * bool(first.title)}{first.title}")
+    try:
+        return _do_sweep(sweep, first, folder, console, comm)
+    finally:
+        folder.leave()
+
+
+def _do_sweep(sweep: Sweep, first: Checked, folder: RunFolder, console: Console, comm: Any) -> int:
+    began = time.perf_counter()
     count = groups.group_count(comm.size, len(sweep.plan), sweep.n_groups)
     ranks = f"{comm.size} rank{'s' * (comm.size > 1)} in {count} group{'s' * (count > 1)}"
     over = f"{len(sweep.plan)} values of {' x '.join(sweep.plan.keys)}"
     console.line(f"sweep of {', '.join(first.analyses)}, {over}, {ranks}, results in {display(folder.path)}")
-    folder.start()
+    on_first_rank(comm, folder.start)
+    say_how_to_go_on(comm, folder.path)
     errors = sweep.run(comm, folder.record["run_id"])
     memory = peak_memory_mb(comm)
     outcomes, lines = on_first_rank(comm, lambda: _write(sweep, first, folder, errors))
@@ -91,9 +102,9 @@ def _run_sweep(sweep: Sweep, first: Checked, folder: RunFolder, comm: Any) -> in
     bad = [number for number, outcome in enumerate(outcomes) if outcome["status"] != "done"]
     status = {"status": "stopped" if bad else "done", "wall_s": round(time.perf_counter() - began, 3)}
     folder.record.update({**status, "peak_memory_mb": memory, "values": outcomes})
-    if sweep.options.plots and comm.rank == 0:
-        plot(folder.path, console)
-    folder.close()
+    if sweep.options.plots:
+        on_first_rank(comm, lambda: plot(folder.path, console))
+    on_first_rank(comm, folder.close)
     if bad:
         raise _incomplete(sweep, outcomes, bad, errors)
     return EXIT_DONE

@@ -22,8 +22,8 @@ from typing import Any
 import numpy as np
 
 from .columns import COLUMNS, Column
-from .results import open_results, rewritten
-from .runfolder import replace_text
+from .files import replace_text
+from .results import has_results, open_results, rewritten
 from .sweep_plan import Plan
 from .sweep_summary import SPLIT, columns_of, summarise
 from .validation import toml
@@ -66,7 +66,7 @@ class Branch:
 
 def read_branch(folder: Path, name: str, number: int, run_id: str) -> Branch | None:
     """What the run of a value found, None when it found nothing (or what is there belongs to another run)."""
-    if not (folder / "results.h5").exists():
+    if not has_results(folder):
         return None
     with open_results(folder / "results.h5") as file:
         if name not in file or file[name].attrs.get("run_id") != run_id:
@@ -95,8 +95,9 @@ def write_sweep(
     branches: Sequence[Branch],
     attributes: Mapping[str, Any],
     title: str = "",
+    summary: Path | None = None,
 ) -> list[dict[str, Any]]:
-    """Write the group `name` of results.h5, ``<name>.csv`` and its summary's rows. One rank only.
+    """Write ``<name>.csv`` and last the group `name` of results.h5; one rank only.
 
     Parameters
     ----------
@@ -108,6 +109,8 @@ def write_sweep(
         Put on the group (status, reason, run_id).
     title : str
         Of the case, an attribute of the file.
+    summary : Path, optional
+        Table of the summary.
 
     Returns
     -------
@@ -117,6 +120,9 @@ def write_sweep(
     kind = str(branches[0].attributes["type"]) if branches else ""
     points = _points(plan, branches)
     rows = _summary(kind, plan, branches)
+    write_rows(folder / f"{name}.csv", {column.name: values for column, values in points})
+    if summary is not None:
+        write_summary(summary, rows)
     with rewritten(folder / "results.h5", name) as file:
         file.attrs["title"] = title
         group = file.create_group(name)
@@ -127,7 +133,6 @@ def write_sweep(
         _write_summary(group.create_group("summary"), kind, plan, rows, scales)
         for branch in branches:
             _copy_branch(branch, of, group.create_group(f"values/{branch.number:04d}"))
-    write_rows(folder / f"{name}.csv", {column.name: values for column, values in points})
     return rows
 
 
@@ -238,7 +243,7 @@ def _copy_branch(branch: Branch, of: str, group: Any) -> None:
         group.attrs.update(branch.attributes)
         for key in file[of]:
             if key not in STATES:
-                file.copy(file[of][key], group, key)
+                group.copy(file[of][key], group, key)
         group.visititems(_forget_scales)
         file[of].visititems(lambda key, source: _attach_scales(source, group.get(key), group, file[of].name))
 

@@ -18,16 +18,25 @@ from .analyses.wear_line import wear_areas
 from .casefile import Case
 from .console import Console
 from .errors import EXIT_DONE, FretwaveError, NotConverged
+from .files import replace_text
 from .parallel import caught_by_all, on_first_rank
 from .petsc_options import AnalysisOptions
 from .reduced import reduce_case
 from .run import build_model
 from .schema import ModeAnalysis, WearAnalysis
 from .sectors import nodal_diameter
+from .study_folder import StudyFolder
 from .study_report import LEGEND_OF_WEAR, PRINTED_OF_WEAR, markdown, write_csv
 
 #: Swept where neither the command line nor the case says anything.
 TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4)
+
+
+@dataclass(frozen=True)
+class CycleUnit:
+    """How many vibrations a normalised cycle has."""
+
+    vibrations: float
 
 
 @dataclass(frozen=True)
@@ -106,15 +115,17 @@ def _row(
     }
 
 
-def study_wear(case: Case, options: argparse.Namespace, comm: Any, console: Console) -> int:
+def study_wear(case: Case, options: argparse.Namespace, comm: Any, console: Console, folder: StudyFolder) -> int:
     """Run the study; returns the exit code. Collective."""
     analysis = cast(WearAnalysis, case.analyses[options.analysis])
     plan = wear_plan(case, analysis, options)
     amplitude = max(analysis.amplitude)
     console.line(f"study of '{analysis.name}' at a = {amplitude:g} m: {len(plan.runs())} runs")
     solver = _Solver(case, analysis, comm, console, options.repeats)
-    for settings in plan.runs():
-        found = solver.solve(settings)
+    unit = folder.solved(len(plan.runs()), CycleUnit, lambda: solver.cycle_unit(plan.runs()[0]))
+    solver.unit = 0.0 if isinstance(unit, str) else unit.vibrations
+    for number, settings in enumerate(plan.runs()):
+        found = folder.solved(number, WearOutcome, lambda settings=settings: solver.solve(settings))  # type: ignore[misc]
         if isinstance(found, str):
             plan.failures[settings] = found
         else:
@@ -124,8 +135,7 @@ def study_wear(case: Case, options: argparse.Namespace, comm: Any, console: Cons
     if not plan.table():
         reasons = "; ".join(plan.failures.values())
         raise NotConverged("no sweep has its finest run", None, reasons, "a finished march", "milder finest settings")
-    folder = options.out or Path("runs") / f"{case.name}_study"
-    on_first_rank(comm, lambda: _write(plan, amplitude, analysis, folder, console))
+    folder.finish(lambda path: _write(plan, amplitude, analysis, path, console))
     return EXIT_DONE
 
 
@@ -156,7 +166,7 @@ class _Solver:
         preload = self.case.preload_of(analysis)
         self.model = build_model(self.case, mode.dampers, comm, preload, nodal_diameter(mode))
         self._starts: dict[int, dict[str, Any]] = {}
-        self._unit = analysis.cycle_unit or 0.0  # of the first run, so that all compare at the same cycles
+        self.unit = 0.0  # of the first run, so that all compare at the same cycles
 
     def _mode(self, harmonics: int | None) -> ModeAnalysis:
         given = self.analysis.harmonics if harmonics is None else harmonics
@@ -169,6 +179,19 @@ class _Solver:
     def _context(self, mode: ModeAnalysis) -> AnalysisContext:
         return AnalysisContext(self.model, self.case, mode, self.comm, Path(), Console(False))
 
+    def cycle_unit(self, settings: WearSettings) -> CycleUnit | str:
+        """Vibrations in a normalised cycle, or why they are not known."""
+        if self.analysis.cycle_unit:
+            return CycleUnit(self.analysis.cycle_unit)
+        mode = self._mode(settings.harmonics)
+        context = self._context(mode)
+        with AnalysisOptions(context.prefix, [mode.petsc]).inserted():
+            try:
+                self._starts[settings.harmonics] = unworn_starts(context, self.analysis)
+            except FretwaveError as error:
+                return str(error)
+        return CycleUnit(float(self._starts[settings.harmonics]["cycle_unit"]))
+
     def solve(self, settings: WearSettings) -> WearOutcome | str:
         """Values at the compared cycles, or why there are none; its time is that of the fastest march."""
         mode = self._mode(settings.harmonics)
@@ -177,7 +200,7 @@ class _Solver:
             try:
                 if settings.harmonics not in self._starts:
                     self._starts[settings.harmonics] = unworn_starts(context, self.analysis)
-                    self._unit = self._unit or float(self._starts[settings.harmonics]["cycle_unit"])
+                    self.unit = self.unit or float(self._starts[settings.harmonics]["cycle_unit"])
                 tried = [self._march(context, settings) for _ in range(self.repeats)]
             except FretwaveError as error:
                 caught_by_all(self.comm, error)
@@ -188,7 +211,7 @@ class _Solver:
     def _march(self, context: AnalysisContext, settings: WearSettings) -> WearOutcome | str:
         import fretwave
 
-        mode, a, unit = cast(ModeAnalysis, context.analysis), self.analysis, self._unit
+        mode, a, unit = cast(ModeAnalysis, context.analysis), self.analysis, self.unit
         start, rest = start_mode(context, mode.linear_mode)
         problem = fretwave.NonlinearMode(
             self.model, retained(context), mode.method, self.case.dof(mode.normalise), start, context.prefix
@@ -222,13 +245,12 @@ def _follow(march: Any, problem: Any, areas: Any) -> WearOutcome | str:
 def _write(plan: WearPlan, amplitude: float, analysis: WearAnalysis, folder: Path, console: Console) -> None:
     from .plots import plot_run
 
-    folder.mkdir(parents=True, exist_ok=True)
     rows = plan.table()
     notes = [f"{analysis.name}, a = {amplitude:g} m, {analysis.stepper}, after {analysis.cycles:g} cycles."]
     notes += [f"No whole march with {_text(settings)}: {reason}." for settings, reason in plan.failures.items()]
     text = markdown(rows, notes, PRINTED_OF_WEAR, LEGEND_OF_WEAR)
     write_csv(rows, folder / "study.csv")
-    (folder / "study.md").write_text(text, encoding="utf-8")
+    replace_text(folder / "study.md", text)
     pictures = plot_run(folder, ["study"])
     for line in text.splitlines():
         console.line(line)

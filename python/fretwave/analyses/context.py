@@ -14,9 +14,9 @@ from ..casefile import Case
 from ..columns import Column
 from ..console import Console
 from ..errors import InputError
+from ..files import replace_text
 from ..parallel import on_first_rank
-from ..results import AnalysisWriter, Field, open_results
-from ..runfolder import replace_text
+from ..results import AnalysisWriter, Field, has_results, open_results
 from ..schema import AnalysisSection, WearAnalysis
 from ..sectors import nodal_diameter
 from ..source import display
@@ -77,6 +77,10 @@ class AnalysisContext:
         Arrays that every row of the table brings.
     entry : dict
         What else run.json says of the analysis.
+    writers : list of AnalysisWriter
+        Its tables; the runner publishes them when all else that belongs to the analysis is written.
+    afterwards : list of callable
+        Done after that on the writing rank (to clean up).
     """
 
     model: Any
@@ -92,6 +96,8 @@ class AnalysisContext:
     arrays: dict[str, Any] = field(default_factory=dict)
     fields: dict[str, Field] = field(default_factory=dict)
     entry: dict[str, Any] = field(default_factory=dict)
+    writers: list[AnalysisWriter] = field(default_factory=list)
+    afterwards: list[Callable[[], None]] = field(default_factory=list)
 
     @property
     def name(self) -> str:
@@ -132,7 +138,7 @@ class AnalysisContext:
             Further attributes of the group.
         """
         described = {key: value for key, value in attributes.items() if value is not None}
-        return AnalysisWriter(
+        writer = AnalysisWriter(
             self.folder,
             self.name,
             columns,
@@ -144,7 +150,21 @@ class AnalysisContext:
             file_attributes={"title": self.case.title},
             arrays=self.arrays,
             fields=self.fields,
+            publish_later=True,
         )
+        self.writers.append(writer)
+        return writer
+
+    def publish(self) -> None:
+        """The analysis is done, with all its tables: its results take their place. Collective."""
+
+        def finish() -> None:
+            for writer in self.writers:
+                writer.publish()
+            for work in self.afterwards:
+                work()
+
+        on_first_rank(self.comm, finish)
 
     def table(self, name: str) -> dict[str, Any]:
         """Columns of a finished analysis (``event`` included) on every rank. Collective.
@@ -171,10 +191,9 @@ class AnalysisContext:
         """Whether an analysis has rows in the run folder that belong to this very case. Collective."""
 
         def look() -> bool:
-            path = self.folder / "results.h5"
-            if not path.exists():
+            if not has_results(self.folder):
                 return False
-            with open_results(path) as file:
+            with open_results(self.folder / "results.h5") as file:
                 return name in file and belongs(file[name], self.case, name)
 
         return on_first_rank(self.comm, look)

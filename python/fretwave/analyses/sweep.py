@@ -15,7 +15,7 @@ from ..schema import SweepAnalysis
 from ..source import Source
 from ..sweep import Sweep
 from ..sweep_plan import table_overrides, table_plan
-from ..sweep_results import write_summary, write_sweep
+from ..sweep_results import write_sweep
 from ..sweep_summary import landmarks
 from .context import Outcome
 
@@ -58,8 +58,8 @@ def run_sweep(sweep: Sweep, name: str, comm: Any, console: Console, folder: RunF
         reason = "; ".join(f"{labels[k]}: {outcomes[k]['reason']}" for k in bad) or "all values done"
         if branches:
             attributes = {"run_id": run_id, "status": "stopped" if bad else "done", "reason": reason}
-            rows = write_sweep(folder.path, name, of, sweep.plan, branches, attributes, title)
-            write_summary(folder.path / f"{name}_summary.csv", rows)
+            summary = folder.path / f"{name}_summary.csv"
+            rows = write_sweep(folder.path, name, of, sweep.plan, branches, attributes, title, summary)
         sweep.forget_others()
         lines = landmarks(name, sweep.plan, rows) if branches else []
         points = sum(branch.points for branch in branches)

@@ -17,7 +17,7 @@ import numpy as np
 from .. import groups
 from ..errors import FretwaveError, NotConverged
 from ..parallel import on_first_rank
-from ..results import AnalysisWriter, open_results
+from ..results import AnalysisWriter, has_results, open_results
 from ..schema import ModeAnalysis, WearAnalysis
 from .branch import mode_problem, points_of, step_control
 from .context import AnalysisContext, Outcome
@@ -149,8 +149,8 @@ def _collect(
         writer.close("stopped" if failures else "done", reason)
     finally:
         writer.abandon()
-    if context.comm.rank == 0 and writer.rows:
-        shutil.rmtree(folder, ignore_errors=True)
+    if writer.rows:
+        context.afterwards.append(lambda: shutil.rmtree(folder, ignore_errors=True))
     goal = f"{analysis.cycles:g} normalised cycles at every amplitude, or wear that stops"
     return Outcome(writer.rows, reason, not failures, [result["summary"] for result in marched], goal)
 
@@ -198,7 +198,7 @@ def _copy(context: AnalysisContext, writer: AnalysisWriter, line: Line) -> None:
 
 
 def _rows_of(path: Path) -> int:
-    if not path.exists():
+    if not has_results(path.parent):
         return 0
     with open_results(path) as file:
         return len(file[LINE]["points"]["point"]) if LINE in file else 0

@@ -209,7 +209,7 @@ class _Marcher:
     def _close(self, march: Any) -> dict[str, Any]:
         status = "done" if march.converged else "stopped"
         told = _told(finished_table(self.writer))
-        self.writer.close(status, march.reason)
+        self.writer.abandon()  # its journal stays until the common table is done: a resumed run finds the line there
         end = march.eta / self.unit
         return {
             "status": status,

@@ -5,12 +5,17 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import zlib
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
+from zipfile import BadZipFile
 
 import numpy as np
 import scipy.sparse as sp
+
+from ..files import FileError, replaced
 
 _PARTS = ("data", "indices", "indptr", "shape")
 
@@ -33,16 +38,13 @@ def cached(file: Path, compute: Callable[[], dict[str, Any]]) -> dict[str, Any]:
 
     The file appears whole or not at all, so that several processes may build at once.
     """
-    if file.exists():
+    with suppress(OSError, ValueError, KeyError, EOFError, BadZipFile, zlib.error):  # not there, or damaged: made anew
         return load(file)
     values = compute()
-    file.parent.mkdir(parents=True, exist_ok=True)
-    partial = file.with_name(f"{file.stem}.{os.getpid()}.part.npz")
-    try:
-        save(partial, values)
-        os.replace(partial, file)
-    finally:
-        partial.unlink(missing_ok=True)
+    with suppress(OSError, FileError):  # a cache that cannot be written costs time, nothing else
+        file.parent.mkdir(parents=True, exist_ok=True)
+        with replaced(file, own=True, keep_suffix=True) as fresh:
+            save(fresh, values)
     return values
 
 

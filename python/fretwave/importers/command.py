@@ -16,7 +16,7 @@ from ..parallel import on_first_rank
 from ..source import display, nearest
 from .calculix import SUFFIXES, read_dofs
 from .entries import Assembled, assemble
-from .formats import read_matrix, split
+from .formats import read_matrix, readable, split
 from .nodes import Nodes, read_nodes
 from .pairs import Pairs, contact_map, match, read_pairs
 from .report import check
@@ -47,7 +47,10 @@ def read_parts(options: argparse.Namespace) -> tuple[FileModel, Assembled]:
     paths = {letter: getattr(options, role) for letter, role in ROLES.items() if getattr(options, role)}
     given = {letter: read_matrix(path, letter) for letter, path in paths.items()}
     found = assemble(given, options.symmetric)
-    nodes = read_nodes(options.coordinates) if options.coordinates else None
+    nodes = None
+    if options.coordinates:
+        with readable(options.coordinates, "file of the nodes"):
+            nodes = read_nodes(options.coordinates)
     labels = _labels(options, found, nodes)
     found.labels = labels
     model = FileModel(
@@ -88,7 +91,8 @@ def _check_place(out: Path, inputs: Iterable[Any]) -> None:
 def _labels(options: argparse.Namespace, found: Assembled, nodes: Nodes | None) -> npt.NDArray[np.int64] | None:
     """Node and direction of each dof: from --dofs, the matrices, or node by node as the coordinates stand."""
     if options.dofs:
-        labels = _read_table(options.dofs)
+        with readable(options.dofs, "table of dofs"):
+            labels = _read_table(options.dofs)
         where = display(options.dofs)
         if len(labels) != found.given_size:
             fix = "give one line for each row of the matrices"
@@ -172,7 +176,8 @@ def _contacts(
 
 def _pairs(first: str, second: list[str], options: argparse.Namespace, nodes: Nodes | None, where: str) -> Pairs:
     if not second:
-        return read_pairs(Path(first))
+        with readable(Path(first), "file of the pairs"):
+            return read_pairs(Path(first))
     if nodes is None:
         fix = "give --coordinates FILE with the sets, or a CSV of pairs"
         raise InputError("the node sets are not known", where, None, "nodes with sets", fix)

@@ -58,6 +58,8 @@ class Entries:
     @classmethod
     def of(cls, matrix: Any, where: str, kind: str, mirrored: str = "") -> Entries:
         """From a dense or SciPy sparse matrix."""
+        if hasattr(matrix, "check_format"):
+            matrix.check_format(full_check=True)  # SciPy's loops trust the indices
         found = sp.coo_matrix(matrix)
         rows, columns = found.row.astype(np.int64), found.col.astype(np.int64)
         return cls(rows, columns, found.data, found.shape, where, kind, mirrored=mirrored)

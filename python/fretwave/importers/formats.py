@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from ..errors import InputError
+from ..isolated import call_isolated
 from ..source import display, nearest
 from . import abaqus, calculix, matlab, matrix_market, npz, petsc_binary
 from .entries import Entries
@@ -41,15 +44,36 @@ def read_matrix(given: str, letter: str) -> Entries:
         names = sorted(entry.name for entry in path.parent.iterdir()) if path.parent.is_dir() else []
         fix = nearest(path.name, names) or "check the path"
         raise InputError(f"the file of {letter} does not exist", display(path), None, "a matrix file", fix)
-    with path.open("rb") as file:
-        head = file.read(520)
-    try:
+    with readable(path, f"file of {letter}"):
+        with path.open("rb") as file:
+            head = file.read(520)
         return _read(path, head, variable, letter)
-    except InputError:
+
+
+@contextmanager
+def readable(path: Path, what: str) -> Iterator[None]:
+    """A damaged file makes the readers of NumPy, SciPy and h5py raise anything: it is named, whatever that was.
+
+    Raises
+    ------
+    InputError
+    """
+    try:
+        yield
+    except InputError as error:
+        if error.where is None:
+            raise InputError(f"the {what} cannot be read", display(path), error.measured, None, error.fix) from None
         raise
-    except Exception as error:  # a damaged file makes the readers of NumPy, SciPy and h5py raise anything
-        measured, fix = f"{type(error).__name__}: {error}", "export it again; is the file complete?"
-        raise InputError(f"the file of {letter} cannot be read", display(path), measured, None, fix) from None
+    except Exception as error:
+        text = " ".join(str(error).split())
+        measured, fix = f"{type(error).__name__}: {text}", "export it again; is the file complete?"
+        raise InputError(f"the {what} cannot be read", display(path), measured, None, fix) from None
+
+
+def _isolated(function: str, path: Path, letter: str, variable: str | None) -> Entries:
+    """A reader of `matlab` in a process of its own: SciPy and HDF5 can crash on a damaged file."""
+    found: Entries = call_isolated(matlab.__name__, function, path, letter, variable, size=path.stat().st_size)
+    return found
 
 
 def split(given: str) -> tuple[Path, str | None]:
@@ -66,9 +90,9 @@ def _read(path: Path, head: bytes, variable: str | None, letter: str) -> Entries
     if head.startswith(b"%%MatrixMarket"):
         return matrix_market.read(path)
     if head.startswith(b"MATLAB 7.3") or HDF5 in (head[:8], head[512:520]):
-        return matlab.read_v73(path, letter, variable)
+        return _isolated("read_v73", path, letter, variable)
     if head.startswith(b"MATLAB 5.0"):
-        return matlab.read_v5(path, letter, variable)
+        return _isolated("read_v5", path, letter, variable)
     if petsc_binary.integer_type(head):
         return petsc_binary.read(path)
     if path.suffix.lower() in calculix.SUFFIXES:

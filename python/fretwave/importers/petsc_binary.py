@@ -39,7 +39,7 @@ def read(path: Path) -> Entries:
     count = rows * columns if entries < 0 else entries
     values = content[size * integers :]
     scalar = {8 * count: ">f8", 16 * count: ">c16"}.get(len(values))
-    if scalar is None or min(rows, columns) < 0:
+    if scalar is None or min(rows, columns) < 0 or integers * size > len(content):
         raise ValueError(
             f"{len(values)} bytes of values; {count} entries are {8 * count} bytes (real) or {16 * count} (complex)"
         )

@@ -15,6 +15,8 @@ Array = npt.NDArray[np.float64]
 
 
 COMMENTS = ("*", "#", "%")
+#: Rows for each entry from which on an index is wrong: mass and stiffness have an entry in every row.
+SPARSEST = 10
 
 
 def first_data_line(head: bytes) -> str:
@@ -55,4 +57,7 @@ def triplets(table: Array, where: str, kind: str) -> Entries:
         fix = "export again; internal dofs of Abaqus need FORMAT=MATRIX INPUT"
         raise InputError("a row or column is not a number from 1 on", where, measured, "1, 2, ...", fix)
     size = int(places.max()) + 1
+    if size > SPARSEST * len(table) + 1000:
+        measured, fix = f"{size} rows, {len(table)} entries", "correct the number of the row or column"
+        raise InputError("most rows of a matrix are empty", where, measured, "an entry in each row", fix)
     return Entries(places[:, 0], places[:, 1], table[:, 2], (size, size), where, kind)

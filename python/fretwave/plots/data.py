@@ -9,12 +9,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 import numpy.typing as npt
 
 from ..analyses.mode_curve import ModeCurve
 from ..harmonic_motion import motion
+from ..results_file import has_results, open_results
 
 Array = npt.NDArray[np.float64]
 Table = dict[str, Array]
@@ -44,53 +44,53 @@ class Analysis:
     reported: list[int] = field(default_factory=list)
     contacts: list[str] = field(default_factory=list)
     units: dict[str, str] = field(default_factory=dict)
-    path: Path | None = None
+    path: Path = Path()
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values()), ()))
 
     def coefficients(self, points: Sequence[int]) -> Array:
         """Physical harmonic coefficients (len(points), n_dof, m) of some points."""
-        with h5py.File(self.path, "r") as file:
+        with open_results(self.path) as file:
             return np.stack([file[self.name]["coefficients"][p] for p in points])
 
     def loop(self, contact: str, point: int) -> Table:
         """Motion of a contact over one period: u, v, f (n_samples, components, n_pairs)."""
         row = self.reported.index(point)
-        with h5py.File(self.path, "r") as file:
+        with open_results(self.path) as file:
             group = file[self.name]["contact_" + contact]
             return {key: np.asarray(group[key][row], dtype=float) for key in ("u", "v", "f")}
 
     def components(self, contact: str) -> int:
         """Relative displacements of a pair: 1, or 3 with the normal one first."""
-        with h5py.File(self.path, "r") as file:
+        with open_results(self.path) as file:
             return int(file[self.name]["contact_" + contact]["u"].shape[2])
 
     def placed(self) -> list[str]:
         """Contacts whose pairs have known places."""
-        with h5py.File(self.path, "r") as file:
+        with open_results(self.path) as file:
             return [key[len("pairs_") :] for key in file[self.name] if key.startswith("pairs_")]
 
     def pairs(self, contact: str) -> Table:
         """Of each pair of a contact: position (n_pairs, 2) on its face [m], face, friction_coefficient."""
-        with h5py.File(self.path, "r") as file:
+        with open_results(self.path) as file:
             group = file[self.name]["pairs_" + contact]
             table = {key: group[key][()] for key in group}
         return {**table, "face": np.array(_texts(table["face"]))}
 
     def worn_contacts(self) -> list[str]:
         """Contacts whose worn depth is kept."""
-        with h5py.File(self.path, "r") as file:
+        with open_results(self.path) as file:
             return [key[len("depth_") :] for key in file[self.name] if key.startswith("depth_")]
 
     def field(self, name: str) -> Array:
         """An array that every point has, (n_points, ...)."""
-        with h5py.File(self.path, "r") as file:
+        with open_results(self.path) as file:
             return np.asarray(file[self.name][name], dtype=float)
 
     def long_name(self, column: str) -> str:
         """What a column of the table is."""
-        with h5py.File(self.path, "r") as file:
+        with open_results(self.path) as file:
             return str(_text(file[self.name]["points"][column].attrs["long_name"]))
 
     def met(self, event: str) -> list[int]:
@@ -127,7 +127,7 @@ class Analysis:
 
     def history(self, start: int) -> Array:
         """Time, displacement and velocity (3, n) of a start; empty when it was not kept."""
-        with h5py.File(self.path, "r") as file:
+        with open_results(self.path) as file:
             return np.asarray(file[self.name].get(f"motion_{start}", ()), dtype=float)
 
     def curve(self) -> ModeCurve:
@@ -142,8 +142,8 @@ class Run:
         self.folder = Path(folder)
         self.analyses: dict[str, Analysis] = {}
         path = self.folder / "results.h5"
-        if path.exists():
-            with h5py.File(path, "r") as file:
+        if has_results(self.folder):
+            with open_results(path) as file:
                 groups = {name: group for name, group in file.items() if "type" in group.attrs}
                 self.analyses = {name: _analysis(group, path) for name, group in groups.items()}
         self.title = str(self._attribute("title") or self.folder.name)
@@ -175,10 +175,9 @@ class Run:
                 yield analysis, mode
 
     def _attribute(self, name: str) -> Any:
-        path = self.folder / "results.h5"
-        if not path.exists():
+        if not has_results(self.folder):
             return None
-        with h5py.File(path, "r") as file:
+        with open_results(self.folder / "results.h5") as file:
             return file.attrs.get(name)
 
 

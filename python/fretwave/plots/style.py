@@ -16,6 +16,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
+from ..files import replaced
+
 Array = npt.NDArray[Any]
 
 #: Okabe and Ito's palette: distinguishable under every common colour-vision deficiency
@@ -65,7 +67,8 @@ def new_figure(height: float, rows: int = 1, columns: int = 1, **options: Any) -
 
 def save(figure: Figure, path: Path) -> Path:
     """Write a PNG."""
-    figure.savefig(path, dpi=DPI)
+    with replaced(path, own=True, keep_suffix=True) as fresh:
+        figure.savefig(fresh, dpi=DPI)
     return path
 
 

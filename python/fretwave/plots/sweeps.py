@@ -8,7 +8,6 @@ from functools import partial
 from itertools import product
 from typing import Any
 
-import h5py
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
@@ -16,6 +15,7 @@ from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
 
 from ..analyses.mode_curve import ModeCurve
+from ..results_file import open_results
 from ..sweep_plan import Plan, short_names
 from ..sweep_summary import SPLIT
 from . import style
@@ -53,7 +53,7 @@ class Swept:
 
     @classmethod
     def of(cls, analysis: Analysis) -> Swept:
-        with h5py.File(analysis.path, "r") as file:
+        with open_results(analysis.path) as file:
             summary = {key: np.asarray(data[()], dtype=float) for key, data in file[analysis.name]["summary"].items()}
         split = SPLIT.get(str(analysis.attributes["of_type"]), "")
         parts = [float(part) for part in summary.pop(split, ())]
