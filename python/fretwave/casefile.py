@@ -15,7 +15,7 @@ import scipy.sparse
 from . import checks
 from .aerodynamics_case import check_aerodynamics
 from .built import BuiltModel
-from .checks_rest import check_preloads, check_reduction, check_wear
+from .checks_rest import check_memory, check_preloads, check_reduction, check_wear
 from .checks_size import check_sizes
 from .checks_wheel import check_wheels
 from .contacts import ContactSpec, read_contacts
@@ -249,6 +249,7 @@ def _build(source: Source, laws: Mapping[str, Any], found: list[FretwaveError]) 
     checks.check_analyses(source, analyses, [name for name in keep.values() if name in known] if keep else dofs, found)
     check_reduction(source, reduction, analyses, neighbours.sectors if neighbours else None, found)
     check_preloads(source, preload, analyses, built.loads if built else () if origin else None, found)
+    check_memory(source, analyses, contacts, laws, found)
     notes: list[str] = []
     if origin is not None:
         least = len(keep) if reduction else len(origin.dofs)
