@@ -186,3 +186,64 @@ def test_bad_inputs_are_refused(comm):
     for t_end, dt_out in ((0.0, 0.1), (1.0, 0.0), (-1.0, 0.1)):
         with pytest.raises(fw.InputError, match="positive duration"):
             fw.Transient(model).run([1.0], [0.0], t_end, dt_out)
+
+
+#: Regularisation velocities that no explicit step follows while the mass sticks: R / (eps m) is up to 1e12 / s.
+STIFF = [1e-7, 5e-11]
+
+
+@SERIAL
+@pytest.mark.parametrize("eps", STIFF)
+def test_slider_sticks_where_friction_holds_the_spring(comm, eps):
+    """k = m = 1, R = 0.05 from 0.12: turns at 0.12 - 2 R = 0.02, where k x < R, and stays (eps creeps: eps t x / R)."""
+    model = single_dof(comm, law=friction([[1.0]], 0.05, eps))
+    run = fw.Transient(model).run([0.12], [0.0], 12 * np.pi, np.pi / 8, 1e-8)
+    stuck = run["t"] > 1.01 * np.pi
+    assert run["finished"] and run["implicit"] and run["steps"] < 20000
+    assert run["x"][stuck, 0] == pytest.approx(np.full(stuck.sum(), -0.02), abs=2e-6 + 20 * eps)
+
+
+@SERIAL
+@pytest.mark.parametrize("eps", STIFF)
+def test_stuck_damper_of_two_masses_is_a_spring(two_dof, comm, eps):
+    """Below slip m2 stands still and m1 swings with sqrt(640) undamped: a cos(w t), and eps of creep."""
+    law = fw.Contact("regularised_coulomb", two_dof.B, {**two_dof.parameters, "regularisation_velocity": eps})
+    period = 2 * np.pi / two_dof.omega_stuck
+    run = fw.Transient(fw.Model(two_dof.M, two_dof.K, None, [law], comm)).run(
+        [0.1, 0.0], [0.0, 0.0], 4 * period, period / 32, 1e-8
+    )
+    assert run["finished"] and run["implicit"]
+    exact = 0.1 * np.cos(two_dof.omega_stuck * run["t"])
+    assert run["x"][:, 0] == pytest.approx(exact, abs=0.1 * (1e-6 + 3 * eps))
+    assert np.abs(run["x"][:, 1]).max() < eps
+
+
+@pytest.mark.ranks(1, 2)
+def test_implicit_steps_have_the_frequency_response_of_a_stiff_damper(comm):
+    """A linear damper of 1e9 on the second mass: q = (K + s C + s^2 M)^-1 P, phase included, on any ranks."""
+    mass, stiffness, damping = np.diag([1.0, 0.5]), chain(2, 10.0, 1.0), np.diag([0.1, 1e9])
+    omega, force = 2.0, np.array([1.0, 0.5j])
+    s = 1j * omega
+    q = np.linalg.solve(stiffness + s * damping + s**2 * mass, force)
+    model = fw.Model(mass, stiffness, damping, comm=comm)
+    run = fw.Transient(model, {1: force}, 1.0, omega).run(q.real, (s * q).real, 1.0, 0.05, 1e-7)
+    assert run["finished"] and run["implicit"]
+    exact = (np.exp(s * run["t"])[:, None] * q).real
+    assert np.allclose(run["x"], exact, rtol=0, atol=1e-5 * np.abs(exact).max())
+
+
+@SERIAL
+def test_integration_that_would_not_end_says_so(comm):
+    """More steps than allowed, explicit and implicit: what was found until then, and the reason."""
+    model = single_dof(comm, law=friction([[1.0]], 0.05, 1e-9))
+    run = fw.Transient(model).run([0.12], [0.0], 1e4, 0.1, 1e-12, most_steps=100)
+    assert (run["finished"], run["implicit"], run["reason"]) == (False, True, "steps")
+    assert 0 <= run["t"][-1] < 1e4 and run["steps"] <= 100
+
+
+@SERIAL
+def test_law_with_a_memory_is_refused(comm):
+    """The place of a slider is no part of (x, v): a Jenkins element integrated without it would never dissipate."""
+    slider = fw.Contact("jenkins", [[1.0]], {"tangential_stiffness": 1.0, "friction_limit": 1.0}, name="ring")
+    with pytest.raises(fw.InputError, match="memory"):
+        fw.Transient(fw.Model([[1.0]], [[1.0]], None, [slider], comm))

@@ -52,10 +52,13 @@ nb::list law_table() {
   nb::list out;
   for (auto const& entry : contact::laws()) {
     nb::list parameters;
+    contact::Parameters one;
+    for (auto const& p : entry.parameters) one[p.name] = {1.0};
     for (auto const& p : entry.parameters)
       parameters.append(nb::make_tuple(p.name, p.unit, p.doc, p.lower, p.strict,
                                        p.standard ? nb::object(nb::cast(*p.standard)) : nb::none()));
-    out.append(nb::make_tuple(entry.name, entry.doc, entry.components, parameters));
+    out.append(
+        nb::make_tuple(entry.name, entry.doc, entry.components, parameters, entry.make(one)->hereditary()));
   }
   return out;
 }

@@ -10,7 +10,7 @@ namespace fretwave::python {
 
 namespace {
 
-/// C++ errors become the package's own: fretwave.errors.InputError and FretwaveError.
+/// C++ errors become the package's own: fretwave.errors.InputError and PetscError.
 void translate(std::exception_ptr const& pointer, void*) {
   const auto raise = [](char const* name, nb::object error) {
     PyErr_SetObject(nb::module_::import_("fretwave.errors").attr(name).ptr(), error.ptr());
@@ -30,8 +30,8 @@ void translate(std::exception_ptr const& pointer, void*) {
     nb::object type = nb::module_::import_("fretwave.errors").attr("FretwaveError");
     raise("FretwaveError", type(e.what()));
   } catch (PetscFailure const& e) {
-    nb::object type = nb::module_::import_("fretwave.errors").attr("FretwaveError");
-    raise("FretwaveError", type(e.what()));
+    nb::object type = nb::module_::import_("fretwave.errors").attr("PetscError");
+    raise("PetscError", type(e.what()));
   }
 }
 

@@ -29,11 +29,11 @@ void bind_transient(nb::module_& m) {
           },
           nb::keep_alive<1, 2>())
       .def("run", [](Transient& t, Petsc<Vec> x0, Petsc<Vec> v0, double t_end, double dt_out,
-                     double tolerance, double limit) {
-        const auto h = t.run(x0.object, v0.object, t_end, dt_out, tolerance, limit);
+                     double tolerance, double limit, double most_steps) {
+        const auto h = t.run(x0.object, v0.object, t_end, dt_out, tolerance, limit, most_steps);
         const size_t n = size_t(local_size(x0.object));
         return nb::make_tuple(numpy_copy(h.t.data(), {h.t.size()}), stack(h.x, n), stack(h.v, n), h.steps,
-                              h.finished, h.reason);
+                              h.implicit, h.finished, h.reason);
       });
 }
 

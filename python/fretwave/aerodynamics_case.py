@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +11,9 @@ import numpy as np
 from .reporter import Found, Reporter
 from .schema import AerodynamicsSection, AnalysisSection, FlutterAnalysis
 from .source import Source
+
+#: A number of sectors as a key.
+_WHOLE = re.compile("-?[0-9]{1,9}")
 
 if TYPE_CHECKING:
     from .aerodynamics import Aerodynamics
@@ -92,9 +96,8 @@ def _check_places(report: Reporter, key: str, given: Mapping[str, Any], sectors:
     """Whole numbers of sectors, each place (or wave) once."""
     seen: dict[int, str] = {}
     for text in given:
-        digits = text[1:] if text.startswith("-") else text
         expected = f"-{sectors // 2} .. {sectors // 2}"
-        if not digits.isdecimal() or abs(int(text)) > sectors // 2:
+        if not _WHOLE.fullmatch(text) or abs(int(text)) > sectors // 2:
             report.wrong((key, text), "is not of this wheel", expected, f"write for example `{key} = {{ 1 = ... }}`")
         elif int(text) % sectors in seen:
             first = seen[int(text) % sectors]
@@ -119,7 +122,7 @@ def _check_flutter(
             report.wrong(("nodal_diameters", index), "is no wave of this wheel", expected, "take it out")
     if section is None or section.damping is None:
         return
-    named = {int(text) % sectors for text in section.damping if text.lstrip("-").isdecimal()}
+    named = {int(text) % sectors for text in section.damping if _WHOLE.fullmatch(text)}
     missing = [d for d in diameters_of(analysis, sectors) if d % sectors not in named]
     if missing:
         key = "type" if analysis.nodal_diameters is None else "nodal_diameters"

@@ -19,7 +19,7 @@ import scipy.sparse as sp
 from pydantic import TypeAdapter, ValidationError
 
 from .errors import FretwaveError, InputError
-from .source import Source, display, nearest
+from .source import Source, display, is_there, nearest, shortened
 from .validation import at, toml
 
 Array = npt.NDArray[np.float64]
@@ -117,6 +117,8 @@ class BuiltModel:
     def complaint(self) -> str | None:
         """What is inconsistent, None when nothing is."""
         n = self.M.shape[0]
+        if n == 0:
+            return "M has no dofs"
         sizes = {"M": self.M, "K": self.K, **({} if self.C is None else {"C": self.C})}
         sizes.update({f"part '{name}' of K": part for name, part in self.parts.items()})
         for name, matrix in sizes.items():
@@ -128,6 +130,8 @@ class BuiltModel:
         for name, load in self.loads.items():
             if np.shape(load) != (n,):
                 return f"load '{name}' has the shape {np.shape(load)}, not ({n},)"
+            if not np.all(np.isfinite(load)):
+                return f"load '{name}' has an entry that is not a number"
         return self._wrong_grid() or next(
             (text for text in (_wrong(c, name, n) for name, c in self.contacts.items()) if text), None
         )
@@ -160,6 +164,8 @@ def _wrong(contact: BuiltContact, name: str, n_dof: int) -> str | None:
     rows, columns = contact.B.shape
     if columns != n_dof or rows % contact.components or not rows:
         return f"B of contact '{name}' is {rows} x {columns}, not {contact.components} n_pairs x {n_dof}"
+    if not np.all(np.isfinite(contact.B.data)):
+        return f"B of contact '{name}' has an entry that is not a number"
     n = contact.n_pairs
     shapes = {"areas": (n,), "points": (n, 3), "frames": (n, 3, 3), "faces": (n,), "positions": (n, 2)}
     given = {key: getattr(contact, key) for key in shapes if getattr(contact, key) is not None}
@@ -169,6 +175,8 @@ def _wrong(contact: BuiltContact, name: str, n_dof: int) -> str | None:
     for key, value in contact.parameters.items():
         if np.shape(value) not in ((), (n,)):
             return f"parameter {key} of contact '{name}' has the shape {np.shape(value)}, not ({n},)"
+        if not np.all(np.isfinite(np.asarray(value, dtype=float))):
+            return f"parameter {key} of contact '{name}' is not a number"
     return None
 
 
@@ -189,7 +197,7 @@ def run_builder(
             )
         chosen = _checked(module, function, options, source, found)
         built = function(**chosen) if len(found) == before else None
-    except Exception as error:
+    except (Exception, SystemExit) as error:  # whatever a builder may do, it is not a defect of ours
         found.append(_blame(error, path, source))
         return None
     return _consistent(built, path, found) if len(found) == before else None
@@ -202,9 +210,9 @@ def builder_digest(given: str, source: Source) -> str:
 
 def _import(path: Path, source: Source) -> ModuleType:
     where = source.where(("model", "builder"))
-    if path.suffix != ".py" or not path.is_file():
+    if path.suffix != ".py" or not is_there(path) or not path.is_file():
         folder = path.parent
-        files = sorted(entry.name for entry in folder.glob("*.py")) if folder.is_dir() else []
+        files = sorted(entry.name for entry in folder.glob("*.py")) if is_there(folder) and folder.is_dir() else []
         near = nearest(path.name, files) or (f"there is {', '.join(files)}" if files else "check the path")
         raise InputError("there is no such builder", where, display(path), "a Python file beside the case", near)
     spec = importlib.util.spec_from_file_location(f"fretwave_builder_{path.stem}", path)
@@ -257,7 +265,7 @@ def _checked(
     return values
 
 
-def _blame(error: Exception, path: Path, source: Source) -> InputError:
+def _blame(error: BaseException, path: Path, source: Source) -> InputError:
     """An exception of the builder as bad input, with the builder's line that raised it or led to it."""
     frames = [f for f in traceback.extract_tb(error.__traceback__) if Path(f.filename) == path]
     where = f"{display(path)}:{frames[-1].lineno}" if frames else source.where(("model", "builder"))
@@ -266,20 +274,18 @@ def _blame(error: Exception, path: Path, source: Source) -> InputError:
     if isinstance(error, FretwaveError):
         place = error.where if error.where and not frames else where
         return InputError(error.what, place, error.measured, error.expected, error.fix)
-    what = f"the builder failed: {type(error).__name__}: {error}"
+    what = f"the builder failed: {type(error).__name__}: {shortened(str(error))}"
     return InputError(what, where, fix="correct the builder, or the options in [model.options]")
 
 
 def _consistent(built: Any, path: Path, found: list[FretwaveError]) -> BuiltModel | None:
-    if not isinstance(built, BuiltModel):
-        problem: str | None = f"it returned {type(built).__name__}"
-    else:
-        built.M, built.K = (sp.csr_matrix(A, dtype=float) for A in (built.M, built.K))
-        built.C = None if built.C is None else sp.csr_matrix(built.C, dtype=float)
-        built.parts = {name: sp.csr_matrix(part, dtype=float) for name, part in built.parts.items()}
-        for contact in built.contacts.values():
-            contact.B = sp.csr_matrix(contact.B, dtype=float)
-        problem = built.complaint()
+    problem: str | None = f"it returned {type(built).__name__}"
+    if isinstance(built, BuiltModel):
+        try:
+            _convert(built)
+            problem = built.complaint()
+        except Exception as error:  # entries of any type may stand in it
+            problem = f"{type(error).__name__}: {shortened(str(error))}"
     if problem is None:
         return typing.cast(BuiltModel, built)
     expected = "fretwave.BuiltModel with matrices, contacts and loads that fit each other"
@@ -287,3 +293,12 @@ def _consistent(built: Any, path: Path, found: list[FretwaveError]) -> BuiltMode
         InputError("the builder gave no usable model", display(path), problem, expected, "correct the builder")
     )
     return None
+
+
+def _convert(built: BuiltModel) -> None:
+    """Matrices as sparse ones of float."""
+    built.M, built.K = (sp.csr_matrix(A, dtype=float) for A in (built.M, built.K))
+    built.C = None if built.C is None else sp.csr_matrix(built.C, dtype=float)
+    built.parts = {name: sp.csr_matrix(part, dtype=float) for name, part in built.parts.items()}
+    for contact in built.contacts.values():
+        contact.B = sp.csr_matrix(contact.B, dtype=float)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,7 +15,8 @@ import scipy.sparse
 from . import checks
 from .aerodynamics_case import check_aerodynamics
 from .built import BuiltModel
-from .checks_rest import check_preloads, check_reduction, check_wear
+from .checks_rest import check_memory, check_preloads, check_reduction, check_wear
+from .checks_size import check_sizes
 from .checks_wheel import check_wheels
 from .contacts import ContactSpec, read_contacts
 from .engine_order import fold_engine_orders
@@ -215,7 +217,7 @@ def _core_laws() -> Mapping[str, Any]:
 def _in_file_order(found: list[FretwaveError]) -> list[FretwaveError]:
     def line(problem: FretwaveError) -> int:
         digits = (problem.where or "").rpartition(":")[2].split(" ")[0]
-        return int(digits) if digits.isdigit() else 0
+        return int(digits) if re.fullmatch("[0-9]{1,9}", digits) else 0
 
     return sorted(found, key=line)
 
@@ -247,8 +249,11 @@ def _build(source: Source, laws: Mapping[str, Any], found: list[FretwaveError]) 
     checks.check_analyses(source, analyses, [name for name in keep.values() if name in known] if keep else dofs, found)
     check_reduction(source, reduction, analyses, neighbours.sectors if neighbours else None, found)
     check_preloads(source, preload, analyses, built.loads if built else () if origin else None, found)
+    check_memory(source, analyses, contacts, laws, found)
     notes: list[str] = []
     if origin is not None:
+        least = len(keep) if reduction else len(origin.dofs)
+        check_sizes(source, analyses, least, contacts, neighbours.sectors if neighbours else 1, found)
         complete = len(contacts) == len(source.entries("contact"))
         if complete:
             check_wear(source, analyses, contacts, built.contacts if built else {}, found)

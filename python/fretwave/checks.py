@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from .errors import FretwaveError, InputError
+from .petsc_options import parse
 from .reporter import Reporter
 from .schema import (
     ANALYSES,
@@ -31,7 +32,7 @@ def read_analyses(source: Source, found: Found) -> dict[int, AnalysisSection]:
     analyses: dict[int, AnalysisSection] = {}
     for number, entry in enumerate(source.entries("analysis")):
         kind = entry.get("type")
-        if kind not in ANALYSES:
+        if not isinstance(kind, str) or kind not in ANALYSES:
             found.append(_unknown_type(source, number, kind))
             continue
         section = validate(ANALYSES[kind], source, ("analysis", number), found)
@@ -221,14 +222,10 @@ def _check_forced(report: Reporter, analysis: ForcedAnalysis, dofs: Sequence[str
 
 
 def _check_petsc(report: Reporter, analysis: AnalysisSection) -> None:
-    words = analysis.petsc.split()
-    if words and not words[0].startswith("-"):
-        report.wrong(
-            ("petsc",),
-            "is not a list of PETSc options",
-            "'-name value' pairs",
-            'for example `petsc = "-snes_rtol 1e-9"`',
-        )
+    try:
+        parse(analysis.petsc)
+    except InputError as error:
+        report.wrong(("petsc",), f"cannot be used: {error.what}", str(error.expected), str(error.fix))
 
 
 def choose(names: Sequence[str], only: Sequence[str], origin: str = "--only") -> list[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 from .built import BuiltContact
 from .contacts import ContactSpec, wear_areas
@@ -79,6 +80,22 @@ def check_preloads(
             _check_factors(report, analysis, own or section)
         elif section is not None:
             _check_time_integration(report, analysis)
+
+
+def check_memory(
+    source: Source, analyses: Analyses, contacts: Sequence[ContactSpec], laws: Mapping[str, Any], found: Found
+) -> None:
+    """Time integration sees the present motion alone: a slider's place is no part of its state."""
+    named = next((contact for contact in contacts if getattr(laws.get(contact.law), "memory", False)), None)
+    for number, analysis in analyses.items():
+        transient = isinstance(analysis, TransientSection)
+        if named is not None and (transient or getattr(analysis, "time_points", False)):
+            Reporter(source, ("analysis", number), found).wrong(
+                ("type" if transient else "time_points",),
+                f"needs time integration, which does not know the law '{named.law}' of contact '{named.name}'",
+                "a law of the present motion, such as regularised_coulomb",
+                "remove the analysis, or take such a law" if transient else "write `time_points = 0`",
+            )
 
 
 def _check_loads(report: Reporter, section: PreloadSection | None, known: list[str]) -> None:

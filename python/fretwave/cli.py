@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -27,6 +28,9 @@ def _dispatch(arguments: list[str]) -> int:
         from . import study
 
         return int(study.main(arguments[1:]))
+    lone = next((text for text in arguments if re.fullmatch("--[a-z-]+=--", text)), None)
+    if lone is not None:  # argparse takes the value for the end of the options
+        raise InputError("an option has the value '--'", "fretwave", lone, "a value", "give it one, or leave it out")
     options = parser().parse_args(_joined_petsc(arguments))
     code: int = options.command(options)
     return code

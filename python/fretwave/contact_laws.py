@@ -26,19 +26,23 @@ class ParameterInfo:
 
 @dataclass(frozen=True)
 class LawInfo:
-    """A compiled contact law; `components` is 1 (tangent) or 3 (normal, two tangents)."""
+    """A compiled contact law; `components` is 1 (tangent) or 3 (normal, two tangents).
+
+    One with a `memory` depends on the path of the displacement.
+    """
 
     name: str
     doc: str
     components: int
     parameters: list[ParameterInfo]
+    memory: bool = False
 
 
 def laws() -> dict[str, LawInfo]:
     """All compiled laws by name."""
     return {
-        name: LawInfo(name, doc, components, [ParameterInfo(*p) for p in parameters])
-        for name, doc, components, parameters in _core.law_table()
+        name: LawInfo(name, doc, components, [ParameterInfo(*p) for p in parameters], memory)
+        for name, doc, components, parameters, memory in _core.law_table()
     }
 
 

@@ -15,6 +15,7 @@ from .validation import at, toml
 
 #: A parameter's name with this ending is given per area; the pair's area comes with the model.
 PER_AREA = "_per_area"
+LARGEST = float(np.finfo(float).max)
 
 
 def law_of(
@@ -135,7 +136,7 @@ def _wrong_number(value: Any, parameter: Any, n_pairs: int) -> str | None:
         return "is not a number"
     if isinstance(value, list) and len(value) != n_pairs:
         return f"has {len(value)} values for {n_pairs} contact pairs"
-    if not np.all(np.isfinite(values)):
+    if not all(-LARGEST <= entry <= LARGEST for entry in values):  # integers may be larger than any float
         return "is not finite"
     lower = -np.inf if parameter.lower is None else parameter.lower
     below = min(values) < lower or (parameter.strict and min(values) == lower)

@@ -8,6 +8,8 @@ EXIT_DONE = 0
 EXIT_OTHER = 1
 EXIT_BAD_INPUT = 2
 EXIT_NOT_CONVERGED = 3
+#: Of a message: longer values are cut.
+LONGEST_LINE = 1000
 
 
 class FretwaveError(Exception):
@@ -51,8 +53,8 @@ class FretwaveError(Exception):
             ("expected", self.expected),
             (self.advice, self.fix),
         ]
-        lines = [f"  {label + ':':<10}{value}" for label, value in rows if value is not None]
-        return "\n".join([self.what, *lines])
+        lines = [f"  {label + ':':<10}{_said(value)}" for label, value in rows if value is not None]
+        return "\n".join([_said(self.what), *lines])
 
     def render(self) -> str:
         """The whole message as printed."""
@@ -60,6 +62,13 @@ class FretwaveError(Exception):
 
     def __str__(self) -> str:
         return self.body()
+
+
+def _said(value: object) -> str:
+    """As a terminal can bear it: what a user wrote may be long, or hold control characters."""
+    text = str(value)
+    text = text if len(text) <= LONGEST_LINE else text[: LONGEST_LINE - 3] + "..."
+    return "".join(c if c.isprintable() or c == "\n" else c.encode("unicode_escape").decode() for c in text)
 
 
 class InputError(FretwaveError):
@@ -73,6 +82,10 @@ class NotConverged(FretwaveError):
 
     exit_code = EXIT_NOT_CONVERGED
     advice = "try"
+
+
+class PetscError(FretwaveError):
+    """A call of PETSc, SLEPc or MUMPS failed; `petsc_options` tells whether an option of the user did it."""
 
 
 class CaseErrors(InputError):

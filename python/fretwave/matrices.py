@@ -14,12 +14,14 @@ import scipy.sparse
 import scipy.sparse.linalg
 
 from .errors import FretwaveError, InputError
-from .source import Source, display, nearest
+from .source import Source, display, is_there, nearest, shortened
 
 #: Largest entry of A - A^T over the largest entry of A that still counts as rounding.
 SYMMETRY_TOLERANCE = 1e-10
 #: Eigenvalues of the diagonally scaled matrix below this (over the largest) count as zero.
 SINGULAR_TOLERANCE = 1e-13
+#: Of a matrix; norms sum squares.
+LARGEST_ENTRY = 1e150
 #: Up to this size definiteness is decided by a dense eigenvalue problem.
 DENSE_LIMIT = 600
 
@@ -67,7 +69,6 @@ def load(
             matrix.digest = "sha256:" + hashlib.sha256(path.read_bytes()).hexdigest()
         else:
             matrix = Matrix(letter, _from_rows(letter, given, source), where)
-        _check_entries(matrix)
         _check_square(matrix)
     except InputError as problem:
         found.append(problem)
@@ -90,9 +91,9 @@ def _from_rows(letter: str, rows: list[list[float]], source: Source) -> Any:
 
 
 def _read(path: Path, letter: str, where: str) -> Any:
-    if not path.exists():
+    if not is_there(path):
         folder = path.parent
-        names = sorted(entry.name for entry in folder.iterdir()) if folder.is_dir() else []
+        names = sorted(entry.name for entry in folder.iterdir()) if is_there(folder) and folder.is_dir() else []
         raise InputError(
             f"the file of the {_NAMES[letter]} does not exist",
             where=where,
@@ -102,22 +103,25 @@ def _read(path: Path, letter: str, where: str) -> Any:
         )
     try:
         values = _read_known(path, letter)
-    except Exception as error:  # a damaged file makes the readers of NumPy and SciPy raise anything
+        sparse = scipy.sparse.csr_matrix(values)
+        if not (np.issubdtype(sparse.dtype, np.number) or sparse.dtype == bool):
+            raise ValueError(f"entries of type {sparse.dtype}")
+    except Exception as error:  # whatever the readers raise on a damaged file
         raise InputError(
             f"the file of the {_NAMES[letter]} cannot be read",
             where=where,
-            measured=f"{display(path)}: {' '.join(str(error).split())}",
+            measured=f"{display(path)}: {shortened(str(error) or type(error).__name__)}",
             expected=f".npz of scipy.sparse.save_npz, .npz of numpy.savez with an array '{letter}', or .mtx",
             fix=f"write it with scipy.sparse.save_npz('{path.name}', {letter})",
         ) from None
-    if np.iscomplexobj(values):
+    if np.iscomplexobj(sparse):
         raise InputError(
             f"the {_NAMES[letter]} is complex",
             where=f"{where}, {display(path)}",
             expected="real entries",
             fix="put the imaginary part of a loss factor into C",
         )
-    return scipy.sparse.csr_matrix(values, dtype=float)
+    return sparse.astype(float)
 
 
 def _read_known(path: Path, letter: str) -> Any:
@@ -146,19 +150,21 @@ def _check_square(matrix: Matrix) -> None:
         )
 
 
-def _check_entries(matrix: Matrix) -> None:
+def check_entries(matrix: Matrix) -> InputError | None:
+    """Every entry is a number whose square is one."""
     entries = matrix.values.tocoo()
-    bad = np.flatnonzero(~np.isfinite(entries.data))
-    if len(bad):
-        row, column = int(entries.row[bad[0]]), int(entries.col[bad[0]])
-        raise InputError(
-            f"the {matrix.name} has an entry that is not a number",
-            where=matrix.where,
-            measured=f"{matrix.letter}[{row}][{column}] = {entries.data[bad[0]]}"
-            + (f", and {len(bad) - 1} more" if len(bad) > 1 else ""),
-            expected="finite entries",
-            fix="look at what wrote this entry",
-        )
+    bad = np.flatnonzero(~(abs(entries.data) <= LARGEST_ENTRY))
+    if not len(bad):
+        return None
+    row, column, value = int(entries.row[bad[0]]), int(entries.col[bad[0]]), float(entries.data[bad[0]])
+    finite = bool(np.isfinite(value))
+    return InputError(
+        f"the {matrix.name} has an entry that is {'too large' if finite else 'not a number'}",
+        where=matrix.where,
+        measured=f"{matrix.letter}[{row}][{column}] = {value}" + (f", and {len(bad) - 1} more" if len(bad) > 1 else ""),
+        expected=f"at most {LARGEST_ENTRY:g}, whose square is a number" if finite else "finite entries",
+        fix="choose other units" if finite else "look at what wrote this entry",
+    )
 
 
 def check_symmetric(matrix: Matrix, dofs: Sequence[str]) -> InputError | None:

@@ -13,7 +13,7 @@ from .built import BuiltModel, builder_digest, run_builder
 from .errors import FretwaveError, InputError
 from .matrices import Matrix
 from .schema import ModelSection
-from .source import Source
+from .source import Source, display
 from .validation import missing_key, toml
 
 Found = list[FretwaveError]
@@ -96,6 +96,10 @@ def _from_file(section: ModelSection, source: Source, found: Found) -> Origin | 
         place = f"{where}, {error.where}"
         found.append(InputError(error.what, place, error.measured, error.expected, error.fix))
         return None
+    except OSError as error:
+        problem = f"{display(path)}: {error.strerror}"
+        found.append(InputError("the model file cannot be read", where, problem, "a file of `fretwave import`"))
+        return None
     loaded = {
         letter: Matrix(letter, getattr(model, letter), f"{where}, {letter}")
         for letter in ("M", "K", "C")
@@ -158,9 +162,11 @@ def check_physics(origin: Origin, rows: Sequence[Any] | None, notes: list[str], 
     rows : B of every contact; None when some are wrong, and what holds the structure is not known.
     """
     loaded, dofs = origin.matrices, origin.dofs
+    bad = [problem for matrix in loaded.values() if (problem := matrices.check_entries(matrix))]
+    found.extend(bad)
     for letter in ("M", "K"):
         matrix = loaded.get(letter)
-        if matrix is None:
+        if matrix is None or bad:
             continue
         problem = matrices.check_symmetric(matrix, dofs)
         if problem is None and letter == "M":

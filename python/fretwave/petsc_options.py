@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-from .errors import InputError
-from .source import nearest
+from .errors import InputError, PetscError
+from .source import nearest, shortened
 
 #: Names to suggest for a misspelt option; PETSc has many more.
 COMMON = (
@@ -16,6 +17,40 @@ COMMON = (
     *("snes_linesearch_type", "snes_type", "ksp_type", "ksp_rtol", "ksp_max_it", "ksp_monitor"),
     *("pc_type", "pc_factor_mat_solver_type", "mat_mumps_icntl_14", "ts_type", "ts_rtol", "ts_atol", "ts_monitor"),
 )
+
+
+#: What a complaint of PETSc says of the value it wants.
+WANTED = (
+    ("no numeric value", "a number"),
+    ("no integer value", "a whole number of 32 bits"),
+    ("logical value", "true or false"),
+    ("nable to find|nknown type|not found|nknown option", "a name that PETSc knows (its manual lists them)"),
+    ("pen file|pen viewer", "a file that can be opened"),
+)
+
+
+#: Options whose value PETSc takes as it comes: what their name ends with, what is right, and in words.
+RULES: tuple[tuple[str, Callable[[float], bool], str], ...] = (
+    ("_rtol", lambda value: 0 <= value < 1, "a number from 0 to below 1"),
+    ("_atol", lambda value: 0 <= value < math.inf, "a finite number from 0 up"),
+    ("_stol", lambda value: 0 <= value < math.inf, "a finite number from 0 up"),
+    ("_max_it", lambda value: value >= 0 and value == int(value), "a whole number from 0 up"),
+    ("_max_steps", lambda value: value >= 0 and value == int(value), "a whole number from 0 up"),
+    ("ts_dt", lambda value: 0 < value < math.inf, "a finite number above 0"),
+)
+
+
+def complaint(name: str, value: str | None) -> str | None:
+    """What was expected of an option's value; None when it may be right."""
+    if name.endswith("_type") and value is None:
+        return "the name of a type"
+    for ending, right, expected in RULES:
+        if name.endswith(ending):
+            try:
+                return None if value is not None and right(float(value)) else expected
+            except (ValueError, OverflowError):
+                return expected
+    return None
 
 
 def parse(text: str) -> list[tuple[str, str | None]]:
@@ -30,9 +65,19 @@ def parse(text: str) -> list[tuple[str, str | None]]:
             raise InputError(
                 "these are no PETSc options",
                 "--petsc",
-                text,
+                shortened(text),
                 "'-name value' pairs",
                 'for example --petsc "-snes_rtol 1e-9"',
+            )
+    for name, value in pairs:
+        expected = complaint(name, value)
+        if expected is not None:
+            raise InputError(
+                f"the PETSc option -{name} has a wrong value",
+                "--petsc, or petsc = ... of an analysis",
+                f"-{name} {shortened(value or '')}".strip(),
+                expected,
+                "correct the value, or remove the option",
             )
     return pairs
 
@@ -65,9 +110,31 @@ class AnalysisOptions:
             database.setValue(name, value)
         try:
             yield
+        except (PetscError, PETSc.Error) as error:
+            if not self.pairs:
+                raise
+            raise self._blamed(" ".join(PETSc.Error._traceback_[-1:])) from error
         finally:
             for name in self.pairs:
                 database.delValue(name)
+
+    def _blamed(self, complaint: str) -> InputError:
+        """PETSc failed under the user's options: the one that its complaint speaks of, or all."""
+        plain = {name[len(self.prefix) :]: value or "" for name, value in self.pairs.items()}
+        words = re.split(r"[\s,;:'\"()]+", complaint)
+        named = [name for name, value in plain.items() if name in words or (value and value in words)]
+        shown = named or list(plain)
+        wanted = next((text for rule, text in WANTED if re.search(rule, complaint)), None)
+        bound = re.search(r"must be ([\w<>=. -]+)", complaint)
+        return InputError(
+            f"PETSc does not take {' or '.join(f'-{name}' for name in shown)}"
+            + ("" if len(shown) == 1 else " (one of them, or all together)"),
+            where=f"PETSc options of '{self.prefix.rstrip('_')}'",
+            measured=shortened(" ".join(f"-{name} {plain[name]}".strip() for name in shown)),
+            expected=wanted
+            or (f"a value that is {bound.group(1).strip(' .')}" if bound else "what the solvers in use can do"),
+            fix="correct the value, or remove the option",
+        )
 
     def check_used(self, unused: Callable[[], Sequence[str]], where: str) -> None:
         """Refuse options that nothing has read until the first point was solved.
@@ -89,6 +156,8 @@ class AnalysisOptions:
             where=where,
             measured=", ".join(f"-{name[len(self.prefix) :]}" for name in wrong),
             expected="options of the solvers in use (a prefix is added by fretwave)",
-            fix=nearest(plain, COMMON, "did you mean `-{}`?".format)
+            fix="remove it: this solver is not in use here (`-snes_view` shows those that are)"
+            if plain in COMMON
+            else nearest(plain, COMMON, "did you mean `-{}`?".format)
             or "remove it; `-snes_view` shows the solvers in use",
         )

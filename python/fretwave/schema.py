@@ -8,9 +8,30 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal, Optional, Union
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic_core import PydanticKnownError
 
-Dof = Annotated[str, BeforeValidator(lambda value: str(value) if type(value) is int else value)]
+#: Longest name: results are files of that name, whose systems allow 255 characters with all that is added.
+LONGEST_NAME = 100
+LARGEST_WHOLE = 2**31 - 1
+
+
+def _of_the_core(value: int) -> int:
+    """Whole numbers have 32 bits in the core; harmonics, sectors and points beyond are a slip."""
+    if value > LARGEST_WHOLE:
+        raise PydanticKnownError("less_than_equal", {"le": LARGEST_WHOLE})
+    if value < -LARGEST_WHOLE:
+        raise PydanticKnownError("greater_than_equal", {"ge": -LARGEST_WHOLE})
+    return value
+
+
+Whole = Annotated[int, AfterValidator(_of_the_core)]
+Dof = Annotated[
+    str,
+    BeforeValidator(lambda value: str(value) if type(value) is int else value),
+    Field(pattern=r"^[^\x00-\x1f\x7f]{1,100}$"),
+]
+Name = Annotated[str, Field(max_length=LONGEST_NAME)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Matrix = Union[str, list[list[float]]]
 Numbers = Union[float, list[float]]
@@ -50,8 +71,8 @@ class ModelSection(Section):
         default=None,
     )
     options: dict[str, Any] = key("options of the builder", example="{ speed_rpm = 2000 }", default_factory=dict)
-    sectors: Optional[int] = key(
-        "the model is one of this many equal sectors of a wheel", example="24", default=None, ge=2
+    sectors: Optional[Whole] = key(
+        "the model is one of this many equal sectors of a wheel", example="24", default=None, ge=2, le=10_000
     )
     low: Optional[list[Dof]] = key("dofs of the sector's low face", example='["rim_0"]', default=None, min_length=1)
     high: Optional[list[Dof]] = key(
@@ -64,22 +85,22 @@ class ModelSection(Section):
 class ReductionSection(Section):
     """``[reduction]``: Craig-Bampton; kept are the dofs of contacts and those that the case or its builder names."""
 
-    modes: Optional[int] = key("number of component modes (10 unless told)", example="10", default=None, ge=0)
+    modes: Optional[Whole] = key("number of component modes (10 unless told)", example="10", default=None, ge=0)
     up_to_hz: Optional[Positive] = key("instead of modes: all component modes up to here", "Hz", "5000.0", default=None)
-    compare: int = key("linear modes compared with the unreduced model, 0 for none", example="5", default=5, ge=0)
+    compare: Whole = key("linear modes compared with the unreduced model, 0 for none", example="5", default=5, ge=0)
     interface: Literal["whole", "modes"] = key(
         "faces of a sector: kept whole, or moving in modes that waves of the unreduced sector give",
         example='"modes"',
         default="whole",
     )
-    interface_diameters: Optional[list[Annotated[int, Field(ge=0)]]] = key(
+    interface_diameters: Optional[list[Annotated[Whole, Field(ge=0)]]] = key(
         "nodal diameters of the waves that give interface modes", example="[4, 12]", default=None, min_length=1
     )
-    interface_waves: int = key("lowest waves of each, stuck and as many sliding", example="10", default=10, ge=1)
+    interface_waves: Whole = key("lowest waves of each, stuck and as many sliding", example="10", default=10, ge=1)
     interface_tolerance: Positive = key(
         "singular values of interface modes that are kept, over the largest", "-", "1e-5", default=1e-5, lt=1
     )
-    compare_diameters: Optional[list[Annotated[int, Field(ge=0)]]] = key(
+    compare_diameters: Optional[list[Annotated[Whole, Field(ge=0)]]] = key(
         "nodal diameters compared (those of the analyses and of the interface modes)", example="[4, 8]", default=None
     )
     error_at: Optional[Positive] = key(
@@ -125,7 +146,7 @@ class ContactSection(BaseModel):
 
     model_config = ConfigDict(extra="allow", strict=True)
 
-    name: str = key("name of the contact", example='"damper"', default="contact", pattern=r"^[A-Za-z]\w*$")
+    name: Name = key("name of the contact", example='"damper"', default="contact", pattern=r"^[A-Za-z][A-Za-z0-9_]*$")
     law: str = key("contact law", example='"regularised_coulomb"')
     pairs: Optional[list[Union[Dof, list[Dof]]]] = key(
         "contact pairs: a dof against ground, or [first, second] for second minus first; a builder brings its own",
@@ -145,7 +166,7 @@ class StepSection(Section):
     max_error: Positive = key(
         "largest distance of the branch from the curve through its points", "-", "5e-4", default=5e-4
     )
-    max_points: int = key("largest number of points of the branch", example="5000", default=5000, ge=2)
+    max_points: Whole = key("largest number of points of the branch", example="5000", default=5000, ge=2)
 
 
 class Damper(Section):
@@ -166,7 +187,7 @@ class MistuningSection(Section):
     standard_deviation: Optional[Positive] = key(
         "of normally distributed deviations, less their mean", "-", "0.02", default=None, lt=0.3
     )
-    seed: int = key("of the deviations that are drawn", example="1", default=1, ge=0)
+    seed: Whole = key("of the deviations that are drawn", example="1", default=1, ge=0)
     deviations: Optional[list[Annotated[float, Field(gt=-1, allow_inf_nan=False)]]] = key(
         "instead, one for each sector", "-", "[0.01, -0.02, 0.005]", default=None, min_length=2
     )
@@ -175,7 +196,7 @@ class MistuningSection(Section):
 class AnalysisSection(Section):
     """What every ``[[analysis]]`` has."""
 
-    name: str = key("unique name; results go to <name>.csv", example='"mode"', pattern=r"^[A-Za-z][\w-]*$")
+    name: Name = key("unique name; results go to <name>.csv", example='"mode"', pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
     type: str = key("kind of analysis", example='"mode"')
     dampers: list[Damper] = key(
         "viscous dampers to ground added in this analysis",
@@ -188,13 +209,13 @@ class AnalysisSection(Section):
 class HarmonicSection(AnalysisSection):
     """Keys of the analyses in the frequency domain."""
 
-    harmonics: int = key("highest harmonic", example="21", ge=1)
+    harmonics: Whole = key("highest harmonic", example="21", ge=1)
     retain: Literal["auto", "odd", "all"] = key(
         "which harmonics up to the highest are kept", example='"auto"', default="auto"
     )
-    samples: Optional[int] = key("time samples of a period in the contact law", example="1024", default=None, ge=4)
-    linear_mode: int = key("linear mode to start from, 1 is the lowest", example="1", default=1, ge=1)
-    nodal_diameter: Optional[int] = key(
+    samples: Optional[Whole] = key("time samples of a period in the contact law", example="1024", default=None, ge=4)
+    linear_mode: Whole = key("linear mode to start from, 1 is the lowest", example="1", default=1, ge=1)
+    nodal_diameter: Optional[Whole] = key(
         "nodal diameters of the wave on a sector, negative for a backward wave", example="4", default=None
     )
     aerodynamics: bool = key("the forces of [aerodynamics] act", example="true", default=False)
@@ -202,7 +223,7 @@ class HarmonicSection(AnalysisSection):
     mistuning: Optional[MistuningSection] = key(
         "deviations of the wheel's sectors", example='{ of = "blade", standard_deviation = 0.02 }', default=None
     )
-    sector: Optional[int] = key(
+    sector: Optional[Whole] = key(
         "sector of the wheel whose dof is normalised or observed (0; of a mistuned mode where it moves most)",
         example="7",
         default=None,
@@ -240,7 +261,7 @@ class FlutterAnalysis(HarmonicSection):
     )
     normalise: Dof = key("dof whose fundamental harmonic is the modal amplitude", example='"m1"')
     amplitude: list[Positive] = key("first and last modal amplitude", "m", "[1e-5, 1e-2]", min_length=2, max_length=2)
-    nodal_diameters: Optional[list[int]] = key(
+    nodal_diameters: Optional[list[Whole]] = key(
         "waves looked at, negative for backward ones; all unless told", example="[-4, 3, 4]", default=None, min_length=1
     )
     report_at: list[Positive] = key(
@@ -273,7 +294,7 @@ class ForcedAnalysis(HarmonicSection):
         "{ m1 = 1.0 }",
         min_length=1,
     )
-    engine_order: Optional[int] = key(
+    engine_order: Optional[Whole] = key(
         "order of the excitation of a wheel, in place of nodal_diameter; negative where the rotor turns with the "
         "sectors' numbers",
         example="4",
@@ -287,7 +308,9 @@ class ForcedAnalysis(HarmonicSection):
     report_at: list[Positive] = key(
         "frequencies at which the motion of a period is kept", "Hz", "[3.9]", default_factory=list
     )
-    time_points: int = key("points of each response that are checked by time integration", example="4", default=0, ge=0)
+    time_points: Whole = key(
+        "points of each response that are checked by time integration", example="4", default=0, ge=0
+    )
 
 
 class WearAnalysis(AnalysisSection):
@@ -318,8 +341,10 @@ class WearAnalysis(AnalysisSection):
     report_at: list[Positive] = key(
         "normalised cycles at which the motion of a period is kept", "-", "[10.0, 40.0]", default_factory=list
     )
-    harmonics: Optional[int] = key("highest harmonic, in place of the mode's", example="5", default=None, ge=1)
-    samples: Optional[int] = key("time samples of a period, in place of the mode's", example="256", default=None, ge=4)
+    harmonics: Optional[Whole] = key("highest harmonic, in place of the mode's", example="5", default=None, ge=1)
+    samples: Optional[Whole] = key(
+        "time samples of a period, in place of the mode's", example="256", default=None, ge=4
+    )
 
 
 class TransientSection(AnalysisSection):
@@ -327,8 +352,8 @@ class TransientSection(AnalysisSection):
 
     mode: str = key("mode analysis to start from and compare with", example='"mode"')
     amplitude: list[Positive] = key("start amplitudes", "m", "[0.05, 0.3, 2.5]", min_length=1)
-    periods: int = key("vibration periods to integrate", example="30", ge=1)
-    samples_per_period: int = key("output samples of a period", example="64", default=64, ge=8)
+    periods: Whole = key("vibration periods to integrate", example="30", ge=1)
+    samples_per_period: Whole = key("output samples of a period", example="64", default=64, ge=8)
     tolerance: Positive = key("relative tolerance of the time integration", "-", "1e-10", default=1e-10, lt=1)
 
 
@@ -357,7 +382,7 @@ class SweepAnalysis(AnalysisSection):
     overrides: dict[str, Any] = key(
         "other values of keys for these runs", example="{ mode.amplitude = [1e-6, 1e-2] }", default_factory=dict
     )
-    groups: Optional[int] = key(
+    groups: Optional[Whole] = key(
         "most groups of ranks, each with a value at a time (as many as there are ranks and values unless told)",
         example="2",
         default=None,
@@ -380,11 +405,11 @@ ANALYSES: dict[str, type[AnalysisSection]] = {
 class StudySection(Section):
     """``[study]``: sweeps of ``fretwave study``, each with the others at their finest (of wear: as in the analysis)."""
 
-    harmonics: Optional[list[int]] = key("highest harmonics", example="[1, 3, 7, 21, 41]", default=None, min_length=2)
-    samples: Optional[list[int]] = key(
+    harmonics: Optional[list[Whole]] = key("highest harmonics", example="[1, 3, 7, 21, 41]", default=None, min_length=2)
+    samples: Optional[list[Whole]] = key(
         "time samples of a period", example="[128, 512, 2048]", default=None, min_length=2
     )
-    component_modes: Optional[list[int]] = key(
+    component_modes: Optional[list[Whole]] = key(
         "numbers of component modes, for a reduced model", example="[2, 5, 10, 20]", default=None, min_length=2
     )
     tolerance: Optional[list[Positive]] = key(

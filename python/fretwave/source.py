@@ -13,13 +13,15 @@ from typing import Any
 from .errors import FretwaveError, InputError
 from .locate import Locator
 from .locate import Path as KeyPath
+from .plain import check_plain
 
 if sys.version_info >= (3, 11):
     import tomllib
 else:
     import tomli as tomllib
 
-TomlError = tomllib.TOMLDecodeError
+#: What `tomllib` raises besides its own error: numbers of more than 4300 digits, and arrays nested without end.
+TomlError = (tomllib.TOMLDecodeError, ValueError, RecursionError)
 _PLAIN_TEXT = re.compile(r"[A-Za-z_./-][^\[\]{}\"'\n]*")
 
 
@@ -51,6 +53,7 @@ class Source:
         self.label = display(path)
         self.text = _read(path) if text is None else text
         self.data: dict[str, Any] = _parse(self.text, self.label)
+        check_plain(self.data, self.label)
         self.problems: list[FretwaveError] = []
         self._locator = Locator(self.text)
         self._origin: dict[KeyPath, str] = {}
@@ -110,7 +113,7 @@ class Source:
 
     def apply_set(self, assignment: str) -> None:
         """Apply one ``key=value`` of ``--set``."""
-        origin = f"--set {assignment}"
+        origin = f"--set {shortened(assignment)}"
         address, equals, text = assignment.partition("=")
         if not equals or not address.strip():
             self.problems.append(
@@ -123,12 +126,16 @@ class Source:
             return
         try:
             value = parse_value(text)
-        except tomllib.TOMLDecodeError as error:
+            check_plain([address, value], origin)
+        except InputError as error:
+            self.problems.append(error)
+            return
+        except TomlError as error:
             self.problems.append(
                 InputError(
                     "the value of an override is not TOML",
                     where=origin,
-                    measured=f"{text} ({error})",
+                    measured=f"{shortened(text)} ({error})",
                     expected='a TOML value: 7, 0.5, "text", [1.0, 2.0]',
                     fix="quote it for the shell: --set 'mode.amplitude=[0.02, 3.0]'",
                 )
@@ -165,7 +172,7 @@ class Source:
             kind, rest = parts[0], parts[1:]
         names = [self.entry_name(kind, number) for number in range(len(self.entries(kind)))]
         if rest[0] in names and len(rest) > 1:
-            return (kind, names.index(rest[0]), *(int(p) if p.isdigit() else p for p in rest[1:]))
+            return (kind, names.index(rest[0]), *map(_part, rest[1:]))
         known = [name for name in names if name]
         address = ".".join(parts)
         problem = InputError(
@@ -177,6 +184,11 @@ class Source:
         )
         self.problems.append(problem)
         return None
+
+
+def _part(text: str) -> str | int:
+    """Number of an array's entry, or a key."""
+    return int(text) if re.fullmatch("[0-9]{1,9}", text) else text
 
 
 def _step_into(holder: Any, part: str | int, following: str | int) -> Any:
@@ -200,11 +212,19 @@ def nested_leaves(table: Mapping[str, Any], path: tuple[str, ...] = ()) -> Itera
 def parse_value(text: str) -> Any:
     """A TOML value; plain text is taken as a string, so that ``mode.method=EPMC`` needs no quotes."""
     try:
-        return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
+        parsed = tomllib.loads(f"value = {text}")
+        if len(parsed) > 1:
+            raise ValueError("more than one value")
+        return parsed["value"]
+    except TomlError:
         if _PLAIN_TEXT.fullmatch(text.strip()):
             return text.strip()
         raise
+
+
+def shortened(text: str, longest: int = 200) -> str:
+    """A text as a message can bear it."""
+    return text if len(text) <= longest else text[: longest - 3] + "..."
 
 
 def nearest(word: str, known: Sequence[str], say: Any = "did you mean `{}`?".format) -> str | None:
@@ -217,7 +237,15 @@ def nearest(word: str, known: Sequence[str], say: Any = "did you mean `{}`?".for
 def display(path: Path) -> str:
     """A path as short as it can be said from here."""
     relative = os.path.relpath(path)
-    return relative if not relative.startswith("..") else str(path)
+    return shortened(relative if not relative.startswith("..") else str(path))
+
+
+def is_there(path: Path) -> bool:
+    """Whether a path can be opened; a name that no file can have is not there."""
+    try:
+        return path.exists()
+    except (OSError, ValueError):
+        return False
 
 
 def _read(path: Path) -> str:
@@ -247,7 +275,7 @@ def _similar_file(path: Path) -> str:
 def _parse(text: str, label: str) -> dict[str, Any]:
     try:
         return tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+    except TomlError as error:
         found = re.search(r"line (\d+)", str(error))
         line = int(found.group(1)) if found else text.count("\n") + 1
         lines = text.splitlines()
@@ -255,7 +283,7 @@ def _parse(text: str, label: str) -> dict[str, Any]:
         raise InputError(
             "the case file is not TOML",
             where=f"{label}:{line}",
-            measured=f"{shown}   ({error})",
+            measured=f"{shortened(shown)}   ({shortened(str(error))})",
             expected="key = value, [table] or [[array of tables]]",
             fix="strings need quotes, arrays [ ], and a key may stand once in its table",
         ) from None

@@ -29,7 +29,10 @@ _KINDS = {
 
 def toml(value: Any, longest: int = 60) -> str:
     """A value as TOML writes it, cut when long."""
-    text = str(value) if isinstance(value, float) else json.dumps(value, default=str, ensure_ascii=False)
+    try:
+        text = str(value) if isinstance(value, float) else json.dumps(value, default=str, ensure_ascii=False)
+    except (ValueError, RecursionError):  # integers of more than 4300 digits, arrays nested without end
+        text = "(too long to show)"
     return text if len(text) <= longest else text[: longest - 3] + "..."
 
 
@@ -180,7 +183,11 @@ def _rule(item: Any) -> str:
         return f"{word} {count} {'entry' if count == 1 else 'entries'}"
     for name, sign in (("gt", ">"), ("ge", ">="), ("lt", "<"), ("le", "<=")):
         if name in context:
-            return f"a value {sign} {context[name]:g}"
+            bound = context[name]
+            return f"a value {sign} {bound if isinstance(bound, int) else format(bound, 'g')}"
     if kind == "string_pattern_mismatch":
-        return "a name of letters, digits, '_' and '-', a letter first"
+        named = context["pattern"].startswith("^[A-Za-z]")
+        return "a name of letters, digits, '_' and '-', a letter first" if named else "1 to 100 printable characters"
+    if kind == "string_too_long":
+        return f"at most {context['max_length']} characters"
     return str(item["msg"])

@@ -21,39 +21,59 @@ struct History {
   std::vector<double> t;
   std::vector<std::vector<double>> x, v;  ///< this rank's dofs at each time
   int steps = 0;
-  bool finished = true;
-  std::string reason;
+  bool implicit = false;  ///< by implicit steps, since explicit ones would have been too many
+  bool finished = true;   ///< reached the end
+  std::string reason;     ///< "end", "limit" (of the motion), "steps" (too many), or what stopped the method
 };
 
-/// M x'' + C x' + K x + B^T f = p(t) as a first-order system for PETSc TS (prefix transient_; default:
-/// Runge-Kutta 5(4) of Dormand and Prince with step control). Only for laws that depend on the present state
-/// alone.
+/// M x'' + C x' + K x + B^T f = p(t) as a first-order system for PETSc TS (prefix transient_), with step
+/// control: Runge-Kutta 5(4) of Dormand and Prince; where the contact is so stiff that its steps would never
+/// end, linearly implicit steps (Rosenbrock-W of order 3 with the laws' tangents: no Newton iteration that a
+/// kink could stop). Only for laws that depend on the present state alone; InputError for others.
 class Transient {
  public:
   Transient(model::Model const&, std::vector<Excitation> excitation, double omega, std::string const& prefix);
   Transient(Transient const&) = delete;
   /// From (x0, v0) to t_end, sampled every dt_out by the method's own interpolation; stops early when |x|
-  /// exceeds `limit`. Collective.
-  History run(Vec x0, Vec v0, double t_end, double dt_out, double tolerance, double limit);
+  /// exceeds `limit`, or when more than `most_steps` steps would be needed. Collective.
+  History run(Vec x0, Vec v0, double t_end, double dt_out, double tolerance, double limit, double most_steps);
 
  private:
+  /// A contact's rows of B on this rank, and its law's tangents at the present state.
+  struct Tangents {
+    std::vector<std::vector<std::pair<PetscInt, double>>> rows;
+    contact::Record record;
+  };
   static PetscErrorCode right_side(TS, PetscReal, Vec, Vec, void*);
+  static PetscErrorCode residual(TS, PetscReal, Vec, Vec, Vec, void*);
+  static PetscErrorCode jacobian(TS, PetscReal, Vec, Vec, PetscReal, Mat, Mat, void*);
   static PetscErrorCode after_step(TS);
-  void rate(double t, Vec state, Vec rate);
-  void contact_force(model::Contact const&, Vec force);
+  History integrate(Vec x0, Vec v0, double tolerance, bool implicit);
+  void use_explicit(TS);
+  void use_implicit(TS);
+  void resolve_sticking(double tolerance, double size, Vec allowed);
+  void forces(double t, Vec state);
+  void contact_force(model::Contact const&, Vec force, contact::Record&);
+  void assemble(double shift, Mat A);
+  void assemble_contact(size_t number, Mat A);
   void record(TS);
+  void watch(TS);
   void sample(double t, Vec state);
+  /// Places of a dof's displacement and velocity in the state, which holds [x, v] rank by rank.
+  std::pair<PetscInt, PetscInt> places(PetscInt dof) const;
 
   model::Model const& model_;
   std::vector<Excitation> excitation_;
   double omega_;
   std::string prefix_;
-  MatHandle K_, C_;
+  MatHandle M_, K_, C_, jacobian_;
   KspHandle mass_;
+  std::vector<Tangents> tangents_;
+  bool stiff_ = false, exhausted_ = false;
   VecHandle x_, v_, force_, acceleration_, interpolated_;
   std::exception_ptr exception_;
   History history_;
-  double interval_ = 0, end_ = 0, limit_ = 0;
+  double interval_ = 0, end_ = 0, limit_ = 0, most_steps_ = 0;
 };
 
 }  // namespace fretwave::transient

@@ -141,5 +141,6 @@ def largest_differences(rows: Sequence[Mapping[str, float | int]]) -> tuple[floa
 
 
 def _is_slow(*rows: Mapping[str, float | int]) -> bool:
-    change = max(abs(row[key] / rows[1][key] - 1.0) for key in ("zeta", "zeta_mode") for row in rows)
-    return len({row["start"] for row in rows}) == 1 and rows[1]["sheets"] == 1 and change < SLOW
+    pairs = [(row[key], rows[1][key]) for key in ("zeta", "zeta_mode") for row in rows]
+    slow = all(abs(value - middle) < SLOW * abs(middle) for value, middle in pairs)
+    return len({row["start"] for row in rows}) == 1 and rows[1]["sheets"] == 1 and slow

@@ -69,7 +69,11 @@ def _all_levels(context: AnalysisContext, analysis: ForcedAnalysis, excitation: 
     curves = _curves(context, analysis)
     summary = blade_by_blade(excitation, table, blades, curves) if wheel else _peaks(context, table, curves)
     if analysis.time_points and writer.rows:
-        summary += time_points(context, table, analysis.time_points)
+        lines, given_up = time_points(context, table, analysis.time_points)
+        summary += lines
+        if given_up and not stopped:
+            fix = f"--set {context.name}.time_points=0, or a smoother contact law"
+            return Outcome(writer.rows, given_up, False, summary, "a steady motion in time", fix)
     goal = f"{analysis.frequency[1]:g} Hz at every level"
     advice = "lower levels, or damping that takes their work" if "without bound" in reason else ""
     return Outcome(writer.rows, reason, not stopped, summary, goal, advice)

@@ -21,7 +21,7 @@ SAMPLES = 64
 TOLERANCE = 1e-10
 
 
-def time_points(context: AnalysisContext, table: Mapping[str, Any], count: int) -> list[str]:
+def time_points(context: AnalysisContext, table: Mapping[str, Any], count: int) -> tuple[list[str], str]:
     """Integrate `count` points per level to their steady state and write `<name>_time.csv`. Collective.
 
     The first point of a level starts from rest, the others from their neighbour's steady state. Columns: level,
@@ -33,22 +33,23 @@ def time_points(context: AnalysisContext, table: Mapping[str, Any], count: int) 
 
     Returns
     -------
-    Lines that say how well they agree.
+    Lines that say how well they agree, and why a point was given up (empty where none was).
     """
     columns = ("level", "omega", "amplitude")
     numbers = context.comm.bcast({key: np.asarray(table[key]) for key in columns} if context.comm.rank == 0 else None)
     with integrated_model(context) as model:
         rows = list(_integrated(context, model, numbers, count))
-    context.write_table("time", {key: [row[key] for row in rows] for key in rows[0]})
+    stopped = next((str(row["stopped"]) for row in rows if row["stopped"]), "")
+    context.write_table("time", {key: [row[key] for row in rows] for key in rows[0] if key != "stopped"})
     worst = max((abs(row["relative_difference"]) for row in rows if row["steady"]), default=np.nan)
     unsteady = sum(not row["steady"] for row in rows)
     line = f"{context.name}: {len(rows)} points by time integration, amplitude differs by up to {worst:.1e} (relative)"
-    return [line + (f"; {unsteady} did not become steady" if unsteady else "")]
+    return [line + (f"; {unsteady} did not become steady" if unsteady else "")], stopped
 
 
 def _integrated(
     context: AnalysisContext, model: Any, table: Mapping[str, Array], count: int
-) -> Iterator[dict[str, float]]:
+) -> Iterator[dict[str, Any]]:
     dof = context.case.dof(_section(context).observe)
     for level in np.unique(table["level"]):
         rows = {key: values[table["level"] == level] for key, values in table.items()}
@@ -63,9 +64,10 @@ def _integrated(
                 "frequency_hz": omega / (2.0 * np.pi),
                 "amplitude": found.amplitude,
                 "amplitude_hb": expected,
-                "relative_difference": found.amplitude / expected - 1.0,
+                "relative_difference": found.amplitude / expected - 1.0 if expected else np.nan,
                 "periods": found.periods,
                 "steady": int(found.steady),
+                "stopped": found.stopped,
             }
 
 

@@ -21,34 +21,46 @@ PIECE = 10
 STEADY = 2e-5
 STEADY_PERIODS = 4
 MOST_PERIODS = 1500
+#: more explicit steps than a quarter of these give way to implicit ones; more implicit ones end the integration
+STEPS_PER_PERIOD = 20_000
 
 
 class TimeIntegrator(Protocol):
     """What is used of :class:`fretwave.Transient`."""
 
     def run(
-        self, x0: Array, v0: Array, t_end: float, dt_out: float, rtol: float = ..., limit: float = ...
+        self,
+        x0: Array,
+        v0: Array,
+        t_end: float,
+        dt_out: float,
+        rtol: float = ...,
+        limit: float = ...,
+        most_steps: float = ...,
     ) -> Mapping[str, Any]: ...
 
 
 @dataclass(frozen=True)
 class Motion:
-    """Motion of one dof (n,) each; `diverged` when it was stopped by the limit."""
+    """Motion of one dof (n,) each; `diverged` when it was stopped by the limit, `stopped` says why before its end."""
 
     t: Array
     x: Array
     v: Array
     diverged: bool
+    stopped: str = ""
+    implicit: bool = False
 
 
 @dataclass(frozen=True)
 class SteadyState:
-    """Steady forced motion: fundamental amplitude, periods it took, and the state at its end."""
+    """Steady forced motion: fundamental amplitude, periods it took, the state at its end; why it was not reached."""
 
     amplitude: float
     periods: int
     steady: bool
     end: tuple[Array, Array]
+    stopped: str = ""
 
 
 def start_state(labels: list[str], coefficients: Array, beta: float, omega: float) -> tuple[Array, Array]:
@@ -67,6 +79,7 @@ def free_motion(
     count: int,
     tolerance: float,
     limit: float = np.inf,
+    most_steps: float = np.inf,
 ) -> Motion:
     """Integrate over `count` output steps, or until |x| of any dof exceeds `limit`. Collective.
 
@@ -74,10 +87,20 @@ def free_motion(
     ----------
     state : displacement and velocity (n_dof,) at t = 0
     step : between outputs [s]
+    most_steps : of the integrator itself
     """
-    run = integrator.run(*state, count * step, step, rtol=tolerance, limit=limit)
+    run = integrator.run(*state, count * step, step, rtol=tolerance, limit=limit, most_steps=most_steps)
     t, x, v = (np.asarray(run[key], dtype=float) for key in ("t", "x", "v"))
-    return Motion(t, x[:, dof], v[:, dof], not run["finished"])
+    return Motion(t, x[:, dof], v[:, dof], run["reason"] == "limit", _stopped(run, count * step), run["implicit"])
+
+
+def _stopped(run: Mapping[str, Any], end: float) -> str:
+    """Why an integration ended before its end; empty where it did not."""
+    if run["reason"] in ("end", "limit"):
+        return ""
+    kind = "implicit" if run["implicit"] else "explicit"
+    what = "it would take too many" if run["reason"] == "steps" else "no step is accurate enough, however short, of its"
+    return f"time integration ended at {run['t'][-1]:.3g} of {end:.3g} s: {what} {kind} steps"
 
 
 def steady_motion(
@@ -92,7 +115,12 @@ def steady_motion(
     period = 2.0 * np.pi / omega
     amplitudes: list[float] = []
     while len(amplitudes) < MOST_PERIODS and not _is_steady(amplitudes):
-        piece = integrator.run(*state, PIECE * period, period / samples, rtol=tolerance)
+        most = PIECE * STEPS_PER_PERIOD
+        piece = integrator.run(*state, PIECE * period, period / samples, rtol=tolerance, most_steps=most)
+        stopped = _stopped(piece, PIECE * period)
+        if stopped:
+            amplitude = amplitudes[-1] if amplitudes else np.nan
+            return SteadyState(amplitude, len(amplitudes), False, state, stopped)
         # the integrator may give one sample beyond the end
         state = piece["x"][PIECE * samples], piece["v"][PIECE * samples]
         motion = np.asarray(piece["x"])[: PIECE * samples, dof].reshape(PIECE, samples)

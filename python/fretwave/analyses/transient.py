@@ -15,7 +15,7 @@ from ..schema import ModeAnalysis, TransientSection
 from .context import AnalysisContext, Outcome
 from .cycles import extract
 from .decays import Ending, compare, cycle_rows, decay_rows, divergence_factor, ending, largest_differences, mode_state
-from .integrate import Motion, free_motion, start_state
+from .integrate import STEPS_PER_PERIOD, Motion, free_motion, start_state
 from .mode_curve import Crossing, ModeCurve
 from .shifted import shifted_damping
 from .whole import integrated_model
@@ -77,6 +77,7 @@ class _Starts:
         model = self._model.enter_context(integrated_model(context))
         self.integrator = fretwave.Transient(model, prefix=context.prefix)
         self.writer = context.writer(columns, normalise=self.mode.normalise)
+        self.stopped: list[str] = []
 
     def __enter__(self) -> _Starts:
         return self
@@ -97,7 +98,13 @@ class _Starts:
         step = 2.0 * np.pi / omega / section.samples_per_period
         count = section.periods * section.samples_per_period
         limit = factor * float(np.abs(coefficients).max())
-        return free_motion(self.integrator, state, self.dof, step, count, section.tolerance, limit)
+        most = section.periods * STEPS_PER_PERIOD
+        motion = free_motion(self.integrator, state, self.dof, step, count, section.tolerance, limit, most)
+        if motion.implicit:
+            self.context.console.line(f"{self.context.name}: the contact is stiff: implicit steps")
+        if motion.stopped:
+            self.stopped.append(f"start {number}: {motion.stopped}")
+        return motion
 
     def write(self, number: int, motion: Motion, rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
         """Keep the cycles as rows and the motion (3, n: t, x, v) as a dataset. Collective."""
@@ -110,9 +117,11 @@ class _Starts:
 
     def finish(self, lines: list[str], **attributes: Any) -> Outcome:
         """Close the table."""
-        reason = "all starts integrated"
-        self.writer.close("done", reason, **attributes)
-        return Outcome(self.writer.rows, reason, True, lines)
+        reason = "; ".join(self.stopped) or "all starts integrated"
+        self.writer.close("stopped" if self.stopped else "done", reason, **attributes)
+        goal = f"{self.section.periods} periods of every start"
+        advice = f"--set {self.context.name}.tolerance=1e-6, fewer periods, or a smoother contact law"
+        return Outcome(self.writer.rows, reason, not self.stopped, lines, goal, advice)
 
 
 def _section(context: AnalysisContext) -> TransientSection:
