@@ -43,52 +43,47 @@ def ratio(beta, omega, method):
     return beta / np.hypot(beta, omega) if method == "CNM" else beta / omega
 
 
-def distance(eq, Q, beta, omega, enough=None):
+def distance(eq, Q, beta, omega, enough=None, first=None):
     """Errors of coefficients Q (n_dof, m) with decay beta and frequency omega (EPMC: w0; forced: beta = 0).
 
     Parameters
     ----------
     enough : callable, optional
         Says whether the first step is small enough to need no iteration.
+    first : (R, acting, J), optional
+        The equations at the point, if they are known.
     """
-    fixed = beta if eq.method == "forced" else None
-    R, acting = eq.residual(Q, beta, omega)
-    balance = _balance(eq, R, acting)
+    start = now = (Q, beta, omega)
     size = np.linalg.norm(_dynamic(eq, Q)) or 1.0
-    start, now = (Q, beta, omega), (Q, beta, omega)
-    first, reached, least = None, False, _norm(R, acting)
+    R, acting, J = first or eq.linearise([now])[0]
+    balance, least, errors = _balance(eq, R, acting), _norm(R, acting), None
     for _ in range(ENOUGH):
-        J = eq.jacobian(*now)
-        step = least_step(eq, J, R, now, size, fixed is not None, acting)
-        taken = _take(now, step, 1.0)
-        first = first or _errors(eq, start, taken, size, balance, False)
-        if enough is not None and now is start and enough(first):
-            first.found = True
-            return first
-        now, R, acting, norm = _search(eq, now, step)
+        step = least_step(eq, J, R, now, size)
+        if errors is None:
+            errors = _errors(eq, start, _take(now, step, 1.0), size, balance, False)
+            if enough is not None and enough(errors):
+                errors.found = True
+                return errors
+        now, norm = _search(eq, now, step, _norm(R, acting))
         if norm is None:
-            break
-        reached = norm < 1e-9 or norm < 1e-3 * least or step_size(step, now, size) < 1e-11
-        if reached and step_size(step, now, size) < 1e-9:
-            break
-        least = min(least, norm)
-    if not reached:
-        return first
-    found = _errors(eq, start, now, size, balance, True)
-    found.solution = now
-    return found
+            return errors
+        small = step_size(step, now, size)
+        if small < 1e-9 and (norm < 1e-9 or norm < 1e-3 * least or small < 1e-11):
+            found = _errors(eq, start, now, size, balance, True)
+            found.solution = now
+            return found
+        R, acting, J = eq.linearise([now])[0]
+    return errors
 
 
-def _search(eq, now, step):
+def _search(eq, now, step, before):
     """The largest of a few shares of the step that lowers the residual; None when none does."""
-    before = _norm(*eq.residual(*now))
     for share in (1.0, 0.5, 0.25, 0.1, 0.02):
         trial = _take(now, step, share)
-        R, acting = eq.residual(*trial)
-        norm = _norm(R, acting)
+        norm = _norm(*eq.residual(*trial))
         if np.isfinite(norm) and (norm < before or norm < 1e-12):
-            return trial, R, acting, norm
-    return now, None, None, None
+            return trial, norm
+    return now, None
 
 
 def step_size(step, now, size):
@@ -127,7 +122,7 @@ def _errors(eq, start, end, size, balance, found):
     return Distance(float(domega), float(dzeta), float(motion), balance, found)
 
 
-def least_step(eq, J, R, now, size, forced, acting):
+def least_step(eq, J, R, now, size):
     """Least-norm solution of J d = -R in units of the motion's size and of omega. For a mode the normalised
     coefficient's sine stays zero; its cosine, the amplitude, is free.
 
@@ -136,7 +131,7 @@ def least_step(eq, J, R, now, size, forced, acting):
     (dQ, dbeta, domega)
     """
     Q, _, omega = now
-    n = Q.size
+    n, forced = Q.size, eq.method == "forced"
     columns = np.r_[np.full(n, size), abs(omega), abs(omega)]
     J = J @ sp.diags(columns)
     if forced:

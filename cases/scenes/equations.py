@@ -17,7 +17,7 @@ import scipy.sparse as sp
 from . import laws
 
 STEP = 1e-30  #: of complex differentiation
-DENSE = 700  #: unknowns up to which the distance is found by singular values
+LARGEST = 4e6  #: numbers in one march
 
 
 @dataclass
@@ -152,15 +152,18 @@ class Equations:
                 load += B.T @ f.ravel()
         return load
 
-    # Residual
+    # Residual and Jacobian
 
     def residual(self, Q, beta, omega):
         """R (n_dof, m), and the sum of moduli of all forces that act there, by dof and order (n_dof, orders)."""
-        R, acting = np.zeros_like(Q), np.zeros((len(Q), len(self.orders)))
-        contact_force = np.zeros_like(Q)
+        force = np.zeros_like(Q)
         for contact, B in zip(self.contacts, self.maps):
-            F = self.law(contact, (B @ Q)[..., None].astype(complex), beta, omega)[..., 0].real
-            contact_force += B.T @ F
+            force += B.T @ self.law(contact, (B @ Q)[..., None].astype(complex), beta, omega)[..., 0].real
+        return self.balance(Q, beta, omega, force)
+
+    def balance(self, Q, beta, omega, contact_force):
+        """The same with the contact's force (n_dof, m) given."""
+        R, acting = np.zeros_like(Q), np.zeros((len(Q), len(self.orders)))
         for place, n in enumerate(self.orders):
             q, s = self.complex_of(Q, n), self.exponent(n, beta, omega)
             parts = [self.K @ q, s * (self.damping(beta) @ q), s * s * (self.M @ q), self.complex_of(contact_force, n)]
@@ -175,10 +178,24 @@ class Equations:
             acting[:, place] = sum(abs(part) for part in parts)
         return R, acting
 
-    # Jacobian
+    def linearise(self, states):
+        """(R, acting, J) of each state (Q, beta, omega), J = dR / d(Q, beta, omega) sparse (n_dof m, n_dof m + 2).
 
-    def jacobian(self, Q, beta, omega):
-        """dR / d(Q, beta, omega) as sparse (n_dof m, n_dof m + 2)."""
+        The contact's part comes from complex steps, all unknowns of all pairs of many states in one march.
+        """
+        linear = [self._linear(*state) for state in states]
+        forces = [np.zeros_like(Q) for Q, _, _ in states]
+        for contact, B in zip(self.contacts, self.maps):
+            big = sp.kron(B, sp.identity(self.m), format="csr")
+            for number, (F, D, tail) in enumerate(self._contact(contact, B, states)):
+                forces[number] += B.T @ F
+                linear[number] = linear[number] + sp.hstack(
+                    [big.T @ D @ big, sp.csr_matrix(big.T @ tail)], format="csr"
+                )
+        return [(*self.balance(*state, force), J) for state, force, J in zip(states, forces, linear)]
+
+    def _linear(self, Q, beta, omega):
+        """The part of M, C and K."""
         blocks, tail = [], np.zeros((*Q.shape, 2))
         for n in self.orders:
             s, q, C = self.exponent(n, beta, omega), self.complex_of(Q, n), self.damping(beta)
@@ -197,24 +214,28 @@ class Equations:
         rows = np.concatenate([b.row * m + r for b, r, _ in blocks])
         cols = np.concatenate([b.col * m + c for b, _, c in blocks])
         J = sp.csr_matrix((np.concatenate([b.data for b, _, _ in blocks]), (rows, cols)), shape=(size, size))
-        for contact, B in zip(self.contacts, self.maps):
-            D, by_lambda = self.contact_jacobian(contact, B @ Q, beta, omega)
-            big = sp.kron(B, sp.identity(m), format="csr")
-            J = J + big.T @ D @ big
-            tail += (big.T @ by_lambda).reshape(tail.shape)
         return sp.hstack([J, sp.csr_matrix(tail.reshape(size, 2))], format="csr")
 
-    def contact_jacobian(self, contact, U, beta, omega):
-        """dF/dU, block diagonal by pairs, and dF/d(beta, omega), by complex steps: a lane for each unknown."""
+    def _contact(self, contact, B, states):
+        """F, dF/dU (block diagonal by pairs) and dF/d(beta, omega) of each state: a lane for each unknown of a pair."""
         c, m, pairs = contact.components, self.m, contact.pairs
         lanes = c * m + 2
-        lifted = np.repeat(U[..., None].astype(complex), lanes, axis=2)
+        lifted = np.stack([B @ Q for Q, _, _ in states], axis=-1).astype(complex)
+        lifted = np.repeat(lifted[..., None], lanes, axis=3)
         for component in range(c):
             for k in range(m):
-                lifted[component::c, k, component * m + k] += 1j * STEP
-        beta, omega = (np.full(lanes, x, complex) for x in (beta, omega))
-        beta[-2] += 1j * STEP
-        omega[-1] += 1j * STEP
-        d = (self.law(contact, lifted, beta, omega).imag / STEP).reshape(pairs, c * m, lanes)
-        D = sp.block_diag(list(d[:, :, :-2]), format="csr")
-        return D, d[:, :, -2:].reshape(-1, 2)
+                lifted[component::c, k, :, component * m + k] += 1j * STEP
+        beta, omega = (np.repeat(np.array([state[i] for state in states], complex)[:, None], lanes, 1) for i in (1, 2))
+        beta[:, -2] += 1j * STEP
+        omega[:, -1] += 1j * STEP
+        found = self.law(contact, lifted.reshape(pairs * c, m, -1), beta.ravel(), omega.ravel())
+        found = found.reshape(pairs, c * m, len(states), lanes)
+        for number in range(len(states)):
+            d = found[:, :, number].imag / STEP
+            D = sp.block_diag(list(d[:, :, :-2]), format="csr")
+            yield found[:, :, number, 0].real.reshape(pairs * c, m), D, d[:, :, -2:].reshape(-1, 2)
+
+    def batch(self):
+        """States that fit in one march."""
+        lanes = sum(x.pairs * x.components * (x.components * self.m + 2) for x in self.contacts) * self.samples
+        return int(np.clip(LARGEST / max(lanes, 1), 1, 64))

@@ -21,7 +21,7 @@ OMEGA, ZETA, ZETA_FLOOR, MOTION = (
     1e-9,
     1e-6,
 )  #: bars of a point's errors; zeta's is relative above its floor
-SECONDS = 5.0  #: for judging points of one branch, four at least
+SECONDS = 1.5  #: for judging points of one branch, four at least
 
 
 @dataclass
@@ -127,7 +127,7 @@ def judge(scene: Scene, done: Finished) -> Verdict:
     """Verdict on a finished run."""
     reason = reason_of(done)
     if done.code is None:
-        return Verdict("hung", [f"still running after {scene.timeout:g} s"], done.seconds)
+        return Verdict("hung", [f"not ended after {scene.timeout:g} s of processor time"], done.seconds)
     if done.code == 2:
         return Verdict("right" if scene.answer == "none" else "refused", [reason], done.seconds)
     if done.code not in (0, 3) or "Traceback" in done.text:
@@ -175,18 +175,22 @@ def _points(run: Run, verdict: Verdict) -> list[str]:
     bad = path.values(run)
     if bad:
         return bad
-    begin, worst = time.perf_counter(), None
-    for count, row in enumerate(_order(run)):
-        if count >= 4 and time.perf_counter() - begin > SECONDS:
-            break
+    begin, worst, rows = time.thread_time(), None, _order(run)
+    while rows and (verdict.judged < 4 or time.thread_time() - begin < SECONDS):
+        batch, rows = rows[: run.equations.batch()], rows[run.equations.batch() :]
         with np.errstate(all="ignore"):
-            found = distance(run.equations, *run.state(row), enough=lambda d: not errors(run, row, d))  # noqa: B023
-        verdict.judged += 1
-        for key in ("omega", "zeta", "motion", "balance"):
-            verdict.worst[key] = max(verdict.worst.get(key, 0.0), getattr(found, key))
-        wrong = errors(run, row, found)
-        if wrong and (worst is None or found.motion > worst[1].motion):
-            worst = (row, found, wrong)
+            known = run.equations.linearise([run.state(row) for row in batch])
+        for row, first in zip(batch, known):
+            with np.errstate(all="ignore"):
+                found = distance(run.equations, *run.state(row), lambda d: not errors(run, row, d), first)  # noqa: B023
+            verdict.judged += 1
+            for key in ("omega", "zeta", "motion", "balance"):
+                verdict.worst[key] = max(verdict.worst.get(key, 0.0), getattr(found, key))
+            wrong = errors(run, row, found)
+            if wrong and (worst is None or found.motion > worst[1].motion):
+                worst = (row, found, wrong)
+            if time.thread_time() - begin > 2 * SECONDS and verdict.judged >= 4:
+                break
     if worst is None:
         return []
     row, found, wrong = worst

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from .distance import distance
 STOP = 1e-6  #: relative distance of the last row from the asked end
 SAME = 1e-9  #: relative, of a reported value
 BACK = 0.05  #: of a step: a later point this near to an earlier piece of the branch retraces it
+SECONDS = 1.0  #: for the search for jumps
 TWICE = 3  #: consecutive points that retrace
 
 
@@ -135,8 +137,10 @@ def _jumps(run: Any, most: int = 4) -> list[str]:
         return []
     chords = d / np.maximum(lengths, 1e-300)[:, None]
     turn = np.r_[0, np.arccos(np.clip((chords[1:] * chords[:-1]).sum(axis=1), -1, 1))]
-    weight = lengths * (1 + turn)
+    weight, begin = lengths * (1 + turn), time.thread_time()
     for row in np.argsort(-weight)[:most]:
+        if time.thread_time() - begin > SECONDS:
+            break
         gap = _gap(run, int(row))
         if gap is not None:
             return [f"jumps between rows {row} and {row + 1}, at {run.parameter[row]:.6g}: a gap of {gap:.1e} stays"]

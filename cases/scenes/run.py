@@ -15,6 +15,7 @@ import tempfile
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
@@ -66,6 +67,18 @@ def compare(scene: Scene, folder: Path, tolerance: float = 1e-9) -> list[str]:
     return out
 
 
+def keep(file: Path, results: dict[str, tuple[Scene, Verdict]]) -> None:
+    """Verdicts so far, with all measured figures."""
+    rows = {name: {**vars(v), "axis": s.axis} for name, (s, v) in results.items()}
+    file.write_text(json.dumps(rows, indent=1, default=float))
+
+
+def recall(scene: Scene, known: dict[str, Any]) -> Verdict | None:
+    """The verdict of an earlier, unfinished call."""
+    row = known.get(scene.name)
+    return None if row is None else Verdict(**{k: v for k, v in row.items() if k != "axis"})
+
+
 def table(results: dict[str, tuple[Scene, Verdict]]) -> str:
     """Verdicts by axis, then everything that is not right, in Markdown."""
     axes = list(dict.fromkeys(scene.axis for scene, _ in results.values()))
@@ -90,6 +103,7 @@ def main() -> int:
         "--keep", type=Path, help="folder for cases and results; repeat one by `fretwave run KEEP/NAME/case.toml`"
     )
     parser.add_argument("--json", type=Path, help="verdicts with all measured figures")
+    parser.add_argument("--go-on", action="store_true", help="take over what stands in the file of --json")
     args = parser.parse_args()
     wanted = [word for word in args.only.split(",") if word]
     scenes = [s for s in all_scenes() if not args.quick or s.quick]
@@ -100,16 +114,16 @@ def main() -> int:
     results: dict[str, tuple[Scene, Verdict]] = {}
     with tempfile.TemporaryDirectory() as temporary, ThreadPoolExecutor(args.jobs) as pool:
         folder = args.keep or Path(temporary)
-        for scene, verdict in zip(scenes, pool.map(lambda s: one(s, folder), scenes)):
+        known = json.loads(args.json.read_text()) if args.go_on and args.json.exists() else {}
+        for scene, verdict in zip(scenes, pool.map(lambda s: recall(s, known) or one(s, folder), scenes)):
             results[scene.name] = (scene, verdict)
+            if args.json:
+                keep(args.json, results)
             print(
                 f"{scene.name:40s} {verdict.word:8s} {verdict.seconds:6.1f} s  {'; '.join(verdict.reasons)[:300]}",
                 flush=True,
             )
     print("\n" + table(results))
-    if args.json:
-        rows = {name: {**vars(v), "axis": s.axis} for name, (s, v) in results.items()}
-        args.json.write_text(json.dumps(rows, indent=1, default=float))
     return sum(v.word in ("wrong", "kept", "crashed", "hung") for _, v in results.values())
 
 

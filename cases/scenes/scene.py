@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import resource
 import shutil
+import signal
 import subprocess
 import sys
 import time
@@ -17,6 +19,7 @@ import scipy.sparse as sp
 
 from .equations import Contact
 
+WAIT = 10  #: times its processor time that a run may last
 INLINE = 30  #: dofs up to which the matrices stand in the case file
 BUILDER = '''"""The model beside this file."""
 
@@ -153,13 +156,18 @@ def run(scene: Scene, folder: Path) -> Finished:
     case = write(scene, folder)
     command = [sys.executable, "-m", "fretwave", "run", str(case), "--no-plots", "--out", str(folder / "out")]
     begin = time.perf_counter()
-    try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=scene.timeout)
-        code, text = done.returncode, done.stdout + done.stderr
-    except subprocess.TimeoutExpired as error:
-        code, text = (
-            None,
-            "".join(x.decode() if isinstance(x, bytes) else x or "" for x in (error.stdout, error.stderr)),
-        )
-    (folder / "output.txt").write_text(text)
-    return Finished(code, time.perf_counter() - begin, text, folder / "out")
+    with (folder / "output.txt").open("w") as output:
+        process = subprocess.Popen(command, stdout=output, stderr=subprocess.STDOUT, preexec_fn=limit(scene.timeout))
+        try:
+            code: int | None = process.wait(WAIT * scene.timeout)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+            code = None
+    code = None if code in (-signal.SIGXCPU, -signal.SIGKILL) else code
+    return Finished(code, time.perf_counter() - begin, (folder / "output.txt").read_text(), folder / "out")
+
+
+def limit(seconds: float) -> Callable[[], None]:
+    """Processor time a run may take: a busy machine makes nothing hang."""
+    return lambda: resource.setrlimit(resource.RLIMIT_CPU, (int(seconds), int(seconds) + 5))
