@@ -29,7 +29,7 @@ WORDS = ["right", "wrong", "kept", "gave up", "refused", "crashed", "hung"]
 
 def all_scenes() -> list[Scene]:
     """Every scene, each name once."""
-    scenes = [s for part in (list_friction, list_contact, list_forced) for s in part.scenes()]
+    scenes = [s for part in (list_forced, list_friction, list_contact) for s in part.scenes()]
     names = Counter(scene.name for scene in scenes)
     assert max(names.values()) == 1, [name for name, count in names.items() if count > 1]
     return scenes
