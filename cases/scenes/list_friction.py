@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
@@ -60,6 +61,15 @@ def slider_mass() -> Iterator[Scene]:
         yield two_dof(axis, f"mass_1e-{decade}_jenkins", mode(), jenkins(1e3, 5.0, ON_X1), M=M)
 
 
+def slowest(M: Any, C: Any, K: Any) -> complex:
+    """Eigenvalue lambda of M lambda^2 + C lambda + K with the lowest frequency > 0."""
+    n = len(M)
+    companion = np.block([[np.zeros((n, n)), np.eye(n)], [-np.linalg.solve(M, K), -np.linalg.solve(M, C)]])
+    values = np.linalg.eigvals(companion)
+    values = values[values.imag > 1e-6 * abs(values)]
+    return complex(values[np.argmin(values.imag)]) if len(values) else 0j
+
+
 def viscous() -> Iterator[Scene]:
     axis = "zeta 1e-6 to 1.5 and -0.2"
     w = np.sqrt(640.0)
@@ -68,9 +78,11 @@ def viscous() -> Iterator[Scene]:
             analysis = mode(method, dampers=[{"dof": "x0", "c": 2 * zeta * w}])
             # above zeta = 1 nothing oscillates: no CNM; EPMC's periodic motion is there all the same
             answer = "none" if zeta > 1 and method == "CNM" else "branch"
-            # stuck: m x'' + c x' + 640 x with m = 1 (x1 at rest but for tanh's viscous creep, 0.01 m/s per N)
-            form = damping(0, zeta, 1e-2) if abs(zeta) >= 1e-2 else None
-            closed = [form] if form and answer == "branch" else []
+            # at small amplitude tanh is a damper of 100 N s/m on x1; the first row's third order is 1e-3 of its share
+            C = np.diag([2 * zeta * w, 100.0])
+            eigen = slowest(TWO_DOF_M, C, TWO_DOF_K)
+            known = abs(zeta) >= 1e-2 and answer == "branch" and method == "CNM"
+            closed = [damping(0, -eigen.real / abs(eigen), 1e-3)] if known else []
             name = f"zeta_{number(zeta)}_{method.lower()}"
             yield two_dof(axis, name, analysis, closed=closed, answer=answer, quick=zeta in (0.1, -0.2))
     yield two_dof(axis, "damper_c_25.3", mode(H=21, samples=1024, dampers=[{"dof": "x0", "c": 25.3}]))

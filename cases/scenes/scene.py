@@ -76,7 +76,7 @@ class Scene:
     preload: bool = False
     twin: tuple[Scene, float, float] | None = None
     quick: bool = False
-    timeout: float = 60.0
+    timeout: float = 30.0
     note: str = ""
 
 
