@@ -123,8 +123,9 @@ def reason_of(done: Finished) -> str:
     return " | ".join(lines[-3:])
 
 
+@np.errstate(all="ignore")
 def judge(scene: Scene, done: Finished) -> Verdict:
-    """Verdict on a finished run."""
+    """Verdict on a finished run; tables that hold infinities are read as they are."""
     reason = reason_of(done)
     if done.code is None:
         return Verdict("hung", [f"not ended after {scene.timeout:g} s of processor time"], done.seconds)
@@ -178,11 +179,9 @@ def _points(run: Run, verdict: Verdict) -> list[str]:
     begin, worst, rows = time.thread_time(), None, _order(run)
     while rows and (verdict.judged < 4 or time.thread_time() - begin < SECONDS):
         batch, rows = rows[: run.equations.batch()], rows[run.equations.batch() :]
-        with np.errstate(all="ignore"):
-            known = run.equations.linearise([run.state(row) for row in batch])
+        known = run.equations.linearise([run.state(row) for row in batch])
         for row, first in zip(batch, known):
-            with np.errstate(all="ignore"):
-                found = distance(run.equations, *run.state(row), lambda d: not errors(run, row, d), first)  # noqa: B023
+            found = distance(run.equations, *run.state(row), lambda d: not errors(run, row, d), first)  # noqa: B023
             verdict.judged += 1
             for key in ("omega", "zeta", "motion", "balance"):
                 verdict.worst[key] = max(verdict.worst.get(key, 0.0), getattr(found, key))

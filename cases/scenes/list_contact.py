@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -21,10 +22,14 @@ def scenes() -> Iterator[Scene]:
 
 
 def on_block(
-    axis: str, name: str, analysis: dict, kn: float = 5.0, mu: float = 0.5, N0: float = 1.0, gap: float = 0.0, **more
+    axis: str, name: str, kn: float = 5.0, mu: float = 0.5, N0: float = 1.0, gap: float = 0.0, **more: Any
 ) -> Scene:
+    """The block, normalised on the dof that moves most: stuck at first, slipping and lifting off at the end."""
+    span = (more.pop("low", 1e-2), more.pop("high", 20.0))
+    keys = {"normalise": more.pop("normalise", "x2"), **more.pop("keys", {})}
+    analysis = mode(more.pop("method", "CNM"), 5, 128, span, **keys)
     scene = block(axis, name, analysis, pad(kn, more.pop("kt", 0.8 * kn), mu, N0, gap, BLOCK_B), **more)
-    if kn * gap < N0:
+    if kn * gap < N0 and mu and keys["normalise"] == "x2":
         scene.closed = [limits(stuck_modes(scene)[0], None, 1e-6)]
     return scene
 
@@ -33,12 +38,14 @@ def stiffness() -> Iterator[Scene]:
     axis = "kn and kt 1e2 to 1e14"
     for decade in range(0, 15, 2):
         for method in ("CNM", "EPMC") if decade % 4 == 2 else ("CNM",):
-            analysis = mode(method, 5, 128, (1e-2, 20.0))
-            yield on_block(axis, f"block_kn_1e{decade}_{method.lower()}", analysis, kn=10.0**decade, quick=decade == 2)
+            name = f"block_kn_1e{decade}_{method.lower()}"
+            yield on_block(axis, name, 10.0**decade, method=method, quick=decade == 2)
     for decade in (4, 9, 14):
-        analysis = mode("CNM", 5, 128, (1e-2, 20.0))
-        yield on_block(axis, f"block_kn_1e{decade}_kt_1", analysis, kn=10.0**decade, kt=1.0)
-        yield on_block(axis, f"block_kn_1_kt_1e{decade}", analysis, kn=1.0, kt=10.0**decade)
+        yield on_block(axis, f"block_kn_1e{decade}_kt_1", 10.0**decade, kt=1.0)
+        yield on_block(axis, f"block_kn_1_kt_1e{decade}", 1.0, kt=10.0**decade)
+    for decade in (2, 6, 10):
+        # x0 moves a hundredth of x2: the first point slips
+        yield on_block(axis, f"block_starts_in_slip_kn_1e{decade}", 10.0**decade, normalise="x0")
 
 
 def stop() -> Iterator[Scene]:
@@ -62,25 +69,23 @@ def stop() -> Iterator[Scene]:
             name = f"gap_{number(gap)}_kn_{number(kn)}"
             yield Scene(axis, name, np.eye(1), np.eye(1), [contact], analysis, closed=closed, preload=True)
     for gap in (-0.5, 0.2):
-        yield on_block(
-            axis, f"block_gap_{gap:g}", mode("CNM", 5, 128, (1e-2, 20.0)), N0=0.0 if gap < 0 else 2.0, gap=gap
-        )
-    yield on_block(axis, "block_open_gap", mode("CNM", 5, 128, (1e-2, 20.0)), N0=0.0, gap=0.5)
+        yield on_block(axis, f"block_gap_{gap:g}", N0=0.0 if gap < 0 else 2.0, gap=gap)
+    yield on_block(axis, "block_open_gap", N0=0.0, gap=0.5)
 
 
 def friction() -> Iterator[Scene]:
     axis = "mu 0 to 1e3"
     for mu in (0.0, 1e-6, 1e-3, 0.1, 1.0, 10.0, 100.0, 1e3):
-        yield on_block(axis, f"mu_{number(mu)}", mode("CNM", 5, 128, (1e-2, 20.0)), mu=mu, quick=mu == 0.1)
+        yield on_block(axis, f"mu_{number(mu)}", mu=mu, quick=mu == 0.1)
 
 
 def load() -> Iterator[Scene]:
     axis = "load 0 to 1e6"
     for N0 in (0.0, 1e-9, 1e-3, 1e3, 1e6):
-        low = 1e-2 * min(max(N0, 1e-3), 1.0)
-        yield on_block(axis, f"load_{number(N0)}", mode("CNM", 5, 128, (low, 20.0)), N0=N0)
+        low = 1e-2 * min(max(N0, 1e-3), 1.0)  # a pad without load slips at any amplitude
+        yield on_block(axis, f"load_{number(N0)}", N0=N0, low=low)
     contact = pad(5.0, 4.0, 0.5, 1.0, 0.0, BLOCK_B)
-    analysis = mode("CNM", 5, 128, (1e-2, 20.0), retain="all")
+    analysis = mode("CNM", 5, 128, (1e-2, 20.0), retain="all", normalise="x2")
     yield block(axis, "load_not_balanced", analysis, contact, preload=False)
     yield two_dof(
         axis,
@@ -151,7 +156,7 @@ def units() -> Iterator[Scene]:
     }
     tanh = two_dof(axis, "tanh", mode(report_at=[0.1, 0.2, 1.0]))
     slider = two_dof(axis, "jenkins", mode("EPMC", report_at=[0.1, 0.2, 1.0]), jenkins(1e4, 5.0, [0.0, 1.0]))
-    pads = on_block(axis, "pad", mode("CNM", 5, 128, (1e-2, 20.0), report_at=[0.1, 1.0, 10.0]))
+    pads = on_block(axis, "pad", keys={"report_at": [0.1, 1.0, 10.0]})
     for base in (tanh, slider, pads):
         for name, (mass, length, time) in systems.items():
             twin = scaled(base, f"{base.name}_{name}", mass, length, time)

@@ -159,8 +159,7 @@ def _gap(run: Any, row: int, halvings: int = 14) -> float | None:
     whole = chord(*ends)
     for _ in range(halvings):
         middle = tuple((x + y) / 2 for x, y in zip(*ends))
-        with np.errstate(all="ignore"):
-            found = distance(eq, *middle)
+        found = distance(eq, *middle)
         if not found.found:
             return None
         parts = [chord(ends[0], found.solution), chord(found.solution, ends[1])]
