@@ -1,0 +1,123 @@
+"""Contact laws for the judge, written from their definitions (DESIGN, section 6) and differentiated by complex steps.
+
+Every function takes one period of motion as (samples, components, lanes) arrays and is analytic in it except at
+changes of state, which real parts decide: a motion u + 1e-30 i du gives the force's exact derivative along du in the
+imaginary part. Nothing here is shared with the solver.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+CLOSED = 1e-13  #: of a motion's size: a slider that comes back this near to its start has closed its period
+MOST_PERIODS = 400
+TINY = 1e-300
+
+
+def regularised_coulomb(v, p):
+    """mu N tanh(v / eps); v (samples, 1, lanes)."""
+    ratio = v / p["regularisation_velocity"]
+    # Beyond 20 the tanh is 1 and its derivative 0 to 1e-17; complex exponentials would overflow there.
+    inside = np.clip(ratio.real, -20.0, 20.0) + 1j * np.where(abs(ratio.real) < 20.0, ratio.imag, 0.0)
+    return p["friction_limit"] * np.tanh(inside)
+
+
+def jenkins(u, p, rest):
+    """Elastic Coulomb slider: f = kt (u - w), |f| <= limit; read on the second period from the rest state."""
+    kt, limit = p["tangential_stiffness"], p["friction_limit"]
+    w, f = rest[0] + 0j * u[0, 0], np.empty_like(u)
+    for _ in range(2):
+        for t in range(len(u)):
+            trial = kt * (u[t, 0] - w)
+            slips = (abs(trial.real) > limit) | (limit == 0)
+            f[t, 0] = np.where(slips, np.sign(trial.real) * limit, trial)
+            w = np.where(slips, u[t, 0] - f[t, 0] / kt, w)
+    return f
+
+
+def coulomb_3d(u, p, rest):
+    """3-D Coulomb contact with elastic stiffness, lift-off and circular slip limit, on the period its sliders close.
+
+    Parameters
+    ----------
+    u : (samples, 3, lanes), u[:, 0] > 0 closes
+    p : parameters, (lanes,) each
+    rest : (2, lanes) sliders in the static state; of the periods that close without slip the one nearest to it counts
+    """
+    elastic = p["normal_load"] + p["normal_stiffness"] * (u[:, 0] - p["gap"])
+    normal = np.where(elastic.real > 0, elastic, 0.0)
+    size = abs(u[:, 1:].real).max(axis=(0, 1)) + abs(rest).max(axis=0) + TINY
+    pace = abs(u.imag).max() + TINY
+    w = rest + 0j * u[0, 1:]
+    for period in range(MOST_PERIODS):
+        start, (w, slipped) = w, _march(u, normal, w, p)
+        off = w - start
+        if np.all(abs(off.real).max(axis=0) <= CLOSED * size) and (not period or abs(off.imag).max() <= 1e-10 * pace):
+            break
+    left = ~slipped & np.any(w.real != rest, axis=0)
+    for lane in np.flatnonzero(left):
+        radius = p["friction_coefficient"][lane] / p["tangential_stiffness"][lane] * normal[:, lane]
+        w[:, lane] = nearest_common(u[:, 1:, lane], radius, rest[:, lane])
+    f = np.empty_like(u)
+    _march(u, normal, w, p, f)
+    return f
+
+
+def _march(u, normal, w, p, f=None):
+    """One period of sliders w (2, lanes): their end, and which of them slipped by more than rounding."""
+    kt = p["tangential_stiffness"]
+    reach = p["friction_coefficient"] / kt
+    slipped = np.zeros(u.shape[2], dtype=bool)
+    for t in range(len(u)):
+        radius, d = reach * normal[t], u[t, 1:] - w
+        square = d[0] * d[0] + d[1] * d[1]
+        outside = (square.real > radius.real**2) | (radius.real == 0)
+        length = np.sqrt(np.where(square.real > 0, square, 1.0))
+        kept = np.where(outside, d * (radius / length), d)
+        w = np.where(outside, w + d - kept, w)
+        slipped |= (radius.real == 0) | (length.real > radius.real * (1 + 1e-12)) & outside
+        if f is not None:
+            f[t, 0], f[t, 1:] = normal[t], kt * kept
+    return w, slipped
+
+
+def nearest_common(centres, radii, rest):
+    """The point nearest to `rest` that lies in all discs: on one circle, or where two of them meet.
+
+    Parameters
+    ----------
+    centres : (discs, 2), radii : (discs,), rest : (2,); complex parts of centres and radii are carried along
+    """
+    keep = _tightest(centres.real, radii.real)
+    centres, radii = centres[keep], radii[keep]
+    away = rest - centres
+    one = centres + away * (radii / np.sqrt((away * away).sum(axis=1)))[:, None]
+    candidates = [one]
+    i, j = np.triu_indices(len(radii), 1)
+    apart = centres[j] - centres[i]
+    square = (apart * apart).sum(axis=1)
+    along = (1 + (radii[i] ** 2 - radii[j] ** 2) / square) / 2
+    across = radii[i] ** 2 / square - along**2
+    meet = across.real >= 0
+    i, apart, along, across = i[meet], apart[meet], along[meet, None], np.sqrt(across[meet])[:, None]
+    turned = np.stack([-apart[:, 1], apart[:, 0]], axis=1)
+    candidates += [centres[i] + along * apart + sign * across * turned for sign in (1, -1)]
+    points = np.concatenate(candidates)
+    distance = np.linalg.norm(points.real[:, None] - centres.real[None], axis=2) - radii.real
+    size = abs(centres.real).max() + radii.real.max()
+    points = points[np.all(distance <= 1e-12 * size, axis=1)]
+    return points[np.argmin(np.linalg.norm(points.real - rest, axis=1))]
+
+
+def _tightest(centres, radii, most=40):
+    """Of many discs those nearest to excluding something: the others are redundant for a smooth motion."""
+    if len(radii) <= most:
+        return np.arange(len(radii))
+    middle = centres[np.argmin(radii)]
+    for _ in range(200):  # a point of the intersection, by projection onto the disc it is farthest outside of
+        distance = np.linalg.norm(middle - centres, axis=1) - radii
+        worst = int(np.argmax(distance))
+        if distance[worst] <= 0:
+            break
+        middle = centres[worst] + (middle - centres[worst]) * radii[worst] / (distance[worst] + radii[worst])
+    return np.sort(np.argsort(np.linalg.norm(middle - centres, axis=1) - radii)[-most:])
