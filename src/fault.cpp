@@ -1,6 +1,7 @@
 #include "fault.h"
 
 #include <cstdlib>
+#include <fstream>
 #include <new>
 #include <sstream>
 #include <stdexcept>
@@ -23,6 +24,7 @@ bool armed = false;
 bool meets(char const* place, bool value) {
   if (armed_place != place || (armed_kind == "value") != value || --remaining > 0) return false;
   armed = false;  // once
+  if (char const* path = std::getenv("FRETWAVE_FAULT_SEEN")) std::ofstream(path) << place << std::endl;
   return true;
 }
 

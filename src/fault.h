@@ -16,7 +16,8 @@ bool meets(char const* place, bool value);
 /// exception of that kind) or value (what the place itself calls a failure).
 void arm(std::string const& place, std::string const& kind, int count);
 
-/// Arms this process if the text "place:kind:count:rank" (FRETWAVE_FAULT; null: nothing) names its rank.
+/// Arms this process if the text "place:kind:count:rank" (FRETWAVE_FAULT; null: nothing) names its rank. A
+/// fault that strikes leaves the file FRETWAVE_FAULT_SEEN, whose time says when.
 void arm_from(char const* text, int rank);
 
 /// Throws if this is where and when.
