@@ -15,4 +15,16 @@ struct InputError : std::runtime_error {
   std::string measured, expected, fix;
 };
 
+/// A block that cannot be inverted: what was to be solved with it fails (a step), not the run.
+struct SingularBlock : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+/// What a rank failed at, known to all of them (`together`). Becomes fretwave.FretwaveError in Python.
+struct RankFailure : std::runtime_error {
+  RankFailure(std::string what_, std::string where_, std::string fix_)
+      : std::runtime_error(what_), where(std::move(where_)), fix(std::move(fix_)) {}
+  std::string where, fix;
+};
+
 }  // namespace fretwave

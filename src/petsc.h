@@ -1,6 +1,10 @@
 #pragma once
 #include <petscsnes.h>
 
+#include <algorithm>
+#include <complex>
+#include <limits>
+#include <numeric>
 #include <source_location>
 #include <span>
 #include <stdexcept>
@@ -8,6 +12,8 @@
 #include <type_traits>
 #include <utility>
 #include <vector>
+
+#include "error.h"
 
 namespace fretwave {
 
@@ -142,17 +148,48 @@ void for_entries(Mat A, Visit visit) {
   }
 }
 
+/// A count as MPI, BLAS and MUMPS take it; `InputError` where it is beyond them. What all ranks count alike
+/// is refused by all.
+inline int as_int(PetscInt64 count, char const* what) {
+  if (count < 0 || count > std::numeric_limits<int>::max())
+    throw InputError(std::string(what) + ": too many for the 32-bit counts of MPI and BLAS",
+                     std::to_string(count), "at most " + std::to_string(std::numeric_limits<int>::max()),
+                     "reduce the model, or retain fewer harmonics");
+  return int(count);
+}
+
 /// All ranks' items in rank order, on every rank. Collective.
 template <class T>
 std::vector<T> gathered(std::span<T const> mine, MPI_Comm comm) {
   static_assert(std::is_trivially_copyable_v<T>);
-  const int ranks = comm_size(comm), bytes = int(mine.size_bytes());
-  std::vector<int> counts(ranks), starts(ranks, 0);
-  MPI_Allgather(&bytes, 1, MPI_INT, counts.data(), 1, MPI_INT, comm);
-  for (int r = 1; r < ranks; ++r) starts[r] = starts[r - 1] + counts[r - 1];
-  std::vector<T> all(size_t(starts.back() + counts.back()) / sizeof(T));
-  MPI_Allgatherv(mine.data(), bytes, MPI_BYTE, all.data(), counts.data(), starts.data(), MPI_BYTE, comm);
+  if (comm_size(comm) == 1) return {mine.begin(), mine.end()};
+  std::vector<PetscInt64> sizes(comm_size(comm));
+  const PetscInt64 own = PetscInt64(mine.size());
+  MPI_Allgather(&own, 1, MPIU_INT64, sizes.data(), 1, MPIU_INT64, comm);
+  const int total =
+      as_int(std::accumulate(sizes.begin(), sizes.end(), PetscInt64(0)), "numbers gathered from all ranks");
+  std::vector<int> counts(sizes.begin(), sizes.end()), starts(sizes.size(), 0);
+  std::exclusive_scan(counts.begin(), counts.end(), starts.begin(), 0);
+  std::vector<T> all(static_cast<size_t>(total));
+  MPI_Datatype item;
+  MPI_Type_contiguous(int(sizeof(T)), MPI_BYTE, &item);
+  MPI_Type_commit(&item);
+  MPI_Allgatherv(mine.data(), int(own), item, all.data(), counts.data(), starts.data(), item, comm);
+  MPI_Type_free(&item);
   return all;
+}
+
+/// Sums over the ranks in place, in pieces that MPI's counts hold. Collective.
+inline void sum_over_ranks(std::span<double> x, MPI_Comm comm) {
+  constexpr size_t piece = size_t(1) << 30;
+  if (comm_size(comm) == 1) return;
+  for (size_t first = 0; first < x.size(); first += piece) {
+    const auto part = x.subspan(first, std::min(piece, x.size() - first));
+    MPI_Allreduce(MPI_IN_PLACE, part.data(), int(part.size()), MPI_DOUBLE, MPI_SUM, comm);
+  }
+}
+inline void sum_over_ranks(std::span<std::complex<double>> x, MPI_Comm comm) {
+  sum_over_ranks(std::span(reinterpret_cast<double*>(x.data()), 2 * x.size()), comm);
 }
 
 /// A vector whole on every rank. Collective.

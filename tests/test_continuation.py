@@ -189,11 +189,20 @@ def test_law_that_returns_nan_is_a_failure_at_the_start(comm):
     assert points == [] and branch.reason.startswith("no solution at the start: ")
 
 
-def test_step_too_small_tells_why(two_dof, comm):
-    """A turn that no step can satisfy: the points found stay, the reason names the turn."""
-    branch, points = follow(problem_of(two_dof, comm), max_angle=1e-9, minimum=1e-3)
-    assert not branch.converged and len(points) >= 1
-    assert branch.reason == "step too small: the branch turns too sharply"
+class EndsAbove(TanhLaw):
+    """No force above a displacement: the branch has no further points there."""
+
+    def force(self, u, v):
+        return np.where(np.abs(u).max() > 1.0, np.nan, super().force(u, v))
+
+
+def test_step_too_small_tells_why(comm):
+    """A law without a value beyond 1 m: the points found stay, the reason is Newton's."""
+    problem = mode_problem(single_dof(comm, law=EndsAbove(0.1, 1.0)), [1], 16)
+    branch, points = follow(problem, start=0.1, stop=(0.1, 5.0))
+    assert not branch.converged and len(points) > 3
+    assert branch.reason.startswith("step too small: ")
+    assert 0.9 < points[-1].parameter <= 1.0
 
 
 def test_linear_problem_takes_one_newton_iteration(two_dof, comm):

@@ -7,7 +7,14 @@ import pytest
 
 from fretwave.analyses.cycles import extract, harmonic_amplitude, peaks
 from fretwave.analyses.mode_curve import ModeCurve, fold_interval
-from fretwave.analyses.response_peaks import amplitude_peak, distance, peak_table, points_around_peak, quadrature
+from fretwave.analyses.response_peaks import (
+    amplitude_peak,
+    distance,
+    located_peak,
+    peak_table,
+    points_around_peak,
+    quadrature,
+)
 
 pytestmark = pytest.mark.ranks(1)
 
@@ -116,21 +123,27 @@ def test_zero_of_the_damping_is_found_and_stable_where_damping_grows():
 
 
 def linear_response(zeta=0.02, omega0=25.0, count=401):
-    omega = np.linspace(20.0, 30.0, count)
+    top = omega0 * np.sqrt(1.0 - 2.0 * zeta**2)
+    omega = np.sort(np.append(np.linspace(20.0, 30.0, count - 1), top))  # with its peak, as a branch has it
     q = 1.0 / (omega0**2 - omega**2 + 2j * zeta * omega0 * omega)
-    return {"level": np.ones(count), "omega": omega, "amplitude": np.abs(q), "phase": np.angle(q)}
+    event = np.where(omega == top, "peak", "")
+    return {"level": np.ones(count), "omega": omega, "amplitude": np.abs(q), "phase": np.angle(q), "event": event}
 
 
 def test_linear_resonance_peaks_at_the_resonance_frequency_and_is_in_quadrature_at_omega0():
     response = linear_response()
-    peak = amplitude_peak(response["omega"], response["amplitude"])
+    peak = located_peak(response["omega"], response["amplitude"], response["event"])
+    blade = amplitude_peak(response["omega"][::2], response["amplitude"][::2])
     turn = quadrature(response["omega"], response["amplitude"], response["phase"])
     assert peak.omega == pytest.approx(25.0 * np.sqrt(1.0 - 2.0 * 0.02**2), rel=1e-5)
+    assert blade.omega == pytest.approx(peak.omega, rel=1e-5)
     assert peak.amplitude == pytest.approx(1.0 / (2.0 * 0.02 * np.sqrt(1.0 - 0.02**2) * 625.0), rel=1e-5)
     assert turn.omega == pytest.approx(25.0, rel=1e-5)
 
 
 def test_peak_at_the_end_of_the_range_is_no_peak():
+    nowhere = located_peak(np.arange(5.0), np.arange(5.0), np.array(["", "peak", "", "", ""]))
+    assert np.isnan(nowhere.omega)
     assert np.isnan(amplitude_peak(np.arange(5.0), np.arange(5.0)).omega)
 
 

@@ -51,7 +51,7 @@ def test_columns_are_those_of_the_contract(run: Path) -> None:
     header = (run / "mode.csv").read_text().splitlines()[0]
     assert header == (
         "point,amplitude,omega,omega0,frequency_hz,beta,zeta,stick,slip,open,"
-        "error_estimate,residual,newton,linear,wall_s,event"
+        "error_estimate,residual,newton,linear,wall_s,rounding,accepted,unclosed,event"
     )
     header = (run / "forced.csv").read_text().splitlines()[0]
     assert header.startswith("point,level,omega,frequency_hz,amplitude,phase,")

@@ -13,7 +13,7 @@ nb::dict contact_summary(hb::ContactSummary const& s) {
   out["stick"] = s.stick / samples, out["slip"] = s.slip / samples, out["open"] = s.open / samples;
   out["error_estimate"] = s.total > 0 ? std::sqrt(s.truncated / s.total) : 0.0;
   out["aliasing"] = s.retained > 0 ? std::sqrt(s.aliased / s.retained) : 0.0;
-  out["work"] = s.work;
+  out["work"] = s.work, out["unclosed"] = s.unclosed, out["slip_path"] = s.path;
   return out;
 }
 
@@ -85,7 +85,7 @@ void bind_hb(nb::module_& m) {
   nb::class_<NonlinearMode, HarmonicProblem>(m, "NonlinearMode")
       .def(
           "__init__",
-          [](NonlinearMode* self, model::Model const& model, Harmonics const& h, Method method, int dof,
+          [](NonlinearMode* self, model::Model const& model, Harmonics const& h, Method method, PetscInt dof,
              double omega, Petsc<Vec> shape, Petsc<Vec> imaginary) {
             new (self) NonlinearMode(model, h, method, dof, omega, shape.object, imaginary.object);
           },
@@ -103,10 +103,17 @@ void bind_hb(nb::module_& m) {
           },
           nb::keep_alive<1, 2>())
       .def("initial", [](StaticPreload& p) { return nb::steal(to_petsc4py(p.initial())); });
+  nb::class_<ForcedStart, HarmonicProblem>(m, "ForcedStart")
+      .def(
+          "__init__",
+          [](ForcedStart* self, ForcedResponse& to, Petsc<Vec> y) { new (self) ForcedStart(to, y.object); },
+          nb::keep_alive<1, 2>())
+      .def("initial", [](ForcedStart& p) { return nb::steal(to_petsc4py(p.initial())); })
+      .def("response", [](ForcedStart& p, Petsc<Vec> y) { return nb::steal(to_petsc4py(p.response(y.object))); });
   nb::class_<ForcedResponse, HarmonicProblem>(m, "ForcedResponse")
       .def(
           "__init__",
-          [](ForcedResponse* self, model::Model const& model, Harmonics const& h, int dof, Petsc<Vec> P,
+          [](ForcedResponse* self, model::Model const& model, Harmonics const& h, PetscInt dof, Petsc<Vec> P,
              double level, double omega, Petsc<Vec> shape) {
             new (self) ForcedResponse(model, h, dof, P.object, level, omega, shape.object);
           },

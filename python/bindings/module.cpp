@@ -1,7 +1,10 @@
 #include <slepcsys.h>
 
+#include <cstdlib>
+
 #include "casters.h"
 #include "error.h"
+#include "fault.h"
 
 namespace fretwave::python {
 
@@ -20,6 +23,12 @@ void translate(std::exception_ptr const& pointer, void*) {
   } catch (InputError const& e) {
     nb::object type = nb::module_::import_("fretwave.errors").attr("InputError");
     raise("InputError", type(e.what(), nb::none(), text(e.measured), text(e.expected), text(e.fix)));
+  } catch (RankFailure const& e) {
+    nb::object type = nb::module_::import_("fretwave.errors").attr("FretwaveError");
+    raise("FretwaveError", type(e.what(), text(e.where), nb::none(), nb::none(), text(e.fix)));
+  } catch (SingularBlock const& e) {
+    nb::object type = nb::module_::import_("fretwave.errors").attr("FretwaveError");
+    raise("FretwaveError", type(e.what()));
   } catch (PetscFailure const& e) {
     nb::object type = nb::module_::import_("fretwave.errors").attr("FretwaveError");
     raise("FretwaveError", type(e.what()));
@@ -41,8 +50,14 @@ std::vector<std::string> unused_options() {
 NB_MODULE(_core, m) {
   import_petsc4py_module();  // initialises PETSc
   check(SlepcInitializeNoArguments());
+  fault::arm_from(std::getenv("FRETWAVE_FAULT"), comm_rank(PETSC_COMM_WORLD));
   nb::register_exception_translator(translate);
   m.doc() = "C++ core of fretwave; use the package's own classes";
+  m.def("arm_fault", fault::arm,
+        "Lets this process fail at the count-th pass of a named place (src/fault.h).");
+  m.def(
+      "fault_point", [](std::string const& place) { fault::point(place.c_str()); },
+      "A place in Python at which a fault may be armed.");
   m.def("unused_options", unused_options, "PETSc options that were set and that nothing has read.");
   bind_contact(m);
   bind_model(m);

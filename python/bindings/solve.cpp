@@ -11,6 +11,7 @@ nb::object to_python(std::optional<solve::Point> const& p) {
   out["index"] = p->index, out["y"] = Petsc<Vec>{p->y}, out["tangent"] = Petsc<Vec>{p->tangent};
   out["parameter"] = p->parameter, out["step"] = p->step, out["event"] = p->event, out["wall_s"] = p->wall;
   out["newton"] = p->outcome.newton, out["linear"] = p->outcome.linear, out["residual"] = p->outcome.residual;
+  out["rounding"] = p->outcome.rounding, out["accepted"] = int(p->outcome.accepted);
   return out;
 }
 
@@ -32,8 +33,8 @@ void bind_solve(nb::module_& m) {
       .def_rw("initial", &StepControl::initial)
       .def_rw("minimum", &StepControl::minimum)
       .def_rw("maximum", &StepControl::maximum)
-      .def_rw("target_newton", &StepControl::target_newton)
       .def_rw("max_angle", &StepControl::max_angle)
+      .def_rw("max_error", &StepControl::max_error)
       .def_rw("max_points", &StepControl::max_points);
   nb::class_<Bordered>(m, "Bordered")
       .def("close", [](Bordered& b, Petsc<Vec> row, double value) { b.close(row.object, value); })
@@ -63,16 +64,32 @@ void bind_solve(nb::module_& m) {
            nb::keep_alive<1, 2>())
       .def("start",
            [](Continuation& c, Petsc<Vec> y, bool upwards) { return to_python(c.start(y.object, upwards)); })
-      .def("restore", [](Continuation& c, Petsc<Vec> y, Petsc<Vec> t, double step, int index,
-                         int emitted) { c.restore(y.object, t.object, step, index, emitted); })
+      .def("restore",
+           [](Continuation& c, std::vector<Petsc<Vec>> const& at, std::vector<Petsc<Vec>> const& before,
+              double step, int index, int emitted, bool upwards, double began) {
+             const auto anchor = [&](std::vector<Petsc<Vec>> const& pair) {
+               Continuation::Anchor a;
+               if (pair.empty()) return a;
+               a.y = copy(pair[0].object), a.tangent = copy(pair[1].object);
+               a.step = step, a.index = index;
+               return a;
+             };
+             return to_python(c.restore(anchor(at), anchor(before), emitted, upwards, began));
+           })
       .def("next", [](Continuation& c) { return to_python(c.next()); })
       .def_prop_ro("reason", &Continuation::reason)
       .def_prop_ro("converged", &Continuation::converged)
       .def_prop_ro("route", [](Continuation& c) { return c.newton().route(); })
       .def_prop_ro("snes", [](Continuation& c) { return nb::steal(to_petsc4py(c.newton().snes())); })
+      .def_prop_ro("missed", &Continuation::missed)
       .def("anchor", [](Continuation& c) {
-        auto const& a = c.anchor();
-        return nb::make_tuple(Petsc<Vec>{a.y}, Petsc<Vec>{a.tangent}, a.step, a.index, c.emitted());
+        auto const &a = c.anchor(), &b = c.before();
+        nb::dict out;
+        out["y"] = Petsc<Vec>{a.y}, out["tangent"] = Petsc<Vec>{a.tangent};
+        if (b.y) out["before_y"] = Petsc<Vec>{b.y}, out["before_tangent"] = Petsc<Vec>{b.tangent};
+        out["step"] = a.step, out["index"] = a.index, out["emitted"] = c.emitted();
+        out["upwards"] = c.upwards(), out["began"] = c.began();
+        return out;
       });
 }
 

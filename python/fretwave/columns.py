@@ -84,11 +84,27 @@ _ALL = (
     Column("newton", "1", "Newton iterations", "i"),
     Column("linear", "1", "linear iterations", "i"),
     Column("wall_s", "s", "wall time of the point"),
+    Column("rounding", "1", "what rounding leaves in the scaled residual, expected"),
+    Column("accepted", "1", "1: residual below the tolerance; 0: at rounding, without effect on the result", "i"),
+    Column("unclosed", "m", "largest distance of a slider from where it began its period"),
     Column("event", "", "what was met at the point", "s"),
 )
 COLUMNS = {column.name: column for column in _ALL}
 
-_SHARED = ("stick", "slip", "open", "error_estimate", "residual", "newton", "linear", "wall_s", "event")
+_SHARED = (
+    "stick",
+    "slip",
+    "open",
+    "error_estimate",
+    "residual",
+    "newton",
+    "linear",
+    "wall_s",
+    "rounding",
+    "accepted",
+    "unclosed",
+    "event",
+)
 MODE = ("point", "amplitude", "omega", "omega0", "frequency_hz", "beta", "zeta", *_SHARED)
 FLUTTER = ("point", "nodal_diameter", *MODE[1:])
 FORCED = ("point", "level", "omega", "frequency_hz", "amplitude", "phase", *_SHARED)

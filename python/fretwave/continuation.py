@@ -20,21 +20,25 @@ Array = npt.NDArray[np.float64]
 ALIASING_LIMIT = 1e-3
 
 
+#: Of a snapshot: the last anchor and the one before it.
+_VECTORS = ("y", "tangent", "before_y", "before_tangent")
+
+
 @dataclass(frozen=True)
 class StepControl:
     """Arclength steps; 0.1 is about a tenth of the motion's own size, or of log amplitude.
 
     Attributes
     ----------
-    target_newton : steps grow below this many iterations and shrink above
     max_angle : largest turn [rad] of the branch in one step; longer steps are halved
+    max_error : largest distance between the branch and the cubic through its points and tangents; likewise
     """
 
     initial: float = 0.05
     minimum: float = 1e-9
     maximum: float = 0.3
-    target_newton: int = 4
     max_angle: float = 0.6
+    max_error: float = 5e-4
     max_points: int = 5000
 
     def core(self) -> Any:
@@ -55,6 +59,8 @@ class Point:
     event : "", start, stop, report, fold, zero_damping or peak_damping
     step : arclength from the last regular point
     wall_s : seconds since the point before
+    rounding : error of the residual that rounding leaves, expected
+    accepted : 1 where the residual is below the tolerance, 0 where rounding let it fall no further
     """
 
     index: int
@@ -67,6 +73,8 @@ class Point:
     linear: int
     residual: float
     wall_s: float
+    rounding: float = 0.0
+    accepted: int = 1
 
 
 class Continuation:
@@ -80,6 +88,7 @@ class Continuation:
         The last point lies on the value the branch reaches.
     report_at : parameter values at which points are located
     upwards : the parameter grows at first
+    helped : a start that Newton does not find is looked for on other ways (`started` tells)
     """
 
     def __init__(
@@ -90,6 +99,7 @@ class Continuation:
         steps: StepControl | None = None,
         report_at: Sequence[float] = (),
         upwards: bool | None = None,
+        helped: bool = True,
     ) -> None:
         low, high = stop
         if not low < high:
@@ -104,23 +114,41 @@ class Continuation:
             start = self._parameter(y0)
             upwards = bool(start < 0.5 * (low + high))
         self._upwards, self._restored, self._advice = upwards, False, ""
+        self.repeated: Point | None = None
+        self.helped, self.started, self._first_reason = helped, "", ""
 
     def _parameter(self, y: PETSc.Vec) -> float:
-        return float(self.problem.core.parameter_value(self.last_entry(y)))
+        return float(self.problem.core.parameter_value(self.problem.last_entry(y)))
 
     def last_entry(self, y: PETSc.Vec) -> float:
         """The parameter's entry of unknowns or a tangent, on every rank. Collective."""
-        comm = self.problem.model.comm
-        local = y.getArray(readonly=True)
-        return float(comm.bcast(local[-1] if len(local) else 0.0, root=comm.size - 1))
+        return self.problem.last_entry(y)
+
+    def _first(self) -> dict[str, Any] | None:
+        """The first point, by another way if Newton does not find it from the first guess."""
+        point = self._core.start(self._y0, self._upwards)
+        if point is not None or not self.helped:
+            return dict(point) if point is not None else None
+        from .starting import starts
+
+        reason = str(self._core.reason)
+        reasons: list[str] = []
+        for how, y in starts(self.problem, self._y0, reasons):
+            point = self._core.start(y, self._upwards)
+            if point is not None:
+                self.started = how
+                return dict(point)
+        self._advice = "".join(f"; {other}" for other in reasons)
+        self._first_reason = reason
+        return None
 
     def __iter__(self) -> Iterator[Point]:
-        point = self._core.next() if self._restored else self._core.start(self._y0, self._upwards)
+        point = self._core.next() if self._restored else self._first()
         while point is not None:
             last = point["y"]
             yield Point(**point)
             point = self._core.next()
-            if point is None and not self.converged:
+            if point is None and not self.converged and "without bound" not in self._core.reason:
                 self._advise(last)
 
     def _advise(self, y: PETSc.Vec) -> None:
@@ -140,7 +168,7 @@ class Continuation:
     @property
     def reason(self) -> str:
         """Why the branch ended."""
-        return str(self._core.reason) + self._advice
+        return (self._first_reason or str(self._core.reason)) + self._advice
 
     @property
     def route(self) -> str:
@@ -152,14 +180,25 @@ class Continuation:
         """The corrector, to look into or to set options on."""
         return self._core.snes
 
+    @property
+    def anchor(self) -> PETSc.Vec:
+        """Unknowns of the regular point that the branch last started a step from."""
+        return self._core.anchor()["y"]
+
+    @property
+    def missed(self) -> list[str]:
+        """Reports and events that were asked for or seen and could not be had, each with its reason."""
+        return list(self._core.missed)
+
     def snapshot(self) -> dict[str, Any] | None:
-        """All that `restore` needs to go on bit for bit; on rank 0. Collective."""
-        y, tangent, step, index, emitted = self._core.anchor()
-        parts = [self.problem.model.comm.gather(v.getArray(readonly=True).copy()) for v in (y, tangent)]
-        if self.problem.model.comm.rank:
+        """All that `restore` needs to go on; on rank 0. Collective."""
+        state = dict(self._core.anchor())
+        comm = self.problem.model.comm
+        vectors = [name for name in _VECTORS if name in state]
+        parts = {name: comm.gather(state[name].getArray(readonly=True).copy()) for name in vectors}
+        if comm.rank:
             return None
-        whole = [np.concatenate(p) for p in parts if p is not None]
-        return {"y": whole[0], "tangent": whole[1], "step": step, "index": index, "emitted": emitted}
+        return {**state, **{name: np.concatenate(p) for name, p in parts.items() if p is not None}}
 
     @classmethod
     def restore(
@@ -170,12 +209,21 @@ class Continuation:
         steps: StepControl | None = None,
         report_at: Sequence[float] = (),
     ) -> Continuation:
-        """Goes on after the snapshot's point, on any number of ranks; rank 0 alone needs the snapshot. Collective."""
+        """Goes on after the snapshot's point, on any number of ranks; rank 0 alone needs the snapshot. Collective.
+
+        On the same ranks and the direct route the branch is the same bit for bit; elsewhere (another number of ranks,
+        or a preconditioner of another age) to the tolerance of the corrector. `repeated` is the last point handed out
+        before, solved again, to measure that by.
+        """
         snapshot = problem.model.comm.bcast(snapshot)
         assert snapshot is not None
-        y, tangent = (cls._scatter(problem, np.asarray(snapshot[name])) for name in ("y", "tangent"))
-        branch = cls(problem, y, stop, steps, report_at, upwards=True)
-        branch._core.restore(y, tangent, float(snapshot["step"]), int(snapshot["index"]), int(snapshot["emitted"]))
+        vectors = {name: cls._scatter(problem, np.asarray(snapshot[name])) for name in _VECTORS if name in snapshot}
+        upwards, began = bool(snapshot.get("upwards", True)), float(snapshot.get("began", np.nan))
+        branch = cls(problem, vectors["y"], stop, steps, report_at, upwards)
+        before = [vectors[name] for name in _VECTORS[2:] if name in vectors]
+        step, index, emitted = float(snapshot["step"]), int(snapshot["index"]), int(snapshot["emitted"])
+        point = branch._core.restore([vectors["y"], vectors["tangent"]], before, step, index, emitted, upwards, began)
+        branch.repeated = None if point is None else Point(**point)
         branch._restored = True
         return branch
 

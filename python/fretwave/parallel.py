@@ -22,6 +22,8 @@ Result = TypeVar("Result")
 AGREEMENT_WAIT = 1.0
 #: Head start of the lower rank, so that one message is printed when several but not all fail [s].
 RANK_DELAY = 0.25
+#: Environment variable that adds the traceback to the message of an unexpected error.
+TRACEBACK = "FRETWAVE_TRACEBACK"
 
 
 def world() -> Any:
@@ -67,8 +69,8 @@ def _wait(requests: list[Any], seconds: float) -> bool:
     return not waiting
 
 
-def describe(error: BaseException, rank: int | None = None) -> str:
-    """The message for an exception; an unexpected one brings its traceback."""
+def describe(error: BaseException, rank: int | None = None, traced: bool = False) -> str:
+    """The message for an exception; an unexpected one brings its traceback if `traced`, else the place it came from."""
     if isinstance(error, FretwaveError):
         text = error.render()
         return text if rank is None else f"{text}\n  {'rank:':<10}{rank}"
@@ -79,28 +81,31 @@ def describe(error: BaseException, rank: int | None = None) -> str:
     if isinstance(error, KeyboardInterrupt):
         return "interrupted: finished points are kept; `fretwave resume RUNDIR` goes on from there"
     place = "" if rank is None else f" on rank {rank}"
-    trace = "".join(traceback.format_exception(type(error), error, error.__traceback__))
-    return (
-        f"{trace}error: {type(error).__name__}{place}: {error}\n"
-        "  fix:      this is a defect of fretwave or of a law given to it; report it with the lines above"
-    )
+    text = f"error: {type(error).__name__}{place}: {error}\n"
+    if traced or os.environ.get(TRACEBACK):
+        text = "".join(traceback.format_exception(type(error), error, error.__traceback__)) + text
+        return f"{text}  fix:      this is a defect of the script, or of fretwave; report it with the lines above"
+    frames = traceback.extract_tb(error.__traceback__)
+    if frames:
+        text += f"  where:    {os.path.basename(frames[-1].filename)}:{frames[-1].lineno}, {frames[-1].name}\n"
+    return f"{text}  fix:      this is a defect of fretwave; report it with what {TRACEBACK}=1 adds to this message"
 
 
-def end_all_ranks(error: BaseException) -> int:
+def end_all_ranks(error: BaseException, traced: bool = False) -> int:
     """Print one message, end the other ranks if they have not failed too, return the exit code."""
     comm = world()
     code = exit_code_of(error)
     if comm is None or comm.size == 1:
         # Before MPI runs only the command line can be wrong, and it is the same on all ranks.
         if launched_rank() == 0 or comm is not None or not isinstance(error, FretwaveError):
-            _print(describe(error))
+            _print(describe(error, None, traced))
         return code
     if all_ranks_failed(comm):
         if comm.rank == 0:
-            _print(describe(error))
+            _print(describe(error, None, traced))
         return code
     time.sleep(RANK_DELAY * comm.rank)
-    _print(describe(error, comm.rank))
+    _print(describe(error, comm.rank, traced))
     comm.Abort(code)
     return code
 
@@ -141,12 +146,24 @@ def guarded(main: Callable[[], int]) -> int:
 
 
 def _excepthook(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
-    end_all_ranks(error.with_traceback(trace))
+    end_all_ranks(error.with_traceback(trace), traced=True)
 
 
 def install() -> None:
     """Make uncaught exceptions of scripts end all ranks with one message."""
     sys.excepthook = _excepthook
+
+
+def caught_by_all(comm: Any, error: FretwaveError) -> None:
+    """Return where every rank has caught this error and goes on; end all of them where some only have. Collective.
+
+    For those who catch a `FretwaveError` and go on with collective calls: the others may wait in one of before.
+    """
+    if comm.size == 1 or all_ranks_failed(comm):
+        return
+    time.sleep(RANK_DELAY * comm.rank)
+    _print(describe(error, comm.rank))
+    comm.Abort(exit_code_of(error))
 
 
 def on_first_rank(comm: Any, work: Callable[[], Result]) -> Result:

@@ -86,6 +86,11 @@ class HarmonicProblem:
         self.core.product(y, dy, r)
         return r
 
+    def last_entry(self, y: PETSc.Vec) -> float:
+        """The parameter's entry of unknowns or a tangent, on every rank. Collective."""
+        local = y.getArray(readonly=True)
+        return float(self.model.comm.bcast(local[-1] if len(local) else 0.0, root=self.model.comm.size - 1))
+
     def coefficients(self, y: PETSc.Vec) -> Array | None:
         """Harmonic coefficients Q (n_dof, m) in physical units, columns `harmonics.labels`, on rank 0. Collective."""
         parts = self.model.comm.gather(self.core.coefficients(y).getArray(readonly=True).copy())

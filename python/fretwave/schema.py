@@ -141,8 +141,10 @@ class StepSection(Section):
     initial: Positive = key("length of the first arclength step", "-", "0.05", default=0.05)
     minimum: Positive = key("shortest step before the branch is given up", "-", "1e-9", default=1e-9)
     maximum: Positive = key("longest step", "-", "0.3", default=0.3)
-    target_newton: int = key("Newton iterations the step aims at", example="4", default=4, ge=1)
     max_angle: Positive = key("largest turn of the branch in one step", "rad", "0.6", default=0.6, le=3.2)
+    max_error: Positive = key(
+        "largest distance of the branch from the curve through its points", "-", "5e-4", default=5e-4
+    )
     max_points: int = key("largest number of points of the branch", example="5000", default=5000, ge=2)
 
 

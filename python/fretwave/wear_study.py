@@ -18,7 +18,7 @@ from .analyses.wear_line import wear_areas
 from .casefile import Case
 from .console import Console
 from .errors import EXIT_DONE, FretwaveError, NotConverged
-from .parallel import on_first_rank
+from .parallel import caught_by_all, on_first_rank
 from .petsc_options import AnalysisOptions
 from .reduced import reduce_case
 from .run import build_model
@@ -180,6 +180,7 @@ class _Solver:
                     self._unit = self._unit or float(self._starts[settings.harmonics]["cycle_unit"])
                 tried = [self._march(context, settings) for _ in range(self.repeats)]
             except FretwaveError as error:
+                caught_by_all(self.comm, error)
                 return str(error)
         runs = [run for run in tried if isinstance(run, WearOutcome)]
         return replace(runs[0], wall_s=min(run.wall_s for run in runs)) if runs else str(tried[0])

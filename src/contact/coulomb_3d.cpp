@@ -33,7 +33,7 @@ PairConstants Coulomb3d<Coupled>::constants(int first) const {
 
 /// One step of the march from a slider at zero.
 template <bool Coupled>
-void Coulomb3d<Coupled>::rest(double const* u) {
+void Coulomb3d<Coupled>::set_rest(double const* u) {
   const int n = pairs();
   std::fill(slider_.begin(), slider_.end(), 0.0);
   std::vector<double> f(3 * size_t(n)), record(record_arrays * size_t(n));
@@ -42,7 +42,7 @@ void Coulomb3d<Coupled>::rest(double const* u) {
 }
 
 template <bool Coupled>
-void Coulomb3d<Coupled>::wear(double const* depth) {
+void Coulomb3d<Coupled>::set_wear(double const* depth) {
   for (int i = 0; i < pairs(); ++i) p_.gap[i] = unworn_[i] + depth[i];
 }
 
@@ -56,9 +56,11 @@ void Coulomb3d<Coupled>::force(Motion const& motion, double* f, Record& record) 
   record.march.resize(size_t(record_arrays) * samples * n);
   record.start.assign(n, {}), record.unclosed = 0;
   march<Coupled>(p, samples, n, motion.u, w.data(), f, record.march.data());
-  if (w == rest) return;
+  std::vector<double> left(n);
+  left_rest<Coupled>(samples, n, record.march.data(), left.data());
+  if (std::ranges::count(left, 0.0) == n) return;
   if constexpr (Coupled)
-    close(motion, rest, f, w, record);
+    close(motion, rest, left, f, w, record);
   else
     last_slip(motion, record);
   const std::vector<double> closed = w;
@@ -83,18 +85,19 @@ void Coulomb3d<Coupled>::last_slip(Motion const& motion, Record& record) const {
       }
 }
 
-/// Periodic sliders of the pairs whose slider w left its rest; one that opens forgets all before, and is
-/// closed.
+/// Periodic sliders of the pairs that slipped or opened (`left`), wherever their slider w ended: it follows
+/// the motion even where it has come back to its rest. One that opens forgets all before, and is closed.
 template <bool Coupled>
-void Coulomb3d<Coupled>::close(Motion const& motion, std::vector<double> const& rest, double const* f,
-                               std::vector<double>& w, Record& record) const {
+void Coulomb3d<Coupled>::close(Motion const& motion, std::vector<double> const& rest,
+                               std::vector<double> const& left, double const* f, std::vector<double>& w,
+                               Record& record) const {
   const int n = motion.pairs;
   std::vector<double> least(n, std::numeric_limits<double>::infinity());
   for (int t = 0; t < motion.samples; ++t)
     for (int i = 0; i < n; ++i) least[i] = std::min(least[i], f[size_t(t) * 3 * n + i]);
   std::vector<int> chosen;
   for (int i = 0; i < n; ++i) {
-    if (w[i] == rest[i] && w[n + i] == rest[n + i]) continue;
+    if (left[i] == 0) continue;
     if (least[i] * reach_[motion.first + i] > 0)
       chosen.push_back(i);
     else

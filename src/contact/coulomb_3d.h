@@ -22,9 +22,7 @@ class Coulomb3d : public Law {
   int pairs() const override { return int(p_.gap.size()); }
   bool uses_velocity() const override { return false; }
   bool hereditary() const override { return true; }
-  void rest(double const* u) override;
   bool wears() const override { return true; }
-  void wear(double const* depth) override;
   double stuck_stiffness(int component, int pair) const override;
   void force(Motion const&, double* f, Record&) const override;
   void product(Motion const&, Record const&, double const* du, double const* dv, double* df) const override;
@@ -32,11 +30,15 @@ class Coulomb3d : public Law {
                     double* df) const override;
   void diagnose(Motion const&, double const* f, Diagnosis&) const override;
 
+ protected:
+  void set_rest(double const* u) override;
+  void set_wear(double const* depth) override;
+
  private:
   PairConstants constants(int first) const;
   void last_slip(Motion const&, Record&) const;
-  void close(Motion const&, std::vector<double> const& rest, double const* f, std::vector<double>& w,
-             Record&) const;
+  void close(Motion const&, std::vector<double> const& rest, std::vector<double> const& left, double const* f,
+             std::vector<double>& w, Record&) const;
   void linearised(Motion const&, Record const&, int pair, int n, double const* du, double* df) const;
 
   Coulomb3dParameters p_;

@@ -88,8 +88,27 @@ FRETWAVE_INLINE void linear_choice(PairConstants const& p, int samples, int pair
     linear_loop<Coupled, false, false>(p, samples, pairs, pair, n, record, du, dw, df);
 }
 
+/// A sample that sticks is (1, 0, 0) in the coupled record, (1, 2, 2) in the other.
+template <bool Coupled>
+FRETWAVE_INLINE void left_loop(int samples, int n, double const* record, double* left) {
+  constexpr double stuck = Coupled ? 0 : 2;
+  for (int i = 0; i < n; ++i) left[i] = 0;
+  for (int t = 0; t < samples; ++t, record += record_arrays * n)
+#pragma omp simd
+    for (int i = 0; i < n; ++i) {
+      const bool sticks = record[i] == 1 && record[n + i] == stuck && record[2 * n + i] == stuck;
+      left[i] = sticks ? left[i] : 1.0;
+    }
+}
+
 }  // namespace
 
+FRETWAVE_VECTORISE void left_coupled(int samples, int n, double const* record, double* left) {
+  left_loop<true>(samples, n, record, left);
+}
+FRETWAVE_VECTORISE void left_alone(int samples, int n, double const* record, double* left) {
+  left_loop<false>(samples, n, record, left);
+}
 FRETWAVE_VECTORISE void march_coupled(PairConstants const& p, int samples, int n, double const* u, double* w,
                                       double* f, double* record) {
   march_loop<true>(p, samples, n, u, w, f, record);

@@ -44,11 +44,17 @@ using LinearMarch = void(PairConstants const&, int samples, int pairs, int pair,
                          double const* du, double* dw, double* df);
 LinearMarch linear_coupled, linear_alone;
 
+/// 1 where a pair slipped or opened at any sample of a record, 0 where it stuck all along.
+using LeftRest = void(int samples, int n, double const* record, double* left);
+LeftRest left_coupled, left_alone;
+
 // Plain functions, because the compiler clones no templates for several processors.
 template <bool Coupled>
 constexpr March* march = Coupled ? march_coupled : march_alone;
 template <bool Coupled>
 constexpr LinearMarch* linear_march = Coupled ? linear_coupled : linear_alone;
+template <bool Coupled>
+constexpr LeftRest* left_rest = Coupled ? left_coupled : left_alone;
 
 /// Sliders over one period of discs (samples x (x, y, R) x n) and the derivative A (2 x 2 x n) of their end
 /// by their start.

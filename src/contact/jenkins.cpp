@@ -10,7 +10,7 @@ namespace fretwave::contact {
 Jenkins::Jenkins(std::vector<double> stiffness, std::vector<double> friction_limit)
     : stiffness_(std::move(stiffness)), limit_(std::move(friction_limit)), slider_(stiffness_.size(), 0.0) {}
 
-void Jenkins::rest(double const* u) {
+void Jenkins::set_rest(double const* u) {
   for (size_t i = 0; i < slider_.size(); ++i)
     slider_[i] = u[i] - std::clamp(stiffness_[i] * u[i], -limit_[i], limit_[i]) / stiffness_[i];
 }
@@ -72,7 +72,10 @@ void Jenkins::force(Motion const& motion, double* f, Record& record) const {
           record.march.data(), slip.data());
   };
   period(last);
+  const std::vector<double> closed = w;
   period(unused);
+  record.unclosed = 0;
+  for (int i = 0; i < n; ++i) record.unclosed = std::max(record.unclosed, std::abs(w[i] - closed[i]));
   for (int i = 0; i < n; ++i)
     if (last[i] >= 0) record.start[i].sample[0] = int(last[i]), record.start[i].gain[0][0][0] = 1;
 }

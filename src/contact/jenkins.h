@@ -12,7 +12,6 @@ class Jenkins : public Law {
   int pairs() const override { return int(stiffness_.size()); }
   bool uses_velocity() const override { return false; }
   bool hereditary() const override { return true; }
-  void rest(double const* u) override;
   bool odd() const override;
   double stuck_stiffness(int, int pair) const override { return stiffness_[pair]; }
   void force(Motion const&, double* f, Record&) const override;
@@ -20,6 +19,9 @@ class Jenkins : public Law {
   void pair_product(Motion const&, Record const&, int pair, int columns, double const* du,
                     double* df) const override;
   void diagnose(Motion const&, double const* f, Diagnosis&) const override;
+
+ protected:
+  void set_rest(double const* u) override;
 
  private:
   void linearised(Motion const&, Record const&, int pair, int n, double const* du, double* df) const;

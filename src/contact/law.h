@@ -61,11 +61,18 @@ class Law {
   virtual bool hereditary() const { return false; }
   /// The static state the dynamics start from: relative displacement components x pairs, reached from zero in
   /// one step.
-  virtual void rest(double const* /*u*/) {}
+  void rest(double const* u) { set_rest(u), ++version_; }
   /// Has a normal direction, along which worn depths count as additional gap.
   virtual bool wears() const { return false; }
-  /// Worn depth of each pair [m], in place of what was set before; the rest state stays as it is.
-  virtual void wear(double const* /*depth*/) {}
+  /// Worn depth of each pair [m], in place of what was set before; the rest state stays as it is. Null: as
+  /// they are.
+  void wear(double const* depth) {
+    if (depth) set_wear(depth);
+    ++version_;
+  }
+  /// Grows whenever `rest` or `wear` may have changed the force: a linearisation made before is of another
+  /// law.
+  unsigned version() const { return version_; }
   /// f(-u, -v) = -f(u, v): the motion may keep odd harmonics only.
   virtual bool odd() const { return false; }
   /// Stiffness of the contact when stuck in its rest state [N/m] (0 for a pair that is open there); infinite
@@ -84,6 +91,13 @@ class Law {
   virtual void pair_product(Motion const&, Record const&, int /*pair*/, int /*columns*/, double const* /*du*/,
                             double* /*df*/) const {}
   virtual void diagnose(Motion const&, double const* f, Diagnosis&) const = 0;
+
+ protected:
+  virtual void set_rest(double const* /*u*/) {}
+  virtual void set_wear(double const* /*depth*/) {}
+
+ private:
+  unsigned version_ = 0;
 };
 
 /// Work done against the force over the motion, per pair: sum of f . v dt (for laws that see the velocity).

@@ -11,6 +11,7 @@ namespace {
 
 /// Rounding of a march, relative to the size of its motion.
 constexpr double rounding = 1e-14;
+constexpr double touching = 1e-7;  // sine between two discs' directions: half the digits are left
 constexpr int most_discs = 100, most_periods = 60;
 
 }  // namespace
@@ -110,6 +111,13 @@ SliderStart SliderClosure::follow(Nearest const& now, int pair) const {
     }
   } else if (now.active.size() == 2) {
     const double det = e[0][0] * e[1][1] - e[0][1] * e[1][0];
+    if (std::abs(det) < touching) {  // they have one point in common, which moves along the line of centres
+      for (int row = 0; row < 2; ++row) {
+        out.gain[0][row][0] = -slope[pair] * e[0][row];
+        for (int col = 0; col < 2; ++col) out.gain[0][row][col + 1] = e[0][row] * e[0][col];
+      }
+      return out;
+    }
     const double inverse[2][2] = {{e[1][1] / det, -e[0][1] / det}, {-e[1][0] / det, e[0][0] / det}};
     for (int k = 0; k < 2; ++k)
       for (int row = 0; row < 2; ++row) {

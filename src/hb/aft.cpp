@@ -216,6 +216,7 @@ void count(contact::Diagnosis const& diagnosis, ContactSummary& summary) {
   double* shares[] = {&summary.stick, &summary.slip, &summary.open};
   for (auto s : diagnosis.status) *shares[int(s)] += 1;
   for (double w : diagnosis.work) summary.work += w;
+  for (double path : diagnosis.slip_path) summary.path = std::max(summary.path, path);
 }
 
 }  // namespace

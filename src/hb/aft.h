@@ -12,6 +12,7 @@ struct ContactSummary {
          retained = 0;  ///< squared change of the coefficients on doubled samples, and their square
   double work = 0;      ///< dissipated energy per period [J]
   double unclosed = 0;  ///< largest |w(T) - w(0)| of a slider [m]
+  double path = 0;      ///< longest slip path of a pair in the period [m], to measure it with
 };
 
 /// Time samples of a period: samples x components x pairs.

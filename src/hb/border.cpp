@@ -24,12 +24,12 @@ void Border::make(Solve solve, std::vector<Local> const& columns, std::vector<Lo
     AC_.push_back(solve_(column.data()));
     for (double share : along_rows(AC_.back())) RAC.push_back(share);
   }
-  MPI_Allreduce(MPI_IN_PLACE, RAC.data(), int(RAC.size()), MPI_DOUBLE, MPI_SUM, comm_);
+  sum_over_ranks(RAC, comm_);
   for (size_t k = 0; k < S.size(); ++k) S[k] -= RAC[k];
   inverse_S_ = std::move(S);
   if (const int info = lapack::invert(inverse_S_, int(rows_.size())))
-    throw InputError("the border of the preconditioner is singular", "LAPACK info " + std::to_string(info),
-                     "0", "start from a mode in which the chosen dof moves");
+    throw SingularBlock("the border of the preconditioner is singular (LAPACK info " + std::to_string(info) +
+                        "): the chosen dof does not move");
 }
 
 void Border::apply(double const* x, double* z) const {

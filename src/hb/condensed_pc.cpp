@@ -4,7 +4,9 @@
 #include <cstdio>
 
 #include "error.h"
+#include "fault.h"
 #include "lapack.h"
+#include "together.h"
 
 namespace fretwave::hb {
 
@@ -37,11 +39,13 @@ bool CondensedPreconditioner::moved(Exponents const& e) const {
 }
 
 void CondensedPreconditioner::factorise(Exponents e, std::vector<PairTangents> const& contacts) {
-  made_at_ = e;
+  const Exponents at = e;
+  made_at_ = {};  // until all harmonics have their factors
   if (scalars_ > 1) e.s[problem_.harmonics().fundamental()] *= 1 + shift;
   factors_.factorise(e, contacts);
   G_.clear();
   for (int i = 0; i < problem_.harmonics().count(); ++i) G_.push_back(factors_.compliance(i, rows_));
+  made_at_ = at;
 }
 
 /// dD of all pairs on rank 0.
@@ -176,20 +180,23 @@ void CondensedPreconditioner::add_border(std::vector<double>& T) const {
 }
 
 void CondensedPreconditioner::condense() {
-  size_ = rows_.count * m_ + scalars_;
+  size_ = as_int(PetscInt64(rows_.count) * m_ + scalars_, "coefficients of the contact");
   int info = 0;
-  if (first_rank_) {
+  together(problem_.comm(), "condensing the structure on its contact", [&] {
+    if (!first_rank_) return;
+    fault::point("condensed system");
     T_.assign(size_t(size_) * size_, 0.0);
     for (int k = 0; k < rows_.count * m_; ++k) T_[size_t(k) * size_ + k] = 1;
     add_contact(T_);
     add_border(T_);
     pivots_.resize(size_);
     dgetrf_(&size_, &size_, T_.data(), &size_, pivots_.data(), &info);
-  }
+    if (fault::value("condensed system")) info = 1;
+  });
   MPI_Bcast(&info, 1, MPI_INT, 0, problem_.comm());
   if (info > 0)
-    throw InputError("the condensed contact system is singular", "LAPACK info " + std::to_string(info), "0",
-                     "hold the structure where contact alone cannot");
+    throw SingularBlock("the condensed contact system is singular (LAPACK info " + std::to_string(info) +
+                        "): contact alone does not hold the structure");
   // dgetrf and two rounds of solves for the border, over the two rounds of an application
   const double solve = 8 * 2 * factors_.entries(), lu = 2.0 / 3 * size_ * double(size_) * size_;
   build_cost_ = 2 + lu / 10 / solve;

@@ -4,6 +4,7 @@
 #include <numbers>
 
 #include "error.h"
+#include "fault.h"
 #include "lapack.h"
 
 namespace fretwave::hb {
@@ -25,11 +26,12 @@ void CyclicInverse::invert(size_t wave, CirculantBlocks<complex> const& blocks) 
         1.0, 2 * std::numbers::pi * double(size_t(k) * waves_[wave].diameter % sectors_) / sectors_);
     for (size_t i = 0; i < P.size(); ++i) P[i] += t * A[i];
   }
-  if (const int info = lapack::invert(P, n_))
-    throw InputError(
-        "a nodal diameter's block of the wheel's preconditioner is singular",
-        "nodal diameter " + std::to_string(waves_[wave].diameter) + ", LAPACK info " + std::to_string(info),
-        "0", "check the wheel for free motions at this harmonic");
+  fault::point("wave block");
+  const int info = lapack::invert(P, n_);
+  if (info != 0 || fault::value("wave block"))
+    throw SingularBlock("the block of nodal diameter " + std::to_string(waves_[wave].diameter) +
+                        " of the wheel's preconditioner is singular (LAPACK info " + std::to_string(info) +
+                        "): a free motion at this harmonic");
   std::copy(P.begin(), P.end(), inverses_.begin() + at_[wave]);
 }
 

@@ -20,7 +20,8 @@ class CyclicInverse {
  public:
   CyclicInverse(std::vector<Wave> const& waves, int sectors, int n, bool symmetric);
   /// Of the waves with select(wave); a wave and its mirror are selected together. blocks(harmonic): A_k.
-  /// `InputError` if singular.
+  /// `SingularBlock` if one is; not collective, for each
+  /// rank has waves of its own.
   template <class Select, class Make>
   void make(Select select, Make blocks) {
     CirculantBlocks<complex> A;

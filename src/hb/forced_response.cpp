@@ -1,11 +1,23 @@
 #include "hb/forced_response.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "error.h"
 #include "hb/nonlinear_mode.h"
+#include "solve/vectors.h"
+#include "text.h"
 
 namespace fretwave::hb {
+
+using solve::dot, solve::last_entry, solve::set_last_entry;
+
+namespace {
+
+// Motion in units of the static deflection at the reference stiffness: a resonance of zeta = 5e-9.
+constexpr double unbounded = 1e8;
+
+}  // namespace
 
 ForcedResponse::ForcedResponse(model::Model const& model, Harmonics const& h, PetscInt dof, Vec P,
                                double level, double omega, Vec shape)
@@ -40,10 +52,87 @@ ScaledMotion ForcedResponse::motion(std::vector<double> const& z) const {
   return out;
 }
 
+std::string ForcedResponse::parameter_text(double value) const { return short_text(value) + " rad/s"; }
+
+std::string ForcedResponse::impossible(Vec y) {
+  const auto z = scalars(y);
+  if (!std::isfinite(z[0]) || !std::isfinite(z[1]) || !std::isfinite(z[2])) return "the motion is not finite";
+  return z[0] > 0 ? "" : "the frequency falls below zero";
+}
+
+std::string ForcedResponse::beyond(Vec y) {
+  double largest;
+  check(VecNorm(y, NORM_INFINITY, &largest));
+  return largest > unbounded ? "the response grows without bound" : "";
+}
+
+/// a da/ds > 0 before a peak of the observed amplitude a, with a^2 = c^2 + s^2 of its fundamental.
+std::vector<solve::TestFunction> ForcedResponse::tests(Vec y, Vec tangent) {
+  const auto z = scalars(y), dz = scalars(tangent);
+  const double square = z[1] * z[1] + z[2] * z[2];
+  return {{"peak", square > 0 ? (z[1] * dz[1] + z[2] * dz[2]) / square : 0, true, true}};
+}
+
 ForcedState ForcedResponse::state(Vec y) {
   const auto z = scalars(y);
   const double cosine = amplitude_ * z[1], sine = amplitude_ * z[2];
   return {level_, z[0] * omega_reference_, std::hypot(cosine, sine), std::atan2(-sine, cosine)};
+}
+
+ForcedStart::ForcedStart(ForcedResponse& to, Vec y)
+    : HarmonicProblem(to.model(), to.harmonics(), 1, to.dof(), to.stiffness_scale()),
+      amplitude_(to.reference_amplitude()),
+      frequency_(last_entry(y)),
+      exponents_(to.exponents(y)) {
+  VecHandle left = to.equations();
+  to.residual(y, left);
+  guess_ = like(excitation());
+  {
+    const PetscInt n = local_size(guess_);
+    const ReadArray r(left), q(y);
+    const double force = stiffness_scale() * amplitude_;
+    WriteArray rest(excitation()), guess(guess_);
+    for (PetscInt i = 0; i < n; ++i) rest[i] = force * r[i], guess[i] = q[i];
+  }
+  keep_loads(to);
+}
+
+VecHandle ForcedStart::response(Vec y) const {
+  VecHandle q = like(guess_);
+  {
+    const PetscInt n = local_size(q);
+    const ReadArray in(y);
+    std::copy_n(in.data(), n, WriteArray(q).data());
+  }
+  return pack(q, {frequency_});
+}
+
+ScaledMotion ForcedStart::motion(std::vector<double> const& z) const {
+  Exponents none{std::vector<complex>(harmonics().count()), 0};
+  return {.amplitude = amplitude_,
+          .exponents = exponents_,
+          .dlog_amplitude = {0},
+          .dexponents = {none},
+          .load = 1 - z[0],
+          .dload = {-1}};
+}
+
+std::string ForcedStart::parameter_text(double value) const {
+  return short_text(100 * value) + " % of the way to the start";
+}
+
+std::string ForcedStart::beyond(Vec y) {
+  double largest;
+  check(VecNorm(y, NORM_INFINITY, &largest));
+  return largest > unbounded ? "the response grows without bound" : "";
+}
+
+/// The motion counts relative to its own size, but not below the static deflection.
+void ForcedStart::metric(Vec y, Vec weights) {
+  const double t = last_entry(y);
+  double square = dot(y, y) - t * t;
+  check(VecSet(weights, 1 / std::max(square, 1.0)));
+  set_last_entry(weights, 1);
 }
 
 }  // namespace fretwave::hb

@@ -20,13 +20,44 @@ class ForcedResponse : public HarmonicProblem {
   /// Amplitude and phase of the observed dof's fundamental, x = A cos(w t + phase).
   ForcedState state(Vec y);
 
+  double reference_amplitude() const { return amplitude_; }
+
   double parameter_value(double entry) const override { return entry * omega_reference_; }
   double parameter_entry(double value) const override { return value / omega_reference_; }
+  std::string parameter_text(double value) const override;
+  std::string impossible(Vec y) override;
+  std::string beyond(Vec y) override;
+  std::vector<solve::TestFunction> tests(Vec y, Vec tangent) override;
 
  private:
   ScaledMotion motion(std::vector<double> const& z) const override;
   double metric_weight(int) const override { return 100; }  // a step of 0.1 is 1 % of the frequency
   double level_, omega_reference_, amplitude_ = 1;
+};
+
+/// The way to a response that Newton does not find from afar, at its fixed frequency: at the share t of the
+/// way, R(Q) = P + (1 - t) R_0, with R_0 = R(Q_0) - P what a guess Q_0 leaves of the forces. From Q_0 = 0 it
+/// is the excitation that grows; from another guess a fictitious force that fades (Newton homotopy, Allgower
+/// & Georg 2003). y = (Q/a_ref, t).
+class ForcedStart : public HarmonicProblem {
+ public:
+  /// From the guess y of a response, whose frequency it keeps. Collective.
+  ForcedStart(ForcedResponse&, Vec y);
+  VecHandle initial() { return pack(guess_, {0.0}); }
+  /// Unknowns of the response at the end of the way.
+  VecHandle response(Vec y) const;
+
+  double parameter_value(double entry) const override { return entry; }
+  double parameter_entry(double value) const override { return value; }
+  std::string parameter_text(double value) const override;
+  std::string beyond(Vec y) override;
+  void metric(Vec y, Vec weights) override;
+
+ private:
+  ScaledMotion motion(std::vector<double> const& z) const override;
+  double amplitude_, frequency_;  ///< the response's parameter entry
+  Exponents exponents_;
+  VecHandle guess_;
 };
 
 }  // namespace fretwave::hb

@@ -1,8 +1,12 @@
 #include "hb/harmonic_factors.h"
 
 #include <algorithm>
+#include <cmath>
 
+#include "error.h"
+#include "fault.h"
 #include "hb/pair_correction.h"
+#include "together.h"
 
 namespace fretwave::hb {
 
@@ -28,7 +32,7 @@ bool symmetric(model::Model const& model) {
 }  // namespace
 
 HarmonicFactors::HarmonicFactors(HarmonicProblem& problem) : problem_(problem) {
-  pattern_.size = int(problem.model().dofs());
+  pattern_.size = as_int(problem.model().dofs(), "dofs in sparse blocks");
   pattern_.symmetric = hb::symmetric(problem.model());
   find_terms();
 }
@@ -120,7 +124,18 @@ void HarmonicFactors::factorise(Exponents const& e, std::vector<PairTangents> co
     for (int i = 0; i < problem_.harmonics().count(); ++i)
       factors_.emplace_back(problem_.comm(), pattern_, i > 0 ? &factors_[0] : nullptr);
   }
-  for (int i = 0; i < problem_.harmonics().count(); ++i) factors_[i].factorise(values(i, e));
+  for (int i = 0; i < problem_.harmonics().count(); ++i) {
+    std::vector<complex> v;
+    together(problem_.comm(), "assembling a sparse harmonic block", [&] {
+      fault::point("sparse block");
+      v = values(i, e);
+      if (fault::value("sparse block") || !std::ranges::all_of(v, [](complex c) {
+            return std::isfinite(c.real()) && std::isfinite(c.imag());
+          }))
+        throw SingularBlock("a harmonic block of the preconditioner is not finite");
+    });
+    factors_[i].factorise(std::move(v));
+  }
 }
 
 // Real form of a on (qc, qs) is [ar ai; -ai ar]; its transpose is that of conj(a), so A^-T r = conj(A^-T

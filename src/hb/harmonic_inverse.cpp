@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "error.h"
+#include "fault.h"
 #include "lapack.h"
 
 namespace fretwave::hb {
@@ -10,10 +11,9 @@ namespace fretwave::hb {
 namespace {
 
 void need(int info) {
-  if (info != 0)
-    throw InputError("a harmonic block of the preconditioner is singular",
-                     "LAPACK info " + std::to_string(info), "0",
-                     "check the model for free motions at this harmonic");
+  if (info != 0 || fault::value("harmonic block"))
+    throw SingularBlock("a harmonic block of the preconditioner is singular (LAPACK info " +
+                        std::to_string(info) + "): a free motion at this harmonic");
 }
 
 using scomplex = std::complex<float>;
@@ -21,6 +21,7 @@ using scomplex = std::complex<float>;
 /// The inverse, rounded to single precision.
 template <class Single, class T>
 std::vector<Single> inverse_of(std::vector<T> A, int n) {
+  fault::point("harmonic block");
   need(lapack::invert(A, n));
   return {A.begin(), A.end()};
 }

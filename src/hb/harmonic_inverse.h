@@ -62,7 +62,7 @@ class HarmonicInverse {
   virtual Rotation entry(int i, int j) const = 0;
 };
 
-/// Inverse of the n x n block A (column-major). `InputError` if singular.
+/// Inverse of the n x n block A (column-major). `SingularBlock` if it is.
 std::unique_ptr<HarmonicInverse> invert(Place, std::vector<complex> A);
 /// Inverse of the real block over (qc, qs, scalars), (2 n + scalars) squared, column-major.
 std::unique_ptr<HarmonicInverse> invert_bordered(Place, std::vector<double> A, int scalars);

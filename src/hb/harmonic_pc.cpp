@@ -10,9 +10,10 @@ std::vector<double> whole(Mat A) {
   PetscInt n;
   check(PetscObjectGetComm(reinterpret_cast<PetscObject>(A), &comm));
   check(MatGetSize(A, &n, nullptr));
+  as_int(PetscInt64(n) * n, "entries of a dense block");
   std::vector<double> dense(size_t(n) * n, 0.0);
   for_entries(A, [&](PetscInt row, PetscInt col, double value) { dense[size_t(col) * n + row] = value; });
-  MPI_Allreduce(MPI_IN_PLACE, dense.data(), int(dense.size()), MPI_DOUBLE, MPI_SUM, comm);
+  sum_over_ranks(dense, comm);
   return dense;
 }
 

@@ -1,8 +1,10 @@
 #include "hb/harmonic_problem.h"
 
 #include <algorithm>
+#include <type_traits>
 
 #include "error.h"
+#include "hb/checked_pc.h"
 #include "hb/condensed_pc.h"
 #include "hb/harmonic_pc.h"
 #include "hb/wheel_pc.h"
@@ -31,11 +33,26 @@ bool suits_dense(model::Model const& model) {
   return n <= always || (n <= largest && entries > share * n * n);
 }
 
+[[noreturn]] void refuse(std::string const& blocks, std::string const& problem) {
+  throw InputError("option blocks: there are no " + blocks + " blocks for " + problem, blocks, "auto",
+                   "leave out the option -<analysis>_blocks");
+}
+
+/// PETSc counts unknowns in PetscInt.
+model::Model const& countable(model::Model const& model, Harmonics const& h) {
+  const double unknowns = double(model.dofs()) * h.block_size() + 10;
+  if (unknowns > double(PETSC_MAX_INT))
+    throw InputError("the harmonic balance has more unknowns than this build of PETSc can count",
+                     std::to_string(PetscInt64(unknowns)), "at most " + std::to_string(PETSC_MAX_INT),
+                     "reduce the model, retain fewer harmonics, or build PETSc with 64-bit indices");
+  return model;
+}
+
 }  // namespace
 
 HarmonicProblem::HarmonicProblem(model::Model const& model, Harmonics const& h, int scalars, PetscInt dof,
                                  double reference_stiffness)
-    : residual_(model, h),
+    : residual_(countable(model, h), h),
       scalars_(scalars),
       dof_(dof),
       local_block_(model.local_dofs() * h.block_size()),
@@ -80,10 +97,10 @@ void HarmonicProblem::unpack(Vec y) {
   check(VecWAXPY(Q_, motion_.amplitude, q_, static_));
 }
 
-void HarmonicProblem::add_mean(Vec per_dof, Vec blocks) {
+void HarmonicProblem::set_mean(Vec per_dof, Vec blocks) {
   ReadArray in(per_dof);
   WriteArray out(blocks);
-  for (PetscInt i = 0; i < model().local_dofs(); ++i) out[i * harmonics().block_size()] += in[i];
+  for (PetscInt i = 0; i < model().local_dofs(); ++i) out[i * harmonics().block_size()] = in[i];
 }
 
 void HarmonicProblem::preload(Vec x, Vec P) {
@@ -91,8 +108,14 @@ void HarmonicProblem::preload(Vec x, Vec P) {
     throw InputError("a preloaded structure moves about a mean that is not retained",
                      "lowest harmonic " + std::to_string(harmonics().orders()[0]), "harmonic 0 retained",
                      "retain all harmonics");
-  add_mean(x, static_);
-  add_mean(P, static_load_);
+  set_mean(x, static_);
+  set_mean(P, static_load_);
+  linearised_ = false;
+}
+
+void HarmonicProblem::keep_loads(HarmonicProblem const& other) {
+  check(VecCopy(other.static_, static_));
+  check(VecWAXPY(static_load_, 1, other.excitation_, other.static_load_));
   linearised_ = false;
 }
 
@@ -102,7 +125,7 @@ void HarmonicProblem::residual(Vec y, Vec r) {
   check(VecAXPBYPCZ(R_, -motion_.load, -1, 1, excitation_, static_load_));
   check(VecScale(R_, 1 / (stiffness_ * motion_.amplitude)));
   check(VecCopy(y, last_));
-  linearised_ = true;
+  linearised_ = true, contact_version_ = residual_.contact_version();
   const auto along = components(q_);
   WriteArray out(r);
   ReadArray in(R_);
@@ -130,7 +153,11 @@ void HarmonicProblem::unfold(Vec re, Vec im) {
         out[i * m + cosine + 1] = part ? a[i] : -b[i];
       }
     }
-    check(VecNormalize(g, nullptr));
+    double length;
+    check(VecNormalize(g, &length));
+    if (!(length > 0))
+      throw InputError("the mode to be avoided has no inertia", std::to_string(length), "> 0",
+                       "give the other mode of the pair");
     unfold_.push_back(std::move(g));
   }
   last_ = unknowns();
@@ -169,10 +196,18 @@ double HarmonicProblem::rounding(Vec y) {
   return residual_.rounding() / (stiffness_ * motion_.amplitude);
 }
 
-/// Line searches evaluate elsewhere: the point of linearisation is y, whatever was evaluated last.
+bool HarmonicProblem::measure_in(double k) {
+  const bool changes = k != stiffness_;
+  stiffness_ = k;
+  if (changes) linearised_ = false;
+  return changes;
+}
+
+/// Line searches evaluate elsewhere: the point of linearisation is y, whatever was evaluated last, and the
+/// laws are as they are now, whichever problem of the model has changed them.
 void HarmonicProblem::linearise(Vec y) {
   PetscBool same = PETSC_FALSE;
-  if (linearised_) check(VecEqual(y, last_, &same));
+  if (linearised_ && contact_version_ == residual_.contact_version()) check(VecEqual(y, last_, &same));
   if (same) return;
   VecHandle unused = equations();
   residual(y, unused);
@@ -272,15 +307,26 @@ EnergyBalance HarmonicProblem::energy(Vec y) {
   return residual_.energy();
 }
 
+/// `blocks` other than auto is taken or refused. A wheel is dealt with by its waves, unless the contact is
+/// not the same in all sectors.
 std::unique_ptr<solve::Preconditioner> HarmonicProblem::preconditioner(std::string const& blocks) {
-  if (harmonics().fundamental() < 0) return nullptr;
-  if (model().unit()) return std::make_unique<WheelPreconditioner>(*this);
-  if (unfoldings()) return nullptr;
+  const bool waves = model().unit() && WheelPreconditioner::suits(*this), free = blocks == "auto";
+  const auto make = [&]<class P>(std::type_identity<P>, std::string note = "") {
+    return std::make_unique<CheckedPreconditioner>(std::make_unique<P>(*this), std::move(note));
+  };
+  if (harmonics().fundamental() < 0 || (unfoldings() && !waves)) {
+    if (!free) refuse(blocks, unfoldings() ? "a wheel whose double mode is unfolded" : "a static problem");
+    return nullptr;
+  }
+  if (waves && free) return make(std::type_identity<WheelPreconditioner>());
+  if (unfoldings()) refuse(blocks, "a wheel whose double mode is unfolded");
   const bool phased = std::any_of(model().contacts().begin(), model().contacts().end(),
                                   [](auto const& contact) { return !contact.ahead.empty(); });
-  if (!phased && (blocks == "sparse" || (blocks == "auto" && !suits_dense(model()))))
-    return std::make_unique<CondensedPreconditioner>(*this);
-  return std::make_unique<HarmonicPreconditioner>(*this);
+  if (phased && blocks == "sparse") refuse(blocks, "a contact that reaches the next sector");
+  const std::string note = model().unit() && !waves ? " (contact not the same in all sectors: no waves)" : "";
+  if (!phased && (blocks == "sparse" || (free && !suits_dense(model()))))
+    return make(std::type_identity<CondensedPreconditioner>(), note);
+  return make(std::type_identity<HarmonicPreconditioner>(), note);
 }
 
 /// Motion counts relative to its own size, so that a step is a share of it whatever the mesh. The mean of a
@@ -295,7 +341,8 @@ void HarmonicProblem::metric(Vec y, Vec weights) {
     if (i % m >= mean) square += in[i] * in[i];
   MPI_Allreduce(MPI_IN_PLACE, &square, 1, MPI_DOUBLE, MPI_SUM, comm());
   WriteArray out(weights);
-  for (PetscInt i = 0; i < local_block_; ++i) out[i] = i % m < mean ? 0 : 1 / square;
+  const double weight = square > 0 ? 1 / square : 1;  // no motion at all: the scalars alone measure
+  for (PetscInt i = 0; i < local_block_; ++i) out[i] = i % m < mean ? 0 : weight;
   if (!last_rank()) return;
   std::fill_n(out.data() + local_block_, unfoldings(), 1.0);
   for (int j = 0; j < scalars_; ++j) out[local_block_ + unfoldings() + j] = metric_weight(j);

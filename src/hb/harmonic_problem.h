@@ -40,7 +40,7 @@ class HarmonicProblem : public solve::Problem {
   model::Model const& model() const { return residual_.model(); }
   PetscInt dof() const { return dof_; }
   /// Dynamics about a static state x under the static load P: Q = (x, 0, ...) + a q. The mean is retained
-  /// then. Collective.
+  /// then; what was set before is replaced. Collective.
   void preload(Vec x, Vec P);
   /// Unfolds the double mode of a tuned wheel (DESIGN fact 6): a fundamental force along M phi with two
   /// unknown amplitudes tau, and two rows that keep the fundamental's component phi^H M q_1 at zero; phi = re
@@ -78,6 +78,10 @@ class HarmonicProblem : public solve::Problem {
  protected:
   virtual ScaledMotion motion(std::vector<double> const& z) const = 0;
   virtual double metric_weight(int /*scalar*/) const { return 1; }
+  /// Force rows are measured in k a from now on; true if that changed them.
+  bool measure_in(double k);
+  /// The fixed loads of another problem, excitation included; its static state is the rest. Collective.
+  void keep_loads(HarmonicProblem const& other);
   Vec excitation() { return excitation_; }  ///< P, zero unless a variant sets it
   VecHandle pack(Vec q, std::vector<double> const& z) const;
 
@@ -90,7 +94,7 @@ class HarmonicProblem : public solve::Problem {
   void linearise(Vec y);
   void unpack(Vec y);
   void column(int j, double* v);
-  void add_mean(Vec per_dof, Vec blocks);
+  void set_mean(Vec per_dof, Vec blocks);
   double dload(int j) const { return motion_.dload.empty() ? 0 : motion_.dload[j]; }
 
   Residual residual_;
@@ -100,6 +104,7 @@ class HarmonicProblem : public solve::Problem {
   VecHandle q_, Q_, dQ_, R_, dR_, excitation_, static_, static_load_, last_;
   std::vector<VecHandle> unfold_;
   bool linearised_ = false;
+  unsigned contact_version_ = 0;  ///< of the laws at the point of linearisation
   std::vector<double> z_;
   ScaledMotion motion_;
 };

@@ -4,11 +4,14 @@
 #include <cmath>
 
 #include "error.h"
+#include "text.h"
 
 namespace fretwave::hb {
 
-double reference_stiffness(model::Model const& model, double omega, Vec shape, Vec imaginary) {
-  const MatHandle M = model.sum(2);
+namespace {
+
+/// phi^H M phi w^2 / phi^H phi
+double inertia_per_displacement(Mat M, double omega, Vec shape, Vec imaginary) {
   double modal_mass = 0, square = 0;
   for (Vec part : {shape, imaginary}) {
     if (!part) continue;
@@ -19,11 +22,18 @@ double reference_stiffness(model::Model const& model, double omega, Vec shape, V
     check(VecDot(part, part, &length));
     modal_mass += mass, square += length;
   }
-  if (!(modal_mass > 0) || !(omega > 0))
-    throw InputError("the starting mode has no modal mass or no frequency",
-                     std::to_string(modal_mass) + ", " + std::to_string(omega) + " rad/s", "both > 0",
-                     "start from an elastic mode of the model");
   return omega * omega * modal_mass / square;
+}
+
+}  // namespace
+
+double reference_stiffness(model::Model const& model, double omega, Vec shape, Vec imaginary) {
+  const double k = inertia_per_displacement(model.sum(2), omega, shape, imaginary);
+  if (!(k > 0) || !(omega > 0))
+    throw InputError("the starting mode has no modal mass or no frequency",
+                     std::to_string(k) + " N/m, " + std::to_string(omega) + " rad/s", "both > 0",
+                     "start from an elastic mode of the model");
+  return k;
 }
 
 NonlinearMode::NonlinearMode(model::Model const& model, Harmonics const& h, Method method, PetscInt dof,
@@ -31,6 +41,8 @@ NonlinearMode::NonlinearMode(model::Model const& model, Harmonics const& h, Meth
     : HarmonicProblem(model, h, 3, dof, reference_stiffness(model, omega, shape, imaginary)),
       method_(method),
       omega_reference_(omega),
+      starting_stiffness_(stiffness_scale()),
+      mass_(model.sum(2)),
       shape_(like(shape)),
       imaginary_(like(shape)) {
   double at_dof[2] = {};
@@ -96,8 +108,39 @@ ModalState NonlinearMode::state(Vec y) {
   return {std::exp(z[2]), w * std::sqrt(1 - zeta * zeta), w, beta, zeta};
 }
 
+bool NonlinearMode::scale(Vec y) {
+  const PetscInt m = harmonics().block_size(), fundamental = harmonics().offset(harmonics().fundamental());
+  VecHandle re = like(shape_), im = like(shape_);
+  {
+    ReadArray in(y);
+    WriteArray cosine(re), sine(im);
+    for (PetscInt i = 0; i < model().local_dofs(); ++i)
+      cosine[i] = in[i * m + fundamental], sine[i] = in[i * m + fundamental + 1];
+  }
+  const auto z = scalars(y);
+  const double now = inertia_per_displacement(mass_, std::hypot(z[0], z[1]) * omega_reference_, re, im);
+  if (!(now > 0) || !std::isfinite(now)) return false;
+  const double steps = std::round(std::log2(now / starting_stiffness_) / 4);
+  return measure_in(starting_stiffness_ * std::exp2(4 * steps));
+}
+
+double NonlinearMode::effect(Vec y, Vec dy) {
+  const auto z = scalars(y), dz = scalars(dy);
+  const double omega = std::abs(z[1]), beta = std::max(std::abs(z[0]), 1e-4 * omega);
+  return std::max(std::abs(dz[1]) / omega, 0.01 * std::abs(dz[0]) / beta);
+}
+
 double NonlinearMode::parameter_value(double entry) const { return std::exp(entry); }
 double NonlinearMode::parameter_entry(double value) const { return std::log(value); }
+
+std::string NonlinearMode::parameter_text(double value) const { return "amplitude " + short_text(value); }
+
+std::string NonlinearMode::impossible(Vec y) {
+  const auto z = scalars(y);
+  if (!std::isfinite(z[0]) || !std::isfinite(z[1]) || !std::isfinite(std::exp(z[2])))
+    return "frequency, damping or amplitude is not finite";
+  return z[1] > 0 ? "" : "the frequency falls below zero";
+}
 
 std::vector<solve::TestFunction> NonlinearMode::tests(Vec y, Vec tangent) {
   const auto z = scalars(y), dz = scalars(tangent);

@@ -25,15 +25,23 @@ class NonlinearMode : public HarmonicProblem {
   VecHandle initial(double amplitude);
   ModalState state(Vec y);
   Method method() const { return method_; }
+  /// k_ref of the motion at y in place of the starting mode's, by powers of 16: a contact far stiffer than
+  /// what moves once it slips would hide every other force behind its own.
+  bool scale(Vec y) override;
+  /// Of omega, and a hundredth of the relative one of beta (of 1e-4 omega where it is smaller).
+  double effect(Vec y, Vec dy) override;
 
   double parameter_value(double entry) const override;
   double parameter_entry(double value) const override;
+  std::string parameter_text(double value) const override;
+  std::string impossible(Vec y) override;
   std::vector<solve::TestFunction> tests(Vec y, Vec tangent) override;
 
  private:
   ScaledMotion motion(std::vector<double> const& z) const override;
   Method method_;
-  double omega_reference_;
+  double omega_reference_, starting_stiffness_;
+  MatHandle mass_;
   VecHandle shape_, imaginary_;
 };
 

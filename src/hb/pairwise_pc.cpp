@@ -3,19 +3,14 @@
 #include <algorithm>
 #include <numeric>
 
+#include "fault.h"
+#include "together.h"
+
 namespace fretwave::hb {
-
-namespace {
-
-void sum_over_ranks(double* x, size_t n, MPI_Comm comm) {
-  if (comm_size(comm) > 1) MPI_Allreduce(MPI_IN_PLACE, x, int(n), MPI_DOUBLE, MPI_SUM, comm);
-}
-
-}  // namespace
 
 PairwisePreconditioner::PairwisePreconditioner(HarmonicProblem& problem)
     : problem_(problem),
-      n_(int(problem.model().dofs())),
+      n_(as_int(problem.model().dofs(), "dofs in dense blocks")),
       m_(problem.harmonics().block_size()),
       scalars_(problem.scalar_count()),
       rank_(comm_rank(problem.comm())),
@@ -79,7 +74,8 @@ std::vector<Rotation> PairwisePreconditioner::compliance() const {
       G[k].add(row.value * col.value, g);
     });
   }
-  sum_over_ranks(&G[0].cc, 4 * G.size(), problem_.comm());
+  static_assert(sizeof(Rotation) == 4 * sizeof(double));
+  sum_over_ranks(std::span(&G[0].cc, 4 * G.size()), problem_.comm());
   return G;
 }
 
@@ -87,15 +83,18 @@ void PairwisePreconditioner::correct_pairs(std::vector<PairTangents>&& contacts)
   corrections_.clear();
   if (pairs_.empty()) return;
   const auto G = compliance();
-  for (auto const& contact : contacts) {
-    const size_t ld = size_t(contact.components) * m_;
-    for (int p = 0; p < contact.pairs; ++p) {
-      const size_t at = pairs_[first_pair_ + corrections_.size()].first_block;
-      double const* D = &contact.D[p * ld * ld];
-      corrections_.emplace_back(problem_.harmonics(), contact.components, std::vector<double>(D, D + ld * ld),
-                                &tangents_[at], &G[at]);
+  together(problem_.comm(), "correcting contact pairs", [&] {
+    for (auto const& contact : contacts) {
+      const size_t ld = size_t(contact.components) * m_;
+      for (int p = 0; p < contact.pairs; ++p) {
+        const size_t at = pairs_[first_pair_ + corrections_.size()].first_block;
+        double const* D = &contact.D[p * ld * ld];
+        fault::point("pair correction");
+        corrections_.emplace_back(problem_.harmonics(), contact.components,
+                                  std::vector<double>(D, D + ld * ld), &tangents_[at], &G[at]);
+      }
     }
-  }
+  });
 }
 
 void PairwisePreconditioner::build(Vec y, Vec row) {
@@ -107,8 +106,10 @@ void PairwisePreconditioner::build(Vec y, Vec row) {
   tangents_ = gather_contact(contacts);
   inverses_.clear(), inverses_.resize(h.count());
   prepare(e, y, row);
-  for (int i = 0; i < h.count(); ++i)
-    if (mine(i)) inverses_[i] = inverse(i, e);
+  together(problem_.comm(), "inverting harmonic blocks", [&] {
+    for (int i = 0; i < h.count(); ++i)
+      if (mine(i)) inverses_[i] = inverse(i, e);
+  });
   correct_pairs(std::move(contacts));
 }
 
@@ -117,7 +118,7 @@ std::vector<double> PairwisePreconditioner::solve(std::vector<double> const& x) 
   std::vector<double> z(x.size(), 0.0);
   for (auto const& inverse : inverses_)
     if (inverse) inverse->apply(x.data(), z.data());
-  sum_over_ranks(z.data(), z.size(), problem_.comm());
+  sum_over_ranks(z, problem_.comm());
   return z;
 }
 
@@ -148,7 +149,7 @@ std::vector<double> PairwisePreconditioner::correction(std::vector<double> const
     corrections_[p].apply(u.data(), f.data());
     for (Weight const& w : weights) add_turned(w, true, &f[w.component * m_], &out[w.dof * m_]);
   }
-  sum_over_ranks(out.data(), out.size(), problem_.comm());
+  sum_over_ranks(out, problem_.comm());
   return out;
 }
 

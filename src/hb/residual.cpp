@@ -6,6 +6,8 @@
 #include <numbers>
 
 #include "error.h"
+#include "fault.h"
+#include "together.h"
 
 namespace fretwave::hb {
 
@@ -73,6 +75,12 @@ VecHandle Residual::relative_motion(Group const& group, Vec Q) const {
   return U;
 }
 
+std::vector<VecHandle> Residual::relative_motions(Vec Q) const {
+  std::vector<VecHandle> out;
+  for (Group const& group : groups_) out.push_back(relative_motion(group, Q));
+  return out;
+}
+
 /// R += sum_k B_k^T e^{+i k n theta} F: the force of the pair k places behind, which reaches into this
 /// sector.
 void Residual::add_force(Group const& group, Vec F, Vec R) const {
@@ -87,11 +95,16 @@ void Residual::evaluate(Vec Q, Exponents const& e, Vec R) {
   e_ = e;
   check(VecSet(R, 0));
   stiffness_.multiply_add(e, Q_, R);
-  for (Group& group : groups_) {
-    relative_motion(group, Q_, group.U);
-    group.aft.force(ReadArray(group.U).data(), e, WriteArray(group.F).data());
-    add_force(group, group.F, R);
-  }
+  for (Group& group : groups_) relative_motion(group, Q_, group.U);
+  together(model_.comm(), "contact forces", [&] {
+    for (Group& group : groups_) {
+      fault::point("contact force");
+      WriteArray F(group.F);
+      group.aft.force(ReadArray(group.U).data(), e, F.data());
+      if (fault::value("contact force") && group.aft.columns()) F[0] = std::nan("");
+    }
+  });
+  for (Group& group : groups_) add_force(group, group.F, R);
 }
 
 void Residual::product(Vec dQ, Exponents const* de, Vec dR) {
@@ -122,34 +135,55 @@ void Residual::contact_product(Group& group, Vec dQ, Exponents const* de, Vec dR
   add_force(group, dF, dR);
 }
 
-void Residual::wear(PerContact const& depth) {
+void Residual::expect_depths(PerContact const& depth) const {
+  if (depth.size() != groups_.size())
+    throw InputError("worn depths are given for another number of contacts", std::to_string(depth.size()),
+                     std::to_string(groups_.size()), "give a list, may be empty, for each contact");
   for (size_t k = 0; k < groups_.size(); ++k) {
-    contact::Law& law = *groups_[k].contact->law;
+    contact::Law const& law = *groups_[k].contact->law;
     if (!depth[k].empty() && (!law.wears() || int(depth[k].size()) != law.pairs()))
       throw InputError(
           "a contact cannot take these worn depths",
           "contact '" + groups_[k].contact->name + "', " + std::to_string(depth[k].size()) + " depths",
           law.wears() ? std::to_string(law.pairs()) + " depths" : "a law with a normal direction",
           "wear contacts with law coulomb_3d");
-    if (!depth[k].empty()) law.wear(depth[k].data());
+  }
+}
+
+void Residual::wear(PerContact const& depth) {
+  together(model_.comm(), "wearing contacts", [&] {
+    fault::point("wear");
+    expect_depths(depth);
+  });
+  for (size_t k = 0; k < groups_.size(); ++k) {
+    contact::Law& law = *groups_[k].contact->law;
+    // on a rank without pairs too: all must agree that linearisations are of other depths
+    law.wear(depth[k].empty() ? nullptr : depth[k].data());
   }
 }
 
 void Residual::gap_product(PerContact const& dgap, Vec dR) {
   check(VecSet(dR, 0));
+  together(model_.comm(), "wearing contacts", [&] { expect_depths(dgap); });
   for (size_t k = 0; k < groups_.size(); ++k) {
     Group& group = groups_[k];
     if (!group.contact->law->wears()) continue;
     VecHandle dF = like(group.F);
-    group.aft.gap_product(dgap[k].data(), WriteArray(dF).data());
+    std::vector<double> gaps = dgap[k];
+    gaps.resize(size_t(group.contact->law->pairs()), 0.0);  // an empty list: this contact does not wear
+    group.aft.gap_product(gaps.data(), WriteArray(dF).data());
     add_force(group, dF, dR);
   }
 }
 
 std::vector<Wearing> Residual::wearing(Vec Q, Exponents const& e) {
   std::vector<Wearing> out;
-  for (Group& group : groups_)
-    out.push_back(group.aft.wearing(ReadArray(relative_motion(group, Q)).data(), e));
+  const auto U = relative_motions(Q);
+  together(model_.comm(), "what wears the contacts", [&] {
+    fault::point("wearing");
+    for (size_t k = 0; k < groups_.size(); ++k)
+      out.push_back(groups_[k].aft.wearing(ReadArray(U[k]).data(), e));
+  });
   return out;
 }
 
@@ -249,12 +283,16 @@ double Residual::rounding() const {
 
 std::vector<PairTangents> Residual::pair_tangents() {
   std::vector<PairTangents> out;
-  for (Group& group : groups_) {
-    const int d = group.contact->law->components(), pairs = group.contact->law->pairs();
-    const size_t ld = size_t(d) * harmonics_.block_size();
-    out.push_back({pairs, d, group.weights, std::vector<double>(pairs * ld * ld)});
-    group.aft.blocks(e_, out.back().D.data());
-  }
+  together(model_.comm(), "linearising contacts", [&] {
+    fault::point("contact tangents");
+    for (Group& group : groups_) {
+      const int d = group.contact->law->components(), pairs = group.contact->law->pairs();
+      const size_t ld = size_t(d) * harmonics_.block_size();
+      out.push_back({pairs, d, group.weights, std::vector<double>(pairs * ld * ld)});
+      group.aft.blocks(e_, out.back().D.data());
+      if (fault::value("contact tangents") && !out.back().D.empty()) out.back().D[0] = std::nan("");
+    }
+  });
   return out;
 }
 
@@ -299,34 +337,52 @@ double* Residual::values(double scale, double* v) {
 }
 
 ContactSummary Residual::summarise(Vec Q, Exponents const& e) {
-  double sums[8] = {};
-  for (Group& group : groups_) {
-    const auto s = group.aft.summarise(ReadArray(relative_motion(group, Q)).data(), e);
-    const double parts[8] = {s.stick, s.slip, s.open, s.truncated, s.total, s.aliased, s.retained, s.work};
-    for (int i = 0; i < 8; ++i) sums[i] += parts[i];
-  }
+  double sums[8] = {}, largest[2] = {};
+  const auto U = relative_motions(Q);
+  together(model_.comm(), "reading contacts", [&] {
+    fault::point("summary");
+    for (size_t k = 0; k < groups_.size(); ++k) {
+      const auto s = groups_[k].aft.summarise(ReadArray(U[k]).data(), e);
+      const double parts[8] = {s.stick, s.slip, s.open, s.truncated, s.total, s.aliased, s.retained, s.work};
+      for (int i = 0; i < 8; ++i) sums[i] += parts[i];
+      largest[0] = std::max(largest[0], s.unclosed), largest[1] = std::max(largest[1], s.path);
+    }
+  });
   MPI_Allreduce(MPI_IN_PLACE, sums, 8, MPI_DOUBLE, MPI_SUM, model_.comm());
-  return {sums[0], sums[1], sums[2], sums[3], sums[4], sums[5], sums[6], sums[7]};
+  MPI_Allreduce(MPI_IN_PLACE, largest, 2, MPI_DOUBLE, MPI_MAX, model_.comm());
+  return {sums[0], sums[1], sums[2], sums[3], sums[4], sums[5], sums[6], sums[7], largest[0], largest[1]};
+}
+
+unsigned Residual::contact_version() const {
+  unsigned sum = 0;
+  for (Group const& group : groups_) sum += group.contact->law->version();
+  return sum;
 }
 
 void Residual::settle(Vec Q) {
-  for (Group& group : groups_) {
-    contact::Law& law = *group.contact->law;
-    const int d = law.components(), n = law.pairs();
-    VecHandle U = relative_motion(group, Q);
-    ReadArray blocks(U);
-    std::vector<double> u(size_t(d) * n);
-    for (int i = 0; i < n; ++i)
-      for (int c = 0; c < d; ++c) u[size_t(c) * n + i] = blocks[(i * d + c) * harmonics_.block_size()];
-    law.rest(u.data());
-  }
+  const auto U = relative_motions(Q);
+  together(model_.comm(), "settling contacts", [&] {
+    fault::point("settle");
+    for (size_t k = 0; k < groups_.size(); ++k) {
+      contact::Law& law = *groups_[k].contact->law;
+      const int d = law.components(), n = law.pairs();
+      ReadArray blocks(U[k]);
+      std::vector<double> u(size_t(d) * n);
+      for (int i = 0; i < n; ++i)
+        for (int c = 0; c < d; ++c) u[size_t(c) * n + i] = blocks[(i * d + c) * harmonics_.block_size()];
+      law.rest(u.data());
+    }
+  });
 }
 
 std::vector<ContactPeriod> Residual::periods(Vec Q, Exponents const& e) {
   std::vector<ContactPeriod> out;
-  for (Group& group : groups_) {
-    out.push_back(group.aft.period(ReadArray(relative_motion(group, Q)).data(), e));
-  }
+  const auto U = relative_motions(Q);
+  together(model_.comm(), "contact samples", [&] {
+    fault::point("contact samples");
+    for (size_t k = 0; k < groups_.size(); ++k)
+      out.push_back(groups_[k].aft.period(ReadArray(U[k]).data(), e));
+  });
   return out;
 }
 

@@ -68,14 +68,16 @@ class Residual {
   std::vector<Wearing> wearing(Vec Q, Exponents const& e);
 
   DynamicStiffness const& stiffness() const { return stiffness_; }
-  /// Linearised contact at the last evaluated point, one per contact.
+  /// Linearised contact at the last evaluated point, one per contact. Collective.
   std::vector<PairTangents> pair_tangents();
 
   /// Contact of the motion (Q, e), summed over all ranks and contacts. Collective.
   ContactSummary summarise(Vec Q, Exponents const& e);
+  /// Grows with every `settle` and `wear` of any problem that shares the laws; the same on every rank.
+  unsigned contact_version() const;
   /// The laws take the mean relative displacement of Q as their rest state. Collective.
   void settle(Vec Q);
-  /// This rank's contact samples, one per contact.
+  /// This rank's contact samples, one per contact. Collective.
   std::vector<ContactPeriod> periods(Vec Q, Exponents const& e);
 
  private:
@@ -103,9 +105,11 @@ class Residual {
     template <class Body>
     void each_couple(Body body) const;
   };
+  void expect_depths(PerContact const& depth) const;
   Map make_map(Mat B, int phase) const;
   void relative_motion(Group const&, Vec Q, Vec U) const;
   VecHandle relative_motion(Group const&, Vec Q) const;
+  std::vector<VecHandle> relative_motions(Vec Q) const;  ///< of all contacts. Collective.
   void add_force(Group const&, Vec F, Vec R) const;
   void contact_product(Group&, Vec dQ, Exponents const* de, Vec dR);
   void find_weights(Group&);

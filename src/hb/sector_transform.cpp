@@ -11,6 +11,11 @@ SectorTransform::SectorTransform(int local_sectors, int harmonics, int items, MP
   first_sector_.insert(first_sector_.begin(), 0);
   std::partial_sum(first_sector_.begin(), first_sector_.end(), first_sector_.begin());
 
+  // a rank never sends more than it holds
+  for (int r = 0; r < size_; ++r)
+    as_int(PetscInt64(first_sector_[r + 1] - first_sector_[r]) * harmonics * items,
+           "coefficients of a rank's sectors");
+  as_int(PetscInt64(sectors()) * (share(harmonics * items, 1, size_) + 1), "coefficients of a rank's waves");
   const int n = sectors(), half = n / 2 + 1;
   for (int r = 0; r < size_; ++r) {
     waves_.emplace_back();

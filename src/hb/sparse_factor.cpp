@@ -44,9 +44,13 @@ struct SparseFactor::Instance {
   void need(char const* what) const {
     if (status() >= 0) return;
     if (status() == -10)
-      throw InputError("a harmonic block of the preconditioner is singular",
-                       "MUMPS INFOG(1) = -10 at pivot " + std::to_string(id.infog[1]), "INFOG(1) = 0",
-                       "check the model for free motions at this harmonic");
+      throw SingularBlock(
+          "a harmonic block of the preconditioner is singular (MUMPS INFOG(1) = -10 at pivot " +
+          std::to_string(id.infog[1]) + "): a free motion at this harmonic");
+    if (status() == -13)
+      throw RankFailure("there is not enough memory for the sparse factors",
+                        "MUMPS INFOG(1) = -13, INFOG(2) = " + std::to_string(id.infog[1]),
+                        "use more ranks on more machines, fewer harmonics or a reduced model");
     throw PetscFailure(std::string("MUMPS cannot ") + what + " a harmonic block: INFOG(1) = " +
                        std::to_string(status()) + ", INFOG(2) = " + std::to_string(id.infog[1]));
   }

@@ -1,5 +1,6 @@
 #pragma once
 #include "hb/harmonic_problem.h"
+#include "text.h"
 
 namespace fretwave::hb {
 
@@ -13,6 +14,7 @@ class StaticPreload : public HarmonicProblem {
   VecHandle initial();
   double parameter_value(double entry) const override { return entry; }
   double parameter_entry(double value) const override { return value; }
+  std::string parameter_text(double value) const override { return "load factor " + short_text(value); }
   void metric(Vec y, Vec weights) override { (void)y, check(VecSet(weights, 1)); }
 
  private:

@@ -65,8 +65,7 @@ void TravellingContact::linearise(WheelContact::Group const& group, std::vector<
           }
       }
   }
-  for (auto* A : {&L, &M})
-    MPI_Allreduce(MPI_IN_PLACE, A->data(), int(A->size()), MPI_C_DOUBLE_COMPLEX, MPI_SUM, comm_);
+  for (auto* A : {&L, &M}) sum_over_ranks(*A, comm_);
 }
 
 std::vector<complex> TravellingContact::eliminated(WheelContact::Group const& group, size_t wave,

@@ -18,11 +18,18 @@ std::vector<double> exchanged(std::vector<std::vector<double>> const& out, MPI_C
   const size_t size = out.size();
   std::vector<int> sent(size), received(size), from(size, 0), to(size, 0);
   std::vector<double> all;
+  PetscInt64 most = 0;
+  for (size_t r = 0; r < size; ++r) most += PetscInt64(out[r].size());
+  MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPIU_INT64, MPI_MAX, comm);
+  as_int(most, "numbers of a rank's contact pairs");
   for (size_t r = 0; r < size; ++r) {
     sent[r] = int(out[r].size());
     all.insert(all.end(), out[r].begin(), out[r].end());
   }
   MPI_Alltoall(sent.data(), 1, MPI_INT, received.data(), 1, MPI_INT, comm);
+  most = std::accumulate(received.begin(), received.end(), PetscInt64(0));
+  MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPIU_INT64, MPI_MAX, comm);
+  as_int(most, "numbers of a rank's contact pairs");
   std::exclusive_scan(sent.begin(), sent.end(), from.begin(), 0);
   std::exclusive_scan(received.begin(), received.end(), to.begin(), 0);
   std::vector<double> in(size_t(to.back()) + received.back());
@@ -135,7 +142,7 @@ void WheelContact::average(bool symmetric) {
               (symmetric ? (t(r, c) + t(c, r)) / 2.0 : t(r, c)) / double(sectors_.sectors());
         }
   }
-  MPI_Allreduce(MPI_IN_PLACE, tangents_.data(), int(tangents_.size()), MPI_C_DOUBLE_COMPLEX, MPI_SUM, comm_);
+  sum_over_ranks(tangents_, comm_);
 }
 
 /// dD of a group's pairs.

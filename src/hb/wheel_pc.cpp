@@ -1,10 +1,13 @@
 #include "hb/wheel_pc.h"
 
 #include <algorithm>
+#include <array>
 #include <cstdio>
+#include <map>
 #include <numbers>
 
 #include "error.h"
+#include "together.h"
 
 namespace fretwave::hb {
 
@@ -15,24 +18,37 @@ constexpr double far = 1e-2;     // change of the exponents that makes the block
 constexpr double pure = 0.999;   // share of the largest wave in a travelling one
 constexpr double faint = 1e-6;   // share of a wave in the motion that counts as none
 
-HarmonicProblem& repeating(HarmonicProblem& problem) {
-  model::Model const& model = problem.model();
-  for (auto const& contact : model.contacts()) {
-    const PetscInt sectors = model.dofs() / model.unit();
-    int pairs = contact.law->pairs();
-    MPI_Allreduce(MPI_IN_PLACE, &pairs, 1, MPI_INT, MPI_SUM, model.comm());
-    if (pairs % sectors != 0)
-      throw InputError("contact '" + contact.name + "' of a wheel is not the same in every sector",
-                       std::to_string(pairs) + " pairs in " + std::to_string(sectors) + " sectors",
-                       "as many in each", "build the wheel by Sector.wheel, or take the direct route");
-  }
-  return problem;
-}
-
 }  // namespace
 
+/// Every sector has the same pairs on the same of its dofs: those of a rank are numbered sector by sector.
+bool WheelPreconditioner::suits(HarmonicProblem const& problem) {
+  model::Model const& model = problem.model();
+  const PetscInt unit = model.unit(), sectors = model.dofs() / unit;
+  int repeats = model.dofs() % unit == 0;
+  for (auto const& contact : model.contacts()) {
+    PetscInt64 pairs = contact.law->pairs();
+    MPI_Allreduce(MPI_IN_PLACE, &pairs, 1, MPIU_INT64, MPI_SUM, model.comm());
+    if (pairs % sectors != 0 || !contact.ahead.empty()) return false;
+    const int d = contact.law->components(), in_sector = int(pairs / sectors);
+    // (pair in its sector, component, sectors ahead, dof) -> how many of this rank's pairs have it
+    std::map<std::array<PetscInt, 4>, int> places;
+    PetscInt begin;
+    check(MatGetOwnershipRange(contact.B, &begin, nullptr));
+    for_entries(contact.B, [&](PetscInt row, PetscInt dof, double) {
+      const int number = contact.numbers[(row - begin) / d];
+      const PetscInt ahead = (dof / unit - number / in_sector + sectors) % sectors;
+      ++places[{number % in_sector, (row - begin) % d, ahead, dof % unit}];
+    });
+    std::vector<int> mine(in_sector, 0);
+    for (int number : contact.numbers) ++mine[number % in_sector];
+    for (auto const& [place, count] : places) repeats = repeats && count == mine[size_t(place[0])];
+  }
+  MPI_Allreduce(MPI_IN_PLACE, &repeats, 1, MPI_INT, MPI_LAND, model.comm());
+  return repeats;
+}
+
 WheelPreconditioner::WheelPreconditioner(HarmonicProblem& problem)
-    : problem_(repeating(problem)),
+    : problem_(problem),
       unit_(int(problem.model().unit())),
       sectors_(int(problem.model().dofs() / problem.model().unit())),
       m_(problem.harmonics().block_size()),
@@ -72,7 +88,7 @@ WheelPreconditioner::Blocks WheelPreconditioner::average(Mat A) const {
   for (auto& [k, block] : all) {
     if (mine.contains(k)) block = std::move(mine[k]);
     block.resize(size_t(unit_) * unit_);
-    MPI_Allreduce(MPI_IN_PLACE, block.data(), int(block.size()), MPI_DOUBLE, MPI_SUM, problem_.comm());
+    sum_over_ranks(block, problem_.comm());
   }
   return all;
 }
@@ -100,7 +116,8 @@ std::vector<complex> WheelPreconditioner::rows_of(int diameter) const {
   std::vector<complex> B(size_t(contact_.rows()) * contact_dofs_);
   for (auto const& b : contact_.entries())
     B[size_t(b.row) * contact_dofs_ + position_[b.dof]] +=
-        std::polar(b.value, 2 * std::numbers::pi * double(size_t(b.ahead) * diameter % sectors_) / sectors_);
+        b.value *
+        std::polar(1.0, 2 * std::numbers::pi * double(size_t(b.ahead) * diameter % sectors_) / sectors_);
   return B;
 }
 
@@ -151,16 +168,19 @@ void WheelPreconditioner::factorise(Exponents const& e, std::vector<double> cons
   const auto at = [this](Exponents const& point) {
     return [this, &point](int harmonic) { return blocks(harmonic, point); };
   };
-  if (moved(e)) {
-    made_at_ = e;
-    contact_.average(symmetric());
-    inverse_->make([&](Wave const& wave) { return wave.harmonic != first; }, at(e));
-  }
+  const bool all = moved(e);
+  const Exponents kept = made_at_.value_or(e);
+  made_at_.reset();  // until every rank has its blocks
+  if (all) contact_.average(symmetric());
   Exponents shifted = e;
   shifted.s[first] *= 1 + beside;
-  inverse_->make([&](Wave const& wave) { return wave.harmonic == first && !moving(wave); }, at(e));
-  inverse_->make([&](Wave const& wave) { return wave.harmonic == first && moving(wave); }, at(shifted));
-  G_ = compliances();
+  together(problem_.comm(), "inverting the waves' blocks", [&] {
+    if (all) inverse_->make([&](Wave const& wave) { return wave.harmonic != first; }, at(e));
+    inverse_->make([&](Wave const& wave) { return wave.harmonic == first && !moving(wave); }, at(e));
+    inverse_->make([&](Wave const& wave) { return wave.harmonic == first && moving(wave); }, at(shifted));
+    G_ = compliances();
+  });
+  made_at_ = all ? e : kept;
 }
 
 /// This rank's harmonic blocks as sectors x harmonics x places, q = qc - i qs.
@@ -225,7 +245,7 @@ std::vector<complex> WheelPreconditioner::met(std::vector<double> const& shares)
         share += shares[d];
     for (size_t k = 0; k < square && share > 0; ++k) G[harmonic * square + k] += share * G_[w * square + k];
   }
-  MPI_Allreduce(MPI_IN_PLACE, G.data(), int(G.size()), MPI_C_DOUBLE_COMPLEX, MPI_SUM, problem_.comm());
+  sum_over_ranks(G, problem_.comm());
   return G;
 }
 

@@ -21,7 +21,9 @@ namespace fretwave::hb {
 /// among them: no vector stands whole anywhere.
 class WheelPreconditioner : public solve::Preconditioner {
  public:
-  /// `InputError` if the contact is not the same in all sectors.
+  /// The contact is the same in all sectors. Collective.
+  static bool suits(HarmonicProblem const&);
+  /// Of a problem that it suits. Collective.
   explicit WheelPreconditioner(HarmonicProblem&);
   void build(Vec y, Vec row) override;
   void apply(Vec x, Vec z) override;

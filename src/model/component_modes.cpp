@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "error.h"
+#include "model/inertia.h"
 #include "model/mode_orientation.h"
 
 namespace fretwave::model {
@@ -16,58 +17,10 @@ using EpsHandle = Handle<EPS, EPSDestroy>;
 using Modes = std::vector<ComponentMode>;
 
 constexpr double tolerance = 1e-11;  // of the residual; frequencies are exact to its square
-constexpr double null_pivot =
-    1e-13;  // relative to the scaled matrix; rounding leaves 1e-15 of a rigid motion
 constexpr PetscInt small = 500;
 
-Mat factor_of(KSP ksp) {
-  PC pc;
-  Mat factor;
-  check(KSPGetPC(ksp, &pc));
-  check(PCFactorGetMatrix(pc, &factor));
-  return factor;
-}
-
-void expect_factorised(KSP ksp) {
-  PC pc;
-  PCFailedReason reason;
-  PetscInt code;
-  check(KSPGetPC(ksp, &pc));
-  check(PCGetFailedReason(pc, &reason));
-  check(MatMumpsGetInfog(factor_of(ksp), 1, &code));
-  if (reason != PC_NOERROR || code < 0)
-    throw PetscFailure("the stiffness of the internal dofs could not be factorised: MUMPS INFOG(1) = " +
-                       std::to_string(code));
-}
-
-/// L D L^T by MUMPS, which also counts negative and null pivots.
-KspHandle factorise(Mat A) {
-  KspHandle ksp;
-  PC pc;
-  MPI_Comm comm;
-  check(PetscObjectGetComm(reinterpret_cast<PetscObject>(A), &comm));
-  check(KSPCreate(comm, ksp.out()));
-  check(KSPSetOptionsPrefix(ksp, "component_"));
-  check(KSPSetOperators(ksp, A, A));
-  check(KSPSetType(ksp, KSPPREONLY));
-  check(KSPGetPC(ksp, &pc));
-  check(PCSetType(pc, PCCHOLESKY));
-  check(PCFactorSetMatSolverType(pc, MATSOLVERMUMPS));
-  check(PCFactorSetUpMatSolverType(pc));
-  const Mat factor = factor_of(ksp);
-  check(MatMumpsSetIcntl(factor, 13, 1));  // no ScaLAPACK root, or its pivots are not counted
-  check(MatMumpsSetIcntl(factor, 24, 1));
-  check(MatMumpsSetCntl(factor, 3, null_pivot));
-  check(KSPSetFromOptions(ksp));
-  check(KSPSetUp(ksp));
-  expect_factorised(ksp);
-  return ksp;
-}
-
 void expect_held(KSP ksp) {
-  PetscInt null = 0, negative = 0;
-  check(MatMumpsGetInfog(factor_of(ksp), 28, &null));
-  check(MatMumpsGetInfog(factor_of(ksp), 12, &negative));
+  const PetscInt null = null_pivots(ksp), negative = negative_pivots(ksp);
   if (null > 0)
     throw InputError("the structure can still move freely when the kept dofs are held",
                      std::to_string(null) + " rigid motions or dofs without stiffness", "none",
@@ -92,9 +45,8 @@ FixedInterface::FixedInterface(Mat K, Mat M, IS internal) {
   check(PetscObjectGetComm(reinterpret_cast<PetscObject>(K), &comm_));
   check(MatCreateSubMatrix(K, internal, internal, MAT_INITIAL_MATRIX, K_.out()));
   check(MatCreateSubMatrix(M, internal, internal, MAT_INITIAL_MATRIX, M_.out()));
-  check(MatSetOption(K_, MAT_SYMMETRIC, PETSC_TRUE));
   check(MatSetOption(M_, MAT_SYMMETRIC, PETSC_TRUE));
-  ksp_ = factorise(K_);
+  ksp_ = symmetric_factor(K_, "component_");
   expect_held(ksp_);
 }
 
@@ -113,19 +65,6 @@ PetscInt FixedInterface::local_dofs() const {
 void FixedInterface::solve(Mat B, Mat X) const {
   check(KSPMatSolve(ksp_, B, X));
   expect_factorised(ksp_);
-}
-
-/// Number of modes up to omega: negative pivots of K_ii - omega^2 M_ii (Sylvester), which misses no double
-/// mode.
-PetscInt FixedInterface::count_below(double omega) const {
-  MatHandle A;
-  check(MatDuplicate(K_, MAT_COPY_VALUES, A.out()));
-  check(MatAXPY(A, -omega * omega, M_, DIFFERENT_NONZERO_PATTERN));
-  check(MatSetOption(A, MAT_SYMMETRIC, PETSC_TRUE));
-  PetscInt negative;
-  const KspHandle ksp = factorise(A);
-  check(MatMumpsGetInfog(factor_of(ksp), 12, &negative));
-  return negative;
 }
 
 /// Shift-invert about zero with the factorisation that the constraint modes have used.
@@ -198,7 +137,8 @@ Modes FixedInterface::all_modes() const {
 Modes FixedInterface::modes(ComponentModes wanted) {
   const bool by_frequency = wanted.highest_omega > 0;
   const bool dense = dofs() <= std::max(small, by_frequency ? 0 : 2 * wanted.count);
-  if (by_frequency && !dense) wanted.count = count_below(wanted.highest_omega);
+  if (by_frequency && !dense)
+    wanted.count = count_below(K_, M_, wanted.highest_omega * wanted.highest_omega, "component_");
   if (wanted.count == 0 && !(by_frequency && dense)) return {};
   // two more, so that a double mode is not cut before it is oriented
   Modes modes = dense ? all_modes() : krylov_modes(std::min(wanted.count + 2, dofs()));

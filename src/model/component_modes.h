@@ -32,7 +32,6 @@ class FixedInterface {
   std::vector<ComponentMode> modes(ComponentModes);
 
  private:
-  PetscInt count_below(double omega) const;
   std::vector<ComponentMode> krylov_modes(PetscInt count);
   std::vector<ComponentMode> all_modes() const;
 

@@ -4,6 +4,8 @@
 #include <cmath>
 
 #include "error.h"
+#include "fault.h"
+#include "together.h"
 
 namespace fretwave::model {
 
@@ -43,11 +45,14 @@ Model::Model(std::vector<Term> terms, std::vector<Contact> contacts, double thet
   check(MatGetSize(terms_[0].A, &global_, nullptr));
   check(MatGetLocalSize(terms_[0].A, &local_, nullptr));
   check(MatGetOwnershipRange(terms_[0].A, &first_, nullptr));
-  for (auto const& term : terms_) check_term(term, local_, global_);
-  for (auto const& contact : contacts_) {
-    check_map(contact, contact.B, local_, global_);
-    for (auto const& map : contact.ahead) check_map(contact, map.B, local_, global_);
-  }
+  together(comm_, "checking the model", [this] {
+    fault::point("model");
+    for (auto const& term : terms_) check_term(term, local_, global_);
+    for (auto const& contact : contacts_) {
+      check_map(contact, contact.B, local_, global_);
+      for (auto const& map : contact.ahead) check_map(contact, map.B, local_, global_);
+    }
+  });
 }
 
 MatHandle Model::sum(int order) const {

@@ -1,6 +1,5 @@
 #include "model/modes.h"
 
-#include <slepceps.h>
 #include <slepcpep.h>
 
 #include <algorithm>
@@ -9,14 +8,17 @@
 #include <functional>
 
 #include "error.h"
+#include "fault.h"
+#include "model/lowest_pairs.h"
+#include "model/mode_orientation.h"
 #include "model/phases.h"
+#include "together.h"
 
 namespace fretwave::model {
 
 namespace {
 
 using namespace std::complex_literals;
-using EpsHandle = Handle<EPS, EPSDestroy>;
 using PepHandle = Handle<PEP, PEPDestroy>;
 
 constexpr double tolerance = 1e-13;
@@ -210,12 +212,13 @@ bool orthonormalise(Mat M, std::vector<VecHandle> const& found, bool travelling,
   double before, share, after;
   check(MatMult(M, x, Mx));
   check(VecDot(x, Mx, &before));
-  for (size_t k = 0; travelling && k < found.size(); ++k) {
-    const VecHandle other = turned(found[k]);
-    for (Vec basis : {Vec(found[k]), Vec(other)}) {
-      check(VecDot(basis, Mx, &share));
-      check(VecAXPY(x, -share, basis));
-    }
+  const auto remove = [&](Vec basis) {
+    check(VecDot(basis, Mx, &share));
+    check(VecAXPY(x, -share, basis));
+  };
+  for (auto const& mode : found) {
+    remove(mode);
+    if (travelling) remove(turned(mode));
   }
   check(MatMult(M, x, Mx));
   check(VecDot(x, Mx, &after));
@@ -245,30 +248,20 @@ std::vector<LinearMode> undamped(Model const& model, int count, bool stuck) {
   const PetscInt wanted = std::min<PetscInt>(count, model.dofs() - rows_of(G) / copies);
   if (wanted < 1)
     throw InputError("the stuck contact leaves no degree of freedom", "0", ">= 1", "use contact = \"free\"");
-  EpsHandle eps;
-  check(EPSCreate(AB.comm(), eps.out()));
-  check(EPSSetOptionsPrefix(eps, "modes_"));
-  check(EPSSetOperators(eps, AB[0], AB[1]));
-  check(EPSSetProblemType(eps, EPS_GHEP));
-  check(EPSSetDimensions(eps, copies * wanted, PETSC_DEFAULT, PETSC_DEFAULT));
-  check(EPSSetTolerances(eps, tolerance, 1000));
-  check(EPSSetWhichEigenpairs(eps, EPS_TARGET_MAGNITUDE));
-  // a little below zero: K may be singular (rigid motions), K - target M is not
-  check(EPSSetTarget(eps, -1e-8 * scale));
-  ST st;
-  check(EPSGetST(eps, &st));
-  use_mumps(st);
-  check(EPSSetFromOptions(eps));
-  check(EPSSolve(eps));
-  PetscInt converged;
-  check(EPSGetConverged(eps, &converged));
+  // a little below zero: K may be singular (rigid motions), K - shift M is not
+  const auto pairs = lowest_pairs({.K = AB[0],
+                                   .M = AB[1],
+                                   .size = copies * model.dofs() - rows_of(G),
+                                   .constraints = rows_of(G),
+                                   .shift = -1e-8 * scale,
+                                   .rounding = rounding(K, M)},
+                                  copies * wanted);
   std::vector<LinearMode> modes;
   std::vector<VecHandle> found;
-  for (PetscInt k = 0; k < converged && PetscInt(modes.size()) < wanted; ++k) {
-    double value;
-    VecHandle x;
-    check(MatCreateVecs(AB[0], x.out(), nullptr));
-    check(EPSGetEigenpair(eps, k, &value, nullptr, x, nullptr));
+  for (auto const& [value, vector] : pairs) {
+    if (PetscInt(modes.size()) == wanted) break;
+    VecHandle x = like(vector);
+    check(VecCopy(vector, x));
     if (!orthonormalise(AB[1], found, travelling, x)) continue;
     modes.push_back({std::sqrt(std::max(value, 0.0)), 0, {}, {}});
     take_shape(model, AB, x, nullptr, modes.back());
@@ -282,12 +275,15 @@ struct RestTangent {
   std::vector<double> stiffness, damping;
 };
 
-RestTangent rest_tangent(contact::Law const& law) {
+RestTangent rest_tangent(contact::Law const& law, MPI_Comm comm) {
   const int d = law.components(), n = law.pairs();
   std::vector<double> zero(size_t(d) * n), f(size_t(d) * n);
   contact::Record record;
-  law.force({.samples = 1, .components = d, .pairs = n, .u = zero.data(), .v = zero.data(), .step = 1},
-            f.data(), record);
+  together(comm, "contact at rest", [&] {
+    fault::point("contact at rest");
+    law.force({.samples = 1, .components = d, .pairs = n, .u = zero.data(), .v = zero.data(), .step = 1},
+              f.data(), record);
+  });
   RestTangent out{zero, zero};
   for (int c = 0; c < d; ++c)
     for (int i = 0; i < n; ++i) {
@@ -328,7 +324,7 @@ std::vector<LinearMode> damped(Model const& model, int count) {
   const int copies = travelling ? 2 : 1;
   auto stiffness = required(model, 0, "stiffness"), damping = terms_of(model, 1);
   for (auto const& contact : model.contacts()) {
-    const RestTangent rest = rest_tangent(*contact.law);
+    const RestTangent rest = rest_tangent(*contact.law, model.comm());
     const int d = contact.law->components();
     add_contact(stiffness, contact, [&](int c, int i) { return rest.stiffness[size_t(i) * d + c]; });
     add_contact(damping, contact, [&](int c, int i) { return rest.damping[size_t(i) * d + c]; });
@@ -361,7 +357,9 @@ std::vector<LinearMode> damped(Model const& model, int count) {
   check(PEPSetFromOptions(pep));
   check(PEPSolve(pep));
   PetscInt converged;
+  PEPConvergedReason reason;
   check(PEPGetConverged(pep, &converged));
+  check(PEPGetConvergedReason(pep, &reason));
   std::vector<LinearMode> modes;
   VecHandle x, y;
   check(MatCreateVecs(terms[0], x.out(), y.out()));
@@ -373,6 +371,9 @@ std::vector<LinearMode> damped(Model const& model, int count) {
     take_shape(model, terms, x, y, mode);
     if (!travelling || is_new(mode, modes)) modes.push_back(std::move(mode));
   }
+  if (reason < 0 && PetscInt(modes.size()) < std::min<PetscInt>(count, model.dofs()))
+    throw PetscFailure("damped linear modes: " + std::to_string(modes.size()) + " of " +
+                       std::to_string(count) + " converged; raise -modes_pep_max_it or -modes_pep_ncv");
   return modes;
 }
 

@@ -29,9 +29,7 @@ void multiply(char const* op_a, char const* op_b, std::array<PetscInt, 3> size, 
   BLASgemm_(op_a, op_b, &n[0], &n[1], &n[2], &one, A.data, &n[3], B.data, &n[4], &zero, C, &n[5]);
 }
 
-void add_over_ranks(MPI_Comm comm, std::vector<double>& values) {
-  MPI_Allreduce(MPI_IN_PLACE, values.data(), int(values.size()), MPI_DOUBLE, MPI_SUM, comm);
-}
+void add_over_ranks(MPI_Comm comm, std::vector<double>& values) { sum_over_ranks(values, comm); }
 
 /// This rank's rows of a dense matrix, column by column, for the guard's lifetime.
 class DenseArray {

@@ -7,35 +7,11 @@ namespace fretwave::solve {
 
 namespace {
 
-constexpr double kink_length =
-    1e-4;  // a turn that is left in so short a step is a kink (a sample changes state), not curvature
-constexpr double test_noise = 1e-11;  // a test function closer to zero than this has no sign
-
-VecHandle copy(Vec v) {
-  VecHandle w = like(v);
-  check(VecCopy(v, w));
-  return w;
-}
-
-VecHandle zero_like(Vec v) {
-  VecHandle w = like(v);
-  check(VecSet(w, 0));
-  return w;
-}
-
-double weighted_norm(Vec weights, Vec t) {
-  VecHandle wt = like(t);
-  double square;
-  check(VecPointwiseMult(wt, weights, t));
-  check(VecDot(wt, t, &square));
-  return std::sqrt(square);
-}
-
-bool crosses(TestFunction const& before, TestFunction const& after) {
-  const bool falls = before.value > test_noise && after.value < -test_noise;
-  const bool rises = before.value < -test_noise && after.value > test_noise;
-  return falls || (rises && !before.falling_only);
-}
+// A turn that is left in so short a step is a kink (a sample changes state), not curvature.
+constexpr double kink_length = 1e-4;
+constexpr double kink_angle = 0.02;  // [rad] in so short a step
+constexpr int certain = 3;           // meetings with earlier points of the branch in a row
+constexpr double at_the_end = 1e-9;  // relative: a branch that starts here starts at the end of its range
 
 }  // namespace
 
@@ -49,8 +25,7 @@ Continuation::Continuation(Problem& problem, std::string const& prefix, double l
       report_at_(std::move(report_at)) {
   row_ = problem.unknowns();
   weights_ = like(row_);
-  parameter_row_ = like(row_);
-  check(VecSet(parameter_row_, 0));
+  parameter_row_ = zero_like(row_);
   set_last_entry(parameter_row_, 1);
   clock_ = MPI_Wtime();
 }
@@ -63,7 +38,7 @@ void Continuation::finish(std::string reason, bool converged) {
 
 Point Continuation::point(Trial&& trial, std::string event, double step) {
   Point p;
-  p.parameter = problem_.parameter_value(last_entry(trial.y));
+  p.parameter = parameter_of(trial.y);
   p.y = std::move(trial.y), p.tangent = std::move(trial.tangent);
   p.outcome = std::move(trial.outcome);
   p.event = std::move(event), p.step = step;
@@ -79,210 +54,222 @@ std::vector<TestFunction> Continuation::tests(Vec y, Vec tangent) {
   return all;
 }
 
-/// Newton on the system closed by row . y = value, then the unit tangent there, oriented along the row.
-bool Continuation::correct(Trial& trial, Vec row, double value) {
+/// Newton on the system closed by row . y = value, then the unit tangent there, oriented along `tangent_row`.
+bool Continuation::correct(Trial& trial, Vec row, double value, Vec tangent_row) {
   newton_.system().close(row, value);
   trial.outcome = newton_.solve(trial.y);
   if (!trial.outcome.converged) return false;
+  if (const std::string why = problem_.impossible(trial.y); !why.empty()) {
+    trial.outcome.reason = why;
+    return false;
+  }
   trial.tangent = anchor_.tangent ? copy(anchor_.tangent) : zero_like(trial.y);
-  if (row != Vec(row_)) newton_.system().close(row_, row_value_);
+  if (tangent_row != row) newton_.system().close(tangent_row, 0);
   if (!newton_.tangent(trial.y, trial.tangent)) {
     trial.outcome.reason = "the linear solve for the tangent fails";
     return false;
   }
   VecHandle weights = like(trial.y);
   problem_.metric(trial.y, weights);
-  check(VecScale(trial.tangent, 1 / weighted_norm(weights, trial.tangent)));
+  const double size = weighted_norm(weights, trial.tangent);
+  if (!std::isfinite(size)) {
+    trial.outcome.reason = "the tangent is not finite";
+    return false;
+  }
+  check(VecScale(trial.tangent, 1 / size));
   trial.tests = tests(trial.y, trial.tangent);
   return true;
 }
 
 std::optional<Point> Continuation::start(Vec y0, bool upwards) {
-  Trial trial{.y = copy(y0), .tangent = {}, .outcome = {}, .tests = {}};
+  Trial trial = at(copy(y0));
+  finished_ = false;  // an earlier start may have failed
   check(VecCopy(parameter_row_, row_));
   row_value_ = last_entry(y0);
-  if (!correct(trial, row_, row_value_)) {
+  upwards_ = upwards;
+  if (!correct(trial, row_, row_value_, row_)) {
     finish("no solution at the start: " + trial.outcome.reason, false);
     return {};
   }
   if ((last_entry(trial.tangent) > 0) != upwards) check(VecScale(trial.tangent, -1));
   anchor_ = {.y = copy(trial.y), .tangent = copy(trial.tangent), .step = steps_.initial, .index = 1};
+  began_ = parameter_of(trial.y);
   prepare_row();
+  (void)trail_.add(anchor_.y, anchor_.tangent);
   return point(std::move(trial), "start", 0);
 }
 
-void Continuation::restore(Vec y, Vec tangent, double step, int index, int emitted) {
-  anchor_ = {.y = copy(y), .tangent = copy(tangent), .step = step, .index = index};
+std::optional<Point> Continuation::restore(Anchor anchor, Anchor before, int emitted, bool upwards,
+                                           double began) {
+  anchor_ = std::move(anchor), before_ = std::move(before);
+  upwards_ = upwards, began_ = began;
   prepare_row();
+  (void)trail_.add(anchor_.y, anchor_.tangent);
+  if (emitted == 0) return {};
   make_batch();
-  emitted_ = emitted;
+  emitted_ = std::min(emitted, int(batch_.size()));
+  if (emitted_ < emitted) miss("a point handed out before the interruption", "it is not met again");
+  if (emitted_ == 0) return {};
+  return std::move(batch_[emitted_ - 1].second);
 }
 
 /// Closing row W t at the anchor: row . (y - y_anchor) is the arclength.
 void Continuation::prepare_row() {
   problem_.metric(anchor_.y, weights_);
   check(VecPointwiseMult(row_, weights_, anchor_.tangent));
-  check(VecDot(row_, anchor_.y, &row_value_));
+  row_value_ = dot(row_, anchor_.y);
   anchor_tests_ = tests(anchor_.y, anchor_.tangent);
 }
 
-/// How far the corrector moved from the tangent's prediction.
-double Continuation::deviation(Vec y, double length) const {
-  VecHandle moved = like(y);
-  check(VecWAXPY(moved, -1, anchor_.y, y));
-  check(VecAXPY(moved, -length, anchor_.tangent));
-  return weighted_norm(weights_, moved);
+/// Angle between the anchor's tangent and the trial's [rad].
+double Continuation::turn_of(Trial const& trial) const {
+  return std::acos(std::clamp(dot(row_, trial.tangent), -1.0, 1.0));
 }
 
-/// A kink may turn the branch by more than a right angle. The tangent behind it that agrees with the one
-/// before then leads back, where the tangent is the old one; only along the right sign does it stay.
-void Continuation::orient_past_kink(Trial& trial) {
-  VecHandle weights = like(trial.y), row = like(trial.y);
-  problem_.metric(trial.y, weights);
-  check(VecPointwiseMult(row, weights, trial.tangent));
-  double here;
-  check(VecDot(row, trial.y, &here));
-  const auto stays = [&](double length) {
-    Trial probe{.y = copy(trial.y), .tangent = {}, .outcome = {}, .tests = {}};
-    check(VecAXPY(probe.y, length, trial.tangent));
-    double along;
-    if (!correct(probe, row, here + length)) return false;
-    check(VecDot(row, probe.tangent, &along));
-    return std::abs(along) > std::cos(steps_.max_angle);
-  };
-  if (stays(kink_length) || !stays(-kink_length)) return;
-  check(VecScale(trial.tangent, -1));
-  trial.tests = tests(trial.y, trial.tangent);
+/// Distance of the anchor from the cubic through its neighbours, y'''' (H L)^2 / 24 for steps H and L, scaled
+/// to the error y'''' L^4 / 384 of the cubic over the new step.
+double Continuation::interpolation_error(Trial const& trial, double length) const {
+  if (!before_.y) return 0;
+  const double last = weighted_norm(weights_, moved(anchor_.y, -1, before_.y)),
+               now = weighted_norm(weights_, moved(trial.y, -1, anchor_.y));
+  if (!(last > length / 8)) return 0;  // too short a step to tell
+  const Hermite across(before_.y, before_.tangent, trial.y, trial.tangent, last + now);
+  const double ratio = now / last;
+  return weighted_norm(weights_, moved(across.value(last), -1, anchor_.y)) * std::min(ratio * ratio, 4.0) /
+         16;
 }
 
-/// One accepted step from the anchor; halves the length on failure or when the branch turns too much.
-std::optional<Continuation::Trial> Continuation::step(double& length, double& angle, double& next_length) {
-  std::string why = "the branch turns too sharply";
+/// What speaks against a corrected trial as the next point; nothing if it is one.
+std::string Continuation::complaint(Trial& trial, double length, bool may_shorten) {
+  const VecHandle predicted = moved(anchor_.y, length, anchor_.tangent);
+  if (!(weighted_norm(weights_, moved(trial.y, -1, predicted)) <= length))
+    return "the corrector lands on another branch";
+  const double angle = turn_of(trial);
+  if (may_shorten && angle > steps_.max_angle) return "the branch turns too sharply";
+  if (may_shorten && interpolation_error(trial, length) > steps_.max_error)
+    return "the branch bends more than a step resolves";
+  if (may_shorten || angle < kink_angle) return "";
+  const int sign = orientation(trial.y, trial.tangent);
+  if (sign == 0) return angle > steps_.max_angle ? "the branch turns too sharply" : "";
+  if (sign < 0) {
+    check(VecScale(trial.tangent, -1));
+    trial.tests = tests(trial.y, trial.tangent);
+  }
+  turned_ = angle > steps_.max_angle;
+  return "";
+}
+
+/// One accepted step from the anchor; halves the length on failure or when the branch bends too much, and
+/// turns a corner that no shorter step gets round.
+std::optional<Continuation::Trial> Continuation::step(double& length, double& next_length) {
+  std::string why;
+  const bool after_corner = std::exchange(turned_, false);
   for (length = anchor_.step; length >= steps_.minimum; length /= 2) {
-    Trial trial{.y = copy(anchor_.y), .tangent = {}, .outcome = {}, .tests = {}};
-    check(VecAXPY(trial.y, length, anchor_.tangent));
-    if (!correct(trial, row_, row_value_ + length)) {
-      why = trial.outcome.reason;
-      continue;
-    }
-    double along;
-    check(VecDot(row_, trial.tangent, &along));
-    angle = std::acos(std::clamp(along, -1.0, 1.0));
     const bool may_shorten = length > std::max(kink_length, 16 * steps_.minimum);
-    if (angle > steps_.max_angle && may_shorten) continue;
-    if (may_shorten && deviation(trial.y, length) > length) {
-      why = "the corrector lands on another branch";
-      continue;
+    Trial trial = at(moved(anchor_.y, length, anchor_.tangent));
+    why = correct(trial, row_, row_value_ + length, row_) ? complaint(trial, length, may_shorten)
+                                                          : trial.outcome.reason;
+    if (!why.empty() && !may_shorten) {
+      if (auto behind = turn_corner(length)) {
+        trial = std::move(*behind);
+        turned_ = true;
+        why.clear();
+      }
     }
-    const double by_newton = std::exp2((steps_.target_newton - trial.outcome.newton) / 2.0);
-    const double by_angle = 0.5 * steps_.max_angle / std::max(angle, 1e-12);
-    next_length = std::min(steps_.maximum, length * std::clamp(std::min(by_newton, by_angle), 0.4, 2.0));
-    if (angle > steps_.max_angle) {
-      orient_past_kink(trial);
-      next_length = std::min(steps_.maximum, kink_length);  // behind it the branch is smooth again
-    }
+    if (!why.empty()) continue;
+    const double by_angle = turned_ ? 1.0 : 0.5 * steps_.max_angle / std::max(turn_of(trial), 1e-12),
+                 by_error = std::pow(
+                     0.5 * steps_.max_error / std::max(interpolation_error(trial, length), 1e-16), 0.25);
+    const bool shortened = length < anchor_.step;
+    const double most = shortened ? 1.0 : after_corner || length < kink_length ? 4.0 : 2.0;
+    next_length = std::min(steps_.maximum, length * std::clamp(std::min(by_angle, by_error), 0.3, most));
     return trial;
   }
   finish("step too small: " + why, false);
   return {};
 }
 
-/// Cubic Hermite interpolation between the anchor and the end of the step.
-void Continuation::interpolate(Trial const& end, double length, double at, Vec y) const {
-  const double x = at / length;
-  const double h00 = (1 + 2 * x) * (1 - x) * (1 - x), h10 = x * (1 - x) * (1 - x), h01 = x * x * (3 - 2 * x),
-               h11 = x * x * (x - 1);
-  Vec parts[4] = {anchor_.y, anchor_.tangent, end.y, end.tangent};
-  const double factors[4] = {h00, h10 * length, h01, h11 * length};
-  check(VecSet(y, 0));
-  check(VecMAXPY(y, 4, factors, parts));
-}
-
-void Continuation::emit(Trial&& trial, double at, std::string event) {
-  batch_.emplace_back(at, point(std::move(trial), std::move(event), at));
-}
-
-/// The branch at a given parameter inside the step.
-void Continuation::reach(double value, std::string const& event, Trial const& end, double length) {
-  const double target = problem_.parameter_entry(value), from = last_entry(anchor_.y), to = last_entry(end.y);
-  const double at = length * (target - from) / (to - from);
-  Trial trial{.y = like(end.y), .tangent = {}, .outcome = {}, .tests = {}};
-  interpolate(end, length, at, trial.y);
-  if (correct(trial, parameter_row_, target)) emit(std::move(trial), at, event);
-}
-
-/// Root of a test function on the step by the Illinois form of regula falsi in arclength. Where flags of
-/// sampled contact make the function jump it can only bisect: eight trials are enough then for an extremum.
-void Continuation::locate(TestFunction const& before, size_t which, Trial const& end, double length) {
-  double a = 0, b = length, fa = before.value, fb = end.tests[which].value;
-  const double precision = (before.extremum ? 1e-6 : 1e-9) * length;
-  const int trials = before.extremum ? 8 : 12;
-  std::optional<std::pair<double, Trial>> best;
-  int side = 0;
-  for (int iteration = 0; iteration < trials && std::abs(b - a) > precision; ++iteration) {
-    const double at = (a * fb - b * fa) / (fb - fa);
-    Trial trial{.y = like(end.y), .tangent = {}, .outcome = {}, .tests = {}};
-    interpolate(end, length, at, trial.y);
-    if (!correct(trial, row_, row_value_ + at)) break;
-    const double f = trial.tests[which].value;
-    const bool done = std::abs(f) < 1e-12 || (best && std::abs(at - best->first) < precision);
-    best = {at, std::move(trial)};
-    if (done) break;
-    const int now = (f > 0) == (fb > 0) ? +1 : -1;
-    double& kept = now > 0 ? fa : fb;  // the end kept twice in a row is given half its value
-    if (now == side) kept /= 2;
-    (now > 0 ? b : a) = at, (now > 0 ? fb : fa) = f;
-    side = now;
+/// Whether the branch passes places again where it has been; it ends then. Each suspicion is confirmed by
+/// Newton on the plane through such a place, and three in a row are certainty: sheets may lie side by side.
+bool Continuation::been_here(Trial const& trial) {
+  const auto meeting = trail_.add(trial.y, trial.tangent);
+  if (!meeting || !passes(trial, *meeting)) {
+    meetings_ = 0;
+    return false;
   }
-  if (best) emit(std::move(best->second), best->first, before.name);
+  if (++meetings_ < certain) return false;
+  const std::string where = problem_.parameter_text(parameter_of(trial.y));
+  finish(meeting->forwards ? "the branch is a closed loop: it comes back to " + where + ", where it has been"
+                           : "the branch turns back onto itself: it passes " + where + " a second time",
+         false);
+  return true;
 }
 
-void Continuation::locate_events(Trial const& end, double length) {
-  for (size_t k = 0; k < anchor_tests_.size(); ++k)
-    if (crosses(anchor_tests_[k], end.tests[k])) locate(anchor_tests_[k], k, end, length);
-  const double from = problem_.parameter_value(last_entry(anchor_.y)),
-               to = problem_.parameter_value(last_entry(end.y));
-  for (double value : report_at_)
-    if ((from < value) != (to < value) && from != value) reach(value, "report", end, length);
+bool Continuation::passes(Trial const& trial, Trail::Meeting const& meeting) {
+  Trial there = at(moved(trial.y, meeting.along, trial.tangent));
+  const VecHandle expected = copy(there.y);
+  VecHandle row = like(trial.y);
+  Trail::fill(row, meeting.functional);
+  if (!correct(there, row, meeting.place[meeting.functional], row_)) return false;
+  const double off = weighted_norm(weights_, moved(there.y, -1, expected));
+  return off <= 0.1 * std::abs(meeting.along) + 1e-8 && Trail::same(there.y, meeting.place);
+}
+
+/// The branch has left its range at this end.
+void Continuation::arrive(double reached) {
+  const double goal = upwards_ ? high_ : low_;
+  arrived_ = reached == goal;
+  const std::string end = problem_.parameter_text(reached);
+  if (arrived_)
+    ending_ = "stop value reached";
+  else if (std::abs(began_ - reached) <= at_the_end * std::abs(reached))
+    ending_ = "the branch comes back to " + end + ", where it began, without reaching " +
+              problem_.parameter_text(goal);
+  else
+    ending_ = "the branch turns round and leaves its range at " + end + " instead of " +
+              problem_.parameter_text(goal);
 }
 
 /// All points of the next step in order: events inside it, then its end (or the stop value).
 void Continuation::make_batch() {
   batch_.clear();
   emitted_ = 0;
-  double length, angle, next_length;
-  auto end = step(length, angle, next_length);
-  if (!end) return;
+  double length, next_length;
+  auto end = step(length, next_length);
+  if (!end || been_here(*end)) return;
   locate_events(*end, length);
-  const double reached = problem_.parameter_value(last_entry(end->y));
-  stop_after_batch_ = reached <= low_ || reached >= high_;
+  ending_ = problem_.beyond(end->y);
   after_ = {.y = copy(end->y), .tangent = copy(end->tangent), .step = next_length, .index = 0};
-  if (stop_after_batch_)
-    reach(reached <= low_ ? low_ : high_, "stop", *end, length);
-  else
-    emit(std::move(*end), length, "");
+  const double reached = parameter_of(end->y);
+  const bool outside = reached <= low_ || reached >= high_;
+  if (!outside) emit(std::move(*end), length, "");
   std::stable_sort(batch_.begin(), batch_.end(),
                    [](auto const& x, auto const& y) { return x.first < y.first; });
   const auto stop =
       std::find_if(batch_.begin(), batch_.end(), [](auto const& x) { return x.second.event == "stop"; });
-  if (stop != batch_.end()) batch_.erase(stop + 1, batch_.end());
-  if (stop_after_batch_ && stop == batch_.end() && length / 2 >= steps_.minimum) {
-    anchor_.step = length / 2;  // a long step's interpolation is too far from the branch
-    return make_batch();
-  }
-  if (stop_after_batch_ && stop == batch_.end())
+  if (stop != batch_.end()) {
+    const double value = stop->second.parameter;
+    batch_.erase(stop + 1, batch_.end());
+    arrive(std::abs(value - low_) < std::abs(value - high_) ? low_ : high_);
+  } else if (outside) {
+    if (length / 2 >= steps_.minimum) {
+      anchor_.step = length / 2;  // a long step's interpolation is too far from the branch
+      return make_batch();
+    }
     finish("the stop value is not reached: the corrector fails there", false);
+  }
   after_.index = anchor_.index + int(batch_.size());
 }
 
 std::optional<Point> Continuation::next() {
   if (finished_) return {};
   if (emitted_ == int(batch_.size())) {
-    if (stop_after_batch_) {
-      finish("stop value reached", true);
+    if (!ending_.empty()) {
+      finish(ending_, arrived_);
       return {};
     }
     if (!batch_.empty()) {
+      before_ = std::move(anchor_);
       anchor_ = std::move(after_);
       prepare_row();
     }

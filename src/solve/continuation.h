@@ -1,18 +1,20 @@
 #pragma once
 #include <deque>
-#include <functional>
 #include <optional>
 
+#include "solve/hermite.h"
 #include "solve/newton.h"
+#include "solve/trail.h"
 
 namespace fretwave::solve {
 
 /// How long the arclength steps are. The weighted norm of the unknowns is about 1, so a step of 0.1 is a
-/// tenth of it.
+/// tenth of it. Lengths follow from converged points alone (turn, error of interpolation), never from
+/// iteration counts: the same branch has the same points on any number of ranks.
 struct StepControl {
   double initial = 0.05, minimum = 1e-9, maximum = 0.3;
-  int target_newton = 4;   ///< longer steps below, shorter above
-  double max_angle = 0.6;  ///< [rad] between neighbouring tangents; a step that turns more is halved
+  double max_angle = 0.6;   ///< [rad] between neighbouring tangents; a step that turns more is halved
+  double max_error = 5e-4;  ///< between the branch and the cubic through its points; likewise
   int max_points = 5000;
 };
 
@@ -26,31 +28,39 @@ struct Point {
 };
 
 /// Pseudo-arclength continuation of a problem's branch: tangent predictor, SNES corrector on the bordered
-/// system (Keller 1977).
+/// system (Keller 1977), corners passed by the orientation of Allgower & Georg (2003).
 class Continuation {
  public:
-  Continuation(Problem&, std::string const& prefix, double low, double high, StepControl,
-               std::vector<double> report_at);
-  Continuation(Continuation const&) = delete;
-  /// Newton at the parameter of y0, or the last state of an earlier run (anchor, tangent, ...). Collective.
-  std::optional<Point> start(Vec y0, bool upwards);
-  void restore(Vec y, Vec tangent, double step, int index, int emitted);
-  /// The next point, or none with a reason. Collective.
-  std::optional<Point> next();
-
-  std::string const& reason() const { return reason_; }
-  bool converged() const { return converged_; }
-  Newton& newton() { return newton_; }
-
-  /// What `restore` needs to go on bit for bit: the last anchor, and how many points of the step after it
-  /// were handed out.
+  /// What `restore` needs to go on: the last anchor, the one before it, and how many points of the step after
+  /// it were handed out.
   struct Anchor {
     VecHandle y, tangent;
     double step = 0;
     int index = 0;
   };
+
+  Continuation(Problem&, std::string const& prefix, double low, double high, StepControl,
+               std::vector<double> report_at);
+  Continuation(Continuation const&) = delete;
+  /// Newton at the parameter of y0. The branch is to reach `high` if it is to go upwards, else `low`.
+  /// Collective.
+  std::optional<Point> start(Vec y0, bool upwards);
+  /// The last state of an earlier run; `before` may be empty. Returns what was the last point handed out.
+  /// Collective.
+  std::optional<Point> restore(Anchor anchor, Anchor before, int emitted, bool upwards, double began);
+  /// The next point, or none with a reason. Collective.
+  std::optional<Point> next();
+
+  std::string const& reason() const { return reason_; }
+  bool converged() const { return converged_; }
+  /// Points that were asked for or seen and could not be had, each with its reason.
+  std::vector<std::string> const& missed() const { return missed_; }
+  Newton& newton() { return newton_; }
   Anchor const& anchor() const { return anchor_; }
+  Anchor const& before() const { return before_; }
   int emitted() const { return emitted_; }
+  bool upwards() const { return upwards_; }
+  double began() const { return began_; }
 
  private:
   struct Trial {
@@ -58,33 +68,63 @@ class Continuation {
     Outcome outcome;
     std::vector<TestFunction> tests;
   };
-  bool correct(Trial&, Vec row, double value);
-  void orient_past_kink(Trial& trial);
-  std::optional<Trial> step(double& length, double& angle, double& next_length);
-  double deviation(Vec y, double length) const;
-  void make_batch();
-  void locate_events(Trial const& end, double length);
-  void locate(TestFunction const& before, size_t which, Trial const& end, double length);
-  void reach(double value, std::string const& event, Trial const& end, double length);
-  void interpolate(Trial const& end, double length, double at, Vec y) const;
-  void emit(Trial&&, double at, std::string event);
+  /// A place inside the present step that Newton has been to.
+  struct Place {
+    double at, value;
+  };
+
+  // The corrector (continuation.cpp)
+  Trial at(VecHandle y) const { return {.y = std::move(y), .tangent = {}, .outcome = {}, .tests = {}}; }
+  bool correct(Trial&, Vec row, double value, Vec tangent_row);
   std::vector<TestFunction> tests(Vec y, Vec tangent);
   void prepare_row();
-  Point point(Trial&&, std::string event, double step);
+  double turn_of(Trial const&) const;
+  double interpolation_error(Trial const&, double length) const;
+  std::string complaint(Trial&, double length, bool may_shorten);
+  std::optional<Trial> step(double& length, double& next_length);
   void finish(std::string reason, bool converged);
+  Point point(Trial&&, std::string event, double step);
+  void make_batch();
+  void arrive(double reached);
+  bool been_here(Trial const&);
+  bool passes(Trial const&, Trail::Meeting const&);
+
+  // Corners of the branch (corner.cpp)
+  int determinant(Vec y, Vec row);
+  int orientation(Vec y, Vec tangent);
+  std::optional<Trial> turn_corner(double reach);
+
+  // What lies inside a step (events.cpp)
+  void locate_events(Trial const& end, double length);
+  void locate(size_t which, std::vector<Place> const& scan, Trial const& end, Hermite const&, double length);
+  std::optional<Trial> root(size_t which, Place a, Place b, double guess, Hermite const&, double length,
+                            double& found);
+  void reach(double value, std::string const& event, Place a, Place b, Hermite const&, double length);
+  void polish(Trial&, double target);
+  std::optional<Trial> reach_along(double target, Place a, Place b, Hermite const&);
+  void locate_values(Trial const& end, Hermite const&, double length);
+  void emit(Trial&&, double at, std::string event);
+  void miss(std::string const& what, std::string const& why);
+  double parameter_of(Vec y) const { return problem_.parameter_value(last_entry(y)); }
 
   Problem& problem_;
   Newton newton_;
   double low_, high_;
   StepControl steps_;
   std::vector<double> report_at_;
-  Anchor anchor_, after_;
+  Anchor anchor_, before_, after_;
   std::vector<TestFunction> anchor_tests_;
+  std::vector<int> signs_;  ///< of the test functions where they last had one
   VecHandle row_, weights_, parameter_row_;
-  double row_value_ = 0;
+  double row_value_ = 0, began_ = 0;
   std::vector<std::pair<double, Point>> batch_;  ///< points of the present step by arclength
-  int emitted_ = 0, index_ = 0;
-  bool finished_ = false, stop_after_batch_ = false, converged_ = false;
+  std::vector<double> folds_;                    ///< arclengths of the folds in it
+  std::vector<std::string> missed_;
+  Trail trail_;
+  int emitted_ = 0, index_ = 0, meetings_ = 0;
+  bool upwards_ = true, turned_ = false, finished_ = false, converged_ = false;
+  std::string ending_;  ///< reason to stop once the batch is handed out
+  bool arrived_ = false;
   std::string reason_;
   double clock_ = 0;
 };

@@ -1,8 +1,7 @@
 #pragma once
-#include <exception>
 #include <string>
 
-#include "solve/bordered.h"
+#include "solve/linear_solver.h"
 
 namespace fretwave::solve {
 
@@ -10,12 +9,15 @@ struct Outcome {
   bool converged = false;
   int newton = 0, linear = 0;
   double residual = 0;
-  std::string reason;  ///< PETSc's converged or diverged reason
+  std::string reason;     ///< PETSc's converged or diverged reason, or ours
+  bool accepted = false;  ///< by the tolerance; a converged solve that is not ended at rounding
+  double rounding = 0;    ///< expected in the residual
+  /// Newton iterations as exact linear solves would have needed them: a measure of the branch, not of
+  /// options.
+  double effort = 0;
 };
 
-/// SNES on a bordered problem. Two routes to the same corrector (DESIGN section 4), chosen by size or by
-/// -<prefix>route: direct (assembled, LU) and krylov (matrix-free product, the problem's own preconditioner,
-/// rebuilt when iterations rise). PETSc options apply under the prefix; ours are only its defaults.
+/// SNES on a bordered problem, whose linear systems `LinearSolver` solves.
 class Newton {
  public:
   Newton(Problem&, std::string const& prefix);
@@ -23,7 +25,7 @@ class Newton {
   Bordered& system() { return bordered_; }
   SNES snes() const { return snes_; }
   /// "direct" or "krylov", with the reason of the choice.
-  std::string route() const;
+  std::string route() const { return linear_->route(); }
   /// Solves from y, in place; y is the last iterate when it does not converge. Collective.
   Outcome solve(Vec y);
   /// Tangent at y: J t = 0, row . t = 1 with the closing row. t holds a guess (zero, or the last tangent),
@@ -37,29 +39,19 @@ class Newton {
                                   PetscReal residual, SNESConvergedReason*, void*);
   static PetscErrorCode form_function(SNES, Vec, Vec, void*);
   static PetscErrorCode form_jacobian(SNES, Vec, Mat, Mat, void*);
-  static PetscErrorCode shell_product(Mat, Vec, Vec);
-  static PetscErrorCode shell_precondition(PC, Vec, Vec);
-  void choose_route(std::string const& prefix);
-  void use_direct();
-  void use_krylov();
-  bool solve_linear(Vec b, Vec x);
-  void linearise(Vec y);
-  void count_iterations();
-  bool at_rounding(Vec y);
+  Outcome solve_scaled(Vec y);
+  SNESConvergedReason judge(Vec y, double unknowns, double step, double residual, double residual_before);
+  bool below_tolerance(double residual, bool started) const;
+  bool stuck_at_rounding(Vec y);
+  double last_effect(Vec y);
+  double last_effort(double reduction) const;
 
   Bordered bordered_;
-  MatHandle J_;
   SnesHandle snes_;
-  VecHandle right_side_, point_;
-  std::unique_ptr<Preconditioner> preconditioner_;
-  bool stale_ = true;
-  int fresh_ = -1;          ///< Krylov iterations of the first solve after a build; -1: none yet
-  int excess_ = 0;          ///< iterations beyond that, of all solves since
-  double first_reuse_ = 0;  ///< iterations beyond it that the first reuse cost when it was last tried, halved
-                            ///< at every build since
+  std::unique_ptr<LinearSolver> linear_;
+  VecHandle right_side_;
   double residual_before_ = 0;  ///< at the iteration before
-  std::string route_;
-  std::exception_ptr exception_;
+  double effort_ = 0;           ///< of the iterations so far
 };
 
 }  // namespace fretwave::solve

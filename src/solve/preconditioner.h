@@ -12,6 +12,8 @@ class Preconditioner {
   /// Factorise at y with the closing row. Collective.
   virtual void build(Vec y, Vec row) = 0;
   virtual void apply(Vec x, Vec z) = 0;
+  /// Why the last build gave nothing to apply (a singular block), the same on every rank; empty if it did.
+  virtual std::string failure() const { return {}; }
   /// What building costs, in Krylov iterations.
   virtual double build_cost() const = 0;
   /// One line for the log, with its memory once it is built.

@@ -32,6 +32,10 @@ class Problem {
   virtual void residual(Vec y, Vec r) = 0;
   /// Rounding error to expect in r(y): Newton stops there. Collective.
   virtual double rounding(Vec /*y*/) { return 0; }
+  /// Measures the rows in the forces that act at y from now on; true if that changed them. Collective.
+  virtual bool scale(Vec /*y*/) { return false; }
+  /// Relative change of what is read from y by a small step dy; 0 if nothing is known. Collective.
+  virtual double effect(Vec /*y*/, Vec /*dy*/) { return 0; }
   /// dr = J(y) dy, J is N x (N + 1). Collective.
   virtual void product(Vec y, Vec dy, Vec dr) = 0;
   /// Global places of J's entries contributed by this rank, and their values in the same order (places may
@@ -50,6 +54,12 @@ class Problem {
   /// What users call the parameter (an amplitude, a frequency) from the entry of y, and back.
   virtual double parameter_value(double entry) const = 0;
   virtual double parameter_entry(double value) const = 0;
+  /// A value of the parameter in words.
+  virtual std::string parameter_text(double value) const { return std::to_string(value); }
+  /// Why a solution cannot be a point of the branch (a frequency below zero); nothing if it can. Collective.
+  virtual std::string impossible(Vec /*y*/) { return {}; }
+  /// Why the branch leads nowhere from here (it grows without bound); nothing while it does. Collective.
+  virtual std::string beyond(Vec /*y*/) { return {}; }
 
   bool last_rank() const { return comm_rank(comm()) == comm_size(comm()) - 1; }
   VecHandle equations() const { return make_vector(comm(), local_equations()); }

@@ -12,6 +12,17 @@ from ..schema import StepSection
 
 #: Events at which the contact's motion over a period is kept.
 PLAIN_EVENTS = ("", "step")
+#: A slider's distance from where it began its period is rounding below these shares of slip path and amplitude.
+UNCLOSED_OF_PATH, UNCLOSED_OF_AMPLITUDE = 1e-6, 1e-12
+
+
+def closure_note(row: Mapping[str, Any]) -> str:
+    """What a point's line says of sliders that do not close their period; empty where they do."""
+    unclosed, path = row["unclosed"], row["slip_path"]
+    if not unclosed > max(UNCLOSED_OF_PATH * path, UNCLOSED_OF_AMPLITUDE * abs(row["amplitude"])):
+        return ""
+    share = f"{100 * unclosed / path:.2g} % of the longest slip path" if path > 0 else "no slip in the period"
+    return f"  note: a slider ends {unclosed:.1e} m from where it began ({share})"
 
 
 def step_control(step: StepSection) -> Any:
@@ -41,6 +52,9 @@ def record(
     dict
         The row as written.
     """
+    from .. import _core
+
+    _core.fault_point("record")
     state, diagnostics = problem.state(point.y), problem.diagnostics(point.y)
     row = {
         **state,
@@ -50,6 +64,8 @@ def record(
         "newton": point.newton,
         "linear": point.linear,
         "wall_s": point.wall_s,
+        "rounding": point.rounding,
+        "accepted": point.accepted,
         "event": point.event,
     }
     motions = None
@@ -82,6 +98,25 @@ def mode_problem(context: Any, harmonics: Any, mode: Any, rest: Any, dof: int | 
     if rest is not None:
         problem.preload(rest.displacement, rest.load)
     return problem
+
+
+def tell(context: Any, branch: Any, name: str = "") -> None:
+    """Say how a branch began, how well a resumed one meets its last point, and what it could not have. Collective.
+
+    Kept in run.json too, under `branches`.
+    """
+    name = name or context.name
+    lines = [f"started: {branch.started}"] if branch.started else []
+    if branch.repeated is not None:
+        last = branch.repeated
+        lines.append(
+            f"resumed at {last.parameter:.6g}; its last point is solved again to a residual of {last.residual:.1e}"
+        )
+    lines += [f"missed: {text}" for text in branch.missed]
+    for line in lines:
+        context.console.line(f"{name}: {line}")
+    if lines:
+        context.entry.setdefault("branches", {})[name] = lines
 
 
 def points_of(branch: Any) -> Iterator[Any]:

@@ -29,12 +29,15 @@ class Excitation:
     reference : LinearMode
         Scales the unknowns.
     rest : Preload or None
+    phase : float or None
+        Of the last point of the response [rad]: the next one's is the nearest to it, no jump by 2 pi.
     """
 
     context: AnalysisContext
     harmonics: Any
     reference: Any
     rest: Any
+    phase: float | None = None
 
     @property
     def analysis(self) -> ForcedAnalysis:
@@ -90,9 +93,13 @@ class Excitation:
     def row(self, problem: Any, y: Any, coefficients: Any) -> dict[str, Any]:
         """Their values at a point; of the blades on the rank that has coefficients. Collective."""
         order = self.analysis.engine_order
-        row: dict[str, Any] = {}
+        state = problem.state(y)
+        # A first phase near -pi and pi, where undamped motion stands, reads as -pi.
+        around = self.phase if self.phase is not None else -0.5 * math.pi
+        self.phase = state["phase"] + 2.0 * math.pi * round((around - state["phase"]) / (2.0 * math.pi))
+        row: dict[str, Any] = {"phase": self.phase}
         if order:
-            row["speed_rpm"] = speed_rpm(problem.state(y)["omega"], order)
+            row["speed_rpm"] = speed_rpm(state["omega"], order)
         if self.context.case.wheel is not None and coefficients is not None:
             observed = coefficients[self.context.case.places(self.analysis.observe)]
             blades = np.abs(complex_amplitudes(self.harmonics.labels, observed)[1])
@@ -104,11 +111,11 @@ def excitation_of(context: AnalysisContext, harmonics: Any) -> Excitation:
     """Of a forced analysis; a wheel's unknowns are scaled by the tuned wave that its force drives. Collective."""
     analysis: Any = context.analysis
     if context.case.wheel is None:
-        return Excitation(context, harmonics, *start_mode(context, analysis.linear_mode))
+        return Excitation(context, harmonics, *start_mode(context, analysis.linear_mode, or_free=True))
     from ..cyclic import wave_mode
 
     with tuned_sector(context) as sector:
-        tuned, _ = start_mode(sector, analysis.linear_mode)
+        tuned, _ = start_mode(sector, analysis.linear_mode, or_free=True)
     rest = rest_state(context)
     return Excitation(context, harmonics, wave_mode(tuned, analysis.nodal_diameter, context.case.wheel.sectors), rest)
 

@@ -19,7 +19,7 @@ from typing import Any
 from ..aerodynamics_case import diameters_of
 from ..columns import FLUTTER
 from ..schema import FlutterAnalysis
-from .branch import finished_table, mode_problem, open_branch, points_of, record, step_control
+from .branch import closure_note, finished_table, mode_problem, open_branch, points_of, record, step_control, tell
 from .context import AnalysisContext, Outcome
 from .flutter_waves import STABLE, describe_waves, with_sign, words
 from .mode import point_line
@@ -81,6 +81,7 @@ class _Wave:
             for point in points_of(branch):
                 own = {"wave_number": self.number}
                 self._say(record(writer, problem, point, branch.snapshot(), own, self._column))
+            tell(self.context, branch, f"{self.context.name}: nodal diameter {self.diameter}")
             stopped = "" if branch.converged else f"nodal diameter {self.diameter}: {branch.reason}"
             branch.destroy()
             problem.destroy()
@@ -107,7 +108,8 @@ class _Wave:
         low, high = self.analysis.amplitude
         share = (self.number + math.log(row["amplitude"] / low) / math.log(high / low)) / self.count
         line = point_line(f"{self.context.name} ND {with_sign(self.diameter):>3}", dict(row))
-        self.context.console.point(line, line, share, notable=row["event"] not in ("", "start", "stop"))
+        notable = row["event"] not in ("", "start", "stop") or bool(closure_note(row))
+        self.context.console.point(line, line, share, notable)
 
 
 def _write(context: AnalysisContext, waves: Sequence[Mapping[str, Any]], cycles: Sequence[Mapping[str, Any]]) -> None:

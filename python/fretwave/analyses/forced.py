@@ -5,9 +5,12 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
+
 from ..columns import FORCED
+from ..harmonic_motion import complex_amplitudes
 from ..schema import ForcedAnalysis
-from .branch import finished_table, open_branch, points_of, record
+from .branch import closure_note, finished_table, open_branch, points_of, record, tell
 from .context import AnalysisContext, Outcome
 from .excitation import Excitation, excitation_of
 from .forced_time import time_points
@@ -67,7 +70,8 @@ def _all_levels(context: AnalysisContext, analysis: ForcedAnalysis, excitation: 
     if analysis.time_points and writer.rows:
         summary += time_points(context, table, analysis.time_points)
     goal = f"{analysis.frequency[1]:g} Hz at every level"
-    return Outcome(writer.rows, reason, not stopped, summary, goal)
+    advice = "lower levels, or damping that takes their work" if "without bound" in reason else ""
+    return Outcome(writer.rows, reason, not stopped, summary, goal, advice)
 
 
 def _one_level(excitation: Excitation, writer: Any, number: int, snapshot: Any, go_on: bool) -> str:
@@ -76,14 +80,36 @@ def _one_level(excitation: Excitation, writer: Any, number: int, snapshot: Any, 
     low, high = (2.0 * math.pi * hertz for hertz in analysis.frequency)
     problem = excitation.problem(analysis.levels[number])
     branch = excitation.branch(problem, snapshot, go_on)
+    table = finished_table(writer) if go_on else {}
+    excitation.phase = context.comm.bcast(float(table["phase"][-1]) if table else None)
     for point in points_of(branch):
         row = record(writer, problem, point, branch.snapshot(), {"level_number": number}, excitation.row)
         share = (number + (row["omega"] - low) / (high - low)) / len(analysis.levels)
-        context.console.point(point_line(context.name, row), _short(row), share, _notable(row["event"]))
+        context.console.point(
+            point_line(context.name, row), _short(row), share, _notable(row["event"]) or bool(closure_note(row))
+        )
+    tell(context, branch, f"{context.name}: level {analysis.levels[number]:g}")
     stopped = "" if branch.converged else f"level {analysis.levels[number]:g}: {branch.reason}"
+    if "without bound" in stopped:
+        most = _bounded(excitation, problem, branch.anchor)
+        stopped += f": damping and friction take at most the work of level {most:.4g}"
     branch.destroy()
     problem.destroy()
     return stopped
+
+
+def _bounded(excitation: Excitation, problem: Any, y: Any) -> float:
+    """Level whose work damping and friction still take in the shape of the motion at y. Collective.
+
+    The work that a force at level 1 does at most, at a right angle to the motion, is pi |q_1^H P| per period.
+    """
+    taken = problem.energy(y)
+    coefficients = problem.coefficients(y)
+    work = None
+    if coefficients is not None:
+        q = complex_amplitudes(excitation.harmonics.labels, coefficients)[1]
+        work = math.pi * abs(np.vdot(q, excitation.force()))
+    return float((taken["contact"] + taken["damping"]) / excitation.context.comm.bcast(work))
 
 
 def _notable(event: str) -> bool:
@@ -98,6 +124,7 @@ def point_line(name: str, row: dict[str, Any]) -> str:
         f"  stick {100 * row['stick']:3.0f} %  error {row['error_estimate']:.1e}"
         f"  newton {row['newton']:2d}  {row['wall_s']:.3f} s"
         + (f"  {row['event'].replace('_', ' ')}" if row["event"] else "")
+        + closure_note(row)
     )
 
 
@@ -127,7 +154,7 @@ def _peaks(context: AnalysisContext, table: dict[str, Any], curves: dict[str, Mo
     """Write the peaks of all levels with their distance from the backbones; a line for each level."""
     if not table:
         return []
-    peaks = peak_table({key: table[key] for key in ("level", "omega", "amplitude", "phase")}, curves)
+    peaks = peak_table({key: table[key] for key in ("level", "omega", "amplitude", "phase", "event")}, curves)
     context.write_table("peaks", peaks)
     lines = [
         f"{context.name}: {len(table['level'])} points, {len(peaks['level'])} levels,"

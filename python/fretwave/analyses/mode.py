@@ -12,7 +12,7 @@ import numpy as np
 from ..columns import MODE
 from ..schema import ModeAnalysis
 from .asymptotes import asymptote_line
-from .branch import finished_table, mode_problem, open_branch, points_of, record, step_control
+from .branch import closure_note, finished_table, mode_problem, open_branch, points_of, record, step_control, tell
 from .context import AnalysisContext, Outcome
 from .rest import keep_pairs, retained
 from .wheel_shape import WHEEL, WheelShape, finish_wheel, one_by_one
@@ -71,7 +71,10 @@ def _follow(context: AnalysisContext, analysis: ModeAnalysis, problem: Any, writ
             if error_at is not None and math.isclose(row["amplitude"], error_at, rel_tol=1e-9):
                 context.console.line(_reduction_error(context, problem, point, row))
             share = math.log(row["amplitude"] / low) / math.log(high / low)
-            context.console.point(point_line(context.name, row), _short(row), share, notable=bool(row["event"]))
+            context.console.point(
+                point_line(context.name, row), _short(row), share, bool(row["event"] or closure_note(row))
+            )
+    tell(context, branch)
     outcome = _finish(context, writer, branch, start)
     outcome.goal = f"amplitude {high:g} m"
     branch.destroy()
@@ -112,6 +115,7 @@ def point_line(name: str, row: dict[str, Any]) -> str:
         f"  zeta {_percent(row['zeta'], 4):>8} %  stick {100 * row['stick']:3.0f} %"
         f"  error {row['error_estimate']:.1e}  newton {row['newton']:2d}  {row['wall_s']:.3f} s"
         + (f"  {row['event'].replace('_', ' ')}" if row["event"] else "")
+        + closure_note(row)
     )
 
 

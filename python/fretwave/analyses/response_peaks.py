@@ -29,8 +29,18 @@ class Peak:
 NOWHERE = Peak(np.nan, np.nan)
 
 
+def located_peak(omega: Array, amplitude: Array, event: npt.NDArray[np.str_]) -> Peak:
+    """Largest amplitude of a response, located on its branch (event ``peak``); none at the ends of the range."""
+    top = int(np.argmax(amplitude))
+    peaks = np.flatnonzero(["peak" in text.split() for text in event])
+    if top in (0, len(amplitude) - 1) or not len(peaks):
+        return NOWHERE
+    highest = peaks[np.argmax(amplitude[peaks])]
+    return Peak(float(omega[highest]), float(amplitude[highest]))
+
+
 def amplitude_peak(omega: Array, amplitude: Array) -> Peak:
-    """Largest amplitude; none at the ends of the range.
+    """Largest amplitude of a motion that is not observed (a blade of many); none at the ends of the range.
 
     1/a^2, which is almost a parabola of the frequency at a resonance, is drawn through the three points around the
     largest one. Across the top of a response the frequency never turns round, even where the curve folds.
@@ -80,7 +90,7 @@ def peak_table(forced: Mapping[str, Array], modes: Mapping[str, ModeCurve]) -> d
     """
     levels = np.unique(forced["level"])
     rows = [{key: value[forced["level"] == level] for key, value in forced.items()} for level in levels]
-    peaks = [amplitude_peak(row["omega"], row["amplitude"]) for row in rows]
+    peaks = [located_peak(row["omega"], row["amplitude"], row["event"]) for row in rows]
     turns = [quadrature(row["omega"], row["amplitude"], row["phase"]) for row in rows]
     table = {"level": levels, **_columns("", peaks), **_columns("quadrature_", turns)}
     for name, mode in modes.items():

@@ -74,8 +74,13 @@ def closed_mode(context: AnalysisContext) -> Any:
         return fretwave.linear_modes(model, 1)[0]
 
 
-def start_mode(context: AnalysisContext, linear_mode: int) -> tuple[Any, Any]:
-    """The linear mode with the contact as it is at rest, stuck, and the rest state (or None). Collective."""
+def start_mode(context: AnalysisContext, linear_mode: int, or_free: bool = False) -> tuple[Any, Any]:
+    """The linear mode with the contact as it is at rest, stuck, and the rest state (or None). Collective.
+
+    Parameters
+    ----------
+    or_free : where contact that sticks leaves nothing to move, the mode without it (a scale for forced motions)
+    """
     rest = rest_state(context)
     if rest is not None:
         context.console.line(
@@ -83,7 +88,12 @@ def start_mode(context: AnalysisContext, linear_mode: int) -> tuple[Any, Any]:
             f" {100 * rest.open:.3g} % are open"
         )
         context.arrays["rest_displacement"] = rest.displacement
-    modes = context.linear_mode("stuck", linear_mode)
+    try:
+        modes = context.linear_mode("stuck", linear_mode)
+    except InputError:
+        if not or_free:
+            raise
+        modes = context.linear_mode("free", linear_mode)
     start = modes[linear_mode - 1]
     if start.omega <= RIGID * closed_mode(context).omega:
         is_open = 1.0 if rest is None else rest.open

@@ -1,0 +1,92 @@
+"""Every table of every case on 1, 2, 3 and 4 ranks: the same rows, and every number to 1e-8 of its column's maximum.
+
+    .venv/bin/python cases/robustness/ranks.py [--cases two_dof ...] [--ranks 1 2 3 4] [--full]
+
+Runs each case in its short form and writes one line a table: rows on each number of ranks, and the largest difference
+of any entry from one rank with its column. Columns that say how a point was solved (iterations, residual, wall time)
+are left out. Exit 1 if a table differs.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[2]
+#: How a point was solved, not what it is; quantities at rounding level.
+WORK = {"wall_s", "newton", "linear", "residual", "rounding", "accepted", "unfolding", "energy_error", "unclosed"}
+SAME = 1e-8
+Table = dict[str, list[str]]
+
+
+def read(path: Path) -> Table:
+    with path.open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    return {name: [row[name] for row in rows] for name in (rows[0] if rows else {})}
+
+
+def run(case: str, ranks: int, out: Path, full: bool) -> int:
+    command = ["mpirun", "-n", str(ranks)] if ranks > 1 else []
+    command += [str(ROOT / ".venv/bin/fretwave"), "run", str(ROOT / "cases" / case / "case.toml"), "--out", str(out)]
+    done = subprocess.run([*command, "--no-plots", *([] if full else ["--quick"])], capture_output=True, text=True)
+    if done.returncode:
+        print(done.stderr[-2000:])
+    return done.returncode
+
+
+def difference(one: Table, other: Table) -> tuple[float, str]:
+    """Largest difference of two tables with as many rows, relative to the column's maximum, and its column."""
+    worst, where = 0.0, "-"
+    for name, values in one.items():
+        if name in WORK or name not in other:
+            continue
+        try:
+            a, b = (np.array([float(v) for v in column]) for column in (values, other[name]))
+        except ValueError:
+            apart = float(values != other[name])
+        else:
+            size = np.nanmax(np.abs(a), initial=0.0) or 1.0
+            apart = float(np.nanmax(np.abs(a - b), initial=0.0) / size)
+            apart = np.inf if (np.isnan(a) != np.isnan(b)).any() else apart
+        if apart > worst:
+            worst, where = apart, name
+    return worst, where
+
+
+def compare(case: str, ranks: list[int], folder: Path, full: bool) -> bool:
+    """Run a case on each number of ranks and print a line a table."""
+    outs = {n: folder / f"{case}-{n}" for n in ranks}
+    codes = {n: run(case, n, out, full) for n, out in outs.items()}
+    good = not any(codes.values())
+    for path in sorted(outs[ranks[0]].glob("*.csv")):
+        tables = {n: read(out / path.name) if (out / path.name).exists() else {} for n, out in outs.items()}
+        rows = {n: len(next(iter(table.values()), [])) for n, table in tables.items()}
+        same = len(set(rows.values())) == 1
+        apart = [difference(tables[ranks[0]], tables[n]) for n in ranks[1:]] if same else [(np.inf, "rows")]
+        worst, where = max(apart, default=(0.0, "-"))
+        counts = ", ".join(str(count) for count in rows.values())
+        print(f"| {case} | {path.name} | {counts} | {worst:.1e} | {where} |", flush=True)
+        good &= worst <= SAME
+    return good
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    cases = sorted(path.parent.name for path in (ROOT / "cases").glob("*/case.toml"))
+    parser.add_argument("--cases", nargs="+", default=cases)
+    parser.add_argument("--ranks", nargs="+", type=int, default=[1, 2, 3, 4])
+    parser.add_argument("--full", action="store_true", help="not the short form")
+    told = parser.parse_args()
+    print(f"| case | table | rows on {told.ranks} ranks | largest difference | column |\n|---|---|---|---:|---|")
+    with tempfile.TemporaryDirectory() as folder:
+        return 0 if all([compare(case, told.ranks, Path(folder), told.full) for case in told.cases]) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

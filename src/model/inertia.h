@@ -1,0 +1,20 @@
+#pragma once
+#include <string>
+
+#include "petsc.h"
+
+namespace fretwave::model {
+
+/// L D L^T of a symmetric matrix by MUMPS, which also counts negative and null pivots. `PetscFailure` where
+/// there is none. Collective.
+KspHandle symmetric_factor(Mat A, std::string const& prefix);
+/// `PetscFailure` if the factorisation, or the solve just made with it, failed. Collective.
+void expect_factorised(KSP);
+PetscInt negative_pivots(KSP);
+PetscInt null_pivots(KSP);
+
+/// Number of eigenvalues of K x = lambda M x below lambda, for M without negative ones: negative pivots of
+/// K - lambda M (Sylvester's law of inertia), which misses no multiple one. Collective.
+PetscInt count_below(Mat K, Mat M, double lambda, std::string const& prefix);
+
+}  // namespace fretwave::model

@@ -1,0 +1,141 @@
+#include "model/lowest_pairs.h"
+
+#include <slepceps.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "model/inertia.h"
+
+namespace fretwave::model {
+
+namespace {
+
+using EpsHandle = Handle<EPS, EPSDestroy>;
+using Pairs = std::vector<EigenPair>;
+
+constexpr double tolerance = 1e-13;
+constexpr double resolution = 1e-9;  // relative distance below which eigenvalues count as one
+constexpr PetscInt beyond = 2;       // more than wanted, to find a gap behind them
+constexpr int searches = 5;
+
+MPI_Comm comm_of(Mat A) {
+  MPI_Comm comm;
+  check(PetscObjectGetComm(reinterpret_cast<PetscObject>(A), &comm));
+  return comm;
+}
+
+/// LU: the saddle point of rigid contact is indefinite.
+void shift_invert(ST st) {
+  KSP ksp;
+  PC pc;
+  check(STSetType(st, STSINVERT));
+  check(STGetKSP(st, &ksp));
+  check(KSPSetType(ksp, KSPPREONLY));
+  check(KSPGetPC(ksp, &pc));
+  check(PCSetType(pc, PCLU));
+  check(PCFactorSetMatSolverType(pc, MATSOLVERMUMPS));
+}
+
+struct Search {
+  bool more, diverged;
+};
+
+/// Up to `count` eigenpairs orthogonal to those found, which they join.
+Search search(Pencil const& pencil, PetscInt count, Pairs& found) {
+  EpsHandle eps;
+  ST st;
+  check(EPSCreate(comm_of(pencil.K), eps.out()));
+  check(EPSSetOptionsPrefix(eps, "modes_"));
+  check(EPSSetOperators(eps, pencil.K, pencil.M));
+  check(EPSSetProblemType(eps, EPS_GHEP));
+  check(EPSSetDimensions(eps, count, PETSC_DEFAULT, PETSC_DEFAULT));
+  check(EPSSetTolerances(eps, tolerance, 1000));
+  check(EPSSetWhichEigenpairs(eps, EPS_TARGET_MAGNITUDE));
+  check(EPSSetTarget(eps, pencil.shift));
+  check(EPSGetST(eps, &st));
+  shift_invert(st);
+  std::vector<Vec> known;
+  for (auto const& pair : found) known.push_back(pair.vector);
+  if (!known.empty()) check(EPSSetDeflationSpace(eps, PetscInt(known.size()), known.data()));
+  check(EPSSetFromOptions(eps));
+  check(EPSSolve(eps));
+  PetscInt converged;
+  EPSConvergedReason reason;
+  check(EPSGetConverged(eps, &converged));
+  check(EPSGetConvergedReason(eps, &reason));
+  const size_t before = found.size();
+  for (PetscInt k = 0; k < converged && PetscInt(found.size()) < pencil.size; ++k) {
+    EigenPair pair;
+    check(MatCreateVecs(pencil.K, pair.vector.out(), nullptr));
+    check(EPSGetEigenpair(eps, k, &pair.value, nullptr, pair.vector, nullptr));
+    if (std::isfinite(pair.value)) found.push_back(std::move(pair));  // else: a motion without mass
+  }
+  std::sort(found.begin(), found.end(), [](auto const& a, auto const& b) { return a.value < b.value; });
+  return {found.size() > before, reason < 0};
+}
+
+double width(Pencil const& pencil, double value) {
+  return std::max(resolution * std::abs(value), pencil.rounding);
+}
+
+/// Behind the wanted ones in the first gap, or behind the last.
+double bound(Pencil const& pencil, PetscInt count, Pairs const& found) {
+  for (size_t k = size_t(count); k < found.size(); ++k) {
+    const double below = found[k - 1].value, above = found[k].value;
+    if (above - below > 20 * width(pencil, above)) return (below + above) / 2;
+  }
+  return found.back().value + 10 * width(pencil, found.back().value);
+}
+
+PetscInt found_below(double lambda, Pairs const& found) {
+  return PetscInt(std::count_if(found.begin(), found.end(), [&](auto const& p) { return p.value < lambda; }));
+}
+
+/// Eigenvalues between the lowest found, or the shift, and a bound. Only those of a structure that is
+/// unstable lie below.
+PetscInt counted_below(Pencil const& pencil, double lambda, Pairs const& found) {
+  const PetscInt all = count_below(pencil.K, pencil.M, lambda, "modes_count_") - pencil.constraints;
+  if (all <= found_below(lambda, found)) return all;
+  const double lowest = std::min(pencil.shift, found.front().value);
+  const double floor = lowest - 10 * width(pencil, lowest) - std::abs(pencil.shift);
+  return all - (count_below(pencil.K, pencil.M, floor, "modes_count_") - pencil.constraints);
+}
+
+[[noreturn]] void name_short(PetscInt found, PetscInt count) {
+  throw PetscFailure("linear modes: " + std::to_string(found) + " of " + std::to_string(count) +
+                     " converged; raise -modes_eps_max_it or -modes_eps_ncv");
+}
+
+[[noreturn]] void name_missing(PetscInt missing, double lambda) {
+  throw PetscFailure("linear modes: " + std::to_string(missing) + " of those below " +
+                     std::to_string(std::sqrt(std::max(lambda, 0.0))) +
+                     " rad/s do not converge, by the number of negative pivots; raise -modes_eps_max_it or "
+                     "-modes_eps_ncv");
+}
+
+}  // namespace
+
+std::vector<EigenPair> lowest_pairs(Pencil const& pencil, PetscInt count) {
+  Pairs found;
+  PetscInt wanted = std::min(count + beyond, pencil.size), missing = 0;
+  double lambda = 0;
+  for (int k = 0; k < searches; ++k) {
+    const auto [more, diverged] = search(pencil, wanted, found);
+    if (PetscInt(found.size()) >= pencil.size) return found;
+    if (PetscInt(found.size()) < count) {
+      if (!more && diverged) name_short(PetscInt(found.size()), count);
+      if (!more) return found;  // the others have no mass
+      wanted = std::min(count + beyond, pencil.size) - PetscInt(found.size());
+      continue;
+    }
+    lambda = bound(pencil, count, found);
+    missing = counted_below(pencil, lambda, found) - found_below(lambda, found);
+    if (missing <= 0) return found;
+    wanted = std::min(missing + beyond, pencil.size - PetscInt(found.size()));
+  }
+  if (missing > 0) name_missing(missing, lambda);
+  return found;
+}
+
+}  // namespace fretwave::model

@@ -1,0 +1,29 @@
+#pragma once
+#include <vector>
+
+#include "petsc.h"
+
+namespace fretwave::model {
+
+/// An eigenvalue with its vector, of unit length in M.
+struct EigenPair {
+  double value;
+  VecHandle vector;
+};
+
+/// The pencil K x = lambda M x of symmetric matrices, M without negative eigenvalues.
+struct Pencil {
+  Mat K, M;
+  PetscInt size;         ///< number of finite eigenvalues, at most
+  PetscInt constraints;  ///< rows of a saddle point's constraints: each has a negative pivot
+  double shift;          ///< where K - shift M is regular, next to the eigenvalues wanted
+  double rounding;       ///< what rounding in K leaves in an eigenvalue
+};
+
+/// The `count` eigenvalues next to the shift, or more, ascending, by SLEPc with shift-invert under the prefix
+/// "modes_". Those up to the last are counted by inertia: what the Krylov space has missed (further copies of
+/// multiple eigenvalues, members of a family) is searched for among the vectors orthogonal to those found.
+/// `PetscFailure` names what is still missing then. Collective.
+std::vector<EigenPair> lowest_pairs(Pencil const&, PetscInt count);
+
+}  // namespace fretwave::model

@@ -1,0 +1,237 @@
+#include <algorithm>
+#include <cmath>
+
+#include "solve/continuation.h"
+
+/// Points inside a step: zeros of test functions, reported values, the stop value. They are looked for on the
+/// cubic through the step's ends, several of a kind if it has several, and corrected by Newton.
+namespace fretwave::solve {
+
+namespace {
+
+constexpr int nodes = 8;               // parts of a step in which its cubic is looked at
+constexpr double test_noise = 1e-11;   // a test function closer to zero than this has no sign
+constexpr double near_zero = 0.3;      // of the smaller end value: so low a minimum may hide two zeros
+constexpr double jump = 0.1;           // of the end values: what is left where a test function jumps
+constexpr double value_error = 1e-9;   // relative, of a reported value reached along the branch
+constexpr double off_the_curve = 0.5;  // of the step: a solution farther from the cubic is another branch
+
+int sign_of(double value) { return value > test_noise ? 1 : value < -test_noise ? -1 : 0; }
+
+/// Zero of the straight line between two places.
+double secant(double a, double fa, double b, double fb) { return (a * fb - b * fa) / (fb - fa); }
+
+}  // namespace
+
+void Continuation::emit(Trial&& trial, double at, std::string event) {
+  batch_.emplace_back(at, point(std::move(trial), std::move(event), at));
+}
+
+void Continuation::miss(std::string const& what, std::string const& why) {
+  missed_.push_back(what + ": " + why);
+}
+
+void Continuation::locate_events(Trial const& end, double length) {
+  const double along = dot(row_, end.tangent);
+  const Hermite curve(anchor_.y, anchor_.tangent, end.y, end.tangent, length,
+                      along > 0.2 ? 1 / along : 1);  // dy/ds = t / (row . t), row . (y - anchor) = s
+  folds_.clear();
+  std::vector<std::vector<Place>> scans(end.tests.size());
+  for (int node = 0; node <= nodes; ++node) {
+    const double at = length * node / nodes;
+    const auto values = node == 0       ? anchor_tests_
+                        : node == nodes ? end.tests
+                                        : tests(curve.value(at), curve.derivative(at));
+    for (size_t k = 0; k < scans.size(); ++k) scans[k].push_back({at, values[k].value});
+  }
+  if (signs_.size() != scans.size()) {
+    signs_.clear();
+    for (auto const& test : anchor_tests_) signs_.push_back(sign_of(test.value));
+  }
+  for (size_t k = 0; k < scans.size(); ++k) locate(k, scans[k], end, curve, length);
+  locate_values(end, curve, length);
+}
+
+/// All zeros of one test function in the step.
+void Continuation::locate(size_t which, std::vector<Place> const& scan, Trial const& end,
+                          Hermite const& curve, double length) {
+  TestFunction const& test = anchor_tests_[which];
+  const auto locate_between = [&](Place a, Place b, double guess, int before) {
+    if (test.falling_only && before < 0) return;
+    double found;
+    if (auto trial = root(which, a, b, guess, curve, length, found)) {
+      if (test.name == "fold") folds_.push_back(found);
+      emit(std::move(*trial), found, test.name);
+    } else {
+      miss(test.name,
+           "the corrector fails at it, near " + problem_.parameter_text(parameter_of(curve.value(guess))));
+    }
+  };
+  const auto actual = [&](double at) {
+    Trial trial = this->at(curve.value(at));
+    return correct(trial, row_, row_value_ + at, row_) ? trial.tests[which].value : std::nan("");
+  };
+  // places that Newton has been to, in order; the ends of the step to begin with
+  std::vector<Place> places = {scan.front(), scan.back()};
+  const auto visit = [&](double at) {
+    const double value = actual(at);
+    if (std::isfinite(value)) places.insert(places.end() - 1, {at, value});
+  };
+  const bool ends_differ = sign_of(scan.front().value) * sign_of(scan.back().value) < 0;
+  std::vector<double> changes;  // of sign on the cubic
+  for (size_t i = 0; i + 1 < scan.size(); ++i)
+    if (sign_of(scan[i].value) * sign_of(scan[i + 1].value) < 0)
+      changes.push_back(secant(scan[i].at, scan[i].value, scan[i + 1].at, scan[i + 1].value));
+  if (changes.size() > 1)
+    for (size_t i = 0; i + 1 < changes.size(); ++i) visit((changes[i] + changes[i + 1]) / 2);
+  if (changes.empty() && !ends_differ) {
+    const auto lowest = std::min_element(scan.begin(), scan.end(), [](Place const& a, Place const& b) {
+      return std::abs(a.value) < std::abs(b.value);
+    });
+    const double ends = std::min(std::abs(scan.front().value), std::abs(scan.back().value));
+    if (ends > test_noise && std::abs(lowest->value) < near_zero * ends && lowest->at > 0 &&
+        lowest->at < length)
+      visit(lowest->at);
+  }
+  int before = signs_[which];
+  for (size_t i = 0; i + 1 < places.size(); ++i) {
+    const int now = sign_of(places[i + 1].value);
+    if (now == 0) continue;
+    if (before * now < 0) {
+      double guess = secant(places[i].at, places[i].value, places[i + 1].at, places[i + 1].value);
+      for (double change : changes)
+        if (change > places[i].at && change < places[i + 1].at) guess = change;
+      if (!(guess >= places[i].at && guess <= places[i + 1].at)) guess = places[i].at;
+      locate_between(places[i], places[i + 1], guess, before);
+    }
+    before = now;
+  }
+  signs_[which] = before;
+}
+
+/// Root of a test function between two places by the Illinois form of regula falsi in arclength, from a first
+/// guess off the cubic. Where flags of sampled contact make the function jump it can only bisect: eight
+/// trials are enough then for an extremum, and the last one, nearest to the jump, is taken; else the best.
+std::optional<Continuation::Trial> Continuation::root(size_t which, Place a, Place b, double guess,
+                                                      Hermite const& curve, double length, double& found) {
+  TestFunction const& test = anchor_tests_[which];
+  const double precision = (test.extremum ? 1e-6 : 1e-9) * length,
+               size = std::max(std::abs(a.value), std::abs(b.value));
+  const int trials = test.extremum ? 8 : 12;
+  std::optional<Trial> best, latest;
+  double best_value = INFINITY, best_at = 0, last = INFINITY;
+  int side = 0;
+  for (int k = 0; k < trials && b.at - a.at > precision; ++k) {
+    const double at = k == 0 ? guess : secant(a.at, a.value, b.at, b.value);
+    Trial trial = this->at(curve.value(at));
+    if (!correct(trial, row_, row_value_ + at, row_)) break;
+    const double value = trial.tests[which].value;
+    if (std::abs(value) <= best_value) {
+      best_value = std::abs(value), best_at = at;
+      best = this->at(copy(trial.y));
+      best->tangent = copy(trial.tangent), best->outcome = trial.outcome, best->tests = trial.tests;
+    }
+    found = at;
+    latest = std::move(trial);
+    if (best_value < (test.extremum ? 1e-9 * size : 1e-12) || std::abs(at - last) < precision) break;
+    last = at;
+    const int now = (value > 0) == (b.value > 0) ? +1 : -1;
+    double& kept = now > 0 ? a.value : b.value;  // the end kept twice in a row is given half its value
+    if (now == side) kept /= 2;
+    (now > 0 ? b : a) = {at, value};
+    side = now;
+  }
+  if (best_value > jump * size) return latest;
+  found = best_at;
+  return best;
+}
+
+/// Reported values and the ends of the range. Between the folds of the step the parameter is monotone.
+void Continuation::locate_values(Trial const& end, Hermite const& curve, double length) {
+  std::sort(folds_.begin(), folds_.end());
+  std::vector<Place> places = {{0, last_entry(anchor_.y)}};
+  for (double at : folds_)
+    for (auto const& [where, point] : batch_)
+      if (where == at && point.event == "fold") places.push_back({at, last_entry(point.y)});
+  places.push_back({length, last_entry(end.y)});
+  const auto each = [&](double value, std::string const& event, bool outside) {
+    const double target = problem_.parameter_entry(value);
+    for (size_t i = 0; i + 1 < places.size(); ++i) {
+      const double from = places[i].value, to = places[i + 1].value;
+      if ((from < target) == (to < target) || from == to) continue;
+      if (outside && i == 0 && from == target) continue;  // the branch starts here
+      reach(value, event, places[i], places[i + 1], curve, length);
+    }
+  };
+  for (double value : report_at_) each(value, "report", false);
+  if (places.back().value <= problem_.parameter_entry(low_) || folds_.size()) each(low_, "stop", true);
+  if (places.back().value >= problem_.parameter_entry(high_) || folds_.size()) each(high_, "stop", true);
+}
+
+/// The branch at a given parameter between two places of the step.
+void Continuation::reach(double value, std::string const& event, Place a, Place b, Hermite const& curve,
+                         double length) {
+  const double target = problem_.parameter_entry(value);
+  double low = a.at, high = b.at;  // on the cubic, which is as monotone as the branch but for rounding
+  for (int k = 0; k < 40; ++k) {
+    const double middle = (low + high) / 2;
+    ((last_entry(curve.value(middle)) < target) == (a.value < target) ? low : high) = middle;
+  }
+  Trial trial = at(curve.value(low));
+  set_last_entry(trial.y, target);  // to the last digit, not to that of a linear solve
+  const VecHandle expected = copy(trial.y);
+  bool good = correct(trial, parameter_row_, target, row_);
+  const auto place = [&] { return dot(row_, trial.y) - row_value_; };
+  const double slack = 0.05 * (b.at - a.at);
+  if (good)
+    good = place() > a.at - slack && place() < b.at + slack &&
+           weighted_norm(weights_, moved(trial.y, -1, expected)) <= off_the_curve * length;
+  if (!good) {
+    auto along = reach_along(target, a, b, curve);
+    if (!along) {
+      if (event == "report")
+        miss("report at " + problem_.parameter_text(value),
+             trial.outcome.converged ? "Newton goes to another branch there" : trial.outcome.reason);
+      return;
+    }
+    trial = std::move(*along);
+  }
+  polish(trial, target);
+  emit(std::move(trial), std::clamp(place(), a.at, b.at), event);
+}
+
+/// One Newton step more: what is reported is as good as the corrector can make it, not just good enough.
+void Continuation::polish(Trial& trial, double target) {
+  Trial better = at(copy(trial.y));
+  check(SNESSetForceIteration(newton_.snes(), PETSC_TRUE));
+  const bool good = correct(better, parameter_row_, target, row_);
+  check(SNESSetForceIteration(newton_.snes(), PETSC_FALSE));
+  // counted as the one step it is: at rounding level its line search ends where it likes
+  better.outcome.newton = trial.outcome.newton + 1, better.outcome.linear += trial.outcome.linear;
+  if (good && better.outcome.residual <= trial.outcome.residual)
+    trial = std::move(better);
+  else
+    trial.outcome.newton = better.outcome.newton, trial.outcome.linear = better.outcome.linear;
+}
+
+/// The same along the branch, where the corrector at a fixed parameter fails (beside a fold).
+std::optional<Continuation::Trial> Continuation::reach_along(double target, Place a, Place b,
+                                                             Hermite const& curve) {
+  a.value -= target, b.value -= target;
+  for (int k = 0; k < 60; ++k) {
+    double at = secant(a.at, a.value, b.at, b.value);
+    if (k % 3 == 2) at = (a.at + b.at) / 2;
+    Trial trial = this->at(curve.value(at));
+    if (!correct(trial, row_, row_value_ + at, row_)) return {};
+    const double value = last_entry(trial.y) - target;
+    if (std::abs(value) <= value_error * std::max(1.0, std::abs(target))) {
+      Trial exact = this->at(copy(trial.y));
+      set_last_entry(exact.y, target);
+      return correct(exact, parameter_row_, target, row_) ? std::move(exact) : std::move(trial);
+    }
+    ((value < 0) == (a.value < 0) ? a : b) = {at, value};
+  }
+  return {};
+}
+
+}  // namespace fretwave::solve

@@ -1,0 +1,88 @@
+#include "solve/trail.h"
+
+#include <cmath>
+#include <cstdint>
+
+namespace fretwave::solve {
+
+namespace {
+
+constexpr size_t recent = 3;         // steps just made are near by nature
+constexpr double parallel = 0.98;    // cosine between directions of the same piece of a branch
+constexpr double nearness = 0.1;     // of a step's length: the chord's distance from a bent branch
+constexpr double same_place = 1e-6;  // relative
+
+/// Uniform in (-1, 1) by the entry's global number and the functional's (splitmix64, Steele et al. 2014).
+double weight(PetscInt entry, int functional) {
+  std::uint64_t x = std::uint64_t(entry) * Trail::count + std::uint64_t(functional) + 0x9e3779b97f4a7c15u;
+  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
+  x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
+  x ^= x >> 31;
+  return double(std::int64_t(x)) / 9223372036854775808.0;
+}
+
+double inner(Trail::Projection const& a, Trail::Projection const& b) {
+  double sum = 0;
+  for (int k = 0; k < Trail::count; ++k) sum += a[k] * b[k];
+  return sum;
+}
+
+Trail::Projection minus(Trail::Projection a, Trail::Projection const& b) {
+  for (int k = 0; k < Trail::count; ++k) a[k] -= b[k];
+  return a;
+}
+
+double length(Trail::Projection const& a) { return std::sqrt(inner(a, a)); }
+
+}  // namespace
+
+Trail::Projection Trail::project(Vec v) {
+  PetscInt begin;
+  MPI_Comm comm;
+  check(VecGetOwnershipRange(v, &begin, nullptr));
+  check(PetscObjectGetComm(reinterpret_cast<PetscObject>(v), &comm));
+  const PetscInt n = local_size(v);
+  const ReadArray in(v);
+  Projection out{};
+  for (PetscInt i = 0; i < n; ++i)
+    for (int k = 0; k < count; ++k) out[k] += weight(begin + i, k) * in[i];
+  MPI_Allreduce(MPI_IN_PLACE, out.data(), count, MPI_DOUBLE, MPI_SUM, comm);
+  return out;
+}
+
+void Trail::fill(Vec row, int functional) {
+  PetscInt begin;
+  check(VecGetOwnershipRange(row, &begin, nullptr));
+  const PetscInt n = local_size(row);
+  WriteArray out(row);
+  for (PetscInt i = 0; i < n; ++i) out[i] = weight(begin + i, functional);
+}
+
+bool Trail::same(Vec y, Projection const& place) {
+  return length(minus(project(y), place)) <= same_place * (1 + length(place));
+}
+
+std::optional<Trail::Meeting> Trail::add(Vec y, Vec tangent) {
+  const Step now{project(y), project(tangent)};
+  std::optional<Meeting> found;
+  for (size_t i = 0; i + 1 + recent < steps_.size() && !found; ++i) {
+    Projection const &a = steps_[i].y, chord = minus(steps_[i + 1].y, a);
+    const double square = inner(chord, chord);
+    if (!(square > 0)) continue;
+    const Projection offset = minus(now.y, a);
+    const double along = inner(offset, chord) / square;
+    if (along < 0 || along > 1) continue;
+    double aside = 0;
+    for (int k = 0; k < count; ++k) aside += std::pow(offset[k] - along * chord[k], 2);
+    const double cosine = inner(now.t, chord) / (length(now.t) * std::sqrt(square));
+    if (std::sqrt(aside) > nearness * std::sqrt(square) || std::abs(cosine) < parallel) continue;
+    int best = 0;
+    for (int k = 1; k < count; ++k)
+      if (std::abs(now.t[k]) > std::abs(now.t[best])) best = k;
+    found = {a, best, -offset[best] / now.t[best], cosine > 0};
+  }
+  steps_.push_back(now);
+  return found;
+}
+
+}  // namespace fretwave::solve

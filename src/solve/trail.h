@@ -1,0 +1,39 @@
+#pragma once
+#include <array>
+#include <optional>
+#include <vector>
+
+#include "petsc.h"
+
+namespace fretwave::solve {
+
+/// Where a branch has been, remembered by a few fixed random projections of each point: enough to recognise a
+/// place it comes back to, at no memory worth mention. The same on any number of ranks.
+class Trail {
+ public:
+  static constexpr int count = 8;
+  using Projection = std::array<double, count>;
+  /// A remembered point near which the branch seems to pass again.
+  struct Meeting {
+    Projection place;
+    int functional;  ///< that tells places along the branch apart best
+    double along;    ///< signed length from the new point to it
+    bool forwards;   ///< passed in the same direction
+  };
+
+  /// Adds a point with its unit tangent; returns a meeting with an earlier part of the branch. Collective.
+  std::optional<Meeting> add(Vec y, Vec tangent);
+  /// Whether y is the remembered place. Collective.
+  static bool same(Vec y, Projection const& place);
+  static Projection project(Vec v);
+  /// The functional itself, as a row.
+  static void fill(Vec row, int functional);
+
+ private:
+  struct Step {
+    Projection y, t;
+  };
+  std::vector<Step> steps_;
+};
+
+}  // namespace fretwave::solve

@@ -1,0 +1,90 @@
+#include "together.h"
+
+#include <new>
+
+#include "error.h"
+
+namespace fretwave {
+
+namespace {
+
+enum class Kind : int { other, memory, input, singular, petsc };
+
+/// An exception as it goes from one rank to the others: its kind and its texts, each ended by a zero.
+struct Message {
+  Kind kind = Kind::other;
+  std::string texts;
+
+  void add(std::string const& text) { texts += text + '\0'; }
+  std::string take() {
+    const auto end = texts.find('\0');
+    std::string first = texts.substr(0, end);
+    texts.erase(0, end + 1);
+    return first;
+  }
+};
+
+/// Its last line: those before it are the traceback of an exception in Python.
+std::string last_line(std::string text) {
+  while (!text.empty() && text.back() == '\n') text.pop_back();
+  return text.substr(text.find_last_of('\n') + 1);
+}
+
+Message message_of(std::exception_ptr const& failure) {
+  Message out;
+  try {
+    std::rethrow_exception(failure);
+  } catch (InputError const& e) {
+    out.kind = Kind::input;
+    for (auto const& text : {std::string(e.what()), e.measured, e.expected, e.fix}) out.add(text);
+  } catch (SingularBlock const& e) {
+    out.kind = Kind::singular, out.add(e.what());
+  } catch (PetscFailure const& e) {
+    out.kind = Kind::petsc, out.add(e.what());
+  } catch (std::bad_alloc const&) {
+    out.kind = Kind::memory;
+  } catch (std::exception const& e) {
+    out.add(last_line(e.what()));
+  } catch (...) {
+    out.add("an exception without words");
+  }
+  return out;
+}
+
+[[noreturn]] void raise(Message message, std::string const& task, int rank) {
+  const std::string where = "rank " + std::to_string(rank) + ", " + task;
+  switch (message.kind) {
+    case Kind::input: {
+      const auto what = message.take(), measured = message.take(), expected = message.take();
+      throw InputError(what, measured, expected, message.take());
+    }
+    case Kind::singular:
+      throw SingularBlock(message.take());
+    case Kind::petsc:
+      throw PetscFailure(message.take() + " (" + where + ")");
+    case Kind::memory:
+      throw RankFailure("there is not enough memory", where,
+                        "use more ranks on more machines, fewer harmonics or a reduced model");
+    case Kind::other:
+      break;
+  }
+  throw RankFailure(message.take(), where, "mend the law if it is one of your own; report it otherwise");
+}
+
+}  // namespace
+
+void agree(MPI_Comm comm, char const* task, std::exception_ptr failure) {
+  const int rank = comm_rank(comm), ranks = comm_size(comm);
+  int first = failure ? rank : ranks;
+  MPI_Allreduce(MPI_IN_PLACE, &first, 1, MPI_INT, MPI_MIN, comm);
+  if (first == ranks) return;
+  Message message;
+  if (rank == first) message = message_of(failure);
+  int head[2] = {int(message.kind), int(message.texts.size())};
+  MPI_Bcast(head, 2, MPI_INT, first, comm);
+  message.kind = Kind(head[0]), message.texts.resize(size_t(head[1]));
+  MPI_Bcast(message.texts.data(), head[1], MPI_CHAR, first, comm);
+  raise(std::move(message), task, first);
+}
+
+}  // namespace fretwave
