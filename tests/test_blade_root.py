@@ -117,6 +117,22 @@ def test_the_axial_stop_alone_holds_the_slipping_blade(blade):
     assert pivots.diagonal().min() > 0
 
 
+def test_plates_hold_the_root_across_its_axis(blade):
+    """Two plates of k: 2 k across the axis, nothing along it, and 2 k times the mean square distance about the axis."""
+    held = model.blade(cache=None, retainer=1e9, **COARSE)
+    plates = held["K"] - blade["K"]
+    nodes = blade["coordinates"]
+    o = model.Options()
+    bottom, lower, upper = o.heights
+    z = np.linspace(bottom, upper, 20_001)
+    half = np.where(z < lower, o.foot_half_width, o.foot_half_width - (z - lower) / np.tan(o.angle))
+    section = np.average(half**2 / 3 + (z - z.mean()) ** 2, weights=half)
+    turn = np.column_stack([0 * nodes[:, 0], z.mean() - nodes[:, 2], nodes[:, 1]]).ravel()
+    moves = [np.tile(axis, len(nodes)) for axis in np.eye(3)]
+    assert [move @ (plates @ move) for move in moves] == pytest.approx([0, 2e9, 2e9], rel=1e-9, abs=1)
+    assert turn @ (plates @ turn) == pytest.approx(2e9 * section, rel=5e-3)
+
+
 def test_first_bending_sticks_higher_than_it_slides_and_converges_with_the_mesh(blade):
     frequencies, shapes = model.stuck_modes(blade, 2)
     tip = shapes[:, 0].reshape(-1, 3)[blade["observation_dof"] // 3]
@@ -203,6 +219,28 @@ def test_case_goes_from_stick_to_slip(tmp_path):
     assert np.all(np.diff(slipping) < 0) and np.all(np.diff(points["zeta"][~stick]) > 0)
     assert sliding < slipping[-1] < stuck
     assert len(report["relative"]) == 3 and 0 < report["relative"][0] < 1e-5
+
+
+def test_held_root_goes_through_its_largest_damping(tmp_path):
+    """The paper's figure 12: damping rises and falls once, the frequency goes from stuck to sliding. One elastic slider
+    that takes omega_s to omega_f damps at most (omega_s^2 - omega_f^2) / (2 pi omega^2) (area of its loop at twice
+    the amplitude of first slip); 48 that let go nearly together come close to it."""
+    held = FOLDER.parent / "blade_root_retained" / "case.toml"
+    hook = sys.excepthook
+    assert main(["run", str(held), "--quick", "--out", str(tmp_path), "--no-plots"]) == 0
+    sys.excepthook = hook
+    with h5py.File(tmp_path / "results.h5") as file:
+        points = {name: data[()] for name, data in file["mode"]["points"].items()}
+        stuck, sliding = (file["mode"].attrs[f"{name}_omega"] for name in ("stuck", "sliding"))
+    zeta, top = points["zeta"], int(np.argmax(points["zeta"]))
+    assert points["stick"][0] == 1 and points["stick"][-1] < 0.05 and (np.diff(points["amplitude"]) > 0).all()
+    slips = int(np.argmax(points["stick"] < 0.99))
+    assert (np.diff(zeta[slips : top + 1]) > 0).all() and (np.diff(zeta[top:]) < 0).all()
+    assert 3 < top < len(zeta) - 4 and zeta[-1] < 0.9 * zeta[top]
+    assert (np.diff(points["omega"][slips:]) < 0).all()
+    assert points["omega"][-1] == pytest.approx(sliding, abs=0.25 * (stuck - sliding))
+    slider = (stuck**2 - sliding**2) / (2 * np.pi * stuck**2)
+    assert zeta[top] - zeta[0] == pytest.approx(slider, rel=0.15)
 
 
 def test_wear_of_the_flanks(tmp_path):

@@ -51,6 +51,7 @@ class Options:
     slot_gap: float = 0.001  #: clearance around the foot, away from the flanks
     foundation_depth: float = 0.050  #: the rest of the disk is an elastic foundation of modulus E / depth
     axial_stop: float = 1e7  #: retention of the root along the axis [N/m]
+    retainer: float = 0.0  #: stiffness across the axis of the plate screwed to each end of the root [N/m]; 0 for none
     normal_stiffness: float = 5e13  #: of the contact, per area [N/m^3]
     tangential_stiffness: float = 4e13  #: [N/m^3]
     speed_rpm: float = 1500.0  #: gives the normal loads; 0 for none
@@ -169,7 +170,8 @@ def compute(o: Options) -> dict[str, Any]:
     report = fe.check_matrices(blade, o.material, M, K)
     load = fe.centrifugal_load(M, blade.nodes, o.speed_rpm * np.pi / 30, (0, 0, 0), (1, 0, 0))
     stop = axial_stop(blade, o)
-    model = dict(M=M, K=K + stop, centrifugal_load=load, stop_nodes=np.nonzero(stop.diagonal())[0] // 3)
+    K = K + stop + retainers(blade, o)
+    model = dict(M=M, K=K, centrifugal_load=load, stop_nodes=np.nonzero(stop.diagonal())[0] // 3)
     model |= dict(coordinates=blade.nodes, hexahedra=blade.vtk_cells, boundary_faces=blade.boundary_faces)
     model |= dict(mass=report.mass, volume=report.volume, rigid_residual=report.rigid_residual)
     model |= dict(worst_jacobian=worst.ratio, observation_dof=observed_dof(blade), blade_nodes=len(blade.nodes))
@@ -341,6 +343,13 @@ def axial_stop(blade: fe.Mesh, o: Options) -> sp.csr_matrix:
     """Springs along the axis over the foot's downstream end: all that holds the blade there when every pair slips."""
     area = fe.nodal_areas(blade, blade.block_faces("foot", 0, 1))
     return sp.diags(np.kron(o.axial_stop * area / area.sum(), [1.0, 0.0, 0.0]), format="csr")
+
+
+def retainers(blade: fe.Mesh, o: Options) -> sp.csr_matrix:
+    """Springs across the axis over both end faces of the root: plates that carry moments its flanks cannot."""
+    faces = [blade.block_faces(block, 0, end) for block in ("foot", *FLANKS) for end in (0, 1)]
+    area = np.sum([fe.nodal_areas(blade, face) for face in faces], axis=0)
+    return sp.diags(np.kron(2 * o.retainer * area / area.sum(), [0.0, 1.0, 1.0]), format="csr")
 
 
 def nodal_load(o: Options, load: Array, pairs: int) -> float:
