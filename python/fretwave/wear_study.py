@@ -19,7 +19,7 @@ from .casefile import Case
 from .console import Console
 from .errors import EXIT_DONE, FretwaveError, NotConverged
 from .files import replace_text
-from .parallel import caught_by_all, on_first_rank
+from .parallel import caught_by_all
 from .petsc_options import AnalysisOptions
 from .reduced import reduce_case
 from .run import build_model

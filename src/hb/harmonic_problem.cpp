@@ -335,8 +335,7 @@ std::unique_ptr<solve::Preconditioner> HarmonicProblem::preconditioner(std::stri
   if (phased && blocks == "sparse") refuse(blocks, "a contact that reaches the next sector");
   const std::string note = model().unit() && !waves ? " (contact not the same in all sectors: no waves)" : "";
   condensed_ = !phased && (blocks == "sparse" || (free && !suits_dense(model())));
-  if (condensed_)
-    return make(std::type_identity<CondensedPreconditioner>(), note);
+  if (condensed_) return make(std::type_identity<CondensedPreconditioner>(), note);
   return make(std::type_identity<HarmonicPreconditioner>(), note);
 }
 
