@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from core_models import CubicLaw
+from core_models import CubicLaw, chain
 from petsc4py import PETSc
 from test_krylov import TIP, blade, preloaded
 
@@ -171,6 +171,19 @@ def test_a_motion_that_does_not_oscillate_has_no_frequency(comm):
         for state in states:
             assert state["zeta"] == pytest.approx(damping) and state["omega0"] == pytest.approx(1)
             assert state["omega"] == pytest.approx(np.sqrt(max(0, 1 - damping**2)))
+
+
+def test_a_route_that_cannot_be_taken_is_said(comm):
+    """A wheel with a pair in one sector alone has no preconditioner; it was an error without being asked for."""
+    contact = fw.Contact("jenkins", np.eye(1, 6), {"tangential_stiffness": 1.0, "friction_limit": 1.0})
+    model = fw.Model(np.eye(6), chain(6), None, [contact], comm, unit=2)
+    problem = fw.NonlinearMode(model, fw.Harmonics([1], 16), "EPMC", 0, fw.linear_modes(model, 1)[0], "asked_")
+    PETSc.Options("asked_")["route"] = "krylov"
+    route = fw._core.Newton(problem.core, "asked_").route
+    assert route == "direct (krylov asked for, but this problem has no preconditioner)"
+    PETSc.Options("asked_")["blocks"] = "sparse"
+    with pytest.raises(fw.InputError, match="sparse blocks"):
+        fw._core.Newton(problem.core, "asked_")
 
 
 class BrokenLaw(CubicLaw):

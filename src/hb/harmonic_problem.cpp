@@ -288,12 +288,24 @@ bool HarmonicProblem::condensable() const {
                      [](auto const& contact) { return contact.ahead.empty(); });
 }
 
+/// As many pairs of each contact in every sector of a wheel.
+bool HarmonicProblem::repeats() const {
+  const PetscInt sectors = model().dofs() / model().unit();
+  for (auto const& contact : model().contacts()) {
+    int pairs = contact.law->pairs();
+    MPI_Allreduce(MPI_IN_PLACE, &pairs, 1, MPI_INT, MPI_SUM, comm());
+    if (pairs % sectors) return false;
+  }
+  return true;
+}
+
 std::unique_ptr<solve::Preconditioner> HarmonicProblem::preconditioner(std::string const& blocks) {
   if (harmonics().fundamental() < 0) return nullptr;
   if (blocks == "sparse" && !condensable())
     throw InputError("sparse blocks are not made for this model", "-blocks sparse",
                      "a model without wheel or pairs that reach into the next sector",
                      "leave -blocks out, or take -route direct");
+  if (model().unit() && !repeats()) return nullptr;
   if (model().unit()) return std::make_unique<WheelPreconditioner>(*this);
   if (unfoldings()) return nullptr;
   condensed_ = condensable() && (blocks == "sparse" || (blocks == "auto" && !suits_dense(model())));

@@ -93,6 +93,7 @@ class HarmonicProblem : public solve::Problem {
   void border(std::vector<double> const& z, std::vector<double> const& along, double* r) const;
   bool owns_dof() const;
   bool condensable() const;
+  bool repeats() const;
   void linearise(Vec y);
   void unpack(Vec y);
   void column(int j, double* v);
