@@ -63,6 +63,25 @@ def test_a_slider_of_any_stiffness_has_its_closed_form(comm, kt, method):
     assert branch.converged, branch.reason
 
 
+@pytest.mark.ranks(1)
+@pytest.mark.parametrize("kt", [1e8, 1e12, 1e14])
+def test_stiff_kinks_between_masses_are_passed(comm, kt):
+    """A slider between two of three: far beyond slip zeta is 4 R |dphi| / (2 pi w^2 a phi^T M phi) of the free mode."""
+    springs, B = chain(3, 1e6), np.array([[-1.0, 1.0, 0.0]])
+    contact = fw.Contact("jenkins", B, {"tangential_stiffness": kt, "friction_limit": LIMIT})
+    model = fw.Model(np.eye(3), springs, None, [contact], comm)
+    problem = fw.NonlinearMode(model, fw.Harmonics([1], 256), "CNM", 0, fw.linear_modes(model, 1)[0])
+    branch = fw.Continuation(problem, problem.initial(1e-6), (1e-6, 1e-2))
+    for point in branch:
+        last = problem.state(point.y)
+    assert branch.converged, branch.reason
+    square, shape = 1e6 * (2 - np.sqrt(2)), np.array([1, np.sqrt(2), 1])
+    loss = 4 * LIMIT * (shape[1] - shape[0]) / (2 * np.pi * square * 1e-2 * shape @ shape)
+    assert last["amplitude"] == pytest.approx(1e-2)
+    assert last["omega"] == pytest.approx(np.sqrt(square), rel=1e-5)
+    assert last["zeta"] == pytest.approx(loss, rel=1e-3)
+
+
 @pytest.mark.parametrize("method", ["CNM", "EPMC"])
 def test_sampling_converges_to_the_continuous_closed_form(comm, method):
     """To second order, at twice the amplitude of first slip."""
