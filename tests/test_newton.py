@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from core_models import CubicLaw
+from core_models import CubicLaw, chain
 from petsc4py import PETSc
 from test_krylov import TIP, blade, preloaded
 
@@ -61,6 +61,25 @@ def test_a_slider_of_any_stiffness_has_its_closed_form(comm, kt, method):
         assert p["zeta"] == pytest.approx(zeta, rel=1e-6 + cancelled, abs=1e-9)
         assert point.accepted or point.rounding > 1e-10
     assert branch.converged, branch.reason
+
+
+@pytest.mark.ranks(1)
+@pytest.mark.parametrize("kt", [1e8, 1e12, 1e14])
+def test_stiff_kinks_between_masses_are_passed(comm, kt):
+    """A slider between two of three: far beyond slip zeta is 4 R |dphi| / (2 pi w^2 a phi^T M phi) of the free mode."""
+    springs, B = chain(3, 1e6), np.array([[-1.0, 1.0, 0.0]])
+    contact = fw.Contact("jenkins", B, {"tangential_stiffness": kt, "friction_limit": LIMIT})
+    model = fw.Model(np.eye(3), springs, None, [contact], comm)
+    problem = fw.NonlinearMode(model, fw.Harmonics([1], 256), "CNM", 0, fw.linear_modes(model, 1)[0])
+    branch = fw.Continuation(problem, problem.initial(1e-6), (1e-6, 1e-2))
+    for point in branch:
+        last = problem.state(point.y)
+    assert branch.converged, branch.reason
+    square, shape = 1e6 * (2 - np.sqrt(2)), np.array([1, np.sqrt(2), 1])
+    loss = 4 * LIMIT * (shape[1] - shape[0]) / (2 * np.pi * square * 1e-2 * shape @ shape)
+    assert last["amplitude"] == pytest.approx(1e-2)
+    assert last["omega"] == pytest.approx(np.sqrt(square), rel=1e-5)
+    assert last["zeta"] == pytest.approx(loss, rel=1e-3)
 
 
 @pytest.mark.parametrize("method", ["CNM", "EPMC"])
@@ -171,6 +190,19 @@ def test_a_motion_that_does_not_oscillate_has_no_frequency(comm):
         for state in states:
             assert state["zeta"] == pytest.approx(damping) and state["omega0"] == pytest.approx(1)
             assert state["omega"] == pytest.approx(np.sqrt(max(0, 1 - damping**2)))
+
+
+def test_a_route_that_cannot_be_taken_is_said(comm):
+    """A wheel with a pair in one sector alone has no preconditioner; it was an error without being asked for."""
+    contact = fw.Contact("jenkins", np.eye(1, 6), {"tangential_stiffness": 1.0, "friction_limit": 1.0})
+    model = fw.Model(np.eye(6), chain(6), None, [contact], comm, unit=2)
+    problem = fw.NonlinearMode(model, fw.Harmonics([1], 16), "EPMC", 0, fw.linear_modes(model, 1)[0], "asked_")
+    PETSc.Options("asked_")["route"] = "krylov"
+    route = fw._core.Newton(problem.core, "asked_").route
+    assert route == "direct (krylov asked for, but this problem has no preconditioner)"
+    PETSc.Options("asked_")["blocks"] = "sparse"
+    with pytest.raises(fw.InputError, match="sparse blocks"):
+        fw._core.Newton(problem.core, "asked_")
 
 
 class BrokenLaw(CubicLaw):

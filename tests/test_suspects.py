@@ -54,6 +54,7 @@ def test_a_reference_without_frequency_is_refused_in_words(comm):
         static_preload(model, LOAD, fw.linear_modes(model, 1, "stuck")[0])
 
 
+@pytest.mark.ranks(1)
 def test_a_branch_whose_mean_nothing_holds_says_so(comm):
     """Once every pair slips in a period the blade may drift; Newton's step is then all mean."""
     model = free_blade(comm)

@@ -76,9 +76,9 @@ class LinearSolver {
   int excess_ = 0;          ///< iterations beyond that, of all solves since
   double first_reuse_ = 0;  ///< iterations beyond it that the first reuse cost when it was last tried, halved
                             ///< at every build since
-  bool built_here_ = false;    ///< at the last linearisation
-  int rung_ = 0;               ///< of the ladder; 0: the problem's own preconditioner
-  int stay_ = 8, solved_ = 0;  ///< points to stay up there, and points since
+  bool built_here_ = false;     ///< at the last linearisation
+  int rung_ = 0;                ///< of the ladder; 0: the problem's own preconditioner
+  int stay_ = 32, solved_ = 0;  ///< points to stay up there, and points since
   Fallbacks fallbacks_;
   std::string route_;
   Guard guard_;

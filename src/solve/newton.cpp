@@ -127,11 +127,30 @@ Outcome Newton::solve(Vec y) {
   Outcome out;
   if (bordered_.problem().scale(y)) linear_->renew();
   for (int k = 0; k < rescalings; ++k) {
-    const Outcome before = std::exchange(out, solve_persistently(y));
+    const Outcome before = std::exchange(out, solve_past_kinks(y));
     out.newton += before.newton, out.linear += before.linear, out.effort += before.effort;
     if (!out.converged || !bordered_.problem().scale(y)) return out;
     linear_->renew();
   }
+  return out;
+}
+
+/// At a kink every shortened step raises the residual until the samples behind it have changed state:
+/// backtracking ends there, a search by the secant of |r|^2 goes through. Tried from the same guess.
+Outcome Newton::solve_past_kinks(Vec y) {
+  SNESLineSearch search;
+  PetscBool backtracks;
+  VecHandle guess = like(y);
+  check(VecCopy(y, guess));
+  Outcome out = solve_persistently(y);
+  check(SNESGetLineSearch(snes_, &search));
+  check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(search), SNESLINESEARCHBT, &backtracks));
+  if (out.converged || out.linear_failure || !backtracks || !std::isfinite(out.residual)) return out;
+  check(VecCopy(guess, y));
+  check(SNESLineSearchSetType(search, SNESLINESEARCHL2));
+  const Outcome before = std::exchange(out, solve_persistently(y));
+  check(SNESLineSearchSetType(search, SNESLINESEARCHBT));
+  out.newton += before.newton, out.linear += before.linear, out.effort += before.effort;
   return out;
 }
 

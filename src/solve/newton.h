@@ -41,6 +41,7 @@ class Newton {
                                   PetscReal residual, SNESConvergedReason*, void*);
   static PetscErrorCode form_function(SNES, Vec, Vec, void*);
   static PetscErrorCode form_jacobian(SNES, Vec, Mat, Mat, void*);
+  Outcome solve_past_kinks(Vec y);
   Outcome solve_persistently(Vec y);
   Outcome solve_once(Vec y);
   std::string explain_step(Vec y);
