@@ -141,7 +141,9 @@ def test_told_to_end_it_says_how_to_go_on(known, tmp_path: Path, ranks: int, num
     folder = tmp_path / "run"
     launcher = ["mpirun", "-n", str(ranks)] if ranks > 1 else []
     command = [*launcher, sys.executable, "-m", "fretwave", *known["run"].start(folder)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    # As Python knows the environment: MPI of this process has added to it what confuses mpirun.
+    with subprocess.Popen(command, env={**os.environ}, **pipes) as process:  # type: ignore[call-overload]
         assert process.stdout is not None
         for line in process.stdout:
             if line.startswith("mode    3"):

@@ -1,4 +1,5 @@
 #include <signal.h>
+#include <time.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -22,6 +23,7 @@ std::array<Ending, 4> endings{
 std::array<char, 4096> words;
 size_t length = 0;
 int code = 1;
+struct timespec last_wait = {0, 0};
 bool installed = false;
 
 void say(char const* text, size_t count) {
@@ -42,6 +44,7 @@ void end(int number) {
     for (Ending const& ending : endings)
       if (ending.number == number) say(ending.name, std::strlen(ending.name));
     say(words.data(), length);
+    nanosleep(&last_wait, nullptr);
   }
   _exit(code);
 }
@@ -56,9 +59,11 @@ void set_last_words(std::string const& text) {
   pthread_sigmask(SIG_SETMASK, &before, nullptr);
 }
 
-void end_on_signals(int exit_code) {
+/// `wait` [s] before the end: a launcher that hears of it drops what it has not read yet.
+void end_on_signals(int exit_code, double wait) {
   if (installed) return;
   code = exit_code;
+  last_wait.tv_nsec = static_cast<long>(1e9 * std::clamp(wait, 0.0, 0.9));
   for (Ending& ending : endings) {
     struct sigaction action = {};
     action.sa_handler = end;

@@ -11,6 +11,8 @@ from typing import Any
 from .errors import EXIT_OTHER
 from .source import display
 
+#: mpirun is given this long to read the last words [s]; it ends its ranks a second after it was told to end.
+LAST_WAIT = 0.4
 #: The progress bar hides the cursor.
 SHOW_CURSOR = "\x1b[?25h"
 
@@ -21,7 +23,7 @@ def ending_in_words(comm: Any) -> Iterator[None]:
     from . import _core
 
     _say(comm, ": nothing has been written yet\n  fix:      start again")
-    _core.end_on_signals(EXIT_OTHER)
+    _core.end_on_signals(EXIT_OTHER, LAST_WAIT if comm.size > 1 else 0.0)
     try:
         yield
     finally:

@@ -17,6 +17,7 @@ from .console import Console
 from .contacts import ContactSpec
 from .errors import EXIT_DONE, InputError, NotConverged
 from .interrupt import say_how_to_go_on
+from .journal import Journal
 from .parallel import on_first_rank
 from .petsc_options import AnalysisOptions
 from .reduced import reduce_case
@@ -38,6 +39,10 @@ DISPATCH = {
     "limit_cycle": ("transient", "run_limit_cycle"),
     "wear": ("wear", "run_wear"),
 }
+
+
+#: What is said of an analysis that is complete.
+ENDED = ("done", "stopped")
 
 
 @dataclass
@@ -239,10 +244,13 @@ class Runner:
                 return None
             with open_results(self.folder.path / "results.h5") as file:
                 mine = name in file and file[name].attrs.get("run_id") == self.folder.record["run_id"]
-                return str(file[name].attrs.get("status")) if mine else None
+                status = str(file[name].attrs.get("status")) if mine else None
+            if status in ENDED:
+                Journal(self.folder.path, name).remove()  # killed when all was in results.h5 but this was left
+            return status
 
         status, entry = on_first_rank(self.comm, look), self.folder.record["analyses"].get(name)
-        if status not in ("done", "stopped") or entry is None:
+        if status not in ENDED or entry is None:
             return False
         self.console.line(f"{name}: already {status}")
         if status == "stopped":
