@@ -229,7 +229,8 @@ def test_pictures_of_a_branch_of_two_points(tmp_path: Path, capfd) -> None:
 def test_a_time_integration_starts_on_its_mode(tmp_path: Path, capfd) -> None:
     case = tmp_path / "case.toml"
     case.write_text(as_toml(bases.two_dof()), encoding="utf-8")
-    assert call("check", case, "--set", "free_decay.amplitude=[2.0]") == 2
+    outside = ["--set", "free_decay.amplitude=[2.0]", "--out", tmp_path / "other"]
+    assert call("run", case, "--only", "mode,free_decay", "--set=mode.step.max_points=2", *outside) == 2
     assert "outside the mode's branch" in capfd.readouterr().err
     stopped = ["--set=mode.step.max_points=2", "--out", tmp_path / "out"]
     assert call("run", case, "--only", "mode,free_decay", "--set", "free_decay.amplitude=[0.12]", *stopped) == 3

@@ -131,23 +131,10 @@ def check_analyses(
             _check_forced(report, analysis, dofs, modes)
         if isinstance(analysis, TransientSection):
             report.mode(("mode",), analysis.mode, modes)
-            _check_starts(report, analysis, analyses)
         if isinstance(analysis, SweepAnalysis):
             _check_sweep(report, analysis)
         if isinstance(analysis, WearAnalysis):
             _check_wear(report, analysis, modes)
-
-
-def _check_starts(report: Reporter, analysis: TransientSection, analyses: dict[int, AnalysisSection]) -> None:
-    """A time integration starts on the branch of its mode."""
-    mode = next((other for other in analyses.values() if other.name == analysis.mode), None)
-    if not isinstance(mode, ModeAnalysis):
-        return
-    low, high = mode.amplitude
-    for index, value in enumerate(analysis.amplitude):
-        if not low <= value <= high:
-            expected = f"a value within {mode.name}.amplitude = {toml(mode.amplitude)}"
-            report.wrong(("amplitude", index), "is outside the mode's branch", expected, "move it, or widen the range")
 
 
 def _check_sweep(report: Reporter, analysis: SweepAnalysis) -> None:

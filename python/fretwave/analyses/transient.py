@@ -94,7 +94,10 @@ class _Starts:
         """
         try:
             coefficients, beta, omega = mode_state(self.table, self.coefficients, amplitude, self.mode.method)
-        except InputError as error:  # within what the mode was to reach, as was checked: its branch stopped early
+        except InputError as error:
+            if not self.mode.amplitude[0] <= amplitude <= self.mode.amplitude[1]:
+                raise
+            # within what the mode was to reach: its branch stopped early
             raise NotConverged(
                 f"the branch of '{self.mode.name}' does not reach start {number}",
                 f"analysis '{self.context.name}'",
