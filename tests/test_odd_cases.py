@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from random import Random
 
+import numpy as np
 import pytest
 from chain_case import BUILDER
 from command_line import call
@@ -21,6 +22,9 @@ import bases  # noqa: E402
 from commands import Worker  # noqa: E402
 from mutations import as_toml, mutated  # noqa: E402
 
+from fretwave.analyses.cycles import extract  # noqa: E402
+from fretwave.analyses.mode_curve import ModeCurve  # noqa: E402
+from fretwave.analyses.response_peaks import peak_table  # noqa: E402
 from fretwave.petsc_options import complaint  # noqa: E402
 
 pytestmark = pytest.mark.ranks(1)
@@ -199,3 +203,45 @@ def test_option_of_another_type_names_the_builders_line(tmp_path: Path, capfd) -
     assert call("check", tmp_path / "case.toml", "--set", "model.options.tilt=3") == 2
     error = capfd.readouterr().err
     assert "TypeError" in error and "model.py:" in error
+
+
+@pytest.mark.parametrize("rows", [1, 2])
+def test_a_branch_of_one_point_has_its_values_there_and_no_peak(rows: int) -> None:
+    """Twice the same point is one as well."""
+    same = {"amplitude": 0.1, "omega": 2.0, "omega0": 2.0, "zeta": 0.01, "level": 1.0, "phase": 0.0}
+    table = {name: np.full(rows, value) for name, value in same.items()}
+    curve = ModeCurve.from_table(table)
+    (found,) = curve.all_at(0.1)
+    assert (found.omega, found.zeta) == pytest.approx((2.0, 0.01)) and not curve.all_at(0.2) and not curve.crossings()
+    peaks = peak_table(table, {"mode": curve})
+    assert len(peaks["level"]) == 1 and all(np.isnan(peaks[name][0]) for name in peaks if name != "level")
+    assert len(extract(np.zeros(1), np.ones(1), np.zeros(1))) == 0
+
+
+def test_pictures_of_a_branch_of_two_points(tmp_path: Path, capfd) -> None:
+    (tmp_path / "case.toml").write_text(as_toml(bases.two_dof()), encoding="utf-8")
+    short = [f"--set={name}.step.max_points=2" for name in ("mode", "forced")]
+    assert call("run", tmp_path / "case.toml", "--only", "mode,forced", "--out", tmp_path / "out", *short) == 3
+    assert call("plot", tmp_path / "out") == 0
+    assert "Warning" not in capfd.readouterr().err and (tmp_path / "out" / "mode_backbone.png").exists()
+
+
+def test_a_time_integration_starts_on_its_mode(tmp_path: Path, capfd) -> None:
+    case = tmp_path / "case.toml"
+    case.write_text(as_toml(bases.two_dof()), encoding="utf-8")
+    outside = ["--set", "free_decay.amplitude=[2.0]", "--out", tmp_path / "other"]
+    assert call("run", case, "--only", "mode,free_decay", "--set=mode.step.max_points=2", *outside) == 2
+    assert "outside the mode's branch" in capfd.readouterr().err
+    stopped = ["--set=mode.step.max_points=2", "--out", tmp_path / "out"]
+    assert call("run", case, "--only", "mode,free_decay", "--set", "free_decay.amplitude=[0.12]", *stopped) == 3
+    assert "does not reach start 0" in capfd.readouterr().err
+
+
+def test_sliders_are_not_integrated_without_their_memory(tmp_path: Path, capfd) -> None:
+    case = tmp_path / "case.toml"
+    text = (bases.TWO_DOF / "case.toml").read_text(encoding="utf-8")
+    text = text.replace("regularisation_velocity = 0.05 ", "tangential_stiffness = 1e13")
+    case.write_text(text.replace('law = "regularised_coulomb"', 'law = "jenkins"'), encoding="utf-8")
+    assert call("check", case) == 2
+    error = capfd.readouterr().err
+    assert all(f"{name} needs time integration" in error for name in ("forced.time_points", "free_decay.type"))

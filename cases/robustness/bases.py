@@ -98,7 +98,7 @@ def blisk() -> dict[str, Any]:
     """Sector, wheel, mistuned wheel and flutter of the lumped blisk, on few points."""
     case = load(BLISK)[0]
     for analysis in case["analysis"]:
-        analysis.update(harmonics=1, samples=48, step={"max_points": 4})
+        analysis.update(harmonics=1, samples=48, step={"max_points": 2})
         if analysis["type"] == "flutter":
             analysis["nodal_diameters"] = [4]
     case["quick"] = {"mode.harmonics": 1}

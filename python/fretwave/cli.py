@@ -11,6 +11,7 @@ from typing import Any, NoReturn
 
 from .errors import EXIT_DONE, InputError
 from .parallel import guarded, install, launched_rank
+from .source import display, is_there
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -193,6 +194,13 @@ def _add_import(commands: Any) -> None:
     add.set_defaults(command=_import)
 
 
+def _run_folder(path: Path) -> Path:
+    """The folder of a run; what is in it is looked at later."""
+    if is_there(path) and not path.is_dir():
+        raise InputError("this is a file, not the folder of a run", display(path), fix="give the folder it is in")
+    return path
+
+
 def _world() -> Any:
     """MPI with PETSc started on it; collective, so it comes before anything one rank could fail in alone."""
     from mpi4py import MPI
@@ -228,6 +236,7 @@ def _sweep(options: argparse.Namespace) -> int:
 
 
 def _resume(options: argparse.Namespace) -> int:
+    _run_folder(options.folder)
     comm = _world()
     from .interrupt import ending_in_words, say_how_to_go_on
     from .lock import check_free
@@ -271,6 +280,7 @@ def _import(options: argparse.Namespace) -> int:
 
 
 def _view(options: argparse.Namespace) -> int:
+    _run_folder(options.folder)
     comm = _world()
     from .parallel import on_first_rank
     from .view import view_run
@@ -291,6 +301,7 @@ def _view(options: argparse.Namespace) -> int:
 
 
 def _show(options: argparse.Namespace) -> int:
+    _run_folder(options.folder)
     from .show import show_run
 
     show_run(options.folder)
@@ -298,6 +309,7 @@ def _show(options: argparse.Namespace) -> int:
 
 
 def _plot(options: argparse.Namespace) -> int:
+    _run_folder(options.folder)
     from .console import Console
     from .results import open_results
     from .run import plot

@@ -201,6 +201,14 @@ def check_mass(matrix: Matrix, dofs: Sequence[str]) -> InputError | None:
             expected="> 0 for every dof",
             fix="correct the sign" if diagonal[worst] < 0 else fix,
         )
+    if diagonal[worst] < 1 / LARGEST_ENTRY:
+        return InputError(
+            "the mass matrix has a diagonal entry that is too small",
+            where=matrix.where,
+            measured=f"M[{worst}][{worst}] = {diagonal[worst]:g} (dof {dofs[worst]})",
+            expected=f"at least {1 / LARGEST_ENTRY:g}, whose square is a number",
+            fix="choose other units",
+        )
     smallest, shape = smallest_eigenvalue(matrix.values)
     if smallest > SINGULAR_TOLERANCE:
         return None
@@ -223,6 +231,17 @@ def check_stiffness(matrix: Matrix, dofs: Sequence[str], contact_rows: Any) -> t
     note : str or None
         Said when only the contact holds the structure.
     """
+    if 0 < abs(matrix.values).max() < 1 / LARGEST_ENTRY:
+        return (
+            InputError(
+                "the stiffness matrix is too small",
+                where=matrix.where,
+                measured=f"its largest entry is {abs(matrix.values).max():g}",
+                expected=f"at least {1 / LARGEST_ENTRY:g}, whose square is a number",
+                fix="choose other units",
+            ),
+            None,
+        )
     free, _ = smallest_eigenvalue(matrix.values)
     if free > SINGULAR_TOLERANCE:
         return None, None
@@ -264,6 +283,8 @@ def smallest_eigenvalue(values: Any) -> tuple[float, Any]:
         unit[lowest] = 1.0
         return float(np.sign(diagonal[lowest])), unit
     scaled = values.toarray() / size[:, None] / size
+    if not np.all(np.isfinite(scaled)):
+        return -1.0, np.asarray(~np.isfinite(scaled).all(axis=1), dtype=float)
     eigenvalues, vectors = np.linalg.eigh(scaled)
     largest = max(abs(eigenvalues).max(), np.finfo(float).tiny)
     return float(eigenvalues[0] / largest), vectors[:, 0]

@@ -360,7 +360,10 @@ def plot(folder: Path, console: Console, only: Sequence[str] | None = None) -> i
     """Make the pictures of a run folder; returns how many."""
     from .plots import plot_run
 
-    files = plot_run(folder, only)
+    failed: list[str] = []
+    files = plot_run(folder, only, failed)
+    for line in failed:
+        console.line(line)
     console.line(f"{len(files)} picture{'s' * (len(files) != 1)} in {display(folder)}")
     return len(files)
 

@@ -43,10 +43,13 @@ def extract(t: Array, x: Array, v: Array) -> Cycles:
     The amplitude is that of the fundamental: x e^{beta (t - t_mid)} is projected on the cycle's own
     frequency, which is exact for a e^{-beta t} cos(omega t) and comparable with a modal amplitude.
     """
+    none = Cycles(*(np.empty(0) for _ in range(4)))
+    if len(t) < 2 or not np.all(np.isfinite([x, v])):
+        return none
     signal = CubicHermiteSpline(t, x, v)
     bounds = upward_crossings(signal)
     if len(bounds) < 5:
-        return Cycles(*(np.empty(0) for _ in range(4)))
+        return none
     middle = 0.5 * (bounds[1:] + bounds[:-1])
     omega = 2.0 * np.pi / np.diff(bounds)
     beta = np.zeros_like(omega)

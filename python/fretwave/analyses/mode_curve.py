@@ -9,12 +9,18 @@ import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import PchipInterpolator
 
+from ..errors import InputError
+
 Array = npt.NDArray[np.float64]
 
 #: weights of (log amplitude, relative frequency, damping ratio) in the length along the curve: all of order one
 LENGTH_WEIGHTS = (1.0, 10.0, 20.0)
 #: Damping ratios closer to zero than this have no sign: the rounding of a branch.
 NO_DAMPING = 1e-10
+
+
+#: Relative length of the curve of a branch of one point.
+SHORTEST = 1e-12
 
 
 @dataclass(frozen=True)
@@ -45,9 +51,17 @@ class ModeCurve:
     """
 
     def __init__(self, amplitude: Array, omega: Array, omega0: Array, zeta: Array) -> None:
-        values = np.column_stack([np.log(amplitude), omega, omega0, np.where(np.abs(zeta) > NO_DAMPING, zeta, 0.0)])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            level = np.log(amplitude)
+        values = np.column_stack([level, omega, omega0, np.where(np.abs(zeta) > NO_DAMPING, zeta, 0.0)])
+        values = values[np.isfinite(values).all(axis=1)]
+        if not len(values):
+            raise InputError("the branch has no point with finite values", None, f"{len(amplitude)} points")
         length = _length(values)
         keep = np.concatenate([[True], np.diff(length) > 1e-12 * length[-1]])
+        if keep.sum() < 2:  # one point is a curve too short to see
+            values = values[[0, 0]] * [[1.0], [1.0 + SHORTEST]]
+            length, keep = np.array([0.0, 1.0]), np.array([True, True])
         self._curve = PchipInterpolator(length[keep], values[keep], axis=0)
         self._log_amplitude = PchipInterpolator(length[keep], values[keep, 0])
         self._zeta = PchipInterpolator(length[keep], values[keep, 3])

@@ -49,7 +49,11 @@ def amplitude_peak(omega: Array, amplitude: Array) -> Peak:
     if top in (0, len(amplitude) - 1):
         return NOWHERE
     offset = omega[top - 1 : top + 2] - omega[top]
-    curve = np.polyfit(offset, amplitude[top - 1 : top + 2] ** -2.0, 2)
+    with np.errstate(all="ignore"):
+        inverse = amplitude[top - 1 : top + 2] ** -2.0
+    if len(np.unique(offset)) < 3 or not np.all(np.isfinite([*offset, *inverse])):
+        return NOWHERE
+    curve = np.polyfit(offset, inverse, 2)
     place = -0.5 * curve[1] / curve[0]
     return Peak(float(omega[top] + place), float(np.polyval(curve, place) ** -0.5))
 
@@ -59,6 +63,8 @@ def quadrature(omega: Array, amplitude: Array, phase: Array) -> Peak:
     length = curve_length(omega, amplitude)
     moves = np.concatenate([[True], np.diff(length) > 0])  # a point so far out may equal the last one to rounding
     length, omega, amplitude, phase = length[moves], omega[moves], amplitude[moves], phase[moves]
+    if len(length) < 2 or not np.all(np.isfinite([length, omega, amplitude, phase])):
+        return NOWHERE
     cosine = PchipInterpolator(length, np.cos(phase))
     roots = np.unique(cosine.roots(discontinuity=False, extrapolate=False))
     if not len(roots):
@@ -103,7 +109,7 @@ def points_around_peak(amplitude: Array, omega: Array, count: int) -> list[int]:
     """`count` points of a response between the frequencies of `TOP` times its peak, the peak among them."""
     top = int(np.argmax(amplitude))
     high = np.flatnonzero(amplitude >= TOP * amplitude[top])
-    wanted = np.linspace(omega[high].min(), omega[high].max(), count)
+    wanted = np.linspace(omega[high].min(), omega[high].max(), min(count, 10 * len(omega)))
     chosen = {int(high[np.argmin(np.abs(omega[high] - value))]) for value in wanted}
     nearest = min(chosen, key=lambda i: abs(float(omega[i] - omega[top])))
     return sorted(chosen - {nearest} | {top})
@@ -118,5 +124,6 @@ def _columns(prefix: str, peaks: list[Peak]) -> dict[str, Array]:
 
 def curve_length(omega: Array, amplitude: Array) -> Array:
     """Length along a response up to each point, both axes scaled by their range."""
-    steps = np.hypot(np.diff(omega) / np.ptp(omega), np.diff(amplitude) / np.ptp(amplitude))
+    with np.errstate(invalid="ignore", divide="ignore", over="ignore"):  # of one point, or of a level line
+        steps = np.hypot(np.diff(omega) / np.ptp(omega), np.diff(amplitude) / np.ptp(amplitude))
     return np.concatenate([[0.0], np.cumsum(steps)])

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..columns import Column
+from ..errors import InputError, NotConverged
 from ..schema import ModeAnalysis, TransientSection
 from .context import AnalysisContext, Outcome
 from .cycles import extract
@@ -91,7 +92,19 @@ class _Starts:
 
         It is stopped when any dof exceeds `factor` times the largest coefficient of the start.
         """
-        coefficients, beta, omega = mode_state(self.table, self.coefficients, amplitude, self.mode.method)
+        try:
+            coefficients, beta, omega = mode_state(self.table, self.coefficients, amplitude, self.mode.method)
+        except InputError as error:
+            if not self.mode.amplitude[0] <= amplitude <= self.mode.amplitude[1]:
+                raise
+            # within what the mode was to reach: its branch stopped early
+            raise NotConverged(
+                f"the branch of '{self.mode.name}' does not reach start {number}",
+                f"analysis '{self.context.name}'",
+                error.measured,
+                error.expected,
+                f"other starts, or what lets '{self.mode.name}' go on",
+            ) from None
         state = start_state(self.labels, coefficients, beta, omega)
         section = self.section
         self.context.console.line(f"{self.context.name}: start {number} from a = {amplitude:g} m")

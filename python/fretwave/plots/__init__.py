@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
+
+import numpy as np
+from numpy.linalg import LinAlgError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -33,13 +37,14 @@ FAMILIES = (
 )
 
 
-def plot_run(run_folder: str | Path, only: Sequence[str] | None = None) -> list[Path]:
+def plot_run(run_folder: str | Path, only: Sequence[str] | None = None, failed: list[str] | None = None) -> list[Path]:
     """Make every picture that the results allow; nothing is solved.
 
     Parameters
     ----------
     run_folder : folder with results.h5 and the analyses' tables
     only : names of analyses or of picture families; None for all
+    failed : gets a line for each family that the results are too few or too extreme for; without it they raise
 
     Returns
     -------
@@ -50,11 +55,17 @@ def plot_run(run_folder: str | Path, only: Sequence[str] | None = None) -> list[
 
     run = Run(run_folder)
     written = []
-    with style.rules():
+    with style.rules(), np.errstate(all="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of ranges without a width and values without a logarithm
         for family in FAMILIES:
-            for name, figure in _family(family)(run):
-                if only is None or family in only or _of_analysis(name, run, only):
-                    written.append(style.save(figure, run.folder / f"{name}.png"))
+            try:
+                for name, figure in _family(family)(run):
+                    if only is None or family in only or _of_analysis(name, run, only):
+                        written.append(style.save(figure, run.folder / f"{name}.png"))
+            except (ArithmeticError, ValueError, IndexError, LinAlgError) as error:
+                if failed is None:
+                    raise
+                failed.append(f"no picture '{family}' of these results: {error}")
     return written
 
 

@@ -82,7 +82,8 @@ def _finish(figure: Figure, left: Axes, right: Axes, forced: Analysis) -> None:
     frequency, amplitude = forced.columns["frequency_hz"], _amplitude(forced)
     unit, dof = forced.unit("amplitude"), _dof(forced)
     for axes in (left, right):
-        axes.set_xlim(frequency.min(), frequency.max())
+        if np.ptp(frequency) > 0:  # a response of one point has no range
+            axes.set_xlim(frequency.min(), frequency.max())
         axes.set_xlabel(style.label("Excitation frequency", "Hz"))
     peaks = [amplitude[forced.columns["level"] == level].max() for level in np.unique(forced.columns["level"])]
     if max(peaks) > LINEAR_UP_TO * min(peaks):

@@ -1,0 +1,193 @@
+"""Hundreds of wrong command lines: every sub-command with flags, files and numbers that are not what they should be.
+
+    OMP_NUM_THREADS=1 .venv/bin/python cases/robustness/command_lines.py --count 300 --seed 1 --table COMMAND_LINES.md
+    OMP_NUM_THREADS=1 .venv/bin/python cases/robustness/command_lines.py --only 17
+
+Each must end with a message and exit code 2 (or 1 where the machine refuses a file), or do what it says.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+import time
+from collections import Counter
+from pathlib import Path
+from random import Random
+
+sys.path.insert(0, str(Path(__file__).parent))
+from bases import prepare, two_dof  # noqa: E402
+from commands import Ended, Worker  # noqa: E402
+from mutations import as_toml  # noqa: E402
+
+LIMIT = 60.0  #: processor time of one command [s]
+#: Exit code 1 with a message is right where a folder cannot be written.
+BAD = ("traceback", "PETSc text", "crash", "hang")
+FILES = (
+    "case.toml",
+    "none.toml",
+    "folder",
+    "empty.toml",
+    "binary.toml",
+    "run",
+    "run/results.h5",
+    "locked",
+    "",
+    "-",
+    ".",
+    "/",
+)
+NUMBERS = ("0", "-1", "1", "3", "1e30", "nan", "x", "", "99999999999999999999", "1.5", "\u00b2", "--")
+NAMES = ("mode", "x", "", ",", "mode,mode", "mode,", "\u00e9", "x" * 3000, "../mode", "free_decay", "--only")
+KEYS = (
+    "mode.harmonics=3",
+    "mode.harmonics",
+    "=",
+    "mode.x=1",
+    "x=[",
+    "model.M=1",
+    "mode.harmonics=\u00b2",
+    "quick.a=1",
+    "",
+)
+SWEPT = (
+    "mode.harmonics=1,2",
+    "mode.harmonics=",
+    "=1",
+    "mode.harmonics=1,1",
+    "x.y=1,2",
+    "mode.step=1",
+    "a=[",
+    "mode.harmonics=1..3",
+)
+OPTIONS = (
+    "-snes_rtol 1e-9",
+    "-snes_rtol x",
+    "x",
+    "-",
+    "--",
+    "",
+    "-snes_rtoll 1",
+    "-ksp_type nonsense",
+    "-snes_monitor",
+)
+OUTS = ("out", "locked/out", "case.toml", "case.toml/out", "/proc/out", "/dev/null", "x" * 300, "a\nb", ".", "")
+CASE = {"--set": KEYS, "--only": NAMES, "--quick": None, "--keys": None, "--nonsense": NAMES, "-n": NUMBERS, "-h": None}
+RUN = {**CASE, "--out": OUTS, "--no-plots": None, "--petsc": OPTIONS}
+#: Sub-commands with what they take: first words, and flags with their values (None: without).
+COMMANDS: dict[str, tuple[tuple[str, ...], dict[str, tuple[str, ...] | None]]] = {
+    "check": (FILES, CASE),
+    "run": (FILES, RUN),
+    "sweep": (FILES, {**RUN, "--over": SWEPT, "--groups": NUMBERS}),
+    "resume": (FILES, {"--no-plots": None, "--quick": None}),
+    "show": (FILES, {"--all": None}),
+    "plot": (FILES, {"--only": NAMES}),
+    "view": (
+        FILES,
+        {
+            **{"--analysis": NAMES, "--point": NUMBERS, "--amplitude": NUMBERS, "--sectors": NUMBERS, "--linear": None},
+            **{"--phases": NUMBERS, "--scale": NUMBERS, "--out": OUTS},
+        },
+    ),
+    "import": (
+        ("out.h5", "locked/out.h5", "", "folder", "case.toml"),
+        {
+            **{
+                "--mass": FILES,
+                "--stiffness": FILES,
+                "--damping": FILES,
+                "--symmetric": ("auto", "x"),
+                "--dofs": FILES,
+            },
+            **{
+                "--coordinates": FILES,
+                "--pairs": NAMES,
+                "--normal": ("1,0,0", "0,0,0", "x", "1,2"),
+                "--modes": NUMBERS,
+            },
+            **{"--tolerance": NUMBERS, "--name": ("tip=0", "tip", "=", "tip=x"), "--tangent": ("1,0,0", "", "nan,0,0")},
+        },
+    ),
+    "study": (FILES, {**CASE, "--out": OUTS, "--of": NAMES, "--sweep": NAMES}),
+    "doctor": (("", "--json", "x", "--help"), {"--nonsense": None, "-h": None}),
+    "nonsense": (FILES, {}),
+    "": (("", "--version", "--help", "-h", "-n"), {}),
+}
+
+
+def command(seed: int, number: int) -> list[str]:
+    """The command line of a number."""
+    random = Random(f"{seed}/{number}")
+    name = list(COMMANDS)[number % len(COMMANDS)]
+    first, flags = COMMANDS[name]
+    line = [name] if name else []
+    if random.random() < 0.93:
+        line.append(random.choice((first[0], first[0], first[0], *first)))
+    for _ in range(random.choice((0, 1, 1, 2, 3)) if flags else 0):
+        flag = random.choice(list(flags))
+        values = flags[flag]
+        line.append(flag)
+        if values is not None and random.random() < 0.95:
+            value = random.choice(values)
+            line[-1:] = [f"{flag}={value}"] if random.random() < 0.3 else [flag, value]
+    if name in ("resume", "show", "plot", "view") and random.random() < 0.5:
+        line[1:2] = ["run"]
+    if name == "run" and "--only" not in line and random.random() < 0.8:
+        line += ["--only", "mode"]
+    return line
+
+
+def prepared(folder: Path, worker: Worker) -> None:
+    """A short case, a run of it, and files that are not what they should be."""
+    prepare(folder)
+    (folder / "case.toml").write_text(as_toml(two_dof()), encoding="utf-8")
+    (folder / "empty.toml").write_text("")
+    (folder / "binary.toml").write_bytes(bytes(range(256)))
+    (folder / "folder").mkdir()
+    (folder / "locked").mkdir(mode=0o500)
+    ended = worker.run(["run", "case.toml", "--only", "mode,free_decay", "--out", "run"], folder, LIMIT)
+    assert ended.outcome == "done", ended.text
+
+
+def main() -> int:
+    """Judge all command lines; the exit code is 1 when any ended badly."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--count", type=int, default=300)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--only", type=int, nargs="+")
+    parser.add_argument("--table", type=Path, help="Markdown to write")
+    told = parser.parse_args()
+    counts: Counter[tuple[str, str]] = Counter()
+    began = time.monotonic()
+    with tempfile.TemporaryDirectory() as name, Worker() as worker:
+        prepared(Path(name), worker)
+        for number in told.only or range(told.count):
+            line = command(told.seed, number)
+            ended = worker.run(line, Path(name), LIMIT)
+            counts[line[0] if line else "", ended.outcome] += 1
+            if told.only or ended.outcome in BAD or ended.outcome == "other (1)":
+                report(number, line, ended)
+    result = table(counts, told.seed, time.monotonic() - began)
+    print(result)
+    if told.table:
+        told.table.write_text(result + "\n", encoding="utf-8")
+    return int(any(outcome in BAD for _, outcome in counts))
+
+
+def report(number: int, line: list[str], ended: Ended) -> None:
+    """One command line and what became of it."""
+    print(f"--- {number}: {line}: {ended.outcome}, {ended.seconds:.1f} s\n{ended.text[-2500:]}", flush=True)
+
+
+def table(counts: Counter[tuple[str, str]], seed: int, seconds: float) -> str:
+    """Outcomes by sub-command, as Markdown."""
+    outcomes = sorted({outcome for _, outcome in counts} | set(BAD))
+    rows = [f"| | {' | '.join(outcomes)} |", "|---" * (len(outcomes) + 1) + "|"]
+    for name in sorted({name for name, _ in counts}):
+        rows.append(f"| {name} | {' | '.join(str(counts[name, outcome]) for outcome in outcomes)} |")
+    return "\n".join([f"seed {seed}, {sum(counts.values())} command lines, {seconds:.0f} s", "", *rows])
+
+
+if __name__ == "__main__":
+    sys.exit(main())
