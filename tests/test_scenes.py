@@ -141,6 +141,17 @@ def test_a_right_point_is_right_and_one_off_by_a_thousandth_is_wrong(law, method
     assert errors(run, 3, distance(eq, *run.state(3)))
 
 
+@LAWS
+def test_the_sparse_step_is_the_dense_one(law, monkeypatch):
+    eq, (Q, beta, omega) = solved(law, "CNM", 2.0)
+    off = (Q, beta * 1.0001, omega)
+    dense = distance(eq, *off)
+    monkeypatch.setattr("scenes.distance.DENSE", 0)
+    sparse = distance(eq, *off)
+    assert dense.zeta > 1e-7 and sparse.zeta == pytest.approx(dense.zeta, rel=1e-3)
+    assert sparse.motion == pytest.approx(dense.motion, rel=1e-3)
+
+
 def test_a_friction_force_left_over_by_a_stiff_slider_is_wrong():
     """Stuck at 1e14 N/m, the whole limit of 10 N is 1e-13 m times the stuck stiffness: small only in that scale."""
     contact = Contact("damper", "jenkins", np.array([[1.0]]), {"tangential_stiffness": 1e14, "friction_limit": 10.0})
