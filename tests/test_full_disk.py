@@ -76,9 +76,9 @@ def test_hdf5_never_meets_a_failing_write(tmp_path: Path, monkeypatch) -> None:
 
 
 def test_a_full_disk_ends_the_command_in_one_message(tmp_path: Path, monkeypatch, capfd) -> None:
-    import scenes
+    import small_runs
 
-    scene = scenes.scenes(tmp_path)[0]
+    scene = small_runs.scenes(tmp_path)[0]
     full_after(monkeypatch, 30000)
     assert call(*scene.start(tmp_path / "run")) == 1
     said = capfd.readouterr().err
@@ -89,10 +89,10 @@ def test_a_full_disk_ends_the_command_in_one_message(tmp_path: Path, monkeypatch
 
 
 def test_a_file_in_the_place_of_the_folder_is_named(tmp_path: Path, capfd) -> None:
-    import scenes
+    import small_runs
 
     (tmp_path / "run").write_text("")
-    assert call(*scenes.scenes(tmp_path)[0].start(tmp_path / "run")) == 1
+    assert call(*small_runs.scenes(tmp_path)[0].start(tmp_path / "run")) == 1
     said = capfd.readouterr().err
     assert said.count("error:") == 1 and str(tmp_path / "run") in said and "Traceback" not in said
 

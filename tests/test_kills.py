@@ -13,10 +13,10 @@ from pathlib import Path
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "cases" / "robustness"))
-import scenes
+import small_runs
 from command_line import call
 from kills import Counting
-from scenes import Scene, begins_like, differences
+from small_runs import Scene, begins_like, differences
 
 from fretwave.lock import FolderLock, check_free
 
@@ -29,7 +29,7 @@ PLACES = {"run": (0.3, 0.9), "sweep": (0.97,), "analysis": (0.97,), "study": (0.
 
 @pytest.fixture(scope="module")
 def known(tmp_path_factory) -> dict[str, Scene]:
-    return {scene.name: scene for scene in scenes.scenes(tmp_path_factory.mktemp("scenes"))}
+    return {scene.name: scene for scene in small_runs.scenes(tmp_path_factory.mktemp("scenes"))}
 
 
 def child(arguments: list[str], before=lambda: None) -> int:
@@ -51,7 +51,7 @@ def child(arguments: list[str], before=lambda: None) -> int:
 @pytest.fixture(scope="module")
 def whole(known, tmp_path_factory) -> dict[str, tuple[Path, int]]:
     """Of each scene the uninterrupted folder, and how many calls changed files on the way."""
-    scenes.load()
+    small_runs.load()
     found = {}
     for name in NAMES:
         folder, note = tmp_path_factory.mktemp(name) / "run", tmp_path_factory.mktemp("note") / "count.bin"

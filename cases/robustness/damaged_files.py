@@ -20,10 +20,10 @@ from pathlib import Path
 
 import h5py
 import numpy as np
-import scenes
 import scipy.io
 import scipy.sparse as sp
-from scenes import call, clean
+import small_runs
+from small_runs import call, clean
 
 
 @dataclass(frozen=True)
@@ -61,13 +61,13 @@ def matrices() -> tuple[sp.csr_matrix, sp.csr_matrix]:
 def write_files(folder: Path) -> None:
     """A finished run, one that was cut off, a model file with its case, and matrices in every format."""
     folder.mkdir(parents=True)
-    plain = [str(scenes.TWO_DOF), *scenes.overrides(scenes.SHORT), "--only", "mode", "--no-plots"]
+    plain = [str(small_runs.TWO_DOF), *small_runs.overrides(small_runs.SHORT), "--only", "mode", "--no-plots"]
     assert call(["run", *plain, "--out", str(folder / "run")], folder).code == 0
     calls = 200
     from kills import Counting
 
     gone = folder / "two_dof.toml"  # resumed from the copy in the run's folder
-    shutil.copyfile(scenes.TWO_DOF, gone)
+    shutil.copyfile(small_runs.TWO_DOF, gone)
     cut = ["run", str(gone), *plain[1:], "--out", str(folder / "cut")]
     assert call(cut, folder, Counting(calls, False).install).code == -9
     gone.unlink()
@@ -174,7 +174,7 @@ def main() -> int:
     folder = options.out or Path(tempfile.mkdtemp(prefix="damaged-"))
     folder.mkdir(parents=True, exist_ok=True)
     os.environ["XDG_CACHE_HOME"] = str(folder / "cache")
-    scenes.load()
+    small_runs.load()
     write_files(clean(folder / "whole"))
     random, began = np.random.default_rng(options.seed), time.monotonic()
     outcomes: Counter[tuple[str, str]] = Counter()

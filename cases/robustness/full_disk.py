@@ -20,8 +20,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-import scenes
-from scenes import Ended, Scene, call, clean, differences
+import small_runs
+from small_runs import Ended, Scene, call, clean, differences
 
 #: Bytes of the tmpfs: a whole run and a half.
 DISK = 4 << 20
@@ -105,10 +105,10 @@ def main() -> int:
     options = parser.parse_args()
     folder = options.out or Path(tempfile.mkdtemp(prefix="full-"))
     folder.mkdir(parents=True, exist_ok=True)
-    scenes.load()
+    small_runs.load()
     began, rows, bad = time.monotonic(), [], 0
     with small_disk(folder / "disk") as disk:
-        for scene in scenes.scenes(folder):
+        for scene in small_runs.scenes(folder):
             whole = clean(folder / f"whole_{scene.name}")
             assert call(scene.start(whole), folder).code == 0
             size = sum(path.stat().st_size for path in whole.rglob("*") if path.is_file())

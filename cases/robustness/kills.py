@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import scenes
-from scenes import Scene, begins_like, call, clean, differences
+import small_runs
+from small_runs import Scene, begins_like, call, clean, differences
 
 KINDS = ("random", "at a write", "torn write")
 #: The calls by which files change.
@@ -108,10 +108,10 @@ def main() -> int:
     options = parser.parse_args()
     folder = options.out or Path(tempfile.mkdtemp(prefix="kills-"))
     folder.mkdir(parents=True, exist_ok=True)
-    scenes.load()
+    small_runs.load()
     random, began = np.random.default_rng(options.seed), time.monotonic()
     known, done, bad = [], Counter[tuple[str, str]](), Counter[tuple[str, str]]()
-    for scene in scenes.scenes(folder):
+    for scene in small_runs.scenes(folder):
         whole = clean(folder / f"whole_{scene.name}")
         ended = call(scene.start(whole), folder)
         assert ended.code == 0, ended.err
