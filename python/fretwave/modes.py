@@ -50,8 +50,16 @@ def linear_modes(model: Model, count: int = 6, contact: str = "stuck") -> list[L
     contact : {"stuck", "free", "linearised"}
         Closed contact without slip; no contact force; the laws' tangents at rest (damped, with C).
 
+    Raises
+    ------
+    FretwaveError
+        Fewer converge than there are: how many, and the option that helps.
+
     Notes
     -----
+    Stuck and free modes below the last are counted by the negative pivots of K - omega^2 M (Sylvester), so that no copy
+    of a double mode and no member of a family is left out.
+
     Of one sector: the waves of the model's nodal diameter (`fretwave.cyclic` says which way they run).
     """
     if contact not in ("stuck", "free", "linearised"):

@@ -64,7 +64,7 @@ class HarmonicProblem:
         self.model, self.harmonics, self.prefix, self.core = model, harmonics, prefix, core
 
     def preload(self, displacement: Array, load: Array) -> None:
-        """Dynamics about a static state (n_dof,) under the static load it balances. Collective.
+        """Dynamics about a static state (n_dof,) under the static load it balances, in place of any before. Collective.
 
         Harmonic 0 must be retained.
         """
@@ -104,7 +104,8 @@ class HarmonicProblem:
         dict
             stick, slip, open : shares of all pair-samples; error_estimate : share (2-norm) of the contact force outside
             the retained harmonics; aliasing : relative change of the retained force coefficients on doubled samples;
-            work : energy dissipated by contact in a period.
+            work : energy dissipated by contact in a period; unclosed : largest distance [m] of a slider from where it
+            began its period, rounding unless its closure failed; slip_path : longest slip path of a pair [m].
         """
         return dict(self.core.summary(y))
 
@@ -183,7 +184,7 @@ class NonlinearMode(HarmonicProblem):
     avoid : (n_dof,) complex, optional
         On a tuned wheel, where modes come in pairs and the equations lose rank at small amplitude: the other mode of
         the pair, for a travelling wave the conjugate of the start's shape. The fundamental's component on it is kept
-        at zero by a force that comes out as zero (`unfolding`). Direct route only.
+        at zero by a force that comes out as zero (`unfolding`).
     """
 
     def __init__(
