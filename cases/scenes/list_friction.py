@@ -148,9 +148,9 @@ def resonance() -> Iterator[Scene]:
 
 def folds() -> Iterator[Scene]:
     axis = "points asked for, folds"
-    a = 0.1350472602799
+    a = 0.1350472602799  # with seven harmonics between the folds, at 0.13402 and 0.13541
     for step in (0.3, 0.03, 0.003):
-        analysis = mode(H=21, samples=1024, report_at=[a], step={"maximum": step, "initial": min(0.05, step)})
+        analysis = mode(report_at=[a], step={"maximum": step, "initial": min(0.05, step)})
         yield two_dof(axis, f"three_solutions_step_{step:g}", analysis, folds=2, reports={a: 3})
     yield two_dof(axis, "epmc_two_folds", mode("EPMC", 21, 1024), folds=2)
     yield two_dof(axis, "cnm_two_folds", mode(H=21, samples=1024), folds=2)
