@@ -168,6 +168,8 @@ def main() -> int:
             counts[line[0] if line else "", ended.outcome] += 1
             if told.only or ended.outcome in BAD or ended.outcome == "other (1)":
                 report(number, line, ended)
+            if told.table and sum(counts.values()) % 50 == 0:  # a run that is cut off keeps its table
+                told.table.write_text(table(counts, told.seed, time.monotonic() - began) + "\n", encoding="utf-8")
     result = table(counts, told.seed, time.monotonic() - began)
     print(result)
     if told.table:

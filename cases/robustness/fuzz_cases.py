@@ -130,6 +130,7 @@ def main() -> int:
     told = parser.parse_args()
     counts: Counter[tuple[str, str]] = Counter()
     began = time.monotonic()
+    result = ""
     with tempfile.TemporaryDirectory() as name, Worker() as worker:
         prepare(Path(name))
         for number in told.only or range(told.first, told.first + told.count):
@@ -142,7 +143,9 @@ def main() -> int:
                     flush=True,
                 )
                 print(given.text if told.only else "", ended.text[-3000:], sep="\n", flush=True)
-    result = table(counts, told.seed, sum(counts.values()), time.monotonic() - began)
+            result = table(counts, told.seed, sum(counts.values()), time.monotonic() - began)
+            if told.table and sum(counts.values()) % 50 == 0:  # a run that is cut off keeps its table
+                told.table.write_text(result + "\n", encoding="utf-8")
     print(result)
     if told.table:
         told.table.write_text(result + "\n", encoding="utf-8")
