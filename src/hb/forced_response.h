@@ -27,6 +27,7 @@ class ForcedResponse : public HarmonicProblem {
   std::string parameter_text(double value) const override;
   std::string impossible(Vec y) override;
   std::string beyond(Vec y) override;
+  double effect(Vec y, Vec dy) override;
   std::vector<solve::TestFunction> tests(Vec y, Vec tangent) override;
 
  private:

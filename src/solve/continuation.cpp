@@ -237,12 +237,16 @@ void Continuation::make_batch() {
   double length, next_length;
   auto end = step(length, next_length);
   if (!end || been_here(*end)) return;
-  locate_events(*end, length);
+  std::string events;
+  if (turned_)
+    events = events_of_corner(*end);
+  else
+    locate_events(*end, length);
   ending_ = problem_.beyond(end->y);
   after_ = {.y = copy(end->y), .tangent = copy(end->tangent), .step = next_length, .index = 0};
   const double reached = parameter_of(end->y);
   const bool outside = reached <= low_ || reached >= high_;
-  if (!outside) emit(std::move(*end), length, "");
+  if (!outside) emit(std::move(*end), length, std::move(events));
   std::stable_sort(batch_.begin(), batch_.end(),
                    [](auto const& x, auto const& y) { return x.first < y.first; });
   const auto stop =

@@ -52,6 +52,32 @@ void Continuation::locate_events(Trial const& end, double length) {
   locate_values(end, curve, length);
 }
 
+/// A corner lies within a step too short to tell it from its end: what changes sign or is passed there is met
+/// at the end itself. (Planes across the old tangent do not order the points behind a corner.)
+std::string Continuation::events_of_corner(Trial const& end) {
+  std::string found;
+  for (size_t k = 0; k < end.tests.size(); ++k) {
+    const int before = k < signs_.size() ? signs_[k] : sign_of(anchor_tests_[k].value),
+              now = sign_of(end.tests[k].value);
+    if (now && k < signs_.size()) signs_[k] = now;
+    if (before * now < 0 && !(end.tests[k].falling_only && before < 0))
+      found += (found.empty() ? "" : " ") + end.tests[k].name;
+  }
+  const Place a{0, last_entry(anchor_.y)}, b{1, last_entry(end.y)};
+  for (double value : report_at_) {
+    const double target = problem_.parameter_entry(value);
+    if ((a.value < target) == (b.value < target)) continue;
+    const bool near_end = std::abs(b.value - target) < std::abs(a.value - target);
+    Trial trial = at(copy(near_end ? end.y : Vec(anchor_.y)));
+    set_last_entry(trial.y, target);
+    if (correct(trial, parameter_row_, target, row_))
+      emit(std::move(trial), 0, "report");
+    else
+      miss("report at " + problem_.parameter_text(value), trial.outcome.reason);
+  }
+  return found;
+}
+
 /// All zeros of one test function in the step.
 void Continuation::locate(size_t which, std::vector<Place> const& scan, Trial const& end,
                           Hermite const& curve, double length) {
