@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 import os
 import signal
+import sys
 import tempfile
 import time
 from collections import Counter
@@ -125,6 +126,7 @@ def main() -> int:
         bad[scene.name, kind] += bool(wrong)
         for text in wrong:
             print(f"{scene.name}, {kind}, after {sum(done.values())} kills: {text}", flush=True)
+        print(f"\r{sum(done.values())} kills", end="", file=sys.stderr, flush=True)
     print("| scene | writes | " + " | ".join(KINDS) + " | not survived |\n|---|---|---|---|---|---|")
     for scene, _, _, calls in known:
         each = [done[scene.name, kind] for kind in KINDS]
