@@ -66,16 +66,6 @@ std::string ForcedResponse::beyond(Vec y) {
   return largest > unbounded ? "the response grows without bound" : "";
 }
 
-/// What is left of the forces at y, relative to the excitation: a step tells nothing of it where stiff pairs
-/// change between stick and slip within it.
-double ForcedResponse::effect(Vec y, Vec) {
-  VecHandle left = equations();
-  double norm;
-  residual(y, left);
-  check(VecNorm(left, NORM_2, &norm));
-  return norm;
-}
-
 /// a da/ds > 0 before a peak of the observed amplitude a, with a^2 = c^2 + s^2 of its fundamental.
 std::vector<solve::TestFunction> ForcedResponse::tests(Vec y, Vec tangent) {
   const auto z = scalars(y), dz = scalars(tangent);

@@ -1,4 +1,5 @@
 #pragma once
+#include <limits>
 #include <memory>
 #include <span>
 #include <string>
@@ -36,6 +37,9 @@ class Problem {
   virtual bool scale(Vec /*y*/) { return false; }
   /// Relative change of what is read from y by a small step dy; 0 if nothing is known. Collective.
   virtual double effect(Vec /*y*/, Vec /*dy*/) { return 0; }
+  /// Above it no residual is accepted, whatever rounding may leave: where stiff pairs change between stick
+  /// and slip within a sample, a tiny step tells nothing of the forces that are left.
+  virtual double largest_residual() const { return std::numeric_limits<double>::infinity(); }
   /// dr = J(y) dy, J is N x (N + 1). Collective.
   virtual void product(Vec y, Vec dy, Vec dr) = 0;
   /// Global places of J's entries contributed by this rank, and their values in the same order (places may

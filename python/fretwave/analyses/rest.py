@@ -93,7 +93,7 @@ def start_mode(context: AnalysisContext, linear_mode: int, or_free: bool = False
     except InputError:
         if not or_free:
             raise
-        modes = context.linear_mode("free", linear_mode)
+        return context.linear_mode("free", linear_mode)[linear_mode - 1], rest
     start = modes[linear_mode - 1]
     if start.omega <= RIGID * closed_mode(context).omega:
         is_open = 1.0 if rest is None else rest.open
