@@ -105,35 +105,46 @@ def newton_of(problem, y):
     return newton
 
 
+def solved_alike(comm, newton, start):
+    """Whether Newton converges from the start, with one outcome and reason on all ranks, and where to."""
+    y = start.copy()
+    found = newton.solve(y)
+    assert len(set(comm.allgather((found[0], found[4])))) == 1
+    return found[0], y
+
+
 @pytest.mark.parametrize(
     "blocks, place", [("dense", "harmonic block"), ("sparse", "sparse block"), ("sparse", "condensed system")]
 )
-def test_a_singular_block_on_one_rank_fails_the_step_not_the_run(comm, blocks, place):
-    """No exception, the same answer on every rank, and the next solve is as if nothing had been."""
+def test_a_singular_block_on_one_rank_fails_a_step_not_the_run(comm, blocks, place):
+    """No exception, the same answer on every rank: the right one, for the preconditioner is made again."""
     options = PETSc.Options("faulty_")
     options["route"], options["blocks"] = "krylov", blocks
     try:
         problem = mode_of(model_of(comm))
         start = problem.initial(0.5)
         newton = newton_of(problem, start)
+        undisturbed = start.copy()
+        assert newton.solve(undisturbed)[0]
         arm(comm, place, "value", rank=0)
-        found = newton.solve(start.copy())
-        assert not found[0] and len(set(comm.allgather(found[4]))) == 1
-        y = start.copy()
-        assert newton.solve(y)[0]
-        assert np.isfinite(whole(y)).all()
+        found, y = solved_alike(comm, newton_of(problem, start), start)
+        assert found and np.abs(whole(y) - whole(undisturbed)).max() < 1e-8
     finally:
         del options["route"], options["blocks"]
 
 
-def test_a_force_that_is_no_number_on_one_rank_fails_the_step(comm):
+def test_a_force_that_is_no_number_on_one_rank_fails_no_more_than_the_step(comm):
+    """A number that comes out wrong once is as if nothing had been, in this solve or in the next."""
     problem = mode_of(model_of(comm))
-    y = problem.initial(0.5)
-    newton = newton_of(problem, y)
+    start = problem.initial(0.5)
+    newton = newton_of(problem, start)
+    undisturbed = start.copy()
+    assert newton.solve(undisturbed)[0]
     arm(comm, "contact force", "value", rank=0)
-    found = newton.solve(y.copy())
-    assert not found[0] and len(set(comm.allgather(found[4]))) == 1
-    assert newton.solve(y)[0]
+    found, y = solved_alike(comm, newton, start)
+    if not found:
+        found, y = solved_alike(comm, newton, start)
+    assert found and np.abs(whole(y) - whole(undisturbed)).max() < 1e-8
 
 
 @pytest.mark.ranks(2, 3)

@@ -53,7 +53,8 @@ void bind_solve(nb::module_& m) {
         return nb::steal(to_petsc4py(J));
       });
   nb::class_<Newton>(m, "Newton")
-      .def(nb::init<Problem&, std::string const&>(), nb::keep_alive<1, 2>())
+      .def(nb::init<Problem&, std::string const&, bool>(), nb::keep_alive<1, 2>(), nb::arg(), nb::arg(),
+           nb::arg("past_kinks") = true)
       .def_prop_ro("system", &Newton::system, nb::rv_policy::reference_internal)
       .def_prop_ro("route", &Newton::route)
       .def_prop_ro("fallbacks", [](Newton& n) { return to_python(n.fallbacks()); })
@@ -73,12 +74,12 @@ void bind_solve(nb::module_& m) {
            [](Continuation& c, Petsc<Vec> y, bool upwards) { return to_python(c.start(y.object, upwards)); })
       .def("restore",
            [](Continuation& c, std::vector<Petsc<Vec>> const& at, std::vector<Petsc<Vec>> const& before,
-              double step, int index, int emitted, bool upwards, double began) {
+              double step, int index, bool turned, int emitted, bool upwards, double began) {
              const auto anchor = [&](std::vector<Petsc<Vec>> const& pair) {
                Continuation::Anchor a;
                if (pair.empty()) return a;
                a.y = copy(pair[0].object), a.tangent = copy(pair[1].object);
-               a.step = step, a.index = index;
+               a.step = step, a.index = index, a.turned = turned;
                return a;
              };
              return to_python(c.restore(anchor(at), anchor(before), emitted, upwards, began));
@@ -95,7 +96,7 @@ void bind_solve(nb::module_& m) {
         nb::dict out;
         out["y"] = Petsc<Vec>{a.y}, out["tangent"] = Petsc<Vec>{a.tangent};
         if (b.y) out["before_y"] = Petsc<Vec>{b.y}, out["before_tangent"] = Petsc<Vec>{b.tangent};
-        out["step"] = a.step, out["index"] = a.index, out["emitted"] = c.emitted();
+        out["step"] = a.step, out["index"] = a.index, out["turned"] = a.turned, out["emitted"] = c.emitted();
         out["upwards"] = c.upwards(), out["began"] = c.began();
         return out;
       });

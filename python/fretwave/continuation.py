@@ -234,7 +234,8 @@ class Continuation:
         branch = cls(problem, vectors["y"], stop, steps, report_at, upwards)
         before = [vectors[name] for name in _VECTORS[2:] if name in vectors]
         step, index, emitted = float(snapshot["step"]), int(snapshot["index"]), int(snapshot["emitted"])
-        point = branch._core.restore([vectors["y"], vectors["tangent"]], before, step, index, emitted, upwards, began)
+        turned, now = bool(snapshot.get("turned", False)), [vectors["y"], vectors["tangent"]]
+        point = branch._core.restore(now, before, step, index, turned, emitted, upwards, began)
         branch.repeated = None if point is None else Point(**point)
         branch._restored = True
         return branch

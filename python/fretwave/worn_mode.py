@@ -79,7 +79,7 @@ class WornMode:
                 for k, size in zip(self.contacts, sizes)
             ]
         )
-        self._newton = _core.Newton(problem.core, problem.prefix)
+        self._newton = _core.Newton(problem.core, problem.prefix, past_kinks=False)
         rtol, atol, stol, most = self._newton.snes.getTolerances()
         self._newton.snes.setTolerances(rtol, SHARPER * atol, stol, most)
         self._row = problem.core.unknowns()

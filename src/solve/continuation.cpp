@@ -163,7 +163,8 @@ std::string Continuation::complaint(Trial& trial, double length, bool may_shorte
 /// turns a corner that no shorter step gets round.
 std::optional<Continuation::Trial> Continuation::step(double& length, double& next_length) {
   std::string why;
-  const bool after_corner = std::exchange(turned_, false);
+  const bool after_corner = anchor_.turned;
+  turned_ = false;
   for (length = anchor_.step; length >= steps_.minimum; length /= 2) {
     const bool may_shorten = length > std::max(kink_length, 16 * steps_.minimum);
     Trial trial = at(moved(anchor_.y, length, anchor_.tangent));
@@ -243,7 +244,8 @@ void Continuation::make_batch() {
   else
     locate_events(*end, length);
   ending_ = problem_.beyond(end->y);
-  after_ = {.y = copy(end->y), .tangent = copy(end->tangent), .step = next_length, .index = 0};
+  after_ = {
+      .y = copy(end->y), .tangent = copy(end->tangent), .step = next_length, .index = 0, .turned = turned_};
   const double reached = parameter_of(end->y);
   const bool outside = reached <= low_ || reached >= high_;
   if (!outside) emit(std::move(*end), length, std::move(events));

@@ -37,6 +37,7 @@ class Continuation {
     VecHandle y, tangent;
     double step = 0;
     int index = 0;
+    bool turned = false;  ///< just behind a corner: longer steps may follow at once
   };
 
   Continuation(Problem&, std::string const& prefix, double low, double high, StepControl,

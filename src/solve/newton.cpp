@@ -19,7 +19,8 @@ constexpr int rescalings = 4;   // of the rows, as the motion that is solved for
 
 }  // namespace
 
-Newton::Newton(Problem& problem, std::string const& prefix) : bordered_(problem) {
+Newton::Newton(Problem& problem, std::string const& prefix, bool past_kinks)
+    : bordered_(problem), past_kinks_(past_kinks) {
   VecHandle y = problem.unknowns();
   right_side_ = like(y);
   check(SNESCreate(problem.comm(), snes_.out()));
@@ -147,7 +148,8 @@ Outcome Newton::solve_past_kinks(Vec y) {
   Outcome out = solve_persistently(y);
   check(SNESGetLineSearch(snes_, &search));
   check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(search), SNESLINESEARCHBT, &backtracks));
-  if (out.converged || out.linear_failure || !backtracks || !std::isfinite(out.residual)) return out;
+  if (!past_kinks_ || out.converged || out.linear_failure || !backtracks || !std::isfinite(out.residual))
+    return out;
   check(VecCopy(guess, y));
   check(SNESLineSearchSetType(search, SNESLINESEARCHL2));
   const Outcome before = std::exchange(out, solve_persistently(y));

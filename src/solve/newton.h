@@ -21,7 +21,9 @@ struct Outcome {
 /// SNES on a bordered problem, whose linear systems `LinearSolver` solves.
 class Newton {
  public:
-  Newton(Problem&, std::string const& prefix);
+  /// `past_kinks`: a step that backtracking cannot make is tried by the secant line search, which may end on
+  /// another branch; for callers that look where they have come to.
+  Newton(Problem&, std::string const& prefix, bool past_kinks = true);
   Newton(Newton const&) = delete;
   Bordered& system() { return bordered_; }
   SNES snes() const { return snes_; }
@@ -55,6 +57,7 @@ class Newton {
   SnesHandle snes_;
   std::unique_ptr<LinearSolver> linear_;
   VecHandle right_side_;
+  bool past_kinks_;
   double residual_before_ = 0;  ///< at the iteration before
   double effort_ = 0;           ///< of the iterations so far
 };

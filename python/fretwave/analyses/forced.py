@@ -59,7 +59,7 @@ def _all_levels(context: AnalysisContext, analysis: ForcedAnalysis, excitation: 
     with context.console.progress(context.name):
         for number in range(first, len(analysis.levels)):
             go_on = found and number == first
-            reasons.append(_one_level(excitation, writer, number, snapshot, go_on))
+            reasons.append(_one_level(excitation, writer, number, snapshot, go_on, own.get("phase")))
     stopped = [reason for reason in reasons if reason]
     reason = "; ".join(stopped) or "stop value reached"
     table = finished_table(writer)
@@ -79,16 +79,18 @@ def _all_levels(context: AnalysisContext, analysis: ForcedAnalysis, excitation: 
     return Outcome(writer.rows, reason, not stopped, summary, goal, advice)
 
 
-def _one_level(excitation: Excitation, writer: Any, number: int, snapshot: Any, go_on: bool) -> str:
-    """Follow one response; returns why it stopped early, or nothing. Collective."""
+def _one_level(
+    excitation: Excitation, writer: Any, number: int, snapshot: Any, go_on: bool, phase: float | None
+) -> str:
+    """Follow one response, on from a phase if it was begun; returns why it stopped early, or nothing. Collective."""
     context, analysis = excitation.context, excitation.analysis
     low, high = (2.0 * math.pi * hertz for hertz in analysis.frequency)
     problem = excitation.problem(analysis.levels[number])
     branch = excitation.branch(problem, snapshot, go_on)
-    table = finished_table(writer) if go_on else {}
-    excitation.phase = context.comm.bcast(float(table["phase"][-1]) if table else None)
+    excitation.phase = phase if go_on else None
     for point in points_of(branch):
-        row = record(writer, problem, point, branch.snapshot(), {"level_number": number}, excitation.row)
+        own = {"level_number": number, **({} if excitation.phase is None else {"phase": excitation.phase})}
+        row = record(writer, problem, point, branch.snapshot(), own, excitation.row)
         share = (number + (row["omega"] - low) / (high - low)) / len(analysis.levels)
         context.console.point(
             point_line(context.name, row), _short(row), share, _notable(row["event"]) or bool(closure_note(row))

@@ -39,15 +39,18 @@ def located_peak(omega: Array, amplitude: Array, event: npt.NDArray[np.str_]) ->
     return Peak(float(omega[highest]), float(amplitude[highest]))
 
 
-def amplitude_peak(omega: Array, amplitude: Array) -> Peak:
-    """Largest amplitude of a motion that is not observed (a blade of many); none at the ends of the range.
+def amplitude_peak(omega: Array, amplitude: Array, event: npt.NDArray[np.str_] | None = None) -> Peak:
+    """Largest amplitude of a motion that need not be observed (a blade of many); none at the ends of the range.
 
-    1/a^2, which is almost a parabola of the frequency at a resonance, is drawn through the three points around the
-    largest one. Across the top of a response the frequency never turns round, even where the curve folds.
+    Where it lies on the located peak of the observed dof, it is that point. Elsewhere 1/a^2, which is almost a parabola
+    of the frequency at a resonance, is drawn through the three points around the largest one. Across the top of a
+    response the frequency never turns round, even where the curve folds.
     """
     top = int(np.argmax(amplitude))
     if top in (0, len(amplitude) - 1):
         return NOWHERE
+    if event is not None and "peak" in str(event[top]).split():
+        return Peak(float(omega[top]), float(amplitude[top]))
     offset = omega[top - 1 : top + 2] - omega[top]
     with np.errstate(all="ignore"):
         inverse = amplitude[top - 1 : top + 2] ** -2.0

@@ -119,7 +119,11 @@ def blade_tables(
 
 def _peak(table: Mapping[str, Array], level: float, omega: Array, amplitude: Array) -> Peak:
     rows = table["level"] == level
-    return amplitude_peak(omega[rows], amplitude[rows]) if rows.any() else NOWHERE
+    return (
+        amplitude_peak(omega[rows], amplitude[rows], table["event"][rows] if "event" in table else None)
+        if rows.any()
+        else NOWHERE
+    )
 
 
 def whitehead(sectors: int) -> float:
