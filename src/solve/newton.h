@@ -56,6 +56,7 @@ class Newton {
   std::unique_ptr<LinearSolver> linear_;
   VecHandle right_side_;
   double residual_before_ = 0;  ///< at the iteration before
+  double step_from_ = 0;        ///< residual where the last step began
   double effort_ = 0;           ///< of the iterations so far
 };
 
