@@ -180,8 +180,10 @@ def test_law_must_fit_the_pairs(write) -> None:
 
 def test_time_integration_refuses_a_preload(write) -> None:
     extra = '[[analysis]]\nname = "decay"\ntype = "free_decay"\nmode = "mode"\namplitude = [1e-6]\nperiods = 3\n'
-    problem = only_problem(write(('\n[[analysis]]\nname = "mode"', f'\n{extra}\n[[analysis]]\nname = "mode"')))
-    assert "time integration" in problem.what
+    found = all_problems(write(('\n[[analysis]]\nname = "mode"', f'\n{extra}\n[[analysis]]\nname = "mode"')))
+    preload, law = (problem.what for problem in found)
+    assert "time integration, which does not know a preload" in preload
+    assert "time integration, which does not know the law 'coulomb_3d' of contact 'pads'" in law
 
 
 # Runs

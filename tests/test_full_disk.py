@@ -18,6 +18,7 @@ from test_results import fill, writer
 from fretwave.files import FileError, Unfailing
 from fretwave.parallel import describe
 from fretwave.results import open_results
+from fretwave.source import display
 
 pytestmark = pytest.mark.ranks(1)
 
@@ -94,7 +95,7 @@ def test_a_file_in_the_place_of_the_folder_is_named(tmp_path: Path, capfd) -> No
     (tmp_path / "run").write_text("")
     assert call(*small_runs.scenes(tmp_path)[0].start(tmp_path / "run")) == 1
     said = capfd.readouterr().err
-    assert said.count("error:") == 1 and str(tmp_path / "run") in said and "Traceback" not in said
+    assert said.count("error:") == 1 and display(tmp_path / "run") in said and "Traceback" not in said
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ from petsc4py import PETSc
 from test_krylov import TIP, blade, preloaded
 
 import fretwave as fw
+from fretwave.preload import StaticPreload
 
 M, K, LIMIT = 1.0, 1e6, 10.0  #: of the single mass [kg, N/m, N]
 
@@ -193,10 +194,9 @@ def test_a_motion_that_does_not_oscillate_has_no_frequency(comm):
 
 
 def test_a_route_that_cannot_be_taken_is_said(comm):
-    """A wheel with a pair in one sector alone has no preconditioner; it was an error without being asked for."""
-    contact = fw.Contact("jenkins", np.eye(1, 6), {"tangential_stiffness": 1.0, "friction_limit": 1.0})
-    model = fw.Model(np.eye(6), chain(6), None, [contact], comm, unit=2)
-    problem = fw.NonlinearMode(model, fw.Harmonics([1], 16), "EPMC", 0, fw.linear_modes(model, 1)[0], "asked_")
+    """A static problem has no preconditioner; it was an error without being asked for."""
+    model = slider(comm, 1.0)
+    problem = StaticPreload(model, np.ones(1), fw.linear_modes(model, 1)[0], prefix="asked_")
     PETSc.Options("asked_")["route"] = "krylov"
     route = fw._core.Newton(problem.core, "asked_").route
     assert route == "direct (krylov asked for, but this problem has no preconditioner)"

@@ -209,7 +209,7 @@ def test_option_of_another_type_names_the_builders_line(tmp_path: Path, capfd) -
 def test_a_branch_of_one_point_has_its_values_there_and_no_peak(rows: int) -> None:
     """Twice the same point is one as well."""
     same = {"amplitude": 0.1, "omega": 2.0, "omega0": 2.0, "zeta": 0.01, "level": 1.0, "phase": 0.0}
-    table = {name: np.full(rows, value) for name, value in same.items()}
+    table = {name: np.full(rows, value) for name, value in same.items()} | {"event": np.full(rows, "")}
     curve = ModeCurve.from_table(table)
     (found,) = curve.all_at(0.1)
     assert (found.omega, found.zeta) == pytest.approx((2.0, 0.01)) and not curve.all_at(0.2) and not curve.crossings()

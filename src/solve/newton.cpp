@@ -41,6 +41,7 @@ PetscErrorCode Newton::converged(SNES snes, PetscInt iteration, PetscReal unknow
                                  PetscReal residual, SNESConvergedReason* reason, void* context) {
   auto& newton = *static_cast<Newton*>(context);
   const double before = std::exchange(newton.residual_before_, residual);
+  newton.step_from_ = iteration == 0 ? residual : before;
   newton.effort_ = iteration == 0 ? 0 : newton.effort_ + newton.last_effort(residual / before);
   PetscErrorCode code = SNESConvergedDefault(snes, iteration, unknowns, step, residual, reason, nullptr);
   if (code || *reason < 0) return code;
@@ -172,15 +173,18 @@ Outcome Newton::solve_persistently(Vec y) {
   return out;
 }
 
-/// Of a step that the residual does not account for: J is nearly singular, and no line search shortens it to
-/// use.
+/// Of a step that the residual it began from does not account for: J is nearly singular, and no line search
+/// shortens it to use.
 std::string Newton::explain_step(Vec y) {
   Vec step;
+  SNESConvergedReason reason;
   double length, residual;
   check(SNESGetSolutionUpdate(snes_, &step));
   if (!step) return {};
   check(VecNorm(step, NORM_2, &length));
+  check(SNESGetConvergedReason(snes_, &reason));
   check(SNESGetFunctionNorm(snes_, &residual));
+  if (reason != SNES_DIVERGED_LINE_SEARCH) residual = step_from_;  // the step was taken
   if (!(length > far * residual)) return {};
   const std::string why = bordered_.problem().explain(y, step);
   return why.empty() ? why : " (" + why + ")";

@@ -59,6 +59,7 @@ class Newton {
   VecHandle right_side_;
   bool past_kinks_;
   double residual_before_ = 0;  ///< at the iteration before
+  double step_from_ = 0;        ///< residual where the last step began
   double effort_ = 0;           ///< of the iterations so far
 };
 
