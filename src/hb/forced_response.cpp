@@ -70,7 +70,7 @@ std::string ForcedResponse::beyond(Vec y) {
 std::vector<solve::TestFunction> ForcedResponse::tests(Vec y, Vec tangent) {
   const auto z = scalars(y), dz = scalars(tangent);
   const double square = z[1] * z[1] + z[2] * z[2];
-  return {{"peak", square > 0 ? (z[1] * dz[1] + z[2] * dz[2]) / square : 0, true, true}};
+  return {{"peak", square > 0 ? (z[1] * dz[1] + z[2] * dz[2]) / square : 0, true, false}};
 }
 
 ForcedState ForcedResponse::state(Vec y) {

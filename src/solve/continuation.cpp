@@ -246,8 +246,9 @@ void Continuation::make_batch() {
   ending_ = problem_.beyond(end->y);
   after_ = {
       .y = copy(end->y), .tangent = copy(end->tangent), .step = next_length, .index = 0, .turned = turned_};
-  const double reached = parameter_of(end->y);
-  const bool outside = reached <= low_ || reached >= high_;
+  const double reached = last_entry(end->y);
+  const bool outside =
+      reached <= problem_.parameter_entry(low_) || reached >= problem_.parameter_entry(high_);
   if (!outside) emit(std::move(*end), length, std::move(events));
   std::stable_sort(batch_.begin(), batch_.end(),
                    [](auto const& x, auto const& y) { return x.first < y.first; });

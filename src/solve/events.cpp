@@ -63,18 +63,19 @@ std::string Continuation::events_of_corner(Trial const& end) {
     if (before * now < 0 && !(end.tests[k].falling_only && before < 0))
       found += (found.empty() ? "" : " ") + end.tests[k].name;
   }
-  const Place a{0, last_entry(anchor_.y)}, b{1, last_entry(end.y)};
-  for (double value : report_at_) {
+  const double from = last_entry(anchor_.y), to = last_entry(end.y);
+  const auto pass = [&](double value, std::string const& event) {
     const double target = problem_.parameter_entry(value);
-    if ((a.value < target) == (b.value < target)) continue;
-    const bool near_end = std::abs(b.value - target) < std::abs(a.value - target);
-    Trial trial = at(copy(near_end ? end.y : Vec(anchor_.y)));
+    if ((from < target) == (to < target) || (event == "stop" && from == target)) return;
+    Trial trial = at(copy(std::abs(to - target) < std::abs(from - target) ? Vec(end.y) : Vec(anchor_.y)));
     set_last_entry(trial.y, target);
     if (correct(trial, parameter_row_, target, row_))
-      emit(std::move(trial), 0, "report");
+      emit(std::move(trial), 0, event);
     else
-      miss("report at " + problem_.parameter_text(value), trial.outcome.reason);
-  }
+      miss(event + " at " + problem_.parameter_text(value), trial.outcome.reason);
+  };
+  for (double value : report_at_) pass(value, "report");
+  pass(low_, "stop"), pass(high_, "stop");
   return found;
 }
 

@@ -67,17 +67,18 @@ def blade_amplitudes(excitation: Excitation, writer: Any) -> Array:
 
 
 def tuned_responses(excitation: Excitation) -> dict[str, Array]:
-    """Responses of the tuned sector at every level: columns level, frequency_hz, amplitude. Collective."""
+    """Responses of the tuned sector at every level: columns level, frequency_hz, amplitude, event. Collective."""
     rows = []
     for level in excitation.analysis.levels:
         problem = excitation.problem(level)
         branch = excitation.branch(problem)
         for point in points_of(branch):
             state = problem.state(point.y)
-            rows.append((level, state["frequency_hz"], state["amplitude"]))
+            rows.append((level, state["frequency_hz"], state["amplitude"], point.event))
         branch.destroy()
         problem.destroy()
-    return dict(zip(("level", "frequency_hz", "amplitude"), np.array(rows).T))
+    names = ("level", "frequency_hz", "amplitude", "event")
+    return {name: np.array(column) for name, column in zip(names, zip(*rows))}
 
 
 def blade_tables(
