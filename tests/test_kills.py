@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -33,6 +34,9 @@ PLACES = {
     ("analysis", False): 0.97,
     ("study", False): 0.5,
 }
+
+#: What the scenes import, once for all forks.
+LOADED = ("analyses.mode", "analyses.forced", "analyses.transient", "analyses.sweep", "sweep_command", "study")
 
 
 @pytest.fixture(scope="module")
@@ -60,6 +64,8 @@ def child(arguments: list[str], before=lambda: None) -> int:
 def whole(known, tmp_path_factory) -> dict[str, tuple[Path, int]]:
     """Of each scene the uninterrupted folder, and how many calls changed files on the way."""
     small_runs.load()
+    for module in LOADED:
+        import_module(f"fretwave.{module}")
     found = {}
     for name in NAMES:
         folder, note = tmp_path_factory.mktemp(name) / "run", tmp_path_factory.mktemp("note") / "count.bin"
@@ -83,7 +89,7 @@ def test_nothing_is_lost_twice_or_changed(known, whole, tmp_path: Path, name: st
 def test_every_call_after_the_last_row_may_be_the_last(known, whole, tmp_path: Path) -> None:
     """Tables, run.json, results.h5 and the removal of the journal: whichever is missing is made when it goes on."""
     expected, calls = whole["run"]
-    for back in (2, 11):
+    for back in (2, 6, 11):
         folder = tmp_path / str(back)
         assert child(known["run"].start(folder), Counting(calls - back, False).install) == -signal.SIGKILL
         assert child(["resume", str(folder), "--no-plots"]) == 0
