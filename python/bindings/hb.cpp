@@ -109,7 +109,8 @@ void bind_hb(nb::module_& m) {
           [](ForcedStart* self, ForcedResponse& to, Petsc<Vec> y) { new (self) ForcedStart(to, y.object); },
           nb::keep_alive<1, 2>())
       .def("initial", [](ForcedStart& p) { return nb::steal(to_petsc4py(p.initial())); })
-      .def("response", [](ForcedStart& p, Petsc<Vec> y) { return nb::steal(to_petsc4py(p.response(y.object))); });
+      .def("response",
+           [](ForcedStart& p, Petsc<Vec> y) { return nb::steal(to_petsc4py(p.response(y.object))); });
   nb::class_<ForcedResponse, HarmonicProblem>(m, "ForcedResponse")
       .def(
           "__init__",
