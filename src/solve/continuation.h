@@ -98,7 +98,7 @@ class Continuation {
   // What lies inside a step (events.cpp)
   void locate_events(Trial const& end, double length);
   std::string events_of_corner(Trial const& end);
-  void locate(size_t which, std::vector<Place> const& scan, Trial const& end, Hermite const&, double length);
+  void locate(size_t which, std::vector<Place> const& scan, Hermite const&, double length);
   std::optional<Trial> root(size_t which, Place a, Place b, double guess, Hermite const&, double length,
                             double& found);
   void reach(double value, std::string const& event, Place a, Place b, Hermite const&, double length);

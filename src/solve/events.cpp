@@ -48,7 +48,7 @@ void Continuation::locate_events(Trial const& end, double length) {
     signs_.clear();
     for (auto const& test : anchor_tests_) signs_.push_back(sign_of(test.value));
   }
-  for (size_t k = 0; k < scans.size(); ++k) locate(k, scans[k], end, curve, length);
+  for (size_t k = 0; k < scans.size(); ++k) locate(k, scans[k], curve, length);
   locate_values(end, curve, length);
 }
 
@@ -80,8 +80,7 @@ std::string Continuation::events_of_corner(Trial const& end) {
 }
 
 /// All zeros of one test function in the step.
-void Continuation::locate(size_t which, std::vector<Place> const& scan, Trial const& end,
-                          Hermite const& curve, double length) {
+void Continuation::locate(size_t which, std::vector<Place> const& scan, Hermite const& curve, double length) {
   TestFunction const& test = anchor_tests_[which];
   const auto locate_between = [&](Place a, Place b, double guess, int before) {
     if (test.falling_only && before < 0) return;
