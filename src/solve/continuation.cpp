@@ -10,6 +10,7 @@ namespace {
 // A turn that is left in so short a step is a kink (a sample changes state), not curvature.
 constexpr double kink_length = 1e-4;
 constexpr double kink_angle = 0.02;  // [rad] in so short a step
+constexpr double seen_angle = 0.05;  // [rad] in a longer one: it may hide a corner
 constexpr int certain = 3;           // meetings with earlier points of the branch in a row
 constexpr double at_the_end = 1e-9;  // relative: a branch that starts here starts at the end of its range
 
@@ -148,7 +149,9 @@ std::string Continuation::complaint(Trial& trial, double length, bool may_shorte
   if (may_shorten && angle > steps_.max_angle) return "the branch turns too sharply";
   if (may_shorten && interpolation_error(trial, length) > steps_.max_error)
     return "the branch bends more than a step resolves";
-  if (may_shorten || angle < kink_angle) return "";
+  if (may_shorten)
+    return angle > seen_angle && leads_back(trial) ? "the corrector lands on another branch" : "";
+  if (angle < kink_angle) return "";
   const int sign = orientation(trial.y, trial.tangent);
   if (sign == 0) return angle > steps_.max_angle ? "the branch turns too sharply" : "";
   if (sign < 0) {

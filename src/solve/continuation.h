@@ -93,6 +93,7 @@ class Continuation {
   // Corners of the branch (corner.cpp)
   int determinant(Vec y, Vec row);
   int orientation(Vec y, Vec tangent);
+  bool leads_back(Trial const&);
   std::optional<Trial> turn_corner(double reach);
 
   // What lies inside a step (events.cpp)

@@ -17,6 +17,7 @@ namespace fretwave::solve {
 namespace {
 
 constexpr PetscInt small = 1000;    // unknowns whose determinant is had in some 50 ms
+constexpr PetscInt quick = 300;     // unknowns whose determinant is had in a few ms
 constexpr double one_facet = 0.98;  // least cosine between the two vectors of a single facet
 constexpr double no_corner = 1e-6;  // 1 - cosine of the angle between the tangents
 
@@ -64,6 +65,14 @@ int Continuation::orientation(Vec y, Vec tangent) {
   const double cosine = -dot(entering, leaving) / std::sqrt(dot(entering, entering) * dot(leaving, leaving));
   if (!(std::abs(cosine) >= one_facet)) return 0;
   return cosine > 0 ? 1 : -1;
+}
+
+/// Whether a trial's tangent runs against the branch: an older piece of it, or another branch. Asked of small
+/// systems, where a determinant costs less than a Newton step.
+bool Continuation::leads_back(Trial const& trial) {
+  PetscInt size;
+  check(VecGetSize(trial.y, &size));
+  return size <= quick && orientation(trial.y, trial.tangent) < 0;
 }
 
 /// The branch behind a corner that lies less than `reach` ahead. The tangent's extension beyond it is off the
