@@ -27,9 +27,13 @@ def values(run: Any) -> list[str]:
         out.append("coefficients are not finite")
     if out:
         return out
+    # EPMC above zeta = 1: the free motion w0 sqrt(1 - zeta^2) does not oscillate, omega is 0
+    slow = c["zeta"] >= 1 if run.method == "EPMC" else np.zeros(len(c["omega"]), bool)
     for name in ("amplitude", "omega", "omega0"):
-        if name in c and np.any(c[name] <= 0):
+        if name in c and np.any(c[name][~slow if name == "omega" else slice(None)] <= 0):
             out.append(f"{name} {c[name].min():.4g} is not positive")
+    if np.any(c["omega"][slow] != 0):
+        out.append("omega of a motion that does not oscillate is not 0")
     if out:
         return out
     eq = run.equations
@@ -38,7 +42,7 @@ def values(run: Any) -> list[str]:
     if np.any(abs(moved - c["amplitude"]) > 1e-9 * abs(c["amplitude"])):
         out.append("the amplitude column is not that of the coefficients")
     if run.method != "forced":
-        w0 = np.hypot(c["omega"], c["beta"])
+        w0 = np.where(slow, c["omega0"], np.hypot(c["omega"], c["beta"]))
         if np.any(abs(w0 - c["omega0"]) > 1e-9 * w0) or np.any(abs(c["zeta"] - c["beta"] / w0) > 1e-9):
             out.append("omega, omega0, beta and zeta contradict one another")
     return out
