@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 
@@ -155,8 +156,10 @@ def test_told_to_end_it_says_how_to_go_on(known, tmp_path: Path, ranks: int, num
     launcher = ["mpirun", "-n", str(ranks)] if ranks > 1 else []
     command = [*launcher, sys.executable, "-m", "fretwave", *known["run"].start(folder)]
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-    # As Python knows the environment: MPI of this process has added to it what confuses mpirun.
-    with subprocess.Popen(command, env={**os.environ}, **pipes) as process:  # type: ignore[call-overload]
+    # As Python knows the environment: MPI of this process has added to it what confuses mpirun. A suite in the
+    # background ignores SIGINT, and a run started so keeps to that.
+    heard = partial(signal.signal, number, signal.SIG_DFL)
+    with subprocess.Popen(command, env={**os.environ}, preexec_fn=heard, **pipes) as process:  # type: ignore[call-overload]
         assert process.stdout is not None
         for line in process.stdout:
             if line.startswith("mode    3"):
