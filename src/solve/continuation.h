@@ -1,5 +1,4 @@
 #pragma once
-#include <deque>
 #include <optional>
 
 #include "solve/hermite.h"
@@ -124,7 +123,7 @@ class Continuation {
   std::vector<double> folds_;                    ///< arclengths of the folds in it
   std::vector<std::string> missed_;
   Trail trail_;
-  int emitted_ = 0, index_ = 0, meetings_ = 0;
+  int emitted_ = 0, meetings_ = 0;
   bool upwards_ = true, turned_ = false, finished_ = false, converged_ = false;
   std::string ending_;  ///< reason to stop once the batch is handed out
   bool arrived_ = false;
