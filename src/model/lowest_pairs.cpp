@@ -25,18 +25,6 @@ MPI_Comm comm_of(Mat A) {
   return comm;
 }
 
-/// LU: the saddle point of rigid contact is indefinite.
-void shift_invert(ST st) {
-  KSP ksp;
-  PC pc;
-  check(STSetType(st, STSINVERT));
-  check(STGetKSP(st, &ksp));
-  check(KSPSetType(ksp, KSPPREONLY));
-  check(KSPGetPC(ksp, &pc));
-  check(PCSetType(pc, PCLU));
-  check(PCFactorSetMatSolverType(pc, MATSOLVERMUMPS));
-}
-
 struct Search {
   bool more, diverged;
 };
@@ -115,6 +103,17 @@ PetscInt counted_below(Pencil const& pencil, double lambda, Pairs const& found) 
 }
 
 }  // namespace
+
+void shift_invert(ST st) {
+  KSP ksp;
+  PC pc;
+  check(STSetType(st, STSINVERT));
+  check(STGetKSP(st, &ksp));
+  check(KSPSetType(ksp, KSPPREONLY));
+  check(KSPGetPC(ksp, &pc));
+  check(PCSetType(pc, PCLU));
+  check(PCFactorSetMatSolverType(pc, MATSOLVERMUMPS));
+}
 
 std::vector<EigenPair> lowest_pairs(Pencil const& pencil, PetscInt count) {
   Pairs found;

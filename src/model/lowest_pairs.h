@@ -1,4 +1,6 @@
 #pragma once
+#include <slepcst.h>
+
 #include <vector>
 
 #include "petsc.h"
@@ -25,5 +27,8 @@ struct Pencil {
 /// multiple eigenvalues, members of a family) is searched for among the vectors orthogonal to those found.
 /// `PetscFailure` names what is still missing then. Collective.
 std::vector<EigenPair> lowest_pairs(Pencil const&, PetscInt count);
+
+/// Shift-invert by MUMPS' LU: the saddle point of rigid contact is indefinite.
+void shift_invert(ST);
 
 }  // namespace fretwave::model

@@ -23,17 +23,6 @@ using PepHandle = Handle<PEP, PEPDestroy>;
 
 constexpr double tolerance = 1e-13;
 
-void use_mumps(ST st) {
-  KSP ksp;
-  PC pc;
-  check(STSetType(st, STSINVERT));
-  check(STGetKSP(st, &ksp));
-  check(KSPSetType(ksp, KSPPREONLY));
-  check(KSPGetPC(ksp, &pc));
-  check(PCSetType(pc, PCLU));
-  check(PCFactorSetMatSolverType(pc, MATSOLVERMUMPS));
-}
-
 /// A^T D B for D diagonal by contact rows.
 MatHandle congruence(Mat A, Vec diagonal, Mat B) {
   MatHandle DB, product;
@@ -353,7 +342,7 @@ std::vector<LinearMode> damped(Model const& model, int count) {
   check(PEPSetTarget(pep, 0));
   ST st;
   check(PEPGetST(pep, &st));
-  use_mumps(st);
+  shift_invert(st);
   check(PEPSetFromOptions(pep));
   check(PEPSolve(pep));
   PetscInt converged;
