@@ -17,7 +17,7 @@ from petsc4py import PETSc
 
 import fretwave as fw
 from fretwave.analyses.context import AnalysisContext
-from fretwave.analyses.wheel_shape import one_by_one, participation, wave_content
+from fretwave.analyses.wheel_shape import one_by_one, participation, phases, wave_content
 from fretwave.analyses.wheel_start import start_of, uneven_samples
 from fretwave.casefile import load_case
 from fretwave.console import Console
@@ -286,6 +286,14 @@ def test_measures_of_a_shape():
     assert participation(np.cos(2 * np.pi * j / 12) + 0j) == pytest.approx(2 / 3)
     assert participation((j == 4) + 0j) == pytest.approx(1 / 12)
     assert [folded(k, 6) for k in range(6)] == [0, 1, 2, 3, -2, -1] and folded(3, 5) == -2
+
+
+@pytest.mark.ranks(1)
+def test_no_phase_jumps_where_sectors_move_against_each_other():
+    """On either side of the cut by rounding, or exactly on it."""
+    a = -np.exp(1j * np.array([-1e-15, 0.0, 1e-15, 0.5, -0.5]))
+    assert phases(a) == pytest.approx(np.pi + np.array([0.0, 0.0, 0.0, 0.5 - 2.0 * np.pi, -0.5]), abs=1e-14)
+    assert phases(np.array([1.0, 1j, -1j])) == pytest.approx([0.0, np.pi / 2.0, -np.pi / 2.0])
 
 
 @pytest.mark.ranks(1)

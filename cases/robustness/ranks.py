@@ -1,6 +1,6 @@
 """Every table of every case on 1, 2, 3 and 4 ranks: the same rows, and every number to 1e-8 of its column's maximum.
 
-    .venv/bin/python cases/robustness/ranks.py [--cases two_dof ...] [--ranks 1 2 3 4] [--full]
+    .venv/bin/python cases/robustness/ranks.py [--cases two_dof ...] [--ranks 1 2 3 4] [--full] [--keep FOLDER]
 
 Runs each case in its short form and writes one line a table: rows on each number of ranks, and the largest difference
 of any entry from one rank with its column. Columns that say how a point was solved (iterations, residual, wall time)
@@ -82,10 +82,12 @@ def main() -> int:
     parser.add_argument("--cases", nargs="+", default=cases)
     parser.add_argument("--ranks", nargs="+", type=int, default=[1, 2, 3, 4])
     parser.add_argument("--full", action="store_true", help="not the short form")
+    parser.add_argument("--keep", type=Path, help="where the runs stay")
     told = parser.parse_args()
     print(f"| case | table | rows on {told.ranks} ranks | largest difference | column |\n|---|---|---|---:|---|")
     with tempfile.TemporaryDirectory() as folder:
-        return 0 if all([compare(case, told.ranks, Path(folder), told.full) for case in told.cases]) else 1
+        kept = told.keep or Path(folder)
+        return 0 if all([compare(case, told.ranks, kept, told.full) for case in told.cases]) else 1
 
 
 if __name__ == "__main__":

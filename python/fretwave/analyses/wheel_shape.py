@@ -23,6 +23,7 @@ from ..engine_order import folded
 from ..harmonic_motion import complex_amplitudes
 from .context import AnalysisContext
 
+Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 
 #: So many folds within this share of one amplitude are those of single sectors.
@@ -37,6 +38,9 @@ WHEEL = (
     Column("unfolding", "1", "force on the avoided mode of a double one over the inertia force"),
 )
 
+#: How far the cut of a phase lies beside pi [rad], where sectors that move against each other stand to rounding.
+CUT = 1e-6
+
 #: A force on the avoided mode above this share of the inertia force is no rounding.
 HELD = 1e-8
 
@@ -50,6 +54,12 @@ def participation(a: Complex) -> float:
     """Participation ratio."""
     square = np.abs(a) ** 2
     return float(square.sum() ** 2 / (len(a) * (square**2).sum()))
+
+
+def phases(a: Complex) -> Array:
+    """Angle of each amplitude [rad], in (-pi + CUT, pi + CUT]: opposite to the reference reads pi, never -pi."""
+    angle = np.angle(a)
+    return np.where(angle <= CUT - np.pi, angle + 2.0 * np.pi, angle)
 
 
 class WheelShape:
@@ -110,7 +120,7 @@ def finish_wheel(context: AnalysisContext, writer: Any, start: Any) -> list[str]
     n = a.shape[1]
     shared = {"point": np.repeat(points["point"][where], n), "amplitude": np.repeat(points["amplitude"][where], n)}
     sector = {"sector": np.tile(np.arange(n), len(where)), "sector_amplitude": np.abs(a).ravel()}
-    context.write_table("sectors", {**shared, **sector, "phase": np.angle(a).ravel()})
+    context.write_table("sectors", {**shared, **sector, "phase": phases(a).ravel()})
     content = np.abs(wave_content(a)) ** 2
     diameters = np.tile([folded(k, n) for k in range(n)], len(where))
     share = content / content.sum(axis=1, keepdims=True)
