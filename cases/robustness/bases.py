@@ -3,29 +3,21 @@
 from __future__ import annotations
 
 import shutil
+import sys
 from pathlib import Path
 from typing import Any
 
 import tomllib
 
 ROOT = Path(__file__).parents[2]
+sys.path.insert(0, str(ROOT / "tests"))
+from chain_case import BUILDER, CHAIN  # noqa: E402
+
 TWO_DOF, BLISK = ROOT / "cases/two_dof", ROOT / "cases/blisk_lumped"
-CHAIN = ROOT / "tests/built_chain.py"
 SHORT_STEPS = {"max_points": 8}
 
-#: A chain on two pads in 3-D contact, by a builder: reduced, preloaded, static, forced, worn and swept.
-CHAIN_CASE = """
-title = "Chain on two pads"
-model = { builder = "model.py", mass_damping = 2.0, options = { masses = 6, mass = 0.5, tilt = [0.0, 0.0] } }
-reduction = { modes = 6, compare = 2 }
-preload = { pair_loads = false, loads = ["weight"] }
-
-[[contact]]
-name = "pads"
-law = "coulomb_3d"
-friction_coefficient = 0.4
-tangential_stiffness_per_area = 2e10
-
+#: What is done with the suite's chain on two pads in 3-D contact.
+CHAIN_ANALYSES = """
 [[analysis]]
 name = "static"
 type = "static"
@@ -106,12 +98,16 @@ def blisk() -> dict[str, Any]:
 
 
 def chain() -> dict[str, Any]:
-    return tomllib.loads(CHAIN_CASE)
+    """The chain by its builder: reduced, preloaded, static, forced, worn and swept."""
+    case = tomllib.loads(CHAIN + CHAIN_ANALYSES)
+    case["model"]["options"] = {"masses": 6, "mass": 0.5, "tilt": [0.0, 0.0]}
+    case["reduction"] = {"modes": 6, "compare": 2}
+    return case
 
 
 def prepare(folder: Path) -> None:
     """Put the builders beside the cases that are written into `folder`."""
-    for name, builder in (("two_dof", None), ("blisk", BLISK / "model.py"), ("chain", CHAIN)):
+    for name, builder in (("two_dof", None), ("blisk", BLISK / "model.py"), ("chain", BUILDER)):
         (folder / name).mkdir(parents=True, exist_ok=True)
         if builder is not None:
             shutil.copy(builder, folder / name / "model.py")

@@ -8,16 +8,14 @@ Each must end with a message and exit code 2 (or 1 where the machine refuses a f
 
 from __future__ import annotations
 
-import argparse
 import sys
 import tempfile
-import time
-from collections import Counter
 from pathlib import Path
 from random import Random
 
 sys.path.insert(0, str(Path(__file__).parent))
 from bases import prepare, two_dof  # noqa: E402
+from campaign import campaign, options  # noqa: E402
 from commands import Ended, Worker  # noqa: E402
 from mutations import as_toml  # noqa: E402
 
@@ -152,43 +150,15 @@ def prepared(folder: Path, worker: Worker) -> None:
 
 def main() -> int:
     """Judge all command lines; the exit code is 1 when any ended badly."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--count", type=int, default=300)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--only", type=int, nargs="+")
-    parser.add_argument("--table", type=Path, help="Markdown to write")
-    told = parser.parse_args()
-    counts: Counter[tuple[str, str]] = Counter()
-    began = time.monotonic()
+    told = options(__doc__, 300)
     with tempfile.TemporaryDirectory() as name, Worker() as worker:
         prepared(Path(name), worker)
-        for number in told.only or range(told.count):
+
+        def one(number: int) -> tuple[str, str, Ended]:
             line = command(told.seed, number)
-            ended = worker.run(line, Path(name), LIMIT)
-            counts[line[0] if line else "", ended.outcome] += 1
-            if told.only or ended.outcome in BAD or ended.outcome == "other (1)":
-                report(number, line, ended)
-            if told.table and sum(counts.values()) % 50 == 0:  # a run that is cut off keeps its table
-                told.table.write_text(table(counts, told.seed, time.monotonic() - began) + "\n", encoding="utf-8")
-    result = table(counts, told.seed, time.monotonic() - began)
-    print(result)
-    if told.table:
-        told.table.write_text(result + "\n", encoding="utf-8")
-    return int(any(outcome in BAD for _, outcome in counts))
+            return line[0] if line else "", str(line), worker.run(line, Path(name), LIMIT)
 
-
-def report(number: int, line: list[str], ended: Ended) -> None:
-    """One command line and what became of it."""
-    print(f"--- {number}: {line}: {ended.outcome}, {ended.seconds:.1f} s\n{ended.text[-2500:]}", flush=True)
-
-
-def table(counts: Counter[tuple[str, str]], seed: int, seconds: float) -> str:
-    """Outcomes by sub-command, as Markdown."""
-    outcomes = sorted({outcome for _, outcome in counts} | set(BAD))
-    rows = [f"| | {' | '.join(outcomes)} |", "|---" * (len(outcomes) + 1) + "|"]
-    for name in sorted({name for name, _ in counts}):
-        rows.append(f"| {name} | {' | '.join(str(counts[name, outcome]) for outcome in outcomes)} |")
-    return "\n".join([f"seed {seed}, {sum(counts.values())} command lines, {seconds:.0f} s", "", *rows])
+        return campaign(told, "command lines", one, BAD)
 
 
 if __name__ == "__main__":

@@ -8,11 +8,9 @@ the file named, no traceback, no crash, no hang, and every other file of the fol
 
 from __future__ import annotations
 
-import argparse
 import os
 import shutil
 import sys
-import tempfile
 import time
 from collections import Counter
 from dataclasses import dataclass
@@ -166,15 +164,9 @@ def trial(target: Target, source: Path, folder: Path, random: np.random.Generato
 
 def main() -> int:
     """Print a table; exit code 1 when a file was not taken as it should."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--count", type=int, default=400)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--out", type=Path)
-    options = parser.parse_args()
-    folder = options.out or Path(tempfile.mkdtemp(prefix="damaged-"))
-    folder.mkdir(parents=True, exist_ok=True)
+    options = small_runs.begin(__doc__, count=400, seed=1)
+    folder = options.out
     os.environ["XDG_CACHE_HOME"] = str(folder / "cache")
-    small_runs.load()
     write_files(clean(folder / "whole"))
     random, began = np.random.default_rng(options.seed), time.monotonic()
     outcomes: Counter[tuple[str, str]] = Counter()

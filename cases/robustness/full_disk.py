@@ -8,13 +8,11 @@ a quota. Right is one message, exit 1, no traceback and no crash; and after `res
 
 from __future__ import annotations
 
-import argparse
 import os
 import resource
 import shutil
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -99,13 +97,8 @@ def memory_limit(more: int) -> Callable[[], None]:
 
 def main() -> int:
     """Print a table; exit code 1 when anything was not taken as it should."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--out", type=Path)
-    parser.add_argument("--steps", type=int, default=12, help="places along each run")
-    options = parser.parse_args()
-    folder = options.out or Path(tempfile.mkdtemp(prefix="full-"))
-    folder.mkdir(parents=True, exist_ok=True)
-    small_runs.load()
+    options = small_runs.begin(__doc__, steps=12)  # places along each run
+    folder = options.out
     began, rows, bad = time.monotonic(), [], 0
     with small_disk(folder / "disk") as disk:
         for scene in small_runs.scenes(folder):

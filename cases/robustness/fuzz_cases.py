@@ -9,18 +9,16 @@ tenth is run for a few points, the others are checked.
 
 from __future__ import annotations
 
-import argparse
 import sys
 import tempfile
-import time
-from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 from random import Random
 
 sys.path.insert(0, str(Path(__file__).parent))
 from bases import SHORT, prepare  # noqa: E402
-from commands import BAD, Ended, Worker  # noqa: E402
+from campaign import campaign, options  # noqa: E402
+from commands import Ended, Worker  # noqa: E402
 from mutations import as_toml, garbled, mutated  # noqa: E402
 
 #: Processor time that a command may use [s].
@@ -108,48 +106,18 @@ def judge(worker: Worker, folder: Path, given: Example) -> Ended:
     return worker.run(arguments, place, LIMITS[given.action])
 
 
-def table(counts: Counter[tuple[str, str]], seed: int, count: int, seconds: float) -> str:
-    """Outcomes by what was done, as Markdown."""
-    outcomes = sorted({outcome for _, outcome in counts} | set(BAD))
-    head = f"| | {' | '.join(outcomes)} | all |"
-    numbers = {action: [counts[action, outcome] for outcome in outcomes] for action in LIMITS}
-    rows = [f"| {action} | {' | '.join(map(str, found))} | {sum(found)} |" for action, found in numbers.items()]
-    return "\n".join(
-        [f"seed {seed}, {count} cases, {seconds:.0f} s", "", head, "|---" * (len(outcomes) + 2) + "|", *rows]
-    )
-
-
 def main() -> int:
     """Judge all examples; the exit code is 1 when any ended badly."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--count", type=int, default=5000)
-    parser.add_argument("--first", type=int, default=0)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--only", type=int, nargs="+")
-    parser.add_argument("--table", type=Path, help="Markdown to write")
-    told = parser.parse_args()
-    counts: Counter[tuple[str, str]] = Counter()
-    began = time.monotonic()
-    result = ""
+    told = options(__doc__, 5000)
     with tempfile.TemporaryDirectory() as name, Worker() as worker:
         prepare(Path(name))
-        for number in told.only or range(told.first, told.first + told.count):
+
+        def one(number: int) -> tuple[str, str, Ended]:
             given = example(told.seed, number)
-            ended = judge(worker, Path(name), given)
-            counts[given.action, ended.outcome] += 1
-            if told.only or ended.bad or ended.seconds > 20:
-                print(
-                    f"--- {number}: {given.action} {given.arguments}: {ended.outcome}, {ended.seconds:.1f} s",
-                    flush=True,
-                )
-                print(given.text if told.only else "", ended.text[-3000:], sep="\n", flush=True)
-            result = table(counts, told.seed, sum(counts.values()), time.monotonic() - began)
-            if told.table and sum(counts.values()) % 50 == 0:  # a run that is cut off keeps its table
-                told.table.write_text(result + "\n", encoding="utf-8")
-    print(result)
-    if told.table:
-        told.table.write_text(result + "\n", encoding="utf-8")
-    return int(any(outcome in BAD for _, outcome in counts))
+            text = f"{given.action} {given.arguments}" + (f"\n{given.text}" if told.only else "")
+            return given.action, text, judge(worker, Path(name), given)
+
+        return campaign(told, "cases", one)
 
 
 if __name__ == "__main__":

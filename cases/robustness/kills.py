@@ -5,11 +5,9 @@
 
 from __future__ import annotations
 
-import argparse
 import os
 import signal
 import sys
-import tempfile
 import time
 from collections import Counter
 from collections.abc import Callable
@@ -102,14 +100,8 @@ def one_kill(
 
 def main() -> int:
     """Print a table of kills; exit code 1 when any was not survived."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--count", type=int, default=300)
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--out", type=Path)
-    options = parser.parse_args()
-    folder = options.out or Path(tempfile.mkdtemp(prefix="kills-"))
-    folder.mkdir(parents=True, exist_ok=True)
-    small_runs.load()
+    options = small_runs.begin(__doc__, count=300, seed=1)
+    folder = options.out
     random, began = np.random.default_rng(options.seed), time.monotonic()
     known, done, bad = [], Counter[tuple[str, str]](), Counter[tuple[str, str]]()
     for scene in small_runs.scenes(folder):

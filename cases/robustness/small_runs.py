@@ -5,12 +5,14 @@ The parent loads fretwave once; every command is a fork of it, which can be kill
 
 from __future__ import annotations
 
+import argparse
 import csv
 import json
 import os
 import shutil
 import signal
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
@@ -145,6 +147,19 @@ def _become(arguments: list[str], out: Path, err: Path, before: Callable[[], Non
 def load() -> None:
     """What every command needs, once, before the first fork."""
     from fretwave.plots import style  # noqa: F401
+
+
+def begin(text: str, **counts: int) -> argparse.Namespace:
+    """Options of a script with this docstring (its counts with their defaults, a folder), ready to fork commands."""
+    parser = argparse.ArgumentParser(description=text, formatter_class=argparse.RawDescriptionHelpFormatter)
+    for name, default in counts.items():
+        parser.add_argument(f"--{name}", type=int, default=default)
+    parser.add_argument("--out", type=Path, help="where the runs stay")
+    options = parser.parse_args()
+    options.out = options.out or Path(tempfile.mkdtemp(prefix="robustness-"))
+    options.out.mkdir(parents=True, exist_ok=True)
+    load()
+    return options
 
 
 # Comparison with the uninterrupted run
