@@ -101,6 +101,16 @@ def test_the_error_control_keeps_its_tolerance(comm):
     assert 0.03 * P0 < np.abs(np.diff(loads)).max() <= 0.05 * P0
 
 
+def test_last_digits_change_no_step(comm):
+    """Rates that differ as they do between numbers of ranks: the same points, not points that drift apart."""
+    marches = []
+    for factor in (1.0, 1.0 + 1e-10, 1.0 - 1e-10):
+        mode, y = node(comm)
+        mode.coefficient *= factor
+        marches.append([point.cycles for point in fw.Wear(mode, y, 400.0)])
+    assert len(marches[0]) == 8 and marches[0] == marches[1] == marches[2]
+
+
 def test_stop_rules(comm):
     """A load that has gone, a rate that will change nothing any more, a node that sticks from the start."""
     mode, y = node(comm)

@@ -24,6 +24,8 @@ SHORTEST = 1e-10
 LAST_TRY = 1e-2
 #: A step grows and shrinks by no more than this, and aims at this share of what is allowed.
 GROWTH, SHRINKING, SAFETY = 3.0, 0.1, 0.85
+#: Lengths that a step may have in every factor of two.
+GRID = 16
 
 
 @dataclass(frozen=True)
@@ -107,7 +109,11 @@ class Wear:
     def _first_step(self) -> float:
         """A tenth of the allowed change at the present rates."""
         fastest = float((self.state.rate / self.depth_scale).max(initial=0.0))
-        return 0.1 * self.control.pressure_change / fastest if fastest else self.cycles
+        return self._on_grid(0.1 * self.control.pressure_change / fastest) if fastest else self.cycles
+
+    def _on_grid(self, step: float) -> float:
+        """The next length of a coarse grid: last digits of a mode, which differ with the ranks, change no step."""
+        return float(self.cycles * 2.0 ** (np.round(GRID * np.log2(step / self.cycles)) / GRID))
 
     def __iter__(self) -> Iterator[WearPoint]:
         yield WearPoint(self.eta, 0.0, self.state, 0.0, "start", self.state.newton, self.state.linear)
@@ -161,7 +167,7 @@ class Wear:
                 return self._accept(h, target if meets else self.eta + h, state, error, share)
             why = "the contact changes too fast"
             state.y.destroy()
-            self.step = h * max(SHRINKING, SAFETY / share)
+            self.step = self._on_grid(h * max(SHRINKING, SAFETY / share))
         tangent.destroy()
         self.reason = f"step too small: {why}"
         return None
@@ -170,7 +176,7 @@ class Wear:
         self.state.y.destroy()
         self.state, self.eta = state, eta
         if not self.control.fixed:
-            longer = h * min(GROWTH, max(SHRINKING, SAFETY / max(share, 1e-12)))
+            longer = self._on_grid(h * min(GROWTH, max(SHRINKING, SAFETY / max(share, 1e-12))))
             # a step cut short to meet a report says little about the next one
             self.step = max(longer, self.step) if h < self.step else longer
         event = "report" if eta in self.reports else ""
