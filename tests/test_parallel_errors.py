@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 import time
 
 import pytest
@@ -104,3 +107,12 @@ def test_on_one_rank_nothing_is_aborted(launch) -> None:
     done, _ = run(launch, "raise InputError('bad', fix='mend it')", ranks=1)
     assert done.returncode == 2
     assert done.stderr == "error: bad\n  fix:      mend it\n"
+
+
+def test_a_start_without_mpirun_needs_no_daemon() -> None:
+    """Open MPI's own may get lost where several runs begin and end at once; MPI_Init then waits for it for ever."""
+    children = "open(f'/proc/self/task/{os.getpid()}/children').read().split()"
+    code = f"import os, fretwave; from mpi4py import MPI; print(MPI.COMM_WORLD.size, len({children}))"
+    plain = {key: value for key, value in os.environ.items() if not key.startswith(("OMPI_", "PMIX_", "PRTE_"))}
+    done = subprocess.run([sys.executable, "-c", code], env=plain, capture_output=True, text=True, timeout=60)
+    assert done.stdout.split() == ["1", "0"], done.stderr
