@@ -17,12 +17,14 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 ROOT = Path(__file__).resolve().parents[2]
 #: How a point was solved, not what it is; quantities at rounding level.
 WORK = {"wall_s", "newton", "linear", "residual", "rounding", "accepted", "unfolding", "energy_error", "unclosed"}
 SAME = 1e-8
 Table = dict[str, list[str]]
+Array = npt.NDArray[np.float64]
 
 
 def read(path: Path) -> Table:
@@ -42,21 +44,28 @@ def run(case: str, ranks: int, out: Path, full: bool) -> int:
 
 def difference(one: Table, other: Table) -> tuple[float, str]:
     """Largest difference of two tables with as many rows, relative to the column's maximum, and its column."""
+    if set(one) != set(other):
+        return np.inf, f"{', '.join(sorted(set(one) ^ set(other)))} in one alone"
     worst, where = 0.0, "-"
-    for name, values in one.items():
-        if name in WORK or name not in other:
-            continue
+    for name in set(one) - WORK:
         try:
-            a, b = (np.array([float(v) for v in column]) for column in (values, other[name]))
+            a, b = (np.array([float(v) for v in table[name]]) for table in (one, other))
         except ValueError:
-            apart = float(values != other[name])
+            apart = 0.0 if one[name] == other[name] else np.inf
         else:
-            size = np.nanmax(np.abs(a), initial=0.0) or 1.0
-            apart = float(np.nanmax(np.abs(a - b), initial=0.0) / size)
-            apart = np.inf if (np.isnan(a) != np.isnan(b)).any() else apart
+            apart = apart_by(a, b)
         if apart > worst:
             worst, where = apart, name
     return worst, where
+
+
+def apart_by(a: Array, b: Array) -> float:
+    """Of two columns; inf where one has a number and the other none."""
+    number = np.isfinite(a) & np.isfinite(b)
+    if not np.array_equal(a[~number], b[~number], equal_nan=True):
+        return np.inf
+    size = np.abs(a[number]).max(initial=0.0) or 1.0
+    return float(np.abs(a[number] - b[number]).max(initial=0.0) / size)
 
 
 def compare(case: str, ranks: list[int], folder: Path, full: bool) -> bool:
@@ -64,14 +73,14 @@ def compare(case: str, ranks: list[int], folder: Path, full: bool) -> bool:
     outs = {n: folder / f"{case}-{n}" for n in ranks}
     codes = {n: run(case, n, out, full) for n, out in outs.items()}
     good = not any(codes.values())
-    for path in sorted(outs[ranks[0]].glob("*.csv")):
-        tables = {n: read(out / path.name) if (out / path.name).exists() else {} for n, out in outs.items()}
-        rows = {n: len(next(iter(table.values()), [])) for n, table in tables.items()}
+    for table in sorted({path.name for out in outs.values() for path in out.glob("*.csv")}):
+        tables = {n: read(out / table) if (out / table).exists() else {} for n, out in outs.items()}
+        rows = {n: len(next(iter(columns.values()), [])) for n, columns in tables.items()}
         same = len(set(rows.values())) == 1
         apart = [difference(tables[ranks[0]], tables[n]) for n in ranks[1:]] if same else [(np.inf, "rows")]
         worst, where = max(apart, default=(0.0, "-"))
         counts = ", ".join(str(count) for count in rows.values())
-        print(f"| {case} | {path.name} | {counts} | {worst:.1e} | {where} |", flush=True)
+        print(f"| {case} | {table} | {counts} | {worst:.1e} | {where} |", flush=True)
         good &= worst <= SAME
     return good
 
