@@ -161,6 +161,14 @@ def test_pictures_show_every_wave(write, tmp_path, comm):
 
 
 @pytest.mark.ranks(1)
+def test_spans_end_where_a_limit_cycle_was_located():
+    """A located damping ratio of 1.7e-12, that is 1.7e-10 %, is zero."""
+    zeta = 100.0 * np.array([-0.03, -1.7e-12, 0.08, 6e-13, -0.02])
+    found = pictures.spans(np.arange(1.0, 6.0), zeta)
+    assert found == [(1.0, 2.0, -1.0), (2.0, 4.0, 1.0), (4.0, 5.0, -1.0)]
+
+
+@pytest.mark.ranks(1)
 def test_verdicts_follow_the_signs_of_the_damping():
     cases = {
         "stable": [0.1, 0.3, 0.1],

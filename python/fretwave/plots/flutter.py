@@ -85,9 +85,9 @@ def limits(flutter: Analysis) -> Figure:
 
 
 def spans(amplitude: style.Array, zeta: style.Array) -> list[tuple[float, float, float]]:
-    """Ranges of amplitude between sign changes of the damping along a branch: (low, high, sign)."""
+    """Ranges of amplitude between sign changes of the damping [%] along a branch: (low, high, sign)."""
     signs = np.sign(zeta)
-    signs[np.abs(zeta) < NO_DAMPING] = 0  # located limit cycles belong to both sides
+    signs[np.abs(zeta) < 100.0 * NO_DAMPING] = 0  # located limit cycles belong to both sides
     ends = np.concatenate([[0], np.flatnonzero(signs == 0), [len(zeta) - 1]])
     parts = [(i, k) for i, k in zip(ends, ends[1:]) if k > i]
     return [(float(amplitude[i]), float(amplitude[k]), float(np.sign(zeta[i : k + 1].sum()))) for i, k in parts]
