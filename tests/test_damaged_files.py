@@ -149,6 +149,14 @@ def wild_petsc(path: Path, K: sp.csr_matrix) -> None:
     _write_petsc(path, wrong)
 
 
+def negative_petsc(path: Path, K: sp.csr_matrix) -> None:
+    """A row of -(2^30) entries, so that all of them are fewer than none."""
+    _write_petsc(path, K)
+    content = bytearray(path.read_bytes())
+    content[4 * (4 + 24)] = 0xC0
+    path.write_bytes(content)
+
+
 def wild_matlab(path: Path, K: sp.csr_matrix) -> None:
     scipy.io.savemat(str(path), {"K": K.tocsc()})
     content = path.read_bytes()
@@ -176,6 +184,7 @@ def wild_npz(path: Path, K: sp.csr_matrix) -> None:
     [
         (huge_petsc, "K.petsc"),
         (wild_petsc, "K.petsc"),
+        (negative_petsc, "K.petsc"),
         (wild_matlab, "K.mat"),
         (huge_market, "K.mtx"),
         (huge_index, "K.sti"),
