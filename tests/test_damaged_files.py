@@ -157,6 +157,13 @@ def negative_petsc(path: Path, K: sp.csr_matrix) -> None:
     path.write_bytes(content)
 
 
+def negative_npz(path: Path, K: sp.csr_matrix) -> None:
+    wrong = K.copy()
+    wrong.indptr = wrong.indptr.copy()
+    wrong.indptr[-1] = -4
+    sp.save_npz(path, wrong)
+
+
 def wild_matlab(path: Path, K: sp.csr_matrix) -> None:
     scipy.io.savemat(str(path), {"K": K.tocsc()})
     content = path.read_bytes()
@@ -189,6 +196,7 @@ def wild_npz(path: Path, K: sp.csr_matrix) -> None:
         (huge_market, "K.mtx"),
         (huge_index, "K.sti"),
         (wild_npz, "K.npz"),
+        (negative_npz, "K.npz"),
     ],
 )
 def test_sizes_and_indices_of_imports_are_not_believed(tmp_path: Path, make, name: str) -> None:
@@ -197,6 +205,14 @@ def test_sizes_and_indices_of_imports_are_not_believed(tmp_path: Path, make, nam
     with pytest.raises(InputError) as found:
         read_matrix(str(path), "K")
     assert name in str(found.value)
+
+
+def test_an_archive_named_in_a_case_is_not_believed_either(tmp_path: Path, capsys) -> None:
+    negative_npz(tmp_path / "K.npz", matrices()[1])
+    sp.save_npz(tmp_path / "M.npz", matrices()[0])
+    (tmp_path / "case.toml").write_text('[model]\nM = "M.npz"\nK = "K.npz"\n')
+    assert call("check", tmp_path / "case.toml") == 2
+    assert "K.npz" in capsys.readouterr().err
 
 
 def test_a_reader_that_crashes_ends_in_words() -> None:

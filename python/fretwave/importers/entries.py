@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
 
+from ..compressed import check_compressed
 from ..errors import InputError
 from ..matrices import Matrix, check_symmetric
 from ..model_file import dof_name
@@ -58,11 +59,7 @@ class Entries:
     @classmethod
     def of(cls, matrix: Any, where: str, kind: str, mirrored: str = "") -> Entries:
         """From a dense or SciPy sparse matrix."""
-        if hasattr(matrix, "check_format"):
-            starts = matrix.indptr  # SciPy's check skips a matrix whose last start, its number of entries, is negative
-            if starts[0] != 0 or (np.diff(starts) < 0).any() or starts[-1] != len(matrix.indices):
-                raise ValueError("the numbers of entries of its rows are wrong")
-            matrix.check_format(full_check=True)  # SciPy's loops trust the indices
+        check_compressed(matrix)
         found = sp.coo_matrix(matrix)
         rows, columns = found.row.astype(np.int64), found.col.astype(np.int64)
         return cls(rows, columns, found.data, found.shape, where, kind, mirrored=mirrored)
