@@ -95,6 +95,17 @@ void bind_hb(nb::module_& m) {
         const auto s = p.state(y.object);
         return nb::make_tuple(s.amplitude, s.omega, s.omega0, s.beta, s.zeta);
       });
+  nb::class_<ModeStart, NonlinearMode>(m, "ModeStart")
+      .def(
+          "__init__",
+          [](ModeStart* self, model::Model const& model, Harmonics const& h, Method method, PetscInt dof,
+             double omega, Petsc<Vec> shape, Petsc<Vec> imaginary, double amplitude) {
+            new (self) ModeStart(model, h, method, dof, omega, shape.object, imaginary.object, amplitude);
+          },
+          nb::keep_alive<1, 2>())
+      .def("initial", [](ModeStart& p) { return nb::steal(to_petsc4py(p.initial())); })
+      .def("mode", [](ModeStart& p, Petsc<Vec> y) { return nb::steal(to_petsc4py(p.mode(y.object))); })
+      .def("keep_loads", [](ModeStart& p, HarmonicProblem const& other) { p.keep_loads(other); });
   nb::class_<StaticPreload, HarmonicProblem>(m, "StaticPreload")
       .def(
           "__init__",
@@ -106,7 +117,9 @@ void bind_hb(nb::module_& m) {
   nb::class_<ForcedStart, HarmonicProblem>(m, "ForcedStart")
       .def(
           "__init__",
-          [](ForcedStart* self, ForcedResponse& to, Petsc<Vec> y) { new (self) ForcedStart(to, y.object); },
+          [](ForcedStart* self, ForcedResponse& to, Petsc<Vec> y, bool gaps) {
+            new (self) ForcedStart(to, y.object, gaps ? Way::gaps : Way::excitation);
+          },
           nb::keep_alive<1, 2>())
       .def("initial", [](ForcedStart& p) { return nb::steal(to_petsc4py(p.initial())); })
       .def("response",

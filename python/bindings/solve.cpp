@@ -32,6 +32,7 @@ void bind_solve(nb::module_& m) {
       .def("product", [](Problem& p, Petsc<Vec> y, Petsc<Vec> dy,
                          Petsc<Vec> dr) { p.product(y.object, dy.object, dr.object); })
       .def("jacobian", [](Problem& p, Petsc<Vec> y) { return nb::steal(to_petsc4py(assemble(p, y.object))); })
+      .def("piece", [](Problem& p, Petsc<Vec> y) { return p.piece(y.object); })
       .def("parameter_entry", &Problem::parameter_entry)
       .def("parameter_value", &Problem::parameter_value);
   nb::class_<StepControl>(m, "StepControl")
@@ -74,12 +75,12 @@ void bind_solve(nb::module_& m) {
            [](Continuation& c, Petsc<Vec> y, bool upwards) { return to_python(c.start(y.object, upwards)); })
       .def("restore",
            [](Continuation& c, std::vector<Petsc<Vec>> const& at, std::vector<Petsc<Vec>> const& before,
-              double step, int index, bool turned, int emitted, bool upwards, double began) {
+              double step, int index, bool wary, int emitted, bool upwards, double began) {
              const auto anchor = [&](std::vector<Petsc<Vec>> const& pair) {
                Continuation::Anchor a;
                if (pair.empty()) return a;
                a.y = copy(pair[0].object), a.tangent = copy(pair[1].object);
-               a.step = step, a.index = index, a.turned = turned;
+               a.step = step, a.index = index, a.wary = wary;
                return a;
              };
              return to_python(c.restore(anchor(at), anchor(before), emitted, upwards, began));
@@ -96,7 +97,7 @@ void bind_solve(nb::module_& m) {
         nb::dict out;
         out["y"] = Petsc<Vec>{a.y}, out["tangent"] = Petsc<Vec>{a.tangent};
         if (b.y) out["before_y"] = Petsc<Vec>{b.y}, out["before_tangent"] = Petsc<Vec>{b.tangent};
-        out["step"] = a.step, out["index"] = a.index, out["turned"] = a.turned, out["emitted"] = c.emitted();
+        out["step"] = a.step, out["index"] = a.index, out["wary"] = a.wary, out["emitted"] = c.emitted();
         out["upwards"] = c.upwards(), out["began"] = c.began();
         return out;
       });

@@ -30,6 +30,7 @@ class StepControl:
 
     Attributes
     ----------
+    minimum : shortest step before a branch is given up, but over the corner where a sample of contact changes state
     max_angle : largest turn [rad] of the branch in one step; longer steps are halved
     max_error : largest distance between the branch and the cubic through its points and tangents; likewise
     """
@@ -85,7 +86,8 @@ class Continuation:
     y0 : Vec
         First guess; Newton runs at its parameter.
     stop : (low, high)
-        The last point lies on the value the branch reaches.
+        The last point lies on the value the branch reaches. One that begins at an end may fold back over it and come
+        in again: it is followed a quarter of the range (half the value at most) outside, and its points are kept.
     report_at : parameter values at which points are located
     upwards : the parameter grows at first
     helped : a start that Newton does not find is looked for on other ways (`started` tells)
@@ -126,18 +128,24 @@ class Continuation:
 
     def _first(self) -> dict[str, Any] | None:
         """The first point, by another way if Newton does not find it from the first guess."""
-        point = self._core.start(self._y0, self._upwards)
-        if point is not None or not self.helped:
-            return dict(point) if point is not None else None
-        from .starting import starts
+        from .starting import far_from_start, starts
 
-        reason = str(self._core.reason)
+        point = self._core.start(self._y0, self._upwards)
+        if not self.helped:
+            return dict(point) if point is not None else None
+        far = point is not None and far_from_start(self.problem, point["y"])
+        if point is not None and not far:
+            return dict(point)
+        reason = "the first point found is far from the linear mode" if far else str(self._core.reason)
         reasons: list[str] = []
-        for how, y in starts(self.problem, self._y0, reasons):
+        for how, y in starts(self.problem, self._y0, reasons, far):
             point = self._core.start(y, self._upwards)
             if point is not None:
                 self.started = how
                 return dict(point)
+        if far and not reasons:
+            point = self._core.start(self._y0, self._upwards)
+            return dict(point) if point is not None else None
         self._advice = "".join(f"; {other}" for other in reasons)
         self._first_reason = reason
         return None
@@ -234,8 +242,8 @@ class Continuation:
         branch = cls(problem, vectors["y"], stop, steps, report_at, upwards)
         before = [vectors[name] for name in _VECTORS[2:] if name in vectors]
         step, index, emitted = float(snapshot["step"]), int(snapshot["index"]), int(snapshot["emitted"])
-        turned, now = bool(snapshot.get("turned", False)), [vectors["y"], vectors["tangent"]]
-        point = branch._core.restore(now, before, step, index, turned, emitted, upwards, began)
+        wary, now = bool(snapshot.get("wary", False)), [vectors["y"], vectors["tangent"]]
+        point = branch._core.restore(now, before, step, index, wary, emitted, upwards, began)
         branch.repeated = None if point is None else Point(**point)
         branch._restored = True
         return branch

@@ -160,7 +160,7 @@ class StepSection(Section):
     """Step control of the continuation."""
 
     initial: Positive = key("length of the first arclength step", "-", "0.05", default=0.05)
-    minimum: Positive = key("shortest step before the branch is given up", "-", "1e-9", default=1e-9)
+    minimum: Positive = key("shortest step, but over a corner", "-", "1e-9", default=1e-9)
     maximum: Positive = key("longest step", "-", "0.3", default=0.3)
     max_angle: Positive = key("largest turn of the branch in one step", "rad", "0.6", default=0.6, le=3.2)
     max_error: Positive = key(

@@ -11,6 +11,7 @@ template <bool Coupled>
 Coulomb3d<Coupled>::Coulomb3d(Coulomb3dParameters p)
     : p_(std::move(p)),
       unworn_(p_.gap),
+      worn_(p_.gap),
       reach_(p_.gap.size()),
       slider_(2 * p_.gap.size(), 0.0),
       closed_(p_.gap.size()) {
@@ -43,7 +44,13 @@ void Coulomb3d<Coupled>::set_rest(double const* u) {
 
 template <bool Coupled>
 void Coulomb3d<Coupled>::set_wear(double const* depth) {
-  for (int i = 0; i < pairs(); ++i) p_.gap[i] = unworn_[i] + depth[i];
+  for (int i = 0; i < pairs(); ++i) worn_[i] = unworn_[i] + depth[i];
+  p_.gap = worn_;
+}
+
+template <bool Coupled>
+void Coulomb3d<Coupled>::set_stand_off(double distance) {
+  for (int i = 0; i < pairs(); ++i) p_.gap[i] = worn_[i] + distance;
 }
 
 template <bool Coupled>
@@ -196,6 +203,19 @@ void Coulomb3d<Coupled>::diagnose(Motion const& motion, double const* f, Diagnos
       out.work[i] += std::max(0.0, now[n + i] * moved[0] + now[2 * n + i] * moved[1]);
     }
   }
+}
+
+/// Without friction: which samples are open. With it slip turns within its piece, and a slider in shakedown
+/// touches its limit by rounding: pieces have no sharp ends there.
+template <bool Coupled>
+std::uint64_t Coulomb3d<Coupled>::piece(Motion const& motion, Record const& record) const {
+  const int n = motion.pairs;
+  if (std::ranges::any_of(p_.friction_coefficient, [](double mu) { return mu > 0; })) return 0;
+  std::vector<double> states(size_t(motion.samples) * n);
+  double const* r = record.march.data();
+  for (int t = 0; t < motion.samples; ++t, r += record_arrays * n)
+    for (int i = 0; i < n; ++i) states[size_t(t) * n + i] = Coupled ? r[i] >= 0 : r[i];
+  return number_of(states, motion.first);
 }
 
 template class Coulomb3d<true>;

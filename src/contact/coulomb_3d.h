@@ -29,10 +29,12 @@ class Coulomb3d : public Law {
   void pair_product(Motion const&, Record const&, int pair, int columns, double const* du,
                     double* df) const override;
   void diagnose(Motion const&, double const* f, Diagnosis&) const override;
+  std::uint64_t piece(Motion const&, Record const&) const override;
 
  protected:
   void set_rest(double const* u) override;
   void set_wear(double const* depth) override;
+  void set_stand_off(double distance) override;
 
  private:
   PairConstants constants(int first) const;
@@ -42,7 +44,7 @@ class Coulomb3d : public Law {
   void linearised(Motion const&, Record const&, int pair, int n, double const* du, double* df) const;
 
   Coulomb3dParameters p_;
-  std::vector<double> unworn_;           ///< gap without wear [m]
+  std::vector<double> unworn_, worn_;    ///< gap without wear, and with it [m]; p_.gap has the stand-off too
   std::vector<double> reach_;            ///< mu / kt [m/N]
   std::vector<double> slider_, closed_;  ///< at rest: w (2 x pairs), 1 where closed
 };

@@ -21,7 +21,8 @@ bool Jenkins::odd() const {
 
 namespace {
 
-/// One period; `last` notes the last sample that slips (-1 none), `stick` the flags.
+/// One period; `last` notes the last sample that slips (-1 none), `stick` the flags: 1, or 0 with the sign of
+/// the slip.
 FRETWAVE_VECTORISE void march(int samples, int n, double const* k, double const* limit, double const* u,
                               double* w, double* f, double* stick, double* last) {
   for (int t = 0; t < samples; ++t, u += n, f += n, stick += n)
@@ -32,7 +33,7 @@ FRETWAVE_VECTORISE void march(int samples, int n, double const* k, double const*
       const bool sticks = force == trial && limit[i] > 0;  // without friction nothing sticks
       w[i] = sticks ? w[i] : u[i] - force / k[i];
       last[i] = sticks ? last[i] : double(t);
-      stick[i] = sticks ? 1.0 : 0.0;
+      stick[i] = sticks ? 1.0 : std::copysign(0.0, force);
       f[i] = force;
     }
 }
@@ -116,6 +117,10 @@ void Jenkins::diagnose(Motion const& motion, double const* f, Diagnosis& out) co
       out.work[i] += std::max(0.0, f[now] * moved);  // by rounding only where it just touches the limit
     }
   }
+}
+
+std::uint64_t Jenkins::piece(Motion const& motion, Record const& record) const {
+  return number_of(record.march, motion.first);
 }
 
 Entry jenkins_entry() {

@@ -19,6 +19,7 @@ class Jenkins : public Law {
   void pair_product(Motion const&, Record const&, int pair, int columns, double const* du,
                     double* df) const override;
   void diagnose(Motion const&, double const* f, Diagnosis&) const override;
+  std::uint64_t piece(Motion const&, Record const&) const override;
 
  protected:
   void set_rest(double const* u) override;

@@ -70,8 +70,15 @@ class Law {
     if (depth) set_wear(depth);
     ++version_;
   }
-  /// Grows whenever `rest` or `wear` may have changed the force: a linearisation made before is of another
-  /// law.
+  /// Widens the gaps of all pairs by a distance [m] that is no wear; the rest state stays as it is.
+  void stand_off(double distance) {
+    if (distance == stand_off_) return;
+    stand_off_ = distance;
+    set_stand_off(distance);
+    ++version_;
+  }
+  /// Grows whenever `rest`, `wear` or `stand_off` may have changed the force: a linearisation made before is
+  /// of another law.
   unsigned version() const { return version_; }
   /// f(-u, -v) = -f(u, v): the motion may keep odd harmonics only.
   virtual bool odd() const { return false; }
@@ -91,14 +98,22 @@ class Law {
   virtual void pair_product(Motion const&, Record const&, int /*pair*/, int /*columns*/, double const* /*du*/,
                             double* /*df*/) const {}
   virtual void diagnose(Motion const&, double const* f, Diagnosis&) const = 0;
+  /// Number of the smooth piece that the last force lies on: another one where any sample is in another state
+  /// (stick, slip, open). The same everywhere for a law that is smooth.
+  virtual std::uint64_t piece(Motion const&, Record const&) const { return 0; }
 
  protected:
   virtual void set_rest(double const* /*u*/) {}
   virtual void set_wear(double const* /*depth*/) {}
+  virtual void set_stand_off(double /*distance*/) {}
 
  private:
+  double stand_off_ = 0;
   unsigned version_ = 0;
 };
+
+/// Number of a pattern of states, given as record entries (any values that differ from state to state).
+std::uint64_t number_of(std::vector<double> const& states, int first);
 
 /// Work done against the force over the motion, per pair: sum of f . v dt (for laws that see the velocity).
 void add_work(Motion const&, double const* f, std::vector<double>& work);

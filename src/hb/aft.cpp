@@ -76,6 +76,12 @@ void Aft::force(double const* U, Exponents const& e, double* F) {
   }
 }
 
+std::uint64_t Aft::piece() const {
+  std::uint64_t sum = 0;
+  for (Tile const& tile : tiles_) sum += columns_ ? law_->piece(motion(tile, 1), tile.record) : 0;
+  return sum;
+}
+
 void Aft::product(double const* dU, double const* dV, double* dF) {
   if (columns_ == 0) return;
   for (Tile const& tile : tiles_) {

@@ -45,6 +45,9 @@ class Aft {
   /// Dense dF/dU of each pair, pairs x (components m) x (components m), with the velocity's share through s.
   void blocks(Exponents const&, double* D);
 
+  /// Number of the smooth piece that the last force lies on.
+  std::uint64_t piece() const;
+
   ContactSummary summarise(double const* U, Exponents const&);
   ContactPeriod period(double const* U, Exponents const&) const;
   Wearing wearing(double const* U, Exponents const&) const;

@@ -79,8 +79,9 @@ ForcedState ForcedResponse::state(Vec y) {
   return {level_, z[0] * omega_reference_, std::hypot(cosine, sine), std::atan2(-sine, cosine)};
 }
 
-ForcedStart::ForcedStart(ForcedResponse& to, Vec y)
+ForcedStart::ForcedStart(ForcedResponse& to, Vec y, Way way)
     : HarmonicProblem(to.model(), to.harmonics(), 1, to.dof(), to.stiffness_scale()),
+      way_(way),
       amplitude_(to.reference_amplitude()),
       frequency_(last_entry(y)),
       exponents_(to.exponents(y)) {
@@ -92,7 +93,7 @@ ForcedStart::ForcedStart(ForcedResponse& to, Vec y)
     const ReadArray r(left), q(y);
     const double force = stiffness_scale() * amplitude_;
     WriteArray rest(excitation()), guess(guess_);
-    for (PetscInt i = 0; i < n; ++i) rest[i] = force * r[i], guess[i] = q[i];
+    for (PetscInt i = 0; i < n; ++i) rest[i] = way_ == Way::excitation ? force * r[i] : 0, guess[i] = q[i];
   }
   keep_loads(to);
 }
@@ -109,16 +110,18 @@ VecHandle ForcedStart::response(Vec y) const {
 
 ScaledMotion ForcedStart::motion(std::vector<double> const& z) const {
   Exponents none{std::vector<complex>(harmonics().count()), 0};
-  return {.amplitude = amplitude_,
-          .exponents = exponents_,
-          .dlog_amplitude = {0},
-          .dexponents = {none},
-          .load = 1 - z[0],
-          .dload = {-1}};
+  ScaledMotion out{
+      .amplitude = amplitude_, .exponents = exponents_, .dlog_amplitude = {0}, .dexponents = {none}};
+  if (way_ == Way::excitation)
+    out.load = 1 - z[0], out.dload = {-1};
+  else
+    out.stand_off = amplitude_ * z[0], out.dstand_off = amplitude_;
+  return out;
 }
 
 std::string ForcedStart::parameter_text(double value) const {
-  return short_text(100 * value) + " % of the way to the start";
+  return way_ == Way::gaps ? gap_text(value * amplitude_)
+                           : short_text(100 * value) + " % of the way to the start";
 }
 
 std::string ForcedStart::beyond(Vec y) {
@@ -132,7 +135,7 @@ void ForcedStart::metric(Vec y, Vec weights) {
   const double t = last_entry(y);
   double square = dot(y, y) - t * t;
   check(VecSet(weights, 1 / std::max(square, 1.0)));
-  set_last_entry(weights, 1);
+  set_last_entry(weights, way_ == Way::gaps ? gap_weight(t) : 1);
 }
 
 }  // namespace fretwave::hb

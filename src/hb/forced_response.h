@@ -37,15 +37,20 @@ class ForcedResponse : public HarmonicProblem {
   double level_, omega_reference_, amplitude_ = 1;
 };
 
-/// The way to a response that Newton does not find from afar, at its fixed frequency: at the share t of the
-/// way, R(Q) = P + (1 - t) R_0, with R_0 = R(Q_0) - P what a guess Q_0 leaves of the forces. From Q_0 = 0 it
-/// is the excitation that grows; from another guess a fictitious force that fades (Newton homotopy, Allgower
-/// & Georg 2003). y = (Q/a_ref, t).
+/// What changes on the way to a response.
+enum class Way { excitation, gaps };
+
+/// The way to a response that Newton does not find from afar, at its fixed frequency.
+/// Excitation, at the share t of the way: R(Q) = P + (1 - t) R_0, with R_0 = R(Q_0) - P what a guess Q_0
+/// leaves of the forces. From Q_0 = 0 it is the excitation that grows; from another guess a fictitious force
+/// that fades (Newton homotopy, Allgower & Georg 2003). Gaps: R(Q) = P with all gaps wider by t a_ref; from
+/// the response that touches nothing they close, to t = 0. A stop without gap is the same at any level:
+/// raising the excitation changes nothing there. y = (Q/a_ref, t).
 class ForcedStart : public HarmonicProblem {
  public:
   /// From the guess y of a response, whose frequency it keeps. Collective.
-  ForcedStart(ForcedResponse&, Vec y);
-  VecHandle initial() { return pack(guess_, {0.0}); }
+  ForcedStart(ForcedResponse&, Vec y, Way);
+  VecHandle initial() { return pack(guess_, {way_ == Way::gaps ? out_of_reach : 0.0}); }
   /// Unknowns of the response at the end of the way.
   VecHandle response(Vec y) const;
 
@@ -57,6 +62,7 @@ class ForcedStart : public HarmonicProblem {
 
  private:
   ScaledMotion motion(std::vector<double> const& z) const override;
+  Way way_;
   double amplitude_, frequency_;  ///< the response's parameter entry
   Exponents exponents_;
   VecHandle guess_;

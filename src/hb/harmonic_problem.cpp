@@ -8,6 +8,7 @@
 #include "hb/condensed_pc.h"
 #include "hb/harmonic_pc.h"
 #include "hb/wheel_pc.h"
+#include "text.h"
 
 namespace fretwave::hb {
 
@@ -50,6 +51,8 @@ model::Model const& countable(model::Model const& model, Harmonics const& h) {
 
 }  // namespace
 
+std::string gap_text(double distance) { return "gaps " + short_text(distance) + " m wider"; }
+
 HarmonicProblem::HarmonicProblem(model::Model const& model, Harmonics const& h, int scalars, PetscInt dof,
                                  double reference_stiffness)
     : residual_(countable(model, h), h),
@@ -90,6 +93,7 @@ std::vector<double> HarmonicProblem::scalars(Vec y) {
 void HarmonicProblem::unpack(Vec y) {
   z_ = scalars(y);
   motion_ = motion(z_);
+  residual_.stand_off(motion_.stand_off);
   {
     ReadArray in(y);
     std::copy_n(in.data(), local_block_, WriteArray(q_).data());
@@ -196,6 +200,11 @@ double HarmonicProblem::rounding(Vec y) {
   return residual_.rounding() / (stiffness_ * motion_.amplitude);
 }
 
+std::uint64_t HarmonicProblem::piece(Vec y) {
+  linearise(y);
+  return residual_.piece();
+}
+
 bool HarmonicProblem::measure_in(double k) {
   const bool changes = k != stiffness_;
   stiffness_ = k;
@@ -232,6 +241,7 @@ void HarmonicProblem::product(Vec y, Vec dy, Vec dr) {
   check(VecAXPBY(dQ_, motion_.amplitude * dlog, motion_.amplitude, q_));
   residual_.product(dQ_, &de, dR_);
   check(VecAXPY(dR_, -load, excitation_));
+  add_stand_off(scalars_ - 1, dz[scalars_ - 1], dR_);
   check(VecAXPBY(dR_, -dlog, 1 / (stiffness_ * motion_.amplitude), R_));
   WriteArray out(dr);
   ReadArray in(dR_);
@@ -253,12 +263,21 @@ void HarmonicProblem::pattern(std::vector<PetscInt>& rows, std::vector<PetscInt>
         cols.push_back(dof_ * harmonics().block_size() + harmonics().offset(harmonics().fundamental()) + j);
 }
 
+/// dR += dR/d(stand-off) d(stand-off)/dz_j dz.
+void HarmonicProblem::add_stand_off(int j, double dz, Vec dR) {
+  if (j != scalars_ - 1 || motion_.dstand_off == 0) return;
+  VecHandle wider = like(dR);
+  residual_.stand_off_product(wider);
+  check(VecAXPY(dR, dz * motion_.dstand_off, wider));
+}
+
 void HarmonicProblem::column(int j, double* v) {
   const double dlog = motion_.dlog_amplitude[j];
   check(VecCopy(q_, dQ_));
   check(VecScale(dQ_, dlog * motion_.amplitude));
   residual_.product(dlog ? Vec(dQ_) : nullptr, &motion_.dexponents[j], dR_);
   check(VecAXPY(dR_, -dload(j), excitation_));
+  add_stand_off(j, 1, dR_);
   check(VecAXPBY(dR_, -dlog, 1 / (stiffness_ * motion_.amplitude), R_));
   ReadArray in(dR_);
   std::copy_n(in.data(), local_block_, v);

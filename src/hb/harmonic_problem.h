@@ -6,15 +6,22 @@
 
 namespace fretwave::hb {
 
+/// Gaps of this many amplitudes are out of a motion's reach, also in resonance.
+constexpr double out_of_reach = 1000;
+/// Of gaps t amplitudes wider: a step is a share of them while they are wide.
+inline double gap_weight(double t) { return 1 / std::max(1.0, t * t); }
+std::string gap_text(double distance);
+
 /// What a variant's scalar unknowns z mean: motion Q = a q, exponents s_n, and their derivatives by each
 /// scalar.
 struct ScaledMotion {
-  double amplitude = 1;                ///< a
-  Exponents exponents;                 ///< s_n
-  std::vector<double> dlog_amplitude;  ///< d log a / dz_j
-  std::vector<Exponents> dexponents;   ///< d s_n / dz_j
-  double load = 1;                     ///< factor on the excitation P
-  std::vector<double> dload = {};      ///< d load / dz_j; empty if constant
+  double amplitude = 1;                  ///< a
+  Exponents exponents;                   ///< s_n
+  std::vector<double> dlog_amplitude;    ///< d log a / dz_j
+  std::vector<Exponents> dexponents;     ///< d s_n / dz_j
+  double load = 1;                       ///< factor on the excitation P
+  std::vector<double> dload = {};        ///< d load / dz_j; empty if constant
+  double stand_off = 0, dstand_off = 0;  ///< by which all gaps are widened [m], and by the last scalar
 };
 
 /// y = (q, tau, z): scaled harmonic blocks q = (Q - Q_static) / a, then on the last rank the unfolding tau,
@@ -31,6 +38,7 @@ class HarmonicProblem : public solve::Problem {
   }
   void residual(Vec y, Vec r) override;
   double rounding(Vec y) override;
+  std::uint64_t piece(Vec y) override;
   void product(Vec y, Vec dy, Vec dr) override;
   void pattern(std::vector<PetscInt>& rows, std::vector<PetscInt>& cols) override;
   void values(Vec y, std::span<double> v) override;
@@ -67,6 +75,8 @@ class HarmonicProblem : public solve::Problem {
   std::unique_ptr<solve::Preconditioner> fallback(double& bytes) override;
   double jacobian_entries() const override;
   std::string explain(Vec y, Vec dy) override;
+  /// The fixed loads of another problem, excitation included; its static state is the rest. Collective.
+  void keep_loads(HarmonicProblem const& other);
   /// The laws start their march from the static state at y. Collective.
   void settle(Vec y) { residual_.settle(coefficients(y)); }
   std::vector<ContactPeriod> contact_periods(Vec y);
@@ -83,8 +93,6 @@ class HarmonicProblem : public solve::Problem {
   virtual double metric_weight(int /*scalar*/) const { return 1; }
   /// Force rows are measured in k a from now on; true if that changed them.
   bool measure_in(double k);
-  /// The fixed loads of another problem, excitation included; its static state is the rest. Collective.
-  void keep_loads(HarmonicProblem const& other);
   Vec excitation() { return excitation_; }  ///< P, zero unless a variant sets it
   VecHandle pack(Vec q, std::vector<double> const& z) const;
 
@@ -99,6 +107,7 @@ class HarmonicProblem : public solve::Problem {
   void unpack(Vec y);
   void column(int j, double* v);
   void set_mean(Vec per_dof, Vec blocks);
+  void add_stand_off(int j, double dz, Vec dR);
   double dload(int j) const { return motion_.dload.empty() ? 0 : motion_.dload[j]; }
 
   Residual residual_;

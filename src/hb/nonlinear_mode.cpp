@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "error.h"
+#include "solve/vectors.h"
 #include "text.h"
 
 namespace fretwave::hb {
@@ -148,6 +149,43 @@ std::vector<solve::TestFunction> NonlinearMode::tests(Vec y, Vec tangent) {
   // zeta = beta/w0 grows with beta/w in both variants: its change along the branch has the sign of w dbeta -
   // beta dw
   return {{"zero_damping", z[0]}, {"peak_damping", z[1] * dz[0] - z[0] * dz[1], true, true}};
+}
+
+ModeStart::ModeStart(model::Model const& model, Harmonics const& h, Method method, PetscInt dof, double omega,
+                     Vec shape, Vec imaginary, double amplitude)
+    : NonlinearMode(model, h, method, dof, omega, shape, imaginary), amplitude_(amplitude) {}
+
+VecHandle ModeStart::initial() {
+  VecHandle y = NonlinearMode::initial(amplitude_);
+  solve::set_last_entry(y, out_of_reach);
+  return y;
+}
+
+VecHandle ModeStart::mode(Vec y) const {
+  VecHandle out = solve::copy(y);
+  solve::set_last_entry(out, std::log(amplitude_));
+  return out;
+}
+
+ScaledMotion ModeStart::motion(std::vector<double> const& z) const {
+  ScaledMotion out = NonlinearMode::motion({z[0], z[1], std::log(amplitude_)});
+  out.dlog_amplitude[2] = 0;
+  out.stand_off = amplitude_ * z[2], out.dstand_off = amplitude_;
+  return out;
+}
+
+std::string ModeStart::parameter_text(double value) const { return gap_text(value * amplitude_); }
+
+void ModeStart::metric(Vec y, Vec weights) {
+  NonlinearMode::metric(y, weights);
+  solve::set_last_entry(weights, gap_weight(solve::last_entry(y)));
+}
+
+std::string ModeStart::impossible(Vec y) {
+  const auto z = scalars(y);
+  if (!std::isfinite(z[0]) || !std::isfinite(z[1]) || !std::isfinite(z[2]))
+    return "frequency or damping is not finite";
+  return z[1] > 0 ? "" : "the frequency falls below zero";
 }
 
 }  // namespace fretwave::hb

@@ -38,12 +38,37 @@ class NonlinearMode : public HarmonicProblem {
   std::string impossible(Vec y) override;
   std::vector<solve::TestFunction> tests(Vec y, Vec tangent) override;
 
- private:
+ protected:
   ScaledMotion motion(std::vector<double> const& z) const override;
+
+ private:
   Method method_;
   double omega_reference_, starting_stiffness_;
   MatHandle mass_;
   VecHandle shape_, imaginary_;
+};
+
+/// The way to a mode with stops, at its fixed amplitude a: all gaps are wider by t a; from the mode that
+/// touches nothing they close, to t = 0. A stop without gap is the same at any amplitude: a smaller one
+/// changes nothing there.
+class ModeStart : public NonlinearMode {
+ public:
+  ModeStart(model::Model const&, Harmonics const&, Method, PetscInt dof, double omega, Vec shape,
+            Vec imaginary, double amplitude);
+  VecHandle initial();
+  /// Unknowns of the mode at the end of the way.
+  VecHandle mode(Vec y) const;
+
+  double parameter_value(double entry) const override { return entry; }
+  double parameter_entry(double value) const override { return value; }
+  std::string parameter_text(double value) const override;
+  std::string impossible(Vec y) override;
+  std::vector<solve::TestFunction> tests(Vec, Vec) override { return {}; }
+  void metric(Vec y, Vec weights) override;
+
+ private:
+  ScaledMotion motion(std::vector<double> const& z) const override;
+  double amplitude_;
 };
 
 /// phi^H M phi w^2 / phi^H phi: the inertia force per displacement that force rows are measured in [N/m]; of

@@ -7,6 +7,7 @@
 
 #include "error.h"
 #include "fault.h"
+#include "scramble.h"
 #include "together.h"
 
 namespace fretwave::hb {
@@ -174,6 +175,17 @@ void Residual::gap_product(PerContact const& dgap, Vec dR) {
     group.aft.gap_product(gaps.data(), WriteArray(dF).data());
     add_force(group, dF, dR);
   }
+}
+
+void Residual::stand_off(double distance) {
+  for (Group const& group : groups_) group.contact->law->stand_off(distance);
+}
+
+void Residual::stand_off_product(Vec dR) {
+  PerContact dgap(groups_.size());
+  for (size_t k = 0; k < groups_.size(); ++k)
+    if (groups_[k].contact->law->wears()) dgap[k].assign(groups_[k].contact->law->pairs(), 1.0);
+  gap_product(dgap, dR);
 }
 
 std::vector<Wearing> Residual::wearing(Vec Q, Exponents const& e) {
@@ -351,6 +363,14 @@ ContactSummary Residual::summarise(Vec Q, Exponents const& e) {
   MPI_Allreduce(MPI_IN_PLACE, sums, 8, MPI_DOUBLE, MPI_SUM, model_.comm());
   MPI_Allreduce(MPI_IN_PLACE, largest, 2, MPI_DOUBLE, MPI_MAX, model_.comm());
   return {sums[0], sums[1], sums[2], sums[3], sums[4], sums[5], sums[6], sums[7], largest[0], largest[1]};
+}
+
+std::uint64_t Residual::piece() const {
+  std::uint64_t sum = 0;
+  for (size_t g = 0; g < groups_.size(); ++g) sum += scrambled(groups_[g].aft.piece() + g);
+  sum = scrambled(sum + std::uint64_t(comm_rank(model_.comm())));
+  MPI_Allreduce(MPI_IN_PLACE, &sum, 1, MPI_UINT64_T, MPI_SUM, model_.comm());
+  return sum;
 }
 
 unsigned Residual::contact_version() const {

@@ -62,6 +62,10 @@ class Residual {
   /// Worn depths of the pairs [m], in the laws, which all residuals of the model share; empty for a contact
   /// that does not wear.
   void wear(PerContact const& depth);
+  /// Widens all gaps by a distance [m] that is no wear, in the laws, which all residuals of the model share.
+  void stand_off(double distance);
+  /// dR for gaps that all grow by 1 m, at the last evaluated point. Collective.
+  void stand_off_product(Vec dR);
   /// dR for gaps that grow, at the last evaluated point. Collective.
   void gap_product(PerContact const& dgap, Vec dR);
   /// What wears the contacts in the motion (Q, e). Collective.
@@ -73,6 +77,8 @@ class Residual {
 
   /// Contact of the motion (Q, e), summed over all ranks and contacts. Collective.
   ContactSummary summarise(Vec Q, Exponents const& e);
+  /// Number of the smooth piece that the last evaluated point lies on, the same on every rank. Collective.
+  std::uint64_t piece() const;
   /// Grows with every `settle` and `wear` of any problem that shares the laws; the same on every rank.
   unsigned contact_version() const;
   /// The laws take the mean relative displacement of Q as their rest state. Collective.

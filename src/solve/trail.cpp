@@ -1,7 +1,8 @@
 #include "solve/trail.h"
 
 #include <cmath>
-#include <cstdint>
+
+#include "scramble.h"
 
 namespace fretwave::solve {
 
@@ -12,12 +13,9 @@ constexpr double parallel = 0.98;    // cosine between directions of the same pi
 constexpr double nearness = 0.1;     // of a step's length: the chord's distance from a bent branch
 constexpr double same_place = 1e-6;  // relative
 
-/// Uniform in (-1, 1) by the entry's global number and the functional's (splitmix64, Steele et al. 2014).
+/// Uniform in (-1, 1) by the entry's global number and the functional's.
 double weight(PetscInt entry, int functional) {
-  std::uint64_t x = std::uint64_t(entry) * Trail::count + std::uint64_t(functional) + 0x9e3779b97f4a7c15u;
-  x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9u;
-  x = (x ^ (x >> 27)) * 0x94d049bb133111ebu;
-  x ^= x >> 31;
+  const auto x = scrambled(std::uint64_t(entry) * Trail::count + std::uint64_t(functional));
   return double(std::int64_t(x)) / 9223372036854775808.0;
 }
 

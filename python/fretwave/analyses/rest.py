@@ -79,7 +79,7 @@ def start_mode(context: AnalysisContext, linear_mode: int, or_free: bool = False
 
     Parameters
     ----------
-    or_free : where contact that sticks leaves nothing to move, the mode without it (a scale for forced motions)
+    or_free : where contact that sticks leaves nothing to move, the mode without it
     """
     rest = rest_state(context)
     if rest is not None:
@@ -93,6 +93,7 @@ def start_mode(context: AnalysisContext, linear_mode: int, or_free: bool = False
     except InputError:
         if not or_free:
             raise
+        context.console.line(f"{context.name}: contact that sticks leaves nothing to move: the mode without contact")
         return context.linear_mode("free", linear_mode)[linear_mode - 1], rest
     start = modes[linear_mode - 1]
     if start.omega <= RIGID * closed_mode(context).omega:

@@ -62,7 +62,7 @@ def start_of(context: AnalysisContext) -> Start:
     if context.case.wheel is not None:
         return _on_wheel(context)
     analysis: Any = context.analysis
-    stuck, rest = start_mode(context, analysis.linear_mode)
+    stuck, rest = start_mode(context, analysis.linear_mode, or_free=True)
     return Start(stuck, rest, other_asymptote(context, stuck), context.case.dof(analysis.normalise))
 
 
