@@ -39,6 +39,14 @@ def test_branch_goes_through_both_folds_without_a_gap(two_dof, comm):
     assert (points[0].event, points[-1].event) == ("start", "stop")
 
 
+def test_last_digits_change_no_step(two_dof, comm):
+    """A damping ratio of 2e-11 changes the motion as another order of additions does."""
+    runs = [follow(problem_of(two_dof, comm, C))[1] for C in (None, 1e-9 * np.eye(2))]
+    steps, changed = ([p.step for p in points if not p.event] for points in runs)
+    assert len(steps) > 20 and steps == changed
+    assert not np.array_equal(*(whole(points[-2].y) for points in runs))
+
+
 def test_every_point_solves_the_equations_to_the_tolerance(two_dof, comm):
     """Newton's absolute tolerance on the dimensionless residual: 1e-10."""
     problem = problem_of(two_dof, comm)

@@ -9,10 +9,19 @@ namespace {
 
 // A turn that is left in so short a step is a kink (a sample changes state), not curvature.
 constexpr double kink_length = 1e-4;
-constexpr double kink_angle = 0.02;  // [rad] in so short a step
-constexpr double seen_angle = 0.05;  // [rad] in a longer one: it may hide a corner
-constexpr int certain = 3;           // meetings with earlier points of the branch in a row
-constexpr double at_the_end = 1e-9;  // relative: a branch that starts here starts at the end of its range
+constexpr int crawl = 300;            // steps below the smallest in a row, over pieces that thin
+constexpr double sparse = 1.0 / 32;   // of a step: corners farther than that apart are walked to one by one
+constexpr double before_end = 0.999;  // of the way to the end of a piece
+constexpr double kink_angle = 0.02;   // [rad] in so short a step
+constexpr double seen_angle = 0.05;   // [rad] in a longer one: it may hide a corner
+constexpr int certain = 3;            // meetings with earlier points of the branch in a row
+constexpr double grid = 16;           // lengths of steps in every factor of two
+constexpr double at_the_end = 1e-9;   // relative: a branch that starts here starts at the end of its range
+constexpr double leash = 0.25;        // of the range, by which a branch may leave it where it began
+
+/// On a coarse grid: what a solution's last digits (of which no two numbers of ranks have the same) do to a
+/// length would be handed on from step to step and grow with the steps.
+double on_grid(double length) { return std::exp2(std::round(grid * std::log2(length)) / grid); }
 
 }  // namespace
 
@@ -20,6 +29,8 @@ Continuation::Continuation(Problem& problem, std::string const& prefix, double l
                            StepControl steps, std::vector<double> report_at)
     : problem_(problem),
       newton_(problem, prefix),
+      given_low_(low),
+      given_high_(high),
       low_(low),
       high_(high),
       steps_(steps),
@@ -95,6 +106,7 @@ std::optional<Point> Continuation::start(Vec y0, bool upwards) {
   if ((last_entry(trial.tangent) > 0) != upwards) check(VecScale(trial.tangent, -1));
   anchor_ = {.y = copy(trial.y), .tangent = copy(trial.tangent), .step = steps_.initial, .index = 1};
   began_ = parameter_of(trial.y);
+  open_the_range();
   prepare_row();
   (void)trail_.add(anchor_.y, anchor_.tangent);
   return point(std::move(trial), "start", 0);
@@ -104,6 +116,7 @@ std::optional<Point> Continuation::restore(Anchor anchor, Anchor before, int emi
                                            double began) {
   anchor_ = std::move(anchor), before_ = std::move(before);
   upwards_ = upwards, began_ = began;
+  open_the_range();
   prepare_row();
   (void)trail_.add(anchor_.y, anchor_.tangent);
   if (emitted == 0) return {};
@@ -112,6 +125,18 @@ std::optional<Point> Continuation::restore(Anchor anchor, Anchor before, int emi
   if (emitted_ < emitted) miss("a point handed out before the interruption", "it is not met again");
   if (emitted_ == 0) return {};
   return std::move(batch_[emitted_ - 1].second);
+}
+
+/// A branch may fold back over the end it began at and come in again: it is followed some way outside.
+void Continuation::open_the_range() {
+  const double low = problem_.parameter_entry(given_low_), high = problem_.parameter_entry(given_high_),
+               room = leash * (high - low);
+  const auto at_end = [&](double end) { return std::abs(began_ - end) <= at_the_end * std::abs(end); };
+  low_ = given_low_, high_ = given_high_;
+  if (upwards_ && at_end(low_))
+    low_ = std::max(problem_.parameter_value(low - room), low_ > 0 ? low_ / 2 : -INFINITY);
+  if (!upwards_ && at_end(high_))
+    high_ = std::min(problem_.parameter_value(high + room), high_ > 0 ? 2 * high_ : INFINITY);
 }
 
 /// Closing row W t at the anchor: row . (y - y_anchor) is the arclength.
@@ -128,16 +153,27 @@ double Continuation::turn_of(Trial const& trial) const {
 }
 
 /// Distance of the anchor from the cubic through its neighbours, y'''' (H L)^2 / 24 for steps H and L, scaled
-/// to the error y'''' L^4 / 384 of the cubic over the new step.
-double Continuation::interpolation_error(Trial const& trial, double length) const {
-  if (!before_.y) return 0;
-  const double last = weighted_norm(weights_, moved(anchor_.y, -1, before_.y)),
+/// to the error y'''' L^4 / 384 of the cubic over the new step. Where the last step is too short to tell, it
+/// is measured in the middle, unless so small a turn leaves no room for an error that counts.
+double Continuation::interpolation_error(Trial const& trial, double length) {
+  const double last = before_.y ? weighted_norm(weights_, moved(anchor_.y, -1, before_.y)) : 0,
                now = weighted_norm(weights_, moved(trial.y, -1, anchor_.y));
-  if (!(last > length / 8)) return 0;  // too short a step to tell
+  if (!(last > length / 8)) {
+    const double most = turn_of(trial) * length / 8;
+    return most > steps_.max_error / 2 ? error_in_the_middle(trial, length) : most;
+  }
   const Hermite across(before_.y, before_.tangent, trial.y, trial.tangent, last + now);
   const double ratio = now / last;
   return weighted_norm(weights_, moved(across.value(last), -1, anchor_.y)) * std::min(ratio * ratio, 4.0) /
          16;
+}
+
+double Continuation::error_in_the_middle(Trial const& end, double length) {
+  const Hermite curve(anchor_.y, anchor_.tangent, end.y, end.tangent, length, 1 / dot(row_, end.tangent));
+  Trial middle = at(curve.value(length / 2));
+  const VecHandle expected = copy(middle.y);
+  if (!correct(middle, row_, dot(row_, expected), row_)) return INFINITY;
+  return weighted_norm(weights_, moved(middle.y, -1, expected));
 }
 
 /// What speaks against a corrected trial as the next point; nothing if it is one.
@@ -147,7 +183,7 @@ std::string Continuation::complaint(Trial& trial, double length, bool may_shorte
     return "the corrector lands on another branch";
   const double angle = turn_of(trial);
   if (may_shorten && angle > steps_.max_angle) return "the branch turns too sharply";
-  if (may_shorten && interpolation_error(trial, length) > steps_.max_error)
+  if (may_shorten && (trial.error = interpolation_error(trial, length)) > steps_.max_error)
     return "the branch bends more than a step resolves";
   if (may_shorten)
     return angle > seen_angle && leads_back(trial) ? "the corrector lands on another branch" : "";
@@ -162,35 +198,79 @@ std::string Continuation::complaint(Trial& trial, double length, bool may_shorte
   return "";
 }
 
-/// One accepted step from the anchor; halves the length on failure or when the branch bends too much, and
-/// turns a corner that no shorter step gets round.
-std::optional<Continuation::Trial> Continuation::step(double& length, double& next_length) {
-  std::string why;
-  const bool after_corner = anchor_.turned;
-  turned_ = false;
-  for (length = anchor_.step; length >= steps_.minimum; length /= 2) {
-    const bool may_shorten = length > std::max(kink_length, 16 * steps_.minimum);
-    Trial trial = at(moved(anchor_.y, length, anchor_.tangent));
-    why = correct(trial, row_, row_value_ + length, row_) ? complaint(trial, length, may_shorten)
-                                                          : trial.outcome.reason;
-    if (!why.empty() && !may_shorten) {
-      if (auto behind = turn_corner(length)) {
-        trial = std::move(*behind);
-        turned_ = true;
-        why.clear();
-      }
-    }
-    if (!why.empty()) continue;
-    const double by_angle = turned_ ? 1.0 : 0.5 * steps_.max_angle / std::max(turn_of(trial), 1e-12),
-                 by_error = std::pow(
-                     0.5 * steps_.max_error / std::max(interpolation_error(trial, length), 1e-16), 0.25);
-    const bool shortened = length < anchor_.step;
-    const double most = shortened ? 1.0 : after_corner || length < kink_length ? 4.0 : 2.0;
-    next_length = std::min(steps_.maximum, length * std::clamp(std::min(by_angle, by_error), 0.3, most));
-    return trial;
+/// The corner at the end of the present piece, if that is no farther than a kink. Else `length` is shortened
+/// to end just before it.
+std::optional<Continuation::Trial> Continuation::turn_next_corner(double& length) {
+  const auto end = facet(length);
+  if (!end) return {};
+  if (*end > kink_length) {
+    length = before_end * *end;
+    return {};
   }
-  finish("step too small: " + why, false);
+  return turned(turn_corner(*end, std::min(length, kink_length)), length);
+}
+
+std::optional<Continuation::Trial> Continuation::turned(std::optional<Trial> behind, double& length) {
+  turned_ = bool(behind);
+  if (turned_) length = weighted_norm(weights_, moved(behind->y, -1, anchor_.y));
+  return behind;
+}
+
+/// A trial at `length` from the anchor, or why there is none. Where corners lie about, pieces are walked one
+/// by one; else a corner is looked for where no shorter step leads on.
+/// `beyond`: also long steps are searched beyond corners ahead.
+std::optional<Continuation::Trial> Continuation::attempt(double& length, bool wary, bool beyond,
+                                                         Failure& failure) {
+  const bool may_shorten = length > std::max(kink_length, 16 * steps_.minimum);
+  turned_ = false;
+  if (wary)
+    if (auto behind = turn_next_corner(length)) return behind;
+  Trial trial = at(moved(anchor_.y, length, anchor_.tangent));
+  newton_.search_past_kinks(!wary || !may_shorten);
+  const bool solved = correct(trial, row_, row_value_ + length, row_);
+  newton_.search_past_kinks(true);
+  failure.last = solved ? complaint(trial, length, may_shorten) : trial.outcome.reason;
+  if (failure.last.empty()) return trial;
+  if (!solved && failure.last.ends_with(')')) failure.explained = failure.last;
+  if (may_shorten) return {};
+  if (!wary)
+    if (auto behind = turn_next_corner(length)) return behind;
+  return turned(turn_corner(length, length), length);  // one that no piece's number tells of
+}
+
+/// One accepted step from the anchor; halves the length on failure or when the branch bends too much. After a
+/// failure in front of a corner, with none nearer by far, pieces are walked one by one until one is passed
+/// without a turn. Where that ends, steps of all lengths are searched beyond the corners ahead.
+std::optional<Continuation::Trial> Continuation::step(double& length, double& next_length) {
+  Failure failure;
+  wary_ = anchor_.wary;
+  for (const bool beyond : {false, true}) {
+    double intended = anchor_.step;  // but for the ends of pieces
+    for (length = intended; length >= steps_.minimum; length = intended) {
+      auto trial = attempt(length, wary_ && !beyond, beyond, failure);
+      if (trial && length < steps_.minimum && ++crawled_ > crawl) break;
+      if (trial) {
+        if (length >= steps_.minimum) crawled_ = 0;
+        next_length = next_step(*trial, length, intended);
+        return trial;
+      }
+      wary_ = wary_ || (!same_piece(length) && same_piece(sparse * length));
+      intended = length / 2;
+    }
+  }
+  finish("step too small: " + (failure.explained.empty() ? failure.last : failure.explained), false);
   return {};
+}
+
+/// Behind an accepted trial at `length`, where `intended` was the step but for the end of a piece.
+double Continuation::next_step(Trial const& trial, double length, double intended) {
+  const double turn = turn_of(trial);
+  const double by_angle = turned_ ? intended / length : 0.5 * steps_.max_angle / std::max(turn, 1e-12),
+               by_error = std::pow(0.5 * steps_.max_error / std::max(trial.error, 1e-16), 0.25);
+  if (turned_ && turn < seen_angle) wary_ = false;
+  const double most = intended < anchor_.step ? 1.0 : wary_ || length < kink_length ? 4.0 : 2.0;
+  return std::min(steps_.maximum, on_grid(std::clamp(length * std::min(by_angle, by_error), 0.3 * intended,
+                                                     most * intended)));
 }
 
 /// Whether the branch passes places again where it has been; it ends then. Each suspicion is confirmed by
@@ -226,9 +306,10 @@ void Continuation::arrive(double reached) {
   const std::string end = problem_.parameter_text(reached);
   if (arrived_)
     ending_ = "stop value reached";
-  else if (std::abs(began_ - reached) <= at_the_end * std::abs(reached))
-    ending_ = "the branch comes back to " + end + ", where it began, without reaching " +
-              problem_.parameter_text(goal);
+  else if (reached != given_low_ && reached != given_high_)
+    ending_ = "the branch comes back to " + problem_.parameter_text(began_) +
+              ", where it began, without reaching " + problem_.parameter_text(goal) + " (followed on to " +
+              end + ")";
   else
     ending_ = "the branch turns round and leaves its range at " + end + " instead of " +
               problem_.parameter_text(goal);
@@ -247,8 +328,7 @@ void Continuation::make_batch() {
   else
     locate_events(*end, length);
   ending_ = problem_.beyond(end->y);
-  after_ = {
-      .y = copy(end->y), .tangent = copy(end->tangent), .step = next_length, .index = 0, .turned = turned_};
+  after_ = {.y = copy(end->y), .tangent = copy(end->tangent), .step = next_length, .index = 0, .wary = wary_};
   const double reached = last_entry(end->y);
   const bool outside =
       reached <= problem_.parameter_entry(low_) || reached >= problem_.parameter_entry(high_);

@@ -36,7 +36,7 @@ class Continuation {
     VecHandle y, tangent;
     double step = 0;
     int index = 0;
-    bool turned = false;  ///< just behind a corner: longer steps may follow at once
+    bool wary = false;  ///< corners lie about: pieces are walked one by one
   };
 
   Continuation(Problem&, std::string const& prefix, double low, double high, StepControl,
@@ -67,6 +67,11 @@ class Continuation {
     VecHandle y, tangent;
     Outcome outcome;
     std::vector<TestFunction> tests;
+    double error = 0;  ///< of the cubic from the anchor to it
+  };
+  /// Why trials were none: the last one; one of a corrector that knows why.
+  struct Failure {
+    std::string last, explained;
   };
   /// A place inside the present step that Newton has been to.
   struct Place {
@@ -74,13 +79,21 @@ class Continuation {
   };
 
   // The corrector (continuation.cpp)
-  Trial at(VecHandle y) const { return {.y = std::move(y), .tangent = {}, .outcome = {}, .tests = {}}; }
+  Trial at(VecHandle y) const {
+    return {.y = std::move(y), .tangent = {}, .outcome = {}, .tests = {}, .error = 0};
+  }
   bool correct(Trial&, Vec row, double value, Vec tangent_row);
   std::vector<TestFunction> tests(Vec y, Vec tangent);
+  void open_the_range();
   void prepare_row();
   double turn_of(Trial const&) const;
-  double interpolation_error(Trial const&, double length) const;
+  double interpolation_error(Trial const&, double length);
+  double error_in_the_middle(Trial const&, double length);
   std::string complaint(Trial&, double length, bool may_shorten);
+  std::optional<Trial> turn_next_corner(double& length);
+  std::optional<Trial> turned(std::optional<Trial> behind, double& length);
+  std::optional<Trial> attempt(double& length, bool wary, bool beyond, Failure&);
+  double next_step(Trial const&, double length, double intended);
   std::optional<Trial> step(double& length, double& next_length);
   void finish(std::string reason, bool converged);
   Point point(Trial&&, std::string event, double step);
@@ -93,7 +106,10 @@ class Continuation {
   int determinant(Vec y, Vec row);
   int orientation(Vec y, Vec tangent);
   bool leads_back(Trial const&);
-  std::optional<Trial> turn_corner(double reach);
+  bool same_piece(double at);
+  std::optional<double> facet(double reach);
+  double within_piece(Vec y, Vec tangent, double reach);
+  std::optional<Trial> turn_corner(double beyond, double reach);
 
   // What lies inside a step (events.cpp)
   void locate_events(Trial const& end, double length);
@@ -111,7 +127,7 @@ class Continuation {
 
   Problem& problem_;
   Newton newton_;
-  double low_, high_;
+  double given_low_, given_high_, low_, high_;  ///< the range, and with the room at its first end
   StepControl steps_;
   std::vector<double> report_at_;
   Anchor anchor_, before_, after_;
@@ -123,8 +139,8 @@ class Continuation {
   std::vector<double> folds_;                    ///< arclengths of the folds in it
   std::vector<std::string> missed_;
   Trail trail_;
-  int emitted_ = 0, meetings_ = 0;
-  bool upwards_ = true, turned_ = false, finished_ = false, converged_ = false;
+  int emitted_ = 0, meetings_ = 0, crawled_ = 0;
+  bool upwards_ = true, turned_ = false, wary_ = false, finished_ = false, converged_ = false;
   std::string ending_;  ///< reason to stop once the batch is handed out
   bool arrived_ = false;
   std::string reason_;

@@ -10,8 +10,8 @@
 /// Which way it goes on: the tangent t spans the null space of J, and det [J; t^T] has one sign on all pieces
 /// (Allgower & Georg, Introduction to Numerical Continuation Methods, 2003, section 14: det [J_B; n^T] = det
 /// [J_A; n^T], so that n . t_A and n . t_B agree). Small systems take it from a factorisation, whatever
-/// number of facets lies between. Large ones use J_B t_A = c (n . t_A) and -J_A t_B = c (n . t_B): the right
-/// t_B is the one for which these two point the same way, if a single facet lies between.
+/// number of facets lies between. A single facet has J_B t_A = c (n . t_A) and -J_A t_B = c (n . t_B): the
+/// right t_B is the one for which these two point the same way, if a single facet lies between.
 namespace fretwave::solve {
 
 namespace {
@@ -19,7 +19,10 @@ namespace {
 constexpr PetscInt small = 1000;    // unknowns whose determinant is had in some 50 ms
 constexpr PetscInt quick = 300;     // unknowns whose determinant is had in a few ms
 constexpr double one_facet = 0.98;  // least cosine between the two vectors of a single facet
+constexpr double sharpness = 1e-6;  // relative, of the place where a piece ends
+constexpr double shortest = 1e-13;  // length of a piece that can be told from a point
 constexpr double no_corner = 1e-6;  // 1 - cosine of the angle between the tangents
+constexpr int halvings = 60;
 
 struct Entry {
   PetscInt row, col;
@@ -55,16 +58,16 @@ int Continuation::determinant(Vec y, Vec row) {
 }
 
 /// +1: `tangent` at y, behind a corner ahead of the anchor, leads on; -1: it leads back; 0: it cannot be
-/// told. Collective.
+/// told. Facets that are passed at once by symmetry have the same c and n . t along it, and off it they may
+/// turn the determinant's sign: it is asked where facets differ. Collective.
 int Continuation::orientation(Vec y, Vec tangent) {
-  if (const int here = determinant(anchor_.y, row_))
-    return here * determinant(y, weighted(weights_, tangent));
   VecHandle entering = problem_.equations(), leaving = problem_.equations();
   problem_.product(y, anchor_.tangent, entering);
   problem_.product(anchor_.y, tangent, leaving);
   const double cosine = -dot(entering, leaving) / std::sqrt(dot(entering, entering) * dot(leaving, leaving));
-  if (!(std::abs(cosine) >= one_facet)) return 0;
-  return cosine > 0 ? 1 : -1;
+  if (std::abs(cosine) >= one_facet) return cosine > 0 ? 1 : -1;
+  const int here = determinant(anchor_.y, row_);
+  return here ? here * determinant(y, weighted(weights_, tangent)) : 0;
 }
 
 /// Whether a trial's tangent runs against the branch: an older piece of it, or another branch. Asked of small
@@ -75,29 +78,56 @@ bool Continuation::leads_back(Trial const& trial) {
   return size <= quick && orientation(trial.y, trial.tangent) < 0;
 }
 
-/// The branch behind a corner that lies less than `reach` ahead. The tangent's extension beyond it is off the
-/// branch, but it lies on the piece behind: its Jacobian gives that piece's tangent, along which Newton is
-/// closed.
-std::optional<Continuation::Trial> Continuation::turn_corner(double reach) {
-  const VecHandle beyond = moved(anchor_.y, reach, anchor_.tangent);
+/// Whether the tangent still lies on the anchor's piece at this distance. Collective.
+bool Continuation::same_piece(double at) {
+  const auto here = problem_.piece(anchor_.y);
+  return problem_.piece(moved(anchor_.y, at, anchor_.tangent)) == here;
+}
+
+/// Just beyond the end of the present piece along the tangent, if it ends within `reach`. Collective.
+std::optional<double> Continuation::facet(double reach) {
+  if (same_piece(reach)) return {};
+  for (double inside = 0; reach - inside > sharpness * reach && reach > shortest;) {
+    const double middle = (inside + reach) / 2;
+    (same_piece(middle) ? inside : reach) = middle;
+  }
+  return std::max(reach, shortest);
+}
+
+/// How far, at most `reach`, a tangent leads from y within one piece, halved so that it ends well inside.
+double Continuation::within_piece(Vec y, Vec tangent, double reach) {
+  const auto here = problem_.piece(y);
+  if (problem_.piece(moved(y, reach, tangent)) == here) return reach;
+  for (int k = 0; k < halvings; ++k, reach /= 2)
+    if (problem_.piece(moved(y, reach, tangent)) == here) break;
+  return reach / 2;
+}
+
+/// The branch behind a corner that lies just before `beyond`, at most `reach` from it. The tangent's
+/// extension beyond it is off the branch, but it lies on the piece behind: its Jacobian gives that piece's
+/// tangent, along which Newton is closed.
+std::optional<Continuation::Trial> Continuation::turn_corner(double beyond, double reach) {
+  const VecHandle there = moved(anchor_.y, beyond, anchor_.tangent);
   VecHandle tangent = copy(anchor_.tangent);
   newton_.system().close(row_, 0);
-  if (!newton_.tangent(beyond, tangent)) return {};
+  if (!newton_.tangent(there, tangent)) return {};
   const double size = weighted_norm(weights_, tangent);
   if (!std::isfinite(size)) return {};
   check(VecScale(tangent, 1 / size));
-  if (dot(row_, tangent) > 1 - no_corner) return {};
-  const int sign = orientation(beyond, tangent);
+  const bool straight =
+      dot(row_, tangent) > 1 - no_corner;  // a determinant that changes its sign is a branch point
+  if (straight && same_piece(beyond)) return {};
+  const int sign = straight ? 1 : orientation(there, tangent);
   if (sign == 0) return {};
   check(VecScale(tangent, sign));
-  const VecHandle row = weighted(weights_, tangent);
-  const double along = dot(row, anchor_.tangent);
-  const VecHandle guess = moved(beyond, reach * (1 - along), tangent);  // row . (guess - anchor) = reach
+  const double on = within_piece(there, tangent, reach);
+  if (!(on > shortest)) return {};
+  const VecHandle row = weighted(weights_, tangent), guess = moved(there, on, tangent);
   Trial trial = at(copy(guess));
   if (!correct(trial, row, dot(row, guess), row)) return {};
-  if (!(weighted_norm(weights_, moved(trial.y, -1, guess)) <= 4 * reach)) return {};
+  if (!(weighted_norm(weights_, moved(trial.y, -1, guess)) <= beyond + on)) return {};
   if (!(dot(row, trial.tangent) >= std::cos(steps_.max_angle))) return {};
-  if (orientation(trial.y, trial.tangent) < 0) return {};
+  if (!straight && orientation(trial.y, trial.tangent) < 0) return {};
   return trial;
 }
 

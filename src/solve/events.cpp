@@ -89,13 +89,16 @@ void Continuation::locate(size_t which, std::vector<Place> const& scan, Hermite 
       if (test.name == "fold") folds_.push_back(found);
       emit(std::move(*trial), found, test.name);
     } else {
-      miss(test.name,
-           "the corrector fails at it, near " + problem_.parameter_text(parameter_of(curve.value(guess))));
+      miss(test.name, "the corrector fails at it or leaves for another branch, near " +
+                          problem_.parameter_text(parameter_of(curve.value(guess))));
     }
   };
   const auto actual = [&](double at) {
     Trial trial = this->at(curve.value(at));
-    return correct(trial, row_, row_value_ + at, row_) ? trial.tests[which].value : std::nan("");
+    const VecHandle expected = copy(trial.y);
+    const bool good = correct(trial, row_, row_value_ + at, row_) &&
+                      weighted_norm(weights_, moved(trial.y, -1, expected)) <= off_the_curve * length;
+    return good ? trial.tests[which].value : std::nan("");
   };
   // places that Newton has been to, in order; the ends of the step to begin with
   std::vector<Place> places = {scan.front(), scan.back()};
@@ -150,7 +153,9 @@ std::optional<Continuation::Trial> Continuation::root(size_t which, Place a, Pla
   for (int k = 0; k < trials && b.at - a.at > precision; ++k) {
     const double at = k == 0 ? guess : secant(a.at, a.value, b.at, b.value);
     Trial trial = this->at(curve.value(at));
+    const VecHandle expected = copy(trial.y);
     if (!correct(trial, row_, row_value_ + at, row_)) break;
+    if (!(weighted_norm(weights_, moved(trial.y, -1, expected)) <= off_the_curve * length)) break;
     const double value = trial.tests[which].value;
     if (std::abs(value) <= best_value) {
       best_value = std::abs(value), best_at = at;

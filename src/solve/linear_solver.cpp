@@ -222,17 +222,6 @@ void LinearSolver::descend() {
   fallback_.reset();
 }
 
-double LinearSolver::last_reduction() const {
-  KSP ksp = ksp_of(snes_);
-  Vec b;
-  double left, size;
-  if (is_direct(ksp)) return 0;
-  check(KSPGetRhs(ksp, &b));
-  check(KSPGetResidualNorm(ksp, &left));
-  check(VecNorm(b, NORM_2, &size));
-  return left / size;
-}
-
 /// Behind a kink of the branch the last tangent can be a guess so bad that GMRES takes it for divergence.
 bool LinearSolver::solve(Vec b, Vec x) {
   if (solve_once(b, x)) return true;

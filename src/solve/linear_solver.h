@@ -39,8 +39,6 @@ class LinearSolver {
   bool linearise(Vec y, bool newton);
   /// J x = b from x where the Krylov route is taken, to the tangent's tolerance. Collective.
   bool solve(Vec b, Vec x);
-  /// Of the residual by Newton's last linear solve.
-  double last_reduction() const;
   /// The next linearisation builds the preconditioner anew.
   void renew() { stale_ = true; }
   /// After a failure at the last linearisation: the next one tries another way; false if there is none left.

@@ -14,8 +14,8 @@ constexpr double unstepped = 1e-3;       // times the tolerance, for a guess to 
 constexpr double small_effect = 1e-8;    // on what is read (Problem::effect) of what a step leaves
 constexpr double largest_effect = 1e-6;  // the same, where rounding lets the residual fall no further
 constexpr double far = 1e5;              // length of a step over the residual, where J is nearly singular
-constexpr double exact = 1e-6;  // reduction of the residual that a linear solve as good as exact gives
-constexpr int rescalings = 4;   // of the rows, as the motion that is solved for becomes known
+constexpr int patience = 10;             // iterations after which a residual below the tolerance is enough
+constexpr int rescalings = 4;            // of the rows, as the motion that is solved for becomes known
 
 }  // namespace
 
@@ -42,19 +42,28 @@ PetscErrorCode Newton::converged(SNES snes, PetscInt iteration, PetscReal unknow
   auto& newton = *static_cast<Newton*>(context);
   const double before = std::exchange(newton.residual_before_, residual);
   newton.step_from_ = iteration == 0 ? residual : before;
-  newton.effort_ = iteration == 0 ? 0 : newton.effort_ + newton.last_effort(residual / before);
   PetscErrorCode code = SNESConvergedDefault(snes, iteration, unknowns, step, residual, reason, nullptr);
   if (code || *reason < 0) return code;
   if (iteration == 0) {
     if (*reason > 0 && !newton.below_tolerance(residual, false)) *reason = SNES_CONVERGED_ITERATING;
     return code;
   }
-  if (*reason > 0) return code;
   Vec y;
   code = SNESGetSolution(snes, &y);
   if (code) return code;
-  return newton.linear_->guard().run(
-      [&] { *reason = newton.judge(y, std::max(unknowns, 1.0), step, residual, before); });
+  return newton.linear_->guard().run([&] {
+    if (*reason == 0)
+      *reason = newton.judge(y, std::max(unknowns, 1.0), step, residual, before);
+    else if (iteration < patience && newton.matters(y, residual, before))
+      *reason = SNES_CONVERGED_ITERATING;
+  });
+}
+
+/// Whether what a residual below its tolerance leaves shows in what is read from the point (the damping at
+/// first slip is as small as that), and another step can take it away.
+bool Newton::matters(Vec y, double residual, double before) {
+  return last_effect(y) * std::min(1.0, residual / before) > small_effect &&
+         residual > bordered_.problem().rounding(y);
 }
 
 bool Newton::below_tolerance(double residual, bool started) const {
@@ -88,13 +97,6 @@ double Newton::last_effect(Vec y) {
   Vec step;
   check(SNESGetSolutionUpdate(snes_, &step));
   return bordered_.problem().effect(y, step);
-}
-
-/// An iteration that gained no more than its linear solve allowed counts by what it gained.
-double Newton::last_effort(double reduction) const {
-  const double allowed = linear_->last_reduction();
-  if (!(allowed > exact) || !(reduction < 10 * allowed)) return 1;
-  return std::min(1.0, std::log(reduction) / std::log(exact));
 }
 
 /// The line search found nothing lower along a step this small: rounding, as in `judge`.
@@ -132,7 +134,7 @@ Outcome Newton::solve(Vec y) {
   if (bordered_.problem().scale(y)) linear_->renew();
   for (int k = 0; k < rescalings; ++k) {
     const Outcome before = std::exchange(out, solve_past_kinks(y));
-    out.newton += before.newton, out.linear += before.linear, out.effort += before.effort;
+    out.newton += before.newton, out.linear += before.linear;
     if (!out.converged || !bordered_.problem().scale(y)) return out;
     linear_->renew();
   }
@@ -149,13 +151,14 @@ Outcome Newton::solve_past_kinks(Vec y) {
   Outcome out = solve_persistently(y);
   check(SNESGetLineSearch(snes_, &search));
   check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(search), SNESLINESEARCHBT, &backtracks));
-  if (!past_kinks_ || out.converged || out.linear_failure || !backtracks || !std::isfinite(out.residual))
+  if (!past_kinks_ || !search_ || out.converged || out.linear_failure || !backtracks ||
+      !std::isfinite(out.residual))
     return out;
   check(VecCopy(guess, y));
   check(SNESLineSearchSetType(search, SNESLINESEARCHL2));
   const Outcome before = std::exchange(out, solve_persistently(y));
   check(SNESLineSearchSetType(search, SNESLINESEARCHBT));
-  out.newton += before.newton, out.linear += before.linear, out.effort += before.effort;
+  out.newton += before.newton, out.linear += before.linear;
   return out;
 }
 
@@ -164,7 +167,7 @@ Outcome Newton::solve_persistently(Vec y) {
   Outcome out = solve_once(y);
   while (out.linear_failure && linear_->climb()) {
     const Outcome before = std::exchange(out, solve_once(y));
-    out.newton += before.newton, out.linear += before.linear, out.effort += before.effort;
+    out.newton += before.newton, out.linear += before.linear;
   }
   if (out.converged) linear_->descend();
   if (!out.converged && !out.linear_failure) out.reason += explain_step(y);
@@ -214,7 +217,6 @@ Outcome Newton::solve_once(Vec y) {
           singular ? "the Jacobian is singular" : text,
           reason > 0 && below_tolerance(norm, true),
           std::isfinite(norm) ? bordered_.problem().rounding(y) : 0,
-          effort_,
           singular || reason == SNES_DIVERGED_LINEAR_SOLVE};
 }
 

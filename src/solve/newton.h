@@ -9,12 +9,9 @@ struct Outcome {
   bool converged = false;
   int newton = 0, linear = 0;
   double residual = 0;
-  std::string reason;     ///< PETSc's converged or diverged reason, or ours
-  bool accepted = false;  ///< by the tolerance; a converged solve that is not ended at rounding
-  double rounding = 0;    ///< expected in the residual
-  /// Newton iterations as exact linear solves would have needed them: a measure of the branch, not of
-  /// options.
-  double effort = 0;
+  std::string reason;           ///< PETSc's converged or diverged reason, or ours
+  bool accepted = false;        ///< by the tolerance; a converged solve that is not ended at rounding
+  double rounding = 0;          ///< expected in the residual
   bool linear_failure = false;  ///< the last linear system was not solved, or was singular
 };
 
@@ -32,6 +29,7 @@ class Newton {
   Fallbacks const& fallbacks() const { return linear_->fallbacks(); }
   /// Solves from y, in place; y is the last iterate when it does not converge. Collective.
   Outcome solve(Vec y);
+  void search_past_kinks(bool on) { search_ = on; }
   /// Tangent at y: J t = 0, row . t = 1 with the closing row. t holds a guess (zero, or the last tangent),
   /// from which the Krylov route starts. Collective.
   bool tangent(Vec y, Vec t);
@@ -49,18 +47,17 @@ class Newton {
   std::string explain_step(Vec y);
   SNESConvergedReason judge(Vec y, double unknowns, double step, double residual, double residual_before);
   bool below_tolerance(double residual, bool started) const;
+  bool matters(Vec y, double residual, double before);
   bool stuck_at_rounding(Vec y);
   double last_effect(Vec y);
-  double last_effort(double reduction) const;
 
   Bordered bordered_;
   SnesHandle snes_;
   std::unique_ptr<LinearSolver> linear_;
   VecHandle right_side_;
-  bool past_kinks_;
+  bool past_kinks_, search_ = true;
   double residual_before_ = 0;  ///< at the iteration before
   double step_from_ = 0;        ///< residual where the last step began
-  double effort_ = 0;           ///< of the iterations so far
 };
 
 }  // namespace fretwave::solve
