@@ -106,12 +106,24 @@ def den_hartog(P: float, F: float, k: float, m: float, tolerance: float, above: 
     return form
 
 
-def stuck_modes(scene: Any, tangential: bool = True) -> Any:
-    """Angular frequencies of the structure with stuck contact, by LAPACK."""
+def at_amplitude(a: float, exact: float, tolerance: float) -> Form:
+    """Frequency (modulus of lambda) of the row nearest to an amplitude."""
+    return lambda run: near("omega0", run.at(a, "omega0"), exact, tolerance, a)
+
+
+def closed_modes(scene: Any, sliding: bool = False) -> Any:
+    """Angular frequencies of the structure with stuck contact, or closed and sliding without friction, by LAPACK.
+
+    From K^-1: its largest eigenvalues do not feel the rounding of contact 1e14 times as stiff as the rest.
+    """
     import scipy.linalg
 
     M, K = (np.asarray(A.toarray() if hasattr(A, "toarray") else A, float) for A in (scene.M, scene.K))
     for contact in scene.contacts:
         B = np.asarray(contact.B.toarray() if hasattr(contact.B, "toarray") else contact.B, float)
-        K = K + (B.T * (contact.stuck() if tangential else 0.0)) @ B
-    return np.sqrt(np.maximum(scipy.linalg.eigh(K, M, eigvals_only=True), 0.0))
+        k = np.array(contact.stuck(), float)
+        if sliding:
+            k[np.arange(len(k)) % contact.components > 0] = 0.0
+        K = K + (B.T * k) @ B
+    flexibility = scipy.linalg.cho_solve(scipy.linalg.cho_factor(K), np.eye(len(K)))
+    return 1 / np.sqrt(scipy.linalg.eigvalsh(M @ flexibility @ M, M)[::-1])

@@ -21,6 +21,7 @@ OMEGA, ZETA, ZETA_FLOOR, MOTION = (
     1e-9,
     1e-6,
 )  #: bars of a point's errors; zeta's is relative above its floor
+ZETA_MOST = 1e-8  #: what rounding may add to zeta's bar, whatever the stiffness
 SECONDS = 1.5  #: for judging points of one branch, four at least
 
 
@@ -198,6 +199,13 @@ def _points(run: Run, verdict: Verdict) -> list[str]:
     return [f"{', '.join(wrong)} off {way}, force unbalanced {found.balance:.1e} of those acting, {where}"]
 
 
+def rounding(run: Run) -> float:
+    """Of zeta, by what double precision leaves of the forces of contact stiffer than the structure."""
+    stiffest = max((float(np.max(c.stuck(), initial=0.0)) for c in run.scene.contacts), default=0.0)
+    mass = float(np.max(run.scene.M.diagonal()))
+    return float(np.finfo(float).eps * stiffest / (mass * float(run.columns["omega0"][0]) ** 2))
+
+
 def errors(run: Run, row: int, d: Distance) -> list[str]:
     """Which errors of a point are above their bars."""
     out = []
@@ -206,7 +214,7 @@ def errors(run: Run, row: int, d: Distance) -> list[str]:
     if run.method == "forced":
         return out if d.motion <= MOTION else [*out, f"motion {d.motion:.1e}"]
     zeta = abs(float(run.columns["zeta"][row]))
-    if not d.zeta <= ZETA * zeta + ZETA_FLOOR:
+    if not d.zeta <= ZETA * zeta + ZETA_FLOOR + min(rounding(run), ZETA_MOST):
         out.append(f"zeta {d.zeta:.1e} of {zeta:.1e}")
     return out
 

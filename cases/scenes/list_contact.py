@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from .closed import hysteresis, jenkins_stiffness, limits, stuck_modes, unilateral
+from .closed import at_amplitude, closed_modes, hysteresis, jenkins_stiffness, limits, unilateral
 from .equations import Contact
 from .scene import Scene
 from .structures import BLOCK_B, block, chain, coulomb, jenkins, mode, number, pad, two_dof
@@ -29,8 +29,11 @@ def on_block(
     keys = {"normalise": more.pop("normalise", "x2"), **more.pop("keys", {})}
     analysis = mode(more.pop("method", "CNM"), 5, 128, span, **keys)
     scene = block(axis, name, analysis, pad(kn, more.pop("kt", 0.8 * kn), mu, N0, gap, BLOCK_B), **more)
-    if kn * gap < N0 and mu and keys["normalise"] == "x2":
-        scene.closed = [limits(stuck_modes(scene)[0], None, 1e-6)]
+    limit = mu * (N0 - kn * gap)
+    if limit > span[0] and keys["normalise"] == "x2":
+        scene.closed = [limits(closed_modes(scene)[0], None, 1e-6)]
+    elif limit > 0:  # it slips from the first: friction takes limit / a off the way to the sliding mode
+        scene.closed = [at_amplitude(1.0, closed_modes(scene, sliding=True)[0], 1e-3)]
     return scene
 
 
@@ -76,7 +79,7 @@ def stop() -> Iterator[Scene]:
 def friction() -> Iterator[Scene]:
     axis = "mu 0 to 1e3"
     for mu in (0.0, 1e-6, 1e-3, 0.1, 1.0, 10.0, 100.0, 1e3):
-        yield on_block(axis, f"mu_{number(mu)}", mu=mu)
+        yield on_block(axis, f"mu_{number(mu)}", mu=mu, quick=mu == 1e-3)
 
 
 def load() -> Iterator[Scene]:

@@ -164,8 +164,9 @@ def run(scene: Scene, folder: Path) -> Finished:
             process.kill()
             process.wait()
             code = None
-    code = None if code in (-signal.SIGXCPU, -signal.SIGKILL) else code
-    return Finished(code, time.perf_counter() - begin, (folder / "output.txt").read_text(), folder / "out")
+    text = (folder / "output.txt").read_text()
+    code = None if code in (-signal.SIGXCPU, -signal.SIGKILL) or "interrupted by SIGXCPU" in text else code
+    return Finished(code, time.perf_counter() - begin, text, folder / "out")
 
 
 def limit(seconds: float) -> Callable[[], None]:
