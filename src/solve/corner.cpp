@@ -9,15 +9,18 @@
 ///
 /// Which way it goes on: the tangent t spans the null space of J, and det [J; t^T] has one sign on all pieces
 /// (Allgower & Georg, Introduction to Numerical Continuation Methods, 2003, section 14: det [J_B; n^T] = det
-/// [J_A; n^T], so that n . t_A and n . t_B agree). Small systems take it from a factorisation, whatever
-/// number of facets lies between. A single facet has J_B t_A = c (n . t_A) and -J_A t_B = c (n . t_B): the
-/// right t_B is the one for which these two point the same way, if a single facet lies between.
+/// [J_A; n^T], so that n . t_A and n . t_B agree). A single facet, and several passed at once by symmetry,
+/// have J_B t_A = c (n . t_A) and -J_A t_B = c (n . t_B): the right t_B is the one for which these two point
+/// the same way. Where different ones lie between, the determinant itself is asked, of systems that are small
+/// enough.
 namespace fretwave::solve {
 
 namespace {
 
-constexpr PetscInt small = 1000;    // unknowns whose determinant is had in some 50 ms
-constexpr PetscInt quick = 300;     // unknowns whose determinant is had in a few ms
+constexpr PetscInt small = 1000;         // unknowns whose determinant is had in some 50 ms
+constexpr PetscInt quick = 300;          // unknowns whose determinant is had in a few ms
+constexpr double surely_one = 1 - 1e-6;  // the same cosine, where nothing else can be: facets of two samples
+                                         // side by side are alike
 constexpr double one_facet = 0.98;  // least cosine between the two vectors of a single facet
 constexpr double sharpness = 1e-6;  // relative, of the place where a piece ends
 constexpr double shortest = 1e-13;  // length of a piece that can be told from a point
@@ -65,9 +68,11 @@ int Continuation::orientation(Vec y, Vec tangent) {
   problem_.product(y, anchor_.tangent, entering);
   problem_.product(anchor_.y, tangent, leaving);
   const double cosine = -dot(entering, leaving) / std::sqrt(dot(entering, entering) * dot(leaving, leaving));
-  if (std::abs(cosine) >= one_facet) return cosine > 0 ? 1 : -1;
-  const int here = determinant(anchor_.y, row_);
-  return here ? here * determinant(y, weighted(weights_, tangent)) : 0;
+  const int by_products = cosine > 0 ? 1 : -1;
+  if (std::abs(cosine) >= surely_one) return by_products;
+  if (const int here = determinant(anchor_.y, row_))
+    return here * determinant(y, weighted(weights_, tangent));
+  return std::abs(cosine) >= one_facet ? by_products : 0;
 }
 
 /// Whether a trial's tangent runs against the branch: an older piece of it, or another branch. Asked of small
