@@ -218,9 +218,7 @@ std::optional<Continuation::Trial> Continuation::turned(std::optional<Trial> beh
 
 /// A trial at `length` from the anchor, or why there is none. Where corners lie about, pieces are walked one
 /// by one; else a corner is looked for where no shorter step leads on.
-/// `beyond`: also long steps are searched beyond corners ahead.
-std::optional<Continuation::Trial> Continuation::attempt(double& length, bool wary, bool beyond,
-                                                         Failure& failure) {
+std::optional<Continuation::Trial> Continuation::attempt(double& length, bool wary, Failure& failure) {
   const bool may_shorten = length > std::max(kink_length, 16 * steps_.minimum);
   turned_ = false;
   if (wary)
@@ -240,14 +238,15 @@ std::optional<Continuation::Trial> Continuation::attempt(double& length, bool wa
 
 /// One accepted step from the anchor; halves the length on failure or when the branch bends too much. After a
 /// failure in front of a corner, with none nearer by far, pieces are walked one by one until one is passed
-/// without a turn. Where that ends, steps of all lengths are searched beyond the corners ahead.
+/// without a turn. Where that ends, steps of all lengths are tried beyond the corners ahead.
 std::optional<Continuation::Trial> Continuation::step(double& length, double& next_length) {
   Failure failure;
   wary_ = anchor_.wary;
   for (const bool beyond : {false, true}) {
+    if (beyond && !wary_) break;
     double intended = anchor_.step;  // but for the ends of pieces
     for (length = intended; length >= steps_.minimum; length = intended) {
-      auto trial = attempt(length, wary_ && !beyond, beyond, failure);
+      auto trial = attempt(length, wary_ && !beyond, failure);
       if (trial && length < steps_.minimum && ++crawled_ > crawl) break;
       if (trial) {
         if (length >= steps_.minimum) crawled_ = 0;

@@ -92,7 +92,7 @@ class Continuation {
   std::string complaint(Trial&, double length, bool may_shorten);
   std::optional<Trial> turn_next_corner(double& length);
   std::optional<Trial> turned(std::optional<Trial> behind, double& length);
-  std::optional<Trial> attempt(double& length, bool wary, bool beyond, Failure&);
+  std::optional<Trial> attempt(double& length, bool wary, Failure&);
   double next_step(Trial const&, double length, double intended);
   std::optional<Trial> step(double& length, double& next_length);
   void finish(std::string reason, bool converged);

@@ -21,10 +21,10 @@ constexpr PetscInt small = 1000;         // unknowns whose determinant is had in
 constexpr PetscInt quick = 300;          // unknowns whose determinant is had in a few ms
 constexpr double surely_one = 1 - 1e-6;  // the same cosine, where nothing else can be: facets of two samples
                                          // side by side are alike
-constexpr double one_facet = 0.98;  // least cosine between the two vectors of a single facet
-constexpr double sharpness = 1e-6;  // relative, of the place where a piece ends
-constexpr double shortest = 1e-13;  // length of a piece that can be told from a point
-constexpr double no_corner = 1e-6;  // 1 - cosine of the angle between the tangents
+constexpr double one_facet = 0.98;       // least cosine between the two vectors of a single facet
+constexpr double sharpness = 1e-6;       // relative, of the place where a piece ends
+constexpr double shortest = 1e-13;       // length of a piece that can be told from a point
+constexpr double no_corner = 1e-6;       // 1 - cosine of the angle between the tangents
 constexpr int halvings = 60;
 
 struct Entry {
