@@ -115,7 +115,8 @@ def coordinates(run: Any) -> Any:
 def _retraced(run: Any) -> list[str]:
     """Points that come back along earlier pieces of the branch, the other way."""
     z = coordinates(run)
-    z = z[np.r_[True, np.linalg.norm(np.diff(z, axis=0), axis=1) > 1e-12]]
+    rows = np.flatnonzero(np.r_[True, np.linalg.norm(np.diff(z, axis=0), axis=1) > 1e-12])
+    z = z[rows]
     count = 0
     for i in range(4, len(z)):
         step = z[i] - z[i - 1]
@@ -125,11 +126,24 @@ def _retraced(run: Any) -> list[str]:
         away = np.linalg.norm(z[i] - a - along[:, None] * d, axis=1)
         lengths = np.sqrt(square)
         against = d @ step < -0.9 * lengths * np.linalg.norm(step)
-        near = away < BACK * np.minimum(lengths, np.linalg.norm(step))
-        count = count + 1 if np.any(near & against) else 0
+        near = (away < BACK * np.minimum(lengths, np.linalg.norm(step))) & against
+        j = int(np.argmin(np.where(near, away, np.inf)))
+        count = count + 1 if near[j] and _same_piece(run, rows, i, j, along[j]) else 0
         if count == TWICE:
             return [f"retraces its own points from {run.parameter[min(i, len(run.Q) - 1)]:.6g} on"]
     return []
+
+
+def _same_piece(run: Any, rows: Any, i: int, j: int, along: float) -> bool:
+    """Whether row i lies on the branch between rows j and j + 1: at a corner two pieces may lie a degree apart."""
+    start, end, here = (run.state(int(rows[k])) for k in (j, j + 1, i))
+    found = distance(run.equations, *(x + along * (y - x) for x, y in zip(start, end)))
+    if not found.found:
+        return True
+    chord = (end[0] - start[0]).ravel()
+    off = (here[0] - found.solution[0]).ravel()
+    off -= chord * (off @ chord) / (chord @ chord)
+    return bool(np.linalg.norm(off) < 1e-3 * np.linalg.norm(chord))
 
 
 def _jumps(run: Any, most: int = 4) -> list[str]:
