@@ -253,8 +253,10 @@ std::optional<Continuation::Trial> Continuation::step(double& length, double& ne
         next_length = next_step(*trial, length, intended);
         return trial;
       }
-      wary_ = wary_ || (!same_piece(length) && same_piece(sparse * length));
       intended = length / 2;
+      if (wary_) continue;
+      const auto here = problem_.piece(anchor_.y);
+      wary_ = !on_piece(here, length) && on_piece(here, sparse * length);
     }
   }
   finish("step too small: " + (failure.explained.empty() ? failure.last : failure.explained), false);

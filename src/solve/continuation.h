@@ -106,12 +106,13 @@ class Continuation {
   int determinant(Vec y, Vec row);
   int orientation(Vec y, Vec tangent);
   bool leads_back(Trial const&);
-  bool same_piece(double at);
+  bool on_piece(std::uint64_t here, double at);
   std::optional<double> facet(double reach);
   double within_piece(Vec y, Vec tangent, double reach);
   std::optional<Trial> turn_corner(double beyond, double reach);
 
   // What lies inside a step (events.cpp)
+  bool correct_inside(Trial&, double at, double length);
   void locate_events(Trial const& end, double length);
   std::string events_of_corner(Trial const& end);
   void locate(size_t which, std::vector<Place> const& scan, Hermite const&, double length);

@@ -83,18 +83,18 @@ bool Continuation::leads_back(Trial const& trial) {
   return size <= quick && orientation(trial.y, trial.tangent) < 0;
 }
 
-/// Whether the tangent still lies on the anchor's piece at this distance. Collective.
-bool Continuation::same_piece(double at) {
-  const auto here = problem_.piece(anchor_.y);
+/// Whether the tangent lies on this piece at a distance from the anchor. Collective.
+bool Continuation::on_piece(std::uint64_t here, double at) {
   return problem_.piece(moved(anchor_.y, at, anchor_.tangent)) == here;
 }
 
 /// Just beyond the end of the present piece along the tangent, if it ends within `reach`. Collective.
 std::optional<double> Continuation::facet(double reach) {
-  if (same_piece(reach)) return {};
+  const auto here = problem_.piece(anchor_.y);
+  if (on_piece(here, reach)) return {};
   for (double inside = 0; reach - inside > sharpness * reach && reach > shortest;) {
     const double middle = (inside + reach) / 2;
-    (same_piece(middle) ? inside : reach) = middle;
+    (on_piece(here, middle) ? inside : reach) = middle;
   }
   return std::max(reach, shortest);
 }
@@ -121,7 +121,7 @@ std::optional<Continuation::Trial> Continuation::turn_corner(double beyond, doub
   check(VecScale(tangent, 1 / size));
   const bool straight =
       dot(row_, tangent) > 1 - no_corner;  // a determinant that changes its sign is a branch point
-  if (straight && same_piece(beyond)) return {};
+  if (straight && on_piece(problem_.piece(anchor_.y), beyond)) return {};
   const int sign = straight ? 1 : orientation(there, tangent);
   if (sign == 0) return {};
   check(VecScale(tangent, sign));

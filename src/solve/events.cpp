@@ -31,6 +31,13 @@ void Continuation::miss(std::string const& what, std::string const& why) {
   missed_.push_back(what + ": " + why);
 }
 
+/// A guess off the step's cubic is corrected at its arclength, to a point of the same branch.
+bool Continuation::correct_inside(Trial& trial, double at, double length) {
+  const VecHandle expected = copy(trial.y);
+  return correct(trial, row_, row_value_ + at, row_) &&
+         weighted_norm(weights_, moved(trial.y, -1, expected)) <= off_the_curve * length;
+}
+
 void Continuation::locate_events(Trial const& end, double length) {
   const double along = dot(row_, end.tangent);
   const Hermite curve(anchor_.y, anchor_.tangent, end.y, end.tangent, length,
@@ -95,10 +102,7 @@ void Continuation::locate(size_t which, std::vector<Place> const& scan, Hermite 
   };
   const auto actual = [&](double at) {
     Trial trial = this->at(curve.value(at));
-    const VecHandle expected = copy(trial.y);
-    const bool good = correct(trial, row_, row_value_ + at, row_) &&
-                      weighted_norm(weights_, moved(trial.y, -1, expected)) <= off_the_curve * length;
-    return good ? trial.tests[which].value : std::nan("");
+    return correct_inside(trial, at, length) ? trial.tests[which].value : std::nan("");
   };
   // places that Newton has been to, in order; the ends of the step to begin with
   std::vector<Place> places = {scan.front(), scan.back()};
@@ -153,9 +157,7 @@ std::optional<Continuation::Trial> Continuation::root(size_t which, Place a, Pla
   for (int k = 0; k < trials && b.at - a.at > precision; ++k) {
     const double at = k == 0 ? guess : secant(a.at, a.value, b.at, b.value);
     Trial trial = this->at(curve.value(at));
-    const VecHandle expected = copy(trial.y);
-    if (!correct(trial, row_, row_value_ + at, row_)) break;
-    if (!(weighted_norm(weights_, moved(trial.y, -1, expected)) <= off_the_curve * length)) break;
+    if (!correct_inside(trial, at, length)) break;
     const double value = trial.tests[which].value;
     if (std::abs(value) <= best_value) {
       best_value = std::abs(value), best_at = at;
