@@ -135,6 +135,16 @@ def test_sliders_close_their_period(comm, law):
     assert 0 <= found["unclosed"] < 1e-12 * found["slip_path"]
 
 
+@pytest.mark.ranks(1)
+@pytest.mark.parametrize("swing", [0.6, 1.5])
+def test_a_slider_far_from_its_rest_closes_its_period(comm, swing):
+    """A stiff pad that has walked 1e9 times the reach of its friction, mu N / kt: in shakedown and in slip."""
+    reach = 0.5 / 8e9
+    problem = one_pair(comm, pair("coulomb_3d", tangential_stiffness=8e9, friction_coefficient=0.5, normal_load=1.0))
+    y = unknowns(problem, point(problem, (1, 0, 0.06), (2, 0, -0.03), (1, 1, swing * reach), (2, 1, 0.3 * reach)))
+    assert 0 <= problem.diagnostics(y)["unclosed"] < 1e-4 * reach
+
+
 def test_an_unclosed_period_is_said(comm):
     """The words a point's line gets, and none where the distance is rounding."""
     from fretwave.analyses.branch import closure_note

@@ -13,7 +13,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "cases"))
 
 from scenes import laws, path  # noqa: E402
 from scenes.closed import jenkins_stiffness  # noqa: E402
-from scenes.distance import distance  # noqa: E402
+from scenes.distance import Distance, distance  # noqa: E402
 from scenes.equations import Contact, Equations  # noqa: E402
 from scenes.judge import Run, errors  # noqa: E402
 from scenes.run import all_scenes, one  # noqa: E402
@@ -179,6 +179,19 @@ def test_a_branch_that_retraces_itself_and_one_that_stops_early_are_wrong():
         circle(out), scene=dataclasses.replace(scene("jenkins"), analysis=mode(amplitude=(1.0, 5.0)))
     )
     assert any("ends at" in line for line in path.complaints(run))
+
+
+def test_a_table_that_goes_over_to_another_branch_jumps(monkeypatch):
+    """Two lines omega = 2 and omega = 3, to the nearer of which every point is corrected."""
+
+    def nearer(eq, Q, beta, omega):
+        return Distance(0, 0, 0, 0, True, (Q, beta, 2.0 if omega < 2.5 else 3.0))
+
+    monkeypatch.setattr(path, "distance", nearer)
+    eq = Equations(np.eye(1), np.eye(1), None, [], [1], 16, "CNM")
+    states = [(np.array([[a, 0.0]]), 0.0, 2.0 if a < 1.35 else 3.0) for a in np.arange(1.0, 2.0, 0.1)]
+    assert any("between rows 3 and 4" in line for line in path._jumps(table(eq, "CNM", states)))
+    assert not path._jumps(table(eq, "CNM", states[:4]))
 
 
 def test_a_table_with_values_that_cannot_be_is_wrong():

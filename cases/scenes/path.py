@@ -166,7 +166,10 @@ def _jumps(run: Any, most: int = 4) -> list[str]:
 
 
 def _gap(run: Any, row: int, halvings: int = 14) -> float | None:
-    """What is left of the chord between two rows after bisection towards its larger part, if much is left."""
+    """What is left of the chord between two rows after bisection towards its larger part, if much is left.
+
+    A branch that folds over within it is lost by bisection: it is walked then from one end to the other.
+    """
     eq = run.equations
     ends = [run.state(row), run.state(row + 1)]
     size = np.linalg.norm(ends[0][0]) or 1.0
@@ -174,14 +177,30 @@ def _gap(run: Any, row: int, halvings: int = 14) -> float | None:
     def chord(a: Any, b: Any) -> float:
         return float(np.linalg.norm(a[0] - b[0]) / size + (abs(a[1] - b[1]) + abs(a[2] - b[2])) / abs(ends[0][2]))
 
-    whole = chord(*ends)
+    whole, before = chord(*ends), run.state(row - 1) if row else None
     for _ in range(halvings):
         middle = tuple((x + y) / 2 for x, y in zip(*ends))
         found = distance(eq, *middle)
         if not found.found:
             return None
         parts = [chord(ends[0], found.solution), chord(found.solution, ends[1])]
+        if parts[0] < parts[1]:
+            before = ends[0]
         ends = [ends[0], found.solution] if parts[0] >= parts[1] else [found.solution, ends[1]]
         if max(parts) < 0.02 * whole:
             return None
-    return max(parts)
+    return None if before is not None and _walks(eq, before, *ends, chord) else max(parts)
+
+
+def _walks(eq: Any, before: Any, here: Any, goal: Any, chord: Any, share: float = 1 / 40, most: int = 60) -> bool:
+    """Whether short steps along the secant lead from one solution to another, without a detour."""
+    length = share * chord(here, goal)
+    for _ in range(most):
+        ratio = length / chord(before, here)
+        found = distance(eq, *(y + ratio * (y - x) for x, y in zip(before, here)))
+        if not found.found:
+            return False
+        before, here = here, found.solution
+        if chord(here, goal) < 2 * length:
+            return True
+    return False

@@ -154,16 +154,12 @@ FRETWAVE_VECTORISE void farthest(int samples, int n, double const* discs, double
     }
 }
 
-FRETWAVE_VECTORISE void extent(int samples, int n, double const* discs, double const* rest, double* size,
-                               double* reach) {
+FRETWAVE_VECTORISE void extent(int samples, int n, double const* discs, double* size) {
   for (int t = 0; t < samples; ++t, discs += 3 * n)
 #pragma omp simd
     for (int i = 0; i < n; ++i) {
-      const double x = discs[i], y = discs[n + i], R = discs[2 * n + i];
-      const double whole = std::abs(x) + std::abs(y) + R;
-      const double from_rest = std::abs(x - rest[i]) + std::abs(y - rest[n + i]) + R;
-      size[i] = whole > size[i] ? whole : size[i];
-      reach[i] = from_rest > reach[i] ? from_rest : reach[i];
+      const double now = std::abs(discs[i]) + std::abs(discs[n + i]) + discs[2 * n + i];
+      size[i] = now > size[i] ? now : size[i];
     }
 }
 

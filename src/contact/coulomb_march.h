@@ -63,7 +63,7 @@ void shoot(int samples, int n, double const* discs, double* w, double* A);
 /// The disc that w is farthest outside of, by distance squared less radius squared.
 void farthest(int samples, int n, double const* discs, double const* w, double* excess, double* sample);
 
-/// Largest |u| + R and largest |u - rest| + R (sums of moduli), at least what stands there.
-void extent(int samples, int n, double const* discs, double const* rest, double* size, double* reach);
+/// Largest |u| + R (sums of moduli), at least what stands there.
+void extent(int samples, int n, double const* discs, double* size);
 
 }  // namespace fretwave::contact

@@ -24,7 +24,6 @@ SliderClosure::SliderClosure(int samples, int pairs)
       pairs_(pairs),
       discs_(size_t(3) * samples * pairs),
       size_(pairs),
-      reach_(pairs),
       cycles_(pairs) {}
 
 SliderClosure::Disc SliderClosure::disc(int sample, int pair) const {
@@ -32,8 +31,12 @@ SliderClosure::Disc SliderClosure::disc(int sample, int pair) const {
   return {{at[0], at[pairs_]}, at[2 * pairs_], sample};
 }
 
+/// Distance squared less radius squared of a point that is on the disc's edge but for rounding: that of the
+/// motion, which may be far larger than the disc.
+double SliderClosure::touches(Disc const& d, int pair) const { return 2 * rounding * size_[pair] * d.radius; }
+
 void SliderClosure::close(std::vector<double>& w, std::vector<SliderStart>& starts) {
-  extent(samples_, pairs_, discs_.data(), rest.data(), size_.data(), reach_.data());
+  extent(samples_, pairs_, discs_.data(), size_.data());
   shake_down(w, starts);
   cycle(w, starts);
 }
@@ -50,14 +53,15 @@ void SliderClosure::shake_down(std::vector<double>& w, std::vector<SliderStart>&
     for (int i = 0; i < pairs_; ++i) {
       Nearest& now = nearest[i];
       if (!now.searching) continue;
-      const bool inside = excess[i] <= rounding * size_[i] * reach_[i];
-      if (!inside) now.empty = !enter(now, disc(int(sample[i]), i), i);
+      const Disc farthest_out = disc(int(sample[i]), i);
+      const bool inside = excess[i] <= touches(farthest_out, i);
+      if (!inside) now.empty = !enter(now, farthest_out, i);
       now.searching = !inside && !now.empty;
       left -= !now.searching;
     }
   }
   for (int i = 0; i < pairs_; ++i) {
-    cycles_[i] = nearest[i].empty;
+    cycles_[i] = nearest[i].empty || nearest[i].searching;
     if (!cycles_[i]) starts[i] = follow(nearest[i], i);
   }
 }
@@ -65,12 +69,12 @@ void SliderClosure::shake_down(std::vector<double>& w, std::vector<SliderStart>&
 /// Nearest point to rest on the new disc and inside the active ones; false if they have none in common.
 bool SliderClosure::enter(Nearest& now, Disc const& added, int pair) const {
   const Point origin{rest[pair], rest[pairs_ + pair]};
-  const double tolerance = rounding * size_[pair] * reach_[pair];
   Nearest best;
   double least = std::numeric_limits<double>::infinity();
   const auto offer = [&](Point at, std::vector<Disc> active) {
     for (Disc const& d : now.active)
-      if (std::pow(at.x - d.centre.x, 2) + std::pow(at.y - d.centre.y, 2) > d.radius * d.radius + tolerance)
+      if (std::pow(at.x - d.centre.x, 2) + std::pow(at.y - d.centre.y, 2) - d.radius * d.radius >
+          touches(d, pair))
         return;
     const double distance = std::hypot(at.x - origin.x, at.y - origin.y);
     if (distance < least) least = distance, best.at = at, best.active = std::move(active);

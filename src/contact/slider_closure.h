@@ -37,6 +37,7 @@ class SliderClosure {
     bool searching = true, empty = false;
   };
   Disc disc(int sample, int pair) const;
+  double touches(Disc const&, int pair) const;
   void shake_down(std::vector<double>& w, std::vector<SliderStart>& starts);
   bool enter(Nearest&, Disc const&, int pair) const;
   SliderStart follow(Nearest const&, int pair) const;
@@ -45,7 +46,7 @@ class SliderClosure {
 
   int samples_, pairs_;
   std::vector<double> discs_;
-  std::vector<double> size_, reach_;  ///< of the motion, as `extent` gives them
+  std::vector<double> size_;  ///< of the motion, as `extent` gives it
   std::vector<char> cycles_;
 };
 

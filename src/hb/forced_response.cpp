@@ -60,6 +60,15 @@ std::string ForcedResponse::impossible(Vec y) {
   return z[0] > 0 ? "" : "the frequency falls below zero";
 }
 
+double ForcedResponse::effect(Vec y, Vec dy) {
+  VecHandle weights = unknowns(), weighted = unknowns();
+  double square;
+  metric(y, weights);
+  check(VecPointwiseMult(weighted, weights, dy));
+  check(VecDot(weighted, dy, &square));
+  return std::sqrt(square);
+}
+
 std::string ForcedResponse::beyond(Vec y) {
   double largest;
   check(VecNorm(y, NORM_INFINITY, &largest));

@@ -27,6 +27,8 @@ class ForcedResponse : public HarmonicProblem {
   std::string parameter_text(double value) const override;
   std::string impossible(Vec y) override;
   std::string beyond(Vec y) override;
+  /// Of the motion, relative to its size.
+  double effect(Vec y, Vec dy) override;
   /// Forces count relative to the excitation.
   double largest_residual() const override { return 1e-6; }
   std::vector<solve::TestFunction> tests(Vec y, Vec tangent) override;

@@ -82,7 +82,7 @@ SNESConvergedReason Newton::judge(Vec y, double unknowns, double step, double re
   PetscReal fraction;
   check(SNESGetLineSearch(snes_, &search));
   check(SNESLineSearchGetLambda(search, &fraction));
-  if (residual > bordered_.problem().largest_residual()) return SNES_CONVERGED_ITERATING;
+  if (std::max(residual, rounding) > bordered_.problem().largest_residual()) return SNES_CONVERGED_ITERATING;
   const bool halves = residual <= 0.5 * before;
   if (residual <= rounding && halves && last_effect(y) * residual / before <= small_effect)
     return SNES_CONVERGED_FNORM_ABS;
@@ -103,13 +103,14 @@ double Newton::last_effect(Vec y) {
 bool Newton::stuck_at_rounding(Vec y) {
   Vec step;
   double length, unknowns, residual;
+  const double rounding = bordered_.problem().rounding(y);
   check(SNESGetSolutionUpdate(snes_, &step));
   check(SNESGetFunctionNorm(snes_, &residual));
   check(VecNorm(step, NORM_2, &length));
   check(VecNorm(y, NORM_2, &unknowns));
-  return residual <= bordered_.problem().largest_residual() &&
-         length <= stagnant_step * std::max(unknowns, 1.0) &&
-         residual <= near * bordered_.problem().rounding(y) && last_effect(y) <= largest_effect;
+  return std::max(residual, rounding) <= bordered_.problem().largest_residual() &&
+         length <= stagnant_step * std::max(unknowns, 1.0) && residual <= near * rounding &&
+         last_effect(y) <= largest_effect;
 }
 
 PetscErrorCode Newton::form_function(SNES, Vec y, Vec g, void* context) {

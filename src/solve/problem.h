@@ -40,8 +40,8 @@ class Problem {
   virtual bool scale(Vec /*y*/) { return false; }
   /// Relative change of what is read from y by a small step dy; 0 if nothing is known. Collective.
   virtual double effect(Vec /*y*/, Vec /*dy*/) { return 0; }
-  /// Above it no residual is accepted, whatever rounding may leave: where stiff pairs change between stick
-  /// and slip within a sample, a tiny step tells nothing of the forces that are left.
+  /// Above it no residual is accepted, nor any where rounding alone may leave as much: where stiff pairs
+  /// change between stick and slip within a sample, a tiny step tells nothing of the forces that are left.
   virtual double largest_residual() const { return std::numeric_limits<double>::infinity(); }
   /// dr = J(y) dy, J is N x (N + 1). Collective.
   virtual void product(Vec y, Vec dy, Vec dr) = 0;
