@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 
+import fretwave as fw
 from fretwave.slip_threshold import slip_factor, slip_threshold
 
 pytestmark = pytest.mark.ranks(1)
@@ -52,10 +53,31 @@ def test_no_tangential_force_never_slips() -> None:
     assert slip_factor(f, friction=0.3) == np.inf
 
 
+def kept(law: str, **parameters: object) -> dict[str, str]:
+    """What results say of a contact 'root'."""
+    case = {f"contact.root.{key}": value for key, value in {"law": law, **parameters}.items()}
+    return {"case": json.dumps(case), "laws": json.dumps({"root": fw.laws()[law].plain()})}
+
+
 def test_the_threshold_is_a_multiple_of_the_amplitude() -> None:
     f = {"root": forces(0, 0.1)}
-    case = {"contact.root.law": "coulomb_3d", "contact.root.friction_coefficient": MU.tolist()}
-    found = slip_threshold(2e-5, f, {"case": json.dumps(case)})
+    found = slip_threshold(2e-5, f, kept("coulomb_3d", friction_coefficient=MU.tolist()))
     assert found == pytest.approx(2e-5 * slip_factor(f["root"], friction=MU))
-    viscous = {"contact.root.law": "regularised_coulomb", "contact.root.friction_limit": 5.0}
-    assert np.isnan(slip_threshold(2e-5, {"root": f["root"][:, :1]}, {"case": json.dumps(viscous)}))
+    viscous = kept("regularised_coulomb", friction_limit=5.0)
+    assert np.isnan(slip_threshold(2e-5, {"root": f["root"][:, :1]}, viscous))
+    assert np.isnan(slip_threshold(2e-5, f, {"case": viscous["case"]}))  # of results that do not say what the laws are
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_tangents_that_are_limited_one_by_one_slip_later(seed: int) -> None:
+    """The largest of both tangents meets mu N at the threshold and not before."""
+    f = forces(seed, 0.2)
+    factor = slip_threshold(1.0, {"root": f}, kept("coulomb_3d_uncoupled", friction_coefficient=MU.tolist()))
+
+    def over(share: float) -> float:
+        g = f.mean(axis=0) + share * (f - f.mean(axis=0))
+        return float((np.abs(g[:, 1:]).max(axis=1) - MU * g[:, 0]).max())
+
+    assert abs(over(factor)) < 1e-9
+    assert max(over(share * factor) for share in np.linspace(0, 0.999, 40)) < 0
+    assert factor >= slip_factor(f, friction=MU)

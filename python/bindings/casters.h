@@ -11,6 +11,9 @@
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
+#include <algorithm>
+#include <cstdint>
+
 #include "petsc.h"
 
 namespace nb = nanobind;
@@ -42,6 +45,16 @@ inline Array numpy_copy(double const* data, std::vector<size_t> const& shape) {
   std::copy_n(data, n, copy);
   nb::capsule owner(copy, [](void* p) noexcept { delete[] static_cast<double*>(p); });
   return Array(copy, shape.size(), shape.data(), owner);
+}
+
+/// A numpy array of small whole numbers, from values that become such.
+template <class T>
+inline nb::ndarray<nb::numpy, std::int8_t> numpy_bytes(std::vector<T> const& values,
+                                                       std::vector<size_t> const& shape) {
+  auto* copy = new std::int8_t[values.size() + 1];
+  std::transform(values.begin(), values.end(), copy, [](T value) { return std::int8_t(value); });
+  nb::capsule owner(copy, [](void* p) noexcept { delete[] static_cast<std::int8_t*>(p); });
+  return nb::ndarray<nb::numpy, std::int8_t>(copy, shape.size(), shape.data(), owner);
 }
 
 void bind_contact(nb::module_&);

@@ -12,11 +12,14 @@ class PythonLaw : public contact::Law {
   PythonLaw(nb::object law, int pairs) : law_(std::move(law)), pairs_(pairs) {
     components_ = nb::cast<int>(law_.attr("components"));
     odd_ = nb::cast<bool>(law_.attr("odd"));
+    nb::object normal = law_.attr("normal");
+    normal_ = normal.is_none() ? -1 : nb::cast<int>(normal);
     stuck_stiffness_ = nb::cast<double>(law_.attr("stuck_stiffness"));
   }
   int components() const override { return components_; }
   int pairs() const override { return pairs_; }
   bool odd() const override { return odd_; }
+  int normal() const override { return normal_; }
   double stuck_stiffness(int, int) const override { return stuck_stiffness_; }
 
   void force(contact::Motion const& motion, double* f, contact::Record& record) const override {
@@ -24,11 +27,6 @@ class PythonLaw : public contact::Law {
                                        size_t(motion.pairs)};
     nb::tuple out =
         nb::cast<nb::tuple>(law_.attr("_evaluate")(numpy_copy(motion.u, shape), numpy_copy(motion.v, shape)));
-    const auto take = [&](nb::handle from, size_t size, double* to) {
-      auto array = nb::cast<nb::ndarray<double const, nb::c_contig, nb::device::cpu>>(from);
-      if (array.size() != size) throw nb::value_error("a law in Python returned an array of the wrong size");
-      std::copy_n(array.data(), size, to);
-    };
     take(out[0], motion.size(), f);
     record.df_du.resize(motion.size() * motion.components);
     record.df_dv.resize(motion.size() * motion.components);
@@ -38,15 +36,76 @@ class PythonLaw : public contact::Law {
 
   void diagnose(contact::Motion const& motion, double const* f, contact::Diagnosis& out) const override {
     contact::add_work(motion, f, out.work);
-    std::fill(out.status.begin(), out.status.end(), contact::Status::slip);
+    const std::vector<size_t> shape = {size_t(motion.samples), size_t(motion.components),
+                                       size_t(motion.pairs)};
+    nb::tuple states = nb::cast<nb::tuple>(
+        law_.attr("_states")(numpy_copy(motion.u, shape), numpy_copy(motion.v, shape), numpy_copy(f, shape)));
+    std::vector<double> status(out.status.size()), gap(out.status.size());
+    take(states[0], status.size(), status.data());
+    take(states[1], gap.size(), gap.data());
+    for (size_t k = 0; k < status.size(); ++k) {
+      if (status[k] != 0 && status[k] != 1 && status[k] != 2)
+        throw nb::value_error("a law in Python returned a status other than STICK, SLIP and OPEN");
+      out.status[k] = contact::Status(int(status[k]));
+    }
+    if (!out.gap.empty()) out.gap = gap;
   }
 
  private:
+  static void take(nb::handle from, size_t size, double* to) {
+    auto array = nb::cast<nb::ndarray<double const, nb::c_contig, nb::device::cpu>>(from);
+    if (array.size() != size) throw nb::value_error("a law in Python returned an array of the wrong size");
+    std::copy_n(array.data(), size, to);
+  }
+
   nb::object law_;
-  int pairs_, components_;
+  int pairs_, components_, normal_;
   bool odd_;
   double stuck_stiffness_;
 };
+
+char const* name_of(contact::Role role) {
+  using contact::Role;
+  switch (role) {
+    case Role::none:
+      return "none";
+    case Role::normal_stiffness:
+      return "normal_stiffness";
+    case Role::tangential_stiffness:
+      return "tangential_stiffness";
+    case Role::friction_coefficient:
+      return "friction_coefficient";
+    case Role::friction_limit:
+      return "friction_limit";
+    case Role::load:
+      return "load";
+    case Role::gap:
+      return "gap";
+    case Role::regularisation:
+      return "regularisation";
+  }
+  return "none";
+}
+
+char const* name_of(contact::Limit limit) {
+  return limit == contact::Limit::circle ? "circle" : limit == contact::Limit::each ? "each" : "none";
+}
+
+using Samples = nb::ndarray<double const, nb::c_contig, nb::device::cpu>;
+
+/// (status, gap), each samples x pairs, for any displacements, velocities and forces samples x components x
+/// pairs.
+nb::tuple states(contact::Law const& law, Samples u, Samples v, Samples f) {
+  if (u.ndim() != 3) throw nb::value_error("samples are no array of samples x components x pairs");
+  contact::Motion motion;
+  motion.samples = int(u.shape(0)), motion.components = law.components(), motion.pairs = law.pairs();
+  for (Samples const* given : {&u, &v, &f})
+    if (given->size() != motion.size()) throw nb::value_error("samples that do not fit the law");
+  motion.u = u.data(), motion.v = v.data();
+  const contact::Diagnosis found = contact::states(law, motion, f.data());
+  const std::vector<size_t> shape = {size_t(motion.samples), size_t(motion.pairs)};
+  return nb::make_tuple(numpy_bytes(found.status, shape), numpy_copy(found.gap.data(), shape));
+}
 
 nb::list law_table() {
   nb::list out;
@@ -56,9 +115,12 @@ nb::list law_table() {
     for (auto const& p : entry.parameters) one[p.name] = {1.0};
     for (auto const& p : entry.parameters)
       parameters.append(nb::make_tuple(p.name, p.unit, p.doc, p.lower, p.strict,
-                                       p.standard ? nb::object(nb::cast(*p.standard)) : nb::none()));
-    out.append(
-        nb::make_tuple(entry.name, entry.doc, entry.components, parameters, entry.make(one)->hereditary()));
+                                       p.standard ? nb::object(nb::cast(*p.standard)) : nb::none(),
+                                       name_of(p.role)));
+    const auto law = entry.make(one);
+    out.append(nb::make_tuple(entry.name, entry.doc, entry.components, parameters, law->hereditary(),
+                              law->normal() < 0 ? nb::none() : nb::object(nb::cast(law->normal())),
+                              law->wears(), name_of(law->limit())));
   }
   return out;
 }
@@ -69,7 +131,9 @@ void bind_contact(nb::module_& m) {
   nb::class_<contact::Law>(m, "Law")
       .def_prop_ro("components", &contact::Law::components)
       .def_prop_ro("odd", &contact::Law::odd)
-      .def_prop_ro("pairs", &contact::Law::pairs);
+      .def_prop_ro("pairs", &contact::Law::pairs)
+      .def("states", states);
+  m.attr("limit_tolerance") = contact::limit_tolerance;
   m.def("law_table", law_table);
   m.def("make_law", [](std::string const& name, contact::Parameters const& p) {
     return std::shared_ptr<contact::Law>(contact::make_law(name, p));

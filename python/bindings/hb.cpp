@@ -17,7 +17,8 @@ nb::dict contact_summary(hb::ContactSummary const& s) {
   return out;
 }
 
-/// This rank's samples, one (u, v, f) a contact, each samples x components x pairs.
+/// This rank's samples, one (u, v, f, status, gap) a contact, the first three samples x components x pairs,
+/// the last two samples x pairs.
 nb::list contact_periods(hb::HarmonicProblem& problem, Petsc<Vec> y) {
   nb::list out;
   const auto periods = problem.contact_periods(y.object);
@@ -25,8 +26,11 @@ nb::list contact_periods(hb::HarmonicProblem& problem, Petsc<Vec> y) {
     auto const& law = *problem.model().contacts()[k].law;
     const std::vector<size_t> shape = {size_t(problem.harmonics().samples()), size_t(law.components()),
                                        size_t(law.pairs())};
+    const std::vector<size_t> of_pairs = {shape[0], shape[2]};
     out.append(nb::make_tuple(numpy_copy(periods[k].u.data(), shape), numpy_copy(periods[k].v.data(), shape),
-                              numpy_copy(periods[k].f.data(), shape)));
+                              numpy_copy(periods[k].f.data(), shape),
+                              numpy_bytes(periods[k].status, of_pairs),
+                              numpy_copy(periods[k].gap.data(), of_pairs)));
   }
   return out;
 }

@@ -15,7 +15,7 @@ os.environ.setdefault("OMPI_MCA_ess_singleton_isolated", "1")
 if TYPE_CHECKING:
     from .aerodynamics import Aerodynamics
     from .built import BuiltContact, BuiltModel
-    from .contact_laws import LawInfo, ParameterInfo, PythonLaw, laws
+    from .contact_laws import LawInfo, Limit, ParameterInfo, PythonLaw, Role, laws, register_law
     from .continuation import Continuation, Point, StepControl
     from .cyclic import Sector
     from .cyclic_reduction import SectorReduction, reduce_sector
@@ -39,7 +39,7 @@ _HOMES = {
     "cyclic_reduction": ("SectorReduction", "reduce_sector"),
     "cyclic_waves": ("WaveError",),
     "faces": ("match_faces",),
-    "contact_laws": ("LawInfo", "ParameterInfo", "PythonLaw", "laws"),
+    "contact_laws": ("LawInfo", "Limit", "ParameterInfo", "PythonLaw", "Role", "laws", "register_law"),
     "model": ("Contact", "Model"),
     "modes": ("LinearMode", "linear_modes"),
     "problems": ("ForcedResponse", "Harmonics", "NonlinearMode", "choose_harmonics"),
@@ -63,6 +63,7 @@ __all__ = [
     "Harmonics",
     "InputError",
     "LawInfo",
+    "Limit",
     "LinearMode",
     "Model",
     "NonlinearError",
@@ -72,6 +73,7 @@ __all__ = [
     "Point",
     "PythonLaw",
     "Reduction",
+    "Role",
     "Sector",
     "SectorReduction",
     "StepControl",
@@ -88,6 +90,7 @@ __all__ = [
     "nonlinear_error",
     "reduce",
     "reduce_sector",
+    "register_law",
 ]
 
 

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from .built import BuiltContact
+from .contact_laws import law_like
 from .contacts import ContactSpec, wear_areas
 from .errors import InputError
 from .reporter import Found, Reporter
@@ -93,7 +94,7 @@ def check_memory(
             Reporter(source, ("analysis", number), found).wrong(
                 ("type" if transient else "time_points",),
                 f"needs time integration, which does not know the law '{named.law}' of contact '{named.name}'",
-                "a law of the present motion, such as regularised_coulomb",
+                f"a law of the present motion, such as {law_like(lambda law: not law.memory)}",
                 "remove the analysis, or take such a law" if transient else "write `time_points = 0`",
             )
 

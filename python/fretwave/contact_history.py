@@ -1,19 +1,28 @@
-"""Status, gap and work of contact pairs over a period, from the samples that results.h5 keeps of them."""
+"""Status, gap and work of contact pairs over a period: what the law said of each sample, as results.h5 keeps it."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import reduce
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from .contact_laws import OPEN, SLIP, STICK, UNKNOWN
 
-STICK, SLIP, OPEN = 0, 1, 2
-#: A sample slips when its tangential force is this near to the limit, as in the laws' own diagnosis (src/contact).
-AT_LIMIT = 1e-12
+Array = npt.NDArray[np.float64]
+States = npt.NDArray[np.int8]
+
+#: What is kept of a contact's period, by name: unit, long name, type and the value of rows that lack it.
+MOTION: Mapping[str, tuple[str, str, str, float]] = {
+    "u": ("m", "relative displacement over one period", "f8", 0),
+    "v": ("m/s", "relative velocity over one period", "f8", 0),
+    "f": ("N", "contact force over one period", "f8", 0),
+    "status": ("1", "status over one period: stick 0, slip 1, open 2, not kept -1", "i1", UNKNOWN),
+    "gap": ("m", "distance to contact over one period, 0 where closed", "f8", np.nan),
+}
 
 
 @dataclass(frozen=True)
@@ -22,76 +31,62 @@ class ContactHistory:
 
     Attributes
     ----------
-    law : name of the law
-    parameters : of the law as it acted, numbers or (n_pairs,)
     u, v, f : (n_samples, components, n_pairs)
-        Relative displacement [m] and velocity [m/s], and force [N]; with three components the first is normal.
+        Relative displacement [m] and velocity [m/s], and force [N].
+    kept_status, kept_gap : (n_samples, n_pairs), optional
+        As the law told them; None where they are not kept.
+    normal : int or None
+        Component along the normal, > 0 closing.
     """
 
-    law: str
-    parameters: Mapping[str, Any]
     u: Array
     v: Array
     f: Array
+    kept_status: States | None = None
+    kept_gap: Array | None = None
+    normal: int | None = None
+
+    @classmethod
+    def of(cls, motion: Mapping[str, Any], normal: int | None) -> ContactHistory:
+        """From what is kept of a period, by the names of `MOTION`."""
+        return cls(motion["u"], motion["v"], motion["f"], motion.get("status"), motion.get("gap"), normal)
 
     @property
     def n_pairs(self) -> int:
         return int(self.f.shape[2])
 
-    @property
-    def is_3d(self) -> bool:
-        return bool(self.f.shape[1] == 3)
-
     def delayed(self, samples: int) -> ContactHistory:
         """The same motion so many samples later."""
-        u, v, f = (np.roll(values, samples, axis=0) for values in (self.u, self.v, self.f))
-        return replace(self, u=u, v=v, f=f)
+        return self._each(lambda values: np.roll(values, samples, axis=0))
 
     def of_pairs(self, pairs: slice) -> ContactHistory:
         """Of some pairs alone."""
-        return replace(self, u=self.u[..., pairs], v=self.v[..., pairs], f=self.f[..., pairs])
+        return self._each(lambda values: values[..., pairs])
+
+    def _each(self, change: Any) -> ContactHistory:
+        told = [None if kept is None else change(kept) for kept in (self.kept_status, self.kept_gap)]
+        return ContactHistory(change(self.u), change(self.v), change(self.f), told[0], told[1], self.normal)
 
     @property
     def normal_force(self) -> Array:
         """(n_samples, n_pairs) [N], > 0 compressive; nan for a law without one."""
-        return self.f[:, 0] if self.is_3d else np.full_like(self.f[:, 0], np.nan)
+        return normal_force(self.f, self.normal)
 
     @property
     def tangential_force(self) -> Array:
         """(n_samples, n_pairs) [N], its magnitude."""
-        return np.asarray(np.hypot(self.f[:, 1], self.f[:, 2]) if self.is_3d else np.abs(self.f[:, 0]))
+        return tangential_force(self.f, self.normal)
 
     @property
     def gap(self) -> Array:
-        """(n_samples, n_pairs) [m]: distance to contact where open; nan for a law without one.
-
-        The law's N = max(0, N0 + kn (u_n - gap)), solved for the missing approach (src/contact/coulomb_3d.h).
-        """
-        if not self.is_3d:
-            return np.full_like(self.f[:, 0], np.nan)
-        distance = self._value("gap") - self.u[:, 0] - self._value("normal_load") / self._value("normal_stiffness")
-        return np.where(self.f[:, 0] > 0, 0.0, np.maximum(distance, 0.0))
+        """(n_samples, n_pairs) [m]: distance to contact, 0 where closed; nan for a law without one."""
+        return np.full_like(self.f[:, 0], np.nan) if self.kept_gap is None else self.kept_gap
 
     @property
-    def status(self) -> npt.NDArray[np.int8] | None:
-        """(n_samples, n_pairs): stick 0, slip 1, open 2, as the law counts them; None for an unknown law."""
-        rule = {
-            "coulomb_3d": self._slips_within(np.hypot),
-            "coulomb_3d_uncoupled": self._slips_within(lambda a, b: np.maximum(np.abs(a), np.abs(b))),
-            "jenkins": lambda: np.abs(self.f[:, 0]) >= (1 - AT_LIMIT) * self._value("friction_limit"),
-            "regularised_coulomb": lambda: np.abs(self.v[:, 0]) > 2 * self._value("regularisation_velocity"),
-        }.get(self.law)
-        if rule is None:
-            return None
-        is_open = (self.f[:, 0] <= 0) & self.is_3d
-        return np.where(is_open, OPEN, np.where(rule(), SLIP, STICK)).astype(np.int8)
-
-    def _slips_within(self, size: Any) -> Any:
-        def rule() -> Any:
-            limit = self._value("friction_coefficient") * self.f[:, 0]
-            return size(self.f[:, 1], self.f[:, 2]) >= (1 - AT_LIMIT) * limit
-
-        return rule
+    def status(self) -> States | None:
+        """(n_samples, n_pairs): stick 0, slip 1, open 2; None where it is not kept of all samples."""
+        known = self.kept_status is not None and not np.any(self.kept_status == UNKNOWN)
+        return self.kept_status if known else None
 
     def share(self, status: int) -> Array:
         """(n_pairs,): share of the period in a status."""
@@ -109,5 +104,16 @@ class ContactHistory:
         slope = np.fft.irfft(1j * orders * np.fft.rfft(self.u, axis=0), n, axis=0)
         return np.asarray((self.f * slope).sum(axis=(0, 1)) * 2 * np.pi / n)
 
-    def _value(self, name: str) -> Any:
-        return np.broadcast_to(np.asarray(self.parameters.get(name, 0.0), dtype=float), (self.n_pairs,))
+
+def normal_force(f: Array, normal: int | None) -> Array:
+    """(..., n_pairs) of forces (..., components, n_pairs), > 0 compressive; nan without a normal direction."""
+    return np.full_like(f[..., 0, :], np.nan) if normal is None else f[..., normal, :]
+
+
+def tangential_force(f: Array, normal: int | None) -> Array:
+    """(..., n_pairs) of forces (..., components, n_pairs): its magnitude."""
+    parts = [np.abs(f[..., row, :]) for row in range(f.shape[-2]) if row != normal]
+    return np.asarray(reduce(np.hypot, parts))
+
+
+__all__ = ["MOTION", "OPEN", "SLIP", "STICK", "ContactHistory", "normal_force", "tangential_force"]

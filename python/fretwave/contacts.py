@@ -11,6 +11,7 @@ import numpy.typing as npt
 import scipy.sparse
 
 from .built import BuiltContact
+from .contact_laws import LawInfo, Role, law_like, laws
 from .contact_parameters import fits, law_of, parameters_of
 from .errors import FretwaveError, InputError
 from .schema import ContactSection
@@ -46,17 +47,19 @@ class ContactSpec:
         """Number of pairs."""
         return int(self.rows.shape[0]) // self.components
 
+    @property
+    def info(self) -> LawInfo:
+        """What is known of the law: its parameters with their roles, its normal direction."""
+        return laws()[self.law]
+
+    def value(self, role: Role) -> Any:
+        """Value of the parameter with a role; None where the law has none."""
+        return self.info.value(role, self.parameters)
+
 
 def closed_contacts(contacts: Sequence[ContactSpec]) -> list[ContactSpec]:
     """The same contacts with every pair closed at rest, whatever its load and gap."""
-    closing = {"normal_load": 1.0, "gap": 0.0}
-    return [
-        replace(
-            contact,
-            parameters={**contact.parameters, **{k: v for k, v in closing.items() if k in contact.parameters}},
-        )
-        for contact in contacts
-    ]
+    return [replace(c, parameters={**c.parameters, **c.info.closing()}) for c in contacts]
 
 
 def wear_areas(
@@ -71,7 +74,7 @@ def wear_areas(
     """
     found = {}
     for contact in contacts:
-        if "normal_stiffness" not in contact.parameters:
+        if not contact.info.wears:
             continue
         given = built.get(contact.name)
         if given is None or given.areas is None:
@@ -79,8 +82,9 @@ def wear_areas(
             raise InputError("the areas of the pairs are not known", f"contact '{contact.name}'", None, "areas", fix)
         found[contact.name] = np.asarray(given.areas, dtype=float)
     if not found:
-        laws = ", ".join(contact.law for contact in contacts) or "no contact"
-        raise InputError("no contact can wear", None, laws, "a law with a normal direction", 'use law = "coulomb_3d"')
+        given_laws = ", ".join(contact.law for contact in contacts) or "no contact"
+        fix = f'use law = "{law_like(lambda law: law.wears)}"'
+        raise InputError("no contact can wear", None, given_laws, "a law with a normal direction", fix)
     return found
 
 

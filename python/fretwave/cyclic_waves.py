@@ -11,7 +11,7 @@ import numpy.typing as npt
 import scipy.sparse as sp
 from mpi4py import MPI
 
-from .contact_laws import PythonLaw
+from .contact_laws import PythonLaw, Role, springs
 from .cyclic import Sector
 from .model import Contact, by_sector
 from .modes import linear_modes
@@ -106,13 +106,14 @@ def _closed(contact: Contact) -> Contact:
     """Closed at rest, whatever its load and gap."""
     if contact.components == 1 or isinstance(contact.law, PythonLaw):
         return contact
-    return replace(contact, parameters={**contact.parameters, "normal_load": 1.0, "gap": 0.0})
+    return replace(contact, parameters={**contact.parameters, **contact.info.closing()})
 
 
 def _sliding(contact: Contact) -> Contact | None:
     """What is left of a closed contact without tangential forces: its normal springs, as sliders that never slip."""
-    stiffness = contact.parameters.get("normal_stiffness")
-    if contact.components == 1 or stiffness is None:
+    stiffness, normal = contact.value(Role.NORMAL_STIFFNESS), contact.info.normal
+    if normal is None or stiffness is None:
         return None
-    normals = {k: sp.csr_matrix(B)[:: contact.components] for k, B in by_sector(contact.B).items()}
-    return Contact("jenkins", normals, {"tangential_stiffness": stiffness, "friction_limit": 1.0}, contact.name)
+    normals = {k: sp.csr_matrix(B)[normal :: contact.components] for k, B in by_sector(contact.B).items()}
+    law, parameters = springs(stiffness)
+    return Contact(law, normals, parameters, contact.name)

@@ -14,7 +14,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from . import _core, parallel
-from .contact_laws import PythonLaw, laws
+from .contact_laws import LawInfo, PythonLaw, Role, core_law, laws, python_law
 from .errors import InputError
 
 Array = npt.NDArray[np.float64]
@@ -57,24 +57,44 @@ class Contact:
     @property
     def components(self) -> int:
         """Relative displacements per pair."""
+        return self.law.components if isinstance(self.law, PythonLaw) else self.info.components
+
+    @property
+    def info(self) -> LawInfo:
+        """What is known of the law: its parameters with their roles, its normal direction."""
         if isinstance(self.law, PythonLaw):
-            return self.law.components
+            return self.law.info()
         if self.law not in laws():
             raise InputError(
                 "unknown contact law", f"contact '{self.name}'", self.law, ", ".join(laws()), "choose a known law"
             )
-        return laws()[self.law].components
+        return laws()[self.law]
+
+    def value(self, role: Role) -> Any:
+        """Value of the parameter with a role; None where the law has none."""
+        return self.info.value(role, self.parameters)
+
+    def states(self, u: Array, v: Array, f: Array) -> tuple[npt.NDArray[np.int8], Array]:
+        """What the law says of displacements, velocities and forces (n_samples, components, n_pairs) of a period.
+
+        Returns
+        -------
+        status, gap : (n_samples, n_pairs)
+            Stick 0, slip 1 or open 2; distance to contact [m], nan of a law without a normal direction.
+        """
+        samples = [np.ascontiguousarray(values, dtype=float) for values in (u, v, f)]
+        n_pairs = samples[0].shape[2]
+        found: tuple[npt.NDArray[np.int8], Array] = self.core_law(np.arange(n_pairs), n_pairs).states(*samples)
+        return found
 
     def core_law(self, pairs: npt.NDArray[np.intp], n_pairs: int) -> Any:
         """The compiled law with the parameters of these pairs."""
         if isinstance(self.law, PythonLaw):
-            local = copy(self.law)
-            local.pairs = pairs
-            return _core.python_law(local, len(pairs))
-        return _core.make_law(self.law, {k: v[pairs].tolist() for k, v in self._values(n_pairs).items()})
+            return python_law(copy(self.law), pairs)
+        return core_law(self.law, self._values(n_pairs), pairs)
 
     def _values(self, n_pairs: int) -> dict[str, Array]:
-        known = {p.name: p for p in laws()[str(self.law)].parameters}
+        known = {p.name: p for p in self.info.parameters}
         for name in self.parameters:
             if name not in known:
                 raise InputError(
@@ -235,7 +255,7 @@ class Model:
         parts = self.comm.gather((self._pairs[which], local))
         if parts is None:
             return None
-        whole = np.zeros((*local.shape[:-1], sum(len(pairs) for pairs, _ in parts)))
+        whole = np.zeros((*local.shape[:-1], sum(len(pairs) for pairs, _ in parts)), local.dtype)
         for pairs, values in parts:
             whole[..., pairs] = values
         return whole

@@ -9,6 +9,7 @@ import numpy.typing as npt
 from petsc4py import PETSc
 
 from . import _core
+from .contact_laws import own_load
 from .continuation import Continuation, StepControl
 from .errors import InputError, NotConverged
 from .model import Model
@@ -18,6 +19,8 @@ from .suspects import suspects
 
 Array = npt.NDArray[np.float64]
 
+#: What is kept of each contact.
+TOLD = ("u", "f", "status", "gap")
 #: Load factor at which a structure held by contact alone starts.
 FIRST_FACTOR = 1e-2
 
@@ -37,7 +40,8 @@ class Preload:
     stick, slip, open : shares of the pairs
     imbalance : what the solver left of the load, relative to it
     contacts : list of dict, on rank 0
-        Relative displacement u and force f (components, n_pairs) of each contact.
+        Relative displacement u and force f (components, n_pairs) of each contact, and what its law says of each
+        pair: status (stick 0, slip 1, open 2) and gap [m].
     """
 
     displacement: Array
@@ -63,12 +67,14 @@ class StaticPreload(HarmonicProblem):
         self, model: Model, load: Array, reference: LinearMode, constant: Array | None = None, prefix: str = "static_"
     ) -> None:
         if not reference.omega > 0:
+            load_name = own_load(model.contacts)
+            by = f" ({load_name})" if load_name else ""
             raise InputError(
                 "the mode that forces are measured by is a rigid motion: nothing holds the structure at rest",
                 None,
                 f"{reference.omega:g} rad/s{suspects(model.contacts, 1.0) if model.contacts else ''}",
                 "an elastic mode",
-                "load the contact (normal_load), hold the structure, or take a mode with closed contact",
+                f"load the contact{by}, hold the structure, or take a mode with closed contact",
             )
         self.stiffness = stiffness = reference.omega**2 / float(np.sum(reference.shape**2))
         size = (float(np.linalg.norm(load)) or stiffness) / stiffness
@@ -150,9 +156,9 @@ def _settled(problem: StaticPreload, y: PETSc.Vec, load: Array) -> Preload:
     size = float(np.linalg.norm(load)) or float(np.linalg.norm(load + rest)) or 1.0
     load = load + rest
     contact = problem.diagnostics(y)
-    periods = problem.contact_period(y)
+    periods = problem.contact_history(y)
     on_first = problem.model.comm.rank == 0
-    contacts = [{key: np.asarray(c[key])[0] for key in "uf"} for c in periods] if on_first else None
+    contacts = [{key: np.asarray(c[key])[0] for key in TOLD} for c in periods] if on_first else None
     problem.core.settle(y)
     blocks = _whole(problem.model, problem.core.coefficients(y))
     imbalance = float(np.linalg.norm(rest)) / size

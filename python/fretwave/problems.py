@@ -10,6 +10,7 @@ import numpy.typing as npt
 from petsc4py import PETSc
 
 from . import _core
+from .contact_history import MOTION
 from .errors import InputError
 from .model import Model
 from .modes import LinearMode
@@ -132,8 +133,15 @@ class HarmonicProblem:
 
         Each is (n_samples, components, n_pairs).
         """
+        return [{name: told[name] for name in "uvf"} for told in self.contact_history(y)]
+
+    def contact_history(self, y: PETSc.Vec) -> list[dict[str, Array | None]]:
+        """`contact_period` with what the law says of each pair and sample, on rank 0. Collective.
+
+        (n_samples, n_pairs): status (stick 0, slip 1, open 2) and gap [m] (nan without a normal direction).
+        """
         return [
-            {name: self.model.gather_pairs(k, samples) for name, samples in zip("uvf", period)}
+            {name: self.model.gather_pairs(k, samples) for name, samples in zip(MOTION, period)}
             for k, period in enumerate(self.core.contact_periods(y))
         ]
 

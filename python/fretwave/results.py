@@ -9,7 +9,7 @@ written by rank 0 alone; methods marked Collective are called on every rank.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from .columns import Column, Value, columns_named, csv_header, csv_line
+from .contact_history import MOTION
 from .files import replace_bytes, told, write_all
 from .journal import Journal, Record, journal_path
 from .results_file import NewResults, Rows, attributes_of, build_group, has_results, open_results, rewritten
@@ -147,7 +148,7 @@ class AnalysisWriter:
         if coefficients is not None and self._labels:
             arrays["coefficients"] = np.asarray(coefficients, dtype=float)
         for contact, motion in (motions or {}).items():
-            arrays.update({f"motion/{contact}/{key}": np.asarray(motion[key], dtype=float) for key in "uvf"})
+            arrays.update({f"motion/{contact}/{key}": values for key, values in _kept(motion)})
         return Record("row", values, arrays)
 
     def _write(self, record: Record, line: str) -> None:
@@ -259,6 +260,15 @@ class AnalysisWriter:
     def __del__(self) -> None:
         with suppress(Exception):
             self.abandon()
+
+
+def _kept(motion: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """What there is of a contact's period; no gap of a law that has none."""
+    for key, (_, _, dtype, missing) in MOTION.items():
+        if key in motion:
+            values = np.asarray(motion[key], dtype)
+            if not (np.isnan(missing) and np.isnan(values).all()):
+                yield key, values
 
 
 __all__ = ["AnalysisWriter", "Field", "has_results", "open_results", "rewritten"]

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from .columns import Column, Value
+from .contact_history import MOTION
 from .errors import InputError
 from .files import Unfailing, beside, bring_to_disk, check_whole, seal, sealed_size, told
 from .journal import Record, read_records, unfinished
@@ -129,11 +130,13 @@ def build_group(file: Any, name: str, rows: Rows) -> None:
     _fill(group, rows)
 
 
-def _growing(group: Any, name: str, rows: int, shape: Any, most: int, dtype: Any = "f8") -> Any:
+def _growing(
+    group: Any, name: str, rows: int, shape: Any, most: int, dtype: Any = "f8", missing: float | None = None
+) -> Any:
     """A dataset (rows, *shape) that other programs may add to."""
     size = 8 * int(np.prod(shape, dtype=np.int64))
     chunk = (max(1, min(most, CHUNK_BYTES // max(size, 1))), *(max(1, n) for n in shape))
-    return group.create_dataset(name, (rows, *shape), dtype, maxshape=(None, *shape), chunks=chunk)
+    return group.create_dataset(name, (rows, *shape), dtype, maxshape=(None, *shape), chunks=chunk, fillvalue=missing)
 
 
 def _create_points(group: Any, rows: Rows) -> None:
@@ -179,10 +182,9 @@ def _fill(group: Any, rows: Rows) -> None:
 def _put_motion(group: Any, rows: Rows, contact: str, key: str, values: Any, place: int) -> None:
     holder = group.require_group(f"contact_{contact}")
     if key not in holder:
-        data = _growing(holder, key, len(rows.reported), values.shape, 1)
-        long = {"u": "relative displacement", "v": "relative velocity", "f": "contact force"}
-        units = {"u": "m", "v": "m/s", "f": "N"}
-        data.attrs.update({"units": units[key], "long_name": f"{long[key]} over one period"})
+        unit, long_name, dtype, missing = MOTION[key]
+        data = _growing(holder, key, len(rows.reported), values.shape, 1, dtype, missing)
+        data.attrs.update({"units": unit, "long_name": long_name})
     holder[key][place] = values
 
 

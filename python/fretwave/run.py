@@ -14,6 +14,7 @@ from .aerodynamics_case import with_flow
 from .analyses.context import AnalysisContext, Outcome, belongs, describe_analysis
 from .casefile import Case, changed_keys, load_case
 from .console import Console
+from .contact_laws import Role
 from .contacts import ContactSpec
 from .errors import EXIT_DONE, InputError, NotConverged
 from .interrupt import say_how_to_go_on
@@ -431,5 +432,5 @@ def build_model(
 
 def acting_parameters(contact: ContactSpec, preload: PreloadSection | None) -> dict[str, Any]:
     """Parameters of a contact's law under a preload, which may take the place of the pairs' own loads."""
-    replaced = preload is not None and not preload.pair_loads and "normal_load" in contact.parameters
-    return {**contact.parameters, "normal_load": 0.0} if replaced else dict(contact.parameters)
+    replaced = preload is not None and not preload.pair_loads
+    return {**contact.parameters, **(contact.info.with_roles({Role.LOAD: 0.0}) if replaced else {})}

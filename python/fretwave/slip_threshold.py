@@ -15,10 +15,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from .contact_laws import Limit, Role
+
 Array = npt.NDArray[np.float64]
 
 
-def slip_factor(forces: Array, limit: Any = None, friction: Any = None) -> float:
+def slip_factor(forces: Array, limit: Any = None, friction: Any = None, each: bool = False) -> float:
     """Factor on a sticking motion at which the first pair slips; inf when no amplitude makes it slip.
 
     Parameters
@@ -29,7 +31,11 @@ def slip_factor(forces: Array, limit: Any = None, friction: Any = None) -> float
         Friction limit of sliders with one component [N].
     friction : float or (n_pairs,)
         Coefficient of friction of pairs with three components.
+    each : bool
+        Each of two tangents is limited by itself, rather than both in a circle.
     """
+    if each and forces.shape[1] == 3:
+        return min(slip_factor(forces[:, [0, row]], friction=friction) for row in (1, 2))
     mean = forces.mean(axis=0)
     swing = forces - mean
     if forces.shape[1] == 1:
@@ -63,13 +69,14 @@ def slip_threshold(amplitude: float, forces: Mapping[str, Array], attributes: Ma
     forces : {name of the contact: (n_samples, components, n_pairs)}
     attributes : of the analysis' group in the results, with the parameters of the contacts
     """
-    case = json.loads(attributes["case"])
+    case, laws = json.loads(attributes["case"]), json.loads(attributes.get("laws", "{}"))
     factors = []
     for name, values in forces.items():
-        limit, friction = (case.get(f"contact.{name}.{key}") for key in ("friction_limit", "friction_coefficient"))
-        given = limit if values.shape[1] == 1 else friction
-        if given is None or case.get(f"contact.{name}.law") not in ("jenkins", "coulomb_3d"):
+        law = laws.get(name, {"roles": {}})
+        role = Role.FRICTION_LIMIT if law.get("normal") is None else Role.FRICTION_COEFFICIENT
+        given = case.get(f"contact.{name}.{law['roles'].get(role.value)}")
+        if given is None or law["limit"] == Limit.NONE.value:
             return float("nan")
-        values = values.astype(float)
-        factors.append(slip_factor(values, limit=np.asarray(given), friction=np.asarray(given)))
+        values, bound = values.astype(float), np.asarray(given)
+        factors.append(slip_factor(values, limit=bound, friction=bound, each=law["limit"] == Limit.EACH.value))
     return amplitude * min(factors, default=np.nan)

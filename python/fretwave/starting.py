@@ -8,6 +8,7 @@ from typing import Any
 from petsc4py import PETSc
 
 from . import _core
+from .contact_laws import Role
 from .continuation import Continuation, StepControl
 from .problems import ForcedResponse, HarmonicProblem, NonlinearMode
 
@@ -52,7 +53,7 @@ def starts(
         Newton found a mode, but far from the linear one: only the mode that grows out of the linear one is looked for.
         Without a reason in the end there is none at smaller amplitudes either (a stop without gap has no linear limit).
     """
-    gaps = any("gap" in contact.parameters for contact in problem.model.contacts)
+    gaps = any(contact.info.named(Role.GAP) in contact.parameters for contact in problem.model.contacts)
     if isinstance(problem, ForcedResponse):
         yield from _raised(problem, y0, reasons)
         yield from _closed(problem, _core.ForcedStart(problem.core, y0, True), reasons) if gaps else ()

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from .contact_laws import Role
+
 Array = npt.NDArray[np.float64]
 
 #: Contact stiffness over the structure's from which one sample's change of state changes all forces.
@@ -30,20 +32,28 @@ def suspects(contacts: Sequence[Any], stiffness: float) -> str:
 
 
 def _extremes(contact: Any, stiffness: float) -> Iterator[str]:
-    given = {name: np.atleast_1d(np.asarray(value, dtype=float)) for name, value in contact.parameters.items()}
-    limit = given.get("friction_coefficient", given.get("friction_limit"))
+    given = {role: np.atleast_1d(np.asarray(value, dtype=float)) for role, value in _values(contact)}
+    limit = given.get(Role.FRICTION_COEFFICIENT, given.get(Role.FRICTION_LIMIT))
     if limit is not None and not np.any(limit):
         yield "has no friction: nothing holds the structure along it"
-    if "normal_stiffness" in given:
-        yield from _loads(given.get("normal_load", np.zeros(1)), given.get("gap", np.zeros(1)))
-    for name in ("normal_stiffness", "tangential_stiffness"):
-        if name in given:
-            yield from _stiffness(name, given[name], stiffness)
+    if Role.LOAD in given:
+        yield from _loads(str(contact.info.named(Role.LOAD)), given[Role.LOAD], given.get(Role.GAP, np.zeros(1)))
+    for role in (Role.NORMAL_STIFFNESS, Role.TANGENTIAL_STIFFNESS):
+        if role in given:
+            yield from _stiffness(str(contact.info.named(role)), given[role], stiffness)
 
 
-def _loads(load: Array, gap: Array) -> Iterator[str]:
+def _values(contact: Any) -> Iterator[tuple[Role, Any]]:
+    """Of the parameters with a role, those that have a value."""
+    for parameter in contact.info.parameters:
+        value = contact.value(parameter.role)
+        if parameter.role != Role.NONE and value is not None:
+            yield parameter.role, value
+
+
+def _loads(name: str, load: Array, gap: Array) -> Iterator[str]:
     if not np.any(load) and np.all(gap >= 0):
-        yield "has no normal_load of its own: only an outer load presses its pairs, and none sticks without"
+        yield f"has no {name} of its own: only an outer load presses its pairs, and none sticks without"
     elif np.ptp(load) > UNBALANCED * np.max(load):
         yield (
             f"has normal loads from {np.min(load):.3g} to {np.max(load):.3g} N: given pair by pair they are taken as"

@@ -137,7 +137,9 @@ def _pair_fields(
     fixed = {name: grid.field(name) for name in ("contact", "pair", "sector")}
     moving = {name: grid.field(name, 0, steps) for name in ("normal_force", "tangential_force", "gap")}
     over_period = {"dissipated_work": grid.field("dissipated_work", 0, period)}
-    framed = all(contact.frames is not None for contact in contacts) and all(history.is_3d for history in first)
+    framed = all(contact.frames is not None for contact in contacts) and all(
+        history.normal is not None for history in first
+    )
     normal = grid.field("normal", 3) if framed else None
     if all(history.status is not None for history in first):
         moving["status"] = grid.field("status", 0, steps, "i1")
@@ -149,7 +151,7 @@ def _pair_fields(
             fixed[name](0, part, values)
         fixed["sector"](0, part, np.full(n, float(sector)))
         if normal is not None:
-            normal(0, part, np.asarray(contacts[number].frames)[:, 0] @ turn.T)
+            normal(0, part, np.asarray(contacts[number].frames)[:, first[0].normal] @ turn.T)
         for point, history in enumerate(histories):
             for name, field in moving.items():
                 for step, values in enumerate(getattr(history, name)[samples]):

@@ -15,7 +15,6 @@ from .analyses.context import belongs
 from .casefile import Case
 from .contact_history import ContactHistory
 from .errors import InputError
-from .run import acting_parameters
 from .sectors import nodal_diameter
 from .source import display, nearest
 
@@ -192,7 +191,7 @@ def read_choice(file: Any, folder: Path, case: Case, options: ViewOptions) -> Ch
         rest=group["rest_displacement"][()] if "rest_displacement" in group else np.zeros(len(group["dof"])),
         samples=samples,
         phases=2 * np.pi * samples / count,
-        contacts={} if without else _contacts(group, case, name, rows),
+        contacts={} if without else _contacts(group, case, rows),
         without=without,
         highest_component_hz=json.loads(group.attrs.get("reduction", "{}")).get("highest_component_hz", 0.0),
         diameters=_diameters(group, case, name, rows),
@@ -263,28 +262,13 @@ def _not_kept(what: str, where: str, measured: str, kept: IntArray, amplitude: A
     return InputError(what, where, measured, expected, f"--point {near}")
 
 
-def _contacts(group: Any, case: Case, name: str, rows: Sequence[int]) -> dict[str, list[ContactHistory]]:
+def _contacts(group: Any, case: Case, rows: Sequence[int]) -> dict[str, list[ContactHistory]]:
     """Histories of all contacts at some points."""
     reported = group["reported"][()].tolist()
-    preload = case.preload_of(case.analyses[name])
     found = {}
     for contact in case.contacts:
         place = f"contact_{contact.name}"
         if place in group:
-            values = acting_parameters(contact, preload)
-            found[contact.name] = [
-                ContactHistory(
-                    contact.law,
-                    _worn(values, group, contact.name, row),
-                    *(group[place][key][reported.index(row)] for key in "uvf"),
-                )
-                for row in rows
-            ]
+            kept = [{key: data[reported.index(row)] for key, data in group[place].items()} for row in rows]
+            found[contact.name] = [ContactHistory.of(motion, contact.info.normal) for motion in kept]
     return found
-
-
-def _worn(values: dict[str, Any], group: Any, contact: str, row: int) -> dict[str, Any]:
-    """Parameters of a law at a point: worn depth is gap."""
-    if f"depth_{contact}" not in group:
-        return values
-    return {**values, "gap": values.get("gap", 0.0) + group[f"depth_{contact}"][row]}

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from petsc4py import PETSc
 
 from . import _core
+from .contact_laws import Role, law_like
 from .continuation import Continuation, StepControl
 from .errors import InputError
 from .problems import HarmonicProblem
@@ -18,8 +19,6 @@ from .steppers import StageFailed
 
 Array = npt.NDArray[np.float64]
 
-#: The law's normal stiffness makes worn depth a loss of normal load.
-STIFFNESS = "normal_stiffness"
 #: Changes of log amplitude from which a solution on another sheet is looked for, and points to reach it by.
 DETOURS, DETOUR_POINTS = (1e-3, -1e-3, 1e-2, -1e-2, 3e-2, -3e-2), 40
 #: The corrector's tolerance over that of the branch: depths add up its errors.
@@ -73,9 +72,10 @@ class WornMode:
         self.areas = np.concatenate([np.asarray(areas[names[k]], dtype=float) for k in self.contacts])
         sizes = [len(areas[names[k]]) for k in self.contacts]
         self.slices = [slice(end - size, end) for size, end in zip(sizes, np.cumsum(sizes))]
+        # makes worn depth a loss of normal load
         self.stiffness = np.concatenate(
             [
-                np.broadcast_to(np.asarray(self.model.contacts[k].parameters[STIFFNESS], dtype=float), (size,))
+                np.broadcast_to(np.asarray(self.model.contacts[k].value(Role.NORMAL_STIFFNESS), float), (size,))
                 for k, size in zip(self.contacts, sizes)
             ]
         )
@@ -90,8 +90,8 @@ class WornMode:
         if name not in names:
             raise InputError("there is no such contact", None, name, ", ".join(names), "name one of these")
         contact = self.model.contacts[names.index(name)]
-        if STIFFNESS not in contact.parameters:
-            where, fix = f"contact '{name}'", 'use law = "coulomb_3d"'
+        if not contact.info.wears:
+            where, fix = f"contact '{name}'", f'use law = "{law_like(lambda law: law.wears)}"'
             raise InputError("a contact cannot wear", where, contact.law, "a law with a normal direction", fix)
 
     def _set_last(self, v: PETSc.Vec, value: float) -> None:

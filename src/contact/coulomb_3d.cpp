@@ -190,8 +190,12 @@ void Coulomb3d<Coupled>::diagnose(Motion const& motion, double const* f, Diagnos
         path += moved[c] * moved[c];
         size = Coupled ? std::hypot(size, now[k]) : std::max(size, std::abs(now[k]));
       }
-      const bool open = now[i] <= 0, slips = !open && size >= limit * (1 - 1e-12);
+      const bool open = now[i] <= 0, slips = !open && at_limit(size, limit);
       out.status[size_t(t) * n + i] = open ? Status::open : slips ? Status::slip : Status::stick;
+      if (!out.gap.empty()) {  // N = N0 + kn (u_n - gap), solved for the missing approach
+        const double missing = p_.gap[i] - u[i] - p_.normal_load[i] / p_.normal_stiffness[i];
+        out.gap[size_t(t) * n + i] = open ? std::max(missing, 0.0) : 0.0;
+      }
       // trapezoidal in N, so that a sample that opens takes nothing away at once; a slider in shakedown
       // touches its limit and moves by the rounding of u, which is no slip
       const double size_u = std::hypot(u[n + i], u[2 * n + i]) + limit / kt;
@@ -225,28 +229,43 @@ namespace {
 
 template <bool Coupled>
 Entry entry(std::string name, std::string doc) {
-  return {
-      .name = std::move(name),
-      .doc = std::move(doc),
-      .components = 3,
-      .parameters = {{.name = "normal_stiffness", .unit = "N/m", .doc = "kn", .lower = 0, .strict = true},
-                     {.name = "tangential_stiffness", .unit = "N/m", .doc = "kt", .lower = 0, .strict = true},
-                     {.name = "friction_coefficient", .unit = "-", .doc = "mu", .lower = 0},
-                     {.name = "normal_load",
-                      .unit = "N",
-                      .doc = "N0, contact force at zero relative displacement and gap",
-                      .lower = 0,
-                      .standard = 0.0},
-                     {.name = "gap",
-                      .unit = "m",
-                      .doc = "initial gap; negative is an interference",
-                      .lower = -std::numeric_limits<double>::max(),
-                      .standard = 0.0}},
-      .make = [](Parameters const& p) {
-        return std::make_unique<Coulomb3d<Coupled>>(
-            Coulomb3dParameters{p.at("normal_stiffness"), p.at("tangential_stiffness"),
-                                p.at("friction_coefficient"), p.at("normal_load"), p.at("gap")});
-      }};
+  return {.name = std::move(name),
+          .doc = std::move(doc),
+          .components = 3,
+          .parameters = {{.name = "normal_stiffness",
+                          .unit = "N/m",
+                          .doc = "kn",
+                          .role = Role::normal_stiffness,
+                          .lower = 0,
+                          .strict = true},
+                         {.name = "tangential_stiffness",
+                          .unit = "N/m",
+                          .doc = "kt",
+                          .role = Role::tangential_stiffness,
+                          .lower = 0,
+                          .strict = true},
+                         {.name = "friction_coefficient",
+                          .unit = "-",
+                          .doc = "mu",
+                          .role = Role::friction_coefficient,
+                          .lower = 0},
+                         {.name = "normal_load",
+                          .unit = "N",
+                          .doc = "N0, contact force at zero relative displacement and gap",
+                          .role = Role::load,
+                          .lower = 0,
+                          .standard = 0.0},
+                         {.name = "gap",
+                          .unit = "m",
+                          .doc = "initial gap; negative is an interference",
+                          .role = Role::gap,
+                          .lower = -std::numeric_limits<double>::max(),
+                          .standard = 0.0}},
+          .make = [](Parameters const& p) {
+            return std::make_unique<Coulomb3d<Coupled>>(
+                Coulomb3dParameters{p.at("normal_stiffness"), p.at("tangential_stiffness"),
+                                    p.at("friction_coefficient"), p.at("normal_load"), p.at("gap")});
+          }};
 }
 
 }  // namespace

@@ -23,6 +23,8 @@ class Coulomb3d : public Law {
   bool uses_velocity() const override { return false; }
   bool hereditary() const override { return true; }
   bool wears() const override { return true; }
+  int normal() const override { return 0; }
+  Limit limit() const override { return Coupled ? Limit::circle : Limit::each; }
   double stuck_stiffness(int component, int pair) const override;
   void force(Motion const&, double* f, Record&) const override;
   void product(Motion const&, Record const&, double const* du, double const* dv, double* df) const override;

@@ -108,7 +108,7 @@ void Jenkins::diagnose(Motion const& motion, double const* f, Diagnosis& out) co
     const int before = t ? t - 1 : motion.samples - 1;
     for (int i = 0; i < n; ++i) {
       const size_t now = size_t(t) * n + i, then = size_t(before) * n + i;
-      const bool slips = std::abs(f[now]) >= limit_[i] * (1 - 1e-12);
+      const bool slips = at_limit(std::abs(f[now]), limit_[i]);
       out.status[now] = slips ? Status::slip : Status::stick;
       if (!slips) continue;
       // the slider w = u - f/k moves under the force of the slip's end
@@ -130,9 +130,14 @@ Entry jenkins_entry() {
           .parameters = {{.name = "tangential_stiffness",
                           .unit = "N/m",
                           .doc = "kt of the elastic part",
+                          .role = Role::tangential_stiffness,
                           .lower = 0,
                           .strict = true},
-                         {.name = "friction_limit", .unit = "N", .doc = "sliding force mu N", .lower = 0}},
+                         {.name = "friction_limit",
+                          .unit = "N",
+                          .doc = "sliding force mu N",
+                          .role = Role::friction_limit,
+                          .lower = 0}},
           .make = [](Parameters const& p) {
             return std::make_unique<Jenkins>(p.at("tangential_stiffness"), p.at("friction_limit"));
           }};

@@ -12,6 +12,7 @@ class Jenkins : public Law {
   int pairs() const override { return int(stiffness_.size()); }
   bool uses_velocity() const override { return false; }
   bool hereditary() const override { return true; }
+  Limit limit() const override { return Limit::each; }
   bool odd() const override;
   double stuck_stiffness(int, int pair) const override { return stiffness_[pair]; }
   void force(Motion const&, double* f, Record&) const override;

@@ -41,6 +41,14 @@ std::uint64_t number_of(std::vector<double> const& states, int first) {
   return sum;
 }
 
+Diagnosis states(Law const& law, Motion const& motion, double const* f) {
+  const size_t n = motion.pairs, all = n * motion.samples;
+  Diagnosis out{std::vector<Status>(all), std::vector<double>(n), std::vector<double>(n)};
+  out.gap.assign(all, std::numeric_limits<double>::quiet_NaN());
+  law.diagnose(motion, f, out);
+  return out;
+}
+
 void add_work(Motion const& motion, double const* f, std::vector<double>& work) {
   if (!motion.v) return;
   for (int row = 0; row < motion.samples * motion.components; ++row)

@@ -38,13 +38,25 @@ struct Record {
 
 enum class Status : std::uint8_t { stick, slip, open };
 
-/// What is read from a converged period; sums over the samples of the motion, per pair.
+/// What the tangential force stays within: nothing sharp, a circle over all tangents, or each its own
+/// interval.
+enum class Limit : std::uint8_t { none, circle, each };
+
+/// A tangential force this near to its limit has reached it. The only tolerance on it, of all laws.
+constexpr double limit_tolerance = 1e-12;
+inline bool at_limit(double force, double limit) { return force >= limit * (1 - limit_tolerance); }
+
+/// What is read from a converged period; sums over the samples of the motion, per pair. The only place where
+/// a law says whether a pair sticks, slips or is open.
 struct Diagnosis {
   std::vector<Status> status;     ///< samples x pairs
   std::vector<double> work;       ///< dissipated energy [J], pairs
   std::vector<double> slip_path;  ///< length of the slider's path [m], pairs
   /// Archard's integral of N |d slider| [N m], pairs (Laxalde et al. 2008, eq. 13); empty: not asked for.
   std::vector<double> archard = {};
+  /// Distance to contact where open, 0 where closed [m], nan without a normal direction; samples x pairs;
+  /// empty: not asked for.
+  std::vector<double> gap = {};
 };
 
 /// A contact law with its parameters for the pairs of this rank.
@@ -62,6 +74,9 @@ class Law {
   /// The static state the dynamics start from: relative displacement components x pairs, reached from zero in
   /// one step.
   void rest(double const* u) { set_rest(u), ++version_; }
+  /// Component along the normal, > 0 closing; -1: the law has no normal direction.
+  virtual int normal() const { return -1; }
+  virtual Limit limit() const { return Limit::none; }
   /// Has a normal direction, along which worn depths count as additional gap.
   virtual bool wears() const { return false; }
   /// Worn depth of each pair [m], in place of what was set before; the rest state stays as it is. Null: as
@@ -114,6 +129,9 @@ class Law {
 
 /// Number of a pattern of states, given as record entries (any values that differ from state to state).
 std::uint64_t number_of(std::vector<double> const& states, int first);
+
+/// Status and gap of all pairs for any motion and its forces.
+Diagnosis states(Law const&, Motion const&, double const* f);
 
 /// Work done against the force over the motion, per pair: sum of f . v dt (for laws that see the velocity).
 void add_work(Motion const&, double const* f, std::vector<double>& work);

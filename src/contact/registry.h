@@ -11,9 +11,23 @@
 
 namespace fretwave::contact {
 
+/// What a parameter is to the mechanics, whatever its name: by it other parts of the program find a
+/// stiffness, a limit, a load or a gap. A law has at most one of a role (but `none`).
+enum class Role {
+  none,
+  normal_stiffness,
+  tangential_stiffness,
+  friction_coefficient,
+  friction_limit,
+  load,
+  gap,
+  regularisation
+};
+
 /// One parameter of a law: the only place of its unit, bound and meaning.
 struct Parameter {
   std::string name, unit, doc;
+  Role role = Role::none;
   double lower = 0;
   bool strict = false;  ///< value must be above, not at, the bound
   std::optional<double> standard = {};

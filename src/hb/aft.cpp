@@ -216,6 +216,14 @@ ContactPeriod Aft::period(double const* U, Exponents const& e) const {
   return out;
 }
 
+ContactPeriod Aft::told_period(double const* U, Exponents const& e) const {
+  ContactPeriod out = period(U, e);
+  if (columns_ == 0) return out;
+  contact::Diagnosis found = contact::states(*law_, whole(out, e), out.f.data());
+  out.status = std::move(found.status), out.gap = std::move(found.gap);
+  return out;
+}
+
 namespace {
 
 void count(contact::Diagnosis const& diagnosis, ContactSummary& summary) {

@@ -18,6 +18,8 @@ struct ContactSummary {
 /// Time samples of a period: samples x components x pairs.
 struct ContactPeriod {
   std::vector<double> u, v, f;
+  std::vector<contact::Status> status;  ///< samples x pairs, as is the gap [m]; empty: not asked for
+  std::vector<double> gap;
   double unclosed = 0;  ///< as in ContactSummary
 };
 
@@ -50,6 +52,8 @@ class Aft {
 
   ContactSummary summarise(double const* U, Exponents const&);
   ContactPeriod period(double const* U, Exponents const&) const;
+  /// The period with the law's word on each pair and sample.
+  ContactPeriod told_period(double const* U, Exponents const&) const;
   Wearing wearing(double const* U, Exponents const&) const;
 
  private:

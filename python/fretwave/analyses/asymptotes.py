@@ -43,11 +43,11 @@ def closed_stiffness(context: AnalysisContext, tangential: bool = False) -> Any:
     """Stiffness of all pairs closed, on the dofs: sum kn b_n b_n^T, and kt b_t b_t^T when they do not slide."""
     total = sp.csr_matrix(context.case.K.shape)
     for contact in context.case.contacts:
-        names = {1: ("tangential_stiffness",), 3: ("normal_stiffness",) + 2 * ("tangential_stiffness",)}
-        for row, name in enumerate(names[contact.components]):
-            if name in contact.parameters and (tangential or name == "normal_stiffness"):
+        for row in range(contact.components):
+            value = contact.value(contact.info.stiffness_along(row))
+            if value is not None and (tangential or row == contact.info.normal):
                 rows = contact.rows[row :: contact.components]
-                stiffness = np.broadcast_to(contact.parameters[name], (contact.n_pairs,))
+                stiffness = np.broadcast_to(value, (contact.n_pairs,))
                 total = total + rows.T @ sp.diags(stiffness) @ rows
     return total
 

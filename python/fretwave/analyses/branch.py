@@ -78,7 +78,7 @@ def record(
     }
     motions = None
     if point.event not in PLAIN_EVENTS:
-        periods = problem.contact_period(point.y)
+        periods = problem.contact_history(point.y)
         names = [contact.name for contact in problem.model.contacts]
         motions = dict(zip(names, periods)) if writer.active else None
     kept = None if snapshot is None else {**snapshot, **{f"own_{key}": value for key, value in extra.items()}}

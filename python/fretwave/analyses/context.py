@@ -250,7 +250,8 @@ def describe_analysis(analysis: AnalysisSection, case: Case, run_id: str) -> dic
     plain = {key: value for key, value in keys.items() if value is not None and not isinstance(value, dict)}
     shown = {key: json.dumps(value) if isinstance(value, list) else value for key, value in plain.items()}
     reduction = {"reduction": json.dumps(case.reduced.plain())} if case.reduced else {}
-    return {**shown, **reduction, "run_id": run_id, "case": json.dumps(_deciding(case, analysis.name))}
+    laws = json.dumps({contact.name: contact.info.plain() for contact in case.contacts})
+    return {**shown, **reduction, "laws": laws, "run_id": run_id, "case": json.dumps(_deciding(case, analysis.name))}
 
 
 def _deciding(case: Case, name: str) -> dict[str, Any]:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse.linalg
 
+from ..contact_laws import Role, own_load
 from ..contacts import ContactSpec, closed_contacts
 from ..errors import InputError
 from ..schema import PreloadSection
@@ -55,11 +56,14 @@ def rest_state(context: AnalysisContext, factor: float = 1.0) -> Any:
 
 
 def just_touching(contacts: Sequence[ContactSpec], section: PreloadSection) -> bool:
-    """Pairs in three dimensions without a gap and without a load of their own."""
-    return any(contact.components == 3 for contact in contacts) and all(
-        (not section.pair_loads or not np.any(contact.parameters.get("normal_load", 0.0)))
-        and not np.any(contact.parameters.get("gap", 0.0))
-        for contact in contacts
+    """Pairs with a normal direction, none with a gap or with a load of its own."""
+
+    def has(contact: ContactSpec, role: Role) -> bool:
+        value = contact.value(role)
+        return value is not None and bool(np.any(value))
+
+    return any(contact.info.normal is not None for contact in contacts) and all(
+        (not section.pair_loads or not has(contact, Role.LOAD)) and not has(contact, Role.GAP) for contact in contacts
     )
 
 
@@ -98,12 +102,14 @@ def start_mode(context: AnalysisContext, linear_mode: int, or_free: bool = False
     start = modes[linear_mode - 1]
     if start.omega <= RIGID * closed_mode(context).omega:
         is_open = 1.0 if rest is None else rest.open
+        load_name = own_load(context.case.contacts)
+        by = f"{load_name}, or " if load_name else ""
         raise InputError(
             f"linear mode {linear_mode} is a rigid motion: nothing holds the structure at rest",
             where=f"analysis '{context.name}'",
             measured=f"{start.frequency_hz:.3g} Hz, {100 * is_open:.3g} % of the pairs open at rest",
             expected="an elastic mode",
-            fix="load the contact (normal_load, or [preload] loads), hold the structure, or take a higher linear_mode",
+            fix=f"load the contact ({by}[preload] loads), hold the structure, or take a higher linear_mode",
         )
     return start, rest
 
@@ -132,8 +138,9 @@ def keep_pairs(context: AnalysisContext, writer: Any) -> None:
         if given is None or given.positions is None:
             continue
         faces = list(given.faces) if given.faces is not None else [contact.name] * given.n_pairs
-        friction = np.broadcast_to(contact.parameters.get("friction_coefficient", np.nan), (given.n_pairs,))
+        friction = contact.value(Role.FRICTION_COEFFICIENT)
+        friction = np.broadcast_to(np.nan if friction is None else friction, (given.n_pairs,))
         place = f"pairs_{contact.name}"
         writer.dataset(f"{place}/position", given.positions, units="m", long_name="place on the face")
         writer.dataset(f"{place}/face", np.array([str(face).encode() for face in faces]))
-        writer.dataset(f"{place}/friction_coefficient", friction, units="1")
+        writer.dataset(f"{place}/{Role.FRICTION_COEFFICIENT.value}", friction, units="1")

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
 
 from ..columns import Column
+from ..contact_history import OPEN, SLIP, STICK, normal_force, tangential_force
 from ..contacts import ContactSpec
 from ..errors import NotConverged
 from ..schema import StaticAnalysis
@@ -27,8 +28,8 @@ COLUMNS = (
     Column("status", "", "stick, slip or open", "s"),
     Column("gap", "m", "distance to contact of an open pair"),
 )
-#: A pair slips when its tangential force is this near to its limit.
-AT_LIMIT = 1e-9
+#: Names of the states as the laws number them.
+WORDS = {STICK: "stick", SLIP: "slip", OPEN: "open"}
 
 
 def run_static(context: AnalysisContext) -> Outcome:
@@ -74,37 +75,24 @@ def _rows(context: AnalysisContext, rest: Any, factor: float) -> Iterator[dict[s
                 "contact": spec.name,
                 "pair": pair,
                 **dict(zip("xyz", place)),
-                **pair_state(spec, state["u"][:, pair], state["f"][:, pair], pair),
+                **pair_state(spec, state, pair),
             }
 
 
-def pair_state(spec: ContactSpec, u: Any, f: Any, pair: int) -> dict[str, Any]:
-    """Forces, status and gap of one pair.
+def pair_state(spec: ContactSpec, state: Mapping[str, Any], pair: int) -> dict[str, Any]:
+    """Forces, status and gap of one pair, the last two as its law tells them.
 
     Parameters
     ----------
-    u, f : (components,) relative displacement and force; with three components the first is normal, > 0 closing
+    state : force f (components, n_pairs), status and gap (n_pairs,)
     """
-
-    def value(name: str) -> float:
-        return float(np.broadcast_to(spec.parameters.get(name, np.nan), (spec.n_pairs,))[pair])
-
-    if spec.components == 1:
-        normal, tangential, limit, gap = np.nan, abs(float(f[0])), value("friction_limit"), np.nan
-        is_open = False
-    else:
-        normal, tangential = float(f[0]), float(np.hypot(f[1], f[2]))
-        limit, is_open = value("friction_coefficient") * normal, normal <= 0
-        # The law's N = N0 + kn (u_n - gap) is negative by kn times the distance (src/contact/coulomb_3d.h).
-        gap = max(0.0, value("gap") - u[0] - spec_load(spec, pair) / value("normal_stiffness")) if is_open else 0.0
-    slips = bool(tangential >= (1 - AT_LIMIT) * limit)
-    status = "open" if is_open else "slip" if slips else "stick"
-    return {"normal_force": normal, "tangential_force": tangential, "status": status, "gap": gap}
-
-
-def spec_load(spec: ContactSpec, pair: int) -> float:
-    """Normal load of a pair as its law has it [N]."""
-    return float(np.broadcast_to(spec.parameters.get("normal_load", 0.0), (spec.n_pairs,))[pair])
+    f, normal = state["f"][:, pair : pair + 1], spec.info.normal
+    return {
+        "normal_force": float(normal_force(f, normal)[0]),
+        "tangential_force": float(tangential_force(f, normal)[0]),
+        "status": WORDS[int(state["status"][pair])],
+        "gap": float(state["gap"][pair]),
+    }
 
 
 def _summary(context: AnalysisContext, rest: Any, factor: float) -> list[str]:
@@ -112,13 +100,13 @@ def _summary(context: AnalysisContext, rest: Any, factor: float) -> list[str]:
     lines = []
     contacts = context.comm.bcast(rest.contacts)
     for spec, state in zip(context.case.contacts, contacts):
-        rows = [pair_state(spec, state["u"][:, k], state["f"][:, k], k) for k in range(spec.n_pairs)]
-        count = {word: sum(row["status"] == word for row in rows) for word in ("stick", "slip", "open")}
+        rows = [pair_state(spec, state, pair) for pair in range(spec.n_pairs)]
+        count = {word: sum(row["status"] == word for row in rows) for word in WORDS.values()}
         forces = np.array([row["normal_force"] for row in rows])
         text = f"{context.name}: factor {factor:g}, contact '{spec.name}': " + ", ".join(
             f"{number} {word}" for word, number in count.items()
         )
-        if spec.components == 3:
+        if spec.info.normal is not None:
             text += f"; normal forces {forces.min():.4g} to {forces.max():.4g} N, sum {forces.sum():.6g} N"
         lines += [text, *_resultant(context, spec, state["f"])]
     if section_loads(context):

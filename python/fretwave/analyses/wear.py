@@ -15,6 +15,7 @@ from typing import Any, cast
 import numpy as np
 
 from .. import groups
+from ..contact_laws import Role
 from ..errors import FretwaveError, NotConverged
 from ..parallel import on_first_rank
 from ..results import AnalysisWriter, has_results, open_results
@@ -116,16 +117,17 @@ def normal_cycle(mode: Any, load: Any) -> float:
     contacts = [mode.model.contacts[k] for k in mode.contacts]
     loaded = load > 0
 
-    def values(name: str) -> Any:
+    def values(role: Role) -> Any:
         parts = [
-            np.broadcast_to(np.asarray(contact.parameters[name], dtype=float), (part.stop - part.start,))
+            np.broadcast_to(np.asarray(contact.value(role), dtype=float), (part.stop - part.start,))
             for contact, part in zip(contacts, mode.slices)
         ]
         return np.concatenate(parts)[loaded]
 
     if not loaded.any():
         return 1.0
-    slip = 4 * np.mean(values("friction_coefficient") * load[loaded] / values("tangential_stiffness"))
+    friction, stiffness = values(Role.FRICTION_COEFFICIENT), values(Role.TANGENTIAL_STIFFNESS)
+    slip = 4 * np.mean(friction * load[loaded] / stiffness)
     rate = mode.coefficient * np.mean(mode.stiffness[loaded] / mode.areas[loaded]) * slip
     return float(1 / rate) if rate > 0 else 1.0
 
@@ -212,6 +214,6 @@ def _row(writer: AnalysisWriter, group: Any, row: int) -> tuple[Any, ...]:
     motions = None
     if len(reported):
         names = [name for name in group if name.startswith("contact_")]
-        motions = {name[len("contact_") :]: {k: group[name][k][reported[0]] for k in "uvf"} for name in names}
+        motions = {name[len("contact_") :]: {k: group[name][k][reported[0]] for k in group[name]} for name in names}
     kept = {name: group[name][row] for name in writer.fields}
     return values, group["coefficients"][row], motions, None, kept

@@ -176,7 +176,7 @@ class _Marcher:
         motions = None
         if point.event:
             names = [contact.name for contact in self.problem.model.contacts]
-            motions = dict(zip(names, self.problem.contact_period(y)))
+            motions = dict(zip(names, self.problem.contact_history(y)))
         parts = self.comm.gather(y.getArray(readonly=True).copy())
         kept = None
         if parts is not None:

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..analyses.mode_curve import ModeCurve
+from ..contact_laws import UNKNOWN, Role
 from ..harmonic_motion import motion
 from ..results_file import has_results, open_results
 
@@ -55,11 +56,26 @@ class Analysis:
             return np.stack([file[self.name]["coefficients"][p] for p in points])
 
     def loop(self, contact: str, point: int) -> Table:
-        """Motion of a contact over one period: u, v, f (n_samples, components, n_pairs)."""
+        """Motion of a contact over one period: u, v, f (n_samples, components, n_pairs).
+
+        With them what is kept of its law's word on each pair and sample, status and gap (n_samples, n_pairs).
+        """
         row = self.reported.index(point)
         with open_results(self.path) as file:
             group = file[self.name]["contact_" + contact]
-            return {key: np.asarray(group[key][row], dtype=float) for key in ("u", "v", "f")}
+            return {key: np.asarray(group[key][row], dtype=float) for key in group}
+
+    def tells_status(self, contact: str) -> bool:
+        """Whether the status of a contact's pairs is kept at all reported points."""
+        with open_results(self.path) as file:
+            kept = file[self.name]["contact_" + contact].get("status")
+            return kept is not None and bool(np.all(kept[()] != UNKNOWN))
+
+    def parameter(self, contact: str, role: Role) -> Array | None:
+        """Value in the case of the parameter of a contact's law with a role; None where the results tell none."""
+        law, case = self.attributes.get("laws", {}).get(contact, {}), self.attributes.get("case", {})
+        value = case.get(f"contact.{contact}.{law.get('roles', {}).get(role.value)}")
+        return None if value is None else np.asarray(value, dtype=float)
 
     def components(self, contact: str) -> int:
         """Relative displacements of a pair: 1, or 3 with the normal one first."""
@@ -72,7 +88,7 @@ class Analysis:
             return [key[len("pairs_") :] for key in file[self.name] if key.startswith("pairs_")]
 
     def pairs(self, contact: str) -> Table:
-        """Of each pair of a contact: position (n_pairs, 2) on its face [m], face, friction_coefficient."""
+        """Of each pair of a contact: position (n_pairs, 2) on its face [m], face, friction coefficient."""
         with open_results(self.path) as file:
             group = file[self.name]["pairs_" + contact]
             table = {key: group[key][()] for key in group}

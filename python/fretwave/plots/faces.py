@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from ..contact_laws import OPEN, SLIP, STICK
 from . import style
 from .data import Analysis, Array, Run
 
@@ -19,8 +20,6 @@ DISC = 13.0
 MARGIN = 0.22
 #: smaller shares than this are too thin to draw
 SEEN = 0.005
-#: a sample slips when its tangential force is this near to the limit
-AT_LIMIT = 1e-6
 STATUS = {"stick": style.BLUE, "slip": style.ORANGE, "open": "#dddddd"}
 MM = 1e3
 
@@ -33,7 +32,7 @@ def figures(run: Run) -> Iterator[tuple[str, Figure]]:
             yield f"{static.name}_load_{contact}", draw_load(static, contact, table or {})
     for mode in run.of_kind("mode"):
         for contact in mode.placed():
-            if contact in mode.contacts and mode.reported:
+            if contact in mode.contacts and mode.reported and mode.tells_status(contact):
                 yield f"{mode.name}_map_{contact}", draw_map(mode, contact)
 
 
@@ -75,7 +74,7 @@ def draw_map(mode: Analysis, contact: str) -> Figure:
     grid = figure.add_gridspec(1 + len(points), len(names), height_ratios=[1.9, *(1.0 for _ in points)])
     _shares(figure.add_subplot(grid[0, :]), mode, points)
     for row, point in enumerate(points):
-        shares = status_shares(mode.loop(contact, point)["f"], pairs["friction_coefficient"])
+        shares = status_shares(mode.loop(contact, point)["status"])
         for column, name in enumerate(names):
             axes = figure.add_subplot(grid[1 + row, column])
             mine = pairs["face"] == name
@@ -94,19 +93,9 @@ def chosen_points(mode: Analysis) -> list[int]:
     return [moving[i] for i in np.unique(np.linspace(0, len(moving) - 1, MAPS).round().astype(int))]
 
 
-def status_shares(f: Array, friction: Array) -> Array:
-    """Shares (3, n_pairs) of the samples that stick, slip and are open.
-
-    Parameters
-    ----------
-    f : (n_samples, 3, n_pairs)
-        Normal force and both tangential ones.
-    friction : (n_pairs,)
-    """
-    is_open = f[:, 0] <= 0
-    slips = ~is_open & (np.hypot(f[:, 1], f[:, 2]) >= (1 - AT_LIMIT) * friction * f[:, 0])
-    shares = [~is_open & ~slips, slips, is_open]
-    return np.array([share.mean(axis=0) for share in shares])
+def status_shares(status: Array) -> Array:
+    """Shares (3, n_pairs) of the samples (n_samples, n_pairs) that stick, slip and are open."""
+    return np.array([np.mean(status == state, axis=0) for state in (STICK, SLIP, OPEN)])
 
 
 def _shares(axes: Axes, mode: Analysis, points: Sequence[int]) -> None:

@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ..contact_laws import Role
 from . import style
 from .data import Analysis, Run
 from .phase_planes import amplitude_name, kept_points
@@ -50,7 +51,7 @@ def _limits(axes: Axes, mode: Analysis, contact: str, pair: int) -> None:
     """Coulomb's limits, where the friction coefficient is known."""
     if contact in mode.placed():
         normal = np.array([0.0, axes.get_xlim()[1]])
-        limit = mode.pairs(contact)["friction_coefficient"][pair] * normal
+        limit = mode.pairs(contact)[Role.FRICTION_COEFFICIENT.value][pair] * normal
         for sign in (1.0, -1.0):
             axes.plot(normal, sign * limit, color=style.GREY, linestyle="--", linewidth=1.0, zorder=1)
         axes.annotate("dashed: friction limit", (0.03, 0.05), xycoords="axes fraction", fontsize=9.5)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..contact_laws import Role
 from . import style
 from .data import Analysis, Array, Run, Table
 
@@ -86,8 +87,9 @@ def lines_of(wear: Analysis) -> list[WearLine]:
 def _has_stopped(wear: Analysis, rates: Table, row: int, vibrations: float) -> bool:
     """The march's own rule: up to the last cycle no pair loses more than the tolerance of the mean normal load."""
     lost = float(wear.attributes["tolerance"]) * float(wear.attributes.get("load_scale", 0.0))
-    case = wear.attributes["case"]
-    stiffness = {name: np.asarray(case[f"contact.{name}.normal_stiffness"]) for name in rates}
+    stiffness = {name: wear.parameter(name, Role.NORMAL_STIFFNESS) for name in rates}
+    if any(value is None for value in stiffness.values()):
+        return False  # results that do not say what their laws' parameters are
     return all((stiffness[name] * rate[row] * vibrations <= SLACK * lost).all() for name, rate in rates.items())
 
 
