@@ -51,6 +51,26 @@ def test_gap_is_what_is_missing_to_contact() -> None:
     assert np.abs(ContactHistory(u, 0 * u, f, status, found, 0).work).max() < 1e-12 * load * 1e-3
 
 
+def test_worn_depth_is_gap(comm) -> None:
+    """Of a motion that opens, as the results keep it: N = max(0, N0 + kn (u_n - g - depth)) and what is missing."""
+    given = {"normal_stiffness": 2.0, "tangential_stiffness": 1.5, "friction_coefficient": 0.4}
+    contact = fw.Contact("coulomb_3d", np.eye(3), {**given, "normal_load": 0.5, "gap": 0.01})
+    model = fw.Model(np.eye(3), 4 * np.eye(3), contacts=[contact], comm=comm)
+    start = fw.LinearMode(2.0, 0.0, np.eye(3)[0], np.zeros(3))
+    problem = fw.NonlinearMode(model, fw.Harmonics([0, 1], 64), "EPMC", 0, start)
+    gaps = {}
+    for depth in (0.0, 0.2):
+        problem.core.wear([[depth]])
+        kept = problem.contact_history(problem.initial(1.0))[0]
+        normal, u = kept["f"][:, 0], kept["u"][:, 0]
+        missing = 0.01 + depth - 0.25 - u
+        assert normal == pytest.approx(np.maximum(-2.0 * missing, 0.0), abs=1e-14)
+        assert kept["gap"] == pytest.approx(np.maximum(missing, 0.0), abs=1e-15)
+        assert np.array_equal(kept["status"] == OPEN, normal <= 0)
+        gaps[depth] = kept["gap"].max()
+    assert gaps[0.2] - gaps[0.0] == pytest.approx(0.2) and gaps[0.0] > 0.5
+
+
 def test_uncoupled_tangents_slip_one_by_one() -> None:
     f = np.array([[[10.0], [3.0], [2.9]], [[10.0], [2.0], [2.5]], [[50 / 0.3], [40.0], [40.0]]])
     given = {"normal_stiffness": 1.0, "tangential_stiffness": 1.0, "friction_coefficient": 0.3}

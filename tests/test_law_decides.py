@@ -52,7 +52,7 @@ amplitude = [1e-8, 1e-7]
 """
 COMPILED = (
     f'law = "{{law}}"\nnormal_stiffness = {CONTACT}\ntangential_stiffness = {CONTACT}\n'
-    f"friction_coefficient = {FRICTION}"
+    f"friction_coefficient = {FRICTION}\nnormal_load = 30.0"  # which the preload replaces
 )
 
 

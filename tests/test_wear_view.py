@@ -13,6 +13,7 @@ from test_view import read_step
 from wear_case import write_case
 
 import fretwave as fw
+from fretwave.contact_history import OPEN, SLIP
 from fretwave.vtkhdf import TRIANGLE, VERTEX
 from fretwave.wear_view import surface
 
@@ -76,21 +77,24 @@ def test_amplitudes_asked_for_are_files_of_their_own(run, tmp_path, capfd):
     assert "no wear at this amplitude" in error and "fix:      --amplitude 3e-06" in error
 
 
-def test_the_motion_of_a_worn_point_counts_its_depth_as_gap(run, tmp_path):
-    """The kept forces are the law's with the approach less the depth; an open pair at u = 0 is its depth away."""
+def test_the_motion_of_a_worn_point_is_shown_with_the_law_s_word_on_it(run, tmp_path):
+    """The kept forces are the law's with the approach less the depth; status and gap are shown as they are kept."""
     table, fields = line_of(run, 2)
     point, depth = int(table["point"][-1]), fields["depth"][-1]
     with h5py.File(run / "results.h5") as file:
         u, f = (file[f"wear/contact_pads/{key}"][-1][:, 0] for key in "uf")
+        status = file["wear/contact_pads/status"][-1]
     assert f == pytest.approx(np.maximum(np.array([1e7, 2e7]) * (u - depth), 0.0), rel=1e-9, abs=1e-9)
+    assert depth.max() > 1e-6 and np.mean(status == SLIP, axis=0).tolist() == fields["slip"][-1].tolist()
     shutil.copytree(run, tmp_path / "run")
     with h5py.File(tmp_path / "run" / "results.h5", "r+") as file:
-        for key in "uf":
-            file[f"wear/contact_pads/{key}"][-1] = 0.0
+        file["wear/contact_pads/gap"][-1] = depth
+        file["wear/contact_pads/status"][-1] = OPEN
     out = tmp_path / "motion.vtkhdf"
     assert call("view", tmp_path / "run", "--analysis", "wear", "--point", point, "--phases", "8", "--out", out) == 0
     assert read_step(out, 0)["cycles"] == pytest.approx(8.0)
-    assert read_step(tmp_path / "motion_contact.vtkhdf", 3)["gap"].tolist() == depth.tolist() and depth.max() > 1e-6
+    found = read_step(tmp_path / "motion_contact.vtkhdf", 3)
+    assert found["gap"].tolist() == depth.tolist() and found["status"].tolist() == [OPEN, OPEN]
 
 
 def contact(positions, faces):
