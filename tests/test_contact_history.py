@@ -97,6 +97,19 @@ def test_a_law_in_python_that_says_nothing_is_open_without_normal_force_and_slip
     assert gap[0, 0] == 0.0 and np.isnan(gap[0, 1])
 
 
+class Wrong(Silent):
+    """Gives a state that there is not."""
+
+    def status(self, u: Any, v: Any, f: Any) -> Any:
+        return np.full_like(f[:, 0], 3)
+
+
+def test_a_state_that_there_is_not_is_refused() -> None:
+    f = np.ones((1, 3, 1))
+    with pytest.raises(ValueError, match="other than STICK, SLIP and OPEN"):
+        fw.Contact(Wrong(), np.eye(3)).states(f, f, f)
+
+
 @pytest.mark.parametrize("factor, status", [(1 - 1e-11, STICK), (1.0, SLIP), (1 - 1e-13, SLIP)])
 @pytest.mark.parametrize("law", ["jenkins", "coulomb_3d", "coulomb_3d_uncoupled", "own"])
 def test_one_tolerance_says_when_a_limit_is_reached(law: str, factor: float, status: int) -> None:

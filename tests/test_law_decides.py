@@ -98,10 +98,17 @@ CONTACTS = {
 STILL = ["coulomb_3d_uncoupled", "foreign_pad"]
 
 
+@pytest.fixture(scope="module", autouse=True)
+def registered():
+    """Known to all cases here."""
+    fw.register_law(Foreign)
+    yield
+    forget_law(Foreign)
+
+
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory):
     """Folders of the finished runs, by law."""
-    fw.register_law(Foreign)
     folders = {}
     for law, (contact, _) in CONTACTS.items():
         folder = tmp_path_factory.mktemp(law)
@@ -110,8 +117,7 @@ def runs(tmp_path_factory):
         only = [] if law in STILL else ["--only", "rest"]
         assert call("run", folder / "case.toml", "--out", folder / "run", "--no-plots", *only) == 0
         folders[law] = folder / "run"
-    yield folders
-    forget_law(Foreign)
+    return folders
 
 
 @pytest.mark.parametrize("law", CONTACTS)
@@ -162,8 +168,23 @@ def test_results_say_which_parameter_has_which_role(runs, law: str) -> None:
     assert mode.parameter("pads", Role.FRICTION_LIMIT) is None
 
 
+@pytest.mark.ranks(1, 2)
+def test_parameters_of_a_registered_law_go_with_their_pairs(comm) -> None:
+    """Each pair its own stiffness and gap, also where the pairs lie on different ranks; the normal at component 0."""
+    given = {"squeeze": [2.0, 3.0, 5.0], "shear": 1.0, "rub": 0.4, "push": 0.0, "air": [-0.5, 0.25, 3.0]}
+    contact = fw.Contact("foreign_pad", np.eye(9), given)
+    model = fw.Model(np.eye(9), 4 * np.eye(9), contacts=[contact], comm=comm)
+    start = fw.LinearMode(2.0, 0.0, np.tile([1.0, 0.0, 0.0], 3), np.zeros(9))
+    problem = fw.NonlinearMode(model, fw.Harmonics([0, 1], 16), "EPMC", 0, start)
+    told = comm.bcast(problem.contact_history(problem.initial(1.0))[0])
+    stiffness, gap = np.array(given["squeeze"]), np.array(given["air"])
+    assert told["f"][:, 0] == pytest.approx(np.maximum(0.0, stiffness * (told["u"][:, 0] - gap)), abs=1e-14)
+    assert told["gap"] == pytest.approx(np.maximum(0.0, gap - told["u"][:, 0]), abs=1e-14)
+    assert np.array_equal(told["status"] == OPEN, told["u"][:, 0] <= gap) and told["status"].dtype == np.int8
+
+
 @pytest.mark.parametrize("law", STILL)
-def test_rows_whose_status_was_not_kept_are_not_called_stuck(runs, law: str, tmp_path) -> None:
+def test_rows_whose_status_was_not_kept_are_not_called_stuck(runs, law: str, tmp_path, capfd) -> None:
     """Of a run that an earlier version began: no picture and no status rather than a wrong one."""
     folder = runs[law]
     shutil.copytree(folder, tmp_path / "run")
@@ -172,6 +193,9 @@ def test_rows_whose_status_was_not_kept_are_not_called_stuck(runs, law: str, tmp
     with rewritten(tmp_path / "run" / "results.h5", "other") as file:
         file["mode/contact_pads/status"][0] = -1
     assert not Run(tmp_path / "run").analyses["mode"].tells_status("pads")
+    assert call("view", tmp_path / "run", "--analysis", "mode", "--point", 0, "--phases", "4") == 0
+    assert "contact 'pads' is shown without status" in capfd.readouterr().out
+    assert "status" not in read_step(tmp_path / "run" / "mode_contact.vtkhdf", 0)
     assert [name for name, _ in faces.figures(Run(tmp_path / "run"))] == ["rest_load_pads"]
 
 

@@ -109,6 +109,30 @@ class LawInfo:
         return {"law": self.name, "normal": self.normal, "limit": self.limit.value, "roles": roles}
 
 
+@dataclass(frozen=True)
+class KeptLaw:
+    """What results say of a contact's law; see `LawInfo`. `roles` gives the parameters' names by their roles."""
+
+    law: str
+    normal: int | None
+    limit: Limit
+    roles: Mapping[Role, str]
+
+    def value(self, contact: str, role: Role, case: Mapping[str, Any]) -> Any:
+        """Value in the case's keys, as results keep them, of the parameter with a role; None where there is none."""
+        return case.get(f"contact.{contact}.{self.roles[role]}") if role in self.roles else None
+
+
+def kept_laws(kept: Mapping[str, Any]) -> dict[str, KeptLaw]:
+    """Laws by contact, from what results hold of each (`LawInfo.plain`)."""
+    return {
+        contact: KeptLaw(
+            told["law"], told["normal"], Limit(told["limit"]), {Role(k): name for k, name in told["roles"].items()}
+        )
+        for contact, told in kept.items()
+    }
+
+
 def laws() -> dict[str, LawInfo]:
     """All laws that a case can name: the compiled ones and those registered here."""
     return {**_compiled(), **{name: law.info() for name, law in _registered.items()}}

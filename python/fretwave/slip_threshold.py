@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from .contact_laws import Limit, Role
+from .contact_laws import Limit, Role, kept_laws
 
 Array = npt.NDArray[np.float64]
 
@@ -69,14 +69,16 @@ def slip_threshold(amplitude: float, forces: Mapping[str, Array], attributes: Ma
     forces : {name of the contact: (n_samples, components, n_pairs)}
     attributes : of the analysis' group in the results, with the parameters of the contacts
     """
-    case, laws = json.loads(attributes["case"]), json.loads(attributes.get("laws", "{}"))
+    case, laws = json.loads(attributes["case"]), kept_laws(json.loads(attributes.get("laws", "{}")))
     factors = []
     for name, values in forces.items():
-        law = laws.get(name, {"roles": {}})
-        role = Role.FRICTION_LIMIT if law.get("normal") is None else Role.FRICTION_COEFFICIENT
-        given = case.get(f"contact.{name}.{law['roles'].get(role.value)}")
-        if given is None or law["limit"] == Limit.NONE.value:
+        law = laws.get(name)
+        if law is None or law.limit == Limit.NONE:
+            return float("nan")
+        role = Role.FRICTION_LIMIT if law.normal is None else Role.FRICTION_COEFFICIENT
+        given = law.value(name, role, case)
+        if given is None:
             return float("nan")
         values, bound = values.astype(float), np.asarray(given)
-        factors.append(slip_factor(values, limit=bound, friction=bound, each=law["limit"] == Limit.EACH.value))
+        factors.append(slip_factor(values, limit=bound, friction=bound, each=law.limit == Limit.EACH))
     return amplitude * min(factors, default=np.nan)

@@ -188,4 +188,6 @@ def _placed(case: Case, choice: Choice, say: Callable[[str], None]) -> dict[str,
     for name in choice.contacts:
         if name not in built or built[name].points is None:
             say(f"contact '{name}' is not shown: the model has no places of its pairs")
+        elif any(history.status is None for history in choice.contacts[name]):
+            say(f"contact '{name}' is shown without status: the results do not keep it, run the analysis anew for it")
     return {name: built[name] for name in choice.contacts if name in built and built[name].points is not None}

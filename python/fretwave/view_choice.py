@@ -14,6 +14,7 @@ import numpy.typing as npt
 from .analyses.context import belongs
 from .casefile import Case
 from .contact_history import ContactHistory
+from .contact_laws import kept_laws
 from .errors import InputError
 from .sectors import nodal_diameter
 from .source import display, nearest
@@ -264,11 +265,12 @@ def _not_kept(what: str, where: str, measured: str, kept: IntArray, amplitude: A
 
 def _contacts(group: Any, case: Case, rows: Sequence[int]) -> dict[str, list[ContactHistory]]:
     """Histories of all contacts at some points."""
-    reported = group["reported"][()].tolist()
+    reported, laws = group["reported"][()].tolist(), kept_laws(json.loads(group.attrs.get("laws", "{}")))
     found = {}
     for contact in case.contacts:
         place = f"contact_{contact.name}"
         if place in group:
             kept = [{key: data[reported.index(row)] for key, data in group[place].items()} for row in rows]
-            found[contact.name] = [ContactHistory.of(motion, contact.info.normal) for motion in kept]
+            law = laws.get(contact.name) or contact.info  # results of an earlier version do not tell it
+            found[contact.name] = [ContactHistory.of(motion, law.normal) for motion in kept]
     return found

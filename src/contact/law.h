@@ -77,7 +77,7 @@ class Law {
   /// Component along the normal, > 0 closing; -1: the law has no normal direction.
   virtual int normal() const { return -1; }
   virtual Limit limit() const { return Limit::none; }
-  /// Has a normal direction, along which worn depths count as additional gap.
+  /// Worn depths count as additional gap along its normal direction.
   virtual bool wears() const { return false; }
   /// Worn depth of each pair [m], in place of what was set before; the rest state stays as it is. Null: as
   /// they are.

@@ -98,11 +98,12 @@ void Aft::product(double const* dU, double const* dV, double* dF) {
 void Aft::gap_product(double const* dgap, double* dF) {
   if (columns_ == 0) return;
   for (Tile const& tile : tiles_) {
-    const int d = law_->components();
+    const int d = law_->components(), normal = std::max(law_->normal(), 0);
     const contact::Motion motion = this->motion(tile, 1);
     std::fill_n(u_.data(), motion.size(), 0.0);
     for (int t = 0; t < motion.samples; ++t)
-      for (int i = 0; i < tile.pairs; ++i) u_[size_t(t) * d * tile.pairs + i] = -dgap[tile.first + i];
+      for (int i = 0; i < tile.pairs; ++i)
+        u_[(size_t(t) * d + normal) * tile.pairs + i] = -dgap[tile.first + i];
     law_->product(motion, tile.record, motion.u, nullptr, f_.data());
     transform(tile).to_harmonics(f_.data(), dF + size_t(tile.first) * d * harmonics_.block_size());
   }
@@ -247,7 +248,7 @@ contact::Diagnosis Aft::diagnosis(ContactPeriod const& period, Exponents const& 
 Wearing Aft::wearing(double const* U, Exponents const& e) const {
   const std::vector<double> none(pairs_, 0.0);
   Wearing out{none, none, none, none};
-  if (columns_ == 0 || !law_->wears()) return out;
+  if (columns_ == 0 || !law_->wears() || law_->normal() < 0) return out;
   const ContactPeriod now = period(U, e);
   const contact::Diagnosis found = diagnosis(now, e, true);
   const double share = 1.0 / harmonics_.samples();
@@ -255,7 +256,7 @@ Wearing Aft::wearing(double const* U, Exponents const& e) const {
   for (int t = 0; t < harmonics_.samples(); ++t)
     for (int i = 0; i < pairs_; ++i) {
       const auto status = found.status[size_t(t) * pairs_ + i];
-      out.load[i] += share * now.f[size_t(t) * columns_ + i];
+      out.load[i] += share * now.f[size_t(t) * columns_ + size_t(law_->normal()) * pairs_ + i];
       out.slip[i] += status == contact::Status::slip ? share : 0;
       out.open[i] += status == contact::Status::open ? share : 0;
     }

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..analyses.mode_curve import ModeCurve
-from ..contact_laws import UNKNOWN, Role
+from ..contact_laws import UNKNOWN, Role, kept_laws
 from ..harmonic_motion import motion
 from ..results_file import has_results, open_results
 
@@ -73,8 +73,8 @@ class Analysis:
 
     def parameter(self, contact: str, role: Role) -> Array | None:
         """Value in the case of the parameter of a contact's law with a role; None where the results tell none."""
-        law, case = self.attributes.get("laws", {}).get(contact, {}), self.attributes.get("case", {})
-        value = case.get(f"contact.{contact}.{law.get('roles', {}).get(role.value)}")
+        law = kept_laws(self.attributes.get("laws", {})).get(contact)
+        value = None if law is None else law.value(contact, role, self.attributes["case"])
         return None if value is None else np.asarray(value, dtype=float)
 
     def components(self, contact: str) -> int:
