@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from .problems import ForcedResponse, Harmonics, NonlinearMode, choose_harmonics
     from .reduction import FrequencyError, Reduction, reduce
     from .reduction_error import NonlinearError, nonlinear_error
+    from .solve.branch import Branch
+    from .solve.follow import follow
     from .transient import Transient
     from .wear import Wear, WearControl, WearPoint
     from .worn_mode import WornMode
@@ -45,6 +47,8 @@ _HOMES = {
     "problems": ("ForcedResponse", "Harmonics", "NonlinearMode", "choose_harmonics"),
     "reduction": ("FrequencyError", "Reduction", "reduce"),
     "reduction_error": ("NonlinearError", "nonlinear_error"),
+    "solve.branch": ("Branch",),
+    "solve.follow": ("follow",),
     "transient": ("Transient",),
     "wear": ("Wear", "WearControl", "WearPoint"),
     "worn_mode": ("WornMode",),
@@ -53,6 +57,7 @@ _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 
 __all__ = [
     "Aerodynamics",
+    "Branch",
     "BuiltContact",
     "BuiltModel",
     "Contact",
@@ -82,6 +87,7 @@ __all__ = [
     "WearPoint",
     "WornMode",
     "choose_harmonics",
+    "follow",
     "laws",
     "linear_modes",
     "match_faces",

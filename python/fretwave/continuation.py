@@ -81,6 +81,9 @@ class Point:
 class Continuation:
     """Follows a problem's branch from y0 until its parameter leaves (low, high). Collective.
 
+    It hands out its points once, as files do their lines: a loop that was left goes on where it stood, and behind the
+    last point there are none. `fretwave.follow` keeps them.
+
     Parameters
     ----------
     y0 : Vec
@@ -118,6 +121,7 @@ class Continuation:
         self._upwards, self._restored, self._advice = upwards, False, ""
         self.repeated: Point | None = None
         self.helped, self.started, self._first_reason = helped, "", ""
+        self._points: Iterator[Point] | None = None
 
     def _parameter(self, y: PETSc.Vec) -> float:
         return float(self.problem.core.parameter_value(self.problem.last_entry(y)))
@@ -151,6 +155,11 @@ class Continuation:
         return None
 
     def __iter__(self) -> Iterator[Point]:
+        if self._points is None:
+            self._points = self._walk()
+        return self._points
+
+    def _walk(self) -> Iterator[Point]:
         point = self._core.next() if self._restored else self._first()
         while point is not None:
             last = point["y"]

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from copy import copy
 from dataclasses import dataclass, field
 from typing import Any
@@ -229,6 +230,14 @@ class Model:
     def vector(self, values: Array) -> PETSc.Vec:
         """A distributed vector from an array (n_dof,) given whole on every rank. Collective."""
         return PETSc.Vec().createWithArray(np.array(self.distribute(np.asarray(values, dtype=float))), comm=self.comm)
+
+    @contextmanager
+    def vectors(self, *values: Array) -> Iterator[list[PETSc.Vec]]:
+        """`vector` of each array, for a `with` block that they do not outlive. Collective."""
+        made = [self.vector(one) for one in values]
+        yield made
+        for vector in made:
+            vector.destroy()
 
     def gather_pairs(self, which: int, local: Array) -> Array | None:
         """Samples (.., n_pairs) of one contact in the order of B, on rank 0. Collective."""

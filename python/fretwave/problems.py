@@ -11,6 +11,7 @@ from petsc4py import PETSc
 
 from . import _core
 from .errors import InputError
+from .hb.states import ForcedState, ModalState, State
 from .model import Model
 from .modes import LinearMode
 
@@ -60,19 +61,27 @@ def choose_harmonics(model: Model, highest: int, samples: int | None = None, ret
 class HarmonicProblem:
     """N equations in N + 1 unknowns y: scaled harmonic coefficients, then scalars, the continuation parameter last."""
 
+    #: What its scalar unknowns mean; None where no table says.
+    meaning: State | None = None
+
     def __init__(self, model: Model, harmonics: Harmonics, prefix: str, core: Any) -> None:
         self.model, self.harmonics, self.prefix, self.core = model, harmonics, prefix, core
+
+    def initial(self, parameter: float) -> PETSc.Vec:
+        """A first guess at this amplitude or angular frequency. Collective."""
+        raise NotImplementedError
 
     def preload(self, displacement: Array, load: Array) -> None:
         """Dynamics about a static state (n_dof,) under the static load it balances, in place of any before. Collective.
 
         Harmonic 0 must be retained.
         """
-        self.core.preload(self.model.vector(displacement), self.model.vector(load))
+        with self.model.vectors(displacement, load) as vectors:
+            self.core.preload(*vectors)
 
-    def residual(self, y: PETSc.Vec) -> PETSc.Vec:
-        """r(y), dimensionless, N entries. Collective."""
-        r = self.core.equations()
+    def residual(self, y: PETSc.Vec, r: PETSc.Vec | None = None) -> PETSc.Vec:
+        """r(y), dimensionless, N entries, in `r` where one is given. Collective."""
+        r = self.core.equations() if r is None else r
         self.core.residual(y, r)
         return r
 
@@ -86,6 +95,10 @@ class HarmonicProblem:
         self.core.product(y, dy, r)
         return r
 
+    def scalars(self, y: PETSc.Vec) -> Array:
+        """Scalar unknowns, then the scaled fundamental (c, s) of `dof` and the unfolding, linear in y. Collective."""
+        return np.array(self.core.scalars(y))
+
     def last_entry(self, y: PETSc.Vec) -> float:
         """The parameter's entry of unknowns or a tangent, on every rank. Collective."""
         local = y.getArray(readonly=True)
@@ -93,7 +106,9 @@ class HarmonicProblem:
 
     def coefficients(self, y: PETSc.Vec) -> Array | None:
         """Harmonic coefficients Q (n_dof, m) in physical units, columns `harmonics.labels`, on rank 0. Collective."""
-        parts = self.model.comm.gather(self.core.coefficients(y).getArray(readonly=True).copy())
+        Q = self.core.coefficients(y)
+        parts = self.model.comm.gather(Q.getArray(readonly=True).copy())
+        Q.destroy()
         return None if parts is None else np.concatenate(parts).reshape(-1, self.harmonics.block_size)
 
     def diagnostics(self, y: PETSc.Vec) -> dict[str, float]:
@@ -155,7 +170,7 @@ class HarmonicProblem:
 
     def state(self, y: PETSc.Vec) -> dict[str, float]:
         """What a table of the branch says of this point. Collective."""
-        raise NotImplementedError
+        return {} if self.meaning is None else self.meaning(self.core.scalars(y))
 
     def destroy(self) -> None:
         """Free the solver's vectors. Collective."""
@@ -204,11 +219,14 @@ class NonlinearMode(HarmonicProblem):
 
             start = linear_modes(model, 1)[0]
         self.method, self.dof, self.start = method, dof, start
-        shape = (model.vector(start.shape), model.vector(start.imaginary))
-        core = _core.NonlinearMode(model.core, harmonics.core, getattr(_core.Method, method), dof, start.omega, *shape)
+        known = model.core, harmonics.core, getattr(_core.Method, method), dof, start.omega
+        with model.vectors(start.shape, start.imaginary) as shape:
+            core = _core.NonlinearMode(*known, *shape)
         if avoid is not None:
-            core.unfold(model.vector(np.real(avoid)), model.vector(np.imag(avoid)))
+            with model.vectors(np.real(avoid), np.imag(avoid)) as other:
+                core.unfold(*other)
         super().__init__(model, harmonics, prefix, core)
+        self.meaning = ModalState(method, start.omega)
 
     def initial(self, amplitude: float) -> PETSc.Vec:
         """The linear mode at this amplitude. Collective."""
@@ -217,17 +235,6 @@ class NonlinearMode(HarmonicProblem):
     def unfolding(self, y: PETSc.Vec) -> Array:
         """The force along the avoided mode (2,), dimensionless; empty without `avoid`. Collective."""
         return np.asarray(self.core.unfolding(y))
-
-    def state(self, y: PETSc.Vec) -> dict[str, float]:
-        amplitude, omega, omega0, beta, zeta = self.core.state(y)
-        return {
-            "amplitude": amplitude,
-            "omega": omega,
-            "omega0": omega0,
-            "frequency_hz": omega / (2 * np.pi),
-            "beta": beta,
-            "zeta": zeta,
-        }
 
 
 class ForcedResponse(HarmonicProblem):
@@ -254,9 +261,12 @@ class ForcedResponse(HarmonicProblem):
         prefix: str = "forced_",
     ) -> None:
         self.dof, self.level, self.reference = dof, level, reference
-        shape, P = model.vector(reference.shape), self._blocks(model, harmonics, force)
-        core = _core.ForcedResponse(model.core, harmonics.core, dof, P, level, reference.omega, shape)
+        P = self._blocks(model, harmonics, force)
+        with model.vectors(reference.shape) as (shape,):
+            core = _core.ForcedResponse(model.core, harmonics.core, dof, P, level, reference.omega, shape)
+        P.destroy()
         super().__init__(model, harmonics, prefix, core)
+        self.meaning = ForcedState(level, reference.omega, core.reference_amplitude)
 
     @staticmethod
     def _blocks(model: Model, harmonics: Harmonics, force: Mapping[int, npt.NDArray[Any]]) -> PETSc.Vec:
@@ -281,13 +291,3 @@ class ForcedResponse(HarmonicProblem):
     def initial(self, omega: float) -> PETSc.Vec:
         """Zero motion at this angular frequency: Newton's first step is the linear response. Collective."""
         return self.core.initial(omega)
-
-    def state(self, y: PETSc.Vec) -> dict[str, float]:
-        level, omega, amplitude, phase = self.core.state(y)
-        return {
-            "level": level,
-            "omega": omega,
-            "frequency_hz": omega / (2 * np.pi),
-            "amplitude": amplitude,
-            "phase": phase,
-        }
