@@ -77,7 +77,7 @@ def test_reading_gets_better_by_the_fourth_power_of_the_step_and_a_straight_line
 def test_all_responses_at_a_frequency_are_found_where_the_branch_folds():
     """((k + 3/4 g a^2 - w^2)^2 + (c w)^2) a^2 = F^2: three amplitudes between the folds."""
     F, omega = 0.1, 2.25
-    branch = fw.follow(response(F), 1.8, 3.2, steps=steps(0.02))
+    branch = fw.follow(response(F), 1.8, 3.2, steps=steps(0.06))
     folds = branch["omega"][branch.met("fold")]
     assert len(folds) == 2 and folds.min() < omega < folds.max()
     square = np.roots([(0.75 * G) ** 2, 1.5 * G * (K - omega**2), (K - omega**2) ** 2 + (C * omega) ** 2, -(F**2)])
@@ -89,7 +89,7 @@ def test_all_responses_at_a_frequency_are_found_where_the_branch_folds():
 def test_both_frequencies_of_an_amplitude_are_found():
     """w^2 of the quadratic in it, below and above the resonance; the phase jumps by no crossing there."""
     F, a = 0.02, 0.3
-    branch = fw.follow(response(F), 1.8, 2.6, steps=steps(0.02))
+    branch = fw.follow(response(F), 1.8, 2.3, steps=steps(0.05))
     b = C**2 - 2 * stiffness(a)
     expected = np.sort(np.sqrt(np.roots([1.0, b, stiffness(a) ** 2 - (F / a) ** 2])))
     found = branch.at(amplitude=a)

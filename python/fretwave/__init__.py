@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from importlib import import_module
+from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 from .errors import FretwaveError, InputError, NotConverged
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from .faces import match_faces
     from .model import Contact, Model
     from .modes import LinearMode, linear_modes
+    from .plots.data import Run, open_run
     from .problems import ForcedResponse, Harmonics, NonlinearMode, choose_harmonics
     from .reduction import FrequencyError, Reduction, reduce
     from .reduction_error import NonlinearError, nonlinear_error
@@ -44,6 +46,7 @@ _HOMES = {
     "contact_laws": ("LawInfo", "ParameterInfo", "PythonLaw", "laws"),
     "model": ("Contact", "Model"),
     "modes": ("LinearMode", "linear_modes"),
+    "plots.data": ("Run", "open_run"),
     "problems": ("ForcedResponse", "Harmonics", "NonlinearMode", "choose_harmonics"),
     "reduction": ("FrequencyError", "Reduction", "reduce"),
     "reduction_error": ("NonlinearError", "nonlinear_error"),
@@ -77,6 +80,7 @@ __all__ = [
     "Point",
     "PythonLaw",
     "Reduction",
+    "Run",
     "Sector",
     "SectorReduction",
     "StepControl",
@@ -92,14 +96,21 @@ __all__ = [
     "linear_modes",
     "match_faces",
     "nonlinear_error",
+    "open_run",
     "reduce",
     "reduce_sector",
 ]
 
 
 def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        return version("fretwave")
     if name not in _HOME_OF:
         raise AttributeError(f"module 'fretwave' has no attribute '{name}'")
     value = getattr(import_module(f".{_HOME_OF[name]}", __name__), name)
     globals()[name] = value
     return value
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *__all__, "__version__"])

@@ -69,6 +69,9 @@ class PythonLaw:
     stuck_stiffness: float = float("inf")
     pairs: npt.NDArray[np.intp]
 
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.components} components{', odd' if self.odd else ''})"
+
     def force(self, u: Array, v: Array) -> Array:
         """Contact force, shape of `u`, in the direction of +u (it resists the motion)."""
         raise NotImplementedError

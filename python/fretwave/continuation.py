@@ -77,6 +77,10 @@ class Point:
     rounding: float = 0.0
     accepted: int = 1
 
+    def __repr__(self) -> str:
+        what = f" {self.event}" if self.event else ""
+        return f"Point({self.index}:{what} at {self.parameter:.6g}, residual {self.residual:.1e})"
+
 
 class Continuation:
     """Follows a problem's branch from y0 until its parameter leaves (low, high). Collective.
@@ -111,7 +115,7 @@ class Continuation:
             raise InputError(
                 "the range of the branch is empty", None, f"({low}, {high})", "low < high", "order the two stop values"
             )
-        self.problem, self._y0 = problem, y0
+        self.problem, self._y0, self._low, self._high = problem, y0, low, high
         self._core = _core.Continuation(
             problem.core, problem.prefix, low, high, (steps or StepControl()).core(), list(report_at)
         )
@@ -122,6 +126,11 @@ class Continuation:
         self.repeated: Point | None = None
         self.helped, self.started, self._first_reason = helped, "", ""
         self._points: Iterator[Point] | None = None
+
+    def __repr__(self) -> str:
+        if self._core is None:
+            return "Continuation(destroyed)"
+        return f"Continuation({self._low:g} to {self._high:g}: {self.reason or 'under way'}, of {self.problem})"
 
     def _parameter(self, y: PETSc.Vec) -> float:
         return float(self.problem.core.parameter_value(self.problem.last_entry(y)))

@@ -55,6 +55,12 @@ class Contact:
     parameters: Mapping[str, Any] = field(default_factory=dict)
     name: str = "contact"
 
+    def __repr__(self) -> str:
+        law = self.law if isinstance(self.law, str) else type(self.law).__name__
+        given = "".join(f", {name}={_span(value)}" for name, value in self.parameters.items())
+        rows, n_dof = np.shape(by_sector(self.B)[0])
+        return f"Contact({self.name}: {law}, {rows} rows of B on {n_dof} dofs{given})"
+
     @property
     def components(self) -> int:
         """Relative displacements per pair."""
@@ -109,6 +115,12 @@ class Contact:
                 f"a number {sign} {low:g} {parameter.unit}" if low > -1e300 else f"a number [{parameter.unit}]",
                 "give a value within the bound; leave out pairs that stand for no area",
             )
+
+
+def _span(value: Any) -> str:
+    """A parameter in short: a number, or its least and largest over the pairs."""
+    low, high = float(np.min(value)), float(np.max(value))
+    return f"{low:g}" if low == high else f"{low:g} to {high:g}"
 
 
 class Model:
@@ -257,6 +269,11 @@ class Model:
         """`gather_pairs`, on every rank. Collective."""
         whole: Array = self.comm.bcast(self.gather_pairs(which, local))
         return whole
+
+    def __repr__(self) -> str:
+        wave = f", wave of {self.nodal_diameter} nodal diameters on {self.sectors} sectors" if self.sectors > 1 else ""
+        ranks = f", {self.comm.size} ranks" if self.comm.size > 1 else ""
+        return f"Model({self.n_dof} dofs, contacts {[contact.name for contact in self.contacts]}{wave}{ranks})"
 
     def destroy(self) -> None:
         """Free the matrices. Collective."""

@@ -31,6 +31,9 @@ class LinearMode:
     shape: Array
     imaginary: Array
 
+    def __repr__(self) -> str:
+        return f"LinearMode({self.frequency_hz:.6g} Hz, zeta {self.zeta:.6g}, {len(self.shape)} dofs)"
+
     @property
     def zeta(self) -> float:
         """Modal damping ratio beta / |lambda|."""

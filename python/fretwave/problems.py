@@ -35,6 +35,13 @@ class Harmonics:
         self.labels = [label for n in self.orders for label in (["0"] if n == 0 else [f"{n}c", f"{n}s"])]
         self.left_out: list[str] = []
 
+    def __repr__(self) -> str:
+        step = self.orders[1] - self.orders[0] if len(self.orders) > 1 else 1
+        regular = self.orders == tuple(range(self.orders[0], self.orders[-1] + 1, step))
+        last = f"{self.orders[1]}, ..., {self.orders[-1]}" if len(self.orders) > 3 else ""
+        orders = f"{self.orders[0]}, {last}" if last and regular else ", ".join(map(str, self.orders))
+        return f"Harmonics({orders}; {self.samples} samples)"
+
 
 def choose_harmonics(model: Model, highest: int, samples: int | None = None, retain: str = "auto") -> Harmonics:
     """Retained set up to `highest`: only what the model needs, unless told otherwise.
@@ -172,6 +179,12 @@ class HarmonicProblem:
         """What a table of the branch says of this point. Collective."""
         return {} if self.meaning is None else self.meaning(self.core.scalars(y))
 
+    def _what(self) -> str:
+        return ""
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self._what()}{self.harmonics}, {self.model})"
+
     def destroy(self) -> None:
         """Free the solver's vectors. Collective."""
         self.core = None
@@ -227,6 +240,9 @@ class NonlinearMode(HarmonicProblem):
                 core.unfold(*other)
         super().__init__(model, harmonics, prefix, core)
         self.meaning = ModalState(method, start.omega)
+
+    def _what(self) -> str:
+        return f"{self.method} from {self.start.frequency_hz:.6g} Hz, amplitude of dof {self.dof}, "
 
     def initial(self, amplitude: float) -> PETSc.Vec:
         """The linear mode at this amplitude. Collective."""
@@ -287,6 +303,9 @@ class ForcedResponse(HarmonicProblem):
                 blocks[:, column + 1] = -values.imag
         local = model.distribute(blocks).ravel().copy()
         return PETSc.Vec().createWithArray(local, comm=model.comm)
+
+    def _what(self) -> str:
+        return f"level {self.level:g}, dof {self.dof}, "
 
     def initial(self, omega: float) -> PETSc.Vec:
         """Zero motion at this angular frequency: Newton's first step is the linear response. Collective."""
