@@ -92,13 +92,16 @@ class HarmonicProblem:
         self.core.residual(y, r)
         return r
 
-    def jacobian(self, y: PETSc.Vec) -> PETSc.Mat:
-        """dr/dy assembled, N x (N + 1) AIJ. Collective."""
-        return self.core.jacobian(y)
+    def jacobian(self, y: PETSc.Vec, J: PETSc.Mat | None = None) -> PETSc.Mat:
+        """dr/dy assembled, N x (N + 1) AIJ, in the `J` of an earlier call where one is given. Collective."""
+        if J is None:
+            return self.core.jacobian(y)
+        self.core.fill_jacobian(y, J)
+        return J
 
-    def jacobian_product(self, y: PETSc.Vec, dy: PETSc.Vec) -> PETSc.Vec:
-        """dr/dy dy, matrix-free. Collective."""
-        r = self.core.equations()
+    def jacobian_product(self, y: PETSc.Vec, dy: PETSc.Vec, dr: PETSc.Vec | None = None) -> PETSc.Vec:
+        """dr/dy dy, matrix-free, in `dr` where one is given. Collective."""
+        r = self.core.equations() if dr is None else dr
         self.core.product(y, dy, r)
         return r
 
