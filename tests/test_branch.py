@@ -16,6 +16,7 @@ from petsc4py import PETSc
 
 import fretwave as fw
 from fretwave.columns import FORCED, MODE
+from fretwave.solve.hermite import Cubic
 
 K, C, G = 4.0, 0.02, 0.5
 
@@ -174,6 +175,11 @@ def test_what_cannot_be_read_is_refused_in_words():
         branch.unknowns(1)
     with pytest.raises(KeyError, match="zeta"):
         branch["damping"]
+    problem = mode()
+    kept = fw.follow(problem, 0.1, 0.5)
+    problem.destroy()
+    with pytest.raises(fw.InputError, match="destroyed"):
+        kept.coefficients(1)
     with pytest.raises(fw.InputError, match="empty"):
         fw.follow(mode(), 0.5, 0.5)
 
@@ -254,6 +260,36 @@ def test_continuation_hands_out_its_points_once():
     rest = list(continuation)
     assert [p.index for p in rest] == list(range(first.index + 1, rest[-1].index + 1))
     assert rest[-1].event == "stop" and list(continuation) == []
+    continuation.destroy()
+    assert list(continuation) == [] and "destroyed" in repr(continuation)
+
+
+def test_points_freed_at_once_harm_no_branch_that_breaks_off():
+    """At its end a branch looks back at its last point, to say what may help."""
+    problem = mode()
+    continuation = fw.Continuation(problem, problem.initial(0.1), (0.1, 4.0), fw.StepControl(max_points=3))
+    for point in continuation:
+        point.y.destroy()
+        point.tangent.destroy()
+    assert not continuation.converged and continuation.reason
+
+
+@pytest.mark.parametrize("points", [0, 1])
+def test_branch_of_no_point_or_one_is_kept_drawn_and_read(shared_tmp, comm, points):
+    whole_branch = fw.follow(mode(), 0.1, 0.5)
+    values = {name: whole_branch[name][:points] for name in MODE}
+    z = whole_branch.curves.values[:points]
+    curves = Cubic(z, z[:0], z[:0])
+    branch = fw.Branch(whole_branch.columns, values, whole_branch.meaning, curves, False, "why", comm=comm)
+    branch.save(shared_tmp / "branch.h5")
+    loaded = fw.Branch.load(shared_tmp / "branch.h5")
+    assert len(loaded) == points == len(loaded.curve()) and loaded.reason == "why" and "why" in repr(loaded)
+    branch.plot()
+    if points:
+        assert len(loaded.at(float(values["amplitude"][0]))) == 1 and len(loaded.at(0.3)) == 0
+    else:
+        with pytest.raises(fw.InputError, match="no points"):
+            loaded.at(0.3)
 
 
 def test_residual_and_jacobian_fill_what_is_given(two_dof, comm):

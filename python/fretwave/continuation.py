@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -122,10 +122,11 @@ class Continuation:
         if upwards is None:
             start = self._parameter(y0)
             upwards = bool(start < 0.5 * (low + high))
-        self._upwards, self._restored, self._advice = upwards, False, ""
+        self._upwards, self._begun, self._advice = upwards, False, ""
         self.repeated: Point | None = None
         self.helped, self.started, self._first_reason = helped, "", ""
-        self._points: Iterator[Point] | None = None
+        self._last: PETSc.Vec | None = None
+        self._over = False
 
     def __repr__(self) -> str:
         if self._core is None:
@@ -163,19 +164,21 @@ class Continuation:
         self._first_reason = reason
         return None
 
-    def __iter__(self) -> Iterator[Point]:
-        if self._points is None:
-            self._points = self._walk()
-        return self._points
+    def __iter__(self) -> Continuation:
+        return self
 
-    def _walk(self) -> Iterator[Point]:
-        point = self._core.next() if self._restored else self._first()
-        while point is not None:
-            last = point["y"]
-            yield Point(**point)
-            point = self._core.next()
-            if point is None and not self.converged and "without bound" not in self._core.reason:
-                self._advise(last)
+    def __next__(self) -> Point:
+        if self._over:
+            raise StopIteration
+        point = self._core.next() if self._begun else self._first()
+        last, self._begun = self._last, True
+        self._last = None if point is None else point["y"]
+        if point is None:
+            self._over = True
+            if last and not self.converged and "without bound" not in self._core.reason:
+                self._advise(last)  # unless the caller has freed it
+            raise StopIteration
+        return Point(**point)
 
     def _advise(self, y: PETSc.Vec) -> None:
         """A branch that breaks off often does so at a force that changes within a sample."""
@@ -263,7 +266,7 @@ class Continuation:
         wary, now = bool(snapshot.get("wary", False)), [vectors["y"], vectors["tangent"]]
         point = branch._core.restore(now, before, step, index, wary, emitted, upwards, began)
         branch.repeated = None if point is None else Point(**point)
-        branch._restored = True
+        branch._begun = True
         return branch
 
     @staticmethod
@@ -279,4 +282,4 @@ class Continuation:
 
     def destroy(self) -> None:
         """Free the solver. Collective."""
-        self._core = None
+        self._core, self._last, self._over = None, None, True

@@ -36,7 +36,7 @@ def draw(branch: Branch) -> Figure:
             _events(place, branch, branch[abscissa], rows)
             place.set_ylabel(style.label(_name(column), COLUMNS[column].unit))
         axes[1].set_xlabel(style.label(_name(abscissa), COLUMNS[abscissa].unit))
-        if branch.meaning.kind == "mode" and len(branch):
+        if branch.meaning.kind == "mode" and len(branch) > 1:
             style.log_amplitude(axes[1], branch[abscissa])
         style.legend_outside(figure, axes[0])
     return figure

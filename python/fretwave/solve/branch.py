@@ -234,6 +234,8 @@ class Branch(Table):
         if self._unknowns is None:
             fix = "follow it with unknowns=True (the default) in this script"
             raise InputError("the branch has no unknowns", None, "its table and its curve alone", None, fix)
+        if self._unknowns.problem.core is None:
+            raise InputError("the branch's problem has been destroyed", fix="read the branch before problem.destroy()")
         return self._unknowns
 
     def _once(self, write: Callable[[], None]) -> None:
