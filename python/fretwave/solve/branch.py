@@ -93,8 +93,8 @@ class Branch(Table):
         """Every place where the branch passes a value, with the state there.
 
         Read off the cubic through the two points beside it and their tangents, on which the unknowns lie, so that the
-        error falls with the fourth power of the step. Two crossings within an eighth of a step, about an extremum that is
-        no event, may be missed.
+        error falls with the fourth power of the step. Two crossings within an eighth of a step, about an extremum that
+        is no event, may be missed.
 
         Parameters
         ----------
