@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import re
 from pathlib import Path
 
 import numpy as np
@@ -145,3 +146,31 @@ def test_the_full_wheel_follows_the_branch_of_one_sector(case, comm):
             for key in ("omega", "beta"):
                 assert found[key] == pytest.approx(expected[key], abs=1e-11 * expected["omega"])
             assert np.abs(around.unfolding(b)).max() < 1e-12
+
+
+def printed(launch, script: str) -> list[list[float]]:
+    """Numbers of each line that a script of the case prints."""
+    done = launch(1, str(FILE.parent / script), timeout=120)
+    assert done.returncode == 0, done.stderr
+    return [[float(n) for n in re.findall(r"-?\d+\.?\d*(?:e-?\d+)?", line)] for line in done.stdout.splitlines()]
+
+
+@pytest.mark.ranks(1)
+def test_script_finds_the_limit_cycles_where_friction_takes_what_the_flow_gives(case, comm, launch):
+    """The friction's own damping of the wave of four is there what the flow takes from it, 0.2 %."""
+    mode, _ = wave(case, comm, range(1, 10, 2))
+    friction = fw.follow(mode, 2e-5, 0.1, unknowns=False).at(zeta=2e-3)
+    lines = printed(launch, "flutter.py")
+    of_four = lines[[line[0] for line in lines].index(4.0) + 1 :][:2]
+    assert [len(line) for line in of_four] == [2, 2] and len(friction) == 2
+    np.testing.assert_allclose([line[0] for line in of_four], friction["amplitude"], rtol=0.02)
+    np.testing.assert_allclose([line[1] for line in of_four], friction["frequency_hz"], rtol=1e-3)
+    assert lines[-1][0] == 5.0  # the flow damps this wave: there is none
+
+
+@pytest.mark.ranks(1)
+def test_script_finds_the_peak_of_the_engine_order_on_the_backbone(launch):
+    """At 300 N the whole ring slides, and the response peaks where the periodic mode of its amplitude is."""
+    *_, (level, amplitude, hz), (mode_hz, zeta) = printed(launch, "engine_order.py")
+    assert level == 300.0 and amplitude > 5e-4 and zeta > 0
+    assert hz == pytest.approx(mode_hz, rel=1e-4)

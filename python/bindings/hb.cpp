@@ -83,6 +83,7 @@ void bind_hb(nb::module_& m) {
       .def("unfolding", [](HarmonicProblem& p, Petsc<Vec> y) { return p.unfolding(y.object); })
       .def_prop_ro("stiffness_scale", &HarmonicProblem::stiffness_scale)
       .def("rounding", [](HarmonicProblem& p, Petsc<Vec> y) { return p.rounding(y.object); })
+      .def("scalars", [](HarmonicProblem& p, Petsc<Vec> y) { return p.scalars(y.object); })
       .def("settle", [](HarmonicProblem& p, Petsc<Vec> y) { p.settle(y.object); })
       .def("exponents", [](HarmonicProblem& p, Petsc<Vec> y) { return p.exponents(y.object).s; });
   nb::enum_<Method>(m, "Method").value("CNM", Method::CNM).value("EPMC", Method::EPMC);
@@ -94,11 +95,7 @@ void bind_hb(nb::module_& m) {
             new (self) NonlinearMode(model, h, method, dof, omega, shape.object, imaginary.object);
           },
           nb::keep_alive<1, 2>())
-      .def("initial", [](NonlinearMode& p, double a) { return nb::steal(to_petsc4py(p.initial(a))); })
-      .def("state", [](NonlinearMode& p, Petsc<Vec> y) {
-        const auto s = p.state(y.object);
-        return nb::make_tuple(s.amplitude, s.omega, s.omega0, s.beta, s.zeta);
-      });
+      .def("initial", [](NonlinearMode& p, double a) { return nb::steal(to_petsc4py(p.initial(a))); });
   nb::class_<ModeStart, NonlinearMode>(m, "ModeStart")
       .def(
           "__init__",
@@ -136,12 +133,9 @@ void bind_hb(nb::module_& m) {
             new (self) ForcedResponse(model, h, dof, P.object, level, omega, shape.object);
           },
           nb::keep_alive<1, 2>())
+      .def_prop_ro("reference_amplitude", &ForcedResponse::reference_amplitude)
       .def("initial",
-           [](ForcedResponse& p, double omega) { return nb::steal(to_petsc4py(p.initial(omega))); })
-      .def("state", [](ForcedResponse& p, Petsc<Vec> y) {
-        const auto s = p.state(y.object);
-        return nb::make_tuple(s.level, s.omega, s.amplitude, s.phase);
-      });
+           [](ForcedResponse& p, double omega) { return nb::steal(to_petsc4py(p.initial(omega))); });
 }
 
 }  // namespace fretwave::python

@@ -32,6 +32,8 @@ void bind_solve(nb::module_& m) {
       .def("product", [](Problem& p, Petsc<Vec> y, Petsc<Vec> dy,
                          Petsc<Vec> dr) { p.product(y.object, dy.object, dr.object); })
       .def("jacobian", [](Problem& p, Petsc<Vec> y) { return nb::steal(to_petsc4py(assemble(p, y.object))); })
+      .def("fill_jacobian", [](Problem& p, Petsc<Vec> y, Petsc<Mat> J) { assemble(p, y.object, J.object); })
+      .def("metric", [](Problem& p, Petsc<Vec> y, Petsc<Vec> weights) { p.metric(y.object, weights.object); })
       .def("piece", [](Problem& p, Petsc<Vec> y) { return p.piece(y.object); })
       .def("parameter_entry", &Problem::parameter_entry)
       .def("parameter_value", &Problem::parameter_value);

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from importlib import import_module
+from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 from .errors import FretwaveError, InputError, NotConverged
@@ -23,9 +24,12 @@ if TYPE_CHECKING:
     from .faces import match_faces
     from .model import Contact, Model
     from .modes import LinearMode, linear_modes
+    from .plots.data import Run, open_run
     from .problems import ForcedResponse, Harmonics, NonlinearMode, choose_harmonics
     from .reduction import FrequencyError, Reduction, reduce
     from .reduction_error import NonlinearError, nonlinear_error
+    from .solve.branch import Branch
+    from .solve.follow import follow
     from .transient import Transient
     from .wear import Wear, WearControl, WearPoint
     from .worn_mode import WornMode
@@ -42,9 +46,12 @@ _HOMES = {
     "contact_laws": ("LawInfo", "Limit", "ParameterInfo", "PythonLaw", "Role", "laws", "register_law"),
     "model": ("Contact", "Model"),
     "modes": ("LinearMode", "linear_modes"),
+    "plots.data": ("Run", "open_run"),
     "problems": ("ForcedResponse", "Harmonics", "NonlinearMode", "choose_harmonics"),
     "reduction": ("FrequencyError", "Reduction", "reduce"),
     "reduction_error": ("NonlinearError", "nonlinear_error"),
+    "solve.branch": ("Branch",),
+    "solve.follow": ("follow",),
     "transient": ("Transient",),
     "wear": ("Wear", "WearControl", "WearPoint"),
     "worn_mode": ("WornMode",),
@@ -53,6 +60,7 @@ _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 
 __all__ = [
     "Aerodynamics",
+    "Branch",
     "BuiltContact",
     "BuiltModel",
     "Contact",
@@ -74,6 +82,7 @@ __all__ = [
     "PythonLaw",
     "Reduction",
     "Role",
+    "Run",
     "Sector",
     "SectorReduction",
     "StepControl",
@@ -84,10 +93,12 @@ __all__ = [
     "WearPoint",
     "WornMode",
     "choose_harmonics",
+    "follow",
     "laws",
     "linear_modes",
     "match_faces",
     "nonlinear_error",
+    "open_run",
     "reduce",
     "reduce_sector",
     "register_law",
@@ -95,8 +106,14 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        return version("fretwave")
     if name not in _HOME_OF:
         raise AttributeError(f"module 'fretwave' has no attribute '{name}'")
     value = getattr(import_module(f".{_HOME_OF[name]}", __name__), name)
     globals()[name] = value
     return value
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *__all__, "__version__"])

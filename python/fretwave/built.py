@@ -58,6 +58,9 @@ class BuiltContact:
     faces: Optional[Sequence[str]] = None
     positions: Optional[Array] = None
 
+    def __repr__(self) -> str:
+        return f"BuiltContact({self.n_pairs} pairs of {self.components}, {', '.join(self.parameters)})"
+
     @property
     def n_pairs(self) -> int:
         """Number of pairs."""
@@ -113,6 +116,10 @@ class BuiltModel:
     high: Optional[npt.NDArray[np.intp]] = None
     axis: Optional[str] = None
     parts: Mapping[str, Any] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        wheel = f", one of {self.sectors} sectors" if self.sectors else ""
+        return f"BuiltModel({self.M.shape[0]} dofs, contacts {list(self.contacts)}{wheel})"
 
     def complaint(self) -> str | None:
         """What is inconsistent, None when nothing is."""

@@ -215,6 +215,9 @@ class PythonLaw:
         if cls.components == 3 and "normal" not in vars(cls) and cls.normal is None:
             cls.normal = 0
 
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.components} components{', odd' if self.odd else ''})"
+
     def force(self, u: Array, v: Array) -> Array:
         """Contact force, shape of `u`, in the direction of +u (it resists the motion)."""
         raise NotImplementedError

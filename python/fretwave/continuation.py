@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -77,9 +77,16 @@ class Point:
     rounding: float = 0.0
     accepted: int = 1
 
+    def __repr__(self) -> str:
+        what = f" {self.event}" if self.event else ""
+        return f"Point({self.index}:{what} at {self.parameter:.6g}, residual {self.residual:.1e})"
+
 
 class Continuation:
     """Follows a problem's branch from y0 until its parameter leaves (low, high). Collective.
+
+    It hands out its points once, as files do their lines: a loop that was left goes on where it stood, and behind the
+    last point there are none. `fretwave.follow` keeps them.
 
     Parameters
     ----------
@@ -108,16 +115,23 @@ class Continuation:
             raise InputError(
                 "the range of the branch is empty", None, f"({low}, {high})", "low < high", "order the two stop values"
             )
-        self.problem, self._y0 = problem, y0
+        self.problem, self._y0, self._low, self._high = problem, y0, low, high
         self._core = _core.Continuation(
             problem.core, problem.prefix, low, high, (steps or StepControl()).core(), list(report_at)
         )
         if upwards is None:
             start = self._parameter(y0)
             upwards = bool(start < 0.5 * (low + high))
-        self._upwards, self._restored, self._advice = upwards, False, ""
+        self._upwards, self._begun, self._advice = upwards, False, ""
         self.repeated: Point | None = None
         self.helped, self.started, self._first_reason = helped, "", ""
+        self._last: PETSc.Vec | None = None
+        self._over = False
+
+    def __repr__(self) -> str:
+        if self._core is None:
+            return "Continuation(destroyed)"
+        return f"Continuation({self._low:g} to {self._high:g}: {self.reason or 'under way'}, of {self.problem})"
 
     def _parameter(self, y: PETSc.Vec) -> float:
         return float(self.problem.core.parameter_value(self.problem.last_entry(y)))
@@ -150,14 +164,21 @@ class Continuation:
         self._first_reason = reason
         return None
 
-    def __iter__(self) -> Iterator[Point]:
-        point = self._core.next() if self._restored else self._first()
-        while point is not None:
-            last = point["y"]
-            yield Point(**point)
-            point = self._core.next()
-            if point is None and not self.converged and "without bound" not in self._core.reason:
-                self._advise(last)
+    def __iter__(self) -> Continuation:
+        return self
+
+    def __next__(self) -> Point:
+        if self._over:
+            raise StopIteration
+        point = self._core.next() if self._begun else self._first()
+        last, self._begun = self._last, True
+        self._last = None if point is None else point["y"]
+        if point is None:
+            self._over = True
+            if last and not self.converged and "without bound" not in self._core.reason:
+                self._advise(last)  # unless the caller has freed it
+            raise StopIteration
+        return Point(**point)
 
     def _advise(self, y: PETSc.Vec) -> None:
         """A branch that breaks off often does so at a force that changes within a sample."""
@@ -245,7 +266,7 @@ class Continuation:
         wary, now = bool(snapshot.get("wary", False)), [vectors["y"], vectors["tangent"]]
         point = branch._core.restore(now, before, step, index, wary, emitted, upwards, began)
         branch.repeated = None if point is None else Point(**point)
-        branch._restored = True
+        branch._begun = True
         return branch
 
     @staticmethod
@@ -261,4 +282,4 @@ class Continuation:
 
     def destroy(self) -> None:
         """Free the solver. Collective."""
-        self._core = None
+        self._core, self._last, self._over = None, None, True

@@ -70,6 +70,11 @@ class Sector:
         for name in ("K", "M", "C"):
             check_balanced({k: sp.csr_matrix(A) for k, A in by_sector(getattr(self, name)).items()}, name)
 
+    def __repr__(self) -> str:
+        flow = ", with aerodynamics" if self.aerodynamics else ""
+        contacts = [contact.name for contact in self.contacts]
+        return f"Sector({self.n_dof} dofs, one of {self.sectors} sectors, contacts {contacts}{flow})"
+
     @property
     def n_dof(self) -> int:
         """Dofs of one sector."""

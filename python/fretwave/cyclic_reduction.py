@@ -71,6 +71,9 @@ class SectorReduction:
         self.contacts = [self._on(contact) for contact in waves.contacts]
         self.wall_s: dict[str, float] = {}
 
+    def __repr__(self) -> str:
+        return f"SectorReduction({self.size} coordinates, {self.n_interface} a face, of {self.unreduced})"
+
     @property
     def size(self) -> int:
         """n_r, both faces included."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from copy import copy
 from dataclasses import dataclass, field
 from typing import Any
@@ -53,6 +54,12 @@ class Contact:
     B: Any
     parameters: Mapping[str, Any] = field(default_factory=dict)
     name: str = "contact"
+
+    def __repr__(self) -> str:
+        law = self.law if isinstance(self.law, str) else type(self.law).__name__
+        given = "".join(f", {name}={_span(value)}" for name, value in self.parameters.items())
+        rows, n_dof = np.shape(by_sector(self.B)[0])
+        return f"Contact({self.name}: {law}, {rows} rows of B on {n_dof} dofs{given})"
 
     @property
     def components(self) -> int:
@@ -128,6 +135,12 @@ class Contact:
                 f"a number {sign} {low:g} {parameter.unit}" if low > -1e300 else f"a number [{parameter.unit}]",
                 "give a value within the bound; leave out pairs that stand for no area",
             )
+
+
+def _span(value: Any) -> str:
+    """A parameter in short: a number, or its least and largest over the pairs."""
+    low, high = float(np.min(value)), float(np.max(value))
+    return f"{low:g}" if low == high else f"{low:g} to {high:g}"
 
 
 class Model:
@@ -250,6 +263,14 @@ class Model:
         """A distributed vector from an array (n_dof,) given whole on every rank. Collective."""
         return PETSc.Vec().createWithArray(np.array(self.distribute(np.asarray(values, dtype=float))), comm=self.comm)
 
+    @contextmanager
+    def vectors(self, *values: Array) -> Iterator[list[PETSc.Vec]]:
+        """`vector` of each array, for a `with` block that they do not outlive. Collective."""
+        made = [self.vector(one) for one in values]
+        yield made
+        for vector in made:
+            vector.destroy()
+
     def gather_pairs(self, which: int, local: Array) -> Array | None:
         """Samples (.., n_pairs) of one contact in the order of B, on rank 0. Collective."""
         parts = self.comm.gather((self._pairs[which], local))
@@ -268,6 +289,11 @@ class Model:
         """`gather_pairs`, on every rank. Collective."""
         whole: Array = self.comm.bcast(self.gather_pairs(which, local))
         return whole
+
+    def __repr__(self) -> str:
+        wave = f", wave of {self.nodal_diameter} nodal diameters on {self.sectors} sectors" if self.sectors > 1 else ""
+        ranks = f", {self.comm.size} ranks" if self.comm.size > 1 else ""
+        return f"Model({self.n_dof} dofs, contacts {[contact.name for contact in self.contacts]}{wave}{ranks})"
 
     def destroy(self) -> None:
         """Free the matrices. Collective."""

@@ -31,6 +31,9 @@ class LinearMode:
     shape: Array
     imaginary: Array
 
+    def __repr__(self) -> str:
+        return f"LinearMode({self.frequency_hz:.6g} Hz, zeta {self.zeta:.6g}, {len(self.shape)} dofs)"
+
     @property
     def zeta(self) -> float:
         """Modal damping ratio beta / |lambda|."""
@@ -66,6 +69,9 @@ def linear_modes(model: Model, count: int = 6, contact: str = "stuck") -> list[L
         raise InputError("unknown state of contact", None, contact, "stuck, free or linearised", 'use contact="stuck"')
     found = _core.linear_modes(model.core, count, getattr(_core.ContactState, contact))
     shapes = [_whole(model, re) + 1j * _whole(model, im) for _, _, re, im in found]
+    for _, _, *parts in found:
+        for part in parts:
+            part.destroy()
     if model.core.travelling:
         shapes = [_aligned(phi) for phi in shapes]
     return [LinearMode(mode[0], mode[1], phi.real.copy(), phi.imag.copy()) for mode, phi in zip(found, shapes)]

@@ -84,9 +84,6 @@ class StaticPreload(HarmonicProblem):
             core.preload(model.vector(np.zeros(model.n_dof)), model.vector(constant))
         super().__init__(model, Harmonics([0], 2), prefix, core)
 
-    def state(self, y: PETSc.Vec) -> dict[str, float]:
-        return {}
-
     def at(self, displacement: Array, factor: float) -> PETSc.Vec:
         """Unknowns of a displacement (n_dof,) given whole on every rank, at a load factor. Collective."""
         y = self.core.initial()

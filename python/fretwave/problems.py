@@ -12,6 +12,7 @@ from petsc4py import PETSc
 from . import _core
 from .contact_history import MOTION
 from .errors import InputError
+from .hb.states import ForcedState, ModalState, State
 from .model import Model
 from .modes import LinearMode
 
@@ -34,6 +35,13 @@ class Harmonics:
         self.block_size: int = self.core.block_size
         self.labels = [label for n in self.orders for label in (["0"] if n == 0 else [f"{n}c", f"{n}s"])]
         self.left_out: list[str] = []
+
+    def __repr__(self) -> str:
+        step = self.orders[1] - self.orders[0] if len(self.orders) > 1 else 1
+        regular = self.orders == tuple(range(self.orders[0], self.orders[-1] + 1, step))
+        last = f"{self.orders[1]}, ..., {self.orders[-1]}" if len(self.orders) > 3 else ""
+        orders = f"{self.orders[0]}, {last}" if last and regular else ", ".join(map(str, self.orders))
+        return f"Harmonics({orders}; {self.samples} samples)"
 
 
 def choose_harmonics(model: Model, highest: int, samples: int | None = None, retain: str = "auto") -> Harmonics:
@@ -61,31 +69,46 @@ def choose_harmonics(model: Model, highest: int, samples: int | None = None, ret
 class HarmonicProblem:
     """N equations in N + 1 unknowns y: scaled harmonic coefficients, then scalars, the continuation parameter last."""
 
+    #: What its scalar unknowns mean; None where no table says.
+    meaning: State | None = None
+
     def __init__(self, model: Model, harmonics: Harmonics, prefix: str, core: Any) -> None:
         self.model, self.harmonics, self.prefix, self.core = model, harmonics, prefix, core
+
+    def initial(self, parameter: float) -> PETSc.Vec:
+        """A first guess at this amplitude or angular frequency. Collective."""
+        raise NotImplementedError
 
     def preload(self, displacement: Array, load: Array) -> None:
         """Dynamics about a static state (n_dof,) under the static load it balances, in place of any before. Collective.
 
         Harmonic 0 must be retained.
         """
-        self.core.preload(self.model.vector(displacement), self.model.vector(load))
+        with self.model.vectors(displacement, load) as vectors:
+            self.core.preload(*vectors)
 
-    def residual(self, y: PETSc.Vec) -> PETSc.Vec:
-        """r(y), dimensionless, N entries. Collective."""
-        r = self.core.equations()
+    def residual(self, y: PETSc.Vec, r: PETSc.Vec | None = None) -> PETSc.Vec:
+        """r(y), dimensionless, N entries, in `r` where one is given. Collective."""
+        r = self.core.equations() if r is None else r
         self.core.residual(y, r)
         return r
 
-    def jacobian(self, y: PETSc.Vec) -> PETSc.Mat:
-        """dr/dy assembled, N x (N + 1) AIJ. Collective."""
-        return self.core.jacobian(y)
+    def jacobian(self, y: PETSc.Vec, J: PETSc.Mat | None = None) -> PETSc.Mat:
+        """dr/dy assembled, N x (N + 1) AIJ, in the `J` of an earlier call where one is given. Collective."""
+        if J is None:
+            return self.core.jacobian(y)
+        self.core.fill_jacobian(y, J)
+        return J
 
-    def jacobian_product(self, y: PETSc.Vec, dy: PETSc.Vec) -> PETSc.Vec:
-        """dr/dy dy, matrix-free. Collective."""
-        r = self.core.equations()
+    def jacobian_product(self, y: PETSc.Vec, dy: PETSc.Vec, dr: PETSc.Vec | None = None) -> PETSc.Vec:
+        """dr/dy dy, matrix-free, in `dr` where one is given. Collective."""
+        r = self.core.equations() if dr is None else dr
         self.core.product(y, dy, r)
         return r
+
+    def scalars(self, y: PETSc.Vec) -> Array:
+        """Scalar unknowns, then the scaled fundamental (c, s) of `dof` and the unfolding, linear in y. Collective."""
+        return np.array(self.core.scalars(y))
 
     def last_entry(self, y: PETSc.Vec) -> float:
         """The parameter's entry of unknowns or a tangent, on every rank. Collective."""
@@ -94,7 +117,9 @@ class HarmonicProblem:
 
     def coefficients(self, y: PETSc.Vec) -> Array | None:
         """Harmonic coefficients Q (n_dof, m) in physical units, columns `harmonics.labels`, on rank 0. Collective."""
-        parts = self.model.comm.gather(self.core.coefficients(y).getArray(readonly=True).copy())
+        Q = self.core.coefficients(y)
+        parts = self.model.comm.gather(Q.getArray(readonly=True).copy())
+        Q.destroy()
         return None if parts is None else np.concatenate(parts).reshape(-1, self.harmonics.block_size)
 
     def diagnostics(self, y: PETSc.Vec) -> dict[str, float]:
@@ -163,7 +188,13 @@ class HarmonicProblem:
 
     def state(self, y: PETSc.Vec) -> dict[str, float]:
         """What a table of the branch says of this point. Collective."""
-        raise NotImplementedError
+        return {} if self.meaning is None else self.meaning(self.core.scalars(y))
+
+    def _what(self) -> str:
+        return ""
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self._what()}{self.harmonics}, {self.model})"
 
     def destroy(self) -> None:
         """Free the solver's vectors. Collective."""
@@ -212,11 +243,17 @@ class NonlinearMode(HarmonicProblem):
 
             start = linear_modes(model, 1)[0]
         self.method, self.dof, self.start = method, dof, start
-        shape = (model.vector(start.shape), model.vector(start.imaginary))
-        core = _core.NonlinearMode(model.core, harmonics.core, getattr(_core.Method, method), dof, start.omega, *shape)
+        known = model.core, harmonics.core, getattr(_core.Method, method), dof, start.omega
+        with model.vectors(start.shape, start.imaginary) as shape:
+            core = _core.NonlinearMode(*known, *shape)
         if avoid is not None:
-            core.unfold(model.vector(np.real(avoid)), model.vector(np.imag(avoid)))
+            with model.vectors(np.real(avoid), np.imag(avoid)) as other:
+                core.unfold(*other)
         super().__init__(model, harmonics, prefix, core)
+        self.meaning = ModalState(method, start.omega)
+
+    def _what(self) -> str:
+        return f"{self.method} from {self.start.frequency_hz:.6g} Hz, amplitude of dof {self.dof}, "
 
     def initial(self, amplitude: float) -> PETSc.Vec:
         """The linear mode at this amplitude. Collective."""
@@ -225,17 +262,6 @@ class NonlinearMode(HarmonicProblem):
     def unfolding(self, y: PETSc.Vec) -> Array:
         """The force along the avoided mode (2,), dimensionless; empty without `avoid`. Collective."""
         return np.asarray(self.core.unfolding(y))
-
-    def state(self, y: PETSc.Vec) -> dict[str, float]:
-        amplitude, omega, omega0, beta, zeta = self.core.state(y)
-        return {
-            "amplitude": amplitude,
-            "omega": omega,
-            "omega0": omega0,
-            "frequency_hz": omega / (2 * np.pi),
-            "beta": beta,
-            "zeta": zeta,
-        }
 
 
 class ForcedResponse(HarmonicProblem):
@@ -262,9 +288,12 @@ class ForcedResponse(HarmonicProblem):
         prefix: str = "forced_",
     ) -> None:
         self.dof, self.level, self.reference = dof, level, reference
-        shape, P = model.vector(reference.shape), self._blocks(model, harmonics, force)
-        core = _core.ForcedResponse(model.core, harmonics.core, dof, P, level, reference.omega, shape)
+        P = self._blocks(model, harmonics, force)
+        with model.vectors(reference.shape) as (shape,):
+            core = _core.ForcedResponse(model.core, harmonics.core, dof, P, level, reference.omega, shape)
+        P.destroy()
         super().__init__(model, harmonics, prefix, core)
+        self.meaning = ForcedState(level, reference.omega, core.reference_amplitude)
 
     @staticmethod
     def _blocks(model: Model, harmonics: Harmonics, force: Mapping[int, npt.NDArray[Any]]) -> PETSc.Vec:
@@ -286,16 +315,9 @@ class ForcedResponse(HarmonicProblem):
         local = model.distribute(blocks).ravel().copy()
         return PETSc.Vec().createWithArray(local, comm=model.comm)
 
+    def _what(self) -> str:
+        return f"level {self.level:g}, dof {self.dof}, "
+
     def initial(self, omega: float) -> PETSc.Vec:
         """Zero motion at this angular frequency: Newton's first step is the linear response. Collective."""
         return self.core.initial(omega)
-
-    def state(self, y: PETSc.Vec) -> dict[str, float]:
-        level, omega, amplitude, phase = self.core.state(y)
-        return {
-            "level": level,
-            "omega": omega,
-            "frequency_hz": omega / (2 * np.pi),
-            "amplitude": amplitude,
-            "phase": phase,
-        }

@@ -42,6 +42,9 @@ class FrequencyError:
     relative: Array
     wall_s: float
 
+    def __repr__(self) -> str:
+        return f"FrequencyError({len(self.relative)} modes, largest {self.largest:.2g})"
+
     @property
     def largest(self) -> float:
         """Largest relative error in magnitude."""
@@ -76,6 +79,9 @@ class Reduction:
         self.C: Array | None = core.C
         self.component_hz: Array = np.asarray(core.component_omega) / (2 * np.pi)
         self.wall_s: dict[str, float] = {**core.times, "total": wall}
+
+    def __repr__(self) -> str:
+        return f"Reduction({len(self.keep)} kept dofs and {self.size - len(self.keep)} modes, of {self._model})"
 
     @property
     def size(self) -> int:

@@ -62,6 +62,9 @@ class Transient:
         ]
         self._core = _core.Transient(model.core, parts, float(omega or 0.0), prefix)
 
+    def __repr__(self) -> str:
+        return f"Transient(of {self.model})"
+
     def run(
         self,
         x0: Array,

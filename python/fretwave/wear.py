@@ -106,6 +106,9 @@ class Wear:
         self.step = step or self.control.first or self._first_step()
         self._spent = [0, 0]
 
+    def __repr__(self) -> str:
+        return f"Wear({self.eta:g} of {self.cycles:g} cycles: {self.reason or 'under way'}, of {self.mode})"
+
     def _first_step(self) -> float:
         """A tenth of the allowed change at the present rates."""
         fastest = float((self.state.rate / self.depth_scale).max(initial=0.0))

@@ -86,6 +86,9 @@ class WornMode:
         self._row.set(0.0)
         self._set_last(self._row, 1.0)
 
+    def __repr__(self) -> str:
+        return f"WornMode({len(self.areas)} pairs, k_w = {self.coefficient:g} 1/Pa, of {self.problem})"
+
     def _check(self, name: str, names: list[str]) -> None:
         if name not in names:
             raise InputError("there is no such contact", None, name, ", ".join(names), "name one of these")

@@ -82,12 +82,6 @@ std::vector<solve::TestFunction> ForcedResponse::tests(Vec y, Vec tangent) {
   return {{"peak", square > 0 ? (z[1] * dz[1] + z[2] * dz[2]) / square : 0, true, false}};
 }
 
-ForcedState ForcedResponse::state(Vec y) {
-  const auto z = scalars(y);
-  const double cosine = amplitude_ * z[1], sine = amplitude_ * z[2];
-  return {level_, z[0] * omega_reference_, std::hypot(cosine, sine), std::atan2(-sine, cosine)};
-}
-
 ForcedStart::ForcedStart(ForcedResponse& to, Vec y, Way way)
     : HarmonicProblem(to.model(), to.harmonics(), 1, to.dof(), to.stiffness_scale()),
       way_(way),

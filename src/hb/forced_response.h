@@ -3,10 +3,6 @@
 
 namespace fretwave::hb {
 
-struct ForcedState {
-  double level, omega, amplitude, phase;
-};
-
 /// Steady response to a periodic excitation, s_n = i n w: y = (Q/a_ref, w/w_ref), w the continuation
 /// parameter.
 class ForcedResponse : public HarmonicProblem {
@@ -17,9 +13,6 @@ class ForcedResponse : public HarmonicProblem {
                  Vec shape);
   /// Zero motion at angular frequency w: Newton's first step is then the linear response. Collective.
   VecHandle initial(double omega);
-  /// Amplitude and phase of the observed dof's fundamental, x = A cos(w t + phase).
-  ForcedState state(Vec y);
-
   double reference_amplitude() const { return amplitude_; }
 
   double parameter_value(double entry) const override { return entry * omega_reference_; }

@@ -98,18 +98,6 @@ ScaledMotion NonlinearMode::motion(std::vector<double> const& z) const {
   return out;
 }
 
-ModalState NonlinearMode::state(Vec y) {
-  const auto z = scalars(y);
-  const double beta = z[0] * omega_reference_, w = z[1] * omega_reference_;
-  if (method_ == Method::CNM) {
-    const double omega0 = std::hypot(beta, w);
-    return {std::exp(z[2]), w, omega0, beta, beta / omega0};
-  }
-  // reported as w = w0 sqrt(1 - zeta^2); above 1 the free motion creeps back: its frequency is zero
-  const double zeta = beta / w;
-  return {std::exp(z[2]), w * std::sqrt(std::max(0.0, (1 - zeta) * (1 + zeta))), w, beta, zeta};
-}
-
 bool NonlinearMode::scale(Vec y) {
   const PetscInt m = harmonics().block_size(), fundamental = harmonics().offset(harmonics().fundamental());
   VecHandle re = like(shape_), im = like(shape_);

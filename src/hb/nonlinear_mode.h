@@ -9,13 +9,8 @@ enum class Method {
   EPMC  ///< extended periodic motion concept, s_n = i n w0, damping C - 2 zeta w0 M (Krack 2015)
 };
 
-/// omega is that of the free decay, 0 where it does not oscillate (EPMC with |zeta| >= 1).
-struct ModalState {
-  double amplitude, omega, omega0, beta, zeta;
-};
-
 /// A family of decaying motions over the modal amplitude a: y = (Q/a, beta/w_ref, w/w_ref, log a), w = w0 for
-/// EPMC.
+/// EPMC. What these say of frequency and damping is in python/fretwave/hb/states.py.
 class NonlinearMode : public HarmonicProblem {
  public:
   /// Started from a linear mode, angular frequency and complex shape (real and imaginary part), normalised on
@@ -24,7 +19,6 @@ class NonlinearMode : public HarmonicProblem {
                 Vec imaginary);
   /// The linear mode at amplitude a. Collective.
   VecHandle initial(double amplitude);
-  ModalState state(Vec y);
   Method method() const { return method_; }
   /// k_ref of the motion at y in place of the starting mode's, by powers of 16: a contact far stiffer than
   /// what moves once it slips would hide every other force behind its own.

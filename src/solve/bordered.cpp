@@ -107,11 +107,17 @@ void Bordered::assemble(Vec y, Mat J) {
 MatHandle assemble(Problem& problem, Vec y) {
   std::vector<PetscInt> rows, cols;
   problem.pattern(rows, cols);
-  std::vector<double> v(rows.size());
   MatHandle J = coo_matrix(problem.comm(), problem.local_equations(), local_size(y), rows, cols);
+  assemble(problem, y, J);
+  return J;
+}
+
+void assemble(Problem& problem, Vec y, Mat J) {
+  std::vector<PetscInt> rows, cols;
+  problem.pattern(rows, cols);
+  std::vector<double> v(rows.size());
   problem.values(y, v);
   check(MatSetValuesCOO(J, v.data(), INSERT_VALUES));
-  return J;
 }
 
 }  // namespace fretwave::solve

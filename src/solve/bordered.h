@@ -32,5 +32,7 @@ class Bordered {
 
 /// J(y) of the problem alone, N x (N + 1) AIJ. Collective.
 MatHandle assemble(Problem&, Vec y);
+/// The same in a matrix that this made. Collective.
+void assemble(Problem&, Vec y, Mat J);
 
 }  // namespace fretwave::solve

@@ -61,21 +61,10 @@ def record(
         The row as written.
     """
     from .. import _core
+    from ..solve.follow import row_of
 
     _core.fault_point("record")
-    state, diagnostics = problem.state(point.y), problem.diagnostics(point.y)
-    row = {
-        **state,
-        **diagnostics,
-        "point": writer.rows,
-        "residual": point.residual,
-        "newton": point.newton,
-        "linear": point.linear,
-        "wall_s": point.wall_s,
-        "rounding": point.rounding,
-        "accepted": point.accepted,
-        "event": point.event,
-    }
+    row = row_of(problem, point, writer.rows)
     motions = None
     if point.event not in PLAIN_EVENTS:
         periods = problem.contact_history(point.y)
@@ -145,18 +134,9 @@ def tell_fallbacks(context: Any, branch: Any) -> None:
 
 def points_of(branch: Any) -> Iterator[Any]:
     """Points of a branch; their vectors are freed a point later, for the branch may look back at its last one."""
-    before = None
-    for point in branch:
-        yield point
-        _free(before)
-        before = point
-    _free(before)
+    from ..solve.follow import points_of
 
-
-def _free(point: Any) -> None:
-    if point is not None:
-        point.y.destroy()
-        point.tangent.destroy()
+    return points_of(branch)
 
 
 def split_state(state: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:

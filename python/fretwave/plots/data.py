@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from ..analyses.mode_curve import ModeCurve
 from ..contact_laws import UNKNOWN, Role, kept_laws
+from ..errors import InputError
 from ..harmonic_motion import motion
 from ..results_file import has_results, open_results
 
@@ -50,10 +51,23 @@ class Analysis:
     def __len__(self) -> int:
         return len(next(iter(self.columns.values()), ()))
 
-    def coefficients(self, points: Sequence[int]) -> Array:
-        """Physical harmonic coefficients (len(points), n_dof, m) of some points."""
+    def __getitem__(self, column: str) -> Any:
+        """A column of the table, "event" among them."""
+        if column == "event":
+            return np.array(self.events)
+        if column not in self.columns:
+            raise KeyError(f"no column '{column}' in '{self.name}'; there are {', '.join(self.columns)}")
+        return self.columns[column]
+
+    def __repr__(self) -> str:
+        status = self.attributes.get("status", "")
+        return f"Analysis('{self.name}', {self.kind}, {len(self)} points, {status}: {', '.join(self.columns)})"
+
+    def coefficients(self, points: Sequence[int] | None = None) -> Array:
+        """Harmonic coefficients (len(points), n_dof, m) [m] of some points or all; axes as `dofs` and `labels`."""
         with open_results(self.path) as file:
-            return np.stack([file[self.name]["coefficients"][p] for p in points])
+            found = file[self.name]["coefficients"]
+            return np.asarray(found) if points is None else np.stack([found[p] for p in points])
 
     def loop(self, contact: str, point: int) -> Table:
         """Motion of a contact over one period: u, v, f (n_samples, components, n_pairs).
@@ -151,6 +165,25 @@ class Analysis:
         return ModeCurve.from_table(self.columns)
 
 
+def open_run(folder: str | Path) -> Run:
+    """Read a run that is done, still going on, or was killed; neither MPI nor PETSc is needed.
+
+    Returns
+    -------
+    Run
+        Analyses by name: ``run["mode"]["zeta"]`` is a column, ``run["mode"].coefficients([3])`` the harmonics of a
+        point. ``run.table(name)`` reads any CSV of the folder.
+
+    Raises
+    ------
+    InputError
+        There are no results, or they are damaged.
+    """
+    if not has_results(Path(folder)):
+        raise InputError("there are no results here", str(folder), fix="give the folder of a run")
+    return Run(folder)
+
+
 class Run:
     """The analyses and tables of a run folder."""
 
@@ -163,6 +196,23 @@ class Run:
                 groups = {name: group for name, group in file.items() if "type" in group.attrs}
                 self.analyses = {name: _analysis(group, path) for name, group in groups.items()}
         self.title = str(self._attribute("title") or self.folder.name)
+
+    def __getitem__(self, name: str) -> Analysis:
+        if name not in self.analyses:
+            raise KeyError(f"no analysis '{name}' in {self.folder}; there are {', '.join(self.analyses)}")
+        return self.analyses[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.analyses)
+
+    def __len__(self) -> int:
+        return len(self.analyses)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.analyses
+
+    def __repr__(self) -> str:
+        return "\n".join([f"Run of '{self.title}' in {self.folder}", *(f"  {a}" for a in self.analyses.values())])
 
     def of_kind(self, kind: str) -> list[Analysis]:
         """Analyses of a type that have at least one point."""

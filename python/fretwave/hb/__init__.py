@@ -1,0 +1,1 @@
+"""Harmonic balance: what its unknowns are and mean."""

@@ -1,0 +1,79 @@
+"""What the scalar unknowns of a problem mean: frequency, damping, amplitude. Plain numbers, no PETSc.
+
+The scalars of unknowns y are linear in y: the problem's own (frequency, ...), then the fundamental's coefficients
+(c, s) of the chosen dof, scaled. Whoever has them has the state, of a point as of what lies between two points.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass
+from typing import Any, ClassVar, Union
+
+import numpy as np
+import numpy.typing as npt
+
+
+@dataclass(frozen=True)
+class ModalState:
+    """Scalars (beta / w_ref, w / w_ref, log a, ...) of a nonlinear mode; w = w0 for EPMC.
+
+    Examples
+    --------
+    >>> ModalState("CNM", 10.0)([0.3, 0.4, 0.0])["zeta"]
+    0.6
+    """
+
+    kind: ClassVar[str] = "mode"
+    #: The continuation parameter as users call it.
+    parameter: ClassVar[str] = "amplitude"
+    columns: ClassVar[tuple[str, ...]] = ("amplitude", "omega", "omega0", "frequency_hz", "beta", "zeta")
+    method: str
+    omega_reference: float
+
+    def __call__(self, z: npt.ArrayLike) -> dict[str, float]:
+        """The columns of these scalars."""
+        v: list[float] = np.asarray(z, dtype=float).tolist()
+        beta, w = v[0] * self.omega_reference, v[1] * self.omega_reference
+        omega, omega0 = w, float(np.hypot(beta, w))
+        zeta = beta / omega0
+        if self.method == "EPMC":
+            # above 1 the free motion creeps back: its frequency is zero
+            omega0, zeta = w, beta / w
+            omega = w * math.sqrt(max(0.0, (1 - zeta) * (1 + zeta)))
+        values = (math.exp(v[2]), omega, omega0, omega / (2 * math.pi), beta, zeta)
+        return dict(zip(self.columns, values))
+
+
+@dataclass(frozen=True)
+class ForcedState:
+    """Scalars (w / w_ref, c, s, ...) of a forced response, x = a_ref (c cos w t + s sin w t) = A cos(w t + phase)."""
+
+    kind: ClassVar[str] = "forced"
+    parameter: ClassVar[str] = "omega"
+    columns: ClassVar[tuple[str, ...]] = ("level", "omega", "frequency_hz", "amplitude", "phase")
+    level: float
+    omega_reference: float
+    amplitude_reference: float
+
+    def __call__(self, z: npt.ArrayLike) -> dict[str, float]:
+        """The columns of these scalars."""
+        v: list[float] = np.asarray(z, dtype=float).tolist()
+        omega = v[0] * self.omega_reference
+        cosine, sine = self.amplitude_reference * v[1], self.amplitude_reference * v[2]
+        amplitude, phase = float(np.hypot(cosine, sine)), math.atan2(-sine, cosine)
+        return dict(zip(self.columns, (self.level, omega, omega / (2 * math.pi), amplitude, phase)))
+
+
+State = Union[ModalState, ForcedState]
+
+
+def described(state: State) -> dict[str, Any]:
+    """The state's kind and numbers, from which `state_of` makes it again."""
+    return {"kind": state.kind, **asdict(state)}
+
+
+def state_of(description: dict[str, Any]) -> State:
+    """The inverse of `described`."""
+    given = dict(description)
+    return ModalState(**given) if given.pop("kind") == ModalState.kind else ForcedState(**given)

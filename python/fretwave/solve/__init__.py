@@ -1,0 +1,1 @@
+"""Following branches, and what comes of it."""

@@ -1,0 +1,253 @@
+"""A branch as an object: its table, its events, and the cubic that runs through its points.
+
+Neither PETSc nor MPI is needed to read one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from ..columns import Column
+from ..errors import FretwaveError, InputError
+from ..hb.states import State
+from .hermite import Cubic
+from .table import Table, state_columns
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from .unknowns import Unknowns
+
+Array = npt.NDArray[np.float64]
+
+#: Parts of a step in which a value is looked for on its cubic.
+PARTS = 8
+#: A value this close to that of an end, relative, is met there.
+AT_THE_END = 1e-10
+#: Of a column's change over a part of a step, what may be left at a crossing: a jump of the phase by 2 pi is none.
+LEFT_OVER = 1e-6
+
+
+class Event(NamedTuple):
+    """What was met on a branch, and at which row: start, stop, report, fold, peak, zero_damping or peak_damping."""
+
+    name: str
+    row: int
+
+
+class Branch(Table):
+    """A branch of nonlinear modes or forced responses, as `fretwave.follow` returns it.
+
+    Columns by name (``branch["zeta"]``), rows by number (``branch[3]``), the same as in the CSV of a run.
+
+    Attributes
+    ----------
+    converged : bool
+        It ended as asked.
+    reason : str
+        Why it ended.
+    missed : list of str
+        Reports and events that could not be had, each with its reason.
+    started : str
+        How the first point was found, where Newton did not find it from the first guess.
+    meaning : State
+        What its scalar unknowns mean.
+    curves : Cubic
+        The scalar unknowns along the branch.
+    """
+
+    def __init__(
+        self,
+        columns: Sequence[Column],
+        values: Mapping[str, Any],
+        meaning: State,
+        curves: Cubic,
+        converged: bool,
+        reason: str,
+        missed: Sequence[str] = (),
+        started: str = "",
+        unknowns: Unknowns | None = None,
+        comm: Any = None,
+    ) -> None:
+        super().__init__(columns, values)
+        self.meaning, self.curves = meaning, curves
+        self.converged, self.reason, self.missed, self.started = converged, reason, list(missed), started
+        self._unknowns, self._comm = unknowns, comm
+
+    @property
+    def events(self) -> list[Event]:
+        """What was met, in order."""
+        return [Event(name, row) for row, text in enumerate(self["event"]) for name in text.split()]
+
+    def met(self, event: str) -> list[int]:
+        """Rows at which an event was met."""
+        return [row for name, row in self.events if name == event]
+
+    def at(self, value: float | Sequence[float] | None = None, **where: float | Sequence[float]) -> Table:
+        """Every place where the branch passes a value, with the state there.
+
+        Read off the cubic through the two points beside it and their tangents, on which the unknowns lie, so that the
+        error falls with the fourth power of the step. Two crossings within an eighth of a step, about an extremum that
+        is no event, may be missed.
+
+        Parameters
+        ----------
+        value : float or sequence
+            Of the continuation parameter: amplitude of a mode, omega of a response.
+        where : one column of the state and its value, in place of `value`
+            ``branch.at(zeta=0.02)``.
+
+        Returns
+        -------
+        Table
+            One row per crossing in the order of the branch, value by value: several where it folds, none where it does
+            not pass. Column `place` is for `unknowns` and `coefficients`.
+
+        Raises
+        ------
+        InputError
+            No such column, or a branch without points.
+        """
+        name, values = self._asked(value, where)
+        return self._read([place for one in values for place in self._crossings(name, float(one))])
+
+    def curve(self, n: int = PARTS) -> Table:
+        """The branch for drawing: the state at every point, and at n - 1 places of the cubic between two points."""
+        return self._read(self.curves.places(n))
+
+    def unknowns(self, place: float) -> Any:
+        """Unknowns y at a place (`at`, or a row's number), a Vec of the caller's: where Newton may start. Collective.
+
+        Raises
+        ------
+        InputError
+            They were not kept, or the branch was loaded from a file.
+        """
+        return self._kept().vector(place)
+
+    def coefficients(self, place: float) -> Array | None:
+        """Harmonic coefficients (n_dof, m) [m] at a place, columns `harmonics.labels`, on rank 0. Collective."""
+        kept = self._kept()
+        y = kept.vector(place)
+        found: Array | None = kept.problem.coefficients(y)
+        y.destroy()
+        return found
+
+    def plot(self) -> Figure:
+        """Frequency and damping over amplitude of a mode, amplitude and phase over frequency of a response.
+
+        Drawn along the cubic, points and events on it. `figure.savefig` writes it.
+        """
+        from ..plots.branch import draw
+
+        return draw(self)
+
+    def save(self, path: str | Path) -> None:
+        """Write it as HDF5 that netCDF readers (xarray) open as well; rank 0 writes. Collective.
+
+        All but the unknowns is kept: table, events, and the curve.
+        """
+        from .branch_file import write
+
+        self._once(lambda: write(self, Path(path)))
+
+    @classmethod
+    def load(cls, path: str | Path) -> Branch:
+        """The branch of a file that `save` wrote."""
+        from .branch_file import read
+
+        return read(Path(path))
+
+    def to_csv(self, path: str | Path) -> None:
+        """Write its table as that of a run is written; rank 0 writes. Collective."""
+        self._once(lambda: super(Branch, self).to_csv(path))
+
+    def to_xarray(self) -> Any:
+        """Its table as `xarray.Dataset` over the dimension `point`; xarray must be installed."""
+        import xarray  # type: ignore[import-not-found,unused-ignore]
+
+        return xarray.Dataset(
+            {
+                c.name: ("point", self[c.name], {"units": c.unit, "long_name": c.long_name})
+                for c in self.columns
+                if c.name != "point"
+            },
+            coords={"point": self["point"]},
+            attrs={"converged": int(self.converged), "reason": self.reason},
+        )
+
+    def __repr__(self) -> str:
+        ended = "as asked" if self.converged else "before its end"
+        lines = [f"Branch of {len(self)} points, ended {ended}: {self.reason}", self.text()]
+        return "\n".join([*lines, *(f"missed: {text}" for text in self.missed)])
+
+    def _asked(self, value: Any, where: Mapping[str, Any]) -> tuple[str, Array]:
+        given = {**({} if value is None else {self.meaning.parameter: value}), **where}
+        known = [name for name in self.meaning.columns if name != "level"]
+        if len(given) != 1 or not set(given) <= set(known):
+            text = ", ".join(f"{name}={one}" for name, one in given.items()) or "nothing"
+            raise InputError(
+                "the branch cannot be read at this", None, text, "one of " + ", ".join(known), f"at({known[0]}=...)"
+            )
+        if not len(self):
+            raise InputError(
+                "the branch has no points", None, self.reason, "one at least", "find a first point: other start or stop"
+            )
+        name = next(iter(given))
+        return name, np.atleast_1d(np.asarray(given[name], dtype=float))
+
+    def _crossings(self, name: str, value: float) -> list[float]:
+        """Places where a column of the state has this value."""
+        from scipy.optimize import brentq
+
+        def off(place: float) -> float:
+            return self.meaning(self.curves(place))[name] - value
+
+        places, left = self._parts["place"], self._parts[name] - value
+        for end in (0, -1):
+            if abs(left[end]) <= AT_THE_END * abs(value):
+                left[end] = 0.0
+        found = [0.0] if left[0] == 0 else []
+        for k in range(len(places) - 1):
+            if left[k + 1] == 0:
+                found.append(float(places[k + 1]))
+            elif left[k] * left[k + 1] < 0:
+                place = brentq(off, places[k], places[k + 1], xtol=1e-13)
+                if abs(off(place)) <= LEFT_OVER * abs(left[k + 1] - left[k]):
+                    found.append(float(place))
+        return found
+
+    @cached_property
+    def _parts(self) -> Table:
+        return self.curve(PARTS)
+
+    def _read(self, places: Sequence[float] | Array) -> Table:
+        rows = [{"place": place, **self.meaning(self.curves(place))} for place in places]
+        return Table.of_rows(state_columns(self.meaning.columns), rows)
+
+    def _kept(self) -> Unknowns:
+        if self._unknowns is None:
+            fix = "follow it with unknowns=True (the default) in this script"
+            raise InputError("the branch has no unknowns", None, "its table and its curve alone", None, fix)
+        if self._unknowns.problem.core is None:
+            raise InputError("the branch's problem has been destroyed", fix="read the branch before problem.destroy()")
+        return self._unknowns
+
+    def _once(self, write: Callable[[], None]) -> None:
+        """On one rank; what it raises is raised on all."""
+        error: FretwaveError | None = None
+        if self._comm is None or self._comm.rank == 0:
+            try:
+                write()
+            except FretwaveError as found:
+                error = found
+        if self._comm is not None:
+            error = self._comm.bcast(error)
+        if error is not None:
+            raise error

@@ -1,0 +1,95 @@
+"""A branch in a file: HDF5 as netCDF-4 wants it, every dimension with its coordinate in the same group."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..columns import COLUMNS, Column
+from ..errors import InputError
+from ..files import replaced
+from ..hb.states import described, state_of
+from .branch import Branch
+from .hermite import Cubic
+
+#: What the file says it is.
+FORMAT = "fretwave branch 1"
+
+
+def write(branch: Branch, path: Path) -> None:
+    """Table over `point`, curve over `point`, `piece` and `scalar`; the rest as attributes."""
+    import h5py
+
+    curves = branch.curves
+    with replaced(path) as fresh, h5py.File(fresh, "w", track_order=True) as file:
+        for column in [column for column in branch.columns if column.name != "point"]:
+            _put(file, column, branch[column.name], ["point"])
+        _put(file, _SCALARS, curves.values, ["point", "scalar"])
+        _put(file, _BEGIN, curves.begin, ["piece", "scalar"])
+        _put(file, _END, curves.end, ["piece", "scalar"])
+        file.attrs.update(
+            format=FORMAT,
+            meaning=json.dumps(described(branch.meaning)),
+            columns=json.dumps(branch.names),
+            converged=int(branch.converged),
+            reason=branch.reason,
+            missed=json.dumps(branch.missed),
+            started=branch.started,
+        )
+
+
+def read(path: Path) -> Branch:
+    """The branch that `write` wrote.
+
+    Raises
+    ------
+    InputError
+        There is no such file, or it holds no branch.
+    """
+    import h5py
+
+    try:
+        with h5py.File(path, "r") as file:
+            found = dict(file.attrs)
+            values = {name: file[name][()] for name in file}
+    except OSError as error:
+        text = " ".join(str(error).split())
+        raise InputError("there is no branch to read", str(path), text, None, "give a file of Branch.save") from None
+    if found.get("format") != FORMAT:
+        measured = str(found.get("format", "another format"))
+        raise InputError("the file holds no branch", str(path), measured, FORMAT, "give a file of Branch.save")
+    columns = [COLUMNS[name] for name in json.loads(found["columns"])]
+    values["event"] = np.array([text.decode() for text in values["event"]], dtype=str)
+    return Branch(
+        columns,
+        values,
+        state_of(json.loads(found["meaning"])),
+        Cubic(values["scalars"], values["slope_begin"], values["slope_end"]),
+        bool(found["converged"]),
+        str(found["reason"]),
+        json.loads(found["missed"]),
+        str(found["started"]),
+    )
+
+
+_SCALARS = Column("scalars", "1", "scalar unknowns of the points")
+_BEGIN = Column("slope_begin", "1", "derivative of the scalars by the share of a step, at its begin")
+_END = Column("slope_end", "1", "derivative of the scalars by the share of a step, at its end")
+
+
+def _put(file: Any, column: Column, values: Any, dimensions: list[str]) -> None:
+    """A variable on its dimensions, which are made with the first variable that has them."""
+    import h5py
+
+    text = column.kind == "s"
+    data = np.array([str(value) for value in values], dtype=object) if text else np.asarray(values)
+    variable = file.create_dataset(column.name, data=data, dtype=h5py.string_dtype() if text else None)
+    variable.attrs.update(units=column.unit, long_name=column.long_name)
+    for axis, (name, size) in enumerate(zip(dimensions, data.shape)):
+        if name not in file:
+            file.create_dataset(name, data=np.arange(size))
+            file[name].make_scale(name)
+        variable.dims[axis].attach_scale(file[name])

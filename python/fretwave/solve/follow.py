@@ -1,0 +1,161 @@
+"""Follow a problem's branch to its end and keep what was found."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..columns import FORCED, MODE, columns_named
+from ..continuation import Continuation, Point, StepControl
+from ..errors import InputError
+from ..problems import HarmonicProblem
+from .branch import Branch
+from .hermite import Cubic
+from .table import Table
+from .unknowns import Unknowns
+
+Array = npt.NDArray[np.float64]
+
+
+def follow(
+    problem: HarmonicProblem,
+    start: Any,
+    stop: float | tuple[float, float],
+    *,
+    steps: StepControl | None = None,
+    report_at: Sequence[float] = (),
+    unknowns: bool = True,
+    tell: Callable[[dict[str, Any]], None] | None = None,
+) -> Branch:
+    """Follow a nonlinear mode over its amplitude, or a forced response over its frequency. Collective.
+
+    The table of the branch is on every rank, the unknowns stay where they are. Nothing is left to be destroyed.
+
+    Parameters
+    ----------
+    start : float or Vec
+        Amplitude [m] or omega [rad/s] of the first point, or unknowns from which Newton finds it.
+    stop : float or (low, high)
+        Where the branch shall end: beyond the start in its direction, or the range that it shall not leave.
+    steps : StepControl, optional
+        Lengths of its steps.
+    report_at : sequence of float
+        Amplitudes or omegas at which points are located.
+    unknowns : bool
+        Keep the unknowns of all points (2 x 8 bytes for each of every point's), for `Branch.unknowns` and
+        `Branch.coefficients`.
+    tell : callable, optional
+        Given every row when it is found, on every rank: a dict by column, with the other `diagnostics`.
+
+    Returns
+    -------
+    Branch
+        Also where the branch breaks off, or has no first point: `converged` and `reason` say so.
+
+    Raises
+    ------
+    InputError
+        The range is empty, or the problem is none of these.
+
+    Examples
+    --------
+    A mass on a spring of 4 N/m and one of 5 N/m that slips at 1 N:
+
+    >>> import fretwave as fw
+    >>> slider = fw.Contact("jenkins", [[1.0]], {"tangential_stiffness": 5.0, "friction_limit": 1.0})
+    >>> model = fw.Model([[1.0]], [[4.0]], contacts=[slider])
+    >>> mode = fw.NonlinearMode(model, fw.choose_harmonics(model, 1))
+    >>> branch = fw.follow(mode, 0.1, 4.0)
+    >>> branch.reason
+    'stop value reached'
+    >>> [f"{omega:.2f}" for omega in branch.at([0.15, 2.0])["omega"]]  # stuck: sqrt(4 + 5)
+    ['3.00', '2.07']
+    >>> branch.events[-1]
+    Event(name='stop', row=...)
+    """
+    if problem.meaning is None:
+        given, fix = type(problem).__name__, "follow it with fw.Continuation"
+        raise InputError("the problem has no branch with a table", None, given, "NonlinearMode or ForcedResponse", fix)
+    own = hasattr(start, "getArray")
+    y0 = start if own else problem.initial(float(start))
+    first = problem.core.parameter_value(problem.last_entry(y0)) if own else float(start)
+    low, high, upwards = _range(first, stop)
+    continuation = Continuation(problem, y0, (low, high), steps, report_at, upwards)
+    kept = Unknowns(problem, unknowns)
+    rows: list[dict[str, Any]] = []
+    scalars: list[Array] = []
+    tangents: list[Array] = []
+    for point in points_of(continuation):
+        kept.add(point.y, point.tangent)
+        scalars.append(problem.scalars(point.y))
+        tangents.append(problem.scalars(point.tangent))
+        # each rank has measured its own wall time
+        rows.append(problem.model.comm.bcast(row_of(problem, point, len(rows))))
+        if tell is not None:
+            tell(rows[-1])
+    ended = continuation.converged, continuation.reason, continuation.missed, continuation.started
+    continuation.destroy()
+    kept.close()
+    if not own:
+        y0.destroy()
+    columns = columns_named(MODE if problem.meaning.kind == "mode" else FORCED)
+    table = Table.of_rows(columns, rows)
+    values = {name: table[name] for name in table.names}
+    curves = _curves(scalars, tangents, kept)
+    return Branch(columns, values, problem.meaning, curves, *ended, kept if unknowns else None, problem.model.comm)
+
+
+def row_of(problem: HarmonicProblem, point: Point, number: int) -> dict[str, Any]:
+    """What the table of a branch says of a point. Collective."""
+    return {
+        **problem.state(point.y),
+        **problem.diagnostics(point.y),
+        "point": number,
+        "residual": point.residual,
+        "newton": point.newton,
+        "linear": point.linear,
+        "wall_s": point.wall_s,
+        "rounding": point.rounding,
+        "accepted": point.accepted,
+        "event": point.event,
+    }
+
+
+def points_of(branch: Continuation) -> Iterator[Point]:
+    """Points of a branch; their vectors are freed a point later, for the branch may look back at its last one."""
+    before = None
+    for point in branch:
+        yield point
+        _free(before)
+        before = point
+    _free(before)
+
+
+def _free(point: Point | None) -> None:
+    if point is not None:
+        point.y.destroy()
+        point.tangent.destroy()
+
+
+def _range(first: float, stop: float | tuple[float, float]) -> tuple[float, float, bool | None]:
+    """Ends of the range, and whether the parameter grows at first (None: away from the nearer end)."""
+    if np.ndim(stop):
+        low, high = (float(value) for value in np.asarray(stop))
+        return low, high, None
+    end = float(np.asarray(stop))
+    return min(first, end), max(first, end), end > first
+
+
+def _curves(scalars: list[Array], tangents: list[Array], kept: Unknowns) -> Cubic:
+    """The scalars along the branch: linear in the unknowns, hence on the same cubic."""
+    if not scalars:
+        return Cubic(np.empty((0, 0)), np.empty((0, 0)), np.empty((0, 0)))
+    z, dz = np.array(scalars), np.array(tangents)
+    begin, end = np.diff(z, axis=0), np.diff(z, axis=0)
+    for i, factors in enumerate(kept.slopes):
+        if factors is not None:
+            begin[i], end[i] = factors[0] * dz[i], factors[1] * dz[i + 1]
+    return Cubic(z, begin, end)

@@ -1,0 +1,62 @@
+"""The cubic through two points of a branch with their tangents, piece by piece (src/solve/hermite.h)."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+#: Cosine of the turn within a step past which it is a corner, and its cubic a straight line.
+CORNER = 0.2
+
+
+def basis(x: float) -> tuple[float, float, float, float]:
+    """Factors of (y0, dy0/dx, y1, dy1/dx) at x in [0, 1]."""
+    return (1 + 2 * x) * (1 - x) ** 2, x * (1 - x) ** 2, x * x * (3 - 2 * x), x * x * (x - 1)
+
+
+def slopes(length: float, along: float) -> tuple[float, float] | None:
+    """Factors on the unit tangents t0, t1 that make them dy/dx over a step, or None for a straight line.
+
+    Parameters
+    ----------
+    length : row . (y1 - y0), row = W t0: the step's arclength
+    along : row . t1, for dy/ds = t / (row . t)
+    """
+    return (length, length / along) if along > CORNER and length > 0 else None
+
+
+class Cubic:
+    """A curve through rows of values.
+
+    Parameters
+    ----------
+    values : (n, k)
+    begin, end : (n - 1, k)
+        Derivatives by x in [0, 1] at the begin and the end of each step between two rows.
+    """
+
+    def __init__(self, values: Array, begin: Array, end: Array) -> None:
+        self.values, self.begin, self.end = values, begin, end
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    def __call__(self, place: float) -> Array:
+        """Values (k,) at a place: 3.25 is a quarter of the step from row 3 to row 4."""
+        i, x = piece(place, len(self))
+        if x == 0:
+            return np.asarray(self.values[i])
+        a, b, c, d = basis(x)
+        return np.asarray(a * self.values[i] + b * self.begin[i] + c * self.values[i + 1] + d * self.end[i])
+
+    def places(self, n: int) -> Array:
+        """Places of all rows, and of n - 1 more in each step."""
+        return np.asarray(np.arange(n * (len(self) - 1) + 1 if len(self) else 0) / n)
+
+
+def piece(place: float, rows: int) -> tuple[int, float]:
+    """Row before a place, and share of the step to the next one."""
+    i = min(max(int(place), 0), rows - 1)
+    return (i - 1, 1.0) if i == rows - 1 and rows > 1 and place > i else (i, place - i if rows > 1 else 0.0)

@@ -1,0 +1,68 @@
+"""The unknowns of a branch's points, each rank's own part of them, as NumPy arrays: no Vec outlives its point."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from .hermite import basis, piece, slopes
+
+Array = npt.NDArray[np.float64]
+
+
+class Unknowns:
+    """Points y of a branch with their unit tangents, and the steps between them. Collective where it says so.
+
+    Parameters
+    ----------
+    keep : bool
+        All points; else the last one alone, which the next step is measured from.
+    """
+
+    def __init__(self, problem: Any, keep: bool) -> None:
+        self.problem, self.keep = problem, keep
+        self.y: list[Array] = []
+        self.tangents: list[Array] = []
+        self.slopes: list[tuple[float, float] | None] = []
+        self._row = np.empty(0)
+        self._weights = problem.core.unknowns()
+
+    def add(self, y: Any, tangent: Any) -> None:
+        """The next point. Collective."""
+        y_here, t_here = y.getArray(readonly=True).copy(), tangent.getArray(readonly=True).copy()
+        if self.y:
+            mine = np.array([self._row @ (y_here - self.y[-1]), self._row @ t_here])
+            length, along = self.problem.model.comm.allreduce(mine)
+            self.slopes.append(slopes(float(length), float(along)))
+        self.problem.core.metric(y, self._weights)
+        self._row = self._weights.getArray(readonly=True) * t_here
+        if not self.keep:
+            self.y, self.tangents = [], []
+        self.y.append(y_here)
+        self.tangents.append(t_here)
+
+    def close(self) -> None:
+        """No more points. Collective."""
+        self._weights.destroy()
+
+    def vector(self, place: float) -> Any:
+        """Unknowns at a place. Collective."""
+        i, x = piece(place, len(self.y))
+        values = self.y[i]
+        if x > 0:
+            y0, y1, factors = self.y[i], self.y[i + 1], self.slopes[i]
+            begin, end = (
+                (y1 - y0, y1 - y0)
+                if factors is None
+                else (
+                    factors[0] * self.tangents[i],
+                    factors[1] * self.tangents[i + 1],
+                )
+            )
+            a, b, c, d = basis(x)
+            values = a * y0 + b * begin + c * y1 + d * end
+        vector = self.problem.core.unknowns()
+        vector.setArray(values)
+        return vector
