@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 
-from fretwave.cli import main
+from fretwave.commands.main import main
 
 
 def call(*arguments: object) -> int:

@@ -21,6 +21,9 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+#: Tests take structures from one another by their modules' names, whatever folder they are in.
+sys.path[:0] = [str(folder) for folder in sorted(Path(__file__).parent.iterdir()) if folder.is_dir()]
+
 DEFAULT_RANKS = (1, 2)
 #: How long a rank that failed waits for the others to reach the end of the same test [s].
 GRACE = 3.0

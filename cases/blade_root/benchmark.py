@@ -22,10 +22,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 import fretwave as fw
-from fretwave.casefile import load_case
-from fretwave.preload import balanced
-from fretwave.reduced import reduce_case
-from fretwave.run import build_model
+from fretwave import balanced, build_model, load_case, reduce_case
 
 CASE = Path(__file__).with_name("case.toml")
 AMPLITUDES = [7e-4, 9e-4, 1e-3, 1.1e-3, 1.2e-3, 1.25e-3]  #: [m], from the first slip to 30 % of the pair-samples

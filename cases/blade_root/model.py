@@ -15,9 +15,8 @@ import numpy.typing as npt
 import scipy.sparse as sp
 from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
-from fretwave import BuiltContact, BuiltModel, fe
-from fretwave.errors import InputError
-from fretwave.fe.cache import cached, default_folder, model_key
+from fretwave import BuiltContact, BuiltModel, InputError, fe
+from fretwave.fe import cached, default_folder, model_key
 
 Array = npt.NDArray[np.float64]
 FLANKS = ("shoulder_left", "shoulder_right")

@@ -16,11 +16,10 @@ import scipy.sparse as sp
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from fretwave.model import Model
-from fretwave.reduction import reduce
+from fretwave import Model, reduce
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
-from hexahedra import Bar, bar  # noqa: E402
+from models.hexahedra import Bar, bar  # noqa: E402
 
 
 def flank_dofs(model: Bar, per_flank: int) -> np.ndarray:

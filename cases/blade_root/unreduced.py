@@ -18,8 +18,7 @@ import scipy.sparse as sp
 from mpi4py import MPI
 
 import fretwave as fw
-from fretwave import _core
-from fretwave.preload import balanced
+from fretwave import _core, balanced
 
 sys.path.insert(0, str(Path(__file__).parent))
 from model import build  # noqa: E402

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from matplotlib import pyplot as plt
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-from fretwave.faces import rotation
+from fretwave import rotation
 
 Array = npt.NDArray[np.float64]
 DISK, RING = "#8fb3cf", "#d1495b"

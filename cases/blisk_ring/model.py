@@ -18,10 +18,8 @@ import scipy.sparse as sp
 from mpi4py import MPI
 
 import fretwave as fw
-from fretwave import fe
-from fretwave.errors import InputError
-from fretwave.fe.cache import cached, default_folder, model_key
-from fretwave.model import by_sector
+from fretwave import InputError, by_sector, fe
+from fretwave.fe import cached, default_folder, model_key
 
 sys.path.insert(0, str(Path(__file__).parent))
 from geometry import Options, blade_lines, disk_blocks, low_and_high, ring_blocks, rooted, tip_node  # noqa: E402

@@ -11,7 +11,7 @@ import tomllib
 
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT / "tests"))
-from chain_case import BUILDER, CHAIN  # noqa: E402
+from models.chain_case import BUILDER, CHAIN  # noqa: E402
 
 TWO_DOF, BLISK = ROOT / "cases/two_dof", ROOT / "cases/blisk_lumped"
 SHORT_STEPS = {"max_points": 8}

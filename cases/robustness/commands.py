@@ -121,7 +121,7 @@ def _serve() -> None:
 
 
 def _answer(told: dict[str, Any]) -> dict[str, Any]:
-    from fretwave.cli import main
+    from fretwave import main
 
     os.chdir(told["folder"])
     with tempfile.TemporaryFile("w+", encoding="utf-8", errors="replace") as file:

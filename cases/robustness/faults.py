@@ -24,7 +24,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tests"))
-from wear_case import write_case  # noqa: E402 (the suite's cheap case of wear)
+from models.wear_case import write_case  # noqa: E402 (the suite's cheap case of wear)
 
 #: A run that takes longer hangs [s].
 LIMIT = 150.0

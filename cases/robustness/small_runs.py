@@ -135,7 +135,7 @@ def _become(arguments: list[str], out: Path, err: Path, before: Callable[[], Non
             os.dup2(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), descriptor)
         os.closerange(3, 3)
         sys.stdout, sys.stderr = os.fdopen(1, "w", closefd=False), os.fdopen(2, "w", closefd=False)
-        from fretwave.cli import main
+        from fretwave import main
 
         before()
         code = main(arguments)
@@ -221,7 +221,7 @@ def differences(whole: Path, other: Path) -> list[str]:
 
 def begins_like(whole: Path, other: Path) -> list[str]:
     """What can be seen of a killed run and is not what the uninterrupted one has there."""
-    from fretwave.results import has_results, open_results
+    from fretwave import has_results, open_results
 
     wrong: list[str] = []
     if not has_results(other) or not (whole / "results.h5").exists():

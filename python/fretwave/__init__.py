@@ -14,47 +14,61 @@ from .errors import FretwaveError, InputError, NotConverged
 os.environ.setdefault("OMPI_MCA_ess_singleton_isolated", "1")
 
 if TYPE_CHECKING:
-    from .aerodynamics import Aerodynamics
-    from .built import BuiltContact, BuiltModel
-    from .contact_laws import LawInfo, Limit, ParameterInfo, PythonLaw, Role, laws, register_law
-    from .continuation import Continuation, Point, StepControl
-    from .cyclic import Sector
-    from .cyclic_reduction import SectorReduction, reduce_sector
-    from .cyclic_waves import WaveError
-    from .faces import match_faces
-    from .model import Contact, Model
-    from .modes import LinearMode, linear_modes
-    from .plots.data import Run, open_run
-    from .problems import ForcedResponse, Harmonics, NonlinearMode, choose_harmonics
-    from .reduction import FrequencyError, Reduction, reduce
-    from .reduction_error import NonlinearError, nonlinear_error
+    from .case.build import build_model
+    from .case.load import load_case
+    from .case.reduce import reduce_case
+    from .commands.main import main
+    from .cyclic.aerodynamics import Aerodynamics
+    from .cyclic.faces import match_faces, rotation
+    from .cyclic.reduction import SectorReduction, reduce_sector
+    from .cyclic.sector import Sector
+    from .cyclic.waves import WaveError
+    from .hb.problems import ForcedResponse, Harmonics, NonlinearMode, choose_harmonics
+    from .hb.reduction_error import NonlinearError, nonlinear_error
+    from .model.laws import LawInfo, Limit, ParameterInfo, PythonLaw, Role, laws, register_law
+    from .model.model import Contact, Model, by_sector
+    from .model.modes import LinearMode, linear_modes
+    from .model.reduction import FrequencyError, Reduction, reduce
+    from .model.structure import BuiltContact, BuiltModel
+    from .results.reader import Run, open_run
+    from .results.results import has_results, open_results
     from .solve.branch import Branch
+    from .solve.continuation import Continuation, Point
     from .solve.follow import follow
-    from .transient import Transient
-    from .wear import Wear, WearControl, WearPoint
-    from .worn_mode import WornMode
+    from .solve.preload import balanced, static_preload
+    from .solve.steps import StepControl
+    from .solve.transient import Transient
+    from .solve.wear import Wear, WearControl, WearPoint
+    from .solve.worn_mode import WornMode
 
 #: Where each public name lives; loaded when first used, so that `fretwave --help` starts without PETSc.
 _HOMES = {
-    "aerodynamics": ("Aerodynamics",),
-    "built": ("BuiltContact", "BuiltModel"),
-    "continuation": ("Continuation", "Point", "StepControl"),
-    "cyclic": ("Sector",),
-    "cyclic_reduction": ("SectorReduction", "reduce_sector"),
-    "cyclic_waves": ("WaveError",),
-    "faces": ("match_faces",),
-    "contact_laws": ("LawInfo", "Limit", "ParameterInfo", "PythonLaw", "Role", "laws", "register_law"),
-    "model": ("Contact", "Model"),
-    "modes": ("LinearMode", "linear_modes"),
-    "plots.data": ("Run", "open_run"),
-    "problems": ("ForcedResponse", "Harmonics", "NonlinearMode", "choose_harmonics"),
-    "reduction": ("FrequencyError", "Reduction", "reduce"),
-    "reduction_error": ("NonlinearError", "nonlinear_error"),
+    "solve.preload": ("balanced", "static_preload"),
+    "case.build": ("build_model",),
+    "case.load": ("load_case",),
+    "case.reduce": ("reduce_case",),
+    "commands.main": ("main",),
+    "results.reader": ("Run", "open_run"),
+    "results.results": ("has_results", "open_results"),
+    "cyclic.aerodynamics": ("Aerodynamics",),
+    "model.structure": ("BuiltContact", "BuiltModel"),
     "solve.branch": ("Branch",),
     "solve.follow": ("follow",),
-    "transient": ("Transient",),
-    "wear": ("Wear", "WearControl", "WearPoint"),
-    "worn_mode": ("WornMode",),
+    "solve.continuation": ("Continuation", "Point"),
+    "solve.steps": ("StepControl",),
+    "cyclic.sector": ("Sector",),
+    "cyclic.reduction": ("SectorReduction", "reduce_sector"),
+    "cyclic.waves": ("WaveError",),
+    "cyclic.faces": ("match_faces", "rotation"),
+    "model.laws": ("LawInfo", "Limit", "ParameterInfo", "PythonLaw", "Role", "laws", "register_law"),
+    "model.model": ("Contact", "Model", "by_sector"),
+    "model.modes": ("LinearMode", "linear_modes"),
+    "hb.problems": ("ForcedResponse", "Harmonics", "NonlinearMode", "choose_harmonics"),
+    "model.reduction": ("FrequencyError", "Reduction", "reduce"),
+    "hb.reduction_error": ("NonlinearError", "nonlinear_error"),
+    "solve.transient": ("Transient",),
+    "solve.wear": ("Wear", "WearControl", "WearPoint"),
+    "solve.worn_mode": ("WornMode",),
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 
@@ -92,16 +106,26 @@ __all__ = [
     "WearControl",
     "WearPoint",
     "WornMode",
+    "balanced",
+    "build_model",
+    "by_sector",
     "choose_harmonics",
     "follow",
+    "has_results",
     "laws",
     "linear_modes",
+    "load_case",
+    "main",
     "match_faces",
     "nonlinear_error",
+    "open_results",
     "open_run",
     "reduce",
+    "reduce_case",
     "reduce_sector",
     "register_law",
+    "rotation",
+    "static_preload",
 ]
 
 

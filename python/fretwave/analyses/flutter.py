@@ -16,14 +16,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from ..aerodynamics_case import diameters_of
+from ..case.flow import diameters_of
+from ..case.schema import FlutterAnalysis
 from ..columns import FLUTTER
-from ..schema import FlutterAnalysis
-from .branch import closure_note, finished_table, mode_problem, open_branch, points_of, record, step_control, tell
-from .context import AnalysisContext, Outcome
-from .flutter_waves import STABLE, describe_waves, with_sign, words
+from ..post.flutter_waves import STABLE, describe_waves, with_sign, words
 from .mode import point_line
-from .rest import retained, start_mode
+from .parts.branch import closure_note, finished_table, mode_problem, open_branch, points_of, record, step_control, tell
+from .parts.context import AnalysisContext, Outcome
+from .parts.rest import retained, start_mode
 
 
 def run_flutter(context: AnalysisContext) -> Outcome:
@@ -71,7 +71,7 @@ class _Wave:
 
     def follow(self, writer: Any, snapshot: Any, go_on: bool) -> str:
         """Write its points; returns why it stopped early, or nothing. Collective."""
-        from ..run import build_model
+        from ..case.build import build_model
 
         case, analysis = self.context.case, self.analysis
         preload, comm = case.preload_of(analysis), self.context.comm
@@ -96,13 +96,13 @@ class _Wave:
         return mode_problem(context, self.harmonics, start, rest)
 
     def _branch(self, problem: Any, snapshot: Any, go_on: bool) -> Any:
-        import fretwave
+        from ..solve.continuation import Continuation
 
         low, high = self.analysis.amplitude
         steps, report_at = step_control(self.analysis.step), list(self.analysis.report_at)
         if go_on:
-            return fretwave.Continuation.restore(problem, snapshot, (low, high), steps, report_at)
-        return fretwave.Continuation(problem, problem.initial(low), (low, high), steps, report_at)
+            return Continuation.restore(problem, snapshot, (low, high), steps, report_at)
+        return Continuation(problem, problem.initial(low), (low, high), steps, report_at)
 
     def _say(self, row: Mapping[str, Any]) -> None:
         low, high = self.analysis.amplitude

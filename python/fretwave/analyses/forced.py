@@ -7,18 +7,18 @@ from typing import Any
 
 import numpy as np
 
+from ..case.schema import ForcedAnalysis
 from ..columns import FORCED
-from ..harmonic_motion import complex_amplitudes
-from ..schema import ForcedAnalysis
-from ..suspects import suspects
-from .branch import closure_note, finished_table, open_branch, points_of, record, tell
-from .context import AnalysisContext, Outcome
-from .excitation import Excitation, excitation_of
+from ..hb.suspects import suspects
+from ..post.mode_curve import ModeCurve
+from ..post.motion import complex_amplitudes
+from ..post.response_peaks import peak_table
 from .forced_time import time_points
-from .mode_curve import ModeCurve
-from .response_peaks import peak_table
-from .rest import retained
-from .wheel_peaks import blade_amplitudes, blade_by_blade
+from .parts.branch import closure_note, finished_table, open_branch, points_of, record, tell
+from .parts.context import AnalysisContext, Outcome
+from .parts.excitation import Excitation, excitation_of
+from .parts.rest import retained
+from .parts.wheel_peaks import blade_amplitudes, blade_by_blade
 
 
 def run_forced(context: AnalysisContext) -> Outcome:

@@ -8,11 +8,11 @@ from typing import Any, cast
 import numpy as np
 import numpy.typing as npt
 
-from ..schema import ForcedAnalysis
-from .context import AnalysisContext
-from .integrate import SteadyState, steady_motion
-from .response_peaks import points_around_peak
-from .whole import integrated_model
+from ..case.schema import ForcedAnalysis
+from ..post.response_peaks import points_around_peak
+from ..solve.steady import SteadyState, steady_motion
+from .parts.context import AnalysisContext
+from .parts.whole import integrated_model
 
 Array = npt.NDArray[np.float64]
 
@@ -74,12 +74,12 @@ def _integrated(
 def _steady(
     context: AnalysisContext, model: Any, state: tuple[Array, Array], dof: int, level: float, omega: float
 ) -> SteadyState:
-    import fretwave
+    from ..solve.transient import Transient
 
     force = {1: np.zeros(model.n_dof, dtype=complex)}
     for name, value in _section(context).force.items():
         force[1][context.case.dof(name)] = value
-    integrator = fretwave.Transient(model, force=force, level=level, omega=omega, prefix=f"{context.prefix}time_")
+    integrator = Transient(model, force=force, level=level, omega=omega, prefix=f"{context.prefix}time_")
     return steady_motion(integrator, state, dof, omega, SAMPLES, TOLERANCE)
 
 

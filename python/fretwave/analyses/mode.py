@@ -9,15 +9,16 @@ from typing import Any
 
 import numpy as np
 
+from ..case.schema import ModeAnalysis
 from ..columns import MODE
-from ..schema import ModeAnalysis
-from ..suspects import suspects
-from .asymptotes import asymptote_line
-from .branch import closure_note, finished_table, mode_problem, open_branch, points_of, record, step_control, tell
-from .context import AnalysisContext, Outcome
-from .rest import keep_pairs, retained
-from .wheel_shape import WHEEL, WheelShape, finish_wheel, one_by_one
-from .wheel_start import Start, start_of, uneven_samples
+from ..hb.suspects import suspects
+from ..post.limit_cycles import limit_cycles
+from .parts.asymptotes import asymptote_line
+from .parts.branch import closure_note, finished_table, mode_problem, open_branch, points_of, record, step_control, tell
+from .parts.context import AnalysisContext, Outcome
+from .parts.rest import keep_pairs, retained
+from .parts.wheel_shape import WHEEL, WheelShape, finish_wheel, one_by_one
+from .parts.wheel_start import Start, start_of, uneven_samples
 
 
 def run_mode(context: AnalysisContext) -> Outcome:
@@ -49,7 +50,7 @@ def run_mode(context: AnalysisContext) -> Outcome:
 
 
 def _follow(context: AnalysisContext, analysis: ModeAnalysis, problem: Any, writer: Any, start: Start) -> Outcome:
-    import fretwave
+    from ..solve.continuation import Continuation
 
     low, high = analysis.amplitude
     reduction = context.case.reduction
@@ -59,9 +60,9 @@ def _follow(context: AnalysisContext, analysis: ModeAnalysis, problem: Any, writ
     settings = {"stop": (low, high), "steps": step_control(analysis.step), "report_at": reports}
     snapshot, _, found = open_branch(context.comm, writer, context.resuming)
     if found:
-        branch = fretwave.Continuation.restore(problem, snapshot, **settings)
+        branch = Continuation.restore(problem, snapshot, **settings)
     else:
-        branch = fretwave.Continuation(problem, problem.initial(low), **settings)
+        branch = Continuation(problem, problem.initial(low), **settings)
     describe = None
     if context.case.wheel is not None:
         tuned = start.attributes["tuned_amplitude"]
@@ -86,7 +87,7 @@ def _follow(context: AnalysisContext, analysis: ModeAnalysis, problem: Any, writ
 
 def _reduction_error(context: AnalysisContext, problem: Any, point: Any, row: dict[str, Any]) -> str:
     """What the unreduced model would change at this point, for the log and run.json. Collective."""
-    from ..reduced import nonlinear_error_at
+    from ..case.reduce import nonlinear_error_at
 
     assert isinstance(context.analysis, ModeAnalysis)
     error = nonlinear_error_at(context.case, context.analysis, problem, point.y)
@@ -131,30 +132,6 @@ def _short(row: dict[str, Any]) -> str:
 def _percent(value: float, digits: int) -> str:
     """A share in percent; rounding leaves no negative zero."""
     return f"{round(100 * value, digits) + 0.0:.{digits}f}"
-
-
-def limit_cycles(table: dict[str, Any]) -> list[dict[str, Any]]:
-    """Zero crossings of the damping, each a limit cycle.
-
-    Damping that rises through zero with amplitude draws motions to the cycle from both sides (stable);
-    falling, it drives them away (unstable). At the end of a branch the slope is not known (None).
-    """
-    cycles = []
-    for point in np.flatnonzero(["zero_damping" in event.split() for event in table["event"]]):
-        around = [int(point) - 1, int(point) + 1]
-        known = around[0] >= 0 and around[1] < len(table["zeta"])
-        zeta, amplitude = table["zeta"], table["amplitude"]
-        slope = np.diff(zeta[around])[0] * np.diff(amplitude[around])[0] if known else 0.0
-        cycles.append(
-            {
-                "point": int(point),
-                "event": "zero_damping",
-                "amplitude": float(amplitude[point]),
-                "frequency_hz": float(table["frequency_hz"][point]),
-                "stable": bool(slope > 0) if slope else None,
-            }
-        )
-    return cycles
 
 
 def summarise(name: str, table: dict[str, Any]) -> list[str]:

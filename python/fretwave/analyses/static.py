@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from ..case.contacts import ContactSpec
+from ..case.schema import StaticAnalysis
 from ..columns import Column
-from ..contact_history import OPEN, SLIP, STICK, normal_force, tangential_force
-from ..contacts import ContactSpec
 from ..errors import NotConverged
-from ..schema import StaticAnalysis
-from .context import AnalysisContext, Outcome
-from .rest import keep_pairs, rest_state
+from ..post.contact_history import OPEN, SLIP, STICK, normal_force, tangential_force
+from .parts.context import AnalysisContext, Outcome
+from .parts.rest import keep_pairs, rest_state
 
 COLUMNS = (
     Column("point", "1", "number of the row", "i"),

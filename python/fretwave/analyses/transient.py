@@ -10,16 +10,25 @@ from typing import Any, cast
 import numpy as np
 import numpy.typing as npt
 
+from ..case.schema import ModeAnalysis, TransientSection
 from ..columns import Column
 from ..errors import InputError, NotConverged
-from ..schema import ModeAnalysis, TransientSection
-from .context import AnalysisContext, Outcome
-from .cycles import extract
-from .decays import Ending, compare, cycle_rows, decay_rows, divergence_factor, ending, largest_differences, mode_state
-from .integrate import STEPS_PER_PERIOD, Motion, free_motion, start_state
-from .mode_curve import Crossing, ModeCurve
-from .shifted import shifted_damping
-from .whole import integrated_model
+from ..post.cycles import extract
+from ..post.decays import (
+    Ending,
+    compare,
+    cycle_rows,
+    decay_rows,
+    divergence_factor,
+    ending,
+    largest_differences,
+    mode_state,
+)
+from ..post.mode_curve import Crossing, ModeCurve
+from ..solve.steady import STEPS_PER_PERIOD, Motion, free_motion, start_state
+from .parts.context import AnalysisContext, Outcome
+from .parts.shifted import shifted_damping
+from .parts.whole import integrated_model
 
 Array = npt.NDArray[np.float64]
 
@@ -67,7 +76,7 @@ class _Starts:
     """Integrator, table and progress of one analysis; closes what it opened."""
 
     def __init__(self, context: AnalysisContext, columns: Sequence[str | Column]) -> None:
-        import fretwave
+        from ..solve.transient import Transient
 
         self.context, self.section, self.mode = context, _section(context), _mode(context)
         context.leave_out([])
@@ -76,7 +85,7 @@ class _Starts:
         self.dof = context.case.dof(self.mode.normalise)
         self._model = ExitStack()
         model = self._model.enter_context(integrated_model(context))
-        self.integrator = fretwave.Transient(model, prefix=context.prefix)
+        self.integrator = Transient(model, prefix=context.prefix)
         self.writer = context.writer(columns, normalise=self.mode.normalise)
         self.stopped: list[str] = []
 

@@ -14,15 +14,16 @@ from typing import Any, cast
 
 import numpy as np
 
-from .. import groups
-from ..contact_laws import Role
+from ..case.schema import ModeAnalysis, WearAnalysis
 from ..errors import FretwaveError, NotConverged
-from ..parallel import on_first_rank
-from ..results import AnalysisWriter, has_results, open_results
-from ..schema import ModeAnalysis, WearAnalysis
-from .branch import mode_problem, points_of, step_control
-from .context import AnalysisContext, Outcome
-from .rest import keep_pairs, retained, start_mode
+from ..model.laws import Role
+from ..mpi import groups
+from ..mpi.guard import on_first_rank
+from ..results.file import names_of_data
+from ..results.results import AnalysisWriter, has_results, open_results
+from .parts.branch import mode_problem, points_of, step_control
+from .parts.context import AnalysisContext, Outcome
+from .parts.rest import keep_pairs, retained, start_mode
 from .wear_line import LINE, Line, columns, fields, wear_areas
 
 
@@ -65,7 +66,8 @@ class LineRunner:
 
 def unworn_starts(context: AnalysisContext, analysis: WearAnalysis) -> dict[str, Any]:
     """Unknowns at each amplitude by its number, from the mode's branch, and the normalised cycle. Collective."""
-    import fretwave
+    from ..solve.continuation import Continuation
+    from ..solve.worn_mode import WornMode
 
     settings = cast(ModeAnalysis, context.analysis)
     stuck, rest = start_mode(context, settings.linear_mode)
@@ -73,12 +75,12 @@ def unworn_starts(context: AnalysisContext, analysis: WearAnalysis) -> dict[str,
     context.leave_out(harmonics.left_out)
     problem = mode_problem(context, harmonics, stuck, rest)
     low, high = min(settings.amplitude[0], *analysis.amplitude), max(settings.amplitude[1], *analysis.amplitude)
-    branch = fretwave.Continuation(
+    branch = Continuation(
         problem, problem.initial(low), (low, high), step_control(settings.step), sorted(analysis.amplitude)
     )
     found: dict[str, Any] = {}
     areas = wear_areas(context.case)
-    with fretwave.WornMode(problem, analysis.coefficient, areas) as mode, context.console.progress(context.name):
+    with WornMode(problem, analysis.coefficient, areas) as mode, context.console.progress(context.name):
         for point in points_of(branch):
             if "cycle_unit" not in found:
                 found["cycle_unit"] = analysis.cycle_unit or normal_cycle(
@@ -214,6 +216,9 @@ def _row(writer: AnalysisWriter, group: Any, row: int) -> tuple[Any, ...]:
     motions = None
     if len(reported):
         names = [name for name in group if name.startswith("contact_")]
-        motions = {name[len("contact_") :]: {k: group[name][k][reported[0]] for k in group[name]} for name in names}
+        motions = {
+            name[len("contact_") :]: {k: group[name][k][reported[0]] for k in names_of_data(group[name])}
+            for name in names
+        }
     kept = {name: group[name][row] for name in writer.fields}
     return values, group["coefficients"][row], motions, None, kept

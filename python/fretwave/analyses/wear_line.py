@@ -9,16 +9,16 @@ from typing import Any
 
 import numpy as np
 
-from .. import contacts
-from ..casefile import Case
+from ..case import contacts
+from ..case.load import Case
+from ..case.schema import ModeAnalysis, WearAnalysis
+from ..case.sector import nodal_diameter
 from ..columns import COLUMNS, Column
 from ..console import Console
-from ..results import AnalysisWriter, Field
-from ..schema import ModeAnalysis, WearAnalysis
-from ..sectors import nodal_diameter
-from .branch import finished_table, mode_problem, open_branch
-from .context import AnalysisContext
-from .rest import retained, start_mode
+from ..results.results import AnalysisWriter, Field
+from .parts.branch import finished_table, mode_problem, open_branch
+from .parts.context import AnalysisContext
+from .parts.rest import retained, start_mode
 
 #: Name of a line's table in its own folder.
 LINE = "line"
@@ -84,7 +84,7 @@ def march_line(context: AnalysisContext, settings: ModeAnalysis, unit: float, li
     dict
         status, reason, summary and what else the common table needs.
     """
-    from ..run import build_model
+    from ..case.build import build_model
 
     case, analysis = context.case, context.analysis
     preload = case.preload_of(analysis)
@@ -117,9 +117,9 @@ class _Marcher:
         )
 
     def run(self) -> dict[str, Any]:
-        import fretwave
+        from ..solve.worn_mode import WornMode
 
-        with fretwave.WornMode(self.problem, self.analysis.coefficient, wear_areas(self.case)) as mode:
+        with WornMode(self.problem, self.analysis.coefficient, wear_areas(self.case)) as mode:
             self.mode = mode
             march, points = self._open(mode)
             clock = time.perf_counter()
@@ -131,10 +131,10 @@ class _Marcher:
 
     def _open(self, mode: Any) -> tuple[Any, Any]:
         """The march from its start, or from where a killed run left it."""
-        import fretwave
+        from ..solve.wear import Wear, WearControl
 
         a, unit = self.analysis, self.unit
-        control = fretwave.WearControl(a.stepper, a.tolerance, a.pressure_change)
+        control = WearControl(a.stepper, a.tolerance, a.pressure_change)
         reports = [unit * value for value in a.report_at]
         state, _, found = open_branch(self.comm, self.writer, True)
         state = self.comm.bcast(state)
@@ -145,7 +145,7 @@ class _Marcher:
         going: dict[str, Any] = {"outcome": (int(newton), int(linear), float(residual))}
         if found:
             going = {key: state[key] for key in ("depth", "at", "step", "load_scale")}
-        march = fretwave.Wear(mode, y, unit * a.cycles, control, reports, **going)
+        march = Wear(mode, y, unit * a.cycles, control, reports, **going)
         y.destroy()
         return march, march.go_on() if found else iter(march)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from .cache import cached, default_folder, model_key
 from .elasticity import TITANIUM, Material, MatrixReport, assemble, centrifugal_load, check_matrices, rigid_modes
 from .interface import ContactPatch, contact_patch, nodal_areas, relative_rows, tangent_frames
 from .mesh import Block, Mesh, Quality, join
@@ -16,10 +17,13 @@ __all__ = [
     "Mesh",
     "Quality",
     "assemble",
+    "cached",
     "centrifugal_load",
     "check_matrices",
     "contact_patch",
+    "default_folder",
     "join",
+    "model_key",
     "nodal_areas",
     "relative_rows",
     "rigid_modes",

@@ -15,7 +15,7 @@ from zipfile import BadZipFile
 import numpy as np
 import scipy.sparse as sp
 
-from ..files import FileError, replaced
+from ..files.whole import FileError, replaced
 
 _PARTS = ("data", "indices", "indptr", "shape")
 

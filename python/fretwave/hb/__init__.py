@@ -1,1 +1,1 @@
-"""Harmonic balance: what its unknowns are and mean."""
+"""Harmonic balance: nonlinear modes and forced responses, and what stops them."""

@@ -14,7 +14,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..errors import InputError
-from ..source import display
+from ..texts import display
 from .entries import Array, Entries, IntArray, order_of
 from .text import columns_of, first_data_line, triplets
 

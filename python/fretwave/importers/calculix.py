@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
-from ..source import display
+from ..texts import display
 from .entries import Entries, IntArray
 from .text import columns_of, triplets
 

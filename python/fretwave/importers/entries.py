@@ -10,10 +10,10 @@ import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
 
-from ..compressed import check_compressed
 from ..errors import InputError
-from ..matrices import Matrix, check_symmetric
-from ..model_file import dof_name
+from ..files.compressed import check_compressed
+from ..model.checks import Matrix, check_symmetric
+from ..results.model_file import dof_name
 
 Array = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]

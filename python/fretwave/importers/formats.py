@@ -7,8 +7,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from ..errors import InputError
-from ..isolated import call_isolated
-from ..source import display, nearest
+from ..files.isolated import call_isolated
+from ..texts import display, nearest
 from . import abaqus, calculix, matlab, matrix_market, npz, petsc_binary
 from .entries import Entries
 

@@ -16,7 +16,7 @@ import numpy as np
 import scipy.io
 import scipy.sparse as sp
 
-from ..source import display
+from ..texts import display
 from .entries import Entries
 from .npz import choose
 

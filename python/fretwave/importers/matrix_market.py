@@ -10,7 +10,7 @@ from pathlib import Path
 
 import scipy.io
 
-from ..source import display
+from ..texts import display
 from .entries import Entries
 
 

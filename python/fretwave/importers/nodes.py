@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..errors import InputError
-from ..source import display, nearest
+from ..texts import display, nearest
 from .text import columns_of
 
 Array = npt.NDArray[np.float64]

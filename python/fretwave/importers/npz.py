@@ -14,7 +14,7 @@ import numpy.typing as npt
 import scipy.sparse as sp
 
 from ..errors import InputError
-from ..source import display
+from ..texts import display
 from .entries import Entries
 
 #: What variables are called when none is named.

@@ -16,8 +16,8 @@ from scipy.spatial import cKDTree
 
 from ..errors import InputError
 from ..fe.interface import tangent_frames
-from ..model_file import ContactMap
-from ..source import display
+from ..results.model_file import ContactMap
+from ..texts import display
 from .nodes import Nodes
 from .text import first_data_line
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import scipy.sparse as sp
 
-from ..source import display
+from ..texts import display
 from .entries import Entries
 
 #: MAT_FILE_CLASSID of petscmat.h.

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from scipy.sparse.csgraph import connected_components
 
 from ..errors import FretwaveError
-from ..model_file import FileModel
+from ..results.model_file import FileModel
 from .entries import counted
 
 Array = npt.NDArray[np.float64]
@@ -130,8 +130,8 @@ def _diagonal(model: FileModel, diagonal: Array, quantity: str, report: Report) 
 
 
 def _frequencies(model: FileModel, motions: Array | None, modes: int, comm: Any, report: Report) -> None:
-    from ..model import Model
-    from ..modes import linear_modes
+    from ..model.model import Model
+    from ..model.modes import linear_modes
 
     expected, bodies = (6, 1) if motions is None else expected_rigid(model, motions)
     try:

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..errors import InputError
-from ..source import display
+from ..texts import display
 from .entries import Entries
 
 Array = npt.NDArray[np.float64]

@@ -14,7 +14,7 @@ from numpy.linalg import LinAlgError
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from .data import Run
+    from ..results.reader import Run
 
     Family = Callable[[Run], Iterator[tuple[str, Figure]]]
 
@@ -50,8 +50,8 @@ def plot_run(run_folder: str | Path, only: Sequence[str] | None = None, failed: 
     -------
     The PNG files written, `<analysis>_<picture>.png` in the run folder.
     """
+    from ..results.reader import Run
     from . import style
-    from .data import Run
 
     run = Run(run_folder)
     written = []

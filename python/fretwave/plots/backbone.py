@@ -8,9 +8,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..analyses.mode_curve import NO_DAMPING
+from ..post.mode_curve import NO_DAMPING
+from ..results.reader import Analysis, Run, Table
 from . import style
-from .data import Analysis, Run, Table
 
 #: analyses belong in one picture when their stuck asymptotes agree to this relative difference
 SAME_MODE = 1e-6

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..columns import COLUMNS
-from . import style
+from ..plots import style
 
 if TYPE_CHECKING:
     from ..solve.branch import Branch

@@ -9,9 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from ..contact_laws import OPEN, SLIP, STICK
+from ..model.laws import OPEN, SLIP, STICK
+from ..results.reader import Analysis, Array, Run
 from . import style
-from .data import Analysis, Array, Run
 
 #: amplitudes of a map
 MAPS = 4

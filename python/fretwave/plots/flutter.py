@@ -8,10 +8,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..analyses.flutter_waves import with_sign
-from ..analyses.mode_curve import NO_DAMPING
+from ..post.flutter_waves import with_sign
+from ..post.mode_curve import NO_DAMPING
+from ..results.reader import Analysis, Run
 from . import style
-from .data import Analysis, Run
 
 #: half width of a wave's bar, in distances of neighbouring ones
 HALF = 0.32

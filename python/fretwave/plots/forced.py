@@ -9,9 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.interpolate import PchipInterpolator
 
-from ..analyses.response_peaks import curve_length
+from ..post.response_peaks import curve_length
+from ..results.reader import Analysis, Run, Table
 from . import style
-from .data import Analysis, Run, Table
 
 BACKBONES = (("--", style.INK), (":", style.RED))
 #: peaks that differ by more than this factor are drawn on a logarithmic axis

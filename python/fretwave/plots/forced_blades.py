@@ -9,9 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from ..analyses.wheel_peaks import whitehead
+from ..post.blade_peaks import whitehead
+from ..results.reader import Analysis, Run, Table
 from . import style
-from .data import Analysis, Run, Table
 
 
 def figures(run: Run) -> Iterator[tuple[str, Figure]]:

@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ..results.reader import Analysis, Run, Table
 from . import style
-from .data import Analysis, Run, Table
 
 
 def figures(run: Run) -> Iterator[tuple[str, Figure]]:

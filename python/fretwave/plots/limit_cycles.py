@@ -8,9 +8,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..harmonic_motion import motion
+from ..post.motion import motion
+from ..results.reader import Analysis, Run, Table
 from . import style
-from .data import Analysis, Run, Table
 
 #: top of the axes, in largest starts or predictions; what goes beyond has left the picture
 HEIGHT = 4.0

@@ -8,9 +8,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..contact_laws import Role
+from ..model.laws import Role
+from ..results.reader import Analysis, Run
 from . import style
-from .data import Analysis, Run
 from .phase_planes import amplitude_name, kept_points
 
 UM = 1e6

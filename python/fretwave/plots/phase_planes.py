@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ..results.reader import Analysis, Run, motion_of
 from . import style
-from .data import Analysis, Run, motion_of
 from .trajectories import FEW_DOFS, other_dof, spread
 
 CURVES = 7

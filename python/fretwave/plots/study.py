@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ..results.reader import Run, Table
 from . import style
-from .data import Run, Table
 
 SWEEPS = {
     "harmonics": ("H", "o-"),

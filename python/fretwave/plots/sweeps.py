@@ -14,12 +14,12 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
 
-from ..analyses.mode_curve import ModeCurve
-from ..results_file import open_results
-from ..sweep_plan import Plan, short_names
-from ..sweep_summary import SPLIT
+from ..post.grid import Plan, short_names
+from ..post.mode_curve import ModeCurve
+from ..results.file import open_results
+from ..results.reader import Analysis, Run, Table
+from ..results.sweep_summary import SPLIT
 from . import style
-from .data import Analysis, Run, Table
 from .forced import smooth
 
 #: more branches than these are told apart by a colour bar

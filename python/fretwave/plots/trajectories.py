@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 from matplotlib.figure import Figure
 
+from ..results.reader import Analysis, Run, motion_of
 from . import style
-from .data import Analysis, Run, motion_of
 
 CURVES = 7
 #: up to this number a reader knows each dof by its name

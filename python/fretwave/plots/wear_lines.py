@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..contact_laws import Role
+from ..model.laws import Role
+from ..results.reader import Analysis, Array, Run, Table
 from . import style
-from .data import Analysis, Array, Run, Table
 
 MM, MICRON = 1e3, 1e6
 #: of amplitudes, from which they are at least 0.1

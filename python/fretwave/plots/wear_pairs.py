@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ..results.reader import Analysis, Array, Run, Table
 from . import style
-from .data import Analysis, Array, Run, Table
 from .faces import place_face
 from .wear_lines import (
     KINDS,

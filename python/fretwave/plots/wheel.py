@@ -9,11 +9,11 @@ import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..analyses.wheel_shape import wave_content
-from ..engine_order import folded
-from ..harmonic_motion import complex_amplitudes
+from ..cyclic.engine_order import folded
+from ..post.motion import complex_amplitudes
+from ..post.wave_content import wave_content
+from ..results.reader import Analysis, Run
 from . import style
-from .data import Analysis, Run
 
 Complex = npt.NDArray[np.complex128]
 

@@ -1,1 +1,1 @@
-"""Following branches, and what comes of it."""
+"""Solutions in sequence: branches, preload, time integration, wear."""

@@ -162,7 +162,7 @@ class Branch(Table):
         """The branch of a file that `save` wrote."""
         from .branch_file import read
 
-        return read(Path(path))
+        return read(cls, Path(path))
 
     def to_csv(self, path: str | Path) -> None:
         """Write its table as that of a run is written; rank 0 writes. Collective."""

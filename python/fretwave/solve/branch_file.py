@@ -3,23 +3,25 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from ..columns import COLUMNS, Column
 from ..errors import InputError
-from ..files import replaced
+from ..files.whole import replaced
 from ..hb.states import described, state_of
-from .branch import Branch
 from .hermite import Cubic
+
+Branch = TypeVar("Branch")
 
 #: What the file says it is.
 FORMAT = "fretwave branch 1"
 
 
-def write(branch: Branch, path: Path) -> None:
+def write(branch: Any, path: Path) -> None:
     """Table over `point`, curve over `point`, `piece` and `scalar`; the rest as attributes."""
     import h5py
 
@@ -41,8 +43,8 @@ def write(branch: Branch, path: Path) -> None:
         )
 
 
-def read(path: Path) -> Branch:
-    """The branch that `write` wrote.
+def read(kind: Callable[..., Branch], path: Path) -> Branch:
+    """The branch that `write` wrote, made by `kind`.
 
     Raises
     ------
@@ -63,7 +65,7 @@ def read(path: Path) -> Branch:
         raise InputError("the file holds no branch", str(path), measured, FORMAT, "give a file of Branch.save")
     columns = [COLUMNS[name] for name in json.loads(found["columns"])]
     values["event"] = np.array([text.decode() for text in values["event"]], dtype=str)
-    return Branch(
+    return kind(
         columns,
         values,
         state_of(json.loads(found["meaning"])),

@@ -9,11 +9,12 @@ import numpy as np
 import numpy.typing as npt
 
 from ..columns import FORCED, MODE, columns_named
-from ..continuation import Continuation, Point, StepControl
 from ..errors import InputError
-from ..problems import HarmonicProblem
+from ..hb.problems import HarmonicProblem
 from .branch import Branch
+from .continuation import Continuation, Point
 from .hermite import Cubic
+from .steps import StepControl
 from .table import Table
 from .unknowns import Unknowns
 

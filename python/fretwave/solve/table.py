@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..columns import COLUMNS, Column, Value, csv_header, csv_line
-from ..files import replaced
+from ..files.whole import replaced
 
 Array = npt.NDArray[Any]
 

@@ -1,0 +1,166 @@
+"""What the continuation analyses share: rows of their tables, state, and lines of progress."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from ...case.schema import StepSection
+from ...results.results import AnalysisWriter
+
+#: Events at which the contact's motion over a period is kept.
+PLAIN_EVENTS = ("", "step")
+#: A slider's distance from where it began its period is rounding below these shares of slip path and amplitude.
+UNCLOSED_OF_PATH, UNCLOSED_OF_AMPLITUDE = 1e-6, 1e-12
+
+
+def closure_note(row: Mapping[str, Any]) -> str:
+    """What a point's line says of sliders that do not close their period; empty where they do."""
+    unclosed, path = row["unclosed"], row["slip_path"]
+    if not unclosed > max(UNCLOSED_OF_PATH * path, UNCLOSED_OF_AMPLITUDE * abs(row["amplitude"])):
+        return ""
+    share = f"{100 * unclosed / path:.2g} % of the longest slip path" if path > 0 else "no slip in the period"
+    return f"  note: a slider ends {unclosed:.1e} m from where it began ({share})"
+
+
+#: What was done when GMRES failed.
+FALLBACKS = {
+    "rebuilt": "preconditioner rebuilt",
+    "condensed": "condensed contact system factorised",
+    "whole": "whole system factorised",
+}
+
+
+def step_control(step: StepSection) -> Any:
+    """The case's step control for the continuation."""
+    from ...solve.steps import StepControl
+
+    return StepControl(**step.model_dump())
+
+
+def record(
+    writer: AnalysisWriter,
+    problem: Any,
+    point: Any,
+    snapshot: Mapping[str, Any] | None,
+    extra: Mapping[str, Any],
+    describe: Callable[[Any, Any, Any], Mapping[str, Any]] | None = None,
+) -> dict[str, Any]:
+    """Write one continuation point. Collective.
+
+    Parameters
+    ----------
+    extra : the analysis' own part of the state to go on from
+    describe : further columns from problem, y and (on the writing rank) coefficients (n_dof, m). Collective
+
+    Returns
+    -------
+    dict
+        The row as written.
+    """
+    from ... import _core
+    from ...solve.follow import row_of
+
+    _core.fault_point("record")
+    row = row_of(problem, point, writer.rows)
+    motions = None
+    if point.event not in PLAIN_EVENTS:
+        periods = problem.contact_history(point.y)
+        names = [contact.name for contact in problem.model.contacts]
+        motions = dict(zip(names, periods)) if writer.active else None
+    kept = None if snapshot is None else {**snapshot, **{f"own_{key}": value for key, value in extra.items()}}
+    coefficients = problem.coefficients(point.y)
+    if describe is not None:
+        row.update(describe(problem, point.y, coefficients))
+    writer.append(row, coefficients, motions, kept)
+    return row
+
+
+def mode_problem(context: Any, harmonics: Any, mode: Any, rest: Any, dof: int | None = None, avoid: Any = None) -> Any:
+    """The nonlinear mode of an analysis about its static state. Collective.
+
+    Parameters
+    ----------
+    mode, rest : linear mode to start from, and static state (or None)
+    dof : normalised; by default the one that the analysis names
+    avoid : as in `fretwave.NonlinearMode`
+    """
+    from ...hb.problems import NonlinearMode
+
+    analysis = context.analysis
+    number = context.case.dof(analysis.normalise) if dof is None else dof
+    problem = NonlinearMode(context.model, harmonics, analysis.method, number, mode, context.prefix, avoid)
+    if rest is not None:
+        problem.preload(rest.displacement, rest.load)
+    return problem
+
+
+def tell(context: Any, branch: Any, name: str = "") -> None:
+    """Say how a branch began, how well a resumed one meets its last point, and what it could not have. Collective.
+
+    Kept in run.json too, under `branches`.
+    """
+    name = name or context.name
+    lines = [f"started: {branch.started}"] if branch.started else []
+    if branch.repeated is not None:
+        last = branch.repeated
+        lines.append(
+            f"resumed at {last.parameter:.6g}; its last point is solved again to a residual of {last.residual:.1e}"
+        )
+    lines += [f"missed: {text}" for text in branch.missed]
+    for line in lines:
+        context.console.line(f"{name}: {line}")
+    if lines:
+        context.entry.setdefault("branches", {})[name] = lines
+    tell_fallbacks(context, branch)
+
+
+def tell_fallbacks(context: Any, branch: Any) -> None:
+    """One line of the log on linear solves that failed and how they were solved; counts add up in run.json."""
+    found = branch.fallbacks
+    counts = {key: found[key] for key in ("rebuilt", "condensed", "whole")}
+    if not any(counts.values()):
+        return
+    kept = context.entry.setdefault("linear_fallbacks", dict.fromkeys(counts, 0))
+    for key, count in counts.items():
+        kept[key] += count
+    text = ", ".join(f"{what} {counts[key]} times" for key, what in FALLBACKS.items() if counts[key])
+    context.console.line(f"{context.name}: GMRES failed and was helped: {text}")
+    if found["said"]:
+        context.console.line(f"{context.name}: {found['said']}")
+
+
+def points_of(branch: Any) -> Iterator[Any]:
+    """Points of a branch; their vectors are freed a point later, for the branch may look back at its last one."""
+    from ...solve.follow import points_of
+
+    return points_of(branch)
+
+
+def split_state(state: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """The solver's snapshot and the analysis' own entries of a kept state."""
+    plain = {key: value.item() if np.ndim(value) == 0 else value for key, value in state.items()}
+    own = {key[len("own_") :]: value for key, value in plain.items() if key.startswith("own_")}
+    return {key: value for key, value in plain.items() if not key.startswith("own_")}, own
+
+
+def open_branch(
+    comm: Any, writer: AnalysisWriter, resuming: bool
+) -> tuple[dict[str, Any] | None, dict[str, Any], bool]:
+    """Snapshot (rank 0), own entries (every rank) and whether there is a state to go on from. Collective."""
+    state = writer.go_on() if resuming and writer.active else None
+    snapshot, own = split_state(state) if state is not None else (None, {})
+    found, writer.rows, writer.reported, own = comm.bcast((state is not None, writer.rows, writer.reported, own))
+    return snapshot, own, found
+
+
+def finished_table(writer: AnalysisWriter) -> dict[str, Any]:
+    """Columns written so far (writing rank; empty elsewhere or without rows)."""
+    if not writer.active or not writer.rows:
+        return {}
+    points = writer.group["points"]
+    table = {column.name: points[column.name][()] for column in writer.columns}
+    table["event"] = np.array([text.decode() for text in table["event"]])
+    return table

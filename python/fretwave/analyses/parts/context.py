@@ -1,0 +1,270 @@
+"""What an analysis gets from the runner, and what it gives back."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+
+from ...case.load import Case
+from ...case.schema import AnalysisSection, WearAnalysis
+from ...case.sector import nodal_diameter
+from ...case.wheel import Wheel
+from ...columns import Column
+from ...console import Console
+from ...errors import InputError
+from ...files.whole import replace_text
+from ...mpi.guard import on_first_rank
+from ...results.results import AnalysisWriter, Field, has_results, open_results
+from ...texts import display
+
+
+@dataclass
+class Outcome:
+    """How an analysis ended.
+
+    Attributes
+    ----------
+    points : int
+        Rows of its table.
+    reason : str
+        Why it ended, in the solver's words.
+    converged : bool
+        False when it ended before its goal; what was found is kept.
+    summary : list of str
+        Lines to print.
+    goal : str
+        What it was to reach, for the message when it did not.
+    advice : str
+        What to do when it did not; empty for what usually helps.
+    """
+
+    points: int
+    reason: str
+    converged: bool
+    summary: list[str] = field(default_factory=list)
+    goal: str = ""
+    advice: str = ""
+
+
+@dataclass
+class AnalysisContext:
+    """Everything an analysis needs; the same on every rank.
+
+    Attributes
+    ----------
+    model : fretwave.Model
+        With the analysis' dampers (for time integration without any: those of its mode analysis).
+    case : Case
+        Names, matrices and all analyses of the case.
+    analysis : AnalysisSection
+        This analysis; use its own class for typed access.
+    resuming : bool
+        Go on from the last state, if there is one.
+    before_first : callable
+        Run on every rank before the first row is written.
+    attributes : dict
+        Put on the group of the results.
+    left_out : list of str
+        What this analysis does not compute, and why; filled by :meth:`leave_out`.
+    arrays : dict
+        Arrays [m] put into the group of the results.
+    fields : dict
+        Arrays that every row of the table brings.
+    entry : dict
+        What else run.json says of the analysis.
+    writers : list of AnalysisWriter
+        Its tables; the runner publishes them when all else that belongs to the analysis is written.
+    afterwards : list of callable
+        Done after that on the writing rank (to clean up).
+    """
+
+    model: Any
+    case: Case
+    analysis: AnalysisSection
+    comm: Any
+    folder: Path
+    console: Console
+    resuming: bool = False
+    before_first: Callable[[], None] = lambda: None
+    attributes: dict[str, Any] = field(default_factory=dict)
+    left_out: list[str] = field(default_factory=list)
+    arrays: dict[str, Any] = field(default_factory=dict)
+    fields: dict[str, Field] = field(default_factory=dict)
+    entry: dict[str, Any] = field(default_factory=dict)
+    writers: list[AnalysisWriter] = field(default_factory=list)
+    afterwards: list[Callable[[], None]] = field(default_factory=list)
+
+    @property
+    def name(self) -> str:
+        return self.analysis.name
+
+    @property
+    def wheel(self) -> Wheel:
+        """Of an analysis of a whole wheel."""
+        assert self.case.wheel is not None
+        return self.case.wheel
+
+    @property
+    def prefix(self) -> str:
+        """Prefix of the PETSc options."""
+        return self.analysis.name.replace("-", "_") + "_"
+
+    def leave_out(self, reasons: Sequence[str]) -> None:
+        """Say in one line what is left out and why."""
+        self.left_out.extend(reasons)
+        if self.left_out:
+            self.console.line(f"{self.name}: left out: {'; '.join(self.left_out)}")
+
+    def writer(
+        self,
+        columns: Sequence[str | Column],
+        labels: Sequence[str] = (),
+        **attributes: Any,
+    ) -> AnalysisWriter:
+        """The table of this analysis; see :class:`fretwave.results.results.AnalysisWriter`.
+
+        Parameters
+        ----------
+        columns : sequence of str or Column
+            Known names or columns of its own.
+        labels : sequence of str
+            Harmonic labels, when coefficients are kept.
+        attributes
+            Further attributes of the group.
+        """
+        described = {key: value for key, value in attributes.items() if value is not None}
+        writer = AnalysisWriter(
+            self.folder,
+            self.name,
+            columns,
+            {**self.attributes, "left_out": json.dumps(self.left_out), **described},
+            dofs=self.case.dofs,
+            labels=labels,
+            active=self.comm.rank == 0,
+            before_first=self.before_first,
+            file_attributes={"title": self.case.title},
+            arrays=self.arrays,
+            fields=self.fields,
+            publish_later=True,
+        )
+        self.writers.append(writer)
+        return writer
+
+    def publish(self) -> None:
+        """The analysis is done, with all its tables: its results take their place. Collective."""
+
+        def finish() -> None:
+            for writer in self.writers:
+                writer.publish()
+            for work in self.afterwards:
+                work()
+
+        on_first_rank(self.comm, finish)
+
+    def table(self, name: str) -> dict[str, Any]:
+        """Columns of a finished analysis (``event`` included) on every rank. Collective.
+
+        Raises
+        ------
+        InputError
+            It has no results in the run folder.
+        """
+        return on_first_rank(self.comm, lambda: self._read(name, _columns))
+
+    def coefficients(self, name: str, points: Sequence[int] | None = None) -> tuple[list[str], Any]:
+        """Harmonic labels and coefficients (points, n_dof, m) of a finished analysis. Collective."""
+
+        def read(group: Any) -> tuple[list[str], Any]:
+            labels = [text.decode() for text in group["harmonic"][()]]
+            data = group["coefficients"]
+            return labels, data[()] if points is None else np.stack([data[point] for point in points])
+
+        found: tuple[list[str], Any] = on_first_rank(self.comm, lambda: self._read(name, read))
+        return found
+
+    def has_results(self, name: str) -> bool:
+        """Whether an analysis has rows in the run folder that belong to this very case. Collective."""
+
+        def look() -> bool:
+            if not has_results(self.folder):
+                return False
+            with open_results(self.folder / "results.h5") as file:
+                return name in file and belongs(file[name], self.case, name)
+
+        return on_first_rank(self.comm, look)
+
+    def write_table(self, suffix: str, columns: Mapping[str, Any]) -> None:
+        """A further table ``<name>_<suffix>.csv``, written as a whole by rank 0."""
+        if self.comm.rank:
+            return
+        names = list(columns)
+        lines = [",".join(names)]
+        for row in range(len(columns[names[0]]) if names else 0):
+            values = [np.asarray(columns[name])[row].item() for name in names]
+            lines.append(",".join(value if isinstance(value, str) else repr(value) for value in values))
+        replace_text(self.folder / f"{self.name}_{suffix}.csv", "\n".join(lines) + "\n")
+
+    def _read(self, name: str, what: Callable[[Any], Any]) -> Any:
+        with open_results(self.folder / "results.h5") as file:
+            if name not in file or not belongs(file[name], self.case, name):
+                raise InputError(
+                    f"'{self.name}' needs the results of '{name}'",
+                    where=display(self.folder),
+                    measured=f"no results of '{name}' for this case",
+                    fix=f"--only {name},{self.name}",
+                )
+            return what(file[name])
+
+    def linear_mode(self, contact: str, count: int = 1) -> list[Any]:
+        """Linear modes with the contact ``stuck`` or ``free``, without forces of the flow. Collective."""
+        from ...model.modes import linear_modes
+
+        if not getattr(self.analysis, "aerodynamics", False):
+            return cast("list[Any]", linear_modes(self.model, count=count, contact=contact))
+        from ...case.build import build_model
+
+        preload, diameters = self.case.preload_of(self.analysis), nodal_diameter(self.analysis)
+        with build_model(self.case, (), self.comm, preload, diameters) as structure:
+            return cast("list[Any]", linear_modes(structure, count=count, contact=contact))
+
+
+def _columns(group: Any) -> dict[str, Any]:
+    table = {name: data[()] for name, data in group["points"].items()}
+    if "event" in table:
+        table["event"] = np.array([text.decode() for text in table["event"]])
+    return table
+
+
+#: Tables of the case that decide the results of every analysis.
+_COMMON = ("model", "contact", "reduction", "preload", "aerodynamics")
+
+
+def describe_analysis(analysis: AnalysisSection, case: Case, run_id: str) -> dict[str, Any]:
+    """Attributes every group has: the analysis' own keys, and the values that decided its results."""
+    keys = analysis.model_dump(exclude={"name", "dampers", "petsc", "step", "force", "preload"})
+    plain = {key: value for key, value in keys.items() if value is not None and not isinstance(value, dict)}
+    shown = {key: json.dumps(value) if isinstance(value, list) else value for key, value in plain.items()}
+    reduction = {"reduction": json.dumps(case.reduced.plain())} if case.reduced else {}
+    laws = json.dumps({contact.name: contact.info.plain() for contact in case.contacts})
+    return {**shown, **reduction, "laws": laws, "run_id": run_id, "case": json.dumps(_deciding(case, analysis.name))}
+
+
+def _deciding(case: Case, name: str) -> dict[str, Any]:
+    analysis = case.analyses[name]
+    others = (name, analysis.mode) if isinstance(analysis, WearAnalysis) else (name,)
+    return {key: value for key, value in case.resolved.items() if key.split(".")[0] in (*_COMMON, *others)}
+
+
+def belongs(group: Any, case: Case, name: str) -> bool:
+    """Whether a group's results follow from the present model, contacts and keys of the analysis."""
+    try:
+        stored = json.loads(group.attrs["case"])
+    except (KeyError, ValueError):
+        return False
+    points = group["points"]
+    return bool(stored == _deciding(case, name) and len(next(iter(points.values()))))

@@ -1,0 +1,127 @@
+"""The force of an analysis on a structure, a sector or all sectors of a wheel, and the responses to it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ...case.schema import ForcedAnalysis
+from ...cyclic.engine_order import speed_rpm
+from ...post.motion import complex_amplitudes
+from .branch import step_control
+from .context import AnalysisContext
+from .rest import rest_state, start_mode
+from .wheel_start import tuned_sector
+
+
+@dataclass
+class Excitation:
+    """What the responses of all levels share.
+
+    Attributes
+    ----------
+    reference : LinearMode
+        Scales the unknowns.
+    rest : Preload or None
+    phase : float or None
+        Of the last point of the response [rad]: the next one's is the nearest to it, no jump by 2 pi.
+    """
+
+    context: AnalysisContext
+    harmonics: Any
+    reference: Any
+    rest: Any
+    phase: float | None = None
+
+    @property
+    def analysis(self) -> ForcedAnalysis:
+        assert isinstance(self.context.analysis, ForcedAnalysis)
+        return self.context.analysis
+
+    def force(self) -> npt.NDArray[np.complex128]:
+        """Amplitudes (n_dof,) [N] at level 1; on sector j of a wheel with the delay of the wave, e^{-i j theta}."""
+        case = self.context.case
+        force = np.zeros(len(case.dofs), dtype=complex)
+        turn = 2j * np.pi * (self.analysis.nodal_diameter or 0) / (case.wheel.sectors if case.wheel else 1)
+        for dof, amplitude in self.analysis.force.items():
+            for j, place in enumerate(case.places(dof)):
+                force[place] = amplitude * np.exp(-j * turn)
+        return force
+
+    def problem(self, level: float) -> Any:
+        """Steady response at a level. Collective."""
+        from ...hb.problems import ForcedResponse
+
+        case = self.context.case
+        problem = ForcedResponse(
+            self.context.model,
+            self.harmonics,
+            force={1: self.force()},
+            level=level,
+            dof=case.dof(self.analysis.observe, self.analysis.sector or 0),
+            reference=self.reference,
+            prefix=self.context.prefix,
+        )
+        if self.rest is not None:
+            problem.preload(self.rest.displacement, self.rest.load)
+        return problem
+
+    def branch(self, problem: Any, snapshot: Any = None, go_on: bool = False) -> Any:
+        """From the first to the last frequency, or from where a snapshot was taken. Collective."""
+        from ...solve.continuation import Continuation
+
+        low, high = (2.0 * math.pi * hertz for hertz in self.analysis.frequency)
+        steps, report_at = (
+            step_control(self.analysis.step),
+            [2.0 * math.pi * hertz for hertz in self.analysis.report_at],
+        )
+        if go_on:
+            return Continuation.restore(problem, snapshot, (low, high), steps, report_at)
+        return Continuation(problem, problem.initial(low), (low, high), steps, report_at)
+
+    def columns(self) -> list[str]:
+        """Further columns of the table."""
+        names = ["speed_rpm"] if self.analysis.engine_order else []
+        return names + (["largest_amplitude", "largest_sector"] if self.context.case.wheel else [])
+
+    def row(self, problem: Any, y: Any, coefficients: Any) -> dict[str, Any]:
+        """Their values at a point; of the blades on the rank that has coefficients. Collective."""
+        order = self.analysis.engine_order
+        state = problem.state(y)
+        # A first phase near -pi and pi, where undamped motion stands, reads as -pi.
+        around = self.phase if self.phase is not None else -0.5 * math.pi
+        self.phase = state["phase"] + 2.0 * math.pi * round((around - state["phase"]) / (2.0 * math.pi))
+        row: dict[str, Any] = {"phase": self.phase}
+        if order:
+            row["speed_rpm"] = speed_rpm(state["omega"], order)
+        if self.context.case.wheel is not None and coefficients is not None:
+            observed = coefficients[self.context.case.places(self.analysis.observe)]
+            blades = np.abs(complex_amplitudes(self.harmonics.labels, observed)[1])
+            row = {**row, "largest_amplitude": float(blades.max()), "largest_sector": int(np.argmax(blades))}
+        return row
+
+
+def excitation_of(context: AnalysisContext, harmonics: Any) -> Excitation:
+    """Of a forced analysis; a wheel's unknowns are scaled by the tuned wave that its force drives. Collective."""
+    analysis: Any = context.analysis
+    if context.case.wheel is None:
+        return Excitation(context, harmonics, *start_mode(context, analysis.linear_mode, or_free=True))
+    from ...cyclic.sector import wave_mode
+
+    with tuned_sector(context) as sector:
+        tuned, _ = start_mode(sector, analysis.linear_mode, or_free=True)
+    rest = rest_state(context)
+    return Excitation(context, harmonics, wave_mode(tuned, analysis.nodal_diameter, context.case.wheel.sectors), rest)
+
+
+@contextmanager
+def tuned_excitation(context: AnalysisContext, harmonics: Any) -> Iterator[Excitation]:
+    """The same on the tuned sector that a wheel is made of. Collective."""
+    with tuned_sector(context) as sector:
+        yield excitation_of(sector, harmonics)

@@ -1,0 +1,145 @@
+"""The static state that the dynamics of an analysis move about."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import scipy.sparse.linalg
+
+from ...case.contacts import ContactSpec, closed_contacts
+from ...case.schema import PreloadSection
+from ...case.sector import nodal_diameter
+from ...errors import InputError
+from ...model.laws import Role, own_load
+from .asymptotes import closed_stiffness
+from .context import AnalysisContext
+
+#: A mode below this share of the first frequency with closed contact is a rigid motion.
+RIGID = 1e-6
+
+
+def rest_state(context: AnalysisContext, factor: float = 1.0) -> Any:
+    """Solve the preload of an analysis; the contact laws take it as their rest state. Collective.
+
+    Parameters
+    ----------
+    factor : float
+        On the loads; the pairs' own normal loads are as given.
+
+    Returns
+    -------
+    Preload or None
+        None when there is no preload.
+
+    Raises
+    ------
+    NotConverged
+        There is no static equilibrium.
+    """
+    from ...solve.preload import balanced, static_preload
+
+    section = context.case.preload_of(context.analysis)
+    if section is None and context.analysis.type != "static":
+        return None
+    reference = closed_mode(context)
+    if section is None or not section.loads:
+        return balanced(context.model, reference)
+    load = factor * np.sum([context.case.loads[name] for name in section.loads], axis=0)
+    closed = None
+    if context.case.neighbours is None and just_touching(context.case.contacts, section):
+        stuck = context.case.K + closed_stiffness(context, tangential=True)
+        closed = scipy.sparse.linalg.spsolve(stuck.tocsc(), load)
+    return static_preload(context.model, load, reference, closed=closed)
+
+
+def just_touching(contacts: Sequence[ContactSpec], section: PreloadSection) -> bool:
+    """Pairs with a normal direction, none with a gap or with a load of its own."""
+
+    def has(contact: ContactSpec, role: Role) -> bool:
+        value = contact.value(role)
+        return value is not None and bool(np.any(value))
+
+    return any(contact.info.normal is not None for contact in contacts) and all(
+        (not section.pair_loads or not has(contact, Role.LOAD)) and not has(contact, Role.GAP) for contact in contacts
+    )
+
+
+def closed_mode(context: AnalysisContext) -> Any:
+    """Lowest linear mode with every pair stuck, also those that do not touch before the load: a scale. Collective."""
+    from ...case.build import build_model
+    from ...model.modes import linear_modes
+
+    case = replace(context.case, contacts=closed_contacts(context.case.contacts))
+    with build_model(case, (), context.comm, nodal_diameter=nodal_diameter(context.analysis)) as model:
+        return linear_modes(model, 1)[0]
+
+
+def start_mode(context: AnalysisContext, linear_mode: int, or_free: bool = False) -> tuple[Any, Any]:
+    """The linear mode with the contact as it is at rest, stuck, and the rest state (or None). Collective.
+
+    Parameters
+    ----------
+    or_free : where contact that sticks leaves nothing to move, the mode without it
+    """
+    rest = rest_state(context)
+    if rest is not None:
+        context.console.line(
+            f"{context.name}: at rest {100 * rest.stick:.3g} % of the pairs stick, {100 * rest.slip:.3g} % slip,"
+            f" {100 * rest.open:.3g} % are open"
+        )
+        context.arrays["rest_displacement"] = rest.displacement
+    try:
+        modes = context.linear_mode("stuck", linear_mode)
+    except InputError:
+        if not or_free:
+            raise
+        context.console.line(f"{context.name}: contact that sticks leaves nothing to move: the mode without contact")
+        return context.linear_mode("free", linear_mode)[linear_mode - 1], rest
+    start = modes[linear_mode - 1]
+    if start.omega <= RIGID * closed_mode(context).omega:
+        is_open = 1.0 if rest is None else rest.open
+        load_name = own_load(context.case.contacts)
+        by = f"{load_name}, or " if load_name else ""
+        raise InputError(
+            f"linear mode {linear_mode} is a rigid motion: nothing holds the structure at rest",
+            where=f"analysis '{context.name}'",
+            measured=f"{start.frequency_hz:.3g} Hz, {100 * is_open:.3g} % of the pairs open at rest",
+            expected="an elastic mode",
+            fix=f"load the contact ({by}[preload] loads), hold the structure, or take a higher linear_mode",
+        )
+    return start, rest
+
+
+def retained(context: AnalysisContext, highest: int | None = None, samples: int | None = None) -> Any:
+    """Harmonics of an analysis in the frequency domain: with a preload the even ones too, unless told otherwise.
+
+    Parameters
+    ----------
+    highest, samples : in place of the analysis' own
+    """
+    from ...hb.problems import choose_harmonics
+
+    analysis: Any = context.analysis
+    retain = analysis.retain
+    if retain == "auto" and context.case.preload_of(analysis) is not None:
+        retain = "all"
+    return choose_harmonics(context.model, highest or analysis.harmonics, samples or analysis.samples, retain)
+
+
+def keep_pairs(context: AnalysisContext, writer: Any) -> None:
+    """Keep with the results where the contact pairs are, for the pictures."""
+    built = context.case.built.contacts if context.case.built else {}
+    for contact in context.case.contacts:
+        given = built.get(contact.name)
+        if given is None or given.positions is None:
+            continue
+        faces = list(given.faces) if given.faces is not None else [contact.name] * given.n_pairs
+        friction = contact.value(Role.FRICTION_COEFFICIENT)
+        friction = np.broadcast_to(np.nan if friction is None else friction, (given.n_pairs,))
+        place = f"pairs_{contact.name}"
+        writer.dataset(f"{place}/position", given.positions, units="m", long_name="place on the face")
+        writer.dataset(f"{place}/face", np.array([str(face).encode() for face in faces]))
+        writer.dataset(f"{place}/{Role.FRICTION_COEFFICIENT.value}", friction, units="1")

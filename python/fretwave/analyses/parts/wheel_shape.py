@@ -1,0 +1,168 @@
+"""What a motion of a whole wheel looks like around the wheel, in numbers.
+
+Of the fundamental amplitudes a_j (complex) of one dof in all sectors j = 0 .. N - 1, and the fundamental q of all:
+
+* wave content c_n = (1/N) sum_j a_j e^{2 pi i n j / N}, as a wave of n nodal diameters is a_j = c_n e^{-2 pi i n j / N}
+  (`fretwave.cyclic.sector`); sum_n |c_n|^2 is the mean of |a_j|^2;
+* participation ratio (sum |a_j|^2)^2 / (N sum |a_j|^4): 1 for a travelling wave, 2/3 for a standing one, 1/N when one
+  sector moves alone (Bell and Dean, Discuss. Faraday Soc. 50, 1970);
+* amplification max |a_j| / b, with b the same in the tuned travelling linear wave that has the modal energy of this
+  motion, q^H M q: 1 for that wave, sqrt(2) for a standing one, at most sqrt(N) when a_j carries all of the energy.
+  (For the *forced* response to an engine order Whitehead, J. Mech. Eng. Sci. 8, 1966, has (1 + sqrt(N)) / 2.)
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ...columns import Column
+from ...cyclic.engine_order import folded
+from ...post.motion import complex_amplitudes
+from ...post.wave_content import participation, phases, wave_content
+from .context import AnalysisContext
+
+Array = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+
+#: So many folds within this share of one amplitude are those of single sectors.
+MANY_FOLDS, SAME_AMPLITUDE = 8, 0.01
+
+WHEEL = (
+    Column("amplification", "1", "largest amplitude of a sector over that of the tuned wave of the same energy"),
+    Column("participation", "1", "participation ratio of the sectors"),
+    Column("largest_sector", "1", "sector that moves most", "i"),
+    Column("diameters", "1", "nodal diameters of the largest wave, negative backward", "i"),
+    Column("diameters_share", "1", "share of the largest wave in the sum of squares"),
+    Column("unfolding", "1", "force on the avoided mode of a double one over the inertia force"),
+)
+
+
+#: A force on the avoided mode above this share of the inertia force is no rounding.
+HELD = 1e-8
+
+
+class WheelShape:
+    """The columns :data:`WHEEL` of a table.
+
+    Parameters
+    ----------
+    context
+        Of an analysis on a wheel.
+    dof : str
+        Observed in each sector.
+    tuned_amplitude : float
+        Of that dof in each sector, in the tuned travelling wave of unit modal mass.
+    mode : LinearMode
+        The problem's start.
+    """
+
+    def __init__(self, context: AnalysisContext, dof: str, tuned_amplitude: float, mode: Any) -> None:
+        self.wheel, self.M, self.tuned = context.wheel, context.case.M, tuned_amplitude
+        self.dof = self.wheel.sector.dof(dof)
+        phi = mode.shape + 1j * mode.imaginary
+        # what forces are measured in, per displacement (`reference_stiffness` of the core)
+        self.stiffness = mode.omega**2 * np.real(phi.conj() @ (self.M @ phi)) / np.linalg.norm(phi) ** 2
+
+    def row(self, problem: Any, y: Any, coefficients: Any) -> dict[str, Any]:
+        """Of one point; on ranks without coefficients nothing. Collective."""
+        unfolding, state = problem.unfolding(y), problem.state(y)
+        if coefficients is None:
+            return {}
+        q = complex_amplitudes(problem.harmonics.labels, coefficients)[1]
+        a = self.wheel.by_sector(q)[:, self.dof]
+        content = np.abs(wave_content(a)) ** 2
+        share = content / content.sum()
+        most = int(np.argmax(np.round(share, 9)))  # of a real shape forward and backward waves have equal shares
+        inertia = self.M @ q
+        held = self.stiffness * state["amplitude"] / (state["omega0"] ** 2 * np.linalg.norm(inertia))
+        return {
+            "amplification": float(np.abs(a).max() / (self.tuned * np.sqrt(np.real(q.conj() @ inertia)))),
+            "participation": participation(a),
+            "largest_sector": int(np.argmax(np.round(np.abs(a) / np.abs(a).max(), 9))),
+            "diameters": folded(most, self.wheel.sectors),
+            "diameters_share": float(share[most]),
+            "unfolding": float(held * np.linalg.norm(unfolding)),
+        }
+
+
+def finish_wheel(context: AnalysisContext, writer: Any, start: Any) -> list[str]:
+    """Keep what the branch says of the wheel in run.json and in two tables; lines to print. One rank writes.
+
+    ``<name>_sectors.csv`` has the amplitude and phase of the observed dof in every sector, ``<name>_diameters.csv`` the
+    share of every wave, both at the points with an event.
+    """
+    if not writer.active or not writer.rows:
+        return []
+    points = {column.name: writer.group["points"][column.name][()] for column in writer.columns}
+    where = np.flatnonzero([bool(text) for text in points["event"]])
+    a = _sector_amplitudes(context, writer, where)
+    n = a.shape[1]
+    shared = {"point": np.repeat(points["point"][where], n), "amplitude": np.repeat(points["amplitude"][where], n)}
+    sector = {"sector": np.tile(np.arange(n), len(where)), "sector_amplitude": np.abs(a).ravel()}
+    context.write_table("sectors", {**shared, **sector, "phase": phases(a).ravel()})
+    content = np.abs(wave_content(a)) ** 2
+    diameters = np.tile([folded(k, n) for k in range(n)], len(where))
+    share = content / content.sum(axis=1, keepdims=True)
+    context.write_table("diameters", {**shared, "nodal_diameter": diameters, "share": share.ravel()})
+    deviations = context.wheel.deviations
+    context.entry["wheel"] = {
+        "sectors": n,
+        "normalise": start.attributes["normalise"],
+        "deviations": None if deviations is None else deviations.tolist(),
+        "tuned_frequency_hz": start.tuned.frequency_hz,
+        "start_frequency_hz": start.mode.frequency_hz,
+        "largest_amplification": float(points["amplification"].max()),
+        "smallest_participation": float(points["participation"].min()),
+        "largest_unfolding": float(points["unfolding"].max()) if start.avoid is not None else None,
+    }
+    return _lines(context.name, points, start)
+
+
+def _sector_amplitudes(context: AnalysisContext, writer: Any, points: Any) -> Complex:
+    """Of the observed dof at some points, (points, N), from the coefficients written."""
+    analysis: Any = context.analysis
+    places = context.case.places(analysis.normalise)
+    labels = [text.decode() for text in writer.group["harmonic"][()]]
+    kept = [writer.group["coefficients"][int(point)][places] for point in points]
+    return np.array([complex_amplitudes(labels, Q)[1] for Q in kept])
+
+
+def _lines(name: str, points: dict[str, Any], start: Any) -> list[str]:
+    lines = []
+    shown = [0, *np.flatnonzero(points["event"] == b"report").tolist(), len(points["point"]) - 1]
+    for k in dict.fromkeys(shown):
+        lines.append(
+            f"{name}: at a = {points['amplitude'][k]:.4g} m amplification {points['amplification'][k]:.4g},"
+            f" participation ratio {points['participation'][k]:.4g}, sector {points['largest_sector'][k]} moves most,"
+            f" {100 * points['diameters_share'][k]:.3g} % is the wave of {points['diameters'][k]} nodal diameters"
+        )
+    if start.avoid is not None:
+        force = float(points["unfolding"].max())
+        text = f"{name}: force on the avoided mode at most {force:.1e} of the inertia force"
+        held = ": not quite a free motion, it holds the wave in its place (the sector is no mirror image of itself)"
+        lines.append(text + (held if force > HELD else ""))
+    return lines
+
+
+def one_by_one(table: dict[str, Any]) -> str:
+    """Advice on a branch that folds again and again at one amplitude; empty when it does not.
+
+    A friction contact whose force falls steeply where slip begins is bistable there. In a wave that runs all sectors
+    pass the fold together. Where sectors of almost equal amplitude pass it one after another there are up to 2^n
+    solutions between, and the branch goes through many of them: that is the physics of the case, not a failure.
+    """
+    folds = table["amplitude"][["fold" in event.split() for event in table["event"]]]
+    if len(folds) < MANY_FOLDS:
+        return ""
+    middle = float(np.median(folds))
+    near = int(np.count_nonzero(np.abs(folds / middle - 1) < SAME_AMPLITUDE))
+    if near < MANY_FOLDS:
+        return ""
+    return (
+        f"{near} folds lie within {100 * SAME_AMPLITUDE:g} % of a = {middle:.4g} m: sectors that move almost alike"
+        " begin to slip one after another, each with a fold of its own; begin above this amplitude, deviate more, or"
+        " follow a travelling wave"
+    )

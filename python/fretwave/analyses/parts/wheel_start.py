@@ -1,0 +1,222 @@
+"""Where a nonlinear mode of a whole wheel starts: a wave of the tuned sector, or a mode of the mistuned wheel."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from typing import Any, Optional
+
+import numpy as np
+import numpy.typing as npt
+import scipy.sparse as sp
+
+from ...cyclic.aerodynamics import period_of
+from ...cyclic.sector import wave_mode
+from ...model.modes import LinearMode
+from .asymptotes import most_alike, other_asymptote
+from .context import AnalysisContext
+from .rest import rest_state, start_mode
+
+Complex = npt.NDArray[np.complex128]
+
+#: Modes of a mistuned wheel whose shares in a tuned wave differ by less are alike in it: the lower one is taken.
+ALIKE = 1e-3
+#: Families of the tuned sector looked through for that of a wheel's mode, beyond its number over N.
+MORE_FAMILIES = 3
+
+
+@dataclass(frozen=True)
+class Start:
+    """A linear mode to start from and what the branch needs beside it.
+
+    Attributes
+    ----------
+    mode : LinearMode
+        Stuck.
+    rest : Preload or None
+    asymptotes : dict
+        As `other_asymptote` gives them.
+    dof : int
+        Normalised.
+    avoid : (N n_dof,) complex, optional
+        The other mode of a double one (`fretwave.NonlinearMode`).
+    tuned : LinearMode, optional
+        Mode of one sector that the wheel's is measured against.
+    attributes : dict
+        Of the results.
+    """
+
+    mode: LinearMode
+    rest: Any
+    asymptotes: dict[str, float]
+    dof: int
+    avoid: Optional[Complex] = None
+    tuned: Optional[LinearMode] = None
+    attributes: dict[str, Any] = field(default_factory=dict)
+
+
+def start_of(context: AnalysisContext) -> Start:
+    """Start of a mode analysis, of a sector or structure or of a wheel. Collective."""
+    if context.case.wheel is not None:
+        return _on_wheel(context)
+    analysis: Any = context.analysis
+    stuck, rest = start_mode(context, analysis.linear_mode, or_free=True)
+    return Start(stuck, rest, other_asymptote(context, stuck), context.case.dof(analysis.normalise))
+
+
+def _on_wheel(context: AnalysisContext) -> Start:
+    wheel, mistuned = context.wheel, context.wheel.deviations is not None
+    analysis: Any = context.analysis
+    rest = rest_state(context)
+    mode = None
+    if mistuned and analysis.nodal_diameter is None:
+        mode = context.linear_mode("stuck", analysis.linear_mode)[-1]
+        context = replace(context, analysis=_family(context, mode))
+    tuned, asymptotes = _tuned(context)
+    analysis = context.analysis
+    if rest is not None:
+        context.arrays["rest_displacement"] = rest.displacement
+    if mistuned:
+        mode, avoid = mode or _most_alike(context, tuned), None
+        asymptotes = _free(context, mode)
+        sector = _largest(context, mode) if analysis.sector is None else analysis.sector
+    else:
+        sector = analysis.sector or 0
+        mode, avoid = _wave(context, tuned, sector)
+    dof = context.case.dof(analysis.normalise, sector)
+    attributes = {
+        "normalise": context.case.dofs[dof],
+        "sectors": wheel.sectors,
+        "sector_dofs": wheel.unit,
+        "tuned_omega": tuned.omega,
+        "tuned_amplitude": tuned_amplitude(context, tuned),
+        "deviations": wheel.deviations,
+    }
+    return Start(mode, rest, asymptotes, dof, avoid, tuned, attributes)
+
+
+@contextmanager
+def tuned_sector(context: AnalysisContext) -> Iterator[AnalysisContext]:
+    """The same analysis of the tuned sector alone. Collective."""
+    from ...case.build import build_model
+
+    analysis: Any = context.analysis
+    case = context.wheel.sector
+    preload, flow = case.preload_of(analysis), analysis.aerodynamics
+    with build_model(case, analysis.dampers, context.comm, preload, analysis.nodal_diameter, flow) as model:
+        yield replace(context, model=model, case=case, arrays={})
+
+
+def _tuned(context: AnalysisContext) -> tuple[LinearMode, dict[str, float]]:
+    """Linear mode of the tuned sector in the wave that the analysis names, and its other asymptote. Collective."""
+    analysis: Any = context.analysis
+    with tuned_sector(context) as sector:
+        stuck, _ = start_mode(sector, analysis.linear_mode)
+        return stuck, other_asymptote(sector, stuck)
+
+
+def tuned_amplitude(context: AnalysisContext, tuned: LinearMode) -> float:
+    """Of the normalised dof in each sector of the wheel in the tuned travelling wave of unit modal mass."""
+    analysis: Any = context.analysis
+    dof = context.wheel.sector.dof(analysis.normalise)
+    return float(abs(tuned.shape[dof] + 1j * tuned.imaginary[dof]) / np.sqrt(context.wheel.sectors))
+
+
+def _family(context: AnalysisContext, mode: LinearMode) -> Any:
+    """The analysis with the tuned wave that has the largest share in a mode of the mistuned wheel. Collective.
+
+    Spatial indices n and N - n have equal shares in a real shape: the forward wave is named.
+    """
+    analysis: Any = context.analysis
+    wheel = context.wheel
+    shape = wheel.by_sector(mode.shape)
+    M = sp.csr_matrix(wheel.sector.M)
+    waves = np.fft.ifft(shape, axis=0)[: wheel.sectors // 2 + 1]
+    diameters = int(np.argmax([np.real(c.conj() @ (M @ c)) for c in waves]))
+    named = analysis.model_copy(update={"nodal_diameter": diameters})
+    count = min(wheel.unit, analysis.linear_mode // wheel.sectors + MORE_FAMILIES)
+    with tuned_sector(replace(context, analysis=named)) as sector:
+        modes = sector.linear_mode("stuck", count)
+    shares = [abs((m.shape - 1j * m.imaginary) @ (M @ waves[diameters])) for m in modes]
+    return named.model_copy(update={"linear_mode": 1 + int(np.argmax(shares))})
+
+
+def _wave(context: AnalysisContext, tuned: LinearMode, sector: int) -> tuple[LinearMode, Optional[Complex]]:
+    """A wave of the tuned wheel, and the other of its pair (DESIGN fact 6).
+
+    Of a double mode, motions A phi + B conj(phi) with any A and B solve the linear equations. A travelling wave has
+    B = 0: it avoids conj(phi). A standing wave A = B e^{i alpha} has its crest somewhere; with phi real at the
+    normalised dof, Re(phi) has it there, and avoids Im(phi), the same wave moved by a quarter of its length.
+    """
+    analysis: Any = context.analysis
+    wheel = context.wheel
+    mode = wave_mode(tuned, analysis.nodal_diameter, wheel.sectors)
+    if 2 * analysis.nodal_diameter % wheel.sectors == 0:
+        return mode, None
+    phi = mode.shape + 1j * mode.imaginary
+    if analysis.wave == "travelling":
+        return mode, phi.conj()
+    crest = phi[context.case.dof(analysis.normalise, sector)]
+    phi *= np.sqrt(2) * abs(crest) / crest
+    return LinearMode(mode.omega, mode.beta, phi.real.copy(), np.zeros(len(phi))), phi.imag + 0j
+
+
+def uneven_samples(samples: int, sectors: int, diameters: int) -> Optional[str]:
+    """What to say when the sectors of a wave see its period at different samples; None when all see the same.
+
+    The delay from one sector to the next, ND/N of a period, must be a whole number of samples. If not, each sector
+    meets the kinks of its contact forces between other samples, and the wheel differs from one sector by aliasing.
+    """
+    period = period_of(diameters, sectors)
+    if samples % period == 0:
+        return None
+    unit = math.lcm(2, period)  # even, as the number of samples is
+    nearest = unit * -(-samples // unit)
+    return (
+        f"sectors see this wave at different samples: {samples} * {diameters} is no multiple of {sectors}"
+        f" (samples = {nearest} would be the same in all)"
+    )
+
+
+def _largest(context: AnalysisContext, mode: LinearMode) -> int:
+    """Sector in which the normalised dof moves most."""
+    analysis: Any = context.analysis
+    dof = context.wheel.sector.dof(analysis.normalise)
+    return int(np.argmax(np.abs(context.wheel.by_sector(mode.shape)[:, dof])))
+
+
+def _most_alike(context: AnalysisContext, tuned: LinearMode) -> LinearMode:
+    """Of the N modes nearest in frequency the one with the largest share in the tuned pair's plane. Collective."""
+    analysis: Any = context.analysis
+    wheel = context.wheel
+    wave = wave_mode(tuned, analysis.nodal_diameter, wheel.sectors)
+    phi, M = wave.shape + 1j * wave.imaginary, context.case.M
+    modes = nearest_modes(context, tuned.omega, wheel.sectors)
+    shares = np.array([abs(phi.conj() @ (M @ mode.shape)) ** 2 for mode in modes])
+    alike = np.flatnonzero(shares > (1 - ALIKE) * shares.max())
+    return modes[int(alike[0])]
+
+
+def _free(context: AnalysisContext, mode: LinearMode) -> dict[str, float]:
+    """Frequency without contact of the mode most like one of the mistuned wheel. Collective."""
+    if any(contact.components > 1 for contact in context.case.contacts) or not context.case.contacts:
+        return {}
+    free = nearest_modes(context, mode.omega, context.wheel.sectors, "free")
+    return {"free_omega": most_alike(context, free, mode)}
+
+
+def nearest_modes(context: AnalysisContext, omega: float, count: int, contact: str = "stuck") -> list[LinearMode]:
+    """Linear modes nearest to a frequency, by shift-invert there, in ascending order. Collective."""
+    from petsc4py import PETSc
+
+    options, key = PETSc.Options(), "modes_eps_target"
+    given = options.getString(key, "")
+    options[key] = (1 - 1e-9) * omega**2  # not on an eigenvalue
+    try:
+        return context.linear_mode(contact, count)
+    finally:
+        options.delValue(key)
+        if given:
+            options[key] = given

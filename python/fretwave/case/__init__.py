@@ -1,0 +1,1 @@
+"""Case files: what they may say, and what is built from them."""

@@ -1,0 +1,151 @@
+"""Models built by Python: what a builder gives back, and how it is called."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import inspect
+import traceback
+import typing
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import scipy.sparse as sp
+from pydantic import TypeAdapter, ValidationError
+
+from ..errors import FretwaveError, InputError
+from ..model.structure import BuiltModel
+from ..texts import display, is_there, nearest, shortened, toml
+from .toml.source import Source
+from .toml.validation import at
+
+Array = npt.NDArray[np.float64]
+
+
+def run_builder(
+    given: str, options: Mapping[str, Any], source: Source, found: list[FretwaveError]
+) -> BuiltModel | None:
+    """Call a builder; what is wrong is appended to `found`, with the builder's own file and line where it is there."""
+    path = source.path.parent / given
+    before = len(found)
+    try:
+        module = _import(path, source)
+        function = getattr(module, "build", None)
+        if not callable(function):
+            raise InputError(
+                "the builder has no function build",
+                display(path),
+                fix="define `def build(**options)` returning fretwave.BuiltModel",
+            )
+        chosen = _checked(module, function, options, source, found)
+        built = function(**chosen) if len(found) == before else None
+    except (Exception, SystemExit) as error:  # whatever a builder may do, it is not a defect of ours
+        found.append(_blame(error, path, source))
+        return None
+    return _consistent(built, path, found) if len(found) == before else None
+
+
+def builder_digest(given: str, source: Source) -> str:
+    """Hash of the builder's text: a changed builder is a changed case."""
+    return hashlib.sha256((source.path.parent / given).read_bytes()).hexdigest()[:16]
+
+
+def _import(path: Path, source: Source) -> ModuleType:
+    where = source.where(("model", "builder"))
+    if path.suffix != ".py" or not is_there(path) or not path.is_file():
+        folder = path.parent
+        files = sorted(entry.name for entry in folder.glob("*.py")) if is_there(folder) and folder.is_dir() else []
+        near = nearest(path.name, files) or (f"there is {', '.join(files)}" if files else "check the path")
+        raise InputError("there is no such builder", where, display(path), "a Python file beside the case", near)
+    spec = importlib.util.spec_from_file_location(f"fretwave_builder_{path.stem}", path)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def known_options(module: ModuleType, function: Any) -> dict[str, Any] | None:
+    """Options of a builder with their types: arguments of build; for ``**options`` the fields of `Options`.
+
+    None when any option is taken.
+    """
+    parameters = inspect.signature(function).parameters.values()
+    hints = typing.get_type_hints(function)
+    known = {p.name: hints.get(p.name, Any) for p in parameters if p.kind in (p.KEYWORD_ONLY, p.POSITIONAL_OR_KEYWORD)}
+    if not any(p.kind == p.VAR_KEYWORD for p in parameters):
+        return known
+    table = getattr(module, "Options", None)
+    if table is None or not is_dataclass(table):
+        return None
+    hints = typing.get_type_hints(table)
+    return {f.name: hints[f.name] for f in fields(table)}
+
+
+def _checked(
+    module: ModuleType, function: Any, options: Mapping[str, Any], source: Source, found: list[FretwaveError]
+) -> dict[str, Any]:
+    """Options of known names, converted to the types that the builder says."""
+    known = known_options(module, function)
+    if known is None:
+        return dict(options)
+    values = {}
+    for name, value in options.items():
+        path = ("model", "options", name)
+        if name not in known:
+            problem = f"unknown option '{name}' of the builder"
+            fix = nearest(name, list(known)) or "remove the option"
+            found.append(
+                InputError(problem, source.where(path), f"{name} = {toml(value)}", f"one of {', '.join(known)}", fix)
+            )
+            continue
+        try:
+            values[name] = TypeAdapter(known[name]).validate_python(value)
+        except ValidationError as error:
+            rule = "; ".join(sorted({item["msg"] for item in error.errors(include_url=False)}))
+            measured = toml(at(source.data, path))
+            found.append(InputError(f"the option '{name}' has a wrong value", source.where(path), measured, rule))
+    return values
+
+
+def _blame(error: BaseException, path: Path, source: Source) -> InputError:
+    """An exception of the builder as bad input, with the builder's line that raised it or led to it."""
+    frames = [f for f in traceback.extract_tb(error.__traceback__) if Path(f.filename) == path]
+    where = f"{display(path)}:{frames[-1].lineno}" if frames else source.where(("model", "builder"))
+    if isinstance(error, SyntaxError):
+        where = f"{display(path)}:{error.lineno}"
+    if isinstance(error, FretwaveError):
+        place = error.where if error.where and not frames else where
+        return InputError(error.what, place, error.measured, error.expected, error.fix)
+    what = f"the builder failed: {type(error).__name__}: {shortened(str(error))}"
+    return InputError(what, where, fix="correct the builder, or the options in [model.options]")
+
+
+def _consistent(built: Any, path: Path, found: list[FretwaveError]) -> BuiltModel | None:
+    problem: str | None = f"it returned {type(built).__name__}"
+    if isinstance(built, BuiltModel):
+        try:
+            _convert(built)
+            problem = built.complaint()
+        except Exception as error:  # entries of any type may stand in it
+            problem = f"{type(error).__name__}: {shortened(str(error))}"
+    if problem is None:
+        return typing.cast(BuiltModel, built)
+    expected = "fretwave.BuiltModel with matrices, contacts and loads that fit each other"
+    found.append(
+        InputError("the builder gave no usable model", display(path), problem, expected, "correct the builder")
+    )
+    return None
+
+
+def _convert(built: BuiltModel) -> None:
+    """Matrices as sparse ones of float."""
+    built.M, built.K = (sp.csr_matrix(A, dtype=float) for A in (built.M, built.K))
+    built.C = None if built.C is None else sp.csr_matrix(built.C, dtype=float)
+    built.parts = {name: sp.csr_matrix(part, dtype=float) for name, part in built.parts.items()}
+    for contact in built.contacts.values():
+        contact.B = sp.csr_matrix(contact.B, dtype=float)

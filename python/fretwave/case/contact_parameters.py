@@ -1,0 +1,144 @@
+"""Law and parameters of a contact: from the case, per area or as they are, from the builder, or by default."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..errors import FretwaveError, InputError
+from ..model.structure import BuiltContact
+from ..texts import nearest, toml
+from .schema import ContactSection
+from .toml.source import Source
+from .toml.validation import at
+
+#: A parameter's name with this ending is given per area; the pair's area comes with the model.
+PER_AREA = "_per_area"
+LARGEST = float(np.finfo(float).max)
+
+
+def law_of(
+    source: Source, number: int, section: ContactSection, laws: Mapping[str, Any], found: list[FretwaveError]
+) -> Any:
+    """The law that a contact names; None when there is no such law."""
+    if section.law in laws:
+        return laws[section.law]
+    known = sorted(laws)
+    found.append(
+        InputError(
+            f"unknown contact law '{section.law}'",
+            where=source.where(("contact", number, "law")),
+            measured=f"law = {toml(section.law)}",
+            expected=f"one of {', '.join(known)}",
+            fix=nearest(section.law, known) or f"write for example `law = {toml(known[0])}`",
+        )
+    )
+    return None
+
+
+def fits(source: Source, number: int, law: Any, given: BuiltContact | None, found: list[FretwaveError]) -> bool:
+    """Law and pairs have the same number of components."""
+    here, wanted = given.components if given else 1, getattr(law, "components", 1)
+    if here != wanted:
+        text = "component" if here == 1 else "components"
+        measured = f"{law.name} has {wanted}, the pairs have {here} {text}"
+        fix = "choose another law" if given else "such contacts come with a model that is built or imported"
+        where = source.where(("contact", number, "law"))
+        found.append(InputError("the law does not fit the contact pairs", where, measured, "the same number", fix))
+    return bool(here == wanted)
+
+
+def parameters_of(
+    source: Source,
+    number: int,
+    section: ContactSection,
+    law: Any,
+    given: BuiltContact | None,
+    found: list[FretwaveError],
+) -> dict[str, Any] | None:
+    """Each parameter from the case, per area or as it is, else from the builder, else the law's default."""
+    path = ("contact", number)
+    known = {parameter.name: parameter for parameter in law.parameters}
+    areas = given.areas if given else None
+    per_area = [] if areas is None else [name + PER_AREA for name, p in known.items() if p.unit.startswith("N")]
+    before = len(found)
+    for key in section.model_extra or {}:
+        if key not in known and key not in per_area:
+            found.append(_unknown_parameter(source, (*path, key), section.law, [*known, *per_area]))
+    n_pairs = given.n_pairs if given and section.pairs is None else len(section.pairs or [])
+    extra, values = section.model_extra or {}, {}
+    for name, parameter in known.items():
+        if name + PER_AREA in extra and name + PER_AREA in per_area:
+            if name in extra:
+                where, fix = source.where((*path, name + PER_AREA)), "keep one of them"
+                found.append(InputError(f"'{name}' is given twice, once per area", where, fix=fix))
+            value = _value(source, (*path, name + PER_AREA), parameter, n_pairs, found)
+            values[name] = None if value is None else value * areas
+        elif given and name not in extra and name in given.parameters:
+            values[name] = _plain(given.parameters[name])
+        else:
+            values[name] = _value(source, (*path, name), parameter, n_pairs, found)
+    return values if len(found) == before else None
+
+
+def _plain(value: Any) -> Any:
+    return float(value) if np.ndim(value) == 0 else np.asarray(value, dtype=float)
+
+
+def _unknown_parameter(source: Source, path: tuple[Any, ...], law: str, known: Sequence[str]) -> InputError:
+    keys = [*ContactSection.model_fields, *known]
+    return InputError(
+        f"unknown key '{path[-1]}' in {source.name(path[:-1])}",
+        where=source.where(path),
+        measured=f"{path[-1]} = {toml(at(source.data, path))}",
+        expected=f"a parameter of {law} ({', '.join(known)}) or one of {', '.join(ContactSection.model_fields)}",
+        fix=nearest(str(path[-1]), keys) or "remove the key",
+    )
+
+
+def _value(source: Source, path: tuple[Any, ...], parameter: Any, n_pairs: int, found: list[FretwaveError]) -> Any:
+    """A parameter as number or (n_pairs,) array."""
+    value = at(source.data, path)
+    sign = ">" if parameter.strict else ">="
+    bounded = parameter.lower is not None and np.isfinite(parameter.lower)
+    bound = f" {sign} {parameter.lower:g}" if bounded else ""
+    expected = f"a number{bound}, or one per pair ({n_pairs}): {parameter.doc} [{parameter.unit}]"
+    if value is None:
+        if parameter.default is None:
+            found.append(
+                InputError(
+                    f"the key '{parameter.name}' is missing in {source.name(path[:-1])}",
+                    where=source.where(path[:-1]),
+                    expected=expected,
+                    fix=f"add a line `{parameter.name} = ...`",
+                )
+            )
+        return parameter.default
+    wrong = _wrong_number(value, parameter, n_pairs)
+    if wrong:
+        found.append(
+            InputError(
+                f"{source.name(path)} {wrong}",
+                where=source.where(path),
+                measured=toml(value),
+                expected=expected,
+                fix="correct the value",
+            )
+        )
+        return None
+    return float(value) if not isinstance(value, list) else np.array(value, dtype=float)
+
+
+def _wrong_number(value: Any, parameter: Any, n_pairs: int) -> str | None:
+    values = value if isinstance(value, list) else [value]
+    if not all(isinstance(entry, (int, float)) and not isinstance(entry, bool) for entry in values):
+        return "is not a number"
+    if isinstance(value, list) and len(value) != n_pairs:
+        return f"has {len(value)} values for {n_pairs} contact pairs"
+    if not all(-LARGEST <= entry <= LARGEST for entry in values):  # integers may be larger than any float
+        return "is not finite"
+    lower = -np.inf if parameter.lower is None else parameter.lower
+    below = min(values) < lower or (parameter.strict and min(values) == lower)
+    return "is out of range" if below else None

@@ -1,0 +1,198 @@
+"""``[[contact]]`` entries: laws and their parameters, pairs, and the map B from dofs to relative displacement."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import scipy.sparse
+
+from ..errors import FretwaveError, InputError
+from ..model.laws import LawInfo, Role, law_like, laws
+from ..model.structure import BuiltContact
+from ..texts import nearest, toml
+from .contact_parameters import fits, law_of, parameters_of
+from .schema import ContactSection
+from .toml.source import Source
+from .toml.validation import at, missing_key, validate
+
+
+@dataclass
+class ContactSpec:
+    """A contact of the case, ready for ``fretwave.Contact``.
+
+    Attributes
+    ----------
+    rows : (components * n_pairs, n_dof) sparse
+        u = rows @ x, pair by pair.
+    parameters : dict
+        The law's parameters, a number or (n_pairs,) array each.
+    pairs : list of [dof] or [first, second]
+        As the case names them; empty when a builder made the rows.
+    components : int
+        Rows of a pair.
+    """
+
+    name: str
+    law: str
+    rows: Any
+    parameters: dict[str, Any]
+    pairs: list[list[str]]
+    components: int = 1
+
+    @property
+    def n_pairs(self) -> int:
+        """Number of pairs."""
+        return int(self.rows.shape[0]) // self.components
+
+    @property
+    def info(self) -> LawInfo:
+        """What is known of the law: its parameters with their roles, its normal direction."""
+        return laws()[self.law]
+
+    def value(self, role: Role) -> Any:
+        """Value of the parameter with a role; None where the law has none."""
+        return self.info.value(role, self.parameters)
+
+
+def closed_contacts(contacts: Sequence[ContactSpec]) -> list[ContactSpec]:
+    """The same contacts with every pair closed at rest, whatever its load and gap."""
+    return [replace(c, parameters={**c.parameters, **c.info.closing()}) for c in contacts]
+
+
+def wear_areas(
+    contacts: Sequence[ContactSpec], built: Mapping[str, BuiltContact]
+) -> dict[str, npt.NDArray[np.float64]]:
+    """Nodal areas (n_pairs,) [m^2] of the contacts that can wear: those whose law has a normal direction.
+
+    Raises
+    ------
+    InputError
+        There are none, or their areas are not known.
+    """
+    found = {}
+    for contact in contacts:
+        if not contact.info.wears:
+            continue
+        given = built.get(contact.name)
+        if given is None or given.areas is None:
+            fix = "give the contact its areas (BuiltContact(areas=...))"
+            raise InputError("the areas of the pairs are not known", f"contact '{contact.name}'", None, "areas", fix)
+        found[contact.name] = np.asarray(given.areas, dtype=float)
+    if not found:
+        given_laws = ", ".join(contact.law for contact in contacts) or "no contact"
+        fix = f'use law = "{law_like(lambda law: law.wears)}"'
+        raise InputError("no contact can wear", None, given_laws, "a law with a normal direction", fix)
+    return found
+
+
+def read_contacts(
+    source: Source,
+    dofs: Sequence[str] | None,
+    laws: Mapping[str, Any],
+    found: list[FretwaveError],
+    built: Mapping[str, BuiltContact] | None = None,
+) -> list[ContactSpec]:
+    """All contacts of a case; what is wrong is appended to `found`. Without `dofs` pairs are not checked."""
+    contacts = []
+    for number in range(len(source.entries("contact"))):
+        section = validate(ContactSection, source, ("contact", number), found)
+        if section is None:
+            continue
+        given = (built or {}).get(section.name)
+        if section.pairs is None and given is None and dofs is None:
+            continue  # a model that could not be read may have brought the pairs
+        law = law_of(source, number, section, laws, found)
+        rows = _rows(source, number, section, dofs, built or {}, found)
+        parameters = parameters_of(source, number, section, law, given, found) if law else None
+        if law is None or parameters is None or rows is None:
+            continue
+        if fits(source, number, law, given, found):
+            pairs = [[pair] if isinstance(pair, str) else pair for pair in section.pairs or []]
+            components = given.components if given else 1
+            contacts.append(ContactSpec(section.name, section.law, rows, parameters, pairs, components))
+    return contacts
+
+
+def _rows(
+    source: Source,
+    number: int,
+    section: ContactSection,
+    dofs: Sequence[str] | None,
+    built: Mapping[str, BuiltContact],
+    found: list[FretwaveError],
+) -> Any:
+    """B of a contact: the builder's, or one row for each pair, +1 at the dof (second dof), -1 at the first of two."""
+    if section.pairs is None or section.name in built:
+        return _built_rows(source, number, section, built, found)
+    if dofs is None:
+        return None
+    before = len(found)
+    rows = scipy.sparse.lil_matrix((len(section.pairs), len(dofs)))
+    for row, pair in enumerate(section.pairs):
+        path = ("contact", number, "pairs", row)
+        ends = [pair] if isinstance(pair, str) else pair
+        if len(ends) not in (1, 2) or len(set(ends)) != len(ends):
+            found.append(
+                InputError(
+                    f"{source.name(path)} is not a pair",
+                    where=source.where(path),
+                    measured=toml(pair),
+                    expected="a dof (against ground) or two different dofs [first, second]",
+                    fix='write for example `pairs = ["m2"]` or `pairs = [["m1", "m2"]]`',
+                )
+            )
+            continue
+        for dof, sign in zip(reversed(ends), (1.0, -1.0)):
+            if check_dof(source, path, dof, dofs, found):
+                rows[row, list(dofs).index(dof)] = sign
+    return rows.tocsr() if len(found) == before else None
+
+
+def _built_rows(
+    source: Source,
+    number: int,
+    section: ContactSection,
+    built: Mapping[str, BuiltContact],
+    found: list[FretwaveError],
+) -> Any:
+    """B of a contact that comes with the model."""
+    path = ("contact", number)
+    if section.name in built and section.pairs is None:
+        return built[section.name].B
+    if section.pairs is not None:
+        problem, fix = f"the model brings the pairs of '{section.name}'", "remove the key, or choose another name"
+        found.append(InputError(problem, source.where((*path, "pairs")), fix=fix))
+    elif built:
+        near = nearest(section.name, list(built)) or "choose one of these, or give pairs"
+        problem = f"the model has no contact '{section.name}'"
+        found.append(InputError(problem, source.where((*path, "name")), None, f"one of {', '.join(built)}", near))
+    else:
+        found.append(missing_key(ContactSection, source, path, "pairs"))
+    return None
+
+
+def check_dof(
+    source: Source,
+    path: tuple[Any, ...],
+    dof: str,
+    dofs: Sequence[str] | None,
+    found: list[FretwaveError],
+) -> bool:
+    """True when a dof is known; otherwise the problem is appended to `found`."""
+    if dofs is None or dof in dofs:
+        return True
+    shown = ", ".join(dofs[:12]) + (f", ... ({len(dofs)} in all)" if len(dofs) > 12 else "")
+    found.append(
+        InputError(
+            f"unknown dof '{dof}'",
+            where=source.where(path),
+            measured=toml(at(source.data, path)),
+            expected=f"one of {shown}",
+            fix=nearest(dof, dofs) or "model.dofs names the dofs in the order of the matrices",
+        )
+    )
+    return False

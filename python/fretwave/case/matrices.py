@@ -1,0 +1,110 @@
+"""Matrices of a case: inline rows or files, checked for shape, finite entries, symmetry and definiteness."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+from typing import Any, Union
+
+import numpy as np
+import scipy.io
+import scipy.sparse
+import scipy.sparse.linalg
+
+from ..errors import FretwaveError, InputError
+from ..files.compressed import check_compressed
+from ..model.checks import NAMES, Matrix
+from ..texts import display, is_there, nearest, shortened
+from .toml.source import Source
+
+
+def load(
+    letter: str, given: Union[str, list[list[float]]], source: Source, found: list[FretwaveError]
+) -> Matrix | None:
+    """A matrix of ``[model]``, square with finite entries; None (and an entry in `found`) otherwise."""
+    where = source.where(("model", letter))
+    try:
+        if isinstance(given, str):
+            path = source.path.parent / given
+            matrix = Matrix(letter, _read(path, letter, where), f"{where}, {display(path)}")
+            matrix.digest = "sha256:" + hashlib.sha256(path.read_bytes()).hexdigest()
+        else:
+            matrix = Matrix(letter, _from_rows(letter, given, source), where)
+        _check_square(matrix)
+    except InputError as problem:
+        found.append(problem)
+        return None
+    return matrix
+
+
+def _from_rows(letter: str, rows: list[list[float]], source: Source) -> Any:
+    lengths = [len(row) for row in rows]
+    if len(set(lengths)) != 1 or not lengths[0]:
+        odd = next((i for i, length in enumerate(lengths) if length != lengths[0]), 0)
+        raise InputError(
+            f"the rows of the {NAMES[letter]} differ in length",
+            where=source.where(("model", letter, odd)),
+            measured=f"row {odd} has {lengths[odd] if lengths else 0} entries",
+            expected=f"{len(rows)} entries in each of the {len(rows)} rows",
+            fix="complete the row",
+        )
+    return scipy.sparse.csr_matrix(np.array(rows, dtype=float))
+
+
+def _read(path: Path, letter: str, where: str) -> Any:
+    if not is_there(path):
+        folder = path.parent
+        names = sorted(entry.name for entry in folder.iterdir()) if is_there(folder) and folder.is_dir() else []
+        raise InputError(
+            f"the file of the {NAMES[letter]} does not exist",
+            where=where,
+            measured=display(path),
+            expected="a .npz or .mtx file, path relative to the case file",
+            fix=nearest(path.name, names) or "check the path",
+        )
+    try:
+        values = _read_known(path, letter)
+        sparse = scipy.sparse.csr_matrix(values)
+        if not (np.issubdtype(sparse.dtype, np.number) or sparse.dtype == bool):
+            raise ValueError(f"entries of type {sparse.dtype}")
+    except Exception as error:  # whatever the readers raise on a damaged file
+        raise InputError(
+            f"the file of the {NAMES[letter]} cannot be read",
+            where=where,
+            measured=f"{display(path)}: {shortened(str(error) or type(error).__name__)}",
+            expected=f".npz of scipy.sparse.save_npz, .npz of numpy.savez with an array '{letter}', or .mtx",
+            fix=f"write it with scipy.sparse.save_npz('{path.name}', {letter})",
+        ) from None
+    if np.iscomplexobj(sparse):
+        raise InputError(
+            f"the {NAMES[letter]} is complex",
+            where=f"{where}, {display(path)}",
+            expected="real entries",
+            fix="put the imaginary part of a loss factor into C",
+        )
+    return sparse.astype(float)
+
+
+def _read_known(path: Path, letter: str) -> Any:
+    if path.suffix == ".mtx":
+        return scipy.io.mmread(str(path))
+    if path.suffix != ".npz":
+        raise ValueError(f"unknown file type '{path.suffix}'")
+    with np.load(path) as archive:
+        if "format" not in archive.files:
+            return archive[letter]
+    matrix = scipy.sparse.load_npz(path)
+    check_compressed(matrix)
+    return matrix
+
+
+def _check_square(matrix: Matrix) -> None:
+    rows, columns = matrix.values.shape
+    if rows != columns:
+        raise InputError(
+            f"the {matrix.name} is not square",
+            where=matrix.where,
+            measured=f"{rows} x {columns}",
+            expected="n x n",
+            fix="give one row and one column for each dof",
+        )

@@ -1,0 +1,196 @@
+"""``fretwave import``: matrices of a finite-element code into one native model file, with a check report."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..errors import EXIT_DONE, InputError
+from ..importers.calculix import SUFFIXES, read_dofs
+from ..importers.entries import Assembled, assemble
+from ..importers.formats import read_matrix, readable, split
+from ..importers.nodes import Nodes, read_nodes
+from ..importers.pairs import Pairs, contact_map, match, read_pairs
+from ..importers.report import check
+from ..mpi.guard import on_first_rank
+from ..results.model_file import ContactMap, FileModel, SourceFile, write
+from ..texts import display, nearest
+
+ROLES = {"M": "mass", "K": "stiffness", "C": "damping"}
+
+
+def import_model(options: argparse.Namespace, comm: Any) -> int:
+    """Read, check, write, report. Collective; rank 0 reads and writes."""
+    model, found = on_first_rank(comm, lambda: read_parts(options))
+    report = check(model, found.symmetry, found.notes, options.modes, comm)
+    on_first_rank(comm, lambda: write(options.out, model))
+    if comm.rank == 0:
+        print(report.text())
+        print(f"wrote {display(options.out)}")
+    return EXIT_DONE
+
+
+def read_parts(options: argparse.Namespace) -> tuple[FileModel, Assembled]:
+    """The model that the options describe. One rank.
+
+    Raises
+    ------
+    InputError
+        A file or an option is wrong.
+    """
+    _check_place(options.out, [options.mass, options.stiffness, options.damping])
+    paths = {letter: getattr(options, role) for letter, role in ROLES.items() if getattr(options, role)}
+    given = {letter: read_matrix(path, letter) for letter, path in paths.items()}
+    found = assemble(given, options.symmetric)
+    nodes = None
+    if options.coordinates:
+        with readable(options.coordinates, "file of the nodes"):
+            nodes = read_nodes(options.coordinates)
+    labels = _labels(options, found, nodes)
+    found.labels = labels
+    model = FileModel(
+        found.matrices["M"], found.matrices["K"], found.matrices.get("C"), found.names, units=options.units
+    )
+    if labels is not None:
+        model.node, model.direction = labels[:, 0], labels[:, 1]
+    if nodes is not None:
+        model.node_numbers, model.coordinates = nodes.numbers, nodes.coordinates
+        if nodes.hexahedra is not None:
+            model.hexahedra = nodes.places(nodes.hexahedra.ravel()).reshape(nodes.hexahedra.shape)
+    _name_dofs(model, options.name)
+    model.contacts = {contact.name: contact for contact in _contacts(options, labels, nodes)}
+    model.sources = _sources(options)
+    return model, found
+
+
+def _sources(options: argparse.Namespace) -> list[SourceFile]:
+    """Every file that was read, with its size and checksum."""
+    files = [(role, split(getattr(options, role))[0]) for role in ROLES.values() if getattr(options, role)]
+    tables = [("coordinates", options.coordinates), ("dofs", options.dofs)]
+    files += [(role, path) for role, path in tables if path]
+    files += [("pairs", Path(words[0].rpartition("=")[2])) for words in options.pairs if len(words) == 1]
+    beside = {path.with_suffix(".dof") for _, path in files if path.suffix.lower() in SUFFIXES}
+    files += [("dofs", path) for path in sorted(beside) if path.is_file()]
+    return [SourceFile.of(role, path) for role, path in files]
+
+
+def _check_place(out: Path, inputs: Iterable[Any]) -> None:
+    if any(path and Path(path).exists() and out.exists() and out.samefile(path) for path in inputs):
+        fix = "choose another name"
+        raise InputError("the model file would replace one of the matrices", display(out), None, "a new file", fix)
+    if not out.parent.is_dir():
+        fix = f"mkdir {display(out.parent)}"
+        raise InputError("the folder of the model file does not exist", display(out), fix=fix)
+
+
+def _labels(options: argparse.Namespace, found: Assembled, nodes: Nodes | None) -> npt.NDArray[np.int64] | None:
+    """Node and direction of each dof: from --dofs, the matrices, or node by node as the coordinates stand."""
+    if options.dofs:
+        with readable(options.dofs, "table of dofs"):
+            labels = _read_table(options.dofs)
+        where = display(options.dofs)
+        if len(labels) != found.given_size:
+            fix = "give one line for each row of the matrices"
+            measured, expected = f"{len(labels)} dofs", f"{found.given_size}, the size of the matrices"
+            raise InputError("the table of dofs does not fit", where, measured, expected, fix)
+        different, count = np.unique(labels, axis=0, return_counts=True)
+        if count.max() > 1:
+            node, direction = different[np.argmax(count)]
+            measured, fix = f"node {node}, direction {direction}", "correct the table"
+            raise InputError("a dof stands twice in the table", where, measured, "each dof once", fix)
+    elif found.labels is not None or nodes is None:
+        return found.labels
+    else:
+        labels = _node_by_node(found, nodes)
+    return labels if found.rows is None else labels[found.rows]
+
+
+def _node_by_node(found: Assembled, nodes: Nodes) -> npt.NDArray[np.int64]:
+    """Three or six dofs for each node, in the order of the coordinates."""
+    per_node, rest = divmod(found.given_size, len(nodes.numbers))
+    if rest or per_node not in (3, 6):
+        raise InputError(
+            "which dof belongs to which node is not known",
+            nodes.where,
+            f"{found.given_size} dofs, {len(nodes.numbers)} nodes",
+            "3 or 6 dofs for each node, or a table",
+            "give --dofs FILE with a line `node,direction` for each row of the matrices",
+        )
+    found.notes.append(f"dofs: taken node by node in the order of the coordinates, {per_node} for each")
+    directions = np.tile(np.arange(1, per_node + 1), len(nodes.numbers))
+    return np.column_stack([np.repeat(nodes.numbers, per_node), directions])
+
+
+def _read_table(path: Path) -> npt.NDArray[np.int64]:
+    """CalculiX' ``node.direction``, or a CSV of ``node,direction``."""
+    if not path.is_file():
+        raise InputError("the table of dofs does not exist", display(path), fix="check the path")
+    if "," not in path.read_text(encoding="utf-8"):
+        return read_dofs(path)
+    from ..importers.text import columns_of
+
+    return columns_of(path, 2).astype(np.int64)
+
+
+def _name_dofs(model: FileModel, given: list[str]) -> None:
+    """``--name tip=17y``: a dof's own name, and it is kept by a reduction."""
+    kept = []
+    for text in given:
+        name, _, old = text.partition("=")
+        old = old if old in model.names or f"n{old}" not in model.names else f"n{old}"
+        if not name.isidentifier() or old not in model.names or (name in model.names and name != old):
+            raise InputError(
+                "a dof cannot be named so",
+                f"--name {text}",
+                None,
+                "NAME=DOF, a new name of letters and digits and a dof such as " + model.names[0],
+                nearest(old, model.names) or "check the node and its direction",
+            )
+        kept.append(model.names.index(old))
+        model.names[kept[-1]] = name
+    model.kept = np.array(kept, dtype=np.int64) if kept else None
+
+
+def _contacts(
+    options: argparse.Namespace, labels: npt.NDArray[np.int64] | None, nodes: Nodes | None
+) -> Iterable[ContactMap]:
+    seen: set[str] = set()
+    for number, words in enumerate(options.pairs):
+        name, equals, first = words[0].partition("=")
+        name, first = (name, first) if equals else ("contact" if not number else f"contact_{number + 1}", words[0])
+        where = f"--pairs {' '.join(words)}"
+        if not name.isidentifier() or name in seen or len(words) > 2:
+            expected = "[NAME=]SET_A SET_B, [NAME=]SET GROUND or [NAME=]FILE.csv, each with its own name"
+            raise InputError("contact pairs are not given so", where, None, expected, "--pairs root=BLADE DISK")
+        if labels is None:
+            fix = "give --dofs FILE or --coordinates FILE"
+            raise InputError("the pairs name nodes, the matrices do not", where, None, "a table of dofs", fix)
+        seen.add(name)
+        yield contact_map(name, _pairs(first, words[1:], options, nodes, where), labels, nodes, _axis(options.tangent))
+
+
+def _pairs(first: str, second: list[str], options: argparse.Namespace, nodes: Nodes | None, where: str) -> Pairs:
+    if not second:
+        with readable(Path(first), "file of the pairs"):
+            return read_pairs(Path(first))
+    if nodes is None:
+        fix = "give --coordinates FILE with the sets, or a CSV of pairs"
+        raise InputError("the node sets are not known", where, None, "nodes with sets", fix)
+    return match(nodes, first, second[0], _axis(options.normal), options.tolerance)
+
+
+def _axis(text: str | None) -> Any:
+    if text is None:
+        return None
+    try:
+        axis = np.array([float(word) for word in text.split(",")])
+        if axis.shape == (3,) and np.linalg.norm(axis) > 0:
+            return axis
+    except ValueError:
+        pass
+    raise InputError("this is no direction", f"--normal or --tangent {text}", text, "x,y,z", "for example 0,0,1")

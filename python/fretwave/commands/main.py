@@ -1,0 +1,296 @@
+"""The command ``fretwave``. Heavy modules are imported by the sub-command that needs them."""
+
+from __future__ import annotations
+
+import argparse
+import re
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from ..errors import EXIT_DONE, InputError
+from ..mpi.guard import guarded, install
+from ..texts import display, is_there
+from .parser import Parser
+from .world import world
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Entry point; returns the exit code: 0 done, 2 bad input, 3 did not converge, 1 anything else."""
+    install()
+    return guarded(lambda: _dispatch(sys.argv[1:] if arguments is None else list(arguments)))
+
+
+def _dispatch(arguments: list[str]) -> int:
+    if arguments[:1] == ["doctor"]:
+        from . import doctor
+
+        return doctor.main(arguments[1:])
+    if arguments[:1] == ["study"]:
+        from . import study
+
+        return int(study.main(arguments[1:]))
+    lone = next((text for text in arguments if re.fullmatch("--[a-z-]+=--", text)), None)
+    if lone is not None:  # argparse takes the value for the end of the options
+        raise InputError("an option has the value '--'", "fretwave", lone, "a value", "give it one, or leave it out")
+    options = parser().parse_args(_joined_petsc(arguments))
+    code: int = options.command(options)
+    return code
+
+
+def _joined_petsc(arguments: list[str]) -> list[str]:
+    """``--petsc -snes_monitor`` as one word: argparse takes a value with a leading dash for an option."""
+    if "--petsc" not in arguments[:-1]:
+        return arguments
+    place = arguments.index("--petsc")
+    return [*arguments[:place], f"--petsc={arguments[place + 1]}", *arguments[place + 2 :]]
+
+
+def parser() -> argparse.ArgumentParser:
+    """The command line with all sub-commands."""
+    top = Parser(
+        prog="fretwave",
+        description="Nonlinear modes, forced response and limit cycles of structures with friction contact.",
+        epilog="exit codes: 0 done, 2 bad input, 3 did not converge (what was found is kept), 1 anything else",
+    )
+    commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True, parser_class=Parser)
+    _add_run(commands)
+    check = commands.add_parser("check", help="check a case and say what would run")
+    _add_case(check, optional=True)
+    check.add_argument("--keys", action="store_true", help="list all keys of case files instead")
+    check.set_defaults(command=_check)
+    _add_sweep(commands)
+    resume = commands.add_parser("resume", help="go on with a run that was cut off, on any number of ranks")
+    resume.add_argument("folder", type=Path, metavar="RUNDIR", help="folder of the run")
+    resume.add_argument("--no-plots", action="store_true", help="make no pictures")
+    resume.set_defaults(command=_resume)
+    show = commands.add_parser("show", help="show the results of a run")
+    show.add_argument("folder", type=Path, metavar="RUNDIR", help="folder of the run")
+    show.set_defaults(command=_show)
+    plot = commands.add_parser("plot", help="make the pictures of a run again")
+    plot.add_argument("folder", type=Path, metavar="RUNDIR", help="folder of the run")
+    plot.add_argument("--only", type=_names, default=[], metavar="NAME,...", help="analyses or kinds of picture")
+    plot.set_defaults(command=_plot)
+    _add_view(commands)
+    _add_import(commands)
+    commands.add_parser("study", help="error against run time of a case over harmonics, samples and tolerance")
+    commands.add_parser("doctor", help="what is installed, whether it fits together, and what to do about it")
+    return top
+
+
+def _names(text: str) -> list[str]:
+    return [name.strip() for name in text.split(",") if name.strip()]
+
+
+def _add_case(command: argparse.ArgumentParser, optional: bool = False) -> None:
+    count = "?" if optional else None
+    command.add_argument("case", type=Path, metavar="CASE", nargs=count, help="case file (TOML)")
+    command.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        dest="overrides",
+        help="override a value: mode.harmonics=7, contact.damper.friction_limit=3, 'model.M=[[1.0]]'",
+    )
+    command.add_argument("--only", type=_names, default=[], metavar="NAME,...", help="only these analyses")
+    command.add_argument("--quick", action="store_true", help="the short form: overrides of the table [quick]")
+
+
+def _add_run(commands: Any) -> None:
+    run = commands.add_parser("run", help="run the analyses of a case")
+    _add_case(run)
+    run.add_argument("--out", type=Path, metavar="DIR", help="run folder (default runs/<case>)")
+    run.add_argument("--no-plots", action="store_true", help="make no pictures")
+    run.add_argument("--petsc", default="", metavar="OPTIONS", help='PETSc options: "-snes_rtol 1e-10"')
+    run.set_defaults(command=_run)
+
+
+def _add_sweep(commands: Any) -> None:
+    sweep = commands.add_parser(
+        "sweep",
+        help="run a case for every value of some keys, on groups of ranks",
+        description="Runs the chosen analyses of a case for every value of a key, or every combination of several keys,"
+        " and writes one results.h5 with these dimensions, a table for each analysis led by the keys, and summary.csv."
+        " Under mpirun groups of ranks work side by side. `fretwave resume` goes on with a sweep that was cut off.",
+    )
+    _add_case(sweep)
+    sweep.add_argument(
+        "--over",
+        action="append",
+        default=[],
+        metavar="KEY=V,V,...",
+        help="values of a key, addressed as --set does: model.options.friction=0.1,0.2,0.5; once for each key",
+    )
+    sweep.add_argument("--groups", type=int, metavar="G", help="groups of ranks (default: as many as ranks and values)")
+    sweep.add_argument("--out", type=Path, metavar="DIR", help="folder (default runs/<case>_sweep)")
+    sweep.add_argument("--no-plots", action="store_true", help="make no pictures")
+    sweep.add_argument("--petsc", default="", metavar="OPTIONS", help='PETSc options: "-snes_rtol 1e-10"')
+    sweep.set_defaults(command=_sweep)
+
+
+def _add_view(commands: Any) -> None:
+    view = commands.add_parser(
+        "view",
+        help="write the motion over a period and the contact pairs for ParaView",
+        description="Writes <analysis>.vtkhdf, the mesh with its displacement at phases of the period, and"
+        " <analysis>_contact.vtkhdf, the contact pairs with forces, status and work. Several points follow each other."
+        " Of a sector the whole wheel is written, sector by sector."
+        " Of wear without --point: <analysis>_wear.vtkhdf, the pairs with worn depth and pressure over wear cycles.",
+    )
+    view.add_argument("folder", type=Path, metavar="RUNDIR", help="folder of the run")
+    view.add_argument("--analysis", metavar="NAME", help="mode, forced response or wear (default: the first)")
+    which = view.add_mutually_exclusive_group()
+    which.add_argument("--point", type=int, nargs="+", default=[], metavar="N", help="points of the branch")
+    which.add_argument("--amplitude", type=float, nargs="+", default=[], metavar="A", help="nearest kept points [m]")
+    view.add_argument("--sectors", type=int, nargs="+", default=[], metavar="J", help="of a wheel (default: all)")
+    view.add_argument("--phases", type=int, default=32, metavar="N", help="steps of a period (default 32)")
+    view.add_argument("--scale", default="auto", metavar="X", help="enlargement in the field warp (default auto)")
+    view.add_argument("--linear", action="store_true", help="eight linear hexahedra for each triquadratic one")
+    view.add_argument("--out", type=Path, metavar="FILE.vtkhdf", help="file to write (default: in the run folder)")
+    view.set_defaults(command=_view)
+
+
+def _add_import(commands: Any) -> None:
+    add = commands.add_parser(
+        "import",
+        help="bring matrices of a finite-element code into one model file",
+        description="Matrices: NumPy .npz, Matrix Market, MATLAB .mat (5 to 7.3), PETSc binary, CalculiX .sti/.mas,"
+        ' Abaqus .mtx; FILE:NAME picks a variable. In a case: [model] file = "OUT.h5".',
+    )
+    add.add_argument("out", type=Path, metavar="OUT.h5", help="model file to write")
+    add.add_argument("--mass", required=True, metavar="FILE", help="mass matrix")
+    add.add_argument("--stiffness", required=True, metavar="FILE", help="stiffness matrix")
+    add.add_argument("--damping", metavar="FILE", help="viscous damping matrix")
+    add.add_argument("--symmetric", choices=("auto", "lower", "upper", "full"), default="auto", help="what files hold")
+    add.add_argument("--dofs", type=Path, metavar="FILE", help="node and direction of each row (.dof, or CSV)")
+    add.add_argument("--coordinates", type=Path, metavar="FILE", help="nodes, sets and cells: CSV, .npz or input deck")
+    add.add_argument(
+        "--pairs",
+        nargs="+",
+        action="append",
+        default=[],
+        metavar="[NAME=]SET",
+        help="contact: two sets of coincident nodes, SET GROUND, or one CSV of node_a,node_b,nx,ny,nz,area",
+    )
+    add.add_argument("--normal", metavar="X,Y,Z", help="from the first set to the second")
+    add.add_argument("--tangent", metavar="X,Y,Z", help="first tangent (default: the axis most across the normals)")
+    add.add_argument("--tolerance", type=float, metavar="LENGTH", help="largest distance of two nodes of a pair")
+    add.add_argument("--name", action="append", default=[], metavar="NAME=DOF", help="name a dof: tip=n17y; it is kept")
+    add.add_argument("--units", default="", metavar="TEXT", help='a note, for example "kg, N, m"')
+    add.add_argument("--modes", type=int, default=6, metavar="N", help="frequencies to report (default 6)")
+    add.set_defaults(command=_import)
+
+
+def _run_folder(path: Path) -> Path:
+    """The folder of a run; what is in it is looked at later."""
+    if is_there(path) and not path.is_dir():
+        raise InputError("this is a file, not the folder of a run", display(path), fix="give the folder it is in")
+    return path
+
+
+def _run(options: argparse.Namespace) -> int:
+    comm = world()
+    from ..mpi.interrupt import ending_in_words
+    from ..run.order import RunOptions
+    from ..run.runner import run_case
+
+    with ending_in_words(comm):
+        return run_case(options.case, RunOptions.of(options), comm)
+
+
+def _sweep(options: argparse.Namespace) -> int:
+    comm = world()
+    from ..mpi.interrupt import ending_in_words
+    from ..run.order import RunOptions
+    from ..run.sweep_plan import plan_of
+    from .sweep import sweep_case
+
+    with ending_in_words(comm):
+        return sweep_case(options.case, RunOptions.of(options), plan_of(options.over), options.groups, comm)
+
+
+def _resume(options: argparse.Namespace) -> int:
+    _run_folder(options.folder)
+    comm = world()
+    from ..files.lock import check_free
+    from ..mpi.guard import on_first_rank
+    from ..mpi.interrupt import ending_in_words, say_how_to_go_on
+    from ..results.runfolder import read_record
+    from ..run.runner import resume_run
+    from .sweep import resume_sweep
+
+    record = on_first_rank(comm, lambda: read_record(options.folder))
+    on_first_rank(comm, lambda: check_free(options.folder))
+    with ending_in_words(comm):
+        say_how_to_go_on(comm, options.folder)
+        if "study" in record:
+            from .study import resume_study
+
+            return resume_study(options.folder, record, comm)
+        if "sweep" in record:
+            return resume_sweep(options.folder, record, comm, not options.no_plots)
+        return resume_run(options.folder, comm, not options.no_plots)
+
+
+def _check(options: argparse.Namespace) -> int:
+    if options.keys:
+        from .keys import key_lines
+
+        print("\n".join(key_lines()))
+        return EXIT_DONE
+    if options.case is None:
+        raise InputError("no case is given", "fretwave check", fix="`fretwave check cases/two_dof/case.toml`")
+    comm = world()
+    from .check import check_case
+
+    return check_case(options.case, options.overrides, options.only, options.quick, comm)
+
+
+def _import(options: argparse.Namespace) -> int:
+    comm = world()
+    from .import_model import import_model
+
+    return import_model(options, comm)
+
+
+def _view(options: argparse.Namespace) -> int:
+    _run_folder(options.folder)
+    comm = world()
+    from ..mpi.guard import on_first_rank
+    from ..view.choice import ViewOptions
+    from ..view.run import view_run
+
+    chosen = ViewOptions.checked(
+        options.scale,
+        options.phases,
+        analysis=options.analysis,
+        points=options.point,
+        amplitudes=options.amplitude,
+        linear=options.linear,
+        sectors=options.sectors,
+        out=options.out,
+    )
+    on_first_rank(comm, lambda: view_run(options.folder, chosen))
+    return EXIT_DONE
+
+
+def _show(options: argparse.Namespace) -> int:
+    _run_folder(options.folder)
+    from .show import show_run
+
+    show_run(options.folder)
+    return EXIT_DONE
+
+
+def _plot(options: argparse.Namespace) -> int:
+    _run_folder(options.folder)
+    from ..console import Console
+    from ..results.results import open_results
+    from ..run.runner import plot
+
+    if not (options.folder / "study.csv").exists():
+        open_results(options.folder / "results.h5").close()
+    plot(options.folder, Console(True), options.only or None)
+    return EXIT_DONE

@@ -1,0 +1,60 @@
+"""``fretwave study``: error against run time of a mode analysis over harmonics, samples, tolerance, modes."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from ..run.study import REPEATS, run_study
+from .parser import Parser
+from .world import world
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Run a study; returns the exit code. Collective."""
+    from ..mpi.interrupt import ending_in_words
+
+    options = _parser().parse_args(arguments)
+    comm = world()
+    with ending_in_words(comm):
+        return run_study(options, arguments, comm)
+
+
+def resume_study(folder: Path, record: dict[str, Any], comm: Any) -> int:
+    """Go on with a study that was cut off; returns the exit code. Collective."""
+    arguments = record["study"]["arguments"]
+    options = _parser().parse_args(arguments)
+    options.case, options.out = Path(record["case"]["path"]), folder
+    return run_study(options, arguments, comm, record)
+
+
+def _list(kind: type) -> Any:
+    def parse(text: str) -> list[Any]:
+        return [kind(part) for part in text.split(",")]
+
+    parse.__name__ = f"list of {kind.__name__}"
+    return parse
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = Parser(prog="fretwave study", description=__doc__)
+    parser.add_argument("case", type=Path, metavar="CASE", help="case file (TOML)")
+    parser.add_argument("--analysis", metavar="NAME", help="mode or wear to study (default: the first mode)")
+    parser.add_argument("--set", action="append", default=[], dest="overrides", metavar="KEY=VALUE", help="as for run")
+    parser.add_argument("--quick", action="store_true", help="the short form of the case")
+    parser.add_argument("--harmonics", type=_list(int), metavar="H,...", help="highest harmonics to sweep")
+    parser.add_argument("--samples", type=_list(int), metavar="N,...", help="time samples to sweep")
+    parser.add_argument(
+        "--tolerance", type=_list(float), metavar="T,...", help="tolerances to sweep (of wear: of a step)"
+    )
+    parser.add_argument(
+        "--component-modes", type=_list(int), metavar="N,...", help="numbers of component modes to sweep"
+    )
+    parser.add_argument(
+        "--pressure-change", type=_list(float), metavar="P,...", help="of wear: largest changes of pressure in a step"
+    )
+    parser.add_argument("--repeats", type=int, default=REPEATS, help="times each run is repeated (default 3)")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="folder (default runs/<case>_study)")
+    return parser

@@ -1,0 +1,19 @@
+"""MPI with PETSc started on it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+
+def world() -> Any:
+    """MPI with PETSc started on it; collective, so it comes before anything one rank could fail in alone."""
+    from mpi4py import MPI
+
+    from ..files.memory import check_room
+    from .doctor import check_runtime
+
+    check_runtime()
+    check_room()
+    from .. import _core  # noqa: F401
+
+    return MPI.COMM_WORLD

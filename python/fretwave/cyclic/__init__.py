@@ -1,0 +1,1 @@
+"""Wheels of equal sectors: waves, faces, aerodynamic coupling, reduction."""

@@ -1,0 +1,138 @@
+"""Aerodynamic influence coefficients: what the flow around the blades does to their vibration.
+
+The blade of sector j feels the motion q of its neighbours as the force
+
+    f_j = sum_k L_k q_{j+k}        (complex amplitudes of e^{i omega t}),
+
+L_k the influence coefficient of the blade k places ahead. In a wave of ND nodal diameters, q_{j+k} = q_j e^{-i k theta}
+(`fretwave.cyclic.sector`), this is f = L(theta) q with
+
+    L(theta) = sum_k L_k e^{-i k theta},        L_k = 1/N sum_theta L(theta) e^{i k theta},
+
+the travelling-wave coefficient (Hanamura, Tanaka & Yamaguchi 1980; Crawley 1988). In a period the flow works
+pi Im L |q|^2 on the blade: Im L > 0 feeds the vibration. L_k holds at one frequency omega, where i x is x' / omega, so
+
+    -L_k q  =  (-Re L_k) x + (-Im L_k / omega) x':
+
+one term in K and one in C for each k, of real matrices, like any other coupling between sectors, valid for a wave on
+one sector and for a wheel of any mistuning. They are not reciprocal (L_-k is not L_k): the flow is not at rest, and it
+may feed a forward wave and damp the backward one. Higher harmonics, and the mean, feel the same springs and dampers.
+
+References
+----------
+Hanamura, Y., Tanaka, H., Yamaguchi, K., A simplified method to measure unsteady forces acting on the vibrating blades
+in cascade, Bull. JSME 23, 1980. Crawley, E. F., in AGARD-AG-298 vol. 2, ch. 19, 1988.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Optional
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..errors import InputError
+from ..model.model import by_sector
+from .engine_order import folded
+
+Term = dict[int, sp.csr_matrix]
+
+#: Coefficients below this share of the largest are rounding of the transform, not a coupling.
+NOTHING = 1e-13
+
+
+@dataclass(frozen=True)
+class Aerodynamics:
+    """Influence coefficients and what they act on.
+
+    Attributes
+    ----------
+    influence : {k: complex}
+        L_k, of the blade k places ahead.
+    omega : float [rad/s]
+        Frequency at which they hold.
+    dof : int, optional
+        Of a sector, which the force acts on and whose motion causes it: L_k in N/m. Without it they are modal, L_k in
+        1/s^2: forces distributed like the inertia of the sector, L_k M x_{j+k}, so that L(theta) is the force on a mode
+        of unit modal mass in unit modal motion, whatever its shape.
+    """
+
+    influence: Mapping[int, complex]
+    omega: float
+    dof: Optional[int] = None
+
+    def __post_init__(self) -> None:
+        if not self.omega > 0:
+            raise InputError("influence coefficients need a frequency", None, self.omega, "> 0 rad/s", "give omega")
+
+    @classmethod
+    def from_damping(cls, ratios: Mapping[int, float], sectors: int, omega: float) -> Aerodynamics:
+        """Modal coefficients that give a wave of each nodal diameter its damping ratio at `omega`, and no stiffness.
+
+        A modal viscous damper: L(theta) = -2 i zeta omega^2. Nodal diameters that are not named have none.
+        """
+        wave = np.zeros(sectors, dtype=complex)
+        for nodal_diameter, ratio in ratios.items():
+            wave[nodal_diameter % sectors] = -2j * ratio * omega**2
+        parts = np.fft.ifft(wave)  # 1/N sum_d L(theta_d) e^{+2 pi i k d / N}
+        largest = np.abs(parts).max()
+        kept = [k for k in range(sectors) if abs(parts[k]) > NOTHING * largest]
+        return cls({folded(k, sectors): complex(parts[k]) for k in kept}, omega)
+
+    def wave(self, nodal_diameter: int, sectors: int) -> complex:
+        """L(theta) of a wave, [N/m] at a dof, [1/s^2] modal."""
+        theta = 2 * np.pi * nodal_diameter / sectors
+        return complex(sum(L * np.exp(-1j * k * theta) for k, L in self.influence.items()))
+
+    def terms(self, M: Any, period: int | None = None) -> dict[str, Term]:
+        """{"K": {k: (n_dof, n_dof)}, "C": {k: ...}} to be added to those of a sector.
+
+        Parameters
+        ----------
+        M : (n_dof, n_dof) or {k: ...}
+            Mass of the sector.
+        period : int, optional
+            Of one wave: blades so many places apart move alike in all its harmonics, and their terms are one.
+        """
+        added: dict[str, Term] = {"K": {}, "C": {}}
+        for k, L in self.influence.items():
+            for ahead, shape in self._shape(M).items():
+                place = k + ahead if period is None else folded(k + ahead, period)
+                for letter, value in (("K", -L.real), ("C", -L.imag / self.omega)):
+                    if value:
+                        add_to(added[letter], place, value * shape)
+        return added
+
+    def _shape(self, M: Any) -> Term:
+        """What the force is distributed like."""
+        mass = {k: sp.csr_matrix(part, dtype=float) for k, part in by_sector(M).items()}
+        if self.dof is None:
+            return mass
+        n = mass[0].shape[0]
+        if not 0 <= self.dof < n:
+            raise InputError("no such dof for aerodynamic forces", None, self.dof, f"0 .. {n - 1}", "name a dof")
+        return {0: sp.csr_matrix(([1.0], ([self.dof], [self.dof])), (n, n))}
+
+
+def period_of(nodal_diameter: int, sectors: int) -> int:
+    """Sectors after which a wave repeats itself in phase, in every harmonic."""
+    return sectors // math.gcd(nodal_diameter, sectors)
+
+
+def add_to(parts: Term, k: int, matrix: sp.csr_matrix) -> None:
+    """Add a matrix to the term of the sector k places ahead."""
+    parts[k] = sp.csr_matrix(parts[k] + matrix) if k in parts else matrix
+
+
+def with_terms(given: Any, added: Mapping[int, Any]) -> Any:
+    """A term as `fretwave.Model` takes it, plus further parts."""
+    if not added:
+        return given
+    total = {k: sp.csr_matrix(part, dtype=float) for k, part in by_sector(given).items()}
+    for k, part in added.items():
+        add_to(total, k, part)
+    total.setdefault(0, 0 * next(iter(total.values())))
+    return total

@@ -1,0 +1,119 @@
+"""Linear waves of a sector, contact stuck and sliding: whence interface modes and errors of a reduction come."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Optional, Tuple
+
+import numpy as np
+import numpy.typing as npt
+import scipy.sparse as sp
+from mpi4py import MPI
+
+from ..model.laws import PythonLaw, Role, springs
+from ..model.model import Contact, by_sector
+from ..model.modes import linear_modes
+from .sector import Sector
+
+Array = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+Indices = npt.NDArray[np.intp]
+#: Nodal diameters, and the state of the contact.
+Wave = Tuple[int, str]
+
+STATES = ("stuck", "sliding")
+
+
+@dataclass(frozen=True)
+class WaveError:
+    """Lowest frequencies of the reduced sector against those of the unreduced one.
+
+    Attributes
+    ----------
+    nodal_diameter : int
+    state : {"stuck", "sliding"}
+        All pairs closed; sliding ones without tangential force (free, where the law has no normal direction).
+    gave_interface_modes : bool or None
+        This nodal diameter did; None where the faces are whole.
+    full_hz, reduced_hz : (count,) [Hz]
+    relative : (count,)
+        reduced / full - 1, not negative beyond rounding (Rayleigh-Ritz); NaN of rigid motions.
+    """
+
+    nodal_diameter: int
+    state: str
+    gave_interface_modes: Optional[bool]
+    full_hz: Array
+    reduced_hz: Array
+    relative: Array
+
+    @property
+    def largest(self) -> float:
+        """Largest relative error in magnitude."""
+        return float(np.nanmax(np.abs(self.relative), initial=0.0))
+
+    def line(self) -> str:
+        """For a log."""
+        source = {None: "", True: " (gave interface modes)", False: " (gave no interface modes)"}
+        first = next((e for e in self.relative if np.isfinite(e)), 0.0)
+        return (
+            f"{self.nodal_diameter} nodal diameters, {self.state}{source[self.gave_interface_modes]}:"
+            f" {self.full_hz[0]:.6g} to {self.full_hz[-1]:.6g} Hz are off by {first:.1e} (first) to"
+            f" {self.largest:.1e} (worst)"
+        )
+
+
+class SectorWaves:
+    """Linear waves of a sector, stuck and sliding; each is computed by one rank and kept."""
+
+    def __init__(self, sector: Sector, comm: Any, diameters: tuple[int, ...], contacts: Sequence[Contact] = ()) -> None:
+        self.sector, self.comm, self.diameters, self.contacts = sector, comm, diameters, list(contacts)
+        self._hz: dict[Wave, Array] = {}
+
+    def hz(self, wanted: Sequence[Wave], count: int) -> Mapping[Wave, Array]:
+        """Frequencies (count,) [Hz] on every rank. Collective."""
+        self._solve([w for w in wanted if len(self._hz.get(w, ())) < count], count, np.empty(0, dtype=np.intp))
+        return {wave: self._hz[wave][:count] for wave in wanted}
+
+    def on(self, dofs: Indices, count: int) -> Array:
+        """Motions (n, 2 n_waves) of some dofs of the uncut sector: real and imaginary parts, together of length 1."""
+        shapes = self._solve([(d, state) for d in self.diameters for state in STATES], count, dofs)
+        columns = []
+        for phi in shapes:
+            columns += [part / np.linalg.norm(phi) for part in (phi.real, phi.imag)]
+        return np.column_stack(columns)
+
+    def _solve(self, wanted: Sequence[Wave], count: int, dofs: Indices) -> list[Complex]:
+        """Solves each wave on one rank; shapes on the dofs, in the order wanted, on every rank. Collective."""
+        mine = [self._one(wave, count, dofs) for wave in wanted[self.comm.rank :: self.comm.size]]
+        parts = self.comm.allgather(mine)
+        found = [parts[k % self.comm.size][k // self.comm.size] for k in range(len(wanted))]
+        self._hz.update({wave: hz for wave, (hz, _) in zip(wanted, found)})
+        return [phi for _, shapes in found for phi in shapes]
+
+    def _one(self, wave: Wave, count: int, dofs: Indices) -> tuple[Array, list[Complex]]:
+        diameter, state = wave
+        contacts = [_closed(c) if state == "stuck" else _sliding(c) for c in self.sector.contacts]
+        sector = replace(self.sector, contacts=[c for c in contacts if c is not None])
+        with sector.model(diameter, MPI.COMM_SELF) as model:
+            modes = linear_modes(model, count, "stuck")
+        shapes = [sector.expand(m.shape + 1j * m.imaginary, diameter)[dofs] for m in modes]
+        return np.array([mode.frequency_hz for mode in modes]), shapes
+
+
+def _closed(contact: Contact) -> Contact:
+    """Closed at rest, whatever its load and gap."""
+    if contact.components == 1 or isinstance(contact.law, PythonLaw):
+        return contact
+    return replace(contact, parameters={**contact.parameters, **contact.info.closing()})
+
+
+def _sliding(contact: Contact) -> Contact | None:
+    """What is left of a closed contact without tangential forces: its normal springs, as sliders that never slip."""
+    stiffness, normal = contact.value(Role.NORMAL_STIFFNESS), contact.info.normal
+    if normal is None or stiffness is None:
+        return None
+    normals = {k: sp.csr_matrix(B)[normal :: contact.components] for k, B in by_sector(contact.B).items()}
+    law, parameters = springs(stiffness)
+    return Contact(law, normals, parameters, contact.name)

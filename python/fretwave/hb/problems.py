@@ -1,0 +1,323 @@
+"""Nonlinear modes and forced response by harmonic balance: the problems that continuation follows."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from petsc4py import PETSc
+
+from .. import _core
+from ..errors import InputError
+from ..model.model import Model
+from ..model.modes import LinearMode
+from ..post.contact_history import MOTION
+from .states import ForcedState, ModalState, State
+
+Array = npt.NDArray[np.float64]
+
+
+class Harmonics:
+    """The retained harmonics and the number of time samples of a period.
+
+    Parameters
+    ----------
+    orders : ascending, with 1 among them (0 is the mean)
+    samples : even, at least 2 max(orders) + 2
+    """
+
+    def __init__(self, orders: Sequence[int], samples: int) -> None:
+        self.core = _core.Harmonics(list(orders), samples)
+        self.orders: tuple[int, ...] = tuple(self.core.orders)
+        self.samples: int = samples
+        self.block_size: int = self.core.block_size
+        self.labels = [label for n in self.orders for label in (["0"] if n == 0 else [f"{n}c", f"{n}s"])]
+        self.left_out: list[str] = []
+
+    def __repr__(self) -> str:
+        step = self.orders[1] - self.orders[0] if len(self.orders) > 1 else 1
+        regular = self.orders == tuple(range(self.orders[0], self.orders[-1] + 1, step))
+        last = f"{self.orders[1]}, ..., {self.orders[-1]}" if len(self.orders) > 3 else ""
+        orders = f"{self.orders[0]}, {last}" if last and regular else ", ".join(map(str, self.orders))
+        return f"Harmonics({orders}; {self.samples} samples)"
+
+
+def choose_harmonics(model: Model, highest: int, samples: int | None = None, retain: str = "auto") -> Harmonics:
+    """Retained set up to `highest`: only what the model needs, unless told otherwise.
+
+    Parameters
+    ----------
+    samples : default: the power of two from 16 `highest` up, 64 at least.
+    retain : {"auto", "odd", "all"}
+        auto keeps odd harmonics only when every law is odd and nothing preloads the contact.
+    """
+    if highest < 1:
+        raise InputError("the highest harmonic is below 1", None, highest, ">= 1", "give H = 1 or more")
+    if retain not in ("auto", "odd", "all"):
+        raise InputError("unknown choice of harmonics", None, retain, "auto, odd or all", 'use retain="auto"')
+    odd = retain == "odd" or (retain == "auto" and model.odd)
+    harmonics = Harmonics(
+        [n for n in range(highest + 1) if n % 2 or not odd], samples or max(64, 1 << (16 * highest - 1).bit_length())
+    )
+    if odd:
+        harmonics.left_out.append("even harmonics and the mean (the contact laws are odd, there is no preload)")
+    return harmonics
+
+
+class HarmonicProblem:
+    """N equations in N + 1 unknowns y: scaled harmonic coefficients, then scalars, the continuation parameter last."""
+
+    #: What its scalar unknowns mean; None where no table says.
+    meaning: State | None = None
+
+    def __init__(self, model: Model, harmonics: Harmonics, prefix: str, core: Any) -> None:
+        self.model, self.harmonics, self.prefix, self.core = model, harmonics, prefix, core
+
+    def initial(self, parameter: float) -> PETSc.Vec:
+        """A first guess at this amplitude or angular frequency. Collective."""
+        raise NotImplementedError
+
+    def preload(self, displacement: Array, load: Array) -> None:
+        """Dynamics about a static state (n_dof,) under the static load it balances, in place of any before. Collective.
+
+        Harmonic 0 must be retained.
+        """
+        with self.model.vectors(displacement, load) as vectors:
+            self.core.preload(*vectors)
+
+    def residual(self, y: PETSc.Vec, r: PETSc.Vec | None = None) -> PETSc.Vec:
+        """r(y), dimensionless, N entries, in `r` where one is given. Collective."""
+        r = self.core.equations() if r is None else r
+        self.core.residual(y, r)
+        return r
+
+    def jacobian(self, y: PETSc.Vec, J: PETSc.Mat | None = None) -> PETSc.Mat:
+        """dr/dy assembled, N x (N + 1) AIJ, in the `J` of an earlier call where one is given. Collective."""
+        if J is None:
+            return self.core.jacobian(y)
+        self.core.fill_jacobian(y, J)
+        return J
+
+    def jacobian_product(self, y: PETSc.Vec, dy: PETSc.Vec, dr: PETSc.Vec | None = None) -> PETSc.Vec:
+        """dr/dy dy, matrix-free, in `dr` where one is given. Collective."""
+        r = self.core.equations() if dr is None else dr
+        self.core.product(y, dy, r)
+        return r
+
+    def scalars(self, y: PETSc.Vec) -> Array:
+        """Scalar unknowns, then the scaled fundamental (c, s) of `dof` and the unfolding, linear in y. Collective."""
+        return np.array(self.core.scalars(y))
+
+    def last_entry(self, y: PETSc.Vec) -> float:
+        """The parameter's entry of unknowns or a tangent, on every rank. Collective."""
+        local = y.getArray(readonly=True)
+        return float(self.model.comm.bcast(local[-1] if len(local) else 0.0, root=self.model.comm.size - 1))
+
+    def coefficients(self, y: PETSc.Vec) -> Array | None:
+        """Harmonic coefficients Q (n_dof, m) in physical units, columns `harmonics.labels`, on rank 0. Collective."""
+        Q = self.core.coefficients(y)
+        parts = self.model.comm.gather(Q.getArray(readonly=True).copy())
+        Q.destroy()
+        return None if parts is None else np.concatenate(parts).reshape(-1, self.harmonics.block_size)
+
+    def diagnostics(self, y: PETSc.Vec) -> dict[str, float]:
+        """Contact of this motion. Collective.
+
+        Returns
+        -------
+        dict
+            stick, slip, open : shares of all pair-samples; error_estimate : share (2-norm) of the contact force outside
+            the retained harmonics; aliasing : relative change of the retained force coefficients on doubled samples;
+            work : energy dissipated by contact in a period; unclosed : largest distance [m] of a slider from where it
+            began its period, rounding unless its closure failed; slip_path : longest slip path of a pair [m].
+        """
+        return dict(self.core.summary(y))
+
+    def energy(self, y: PETSc.Vec) -> dict[str, float]:
+        """Where the energy of a period goes [J]. Collective.
+
+        Of each force p the work pi sum_n n Im(q_n^H p_n) on the periodic motion, so that the harmonic equations balance
+        it exactly (q_n^H times their n-th row). With s_n = n (-beta + i w) (CNM) the inertia releases
+        2 pi beta w sum_n n^3 q_n^H M q_n, with s_n = i n w0 and C - 2 zeta w0 M (EPMC)
+        2 pi zeta w0^2 sum_n n^2 q_n^H M q_n; C takes pi w sum_n n^2 q_n^H C q_n.
+
+        Returns
+        -------
+        dict
+            contact, damping : dissipated by contact and by C; modal : released by the decay; error : contact + damping
+            - modal relative to modal (to stored energy where that is below 1e-12 of it).
+        """
+        found = dict(self.core.energy(y))
+        size = max(abs(found["modal"]), 1e-12 * abs(found["stored"])) or 1.0
+        return {**found, "error": (found["contact"] + found["damping"] - found["modal"]) / size}
+
+    def contact_period(self, y: PETSc.Vec) -> list[dict[str, Array | None]]:
+        """Relative displacement u, velocity v and force f of each contact over one period, on rank 0. Collective.
+
+        Each is (n_samples, components, n_pairs).
+        """
+        return [{name: told[name] for name in "uvf"} for told in self.contact_history(y)]
+
+    def contact_history(self, y: PETSc.Vec) -> list[dict[str, Array | None]]:
+        """`contact_period` with what the law says of each pair and sample, on rank 0. Collective.
+
+        (n_samples, n_pairs): status (stick 0, slip 1, open 2) and gap [m] (nan without a normal direction).
+        """
+        return [
+            {name: self.model.gather_pairs(k, samples) for name, samples in zip(MOTION, period)}
+            for k, period in enumerate(self.core.contact_periods(y))
+        ]
+
+    def dof_period(self, y: PETSc.Vec, n: int = 256) -> dict[str, Array] | None:
+        """Displacement x and velocity v (n, n_dof) over one period, on rank 0. Collective."""
+        Q, s = self.coefficients(y), self.core.exponents(y)
+        if Q is None:
+            return None
+        tau = 2 * np.pi * np.arange(n) / n
+        x, v = np.zeros((n, len(Q))), np.zeros((n, len(Q)))
+        column = 0
+        for order, exponent in zip(self.harmonics.orders, s):
+            q = Q[:, column] - (1j * Q[:, column + 1] if order else 0)
+            column += 2 if order else 1
+            wave = np.exp(1j * order * tau)[:, None] * q
+            x += wave.real
+            v += (exponent * wave).real
+        return {"x": x, "v": v}
+
+    def state(self, y: PETSc.Vec) -> dict[str, float]:
+        """What a table of the branch says of this point. Collective."""
+        return {} if self.meaning is None else self.meaning(self.core.scalars(y))
+
+    def _what(self) -> str:
+        return ""
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self._what()}{self.harmonics}, {self.model})"
+
+    def destroy(self) -> None:
+        """Free the solver's vectors. Collective."""
+        self.core = None
+
+    def __enter__(self) -> HarmonicProblem:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.destroy()
+
+
+class NonlinearMode(HarmonicProblem):
+    """A nonlinear mode, frequency and damping over the modal amplitude. Collective.
+
+    Parameters
+    ----------
+    method : {"CNM", "EPMC"}
+        Complex nonlinear mode (Laxalde et al. 2008), or extended periodic motion concept (Krack 2015).
+    dof : int
+        The fundamental coefficient of this dof is (a, 0).
+    start : LinearMode
+        Where the branch begins; scales the unknowns.
+    prefix : str
+        Of the PETSc options.
+    avoid : (n_dof,) complex, optional
+        On a tuned wheel, where modes come in pairs and the equations lose rank at small amplitude: the other mode of
+        the pair, for a travelling wave the conjugate of the start's shape. The fundamental's component on it is kept
+        at zero by a force that comes out as zero (`unfolding`).
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        harmonics: Harmonics,
+        method: str = "CNM",
+        dof: int = 0,
+        start: LinearMode | None = None,
+        prefix: str = "mode_",
+        avoid: npt.NDArray[np.complex128] | None = None,
+    ) -> None:
+        if method not in ("CNM", "EPMC"):
+            raise InputError("unknown method", None, method, "CNM or EPMC", 'use method="CNM"')
+        if start is None:
+            from ..model.modes import linear_modes
+
+            start = linear_modes(model, 1)[0]
+        self.method, self.dof, self.start = method, dof, start
+        known = model.core, harmonics.core, getattr(_core.Method, method), dof, start.omega
+        with model.vectors(start.shape, start.imaginary) as shape:
+            core = _core.NonlinearMode(*known, *shape)
+        if avoid is not None:
+            with model.vectors(np.real(avoid), np.imag(avoid)) as other:
+                core.unfold(*other)
+        super().__init__(model, harmonics, prefix, core)
+        self.meaning = ModalState(method, start.omega)
+
+    def _what(self) -> str:
+        return f"{self.method} from {self.start.frequency_hz:.6g} Hz, amplitude of dof {self.dof}, "
+
+    def initial(self, amplitude: float) -> PETSc.Vec:
+        """The linear mode at this amplitude. Collective."""
+        return self.core.initial(amplitude)
+
+    def unfolding(self, y: PETSc.Vec) -> Array:
+        """The force along the avoided mode (2,), dimensionless; empty without `avoid`. Collective."""
+        return np.asarray(self.core.unfolding(y))
+
+
+class ForcedResponse(HarmonicProblem):
+    """Steady response to a periodic force over its frequency. Collective.
+
+    Parameters
+    ----------
+    force : dict
+        Order n -> complex (n_dof,), p(t) = level Re sum P_n e^{i n w t}.
+    dof : int
+        Observed.
+    reference : LinearMode
+        Scales the unknowns.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        harmonics: Harmonics,
+        force: Mapping[int, npt.NDArray[Any]],
+        level: float,
+        dof: int,
+        reference: LinearMode,
+        prefix: str = "forced_",
+    ) -> None:
+        self.dof, self.level, self.reference = dof, level, reference
+        P = self._blocks(model, harmonics, force)
+        with model.vectors(reference.shape) as (shape,):
+            core = _core.ForcedResponse(model.core, harmonics.core, dof, P, level, reference.omega, shape)
+        P.destroy()
+        super().__init__(model, harmonics, prefix, core)
+        self.meaning = ForcedState(level, reference.omega, core.reference_amplitude)
+
+    @staticmethod
+    def _blocks(model: Model, harmonics: Harmonics, force: Mapping[int, npt.NDArray[Any]]) -> PETSc.Vec:
+        blocks = np.zeros((model.n_dof, harmonics.block_size))
+        for order, P in force.items():
+            if order not in harmonics.orders:
+                raise InputError(
+                    "the force has a harmonic that is not retained",
+                    None,
+                    order,
+                    str(harmonics.orders),
+                    'retain it: retain = "all"',
+                )
+            values = np.asarray(P, dtype=complex)
+            column = harmonics.labels.index(f"{order}c" if order else "0")
+            blocks[:, column] = values.real
+            if order:
+                blocks[:, column + 1] = -values.imag
+        local = model.distribute(blocks).ravel().copy()
+        return PETSc.Vec().createWithArray(local, comm=model.comm)
+
+    def _what(self) -> str:
+        return f"level {self.level:g}, dof {self.dof}, "
+
+    def initial(self, omega: float) -> PETSc.Vec:
+        """Zero motion at this angular frequency: Newton's first step is the linear response. Collective."""
+        return self.core.initial(omega)

@@ -1,0 +1,75 @@
+"""Contact parameters that may be why a solver stopped: what looks alike from inside is told apart by its numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..model.laws import Role
+
+Array = npt.NDArray[np.float64]
+
+#: Contact stiffness over the structure's from which one sample's change of state changes all forces.
+STIFF = 1e4
+#: Contact stiffness over the structure's below which it holds nothing.
+SOFT = 1e-6
+#: Net force of the pairs' own loads over the largest of them, above which they are no balanced set.
+UNBALANCED = 0.1
+
+
+def suspects(contacts: Sequence[Any], stiffness: float) -> str:
+    """What is extreme in the contacts' parameters, contact by contact, or nothing.
+
+    Parameters
+    ----------
+    contacts : contacts of the model
+    stiffness : of the structure [N/m]
+    """
+    return "".join(f"; contact '{c.name}' {words}" for c in contacts for words in _extremes(c, stiffness))
+
+
+def _extremes(contact: Any, stiffness: float) -> Iterator[str]:
+    given = {role: np.atleast_1d(np.asarray(value, dtype=float)) for role, value in _values(contact)}
+    limit = given.get(Role.FRICTION_COEFFICIENT, given.get(Role.FRICTION_LIMIT))
+    if limit is not None and not np.any(limit):
+        yield "has no friction: nothing holds the structure along it"
+    if Role.LOAD in given:
+        yield from _loads(str(contact.info.named(Role.LOAD)), given[Role.LOAD], given.get(Role.GAP, np.zeros(1)))
+    for role in (Role.NORMAL_STIFFNESS, Role.TANGENTIAL_STIFFNESS):
+        if role in given:
+            yield from _stiffness(str(contact.info.named(role)), given[role], stiffness)
+
+
+def _values(contact: Any) -> Iterator[tuple[Role, Any]]:
+    """Of the parameters with a role, those that have a value."""
+    for parameter in contact.info.parameters:
+        value = contact.value(parameter.role)
+        if parameter.role != Role.NONE and value is not None:
+            yield parameter.role, value
+
+
+def _loads(name: str, load: Array, gap: Array) -> Iterator[str]:
+    if not np.any(load) and np.all(gap >= 0):
+        yield f"has no {name} of its own: only an outer load presses its pairs, and none sticks without"
+    elif np.ptp(load) > UNBALANCED * np.max(load):
+        yield (
+            f"has normal loads from {np.min(load):.3g} to {np.max(load):.3g} N: given pair by pair they are taken as"
+            " balanced, whatever their resultant"
+        )
+
+
+def _stiffness(name: str, values: Array, stiffness: float) -> Iterator[str]:
+    ratio = values / stiffness
+    if np.max(ratio) > STIFF:
+        yield (
+            f"has {name} {np.max(values):.3g} N/m, {np.max(ratio):.1g} times the structure's {stiffness:.2g}: one"
+            " sample that opens, sticks or slips changes all forces; a softer contact or more samples help"
+        )
+    if np.min(ratio) < SOFT:
+        yield (
+            f"has {name} {np.min(values):.3g} N/m, {np.min(ratio):.1g} times the structure's {stiffness:.2g}: it holds"
+            " nothing"
+        )

@@ -1,0 +1,1 @@
+"""Structures with contact: matrices, laws, modes, reduction."""

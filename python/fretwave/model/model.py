@@ -1,0 +1,309 @@
+"""The mechanical model: linear terms and contacts, distributed over the ranks of a communicator."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from copy import copy
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import scipy.sparse as sp
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from .. import _core
+from ..errors import InputError
+from ..mpi import guard as parallel
+from .laws import LawInfo, PythonLaw, Role, core_law, laws, python_law
+
+Array = npt.NDArray[np.float64]
+
+if MPI.COMM_WORLD.size > 1:
+    parallel.install()  # in scripts too: one rank's exception ends all ranks, with one message
+
+
+def by_sector(given: Any) -> Mapping[int, Any]:
+    """{k: matrix on the sector k places ahead}, the own sector first; a plain matrix stands for {0: matrix}."""
+    if given is None:
+        return {}
+    if not isinstance(given, Mapping):
+        return {0: given}
+    if 0 not in given:
+        raise InputError("the own sector's matrix is missing", None, sorted(given), "0 among them", "give {0: ...}")
+    return {k: given[k] for k in sorted(given, key=lambda k: (k != 0, k))}
+
+
+@dataclass
+class Contact:
+    """Contact pairs of one law.
+
+    Parameters
+    ----------
+    law : str or PythonLaw
+        Name of a compiled law (see `fretwave.laws`), or a law written in Python.
+    B : (n_pairs * components, n_dof) sparse or dense, or dict
+        Relative displacement u = B x, rows pair by pair (normal, tangent, tangent for three components).
+        On a sector {0: B_0, 1: B_1}: u = B_0 x_j + B_1 x_{j+1} reaches the next sector's dofs.
+    parameters : dict
+        The law's parameters, a number or one per pair.
+    """
+
+    law: str | PythonLaw
+    B: Any
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    name: str = "contact"
+
+    def __repr__(self) -> str:
+        law = self.law if isinstance(self.law, str) else type(self.law).__name__
+        given = "".join(f", {name}={_span(value)}" for name, value in self.parameters.items())
+        rows, n_dof = np.shape(by_sector(self.B)[0])
+        return f"Contact({self.name}: {law}, {rows} rows of B on {n_dof} dofs{given})"
+
+    @property
+    def components(self) -> int:
+        """Relative displacements per pair."""
+        return self.law.components if isinstance(self.law, PythonLaw) else self.info.components
+
+    @property
+    def info(self) -> LawInfo:
+        """What is known of the law: its parameters with their roles, its normal direction."""
+        if isinstance(self.law, PythonLaw):
+            return self.law.info()
+        if self.law not in laws():
+            raise InputError(
+                "unknown contact law", f"contact '{self.name}'", self.law, ", ".join(laws()), "choose a known law"
+            )
+        return laws()[self.law]
+
+    def value(self, role: Role) -> Any:
+        """Value of the parameter with a role; None where the law has none."""
+        return self.info.value(role, self.parameters)
+
+    def states(self, u: Array, v: Array, f: Array) -> tuple[npt.NDArray[np.int8], Array]:
+        """What the law says of displacements, velocities and forces (n_samples, components, n_pairs) of a period.
+
+        Returns
+        -------
+        status, gap : (n_samples, n_pairs)
+            Stick 0, slip 1 or open 2; distance to contact [m], nan of a law without a normal direction.
+        """
+        samples = [np.ascontiguousarray(values, dtype=float) for values in (u, v, f)]
+        n_pairs = samples[0].shape[2]
+        found: tuple[npt.NDArray[np.int8], Array] = self.core_law(np.arange(n_pairs), n_pairs).states(*samples)
+        return found
+
+    def core_law(self, pairs: npt.NDArray[np.intp], n_pairs: int) -> Any:
+        """The compiled law with the parameters of these pairs."""
+        if isinstance(self.law, PythonLaw):
+            return python_law(copy(self.law), pairs)
+        return core_law(self.law, self._values(n_pairs), pairs)
+
+    def _values(self, n_pairs: int) -> dict[str, Array]:
+        known = {p.name: p for p in self.info.parameters}
+        for name in self.parameters:
+            if name not in known:
+                raise InputError(
+                    "unknown law parameter", f"contact '{self.name}'", name, ", ".join(known), "remove or rename it"
+                )
+        values = {}
+        for name, parameter in known.items():
+            value = self.parameters.get(name, parameter.default)
+            if value is None or np.size(value) not in (1, n_pairs):
+                raise InputError(
+                    f"law parameter '{name}' is missing or of the wrong length",
+                    f"contact '{self.name}'",
+                    "nothing" if value is None else f"{np.size(value)} values",
+                    f"1 or {n_pairs} values",
+                    "give one number, or one per pair",
+                )
+            values[name] = np.broadcast_to(np.asarray(value, dtype=float).ravel(), (n_pairs,))
+            self._check_bound(parameter, values[name])
+        return values
+
+    def _check_bound(self, parameter: Any, values: Array) -> None:
+        """Here and not in the core, which knows a rank's own numbers of the pairs."""
+        low, sign = parameter.lower, ">" if parameter.strict else ">="
+        good = np.isfinite(values) & ((values > low) if parameter.strict else (values >= low))
+        if not good.all():
+            pair = int(np.argmin(good))
+            raise InputError(
+                f"law parameter '{parameter.name}' is out of bounds",
+                f"contact '{self.name}', pair {pair}",
+                f"{values[pair]:g}",
+                f"a number {sign} {low:g} {parameter.unit}" if low > -1e300 else f"a number [{parameter.unit}]",
+                "give a value within the bound; leave out pairs that stand for no area",
+            )
+
+
+def _span(value: Any) -> str:
+    """A parameter in short: a number, or its least and largest over the pairs."""
+    low, high = float(np.min(value)), float(np.max(value))
+    return f"{low:g}" if low == high else f"{low:g} to {high:g}"
+
+
+class Model:
+    """M x'' + C x' + K x + sum B^T f(B x, B x') = 0. Collective.
+
+    Parameters
+    ----------
+    M, K, C : (n_dof, n_dof) or dict
+        SciPy sparse or dense matrices, the same on every rank, or distributed petsc4py matrices of one row layout.
+        Any consistent set of units. Of one sector of a wheel {0: K_0, 1: K_1, -1: K_1.T}: K_k acts on the dofs of the
+        sector k places ahead; `fretwave.Sector` makes them.
+    contacts : sequence of Contact
+    comm : mpi4py communicator, optional
+        Default: of the petsc4py matrices, or COMM_WORLD.
+    sectors : int
+        Number of sectors of the wheel that matrices given as dict belong to.
+    nodal_diameter : int
+        Of the wave, in the convention of `fretwave.cyclic.sector`: x_{j+1}(t) = x_j(t - theta / omega) with
+        theta = 2 pi nodal_diameter / sectors.
+    unit : int
+        Ranks take whole groups of this many dofs of matrices given whole: a wheel is cut between its sectors.
+    """
+
+    def __init__(
+        self,
+        M: Any,
+        K: Any,
+        C: Any = None,
+        contacts: Sequence[Contact] = (),
+        comm: Any = None,
+        sectors: int = 1,
+        nodal_diameter: int = 0,
+        unit: int = 1,
+    ) -> None:
+        terms = [(A, order, k) for order, given in enumerate((K, C, M)) for k, A in by_sector(given).items()]
+        first = terms[0][0]
+        if comm is None:
+            comm = first.getComm().tompi4py() if isinstance(first, PETSc.Mat) else MPI.COMM_WORLD
+        self.comm, self.sectors, self.nodal_diameter, self._unit = comm, sectors, nodal_diameter, unit
+        self._matrices = [self._matrix(matrix) for matrix, *_ in terms]
+        self.contacts = list(contacts)
+        self.n_dof: int = self._matrices[0].getSize()[1]
+        self._pairs: list[npt.NDArray[np.intp]] = []
+        groups = [self._group(contact) for contact in self.contacts]
+        theta = 2 * np.pi * nodal_diameter / sectors
+        self.core = _core.Model(
+            [(A, *term[1:]) for A, term in zip(self._matrices, terms)], groups, theta, unit if unit > 1 else 0
+        )
+
+    def _matrix(self, A: Any) -> PETSc.Mat:
+        if isinstance(A, PETSc.Mat):
+            return A
+        rows = sp.csr_matrix(A, dtype=float)
+        if rows.shape[0] != rows.shape[1]:
+            raise InputError(
+                "a matrix of the model is not square", None, f"{rows.shape}", "n x n", "give a square matrix"
+            )
+        begin, end = self._rows(rows.shape[0])
+        local = rows[begin:end]
+        size = (end - begin, rows.shape[0])
+        mat = PETSc.Mat().createAIJ((size, size), csr=(local.indptr, local.indices, local.data), comm=self.comm)
+        mat.assemble()
+        return mat
+
+    def _rows(self, n: int) -> tuple[int, int]:
+        """PETSc's own split of n rows, in whole units."""
+        size, rank, units = self.comm.size, self.comm.rank, n // self._unit
+        local = [self._unit * (units // size + (r < units % size)) for r in range(size)]
+        return sum(local[:rank]), sum(local[: rank + 1])
+
+    def _group(self, contact: Contact) -> tuple[str, list[tuple[PETSc.Mat, int]], Any, list[int]]:
+        """The contact's pairs on the rank that owns the pair's first dof."""
+        maps, d = {k: sp.csr_matrix(B, dtype=float) for k, B in by_sector(contact.B).items()}, contact.components
+        n_rows = maps[0].shape[0]
+        for B in maps.values():
+            if B.shape != (n_rows, self.n_dof) or n_rows % d:
+                raise InputError(
+                    "B does not fit the model",
+                    f"contact '{contact.name}'",
+                    f"{B.shape}",
+                    f"(n_pairs * {d}, {self.n_dof})",
+                    "give B as u = B x",
+                )
+        begin, end = self._matrices[0].getOwnershipRange()
+        n_pairs = n_rows // d
+        pairs = np.nonzero((self._first_dofs(maps, d) >= begin) & (self._first_dofs(maps, d) < end))[0]
+        self._pairs.append(pairs)
+        rows = (pairs[:, None] * d + np.arange(d)).ravel()
+        parts = [(self._rows_of(B, rows), k) for k, B in maps.items()]
+        return contact.name, parts, contact.core_law(pairs, n_pairs), pairs.tolist()
+
+    @staticmethod
+    def _first_dofs(maps: Mapping[int, sp.csr_matrix], d: int) -> npt.NDArray[np.intp]:
+        """The first dof that each pair's first row touches, in its own sector if it does."""
+        first = np.zeros(maps[0].shape[0] // d, dtype=np.intp)
+        for B in reversed(list(maps.values())):
+            filled = np.diff(B.indptr)[::d] > 0
+            first[filled] = B.indices[B.indptr[:-1][::d][filled]]
+        return first
+
+    def _rows_of(self, B: sp.csr_matrix, rows: npt.NDArray[np.intp]) -> PETSc.Mat:
+        begin, end = self._matrices[0].getOwnershipRange()
+        local = B[rows] if len(rows) else B[:0]
+        size = ((local.shape[0], PETSc.DETERMINE), (end - begin, self.n_dof))
+        mat = PETSc.Mat().createAIJ(size, csr=(local.indptr, local.indices, local.data), comm=self.comm)
+        mat.assemble()
+        return mat
+
+    @property
+    def odd(self) -> bool:
+        """All laws are odd: without preload, even harmonics may be left out. Collective."""
+        return bool(self.core.odd)
+
+    def distribute(self, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        """This rank's rows of an array given whole on every rank."""
+        begin, end = self._matrices[0].getOwnershipRange()
+        return values[begin:end]
+
+    def vector(self, values: Array) -> PETSc.Vec:
+        """A distributed vector from an array (n_dof,) given whole on every rank. Collective."""
+        return PETSc.Vec().createWithArray(np.array(self.distribute(np.asarray(values, dtype=float))), comm=self.comm)
+
+    @contextmanager
+    def vectors(self, *values: Array) -> Iterator[list[PETSc.Vec]]:
+        """`vector` of each array, for a `with` block that they do not outlive. Collective."""
+        made = [self.vector(one) for one in values]
+        yield made
+        for vector in made:
+            vector.destroy()
+
+    def gather_pairs(self, which: int, local: Array) -> Array | None:
+        """Samples (.., n_pairs) of one contact in the order of B, on rank 0. Collective."""
+        parts = self.comm.gather((self._pairs[which], local))
+        if parts is None:
+            return None
+        whole = np.zeros((*local.shape[:-1], sum(len(pairs) for pairs, _ in parts)), local.dtype)
+        for pairs, values in parts:
+            whole[..., pairs] = values
+        return whole
+
+    def pairs_of(self, which: int) -> npt.NDArray[np.intp]:
+        """Pairs of one contact on this rank, as numbers in the order of B."""
+        return self._pairs[which]
+
+    def share_pairs(self, which: int, local: Array) -> Array:
+        """`gather_pairs`, on every rank. Collective."""
+        whole: Array = self.comm.bcast(self.gather_pairs(which, local))
+        return whole
+
+    def __repr__(self) -> str:
+        wave = f", wave of {self.nodal_diameter} nodal diameters on {self.sectors} sectors" if self.sectors > 1 else ""
+        ranks = f", {self.comm.size} ranks" if self.comm.size > 1 else ""
+        return f"Model({self.n_dof} dofs, contacts {[contact.name for contact in self.contacts]}{wave}{ranks})"
+
+    def destroy(self) -> None:
+        """Free the matrices. Collective."""
+        self.core = None
+        for mat in self._matrices:
+            mat.destroy()
+
+    def __enter__(self) -> Model:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.destroy()

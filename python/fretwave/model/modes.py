@@ -1,0 +1,87 @@
+"""Linear modes: the asymptotes of every backbone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from .. import _core
+from ..errors import InputError
+from .model import Model
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class LinearMode:
+    """A linear mode, lambda = -beta + i omega.
+
+    Attributes
+    ----------
+    omega, beta : float [1/s]
+    shape : (n_dof,) real part of the mode shape, on every rank (unit modal mass when undamped)
+    imaginary : (n_dof,)
+        x(t) = Re (shape + i imaginary) e^{lambda t}. Of a travelling wave on one sector, the largest entry is real.
+    """
+
+    omega: float
+    beta: float
+    shape: Array
+    imaginary: Array
+
+    def __repr__(self) -> str:
+        return f"LinearMode({self.frequency_hz:.6g} Hz, zeta {self.zeta:.6g}, {len(self.shape)} dofs)"
+
+    @property
+    def zeta(self) -> float:
+        """Modal damping ratio beta / |lambda|."""
+        return self.beta / float(np.hypot(self.beta, self.omega)) if self.omega else 0.0
+
+    @property
+    def frequency_hz(self) -> float:
+        """omega / 2 pi [Hz]."""
+        return self.omega / (2 * np.pi)
+
+
+def linear_modes(model: Model, count: int = 6, contact: str = "stuck") -> list[LinearMode]:
+    """Lowest linear modes, by SLEPc. Collective.
+
+    Parameters
+    ----------
+    contact : {"stuck", "free", "linearised"}
+        Closed contact without slip; no contact force; the laws' tangents at rest (damped, with C).
+
+    Raises
+    ------
+    FretwaveError
+        Fewer converge than there are: how many, and the option that helps.
+
+    Notes
+    -----
+    Stuck and free modes below the last are counted by the negative pivots of K - omega^2 M (Sylvester), so that no copy
+    of a double mode and no member of a family is left out.
+
+    Of one sector: the waves of the model's nodal diameter (`fretwave.cyclic.sector` says which way they run).
+    """
+    if contact not in ("stuck", "free", "linearised"):
+        raise InputError("unknown state of contact", None, contact, "stuck, free or linearised", 'use contact="stuck"')
+    found = _core.linear_modes(model.core, count, getattr(_core.ContactState, contact))
+    shapes = [_whole(model, re) + 1j * _whole(model, im) for _, _, re, im in found]
+    for _, _, *parts in found:
+        for part in parts:
+            part.destroy()
+    if model.core.travelling:
+        shapes = [_aligned(phi) for phi in shapes]
+    return [LinearMode(mode[0], mode[1], phi.real.copy(), phi.imag.copy()) for mode, phi in zip(found, shapes)]
+
+
+def _aligned(phi: npt.NDArray[np.complex128]) -> npt.NDArray[np.complex128]:
+    """The same shape with its largest entry real and positive."""
+    largest = phi[np.argmax(np.abs(phi) > (1 - 1e-6) * np.abs(phi).max())]
+    return np.asarray(phi * (abs(largest) / largest))
+
+
+def _whole(model: Model, vec: object) -> Array:
+    return np.concatenate(model.comm.allgather(vec.getArray(readonly=True).copy()))  # type: ignore[attr-defined]

@@ -1,0 +1,292 @@
+"""Craig-Bampton reduction: contact and observation dofs, and a few component modes."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import scipy.linalg
+import scipy.sparse as sp
+from petsc4py import PETSc
+
+from .. import _core
+from ..errors import InputError
+from .model import Model
+
+Array = npt.NDArray[np.float64]
+
+#: Frequencies below this share of the lowest component frequency are rigid motions, without a relative error.
+RIGID_SHARE = 1e-3
+DEFAULT_MODES = 10
+
+
+@dataclass(frozen=True)
+class FrequencyError:
+    """Lowest elastic frequencies of a reduced model against the unreduced one.
+
+    Attributes
+    ----------
+    full_hz, reduced_hz : (count,) [Hz]
+    relative : (count,)
+        reduced / full - 1; not negative beyond rounding, as the reduction is a Rayleigh-Ritz method.
+    wall_s : float [s]
+        Time spent, nearly all on the unreduced modes.
+    """
+
+    full_hz: Array
+    reduced_hz: Array
+    relative: Array
+    wall_s: float
+
+    def __repr__(self) -> str:
+        return f"FrequencyError({len(self.relative)} modes, largest {self.largest:.2g})"
+
+    @property
+    def largest(self) -> float:
+        """Largest relative error in magnitude."""
+        return float(np.abs(self.relative).max())
+
+
+class Reduction:
+    """x = T x_r with T = [I 0; Psi Phi] over (kept, internal) dofs; made by `reduce`.
+
+    Reduced coordinates are the kept dofs in the order given, then the component modes (unit modal mass). Signs and
+    double modes are fixed by a rule, so that reduced coordinates mean the same on any number of ranks.
+
+    Attributes
+    ----------
+    M, K : (n_r, n_r)
+        On every rank, symmetric. K is block diagonal: the statically condensed stiffness and omega_j^2 [1/s^2].
+    C : (n_r, n_r) or None
+    keep : (n_kept,)
+    component_hz : (n_modes,)
+        Frequencies with the kept dofs held [Hz], ascending.
+    wall_s : dict
+        factorisation, component_modes, constraint_modes, projection, total [s].
+    """
+
+    def __init__(
+        self, model: Model, core: Any, keep: npt.NDArray[np.intp], owned: Sequence[PETSc.Mat], wall: float
+    ) -> None:
+        self._model, self._core, self._owned = model, core, list(owned)
+        self.keep = keep
+        self.M: Array = core.M
+        self.K: Array = core.K
+        self.C: Array | None = core.C
+        self.component_hz: Array = np.asarray(core.component_omega) / (2 * np.pi)
+        self.wall_s: dict[str, float] = {**core.times, "total": wall}
+
+    def __repr__(self) -> str:
+        return f"Reduction({len(self.keep)} kept dofs and {self.size - len(self.keep)} modes, of {self._model})"
+
+    @property
+    def size(self) -> int:
+        """n_r = n_kept + n_modes."""
+        return len(self.K)
+
+    def expand(self, x_r: npt.ArrayLike) -> Array:
+        """Displacement of all dofs, on every rank. Collective.
+
+        Parameters
+        ----------
+        x_r : (n_r,) or (n_r, n)
+            The same on every rank.
+
+        Returns
+        -------
+        (n_dof,) or (n_dof, n)
+        """
+        rows = self._rows(x_r, self.size)
+        local = self._core.expand(rows)
+        full: Array = np.concatenate(self._model.comm.allgather(local))
+        return full if np.ndim(x_r) == 2 else full[:, 0]
+
+    def project(self, f: npt.ArrayLike) -> Array:
+        """T^T f: reduced load of forces on all dofs, on every rank. Collective.
+
+        Parameters
+        ----------
+        f : (n_dof,) or (n_dof, n)
+            The same on every rank.
+
+        Returns
+        -------
+        (n_r,) or (n_r, n)
+        """
+        rows = self._rows(f, self._model.n_dof)
+        reduced: Array = self._core.project(np.ascontiguousarray(self._model.distribute(rows)))
+        return reduced if np.ndim(f) == 2 else reduced[:, 0]
+
+    def error(self, count: int = 5, K_contact: Any = None) -> FrequencyError:
+        """Relative error of the lowest elastic frequencies. Collective.
+
+        Parameters
+        ----------
+        count : int
+        K_contact : (n_dof, n_dof) sparse or dense, optional
+            Stiffness added on kept dofs in both models, as of stuck contact; the same on every rank.
+
+        Raises
+        ------
+        InputError
+            K_contact reaches a dof that is not kept; count exceeds what the reduced model has.
+        """
+        start = time.perf_counter()
+        extra = self._contact_stiffness(K_contact)
+        square = scipy.linalg.eigh(self.K + self._on_kept(extra), self.M, eigvals_only=True)
+        reduced = np.sqrt(np.maximum(square, 0.0)) / (2 * np.pi)
+        rigid = int(np.count_nonzero(reduced < RIGID_SHARE * self._reference_hz()))
+        if not 1 <= count <= self.size - rigid:
+            raise InputError(
+                "the reduced model has not as many elastic modes",
+                None,
+                count,
+                f"1 .. {self.size - rigid}",
+                "ask for fewer",
+            )
+        full = self._full_hz(extra, rigid + count)[rigid:]
+        reduced = reduced[rigid : rigid + count]
+        return FrequencyError(full, reduced, reduced / full - 1, time.perf_counter() - start)
+
+    def destroy(self) -> None:
+        """Free matrices and modes; the reduced matrices stay. Collective."""
+        self._core = None
+        for mat in self._owned:
+            mat.destroy()
+        self._owned = []
+
+    def __enter__(self) -> Reduction:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.destroy()
+
+    def _rows(self, values: npt.ArrayLike, expected: int) -> Array:
+        rows = np.asarray(values, dtype=float)
+        if rows.ndim not in (1, 2) or len(rows) != expected:
+            raise InputError(
+                "an array does not fit the reduction", None, rows.shape, f"({expected},)", "give one row per coordinate"
+            )
+        return np.ascontiguousarray(rows.reshape(expected, -1))
+
+    def _reference_hz(self) -> float:
+        """A frequency of elastic motion: of the internal dofs, or of the kept ones."""
+        if len(self.component_hz):
+            return float(self.component_hz[0])
+        n = len(self.keep)
+        return float(np.sqrt(np.trace(self.K[:n, :n]) / np.trace(self.M[:n, :n])) / (2 * np.pi))
+
+    def _contact_stiffness(self, K_contact: Any) -> sp.csr_matrix:
+        n = self._model.n_dof
+        extra = sp.csr_matrix((n, n)) if K_contact is None else sp.csr_matrix(K_contact, dtype=float)
+        if extra.shape != (n, n):
+            raise InputError("K_contact does not fit the model", None, extra.shape, (n, n), "give it on all dofs")
+        entries = extra.tocoo()
+        reached = np.union1d(entries.row[entries.data != 0], entries.col[entries.data != 0])
+        outside = np.setdiff1d(reached, self.keep)
+        if len(outside):
+            raise InputError(
+                "K_contact reaches dofs that are not kept",
+                None,
+                f"{len(outside)}, the first {outside[0]}",
+                "kept dofs only",
+                "keep them",
+            )
+        return extra
+
+    def _on_kept(self, extra: sp.csr_matrix) -> Array:
+        out = np.zeros((self.size, self.size))
+        n = len(self.keep)
+        out[:n, :n] = extra[self.keep][:, self.keep].toarray()
+        return out
+
+    def _full_hz(self, extra: sp.csr_matrix, count: int) -> Array:
+        K, M = self._model._matrices[0], self._model._matrices[-1]
+        stiff = self._model._matrix(extra)
+        stiffness = K.copy()
+        stiffness.axpy(1.0, stiff)
+        core = _core.Model([(stiffness, 0, 0), (M, 2, 0)], [], 0.0)
+        modes = _core.linear_modes(core, count, _core.ContactState.free)
+        for mat in (stiff, stiffness):
+            mat.destroy()
+        return np.array([omega for omega, *_ in modes]) / (2 * np.pi)
+
+
+def reduce(
+    M: Any,
+    K: Any,
+    C: Any = None,
+    keep: npt.ArrayLike = (),
+    modes: int | None = None,
+    highest_hz: float | None = None,
+    comm: Any = None,
+) -> Reduction:
+    """Craig-Bampton reduction. Collective.
+
+    Parameters
+    ----------
+    M, K, C : (n_dof, n_dof)
+        SciPy sparse or dense, the same on every rank, or distributed petsc4py matrices (AIJ) of one row layout.
+        M and K symmetric, both triangles given. Any consistent set of units with time in seconds.
+    keep : (n_kept,) int
+        Dofs to keep: contact and observation. They must stop every rigid motion when held. The same on every rank.
+    modes : int, optional
+        Number of component modes, the lowest first (default 10, or all where they are fewer; 0: static condensation).
+    highest_hz : float, optional
+        Instead of `modes`: all component modes up to this frequency [Hz], counted by Sylvester's inertia.
+    comm : mpi4py communicator, optional
+        Default: of the petsc4py matrices, or COMM_WORLD.
+
+    Raises
+    ------
+    InputError
+        Kept dofs repeated, missing or out of range; too many modes; K or M not symmetric; structure not held.
+
+    Notes
+    -----
+    One factorisation of K_ii (MUMPS, L D L^T) serves constraint modes and shift-invert; options prefix ``-component_``.
+    Beside it the modes take 8 n_dof n_r bytes over all ranks.
+
+    References
+    ----------
+    Craig, R. R. and Bampton, M. C. C., Coupling of substructures for dynamic analyses, AIAA J. 6(7), 1968.
+    """
+    start = time.perf_counter()
+    kept, count, highest = _kept(keep), _count(modes, highest_hz), 2 * np.pi * (highest_hz or 0.0)
+    model = Model(M, K, C, comm=comm)
+    if modes is None:
+        count = min(count, max(model.n_dof - len(kept), 0))
+    stiffness, mass = model._matrices[0], model._matrices[-1]
+    damping = None if C is None else model._matrices[1]
+    owned = [mat for mat, given in zip(model._matrices, (A for A in (K, C, M) if A is not None)) if mat is not given]
+    core = _core.Reduction(stiffness, mass, damping, kept.tolist(), count, highest)
+    return Reduction(model, core, kept, owned, time.perf_counter() - start)
+
+
+def _kept(keep: npt.ArrayLike) -> npt.NDArray[np.intp]:
+    given = np.asarray(keep).ravel()
+    if given.size and not np.issubdtype(given.dtype, np.integer):
+        raise InputError(
+            "kept dofs are not whole numbers", None, given.dtype, "integers", "give dof numbers, not a mask"
+        )
+    return given.astype(np.intp)
+
+
+def _count(modes: int | None, highest_hz: float | None) -> int:
+    if modes is not None and highest_hz is not None:
+        raise InputError(
+            "component modes are chosen twice",
+            None,
+            f"modes = {modes}, highest_hz = {highest_hz}",
+            "one of them",
+            "remove one",
+        )
+    if highest_hz is not None and not highest_hz > 0:
+        raise InputError(
+            "highest_hz is no frequency", None, highest_hz, "> 0 Hz", "give a frequency, or a number of modes"
+        )
+    return DEFAULT_MODES if modes is None else modes

@@ -1,0 +1,1 @@
+"""Ranks: errors on one of them, groups, PETSc options, interrupts."""

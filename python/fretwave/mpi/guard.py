@@ -1,0 +1,206 @@
+"""One message and a quick end on all ranks, whatever goes wrong on any of them.
+
+Open MPI hangs when one rank raises (or calls ``sys.exit``) and the others wait in a collective. Every
+entry point therefore runs inside :func:`guarded`, and scripts get the same through ``sys.excepthook``.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+import traceback
+from collections.abc import Callable
+from types import TracebackType
+from typing import Any, TypeVar
+
+from ..errors import EXIT_OTHER, FretwaveError, exit_code_of
+from ..files.whole import file_error
+
+Result = TypeVar("Result")
+
+#: How long a failed rank waits for the others to fail too before it ends them [s].
+AGREEMENT_WAIT = 1.0
+#: Head start of the lower rank, so that one message is printed when several but not all fail [s].
+RANK_DELAY = 0.25
+#: Environment variable that adds the traceback to the message of an unexpected error.
+TRACEBACK = "FRETWAVE_TRACEBACK"
+
+
+def world() -> Any:
+    """``MPI.COMM_WORLD``, or None where MPI is not running (so that ``--help`` never starts it)."""
+    module = sys.modules.get("mpi4py.MPI")
+    if module is None or not module.Is_initialized() or module.Is_finalized():
+        return None
+    return module.COMM_WORLD
+
+
+def launched_rank() -> int:
+    """This process's rank as its launcher says, 0 without one: known before MPI is started."""
+    names = ("OMPI_COMM_WORLD_RANK", "PMI_RANK", "PMIX_RANK", "SLURM_PROCID")
+    return int(next((os.environ[name] for name in names if name in os.environ), "0"))
+
+
+def all_ranks_failed(comm: Any) -> bool:
+    """True when every rank gets here within `AGREEMENT_WAIT` seconds.
+
+    A barrier on the world would match a barrier of ranks that are well, so a private message ring is
+    used: rank 0 hears from all and answers.
+    """
+    tag = 32001
+    others = range(1, comm.size)
+    if comm.rank:
+        comm.isend(None, dest=0, tag=tag)
+        answers = [comm.irecv(source=0, tag=tag)]
+    else:
+        answers = [comm.irecv(source=rank, tag=tag) for rank in others]
+    complete = _wait(answers, AGREEMENT_WAIT + RANK_DELAY * bool(comm.rank))
+    if complete and comm.rank == 0:
+        for request in [comm.isend(None, dest=rank, tag=tag) for rank in others]:
+            request.wait()
+    return complete
+
+
+def _wait(requests: list[Any], seconds: float) -> bool:
+    deadline = time.monotonic() + seconds
+    waiting = list(requests)
+    while waiting and time.monotonic() < deadline:
+        waiting = [request for request in waiting if not request.test()[0]]
+        time.sleep(0.002)
+    return not waiting
+
+
+def describe(error: BaseException, rank: int | None = None, traced: bool = False) -> str:
+    """The message for an exception; an unexpected one brings its traceback if `traced`, else the place it came from."""
+    if isinstance(error, FretwaveError):
+        text = error.render()
+        return text if rank is None else f"{text}\n  {'rank:':<10}{rank}"
+    if isinstance(error, BrokenPipeError):
+        return "error: nobody reads the output any more\n  fix:      `fretwave resume RUNDIR > FILE` goes on with a run"
+    plain = in_words(error)
+    if plain is not None:
+        return describe(plain, rank)
+    if isinstance(error, KeyboardInterrupt):
+        return "interrupted: finished points are kept; `fretwave resume RUNDIR` goes on from there"
+    place = "" if rank is None else f" on rank {rank}"
+    text = f"error: {type(error).__name__}{place}: {error}\n"
+    if traced or os.environ.get(TRACEBACK):
+        text = "".join(traceback.format_exception(type(error), error, error.__traceback__)) + text
+        return f"{text}  fix:      this is a defect of the script, or of fretwave; report it with the lines above"
+    frames = traceback.extract_tb(error.__traceback__)
+    if frames:
+        text += f"  where:    {os.path.basename(frames[-1].filename)}:{frames[-1].lineno}, {frames[-1].name}\n"
+    return f"{text}  fix:      this is a defect of fretwave; report it with what {TRACEBACK}=1 adds to this message"
+
+
+def in_words(error: BaseException) -> FretwaveError | None:
+    """The message of an error that the machine makes, not fretwave: disk, memory, libraries; else None."""
+    if isinstance(error, OSError):
+        return file_error(error)
+    text = " ".join(str(error).split())
+    short = any(words in text.lower() for words in ("out of memory", "cannot allocate memory", "bad_alloc"))
+    if isinstance(error, MemoryError) or short:
+        return FretwaveError(
+            "there is not enough memory",
+            measured=text or None,
+            fix="fewer harmonics or samples, a reduction, or more memory (ulimit -v, the batch system's limit);"
+            " finished points are kept: then `fretwave resume RUNDIR`",
+        )
+    if isinstance(error, ImportError) and "shared object" in text:
+        return FretwaveError("a library cannot be loaded", None, text, None, "`fretwave doctor`; is there memory left?")
+    return None
+
+
+def end_all_ranks(error: BaseException, traced: bool = False) -> int:
+    """Print one message, end the other ranks if they have not failed too, return the exit code."""
+    comm = world()
+    code = exit_code_of(error)
+    if comm is None or comm.size == 1:
+        # Before MPI runs only the command line can be wrong, and it is the same on all ranks.
+        if launched_rank() == 0 or comm is not None or not isinstance(error, FretwaveError):
+            _print(describe(error, None, traced))
+        return code
+    if all_ranks_failed(comm):
+        if comm.rank == 0:
+            _print(describe(error, None, traced))
+        return code
+    time.sleep(RANK_DELAY * comm.rank)
+    _print(describe(error, comm.rank, traced))
+    comm.Abort(code)
+    return code
+
+
+def _print(text: str) -> None:
+    sys.stdout.flush()
+    print(text, file=sys.stderr, flush=True)
+
+
+def _lone_exit(exit_: SystemExit) -> int:
+    """Exit of one rank alone: the others must not wait for it."""
+    code = exit_.code if isinstance(exit_.code, int) else EXIT_OTHER * bool(exit_.code)
+    comm = world()
+    if comm is None or comm.size == 1 or all_ranks_failed(comm):
+        if isinstance(exit_.code, str) and (comm is None or comm.rank == 0):
+            _print(exit_.code)
+        return code
+    time.sleep(RANK_DELAY * comm.rank)
+    _print(f"error: rank {comm.rank} left (exit code {code}) while other ranks went on")
+    comm.Abort(code or EXIT_OTHER)
+    return code
+
+
+def guarded(main: Callable[[], int]) -> int:
+    """Run an entry point; no exception and no lone exit leaves another rank waiting.
+
+    Returns
+    -------
+    int
+        The exit code of the process.
+    """
+    try:
+        return main()
+    except SystemExit as exit_:
+        return _lone_exit(exit_)
+    except BaseException as error:
+        return end_all_ranks(error)
+
+
+def _excepthook(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+    end_all_ranks(error.with_traceback(trace), traced=True)
+
+
+def install() -> None:
+    """Make uncaught exceptions of scripts end all ranks with one message."""
+    sys.excepthook = _excepthook
+
+
+def caught_by_all(comm: Any, error: FretwaveError) -> None:
+    """Return where every rank has caught this error and goes on; end all of them where some only have. Collective.
+
+    For those who catch a `FretwaveError` and go on with collective calls: the others may wait in one of before.
+    """
+    if comm.size == 1 or all_ranks_failed(comm):
+        return
+    time.sleep(RANK_DELAY * comm.rank)
+    _print(describe(error, comm.rank))
+    comm.Abort(exit_code_of(error))
+
+
+def on_first_rank(comm: Any, work: Callable[[], Result]) -> Result:
+    """Do `work` on rank 0 and give its result, or its FretwaveError, to every rank. Collective.
+
+    What only one rank reads (case file, matrices, earlier results) cannot differ between ranks then.
+    """
+    outcome: tuple[FretwaveError | None, Any] = (None, None)
+    if comm.rank == 0:
+        try:
+            outcome = (None, work())
+        except FretwaveError as error:
+            outcome = (error, None)
+        except (OSError, MemoryError) as error:
+            outcome = (in_words(error), None)
+    problem, result = comm.bcast(outcome, root=0)
+    if problem is not None:
+        raise problem
+    answer: Result = result
+    return answer

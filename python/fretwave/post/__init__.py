@@ -1,0 +1,1 @@
+"""Numbers from results; NumPy and SciPy only."""

@@ -1,0 +1,63 @@
+"""Largest responses of the blades of a wheel, against those of the tuned wheel."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import numpy.typing as npt
+
+from .response_peaks import NOWHERE, Peak, amplitude_peak
+
+Array = npt.NDArray[np.float64]
+
+
+def blade_tables(
+    table: Mapping[str, Array], blades: Array, tuned: Mapping[str, Array]
+) -> tuple[dict[str, Array], dict[str, Array]]:
+    """``<name>_peaks.csv``, a row for each level, and ``<name>_blades.csv``, one for each level and sector.
+
+    Parameters
+    ----------
+    table : columns level and omega, (points,)
+    blades : (points, N)
+    """
+    levels = np.unique(table["level"])
+    before = [_peak(tuned, level, 2 * np.pi * tuned["frequency_hz"], tuned["amplitude"]) for level in levels]
+    each = [[_peak(table, level, table["omega"], blade) for blade in blades.T] for level in levels]
+    amplitude = np.array([[peak.amplitude for peak in row] for row in each])
+    frequency = np.array([[peak.omega for peak in row] for row in each]) / (2 * np.pi)
+    tuned_amplitude = np.array([peak.amplitude for peak in before])
+    most = np.array([int(np.argmax(np.nan_to_num(row))) for row in amplitude])
+    rows = np.arange(len(levels))
+    peaks = {
+        "level": levels,
+        "frequency_hz": frequency[rows, most],
+        "amplitude": amplitude[rows, most],
+        "sector": most,
+        "tuned_frequency_hz": np.array([peak.omega for peak in before]) / (2 * np.pi),
+        "tuned_amplitude": tuned_amplitude,
+        "amplification": amplitude[rows, most] / tuned_amplitude,
+    }
+    sectors = blades.shape[1]
+    return peaks, {
+        "level": np.repeat(levels, sectors),
+        "sector": np.tile(np.arange(sectors), len(levels)),
+        "frequency_hz": frequency.ravel(),
+        "amplitude": amplitude.ravel(),
+        "amplification": (amplitude / tuned_amplitude[:, None]).ravel(),
+    }
+
+
+def _peak(table: Mapping[str, Array], level: float, omega: Array, amplitude: Array) -> Peak:
+    rows = table["level"] == level
+    return (
+        amplitude_peak(omega[rows], amplitude[rows], table["event"][rows] if "event" in table else None)
+        if rows.any()
+        else NOWHERE
+    )
+
+
+def whitehead(sectors: int) -> float:
+    """Largest amplification of a linear wheel with one degree of freedom per blade."""
+    return float(1 + np.sqrt(sectors)) / 2

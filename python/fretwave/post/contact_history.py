@@ -1,0 +1,119 @@
+"""Status, gap and work of contact pairs over a period: what the law said of each sample, as results.h5 keeps it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import reduce
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..model.laws import OPEN, SLIP, STICK, UNKNOWN
+
+Array = npt.NDArray[np.float64]
+States = npt.NDArray[np.int8]
+
+#: What is kept of a contact's period, by name: unit, long name, type and the value of rows that lack it.
+MOTION: Mapping[str, tuple[str, str, str, float]] = {
+    "u": ("m", "relative displacement over one period", "f8", 0),
+    "v": ("m/s", "relative velocity over one period", "f8", 0),
+    "f": ("N", "contact force over one period", "f8", 0),
+    "status": ("1", "status over one period: stick 0, slip 1, open 2, not kept -1", "i1", UNKNOWN),
+    "gap": ("m", "distance to contact over one period, 0 where closed", "f8", np.nan),
+}
+
+
+@dataclass(frozen=True)
+class ContactHistory:
+    """Samples of one contact over one period.
+
+    Attributes
+    ----------
+    u, v, f : (n_samples, components, n_pairs)
+        Relative displacement [m] and velocity [m/s], and force [N].
+    kept_status, kept_gap : (n_samples, n_pairs), optional
+        As the law told them; None where they are not kept.
+    normal : int or None
+        Component along the normal, > 0 closing.
+    """
+
+    u: Array
+    v: Array
+    f: Array
+    kept_status: States | None = None
+    kept_gap: Array | None = None
+    normal: int | None = None
+
+    @classmethod
+    def of(cls, motion: Mapping[str, Any], normal: int | None) -> ContactHistory:
+        """From what is kept of a period, by the names of `MOTION`."""
+        return cls(motion["u"], motion["v"], motion["f"], motion.get("status"), motion.get("gap"), normal)
+
+    @property
+    def n_pairs(self) -> int:
+        return int(self.f.shape[2])
+
+    def delayed(self, samples: int) -> ContactHistory:
+        """The same motion so many samples later."""
+        return self._each(lambda values: np.roll(values, samples, axis=0))
+
+    def of_pairs(self, pairs: slice) -> ContactHistory:
+        """Of some pairs alone."""
+        return self._each(lambda values: values[..., pairs])
+
+    def _each(self, change: Any) -> ContactHistory:
+        told = [None if kept is None else change(kept) for kept in (self.kept_status, self.kept_gap)]
+        return ContactHistory(change(self.u), change(self.v), change(self.f), told[0], told[1], self.normal)
+
+    @property
+    def normal_force(self) -> Array:
+        """(n_samples, n_pairs) [N], > 0 compressive; nan for a law without one."""
+        return normal_force(self.f, self.normal)
+
+    @property
+    def tangential_force(self) -> Array:
+        """(n_samples, n_pairs) [N], its magnitude."""
+        return tangential_force(self.f, self.normal)
+
+    @property
+    def gap(self) -> Array:
+        """(n_samples, n_pairs) [m]: distance to contact, 0 where closed; nan for a law without one."""
+        return np.full_like(self.f[:, 0], np.nan) if self.kept_gap is None else self.kept_gap
+
+    @property
+    def status(self) -> States | None:
+        """(n_samples, n_pairs): stick 0, slip 1, open 2; None where it is not kept of all samples."""
+        known = self.kept_status is not None and not np.any(self.kept_status == UNKNOWN)
+        return self.kept_status if known else None
+
+    def share(self, status: int) -> Array:
+        """(n_pairs,): share of the period in a status."""
+        return np.asarray(np.mean(self.status == status, axis=0))
+
+    @property
+    def work(self) -> Array:
+        """(n_pairs,) [J]: work done against the force over the period, that is, dissipated.
+
+        The integral of f . du with the exact derivative of the sampled u, which has finitely many harmonics: the sum
+        over all pairs is then in exact balance with the harmonic equations.
+        """
+        n = len(self.u)
+        orders = np.arange(n // 2 + 1)[:, None, None]
+        slope = np.fft.irfft(1j * orders * np.fft.rfft(self.u, axis=0), n, axis=0)
+        return np.asarray((self.f * slope).sum(axis=(0, 1)) * 2 * np.pi / n)
+
+
+def normal_force(f: Array, normal: int | None) -> Array:
+    """(..., n_pairs) of forces (..., components, n_pairs), > 0 compressive; nan without a normal direction."""
+    return np.full_like(f[..., 0, :], np.nan) if normal is None else f[..., normal, :]
+
+
+def tangential_force(f: Array, normal: int | None) -> Array:
+    """(..., n_pairs) of forces (..., components, n_pairs): its magnitude."""
+    parts = [np.abs(f[..., row, :]) for row in range(f.shape[-2]) if row != normal]
+    return np.asarray(reduce(np.hypot, parts))
+
+
+__all__ = ["MOTION", "OPEN", "SLIP", "STICK", "ContactHistory", "normal_force", "tangential_force"]

@@ -1,0 +1,107 @@
+"""What the total damping of each nodal diameter means: where its motion grows, where it decays, and between."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from .limit_cycles import limit_cycles
+from .mode_curve import NO_DAMPING
+
+STABLE = {True: "stable", False: "unstable", None: "unknown"}
+
+
+def describe_waves(table: Mapping[str, Any], diameters: Sequence[int]) -> list[dict[str, Any]]:
+    """Each wave of a flutter table that has points.
+
+    Returns
+    -------
+    list of dict
+        nodal_diameter; frequency_hz and zeta at the smallest amplitude; largest_zeta and at_amplitude; last_amplitude;
+        verdict, of :func:`verdict`; limit_cycles, each as :func:`limit_cycles` gives it with its nodal_diameter
+        and, where the branch runs back there, the amplitudes of the folds around it (None elsewhere).
+    """
+    columns = np.asarray(table["nodal_diameter"])
+    rows = {diameter: np.flatnonzero(columns == diameter) for diameter in diameters}
+    return [_wave(table, diameter, points) for diameter, points in rows.items() if len(points)]
+
+
+def _wave(table: Mapping[str, Any], diameter: int, rows: Any) -> dict[str, Any]:
+    part = {key: np.asarray(table[key])[rows] for key in ("amplitude", "frequency_hz", "zeta", "event")}
+    amplitude, zeta = part["amplitude"], part["zeta"]
+    top = int(np.argmax(zeta))
+    cycles = [
+        {**cycle, "point": int(rows[cycle["point"]]), "nodal_diameter": diameter, "folds": _folds(part, cycle["point"])}
+        for cycle in limit_cycles(part)
+    ]
+    return {
+        "nodal_diameter": diameter,
+        "frequency_hz": float(part["frequency_hz"][0]),
+        "zeta": float(zeta[0]),
+        "largest_zeta": float(zeta[top]),
+        "at_amplitude": float(amplitude[top]),
+        "last_amplitude": float(amplitude[-1]),
+        "verdict": verdict(zeta),
+        "limit_cycles": cycles,
+    }
+
+
+def _folds(part: Mapping[str, Any], point: int) -> list[float] | None:
+    """Amplitudes [m] of the folds before and behind a point between which the branch runs back."""
+    turns = np.flatnonzero(["fold" in str(event).split() for event in part["event"]])
+    before, behind = turns[turns < point], turns[turns > point]
+    if len(before) % 2 == 0 or not len(behind):
+        return None
+    return sorted([float(part["amplitude"][before[-1]]), float(part["amplitude"][behind[0]])])
+
+
+def verdict(zeta: Any) -> str:
+    """From the signs of the damping along a branch that begins with the contact stuck.
+
+    Returns
+    -------
+    str
+        ``stable``: damped at every amplitude. ``unbounded``: fed at every amplitude. ``bounded``: fed at first, damped
+        at the end. ``bounded below``: damped in between only, and beyond the last limit cycle without bound.
+        ``stable below``: damped at first. ``neutral``: neither.
+    """
+    signs = np.sign(np.where(np.abs(zeta) > NO_DAMPING, zeta, 0.0))
+    signs = signs[signs != 0]
+    if not len(signs):
+        return "neutral"
+    if (signs > 0).all() or (signs < 0).all():
+        return "stable" if signs[0] > 0 else "unbounded"
+    if signs[0] > 0:
+        return "stable below"
+    return "bounded" if signs[-1] > 0 else "bounded below"
+
+
+def words(wave: Mapping[str, Any]) -> str:
+    """A wave's fate in one line."""
+    cycles = "; ".join(map(_cycle, wave["limit_cycles"]))
+    peak = f"largest damping {100 * wave['largest_zeta']:+.3g} % at a = {wave['at_amplitude']:.3g} m"
+    last = f"{wave['last_amplitude']:.3g} m"
+    fate = {
+        "neutral": "neither damped nor fed",
+        "stable": f"stable at every amplitude up to {last}",
+        "unbounded": f"grows at every amplitude up to {last}, friction never makes up for the flow: {peak}",
+        "bounded": f"{cycles}; {peak}",
+        "bounded below": f"{cycles}, growth without bound beyond; {peak}",
+        "stable below": f"decays below, {cycles}; {peak}",
+    }[wave["verdict"]]
+    stuck = f"{wave['frequency_hz']:.5g} Hz, {100 * wave['zeta']:+.3g} % at the smallest amplitude"
+    return f"ND {with_sign(wave['nodal_diameter'])}, {stuck}: {fate}"
+
+
+def with_sign(diameters: int) -> str:
+    """Nodal diameters with the sign that tells forward from backward."""
+    return f"{diameters:+d}" if diameters else "0"
+
+
+def _cycle(cycle: Mapping[str, Any]) -> str:
+    text = f"{STABLE[cycle['stable']]} limit cycle at a = {cycle['amplitude']:.4g} m, {cycle['frequency_hz']:.5g} Hz"
+    if cycle["folds"]:
+        text += f" (on a branch that runs back between {cycle['folds'][0]:.5g} and {cycle['folds'][1]:.5g} m)"
+    return text

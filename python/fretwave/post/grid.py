@@ -1,0 +1,67 @@
+"""All combinations of the values of some keys, and how they are named."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from math import prod
+from typing import Any
+
+from ..texts import toml
+
+#: Longer texts of a value are cut where people read them, never where they are used.
+SHOWN = 24
+
+
+@dataclass(frozen=True)
+class Plan:
+    """All combinations of the values of some keys, the last key's values changing fastest.
+
+    Attributes
+    ----------
+    over : dict
+        Values by key; keys are addressed as ``--set`` does.
+    """
+
+    over: Mapping[str, Sequence[Any]]
+
+    def __len__(self) -> int:
+        return prod(self.shape)
+
+    @property
+    def keys(self) -> list[str]:
+        return list(self.over)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Number of values of each key."""
+        return tuple(len(values) for values in self.over.values())
+
+    def values(self) -> Iterator[dict[str, Any]]:
+        """Value of each key, one combination after the other."""
+        for combination in product(*self.over.values()):
+            yield dict(zip(self.over, combination))
+
+    def overrides(self) -> list[list[str]]:
+        """``key=value`` of each combination, as ``--set`` takes it."""
+        return [[f"{key}={value_text(value)}" for key, value in values.items()] for values in self.values()]
+
+    def labels(self) -> list[str]:
+        """Each combination in a few words, by the last parts of the keys."""
+        short = short_names(self.keys)
+        return [
+            ", ".join(f"{short[key]} = {toml(value, SHOWN)}" for key, value in values.items())
+            for values in self.values()
+        ]
+
+
+def short_names(keys: Sequence[str]) -> dict[str, str]:
+    """Last part of each key, or the whole key where two end alike."""
+    last = [key.rpartition(".")[2] for key in keys]
+    return {key: name if last.count(name) == 1 else key for key, name in zip(keys, last)}
+
+
+def value_text(value: Any) -> str:
+    """As TOML reads it back, whole."""
+    return toml(value, longest=1 << 30)

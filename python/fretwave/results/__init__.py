@@ -1,0 +1,1 @@
+"""Tables, journals and files of runs; reading them needs no MPI."""

@@ -1,0 +1,299 @@
+"""What the pictures are made from: results.h5 and the tables of a run folder, nothing else."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..errors import InputError
+from ..model.laws import UNKNOWN, Role, kept_laws
+from ..post.mode_curve import ModeCurve
+from ..post.motion import motion
+from .file import has_results, names_of_data, open_results
+
+Array = npt.NDArray[np.float64]
+Table = dict[str, Array]
+
+
+@dataclass
+class Analysis:
+    """One analysis of a finished or running run.
+
+    Attributes
+    ----------
+    columns : numbers of its table, one array per column
+    events : what was met at each point, "" for nothing
+    labels : of the harmonic coefficients, e.g. "1c", "1s"
+    dofs : names of the degrees of freedom
+    reported : points for which the contacts' motion is kept
+    contacts : names of the contacts
+    """
+
+    name: str
+    kind: str
+    columns: Table
+    events: list[str]
+    attributes: dict[str, Any] = field(default_factory=dict)
+    labels: list[str] = field(default_factory=list)
+    dofs: list[str] = field(default_factory=list)
+    reported: list[int] = field(default_factory=list)
+    contacts: list[str] = field(default_factory=list)
+    units: dict[str, str] = field(default_factory=dict)
+    path: Path = Path()
+
+    def __len__(self) -> int:
+        return len(next(iter(self.columns.values()), ()))
+
+    def __getitem__(self, column: str) -> Any:
+        """A column of the table, "event" among them."""
+        if column == "event":
+            return np.array(self.events)
+        if column not in self.columns:
+            raise KeyError(f"no column '{column}' in '{self.name}'; there are {', '.join(self.columns)}")
+        return self.columns[column]
+
+    def __repr__(self) -> str:
+        status = self.attributes.get("status", "")
+        return f"Analysis('{self.name}', {self.kind}, {len(self)} points, {status}: {', '.join(self.columns)})"
+
+    def coefficients(self, points: Sequence[int] | None = None) -> Array:
+        """Harmonic coefficients (len(points), n_dof, m) [m] of some points or all; axes as `dofs` and `labels`."""
+        with open_results(self.path) as file:
+            found = file[self.name]["coefficients"]
+            return np.asarray(found) if points is None else np.stack([found[p] for p in points])
+
+    def loop(self, contact: str, point: int) -> Table:
+        """Motion of a contact over one period: u, v, f (n_samples, components, n_pairs).
+
+        With them what is kept of its law's word on each pair and sample, status and gap (n_samples, n_pairs).
+        """
+        row = self.reported.index(point)
+        with open_results(self.path) as file:
+            group = file[self.name]["contact_" + contact]
+            return {key: np.asarray(group[key][row], dtype=float) for key in names_of_data(group)}
+
+    def tells_status(self, contact: str) -> bool:
+        """Whether the status of a contact's pairs is kept at all reported points."""
+        with open_results(self.path) as file:
+            kept = file[self.name]["contact_" + contact].get("status")
+            return kept is not None and bool(np.all(kept[()] != UNKNOWN))
+
+    def parameter(self, contact: str, role: Role) -> Array | None:
+        """Value in the case of the parameter of a contact's law with a role; None where the results tell none."""
+        law = kept_laws(self.attributes.get("laws", {})).get(contact)
+        value = None if law is None else law.value(contact, role, self.attributes["case"])
+        return None if value is None else np.asarray(value, dtype=float)
+
+    def components(self, contact: str) -> int:
+        """Relative displacements of a pair: 1, or 3 with the normal one first."""
+        with open_results(self.path) as file:
+            return int(file[self.name]["contact_" + contact]["u"].shape[2])
+
+    def placed(self) -> list[str]:
+        """Contacts whose pairs have known places."""
+        with open_results(self.path) as file:
+            return [key[len("pairs_") :] for key in file[self.name] if key.startswith("pairs_")]
+
+    def pairs(self, contact: str) -> Table:
+        """Of each pair of a contact: position (n_pairs, 2) on its face [m], face, friction coefficient."""
+        with open_results(self.path) as file:
+            group = file[self.name]["pairs_" + contact]
+            table = {key: group[key][()] for key in group}
+        return {**table, "face": np.array(_texts(table["face"]))}
+
+    def worn_contacts(self) -> list[str]:
+        """Contacts whose worn depth is kept."""
+        with open_results(self.path) as file:
+            return [key[len("depth_") :] for key in file[self.name] if key.startswith("depth_")]
+
+    def field(self, name: str) -> Array:
+        """An array that every point has, (n_points, ...)."""
+        with open_results(self.path) as file:
+            return np.asarray(file[self.name][name], dtype=float)
+
+    def long_name(self, column: str) -> str:
+        """What a column of the table is."""
+        with open_results(self.path) as file:
+            return str(_text(file[self.name]["points"][column].attrs["long_name"]))
+
+    def met(self, event: str) -> list[int]:
+        """Points at which an event happened."""
+        return [i for i, text in enumerate(self.events) if event in text.split()]
+
+    def normalised_dof(self) -> int:
+        """Index of the dof that carries the modal amplitude (or is observed)."""
+        name = self.attributes.get("normalise", self.attributes.get("observe"))
+        return self.dofs.index(name) if name in self.dofs else 0
+
+    def method(self) -> str:
+        return str(self.attributes.get("method", ""))
+
+    def unit(self, column: str) -> str:
+        """Unit of a column; "" for a pure number or an unknown one."""
+        unit = self.units.get(column, "")
+        return "" if unit in ("1", "-") else unit
+
+    def asymptote(self, contact: str) -> float | None:
+        """Linear angular frequency with the contact "stuck" or "free" [rad/s]."""
+        value = self.attributes.get(f"{contact}_omega")
+        return None if value is None else float(value)
+
+    def backbones(self) -> list[str]:
+        """Mode analyses to show with a forced one."""
+        names = self.attributes.get("backbone", [])
+        return [names] if isinstance(names, str) else list(names)
+
+    def starts(self) -> list[tuple[int, float]]:
+        """Numbers and amplitudes of the starts of an analysis in the time domain that have a cycle."""
+        amplitudes = self.attributes.get("amplitude", [])
+        return [(int(n), float(amplitudes[int(n)])) for n in np.unique(self.columns.get("start", np.empty(0)))]
+
+    def history(self, start: int) -> Array:
+        """Time, displacement and velocity (3, n) of a start; empty when it was not kept."""
+        with open_results(self.path) as file:
+            return np.asarray(file[self.name].get(f"motion_{start}", ()), dtype=float)
+
+    def curve(self) -> ModeCurve:
+        """Modal values as functions of amplitude."""
+        return ModeCurve.from_table(self.columns)
+
+
+def open_run(folder: str | Path) -> Run:
+    """Read a run that is done, still going on, or was killed; neither MPI nor PETSc is needed.
+
+    Returns
+    -------
+    Run
+        Analyses by name: ``run["mode"]["zeta"]`` is a column, ``run["mode"].coefficients([3])`` the harmonics of a
+        point. ``run.table(name)`` reads any CSV of the folder.
+
+    Raises
+    ------
+    InputError
+        There are no results, or they are damaged.
+    """
+    if not has_results(Path(folder)):
+        raise InputError("there are no results here", str(folder), fix="give the folder of a run")
+    return Run(folder)
+
+
+class Run:
+    """The analyses and tables of a run folder."""
+
+    def __init__(self, folder: str | Path) -> None:
+        self.folder = Path(folder)
+        self.analyses: dict[str, Analysis] = {}
+        path = self.folder / "results.h5"
+        if has_results(self.folder):
+            with open_results(path) as file:
+                groups = {name: group for name, group in file.items() if "type" in group.attrs}
+                self.analyses = {name: _analysis(group, path) for name, group in groups.items()}
+        self.title = str(self._attribute("title") or self.folder.name)
+
+    def __getitem__(self, name: str) -> Analysis:
+        if name not in self.analyses:
+            raise KeyError(f"no analysis '{name}' in {self.folder}; there are {', '.join(self.analyses)}")
+        return self.analyses[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.analyses)
+
+    def __len__(self) -> int:
+        return len(self.analyses)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.analyses
+
+    def __repr__(self) -> str:
+        return "\n".join([f"Run of '{self.title}' in {self.folder}", *(f"  {a}" for a in self.analyses.values())])
+
+    def of_kind(self, kind: str) -> list[Analysis]:
+        """Analyses of a type that have at least one point."""
+        return [a for a in self.analyses.values() if a.kind == kind and len(a)]
+
+    def table(self, name: str) -> Table | None:
+        """Columns of `<name>.csv`; numbers where they are numbers. None when there is no such table."""
+        path = self.folder / f"{name}.csv"
+        if not path.exists():
+            return None
+        with path.open(newline="") as file:
+            rows = list(csv.DictReader(file))
+        if not rows:
+            return None
+        return {key: _numbers([row[key] for row in rows]) for key in rows[0]}
+
+    def tables(self) -> list[str]:
+        """Names of the tables in the folder."""
+        return sorted(path.stem for path in self.folder.glob("*.csv"))
+
+    def compared(self, kind: str) -> Iterator[tuple[Analysis, Analysis]]:
+        """Analyses of a type in the time domain, each with the mode it is compared with."""
+        for analysis in self.of_kind(kind):
+            mode = self.analyses.get(str(analysis.attributes.get("mode")))
+            if mode is not None and len(mode):
+                yield analysis, mode
+
+    def _attribute(self, name: str) -> Any:
+        if not has_results(self.folder):
+            return None
+        with open_results(self.folder / "results.h5") as file:
+            return file.attrs.get(name)
+
+
+def motion_of(analysis: Analysis, point: int) -> tuple[Array, Array]:
+    """Displacement and velocity over one period of a point of a mode analysis, closed (first = last)."""
+    columns = analysis.columns
+    decaying = analysis.method() == "CNM"
+    beta = columns["beta"][point] if decaying else 0.0
+    omega = columns["omega" if decaying else "omega0"][point]
+    return motion(analysis.labels, analysis.coefficients([point])[0], float(beta), float(omega))
+
+
+def _analysis(group: Any, path: Path) -> Analysis:
+    points = group["points"] if "points" in group else {}
+    columns = {key: np.asarray(points[key]) for key in points if key != "event"}
+    numbers = {key: value.astype(float) for key, value in columns.items() if value.dtype.kind in "fiub"}
+    events = _texts(points["event"][()]) if "event" in points else [""] * len(next(iter(numbers.values()), []))
+    return Analysis(
+        name=group.name.strip("/"),
+        kind=_text(group.attrs["type"]),
+        columns=numbers,
+        events=events,
+        attributes={key: _attribute(value) for key, value in group.attrs.items()},
+        labels=_texts(group["harmonic"][()]) if "harmonic" in group else [],
+        dofs=_texts(group["dof"][()]) if "dof" in group else [],
+        reported=[int(p) for p in group["reported"][()]] if "reported" in group else [],
+        contacts=[key[len("contact_") :] for key in group if key.startswith("contact_")],
+        units={key: _text(points[key].attrs.get("units", "")) for key in numbers},
+        path=path,
+    )
+
+
+def _texts(values: Any) -> list[str]:
+    return [str(_text(value)) for value in values]
+
+
+def _text(value: Any) -> Any:
+    return value.decode() if isinstance(value, bytes) else value
+
+
+def _attribute(value: Any) -> Any:
+    """An attribute; lists are kept as JSON."""
+    text = _text(value)
+    if isinstance(text, str) and text[:1] in ("[", "{"):
+        return json.loads(text)
+    return text
+
+
+def _numbers(values: list[str]) -> Any:
+    try:
+        return np.array([float(value) if value else np.nan for value in values])
+    except ValueError:
+        return np.array(values)

@@ -1,0 +1,274 @@
+"""Tables of an analysis: ``<name>.csv`` and a group of ``results.h5``, a row at a time, safe against kills.
+
+Rows go to the analysis' journal and its CSV, one by one. When the analysis is complete, with all its further tables,
+results.h5 is written anew with its group and takes the old one's place in one step; `open_results` shows what is still
+in a journal as if it were there already. Nothing of an earlier run is touched before the first row arrives. Files are
+written by rank 0 alone; methods marked Collective are called on every rank.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..columns import Column, Value, columns_named, csv_header, csv_line
+from ..files.whole import replace_bytes, told, write_all
+from ..post.contact_history import MOTION
+from .file import NewResults, Rows, attributes_of, build_group, has_results, open_results, rewritten
+from .journal import Journal, Record, journal_path
+
+Motion = Mapping[str, Mapping[str, Any]]
+State = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Field:
+    """An array that every row of a table has."""
+
+    shape: tuple[int, ...]
+    unit: str
+    long_name: str
+
+
+class AnalysisWriter:
+    """Writes the table of one analysis.
+
+    Parameters
+    ----------
+    folder : Path
+        The run folder.
+    name : str
+        Name of the analysis: ``<name>.csv`` and ``/<name>``.
+    columns : sequence of str or Column
+        Columns of the table.
+    attributes : mapping
+        Attributes of the group.
+    dofs, labels : sequence of str
+        Names along the axes of the coefficients; without `labels` there are none.
+    active : bool
+        True on the rank that writes.
+    before_first : callable
+        Called on every rank before the first row is written; may raise.
+    file_attributes : mapping, optional
+        Attributes of results.h5 itself.
+    arrays : mapping, optional
+        Arrays [m] of the group that are there from the first row on.
+    fields : mapping, optional
+        Arrays that every row brings.
+    publish_later : bool
+        `close` leaves it to `publish` to write results.h5: tables that belong to the analysis are still to come.
+    """
+
+    def __init__(
+        self,
+        folder: Path,
+        name: str,
+        columns: Sequence[str | Column],
+        attributes: Mapping[str, Any],
+        dofs: Sequence[str] = (),
+        labels: Sequence[str] = (),
+        active: bool = True,
+        before_first: Callable[[], None] = lambda: None,
+        file_attributes: Mapping[str, Any] | None = None,
+        arrays: Mapping[str, Any] | None = None,
+        fields: Mapping[str, Field] | None = None,
+        publish_later: bool = False,
+    ) -> None:
+        self.folder, self.name, self.active = folder, name, active
+        self.columns = columns_named(columns)
+        self.attributes = dict(attributes)
+        self.rows = 0
+        self.reported = 0
+        self.publish_later = publish_later
+        self.fields = dict(fields or {})
+        self._dofs, self._labels = list(dofs), list(labels)
+        self._before_first = before_first
+        self._file_attributes, self._arrays = dict(file_attributes or {}), dict(arrays or {})
+        self._journal = Journal(folder, name)
+        self._table = -1
+        self._ending: dict[str, Any] | None = None
+        self._new: NewResults | None = None
+
+    @property
+    def group(self) -> Any:
+        """The group of the new results.h5 as it will be (on the writing rank, after the last row)."""
+        if self._new is None:
+            self._new = NewResults(self.folder / "results.h5", self.name)
+            build_group(self._new.file, self.name, Rows.of(journal_path(self.folder, self.name)))
+        return self._new.file[self.name]
+
+    def append(
+        self,
+        row: Mapping[str, Value],
+        coefficients: Any = None,
+        motions: Motion | None = None,
+        state: State | None = None,
+        fields: Mapping[str, Any] | None = None,
+    ) -> None:
+        """Add a row; it is there when this returns. Collective.
+
+        Parameters
+        ----------
+        row : mapping
+            One value per column.
+        coefficients : (n_dof, m), optional
+            Harmonic coefficients of the point.
+        motions : mapping, optional
+            Contact name -> u, v, f over one period, for points that are reported.
+        state : mapping, optional
+            Arrays from which the analysis can go on after this row.
+        fields : mapping, optional
+            The arrays of the row.
+
+        Raises
+        ------
+        FileError
+            On the writing rank: the disk does not take it. What was there before stays.
+        """
+        if self.rows == 0:
+            self._before_first()
+        if self.active:
+            self._write(self._record(row, coefficients, motions, fields), csv_line(self.columns, row))
+        self.rows += 1
+        self.reported += bool(motions)
+        if self.active and state is not None:
+            self._journal.keep_state(self.rows, state)
+
+    def _record(
+        self, row: Mapping[str, Value], coefficients: Any, motions: Motion | None, fields: Mapping[str, Any] | None
+    ) -> Record:
+        values = {column.name: column.loaded(column.stored(row[column.name])[()]) for column in self.columns}
+        arrays = {f"field/{name}": np.asarray((fields or {})[name], dtype=float) for name in self.fields}
+        if coefficients is not None and self._labels:
+            arrays["coefficients"] = np.asarray(coefficients, dtype=float)
+        for contact, motion in (motions or {}).items():
+            arrays.update({f"motion/{contact}/{key}": values for key, values in _kept(motion)})
+        return Record("row", values, arrays)
+
+    def _write(self, record: Record, line: str) -> None:
+        """A row to the journal, then to the CSV; the first one starts both."""
+        if self.rows == 0:
+            with told(self.folder):
+                self.folder.mkdir(parents=True, exist_ok=True)
+            self._journal.begin(self._layout(), record)
+            self._open_table(csv_header(self.columns) + line)
+            return
+        self._journal.append(record)
+        with told(self.folder / f"{self.name}.csv"):
+            write_all(self._table, line.encode())
+
+    def _layout(self) -> Record:
+        """What the group is made of besides its rows."""
+        plain, arrays = attributes_of({**self.attributes, "status": "running", "reason": ""})
+        fields = {name: [list(field.shape), field.unit, field.long_name] for name, field in self.fields.items()}
+        told_arrays = {f"array/{name}": np.asarray(values) for name, values in self._arrays.items()}
+        return Record(
+            "layout",
+            {
+                "columns": [[c.name, c.unit, c.long_name, c.kind] for c in self.columns],
+                "attributes": plain,
+                "file_attributes": self._file_attributes,
+                "dofs": self._dofs,
+                "labels": self._labels,
+                "fields": fields,
+            },
+            {**{f"attribute/{name}": values for name, values in arrays.items()}, **told_arrays},
+        )
+
+    def _open_table(self, text: str) -> None:
+        path = self.folder / f"{self.name}.csv"
+        replace_bytes(path, text.encode(), sync=False)
+        with told(path):
+            self._table = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CLOEXEC)
+
+    def dataset(self, name: str, values: Any, **attributes: Any) -> None:
+        """Keep a further array (time histories, peaks) in the group, replacing one of the same name."""
+        if not self.active:
+            return
+        self._journal.append(Record("array", {"name": name, "attributes": attributes}, {"values": values}))
+        if self._new is not None:
+            self._new.array(self.name, name, values, attributes)
+
+    def close(self, status: str, reason: str, **attributes: Any) -> None:
+        """End the table; `status` is ``done`` or ``stopped``. Without any row nothing is written."""
+        if not self.active or not self.rows:
+            return
+        self._ending = {**attributes, "status": status, "reason": reason}
+        if not self.publish_later:
+            self.publish()
+
+    def publish(self) -> None:
+        """Write results.h5 with the closed table, which counts as done from here on. Writing rank only.
+
+        Raises
+        ------
+        FileError
+            The disk does not take it; `fretwave resume` goes on from the last row.
+        """
+        if self._ending is None:
+            return
+        self.group.attrs.update(self._ending)
+        assert self._new is not None
+        new, self._new, self._ending = self._new, None, None
+        new.publish()
+        self._journal.remove()
+
+    def abandon(self) -> None:
+        """Close the files, leaving the analysis unfinished unless it was closed before."""
+        if self._table >= 0:
+            os.close(self._table)
+            self._table = -1
+        if self._ending is None:
+            self._journal.close()
+            if self._new is not None:
+                self._new.discard()
+                self._new = None
+
+    def go_on(self) -> dict[str, Any] | None:
+        """Open the unfinished table of an earlier process, cut back to its last state (writing rank only).
+
+        Returns
+        -------
+        dict or None
+            The state's arrays; None when there is nothing to go on from.
+
+        Raises
+        ------
+        InputError
+            The journal is damaged.
+        """
+        path = journal_path(self.folder, self.name)
+        if not path.exists():
+            return None
+        rows = Rows.of(path)
+        state = self._journal.state(rows.token, len(rows))
+        if state is None:
+            return None
+        kept = rows.first(state[0])
+        self.rows, self.reported = len(kept), len(kept.reported)
+        self._journal.go_on(kept.size, kept.token)
+        lines = [csv_line(self.columns, values) for values in kept.values()]
+        self._open_table("".join([csv_header(self.columns), *lines]))
+        return state[1]
+
+    def __del__(self) -> None:
+        with suppress(Exception):
+            self.abandon()
+
+
+def _kept(motion: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """What there is of a contact's period; no gap of a law that has none."""
+    for key, (_, _, dtype, missing) in MOTION.items():
+        if key in motion:
+            values = np.asarray(motion[key], dtype)
+            if not (np.isnan(missing) and np.isnan(values).all()):
+                yield key, values
+
+
+__all__ = ["AnalysisWriter", "Field", "has_results", "open_results", "rewritten"]

@@ -1,0 +1,86 @@
+"""A study's table as CSV, as Markdown and on the terminal."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping, Sequence
+from io import StringIO
+from pathlib import Path
+
+from ..files.whole import replace_text
+
+Row = Mapping[str, "float | int | str"]
+
+#: heading of the printed table -> how a row fills it
+PRINTED = {
+    "sweep": "{sweep}",
+    "H": "{harmonics}",
+    "N_t": "{samples}",
+    "tolerance": "{tolerance:.0e}",
+    "modes": "{component_modes}",
+    "points": "{points}",
+    "Newton": "{newton}",
+    "time [s]": "{wall_s:.3f}",
+    "peak zeta": "{peak_zeta:.6f}",
+    "error of peak": "{peak_zeta_error:.1e}",
+    "error of zeta": "{zeta_error:.1e}",
+    "error of omega": "{omega_error:.1e}",
+    "estimate": "{error_estimate:.1e}",
+}
+
+LEGEND = (
+    "Errors are against the finest run (marked): of peak zeta relative; of zeta the largest over the amplitudes that "
+    "all runs meet exactly once, divided by the peak; of omega the largest relative one over the same. The estimate is "
+    "the largest error_estimate there: the share of the contact force outside the retained harmonics."
+)
+
+
+def write_csv(rows: Sequence[Row], path: Path) -> Path:
+    """All columns, full digits."""
+    text = StringIO()
+    writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    replace_text(path, text.getvalue())
+    return path
+
+
+#: the same of a study of wear
+PRINTED_OF_WEAR = {
+    "sweep": "{sweep}",
+    "H": "{harmonics}",
+    "tolerance": "{tolerance:.0e}",
+    "pressure change": "{pressure_change:g}",
+    "steps": "{steps}",
+    "Newton": "{newton}",
+    "time [s]": "{wall_s:.3f}",
+    "frequency [Hz]": "{frequency_hz:.5f}",
+    "zeta [%]": "{zeta_percent:.5f}",
+    "worn [mm^3]": "{worn_mm3:.5f}",
+    "error of omega": "{omega_error:.1e}",
+    "error of zeta": "{zeta_error:.1e}",
+    "error of worn": "{worn_error:.1e}",
+}
+
+LEGEND_OF_WEAR = (
+    "Values are those after the last cycle, errors of them are relative to the finest run of each sweep (marked)."
+)
+
+
+def markdown(
+    rows: Sequence[Row], notes: Sequence[str] = (), printed: Mapping[str, str] = PRINTED, legend: str = LEGEND
+) -> str:
+    """Aligned Markdown table with its legend; readable as plain text too."""
+    reduced = any(row.get("component_modes", -1) != -1 for row in rows)
+    shown = {name: form for name, form in printed.items() if name != "modes" or reduced}
+    body = [[form.format(**row) for form in shown.values()] for row in rows]
+    for cells, row in zip(body, rows):
+        cells[0] += " (finest)" if row["reference"] else ""
+    widths = [max(len(line[i]) for line in (list(shown), *body)) for i in range(len(shown))]
+    lines = [_line(shown, widths), "|" + "|".join("-" * (width + 1) + ":" for width in widths) + "|"]
+    lines += [_line(cells, widths) for cells in body]
+    return "\n".join([*lines, "", legend, *notes, ""])
+
+
+def _line(cells: Sequence[str] | Mapping[str, str], widths: Sequence[int]) -> str:
+    return "|" + "|".join(f" {cell:>{width}} " for cell, width in zip(cells, widths)) + "|"

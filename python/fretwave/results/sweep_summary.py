@@ -1,0 +1,166 @@
+"""What a sweep says of each value in a few numbers: onset of slip, largest damping, lowest frequency, peaks."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from ..columns import Column
+from ..post.grid import Plan
+from ..post.limit_cycles import limit_cycles
+from ..post.mode_curve import ModeCurve
+from ..post.slip_threshold import slip_threshold
+
+#: Damping has set in where this share of its rise to the maximum is reached.
+ONSET = 0.1
+
+COMMON = (
+    Column("points", "1", "points of the branch", "i"),
+    Column("newton", "1", "Newton iterations of the branch", "i"),
+    Column("wall_s", "s", "wall time of the branch"),
+)
+MODE = (
+    *COMMON,
+    Column("stuck_hz", "Hz", "linear frequency with the contact stuck"),
+    Column("free_hz", "Hz", "linear frequency without friction (contact free, or closed and sliding)"),
+    Column("slip_threshold", "m", "amplitude at which the first pair slips"),
+    Column("stick_until", "m", "last amplitude of the branch before any slip"),
+    Column("slip_from", "m", "first amplitude of the branch with slip"),
+    Column("onset_amplitude", "m", "amplitude at which a tenth of the damping's rise is reached"),
+    Column("largest_zeta", "1", "largest modal damping ratio"),
+    Column("amplitude_of_largest_zeta", "m", "amplitude of the largest damping"),
+    Column("lowest_frequency_hz", "Hz", "lowest frequency of the branch"),
+    Column("amplitude_of_lowest_frequency", "m", "amplitude of the lowest frequency, nan at an end of the branch"),
+    Column("last_frequency_hz", "Hz", "frequency at the end of the branch"),
+    Column("stable_limit_cycle", "m", "smallest amplitude at which damping rises through zero"),
+    Column("unstable_limit_cycle", "m", "smallest amplitude at which damping falls through zero"),
+)
+FORCED = (
+    *COMMON,
+    Column("largest_amplitude", "m", "largest amplitude of the response"),
+    Column("frequency_of_largest_amplitude", "Hz", "frequency of the largest amplitude"),
+)
+
+#: Column whose values tell the branches of one table apart.
+SPLIT = {"forced": "level", "flutter": "nodal_diameter"}
+
+Table = Mapping[str, Any]
+
+
+def columns_of(kind: str) -> tuple[Column, ...]:
+    """What is said of each branch in a sweep of this kind of analysis."""
+    return {"mode": MODE, "flutter": MODE, "forced": FORCED}.get(kind, COMMON)
+
+
+def summarise(
+    kind: str, table: Table, attributes: Mapping[str, Any], start_forces: Mapping[str, Any] | None = None
+) -> dict[str, float]:
+    """The numbers of one branch.
+
+    Parameters
+    ----------
+    kind : of the analysis
+    table : its columns (n_points,)
+    attributes : of its group in the results
+    start_forces : of the contacts over the period of the first point, where they are kept
+    """
+    common = {
+        "points": len(next(iter(table.values()))),
+        "newton": int(np.sum(table.get("newton", 0))),
+        "wall_s": float(np.sum(table.get("wall_s", 0.0))),
+    }
+    if columns_of(kind) is MODE:
+        return {**common, **_mode(table, attributes, start_forces or {})}
+    return {**common, **_forced(table)} if kind == "forced" else common
+
+
+def _mode(table: Table, attributes: Mapping[str, Any], forces: Mapping[str, Any]) -> dict[str, float]:
+    amplitude, frequency, zeta = (np.asarray(table[name]) for name in ("amplitude", "frequency_hz", "zeta"))
+    top, low = int(np.argmax(zeta)), int(np.argmin(frequency))
+    slips = np.flatnonzero(table["slip"] > 0)
+    first = int(slips[0]) if len(slips) else len(zeta)
+    other = attributes.get("free_omega", attributes.get("sliding_omega", np.nan))
+    return {
+        "stuck_hz": float(attributes.get("stuck_omega", np.nan)) / (2 * np.pi),
+        "free_hz": float(other) / (2 * np.pi),
+        "slip_threshold": slip_threshold(float(amplitude[0]), forces, attributes) if first and forces else np.nan,
+        "stick_until": float(amplitude[first - 1]) if first else np.nan,
+        "slip_from": float(amplitude[first]) if len(slips) else np.nan,
+        "onset_amplitude": _onset(table, float(zeta[0]), float(zeta[top])) if first else np.nan,
+        "largest_zeta": float(zeta[top]),
+        "amplitude_of_largest_zeta": float(amplitude[top]),
+        "lowest_frequency_hz": float(frequency[low]),
+        "amplitude_of_lowest_frequency": float(amplitude[low]) if 0 < low < len(zeta) - 1 else np.nan,
+        "last_frequency_hz": float(frequency[-1]),
+        **_limit_cycles(table),
+    }
+
+
+def _limit_cycles(table: Table) -> dict[str, float]:
+    events = [text.decode() if isinstance(text, bytes) else str(text) for text in table.get("event", ())]
+    cycles = limit_cycles({**table, "event": events})
+    return {
+        f"{word}_limit_cycle": min((c["amplitude"] for c in cycles if c["stable"] is stable), default=np.nan)
+        for word, stable in (("stable", True), ("unstable", False))
+    }
+
+
+def _onset(table: Table, start: float, largest: float) -> float:
+    """Amplitude at which damping has risen by a share of its whole rise; nan when it does not rise."""
+    if len(table["zeta"]) < 2 or not largest > start:
+        return float("nan")
+    found = ModeCurve.from_table(table).amplitudes_at(start + ONSET * (largest - start))
+    return found[0] if found else float("nan")
+
+
+def _forced(table: Table) -> dict[str, float]:
+    top = int(np.argmax(table["amplitude"]))
+    return {
+        "largest_amplitude": float(table["amplitude"][top]),
+        "frequency_of_largest_amplitude": float(table["frequency_hz"][top]),
+    }
+
+
+def landmarks(name: str, plan: Plan, rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """A line for each row of a sweep's summary, for the terminal."""
+    labels = plan.labels()
+    return [f"{name}: {labels[row['value']]}{_part(row)}: {_landmark(row)}" for row in rows]
+
+
+def read_landmarks(name: str, group: Any) -> list[str]:
+    """The same from a sweep's group in results.h5."""
+    plan = Plan(json.loads(group.attrs["over"]))
+    data = {key: values[()] for key, values in group["summary"].items()}
+    split = SPLIT.get(str(group.attrs["of_type"]), "")
+    parts = [{split: part} for part in data.pop(split)] if split in data else [{}]
+    rows = []
+    for number, (k, part) in product(range(len(plan)), enumerate(parts)):
+        row = {key: float(values.reshape(len(plan), -1)[number, k]) for key, values in data.items()}
+        if not math.isnan(row["points"]):
+            rows.append({"value": number, **part, **row})
+    return landmarks(name, plan, rows)
+
+
+def _part(row: Mapping[str, Any]) -> str:
+    """Which of a value's branches a row is of."""
+    return "".join(f", {column.replace('_', ' ')} {row[column]:g}" for column in SPLIT.values() if column in row)
+
+
+def _landmark(row: Mapping[str, Any]) -> str:
+    if "largest_zeta" in row:
+        starts = next((row[key] for key in ("slip_threshold", "slip_from") if math.isfinite(row[key])), None)
+        slip = "no slip" if starts is None else f"slip from {starts:.4g} m"
+        top = f"largest zeta {100 * row['largest_zeta']:.4g} % at {row['amplitude_of_largest_zeta']:.4g} m"
+        words = [slip, top, f"lowest {row['lowest_frequency_hz']:.6g} Hz"]
+        for word in ("stable", "unstable"):
+            amplitude = row[f"{word}_limit_cycle"]
+            words += [] if math.isnan(amplitude) else [f"{word} limit cycle at {amplitude:.4g} m"]
+        return ", ".join(words)
+    if "largest_amplitude" in row:
+        return f"largest {row['largest_amplitude']:.4g} m at {row['frequency_of_largest_amplitude']:.6g} Hz"
+    return f"{row['points']:.0f} points"

@@ -1,0 +1,271 @@
+"""The results of a sweep in one group of results.h5 and two tables, put together from the runs of its values.
+
+::
+
+    <name>/points/...           one after the other, the branches of all values: `value`, the keys, then the columns
+    <name>/over/<key>           values of a key: dimension scale (n,)
+    <name>/summary/<quantity>   (n_1, n_2, ..., [n_branches]), dimensions as in `over`; nan where there is no branch.
+                                The last one is there for tables of several branches: levels, nodal diameters
+    <name>/values/0003/...      all that is kept of the value with this number: coefficients, motions of the contacts
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..columns import COLUMNS, Column
+from ..files.whole import replace_text
+from ..post.grid import Plan
+from ..texts import toml
+from .file import name_dimensions
+from .results import has_results, open_results, rewritten
+from .sweep_summary import SPLIT, columns_of, summarise
+
+#: State of the solver: a finished branch has no use for it.
+STATES = ("state_0", "state_1")
+#: Attributes of a value's group that the sweep's group has when they are the same for all values.
+SHARED = ("method", "harmonics", "samples", "normalise", "observe", "nodal_diameter", "retain", "linear_mode")
+
+
+@dataclass
+class Branch:
+    """The table of one analysis at one value.
+
+    Attributes
+    ----------
+    number : int
+        Of the value.
+    table : dict
+        Columns (n_points,) by name; texts are bytes.
+    units : dict
+        (unit, long name) of each column.
+    attributes : dict
+        Of the analysis' group.
+    start_forces : dict
+        By row that starts a branch: of each contact over its period (n_samples, components, n_pairs) [N], where kept.
+    """
+
+    number: int
+    folder: Path
+    table: dict[str, Any]
+    units: dict[str, tuple[str, str]]
+    attributes: dict[str, Any]
+    start_forces: dict[int, dict[str, Any]]
+
+    @property
+    def points(self) -> int:
+        return len(next(iter(self.table.values())))
+
+
+def read_branch(folder: Path, name: str, number: int, run_id: str) -> Branch | None:
+    """What the run of a value found, None when it found nothing (or what is there belongs to another run)."""
+    if not has_results(folder):
+        return None
+    with open_results(folder / "results.h5") as file:
+        if name not in file or file[name].attrs.get("run_id") != run_id:
+            return None
+        group = file[name]
+        table = {key: data[()] for key, data in group["points"].items()}
+        units = {key: (data.attrs["units"], data.attrs["long_name"]) for key, data in group["points"].items()}
+        order = [key for key in COLUMNS if key in table] + [key for key in table if key not in COLUMNS]
+        ordered = {key: table[key] for key in order}
+        return Branch(number, folder, ordered, units, dict(group.attrs), _start_forces(group, table))
+
+
+def _start_forces(group: Any, table: Mapping[str, Any]) -> dict[int, dict[str, Any]]:
+    """Forces of the contacts at rows with the event `start`."""
+    contacts = [key for key in group if key.startswith("contact_")]
+    reported = group["reported"][()] if "reported" in group else ()
+    starts = [(k, int(row)) for k, row in enumerate(reported) if b"start" in table["event"][row].split()]
+    return {row: {key[len("contact_") :]: group[key]["f"][k] for key in contacts} for k, row in starts}
+
+
+def write_sweep(
+    folder: Path,
+    name: str,
+    of: str,
+    plan: Plan,
+    branches: Sequence[Branch],
+    attributes: Mapping[str, Any],
+    title: str = "",
+    summary: Path | None = None,
+) -> list[dict[str, Any]]:
+    """Write ``<name>.csv`` and last the group `name` of results.h5; one rank only.
+
+    Parameters
+    ----------
+    of : str
+        The analysis in the values' runs.
+    branches : sequence of Branch
+        In the order of the values; those that found nothing are not there.
+    attributes : mapping
+        Put on the group (status, reason, run_id).
+    title : str
+        Of the case, an attribute of the file.
+    summary : Path, optional
+        Table of the summary.
+
+    Returns
+    -------
+    list of dict
+        The rows of the summary: the keys, which branch of the value's table, and what is said of it.
+    """
+    kind = str(branches[0].attributes["type"]) if branches else ""
+    points = _points(plan, branches)
+    rows = _summary(kind, plan, branches)
+    write_rows(folder / f"{name}.csv", {column.name: values for column, values in points})
+    if summary is not None:
+        write_summary(summary, rows)
+    with rewritten(folder / "results.h5", name) as file:
+        file.attrs["title"] = title
+        group = file.create_group(name)
+        described = {"type": "sweep", "of": of, "of_type": kind, "over": json.dumps(dict(plan.over)), "left_out": "[]"}
+        group.attrs.update({**_shared(branches), **described, **attributes})
+        _write_points(group.create_group("points"), points)
+        scales = _write_over(group.create_group("over"), plan)
+        _write_summary(group.create_group("summary"), kind, plan, rows, scales)
+        for branch in branches:
+            _copy_branch(branch, of, group.create_group(f"values/{branch.number:04d}"))
+    return rows
+
+
+def write_summary(path: Path, rows: Sequence[dict[str, Any]]) -> None:
+    """Rows of a summary as CSV, empty where a row has no such column."""
+    names = list(dict.fromkeys(name for row in rows for name in row))
+    write_rows(path, {name: [row.get(name, "") for row in rows] for name in names})
+
+
+def write_rows(path: Path, columns: Mapping[str, Any]) -> None:
+    """A table as CSV, written in one step: numbers with all digits, texts quoted where they must be."""
+    text = StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows(zip(*([_plain(value) for value in values] for values in columns.values())))
+    replace_text(path, text.getvalue())
+
+
+def _plain(value: Any) -> Any:
+    plain = value.item() if isinstance(value, np.generic) else value
+    return plain.decode() if isinstance(plain, bytes) else repr(plain) if isinstance(plain, float) else plain
+
+
+def key_values(values: Sequence[Any]) -> Any:
+    """Values of a key as an array: numbers as numbers, anything else as texts."""
+    if all(type(value) in (int, float) for value in values):
+        return np.array(values, dtype="i8" if all(type(value) is int for value in values) else "f8")
+    texts = [value if isinstance(value, str) else toml(value, 1 << 30) for value in values]
+    return np.array([text.encode() for text in texts])
+
+
+def _key_column(plan: Plan, key: str) -> Any:
+    """The value of a key in each combination (n,)."""
+    place = plan.keys.index(key)
+    return key_values(plan.over[key])[np.indices(plan.shape)[place].ravel()]
+
+
+def _points(plan: Plan, branches: Sequence[Branch]) -> list[tuple[Column, Any]]:
+    """All branches under each other, led by the keys."""
+    lengths = [branch.points for branch in branches]
+    numbers = np.repeat(np.array([branch.number for branch in branches], dtype="i8"), lengths)
+    columns = [(Column(key, "", "swept key"), _key_column(plan, key)[numbers]) for key in plan.keys]
+    columns.append((Column("value", "1", "number of the combination of values", "i"), numbers))
+    for key in branches[0].table if branches else ():
+        unit, long_name = branches[0].units[key]
+        columns.append((Column(key, unit, long_name), np.concatenate([branch.table[key] for branch in branches])))
+    return columns
+
+
+def _summary(kind: str, plan: Plan, branches: Sequence[Branch]) -> list[dict[str, Any]]:
+    """A row for each branch; a table of a value has one, or one for each level or nodal diameter."""
+    rows, split = [], SPLIT.get(kind, "")
+    for branch in branches:
+        keys = {key: _plain(_key_column(plan, key)[branch.number]) for key in plan.keys}
+        column = branch.table.get(split)
+        for part in [None] if column is None else np.unique(column):
+            chosen = np.full(branch.points, True) if part is None else column == part
+            table = {key: values[chosen] for key, values in branch.table.items()}
+            head = {**keys, "value": branch.number, **({} if part is None else {split: part.item()})}
+            forces = branch.start_forces.get(int(np.argmax(chosen)), {})
+            rows.append({**head, **summarise(kind, table, branch.attributes, forces)})
+    return rows
+
+
+def _shared(branches: Sequence[Branch]) -> dict[str, Any]:
+    given = [[branch.attributes.get(name) for branch in branches] for name in SHARED]
+    return {
+        name: values[0]
+        for name, values in zip(SHARED, given)
+        if values and values[0] is not None and all(value == values[0] for value in values)
+    }
+
+
+def _write_points(group: Any, points: Sequence[tuple[Column, Any]]) -> None:
+    for column, values in points:
+        data = group.create_dataset(column.name, data=values)
+        data.attrs.update({"units": column.unit, "long_name": column.long_name})
+        name_dimensions(group.parent, data, ["row"])
+
+
+def _write_over(group: Any, plan: Plan) -> list[Any]:
+    for key, values in plan.over.items():
+        group.create_dataset(key, data=key_values(values))
+        group[key].make_scale(key)
+    return [group[key] for key in plan.keys]
+
+
+def _write_summary(group: Any, kind: str, plan: Plan, rows: Sequence[Mapping[str, Any]], scales: Sequence[Any]) -> None:
+    split = SPLIT.get(kind, "")
+    parts = sorted({row[split] for row in rows if split in row})
+    for scale in scales:
+        group.parent.create_dataset(scale.name.rpartition("/")[2], data=scale[()])
+    if parts:
+        group.create_dataset(split, data=parts)
+    names = [*plan.keys, *([split] if parts else [])]
+    shape = (*plan.shape, *([len(parts)] if parts else []))
+    for column in columns_of(kind) if rows else ():
+        values = np.full(shape, np.nan)
+        for row in rows:
+            place = np.unravel_index(row["value"], plan.shape)
+            values[(*place, *([parts.index(row[split])] if parts else []))] = row[column.name]
+        data = group.create_dataset(column.name, data=values)
+        data.attrs.update({"units": column.unit, "long_name": column.long_name})
+        name_dimensions(group, data, names)
+
+
+def _copy_branch(branch: Branch, of: str, group: Any) -> None:
+    """Everything but the solver's state; HDF5's copy loses the references of dimension scales."""
+    with open_results(branch.folder / "results.h5") as file:
+        group.attrs.update(branch.attributes)
+        for key in file[of]:
+            if key not in STATES:
+                group.copy(file[of][key], group, key)
+        group.visititems(_forget_scales)
+        file[of].visititems(lambda key, source: _attach_scales(source, group.get(key), group, file[of].name))
+
+
+def _forget_scales(_: str, item: Any) -> None:
+    for name in ("DIMENSION_LIST", "REFERENCE_LIST", "CLASS", "NAME"):
+        if name in item.attrs:
+            del item.attrs[name]
+
+
+def _attach_scales(source: Any, copy: Any, group: Any, root: str) -> None:
+    """Give a copy the scales of its source, by their places below the root."""
+    from h5py import h5ds
+
+    if copy is None or not hasattr(source, "dims"):
+        return
+    for there, here in zip(source.dims, copy.dims):
+        for name, scale in there.items():
+            mine = group[scale.name[len(root) + 1 :]]
+            if not h5ds.is_scale(mine.id):
+                mine.make_scale(name)
+            here.attach_scale(mine)

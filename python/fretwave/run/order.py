@@ -1,0 +1,66 @@
+"""What runs, and in which order: options of a run, analyses after those whose results they need."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from ..case.load import Case
+from ..case.schema import AnalysisSection, ForcedAnalysis, TransientSection
+
+
+@dataclass
+class RunOptions:
+    """What the command line says besides the case.
+
+    Attributes
+    ----------
+    only : list of str
+        Analyses to run; empty for all.
+    petsc : str
+        PETSc options for every analysis.
+    """
+
+    out: Path | None = None
+    overrides: list[str] = field(default_factory=list)
+    only: list[str] = field(default_factory=list)
+    quick: bool = False
+    plots: bool = True
+    petsc: str = ""
+
+    @classmethod
+    def of(cls, told: Any) -> RunOptions:
+        """From the command line."""
+        return cls(told.out, told.overrides, told.only, told.quick, not told.no_plots, told.petsc)
+
+    def given(self, path: Path, case: Case) -> dict[str, Any]:
+        """How the case was given, for run.json."""
+        told = {key: getattr(self, key) for key in ("overrides", "quick", "only", "petsc")}
+        return {"path": str(path.resolve()), **told, "digest": case.digest, "resolved": case.resolved}
+
+
+def in_order(case: Case, names: Sequence[str]) -> list[str]:
+    """Analyses in the order of the file, but after those whose results they need."""
+    ordered: list[str] = []
+
+    def place(name: str) -> None:
+        if name in ordered or name not in names:
+            return
+        for needed in needs(case.analyses[name]):
+            place(needed)
+        ordered.append(name)
+
+    for name in names:
+        place(name)
+    return ordered
+
+
+def needs(analysis: AnalysisSection) -> list[str]:
+    """Names of the analyses whose results this one reads."""
+    if isinstance(analysis, TransientSection):
+        return [analysis.mode]
+    if isinstance(analysis, ForcedAnalysis):
+        return [analysis.backbone] if isinstance(analysis.backbone, str) else list(analysis.backbone)
+    return []

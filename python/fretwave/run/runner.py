@@ -1,0 +1,337 @@
+"""Run the analyses of a case: order, models, run folder, exit code."""
+
+from __future__ import annotations
+
+import importlib
+import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from ..analyses.parts.context import AnalysisContext, Outcome, belongs, describe_analysis
+from ..case import checks
+from ..case.build import build_model
+from ..case.load import Case, changed_keys, load_case
+from ..case.reduce import reduce_case
+from ..case.schema import AnalysisSection, SweepAnalysis, TransientSection
+from ..case.sector import nodal_diameter
+from ..case.wheel import on_wheel, solver_room
+from ..console import Console
+from ..errors import EXIT_DONE, InputError, NotConverged
+from ..mpi.guard import on_first_rank
+from ..mpi.interrupt import say_how_to_go_on
+from ..mpi.petsc_options import AnalysisOptions
+from ..results.journal import Journal
+from ..results.results import has_results, open_results
+from ..results.runfolder import CASE_COPY, RunFolder, new_record, peak_memory_mb, read_copy, read_record
+from ..texts import display
+from .order import RunOptions, in_order
+from .stopped import joined, not_converged
+
+#: Module and function of each kind of analysis, imported when one is run.
+DISPATCH = {
+    "static": ("static", "run_static"),
+    "mode": ("mode", "run_mode"),
+    "forced": ("forced", "run_forced"),
+    "flutter": ("flutter", "run_flutter"),
+    "free_decay": ("transient", "run_free_decay"),
+    "limit_cycle": ("transient", "run_limit_cycle"),
+    "wear": ("wear", "run_wear"),
+}
+
+
+#: What is said of an analysis that is complete.
+ENDED = ("done", "stopped")
+
+
+def run_case(path: Path, options: RunOptions, comm: Any) -> int:
+    """Run a case from its start; returns the exit code. Collective."""
+    case = on_first_rank(comm, lambda: load_case(path, options.overrides, options.quick))
+    folder = options.out or Path("runs") / case.name
+    record = comm.bcast(new_record(options.given(path, case), comm.size) if comm.rank == 0 else None)
+    return Runner(case, options, folder, record, comm).run()
+
+
+def resume_run(folder: Path, comm: Any, plots: bool = True) -> int:
+    """Go on with a run that was cut off; returns the exit code. Collective.
+
+    Raises
+    ------
+    InputError
+        The folder holds no run, or its case has changed since.
+    """
+    case, record = on_first_rank(comm, lambda: reload_case(folder))
+    given = record["case"]
+    options = RunOptions(folder, given["overrides"], given["only"], given["quick"], plots, given["petsc"])
+    record["ranks"], record["status"] = comm.size, "running"
+    return Runner(case, options, folder, record, comm, resuming=True).run()
+
+
+def reload_case(folder: Path, kept: bool = False) -> tuple[Case, dict[str, Any]]:
+    """The case of a run and its record. One rank only.
+
+    Parameters
+    ----------
+    kept : bool
+        Read the copy in the folder, as the run did: then only the model can have changed.
+
+    Raises
+    ------
+    InputError
+        The folder holds no run, or its case has changed since.
+    """
+    record = read_record(folder)
+    if "sweep" in record:
+        one = folder / record.get("values", [{}])[0].get("folder", "values/0000")
+        problem = "this is the folder of a sweep, not of one run"
+        raise InputError(problem, display(folder), expected="the folder of a value", fix=f"give {display(one)}")
+    given = record["case"]
+    path = Path(given["path"])
+    text = None if path.exists() and not kept else read_copy(folder, record)
+    case = load_case(path, given["overrides"], given["quick"], text=text)
+    changed = changed_keys(given["resolved"], case.resolved)
+    if changed:
+        raise InputError(
+            "the case has changed since this run",
+            where=display(path),
+            measured="; ".join(changed[:5]) + (f"; and {len(changed) - 5} more" if len(changed) > 5 else ""),
+            expected=f"the case as kept in {display(folder / CASE_COPY)}",
+            fix=f"change it back, or start anew with `fretwave run {display(path)}`",
+        )
+    return case, record
+
+
+class Runner:
+    """One run of some analyses of a case; `quiet` when it is part of another that speaks for it."""
+
+    def __init__(
+        self,
+        case: Case,
+        options: RunOptions,
+        folder: Path,
+        record: dict[str, Any],
+        comm: Any,
+        resuming: bool = False,
+        quiet: bool = False,
+    ) -> None:
+        self.case, self.options, self.comm, self.resuming = case, options, comm, resuming
+        active = comm.rank == 0
+        self.folder = RunFolder(folder, record, case.text, active, resuming)
+        self.console = Console(active, self.folder.log, quiet=quiet)
+        self.failures: list[NotConverged] = []
+        if resuming:
+            on_first_rank(comm, self._check_readable)
+            self._start()
+
+    def _check_readable(self) -> None:
+        """Refuse damaged results before anything in the folder is changed."""
+        if has_results(self.folder.path):
+            open_results(self.folder.path / "results.h5").close()
+
+    def _start(self) -> None:
+        """Collective."""
+        on_first_rank(self.comm, self.folder.start)
+        self.folder.started = True
+        if not self.console.quiet:
+            say_how_to_go_on(self.comm, self.folder.path)
+
+    def run(self) -> int:
+        """Do all analyses, keep what was found; returns the exit code. Collective."""
+        try:
+            return self._run()
+        finally:
+            self.folder.leave()
+
+    def _run(self) -> int:
+        if not self.folder.started:
+            on_first_rank(self.comm, self.folder.check_free)
+        names = in_order(self.case, checks.choose(list(self.case.analyses), self.options.only))
+        on_first_rank(self.comm, lambda: self._check_needs(names))
+        sweeps = check_sweeps(self.case, names, self.options, self.comm)
+        self.folder.record["selected"] = names
+        self._greet(names)
+        self._reduce()
+        for name in names:
+            if self.resuming and self._is_done(name):
+                continue
+            if name in sweeps:
+                self._sweep(name, sweeps[name])
+            else:
+                self._run_one(self.case.analyses[name])
+        self._finish()
+        if self.failures:
+            raise self.failures[0] if len(self.failures) == 1 else joined(self.failures)
+        return EXIT_DONE
+
+    def _greet(self, names: Sequence[str]) -> None:
+        ranks = f"{self.comm.size} rank{'s' * (self.comm.size > 1)}"
+        verb = "resumed" if self.resuming else "run"
+        title = f": {self.case.title}" if self.case.title else ""
+        self.console.line(f"{self.case.name}{title}")
+        self.console.line(
+            f"{verb} on {ranks}, {len(self.case.dofs)} dofs, results in {display(self.folder.path)}: {', '.join(names)}"
+        )
+        if self.case.neighbours is not None:
+            self.console.line(f"one of {self.case.neighbours.sectors} sectors of a wheel")
+        for note in self.case.notes:
+            self.console.line(f"note: {note}")
+        others = [name for name in self.case.analyses if name not in names]
+        if others:
+            self.console.line(f"left out by --only: {', '.join(others)}")
+
+    def _reduce(self) -> None:
+        """Solve on the reduced model from here on, when the case asks for one; its error is kept."""
+        self.case = reduce_case(self.case, self.comm)
+        if self.case.reduced is not None:
+            for line in self.case.reduced.lines():
+                self.console.line(line)
+            self.folder.record["reduction"] = self.case.reduced.plain()
+
+    def _check_needs(self, names: Sequence[str]) -> None:
+        """Time integration needs the results of its mode: from this run, or kept in the folder."""
+        for name in names:
+            analysis = self.case.analyses[name]
+            mode = analysis.mode if isinstance(analysis, TransientSection) else None
+            if mode is None or mode in names or self._kept(mode):
+                continue
+            raise InputError(
+                f"'{name}' needs the results of '{mode}'",
+                where="--only",
+                measured=f"no results of '{mode}' for this case in {display(self.folder.path)}",
+                fix=f"--only {mode},{name}",
+            )
+
+    def _kept(self, name: str) -> bool:
+        if not has_results(self.folder.path):
+            return False
+        with open_results(self.folder.path / "results.h5") as file:
+            return name in file and belongs(file[name], self.case, name)
+
+    def _is_done(self, name: str) -> bool:
+        def look() -> str | None:
+            if not has_results(self.folder.path):
+                return None
+            with open_results(self.folder.path / "results.h5") as file:
+                mine = name in file and file[name].attrs.get("run_id") == self.folder.record["run_id"]
+                status = str(file[name].attrs.get("status")) if mine else None
+            if status in ENDED:
+                Journal(self.folder.path, name).remove()  # killed when all was in results.h5 but this was left
+            return status
+
+        status, entry = on_first_rank(self.comm, look), self.folder.record["analyses"].get(name)
+        if status not in ENDED or entry is None:
+            return False
+        self.console.line(f"{name}: already {status}")
+        if status == "stopped":
+            self.failures.append(not_converged(name, Outcome(int(entry["points"]), str(entry["reason"]), False)))
+        return True
+
+    def _is_begun(self, name: str) -> bool:
+        def look() -> bool:
+            if not has_results(self.folder.path):
+                return False
+            with open_results(self.folder.path / "results.h5") as file:
+                return name in file and file[name].attrs.get("run_id") == self.folder.record["run_id"]
+
+        return self.resuming and on_first_rank(self.comm, look)
+
+    def _run_one(self, analysis: AnalysisSection) -> None:
+        from .. import _core
+
+        began = time.perf_counter()
+        prefix = analysis.name.replace("-", "_") + "_"
+        options = AnalysisOptions(prefix, [self.options.petsc, analysis.petsc])
+
+        def before_first() -> None:
+            options.check_used(_core.unused_options, f"analysis '{analysis.name}'")
+            self._start()
+
+        case = on_wheel(self.case, analysis)
+        preload, flow = case.preload_of(analysis), getattr(analysis, "aerodynamics", False)
+        wave = nodal_diameter(case.settings(analysis))
+        built = build_model(case, self._dampers(analysis), self.comm, preload, wave, flow)
+        with built as model, options.inserted(), solver_room(case, analysis, prefix):
+            context = AnalysisContext(
+                model,
+                case,
+                analysis,
+                self.comm,
+                self.folder.path,
+                self.console,
+                resuming=self._is_begun(analysis.name),
+                before_first=before_first,
+                attributes=describe_analysis(analysis, self.case, self.folder.record["run_id"]),
+            )
+            module, function = DISPATCH[analysis.type]
+            try:
+                outcome = getattr(importlib.import_module(f"fretwave.analyses.{module}"), function)(context)
+            except NotConverged as error:  # before its first point: there was no static state to start from
+                reason = f"{error.what}: {error.measured}"
+                outcome = Outcome(0, reason, False, goal=str(error.expected), advice=error.fix or "")
+        entry = {"left_out": context.left_out, **context.entry}
+        self._note(analysis.name, outcome, time.perf_counter() - began, entry)
+        context.publish()  # last of all: from here on a resumed run leaves the analysis as it is
+
+    def _sweep(self, name: str, sweep: Any) -> None:
+        """Run another analysis for every value, on groups of ranks."""
+        from .sweep_analysis import run_sweep
+
+        began = time.perf_counter()
+        self._start()
+        outcome = run_sweep(sweep, name, self.comm, self.console, self.folder, self.case.title)
+        self._note(name, outcome, time.perf_counter() - began)
+
+    def _dampers(self, analysis: AnalysisSection) -> list[Any]:
+        """The analysis' dampers; a time integration without any takes those of its mode."""
+        if isinstance(analysis, TransientSection) and not analysis.dampers:
+            return list(self.case.analyses[analysis.mode].dampers)
+        return list(self.case.settings(analysis).dampers)
+
+    def _note(self, name: str, outcome: Outcome, seconds: float, entry: Mapping[str, Any] | None = None) -> None:
+        """Print the outcome and keep it in run.json, with what else `entry` says."""
+        for line in outcome.summary:
+            self.console.line(line)
+        memory = peak_memory_mb(self.comm)
+        self.folder.record["analyses"][name] = {
+            "status": "done" if outcome.converged else "stopped",
+            "reason": outcome.reason,
+            "points": outcome.points,
+            "wall_s": round(seconds, 3),
+            "peak_memory_mb": memory,
+            **(entry or {}),
+        }
+        on_first_rank(self.comm, self.folder.save)
+        if not outcome.converged:
+            self.failures.append(not_converged(name, outcome))
+
+    def _finish(self) -> None:
+        self.folder.record["status"] = "stopped" if self.failures else "done"
+        self.folder.record["peak_memory_mb"] = peak_memory_mb(self.comm)
+        if self.options.plots and self.folder.started:
+            on_first_rank(self.comm, lambda: plot(self.folder.path, self.console))
+        on_first_rank(self.comm, self.folder.close)
+
+
+def check_sweeps(case: Case, names: Sequence[str], options: RunOptions, comm: Any) -> dict[str, Any]:
+    """The sweeps among some analyses, after the case was loaded with each of their values. Collective."""
+    sweeps = {}
+    for name in names:
+        analysis = case.analyses[name]
+        if isinstance(analysis, SweepAnalysis):
+            from .sweep_analysis import analysis_sweep
+
+            sweeps[name] = analysis_sweep(Runner, case, analysis, options, comm.size)
+            sweeps[name].check(comm)
+    return sweeps
+
+
+def plot(folder: Path, console: Console, only: Sequence[str] | None = None) -> int:
+    """Make the pictures of a run folder; returns how many."""
+    from ..plots import plot_run
+
+    failed: list[str] = []
+    files = plot_run(folder, only, failed)
+    for line in failed:
+        console.line(line)
+    console.line(f"{len(files)} picture{'s' * (len(files) != 1)} in {display(folder)}")
+    return len(files)

@@ -1,0 +1,50 @@
+"""The message of an analysis that stopped before its goal."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ..analyses.parts.context import Outcome
+from ..errors import NotConverged
+
+
+def not_converged(name: str, outcome: Outcome) -> NotConverged:
+    """What stopped an analysis, what is kept, and what to try."""
+    kept = f"{outcome.points} points are kept" if outcome.points else "nothing was solved, no results written"
+    place = f"after point {outcome.points - 1}" if outcome.points else "first point"
+    return NotConverged(
+        f"'{name}' stopped early; {kept}",
+        where=f"analysis '{name}', {place}",
+        measured=outcome.reason,
+        expected=outcome.goal or None,
+        fix=outcome.advice or _advice(name, outcome.reason),
+    )
+
+
+def _advice(name: str, reason: str) -> str:
+    """What most often helps against a reason to stop."""
+    if "number of points" in reason:
+        return f"--set {name}.step.max_points=20000, or longer steps (step.maximum)"
+    if "does not fit" in reason:
+        return "more memory or ranks, fewer harmonics or component modes, or fewer contact pairs"
+    if "mean position is free" in reason:
+        return "hold the structure where contact alone cannot (a spring, an axial stop), or load its contact more"
+    if "linear solve" in reason or "LINEAR_SOLVE" in reason:
+        return (
+            f"more samples, or another start; --petsc '-ksp_monitor -{name.replace('-', '_')}_snes_monitor' shows why"
+        )
+    if "at the start" in reason:
+        return (
+            "another start (amplitude or frequency) where the motion is nearly linear; --petsc -snes_monitor shows why"
+        )
+    return (
+        f"more samples, or shorter steps (--set {name}.step.minimum=1e-11); --petsc -snes_monitor shows Newton's steps"
+    )
+
+
+def joined(failures: Sequence[NotConverged]) -> NotConverged:
+    """One message for several analyses."""
+    first = failures[0]
+    names = "; ".join(failure.what for failure in failures)
+    reasons = "; ".join(f"{failure.where}: {failure.measured}" for failure in failures)
+    return NotConverged(names, None, reasons, first.expected, first.fix)

@@ -1,0 +1,208 @@
+"""Run a case for every value of some keys, on groups of ranks.
+
+Every value has a run folder of its own below ``values`` (of an analysis: below its name), which can be shown, viewed
+and resumed like any other; from these the sweep's results are put together.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from ..case.checks import choose
+from ..case.load import Case, load_case
+from ..case.schema import SweepAnalysis
+from ..errors import CaseErrors, FretwaveError, InputError, NotConverged
+from ..mpi import groups
+from ..mpi.guard import on_first_rank
+from ..post.grid import Plan
+from ..results.runfolder import RECORD, new_record, read_record
+from ..results.sweeps import Branch, read_branch
+from ..texts import display
+from .order import RunOptions, in_order
+
+
+@dataclass(frozen=True)
+class Checked:
+    """What is known of a value before it runs; only the first brings more than its hash."""
+
+    digest: str
+    resolved: dict[str, Any] = field(default_factory=dict)
+    title: str = ""
+    name: str = ""
+    text: str = ""
+    analyses: list[str] = field(default_factory=list)
+
+
+@dataclass
+class Sweep:
+    """The runs of a case with each combination of some keys' values.
+
+    Attributes
+    ----------
+    path : Path
+        The case file.
+    plan : Plan
+    runner : Runner, or what else runs a case
+    options : RunOptions
+        As for one run; `overrides` are those that all values share.
+    folder : Path
+        Holds the values' runs: ``0000``, ``0001``, ...
+    n_groups : int
+        Groups of ranks; None for as many as there are ranks and values.
+    text : str
+        Of the case file, when it is not to be read again.
+    where : str
+        Where the values were given, when not on the command line.
+    places : dict
+        Where the user gave overrides that all values share, when not by ``--set``.
+    """
+
+    runner: Callable[..., Any]
+    path: Path
+    plan: Plan
+    options: RunOptions
+    folder: Path
+    n_groups: int | None = None
+    text: str | None = None
+    where: str | None = None
+    places: dict[str, str] = field(default_factory=dict)
+
+    def check(self, comm: Any) -> list[Checked]:
+        """Load the case with every value, several at a time. Collective.
+
+        Raises
+        ------
+        CaseErrors
+            All that is wrong with any of them, each thing once.
+        """
+        groups.group_count(comm.size, len(self.plan), self.n_groups)
+        try:
+            found: list[Any] = [on_first_rank(comm, lambda: self._checked(0))]  # alone: others find what it caches
+        except FretwaveError as error:
+            found = [error]
+        others = range(1, len(self.plan))
+        found += groups.run(comm, others, lambda k, group: on_first_rank(group, partial(self._checked, k)))
+        problems = self._problems(found)
+        if problems:
+            raise CaseErrors(problems, f"the sweep of {display(self.path)}")
+        return found
+
+    def run(self, comm: Any, run_id: str) -> list[FretwaveError | None]:
+        """Run every value that is not done; gives what went wrong with each. Collective."""
+        numbers = range(len(self.plan))
+        return groups.run(comm, numbers, lambda k, group: self._run_value(k, group, run_id), self.n_groups)
+
+    def branches(self, analysis: str, run_id: str) -> list[Branch]:
+        """What was found for an analysis, in the order of the values. One rank only."""
+        found = []
+        for number in range(len(self.plan)):
+            record = self._record(number, run_id)
+            branch = read_branch(self.value_folder(number), analysis, number, record["run_id"]) if record else None
+            found += [branch] if branch is not None else []
+        return found
+
+    def outcomes(self, run_id: str, errors: Sequence[FretwaveError | None]) -> list[dict[str, Any]]:
+        """Status, reason and time of each value, for run.json. One rank only."""
+        found = []
+        for number, (values, error) in enumerate(zip(self.plan.values(), errors)):
+            entries = (self._record(number, run_id) or {}).get("analyses", {})
+            stopped = [entry["reason"] for entry in entries.values() if entry["status"] != "done"]
+            reason = "; ".join(stopped) if error is None or stopped else f"{error.what}: {error.measured}"
+            status = "done" if not reason and entries else "stopped" if entries else "failed"
+            times = {"wall_s": round(sum(entry["wall_s"] for entry in entries.values()), 3)}
+            place = f"{self.folder.name}/{number:04d}"
+            found.append({"over": values, "folder": place, "status": status, "reason": reason, **times})
+        return found
+
+    def forget_others(self) -> None:
+        """Remove runs of values of an earlier sweep that had more of them. One rank only."""
+        for entry in self.folder.glob("[0-9]*"):
+            if re.fullmatch(r"\d{4,}", entry.name) and int(entry.name) >= len(self.plan) and (entry / RECORD).exists():
+                shutil.rmtree(entry)
+
+    def value_folder(self, number: int) -> Path:
+        """Run folder of a value."""
+        return self.folder / f"{number:04d}"
+
+    def _case(self, number: int) -> Case:
+        overrides = [*self.options.overrides, *self.plan.overrides()[number]]
+        return load_case(self.path, overrides, self.options.quick, text=self.text)
+
+    def _checked(self, number: int) -> Checked:
+        case = self._case(number)
+        names = in_order(case, choose(swept_names(case), self.options.only))
+        if number:
+            return Checked(case.digest)
+        return Checked(case.digest, case.resolved, case.title, case.name, case.text, names)
+
+    def _problems(self, found: Sequence[Any]) -> list[FretwaveError]:
+        """Each problem once, with the first of the values that have it."""
+        numbers: dict[tuple[Any, ...], list[int]] = {}
+        kept: dict[tuple[Any, ...], FretwaveError] = {}
+        for number, error in enumerate(found):
+            for problem in getattr(error, "problems", [error] if isinstance(error, FretwaveError) else []):
+                where, own = self._place(str(problem.where), number)
+                same = (problem.what, str(problem.expected), None if own else (where, str(problem.measured)))
+                numbers.setdefault(same, []).append(number)
+                kept.setdefault(same, InputError(problem.what, where, problem.measured, problem.expected, problem.fix))
+        labels = self.plan.labels()
+        for same, problem in kept.items():
+            count = len(numbers[same])
+            if same[2] is None and count > 1:
+                problem.measured = f"{problem.measured}, and with {count - 1} more value{'s' * (count > 2)}"
+            elif same[2] is not None and count < len(self.plan):
+                problem.what = f"with {labels[numbers[same][0]]}: {problem.what}"
+        return list(kept.values())
+
+    def _place(self, where: str, number: int) -> tuple[str, bool]:
+        """Where the user gave what a problem is about, and whether that is the value itself."""
+        given = where[len("--set ") :] if where.startswith("--set ") else ""
+        if given in self.plan.overrides()[number]:
+            return self.where or f"--over {given}", True
+        return self.places.get(given, where), False
+
+    def _record(self, number: int, run_id: str) -> dict[str, Any] | None:
+        """run.json of a value when it is part of this sweep."""
+        folder = self.value_folder(number)
+        record = read_record(folder) if (folder / RECORD).exists() else {}
+        return record if record.get("part_of") == run_id else None
+
+    def _run_value(self, number: int, group: Any, run_id: str) -> FretwaveError | None:
+        began, label = time.perf_counter(), self.plan.labels()[number]
+        earlier = on_first_rank(group, lambda: self._record(number, run_id))
+        if earlier is not None and earlier["status"] != "running":
+            say(group, f"{label}: already {earlier['status']}")
+            return None
+        case = on_first_rank(group, lambda: self._case(number))
+        overrides = [*self.options.overrides, *self.plan.overrides()[number]]
+        options = replace(self.options, out=self.value_folder(number), overrides=overrides, plots=False)
+        record = earlier or group.bcast(new_record(options.given(self.path, case), group.size))
+        record.update({"part_of": run_id, "ranks": group.size, "status": "running"})
+        runner = self.runner(case, options, self.value_folder(number), record, group, earlier is not None, quiet=True)
+        try:
+            runner.run()
+            error: NotConverged | None = None
+        except NotConverged as stopped:
+            error = stopped
+        word = "done" if error is None else f"stopped: {error.measured}"
+        seconds, ranks = time.perf_counter() - began, f"{group.size} rank{'s' * (group.size > 1)}"
+        say(group, f"{label}: {word} ({seconds:.1f} s, {ranks})")
+        return error
+
+
+def say(group: Any, text: str) -> None:
+    """A line from a group, from its first rank."""
+    if group.rank == 0:
+        print(text, flush=True)
+
+
+def swept_names(case: Case) -> list[str]:
+    """Analyses that a sweep may run: all but sweeps."""
+    return [name for name, analysis in case.analyses.items() if not isinstance(analysis, SweepAnalysis)]

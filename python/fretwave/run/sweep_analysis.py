@@ -1,0 +1,75 @@
+"""``type = "sweep"``: another analysis for every value of some keys, on groups of ranks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from ..analyses.parts.context import Outcome
+from ..case.load import Case
+from ..case.schema import SweepAnalysis
+from ..case.toml.source import Source
+from ..console import Console
+from ..mpi.guard import on_first_rank
+from ..results.runfolder import RunFolder
+from ..results.sweep_summary import landmarks
+from ..results.sweeps import write_sweep
+from .order import RunOptions, needs
+from .sweep import Sweep
+from .sweep_plan import table_overrides, table_plan
+
+
+def analysis_sweep(
+    runner: Callable[..., Any], case: Case, analysis: SweepAnalysis, options: RunOptions, ranks: int = 1
+) -> Sweep:
+    """The sweep that an analysis of a case asks for, each value run by `runner`.
+
+    On fewer ranks than groups each rank is a group.
+    """
+    wanted: list[str] = []
+
+    def want(name: str) -> None:
+        for needed in needs(case.analyses[name]):
+            want(needed)
+        wanted.append(name)
+
+    want(analysis.of)
+    petsc = f"{options.petsc} {analysis.petsc}".strip()
+    own = table_overrides(analysis.overrides)
+    chosen = replace(options, only=list(dict.fromkeys(wanted)), petsc=petsc, overrides=[*options.overrides, *own])
+    over, overrides = (place_of(case, analysis.name, key) for key in ("over", "overrides"))
+    plan, places = table_plan(analysis.over), dict.fromkeys(own, overrides)
+    count = None if analysis.groups is None else min(analysis.groups, ranks)
+    return Sweep(runner, case.path, plan, chosen, Path(), count, case.text, over, places)
+
+
+def place_of(case: Case, name: str, key: str) -> str:
+    """``file:line`` of a key of an analysis."""
+    return Source(case.path, case.text).where(("analysis", list(case.analyses).index(name), key))
+
+
+def run_sweep(sweep: Sweep, name: str, comm: Any, console: Console, folder: RunFolder, title: str = "") -> Outcome:
+    """Run every value and write the results of all in one group and two tables. Collective."""
+    run_id, of = folder.record["run_id"], sweep.options.only[-1]
+    sweep.folder = folder.path / name
+    console.line(f"{name}: '{of}' with {len(sweep.plan)} values of {', '.join(sweep.plan.keys)}")
+    errors = sweep.run(comm, run_id)
+
+    def finish() -> Outcome:
+        outcomes, branches = sweep.outcomes(run_id, errors), sweep.branches(of, run_id)
+        bad = [k for k, outcome in enumerate(outcomes) if outcome["status"] != "done"]
+        labels = sweep.plan.labels()
+        reason = "; ".join(f"{labels[k]}: {outcomes[k]['reason']}" for k in bad) or "all values done"
+        if branches:
+            attributes = {"run_id": run_id, "status": "stopped" if bad else "done", "reason": reason}
+            summary = folder.path / f"{name}_summary.csv"
+            rows = write_sweep(folder.path, name, of, sweep.plan, branches, attributes, title, summary)
+        sweep.forget_others()
+        lines = landmarks(name, sweep.plan, rows) if branches else []
+        points = sum(branch.points for branch in branches)
+        advice = next((error.fix for error in errors if error is not None and error.fix), "")
+        return Outcome(points, reason, not bad, lines, f"{len(sweep.plan)} whole branches", advice)
+
+    return on_first_rank(comm, finish)

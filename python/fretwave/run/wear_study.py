@@ -1,0 +1,270 @@
+"""``fretwave study`` of wear: error against run time over the tolerance of a step, its bound on pressure, harmonics."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+
+from ..analyses.parts.context import AnalysisContext
+from ..analyses.parts.rest import retained, start_mode
+from ..analyses.wear import unworn_starts
+from ..analyses.wear_line import wear_areas
+from ..case.build import build_model
+from ..case.load import Case
+from ..case.reduce import reduce_case
+from ..case.schema import ModeAnalysis, WearAnalysis
+from ..case.sector import nodal_diameter
+from ..console import Console
+from ..errors import EXIT_DONE, FretwaveError, NotConverged
+from ..files.whole import replace_text
+from ..mpi.guard import caught_by_all
+from ..mpi.petsc_options import AnalysisOptions
+from ..results.study_report import LEGEND_OF_WEAR, PRINTED_OF_WEAR, markdown, write_csv
+from .study_folder import StudyFolder
+
+#: Swept where neither the command line nor the case says anything.
+TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4)
+
+
+@dataclass(frozen=True)
+class CycleUnit:
+    """How many vibrations a normalised cycle has."""
+
+    vibrations: float
+
+
+@dataclass(frozen=True)
+class WearSettings:
+    """Numerical settings of one run."""
+
+    harmonics: int
+    tolerance: float
+    pressure_change: float
+
+
+@dataclass(frozen=True)
+class WearOutcome:
+    """What one run found after the last cycle: omega [rad/s], zeta and the worn volume [m^3]; and its cost."""
+
+    omega: float
+    zeta: float
+    worn: float
+    steps: int
+    newton: int
+    wall_s: float
+
+
+@dataclass
+class WearPlan:
+    """Sweeps of one setting at a time, the others as in the analysis; each has its own reference, its finest."""
+
+    base: WearSettings
+    harmonics: Sequence[int] = ()
+    tolerance: Sequence[float] = ()
+    pressure_change: Sequence[float] = ()
+    outcomes: dict[WearSettings, WearOutcome] = field(default_factory=dict)
+    failures: dict[WearSettings, str] = field(default_factory=dict)
+
+    def sweeps(self) -> Iterator[tuple[str, list[WearSettings]]]:
+        """(swept setting, all settings of the sweep), coarse to fine."""
+        for name, coarse_to_fine in (("tolerance", -1), ("pressure_change", -1), ("harmonics", 1)):
+            values = sorted(getattr(self, name))[::coarse_to_fine]
+            if values:
+                yield name, [replace(self.base, **{name: value}) for value in values]
+
+    def runs(self) -> list[WearSettings]:
+        """All settings, those of several sweeps once."""
+        return list(dict.fromkeys(settings for _, swept in self.sweeps() for settings in swept))
+
+    def table(self) -> list[dict[str, float | int | str]]:
+        """One row per run and sweep; sweeps without their reference are left out."""
+        return [
+            _row(name, settings, self.outcomes[settings], self.outcomes[swept[-1]], settings == swept[-1])
+            for name, swept in self.sweeps()
+            for settings in swept
+            if settings in self.outcomes and swept[-1] in self.outcomes
+        ]
+
+
+def _row(
+    sweep: str, settings: WearSettings, run: WearOutcome, finest: WearOutcome, is_finest: bool
+) -> dict[str, float | int | str]:
+    errors = {
+        f"{name}_error": abs(getattr(run, name) - getattr(finest, name)) / (abs(getattr(finest, name)) or 1.0)
+        for name in ("omega", "zeta", "worn")
+    }
+    return {
+        "sweep": sweep,
+        "harmonics": settings.harmonics,
+        "tolerance": settings.tolerance,
+        "pressure_change": settings.pressure_change,
+        "steps": run.steps,
+        "newton": run.newton,
+        "wall_s": run.wall_s,
+        "frequency_hz": run.omega / (2 * np.pi),
+        "zeta_percent": 100 * run.zeta,
+        "worn_mm3": 1e9 * run.worn,
+        **errors,
+        "reference": int(is_finest),
+    }
+
+
+def study_wear(case: Case, options: argparse.Namespace, comm: Any, console: Console, folder: StudyFolder) -> int:
+    """Run the study; returns the exit code. Collective."""
+    analysis = cast(WearAnalysis, case.analyses[options.analysis])
+    plan = wear_plan(case, analysis, options)
+    amplitude = max(analysis.amplitude)
+    console.line(f"study of '{analysis.name}' at a = {amplitude:g} m: {len(plan.runs())} runs")
+    solver = _Solver(case, analysis, comm, console, options.repeats)
+    unit = folder.solved(len(plan.runs()), CycleUnit, lambda: solver.cycle_unit(plan.runs()[0]))
+    solver.unit = 0.0 if isinstance(unit, str) else unit.vibrations
+    for number, settings in enumerate(plan.runs()):
+        found = folder.solved(number, WearOutcome, lambda settings=settings: solver.solve(settings))  # type: ignore[misc]
+        if isinstance(found, str):
+            plan.failures[settings] = found
+        else:
+            plan.outcomes[settings] = found
+        console.line(_progress(settings, found))
+    solver.destroy()
+    if not plan.table():
+        reasons = "; ".join(plan.failures.values())
+        raise NotConverged("no sweep has its finest run", None, reasons, "a finished march", "milder finest settings")
+    folder.finish(lambda path: _write(plan, amplitude, analysis, path, console))
+    return EXIT_DONE
+
+
+def wear_plan(case: Case, analysis: WearAnalysis, options: argparse.Namespace) -> WearPlan:
+    """Sweeps of the command line, else of the case's table [study], else of the tolerance alone."""
+    mode = cast(ModeAnalysis, case.settings(analysis))
+    base = WearSettings(mode.harmonics, analysis.tolerance, analysis.pressure_change)
+    given = {name: getattr(options, name) for name in ("harmonics", "tolerance", "pressure_change")}
+    if not any(given.values()):
+        section = case.study
+        given = dict(
+            harmonics=section.harmonics, tolerance=section.wear_tolerance, pressure_change=section.pressure_change
+        )
+    chosen = {name: tuple(values or ()) for name, values in given.items()}
+    if not any(chosen.values()):
+        chosen["tolerance"] = TOLERANCES
+    return WearPlan(base, chosen["harmonics"], chosen["tolerance"], chosen["pressure_change"])
+
+
+class _Solver:
+    """Marches wear at the largest amplitude of an analysis with any settings. Collective, as all methods."""
+
+    def __init__(self, case: Case, analysis: WearAnalysis, comm: Any, console: Console, repeats: int) -> None:
+        self.case = reduce_case(case, comm)
+        self.analysis = analysis.model_copy(update={"amplitude": [max(analysis.amplitude)]})
+        self.comm, self.console, self.repeats = comm, console, repeats
+        mode = self._mode(None)
+        preload = self.case.preload_of(analysis)
+        self.model = build_model(self.case, mode.dampers, comm, preload, nodal_diameter(mode))
+        self._starts: dict[int, dict[str, Any]] = {}
+        self.unit = 0.0  # of the first run, so that all compare at the same cycles
+
+    def _mode(self, harmonics: int | None) -> ModeAnalysis:
+        given = self.analysis.harmonics if harmonics is None else harmonics
+        return cast(ModeAnalysis, self.case.settings(self.analysis.model_copy(update={"harmonics": given})))
+
+    def destroy(self) -> None:
+        """Free the model."""
+        self.model.destroy()
+
+    def _context(self, mode: ModeAnalysis) -> AnalysisContext:
+        return AnalysisContext(self.model, self.case, mode, self.comm, Path(), Console(False))
+
+    def cycle_unit(self, settings: WearSettings) -> CycleUnit | str:
+        """Vibrations in a normalised cycle, or why they are not known."""
+        if self.analysis.cycle_unit:
+            return CycleUnit(self.analysis.cycle_unit)
+        mode = self._mode(settings.harmonics)
+        context = self._context(mode)
+        with AnalysisOptions(context.prefix, [mode.petsc]).inserted():
+            try:
+                self._starts[settings.harmonics] = unworn_starts(context, self.analysis)
+            except FretwaveError as error:
+                return str(error)
+        return CycleUnit(float(self._starts[settings.harmonics]["cycle_unit"]))
+
+    def solve(self, settings: WearSettings) -> WearOutcome | str:
+        """Values at the compared cycles, or why there are none; its time is that of the fastest march."""
+        mode = self._mode(settings.harmonics)
+        context = self._context(mode)
+        with AnalysisOptions(context.prefix, [mode.petsc]).inserted():
+            try:
+                if settings.harmonics not in self._starts:
+                    self._starts[settings.harmonics] = unworn_starts(context, self.analysis)
+                    self.unit = self.unit or float(self._starts[settings.harmonics]["cycle_unit"])
+                tried = [self._march(context, settings) for _ in range(self.repeats)]
+            except FretwaveError as error:
+                caught_by_all(self.comm, error)
+                return str(error)
+        runs = [run for run in tried if isinstance(run, WearOutcome)]
+        return replace(runs[0], wall_s=min(run.wall_s for run in runs)) if runs else str(tried[0])
+
+    def _march(self, context: AnalysisContext, settings: WearSettings) -> WearOutcome | str:
+        from ..hb.problems import NonlinearMode
+        from ..solve.wear import Wear, WearControl
+        from ..solve.worn_mode import WornMode
+
+        mode, a, unit = cast(ModeAnalysis, context.analysis), self.analysis, self.unit
+        start, rest = start_mode(context, mode.linear_mode)
+        problem = NonlinearMode(
+            self.model, retained(context), mode.method, self.case.dof(mode.normalise), start, context.prefix
+        )
+        if rest is not None:
+            problem.preload(rest.displacement, rest.load)
+        areas = wear_areas(self.case)
+        with problem, WornMode(problem, a.coefficient, areas) as worn:
+            y = problem.core.unknowns()
+            begin, end = y.getOwnershipRange()
+            y.setArray(np.asarray(self._starts[settings.harmonics]["y_0"])[begin:end])
+            control = WearControl(a.stepper, settings.tolerance, settings.pressure_change)
+            march = Wear(worn, y, unit * a.cycles, control)
+            y.destroy()
+            return _follow(march, problem, np.concatenate(list(areas.values())))
+
+
+def _follow(march: Any, problem: Any, areas: Any) -> WearOutcome | str:
+    """The end of a march; where wear has stopped before the last cycle, the values stay."""
+    began = time.perf_counter()
+    newton = [point.newton for point in march]
+    wall = time.perf_counter() - began
+    if not march.converged:
+        return str(march.reason)
+    state = problem.state(march.state.y)
+    return WearOutcome(
+        state["omega"], state["zeta"], float(areas @ march.state.depth), len(newton) - 1, sum(newton), wall
+    )
+
+
+def _write(plan: WearPlan, amplitude: float, analysis: WearAnalysis, folder: Path, console: Console) -> None:
+    from ..plots import plot_run
+
+    rows = plan.table()
+    notes = [f"{analysis.name}, a = {amplitude:g} m, {analysis.stepper}, after {analysis.cycles:g} cycles."]
+    notes += [f"No whole march with {_text(settings)}: {reason}." for settings, reason in plan.failures.items()]
+    text = markdown(rows, notes, PRINTED_OF_WEAR, LEGEND_OF_WEAR)
+    write_csv(rows, folder / "study.csv")
+    replace_text(folder / "study.md", text)
+    pictures = plot_run(folder, ["study"])
+    for line in text.splitlines():
+        console.line(line)
+    console.line(f"written: {', '.join(str(path) for path in (folder / 'study.csv', folder / 'study.md', *pictures))}")
+
+
+def _progress(settings: WearSettings, found: WearOutcome | str) -> str:
+    if isinstance(found, str):
+        return f"{_text(settings)}: {found}"
+    cost = f"{found.steps} steps, {found.newton} Newton iterations, {found.wall_s:.3f} s"
+    return f"{_text(settings)}: {cost}, worn {1e9 * found.worn:.5g} mm^3"
+
+
+def _text(settings: WearSettings) -> str:
+    return f"H = {settings.harmonics}, tolerance {settings.tolerance:.0e}, pressure {settings.pressure_change:g}"

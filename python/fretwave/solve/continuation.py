@@ -1,0 +1,259 @@
+"""Branches: pseudo-arclength continuation as a generator of points."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from petsc4py import PETSc
+
+from .. import _core
+from ..errors import InputError
+from ..hb.problems import HarmonicProblem
+from .starting import far_from_start, starts
+from .steps import StepControl
+
+Array = npt.NDArray[np.float64]
+
+#: Relative change of the force's harmonics on doubled samples above which a failure is put down to sampling.
+ALIASING_LIMIT = 1e-3
+
+
+#: Of a snapshot: the last anchor and the one before it.
+_VECTORS = ("y", "tangent", "before_y", "before_tangent")
+
+
+@dataclass
+class Point:
+    """A converged point of a branch. `y` and `tangent` are the caller's to keep or destroy.
+
+    Attributes
+    ----------
+    parameter : amplitude (modes) or omega (forced response)
+    event : "", start, stop, report, fold, zero_damping or peak_damping
+    step : arclength from the last regular point
+    wall_s : seconds since the point before
+    rounding : error of the residual that rounding leaves, expected
+    accepted : 1 where the residual is below the tolerance, 0 where rounding let it fall no further
+    """
+
+    index: int
+    y: PETSc.Vec
+    tangent: PETSc.Vec
+    parameter: float
+    step: float
+    event: str
+    newton: int
+    linear: int
+    residual: float
+    wall_s: float
+    rounding: float = 0.0
+    accepted: int = 1
+
+    def __repr__(self) -> str:
+        what = f" {self.event}" if self.event else ""
+        return f"Point({self.index}:{what} at {self.parameter:.6g}, residual {self.residual:.1e})"
+
+
+class Continuation:
+    """Follows a problem's branch from y0 until its parameter leaves (low, high). Collective.
+
+    It hands out its points once, as files do their lines: a loop that was left goes on where it stood, and behind the
+    last point there are none. `fretwave.follow` keeps them.
+
+    Parameters
+    ----------
+    y0 : Vec
+        First guess; Newton runs at its parameter.
+    stop : (low, high)
+        The last point lies on the value the branch reaches. One that begins at an end may fold back over it and come
+        in again: it is followed a quarter of the range (half the value at most) outside, and its points are kept.
+    report_at : parameter values at which points are located
+    upwards : the parameter grows at first
+    helped : a start that Newton does not find is looked for on other ways (`started` tells)
+    """
+
+    def __init__(
+        self,
+        problem: HarmonicProblem,
+        y0: PETSc.Vec,
+        stop: tuple[float, float],
+        steps: StepControl | None = None,
+        report_at: Sequence[float] = (),
+        upwards: bool | None = None,
+        helped: bool = True,
+    ) -> None:
+        low, high = stop
+        if not low < high:
+            raise InputError(
+                "the range of the branch is empty", None, f"({low}, {high})", "low < high", "order the two stop values"
+            )
+        self.problem, self._y0, self._low, self._high = problem, y0, low, high
+        self._core = _core.Continuation(
+            problem.core, problem.prefix, low, high, (steps or StepControl()).core(), list(report_at)
+        )
+        if upwards is None:
+            start = self._parameter(y0)
+            upwards = bool(start < 0.5 * (low + high))
+        self._upwards, self._begun, self._advice = upwards, False, ""
+        self.repeated: Point | None = None
+        self.helped, self.started, self._first_reason = helped, "", ""
+        self._last: PETSc.Vec | None = None
+        self._over = False
+
+    def __repr__(self) -> str:
+        if self._core is None:
+            return "Continuation(destroyed)"
+        return f"Continuation({self._low:g} to {self._high:g}: {self.reason or 'under way'}, of {self.problem})"
+
+    def _parameter(self, y: PETSc.Vec) -> float:
+        return float(self.problem.core.parameter_value(self.problem.last_entry(y)))
+
+    def last_entry(self, y: PETSc.Vec) -> float:
+        """The parameter's entry of unknowns or a tangent, on every rank. Collective."""
+        return self.problem.last_entry(y)
+
+    def _first(self) -> dict[str, Any] | None:
+        """The first point, by another way if Newton does not find it from the first guess."""
+        point = self._core.start(self._y0, self._upwards)
+        if not self.helped:
+            return dict(point) if point is not None else None
+        far = point is not None and far_from_start(self.problem, point["y"])
+        if point is not None and not far:
+            return dict(point)
+        reason = "the first point found is far from the linear mode" if far else str(self._core.reason)
+        reasons: list[str] = []
+        for how, y in starts(Continuation, self.problem, self._y0, reasons, far):
+            point = self._core.start(y, self._upwards)
+            if point is not None:
+                self.started = how
+                return dict(point)
+        if far and not reasons:
+            point = self._core.start(self._y0, self._upwards)
+            return dict(point) if point is not None else None
+        self._advice = "".join(f"; {other}" for other in reasons)
+        self._first_reason = reason
+        return None
+
+    def __iter__(self) -> Continuation:
+        return self
+
+    def __next__(self) -> Point:
+        if self._over:
+            raise StopIteration
+        point = self._core.next() if self._begun else self._first()
+        last, self._begun = self._last, True
+        self._last = None if point is None else point["y"]
+        if point is None:
+            self._over = True
+            if last and not self.converged and "without bound" not in self._core.reason:
+                self._advise(last)  # unless the caller has freed it
+            raise StopIteration
+        return Point(**point)
+
+    def _advise(self, y: PETSc.Vec) -> None:
+        """A branch that breaks off often does so at a force that changes within a sample."""
+        aliasing = self.problem.diagnostics(y)["aliasing"]
+        if aliasing > ALIASING_LIMIT:
+            self._advice = (
+                f"; the contact force may be poorly resolved in time (its harmonics change by {100 * aliasing:.2g} % on"
+                f" doubled samples): if so, samples = {4 * self.problem.harmonics.samples} or a smoother law helps"
+            )
+
+    @property
+    def converged(self) -> bool:
+        """The branch ended as asked."""
+        return bool(self._core.converged)
+
+    @property
+    def reason(self) -> str:
+        """Why the branch ended."""
+        return (self._first_reason or str(self._core.reason)) + self._advice
+
+    @property
+    def route(self) -> str:
+        """How linear systems are solved, why so, and the memory of the Krylov route's factors."""
+        return str(self._core.route)
+
+    @property
+    def fallbacks(self) -> dict[str, Any]:
+        """How often a linear solve that failed was tried in a dearer way, and what is to be said of it.
+
+        Returns
+        -------
+        dict
+            rebuilt, condensed, whole : preconditioner built anew at the point, condensed contact system factorised,
+            whole system factorised; said : of the last one, or why it could not be taken.
+        """
+        return dict(self._core.fallbacks)
+
+    @property
+    def snes(self) -> PETSc.SNES:
+        """The corrector, to look into or to set options on."""
+        return self._core.snes
+
+    @property
+    def anchor(self) -> PETSc.Vec:
+        """Unknowns of the regular point that the branch last started a step from."""
+        return self._core.anchor()["y"]
+
+    @property
+    def missed(self) -> list[str]:
+        """Reports and events that were asked for or seen and could not be had, each with its reason."""
+        return list(self._core.missed)
+
+    def snapshot(self) -> dict[str, Any] | None:
+        """All that `restore` needs to go on; on rank 0. Collective."""
+        state = dict(self._core.anchor())
+        comm = self.problem.model.comm
+        vectors = [name for name in _VECTORS if name in state]
+        parts = {name: comm.gather(state[name].getArray(readonly=True).copy()) for name in vectors}
+        if comm.rank:
+            return None
+        return {**state, **{name: np.concatenate(p) for name, p in parts.items() if p is not None}}
+
+    @classmethod
+    def restore(
+        cls,
+        problem: HarmonicProblem,
+        snapshot: dict[str, Any] | None,
+        stop: tuple[float, float],
+        steps: StepControl | None = None,
+        report_at: Sequence[float] = (),
+    ) -> Continuation:
+        """Goes on after the snapshot's point, on any number of ranks; rank 0 alone needs the snapshot. Collective.
+
+        On the same ranks and the direct route the branch is the same bit for bit; elsewhere (another number of ranks,
+        or a preconditioner of another age) to the tolerance of the corrector. `repeated` is the last point handed out
+        before, solved again, to measure that by.
+        """
+        snapshot = problem.model.comm.bcast(snapshot)
+        assert snapshot is not None
+        vectors = {name: cls._scatter(problem, np.asarray(snapshot[name])) for name in _VECTORS if name in snapshot}
+        upwards, began = bool(snapshot.get("upwards", True)), float(snapshot.get("began", np.nan))
+        branch = cls(problem, vectors["y"], stop, steps, report_at, upwards)
+        before = [vectors[name] for name in _VECTORS[2:] if name in vectors]
+        step, index, emitted = float(snapshot["step"]), int(snapshot["index"]), int(snapshot["emitted"])
+        wary, now = bool(snapshot.get("wary", False)), [vectors["y"], vectors["tangent"]]
+        point = branch._core.restore(now, before, step, index, wary, emitted, upwards, began)
+        branch.repeated = None if point is None else Point(**point)
+        branch._begun = True
+        return branch
+
+    @staticmethod
+    def _scatter(problem: HarmonicProblem, whole: Array) -> PETSc.Vec:
+        v = problem.core.unknowns()
+        if v.getSize() != len(whole):
+            raise InputError(
+                "the saved state is of another problem", None, len(whole), v.getSize(), "resume with the same case"
+            )
+        begin, end = v.getOwnershipRange()
+        v.setArray(whole[begin:end])
+        return v
+
+    def destroy(self) -> None:
+        """Free the solver. Collective."""
+        self._core, self._last, self._over = None, None, True

@@ -1,0 +1,167 @@
+"""The static state under load: where the sliders start and what the dynamics move about."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from petsc4py import PETSc
+
+from .. import _core
+from ..errors import InputError, NotConverged
+from ..hb.problems import HarmonicProblem, Harmonics
+from ..hb.suspects import suspects
+from ..model.laws import own_load
+from ..model.model import Model
+from ..model.modes import LinearMode
+from .continuation import Continuation
+from .steps import StepControl
+
+Array = npt.NDArray[np.float64]
+
+#: What is kept of each contact.
+TOLD = ("u", "f", "status", "gap")
+#: Load factor at which a structure held by contact alone starts.
+FIRST_FACTOR = 1e-2
+
+
+#: A tangent with less load than this (displacement and load are of one size) is a motion that nothing holds.
+UNHELD = 1e-10
+
+
+@dataclass(frozen=True)
+class Preload:
+    """A solved static state; the model's laws have it as their rest state.
+
+    Attributes
+    ----------
+    displacement : (n_dof,) on every rank
+    load : (n_dof,) the static load it balances, contact included
+    stick, slip, open : shares of the pairs
+    imbalance : what the solver left of the load, relative to it
+    contacts : list of dict, on rank 0
+        Relative displacement u and force f (components, n_pairs) of each contact, and what its law says of each
+        pair: status (stick 0, slip 1, open 2) and gap [m].
+    """
+
+    displacement: Array
+    load: Array
+    stick: float
+    slip: float
+    open: float
+    imbalance: float = 0.0
+    contacts: list[dict[str, Array]] | None = None
+
+
+class StaticPreload(HarmonicProblem):
+    """K x + B^T f(B x) = p P over the load factor p; the contact starts untouched. Collective.
+
+    Parameters
+    ----------
+    load : (n_dof,) P
+    reference : LinearMode
+        Scales the unknowns.
+    """
+
+    def __init__(
+        self, model: Model, load: Array, reference: LinearMode, constant: Array | None = None, prefix: str = "static_"
+    ) -> None:
+        if not reference.omega > 0:
+            load_name = own_load(model.contacts)
+            by = f" ({load_name})" if load_name else ""
+            raise InputError(
+                "the mode that forces are measured by is a rigid motion: nothing holds the structure at rest",
+                None,
+                f"{reference.omega:g} rad/s{suspects(model.contacts, 1.0) if model.contacts else ''}",
+                "an elastic mode",
+                f"load the contact{by}, hold the structure, or take a mode with closed contact",
+            )
+        self.stiffness = stiffness = reference.omega**2 / float(np.sum(reference.shape**2))
+        size = (float(np.linalg.norm(load)) or stiffness) / stiffness
+        self.force_scale, self.size = stiffness * size, size
+        core = _core.StaticPreload(model.core, model.vector(load), size, stiffness)
+        if constant is not None:
+            core.preload(model.vector(np.zeros(model.n_dof)), model.vector(constant))
+        super().__init__(model, Harmonics([0], 2), prefix, core)
+
+    def at(self, displacement: Array, factor: float) -> PETSc.Vec:
+        """Unknowns of a displacement (n_dof,) given whole on every rank, at a load factor. Collective."""
+        y = self.core.initial()
+        local = y.getArray().copy()
+        n = self.model.core.local_dofs
+        local[:n] = self.model.distribute(displacement) / self.size
+        local[n:] = factor  # the last rank's last entry
+        y.setArray(local)
+        return y
+
+
+def balanced(model: Model, reference: LinearMode) -> Preload:
+    """Normal loads given pair by pair are in balance as they are: no displacement, the load is B^T f(0). Collective."""
+    problem = StaticPreload(model, np.zeros(model.n_dof), reference)
+    y = problem.core.initial()
+    problem.core.settle(y)  # sliders of a state solved before must not act on this one
+    return _settled(problem, y, np.zeros(model.n_dof))
+
+
+def static_preload(
+    model: Model, load: Array, reference: LinearMode, steps: StepControl | None = None, closed: Array | None = None
+) -> Preload:
+    """Static equilibrium under `load` and the normal loads given pair by pair. Collective.
+
+    By continuation in the load factor, from the unloaded state.
+
+    Parameters
+    ----------
+    closed : (n_dof,), optional
+        Displacement under the full load with all pairs closed: start from a small share of it. For pairs that just
+        touch when unloaded: a structure that they alone hold has no stiffness there.
+
+    Raises
+    ------
+    NotConverged
+        With the load factor that was reached.
+    """
+    load = np.asarray(load, dtype=float)
+    rest = balanced(model, reference)
+    problem = StaticPreload(model, load, reference, rest.load)
+    control = steps or StepControl(initial=0.1, maximum=0.5)
+    start = problem.core.initial() if closed is None else problem.at(FIRST_FACTOR * closed, FIRST_FACTOR)
+    y, reached, branch = None, 0.0, Continuation(problem, start, (-1.0, 1.0), control, upwards=True)
+    reason = ""
+    for point in branch:
+        y, reached = point.y, point.parameter
+        if point.event in ("", "start") and abs(branch.last_entry(point.tangent)) < UNHELD:
+            reason = "the structure moves without load: nothing holds it in some direction"
+            break
+    if branch.converged:
+        return _settled(problem, y, rest.load + load)
+    raise NotConverged(
+        "no static equilibrium under the full load",
+        None,
+        f"load factor {reached:.4g}: {reason or branch.reason}{suspects(model.contacts, problem.stiffness)}",
+        "1",
+        "hold the structure where contact alone cannot (an axial stop), or lower the load",
+    )
+
+
+def _settled(problem: StaticPreload, y: PETSc.Vec, load: Array) -> Preload:
+    """The laws take the state at y as theirs; the load is what the state balances, Newton's rest included.
+
+    That rest, small beside the load, would be large beside the forces of a small motion.
+    """
+    rest = _whole(problem.model, problem.residual(y)) * problem.force_scale
+    size = float(np.linalg.norm(load)) or float(np.linalg.norm(load + rest)) or 1.0
+    load = load + rest
+    contact = problem.diagnostics(y)
+    periods = problem.contact_history(y)
+    on_first = problem.model.comm.rank == 0
+    contacts = [{key: np.asarray(c[key])[0] for key in TOLD} for c in periods] if on_first else None
+    problem.core.settle(y)
+    blocks = _whole(problem.model, problem.core.coefficients(y))
+    imbalance = float(np.linalg.norm(rest)) / size
+    return Preload(blocks, load, contact["stick"], contact["slip"], contact["open"], imbalance, contacts)
+
+
+def _whole(model: Model, v: PETSc.Vec) -> Array:
+    return np.concatenate(model.comm.allgather(v.getArray(readonly=True)[: model.core.local_dofs].copy()))

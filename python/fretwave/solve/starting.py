@@ -1,0 +1,155 @@
+"""First points of branches that Newton does not find from the first guess: ways to them, chosen by themselves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from petsc4py import PETSc
+
+from .. import _core
+from ..hb.problems import ForcedResponse, HarmonicProblem, NonlinearMode
+from ..model.laws import Role
+from .steps import StepControl
+
+#: Amplitudes below the first one, each a hundredth of the one before, at which a mode is tried.
+SMALLER = 5
+#: Points of a way at the most: a sampled contact turns a corner wherever one of its samples begins to slip.
+WAY_POINTS = 20000
+#: Relative distance in frequency from the linear mode beyond which a first point may be of another mode.
+FAR = 0.02
+#: Why no mode grows out of the linear one.
+NONE = "no mode was found"
+CLOSING = "closing the gaps from where nothing touches"
+
+
+#: Follows a branch, as `Continuation` does.
+Follow = Callable[..., Any]
+
+
+class _Way(HarmonicProblem):
+    """The homotopy to a first point as a problem of its own."""
+
+    def __init__(self, problem: HarmonicProblem, core: Any) -> None:
+        super().__init__(problem.model, problem.harmonics, problem.prefix, core)
+
+
+def far_from_start(problem: HarmonicProblem, y: PETSc.Vec) -> bool:
+    """Whether a first point of a mode stands so far from the linear one that it may be of another. Collective."""
+    if not isinstance(problem, NonlinearMode):
+        return False
+    return bool(abs(problem.state(y)["omega0"] / problem.start.omega - 1.0) > FAR)
+
+
+def starts(
+    follow: Follow, problem: HarmonicProblem, y0: PETSc.Vec, reasons: list[str], far: bool = False
+) -> Iterator[tuple[str, PETSc.Vec]]:
+    """Guesses for the solution at the parameter of y0, each with how it was found. Collective.
+
+    A forced response is led there by its excitation, raised from zero at the first frequency; a mode is followed from
+    a smaller amplitude, where its contacts stick. Either is led there by gaps that close from where nothing touches.
+
+    Parameters
+    ----------
+    follow : Continuation, or what else follows a branch
+    reasons : list of str
+        Takes in why a way did not lead there.
+    far : bool
+        Newton found a mode, but far from the linear one: only the mode that grows out of the linear one is looked for.
+        Without a reason in the end there is none at smaller amplitudes either (a stop without gap has no linear limit).
+    """
+    gaps = any(contact.info.named(Role.GAP) in contact.parameters for contact in problem.model.contacts)
+    if isinstance(problem, ForcedResponse):
+        yield from _raised(follow, problem, y0, reasons)
+        yield from _closed(follow, problem, _core.ForcedStart(problem.core, y0, True), reasons) if gaps else ()
+    elif isinstance(problem, NonlinearMode):
+        yield from _grown(follow, problem, y0, reasons)
+        if far:
+            reasons[:] = [reason for reason in reasons if not reason.startswith(NONE)]
+            return
+        yield from _closed(follow, problem, _mode_start(problem, y0), reasons) if gaps else ()
+
+
+def _raised(
+    follow: Follow, problem: ForcedResponse, y0: PETSc.Vec, reasons: list[str]
+) -> Iterator[tuple[str, PETSc.Vec]]:
+    """The excitation grows from nothing to its full level."""
+    way = _core.ForcedStart(problem.core, y0, False)
+    yield from _led(follow, problem, way, "raising the excitation from zero", reasons)
+
+
+def _closed(follow: Follow, problem: HarmonicProblem, way: Any, reasons: list[str]) -> Iterator[tuple[str, PETSc.Vec]]:
+    """Gaps close that were too wide to touch."""
+    yield from _led(follow, problem, way, CLOSING, reasons)
+
+
+def _mode_start(problem: NonlinearMode, y0: PETSc.Vec) -> Any:
+    """The way with closing gaps at the amplitude of y0. Collective."""
+    method, amplitude = getattr(_core.Method, problem.method), _parameter(problem, y0)
+    shape = [problem.model.vector(part) for part in (problem.start.shape, problem.start.imaginary)]
+    model, harmonics = problem.model.core, problem.harmonics.core
+    way = _core.ModeStart(model, harmonics, method, problem.dof, problem.start.omega, *shape, amplitude)
+    way.keep_loads(problem.core)
+    return way
+
+
+def _led(
+    follow: Follow, problem: HarmonicProblem, core: Any, how: str, reasons: list[str]
+) -> Iterator[tuple[str, PETSc.Vec]]:
+    """The solution at the end of a homotopy: an excitation that is whole (t = 1), or gaps that are no wider (t = 0)."""
+    way = _Way(problem, core)
+    control = StepControl(initial=0.05, maximum=0.3, max_points=WAY_POINTS)
+    closing = how == CLOSING
+    stop = (0.0, 2 * way.last_entry(core.initial())) if closing else (-1.0, 1.0)
+    branch = follow(way, core.initial(), stop, control, upwards=not closing, helped=False)
+    last, count = _last(branch)
+    if branch.converged and last is not None:
+        y = core.response(last) if isinstance(problem, ForcedResponse) else core.mode(last)
+        branch.destroy()
+        yield f"by {how} in {count} steps", y
+        return
+    reasons.append(f"{how}: {branch.reason}")
+    branch.destroy()
+
+
+def _parameter(problem: HarmonicProblem, y: PETSc.Vec) -> float:
+    return float(problem.core.parameter_value(problem.last_entry(y)))
+
+
+def _grown(
+    follow: Follow, problem: NonlinearMode, y0: PETSc.Vec, reasons: list[str]
+) -> Iterator[tuple[str, PETSc.Vec]]:
+    """The mode grows from an amplitude at which the linear one solves it."""
+    amplitude = _parameter(problem, y0)
+    for power in range(1, SMALLER + 1):
+        small = amplitude / 100**power
+        control = StepControl(maximum=1.0, max_points=WAY_POINTS)
+        branch = follow(problem, problem.initial(small), (0.5 * small, amplitude), control, upwards=True, helped=False)
+        last, count = _last(branch, nearby=True)
+        converged, reason = branch.converged, branch.reason
+        branch.destroy()
+        if converged and last is not None:
+            yield f"the mode was followed from amplitude {small:.3g} in {count} steps", last
+            return
+        if count:
+            reasons.append(f"following the mode from amplitude {small:.3g}: {reason}")
+            return
+    reasons.append(f"{NONE} at {SMALLER} smaller amplitudes down to {small:.3g}")
+
+
+def _last(branch: Any, nearby: bool = False) -> tuple[PETSc.Vec | None, int]:
+    """Unknowns of the last point of a branch, and the number of its points. Collective.
+
+    Parameters
+    ----------
+    nearby : nothing is followed from a first point far from the linear mode
+    """
+    last, count = None, 0
+    for point in branch:
+        if last is not None:
+            last.destroy()
+        point.tangent.destroy()
+        last, count = point.y, count + 1
+        if nearby and count == 1 and far_from_start(branch.problem, last):
+            return None, 0
+    return last, count

@@ -1,0 +1,96 @@
+"""Direct time integration of the unreduced equations with PETSc TS, for verification."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from .. import _core
+from ..errors import InputError
+from ..model.model import Model
+
+Array = npt.NDArray[np.float64]
+
+#: Of one run, unless told: a minute of a small model.
+MOST_STEPS = 400_000
+
+
+class Transient:
+    """M x'' + C x' + K x + B^T f = level Re sum P_n e^{i n w t} from given initial conditions. Collective.
+
+    Runge-Kutta 5(4) with step control; where contact is so stiff that it would take too many steps, linearly implicit
+    steps (Rosenbrock-W, order 3) with the laws' tangents, to the same tolerance.
+    For contact laws that depend on the present motion only.
+
+    Parameters
+    ----------
+    force : dict, optional
+        Order n -> complex (n_dof,).
+    omega : float [rad/s], needed with a force
+
+    Raises
+    ------
+    InputError
+        A contact law has a memory, the model is one sector, or a force has no frequency.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        force: Mapping[int, npt.NDArray[Any]] | None = None,
+        level: float = 1.0,
+        omega: float | None = None,
+        prefix: str = "transient_",
+    ) -> None:
+        if force and not omega:
+            raise InputError("a force needs its frequency", None, omega, "omega > 0", "give omega")
+        if model.sectors > 1:
+            raise InputError(
+                "one sector with a wave has no equations in time",
+                None,
+                f"a sector of {model.sectors}",
+                "a model of the whole structure",
+                "integrate the wheel: sector.wheel()",
+            )
+        self.model = model
+        parts = [
+            (order, model.vector(level * np.real(P)), model.vector(-level * np.imag(P)))
+            for order, P in (force or {}).items()
+        ]
+        self._core = _core.Transient(model.core, parts, float(omega or 0.0), prefix)
+
+    def __repr__(self) -> str:
+        return f"Transient(of {self.model})"
+
+    def run(
+        self,
+        x0: Array,
+        v0: Array,
+        t_end: float,
+        dt_out: float,
+        rtol: float = 1e-8,
+        limit: float = float("inf"),
+        most_steps: float = MOST_STEPS,
+    ) -> dict[str, Any]:
+        """Integrate to `t_end`, or until |x| of any dof exceeds `limit`. Collective.
+
+        Parameters
+        ----------
+        most_steps : explicit steps that would be more than a quarter of these give way to implicit ones; if those would
+            be more too, it ends
+
+        Returns
+        -------
+        dict
+            t (n,), x and v (n, n_dof) every `dt_out`; steps; implicit; finished (reached the end); reason ("end",
+            "limit" of the motion, too many "steps", or why the method stopped). On every rank.
+        """
+        t, x, v, steps, implicit, finished, reason = self._core.run(
+            self.model.vector(x0), self.model.vector(v0), t_end, dt_out, rtol, limit, float(most_steps)
+        )
+        gather = self.model.comm.allgather
+        whole = {name: np.concatenate(gather(local), axis=1) for name, local in (("x", x), ("v", v))}
+        return {"t": t, **whole, "steps": steps, "implicit": implicit, "finished": finished, "reason": reason}

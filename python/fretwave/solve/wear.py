@@ -1,0 +1,226 @@
+"""Fretting wear of a mode in two time scales (Laxalde et al. 2008, section 4): the mode is a function of worn depths,
+which grow over the slow time of wear cycles.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from petsc4py import PETSc
+
+from ..errors import InputError
+from .steppers import STEPPERS, StageFailed, take
+from .worn_mode import WornMode, WornState
+
+Array = npt.NDArray[np.float64]
+
+#: Shortest step as a share of all cycles.
+SHORTEST = 1e-10
+#: A step without a solution is cut to this share of a first step before the mode is taken to end there and to jump.
+LAST_TRY = 1e-2
+#: A step grows and shrinks by no more than this, and aims at this share of what is allowed.
+GROWTH, SHRINKING, SAFETY = 3.0, 0.1, 0.85
+#: Lengths that a step may have in every factor of two.
+GRID = 16
+
+
+@dataclass(frozen=True)
+class WearControl:
+    """How long the steps over wear cycles are.
+
+    Attributes
+    ----------
+    stepper : name in `fretwave.solve.steppers.STEPPERS`
+    tolerance : largest estimated error of a step's depths, as loss of normal load relative to the mean at the start
+    pressure_change : largest change of a pair's mean normal force in a step, relative to the same
+    first, fixed : length of the first step [cycles]; `fixed` for all steps, without control
+    """
+
+    stepper: str = "bogacki_shampine"
+    tolerance: float = 1e-4
+    pressure_change: float = 0.2
+    first: float | None = None
+    fixed: bool = False
+
+
+@dataclass
+class WearPoint:
+    """A point of the march. `state.y` is freed when the next point is asked for."""
+
+    cycles: float
+    step: float
+    state: WornState
+    error: float
+    event: str
+    newton: int
+    linear: int
+
+
+class Wear:
+    """Marches dw/d eta = (k_w / I) g(y(w)) over wear cycles eta at fixed amplitude (eqs. 13 and 14). Collective.
+
+    Iterating gives the start and every accepted step; no depth ever falls, for no stepper has a negative weight.
+
+    Parameters
+    ----------
+    mode : WornMode
+    y : Vec
+        The mode at `depth`, kept as a copy.
+    cycles : float
+        Where to stop.
+    report_at : cycles that are met exactly
+    depth, at, step, load_scale : (n_pairs,), cycles, length, [N]
+        To go on from an earlier march's point; by default the surfaces are new.
+    outcome : Newton and linear iterations and residual that y was found with
+    """
+
+    def __init__(
+        self,
+        mode: WornMode,
+        y: PETSc.Vec,
+        cycles: float,
+        control: WearControl | None = None,
+        report_at: Sequence[float] = (),
+        depth: Array | None = None,
+        at: float = 0.0,
+        step: float | None = None,
+        load_scale: float | None = None,
+        outcome: Sequence[Any] = (0, 0, 0.0),
+    ) -> None:
+        self.mode, self.control, self.cycles = mode, control or WearControl(), cycles
+        if self.control.stepper not in STEPPERS:
+            raise InputError("unknown stepper", None, self.control.stepper, ", ".join(STEPPERS), "choose one of these")
+        self.tableau = STEPPERS[self.control.stepper]
+        self.reports = sorted({*(value for value in report_at if value > at), cycles})
+        self.eta, self.reason, self.converged = at, "", False
+        start = np.zeros(len(mode.areas)) if depth is None else np.asarray(depth, dtype=float)
+        mode.wear(start)
+        self.state = mode.measure(y.copy(), start, outcome)
+        closed = self.state.load[self.state.load > 0]
+        self.load_scale = load_scale or (float(closed.mean()) if len(closed) else 1.0)
+        self.depth_scale = self.load_scale / mode.stiffness
+        self.step = step or self.control.first or self._first_step()
+        self._spent = [0, 0]
+
+    def __repr__(self) -> str:
+        return f"Wear({self.eta:g} of {self.cycles:g} cycles: {self.reason or 'under way'}, of {self.mode})"
+
+    def _first_step(self) -> float:
+        """A tenth of the allowed change at the present rates."""
+        fastest = float((self.state.rate / self.depth_scale).max(initial=0.0))
+        return self._on_grid(0.1 * self.control.pressure_change / fastest) if fastest else self.cycles
+
+    def _on_grid(self, step: float) -> float:
+        """The next length of a coarse grid: last digits of a mode, which differ with the ranks, change no step."""
+        return float(self.cycles * 2.0 ** (np.round(GRID * np.log2(step / self.cycles)) / GRID))
+
+    def __iter__(self) -> Iterator[WearPoint]:
+        yield WearPoint(self.eta, 0.0, self.state, 0.0, "start", self.state.newton, self.state.linear)
+        yield from self.go_on()
+
+    def go_on(self) -> Iterator[WearPoint]:
+        """The points after the present one."""
+        while not self._finished():
+            point = self._advance()
+            if point is None:
+                return
+            if self._finished():
+                point.event = "stop"
+            yield point
+
+    def _finished(self) -> bool:
+        """Stop rules: cycles done, contact lost, wear stopped."""
+        remaining = self.cycles - self.eta
+        if remaining <= 0:
+            self.reason = "cycles done"
+        elif (self.state.load <= 0).all():
+            self.reason = "contact lost: all pairs are open"
+        elif (self.state.rate * remaining <= self.control.tolerance * self.depth_scale).all():
+            self.reason = "wear has stopped: to the last cycle it changes nothing beyond the tolerance"
+        self.converged = bool(self.reason)
+        return self.converged
+
+    def _advance(self) -> WearPoint | None:
+        """One accepted step, shortened as often as needed; None when it becomes too short."""
+        self._spent = [0, 0]
+        target = next(value for value in self.reports if value > self.eta)
+        tangent = self.mode.tangent(self.state, self.state.rate)
+        why, least = "", LAST_TRY * self._first_step()
+        while self.step >= SHORTEST * self.cycles:
+            meets = self.eta + self.step * (1 + 1e-12) >= target
+            h = target - self.eta if meets else self.step
+            try:
+                found, state = self._try(h, tangent)
+            except StageFailed as failure:
+                if h < least:
+                    tangent.destroy()
+                    return self._jump(h)
+                why, self.step = str(failure), h / 4
+                continue
+            error = float((np.abs(found) / (self.depth_scale + state.depth)).max(initial=0.0))
+            change = float(np.abs(state.load - self.state.load).max(initial=0.0)) / self.load_scale
+            by_error = (error / self.control.tolerance) ** (1 / self.tableau.error_order)
+            share = max(by_error, change / self.control.pressure_change)
+            if self.control.fixed or share <= 1:
+                tangent.destroy()
+                return self._accept(h, target if meets else self.eta + h, state, error, share)
+            why = "the contact changes too fast"
+            state.y.destroy()
+            self.step = self._on_grid(h * max(SHRINKING, SAFETY / share))
+        tangent.destroy()
+        self.reason = f"step too small: {why}"
+        return None
+
+    def _accept(self, h: float, eta: float, state: WornState, error: float, share: float) -> WearPoint:
+        self.state.y.destroy()
+        self.state, self.eta = state, eta
+        if not self.control.fixed:
+            longer = self._on_grid(h * min(GROWTH, max(SHRINKING, SAFETY / max(share, 1e-12))))
+            # a step cut short to meet a report says little about the next one
+            self.step = max(longer, self.step) if h < self.step else longer
+        event = "report" if eta in self.reports else ""
+        return WearPoint(eta, h, state, error, event, *self._spent)
+
+    def _jump(self, h: float) -> WearPoint | None:
+        """The sheet ends within a short step h: go on from another one there, as the motion would."""
+        try:
+            state = self.mode.elsewhere(self.state.depth + h * self.state.rate, self.state.y)
+        except StageFailed as failure:
+            self.reason = str(failure)
+            return None
+        self.state.y.destroy()
+        self.state, self.eta = state, self.eta + h
+        self.step = self._first_step()
+        return WearPoint(self.eta, h, state, 0.0, "jump", state.newton, state.linear)
+
+    def _try(self, h: float, tangent: PETSc.Vec) -> tuple[Array, WornState]:
+        """The error's estimate and the mode at the end; each stage is predicted from the last along the tangent."""
+        last, place = self.state, 0.0
+
+        def rate(x: Array, stage: float) -> Array:
+            nonlocal last, place
+            guess = last.y.copy()
+            guess.axpy((stage - place) * h, tangent)
+            try:
+                now = self.mode.solve(x, guess)
+            finally:
+                guess.destroy()
+            if last is not self.state:
+                last.y.destroy()
+            last, place = now, stage
+            self._spent[0] += now.newton
+            self._spent[1] += now.linear
+            return now.rate
+
+        stage_tolerance = 1e-2 * self.control.tolerance * self.depth_scale
+        try:
+            step = take(self.tableau, rate, self.state.depth, self.state.rate, h, stage_tolerance)
+        except StageFailed:
+            if last is not self.state:
+                last.y.destroy()
+            raise
+        return step.error, last

@@ -1,0 +1,223 @@
+"""A mode at fixed amplitude as a function of worn depths (Laxalde et al. 2008, eq. 14 at one slow time)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from petsc4py import PETSc
+
+from .. import _core
+from ..errors import InputError
+from ..hb.problems import HarmonicProblem
+from ..model.laws import Role, law_like
+from .continuation import Continuation
+from .steppers import StageFailed
+from .steps import StepControl
+
+Array = npt.NDArray[np.float64]
+
+#: Changes of log amplitude from which a solution on another sheet is looked for, and points to reach it by.
+DETOURS, DETOUR_POINTS = (1e-3, -1e-3, 1e-2, -1e-2, 3e-2, -3e-2), 40
+#: The corrector's tolerance over that of the branch: depths add up its errors.
+SHARPER = 1e-2
+
+
+@dataclass
+class WornState:
+    """The mode at some worn depths. `y` is the owner's to destroy.
+
+    Attributes
+    ----------
+    depth, load : (n_pairs,)
+        Worn depth [m] and mean normal force [N] of the pairs of all wearing contacts, one after the other.
+    rate : (n_pairs,)
+        Growth of the depth in a cycle [m], k_w / I times the integral of |P_N| |d slider| (eq. 13).
+    slip, open : (n_pairs,)
+        Shares of the period.
+    """
+
+    y: PETSc.Vec
+    depth: Array
+    rate: Array
+    load: Array
+    slip: Array
+    open: Array
+    newton: int = 0
+    linear: int = 0
+    residual: float = 0.0
+
+
+class WornMode:
+    """A mode at fixed amplitude as a function of worn depths. Collective, as all methods.
+
+    Parameters
+    ----------
+    problem : NonlinearMode
+        With contacts that have a normal direction, whose depths it takes over.
+    coefficient : float
+        k_w [1/Pa].
+    areas : dict
+        Contact name -> nodal areas I (n_pairs,) [m^2]; contacts without an entry do not wear.
+    """
+
+    def __init__(self, problem: HarmonicProblem, coefficient: float, areas: Mapping[str, Array]) -> None:
+        self.problem, self.model, self.coefficient = problem, problem.model, coefficient
+        names = [contact.name for contact in self.model.contacts]
+        for name in areas:
+            self._check(name, names)
+        self.contacts = [k for k, name in enumerate(names) if name in areas]
+        self.areas = np.concatenate([np.asarray(areas[names[k]], dtype=float) for k in self.contacts])
+        sizes = [len(areas[names[k]]) for k in self.contacts]
+        self.slices = [slice(end - size, end) for size, end in zip(sizes, np.cumsum(sizes))]
+        # makes worn depth a loss of normal load
+        self.stiffness = np.concatenate(
+            [
+                np.broadcast_to(np.asarray(self.model.contacts[k].value(Role.NORMAL_STIFFNESS), float), (size,))
+                for k, size in zip(self.contacts, sizes)
+            ]
+        )
+        self._newton = _core.Newton(problem.core, problem.prefix, past_kinks=False)
+        rtol, atol, stol, most = self._newton.snes.getTolerances()
+        self._newton.snes.setTolerances(rtol, SHARPER * atol, stol, most)
+        self._row = problem.core.unknowns()
+        self._row.set(0.0)
+        self._set_last(self._row, 1.0)
+
+    def __repr__(self) -> str:
+        return f"WornMode({len(self.areas)} pairs, k_w = {self.coefficient:g} 1/Pa, of {self.problem})"
+
+    def _check(self, name: str, names: list[str]) -> None:
+        if name not in names:
+            raise InputError("there is no such contact", None, name, ", ".join(names), "name one of these")
+        contact = self.model.contacts[names.index(name)]
+        if not contact.info.wears:
+            where, fix = f"contact '{name}'", f'use law = "{law_like(lambda law: law.wears)}"'
+            raise InputError("a contact cannot wear", where, contact.law, "a law with a normal direction", fix)
+
+    def _set_last(self, v: PETSc.Vec, value: float) -> None:
+        local = v.getArray()
+        if self.model.comm.rank == self.model.comm.size - 1:
+            local[-1] = value
+
+    def _local(self, values: Array) -> list[list[float]]:
+        """Of all pairs, those on this rank, contact by contact."""
+        out: list[list[float]] = [[] for _ in self.model.contacts]
+        for k, part in zip(self.contacts, self.slices):
+            out[k] = values[part][self.model.pairs_of(k)].tolist()
+        return out
+
+    def wear(self, depth: Array) -> None:
+        """The contacts have these depths (n_pairs,) from now on."""
+        self.problem.core.wear(self._local(depth))
+
+    def measure(self, y: PETSc.Vec, depth: Array, outcome: Sequence[Any] = (0, 0, 0.0)) -> WornState:
+        """Rates and loads of a converged motion at these depths."""
+        found = self.problem.core.wearing(y)
+        archard, load, slip, opened = (
+            np.concatenate([self.model.share_pairs(k, np.asarray(found[k][which])) for k in self.contacts])
+            for which in range(4)
+        )
+        return WornState(y, depth, self.coefficient / self.areas * archard, load, slip, opened, *outcome)
+
+    def solve(self, depth: Array, guess: PETSc.Vec) -> WornState:
+        """The mode at these depths and the amplitude of the guess, which is kept.
+
+        Raises
+        ------
+        StageFailed
+            Newton does not converge.
+        """
+        self.wear(depth)
+        y = guess.copy()
+        return self.measure(y, depth, self._correct(y))
+
+    def _correct(self, y: PETSc.Vec) -> tuple[int, int, float]:
+        """Newton at the amplitude of y, in place."""
+        self._newton.system.close(self._row, self.log_amplitude(y))
+        converged, newton, linear, residual, reason = self._newton.solve(y)
+        if not converged:
+            y.destroy()
+            raise StageFailed(reason)
+        return newton, linear, residual
+
+    def elsewhere(self, depth: Array, guess: PETSc.Vec) -> WornState:
+        """The mode at these depths on whatever sheet is near: by arclength from an amplitude above or below.
+
+        At a fixed amplitude a sheet may end while depths grow, as a branch that folds does in amplitude.
+
+        Raises
+        ------
+        StageFailed
+            None of the detours comes back to the amplitude.
+        """
+        self.wear(depth)
+        target = float(self.problem.core.parameter_value(self.log_amplitude(guess)))
+        for change in DETOURS:
+            y = guess.copy()
+            self._set_last(y, self.log_amplitude(guess) + change)
+            try:
+                self._correct(y)
+            except StageFailed:
+                continue
+            found = self._come_back(y, target, change)
+            y.destroy()
+            if found is not None:
+                return self.measure(found, depth, self._correct(found))
+        raise StageFailed("the mode ends here, and no other sheet of it was found at this amplitude")
+
+    def _come_back(self, y: PETSc.Vec, target: float, change: float) -> PETSc.Vec | None:
+        """The first point of the branch from y that lies on the target amplitude."""
+        length = abs(change)
+        ends = (target * float(np.exp(-2 * length)), target * float(np.exp(2 * length)))
+        steps = StepControl(initial=length / 8, minimum=1e-4 * length, maximum=length, max_points=DETOUR_POINTS)
+        branch = Continuation(self.problem, y, ends, steps, [target], upwards=change < 0)
+        found = None
+        for point in branch:
+            point.tangent.destroy()
+            if point.event == "report":
+                found = point.y
+                break
+        branch.destroy()
+        return found
+
+    def log_amplitude(self, y: PETSc.Vec) -> float:
+        """The parameter's entry, on every rank."""
+        comm = self.model.comm
+        local = y.getArray(readonly=True)
+        return float(comm.bcast(local[-1] if comm.rank == comm.size - 1 else None, root=comm.size - 1))
+
+    def gap_product(self, y: PETSc.Vec, change: Array) -> PETSc.Vec:
+        """dr/dw times a change of the depths (n_pairs,) at the present depths: worn depth is gap."""
+        return self.problem.core.gap_product(y, self._local(change))
+
+    def tangent(self, state: WornState, change: Array) -> PETSc.Vec:
+        """dy for a change of the depths at fixed amplitude: one solve with the bordered Jacobian, zero if it fails."""
+        self.wear(state.depth)
+        r = self.gap_product(state.y, change)
+        b, t = self.problem.core.unknowns(), self.problem.core.unknowns()
+        local = b.getArray()
+        local[:] = 0.0
+        local[: r.getLocalSize()] = -r.getArray(readonly=True)
+        r.destroy()
+        self._newton.system.close(self._row, 0.0)
+        t.set(0.0)
+        if not self._newton.linear(state.y, b, t):
+            t.set(0.0)
+        b.destroy()
+        return t
+
+    def destroy(self) -> None:
+        """Free the solver; the contacts are as new again."""
+        self.wear(np.zeros(len(self.areas)))
+        self._newton = None
+        self._row.destroy()
+
+    def __enter__(self) -> WornMode:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.destroy()

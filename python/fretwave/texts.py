@@ -1,0 +1,45 @@
+"""How values, paths and likely words are written in messages."""
+
+from __future__ import annotations
+
+import difflib
+import json
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+
+def shortened(text: str, longest: int = 200) -> str:
+    """A text as a message can bear it."""
+    return text if len(text) <= longest else text[: longest - 3] + "..."
+
+
+def nearest(word: str, known: Sequence[str], say: Any = "did you mean `{}`?".format) -> str | None:
+    """A fix line with the nearest known word (one it begins, or one of like letters), None when nothing is near."""
+    begun = [other for other in known if len(word) > 1 and other.startswith(word)]
+    found = begun or difflib.get_close_matches(word, known, n=1, cutoff=0.65)
+    return str(say(found[0])) if found else None
+
+
+def display(path: Path) -> str:
+    """A path as short as it can be said from here."""
+    relative = os.path.relpath(path)
+    return shortened(relative if not relative.startswith("..") else str(path))
+
+
+def is_there(path: Path) -> bool:
+    """Whether a path can be opened; a name that no file can have is not there."""
+    try:
+        return path.exists()
+    except (OSError, ValueError):
+        return False
+
+
+def toml(value: Any, longest: int = 60) -> str:
+    """A value as TOML writes it, cut when long."""
+    try:
+        text = str(value) if isinstance(value, float) else json.dumps(value, default=str, ensure_ascii=False)
+    except (ValueError, RecursionError):  # integers of more than 4300 digits, arrays nested without end
+        text = "(too long to show)"
+    return text if len(text) <= longest else text[: longest - 3] + "..."

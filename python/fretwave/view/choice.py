@@ -1,0 +1,278 @@
+"""What ``fretwave view`` shows of a run: the analysis, the points of its branch and the phases of the period."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..analyses.parts.context import belongs
+from ..case.load import Case
+from ..case.sector import nodal_diameter
+from ..errors import InputError
+from ..model.laws import kept_laws
+from ..post.contact_history import ContactHistory
+from ..results.file import names_of_data
+from ..texts import display, nearest
+
+Array = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.intp]
+
+#: Columns of the branch that go with a picture.
+SHOWN = ("point", "amplitude", "cycles", "frequency_hz", "zeta", "level", "stick", "slip", "open")
+#: Points named in a message.
+NAMED = 12
+
+
+@dataclass(frozen=True)
+class ViewOptions:
+    """What the command line says besides the run folder.
+
+    Attributes
+    ----------
+    points : numbers of points of the branch
+    amplitudes : modal amplitudes [m]; the nearest kept points are shown
+    phases : number of steps of a period
+    scale : factor on the displacement in the field ``warp``; None chooses one
+    linear : eight linear hexahedra in place of a triquadratic one
+    sectors : those shown of a wheel; empty for all
+    """
+
+    analysis: str | None = None
+    points: Sequence[int] = ()
+    amplitudes: Sequence[float] = ()
+    phases: int = 32
+    scale: float | None = None
+    linear: bool = False
+    sectors: Sequence[int] = ()
+    out: Path | None = None
+
+    @classmethod
+    def checked(cls, scale: str, phases: int, **others: Any) -> ViewOptions:
+        """From the words of the command line.
+
+        Raises
+        ------
+        InputError
+            The scale is neither ``auto`` nor a number, or there are no phases.
+        """
+        if phases < 1:
+            raise InputError("a period has no phases", "--phases", phases, ">= 1", "--phases 32")
+        try:
+            factor = None if scale == "auto" else float(scale)
+        except ValueError:
+            factor = np.nan
+        if factor is not None and not np.isfinite(factor):
+            raise InputError("the scale is no number", "--scale", scale, "auto or a number", "--scale auto")
+        return cls(scale=factor, phases=phases, **others)
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Points of one analysis with all that is kept of them.
+
+    Attributes
+    ----------
+    points : numbers on the branch
+    asked : what the command line said of each, "" for nothing
+    states : columns of the branch at these points, by name
+    coefficients : (n_points, n_coordinates, m) [m], as solved
+    labels : of the m columns
+    rest : (n_coordinates,) displacement at rest [m]
+    samples : (n_phases,)
+        Numbers of the contacts' samples at which the motion is shown.
+    phases : (n_phases,) [rad]
+    contacts : histories per point, by the contact's name; none unless every point keeps them
+    without : points that do not keep the motion of their contacts
+    highest_component_hz : of the run's reduction, 0 without component modes
+    diameters : nodal diameters of the wave on one sector, per point; 0 for a structure
+    wheel : the coordinates are those of all sectors of a wheel, one after the other
+    sample_count : of a period
+    """
+
+    name: str
+    points: list[int]
+    asked: list[str]
+    states: dict[str, Array]
+    coefficients: Array
+    labels: list[str]
+    rest: Array
+    samples: IntArray
+    phases: Array
+    contacts: dict[str, list[ContactHistory]]
+    without: list[int]
+    highest_component_hz: float = 0.0
+    diameters: Sequence[int] = ()
+    wheel: bool = False
+    sample_count: int = 1
+
+    @property
+    def times(self) -> Array:
+        """Of all steps, in periods."""
+        return np.concatenate([number + self.phases / (2 * np.pi) for number in range(len(self.points))])
+
+    @property
+    def point_of_step(self) -> IntArray:
+        """(n_steps,) place in `points`."""
+        return np.repeat(np.arange(len(self.points)), len(self.phases))
+
+    def basis(self) -> Array:
+        """Value (n_phases, m) of each column's function of time: x = sum Qc_n cos n tau + Qs_n sin n tau."""
+        waves = [(np.sin if text.endswith("s") else np.cos, int(text.rstrip("cs"))) for text in self.labels]
+        return np.column_stack([wave(order * self.phases) for wave, order in waves])
+
+    @property
+    def orders(self) -> list[int]:
+        """Harmonics, ascending."""
+        return sorted({int(text.rstrip("cs")) for text in self.labels})
+
+    def delay(self, angle: float) -> Array:
+        """D (m, m): coefficients @ D are those of the motion x(tau - angle).
+
+        Of each harmonic (Qc - i Qs) e^{-i n angle}.
+        """
+        columns = {text: k for k, text in enumerate(self.labels)}
+        D = np.eye(len(self.labels))
+        for n in filter(None, self.orders):
+            both, c, s = [columns[f"{n}c"], columns[f"{n}s"]], np.cos(n * angle), np.sin(n * angle)
+            D[np.ix_(both, both)] = [[c, s], [-s, c]]
+        return D
+
+    def whole_delays(self, sectors: int) -> bool:
+        """In a wave every sector is whole samples behind the last one."""
+        return self.wheel or all(self.sample_count * n % sectors == 0 for n in self.diameters)
+
+    def histories(self, name: str, sector: int, sectors: int) -> list[ContactHistory]:
+        """Of a contact in one sector, per point."""
+        if self.wheel:
+            n = self.contacts[name][0].n_pairs // sectors
+            return [history.of_pairs(slice(sector * n, (sector + 1) * n)) for history in self.contacts[name]]
+        shifts = [self.sample_count * n * sector // sectors for n in self.diameters]
+        return [history.delayed(shift) if shift else history for history, shift in zip(self.contacts[name], shifts)]
+
+    def lines(self) -> Iterator[str]:
+        """Which points are shown, each in a line."""
+        for row, (point, asked) in enumerate(zip(self.points, self.asked)):
+            amplitude, frequency = self.states["amplitude"][row], self.states["frequency_hz"][row]
+            yield f"{self.name}: point {point}, amplitude {amplitude:.6g} m, {frequency:.6g} Hz{asked}"
+        if self.without:
+            numbers = ", ".join(str(point) for point in self.without)
+            yield f"{self.name}: no contact pairs are shown: their motion is not kept at point {numbers}"
+
+
+def read_choice(file: Any, folder: Path, case: Case, options: ViewOptions) -> Choice:
+    """Read what is asked for from an open results.h5.
+
+    Raises
+    ------
+    InputError
+        There is no such analysis, or it keeps no such point.
+    """
+    group = file[analysis_name(file, folder, case, options.analysis)]
+    name = group.name.strip("/")
+    held = _held(group)
+    # A mode is shown where its contacts are kept; a response is sought at its peaks, where they are not.
+    offered = held if group.attrs["type"] == "mode" and len(held) else np.arange(len(group["coefficients"]))
+    chosen = _points(group, offered, options, f"analysis '{name}' in {display(folder)}")
+    count = int(group.attrs["samples"])
+    samples = np.unique(np.arange(options.phases) * count // options.phases)
+    rows = [row for row, _ in chosen]
+    without = [row for row in rows if row not in held]
+    return Choice(
+        name=name,
+        points=rows,
+        asked=[asked for _, asked in chosen],
+        states={key: group["points"][key][()][rows].astype(float) for key in SHOWN if key in group["points"]},
+        coefficients=np.stack([group["coefficients"][row] for row in rows]),
+        labels=[text.decode() for text in group["harmonic"][()]],
+        rest=group["rest_displacement"][()] if "rest_displacement" in group else np.zeros(len(group["dof"])),
+        samples=samples,
+        phases=2 * np.pi * samples / count,
+        contacts={} if without else _contacts(group, case, rows),
+        without=without,
+        highest_component_hz=json.loads(group.attrs.get("reduction", "{}")).get("highest_component_hz", 0.0),
+        diameters=_diameters(group, case, name, rows),
+        wheel=case.neighbours is not None and bool(getattr(case.analyses[name], "wheel", False)),
+        sample_count=count,
+    )
+
+
+def _diameters(group: Any, case: Case, name: str, rows: Sequence[int]) -> list[int]:
+    """Nodal diameters of the points: those of their rows, where an analysis has several, or of the analysis."""
+    if case.neighbours is None:
+        return [0] * len(rows)
+    if "nodal_diameter" in group["points"]:
+        return [int(group["points/nodal_diameter"][row]) for row in rows]
+    return [nodal_diameter(case.analyses[name])] * len(rows)
+
+
+def analysis_name(file: Any, folder: Path, case: Case, asked: str | None) -> str:
+    """Name of the analysis asked for, or of the first that has a motion: in the order of the case."""
+    found = [name for name in case.analyses if name in file and "coefficients" in file[name]]
+    found = [name for name in found if belongs(file[name], case, name)]
+    if found and asked in (None, *found):
+        return asked or found[0]
+    listed = ", ".join(found) or "none"
+    raise InputError(
+        "there is no motion to show" if asked is None else f"'{asked}' has no motion to show",
+        display(folder),
+        f"analyses with harmonic coefficients: {listed}",
+        "a mode or forced response of this run",
+        (nearest(asked, found) if asked else None) or (f"--analysis {found[0]}" if found else "run such an analysis"),
+    )
+
+
+def _held(group: Any) -> IntArray:
+    """Points of which all is kept: where there are contacts, those at which their motion is."""
+    with_contacts = any(name.startswith("contact_") for name in group)
+    return np.asarray(group["reported"][()] if with_contacts else np.arange(len(group["coefficients"])), dtype=np.intp)
+
+
+def _points(group: Any, kept: IntArray, options: ViewOptions, where: str) -> list[tuple[int, str]]:
+    """Numbers of points, each with a word on what was asked for; without a wish that of the largest amplitude.
+
+    Parameters
+    ----------
+    kept : points that an amplitude may choose
+    """
+    amplitude = group["points/amplitude"][()]
+    for point in options.points:
+        if not 0 <= point < len(amplitude):
+            near = kept[np.argmin(np.abs(kept - point))]
+            raise _not_kept("there is no such point", where, f"point {point}", kept, amplitude, near)
+    chosen = [(int(point), "") for point in options.points]
+    for asked in options.amplitudes:
+        near = kept[np.argmin(np.abs(amplitude[kept] - asked))]
+        if not amplitude.min() <= asked <= amplitude.max():
+            raise _not_kept("the branch does not reach this amplitude", where, f"{asked:g} m", kept, amplitude, near)
+        chosen.append((int(near), f", the kept point nearest to {asked:g} m"))
+    return chosen or [(int(kept[np.argmax(amplitude[kept])]), ", the kept point of the largest amplitude")]
+
+
+def _not_kept(what: str, where: str, measured: str, kept: IntArray, amplitude: Array, near: int) -> InputError:
+    """Names the kept points around the nearest one."""
+    place = int(np.flatnonzero(kept == near)[0])
+    begin = max(0, min(place - NAMED // 2, len(kept) - NAMED))
+    named = ", ".join(f"{point} ({amplitude[point]:.4g} m)" for point in kept[begin : begin + NAMED])
+    more = f" ({len(kept)} in all)" if len(kept) > NAMED else ""
+    expected = f"a point from 0 to {len(amplitude) - 1}, best one of {named}{more}"
+    return InputError(what, where, measured, expected, f"--point {near}")
+
+
+def _contacts(group: Any, case: Case, rows: Sequence[int]) -> dict[str, list[ContactHistory]]:
+    """Histories of all contacts at some points."""
+    reported, laws = group["reported"][()].tolist(), kept_laws(json.loads(group.attrs.get("laws", "{}")))
+    found = {}
+    for contact in case.contacts:
+        place = f"contact_{contact.name}"
+        if place in group:
+            data = {key: group[place][key] for key in names_of_data(group[place])}
+            kept = [{key: values[reported.index(row)] for key, values in data.items()} for row in rows]
+            law = laws.get(contact.name) or contact.info  # results of an earlier version do not tell it
+            found[contact.name] = [ContactHistory.of(motion, law.normal) for motion in kept]
+    return found

@@ -1,0 +1,250 @@
+"""Motion of the nodes that a run shows: of a structure, or of the sectors of a wheel one after the other.
+
+A wave on one sector is that of sector 0 in sector j, turned by 2 pi j / N about the axis and delayed by j theta
+(`fretwave.cyclic.sector`). A whole wheel's results have each sector's own motion, in the frame that is turned with it.
+A run does not keep its reduction: it is made again from the case, and is the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..case.load import Case
+from ..case.reduce import reduction_of
+from ..case.reduce_sector import sector_reduction_of
+from ..cyclic.faces import rotation
+from ..errors import InputError
+from ..fe.mesh import VTK_LATTICE
+from ..model.structure import BuiltModel
+from ..texts import display
+from .choice import Choice
+from .vtkhdf import HEXAHEDRON, QUADRATIC_HEXAHEDRON, TRIQUADRATIC_HEXAHEDRON, VERTEX, linear_cells
+
+Array = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.intp]
+#: Displacements (n_nodes, 3, n) of all nodes from columns (n_dof, n) on the model's dofs, both faces of a sector free.
+ToNodes = Callable[[Array], Array]
+Expand = Callable[[Any], Array]
+
+#: Largest displacement as drawn, as a share of the model's size, where no scale is given.
+DRAWN = 0.1
+#: Relative difference of a frequency that rounding explains.
+SAME = 1e-6
+
+
+@dataclass(frozen=True)
+class Shape:
+    """The motion of all nodes of a structure or a sector.
+
+    Attributes
+    ----------
+    nodes : (n_nodes, 3) [m]
+    rest : (n_nodes, 3) displacement at rest [m]
+    coefficients : (n_points, n_nodes, 3, m) [m]
+    basis : (n_phases, m)
+        Value of each coefficient's function of time.
+    """
+
+    nodes: Array
+    rest: Array
+    coefficients: Array
+    basis: Array
+
+    def displacements(self, chosen: Any = slice(None)) -> Iterator[Array]:
+        """(n_chosen, 3) of some nodes in all steps, one after the other."""
+        return (values[chosen] @ row for values in self.coefficients for row in self.basis)
+
+    def largest(self) -> float:
+        """Largest displacement from rest [m]."""
+        return max(float(np.linalg.norm(x - self.rest, axis=1).max()) for x in self.displacements())
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What is shown, part by part: a structure (sector 0 alone), or sectors of a wheel.
+
+    Attributes
+    ----------
+    nodes : (n_nodes, 3) of sector 0 [m]
+    sectors : numbers of those shown
+    ties : {k: (n_dof, n)}
+        Dofs with both faces from those of the sector k places ahead, as solved; None for a structure.
+    around : int
+        Sectors of the wheel, 1 for a structure.
+    axis : of the wheel
+    """
+
+    nodes: Array
+    choice: Choice
+    to_nodes: ToNodes
+    sectors: Sequence[int]
+    ties: Any = None
+    around: int = 1
+    axis: str = "z"
+
+    def shape(self, sector: int) -> Shape:
+        """Of one sector, in space."""
+        if self.ties is None or not self.choice.wheel:
+            columns = self._delayed(self._first, sector)
+        else:
+            columns = self._expanded(sector)
+        columns = np.einsum("xy,nyc->nxc", self.turn(sector), columns)
+        points, m = len(self.choice.points), len(self.choice.labels)
+        coefficients = np.moveaxis(columns[..., 1:].reshape(len(self.nodes), 3, points, m), 2, 0)
+        return Shape(self.nodes @ self.turn(sector).T, columns[..., 0], coefficients, self.choice.basis())
+
+    def turn(self, sector: int) -> Array:
+        """Rotation (3, 3) of a sector's frame."""
+        return np.eye(3) if sector == 0 else rotation(2 * np.pi * sector / self.around, self.axis)
+
+    def natural_scale(self) -> float:
+        """Draws the largest displacement from rest as a tenth of the size of what is shown."""
+        corners = np.concatenate([self.nodes @ self.turn(sector).T for sector in self.sectors])
+        size = float(np.linalg.norm(np.ptp(corners, axis=0)))
+        different = self.sectors if self.choice.wheel else self.sectors[:1]  # in a wave all sectors move alike
+        largest = max(self.shape(sector).largest() for sector in different)
+        return float(f"{DRAWN * size / largest:.2g}") if largest > 0 and size > 0 else 1.0
+
+    @cached_property
+    def _first(self) -> Array:
+        """Columns of sector 0 in a wave, or of a structure."""
+        return self._expanded(0)
+
+    def _expanded(self, sector: int) -> Array:
+        """Nodal columns (n_nodes, 3, 1 + n_points m): at rest, then the coefficients of every point."""
+        if self.ties is None:
+            return self.to_nodes(self._columns(0))
+        total: Any = 0
+        for k, T in self.ties.items():
+            if self.choice.wheel:
+                total = total + T @ self._columns((sector + k) % self.around)
+            else:
+                total = total + T @ self._delayed(self._columns(0), k)
+        return self.to_nodes(total)
+
+    def _columns(self, sector: int) -> Array:
+        """(n, 1 + n_points m) of one sector as solved."""
+        n = len(self.choice.rest) // (self.around if self.choice.wheel else 1)
+        rows = slice(sector * n, (sector + 1) * n)
+        coefficients = np.moveaxis(self.choice.coefficients[:, rows], 1, 0).reshape(n, -1)
+        return np.column_stack([self.choice.rest[rows], coefficients])
+
+    def _delayed(self, columns: Array, sectors: int) -> Array:
+        """The wave so many sectors ahead; what is at rest has no delay."""
+        if sectors == 0:
+            return columns
+        D = np.stack([self.choice.delay(2 * np.pi * n * sectors / self.around) for n in self.choice.diameters])
+        points = columns[..., 1:].reshape(*columns.shape[:-1], *D.shape[:2])
+        moved = np.einsum("...pm,pmk->...pk", points, D)
+        return np.concatenate([columns[..., :1], moved.reshape(*columns.shape[:-1], -1)], axis=-1)
+
+
+@contextmanager
+def scene_of(case: Case, choice: Choice, nodes: Array, sectors: Sequence[int] = ()) -> Iterator[Scene]:
+    """The scene of a choice; reductions live as long as it does. One rank only.
+
+    Parameters
+    ----------
+    sectors : those shown of a wheel; empty for all
+
+    Raises
+    ------
+    InputError
+        The model is not that of the run, there is no such sector, or a wheel without axis.
+    """
+    from mpi4py import MPI
+
+    neighbours = case.neighbours
+    around = neighbours.sectors if neighbours else 1
+    ties: Any = neighbours.ties if neighbours else None
+    expand: Expand = _unchanged
+    with ExitStack() as stack:
+        if case.reduction is not None and neighbours is not None:
+            sector = stack.enter_context(sector_reduction_of(case, MPI.COMM_SELF))
+            expand, ties = sector.expand, sector.sector().ties
+            size = (sector.size - sector.n_interface) * (around if choice.wheel else 1)
+            _check_same(case, choice, size, sector.component_hz)
+        elif case.reduction is not None:
+            reduction = stack.enter_context(reduction_of(case, case.reduction, MPI.COMM_SELF))
+            expand = reduction.expand
+            _check_same(case, choice, reduction.size, reduction.component_hz)
+        built, shown = geometry(case), _shown(case, around, sectors)
+        yield Scene(nodes, choice, _to_nodes(built, len(nodes), expand), shown, ties, around, built.axis or "z")
+
+
+def geometry(case: Case) -> BuiltModel:
+    """Nodes, cells and pairs of the model as it was given: of a sector, with both its faces.
+
+    Raises
+    ------
+    InputError
+        There are no nodes.
+    """
+    built = case.built if case.neighbours is None else case.neighbours.cut.origin.built
+    if built is None or built.coordinates is None:
+        matrices = "only matrices" if built is None else "no coordinates of nodes with three displacements each"
+        raise InputError(
+            "the model cannot be drawn: it has no nodes",
+            display(case.path),
+            matrices,
+            "a builder that gives coordinates (and hexahedra), or a model file with coordinates",
+            "give BuiltModel its coordinates, or import with --coordinates; `fretwave plot` needs neither",
+        )
+    return built
+
+
+def mesh_of(case: Case, linear: bool = False) -> tuple[Array, tuple[IntArray, int]]:
+    """Nodes (n_nodes, 3), and cells (n_cells, m) with VTK's number of their kind; points where there are no cells."""
+    built = geometry(case)
+    nodes, cells = np.asarray(built.coordinates), built.hexahedra
+    if cells is None:
+        return nodes, (np.arange(len(nodes))[:, None], VERTEX)
+    if cells.shape[1] == 27 and linear:
+        return nodes, (linear_cells(cells, VTK_LATTICE), HEXAHEDRON)
+    return nodes, (cells, {8: HEXAHEDRON, 20: QUADRATIC_HEXAHEDRON, 27: TRIQUADRATIC_HEXAHEDRON}[cells.shape[1]])
+
+
+def _unchanged(columns: Any) -> Array:
+    return np.asarray(columns)
+
+
+def _to_nodes(built: BuiltModel, n_nodes: int, expand: Expand) -> ToNodes:
+    """Through the case's reduction and the builder's own."""
+
+    def displacements(columns: Array) -> Array:
+        columns = expand(np.ascontiguousarray(columns))
+        if built.expansion is not None:
+            columns = built.expansion @ columns
+        if built.displacements is not None:  # held dofs, -1, read the row of zeros
+            columns = np.vstack([columns, np.zeros(columns.shape[1])])[built.displacements.ravel()]
+        return np.asarray(columns.reshape(n_nodes, 3, -1))
+
+    return displacements
+
+
+def _shown(case: Case, around: int, asked: Sequence[int]) -> list[int]:
+    chosen = list(asked) or list(range(around))
+    wrong = [sector for sector in chosen if not 0 <= sector < around]
+    if wrong:
+        expected = f"0 to {around - 1}" if around > 1 else "a model with sectors"
+        raise InputError("there is no such sector", "--sectors", wrong[0], expected, "--sectors 0")
+    if case.neighbours is not None and geometry(case).axis is None and chosen != [0]:
+        fix = "give BuiltModel its axis, or show one sector with --sectors 0"
+        raise InputError("the wheel cannot be drawn: it has no axis", display(case.path), fix=fix)
+    return chosen
+
+
+def _check_same(case: Case, choice: Choice, size: int, component_hz: Array) -> None:
+    """The last component mode tells whether this is the run's model: a builder may read what a case cannot tell."""
+    then, now = choice.highest_component_hz, component_hz[-1:].sum()
+    if size != len(choice.rest) or abs(now - then) > SAME * then:
+        found = f"{size} coordinates, highest component mode {now:.9g} Hz"
+        expected = f"{len(choice.rest)} coordinates, {then:.9g} Hz, as in the run"
+        raise InputError("the model is no longer that of the run", display(case.path), found, expected, "run it again")

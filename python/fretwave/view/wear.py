@@ -1,0 +1,167 @@
+"""``fretwave view`` of wear: worn depth, rate, pressure and slip of the contact pairs over wear cycles, as VTKHDF.
+
+The steps are the points of one amplitude and ParaView's time is the normalised wear cycle. Pairs of a face are joined
+by triangles where their places on the face are known, so that the maps are surfaces.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial import Delaunay, QhullError
+
+from ..case.contacts import wear_areas
+from ..case.load import Case
+from ..case.schema import WearAnalysis
+from ..errors import InputError
+from ..model.structure import BuiltContact
+from ..results.results import open_results
+from ..texts import display
+from .choice import ViewOptions, analysis_name
+from .vtkhdf import TRIANGLE, VERTEX, GridFile
+
+Array = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.intp]
+
+#: Columns of the table that go with each step.
+SHOWN = ("cycles", "vibrations", "amplitude", "frequency_hz", "zeta", "stick", "slip", "open", "work")
+#: Arrays of the results and what they are called in the picture.
+FIELDS = {
+    "depth": "depth",
+    "rate": "wear_rate",
+    "load": "mean_normal_force",
+    "slip": "slip_share",
+    "open": "open_share",
+}
+#: Largest depth as drawn, as a share of the extent of the pairs, where no scale is given.
+DRAWN = 0.1
+#: A triangle with a side longer than the median of the longest sides by this bridges a gap between pairs.
+BRIDGE = 3.0
+
+
+def worn_analysis(folder: Path, case: Case, options: ViewOptions) -> str | None:
+    """Name of the analysis to show when it is one of wear."""
+    with open_results(folder / "results.h5") as file:
+        name = analysis_name(file, folder, case, options.analysis)
+    return name if isinstance(case.analyses[name], WearAnalysis) else None
+
+
+def view_wear(folder: Path, case: Case, name: str, options: ViewOptions, say: Callable[[str], None]) -> list[Path]:
+    """Write a file for each amplitude asked for, by default the largest; returns their paths. One rank only.
+
+    Raises
+    ------
+    InputError
+        The places of the pairs are not known, or there is no wear at such an amplitude.
+    """
+    placed = _placed(case, name)
+    out = options.out or folder / f"{name}_wear.vtkhdf"
+    written = []
+    with open_results(folder / "results.h5") as file:
+        lines = _chosen(file[name], options, f"analysis '{name}' in {display(folder)}")
+        for number, rows in enumerate(lines, 1):
+            path = out if len(lines) == 1 else out.with_name(f"{out.stem}_{number}{out.suffix}")
+            scale = _write(path, file[name], rows, placed, options.scale)
+            amplitude, cycles = (file[name]["points"][key][rows[-1]] for key in ("amplitude", "cycles"))
+            say(f"{display(path)}: amplitude {amplitude:.6g} m, {len(rows)} steps to {cycles:.6g} wear cycles")
+            say(f"  {sum(contact.n_pairs for contact in placed.values())} contact pairs; warp draws depths x {scale:g}")
+            whole = ", ".join(str(row) for row in file[name]["reported"][()] if row in rows)
+            say(f"  `--point N` shows the motion at a point, with its pairs at the points {whole}")
+            written.append(path)
+    say("ParaView (5.12 or later): time is the wear cycle")
+    return written
+
+
+def _placed(case: Case, name: str) -> dict[str, BuiltContact]:
+    built = case.built.contacts if case.built else {}
+    found = {key: built[key] for key in wear_areas(case.contacts, built) if built[key].points is not None}
+    if not found:
+        fix = "give BuiltContact its points; `fretwave plot` draws histories without them"
+        raise InputError("the model has no places of its contact pairs", f"analysis '{name}'", None, "points", fix)
+    return found
+
+
+def _chosen(group: Any, options: ViewOptions, where: str) -> list[IntArray]:
+    """Rows of the lines whose amplitudes are asked for."""
+    number, amplitude = group["points/line"][()], group["points/amplitude"][()]
+    lines = [np.flatnonzero(number == k) for k in np.unique(number)]
+    given = np.array([amplitude[rows[0]] for rows in lines])
+    if not options.amplitudes:
+        return [lines[int(np.argmax(given))]]
+    for asked in options.amplitudes:
+        if not given.min() * (1 - 1e-6) <= asked <= given.max() * (1 + 1e-6):
+            known = ", ".join(f"{a:g}" for a in given)
+            near = given[np.argmin(np.abs(given - asked))]
+            raise InputError("no wear at this amplitude", where, f"{asked:g} m", known, f"--amplitude {near:g}")
+    return [lines[int(np.argmin(np.abs(given - asked)))] for asked in options.amplitudes]
+
+
+def _write(path: Path, group: Any, rows: IntArray, placed: Mapping[str, BuiltContact], scale: float | None) -> float:
+    """One line; returns the factor on the depths in the field warp."""
+    steps, table = np.arange(len(rows)), group["points"]
+    arrays = {key: _over_steps(group, key, rows, placed) for key in FIELDS}
+    points = np.concatenate([np.asarray(contact.points) for contact in placed.values()])
+    scale = _natural_scale(points, arrays["depth"]) if scale is None else scale
+    with GridFile(path, table["cycles"][()][rows]) as grid:
+        for contact in placed.values():
+            grid.part(np.asarray(contact.points), *surface(contact))
+        for key, name in FIELDS.items():
+            grid.point_field(name, arrays[key], steps)
+        areas = np.concatenate([np.asarray(contact.areas) for contact in placed.values()])
+        grid.point_field("mean_pressure", arrays["load"] / areas, steps)
+        if all(contact.frames is not None for contact in placed.values()):
+            normals = np.concatenate([np.asarray(contact.frames)[:, 0] for contact in placed.values()])
+            grid.point_field("normal", [normals])
+            # what is worn away is gap: the surface recedes against the normal, which closes the contact
+            grid.point_field("warp", (-scale * depth[:, None] * normals for depth in arrays["depth"]), steps, "f4")
+        grid.point_field("face", [_faces(contact)[1].astype(float) for contact in placed.values()])
+        grid.point_field("pair", [np.arange(float(contact.n_pairs)) for contact in placed.values()])
+        for name in SHOWN:
+            grid.field_data(name, table[name][()][rows])
+    return scale
+
+
+def _over_steps(group: Any, key: str, rows: IntArray, placed: Mapping[str, BuiltContact]) -> Array:
+    """(n_steps, n_pairs of all contacts)."""
+    parts = [np.asarray(group[f"{key}_{name}"][rows[0] : rows[-1] + 1])[rows - rows[0]] for name in placed]
+    return np.concatenate(parts, axis=1)
+
+
+def surface(contact: BuiltContact) -> tuple[IntArray, int]:
+    """Cells on the pairs with VTK's number of their kind: triangles on each face, single points where that fails."""
+    vertices = np.arange(contact.n_pairs)[:, None], VERTEX
+    if contact.positions is None:
+        return vertices
+    names, number = _faces(contact)
+    try:
+        cells = [_triangles(contact.positions, np.flatnonzero(number == k)) for k in range(len(names))]
+    except QhullError:  # fewer than three pairs, or all in a line
+        return vertices
+    return np.concatenate(cells), TRIANGLE
+
+
+def _faces(contact: BuiltContact) -> tuple[list[str], IntArray]:
+    """Names of the faces, and the number of each pair's."""
+    given = list(contact.faces) if contact.faces is not None else [""] * contact.n_pairs
+    names = list(dict.fromkeys(str(face) for face in given))
+    return names, np.array([names.index(str(face)) for face in given])
+
+
+def _triangles(positions: Array, pairs: IntArray) -> IntArray:
+    """Of a face's pairs (n, 3), without those that bridge gaps."""
+    places = np.asarray(positions, dtype=float)[pairs]
+    if len(pairs) < 3:
+        raise QhullError("fewer than three pairs")
+    corners = Delaunay(places).simplices
+    sides = np.linalg.norm(places[corners] - places[np.roll(corners, 1, axis=1)], axis=2).max(axis=1)
+    return np.asarray(pairs[corners[sides <= BRIDGE * np.median(sides)]])
+
+
+def _natural_scale(points: Array, depth: Array) -> float:
+    """Draws the largest depth as a tenth of the extent of the pairs."""
+    size, largest = float(np.linalg.norm(np.ptp(points, axis=0))), float(depth.max(initial=0.0))
+    return float(f"{DRAWN * size / largest:.2g}") if largest > 0 and size > 0 else 1.0

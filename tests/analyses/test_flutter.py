@@ -1,0 +1,253 @@
+"""`type = "flutter"` from a case file: limit cycles of every nodal diameter, their verdicts, and what is refused."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from models.cyclic_models import chain_crossings
+
+import fretwave as fw
+from fretwave.analyses import flutter
+from fretwave.case.load import load_case
+from fretwave.commands.check import check_case
+from fretwave.commands.keys import key_lines
+from fretwave.errors import CaseErrors
+from fretwave.plots import flutter as pictures
+from fretwave.post.flutter_waves import describe_waves, verdict, words
+from fretwave.results.reader import Run
+from fretwave.run.order import RunOptions
+from fretwave.run.runner import resume_run, run_case
+
+SECTORS, OMEGA = 5, 1.7
+INFLUENCE = {0: 0.02 - 0.06j, 1: -0.1 + 0.02j, -1: 0.12 + 0.05j, 2: 0.01 - 0.005j}
+#: The chain of REFERENCE as a case: a mass on its ground spring, a Jenkins element to the next one, and the flow.
+TEXT = f"""
+[model]
+dofs = ["mass", "next"]
+M = [[1.0, 0.0], [0.0, 0.0]]
+K = [[1.0, 0.0], [0.0, 0.0]]
+sectors = {SECTORS}
+low = ["mass"]
+high = ["next"]
+
+[[contact]]
+name = "between"
+law = "jenkins"
+pairs = [["mass", "next"]]
+tangential_stiffness = 1.0
+friction_limit = 1.0
+
+[aerodynamics]
+frequency = {OMEGA / (2 * np.pi)!r}
+dof = "mass"
+influence = {{ {", ".join(f"{k} = [{L.real}, {L.imag}]" for k, L in INFLUENCE.items())} }}
+
+[[analysis]]
+name = "flutter"
+type = "flutter"
+normalise = "mass"
+harmonics = 1
+samples = 960
+amplitude = [0.2, 100.0]
+"""
+
+
+@pytest.fixture
+def write(shared_tmp, comm):
+    """The case with replacements."""
+
+    def make(*changes: tuple[str, str]) -> Path:
+        text = TEXT
+        for old, new in changes:
+            assert old in text
+            text = text.replace(old, new, 1)
+        path = shared_tmp / "case.toml"
+        if comm.rank == 0:
+            path.write_text(text, encoding="utf-8")
+        comm.barrier()
+        return path
+
+    return make
+
+
+def table(folder: Path, name: str) -> list[dict[str, str]]:
+    with open(folder / f"{name}.csv", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_every_wave_has_the_limit_cycles_of_the_closed_form(write, shared_tmp, comm):
+    """All nodal diameters, forward and backward, in one run."""
+    out = shared_tmp / "run"
+    assert run_case(write(), RunOptions(out=out, plots=False), comm) == 0
+    flow, found = fw.Aerodynamics(INFLUENCE, OMEGA), table(out, "flutter_crossings")
+    for diameters in range(-2, 3):
+        expected = chain_crossings(flow, diameters, SECTORS) if diameters else []
+        mine = [row for row in found if int(row["nodal_diameter"]) == diameters]
+        values = [(float(row["amplitude"]), 2 * np.pi * float(row["frequency_hz"])) for row in mine]
+        assert values == [pytest.approx(pair, rel=1e-5) for pair in expected]
+    waves = {int(row["nodal_diameter"]): row for row in table(out, "flutter_waves")}
+    verdicts = {diameters: row["verdict"] for diameters, row in waves.items()}
+    assert verdicts == {-2: "stable", -1: "stable", 0: "unbounded", 1: "bounded below", 2: "stable below"}
+    assert [row["stable"] for row in found] == ["stable", "unstable", "unstable"]
+    record = json.loads((out / "run.json").read_text())["analyses"]["flutter"]
+    assert [wave["nodal_diameter"] for wave in record["waves"]] == list(range(-2, 3))
+    assert any("other nodal diameters" in text for text in record["left_out"])
+    with h5py.File(out / "results.h5") as file:
+        points = file["flutter/points"]
+        events, zeta = points["event"][()], points["zeta"][()]
+        assert (np.abs(zeta[events == b"zero_damping"]) < 1e-9).all()
+
+
+def test_wave_on_the_whole_wheel_from_the_case_file(write, shared_tmp, comm):
+    """A mode with `aerodynamics` on all sectors meets the limit cycles of the flutter analysis."""
+    mode = '[[analysis]]\nname = "wheel"\ntype = "mode"\nwheel = true\naerodynamics = true\nnodal_diameter = 1\n'
+    keys = 'normalise = "mass"\nharmonics = 1\nsamples = 960\namplitude = [0.5, 20.0]\n\n'
+    alone = ("amplitude = [0.2, 100.0]", "nodal_diameters = [1]\namplitude = [0.5, 20.0]")
+    path = write(alone, ("[[analysis]]", mode + keys + "[[analysis]]"))
+    out = shared_tmp / "wheel"
+    assert run_case(path, RunOptions(out=out, plots=False), comm) == 0
+    whole = [row for row in table(out, "wheel") if "zero_damping" in row["event"]]
+    alone = [row for row in table(out, "flutter_crossings") if row["nodal_diameter"] == "1"]
+    assert len(whole) == len(alone) == 2
+    for one, other in zip(whole, alone):
+        for key in ("amplitude", "frequency_hz"):
+            assert float(one[key]) == pytest.approx(float(other[key]), rel=1e-8)
+
+
+@pytest.mark.ranks(1)
+def test_an_interrupted_run_goes_on_in_the_wave_where_it_was(write, tmp_path, comm, monkeypatch):
+    """Same points, same limit cycles as without the interruption in the third wave."""
+    path = write(("amplitude = [0.2, 100.0]", "amplitude = [0.5, 10.0]"))
+    assert run_case(path, RunOptions(out=tmp_path / "whole", plots=False), comm) == 0
+    write_row = flutter.record
+
+    def interrupted(writer, *arguments):
+        if writer.rows == 40:
+            raise KeyboardInterrupt
+        return write_row(writer, *arguments)
+
+    monkeypatch.setattr(flutter, "record", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        run_case(path, RunOptions(out=tmp_path / "joined", plots=False), comm)
+    assert int(table(tmp_path / "joined", "flutter")[-1]["nodal_diameter"]) == 0
+    monkeypatch.setattr(flutter, "record", write_row)
+    assert resume_run(tmp_path / "joined", comm, plots=False) == 0
+    for name in ("flutter", "flutter_waves", "flutter_crossings"):
+        rows = [
+            [{k: v for k, v in row.items() if k != "wall_s"} for row in table(tmp_path / folder, name)]
+            for folder in ("whole", "joined")
+        ]
+        assert rows[0] == rows[1], name
+
+
+@pytest.mark.ranks(1)
+def test_pictures_show_every_wave(write, tmp_path, comm):
+    out = tmp_path / "run"
+    changes = [("amplitude = [0.2, 100.0]", "amplitude = [0.5, 10.0]")]
+    assert run_case(write(*changes), RunOptions(out=out), comm) == 0
+    assert {path.name for path in out.glob("*.png")} == {"flutter_damping.png", "flutter_limits.png"}
+    (run,) = Run(out).of_kind("flutter")
+    upper = pictures.damping(run).axes[0]
+    assert {"ND -2", "ND 0", "ND +1", "stable limit cycle"} <= set(upper.get_legend_handles_labels()[1])
+    amplitude, zeta = pictures.wave(run, 1)
+    spans = pictures.spans(amplitude, zeta)
+    assert [sign for *_, sign in spans] == [-1, 1, -1]
+    cycles = [cycle["amplitude"] for cycle in run.attributes["events"] if cycle["nodal_diameter"] == 1]
+    assert [high for _, high, _ in spans[:2]] == pytest.approx(cycles, rel=1e-12)
+
+
+@pytest.mark.ranks(1)
+def test_spans_end_where_a_limit_cycle_was_located():
+    """A located damping ratio of 1.7e-12, that is 1.7e-10 %, is zero."""
+    zeta = 100.0 * np.array([-0.03, -1.7e-12, 0.08, 6e-13, -0.02])
+    found = pictures.spans(np.arange(1.0, 6.0), zeta)
+    assert found == [(1.0, 2.0, -1.0), (2.0, 4.0, 1.0), (4.0, 5.0, -1.0)]
+
+
+@pytest.mark.ranks(1)
+def test_verdicts_follow_the_signs_of_the_damping():
+    cases = {
+        "stable": [0.1, 0.3, 0.1],
+        "unbounded": [-0.1, -0.01, -0.1],
+        "bounded": [-0.1, 0.2, 0.1],
+        "bounded below": [-0.1, 0.2, -0.1],
+        "stable below": [0.1, 0.2, -0.1],
+        "neutral": [0.0, 1e-13, 0.0],
+    }
+    for expected, zeta in cases.items():
+        assert verdict(np.array(zeta)) == expected
+
+
+@pytest.mark.ranks(1)
+def test_a_limit_cycle_on_a_branch_that_runs_back_names_its_folds():
+    """Damping rises along the branch while the amplitude falls: not attracting, whatever its damping's sign beyond."""
+    rows = [
+        (1.0, -0.02, ""),
+        (1.2, -0.01, "fold"),
+        (1.1, 0.0, "zero_damping"),
+        (1.0, 0.01, "fold"),
+        (1.5, 0.02, ""),
+    ]
+    amplitude, zeta, events = (np.array(column) for column in zip(*rows))
+    columns = {"nodal_diameter": np.full(5, 3), "amplitude": amplitude, "zeta": zeta, "frequency_hz": 10 + 0 * zeta}
+    (wave,) = describe_waves({**columns, "event": events}, [3, 4])
+    (cycle,) = wave["limit_cycles"]
+    assert cycle["folds"] == [1.0, 1.2] and cycle["stable"] is False and wave["verdict"] == "bounded"
+    assert "runs back between 1 and 1.2 m" in words(wave)
+
+
+@pytest.mark.ranks(1)
+def test_check_and_the_list_of_keys_know_flutter(write, capsys, comm):
+    assert check_case(write(("harmonics = 1", "harmonics = 1\nnodal_diameters = [-1, 2]")), (), (), False, comm) == 0
+    assert "flutter (CNM), nodal diameters -1, 2, linear mode 1, a = 0.2 to 100 m" in capsys.readouterr().out
+    keys = "\n".join(key_lines())
+    assert "[aerodynamics]" in keys and "engine_order" in keys and "nodal_diameters" in keys
+
+
+@pytest.mark.ranks(1)
+def test_the_flow_can_be_set_from_the_command_line(write):
+    case = load_case(write(), ["aerodynamics.influence.1=[0.0,0.25]", "aerodynamics.frequency=2"])
+    assert case.aerodynamics.influence["1"] == [0.0, 0.25] and case.aerodynamics.frequency == 2
+    assert case.resolved["aerodynamics.influence"]["-1"] == [INFLUENCE[-1].real, INFLUENCE[-1].imag]
+
+
+#: (text in the case, its replacement, what is said)
+WRONG = {
+    "no flow": (TEXT[TEXT.index("[aero") : TEXT.index("[[analysis]]")], "", "needs forces of the flow"),
+    "one wave": ("harmonics = 1", "harmonics = 1\nnodal_diameter = 1", r"nodal_diameters = \[1\]"),
+    "too many": ("harmonics = 1", "harmonics = 1\nnodal_diameters = [1, 3]", "no wave of this wheel"),
+    "wheel": ("harmonics = 1", "harmonics = 1\nwheel = true", "follows waves on one sector"),
+    "no coefficients": ("influence =", "damping =", "wrong value"),
+    "both": ('dof = "mass"', 'dof = "mass"\ndamping = { 1 = 0.01 }', "given beside each other"),
+    "neither": (TEXT[TEXT.index("influence") : TEXT.index("[[analysis]]")], "", "are both missing"),
+    "far blade": ("-1 = [", "3 = [", "is not of this wheel"),
+    "no number": ("-1 = [", "left = [", "is not of this wheel"),
+    "twice": ("-1 = [", "-3 = [0.0, 0.0], -1 = [", "is not of this wheel"),
+    "real": ("[0.02, -0.06]", "[0.02]", r"\[real, imaginary\]"),
+    "unknown dof": ('dof = "mass"', 'dof = "mas"', "unknown dof 'mas'"),
+    "no frequency": (TEXT[TEXT.index("frequency") : TEXT.index("dof = ")], "", "'frequency' is missing"),
+    "no sectors": (f'sectors = {SECTORS}\nlow = ["mass"]\nhigh = ["next"]\n', "", "is of no sector of a wheel"),
+}
+
+
+@pytest.mark.ranks(1)
+@pytest.mark.parametrize("change", WRONG.values(), ids=WRONG)
+def test_what_is_wrong_with_flutter_is_said(write, change):
+    old, new, message = change
+    with pytest.raises(CaseErrors, match=message):
+        load_case(write((old, new)))
+
+
+@pytest.mark.ranks(1)
+def test_a_wave_without_damping_is_asked_for(write):
+    given = TEXT[TEXT.index("dof = ") : TEXT.index("[[analysis]]")].split("\n", 1)[1]
+    path = write((given, "damping = { 1 = -0.01, -1 = 0.02 }\n"), ('dof = "mass"\n', ""))
+    with pytest.raises(CaseErrors, match="damping of nodal diameters -2, 0, 2"):
+        load_case(path)
+    path.write_text(path.read_text().replace("harmonics", "nodal_diameters = [1, -1]\nharmonics"))
+    assert load_case(path).aerodynamics.damping == {"1": -0.01, "-1": 0.02}

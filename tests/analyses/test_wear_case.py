@@ -1,0 +1,184 @@
+"""Wear from a case file: the table, what it says of bad input, kills, ranks, and no wear at all."""
+
+from __future__ import annotations
+
+import csv
+import json
+import subprocess
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from test_built import BUILDER, TEXT
+from test_resume import command, kill_at, without_time
+
+from fretwave.case.load import load_case
+from fretwave.commands.main import main
+from fretwave.errors import CaseErrors
+
+pytestmark = pytest.mark.ranks(1)
+
+WEAR = """
+[[analysis]]
+name = "wear"
+type = "wear"
+mode = "mode"
+amplitude = [1.8e-6, 2.1e-6]
+cycles = 3.0
+coefficient = 1e-12
+report_at = [1.0]
+"""
+#: Differences between rank counts come from the order of additions.
+RANK_TOLERANCE = 1e-9
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory) -> Path:
+    path = tmp_path_factory.mktemp("wear_case")
+    (path / "model.py").write_text(BUILDER.read_text())
+    (path / "case.toml").write_text(TEXT + WEAR)
+    return path
+
+
+def arguments(folder: Path, out: Path, *more: str) -> list[str]:
+    return ["run", str(folder / "case.toml"), "--only", "wear", "--no-plots", "--out", str(out), *more]
+
+
+def rows(folder: Path, name: str = "wear") -> list[dict[str, str]]:
+    with open(folder / f"{name}.csv", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+@pytest.fixture(scope="module")
+def run(folder: Path, tmp_path_factory) -> Path:
+    out = tmp_path_factory.mktemp("run")
+    assert main(arguments(folder, out)) == 0
+    return out
+
+
+def test_table_has_a_line_for_each_amplitude(run: Path) -> None:
+    table = rows(run)
+    for number, amplitude in enumerate((1.8e-6, 2.1e-6)):
+        line = [row for row in table if int(row["line"]) == number]
+        assert [float(row["amplitude"]) for row in line] == pytest.approx([amplitude] * len(line), rel=1e-12)
+        cycles, worn = (np.array([float(row[key]) for row in line]) for key in ("cycles", "worn_1"))
+        assert cycles[0] == 0 and (np.diff(cycles) > 0).all() and cycles[-1] == pytest.approx(3.0, rel=1e-14)
+        assert worn[0] == 0 and (np.diff(worn) >= 0).all() and worn[-1] > 0
+        assert [row["event"] for row in line if row["event"]] == ["start", "report", "stop"]
+        assert max(abs(float(row["energy_error"])) for row in line) < 1e-8
+
+
+def test_arrays_belong_to_the_rows(run: Path) -> None:
+    with h5py.File(run / "results.h5") as file:
+        wear = file["wear"]
+        areas, depth = wear["pairs_pads/area"][()], wear["depth_pads"][()]
+        assert depth @ areas == pytest.approx(wear["points/worn_1"][()], rel=1e-12)
+        assert (wear["rate_pads"][()] >= 0).all() and (wear["load_pads"][()] > 0).all()
+        assert wear["coefficients"].shape[0] == len(depth) and len(wear["reported"]) == 6
+        vibrations = wear["points/cycles"][()] * wear.attrs["cycle_unit"]
+        assert wear["points/vibrations"][()] == pytest.approx(vibrations, rel=1e-12)
+    assert not list(run.glob(".wear*"))
+    assert json.loads((run / "run.json").read_text())["analyses"]["wear"]["status"] == "done"
+
+
+def test_the_coefficient_only_scales_time(folder: Path, run: Path, tmp_path: Path) -> None:
+    """Ten times k_w: a tenth of the vibrations, the same normalised cycles."""
+    assert main(arguments(folder, tmp_path, "--set", "wear.coefficient=1e-11")) == 0
+    one, ten = rows(run), rows(tmp_path)
+    for key, ratio in (("zeta", 1.0), ("worn_1", 1.0), ("cycles", 1.0), ("vibrations", 0.1)):
+        assert [float(row[key]) for row in ten] == pytest.approx([ratio * float(row[key]) for row in one], rel=1e-7)
+
+
+def test_without_a_coefficient_there_is_the_mode(folder: Path, tmp_path: Path) -> None:
+    """k_w = 0: the reported points of the mode to the last digit, found by the same iterations."""
+    assert main([*arguments(folder, tmp_path, "--set", "wear.coefficient=0.0"), "--only", "mode,wear"]) == 0
+    expected = {float(row["amplitude"]): row for row in rows(tmp_path, "mode") if row["event"] == "report"}
+    table = rows(tmp_path)
+    assert len(table) == 2
+    for row in table:
+        mode = expected[float(row["amplitude"])]
+        for key in ("omega", "omega0", "beta", "zeta", "stick", "slip", "open", "error_estimate"):
+            assert row[key] == mode[key], key
+        assert (row["newton"], row["linear"], row["residual"]) == (mode["newton"], mode["linear"], mode["residual"])
+
+
+@pytest.mark.parametrize("ranks", [2, 3])
+def test_ranks_do_not_matter(folder: Path, run: Path, tmp_path: Path, launch, ranks: int) -> None:
+    """Groups of ranks take the lines; and one line on all ranks."""
+    done = launch(ranks, "-m", "fretwave", *arguments(folder, tmp_path), timeout=120)
+    assert done.returncode == 0, done.stderr
+    one, many = rows(run), rows(tmp_path)
+    for key in ("worn_1", "omega", "zeta", "cycles"):
+        assert [float(row[key]) for row in many] == pytest.approx([float(row[key]) for row in one], rel=RANK_TOLERANCE)
+
+
+def test_one_line_on_two_ranks(folder: Path, run: Path, tmp_path: Path, launch) -> None:
+    done = launch(2, "-m", "fretwave", *arguments(folder, tmp_path, "--set", "wear.amplitude=[2.1e-6]"), timeout=120)
+    assert done.returncode == 0, done.stderr
+    one = [row for row in rows(run) if row["line"] == "1"]
+    for key in ("worn_1", "omega", "zeta", "cycles"):
+        found = [float(row[key]) for row in rows(tmp_path)]
+        assert found == pytest.approx([float(row[key]) for row in one], rel=RANK_TOLERANCE)
+
+
+@pytest.mark.parametrize("branch", ["[5e-7, 1e-6]", "[2e-6, 3e-6]"])
+def test_amplitudes_may_lie_outside_the_branch_of_the_mode(
+    folder: Path, run: Path, tmp_path: Path, branch: str
+) -> None:
+    """The mode is followed as far as wear needs it."""
+    assert main(arguments(folder, tmp_path, "--set", f"mode.amplitude={branch}", "--set", "mode.report_at=[]")) == 0
+    expected, found = (float(rows(out)[-1]["worn_1"]) for out in (run, tmp_path))
+    assert found == pytest.approx(expected, rel=1e-6)
+
+
+def test_a_killed_run_resumes_exactly(folder: Path, run: Path, tmp_path: Path) -> None:
+    """Killed in the second line: the first is not computed again, and the table is the uninterrupted one."""
+    line = tmp_path / ".wear_lines" / "line_001" / "line.csv"
+    lines = kill_at(command(*arguments(folder, tmp_path)), line, 4)
+    assert 4 <= lines < len(rows(run))
+    first = (tmp_path / ".wear_lines" / "line_000" / "line.csv").read_text()
+    done = subprocess.run(command("resume", str(tmp_path)), check=True, capture_output=True, text=True)
+    assert without_time(rows(tmp_path)) == without_time(rows(run))
+    walls = [row["wall_s"] for row in rows(tmp_path) if row["line"] == "0"]
+    assert walls == [row["wall_s"] for row in csv.DictReader(first.splitlines())] and "resumed" in done.stdout
+
+
+def test_an_amplitude_that_the_mode_does_not_reach_leaves_the_others(folder: Path, tmp_path: Path, launch) -> None:
+    """Exit 3, and what was found is kept; without any start nothing is written."""
+    words = ["--set", "mode.step.max_points=8", "--set", "wear.amplitude=[2.5e-7, 2.1e-6]"]
+    done = launch(1, "-m", "fretwave", *arguments(folder, tmp_path / "some", *words))
+    assert done.returncode == 3 and "a = 2.1e-06 m: not reached by the mode" in done.stderr
+    assert {row["line"] for row in rows(tmp_path / "some")} == {"0"}
+    done = launch(
+        1, "-m", "fretwave", *arguments(folder, tmp_path / "none", *words, "--set", "wear.amplitude=[2.1e-6]")
+    )
+    assert done.returncode == 3 and "reaches none of the amplitudes" in done.stderr
+    assert not (tmp_path / "none").exists()
+
+
+BAD = [
+    ('mode = "mode"', 'mode = "mod"', "is no mode analysis"),
+    ("report_at = [1.0]", "report_at = [4.0]", "beyond the last cycle"),
+    ("coefficient = 1e-12", "coefficient = -1e-12", "coefficient"),
+    ("cycles = 3.0", 'cycles = 3.0\nstepper = "euler"', "stepper"),
+]
+
+
+@pytest.mark.parametrize("old, new, message", BAD)
+def test_bad_input_is_refused(folder: Path, tmp_path: Path, old: str, new: str, message: str) -> None:
+    assert old in WEAR
+    (tmp_path / "model.py").write_text(BUILDER.read_text())
+    (tmp_path / "case.toml").write_text(TEXT + WEAR.replace(old, new))
+    with pytest.raises(CaseErrors, match=message):
+        load_case(tmp_path / "case.toml")
+
+
+def test_pairs_without_area_cannot_wear(tmp_path: Path) -> None:
+    code, areas = BUILDER.read_text(), "areas=np.full(2, AREA),"
+    text = TEXT.replace("tangential_stiffness_per_area = 2e10", "tangential_stiffness = 4e6")
+    assert areas in code and text != TEXT
+    (tmp_path / "model.py").write_text(code.replace(areas, ""))
+    (tmp_path / "case.toml").write_text(text + WEAR)
+    with pytest.raises(CaseErrors, match="areas of the pairs are not known"):
+        load_case(tmp_path / "case.toml")

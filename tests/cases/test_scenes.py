@@ -1,0 +1,214 @@
+"""The judge of cases/scenes against closed forms, its own ability to say wrong, and the short list of scenes."""
+
+from __future__ import annotations
+
+import dataclasses
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "cases"))
+
+from scenes import laws, path  # noqa: E402
+from scenes.closed import jenkins_stiffness  # noqa: E402
+from scenes.distance import Distance, distance  # noqa: E402
+from scenes.equations import Contact, Equations  # noqa: E402
+from scenes.judge import Run, errors  # noqa: E402
+from scenes.run import all_scenes, one  # noqa: E402
+from scenes.scene import Scene  # noqa: E402
+from scenes.structures import mode  # noqa: E402
+
+pytestmark = pytest.mark.ranks(1)
+TAU = 2 * np.pi * np.arange(1024) / 1024
+SLIDER = {"tangential_stiffness": np.ones(1), "friction_limit": np.ones(1)}
+PAD = {
+    "normal_stiffness": 2.0,
+    "tangential_stiffness": 1.0,
+    "friction_coefficient": 0.5,
+    "normal_load": 2.0,
+    "gap": 0.0,
+}
+
+
+def fundamental(f):
+    return 2 * np.mean(f * np.exp(-1j * TAU))
+
+
+def test_a_jenkins_element_has_its_complex_stiffness():
+    f = laws.jenkins((2 * np.cos(TAU)).reshape(-1, 1, 1).astype(complex), SLIDER, np.zeros((1, 1)))
+    assert fundamental(f[:, 0, 0]) / 2 == pytest.approx(jenkins_stiffness(1.0, 1.0, 2.0), abs=1e-5)
+    assert fundamental(f[:, 0, 0]) / 2 == pytest.approx(0.5 + 0.318310j, abs=1e-5)
+
+
+def test_coulomb_in_three_dimensions_on_a_straight_path_is_a_jenkins_element():
+    u = np.zeros((1024, 3, 1), complex)
+    u[:, 1, 0], u[:, 2, 0] = 0.6 * 3 * np.cos(TAU), 0.8 * 3 * np.cos(TAU)
+    p = {k: np.array([v]) for k, v in PAD.items()}
+    f = laws.coulomb_3d(u, p, np.zeros((2, 1)))
+    line = laws.jenkins((3 * np.cos(TAU)).reshape(-1, 1, 1).astype(complex), SLIDER, np.zeros((1, 1)))
+    np.testing.assert_allclose(f[:, 1:, 0], line[:, 0] * [0.6, 0.8], atol=1e-12)
+
+
+def test_a_pad_that_lifts_off_has_no_force_and_reaches_the_unilateral_spring():
+    u = np.zeros((1024, 3, 1), complex)
+    u[:, 0, 0] = 3 * np.cos(TAU)
+    f = laws.coulomb_3d(u, {k: np.array([v]) for k, v in PAD.items()}, np.zeros((2, 1)))
+    np.testing.assert_allclose(f[:, 0, 0], np.maximum(0, 2 + 6 * np.cos(TAU)), atol=1e-12)
+
+
+def test_a_slider_in_shakedown_rests_on_the_point_nearest_to_its_start():
+    centres = np.array([[1.0, 0.0], [0.0, 1.0], [0.5, 0.5]])
+    at = laws.nearest_common(centres, np.array([0.9, 0.9, 5.0]), np.zeros(2))
+    gap = np.linalg.norm(at - centres[:2], axis=1)
+    np.testing.assert_allclose(gap, 0.9, atol=1e-12)
+    assert np.linalg.norm(at) < np.linalg.norm([0.5, 0.5])
+
+
+def scene(law: str) -> Scene:
+    if law == "coulomb_3d":
+        contact = Contact("pad", law, np.eye(3), PAD)
+        K = np.array([[3.0, 0.4, 0.1], [0.4, 1.0, 0.2], [0.1, 0.2, 1.5]])
+        return Scene("", law, np.eye(3), K, [contact], mode(), preload=True)
+    limits = {"friction_limit": 1.0}
+    limits |= {"tangential_stiffness": 2.0} if law == "jenkins" else {"regularisation_velocity": 0.1}
+    K = np.array([[3.0, -1.0], [-1.0, 2.0]])
+    return Scene("", law, np.eye(2), K, [Contact("damper", law, np.array([[0.0, 1.0]]), limits)], mode())
+
+
+def solved(law: str, method: str, amplitude: float) -> tuple[Equations, tuple]:
+    """A solution that the judge itself finds from a linear mode."""
+    s = scene(law)
+    orders = [0, 1, 2, 3] if law == "coulomb_3d" else [1, 3]
+    eq = Equations(s.M, s.K, s.C, s.contacts, orders, 128, method, 0, None, True)
+    stuck = np.asarray(s.K, float) + sum(np.asarray(c.B).T @ (c.stuck()[:, None] * c.B) for c in s.contacts)
+    square, shapes = np.linalg.eigh(stuck)
+    Q = np.zeros((len(s.M), eq.m))
+    Q[:, eq.column[1]] = amplitude * shapes[:, 0] / shapes[0, 0]
+    found = distance(eq, Q, 0.01, np.sqrt(square[0]))
+    assert found.found
+    return eq, found.solution
+
+
+LAWS = pytest.mark.parametrize("law", ["regularised_coulomb", "jenkins", "coulomb_3d"])
+METHODS = pytest.mark.parametrize("method", ["CNM", "EPMC"])
+
+
+@LAWS
+@METHODS
+def test_the_jacobian_is_the_residuals_derivative(law, method):
+    eq, (Q, beta, omega) = solved(law, method, 2.0)
+    rng = np.random.default_rng(0)
+    dQ, h = rng.standard_normal(Q.shape), 1e-7
+
+    def residual(x):
+        return eq.residual(Q + x * dQ, beta + 0.3 * x, omega + 0.7 * x)[0].ravel()
+
+    difference = (residual(h) - residual(-h)) / (2 * h)
+    exact = eq.linearise([(Q, beta, omega)])[0][2] @ np.r_[dQ.ravel(), 0.3, 0.7]
+    np.testing.assert_allclose(difference, exact, atol=1e-5 * abs(exact).max())
+
+
+def table(eq: Equations, method: str, states: list[tuple]) -> Run:
+    Q, beta, omega = (np.array(x) for x in zip(*states))
+    w0 = omega if method == "EPMC" else np.hypot(beta, omega)
+    k = eq.column[1]
+    columns = {
+        "amplitude": np.hypot(Q[:, eq.dof, k], Q[:, eq.dof, k + 1]),
+        "omega": omega if method == "CNM" else np.sqrt(omega**2 - beta**2),
+        "omega0": w0,
+        "frequency_hz": omega / 2 / np.pi,
+        "beta": beta,
+        "zeta": beta / w0,
+        "residual": np.zeros(len(Q)),
+        "event": np.array([""] * len(Q)),
+    }
+    return Run(scene("jenkins"), columns, Q, eq, method)
+
+
+@LAWS
+@METHODS
+def test_a_right_point_is_right_and_one_off_by_a_thousandth_is_wrong(law, method):
+    eq, (Q, beta, omega) = solved(law, method, 2.0)
+    assert beta > 1e-3
+    run = table(
+        eq, method, [(Q, beta, omega), (Q, beta * 1.001, omega), (Q, beta, omega * 1.001), (Q * 1.001, beta, omega)]
+    )
+    assert not errors(run, 0, distance(eq, *run.state(0)))
+    assert any("zeta" in text for text in errors(run, 1, distance(eq, *run.state(1))))
+    assert any("omega" in text for text in errors(run, 2, distance(eq, *run.state(2))))
+    assert errors(run, 3, distance(eq, *run.state(3)))
+
+
+@LAWS
+def test_the_sparse_step_is_the_dense_one(law, monkeypatch):
+    eq, (Q, beta, omega) = solved(law, "CNM", 2.0)
+    off = (Q, beta * 1.0001, omega)
+    dense = distance(eq, *off)
+    monkeypatch.setattr("scenes.distance.DENSE", 0)
+    sparse = distance(eq, *off)
+    assert dense.zeta > 1e-7 and sparse.zeta == pytest.approx(dense.zeta, rel=1e-3)
+    assert sparse.motion == pytest.approx(dense.motion, rel=1e-3)
+
+
+def test_a_friction_force_left_over_by_a_stiff_slider_is_wrong():
+    """Stuck at 1e14 N/m, the whole limit of 10 N is 1e-13 m times the stuck stiffness: small only in that scale."""
+    contact = Contact("damper", "jenkins", np.array([[1.0]]), {"tangential_stiffness": 1e14, "friction_limit": 10.0})
+    eq = Equations(np.eye(1), 1e6 * np.eye(1), None, [contact], [1], 1024, "EPMC")
+    a = 1e-4
+    exact = 1e6 + jenkins_stiffness(1e14, 10.0, a)
+    w, zeta = np.sqrt(exact.real), exact.imag / exact.real / 2
+    right = distance(eq, np.array([[a, 0.0]]), zeta * w, w)
+    wrong = distance(eq, np.array([[a, 0.0]]), 0.59 * zeta * w, w)
+    # the least change is shared with the amplitude, and 1024 samples cost 4e-4 of zeta
+    assert right.zeta < 1e-3 * zeta and wrong.zeta == pytest.approx(0.41 * zeta, rel=1e-2)
+
+
+def circle(angles):
+    """A table whose branch runs on a circle of amplitude and frequency."""
+    eq = Equations(np.eye(1), np.eye(1), None, [], [1], 16, "CNM")
+    return table(eq, "CNM", [(np.array([[np.exp(np.sin(x)), 0.0]]), 0.1, 2 + np.cos(x)) for x in angles])
+
+
+def test_a_branch_that_retraces_itself_and_one_that_stops_early_are_wrong():
+    out, back = np.arange(0.0, 1.5, 0.1), np.arange(1.43, 0.0, -0.1)
+    assert not path._retraced(circle(np.r_[out]))
+    assert path._retraced(circle(np.r_[out, back]))
+    run = dataclasses.replace(
+        circle(out), scene=dataclasses.replace(scene("jenkins"), analysis=mode(amplitude=(1.0, 5.0)))
+    )
+    assert any("ends at" in line for line in path.complaints(run))
+
+
+def test_a_table_that_goes_over_to_another_branch_jumps(monkeypatch):
+    """Two lines omega = 2 and omega = 3, to the nearer of which every point is corrected."""
+
+    def nearer(eq, Q, beta, omega):
+        return Distance(0, 0, 0, 0, True, (Q, beta, 2.0 if omega < 2.5 else 3.0))
+
+    monkeypatch.setattr(path, "distance", nearer)
+    eq = Equations(np.eye(1), np.eye(1), None, [], [1], 16, "CNM")
+    states = [(np.array([[a, 0.0]]), 0.0, 2.0 if a < 1.35 else 3.0) for a in np.arange(1.0, 2.0, 0.1)]
+    assert any("between rows 3 and 4" in line for line in path._jumps(table(eq, "CNM", states)))
+    assert not path._jumps(table(eq, "CNM", states[:4]))
+
+
+def test_a_table_with_values_that_cannot_be_is_wrong():
+    run = circle(np.arange(0.0, 1.0, 0.1))
+    assert not path.values(run)
+    for name, value in (("zeta", np.nan), ("omega", -1.0), ("amplitude", np.inf), ("amplitude", 2.0)):
+        broken = dataclasses.replace(run, columns={k: v.copy() for k, v in run.columns.items()})
+        broken.columns[name][3] = value
+        assert path.values(broken)
+
+
+@pytest.mark.parametrize("name", [s.name for s in all_scenes() if s.quick])
+def test_scene(name, tmp_path):
+    verdict = one(next(s for s in all_scenes() if s.name == name), tmp_path)
+    assert verdict.word == "right", verdict.reasons
+
+
+def test_the_list_is_long_and_covers_every_axis():
+    scenes = all_scenes()
+    assert len(scenes) >= 150 and len({s.axis for s in scenes}) >= 12

@@ -1,0 +1,224 @@
+"""The command line on wrong input: the message, the exit code, and nothing of an earlier run overwritten."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+from fretwave.commands.main import main
+
+pytestmark = pytest.mark.ranks(1)
+
+CASE = Path(__file__).parents[2] / "cases" / "two_dof" / "case.toml"
+#: A short branch: the earlier run that must stay as it is.
+SHORT = [
+    "--only",
+    "mode",
+    "--no-plots",
+    "--set",
+    "mode.harmonics=3",
+    "--set",
+    "mode.samples=64",
+]
+RANGE = ["--set", "mode.amplitude=[0.02, 0.03]", "--set", "mode.report_at=[]"]
+
+#: What is given wrong -> what is said.
+WRONG = {
+    "mode.harmonic=7": "unknown key 'harmonic'",
+    "model.M=[[1.0, 0.0], [0.0, -0.02]]": "negative diagonal",
+    "model.K=[[640.0, nan], [-40.0, 40.0]]": "K[0][1] = nan",
+    "model.M=[[1.0, 1.0], [1.0, 1.0]]": "mass matrix is singular",
+    "model.K=[[640.0, -41.0], [-40.0, 40.0]]": "not symmetric",
+    "model.K=[[640.0]]": "wrong size",
+    "mode.amplitude=[0, 3]": "mode.amplitude[0]",
+    "mode.harmonics=0": "mode.harmonics",
+    "model.M='M.npz'": "does not exist",
+    "contact.damper.law=coulomb": "unknown contact law",
+    "mode.petsc=-snes_rtoll 1e-9": "did you mean `-snes_rtol`?",
+    "mode.petsc='-snes_rtoll 1e-9'": "did you mean `-snes_rtol`?",
+}
+
+
+def fingerprint(folder: Path) -> dict[str, str]:
+    return {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in folder.iterdir()}
+
+
+@pytest.fixture(autouse=True)
+def own_hook(monkeypatch):
+    """The command line sets sys.excepthook; put it back after each test."""
+    monkeypatch.setattr(sys, "excepthook", sys.excepthook)
+
+
+@pytest.fixture(scope="module")
+def earlier(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("run") / "two_dof"
+    assert main(["run", str(CASE), "--out", str(folder), *SHORT, *RANGE]) == 0
+    return folder
+
+
+@pytest.mark.parametrize("wrong", WRONG)
+def test_wrong_input_overwrites_nothing(earlier: Path, wrong: str, capfd) -> None:
+    before = fingerprint(earlier)
+    overrides = [] if "amplitude" in wrong else RANGE
+    if "harmonics" in wrong:
+        code = main(["run", str(CASE), "--out", str(earlier), "--only", "mode", "--set", wrong])
+    else:
+        code = main(
+            [
+                "run",
+                str(CASE),
+                "--out",
+                str(earlier),
+                *SHORT,
+                *overrides,
+                "--set",
+                wrong,
+            ]
+        )
+    text = capfd.readouterr().err
+    assert code == 2
+    assert text.startswith("error: ")
+    assert WRONG[wrong] in text
+    assert "  where: " in text
+    assert "  fix: " in text
+    assert fingerprint(earlier) == before
+
+
+def test_misspelt_option_on_the_command_line(earlier: Path, capfd) -> None:
+    before = fingerprint(earlier)
+    code = main(
+        [
+            "run",
+            str(CASE),
+            "--out",
+            str(earlier),
+            *SHORT,
+            *RANGE,
+            "--petsc",
+            "-snes_max_itt",
+        ]
+    )
+    assert code == 2
+    assert "did you mean `-snes_max_it`?" in capfd.readouterr().err
+    assert fingerprint(earlier) == before
+
+
+def test_right_option_is_used_and_taken_back(tmp_path: Path) -> None:
+    from petsc4py import PETSc
+
+    options = ["--petsc", "-snes_max_it 30 -snes_atol 1e-12"]
+    assert main(["run", str(CASE), "--out", str(tmp_path / "run"), *SHORT, *RANGE, *options]) == 0
+    assert not PETSc.Options().hasName("mode_snes_max_it")
+
+
+def test_failure_before_the_first_point_makes_no_folder(tmp_path: Path, capfd) -> None:
+    folder = tmp_path / "run"
+    for wrong in ("mode.harmonics=0", "mode.petsc=-snes_rtoll 1"):
+        assert (
+            main(
+                [
+                    "run",
+                    str(CASE),
+                    "--out",
+                    str(folder),
+                    "--only",
+                    "mode",
+                    "--set",
+                    wrong,
+                ]
+            )
+            == 2
+        )
+    assert not folder.exists()
+
+
+def test_not_converged_keeps_what_was_found(tmp_path: Path, capfd) -> None:
+    folder = tmp_path / "run"
+    code = main(
+        [
+            "run",
+            str(CASE),
+            "--out",
+            str(folder),
+            *SHORT,
+            "--set",
+            "mode.step.max_points=4",
+            "--set",
+            "mode.report_at=[]",
+        ]
+    )
+    text = capfd.readouterr().err
+    assert code == 3
+    assert "'mode' stopped early" in text
+    assert "  try: " in text
+    assert len((folder / "mode.csv").read_text().splitlines()) == 5
+    assert json.loads((folder / "run.json").read_text())["analyses"]["mode"]["status"] == "stopped"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["rum"], "invalid choice"),
+        (["run"], "CASE"),
+        (["run", "nowhere.toml"], "does not exist"),
+        (["run", str(CASE), "--only", "mod"], "did you mean `mode`?"),
+        (
+            ["run", str(CASE), "--only", "free_decay", "--out", "nowhere"],
+            "--only mode,free_decay",
+        ),
+        (["resume", "nowhere"], "not a run folder"),
+        (["show", "nowhere"], "no results here"),
+        (["plot", "nowhere"], "no results here"),
+        (["check", str(CASE), "--set", "mode.harmonics=0"], "mode.harmonics"),
+    ],
+)
+def test_wrong_command_lines(arguments: list[str], said: str, capfd, tmp_path: Path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(arguments) == 2
+    assert said in capfd.readouterr().err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_check_says_what_would_run(capfd) -> None:
+    assert main(["check", str(CASE)]) == 0
+    text = capfd.readouterr().out
+    for said in (
+        "no errors",
+        "2 dofs: m1, m2",
+        "friction_limit = 5",
+        "harmonics 1, 3, ..., 21",
+        "left out: even",
+    ):
+        assert said in text
+
+
+def test_help_starts_without_the_solvers(launch) -> None:
+    program = (
+        "import sys; from fretwave.commands.main import parser; parser().format_help();"
+        "print([m for m in ('petsc4py', 'mpi4py', 'matplotlib', 'h5py', 'numpy', 'rich') if m in sys.modules])"
+    )
+    assert launch(1, "-c", program).stdout.strip() == "[]"
+
+
+def test_one_message_on_two_ranks(launch, tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    wrong = ["--set", "mode.petsc=-snes_rtoll 1"]
+    done = launch(
+        2,
+        "-m",
+        "fretwave",
+        "run",
+        str(CASE),
+        "--out",
+        str(folder),
+        *SHORT,
+        *RANGE,
+        *wrong,
+    )
+    assert done.returncode == 2
+    assert done.stderr.count("error: no solver reads") == 1
+    assert not folder.exists()

@@ -1,0 +1,125 @@
+"""What -route and -blocks ask for is taken, or refused in words; a wheel that does not repeat falls back to blocks."""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+from models.core_models import unknowns, whole
+from models.cyclic_models import rich_sector
+from petsc4py import PETSc
+
+import fretwave as fw
+from fretwave import _core
+
+SECTORS, UNIT = 6, 2
+SLIDER = {"tangential_stiffness": 3.0, "friction_limit": 0.4}
+
+
+@contextmanager
+def asked(**options):
+    """PETSc options of the prefix blocks_."""
+    database = PETSc.Options("blocks_")
+    for name, value in options.items():
+        database[name] = value
+    try:
+        yield
+    finally:
+        for name in options:
+            del database[name]
+
+
+def wheel(comm, rubbing=range(SECTORS), dof_of=lambda sector: 0):
+    """Six sectors of two dofs; those that rub have one slider each, on a dof of their own."""
+    n = SECTORS * UNIT
+    K = np.kron(np.eye(SECTORS), [[3.0, -1.0], [-1.0, 2.0]])
+    for j in range(SECTORS):
+        here, there = UNIT * j, UNIT * ((j + 1) % SECTORS)
+        K[np.ix_([here, there], [here, there])] += 0.3 * np.array([[1, -1], [-1, 1]])
+    B = np.zeros((len(rubbing), n))
+    for row, sector in enumerate(rubbing):
+        B[row, UNIT * sector + dof_of(sector)] = 1.0
+    return fw.Model(np.eye(n), K, 0.01 * K, [fw.Contact("jenkins", B, SLIDER)], comm, unit=UNIT)
+
+
+def mode_of(model, avoid=None):
+    start = fw.LinearMode(1.3, 0.0, np.ones(model.n_dof), np.zeros(model.n_dof))
+    return fw.NonlinearMode(model, fw.Harmonics([1, 3], 32), "EPMC", 0, start, "blocks_", avoid)
+
+
+def newton_of(problem):
+    return _core.Newton(problem.core, problem.prefix)
+
+
+@pytest.mark.parametrize(
+    "rubbing, dof_of",
+    [
+        ([0, 1, 2], lambda sector: 0),  # a number of pairs that the sectors cannot share
+        ([0, 0, 1, 1, 2, 2], lambda sector: 0),  # as many as sectors, but two in each of three
+        (range(SECTORS), lambda sector: sector % 2),  # one in each, on another dof in every second
+    ],
+)
+def test_a_wheel_whose_contact_does_not_repeat_falls_back(comm, rubbing, dof_of):
+    """Before: an error that took the wheel for bad input. The solution is that of the direct route."""
+    found = {}
+    for route in ("direct", "krylov"):
+        with asked(route=route):
+            problem = mode_of(wheel(comm, rubbing, dof_of))
+            newton = newton_of(problem)
+            if route == "krylov":
+                assert "contact not the same in all sectors: no waves" in newton.route
+            y = problem.initial(0.4)
+            row = unknowns(problem, np.eye(1, len(whole(y)), len(whole(y)) - 1)[0])
+            newton.system.close(row, np.log(0.4))
+            assert newton.solve(y)[0]
+            found[route] = whole(y)
+    assert np.allclose(found["krylov"], found["direct"], rtol=0, atol=1e-8)
+
+
+def test_a_wheel_that_repeats_is_dealt_with_by_its_waves(comm):
+    with asked(route="krylov"):
+        assert f"{SECTORS} nodal diameters" in newton_of(mode_of(wheel(comm))).route
+
+
+@pytest.mark.parametrize("blocks, words", [("dense", "dense blocks of 12 dofs"), ("sparse", "sparse factors")])
+def test_blocks_asked_for_are_taken_on_a_wheel_too(comm, blocks, words):
+    """Before: ignored."""
+    with asked(route="krylov", blocks=blocks):
+        assert words in newton_of(mode_of(wheel(comm))).route
+
+
+@pytest.mark.parametrize("blocks", ["dense", "sparse"])
+def test_blocks_that_an_unfolded_wheel_has_not_are_refused(comm, blocks):
+    avoid = np.kron(np.exp(1j * np.arange(SECTORS)), [1.0, 0.5])
+    with asked(route="krylov", blocks=blocks), pytest.raises(fw.InputError, match="(?s)option blocks.*unfolded"):
+        newton_of(mode_of(wheel(comm), avoid))
+
+
+def test_sparse_blocks_of_a_contact_that_reaches_the_next_sector_are_refused(comm):
+    """Before: dense ones were made without a word."""
+    problem = mode_of(rich_sector().model(2, comm))
+    with asked(route="krylov", blocks="sparse"), pytest.raises(fw.InputError, match="reaches the next sector"):
+        newton_of(problem)
+
+
+def test_a_mode_to_avoid_without_inertia_is_refused(comm):
+    with pytest.raises(fw.InputError, match="no inertia"):
+        mode_of(wheel(comm), np.zeros(SECTORS * UNIT, dtype=complex))
+
+
+def test_counts_that_32_bit_petsc_does_not_hold_are_refused(comm):
+    """A model of few dofs and as many harmonics as no memory holds stays small: the refusal comes first."""
+    if np.dtype(PETSc.IntType).itemsize > 4:
+        pytest.skip("this PETSc counts in 64 bits")
+    n = 120_000
+    K = PETSc.Mat().createAIJ((n, n), nnz=1, comm=comm)
+    K.setUp()
+    begin, end = K.getOwnershipRange()
+    for row in range(begin, end):
+        K.setValue(row, row, 1.0)
+    K.assemble()
+    model = fw.Model(K, K)
+    start = fw.LinearMode(1.0, 0.0, np.ones(n), np.zeros(n))
+    with pytest.raises(fw.InputError, match="more unknowns than this build of PETSc can count"):
+        fw.NonlinearMode(model, fw.Harmonics(range(10_001), 20_004), "EPMC", 0, start)

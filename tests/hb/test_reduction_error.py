@@ -1,0 +1,72 @@
+"""Estimated error of a reduced nonlinear mode, against the unreduced model solved."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from models.core_models import solve_at
+from models.hexahedra import bar
+
+import fretwave as fw
+from fretwave.errors import InputError
+from fretwave.hb.reduction_error import nonlinear_error
+from fretwave.solve.preload import balanced
+
+pytestmark = pytest.mark.ranks(1, 2)
+
+STIFFNESS = {"normal_stiffness": 4e7, "tangential_stiffness": 3e7}
+LOADS = {"friction_coefficient": 0.4, "normal_load": 100.0}
+AMPLITUDE = 4e-4  #: partial slip
+
+
+@pytest.fixture(scope="module")
+def block():
+    """630 dofs: a bar on six friction pairs and a few springs, damped by its stiffness."""
+    made = bar((34, 2, 1), (0.2, 0.02, 0.008))
+    nodes = made.nodes
+    root = np.flatnonzero((nodes[:, 0] < 0.007) & (np.isclose(nodes[:, 2], 0)))
+    B = np.zeros((3 * len(root), made.K.shape[0]))
+    for k, node in enumerate(root):
+        B[3 * k : 3 * k + 3, 3 * node : 3 * node + 3] = np.eye(3)[[1, 2, 0]]  # across the bar: bending slips
+    K = made.K.toarray() + 0.3 * STIFFNESS["tangential_stiffness"] * B.T @ B
+    tip = 3 * int(np.argmax(nodes @ [1.0, 1e-3, 1e-3])) + 2
+    return made.M, sp.csr_matrix(K), 1e-6 * sp.csr_matrix(K), B, tip
+
+
+def mode(M, K, C, B, dof, comm, method, prefix):
+    model = fw.Model(M, K, C, [fw.Contact("coulomb_3d", B, {**STIFFNESS, **LOADS}, "root")], comm)
+    first = fw.linear_modes(model, 1, "stuck")[0]
+    rest = balanced(model, first)
+    problem = fw.NonlinearMode(model, fw.Harmonics(range(4), 64), method, dof, first, prefix)
+    problem.preload(rest.displacement, rest.load)
+    return problem
+
+
+@pytest.mark.parametrize("method", ["CNM", "EPMC"])
+def test_estimate_is_the_true_difference(block, comm, method):
+    M, K, C, B, tip = block
+    keep = np.union1d(np.flatnonzero(np.abs(B).sum(axis=0)), [tip])
+    full = mode(M, K, C, B, tip, comm, method, "full_")
+    y = solve_at(full, AMPLITUDE)
+    true = full.state(y)
+    assert full.diagnostics(y)["slip"] > 0.02
+    for modes in (1, 3):
+        with fw.reduce(M, K, C, keep=keep, modes=modes, comm=comm) as reduction:
+            Br = np.hstack([B[:, keep], np.zeros((len(B), modes))])
+            at = int(np.searchsorted(keep, tip))
+            small = mode(reduction.M, reduction.K, reduction.C, Br, at, comm, method, "small_")
+            y = solve_at(small, AMPLITUDE)
+            found, estimate = small.state(y), nonlinear_error(reduction, small, y)
+        for key in ("omega", "beta", "zeta"):
+            difference = true[key] - found[key]
+            assert 0.5 * abs(difference) <= abs(getattr(estimate, key)) <= 2 * abs(difference), key
+
+
+def test_a_problem_on_other_dofs_is_refused(block, comm):
+    M, K, C, B, tip = block
+    full = mode(M, K, C, B, tip, comm, "CNM", "full_")
+    keep = np.union1d(np.flatnonzero(np.abs(B).sum(axis=0)), [tip])
+    reduction = fw.reduce(M, K, C, keep=keep, modes=1, comm=comm)
+    with reduction, pytest.raises(InputError, match="reduced coordinates"):
+        nonlinear_error(reduction, full, full.initial(AMPLITUDE))

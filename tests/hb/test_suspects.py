@@ -1,0 +1,67 @@
+"""Causes that look alike from inside a solver are named by the parameters that differ."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+from test_krylov import ROOT, TIP, beam, root_map
+
+import fretwave as fw
+from fretwave.hb.suspects import suspects
+from fretwave.solve.preload import static_preload
+
+LOAD = np.tile([100.0, 1.0, 0, 0, 0, 0], 5)  #: a pull along the blade, a push across [N]
+
+
+def free_blade(comm, **changes):
+    """The blade of test_krylov held by its contact alone."""
+    M, K = beam()
+    B = root_map(len(K))
+    return fw.Model(M, K, None, [fw.Contact("coulomb_3d", B, {**ROOT, **changes}, "root")], comm)
+
+
+@pytest.mark.parametrize(
+    "changes, words",
+    [
+        ({"friction_coefficient": 0.0}, "contact 'root' has no friction"),
+        ({"normal_stiffness": 1e12}, "normal_stiffness 1e.12 N/m"),
+        ({"tangential_stiffness": 1e-3}, "tangential_stiffness 0.001 N/m, .*holds nothing"),
+        ({"normal_load": 0.0}, "has no normal_load"),
+        ({"normal_load": np.array([4000.0] * 3 + [1000.0] * 3)}, "normal loads from 1e.03 to 4e.03 N"),
+    ],
+    ids=["no friction", "stiff", "soft", "no load", "unbalanced"],
+)
+def test_each_extreme_parameter_has_its_own_words(comm, changes, words):
+    model = free_blade(comm, **changes)
+    found = suspects(model.contacts, 1e6)
+    assert found.count("contact 'root'") == 1
+    assert re.search(words, found), found
+    assert suspects(free_blade(comm).contacts, 1e6) == ""
+
+
+def test_no_friction_is_named_where_the_preload_fails(comm):
+    model = free_blade(comm, friction_coefficient=0.0)
+    with pytest.raises(fw.NotConverged, match="has no friction"):
+        static_preload(model, LOAD, fw.linear_modes(free_blade(comm), 1, "stuck")[0])
+
+
+def test_a_reference_without_frequency_is_refused_in_words(comm):
+    """It was a division by zero."""
+    model = free_blade(comm, normal_load=0.0)
+    with pytest.raises(fw.InputError, match="(?s)rigid motion.*no normal_load"):
+        static_preload(model, LOAD, fw.linear_modes(model, 1, "stuck")[0])
+
+
+@pytest.mark.ranks(1)
+def test_a_branch_whose_mean_nothing_holds_says_so(comm):
+    """Once every pair slips in a period the blade may drift; Newton's step is then all mean."""
+    model = free_blade(comm)
+    first = fw.linear_modes(model, 1, "stuck")[0]
+    rest = static_preload(model, LOAD, first)
+    problem = fw.NonlinearMode(model, fw.Harmonics(range(4), 64), "CNM", TIP, first, "drift_")
+    problem.preload(rest.displacement, rest.load)
+    branch = fw.Continuation(problem, problem.initial(1e-4), (1e-4, 3e-3), fw.StepControl(max_points=60))
+    assert [point.index for point in branch]
+    assert not branch.converged and "mean position is free" in branch.reason

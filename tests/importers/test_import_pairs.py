@@ -1,0 +1,188 @@
+"""Node sets of input decks, and contact pairs of matching nodes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.linalg
+import scipy.sparse as sp
+from models import hexahedra
+from models.matrix_files import write_npz
+
+import fretwave as fw
+from fretwave.commands.main import main
+from fretwave.importers.nodes import read_nodes
+from fretwave.results import model_file
+
+pytestmark = pytest.mark.ranks(1)
+
+DECK = """*HEADING
+ a plate
+** comment
+*Node, nset=All
+ 10, 0., 0., 0.
+ 20, 1., 0., 0.
+ 30, 1., 1.
+*NODE
+ 40, 0., 1., 5e-1
+*NSET, NSET=Odd,
+ GENERATE
+ 10, 30, 20
+*ELEMENT, TYPE=S4
+ 1, 10, 20, 30, 40
+*INCLUDE, INPUT=sets.inp
+*STEP
+"""
+
+
+def test_deck(tmp_path: Path) -> None:
+    (tmp_path / "plate.inp").write_text(DECK)
+    (tmp_path / "sets.inp").write_text("*NSET, NSET=BOTH\nodd, 40\n")
+    nodes = read_nodes(tmp_path / "plate.inp")
+    np.testing.assert_array_equal(nodes.numbers, [10, 20, 30, 40])
+    np.testing.assert_array_equal(nodes.coordinates[2:], [[1, 1, 0], [0, 1, 0.5]])
+    assert {name: list(members) for name, members in nodes.sets.items()} == {
+        "ALL": [10, 20, 30],
+        "ODD": [10, 30],
+        "BOTH": [10, 30, 40],
+    }
+
+
+def test_hexahedra_of_a_deck(tmp_path: Path) -> None:
+    """C3D20 over two lines; beside C3D8 the corners alone are kept. Other elements are passed over."""
+    numbers = list(range(1, 29))
+    rows = "".join(f"{n}, {n}., 0., 0.\n" for n in numbers)
+    first, second = (", ".join(str(n) for n in part) for part in (numbers[:15], numbers[15:20]))
+    quadratic = f"*ELEMENT, TYPE=C3D20R, ELSET=A\n7, {first},\n {second}\n"
+    linear = "*ELEMENT, type=c3d8\n8, 21, 22, 23, 24, 25, 26, 27, 28\n*ELEMENT, TYPE=C3D4\n9, 1, 2, 3, 4\n"
+    deck = tmp_path / "deck.inp"
+    deck.write_text(f"*NODE\n{rows}{quadratic}")
+    assert read_nodes(deck).hexahedra.tolist() == [numbers[:20]]
+    deck.write_text(f"*NODE\n{rows}{quadratic}{linear}")
+    assert read_nodes(deck).hexahedra.tolist() == [numbers[:8], numbers[20:]]
+    deck.write_text(f"*NODE\n{rows}*ELEMENT, TYPE=C3D4\n9, 1, 2, 3, 4\n")
+    assert read_nodes(deck).hexahedra is None
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("*NODE\n1, 1.\n*ELEMENT, TYPE=C3D8\n1, 1, 2, 3\n", "this is no element"),
+        ("*NODE, SYSTEM=C\n1, 1., 0., 0.\n", "not rectangular"),
+        ("*NODE\n1, 1., zero, 0.\n", "this is no node"),
+        ("*NODE\n1, 1.\n*NODE\n1, 2.\n", "stands twice"),
+        ("*NODE\n1, 1.\n*NSET, NSET=A\nB\n", "names 'B'"),
+        ("*INSTANCE, NAME=I, PART=P\n0., 0., 1.\n", "an instance is moved"),
+        ("*HEADING\n", "has no nodes"),
+        ("*INCLUDE, INPUT=nowhere.inp\n", "does not exist"),
+        ("1, 0., 0., 0.\n2, 0., 0.\n", "no table"),
+    ],
+)
+def test_wrong_decks(tmp_path: Path, text: str, said: str) -> None:
+    (tmp_path / "deck.inp").write_text(text)
+    with pytest.raises(fw.InputError, match=said):
+        read_nodes(tmp_path / "deck.inp")
+
+
+class Two:
+    """Two bars end to end, not joined: the first one's end and the second one's begin coincide."""
+
+    def __init__(self) -> None:
+        self.first = hexahedra.bar((2, 2, 1), (0.04, 0.02, 0.01))
+        self.whole = hexahedra.bar((4, 2, 1), (0.08, 0.02, 0.01))
+        self.nodes = np.vstack([self.first.nodes, self.first.nodes + [0.04, 0, 0]])
+        self.ends = np.flatnonzero(np.isclose(self.nodes[:, 0], 0.04)) + 1
+        self.M, self.K = (sp.block_diag([A, A], format="csr") for A in (self.first.M, self.first.K))
+
+    def write(self, folder: Path) -> list[str]:
+        parts = [write_npz(folder, A, letter, np.zeros(0)) for letter, A in (("M", self.M), ("K", self.K))]
+        mine = self.ends <= len(self.first.nodes)
+        np.savez(folder / "n.npz", coordinates=self.nodes, left=self.ends[mine], right=np.flip(self.ends[~mine]))
+        coordinates = ["--coordinates", str(folder / "n.npz")]
+        return ["import", str(folder / "m.h5"), "--mass", parts[0], "--stiffness", parts[1], *coordinates]
+
+
+def test_pairs_of_coincident_nodes_join_two_bodies(tmp_path: Path, capfd) -> None:
+    """Without relative motion two bars are one; a common rigid motion moves no pair."""
+    two = Two()
+    command = [*two.write(tmp_path), "--pairs", "joint=LEFT", "RIGHT", "--normal", "2,0,0"]
+    assert main(command) == 0
+    assert "expected 12 (2 bodies" in capfd.readouterr().out
+    model = model_file.read(tmp_path / "m.h5")
+    joint = model.contacts["joint"]
+    np.testing.assert_array_equal(two.nodes[joint.nodes[:, 0] - 1], two.nodes[joint.nodes[:, 1] - 1])
+    np.testing.assert_allclose(joint.frames[:, 0], np.broadcast_to([1.0, 0, 0], (6, 3)))
+    np.testing.assert_array_equal(joint.positions[:, 0], 0.04)
+    moved = np.zeros((len(two.nodes), 3))
+    moved[: len(two.first.nodes), 0] = 1.0
+    np.testing.assert_allclose((joint.B @ moved.ravel()).reshape(-1, 3), np.broadcast_to([1.0, 0, 0], (6, 3)))
+    rotation = np.cross([0.3, 0.5, 0.7], two.nodes).ravel()
+    assert abs(joint.B @ rotation).max() < 1e-15
+    T = scipy.linalg.null_space(joint.B.toarray())
+    K, M, whole = T.T @ model.K @ T, T.T @ model.M @ T, two.whole
+    joined = scipy.linalg.eigh(K, M, eigvals_only=True)[6:]
+    np.testing.assert_allclose(
+        joined, scipy.linalg.eigh(whole.K.toarray(), whole.M.toarray(), eigvals_only=True)[6:], rtol=1e-9
+    )
+
+
+def test_pairs_from_a_table(tmp_path: Path) -> None:
+    """Against ground with an own normal and area each; nodes that are held drop out of B."""
+    two = Two()
+    (tmp_path / "pairs.csv").write_text("node_a,node_b,nx,ny,nz,area\n1,,0,0,-2,3e-6\n2,3,0,1,1,4e-6\n")
+    command = [*two.write(tmp_path), "--pairs", str(tmp_path / "pairs.csv"), "--name", "tip=8y"]
+    assert main(command) == 0
+    model = model_file.read(tmp_path / "m.h5")
+    contact = model.contacts["contact"]
+    np.testing.assert_array_equal(contact.areas, [3e-6, 4e-6])
+    np.testing.assert_array_equal(contact.nodes, [[1, 0], [2, 3]])
+    x = np.random.default_rng(2).normal(size=(len(two.nodes), 3))
+    u = (contact.B @ x.ravel()).reshape(-1, 3)
+    np.testing.assert_allclose(u[0, 0], -x[0, 2])
+    np.testing.assert_allclose(u[1, 0], (x[1] - x[2]) @ [0, 1, 1] / np.sqrt(2))
+    np.testing.assert_allclose(np.linalg.norm(u, axis=1), [np.linalg.norm(x[0]), np.linalg.norm(x[1] - x[2])])
+    assert model.names[int(model.kept[0])] == "tip" and int(model.kept[0]) == 22
+
+
+def test_pairs_with_ground(tmp_path: Path) -> None:
+    two = Two()
+    assert main([*two.write(tmp_path), "--pairs", "wall=LEFT", "ground", "--normal", "1,0,0"]) == 0
+    wall = model_file.read(tmp_path / "m.h5").contacts["wall"]
+    moved = np.arange(3.0 * len(two.nodes)).reshape(-1, 3)
+    u = (wall.B @ moved.ravel()).reshape(-1, 3)
+    np.testing.assert_allclose(u[:, 0], moved[wall.nodes[:, 0] - 1, 0])
+    np.testing.assert_array_equal(wall.nodes[:, 1], 0)
+
+
+WRONG_PAIRS = {
+    "set": (["--pairs", "LEFT", "RIHGT", "--normal", "1,0,0"], "did you mean `RIGHT`?"),
+    "normal": (["--pairs", "LEFT", "RIGHT"], "--normal X,Y,Z"),
+    "direction": (["--pairs", "LEFT", "RIGHT", "--normal", "1,0"], "x,y,z"),
+    "both": (["--pairs", "LEFT", "LEFT", "--normal", "1,0,0"], "in both sets"),
+    "file": (["--pairs", "nowhere.csv"], "does not exist"),
+    "three": (["--pairs", "LEFT", "RIGHT", "MORE"], "[NAME=]SET_A SET_B"),
+    "twice": (["--pairs", "a=LEFT", "RIGHT", "--pairs", "a=LEFT", "RIGHT", "--normal", "1,0,0"], "own name"),
+    "parallel": (["--pairs", "LEFT", "RIGHT", "--normal", "1,0,0", "--tangent", "1,0,0"], "parallel"),
+    "dof": (["--name", "tip=n99x"], "cannot be named"),
+}
+
+
+@pytest.mark.parametrize("wrong", WRONG_PAIRS)
+def test_wrong_pairs(wrong: str, tmp_path: Path, capfd) -> None:
+    arguments, said = WRONG_PAIRS[wrong]
+    assert main([*Two().write(tmp_path), *arguments]) == 2
+    text = capfd.readouterr().err
+    assert said in text and "where:" in text
+    assert not (tmp_path / "m.h5").exists()
+
+
+def test_unmatched_nodes_are_named(tmp_path: Path, capfd) -> None:
+    two = Two()
+    two.nodes[two.ends[0] - 1] += [0, 1e-3, 0]
+    assert main([*two.write(tmp_path), "--pairs", "LEFT", "RIGHT", "--normal", "1,0,0"]) == 2
+    text = capfd.readouterr().err
+    partner = two.ends[len(two.ends) // 2]
+    assert f"2 of 6 + 6 nodes: {two.ends[0]} (0.001 away), {partner} (0.001 away)" in text
+    assert main([*two.write(tmp_path), "--pairs", "LEFT", "RIGHT", "--normal", "1,0,0", "--tolerance", "2e-3"]) == 0

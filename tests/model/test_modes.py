@@ -1,0 +1,161 @@
+"""Linear modes against closed forms and numpy's dense eigenvalues."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from models.core_models import LinearLaw, chain, friction, oscillator, single_dof
+from petsc4py import PETSc
+
+import fretwave as fw
+
+pytestmark = pytest.mark.ranks(1, 2, 3)
+
+CHAIN = 12
+M3 = np.array([[2.0, 0.1, 0.0], [0.1, 1.0, 0.2], [0.0, 0.2, 0.5]])
+K3 = chain(3, 40.0, 5.0)
+C3 = np.array([[0.5, -0.1, 0.0], [-0.1, 0.3, -0.2], [0.0, -0.2, 0.4]])
+
+
+def chain_frequencies(n, k, m):
+    """Chain between two walls: 2 sqrt(k/m) sin(j pi / (2 (n + 1))), j = 1..n (Meirovitch)."""
+    return 2 * np.sqrt(k / m) * np.sin(np.arange(1, n + 1) * np.pi / (2 * (n + 1)))
+
+
+def state_eigenvalues(M, C, K):
+    """Oscillating eigenvalues of [x, x'], by dense linear algebra, ascending in Im."""
+    n, inverse = len(M), np.linalg.inv(M)
+    values = np.linalg.eigvals(np.block([[np.zeros((n, n)), np.eye(n)], [-inverse @ K, -inverse @ C]]))
+    return sorted((v for v in values if v.imag > 1e-9), key=lambda v: v.imag)
+
+
+def test_stuck_and_free_asymptotes_of_the_paper_s_oscillator(two_dof, comm):
+    """REFERENCE: sqrt(640) stuck; 24.1562 and 45.3484 rad/s free."""
+    model = oscillator(two_dof, comm)
+    stuck, free = fw.linear_modes(model, 2, "stuck"), fw.linear_modes(model, 2, "free")
+    high = np.sqrt(1320.0 + np.sqrt(1320.0**2 - 1.2e6))
+    assert [mode.omega for mode in stuck] == pytest.approx([two_dof.omega_stuck], rel=1e-12)
+    assert [mode.omega for mode in free] == pytest.approx([two_dof.omega_free, high], rel=1e-12)
+    assert [two_dof.omega_free, high] == pytest.approx([24.1562, 45.3484], abs=5e-5)
+
+
+def test_stuck_shape_keeps_the_contact_closed(two_dof, comm):
+    """The tanh law is rigid when stuck: m2 does not move, and m1 = 1 has unit modal mass."""
+    shape = fw.linear_modes(oscillator(two_dof, comm), 1, "stuck")[0].shape
+    assert np.abs(shape) == pytest.approx([1.0, 0.0], abs=1e-12)
+
+
+def test_elastic_contact_adds_its_stiffness_when_stuck(comm):
+    """A closed contact of stiffness kt on each mass: eigenvalues of K + kt."""
+    law = LinearLaw(0.0, 0.0)
+    law.stuck_stiffness = 7.0
+    model = fw.Model(M3, K3, None, [fw.Contact(law, np.eye(3))], comm)
+    expected = np.sqrt(np.linalg.eigvals(np.linalg.solve(M3, K3 + 7.0 * np.eye(3))).real)
+    assert [m.omega for m in fw.linear_modes(model, 3, "stuck")] == pytest.approx(sorted(expected), rel=1e-11)
+    assert fw.linear_modes(model, 1, "free")[0].omega < 0.99 * min(expected)
+
+
+@pytest.mark.parametrize("k, m", [(1.0, 1.0), (4e9, 2e-3)])
+def test_chain_of_masses_has_its_closed_form(comm, k, m):
+    model = fw.Model(m * np.eye(CHAIN), chain(CHAIN, k), comm=comm)
+    found = [mode.omega for mode in fw.linear_modes(model, 6, "free")]
+    assert found == pytest.approx(chain_frequencies(CHAIN, k, m)[:6], rel=1e-11)
+
+
+def distributed(A, comm):
+    """The same matrix built from petsc4py, each rank its own rows."""
+    mat = PETSc.Mat().createAIJ(A.shape, comm=comm)
+    mat.setUp()
+    for row in range(*mat.getOwnershipRange()):
+        for column in np.nonzero(A[row])[0]:
+            mat.setValue(row, column, A[row, column])
+    mat.assemble()
+    return mat
+
+
+def test_sparse_dense_and_petsc_matrices_give_the_same_modes(comm):
+    M, K = np.eye(CHAIN), chain(CHAIN)
+    models = [
+        fw.Model(M, K, comm=comm),
+        fw.Model(sp.csr_matrix(M), sp.coo_matrix(K), comm=comm),
+        fw.Model(distributed(M, comm), distributed(K, comm)),
+    ]
+    found = [[mode.omega for mode in fw.linear_modes(model, 4, "free")] for model in models]
+    assert found[0] == found[1] == found[2]
+
+
+def test_shapes_have_unit_modal_mass_and_are_orthogonal(comm):
+    model = fw.Model(M3, K3, comm=comm)
+    modes = fw.linear_modes(model, 3, "free")
+    shapes = np.column_stack([mode.shape for mode in modes])
+    assert np.allclose(shapes.T @ M3 @ shapes, np.eye(3), rtol=0, atol=1e-12)
+    assert np.allclose(shapes.T @ K3 @ shapes, np.diag([m.omega**2 for m in modes]), rtol=0, atol=1e-12 * 200)
+    assert [mode.zeta for mode in modes] == [0, 0, 0]
+
+
+def test_rigid_body_mode_has_no_frequency(comm):
+    """Free-free chain: omega = 0 with all masses moving alike, then 2 sqrt(k/m) sin(pi j / (2 n)), j = 1, 2."""
+    n = 6
+    K = chain(n, 100.0)
+    K[0, 0] = K[-1, -1] = 100.0
+    modes = fw.linear_modes(fw.Model(np.eye(n), K, comm=comm), 3, "free")
+    assert modes[0].omega < 1e-5
+    assert np.abs(modes[0].shape) == pytest.approx(np.full(n, 1 / np.sqrt(n)), rel=1e-9)
+    assert [m.omega for m in modes[1:]] == pytest.approx(20 * np.sin(np.pi * np.array([1, 2]) / (2 * n)), rel=1e-11)
+
+
+def test_double_mode_is_found_twice(comm):
+    """Ring of masses: nodal diameters 1 and 2 come as pairs, 2 sqrt(k/m) sin(pi ND / n) above the ground spring."""
+    n = 6
+    K = chain(n, 3.0, 1.0)
+    K[0, -1] = K[-1, 0] = -3.0
+    expected = [np.sqrt(1 + 12 * np.sin(np.pi * nd / n) ** 2) for nd in (0, 1, 1, 2, 2, 3)]
+    modes = fw.linear_modes(fw.Model(np.eye(n), K, comm=comm), n, "free")
+    assert [m.omega for m in modes] == pytest.approx(expected, rel=1e-11)
+
+
+def check_quadratic_modes(modes, M, C, K):
+    expected = state_eigenvalues(M, C, K)
+    assert [-m.beta + 1j * m.omega for m in modes] == pytest.approx(expected, rel=1e-10)
+    for mode in modes:
+        s, phi = -mode.beta + 1j * mode.omega, mode.shape + 1j * mode.imaginary
+        residual = (K + s * C + s**2 * M) @ phi
+        assert np.abs(residual).max() < 1e-9 * np.abs(K).max() * np.abs(phi).max()
+
+
+def test_damped_modes_are_those_of_the_state_matrix(comm):
+    """(K + s C + s^2 M) phi = 0 against the eigenvalues of the first-order form."""
+    check_quadratic_modes(fw.linear_modes(fw.Model(M3, K3, C3, comm=comm), 3, "linearised"), M3, C3, K3)
+
+
+def test_friction_at_rest_is_a_viscous_damper(comm):
+    """REFERENCE: as a -> 0 the tanh law is a damper mu N / eps."""
+    B = np.array([[0.0, 1.0, -1.0]])
+    model = fw.Model(M3, K3, C3, [friction(B, 0.3, 2.0)], comm)
+    check_quadratic_modes(fw.linear_modes(model, 3, "linearised"), M3, C3 + 0.15 * B.T @ B, K3)
+
+
+def test_damping_ratio_and_frequency_of_a_single_dof(comm):
+    """lambda = -c/(2m) +- i sqrt(k/m - c^2/(4m^2))."""
+    m, k, c = 2.0, 50.0, 0.8
+    mode = fw.linear_modes(single_dof(comm, m, k, c), 1, "linearised")[0]
+    assert (mode.beta, mode.zeta) == pytest.approx((c / (2 * m), c / (2 * np.sqrt(k * m))), rel=1e-12)
+    assert mode.omega == pytest.approx(np.sqrt(k / m - (c / (2 * m)) ** 2), rel=1e-12)
+    assert mode.frequency_hz == pytest.approx(mode.omega / (2 * np.pi), rel=1e-15)
+
+
+def test_negative_damping_is_reported_as_such(comm):
+    mode = fw.linear_modes(single_dof(comm, 1.0, 1.0, -0.04), 1, "linearised")[0]
+    assert mode.zeta == pytest.approx(-0.02, rel=1e-12)
+
+
+def test_no_more_modes_than_degrees_of_freedom(comm):
+    assert len(fw.linear_modes(fw.Model(M3, K3, comm=comm), 10, "free")) == 3
+
+
+def test_unusable_requests_are_refused(comm):
+    with pytest.raises(fw.InputError, match="state of contact"):
+        fw.linear_modes(single_dof(comm), 1, "sticking")
+    with pytest.raises(fw.InputError, match="no degree of freedom"):
+        fw.linear_modes(single_dof(comm, law=friction([[1.0]])), 1, "stuck")

@@ -1,0 +1,115 @@
+"""No linear mode is missed: double modes of wheels, families of close modes, many at one frequency; against numpy."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from models.core_models import chain, single_dof
+from petsc4py import PETSc
+
+import fretwave as fw
+from fretwave.errors import FretwaveError
+
+#: Wheels and chains drawn by the property test; several ranks take every 25th.
+DRAWN = 200
+
+
+def wheel(rng):
+    """A ring of equal or mistuned sectors of 1 to 3 dofs, coupled strongly, weakly or not at all."""
+    sectors, size = int(rng.integers(2, 31)), int(rng.integers(1, 4))
+    coupling = 10.0 ** rng.uniform(-9, 1)
+    scatter = rng.choice([0.0, 1e-12, 1e-8, 1e-4])
+    n = sectors * size
+    K, M = np.zeros((n, n)), np.zeros((n, n))
+    own, mass = chain(size, rng.uniform(0.5, 2.0), rng.uniform(0.0, 0.5)), np.diag(rng.uniform(0.5, 2.0, size))
+    for j in range(sectors):
+        here, there = j * size, (j + 1) % sectors * size
+        block = slice(here, here + size)
+        K[block, block] += own * (1 + scatter * rng.standard_normal())
+        M[block, block] += mass
+        tie = np.array([[1, -1], [-1, 1]]) * coupling
+        K[np.ix_([here, there], [here, there])] += tie
+    return K, M
+
+
+def row(rng):
+    """A chain of random springs, held or free."""
+    n = int(rng.integers(2, 40))
+    springs = 10.0 ** rng.uniform(-2, 2, n + 1)
+    if rng.random() < 0.3:
+        springs[0] = springs[-1] = 0.0
+    K = np.diag(springs[:-1] + springs[1:]) - np.diag(springs[1:-1], 1) - np.diag(springs[1:-1], -1)
+    return K, np.diag(rng.uniform(0.2, 5.0, n))
+
+
+def squares(K, M):
+    """Eigenvalues by dense linear algebra, ascending."""
+    root = 1 / np.sqrt(np.diag(M))
+    return np.linalg.eigvalsh(root[:, None] * K * root)
+
+
+def check(comm, K, M, count):
+    modes = fw.linear_modes(fw.Model(M, K, comm=comm), count, "free")
+    expected = np.maximum(squares(K, M), 0.0)[:count]
+    size = squares(K, M)[-1]
+    assert len(modes) == min(count, len(K))
+    assert np.allclose([mode.omega**2 for mode in modes], expected, rtol=1e-9, atol=1e-12 * size)
+    shapes = np.column_stack([mode.shape for mode in modes])
+    assert np.allclose(shapes.T @ M @ shapes, np.eye(len(modes)), rtol=0, atol=1e-8)
+
+
+@pytest.mark.ranks(1, 2, 3)
+def test_random_wheels_and_chains_have_all_their_lowest_modes(comm):
+    """Multiplicity and order of as many modes as are asked for."""
+    for seed in range(0, DRAWN, 1 if comm.size == 1 else 25):
+        rng = np.random.default_rng(seed)
+        K, M = (wheel if seed % 2 else row)(rng)
+        check(comm, K, M, int(rng.integers(1, min(len(K), 12) + 1)))
+
+
+def test_many_modes_at_one_frequency(comm):
+    """600 equal masses that nothing couples, above the size that each rank takes whole: one eigenvalue 600 times."""
+    check(comm, 4.0 * np.eye(600), np.eye(600), 8)
+
+
+def test_a_family_closer_than_the_eigensolver_resolves_by_its_first_vector(comm):
+    """520 blades within 1e-9, and two single ones below them."""
+    k = 1 + 1e-9 * np.arange(520) / 520
+    k[:2] = 0.25, 0.5
+    check(comm, np.diag(k), np.eye(520), 6)
+
+
+def test_double_waves_of_a_sector_are_counted_once(comm):
+    """A travelling wave's real form doubles every eigenvalue: two dofs have two modes."""
+    model = fw.Model(
+        {0: np.eye(2)},
+        {0: np.array([[3.0, -1.0], [-1.0, 2.0]]), 1: -0.5 * np.eye(2), -1: -0.5 * np.eye(2)},
+        comm=comm,
+        sectors=12,
+        nodal_diameter=5,
+    )
+    theta = 2 * np.pi * 5 / 12
+    expected = np.linalg.eigvalsh(np.array([[3.0, -1.0], [-1.0, 2.0]]) - np.cos(theta) * np.eye(2))
+    assert [m.omega**2 for m in fw.linear_modes(model, 9, "free")] == pytest.approx(expected, rel=1e-11)
+
+
+def test_modes_that_do_not_converge_are_named(comm):
+    """Before: the list was short, and nothing was said."""
+    n = 700
+    options = PETSc.Options("modes_")
+    options["eps_max_it"], options["eps_ncv"] = 1, 14
+    try:
+        with pytest.raises(FretwaveError, match="linear modes.*converge"):
+            fw.linear_modes(fw.Model(np.eye(n), chain(n), comm=comm), 10, "free")
+    finally:
+        del options["eps_max_it"], options["eps_ncv"]
+
+
+def test_an_unstable_direction_does_not_count_as_missed(comm):
+    """One negative stiffness: its mode has omega 0 as before, and nothing else is looked for."""
+    K = np.diag([-2.0, 1.0, 4.0, 9.0])
+    assert [m.omega for m in fw.linear_modes(fw.Model(np.eye(4), K, comm=comm), 3, "free")] == pytest.approx([0, 1, 2])
+
+
+def test_a_single_dof_has_one_mode(comm):
+    assert [m.omega for m in fw.linear_modes(single_dof(comm, 4.0, 1.0), 5, "free")] == pytest.approx([0.5])

@@ -1,0 +1,114 @@
+"""What a study runs, how it measures errors, and what it prints; solvers are replaced by closed forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fretwave.results.study_report import markdown, write_csv
+from fretwave.run.study_plan import Outcome, Plan, Settings, Study, common_amplitudes
+
+pytestmark = pytest.mark.ranks(1)
+
+PLAN = Plan(harmonics=(1, 3, 7), samples=(8, 64, 256), tolerance=(1e-2, 1e-10))
+
+
+def solve(settings: Settings, extra=()) -> Outcome:
+    """A branch with zeta off by 1/H^2 of its peak, omega by 1/N_t relative."""
+    amplitude = np.concatenate([common_amplitudes(0.1, 1.0, 5), extra])
+    zeta = 0.04 * amplitude * (1.0 + 1.0 / settings.harmonics**2)
+    omega = np.full_like(amplitude, 25.0 * (1.0 + 1.0 / settings.samples))
+    estimate = np.full_like(amplitude, 0.5 / settings.harmonics)
+    return Outcome(amplitude, omega, zeta, estimate, float(zeta.max()), 1.0, 50, 150, 0.01 * settings.harmonics)
+
+
+def run_study(solver=solve):
+    study = Study(PLAN, common_amplitudes(0.1, 1.0, 5))
+    solved = []
+    study.run(solver, lambda sweep, settings: solved.append((sweep, settings)))
+    return study, solved
+
+
+def test_one_setting_is_swept_at_a_time_and_the_finest_run_is_shared():
+    study, solved = run_study()
+    assert PLAN.reference == Settings(7, 256, 1e-10)
+    assert [settings for _, settings in solved].count(PLAN.reference) == 1
+    assert [row["reference"] for row in study.table()].count(1) == 3
+    assert all(row["zeta_error"] == 0.0 for row in study.table() if row["reference"])
+
+
+def test_fewer_than_two_samples_per_highest_harmonic_are_not_run():
+    assert all(settings.samples > 14 for sweep, settings in PLAN.sweeps() if sweep == "samples")
+
+
+def test_errors_are_measured_against_the_finest_run():
+    study, _ = run_study()
+    first = study.table()[0]
+    peak = 0.04 * study.amplitudes[-1] * (1.0 + 1.0 / 49.0)
+    assert first["zeta_error"] == pytest.approx(0.04 * study.amplitudes[-1] * (1.0 - 1.0 / 49.0) / peak)
+    assert first["peak_zeta_error"] == pytest.approx(2.0 / (1.0 + 1.0 / 49.0) - 1.0)
+    assert first["error_estimate"] == pytest.approx(0.5)
+    samples = next(row for row in study.table() if row["sweep"] == "samples")
+    assert samples["omega_error"] == pytest.approx((1.0 + 1.0 / 64.0) / (1.0 + 1.0 / 256.0) - 1.0)
+
+
+def test_amplitudes_that_a_run_meets_several_times_are_left_out():
+    inside = common_amplitudes(0.1, 1.0, 5)[2]
+    study, _ = run_study(lambda settings: solve(settings, [inside] if settings.harmonics == 3 else []))
+    assert study.left_out == pytest.approx([inside])
+    assert len(study.compared) == 4
+    assert study.table()[0]["zeta_error"] > 0.0
+
+
+def test_a_run_that_fails_is_named_and_the_others_are_kept():
+    study, _ = run_study(lambda settings: "step too small" if settings.harmonics == 1 else solve(settings))
+    assert study.failures == {Settings(1, 256, 1e-10): "step too small"}
+    assert len(study.table()) == len(PLAN.sweeps()) - 1
+
+
+def test_without_the_finest_run_there_is_no_table():
+    study, _ = run_study(lambda settings: "no" if settings == PLAN.reference else solve(settings))
+    assert study.table() == []
+
+
+def test_table_is_written_as_csv_and_as_markdown(tmp_path):
+    rows = run_study()[0].table()
+    lines = write_csv(rows, tmp_path / "study.csv").read_text().splitlines()
+    assert lines[0].startswith("sweep,harmonics,samples,tolerance,points,newton,wall_s,omega_error,zeta_error,")
+    assert len(lines) == 1 + len(rows)
+    text = markdown(rows, ["a note"]).splitlines()
+    assert len({len(line) for line in text[: 2 + len(rows)]}) == 1  # aligned
+    assert "harmonics (finest)" in text[4]
+    assert text[-1] == "a note"
+
+
+@pytest.mark.ranks(1, 2)
+def test_study_of_the_two_dof_case_shows_that_harmonics_pay(tmp_path):
+    """One harmonic misses 40 % of the peak damping, seven about 8 % (REFERENCE; measured with other programs)."""
+    from pathlib import Path
+
+    from mpi4py import MPI
+
+    from fretwave.commands import study as command
+
+    folder = Path(MPI.COMM_WORLD.bcast(str(tmp_path)))
+    case = Path(__file__).parents[2] / "cases" / "two_dof" / "case.toml"
+    choice = ["--harmonics", "1,7,15", "--samples", "256", "--tolerance", "1e-10", "--repeats", "1"]
+    assert command.main([str(case), "--analysis", "mode", "--out", str(folder), *choice]) == 0
+    if MPI.COMM_WORLD.rank == 0:
+        lines = (folder / "study.csv").read_text().splitlines()
+        rows = [dict(zip(lines[0].split(","), line.split(","))) for line in lines[1:]]
+        assert float(rows[0]["peak_zeta_error"]) == pytest.approx(0.40, abs=0.03)
+        assert float(rows[1]["peak_zeta_error"]) == pytest.approx(0.08, abs=0.03)
+        assert (folder / "study.png").exists()
+
+
+def test_component_modes_are_swept_like_any_setting():
+    plan = Plan(harmonics=(1, 3), samples=(64,), tolerance=(1e-10,), component_modes=(8, 2))
+    assert plan.reference == Settings(3, 64, 1e-10, 8)
+    swept = [settings for sweep, settings in plan.sweeps() if sweep == "component_modes"]
+    assert swept == [Settings(3, 64, 1e-10, 2), Settings(3, 64, 1e-10, 8)]
+    study = Study(plan, common_amplitudes(0.1, 1.0, 5))
+    study.run(solve, lambda sweep, settings: None)
+    assert "| modes " in markdown(study.table())
+    assert "modes" not in markdown(run_study()[0].table())

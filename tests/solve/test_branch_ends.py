@@ -1,0 +1,229 @@
+"""What a branch says of its end, what it meets on its way, and how it begins where Newton alone does not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from models.core_models import friction, mode_problem, oscillator, single_dof, whole
+
+import fretwave as fw
+from fretwave import _core
+from fretwave.solve.starting import _mode_start, _Way, starts
+
+LOW, HIGH = 0.02, 3.0
+#: Of the oscillator's EPMC branch with H = 21 between its two folds: three solutions.
+THREE = 0.1350472602799
+
+
+def epmc(two_dof, comm):
+    return mode_problem(oscillator(two_dof, comm), range(1, 22, 2), 1024, "EPMC", start="stuck")
+
+
+def follow(problem, low, high, report_at=(), **steps):
+    branch = fw.Continuation(problem, problem.initial(low), (low, high), fw.StepControl(**steps), report_at)
+    return branch, list(branch)
+
+
+def named(points, event):
+    return [p.parameter for p in points if event in p.event.split()]
+
+
+@pytest.mark.ranks(1)
+@pytest.mark.parametrize("maximum", [0.3, 0.1, 0.03])
+def test_every_crossing_of_a_reported_value_is_found(two_dof, comm, maximum):
+    """One step of 0.3 passes the value three times."""
+    branch, points = follow(epmc(two_dof, comm), 0.13, 0.15, [THREE], maximum=maximum)
+    assert branch.converged and branch.missed == []
+    assert named(points, "report") == pytest.approx([THREE] * 3, rel=1e-12)
+
+
+@pytest.mark.ranks(1)
+def test_two_folds_in_a_step_are_found_at_the_same_places_as_by_short_steps(two_dof, comm):
+    long, short = (named(follow(epmc(two_dof, comm), LOW, 0.2, maximum=m)[1], "fold") for m in (0.3, 0.02))
+    assert len(long) == 2 and long == pytest.approx(short, rel=1e-9)
+
+
+@pytest.mark.ranks(1)
+def test_a_branch_that_comes_back_has_not_arrived(two_dof, comm):
+    """With 50 % damping and H = 21 the complex mode returns to small amplitudes on another sheet."""
+    problem = mode_problem(oscillator(two_dof, comm, np.diag([25.3, 0.0])), range(1, 22, 2), 1024, start="stuck")
+    branch, points = follow(problem, LOW, HIGH)
+    assert not branch.converged and points[-1].parameter == pytest.approx(LOW / 2, rel=1e-9)
+    assert branch.reason.startswith("the branch comes back to amplitude 0.02, where it began, without reaching")
+
+
+def response(model, level, omega, orders=(1, 3, 5), samples=128):
+    reference = fw.linear_modes(model, 1, "free")[0]
+    force = np.zeros(model.n_dof)
+    force[0] = 1.0
+    problem = fw.ForcedResponse(model, fw.Harmonics(list(orders), samples), {1: force}, level, 0, reference)
+    return problem, fw.Continuation(problem, problem.initial(omega[0]), omega)
+
+
+def test_a_response_without_bound_is_no_arrival(two_dof, comm):
+    """Friction takes at most 4 R |phi_2| per period and amplitude, a force F does pi F |phi_1|: F = 8.99 is lost."""
+    omega = two_dof.omega_free
+    most = 4 * 5.0 * 40.0 / (40.0 - 0.02 * omega**2) / np.pi
+    for level, bounded in ((0.98 * most, True), (1.02 * most, False)):
+        _, branch = response(oscillator(two_dof, comm), level, (22.0, 27.0))
+        for point in branch:
+            last = point
+        assert branch.converged is bounded
+        assert last.parameter == pytest.approx(27.0) if bounded else branch.reason == "the response grows without bound"
+
+
+@pytest.mark.ranks(1)
+def test_the_peak_of_a_response_does_not_depend_on_the_step(two_dof, comm):
+    found = []
+    for maximum in (0.3, 0.03):
+        problem, _ = response(oscillator(two_dof, comm), 8.0, (22.0, 27.0), samples=1024)
+        branch, points = follow(problem, 22.0, 27.0, maximum=maximum)
+        assert branch.converged
+        found.append([(p.parameter, problem.state(p.y)["amplitude"]) for p in points if p.event == "peak"])
+    assert len(found[0]) == 1 and np.allclose(found[0], found[1], rtol=1e-8, atol=0)
+
+
+# Den Hartog's oscillator with a limit of 0.3: most frequencies start in a motion that Newton does not find from zero.
+SLIDERS = [("jenkins", 1e2), ("jenkins", 1e3), ("jenkins", 1e4), ("regularised_coulomb", 1e-3)]
+
+
+@pytest.mark.ranks(1)
+@pytest.mark.parametrize("omega", [0.3, 0.5, 0.7, 0.8])
+@pytest.mark.parametrize("law, stiffness", SLIDERS)
+def test_a_textbook_response_starts(comm, law, stiffness, omega):
+    keys = {"jenkins": "tangential_stiffness", "regularised_coulomb": "regularisation_velocity"}
+    model = single_dof(comm, law=fw.Contact(law, [[1.0]], {"friction_limit": 0.3, keys[law]: stiffness}))
+    problem, branch = response(model, 1.0, (omega, 1.001 * omega), (1, 3, 5, 7), 256)
+    first = next(iter(branch))
+    assert problem.state(first.y)["amplitude"] > 0.9  # it slides: 1 / (1 - omega^2) less what friction takes
+    assert first.residual < 1e-10
+
+
+def test_raising_the_excitation_leads_to_the_response(comm):
+    """The way's end solves the equations of the response, in slip, and is the point that Newton finds from there."""
+    model = single_dof(comm, law=friction([[1.0]], 0.3, 1e-3))
+    problem, branch = response(model, 1.0, (0.7, 0.71), (1, 3, 5, 7), 256)
+    reasons: list[str] = []
+    ((how, y),) = starts(fw.Continuation, problem, problem.initial(0.7), reasons)
+    assert how.startswith("by raising the excitation from zero in ") and reasons == []
+    assert np.linalg.norm(whole(problem.residual(y))) < 1e-9
+    first = next(iter(branch))
+    assert problem.state(first.y)["amplitude"] == pytest.approx(problem.state(y)["amplitude"], rel=1e-8)
+
+
+@pytest.mark.ranks(1)
+def test_steps_follow_from_the_branch_not_from_iterations(two_dof, comm):
+    """A looser corrector leaves as many points, and each within a thousandth of where it was."""
+    found = []
+    for tolerance in (1e-10, 1e-8):
+        problem = mode_problem(oscillator(two_dof, comm), [1, 3, 5], 1024, start="stuck", prefix="loose_")
+        branch = fw.Continuation(problem, problem.initial(LOW), (LOW, 0.5))
+        branch.snes.setTolerances(atol=tolerance)
+        found.append([p.parameter for p in branch])
+    assert len(found[0]) == len(found[1]) and np.allclose(found[0], found[1], rtol=1e-3, atol=0)
+
+
+def sampled_slider(comm, two_dof, stiffness):
+    """The oscillator with an elastic slider in place of the smooth damper."""
+    law = fw.Contact("jenkins", two_dof.B, {"tangential_stiffness": stiffness, "friction_limit": 5.0})
+    return fw.Model(two_dof.M, two_dof.K, None, [law], comm)
+
+
+@pytest.mark.ranks(1)
+@pytest.mark.parametrize("stiffness", [1e6, 1e10])
+def test_stiff_sliders_are_followed_from_piece_to_piece(two_dof, comm, stiffness):
+    """Samples stick or slip one by one over 5 N / kt: a staircase of corners, from stuck to free. Zeta peaks alike."""
+    problem = mode_problem(sampled_slider(comm, two_dof, stiffness), [1, 3, 5, 7], 256, start="stuck")
+    branch, points = follow(problem, LOW, HIGH)
+    assert branch.converged, branch.reason
+    states = [problem.state(p.y) for p in points]
+    assert states[0]["omega0"] == pytest.approx(two_dof.omega_stuck, rel=1e-4)
+    assert states[-1]["omega0"] == pytest.approx(two_dof.omega_free, rel=1e-3)
+    assert max(s["zeta"] for s in states) == pytest.approx(0.0368, rel=5e-3)  # of both, 7 harmonics
+    # rounding of forces kt u against inertia k a
+    assert max(p.residual for p in points) < 1e-9 + 8 * np.finfo(float).eps * stiffness / 640
+
+
+def stop(comm, stiffness, gap=0.0):
+    """One mass on a spring beside a one-sided stop, with 5 % damping."""
+    B = np.array([[1.0], [0.0], [0.0]])
+    values = {
+        "normal_stiffness": stiffness,
+        "tangential_stiffness": 1.0,
+        "friction_coefficient": 0.0,
+        "normal_load": 0.0,
+        "gap": gap,
+    }
+    return fw.Model(np.eye(1), np.eye(1), 0.1 * np.eye(1), [fw.Contact("coulomb_3d", B, values)], comm)
+
+
+@pytest.mark.ranks(1)
+def test_a_response_at_a_stiff_stop_starts_by_closing_its_gap(comm):
+    """Its equations are the same at every level: raising the excitation leads nowhere."""
+    problem, branch = response(stop(comm, 1e4), 1.0, (0.9, 0.91), range(8), 128)
+    first = next(iter(branch))
+    assert branch.started.startswith("by closing the gaps from where nothing touches in ")
+    assert np.linalg.norm(whole(problem.residual(first.y))) < 1e-8
+
+
+@pytest.mark.ranks(1)
+def test_a_mode_at_a_stiff_stop_is_the_bilinear_oscillator(comm):
+    """Half a period on each spring, w = 2 / (1 + 1/sqrt(1 + kn)), at every amplitude; 5e-3 for harmonics left out."""
+    model = fw.Model(np.eye(1), np.eye(1), None, stop(comm, 100.0).contacts, comm)
+    problem = mode_problem(model, range(16), 512, "EPMC", start="free")
+    branch, points = follow(problem, 0.1, 0.2)
+    assert branch.converged and branch.started.startswith("by closing the gaps")
+    found = [problem.state(p.y)["omega0"] for p in points]
+    assert np.allclose(found, 2 / (1 + 1 / np.sqrt(101.0)), rtol=5e-3, atol=0)
+
+
+def ways(comm):
+    """Problems on the way to a response and to a mode whose stop is in touch."""
+    problem, _ = response(stop(comm, 3.0), 1.0, (0.9, 0.91), range(4), 64)
+    yield _Way(problem, _core.ForcedStart(problem.core, problem.initial(0.9), True)), problem
+    yield _Way(problem, _core.ForcedStart(problem.core, problem.initial(0.9), False)), problem
+    mode = mode_problem(stop(comm, 3.0), range(4), 64, "EPMC", start="free")
+    yield _Way(mode, _mode_start(mode, mode.initial(0.7))), mode
+
+
+@pytest.mark.ranks(1)
+def test_ways_to_a_start_have_exact_derivatives(comm):
+    for way, problem in ways(comm):
+        y = way.core.initial()
+        values, rng = y.getArray().copy(), np.random.default_rng(3)
+        values[: 2 * 4 - 1] = 0.4 * rng.standard_normal(7)
+        values[-1] = 0.1
+
+        def residual(x, way=way, y=y):
+            at = y.copy()
+            at.setArray(x)
+            return whole(way.residual(at)).copy()
+
+        step = rng.standard_normal(len(values))
+        there, direction = y.copy(), y.copy()
+        there.setArray(values), direction.setArray(step)
+        exact = whole(way.jacobian_product(there, direction))
+        assembled = way.jacobian(there).convert("dense").getDenseArray() @ step
+        differences = (residual(values + 1e-7 * step) - residual(values - 1e-7 * step)) / 2e-7
+        assert np.allclose(exact, differences, rtol=0, atol=1e-5 * abs(exact).max())
+        assert np.allclose(exact, assembled, rtol=0, atol=1e-12 * abs(exact).max())
+        # the law they share stands where it stood once the problem itself is evaluated
+        problem.residual(y)
+
+
+def test_a_piece_is_told_by_its_number(two_dof, comm):
+    """Same number while every sample keeps its state, another one beyond: at first slip, and on every rank."""
+    problem = mode_problem(sampled_slider(comm, two_dof, 1e4), [1, 3, 5], 128, start="stuck")
+    first = 5.0 / 1e4 / abs(problem.start.shape[1] / problem.start.shape[0])  # amplitude at which it slips
+    numbers = [problem.core.piece(problem.initial(a * first)) for a in (0.1, 0.5, 0.99, 1.01, 1.5)]
+    assert len(set(numbers[:3])) == 1 and len(set(numbers)) == 3
+    assert comm.allgather(numbers) == [numbers] * comm.size
+
+
+@pytest.mark.ranks(1)
+def test_a_response_may_leave_the_range_where_it_began_and_come_in_again(comm):
+    """A stop of ten times the spring: the branch from 0.4 rad/s folds back below it first, and arrives all the same."""
+    problem, branch = response(stop(comm, 10.0), 1.0, (0.4, 0.6), range(8), 256)
+    omega = [p.parameter for p in branch]
+    assert branch.converged and omega[-1] == pytest.approx(0.6)
+    assert 0.39 < min(omega) < 0.4

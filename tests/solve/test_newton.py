@@ -1,0 +1,222 @@
+"""The corrector: what counts as converged, and how its linear systems fail and are solved."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from models.core_models import CubicLaw, chain
+from petsc4py import PETSc
+from test_krylov import TIP, blade, preloaded
+
+import fretwave as fw
+from fretwave.solve.preload import StaticPreload
+
+M, K, LIMIT = 1.0, 1e6, 10.0  #: of the single mass [kg, N/m, N]
+
+
+def hysteresis(kt, amplitude, samples):
+    """Complex stiffness of a sampled Jenkins element under one harmonic: its force, marched here, over its motion."""
+    turn = 2 * np.pi * np.arange(samples) / samples
+    force, slider = np.zeros(samples), 0.0
+    for t in [*range(samples)] * 2:
+        u = amplitude * np.cos(turn[t])
+        force[t] = np.clip(kt * (u - slider), -LIMIT, LIMIT)
+        slider = slider if abs(force[t]) < LIMIT else u - force[t] / kt
+    return complex(2 / samples * np.sum(force * np.exp(-1j * turn)) / amplitude)
+
+
+def jenkins(kt, amplitude):
+    """The same without sampling (REFERENCE)."""
+    angle = np.arccos(1 - 2 * LIMIT / (kt * amplitude))
+    loss = 4 * LIMIT / (np.pi * amplitude) * (1 - LIMIT / (kt * amplitude))
+    return complex(kt / np.pi * (angle - np.sin(2 * angle) / 2), loss)
+
+
+def closed_form(method, friction):
+    """(omega0, zeta) of the single mass with one harmonic (REFERENCE) and the complex stiffness of its friction."""
+    k = K + friction
+    if method == "EPMC":
+        return np.sqrt(k.real / M), k.imag / (2 * k.real)
+    return np.sqrt(abs(k) / M), np.sin(np.angle(k) / 2)
+
+
+def slider(comm, kt):
+    one = np.eye(1)
+    contact = fw.Contact("jenkins", one, {"tangential_stiffness": kt, "friction_limit": LIMIT})
+    return fw.Model(M * one, K * one, None, [contact], comm)
+
+
+@pytest.mark.parametrize("method", ["CNM", "EPMC"])
+@pytest.mark.parametrize("kt", [1e2, 1e4, 1e6, 1e8, 1e10, 1e12, 1e14])
+def test_a_slider_of_any_stiffness_has_its_closed_form(comm, kt, method):
+    """From stick to a thousand times the slip; at 1e14 N/m friction was lost beside the stuck stiffness' force."""
+    model, samples = slider(comm, kt), 128
+    problem = fw.NonlinearMode(model, fw.Harmonics([1], samples), method, 0, fw.linear_modes(model, 1)[0])
+    ends = (0.5 * LIMIT / kt, 1e3 * LIMIT / min(kt, K))
+    branch = fw.Continuation(problem, problem.initial(ends[0]), ends)
+    for point in branch:
+        p = problem.state(point.y)
+        omega, zeta = closed_form(method, hysteresis(kt, p["amplitude"], samples))
+        cancelled = 1e-16 * kt * p["amplitude"] / LIMIT  # of the slider's force where it sticks
+        assert p["omega0"] == pytest.approx(omega, rel=1e-8 + cancelled)
+        assert p["zeta"] == pytest.approx(zeta, rel=1e-6 + cancelled, abs=1e-9)
+        assert point.accepted or point.rounding > 1e-10
+    assert branch.converged, branch.reason
+
+
+@pytest.mark.ranks(1)
+@pytest.mark.parametrize("kt", [1e8, 1e12, 1e14])
+def test_stiff_kinks_between_masses_are_passed(comm, kt):
+    """A slider between two of three: far beyond slip zeta is 4 R |dphi| / (2 pi w^2 a phi^T M phi) of the free mode."""
+    springs, B = chain(3, 1e6), np.array([[-1.0, 1.0, 0.0]])
+    contact = fw.Contact("jenkins", B, {"tangential_stiffness": kt, "friction_limit": LIMIT})
+    model = fw.Model(np.eye(3), springs, None, [contact], comm)
+    problem = fw.NonlinearMode(model, fw.Harmonics([1], 256), "CNM", 0, fw.linear_modes(model, 1)[0])
+    branch = fw.Continuation(problem, problem.initial(1e-6), (1e-6, 1e-2))
+    for point in branch:
+        last = problem.state(point.y)
+    assert branch.converged, branch.reason
+    square, shape = 1e6 * (2 - np.sqrt(2)), np.array([1, np.sqrt(2), 1])
+    loss = 4 * LIMIT * (shape[1] - shape[0]) / (2 * np.pi * square * 1e-2 * shape @ shape)
+    assert last["amplitude"] == pytest.approx(1e-2)
+    assert last["omega"] == pytest.approx(np.sqrt(square), rel=1e-5)
+    assert last["zeta"] == pytest.approx(loss, rel=1e-3)
+
+
+@pytest.mark.parametrize("method", ["CNM", "EPMC"])
+def test_sampling_converges_to_the_continuous_closed_form(comm, method):
+    """To second order, at twice the amplitude of first slip."""
+    kt, errors = 1e6, []
+    for samples in (64, 128, 256):
+        model = slider(comm, kt)
+        problem = fw.NonlinearMode(model, fw.Harmonics([1], samples), method, 0, fw.linear_modes(model, 1)[0])
+        amplitude = 2 * LIMIT / kt
+        point = next(iter(fw.Continuation(problem, problem.initial(amplitude), (amplitude / 2, 2 * amplitude))))
+        omega, zeta = closed_form(method, jenkins(kt, amplitude))
+        errors.append(abs(problem.state(point.y)["zeta"] / zeta - 1))
+    assert errors[2] < 1e-3 and errors[0] > 3 * errors[1] > 9 * errors[2]
+
+
+def counts(comm, case, **options):
+    """Points, Newton steps and linear iterations of a branch on the Krylov route. Collective."""
+    model, first, rest = case
+    database = PETSc.Options("loose_")
+    for name, value in {"route": "krylov", **options}.items():
+        database.setValue(name, value)
+    problem = fw.NonlinearMode(model, fw.Harmonics(range(8), 128), "CNM", TIP, first, "loose_")
+    problem.preload(rest.displacement, rest.load)
+    branch = fw.Continuation(problem, problem.initial(1e-3), (1e-3, 6e-3), fw.StepControl(max_points=50))
+    found = np.array([(1, p.newton, p.linear) for p in branch]).sum(axis=0)
+    for name in options:
+        database.delValue(name)
+    assert branch.converged, branch.reason
+    return found
+
+
+def test_how_roughly_newton_steps_are_solved_for_does_not_shape_the_branch(comm):
+    """A tangent is solved to its own tolerance, and steps are measured as exact ones: it was 12 to 4,247 points."""
+    model = blade(comm)
+    case = (model, *preloaded(model))
+    usual = counts(comm, case)
+    for options in ({"ksp_rtol": 1e-3}, {"ksp_rtol": 1e-2}, {"snes_ksp_ew": None}):
+        found = counts(comm, case, **options)
+        assert abs(found[0] - usual[0]) < 0.2 * usual[0], f"{options}: {found} against {usual}"
+        assert found[2] < 1.5 * usual[2], f"{options}: {found} against {usual}"
+
+
+def newton_at(problem, amplitude, prefix):
+    """The corrector at a fixed amplitude, its row, and the starting mode."""
+    newton, row = fw._core.Newton(problem.core, prefix), problem.core.unknowns()
+    row.set(0)
+    row.setValue(row.getSize() - 1, 1.0)
+    row.assemble()
+    newton.system.close(row, np.log(amplitude))
+    return newton, row, problem.initial(amplitude)
+
+
+@pytest.mark.parametrize("size", [3, 700], ids=["dense", "sparse"])
+def test_a_singular_jacobian_is_a_failed_step_and_no_more(comm, size):
+    """LAPACK, KLU and MUMPS each tell it in their own way; the next solve starts from clean factors."""
+    springs = 2 * np.eye(size) - np.eye(size, k=1) - np.eye(size, k=-1)
+    contact = fw.Contact("jenkins", np.eye(1, size), {"tangential_stiffness": 1.0, "friction_limit": 1.0})
+    model = fw.Model(np.eye(size), springs + np.eye(size), None, [contact], comm)
+    problem = fw.NonlinearMode(model, fw.Harmonics([1], 16), "EPMC", 0, fw.linear_modes(model, 1)[0], "singular_")
+    PETSc.Options("singular_")["route"] = "direct"
+    newton, row, y = newton_at(problem, 0.1, "singular_")
+    none = row.duplicate()
+    none.set(0)
+    for _ in range(3):
+        newton.system.close(none, 1.0)
+        converged, *_, reason = newton.solve(y.copy())
+        assert not converged and "singular" in reason
+        assert not newton.linear(y, row, none.duplicate())
+        newton.system.close(row, np.log(0.1))
+        trial = y.copy()
+        converged, *_, reason = newton.solve(trial)
+        assert converged, reason
+
+
+@pytest.mark.parametrize("rung, iterations", [("condensed", 4), ("whole", 1)])
+def test_a_linear_solve_that_fails_is_solved_in_a_dearer_way(comm, rung, iterations):
+    """GMRES is cut short, so that the dense blocks, then the condensed system too, are not enough."""
+    model = blade(comm)
+    case = (model, *preloaded(model))
+    _, first, rest = case
+    found = {}
+    for prefix, limit in (("usual_", 200), ("cut_", iterations)):
+        database = PETSc.Options(prefix)
+        database["route"], database["ksp_max_it"] = "krylov", limit
+        problem = fw.NonlinearMode(model, fw.Harmonics(range(6), 128), "CNM", TIP, first, prefix)
+        problem.preload(rest.displacement, rest.load)
+        branch = fw.Continuation(problem, problem.initial(2e-3), (2e-3, 3e-3), report_at=[2.5e-3])
+        points = [(problem.state(p.y), p.event) for p in branch]
+        assert branch.converged, branch.reason
+        found[prefix] = next(state for state, event in points if event == "report"), branch.fallbacks
+    assert not any(found["usual_"][1][key] for key in ("rebuilt", "condensed", "whole"))
+    assert found["cut_"][1]["rebuilt"] and found["cut_"][1][rung] and "factorised" in found["cut_"][1]["said"]
+    for key in ("omega", "zeta"):
+        assert found["cut_"][0][key] == pytest.approx(found["usual_"][0][key], rel=1e-8)
+
+
+def test_a_motion_that_does_not_oscillate_has_no_frequency(comm):
+    """A mass with zeta = 1.5 by its damper, and -1.5: EPMC's omega is 0 there, never nan; omega0 and beta stay."""
+    one = np.eye(1)
+    for damping in (1.5, -1.5, 0.5):
+        contact = fw.Contact("jenkins", one, {"tangential_stiffness": 1e-9, "friction_limit": 1.0})
+        model = fw.Model(one, one, 2 * damping * one, [contact], comm)
+        problem = fw.NonlinearMode(model, fw.Harmonics([1], 16), "EPMC", 0, fw.linear_modes(model, 1)[0])
+        branch = fw.Continuation(problem, problem.initial(0.1), (0.1, 0.2))
+        states = [problem.state(p.y) for p in branch]
+        assert branch.converged, branch.reason
+        for state in states:
+            assert state["zeta"] == pytest.approx(damping) and state["omega0"] == pytest.approx(1)
+            assert state["omega"] == pytest.approx(np.sqrt(max(0, 1 - damping**2)))
+
+
+def test_a_route_that_cannot_be_taken_is_said(comm):
+    """A static problem has no preconditioner; it was an error without being asked for."""
+    model = slider(comm, 1.0)
+    problem = StaticPreload(model, np.ones(1), fw.linear_modes(model, 1)[0], prefix="asked_")
+    PETSc.Options("asked_")["route"] = "krylov"
+    route = fw._core.Newton(problem.core, "asked_").route
+    assert route == "direct (krylov asked for, but this problem has no preconditioner)"
+    PETSc.Options("asked_")["blocks"] = "sparse"
+    with pytest.raises(fw.InputError, match="sparse blocks"):
+        fw._core.Newton(problem.core, "asked_")
+
+
+class BrokenLaw(CubicLaw):
+    """A cubic spring whose force is not a number beyond an elongation of 1."""
+
+    def force(self, u, v):
+        return np.where(np.abs(u) > 1, np.nan, super().force(u, v))
+
+
+def test_a_force_that_is_not_a_number_is_a_failed_step(comm):
+    one = np.eye(1)
+    model = fw.Model(one, one, None, [fw.Contact(BrokenLaw(), one)], comm)
+    problem = fw.NonlinearMode(model, fw.Harmonics([1, 3], 64), "EPMC", 0, fw.linear_modes(model, 1, "free")[0])
+    branch = fw.Continuation(problem, problem.initial(0.1), (0.1, 2.0))
+    amplitudes = [problem.state(p.y)["amplitude"] for p in branch]
+    assert not branch.converged and "step too small" in branch.reason
+    assert 0.9 < max(amplitudes) < 1.2
