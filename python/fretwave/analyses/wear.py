@@ -19,7 +19,7 @@ from ..errors import FretwaveError, NotConverged
 from ..model.laws import Role
 from ..mpi import groups
 from ..mpi.guard import on_first_rank
-from ..results.file import names_of_data
+from ..results.dimensions import names_of_data
 from ..results.results import AnalysisWriter, has_results, open_results
 from .parts.branch import mode_problem, points_of, step_control
 from .parts.context import AnalysisContext, Outcome

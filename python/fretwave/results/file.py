@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import uuid
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -18,6 +18,7 @@ from ..errors import InputError
 from ..files.whole import Unfailing, beside, bring_to_disk, check_whole, seal, sealed_size, told
 from ..post.contact_history import MOTION
 from ..texts import display
+from .dimensions import name_dimensions, put_array
 from .journal import Record, read_records, unfinished
 
 #: Rows of one HDF5 chunk: a branch of usual length allocates no chunk while it grows.
@@ -130,25 +131,6 @@ def build_group(file: Any, name: str, rows: Rows) -> None:
     _fill(group, rows)
 
 
-def name_dimensions(group: Any, data: Any, names: Sequence[str] = ()) -> None:
-    """Dimension scales for every axis of a dataset: those of this group or the one above, or new ones in this group.
-
-    netCDF-4 wants each axis named by a scale in the dataset's own group or in one above. Axes beyond `names` are
-    numbered as the dataset's own.
-    """
-    from h5py import h5ds
-
-    own = data.name.rpartition("/")[2]
-    for axis, size in enumerate(data.shape):
-        name = names[axis] if axis < len(names) else _axis_of(own, axis)
-        holder = group.parent if name not in group and axis < len(names) and name in group.parent else group
-        if name not in holder:
-            holder.create_dataset(name, data=np.arange(size))
-        if not h5ds.is_scale(holder[name].id):
-            holder[name].make_scale(name)
-        data.dims[axis].attach_scale(holder[name])
-
-
 def _growing(
     group: Any, name: str, rows: int, shape: Any, most: int, dtype: Any = "f8", missing: float | None = None
 ) -> Any:
@@ -156,17 +138,6 @@ def _growing(
     size = 8 * int(np.prod(shape, dtype=np.int64))
     chunk = (max(1, min(most, CHUNK_BYTES // max(size, 1))), *(max(1, n) for n in shape))
     return group.create_dataset(name, (rows, *shape), dtype, maxshape=(None, *shape), chunks=chunk, fillvalue=missing)
-
-
-def _axis_of(name: str, axis: int) -> str:
-    return f"axis_{axis}_of_{name}"
-
-
-def names_of_data(group: Any) -> list[str]:
-    """Names of the datasets of a group that are no dimension scales."""
-    from h5py import h5ds
-
-    return [key for key, item in group.items() if hasattr(item, "shape") and not h5ds.is_scale(item.id)]
 
 
 def _create_points(group: Any, rows: Rows) -> None:
@@ -224,17 +195,6 @@ def _put_motion(group: Any, rows: Rows, contact: str, key: str, values: Any, pla
         axes = ["reported", "sample", "component", "pair"] if values.ndim == 3 else ["reported", "sample", "pair"]
         name_dimensions(holder, data, axes)
     holder[key][place] = values
-
-
-def put_array(group: Any, name: str, values: Any, attributes: Mapping[str, Any]) -> None:
-    """A further array in the group, replacing one of the same name."""
-    own = name.rpartition("/")[2]
-    for key in [name, *(_axis_of(own, axis) for axis in range(np.ndim(values)))]:
-        if key in group:
-            del group[key]
-    data = group.create_dataset(name, data=values)
-    data.attrs.update(attributes)
-    name_dimensions(group, data)
 
 
 class NewResults:

@@ -16,7 +16,8 @@ from ..errors import InputError
 from ..model.laws import UNKNOWN, Role, kept_laws
 from ..post.mode_curve import ModeCurve
 from ..post.motion import motion
-from .file import has_results, names_of_data, open_results
+from .dimensions import names_of_data
+from .file import has_results, open_results
 
 Array = npt.NDArray[np.float64]
 Table = dict[str, Array]

@@ -25,7 +25,7 @@ from ..columns import COLUMNS, Column
 from ..files.whole import replace_text
 from ..post.grid import Plan
 from ..texts import toml
-from .file import name_dimensions
+from .dimensions import name_dimensions
 from .results import has_results, open_results, rewritten
 from .sweep_summary import SPLIT, columns_of, summarise
 

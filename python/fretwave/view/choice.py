@@ -17,7 +17,7 @@ from ..case.sector import nodal_diameter
 from ..errors import InputError
 from ..model.laws import kept_laws
 from ..post.contact_history import ContactHistory
-from ..results.file import names_of_data
+from ..results.dimensions import names_of_data
 from ..texts import display, nearest
 
 Array = npt.NDArray[np.float64]

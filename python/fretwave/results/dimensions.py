@@ -1,0 +1,49 @@
+"""Names of the axes of datasets, as netCDF-4 wants them: xarray reads a run as a tree of datasets."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+
+def name_dimensions(group: Any, data: Any, names: Sequence[str] = ()) -> None:
+    """Dimension scales for every axis of a dataset: those of this group or the one above, or new ones in this group.
+
+    netCDF-4 wants each axis named by a scale in the dataset's own group or in one above. Axes beyond `names` are
+    numbered as the dataset's own.
+    """
+    from h5py import h5ds
+
+    own = data.name.rpartition("/")[2]
+    for axis, size in enumerate(data.shape):
+        name = names[axis] if axis < len(names) else _axis_of(own, axis)
+        holder = group.parent if name not in group and axis < len(names) and name in group.parent else group
+        if name not in holder:
+            holder.create_dataset(name, data=np.arange(size))
+        if not h5ds.is_scale(holder[name].id):
+            holder[name].make_scale(name)
+        data.dims[axis].attach_scale(holder[name])
+
+
+def put_array(group: Any, name: str, values: Any, attributes: Mapping[str, Any]) -> None:
+    """A further array in the group, replacing one of the same name."""
+    own = name.rpartition("/")[2]
+    for key in [name, *(_axis_of(own, axis) for axis in range(np.ndim(values)))]:
+        if key in group:
+            del group[key]
+    data = group.create_dataset(name, data=values)
+    data.attrs.update(attributes)
+    name_dimensions(group, data)
+
+
+def names_of_data(group: Any) -> list[str]:
+    """Names of the datasets of a group that are no dimension scales."""
+    from h5py import h5ds
+
+    return [key for key, item in group.items() if hasattr(item, "shape") and not h5ds.is_scale(item.id)]
+
+
+def _axis_of(name: str, axis: int) -> str:
+    return f"axis_{axis}_of_{name}"
