@@ -6,8 +6,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
+from h5py import h5ds
 
 import fretwave as fw
 
@@ -46,6 +48,25 @@ def test_a_run_is_shown_without_mpi_and_petsc(run, command):
         assert "limit cycle at a = 0.1375" in done.stdout
     else:
         assert (run / "mode_backbone.png").exists()
+
+
+def test_every_axis_has_its_name(run):
+    """A scale in the dataset's own group or in the one above, as netCDF-4 wants it; or it is one itself."""
+    nameless, foreign = [], []
+
+    def look(name, item):
+        if not hasattr(item, "dims") or h5ds.is_scale(item.id):
+            return
+        for axis in item.dims:
+            if len(axis) != 1:
+                nameless.append(name)
+            elif axis[0].parent not in (item.parent, item.parent.parent):
+                foreign.append(name)
+
+    with h5py.File(run / "results.h5") as file:
+        file.visititems(look)
+        assert len(file["mode/points"]) > 10
+    assert not nameless and not foreign
 
 
 def test_results_are_a_tree_of_datasets(run):

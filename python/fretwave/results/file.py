@@ -147,6 +147,7 @@ def _create_points(group: Any, rows: Rows) -> None:
     scale = _growing(group, first.name, len(rows), (), CHUNK_ROWS, first.dtype)
     scale[...] = np.array([first.stored(row[first.name]) for row in table], first.dtype)
     scale.attrs.update({"units": first.unit, "long_name": first.long_name})
+    scale.make_scale(first.name)
     for column in columns:
         data = _growing(points, column.name, len(rows), (), CHUNK_ROWS, column.dtype)
         data[...] = np.array([column.stored(row[column.name]) for row in table], column.dtype)
