@@ -61,12 +61,9 @@ std::string ForcedResponse::impossible(Vec y) {
 }
 
 double ForcedResponse::effect(Vec y, Vec dy) {
-  VecHandle weights = unknowns(), weighted = unknowns();
-  double square;
+  VecHandle weights = unknowns();
   metric(y, weights);
-  check(VecPointwiseMult(weighted, weights, dy));
-  check(VecDot(weighted, dy, &square));
-  return std::sqrt(square);
+  return solve::weighted_norm(weights, dy);
 }
 
 std::string ForcedResponse::beyond(Vec y) {

@@ -104,20 +104,28 @@ void Bordered::assemble(Vec y, Mat J) {
   check(MatAssemblyEnd(J, MAT_FINAL_ASSEMBLY));
 }
 
+namespace {
+
+void fill(Problem& problem, Vec y, size_t entries, Mat J) {
+  std::vector<double> v(entries);
+  problem.values(y, v);
+  check(MatSetValuesCOO(J, v.data(), INSERT_VALUES));
+}
+
+}  // namespace
+
 MatHandle assemble(Problem& problem, Vec y) {
   std::vector<PetscInt> rows, cols;
   problem.pattern(rows, cols);
   MatHandle J = coo_matrix(problem.comm(), problem.local_equations(), local_size(y), rows, cols);
-  assemble(problem, y, J);
+  fill(problem, y, rows.size(), J);
   return J;
 }
 
 void assemble(Problem& problem, Vec y, Mat J) {
   std::vector<PetscInt> rows, cols;
   problem.pattern(rows, cols);
-  std::vector<double> v(rows.size());
-  problem.values(y, v);
-  check(MatSetValuesCOO(J, v.data(), INSERT_VALUES));
+  fill(problem, y, rows.size(), J);
 }
 
 }  // namespace fretwave::solve

@@ -12,6 +12,7 @@ import pytest
 from h5py import h5ds
 
 import fretwave as fw
+from fretwave.files.dimensions import put_array
 
 pytestmark = pytest.mark.ranks(1)
 CASE = Path(__file__).parents[2] / "cases" / "two_dof" / "case.toml"
@@ -67,6 +68,16 @@ def test_every_axis_has_its_name(run):
         file.visititems(look)
         assert len(file["mode/points"]) > 10
     assert not nameless and not foreign
+
+
+def test_arrays_of_one_name_in_two_groups_keep_their_own_axes():
+    """Places of the pairs of two contacts, unlike in number, the first of them written again."""
+    with h5py.File("axes", "w", driver="core", backing_store=False) as file:
+        group = file.create_group("mode")
+        for name, size in (("pairs_ring/position", 4), ("pairs_root/position", 7), ("pairs_ring/position", 5)):
+            put_array(group, name, np.zeros((size, 2)), {})
+        for name, size in (("pairs_ring/position", 5), ("pairs_root/position", 7)):
+            assert [len(axis[0]) for axis in group[name].dims] == [size, 2]
 
 
 def test_results_are_a_tree_of_datasets(run):

@@ -16,10 +16,10 @@ import numpy as np
 
 from ..case.schema import ModeAnalysis, WearAnalysis
 from ..errors import FretwaveError, NotConverged
+from ..files.dimensions import names_of_data
 from ..model.laws import Role
 from ..mpi import groups
 from ..mpi.guard import on_first_rank
-from ..results.dimensions import names_of_data
 from ..results.results import AnalysisWriter, has_results, open_results
 from .parts.branch import mode_problem, points_of, step_control
 from .parts.context import AnalysisContext, Outcome

@@ -15,10 +15,10 @@ import numpy as np
 
 from ..columns import Column, Value
 from ..errors import InputError
+from ..files.dimensions import name_dimensions, put_array
 from ..files.whole import Unfailing, beside, bring_to_disk, check_whole, seal, sealed_size, told
 from ..post.contact_history import MOTION
 from ..texts import display
-from .dimensions import name_dimensions, put_array
 from .journal import Record, read_records, unfinished
 
 #: Rows of one HDF5 chunk: a branch of usual length allocates no chunk while it grows.

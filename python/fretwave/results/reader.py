@@ -13,10 +13,10 @@ import numpy as np
 import numpy.typing as npt
 
 from ..errors import InputError
+from ..files.dimensions import names_of_data
 from ..model.laws import UNKNOWN, Role, kept_laws
 from ..post.mode_curve import ModeCurve
 from ..post.motion import motion
-from .dimensions import names_of_data
 from .file import has_results, open_results
 
 Array = npt.NDArray[np.float64]

@@ -22,10 +22,10 @@ from typing import Any
 import numpy as np
 
 from ..columns import COLUMNS, Column
+from ..files.dimensions import name_dimensions
 from ..files.whole import replace_text
 from ..post.grid import Plan
 from ..texts import toml
-from .dimensions import name_dimensions
 from .results import has_results, open_results, rewritten
 from .sweep_summary import SPLIT, columns_of, summarise
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..columns import COLUMNS, Column
 from ..errors import InputError
+from ..files.dimensions import name_dimensions
 from ..files.whole import replaced
 from ..hb.states import described, state_of
 from .hermite import Cubic
@@ -90,8 +91,4 @@ def _put(file: Any, column: Column, values: Any, dimensions: list[str]) -> None:
     data = np.array([str(value) for value in values], dtype=object) if text else np.asarray(values)
     variable = file.create_dataset(column.name, data=data, dtype=h5py.string_dtype() if text else None)
     variable.attrs.update(units=column.unit, long_name=column.long_name)
-    for axis, (name, size) in enumerate(zip(dimensions, data.shape)):
-        if name not in file:
-            file.create_dataset(name, data=np.arange(size))
-            file[name].make_scale(name)
-        variable.dims[axis].attach_scale(file[name])
+    name_dimensions(file, variable, dimensions)

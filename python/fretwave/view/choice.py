@@ -15,9 +15,9 @@ from ..analyses.parts.context import belongs
 from ..case.load import Case
 from ..case.sector import nodal_diameter
 from ..errors import InputError
+from ..files.dimensions import names_of_data
 from ..model.laws import kept_laws
 from ..post.contact_history import ContactHistory
-from ..results.dimensions import names_of_data
 from ..texts import display, nearest
 
 Array = npt.NDArray[np.float64]

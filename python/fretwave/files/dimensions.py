@@ -16,7 +16,7 @@ def name_dimensions(group: Any, data: Any, names: Sequence[str] = ()) -> None:
     """
     from h5py import h5ds
 
-    own = data.name.rpartition("/")[2]
+    own = data.name[len(group.name) :]
     for axis, size in enumerate(data.shape):
         name = names[axis] if axis < len(names) else _axis_of(own, axis)
         holder = group.parent if name not in group and axis < len(names) and name in group.parent else group
@@ -29,8 +29,7 @@ def name_dimensions(group: Any, data: Any, names: Sequence[str] = ()) -> None:
 
 def put_array(group: Any, name: str, values: Any, attributes: Mapping[str, Any]) -> None:
     """A further array in the group, replacing one of the same name."""
-    own = name.rpartition("/")[2]
-    for key in [name, *(_axis_of(own, axis) for axis in range(np.ndim(values)))]:
+    for key in [name, *(_axis_of(name, axis) for axis in range(np.ndim(values)))]:
         if key in group:
             del group[key]
     data = group.create_dataset(name, data=values)
@@ -46,4 +45,4 @@ def names_of_data(group: Any) -> list[str]:
 
 
 def _axis_of(name: str, axis: int) -> str:
-    return f"axis_{axis}_of_{name}"
+    return f"axis_{axis}_of_{name.strip('/').replace('/', '_')}"
