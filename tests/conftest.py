@@ -31,6 +31,7 @@ GRACE = 3.0
 WORLD = MPI.COMM_WORLD
 EVENTS = os.environ.get("FRETWAVE_TEST_EVENTS")
 COLLECT = os.environ.get("FRETWAVE_TEST_COLLECT")
+CLAIMS = os.environ.get("FRETWAVE_TEST_CLAIMS")
 
 
 def rank_counts(item: pytest.Item) -> tuple[int, ...]:
@@ -54,7 +55,9 @@ def write_event(**event: object) -> None:
 @pytest.hookimpl(tryfirst=True)
 def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line("markers", "ranks(*counts): numbers of MPI ranks the test runs on (default 1 and 2)")
-    config.pluginmanager.register(Lockstep(config), "fretwave-lockstep")
+    claims = Claims(Path(CLAIMS) if CLAIMS else None)
+    config.pluginmanager.register(claims, "fretwave-claims")
+    config.pluginmanager.register(Lockstep(config, claims), "fretwave-lockstep")
     if EVENTS and not config.option.basetemp:
         config.option.basetemp = str(Path(EVENTS) / f"tmp_{WORLD.rank}")
 
@@ -118,17 +121,48 @@ class Outcome:
         return "failed" if self.failed else "skipped" if self.skipped else "passed"
 
 
+class Claims:
+    """Test files are shared with the pytests beside this one: each runs those that it was first to claim."""
+
+    def __init__(self, folder: Path | None) -> None:
+        self.folder = folder
+        self.mine: dict[str, bool] = {}
+
+    def has(self, item: pytest.Item) -> bool:
+        """Whether this pytest runs the test. Collective."""
+        file = item.nodeid.partition("::")[0]
+        if self.folder is not None and file not in self.mine:
+            self.mine[file] = WORLD.bcast(self.claim(file) if WORLD.rank == 0 else None)
+        return self.mine.get(file, True)
+
+    def claim(self, file: str) -> bool:
+        assert self.folder is not None
+        try:
+            (self.folder / file.replace("/", "--")).touch(exist_ok=False)
+        except FileExistsError:
+            return False
+        return True
+
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_runtest_protocol(self, item: pytest.Item) -> bool | None:
+        return None if self.has(item) else True  # True: nothing is left to do for it
+
+
 class Lockstep:
     """Ranks end every test together; one that failed on some ranks only ends the run, as the ranks are out of step."""
 
-    def __init__(self, config: pytest.Config) -> None:
+    def __init__(self, config: pytest.Config, claims: Claims) -> None:
         self.config = config
+        self.claims = claims
         self.comm = WORLD.Dup()
         self.outcome = Outcome()
 
     @pytest.hookimpl(hookwrapper=True, tryfirst=True)
     def pytest_runtest_protocol(self, item: pytest.Item):
         self.outcome = Outcome()
+        if not self.claims.has(item):
+            yield
+            return
         write_event(test=item.nodeid, outcome="started")
         yield
         write_event(test=item.nodeid, outcome=self.outcome.word)

@@ -1,7 +1,8 @@
 """Runs pytest once per number of MPI ranks and counts what really ran.
 
 A test that was asked for and did not run to its end on every rank (crash, hang, abort) is counted as a failure, so that
-a green last line means: every test, on every number of ranks it asks for.
+a green last line means: every test, on every number of ranks it asks for. Where there are more cores than ranks,
+several pytests share the test files: each takes the next that nobody has begun (``Claims`` in conftest.py).
 """
 
 from __future__ import annotations
@@ -12,11 +13,14 @@ import shutil
 import signal
 import subprocess
 import sys
+import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 EVENTS = ROOT / ".build" / "tests"
+#: At most so many pytests side by side: tests start programs of their own.
+MOST_SHARES = 4
 #: An outcome hides those before it: the worst rank speaks for the test.
 WORST_LAST = ["passed", "skipped", "started", "failed"]
 
@@ -41,7 +45,11 @@ class Count:
 
 
 def read_outcomes(folder: Path, ranks: int) -> dict[str, str]:
-    """Outcome of each test over all ranks; a test that a rank did not finish is "started"."""
+    """Outcome of each test over all shares and ranks; a test that a rank did not finish is "started"."""
+    return {test: word for share in folder.glob("share_*/") for test, word in read_share(share, ranks).items()}
+
+
+def read_share(folder: Path, ranks: int) -> dict[str, str]:
     outcomes: dict[str, str] = {}
     per_rank = [read_rank(folder / f"rank_{rank}.jsonl") for rank in range(ranks)]
     for test in {test for outcome in per_rank for test in outcome}:
@@ -122,27 +130,63 @@ def collect(arguments: list[str]) -> dict[str, list[int]]:
     sys.exit(1)
 
 
+def shares_for(ranks: int) -> int:
+    """How many pytests of so many ranks run side by side: one a core."""
+    return max(1, min(MOST_SHARES, len(os.sched_getaffinity(0)) // ranks))
+
+
 def run_ranks(ranks: int, arguments: list[str], timeout: float) -> str:
-    """Run pytest on `ranks` processes; returns how they ended, "" when well."""
+    """Run pytest on `ranks` processes, side by side on what cores there are; returns how they ended, "" when well."""
     folder = events_folder(ranks)
     shutil.rmtree(folder, ignore_errors=True)
-    folder.mkdir(parents=True)
+    shares = shares_for(ranks)
+    running = [start(ranks, share, folder, arguments, timeout) for share in range(shares)]
+    deadline = time.monotonic() + timeout
+    try:
+        endings = [wait(process, deadline, timeout) for process in running]
+    except BaseException:
+        for process in running:
+            end(process)
+        raise
+    for share in range(1, shares):
+        print((folder / f"share_{share}.log").read_text(encoding="utf-8"), end="", flush=True)
+    return next((ending for ending in endings if ending), "")
+
+
+def start(ranks: int, share: int, folder: Path, arguments: list[str], timeout: float) -> subprocess.Popen:
+    """One pytest; the first writes to the terminal, the others to files that are shown when all have ended."""
+    events = folder / f"share_{share}"
+    events.mkdir(parents=True)
     # mpirun gives every rank a terminal of its own, whatever this one is.
     colour = "--color=yes" if sys.stdout.isatty() else "--color=no"
     command = pytest_command(["-q", colour, f"--override-ini=faulthandler_timeout={0.8 * timeout}", *arguments])
+    if shares_for(ranks) > 1:  # a share of the tests has no percentage
+        command = [*command, "--override-ini=console_output_style=classic"]
     if ranks > 1:
         command = ["mpirun", "-n", str(ranks), *command]
-    environment = {**os.environ, "FRETWAVE_TEST_EVENTS": str(folder)}
-    # Its own session, so that a hanging tree of processes can be ended as a whole.
-    process = subprocess.Popen(command, cwd=ROOT, env=environment, stdin=subprocess.DEVNULL, start_new_session=True)
+    claims = folder / "claims"
+    claims.mkdir(exist_ok=True)
+    environment = {**os.environ, "FRETWAVE_TEST_EVENTS": str(events), "FRETWAVE_TEST_CLAIMS": str(claims)}
+    with open(folder / f"share_{share}.log", "wb") as log:
+        # Its own session, so that a hanging tree of processes can be ended as a whole.
+        return subprocess.Popen(
+            command,
+            cwd=ROOT,
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            stdout=log if share else None,
+            stderr=subprocess.STDOUT if share else None,
+            start_new_session=True,
+        )
+
+
+def wait(process: subprocess.Popen, deadline: float, timeout: float) -> str:
+    """How it ended, "" when well."""
     try:
-        code = process.wait(timeout)
+        code = process.wait(max(deadline - time.monotonic(), 0.0))
     except subprocess.TimeoutExpired:
         end(process)
         return f"no end after {timeout:g} s"
-    except BaseException:
-        end(process)
-        raise
     return f"exit code {code}" if code else ""
 
 

@@ -32,7 +32,8 @@ def clone(tmp_path: Path) -> Path:
 
 def call(clone: Path, *arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
     command = ["bash", *(str(clone / argument) if i == 0 else argument for i, argument in enumerate(arguments))]
-    return subprocess.run(command, env={**os.environ, **environment}, capture_output=True, text=True, timeout=60)
+    inherited = {key: value for key, value in os.environ.items() if key != "FRETWAVE_BUILD_TYPE"}
+    return subprocess.run(command, env={**inherited, **environment}, capture_output=True, text=True, timeout=60)
 
 
 def setup_function_call(clone: Path, code: str, **environment: str) -> subprocess.CompletedProcess[str]:
@@ -130,16 +131,23 @@ def test_root_may_start_ranks(clone: Path) -> None:
     assert setup_function_call(clone, code).stdout == "1 1\n"
 
 
-def events(folder: Path, *ranks: dict[str, str]) -> dict[str, str]:
+def events(folder: Path, *ranks: dict[str, str], share: int = 0) -> dict[str, str]:
+    folder = folder / f"share_{share}"
+    folder.mkdir()
     for rank, outcomes in enumerate(ranks):
         lines = [json.dumps({"test": test, "outcome": outcome}) for test, outcome in outcomes.items()]
         (folder / f"rank_{rank}.jsonl").write_text("\n".join(lines) + "\n", encoding="utf-8")
-    return rank_runner.read_outcomes(folder, len(ranks))
+    return rank_runner.read_outcomes(folder.parent, len(ranks))
 
 
 def test_worst_rank_speaks(tmp_path: Path) -> None:
     outcomes = events(tmp_path, {"a": "passed", "b": "passed", "c": "skipped"}, {"a": "passed", "b": "failed"})
     assert outcomes == {"a": "passed", "b": "failed", "c": "started"}
+
+
+def test_shares_add_up(tmp_path: Path) -> None:
+    events(tmp_path, {"a": "passed"}, share=0)
+    assert events(tmp_path, {"b": "failed"}, share=1) == {"a": "passed", "b": "failed"}
 
 
 @pytest.mark.parametrize(
@@ -185,13 +193,43 @@ def test_inner(comm):
 )
 def test_one_rank_that_fails_ends_the_run(tmp_path: Path, launch, body: str, line: str) -> None:
     """No hang: each of these would otherwise wait in the barrier until the timeout."""
-    tests = tmp_path / "tests"
-    tests.mkdir()
-    (tmp_path / "python").mkdir()
-    shutil.copy2(ROOT / "python" / "pyproject.toml", tmp_path / "python")
-    for name in ("conftest.py", "rank_runner.py"):
-        shutil.copy2(ROOT / "tests" / name, tests)
-    (tests / "test_inner.py").write_text(INNER.format(body=body), encoding="utf-8")
-    done = launch(1, str(tests / "rank_runner.py"), cwd=tmp_path)
+    done = run_inner(tmp_path, launch, test_inner=INNER.format(body=body))
     assert line in done.stdout, done.stdout + done.stderr
     assert done.returncode == (0 if "1 passed" in line else 1)
+
+
+def run_inner(folder: Path, launch, **files: str):
+    """The runner in a root of its own that has these test files."""
+    tests = folder / "tests"
+    tests.mkdir()
+    (folder / "python").mkdir()
+    shutil.copy2(ROOT / "python" / "pyproject.toml", folder / "python")
+    for name in ("conftest.py", "rank_runner.py"):
+        shutil.copy2(ROOT / "tests" / name, tests)
+    for name, text in files.items():
+        (tests / f"{name}.py").write_text(text, encoding="utf-8")
+    return launch(1, str(tests / "rank_runner.py"), cwd=folder)
+
+
+SHARED = """
+import pathlib, pytest
+
+@pytest.mark.ranks(1)
+@pytest.mark.parametrize("k", range(3))
+def test_shared(k):
+    with open({log!r}, "a") as file:
+        file.write(f"{name} {{k}}\\n")
+    assert {fine}
+"""
+
+
+@pytest.mark.skipif(rank_runner.shares_for(1) < 2, reason="one core: the tests are not shared")
+def test_every_file_runs_once_however_many_share_them(tmp_path: Path, launch) -> None:
+    """And what fails in one that does not write to the terminal is shown and counted."""
+    log = tmp_path / "ran.txt"
+    texts = {f"test_{k}": SHARED.format(log=str(log), name=k, fine=k != 4 and "True" or "k < 2") for k in range(6)}
+    done = run_inner(tmp_path, launch, **texts)
+    assert sorted(log.read_text().splitlines()) == sorted(f"{k} {test}" for k in range(6) for test in range(3))
+    assert "1 rank: 17 passed, 1 failed (expected 18)" in done.stdout, done.stdout + done.stderr
+    assert "assert 2 < 2" in done.stdout, done.stdout
+    assert done.stdout.splitlines()[-1] == "17 passed, 1 failed"
