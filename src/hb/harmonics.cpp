@@ -34,6 +34,11 @@ bool Harmonics::odd_only() const {
   return std::all_of(orders_.begin(), orders_.end(), [](int n) { return n % 2 == 1; });
 }
 
+std::vector<complex> conjugate(std::vector<complex> factor) {
+  for (complex& c : factor) c = std::conj(c);
+  return factor;
+}
+
 void multiply(Harmonics const& h, std::vector<complex> const& s, double const* x, double* y, int columns) {
   const int m = h.block_size();
   for (int c = 0; c < columns; ++c)

@@ -45,6 +45,7 @@ struct Exponents {
 
 /// y = s x on harmonic blocks: columns x block size, real (cos, sin) pairs.
 void multiply(Harmonics const&, std::vector<complex> const& s, double const* x, double* y, int columns);
+std::vector<complex> conjugate(std::vector<complex> factor);
 
 /// Between harmonic blocks (pairs x components x block size) and time samples (samples x components x pairs,
 /// pairs innermost): by a table of cosines and sines for few harmonics, by FFT for many.

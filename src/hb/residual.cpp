@@ -1,13 +1,10 @@
 #include "hb/residual.h"
 
-#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
 
-#include "error.h"
 #include "fault.h"
-#include "scramble.h"
 #include "together.h"
 
 namespace fretwave::hb {
@@ -47,11 +44,6 @@ std::vector<complex> Residual::factors(int phase) const {
 }
 
 namespace {
-
-std::vector<complex> conjugate(std::vector<complex> factor) {
-  for (complex& c : factor) c = std::conj(c);
-  return factor;
-}
 
 /// A harmonic-block vector with each order multiplied by its factor.
 VecHandle multiplied(Harmonics const& h, std::vector<complex> const& factor, Vec x) {
@@ -136,69 +128,6 @@ void Residual::contact_product(Group& group, Vec dQ, Exponents const* de, Vec dR
   add_force(group, dF, dR);
 }
 
-void Residual::expect_depths(PerContact const& depth) const {
-  if (depth.size() != groups_.size())
-    throw InputError("worn depths are given for another number of contacts", std::to_string(depth.size()),
-                     std::to_string(groups_.size()), "give a list, may be empty, for each contact");
-  for (size_t k = 0; k < groups_.size(); ++k) {
-    contact::Law const& law = *groups_[k].contact->law;
-    if (!depth[k].empty() && (!law.wears() || int(depth[k].size()) != law.pairs()))
-      throw InputError(
-          "a contact cannot take these worn depths",
-          "contact '" + groups_[k].contact->name + "', " + std::to_string(depth[k].size()) + " depths",
-          law.wears() ? std::to_string(law.pairs()) + " depths" : "a law with a normal direction",
-          "wear contacts with law coulomb_3d");
-  }
-}
-
-void Residual::wear(PerContact const& depth) {
-  together(model_.comm(), "wearing contacts", [&] {
-    fault::point("wear");
-    expect_depths(depth);
-  });
-  for (size_t k = 0; k < groups_.size(); ++k) {
-    contact::Law& law = *groups_[k].contact->law;
-    // on a rank without pairs too: all must agree that linearisations are of other depths
-    law.wear(depth[k].empty() ? nullptr : depth[k].data());
-  }
-}
-
-void Residual::gap_product(PerContact const& dgap, Vec dR) {
-  check(VecSet(dR, 0));
-  together(model_.comm(), "wearing contacts", [&] { expect_depths(dgap); });
-  for (size_t k = 0; k < groups_.size(); ++k) {
-    Group& group = groups_[k];
-    if (!group.contact->law->wears()) continue;
-    VecHandle dF = like(group.F);
-    std::vector<double> gaps = dgap[k];
-    gaps.resize(size_t(group.contact->law->pairs()), 0.0);  // an empty list: this contact does not wear
-    group.aft.gap_product(gaps.data(), WriteArray(dF).data());
-    add_force(group, dF, dR);
-  }
-}
-
-void Residual::stand_off(double distance) {
-  for (Group const& group : groups_) group.contact->law->stand_off(distance);
-}
-
-void Residual::stand_off_product(Vec dR) {
-  PerContact dgap(groups_.size());
-  for (size_t k = 0; k < groups_.size(); ++k)
-    if (groups_[k].contact->law->wears()) dgap[k].assign(groups_[k].contact->law->pairs(), 1.0);
-  gap_product(dgap, dR);
-}
-
-std::vector<Wearing> Residual::wearing(Vec Q, Exponents const& e) {
-  std::vector<Wearing> out;
-  const auto U = relative_motions(Q);
-  together(model_.comm(), "what wears the contacts", [&] {
-    fault::point("wearing");
-    for (size_t k = 0; k < groups_.size(); ++k)
-      out.push_back(groups_[k].aft.wearing(ReadArray(U[k]).data(), e));
-  });
-  return out;
-}
-
 namespace {
 
 /// pi sum_n n q_n^H p_n of this rank, q_n = Qc_n - i Qs_n: its imaginary part is the work of -p over a
@@ -231,39 +160,6 @@ EnergyBalance Residual::energy() {
   return {.contact = sums[0], .damping = sums[2], .modal = sums[1], .stored = sums[3]};
 }
 
-/// Entries of this rank's rows of all maps, pair by pair.
-void Residual::find_weights(Group& group) {
-  const int d = group.contact->law->components();
-  for (auto const& [phase, B, blocked, factor] : group.maps) {
-    PetscInt begin;
-    check(MatGetOwnershipRange(B, &begin, nullptr));
-    for_entries(B, [&](PetscInt row, PetscInt dof, double value) {
-      const int own = int(row - begin);
-      group.weights.push_back({own / d, own % d, dof, value, phase});
-    });
-  }
-  std::stable_sort(group.weights.begin(), group.weights.end(),
-                   [](auto const& a, auto const& b) { return a.pair < b.pair; });
-}
-
-template <class Body>
-void Residual::Group::each_couple(Body body) const {
-  for (size_t first = 0, last = 0; first < weights.size(); first = last) {
-    while (last < weights.size() && weights[last].pair == weights[first].pair) ++last;
-    for (size_t a = first; a < last; ++a)
-      for (size_t b = first; b < last; ++b) body(weights[a], weights[b]);
-  }
-}
-
-void Residual::contact_pattern(Group& group, std::vector<PetscInt>& rows, std::vector<PetscInt>& cols) {
-  const PetscInt m = harmonics_.block_size();
-  group.each_couple([&](auto const& a, auto const& b) {
-    group.places.push_back({a.pair, a.component, b.component, a.value * b.value, a.phase, b.phase});
-    for (PetscInt i = 0; i < m; ++i)
-      for (PetscInt j = 0; j < m; ++j) rows.push_back(a.dof * m + i), cols.push_back(b.dof * m + j);
-  });
-}
-
 double Residual::rounding() const {
   const int m = harmonics_.block_size();
   ReadArray Q(Q_);
@@ -291,119 +187,6 @@ double Residual::rounding() const {
   }
   MPI_Allreduce(MPI_IN_PLACE, &square, 1, MPI_DOUBLE, MPI_SUM, model_.comm());
   return std::hypot(stiffness_.rounding(e_, Q_), std::numeric_limits<double>::epsilon() * std::sqrt(square));
-}
-
-std::vector<PairTangents> Residual::pair_tangents() {
-  std::vector<PairTangents> out;
-  together(model_.comm(), "linearising contacts", [&] {
-    fault::point("contact tangents");
-    for (Group& group : groups_) {
-      const int d = group.contact->law->components(), pairs = group.contact->law->pairs();
-      const size_t ld = size_t(d) * harmonics_.block_size();
-      out.push_back({pairs, d, group.weights, std::vector<double>(pairs * ld * ld)});
-      group.aft.blocks(e_, out.back().D.data());
-      if (fault::value("contact tangents") && !out.back().D.empty()) out.back().D[0] = std::nan("");
-    }
-  });
-  return out;
-}
-
-void Residual::pattern(std::vector<PetscInt>& rows, std::vector<PetscInt>& cols) {
-  stiffness_.pattern(rows, cols);
-  for (Group& group : groups_) {
-    group.places.clear();
-    contact_pattern(group, rows, cols);
-  }
-}
-
-/// P_row^H D P_col of an m x m block, P the phase factors: rows and columns are harmonic blocks themselves.
-void Residual::turn(int row_phase, int col_phase, double* block) const {
-  const int m = harmonics_.block_size();
-  std::vector<double> work(size_t(m) * m);
-  const auto transpose = [m](double const* in, double* out) {
-    for (int i = 0; i < m; ++i)
-      for (int j = 0; j < m; ++j) out[size_t(j) * m + i] = in[size_t(i) * m + j];
-  };
-  // a row d of D becomes P^T d, which is the factor's conjugate times d
-  multiply(harmonics_, conjugate(factors(col_phase)), block, work.data(), m);
-  transpose(work.data(), block);
-  multiply(harmonics_, conjugate(factors(row_phase)), block, work.data(), m);
-  transpose(work.data(), block);
-}
-
-double* Residual::values(double scale, double* v) {
-  v = stiffness_.values(e_, scale, v);
-  const size_t m = harmonics_.block_size();
-  const auto tangents = pair_tangents();
-  for (size_t g = 0; g < groups_.size(); ++g) {
-    const size_t ld = tangents[g].components * m;
-    for (auto const& place : groups_[g].places) {  // B^H (dF/dU) B
-      double const* from = tangents[g].D.data() + (place.pair * ld + place.row * m) * ld + place.col * m;
-      for (size_t i = 0; i < m; ++i)
-        for (size_t j = 0; j < m; ++j) v[i * m + j] = scale * place.value * from[i * ld + j];
-      if (place.row_phase || place.col_phase) turn(place.row_phase, place.col_phase, v);
-      v += m * m;
-    }
-  }
-  return v;
-}
-
-ContactSummary Residual::summarise(Vec Q, Exponents const& e) {
-  double sums[8] = {}, largest[2] = {};
-  const auto U = relative_motions(Q);
-  together(model_.comm(), "reading contacts", [&] {
-    fault::point("summary");
-    for (size_t k = 0; k < groups_.size(); ++k) {
-      const auto s = groups_[k].aft.summarise(ReadArray(U[k]).data(), e);
-      const double parts[8] = {s.stick, s.slip, s.open, s.truncated, s.total, s.aliased, s.retained, s.work};
-      for (int i = 0; i < 8; ++i) sums[i] += parts[i];
-      largest[0] = std::max(largest[0], s.unclosed), largest[1] = std::max(largest[1], s.path);
-    }
-  });
-  MPI_Allreduce(MPI_IN_PLACE, sums, 8, MPI_DOUBLE, MPI_SUM, model_.comm());
-  MPI_Allreduce(MPI_IN_PLACE, largest, 2, MPI_DOUBLE, MPI_MAX, model_.comm());
-  return {sums[0], sums[1], sums[2], sums[3], sums[4], sums[5], sums[6], sums[7], largest[0], largest[1]};
-}
-
-std::uint64_t Residual::piece() const {
-  std::uint64_t sum = 0;
-  for (size_t g = 0; g < groups_.size(); ++g) sum += scrambled(groups_[g].aft.piece() + g);
-  sum = scrambled(sum + std::uint64_t(comm_rank(model_.comm())));
-  MPI_Allreduce(MPI_IN_PLACE, &sum, 1, MPI_UINT64_T, MPI_SUM, model_.comm());
-  return sum;
-}
-
-unsigned Residual::contact_version() const {
-  unsigned sum = 0;
-  for (Group const& group : groups_) sum += group.contact->law->version();
-  return sum;
-}
-
-void Residual::settle(Vec Q) {
-  const auto U = relative_motions(Q);
-  together(model_.comm(), "settling contacts", [&] {
-    fault::point("settle");
-    for (size_t k = 0; k < groups_.size(); ++k) {
-      contact::Law& law = *groups_[k].contact->law;
-      const int d = law.components(), n = law.pairs();
-      ReadArray blocks(U[k]);
-      std::vector<double> u(size_t(d) * n);
-      for (int i = 0; i < n; ++i)
-        for (int c = 0; c < d; ++c) u[size_t(c) * n + i] = blocks[(i * d + c) * harmonics_.block_size()];
-      law.rest(u.data());
-    }
-  });
-}
-
-std::vector<ContactPeriod> Residual::periods(Vec Q, Exponents const& e) {
-  std::vector<ContactPeriod> out;
-  const auto U = relative_motions(Q);
-  together(model_.comm(), "contact samples", [&] {
-    fault::point("contact samples");
-    for (size_t k = 0; k < groups_.size(); ++k)
-      out.push_back(groups_[k].aft.told_period(ReadArray(U[k]).data(), e));
-  });
-  return out;
 }
 
 }  // namespace fretwave::hb
