@@ -75,7 +75,7 @@ def write_files(folder: Path) -> None:
         sp.save_npz(folder / f"{letter}.npz", matrix)
         scipy.io.savemat(str(folder / f"{letter}.mat"), {letter: matrix.tocsc()}, do_compression=letter == "M")
         _write_v73(folder / f"{letter}.v73.mat", letter, matrix.tocsc())
-        _write_petsc(folder / f"{letter}.petsc", matrix)
+        write_petsc(folder / f"{letter}.petsc", matrix)
         lines = [f"{c + 1} {r + 1} {v:.14e}" for r, c, v in zip(lower.row, lower.col, lower.data)]
         (folder / f"{letter}.sti").write_text("\n".join(lines) + "\n")
     made = ["import", str(folder / "model.h5"), "--mass", str(folder / "M.npz"), "--stiffness", str(folder / "K.npz")]
@@ -96,7 +96,7 @@ def _write_v73(path: Path, name: str, matrix: sp.csc_matrix) -> None:
         file.write(b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM")
 
 
-def _write_petsc(path: Path, matrix: sp.csr_matrix) -> None:
+def write_petsc(path: Path, matrix: sp.csr_matrix) -> None:
     head = np.array([1211216, *matrix.shape, matrix.nnz], ">i4")
     rows = np.diff(matrix.indptr).astype(">i4")
     path.write_bytes(

@@ -15,7 +15,7 @@ import scipy.sparse as sp
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "cases" / "robustness"))
 from command_line import call
-from damaged_files import _write_petsc, damaged, matrices, state_of
+from damaged_files import write_petsc, damaged, matrices, state_of
 from test_results import fill, writer
 
 from fretwave.errors import InputError
@@ -136,7 +136,7 @@ def test_indices_of_a_model_file_without_a_seal_are_checked(tmp_path: Path) -> N
 
 
 def huge_petsc(path: Path, K: sp.csr_matrix) -> None:
-    _write_petsc(path, K)
+    write_petsc(path, K)
     content = bytearray(path.read_bytes())
     content[4:8] = (2**31 - 1).to_bytes(4, "big")
     path.write_bytes(content)
@@ -146,12 +146,12 @@ def wild_petsc(path: Path, K: sp.csr_matrix) -> None:
     wrong = K.copy()
     wrong.indices = wrong.indices.copy()
     wrong.indices[5] = 2**30
-    _write_petsc(path, wrong)
+    write_petsc(path, wrong)
 
 
 def negative_petsc(path: Path, K: sp.csr_matrix) -> None:
     """A row of -(2^30) entries, so that all of them are fewer than none."""
-    _write_petsc(path, K)
+    write_petsc(path, K)
     content = bytearray(path.read_bytes())
     content[4 * (4 + 24)] = 0xC0
     path.write_bytes(content)

@@ -8,7 +8,7 @@ from models.core_models import friction, mode_problem, oscillator, single_dof, w
 
 import fretwave as fw
 from fretwave import _core
-from fretwave.solve.starting import _mode_start, _Way, starts
+from fretwave.solve.starting import Way, mode_start, starts
 
 LOW, HIGH = 0.02, 3.0
 #: Of the oscillator's EPMC branch with H = 21 between its two folds: three solutions.
@@ -180,10 +180,10 @@ def test_a_mode_at_a_stiff_stop_is_the_bilinear_oscillator(comm):
 def ways(comm):
     """Problems on the way to a response and to a mode whose stop is in touch."""
     problem, _ = response(stop(comm, 3.0), 1.0, (0.9, 0.91), range(4), 64)
-    yield _Way(problem, _core.ForcedStart(problem.core, problem.initial(0.9), True)), problem
-    yield _Way(problem, _core.ForcedStart(problem.core, problem.initial(0.9), False)), problem
+    yield Way(problem, _core.ForcedStart(problem.core, problem.initial(0.9), True)), problem
+    yield Way(problem, _core.ForcedStart(problem.core, problem.initial(0.9), False)), problem
     mode = mode_problem(stop(comm, 3.0), range(4), 64, "EPMC", start="free")
-    yield _Way(mode, _mode_start(mode, mode.initial(0.7))), mode
+    yield Way(mode, mode_start(mode, mode.initial(0.7))), mode
 
 
 @pytest.mark.ranks(1)

@@ -18,8 +18,6 @@ SMALLER = 5
 WAY_POINTS = 20000
 #: Relative distance in frequency from the linear mode beyond which a first point may be of another mode.
 FAR = 0.02
-#: Why no mode grows out of the linear one.
-NONE = "no mode was found"
 CLOSING = "closing the gaps from where nothing touches"
 
 
@@ -27,7 +25,7 @@ CLOSING = "closing the gaps from where nothing touches"
 Follow = Callable[..., Any]
 
 
-class _Way(HarmonicProblem):
+class Way(HarmonicProblem):
     """The homotopy to a first point as a problem of its own."""
 
     def __init__(self, problem: HarmonicProblem, core: Any) -> None:
@@ -63,11 +61,10 @@ def starts(
         yield from _raised(follow, problem, y0, reasons)
         yield from _closed(follow, problem, _core.ForcedStart(problem.core, y0, True), reasons) if gaps else ()
     elif isinstance(problem, NonlinearMode):
-        yield from _grown(follow, problem, y0, reasons)
+        yield from _grown(follow, problem, y0, reasons, far)
         if far:
-            reasons[:] = [reason for reason in reasons if not reason.startswith(NONE)]
             return
-        yield from _closed(follow, problem, _mode_start(problem, y0), reasons) if gaps else ()
+        yield from _closed(follow, problem, mode_start(problem, y0), reasons) if gaps else ()
 
 
 def _raised(
@@ -83,7 +80,7 @@ def _closed(follow: Follow, problem: HarmonicProblem, way: Any, reasons: list[st
     yield from _led(follow, problem, way, CLOSING, reasons)
 
 
-def _mode_start(problem: NonlinearMode, y0: PETSc.Vec) -> Any:
+def mode_start(problem: NonlinearMode, y0: PETSc.Vec) -> Any:
     """The way with closing gaps at the amplitude of y0. Collective."""
     method, amplitude = getattr(_core.Method, problem.method), _parameter(problem, y0)
     shape = [problem.model.vector(part) for part in (problem.start.shape, problem.start.imaginary)]
@@ -97,7 +94,7 @@ def _led(
     follow: Follow, problem: HarmonicProblem, core: Any, how: str, reasons: list[str]
 ) -> Iterator[tuple[str, PETSc.Vec]]:
     """The solution at the end of a homotopy: an excitation that is whole (t = 1), or gaps that are no wider (t = 0)."""
-    way = _Way(problem, core)
+    way = Way(problem, core)
     control = StepControl(initial=0.05, maximum=0.3, max_points=WAY_POINTS)
     closing = how == CLOSING
     stop = (0.0, 2 * way.last_entry(core.initial())) if closing else (-1.0, 1.0)
@@ -117,7 +114,7 @@ def _parameter(problem: HarmonicProblem, y: PETSc.Vec) -> float:
 
 
 def _grown(
-    follow: Follow, problem: NonlinearMode, y0: PETSc.Vec, reasons: list[str]
+    follow: Follow, problem: NonlinearMode, y0: PETSc.Vec, reasons: list[str], far: bool
 ) -> Iterator[tuple[str, PETSc.Vec]]:
     """The mode grows from an amplitude at which the linear one solves it."""
     amplitude = _parameter(problem, y0)
@@ -134,7 +131,8 @@ def _grown(
         if count:
             reasons.append(f"following the mode from amplitude {small:.3g}: {reason}")
             return
-    reasons.append(f"{NONE} at {SMALLER} smaller amplitudes down to {small:.3g}")
+    if not far:
+        reasons.append(f"no mode was found at {SMALLER} smaller amplitudes down to {small:.3g}")
 
 
 def _last(branch: Any, nearby: bool = False) -> tuple[PETSc.Vec | None, int]:
