@@ -21,7 +21,7 @@ def figures(run: Run) -> Iterator[tuple[str, Figure]]:
 def draw(mode: Analysis, decay: Analysis) -> Figure:
     """Circles are cycles of the unreduced equations in time, the line is the nonlinear mode."""
     figure, (upper, lower) = style.new_figure(6.2, rows=2, sharex=True)
-    curve, table = mode.curve().sampled(), decay.columns
+    curve, table = mode.curve(), decay.columns
     for axes, column, factor in ((upper, "frequency_hz", 1.0), (lower, "zeta", 100.0)):
         axes.plot(curve["amplitude"], factor * curve[column], color=style.INK, label=f"mode, {mode.method()}")
     for (start, amplitude), colour in zip(decay.starts(), style.PALETTE):
