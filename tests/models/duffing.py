@@ -16,18 +16,18 @@ class Spring(CubicLaw):
     stuck_stiffness = 0.0
 
 
-def duffing():
+def duffing(damping=C):
     """With one harmonic the spring's force is 3/4 g a^3, exactly."""
-    return fw.Model([[1.0]], [[K]], [[C]], [fw.Contact(Spring(G), [[1.0]])])
+    return fw.Model([[1.0]], [[K]], [[damping]], [fw.Contact(Spring(G), [[1.0]])])
 
 
 def stiffness(a):
     return K + 0.75 * G * np.asarray(a) ** 2
 
 
-def mode(method="CNM"):
+def mode(method="CNM", damping=C):
     """lambda^2 + c lambda + k + 3/4 g a^2 = 0."""
-    model = duffing()
+    model = duffing(damping)
     return fw.NonlinearMode(model, fw.choose_harmonics(model, 1), method)
 
 

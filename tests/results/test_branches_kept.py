@@ -6,39 +6,19 @@ import h5py
 import numpy as np
 import pytest
 from models.duffing import C, mode, response, steps, stiffness
+from models.kept_branches import write_branches
 
 import fretwave as fw
 from fretwave.analyses.parts.branch import points_of, record
-from fretwave.columns import FORCED, MODE
+from fretwave.columns import MODE
 from fretwave.results.results import AnalysisWriter
 
 AMPLITUDES = [0.1, 0.37, 1.234, 2.9, 4.0]
 
 
-def write(folder, comm, kind, problems, ends, length=0.05, stop_after=None, **attributes):
-    """The analysis as a run writes it; `stop_after` rows it is interrupted and gone on with from the snapshot."""
-    columns = MODE if kind == "mode" else FORCED
-    described = {"type": kind, **attributes}
-    writer = AnalysisWriter(folder, kind, columns, described, ["x"], ["1c", "1s"], active=comm.rank == 0)
-    for problem in problems:
-        branch = fw.Continuation(problem, problem.initial(ends[0]), ends, steps(length))
-        for point in points_of(branch):
-            record(writer, problem, point, None, {})
-            if writer.rows == stop_after:
-                snapshot = branch.snapshot()
-                break
-        if stop_after is not None:
-            branch = fw.Continuation.restore(problem, snapshot, ends, steps(length))
-            for point in points_of(branch):
-                record(writer, problem, point, None, {})
-    writer.close("done", "stop value reached")
-    comm.barrier()
-    return fw.open_run(folder)[kind]
-
-
 @pytest.mark.parametrize("method", ["CNM", "EPMC"])
 def test_mode_is_read_as_the_closed_form(shared_tmp, comm, method):
-    found = write(shared_tmp, comm, "mode", [mode(method)], (0.1, 4.0), method=method).at(AMPLITUDES)
+    found = write_branches(shared_tmp, comm, "mode", [mode(method)], (0.1, 4.0), method=method).at(AMPLITUDES)
     omega0 = np.sqrt(stiffness(AMPLITUDES))
     np.testing.assert_allclose(found["amplitude"], AMPLITUDES, rtol=1e-12)
     np.testing.assert_allclose(found["omega0"], omega0, rtol=1e-6)
@@ -48,8 +28,8 @@ def test_mode_is_read_as_the_closed_form(shared_tmp, comm, method):
 @pytest.mark.parametrize("rows", [1, 7, 20])
 def test_interrupted_branch_keeps_the_same_cubic(shared_tmp, comm, rows):
     """Behind the first point, and in the middle; the step over the interruption is no straight line."""
-    whole = write(shared_tmp / "whole", comm, "mode", [mode()], (0.1, 4.0), 0.2)
-    halves = write(shared_tmp / "halves", comm, "mode", [mode()], (0.1, 4.0), 0.2, rows)
+    whole = write_branches(shared_tmp / "whole", comm, "mode", [mode()], (0.1, 4.0), 0.2)
+    halves = write_branches(shared_tmp / "halves", comm, "mode", [mode()], (0.1, 4.0), 0.2, rows)
     np.testing.assert_allclose(halves.curve()["omega"], whole.curve()["omega"], rtol=1e-9)
     assert len(whole) > 16 and not np.isnan(halves.slopes[1:]).any()
 
@@ -57,7 +37,7 @@ def test_interrupted_branch_keeps_the_same_cubic(shared_tmp, comm, rows):
 def test_script_and_run_read_the_same(shared_tmp, comm):
     problem = response()
     branch = fw.follow(problem, 1.8, 3.2, steps=steps(0.06))
-    kept = write(shared_tmp, comm, "forced", [problem], (1.8, 3.2), 0.06)
+    kept = write_branches(shared_tmp, comm, "forced", [problem], (1.8, 3.2), 0.06)
     for read in (lambda b: b.at(2.25), lambda b: b.at(amplitude=0.3), lambda b: b.curve(5)):
         mine, its = read(branch), read(kept)
         assert sorted(mine.names) == sorted(its.names) and len(mine) == len(its) > 1
@@ -68,7 +48,7 @@ def test_script_and_run_read_the_same(shared_tmp, comm):
 def test_levels_of_a_response_are_branches_of_their_own(shared_tmp, comm):
     """No line runs from the end of one to the start of the next; each is read where it is met."""
     F, levels = 0.02, (1.0, 2.0)
-    kept = write(shared_tmp, comm, "forced", [response(F, level) for level in levels], (1.8, 2.3))
+    kept = write_branches(shared_tmp, comm, "forced", [response(F, level) for level in levels], (1.8, 2.3))
     found = kept.at(1.9)
     assert found["level"].tolist() == list(levels)
     a = found["amplitude"]
@@ -82,7 +62,7 @@ def test_levels_of_a_response_are_branches_of_their_own(shared_tmp, comm):
 
 @pytest.mark.ranks(1)
 def test_results_without_slopes_are_read_by_chords(shared_tmp, comm):
-    kept = write(shared_tmp, comm, "mode", [mode()], (0.1, 4.0), 0.2)
+    kept = write_branches(shared_tmp, comm, "mode", [mode()], (0.1, 4.0), 0.2)
     with h5py.File(shared_tmp / "results.h5", "r+") as file:
         del file["mode/slopes"]
     old = fw.open_run(shared_tmp)["mode"]
@@ -108,7 +88,7 @@ def test_an_unfinished_branch_is_read_from_its_journal(tmp_path, comm):
 
 @pytest.mark.ranks(1)
 def test_slopes_are_scalars_alone_and_their_axes_have_names(shared_tmp, comm):
-    write(shared_tmp, comm, "mode", [mode()], (0.1, 4.0))
+    write_branches(shared_tmp, comm, "mode", [mode()], (0.1, 4.0))
     with h5py.File(shared_tmp / "results.h5") as file:
         slopes = file["mode/slopes"]
         assert slopes.shape == (len(file["mode/point"]), 2, 3)
