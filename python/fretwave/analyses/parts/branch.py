@@ -9,6 +9,7 @@ import numpy as np
 
 from ...case.schema import StepSection
 from ...results.results import AnalysisWriter
+from ...results.slopes import slope_fields, slopes_of
 
 #: Events at which the contact's motion over a period is kept.
 PLAIN_EVENTS = ("", "step")
@@ -74,7 +75,11 @@ def record(
     coefficients = problem.coefficients(point.y)
     if describe is not None:
         row.update(describe(problem, point.y, coefficients))
-    writer.append(row, coefficients, motions, kept)
+    slopes = {}
+    if point.knot is not None:
+        writer.keep(slope_fields(problem.meaning))
+        slopes = slopes_of(problem.meaning, point.knot)
+    writer.append(row, coefficients, motions, kept, slopes)
     return row
 
 
@@ -133,10 +138,20 @@ def tell_fallbacks(context: Any, branch: Any) -> None:
 
 
 def points_of(branch: Any) -> Iterator[Any]:
-    """Points of a branch; their vectors are freed a point later, for the branch may look back at its last one."""
-    from ...solve.follow import points_of
+    """Points of a branch with their knots. Collective.
 
-    return points_of(branch)
+    Their vectors are freed a point later, for the branch may look back at its last one.
+    """
+    from ...solve.follow import points_of
+    from ...solve.trace import Trace
+
+    trace = Trace(branch.problem)
+    if branch.resumed_at is not None:
+        trace.add(*branch.resumed_at)
+    for point in points_of(branch):
+        point.knot = trace.add(point.y, point.tangent)
+        yield point
+    trace.close()
 
 
 def split_state(state: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
