@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from .model.model import Contact, Model, by_sector
     from .model.modes import LinearMode, linear_modes
     from .model.reduction import FrequencyError, Reduction, reduce
+    from .model.rest import Rest
     from .model.structure import BuiltContact, BuiltModel
     from .results.reader import Run, open_run
     from .results.results import has_results, open_results
@@ -59,6 +60,7 @@ _HOMES = {
     "cyclic.sector": ("Sector",),
     "cyclic.reduction": ("SectorReduction", "reduce_sector"),
     "cyclic.waves": ("WaveError",),
+    "model.rest": ("Rest",),
     "cyclic.faces": ("match_faces", "rotation"),
     "model.laws": ("LawInfo", "Limit", "ParameterInfo", "PythonLaw", "Role", "laws", "register_law"),
     "model.model": ("Contact", "Model", "by_sector"),
@@ -95,6 +97,7 @@ __all__ = [
     "Point",
     "PythonLaw",
     "Reduction",
+    "Rest",
     "Role",
     "Run",
     "Sector",
