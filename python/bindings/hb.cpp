@@ -84,24 +84,28 @@ void bind_hb(nb::module_& m) {
       .def_prop_ro("stiffness_scale", &HarmonicProblem::stiffness_scale)
       .def("rounding", [](HarmonicProblem& p, Petsc<Vec> y) { return p.rounding(y.object); })
       .def("scalars", [](HarmonicProblem& p, Petsc<Vec> y) { return p.scalars(y.object); })
-      .def("settle", [](HarmonicProblem& p, Petsc<Vec> y) { p.settle(y.object); })
+      .def(
+          "settle",
+          [](HarmonicProblem& p, Petsc<Vec> y, PerContact const& from) { p.settle(y.object, from); },
+          nb::arg(), nb::arg("sliders") = PerContact{})
+      .def("stand", &HarmonicProblem::stand)
       .def("exponents", [](HarmonicProblem& p, Petsc<Vec> y) { return p.exponents(y.object).s; });
   nb::enum_<Method>(m, "Method").value("CNM", Method::CNM).value("EPMC", Method::EPMC);
   nb::class_<NonlinearMode, HarmonicProblem>(m, "NonlinearMode")
       .def(
           "__init__",
-          [](NonlinearMode* self, model::Model const& model, Harmonics const& h, Method method, PetscInt dof,
+          [](NonlinearMode* self, model::Model const& model, Harmonics const& h, Method method, Row row,
              double omega, Petsc<Vec> shape, Petsc<Vec> imaginary) {
-            new (self) NonlinearMode(model, h, method, dof, omega, shape.object, imaginary.object);
+            new (self) NonlinearMode(model, h, method, row, omega, shape.object, imaginary.object);
           },
           nb::keep_alive<1, 2>())
       .def("initial", [](NonlinearMode& p, double a) { return nb::steal(to_petsc4py(p.initial(a))); });
   nb::class_<ModeStart, NonlinearMode>(m, "ModeStart")
       .def(
           "__init__",
-          [](ModeStart* self, model::Model const& model, Harmonics const& h, Method method, PetscInt dof,
+          [](ModeStart* self, model::Model const& model, Harmonics const& h, Method method, Row row,
              double omega, Petsc<Vec> shape, Petsc<Vec> imaginary, double amplitude) {
-            new (self) ModeStart(model, h, method, dof, omega, shape.object, imaginary.object, amplitude);
+            new (self) ModeStart(model, h, method, row, omega, shape.object, imaginary.object, amplitude);
           },
           nb::keep_alive<1, 2>())
       .def("initial", [](ModeStart& p) { return nb::steal(to_petsc4py(p.initial())); })
@@ -128,9 +132,9 @@ void bind_hb(nb::module_& m) {
   nb::class_<ForcedResponse, HarmonicProblem>(m, "ForcedResponse")
       .def(
           "__init__",
-          [](ForcedResponse* self, model::Model const& model, Harmonics const& h, PetscInt dof, Petsc<Vec> P,
+          [](ForcedResponse* self, model::Model const& model, Harmonics const& h, Row row, Petsc<Vec> P,
              double level, double omega, Petsc<Vec> shape) {
-            new (self) ForcedResponse(model, h, dof, P.object, level, omega, shape.object);
+            new (self) ForcedResponse(model, h, row, P.object, level, omega, shape.object);
           },
           nb::keep_alive<1, 2>())
       .def_prop_ro("reference_amplitude", &ForcedResponse::reference_amplitude)

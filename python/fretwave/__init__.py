@@ -23,12 +23,15 @@ if TYPE_CHECKING:
     from .cyclic.reduction import SectorReduction, reduce_sector
     from .cyclic.sector import Sector
     from .cyclic.waves import WaveError
+    from .cyclic.wheel_modes import deviations, most_alike, standing_wave, travelling_wave
+    from .cyclic.wheel_shape import WheelShape
     from .hb.problems import ForcedResponse, Harmonics, NonlinearMode, choose_harmonics
     from .hb.reduction_error import NonlinearError, nonlinear_error
     from .model.laws import LawInfo, Limit, ParameterInfo, PythonLaw, Role, laws, register_law
     from .model.model import Contact, Model, by_sector
     from .model.modes import LinearMode, linear_modes
     from .model.reduction import FrequencyError, Reduction, reduce
+    from .model.rest import Rest
     from .model.structure import BuiltContact, BuiltModel
     from .results.reader import Run, open_run
     from .results.results import has_results, open_results
@@ -37,8 +40,10 @@ if TYPE_CHECKING:
     from .solve.follow import follow
     from .solve.preload import balanced, static_preload
     from .solve.steps import StepControl
+    from .solve.sweep import Sweep, sweep
     from .solve.transient import Transient
     from .solve.wear import Wear, WearControl, WearPoint
+    from .solve.wear_march import WearMarch, wear
     from .solve.worn_mode import WornMode
 
 #: Where each public name lives; loaded when first used, so that `fretwave --help` starts without PETSc.
@@ -59,6 +64,11 @@ _HOMES = {
     "cyclic.sector": ("Sector",),
     "cyclic.reduction": ("SectorReduction", "reduce_sector"),
     "cyclic.waves": ("WaveError",),
+    "cyclic.wheel_modes": ("deviations", "most_alike", "standing_wave", "travelling_wave"),
+    "cyclic.wheel_shape": ("WheelShape",),
+    "model.rest": ("Rest",),
+    "solve.sweep": ("Sweep", "sweep"),
+    "solve.wear_march": ("WearMarch", "wear"),
     "cyclic.faces": ("match_faces", "rotation"),
     "model.laws": ("LawInfo", "Limit", "ParameterInfo", "PythonLaw", "Role", "laws", "register_law"),
     "model.model": ("Contact", "Model", "by_sector"),
@@ -95,21 +105,26 @@ __all__ = [
     "Point",
     "PythonLaw",
     "Reduction",
+    "Rest",
     "Role",
     "Run",
     "Sector",
     "SectorReduction",
     "StepControl",
+    "Sweep",
     "Transient",
     "WaveError",
     "Wear",
     "WearControl",
+    "WearMarch",
     "WearPoint",
+    "WheelShape",
     "WornMode",
     "balanced",
     "build_model",
     "by_sector",
     "choose_harmonics",
+    "deviations",
     "follow",
     "has_results",
     "laws",
@@ -117,6 +132,7 @@ __all__ = [
     "load_case",
     "main",
     "match_faces",
+    "most_alike",
     "nonlinear_error",
     "open_results",
     "open_run",
@@ -125,7 +141,11 @@ __all__ = [
     "reduce_sector",
     "register_law",
     "rotation",
+    "standing_wave",
     "static_preload",
+    "sweep",
+    "travelling_wave",
+    "wear",
 ]
 
 

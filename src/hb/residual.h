@@ -81,8 +81,11 @@ class Residual {
   std::uint64_t piece() const;
   /// Grows with every `settle` and `wear` of any problem that shares the laws; the same on every rank.
   unsigned contact_version() const;
-  /// The laws take the mean relative displacement of Q as their rest state. Collective.
-  void settle(Vec Q);
+  /// The laws take the mean relative displacement of Q as their rest state, reached from sliders that stand
+  /// at zero, or as `from` says. Collective.
+  void settle(Vec Q, PerContact const& from = {});
+  /// Puts the sliders at rest there, tangents x pairs of each contact (Law::place).
+  void place(PerContact const& sliders, unsigned owner);
   /// This rank's contact samples, one per contact. Collective.
   std::vector<ContactPeriod> periods(Vec Q, Exponents const& e);
 

@@ -104,7 +104,11 @@ unsigned Residual::contact_version() const {
   return sum;
 }
 
-void Residual::settle(Vec Q) {
+void Residual::place(PerContact const& sliders, unsigned owner) {
+  for (size_t k = 0; k < groups_.size(); ++k) groups_[k].contact->law->place(sliders[k], owner);
+}
+
+void Residual::settle(Vec Q, PerContact const& from) {
   const auto U = relative_motions(Q);
   together(model_.comm(), "settling contacts", [&] {
     fault::point("settle");
@@ -115,7 +119,7 @@ void Residual::settle(Vec Q) {
       std::vector<double> u(size_t(d) * n);
       for (int i = 0; i < n; ++i)
         for (int c = 0; c < d; ++c) u[size_t(c) * n + i] = blocks[(i * d + c) * harmonics_.block_size()];
-      law.rest(u.data());
+      law.rest(u.data(), from.empty() ? std::vector<double>{} : from[k]);
     }
   });
 }

@@ -17,7 +17,6 @@ import numpy as np
 from ..case.schema import ModeAnalysis, WearAnalysis
 from ..errors import FretwaveError, NotConverged
 from ..files.dimensions import names_of_data
-from ..model.laws import Role
 from ..mpi import groups
 from ..mpi.guard import on_first_rank
 from ..results.results import AnalysisWriter, has_results, open_results
@@ -83,9 +82,8 @@ def unworn_starts(context: AnalysisContext, analysis: WearAnalysis) -> dict[str,
     with WornMode(problem, analysis.coefficient, areas) as mode, context.console.progress(context.name):
         for point in points_of(branch):
             if "cycle_unit" not in found:
-                found["cycle_unit"] = analysis.cycle_unit or normal_cycle(
-                    mode, mode.measure(point.y, np.zeros(len(mode.areas))).load
-                )
+                load = mode.measure(point.y, np.zeros(len(mode.areas))).load
+                found["cycle_unit"] = analysis.cycle_unit or mode.normal_cycle(load)
             _take(context, analysis, point, found)
             if len(found) == 1 + 2 * len(analysis.amplitude):
                 break
@@ -109,29 +107,6 @@ def _take(context: AnalysisContext, analysis: WearAnalysis, point: Any, found: d
         if math.isclose(point.parameter, amplitude, rel_tol=1e-9) and f"y_{number}" not in found:
             found[f"y_{number}"] = whole
             found[f"outcome_{number}"] = np.array([point.newton, point.linear, point.residual])
-
-
-def normal_cycle(mode: Any, load: Any) -> float:
-    """Vibration cycles in which sliding four stick limits mu N0/kt a cycle leaves 1/e of a normal load.
-
-    N' = -kn k_w/I N s with s = 4 mu N0/kt, in means over the loaded pairs; 1 where nothing can wear.
-    """
-    contacts = [mode.model.contacts[k] for k in mode.contacts]
-    loaded = load > 0
-
-    def values(role: Role) -> Any:
-        parts = [
-            np.broadcast_to(np.asarray(contact.value(role), dtype=float), (part.stop - part.start,))
-            for contact, part in zip(contacts, mode.slices)
-        ]
-        return np.concatenate(parts)[loaded]
-
-    if not loaded.any():
-        return 1.0
-    friction, stiffness = values(Role.FRICTION_COEFFICIENT), values(Role.TANGENTIAL_STIFFNESS)
-    slip = 4 * np.mean(friction * load[loaded] / stiffness)
-    rate = mode.coefficient * np.mean(mode.stiffness[loaded] / mode.areas[loaded]) * slip
-    return float(1 / rate) if rate > 0 else 1.0
 
 
 def _collect(

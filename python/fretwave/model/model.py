@@ -18,6 +18,7 @@ from .. import _core
 from ..errors import InputError
 from ..mpi import guard as parallel
 from .laws import LawInfo, PythonLaw, Role, core_law, laws, python_law
+from .rest import Rest
 
 Array = npt.NDArray[np.float64]
 
@@ -138,6 +139,11 @@ class Contact:
             )
 
 
+def _tangents(contact: Contact) -> int:
+    """Components beside the normal one."""
+    return contact.components - (contact.info.normal is not None)
+
+
 def _span(value: Any) -> str:
     """A parameter in short: a number, or its least and largest over the pairs."""
     low, high = float(np.min(value)), float(np.max(value))
@@ -182,9 +188,11 @@ class Model:
             comm = first.getComm().tompi4py() if isinstance(first, PETSc.Mat) else MPI.COMM_WORLD
         self.comm, self.sectors, self.nodal_diameter, self._unit = comm, sectors, nodal_diameter, unit
         self._matrices = [self._matrix(matrix) for matrix, *_ in terms]
+        self._mass = next(A for A, term in zip(self._matrices, terms) if term[1:] == (2, 0))
         self.contacts = list(contacts)
         self.n_dof: int = self._matrices[0].getSize()[1]
         self._pairs: list[npt.NDArray[np.intp]] = []
+        self._laws: list[Any] = []
         groups = [self._group(contact) for contact in self.contacts]
         theta = 2 * np.pi * nodal_diameter / sectors
         self.core = _core.Model(
@@ -231,7 +239,8 @@ class Model:
         self._pairs.append(pairs)
         rows = (pairs[:, None] * d + np.arange(d)).ravel()
         parts = [(self._rows_of(B, rows), k) for k, B in maps.items()]
-        return contact.name, parts, contact.core_law(pairs, n_pairs), pairs.tolist()
+        self._laws.append(contact.core_law(pairs, n_pairs))
+        return contact.name, parts, self._laws[-1], pairs.tolist()
 
     @staticmethod
     def _first_dofs(maps: Mapping[int, sp.csr_matrix], d: int) -> npt.NDArray[np.intp]:
@@ -264,6 +273,15 @@ class Model:
         """A distributed vector from an array (n_dof,) given whole on every rank. Collective."""
         return PETSc.Vec().createWithArray(np.array(self.distribute(np.asarray(values, dtype=float))), comm=self.comm)
 
+    def inertia(self, x: Array) -> Array:
+        """M x (n_dof,) of a displacement given whole, on every rank. Collective."""
+        with self.vectors(x) as (vector,):
+            product = vector.duplicate()
+            self._mass.mult(vector, product)
+            whole: Array = np.concatenate(self.comm.allgather(product.getArray(readonly=True).copy()))
+            product.destroy()
+        return whole
+
     @contextmanager
     def vectors(self, *values: Array) -> Iterator[list[PETSc.Vec]]:
         """`vector` of each array, for a `with` block that they do not outlive. Collective."""
@@ -290,6 +308,54 @@ class Model:
         """`gather_pairs`, on every rank. Collective."""
         whole: Array = self.comm.bcast(self.gather_pairs(which, local))
         return whole
+
+    def settle(self, rest: Rest) -> None:
+        """The laws take a static state as theirs: which pairs are closed, and where the sliders stand. Collective.
+
+        As every static state that is solved does by itself. Linear modes are those about it, and problems that are
+        made without a state of their own move about it.
+
+        Raises
+        ------
+        InputError
+            The sliders are not those of this model's contacts.
+        """
+        for k, (contact, law) in enumerate(zip(self.contacts, self._laws)):
+            u = np.sum([sp.csr_matrix(B) @ rest.displacement for B in by_sector(contact.B).values()], axis=0)
+            mine = u.reshape(-1, contact.components)[self._pairs[k]]
+            law.rest(mine.T.ravel().tolist())
+            if rest.sliders is not None and contact.info.memory:  # also where this rank has no pair of it
+                law.place(self.local_sliders(rest.sliders)[k])
+
+    def sliders(self) -> dict[str, Array]:
+        """Where the sliders of each contact with a memory stand at rest [m], (n_pairs, n_tangents). Collective."""
+        found = {}
+        for k, (contact, law) in enumerate(zip(self.contacts, self._laws)):
+            if contact.info.memory:
+                local = np.array(law.sliders).reshape(_tangents(contact), len(self._pairs[k]))
+                found[contact.name] = self.share_pairs(k, local).T.copy()
+        return found
+
+    def local_sliders(self, sliders: Mapping[str, Array]) -> list[list[float]]:
+        """Those of this rank's pairs, contact by contact, as the core takes them."""
+        named = {contact.name: contact for contact in self.contacts if contact.info.memory}
+        if set(sliders) != set(named):
+            fix = "give (n_pairs, n_tangents) of each"
+            raise InputError("sliders at rest are of other contacts", None, list(sliders), list(named), fix)
+        out: list[list[float]] = []
+        for k, contact in enumerate(self.contacts):
+            if contact.name not in named:
+                out.append([])
+                continue
+            pairs = np.shape(by_sector(contact.B)[0])[0] // contact.components
+            given, wanted = np.asarray(sliders[contact.name], dtype=float), (pairs, _tangents(contact))
+            if given.shape != wanted or not np.isfinite(given).all():
+                where = f"contact '{contact.name}'"
+                raise InputError(
+                    "sliders at rest do not fit", where, given.shape, f"{wanted}, finite", "one row a pair"
+                )
+            out.append(given[self._pairs[k]].T.ravel().tolist())
+        return out
 
     def __repr__(self) -> str:
         wave = f", wave of {self.nodal_diameter} nodal diameters on {self.sectors} sectors" if self.sectors > 1 else ""

@@ -121,6 +121,21 @@ class Reduction:
         reduced: Array = self._core.project(np.ascontiguousarray(self._model.distribute(rows)))
         return reduced if np.ndim(f) == 2 else reduced[:, 0]
 
+    def rows(self, B: Any) -> sp.csr_matrix:
+        """The map B T (n_rows, n_r) of the reduced coordinates from one on all dofs, B of kept dofs alone.
+
+        Raises
+        ------
+        InputError
+            B reaches dofs that are not kept.
+        """
+        full = sp.csr_matrix(B)
+        kept = full[:, self.keep]
+        lost = np.setdiff1d(np.unique(full.indices[full.data != 0]), self.keep)
+        if len(lost):
+            raise InputError("B reaches dofs that are not kept", None, f"dof {lost[0]}", "kept dofs", "keep them too")
+        return sp.csr_matrix(sp.hstack([kept, sp.csr_matrix((full.shape[0], self.size - len(self.keep)))]))
+
     def error(self, count: int = 5, K_contact: Any = None) -> FrequencyError:
         """Relative error of the lowest elastic frequencies. Collective.
 

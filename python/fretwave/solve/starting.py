@@ -85,7 +85,7 @@ def mode_start(problem: NonlinearMode, y0: PETSc.Vec) -> Any:
     method, amplitude = getattr(_core.Method, problem.method), _parameter(problem, y0)
     shape = [problem.model.vector(part) for part in (problem.start.shape, problem.start.imaginary)]
     model, harmonics = problem.model.core, problem.harmonics.core
-    way = _core.ModeStart(model, harmonics, method, problem.dof, problem.start.omega, *shape, amplitude)
+    way = _core.ModeStart(model, harmonics, method, problem.row, problem.start.omega, *shape, amplitude)
     way.keep_loads(problem.core)
     return way
 

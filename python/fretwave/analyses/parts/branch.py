@@ -96,10 +96,7 @@ def mode_problem(context: Any, harmonics: Any, mode: Any, rest: Any, dof: int | 
 
     analysis = context.analysis
     number = context.case.dof(analysis.normalise) if dof is None else dof
-    problem = NonlinearMode(context.model, harmonics, analysis.method, number, mode, context.prefix, avoid)
-    if rest is not None:
-        problem.preload(rest.displacement, rest.load)
-    return problem
+    return NonlinearMode(context.model, harmonics, analysis.method, number, mode, context.prefix, avoid, rest)
 
 
 def tell(context: Any, branch: Any, name: str = "") -> None:

@@ -220,17 +220,22 @@ class AnalysisContext:
                 )
             return what(file[name])
 
-    def linear_mode(self, contact: str, count: int = 1) -> list[Any]:
-        """Linear modes with the contact ``stuck`` or ``free``, without forces of the flow. Collective."""
+    def linear_mode(self, contact: str, count: int = 1, near: float | None = None) -> list[Any]:
+        """Linear modes, the contact ``stuck`` or ``free``, without forces of the flow. Collective.
+
+        Parameters
+        ----------
+        near : frequency [rad/s] that they are nearest to, in place of the lowest
+        """
         from ...model.modes import linear_modes
 
         if not getattr(self.analysis, "aerodynamics", False):
-            return cast("list[Any]", linear_modes(self.model, count=count, contact=contact))
+            return cast("list[Any]", linear_modes(self.model, count, contact, near))
         from ...case.build import build_model
 
         preload, diameters = self.case.preload_of(self.analysis), nodal_diameter(self.analysis)
         with build_model(self.case, (), self.comm, preload, diameters) as structure:
-            return cast("list[Any]", linear_modes(structure, count=count, contact=contact))
+            return cast("list[Any]", linear_modes(structure, count, contact, near))
 
 
 def _columns(group: Any) -> dict[str, Any]:

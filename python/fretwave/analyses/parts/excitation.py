@@ -59,7 +59,7 @@ class Excitation:
         from ...hb.problems import ForcedResponse
 
         case = self.context.case
-        problem = ForcedResponse(
+        return ForcedResponse(
             self.context.model,
             self.harmonics,
             force={1: self.force()},
@@ -67,10 +67,8 @@ class Excitation:
             dof=case.dof(self.analysis.observe, self.analysis.sector or 0),
             reference=self.reference,
             prefix=self.context.prefix,
+            rest=self.rest,
         )
-        if self.rest is not None:
-            problem.preload(self.rest.displacement, self.rest.load)
-        return problem
 
     def branch(self, problem: Any, snapshot: Any = None, go_on: bool = False) -> Any:
         """From the first to the last frequency, or from where a snapshot was taken. Collective."""

@@ -14,15 +14,15 @@ import scipy.sparse as sp
 
 from ...cyclic.aerodynamics import period_of
 from ...cyclic.sector import wave_mode
+from ...cyclic.wheel_modes import most_alike, standing_wave, travelling_wave
 from ...model.modes import LinearMode
-from .asymptotes import most_alike, other_asymptote
+from .asymptotes import most_alike as omega_most_alike
+from .asymptotes import other_asymptote
 from .context import AnalysisContext
 from .rest import rest_state, start_mode
 
 Complex = npt.NDArray[np.complex128]
 
-#: Modes of a mistuned wheel whose shares in a tuned wave differ by less are alike in it: the lower one is taken.
-ALIKE = 1e-3
 #: Families of the tuned sector looked through for that of a wheel's mode, beyond its number over N.
 MORE_FAMILIES = 3
 
@@ -144,23 +144,12 @@ def _family(context: AnalysisContext, mode: LinearMode) -> Any:
 
 
 def _wave(context: AnalysisContext, tuned: LinearMode, sector: int) -> tuple[LinearMode, Optional[Complex]]:
-    """A wave of the tuned wheel, and the other of its pair (DESIGN fact 6).
-
-    Of a double mode, motions A phi + B conj(phi) with any A and B solve the linear equations. A travelling wave has
-    B = 0: it avoids conj(phi). A standing wave A = B e^{i alpha} has its crest somewhere; with phi real at the
-    normalised dof, Re(phi) has it there, and avoids Im(phi), the same wave moved by a quarter of its length.
-    """
+    """A wave of the tuned wheel, and the other of its pair (DESIGN fact 6)."""
     analysis: Any = context.analysis
-    wheel = context.wheel
-    mode = wave_mode(tuned, analysis.nodal_diameter, wheel.sectors)
-    if 2 * analysis.nodal_diameter % wheel.sectors == 0:
-        return mode, None
-    phi = mode.shape + 1j * mode.imaginary
+    wheel, diameters = context.wheel, analysis.nodal_diameter
     if analysis.wave == "travelling":
-        return mode, phi.conj()
-    crest = phi[context.case.dof(analysis.normalise, sector)]
-    phi *= np.sqrt(2) * abs(crest) / crest
-    return LinearMode(mode.omega, mode.beta, phi.real.copy(), np.zeros(len(phi))), phi.imag + 0j
+        return travelling_wave(tuned, diameters, wheel.sectors)
+    return standing_wave(tuned, diameters, wheel.sectors, wheel.sector.dof(analysis.normalise), sector)
 
 
 def uneven_samples(samples: int, sectors: int, diameters: int) -> Optional[str]:
@@ -192,11 +181,7 @@ def _most_alike(context: AnalysisContext, tuned: LinearMode) -> LinearMode:
     analysis: Any = context.analysis
     wheel = context.wheel
     wave = wave_mode(tuned, analysis.nodal_diameter, wheel.sectors)
-    phi, M = wave.shape + 1j * wave.imaginary, context.case.M
-    modes = nearest_modes(context, tuned.omega, wheel.sectors)
-    shares = np.array([abs(phi.conj() @ (M @ mode.shape)) ** 2 for mode in modes])
-    alike = np.flatnonzero(shares > (1 - ALIKE) * shares.max())
-    return modes[int(alike[0])]
+    return most_alike(nearest_modes(context, tuned.omega, wheel.sectors), wave, context.case.M)
 
 
 def _free(context: AnalysisContext, mode: LinearMode) -> dict[str, float]:
@@ -204,19 +189,9 @@ def _free(context: AnalysisContext, mode: LinearMode) -> dict[str, float]:
     if any(contact.components > 1 for contact in context.case.contacts) or not context.case.contacts:
         return {}
     free = nearest_modes(context, mode.omega, context.wheel.sectors, "free")
-    return {"free_omega": most_alike(context, free, mode)}
+    return {"free_omega": omega_most_alike(context, free, mode)}
 
 
 def nearest_modes(context: AnalysisContext, omega: float, count: int, contact: str = "stuck") -> list[LinearMode]:
-    """Linear modes nearest to a frequency, by shift-invert there, in ascending order. Collective."""
-    from petsc4py import PETSc
-
-    options, key = PETSc.Options(), "modes_eps_target"
-    given = options.getString(key, "")
-    options[key] = (1 - 1e-9) * omega**2  # not on an eigenvalue
-    try:
-        return context.linear_mode(contact, count)
-    finally:
-        options.delValue(key)
-        if given:
-            options[key] = given
+    """Linear modes nearest to a frequency, in ascending order. Collective."""
+    return context.linear_mode(contact, count, omega)
