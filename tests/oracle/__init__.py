@@ -1,0 +1,39 @@
+"""Exact periodic motions with piecewise-linear contact: the truth that the solver's errors are measured against.
+
+Event-driven: between events the equations are linear and solved by their Taylor series, events are zeros of polynomials
+found to rounding, none is missed (`pieces`), and the period is closed by Newton with the exact monodromy. NumPy and
+SciPy only; not one line of the solver is used.
+
+    system = System(M, C, K, [Jenkins(B, kt, limit)], P, omega=w)   # or Coulomb, Unilateral, LoadedJenkins
+    orbit = forced_orbit(system)                                    # .defect, .multipliers, .events, .work()
+    orbit.harmonics(system.displacement(0), 21)                     # q_n = Qc_n - i Qs_n, integrated exactly
+    mode = mode_orbit(system, dof, a, omega0, zeta, state)          # EPMC: .omega0, .zeta
+    motion = series_motion(system, "CNM", 601, dof, a)              # what has no differential equation: .lambda_
+"""
+
+from .flow import Event, Flow, OracleError
+from .laws import Coulomb, Jenkins, LoadedJenkins, Unilateral
+from .mode import ModeOrbit, mode_orbit
+from .orbit import Orbit, forced_orbit
+from .period import Hysteresis, hysteresis
+from .series import SeriesMotion, series_motion
+from .system import System
+
+__all__ = [
+    "Coulomb",
+    "Event",
+    "Flow",
+    "Hysteresis",
+    "Jenkins",
+    "LoadedJenkins",
+    "ModeOrbit",
+    "OracleError",
+    "Orbit",
+    "SeriesMotion",
+    "System",
+    "Unilateral",
+    "forced_orbit",
+    "hysteresis",
+    "mode_orbit",
+    "series_motion",
+]
