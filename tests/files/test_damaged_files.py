@@ -15,7 +15,7 @@ import scipy.sparse as sp
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "cases" / "robustness"))
 from command_line import call
-from damaged_files import write_petsc, damaged, matrices, state_of
+from damaged_files import damaged, matrices, state_of, write_petsc
 from test_results import fill, writer
 
 from fretwave.errors import InputError
