@@ -10,6 +10,7 @@ import h5py
 import numpy as np
 import pytest
 from h5py import h5ds
+from models.chain_case import CHAIN
 from models.wear_case import write_case
 
 import fretwave as fw
@@ -108,14 +109,49 @@ def files(run, tmp_path_factory) -> list[Path]:
 
 @pytest.mark.parametrize("command", ["show", "plot"])
 def test_a_run_is_shown_without_mpi_and_petsc(run, command):
-    done = subprocess.run(
-        [sys.executable, "-c", BLOCKED, command, str(run)], capture_output=True, text=True, timeout=300
-    )
+    done = blocked(command, run)
     assert done.returncode == 0, done.stderr
     if command == "show":
         assert "limit cycle at a = 0.1375" in done.stdout
     else:
         assert (run / "mode_backbone.png").exists()
+
+
+def blocked(*words) -> subprocess.CompletedProcess[str]:
+    """The command where neither MPI, PETSc nor the core can be imported."""
+    call = [sys.executable, "-c", BLOCKED, *map(str, words)]
+    return subprocess.run(call, capture_output=True, text=True, timeout=300)
+
+
+def test_a_motion_is_viewed_without_mpi_and_petsc(tmp_path):
+    """Of a model as it is: the same files, value by value."""
+    case = write_case(tmp_path)
+    begin, end = CHAIN.index("[reduction]"), CHAIN.index("[preload]")
+    case.write_text(case.read_text().replace(CHAIN[begin:end], ""))
+    folder = tmp_path / "run"
+    assert fw.main(["run", str(case), "--only", "mode,one", "--no-plots", "--out", str(folder)]) == 0
+    for name in ("mode", "one"):
+        for place, view in (("with", lambda *words: fw.main([str(word) for word in words])), ("without", blocked)):
+            (tmp_path / place).mkdir(exist_ok=True)
+            out = tmp_path / place / f"{name}.vtkhdf"
+            done = view("view", folder, "--analysis", name, "--phases", "8", "--out", out)
+            assert done == 0 if place == "with" else done.returncode == 0, done.stderr
+    made = {place: sorted((tmp_path / place).iterdir()) for place in ("with", "without")}
+    assert len(made["with"]) == 3 and [p.name for p in made["with"]] == [p.name for p in made["without"]]
+    for mine, its in zip(*made.values()):
+        with h5py.File(mine) as one, h5py.File(its) as other:
+            names = []
+            one.visititems(lambda name, item, names=names: names.append(name) if hasattr(item, "dims") else None)
+            assert len(names) > 10
+            for name in names:
+                np.testing.assert_array_equal(one[name][()], other[name][()], err_msg=name)
+
+
+def test_a_reduced_model_is_refused_in_words_where_it_cannot_be_expanded(files):
+    (chain,) = [path.parent for path in files if path.parent.name == "chain"]
+    done = blocked("view", chain / "limits" / "0000")
+    assert done.returncode == 2 and "fix:" in done.stderr and "Traceback" not in done.stderr
+    assert "the motion of a reduced model cannot be shown here" in done.stderr
 
 
 def test_every_axis_has_its_name(files):
