@@ -14,6 +14,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
 
+from ..files.dimensions import names_of_data
 from ..post.grid import Plan, short_names
 from ..results.file import open_results
 from ..results.reader import Analysis, Run, Table
@@ -52,8 +53,9 @@ class Swept:
     @classmethod
     def of(cls, analysis: Analysis) -> Swept:
         with open_results(analysis.path) as file:
-            summary = {key: np.asarray(data[()], dtype=float) for key, data in file[analysis.name]["summary"].items()}
-        split = SPLIT.get(str(analysis.attributes["of_type"]), "")
+            group, split = file[analysis.name]["summary"], SPLIT.get(str(analysis.attributes["of_type"]), "")
+            names = [*names_of_data(group), *([split] if split in group else [])]
+            summary = {key: np.asarray(group[key][()], dtype=float) for key in names}
         parts = [float(part) for part in summary.pop(split, ())]
         plan, branches, curve = Plan(analysis.attributes["over"]), [], analysis.curve()
         for number, (place, part) in product(range(len(plan)), enumerate(parts or [np.nan])):

@@ -17,8 +17,6 @@ import numpy as np
 import numpy.typing as npt
 
 from ..case.load import Case
-from ..case.reduce import reduction_of
-from ..case.reduce_sector import sector_reduction_of
 from ..cyclic.faces import rotation
 from ..errors import InputError
 from ..fe.mesh import VTK_LATTICE
@@ -159,24 +157,47 @@ def scene_of(case: Case, choice: Choice, nodes: Array, sectors: Sequence[int] = 
     InputError
         The model is not that of the run, there is no such sector, or a wheel without axis.
     """
-    from mpi4py import MPI
-
     neighbours = case.neighbours
     around = neighbours.sectors if neighbours else 1
     ties: Any = neighbours.ties if neighbours else None
     expand: Expand = _unchanged
     with ExitStack() as stack:
-        if case.reduction is not None and neighbours is not None:
-            sector = stack.enter_context(sector_reduction_of(case, MPI.COMM_SELF))
-            expand, ties = sector.expand, sector.sector().ties
-            size = (sector.size - sector.n_interface) * (around if choice.wheel else 1)
-            _check_same(case, choice, size, sector.component_hz)
-        elif case.reduction is not None:
-            reduction = stack.enter_context(reduction_of(case, case.reduction, MPI.COMM_SELF))
-            expand = reduction.expand
-            _check_same(case, choice, reduction.size, reduction.component_hz)
+        if case.reduction is not None:
+            expand, ties, size, component_hz = _expansion(case, choice, around, ties, stack)
+            _check_same(case, choice, size, component_hz)
         built, shown = geometry(case), _shown(case, around, sectors)
         yield Scene(nodes, choice, _to_nodes(built, len(nodes), expand), shown, ties, around, built.axis or "z")
+
+
+def _expansion(case: Case, choice: Choice, around: int, ties: Any, stack: ExitStack) -> tuple[Expand, Any, int, Array]:
+    """Of a reduced model: to all its dofs, ties of sectors, number of coordinates and component frequencies [Hz].
+
+    Raises
+    ------
+    InputError
+        There is neither MPI nor PETSc, with which the reduction is made again.
+    """
+    try:
+        from mpi4py import MPI
+
+        from ..case.reduce import reduction_of
+        from ..case.reduce_sector import sector_reduction_of
+        from ..model import reduction as _  # noqa: F401
+    except ImportError as error:
+        raise InputError(
+            "the motion of a reduced model cannot be shown here",
+            display(case.path),
+            f"no {error.name or 'solver'}",
+            "mpi4py and PETSc: the reduction is made again to reach the nodes that the run does not keep",
+            "view it where the case was run; `fretwave show` and `fretwave plot` need neither",
+        ) from None
+    assert case.reduction is not None
+    if case.neighbours is not None:
+        sector = stack.enter_context(sector_reduction_of(case, MPI.COMM_SELF))
+        size = (sector.size - sector.n_interface) * (around if choice.wheel else 1)
+        return sector.expand, sector.sector().ties, size, sector.component_hz
+    reduction = stack.enter_context(reduction_of(case, case.reduction, MPI.COMM_SELF))
+    return reduction.expand, ties, reduction.size, reduction.component_hz
 
 
 def geometry(case: Case) -> BuiltModel:
