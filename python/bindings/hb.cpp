@@ -66,7 +66,7 @@ void bind_hb(nb::module_& m) {
       .def("coefficients",
            [](HarmonicProblem& p, Petsc<Vec> y) {
              VecHandle Q = p.coefficients(y.object);
-             return nb::steal(to_petsc4py(Q));
+             return handed(Q);
            })
       .def("summary", [](HarmonicProblem& p, Petsc<Vec> y) { return contact_summary(p.summarise(y.object)); })
       .def("contact_periods", contact_periods)
@@ -75,7 +75,7 @@ void bind_hb(nb::module_& m) {
       .def("gap_product",
            [](HarmonicProblem& p, Petsc<Vec> y, PerContact const& dgap) {
              VecHandle r = p.gap_product(y.object, dgap);
-             return nb::steal(to_petsc4py(r));
+             return handed(r);
            })
       .def("energy", energy)
       .def("preload", [](HarmonicProblem& p, Petsc<Vec> x, Petsc<Vec> P) { p.preload(x.object, P.object); })
@@ -99,7 +99,7 @@ void bind_hb(nb::module_& m) {
             new (self) NonlinearMode(model, h, method, row, omega, shape.object, imaginary.object);
           },
           nb::keep_alive<1, 2>())
-      .def("initial", [](NonlinearMode& p, double a) { return nb::steal(to_petsc4py(p.initial(a))); });
+      .def("initial", [](NonlinearMode& p, double a) { return handed(p.initial(a)); });
   nb::class_<ModeStart, NonlinearMode>(m, "ModeStart")
       .def(
           "__init__",
@@ -108,8 +108,8 @@ void bind_hb(nb::module_& m) {
             new (self) ModeStart(model, h, method, row, omega, shape.object, imaginary.object, amplitude);
           },
           nb::keep_alive<1, 2>())
-      .def("initial", [](ModeStart& p) { return nb::steal(to_petsc4py(p.initial())); })
-      .def("mode", [](ModeStart& p, Petsc<Vec> y) { return nb::steal(to_petsc4py(p.mode(y.object))); })
+      .def("initial", [](ModeStart& p) { return handed(p.initial()); })
+      .def("mode", [](ModeStart& p, Petsc<Vec> y) { return handed(p.mode(y.object)); })
       .def("keep_loads", [](ModeStart& p, HarmonicProblem const& other) { p.keep_loads(other); });
   nb::class_<StaticPreload, HarmonicProblem>(m, "StaticPreload")
       .def(
@@ -118,7 +118,7 @@ void bind_hb(nb::module_& m) {
             new (self) StaticPreload(model, P.object, size, stiffness);
           },
           nb::keep_alive<1, 2>())
-      .def("initial", [](StaticPreload& p) { return nb::steal(to_petsc4py(p.initial())); });
+      .def("initial", [](StaticPreload& p) { return handed(p.initial()); });
   nb::class_<ForcedStart, HarmonicProblem>(m, "ForcedStart")
       .def(
           "__init__",
@@ -126,9 +126,8 @@ void bind_hb(nb::module_& m) {
             new (self) ForcedStart(to, y.object, gaps ? Way::gaps : Way::excitation);
           },
           nb::keep_alive<1, 2>())
-      .def("initial", [](ForcedStart& p) { return nb::steal(to_petsc4py(p.initial())); })
-      .def("response",
-           [](ForcedStart& p, Petsc<Vec> y) { return nb::steal(to_petsc4py(p.response(y.object))); });
+      .def("initial", [](ForcedStart& p) { return handed(p.initial()); })
+      .def("response", [](ForcedStart& p, Petsc<Vec> y) { return handed(p.response(y.object)); });
   nb::class_<ForcedResponse, HarmonicProblem>(m, "ForcedResponse")
       .def(
           "__init__",
@@ -138,8 +137,7 @@ void bind_hb(nb::module_& m) {
           },
           nb::keep_alive<1, 2>())
       .def_prop_ro("reference_amplitude", &ForcedResponse::reference_amplitude)
-      .def("initial",
-           [](ForcedResponse& p, double omega) { return nb::steal(to_petsc4py(p.initial(omega))); });
+      .def("initial", [](ForcedResponse& p, double omega) { return handed(p.initial(omega)); });
 }
 
 }  // namespace fretwave::python

@@ -90,6 +90,8 @@ class Law {
   virtual Limit limit() const { return Limit::none; }
   /// Worn depths count as additional gap along its normal direction.
   virtual bool wears() const { return false; }
+  /// `stand_off` widens its gaps.
+  virtual bool stands_off() const { return wears(); }
   /// Worn depth of each pair [m], in place of what was set before; the rest state stays as it is. Null: as
   /// they are.
   void wear(double const* depth) {

@@ -115,6 +115,7 @@ class Residual {
     void each_couple(Body body) const;
   };
   void expect_depths(PerContact const& depth) const;
+  void gaps_product(PerContact const& dgap, Vec dR);
   Map make_map(Mat B, int phase) const;
   void relative_motion(Group const&, Vec Q, Vec U) const;
   VecHandle relative_motion(Group const&, Vec Q) const;

@@ -38,11 +38,15 @@ void Residual::wear(PerContact const& depth) {
 }
 
 void Residual::gap_product(PerContact const& dgap, Vec dR) {
-  check(VecSet(dR, 0));
   together(model_.comm(), "wearing contacts", [&] { expect_depths(dgap); });
+  gaps_product(dgap, dR);
+}
+
+void Residual::gaps_product(PerContact const& dgap, Vec dR) {
+  check(VecSet(dR, 0));
   for (size_t k = 0; k < groups_.size(); ++k) {
     Group& group = groups_[k];
-    if (!group.contact->law->wears()) continue;
+    if (!group.contact->law->stands_off()) continue;
     VecHandle dF = like(group.F);
     std::vector<double> gaps = dgap[k];
     gaps.resize(size_t(group.contact->law->pairs()), 0.0);  // an empty list: this contact does not wear
@@ -58,8 +62,8 @@ void Residual::stand_off(double distance) {
 void Residual::stand_off_product(Vec dR) {
   PerContact dgap(groups_.size());
   for (size_t k = 0; k < groups_.size(); ++k)
-    if (groups_[k].contact->law->wears()) dgap[k].assign(groups_[k].contact->law->pairs(), 1.0);
-  gap_product(dgap, dR);
+    if (groups_[k].contact->law->stands_off()) dgap[k].assign(groups_[k].contact->law->pairs(), 1.0);
+  gaps_product(dgap, dR);
 }
 
 std::vector<Wearing> Residual::wearing(Vec Q, Exponents const& e) {

@@ -123,3 +123,60 @@ def test_a_row_that_the_mode_does_not_move_is_refused(comm):
     start = fw.linear_modes(model, 1)[0]
     with pytest.raises(fw.InputError, match="does not move"):
         fw.NonlinearMode(model, fw.Harmonics([1], 16), dof=[1.0, -1.0], start=start)
+
+
+def test_observed_columns_are_those_of_the_motion(comm, tmp_path):
+    """A dof, a row and a coordinate, from the coefficients; kept by a file."""
+    with model_of(comm) as model:
+        first = fw.linear_modes(model, 1)[0]
+        observe = {"tip": 5, "relative": ROW, "first": first, "energy": "energy"}
+        branch = fw.follow(mode_of(model, 3), 0.05, 3.0, observe=observe)
+        q = branch.shape(len(branch) - 1)
+        coordinate = model.inertia(first.shape) @ q
+    last = branch[len(branch) - 1]
+    assert last["tip"] == pytest.approx(abs(q[5]), rel=1e-12)
+    assert last["relative"] == pytest.approx(abs(ROW @ q), rel=1e-12)
+    assert last["first"] == pytest.approx(abs(coordinate), rel=1e-12)
+    assert branch.units["energy"] == "J" and branch.names[-4:] == ["tip", "relative", "first", "energy"]
+    path = comm.bcast(tmp_path) / "branch.h5"
+    branch.save(path)
+    comm.barrier()
+    np.testing.assert_array_equal(fw.Branch.load(path)["relative"], branch["relative"])
+
+
+def test_energy_of_a_linear_mode_is_half_k_a_squared(comm):
+    """Of the coordinate a of unit modal mass omega^2 a^2 / 2; a response far from resonance (m w^2 + k) a^2 / 4."""
+    with fw.Model(np.diag(np.arange(1.0, N + 1)), chain(N), comm=comm) as model:
+        second = fw.linear_modes(model, 2)[1]
+        mode = fw.NonlinearMode(model, fw.Harmonics([1, 3], 16), dof=second, start=second)
+        branch = fw.follow(mode, 0.1, 1.0, observe={"energy": "energy"})
+    np.testing.assert_allclose(branch["energy"], second.omega**2 * branch["amplitude"] ** 2 / 2, rtol=1e-9)
+    with fw.Model([[2.0]], [[8.0]], comm=comm) as model:
+        start = fw.linear_modes(model, 1)[0]
+        response = fw.ForcedResponse(model, fw.Harmonics([1], 16), {1: [1.0]}, 1.0, 0, start)
+        branch = fw.follow(response, 0.5, 1.0, observe={"energy": "energy"})
+    wanted = (2 * branch["omega"] ** 2 + 8) * branch["amplitude"] ** 2 / 4
+    np.testing.assert_allclose(branch["energy"], wanted, rtol=1e-10)
+
+
+def test_energy_of_a_sectors_wave_is_that_of_the_wheel_over_its_sectors(comm):
+    ties = {0: [[1.6]], 1: [[-0.3]], -1: [[-0.3]]}
+    sector = fw.Sector([[1.0]], {k: np.array(A) for k, A in ties.items()}, 12)
+    with sector.model(2, comm) as model, sector.wheel(comm) as wheel:
+        one = fw.linear_modes(model, 1, "free")[0]
+        start, other = fw.travelling_wave(one, 2, 12)
+        modes = [
+            fw.NonlinearMode(model, fw.Harmonics([1], 24), start=one),
+            fw.NonlinearMode(wheel, fw.Harmonics([1], 24), start=start, avoid=other),
+        ]
+        energy = [fw.follow(mode, 0.5, 1.0, observe={"energy": "energy"})["energy"][0] for mode in modes]
+    assert energy[0] == pytest.approx(one.omega**2 * 0.5**2 / 2, rel=1e-9)
+    assert energy[1] == pytest.approx(12 * energy[0], rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    "observe, words", [({"zeta": 0}, "there already"), ({"e": "power"}, "cannot be observed"), ({"r": [1.0]}, "fit")]
+)
+def test_what_cannot_be_observed_is_refused(comm, observe, words):
+    with model_of(comm) as model, pytest.raises(fw.InputError, match=words):
+        fw.follow(mode_of(model, 3), 0.05, 3.0, observe=observe)

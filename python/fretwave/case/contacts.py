@@ -110,9 +110,9 @@ def read_contacts(
         parameters = parameters_of(source, number, section, law, given, found) if law else None
         if law is None or parameters is None or rows is None:
             continue
-        if fits(source, number, law, given, found):
+        components = given.components if given else 2 if section.tangents else 1
+        if fits(source, number, law, components, given, found):
             pairs = [[pair] if isinstance(pair, str) else pair for pair in section.pairs or []]
-            components = given.components if given else 1
             contacts.append(ContactSpec(section.name, section.law, rows, parameters, pairs, components))
     return contacts
 
@@ -125,15 +125,42 @@ def _rows(
     built: Mapping[str, BuiltContact],
     found: list[FretwaveError],
 ) -> Any:
-    """B of a contact: the builder's, or one row for each pair, +1 at the dof (second dof), -1 at the first of two."""
+    """B of a contact: the builder's, or a row for each pair, +1 at the dof (second dof), -1 at the first of two.
+
+    With tangents two rows a pair, normal and tangent.
+    """
     if section.pairs is None or section.name in built:
         return _built_rows(source, number, section, built, found)
     if dofs is None:
         return None
+    rows = [_rows_of(source, number, "pairs", section.pairs, dofs, found)]
+    if section.tangents is not None:
+        if len(section.tangents) != len(section.pairs):
+            where, fix = source.where(("contact", number, "tangents")), "give one tangent for each pair"
+            measured = f"{len(section.tangents)} tangents, {len(section.pairs)} pairs"
+            found.append(InputError("tangents do not match the pairs", where, measured, "as many of both", fix))
+            return None
+        rows.append(_rows_of(source, number, "tangents", section.tangents, dofs, found))
+    if any(part is None for part in rows):
+        return None
+    # pair by pair: normal, tangent
+    order = np.arange(len(rows) * len(section.pairs)).reshape(len(rows), -1).T.ravel()
+    return scipy.sparse.csr_matrix(scipy.sparse.vstack(rows))[order]
+
+
+def _rows_of(
+    source: Source,
+    number: int,
+    key: str,
+    pairs: Sequence[str | list[str]],
+    dofs: Sequence[str],
+    found: list[FretwaveError],
+) -> Any:
+    """A row of B for each pair; None when one is wrong."""
     before = len(found)
-    rows = scipy.sparse.lil_matrix((len(section.pairs), len(dofs)))
-    for row, pair in enumerate(section.pairs):
-        path = ("contact", number, "pairs", row)
+    rows = scipy.sparse.lil_matrix((len(pairs), len(dofs)))
+    for row, pair in enumerate(pairs):
+        path = ("contact", number, key, row)
         ends = [pair] if isinstance(pair, str) else pair
         if len(ends) not in (1, 2) or len(set(ends)) != len(ends):
             found.append(
@@ -142,7 +169,7 @@ def _rows(
                     where=source.where(path),
                     measured=toml(pair),
                     expected="a dof (against ground) or two different dofs [first, second]",
-                    fix='write for example `pairs = ["m2"]` or `pairs = [["m1", "m2"]]`',
+                    fix=f'write for example `{key} = ["m2"]` or `{key} = [["m1", "m2"]]`',
                 )
             )
             continue
@@ -161,6 +188,10 @@ def _built_rows(
 ) -> Any:
     """B of a contact that comes with the model."""
     path = ("contact", number)
+    if section.tangents is not None and (section.pairs is None or section.name in built):
+        where, fix = source.where((*path, "tangents")), "give `pairs`, or leave the key out"
+        found.append(InputError("tangents belong to pairs that the case names", where, fix=fix))
+        return None
     if section.name in built and section.pairs is None:
         return built[section.name].B
     if section.pairs is not None:

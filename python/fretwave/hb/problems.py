@@ -160,6 +160,13 @@ class HarmonicProblem:
         Q.destroy()
         return None if parts is None else np.concatenate(parts).reshape(-1, self.harmonics.block_size)
 
+    def local_coefficients(self, y: PETSc.Vec) -> Array:
+        """This rank's rows of `coefficients`. Collective."""
+        Q = self.core.coefficients(y)
+        local = Q.getArray(readonly=True).reshape(-1, self.harmonics.block_size).copy()
+        Q.destroy()
+        return np.asarray(local)
+
     def diagnostics(self, y: PETSc.Vec) -> dict[str, float]:
         """Contact of this motion. Collective.
 

@@ -188,7 +188,7 @@ class Model:
             comm = first.getComm().tompi4py() if isinstance(first, PETSc.Mat) else MPI.COMM_WORLD
         self.comm, self.sectors, self.nodal_diameter, self._unit = comm, sectors, nodal_diameter, unit
         self._matrices = [self._matrix(matrix) for matrix, *_ in terms]
-        self._mass = next(A for A, term in zip(self._matrices, terms) if term[1:] == (2, 0))
+        self._terms = [(A, order, k) for A, (_, order, k) in zip(self._matrices, terms)]
         self.contacts = list(contacts)
         self.n_dof: int = self._matrices[0].getSize()[1]
         self._pairs: list[npt.NDArray[np.intp]] = []
@@ -275,12 +275,38 @@ class Model:
 
     def inertia(self, x: Array) -> Array:
         """M x (n_dof,) of a displacement given whole, on every rank. Collective."""
-        with self.vectors(x) as (vector,):
-            product = vector.duplicate()
-            self._mass.mult(vector, product)
-            whole: Array = np.concatenate(self.comm.allgather(product.getArray(readonly=True).copy()))
-            product.destroy()
+        mass = next(A for A, order, k in self._terms if (order, k) == (2, 0))
+        whole: Array = np.concatenate(self.comm.allgather(self._product(mass, self.distribute(x))))
         return whole
+
+    def form(self, order: int, q: npt.NDArray[np.complex128], n: int = 1) -> float:
+        """Re q^H A q of K (order 0), C (1) or M (2), from this rank's part of harmonic n's amplitudes q. Collective.
+
+        Of a sector in a wave A is sum_k A_k e^{-i k n theta}.
+        """
+        theta = 2 * np.pi * self.nodal_diameter / self.sectors
+        total = 0.0
+        for A, own, k in self._terms:
+            if own == order:
+                Aq = self._product(A, q.real) + 1j * self._product(A, q.imag)
+                total += float(np.real(np.exp(-1j * k * n * theta) * np.vdot(q, Aq)))
+        return float(self.comm.allreduce(total))
+
+    def _product(self, A: PETSc.Mat, local: Array) -> Array:
+        """This rank's part of A x, from its part of x. Collective."""
+        x = PETSc.Vec().createWithArray(np.ascontiguousarray(local, dtype=float), comm=self.comm)
+        y = x.duplicate()
+        A.mult(x, y)
+        product: Array = y.getArray(readonly=True).copy()
+        x.destroy()
+        y.destroy()
+        return product
+
+    @property
+    def ownership(self) -> tuple[int, int]:
+        """First of this rank's dofs, and the first of the next one's."""
+        begin, end = self._matrices[0].getOwnershipRange()
+        return int(begin), int(end)
 
     @contextmanager
     def vectors(self, *values: Array) -> Iterator[list[PETSc.Vec]]:
@@ -364,7 +390,7 @@ class Model:
 
     def destroy(self) -> None:
         """Free the matrices. Collective."""
-        self.core = None
+        self.core = None  # type: ignore[assignment]
         for mat in self._matrices:
             mat.destroy()
 

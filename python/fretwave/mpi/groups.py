@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar, Union
+from typing import TYPE_CHECKING, Any, TypeVar, Union, cast
 from zipfile import BadZipFile
 
 import numpy as np
@@ -21,6 +21,9 @@ import numpy as np
 from ..errors import FretwaveError, InputError
 from ..files.whole import replaced, told
 from .guard import all_ranks_failed, on_first_rank
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
 
 Task = TypeVar("Task")
 
@@ -62,9 +65,9 @@ class Kept:
 
 
 def run(
-    comm: Any,
+    comm: MPI.Intracomm,
     tasks: Sequence[Task],
-    work: Callable[[Task, Any], Any],
+    work: Callable[[Task, MPI.Intracomm], Any],
     n_groups: int | None = None,
     kept: Kept | None = None,
 ) -> list[Any]:
@@ -97,7 +100,8 @@ def run(
     done = on_first_rank(comm, lambda: _loaded(kept, len(tasks)))
     waiting = [number for number in range(len(tasks)) if number not in done]
     count = group_count(comm.size, len(waiting), n_groups)
-    group = comm.Split(comm.rank * count // comm.size, comm.rank) if count > 1 else comm
+    own = comm.Split(comm.rank * count // comm.size, comm.rank) if count > 1 else comm
+    group = cast("MPI.Intracomm", own)
     queue = _Queue(comm if count > 1 else None)
     mine: dict[int, Any] = {}
     while (place := group.bcast(queue.take() if group.rank == 0 else None)) < len(waiting):
@@ -132,7 +136,7 @@ def _loaded(kept: Kept | None, count: int) -> dict[int, Any]:
     return {number: result for number, result in found.items() if result is not None}
 
 
-def _attempt(work: Callable[[Task, Any], Any], task: Task, group: Any) -> Union[Any, FretwaveError]:
+def _attempt(work: Callable[[Task, MPI.Intracomm], Any], task: Task, group: MPI.Intracomm) -> Union[Any, FretwaveError]:
     """The result of a task, or the error that it ended in on every rank; an error of some ranks alone is raised."""
     try:
         return work(task, group)
@@ -151,7 +155,7 @@ class _Queue:
         None for a queue with one caller. Collective.
     """
 
-    def __init__(self, comm: Any) -> None:
+    def __init__(self, comm: MPI.Intracomm | None) -> None:
         self._window: Any = None
         self._next = -1
         if comm is None:

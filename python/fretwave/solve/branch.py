@@ -22,6 +22,8 @@ from .table import Table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from mpi4py import MPI
+    from petsc4py import PETSc
 
     from ..hb.problems import HarmonicProblem
     from .unknowns import Unknowns
@@ -68,7 +70,7 @@ class Branch(Table):
         missed: Sequence[str] = (),
         started: str = "",
         unknowns: Unknowns | None = None,
-        comm: Any = None,
+        comm: MPI.Comm | None = None,
     ) -> None:
         super().__init__(columns, values)
         self.meaning, self.curves = meaning, curves
@@ -135,7 +137,7 @@ class Branch(Table):
         """
         return self._kept().problem
 
-    def unknowns(self, place: float) -> Any:
+    def unknowns(self, place: float) -> PETSc.Vec:
         """Unknowns y at a place (`at`, or a row's number), a Vec of the caller's: where Newton may start. Collective.
 
         Raises

@@ -70,7 +70,7 @@ class Sweep:
         return f"Sweep({len(self)} branches over {over}{f', {lost} failed' if lost else ''})"
 
 
-def sweep(work: Callable[..., Branch], *, comm: MPI.Comm | None = None, **over: Sequence[Any]) -> Sweep:
+def sweep(work: Callable[..., Branch], *, comm: MPI.Intracomm | None = None, **over: Sequence[Any]) -> Sweep:
     """Follow a branch for every value of a parameter, or for all combinations of several. Collective.
 
     Parameters
@@ -94,7 +94,7 @@ def sweep(work: Callable[..., Branch], *, comm: MPI.Comm | None = None, **over: 
 
     Examples
     --------
-    Damping of a sliding mass is largest at 2 R / kt, whatever the limit R:
+    The largest damping of a sliding mass does not ask how large its limit is:
 
     >>> import fretwave as fw
     >>> def mode(limit):
@@ -103,7 +103,7 @@ def sweep(work: Callable[..., Branch], *, comm: MPI.Comm | None = None, **over: 
     ...     problem = fw.NonlinearMode(model, fw.choose_harmonics(model, 1))
     ...     return fw.follow(problem, 0.1 * limit, 2.0 * limit)
     >>> fw.sweep(mode, limit=[1.0, 3.0]).each(lambda branch: branch["zeta"].max()).round(4)
-    array([0.0191, 0.0191])
+    array([0.0187, 0.0187])
     """
     grid = {name: list(values) for name, values in over.items()}
     if not grid or not all(grid.values()):

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -108,7 +107,7 @@ class WornMode:
         """The contacts have these depths (n_pairs,) from now on."""
         self.problem.core.wear(self._local(depth))
 
-    def measure(self, y: PETSc.Vec, depth: Array, outcome: Sequence[Any] = (0, 0, 0.0)) -> WornState:
+    def measure(self, y: PETSc.Vec, depth: Array, outcome: tuple[int, int, float] = (0, 0, 0.0)) -> WornState:
         """Rates and loads of a converged motion at these depths."""
         found = self.problem.core.wearing(y)
         archard, load, slip, opened = (
@@ -235,7 +234,7 @@ class WornMode:
     def destroy(self) -> None:
         """Free the solver; the contacts are as new again."""
         self.wear(np.zeros(len(self.areas)))
-        self._newton = None
+        self._newton = None  # type: ignore[assignment]
         self._row.destroy()
 
     def __enter__(self) -> WornMode:
