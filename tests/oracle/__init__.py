@@ -9,8 +9,10 @@ SciPy only; not one line of the solver is used.
     orbit.harmonics(system.displacement(0), 21)                     # q_n = Qc_n - i Qs_n, integrated exactly
     mode = mode_orbit(system, dof, a, omega0, zeta, state)          # EPMC: .omega0, .zeta
     motion = series_motion(system, "CNM", 601, dof, a)              # what has no differential equation: .lambda_
+    orbit = orbit_3d(Block(M, C, K, [Pair(B, kn, kt, mu, N0)], P, p, w))   # friction on a circle
 """
 
+from .circle import Block, Orbit3d, Pair, orbit_3d
 from .flow import Event, Flow, OracleError
 from .laws import Coulomb, Jenkins, LoadedJenkins, Unilateral
 from .mode import ModeOrbit, mode_orbit
@@ -20,6 +22,7 @@ from .series import SeriesMotion, series_motion
 from .system import System
 
 __all__ = [
+    "Block",
     "Coulomb",
     "Event",
     "Flow",
@@ -29,11 +32,14 @@ __all__ = [
     "ModeOrbit",
     "OracleError",
     "Orbit",
+    "Orbit3d",
+    "Pair",
     "SeriesMotion",
     "System",
     "Unilateral",
     "forced_orbit",
     "hysteresis",
     "mode_orbit",
+    "orbit_3d",
     "series_motion",
 ]

@@ -30,7 +30,7 @@ def wild(seed):
 def test_forces_are_what_ever_more_samples_tend_to():
     """The sampled slider (f = clip(f + kt du) from sample to sample) meets them as N_t^-2, on the mean of motions."""
     law, off = Jenkins(np.array([1.0]), 1.0, 1.0), []
-    periods = [hysteresis(law, wild(seed)) for seed in range(24)]
+    periods = [hysteresis(law, wild(seed)) for seed in range(12)]
     exact = np.array([period.force() for period in periods])
     for count in (500, 2000):
         motion = np.array([period.series.grid(count) for period in periods])
@@ -67,11 +67,11 @@ def test_one_harmonic_has_its_closed_form():
     assert (cnm.omega0, cnm.zeta) == pytest.approx((1.238306, 0.104362), abs=1e-6)
 
 
-@pytest.mark.parametrize("a", [0.137, 0.15, 0.5])
+@pytest.mark.parametrize("a", [0.15, 0.5])
 def test_the_series_tends_to_the_orbit(a):
-    """EPMC with 301 harmonics and by shooting: two programs that share the law's two numbers only."""
+    """EPMC with 201 harmonics and by shooting: two programs that share the law's two numbers only."""
     coarse = series_motion(PAPER, "EPMC", 21, amplitude=a)
-    fine = series_motion(PAPER, "EPMC", 301, amplitude=a, guess=coarse)
+    fine = series_motion(PAPER, "EPMC", 201, amplitude=a, guess=coarse)
     orbit = mode_orbit(PAPER, 0, a, coarse.omega0, coarse.zeta, coarse.state(0.3), phase=0.3)
     assert orbit.defect < 1e-12
     assert fine.omega0 == pytest.approx(orbit.omega0, rel=1e-9)
@@ -79,14 +79,14 @@ def test_the_series_tends_to_the_orbit(a):
     turned = np.exp(-0.3j * np.arange(10))
     q = orbit.harmonics([orbit.system.displacement(k) for k in range(2)], 9) * turned
     off = [abs(motion.q[:, :10] - q).max() for motion in (coarse, fine)]
-    assert off[1] < (21 / 301) ** 3 * off[0]
+    assert off[1] < (21 / 201) ** 3 * off[0]
 
 
 def test_the_complex_mode_has_a_limit_that_it_meets_with_the_third_power_and_better():
     """H^-4 in lambda on the mean, with a factor that comes and goes between H and 2 H."""
     motion, found = series_motion(PAPER, "EPMC", 21, amplitude=2.0), []
-    for H in (21, 401, 801):
+    for H in (21, 201, 601):
         motion = series_motion(PAPER, "CNM", H, amplitude=2.0, guess=motion)
         found.append(motion.lambda_)
     off = [abs(value - found[-1]) / abs(found[-1]) for value in found[:-1]]
-    assert off[0] < 1e-5 and off[1] < (21 / 401) ** 3 * off[0]
+    assert off[0] < 1e-5 and off[1] < (21 / 201) ** 3 * off[0]
