@@ -20,6 +20,7 @@ from fretwave.plots import (
     loops,
     phase_planes,
     study,
+    style,
     sweeps,
     trajectories,
     wheel,
@@ -94,6 +95,12 @@ def test_backbone_runs_through_the_closed_form_in_hertz_and_percent(kept):
     assert lower.get_xlim() == pytest.approx((0.5, 4.0))
     assert (upper.get_ylabel(), lower.get_ylabel()) == ("Frequency ω/2π [Hz]", "Damping ratio ζ [%]")
     assert lower.get_xlabel() == "Modal amplitude of x [m]"
+
+
+def test_asymptotes_have_the_digits_that_tell_them_apart():
+    assert [style.apart([4.026, 3.845])(value) for value in (4.026, 3.845)] == ["4.026", "3.845"]
+    assert [style.apart([193.33226, 193.33101])(value) for value in (193.33226, 193.33101)] == ["193.332", "193.331"]
+    assert style.apart([7.0, 7.0])(7.0) == "7"
 
 
 def test_responses_solve_their_equation_and_are_divided_by_their_level(kept):
@@ -235,7 +242,13 @@ def write_wheel(folder, sectors=6, diameter=2):
         q = np.zeros((2 * sectors, 2))
         q[1::2] = np.column_stack([shape.real, -shape.imag])
         row = {"point": point, "amplitude": 0.1 * (1 + point), "omega": 3.0, "omega0": 3.0, "frequency_hz": 0.5}
-        row |= {"beta": 0.0, "zeta": 0.01, **SHARED, "participation": share, "amplification": np.abs(shape).max()}
+        row |= {
+            "beta": 0.0,
+            "zeta": 1e-24 + 0.01 * point,
+            **SHARED,
+            "participation": share,
+            "amplification": np.abs(shape).max(),
+        }
         writer.append(row, q)
     writer.close("done", "")
     return Run(folder)
@@ -249,6 +262,7 @@ def test_sectors_of_a_wheel_are_bars_of_their_amplitude_over_the_tuned_waves(tmp
     assert [bar.get_height() for bar in last.patches] == pytest.approx([0.1, 0.1, 0.1, 2.0, 0.1, 0.1])
     shares = {round(bar.get_x() + bar.get_width() / 2): bar.get_height() for bar in waves.patches}
     assert shares[2] == pytest.approx(1.0) and sum(shares.values()) == pytest.approx(1.0)
+    assert [axes.texts[0].get_text().split(", ")[1] for axes in (first, last)] == ["ζ = 0 %", "ζ = 1 %"]
     upper, lower = found["mode_localisation"].axes
     np.testing.assert_allclose(upper.lines[0].get_xydata(), [[0.1, 1.0], [0.2, 0.2]])
     np.testing.assert_allclose(lower.lines[0].get_ydata(), [1.0, 2.0])

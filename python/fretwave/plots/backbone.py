@@ -78,25 +78,28 @@ def _close_up(axes: Axes, modes: Sequence[Analysis], column: str, place: tuple[f
     inset.set_xlim(low - width, high + width)
     inset.set_ylim(values.min() - 0.1 * np.ptp(values), values.max() + 0.15 * np.ptp(values))
     inset.tick_params(labelsize=8.5)
-    inset.locator_params(nbins=4)
+    inset.locator_params("x", nbins=2)  # amplitudes that differ little have long numbers
+    inset.locator_params("y", nbins=4)
     inset.set_title("around the folds", fontsize=9.5)
 
 
 def _asymptotes(axes: Axes, mode: Analysis) -> None:
     """Linear frequencies with the contact stuck (dashed), and free or sliding (dash-dotted)."""
-    for key, name, line in (("stuck", "stuck", "--"), ("free", "free", "-."), ("sliding", "closed and sliding", "-.")):
-        omega = mode.asymptote(key)
-        if omega is None:
+    kinds = (("stuck", "stuck", "--"), ("free", "free", "-."), ("sliding", "closed and sliding", "-."))
+    known = {key: omega / (2.0 * np.pi) for key, *_ in kinds if (omega := mode.asymptote(key)) is not None}
+    text = style.apart(list(known.values()))
+    for key, name, line in kinds:
+        if key not in known:
             continue
-        frequency = omega / (2.0 * np.pi)
+        frequency = known[key]
         low, high = axes.get_ylim()
         if frequency < low - FAR * (high - low):
-            _below(axes, f"{name} {frequency:.4g} Hz")
+            _below(axes, f"{name} {text(frequency)} Hz")
             continue
         axes.axhline(frequency, color=style.GREY, linestyle=line, linewidth=1.2, zorder=1)
         above = frequency >= np.mean(mode.columns["frequency_hz"])
         axes.annotate(
-            f"{name} {frequency:.4g} Hz",
+            f"{name} {text(frequency)} Hz",
             (1.0 if above else 0.0, frequency),
             (-4 if above else 4, -4 if above else 4),
             xycoords=("axes fraction", "data"),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
@@ -86,6 +86,13 @@ def shades(count: int) -> list[Any]:
 def number(value: float, digits: int = 3) -> str:
     """Short plain number: 0.134, 25.3, 1.2e-05."""
     return f"{value:.{digits}g}"
+
+
+def apart(values: Sequence[float]) -> Callable[[float], str]:
+    """Writes numbers with four digits, or as many more as tell these values apart."""
+    enough = (d for d in range(4, 12) if len({number(value, d) for value in values}) == len(set(values)))
+    digits = next(enough, 12)
+    return lambda value: number(value, digits)
 
 
 def log_amplitude(axes: Axes, values: Array | Sequence[float]) -> None:

@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..cyclic.engine_order import folded
+from ..post.mode_curve import NO_DAMPING
 from ..post.motion import complex_amplitudes
 from ..post.wave_content import wave_content
 from ..results.reader import Analysis, Run
@@ -82,7 +83,8 @@ def _sectors(axes: Axes, mode: Analysis, point: int, a: Complex) -> None:
     axes.axhline(1.0, color=style.GREY, linestyle="--", linewidth=1.0)
     axes.set_xlim(-0.7, len(a) - 0.3)
     axes.grid(axis="x", visible=False)
-    size, zeta = mode.columns["amplitude"][point], 100.0 * mode.columns["zeta"][point]
+    size, zeta = mode.columns["amplitude"][point], mode.columns["zeta"][point]
+    zeta = 100.0 * zeta if abs(zeta) > NO_DAMPING else 0.0
     text = f"a = {style.number(size)} {mode.unit('amplitude')}, ζ = {style.number(zeta)} %"
     text = f"{text}, participation {mode.columns['participation'][point]:.2f}"
     axes.annotate(text, (0.99, 0.97), xycoords="axes fraction", ha="right", va="top", fontsize=9.5)
