@@ -59,6 +59,7 @@ def test_derivatives(comm):
     assert np.allclose(J, expected, rtol=0, atol=1e-8 * np.abs(expected).max())
 
 
+@pytest.mark.ranks(1)
 def test_a_branch_is_that_of_the_law_in_space(comm):
     branches = [fw.follow(problem_of(comm, law), 0.02, 1.0) for law in ("coulomb_2d", "coulomb_3d")]
     for name in ("omega", "zeta"):
