@@ -19,17 +19,21 @@ if TYPE_CHECKING:
     from .case.reduce import reduce_case
     from .commands.main import main
     from .cyclic.aerodynamics import Aerodynamics
-    from .cyclic.faces import match_faces, rotation
+    from .cyclic.faces import match_faces
     from .cyclic.reduction import SectorReduction, reduce_sector
     from .cyclic.sector import Sector
     from .cyclic.waves import WaveError
     from .hb.problems import ForcedResponse, Harmonics, NonlinearMode, choose_harmonics
     from .hb.reduction_error import NonlinearError, nonlinear_error
+    from .model.contact import Contact
     from .model.laws import LawInfo, Limit, ParameterInfo, PythonLaw, Role, laws, register_law
-    from .model.model import Contact, Model, by_sector
+    from .model.model import Model
     from .model.modes import LinearMode, linear_modes
+    from .model.pairs import Pairs
     from .model.reduction import FrequencyError, Reduction, reduce
-    from .model.structure import BuiltContact, BuiltModel
+    from .model.sectors import by_sector, rotation
+    from .model.structure import Structure
+    from .results.model_file import read_model, write_model
     from .results.reader import Run, open_run
     from .results.results import has_results, open_results
     from .solve.branch import Branch
@@ -51,7 +55,10 @@ _HOMES = {
     "results.reader": ("Run", "open_run"),
     "results.results": ("has_results", "open_results"),
     "cyclic.aerodynamics": ("Aerodynamics",),
-    "model.structure": ("BuiltContact", "BuiltModel"),
+    "model.pairs": ("Pairs",),
+    "model.sectors": ("by_sector", "rotation"),
+    "model.structure": ("Structure",),
+    "results.model_file": ("read_model", "write_model"),
     "solve.branch": ("Branch",),
     "solve.follow": ("follow",),
     "solve.continuation": ("Continuation", "Point"),
@@ -59,9 +66,10 @@ _HOMES = {
     "cyclic.sector": ("Sector",),
     "cyclic.reduction": ("SectorReduction", "reduce_sector"),
     "cyclic.waves": ("WaveError",),
-    "cyclic.faces": ("match_faces", "rotation"),
+    "cyclic.faces": ("match_faces",),
     "model.laws": ("LawInfo", "Limit", "ParameterInfo", "PythonLaw", "Role", "laws", "register_law"),
-    "model.model": ("Contact", "Model", "by_sector"),
+    "model.contact": ("Contact",),
+    "model.model": ("Model",),
     "model.modes": ("LinearMode", "linear_modes"),
     "hb.problems": ("ForcedResponse", "Harmonics", "NonlinearMode", "choose_harmonics"),
     "model.reduction": ("FrequencyError", "Reduction", "reduce"),
@@ -75,8 +83,6 @@ _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 __all__ = [
     "Aerodynamics",
     "Branch",
-    "BuiltContact",
-    "BuiltModel",
     "Contact",
     "Continuation",
     "ForcedResponse",
@@ -91,6 +97,7 @@ __all__ = [
     "NonlinearError",
     "NonlinearMode",
     "NotConverged",
+    "Pairs",
     "ParameterInfo",
     "Point",
     "PythonLaw",
@@ -100,6 +107,7 @@ __all__ = [
     "Sector",
     "SectorReduction",
     "StepControl",
+    "Structure",
     "Transient",
     "WaveError",
     "Wear",
@@ -120,12 +128,14 @@ __all__ = [
     "nonlinear_error",
     "open_results",
     "open_run",
+    "read_model",
     "reduce",
     "reduce_case",
     "reduce_sector",
     "register_law",
     "rotation",
     "static_preload",
+    "write_model",
 ]
 
 

@@ -6,10 +6,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from ..errors import InputError
+from ..model.contact import Contact
 from ..model.laws import law_like
-from ..model.structure import BuiltContact
 from ..texts import nearest
-from .contacts import ContactSpec, wear_areas
+from .contacts import wear_areas
 from .reporter import Found, Reporter
 from .schema import AnalysisSection, PreloadSection, ReductionSection, StaticAnalysis, TransientSection, WearAnalysis
 from .toml.source import Source
@@ -53,15 +53,14 @@ def _spatial_indices(analyses: Analyses, sectors: int) -> set[int]:
 def check_wear(
     source: Source,
     analyses: Analyses,
-    contacts: Sequence[ContactSpec],
-    built: Mapping[str, BuiltContact],
+    contacts: Sequence[Contact],
     found: Found,
 ) -> None:
     """Wear needs a contact with a normal direction, and the areas of its pairs."""
     for number, analysis in analyses.items():
         if isinstance(analysis, WearAnalysis):
             try:
-                wear_areas(contacts, built)
+                wear_areas(contacts)
             except InputError as error:
                 where = source.where(("analysis", number, "type"))
                 found.append(InputError(error.what, where, error.where or error.measured, error.expected, error.fix))
@@ -85,10 +84,10 @@ def check_preloads(
 
 
 def check_memory(
-    source: Source, analyses: Analyses, contacts: Sequence[ContactSpec], laws: Mapping[str, Any], found: Found
+    source: Source, analyses: Analyses, contacts: Sequence[Contact], laws: Mapping[str, Any], found: Found
 ) -> None:
     """Time integration sees the present motion alone: a slider's place is no part of its state."""
-    named = next((contact for contact in contacts if getattr(laws.get(contact.law), "memory", False)), None)
+    named = next((contact for contact in contacts if getattr(laws.get(str(contact.law)), "memory", False)), None)
     for number, analysis in analyses.items():
         transient = isinstance(analysis, TransientSection)
         if named is not None and (transient or getattr(analysis, "time_points", False)):

@@ -8,7 +8,7 @@ import resource
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from .contacts import ContactSpec
+from ..model.contact import Contact
 from .reporter import Found, Reporter
 from .schema import AnalysisSection, HarmonicSection, TransientSection, WearAnalysis
 from .toml.source import Source
@@ -36,7 +36,7 @@ def check_sizes(
     source: Source,
     analyses: Mapping[int, AnalysisSection],
     n_dof: int,
-    contacts: Sequence[ContactSpec],
+    contacts: Sequence[Contact],
     sectors: int,
     found: Found,
 ) -> None:
@@ -48,7 +48,7 @@ def check_sizes(
     sectors : of the wheel, 1 for a whole structure
     """
     available = machine_memory()
-    columns = sum(int(contact.rows.shape[0]) for contact in contacts)
+    columns = sum(contact.n_pairs * contact.components for contact in contacts)
     for number, analysis in analyses.items():
         parts = _parts(analysis, n_dof, columns, sectors)
         least = sum(parts.values())

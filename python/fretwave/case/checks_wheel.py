@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from ..model.structure import Structure
 from ..texts import nearest
 from .reporter import Found, Reporter
 from .schema import AnalysisSection, HarmonicSection, MistuningSection, ModeAnalysis
-from .sector import Neighbours
 from .toml.source import Source
 
 
 def check_wheels(
     source: Source,
     analyses: Mapping[int, AnalysisSection],
-    neighbours: Neighbours | None,
+    neighbours: Structure | None,
     dofs: Sequence[str] | None,
     found: Found,
 ) -> None:
@@ -44,7 +44,7 @@ def _check_needs_wheel(report: Reporter, analysis: HarmonicSection) -> None:
         report.wrong((key,), "needs the whole wheel", "beside `wheel = true`", "add `wheel = true`, or remove the key")
 
 
-def _check_on_wheel(report: Reporter, analysis: HarmonicSection, neighbours: Neighbours, n_dof: int) -> None:
+def _check_on_wheel(report: Reporter, analysis: HarmonicSection, neighbours: Structure, n_dof: int) -> None:
     n, diameters = neighbours.sectors, analysis.nodal_diameter
     if analysis.sector is not None and analysis.sector >= n:
         report.wrong(("sector",), "does not exist", f"0 to {n - 1}", "write `sector = 0`, or leave the key out")
@@ -66,10 +66,10 @@ def _check_on_wheel(report: Reporter, analysis: HarmonicSection, neighbours: Nei
             report.wrong(("linear_mode",), "does not exist", expected, "write `linear_mode = 1`")
 
 
-def _check_mistuning(report: Reporter, mistuning: MistuningSection, neighbours: Neighbours) -> None:
+def _check_mistuning(report: Reporter, mistuning: MistuningSection, neighbours: Structure) -> None:
     if mistuning.of not in neighbours.parts:
         known = list(neighbours.parts)
-        fix = nearest(mistuning.of, known) or "name a part that the builder gives (BuiltModel.parts)"
+        fix = nearest(mistuning.of, known) or "name a part that the builder gives (Structure.parts)"
         report.wrong(("of",), "is no part of the stiffness", f"one of {', '.join(known)}", fix)
     given, drawn = mistuning.deviations, mistuning.standard_deviation
     if given is None and drawn is None:
