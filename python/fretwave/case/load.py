@@ -16,26 +16,24 @@ from ..errors import CaseErrors, FretwaveError
 from ..model.structure import BuiltModel
 from ..texts import toml
 from . import checks
-from .checks_rest import check_memory, check_preloads, check_reduction, check_wear
-from .checks_size import check_sizes
-from .checks_wheel import check_wheels
+from .analysis import Analyses, AnalysisSection
+from .checks_tables import check_preload, check_reduction
 from .contacts import ContactSpec, read_contacts
-from .engine_order import fold_engine_orders
+from .facts import Facts
 from .flow import check_aerodynamics
 from .origin import Origin, check_physics, load_origin
+from .plugins import Plugin, read_plugins
 from .reduce import kept_dofs
 from .reduction_report import ReductionReport
 from .schema import (
     AerodynamicsSection,
-    AnalysisSection,
     ModelSection,
     PreloadSection,
     ReductionSection,
     Section,
     StudySection,
-    WearAnalysis,
 )
-from .sector import Neighbours, check_waves, tie
+from .sector import Neighbours, tie
 from .toml.source import Source
 from .toml.validation import validate
 
@@ -78,7 +76,7 @@ class Case:
         Forces of the flow on a sector's blades; None for none.
     wheel : Wheel
         Of a case put on its whole wheel (`fretwave.case.wheel.on_wheel`), the sector it is made of.
-    analyses : dict
+    analyses : Analyses
         Validated analyses by name, in the order of the file.
     resolved : dict
         Every value that decides the results, defaults included, by its address (``mode.harmonics``).
@@ -98,7 +96,7 @@ class Case:
     K: Any
     C: Any
     contacts: list[ContactSpec]
-    analyses: dict[str, AnalysisSection]
+    analyses: Analyses
     resolved: dict[str, Any]
     notes: list[str] = field(default_factory=list)
     has_quick: bool = False
@@ -156,16 +154,7 @@ class Case:
 
     def preload_of(self, analysis: AnalysisSection) -> PreloadSection | None:
         """The preload of an analysis: its own, or that of the case."""
-        return getattr(self.settings(analysis), "preload", None) or self.preload
-
-    def settings(self, analysis: AnalysisSection) -> AnalysisSection:
-        """The analysis whose model and harmonics an analysis uses: wear takes those of its mode."""
-        if not isinstance(analysis, WearAnalysis):
-            return analysis
-        mode = self.analyses[analysis.mode]
-        own = {key: getattr(analysis, key) for key in ("harmonics", "samples") if getattr(analysis, key) is not None}
-        dampers = analysis.dampers or mode.dampers
-        return mode.model_copy(update={**own, "name": analysis.name, "dampers": dampers})
+        return analysis.settings(self).own_preload() or self.preload
 
 
 def load_case(
@@ -174,6 +163,7 @@ def load_case(
     quick: bool = False,
     laws: Mapping[str, Any] | None = None,
     text: str | None = None,
+    plugins: Sequence[Mapping[str, str]] = (),
 ) -> Case:
     """Read and check a case file.
 
@@ -189,6 +179,8 @@ def load_case(
         Known contact laws; default those of the core.
     text : str, optional
         Text to use in place of the file's.
+    plugins : sequence of mappings, optional
+        `name` and `text` of plug-ins as a run's record keeps them, for those whose files are gone.
 
     Raises
     ------
@@ -203,7 +195,10 @@ def load_case(
     for assignment in overrides:
         source.apply_set(assignment)
     found: list[FretwaveError] = list(source.problems)
-    case = _build(source, _core_laws() if laws is None else laws, found)
+    loaded = read_plugins(source, found, plugins)
+    if len(found) > len(source.problems):  # what they would have added is missing everywhere
+        raise CaseErrors(_in_file_order(found), source.label)
+    case = _build(source, _core_laws() if laws is None else laws, loaded, found)
     if found or case is None:
         raise CaseErrors(_in_file_order(found), source.label)
     return case
@@ -223,7 +218,9 @@ def _in_file_order(found: list[FretwaveError]) -> list[FretwaveError]:
     return sorted(found, key=line)
 
 
-def _build(source: Source, laws: Mapping[str, Any], found: list[FretwaveError]) -> Case | None:
+def _build(
+    source: Source, laws: Mapping[str, Any], plugins: Sequence[Plugin], found: list[FretwaveError]
+) -> Case | None:
     checks.check_top_level(source, found)
     analyses = checks.read_analyses(source, found)
     section = _table(ModelSection, "model", source, found)
@@ -239,26 +236,32 @@ def _build(source: Source, laws: Mapping[str, Any], found: list[FretwaveError]) 
     if section and origin:
         origin, contacts, neighbours = tie(section, source, origin, contacts, found)
         dofs, built = origin.dofs, origin.built
-        fold_engine_orders(source, analyses, neighbours.sectors if neighbours else None, found)
-        check_waves(source, analyses, neighbours, found)
-        check_wheels(source, analyses, neighbours, dofs, found)
-    if origin:
-        check_aerodynamics(source, flow, analyses, neighbours.sectors if neighbours else None, origin.dofs, found)
+        check_aerodynamics(source, flow, neighbours.sectors if neighbours else None, origin.dofs, found)
     blade = flow.dof if flow else None
     keep = _kept(origin, contacts, analyses, neighbours, blade) if origin and reduction else {}
     known = set(dofs or ())  # of a sector, dofs of the high face are kept, and left out
-    checks.check_analyses(source, analyses, [name for name in keep.values() if name in known] if keep else dofs, found)
-    check_reduction(source, reduction, analyses, neighbours.sectors if neighbours else None, found)
-    check_preloads(source, preload, analyses, built.loads if built else () if origin else None, found)
-    check_memory(source, analyses, contacts, laws, found)
+    facts = Facts(
+        source=source,
+        model_known=section is not None and origin is not None,
+        dofs=dofs,
+        named=[name for name in keep.values() if name in known] if keep else dofs,
+        least_dofs=len(keep) if reduction else len(dofs or ()),
+        neighbours=neighbours,
+        contacts=contacts,
+        complete=len(contacts) == len(source.entries("contact")),
+        laws=laws,
+        built=built.contacts if built else {},
+        loads=list(built.loads) if built else () if origin else None,
+        preload=preload,
+        flow=flow,
+    )
+    checks.complete_analyses(source, analyses, facts, found)
+    checks.check_analyses(source, analyses, facts, found)
+    check_reduction(source, reduction, analyses, facts.sectors, found)
+    check_preload(source, preload, facts.loads, found)
     notes: list[str] = []
     if origin is not None:
-        least = len(keep) if reduction else len(origin.dofs)
-        check_sizes(source, analyses, least, contacts, neighbours.sectors if neighbours else 1, found)
-        complete = len(contacts) == len(source.entries("contact"))
-        if complete:
-            check_wear(source, analyses, contacts, built.contacts if built else {}, found)
-        check_physics(origin, [contact.rows for contact in contacts] if complete else None, notes, found)
+        check_physics(origin, [contact.rows for contact in contacts] if facts.complete else None, notes, found)
     if found or section is None or origin is None:
         return None
     loaded = {letter: matrix.values for letter, matrix in origin.matrices.items()}
@@ -272,8 +275,11 @@ def _build(source: Source, laws: Mapping[str, Any], found: list[FretwaveError]) 
         K=loaded["K"],
         C=loaded.get("C"),
         contacts=contacts,
-        analyses={analysis.name: analysis for analysis in analyses.values()},
-        resolved=_resolve(origin, section, contacts, analyses, tables),
+        analyses=Analyses({analysis.name: analysis for analysis in analyses.values()}, plugins),
+        resolved={
+            **_resolve(origin, section, contacts, analyses, tables),
+            **{f"plugins.{plugin.name}": plugin.digest for plugin in plugins},
+        },
         notes=[*notes, *_unused_contacts(built, contacts)],
         has_quick="quick" in source.data,
         study=study or StudySection(),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -12,10 +12,11 @@ import scipy.sparse as sp
 
 from .contacts import ContactSpec, closed_contacts
 from .reduction_report import ReductionReport
-from .schema import AnalysisSection, FlutterAnalysis, ForcedAnalysis, ModeAnalysis, ReductionSection
+from .schema import ReductionSection
 
 if TYPE_CHECKING:
     from ..model.reduction import Reduction
+    from .analysis import AnalysisSection
     from .load import Case
 
 
@@ -26,18 +27,9 @@ def kept_dofs(
     dofs: Sequence[str],
 ) -> list[int]:
     """Numbers of the dofs that a reduction keeps: of contacts, and those named by the model or an analysis."""
-    asked = {name for analysis in analyses.values() for name in _names(analysis)}
+    asked = {name for analysis in analyses.values() for name in analysis.kept_dofs()}
     numbers = {k for k, name in enumerate(dofs) if name in asked} | set(named.values())
     return sorted(numbers.union(*(np.unique(contact.rows.indices).tolist() for contact in contacts)))
-
-
-def _names(analysis: AnalysisSection) -> Iterable[str]:
-    yield from (damper.dof for damper in analysis.dampers)
-    if isinstance(analysis, (ModeAnalysis, FlutterAnalysis)):
-        yield analysis.normalise
-    if isinstance(analysis, ForcedAnalysis):
-        yield analysis.observe
-        yield from analysis.force
 
 
 def reduce_case(case: Case, comm: Any, modes: int | None = None) -> Case:
@@ -62,7 +54,7 @@ def reduce_case(case: Case, comm: Any, modes: int | None = None) -> Case:
     return replace(small, reduced=_report(case, small, reduction.component_hz, wall, comm), unreduced=kept)
 
 
-def nonlinear_error_at(case: Case, analysis: ModeAnalysis, problem: Any, y: Any) -> Any:
+def nonlinear_error_at(case: Case, analysis: AnalysisSection, problem: Any, y: Any) -> Any:
     """Estimate of what the unreduced model would change at a point of a mode; the reduction is made again. Collective.
 
     Returns

@@ -11,13 +11,15 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..cyclic.waves import WaveError
+from .checks_tables import waves_of
 from .reduction_report import ReductionReport
-from .schema import ModeAnalysis, ReductionSection
+from .schema import ReductionSection
 from .sector import CutSector, fold
 
 if TYPE_CHECKING:
     from ..cyclic.reduction import SectorReduction
     from ..hb.reduction_error import NonlinearError
+    from .analysis import AnalysisSection
     from .load import Case
 
 
@@ -49,7 +51,7 @@ def reduce_sector_case(case: Case, comm: Any, modes: int | None = None) -> Case:
         )
 
 
-def wave_error_at(case: Case, analysis: ModeAnalysis, problem: Any, y: Any) -> NonlinearError:
+def wave_error_at(case: Case, analysis: AnalysisSection, problem: Any, y: Any) -> NonlinearError:
     """As `fretwave.case.reduce.nonlinear_error_at`, of a wave on a sector. Collective."""
     from ..cyclic.reduction_error import sector_nonlinear_error
 
@@ -153,12 +155,11 @@ def _report(case: Case, reduction: SectorReduction, wall: float) -> ReductionRep
     )
 
 
-def _compared(section: ReductionSection, analyses: Mapping[str, Any]) -> list[int]:
+def _compared(section: ReductionSection, analyses: Mapping[str, AnalysisSection]) -> list[int]:
     """Nodal diameters whose error is stated: unless told, those of the analyses and of the interface modes."""
     if section.compare_diameters is not None:
         return section.compare_diameters
-    given = [getattr(analysis, "nodal_diameter", None) for analysis in analyses.values()]
-    found = [abs(d) for d in given if d is not None] + list(section.interface_diameters or ())
+    found = [abs(d) for d in waves_of(analyses.values())] + list(section.interface_diameters or ())
     return list(dict.fromkeys(found)) or [0]
 
 

@@ -13,7 +13,7 @@ from ..errors import FretwaveError, InputError
 from ..texts import nearest, toml
 from .contacts import ContactSpec
 from .origin import Origin
-from .schema import AnalysisSection, FlutterAnalysis, ForcedAnalysis, HarmonicSection, ModelSection, TransientSection
+from .schema import ModelSection
 from .toml.source import Source
 from .toml.validation import at
 
@@ -166,45 +166,3 @@ def fold(cut: CutSector, number: int) -> tuple[Origin, list[ContactSpec], Neighb
 
 def _without_own(parts: Mapping[int, Any]) -> dict[int, Any]:
     return {k: part for k, part in parts.items() if k}
-
-
-def check_waves(
-    source: Source, analyses: Mapping[int, AnalysisSection], neighbours: Neighbours | None, found: Found
-) -> None:
-    """Analyses of a sector say their nodal diameter; no others do; none integrates in time."""
-
-    def wrong(number: int, key: str, what: str, expected: str, fix: str) -> None:
-        path = ("analysis", number, key)
-        measured = at(source.data, path)
-        text = None if measured is None else f"{key} = {toml(measured)}"
-        found.append(InputError(f"{source.name(path[:-1])} {what}", source.where(path), text, expected, fix))
-
-    for number, analysis in analyses.items():
-        given = getattr(analysis, "nodal_diameter", None)
-        if neighbours is None:
-            if isinstance(analysis, FlutterAnalysis):
-                wrong(number, "type", "is of a wheel", "a model with sectors", "give [model] its sectors")
-            elif given is not None:
-                fix = "remove the key, or give [model] its sectors"
-                wrong(number, "nodal_diameter", "is of no sector of a wheel", "a model with sectors", fix)
-            continue
-        half = neighbours.sectors // 2
-        integrates = isinstance(analysis, TransientSection) or (
-            isinstance(analysis, ForcedAnalysis) and analysis.time_points > 0
-        )
-        if integrates:
-            key = "type" if isinstance(analysis, TransientSection) else "time_points"
-            wrong(number, key, "integrates in time, which one sector cannot", "harmonic balance", "remove it")
-        elif isinstance(analysis, FlutterAnalysis):
-            continue  # has several waves, checked with the aerodynamics
-        elif isinstance(analysis, HarmonicSection) and (
-            abs(given) > half if given is not None else analysis.mistuning is None
-        ):
-            what = "says no nodal diameter" if given is None else "has no such nodal diameter"
-            expected = f"-{half} .. {half}, negative for backward waves"
-            wrong(number, "nodal_diameter", what, expected, "add for example `nodal_diameter = 1`")
-
-
-def nodal_diameter(analysis: Any) -> int:
-    """Of an analysis; 0 where it has none."""
-    return getattr(analysis, "nodal_diameter", None) or 0

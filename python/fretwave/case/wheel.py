@@ -15,6 +15,7 @@ from .contacts import ContactSpec
 from .schema import MistuningSection
 
 if TYPE_CHECKING:
+    from .analysis import AnalysisSection
     from .load import Case
 
 Array = npt.NDArray[np.float64]
@@ -57,21 +58,22 @@ class Wheel:
         return values.reshape(self.sectors, self.unit, *values.shape[1:])
 
 
-def on_wheel(case: Case, analysis: Any) -> Case:
+def on_wheel(case: Case, analysis: AnalysisSection) -> Case:
     """The case as an analysis takes it: the sector (or structure) itself, or with `wheel = true` all sectors.
 
     Dofs are numbered sector by sector and named `tip@0`, `tip@1`, ...; names in the case file are those of a sector.
     """
-    if case.neighbours is None or not getattr(analysis, "wheel", False):
+    section = analysis.harmonic()
+    if case.neighbours is None or section is None or not section.wheel:
         return case
     from ..cyclic.sector import around
 
     neighbours, n = case.neighbours, case.neighbours.sectors
     C = neighbours.with_own("C", case.C) if case.C is not None else None
-    deviations = None if analysis.mistuning is None else deviations_of(analysis.mistuning, n)
+    deviations = None if section.mistuning is None else deviations_of(section.mistuning, n)
     K = around(neighbours.with_own("K", case.K), n)
-    if deviations is not None:
-        K = sp.csr_matrix(K + stiffness_change(neighbours, analysis.mistuning.of, deviations))
+    if section.mistuning is not None and deviations is not None:
+        K = sp.csr_matrix(K + stiffness_change(neighbours, section.mistuning.of, deviations))
     return replace(
         case,
         dofs=[f"{name}@{j}" for j in range(n) for name in case.dofs],
@@ -87,7 +89,7 @@ def on_wheel(case: Case, analysis: Any) -> Case:
 
 
 @contextmanager
-def solver_room(case: Case, analysis: Any, prefix: str) -> Iterator[None]:
+def solver_room(case: Case, analysis: AnalysisSection, prefix: str) -> Iterator[None]:
     """How a mistuned wheel's linear systems are solved, unless PETSc options say otherwise.
 
     The tuned wheel's operator preconditions the mistuned one. Near a resonance it leaves the modes of a family, whose
@@ -98,8 +100,9 @@ def solver_room(case: Case, analysis: Any, prefix: str) -> Iterator[None]:
 
     database: Any = PETSc.Options(prefix)
     wanted: dict[str, Any] = {}
-    if case.wheel is not None and case.wheel.deviations is not None:
-        direct = len(case.dofs) * (2 * analysis.harmonics + 1) <= DIRECT_UNKNOWNS
+    section = analysis.harmonic()
+    if case.wheel is not None and case.wheel.deviations is not None and section is not None:
+        direct = len(case.dofs) * (2 * section.harmonics + 1) <= DIRECT_UNKNOWNS
         room = FIRST_RESTART + 4 * case.wheel.sectors
         wanted = {"route": "direct"} if direct else {"ksp_gmres_restart": room, "ksp_max_it": 2 * room}
     added = [name for name in wanted if not database.hasName(name)]
