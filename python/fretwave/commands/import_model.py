@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -21,10 +21,14 @@ from ..mpi.guard import on_first_rank
 from ..results.model_file import ContactMap, FileModel, SourceFile, write
 from ..texts import display, nearest
 
+if TYPE_CHECKING:
+    from mpi4py import MPI
+
+
 ROLES = {"M": "mass", "K": "stiffness", "C": "damping"}
 
 
-def import_model(options: argparse.Namespace, comm: Any) -> int:
+def import_model(options: argparse.Namespace, comm: MPI.Comm) -> int:
     """Read, check, write, report. Collective; rank 0 reads and writes."""
     model, found = on_first_rank(comm, lambda: read_parts(options))
     report = check(model, found.symmetry, found.notes, options.modes, comm)

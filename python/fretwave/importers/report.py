@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +13,10 @@ from scipy.sparse.csgraph import connected_components
 from ..errors import FretwaveError
 from ..results.model_file import FileModel
 from .entries import counted
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
+
 
 Array = npt.NDArray[np.float64]
 
@@ -66,7 +70,7 @@ def expected_rigid(model: FileModel, motions: Array) -> tuple[int, int]:
     return free, int(count)
 
 
-def check(model: FileModel, symmetry: dict[str, str], notes: Sequence[str], modes: int, comm: Any) -> Report:
+def check(model: FileModel, symmetry: dict[str, str], notes: Sequence[str], modes: int, comm: MPI.Comm) -> Report:
     """Everything that can be said without a law of contact. Collective.
 
     Parameters
@@ -129,7 +133,7 @@ def _diagonal(model: FileModel, diagonal: Array, quantity: str, report: Report) 
             report.warnings.append(f"{counted(int(wrong.sum()), 'dof')} with {kind} {quantity}, the first is {first}")
 
 
-def _frequencies(model: FileModel, motions: Array | None, modes: int, comm: Any, report: Report) -> None:
+def _frequencies(model: FileModel, motions: Array | None, modes: int, comm: MPI.Comm, report: Report) -> None:
     from ..model.model import Model
     from ..model.modes import linear_modes
 
