@@ -14,9 +14,14 @@ from .errors import FretwaveError, InputError, NotConverged
 os.environ.setdefault("OMPI_MCA_ess_singleton_isolated", "1")
 
 if TYPE_CHECKING:
+    from .analyses.parts.context import AnalysisContext, Outcome
+    from .case.analysis import AnalysisSection, register_analysis
     from .case.build import build_model
+    from .case.harmonic import HarmonicSection
     from .case.load import load_case
     from .case.reduce import reduce_case
+    from .case.schema import key
+    from .columns import Column
     from .commands.main import main
     from .cyclic.aerodynamics import Aerodynamics
     from .cyclic.faces import match_faces
@@ -48,9 +53,14 @@ if TYPE_CHECKING:
 #: Where each public name lives; loaded when first used, so that `fretwave --help` starts without PETSc.
 _HOMES = {
     "solve.preload": ("balanced", "static_preload"),
+    "analyses.parts.context": ("AnalysisContext", "Outcome"),
+    "case.analysis": ("AnalysisSection", "register_analysis"),
     "case.build": ("build_model",),
+    "case.harmonic": ("HarmonicSection",),
     "case.load": ("load_case",),
     "case.reduce": ("reduce_case",),
+    "case.schema": ("key",),
+    "columns": ("Column",),
     "commands.main": ("main",),
     "results.reader": ("Run", "open_run"),
     "results.results": ("has_results", "open_results"),
@@ -82,12 +92,16 @@ _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 
 __all__ = [
     "Aerodynamics",
+    "AnalysisContext",
+    "AnalysisSection",
     "Branch",
+    "Column",
     "Contact",
     "Continuation",
     "ForcedResponse",
     "FrequencyError",
     "FretwaveError",
+    "HarmonicSection",
     "Harmonics",
     "InputError",
     "LawInfo",
@@ -97,6 +111,7 @@ __all__ = [
     "NonlinearError",
     "NonlinearMode",
     "NotConverged",
+    "Outcome",
     "Pairs",
     "ParameterInfo",
     "Point",
@@ -120,6 +135,7 @@ __all__ = [
     "choose_harmonics",
     "follow",
     "has_results",
+    "key",
     "laws",
     "linear_modes",
     "load_case",
@@ -132,6 +148,7 @@ __all__ = [
     "reduce",
     "reduce_case",
     "reduce_sector",
+    "register_analysis",
     "register_law",
     "rotation",
     "static_preload",

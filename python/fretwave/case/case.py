@@ -16,15 +16,14 @@ from ..model.contact import Contact
 from ..model.sectors import Sparse
 from ..model.structure import Structure
 from ..texts import toml
+from .analysis import Analyses, AnalysisSection
 from .reduction_report import ReductionReport
 from .schema import (
     AerodynamicsSection,
-    AnalysisSection,
     Damper,
     PreloadSection,
     ReductionSection,
     StudySection,
-    WearAnalysis,
 )
 from .toml.source import Source
 
@@ -60,7 +59,7 @@ class Case:
     contacts : list of Contact
         On the dofs of the structure.
     tables : Tables
-    analyses : dict
+    analyses : Analyses
         Validated analyses by name, in the order of the file.
     resolved : dict
         Every value that decides the results, defaults included, by its address (``mode.harmonics``).
@@ -79,7 +78,7 @@ class Case:
     source: Source
     structure: Structure
     contacts: list[Contact]
-    analyses: dict[str, AnalysisSection]
+    analyses: Analyses
     resolved: dict[str, Any]
     tables: Tables = field(default_factory=Tables)
     notes: list[str] = field(default_factory=list)
@@ -186,16 +185,7 @@ class Case:
 
     def preload_of(self, analysis: AnalysisSection) -> PreloadSection | None:
         """The preload of an analysis: its own, or that of the case."""
-        return getattr(self.settings(analysis), "preload", None) or self.tables.preload
-
-    def settings(self, analysis: AnalysisSection) -> AnalysisSection:
-        """The analysis whose model and harmonics an analysis uses: wear takes those of its mode."""
-        if not isinstance(analysis, WearAnalysis):
-            return analysis
-        mode = self.analyses[analysis.mode]
-        own = {key: getattr(analysis, key) for key in ("harmonics", "samples") if getattr(analysis, key) is not None}
-        dampers = analysis.dampers or mode.dampers
-        return mode.model_copy(update={**own, "name": analysis.name, "dampers": dampers})
+        return analysis.settings(self).own_preload() or self.tables.preload
 
 
 def changed_keys(then: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:

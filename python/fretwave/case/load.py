@@ -13,25 +13,24 @@ from ..model.contact import Contact
 from ..model.pairs import Pairs
 from ..model.structure import Structure
 from . import checks
+from .analysis import Analyses, AnalysisSection
 from .case import Case, Tables, changed_keys
-from .checks_rest import check_memory, check_preloads, check_reduction, check_wear
-from .checks_size import check_sizes
-from .checks_wheel import check_wheels
+from .checks_tables import check_preload, check_reduction
 from .contacts import read_contacts
-from .engine_order import fold_engine_orders
+from .facts import Facts
 from .flow import check_aerodynamics
 from .origin import check_physics, load_origin
+from .plugins import Plugin, read_plugins
 from .reduce import kept_dofs
 from .schema import (
     AerodynamicsSection,
-    AnalysisSection,
     ModelSection,
     PreloadSection,
     ReductionSection,
     Section,
     StudySection,
 )
-from .sector import check_waves, tie
+from .sector import tie
 from .toml.source import Source
 from .toml.validation import validate
 
@@ -46,6 +45,7 @@ def load_case(
     quick: bool = False,
     laws: Mapping[str, Any] | None = None,
     text: str | None = None,
+    plugins: Sequence[Mapping[str, str]] = (),
 ) -> Case:
     """Read and check a case file.
 
@@ -61,6 +61,8 @@ def load_case(
         Known contact laws; default those of the core.
     text : str, optional
         Text to use in place of the file's.
+    plugins : sequence of mappings, optional
+        `name` and `text` of plug-ins as a run's record keeps them, for those whose files are gone.
 
     Raises
     ------
@@ -75,7 +77,10 @@ def load_case(
     for assignment in overrides:
         source.apply_set(assignment)
     found: list[FretwaveError] = list(source.problems)
-    case = _build(source, _core_laws() if laws is None else laws, found)
+    loaded = read_plugins(source, found, plugins)
+    if len(found) > len(source.problems):  # what they would have added is missing everywhere
+        raise CaseErrors(_in_file_order(found), source.label)
+    case = _build(source, _core_laws() if laws is None else laws, loaded, found)
     if found or case is None:
         raise CaseErrors(_in_file_order(found), source.label)
     return case
@@ -95,7 +100,9 @@ def _in_file_order(found: list[FretwaveError]) -> list[FretwaveError]:
     return sorted(found, key=line)
 
 
-def _build(source: Source, laws: Mapping[str, Any], found: list[FretwaveError]) -> Case | None:
+def _build(
+    source: Source, laws: Mapping[str, Any], plugins: Sequence[Plugin], found: list[FretwaveError]
+) -> Case | None:
     checks.check_top_level(source, found)
     analyses = checks.read_analyses(source, found)
     section = _table(ModelSection, "model", source, found)
@@ -119,26 +126,31 @@ def _build(source: Source, laws: Mapping[str, Any], found: list[FretwaveError]) 
         structure, contacts = tie(section, source, structure, contacts, found)
         dofs = structure.dof_names
         neighbours = structure if structure.cut else None
-        fold_engine_orders(source, analyses, neighbours.sectors if neighbours else None, found)
-        check_waves(source, analyses, neighbours, found)
-        check_wheels(source, analyses, neighbours, dofs, found)
-    if structure:
-        check_aerodynamics(source, flow, analyses, neighbours.sectors if neighbours else None, dofs or [], found)
+        check_aerodynamics(source, flow, neighbours.sectors if neighbours else None, dofs, found)
     blade = flow.dof if flow else None
     keep = _kept(structure, analyses, blade) if structure and reduction else {}
     known = set(dofs or ())  # of a sector, dofs of the high face are kept, and left out
-    checks.check_analyses(source, analyses, [name for name in keep.values() if name in known] if keep else dofs, found)
-    check_reduction(source, reduction, analyses, neighbours.sectors if neighbours else None, found)
-    check_preloads(source, preload, analyses, structure.loads if structure else None, found)
-    check_memory(source, analyses, contacts, laws, found)
+    facts = Facts(
+        source=source,
+        model_known=structure is not None,
+        dofs=dofs,
+        named=[name for name in keep.values() if name in known] if keep else dofs,
+        least_dofs=len(keep) if reduction else len(dofs or ()),
+        neighbours=neighbours,
+        contacts=contacts,
+        complete=len(contacts) == len(source.entries("contact")),
+        laws=laws,
+        loads=list(structure.loads) if structure else None,
+        preload=preload,
+        flow=flow,
+    )
+    checks.complete_analyses(source, analyses, facts, found)
+    checks.check_analyses(source, analyses, facts, found)
+    check_reduction(source, reduction, analyses, facts.sectors, found)
+    check_preload(source, preload, facts.loads, found)
     notes: list[str] = []
     if structure is not None:
-        least = len(keep) if reduction else len(dofs or ())
-        check_sizes(source, analyses, least, contacts, neighbours.sectors if neighbours else 1, found)
-        complete = len(contacts) == len(source.entries("contact"))
-        if complete:
-            check_wear(source, analyses, contacts, found)
-        rows = [contact.pairs.own for contact in contacts] if complete else None
+        rows = [contact.pairs.own for contact in contacts] if facts.complete else None
         check_physics(structure, places, rows, notes, found)
     if found or section is None or structure is None:
         return None
@@ -147,8 +159,11 @@ def _build(source: Source, laws: Mapping[str, Any], found: list[FretwaveError]) 
         source=source,
         structure=structure,
         contacts=contacts,
-        analyses={analysis.name: analysis for analysis in analyses.values()},
-        resolved=_resolve({**identity, **_faces(structure)}, source, section, contacts, analyses, tables),
+        analyses=Analyses({analysis.name: analysis for analysis in analyses.values()}, plugins),
+        resolved={
+            **_resolve({**identity, **_faces(structure)}, source, section, contacts, analyses, tables),
+            **{f"plugins.{plugin.name}": plugin.digest for plugin in plugins},
+        },
         tables=Tables(reduction, preload, flow, study or StudySection()),
         notes=[*notes, *_unused_contacts(built, contacts)],
         keep=list(keep),

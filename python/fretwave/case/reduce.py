@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, cast
 
@@ -13,7 +13,6 @@ from ..model.sectors import by_sector
 from ..model.structure import Structure
 from .contacts import on
 from .reduction_report import report_of
-from .schema import AnalysisSection, FlutterAnalysis, ForcedAnalysis, ModeAnalysis
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -23,23 +22,15 @@ if TYPE_CHECKING:
     from ..hb.problems import NonlinearMode
     from ..hb.reduction_error import NonlinearError
     from ..model.reduction import Reduction
+    from .analysis import AnalysisSection
     from .load import Case
 
 
 def kept_dofs(structure: Structure, analyses: Mapping[int, AnalysisSection]) -> list[int]:
     """Numbers of the dofs that a reduction keeps: of contacts, and those named by the model or an analysis."""
-    asked = {name for analysis in analyses.values() for name in _names(analysis)}
+    asked = {name for analysis in analyses.values() for name in analysis.kept_dofs()}
     numbers = {k for k, name in enumerate(structure.dof_names) if name in asked}
     return sorted(numbers.union(structure.kept.tolist()))
-
-
-def _names(analysis: AnalysisSection) -> Iterable[str]:
-    yield from (damper.dof for damper in analysis.dampers)
-    if isinstance(analysis, (ModeAnalysis, FlutterAnalysis)):
-        yield analysis.normalise
-    if isinstance(analysis, ForcedAnalysis):
-        yield analysis.observe
-        yield from analysis.force
 
 
 def reduce_case(case: Case, comm: MPI.Comm, modes: int | None = None) -> Case:
@@ -62,7 +53,7 @@ def reduce_case(case: Case, comm: MPI.Comm, modes: int | None = None) -> Case:
     return replace(reduced, reduced=report, unreduced=full if section.error_at is not None else None)
 
 
-def nonlinear_error_at(case: Case, analysis: ModeAnalysis, problem: NonlinearMode, y: PETSc.Vec) -> NonlinearError:
+def nonlinear_error_at(case: Case, analysis: AnalysisSection, problem: NonlinearMode, y: PETSc.Vec) -> NonlinearError:
     """Estimate of what the unreduced model would change at a point of a mode; the reduction is made again. Collective.
 
     Of a sector in a wave as of a structure.

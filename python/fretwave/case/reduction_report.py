@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
+from .checks_tables import waves_of
 from .contacts import closed_contacts
-from .schema import AnalysisSection, ReductionSection
+from .schema import ReductionSection
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from ..cyclic.reduction import SectorReduction
     from ..cyclic.waves import WaveError
     from ..model.reduction import Reduction
+    from .analysis import AnalysisSection
     from .load import Case
 
 
@@ -146,8 +148,7 @@ def _compared(section: ReductionSection, analyses: Mapping[str, AnalysisSection]
     """Nodal diameters whose error is stated: unless told, those of the analyses and of the interface modes."""
     if section.compare_diameters is not None:
         return section.compare_diameters
-    given = [getattr(analysis, "nodal_diameter", None) for analysis in analyses.values()]
-    found = [abs(d) for d in given if d is not None] + list(section.interface_diameters or ())
+    found = [abs(d) for d in waves_of(analyses.values())] + list(section.interface_diameters or ())
     return list(dict.fromkeys(found)) or [0]
 
 

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -14,7 +12,7 @@ from ..model.sectors import Indices
 from ..model.structure import Structure
 from ..texts import nearest, toml
 from .contacts import on
-from .schema import AnalysisSection, FlutterAnalysis, ForcedAnalysis, HarmonicSection, ModelSection, TransientSection
+from .schema import ModelSection
 from .toml.source import Source
 from .toml.validation import at
 
@@ -67,45 +65,3 @@ def _face(name: str, section: ModelSection, source: Source, structure: Structure
             where, fix = source.where(("model", name, index)), nearest(dof, dofs) or "name a dof of the model"
             found.append(InputError(f"unknown dof '{dof}' of the {name} face", where, expected="a dof", fix=fix))
     return np.array([known[dof] for dof in names if dof in known], dtype=np.intp)
-
-
-def check_waves(
-    source: Source, analyses: Mapping[int, AnalysisSection], neighbours: Structure | None, found: Found
-) -> None:
-    """Analyses of a sector say their nodal diameter; no others do; none integrates in time."""
-
-    def wrong(number: int, key: str, what: str, expected: str, fix: str) -> None:
-        path = ("analysis", number, key)
-        measured = at(source.data, path)
-        text = None if measured is None else f"{key} = {toml(measured)}"
-        found.append(InputError(f"{source.name(path[:-1])} {what}", source.where(path), text, expected, fix))
-
-    for number, analysis in analyses.items():
-        given = getattr(analysis, "nodal_diameter", None)
-        if neighbours is None:
-            if isinstance(analysis, FlutterAnalysis):
-                wrong(number, "type", "is of a wheel", "a model with sectors", "give [model] its sectors")
-            elif given is not None:
-                fix = "remove the key, or give [model] its sectors"
-                wrong(number, "nodal_diameter", "is of no sector of a wheel", "a model with sectors", fix)
-            continue
-        half = neighbours.sectors // 2
-        integrates = isinstance(analysis, TransientSection) or (
-            isinstance(analysis, ForcedAnalysis) and analysis.time_points > 0
-        )
-        if integrates:
-            key = "type" if isinstance(analysis, TransientSection) else "time_points"
-            wrong(number, key, "integrates in time, which one sector cannot", "harmonic balance", "remove it")
-        elif isinstance(analysis, FlutterAnalysis):
-            continue  # has several waves, checked with the aerodynamics
-        elif isinstance(analysis, HarmonicSection) and (
-            abs(given) > half if given is not None else analysis.mistuning is None
-        ):
-            what = "says no nodal diameter" if given is None else "has no such nodal diameter"
-            expected = f"-{half} .. {half}, negative for backward waves"
-            wrong(number, "nodal_diameter", what, expected, "add for example `nodal_diameter = 1`")
-
-
-def nodal_diameter(analysis: Any) -> int:
-    """Of an analysis; 0 where it has none."""
-    return getattr(analysis, "nodal_diameter", None) or 0

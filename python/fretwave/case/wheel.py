@@ -11,9 +11,10 @@ import numpy as np
 import numpy.typing as npt
 
 from ..model.structure import WHOLE
-from .schema import AnalysisSection, MistuningSection
+from .schema import MistuningSection
 
 if TYPE_CHECKING:
+    from .analysis import AnalysisSection
     from .load import Case
 
 Array = npt.NDArray[np.float64]
@@ -29,18 +30,17 @@ def on_wheel(case: Case, analysis: AnalysisSection) -> Case:
 
     Dofs are numbered sector by sector and named `tip@0`, `tip@1`, ...; names in the case file are those of a sector.
     """
-    sector = case.neighbours
-    if sector is None or not getattr(analysis, "wheel", False):
+    sector, section = case.neighbours, analysis.harmonic()
+    if sector is None or section is None or not section.wheel:
         return case
-    mistuning: MistuningSection | None = getattr(analysis, "mistuning", None)
-    n = sector.sectors
+    n, mistuning = sector.sectors, section.mistuning
     deviations, of = (None, WHOLE) if mistuning is None else (deviations_of(mistuning, n), mistuning.of)
     contacts = [contact.around(n) for contact in case.contacts]
     return replace(case, structure=sector.around(deviations, of), contacts=contacts, sector=case)
 
 
 @contextmanager
-def solver_room(case: Case, analysis: Any, prefix: str) -> Iterator[None]:
+def solver_room(case: Case, analysis: AnalysisSection, prefix: str) -> Iterator[None]:
     """How a mistuned wheel's linear systems are solved, unless PETSc options say otherwise.
 
     The tuned wheel's operator preconditions the mistuned one. Near a resonance it leaves the modes of a family, whose
@@ -51,8 +51,9 @@ def solver_room(case: Case, analysis: Any, prefix: str) -> Iterator[None]:
 
     database: Any = PETSc.Options(prefix)
     wanted: dict[str, Any] = {}
-    if case.wheel is not None and case.wheel.deviations is not None:
-        direct = case.wheel.n_dof * (2 * analysis.harmonics + 1) <= DIRECT_UNKNOWNS
+    section = analysis.harmonic()
+    if case.wheel is not None and case.wheel.deviations is not None and section is not None:
+        direct = case.wheel.n_dof * (2 * section.harmonics + 1) <= DIRECT_UNKNOWNS
         room = FIRST_RESTART + 4 * case.wheel.sectors
         wanted = {"route": "direct"} if direct else {"ksp_gmres_restart": room, "ksp_max_it": 2 * room}
     added = [name for name in wanted if not database.hasName(name)]

@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar, Union
+from typing import TYPE_CHECKING, Any, TypeVar, Union
 from zipfile import BadZipFile
 
 import numpy as np
@@ -21,6 +21,10 @@ import numpy as np
 from ..errors import FretwaveError, InputError
 from ..files.whole import replaced, told
 from .guard import all_ranks_failed, on_first_rank
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
+
 
 Task = TypeVar("Task")
 
@@ -62,7 +66,7 @@ class Kept:
 
 
 def run(
-    comm: Any,
+    comm: MPI.Comm,
     tasks: Sequence[Task],
     work: Callable[[Task, Any], Any],
     n_groups: int | None = None,
@@ -132,7 +136,7 @@ def _loaded(kept: Kept | None, count: int) -> dict[int, Any]:
     return {number: result for number, result in found.items() if result is not None}
 
 
-def _attempt(work: Callable[[Task, Any], Any], task: Task, group: Any) -> Union[Any, FretwaveError]:
+def _attempt(work: Callable[[Task, Any], Any], task: Task, group: MPI.Comm) -> Union[Any, FretwaveError]:
     """The result of a task, or the error that it ended in on every rank; an error of some ranks alone is raised."""
     try:
         return work(task, group)

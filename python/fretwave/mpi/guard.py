@@ -12,10 +12,14 @@ import time
 import traceback
 from collections.abc import Callable
 from types import TracebackType
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from ..errors import EXIT_OTHER, FretwaveError, exit_code_of
 from ..files.whole import file_error
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
+
 
 Result = TypeVar("Result")
 
@@ -41,7 +45,7 @@ def launched_rank() -> int:
     return int(next((os.environ[name] for name in names if name in os.environ), "0"))
 
 
-def all_ranks_failed(comm: Any) -> bool:
+def all_ranks_failed(comm: MPI.Comm) -> bool:
     """True when every rank gets here within `AGREEMENT_WAIT` seconds.
 
     A barrier on the world would match a barrier of ranks that are well, so a private message ring is
@@ -174,7 +178,7 @@ def install() -> None:
     sys.excepthook = _excepthook
 
 
-def caught_by_all(comm: Any, error: FretwaveError) -> None:
+def caught_by_all(comm: MPI.Comm, error: FretwaveError) -> None:
     """Return where every rank has caught this error and goes on; end all of them where some only have. Collective.
 
     For those who catch a `FretwaveError` and go on with collective calls: the others may wait in one of before.
@@ -186,7 +190,7 @@ def caught_by_all(comm: Any, error: FretwaveError) -> None:
     comm.Abort(exit_code_of(error))
 
 
-def on_first_rank(comm: Any, work: Callable[[], Result]) -> Result:
+def on_first_rank(comm: MPI.Comm, work: Callable[[], Result]) -> Result:
     """Do `work` on rank 0 and give its result, or its FretwaveError, to every rank. Collective.
 
     What only one rank reads (case file, matrices, earlier results) cannot differ between ranks then.

@@ -6,10 +6,14 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from ..errors import EXIT_OTHER
 from ..texts import display
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
+
 
 #: mpirun is given this long to read the last words [s]; it ends its ranks a second after it was told to end.
 LAST_WAIT = 0.4
@@ -18,7 +22,7 @@ SHOW_CURSOR = "\x1b[?25h"
 
 
 @contextmanager
-def ending_in_words(comm: Any) -> Iterator[None]:
+def ending_in_words(comm: MPI.Comm) -> Iterator[None]:
     """End at once on a signal, saying on the first rank how to go on."""
     from .. import _core
 
@@ -30,13 +34,13 @@ def ending_in_words(comm: Any) -> Iterator[None]:
         _core.restore_signals()
 
 
-def say_how_to_go_on(comm: Any, folder: Path) -> None:
+def say_how_to_go_on(comm: MPI.Comm, folder: Path) -> None:
     """From now on there are results in a folder that can be gone on with."""
     words = f"finished points are kept in {display(folder)}"
     _say(comm, f": {words}\n  fix:      `fretwave resume {display(folder)}` goes on from there")
 
 
-def _say(comm: Any, text: str) -> None:
+def _say(comm: MPI.Comm, text: str) -> None:
     from .. import _core
 
     cursor = SHOW_CURSOR if sys.stderr.isatty() else ""

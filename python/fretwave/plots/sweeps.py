@@ -18,7 +18,7 @@ from ..post.grid import Plan, short_names
 from ..post.mode_curve import ModeCurve
 from ..results.file import open_results
 from ..results.reader import Analysis, Run, Table
-from ..results.sweep_summary import SPLIT
+from ..results.sweep_summary import split_of
 from . import style
 from .forced import smooth
 
@@ -55,7 +55,7 @@ class Swept:
     def of(cls, analysis: Analysis) -> Swept:
         with open_results(analysis.path) as file:
             summary = {key: np.asarray(data[()], dtype=float) for key, data in file[analysis.name]["summary"].items()}
-        split = SPLIT.get(str(analysis.attributes["of_type"]), "")
+        split = split_of(str(analysis.attributes["of_type"]))
         parts = [float(part) for part in summary.pop(split, ())]
         plan, branches = Plan(analysis.attributes["over"]), []
         for number, (place, part) in product(range(len(plan)), enumerate(parts or [np.nan])):

@@ -56,7 +56,7 @@ class Shape:
     coefficients: Array
     basis: Array
 
-    def displacements(self, chosen: Any = slice(None)) -> Iterator[Array]:
+    def displacements(self, chosen: slice | npt.NDArray[np.intp] = slice(None)) -> Iterator[Array]:
         """(n_chosen, 3) of some nodes in all steps, one after the other."""
         return (values[chosen] @ row for values in self.coefficients for row in self.basis)
 

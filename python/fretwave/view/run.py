@@ -9,23 +9,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
 
+from ..case.kept import reload_case
 from ..case.load import Case
 from ..model.pairs import Pairs
 from ..post.contact_history import OPEN, SLIP, STICK, ContactHistory
 from ..post.motion import complex_amplitudes
 from ..results.results import open_results
-from ..run.runner import reload_case
 from ..texts import display
-from .choice import Choice, ViewOptions, read_choice
+from .choice import Choice, ViewOptions, analysis_name, read_choice
 from .motion import Scene, Shape, geometry, mesh_of, scene_of
 from .vtkhdf import VERTEX, GridFile
-from .wear import view_wear, worn_analysis
 
 Array = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.intp]
@@ -45,9 +43,11 @@ def view_run(folder: Path, options: ViewOptions, say: Callable[[str], None] = pr
         sector.
     """
     case, _ = reload_case(folder, kept=True)
-    worn = None if options.points else worn_analysis(folder, case, options)
-    if worn is not None:
-        return view_wear(folder, case, worn, options, say)
+    with open_results(folder / "results.h5") as file:
+        name = analysis_name(file, folder, case, options.analysis)
+    written = case.analyses[name].view(folder, case, options, say)
+    if written is not None:
+        return list(written)
     nodes, cells = mesh_of(case, options.linear)
     with open_results(folder / "results.h5") as file:
         choice = read_choice(file, folder, case, options)
@@ -163,12 +163,12 @@ def _pair_fields(
     return write
 
 
-def _motion(grid: GridFile, scale: float) -> Callable[[int, Shape, Any], None]:
+def _motion(grid: GridFile, scale: float) -> Callable[[int, Shape, slice | IntArray], None]:
     """Writes the true displacement of a part, and the one from rest enlarged for the eye."""
     steps = np.arange(grid.steps)
     true, warp = grid.field("displacement", 3, steps), grid.field("warp", 3, steps, "f4")
 
-    def write(part: int, shape: Shape, chosen: Any) -> None:
+    def write(part: int, shape: Shape, chosen: slice | IntArray) -> None:
         for step, x in enumerate(shape.displacements(chosen)):
             true(step, part, x)
             warp(step, part, scale * (x - shape.rest[chosen]))

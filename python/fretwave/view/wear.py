@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -16,13 +16,16 @@ from scipy.spatial import Delaunay, QhullError
 
 from ..case.contacts import wear_areas
 from ..case.load import Case
-from ..case.schema import WearAnalysis
 from ..errors import InputError
 from ..model.pairs import Pairs
 from ..results.results import open_results
 from ..texts import display
-from .choice import ViewOptions, analysis_name
+from .choice import ViewOptions
 from .vtkhdf import TRIANGLE, VERTEX, GridFile
+
+if TYPE_CHECKING:
+    import h5py
+
 
 Array = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.intp]
@@ -41,13 +44,6 @@ FIELDS = {
 DRAWN = 0.1
 #: A triangle with a side longer than the median of the longest sides by this bridges a gap between pairs.
 BRIDGE = 3.0
-
-
-def worn_analysis(folder: Path, case: Case, options: ViewOptions) -> str | None:
-    """Name of the analysis to show when it is one of wear."""
-    with open_results(folder / "results.h5") as file:
-        name = analysis_name(file, folder, case, options.analysis)
-    return name if isinstance(case.analyses[name], WearAnalysis) else None
 
 
 def view_wear(folder: Path, case: Case, name: str, options: ViewOptions, say: Callable[[str], None]) -> list[Path]:
@@ -85,7 +81,7 @@ def _placed(case: Case, name: str) -> dict[str, Pairs]:
     return found
 
 
-def _chosen(group: Any, options: ViewOptions, where: str) -> list[IntArray]:
+def _chosen(group: h5py.Group, options: ViewOptions, where: str) -> list[IntArray]:
     """Rows of the lines whose amplitudes are asked for."""
     number, amplitude = group["points/line"][()], group["points/amplitude"][()]
     lines = [np.flatnonzero(number == k) for k in np.unique(number)]
@@ -100,7 +96,7 @@ def _chosen(group: Any, options: ViewOptions, where: str) -> list[IntArray]:
     return [lines[int(np.argmin(np.abs(given - asked)))] for asked in options.amplitudes]
 
 
-def _write(path: Path, group: Any, rows: IntArray, placed: Mapping[str, Pairs], scale: float | None) -> float:
+def _write(path: Path, group: h5py.Group, rows: IntArray, placed: Mapping[str, Pairs], scale: float | None) -> float:
     """One line; returns the factor on the depths in the field warp."""
     steps, table = np.arange(len(rows)), group["points"]
     arrays = {key: _over_steps(group, key, rows, placed) for key in FIELDS}
@@ -125,7 +121,7 @@ def _write(path: Path, group: Any, rows: IntArray, placed: Mapping[str, Pairs], 
     return scale
 
 
-def _over_steps(group: Any, key: str, rows: IntArray, placed: Mapping[str, Pairs]) -> Array:
+def _over_steps(group: h5py.Group, key: str, rows: IntArray, placed: Mapping[str, Pairs]) -> Array:
     """(n_steps, n_pairs of all contacts)."""
     parts = [np.asarray(group[f"{key}_{name}"][rows[0] : rows[-1] + 1])[rows - rows[0]] for name in placed]
     return np.concatenate(parts, axis=1)

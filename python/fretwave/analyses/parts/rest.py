@@ -4,31 +4,33 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Optional
 
 import numpy as np
 import scipy.sparse.linalg
 
+from ...case.analysis import AnalysisSection
 from ...case.contacts import closed_contacts
+from ...case.harmonic import HarmonicSection, nodal_diameter
 from ...case.schema import PreloadSection
-from ...case.sector import nodal_diameter
 from ...errors import InputError
 from ...model.contact import Contact
 from ...model.laws import Role, own_load
 from .asymptotes import closed_stiffness
 from .context import AnalysisContext
 
+if TYPE_CHECKING:
+    from ...hb.problems import Harmonics
+    from ...model.modes import LinearMode
+    from ...results.results import AnalysisWriter
+    from ...solve.preload import Preload
+
 #: A mode below this share of the first frequency with closed contact is a rigid motion.
 RIGID = 1e-6
 
 
-def rest_state(context: AnalysisContext, factor: float = 1.0) -> Any:
+def rest_state(context: AnalysisContext[AnalysisSection]) -> Optional[Preload]:
     """Solve the preload of an analysis; the contact laws take it as their rest state. Collective.
-
-    Parameters
-    ----------
-    factor : float
-        On the loads; the pairs' own normal loads are as given.
 
     Returns
     -------
@@ -40,11 +42,20 @@ def rest_state(context: AnalysisContext, factor: float = 1.0) -> Any:
     NotConverged
         There is no static equilibrium.
     """
+    return None if context.case.preload_of(context.analysis) is None else loaded_state(context)
+
+
+def loaded_state(context: AnalysisContext[AnalysisSection], factor: float = 1.0) -> Preload:
+    """The same also without [preload], where the pairs' own loads act alone. Collective.
+
+    Parameters
+    ----------
+    factor : float
+        On the loads; the pairs' own normal loads are as given.
+    """
     from ...solve.preload import balanced, static_preload
 
     section = context.case.preload_of(context.analysis)
-    if section is None and context.analysis.type != "static":
-        return None
     reference = closed_mode(context)
     if section is None or not section.loads:
         return balanced(context.model, reference)
@@ -68,7 +79,7 @@ def just_touching(contacts: Sequence[Contact], section: PreloadSection) -> bool:
     )
 
 
-def closed_mode(context: AnalysisContext) -> Any:
+def closed_mode(context: AnalysisContext[AnalysisSection]) -> LinearMode:
     """Lowest linear mode with every pair stuck, also those that do not touch before the load: a scale. Collective."""
     from ...case.build import build_model
     from ...model.modes import linear_modes
@@ -78,7 +89,9 @@ def closed_mode(context: AnalysisContext) -> Any:
         return linear_modes(model, 1)[0]
 
 
-def start_mode(context: AnalysisContext, linear_mode: int, or_free: bool = False) -> tuple[Any, Any]:
+def start_mode(
+    context: AnalysisContext[AnalysisSection], linear_mode: int, or_free: bool = False
+) -> tuple[LinearMode, Optional[Preload]]:
     """The linear mode with the contact as it is at rest, stuck, and the rest state (or None). Collective.
 
     Parameters
@@ -114,7 +127,9 @@ def start_mode(context: AnalysisContext, linear_mode: int, or_free: bool = False
     return start, rest
 
 
-def retained(context: AnalysisContext, highest: int | None = None, samples: int | None = None) -> Any:
+def retained(
+    context: AnalysisContext[HarmonicSection], highest: Optional[int] = None, samples: Optional[int] = None
+) -> Harmonics:
     """Harmonics of an analysis in the frequency domain: with a preload the even ones too, unless told otherwise.
 
     Parameters
@@ -123,14 +138,13 @@ def retained(context: AnalysisContext, highest: int | None = None, samples: int 
     """
     from ...hb.problems import choose_harmonics
 
-    analysis: Any = context.analysis
-    retain = analysis.retain
+    analysis, retain = context.analysis, context.analysis.retain
     if retain == "auto" and context.case.preload_of(analysis) is not None:
         retain = "all"
     return choose_harmonics(context.model, highest or analysis.harmonics, samples or analysis.samples, retain)
 
 
-def keep_pairs(context: AnalysisContext, writer: Any) -> None:
+def keep_pairs(context: AnalysisContext[AnalysisSection], writer: AnalysisWriter) -> None:
     """Keep with the results where the contact pairs are, for the pictures."""
     for contact in context.case.contacts:
         given = contact.pairs
