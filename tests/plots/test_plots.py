@@ -143,7 +143,7 @@ def test_backbone_shows_both_methods_both_asymptotes_folds_and_peak(run):
 def test_backbone_under_negative_damping_marks_stable_and_unstable_limit_cycles(run):
     figure = backbone.draw([run.analyses["flutter"]])
     assert {"stable limit cycle (attractor)", "unstable limit cycle"} <= set(texts(figure))
-    stable, unstable = run.analyses["flutter"].curve().crossings()
+    stable, unstable = run.analyses["flutter"].mode_curve().crossings()
     width = np.sqrt(np.log(2.0))
     assert stable.amplitude == pytest.approx(0.2 * np.exp(-width), rel=1e-2) and stable.stable
     assert unstable.amplitude == pytest.approx(0.2 * np.exp(width), rel=1e-2) and not unstable.stable

@@ -64,9 +64,9 @@ def test_the_map_is_cut_where_its_legend_says(folder, run):
 
 
 def test_volumes_of_wide_range_are_logarithmic():
-    linear, norm = wear._volume_levels(np.array([[0.0, 0.1], [0.0, 2.0]]))
+    linear, norm = wear.volume_levels(np.array([[0.0, 0.1], [0.0, 2.0]]))
     assert norm is None and linear[0] == 0.0 and linear[-1] >= 2.0
-    levels, norm = wear._volume_levels(np.array([[0.0, 0.0], [0.0, 0.019], [0.0, 22.3]]))
+    levels, norm = wear.volume_levels(np.array([[0.0, 0.0], [0.0, 0.019], [0.0, 22.3]]))
     assert norm is not None and levels == pytest.approx([d * 10.0**k for k in range(-2, 2) for d in (1, 2, 5)])
 
 

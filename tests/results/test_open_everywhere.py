@@ -10,12 +10,60 @@ import h5py
 import numpy as np
 import pytest
 from h5py import h5ds
+from models.chain_case import CHAIN
+from models.wear_case import write_case
 
 import fretwave as fw
 from fretwave.files.dimensions import put_array
 
 pytestmark = pytest.mark.ranks(1)
 CASE = Path(__file__).parents[2] / "cases" / "two_dof" / "case.toml"
+#: Every type of analysis, and what has results without being one.
+TYPES = {"static", "mode", "forced", "flutter", "free_decay", "limit_cycle", "wear", "sweep"}
+#: Added to the chain on two pads.
+MORE = """
+[[analysis]]
+name = "static"
+type = "static"
+preload = { pair_loads = false, loads = ["weight"] }
+factors = [0.5, 1.0]
+
+[[analysis]]
+name = "limits"
+type = "sweep"
+of = "mode"
+over.contact.pads.friction_coefficient = [0.3, 0.5]
+"""
+#: Of a chain of five sectors, a mass on its spring and a Jenkins element to the next one, in a flow.
+FLUTTER = """
+[model]
+dofs = ["mass", "next"]
+M = [[1.0, 0.0], [0.0, 0.0]]
+K = [[1.0, 0.0], [0.0, 0.0]]
+sectors = 5
+low = ["mass"]
+high = ["next"]
+
+[[contact]]
+name = "between"
+law = "jenkins"
+pairs = [["mass", "next"]]
+tangential_stiffness = 1.0
+friction_limit = 1.0
+
+[aerodynamics]
+frequency = 0.27
+dof = "mass"
+influence = { 0 = [0.02, -0.06], 1 = [-0.1, 0.02] }
+
+[[analysis]]
+name = "flutter"
+type = "flutter"
+normalise = "mass"
+harmonics = 1
+samples = 64
+amplitude = [0.2, 2.0]
+"""
 #: As where neither is installed.
 BLOCKED = """
 import sys
@@ -39,11 +87,29 @@ def run(tmp_path_factory) -> Path:
     return folder
 
 
+@pytest.fixture(scope="module")
+def files(run, tmp_path_factory) -> list[Path]:
+    """results.h5 of runs of every type of analysis, of a sweep from the command line, and of a study."""
+    base = tmp_path_factory.mktemp("types")
+    case = write_case(base)
+    case.write_text(case.read_text() + MORE)
+    (base / "flutter.toml").write_text(FLUTTER)
+    calls = (
+        ["run", case, "--only", "static,one,limits", "--no-plots", "--out", base / "chain"],
+        ["run", base / "flutter.toml", "--no-plots", "--out", base / "flutter"],
+        ["sweep", case, "--over", "contact.pads.friction_coefficient=0.3,0.5", "--only", "static", "--no-plots"],
+        ["study", CASE, "--analysis", "mode", "--harmonics", "1,3", "--samples", "64", "--tolerance", "1e-8"],
+    )
+    for call in calls:
+        out = [] if "--out" in call else ["--out", base / call[0]]
+        repeats = ["--repeats", "1"] if call[0] == "study" else []
+        assert fw.main([str(word) for word in (*call, *out, *repeats)]) == 0, call
+    return sorted([run / "results.h5", *base.rglob("results.h5")])
+
+
 @pytest.mark.parametrize("command", ["show", "plot"])
 def test_a_run_is_shown_without_mpi_and_petsc(run, command):
-    done = subprocess.run(
-        [sys.executable, "-c", BLOCKED, command, str(run)], capture_output=True, text=True, timeout=300
-    )
+    done = blocked(command, run)
     assert done.returncode == 0, done.stderr
     if command == "show":
         assert "limit cycle at a = 0.1375" in done.stdout
@@ -51,9 +117,46 @@ def test_a_run_is_shown_without_mpi_and_petsc(run, command):
         assert (run / "mode_backbone.png").exists()
 
 
-def test_every_axis_has_its_name(run):
-    """A scale in the dataset's own group or in the one above, as netCDF-4 wants it; or it is one itself."""
-    nameless, foreign = [], []
+def blocked(*words) -> subprocess.CompletedProcess[str]:
+    """The command where neither MPI, PETSc nor the core can be imported."""
+    call = [sys.executable, "-c", BLOCKED, *map(str, words)]
+    return subprocess.run(call, capture_output=True, text=True, timeout=300)
+
+
+def test_a_motion_is_viewed_without_mpi_and_petsc(tmp_path):
+    """Of a model as it is: the same files, value by value."""
+    case = write_case(tmp_path)
+    begin, end = CHAIN.index("[reduction]"), CHAIN.index("[preload]")
+    case.write_text(case.read_text().replace(CHAIN[begin:end], ""))
+    folder = tmp_path / "run"
+    assert fw.main(["run", str(case), "--only", "mode,one", "--no-plots", "--out", str(folder)]) == 0
+    for name in ("mode", "one"):
+        for place, view in (("with", lambda *words: fw.main([str(word) for word in words])), ("without", blocked)):
+            (tmp_path / place).mkdir(exist_ok=True)
+            out = tmp_path / place / f"{name}.vtkhdf"
+            done = view("view", folder, "--analysis", name, "--phases", "8", "--out", out)
+            assert done == 0 if place == "with" else done.returncode == 0, done.stderr
+    made = {place: sorted((tmp_path / place).iterdir()) for place in ("with", "without")}
+    assert len(made["with"]) == 3 and [p.name for p in made["with"]] == [p.name for p in made["without"]]
+    for mine, its in zip(*made.values()):
+        with h5py.File(mine) as one, h5py.File(its) as other:
+            names = []
+            one.visititems(lambda name, item, names=names: names.append(name) if hasattr(item, "dims") else None)
+            assert len(names) > 10
+            for name in names:
+                np.testing.assert_array_equal(one[name][()], other[name][()], err_msg=name)
+
+
+def test_a_reduced_model_is_refused_in_words_where_it_cannot_be_expanded(files):
+    (chain,) = [path.parent for path in files if path.parent.name == "chain"]
+    done = blocked("view", chain / "limits" / "0000")
+    assert done.returncode == 2 and "fix:" in done.stderr and "Traceback" not in done.stderr
+    assert "the motion of a reduced model cannot be shown here" in done.stderr
+
+
+def test_every_axis_has_its_name(files):
+    """A scale in the dataset's own group or in one above, as netCDF-4 wants it; or it is one itself."""
+    nameless, foreign, types = [], [], set()
 
     def look(name, item):
         if not hasattr(item, "dims") or h5ds.is_scale(item.id):
@@ -64,10 +167,26 @@ def test_every_axis_has_its_name(run):
             elif axis[0].parent not in (item.parent, item.parent.parent):
                 foreign.append(name)
 
-    with h5py.File(run / "results.h5") as file:
-        file.visititems(look)
-        assert len(file["mode/points"]) > 10
-    assert not nameless and not foreign
+    for path in files:
+        with h5py.File(path) as file:
+            file.visititems(look)
+            types |= {group.attrs["type"] for group in file.values() if "type" in group.attrs}
+    assert not nameless and not foreign and types == TYPES
+
+
+def test_every_type_of_analysis_is_a_tree_of_datasets(files):
+    """xarray reads every dataset of every file, with the same values and as many axes as HDF5 has."""
+    xarray = pytest.importorskip("xarray")
+    for path in files:
+        with xarray.open_datatree(path, engine="h5netcdf") as tree, h5py.File(path) as file:
+            found = []
+            file.visititems(lambda name, item, found=found: found.append(name) if hasattr(item, "dims") else None)
+            assert found
+            for name in found:
+                values, kept = np.asarray(tree[name].values), file[name][()]
+                assert values.shape == np.shape(kept), (path, name)
+                if np.asarray(kept).dtype.kind in "fiu":
+                    np.testing.assert_array_equal(values, kept, err_msg=name)
 
 
 def test_arrays_of_one_name_in_two_groups_keep_their_own_axes():

@@ -11,45 +11,13 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from models.core_models import CubicLaw, dense, mode_problem, oscillator, whole
+from models.core_models import dense, mode_problem, oscillator, whole
+from models.duffing import C, G, K, mode, response, steps, stiffness
 from petsc4py import PETSc
 
 import fretwave as fw
 from fretwave.columns import FORCED, MODE
 from fretwave.solve.hermite import Cubic
-
-K, C, G = 4.0, 0.02, 0.5
-
-
-class Spring(CubicLaw):
-    """A cubic spring never sticks."""
-
-    stuck_stiffness = 0.0
-
-
-def duffing():
-    """m x'' + c x' + k x + g x^3 = 0; with one harmonic its force is 3/4 g a^3, exactly."""
-    return fw.Model([[1.0]], [[K]], [[C]], [fw.Contact(Spring(G), [[1.0]])])
-
-
-def stiffness(a):
-    return K + 0.75 * G * np.asarray(a) ** 2
-
-
-def mode(method="CNM"):
-    """lambda^2 + c lambda + k + 3/4 g a^2 = 0."""
-    model = duffing()
-    return fw.NonlinearMode(model, fw.choose_harmonics(model, 1), method)
-
-
-def response(force=0.1):
-    model = duffing()
-    start = fw.linear_modes(model, 1)[0]
-    return fw.ForcedResponse(model, fw.choose_harmonics(model, 1), {1: [force]}, 1.0, 0, start)
-
-
-def steps(length):
-    return fw.StepControl(initial=length, maximum=length, max_error=1.0)
 
 
 def test_every_column_of_a_reading_is_the_closed_form():

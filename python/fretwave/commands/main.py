@@ -13,7 +13,7 @@ from ..errors import EXIT_DONE, InputError
 from ..mpi.guard import guarded, install
 from ..texts import display, is_there
 from .parser import Parser
-from .world import world
+from .world import world, world_if_any
 
 if TYPE_CHECKING:
     from argparse import _SubParsersAction
@@ -262,8 +262,7 @@ def _import(options: argparse.Namespace) -> int:
 
 def _view(options: argparse.Namespace) -> int:
     _run_folder(options.folder)
-    comm = world()
-    from ..mpi.guard import on_first_rank
+    comm = world_if_any()
     from ..view.choice import ViewOptions
     from ..view.run import view_run
 
@@ -277,6 +276,11 @@ def _view(options: argparse.Namespace) -> int:
         sectors=options.sectors,
         out=options.out,
     )
+    if comm is None:
+        view_run(options.folder, chosen)
+        return EXIT_DONE
+    from ..mpi.guard import on_first_rank
+
     on_first_rank(comm, lambda: view_run(options.folder, chosen))
     return EXIT_DONE
 

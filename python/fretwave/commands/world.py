@@ -17,3 +17,12 @@ def world() -> Any:
     from .. import _core  # noqa: F401
 
     return MPI.COMM_WORLD
+
+
+def world_if_any() -> Any:
+    """The same where there is MPI, else None: for what reads results and asks little of the solver."""
+    try:
+        import mpi4py  # noqa: F401
+    except ImportError:
+        return None
+    return world()

@@ -7,11 +7,14 @@ The scalars of unknowns y are linear in y: the problem's own (frequency, ...), t
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any, ClassVar, Union
 
 import numpy as np
 import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -28,8 +31,20 @@ class ModalState:
     #: The continuation parameter as users call it.
     parameter: ClassVar[str] = "amplitude"
     columns: ClassVar[tuple[str, ...]] = ("amplitude", "omega", "omega0", "frequency_hz", "beta", "zeta")
+    #: The scalars by name, in physical units [1/s, rad/s, 1] as `factors` gives them.
+    scalars: ClassVar[tuple[str, ...]] = ("beta", "w", "log_amplitude")
     method: str
-    omega_reference: float
+    omega_reference: float = 1.0
+
+    @property
+    def factors(self) -> Array:
+        """That bring the scalars to physical units (3,)."""
+        return np.array([self.omega_reference, self.omega_reference, 1.0])
+
+    def scalars_of(self, table: Mapping[str, Any]) -> Array:
+        """The inverse in physical units (n, 3), from columns of n states."""
+        w = table["omega0" if self.method == "EPMC" else "omega"]
+        return np.column_stack([table["beta"], w, np.log(table["amplitude"])])
 
     def __call__(self, z: npt.ArrayLike) -> dict[str, float]:
         """The columns of these scalars."""
@@ -52,9 +67,20 @@ class ForcedState:
     kind: ClassVar[str] = "forced"
     parameter: ClassVar[str] = "omega"
     columns: ClassVar[tuple[str, ...]] = ("level", "omega", "frequency_hz", "amplitude", "phase")
+    scalars: ClassVar[tuple[str, ...]] = ("omega", "cosine", "sine")
     level: float
-    omega_reference: float
-    amplitude_reference: float
+    omega_reference: float = 1.0
+    amplitude_reference: float = 1.0
+
+    @property
+    def factors(self) -> Array:
+        """That bring the scalars to physical units [rad/s, m, m] (3,)."""
+        return np.array([self.omega_reference, self.amplitude_reference, self.amplitude_reference])
+
+    def scalars_of(self, table: Mapping[str, Any]) -> Array:
+        """The inverse in physical units (n, 3), from columns of n states."""
+        amplitude, phase = np.asarray(table["amplitude"]), np.asarray(table["phase"])
+        return np.column_stack([table["omega"], amplitude * np.cos(phase), -amplitude * np.sin(phase)])
 
     def __call__(self, z: npt.ArrayLike) -> dict[str, float]:
         """The columns of these scalars."""

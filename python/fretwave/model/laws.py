@@ -108,7 +108,24 @@ class LawInfo:
     def plain(self) -> dict[str, Any]:
         """What results keep of the law, that they may be drawn without it."""
         roles = {parameter.role.value: parameter.name for parameter in self.parameters if parameter.role != Role.NONE}
-        return {"law": self.name, "normal": self.normal, "limit": self.limit.value, "roles": roles}
+        parameters = [
+            [p.name, p.unit, p.doc, p.lower if np.isfinite(p.lower) else None, p.strict, p.default, p.role.value]
+            for p in self.parameters
+        ]
+        more = {"components": self.components, "memory": self.memory, "wears": self.wears, "doc": self.doc}
+        told = {"law": self.name, "normal": self.normal, "limit": self.limit.value, "roles": roles}
+        return {**told, **more, "parameters": parameters}
+
+    @classmethod
+    def told(cls, plain: Mapping[str, Any]) -> LawInfo:
+        """The inverse: a case is read with it where the core is missing."""
+        parameters = [
+            _parameter(name, unit, doc, -np.inf if lower is None else lower, *others)
+            for name, unit, doc, lower, *others in plain["parameters"]
+        ]
+        name, doc, components = plain["law"], plain["doc"], plain["components"]
+        limit = Limit(plain["limit"])
+        return cls(name, doc, components, parameters, plain["memory"], plain["normal"], plain["wears"], limit)
 
 
 @dataclass(frozen=True)
@@ -136,8 +153,25 @@ def kept_laws(kept: Mapping[str, Any]) -> dict[str, KeptLaw]:
 
 
 def laws() -> dict[str, LawInfo]:
-    """All laws that a case can name: the compiled ones and those registered here."""
-    return {**_compiled(), **{name: law.info() for name, law in _registered.items()}}
+    """All laws that a case can name: the compiled ones and those registered here.
+
+    Without the core those that results told of (`learn_laws`) stand for the compiled ones.
+    """
+    return {**(_learnt or _compiled()), **{name: law.info() for name, law in _registered.items()}}
+
+
+def learn_laws(kept: Sequence[Mapping[str, Any]]) -> bool:
+    """Where the core is missing, know the laws that results keep (`LawInfo.plain`); False if they are too old."""
+    with suppress(ImportError):
+        _compiled()
+        return True
+    if not all("parameters" in told for told in kept):
+        return False
+    _learnt.update({told["law"]: LawInfo.told(told) for told in kept})
+    return True
+
+
+_learnt: dict[str, LawInfo] = {}
 
 
 @cache

@@ -55,7 +55,7 @@ def _curves(axes: Axes, modes: Sequence[Analysis], column: str) -> None:
     """Every mode's curve, and the folds of the first."""
     factor = 100.0 if column == "zeta" else 1.0
     for mode, colour, line in zip(modes, style.PALETTE, LINES):
-        curve = mode.curve().sampled()
+        curve = mode.curve()
         axes.plot(curve["amplitude"], factor * curve[column], color=colour, linestyle=line, label=_name(mode))
     points = modes[0].met("fold")
     if points:
@@ -72,7 +72,7 @@ def _close_up(axes: Axes, modes: Sequence[Analysis], column: str, place: tuple[f
     width = CLOSE_UP * (high - low)
     inset = axes.inset_axes(place)
     _curves(inset, modes, column)
-    curve = modes[0].curve().sampled()
+    curve = modes[0].curve()
     near = (curve["amplitude"] > low - width) & (curve["amplitude"] < high + width)
     values = curve[column][near] * (100.0 if column == "zeta" else 1.0)
     inset.set_xlim(low - width, high + width)
@@ -149,7 +149,7 @@ def _limit_cycles(upper: Axes, lower: Axes, mode: Analysis) -> None:
     low, high = lower.get_ylim()
     lower.axhspan(low, 0.0, color=style.RED, alpha=0.07, zorder=0)
     lower.set_ylim(low, high)
-    for crossing in mode.curve().crossings():
+    for crossing in mode.mode_curve().crossings():
         face = style.GREEN if crossing.stable else "white"
         look = {"marker": "o", "markersize": 8, "markerfacecolor": face, "markeredgecolor": style.INK, "zorder": 6}
         kind = "stable limit cycle (attractor)" if crossing.stable else "unstable limit cycle"

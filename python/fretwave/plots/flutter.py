@@ -30,9 +30,10 @@ def diameters(flutter: Analysis) -> list[int]:
 
 
 def wave(flutter: Analysis, diameter: int) -> tuple[style.Array, style.Array]:
-    """Amplitude and damping [%] along the branch of a wave."""
-    rows = flutter.columns["nodal_diameter"] == diameter
-    return flutter.columns["amplitude"][rows], 100.0 * flutter.columns["zeta"][rows]
+    """Amplitude and damping [%] along the branch of a wave, its points among them."""
+    curve = flutter.curve()
+    rows = curve["nodal_diameter"] == diameter
+    return curve["amplitude"][rows], 100.0 * curve["zeta"][rows]
 
 
 def damping(flutter: Analysis) -> Figure:

@@ -34,7 +34,7 @@ def draw(forced: Analysis, modes: Sequence[Analysis], times: Table | None, peaks
         _level(left, forced, times, level, colour, 1.0)
         _level(right, forced, times, level, colour, level)
     for mode, (line, colour) in zip(modes, BACKBONES):
-        curve = mode.curve().sampled()
+        curve = mode.curve()
         name = f"backbone, {mode.method()}"
         left.plot(curve["frequency_hz"], curve["amplitude"], color=colour, linestyle=line, label=name, zorder=5)
     if peaks is not None:
@@ -46,15 +46,27 @@ def draw(forced: Analysis, modes: Sequence[Analysis], times: Table | None, peaks
 
 
 def _level(axes: Axes, forced: Analysis, times: Table | None, level: float, colour: object, scale: float) -> None:
-    rows = forced.columns["level"] == level
-    name = f"level {level:g}"
-    frequency, amplitude = smooth(forced.columns["frequency_hz"][rows], _amplitude(forced)[rows])
-    axes.plot(frequency, amplitude / scale, color=colour, label=name)
+    frequency, amplitude = response(forced, level)
+    axes.plot(frequency, amplitude / scale, color=colour, label=f"level {level:g}")
     if times is not None:
         rows = times["level"] == level
         frequency, amplitude = times["frequency_hz"][rows], times["amplitude"][rows]
         look = {"markerfacecolor": "white", "markeredgecolor": colour, "markersize": 6}
         axes.plot(frequency, amplitude / scale, "o", zorder=4, **look)
+
+
+def response(forced: Analysis, level: float) -> tuple[style.Array, style.Array]:
+    """Frequency [Hz] and amplitude [m] along the branch of a level.
+
+    The observed dof's amplitude lies on the branch's cubic. The largest one of a wheel's blades is no function of the
+    scalar unknowns and is drawn through its points.
+    """
+    if "largest_amplitude" not in forced.columns:
+        curve = forced.curve()
+        rows = curve["level"] == level
+        return curve["frequency_hz"][rows], curve["amplitude"][rows]
+    rows = forced.columns["level"] == level
+    return smooth(forced.columns["frequency_hz"][rows], forced.columns["largest_amplitude"][rows])
 
 
 def smooth(frequency: style.Array, amplitude: style.Array) -> tuple[style.Array, style.Array]:

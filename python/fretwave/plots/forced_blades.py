@@ -12,6 +12,7 @@ from matplotlib.ticker import MaxNLocator
 from ..post.blade_peaks import whitehead
 from ..results.reader import Analysis, Run, Table
 from . import style
+from .forced import smooth
 
 
 def figures(run: Run) -> Iterator[tuple[str, Figure]]:
@@ -55,9 +56,10 @@ def _curves(axes: Axes, forced: Analysis, tuned: Table) -> None:
     for j, blade in enumerate(amplitude.T):
         look = {"color": style.BLUE, "linewidth": 1.8, "zorder": 5} if j == most else {"color": "#bbbbbb"}
         name = f"sector {j}, which moves most" if j == most else "other sectors"
-        axes.plot(frequency, blade, **{"linewidth": 0.8, **look}, label=name)
+        axes.plot(*smooth(frequency, blade), **{"linewidth": 0.8, **look}, label=name)
     rows = tuned["level"] == level
-    axes.plot(tuned["frequency_hz"][rows], tuned["amplitude"][rows], "--", color=style.INK, label="tuned wheel")
+    line = smooth(tuned["frequency_hz"][rows], tuned["amplitude"][rows])
+    axes.plot(*line, "--", color=style.INK, label="tuned wheel")
     axes.set_xlim(frequency.min(), frequency.max())
     axes.set_ylim(0.0, None)
     axes.set_xlabel(style.label("Excitation frequency", "Hz"))

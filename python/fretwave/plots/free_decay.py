@@ -21,9 +21,12 @@ def figures(run: Run) -> Iterator[tuple[str, Figure]]:
 def draw(mode: Analysis, decay: Analysis) -> Figure:
     """Circles are cycles of the unreduced equations in time, the line is the nonlinear mode."""
     figure, (upper, lower) = style.new_figure(6.2, rows=2, sharex=True)
-    curve, table = mode.curve().sampled(), decay.columns
+    curve, table = mode.curve(), decay.columns
+    shown = _shown(table)
     for axes, column, factor in ((upper, "frequency_hz", 1.0), (lower, "zeta", 100.0)):
         axes.plot(curve["amplitude"], factor * curve[column], color=style.INK, label=f"mode, {mode.method()}")
+        cycles = table["omega"] / (2.0 * np.pi) if axes is upper else 100.0 * table["zeta"]
+        style.fit_values(axes, curve["amplitude"], factor * curve[column], shown, cycles)
     for (start, amplitude), colour in zip(decay.starts(), style.PALETTE):
         rows = table["start"] == start
         name = f"cycles of the decay from {style.number(amplitude)} {mode.unit('amplitude')}".strip()
@@ -38,9 +41,13 @@ def _cycles(axes: Axes, table: Table, rows: style.Array, values: style.Array, co
     axes.plot(table["amplitude"][rows], values[rows], "o", zorder=3, **look)
 
 
+def _shown(table: Table) -> tuple[float, float]:
+    """Amplitudes of the cycles, and a little room."""
+    return float(table["amplitude"].min() / 1.3), float(table["amplitude"].max() * 1.3)
+
+
 def _finish(figure: Figure, upper: Axes, lower: Axes, mode: Analysis, table: Table) -> None:
-    low, high = table["amplitude"].min() / 1.3, table["amplitude"].max() * 1.3
-    style.log_amplitude(lower, [low, high])
+    style.log_amplitude(lower, _shown(table))
     upper.set_ylabel(style.label("Frequency ω/2π", "Hz"))
     lower.set_ylabel(style.label("Damping ratio ζ", "%"))
     dof = mode.dofs[mode.normalised_dof()] if mode.dofs else ""

@@ -50,7 +50,9 @@ def envelopes(mode: Analysis, motions: Analysis) -> Figure:
 def _visible(mode: Analysis, motions: Analysis) -> tuple[float, float]:
     """Amplitudes shown: everything, but not far beyond the starts and predictions."""
     amplitude = motions.columns["amplitude"]
-    largest = [crossing.amplitude for crossing in mode.curve().crossings()] + [start for _, start in motions.starts()]
+    largest = [crossing.amplitude for crossing in mode.mode_curve().crossings()] + [
+        start for _, start in motions.starts()
+    ]
     return 0.7 * float(amplitude.min()), min(HEIGHT * max(largest), 1.4 * float(amplitude.max()))
 
 
@@ -66,7 +68,7 @@ def _settled(table: Table) -> float:
 
 
 def _predicted(axes: Axes, mode: Analysis) -> None:
-    for crossing in mode.curve().crossings():
+    for crossing in mode.mode_curve().crossings():
         kind = "stable" if crossing.stable else "unstable"
         name = f"predicted, {kind}, a = {style.number(crossing.amplitude)} {mode.unit('amplitude')}"
         axes.axhline(crossing.amplitude, color=style.INK, linestyle="--" if crossing.stable else ":", label=name)
@@ -94,7 +96,7 @@ def phase_planes(mode: Analysis, motions: Analysis) -> Figure:
 def predicted_orbits(mode: Analysis) -> list[tuple[str, style.Array, style.Array]]:
     """Closed orbits of the normalised dof at the zeros of the damping, from the nearest point scaled to the zero."""
     orbits = []
-    for crossing in mode.curve().crossings() if mode.labels else []:
+    for crossing in mode.mode_curve().crossings() if mode.labels else []:
         away = np.abs(mode.columns["amplitude"] / crossing.amplitude - 1.0) + np.abs(mode.columns["zeta"])
         point = int(np.argmin(away))
         coefficients = mode.coefficients([point])[0] * crossing.amplitude / mode.columns["amplitude"][point]

@@ -96,6 +96,15 @@ def log_amplitude(axes: Axes, values: Array | Sequence[float]) -> None:
     plain_numbers(axes.xaxis)
 
 
+def fit_values(axes: Axes, x: Array, y: Array, shown: Sequence[float], others: Array) -> None:
+    """Fit the value axis to what of a curve lies between two abscissas, and to all other values."""
+    inside = np.concatenate([y[(x >= shown[0]) & (x <= shown[1])], others])
+    inside = inside[np.isfinite(inside)]
+    room = 0.08 * float(np.ptp(inside)) if len(inside) else 0.0
+    if room > 1e-6 * float(np.abs(inside).max(initial=0.0)):
+        axes.set_ylim(inside.min() - room, inside.max() + room)
+
+
 def plain_numbers(axis: Axis, values: Array | Sequence[float] = (1.0, 10.0)) -> None:
     """Ticks of a logarithmic axis at 1, 2, 5 of each decade (closer within one), as 0.05 and not as a power."""
     short = np.max(values) < 8.0 * np.min(values)

@@ -14,13 +14,12 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
 
+from ..files.dimensions import names_of_data
 from ..post.grid import Plan, short_names
-from ..post.mode_curve import ModeCurve
 from ..results.file import open_results
 from ..results.reader import Analysis, Run, Table
 from ..results.sweep_summary import split_of
 from . import style
-from .forced import smooth
 
 #: more branches than these are told apart by a colour bar
 NAMED = 10
@@ -39,7 +38,7 @@ class Swept:
 
     Attributes
     ----------
-    branches : (number of the value, place in `parts`, columns)
+    branches : (number of the value, place in `parts`, columns along the branch)
     summary : quantity -> (n_1, n_2, ..., [n_parts])
     split, parts : what tells the branches of one value apart, and its values: levels, nodal diameters
     """
@@ -54,14 +53,15 @@ class Swept:
     @classmethod
     def of(cls, analysis: Analysis) -> Swept:
         with open_results(analysis.path) as file:
-            summary = {key: np.asarray(data[()], dtype=float) for key, data in file[analysis.name]["summary"].items()}
-        split = split_of(str(analysis.attributes["of_type"]))
+            group, split = file[analysis.name]["summary"], split_of(str(analysis.attributes["of_type"]))
+            names = [*names_of_data(group), *([split] if split in group else [])]
+            summary = {key: np.asarray(group[key][()], dtype=float) for key in names}
         parts = [float(part) for part in summary.pop(split, ())]
-        plan, branches = Plan(analysis.attributes["over"]), []
+        plan, branches, curve = Plan(analysis.attributes["over"]), [], analysis.curve()
         for number, (place, part) in product(range(len(plan)), enumerate(parts or [np.nan])):
-            rows = (analysis.columns["value"] == number) & (analysis.columns[split] == part if parts else True)
+            rows = (curve["value"] == number) & (curve[split] == part if parts else True)
             if rows.any():
-                branches.append((number, place, {name: column[rows] for name, column in analysis.columns.items()}))
+                branches.append((number, place, {name: curve[name][rows] for name in curve.names}))
         return cls(analysis, plan, branches, summary, split, parts)
 
     @property
@@ -102,11 +102,14 @@ class Swept:
 def figures(run: Run) -> Iterator[tuple[str, Figure]]:
     """All branches, and quantities over the value, of every sweep of modes or forced responses."""
     for analysis in run.of_kind("sweep"):
-        swept, kind = Swept.of(analysis), analysis.attributes["of_type"]
-        if kind in ("mode", "flutter"):
+        kind = analysis.attributes["of_type"]
+        if kind not in ("mode", "flutter", "forced"):
+            continue
+        swept = Swept.of(analysis)
+        if kind != "forced":
             yield f"{analysis.name}_backbones", backbones(swept)
             yield f"{analysis.name}_summary", overview(swept, MODE_PANELS)
-        elif kind == "forced":
+        else:
             yield f"{analysis.name}_responses", responses(swept)
             yield f"{analysis.name}_summary", overview(swept, FORCED_PANELS)
 
@@ -115,9 +118,8 @@ def backbones(swept: Swept) -> Figure:
     """Frequency above damping, over a common logarithmic amplitude axis."""
     figure, (upper, lower) = style.new_figure(6.6, rows=2, sharex=True)
     for number, part, table in swept.branches:
-        curve = ModeCurve.from_table(table).sampled()
-        upper.plot(curve["amplitude"], curve["frequency_hz"], **swept.look(number, part))
-        lower.plot(curve["amplitude"], 100.0 * curve["zeta"], **swept.look(number, part))
+        upper.plot(table["amplitude"], table["frequency_hz"], **swept.look(number, part))
+        lower.plot(table["amplitude"], 100.0 * table["zeta"], **swept.look(number, part))
     if (swept.analysis.columns["zeta"] < -TINY).any():
         lower.axhline(0.0, color=style.INK, linewidth=1.0, zorder=1)
     _asymptotes(upper, swept)
@@ -134,7 +136,7 @@ def responses(swept: Swept) -> Figure:
     """Amplitude over frequency, a line style for each level."""
     figure, axes = style.new_figure(5.0)
     for number, part, table in swept.branches:
-        axes.plot(*smooth(table["frequency_hz"], table["amplitude"]), **swept.look(number, part))
+        axes.plot(table["frequency_hz"], table["amplitude"], **swept.look(number, part))
     peaks = swept.summary["largest_amplitude"]
     if np.nanmax(peaks) > LINEAR_UP_TO * np.nanmin(peaks):
         axes.set_yscale("log")

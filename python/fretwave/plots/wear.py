@@ -87,7 +87,7 @@ def draw_volume_map(wear: Analysis, lines: Sequence[WearLine]) -> Figure:
     figure, axes = style.new_figure(7.2, rows=2, columns=len(faces), sharex=True, sharey="row", squeeze=False)
     cycles = np.linspace(0.0, _last(lines), COLUMNS)
     values = {face: np.stack([line.at(MM**3 * line.columns[face], cycles) for line in lines]) for face in faces}
-    levels, norm = _volume_levels(np.stack(list(values.values())))
+    levels, norm = volume_levels(np.stack(list(values.values())))
     amplitude, unit = amplitudes(lines)
     scale = ScalarMappable(Normalize(amplitude[0], amplitude[-1]), ListedColormap(style.shades(256)))
     for (upper, lower), (face, name) in zip(axes.T, faces.items()):
@@ -173,7 +173,7 @@ def _levels(values: Array) -> Array:
     return np.asarray(MaxNLocator(LEVELS).tick_values(low, high if high > low else low + 1.0))
 
 
-def _volume_levels(values: Array) -> tuple[Array, LogNorm | None]:
+def volume_levels(values: Array) -> tuple[Array, LogNorm | None]:
     """Levels of a map of volumes (..., n_lines, n_cycles); logarithmic where the last of the lines differ widely."""
     last = np.nanmax(values, axis=-1)
     high = float(last.max())

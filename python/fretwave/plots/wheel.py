@@ -100,7 +100,7 @@ def draw_change(mode: Analysis) -> Figure:
     figure, (upper, lower) = style.new_figure(5.2, rows=2, sharex=True)
     amplitude = mode.columns["amplitude"]
     for axes, column in ((upper, "participation"), (lower, "amplification")):
-        axes.plot(amplitude, mode.columns[column], ".-", color=style.BLUE, markersize=4)
+        axes.plot(amplitude, mode.columns[column], ".-", color=style.BLUE, markersize=4)  # no scalars of the branch
     upper.set_ylim(0.0, 1.05)
     upper.set_ylabel("Participation ratio")
     lower.set_ylabel("Amplification")

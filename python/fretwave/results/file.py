@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import uuid
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -19,6 +19,7 @@ from ..files.dimensions import name_dimensions, put_array
 from ..files.whole import Unfailing, beside, bring_to_disk, check_whole, seal, sealed_size, told
 from ..post.contact_history import MOTION
 from ..texts import display
+from .field import Field
 from .journal import Record, read_records, unfinished
 
 #: Rows of one HDF5 chunk: a branch of usual length allocates no chunk while it grows.
@@ -81,6 +82,10 @@ class Rows:
     def columns(self) -> list[Column]:
         return [Column(*given) for given in self.layout.values["columns"]]
 
+    @property
+    def fields(self) -> dict[str, Field]:
+        return {name: Field.of(described) for name, described in self.layout.values["fields"].items()}
+
     def first(self, count: int) -> Rows:
         """Only so many rows, and the arrays before the next one."""
         end = next((k for k, (_, _, row) in enumerate(self.places) if row == count), len(self.places))
@@ -121,10 +126,8 @@ def build_group(file: Any, name: str, rows: Rows) -> None:
     group.attrs.update({key[len("attribute/") :]: a for key, a in arrays.items() if key.startswith("attribute/")})
     _create_points(group, rows)
     _create_coefficients(group, rows)
-    for key, (shape, unit, long_name) in told_of["fields"].items():
-        data = _growing(group, key, len(rows), shape, CHUNK_ROWS)
-        data.attrs.update({"units": unit, "long_name": long_name})
-        name_dimensions(group, data, [rows.columns[0].name])
+    for key, kept in rows.fields.items():
+        _create_field(group, rows, key, kept)
     for key, values in arrays.items():
         if key.startswith("array/"):
             put_array(group, key[len("array/") :], values, {"units": "m"})
@@ -162,13 +165,26 @@ def _create_coefficients(group: Any, rows: Rows) -> None:
     dofs, labels = rows.layout.values["dofs"], rows.layout.values["labels"]
     if not labels:
         return
-    from h5py import string_dtype
-
     data = _growing(group, "coefficients", len(rows), (len(dofs), len(labels)), CHUNK_ROWS)
     data.attrs.update({"units": "m", "long_name": "harmonic coefficients of the displacement"})
-    for name, texts in (("dof", dofs), ("harmonic", labels)):
-        group.create_dataset(name, data=list(texts), dtype=string_dtype())
+    _name_axes(group, {"dof": dofs, "harmonic": labels})
     name_dimensions(group, data, [rows.columns[0].name, "dof", "harmonic"])
+
+
+def _create_field(group: Any, rows: Rows, name: str, kept: Field) -> None:
+    data = group.create_dataset(name, (len(rows), *kept.shape), "f8")
+    data.attrs.update({"units": kept.unit, "long_name": kept.long_name, **kept.attributes})
+    _name_axes(group, kept.axes)
+    name_dimensions(group, data, [rows.columns[0].name, *kept.axes])
+
+
+def _name_axes(group: Any, axes: Mapping[str, Sequence[str]]) -> None:
+    """Coordinates of axes that have names."""
+    from h5py import string_dtype
+
+    for name, texts in axes.items():
+        if name not in group:
+            group.create_dataset(name, data=list(texts), dtype=string_dtype())
 
 
 def _fill(group: Any, rows: Rows) -> None:

@@ -4,20 +4,26 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from ..columns import COLUMNS
 from ..errors import InputError
 from ..files.dimensions import names_of_data
+from ..hb.states import State
 from ..model.laws import UNKNOWN, Role, kept_laws
 from ..post.mode_curve import ModeCurve
 from ..post.motion import motion
+from ..solve.curve import PARTS, Curve
+from ..solve.table import Table as Reading
 from .file import has_results, open_results
+from .slopes import curves_of, read_slopes
 
 Array = npt.NDArray[np.float64]
 Table = dict[str, Array]
@@ -35,6 +41,8 @@ class Analysis:
     dofs : names of the degrees of freedom
     reported : points for which the contacts' motion is kept
     contacts : names of the contacts
+    meaning : of the scalar unknowns, of an analysis that follows branches
+    slopes : (n_points, 2, k), their derivatives by the share of the step that ends at each point, at its begin and end
     """
 
     name: str
@@ -48,6 +56,8 @@ class Analysis:
     contacts: list[str] = field(default_factory=list)
     units: dict[str, str] = field(default_factory=dict)
     path: Path = Path()
+    meaning: State | None = None
+    slopes: Array | None = None
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values()), ()))
@@ -161,8 +171,51 @@ class Analysis:
         with open_results(self.path) as file:
             return np.asarray(file[self.name].get(f"motion_{start}", ()), dtype=float)
 
-    def curve(self) -> ModeCurve:
-        """Modal values as functions of amplitude."""
+    def at(self, value: float | Sequence[float] | None = None, **where: float | Sequence[float]) -> Reading:
+        """Every place where its branches pass a value, with the state there, as `fretwave.Branch.at` reads them.
+
+        Of results without derivatives (of earlier versions), off straight lines between the points.
+
+        Parameters
+        ----------
+        value : float or sequence
+            Amplitude of a mode, omega of a response.
+        where : one column of the state and its value, in place of `value`
+            ``run["forced"].at(amplitude=0.01)``.
+
+        Returns
+        -------
+        Table
+            One row per crossing, branch by branch; `level` or `nodal_diameter` tell which.
+
+        Raises
+        ------
+        InputError
+            No such column, or it follows no branch.
+        """
+        return self._joined(lambda curve: curve.at(value, **where))
+
+    def curve(self, n: int = PARTS) -> Reading:
+        """Its branches for drawing, one under the other: all points, and n - 1 places of the cubic between two."""
+        return self._joined(lambda curve: curve.drawn(n))
+
+    def _joined(self, read: Callable[[Curve], Reading]) -> Reading:
+        if self.meaning is None or not len(self):
+            what, fix = self.kind if self.meaning is None else "no points", "mode, forced, flutter, or a sweep of these"
+            raise InputError("the analysis has no branch to read", self.name, what, None, fix)
+        tables = []
+        for first, curve in self._curves:
+            tables.append(read(curve))
+            tables[-1]["place"][:] += first
+        return Reading.joined(tables)
+
+    @cached_property
+    def _curves(self) -> list[tuple[int, Curve]]:
+        assert self.meaning is not None
+        return curves_of(self.columns, self.units, self.events, self.meaning, self.slopes)
+
+    def mode_curve(self) -> ModeCurve:
+        """Modal values as functions of amplitude, as the tables of comparisons read them."""
         return ModeCurve.from_table(self.columns)
 
 
@@ -259,8 +312,10 @@ def motion_of(analysis: Analysis, point: int) -> tuple[Array, Array]:
 
 def _analysis(group: Any, path: Path) -> Analysis:
     points = group["points"] if "points" in group else {}
-    columns = {key: np.asarray(points[key]) for key in points if key != "event"}
+    order = [key for key in COLUMNS if key in points] + [key for key in points if key not in COLUMNS]
+    columns = {key: np.asarray(points[key]) for key in order if key != "event"}
     numbers = {key: value.astype(float) for key, value in columns.items() if value.dtype.kind in "fiub"}
+    meaning, slopes = read_slopes(group)
     events = _texts(points["event"][()]) if "event" in points else [""] * len(next(iter(numbers.values()), []))
     return Analysis(
         name=group.name.strip("/"),
@@ -274,6 +329,8 @@ def _analysis(group: Any, path: Path) -> Analysis:
         contacts=[key[len("contact_") :] for key in group if key.startswith("contact_")],
         units={key: _text(points[key].attrs.get("units", "")) for key in numbers},
         path=path,
+        meaning=meaning,
+        slopes=slopes,
     )
 
 

@@ -11,7 +11,6 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -20,20 +19,12 @@ import numpy as np
 from ..columns import Column, Value, columns_named, csv_header, csv_line
 from ..files.whole import replace_bytes, told, write_all
 from ..post.contact_history import MOTION
+from .field import Field
 from .file import NewResults, Rows, attributes_of, build_group, has_results, open_results, rewritten
 from .journal import Journal, Record, journal_path
 
 Motion = Mapping[str, Mapping[str, Any]]
 State = Mapping[str, Any]
-
-
-@dataclass(frozen=True)
-class Field:
-    """An array that every row of a table has."""
-
-    shape: tuple[int, ...]
-    unit: str
-    long_name: str
 
 
 class AnalysisWriter:
@@ -103,6 +94,11 @@ class AnalysisWriter:
             build_group(self._new.file, self.name, Rows.of(journal_path(self.folder, self.name)))
         return self._new.file[self.name]
 
+    def keep(self, fields: Mapping[str, Field]) -> None:
+        """Let every row bring these arrays too; a table that was begun keeps what it was begun with."""
+        if not self.rows:
+            self.fields.update(fields)
+
     def append(
         self,
         row: Mapping[str, Value],
@@ -166,7 +162,7 @@ class AnalysisWriter:
     def _layout(self) -> Record:
         """What the group is made of besides its rows."""
         plain, arrays = attributes_of({**self.attributes, "status": "running", "reason": ""})
-        fields = {name: [list(field.shape), field.unit, field.long_name] for name, field in self.fields.items()}
+        fields = {name: kept.described() for name, kept in self.fields.items()}
         told_arrays = {f"array/{name}": np.asarray(values) for name, values in self._arrays.items()}
         return Record(
             "layout",
@@ -251,6 +247,7 @@ class AnalysisWriter:
         if state is None:
             return None
         kept = rows.first(state[0])
+        self.fields = kept.fields
         self.rows, self.reported = len(kept), len(kept.reported)
         self._journal.go_on(kept.size, kept.token)
         lines = [csv_line(self.columns, values) for values in kept.values()]

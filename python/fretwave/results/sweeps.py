@@ -4,8 +4,10 @@
 
     <name>/points/...           one after the other, the branches of all values: `value`, the keys, then the columns
     <name>/over/<key>           values of a key: dimension scale (n,)
-    <name>/summary/<quantity>   (n_1, n_2, ..., [n_branches]), dimensions as in `over`; nan where there is no branch.
-                                The last one is there for tables of several branches: levels, nodal diameters
+    <name>/summary/<quantity>   (n_1, n_2, ..., [n_branches]), dimensions as in `over`, whose scales are here too: one
+                                group above they would hide the columns of their names in `points` from xarray.
+                                nan where there is no branch. The last one is there for tables of several branches:
+                                levels, nodal diameters
     <name>/values/0003/...      all that is kept of the value with this number: coefficients, motions of the contacts
 """
 
@@ -225,7 +227,7 @@ def _write_summary(group: Any, kind: str, plan: Plan, rows: Sequence[Mapping[str
     split = split_of(kind)
     parts = sorted({row[split] for row in rows if split in row})
     for scale in scales:
-        group.parent.create_dataset(scale.name.rpartition("/")[2], data=scale[()])
+        group.create_dataset(scale.name.rpartition("/")[2], data=scale[()]).make_scale(scale.name.rpartition("/")[2])
     if parts:
         group.create_dataset(split, data=parts)
     names = [*plan.keys, *([split] if parts else [])]
@@ -263,6 +265,8 @@ def _attach_scales(source: Any, copy: Any, group: Any, root: str) -> None:
 
     if copy is None or not hasattr(source, "dims"):
         return
+    if h5ds.is_scale(source.id) and not h5ds.is_scale(copy.id):  # also where no dataset refers to it
+        copy.make_scale(source.name.rpartition("/")[2])
     for there, here in zip(source.dims, copy.dims):
         for name, scale in there.items():
             mine = group[scale.name[len(root) + 1 :]]

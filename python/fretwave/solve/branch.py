@@ -16,8 +16,9 @@ import numpy.typing as npt
 from ..columns import Column
 from ..errors import FretwaveError, InputError
 from ..hb.states import State
+from .curve import PARTS, Curve
 from .hermite import Cubic
-from .table import Table, state_columns
+from .table import Table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -25,13 +26,6 @@ if TYPE_CHECKING:
     from .unknowns import Unknowns
 
 Array = npt.NDArray[np.float64]
-
-#: Parts of a step in which a value is looked for on its cubic.
-PARTS = 8
-#: A value this close to that of an end, relative, is met there.
-AT_THE_END = 1e-10
-#: Of a column's change over a part of a step, what may be left at a crossing: a jump of the phase by 2 pi is none.
-LEFT_OVER = 1e-6
 
 
 class Event(NamedTuple):
@@ -94,7 +88,8 @@ class Branch(Table):
 
         Read off the cubic through the two points beside it and their tangents, on which the unknowns lie, so that the
         error falls with the fourth power of the step. Two crossings within an eighth of a step, about an extremum that
-        is no event, may be missed.
+        is no event, may be missed. Columns that are no functions of the scalar unknowns (`slip`) run straight
+        between the points.
 
         Parameters
         ----------
@@ -114,12 +109,19 @@ class Branch(Table):
         InputError
             No such column, or a branch without points.
         """
-        name, values = self._asked(value, where)
-        return self._read([place for one in values for place in self._crossings(name, float(one))])
+        if not len(self):
+            raise InputError(
+                "the branch has no points", None, self.reason, "one at least", "find a first point: other start or stop"
+            )
+        return self._curve.at(value, **where)
 
     def curve(self, n: int = PARTS) -> Table:
-        """The branch for drawing: the state at every point, and at n - 1 places of the cubic between two points."""
-        return self._read(self.curves.places(n))
+        """The branch for drawing: its columns at every point, and at n - 1 places of the cubic between two points."""
+        return self._curve.drawn(n)
+
+    @cached_property
+    def _curve(self) -> Curve:
+        return Curve(self, self.meaning, self.curves)
 
     def unknowns(self, place: float) -> Any:
         """Unknowns y at a place (`at`, or a row's number), a Vec of the caller's: where Newton may start. Collective.
@@ -186,50 +188,6 @@ class Branch(Table):
         ended = "as asked" if self.converged else "before its end"
         lines = [f"Branch of {len(self)} points, ended {ended}: {self.reason}", self.text()]
         return "\n".join([*lines, *(f"missed: {text}" for text in self.missed)])
-
-    def _asked(self, value: Any, where: Mapping[str, Any]) -> tuple[str, Array]:
-        given = {**({} if value is None else {self.meaning.parameter: value}), **where}
-        known = [name for name in self.meaning.columns if name != "level"]
-        if len(given) != 1 or not set(given) <= set(known):
-            text = ", ".join(f"{name}={one}" for name, one in given.items()) or "nothing"
-            raise InputError(
-                "the branch cannot be read at this", None, text, "one of " + ", ".join(known), f"at({known[0]}=...)"
-            )
-        if not len(self):
-            raise InputError(
-                "the branch has no points", None, self.reason, "one at least", "find a first point: other start or stop"
-            )
-        name = next(iter(given))
-        return name, np.atleast_1d(np.asarray(given[name], dtype=float))
-
-    def _crossings(self, name: str, value: float) -> list[float]:
-        """Places where a column of the state has this value."""
-        from scipy.optimize import brentq
-
-        def off(place: float) -> float:
-            return self.meaning(self.curves(place))[name] - value
-
-        places, left = self._parts["place"], self._parts[name] - value
-        for end in (0, -1):
-            if abs(left[end]) <= AT_THE_END * abs(value):
-                left[end] = 0.0
-        found = [0.0] if left[0] == 0 else []
-        for k in range(len(places) - 1):
-            if left[k + 1] == 0:
-                found.append(float(places[k + 1]))
-            elif left[k] * left[k + 1] < 0:
-                place = brentq(off, places[k], places[k + 1], xtol=1e-13)
-                if abs(off(place)) <= LEFT_OVER * abs(left[k + 1] - left[k]):
-                    found.append(float(place))
-        return found
-
-    @cached_property
-    def _parts(self) -> Table:
-        return self.curve(PARTS)
-
-    def _read(self, places: Sequence[float] | Array) -> Table:
-        rows = [{"place": place, **self.meaning(self.curves(place))} for place in places]
-        return Table.of_rows(state_columns(self.meaning.columns), rows)
 
     def _kept(self) -> Unknowns:
         if self._unknowns is None:

@@ -15,6 +15,7 @@ from ..errors import InputError
 from ..hb.problems import HarmonicProblem
 from .starting import far_from_start, starts
 from .steps import StepControl
+from .trace import Knot
 
 Array = npt.NDArray[np.float64]
 
@@ -38,6 +39,7 @@ class Point:
     wall_s : seconds since the point before
     rounding : error of the residual that rounding leaves, expected
     accepted : 1 where the residual is below the tolerance, 0 where rounding let it fall no further
+    knot : its scalars and their derivatives over the step, where they are traced
     """
 
     index: int
@@ -52,6 +54,7 @@ class Point:
     wall_s: float
     rounding: float = 0.0
     accepted: int = 1
+    knot: Knot | None = None
 
     def __repr__(self) -> str:
         what = f" {self.event}" if self.event else ""
@@ -100,6 +103,7 @@ class Continuation:
             upwards = bool(start < 0.5 * (low + high))
         self._upwards, self._begun, self._advice = upwards, False, ""
         self.repeated: Point | None = None
+        self.resumed_at: tuple[PETSc.Vec, PETSc.Vec] | None = None
         self.helped, self.started, self._first_reason = helped, "", ""
         self._last: PETSc.Vec | None = None
         self._over = False
@@ -228,7 +232,7 @@ class Continuation:
 
         On the same ranks and the direct route the branch is the same bit for bit; elsewhere (another number of ranks,
         or a preconditioner of another age) to the tolerance of the corrector. `repeated` is the last point handed out
-        before, solved again, to measure that by.
+        before, solved again, to measure that by; `resumed_at` are unknowns and tangent there.
         """
         snapshot = problem.model.comm.bcast(snapshot)
         assert snapshot is not None
@@ -240,6 +244,8 @@ class Continuation:
         wary, now = bool(snapshot.get("wary", False)), [vectors["y"], vectors["tangent"]]
         point = branch._core.restore(now, before, step, index, wary, emitted, upwards, began)
         branch.repeated = None if point is None else Point(**point)
+        anchor = branch._core.anchor()
+        branch.resumed_at = (point["y"], point["tangent"]) if point is not None else (anchor["y"], anchor["tangent"])
         branch._begun = True
         return branch
 

@@ -6,19 +6,16 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from ..columns import FORCED, MODE, columns_named
 from ..errors import InputError
 from ..hb.problems import HarmonicProblem
 from .branch import Branch
 from .continuation import Continuation, Point
-from .hermite import Cubic
 from .steps import StepControl
 from .table import Table
+from .trace import Knot, Trace, cubic_of
 from .unknowns import Unknowns
-
-Array = npt.NDArray[np.float64]
 
 
 def follow(
@@ -86,26 +83,24 @@ def follow(
     low, high, upwards = _range(first, stop)
     continuation = Continuation(problem, y0, (low, high), steps, report_at, upwards)
     kept = Unknowns(problem, unknowns)
+    trace = Trace(problem, kept)
     rows: list[dict[str, Any]] = []
-    scalars: list[Array] = []
-    tangents: list[Array] = []
+    knots: list[Knot] = []
     for point in points_of(continuation):
-        kept.add(point.y, point.tangent)
-        scalars.append(problem.scalars(point.y))
-        tangents.append(problem.scalars(point.tangent))
+        knots.append(trace.add(point.y, point.tangent))
         # each rank has measured its own wall time
         rows.append(problem.model.comm.bcast(row_of(problem, point, len(rows))))
         if tell is not None:
             tell(rows[-1])
     ended = continuation.converged, continuation.reason, continuation.missed, continuation.started
     continuation.destroy()
-    kept.close()
+    trace.close()
     if not own:
         y0.destroy()
     columns = columns_named(MODE if problem.meaning.kind == "mode" else FORCED)
     table = Table.of_rows(columns, rows)
     values = {name: table[name] for name in table.names}
-    curves = _curves(scalars, tangents, kept)
+    curves = cubic_of(knots)
     return Branch(columns, values, problem.meaning, curves, *ended, kept if unknowns else None, problem.model.comm)
 
 
@@ -148,15 +143,3 @@ def _range(first: float, stop: float | tuple[float, float]) -> tuple[float, floa
         return low, high, None
     end = float(np.asarray(stop))
     return min(first, end), max(first, end), end > first
-
-
-def _curves(scalars: list[Array], tangents: list[Array], kept: Unknowns) -> Cubic:
-    """The scalars along the branch: linear in the unknowns, hence on the same cubic."""
-    if not scalars:
-        return Cubic(np.empty((0, 0)), np.empty((0, 0)), np.empty((0, 0)))
-    z, dz = np.array(scalars), np.array(tangents)
-    begin, end = np.diff(z, axis=0), np.diff(z, axis=0)
-    for i, factors in enumerate(kept.slopes):
-        if factors is not None:
-            begin[i], end[i] = factors[0] * dz[i], factors[1] * dz[i + 1]
-    return Cubic(z, begin, end)

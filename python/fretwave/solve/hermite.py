@@ -11,9 +11,10 @@ Array = npt.NDArray[np.float64]
 CORNER = 0.2
 
 
-def basis(x: float) -> tuple[float, float, float, float]:
-    """Factors of (y0, dy0/dx, y1, dy1/dx) at x in [0, 1]."""
-    return (1 + 2 * x) * (1 - x) ** 2, x * (1 - x) ** 2, x * x * (3 - 2 * x), x * x * (x - 1)
+def between(x: float, y0: Array, begin: Array, y1: Array, end: Array) -> Array:
+    """The cubic from y0 to y1 at x in [0, 1], with its derivatives by x at both ends."""
+    a, b, c, d = (1 + 2 * x) * (1 - x) ** 2, x * (1 - x) ** 2, x * x * (3 - 2 * x), x * x * (x - 1)
+    return np.asarray(a * y0 + b * begin + c * y1 + d * end)
 
 
 def slopes(length: float, along: float) -> tuple[float, float] | None:
@@ -25,6 +26,11 @@ def slopes(length: float, along: float) -> tuple[float, float] | None:
     along : row . t1, for dy/ds = t / (row . t)
     """
     return (length, length / along) if along > CORNER and length > 0 else None
+
+
+def derivatives(factors: tuple[float, float] | None, y0: Array, t0: Array, y1: Array, t1: Array) -> tuple[Array, Array]:
+    """Derivatives by x at both ends of a step: of the tangents by their factors (`slopes`), or of a straight line."""
+    return (y1 - y0, y1 - y0) if factors is None else (factors[0] * t0, factors[1] * t1)
 
 
 class Cubic:
@@ -48,8 +54,7 @@ class Cubic:
         i, x = piece(place, len(self))
         if x == 0:
             return np.asarray(self.values[i])
-        a, b, c, d = basis(x)
-        return np.asarray(a * self.values[i] + b * self.begin[i] + c * self.values[i + 1] + d * self.end[i])
+        return between(x, self.values[i], self.begin[i], self.values[i + 1], self.end[i])
 
     def places(self, n: int) -> Array:
         """Places of all rows, and of n - 1 more in each step."""

@@ -9,7 +9,7 @@ from typing import Any, overload
 import numpy as np
 import numpy.typing as npt
 
-from ..columns import COLUMNS, Column, Value, csv_header, csv_line
+from ..columns import Column, Value, csv_header, csv_line
 from ..files.whole import replaced
 
 Array = npt.NDArray[Any]
@@ -43,6 +43,12 @@ class Table:
     def of_rows(cls, columns: Sequence[Column], rows: Sequence[Mapping[str, Value]]) -> Table:
         """From rows by column name."""
         return Table(columns, {c.name: [row[c.name] for row in rows] for c in columns})
+
+    @classmethod
+    def joined(cls, tables: Sequence[Table]) -> Table:
+        """One under the other, all with the columns of the first."""
+        columns = tables[0].columns
+        return Table(columns, {c.name: np.concatenate([table[c.name] for table in tables]) for c in columns})
 
     @property
     def names(self) -> list[str]:
@@ -102,11 +108,6 @@ _SHORT = ("place", "point", "level", "amplitude", "omega", "frequency_hz", "zeta
 
 def _cell(value: Value) -> str:
     return f"{value:.6g}" if isinstance(value, float) else str(value)
-
-
-def state_columns(names: Sequence[str]) -> list[Column]:
-    """A row's place on its branch, then columns by name."""
-    return [PLACE, *(COLUMNS[name] for name in names)]
 
 
 #: Where on a branch something lies: 3.25 is a quarter of the step from row 3 to row 4.

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from .hermite import basis, piece, slopes
+from .hermite import between, derivatives, piece, slopes
 
 Array = npt.NDArray[np.float64]
 
@@ -19,6 +19,11 @@ class Unknowns:
     ----------
     keep : bool
         All points; else the last one alone, which the next step is measured from.
+
+    Attributes
+    ----------
+    slopes : list
+        Of each step, the factors that make its two tangents derivatives (`hermite.slopes`).
     """
 
     def __init__(self, problem: Any, keep: bool) -> None:
@@ -39,7 +44,7 @@ class Unknowns:
         self.problem.core.metric(y, self._weights)
         self._row = self._weights.getArray(readonly=True) * t_here
         if not self.keep:
-            self.y, self.tangents = [], []
+            self.y, self.tangents, self.slopes = [], [], self.slopes[-1:]
         self.y.append(y_here)
         self.tangents.append(t_here)
 
@@ -52,17 +57,9 @@ class Unknowns:
         i, x = piece(place, len(self.y))
         values = self.y[i]
         if x > 0:
-            y0, y1, factors = self.y[i], self.y[i + 1], self.slopes[i]
-            begin, end = (
-                (y1 - y0, y1 - y0)
-                if factors is None
-                else (
-                    factors[0] * self.tangents[i],
-                    factors[1] * self.tangents[i + 1],
-                )
-            )
-            a, b, c, d = basis(x)
-            values = a * y0 + b * begin + c * y1 + d * end
+            y0, t0, y1, t1 = self.y[i], self.tangents[i], self.y[i + 1], self.tangents[i + 1]
+            begin, end = derivatives(self.slopes[i], y0, t0, y1, t1)
+            values = between(x, y0, begin, y1, end)
         vector = self.problem.core.unknowns()
         vector.setArray(values)
         return vector

@@ -17,7 +17,6 @@ import numpy as np
 import numpy.typing as npt
 
 from ..case.load import Case
-from ..case.reduce import reduction_of
 from ..errors import InputError
 from ..fe.mesh import VTK_LATTICE
 from ..model.sectors import rotation
@@ -158,25 +157,46 @@ def scene_of(case: Case, choice: Choice, nodes: Array, sectors: Sequence[int] = 
     InputError
         The model is not that of the run, there is no such sector, or a wheel without axis.
     """
-    from mpi4py import MPI
-
-    from ..cyclic.reduction import SectorReduction
-
     neighbours = case.neighbours
     around = neighbours.sectors if neighbours else 1
     ties: Any = neighbours.ties if neighbours else None
     expand: Expand = _unchanged
     with ExitStack() as stack:
         if case.reduction is not None:
-            reduction = reduction_of(case, MPI.COMM_SELF)
-            stack.callback(reduction.destroy)
-            expand, size = reduction.expand, reduction.size
-            if isinstance(reduction, SectorReduction):
-                ties = reduction.sector().ties
-                size = (size - reduction.n_interface) * (around if choice.wheel else 1)
-            _check_same(case, choice, size, reduction.component_hz)
+            expand, ties, size, component_hz = _expansion(case, choice, around, ties, stack)
+            _check_same(case, choice, size, component_hz)
         given, shown = geometry(case), _shown(case, around, sectors)
         yield Scene(nodes, choice, _to_nodes(given, len(nodes), expand), shown, ties, around, given.axis or "z")
+
+
+def _expansion(case: Case, choice: Choice, around: int, ties: Any, stack: ExitStack) -> tuple[Expand, Any, int, Array]:
+    """Of a reduced model: to all its dofs, ties of sectors, number of coordinates and component frequencies [Hz].
+
+    Raises
+    ------
+    InputError
+        There is neither MPI nor PETSc, with which the reduction is made again.
+    """
+    try:
+        from mpi4py import MPI
+
+        from ..case.reduce import reduction_of
+        from ..cyclic.reduction import SectorReduction
+    except ImportError as error:
+        raise InputError(
+            "the motion of a reduced model cannot be shown here",
+            display(case.path),
+            f"no {error.name or 'solver'}",
+            "mpi4py and PETSc: the reduction is made again to reach the nodes that the run does not keep",
+            "view it where the case was run; `fretwave show` and `fretwave plot` need neither",
+        ) from None
+    reduction = reduction_of(case, MPI.COMM_SELF)
+    stack.callback(reduction.destroy)
+    size = reduction.size
+    if isinstance(reduction, SectorReduction):
+        ties = reduction.sector().ties
+        size = (size - reduction.n_interface) * (around if choice.wheel else 1)
+    return reduction.expand, ties, size, reduction.component_hz
 
 
 def geometry(case: Case) -> Structure:

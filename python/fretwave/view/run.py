@@ -7,6 +7,7 @@ e^{-n beta t} of a decaying mode, as the results do. A wheel is written sector b
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
@@ -16,10 +17,12 @@ from scipy.spatial import cKDTree
 
 from ..case.kept import reload_case
 from ..case.load import Case
+from ..errors import InputError
+from ..model.laws import learn_laws
 from ..model.pairs import Pairs
 from ..post.contact_history import OPEN, SLIP, STICK, ContactHistory
 from ..post.motion import complex_amplitudes
-from ..results.results import open_results
+from ..results.results import has_results, open_results
 from ..texts import display
 from .choice import Choice, ViewOptions, analysis_name, read_choice
 from .motion import Scene, Shape, geometry, mesh_of, scene_of
@@ -42,6 +45,7 @@ def view_run(folder: Path, options: ViewOptions, say: Callable[[str], None] = pr
         The folder holds no run, its case has changed, the model has no nodes, or there is no such analysis, point or
         sector.
     """
+    _learn_laws(folder)
     case, _ = reload_case(folder, kept=True)
     with open_results(folder / "results.h5") as file:
         name = analysis_name(file, folder, case, options.analysis)
@@ -69,6 +73,17 @@ def view_run(folder: Path, options: ViewOptions, say: Callable[[str], None] = pr
             pairs.unlink(missing_ok=True)  # of another point
     say(f"ParaView (5.12 or later): 'Warp By Vector' with the field warp draws displacements {scale:g} times as large")
     return [out, pairs] if placed else [out]
+
+
+def _learn_laws(folder: Path) -> None:
+    """A case is read with the laws that its results keep, where the core that knows them is missing."""
+    if not has_results(folder):
+        return
+    with open_results(folder / "results.h5") as file:
+        kept = [told for group in file.values() for told in json.loads(group.attrs.get("laws", "{}")).values()]
+    if not learn_laws(kept):
+        fix = "view it where fretwave is installed with its core, or run it again"
+        raise InputError("results of an earlier version do not keep their contact laws", display(folder), fix=fix)
 
 
 def _size(scene: Scene, count: int, what: str) -> str:

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from ...case.analysis import AnalysisSection
 from ...case.schema import StepSection
 from ...results.results import AnalysisWriter
+from ...results.slopes import slope_fields, slopes_of
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -93,7 +94,11 @@ def record(
     coefficients = problem.coefficients(point.y)
     if describe is not None:
         row.update(describe(problem, point.y, coefficients))
-    writer.append(row, coefficients, motions, kept)
+    slopes = {}
+    if point.knot is not None and problem.meaning is not None:
+        writer.keep(slope_fields(problem.meaning))
+        slopes = slopes_of(problem.meaning, point.knot)
+    writer.append(row, coefficients, motions, kept, slopes)
     return row
 
 
@@ -159,10 +164,20 @@ def tell_fallbacks(context: AnalysisContext[AnalysisSection], branch: Continuati
 
 
 def points_of(branch: Continuation) -> Iterator[Point]:
-    """Points of a branch; their vectors are freed a point later, for the branch may look back at its last one."""
-    from ...solve.follow import points_of
+    """Points of a branch with their knots. Collective.
 
-    return points_of(branch)
+    Their vectors are freed a point later, for the branch may look back at its last one.
+    """
+    from ...solve.follow import points_of
+    from ...solve.trace import Trace
+
+    trace = Trace(branch.problem)
+    if branch.resumed_at is not None:
+        trace.add(*branch.resumed_at)
+    for point in points_of(branch):
+        point.knot = trace.add(point.y, point.tangent)
+        yield point
+    trace.close()
 
 
 def split_state(state: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:

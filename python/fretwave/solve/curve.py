@@ -1,0 +1,125 @@
+"""What lies between the points of a branch: the one reading of it, for scripts, results and pictures.
+
+The state's columns are functions of the scalar unknowns, which lie on a cubic through the points and their tangents;
+all other columns run straight from point to point. Neither PETSc nor MPI is needed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..errors import InputError
+from ..hb.states import State
+from .hermite import Cubic
+from .table import PLACE, Table
+
+Array = npt.NDArray[np.float64]
+
+#: Parts of a step in which a value is looked for on its cubic, and is drawn.
+PARTS = 8
+#: A value this close to that of an end, relative, is met there.
+AT_THE_END = 1e-10
+#: Of a column's change over a part of a step, what may be left at a crossing: a jump of the phase by 2 pi is none.
+LEFT_OVER = 1e-6
+#: Columns that tell of a point's solution, and nothing of what lies beside it.
+OF_POINTS = ("point", "residual", "newton", "linear", "wall_s", "rounding", "accepted", "unclosed")
+
+
+class Curve:
+    """A branch between its points.
+
+    Parameters
+    ----------
+    table : Table
+        Its points.
+    meaning : State
+        What the scalars mean.
+    cubic : Cubic or None
+        The scalars along the branch; None where no tangents are known: every column then runs straight.
+    """
+
+    def __init__(self, table: Table, meaning: State, cubic: Cubic | None) -> None:
+        self.table, self.meaning, self.cubic = table, meaning, cubic
+        self.columns = [c for c in table.columns if c.kind != "s" and c.name not in OF_POINTS]
+
+    def at(self, value: float | Sequence[float] | None = None, **where: float | Sequence[float]) -> Table:
+        """Every place where the branch passes a value; see `fretwave.Branch.at`."""
+        name, values = self._asked(value, where)
+        return self.read([place for one in values for place in self._crossings(name, float(one))])
+
+    def drawn(self, n: int = PARTS) -> Table:
+        """All points, and n - 1 places of the cubic between two; between straight lines none is needed."""
+        return self.read(np.arange(float(len(self.table))) if self.cubic is None else self.cubic.places(n))
+
+    def read(self, places: Sequence[float] | Array) -> Table:
+        """State and other columns at some places: 3.25 is a quarter of the step from row 3 to row 4."""
+        x, rows = np.asarray(places, dtype=float), np.arange(len(self.table))
+        values: dict[str, Any] = {PLACE.name: x}
+        for column in self.columns:
+            data = self.table[column.name]
+            if column.kind == "i":  # of the last point
+                values[column.name] = data[np.clip(x.astype(int), 0, None)] if len(data) else data
+            else:
+                values[column.name] = np.interp(x, rows, data) if len(data) else data
+        if self.cubic is not None:
+            states = [self._state(place) for place in x]
+            for name in self._names:
+                values[name] = [state[name] for state in states]
+        return Table([PLACE, *self.columns], values)
+
+    @property
+    def _names(self) -> list[str]:
+        return [name for name in self.meaning.columns if name in self.table]
+
+    def _state(self, place: float) -> dict[str, float]:
+        """Of one place, as far as the table has it; the phase, which the table may count on, next to its points'."""
+        rows = np.arange(len(self.table))
+        if self.cubic is None:
+            return {name: float(np.interp(place, rows, self.table[name])) for name in self._names}
+        state = self.meaning(self.cubic(place))
+        if "phase" in state and "phase" in self.table:
+            near = float(np.interp(place, rows, self.table["phase"]))
+            state["phase"] += 2 * math.pi * round((near - state["phase"]) / (2 * math.pi))
+        return state
+
+    def _asked(self, value: Any, where: Mapping[str, Any]) -> tuple[str, Array]:
+        given = {**({} if value is None else {self.meaning.parameter: value}), **where}
+        known = [name for name in self._names if name != "level"]
+        if len(given) != 1 or not set(given) <= set(known):
+            text = ", ".join(f"{name}={one}" for name, one in given.items()) or "nothing"
+            raise InputError(
+                "the branch cannot be read at this", None, text, "one of " + ", ".join(known), f"at({known[0]}=...)"
+            )
+        name = next(iter(given))
+        return name, np.atleast_1d(np.asarray(given[name], dtype=float))
+
+    def _crossings(self, name: str, value: float) -> list[float]:
+        """Places where a column of the state has this value."""
+        from scipy.optimize import brentq
+
+        def off(place: float) -> float:
+            return self._state(place)[name] - value
+
+        places, left = self._parts["place"], self._parts[name] - value
+        for end in (0, -1):
+            if abs(left[end]) <= AT_THE_END * abs(value):
+                left[end] = 0.0
+        found = [0.0] if left[0] == 0 else []
+        for k in range(len(places) - 1):
+            if left[k + 1] == 0:
+                found.append(float(places[k + 1]))
+            elif left[k] * left[k + 1] < 0:
+                place = brentq(off, places[k], places[k + 1], xtol=1e-13)
+                if abs(off(place)) <= LEFT_OVER * abs(left[k + 1] - left[k]):
+                    found.append(float(place))
+        return found
+
+    @cached_property
+    def _parts(self) -> Table:
+        return self.drawn(PARTS)
