@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import fields
 from importlib import resources
 from importlib.metadata import version
 
@@ -9,6 +11,7 @@ import numpy as np
 import pytest
 
 import fretwave as fw
+from fretwave import _core
 
 LONGEST = 300
 
@@ -52,3 +55,28 @@ def test_every_object_says_what_it_is():
 def test_they_say_what_matters(index, words):
     text = repr(list(objects())[index])
     assert all(word in text for word in words.split()), text
+
+
+def test_every_public_class_has_words_of_its_own():
+    """No address, and no array written out: a generated text is for plain numbers and words alone."""
+    plain = {"int", "float", "str", "bool", "None", "Role", "Limit", "Optional[int]"}
+    for name in fw.__all__:
+        kind = getattr(fw, name)
+        if not isinstance(kind, type) or kind is fw.LawInfo:
+            continue
+        assert kind.__repr__ is not object.__repr__, name
+        if hasattr(kind.__repr__, "__wrapped__"):  # as dataclasses write it
+            types = {part for field in fields(kind) for part in str(field.type).split(" | ")}
+            assert types <= plain, f"{name}: {types - plain}"
+
+
+def test_the_core_has_stubs_of_all_its_names():
+    text = (resources.files("fretwave") / "_core.pyi").read_text(encoding="utf-8")
+    names = [name for name in dir(_core) if not name.startswith("_")]
+    assert len(names) > 20
+    assert [name for name in names if not re.search(rf"^(class |def )?{name}\b", text, re.MULTILINE)] == []
+    assert "petsc4py.PETSc.Vec" in text
+
+
+def test_dir_lists_what_is_public_and_nothing_else():
+    assert {name for name in dir(fw) if not name.startswith("__")} == set(fw.__all__)

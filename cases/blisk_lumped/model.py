@@ -6,6 +6,7 @@ Dofs of a sector: disk, blade, tip, ring. `sector(**options)` makes the `fretwav
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 import fretwave as fw
 
@@ -75,14 +76,21 @@ class Options:
         return self.ring_mass * self.ring_radius * (self.speed_rpm * np.pi / 30) ** 2
 
 
+def blade_stiffness() -> npt.NDArray[np.float64]:
+    """The blade's own share (4, 4) of a sector's stiffness [N/m]."""
+    K = np.zeros((4, 4))
+    for (first, second), stiffness in BLADE_SPRINGS.items():
+        K[np.ix_([first, second], [first, second])] += stiffness * np.array([[1, -1], [-1, 1]])
+    return K
+
+
 def sector(**options: float) -> fw.Sector:
     """The sector with its ties to both neighbours and the friction between disk and ring."""
     chosen = Options(**options)  # type: ignore[arg-type]
     ties = np.diag([NEIGHBOUR, 0.0, 0.0, chosen.ring_coupling])
     K = np.zeros((4, 4))
     K[0, 0] = GROUND
-    for (first, second), stiffness in BLADE_SPRINGS.items():
-        K[np.ix_([first, second], [first, second])] += stiffness * np.array([[1, -1], [-1, 1]])
+    K += blade_stiffness()
     groove = fw.Contact(
         "jenkins",
         [[1.0, 0.0, 0.0, -1.0]],
@@ -103,9 +111,6 @@ def build(**options: float) -> fw.Structure:
     M[:4, :4], K[:4, :4] = one.M, one.K[0] + 2 * one.K[1]
     for low, high in ((0, 4), (3, 5)):
         K[np.ix_([low, high], [low, high])] += one.K[1][low, low] * np.array([[-1, 1], [1, -1]])
-    blade = np.zeros((6, 6))
-    for (first, second), stiffness in BLADE_SPRINGS.items():
-        blade[np.ix_([first, second], [first, second])] += stiffness * np.array([[1, -1], [-1, 1]])
     groove = one.contacts[0]
     contact = fw.Pairs(np.hstack([groove.B, np.zeros((1, 2))]), 1, groove.parameters)
     return fw.Structure(
@@ -116,7 +121,7 @@ def build(**options: float) -> fw.Structure:
         sectors=SECTORS,
         low=np.array([0, 3]),
         high=np.array([4, 5]),
-        parts={"blade": blade},
+        parts={"blade": np.pad(blade_stiffness(), (0, 2))},
     )
 
 

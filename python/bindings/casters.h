@@ -13,6 +13,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <type_traits>
 
 #include "petsc.h"
 
@@ -27,6 +28,23 @@ struct Petsc {
   T object = nullptr;
 };
 
+/// As annotations have them.
+template <class T>
+constexpr auto petsc_name() {
+  if constexpr (std::is_same_v<T, Vec>)
+    return nb::detail::const_name("petsc4py.PETSc.Vec");
+  else if constexpr (std::is_same_v<T, Mat>)
+    return nb::detail::const_name("petsc4py.PETSc.Mat");
+  else
+    return nb::detail::const_name("petsc4py.PETSc.SNES");
+}
+
+/// A new object on its way to Python.
+template <class T>
+struct Handed {
+  nb::object object;
+};
+
 bool from_petsc4py(PyObject*, Vec*);
 bool from_petsc4py(PyObject*, Mat*);
 bool from_petsc4py(PyObject*, SNES*);
@@ -34,6 +52,10 @@ PyObject* to_petsc4py(Vec);
 PyObject* to_petsc4py(Mat);
 PyObject* to_petsc4py(SNES);
 void import_petsc4py_module();
+
+inline Handed<Vec> handed(Vec v) { return {nb::steal(to_petsc4py(v))}; }
+inline Handed<Mat> handed(Mat A) { return {nb::steal(to_petsc4py(A))}; }
+inline Handed<SNES> handed(SNES snes) { return {nb::steal(to_petsc4py(snes))}; }
 
 using Array = nb::ndarray<nb::numpy, double>;
 
@@ -70,12 +92,21 @@ namespace nanobind::detail {
 
 template <class T>
 struct type_caster<fretwave::python::Petsc<T>> {
-  NB_TYPE_CASTER(fretwave::python::Petsc<T>, const_name("petsc4py.PETSc.Object"))
+  NB_TYPE_CASTER(fretwave::python::Petsc<T>, fretwave::python::petsc_name<T>())
   bool from_python(handle source, uint8_t, cleanup_list*) noexcept {
     return fretwave::python::from_petsc4py(source.ptr(), &value.object);
   }
   static handle from_cpp(fretwave::python::Petsc<T> source, rv_policy, cleanup_list*) noexcept {
     return fretwave::python::to_petsc4py(source.object);
+  }
+};
+
+template <class T>
+struct type_caster<fretwave::python::Handed<T>> {
+  NB_TYPE_CASTER(fretwave::python::Handed<T>, fretwave::python::petsc_name<T>())
+  bool from_python(handle, uint8_t, cleanup_list*) noexcept { return false; }
+  static handle from_cpp(fretwave::python::Handed<T> source, rv_policy, cleanup_list*) noexcept {
+    return source.object.release();
   }
 };
 

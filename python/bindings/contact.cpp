@@ -132,6 +132,18 @@ void bind_contact(nb::module_& m) {
       .def_prop_ro("components", &contact::Law::components)
       .def_prop_ro("odd", &contact::Law::odd)
       .def_prop_ro("pairs", &contact::Law::pairs)
+      .def_prop_ro("sliders", &contact::Law::sliders)
+      .def("rest",
+           [](contact::Law& law, std::vector<double> const& u) {
+             if (u.size() != size_t(law.components()) * law.pairs())
+               throw nb::value_error("displacements that do not fit the law");
+             law.rest(u.data());
+           })
+      .def("place",
+           [](contact::Law& law, std::vector<double> const& at) {
+             if (at.size() != law.sliders().size()) throw nb::value_error("sliders that do not fit the law");
+             law.place(at);
+           })
       .def("states", states);
   m.attr("limit_tolerance") = contact::limit_tolerance;
   m.def("law_table", law_table);

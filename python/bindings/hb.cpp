@@ -66,7 +66,7 @@ void bind_hb(nb::module_& m) {
       .def("coefficients",
            [](HarmonicProblem& p, Petsc<Vec> y) {
              VecHandle Q = p.coefficients(y.object);
-             return nb::steal(to_petsc4py(Q));
+             return handed(Q);
            })
       .def("summary", [](HarmonicProblem& p, Petsc<Vec> y) { return contact_summary(p.summarise(y.object)); })
       .def("contact_periods", contact_periods)
@@ -75,7 +75,7 @@ void bind_hb(nb::module_& m) {
       .def("gap_product",
            [](HarmonicProblem& p, Petsc<Vec> y, PerContact const& dgap) {
              VecHandle r = p.gap_product(y.object, dgap);
-             return nb::steal(to_petsc4py(r));
+             return handed(r);
            })
       .def("energy", energy)
       .def("preload", [](HarmonicProblem& p, Petsc<Vec> x, Petsc<Vec> P) { p.preload(x.object, P.object); })
@@ -84,28 +84,32 @@ void bind_hb(nb::module_& m) {
       .def_prop_ro("stiffness_scale", &HarmonicProblem::stiffness_scale)
       .def("rounding", [](HarmonicProblem& p, Petsc<Vec> y) { return p.rounding(y.object); })
       .def("scalars", [](HarmonicProblem& p, Petsc<Vec> y) { return p.scalars(y.object); })
-      .def("settle", [](HarmonicProblem& p, Petsc<Vec> y) { p.settle(y.object); })
+      .def(
+          "settle",
+          [](HarmonicProblem& p, Petsc<Vec> y, PerContact const& from) { p.settle(y.object, from); },
+          nb::arg(), nb::arg("sliders") = PerContact{})
+      .def("stand", &HarmonicProblem::stand)
       .def("exponents", [](HarmonicProblem& p, Petsc<Vec> y) { return p.exponents(y.object).s; });
   nb::enum_<Method>(m, "Method").value("CNM", Method::CNM).value("EPMC", Method::EPMC);
   nb::class_<NonlinearMode, HarmonicProblem>(m, "NonlinearMode")
       .def(
           "__init__",
-          [](NonlinearMode* self, model::Model const& model, Harmonics const& h, Method method, PetscInt dof,
+          [](NonlinearMode* self, model::Model const& model, Harmonics const& h, Method method, Row row,
              double omega, Petsc<Vec> shape, Petsc<Vec> imaginary) {
-            new (self) NonlinearMode(model, h, method, dof, omega, shape.object, imaginary.object);
+            new (self) NonlinearMode(model, h, method, row, omega, shape.object, imaginary.object);
           },
           nb::keep_alive<1, 2>())
-      .def("initial", [](NonlinearMode& p, double a) { return nb::steal(to_petsc4py(p.initial(a))); });
+      .def("initial", [](NonlinearMode& p, double a) { return handed(p.initial(a)); });
   nb::class_<ModeStart, NonlinearMode>(m, "ModeStart")
       .def(
           "__init__",
-          [](ModeStart* self, model::Model const& model, Harmonics const& h, Method method, PetscInt dof,
+          [](ModeStart* self, model::Model const& model, Harmonics const& h, Method method, Row row,
              double omega, Petsc<Vec> shape, Petsc<Vec> imaginary, double amplitude) {
-            new (self) ModeStart(model, h, method, dof, omega, shape.object, imaginary.object, amplitude);
+            new (self) ModeStart(model, h, method, row, omega, shape.object, imaginary.object, amplitude);
           },
           nb::keep_alive<1, 2>())
-      .def("initial", [](ModeStart& p) { return nb::steal(to_petsc4py(p.initial())); })
-      .def("mode", [](ModeStart& p, Petsc<Vec> y) { return nb::steal(to_petsc4py(p.mode(y.object))); })
+      .def("initial", [](ModeStart& p) { return handed(p.initial()); })
+      .def("mode", [](ModeStart& p, Petsc<Vec> y) { return handed(p.mode(y.object)); })
       .def("keep_loads", [](ModeStart& p, HarmonicProblem const& other) { p.keep_loads(other); });
   nb::class_<StaticPreload, HarmonicProblem>(m, "StaticPreload")
       .def(
@@ -114,7 +118,7 @@ void bind_hb(nb::module_& m) {
             new (self) StaticPreload(model, P.object, size, stiffness);
           },
           nb::keep_alive<1, 2>())
-      .def("initial", [](StaticPreload& p) { return nb::steal(to_petsc4py(p.initial())); });
+      .def("initial", [](StaticPreload& p) { return handed(p.initial()); });
   nb::class_<ForcedStart, HarmonicProblem>(m, "ForcedStart")
       .def(
           "__init__",
@@ -122,20 +126,18 @@ void bind_hb(nb::module_& m) {
             new (self) ForcedStart(to, y.object, gaps ? Way::gaps : Way::excitation);
           },
           nb::keep_alive<1, 2>())
-      .def("initial", [](ForcedStart& p) { return nb::steal(to_petsc4py(p.initial())); })
-      .def("response",
-           [](ForcedStart& p, Petsc<Vec> y) { return nb::steal(to_petsc4py(p.response(y.object))); });
+      .def("initial", [](ForcedStart& p) { return handed(p.initial()); })
+      .def("response", [](ForcedStart& p, Petsc<Vec> y) { return handed(p.response(y.object)); });
   nb::class_<ForcedResponse, HarmonicProblem>(m, "ForcedResponse")
       .def(
           "__init__",
-          [](ForcedResponse* self, model::Model const& model, Harmonics const& h, PetscInt dof, Petsc<Vec> P,
+          [](ForcedResponse* self, model::Model const& model, Harmonics const& h, Row row, Petsc<Vec> P,
              double level, double omega, Petsc<Vec> shape) {
-            new (self) ForcedResponse(model, h, dof, P.object, level, omega, shape.object);
+            new (self) ForcedResponse(model, h, row, P.object, level, omega, shape.object);
           },
           nb::keep_alive<1, 2>())
       .def_prop_ro("reference_amplitude", &ForcedResponse::reference_amplitude)
-      .def("initial",
-           [](ForcedResponse& p, double omega) { return nb::steal(to_petsc4py(p.initial(omega))); });
+      .def("initial", [](ForcedResponse& p, double omega) { return handed(p.initial(omega)); });
 }
 
 }  // namespace fretwave::python

@@ -90,9 +90,10 @@ void bind_model(nb::module_& m) {
       .value("stuck", model::ContactState::stuck)
       .value("free", model::ContactState::free)
       .value("linearised", model::ContactState::linearised);
-  m.def("linear_modes", [](Model const& mod, int count, model::ContactState state) {
+  m.def("linear_modes", [](Model const& mod, int count, model::ContactState state,
+                           std::optional<double> near) {
     nb::list out;
-    for (auto const& mode : model::linear_modes(mod, count, state))
+    for (auto const& mode : model::linear_modes(mod, count, state, near))
       out.append(nb::make_tuple(mode.omega, mode.beta, Petsc<Vec>{mode.shape}, Petsc<Vec>{mode.imaginary}));
     return out;
   });

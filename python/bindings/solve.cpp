@@ -5,8 +5,8 @@ namespace fretwave::python {
 
 namespace {
 
-nb::object to_python(std::optional<solve::Point> const& p) {
-  if (!p) return nb::none();
+std::optional<nb::dict> to_python(std::optional<solve::Point> const& p) {
+  if (!p) return {};
   nb::dict out;
   out["index"] = p->index, out["y"] = Petsc<Vec>{p->y}, out["tangent"] = Petsc<Vec>{p->tangent};
   out["parameter"] = p->parameter, out["step"] = p->step, out["event"] = p->event, out["wall_s"] = p->wall;
@@ -26,12 +26,12 @@ nb::dict to_python(solve::Fallbacks const& f) {
 void bind_solve(nb::module_& m) {
   using namespace solve;
   nb::class_<Problem>(m, "Problem")
-      .def("unknowns", [](Problem& p) { return nb::steal(to_petsc4py(p.unknowns())); })
-      .def("equations", [](Problem& p) { return nb::steal(to_petsc4py(p.equations())); })
+      .def("unknowns", [](Problem& p) { return handed(p.unknowns()); })
+      .def("equations", [](Problem& p) { return handed(p.equations()); })
       .def("residual", [](Problem& p, Petsc<Vec> y, Petsc<Vec> r) { p.residual(y.object, r.object); })
       .def("product", [](Problem& p, Petsc<Vec> y, Petsc<Vec> dy,
                          Petsc<Vec> dr) { p.product(y.object, dy.object, dr.object); })
-      .def("jacobian", [](Problem& p, Petsc<Vec> y) { return nb::steal(to_petsc4py(assemble(p, y.object))); })
+      .def("jacobian", [](Problem& p, Petsc<Vec> y) { return handed(assemble(p, y.object)); })
       .def("fill_jacobian", [](Problem& p, Petsc<Vec> y, Petsc<Mat> J) { assemble(p, y.object, J.object); })
       .def("metric", [](Problem& p, Petsc<Vec> y, Petsc<Vec> weights) { p.metric(y.object, weights.object); })
       .def("piece", [](Problem& p, Petsc<Vec> y) { return p.piece(y.object); })
@@ -53,7 +53,7 @@ void bind_solve(nb::module_& m) {
       .def("jacobian", [](Bordered& b, Petsc<Vec> y) {
         MatHandle J = b.matrix();
         b.assemble(y.object, J);
-        return nb::steal(to_petsc4py(J));
+        return handed(J);
       });
   nb::class_<Newton>(m, "Newton")
       .def(nb::init<Problem&, std::string const&, bool>(), nb::keep_alive<1, 2>(), nb::arg(), nb::arg(),
@@ -61,7 +61,7 @@ void bind_solve(nb::module_& m) {
       .def_prop_ro("system", &Newton::system, nb::rv_policy::reference_internal)
       .def_prop_ro("route", &Newton::route)
       .def_prop_ro("fallbacks", [](Newton& n) { return to_python(n.fallbacks()); })
-      .def_prop_ro("snes", [](Newton& n) { return nb::steal(to_petsc4py(n.snes())); })
+      .def_prop_ro("snes", [](Newton& n) { return handed(n.snes()); })
       .def("solve",
            [](Newton& n, Petsc<Vec> y) {
              const Outcome o = n.solve(y.object);
@@ -92,7 +92,7 @@ void bind_solve(nb::module_& m) {
       .def_prop_ro("converged", &Continuation::converged)
       .def_prop_ro("route", [](Continuation& c) { return c.newton().route(); })
       .def_prop_ro("fallbacks", [](Continuation& c) { return to_python(c.newton().fallbacks()); })
-      .def_prop_ro("snes", [](Continuation& c) { return nb::steal(to_petsc4py(c.newton().snes())); })
+      .def_prop_ro("snes", [](Continuation& c) { return handed(c.newton().snes()); })
       .def_prop_ro("missed", &Continuation::missed)
       .def("anchor", [](Continuation& c) {
         auto const &a = c.anchor(), &b = c.before();

@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from .cyclic.reduction import SectorReduction, reduce_sector
     from .cyclic.sector import Sector
     from .cyclic.waves import WaveError
+    from .cyclic.wheel_modes import deviations, most_alike, standing_wave, travelling_wave
+    from .cyclic.wheel_shape import WheelShape
     from .hb.problems import ForcedResponse, Harmonics, NonlinearMode, choose_harmonics
     from .hb.reduction_error import NonlinearError, nonlinear_error
     from .model.contact import Contact
@@ -36,6 +38,7 @@ if TYPE_CHECKING:
     from .model.modes import LinearMode, linear_modes
     from .model.pairs import Pairs
     from .model.reduction import FrequencyError, Reduction, reduce
+    from .model.rest import Rest
     from .model.sectors import by_sector, rotation
     from .model.structure import Structure
     from .results.model_file import read_model, write_model
@@ -46,8 +49,10 @@ if TYPE_CHECKING:
     from .solve.follow import follow
     from .solve.preload import balanced, static_preload
     from .solve.steps import StepControl
+    from .solve.sweep import Sweep, sweep
     from .solve.transient import Transient
     from .solve.wear import Wear, WearControl, WearPoint
+    from .solve.wear_march import WearMarch, wear
     from .solve.worn_mode import WornMode
 
 #: Where each public name lives; loaded when first used, so that `fretwave --help` starts without PETSc.
@@ -76,6 +81,11 @@ _HOMES = {
     "cyclic.sector": ("Sector",),
     "cyclic.reduction": ("SectorReduction", "reduce_sector"),
     "cyclic.waves": ("WaveError",),
+    "cyclic.wheel_modes": ("deviations", "most_alike", "standing_wave", "travelling_wave"),
+    "cyclic.wheel_shape": ("WheelShape",),
+    "model.rest": ("Rest",),
+    "solve.sweep": ("Sweep", "sweep"),
+    "solve.wear_march": ("WearMarch", "wear"),
     "cyclic.faces": ("match_faces",),
     "model.laws": ("LawInfo", "Limit", "ParameterInfo", "PythonLaw", "Role", "laws", "register_law"),
     "model.contact": ("Contact",),
@@ -117,22 +127,27 @@ __all__ = [
     "Point",
     "PythonLaw",
     "Reduction",
+    "Rest",
     "Role",
     "Run",
     "Sector",
     "SectorReduction",
     "StepControl",
     "Structure",
+    "Sweep",
     "Transient",
     "WaveError",
     "Wear",
     "WearControl",
+    "WearMarch",
     "WearPoint",
+    "WheelShape",
     "WornMode",
     "balanced",
     "build_model",
     "by_sector",
     "choose_harmonics",
+    "deviations",
     "follow",
     "has_results",
     "key",
@@ -141,6 +156,7 @@ __all__ = [
     "load_case",
     "main",
     "match_faces",
+    "most_alike",
     "nonlinear_error",
     "open_results",
     "open_run",
@@ -151,7 +167,11 @@ __all__ = [
     "register_analysis",
     "register_law",
     "rotation",
+    "standing_wave",
     "static_preload",
+    "sweep",
+    "travelling_wave",
+    "wear",
     "write_model",
 ]
 
@@ -167,4 +187,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted([*globals(), *__all__, "__version__"])
+    return sorted({*__all__, "__version__", *(name for name in globals() if name.startswith("__"))})

@@ -32,11 +32,10 @@ PairConstants Coulomb3d<Coupled>::constants(int first) const {
           p_.normal_load.data() + first, p_.gap.data() + first};
 }
 
-/// One step of the march from a slider at zero.
+/// One step of the march.
 template <bool Coupled>
 void Coulomb3d<Coupled>::set_rest(double const* u) {
   const int n = pairs();
-  std::fill(slider_.begin(), slider_.end(), 0.0);
   std::vector<double> f(3 * size_t(n)), record(record_arrays * size_t(n));
   march<Coupled>(constants(0), 1, n, u, slider_.data(), f.data(), record.data());
   for (int i = 0; i < n; ++i) closed_[i] = f[i] > 0;

@@ -22,6 +22,7 @@ class Coulomb3d : public Law {
   int pairs() const override { return int(p_.gap.size()); }
   bool uses_velocity() const override { return false; }
   bool hereditary() const override { return true; }
+  std::vector<double> sliders() const override { return slider_; }
   bool wears() const override { return true; }
   int normal() const override { return 0; }
   Limit limit() const override { return Coupled ? Limit::circle : Limit::each; }
@@ -35,6 +36,7 @@ class Coulomb3d : public Law {
 
  protected:
   void set_rest(double const* u) override;
+  void set_sliders(std::vector<double> const& sliders) override { slider_ = sliders; }
   void set_wear(double const* depth) override;
   void set_stand_off(double distance) override;
 

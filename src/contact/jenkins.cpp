@@ -12,7 +12,8 @@ Jenkins::Jenkins(std::vector<double> stiffness, std::vector<double> friction_lim
 
 void Jenkins::set_rest(double const* u) {
   for (size_t i = 0; i < slider_.size(); ++i)
-    slider_[i] = u[i] - std::clamp(stiffness_[i] * u[i], -limit_[i], limit_[i]) / stiffness_[i];
+    slider_[i] =
+        u[i] - std::clamp(stiffness_[i] * (u[i] - slider_[i]), -limit_[i], limit_[i]) / stiffness_[i];
 }
 
 bool Jenkins::odd() const {

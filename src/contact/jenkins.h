@@ -14,6 +14,7 @@ class Jenkins : public Law {
   bool hereditary() const override { return true; }
   Limit limit() const override { return Limit::each; }
   bool odd() const override;
+  std::vector<double> sliders() const override { return slider_; }
   double stuck_stiffness(int, int pair) const override { return stiffness_[pair]; }
   void force(Motion const&, double* f, Record&) const override;
   void product(Motion const&, Record const&, double const* du, double const* dv, double* df) const override;
@@ -24,6 +25,7 @@ class Jenkins : public Law {
 
  protected:
   void set_rest(double const* u) override;
+  void set_sliders(std::vector<double> const& sliders) override { slider_ = sliders; }
 
  private:
   void linearised(Motion const&, Record const&, int pair, int n, double const* du, double* df) const;

@@ -71,14 +71,27 @@ class Law {
   /// period that its sliders close, of all such the one nearest to the rest state: DESIGN fact 3 without the
   /// transient.
   virtual bool hereditary() const { return false; }
-  /// The static state the dynamics start from: relative displacement components x pairs, reached from zero in
-  /// one step.
-  void rest(double const* u) { set_rest(u), ++version_; }
+  /// The static state the dynamics start from: relative displacement components x pairs, reached in one step
+  /// from sliders that stand at zero, or at `from` (tangents x pairs).
+  void rest(double const* u, std::vector<double> const& from = {}) {
+    set_sliders(from.empty() ? std::vector<double>(sliders().size(), 0.0) : from);
+    set_rest(u), owner_ = 0, ++version_;
+  }
+  /// Where the sliders stand at rest [m], tangents x pairs; none without memory.
+  virtual std::vector<double> sliders() const { return {}; }
+  /// Puts them there, as they are. For an `owner` who has put them there last, nothing is to be done (the
+  /// same on every rank, as a comparison of the sliders would not be).
+  void place(std::vector<double> const& sliders_at, unsigned owner = 0) {
+    if (owner && owner == owner_) return;
+    set_sliders(sliders_at), owner_ = owner, ++version_;
+  }
   /// Component along the normal, > 0 closing; -1: the law has no normal direction.
   virtual int normal() const { return -1; }
   virtual Limit limit() const { return Limit::none; }
   /// Worn depths count as additional gap along its normal direction.
   virtual bool wears() const { return false; }
+  /// `stand_off` widens its gaps.
+  virtual bool stands_off() const { return wears(); }
   /// Worn depth of each pair [m], in place of what was set before; the rest state stays as it is. Null: as
   /// they are.
   void wear(double const* depth) {
@@ -92,8 +105,8 @@ class Law {
     set_stand_off(distance);
     ++version_;
   }
-  /// Grows whenever `rest`, `wear` or `stand_off` may have changed the force: a linearisation made before is
-  /// of another law.
+  /// Grows whenever `rest`, `place`, `wear` or `stand_off` may have changed the force: a linearisation made
+  /// before is of another law.
   unsigned version() const { return version_; }
   /// f(-u, -v) = -f(u, v): the motion may keep odd harmonics only.
   virtual bool odd() const { return false; }
@@ -119,12 +132,13 @@ class Law {
 
  protected:
   virtual void set_rest(double const* /*u*/) {}
+  virtual void set_sliders(std::vector<double> const& /*sliders*/) {}
   virtual void set_wear(double const* /*depth*/) {}
   virtual void set_stand_off(double /*distance*/) {}
 
  private:
   double stand_off_ = 0;
-  unsigned version_ = 0;
+  unsigned version_ = 0, owner_ = 0;
 };
 
 /// Number of a pattern of states, given as record entries (any values that differ from state to state).

@@ -2,19 +2,20 @@
 
 #include <cmath>
 
+#include "contact/coulomb_2d.h"
 #include "contact/coulomb_3d.h"
 #include "contact/jenkins.h"
 #include "contact/regularised_coulomb.h"
+#include "contact/springs.h"
 #include "error.h"
 
 namespace fretwave::contact {
 
 std::span<Entry const> laws() {
   static std::vector<Entry> const entries = {
-      regularised_coulomb_entry(),
-      jenkins_entry(),
-      coulomb_3d_entry(),
-      coulomb_3d_uncoupled_entry(),
+      regularised_coulomb_entry(),  jenkins_entry(),    coulomb_3d_entry(),
+      coulomb_3d_uncoupled_entry(), coulomb_2d_entry(), unilateral_spring_entry(),
+      cubic_spring_entry(),
   };
   return entries;
 }

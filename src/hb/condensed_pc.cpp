@@ -99,7 +99,8 @@ void CondensedPreconditioner::border(Vec y, Vec row) {
     R_.assign(blocks_ * (scalars_ - 1), 0.0);
     Harmonics const& h = problem_.harmonics();
     for (int j = 0; j < scalars_ - 1; ++j)
-      R_[j * blocks_ + size_t(problem_.dof()) * m_ + h.offset(h.fundamental()) + j] = 1;
+      for (auto const& [dof, weight] : problem_.row())
+        R_[j * blocks_ + size_t(dof) * m_ + h.offset(h.fundamental()) + j] = weight;
   }
   fetch(row, R_);
   if (first_rank_) {

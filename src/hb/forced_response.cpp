@@ -19,9 +19,9 @@ constexpr double unbounded = 1e8;
 
 }  // namespace
 
-ForcedResponse::ForcedResponse(model::Model const& model, Harmonics const& h, PetscInt dof, Vec P,
-                               double level, double omega, Vec shape)
-    : HarmonicProblem(model, h, 1, dof, reference_stiffness(model, omega, shape)),
+ForcedResponse::ForcedResponse(model::Model const& model, Harmonics const& h, Row row, Vec P, double level,
+                               double omega, Vec shape)
+    : HarmonicProblem(model, h, 1, std::move(row), reference_stiffness(model, omega, shape)),
       level_(level),
       omega_reference_(omega) {
   check(VecCopy(P, excitation()));
@@ -80,7 +80,7 @@ std::vector<solve::TestFunction> ForcedResponse::tests(Vec y, Vec tangent) {
 }
 
 ForcedStart::ForcedStart(ForcedResponse& to, Vec y, Way way)
-    : HarmonicProblem(to.model(), to.harmonics(), 1, to.dof(), to.stiffness_scale()),
+    : HarmonicProblem(to.model(), to.harmonics(), 1, to.row(), to.stiffness_scale()),
       way_(way),
       amplitude_(to.reference_amplitude()),
       frequency_(last_entry(y)),

@@ -9,7 +9,7 @@ class ForcedResponse : public HarmonicProblem {
  public:
   /// P: excitation as harmonic blocks at level 1; `omega`, `shape`: the linear mode that scales the unknowns.
   /// Collective.
-  ForcedResponse(model::Model const&, Harmonics const&, PetscInt dof, Vec P, double level, double omega,
+  ForcedResponse(model::Model const&, Harmonics const&, Row row, Vec P, double level, double omega,
                  Vec shape);
   /// Zero motion at angular frequency w: Newton's first step is then the linear response. Collective.
   VecHandle initial(double omega);

@@ -67,7 +67,8 @@ std::vector<double> HarmonicPreconditioner::bordered_block(Exponents const& e, V
   for (int i = 0; i < n_; ++i)
     for (int part = 0; part < 2; ++part)
       at(size - 1, part * n_ + i) = closing[size_t(i) * m_ + offset + part];
-  for (int part = 0; part < scalars_ - 1; ++part) at(2 * n_ + part, part * n_ + int(problem_.dof())) = 1;
+  for (int part = 0; part < scalars_ - 1; ++part)
+    for (auto const& [dof, weight] : problem_.row()) at(2 * n_ + part, part * n_ + int(dof)) = weight;
   return F;
 }
 

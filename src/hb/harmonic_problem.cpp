@@ -53,16 +53,20 @@ model::Model const& countable(model::Model const& model, Harmonics const& h) {
 
 std::string gap_text(double distance) { return "gaps " + short_text(distance) + " m wider"; }
 
-HarmonicProblem::HarmonicProblem(model::Model const& model, Harmonics const& h, int scalars, PetscInt dof,
+HarmonicProblem::HarmonicProblem(model::Model const& model, Harmonics const& h, int scalars, Row row,
                                  double reference_stiffness)
     : residual_(countable(model, h), h),
       scalars_(scalars),
-      dof_(dof),
+      row_(std::move(row)),
       local_block_(model.local_dofs() * h.block_size()),
       stiffness_(reference_stiffness) {
-  if (dof < 0 || dof >= model.dofs())
-    throw InputError("the chosen dof does not exist", std::to_string(dof),
-                     "0 to " + std::to_string(model.dofs() - 1), "choose a dof of the model");
+  if (row_.empty())
+    throw InputError("the row to be normalised or observed is zero", "no entry", "one at least",
+                     "give a row");
+  for (auto const& [dof, weight] : row_)
+    if (dof < 0 || dof >= model.dofs())
+      throw InputError("the chosen dof does not exist", std::to_string(dof),
+                       "0 to " + std::to_string(model.dofs() - 1), "choose a dof of the model");
   q_ = residual_.vector();
   for (auto* v : {&Q_, &dQ_, &R_, &dR_, &excitation_, &static_, &static_load_}) *v = like(q_);
   check(VecSet(excitation_, 0));
@@ -71,8 +75,11 @@ HarmonicProblem::HarmonicProblem(model::Model const& model, Harmonics const& h, 
   last_ = unknowns();
 }
 
-bool HarmonicProblem::owns_dof() const {
-  return dof_ >= model().first_dof() && dof_ < model().first_dof() + model().local_dofs();
+std::span<std::pair<PetscInt, double> const> HarmonicProblem::mine() const {
+  const PetscInt first = model().first_dof(), end = first + model().local_dofs();
+  const auto before = [](auto const& entry, PetscInt dof) { return entry.first < dof; };
+  return {std::lower_bound(row_.begin(), row_.end(), first, before),
+          std::lower_bound(row_.begin(), row_.end(), end, before)};
 }
 
 std::vector<double> HarmonicProblem::scalars(Vec y) {
@@ -82,10 +89,15 @@ std::vector<double> HarmonicProblem::scalars(Vec y) {
     std::copy_n(in.data() + local_block_, unfoldings(), z.begin() + scalars_ + 2);
     std::copy_n(in.data() + local_block_ + unfoldings(), scalars_, z.begin());
   }
-  if (owns_dof() && harmonics().fundamental() >= 0)
-    std::copy_n(in.data() + (dof_ - model().first_dof()) * harmonics().block_size() +
-                    harmonics().offset(harmonics().fundamental()),
-                2, z.begin() + scalars_);
+  if (harmonics().fundamental() >= 0 && !mine().empty()) {
+    double* along = z.data() + scalars_;
+    along[0] = along[1] = -0.0;  // to which adding x gives x
+    for (auto const& [dof, weight] : mine()) {
+      const PetscInt place = (dof - model().first_dof()) * harmonics().block_size() +
+                             harmonics().offset(harmonics().fundamental());
+      for (int j = 0; j < 2; ++j) along[j] += weight * in[place + j];
+    }
+  }
   MPI_Allreduce(MPI_IN_PLACE, z.data(), int(z.size()), MPI_DOUBLE, MPI_SUM, comm());
   return z;
 }
@@ -94,6 +106,7 @@ void HarmonicProblem::unpack(Vec y) {
   z_ = scalars(y);
   motion_ = motion(z_);
   residual_.stand_off(motion_.stand_off);
+  if (sliders_) residual_.place(*sliders_, owner_);
   {
     ReadArray in(y);
     std::copy_n(in.data(), local_block_, WriteArray(q_).data());
@@ -117,7 +130,15 @@ void HarmonicProblem::preload(Vec x, Vec P) {
   linearised_ = false;
 }
 
+void HarmonicProblem::stand(PerContact sliders) {
+  static unsigned owners = 0;
+  sliders_ = std::move(sliders), owner_ = ++owners;
+  residual_.place(*sliders_, owner_);
+  linearised_ = false;
+}
+
 void HarmonicProblem::keep_loads(HarmonicProblem const& other) {
+  sliders_ = other.sliders_, owner_ = other.owner_;
   check(VecCopy(other.static_, static_));
   check(VecWAXPY(static_load_, 1, other.excitation_, other.static_load_));
   linearised_ = false;
@@ -183,7 +204,7 @@ std::vector<double> HarmonicProblem::components(Vec q) const {
   return along;
 }
 
-/// Adds the unfolding's force and sets the rows beside the harmonic ones, all of them linear: (q_dof, along).
+/// Adds the unfolding's force and sets the rows beside the harmonic ones, all of them linear: (w . q, along).
 void HarmonicProblem::border(std::vector<double> const& z, std::vector<double> const& along,
                              double* r) const {
   for (int j = 0; j < unfoldings(); ++j) {
@@ -257,10 +278,11 @@ void HarmonicProblem::pattern(std::vector<PetscInt>& rows, std::vector<PetscInt>
     for (PetscInt i = 0; i < local_block_; ++i) rows.push_back(first + i), cols.push_back(all + j);
   for (int j = 0; j < unfoldings(); ++j)
     for (PetscInt i = 0; i < local_block_; ++i) rows.push_back(all + 2 + j), cols.push_back(first + i);
-  if (!normalised() || !owns_dof()) return;
+  if (!normalised()) return;
   for (int j = 0; j < 2; ++j)
-    rows.push_back(all + j),
-        cols.push_back(dof_ * harmonics().block_size() + harmonics().offset(harmonics().fundamental()) + j);
+    for (auto const& [dof, weight] : mine())
+      rows.push_back(all + j),
+          cols.push_back(dof * harmonics().block_size() + harmonics().offset(harmonics().fundamental()) + j);
 }
 
 /// dR += dR/d(stand-off) d(stand-off)/dz_j dz.
@@ -289,7 +311,8 @@ void HarmonicProblem::values(Vec y, std::span<double> v) {
   for (auto const& g : unfold_) next = std::copy_n(ReadArray(g).data(), local_block_, next);
   for (int j = 0; j < scalars_; ++j, next += local_block_) column(j, next);
   for (auto const& g : unfold_) next = std::copy_n(ReadArray(g).data(), local_block_, next);
-  if (normalised() && owns_dof()) next[0] = next[1] = 1;
+  for (int j = 0; normalised() && j < 2; ++j)
+    for (auto const& [dof, weight] : mine()) *next++ = weight;
 }
 
 VecHandle HarmonicProblem::scalar_column(Vec y, int j) {
@@ -435,6 +458,7 @@ VecHandle HarmonicProblem::pack(Vec q, std::vector<double> const& z) const {
 }
 
 VecHandle HarmonicProblem::coefficients(Vec y) {
+  if (sliders_) residual_.place(*sliders_, owner_);  // whoever asks for the motion asks the laws next
   VecHandle Q = residual_.vector();
   const auto m = motion(scalars(y));
   ReadArray in(y), rest(static_);

@@ -24,14 +24,16 @@ struct ScaledMotion {
   double stand_off = 0, dstand_off = 0;  ///< by which all gaps are widened [m], and by the last scalar
 };
 
+/// A row of displacements w . x: (dof, weight), dofs ascending, the whole row on every rank.
+using Row = std::vector<std::pair<PetscInt, double>>;
+
 /// y = (q, tau, z): scaled harmonic blocks q = (Q - Q_static) / a, then on the last rank the unfolding tau,
 /// if any, and the scalars z; z's last entry is the continuation parameter. Rows (R(a q, s(z)) - P) / (k_ref
-/// a), then, on the last rank, q_dof = (1, 0) in the fundamental if there are three scalars (DESIGN fact 4),
+/// a), then, on the last rank, w . q = (1, 0) in the fundamental if there are three scalars (DESIGN fact 4),
 /// and the unfolding's.
 class HarmonicProblem : public solve::Problem {
  public:
-  HarmonicProblem(model::Model const&, Harmonics const&, int scalars, PetscInt dof,
-                  double reference_stiffness);
+  HarmonicProblem(model::Model const&, Harmonics const&, int scalars, Row row, double reference_stiffness);
   MPI_Comm comm() const override { return residual_.model().comm(); }
   PetscInt local_equations() const override {
     return local_block_ + (last_rank() ? unfoldings() + scalars_ - 1 : 0);
@@ -46,7 +48,8 @@ class HarmonicProblem : public solve::Problem {
 
   Harmonics const& harmonics() const { return residual_.harmonics(); }
   model::Model const& model() const { return residual_.model(); }
-  PetscInt dof() const { return dof_; }
+  /// What the fundamental is normalised by, or observed at.
+  Row const& row() const { return row_; }
   /// Dynamics about a static state x under the static load P: Q = (x, 0, ...) + a q. The mean is retained
   /// then; what was set before is replaced. Collective.
   void preload(Vec x, Vec P);
@@ -60,7 +63,7 @@ class HarmonicProblem : public solve::Problem {
   std::vector<VecHandle> const& unfolding_vectors() const { return unfold_; }
   /// Physical coefficients Q as harmonic blocks. Collective.
   VecHandle coefficients(Vec y);
-  /// (scalars z, fundamental coefficients of the chosen dof in q, tau): on every rank. Collective.
+  /// (scalars z, fundamental coefficients of the row in q, tau): on every rank. Collective.
   std::vector<double> scalars(Vec y);
   /// Contact of the motion at y, summed over ranks. Collective.
   ContactSummary summarise(Vec y);
@@ -77,8 +80,10 @@ class HarmonicProblem : public solve::Problem {
   std::string explain(Vec y, Vec dy) override;
   /// The fixed loads of another problem, excitation included; its static state is the rest. Collective.
   void keep_loads(HarmonicProblem const& other);
-  /// The laws start their march from the static state at y. Collective.
-  void settle(Vec y) { residual_.settle(coefficients(y)); }
+  /// The laws start their march from the static state at y (Residual::settle). Collective.
+  void settle(Vec y, PerContact const& from = {}) { residual_.settle(coefficients(y), from); }
+  /// Sliders at rest of this problem, whatever others of the model do with the laws' (Residual::place).
+  void stand(PerContact sliders);
   std::vector<ContactPeriod> contact_periods(Vec y);
   /// Worn depths of this rank's pairs [m], contact by contact, from now on (Residual::wear).
   void wear(PerContact const& depth);
@@ -101,7 +106,8 @@ class HarmonicProblem : public solve::Problem {
   int unfoldings() const { return int(unfold_.size()); }
   std::vector<double> components(Vec q) const;
   void border(std::vector<double> const& z, std::vector<double> const& along, double* r) const;
-  bool owns_dof() const;
+  /// The row's entries on this rank.
+  std::span<std::pair<PetscInt, double> const> mine() const;
   bool condensable() const;
   void linearise(Vec y);
   void unpack(Vec y);
@@ -112,10 +118,13 @@ class HarmonicProblem : public solve::Problem {
 
   Residual residual_;
   int scalars_;
-  PetscInt dof_, local_block_;
+  Row row_;
+  PetscInt local_block_;
   double stiffness_;
   VecHandle q_, Q_, dQ_, R_, dR_, excitation_, static_, static_load_, last_;
   std::vector<VecHandle> unfold_;
+  std::optional<PerContact> sliders_;
+  unsigned owner_ = 0;  ///< of the sliders, as the laws know it
   bool linearised_ = false, condensed_ = false;
   unsigned contact_version_ = 0;  ///< of the laws at the point of linearisation
   std::vector<double> z_;

@@ -37,9 +37,9 @@ double reference_stiffness(model::Model const& model, double omega, Vec shape, V
   return k;
 }
 
-NonlinearMode::NonlinearMode(model::Model const& model, Harmonics const& h, Method method, PetscInt dof,
+NonlinearMode::NonlinearMode(model::Model const& model, Harmonics const& h, Method method, Row row,
                              double omega, Vec shape, Vec imaginary)
-    : HarmonicProblem(model, h, 3, dof, reference_stiffness(model, omega, shape, imaginary)),
+    : HarmonicProblem(model, h, 3, std::move(row), reference_stiffness(model, omega, shape, imaginary)),
       method_(method),
       omega_reference_(omega),
       starting_stiffness_(stiffness_scale()),
@@ -49,8 +49,12 @@ NonlinearMode::NonlinearMode(model::Model const& model, Harmonics const& h, Meth
   double at_dof[2] = {};
   PetscInt begin, end;
   check(VecGetOwnershipRange(shape, &begin, &end));
-  if (dof >= begin && dof < end)
-    at_dof[0] = ReadArray(shape)[dof - begin], at_dof[1] = ReadArray(imaginary)[dof - begin];
+  {
+    const ReadArray re(shape), im(imaginary);
+    for (auto const& [dof, weight] : this->row())
+      if (dof >= begin && dof < end)
+        at_dof[0] += weight * re[dof - begin], at_dof[1] += weight * im[dof - begin];
+  }
   MPI_Allreduce(MPI_IN_PLACE, at_dof, 2, MPI_DOUBLE, MPI_SUM, comm());
   double largest, largest_imaginary;
   check(VecNorm(shape, NORM_INFINITY, &largest));
@@ -58,9 +62,9 @@ NonlinearMode::NonlinearMode(model::Model const& model, Harmonics const& h, Meth
   largest = std::max(largest, largest_imaginary);
   const complex normal(at_dof[0], at_dof[1]);
   if (std::abs(normal) < 1e-10 * largest)
-    throw InputError("the normalised dof does not move in the starting mode",
+    throw InputError("what is normalised does not move in the starting mode",
                      std::to_string(std::abs(normal) / largest) + " of the largest displacement", "> 1e-10",
-                     "normalise on a dof that takes part in the mode");
+                     "normalise on a dof or row that takes part in the mode");
   const complex scale = 1.0 / normal;
   check(VecAXPBYPCZ(shape_, scale.real(), -scale.imag(), 0, shape, imaginary));
   check(VecAXPBYPCZ(imaginary_, scale.imag(), scale.real(), 0, shape, imaginary));
@@ -139,9 +143,9 @@ std::vector<solve::TestFunction> NonlinearMode::tests(Vec y, Vec tangent) {
   return {{"zero_damping", z[0]}, {"peak_damping", z[1] * dz[0] - z[0] * dz[1], true, true}};
 }
 
-ModeStart::ModeStart(model::Model const& model, Harmonics const& h, Method method, PetscInt dof, double omega,
+ModeStart::ModeStart(model::Model const& model, Harmonics const& h, Method method, Row row, double omega,
                      Vec shape, Vec imaginary, double amplitude)
-    : NonlinearMode(model, h, method, dof, omega, shape, imaginary), amplitude_(amplitude) {}
+    : NonlinearMode(model, h, method, std::move(row), omega, shape, imaginary), amplitude_(amplitude) {}
 
 VecHandle ModeStart::initial() {
   VecHandle y = NonlinearMode::initial(amplitude_);

@@ -14,8 +14,8 @@ enum class Method {
 class NonlinearMode : public HarmonicProblem {
  public:
   /// Started from a linear mode, angular frequency and complex shape (real and imaginary part), normalised on
-  /// `dof`. Collective.
-  NonlinearMode(model::Model const&, Harmonics const&, Method, PetscInt dof, double omega, Vec shape,
+  /// a row. Collective.
+  NonlinearMode(model::Model const&, Harmonics const&, Method, Row row, double omega, Vec shape,
                 Vec imaginary);
   /// The linear mode at amplitude a. Collective.
   VecHandle initial(double amplitude);
@@ -47,8 +47,8 @@ class NonlinearMode : public HarmonicProblem {
 /// changes nothing there.
 class ModeStart : public NonlinearMode {
  public:
-  ModeStart(model::Model const&, Harmonics const&, Method, PetscInt dof, double omega, Vec shape,
-            Vec imaginary, double amplitude);
+  ModeStart(model::Model const&, Harmonics const&, Method, Row row, double omega, Vec shape, Vec imaginary,
+            double amplitude);
   VecHandle initial();
   /// Unknowns of the mode at the end of the way.
   VecHandle mode(Vec y) const;

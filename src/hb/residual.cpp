@@ -164,11 +164,15 @@ void Residual::wear(PerContact const& depth) {
 }
 
 void Residual::gap_product(PerContact const& dgap, Vec dR) {
-  check(VecSet(dR, 0));
   together(model_.comm(), "wearing contacts", [&] { expect_depths(dgap); });
+  gaps_product(dgap, dR);
+}
+
+void Residual::gaps_product(PerContact const& dgap, Vec dR) {
+  check(VecSet(dR, 0));
   for (size_t k = 0; k < groups_.size(); ++k) {
     Group& group = groups_[k];
-    if (!group.contact->law->wears()) continue;
+    if (!group.contact->law->stands_off()) continue;
     VecHandle dF = like(group.F);
     std::vector<double> gaps = dgap[k];
     gaps.resize(size_t(group.contact->law->pairs()), 0.0);  // an empty list: this contact does not wear
@@ -184,8 +188,8 @@ void Residual::stand_off(double distance) {
 void Residual::stand_off_product(Vec dR) {
   PerContact dgap(groups_.size());
   for (size_t k = 0; k < groups_.size(); ++k)
-    if (groups_[k].contact->law->wears()) dgap[k].assign(groups_[k].contact->law->pairs(), 1.0);
-  gap_product(dgap, dR);
+    if (groups_[k].contact->law->stands_off()) dgap[k].assign(groups_[k].contact->law->pairs(), 1.0);
+  gaps_product(dgap, dR);
 }
 
 std::vector<Wearing> Residual::wearing(Vec Q, Exponents const& e) {
@@ -379,7 +383,11 @@ unsigned Residual::contact_version() const {
   return sum;
 }
 
-void Residual::settle(Vec Q) {
+void Residual::place(PerContact const& sliders, unsigned owner) {
+  for (size_t k = 0; k < groups_.size(); ++k) groups_[k].contact->law->place(sliders[k], owner);
+}
+
+void Residual::settle(Vec Q, PerContact const& from) {
   const auto U = relative_motions(Q);
   together(model_.comm(), "settling contacts", [&] {
     fault::point("settle");
@@ -390,7 +398,7 @@ void Residual::settle(Vec Q) {
       std::vector<double> u(size_t(d) * n);
       for (int i = 0; i < n; ++i)
         for (int c = 0; c < d; ++c) u[size_t(c) * n + i] = blocks[(i * d + c) * harmonics_.block_size()];
-      law.rest(u.data());
+      law.rest(u.data(), from.empty() ? std::vector<double>{} : from[k]);
     }
   });
 }

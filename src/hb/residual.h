@@ -81,8 +81,11 @@ class Residual {
   std::uint64_t piece() const;
   /// Grows with every `settle` and `wear` of any problem that shares the laws; the same on every rank.
   unsigned contact_version() const;
-  /// The laws take the mean relative displacement of Q as their rest state. Collective.
-  void settle(Vec Q);
+  /// The laws take the mean relative displacement of Q as their rest state, reached from sliders that stand
+  /// at zero, or as `from` says. Collective.
+  void settle(Vec Q, PerContact const& from = {});
+  /// Puts the sliders at rest there, tangents x pairs of each contact (Law::place).
+  void place(PerContact const& sliders, unsigned owner);
   /// This rank's contact samples, one per contact. Collective.
   std::vector<ContactPeriod> periods(Vec Q, Exponents const& e);
 
@@ -112,6 +115,7 @@ class Residual {
     void each_couple(Body body) const;
   };
   void expect_depths(PerContact const& depth) const;
+  void gaps_product(PerContact const& dgap, Vec dR);
   Map make_map(Mat B, int phase) const;
   void relative_motion(Group const&, Vec Q, Vec U) const;
   VecHandle relative_motion(Group const&, Vec Q) const;

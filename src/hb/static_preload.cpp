@@ -3,7 +3,7 @@
 namespace fretwave::hb {
 
 StaticPreload::StaticPreload(model::Model const& model, Vec P, double size, double stiffness)
-    : HarmonicProblem(model, Harmonics({0}, 2), 1, 0, stiffness), size_(size) {
+    : HarmonicProblem(model, Harmonics({0}, 2), 1, {{0, 1.0}}, stiffness), size_(size) {
   check(VecCopy(P, excitation()));
 }
 

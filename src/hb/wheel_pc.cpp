@@ -311,8 +311,11 @@ void WheelPreconditioner::make_border(Vec y, Vec row) {
   for (auto const& g : problem_.unfolding_vectors()) columns.push_back(copy(g));
   for (int part = 0; part < problem_.scalar_count() - 1; ++part) {
     rows.emplace_back(local, 0.0);
-    const PetscInt dof = problem_.dof() - model.first_dof();
-    if (dof >= 0 && dof < model.local_dofs()) rows.back()[dof * m_ + h.offset(h.fundamental()) + part] = 1;
+    for (auto const& [dof, weight] : problem_.row()) {
+      const PetscInt own = dof - model.first_dof();
+      if (own >= 0 && own < model.local_dofs())
+        rows.back()[own * m_ + h.offset(h.fundamental()) + part] = weight;
+    }
   }
   rows.insert(rows.end(), columns.begin(), columns.end());
   for (int j = 0; j < problem_.scalar_count(); ++j) columns.push_back(copy(problem_.scalar_column(y, j)));

@@ -90,6 +90,29 @@ PetscInt counted_below(Pencil const& pencil, double lambda, Pairs const& found) 
   return all - (count_below(pencil.K, pencil.M, floor, "modes_count_") - pencil.constraints);
 }
 
+/// How far from the shift the `count` nearest ones reach, and what cannot be told from the last of them.
+double reach(Pencil const& pencil, PetscInt count, Pairs const& found) {
+  std::vector<double> distance;
+  for (auto const& pair : found) distance.push_back(std::abs(pair.value - pencil.shift));
+  std::sort(distance.begin(), distance.end());
+  return distance[size_t(count) - 1] +
+         10 * width(pencil, std::abs(pencil.shift) + distance[size_t(count) - 1]);
+}
+
+PetscInt counted_between(Pencil const& pencil, double low, double high) {
+  const auto below = [&](double lambda) { return count_below(pencil.K, pencil.M, lambda, "modes_count_"); };
+  return below(high) - below(low);
+}
+
+/// The `count` nearest to the shift, ascending.
+Pairs nearest(Pencil const& pencil, PetscInt count, Pairs found) {
+  const auto off = [&](EigenPair const& pair) { return std::abs(pair.value - pencil.shift); };
+  std::sort(found.begin(), found.end(), [&](auto const& a, auto const& b) { return off(a) < off(b); });
+  if (PetscInt(found.size()) > count) found.erase(found.begin() + count, found.end());
+  std::sort(found.begin(), found.end(), [](auto const& a, auto const& b) { return a.value < b.value; });
+  return found;
+}
+
 [[noreturn]] void name_short(PetscInt found, PetscInt count) {
   throw PetscFailure("linear modes: " + std::to_string(found) + " of " + std::to_string(count) +
                      " converged; raise -modes_eps_max_it or -modes_eps_ncv");
@@ -113,6 +136,29 @@ void shift_invert(ST st) {
   check(KSPGetPC(ksp, &pc));
   check(PCSetType(pc, PCLU));
   check(PCFactorSetMatSolverType(pc, MATSOLVERMUMPS));
+}
+
+std::vector<EigenPair> nearest_pairs(Pencil const& pencil, PetscInt count) {
+  Pairs found;
+  PetscInt wanted = std::min(count + beyond, pencil.size), missing = 0;
+  double radius = 0;
+  for (int k = 0; k < searches; ++k) {
+    const auto [more, diverged] = search(pencil, wanted, found);
+    const PetscInt have = PetscInt(found.size());
+    if (have >= pencil.size || (have < count && !more && !diverged))
+      return nearest(pencil, count, std::move(found));
+    if (have < count) {
+      if (!more) name_short(have, count);
+      wanted = std::min(count + beyond, pencil.size) - have;
+      continue;
+    }
+    radius = reach(pencil, count, found);
+    const double low = pencil.shift - radius, high = pencil.shift + radius;
+    missing = counted_between(pencil, low, high) - (found_below(high, found) - found_below(low, found));
+    if (missing <= 0) return nearest(pencil, count, std::move(found));
+    wanted = std::min(missing + beyond, pencil.size - have);
+  }
+  name_missing(missing, pencil.shift + radius);
 }
 
 std::vector<EigenPair> lowest_pairs(Pencil const& pencil, PetscInt count) {

@@ -28,6 +28,10 @@ struct Pencil {
 /// `PetscFailure` names what is still missing then. Collective.
 std::vector<EigenPair> lowest_pairs(Pencil const&, PetscInt count);
 
+/// The `count` eigenvalues nearest to a shift amid the spectrum, ascending; likewise counted, within their
+/// distance of the shift. Collective.
+std::vector<EigenPair> nearest_pairs(Pencil const&, PetscInt count);
+
 /// Shift-invert by MUMPS' LU: the saddle point of rigid contact is indefinite.
 void shift_invert(ST);
 

@@ -217,7 +217,7 @@ bool orthonormalise(Mat M, std::vector<VecHandle> const& found, bool travelling,
 }
 
 /// (K + B^H kt B) phi = w^2 M phi, with B phi = 0 where the stuck contact is rigid.
-std::vector<LinearMode> undamped(Model const& model, int count, bool stuck) {
+std::vector<LinearMode> undamped(Model const& model, int count, bool stuck, std::optional<double> near) {
   const bool travelling = model.travelling();
   const int copies = travelling ? 2 : 1;
   auto stiffness = required(model, 0, "stiffness");
@@ -237,14 +237,14 @@ std::vector<LinearMode> undamped(Model const& model, int count, bool stuck) {
   const PetscInt wanted = std::min<PetscInt>(count, model.dofs() - rows_of(G) / copies);
   if (wanted < 1)
     throw InputError("the stuck contact leaves no degree of freedom", "0", ">= 1", "use contact = \"free\"");
-  // a little below zero: K may be singular (rigid motions), K - shift M is not
-  const auto pairs = lowest_pairs({.K = AB[0],
-                                   .M = AB[1],
-                                   .size = copies * model.dofs() - rows_of(G),
-                                   .constraints = rows_of(G),
-                                   .shift = -1e-8 * scale,
-                                   .rounding = rounding(K, M)},
-                                  copies * wanted);
+  // a little below zero: K may be singular (rigid motions), K - shift M is not; nor on a frequency given
+  const Pencil pencil = {.K = AB[0],
+                         .M = AB[1],
+                         .size = copies * model.dofs() - rows_of(G),
+                         .constraints = rows_of(G),
+                         .shift = near ? (1 - 1e-9) * *near * *near : -1e-8 * scale,
+                         .rounding = rounding(K, M)};
+  const auto pairs = near ? nearest_pairs(pencil, copies * wanted) : lowest_pairs(pencil, copies * wanted);
   std::vector<LinearMode> modes;
   std::vector<VecHandle> found;
   for (auto const& [value, vector] : pairs) {
@@ -368,9 +368,10 @@ std::vector<LinearMode> damped(Model const& model, int count) {
 
 }  // namespace
 
-std::vector<LinearMode> linear_modes(Model const& model, int count, ContactState state) {
+std::vector<LinearMode> linear_modes(Model const& model, int count, ContactState state,
+                                     std::optional<double> near) {
   auto modes = state == ContactState::linearised ? damped(model, count)
-                                                 : undamped(model, count, state == ContactState::stuck);
+                                                 : undamped(model, count, state == ContactState::stuck, near);
   std::sort(modes.begin(), modes.end(), [](auto const& a, auto const& b) { return a.omega < b.omega; });
   if (modes.size() > size_t(count)) modes.resize(size_t(count));
   return modes;

@@ -206,7 +206,7 @@ ROLES = {
     },
     "jenkins": {"tangential_stiffness": Role.TANGENTIAL_STIFFNESS, "friction_limit": Role.FRICTION_LIMIT},
     **dict.fromkeys(
-        ("coulomb_3d", "coulomb_3d_uncoupled"),
+        ("coulomb_3d", "coulomb_3d_uncoupled", "coulomb_2d"),
         {
             "normal_stiffness": Role.NORMAL_STIFFNESS,
             "tangential_stiffness": Role.TANGENTIAL_STIFFNESS,
@@ -215,6 +215,8 @@ ROLES = {
             "gap": Role.GAP,
         },
     ),
+    "unilateral_spring": {"normal_stiffness": Role.NORMAL_STIFFNESS, "gap": Role.GAP},
+    "cubic_spring": {"cubic_stiffness": Role.NONE},
 }
 
 
@@ -227,10 +229,13 @@ def test_every_law_says_the_roles_of_its_parameters() -> None:
         "jenkins": (None, Limit.EACH, False),
         "coulomb_3d": (0, Limit.CIRCLE, True),
         "coulomb_3d_uncoupled": (0, Limit.EACH, True),
+        "coulomb_2d": (0, Limit.EACH, True),
+        "unilateral_spring": (0, Limit.NONE, False),
+        "cubic_spring": (None, Limit.NONE, False),
     }
 
 
-@pytest.mark.parametrize("law", [name for name in ROLES if name != "regularised_coulomb"])
+@pytest.mark.parametrize("law", [name for name in ROLES if name not in ("regularised_coulomb", "cubic_spring")])
 def test_stiffnesses_by_role_are_what_a_stuck_pair_has(comm, law: str) -> None:
     """omega^2 = 1 + stiffness of unit masses on unit springs, by component."""
     info = fw.laws()[law]

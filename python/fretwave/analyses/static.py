@@ -20,7 +20,7 @@ from .parts.rest import keep_pairs, loaded_state
 if TYPE_CHECKING:
     from ..case.facts import Facts
     from ..case.reporter import Reporter
-    from ..solve.preload import Preload
+    from ..model.rest import Rest
 
 COLUMNS = (
     Column("point", "1", "number of the row", "i"),
@@ -90,7 +90,7 @@ def section_loads(context: AnalysisContext[StaticAnalysis]) -> list[str]:
     return section.loads if section else []
 
 
-def _rows(context: AnalysisContext[StaticAnalysis], rest: Preload, factor: float) -> Iterator[dict[str, Any]]:
+def _rows(context: AnalysisContext[StaticAnalysis], rest: Rest, factor: float) -> Iterator[dict[str, Any]]:
     """One row for each pair, on every rank."""
     contacts = context.comm.bcast(rest.contacts)
     for spec, state in zip(context.case.contacts, contacts):
@@ -122,7 +122,7 @@ def pair_state(spec: Contact, state: Mapping[str, Any], pair: int) -> dict[str, 
     }
 
 
-def _summary(context: AnalysisContext[StaticAnalysis], rest: Preload, factor: float) -> list[str]:
+def _summary(context: AnalysisContext[StaticAnalysis], rest: Rest, factor: float) -> list[str]:
     """Status of the pairs and balance of the forces."""
     lines = []
     contacts = context.comm.bcast(rest.contacts)

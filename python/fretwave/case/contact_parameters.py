@@ -38,13 +38,17 @@ def law_of(
     return None
 
 
-def fits(source: Source, number: int, law: Any, given: Pairs | None, found: list[FretwaveError]) -> bool:
-    """Law and pairs have the same number of components."""
-    here, wanted = given.components if given else 1, getattr(law, "components", 1)
+#: How a contact of so many components is given.
+_FIX = {2: "give the key `tangents` beside `pairs`", 3: "such contacts come with a model that is built or imported"}
+
+
+def fits(source: Source, number: int, law: Any, here: int, given: Pairs | None, found: list[FretwaveError]) -> bool:
+    """Law and pairs have the same number of components (`here` of the pairs)."""
+    wanted = getattr(law, "components", 1)
     if here != wanted:
         text = "component" if here == 1 else "components"
         measured = f"{law.name} has {wanted}, the pairs have {here} {text}"
-        fix = "choose another law" if given else "such contacts come with a model that is built or imported"
+        fix = "choose another law" if given else _FIX.get(wanted, "leave out the key `tangents`")
         where = source.where(("contact", number, "law"))
         found.append(InputError("the law does not fit the contact pairs", where, measured, "the same number", fix))
     return bool(here == wanted)

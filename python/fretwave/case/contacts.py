@@ -14,6 +14,7 @@ from ..errors import FretwaveError, InputError
 from ..model.contact import Contact
 from ..model.laws import law_like
 from ..model.pairs import Pairs
+from ..model.sectors import Sparse
 from ..model.structure import Structure
 from ..texts import nearest, toml
 from .contact_parameters import fits, law_of, parameters_of
@@ -76,7 +77,7 @@ def read_contacts(
         parameters = parameters_of(source, number, section, law, given, found) if law else None
         if law is None or parameters is None or pairs is None:
             continue
-        if fits(source, number, law, given, found):
+        if fits(source, number, law, pairs.components, given, found):
             contacts.append(Contact(section.law, pairs, parameters, section.name))
     return contacts
 
@@ -89,15 +90,42 @@ def _pairs(
     built: Mapping[str, Pairs],
     found: list[FretwaveError],
 ) -> Pairs | None:
-    """The builder's, or one row for each pair, +1 at the dof (second dof), -1 at the first of two."""
+    """The builder's, or a row for each pair, +1 at the dof (second dof), -1 at the first of two.
+
+    With tangents two rows a pair, normal and tangent.
+    """
     if section.pairs is None or section.name in built:
         return _built_pairs(source, number, section, built, found)
     if dofs is None:
         return None
+    rows = [_rows_of(source, number, "pairs", section.pairs, dofs, found)]
+    if section.tangents is not None:
+        if len(section.tangents) != len(section.pairs):
+            where, fix = source.where(("contact", number, "tangents")), "give one tangent for each pair"
+            measured = f"{len(section.tangents)} tangents, {len(section.pairs)} pairs"
+            found.append(InputError("tangents do not match the pairs", where, measured, "as many of both", fix))
+            return None
+        rows.append(_rows_of(source, number, "tangents", section.tangents, dofs, found))
+    if any(part is None for part in rows):
+        return None
+    # pair by pair: normal, tangent
+    order = np.arange(len(rows) * len(section.pairs)).reshape(len(rows), -1).T.ravel()
+    return Pairs(scipy.sparse.csr_matrix(scipy.sparse.vstack(rows))[order], len(rows))
+
+
+def _rows_of(
+    source: Source,
+    number: int,
+    key: str,
+    pairs: Sequence[str | list[str]],
+    dofs: Sequence[str],
+    found: list[FretwaveError],
+) -> Sparse | None:
+    """A row of B for each pair; None when one is wrong."""
     before = len(found)
-    rows = scipy.sparse.lil_matrix((len(section.pairs), len(dofs)))
-    for row, pair in enumerate(section.pairs):
-        path = ("contact", number, "pairs", row)
+    rows = scipy.sparse.lil_matrix((len(pairs), len(dofs)))
+    for row, pair in enumerate(pairs):
+        path = ("contact", number, key, row)
         ends = [pair] if isinstance(pair, str) else pair
         if len(ends) not in (1, 2) or len(set(ends)) != len(ends):
             found.append(
@@ -106,14 +134,14 @@ def _pairs(
                     where=source.where(path),
                     measured=toml(pair),
                     expected="a dof (against ground) or two different dofs [first, second]",
-                    fix='write for example `pairs = ["m2"]` or `pairs = [["m1", "m2"]]`',
+                    fix=f'write for example `{key} = ["m2"]` or `{key} = [["m1", "m2"]]`',
                 )
             )
             continue
         for dof, sign in zip(reversed(ends), (1.0, -1.0)):
             if check_dof(source, path, dof, dofs, found):
                 rows[row, list(dofs).index(dof)] = sign
-    return Pairs(rows.tocsr(), 1) if len(found) == before else None
+    return rows.tocsr() if len(found) == before else None
 
 
 def _built_pairs(
@@ -125,6 +153,10 @@ def _built_pairs(
 ) -> Pairs | None:
     """Pairs that come with the model."""
     path = ("contact", number)
+    if section.tangents is not None and (section.pairs is None or section.name in built):
+        where, fix = source.where((*path, "tangents")), "give `pairs`, or leave the key out"
+        found.append(InputError("tangents belong to pairs that the case names", where, fix=fix))
+        return None
     if section.name in built and section.pairs is None:
         return built[section.name]
     if section.pairs is not None:

@@ -222,6 +222,8 @@ def _resolve(
     for entry, contact in zip(source.entries("contact"), contacts):
         pairs = [[pair] if isinstance(pair, str) else pair for pair in entry.get("pairs", [])]
         values: dict[str, Any] = {"law": contact.law, "pairs": pairs}
+        if entry.get("tangents") is not None:
+            values["tangents"] = [[end] if isinstance(end, str) else end for end in entry["tangents"]]
         values.update({key: _plain(value) for key, value in contact.parameters.items()})
         resolved.update({f"contact.{contact.name}.{key}": value for key, value in values.items()})
     for analysis in analyses.values():

@@ -155,6 +155,12 @@ class ContactSection(BaseModel):
         default=None,
         min_length=1,
     )
+    tangents: Optional[list[Union[Dof, list[Dof]]]] = key(
+        "of a law in a plane: the tangent of each pair, given as `pairs`, which are then its normals (> 0 closes)",
+        example='["m2_x"] or [["m1_x", "m2_x"]]',
+        default=None,
+        min_length=1,
+    )
 
 
 class StepSection(Section):

@@ -67,11 +67,9 @@ def solver_room(case: Case, analysis: AnalysisSection, prefix: str) -> Iterator[
 
 
 def deviations_of(mistuning: MistuningSection, sectors: int) -> Array:
-    """Relative stiffness deviations (N,): those given, or normally distributed ones (PCG64) less their mean.
-
-    Without its mean a pattern leaves the family's mean frequency, to first order, where it was.
-    """
+    """Relative stiffness deviations (N,): those given, or drawn ones."""
     if mistuning.deviations is not None:
         return np.array(mistuning.deviations)
-    drawn = np.random.Generator(np.random.PCG64(mistuning.seed)).standard_normal(sectors)
-    return np.asarray(mistuning.standard_deviation * (drawn - drawn.mean()))
+    from ..cyclic.wheel_modes import deviations
+
+    return deviations(sectors, mistuning.standard_deviation or 0.0, mistuning.seed)

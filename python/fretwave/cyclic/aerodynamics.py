@@ -68,6 +68,10 @@ class Aerodynamics:
         if not self.omega > 0:
             raise InputError("influence coefficients need a frequency", None, self.omega, "> 0 rad/s", "give omega")
 
+    def __repr__(self) -> str:
+        acts = "modal" if self.dof is None else f"on dof {self.dof}"
+        return f"Aerodynamics({len(self.influence)} coefficients, {acts}, at {self.omega:.6g} rad/s)"
+
     @classmethod
     def from_damping(cls, ratios: Mapping[int, float], sectors: int, omega: float) -> Aerodynamics:
         """Modal coefficients that give a wave of each nodal diameter its damping ratio at `omega`, and no stiffness.

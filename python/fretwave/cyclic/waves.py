@@ -49,6 +49,9 @@ class WaveError:
     reduced_hz: Array
     relative: Array
 
+    def __repr__(self) -> str:
+        return f"WaveError({self.line()})"
+
     @property
     def largest(self) -> float:
         """Largest relative error in magnitude."""
@@ -105,7 +108,7 @@ class SectorWaves:
 
 def _closed(contact: Contact) -> Contact:
     """Closed at rest, whatever its load and gap."""
-    if contact.components == 1 or isinstance(contact.law, PythonLaw):
+    if isinstance(contact.law, PythonLaw) or contact.info.normal is None:
         return contact
     return replace(contact, parameters={**contact.parameters, **contact.info.closing()})
 

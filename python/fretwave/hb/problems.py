@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, Union, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +14,7 @@ from .. import _core
 from ..errors import InputError
 from ..model.model import Model
 from ..model.modes import LinearMode
+from ..model.rest import Rest
 from ..post.contact_history import MOTION
 from .states import ForcedState, ModalState, State
 
@@ -66,14 +68,50 @@ def choose_harmonics(model: Model, highest: int, samples: int | None = None, ret
     return harmonics
 
 
+#: What is normalised or observed: a dof's number, a row (n_dof,), or a linear mode's coordinate.
+Observed = Union[int, Sequence[float], Array, LinearMode]
+
+
+def row_of(model: Model, observed: Observed) -> list[tuple[int, float]]:
+    """Entries (dof, weight) of what is observed, on every rank. Collective.
+
+    Raises
+    ------
+    InputError
+        The row does not fit the model.
+    """
+    if isinstance(observed, LinearMode):
+        if np.any(observed.imaginary):
+            fix = "take a real mode, or a dof"
+            raise InputError("a complex mode has no one coordinate", None, repr(observed), "a standing wave", fix)
+        return row_of(model, model.inertia(observed.shape))
+    if np.ndim(observed) == 0:
+        return [(operator.index(cast(int, observed)), 1.0)]
+    row = np.asarray(observed, dtype=float)
+    if row.shape != (model.n_dof,) or not np.isfinite(row).all():
+        fix = "give one weight a dof"
+        raise InputError("the row does not fit the model", None, row.shape, f"({model.n_dof},), finite", fix)
+    return [(int(k), float(row[k])) for k in np.flatnonzero(row)]
+
+
+def _named(observed: Observed) -> str:
+    if isinstance(observed, LinearMode):
+        return f"the coordinate of {observed.frequency_hz:.6g} Hz"
+    return f"dof {observed!r}" if np.ndim(observed) == 0 else "a row"
+
+
 class HarmonicProblem:
     """N equations in N + 1 unknowns y: scaled harmonic coefficients, then scalars, the continuation parameter last."""
 
     #: What its scalar unknowns mean; None where no table says.
     meaning: State | None = None
 
-    def __init__(self, model: Model, harmonics: Harmonics, prefix: str, core: Any) -> None:
-        self.model, self.harmonics, self.prefix, self.core = model, harmonics, prefix, core
+    def __init__(self, model: Model, harmonics: Harmonics, prefix: str, core: Any, rest: Rest | None = None) -> None:
+        self.model, self.harmonics, self.prefix, self.core, self.rest = model, harmonics, prefix, core, rest
+        if rest is not None:
+            self.preload(rest.displacement, rest.load)
+            model.settle(rest)
+            self.core.stand(model.local_sliders(rest.sliders or model.sliders()))
 
     def initial(self, parameter: float) -> PETSc.Vec:
         """A first guess at this amplitude or angular frequency. Collective."""
@@ -121,6 +159,13 @@ class HarmonicProblem:
         parts = self.model.comm.gather(Q.getArray(readonly=True).copy())
         Q.destroy()
         return None if parts is None else np.concatenate(parts).reshape(-1, self.harmonics.block_size)
+
+    def local_coefficients(self, y: PETSc.Vec) -> Array:
+        """This rank's rows of `coefficients`. Collective."""
+        Q = self.core.coefficients(y)
+        local = Q.getArray(readonly=True).reshape(-1, self.harmonics.block_size).copy()
+        Q.destroy()
+        return np.asarray(local)
 
     def diagnostics(self, y: PETSc.Vec) -> dict[str, float]:
         """Contact of this motion. Collective.
@@ -214,8 +259,9 @@ class NonlinearMode(HarmonicProblem):
     ----------
     method : {"CNM", "EPMC"}
         Complex nonlinear mode (Laxalde et al. 2008), or extended periodic motion concept (Krack 2015).
-    dof : int
-        The fundamental coefficient of this dof is (a, 0).
+    dof : int, (n_dof,), or LinearMode
+        The fundamental coefficient of this dof is (a, 0); or that of a row w . x of displacements, or of a linear
+        mode's coordinate phi^T M x (of unit modal mass).
     start : LinearMode
         Where the branch begins; scales the unknowns.
     prefix : str
@@ -224,6 +270,9 @@ class NonlinearMode(HarmonicProblem):
         On a tuned wheel, where modes come in pairs and the equations lose rank at small amplitude: the other mode of
         the pair, for a travelling wave the conjugate of the start's shape. The fundamental's component on it is kept
         at zero by a force that comes out as zero (`unfolding`).
+    rest : Rest, optional
+        The static state that the motion is about (`fretwave.static_preload`), its own whatever other problems of the
+        model are about; without it that of the model (`Model.settle`), and no static load.
     """
 
     def __init__(
@@ -231,10 +280,11 @@ class NonlinearMode(HarmonicProblem):
         model: Model,
         harmonics: Harmonics,
         method: str = "CNM",
-        dof: int = 0,
+        dof: Observed = 0,
         start: LinearMode | None = None,
         prefix: str = "mode_",
         avoid: npt.NDArray[np.complex128] | None = None,
+        rest: Rest | None = None,
     ) -> None:
         if method not in ("CNM", "EPMC"):
             raise InputError("unknown method", None, method, "CNM or EPMC", 'use method="CNM"')
@@ -243,17 +293,18 @@ class NonlinearMode(HarmonicProblem):
 
             start = linear_modes(model, 1)[0]
         self.method, self.dof, self.start = method, dof, start
-        known = model.core, harmonics.core, getattr(_core.Method, method), dof, start.omega
+        self.row = row_of(model, dof)
+        known = model.core, harmonics.core, getattr(_core.Method, method), self.row, start.omega
         with model.vectors(start.shape, start.imaginary) as shape:
             core = _core.NonlinearMode(*known, *shape)
         if avoid is not None:
             with model.vectors(np.real(avoid), np.imag(avoid)) as other:
                 core.unfold(*other)
-        super().__init__(model, harmonics, prefix, core)
+        super().__init__(model, harmonics, prefix, core, rest)
         self.meaning = ModalState(method, start.omega)
 
     def _what(self) -> str:
-        return f"{self.method} from {self.start.frequency_hz:.6g} Hz, amplitude of dof {self.dof}, "
+        return f"{self.method} from {self.start.frequency_hz:.6g} Hz, amplitude of {_named(self.dof)}, "
 
     def initial(self, amplitude: float) -> PETSc.Vec:
         """The linear mode at this amplitude. Collective."""
@@ -271,10 +322,15 @@ class ForcedResponse(HarmonicProblem):
     ----------
     force : dict
         Order n -> complex (n_dof,), p(t) = level Re sum P_n e^{i n w t}.
-    dof : int
-        Observed.
+    dof : int, (n_dof,), or LinearMode
+        Observed: a dof, a row w . x of displacements, or a linear mode's coordinate phi^T M x (of unit modal mass).
     reference : LinearMode
         Scales the unknowns.
+    prefix : str
+        Of the PETSc options.
+    rest : Rest, optional
+        The static state that the motion is about (`fretwave.static_preload`), its own whatever other problems of the
+        model are about; without it that of the model (`Model.settle`), and no static load.
     """
 
     def __init__(
@@ -283,16 +339,18 @@ class ForcedResponse(HarmonicProblem):
         harmonics: Harmonics,
         force: Mapping[int, npt.NDArray[Any]],
         level: float,
-        dof: int,
+        dof: Observed,
         reference: LinearMode,
         prefix: str = "forced_",
+        rest: Rest | None = None,
     ) -> None:
         self.dof, self.level, self.reference = dof, level, reference
         P = self._blocks(model, harmonics, force)
         with model.vectors(reference.shape) as (shape,):
-            core = _core.ForcedResponse(model.core, harmonics.core, dof, P, level, reference.omega, shape)
+            row = row_of(model, dof)
+            core = _core.ForcedResponse(model.core, harmonics.core, row, P, level, reference.omega, shape)
         P.destroy()
-        super().__init__(model, harmonics, prefix, core)
+        super().__init__(model, harmonics, prefix, core, rest)
         self.meaning = ForcedState(level, reference.omega, core.reference_amplitude)
 
     @staticmethod
@@ -316,7 +374,7 @@ class ForcedResponse(HarmonicProblem):
         return PETSc.Vec().createWithArray(local, comm=model.comm)
 
     def _what(self) -> str:
-        return f"level {self.level:g}, dof {self.dof}, "
+        return f"level {self.level:g}, {_named(self.dof)}, "
 
     def initial(self, omega: float) -> PETSc.Vec:
         """Zero motion at this angular frequency: Newton's first step is the linear response. Collective."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +14,9 @@ from petsc4py import PETSc
 from ..errors import InputError, NotConverged
 from ..model.reduction import Reduction
 from .problems import NonlinearMode
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
@@ -104,7 +107,7 @@ def _harmonics(problem: NonlinearMode, y: PETSc.Vec) -> Iterator[tuple[int, int,
         column += 2 if order else 1
 
 
-def _square(comm: Any, v: Complex) -> float:
+def _square(comm: MPI.Comm, v: Complex) -> float:
     return float(comm.allreduce(np.vdot(v, v).real))
 
 

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from ..model.laws import Role
+
+if TYPE_CHECKING:
+    from ..model.contact import Contact
 
 Array = npt.NDArray[np.float64]
 
@@ -20,7 +23,7 @@ SOFT = 1e-6
 UNBALANCED = 0.1
 
 
-def suspects(contacts: Sequence[Any], stiffness: float) -> str:
+def suspects(contacts: Sequence[Contact], stiffness: float) -> str:
     """What is extreme in the contacts' parameters, contact by contact, or nothing.
 
     Parameters
@@ -31,7 +34,7 @@ def suspects(contacts: Sequence[Any], stiffness: float) -> str:
     return "".join(f"; contact '{c.name}' {words}" for c in contacts for words in _extremes(c, stiffness))
 
 
-def _extremes(contact: Any, stiffness: float) -> Iterator[str]:
+def _extremes(contact: Contact, stiffness: float) -> Iterator[str]:
     given = {role: np.atleast_1d(np.asarray(value, dtype=float)) for role, value in _values(contact)}
     limit = given.get(Role.FRICTION_COEFFICIENT, given.get(Role.FRICTION_LIMIT))
     if limit is not None and not np.any(limit):
@@ -43,7 +46,7 @@ def _extremes(contact: Any, stiffness: float) -> Iterator[str]:
             yield from _stiffness(str(contact.info.named(role)), given[role], stiffness)
 
 
-def _values(contact: Any) -> Iterator[tuple[Role, Any]]:
+def _values(contact: Contact) -> Iterator[tuple[Role, Any]]:
     """Of the parameters with a role, those that have a value."""
     for parameter in contact.info.parameters:
         value = contact.value(parameter.role)

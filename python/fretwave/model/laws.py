@@ -61,7 +61,7 @@ class ParameterInfo:
 
 @dataclass(frozen=True)
 class LawInfo:
-    """A contact law; `components` is 1 (tangent) or 3 (normal, two tangents).
+    """A contact law; `components` is 1 (tangent, or a stop's normal), 2 (normal, tangent) or 3 (normal, two tangents).
 
     Attributes
     ----------
@@ -99,7 +99,8 @@ class LawInfo:
 
     def closing(self) -> dict[str, float]:
         """Parameters with which every pair is closed at rest, whatever its load and gap."""
-        return self.with_roles({Role.LOAD: 1.0, Role.GAP: 0.0})
+        # by a load, or where the law has none by an interference
+        return self.with_roles({Role.LOAD: 1.0, Role.GAP: 0.0 if self.named(Role.LOAD) else -1.0})
 
     def stiffness_along(self, component: int) -> Role:
         """Role of the stiffness of a stuck pair along a component."""
@@ -221,9 +222,9 @@ class PythonLaw:
     parameters : sequence of ParameterInfo
         Of a registered law, with their roles.
     components : int
-        1 (tangent) or 3 (normal, two tangents).
+        1 (tangent), 2 (normal, tangent) or 3 (normal, two tangents).
     normal : int or None
-        Component along the normal, > 0 closing; by default 0 of three, none of one.
+        Component along the normal, > 0 closing; by default the first of several, none of one.
     limit : Limit
         What the tangential force stays within, where that is sharp.
     odd : bool
@@ -248,7 +249,7 @@ class PythonLaw:
 
     def __init_subclass__(cls, **given: Any) -> None:
         super().__init_subclass__(**given)
-        if cls.components == 3 and "normal" not in vars(cls) and cls.normal is None:
+        if cls.components > 1 and "normal" not in vars(cls) and cls.normal is None:
             cls.normal = 0
 
     def __repr__(self) -> str:

@@ -16,12 +16,18 @@ from .. import _core
 from ..errors import InputError
 from ..mpi import guard as parallel
 from .contact import Contact
+from .rest import Rest
 from .sectors import Given, Term, by_sector
 
 Array = npt.NDArray[np.float64]
 
 if MPI.COMM_WORLD.size > 1:
     parallel.install()  # in scripts too: one rank's exception ends all ranks, with one message
+
+
+def _tangents(contact: Contact) -> int:
+    """Components beside the normal one."""
+    return contact.components - (contact.info.normal is not None)
 
 
 class Model:
@@ -62,9 +68,11 @@ class Model:
             comm = first.getComm().tompi4py() if isinstance(first, PETSc.Mat) else MPI.COMM_WORLD
         self.comm, self.sectors, self.nodal_diameter, self._unit = comm, sectors, nodal_diameter, unit
         self._matrices = [self._matrix(matrix) for matrix, *_ in terms]
+        self._terms = [(A, order, k) for A, (_, order, k) in zip(self._matrices, terms)]
         self.contacts = list(contacts)
         self.n_dof: int = self._matrices[0].getSize()[1]
         self._pairs: list[npt.NDArray[np.intp]] = []
+        self._laws: list[Any] = []
         groups = [self._group(contact) for contact in self.contacts]
         theta = 2 * np.pi * nodal_diameter / sectors
         self.core = _core.Model(
@@ -111,7 +119,8 @@ class Model:
         self._pairs.append(pairs)
         rows = (pairs[:, None] * d + np.arange(d)).ravel()
         parts = [(self._rows_of(B, rows), k) for k, B in maps.items()]
-        return contact.name, parts, contact.core_law(pairs, n_pairs), pairs.tolist()
+        self._laws.append(contact.core_law(pairs, n_pairs))
+        return contact.name, parts, self._laws[-1], pairs.tolist()
 
     @staticmethod
     def _first_dofs(maps: Mapping[int, sp.csr_matrix], d: int) -> npt.NDArray[np.intp]:
@@ -144,6 +153,41 @@ class Model:
         """A distributed vector from an array (n_dof,) given whole on every rank. Collective."""
         return PETSc.Vec().createWithArray(np.array(self.distribute(np.asarray(values, dtype=float))), comm=self.comm)
 
+    def inertia(self, x: Array) -> Array:
+        """M x (n_dof,) of a displacement given whole, on every rank. Collective."""
+        mass = next(A for A, order, k in self._terms if (order, k) == (2, 0))
+        whole: Array = np.concatenate(self.comm.allgather(self._product(mass, self.distribute(x))))
+        return whole
+
+    def form(self, order: int, q: npt.NDArray[np.complex128], n: int = 1) -> float:
+        """Re q^H A q of K (order 0), C (1) or M (2), from this rank's part of harmonic n's amplitudes q. Collective.
+
+        Of a sector in a wave A is sum_k A_k e^{-i k n theta}.
+        """
+        theta = 2 * np.pi * self.nodal_diameter / self.sectors
+        total = 0.0
+        for A, own, k in self._terms:
+            if own == order:
+                Aq = self._product(A, q.real) + 1j * self._product(A, q.imag)
+                total += float(np.real(np.exp(-1j * k * n * theta) * np.vdot(q, Aq)))
+        return float(self.comm.allreduce(total))
+
+    def _product(self, A: PETSc.Mat, local: Array) -> Array:
+        """This rank's part of A x, from its part of x. Collective."""
+        x = PETSc.Vec().createWithArray(np.ascontiguousarray(local, dtype=float), comm=self.comm)
+        y = x.duplicate()
+        A.mult(x, y)
+        product: Array = y.getArray(readonly=True).copy()
+        x.destroy()
+        y.destroy()
+        return product
+
+    @property
+    def ownership(self) -> tuple[int, int]:
+        """First of this rank's dofs, and the first of the next one's."""
+        begin, end = self._matrices[0].getOwnershipRange()
+        return int(begin), int(end)
+
     @contextmanager
     def vectors(self, *values: Array) -> Iterator[list[PETSc.Vec]]:
         """`vector` of each array, for a `with` block that they do not outlive. Collective."""
@@ -170,6 +214,54 @@ class Model:
         """`gather_pairs`, on every rank. Collective."""
         whole: Array = self.comm.bcast(self.gather_pairs(which, local))
         return whole
+
+    def settle(self, rest: Rest) -> None:
+        """The laws take a static state as theirs: which pairs are closed, and where the sliders stand. Collective.
+
+        As every static state that is solved does by itself. Linear modes are those about it, and problems that are
+        made without a state of their own move about it.
+
+        Raises
+        ------
+        InputError
+            The sliders are not those of this model's contacts.
+        """
+        for k, (contact, law) in enumerate(zip(self.contacts, self._laws)):
+            u = np.sum([sp.csr_matrix(B) @ rest.displacement for B in by_sector(contact.B).values()], axis=0)
+            mine = u.reshape(-1, contact.components)[self._pairs[k]]
+            law.rest(mine.T.ravel().tolist())
+            if rest.sliders is not None and contact.info.memory:  # also where this rank has no pair of it
+                law.place(self.local_sliders(rest.sliders)[k])
+
+    def sliders(self) -> dict[str, Array]:
+        """Where the sliders of each contact with a memory stand at rest [m], (n_pairs, n_tangents). Collective."""
+        found = {}
+        for k, (contact, law) in enumerate(zip(self.contacts, self._laws)):
+            if contact.info.memory:
+                local = np.array(law.sliders).reshape(_tangents(contact), len(self._pairs[k]))
+                found[contact.name] = self.share_pairs(k, local).T.copy()
+        return found
+
+    def local_sliders(self, sliders: Mapping[str, Array]) -> list[list[float]]:
+        """Those of this rank's pairs, contact by contact, as the core takes them."""
+        named = {contact.name: contact for contact in self.contacts if contact.info.memory}
+        if set(sliders) != set(named):
+            fix = "give (n_pairs, n_tangents) of each"
+            raise InputError("sliders at rest are of other contacts", None, list(sliders), list(named), fix)
+        out: list[list[float]] = []
+        for k, contact in enumerate(self.contacts):
+            if contact.name not in named:
+                out.append([])
+                continue
+            pairs = np.shape(by_sector(contact.B)[0])[0] // contact.components
+            given, wanted = np.asarray(sliders[contact.name], dtype=float), (pairs, _tangents(contact))
+            if given.shape != wanted or not np.isfinite(given).all():
+                where = f"contact '{contact.name}'"
+                raise InputError(
+                    "sliders at rest do not fit", where, given.shape, f"{wanted}, finite", "one row a pair"
+                )
+            out.append(given[self._pairs[k]].T.ravel().tolist())
+        return out
 
     def __repr__(self) -> str:
         wave = f", wave of {self.nodal_diameter} nodal diameters on {self.sectors} sectors" if self.sectors > 1 else ""

@@ -45,13 +45,15 @@ class LinearMode:
         return self.omega / (2 * np.pi)
 
 
-def linear_modes(model: Model, count: int = 6, contact: str = "stuck") -> list[LinearMode]:
-    """Lowest linear modes, by SLEPc. Collective.
+def linear_modes(model: Model, count: int = 6, contact: str = "stuck", near: float | None = None) -> list[LinearMode]:
+    """Lowest linear modes, or those nearest to a frequency, in ascending order, by SLEPc. Collective.
 
     Parameters
     ----------
     contact : {"stuck", "free", "linearised"}
         Closed contact without slip; no contact force; the laws' tangents at rest (damped, with C).
+    near : float [rad/s], optional
+        By shift-invert there.
 
     Raises
     ------
@@ -60,14 +62,17 @@ def linear_modes(model: Model, count: int = 6, contact: str = "stuck") -> list[L
 
     Notes
     -----
-    Stuck and free modes below the last are counted by the negative pivots of K - omega^2 M (Sylvester), so that no copy
-    of a double mode and no member of a family is left out.
+    Stuck and free modes below the last (nearer than the farthest) are counted by the negative pivots of K - omega^2 M
+    (Sylvester), so that no copy of a double mode and no member of a family is left out.
 
     Of one sector: the waves of the model's nodal diameter (`fretwave.cyclic.sector` says which way they run).
     """
     if contact not in ("stuck", "free", "linearised"):
         raise InputError("unknown state of contact", None, contact, "stuck, free or linearised", 'use contact="stuck"')
-    found = _core.linear_modes(model.core, count, getattr(_core.ContactState, contact))
+    if near is not None and (contact == "linearised" or not near > 0):
+        given, fix = f"near={near}, contact={contact}", "give a frequency above 0, and stuck or free contact"
+        raise InputError("modes near a frequency are those without damping", None, given, "near > 0 [rad/s]", fix)
+    found = _core.linear_modes(model.core, count, getattr(_core.ContactState, contact), near)
     shapes = [_whole(model, re) + 1j * _whole(model, im) for _, _, re, im in found]
     for _, _, *parts in found:
         for part in parts:

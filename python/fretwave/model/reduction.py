@@ -239,7 +239,7 @@ class Reduction:
         stiffness = K.copy()
         stiffness.axpy(1.0, stiff)
         core = _core.Model([(stiffness, 0, 0), (M, 2, 0)], [], 0.0)
-        modes = _core.linear_modes(core, count, _core.ContactState.free)
+        modes = _core.linear_modes(core, count, _core.ContactState.free, None)
         for mat in (stiff, stiffness):
             mat.destroy()
         return np.array([omega for omega, *_ in modes]) / (2 * np.pi)

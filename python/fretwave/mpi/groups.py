@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar, Union
+from typing import TYPE_CHECKING, Any, TypeVar, Union, cast
 from zipfile import BadZipFile
 
 import numpy as np
@@ -68,7 +68,7 @@ class Kept:
 def run(
     comm: MPI.Comm,
     tasks: Sequence[Task],
-    work: Callable[[Task, Any], Any],
+    work: Callable[[Task, MPI.Comm], Any],
     n_groups: int | None = None,
     kept: Kept | None = None,
 ) -> list[Any]:
@@ -136,7 +136,7 @@ def _loaded(kept: Kept | None, count: int) -> dict[int, Any]:
     return {number: result for number, result in found.items() if result is not None}
 
 
-def _attempt(work: Callable[[Task, Any], Any], task: Task, group: MPI.Comm) -> Union[Any, FretwaveError]:
+def _attempt(work: Callable[[Task, MPI.Comm], Any], task: Task, group: MPI.Comm) -> Union[Any, FretwaveError]:
     """The result of a task, or the error that it ended in on every rank; an error of some ranks alone is raised."""
     try:
         return work(task, group)
@@ -155,14 +155,14 @@ class _Queue:
         None for a queue with one caller. Collective.
     """
 
-    def __init__(self, comm: Any) -> None:
+    def __init__(self, comm: MPI.Comm | None) -> None:
         self._window: Any = None
         self._next = -1
         if comm is None:
             return
         from mpi4py import MPI
 
-        self._window = MPI.Win.Allocate(8 * (comm.rank == 0), 8, comm=comm)
+        self._window = MPI.Win.Allocate(8 * (comm.rank == 0), 8, comm=cast("MPI.Intracomm", comm))
         if comm.rank == 0:
             self._window.Lock(0)
             np.frombuffer(self._window.tomemory(), "i8")[:] = 0

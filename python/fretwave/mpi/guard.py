@@ -20,7 +20,6 @@ from ..files.whole import file_error
 if TYPE_CHECKING:
     from mpi4py import MPI
 
-
 Result = TypeVar("Result")
 
 #: How long a failed rank waits for the others to fail too before it ends them [s].
@@ -31,12 +30,13 @@ RANK_DELAY = 0.25
 TRACEBACK = "FRETWAVE_TRACEBACK"
 
 
-def world() -> Any:
+def world() -> MPI.Comm | None:
     """``MPI.COMM_WORLD``, or None where MPI is not running (so that ``--help`` never starts it)."""
     module = sys.modules.get("mpi4py.MPI")
     if module is None or not module.Is_initialized() or module.Is_finalized():
         return None
-    return module.COMM_WORLD
+    comm: MPI.Comm = module.COMM_WORLD
+    return comm
 
 
 def launched_rank() -> int:

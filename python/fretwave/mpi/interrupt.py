@@ -14,7 +14,6 @@ from ..texts import display
 if TYPE_CHECKING:
     from mpi4py import MPI
 
-
 #: mpirun is given this long to read the last words [s]; it ends its ranks a second after it was told to end.
 LAST_WAIT = 0.4
 #: The progress bar hides the cursor.

@@ -139,9 +139,8 @@ class _Solver:
                 start=start.mode,
                 prefix="study_",
                 avoid=start.avoid,
+                rest=start.rest,
             )
-            if start.rest is not None:
-                problem.preload(start.rest.displacement, start.rest.load)
             try:
                 return self._follow(problem)
             finally:

@@ -224,10 +224,8 @@ class _Solver:
         mode, a, unit = context.analysis, self.analysis, self.unit
         start, rest = start_mode(context, mode.linear_mode)
         problem = NonlinearMode(
-            self.model, retained(context), mode.method, self.case.dof(mode.normalise), start, context.prefix
+            self.model, retained(context), mode.method, self.case.dof(mode.normalise), start, context.prefix, rest=rest
         )
-        if rest is not None:
-            problem.preload(rest.displacement, rest.load)
         areas = wear_areas(self.case)
         with problem, WornMode(problem, a.coefficient, areas) as worn:
             y = problem.core.unknowns()

@@ -22,7 +22,10 @@ from .table import Table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from mpi4py import MPI
+    from petsc4py import PETSc
 
+    from ..hb.problems import HarmonicProblem
     from .unknowns import Unknowns
 
 Array = npt.NDArray[np.float64]
@@ -67,7 +70,7 @@ class Branch(Table):
         missed: Sequence[str] = (),
         started: str = "",
         unknowns: Unknowns | None = None,
-        comm: Any = None,
+        comm: MPI.Comm | None = None,
     ) -> None:
         super().__init__(columns, values)
         self.meaning, self.curves = meaning, curves
@@ -123,7 +126,18 @@ class Branch(Table):
     def _curve(self) -> Curve:
         return Curve(self, self.meaning, self.curves)
 
-    def unknowns(self, place: float) -> Any:
+    @property
+    def problem(self) -> HarmonicProblem:
+        """What it is a branch of.
+
+        Raises
+        ------
+        InputError
+            As of `unknowns`.
+        """
+        return self._kept().problem
+
+    def unknowns(self, place: float) -> PETSc.Vec:
         """Unknowns y at a place (`at`, or a row's number), a Vec of the caller's: where Newton may start. Collective.
 
         Raises
@@ -140,6 +154,29 @@ class Branch(Table):
         found: Array | None = kept.problem.coefficients(y)
         y.destroy()
         return found
+
+    def shape(self, place: float, order: int = 1) -> npt.NDArray[np.complex128]:
+        """Complex amplitudes q_n (n_dof,) [m] of a harmonic at a place, on every rank. Collective.
+
+        x = Re sum q_n e^{i n tau}.
+
+        Raises
+        ------
+        InputError
+            The harmonic is not retained, or as of `unknowns`.
+        """
+        kept = self._kept()
+        labels, Q = kept.problem.harmonics.labels, self.coefficients(place)
+        first = str(order) if order == 0 else f"{order}c"
+        if first not in labels:
+            raise InputError("this harmonic is not retained", None, order, ", ".join(labels), "take one that is")
+        Q = kept.problem.model.comm.bcast(Q)
+        column = labels.index(first)
+        return np.asarray(Q[:, column] - (1j * Q[:, column + 1] if order else 0))
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Unknowns stay where they are: a branch travels between ranks without them."""
+        return {**self.__dict__, "_unknowns": None, "_comm": None}
 
     def plot(self) -> Figure:
         """Frequency and damping over amplitude of a mode, amplitude and phase over frequency of a response.

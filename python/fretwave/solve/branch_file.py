@@ -58,13 +58,14 @@ def read(kind: Callable[..., Branch], path: Path) -> Branch:
         with h5py.File(path, "r") as file:
             found = dict(file.attrs)
             values = {name: file[name][()] for name in file}
+            said = {name: (str(file[name].attrs.get("units")), str(file[name].attrs.get("long_name"))) for name in file}
     except OSError as error:
         text = " ".join(str(error).split())
         raise InputError("there is no branch to read", str(path), text, None, "give a file of Branch.save") from None
     if found.get("format") != FORMAT:
         measured = str(found.get("format", "another format"))
         raise InputError("the file holds no branch", str(path), measured, FORMAT, "give a file of Branch.save")
-    columns = [COLUMNS[name] for name in json.loads(found["columns"])]
+    columns = [COLUMNS.get(name) or Column(name, *said[name]) for name in json.loads(found["columns"])]
     values["event"] = np.array([text.decode() for text in values["event"]], dtype=str)
     return kind(
         columns,

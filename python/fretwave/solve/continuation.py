@@ -262,4 +262,5 @@ class Continuation:
 
     def destroy(self) -> None:
         """Free the solver. Collective."""
-        self._core, self._last, self._over = None, None, True
+        self._last, self._over = None, True
+        self._core = None

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from petsc4py import PETSc
 
 from ..columns import FORCED, MODE, columns_named
 from ..errors import InputError
-from ..hb.problems import HarmonicProblem
+from ..hb.observe import Observer
+from ..hb.problems import HarmonicProblem, Observed
 from .branch import Branch
 from .continuation import Continuation, Point
 from .steps import StepControl
@@ -20,12 +22,13 @@ from .unknowns import Unknowns
 
 def follow(
     problem: HarmonicProblem,
-    start: Any,
+    start: float | PETSc.Vec,
     stop: float | tuple[float, float],
     *,
     steps: StepControl | None = None,
     report_at: Sequence[float] = (),
     unknowns: bool = True,
+    observe: Mapping[str, Observed | str] | None = None,
     tell: Callable[[dict[str, Any]], None] | None = None,
 ) -> Branch:
     """Follow a nonlinear mode over its amplitude, or a forced response over its frequency. Collective.
@@ -45,6 +48,9 @@ def follow(
     unknowns : bool
         Keep the unknowns of all points (2 x 8 bytes for each of every point's), for `Branch.unknowns` and
         `Branch.coefficients`.
+    observe : dict, optional
+        Further columns by name: the fundamental's amplitude of a dof, of a row (n_dof,) or of a linear mode's
+        coordinate, or "energy", the mechanical energy of the vibration, mean over a period [J].
     tell : callable, optional
         Given every row when it is found, on every rank: a dict by column, with the other `diagnostics`.
 
@@ -77,19 +83,21 @@ def follow(
     if problem.meaning is None:
         given, fix = type(problem).__name__, "follow it with fw.Continuation"
         raise InputError("the problem has no branch with a table", None, given, "NonlinearMode or ForcedResponse", fix)
-    own = hasattr(start, "getArray")
-    y0 = start if own else problem.initial(float(start))
+    own = isinstance(start, PETSc.Vec)
+    y0: PETSc.Vec = start if own else problem.initial(float(start))
     first = problem.core.parameter_value(problem.last_entry(y0)) if own else float(start)
     low, high, upwards = _range(first, stop)
     continuation = Continuation(problem, y0, (low, high), steps, report_at, upwards)
     kept = Unknowns(problem, unknowns)
     trace = Trace(problem, kept)
+    observer = Observer(problem, observe or {})
     rows: list[dict[str, Any]] = []
     knots: list[Knot] = []
     for point in points_of(continuation):
         knots.append(trace.add(point.y, point.tangent))
         # each rank has measured its own wall time
-        rows.append(problem.model.comm.bcast(row_of(problem, point, len(rows))))
+        seen = observer(point.y) if observe else {}
+        rows.append(problem.model.comm.bcast({**row_of(problem, point, len(rows)), **seen}))
         if tell is not None:
             tell(rows[-1])
     ended = continuation.converged, continuation.reason, continuation.missed, continuation.started
@@ -97,7 +105,7 @@ def follow(
     trace.close()
     if not own:
         y0.destroy()
-    columns = columns_named(MODE if problem.meaning.kind == "mode" else FORCED)
+    columns = [*columns_named(MODE if problem.meaning.kind == "mode" else FORCED), *observer.columns]
     table = Table.of_rows(columns, rows)
     values = {name: table[name] for name in table.names}
     curves = cubic_of(knots)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +14,8 @@ from ..hb.problems import HarmonicProblem, Harmonics
 from ..hb.suspects import suspects
 from ..model.laws import own_load
 from ..model.model import Model
-from ..model.modes import LinearMode
+from ..model.modes import LinearMode, linear_modes
+from ..model.rest import Rest
 from .continuation import Continuation
 from .steps import StepControl
 
@@ -28,30 +29,6 @@ FIRST_FACTOR = 1e-2
 
 #: A tangent with less load than this (displacement and load are of one size) is a motion that nothing holds.
 UNHELD = 1e-10
-
-
-@dataclass(frozen=True)
-class Preload:
-    """A solved static state; the model's laws have it as their rest state.
-
-    Attributes
-    ----------
-    displacement : (n_dof,) on every rank
-    load : (n_dof,) the static load it balances, contact included
-    stick, slip, open : shares of the pairs
-    imbalance : what the solver left of the load, relative to it
-    contacts : list of dict, on rank 0
-        Relative displacement u and force f (components, n_pairs) of each contact, and what its law says of each
-        pair: status (stick 0, slip 1, open 2) and gap [m].
-    """
-
-    displacement: Array
-    load: Array
-    stick: float
-    slip: float
-    open: float
-    imbalance: float = 0.0
-    contacts: list[dict[str, Array]] | None = None
 
 
 class StaticPreload(HarmonicProblem):
@@ -96,23 +73,40 @@ class StaticPreload(HarmonicProblem):
         return y
 
 
-def balanced(model: Model, reference: LinearMode) -> Preload:
-    """Normal loads given pair by pair are in balance as they are: no displacement, the load is B^T f(0). Collective."""
-    problem = StaticPreload(model, np.zeros(model.n_dof), reference)
+def balanced(model: Model, reference: LinearMode | None = None) -> Rest:
+    """Normal loads given pair by pair are in balance as they are: no displacement, the load is B^T f(0). Collective.
+
+    Parameters
+    ----------
+    reference : LinearMode, optional
+        Scales the unknowns; by default the lowest one with stuck contact.
+    """
+    problem = StaticPreload(model, np.zeros(model.n_dof), reference or linear_modes(model, 1)[0])
     y = problem.core.initial()
     problem.core.settle(y)  # sliders of a state solved before must not act on this one
     return _settled(problem, y, np.zeros(model.n_dof))
 
 
 def static_preload(
-    model: Model, load: Array, reference: LinearMode, steps: StepControl | None = None, closed: Array | None = None
-) -> Preload:
+    model: Model,
+    load: Array,
+    reference: LinearMode | None = None,
+    steps: StepControl | None = None,
+    closed: Array | None = None,
+    sliders: Mapping[str, Array] | None = None,
+) -> Rest:
     """Static equilibrium under `load` and the normal loads given pair by pair. Collective.
 
-    By continuation in the load factor, from the unloaded state.
+    By continuation in the load factor, from the unloaded state. The model's laws have it as their rest state.
 
     Parameters
     ----------
+    load : (n_dof,) [N]
+    reference : LinearMode, optional
+        Scales the unknowns; by default the lowest one with stuck contact.
+    sliders : dict, optional
+        Contact name -> (n_pairs, n_tangents) [m], where the sliders stand before the load comes: a history. By default
+        at zero.
     closed : (n_dof,), optional
         Displacement under the full load with all pairs closed: start from a small share of it. For pairs that just
         touch when unloaded: a structure that they alone hold has no stiffness there.
@@ -123,8 +117,12 @@ def static_preload(
         With the load factor that was reached.
     """
     load = np.asarray(load, dtype=float)
+    reference = reference or linear_modes(model, 1)[0]
     rest = balanced(model, reference)
     problem = StaticPreload(model, load, reference, rest.load)
+    history = None if sliders is None else model.local_sliders(sliders)
+    if history is not None:
+        problem.core.stand(history)
     control = steps or StepControl(initial=0.1, maximum=0.5)
     start = problem.core.initial() if closed is None else problem.at(FIRST_FACTOR * closed, FIRST_FACTOR)
     y, reached, branch = None, 0.0, Continuation(problem, start, (-1.0, 1.0), control, upwards=True)
@@ -135,7 +133,7 @@ def static_preload(
             reason = "the structure moves without load: nothing holds it in some direction"
             break
     if branch.converged:
-        return _settled(problem, y, rest.load + load)
+        return _settled(problem, y, rest.load + load, history)
     raise NotConverged(
         "no static equilibrium under the full load",
         None,
@@ -145,7 +143,7 @@ def static_preload(
     )
 
 
-def _settled(problem: StaticPreload, y: PETSc.Vec, load: Array) -> Preload:
+def _settled(problem: StaticPreload, y: PETSc.Vec, load: Array, history: list[list[float]] | None = None) -> Rest:
     """The laws take the state at y as theirs; the load is what the state balances, Newton's rest included.
 
     That rest, small beside the load, would be large beside the forces of a small motion.
@@ -157,10 +155,11 @@ def _settled(problem: StaticPreload, y: PETSc.Vec, load: Array) -> Preload:
     periods = problem.contact_history(y)
     on_first = problem.model.comm.rank == 0
     contacts = [{key: np.asarray(c[key])[0] for key in TOLD} for c in periods] if on_first else None
-    problem.core.settle(y)
     blocks = _whole(problem.model, problem.core.coefficients(y))
+    problem.core.settle(y, history or [])
     imbalance = float(np.linalg.norm(rest)) / size
-    return Preload(blocks, load, contact["stick"], contact["slip"], contact["open"], imbalance, contacts)
+    sliders = problem.model.sliders()
+    return Rest(blocks, load, sliders, contact["stick"], contact["slip"], contact["open"], imbalance, contacts)
 
 
 def _whole(model: Model, v: PETSc.Vec) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from petsc4py import PETSc
 
@@ -11,6 +11,9 @@ from .. import _core
 from ..hb.problems import ForcedResponse, HarmonicProblem, NonlinearMode
 from ..model.laws import Role
 from .steps import StepControl
+
+if TYPE_CHECKING:
+    from .continuation import Continuation
 
 #: Amplitudes below the first one, each a hundredth of the one before, at which a mode is tried.
 SMALLER = 5
@@ -86,9 +89,9 @@ def _closed(follow: Follow, problem: HarmonicProblem, way: Any, reasons: list[st
 def _mode_start(problem: NonlinearMode, y0: PETSc.Vec) -> Any:
     """The way with closing gaps at the amplitude of y0. Collective."""
     method, amplitude = getattr(_core.Method, problem.method), _parameter(problem, y0)
-    shape = [problem.model.vector(part) for part in (problem.start.shape, problem.start.imaginary)]
+    re, im = (problem.model.vector(part) for part in (problem.start.shape, problem.start.imaginary))
     model, harmonics = problem.model.core, problem.harmonics.core
-    way = _core.ModeStart(model, harmonics, method, problem.dof, problem.start.omega, *shape, amplitude)
+    way = _core.ModeStart(model, harmonics, method, problem.row, problem.start.omega, re, im, amplitude)
     way.keep_loads(problem.core)
     return way
 
@@ -137,7 +140,7 @@ def _grown(
     reasons.append(f"{NONE} at {SMALLER} smaller amplitudes down to {small:.3g}")
 
 
-def _last(branch: Any, nearby: bool = False) -> tuple[PETSc.Vec | None, int]:
+def _last(branch: Continuation, nearby: bool = False) -> tuple[PETSc.Vec | None, int]:
     """Unknowns of the last point of a branch, and the number of its points. Collective.
 
     Parameters

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 from .. import _core
 
@@ -26,7 +25,7 @@ class StepControl:
     max_error: float = 5e-4
     max_points: int = 5000
 
-    def core(self) -> Any:
+    def core(self) -> _core.StepControl:
         """The compiled twin."""
         steps = _core.StepControl()
         for name, value in vars(self).items():

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from .hermite import between, derivatives, piece, slopes
+
+if TYPE_CHECKING:
+    from petsc4py import PETSc
+
+    from ..hb.problems import HarmonicProblem
 
 Array = npt.NDArray[np.float64]
 
@@ -26,7 +31,7 @@ class Unknowns:
         Of each step, the factors that make its two tangents derivatives (`hermite.slopes`).
     """
 
-    def __init__(self, problem: Any, keep: bool) -> None:
+    def __init__(self, problem: HarmonicProblem, keep: bool) -> None:
         self.problem, self.keep = problem, keep
         self.y: list[Array] = []
         self.tangents: list[Array] = []
@@ -34,7 +39,7 @@ class Unknowns:
         self._row = np.empty(0)
         self._weights = problem.core.unknowns()
 
-    def add(self, y: Any, tangent: Any) -> None:
+    def add(self, y: PETSc.Vec, tangent: PETSc.Vec) -> None:
         """The next point. Collective."""
         y_here, t_here = y.getArray(readonly=True).copy(), tangent.getArray(readonly=True).copy()
         if self.y:
@@ -52,7 +57,7 @@ class Unknowns:
         """No more points. Collective."""
         self._weights.destroy()
 
-    def vector(self, place: float) -> Any:
+    def vector(self, place: float) -> PETSc.Vec:
         """Unknowns at a place. Collective."""
         i, x = piece(place, len(self.y))
         values = self.y[i]

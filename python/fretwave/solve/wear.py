@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -59,6 +58,11 @@ class WearPoint:
     newton: int
     linear: int
 
+    def __repr__(self) -> str:
+        what = f" {self.event}" if self.event else ""
+        deepest = float(self.state.depth.max(initial=0.0))
+        return f"WearPoint({self.cycles:.6g} cycles{what}: {deepest:.3g} m at most, step error {self.error:.1e})"
+
 
 class Wear:
     """Marches dw/d eta = (k_w / I) g(y(w)) over wear cycles eta at fixed amplitude (eqs. 13 and 14). Collective.
@@ -89,7 +93,7 @@ class Wear:
         at: float = 0.0,
         step: float | None = None,
         load_scale: float | None = None,
-        outcome: Sequence[Any] = (0, 0, 0.0),
+        outcome: tuple[int, int, float] = (0, 0, 0.0),
     ) -> None:
         self.mode, self.control, self.cycles = mode, control or WearControl(), cycles
         if self.control.stepper not in STEPPERS:

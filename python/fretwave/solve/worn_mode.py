@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -73,13 +72,7 @@ class WornMode:
         self.areas = np.concatenate([np.asarray(areas[names[k]], dtype=float) for k in self.contacts])
         sizes = [len(areas[names[k]]) for k in self.contacts]
         self.slices = [slice(end - size, end) for size, end in zip(sizes, np.cumsum(sizes))]
-        # makes worn depth a loss of normal load
-        self.stiffness = np.concatenate(
-            [
-                np.broadcast_to(np.asarray(self.model.contacts[k].value(Role.NORMAL_STIFFNESS), float), (size,))
-                for k, size in zip(self.contacts, sizes)
-            ]
-        )
+        self.stiffness = self._values(Role.NORMAL_STIFFNESS)  # makes worn depth a loss of normal load
         self._newton = _core.Newton(problem.core, problem.prefix, past_kinks=False)
         rtol, atol, stol, most = self._newton.snes.getTolerances()
         self._newton.snes.setTolerances(rtol, SHARPER * atol, stol, most)
@@ -114,7 +107,7 @@ class WornMode:
         """The contacts have these depths (n_pairs,) from now on."""
         self.problem.core.wear(self._local(depth))
 
-    def measure(self, y: PETSc.Vec, depth: Array, outcome: Sequence[Any] = (0, 0, 0.0)) -> WornState:
+    def measure(self, y: PETSc.Vec, depth: Array, outcome: tuple[int, int, float] = (0, 0, 0.0)) -> WornState:
         """Rates and loads of a converged motion at these depths."""
         found = self.problem.core.wearing(y)
         archard, load, slip, opened = (
@@ -122,6 +115,34 @@ class WornMode:
             for which in range(4)
         )
         return WornState(y, depth, self.coefficient / self.areas * archard, load, slip, opened, *outcome)
+
+    def normal_cycle(self, load: Array) -> float:
+        """Vibration cycles in which sliding four stick limits mu N0/kt a cycle leaves 1/e of a normal load.
+
+        N' = -kn k_w/I N s with s = 4 mu N0/kt, in means over the loaded pairs; 1 where nothing can wear.
+
+        Parameters
+        ----------
+        load : (n_pairs,) [N]
+            Of the new surfaces.
+        """
+        loaded = load > 0
+        if not loaded.any():
+            return 1.0
+        friction, stiffness = (
+            self._values(role)[loaded] for role in (Role.FRICTION_COEFFICIENT, Role.TANGENTIAL_STIFFNESS)
+        )
+        slip = 4 * np.mean(friction * load[loaded] / stiffness)
+        rate = self.coefficient * np.mean(self.stiffness[loaded] / self.areas[loaded]) * slip
+        return float(1 / rate) if rate > 0 else 1.0
+
+    def _values(self, role: Role) -> Array:
+        """Of all wearing pairs."""
+        parts = [
+            np.broadcast_to(np.asarray(self.model.contacts[k].value(role), float), (part.stop - part.start,))
+            for k, part in zip(self.contacts, self.slices)
+        ]
+        return np.concatenate(parts)
 
     def solve(self, depth: Array, guess: PETSc.Vec) -> WornState:
         """The mode at these depths and the amplitude of the guess, which is kept.

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 
     from ...hb.problems import HarmonicProblem, Harmonics, NonlinearMode
     from ...model.modes import LinearMode
+    from ...model.rest import Rest
     from ...solve.continuation import Continuation, Point
-    from ...solve.preload import Preload
     from ...solve.steps import StepControl
     from ..flutter import FlutterAnalysis
     from ..mode import ModeAnalysis
@@ -106,7 +106,7 @@ def mode_problem(
     context: AnalysisContext[ModeLike],
     harmonics: Harmonics,
     mode: LinearMode,
-    rest: Optional[Preload],
+    rest: Optional[Rest],
     dof: Optional[int] = None,
     avoid: Optional[npt.NDArray[np.complex128]] = None,
 ) -> NonlinearMode:
@@ -122,10 +122,7 @@ def mode_problem(
 
     analysis = context.analysis
     number = context.case.dof(analysis.normalise) if dof is None else dof
-    problem = NonlinearMode(context.model, harmonics, analysis.method, number, mode, context.prefix, avoid)
-    if rest is not None:
-        problem.preload(rest.displacement, rest.load)
-    return problem
+    return NonlinearMode(context.model, harmonics, analysis.method, number, mode, context.prefix, avoid, rest)
 
 
 def tell(context: AnalysisContext[AnalysisSection], branch: Continuation, name: str = "") -> None:

@@ -245,17 +245,22 @@ class AnalysisContext(Generic[Section]):
                 )
             return what(file[name])
 
-    def linear_mode(self, contact: str, count: int = 1) -> list[LinearMode]:
-        """Linear modes with the contact ``stuck`` or ``free``, without forces of the flow. Collective."""
+    def linear_mode(self, contact: str, count: int = 1, near: float | None = None) -> list[LinearMode]:
+        """Linear modes, the contact ``stuck`` or ``free``, without forces of the flow. Collective.
+
+        Parameters
+        ----------
+        near : frequency [rad/s] that they are nearest to, in place of the lowest
+        """
         from ...model.modes import linear_modes
 
         if not with_flow_forces(self.analysis):
-            return linear_modes(self.model, count=count, contact=contact)
+            return linear_modes(self.model, count, contact, near)
         from ...case.build import build_model
 
         preload, diameters = self.case.preload_of(self.analysis), nodal_diameter(self.analysis)
         with build_model(self.case, (), self.comm, preload, diameters) as structure:
-            return linear_modes(structure, count=count, contact=contact)
+            return linear_modes(structure, count, contact, near)
 
 
 def _columns(group: h5py.Group) -> dict[str, Any]:

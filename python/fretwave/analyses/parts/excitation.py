@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 
     from ...hb.problems import ForcedResponse, HarmonicProblem, Harmonics
     from ...model.modes import LinearMode
+    from ...model.rest import Rest
     from ...solve.continuation import Continuation
-    from ...solve.preload import Preload
     from ..forced import ForcedAnalysis
 
 
@@ -37,7 +37,7 @@ class Excitation:
     ----------
     reference : LinearMode
         Scales the unknowns.
-    rest : Preload or None
+    rest : Rest or None
     phase : float or None
         Of the last point of the response [rad]: the next one's is the nearest to it, no jump by 2 pi.
     """
@@ -45,7 +45,7 @@ class Excitation:
     context: AnalysisContext[ForcedAnalysis]
     harmonics: Harmonics
     reference: LinearMode
-    rest: Optional[Preload]
+    rest: Optional[Rest]
     phase: float | None = None
 
     @property
@@ -67,7 +67,7 @@ class Excitation:
         from ...hb.problems import ForcedResponse
 
         case = self.context.case
-        problem = ForcedResponse(
+        return ForcedResponse(
             self.context.model,
             self.harmonics,
             force={1: self.force()},
@@ -75,10 +75,8 @@ class Excitation:
             dof=case.dof(self.analysis.observe, self.analysis.sector or 0),
             reference=self.reference,
             prefix=self.context.prefix,
+            rest=self.rest,
         )
-        if self.rest is not None:
-            problem.preload(self.rest.displacement, self.rest.load)
-        return problem
 
     def branch(
         self, problem: ForcedResponse, snapshot: Optional[dict[str, Any]] = None, go_on: bool = False

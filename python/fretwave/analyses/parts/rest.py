@@ -22,19 +22,19 @@ from .context import AnalysisContext
 if TYPE_CHECKING:
     from ...hb.problems import Harmonics
     from ...model.modes import LinearMode
+    from ...model.rest import Rest
     from ...results.results import AnalysisWriter
-    from ...solve.preload import Preload
 
 #: A mode below this share of the first frequency with closed contact is a rigid motion.
 RIGID = 1e-6
 
 
-def rest_state(context: AnalysisContext[AnalysisSection]) -> Optional[Preload]:
+def rest_state(context: AnalysisContext[AnalysisSection]) -> Optional[Rest]:
     """Solve the preload of an analysis; the contact laws take it as their rest state. Collective.
 
     Returns
     -------
-    Preload or None
+    Rest or None
         None when there is no preload.
 
     Raises
@@ -45,7 +45,7 @@ def rest_state(context: AnalysisContext[AnalysisSection]) -> Optional[Preload]:
     return None if context.case.preload_of(context.analysis) is None else loaded_state(context)
 
 
-def loaded_state(context: AnalysisContext[AnalysisSection], factor: float = 1.0) -> Preload:
+def loaded_state(context: AnalysisContext[AnalysisSection], factor: float = 1.0) -> Rest:
     """The same also without [preload], where the pairs' own loads act alone. Collective.
 
     Parameters
@@ -91,7 +91,7 @@ def closed_mode(context: AnalysisContext[AnalysisSection]) -> LinearMode:
 
 def start_mode(
     context: AnalysisContext[AnalysisSection], linear_mode: int, or_free: bool = False
-) -> tuple[LinearMode, Optional[Preload]]:
+) -> tuple[LinearMode, Optional[Rest]]:
     """The linear mode with the contact as it is at rest, stuck, and the rest state (or None). Collective.
 
     Parameters

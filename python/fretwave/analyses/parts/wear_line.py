@@ -168,24 +168,15 @@ class _Marcher:
 
     def _record(self, march: Wear, point: WearPoint, wall: float) -> dict[str, Any]:
         """One row. Collective."""
+        from ...solve.wear_march import wear_row
+
         y, state = point.state.y, point.state
-        energy, per_contact = self.problem.energy(y), self._per_contact(state)
+        per_contact = self._per_contact(state)
         row: dict[str, Value] = {
-            **self.problem.state(y),
-            **self.problem.diagnostics(y),
+            **wear_row(self.problem, point, self.unit),
             "point": self.writer.rows,
             "line": self.line.number,
-            "cycles": point.cycles / self.unit,
-            "vibrations": point.cycles,
-            "step": point.step / self.unit,
-            "work": energy["contact"],
-            "energy_error": energy["error"],
-            "step_error": point.error,
-            "residual": state.residual,
-            "newton": point.newton,
-            "linear": point.linear,
             "wall_s": wall,
-            "event": point.event,
         }
         areas = wear_areas(self.case)
         for number, (_, name, mask) in enumerate(self.faces, 1):

@@ -1,14 +1,6 @@
 """What a motion of a whole wheel looks like around the wheel, in numbers.
 
-Of the fundamental amplitudes a_j (complex) of one dof in all sectors j = 0 .. N - 1, and the fundamental q of all:
-
-* wave content c_n = (1/N) sum_j a_j e^{2 pi i n j / N}, as a wave of n nodal diameters is a_j = c_n e^{-2 pi i n j / N}
-  (`fretwave.cyclic.sector`); sum_n |c_n|^2 is the mean of |a_j|^2;
-* participation ratio (sum |a_j|^2)^2 / (N sum |a_j|^4): 1 for a travelling wave, 2/3 for a standing one, 1/N when one
-  sector moves alone (Bell and Dean, Discuss. Faraday Soc. 50, 1970);
-* amplification max |a_j| / b, with b the same in the tuned travelling linear wave that has the modal energy of this
-  motion, q^H M q: 1 for that wave, sqrt(2) for a standing one, at most sqrt(N) when a_j carries all of the energy.
-  (For the *forced* response to an engine order Whitehead, J. Mech. Eng. Sci. 8, 1966, has (1 + sqrt(N)) / 2.)
+The numbers are those of `fretwave.cyclic.wheel_shape`.
 """
 
 from __future__ import annotations
@@ -20,8 +12,9 @@ import numpy.typing as npt
 
 from ...columns import Column
 from ...cyclic.engine_order import folded
+from ...cyclic.wheel_shape import WheelShape as Shape
 from ...post.motion import complex_amplitudes
-from ...post.wave_content import participation, phases, wave_content
+from ...post.wave_content import phases, wave_content
 from .context import AnalysisContext
 
 if TYPE_CHECKING:
@@ -72,8 +65,8 @@ class WheelShape:
     def __init__(
         self, context: AnalysisContext[AnalysisSection], dof: str, tuned_amplitude: float, mode: LinearMode
     ) -> None:
-        self.wheel, self.M, self.tuned = context.wheel, context.case.M, tuned_amplitude
-        self.dof = context.tuned.dof(dof)
+        wheel, self.M = context.wheel, context.case.M
+        self.shape = Shape(self.M, wheel.sectors, context.tuned.dof(dof), tuned_amplitude)
         phi = mode.shape + 1j * mode.imaginary
         # what forces are measured in, per displacement (`reference_stiffness` of the core)
         self.stiffness = mode.omega**2 * np.real(phi.conj() @ (self.M @ phi)) / np.linalg.norm(phi) ** 2
@@ -84,20 +77,8 @@ class WheelShape:
         if coefficients is None:
             return {}
         q = complex_amplitudes(problem.harmonics.labels, coefficients)[1]
-        a = self.wheel.by_sector(q)[:, self.dof]
-        content = np.abs(wave_content(a)) ** 2
-        share = content / content.sum()
-        most = int(np.argmax(np.round(share, 9)))  # of a real shape forward and backward waves have equal shares
-        inertia = self.M @ q
-        held = self.stiffness * state["amplitude"] / (state["omega0"] ** 2 * np.linalg.norm(inertia))
-        return {
-            "amplification": float(np.abs(a).max() / (self.tuned * np.sqrt(np.real(q.conj() @ inertia)))),
-            "participation": participation(a),
-            "largest_sector": int(np.argmax(np.round(np.abs(a) / np.abs(a).max(), 9))),
-            "diameters": folded(most, self.wheel.sectors),
-            "diameters_share": float(share[most]),
-            "unfolding": float(held * np.linalg.norm(unfolding)),
-        }
+        held = self.stiffness * state["amplitude"] / (state["omega0"] ** 2 * np.linalg.norm(self.M @ q))
+        return {**self.shape(q), "unfolding": float(held * np.linalg.norm(unfolding))}
 
 
 def finish_wheel(context: AnalysisContext[ModeAnalysis], writer: AnalysisWriter, start: Start) -> list[str]:

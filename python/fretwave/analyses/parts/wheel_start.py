@@ -14,21 +14,20 @@ import scipy.sparse as sp
 
 from ...case.analysis import AnalysisSection
 from ...case.harmonic import HarmonicSection, nodal_diameter
-from .asymptotes import most_alike, other_asymptote
+from .asymptotes import most_alike as omega_most_alike
+from .asymptotes import other_asymptote
 from .context import AnalysisContext
 from .rest import rest_state, start_mode
 
 if TYPE_CHECKING:
     from ...model.modes import LinearMode
-    from ...solve.preload import Preload
+    from ...model.rest import Rest
     from ..mode import ModeAnalysis
 
 Harmonic = TypeVar("Harmonic", bound=HarmonicSection)
 
 Complex = npt.NDArray[np.complex128]
 
-#: Modes of a mistuned wheel whose shares in a tuned wave differ by less are alike in it: the lower one is taken.
-ALIKE = 1e-3
 #: Families of the tuned sector looked through for that of a wheel's mode, beyond its number over N.
 MORE_FAMILIES = 3
 
@@ -41,7 +40,7 @@ class Start:
     ----------
     mode : LinearMode
         Stuck.
-    rest : Preload or None
+    rest : Rest or None
     asymptotes : dict
         As `other_asymptote` gives them.
     dof : int
@@ -55,7 +54,7 @@ class Start:
     """
 
     mode: LinearMode
-    rest: Optional[Preload]
+    rest: Optional[Rest]
     asymptotes: dict[str, float]
     dof: int
     avoid: Optional[Complex] = None
@@ -152,26 +151,14 @@ def _family(context: AnalysisContext[ModeAnalysis], mode: LinearMode) -> ModeAna
 def _wave(
     context: AnalysisContext[ModeAnalysis], tuned: LinearMode, sector: int
 ) -> tuple[LinearMode, Optional[Complex]]:
-    """A wave of the tuned wheel, and the other of its pair (DESIGN fact 6).
-
-    Of a double mode, motions A phi + B conj(phi) with any A and B solve the linear equations. A travelling wave has
-    B = 0: it avoids conj(phi). A standing wave A = B e^{i alpha} has its crest somewhere; with phi real at the
-    normalised dof, Re(phi) has it there, and avoids Im(phi), the same wave moved by a quarter of its length.
-    """
-    from ...cyclic.sector import wave_mode
-    from ...model.modes import LinearMode
+    """A wave of the tuned wheel, and the other of its pair (DESIGN fact 6)."""
+    from ...cyclic.wheel_modes import standing_wave, travelling_wave
 
     analysis = context.analysis
-    wheel = context.wheel
-    mode = wave_mode(tuned, nodal_diameter(analysis), wheel.sectors)
-    if 2 * nodal_diameter(analysis) % wheel.sectors == 0:
-        return mode, None
-    phi = mode.shape + 1j * mode.imaginary
+    wheel, diameters = context.wheel, nodal_diameter(analysis)
     if analysis.wave == "travelling":
-        return mode, phi.conj()
-    crest = phi[context.case.dof(analysis.normalise, sector)]
-    phi *= np.sqrt(2) * abs(crest) / crest
-    return LinearMode(mode.omega, mode.beta, phi.real.copy(), np.zeros(len(phi))), phi.imag + 0j
+        return travelling_wave(tuned, diameters, wheel.sectors)
+    return standing_wave(tuned, diameters, wheel.sectors, context.tuned.dof(analysis.normalise), sector)
 
 
 def uneven_samples(samples: int, sectors: int, diameters: int) -> Optional[str]:
@@ -203,15 +190,12 @@ def _largest(context: AnalysisContext[ModeAnalysis], mode: LinearMode) -> int:
 def _most_alike(context: AnalysisContext[ModeAnalysis], tuned: LinearMode) -> LinearMode:
     """Of the N modes nearest in frequency the one with the largest share in the tuned pair's plane. Collective."""
     from ...cyclic.sector import wave_mode
+    from ...cyclic.wheel_modes import most_alike
 
     analysis = context.analysis
     wheel = context.wheel
     wave = wave_mode(tuned, nodal_diameter(analysis), wheel.sectors)
-    phi, M = wave.shape + 1j * wave.imaginary, context.case.M
-    modes = nearest_modes(context, tuned.omega, wheel.sectors)
-    shares = np.array([abs(phi.conj() @ (M @ mode.shape)) ** 2 for mode in modes])
-    alike = np.flatnonzero(shares > (1 - ALIKE) * shares.max())
-    return modes[int(alike[0])]
+    return most_alike(nearest_modes(context, tuned.omega, wheel.sectors), wave, context.case.M)
 
 
 def _free(context: AnalysisContext[ModeAnalysis], mode: LinearMode) -> dict[str, float]:
@@ -219,21 +203,11 @@ def _free(context: AnalysisContext[ModeAnalysis], mode: LinearMode) -> dict[str,
     if any(contact.components > 1 for contact in context.case.contacts) or not context.case.contacts:
         return {}
     free = nearest_modes(context, mode.omega, context.wheel.sectors, "free")
-    return {"free_omega": most_alike(context, free, mode)}
+    return {"free_omega": omega_most_alike(context, free, mode)}
 
 
 def nearest_modes(
     context: AnalysisContext[AnalysisSection], omega: float, count: int, contact: str = "stuck"
 ) -> list[LinearMode]:
-    """Linear modes nearest to a frequency, by shift-invert there, in ascending order. Collective."""
-    from petsc4py import PETSc
-
-    options, key = PETSc.Options(), "modes_eps_target"
-    given = options.getString(key, "")
-    options[key] = (1 - 1e-9) * omega**2  # not on an eigenvalue
-    try:
-        return context.linear_mode(contact, count)
-    finally:
-        options.delValue(key)
-        if given:
-            options[key] = given
+    """Linear modes nearest to a frequency, in ascending order. Collective."""
+    return context.linear_mode(contact, count, omega)

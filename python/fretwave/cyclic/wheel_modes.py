@@ -1,0 +1,92 @@
+"""Linear modes of a whole wheel to start from: waves of the tuned one, and modes of a mistuned one that are like them.
+
+Of a double mode of a tuned wheel, motions A phi + B conj(phi) with any A and B solve the linear equations. A travelling
+wave has B = 0, a standing one A = B e^{i alpha}. Nonlinear modes lose rank there at small amplitude unless the other
+one of the pair is avoided (`fretwave.NonlinearMode`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Optional
+
+import numpy as np
+import numpy.typing as npt
+
+from ..model.modes import LinearMode
+from ..model.sectors import around
+from .sector import Sector, wave_mode
+
+Array = npt.NDArray[np.float64]
+Complex = npt.NDArray[np.complex128]
+
+#: Modes of a mistuned wheel whose shares in a tuned wave differ by less are alike in it: the lower one is taken.
+ALIKE = 1e-3
+
+
+def travelling_wave(mode: LinearMode, nodal_diameter: int, sectors: int) -> tuple[LinearMode, Optional[Complex]]:
+    """A wave of a tuned sector as a mode of the wheel, and the one that runs the other way, to be avoided.
+
+    Parameters
+    ----------
+    mode : LinearMode
+        Of one sector in this wave.
+
+    Returns
+    -------
+    LinearMode, (N n_dof,) complex or None
+        None where the wave is no double mode (0 and N/2 nodal diameters).
+    """
+    phi = wave_mode(mode, nodal_diameter, sectors)
+    return phi, None if _single(nodal_diameter, sectors) else phi.shape - 1j * phi.imaginary
+
+
+def standing_wave(
+    mode: LinearMode, nodal_diameter: int, sectors: int, dof: int, crest: int = 0
+) -> tuple[LinearMode, Optional[Complex]]:
+    """The standing wave with the crest of a dof in one sector, and the one a quarter of its length off, to be avoided.
+
+    Parameters
+    ----------
+    mode : LinearMode
+        Of one sector in this wave.
+    dof : int
+        Of a sector.
+    crest : int
+        The sector.
+    """
+    wave = wave_mode(mode, nodal_diameter, sectors)
+    if _single(nodal_diameter, sectors):
+        return wave, None
+    phi = wave.shape + 1j * wave.imaginary
+    there = phi[crest * len(mode.shape) + dof]
+    phi *= np.sqrt(2) * abs(there) / there  # real where its crest shall be
+    return LinearMode(mode.omega, mode.beta, phi.real.copy(), np.zeros(len(phi))), phi.imag + 0j
+
+
+def most_alike(modes: Sequence[LinearMode], wave: LinearMode, M: Any) -> LinearMode:
+    """Of modes of a mistuned wheel the one with the largest share in a tuned wave (`Sector.around`) and its pair.
+
+    Parameters
+    ----------
+    M : (N n_dof, N n_dof) sparse, or Sector
+        Mass of the wheel [kg].
+    """
+    if isinstance(M, Sector):
+        M = around(M.M, M.sectors)
+    phi = wave.shape + 1j * wave.imaginary
+    shares = np.array([abs(phi.conj() @ (M @ mode.shape)) ** 2 for mode in modes])
+    return modes[int(np.flatnonzero(shares > (1 - ALIKE) * shares.max())[0])]
+
+
+def deviations(sectors: int, standard_deviation: float, seed: int) -> Array:
+    """Relative deviations (N,) of the sectors: normally distributed (PCG64), less their mean.
+
+    Without its mean a pattern leaves the family's mean frequency, to first order, where it was.
+    """
+    drawn = np.random.Generator(np.random.PCG64(seed)).standard_normal(sectors)
+    return np.asarray(standard_deviation * (drawn - drawn.mean()))
+
+
+def _single(nodal_diameter: int, sectors: int) -> bool:
+    return 2 * nodal_diameter % sectors == 0

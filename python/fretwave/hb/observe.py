@@ -1,0 +1,78 @@
+"""What is observed of a motion beside its amplitude: rows of displacements, coordinates of linear modes, energy."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Union
+
+import numpy as np
+from petsc4py import PETSc
+
+from ..columns import COLUMNS, Column
+from ..errors import InputError
+from .problems import HarmonicProblem, Observed, row_of
+
+#: The word for `mechanical_energy` among what is observed.
+ENERGY = "energy"
+
+
+class Observer:
+    """Extra columns of a branch. Collective, as all methods.
+
+    Parameters
+    ----------
+    observe : dict
+        Name of the column -> dof, row (n_dof,), linear mode, or "energy".
+
+    Raises
+    ------
+    InputError
+        A name is taken, or a row does not fit.
+    """
+
+    def __init__(self, problem: HarmonicProblem, observe: Mapping[str, Union[Observed, str]]) -> None:
+        self.problem, self.columns = problem, [_column(name, what) for name, what in observe.items()]
+        self.rows = {name: row_of(problem.model, what) for name, what in observe.items() if not isinstance(what, str)}
+        self.energies = [name for name, what in observe.items() if isinstance(what, str)]
+        self.first, self.end = problem.model.ownership
+
+    def __call__(self, y: PETSc.Vec) -> dict[str, float]:
+        """By column: amplitude of the fundamental of each row [m], energy [J]."""
+        labels, local = self.problem.harmonics.labels, self.problem.local_coefficients(y)
+        q = local[:, labels.index("1c")] - 1j * local[:, labels.index("1s")]
+        sums = np.array(
+            [
+                sum((w * q[dof - self.first] for dof, w in row if self.first <= dof < self.end), 0j)
+                for row in self.rows.values()
+            ]
+        )
+        sums = np.asarray(self.problem.model.comm.allreduce(sums))
+        energy = mechanical_energy(self.problem, y) if self.energies else 0.0
+        return {**dict(zip(self.rows, np.abs(sums).tolist())), **dict.fromkeys(self.energies, energy)}
+
+
+def mechanical_energy(problem: HarmonicProblem, y: PETSc.Vec) -> float:
+    """Energy of the vibration [J], mean over a period: of M moving and K strained. Collective.
+
+    sum_n>0 (|s_n|^2 q_n^H M q_n + q_n^H K q_n) / 4 on the periodic motion. What contact stores and the mean
+    displacement are left out. Of one sector where the model is one.
+    """
+    labels, local = problem.harmonics.labels, problem.local_coefficients(y)
+    total = 0.0
+    for n, s in zip(problem.harmonics.orders, problem.core.exponents(y)):
+        if n:
+            q = local[:, labels.index(f"{n}c")] - 1j * local[:, labels.index(f"{n}s")]
+            total += abs(s) ** 2 * problem.model.form(2, q, n) / 4 + problem.model.form(0, q, n) / 4
+    return total
+
+
+def _column(name: str, what: Union[Observed, str]) -> Column:
+    if name in COLUMNS and name != ENERGY:
+        raise InputError("a column of this name is there already", "observe", name, None, "choose another name")
+    if not isinstance(what, str):
+        return Column(name, "m", "fundamental amplitude of what is observed")
+    if what != ENERGY:
+        raise InputError(
+            "this cannot be observed", f"observe '{name}'", what, f'a dof, row, mode or "{ENERGY}"', ENERGY
+        )
+    return Column(name, "J", "mechanical energy of the vibration, mean over a period")

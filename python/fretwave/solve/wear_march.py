@@ -1,0 +1,153 @@
+"""A march over wear cycles as an object: its table, and the worn depths of all pairs at its points."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..columns import Column, columns_named
+from ..errors import InputError
+from ..hb.problems import HarmonicProblem
+from .branch import Branch
+from .table import Table
+from .wear import Wear, WearControl, WearPoint
+from .worn_mode import WornMode
+
+Array = npt.NDArray[np.float64]
+
+#: What the table of a march says beside its points' own numbers.
+STATE = ("omega", "omega0", "frequency_hz", "beta", "zeta", "stick", "slip", "open", "work", "energy_error")
+SOLVER = ("step_error", "error_estimate", "residual", "newton", "linear", "event")
+COLUMNS = columns_named(["cycles", "vibrations", "step", "amplitude", *STATE, *SOLVER])
+
+
+class WearMarch(Table):
+    """A mode at fixed amplitude over wear cycles, as `fretwave.wear` returns it.
+
+    Attributes
+    ----------
+    contacts : dict
+        Contact name -> where its pairs stand in the arrays.
+    depth, rate, load : (n_points, n_pairs) [m], [m], [N]
+        Worn depth of the pairs of all wearing contacts, its growth in a vibration cycle, mean normal force.
+    areas : (n_pairs,) [m^2]
+    cycle_unit : float
+        Vibration cycles in a normalised one.
+    converged : bool
+        It ended as asked.
+    reason : str
+        Why it ended.
+    """
+
+    def __init__(self, columns: Sequence[Column], values: Mapping[str, Any], **attributes: Any) -> None:
+        super().__init__(columns, values)
+        self.contacts: dict[str, slice] = attributes["contacts"]
+        self.depth: Array = attributes["depth"]
+        self.rate: Array = attributes["rate"]
+        self.load: Array = attributes["load"]
+        self.areas: Array = attributes["areas"]
+        self.cycle_unit: float = attributes["cycle_unit"]
+        self.converged: bool = attributes["converged"]
+        self.reason: str = attributes["reason"]
+
+    @property
+    def volume(self) -> Array:
+        """Worn volume (n_points,) [m^3]."""
+        return np.asarray(self.depth @ self.areas)
+
+    def __repr__(self) -> str:
+        ended = "as asked" if self.converged else "before its end"
+        return f"WearMarch of {len(self)} points, ended {ended}: {self.reason}\n{self.text()}"
+
+
+def wear(
+    branch: Branch,
+    amplitude: float,
+    coefficient: float,
+    areas: Mapping[str, Array],
+    cycles: float,
+    *,
+    cycle_unit: float | None = None,
+    control: WearControl | None = None,
+    report_at: Sequence[float] = (),
+    tell: Callable[[dict[str, Any]], None] | None = None,
+) -> WearMarch:
+    """March a mode over wear cycles at an amplitude of its unworn branch. Collective.
+
+    The surfaces are new again afterwards.
+
+    Parameters
+    ----------
+    branch : Branch
+        Of a nonlinear mode, with its unknowns.
+    amplitude : float [m]
+        The first place of the branch there.
+    coefficient : float [1/Pa]
+        k_w.
+    areas : dict
+        Contact name -> nodal areas (n_pairs,) [m^2]; contacts without an entry do not wear.
+    cycles, report_at : float, sequence of float
+        Where to stop, and where points shall lie; in normalised cycles, as all cycles here.
+    cycle_unit : float, optional
+        Vibration cycles in a normalised one; by default those in which sliding four stick limits a cycle leaves 1/e of
+        a normal load (`WornMode.normal_cycle`), with the loads of the branch's first point.
+    control : WearControl, optional
+    tell : callable, optional
+        Given every row when it is found, on every rank.
+
+    Raises
+    ------
+    InputError
+        The branch does not pass the amplitude, or a contact cannot wear.
+    StageFailed
+        Newton does not find the start.
+    """
+    places = branch.at(amplitude=amplitude)
+    if not len(places):
+        span = f"{branch['amplitude'].min():g} to {branch['amplitude'].max():g} m"
+        raise InputError("the branch does not pass this amplitude", None, f"{amplitude:g} m", span, "take one within")
+    first, guess = branch.unknowns(0), branch.unknowns(float(places["place"][0]))
+    problem, rows, states = branch.problem, [], []
+    with WornMode(problem, coefficient, areas) as mode:
+        unworn = np.zeros(len(mode.areas))
+        unit = cycle_unit or mode.normal_cycle(mode.measure(first, unworn).load)
+        new = mode.solve(unworn, guess)
+        for vector in (first, guess):
+            vector.destroy()
+        outcome = (new.newton, new.linear, new.residual)
+        march = Wear(mode, new.y, unit * cycles, control, [unit * value for value in report_at], outcome=outcome)
+        new.y.destroy()
+        for point in march:
+            rows.append(problem.model.comm.bcast(wear_row(problem, point, unit)))
+            states.append((point.state.depth, point.state.rate, point.state.load))
+            if tell is not None:
+                tell(rows[-1])
+        march.state.y.destroy()
+        names = [problem.model.contacts[k].name for k in mode.contacts]
+        contacts, sizes = dict(zip(names, mode.slices)), mode.areas
+    depth, rate, load = (np.array(part) for part in zip(*states))
+    ended = {"converged": march.converged, "reason": march.reason, "cycle_unit": unit}
+    told = {"contacts": contacts, "areas": sizes, "depth": depth, "rate": rate, "load": load, **ended}
+    return WearMarch(COLUMNS, {c.name: [row[c.name] for row in rows] for c in COLUMNS}, **told)
+
+
+def wear_row(problem: HarmonicProblem, point: WearPoint, unit: float) -> dict[str, Any]:
+    """What the table of a march says of a point. Collective."""
+    y, energy = point.state.y, problem.energy(point.state.y)
+    return {
+        **problem.state(y),
+        **problem.diagnostics(y),
+        "cycles": point.cycles / unit,
+        "vibrations": point.cycles,
+        "step": point.step / unit,
+        "work": energy["contact"],
+        "energy_error": energy["error"],
+        "step_error": point.error,
+        "residual": point.state.residual,
+        "newton": point.newton,
+        "linear": point.linear,
+        "event": point.event,
+    }
