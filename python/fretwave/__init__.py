@@ -14,12 +14,17 @@ from .errors import FretwaveError, InputError, NotConverged
 os.environ.setdefault("OMPI_MCA_ess_singleton_isolated", "1")
 
 if TYPE_CHECKING:
+    from .analyses.parts.context import AnalysisContext, Outcome
+    from .case.analysis import AnalysisSection, register_analysis
     from .case.build import build_model
+    from .case.harmonic import HarmonicSection
     from .case.load import load_case
     from .case.reduce import reduce_case
+    from .case.schema import key
+    from .columns import Column
     from .commands.main import main
     from .cyclic.aerodynamics import Aerodynamics
-    from .cyclic.faces import match_faces, rotation
+    from .cyclic.faces import match_faces
     from .cyclic.reduction import SectorReduction, reduce_sector
     from .cyclic.sector import Sector
     from .cyclic.waves import WaveError
@@ -27,12 +32,16 @@ if TYPE_CHECKING:
     from .cyclic.wheel_shape import WheelShape
     from .hb.problems import ForcedResponse, Harmonics, NonlinearMode, choose_harmonics
     from .hb.reduction_error import NonlinearError, nonlinear_error
+    from .model.contact import Contact
     from .model.laws import LawInfo, Limit, ParameterInfo, PythonLaw, Role, laws, register_law
-    from .model.model import Contact, Model, by_sector
+    from .model.model import Model
     from .model.modes import LinearMode, linear_modes
+    from .model.pairs import Pairs
     from .model.reduction import FrequencyError, Reduction, reduce
     from .model.rest import Rest
-    from .model.structure import BuiltContact, BuiltModel
+    from .model.sectors import by_sector, rotation
+    from .model.structure import Structure
+    from .results.model_file import read_model, write_model
     from .results.reader import Run, open_run
     from .results.results import has_results, open_results
     from .solve.branch import Branch
@@ -49,14 +58,22 @@ if TYPE_CHECKING:
 #: Where each public name lives; loaded when first used, so that `fretwave --help` starts without PETSc.
 _HOMES = {
     "solve.preload": ("balanced", "static_preload"),
+    "analyses.parts.context": ("AnalysisContext", "Outcome"),
+    "case.analysis": ("AnalysisSection", "register_analysis"),
     "case.build": ("build_model",),
+    "case.harmonic": ("HarmonicSection",),
     "case.load": ("load_case",),
     "case.reduce": ("reduce_case",),
+    "case.schema": ("key",),
+    "columns": ("Column",),
     "commands.main": ("main",),
     "results.reader": ("Run", "open_run"),
     "results.results": ("has_results", "open_results"),
     "cyclic.aerodynamics": ("Aerodynamics",),
-    "model.structure": ("BuiltContact", "BuiltModel"),
+    "model.pairs": ("Pairs",),
+    "model.sectors": ("by_sector", "rotation"),
+    "model.structure": ("Structure",),
+    "results.model_file": ("read_model", "write_model"),
     "solve.branch": ("Branch",),
     "solve.follow": ("follow",),
     "solve.continuation": ("Continuation", "Point"),
@@ -69,9 +86,10 @@ _HOMES = {
     "model.rest": ("Rest",),
     "solve.sweep": ("Sweep", "sweep"),
     "solve.wear_march": ("WearMarch", "wear"),
-    "cyclic.faces": ("match_faces", "rotation"),
+    "cyclic.faces": ("match_faces",),
     "model.laws": ("LawInfo", "Limit", "ParameterInfo", "PythonLaw", "Role", "laws", "register_law"),
-    "model.model": ("Contact", "Model", "by_sector"),
+    "model.contact": ("Contact",),
+    "model.model": ("Model",),
     "model.modes": ("LinearMode", "linear_modes"),
     "hb.problems": ("ForcedResponse", "Harmonics", "NonlinearMode", "choose_harmonics"),
     "model.reduction": ("FrequencyError", "Reduction", "reduce"),
@@ -84,14 +102,16 @@ _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 
 __all__ = [
     "Aerodynamics",
+    "AnalysisContext",
+    "AnalysisSection",
     "Branch",
-    "BuiltContact",
-    "BuiltModel",
+    "Column",
     "Contact",
     "Continuation",
     "ForcedResponse",
     "FrequencyError",
     "FretwaveError",
+    "HarmonicSection",
     "Harmonics",
     "InputError",
     "LawInfo",
@@ -101,6 +121,8 @@ __all__ = [
     "NonlinearError",
     "NonlinearMode",
     "NotConverged",
+    "Outcome",
+    "Pairs",
     "ParameterInfo",
     "Point",
     "PythonLaw",
@@ -111,6 +133,7 @@ __all__ = [
     "Sector",
     "SectorReduction",
     "StepControl",
+    "Structure",
     "Sweep",
     "Transient",
     "WaveError",
@@ -127,6 +150,7 @@ __all__ = [
     "deviations",
     "follow",
     "has_results",
+    "key",
     "laws",
     "linear_modes",
     "load_case",
@@ -136,9 +160,11 @@ __all__ = [
     "nonlinear_error",
     "open_results",
     "open_run",
+    "read_model",
     "reduce",
     "reduce_case",
     "reduce_sector",
+    "register_analysis",
     "register_law",
     "rotation",
     "standing_wave",
@@ -146,6 +172,7 @@ __all__ = [
     "sweep",
     "travelling_wave",
     "wear",
+    "write_model",
 ]
 
 

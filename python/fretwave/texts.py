@@ -36,7 +36,7 @@ def is_there(path: Path) -> bool:
         return False
 
 
-def toml(value: Any, longest: int = 60) -> str:
+def toml(value: object, longest: int = 60) -> str:
     """A value as TOML writes it, cut when long."""
     try:
         text = str(value) if isinstance(value, float) else json.dumps(value, default=str, ensure_ascii=False)

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 from conftest import own_environment
 
+from fretwave.analyses.sweep import SweepAnalysis
 from fretwave.case.load import load_case
 from fretwave.commands.main import main
 from fretwave.errors import CaseErrors, InputError
@@ -24,7 +25,7 @@ from fretwave.results.sweep_summary import summarise
 from fretwave.run.order import RunOptions
 from fretwave.run.runner import Runner
 from fretwave.run.sweep_analysis import analysis_sweep
-from fretwave.run.sweep_plan import plan_of, table_plan
+from fretwave.run.sweep_plan import plan_of
 
 pytestmark = pytest.mark.ranks(1)
 
@@ -449,7 +450,7 @@ def test_plans() -> None:
     assert plan.overrides()[4] == ["a.b=2", 'c="x"', 'd="y"']
     assert plan.labels()[4] == 'b = 2, c = "x", d = "y"'
     assert Plan({"a.b": [1], "c.b": [2]}).labels() == ["a.b = 1, c.b = 2"]
-    assert table_plan({"a.b": [1], "c": {"d": [2]}}).keys == ["a.b", "c.d"]
+    assert SweepAnalysis(name="s", type="sweep", of="m", over={"a.b": [1], "c": {"d": [2]}}).plan().keys == ["a.b", "c.d"]
     assert len(Plan({"a": [1, 2, 3], "b": [True, False]})) == 6
 
 

@@ -1,1 +1,4 @@
-"""One module per kind of analysis."""
+"""The kinds of analysis, each a file of its name with everything that is known of it alone."""
+
+#: In the order in which they are listed.
+KINDS = ("static", "mode", "forced", "flutter", "free_decay", "limit_cycle", "sweep", "wear")

@@ -13,33 +13,117 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any, Literal, Optional
 
-from ..case.flow import diameters_of
-from ..case.schema import FlutterAnalysis
+from ..case.analysis import register_analysis
+from ..case.checks_common import about
+from ..case.flow import WHOLE
+from ..case.harmonic import HarmonicSection, check_range
+from ..case.schema import Dof, Positive, Whole, key
 from ..columns import FLUTTER
 from ..post.flutter_waves import STABLE, describe_waves, with_sign, words
+from ..results.results import AnalysisWriter
+from ..results.sweep_summary import FLUTTER_WAVES
 from .mode import point_line
 from .parts.branch import closure_note, finished_table, mode_problem, open_branch, points_of, record, step_control, tell
 from .parts.context import AnalysisContext, Outcome
 from .parts.rest import retained, start_mode
 
-
-def run_flutter(context: AnalysisContext) -> Outcome:
-    """Follow the mode of every nodal diameter over its amplitude. Collective."""
-    analysis = context.analysis
-    assert isinstance(analysis, FlutterAnalysis) and context.case.neighbours is not None
-    harmonics = retained(context)
-    context.leave_out([*harmonics.left_out, "stability of the limit cycles against waves of other nodal diameters"])
-    writer = context.writer(FLUTTER, labels=harmonics.labels, samples=harmonics.samples)
-    try:
-        return _all_waves(context, diameters_of(analysis, context.case.neighbours.sectors), harmonics, writer)
-    finally:
-        writer.abandon()
+if TYPE_CHECKING:
+    from ..case.facts import Facts
+    from ..case.reporter import Reporter
+    from ..hb.problems import Harmonics, NonlinearMode
+    from ..solve.continuation import Continuation
 
 
-def _all_waves(context: AnalysisContext, diameters: Sequence[int], harmonics: Any, writer: Any) -> Outcome:
+@register_analysis
+class FlutterAnalysis(HarmonicSection):
+    """``type = "flutter"``: modes of several nodal diameters with [aerodynamics], and their limit cycles."""
+
+    pictures = ("flutter",)
+    summary = FLUTTER_WAVES
+
+    type: Literal["flutter"]
+    method: Literal["CNM", "EPMC"] = key(
+        "complex nonlinear mode (decaying) or extended periodic motion", example='"CNM"', default="CNM"
+    )
+    normalise: Dof = key("dof whose fundamental harmonic is the modal amplitude", example='"m1"')
+    amplitude: list[Positive] = key("first and last modal amplitude", "m", "[1e-5, 1e-2]", min_length=2, max_length=2)
+    nodal_diameters: Optional[list[Whole]] = key(
+        "waves looked at, negative for backward ones; all unless told", example="[-4, 3, 4]", default=None, min_length=1
+    )
+    report_at: list[Positive] = key(
+        "amplitudes at which the motion of a period is kept", "m", "[1e-4]", default_factory=list
+    )
+
+    def waves(self, sectors: int) -> list[int]:
+        """Nodal diameters that it looks at: those it names, or all forward and backward waves."""
+        if self.nodal_diameters is not None:
+            return list(self.nodal_diameters)
+        return list(range(-((sectors - 1) // 2), sectors // 2 + 1))
+
+    def kept_dofs(self) -> list[str]:
+        return [*super().kept_dofs(), self.normalise]
+
+    def follows_waves(self) -> bool:
+        return True
+
+    def check(self, report: Reporter, facts: Facts) -> None:
+        super().check(report, facts)
+        report.dof(("normalise",), self.normalise, facts.named)
+        check_range(report, "amplitude", self.amplitude, self.report_at)
+        if facts.model_known and facts.neighbours is None:
+            about(report, "type", "is of a wheel", "a model with sectors", "give [model] its sectors")
+        if facts.model_known and not facts.has_flow:
+            report.wrong(("type",), "needs forces of the flow", "a table [aerodynamics]", "add [aerodynamics]")
+        if facts.sectors is not None:
+            self._check_waves(report, facts, facts.sectors)
+
+    def _check_waves(self, report: Reporter, facts: Facts, sectors: int) -> None:
+        if self.nodal_diameter is not None:
+            number = self.nodal_diameter
+            fix = f"write `nodal_diameters = [{number}]`"
+            report.wrong(("nodal_diameter",), "is one wave; flutter looks at several", "nodal_diameters", fix)
+        if self.wheel:
+            report.wrong(
+                ("wheel",), "is for modes; flutter follows waves on one sector", "one sector", "remove the key"
+            )
+        half = sectors // 2
+        for index, diameters in enumerate(self.nodal_diameters or []):
+            if abs(diameters) > half:
+                expected = f"-{half} .. {half}, negative for backward waves"
+                report.wrong(("nodal_diameters", index), "is no wave of this wheel", expected, "take it out")
+        section = facts.flow
+        if section is None or section.damping is None:
+            return
+        named = {int(text) % sectors for text in section.damping if WHOLE.fullmatch(text)}
+        missing = [d for d in self.waves(sectors) if d % sectors not in named]
+        if missing:
+            key = "type" if self.nodal_diameters is None else "nodal_diameters"
+            expected = f"damping of nodal diameters {', '.join(map(str, missing))} in [aerodynamics]"
+            report.wrong((key,), "looks at waves without a damping", expected, "add it, or name nodal_diameters")
+
+    def headline(self) -> str:
+        low, high = self.amplitude
+        named = ", ".join(map(str, self.nodal_diameters or [])) or "all"
+        start = f"flutter ({self.method}), nodal diameters {named}, linear mode {self.linear_mode}"
+        return f"{start}, a = {low:g} to {high:g} m of {self.normalise}"
+
+    def run(self, context: AnalysisContext[FlutterAnalysis]) -> Outcome:
+        """Follow the mode of every nodal diameter over its amplitude. Collective."""
+        assert context.case.neighbours is not None
+        harmonics = retained(context)
+        context.leave_out([*harmonics.left_out, "stability of the limit cycles against waves of other nodal diameters"])
+        writer = context.writer(FLUTTER, labels=harmonics.labels, samples=harmonics.samples)
+        try:
+            return _all_waves(context, self.waves(context.case.neighbours.sectors), harmonics, writer)
+        finally:
+            writer.abandon()
+
+
+def _all_waves(
+    context: AnalysisContext[FlutterAnalysis], diameters: Sequence[int], harmonics: Harmonics, writer: AnalysisWriter
+) -> Outcome:
     snapshot, own, found = open_branch(context.comm, writer, context.resuming)
     first = int(own.get("wave_number", 0))
     reasons = []
@@ -56,27 +140,32 @@ def _all_waves(context: AnalysisContext, diameters: Sequence[int], harmonics: An
     writer.close("stopped" if stopped else "done", reason, events=json.dumps(cycles), waves=json.dumps(waves))
     context.entry["waves"] = waves
     summary = [f"{context.name}: {words(wave)}" for wave in waves]
-    goal = f"amplitude {context.analysis.amplitude[1]:g} m in every wave"  # type: ignore[attr-defined]
+    goal = f"amplitude {context.analysis.amplitude[1]:g} m in every wave"
     return Outcome(writer.rows, reason, not stopped, summary, goal)
 
 
 class _Wave:
     """The branch of one nodal diameter."""
 
-    def __init__(self, context: AnalysisContext, diameters: Sequence[int], number: int, harmonics: Any) -> None:
-        assert isinstance(context.analysis, FlutterAnalysis)
+    def __init__(
+        self,
+        context: AnalysisContext[FlutterAnalysis],
+        diameters: Sequence[int],
+        number: int,
+        harmonics: Harmonics,
+    ) -> None:
         self.context, self.number, self.count, self.harmonics = context, number, len(diameters), harmonics
         self.diameter = diameters[number]
         self.analysis = context.analysis.model_copy(update={"nodal_diameter": self.diameter, "aerodynamics": True})
 
-    def follow(self, writer: Any, snapshot: Any, go_on: bool) -> str:
+    def follow(self, writer: AnalysisWriter, snapshot: Optional[dict[str, Any]], go_on: bool) -> str:
         """Write its points; returns why it stopped early, or nothing. Collective."""
         from ..case.build import build_model
 
         case, analysis = self.context.case, self.analysis
         preload, comm = case.preload_of(analysis), self.context.comm
         with build_model(case, analysis.dampers, comm, preload, self.diameter, aerodynamics=True) as model:
-            problem = self._problem(replace(self.context, model=model, analysis=analysis))
+            problem = self._problem(self.context.of(analysis, model=model))
             branch = self._branch(problem, snapshot, go_on)
             for point in points_of(branch):
                 own = {"wave_number": self.number}
@@ -87,15 +176,15 @@ class _Wave:
             problem.destroy()
         return stopped
 
-    def _column(self, *_: Any) -> dict[str, int]:
+    def _column(self, *_: object) -> dict[str, int]:
         return {"nodal_diameter": self.diameter}
 
-    def _problem(self, context: AnalysisContext) -> Any:
+    def _problem(self, context: AnalysisContext[FlutterAnalysis]) -> NonlinearMode:
         """Started from the mode of the structure alone; the flow bends it little."""
         start, rest = start_mode(context, self.analysis.linear_mode)
         return mode_problem(context, self.harmonics, start, rest)
 
-    def _branch(self, problem: Any, snapshot: Any, go_on: bool) -> Any:
+    def _branch(self, problem: NonlinearMode, snapshot: Optional[dict[str, Any]], go_on: bool) -> Continuation:
         from ..solve.continuation import Continuation
 
         low, high = self.analysis.amplitude
@@ -112,7 +201,9 @@ class _Wave:
         self.context.console.point(line, line, share, notable)
 
 
-def _write(context: AnalysisContext, waves: Sequence[Mapping[str, Any]], cycles: Sequence[Mapping[str, Any]]) -> None:
+def _write(
+    context: AnalysisContext[FlutterAnalysis], waves: Sequence[Mapping[str, Any]], cycles: Sequence[Mapping[str, Any]]
+) -> None:
     """``<name>_waves.csv``, a line for each nodal diameter, and ``<name>_crossings.csv``, one for each limit cycle."""
     names = [name for name in waves[0] if name != "limit_cycles"] if waves else []
     context.write_table("waves", {name: [wave[name] for wave in waves] for name in names})

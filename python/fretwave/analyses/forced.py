@@ -3,56 +3,156 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any, Literal, Optional, Union
 
 import numpy as np
 
-from ..case.schema import ForcedAnalysis
+from ..case.analysis import register_analysis
+from ..case.harmonic import HarmonicSection, check_range
+from ..case.schema import Dof, Positive, Whole, key
 from ..columns import FORCED
+from ..cyclic.engine_order import folded
 from ..hb.suspects import suspects
-from ..post.mode_curve import ModeCurve
 from ..post.motion import complex_amplitudes
-from ..post.response_peaks import peak_table
-from .forced_time import time_points
+from ..results.results import AnalysisWriter
+from ..results.sweep_summary import FORCED_LEVELS
 from .parts.branch import closure_note, finished_table, open_branch, points_of, record, tell
 from .parts.context import AnalysisContext, Outcome
 from .parts.excitation import Excitation, excitation_of
+from .parts.forced_peaks import curves_of, write_peaks
+from .parts.forced_time import time_points
 from .parts.rest import retained
 from .parts.wheel_peaks import blade_amplitudes, blade_by_blade
 
+if TYPE_CHECKING:
+    from petsc4py import PETSc
 
-def run_forced(context: AnalysisContext) -> Outcome:
-    """Follow the response of every level over the frequency range. Collective."""
-    analysis = context.analysis
-    assert isinstance(analysis, ForcedAnalysis)
-    harmonics = retained(context)
-    excitation = excitation_of(context, harmonics)
-    left_out = [] if analysis.time_points else ["check by time integration (time_points = 0)"]
-    context.leave_out([*harmonics.left_out, *_missing_backbones(context), *left_out])
-    writer = context.writer(
-        [*FORCED[:-1], *excitation.columns(), FORCED[-1]],
-        labels=harmonics.labels,
-        samples=harmonics.samples,
-        stuck_omega=excitation.reference.omega,
-        **_attributes(context),
+    from ..case.facts import Facts
+    from ..case.reporter import Reporter
+    from ..hb.problems import ForcedResponse
+
+
+@register_analysis
+class ForcedAnalysis(HarmonicSection):
+    """``type = "forced"``: frequency responses at several excitation levels."""
+
+    pictures = ("forced", "forced_blades")
+    summary = FORCED_LEVELS
+
+    type: Literal["forced"]
+    backbone: Union[str, list[str]] = key(
+        "mode analyses whose backbones the peaks are compared with",
+        example='["mode"]',
+        default_factory=list,
     )
-    try:
-        return _all_levels(context, analysis, excitation, writer)
-    finally:
-        writer.abandon()
+    force: dict[Dof, float] = key(
+        "force amplitude of each excited dof, cosine at harmonic 1, delayed from sector to sector of a wheel",
+        "N",
+        "{ m1 = 1.0 }",
+        min_length=1,
+    )
+    engine_order: Optional[Whole] = key(
+        "order of the excitation of a wheel, in place of nodal_diameter; negative where the rotor turns with the "
+        "sectors' numbers",
+        example="4",
+        default=None,
+    )
+    levels: list[Positive] = key("factors on the force", "-", "[1.0, 2.0]", min_length=1)
+    frequency: list[Positive] = key(
+        "first and last excitation frequency", "Hz", "[3.0, 5.0]", min_length=2, max_length=2
+    )
+    observe: Dof = key("dof whose fundamental harmonic is reported", example='"m1"')
+    report_at: list[Positive] = key(
+        "frequencies at which the motion of a period is kept", "Hz", "[3.9]", default_factory=list
+    )
+    time_points: Whole = key(
+        "points of each response that are checked by time integration", example="4", default=0, ge=0
+    )
+
+    def backbones(self) -> list[str]:
+        """Names of the modes that its peaks are compared with."""
+        return [self.backbone] if isinstance(self.backbone, str) else list(self.backbone)
+
+    def compares_with(self) -> list[str]:
+        return self.backbones()
+
+    def kept_dofs(self) -> list[str]:
+        return [*super().kept_dofs(), self.observe, *self.force]
+
+    def integrates(self) -> str:
+        return "time_points" if self.time_points > 0 else ""
+
+    def completed(self, report: Reporter, facts: Facts) -> ForcedAnalysis:
+        """With the nodal diameter of the wave that an engine order drives on so many sectors."""
+        order, given, sectors = self.engine_order, self.nodal_diameter, facts.sectors
+        if not facts.model_known:
+            return self
+        if order is None:
+            if sectors is not None and self.mistuning is not None and given is None:  # it has no wave of its own
+                fix = "add for example `engine_order = 4`"
+                report.wrong(("engine_order",), "is missing", "the order of the excitation, or nodal_diameter", fix)
+            return self
+        if sectors is None:
+            report.wrong(("engine_order",), "is of no sector of a wheel", "a model with sectors", "remove the key")
+        elif order == 0:
+            report.wrong(("engine_order",), "is steady", "1 or more, or -1 or less", "take a mean load to [preload]")
+        elif given is not None and given % sectors != order % sectors:
+            expected = f"{folded(order, sectors)}, which engine order {order} drives on {sectors} sectors"
+            report.wrong(("nodal_diameter",), "is not that of the engine order", expected, "remove nodal_diameter")
+        else:
+            return self.model_copy(update={"nodal_diameter": folded(order, sectors)})
+        return self
+
+    def check(self, report: Reporter, facts: Facts) -> None:
+        super().check(report, facts)
+        check_range(report, "frequency", self.frequency, self.report_at)
+        report.dof(("observe",), self.observe, facts.named)
+        for dof in self.force:
+            report.dof(("force", dof), dof, facts.named)
+        if not any(self.force.values()):
+            report.wrong(
+                ("force",), "is zero", "a force amplitude other than 0", "write for example `force = { m1 = 1.0 }`"
+            )
+        listed, modes = isinstance(self.backbone, list), facts.analyses_of("mode")
+        for index, name in enumerate(self.backbones()):
+            report.mode(("backbone", index) if listed else ("backbone",), name, modes)
+
+    def headline(self) -> str:
+        low, high = self.frequency
+        levels = ", ".join(f"{level:g}" for level in self.levels)
+        order = f" to engine order {self.engine_order}" if self.engine_order else ""
+        return f"forced response of {self.observe}{order}, {low:g} to {high:g} Hz, levels {levels}"
+
+    def run(self, context: AnalysisContext[ForcedAnalysis]) -> Outcome:
+        """Follow the response of every level over the frequency range. Collective."""
+        harmonics = retained(context)
+        excitation = excitation_of(context, harmonics)
+        left_out = [] if self.time_points else ["check by time integration (time_points = 0)"]
+        context.leave_out([*harmonics.left_out, *_missing_backbones(context), *left_out])
+        writer = context.writer(
+            [*FORCED[:-1], *excitation.columns(), FORCED[-1]],
+            labels=harmonics.labels,
+            samples=harmonics.samples,
+            stuck_omega=excitation.reference.omega,
+            **_attributes(context),
+        )
+        try:
+            return _all_levels(context, excitation, writer)
+        finally:
+            writer.abandon()
 
 
-def _attributes(context: AnalysisContext) -> dict[str, Any]:
+def _attributes(context: AnalysisContext[ForcedAnalysis]) -> dict[str, Any]:
     """Of the results of a wheel."""
     analysis, wheel = context.analysis, context.case.wheel
-    assert isinstance(analysis, ForcedAnalysis)
     if wheel is None:
         return {}
     observed = f"{analysis.observe}@{analysis.sector or 0}"
     return {"observe": observed, "sectors": wheel.sectors, "sector_dofs": wheel.unit}
 
 
-def _all_levels(context: AnalysisContext, analysis: ForcedAnalysis, excitation: Excitation, writer: Any) -> Outcome:
+def _all_levels(context: AnalysisContext[ForcedAnalysis], excitation: Excitation, writer: AnalysisWriter) -> Outcome:
+    analysis = context.analysis
     snapshot, own, found = open_branch(context.comm, writer, context.resuming)
     first = int(own.get("level_number", 0))
     reasons = []
@@ -66,8 +166,8 @@ def _all_levels(context: AnalysisContext, analysis: ForcedAnalysis, excitation: 
     wheel = context.case.wheel is not None and writer.rows > 0
     blades = blade_amplitudes(excitation, writer) if wheel and writer.active else None
     writer.close("stopped" if stopped else "done", reason, events="[]")
-    curves = _curves(context, analysis)
-    summary = blade_by_blade(excitation, table, blades, curves) if wheel else _peaks(context, table, curves)
+    curves = curves_of(context, analysis.backbones())
+    summary = blade_by_blade(excitation, table, blades, curves) if wheel else write_peaks(context, table, curves)
     if analysis.time_points and writer.rows:
         lines, given_up = time_points(context, table, analysis.time_points)
         summary += lines
@@ -80,7 +180,12 @@ def _all_levels(context: AnalysisContext, analysis: ForcedAnalysis, excitation: 
 
 
 def _one_level(
-    excitation: Excitation, writer: Any, number: int, snapshot: Any, go_on: bool, phase: float | None
+    excitation: Excitation,
+    writer: AnalysisWriter,
+    number: int,
+    snapshot: Optional[dict[str, Any]],
+    go_on: bool,
+    phase: Optional[float],
 ) -> str:
     """Follow one response, on from a phase if it was begun; returns why it stopped early, or nothing. Collective."""
     context, analysis = excitation.context, excitation.analysis
@@ -107,7 +212,7 @@ def _one_level(
     return stopped
 
 
-def _bounded(excitation: Excitation, problem: Any, y: Any) -> float:
+def _bounded(excitation: Excitation, problem: ForcedResponse, y: PETSc.Vec) -> float:
     """Level whose work damping and friction still take in the shape of the motion at y. Collective.
 
     The work that a force at level 1 does at most, at a right angle to the motion, is pi |q_1^H P| per period.
@@ -141,43 +246,7 @@ def _short(row: dict[str, Any]) -> str:
     return f"point {row['point']}: level {row['level']:g}, {row['frequency_hz']:.5g} Hz, a {row['amplitude']:.4g} m"
 
 
-def _backbones(analysis: ForcedAnalysis) -> list[str]:
-    return [analysis.backbone] if isinstance(analysis.backbone, str) else list(analysis.backbone)
-
-
-def _missing_backbones(context: AnalysisContext) -> list[str]:
+def _missing_backbones(context: AnalysisContext[ForcedAnalysis]) -> list[str]:
     """Backbones that have no results to compare with (another selection by --only)."""
-    analysis = context.analysis
-    assert isinstance(analysis, ForcedAnalysis)
-    missing = [name for name in _backbones(analysis) if not context.has_results(name)]
+    missing = [name for name in context.analysis.backbones() if not context.has_results(name)]
     return [f"distance of the peaks from '{name}' (no results of it in this folder)" for name in missing]
-
-
-def _curves(context: AnalysisContext, analysis: ForcedAnalysis) -> dict[str, ModeCurve]:
-    """Backbones that have results. Collective."""
-    names = [name for name in _backbones(analysis) if context.has_results(name)]
-    return {name: ModeCurve.from_table(context.table(name)) for name in names}
-
-
-def _peaks(context: AnalysisContext, table: dict[str, Any], curves: dict[str, ModeCurve]) -> list[str]:
-    """Write the peaks of all levels with their distance from the backbones; a line for each level."""
-    if not table:
-        return []
-    peaks = peak_table({key: table[key] for key in ("level", "omega", "amplitude", "phase", "event")}, curves)
-    context.write_table("peaks", peaks)
-    lines = [
-        f"{context.name}: {len(table['level'])} points, {len(peaks['level'])} levels,"
-        f" error estimate up to {table['error_estimate'].max():.1e}, {table['wall_s'].sum():.2f} s"
-    ]
-    for row in range(len(peaks["level"])):
-        lines.append(_peak_line(context.name, {key: float(value[row]) for key, value in peaks.items()}, list(curves)))
-    return lines
-
-
-def _peak_line(name: str, peak: dict[str, float], curves: list[str]) -> str:
-    text = f"{name}: level {peak['level']:g}: "
-    if not math.isfinite(peak["amplitude"]):
-        return text + "no peak within the frequency range"
-    text += f"peak a = {peak['amplitude']:.4g} m at {peak['frequency_hz']:.5g} Hz"
-    distances = [f"{100 * peak[f'distance_{curve}']:+.3f} % from {curve}" for curve in curves]
-    return text + (", frequency " + ", ".join(distances) if distances else "")

@@ -5,14 +5,19 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from ..case.schema import ModeAnalysis
+from ..case.analysis import register_analysis
+from ..case.checks_wheel import check_needs_wheel
+from ..case.harmonic import HarmonicSection, check_range
+from ..case.schema import Dof, Positive, key
 from ..columns import MODE
 from ..hb.suspects import suspects
 from ..post.limit_cycles import limit_cycles
+from ..results.results import AnalysisWriter
+from ..results.sweep_summary import MODE_BRANCH
 from .parts.asymptotes import asymptote_line
 from .parts.branch import closure_note, finished_table, mode_problem, open_branch, points_of, record, step_control, tell
 from .parts.context import AnalysisContext, Outcome
@@ -20,44 +25,105 @@ from .parts.rest import keep_pairs, retained
 from .parts.wheel_shape import WHEEL, WheelShape, finish_wheel, one_by_one
 from .parts.wheel_start import Start, start_of, uneven_samples
 
+if TYPE_CHECKING:
+    from ..case.facts import Facts
+    from ..case.reporter import Reporter
+    from ..hb.problems import NonlinearMode
+    from ..solve.continuation import Continuation, Point
 
-def run_mode(context: AnalysisContext) -> Outcome:
-    """Continue the mode from its first to its last amplitude. Collective."""
-    analysis = context.analysis
-    assert isinstance(analysis, ModeAnalysis)
-    start = start_of(context)
-    context.console.line(asymptote_line(context.name, start.mode.omega, start.asymptotes))
-    harmonics = retained(context)
-    context.leave_out(harmonics.left_out)
-    if start.avoid is not None:
-        note = uneven_samples(harmonics.samples, context.wheel.sectors, analysis.nodal_diameter or 0)
-        if note is not None:
-            context.console.line(f"note: {context.name}: {note}")
-    problem = mode_problem(context, harmonics, start.mode, start.rest, start.dof, start.avoid)
-    writer = context.writer(
-        [*MODE[:-1], *(WHEEL if context.case.wheel else ()), MODE[-1]],
-        labels=harmonics.labels,
-        samples=harmonics.samples,
-        stuck_omega=start.mode.omega,
-        **start.asymptotes,
-        **start.attributes,
+
+@register_analysis
+class ModeAnalysis(HarmonicSection):
+    """``type = "mode"``: a nonlinear mode over its amplitude."""
+
+    pictures = ("backbone", "phase_planes", "loops", "faces", "wheel")
+    summary = MODE_BRANCH
+    shown_where_kept = True
+
+    type: Literal["mode"]
+    method: Literal["CNM", "EPMC"] = key(
+        "complex nonlinear mode (decaying) or extended periodic motion", example='"CNM"', default="CNM"
     )
-    try:
-        return _follow(context, analysis, problem, writer, start)
-    finally:
-        writer.abandon()
-        problem.destroy()
+    wave: Literal["travelling", "standing"] = key(
+        "of a tuned wheel: a wave that runs around, or one that stands with its crest at `sector`",
+        example='"standing"',
+        default="travelling",
+    )
+    normalise: Dof = key("dof whose fundamental harmonic is the modal amplitude", example='"m1"')
+    amplitude: list[Positive] = key("first and last modal amplitude", "m", "[0.02, 3.0]", min_length=2, max_length=2)
+    report_at: list[Positive] = key(
+        "amplitudes at which the motion of a period is kept", "m", "[0.1, 0.5]", default_factory=list
+    )
+
+    def kept_dofs(self) -> list[str]:
+        return [*super().kept_dofs(), self.normalise]
+
+    def check(self, report: Reporter, facts: Facts) -> None:
+        super().check(report, facts)
+        report.dof(("normalise",), self.normalise, facts.named)
+        check_range(report, "amplitude", self.amplitude, self.report_at)
+        if self.wave == "standing" and facts.model_known:
+            check_needs_wheel(report, self, "wave")
+            if facts.sectors is not None:
+                self._check_standing(report, facts.sectors)
+
+    def _check_standing(self, report: Reporter, sectors: int) -> None:
+        diameters = self.nodal_diameter
+        if self.mistuning is not None:
+            fix = "remove it: the deviations decide how a mode stands"
+            report.wrong(("wave",), "is of a tuned wheel", "no `wave` beside `mistuning`", fix)
+        elif diameters is not None and not 0 < 2 * diameters < sectors:
+            still = 2 * diameters % sectors == 0
+            fix = "remove the key: this wave stands still" if still else "give the diameters a plus"
+            what, expected = f"cannot be told apart at nodal_diameter = {diameters}", f"1 to {(sectors - 1) // 2}"
+            report.wrong(("wave",), what, expected, fix)
+
+    def headline(self) -> str:
+        low, high = self.amplitude
+        start = f"nonlinear mode ({self.method}) from linear mode {self.linear_mode}"
+        return f"{start}, a = {low:g} to {high:g} m of {self.normalise}"
+
+    def wave_word(self) -> str:
+        return "standing wave" if self.wave == "standing" else "wave"
+
+    def run(self, context: AnalysisContext[ModeAnalysis]) -> Outcome:
+        """Continue the mode from its first to its last amplitude. Collective."""
+        start = start_of(context)
+        context.console.line(asymptote_line(context.name, start.mode.omega, start.asymptotes))
+        harmonics = retained(context)
+        context.leave_out(harmonics.left_out)
+        if start.avoid is not None:
+            note = uneven_samples(harmonics.samples, context.wheel.sectors, self.nodal_diameter or 0)
+            if note is not None:
+                context.console.line(f"note: {context.name}: {note}")
+        problem = mode_problem(context, harmonics, start.mode, start.rest, start.dof, start.avoid)
+        writer = context.writer(
+            [*MODE[:-1], *(WHEEL if context.case.wheel else ()), MODE[-1]],
+            labels=harmonics.labels,
+            samples=harmonics.samples,
+            stuck_omega=start.mode.omega,
+            **start.asymptotes,
+            **start.attributes,
+        )
+        try:
+            return _follow(context, problem, writer, start)
+        finally:
+            writer.abandon()
+            problem.destroy()
 
 
-def _follow(context: AnalysisContext, analysis: ModeAnalysis, problem: Any, writer: Any, start: Start) -> Outcome:
+def _follow(
+    context: AnalysisContext[ModeAnalysis], problem: NonlinearMode, writer: AnalysisWriter, start: Start
+) -> Outcome:
     from ..solve.continuation import Continuation
 
+    analysis = context.analysis
     low, high = analysis.amplitude
     reduction = context.case.reduction
     estimated = context.case.unreduced is not None and context.case.wheel is None
     error_at = reduction.error_at if reduction is not None and estimated else None
     reports = sorted({*analysis.report_at, *([] if error_at is None else [error_at])})
-    settings = {"stop": (low, high), "steps": step_control(analysis.step), "report_at": reports}
+    settings: dict[str, Any] = {"stop": (low, high), "steps": step_control(analysis.step), "report_at": reports}
     snapshot, _, found = open_branch(context.comm, writer, context.resuming)
     if found:
         branch = Continuation.restore(problem, snapshot, **settings)
@@ -85,11 +151,12 @@ def _follow(context: AnalysisContext, analysis: ModeAnalysis, problem: Any, writ
     return outcome
 
 
-def _reduction_error(context: AnalysisContext, problem: Any, point: Any, row: dict[str, Any]) -> str:
+def _reduction_error(
+    context: AnalysisContext[ModeAnalysis], problem: NonlinearMode, point: Point, row: dict[str, Any]
+) -> str:
     """What the unreduced model would change at this point, for the log and run.json. Collective."""
     from ..case.reduce import nonlinear_error_at
 
-    assert isinstance(context.analysis, ModeAnalysis)
     error = nonlinear_error_at(context.case, context.analysis, problem, point.y)
     context.entry["reduction_error"] = {"amplitude": row["amplitude"], **dataclasses.asdict(error)}
     return (
@@ -99,7 +166,9 @@ def _reduction_error(context: AnalysisContext, problem: Any, point: Any, row: di
     )
 
 
-def _finish(context: AnalysisContext, writer: Any, branch: Any, start: Start) -> Outcome:
+def _finish(
+    context: AnalysisContext[ModeAnalysis], writer: AnalysisWriter, branch: Continuation, start: Start
+) -> Outcome:
     table = finished_table(writer)
     summary = summarise(context.name, table) if table else []
     summary += finish_wheel(context, writer, start) if context.case.wheel is not None else []

@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any, Literal, Optional
 
 import numpy as np
+import numpy.typing as npt
 
-from ..case.contacts import ContactSpec
-from ..case.schema import StaticAnalysis
+from ..case.analysis import AnalysisSection, register_analysis
+from ..case.schema import Positive, PreloadSection, key
 from ..columns import Column
 from ..errors import NotConverged
+from ..model.contact import Contact
 from ..post.contact_history import OPEN, SLIP, STICK, normal_force, tangential_force
 from .parts.context import AnalysisContext, Outcome
-from .parts.rest import keep_pairs, rest_state
+from .parts.rest import keep_pairs, loaded_state
+
+if TYPE_CHECKING:
+    from ..case.facts import Facts
+    from ..case.reporter import Reporter
+    from ..model.rest import Rest
 
 COLUMNS = (
     Column("point", "1", "number of the row", "i"),
@@ -32,42 +39,62 @@ COLUMNS = (
 WORDS = {STICK: "stick", SLIP: "slip", OPEN: "open"}
 
 
-def run_static(context: AnalysisContext) -> Outcome:
-    """Solve the static state at every load factor. Collective."""
-    analysis = context.analysis
-    assert isinstance(analysis, StaticAnalysis)
-    context.leave_out([] if section_loads(context) else ["static loads (there are none: only the pairs' own act)"])
-    writer = context.writer(COLUMNS)
-    summary: list[str] = []
-    failure = None
-    try:
-        for factor in sorted(analysis.factors):
-            rest = rest_state(context, factor)
-            for row in _rows(context, rest, factor):
-                writer.append({**row, "point": writer.rows})
-            summary += _summary(context, rest, factor)
-    except NotConverged as error:
-        failure = error
-    reason = "all factors solved" if failure is None else f"factor {factor:g}: {failure.measured}"
-    if writer.rows:
-        keep_pairs(context, writer)
-    writer.close("done" if failure is None else "stopped", reason)
-    advice = failure.fix or "" if failure is not None else ""
-    return Outcome(writer.rows, reason, failure is None, summary, "a static state at every load factor", advice)
+@register_analysis
+class StaticAnalysis(AnalysisSection):
+    """``type = "static"``: the static state under the preload, pair by pair."""
+
+    type: Literal["static"]
+    factors: list[Positive] = key("factors on the loads of the preload", "-", "[0.5, 1.0]", default=[1.0], min_length=1)
+    preload: Optional[PreloadSection] = key(
+        "in place of [preload]", example='{ loads = ["centrifugal"] }', default=None
+    )
+
+    def own_preload(self) -> Optional[PreloadSection]:
+        return self.preload
+
+    def check(self, report: Reporter, facts: Facts) -> None:
+        super().check(report, facts)
+        section = self.preload or facts.preload
+        if self.factors != [1.0] and not (section and section.loads):
+            fix = 'remove the key, or name loads: `preload = { loads = ["centrifugal"] }`'
+            report.wrong(("factors",), "has no load to act on", "static loads in [preload]", fix)
+
+    def headline(self) -> str:
+        return f"static state at load factors {', '.join(f'{factor:g}' for factor in self.factors)}"
+
+    def run(self, context: AnalysisContext[StaticAnalysis]) -> Outcome:
+        """Solve the static state at every load factor. Collective."""
+        context.leave_out([] if section_loads(context) else ["static loads (there are none: only the pairs' own act)"])
+        writer = context.writer(COLUMNS)
+        summary: list[str] = []
+        failure = None
+        try:
+            for factor in sorted(self.factors):
+                rest = loaded_state(context, factor)
+                for row in _rows(context, rest, factor):
+                    writer.append({**row, "point": writer.rows})
+                summary += _summary(context, rest, factor)
+        except NotConverged as error:
+            failure = error
+        reason = "all factors solved" if failure is None else f"factor {factor:g}: {failure.measured}"
+        if writer.rows:
+            keep_pairs(context, writer)
+        writer.close("done" if failure is None else "stopped", reason)
+        advice = failure.fix or "" if failure is not None else ""
+        return Outcome(writer.rows, reason, failure is None, summary, "a static state at every load factor", advice)
 
 
-def section_loads(context: AnalysisContext) -> list[str]:
+def section_loads(context: AnalysisContext[StaticAnalysis]) -> list[str]:
     """Names of the static loads that act."""
     section = context.case.preload_of(context.analysis)
     return section.loads if section else []
 
 
-def _rows(context: AnalysisContext, rest: Any, factor: float) -> Iterator[dict[str, Any]]:
+def _rows(context: AnalysisContext[StaticAnalysis], rest: Rest, factor: float) -> Iterator[dict[str, Any]]:
     """One row for each pair, on every rank."""
     contacts = context.comm.bcast(rest.contacts)
     for spec, state in zip(context.case.contacts, contacts):
-        built = context.case.built.contacts.get(spec.name) if context.case.built else None
-        points = built.points if built is not None else None
+        points = spec.pairs.points
         for pair in range(spec.n_pairs):
             place = (np.nan,) * 3 if points is None else points[pair]
             yield {
@@ -79,7 +106,7 @@ def _rows(context: AnalysisContext, rest: Any, factor: float) -> Iterator[dict[s
             }
 
 
-def pair_state(spec: ContactSpec, state: Mapping[str, Any], pair: int) -> dict[str, Any]:
+def pair_state(spec: Contact, state: Mapping[str, Any], pair: int) -> dict[str, Any]:
     """Forces, status and gap of one pair, the last two as its law tells them.
 
     Parameters
@@ -95,7 +122,7 @@ def pair_state(spec: ContactSpec, state: Mapping[str, Any], pair: int) -> dict[s
     }
 
 
-def _summary(context: AnalysisContext, rest: Any, factor: float) -> list[str]:
+def _summary(context: AnalysisContext[StaticAnalysis], rest: Rest, factor: float) -> list[str]:
     """Status of the pairs and balance of the forces."""
     lines = []
     contacts = context.comm.bcast(rest.contacts)
@@ -114,14 +141,11 @@ def _summary(context: AnalysisContext, rest: Any, factor: float) -> list[str]:
     return lines
 
 
-def _resultant(context: AnalysisContext, spec: ContactSpec, f: Any) -> list[str]:
-    """Sum of the contact forces in space, beside that of the loads (dof = 3 * node + axis)."""
-    built = context.case.built
-    frames = built.contacts[spec.name].frames if built and spec.name in built.contacts else None
-    names = section_loads(context)
-    if frames is None or built is None or built.displacements is not None or not names:
+def _resultant(context: AnalysisContext[StaticAnalysis], spec: Contact, f: npt.NDArray[np.float64]) -> list[str]:
+    """Sum of the contact forces in space, beside that of the loads."""
+    frames, loads = spec.pairs.frames, context.case.structure.resultant(section_loads(context))
+    if frames is None or loads is None:
         return []
     total = np.einsum("kcx,ck->x", frames, f)
-    loads = np.sum([built.loads[name] for name in names], axis=0).reshape(-1, 3).sum(axis=0)
     shown = [", ".join(f"{value:.5g}" for value in vector) for vector in (total, loads)]
     return [f"{context.name}: contact carries ({shown[0]}) N along x, y, z of the loads' ({shown[1]}) N at factor 1"]

@@ -6,117 +6,160 @@ keeps its own table in a hidden folder, from which it goes on after a kill; all 
 
 from __future__ import annotations
 
-import math
 import shutil
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, Literal, Optional
 
 import numpy as np
 
-from ..case.schema import ModeAnalysis, WearAnalysis
-from ..errors import FretwaveError, NotConverged
+from ..case.analysis import AnalysisSection, register_analysis
+from ..case.checks_size import harmonic_memory
+from ..case.contacts import wear_areas as areas_of
+from ..case.schema import Positive, Whole, key
+from ..errors import FretwaveError, InputError
 from ..files.dimensions import names_of_data
 from ..mpi import groups
 from ..mpi.guard import on_first_rank
 from ..results.results import AnalysisWriter, has_results, open_results
-from .parts.branch import mode_problem, points_of, step_control
+from .mode import ModeAnalysis
 from .parts.context import AnalysisContext, Outcome
-from .parts.rest import keep_pairs, retained, start_mode
-from .wear_line import LINE, Line, columns, fields, wear_areas
+from .parts.rest import keep_pairs
+from .parts.wear_line import LINE, Line, columns, fields, march_line, wear_areas
+from .parts.wear_start import unworn_starts
+
+if TYPE_CHECKING:
+    import h5py
+    from mpi4py import MPI
+
+    from ..case.facts import Facts
+    from ..case.load import Case
+    from ..case.reporter import Reporter
+    from ..view.choice import ViewOptions
 
 
-def run_wear(context: AnalysisContext) -> Outcome:
-    """March all amplitudes. Collective."""
-    analysis = context.analysis
-    assert isinstance(analysis, WearAnalysis)
-    settings = cast(ModeAnalysis, context.case.settings(analysis))
-    folder = context.folder / f".{context.name}_lines"
-    kept = groups.Kept(folder, str(context.attributes["run_id"]))
-    starts = on_first_rank(context.comm, lambda: kept.load(0))
-    if starts is None:
-        starts = unworn_starts(replace(context, analysis=settings), analysis)
-        context.before_first()
-        if context.comm.rank == 0:
-            kept.save(0, starts)
-    lines = [
-        Line(number, amplitude, starts[f"y_{number}"], starts[f"outcome_{number}"], folder / f"line_{number:03d}")
-        for number, amplitude in enumerate(analysis.amplitude)
-        if f"y_{number}" in starts
-    ]
-    unit = float(starts["cycle_unit"])
-    context.console.line(f"{context.name}: a normalised cycle is {unit:.6g} vibration cycles")
-    march = LineRunner(context, settings, unit)
-    results = groups.run(context.comm, lines, march)
-    return _collect(context, analysis, lines, results, unit, folder)
+@register_analysis
+class WearAnalysis(AnalysisSection):
+    """``type = "wear"``: fretting wear of a mode at fixed amplitudes over wear cycles."""
+
+    pictures = ("wear", "wear_pairs")
+
+    type: Literal["wear"]
+    mode: str = key("mode analysis whose settings and branch this one takes", example='"mode"')
+    amplitude: list[Positive] = key("fixed modal amplitudes, one or a grid", "m", "[1.2e-3]", min_length=1)
+    cycles: Positive = key("normalised wear cycles to march", "-", "40.0")
+    coefficient: float = key("wear coefficient k_w", "1/Pa", "1e-14", ge=0, allow_inf_nan=False)
+    cycle_unit: Optional[Positive] = key(
+        "vibration cycles in a normalised one (by default: in which sliding 4 mu N0/kt a cycle leaves 1/e of the load)",
+        "-",
+        "1e6",
+        default=None,
+    )
+    stepper: Literal["heun", "bogacki_shampine", "trapezoidal", "tr_bdf2"] = key(
+        "step over wear cycles: explicit of order 2 or 3, implicit of order 2 (two)",
+        example='"tr_bdf2"',
+        default="bogacki_shampine",
+    )
+    tolerance: Positive = key(
+        "estimated error of a step, as normal load lost relative to the mean", "-", "1e-4", default=1e-3, lt=1
+    )
+    pressure_change: Positive = key(
+        "largest change of a pair's contact pressure in a step, relative to the mean", "-", "0.1", default=0.2
+    )
+    report_at: list[Positive] = key(
+        "normalised cycles at which the motion of a period is kept", "-", "[10.0, 40.0]", default_factory=list
+    )
+    harmonics: Optional[Whole] = key("highest harmonic, in place of the mode's", example="5", default=None, ge=1)
+    samples: Optional[Whole] = key(
+        "time samples of a period, in place of the mode's", example="256", default=None, ge=4
+    )
+
+    def settings(self, case: Case) -> ModeAnalysis:
+        """Its mode, with what it gives in place of the mode's."""
+        mode = case.analyses.of(ModeAnalysis)[self.mode]
+        own = {name: getattr(self, name) for name in ("harmonics", "samples") if getattr(self, name) is not None}
+        return mode.model_copy(update={**own, "name": self.name, "dampers": self.dampers or mode.dampers})
+
+    def decided_by(self) -> list[str]:
+        return [self.mode]
+
+    def check(self, report: Reporter, facts: Facts) -> None:
+        super().check(report, facts)
+        report.mode(("mode",), self.mode, facts.analyses_of("mode"))
+        for index, value in enumerate(self.report_at):
+            if value > self.cycles:
+                expected = f"at most cycles = {self.cycles:g}"
+                report.wrong(("report_at", index), "is beyond the last cycle", expected, "move it, or raise cycles")
+        if facts.model_known and facts.complete:
+            self._check_contacts(report, facts)
+
+    def _check_contacts(self, report: Reporter, facts: Facts) -> None:
+        """A contact with a normal direction, and the areas of its pairs."""
+        try:
+            areas_of(facts.contacts)
+        except InputError as error:
+            where = report.source.where((*report.path, "type"))
+            measured = error.where or error.measured
+            report.found.append(InputError(error.what, where, measured, error.expected, error.fix))
+
+    def least_memory(self, facts: Facts) -> Mapping[str, float]:
+        return harmonic_memory(self.harmonics, self.samples, 1, facts) if self.harmonics else {}
+
+    def headline(self) -> str:
+        amplitudes = ", ".join(f"{amplitude:g}" for amplitude in self.amplitude)
+        return f"wear of '{self.mode}' at a = {amplitudes} m over {self.cycles:g} normalised cycles"
+
+    def run(self, context: AnalysisContext[WearAnalysis]) -> Outcome:
+        """March all amplitudes. Collective."""
+        settings = self.settings(context.case)
+        folder = context.folder / f".{context.name}_lines"
+        kept = groups.Kept(folder, str(context.attributes["run_id"]))
+        starts = on_first_rank(context.comm, lambda: kept.load(0))
+        if starts is None:
+            starts = unworn_starts(context.of(settings), self)
+            context.before_first()
+            if context.comm.rank == 0:
+                kept.save(0, starts)
+        lines = [
+            Line(number, amplitude, starts[f"y_{number}"], starts[f"outcome_{number}"], folder / f"line_{number:03d}")
+            for number, amplitude in enumerate(self.amplitude)
+            if f"y_{number}" in starts
+        ]
+        unit = float(starts["cycle_unit"])
+        context.console.line(f"{context.name}: a normalised cycle is {unit:.6g} vibration cycles")
+        march = LineRunner(context, settings, unit)
+        results = groups.run(context.comm, lines, march)
+        return _collect(context, lines, results, unit, folder)
+
+    def view(
+        self, folder: Path, case: Case, options: ViewOptions, say: Callable[[str], None]
+    ) -> Optional[Sequence[Path]]:
+        """The pairs over wear cycles, unless points are asked for."""
+        from ..view.wear import view_wear
+
+        return None if options.points else view_wear(folder, case, self.name, options, say)
 
 
 class LineRunner:
     """Does a line on a group of ranks."""
 
-    def __init__(self, context: AnalysisContext, settings: ModeAnalysis, unit: float) -> None:
+    def __init__(self, context: AnalysisContext[WearAnalysis], settings: ModeAnalysis, unit: float) -> None:
         self.context, self.settings, self.unit = context, settings, unit
 
-    def __call__(self, line: Line, group: Any) -> dict[str, Any]:
-        from .wear_line import march_line
-
+    def __call__(self, line: Line, group: MPI.Comm) -> dict[str, Any]:
         return march_line(self.context, self.settings, self.unit, line, group)
 
 
-def unworn_starts(context: AnalysisContext, analysis: WearAnalysis) -> dict[str, Any]:
-    """Unknowns at each amplitude by its number, from the mode's branch, and the normalised cycle. Collective."""
-    from ..solve.continuation import Continuation
-    from ..solve.worn_mode import WornMode
-
-    settings = cast(ModeAnalysis, context.analysis)
-    stuck, rest = start_mode(context, settings.linear_mode)
-    harmonics = retained(context)
-    context.leave_out(harmonics.left_out)
-    problem = mode_problem(context, harmonics, stuck, rest)
-    low, high = min(settings.amplitude[0], *analysis.amplitude), max(settings.amplitude[1], *analysis.amplitude)
-    branch = Continuation(
-        problem, problem.initial(low), (low, high), step_control(settings.step), sorted(analysis.amplitude)
-    )
-    found: dict[str, Any] = {}
-    areas = wear_areas(context.case)
-    with WornMode(problem, analysis.coefficient, areas) as mode, context.console.progress(context.name):
-        for point in points_of(branch):
-            if "cycle_unit" not in found:
-                load = mode.measure(point.y, np.zeros(len(mode.areas))).load
-                found["cycle_unit"] = analysis.cycle_unit or mode.normal_cycle(load)
-            _take(context, analysis, point, found)
-            if len(found) == 1 + 2 * len(analysis.amplitude):
-                break
-    if len(found) < 1 + 2 * len(analysis.amplitude):
-        context.console.line(f"{context.name}: the mode ends early: {branch.reason}")
-    branch.destroy()
-    problem.destroy()
-    if len(found) < 2:
-        raise NotConverged(
-            "the mode reaches none of the amplitudes of wear", None, "no start", analysis.amplitude, "lower amplitudes"
-        )
-    return found
-
-
-def _take(context: AnalysisContext, analysis: WearAnalysis, point: Any, found: dict[str, Any]) -> None:
-    """Keep the unknowns of a point that lies on an amplitude, the first on a branch that folds. Collective."""
-    if point.event == "":
-        return
-    whole = np.concatenate(context.comm.allgather(point.y.getArray(readonly=True).copy()))
-    for number, amplitude in enumerate(analysis.amplitude):
-        if math.isclose(point.parameter, amplitude, rel_tol=1e-9) and f"y_{number}" not in found:
-            found[f"y_{number}"] = whole
-            found[f"outcome_{number}"] = np.array([point.newton, point.linear, point.residual])
-
-
 def _collect(
-    context: AnalysisContext, analysis: WearAnalysis, lines: list[Line], results: list[Any], unit: float, folder: Path
+    context: AnalysisContext[WearAnalysis], lines: list[Line], results: list[Any], unit: float, folder: Path
 ) -> Outcome:
     """All lines as one table. Collective."""
+    analysis = context.analysis
     marched = [result for result in results if isinstance(result, dict)]
     failures = _failures(analysis, lines, results)
     reason = "; ".join(failures or sorted({result["reason"] for result in marched}))
-    writer = _writer(context, analysis, unit, marched[0] if marched else {})
+    writer = _writer(context, unit, marched[0] if marched else {})
     try:
         for line in lines:
             _copy(context, writer, line)
@@ -141,27 +184,27 @@ def _failures(analysis: WearAnalysis, lines: list[Line], results: list[Any]) -> 
     return [f"a = {amplitude:g} m: {text}" for amplitude, text in zip(analysis.amplitude, reasons) if text]
 
 
-def _writer(context: AnalysisContext, analysis: WearAnalysis, unit: float, marched: dict[str, Any]) -> AnalysisWriter:
+def _writer(context: AnalysisContext[WearAnalysis], unit: float, marched: dict[str, Any]) -> AnalysisWriter:
     """The common table. The run folder is open since the starts were found."""
     context = replace(context, before_first=lambda: None, fields=fields(context.case))
     return context.writer(
         columns(context.case),
         labels=str(marched.get("labels", "")).split(),
         cycle_unit=unit,
-        wear_coefficient=analysis.coefficient,
+        wear_coefficient=context.analysis.coefficient,
         samples=marched.get("samples"),
         load_scale=marched.get("load_scale"),
     )
 
 
-def _why(result: Any) -> str:
+def _why(result: FretwaveError | dict[str, Any]) -> str:
     """Why a line did not end as it should; empty when it did."""
     if isinstance(result, FretwaveError):
         return str(result)
     return "" if result["status"] == "done" else str(result["reason"])
 
 
-def _copy(context: AnalysisContext, writer: AnalysisWriter, line: Line) -> None:
+def _copy(context: AnalysisContext[WearAnalysis], writer: AnalysisWriter, line: Line) -> None:
     """The rows of a line into the table of all. Collective."""
     active = context.comm.rank == 0
     path = line.folder / "results.h5"
@@ -183,7 +226,7 @@ def _rows_of(path: Path) -> int:
         return len(file[LINE]["points"]["point"]) if LINE in file else 0
 
 
-def _row(writer: AnalysisWriter, group: Any, row: int) -> tuple[Any, ...]:
+def _row(writer: AnalysisWriter, group: h5py.Group, row: int) -> tuple[Any, ...]:
     """What `AnalysisWriter.append` takes, read back."""
     values = {column.name: column.loaded(group["points"][column.name][row]) for column in writer.columns}
     values["point"] = writer.rows

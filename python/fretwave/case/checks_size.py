@@ -1,17 +1,17 @@
-"""Refuse an analysis that cannot fit into the memory of the machine, before anything of it is allocated."""
+"""What an analysis takes of memory at the least, and what the machine has: known before anything is allocated."""
 
 from __future__ import annotations
 
 import contextlib
 import os
 import resource
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from .contacts import ContactSpec
-from .reporter import Found, Reporter
-from .schema import AnalysisSection, HarmonicSection, TransientSection, WearAnalysis
-from .toml.source import Source
+if TYPE_CHECKING:
+    from ..model.contact import Contact
+    from .facts import Facts
 
 NUMBER = 8  #: bytes
 #: Vectors of all coefficients at once, at the very least: point, tangent, residual, predictor and those of SNES.
@@ -32,52 +32,26 @@ def machine_memory() -> float:
     return min(found)
 
 
-def check_sizes(
-    source: Source,
-    analyses: Mapping[int, AnalysisSection],
-    n_dof: int,
-    contacts: Sequence[ContactSpec],
-    sectors: int,
-    found: Found,
-) -> None:
-    """Every analysis fits into memory by the least that it can need.
+def harmonic_memory(harmonics: int, samples: int | None, copies: int, facts: Facts) -> dict[str, float]:
+    """Least memory [bytes] of harmonic balance by the key that asks for it, and what it is for.
 
     Parameters
     ----------
-    n_dof : of the model that is solved, at least
-    sectors : of the wheel, 1 for a whole structure
+    copies : sectors that are solved
     """
-    available = machine_memory()
-    columns = sum(int(contact.rows.shape[0]) for contact in contacts)
-    for number, analysis in analyses.items():
-        parts = _parts(analysis, n_dof, columns, sectors)
-        least = sum(parts.values())
-        if least > available:
-            key, shown = max(parts.items(), key=lambda part: part[1])[0].split(": ", 1)
-            Reporter(source, ("analysis", number), found).wrong(
-                (key,),
-                f"takes at least {size(least)} of memory: {shown}",
-                f"at most the {size(available)} of this machine",
-                "lower it, or take a machine with more memory",
-            )
-
-
-def _parts(analysis: AnalysisSection, n_dof: int, columns: int, sectors: int) -> dict[str, float]:
-    """Least memory [bytes] by the key that asks for it, and what it is for."""
-    if isinstance(analysis, TransientSection):
-        count = analysis.periods * analysis.samples_per_period
-        return {f"periods: {count} samples of {n_dof} dofs": 2.0 * NUMBER * n_dof * count}
-    if not isinstance(analysis, (HarmonicSection, WearAnalysis)) or not analysis.harmonics:
-        return {}
-    copies = sectors if getattr(analysis, "wheel", False) else 1
-    harmonics = analysis.harmonics
-    samples = analysis.samples or max(64, 1 << (16 * harmonics - 1).bit_length())
+    n_dof, columns = facts.least_dofs, contact_columns(facts.contacts)
+    count = samples or max(64, 1 << (16 * harmonics - 1).bit_length())
     return {
         f"harmonics: {VECTORS} vectors of {n_dof * copies} dofs": float(NUMBER) * VECTORS * n_dof * copies * harmonics,
-        f"{'samples' if analysis.samples else 'harmonics'}: {samples} samples of {columns * copies} contact motions": (
-            float(NUMBER) * SERIES * columns * copies * samples
+        f"{'samples' if samples else 'harmonics'}: {count} samples of {columns * copies} contact motions": (
+            float(NUMBER) * SERIES * columns * copies * count
         ),
     }
+
+
+def contact_columns(contacts: Sequence[Contact]) -> int:
+    """Relative motions of all pairs."""
+    return sum(contact.n_pairs * contact.components for contact in contacts)
 
 
 def size(count: float) -> str:

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from ..post.grid import value_text
 
 
-def complaint(values: Any) -> tuple[str, str] | None:
+def complaint(values: object) -> tuple[str, str] | None:
     """What is wrong with the values of a key, and what was expected; None when they are fine."""
     expected = "at least one value, each once: numbers, texts or arrays"
     if not isinstance(values, list) or not values:

@@ -1,75 +1,71 @@
-"""Checks of the keys that put an analysis on the whole wheel: `wheel`, `wave`, `mistuning`, `sector`."""
+"""Checks of the keys that put an analysis on a sector or the whole wheel: `nodal_diameter`, `wheel`, `mistuning`."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
+from ..model.structure import Structure
 from ..texts import nearest
-from .reporter import Found, Reporter
-from .schema import AnalysisSection, HarmonicSection, MistuningSection, ModeAnalysis
-from .sector import Neighbours
-from .toml.source import Source
+from .checks_common import about
+from .reporter import Reporter
+from .schema import MistuningSection
+
+if TYPE_CHECKING:
+    from .facts import Facts
+    from .harmonic import HarmonicSection
 
 
-def check_wheels(
-    source: Source,
-    analyses: Mapping[int, AnalysisSection],
-    neighbours: Neighbours | None,
-    dofs: Sequence[str] | None,
-    found: Found,
-) -> None:
-    """All that is wrong with analyses of the whole wheel.
-
-    Parameters
-    ----------
-    dofs : of one sector
-    """
-    for number, analysis in analyses.items():
-        if isinstance(analysis, HarmonicSection):
-            report = Reporter(source, ("analysis", number), found)
-            if analysis.wheel and neighbours is None:
-                report.wrong(
-                    ("wheel",), "is of no sector of a wheel", "a model with sectors", "remove the key, or add sectors"
-                )
-            _check_needs_wheel(report, analysis)
-            if neighbours is not None:
-                _check_on_wheel(report, analysis, neighbours, len(dofs or ()))
+def check_wave(report: Reporter, analysis: HarmonicSection, facts: Facts) -> None:
+    """Analyses of a sector say their nodal diameter; no others do."""
+    given = analysis.nodal_diameter
+    if facts.neighbours is None:
+        if given is not None:
+            fix = "remove the key, or give [model] its sectors"
+            about(report, "nodal_diameter", "is of no sector of a wheel", "a model with sectors", fix)
+        return
+    half = facts.neighbours.sectors // 2
+    if analysis.integrates() or (abs(given) <= half if given is not None else analysis.mistuning is not None):
+        return
+    what = "says no nodal diameter" if given is None else "has no such nodal diameter"
+    expected = f"-{half} .. {half}, negative for backward waves"
+    about(report, "nodal_diameter", what, expected, "add for example `nodal_diameter = 1`")
 
 
-def _check_needs_wheel(report: Reporter, analysis: HarmonicSection) -> None:
-    """Keys that mean something on a whole wheel alone."""
-    standing = isinstance(analysis, ModeAnalysis) and analysis.wave == "standing"
-    given = {"mistuning": analysis.mistuning is not None, "sector": analysis.sector is not None, "wave": standing}
-    for key in (key for key, is_given in given.items() if is_given and not analysis.wheel):
+def check_wheel(report: Reporter, analysis: HarmonicSection, facts: Facts) -> None:
+    """All that is wrong with the keys of the whole wheel."""
+    neighbours = facts.neighbours
+    if analysis.wheel and neighbours is None:
+        report.wrong(("wheel",), "is of no sector of a wheel", "a model with sectors", "remove the key, or add sectors")
+    for key in ("mistuning", "sector"):
+        if getattr(analysis, key) is not None:
+            check_needs_wheel(report, analysis, key)
+    if neighbours is not None:
+        _check_on_wheel(report, analysis, neighbours, len(facts.dofs or ()))
+
+
+def check_needs_wheel(report: Reporter, analysis: HarmonicSection, key: str) -> None:
+    """A key that means something on a whole wheel alone."""
+    if not analysis.wheel:
         report.wrong((key,), "needs the whole wheel", "beside `wheel = true`", "add `wheel = true`, or remove the key")
 
 
-def _check_on_wheel(report: Reporter, analysis: HarmonicSection, neighbours: Neighbours, n_dof: int) -> None:
-    n, diameters = neighbours.sectors, analysis.nodal_diameter
+def _check_on_wheel(report: Reporter, analysis: HarmonicSection, neighbours: Structure, n_dof: int) -> None:
+    n = neighbours.sectors
     if analysis.sector is not None and analysis.sector >= n:
         report.wrong(("sector",), "does not exist", f"0 to {n - 1}", "write `sector = 0`, or leave the key out")
-    if isinstance(analysis, ModeAnalysis) and analysis.wave == "standing":
-        if analysis.mistuning is not None:
-            fix = "remove it: the deviations decide how a mode stands"
-            report.wrong(("wave",), "is of a tuned wheel", "no `wave` beside `mistuning`", fix)
-        elif diameters is not None and not 0 < 2 * diameters < n:
-            fix = "remove the key: this wave stands still" if 2 * diameters % n == 0 else "give the diameters a plus"
-            report.wrong(
-                ("wave",), f"cannot be told apart at nodal_diameter = {diameters}", f"1 to {(n - 1) // 2}", fix
-            )
     if analysis.mistuning is not None:
         _check_mistuning(
             Reporter(report.source, (*report.path, "mistuning"), report.found), analysis.mistuning, neighbours
         )
-        if diameters is None and n_dof and analysis.linear_mode > n * n_dof:
+        if analysis.nodal_diameter is None and n_dof and analysis.linear_mode > n * n_dof:
             expected = f"1 to {n * n_dof}, the number of the wheel's dofs"
             report.wrong(("linear_mode",), "does not exist", expected, "write `linear_mode = 1`")
 
 
-def _check_mistuning(report: Reporter, mistuning: MistuningSection, neighbours: Neighbours) -> None:
+def _check_mistuning(report: Reporter, mistuning: MistuningSection, neighbours: Structure) -> None:
     if mistuning.of not in neighbours.parts:
         known = list(neighbours.parts)
-        fix = nearest(mistuning.of, known) or "name a part that the builder gives (BuiltModel.parts)"
+        fix = nearest(mistuning.of, known) or "name a part that the builder gives (Structure.parts)"
         report.wrong(("of",), "is no part of the stiffness", f"one of {', '.join(known)}", fix)
     given, drawn = mistuning.deviations, mistuning.standard_deviation
     if given is None and drawn is None:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import FretwaveError, InputError
-from ..model.structure import BuiltContact
+from ..model.pairs import Pairs
 from ..texts import nearest, toml
 from .schema import ContactSection
 from .toml.source import Source
@@ -42,9 +42,7 @@ def law_of(
 _FIX = {2: "give the key `tangents` beside `pairs`", 3: "such contacts come with a model that is built or imported"}
 
 
-def fits(
-    source: Source, number: int, law: Any, here: int, given: BuiltContact | None, found: list[FretwaveError]
-) -> bool:
+def fits(source: Source, number: int, law: Any, here: int, given: Pairs | None, found: list[FretwaveError]) -> bool:
     """Law and pairs have the same number of components (`here` of the pairs)."""
     wanted = getattr(law, "components", 1)
     if here != wanted:
@@ -61,7 +59,7 @@ def parameters_of(
     number: int,
     section: ContactSection,
     law: Any,
-    given: BuiltContact | None,
+    given: Pairs | None,
     found: list[FretwaveError],
 ) -> dict[str, Any] | None:
     """Each parameter from the case, per area or as it is, else from the builder, else the law's default."""

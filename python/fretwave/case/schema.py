@@ -1,7 +1,8 @@
 """What may stand in a case file: every key with its one-line doc, unit and default.
 
-The models below are the only place where keys, defaults and plain bounds are written. Checks that need
-matrices or other entries are in :mod:`fretwave.case.checks`.
+The models below are the only place where keys, defaults and plain bounds are written, but for those of an analysis,
+which stand in its own file (:mod:`fretwave.analyses`). Checks that need matrices or other entries are in
+:mod:`fretwave.case.checks`.
 """
 
 from __future__ import annotations
@@ -199,215 +200,6 @@ class MistuningSection(Section):
     )
 
 
-class AnalysisSection(Section):
-    """What every ``[[analysis]]`` has."""
-
-    name: Name = key("unique name; results go to <name>.csv", example='"mode"', pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")
-    type: str = key("kind of analysis", example='"mode"')
-    dampers: list[Damper] = key(
-        "viscous dampers to ground added in this analysis",
-        example='[{ dof = "m1", c = -1.0 }]',
-        default_factory=list,
-    )
-    petsc: str = key("PETSc options of this analysis", example='"-snes_rtol 1e-9"', default="")
-
-
-class HarmonicSection(AnalysisSection):
-    """Keys of the analyses in the frequency domain."""
-
-    harmonics: Whole = key("highest harmonic", example="21", ge=1)
-    retain: Literal["auto", "odd", "all"] = key(
-        "which harmonics up to the highest are kept", example='"auto"', default="auto"
-    )
-    samples: Optional[Whole] = key("time samples of a period in the contact law", example="1024", default=None, ge=4)
-    linear_mode: Whole = key("linear mode to start from, 1 is the lowest", example="1", default=1, ge=1)
-    nodal_diameter: Optional[Whole] = key(
-        "nodal diameters of the wave on a sector, negative for a backward wave", example="4", default=None
-    )
-    aerodynamics: bool = key("the forces of [aerodynamics] act", example="true", default=False)
-    wheel: bool = key("solve all sectors of the wheel in place of one", example="true", default=False)
-    mistuning: Optional[MistuningSection] = key(
-        "deviations of the wheel's sectors", example='{ of = "blade", standard_deviation = 0.02 }', default=None
-    )
-    sector: Optional[Whole] = key(
-        "sector of the wheel whose dof is normalised or observed (0; of a mistuned mode where it moves most)",
-        example="7",
-        default=None,
-        ge=0,
-    )
-    step: StepSection = key("step control", example="{ initial = 0.05, maximum = 0.3 }", default_factory=StepSection)
-    preload: Optional[PreloadSection] = key("in place of [preload]", example="{ pair_loads = true }", default=None)
-
-
-class ModeAnalysis(HarmonicSection):
-    """``type = "mode"``: a nonlinear mode over its amplitude."""
-
-    type: Literal["mode"]
-    method: Literal["CNM", "EPMC"] = key(
-        "complex nonlinear mode (decaying) or extended periodic motion", example='"CNM"', default="CNM"
-    )
-    wave: Literal["travelling", "standing"] = key(
-        "of a tuned wheel: a wave that runs around, or one that stands with its crest at `sector`",
-        example='"standing"',
-        default="travelling",
-    )
-    normalise: Dof = key("dof whose fundamental harmonic is the modal amplitude", example='"m1"')
-    amplitude: list[Positive] = key("first and last modal amplitude", "m", "[0.02, 3.0]", min_length=2, max_length=2)
-    report_at: list[Positive] = key(
-        "amplitudes at which the motion of a period is kept", "m", "[0.1, 0.5]", default_factory=list
-    )
-
-
-class FlutterAnalysis(HarmonicSection):
-    """``type = "flutter"``: modes of several nodal diameters with [aerodynamics], and their limit cycles."""
-
-    type: Literal["flutter"]
-    method: Literal["CNM", "EPMC"] = key(
-        "complex nonlinear mode (decaying) or extended periodic motion", example='"CNM"', default="CNM"
-    )
-    normalise: Dof = key("dof whose fundamental harmonic is the modal amplitude", example='"m1"')
-    amplitude: list[Positive] = key("first and last modal amplitude", "m", "[1e-5, 1e-2]", min_length=2, max_length=2)
-    nodal_diameters: Optional[list[Whole]] = key(
-        "waves looked at, negative for backward ones; all unless told", example="[-4, 3, 4]", default=None, min_length=1
-    )
-    report_at: list[Positive] = key(
-        "amplitudes at which the motion of a period is kept", "m", "[1e-4]", default_factory=list
-    )
-
-
-class StaticAnalysis(AnalysisSection):
-    """``type = "static"``: the static state under the preload, pair by pair."""
-
-    type: Literal["static"]
-    factors: list[Positive] = key("factors on the loads of the preload", "-", "[0.5, 1.0]", default=[1.0], min_length=1)
-    preload: Optional[PreloadSection] = key(
-        "in place of [preload]", example='{ loads = ["centrifugal"] }', default=None
-    )
-
-
-class ForcedAnalysis(HarmonicSection):
-    """``type = "forced"``: frequency responses at several excitation levels."""
-
-    type: Literal["forced"]
-    backbone: Union[str, list[str]] = key(
-        "mode analyses whose backbones the peaks are compared with",
-        example='["mode"]',
-        default_factory=list,
-    )
-    force: dict[Dof, float] = key(
-        "force amplitude of each excited dof, cosine at harmonic 1, delayed from sector to sector of a wheel",
-        "N",
-        "{ m1 = 1.0 }",
-        min_length=1,
-    )
-    engine_order: Optional[Whole] = key(
-        "order of the excitation of a wheel, in place of nodal_diameter; negative where the rotor turns with the "
-        "sectors' numbers",
-        example="4",
-        default=None,
-    )
-    levels: list[Positive] = key("factors on the force", "-", "[1.0, 2.0]", min_length=1)
-    frequency: list[Positive] = key(
-        "first and last excitation frequency", "Hz", "[3.0, 5.0]", min_length=2, max_length=2
-    )
-    observe: Dof = key("dof whose fundamental harmonic is reported", example='"m1"')
-    report_at: list[Positive] = key(
-        "frequencies at which the motion of a period is kept", "Hz", "[3.9]", default_factory=list
-    )
-    time_points: Whole = key(
-        "points of each response that are checked by time integration", example="4", default=0, ge=0
-    )
-
-
-class WearAnalysis(AnalysisSection):
-    """``type = "wear"``: fretting wear of a mode at fixed amplitudes over wear cycles."""
-
-    type: Literal["wear"]
-    mode: str = key("mode analysis whose settings and branch this one takes", example='"mode"')
-    amplitude: list[Positive] = key("fixed modal amplitudes, one or a grid", "m", "[1.2e-3]", min_length=1)
-    cycles: Positive = key("normalised wear cycles to march", "-", "40.0")
-    coefficient: float = key("wear coefficient k_w", "1/Pa", "1e-14", ge=0, allow_inf_nan=False)
-    cycle_unit: Optional[Positive] = key(
-        "vibration cycles in a normalised one (by default: in which sliding 4 mu N0/kt a cycle leaves 1/e of the load)",
-        "-",
-        "1e6",
-        default=None,
-    )
-    stepper: Literal["heun", "bogacki_shampine", "trapezoidal", "tr_bdf2"] = key(
-        "step over wear cycles: explicit of order 2 or 3, implicit of order 2 (two)",
-        example='"tr_bdf2"',
-        default="bogacki_shampine",
-    )
-    tolerance: Positive = key(
-        "estimated error of a step, as normal load lost relative to the mean", "-", "1e-4", default=1e-3, lt=1
-    )
-    pressure_change: Positive = key(
-        "largest change of a pair's contact pressure in a step, relative to the mean", "-", "0.1", default=0.2
-    )
-    report_at: list[Positive] = key(
-        "normalised cycles at which the motion of a period is kept", "-", "[10.0, 40.0]", default_factory=list
-    )
-    harmonics: Optional[Whole] = key("highest harmonic, in place of the mode's", example="5", default=None, ge=1)
-    samples: Optional[Whole] = key(
-        "time samples of a period, in place of the mode's", example="256", default=None, ge=4
-    )
-
-
-class TransientSection(AnalysisSection):
-    """Keys of the analyses by direct time integration."""
-
-    mode: str = key("mode analysis to start from and compare with", example='"mode"')
-    amplitude: list[Positive] = key("start amplitudes", "m", "[0.05, 0.3, 2.5]", min_length=1)
-    periods: Whole = key("vibration periods to integrate", example="30", ge=1)
-    samples_per_period: Whole = key("output samples of a period", example="64", default=64, ge=8)
-    tolerance: Positive = key("relative tolerance of the time integration", "-", "1e-10", default=1e-10, lt=1)
-
-
-class FreeDecayAnalysis(TransientSection):
-    """``type = "free_decay"``: decay and frequency of each cycle against the mode."""
-
-    type: Literal["free_decay"]
-
-
-class LimitCycleAnalysis(TransientSection):
-    """``type = "limit_cycle"``: where starts at several amplitudes end up."""
-
-    type: Literal["limit_cycle"]
-
-
-class SweepAnalysis(AnalysisSection):
-    """``type = "sweep"``: another analysis for every value of some keys of the case."""
-
-    type: Literal["sweep"]
-    of: str = key("analysis to run for every value", example='"mode"')
-    over: dict[str, Any] = key(
-        "values of keys, addressed as --set does; of several keys all combinations",
-        example='{ "model.options.friction" = [0.1, 0.2, 0.5] }',
-        min_length=1,
-    )
-    overrides: dict[str, Any] = key(
-        "other values of keys for these runs", example="{ mode.amplitude = [1e-6, 1e-2] }", default_factory=dict
-    )
-    groups: Optional[Whole] = key(
-        "most groups of ranks, each with a value at a time (as many as there are ranks and values unless told)",
-        example="2",
-        default=None,
-        ge=1,
-    )
-
-
-ANALYSES: dict[str, type[AnalysisSection]] = {
-    "static": StaticAnalysis,
-    "mode": ModeAnalysis,
-    "forced": ForcedAnalysis,
-    "flutter": FlutterAnalysis,
-    "free_decay": FreeDecayAnalysis,
-    "limit_cycle": LimitCycleAnalysis,
-    "sweep": SweepAnalysis,
-    "wear": WearAnalysis,
-}
-
-
 class StudySection(Section):
     """``[study]``: sweeps of ``fretwave study``, each with the others at their finest (of wear: as in the analysis)."""
 
@@ -432,6 +224,7 @@ class StudySection(Section):
 #: Top-level keys; analyses cannot bear these names, or ``--set`` could not tell them apart.
 TOP_LEVEL = {
     "title": "one line that says what the case is",
+    "plugins": "Python files beside the case that add contact laws and analyses",
     "model": "matrices and names of the degrees of freedom, or what makes them",
     "reduction": "Craig-Bampton reduction",
     "preload": "the static state that the dynamics move about",

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
-from typing import Any
+from pathlib import Path
 
 from pydantic import BaseModel
+from pydantic.fields import FieldInfo
 
+from ..case.analysis import AnalysisSection
+from ..case.plugins import read_plugins
 from ..case.schema import (
-    ANALYSES,
+    TOP_LEVEL,
     AerodynamicsSection,
-    AnalysisSection,
     ContactSection,
     Damper,
     MistuningSection,
@@ -20,11 +22,23 @@ from ..case.schema import (
     StepSection,
     StudySection,
 )
+from ..case.toml.source import Source
 from ..case.toml.validation import describe
+from ..errors import CaseErrors, FretwaveError
+from ..registry import kinds
 
 
-def key_lines() -> Iterator[str]:
-    """The reference, section by section; keys that all analyses share are said once."""
+def key_lines(case: Path | None = None) -> Iterator[str]:
+    """The reference, section by section; keys that all analyses share are said once.
+
+    Parameters
+    ----------
+    case : whose plug-ins' analyses are listed too
+    """
+    if case is not None:
+        _load_plugins(case)
+    yield "top level"
+    yield from (f"  {name:<18} {'':<12} {text}" for name, text in TOP_LEVEL.items() if name in ("title", "plugins"))
     sections: dict[str, type[BaseModel]] = {
         "[model]": ModelSection,
         "[reduction]": ReductionSection,
@@ -36,7 +50,7 @@ def key_lines() -> Iterator[str]:
     for title, section in sections.items():
         yield title
         yield from _section(section)
-    for kind, analysis in ANALYSES.items():
+    for kind, analysis in kinds().items():
         yield f'[[analysis]] with type = "{kind}"'
         yield from _section(analysis, without=set(AnalysisSection.model_fields))
     tables: dict[str, type[BaseModel]] = {
@@ -50,13 +64,20 @@ def key_lines() -> Iterator[str]:
         yield from _section(nested)
 
 
+def _load_plugins(case: Path) -> None:
+    source, found = Source(case), list[FretwaveError]()
+    read_plugins(source, found)
+    if found:
+        raise CaseErrors(found, source.label)
+
+
 def _section(section: type[BaseModel], without: Collection[str] = ()) -> Iterator[str]:
     for name, field in section.model_fields.items():
         if name not in without:
             yield f"  {name:<18} {_default(field):<12} {describe(field)}"
 
 
-def _default(field: Any) -> str:
+def _default(field: FieldInfo) -> str:
     if field.is_required():
         return "required"
     value = field.get_default(call_default_factory=True)

@@ -7,13 +7,18 @@ import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from ..errors import EXIT_DONE, InputError
 from ..mpi.guard import guarded, install
 from ..texts import display, is_there
 from .parser import Parser
 from .world import world, world_if_any
+
+if TYPE_CHECKING:
+    from argparse import _SubParsersAction
+
+    _SubParsers = _SubParsersAction[Parser]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -58,7 +63,7 @@ def parser() -> argparse.ArgumentParser:
     _add_run(commands)
     check = commands.add_parser("check", help="check a case and say what would run")
     _add_case(check, optional=True)
-    check.add_argument("--keys", action="store_true", help="list all keys of case files instead")
+    check.add_argument("--keys", action="store_true", help="list all keys instead, with those of a case's plug-ins")
     check.set_defaults(command=_check)
     _add_sweep(commands)
     resume = commands.add_parser("resume", help="go on with a run that was cut off, on any number of ranks")
@@ -98,7 +103,7 @@ def _add_case(command: argparse.ArgumentParser, optional: bool = False) -> None:
     command.add_argument("--quick", action="store_true", help="the short form: overrides of the table [quick]")
 
 
-def _add_run(commands: Any) -> None:
+def _add_run(commands: _SubParsers) -> None:
     run = commands.add_parser("run", help="run the analyses of a case")
     _add_case(run)
     run.add_argument("--out", type=Path, metavar="DIR", help="run folder (default runs/<case>)")
@@ -107,7 +112,7 @@ def _add_run(commands: Any) -> None:
     run.set_defaults(command=_run)
 
 
-def _add_sweep(commands: Any) -> None:
+def _add_sweep(commands: _SubParsers) -> None:
     sweep = commands.add_parser(
         "sweep",
         help="run a case for every value of some keys, on groups of ranks",
@@ -130,7 +135,7 @@ def _add_sweep(commands: Any) -> None:
     sweep.set_defaults(command=_sweep)
 
 
-def _add_view(commands: Any) -> None:
+def _add_view(commands: _SubParsers) -> None:
     view = commands.add_parser(
         "view",
         help="write the motion over a period and the contact pairs for ParaView",
@@ -152,7 +157,7 @@ def _add_view(commands: Any) -> None:
     view.set_defaults(command=_view)
 
 
-def _add_import(commands: Any) -> None:
+def _add_import(commands: _SubParsers) -> None:
     add = commands.add_parser(
         "import",
         help="bring matrices of a finite-element code into one model file",
@@ -238,7 +243,7 @@ def _check(options: argparse.Namespace) -> int:
     if options.keys:
         from .keys import key_lines
 
-        print("\n".join(key_lines()))
+        print("\n".join(key_lines(options.case)))
         return EXIT_DONE
     if options.case is None:
         raise InputError("no case is given", "fretwave check", fix="`fretwave check cases/two_dof/case.toml`")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,6 +14,10 @@ from ..files.lock import is_taken
 from ..results.record import RECORD, read_record
 from ..results.results import open_results
 from ..texts import display
+
+if TYPE_CHECKING:
+    import h5py
+
 
 HEADINGS = ("analysis", "type", "status", "points", "range", "peak", "folds", "error", "wall")
 
@@ -73,7 +77,7 @@ def _heading(folder: Path, title: str) -> list[str]:
     return [line for line in (title, f"{status}, {ranks}, started {started}") if line]
 
 
-def describe(name: str, group: Any) -> tuple[str, ...]:
+def describe(name: str, group: h5py.Group) -> tuple[str, ...]:
     """One row of the table."""
     points = group["points"]
     table = {key: points[key][()] for key in points}
@@ -125,7 +129,7 @@ def _wave(cycle: Mapping[str, Any]) -> str:
     return f"nodal diameter {cycle['nodal_diameter']}, " if "nodal_diameter" in cycle else ""
 
 
-def _notes(name: str, group: Any) -> list[str]:
+def _notes(name: str, group: h5py.Group) -> list[str]:
     """Limit cycles, and why an analysis is not complete."""
     words = {True: "stable", False: "unstable", None: "stability unknown"}
     if group.attrs["type"] == "sweep":

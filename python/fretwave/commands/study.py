@@ -5,11 +5,14 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..run.study import REPEATS, run_study
 from .parser import Parser
 from .world import world
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -22,7 +25,7 @@ def main(arguments: Sequence[str]) -> int:
         return run_study(options, arguments, comm)
 
 
-def resume_study(folder: Path, record: dict[str, Any], comm: Any) -> int:
+def resume_study(folder: Path, record: dict[str, Any], comm: MPI.Comm) -> int:
     """Go on with a study that was cut off; returns the exit code. Collective."""
     arguments = record["study"]["arguments"]
     options = _parser().parse_args(arguments)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..case.load import changed_keys
 from ..console import Console
@@ -15,15 +15,18 @@ from ..mpi.guard import on_first_rank
 from ..mpi.interrupt import say_how_to_go_on
 from ..post.grid import Plan
 from ..results.runfolder import CASE_COPY, RunFolder, new_record, peak_memory_mb, read_copy
-from ..results.sweep_summary import landmarks
+from ..results.sweep_summary import landmarks, summary_of
 from ..results.sweeps import write_summary, write_sweep
 from ..run.order import RunOptions
 from ..run.runner import Runner, plot
 from ..run.sweep import Checked, Sweep
 from ..texts import display
 
+if TYPE_CHECKING:
+    from mpi4py import MPI
 
-def sweep_case(path: Path, options: RunOptions, plan: Plan, n_groups: int | None, comm: Any) -> int:
+
+def sweep_case(path: Path, options: RunOptions, plan: Plan, n_groups: int | None, comm: MPI.Comm) -> int:
     """``fretwave sweep``: run a case for every value from the start; returns the exit code. Collective.
 
     Raises
@@ -40,13 +43,15 @@ def sweep_case(path: Path, options: RunOptions, plan: Plan, n_groups: int | None
     sweep.folder = folder / "values"
     told = {key: getattr(options, key) for key in ("overrides", "quick", "only", "petsc")}
     given = {"path": str(path.resolve()), **told, "digest": first.digest, "resolved": first.resolved}
+    if first.plugins:
+        given["plugins"] = [plugin.plain() for plugin in first.plugins]
     record = comm.bcast(new_record(given, comm.size) if comm.rank == 0 else None)
     digests = [one.digest for one in checked]
     record["sweep"] = {"over": dict(plan.over), "groups": n_groups, "digests": digests}
     return _run_sweep(sweep, first, RunFolder(folder, record, first.text, comm.rank == 0), comm)
 
 
-def resume_sweep(folder: Path, record: dict[str, Any], comm: Any, plots: bool = True) -> int:
+def resume_sweep(folder: Path, record: dict[str, Any], comm: MPI.Comm, plots: bool = True) -> int:
     """Go on with the values of a sweep that are not done; returns the exit code. Collective.
 
     Raises
@@ -75,7 +80,7 @@ def resume_sweep(folder: Path, record: dict[str, Any], comm: Any, plots: bool = 
     return _run_sweep(sweep, checked[0], RunFolder(folder, record, checked[0].text, comm.rank == 0, True), comm)
 
 
-def _run_sweep(sweep: Sweep, first: Checked, folder: RunFolder, comm: Any) -> int:
+def _run_sweep(sweep: Sweep, first: Checked, folder: RunFolder, comm: MPI.Comm) -> int:
     """Run, put together, draw, and say what did not come to its end."""
     console = Console(comm.rank == 0, folder.log)
     on_first_rank(comm, folder.check_free)
@@ -87,7 +92,7 @@ def _run_sweep(sweep: Sweep, first: Checked, folder: RunFolder, comm: Any) -> in
         folder.leave()
 
 
-def _do_sweep(sweep: Sweep, first: Checked, folder: RunFolder, console: Console, comm: Any) -> int:
+def _do_sweep(sweep: Sweep, first: Checked, folder: RunFolder, console: Console, comm: MPI.Comm) -> int:
     began = time.perf_counter()
     count = groups.group_count(comm.size, len(sweep.plan), sweep.n_groups)
     ranks = f"{comm.size} rank{'s' * (comm.size > 1)} in {count} group{'s' * (count > 1)}"
@@ -124,7 +129,8 @@ def _write(
             attributes = {"run_id": run_id, "status": "done" if complete else "stopped", "reason": ""}
             rows = write_sweep(folder.path, name, name, sweep.plan, branches, attributes, first.title)
             summary += [{"analysis": name, **row} for row in rows]
-            lines += landmarks(name, sweep.plan, rows)
+            of = summary_of(str(branches[0].attributes["type"]))
+            lines += landmarks(name, sweep.plan, rows, of)
     if summary:
         lead = [*sweep.plan.keys, "value", "analysis"]
         ordered = [{key: row[key] for key in (*lead, *(k for k in row if k not in lead))} for row in summary]

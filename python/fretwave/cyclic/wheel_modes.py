@@ -14,7 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ..model.modes import LinearMode
-from .sector import Sector, around, wave_mode
+from ..model.sectors import around
+from .sector import Sector, wave_mode
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]

@@ -19,9 +19,10 @@ import numpy as np
 import numpy.typing as npt
 
 from ..model.modes import LinearMode
+from ..model.sectors import around
 from ..post.wave_content import participation, wave_content
 from .engine_order import folded
-from .sector import Sector, around
+from .sector import Sector
 
 Complex = npt.NDArray[np.complex128]
 

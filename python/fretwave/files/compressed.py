@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
+import scipy.sparse as sp
 
 
-def check_compressed(matrix: Any) -> None:
+def check_compressed(matrix: sp.spmatrix) -> None:
     """Of any kind of matrix; only compressed ones (rows, columns, blocks) have something to check.
 
     Raises

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
+
+if TYPE_CHECKING:
+    import h5py
 
 
-def name_dimensions(group: Any, data: Any, names: Sequence[str] = ()) -> None:
+def name_dimensions(group: h5py.Group, data: h5py.Dataset, names: Sequence[str] = ()) -> None:
     """Dimension scales for every axis of a dataset: those of this group or the one above, or new ones in this group.
 
     netCDF-4 wants each axis named by a scale in the dataset's own group or in one above. Axes beyond `names` are
@@ -27,7 +31,7 @@ def name_dimensions(group: Any, data: Any, names: Sequence[str] = ()) -> None:
         data.dims[axis].attach_scale(holder[name])
 
 
-def put_array(group: Any, name: str, values: Any, attributes: Mapping[str, Any]) -> None:
+def put_array(group: h5py.Group, name: str, values: npt.ArrayLike, attributes: Mapping[str, Any]) -> None:
     """A further array in the group, replacing one of the same name."""
     for key in [name, *(_axis_of(name, axis) for axis in range(np.ndim(values)))]:
         if key in group:
@@ -37,7 +41,7 @@ def put_array(group: Any, name: str, values: Any, attributes: Mapping[str, Any])
     name_dimensions(group, data)
 
 
-def names_of_data(group: Any) -> list[str]:
+def names_of_data(group: h5py.Group) -> list[str]:
     """Names of the datasets of a group that are no dimension scales."""
     from h5py import h5ds
 

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from ..model.laws import Role
 
 if TYPE_CHECKING:
-    from ..model.model import Contact
+    from ..model.contact import Contact
 
 Array = npt.NDArray[np.float64]
 

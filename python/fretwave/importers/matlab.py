@@ -10,7 +10,7 @@ a dataset with its dimensions reversed; complex numbers are compounds (real, ima
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy.io
@@ -19,6 +19,10 @@ import scipy.sparse as sp
 from ..texts import display
 from .entries import Entries
 from .npz import choose
+
+if TYPE_CHECKING:
+    import h5py
+
 
 NUMERIC = ("sparse", "double", "single", "int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64")
 
@@ -49,7 +53,7 @@ def _is_matrix(item: Any) -> bool:
     return item.ndim == 2 and (item.dtype.kind in "fiu" or item.dtype.names == ("real", "imag"))
 
 
-def _sparse(group: Any) -> sp.csc_matrix:
+def _sparse(group: h5py.Group) -> sp.csc_matrix:
     starts = group["jc"][()].astype(np.int64)
     shape = (int(group.attrs["MATLAB_sparse"]), len(starts) - 1)
     if "data" not in group:

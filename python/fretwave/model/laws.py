@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..errors import InputError
+from ..registry import LAW, admit
 
 Array = npt.NDArray[np.float64]
 
@@ -317,16 +318,18 @@ def register_law(law: type[PythonLaw]) -> type[PythonLaw]:
     Raises
     ------
     InputError
-        A compiled law has the name, or two parameters have one role.
+        A compiled law or one of another file has the name, or two parameters have one role.
     """
     info = law.info()
     where = f"law '{info.name}'"
-    if info.name in _compiled():
-        raise InputError("a contact law of this name is there already", where, fix="give it another name")
+    with suppress(ImportError):  # where results are only drawn the core need not be there
+        if info.name in _compiled():
+            raise InputError("a contact law of this name is there already", where, fix="give it another name")
     roles = [parameter.role for parameter in info.parameters if parameter.role != Role.NONE]
     twice = sorted({role.value for role in roles if roles.count(role) > 1})
     if twice:
         raise InputError("two parameters of a law have one role", where, twice, "one each", "leave a role out")
+    admit(LAW, info.name, _registered, law)
     _registered[info.name] = law
     return law
 

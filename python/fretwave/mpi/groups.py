@@ -25,6 +25,7 @@ from .guard import all_ranks_failed, on_first_rank
 if TYPE_CHECKING:
     from mpi4py import MPI
 
+
 Task = TypeVar("Task")
 
 
@@ -65,9 +66,9 @@ class Kept:
 
 
 def run(
-    comm: MPI.Intracomm,
+    comm: MPI.Comm,
     tasks: Sequence[Task],
-    work: Callable[[Task, MPI.Intracomm], Any],
+    work: Callable[[Task, MPI.Comm], Any],
     n_groups: int | None = None,
     kept: Kept | None = None,
 ) -> list[Any]:
@@ -100,8 +101,7 @@ def run(
     done = on_first_rank(comm, lambda: _loaded(kept, len(tasks)))
     waiting = [number for number in range(len(tasks)) if number not in done]
     count = group_count(comm.size, len(waiting), n_groups)
-    own = comm.Split(comm.rank * count // comm.size, comm.rank) if count > 1 else comm
-    group = cast("MPI.Intracomm", own)
+    group = comm.Split(comm.rank * count // comm.size, comm.rank) if count > 1 else comm
     queue = _Queue(comm if count > 1 else None)
     mine: dict[int, Any] = {}
     while (place := group.bcast(queue.take() if group.rank == 0 else None)) < len(waiting):
@@ -136,7 +136,7 @@ def _loaded(kept: Kept | None, count: int) -> dict[int, Any]:
     return {number: result for number, result in found.items() if result is not None}
 
 
-def _attempt(work: Callable[[Task, MPI.Intracomm], Any], task: Task, group: MPI.Intracomm) -> Union[Any, FretwaveError]:
+def _attempt(work: Callable[[Task, MPI.Comm], Any], task: Task, group: MPI.Comm) -> Union[Any, FretwaveError]:
     """The result of a task, or the error that it ended in on every rank; an error of some ranks alone is raised."""
     try:
         return work(task, group)
@@ -155,14 +155,14 @@ class _Queue:
         None for a queue with one caller. Collective.
     """
 
-    def __init__(self, comm: MPI.Intracomm | None) -> None:
+    def __init__(self, comm: MPI.Comm | None) -> None:
         self._window: Any = None
         self._next = -1
         if comm is None:
             return
         from mpi4py import MPI
 
-        self._window = MPI.Win.Allocate(8 * (comm.rank == 0), 8, comm=comm)
+        self._window = MPI.Win.Allocate(8 * (comm.rank == 0), 8, comm=cast("MPI.Intracomm", comm))
         if comm.rank == 0:
             self._window.Lock(0)
             np.frombuffer(self._window.tomemory(), "i8")[:] = 0

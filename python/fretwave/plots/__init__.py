@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 from numpy.linalg import LinAlgError
 
+from ..registry import kinds
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
@@ -18,23 +20,15 @@ if TYPE_CHECKING:
 
     Family = Callable[[Run], Iterator[tuple[str, Figure]]]
 
-FAMILIES = (
-    "trajectories",
-    "backbone",
-    "phase_planes",
-    "loops",
-    "faces",
-    "wheel",
-    "limit_cycles",
-    "forced",
-    "forced_blades",
-    "flutter",
-    "free_decay",
-    "wear",
-    "wear_pairs",
-    "study",
-    "sweeps",
-)
+#: Of no analysis.
+OTHERS = ("study",)
+
+
+def families() -> list[tuple[str, Family]]:
+    """Families of pictures: the modules here that the kinds of analysis name, and what kinds draw by themselves."""
+    known = kinds()
+    modules = dict.fromkeys([*(name for kind in known.values() for name in kind.pictures), *OTHERS])
+    return [*((name, _family(name)) for name in modules), *((name, kind.figures) for name, kind in known.items())]
 
 
 def plot_run(run_folder: str | Path, only: Sequence[str] | None = None, failed: list[str] | None = None) -> list[Path]:
@@ -57,9 +51,9 @@ def plot_run(run_folder: str | Path, only: Sequence[str] | None = None, failed: 
     written = []
     with style.rules(), np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of ranges without a width and values without a logarithm
-        for family in FAMILIES:
+        for family, figures in families():
             try:
-                for name, figure in _family(family)(run):
+                for name, figure in figures(run):
                     if only is None or family in only or _of_analysis(name, run, only):
                         written.append(style.save(figure, run.folder / f"{name}.png"))
             except (ArithmeticError, ValueError, IndexError, LinAlgError) as error:

@@ -18,7 +18,7 @@ from ..files.dimensions import names_of_data
 from ..post.grid import Plan, short_names
 from ..results.file import open_results
 from ..results.reader import Analysis, Run, Table
-from ..results.sweep_summary import SPLIT
+from ..results.sweep_summary import split_of
 from . import style
 
 #: more branches than these are told apart by a colour bar
@@ -53,7 +53,7 @@ class Swept:
     @classmethod
     def of(cls, analysis: Analysis) -> Swept:
         with open_results(analysis.path) as file:
-            group, split = file[analysis.name]["summary"], SPLIT.get(str(analysis.attributes["of_type"]), "")
+            group, split = file[analysis.name]["summary"], split_of(str(analysis.attributes["of_type"]))
             names = [*names_of_data(group), *([split] if split in group else [])]
             summary = {key: np.asarray(group[key][()], dtype=float) for key in names}
         parts = [float(part) for part in summary.pop(split, ())]

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
 
@@ -15,6 +16,7 @@ from ..post.grid import Plan
 from ..post.limit_cycles import limit_cycles
 from ..post.mode_curve import ModeCurve
 from ..post.slip_threshold import slip_threshold
+from ..registry import kind_named
 
 #: Damping has set in where this share of its rise to the maximum is reached.
 ONSET = 0.1
@@ -25,7 +27,6 @@ COMMON = (
     Column("wall_s", "s", "wall time of the branch"),
 )
 MODE = (
-    *COMMON,
     Column("stuck_hz", "Hz", "linear frequency with the contact stuck"),
     Column("free_hz", "Hz", "linear frequency without friction (contact free, or closed and sliding)"),
     Column("slip_threshold", "m", "amplitude at which the first pair slips"),
@@ -41,20 +42,54 @@ MODE = (
     Column("unstable_limit_cycle", "m", "smallest amplitude at which damping falls through zero"),
 )
 FORCED = (
-    *COMMON,
     Column("largest_amplitude", "m", "largest amplitude of the response"),
     Column("frequency_of_largest_amplitude", "Hz", "frequency of the largest amplitude"),
 )
 
-#: Column whose values tell the branches of one table apart.
-SPLIT = {"forced": "level", "flutter": "nodal_diameter"}
-
 Table = Mapping[str, Any]
+Row = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What a sweep says of each branch of a kind of analysis.
+
+    Attributes
+    ----------
+    columns : tuple of Column
+        Beside those that all have.
+    numbers : callable
+        Their values by name, from the columns of the branch (n_points,), the attributes of its group, and the forces of
+        the contacts over the period of its first point, where they are kept.
+    words : callable
+        A row of the summary in words, for the terminal.
+    split : str
+        Column of the table whose values tell several branches of one run apart; empty where there is one.
+    """
+
+    columns: tuple[Column, ...] = ()
+    numbers: Callable[[Table, Table, Table], Mapping[str, float]] = lambda table, attributes, forces: {}
+    words: Callable[[Row], str] = lambda row: f"{row['points']:.0f} points"
+    split: str = ""
+
+
+COUNTS = Summary()
+
+
+def summary_of(kind: str) -> Summary:
+    """That of a kind of analysis; points and cost alone where the kind is not known here."""
+    known = kind_named(kind)
+    return COUNTS if known is None else known.summary
 
 
 def columns_of(kind: str) -> tuple[Column, ...]:
     """What is said of each branch in a sweep of this kind of analysis."""
-    return {"mode": MODE, "flutter": MODE, "forced": FORCED}.get(kind, COMMON)
+    return (*COMMON, *summary_of(kind).columns)
+
+
+def split_of(kind: str) -> str:
+    """Column that tells the branches of one table apart; empty where there is one branch."""
+    return summary_of(kind).split
 
 
 def summarise(
@@ -74,9 +109,7 @@ def summarise(
         "newton": int(np.sum(table.get("newton", 0))),
         "wall_s": float(np.sum(table.get("wall_s", 0.0))),
     }
-    if columns_of(kind) is MODE:
-        return {**common, **_mode(table, attributes, start_forces or {})}
-    return {**common, **_forced(table)} if kind == "forced" else common
+    return {**common, **summary_of(kind).numbers(table, attributes, start_forces or {})}
 
 
 def _mode(table: Table, attributes: Mapping[str, Any], forces: Mapping[str, Any]) -> dict[str, float]:
@@ -118,7 +151,7 @@ def _onset(table: Table, start: float, largest: float) -> float:
     return found[0] if found else float("nan")
 
 
-def _forced(table: Table) -> dict[str, float]:
+def _forced(table: Table, attributes: Table, forces: Table) -> dict[str, float]:
     top = int(np.argmax(table["amplitude"]))
     return {
         "largest_amplitude": float(table["amplitude"][top]),
@@ -126,41 +159,46 @@ def _forced(table: Table) -> dict[str, float]:
     }
 
 
-def landmarks(name: str, plan: Plan, rows: Sequence[Mapping[str, Any]]) -> list[str]:
+def landmarks(name: str, plan: Plan, rows: Sequence[Row], of: Summary) -> list[str]:
     """A line for each row of a sweep's summary, for the terminal."""
     labels = plan.labels()
-    return [f"{name}: {labels[row['value']]}{_part(row)}: {_landmark(row)}" for row in rows]
+    return [f"{name}: {labels[row['value']]}{_part(row, of)}: {of.words(row)}" for row in rows]
 
 
 def read_landmarks(name: str, group: Any) -> list[str]:
     """The same from a sweep's group in results.h5."""
     plan = Plan(json.loads(group.attrs["over"]))
     data = {key: values[()] for key, values in group["summary"].items()}
-    split = SPLIT.get(str(group.attrs["of_type"]), "")
-    parts = [{split: part} for part in data.pop(split)] if split in data else [{}]
+    of = summary_of(str(group.attrs["of_type"]))
+    parts = [{of.split: part} for part in data.pop(of.split)] if of.split in data else [{}]
     rows = []
     for number, (k, part) in product(range(len(plan)), enumerate(parts)):
         row = {key: float(values.reshape(len(plan), -1)[number, k]) for key, values in data.items()}
         if not math.isnan(row["points"]):
             rows.append({"value": number, **part, **row})
-    return landmarks(name, plan, rows)
+    return landmarks(name, plan, rows, of)
 
 
-def _part(row: Mapping[str, Any]) -> str:
+def _part(row: Row, of: Summary) -> str:
     """Which of a value's branches a row is of."""
-    return "".join(f", {column.replace('_', ' ')} {row[column]:g}" for column in SPLIT.values() if column in row)
+    return f", {of.split.replace('_', ' ')} {row[of.split]:g}" if of.split in row else ""
 
 
-def _landmark(row: Mapping[str, Any]) -> str:
-    if "largest_zeta" in row:
-        starts = next((row[key] for key in ("slip_threshold", "slip_from") if math.isfinite(row[key])), None)
-        slip = "no slip" if starts is None else f"slip from {starts:.4g} m"
-        top = f"largest zeta {100 * row['largest_zeta']:.4g} % at {row['amplitude_of_largest_zeta']:.4g} m"
-        words = [slip, top, f"lowest {row['lowest_frequency_hz']:.6g} Hz"]
-        for word in ("stable", "unstable"):
-            amplitude = row[f"{word}_limit_cycle"]
-            words += [] if math.isnan(amplitude) else [f"{word} limit cycle at {amplitude:.4g} m"]
-        return ", ".join(words)
-    if "largest_amplitude" in row:
-        return f"largest {row['largest_amplitude']:.4g} m at {row['frequency_of_largest_amplitude']:.6g} Hz"
-    return f"{row['points']:.0f} points"
+def _mode_words(row: Row) -> str:
+    starts = next((row[key] for key in ("slip_threshold", "slip_from") if math.isfinite(row[key])), None)
+    slip = "no slip" if starts is None else f"slip from {starts:.4g} m"
+    top = f"largest zeta {100 * row['largest_zeta']:.4g} % at {row['amplitude_of_largest_zeta']:.4g} m"
+    words = [slip, top, f"lowest {row['lowest_frequency_hz']:.6g} Hz"]
+    for word in ("stable", "unstable"):
+        amplitude = row[f"{word}_limit_cycle"]
+        words += [] if math.isnan(amplitude) else [f"{word} limit cycle at {amplitude:.4g} m"]
+    return ", ".join(words)
+
+
+def _forced_words(row: Row) -> str:
+    return f"largest {row['largest_amplitude']:.4g} m at {row['frequency_of_largest_amplitude']:.6g} Hz"
+
+
+MODE_BRANCH = Summary(MODE, _mode, _mode_words)
+FLUTTER_WAVES = replace(MODE_BRANCH, split="nodal_diameter")
+FORCED_LEVELS = Summary(FORCED, _forced, _forced_words, "level")

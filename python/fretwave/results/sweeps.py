@@ -29,7 +29,7 @@ from ..files.whole import replace_text
 from ..post.grid import Plan
 from ..texts import toml
 from .results import has_results, open_results, rewritten
-from .sweep_summary import SPLIT, columns_of, summarise
+from .sweep_summary import columns_of, split_of, summarise
 
 #: State of the solver: a finished branch has no use for it.
 STATES = ("state_0", "state_1")
@@ -187,7 +187,7 @@ def _points(plan: Plan, branches: Sequence[Branch]) -> list[tuple[Column, Any]]:
 
 def _summary(kind: str, plan: Plan, branches: Sequence[Branch]) -> list[dict[str, Any]]:
     """A row for each branch; a table of a value has one, or one for each level or nodal diameter."""
-    rows, split = [], SPLIT.get(kind, "")
+    rows, split = [], split_of(kind)
     for branch in branches:
         keys = {key: _plain(_key_column(plan, key)[branch.number]) for key in plan.keys}
         column = branch.table.get(split)
@@ -224,7 +224,7 @@ def _write_over(group: Any, plan: Plan) -> list[Any]:
 
 
 def _write_summary(group: Any, kind: str, plan: Plan, rows: Sequence[Mapping[str, Any]], scales: Sequence[Any]) -> None:
-    split = SPLIT.get(kind, "")
+    split = split_of(kind)
     parts = sorted({row[split] for row in rows if split in row})
     for scale in scales:
         group.create_dataset(scale.name.rpartition("/")[2], data=scale[()]).make_scale(scale.name.rpartition("/")[2])

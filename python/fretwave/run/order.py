@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from ..case.analysis import AnalysisSection
 from ..case.load import Case
-from ..case.schema import AnalysisSection, ForcedAnalysis, TransientSection
+
+if TYPE_CHECKING:
+    import argparse
 
 
 @dataclass
@@ -31,14 +34,15 @@ class RunOptions:
     petsc: str = ""
 
     @classmethod
-    def of(cls, told: Any) -> RunOptions:
+    def of(cls, told: argparse.Namespace) -> RunOptions:
         """From the command line."""
         return cls(told.out, told.overrides, told.only, told.quick, not told.no_plots, told.petsc)
 
     def given(self, path: Path, case: Case) -> dict[str, Any]:
         """How the case was given, for run.json."""
         told = {key: getattr(self, key) for key in ("overrides", "quick", "only", "petsc")}
-        return {"path": str(path.resolve()), **told, "digest": case.digest, "resolved": case.resolved}
+        brought = {"plugins": [plugin.plain() for plugin in case.analyses.plugins]} if case.analyses.plugins else {}
+        return {"path": str(path.resolve()), **told, "digest": case.digest, "resolved": case.resolved, **brought}
 
 
 def in_order(case: Case, names: Sequence[str]) -> list[str]:
@@ -48,7 +52,7 @@ def in_order(case: Case, names: Sequence[str]) -> list[str]:
     def place(name: str) -> None:
         if name in ordered or name not in names:
             return
-        for needed in needs(case.analyses[name]):
+        for needed in reads(case.analyses[name]):
             place(needed)
         ordered.append(name)
 
@@ -57,10 +61,6 @@ def in_order(case: Case, names: Sequence[str]) -> list[str]:
     return ordered
 
 
-def needs(analysis: AnalysisSection) -> list[str]:
-    """Names of the analyses whose results this one reads."""
-    if isinstance(analysis, TransientSection):
-        return [analysis.mode]
-    if isinstance(analysis, ForcedAnalysis):
-        return [analysis.backbone] if isinstance(analysis.backbone, str) else list(analysis.backbone)
-    return []
+def reads(analysis: AnalysisSection) -> list[str]:
+    """Names of the analyses whose results this one reads, where there are any."""
+    return [*analysis.needs(), *analysis.compares_with()]

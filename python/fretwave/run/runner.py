@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-import importlib
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from ..analyses.parts.context import AnalysisContext, Outcome, belongs, describe_analysis
+from ..analyses.parts.context import AnalysisContext, Outcome
+from ..analyses.sweep import SweepAnalysis
 from ..case import checks
+from ..case.analysis import AnalysisSection
 from ..case.build import build_model
-from ..case.load import Case, changed_keys, load_case
+from ..case.harmonic import nodal_diameter, with_flow_forces
+from ..case.kept import belongs, described, reload_case
+from ..case.load import Case, load_case
+from ..case.plugins import load_recorded
 from ..case.reduce import reduce_case
-from ..case.schema import AnalysisSection, SweepAnalysis, TransientSection
-from ..case.sector import nodal_diameter
 from ..case.wheel import on_wheel, solver_room
 from ..console import Console
 from ..errors import EXIT_DONE, InputError, NotConverged
@@ -23,28 +25,22 @@ from ..mpi.interrupt import say_how_to_go_on
 from ..mpi.petsc_options import AnalysisOptions
 from ..results.journal import Journal
 from ..results.results import has_results, open_results
-from ..results.runfolder import CASE_COPY, RunFolder, new_record, peak_memory_mb, read_copy, read_record
+from ..results.runfolder import RECORD, RunFolder, new_record, peak_memory_mb, read_record
 from ..texts import display
 from .order import RunOptions, in_order
 from .stopped import joined, not_converged
 
-#: Module and function of each kind of analysis, imported when one is run.
-DISPATCH = {
-    "static": ("static", "run_static"),
-    "mode": ("mode", "run_mode"),
-    "forced": ("forced", "run_forced"),
-    "flutter": ("flutter", "run_flutter"),
-    "free_decay": ("transient", "run_free_decay"),
-    "limit_cycle": ("transient", "run_limit_cycle"),
-    "wear": ("wear", "run_wear"),
-}
+if TYPE_CHECKING:
+    from mpi4py import MPI
+
+    from .sweep import Sweep
 
 
 #: What is said of an analysis that is complete.
 ENDED = ("done", "stopped")
 
 
-def run_case(path: Path, options: RunOptions, comm: Any) -> int:
+def run_case(path: Path, options: RunOptions, comm: MPI.Comm) -> int:
     """Run a case from its start; returns the exit code. Collective."""
     case = on_first_rank(comm, lambda: load_case(path, options.overrides, options.quick))
     folder = options.out or Path("runs") / case.name
@@ -52,7 +48,7 @@ def run_case(path: Path, options: RunOptions, comm: Any) -> int:
     return Runner(case, options, folder, record, comm).run()
 
 
-def resume_run(folder: Path, comm: Any, plots: bool = True) -> int:
+def resume_run(folder: Path, comm: MPI.Comm, plots: bool = True) -> int:
     """Go on with a run that was cut off; returns the exit code. Collective.
 
     Raises
@@ -67,40 +63,6 @@ def resume_run(folder: Path, comm: Any, plots: bool = True) -> int:
     return Runner(case, options, folder, record, comm, resuming=True).run()
 
 
-def reload_case(folder: Path, kept: bool = False) -> tuple[Case, dict[str, Any]]:
-    """The case of a run and its record. One rank only.
-
-    Parameters
-    ----------
-    kept : bool
-        Read the copy in the folder, as the run did: then only the model can have changed.
-
-    Raises
-    ------
-    InputError
-        The folder holds no run, or its case has changed since.
-    """
-    record = read_record(folder)
-    if "sweep" in record:
-        one = folder / record.get("values", [{}])[0].get("folder", "values/0000")
-        problem = "this is the folder of a sweep, not of one run"
-        raise InputError(problem, display(folder), expected="the folder of a value", fix=f"give {display(one)}")
-    given = record["case"]
-    path = Path(given["path"])
-    text = None if path.exists() and not kept else read_copy(folder, record)
-    case = load_case(path, given["overrides"], given["quick"], text=text)
-    changed = changed_keys(given["resolved"], case.resolved)
-    if changed:
-        raise InputError(
-            "the case has changed since this run",
-            where=display(path),
-            measured="; ".join(changed[:5]) + (f"; and {len(changed) - 5} more" if len(changed) > 5 else ""),
-            expected=f"the case as kept in {display(folder / CASE_COPY)}",
-            fix=f"change it back, or start anew with `fretwave run {display(path)}`",
-        )
-    return case, record
-
-
 class Runner:
     """One run of some analyses of a case; `quiet` when it is part of another that speaks for it."""
 
@@ -110,7 +72,7 @@ class Runner:
         options: RunOptions,
         folder: Path,
         record: dict[str, Any],
-        comm: Any,
+        comm: MPI.Comm,
         resuming: bool = False,
         quiet: bool = False,
     ) -> None:
@@ -188,18 +150,16 @@ class Runner:
             self.folder.record["reduction"] = self.case.reduced.plain()
 
     def _check_needs(self, names: Sequence[str]) -> None:
-        """Time integration needs the results of its mode: from this run, or kept in the folder."""
+        """Analyses whose results another needs: of this run, or kept in the folder."""
         for name in names:
-            analysis = self.case.analyses[name]
-            mode = analysis.mode if isinstance(analysis, TransientSection) else None
-            if mode is None or mode in names or self._kept(mode):
-                continue
-            raise InputError(
-                f"'{name}' needs the results of '{mode}'",
-                where="--only",
-                measured=f"no results of '{mode}' for this case in {display(self.folder.path)}",
-                fix=f"--only {mode},{name}",
-            )
+            for needed in self.case.analyses[name].needs():
+                if needed not in names and not self._kept(needed):
+                    raise InputError(
+                        f"'{name}' needs the results of '{needed}'",
+                        where="--only",
+                        measured=f"no results of '{needed}' for this case in {display(self.folder.path)}",
+                        fix=f"--only {needed},{name}",
+                    )
 
     def _kept(self, name: str) -> bool:
         if not has_results(self.folder.path):
@@ -247,9 +207,9 @@ class Runner:
             self._start()
 
         case = on_wheel(self.case, analysis)
-        preload, flow = case.preload_of(analysis), getattr(analysis, "aerodynamics", False)
-        wave = nodal_diameter(case.settings(analysis))
-        built = build_model(case, self._dampers(analysis), self.comm, preload, wave, flow)
+        preload, flow = case.preload_of(analysis), with_flow_forces(analysis)
+        wave = nodal_diameter(analysis.settings(case))
+        built = build_model(case, analysis.acting_dampers(case), self.comm, preload, wave, flow)
         with built as model, options.inserted(), solver_room(case, analysis, prefix):
             context = AnalysisContext(
                 model,
@@ -260,11 +220,10 @@ class Runner:
                 self.console,
                 resuming=self._is_begun(analysis.name),
                 before_first=before_first,
-                attributes=describe_analysis(analysis, self.case, self.folder.record["run_id"]),
+                attributes=described(analysis, self.case, self.folder.record["run_id"]),
             )
-            module, function = DISPATCH[analysis.type]
             try:
-                outcome = getattr(importlib.import_module(f"fretwave.analyses.{module}"), function)(context)
+                outcome = analysis.run(context)
             except NotConverged as error:  # before its first point: there was no static state to start from
                 reason = f"{error.what}: {error.measured}"
                 outcome = Outcome(0, reason, False, goal=str(error.expected), advice=error.fix or "")
@@ -272,7 +231,7 @@ class Runner:
         self._note(analysis.name, outcome, time.perf_counter() - began, entry)
         context.publish()  # last of all: from here on a resumed run leaves the analysis as it is
 
-    def _sweep(self, name: str, sweep: Any) -> None:
+    def _sweep(self, name: str, sweep: Sweep) -> None:
         """Run another analysis for every value, on groups of ranks."""
         from .sweep_analysis import run_sweep
 
@@ -280,12 +239,6 @@ class Runner:
         self._start()
         outcome = run_sweep(sweep, name, self.comm, self.console, self.folder, self.case.title)
         self._note(name, outcome, time.perf_counter() - began)
-
-    def _dampers(self, analysis: AnalysisSection) -> list[Any]:
-        """The analysis' dampers; a time integration without any takes those of its mode."""
-        if isinstance(analysis, TransientSection) and not analysis.dampers:
-            return list(self.case.analyses[analysis.mode].dampers)
-        return list(self.case.settings(analysis).dampers)
 
     def _note(self, name: str, outcome: Outcome, seconds: float, entry: Mapping[str, Any] | None = None) -> None:
         """Print the outcome and keep it in run.json, with what else `entry` says."""
@@ -312,14 +265,13 @@ class Runner:
         on_first_rank(self.comm, self.folder.close)
 
 
-def check_sweeps(case: Case, names: Sequence[str], options: RunOptions, comm: Any) -> dict[str, Any]:
+def check_sweeps(case: Case, names: Sequence[str], options: RunOptions, comm: MPI.Comm) -> dict[str, Sweep]:
     """The sweeps among some analyses, after the case was loaded with each of their values. Collective."""
-    sweeps = {}
-    for name in names:
-        analysis = case.analyses[name]
-        if isinstance(analysis, SweepAnalysis):
-            from .sweep_analysis import analysis_sweep
+    from .sweep_analysis import analysis_sweep
 
+    sweeps = {}
+    for name, analysis in case.analyses.of(SweepAnalysis).items():
+        if name in names:
             sweeps[name] = analysis_sweep(Runner, case, analysis, options, comm.size)
             sweeps[name].check(comm)
     return sweeps
@@ -329,7 +281,7 @@ def plot(folder: Path, console: Console, only: Sequence[str] | None = None) -> i
     """Make the pictures of a run folder; returns how many."""
     from ..plots import plot_run
 
-    failed: list[str] = []
+    failed = load_recorded(read_record(folder)) if (folder / RECORD).exists() else []
     files = plot_run(folder, only, failed)
     for line in failed:
         console.line(line)

@@ -7,19 +7,20 @@ import time
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..analyses.mode import ModeAnalysis
 from ..analyses.parts.branch import step_control
 from ..analyses.parts.context import AnalysisContext
 from ..analyses.parts.rest import retained
 from ..analyses.parts.wheel_start import Start, start_of
+from ..analyses.wear import WearAnalysis
 from ..case.build import build_model
+from ..case.harmonic import nodal_diameter
 from ..case.load import Case, load_case
 from ..case.reduce import reduce_case
-from ..case.schema import ModeAnalysis, WearAnalysis
-from ..case.sector import nodal_diameter
 from ..case.wheel import on_wheel, solver_room
 from ..console import Console
 from ..errors import EXIT_DONE, InputError, NotConverged
@@ -31,6 +32,13 @@ from ..results.study_report import markdown, write_csv
 from .study_folder import StudyFolder
 from .study_plan import Outcome, Plan, Settings, Study, common_amplitudes
 
+if TYPE_CHECKING:
+    from mpi4py import MPI
+
+    from ..hb.problems import NonlinearMode
+    from ..solve.continuation import Point
+
+
 #: each branch is solved this often; its time is that of the fastest, which other work on the machine disturbs least
 REPEATS = 3
 #: amplitudes at which runs are compared
@@ -38,12 +46,12 @@ COUNT = 24
 
 
 def run_study(
-    options: argparse.Namespace, arguments: Sequence[str], comm: Any, record: dict[str, Any] | None = None
+    options: argparse.Namespace, arguments: Sequence[str], comm: MPI.Comm, record: dict[str, Any] | None = None
 ) -> int:
     """Run a study, or go on with it; returns the exit code. Collective."""
     case = on_first_rank(comm, lambda: _load(options, record))
-    analysis = case.analyses.get(options.analysis)
-    chosen = None if isinstance(analysis, WearAnalysis) else _analysis(case, options.analysis)
+    worn = options.analysis in case.analyses.of(WearAnalysis)
+    chosen = None if worn else _analysis(case, options.analysis)
     with StudyFolder(case, options, arguments, comm, record) as folder:
         console = Console(comm.rank == 0, folder.log)
         if chosen is not None:
@@ -61,7 +69,12 @@ def _load(options: argparse.Namespace, record: dict[str, Any] | None) -> Case:
 
 
 def _study_mode(
-    case: Case, analysis: ModeAnalysis, options: argparse.Namespace, comm: Any, console: Console, folder: StudyFolder
+    case: Case,
+    analysis: ModeAnalysis,
+    options: argparse.Namespace,
+    comm: MPI.Comm,
+    console: Console,
+    folder: StudyFolder,
 ) -> int:
     plan = _plan(case, options)
     study = Study(plan, common_amplitudes(min(analysis.amplitude), max(analysis.amplitude), COUNT))
@@ -81,12 +94,14 @@ def _study_mode(
 class _Solver:
     """Solves the whole branch of one analysis at any settings."""
 
-    def __init__(self, case: Case, analysis: ModeAnalysis, comm: Any, console: Console, study: Study, repeats: int):
+    def __init__(
+        self, case: Case, analysis: ModeAnalysis, comm: MPI.Comm, console: Console, study: Study, repeats: int
+    ):
         self.case, self.analysis, self.comm, self.console = case, analysis, comm, console
         self.study, self.repeats = study, repeats
-        self._parts: tuple[int | None, AnalysisContext, Start] | None = None
+        self._parts: tuple[int | None, AnalysisContext[ModeAnalysis], Start] | None = None
 
-    def _model(self, component_modes: int | None) -> tuple[AnalysisContext, Start]:
+    def _model(self, component_modes: int | None) -> tuple[AnalysisContext[ModeAnalysis], Start]:
         """Context and start with this many component modes; the last one is kept. Collective."""
         if self._parts is None or self._parts[0] != component_modes:
             if self._parts is not None:
@@ -131,7 +146,7 @@ class _Solver:
             finally:
                 problem.destroy()
 
-    def _follow(self, problem: Any) -> Outcome | str:
+    def _follow(self, problem: NonlinearMode) -> Outcome | str:
         """Only the time spent between points counts: diagnostics are not part of the solution."""
         from ..solve.continuation import Continuation
 
@@ -155,7 +170,7 @@ class _Solver:
         return _outcome(rows, newton, wall) if converged else str(reason)
 
 
-def _row(problem: Any, point: Any) -> dict[str, Any]:
+def _row(problem: NonlinearMode, point: Point) -> dict[str, Any]:
     state = problem.state(point.y)
     reported = "report" in point.event
     estimate = problem.diagnostics(point.y)["error_estimate"] if reported else np.nan
@@ -216,12 +231,12 @@ def _no_reference(study: Study) -> NotConverged:
 
 
 def _analysis(case: Case, name: str | None) -> ModeAnalysis:
-    modes = [name for name, analysis in case.analyses.items() if isinstance(analysis, ModeAnalysis)]
+    modes = case.analyses.of(ModeAnalysis)
     chosen = name or next(iter(modes), None)
     if chosen not in modes:
-        fix = f"--analysis {modes[0]}" if modes else "add an [[analysis]] of type mode to the case"
+        fix = f"--analysis {next(iter(modes))}" if modes else "add an [[analysis]] of type mode to the case"
         raise InputError("a study needs a mode analysis", "--analysis", name, ", ".join(modes) or None, fix)
-    return cast(ModeAnalysis, case.analyses[str(chosen)])
+    return modes[str(chosen)]
 
 
 def _plan(case: Case, options: argparse.Namespace) -> Plan:

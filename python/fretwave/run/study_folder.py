@@ -6,7 +6,7 @@ import argparse
 import dataclasses
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from ..case.load import Case, changed_keys
 from ..errors import InputError
@@ -15,6 +15,10 @@ from ..mpi.guard import on_first_rank
 from ..mpi.interrupt import say_how_to_go_on
 from ..results.runfolder import CASE_COPY, RunFolder, new_record
 from ..texts import display
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
+
 
 Solved = TypeVar("Solved")
 
@@ -40,7 +44,7 @@ class StudyFolder:
         case: Case,
         options: argparse.Namespace,
         arguments: Sequence[str],
-        comm: Any,
+        comm: MPI.Comm,
         record: dict[str, Any] | None = None,
     ) -> None:
         self.path, self.comm = options.out or Path("runs") / f"{case.name}_study", comm

@@ -13,11 +13,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..case.checks import choose
 from ..case.load import Case, load_case
-from ..case.schema import SweepAnalysis
+from ..case.plugins import Plugin
 from ..errors import CaseErrors, FretwaveError, InputError, NotConverged
 from ..mpi import groups
 from ..mpi.guard import on_first_rank
@@ -26,6 +26,9 @@ from ..results.runfolder import RECORD, new_record, read_record
 from ..results.sweeps import Branch, read_branch
 from ..texts import display
 from .order import RunOptions, in_order
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
 
 
 @dataclass(frozen=True)
@@ -38,6 +41,7 @@ class Checked:
     name: str = ""
     text: str = ""
     analyses: list[str] = field(default_factory=list)
+    plugins: tuple[Plugin, ...] = ()
 
 
 @dataclass
@@ -74,7 +78,7 @@ class Sweep:
     where: str | None = None
     places: dict[str, str] = field(default_factory=dict)
 
-    def check(self, comm: Any) -> list[Checked]:
+    def check(self, comm: MPI.Comm) -> list[Checked]:
         """Load the case with every value, several at a time. Collective.
 
         Raises
@@ -94,7 +98,7 @@ class Sweep:
             raise CaseErrors(problems, f"the sweep of {display(self.path)}")
         return found
 
-    def run(self, comm: Any, run_id: str) -> list[FretwaveError | None]:
+    def run(self, comm: MPI.Comm, run_id: str) -> list[FretwaveError | None]:
         """Run every value that is not done; gives what went wrong with each. Collective."""
         numbers = range(len(self.plan))
         return groups.run(comm, numbers, lambda k, group: self._run_value(k, group, run_id), self.n_groups)
@@ -140,7 +144,7 @@ class Sweep:
         names = in_order(case, choose(swept_names(case), self.options.only))
         if number:
             return Checked(case.digest)
-        return Checked(case.digest, case.resolved, case.title, case.name, case.text, names)
+        return Checked(case.digest, case.resolved, case.title, case.name, case.text, names, case.analyses.plugins)
 
     def _problems(self, found: Sequence[Any]) -> list[FretwaveError]:
         """Each problem once, with the first of the values that have it."""
@@ -174,7 +178,7 @@ class Sweep:
         record = read_record(folder) if (folder / RECORD).exists() else {}
         return record if record.get("part_of") == run_id else None
 
-    def _run_value(self, number: int, group: Any, run_id: str) -> FretwaveError | None:
+    def _run_value(self, number: int, group: MPI.Comm, run_id: str) -> FretwaveError | None:
         began, label = time.perf_counter(), self.plan.labels()[number]
         earlier = on_first_rank(group, lambda: self._record(number, run_id))
         if earlier is not None and earlier["status"] != "running":
@@ -197,7 +201,7 @@ class Sweep:
         return error
 
 
-def say(group: Any, text: str) -> None:
+def say(group: MPI.Comm, text: str) -> None:
     """A line from a group, from its first rank."""
     if group.rank == 0:
         print(text, flush=True)
@@ -205,4 +209,4 @@ def say(group: Any, text: str) -> None:
 
 def swept_names(case: Case) -> list[str]:
     """Analyses that a sweep may run: all but sweeps."""
-    return [name for name, analysis in case.analyses.items() if not isinstance(analysis, SweepAnalysis)]
+    return [name for name, analysis in case.analyses.items() if not analysis.sweeps]

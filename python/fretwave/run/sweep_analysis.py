@@ -5,20 +5,23 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..analyses.parts.context import Outcome
+from ..analyses.sweep import SweepAnalysis
 from ..case.load import Case
-from ..case.schema import SweepAnalysis
 from ..case.toml.source import Source
 from ..console import Console
 from ..mpi.guard import on_first_rank
 from ..results.runfolder import RunFolder
-from ..results.sweep_summary import landmarks
+from ..results.sweep_summary import landmarks, summary_of
 from ..results.sweeps import write_sweep
-from .order import RunOptions, needs
+from .order import RunOptions, reads
 from .sweep import Sweep
-from .sweep_plan import table_overrides, table_plan
+from .sweep_plan import table_overrides
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
 
 
 def analysis_sweep(
@@ -31,7 +34,7 @@ def analysis_sweep(
     wanted: list[str] = []
 
     def want(name: str) -> None:
-        for needed in needs(case.analyses[name]):
+        for needed in reads(case.analyses[name]):
             want(needed)
         wanted.append(name)
 
@@ -40,7 +43,7 @@ def analysis_sweep(
     own = table_overrides(analysis.overrides)
     chosen = replace(options, only=list(dict.fromkeys(wanted)), petsc=petsc, overrides=[*options.overrides, *own])
     over, overrides = (place_of(case, analysis.name, key) for key in ("over", "overrides"))
-    plan, places = table_plan(analysis.over), dict.fromkeys(own, overrides)
+    plan, places = analysis.plan(), dict.fromkeys(own, overrides)
     count = None if analysis.groups is None else min(analysis.groups, ranks)
     return Sweep(runner, case.path, plan, chosen, Path(), count, case.text, over, places)
 
@@ -50,7 +53,7 @@ def place_of(case: Case, name: str, key: str) -> str:
     return Source(case.path, case.text).where(("analysis", list(case.analyses).index(name), key))
 
 
-def run_sweep(sweep: Sweep, name: str, comm: Any, console: Console, folder: RunFolder, title: str = "") -> Outcome:
+def run_sweep(sweep: Sweep, name: str, comm: MPI.Comm, console: Console, folder: RunFolder, title: str = "") -> Outcome:
     """Run every value and write the results of all in one group and two tables. Collective."""
     run_id, of = folder.record["run_id"], sweep.options.only[-1]
     sweep.folder = folder.path / name
@@ -67,7 +70,7 @@ def run_sweep(sweep: Sweep, name: str, comm: Any, console: Console, folder: RunF
             summary = folder.path / f"{name}_summary.csv"
             rows = write_sweep(folder.path, name, of, sweep.plan, branches, attributes, title, summary)
         sweep.forget_others()
-        lines = landmarks(name, sweep.plan, rows) if branches else []
+        lines = landmarks(name, sweep.plan, rows, summary_of(str(branches[0].attributes["type"]))) if branches else []
         points = sum(branch.points for branch in branches)
         advice = next((error.fix for error in errors if error is not None and error.fix), "")
         return Outcome(points, reason, not bad, lines, f"{len(sweep.plan)} whole branches", advice)

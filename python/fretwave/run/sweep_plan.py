@@ -40,11 +40,6 @@ def table_overrides(table: Mapping[str, Any]) -> list[str]:
     return [f"{'.'.join(path)}={value_text(value)}" for path, value in nested_leaves(table)]
 
 
-def table_plan(table: Mapping[str, Any]) -> Plan:
-    """The plan of a case's ``over``: ``{ "model.options.friction" = [0.1, 0.5] }``, or with nested tables."""
-    return Plan({".".join(path): value for path, value in nested_leaves(table)})
-
-
 _EXAMPLE = "write for example `--over model.options.friction=0.1,0.2,0.5`"
 
 

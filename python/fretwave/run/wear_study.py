@@ -7,19 +7,21 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 
+from ..analyses.mode import ModeAnalysis
 from ..analyses.parts.context import AnalysisContext
 from ..analyses.parts.rest import retained, start_mode
-from ..analyses.wear import unworn_starts
-from ..analyses.wear_line import wear_areas
+from ..analyses.parts.wear_line import wear_areas
+from ..analyses.parts.wear_start import unworn_starts
+from ..analyses.wear import WearAnalysis
 from ..case.build import build_model
+from ..case.harmonic import nodal_diameter
 from ..case.load import Case
 from ..case.reduce import reduce_case
-from ..case.schema import ModeAnalysis, WearAnalysis
-from ..case.sector import nodal_diameter
 from ..console import Console
 from ..errors import EXIT_DONE, FretwaveError, NotConverged
 from ..files.whole import replace_text
@@ -27,6 +29,12 @@ from ..mpi.guard import caught_by_all
 from ..mpi.petsc_options import AnalysisOptions
 from ..results.study_report import LEGEND_OF_WEAR, PRINTED_OF_WEAR, markdown, write_csv
 from .study_folder import StudyFolder
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
+
+    from ..hb.problems import NonlinearMode
+    from ..solve.wear import Wear
 
 #: Swept where neither the command line nor the case says anything.
 TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4)
@@ -115,9 +123,9 @@ def _row(
     }
 
 
-def study_wear(case: Case, options: argparse.Namespace, comm: Any, console: Console, folder: StudyFolder) -> int:
+def study_wear(case: Case, options: argparse.Namespace, comm: MPI.Comm, console: Console, folder: StudyFolder) -> int:
     """Run the study; returns the exit code. Collective."""
-    analysis = cast(WearAnalysis, case.analyses[options.analysis])
+    analysis = case.analyses.of(WearAnalysis)[options.analysis]
     plan = wear_plan(case, analysis, options)
     amplitude = max(analysis.amplitude)
     console.line(f"study of '{analysis.name}' at a = {amplitude:g} m: {len(plan.runs())} runs")
@@ -141,7 +149,7 @@ def study_wear(case: Case, options: argparse.Namespace, comm: Any, console: Cons
 
 def wear_plan(case: Case, analysis: WearAnalysis, options: argparse.Namespace) -> WearPlan:
     """Sweeps of the command line, else of the case's table [study], else of the tolerance alone."""
-    mode = cast(ModeAnalysis, case.settings(analysis))
+    mode = analysis.settings(case)
     base = WearSettings(mode.harmonics, analysis.tolerance, analysis.pressure_change)
     given = {name: getattr(options, name) for name in ("harmonics", "tolerance", "pressure_change")}
     if not any(given.values()):
@@ -158,7 +166,7 @@ def wear_plan(case: Case, analysis: WearAnalysis, options: argparse.Namespace) -
 class _Solver:
     """Marches wear at the largest amplitude of an analysis with any settings. Collective, as all methods."""
 
-    def __init__(self, case: Case, analysis: WearAnalysis, comm: Any, console: Console, repeats: int) -> None:
+    def __init__(self, case: Case, analysis: WearAnalysis, comm: MPI.Comm, console: Console, repeats: int) -> None:
         self.case = reduce_case(case, comm)
         self.analysis = analysis.model_copy(update={"amplitude": [max(analysis.amplitude)]})
         self.comm, self.console, self.repeats = comm, console, repeats
@@ -170,13 +178,13 @@ class _Solver:
 
     def _mode(self, harmonics: int | None) -> ModeAnalysis:
         given = self.analysis.harmonics if harmonics is None else harmonics
-        return cast(ModeAnalysis, self.case.settings(self.analysis.model_copy(update={"harmonics": given})))
+        return self.analysis.model_copy(update={"harmonics": given}).settings(self.case)
 
     def destroy(self) -> None:
         """Free the model."""
         self.model.destroy()
 
-    def _context(self, mode: ModeAnalysis) -> AnalysisContext:
+    def _context(self, mode: ModeAnalysis) -> AnalysisContext[ModeAnalysis]:
         return AnalysisContext(self.model, self.case, mode, self.comm, Path(), Console(False))
 
     def cycle_unit(self, settings: WearSettings) -> CycleUnit | str:
@@ -208,12 +216,12 @@ class _Solver:
         runs = [run for run in tried if isinstance(run, WearOutcome)]
         return replace(runs[0], wall_s=min(run.wall_s for run in runs)) if runs else str(tried[0])
 
-    def _march(self, context: AnalysisContext, settings: WearSettings) -> WearOutcome | str:
+    def _march(self, context: AnalysisContext[ModeAnalysis], settings: WearSettings) -> WearOutcome | str:
         from ..hb.problems import NonlinearMode
         from ..solve.wear import Wear, WearControl
         from ..solve.worn_mode import WornMode
 
-        mode, a, unit = cast(ModeAnalysis, context.analysis), self.analysis, self.unit
+        mode, a, unit = context.analysis, self.analysis, self.unit
         start, rest = start_mode(context, mode.linear_mode)
         problem = NonlinearMode(
             self.model, retained(context), mode.method, self.case.dof(mode.normalise), start, context.prefix, rest=rest
@@ -229,7 +237,7 @@ class _Solver:
             return _follow(march, problem, np.concatenate(list(areas.values())))
 
 
-def _follow(march: Any, problem: Any, areas: Any) -> WearOutcome | str:
+def _follow(march: Wear, problem: NonlinearMode, areas: npt.NDArray[np.float64]) -> WearOutcome | str:
     """The end of a march; where wear has stopped before the last cycle, the values stay."""
     began = time.perf_counter()
     newton = [point.newton for point in march]

@@ -6,19 +6,23 @@ import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from ..analyses.parts.context import belongs
+from ..case.harmonic import nodal_diameter
+from ..case.kept import belongs
 from ..case.load import Case
-from ..case.sector import nodal_diameter
 from ..errors import InputError
 from ..files.dimensions import names_of_data
 from ..model.laws import kept_laws
 from ..post.contact_history import ContactHistory
 from ..texts import display, nearest
+
+if TYPE_CHECKING:
+    import h5py
+
 
 Array = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.intp]
@@ -165,7 +169,7 @@ class Choice:
             yield f"{self.name}: no contact pairs are shown: their motion is not kept at point {numbers}"
 
 
-def read_choice(file: Any, folder: Path, case: Case, options: ViewOptions) -> Choice:
+def read_choice(file: h5py.File, folder: Path, case: Case, options: ViewOptions) -> Choice:
     """Read what is asked for from an open results.h5.
 
     Raises
@@ -177,11 +181,11 @@ def read_choice(file: Any, folder: Path, case: Case, options: ViewOptions) -> Ch
     name = group.name.strip("/")
     held = _held(group)
     # A mode is shown where its contacts are kept; a response is sought at its peaks, where they are not.
-    offered = held if group.attrs["type"] == "mode" and len(held) else np.arange(len(group["coefficients"]))
+    offered = held if case.analyses[name].shown_where_kept and len(held) else np.arange(len(group["coefficients"]))
     chosen = _points(group, offered, options, f"analysis '{name}' in {display(folder)}")
     count = int(group.attrs["samples"])
     samples = np.unique(np.arange(options.phases) * count // options.phases)
-    rows = [row for row, _ in chosen]
+    rows, section = [row for row, _ in chosen], case.analyses[name].harmonic()
     without = [row for row in rows if row not in held]
     return Choice(
         name=name,
@@ -197,12 +201,12 @@ def read_choice(file: Any, folder: Path, case: Case, options: ViewOptions) -> Ch
         without=without,
         highest_component_hz=json.loads(group.attrs.get("reduction", "{}")).get("highest_component_hz", 0.0),
         diameters=_diameters(group, case, name, rows),
-        wheel=case.neighbours is not None and bool(getattr(case.analyses[name], "wheel", False)),
+        wheel=case.neighbours is not None and section is not None and section.wheel,
         sample_count=count,
     )
 
 
-def _diameters(group: Any, case: Case, name: str, rows: Sequence[int]) -> list[int]:
+def _diameters(group: h5py.Group, case: Case, name: str, rows: Sequence[int]) -> list[int]:
     """Nodal diameters of the points: those of their rows, where an analysis has several, or of the analysis."""
     if case.neighbours is None:
         return [0] * len(rows)
@@ -211,7 +215,7 @@ def _diameters(group: Any, case: Case, name: str, rows: Sequence[int]) -> list[i
     return [nodal_diameter(case.analyses[name])] * len(rows)
 
 
-def analysis_name(file: Any, folder: Path, case: Case, asked: str | None) -> str:
+def analysis_name(file: h5py.File, folder: Path, case: Case, asked: str | None) -> str:
     """Name of the analysis asked for, or of the first that has a motion: in the order of the case."""
     found = [name for name in case.analyses if name in file and "coefficients" in file[name]]
     found = [name for name in found if belongs(file[name], case, name)]
@@ -227,13 +231,13 @@ def analysis_name(file: Any, folder: Path, case: Case, asked: str | None) -> str
     )
 
 
-def _held(group: Any) -> IntArray:
+def _held(group: h5py.Group) -> IntArray:
     """Points of which all is kept: where there are contacts, those at which their motion is."""
     with_contacts = any(name.startswith("contact_") for name in group)
     return np.asarray(group["reported"][()] if with_contacts else np.arange(len(group["coefficients"])), dtype=np.intp)
 
 
-def _points(group: Any, kept: IntArray, options: ViewOptions, where: str) -> list[tuple[int, str]]:
+def _points(group: h5py.Group, kept: IntArray, options: ViewOptions, where: str) -> list[tuple[int, str]]:
     """Numbers of points, each with a word on what was asked for; without a wish that of the largest amplitude.
 
     Parameters
@@ -264,7 +268,7 @@ def _not_kept(what: str, where: str, measured: str, kept: IntArray, amplitude: A
     return InputError(what, where, measured, expected, f"--point {near}")
 
 
-def _contacts(group: Any, case: Case, rows: Sequence[int]) -> dict[str, list[ContactHistory]]:
+def _contacts(group: h5py.Group, case: Case, rows: Sequence[int]) -> dict[str, list[ContactHistory]]:
     """Histories of all contacts at some points."""
     reported, laws = group["reported"][()].tolist(), kept_laws(json.loads(group.attrs.get("laws", "{}")))
     found = {}

@@ -10,25 +10,23 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
 
+from ..case.kept import reload_case
 from ..case.load import Case
 from ..errors import InputError
 from ..model.laws import learn_laws
-from ..model.structure import BuiltContact
+from ..model.pairs import Pairs
 from ..post.contact_history import OPEN, SLIP, STICK, ContactHistory
 from ..post.motion import complex_amplitudes
 from ..results.results import has_results, open_results
-from ..run.runner import reload_case
 from ..texts import display
-from .choice import Choice, ViewOptions, read_choice
+from .choice import Choice, ViewOptions, analysis_name, read_choice
 from .motion import Scene, Shape, geometry, mesh_of, scene_of
 from .vtkhdf import VERTEX, GridFile
-from .wear import view_wear, worn_analysis
 
 Array = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.intp]
@@ -49,9 +47,11 @@ def view_run(folder: Path, options: ViewOptions, say: Callable[[str], None] = pr
     """
     _learn_laws(folder)
     case, _ = reload_case(folder, kept=True)
-    worn = None if options.points else worn_analysis(folder, case, options)
-    if worn is not None:
-        return view_wear(folder, case, worn, options, say)
+    with open_results(folder / "results.h5") as file:
+        name = analysis_name(file, folder, case, options.analysis)
+    written = case.analyses[name].view(folder, case, options, say)
+    if written is not None:
+        return list(written)
     nodes, cells = mesh_of(case, options.linear)
     with open_results(folder / "results.h5") as file:
         choice = read_choice(file, folder, case, options)
@@ -117,7 +117,7 @@ def write_grid(path: Path, scene: Scene, cells: tuple[IntArray, int], scale: flo
                 numbers(0, part, np.full(len(shape.nodes), sector))
 
 
-def write_pairs(path: Path, scene: Scene, placed: Mapping[str, BuiltContact], scale: float) -> list[int]:
+def write_pairs(path: Path, scene: Scene, placed: Mapping[str, Pairs], scale: float) -> list[int]:
     """Contact pairs as points that move with the node next to them; returns the sectors whose pairs are shown.
 
     Other sectors of a wave are shown where their delay is a whole number of samples.
@@ -144,7 +144,7 @@ def write_pairs(path: Path, scene: Scene, placed: Mapping[str, BuiltContact], sc
 
 
 def _pair_fields(
-    grid: GridFile, names: Sequence[str], contacts: Sequence[BuiltContact], choice: Choice
+    grid: GridFile, names: Sequence[str], contacts: Sequence[Pairs], choice: Choice
 ) -> Callable[..., None]:
     """Of every step: forces, gap, status; of every period: shares of the status, dissipated work."""
     first = [history for name in names for history in choice.contacts[name]]
@@ -178,12 +178,12 @@ def _pair_fields(
     return write
 
 
-def _motion(grid: GridFile, scale: float) -> Callable[[int, Shape, Any], None]:
+def _motion(grid: GridFile, scale: float) -> Callable[[int, Shape, slice | IntArray], None]:
     """Writes the true displacement of a part, and the one from rest enlarged for the eye."""
     steps = np.arange(grid.steps)
     true, warp = grid.field("displacement", 3, steps), grid.field("warp", 3, steps, "f4")
 
-    def write(part: int, shape: Shape, chosen: Any) -> None:
+    def write(part: int, shape: Shape, chosen: slice | IntArray) -> None:
         for step, x in enumerate(shape.displacements(chosen)):
             true(step, part, x)
             warp(step, part, scale * (x - shape.rest[chosen]))
@@ -197,9 +197,9 @@ def _write_states(grid: GridFile, choice: Choice) -> None:
     grid.field_data("phase", np.tile(choice.phases, len(choice.points)))
 
 
-def _placed(case: Case, choice: Choice, say: Callable[[str], None]) -> dict[str, BuiltContact]:
+def _placed(case: Case, choice: Choice, say: Callable[[str], None]) -> dict[str, Pairs]:
     """Contacts with known places of their pairs."""
-    built = geometry(case).contacts
+    built = geometry(case).pairs
     for name in choice.contacts:
         if name not in built or built[name].points is None:
             say(f"contact '{name}' is not shown: the model has no places of its pairs")

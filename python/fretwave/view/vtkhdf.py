@@ -11,13 +11,17 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from ..errors import InputError
 from ..texts import display
+
+if TYPE_CHECKING:
+    import h5py
+
 
 #: VTK's numbers of cell types by name (vtkCellType.h).
 VERTEX, TRIANGLE, HEXAHEDRON, QUADRATIC_HEXAHEDRON, TRIQUADRATIC_HEXAHEDRON = 1, 5, 12, 25, 29
@@ -160,7 +164,7 @@ class GridFile:
     def __enter__(self) -> GridFile:
         return self
 
-    def __exit__(self, kind: Any, *_: object) -> None:
+    def __exit__(self, kind: object, *_: object) -> None:
         missing = [name for name, rows in self._missing.items() if rows]
         if kind is None and not missing:
             parts = len(self._root["NumberOfPoints"])
@@ -174,7 +178,7 @@ class GridFile:
             raise ValueError(f"fields not written everywhere: {', '.join(missing)}")
 
     @staticmethod
-    def _table(group: Any, name: str, columns: int, dtype: str, rows: int = 0) -> Any:
+    def _table(group: h5py.Group, name: str, columns: int, dtype: str, rows: int = 0) -> Any:
         """An empty dataset that grows, often by so many rows; `columns` 0 for one number a row."""
         tail = (columns,) if columns else ()
         chunk = min(max(rows, CHUNK_ROWS[0]), CHUNK_ROWS[1])
@@ -194,13 +198,13 @@ def linear_cells(triquadratic: npt.NDArray[Any], lattice: Sequence[tuple[int, in
     return np.asarray(triquadratic, dtype="i8")[:, picked].reshape(-1, 8)
 
 
-def _append(data: Any, rows: npt.NDArray[Any]) -> None:
+def _append(data: h5py.Dataset, rows: npt.NDArray[Any]) -> None:
     start = len(data)
     data.resize(start + len(rows), axis=0)
     data[start:] = rows
 
 
-def _text_attribute(group: Any, name: str, text: str) -> None:
+def _text_attribute(group: h5py.Group, name: str, text: str) -> None:
     """Of fixed length, in ASCII: VTK's reader takes no other."""
     import h5py
 

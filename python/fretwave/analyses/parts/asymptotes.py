@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
 
+from ...case.analysis import AnalysisSection
+from ...case.harmonic import HarmonicSection
 from .context import AnalysisContext
+
+if TYPE_CHECKING:
+    from ...model.modes import LinearMode
 
 #: Modes looked through for the one most like the stuck mode, beyond its own number.
 MORE_MODES = 2
 
 
-def other_asymptote(context: AnalysisContext, stuck: Any) -> dict[str, float]:
+def other_asymptote(context: AnalysisContext[HarmonicSection], stuck: LinearMode) -> dict[str, float]:
     """Frequency of the linear mode most like the stuck one, without friction. Collective.
 
     Returns
@@ -29,7 +35,7 @@ def other_asymptote(context: AnalysisContext, stuck: Any) -> dict[str, float]:
     from ...model.model import Model
     from ...model.modes import linear_modes
 
-    count = min(context.model.n_dof, context.analysis.linear_mode + MORE_MODES)  # type: ignore[attr-defined]
+    count = min(context.model.n_dof, context.analysis.linear_mode + MORE_MODES)
     if all(contact.components == 1 for contact in context.case.contacts):
         return {"free_omega": most_alike(context, context.linear_mode("free", count), stuck)}
     if context.case.neighbours is not None:
@@ -40,14 +46,14 @@ def other_asymptote(context: AnalysisContext, stuck: Any) -> dict[str, float]:
         return {"sliding_omega": most_alike(context, linear_modes(model, count, contact="free"), stuck)}
 
 
-def closed_stiffness(context: AnalysisContext, tangential: bool = False) -> Any:
+def closed_stiffness(context: AnalysisContext[AnalysisSection], tangential: bool = False) -> sp.csr_matrix:
     """Stiffness of all pairs closed, on the dofs: sum kn b_n b_n^T, and kt b_t b_t^T when they do not slide."""
     total = sp.csr_matrix(context.case.K.shape)
     for contact in context.case.contacts:
         for row in range(contact.components):
             value = contact.value(contact.info.stiffness_along(row))
             if value is not None and (tangential or row == contact.info.normal):
-                rows = contact.rows[row :: contact.components]
+                rows = contact.pairs.own[row :: contact.components]
                 stiffness = np.broadcast_to(value, (contact.n_pairs,))
                 total = total + rows.T @ sp.diags(stiffness) @ rows
     return total
@@ -61,7 +67,8 @@ def asymptote_line(name: str, stuck: float, other: dict[str, float]) -> str:
     return f"{name}: asymptotes: {', '.join(texts)}"
 
 
-def most_alike(context: AnalysisContext, modes: list[Any], stuck: Any) -> float:
+def most_alike(context: AnalysisContext[AnalysisSection], modes: Sequence[LinearMode], stuck: LinearMode) -> float:
+    """Frequency of the mode most like another [rad/s]."""
     M, wanted = context.case.M, stuck.shape + 1j * stuck.imaginary
     shapes = [mode.shape + 1j * mode.imaginary for mode in modes]
     likeness = [abs(phi.conj() @ (M @ wanted)) / math.sqrt((phi.conj() @ (M @ phi)).real) for phi in shapes]

@@ -3,13 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any, Optional, Union
 
 import numpy as np
+import numpy.typing as npt
 
+from ...case.analysis import AnalysisSection
 from ...case.schema import StepSection
 from ...results.results import AnalysisWriter
 from ...results.slopes import slope_fields, slopes_of
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
+    from petsc4py import PETSc
+
+    from ...hb.problems import HarmonicProblem, Harmonics, NonlinearMode
+    from ...model.modes import LinearMode
+    from ...model.rest import Rest
+    from ...solve.continuation import Continuation, Point
+    from ...solve.steps import StepControl
+    from ..flutter import FlutterAnalysis
+    from ..mode import ModeAnalysis
+    from .context import AnalysisContext
+
+    ModeLike = Union[ModeAnalysis, FlutterAnalysis]
+    #: Further columns of a point, from problem, y and (on the writing rank) coefficients (n_dof, m).
+    Describe = Callable[[Any, PETSc.Vec, Optional[npt.NDArray[np.float64]]], Mapping[str, Any]]
 
 #: Events at which the contact's motion over a period is kept.
 PLAIN_EVENTS = ("", "step")
@@ -34,7 +53,7 @@ FALLBACKS = {
 }
 
 
-def step_control(step: StepSection) -> Any:
+def step_control(step: StepSection) -> StepControl:
     """The case's step control for the continuation."""
     from ...solve.steps import StepControl
 
@@ -43,11 +62,11 @@ def step_control(step: StepSection) -> Any:
 
 def record(
     writer: AnalysisWriter,
-    problem: Any,
-    point: Any,
+    problem: HarmonicProblem,
+    point: Point,
     snapshot: Mapping[str, Any] | None,
     extra: Mapping[str, Any],
-    describe: Callable[[Any, Any, Any], Mapping[str, Any]] | None = None,
+    describe: Describe | None = None,
 ) -> dict[str, Any]:
     """Write one continuation point. Collective.
 
@@ -76,14 +95,21 @@ def record(
     if describe is not None:
         row.update(describe(problem, point.y, coefficients))
     slopes = {}
-    if point.knot is not None:
+    if point.knot is not None and problem.meaning is not None:
         writer.keep(slope_fields(problem.meaning))
         slopes = slopes_of(problem.meaning, point.knot)
     writer.append(row, coefficients, motions, kept, slopes)
     return row
 
 
-def mode_problem(context: Any, harmonics: Any, mode: Any, rest: Any, dof: int | None = None, avoid: Any = None) -> Any:
+def mode_problem(
+    context: AnalysisContext[ModeLike],
+    harmonics: Harmonics,
+    mode: LinearMode,
+    rest: Optional[Rest],
+    dof: Optional[int] = None,
+    avoid: Optional[npt.NDArray[np.complex128]] = None,
+) -> NonlinearMode:
     """The nonlinear mode of an analysis about its static state. Collective.
 
     Parameters
@@ -99,7 +125,7 @@ def mode_problem(context: Any, harmonics: Any, mode: Any, rest: Any, dof: int | 
     return NonlinearMode(context.model, harmonics, analysis.method, number, mode, context.prefix, avoid, rest)
 
 
-def tell(context: Any, branch: Any, name: str = "") -> None:
+def tell(context: AnalysisContext[AnalysisSection], branch: Continuation, name: str = "") -> None:
     """Say how a branch began, how well a resumed one meets its last point, and what it could not have. Collective.
 
     Kept in run.json too, under `branches`.
@@ -119,7 +145,7 @@ def tell(context: Any, branch: Any, name: str = "") -> None:
     tell_fallbacks(context, branch)
 
 
-def tell_fallbacks(context: Any, branch: Any) -> None:
+def tell_fallbacks(context: AnalysisContext[AnalysisSection], branch: Continuation) -> None:
     """One line of the log on linear solves that failed and how they were solved; counts add up in run.json."""
     found = branch.fallbacks
     counts = {key: found[key] for key in ("rebuilt", "condensed", "whole")}
@@ -134,7 +160,7 @@ def tell_fallbacks(context: Any, branch: Any) -> None:
         context.console.line(f"{context.name}: {found['said']}")
 
 
-def points_of(branch: Any) -> Iterator[Any]:
+def points_of(branch: Continuation) -> Iterator[Point]:
     """Points of a branch with their knots. Collective.
 
     Their vectors are freed a point later, for the branch may look back at its last one.
@@ -159,7 +185,7 @@ def split_state(state: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any
 
 
 def open_branch(
-    comm: Any, writer: AnalysisWriter, resuming: bool
+    comm: MPI.Comm, writer: AnalysisWriter, resuming: bool
 ) -> tuple[dict[str, Any] | None, dict[str, Any], bool]:
     """Snapshot (rank 0), own entries (every rank) and whether there is a state to go on from. Collective."""
     state = writer.go_on() if resuming and writer.active else None

@@ -4,23 +4,36 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, Generic, Optional, TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
+from ...case.analysis import AnalysisSection
+from ...case.harmonic import nodal_diameter, with_flow_forces
+from ...case.kept import belongs
 from ...case.load import Case
-from ...case.schema import AnalysisSection, WearAnalysis
-from ...case.sector import nodal_diameter
-from ...case.wheel import Wheel
 from ...columns import Column
 from ...console import Console
 from ...errors import InputError
 from ...files.whole import replace_text
+from ...model.structure import Structure
 from ...mpi.guard import on_first_rank
 from ...results.results import AnalysisWriter, Field, has_results, open_results
 from ...texts import display
+
+if TYPE_CHECKING:
+    import h5py
+    from mpi4py import MPI
+
+    from ...model.model import Model
+    from ...model.modes import LinearMode
+
+Section = TypeVar("Section", bound=AnalysisSection, covariant=True)
+Other = TypeVar("Other", bound=AnalysisSection)
+Found = TypeVar("Found")
 
 
 @dataclass
@@ -52,7 +65,7 @@ class Outcome:
 
 
 @dataclass
-class AnalysisContext:
+class AnalysisContext(Generic[Section]):
     """Everything an analysis needs; the same on every rank.
 
     Attributes
@@ -62,7 +75,7 @@ class AnalysisContext:
     case : Case
         Names, matrices and all analyses of the case.
     analysis : AnalysisSection
-        This analysis; use its own class for typed access.
+        This analysis, or one whose settings it uses.
     resuming : bool
         Go on from the last state, if there is one.
     before_first : callable
@@ -83,10 +96,10 @@ class AnalysisContext:
         Done after that on the writing rank (to clean up).
     """
 
-    model: Any
+    model: Model
     case: Case
-    analysis: AnalysisSection
-    comm: Any
+    analysis: Section
+    comm: MPI.Comm
     folder: Path
     console: Console
     resuming: bool = False
@@ -104,15 +117,26 @@ class AnalysisContext:
         return self.analysis.name
 
     @property
-    def wheel(self) -> Wheel:
+    def wheel(self) -> Structure:
         """Of an analysis of a whole wheel."""
         assert self.case.wheel is not None
         return self.case.wheel
 
     @property
+    def tuned(self) -> Case:
+        """Of an analysis of a whole wheel: the case of the tuned sector."""
+        assert self.case.sector is not None
+        return self.case.sector
+
+    @property
     def prefix(self) -> str:
         """Prefix of the PETSc options."""
         return self.analysis.name.replace("-", "_") + "_"
+
+    def of(self, analysis: Other, **changes: Any) -> AnalysisContext[Other]:
+        """The same for another analysis, with other changes."""
+        given = {f.name: getattr(self, f.name) for f in fields(self)}
+        return AnalysisContext(**{**given, **changes, "analysis": analysis})
 
     def leave_out(self, reasons: Sequence[str]) -> None:
         """Say in one line what is left out and why."""
@@ -176,16 +200,17 @@ class AnalysisContext:
         """
         return on_first_rank(self.comm, lambda: self._read(name, _columns))
 
-    def coefficients(self, name: str, points: Sequence[int] | None = None) -> tuple[list[str], Any]:
+    def coefficients(
+        self, name: str, points: Optional[Sequence[int]] = None
+    ) -> tuple[list[str], npt.NDArray[np.float64]]:
         """Harmonic labels and coefficients (points, n_dof, m) of a finished analysis. Collective."""
 
-        def read(group: Any) -> tuple[list[str], Any]:
+        def read(group: h5py.Group) -> tuple[list[str], npt.NDArray[np.float64]]:
             labels = [text.decode() for text in group["harmonic"][()]]
             data = group["coefficients"]
             return labels, data[()] if points is None else np.stack([data[point] for point in points])
 
-        found: tuple[list[str], Any] = on_first_rank(self.comm, lambda: self._read(name, read))
-        return found
+        return on_first_rank(self.comm, lambda: self._read(name, read))
 
     def has_results(self, name: str) -> bool:
         """Whether an analysis has rows in the run folder that belong to this very case. Collective."""
@@ -209,7 +234,7 @@ class AnalysisContext:
             lines.append(",".join(value if isinstance(value, str) else repr(value) for value in values))
         replace_text(self.folder / f"{self.name}_{suffix}.csv", "\n".join(lines) + "\n")
 
-    def _read(self, name: str, what: Callable[[Any], Any]) -> Any:
+    def _read(self, name: str, what: Callable[[h5py.Group], Found]) -> Found:
         with open_results(self.folder / "results.h5") as file:
             if name not in file or not belongs(file[name], self.case, name):
                 raise InputError(
@@ -220,7 +245,7 @@ class AnalysisContext:
                 )
             return what(file[name])
 
-    def linear_mode(self, contact: str, count: int = 1, near: float | None = None) -> list[Any]:
+    def linear_mode(self, contact: str, count: int = 1, near: float | None = None) -> list[LinearMode]:
         """Linear modes, the contact ``stuck`` or ``free``, without forces of the flow. Collective.
 
         Parameters
@@ -229,47 +254,17 @@ class AnalysisContext:
         """
         from ...model.modes import linear_modes
 
-        if not getattr(self.analysis, "aerodynamics", False):
-            return cast("list[Any]", linear_modes(self.model, count, contact, near))
+        if not with_flow_forces(self.analysis):
+            return linear_modes(self.model, count, contact, near)
         from ...case.build import build_model
 
         preload, diameters = self.case.preload_of(self.analysis), nodal_diameter(self.analysis)
         with build_model(self.case, (), self.comm, preload, diameters) as structure:
-            return cast("list[Any]", linear_modes(structure, count, contact, near))
+            return linear_modes(structure, count, contact, near)
 
 
-def _columns(group: Any) -> dict[str, Any]:
+def _columns(group: h5py.Group) -> dict[str, Any]:
     table = {name: data[()] for name, data in group["points"].items()}
     if "event" in table:
         table["event"] = np.array([text.decode() for text in table["event"]])
     return table
-
-
-#: Tables of the case that decide the results of every analysis.
-_COMMON = ("model", "contact", "reduction", "preload", "aerodynamics")
-
-
-def describe_analysis(analysis: AnalysisSection, case: Case, run_id: str) -> dict[str, Any]:
-    """Attributes every group has: the analysis' own keys, and the values that decided its results."""
-    keys = analysis.model_dump(exclude={"name", "dampers", "petsc", "step", "force", "preload"})
-    plain = {key: value for key, value in keys.items() if value is not None and not isinstance(value, dict)}
-    shown = {key: json.dumps(value) if isinstance(value, list) else value for key, value in plain.items()}
-    reduction = {"reduction": json.dumps(case.reduced.plain())} if case.reduced else {}
-    laws = json.dumps({contact.name: contact.info.plain() for contact in case.contacts})
-    return {**shown, **reduction, "laws": laws, "run_id": run_id, "case": json.dumps(_deciding(case, analysis.name))}
-
-
-def _deciding(case: Case, name: str) -> dict[str, Any]:
-    analysis = case.analyses[name]
-    others = (name, analysis.mode) if isinstance(analysis, WearAnalysis) else (name,)
-    return {key: value for key, value in case.resolved.items() if key.split(".")[0] in (*_COMMON, *others)}
-
-
-def belongs(group: Any, case: Case, name: str) -> bool:
-    """Whether a group's results follow from the present model, contacts and keys of the analysis."""
-    try:
-        stored = json.loads(group.attrs["case"])
-    except (KeyError, ValueError):
-        return False
-    points = group["points"]
-    return bool(stored == _deciding(case, name) and len(next(iter(points.values()))))

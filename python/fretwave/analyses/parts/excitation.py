@@ -6,18 +6,27 @@ import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any, Optional
 
 import numpy as np
 import numpy.typing as npt
 
-from ...case.schema import ForcedAnalysis
+from ...case.harmonic import nodal_diameter
 from ...cyclic.engine_order import speed_rpm
 from ...post.motion import complex_amplitudes
 from .branch import step_control
 from .context import AnalysisContext
 from .rest import rest_state, start_mode
 from .wheel_start import tuned_sector
+
+if TYPE_CHECKING:
+    from petsc4py import PETSc
+
+    from ...hb.problems import ForcedResponse, HarmonicProblem, Harmonics
+    from ...model.modes import LinearMode
+    from ...model.rest import Rest
+    from ...solve.continuation import Continuation
+    from ..forced import ForcedAnalysis
 
 
 @dataclass
@@ -28,20 +37,19 @@ class Excitation:
     ----------
     reference : LinearMode
         Scales the unknowns.
-    rest : Preload or None
+    rest : Rest or None
     phase : float or None
         Of the last point of the response [rad]: the next one's is the nearest to it, no jump by 2 pi.
     """
 
-    context: AnalysisContext
-    harmonics: Any
-    reference: Any
-    rest: Any
+    context: AnalysisContext[ForcedAnalysis]
+    harmonics: Harmonics
+    reference: LinearMode
+    rest: Optional[Rest]
     phase: float | None = None
 
     @property
     def analysis(self) -> ForcedAnalysis:
-        assert isinstance(self.context.analysis, ForcedAnalysis)
         return self.context.analysis
 
     def force(self) -> npt.NDArray[np.complex128]:
@@ -54,7 +62,7 @@ class Excitation:
                 force[place] = amplitude * np.exp(-j * turn)
         return force
 
-    def problem(self, level: float) -> Any:
+    def problem(self, level: float) -> ForcedResponse:
         """Steady response at a level. Collective."""
         from ...hb.problems import ForcedResponse
 
@@ -70,7 +78,9 @@ class Excitation:
             rest=self.rest,
         )
 
-    def branch(self, problem: Any, snapshot: Any = None, go_on: bool = False) -> Any:
+    def branch(
+        self, problem: ForcedResponse, snapshot: Optional[dict[str, Any]] = None, go_on: bool = False
+    ) -> Continuation:
         """From the first to the last frequency, or from where a snapshot was taken. Collective."""
         from ...solve.continuation import Continuation
 
@@ -88,7 +98,9 @@ class Excitation:
         names = ["speed_rpm"] if self.analysis.engine_order else []
         return names + (["largest_amplitude", "largest_sector"] if self.context.case.wheel else [])
 
-    def row(self, problem: Any, y: Any, coefficients: Any) -> dict[str, Any]:
+    def row(
+        self, problem: HarmonicProblem, y: PETSc.Vec, coefficients: Optional[npt.NDArray[np.float64]]
+    ) -> dict[str, Any]:
         """Their values at a point; of the blades on the rank that has coefficients. Collective."""
         order = self.analysis.engine_order
         state = problem.state(y)
@@ -105,9 +117,9 @@ class Excitation:
         return row
 
 
-def excitation_of(context: AnalysisContext, harmonics: Any) -> Excitation:
+def excitation_of(context: AnalysisContext[ForcedAnalysis], harmonics: Harmonics) -> Excitation:
     """Of a forced analysis; a wheel's unknowns are scaled by the tuned wave that its force drives. Collective."""
-    analysis: Any = context.analysis
+    analysis = context.analysis
     if context.case.wheel is None:
         return Excitation(context, harmonics, *start_mode(context, analysis.linear_mode, or_free=True))
     from ...cyclic.sector import wave_mode
@@ -115,11 +127,11 @@ def excitation_of(context: AnalysisContext, harmonics: Any) -> Excitation:
     with tuned_sector(context) as sector:
         tuned, _ = start_mode(sector, analysis.linear_mode, or_free=True)
     rest = rest_state(context)
-    return Excitation(context, harmonics, wave_mode(tuned, analysis.nodal_diameter, context.case.wheel.sectors), rest)
+    return Excitation(context, harmonics, wave_mode(tuned, nodal_diameter(analysis), context.case.wheel.sectors), rest)
 
 
 @contextmanager
-def tuned_excitation(context: AnalysisContext, harmonics: Any) -> Iterator[Excitation]:
+def tuned_excitation(context: AnalysisContext[ForcedAnalysis], harmonics: Harmonics) -> Iterator[Excitation]:
     """The same on the tuned sector that a wheel is made of. Collective."""
     with tuned_sector(context) as sector:
         yield excitation_of(sector, harmonics)

@@ -4,34 +4,37 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Optional
 
 import numpy as np
 import scipy.sparse.linalg
 
-from ...case.contacts import ContactSpec, closed_contacts
+from ...case.analysis import AnalysisSection
+from ...case.contacts import closed_contacts
+from ...case.harmonic import HarmonicSection, nodal_diameter
 from ...case.schema import PreloadSection
-from ...case.sector import nodal_diameter
 from ...errors import InputError
+from ...model.contact import Contact
 from ...model.laws import Role, own_load
 from .asymptotes import closed_stiffness
 from .context import AnalysisContext
+
+if TYPE_CHECKING:
+    from ...hb.problems import Harmonics
+    from ...model.modes import LinearMode
+    from ...model.rest import Rest
+    from ...results.results import AnalysisWriter
 
 #: A mode below this share of the first frequency with closed contact is a rigid motion.
 RIGID = 1e-6
 
 
-def rest_state(context: AnalysisContext, factor: float = 1.0) -> Any:
+def rest_state(context: AnalysisContext[AnalysisSection]) -> Optional[Rest]:
     """Solve the preload of an analysis; the contact laws take it as their rest state. Collective.
-
-    Parameters
-    ----------
-    factor : float
-        On the loads; the pairs' own normal loads are as given.
 
     Returns
     -------
-    Preload or None
+    Rest or None
         None when there is no preload.
 
     Raises
@@ -39,11 +42,20 @@ def rest_state(context: AnalysisContext, factor: float = 1.0) -> Any:
     NotConverged
         There is no static equilibrium.
     """
+    return None if context.case.preload_of(context.analysis) is None else loaded_state(context)
+
+
+def loaded_state(context: AnalysisContext[AnalysisSection], factor: float = 1.0) -> Rest:
+    """The same also without [preload], where the pairs' own loads act alone. Collective.
+
+    Parameters
+    ----------
+    factor : float
+        On the loads; the pairs' own normal loads are as given.
+    """
     from ...solve.preload import balanced, static_preload
 
     section = context.case.preload_of(context.analysis)
-    if section is None and context.analysis.type != "static":
-        return None
     reference = closed_mode(context)
     if section is None or not section.loads:
         return balanced(context.model, reference)
@@ -55,10 +67,10 @@ def rest_state(context: AnalysisContext, factor: float = 1.0) -> Any:
     return static_preload(context.model, load, reference, closed=closed)
 
 
-def just_touching(contacts: Sequence[ContactSpec], section: PreloadSection) -> bool:
+def just_touching(contacts: Sequence[Contact], section: PreloadSection) -> bool:
     """Pairs with a normal direction, none with a gap or with a load of its own."""
 
-    def has(contact: ContactSpec, role: Role) -> bool:
+    def has(contact: Contact, role: Role) -> bool:
         value = contact.value(role)
         return value is not None and bool(np.any(value))
 
@@ -67,7 +79,7 @@ def just_touching(contacts: Sequence[ContactSpec], section: PreloadSection) -> b
     )
 
 
-def closed_mode(context: AnalysisContext) -> Any:
+def closed_mode(context: AnalysisContext[AnalysisSection]) -> LinearMode:
     """Lowest linear mode with every pair stuck, also those that do not touch before the load: a scale. Collective."""
     from ...case.build import build_model
     from ...model.modes import linear_modes
@@ -77,7 +89,9 @@ def closed_mode(context: AnalysisContext) -> Any:
         return linear_modes(model, 1)[0]
 
 
-def start_mode(context: AnalysisContext, linear_mode: int, or_free: bool = False) -> tuple[Any, Any]:
+def start_mode(
+    context: AnalysisContext[AnalysisSection], linear_mode: int, or_free: bool = False
+) -> tuple[LinearMode, Optional[Rest]]:
     """The linear mode with the contact as it is at rest, stuck, and the rest state (or None). Collective.
 
     Parameters
@@ -113,7 +127,9 @@ def start_mode(context: AnalysisContext, linear_mode: int, or_free: bool = False
     return start, rest
 
 
-def retained(context: AnalysisContext, highest: int | None = None, samples: int | None = None) -> Any:
+def retained(
+    context: AnalysisContext[HarmonicSection], highest: Optional[int] = None, samples: Optional[int] = None
+) -> Harmonics:
     """Harmonics of an analysis in the frequency domain: with a preload the even ones too, unless told otherwise.
 
     Parameters
@@ -122,19 +138,17 @@ def retained(context: AnalysisContext, highest: int | None = None, samples: int 
     """
     from ...hb.problems import choose_harmonics
 
-    analysis: Any = context.analysis
-    retain = analysis.retain
+    analysis, retain = context.analysis, context.analysis.retain
     if retain == "auto" and context.case.preload_of(analysis) is not None:
         retain = "all"
     return choose_harmonics(context.model, highest or analysis.harmonics, samples or analysis.samples, retain)
 
 
-def keep_pairs(context: AnalysisContext, writer: Any) -> None:
+def keep_pairs(context: AnalysisContext[AnalysisSection], writer: AnalysisWriter) -> None:
     """Keep with the results where the contact pairs are, for the pictures."""
-    built = context.case.built.contacts if context.case.built else {}
     for contact in context.case.contacts:
-        given = built.get(contact.name)
-        if given is None or given.positions is None:
+        given = contact.pairs
+        if given.positions is None:
             continue
         faces = list(given.faces) if given.faces is not None else [contact.name] * given.n_pairs
         friction = contact.value(Role.FRICTION_COEFFICIENT)

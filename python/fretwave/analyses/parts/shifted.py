@@ -2,35 +2,41 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Optional
 
 import numpy as np
 import numpy.typing as npt
+import scipy.sparse as sp
 
-from ...case.schema import ModeAnalysis
+from ...case.analysis import AnalysisSection
 from ...post.mode_curve import ModeCurve
 from ...post.motion import complex_amplitudes
 from .context import AnalysisContext
 
+if TYPE_CHECKING:
+    from ..mode import ModeAnalysis
+
 Array = npt.NDArray[np.float64]
 
 
-def added_ratio(phi: npt.NDArray[np.complex128], omega0: float, M: Any, C: Any) -> float:
+def added_ratio(phi: npt.NDArray[np.complex128], omega0: float, M: sp.spmatrix, C: sp.spmatrix) -> float:
     """Damping ratio phi^H C phi / (2 omega0 phi^H M phi) that a damping matrix adds to a motion of shape phi."""
     loss, mass = np.real(phi.conj() @ (C @ phi)), np.real(phi.conj() @ (M @ phi))
     return float(loss / (2.0 * omega0 * mass))
 
 
-def shifted_damping(context: AnalysisContext, damped: ModeAnalysis) -> list[str]:
-    """Add the damping to every undamped twin of a mode; a table and a line for each. Collective.
+def shifted_damping(
+    context: AnalysisContext[AnalysisSection], damped: ModeAnalysis, modes: Iterable[ModeAnalysis]
+) -> list[str]:
+    """Add the damping to every undamped twin of a mode among others; a table and a line for each. Collective.
 
     Writes `<name>_shifted_<twin>.csv` with the columns of :func:`_compare`.
     """
-    return [_shift(context, damped, twin) for twin in _twins(context, damped)]
+    return [_shift(context, damped, twin) for twin in _twins(context, damped, modes)]
 
 
-def _shift(context: AnalysisContext, damped: ModeAnalysis, twin: ModeAnalysis) -> str:
+def _shift(context: AnalysisContext[AnalysisSection], damped: ModeAnalysis, twin: ModeAnalysis) -> str:
     table, (labels, coefficients) = context.table(twin.name), context.coefficients(twin.name)
     dampers = context.case.damping_with(damped.dampers) - _or_zero(context.case.damping_with([]), context.case.M)
     added = [
@@ -64,13 +70,14 @@ def _compare(table: Mapping[str, Array], added: Array, damped: ModeCurve) -> lis
     return rows
 
 
-def _twins(context: AnalysisContext, damped: ModeAnalysis) -> list[ModeAnalysis]:
+def _twins(
+    context: AnalysisContext[AnalysisSection], damped: ModeAnalysis, others: Iterable[ModeAnalysis]
+) -> list[ModeAnalysis]:
     """Finished analyses of the same linear mode on the same dof without dampers."""
-    others = [other for other in context.case.analyses.values() if isinstance(other, ModeAnalysis)]
     key = (damped.linear_mode, damped.normalise)
     twins = [other for other in others if not other.dampers and (other.linear_mode, other.normalise) == key]
     return [twin for twin in twins if damped.dampers and context.has_results(twin.name)]
 
 
-def _or_zero(C: Any, M: Any) -> Any:
+def _or_zero(C: Optional[sp.spmatrix], M: sp.spmatrix) -> sp.spmatrix:
     return 0.0 * M if C is None else C

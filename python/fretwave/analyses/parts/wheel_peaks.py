@@ -8,7 +8,7 @@ modes, one degree of freedom a blade and no friction it is at most (1 + sqrt(N))
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Optional
+from typing import Optional
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +16,7 @@ import numpy.typing as npt
 from ...post.blade_peaks import blade_tables, whitehead
 from ...post.mode_curve import ModeCurve
 from ...post.response_peaks import Peak, distance
+from ...results.results import AnalysisWriter
 from .branch import points_of
 from .excitation import Excitation, tuned_excitation
 
@@ -59,7 +60,7 @@ def _line(row: Mapping[str, float]) -> str:
     )
 
 
-def blade_amplitudes(excitation: Excitation, writer: Any) -> Array:
+def blade_amplitudes(excitation: Excitation, writer: AnalysisWriter) -> Array:
     """Fundamental amplitudes (points, N) [m] of the observed dof in all sectors (writing rank)."""
     labels = excitation.harmonics.labels
     dofs = excitation.context.case.places(excitation.analysis.observe)

@@ -5,7 +5,7 @@ The numbers are those of `fretwave.cyclic.wheel_shape`.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any, Optional
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +16,16 @@ from ...cyclic.wheel_shape import WheelShape as Shape
 from ...post.motion import complex_amplitudes
 from ...post.wave_content import phases, wave_content
 from .context import AnalysisContext
+
+if TYPE_CHECKING:
+    from petsc4py import PETSc
+
+    from ...case.analysis import AnalysisSection
+    from ...hb.problems import NonlinearMode
+    from ...model.modes import LinearMode
+    from ...results.results import AnalysisWriter
+    from ..mode import ModeAnalysis
+    from .wheel_start import Start
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
@@ -52,14 +62,16 @@ class WheelShape:
         The problem's start.
     """
 
-    def __init__(self, context: AnalysisContext, dof: str, tuned_amplitude: float, mode: Any) -> None:
+    def __init__(
+        self, context: AnalysisContext[AnalysisSection], dof: str, tuned_amplitude: float, mode: LinearMode
+    ) -> None:
         wheel, self.M = context.wheel, context.case.M
-        self.shape = Shape(self.M, wheel.sectors, wheel.sector.dof(dof), tuned_amplitude)
+        self.shape = Shape(self.M, wheel.sectors, context.tuned.dof(dof), tuned_amplitude)
         phi = mode.shape + 1j * mode.imaginary
         # what forces are measured in, per displacement (`reference_stiffness` of the core)
         self.stiffness = mode.omega**2 * np.real(phi.conj() @ (self.M @ phi)) / np.linalg.norm(phi) ** 2
 
-    def row(self, problem: Any, y: Any, coefficients: Any) -> dict[str, Any]:
+    def row(self, problem: NonlinearMode, y: PETSc.Vec, coefficients: Optional[Array]) -> dict[str, Any]:
         """Of one point; on ranks without coefficients nothing. Collective."""
         unfolding, state = problem.unfolding(y), problem.state(y)
         if coefficients is None:
@@ -69,7 +81,7 @@ class WheelShape:
         return {**self.shape(q), "unfolding": float(held * np.linalg.norm(unfolding))}
 
 
-def finish_wheel(context: AnalysisContext, writer: Any, start: Any) -> list[str]:
+def finish_wheel(context: AnalysisContext[ModeAnalysis], writer: AnalysisWriter, start: Start) -> list[str]:
     """Keep what the branch says of the wheel in run.json and in two tables; lines to print. One rank writes.
 
     ``<name>_sectors.csv`` has the amplitude and phase of the observed dof in every sector, ``<name>_diameters.csv`` the
@@ -89,6 +101,7 @@ def finish_wheel(context: AnalysisContext, writer: Any, start: Any) -> list[str]
     share = content / content.sum(axis=1, keepdims=True)
     context.write_table("diameters", {**shared, "nodal_diameter": diameters, "share": share.ravel()})
     deviations = context.wheel.deviations
+    assert start.tuned is not None
     context.entry["wheel"] = {
         "sectors": n,
         "normalise": start.attributes["normalise"],
@@ -102,16 +115,17 @@ def finish_wheel(context: AnalysisContext, writer: Any, start: Any) -> list[str]
     return _lines(context.name, points, start)
 
 
-def _sector_amplitudes(context: AnalysisContext, writer: Any, points: Any) -> Complex:
+def _sector_amplitudes(
+    context: AnalysisContext[ModeAnalysis], writer: AnalysisWriter, points: npt.NDArray[np.intp]
+) -> Complex:
     """Of the observed dof at some points, (points, N), from the coefficients written."""
-    analysis: Any = context.analysis
-    places = context.case.places(analysis.normalise)
+    places = context.case.places(context.analysis.normalise)
     labels = [text.decode() for text in writer.group["harmonic"][()]]
     kept = [writer.group["coefficients"][int(point)][places] for point in points]
     return np.array([complex_amplitudes(labels, Q)[1] for Q in kept])
 
 
-def _lines(name: str, points: dict[str, Any], start: Any) -> list[str]:
+def _lines(name: str, points: dict[str, Any], start: Start) -> list[str]:
     lines = []
     shown = [0, *np.flatnonzero(points["event"] == b"report").tolist(), len(points["point"]) - 1]
     for k in dict.fromkeys(shown):

@@ -6,20 +6,25 @@ import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from typing import Any, Optional
+from typing import TYPE_CHECKING, Any, Optional, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
 
-from ...cyclic.aerodynamics import period_of
-from ...cyclic.sector import wave_mode
-from ...cyclic.wheel_modes import most_alike, standing_wave, travelling_wave
-from ...model.modes import LinearMode
+from ...case.analysis import AnalysisSection
+from ...case.harmonic import HarmonicSection, nodal_diameter
 from .asymptotes import most_alike as omega_most_alike
 from .asymptotes import other_asymptote
 from .context import AnalysisContext
 from .rest import rest_state, start_mode
+
+if TYPE_CHECKING:
+    from ...model.modes import LinearMode
+    from ...model.rest import Rest
+    from ..mode import ModeAnalysis
+
+Harmonic = TypeVar("Harmonic", bound=HarmonicSection)
 
 Complex = npt.NDArray[np.complex128]
 
@@ -35,7 +40,7 @@ class Start:
     ----------
     mode : LinearMode
         Stuck.
-    rest : Preload or None
+    rest : Rest or None
     asymptotes : dict
         As `other_asymptote` gives them.
     dof : int
@@ -49,7 +54,7 @@ class Start:
     """
 
     mode: LinearMode
-    rest: Any
+    rest: Optional[Rest]
     asymptotes: dict[str, float]
     dof: int
     avoid: Optional[Complex] = None
@@ -57,23 +62,23 @@ class Start:
     attributes: dict[str, Any] = field(default_factory=dict)
 
 
-def start_of(context: AnalysisContext) -> Start:
+def start_of(context: AnalysisContext[ModeAnalysis]) -> Start:
     """Start of a mode analysis, of a sector or structure or of a wheel. Collective."""
     if context.case.wheel is not None:
         return _on_wheel(context)
-    analysis: Any = context.analysis
+    analysis = context.analysis
     stuck, rest = start_mode(context, analysis.linear_mode, or_free=True)
     return Start(stuck, rest, other_asymptote(context, stuck), context.case.dof(analysis.normalise))
 
 
-def _on_wheel(context: AnalysisContext) -> Start:
+def _on_wheel(context: AnalysisContext[ModeAnalysis]) -> Start:
     wheel, mistuned = context.wheel, context.wheel.deviations is not None
-    analysis: Any = context.analysis
+    analysis = context.analysis
     rest = rest_state(context)
     mode = None
     if mistuned and analysis.nodal_diameter is None:
         mode = context.linear_mode("stuck", analysis.linear_mode)[-1]
-        context = replace(context, analysis=_family(context, mode))
+        context = context.of(_family(context, mode))
     tuned, asymptotes = _tuned(context)
     analysis = context.analysis
     if rest is not None:
@@ -98,58 +103,62 @@ def _on_wheel(context: AnalysisContext) -> Start:
 
 
 @contextmanager
-def tuned_sector(context: AnalysisContext) -> Iterator[AnalysisContext]:
+def tuned_sector(context: AnalysisContext[Harmonic]) -> Iterator[AnalysisContext[Harmonic]]:
     """The same analysis of the tuned sector alone. Collective."""
     from ...case.build import build_model
 
-    analysis: Any = context.analysis
-    case = context.wheel.sector
+    analysis = context.analysis
+    case = context.tuned
     preload, flow = case.preload_of(analysis), analysis.aerodynamics
-    with build_model(case, analysis.dampers, context.comm, preload, analysis.nodal_diameter, flow) as model:
+    with build_model(case, analysis.dampers, context.comm, preload, nodal_diameter(analysis), flow) as model:
         yield replace(context, model=model, case=case, arrays={})
 
 
-def _tuned(context: AnalysisContext) -> tuple[LinearMode, dict[str, float]]:
+def _tuned(context: AnalysisContext[ModeAnalysis]) -> tuple[LinearMode, dict[str, float]]:
     """Linear mode of the tuned sector in the wave that the analysis names, and its other asymptote. Collective."""
-    analysis: Any = context.analysis
+    analysis = context.analysis
     with tuned_sector(context) as sector:
         stuck, _ = start_mode(sector, analysis.linear_mode)
         return stuck, other_asymptote(sector, stuck)
 
 
-def tuned_amplitude(context: AnalysisContext, tuned: LinearMode) -> float:
+def tuned_amplitude(context: AnalysisContext[ModeAnalysis], tuned: LinearMode) -> float:
     """Of the normalised dof in each sector of the wheel in the tuned travelling wave of unit modal mass."""
-    analysis: Any = context.analysis
-    dof = context.wheel.sector.dof(analysis.normalise)
+    analysis = context.analysis
+    dof = context.tuned.dof(analysis.normalise)
     return float(abs(tuned.shape[dof] + 1j * tuned.imaginary[dof]) / np.sqrt(context.wheel.sectors))
 
 
-def _family(context: AnalysisContext, mode: LinearMode) -> Any:
+def _family(context: AnalysisContext[ModeAnalysis], mode: LinearMode) -> ModeAnalysis:
     """The analysis with the tuned wave that has the largest share in a mode of the mistuned wheel. Collective.
 
     Spatial indices n and N - n have equal shares in a real shape: the forward wave is named.
     """
-    analysis: Any = context.analysis
+    analysis = context.analysis
     wheel = context.wheel
     shape = wheel.by_sector(mode.shape)
-    M = sp.csr_matrix(wheel.sector.M)
+    M = sp.csr_matrix(context.tuned.M)
     waves = np.fft.ifft(shape, axis=0)[: wheel.sectors // 2 + 1]
     diameters = int(np.argmax([np.real(c.conj() @ (M @ c)) for c in waves]))
     named = analysis.model_copy(update={"nodal_diameter": diameters})
     count = min(wheel.unit, analysis.linear_mode // wheel.sectors + MORE_FAMILIES)
-    with tuned_sector(replace(context, analysis=named)) as sector:
+    with tuned_sector(context.of(named)) as sector:
         modes = sector.linear_mode("stuck", count)
     shares = [abs((m.shape - 1j * m.imaginary) @ (M @ waves[diameters])) for m in modes]
     return named.model_copy(update={"linear_mode": 1 + int(np.argmax(shares))})
 
 
-def _wave(context: AnalysisContext, tuned: LinearMode, sector: int) -> tuple[LinearMode, Optional[Complex]]:
+def _wave(
+    context: AnalysisContext[ModeAnalysis], tuned: LinearMode, sector: int
+) -> tuple[LinearMode, Optional[Complex]]:
     """A wave of the tuned wheel, and the other of its pair (DESIGN fact 6)."""
-    analysis: Any = context.analysis
-    wheel, diameters = context.wheel, analysis.nodal_diameter
+    from ...cyclic.wheel_modes import standing_wave, travelling_wave
+
+    analysis = context.analysis
+    wheel, diameters = context.wheel, nodal_diameter(analysis)
     if analysis.wave == "travelling":
         return travelling_wave(tuned, diameters, wheel.sectors)
-    return standing_wave(tuned, diameters, wheel.sectors, wheel.sector.dof(analysis.normalise), sector)
+    return standing_wave(tuned, diameters, wheel.sectors, context.tuned.dof(analysis.normalise), sector)
 
 
 def uneven_samples(samples: int, sectors: int, diameters: int) -> Optional[str]:
@@ -158,6 +167,8 @@ def uneven_samples(samples: int, sectors: int, diameters: int) -> Optional[str]:
     The delay from one sector to the next, ND/N of a period, must be a whole number of samples. If not, each sector
     meets the kinks of its contact forces between other samples, and the wheel differs from one sector by aliasing.
     """
+    from ...cyclic.aerodynamics import period_of
+
     period = period_of(diameters, sectors)
     if samples % period == 0:
         return None
@@ -169,22 +180,25 @@ def uneven_samples(samples: int, sectors: int, diameters: int) -> Optional[str]:
     )
 
 
-def _largest(context: AnalysisContext, mode: LinearMode) -> int:
+def _largest(context: AnalysisContext[ModeAnalysis], mode: LinearMode) -> int:
     """Sector in which the normalised dof moves most."""
-    analysis: Any = context.analysis
-    dof = context.wheel.sector.dof(analysis.normalise)
+    analysis = context.analysis
+    dof = context.tuned.dof(analysis.normalise)
     return int(np.argmax(np.abs(context.wheel.by_sector(mode.shape)[:, dof])))
 
 
-def _most_alike(context: AnalysisContext, tuned: LinearMode) -> LinearMode:
+def _most_alike(context: AnalysisContext[ModeAnalysis], tuned: LinearMode) -> LinearMode:
     """Of the N modes nearest in frequency the one with the largest share in the tuned pair's plane. Collective."""
-    analysis: Any = context.analysis
+    from ...cyclic.sector import wave_mode
+    from ...cyclic.wheel_modes import most_alike
+
+    analysis = context.analysis
     wheel = context.wheel
-    wave = wave_mode(tuned, analysis.nodal_diameter, wheel.sectors)
+    wave = wave_mode(tuned, nodal_diameter(analysis), wheel.sectors)
     return most_alike(nearest_modes(context, tuned.omega, wheel.sectors), wave, context.case.M)
 
 
-def _free(context: AnalysisContext, mode: LinearMode) -> dict[str, float]:
+def _free(context: AnalysisContext[ModeAnalysis], mode: LinearMode) -> dict[str, float]:
     """Frequency without contact of the mode most like one of the mistuned wheel. Collective."""
     if any(contact.components > 1 for contact in context.case.contacts) or not context.case.contacts:
         return {}
@@ -192,6 +206,8 @@ def _free(context: AnalysisContext, mode: LinearMode) -> dict[str, float]:
     return {"free_omega": omega_most_alike(context, free, mode)}
 
 
-def nearest_modes(context: AnalysisContext, omega: float, count: int, contact: str = "stuck") -> list[LinearMode]:
+def nearest_modes(
+    context: AnalysisContext[AnalysisSection], omega: float, count: int, contact: str = "stuck"
+) -> list[LinearMode]:
     """Linear modes nearest to a frequency, in ascending order. Collective."""
     return context.linear_mode(contact, count, omega)

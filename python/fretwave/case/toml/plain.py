@@ -10,7 +10,7 @@ from ...errors import InputError
 DEEPEST = 32
 
 
-def check_plain(data: Any, where: str) -> None:
+def check_plain(data: object, where: str) -> None:
     """Refuse a value that would break what reads it (HDF5 and paths end at NUL, walks of a tree are recursive).
 
     Raises
@@ -33,7 +33,7 @@ def check_plain(data: Any, where: str) -> None:
         depth += 1
 
 
-def _inside(value: Any) -> list[Any]:
+def _inside(value: object) -> list[Any]:
     if isinstance(value, dict):
         return list(value.values())
     return value if isinstance(value, list) else []

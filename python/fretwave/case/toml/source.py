@@ -165,7 +165,7 @@ class Source:
     def _path(self, parts: Sequence[str], origin: str) -> KeyPath | None:
         """Where an address points; analyses and contacts are addressed by name."""
         kind, rest = ("analysis", parts)
-        if parts[0] in ("title", "model", "reduction", "preload", "aerodynamics"):
+        if parts[0] in ("title", "plugins", "model", "reduction", "preload", "aerodynamics"):
             return tuple(parts)
         if parts[0] in ("contact", "analysis") and len(parts) > 1:
             kind, rest = parts[0], parts[1:]

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, TypeVar
+from typing import Any, Optional, TypeVar, cast
 
 from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
+from pydantic_core import ErrorDetails
 
 from ...errors import FretwaveError, InputError
 from ...texts import nearest, toml
@@ -33,7 +35,7 @@ def validate(kind: type[Model], source: Source, path: KeyPath, found: list[Fretw
     try:
         return kind.model_validate(data)
     except ValidationError as error:
-        grouped: dict[KeyPath, list[Any]] = {}
+        grouped: dict[KeyPath, list[ErrorDetails]] = {}
         for item in error.errors(include_url=False):
             inside = _inside(data, item["loc"], item["type"])
             grouped.setdefault(inside, []).append(item)
@@ -80,7 +82,7 @@ def _deepest(grouped: Mapping[KeyPath, Any]) -> list[KeyPath]:
     return [path for path in grouped if not any(other != path and other[: len(path)] == path for other in grouped)]
 
 
-def field_of(kind: type[BaseModel], inside: KeyPath) -> tuple[str, Any, type[BaseModel]]:
+def field_of(kind: type[BaseModel], inside: KeyPath) -> tuple[str, Optional[FieldInfo], type[BaseModel]]:
     """Name and pydantic field that hold a place, and the section they are in."""
     name, field = "", None
     for part in inside:
@@ -94,14 +96,16 @@ def field_of(kind: type[BaseModel], inside: KeyPath) -> tuple[str, Any, type[Bas
     return name, field, kind
 
 
-def _section_in(annotation: Any) -> type[BaseModel] | None:
+def _section_in(annotation: object) -> type[BaseModel] | None:
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation
     inner = [_section_in(argument) for argument in getattr(annotation, "__args__", ())]
     return next((section for section in inner if section), None)
 
 
-def _problem(kind: type[BaseModel], source: Source, path: KeyPath, inside: KeyPath, items: list[Any]) -> InputError:
+def _problem(
+    kind: type[BaseModel], source: Source, path: KeyPath, inside: KeyPath, items: list[ErrorDetails]
+) -> InputError:
     whole = (*path, *inside)
     first = items[0]
     key = str(inside[-1]) if inside else source.name(path)
@@ -131,7 +135,7 @@ def _missing(kind: type[BaseModel], source: Source, path: KeyPath, inside: KeyPa
     return InputError(
         f"the key '{key}' is missing in {source.name(holder)}",
         where=source.where(holder),
-        expected=describe(field),
+        expected=describe(field) if field else None,
         fix=_example(name, field, "add"),
     )
 
@@ -149,18 +153,24 @@ def unknown_key(source: Source, path: KeyPath, known: list[str]) -> InputError:
     )
 
 
-def describe(field: Any) -> str:
+def describe(field: FieldInfo) -> str:
     """A field's doc with its unit."""
-    unit = (field.json_schema_extra or {}).get("unit")
+    unit = _extra(field, "unit")
     return f"{field.description} [{unit}]" if unit and unit != "-" else str(field.description)
 
 
-def _example(name: str, field: Any, verb: str = "write") -> str | None:
-    example = (field.json_schema_extra or {}).get("example") if field else None
+def _example(name: str, field: Optional[FieldInfo], verb: str = "write") -> str | None:
+    example = _extra(field, "example") if field else None
     return f"{verb} for example `{name} = {example}`" if example else None
 
 
-def _rule(item: Any) -> str:
+def _extra(field: FieldInfo, name: str) -> Optional[str]:
+    """What :func:`fretwave.case.schema.key` keeps with a field."""
+    given = field.json_schema_extra
+    return cast("Optional[str]", given.get(name)) if isinstance(given, dict) else None
+
+
+def _rule(item: ErrorDetails) -> str:
     """What pydantic wanted, in a few words."""
     context = item.get("ctx", {})
     kind = item["type"]

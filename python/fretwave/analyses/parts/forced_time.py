@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from ..case.schema import ForcedAnalysis
-from ..post.response_peaks import points_around_peak
-from ..solve.steady import SteadyState, steady_motion
-from .parts.context import AnalysisContext
-from .parts.whole import integrated_model
+from ...post.response_peaks import points_around_peak
+from ...solve.steady import SteadyState, steady_motion
+from .context import AnalysisContext
+from .whole import integrated_model
+
+if TYPE_CHECKING:
+    from ...model.model import Model
+    from ..forced import ForcedAnalysis
 
 Array = npt.NDArray[np.float64]
 
@@ -21,7 +24,9 @@ SAMPLES = 64
 TOLERANCE = 1e-10
 
 
-def time_points(context: AnalysisContext, table: Mapping[str, Any], count: int) -> tuple[list[str], str]:
+def time_points(
+    context: AnalysisContext[ForcedAnalysis], table: Mapping[str, Any], count: int
+) -> tuple[list[str], str]:
     """Integrate `count` points per level to their steady state and write `<name>_time.csv`. Collective.
 
     The first point of a level starts from rest, the others from their neighbour's steady state. Columns: level,
@@ -48,9 +53,9 @@ def time_points(context: AnalysisContext, table: Mapping[str, Any], count: int) 
 
 
 def _integrated(
-    context: AnalysisContext, model: Any, table: Mapping[str, Array], count: int
+    context: AnalysisContext[ForcedAnalysis], model: Model, table: Mapping[str, Array], count: int
 ) -> Iterator[dict[str, Any]]:
-    dof = context.case.dof(_section(context).observe)
+    dof = context.case.dof(context.analysis.observe)
     for level in np.unique(table["level"]):
         rows = {key: values[table["level"] == level] for key, values in table.items()}
         state = np.zeros(model.n_dof), np.zeros(model.n_dof)
@@ -72,16 +77,17 @@ def _integrated(
 
 
 def _steady(
-    context: AnalysisContext, model: Any, state: tuple[Array, Array], dof: int, level: float, omega: float
+    context: AnalysisContext[ForcedAnalysis],
+    model: Model,
+    state: tuple[Array, Array],
+    dof: int,
+    level: float,
+    omega: float,
 ) -> SteadyState:
-    from ..solve.transient import Transient
+    from ...solve.transient import Transient
 
     force = {1: np.zeros(model.n_dof, dtype=complex)}
-    for name, value in _section(context).force.items():
+    for name, value in context.analysis.force.items():
         force[1][context.case.dof(name)] = value
     integrator = Transient(model, force=force, level=level, omega=omega, prefix=f"{context.prefix}time_")
     return steady_motion(integrator, state, dof, omega, SAMPLES, TOLERANCE)
-
-
-def _section(context: AnalysisContext) -> ForcedAnalysis:
-    return cast(ForcedAnalysis, context.analysis)

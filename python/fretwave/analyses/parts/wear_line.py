@@ -3,22 +3,31 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..case import contacts
-from ..case.load import Case
-from ..case.schema import ModeAnalysis, WearAnalysis
-from ..case.sector import nodal_diameter
-from ..columns import COLUMNS, Column
-from ..console import Console
-from ..results.results import AnalysisWriter, Field
-from .parts.branch import finished_table, mode_problem, open_branch
-from .parts.context import AnalysisContext
-from .parts.rest import retained, start_mode
+from ...case import contacts
+from ...case.harmonic import nodal_diameter
+from ...case.load import Case
+from ...columns import COLUMNS, Column, Value
+from ...console import Console
+from ...results.results import AnalysisWriter, Field
+from .branch import finished_table, mode_problem, open_branch
+from .context import AnalysisContext
+from .rest import retained, start_mode
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
+
+    from ...hb.problems import NonlinearMode
+    from ...solve.wear import Wear, WearPoint
+    from ...solve.worn_mode import WornMode, WornState
+    from ..mode import ModeAnalysis
+    from ..wear import WearAnalysis
 
 #: Name of a line's table in its own folder.
 LINE = "line"
@@ -40,15 +49,15 @@ class Line:
 
 def wear_areas(case: Case) -> dict[str, Any]:
     """Nodal areas (n_pairs,) [m^2] of the contacts that wear."""
-    return contacts.wear_areas(case.contacts, case.built.contacts if case.built else {})
+    return contacts.wear_areas(case.contacts)
 
 
 def faces_of(case: Case) -> list[tuple[str, str, Any]]:
     """(name of the face, contact, which of its pairs (n_pairs,) bool) of all faces that wear."""
     out = []
     for name, areas in wear_areas(case).items():
-        built = case.built.contacts[name] if case.built else None
-        faces = np.array([name] * len(areas) if built is None or built.faces is None else list(built.faces))
+        given = case.structure.pairs[name].faces
+        faces = np.array([name] * len(areas) if given is None else list(given))
         out += [(str(face), name, faces == face) for face in dict.fromkeys(faces.tolist())]
     return out
 
@@ -76,7 +85,9 @@ def fields(case: Case) -> dict[str, Field]:
     return out
 
 
-def march_line(context: AnalysisContext, settings: ModeAnalysis, unit: float, line: Line, group: Any) -> dict[str, Any]:
+def march_line(
+    context: AnalysisContext[WearAnalysis], settings: ModeAnalysis, unit: float, line: Line, group: MPI.Comm
+) -> dict[str, Any]:
     """Build the model on the group's ranks and march. Collective on the group.
 
     Returns
@@ -84,26 +95,32 @@ def march_line(context: AnalysisContext, settings: ModeAnalysis, unit: float, li
     dict
         status, reason, summary and what else the common table needs.
     """
-    from ..case.build import build_model
+    from ...case.build import build_model
 
     case, analysis = context.case, context.analysis
     preload = case.preload_of(analysis)
     with build_model(case, settings.dampers, group, preload, nodal_diameter(settings)) as model:
         quiet = Console(False)
-        own = replace(context, model=model, comm=group, analysis=settings, console=quiet, arrays={}, left_out=[])
+        own = context.of(settings, model=model, comm=group, console=quiet, arrays={}, left_out=[])
         stuck, rest = start_mode(own, settings.linear_mode)
-        with mode_problem(own, retained(own), stuck, rest) as problem:
+        problem = mode_problem(own, retained(own), stuck, rest)
+        with problem:
             return _Marcher(context, own, problem, unit, line).run()
 
 
 class _Marcher:
     """Writes the points of a line."""
 
-    def __init__(self, context: AnalysisContext, own: AnalysisContext, problem: Any, unit: float, line: Line) -> None:
-        analysis = context.analysis
-        assert isinstance(analysis, WearAnalysis)
+    def __init__(
+        self,
+        context: AnalysisContext[WearAnalysis],
+        own: AnalysisContext[ModeAnalysis],
+        problem: NonlinearMode,
+        unit: float,
+        line: Line,
+    ) -> None:
         self.context, self.own, self.problem, self.unit, self.line = context, own, problem, unit, line
-        self.analysis, self.comm, self.case = analysis, own.comm, own.case
+        self.analysis, self.comm, self.case = context.analysis, own.comm, own.case
         self.faces = faces_of(own.case)
         self.writer = AnalysisWriter(
             line.folder,
@@ -117,7 +134,7 @@ class _Marcher:
         )
 
     def run(self) -> dict[str, Any]:
-        from ..solve.worn_mode import WornMode
+        from ...solve.worn_mode import WornMode
 
         with WornMode(self.problem, self.analysis.coefficient, wear_areas(self.case)) as mode:
             self.mode = mode
@@ -129,9 +146,9 @@ class _Marcher:
                 clock = time.perf_counter()
             return self._close(march)
 
-    def _open(self, mode: Any) -> tuple[Any, Any]:
+    def _open(self, mode: WornMode) -> tuple[Wear, Iterator[WearPoint]]:
         """The march from its start, or from where a killed run left it."""
-        from ..solve.wear import Wear, WearControl
+        from ...solve.wear import Wear, WearControl
 
         a, unit = self.analysis, self.unit
         control = WearControl(a.stepper, a.tolerance, a.pressure_change)
@@ -149,13 +166,13 @@ class _Marcher:
         y.destroy()
         return march, march.go_on() if found else iter(march)
 
-    def _record(self, march: Any, point: Any, wall: float) -> dict[str, Any]:
+    def _record(self, march: Wear, point: WearPoint, wall: float) -> dict[str, Any]:
         """One row. Collective."""
-        from ..solve.wear_march import wear_row
+        from ...solve.wear_march import wear_row
 
         y, state = point.state.y, point.state
         per_contact = self._per_contact(state)
-        row = {
+        row: dict[str, Value] = {
             **wear_row(self.problem, point, self.unit),
             "point": self.writer.rows,
             "line": self.line.number,
@@ -178,7 +195,7 @@ class _Marcher:
         )
         return row
 
-    def _per_contact(self, state: Any) -> dict[str, Any]:
+    def _per_contact(self, state: WornState) -> dict[str, Any]:
         names = [self.problem.model.contacts[k].name for k in self.mode.contacts]
         return {
             f"{key}_{name}": getattr(state, key)[part]
@@ -197,7 +214,7 @@ class _Marcher:
             f"  worn {worn} m^3  newton {row['newton']:2d}  {row['wall_s']:.2f} s"
         )
 
-    def _close(self, march: Any) -> dict[str, Any]:
+    def _close(self, march: Wear) -> dict[str, Any]:
         status = "done" if march.converged else "stopped"
         told = _told(finished_table(self.writer))
         self.writer.abandon()  # its journal stays until the common table is done: a resumed run finds the line there

@@ -1,0 +1,89 @@
+"""``type = "free_decay"``: the motion of a mode decays by itself; direct integration of the unreduced equations."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from ..case.analysis import AnalysisSection, register_analysis
+from ..case.schema import Damper, Positive, Whole, key
+from ..columns import Column
+from ..post.cycles import extract
+from ..post.decays import decay_rows, largest_differences
+from ..post.mode_curve import ModeCurve
+from .mode import ModeAnalysis
+from .parts.context import AnalysisContext, Outcome
+from .parts.starts import Starts
+
+if TYPE_CHECKING:
+    from ..case.facts import Facts
+    from ..case.load import Case
+    from ..case.reporter import Reporter
+
+#: bytes
+NUMBER = 8
+SHEETS = Column("sheets", "1", "solutions of the mode at this amplitude", "i")
+COLUMNS = ("start", "cycle", "time", "amplitude", "omega", "zeta", "omega_mode", "zeta_mode", SHEETS)
+
+
+class TransientSection(AnalysisSection):
+    """Keys of the analyses by direct time integration."""
+
+    mode: str = key("mode analysis to start from and compare with", example='"mode"')
+    amplitude: list[Positive] = key("start amplitudes", "m", "[0.05, 0.3, 2.5]", min_length=1)
+    periods: Whole = key("vibration periods to integrate", example="30", ge=1)
+    samples_per_period: Whole = key("output samples of a period", example="64", default=64, ge=8)
+    tolerance: Positive = key("relative tolerance of the time integration", "-", "1e-10", default=1e-10, lt=1)
+
+    def needs(self) -> list[str]:
+        return [self.mode]
+
+    def mode_of(self, case: Case) -> ModeAnalysis:
+        """The mode that it starts from."""
+        return case.analyses.of(ModeAnalysis)[self.mode]
+
+    def acting_dampers(self, case: Case) -> list[Damper]:
+        """Without any of its own those of its mode."""
+        return list(self.dampers or self.mode_of(case).dampers)
+
+    def integrates(self) -> str:
+        return "type"
+
+    def check(self, report: Reporter, facts: Facts) -> None:
+        super().check(report, facts)
+        report.mode(("mode",), self.mode, facts.analyses_of("mode"))
+
+    def least_memory(self, facts: Facts) -> Mapping[str, float]:
+        count = self.periods * self.samples_per_period
+        return {f"periods: {count} samples of {facts.least_dofs} dofs": 2.0 * NUMBER * facts.least_dofs * count}
+
+    def headline(self) -> str:
+        starts = ", ".join(f"{amplitude:g}" for amplitude in self.amplitude)
+        kind = super().headline()
+        return f"{kind} by time integration from '{self.mode}', starts a = {starts} m, {self.periods} periods"
+
+
+@register_analysis
+class FreeDecayAnalysis(TransientSection):
+    """``type = "free_decay"``: decay and frequency of each cycle against the mode."""
+
+    pictures = ("trajectories", "free_decay")
+
+    type: Literal["free_decay"]
+
+    def run(self, context: AnalysisContext[FreeDecayAnalysis]) -> Outcome:
+        """Let the motion of the mode decay from each start; every cycle is compared with the mode. Collective."""
+        mode = ModeCurve.from_table(context.table(self.mode))
+        rows: list[dict[str, Any]] = []
+        with Starts(context, COLUMNS) as starts:
+            for number, amplitude in enumerate(self.amplitude):
+                motion = starts.integrate(number, amplitude, np.inf)
+                rows += starts.write(number, motion, decay_rows(number, extract(motion.t, motion.x, motion.v), mode))
+            omega, zeta = largest_differences(rows)
+            line = (
+                f"{context.name}: {len(rows)} cycles; where the damping changes slowly the frequency differs "
+                f"from the mode's by up to {omega:.1e} (relative), the damping ratio by up to {zeta:.1e}"
+            )
+            return starts.finish([line], omega_difference=omega, zeta_difference=zeta)

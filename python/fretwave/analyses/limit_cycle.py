@@ -1,0 +1,62 @@
+"""``type = "limit_cycle"``: where motions of a mode end up; direct integration of the unreduced equations."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from typing import Any, Literal
+
+import numpy as np
+
+from ..case.analysis import register_analysis
+from ..post.cycles import extract
+from ..post.decays import Ending, compare, cycle_rows, divergence_factor, ending
+from ..post.mode_curve import Crossing, ModeCurve
+from .free_decay import TransientSection
+from .mode import ModeAnalysis
+from .parts.context import AnalysisContext, Outcome
+from .parts.shifted import shifted_damping
+from .parts.starts import Starts
+
+COLUMNS = ("start", "cycle", "time", "amplitude", "frequency_hz")
+
+
+@register_analysis
+class LimitCycleAnalysis(TransientSection):
+    """``type = "limit_cycle"``: where starts at several amplitudes end up."""
+
+    pictures = ("trajectories", "limit_cycles")
+
+    type: Literal["limit_cycle"]
+
+    def run(self, context: AnalysisContext[LimitCycleAnalysis]) -> Outcome:
+        """Follow each start until it has settled or diverges, and compare with the zeros of the damping. Collective."""
+        crossings = ModeCurve.from_table(context.table(self.mode)).crossings()
+        endings: list[dict[str, Any]] = []
+        lines: list[str] = []
+        with Starts(context, COLUMNS) as starts:
+            for number, amplitude in enumerate(self.amplitude):
+                motion = starts.integrate(number, amplitude, divergence_factor(amplitude, crossings))
+                cycles = extract(motion.t, motion.x, motion.v)
+                starts.write(number, motion, cycle_rows(number, cycles))
+                found = ending(cycles, motion.diverged)
+                endings.append({"start": amplitude, **vars(found), **compare(found, crossings)})
+                lines.append(_ending_line(context.name, amplitude, found, crossings))
+            done = starts.finish(lines, endings=json.dumps(endings))
+        # only now: results.h5 can be read again when the writer has closed it
+        done.summary += shifted_damping(
+            context, self.mode_of(context.case), context.case.analyses.of(ModeAnalysis).values()
+        )
+        return done
+
+
+def _ending_line(name: str, start: float, found: Ending, crossings: Sequence[Crossing]) -> str:
+    differences = compare(found, crossings)
+    line = f"{name}: from a = {start:g} m: {found.text}, a = {found.amplitude:.5g} m, "
+    line += f"{found.omega / (2.0 * np.pi):.5g} Hz"
+    if not np.isfinite(differences["predicted"]):
+        return line
+    return line + (
+        f"; predicted {differences['predicted']:.5g} m: amplitude {differences['amplitude_difference']:+.1e}, "
+        f"frequency {differences['frequency_difference']:+.1e} (relative)"
+    )

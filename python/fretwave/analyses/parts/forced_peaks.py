@@ -1,0 +1,44 @@
+"""Peaks of a frequency response at every level, and how far they are from backbones."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from ...case.analysis import AnalysisSection
+from ...post.mode_curve import ModeCurve
+from ...post.response_peaks import peak_table
+from .context import AnalysisContext
+
+
+def curves_of(context: AnalysisContext[AnalysisSection], backbones: Sequence[str]) -> dict[str, ModeCurve]:
+    """Backbones that have results. Collective."""
+    names = [name for name in backbones if context.has_results(name)]
+    return {name: ModeCurve.from_table(context.table(name)) for name in names}
+
+
+def write_peaks(
+    context: AnalysisContext[AnalysisSection], table: dict[str, Any], curves: dict[str, ModeCurve]
+) -> list[str]:
+    """Write the peaks of all levels with their distance from the backbones; a line for each level."""
+    if not table:
+        return []
+    peaks = peak_table({key: table[key] for key in ("level", "omega", "amplitude", "phase", "event")}, curves)
+    context.write_table("peaks", peaks)
+    lines = [
+        f"{context.name}: {len(table['level'])} points, {len(peaks['level'])} levels,"
+        f" error estimate up to {table['error_estimate'].max():.1e}, {table['wall_s'].sum():.2f} s"
+    ]
+    for row in range(len(peaks["level"])):
+        lines.append(_peak_line(context.name, {key: float(value[row]) for key, value in peaks.items()}, list(curves)))
+    return lines
+
+
+def _peak_line(name: str, peak: dict[str, float], curves: list[str]) -> str:
+    text = f"{name}: level {peak['level']:g}: "
+    if not math.isfinite(peak["amplitude"]):
+        return text + "no peak within the frequency range"
+    text += f"peak a = {peak['amplitude']:.4g} m at {peak['frequency_hz']:.5g} Hz"
+    distances = [f"{100 * peak[f'distance_{curve}']:+.3f} % from {curve}" for curve in curves]
+    return text + (", frequency " + ", ".join(distances) if distances else "")

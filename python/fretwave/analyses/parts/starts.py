@@ -1,0 +1,94 @@
+"""Motions by direct time integration from the mode's own motion at several amplitudes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import ExitStack
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...columns import Column
+from ...errors import InputError, NotConverged
+from ...post.decays import mode_state
+from ...solve.steady import STEPS_PER_PERIOD, Motion, free_motion, start_state
+from .context import AnalysisContext, Outcome
+from .whole import integrated_model
+
+if TYPE_CHECKING:
+    from ..free_decay import TransientSection
+
+
+class Starts:
+    """Integrator, table and progress of one analysis; closes what it opened."""
+
+    def __init__(self, context: AnalysisContext[TransientSection], columns: Sequence[str | Column]) -> None:
+        from ...solve.transient import Transient
+
+        self.context, self.section = context, context.analysis
+        self.mode = context.analysis.mode_of(context.case)
+        context.leave_out([])
+        self.table = context.table(self.mode.name)
+        self.labels, self.coefficients = context.coefficients(self.mode.name)
+        self.dof = context.case.dof(self.mode.normalise)
+        self._model = ExitStack()
+        model = self._model.enter_context(integrated_model(context))
+        self.integrator = Transient(model, prefix=context.prefix)
+        self.writer = context.writer(columns, normalise=self.mode.normalise)
+        self.stopped: list[str] = []
+
+    def __enter__(self) -> Starts:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.writer.abandon()
+        self._model.close()
+
+    def integrate(self, number: int, amplitude: float, factor: float) -> Motion:
+        """The motion of the normalised dof from the mode's own motion at an amplitude. Collective.
+
+        It is stopped when any dof exceeds `factor` times the largest coefficient of the start.
+        """
+        try:
+            coefficients, beta, omega = mode_state(self.table, self.coefficients, amplitude, self.mode.method)
+        except InputError as error:
+            if not self.mode.amplitude[0] <= amplitude <= self.mode.amplitude[1]:
+                raise
+            # within what the mode was to reach: its branch stopped early
+            raise NotConverged(
+                f"the branch of '{self.mode.name}' does not reach start {number}",
+                f"analysis '{self.context.name}'",
+                error.measured,
+                error.expected,
+                f"other starts, or what lets '{self.mode.name}' go on",
+            ) from None
+        state = start_state(self.labels, coefficients, beta, omega)
+        section = self.section
+        self.context.console.line(f"{self.context.name}: start {number} from a = {amplitude:g} m")
+        step = 2.0 * np.pi / omega / section.samples_per_period
+        count = section.periods * section.samples_per_period
+        limit = factor * float(np.abs(coefficients).max())
+        most = section.periods * STEPS_PER_PERIOD
+        motion = free_motion(self.integrator, state, self.dof, step, count, section.tolerance, limit, most)
+        if motion.implicit:
+            self.context.console.line(f"{self.context.name}: the contact is stiff: implicit steps")
+        if motion.stopped:
+            self.stopped.append(f"start {number}: {motion.stopped}")
+        return motion
+
+    def write(self, number: int, motion: Motion, rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+        """Keep the cycles as rows and the motion (3, n: t, x, v) as a dataset. Collective."""
+        for row in rows:
+            self.writer.append(row)
+        if rows:
+            history = np.stack([motion.t, motion.x, motion.v])
+            self.writer.dataset(f"motion_{number}", history, rows="t [s], x [m], v [m/s]")
+        return rows
+
+    def finish(self, lines: list[str], **attributes: Any) -> Outcome:
+        """Close the table."""
+        reason = "; ".join(self.stopped) or "all starts integrated"
+        self.writer.close("stopped" if self.stopped else "done", reason, **attributes)
+        goal = f"{self.section.periods} periods of every start"
+        advice = f"--set {self.context.name}.tolerance=1e-6, fewer periods, or a smoother contact law"
+        return Outcome(self.writer.rows, reason, not self.stopped, lines, goal, advice)

@@ -1,0 +1,94 @@
+"""Where the lines of wear begin: unworn points of the mode's branch, and the normalised cycle."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ...errors import NotConverged
+from ...model.laws import Role
+from .branch import mode_problem, points_of, step_control
+from .context import AnalysisContext
+from .rest import retained, start_mode
+from .wear_line import wear_areas
+
+if TYPE_CHECKING:
+    from ...solve.continuation import Point
+    from ...solve.worn_mode import WornMode
+    from ..mode import ModeAnalysis
+    from ..wear import WearAnalysis
+
+Array = npt.NDArray[np.float64]
+
+
+def unworn_starts(context: AnalysisContext[ModeAnalysis], analysis: WearAnalysis) -> dict[str, Any]:
+    """Unknowns at each amplitude by its number, from the mode's branch, and the normalised cycle. Collective."""
+    from ...solve.continuation import Continuation
+    from ...solve.worn_mode import WornMode
+
+    settings = context.analysis
+    stuck, rest = start_mode(context, settings.linear_mode)
+    harmonics = retained(context)
+    context.leave_out(harmonics.left_out)
+    problem = mode_problem(context, harmonics, stuck, rest)
+    low, high = min(settings.amplitude[0], *analysis.amplitude), max(settings.amplitude[1], *analysis.amplitude)
+    branch = Continuation(
+        problem, problem.initial(low), (low, high), step_control(settings.step), sorted(analysis.amplitude)
+    )
+    found: dict[str, Any] = {}
+    areas = wear_areas(context.case)
+    with WornMode(problem, analysis.coefficient, areas) as mode, context.console.progress(context.name):
+        for point in points_of(branch):
+            if "cycle_unit" not in found:
+                found["cycle_unit"] = analysis.cycle_unit or normal_cycle(
+                    mode, mode.measure(point.y, np.zeros(len(mode.areas))).load
+                )
+            _take(context, analysis, point, found)
+            if len(found) == 1 + 2 * len(analysis.amplitude):
+                break
+    if len(found) < 1 + 2 * len(analysis.amplitude):
+        context.console.line(f"{context.name}: the mode ends early: {branch.reason}")
+    branch.destroy()
+    problem.destroy()
+    if len(found) < 2:
+        raise NotConverged(
+            "the mode reaches none of the amplitudes of wear", None, "no start", analysis.amplitude, "lower amplitudes"
+        )
+    return found
+
+
+def _take(context: AnalysisContext[ModeAnalysis], analysis: WearAnalysis, point: Point, found: dict[str, Any]) -> None:
+    """Keep the unknowns of a point that lies on an amplitude, the first on a branch that folds. Collective."""
+    if point.event == "":
+        return
+    whole = np.concatenate(context.comm.allgather(point.y.getArray(readonly=True).copy()))
+    for number, amplitude in enumerate(analysis.amplitude):
+        if math.isclose(point.parameter, amplitude, rel_tol=1e-9) and f"y_{number}" not in found:
+            found[f"y_{number}"] = whole
+            found[f"outcome_{number}"] = np.array([point.newton, point.linear, point.residual])
+
+
+def normal_cycle(mode: WornMode, load: Array) -> float:
+    """Vibration cycles in which sliding four stick limits mu N0/kt a cycle leaves 1/e of a normal load.
+
+    N' = -kn k_w/I N s with s = 4 mu N0/kt, in means over the loaded pairs; 1 where nothing can wear.
+    """
+    contacts = [mode.model.contacts[k] for k in mode.contacts]
+    loaded = load > 0
+
+    def values(role: Role) -> Array:
+        parts = [
+            np.broadcast_to(np.asarray(contact.value(role), dtype=float), (part.stop - part.start,))
+            for contact, part in zip(contacts, mode.slices)
+        ]
+        return np.asarray(np.concatenate(parts)[loaded])
+
+    if not loaded.any():
+        return 1.0
+    friction, stiffness = values(Role.FRICTION_COEFFICIENT), values(Role.TANGENTIAL_STIFFNESS)
+    slip = 4 * np.mean(friction * load[loaded] / stiffness)
+    rate = mode.coefficient * np.mean(mode.stiffness[loaded] / mode.areas[loaded]) * slip
+    return float(1 / rate) if rate > 0 else 1.0

@@ -1,0 +1,60 @@
+"""Checks of the tables [reduction] and [preload] of a case."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from .checks_common import check_loads
+from .reporter import Found, Reporter
+from .schema import PreloadSection, ReductionSection
+from .toml.source import Source
+
+if TYPE_CHECKING:
+    from .analysis import AnalysisSection
+
+Analyses = Mapping[int, "AnalysisSection"]
+
+
+def check_reduction(
+    source: Source, section: ReductionSection | None, analyses: Analyses, sectors: int | None, found: Found
+) -> None:
+    """Component modes are chosen in one way; faces are those of a sector, and their waves exist."""
+    if section is None:
+        return
+    report = Reporter(source, ("reduction",), found)
+    if section.modes is not None and section.up_to_hz is not None:
+        report.wrong(("up_to_hz",), "is given beside modes", "a number of modes, or a frequency", "remove one of them")
+    if sectors is None:
+        for key in ("interface", "interface_diameters", "compare_diameters"):
+            if key in section.model_fields_set:
+                report.wrong((key,), "is of no sector of a wheel", "a model with sectors", "remove the key")
+        return
+    for key in ("interface_diameters", "compare_diameters"):
+        for index, given in enumerate(getattr(section, key) or ()):
+            if given > sectors // 2:
+                report.wrong((key, index), "is no nodal diameter of the wheel", f"0 to {sectors // 2}", "remove it")
+    if section.interface == "modes" and section.interface_diameters is None:
+        shown = sorted(_spatial_indices(analyses, sectors)) or [1]
+        fix = f"interface_diameters = {shown}, those of the first and third harmonic of the analyses"
+        report.wrong(("interface",), "has no waves to come from", "their nodal diameters", fix)
+    if section.interface == "whole" and section.interface_diameters is not None:
+        report.wrong(("interface_diameters",), "has no effect", "interface modes", 'add `interface = "modes"`')
+
+
+def _spatial_indices(analyses: Analyses, sectors: int) -> set[int]:
+    """Nodal diameters of the first and third harmonic of the analyses' waves."""
+    indices = {n * d % sectors for d in waves_of(analyses.values()) for n in (1, 3)}
+    return {min(index, sectors - index) for index in indices}
+
+
+def waves_of(analyses: Iterable[AnalysisSection]) -> list[int]:
+    """Nodal diameters that analyses name."""
+    sections = [analysis.harmonic() for analysis in analyses]
+    return [s.nodal_diameter for s in sections if s is not None and s.nodal_diameter is not None]
+
+
+def check_preload(source: Source, section: PreloadSection | None, loads: Sequence[str] | None, found: Found) -> None:
+    """Loads come with the model (None: it is not known)."""
+    if loads is not None:
+        check_loads(Reporter(source, ("preload",), found), section, loads)

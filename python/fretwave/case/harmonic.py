@@ -1,0 +1,165 @@
+"""What all analyses in the frequency domain share: keys of harmonics, wave and wheel, and their checks."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Literal, Optional
+
+from ..texts import toml
+from .analysis import AnalysisSection
+from .checks_size import harmonic_memory
+from .checks_wheel import check_wave, check_wheel
+from .schema import MistuningSection, PreloadSection, StepSection, Whole, key
+
+if TYPE_CHECKING:
+    from ..model.model import Model
+    from .facts import Facts
+    from .reporter import Reporter
+
+
+class HarmonicSection(AnalysisSection):
+    """Keys of the analyses in the frequency domain."""
+
+    harmonics: Whole = key("highest harmonic", example="21", ge=1)
+    retain: Literal["auto", "odd", "all"] = key(
+        "which harmonics up to the highest are kept", example='"auto"', default="auto"
+    )
+    samples: Optional[Whole] = key("time samples of a period in the contact law", example="1024", default=None, ge=4)
+    linear_mode: Whole = key("linear mode to start from, 1 is the lowest", example="1", default=1, ge=1)
+    nodal_diameter: Optional[Whole] = key(
+        "nodal diameters of the wave on a sector, negative for a backward wave", example="4", default=None
+    )
+    aerodynamics: bool = key("the forces of [aerodynamics] act", example="true", default=False)
+    wheel: bool = key("solve all sectors of the wheel in place of one", example="true", default=False)
+    mistuning: Optional[MistuningSection] = key(
+        "deviations of the wheel's sectors", example='{ of = "blade", standard_deviation = 0.02 }', default=None
+    )
+    sector: Optional[Whole] = key(
+        "sector of the wheel whose dof is normalised or observed (0; of a mistuned mode where it moves most)",
+        example="7",
+        default=None,
+        ge=0,
+    )
+    step: StepSection = key("step control", example="{ initial = 0.05, maximum = 0.3 }", default_factory=StepSection)
+    preload: Optional[PreloadSection] = key("in place of [preload]", example="{ pair_loads = true }", default=None)
+
+    def own_preload(self) -> Optional[PreloadSection]:
+        return self.preload
+
+    def harmonic(self) -> Optional[HarmonicSection]:
+        return self
+
+    def follows_waves(self) -> bool:
+        """It looks at waves that it names in another way than by `nodal_diameter`, each on one sector."""
+        return False
+
+    def check(self, report: Reporter, facts: Facts) -> None:
+        super().check(report, facts)
+        check_harmonics(report, self, facts.named)
+        if facts.model_known:
+            check_wheel(report, self, facts)
+        if facts.model_known and not self.follows_waves():
+            check_wave(report, self, facts)
+            if self.aerodynamics and not facts.has_flow:
+                fix = "add [aerodynamics]"
+                report.wrong(("aerodynamics",), "needs forces of the flow", "a table [aerodynamics]", fix)
+
+    def least_memory(self, facts: Facts) -> Mapping[str, float]:
+        return harmonic_memory(self.harmonics, self.samples, (facts.sectors or 1) if self.wheel else 1, facts)
+
+    def details(self, model: Model) -> list[str]:
+        from ..hb.problems import choose_harmonics
+
+        lines = super().details(model)
+        harmonics = choose_harmonics(model, self.harmonics, self.samples, self.retain)
+        n_dof = model.n_dof * (model.sectors if self.wheel else 1)
+        lines.append(
+            f"harmonics {_orders(harmonics.orders)}, {harmonics.samples} samples a period,"
+            f" {n_dof} x {harmonics.block_size} = {n_dof * harmonics.block_size} coefficients"
+        )
+        if self.nodal_diameter is not None or self.wheel:
+            lines.append(self._wave_line(model.sectors))
+        if harmonics.left_out:
+            lines.append("left out: " + "; ".join(harmonics.left_out))
+        return lines
+
+    def wave_word(self) -> str:
+        """What its wave is called."""
+        return "wave"
+
+    def _wave_line(self, sectors: int) -> str:
+        place = f"all {sectors} sectors" if self.wheel else f"one sector of {sectors}"
+        if self.mistuning is not None:
+            place = f"{place}, their '{self.mistuning.of}' stiffness mistuned"
+        if self.nodal_diameter is None:
+            return place
+        return f"a {self.wave_word()} of {self.nodal_diameter} nodal diameters on {place}"
+
+
+def nodal_diameter(analysis: AnalysisSection) -> int:
+    """Of the wave of an analysis; 0 where it has none."""
+    section = analysis.harmonic()
+    return (section.nodal_diameter or 0) if section is not None else 0
+
+
+def with_flow_forces(analysis: AnalysisSection) -> bool:
+    """The forces of the flow act on its model."""
+    section = analysis.harmonic()
+    return section is not None and section.aerodynamics
+
+
+def check_harmonics(report: Reporter, analysis: HarmonicSection, dofs: Optional[Sequence[str]]) -> None:
+    """Samples enough for the harmonics, a linear mode that exists, steps in order."""
+    least = 2 * analysis.harmonics + 2
+    if analysis.samples is not None and analysis.samples % 2:
+        report.wrong(("samples",), "is odd", "an even number", f"write `samples = {analysis.samples + 1}`")
+    elif analysis.samples is not None and analysis.samples < least:
+        report.wrong(
+            ("samples",),
+            "is too small",
+            f"at least 2 H + 2 = {least} for harmonics = {analysis.harmonics}",
+            f"write `samples = {_samples(analysis.harmonics)}`, or leave the key out",
+        )
+    by_wave = analysis.mistuning is None or analysis.nodal_diameter is not None  # else of the whole wheel
+    if dofs is not None and by_wave and analysis.linear_mode > len(dofs):
+        report.wrong(
+            ("linear_mode",), "does not exist", f"1 to {len(dofs)}, the number of dofs", "write `linear_mode = 1`"
+        )
+    step = analysis.step
+    if not step.minimum <= step.initial <= step.maximum:
+        report.wrong(
+            ("step",),
+            "is out of order",
+            f"minimum <= initial <= maximum, not {step.minimum:g}, {step.initial:g}, {step.maximum:g}",
+            "for example `step = { minimum = 1e-8, initial = 0.05, maximum = 0.3 }`",
+        )
+
+
+def _samples(harmonics: int) -> int:
+    """A power of two with room above the highest harmonic."""
+    return int(2 ** max(6, (8 * harmonics).bit_length()))
+
+
+def check_range(report: Reporter, key: str, ends: list[float], inside: list[float]) -> None:
+    """First value below last, and the points to report at between them."""
+    if not ends[0] < ends[1]:
+        report.wrong(
+            (key,), "is not a range", "first value < last value", f"write `{key} = [{min(ends)}, {2 * max(ends)}]`"
+        )
+        return
+    for index, value in enumerate(inside):
+        if not ends[0] <= value <= ends[1]:
+            report.wrong(
+                ("report_at", index),
+                "is outside the branch",
+                f"a value within {key} = {toml(ends)}",
+                "move it, or widen the range",
+            )
+
+
+def _orders(orders: Sequence[int]) -> str:
+    """``1, 3, ..., 21`` for an even spacing, all of them otherwise."""
+    steps = {after - before for before, after in zip(orders, orders[1:])}
+    if len(orders) > 4 and len(steps) == 1:
+        return f"{orders[0]}, {orders[1]}, ..., {orders[-1]}"
+    return ", ".join(str(order) for order in orders)

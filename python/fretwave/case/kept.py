@@ -1,0 +1,78 @@
+"""What a run folder keeps of its case: whether its results still follow from the case, and the case itself."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..errors import InputError
+from ..results.runfolder import CASE_COPY, read_copy, read_record
+from ..texts import display
+from .analysis import AnalysisSection
+from .load import Case, changed_keys, load_case
+
+if TYPE_CHECKING:
+    import h5py
+
+#: Tables of the case that decide the results of every analysis.
+COMMON = ("model", "contact", "reduction", "preload", "aerodynamics", "plugins")
+
+
+def reload_case(folder: Path, kept: bool = False) -> tuple[Case, dict[str, Any]]:
+    """The case of a run and its record. One rank only.
+
+    Parameters
+    ----------
+    kept : bool
+        Read the copy in the folder, as the run did: then only the model can have changed.
+
+    Raises
+    ------
+    InputError
+        The folder holds no run, or its case has changed since.
+    """
+    record = read_record(folder)
+    if "sweep" in record:
+        one = folder / record.get("values", [{}])[0].get("folder", "values/0000")
+        problem = "this is the folder of a sweep, not of one run"
+        raise InputError(problem, display(folder), expected="the folder of a value", fix=f"give {display(one)}")
+    given = record["case"]
+    path = Path(given["path"])
+    text = None if path.exists() and not kept else read_copy(folder, record)
+    case = load_case(path, given["overrides"], given["quick"], text=text, plugins=given.get("plugins", ()))
+    changed = changed_keys(given["resolved"], case.resolved)
+    if changed:
+        raise InputError(
+            "the case has changed since this run",
+            where=display(path),
+            measured="; ".join(changed[:5]) + (f"; and {len(changed) - 5} more" if len(changed) > 5 else ""),
+            expected=f"the case as kept in {display(folder / CASE_COPY)}",
+            fix=f"change it back, or start anew with `fretwave run {display(path)}`",
+        )
+    return case, record
+
+
+def described(analysis: AnalysisSection, case: Case, run_id: str) -> dict[str, Any]:
+    """Attributes every group has: the analysis' own keys, and the values that decided its results."""
+    keys = analysis.model_dump(exclude={"name", "dampers", "petsc", "step", "force", "preload"})
+    plain = {key: value for key, value in keys.items() if value is not None and not isinstance(value, dict)}
+    shown = {key: json.dumps(value) if isinstance(value, list) else value for key, value in plain.items()}
+    reduction = {"reduction": json.dumps(case.reduced.plain())} if case.reduced else {}
+    laws = json.dumps({contact.name: contact.info.plain() for contact in case.contacts})
+    return {**shown, **reduction, "laws": laws, "run_id": run_id, "case": json.dumps(_deciding(case, analysis.name))}
+
+
+def _deciding(case: Case, name: str) -> dict[str, Any]:
+    decisive = (*COMMON, name, *case.analyses[name].decided_by())
+    return {key: value for key, value in case.resolved.items() if key.split(".")[0] in decisive}
+
+
+def belongs(group: h5py.Group, case: Case, name: str) -> bool:
+    """Whether a group's results follow from the present model, contacts and keys of the analysis."""
+    try:
+        stored = json.loads(group.attrs["case"])
+    except (KeyError, ValueError):
+        return False
+    points = group["points"]
+    return bool(stored == _deciding(case, name) and len(next(iter(points.values()))))
