@@ -35,8 +35,8 @@ def objects():
         fw.Transient(fw.Model([[1.0]], [[4.0]])),
         fw.PythonLaw(),
     ]
-    built = fw.BuiltContact(B, 1, parameters)
-    yield from [built, fw.BuiltModel(np.eye(2), np.eye(2), contacts={"ring": built})]
+    built = fw.Pairs(B, 1, parameters)
+    yield from [built, fw.Structure(np.eye(2), np.eye(2), pairs={"ring": built})]
 
 
 def test_every_object_says_what_it_is():

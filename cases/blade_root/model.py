@@ -15,7 +15,7 @@ import numpy.typing as npt
 import scipy.sparse as sp
 from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
-from fretwave import BuiltContact, BuiltModel, InputError, fe
+from fretwave import InputError, Pairs, Structure, fe
 from fretwave.fe import cached, default_folder, model_key
 
 Array = npt.NDArray[np.float64]
@@ -87,11 +87,11 @@ class Options:
         return self.foot_radius, lower, lower + self.flank_length * sin(self.angle)
 
 
-def build(**options: Any) -> BuiltModel:
+def build(**options: Any) -> Structure:
     """The blade for a case file; options are the fields of `Options`."""
     b = blade(**options)
     law = {name: b[name] for name in ("normal_stiffness", "tangential_stiffness")}
-    root = BuiltContact(
+    root = Pairs(
         B=b["B"],
         parameters={**law, "normal_load": b["normal_loads"]},
         areas=b["areas"],
@@ -100,11 +100,11 @@ def build(**options: Any) -> BuiltModel:
         faces=b["flank_names"][b["flank"]].tolist(),
         positions=b["flank_positions"],
     )
-    return BuiltModel(
+    return Structure(
         M=b["M"],
         K=b["K"],
         dofs={"tip": b["observation_dof"]},
-        contacts={"root": root},
+        pairs={"root": root},
         loads={"centrifugal": b["centrifugal_load"]},
         coordinates=b["coordinates"],
         hexahedra=b["hexahedra"],

@@ -71,7 +71,7 @@ def main() -> None:
     rank = MPI.COMM_WORLD.rank
 
     built = build(**(COARSE if chosen.coarse else {}))
-    root, tip = built.contacts["root"], built.dofs["tip"]
+    root, tip = built.pairs["root"], built.dofs["tip"]
     harmonics = fw.Harmonics(range(chosen.harmonics + 1), chosen.samples)
     keep = np.union1d(np.unique(root.B.indices), [tip])
     reduction = fw.reduce(built.M, built.K, STIFFNESS_DAMPING * built.K, keep=keep, modes=chosen.modes)

@@ -93,7 +93,7 @@ def sector(**options: float) -> fw.Sector:
     return fw.Sector(M, {0: K + 2 * ties, 1: -ties, -1: -ties}, SECTORS, None, [groove])
 
 
-def build(**options: float) -> fw.BuiltModel:
+def build(**options: float) -> fw.Structure:
     """The sector for the case file: with the disk and the ring of the next one as its high face.
 
     A face's dof belongs to both sectors; its mass and ground spring are given once, on the low face.
@@ -107,12 +107,12 @@ def build(**options: float) -> fw.BuiltModel:
     for (first, second), stiffness in BLADE_SPRINGS.items():
         blade[np.ix_([first, second], [first, second])] += stiffness * np.array([[1, -1], [-1, 1]])
     groove = one.contacts[0]
-    contact = fw.BuiltContact(np.hstack([groove.B, np.zeros((1, 2))]), 1, groove.parameters)
-    return fw.BuiltModel(
+    contact = fw.Pairs(np.hstack([groove.B, np.zeros((1, 2))]), 1, groove.parameters)
+    return fw.Structure(
         M,
         K,
         dofs={name: number for number, name in enumerate([*DOFS, "next_disk", "next_ring"])},
-        contacts={"groove": contact},
+        pairs={"groove": contact},
         sectors=SECTORS,
         low=np.array([0, 3]),
         high=np.array([4, 5]),

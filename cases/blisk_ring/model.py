@@ -28,15 +28,15 @@ Array = npt.NDArray[np.float64]
 COLUMNS = ("left", "middle", "right")
 
 
-def build(**options: Any) -> fw.BuiltModel:
+def build(**options: Any) -> fw.Structure:
     """The reduced sector for a case file; options are the fields of `geometry.Options`."""
     o, r = checked_options(options), reduced(**options)
     K, groove = groove_contact(o, r)
-    return fw.BuiltModel(
+    return fw.Structure(
         M=r["M"],
         K=K,
         dofs={"tip": int(r["tip"])},
-        contacts={"groove": groove},
+        pairs={"groove": groove},
         sectors=o.blades,
         low=r["low"],
         high=r["high"],
@@ -56,7 +56,7 @@ def displacements(model: dict[str, Any]) -> Any:
     return number
 
 
-def groove_contact(o: Options, model: dict[str, Any]) -> tuple[sp.csr_matrix, fw.BuiltContact]:
+def groove_contact(o: Options, model: dict[str, Any]) -> tuple[sp.csr_matrix, fw.Pairs]:
     """K and the pairs for the chosen law.
 
     With constant normal load the pairs stay closed on their normal stiffness, which K then has, and each tangent is a
@@ -66,14 +66,14 @@ def groove_contact(o: Options, model: dict[str, Any]) -> tuple[sp.csr_matrix, fw
     if o.normal == "variable":
         given = {**parameters, "friction_coefficient": o.friction}
         where = {key: model[key] for key in ("areas", "points", "frames", "positions")}
-        return model["K"], fw.BuiltContact(model["B"], 3, given, faces=["groove"] * n, **where)
+        return model["K"], fw.Pairs(model["B"], 3, given, faces=["groove"] * n, **where)
     tangents = np.arange(3 * n) % 3 > 0
     given = {
         "tangential_stiffness": np.repeat(parameters["tangential_stiffness"], 2),
         "friction_limit": o.friction * np.repeat(parameters["normal_load"], 2),
     }
     points = np.repeat(model["points"], 2, axis=0)
-    return stiffened(o, model, False), fw.BuiltContact(model["B"][tangents], 1, given, points=points)
+    return stiffened(o, model, False), fw.Pairs(model["B"][tangents], 1, given, points=points)
 
 
 def checked_options(options: dict[str, Any]) -> Options:

@@ -27,7 +27,7 @@ from pathlib import Path
 
 import numpy as np
 import scipy.sparse as sp
-from fretwave import BuiltContact, BuiltModel
+from fretwave import Pairs, Structure
 
 HERE = Path(__file__).parent
 
@@ -39,9 +39,9 @@ def build():
     for name in sorted({key.split("/")[0] for key in arrays}):
         values = {key.split("/")[1]: arrays[key] for key in arrays if key.startswith(name + "/")}
         components = int(values.pop("components"))
-        contacts[name] = BuiltContact(load("B_" + name), components, {k: np.array(v) for k, v in values.items()})
+        contacts[name] = Pairs(load("B_" + name), components, {k: np.array(v) for k, v in values.items()})
     C = load("C") if (HERE / "C.npz").exists() else None
-    return BuiltModel(load("M"), load("K"), C, dofs=dofs, contacts=contacts)
+    return Structure(load("M"), load("K"), C, dofs=dofs, pairs=contacts)
 '''
 
 

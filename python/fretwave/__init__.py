@@ -24,17 +24,21 @@ if TYPE_CHECKING:
     from .columns import Column
     from .commands.main import main
     from .cyclic.aerodynamics import Aerodynamics
-    from .cyclic.faces import match_faces, rotation
+    from .cyclic.faces import match_faces
     from .cyclic.reduction import SectorReduction, reduce_sector
     from .cyclic.sector import Sector
     from .cyclic.waves import WaveError
     from .hb.problems import ForcedResponse, Harmonics, NonlinearMode, choose_harmonics
     from .hb.reduction_error import NonlinearError, nonlinear_error
+    from .model.contact import Contact
     from .model.laws import LawInfo, Limit, ParameterInfo, PythonLaw, Role, laws, register_law
-    from .model.model import Contact, Model, by_sector
+    from .model.model import Model
     from .model.modes import LinearMode, linear_modes
+    from .model.pairs import Pairs
     from .model.reduction import FrequencyError, Reduction, reduce
-    from .model.structure import BuiltContact, BuiltModel
+    from .model.sectors import by_sector, rotation
+    from .model.structure import Structure
+    from .results.model_file import read_model, write_model
     from .results.reader import Run, open_run
     from .results.results import has_results, open_results
     from .solve.branch import Branch
@@ -61,7 +65,10 @@ _HOMES = {
     "results.reader": ("Run", "open_run"),
     "results.results": ("has_results", "open_results"),
     "cyclic.aerodynamics": ("Aerodynamics",),
-    "model.structure": ("BuiltContact", "BuiltModel"),
+    "model.pairs": ("Pairs",),
+    "model.sectors": ("by_sector", "rotation"),
+    "model.structure": ("Structure",),
+    "results.model_file": ("read_model", "write_model"),
     "solve.branch": ("Branch",),
     "solve.follow": ("follow",),
     "solve.continuation": ("Continuation", "Point"),
@@ -69,9 +76,10 @@ _HOMES = {
     "cyclic.sector": ("Sector",),
     "cyclic.reduction": ("SectorReduction", "reduce_sector"),
     "cyclic.waves": ("WaveError",),
-    "cyclic.faces": ("match_faces", "rotation"),
+    "cyclic.faces": ("match_faces",),
     "model.laws": ("LawInfo", "Limit", "ParameterInfo", "PythonLaw", "Role", "laws", "register_law"),
-    "model.model": ("Contact", "Model", "by_sector"),
+    "model.contact": ("Contact",),
+    "model.model": ("Model",),
     "model.modes": ("LinearMode", "linear_modes"),
     "hb.problems": ("ForcedResponse", "Harmonics", "NonlinearMode", "choose_harmonics"),
     "model.reduction": ("FrequencyError", "Reduction", "reduce"),
@@ -87,8 +95,6 @@ __all__ = [
     "AnalysisContext",
     "AnalysisSection",
     "Branch",
-    "BuiltContact",
-    "BuiltModel",
     "Column",
     "Contact",
     "Continuation",
@@ -106,6 +112,7 @@ __all__ = [
     "NonlinearMode",
     "NotConverged",
     "Outcome",
+    "Pairs",
     "ParameterInfo",
     "Point",
     "PythonLaw",
@@ -115,6 +122,7 @@ __all__ = [
     "Sector",
     "SectorReduction",
     "StepControl",
+    "Structure",
     "Transient",
     "WaveError",
     "Wear",
@@ -136,6 +144,7 @@ __all__ = [
     "nonlinear_error",
     "open_results",
     "open_run",
+    "read_model",
     "reduce",
     "reduce_case",
     "reduce_sector",
@@ -143,6 +152,7 @@ __all__ = [
     "register_law",
     "rotation",
     "static_preload",
+    "write_model",
 ]
 
 

@@ -91,7 +91,7 @@ def test_parameters_come_from_the_case_then_the_builder(write) -> None:
     assert np.array_equal(pads.parameters["normal_stiffness"], [1e7, 2e7])
     assert np.allclose(pads.parameters["tangential_stiffness"], 2e10 * 2e-4, rtol=1e-15)
     assert pads.parameters["friction_coefficient"] == 0.4
-    assert case.damping == (0.0, 2.0)
+    assert (case.structure.stiffness_damping, case.structure.mass_damping) == (0.0, 2.0)
     assert case.keep == [0, 1, 2, 15, 16, 17]
     assert "contact alone holds the structure" in case.notes[0]
 
@@ -135,7 +135,7 @@ def test_wrong_options(write, override: str, what: str, fix: str | None) -> None
     [
         ([("def build", "def built")], "the builder has no function build", None),
         ([("def build(", "def build(]")], "the builder failed: SyntaxError", None),
-        ([("return BuiltModel(", "return dict(")], "gave no usable model", "it returned dict"),
+        ([("return Structure(", "return dict(")], "gave no usable model", "it returned dict"),
         ([('loads={"weight": weight}', 'loads={"weight": weight[1:]}')], "no usable model", "load 'weight'"),
         ([("np.full(2, AREA)", "np.full(3, AREA)")], "no usable model", "areas of contact 'pads'"),
         ([('dofs={"tip": n - 2}', 'dofs={"tip": n}')], "no usable model", "dof 'tip' has the number 18 of 18"),
@@ -198,7 +198,7 @@ def test_stuck_part_of_the_mode_is_linear(run: Path) -> None:
     spec = case.contacts[0]
     kn, kt = (np.broadcast_to(spec.parameters[f"{name}_stiffness"], 2) for name in ("normal", "tangential"))
     springs = np.column_stack([kn, kt, kt]).ravel()
-    B, K, M = spec.rows.toarray(), case.K.toarray(), case.M.toarray()
+    B, K, M = spec.pairs.own.toarray(), case.K.toarray(), case.M.toarray()
     omega = np.sqrt(np.linalg.eigvalsh((K + B.T @ np.diag(springs) @ B) / M[0, 0])[0])
     with h5py.File(run / "results.h5") as file:
         stuck = file["mode"].attrs["stuck_omega"]

@@ -54,7 +54,7 @@ def test_committed_case_is_read() -> None:
     assert case.C is None
     assert list(case.analyses)[:3] == ["mode", "mode_epmc", "flutter"]
     assert case.damping_with(case.analyses["flutter"].dampers)[0, 0] == -2 * 0.02 * np.sqrt(640.0)
-    assert np.array_equal(case.contacts[0].rows.toarray(), [[0.0, 1.0]])
+    assert np.array_equal(case.contacts[0].pairs.own.toarray(), [[0.0, 1.0]])
     assert case.notes == []
 
 
@@ -284,7 +284,7 @@ def test_damaged_matrix_file(write, tmp_path: Path) -> None:
 
 def test_pairs_between_dofs(write) -> None:
     case: Case = load_case(write(('pairs = ["m2"]', 'pairs = [["m1", "m2"], "m2"]')))
-    assert np.array_equal(case.contacts[0].rows.toarray(), [[-1.0, 1.0], [0.0, 1.0]])
+    assert np.array_equal(case.contacts[0].pairs.own.toarray(), [[-1.0, 1.0], [0.0, 1.0]])
 
 
 def test_not_toml(write) -> None:

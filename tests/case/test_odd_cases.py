@@ -161,19 +161,19 @@ BUILDERS = {
     "def build(**o):\n    return 3\n": ("returned int", "model.py"),
     "def build(n: int = 1):\n    return [] + n\n": ("TypeError", "model.py:2"),
     "def build(**o):\n    return build(**o)\n": ("RecursionError", "model.py:2"),
-    "import fretwave\ndef build(**o):\n    return fretwave.BuiltModel(M='a', K=None)\n": (
+    "import fretwave\ndef build(**o):\n    return fretwave.Structure(M='a', K=None)\n": (
         "no usable model",
         "model.py",
     ),
-    "import fretwave\ndef build(**o):\n    return fretwave.BuiltModel(M=[[1.0]], K=[[1.0]], dofs=3)\n": (
+    "import fretwave\ndef build(**o):\n    return fretwave.Structure(M=[[1.0]], K=[[1.0]], dofs=3)\n": (
         "no usable model",
         "model.py",
     ),
-    "import fretwave, numpy as np\ndef build(**o):\n    return fretwave.BuiltModel(*np.zeros((2, 0, 0)))\n": (
+    "import fretwave, numpy as np\ndef build(**o):\n    return fretwave.Structure(*np.zeros((2, 0, 0)))\n": (
         "no dofs",
         "model.py",
     ),
-    "import fretwave\ndef build(**o):\n    return fretwave.BuiltModel([[float('nan')]], [[1.0]], dofs={'tip': 0})\n": (
+    "import fretwave\ndef build(**o):\n    return fretwave.Structure([[float('nan')]], [[1.0]], dofs={'tip': 0})\n": (
         "not a number",
         "case.toml",
     ),

@@ -71,9 +71,9 @@ def test_matrices_of_the_case_are_tied_by_the_names_of_the_faces(write):
     assert case.dofs == ["disk", "blade", "tip"]
     assert np.allclose(case.K.toarray(), expected.K[0]) and np.allclose(case.M.toarray(), expected.M)
     for k in (1, -1):
-        assert np.allclose(case.neighbours.terms["K"][k].toarray(), expected.K[k])
-    assert case.contacts[0].rows.toarray().tolist() == [[0, 0, -1]]
-    assert {k: B.toarray().tolist() for k, B in case.neighbours.contacts["shroud"].items()} == {1: [[1, 0, 0]]}
+        assert np.allclose(case.structure.K[k].toarray(), expected.K[k])
+    assert case.contacts[0].pairs.own.toarray().tolist() == [[0, 0, -1]]
+    assert case.structure.pairs["shroud"].B[1].toarray().tolist() == [[1, 0, 0]]
     assert case.resolved["model.sectors"] == 24 and case.resolved["model.high"] == ["next"]
     assert case.resolved["model.low"] == ["disk"]
 

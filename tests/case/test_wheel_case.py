@@ -38,14 +38,14 @@ BLADE = np.array([[BLADE_1, -BLADE_1, 0], [-BLADE_1, BLADE_1 + BLADE_2, -BLADE_2
 #: Six sectors of the lumped blisk; tips rub on the casing.
 BUILDER = f"""
 import numpy as np
-from fretwave import BuiltContact, BuiltModel
+from fretwave import Pairs, Structure
 
 def build():
     blade = np.zeros((4, 4))
     blade[:3, :3] = {BLADE.tolist()}
-    casing = BuiltContact(np.array([[0, 0, 1.0, 0]]), 1, {{"tangential_stiffness": 1e5, "friction_limit": 2.0}})
-    return BuiltModel(np.diag([*{MASSES}, 0.0]), {STIFFNESS.tolist()},
-                      dofs={{"disk": 0, "blade": 1, "tip": 2, "next": 3}}, contacts={{"casing": casing}},
+    casing = Pairs(np.array([[0, 0, 1.0, 0]]), 1, {{"tangential_stiffness": 1e5, "friction_limit": 2.0}})
+    return Structure(np.diag([*{MASSES}, 0.0]), {STIFFNESS.tolist()},
+                      dofs={{"disk": 0, "blade": 1, "tip": 2, "next": 3}}, pairs={{"casing": casing}},
                       sectors={N}, low=np.array([0]), high=np.array([3]), parts={{"blade": blade}})
 """
 MODE = """

@@ -307,7 +307,7 @@ def test_status_in_results_is_what_the_law_says_of_the_forces_there(runs, law: s
 
     case = load_case(folder.parent / "case.toml")
     spec = case.contacts[0]
-    contact = fw.Contact(spec.law, spec.rows, acting_parameters(spec, case.preload_of(case.analyses["mode"])))
+    contact = fw.Contact(spec.law, spec.pairs, acting_parameters(spec, case.preload_of(case.analyses["mode"])))
     with h5py.File(folder / "results.h5") as file:
         group = {key: data[()] for key, data in file["mode/contact_pads"].items()}
     assert len(group["u"]) > 1

@@ -21,7 +21,7 @@ ROUNDED = 1e-9
 
 
 def pads(built) -> fw.Contact:
-    given = built.contacts["pads"]
+    given = built.pairs["pads"]
     return fw.Contact("coulomb_3d", given.B, {**given.parameters, "friction_coefficient": 0.3}, "pads")
 
 
@@ -42,7 +42,7 @@ def built():
 
 
 def inner_dofs(built) -> int:
-    kept = np.union1d(np.unique(built.contacts["pads"].B.indices), [built.dofs["tip"]])
+    kept = np.union1d(np.unique(built.pairs["pads"].B.indices), [built.dofs["tip"]])
     return built.M.shape[0] - len(np.union1d(kept, np.concatenate([built.low, built.high])))
 
 
@@ -118,7 +118,7 @@ def test_expanded_waves_solve_the_unreduced_equations(built, comm, faces):
 def test_kept_dofs_stand_for_themselves(comm):
     """Observation dof, contact dofs inside and on a face: coordinates of their own, in B and in expanded motions."""
     built = build(on_face=True)
-    touched = np.unique(built.contacts["pads"].B.indices)
+    touched = np.unique(built.pairs["pads"].B.indices)
     with reduced(built, comm, interface_diameters=[2], interface_waves=4, modes=3) as reduction:
         assert reduction.n_interface == 3 + 16 and set(touched) <= set(reduction.places)
         x_r = np.random.default_rng(1).standard_normal(reduction.size)

@@ -22,6 +22,7 @@ from fretwave.errors import InputError
 from fretwave.files.isolated import call_isolated
 from fretwave.files.whole import _LENGTH, FileError, check_whole, replace_bytes, replaced, seal, sealed_size
 from fretwave.importers import read_matrix
+from fretwave.model.structure import Structure
 from fretwave.results import model_file
 from fretwave.results.record import read_record, write_record
 from fretwave.results.results import open_results
@@ -113,26 +114,26 @@ def test_records_without_a_checksum_must_say_what_a_run_says(tmp_path: Path, key
 def test_damaged_model_files_are_named(tmp_path: Path) -> None:
     M, K = matrices()
     path = tmp_path / "model.h5"
-    model_file.write(path, model_file.FileModel(M, K, None, [f"d{k}" for k in range(40)]))
+    model_file.write_model(path, Structure(M, K, names=[f"d{k}" for k in range(40)]))
     content = path.read_bytes()
-    assert model_file.read(path).K.nnz == K.nnz
+    assert model_file.read_model(path).K.nnz == K.nnz
     random = np.random.default_rng(2)
     for _ in range(10):
         path.write_bytes(damaged(content, random)[1])
         if path.read_bytes() != content and path.read_bytes() != content[:-_LENGTH]:
             with pytest.raises(InputError):
-                model_file.read(path)
+                model_file.read_model(path)
 
 
 def test_indices_of_a_model_file_without_a_seal_are_checked(tmp_path: Path) -> None:
     """SciPy would read beyond its arrays."""
     M, K = matrices()
     path = tmp_path / "model.h5"
-    model_file.write(path, model_file.FileModel(M, K, None, [f"d{k}" for k in range(40)]))
+    model_file.write_model(path, Structure(M, K, names=[f"d{k}" for k in range(40)]))
     with h5py.File(path, "r+") as file:
         file["K/indices"][3] = 10**8
     with pytest.raises(InputError, match="damaged"):
-        model_file.read(path)
+        model_file.read_model(path)
 
 
 def huge_petsc(path: Path, K: sp.csr_matrix) -> None:

@@ -110,11 +110,11 @@ def test_pairs_of_coincident_nodes_join_two_bodies(tmp_path: Path, capfd) -> Non
     command = [*two.write(tmp_path), "--pairs", "joint=LEFT", "RIGHT", "--normal", "2,0,0"]
     assert main(command) == 0
     assert "expected 12 (2 bodies" in capfd.readouterr().out
-    model = model_file.read(tmp_path / "m.h5")
-    joint = model.contacts["joint"]
+    model = model_file.read_model(tmp_path / "m.h5")
+    joint = model.pairs["joint"]
     np.testing.assert_array_equal(two.nodes[joint.nodes[:, 0] - 1], two.nodes[joint.nodes[:, 1] - 1])
     np.testing.assert_allclose(joint.frames[:, 0], np.broadcast_to([1.0, 0, 0], (6, 3)))
-    np.testing.assert_array_equal(joint.positions[:, 0], 0.04)
+    np.testing.assert_array_equal(joint.points[:, 0], 0.04)
     moved = np.zeros((len(two.nodes), 3))
     moved[: len(two.first.nodes), 0] = 1.0
     np.testing.assert_allclose((joint.B @ moved.ravel()).reshape(-1, 3), np.broadcast_to([1.0, 0, 0], (6, 3)))
@@ -134,8 +134,8 @@ def test_pairs_from_a_table(tmp_path: Path) -> None:
     (tmp_path / "pairs.csv").write_text("node_a,node_b,nx,ny,nz,area\n1,,0,0,-2,3e-6\n2,3,0,1,1,4e-6\n")
     command = [*two.write(tmp_path), "--pairs", str(tmp_path / "pairs.csv"), "--name", "tip=8y"]
     assert main(command) == 0
-    model = model_file.read(tmp_path / "m.h5")
-    contact = model.contacts["contact"]
+    model = model_file.read_model(tmp_path / "m.h5")
+    contact = model.pairs["contact"]
     np.testing.assert_array_equal(contact.areas, [3e-6, 4e-6])
     np.testing.assert_array_equal(contact.nodes, [[1, 0], [2, 3]])
     x = np.random.default_rng(2).normal(size=(len(two.nodes), 3))
@@ -143,13 +143,13 @@ def test_pairs_from_a_table(tmp_path: Path) -> None:
     np.testing.assert_allclose(u[0, 0], -x[0, 2])
     np.testing.assert_allclose(u[1, 0], (x[1] - x[2]) @ [0, 1, 1] / np.sqrt(2))
     np.testing.assert_allclose(np.linalg.norm(u, axis=1), [np.linalg.norm(x[0]), np.linalg.norm(x[1] - x[2])])
-    assert model.names[int(model.kept[0])] == "tip" and int(model.kept[0]) == 22
+    assert model.dofs == {"tip": 22} and model.dof("tip") == 22
 
 
 def test_pairs_with_ground(tmp_path: Path) -> None:
     two = Two()
     assert main([*two.write(tmp_path), "--pairs", "wall=LEFT", "ground", "--normal", "1,0,0"]) == 0
-    wall = model_file.read(tmp_path / "m.h5").contacts["wall"]
+    wall = model_file.read_model(tmp_path / "m.h5").pairs["wall"]
     moved = np.arange(3.0 * len(two.nodes)).reshape(-1, 3)
     u = (wall.B @ moved.ravel()).reshape(-1, 3)
     np.testing.assert_allclose(u[:, 0], moved[wall.nodes[:, 0] - 1, 0])

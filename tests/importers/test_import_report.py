@@ -72,7 +72,7 @@ def test_report_warns_of_what_cannot_be(held: Held, tmp_path: Path, capfd) -> No
     assert "the mass differs along x, y and z" in text
     loose = report_of(tmp_path, *(sp.diags(cut) @ A @ sp.diags(cut) for A in (bar.M, bar.K)), bar.nodes, capfd)
     assert "warning: 1 dof with no mass" in loose and "warning: the frequencies cannot be computed" in loose
-    assert model_file.read(tmp_path / "m.h5").size == len(cut)
+    assert model_file.read_model(tmp_path / "m.h5").n_dof == len(cut)
     K = bar.K - sp.diags(1e-3 * bar.K.diagonal().max() * (cut == 0))
     assert "warning: K is negative for a motion" in report_of(tmp_path, bar.M, K, bar.nodes, capfd)
 
@@ -93,12 +93,13 @@ def test_damping_names_and_tables(held: Held, tmp_path: Path, capfd) -> None:
     command = ["import", str(tmp_path / "m.h5"), "--mass", parts[0], "--stiffness", parts[1], "--damping", parts[2]]
     tables = ["--dofs", str(tmp_path / "dofs.csv"), "--coordinates", str(tmp_path / "nodes.csv")]
     assert main([*command, *tables, "--units", "kg, N, m", "--name", "tip=24z", "--name", "side=n24y"]) == 0
-    model = model_file.read(tmp_path / "m.h5")
+    model = model_file.read_model(tmp_path / "m.h5")
     assert abs(model.C - 1e-6 * held.K).max() == 0
-    assert model.names[-3:] == ["n24x", "side", "tip"] and sorted(model.kept) == [52, 53]
-    assert model.units == "kg, N, m"
-    assert [(s.role, s.path) for s in model.sources][2:4] == [("damping", "C.npz"), ("coordinates", "nodes.csv")]
-    assert model.sources[0].bytes == (tmp_path / "M.npz").stat().st_size and len(model.sources[0].sha256) == 64
+    assert model.dof_names[-3:] == ["n24x", "side", "tip"] and model.dofs == {"tip": 53, "side": 52}
+    units, sources = model_file.read_sources(tmp_path / "m.h5")
+    assert units == "kg, N, m"
+    assert [(s.role, s.path) for s in sources][2:4] == [("damping", "C.npz"), ("coordinates", "nodes.csv")]
+    assert sources[0].bytes == (tmp_path / "M.npz").stat().st_size and len(sources[0].sha256) == 64
     np.testing.assert_array_equal(model.coordinates, held.bar.nodes)
     assert "C: " in capfd.readouterr().out
 
@@ -112,8 +113,8 @@ def test_held_dofs_keep_the_numbering_of_the_others(held: Held, tmp_path: Path) 
     np.savez(tmp_path / "nodes.npz", coordinates=bar.nodes)
     command = ["import", str(tmp_path / "m.h5"), "--mass", given[0], "--stiffness", given[1]]
     assert main([*command, "--coordinates", str(tmp_path / "nodes.npz")]) == 0
-    model = model_file.read(tmp_path / "m.h5")
-    np.testing.assert_array_equal(np.column_stack([model.node, model.direction]), held.labels)
+    model = model_file.read_model(tmp_path / "m.h5")
+    np.testing.assert_array_equal(model.labels, held.labels)
     assert abs(model.K - held.K).max() <= 1e-15 * abs(held.K).max()
 
 

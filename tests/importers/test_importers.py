@@ -45,7 +45,7 @@ def test_one_model_through_every_format(held: Held, kind: str, tmp_path: Path) -
     write = EXACT.get(kind, write_calculix)
     given = [write(tmp_path, A, letter, held.labels) for letter, A in (("M", held.M), ("K", held.K))]
     assert main(["import", str(tmp_path / "m.h5"), "--mass", given[0], "--stiffness", given[1]]) == 0
-    model = model_file.read(tmp_path / "m.h5")
+    model = model_file.read_model(tmp_path / "m.h5")
     for A, was in ((model.M, held.M), (model.K, held.K)):
         assert abs(A - was).max() <= (0 if kind in EXACT else 5e-14) * abs(was).max()
         assert abs(A - A.T).max() == 0
@@ -53,19 +53,24 @@ def test_one_model_through_every_format(held: Held, kind: str, tmp_path: Path) -
         frequencies(model.K, model.M), frequencies(held.K, held.M), rtol=1e-12 + digits(held, kind)
     )
     if kind in ("CalculiX", "Abaqus, matrix input"):
-        assert model.names[0] == "n7x"
-        np.testing.assert_array_equal(np.column_stack([model.node, model.direction]), held.labels)
+        assert model.dof_names[0] == "n7x"
+        np.testing.assert_array_equal(model.labels, held.labels)
 
 
 def test_matrices_that_calculix_wrote(tmp_path: Path, capfd) -> None:
     """A deck, its matrices and its frequencies of CalculiX 2.20, which prints seven digits: 5e-7 at worst."""
     parts = ["--mass", str(DATA / "block.mas"), "--stiffness", str(DATA / "block.sti")]
     assert main(["import", str(tmp_path / "m.h5"), *parts, "--coordinates", str(DATA / "block.inp")]) == 0
-    model = model_file.read(tmp_path / "m.h5")
+    model = model_file.read_model(tmp_path / "m.h5")
     found = frequencies(model.K, model.M)[: len(CALCULIX_HZ)]
     np.testing.assert_allclose(found, CALCULIX_HZ, rtol=5e-7)
-    assert model.names[:3] == ["n5x", "n5y", "n5z"]
-    assert [s.role for s in model.sources] == ["mass", "stiffness", "coordinates", "dofs"]
+    assert model.dof_names[:3] == ["n5x", "n5y", "n5z"]
+    assert [s.role for s in model_file.read_sources(tmp_path / "m.h5")[1]] == [
+        "mass",
+        "stiffness",
+        "coordinates",
+        "dofs",
+    ]
     text = capfd.readouterr().out
     for said in (
         "upper triangle, mirrored",
@@ -86,7 +91,7 @@ def test_import_on_any_number_of_ranks(comm, shared_tmp: Path, capfd) -> None:
     parts = ["--mass", str(DATA / "block.mas"), "--stiffness", str(DATA / "block.sti")]
     assert main(["import", str(shared_tmp / "m.h5"), *parts]) == 0
     comm.barrier()
-    assert model_file.read(shared_tmp / "m.h5").size == 24
+    assert model_file.read_model(shared_tmp / "m.h5").n_dof == 24
     assert capfd.readouterr().out.count("8099.36, 13332.1, 14782.4, 34664.5") == (comm.rank == 0)
 
 

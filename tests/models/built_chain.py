@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from fretwave import BuiltContact, BuiltModel, InputError
+from fretwave import InputError, Pairs, Structure
 
 STIFFNESS, AREA = 4e6, 2e-4
 
@@ -21,7 +21,7 @@ class Options:
     tilt: tuple[float, float] = (0.0, 0.0)
 
 
-def build(**options: Any) -> BuiltModel:
+def build(**options: Any) -> Structure:
     """Springs along the chain in x (normal, downwards), y, z; ground springs at the first mass in y and z alone."""
     o = Options(**options)
     if o.masses < 2:
@@ -37,7 +37,7 @@ def build(**options: Any) -> BuiltModel:
     weight[::3] = o.weight / o.masses
     ends = [0, o.masses - 1]
     B = sp.csr_matrix((np.ones(6), (np.arange(6), [3 * end + axis for end in ends for axis in range(3)])), shape=(6, n))
-    pads = BuiltContact(
+    pads = Pairs(
         B=B,
         parameters={"normal_stiffness": np.array([1e7, 2e7]), "normal_load": o.weight / 2},
         areas=np.full(2, AREA),
@@ -46,11 +46,11 @@ def build(**options: Any) -> BuiltModel:
         faces=["pads", "pads"],
         positions=np.array([[0.0, 0.0], [0.1, 0.0]]),
     )
-    return BuiltModel(
+    return Structure(
         M=o.mass * sp.identity(n),
         K=STIFFNESS * (sp.kron(line, sp.diags([1.0, 1.0, 2.5])) + held),
         dofs={"tip": n - 2},
-        contacts={"pads": pads},
+        pairs={"pads": pads},
         loads={"weight": weight},
         coordinates=np.column_stack([np.arange(o.masses, dtype=float), np.zeros((o.masses, 2))]),
     )

@@ -40,15 +40,15 @@ def mesh_of(o: Options) -> fe.Mesh:
     return fe.join([*blocks, fe.Block("blade", (2, 1, 1), curved((-0.5, 0.5), (RIM, TIP)))], o.order)
 
 
-def build(**options: Any) -> fw.BuiltModel:
+def build(**options: Any) -> fw.Structure:
     """The sector, or its reduction with the way back to the nodes."""
     o = Options(**options)
     return reduced(unreduced(o)) if o.reduced else unreduced(o)
 
 
-def reduced(full: fw.BuiltModel) -> fw.BuiltModel:
+def reduced(full: fw.Structure) -> fw.Structure:
     """On the pads, the tip, the faces and 80 component modes: nothing is left out."""
-    pads = full.contacts["pads"]
+    pads = full.pairs["pads"]
     contact = fw.Contact("coulomb_3d", pads.B, {**pads.parameters, "friction_coefficient": 0.1})
     arguments = (full.M, full.K, full.low, full.high, full.sectors)
     options = dict(contacts=[contact], keep=[full.dofs["tip"]], axis="z", modes=80, comm=MPI.COMM_SELF)
@@ -58,7 +58,7 @@ def reduced(full: fw.BuiltModel) -> fw.BuiltModel:
             M=reduction.M,
             K=reduction.K,
             dofs={"tip": reduction.places[full.dofs["tip"]]},
-            contacts={"pads": replace(pads, B=reduction.contacts[0].B[0])},
+            pairs={"pads": replace(pads, B=reduction.contacts[0].B[0])},
             loads={name: reduction.project(load) for name, load in full.loads.items()},
             low=reduction.low,
             high=reduction.high,
@@ -66,7 +66,7 @@ def reduced(full: fw.BuiltModel) -> fw.BuiltModel:
         )
 
 
-def unreduced(o: Options) -> fw.BuiltModel:
+def unreduced(o: Options) -> fw.Structure:
     """Dofs 3 * node + axis of the nodes beyond the bore; nodes on it are drawn, and held."""
     mesh = mesh_of(o)
     radius = np.hypot(mesh.nodes[:, 0], mesh.nodes[:, 1])
@@ -80,7 +80,7 @@ def unreduced(o: Options) -> fw.BuiltModel:
     under = np.append(mesh.lattice["middle"][:, 0, -1], low[-1:] if o.on_face else low[:0])
     n = len(under)
     B = sp.csr_matrix((np.ones(3 * n), (np.arange(3 * n), contact_dofs(place[under]))), (3 * n, M.shape[0]))
-    pads = fw.BuiltContact(
+    pads = fw.Pairs(
         B=sp.csr_matrix(-B),  # the rim moves down (-z) onto the pads
         parameters={"normal_stiffness": 2e8, "tangential_stiffness": 1e8, "normal_load": 1000.0},
         areas=np.full(n, 1e-4),
@@ -89,11 +89,11 @@ def unreduced(o: Options) -> fw.BuiltModel:
     )
     weight = np.zeros(M.shape[0])
     weight[2::3] = -9.81 * np.asarray(M.sum(axis=1)).ravel()[2::3]
-    return fw.BuiltModel(
+    return fw.Structure(
         M,
         K,
         dofs={"tip": 3 * int(place[tip]) + 2},
-        contacts={"pads": pads},
+        pairs={"pads": pads},
         loads={"weight": weight},
         coordinates=mesh.nodes,
         displacements=np.where(place[:, None] < 0, -1, 3 * place[:, None] + np.arange(3)),

@@ -18,83 +18,121 @@ from fretwave.case.load import load_case
 from fretwave.commands.main import main
 from fretwave.mpi.guard import on_first_rank
 from fretwave.results import model_file
-from fretwave.results.model_file import ContactMap, FileModel, SourceFile, dof_name
+from fretwave.results.model_file import SourceFile, dof_name
 
 BAR = hexahedra.bar((3, 1, 1), (0.06, 0.02, 0.01))
 
 
-def model_of_a_bar() -> FileModel:
+SOURCES = [SourceFile("mass", "m.mtx", 12, "ab"), SourceFile("stiffness", "k.mtx", 34, "cd")]
+
+
+def model_of_a_bar() -> fw.Structure:
     """A free bar whose end x = 0 rests in contact pairs with ground, normal -x."""
     end = BAR.layer(0.0)
     frames = np.broadcast_to([[-1.0, 0, 0], [0, 1, 0], [0, 0, -1]], (len(end) // 3, 3, 3))
     selection = sp.csr_matrix((np.ones(len(end)), (np.arange(len(end)), end)), (len(end), BAR.K.shape[0]))
     B = (sp.block_diag(list(frames)) @ selection).tocsr()
     nodes, n = np.arange(1, len(BAR.nodes) + 1), len(BAR.nodes)
-    table = np.repeat(nodes, 3), np.tile([1, 2, 3], n)
-    names = [dof_name(*(int(part) for part in label)) for label in zip(*table)]
+    labels = np.column_stack([np.repeat(nodes, 3), np.tile([1, 2, 3], n)])
+    names = [dof_name(*(int(part) for part in label)) for label in labels]
     names[-1] = "tip"
     pairs = np.column_stack([end[::3] // 3 + 1, np.zeros(len(end) // 3, dtype=int)])
-    flank = ContactMap("flank", B, BAR.nodes[pairs[:, 0] - 1], np.full(len(pairs), 5e-5), frames.copy(), pairs)
-    sources = [SourceFile("mass", "m.mtx", 12, "ab"), SourceFile("stiffness", "k.mtx", 34, "cd")]
-    C = 1e-6 * BAR.K
-    parts = dict(kept=np.array([len(names) - 1]), node_numbers=nodes, coordinates=BAR.nodes, contacts={"flank": flank})
-    return FileModel(BAR.M, BAR.K, C, names, *table, **parts, units="kg, N, m", sources=sources)
+    areas = np.full(len(pairs), 5e-5)
+    flank = fw.Pairs(B, areas=areas, points=BAR.nodes[pairs[:, 0] - 1], frames=frames.copy(), nodes=pairs)
+    parts = dict(labels=labels, node_numbers=nodes, coordinates=BAR.nodes, pairs={"flank": flank})
+    return fw.Structure(BAR.M, BAR.K, 1e-6 * BAR.K, dofs={"tip": len(names) - 1}, names=names, **parts)
 
 
 @pytest.fixture
 def path(comm, shared_tmp: Path) -> Path:
-    on_first_rank(comm, lambda: model_file.write(shared_tmp / "bar.h5", model_of_a_bar()))
-    return shared_tmp / "bar.h5"
+    written = shared_tmp / "bar.h5"
+    on_first_rank(comm, lambda: model_file.write_model(written, model_of_a_bar(), "kg, N, m", SOURCES))
+    return written
 
 
 @pytest.mark.ranks(1)
 def test_what_goes_in_comes_out(path: Path) -> None:
-    was, found = model_of_a_bar(), model_file.read(path)
+    was, found = model_of_a_bar(), fw.read_model(path)
     for letter in ("M", "K", "C"):
         assert (getattr(was, letter) != getattr(found, letter)).nnz == 0
-    for key in ("node", "direction", "kept", "node_numbers", "coordinates"):
+    for key in ("labels", "node_numbers", "coordinates"):
         np.testing.assert_array_equal(getattr(was, key), getattr(found, key))
-    for key in ("positions", "areas", "frames", "nodes"):
-        np.testing.assert_array_equal(getattr(was.contacts["flank"], key), getattr(found.contacts["flank"], key))
-    assert (was.contacts["flank"].B != found.contacts["flank"].B).nnz == 0
-    assert (found.names, found.units, found.sources) == (was.names, was.units, was.sources)
+    for key in ("points", "areas", "frames", "nodes"):
+        np.testing.assert_array_equal(getattr(was.pairs["flank"], key), getattr(found.pairs["flank"], key))
+    assert (was.pairs["flank"].B != found.pairs["flank"].B).nnz == 0
+    assert (found.names, found.dofs) == (was.names, was.dofs)
+    assert model_file.read_sources(path) == ("kg, N, m", SOURCES)
     assert not path.with_name("bar.h5.unfinished").exists()
+
+
+@pytest.mark.ranks(1)
+def test_files_as_the_layout_says_are_read(tmp_path: Path) -> None:
+    """Written by h5py alone, as format version 1 has been since the beginning."""
+    was = model_of_a_bar()
+    with h5py.File(tmp_path / "m.h5", "w") as file:
+        file.attrs.update(format="fretwave model", format_version=1, units="")
+        for place, A in (("M", was.M), ("K", was.K), ("contacts/flank/B", was.pairs["flank"].B)):
+            group = file.create_group(place)
+            group.attrs["shape"] = A.shape
+            for key in ("data", "indices", "indptr"):
+                group[key] = getattr(sp.csr_matrix(A), key)
+        file["dofs/name"] = np.array([name.encode() for name in was.names])
+        file["dofs/node"], file["dofs/direction"] = was.labels.T
+        file["dofs/kept"] = [was.n_dof - 1]
+        file["nodes/number"], file["nodes/coordinates"] = was.node_numbers, was.coordinates
+        file["contacts/flank/positions"] = was.pairs["flank"].points
+    found = fw.read_model(tmp_path / "m.h5")
+    assert found.complaint() is None and found.C is None and found.dofs == was.dofs
+    np.testing.assert_array_equal(found.pairs["flank"].points, was.pairs["flank"].points)
+    np.testing.assert_array_equal(found.displacements, np.arange(was.n_dof).reshape(-1, 3))
+
+
+@pytest.mark.ranks(1)
+def test_what_a_file_has_no_place_for_is_not_left_behind(tmp_path: Path) -> None:
+    was = model_of_a_bar()
+    for lost, said in (
+        (replace(was, loads={"pull": np.ones(was.n_dof)}), "loads"),
+        (replace(was, sectors=12), "sectors"),
+        (replace(was, pairs={"one": fw.Pairs(np.ones((1, was.n_dof)), 1)}), "'one' of one component"),
+    ):
+        with pytest.raises(fw.InputError, match=said):
+            fw.write_model(tmp_path / "m.h5", lost)
+    assert not (tmp_path / "m.h5").exists()
 
 
 @pytest.mark.ranks(1)
 def test_grid_of_a_model_with_held_nodes(tmp_path: Path) -> None:
     """Without the dofs of node 1, and rows in another order: each node's own dofs are found, -1 for the held ones."""
     whole = model_of_a_bar()
-    rows = np.random.default_rng(3).permutation(np.arange(3, whole.size))
-    parts = dict(node=whole.node[rows], direction=whole.direction[rows], node_numbers=whole.node_numbers)
+    rows = np.random.default_rng(3).permutation(np.arange(3, whole.n_dof))
+    parts = dict(labels=whole.labels[rows], node_numbers=whole.node_numbers, coordinates=BAR.nodes)
     cells = np.array([[0, 4, 6, 2, 1, 5, 7, 3]])
-    names = [whole.names[row] for row in rows]
-    kept = FileModel(whole.M[rows][:, rows], whole.K[rows][:, rows], None, names, **parts, coordinates=BAR.nodes)
-    model_file.write(tmp_path / "m.h5", replace(kept, hexahedra=cells))
-    built = model_file.read(tmp_path / "m.h5").built()
-    assert built.complaint() is None and built.hexahedra.tolist() == cells.tolist()
-    assert built.displacements[0].tolist() == [-1, -1, -1]
-    np.testing.assert_array_equal(rows[built.displacements[1:]], np.arange(3, whole.size).reshape(-1, 3))
+    kept = fw.Structure(whole.M[rows][:, rows], whole.K[rows][:, rows], names=[whole.names[k] for k in rows], **parts)
+    fw.write_model(tmp_path / "m.h5", replace(kept, hexahedra=cells))
+    found = fw.read_model(tmp_path / "m.h5")
+    assert found.complaint() is None and found.hexahedra.tolist() == cells.tolist()
+    assert found.displacements[0].tolist() == [-1, -1, -1]
+    np.testing.assert_array_equal(rows[found.displacements[1:]], np.arange(3, whole.n_dof).reshape(-1, 3))
     with pytest.raises(fw.InputError, match="a node of a cell does not exist"):
-        model_file.write(tmp_path / "m.h5", replace(kept, hexahedra=cells + len(BAR.nodes)))
+        fw.write_model(tmp_path / "m.h5", replace(kept, hexahedra=cells + len(BAR.nodes)))
 
 
 @pytest.mark.ranks(1)
 def test_parts_may_be_left_out(tmp_path: Path) -> None:
-    model_file.write(tmp_path / "m.h5", FileModel(sp.eye(2), sp.eye(2), None, ["a", "b"]))
-    found = model_file.read(tmp_path / "m.h5")
-    assert found.C is None and found.node is None and found.kept is None and found.coordinates is None
-    assert found.contacts == {} and found.sources == []
+    fw.write_model(tmp_path / "m.h5", fw.Structure(sp.eye(2), sp.eye(2), names=["a", "b"]))
+    found = fw.read_model(tmp_path / "m.h5")
+    assert found.C is None and found.labels is None and found.dofs == {} and found.coordinates is None
+    assert found.pairs == {} and model_file.read_sources(tmp_path / "m.h5") == ("", [])
 
 
 def test_modes_on_any_number_of_ranks(comm, path: Path) -> None:
     """Against dense eigenvalues, with stuck contact of known stiffness."""
-    found = on_first_rank(comm, lambda: model_file.read(path))
+    found = on_first_rank(comm, lambda: model_file.read_model(path))
     stiffness = {"normal_stiffness": 3e8, "tangential_stiffness": 2e8}
     law = {**stiffness, "friction_coefficient": 0.5, "normal_load": 100.0}
-    contact = fw.Contact("coulomb_3d", found.contacts["flank"].B, law, name="flank")
-    springs = np.tile([3e8, 2e8, 2e8], found.contacts["flank"].pairs)
-    stuck = BAR.K + found.contacts["flank"].B.T @ sp.diags(springs) @ found.contacts["flank"].B
+    contact = fw.Contact("coulomb_3d", found.pairs["flank"].B, law, name="flank")
+    springs = np.tile([3e8, 2e8, 2e8], found.pairs["flank"].n_pairs)
+    stuck = BAR.K + found.pairs["flank"].B.T @ sp.diags(springs) @ found.pairs["flank"].B
     with fw.Model(found.M, found.K, contacts=[contact], comm=comm) as model:
         modes = fw.linear_modes(model, 12, "stuck")
     exact = np.sqrt(scipy.linalg.eigh(stuck.toarray(), BAR.M.toarray(), eigvals_only=True)[:12])
@@ -141,7 +179,7 @@ def test_wrong_files(path: Path, wrong: str) -> None:
     change, said = WRONG[wrong]
     damaged(path, change)
     with pytest.raises(fw.InputError, match=said) as raised:
-        model_file.read(path)
+        model_file.read_model(path)
     assert raised.value.fix
 
 
@@ -149,17 +187,17 @@ def test_wrong_files(path: Path, wrong: str) -> None:
 def test_no_model_file(tmp_path: Path) -> None:
     (tmp_path / "blade.h5").write_text("text")
     with pytest.raises(fw.InputError, match="no model file"):
-        model_file.read(tmp_path / "blade.h5")
+        model_file.read_model(tmp_path / "blade.h5")
     with pytest.raises(fw.InputError, match="did you mean `blade.h5`"):
-        model_file.read(tmp_path / "blade.hdf5")
+        model_file.read_model(tmp_path / "blade.hdf5")
 
 
 @pytest.mark.ranks(1)
 def test_parts_that_do_not_fit_are_not_written(tmp_path: Path) -> None:
     with pytest.raises(fw.InputError, match="K does not fit M"):
-        model_file.write(tmp_path / "m.h5", FileModel(sp.eye(2), sp.eye(3), None, ["a", "b"]))
+        model_file.write_model(tmp_path / "m.h5", fw.Structure(sp.eye(2), sp.eye(3), names=["a", "b"]))
     with pytest.raises(fw.InputError, match="cannot be written"):
-        model_file.write(tmp_path / "no" / "m.h5", FileModel(sp.eye(2), sp.eye(2), None, ["a", "b"]))
+        model_file.write_model(tmp_path / "no" / "m.h5", fw.Structure(sp.eye(2), sp.eye(2), names=["a", "b"]))
     assert list(tmp_path.iterdir()) == []
 
 
@@ -193,8 +231,8 @@ def test_case_from_a_model_file(path: Path) -> None:
     case_file.write_text(CASE.replace("[reduction]\nmodes = 8\n[preload]\n", ""))
     case = load_case(case_file)
     assert case.dof("tip") == len(case.dofs) - 1 and case.dof("n1x") == 0
-    assert (case.K != BAR.K).nnz == 0 and case.C is not None
-    assert (case.contacts[0].rows != model_of_a_bar().contacts["flank"].B).nnz == 0
+    assert (case.K != BAR.K).nnz == 0 and case.structure.C is not None
+    assert (case.contacts[0].pairs.own != model_of_a_bar().pairs["flank"].B).nnz == 0
     np.testing.assert_allclose(case.contacts[0].parameters["normal_stiffness"], 6e12 * 5e-5)
     assert case.resolved["model.file"].startswith("bar.h5 ")
 
@@ -227,7 +265,7 @@ def test_run_from_a_model_file(comm, path: Path) -> None:
     assert main(["run", str(folder / "case.toml"), "--out", str(folder / "run"), "--no-plots"]) == 0
     with (folder / "run" / "mode.csv").open() as file:
         rows = list(csv.DictReader(file))
-    found = model_of_a_bar().contacts["flank"].B
+    found = model_of_a_bar().pairs["flank"].B
     stuck = BAR.K + found.T @ sp.diags(np.tile([3e8, 2e8, 2e8], found.shape[0] // 3)) @ found
     exact = np.sqrt(scipy.linalg.eigh(stuck.toarray(), BAR.M.toarray(), eigvals_only=True)[0])
     assert len(rows) >= 2

@@ -251,8 +251,8 @@ def test_cells_of_a_built_model() -> None:
     """Triquadratic as they are or cut in eight; without cells the nodes are points."""
     skewed = skewed_mesh()
     n, cells = skewed.n_dof, skewed.vtk_cells
-    model = fw.BuiltModel(sp.identity(n, format="csr"), sp.identity(n, format="csr"), coordinates=skewed.nodes)
-    case = SimpleNamespace(built=model, neighbours=None, path=Path("case.toml"))
+    model = fw.Structure(sp.identity(n, format="csr"), sp.identity(n, format="csr"), coordinates=skewed.nodes)
+    case = SimpleNamespace(structure=model, path=Path("case.toml"))
     assert (mesh_of(case)[1][0].shape, mesh_of(case)[1][1]) == ((n // 3, 1), VERTEX)
     model.hexahedra = cells
     assert model.complaint() is None and mesh_of(case)[1][1] == TRIQUADRATIC_HEXAHEDRON

@@ -99,7 +99,7 @@ def test_the_motion_of_a_worn_point_is_shown_with_the_law_s_word_on_it(run, tmp_
 
 def contact(positions, faces):
     n = len(positions)
-    return fw.BuiltContact(sp.csr_matrix((3 * n, 3 * n)), faces=faces, positions=np.array(positions, dtype=float))
+    return fw.Pairs(sp.csr_matrix((3 * n, 3 * n)), faces=faces, positions=np.array(positions, dtype=float))
 
 
 def test_faces_become_surfaces_without_bridges():

@@ -9,10 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from ..case.analysis import AnalysisSection, register_analysis
-from ..case.contacts import ContactSpec
 from ..case.schema import Positive, PreloadSection, key
 from ..columns import Column
 from ..errors import NotConverged
+from ..model.contact import Contact
 from ..post.contact_history import OPEN, SLIP, STICK, normal_force, tangential_force
 from .parts.context import AnalysisContext, Outcome
 from .parts.rest import keep_pairs, loaded_state
@@ -94,8 +94,7 @@ def _rows(context: AnalysisContext[StaticAnalysis], rest: Preload, factor: float
     """One row for each pair, on every rank."""
     contacts = context.comm.bcast(rest.contacts)
     for spec, state in zip(context.case.contacts, contacts):
-        built = context.case.built.contacts.get(spec.name) if context.case.built else None
-        points = built.points if built is not None else None
+        points = spec.pairs.points
         for pair in range(spec.n_pairs):
             place = (np.nan,) * 3 if points is None else points[pair]
             yield {
@@ -107,7 +106,7 @@ def _rows(context: AnalysisContext[StaticAnalysis], rest: Preload, factor: float
             }
 
 
-def pair_state(spec: ContactSpec, state: Mapping[str, Any], pair: int) -> dict[str, Any]:
+def pair_state(spec: Contact, state: Mapping[str, Any], pair: int) -> dict[str, Any]:
     """Forces, status and gap of one pair, the last two as its law tells them.
 
     Parameters
@@ -142,14 +141,11 @@ def _summary(context: AnalysisContext[StaticAnalysis], rest: Preload, factor: fl
     return lines
 
 
-def _resultant(context: AnalysisContext[StaticAnalysis], spec: ContactSpec, f: npt.NDArray[np.float64]) -> list[str]:
-    """Sum of the contact forces in space, beside that of the loads (dof = 3 * node + axis)."""
-    built = context.case.built
-    frames = built.contacts[spec.name].frames if built and spec.name in built.contacts else None
-    names = section_loads(context)
-    if frames is None or built is None or built.displacements is not None or not names:
+def _resultant(context: AnalysisContext[StaticAnalysis], spec: Contact, f: npt.NDArray[np.float64]) -> list[str]:
+    """Sum of the contact forces in space, beside that of the loads."""
+    frames, loads = spec.pairs.frames, context.case.structure.resultant(section_loads(context))
+    if frames is None or loads is None:
         return []
     total = np.einsum("kcx,ck->x", frames, f)
-    loads = np.sum([built.loads[name] for name in names], axis=0).reshape(-1, 3).sum(axis=0)
     shown = [", ".join(f"{value:.5g}" for value in vector) for vector in (total, loads)]
     return [f"{context.name}: contact carries ({shown[0]}) N along x, y, z of the loads' ({shown[1]}) N at factor 1"]

@@ -97,7 +97,7 @@ class WearAnalysis(AnalysisSection):
     def _check_contacts(self, report: Reporter, facts: Facts) -> None:
         """A contact with a normal direction, and the areas of its pairs."""
         try:
-            areas_of(facts.contacts, facts.built)
+            areas_of(facts.contacts)
         except InputError as error:
             where = report.source.where((*report.path, "type"))
             measured = error.where or error.measured

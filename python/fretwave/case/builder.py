@@ -13,23 +13,16 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-import numpy as np
-import numpy.typing as npt
-import scipy.sparse as sp
 from pydantic import TypeAdapter, ValidationError
 
 from ..errors import FretwaveError, InputError
-from ..model.structure import BuiltModel
+from ..model.structure import Structure
 from ..texts import display, is_there, nearest, shortened, toml
 from .toml.source import Source
 from .toml.validation import at
 
-Array = npt.NDArray[np.float64]
 
-
-def run_builder(
-    given: str, options: Mapping[str, Any], source: Source, found: list[FretwaveError]
-) -> BuiltModel | None:
+def run_builder(given: str, options: Mapping[str, Any], source: Source, found: list[FretwaveError]) -> Structure | None:
     """Call a builder; what is wrong is appended to `found`, with the builder's own file and line where it is there."""
     path = source.path.parent / given
     before = len(found)
@@ -40,7 +33,7 @@ def run_builder(
             raise InputError(
                 "the builder has no function build",
                 display(path),
-                fix="define `def build(**options)` returning fretwave.BuiltModel",
+                fix="define `def build(**options)` returning fretwave.Structure",
             )
         chosen = _checked(module, function, options, source, found)
         built = function(**chosen) if len(found) == before else None
@@ -125,27 +118,18 @@ def _blame(error: BaseException, path: Path, source: Source) -> InputError:
     return InputError(what, where, fix="correct the builder, or the options in [model.options]")
 
 
-def _consistent(built: Any, path: Path, found: list[FretwaveError]) -> BuiltModel | None:
+def _consistent(built: object, path: Path, found: list[FretwaveError]) -> Structure | None:
     problem: str | None = f"it returned {type(built).__name__}"
-    if isinstance(built, BuiltModel):
+    if isinstance(built, Structure):
         try:
-            _convert(built)
+            built = built.sparse()
             problem = built.complaint()
         except Exception as error:  # entries of any type may stand in it
             problem = f"{type(error).__name__}: {shortened(str(error))}"
-    if problem is None:
-        return typing.cast(BuiltModel, built)
-    expected = "fretwave.BuiltModel with matrices, contacts and loads that fit each other"
+        if problem is None:
+            return built
+    expected = "fretwave.Structure with matrices, pairs and loads that fit each other"
     found.append(
         InputError("the builder gave no usable model", display(path), problem, expected, "correct the builder")
     )
     return None
-
-
-def _convert(built: BuiltModel) -> None:
-    """Matrices as sparse ones of float."""
-    built.M, built.K = (sp.csr_matrix(A, dtype=float) for A in (built.M, built.K))
-    built.C = None if built.C is None else sp.csr_matrix(built.C, dtype=float)
-    built.parts = {name: sp.csr_matrix(part, dtype=float) for name, part in built.parts.items()}
-    for contact in built.contacts.values():
-        contact.B = sp.csr_matrix(contact.B, dtype=float)

@@ -57,7 +57,7 @@ def _check_time_integration(report: Reporter, key: str, facts: Facts) -> None:
         report.wrong((key,), what, expected, "remove the analysis, or [preload]" if whole else f"write `{key} = 0`")
     if facts.model_known and facts.neighbours is not None:
         about(report, key, "integrates in time, which one sector cannot", "harmonic balance", "remove it")
-    named = next((c for c in facts.contacts if getattr(facts.laws.get(c.law), "memory", False)), None)
+    named = next((c for c in facts.contacts if getattr(facts.laws.get(str(c.law)), "memory", False)), None)
     if named is not None:
         report.wrong(
             (key,),

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from .contacts import ContactSpec
+    from ..model.contact import Contact
     from .facts import Facts
 
 NUMBER = 8  #: bytes
@@ -49,9 +49,9 @@ def harmonic_memory(harmonics: int, samples: int | None, copies: int, facts: Fac
     }
 
 
-def contact_columns(contacts: Sequence[ContactSpec]) -> int:
+def contact_columns(contacts: Sequence[Contact]) -> int:
     """Relative motions of all pairs."""
-    return sum(int(contact.rows.shape[0]) for contact in contacts)
+    return sum(contact.n_pairs * contact.components for contact in contacts)
 
 
 def size(count: float) -> str:

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from ..model.structure import Structure
 from ..texts import nearest
 from .checks_common import about
 from .reporter import Reporter
 from .schema import MistuningSection
 
 if TYPE_CHECKING:
+    from ..model.structure import Structure
     from .facts import Facts
     from .harmonic import HarmonicSection
-    from .sector import Neighbours
 
 
 def check_wave(report: Reporter, analysis: HarmonicSection, facts: Facts) -> None:
@@ -49,7 +50,7 @@ def check_needs_wheel(report: Reporter, analysis: HarmonicSection, key: str) -> 
         report.wrong((key,), "needs the whole wheel", "beside `wheel = true`", "add `wheel = true`, or remove the key")
 
 
-def _check_on_wheel(report: Reporter, analysis: HarmonicSection, neighbours: Neighbours, n_dof: int) -> None:
+def _check_on_wheel(report: Reporter, analysis: HarmonicSection, neighbours: Structure, n_dof: int) -> None:
     n = neighbours.sectors
     if analysis.sector is not None and analysis.sector >= n:
         report.wrong(("sector",), "does not exist", f"0 to {n - 1}", "write `sector = 0`, or leave the key out")
@@ -62,10 +63,10 @@ def _check_on_wheel(report: Reporter, analysis: HarmonicSection, neighbours: Nei
             report.wrong(("linear_mode",), "does not exist", expected, "write `linear_mode = 1`")
 
 
-def _check_mistuning(report: Reporter, mistuning: MistuningSection, neighbours: Neighbours) -> None:
+def _check_mistuning(report: Reporter, mistuning: MistuningSection, neighbours: Structure) -> None:
     if mistuning.of not in neighbours.parts:
         known = list(neighbours.parts)
-        fix = nearest(mistuning.of, known) or "name a part that the builder gives (BuiltModel.parts)"
+        fix = nearest(mistuning.of, known) or "name a part that the builder gives (Structure.parts)"
         report.wrong(("of",), "is no part of the stiffness", f"one of {', '.join(known)}", fix)
     given, drawn = mistuning.deviations, mistuning.standard_deviation
     if given is None and drawn is None:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import FretwaveError, InputError
-from ..model.structure import BuiltContact
+from ..model.pairs import Pairs
 from ..texts import nearest, toml
 from .schema import ContactSection
 from .toml.source import Source
@@ -38,7 +38,7 @@ def law_of(
     return None
 
 
-def fits(source: Source, number: int, law: Any, given: BuiltContact | None, found: list[FretwaveError]) -> bool:
+def fits(source: Source, number: int, law: Any, given: Pairs | None, found: list[FretwaveError]) -> bool:
     """Law and pairs have the same number of components."""
     here, wanted = given.components if given else 1, getattr(law, "components", 1)
     if here != wanted:
@@ -55,7 +55,7 @@ def parameters_of(
     number: int,
     section: ContactSection,
     law: Any,
-    given: BuiltContact | None,
+    given: Pairs | None,
     found: list[FretwaveError],
 ) -> dict[str, Any] | None:
     """Each parameter from the case, per area or as it is, else from the builder, else the law's default."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,8 +11,10 @@ import numpy.typing as npt
 import scipy.sparse
 
 from ..errors import FretwaveError, InputError
-from ..model.laws import LawInfo, Role, law_like, laws
-from ..model.structure import BuiltContact
+from ..model.contact import Contact
+from ..model.laws import law_like
+from ..model.pairs import Pairs
+from ..model.structure import Structure
 from ..texts import nearest, toml
 from .contact_parameters import fits, law_of, parameters_of
 from .schema import ContactSection
@@ -20,52 +22,17 @@ from .toml.source import Source
 from .toml.validation import at, missing_key, validate
 
 
-@dataclass
-class ContactSpec:
-    """A contact of the case, ready for ``fretwave.Contact``.
-
-    Attributes
-    ----------
-    rows : (components * n_pairs, n_dof) sparse
-        u = rows @ x, pair by pair.
-    parameters : dict
-        The law's parameters, a number or (n_pairs,) array each.
-    pairs : list of [dof] or [first, second]
-        As the case names them; empty when a builder made the rows.
-    components : int
-        Rows of a pair.
-    """
-
-    name: str
-    law: str
-    rows: Any
-    parameters: dict[str, Any]
-    pairs: list[list[str]]
-    components: int = 1
-
-    @property
-    def n_pairs(self) -> int:
-        """Number of pairs."""
-        return int(self.rows.shape[0]) // self.components
-
-    @property
-    def info(self) -> LawInfo:
-        """What is known of the law: its parameters with their roles, its normal direction."""
-        return laws()[self.law]
-
-    def value(self, role: Role) -> Any:
-        """Value of the parameter with a role; None where the law has none."""
-        return self.info.value(role, self.parameters)
+def on(contacts: Sequence[Contact], structure: Structure) -> list[Contact]:
+    """The contacts on the dofs of a structure that has their pairs."""
+    return [replace(contact, pairs=structure.pairs[contact.name]) for contact in contacts]
 
 
-def closed_contacts(contacts: Sequence[ContactSpec]) -> list[ContactSpec]:
+def closed_contacts(contacts: Sequence[Contact]) -> list[Contact]:
     """The same contacts with every pair closed at rest, whatever its load and gap."""
-    return [replace(c, parameters={**c.parameters, **c.info.closing()}) for c in contacts]
+    return [contact.closed() for contact in contacts]
 
 
-def wear_areas(
-    contacts: Sequence[ContactSpec], built: Mapping[str, BuiltContact]
-) -> dict[str, npt.NDArray[np.float64]]:
+def wear_areas(contacts: Sequence[Contact]) -> dict[str, npt.NDArray[np.float64]]:
     """Nodal areas (n_pairs,) [m^2] of the contacts that can wear: those whose law has a normal direction.
 
     Raises
@@ -77,13 +44,12 @@ def wear_areas(
     for contact in contacts:
         if not contact.info.wears:
             continue
-        given = built.get(contact.name)
-        if given is None or given.areas is None:
-            fix = "give the contact its areas (BuiltContact(areas=...))"
+        if contact.pairs.areas is None:
+            fix = "give the contact its areas (Pairs(areas=...))"
             raise InputError("the areas of the pairs are not known", f"contact '{contact.name}'", None, "areas", fix)
-        found[contact.name] = np.asarray(given.areas, dtype=float)
+        found[contact.name] = np.asarray(contact.pairs.areas, dtype=float)
     if not found:
-        given_laws = ", ".join(contact.law for contact in contacts) or "no contact"
+        given_laws = ", ".join(str(contact.law) for contact in contacts) or "no contact"
         fix = f'use law = "{law_like(lambda law: law.wears)}"'
         raise InputError("no contact can wear", None, given_laws, "a law with a normal direction", fix)
     return found
@@ -94,8 +60,8 @@ def read_contacts(
     dofs: Sequence[str] | None,
     laws: Mapping[str, Any],
     found: list[FretwaveError],
-    built: Mapping[str, BuiltContact] | None = None,
-) -> list[ContactSpec]:
+    built: Mapping[str, Pairs] | None = None,
+) -> list[Contact]:
     """All contacts of a case; what is wrong is appended to `found`. Without `dofs` pairs are not checked."""
     contacts = []
     for number in range(len(source.entries("contact"))):
@@ -106,28 +72,26 @@ def read_contacts(
         if section.pairs is None and given is None and dofs is None:
             continue  # a model that could not be read may have brought the pairs
         law = law_of(source, number, section, laws, found)
-        rows = _rows(source, number, section, dofs, built or {}, found)
+        pairs = _pairs(source, number, section, dofs, built or {}, found)
         parameters = parameters_of(source, number, section, law, given, found) if law else None
-        if law is None or parameters is None or rows is None:
+        if law is None or parameters is None or pairs is None:
             continue
         if fits(source, number, law, given, found):
-            pairs = [[pair] if isinstance(pair, str) else pair for pair in section.pairs or []]
-            components = given.components if given else 1
-            contacts.append(ContactSpec(section.name, section.law, rows, parameters, pairs, components))
+            contacts.append(Contact(section.law, pairs, parameters, section.name))
     return contacts
 
 
-def _rows(
+def _pairs(
     source: Source,
     number: int,
     section: ContactSection,
     dofs: Sequence[str] | None,
-    built: Mapping[str, BuiltContact],
+    built: Mapping[str, Pairs],
     found: list[FretwaveError],
-) -> Any:
-    """B of a contact: the builder's, or one row for each pair, +1 at the dof (second dof), -1 at the first of two."""
+) -> Pairs | None:
+    """The builder's, or one row for each pair, +1 at the dof (second dof), -1 at the first of two."""
     if section.pairs is None or section.name in built:
-        return _built_rows(source, number, section, built, found)
+        return _built_pairs(source, number, section, built, found)
     if dofs is None:
         return None
     before = len(found)
@@ -149,20 +113,20 @@ def _rows(
         for dof, sign in zip(reversed(ends), (1.0, -1.0)):
             if check_dof(source, path, dof, dofs, found):
                 rows[row, list(dofs).index(dof)] = sign
-    return rows.tocsr() if len(found) == before else None
+    return Pairs(rows.tocsr(), 1) if len(found) == before else None
 
 
-def _built_rows(
+def _built_pairs(
     source: Source,
     number: int,
     section: ContactSection,
-    built: Mapping[str, BuiltContact],
+    built: Mapping[str, Pairs],
     found: list[FretwaveError],
-) -> Any:
-    """B of a contact that comes with the model."""
+) -> Pairs | None:
+    """Pairs that come with the model."""
     path = ("contact", number)
     if section.name in built and section.pairs is None:
-        return built[section.name].B
+        return built[section.name]
     if section.pairs is not None:
         problem, fix = f"the model brings the pairs of '{section.name}'", "remove the key, or choose another name"
         found.append(InputError(problem, source.where((*path, "pairs")), fix=fix))

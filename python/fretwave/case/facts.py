@@ -10,9 +10,8 @@ from .schema import AerodynamicsSection, PreloadSection
 from .toml.source import Source
 
 if TYPE_CHECKING:
-    from ..model.structure import BuiltContact
-    from .contacts import ContactSpec
-    from .sector import Neighbours
+    from ..model.contact import Contact
+    from ..model.structure import Structure
 
 
 @dataclass(frozen=True)
@@ -31,14 +30,12 @@ class Facts:
         Dofs that an analysis may name: with a reduction those that it keeps.
     least_dofs : int
         Of the model that is solved, at least.
-    neighbours : Neighbours, optional
+    neighbours : Structure, optional
         Of a sector of a wheel.
     contacts, complete :
         Contacts without an error, and whether these are all.
     laws : mapping
         Known contact laws.
-    built : mapping
-        Contacts that came with the model.
     loads : sequence of str, optional
         Static loads of the model; None where it could not be read.
     preload, flow :
@@ -50,11 +47,10 @@ class Facts:
     dofs: Optional[Sequence[str]] = None
     named: Optional[Sequence[str]] = None
     least_dofs: int = 0
-    neighbours: Optional[Neighbours] = None
-    contacts: Sequence[ContactSpec] = ()
+    neighbours: Optional[Structure] = None
+    contacts: Sequence[Contact] = ()
     complete: bool = False
     laws: Mapping[str, Any] = field(default_factory=dict)
-    built: Mapping[str, BuiltContact] = field(default_factory=dict)
     loads: Optional[Sequence[str]] = None
     preload: Optional[PreloadSection] = None
     flow: Optional[AerodynamicsSection] = None

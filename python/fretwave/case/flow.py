@@ -23,13 +23,13 @@ if TYPE_CHECKING:
 def with_flow(case: Case, K: Any, C: Any, nodal_diameter: int) -> tuple[Any, Any]:
     """K and C of a sector in a wave, or of the wheel that a case was put on, with what the flow adds to them."""
     from ..cyclic.aerodynamics import period_of, with_terms
-    from ..cyclic.sector import around
+    from ..model.sectors import around
 
-    sector = case if case.wheel is None else case.wheel.sector
+    sector = case.sector or case
     assert sector.aerodynamics is not None and sector.neighbours is not None
     number = sector.neighbours.sectors
     period = period_of(nodal_diameter, number) if case.wheel is None else None
-    added = _flow(sector, sector.aerodynamics, number).terms(sector.neighbours.with_own("M", sector.M), period)
+    added = _flow(sector, sector.aerodynamics, number).terms(sector.structure.M, period)
     if case.wheel is not None:
         added = {letter: {0: around(with_terms(None, parts), number)} for letter, parts in added.items() if parts}
     return with_terms(K, added.get("K", {})), with_terms(C, added.get("C", {}))

@@ -13,31 +13,35 @@ import scipy.sparse.linalg
 
 from ..errors import FretwaveError, InputError
 from ..files.compressed import check_compressed
-from ..model.checks import NAMES, Matrix
+from ..model.checks import NAMES
+from ..model.sectors import Sparse
 from ..texts import display, is_there, nearest, shortened
 from .toml.source import Source
 
 
 def load(
     letter: str, given: Union[str, list[list[float]]], source: Source, found: list[FretwaveError]
-) -> Matrix | None:
-    """A matrix of ``[model]``, square with finite entries; None (and an entry in `found`) otherwise."""
-    where = source.where(("model", letter))
+) -> tuple[Sparse, str, str] | None:
+    """A matrix of ``[model]``, square with finite entries, with its place and its hash, "" for rows.
+
+    None (and an entry in `found`) when something is wrong.
+    """
+    where, digest = source.where(("model", letter)), ""
     try:
         if isinstance(given, str):
             path = source.path.parent / given
-            matrix = Matrix(letter, _read(path, letter, where), f"{where}, {display(path)}")
-            matrix.digest = "sha256:" + hashlib.sha256(path.read_bytes()).hexdigest()
+            values, place = _read(path, letter, where), f"{where}, {display(path)}"
+            digest = "sha256:" + hashlib.sha256(path.read_bytes()).hexdigest()
         else:
-            matrix = Matrix(letter, _from_rows(letter, given, source), where)
-        _check_square(matrix)
+            values, place = _from_rows(letter, given, source), where
+        _check_square(letter, values, place)
     except InputError as problem:
         found.append(problem)
         return None
-    return matrix
+    return values, place, digest
 
 
-def _from_rows(letter: str, rows: list[list[float]], source: Source) -> Any:
+def _from_rows(letter: str, rows: list[list[float]], source: Source) -> Sparse:
     lengths = [len(row) for row in rows]
     if len(set(lengths)) != 1 or not lengths[0]:
         odd = next((i for i, length in enumerate(lengths) if length != lengths[0]), 0)
@@ -51,7 +55,7 @@ def _from_rows(letter: str, rows: list[list[float]], source: Source) -> Any:
     return scipy.sparse.csr_matrix(np.array(rows, dtype=float))
 
 
-def _read(path: Path, letter: str, where: str) -> Any:
+def _read(path: Path, letter: str, where: str) -> Sparse:
     if not is_there(path):
         folder = path.parent
         names = sorted(entry.name for entry in folder.iterdir()) if is_there(folder) and folder.is_dir() else []
@@ -98,12 +102,12 @@ def _read_known(path: Path, letter: str) -> Any:
     return matrix
 
 
-def _check_square(matrix: Matrix) -> None:
-    rows, columns = matrix.values.shape
+def _check_square(letter: str, values: Sparse, where: str) -> None:
+    rows, columns = values.shape
     if rows != columns:
         raise InputError(
-            f"the {matrix.name} is not square",
-            where=matrix.where,
+            f"the {NAMES[letter]} is not square",
+            where=where,
             measured=f"{rows} x {columns}",
             expected="n x n",
             fix="give one row and one column for each dof",

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Tuple
 
 import scipy.sparse
 
 from ..errors import FretwaveError, InputError
 from ..model import checks
-from ..model.checks import Matrix
-from ..model.structure import BuiltModel
+from ..model.sectors import Sparse
+from ..model.structure import Structure
 from ..results import model_file
 from ..texts import display, toml
 from . import matrices
@@ -21,36 +20,11 @@ from .toml.source import Source
 from .toml.validation import missing_key
 
 Found = list[FretwaveError]
+#: A structure as it is given, where each of its matrices stands, and what identifies it, by address.
+Given = Tuple[Structure, Mapping[str, str], Mapping[str, Any]]
 
 
-@dataclass
-class Origin:
-    """A model as it is given, before any reduction.
-
-    Attributes
-    ----------
-    matrices : dict
-        M, K and maybe C.
-    dofs : list of str
-        Names of all dofs.
-    built : BuiltModel
-        Contacts and loads that came with the matrices; empty for inline matrices.
-    resolved : dict
-        What identifies the model, by address.
-    """
-
-    matrices: dict[str, Matrix]
-    dofs: list[str]
-    built: BuiltModel | None = None
-    resolved: dict[str, Any] = field(default_factory=dict)
-
-    @property
-    def named(self) -> Mapping[str, int]:
-        """Dofs that a builder gave a name."""
-        return self.built.dofs if self.built else {}
-
-
-def load_origin(section: ModelSection, source: Source, found: Found) -> Origin | None:
+def load_origin(section: ModelSection, source: Source, found: Found) -> Given | None:
     """The model of ``[model]``, from the one source that it names; None when something is wrong."""
     ways = {"builder": section.builder is not None, "file": section.file is not None}
     given = [way for way, is_given in ways.items() if is_given]
@@ -73,29 +47,23 @@ def load_origin(section: ModelSection, source: Source, found: Found) -> Origin |
     return readers.get(given[0] if given else "", _from_matrices)(section, source, found)
 
 
-def _from_builder(section: ModelSection, source: Source, found: Found) -> Origin | None:
+def _from_builder(section: ModelSection, source: Source, found: Found) -> Given | None:
     assert section.builder is not None
     built = run_builder(section.builder, section.options, source, found)
     if built is None:
         return None
     where = source.where(("model", "builder"))
-    loaded = {
-        name: Matrix(name, A, where) for name, A in (("M", built.M), ("K", built.K), ("C", built.C)) if A is not None
-    }
-    dofs = [str(number) for number in range(built.M.shape[0])]
-    for name, number in built.dofs.items():
-        dofs[number] = name
     resolved = {"model.builder": f"{section.builder} {builder_digest(section.builder, source)}"}
     resolved.update({f"model.options.{name}": value for name, value in section.options.items()})
-    return Origin(loaded, dofs, built, resolved)
+    return built, dict.fromkeys("MKC", where), resolved
 
 
-def _from_file(section: ModelSection, source: Source, found: Found) -> Origin | None:
+def _from_file(section: ModelSection, source: Source, found: Found) -> Given | None:
     assert section.file is not None
     where = source.where(("model", "file"))
     path = source.path.parent / section.file
     try:
-        model = model_file.read(path)
+        structure = model_file.read_model(path)
     except InputError as error:
         place = f"{where}, {error.where}"
         found.append(InputError(error.what, place, error.measured, error.expected, error.fix))
@@ -104,17 +72,14 @@ def _from_file(section: ModelSection, source: Source, found: Found) -> Origin | 
         problem = f"{display(path)}: {error.strerror}"
         found.append(InputError("the model file cannot be read", where, problem, "a file of `fretwave import`"))
         return None
-    loaded = {
-        letter: Matrix(letter, getattr(model, letter), f"{where}, {letter}")
-        for letter in ("M", "K", "C")
-        if getattr(model, letter) is not None
-    }
     resolved = {"model.file": f"{section.file} {model_file.digest(path)[:16]}"}
-    return Origin(loaded, model.names, model.built(), resolved)
+    return structure, {letter: f"{where}, {letter}" for letter in "MKC"}, resolved
 
 
-def _from_matrices(section: ModelSection, source: Source, found: Found) -> Origin | None:
-    loaded = {}
+def _from_matrices(section: ModelSection, source: Source, found: Found) -> Given | None:
+    loaded: dict[str, Sparse] = {}
+    places: dict[str, str] = {}
+    resolved: dict[str, Any] = {}
     for letter in ("M", "K", "C"):
         given = getattr(section, letter)
         if given is None:
@@ -123,15 +88,19 @@ def _from_matrices(section: ModelSection, source: Source, found: Found) -> Origi
             continue
         matrix = matrices.load(letter, given, source, found)
         if matrix is not None:
-            loaded[letter] = matrix
-    dofs = _dof_names(section, loaded, source, found)
+            loaded[letter], places[letter], digest = matrix
+            resolved[f"model.{letter}"] = digest or given
+    dofs = _dof_names(section, loaded, places, source, found)
     if dofs is None:
         return None
-    resolved = {f"model.{letter}": matrix.digest or getattr(section, letter) for letter, matrix in loaded.items()}
-    return Origin(loaded, dofs, resolved={"model.dofs": dofs, **resolved})
+    resolved = {key: value for key, value in resolved.items() if key.rpartition(".")[2] in loaded}
+    structure = Structure(loaded.get("M"), loaded.get("K"), loaded.get("C"), names=dofs)
+    return structure, places, {"model.dofs": dofs, **resolved}
 
 
-def _dof_names(section: ModelSection, loaded: dict[str, Matrix], source: Source, found: Found) -> list[str] | None:
+def _dof_names(
+    section: ModelSection, loaded: dict[str, Sparse], places: Mapping[str, str], source: Source, found: Found
+) -> list[str] | None:
     """Names of the dofs once names and matrices agree in number; None when they do not."""
     named = section.dofs
     if named is not None and len(set(named)) != len(named):
@@ -141,43 +110,46 @@ def _dof_names(section: ModelSection, loaded: dict[str, Matrix], source: Source,
         return None
     if named is None and "M" not in loaded:
         return None
-    size = len(named) if named is not None else loaded["M"].size
+    size = len(named) if named is not None else loaded["M"].shape[0]
     told = f"model.dofs names {size} dofs" if named is not None else f"the mass matrix is {size} x {size}"
-    wrong = [matrix for matrix in loaded.values() if matrix.size != size]
-    for matrix in wrong:
+    for letter in [letter for letter, A in loaded.items() if A.shape[0] != size]:
+        wrong = loaded.pop(letter).shape[0]
         found.append(
             InputError(
-                f"the {matrix.name} has the wrong size",
-                where=matrix.where,
-                measured=f"{matrix.size} x {matrix.size}",
+                f"the {checks.NAMES[letter]} has the wrong size",
+                where=places[letter],
+                measured=f"{wrong} x {wrong}",
                 expected=f"{size} x {size}: {told}",
                 fix="all matrices need one row and one column for each dof",
             )
         )
-        del loaded[matrix.letter]
     return named if named is not None else [str(number) for number in range(size)]
 
 
-def check_physics(origin: Origin, rows: Sequence[Any] | None, notes: list[str], found: Found) -> None:
+def check_physics(
+    structure: Structure, places: Mapping[str, str], rows: Sequence[Sparse] | None, notes: list[str], found: Found
+) -> None:
     """Symmetry, positive mass, and a structure that is held once the contact sticks.
 
     Parameters
     ----------
+    places : where each matrix stands
     rows : B of every contact; None when some are wrong, and what holds the structure is not known.
     """
-    loaded, dofs = origin.matrices, origin.dofs
-    bad = [problem for matrix in loaded.values() if (problem := checks.check_entries(matrix))]
+    dofs = structure.dof_names
+    loaded = {letter: A for letter in "MKC" if (A := structure.own(letter)) is not None}
+    bad = [problem for letter, A in loaded.items() if (problem := checks.check_entries(letter, A, places[letter]))]
     found.extend(bad)
     for letter in ("M", "K"):
-        matrix = loaded.get(letter)
-        if matrix is None or bad:
+        A = loaded.get(letter)
+        if A is None or bad:
             continue
-        problem = checks.check_symmetric(matrix, dofs)
+        problem = checks.check_symmetric(letter, A, places[letter], dofs)
         if problem is None and letter == "M":
-            problem = checks.check_mass(matrix, dofs)
+            problem = checks.check_mass(A, places[letter], dofs)
         elif problem is None and rows is not None:
             stacked = scipy.sparse.vstack(rows) if rows else scipy.sparse.csr_matrix((0, len(dofs)))
-            problem, note = checks.check_stiffness(matrix, dofs, stacked)
+            problem, note = checks.check_stiffness(A, places[letter], dofs, stacked)
             notes.extend([note] if note else [])
         if problem is not None:
             found.append(problem)

@@ -3,36 +3,37 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
-import scipy.sparse as sp
 
-from .contacts import ContactSpec, closed_contacts
-from .reduction_report import ReductionReport
-from .schema import ReductionSection
+from ..model.sectors import by_sector
+from ..model.structure import Structure
+from .contacts import on
+from .reduction_report import report_of
 
 if TYPE_CHECKING:
+    from mpi4py import MPI
+    from petsc4py import PETSc
+
+    from ..cyclic.reduction import SectorReduction
+    from ..hb.problems import NonlinearMode
+    from ..hb.reduction_error import NonlinearError
     from ..model.reduction import Reduction
     from .analysis import AnalysisSection
     from .load import Case
 
 
-def kept_dofs(
-    named: Mapping[str, int],
-    contacts: Sequence[ContactSpec],
-    analyses: Mapping[int, AnalysisSection],
-    dofs: Sequence[str],
-) -> list[int]:
+def kept_dofs(structure: Structure, analyses: Mapping[int, AnalysisSection]) -> list[int]:
     """Numbers of the dofs that a reduction keeps: of contacts, and those named by the model or an analysis."""
     asked = {name for analysis in analyses.values() for name in analysis.kept_dofs()}
-    numbers = {k for k, name in enumerate(dofs) if name in asked} | set(named.values())
-    return sorted(numbers.union(*(np.unique(contact.rows.indices).tolist() for contact in contacts)))
+    numbers = {k for k, name in enumerate(structure.dof_names) if name in asked}
+    return sorted(numbers.union(structure.kept.tolist()))
 
 
-def reduce_case(case: Case, comm: Any, modes: int | None = None) -> Case:
+def reduce_case(case: Case, comm: MPI.Comm, modes: int | None = None) -> Case:
     """The case on its reduced matrices, itself when it asks for no reduction. Collective.
 
     Parameters
@@ -40,94 +41,73 @@ def reduce_case(case: Case, comm: Any, modes: int | None = None) -> Case:
     modes : int, optional
         Component modes, in place of the case's.
     """
-    if case.reduction is None:
+    section = case.reduction
+    if section is None:
         return case
-    if case.neighbours is not None:
-        from .reduce_sector import reduce_sector_case
-
-        return reduce_sector_case(case, comm, modes)
     began = time.perf_counter()
-    with reduction_of(case, case.reduction, comm, modes) as reduction:
-        small = _on(case, reduction)
-        wall = time.perf_counter() - began
-    kept = case if case.reduction.error_at is not None else None
-    return replace(small, reduced=_report(case, small, reduction.component_hz, wall, comm), unreduced=kept)
+    with reduction_of(case, comm, modes) as reduction:
+        full = case.structure
+        small = full.reduced(reduction) if full.cut is None else full.cut.reduced(reduction).tied()
+        reduced = replace(case, structure=small, contacts=on(case.contacts, small))
+        report = report_of(case, reduced, reduction, time.perf_counter() - began, comm)
+    return replace(reduced, reduced=report, unreduced=full if section.error_at is not None else None)
 
 
-def nonlinear_error_at(case: Case, analysis: AnalysisSection, problem: Any, y: Any) -> Any:
+def nonlinear_error_at(case: Case, analysis: AnalysisSection, problem: NonlinearMode, y: PETSc.Vec) -> NonlinearError:
     """Estimate of what the unreduced model would change at a point of a mode; the reduction is made again. Collective.
 
-    Returns
-    -------
-    fretwave.NonlinearError
+    Of a sector in a wave as of a structure.
     """
+    from ..cyclic.reduction_error import sector_nonlinear_error
     from ..hb.reduction_error import nonlinear_error
-    from ..model.reduction import reduce
 
-    full = case.unreduced
-    assert full is not None and case.reduced is not None
-    if full.neighbours is not None:
-        from .reduce_sector import wave_error_at
-
-        return wave_error_at(case, analysis, problem, y)
+    assert case.unreduced is not None and case.reduced is not None
+    full = replace(case, structure=case.unreduced, contacts=on(case.contacts, case.unreduced))
     preload = full.preload_of(analysis)
-    loads = [full.loads[name] for name in preload.loads] if preload is not None else []
-    C = full.damping_with(analysis.dampers)
-    modes = case.reduced.component_modes
-    with reduce(full.M, full.K, C, keep=np.array(full.keep), comm=problem.model.comm, modes=modes) as reduction:
-        return nonlinear_error(reduction, problem, y, np.sum(loads, axis=0) if loads else None)
+    given = [full.loads[name] for name in preload.loads] if preload is not None else []
+    load = np.sum(given, axis=0) if given else None
+    damped = full.damped(analysis.dampers)
+    comm, modes = problem.model.comm, case.reduced.component_modes
+    if full.neighbours is not None:
+        terms = (by_sector(damped.K), by_sector(damped.C), by_sector(damped.M))
+        with cast("SectorReduction", reduction_of(full, comm, modes)) as sector:
+            return sector_nonlinear_error(sector, terms, problem, y, load)
+    with cast("Reduction", reduction_of(replace(full, structure=damped), comm, modes)) as reduction:
+        return nonlinear_error(reduction, problem, y, load)
 
 
-def reduction_of(case: Case, section: ReductionSection, comm: Any, modes: int | None = None) -> Reduction:
-    """The reduction that a section asks for; the same whenever and on whatever ranks it is made. Collective."""
+def reduction_of(case: Case, comm: MPI.Comm, modes: int | None = None) -> Reduction | SectorReduction:
+    """The reduction that a case asks for; the same whenever and on whatever ranks it is made. Collective.
+
+    Parameters
+    ----------
+    modes : int, optional
+        Component modes, in place of the case's.
+    """
+    from ..cyclic.reduction import reduce_sector
     from ..model.reduction import reduce
 
-    chosen = {"modes": section.modes, "highest_hz": section.up_to_hz} if modes is None else {"modes": modes}
-    return reduce(case.M, case.K, case.C, keep=np.array(case.keep), comm=comm, **chosen)
-
-
-def _on(case: Case, reduction: Reduction) -> Case:
-    """Matrices, contacts and loads in the reduced coordinates."""
-    component_modes = reduction.size - len(case.keep)
-    names = [case.dofs[k] for k in case.keep] + [f"component_{k + 1}" for k in range(component_modes)]
-    padding = sp.csr_matrix
-    contacts = [
-        replace(c, rows=sp.hstack([c.rows[:, case.keep], padding((c.rows.shape[0], component_modes))]).tocsr())
-        for c in case.contacts
-    ]
-    return replace(
-        case,
-        dofs=names,
-        M=sp.csr_matrix(reduction.M),
-        K=sp.csr_matrix(reduction.K),
-        C=None if reduction.C is None else sp.csr_matrix(reduction.C),
-        contacts=contacts,
-        loads={name: reduction.project(load) for name, load in case.loads.items()},
+    section, cut = case.reduction, case.structure.cut
+    assert section is not None
+    chosen: dict[str, Any] = (
+        {"modes": section.modes, "highest_hz": section.up_to_hz} if modes is None else {"modes": modes}
     )
-
-
-def _report(case: Case, small: Case, component_hz: Any, wall: float, comm: Any) -> ReductionReport:
-    began = time.perf_counter()
-    assert case.reduction is not None
-    count = min(case.reduction.compare, len(small.dofs))
-    full, reduced = ([], []) if not count else (_stuck_hz(which, count, comm) for which in (case, small))
-    return ReductionReport(
-        unreduced=len(case.dofs),
-        kept=len(case.keep),
-        component_modes=len(small.dofs) - len(case.keep),
-        highest_component_hz=float(component_hz[-1]) if len(component_hz) else 0.0,
-        full_hz=full,
-        reduced_hz=reduced,
-        relative=[r / f - 1 if f else 0.0 for f, r in zip(full, reduced)],
-        wall_s=round(wall, 3),
-        compare_wall_s=round(time.perf_counter() - began, 3),
+    if cut is None or cut.low is None or cut.high is None:
+        full = case.structure
+        return reduce(full.M, full.K, full.C, keep=np.array(case.keep), comm=comm, **chosen)
+    return reduce_sector(
+        cut.M,
+        cut.K,
+        cut.low,
+        cut.high,
+        cut.sectors,
+        cut.C,
+        contacts=on(case.contacts, cut),
+        keep=np.array(case.keep, dtype=np.intp),
+        axis=None if cut.expansion is not None else cut.axis,
+        interface_diameters=section.interface_diameters if section.interface == "modes" else None,
+        interface_waves=section.interface_waves,
+        interface_tolerance=section.interface_tolerance,
+        comm=comm,
+        **chosen,
     )
-
-
-def _stuck_hz(case: Case, count: int, comm: Any) -> list[float]:
-    from ..model.modes import linear_modes
-    from .build import build_model
-
-    plain = replace(case, C=None, damping=(0.0, 0.0), contacts=closed_contacts(case.contacts))
-    with build_model(plain, (), comm) as model:
-        return [float(mode.frequency_hz) for mode in linear_modes(model, count, "stuck")]

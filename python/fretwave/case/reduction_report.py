@@ -2,8 +2,25 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
-from typing import Any
+import time
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, replace
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+
+from .checks_tables import waves_of
+from .contacts import closed_contacts
+from .schema import ReductionSection
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
+
+    from ..cyclic.reduction import SectorReduction
+    from ..cyclic.waves import WaveError
+    from ..model.reduction import Reduction
+    from .analysis import AnalysisSection
+    from .load import Case
 
 
 @dataclass(frozen=True)
@@ -71,3 +88,77 @@ class ReductionReport:
                 f" {self.full_hz[-1]:.6g} Hz, are off by {self.relative[0]:.1e} (first) to {worst:.1e} (worst)"
             )
         return text
+
+
+def report_of(
+    case: Case, reduced: Case, reduction: Reduction | SectorReduction, wall: float, comm: MPI.Comm
+) -> ReductionReport:
+    """What was reduced, with the lowest frequencies before and after. Collective."""
+    began = time.perf_counter()
+    common: dict[str, Any] = {
+        "component_modes": len(reduction.component_hz),
+        "highest_component_hz": float(reduction.component_hz[-1]) if len(reduction.component_hz) else 0.0,
+        "wall_s": round(wall, 3),
+    }
+    if case.structure.cut is not None:
+        found = _of_sector(case, cast("SectorReduction", reduction))
+    else:
+        found = _of_structure(case, reduced, comm)
+    return ReductionReport(**common, **found, compare_wall_s=round(time.perf_counter() - began, 3))
+
+
+def _of_structure(case: Case, reduced: Case, comm: MPI.Comm) -> dict[str, Any]:
+    assert case.reduction is not None
+    count = min(case.reduction.compare, reduced.structure.n_dof)
+    full, small = ([], []) if not count else (_stuck_hz(which, count, comm) for which in (case, reduced))
+    return {
+        "unreduced": case.structure.n_dof,
+        "kept": len(case.keep),
+        "full_hz": full,
+        "reduced_hz": small,
+        "relative": [r / f - 1 if f else 0.0 for f, r in zip(full, small)],
+    }
+
+
+def _stuck_hz(case: Case, count: int, comm: MPI.Comm) -> list[float]:
+    """Lowest frequencies [Hz] without damping, every pair closed and stuck."""
+    from ..model.modes import linear_modes
+
+    plain = replace(case.structure, C=None, stiffness_damping=0.0, mass_damping=0.0)
+    with plain.model(closed_contacts(case.contacts), comm) as model:
+        return [float(mode.frequency_hz) for mode in linear_modes(model, count, "stuck")]
+
+
+def _of_sector(case: Case, reduction: SectorReduction) -> dict[str, Any]:
+    section = case.reduction
+    assert section is not None and case.structure.cut is not None
+    errors = reduction.error(_compared(section, case.analyses), section.compare) if section.compare else []
+    first = _wave(errors[0]) if errors else {"full_hz": [], "reduced_hz": [], "relative": []}
+    return {
+        "unreduced": case.structure.cut.n_dof,
+        "kept": int(reduction.low[0]),
+        **{key: first[key] for key in ("full_hz", "reduced_hz", "relative")},
+        "interface": reduction.n_interface,
+        "waves": [_wave(error) for error in errors],
+        "wave_lines": [error.line() for error in errors],
+    }
+
+
+def _compared(section: ReductionSection, analyses: Mapping[str, AnalysisSection]) -> list[int]:
+    """Nodal diameters whose error is stated: unless told, those of the analyses and of the interface modes."""
+    if section.compare_diameters is not None:
+        return section.compare_diameters
+    found = [abs(d) for d in waves_of(analyses.values())] + list(section.interface_diameters or ())
+    return list(dict.fromkeys(found)) or [0]
+
+
+def _wave(error: WaveError) -> dict[str, Any]:
+    """For run.json; rigid motions have no relative error (None)."""
+    return {
+        "nodal_diameter": error.nodal_diameter,
+        "contact": error.state,
+        "gave_interface_modes": error.gave_interface_modes,
+        "full_hz": error.full_hz.tolist(),
+        "reduced_hz": error.reduced_hz.tolist(),
+        "relative": [float(e) if np.isfinite(e) else None for e in error.relative],
+    }

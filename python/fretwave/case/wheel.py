@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Optional
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
-import scipy.sparse as sp
 
-from .contacts import ContactSpec
+from ..model.structure import WHOLE
 from .schema import MistuningSection
 
 if TYPE_CHECKING:
@@ -26,66 +25,19 @@ FIRST_RESTART = 100
 DIRECT_UNKNOWNS = 2000
 
 
-@dataclass(frozen=True)
-class Wheel:
-    """What a case on a wheel was made from.
-
-    Attributes
-    ----------
-    sector : Case
-        The tuned sector.
-    sectors : int
-        N.
-    deviations : (N,), optional
-        Relative stiffness deviations; None for a tuned wheel.
-    """
-
-    sector: Case
-    sectors: int
-    deviations: Optional[Array] = None
-
-    @property
-    def unit(self) -> int:
-        """Dofs of a sector."""
-        return len(self.sector.dofs)
-
-    def dof(self, name: str, sector: int) -> int:
-        """Index of a sector's dof in the wheel."""
-        return sector * self.unit + self.sector.dofs.index(name)
-
-    def by_sector(self, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
-        """Values (N n_dof, ...) of all dofs as (N, n_dof, ...)."""
-        return values.reshape(self.sectors, self.unit, *values.shape[1:])
-
-
 def on_wheel(case: Case, analysis: AnalysisSection) -> Case:
     """The case as an analysis takes it: the sector (or structure) itself, or with `wheel = true` all sectors.
 
     Dofs are numbered sector by sector and named `tip@0`, `tip@1`, ...; names in the case file are those of a sector.
     """
+    sector = case.neighbours
     section = analysis.harmonic()
-    if case.neighbours is None or section is None or not section.wheel:
+    if sector is None or section is None or not section.wheel:
         return case
-    from ..cyclic.sector import around
-
-    neighbours, n = case.neighbours, case.neighbours.sectors
-    C = neighbours.with_own("C", case.C) if case.C is not None else None
-    deviations = None if section.mistuning is None else deviations_of(section.mistuning, n)
-    K = around(neighbours.with_own("K", case.K), n)
-    if section.mistuning is not None and deviations is not None:
-        K = sp.csr_matrix(K + stiffness_change(neighbours, section.mistuning.of, deviations))
-    return replace(
-        case,
-        dofs=[f"{name}@{j}" for j in range(n) for name in case.dofs],
-        M=around(neighbours.with_own("M", case.M), n),
-        K=K,
-        C=None if C is None else around(C, n),
-        contacts=[_around(contact, neighbours.rows(contact), n) for contact in case.contacts],
-        loads={name: np.tile(load, n) for name, load in case.loads.items()},
-        built=None,
-        neighbours=None,
-        wheel=Wheel(case, n, deviations),
-    )
+    mistuning, n = section.mistuning, sector.sectors
+    deviations, of = (None, WHOLE) if mistuning is None else (deviations_of(mistuning, n), mistuning.of)
+    contacts = [contact.around(n) for contact in case.contacts]
+    return replace(case, structure=sector.around(deviations, of), contacts=contacts, sector=case)
 
 
 @contextmanager
@@ -102,7 +54,7 @@ def solver_room(case: Case, analysis: AnalysisSection, prefix: str) -> Iterator[
     wanted: dict[str, Any] = {}
     section = analysis.harmonic()
     if case.wheel is not None and case.wheel.deviations is not None and section is not None:
-        direct = len(case.dofs) * (2 * section.harmonics + 1) <= DIRECT_UNKNOWNS
+        direct = case.wheel.n_dof * (2 * section.harmonics + 1) <= DIRECT_UNKNOWNS
         room = FIRST_RESTART + 4 * case.wheel.sectors
         wanted = {"route": "direct"} if direct else {"ksp_gmres_restart": room, "ksp_max_it": 2 * room}
     added = [name for name in wanted if not database.hasName(name)]
@@ -124,25 +76,3 @@ def deviations_of(mistuning: MistuningSection, sectors: int) -> Array:
         return np.array(mistuning.deviations)
     drawn = np.random.Generator(np.random.PCG64(mistuning.seed)).standard_normal(sectors)
     return np.asarray(mistuning.standard_deviation * (drawn - drawn.mean()))
-
-
-def stiffness_change(neighbours: Any, of: str, deviations: Array) -> sp.csr_matrix:
-    """What deviations delta_j of a part of K add to the wheel's: sum_j delta_j T_j^T K_part T_j.
-
-    T_j gives the dofs of sector j, both faces among them, from those of the wheel: a part that reaches a face is
-    shared with the next sector.
-    """
-    from ..cyclic.sector import around
-
-    ties = around(neighbours.ties, neighbours.sectors)
-    return sp.csr_matrix(ties.T @ sp.kron(sp.diags(deviations), neighbours.parts[of]) @ ties)
-
-
-def _around(contact: ContactSpec, rows: Any, sectors: int) -> ContactSpec:
-    """The pairs of all sectors."""
-    from ..cyclic.sector import around
-
-    parameters = {
-        key: np.tile(value, sectors) if np.size(value) > 1 else value for key, value in contact.parameters.items()
-    }
-    return replace(contact, rows=around(rows, sectors), parameters=parameters, pairs=[])

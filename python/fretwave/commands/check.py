@@ -65,7 +65,7 @@ def _report(case: Case, described: dict[str, list[str]]) -> list[str]:
     return [line for line in lines if line]
 
 
-def _short(value: float | npt.NDArray[np.float64]) -> str:
-    if isinstance(value, float) or value.min() == value.max():
-        return f"{np.max(value):g}"
-    return f"{value.min():g} to {value.max():g}"
+def _short(value: npt.ArrayLike) -> str:
+    values = np.asarray(value, dtype=float)
+    low, high = values.min(), values.max()
+    return f"{high:g}" if low == high else f"{low:g} to {high:g}"

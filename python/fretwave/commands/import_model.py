@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -15,15 +15,16 @@ from ..importers.calculix import SUFFIXES, read_dofs
 from ..importers.entries import Assembled, assemble
 from ..importers.formats import read_matrix, readable, split
 from ..importers.nodes import Nodes, read_nodes
-from ..importers.pairs import Pairs, contact_map, match, read_pairs
+from ..importers.pairs import match, read_pairs
 from ..importers.report import check
+from ..model.pairs import Pairs
+from ..model.structure import Structure
 from ..mpi.guard import on_first_rank
-from ..results.model_file import ContactMap, FileModel, SourceFile, write
+from ..results.model_file import SourceFile, write_model
 from ..texts import display, nearest
 
 if TYPE_CHECKING:
     from mpi4py import MPI
-
 
 ROLES = {"M": "mass", "K": "stiffness", "C": "damping"}
 
@@ -32,14 +33,14 @@ def import_model(options: argparse.Namespace, comm: MPI.Comm) -> int:
     """Read, check, write, report. Collective; rank 0 reads and writes."""
     model, found = on_first_rank(comm, lambda: read_parts(options))
     report = check(model, found.symmetry, found.notes, options.modes, comm)
-    on_first_rank(comm, lambda: write(options.out, model))
+    on_first_rank(comm, lambda: write_model(options.out, model, options.units, _sources(options)))
     if comm.rank == 0:
         print(report.text())
         print(f"wrote {display(options.out)}")
     return EXIT_DONE
 
 
-def read_parts(options: argparse.Namespace) -> tuple[FileModel, Assembled]:
+def read_parts(options: argparse.Namespace) -> tuple[Structure, Assembled]:
     """The model that the options describe. One rank.
 
     Raises
@@ -57,18 +58,15 @@ def read_parts(options: argparse.Namespace) -> tuple[FileModel, Assembled]:
             nodes = read_nodes(options.coordinates)
     labels = _labels(options, found, nodes)
     found.labels = labels
-    model = FileModel(
-        found.matrices["M"], found.matrices["K"], found.matrices.get("C"), found.names, units=options.units
+    names, dofs = _names(found.names, options.name)
+    model = Structure(
+        found.matrices["M"], found.matrices["K"], found.matrices.get("C"), dofs=dofs, names=names, labels=labels
     )
-    if labels is not None:
-        model.node, model.direction = labels[:, 0], labels[:, 1]
     if nodes is not None:
         model.node_numbers, model.coordinates = nodes.numbers, nodes.coordinates
         if nodes.hexahedra is not None:
             model.hexahedra = nodes.places(nodes.hexahedra.ravel()).reshape(nodes.hexahedra.shape)
-    _name_dofs(model, options.name)
-    model.contacts = {contact.name: contact for contact in _contacts(options, labels, nodes)}
-    model.sources = _sources(options)
+    model.pairs = dict(_pairs(options, labels, nodes))
     return model, found
 
 
@@ -83,7 +81,7 @@ def _sources(options: argparse.Namespace) -> list[SourceFile]:
     return [SourceFile.of(role, path) for role, path in files]
 
 
-def _check_place(out: Path, inputs: Iterable[Any]) -> None:
+def _check_place(out: Path, inputs: Iterable[str | None]) -> None:
     if any(path and Path(path).exists() and out.exists() and out.samefile(path) for path in inputs):
         fix = "choose another name"
         raise InputError("the model file would replace one of the matrices", display(out), None, "a new file", fix)
@@ -141,28 +139,29 @@ def _read_table(path: Path) -> npt.NDArray[np.int64]:
     return columns_of(path, 2).astype(np.int64)
 
 
-def _name_dofs(model: FileModel, given: list[str]) -> None:
-    """``--name tip=17y``: a dof's own name, and it is kept by a reduction."""
-    kept = []
+def _names(known: Sequence[str], given: list[str]) -> tuple[list[str], dict[str, int]]:
+    """``--name tip=17y``: a dof's own name, and it is kept by a reduction. All names, and those given by number."""
+    names, kept = list(known), []
     for text in given:
         name, _, old = text.partition("=")
-        old = old if old in model.names or f"n{old}" not in model.names else f"n{old}"
-        if not name.isidentifier() or old not in model.names or (name in model.names and name != old):
+        old = old if old in names or f"n{old}" not in names else f"n{old}"
+        if not name.isidentifier() or old not in names or (name in names and name != old):
             raise InputError(
                 "a dof cannot be named so",
                 f"--name {text}",
                 None,
-                "NAME=DOF, a new name of letters and digits and a dof such as " + model.names[0],
-                nearest(old, model.names) or "check the node and its direction",
+                "NAME=DOF, a new name of letters and digits and a dof such as " + names[0],
+                nearest(old, names) or "check the node and its direction",
             )
-        kept.append(model.names.index(old))
-        model.names[kept[-1]] = name
-    model.kept = np.array(kept, dtype=np.int64) if kept else None
+        kept.append(names.index(old))
+        names[kept[-1]] = name
+    return names, {names[dof]: dof for dof in kept}
 
 
-def _contacts(
+def _pairs(
     options: argparse.Namespace, labels: npt.NDArray[np.int64] | None, nodes: Nodes | None
-) -> Iterable[ContactMap]:
+) -> Iterator[tuple[str, Pairs]]:
+    """Contact pairs by name."""
     seen: set[str] = set()
     for number, words in enumerate(options.pairs):
         name, equals, first = words[0].partition("=")
@@ -175,20 +174,19 @@ def _contacts(
             fix = "give --dofs FILE or --coordinates FILE"
             raise InputError("the pairs name nodes, the matrices do not", where, None, "a table of dofs", fix)
         seen.add(name)
-        yield contact_map(name, _pairs(first, words[1:], options, nodes, where), labels, nodes, _axis(options.tangent))
+        tangent = _axis(options.tangent)
+        if len(words) == 1:
+            with readable(Path(first), "file of the pairs"):
+                found = read_pairs(name, Path(first), labels, nodes, tangent)
+        elif nodes is None:
+            fix = "give --coordinates FILE with the sets, or a CSV of pairs"
+            raise InputError("the node sets are not known", where, None, "nodes with sets", fix)
+        else:
+            found = match(name, nodes, first, words[1], _axis(options.normal), labels, options.tolerance, tangent)
+        yield name, found
 
 
-def _pairs(first: str, second: list[str], options: argparse.Namespace, nodes: Nodes | None, where: str) -> Pairs:
-    if not second:
-        with readable(Path(first), "file of the pairs"):
-            return read_pairs(Path(first))
-    if nodes is None:
-        fix = "give --coordinates FILE with the sets, or a CSV of pairs"
-        raise InputError("the node sets are not known", where, None, "nodes with sets", fix)
-    return match(nodes, first, second[0], _axis(options.normal), options.tolerance)
-
-
-def _axis(text: str | None) -> Any:
+def _axis(text: str | None) -> npt.NDArray[np.float64] | None:
     if text is None:
         return None
     try:

@@ -35,7 +35,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..errors import InputError
-from ..model.model import by_sector
+from ..model.sectors import by_sector
 from .engine_order import folded
 
 Term = dict[int, sp.csr_matrix]

@@ -7,6 +7,7 @@ import numpy.typing as npt
 from scipy.spatial import cKDTree
 
 from ..errors import InputError
+from ..model.sectors import rotation
 
 Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.intp]
@@ -14,18 +15,6 @@ Indices = npt.NDArray[np.intp]
 #: Distance of matching nodes, as a share of the face's extent.
 TOLERANCE = 1e-6
 SHOWN = 5
-
-
-def rotation(angle: float, axis: str = "z") -> Array:
-    """Rotation (3, 3) by `angle` [rad] about a Cartesian axis, positive by the right-hand rule."""
-    if axis not in ("x", "y", "z"):
-        raise InputError("unknown axis of rotation", None, axis, "x, y or z", 'use axis="z"')
-    i, c, s = "xyz".index(axis), np.cos(angle), np.sin(angle)
-    turn = np.zeros((3, 3))
-    turn[i, i] = 1.0
-    j, k = (i + 1) % 3, (i + 2) % 3
-    turn[[j, j, k, k], [j, k, j, k]] = [c, -s, s, c]
-    return turn
 
 
 def match_faces(

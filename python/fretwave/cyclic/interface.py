@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
 
-from ..model.model import Contact, by_sector
-from .faces import rotation
+from ..model.contact import Contact
+from ..model.sectors import by_sector, rotation
 
 Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.intp]

@@ -24,8 +24,9 @@ import scipy.sparse as sp
 from mpi4py import MPI
 
 from ..errors import InputError
-from ..model.model import Contact, by_sector
-from ..model.reduction import RIGID_SHARE, Reduction, reduce
+from ..model.contact import Contact
+from ..model.reduction import RIGID_SHARE, Reduction, check_all_kept, reduce
+from ..model.sectors import Given, by_sector
 from .interface import Interface
 from .sector import Sector
 from .waves import STATES, SectorWaves, WaveError
@@ -84,6 +85,34 @@ class SectorReduction:
         """Coordinates of one face."""
         return len(self.low)
 
+    def rows(self, B: Given) -> sp.csr_matrix:
+        """B (n, n_r) on the reduced coordinates of rows (n, n_dof) that reach kept dofs alone.
+
+        Raises
+        ------
+        InputError
+            They reach another dof.
+        """
+        moved = (sp.csr_matrix(B, dtype=float) @ self._P).tocsc()
+        kept = moved[:, self._inner.keep]
+        check_all_kept(moved, kept)
+        return sp.csr_matrix(sp.hstack([kept, sp.csr_matrix((kept.shape[0], len(self.component_hz)))]))
+
+    def names(self, dofs: Sequence[str]) -> list[str]:
+        """Names of the reduced coordinates: kept dofs keep theirs."""
+        names = [""] * self.size
+        for k in range(self.n_interface):
+            names[self.low[k]], names[self.high[k]] = f"interface_{k + 1}", f"next_interface_{k + 1}"
+        modes = len(self.component_hz)
+        names[self.size - modes :] = [f"component_{k + 1}" for k in range(modes)]
+        for dof, place in self.places.items():
+            names[place] = dofs[dof]
+        return names
+
+    def faces(self) -> dict[str, Any]:
+        """The faces of the reduced structure."""
+        return {"low": self.low, "high": self.high}
+
     def sector(self) -> Sector:
         """The reduced sector, its faces tied; its `expand` gives the coordinates with both faces."""
         M, K, C = (None if A is None else sp.csr_matrix(A) for A in (self.M, self.K, self.C))
@@ -126,13 +155,8 @@ class SectorReduction:
 
     def _on(self, contact: Contact) -> Contact:
         """The contact on reduced coordinates, which contain all that it touches."""
-        keep, more = self._inner.keep, len(self.component_hz)
-
-        def rows(B: Any) -> sp.csr_matrix:
-            moved = (sp.csr_matrix(B, dtype=float) @ self._P).tocsc()[:, keep]
-            return sp.csr_matrix(sp.hstack([moved, sp.csr_matrix((moved.shape[0], more))]))
-
-        return replace(contact, B={k: rows(B) for k, B in by_sector(contact.B).items()})
+        rows = {k: self.rows(B) for k, B in by_sector(contact.B).items()}
+        return replace(contact, pairs=replace(contact.pairs, B=rows))
 
     def _compared(self) -> list[int]:
         """Nodal diameters that gave interface modes, and the one farthest from all of them."""
@@ -148,12 +172,12 @@ class SectorReduction:
 
 
 def reduce_sector(
-    M: Any,
-    K: Any,
+    M: Given,
+    K: Given,
     low: npt.ArrayLike,
     high: npt.ArrayLike,
     sectors: int,
-    C: Any = None,
+    C: Given | None = None,
     contacts: Sequence[Contact] = (),
     keep: npt.ArrayLike = (),
     axis: str | None = None,
@@ -162,7 +186,7 @@ def reduce_sector(
     interface_tolerance: float = INTERFACE_TOLERANCE,
     modes: int | None = None,
     highest_hz: float | None = None,
-    comm: Any = None,
+    comm: MPI.Comm | None = None,
 ) -> SectorReduction:
     """Reduce a sector cut out of a wheel. Collective.
 

@@ -9,6 +9,7 @@ modes. With w_n = -Z_ii(s_n)^-1 r_n on them, J_r dy = -S^H Z w (`fretwave.hb.red
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,7 @@ from .reduction import SectorReduction
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
-Terms = dict[int, Any]
+Terms = Mapping[int, Any]
 
 
 def sector_nonlinear_error(

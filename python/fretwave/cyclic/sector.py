@@ -20,21 +20,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
 
 from ..errors import InputError
-from ..model.model import Contact, Model, by_sector
+from ..model.contact import Contact
+from ..model.model import Model
 from ..model.modes import LinearMode
+from ..model.sectors import Given, Parts, Term, by_sector, check_balanced, check_number
+from ..model.structure import Structure
 from .aerodynamics import Aerodynamics, period_of, with_terms
-from .faces import rotation
 
-Array = npt.NDArray[np.float64]
-Indices = npt.NDArray[np.intp]
-Parts = Mapping[int, Any]
+if TYPE_CHECKING:
+    from mpi4py import MPI
 
 
 @dataclass(frozen=True)
@@ -56,19 +57,18 @@ class Sector:
         Forces of the flow between the blades; they alone need not be balanced.
     """
 
-    M: Any
-    K: Any
+    M: Term
+    K: Term
     sectors: int
-    C: Any = None
+    C: Term | None = None
     contacts: Sequence[Contact] = ()
     ties: Parts = field(default_factory=dict)
     aerodynamics: Aerodynamics | None = None
 
     def __post_init__(self) -> None:
-        if self.sectors < 2:
-            raise InputError("a wheel has two sectors or more", None, self.sectors, ">= 2", "give their number")
+        check_number(self.sectors)
         for name in ("K", "M", "C"):
-            check_balanced({k: sp.csr_matrix(A) for k, A in by_sector(getattr(self, name)).items()}, name)
+            check_balanced(getattr(self, name), name)
 
     def __repr__(self) -> str:
         flow = ", with aerodynamics" if self.aerodynamics else ""
@@ -83,12 +83,12 @@ class Sector:
     @classmethod
     def from_faces(
         cls,
-        M: Any,
-        K: Any,
+        M: Given,
+        K: Given,
         low: npt.ArrayLike,
         high: npt.ArrayLike,
         sectors: int,
-        C: Any = None,
+        C: Given | None = None,
         contacts: Sequence[Contact] = (),
         axis: str | None = None,
     ) -> Sector:
@@ -109,19 +109,30 @@ class Sector:
             face moves like the low one turned by 2 pi / N. Without it dofs correspond as they are (scalars, or
             components that are radial, circumferential and axial already).
         """
-        low, high, n = _indices("low", low), _indices("high", high), sp.csr_matrix(K).shape[0]
-        _check_faces(low, high, n, axis is not None)
-        ties = _ties(low, high, n, rotation(2 * np.pi / sectors, axis) if axis else np.eye(1))
-        tied = [replace(c, B=combine({0: sp.identity(_row_count(c))}, by_sector(c.B), ties, +1)) for c in contacts]
-        terms = [None if A is None else combine(ties, {0: sp.csr_matrix(A, dtype=float)}, ties, -1) for A in (M, K, C)]
-        return cls(terms[0], terms[1], sectors, terms[2], tied, ties)
+        cut = Structure(M, K, C, sectors=sectors, low=np.asarray(low), high=np.asarray(high), axis=axis)
+        tied = cut.tied()
+        return cls.of(tied, [replace(contact, pairs=contact.pairs.tied(tied.ties)) for contact in contacts])
 
-    def model(self, nodal_diameter: int, comm: Any = None) -> Model:
+    @classmethod
+    def of(
+        cls, structure: Structure, contacts: Sequence[Contact] = (), aerodynamics: Aerodynamics | None = None
+    ) -> Sector:
+        """Of a structure that is a tied sector (`fretwave.Structure.tied`), with contacts on its dofs."""
+        M, K, C = structure.M, structure.K, structure.damped().C
+        return cls(M, K, structure.sectors, C, contacts, structure.ties, aerodynamics)
+
+    @property
+    def structure(self) -> Structure:
+        """Its terms with those of the flow, and the ties."""
+        terms = self._terms()
+        return Structure(terms["M"], terms["K"], terms["C"], sectors=self.sectors, ties=self.ties)
+
+    def model(self, nodal_diameter: int, comm: MPI.Comm | None = None) -> Model:
         """The equations of one sector in a wave of this many nodal diameters (negative: backward). Collective."""
         terms = self._terms(period_of(nodal_diameter, self.sectors))
         return Model(terms["M"], terms["K"], terms["C"], self.contacts, comm, self.sectors, nodal_diameter)
 
-    def wheel(self, comm: Any = None, changes: Mapping[str, Sequence[Any]] | None = None) -> Model:
+    def wheel(self, comm: MPI.Comm | None = None, changes: Mapping[str, Sequence[Any]] | None = None) -> Model:
         """The whole wheel, sector after sector, N n_dof dofs; ranks take whole sectors. Collective.
 
         Parameters
@@ -129,15 +140,14 @@ class Sector:
         changes : {"K": N matrices (n_dof, n_dof), ...}, optional
             Added to a term of each sector in turn: a mistuned wheel.
         """
-        around = {letter: self._around(A) for letter, A in self._terms().items() if A is not None}
         for letter, own in (changes or {}).items():
             _check_changes(letter, own, self.sectors, self.n_dof)
-            added = sp.csr_matrix(sp.block_diag([sp.csr_matrix(A) for A in own]))
-            around[letter] = around[letter] + added if letter in around else added
-        contacts = [
-            replace(contact, B=self._around(contact.B), parameters=self._repeated(contact)) for contact in self.contacts
-        ]
-        return Model(around["M"], around["K"], around.get("C"), contacts, comm, unit=self.n_dof)
+        added = {
+            letter: sp.csr_matrix(sp.block_diag([sp.csr_matrix(A) for A in own]))
+            for letter, own in (changes or {}).items()
+        }
+        around = [contact.around(self.sectors) for contact in self.contacts]
+        return self.structure.around(added=added).model(around, comm)
 
     def _terms(self, period: int | None = None) -> dict[str, Any]:
         """M, K and C with what the flow adds."""
@@ -160,12 +170,6 @@ class Sector:
         theta = 2 * np.pi * order * nodal_diameter / self.sectors
         return np.asarray(sum(np.exp(-1j * k * theta) * (T @ np.asarray(q)) for k, T in self.ties.items()))
 
-    def _around(self, given: Any) -> sp.csr_matrix:
-        return around(given, self.sectors)
-
-    def _repeated(self, contact: Contact) -> dict[str, Any]:
-        return {k: np.tile(v, self.sectors) if np.size(v) > 1 else v for k, v in contact.parameters.items()}
-
 
 def wave(q: npt.ArrayLike, index: int, sectors: int) -> npt.NDArray[np.complex128]:
     """Complex amplitudes (N, n_dof) in all sectors of a wave with this spatial index, from those of sector 0."""
@@ -179,50 +183,6 @@ def wave_mode(mode: LinearMode, nodal_diameter: int, sectors: int) -> LinearMode
     return LinearMode(mode.omega, mode.beta, phi.real.copy(), phi.imag.copy())
 
 
-def around(given: Any, sectors: int) -> sp.csr_matrix:
-    """Block-circulant matrix of the wheel, from the own part of a sector and those on the sectors k places ahead."""
-    ahead = sp.csr_matrix(np.roll(np.eye(sectors), 1, axis=1))  # row j has its 1 in column j + 1
-    behind = sp.csr_matrix(ahead.T)
-    parts = by_sector(given).items()
-    return sp.csr_matrix(sum(sp.kron((ahead if k > 0 else behind) ** abs(k), sp.csr_matrix(A)) for k, A in parts))
-
-
-def combine(left: Parts, middle: Parts, right: Parts, sign: int) -> dict[int, sp.csr_matrix]:
-    """Sum of left_a^T middle_b right_c by the sector c + b + sign a it acts on."""
-    out: dict[int, sp.csr_matrix] = {}
-    for a, L in left.items():
-        for b, A in middle.items():
-            for c, R in right.items():
-                part = sp.csr_matrix(L.T @ sp.csr_matrix(A) @ R)
-                k = c + b + sign * a
-                if part.nnz or k == 0:
-                    out[k] = out[k] + part if k in out else part
-    return out
-
-
-def check_balanced(parts: Parts, name: str) -> None:
-    """Action and reaction: what the next sector does to this one, this one does to the next (K_-k = K_k^T).
-
-    C may have an unsymmetric (gyroscopic) part, but no one-sided coupling.
-    """
-    for k, A in parts.items():
-        other = parts.get(-k)
-        wrong = other is None or (name != "C" and abs(A - other.T).max() > 1e-9 * max(abs(A).max(), abs(other).max()))
-        if wrong:
-            raise InputError(
-                f"the coupling of {name} between sectors is one-sided",
-                f"{name}[{k}]",
-                "no counterpart" if other is None else f"{name}[{k}] - {name}[{-k}].T is not zero",
-                f"{name}[{-k}] = {name}[{k}].T",
-                f"give {{0: {name}_0, {k}: {name}_k, {-k}: {name}_k.T}}",
-            )
-
-
-def _row_count(contact: Contact) -> int:
-    """Rows of a contact's B."""
-    return int(np.shape(by_sector(contact.B)[0])[0])
-
-
 def _check_changes(letter: str, own: Sequence[Any], sectors: int, n_dof: int) -> None:
     shapes = {np.shape(A) for A in own}
     if letter not in "MKC" or len(own) != sectors or shapes != {(n_dof, n_dof)}:
@@ -233,41 +193,3 @@ def _check_changes(letter: str, own: Sequence[Any], sectors: int, n_dof: int) ->
             f"M, K or C: {sectors} matrices of ({n_dof}, {n_dof})",
             "give one matrix for each sector",
         )
-
-
-def _indices(name: str, dofs: npt.ArrayLike) -> Indices:
-    given = np.asarray(dofs).ravel()
-    if not np.issubdtype(given.dtype, np.integer):
-        raise InputError(
-            f"dofs of the {name} face are not whole numbers", None, given.dtype, "integers", "give dof numbers"
-        )
-    return given.astype(np.intp)
-
-
-def _check_faces(low: Indices, high: Indices, n: int, triples: bool) -> None:
-    """Matching lists of different dofs of the sector."""
-    both = np.concatenate([low, high])
-    values, counts = np.unique(both, return_counts=True)
-    problem = None
-    if len(low) != len(high):
-        problem = (f"{len(low)} low and {len(high)} high dofs", "as many on both")
-    elif len(both) and (both.min() < 0 or both.max() >= n):
-        problem = (f"dof {both.min() if both.min() < 0 else both.max()}", f"0 .. {n - 1}")
-    elif counts.max(initial=0) > 1:
-        problem = (f"dof {values[np.argmax(counts)]} stands {counts.max()} times", "each dof once, on one face")
-    elif triples and len(low) % 3:
-        problem = (f"{len(low)} dofs a face", "three Cartesian components a node")
-    if problem:
-        raise InputError("the faces of the sector do not match", None, *problem, "give matching dofs of both faces")
-
-
-def _ties(low: Indices, high: Indices, n: int, turn: Array) -> dict[int, sp.csr_matrix]:
-    """x_full = ties[0] x_j + ties[1] x_{j+1}: the high face is the next sector's low face, turned."""
-    kept = np.setdiff1d(np.arange(n), high)
-    place = np.full(n, -1, dtype=np.intp)
-    place[kept] = np.arange(len(kept))
-    own = sp.csr_matrix((np.ones(len(kept)), (kept, place[kept])), (n, len(kept)))
-    face = sp.csr_matrix(sp.kron(sp.identity(len(low) // len(turn)), turn))
-    pick = sp.csr_matrix((np.ones(len(high)), (high, np.arange(len(high)))), (n, len(high)))
-    take = sp.csr_matrix((np.ones(len(low)), (np.arange(len(low)), place[low])), (len(low), len(kept)))
-    return {0: own, 1: sp.csr_matrix(pick @ face @ take)}

@@ -11,9 +11,10 @@ import numpy.typing as npt
 import scipy.sparse as sp
 from mpi4py import MPI
 
+from ..model.contact import Contact
 from ..model.laws import PythonLaw, Role, springs
-from ..model.model import Contact, by_sector
 from ..model.modes import linear_modes
+from ..model.sectors import by_sector
 from .sector import Sector
 
 Array = npt.NDArray[np.float64]

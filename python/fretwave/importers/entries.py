@@ -12,7 +12,7 @@ import scipy.sparse as sp
 
 from ..errors import InputError
 from ..files.compressed import check_compressed
-from ..model.checks import Matrix, check_symmetric
+from ..model.checks import check_symmetric
 from ..results.model_file import dof_name
 
 Array = npt.NDArray[np.float64]
@@ -236,7 +236,7 @@ def _both_triangles(
             return A, "diagonal"
         one = "lower" if counts["lower"] else "upper"
         return _mirror(A), f"{one} triangle, mirrored"
-    problem = check_symmetric(Matrix(letter, A, entries.where), names)
+    problem = check_symmetric(letter, A, entries.where, names)
     if problem is None:
         return A, entries.mirrored or f"full, symmetric {_asymmetry(A)}"
     if min(counts.values()) < STRAY_SHARE * max(counts.values()):

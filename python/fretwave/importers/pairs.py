@@ -6,7 +6,6 @@ from the first body to the second: u_n > 0 closes the contact. A direction that 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +15,7 @@ from scipy.spatial import cKDTree
 
 from ..errors import InputError
 from ..fe.interface import tangent_frames
-from ..results.model_file import ContactMap
+from ..model.pairs import Pairs
 from ..texts import display
 from .nodes import Nodes
 from .text import first_data_line
@@ -32,30 +31,27 @@ GROUND = "GROUND"
 SHOWN = 8
 
 
-@dataclass
-class Pairs:
-    """Nodes that touch.
-
-    Attributes
-    ----------
-    nodes : (n_pairs, 2)
-        First and second node, 0 for ground.
-    normals : (n_pairs, 3)
-        From the first body to the second, of any length.
-    areas : (n_pairs,) or None
-    """
-
-    nodes: IntArray
-    normals: Array
-    where: str
-    areas: Array | None = None
-
-
-def match(nodes: Nodes, first: str, second: str, normal: Array | None, tolerance: float | None = None) -> Pairs:
+def match(
+    name: str,
+    nodes: Nodes,
+    first: str,
+    second: str,
+    normal: Array | None,
+    labels: IntArray,
+    tolerance: float | None = None,
+    tangent: Array | None = None,
+) -> Pairs:
     """Pairs of coincident nodes of two sets, or of one set with ``GROUND``.
 
     Parameters
     ----------
+    name : of the contact
+    normal : (3,)
+        From the first body to the second.
+    labels : (n_dof, 2)
+        Node and direction of each dof.
+    tangent : (3,), optional
+        The first tangent is this direction made orthogonal to the normal; default: the axis most across it.
     tolerance : float, optional
         Largest distance of two nodes of a pair; default 1e-6 of the mesh's diagonal.
 
@@ -70,7 +66,8 @@ def match(nodes: Nodes, first: str, second: str, normal: Array | None, tolerance
         raise InputError("the pairs have no normal", where, None, "a direction", fix)
     if second.upper() == GROUND and GROUND not in nodes.sets:
         a = nodes.node_set(first)
-        return Pairs(np.column_stack([a, np.zeros_like(a)]), np.broadcast_to(normal, (len(a), 3)), where)
+        grounded = np.column_stack([a, np.zeros_like(a)])
+        return _joined(name, grounded, np.broadcast_to(normal, (len(a), 3)), None, where, labels, nodes, tangent)
     a, b = nodes.node_set(first), nodes.node_set(second)
     both = np.intersect1d(a, b)
     if len(both):
@@ -92,11 +89,20 @@ def match(nodes: Nodes, first: str, second: str, normal: Array | None, tolerance
             f"one node of the other set within {reach:.3g}",
             "mesh both sides alike, widen --tolerance, or give a CSV of pairs",
         )
-    return Pairs(np.column_stack([a, b[partner]]), np.broadcast_to(normal, (len(a), 3)), where)
+    both = np.column_stack([a, b[partner]])
+    return _joined(name, both, np.broadcast_to(normal, (len(a), 3)), None, where, labels, nodes, tangent)
 
 
-def read_pairs(path: Path) -> Pairs:
-    """A CSV of ``node_a, node_b, nx, ny, nz, area``; node_b empty or 0 is ground, the area may be left out."""
+def read_pairs(
+    name: str, path: Path, labels: IntArray, nodes: Nodes | None = None, tangent: Array | None = None
+) -> Pairs:
+    """A CSV of ``node_a, node_b, nx, ny, nz, area``; node_b empty or 0 is ground, the area may be left out.
+
+    Parameters
+    ----------
+    name, labels, tangent
+        As `match`, the default tangent being the axis most across all normals.
+    """
     where = display(path)
     if not path.is_file():
         raise InputError("the file of pairs does not exist", where, fix="check the path; two names are two node sets")
@@ -114,39 +120,38 @@ def read_pairs(path: Path) -> Pairs:
             raise InputError("this is no pair", f"{where}:{number}", line, expected, "correct the line") from None
     table = np.array(rows, dtype=float).reshape(-1, 6)
     areas = None if np.isnan(table[:, 5]).any() else table[:, 5]
-    return Pairs(table[:, :2].astype(np.int64), table[:, 2:5], where, areas)
+    return _joined(name, table[:, :2].astype(np.int64), table[:, 2:5], areas, where, labels, nodes, tangent)
 
 
-def contact_map(
-    name: str, pairs: Pairs, labels: IntArray, nodes: Nodes | None = None, tangent: Array | None = None
-) -> ContactMap:
-    """B and the geometry of pairs.
-
-    Parameters
-    ----------
-    labels : (n_dof, 2)
-        Node and direction of each dof.
-    tangent : (3,), optional
-        The first tangent is this direction made orthogonal to the normal; default: the axis most across all normals.
-    """
-    n = len(pairs.nodes)
-    length = np.linalg.norm(pairs.normals, axis=1)
+def _joined(
+    name: str,
+    both: IntArray,
+    normals: Array,
+    areas: Array | None,
+    where: str,
+    labels: IntArray,
+    nodes: Nodes | None,
+    tangent: Array | None,
+) -> Pairs:
+    """B and the geometry of pairs of nodes (n_pairs, 2), 0 for ground, with normals of any length."""
+    n = len(both)
+    length = np.linalg.norm(normals, axis=1)
     if not n or not (length > 0).all():
         measured = "no pair" if not n else f"pair {int(np.argmin(length)) + 1} has the normal (0, 0, 0)"
-        raise InputError(f"contact '{name}' has no pairs or no normals", pairs.where, measured, "a direction each")
-    normals = pairs.normals / length[:, None]
+        raise InputError(f"contact '{name}' has no pairs or no normals", where, measured, "a direction each")
+    normals = normals / length[:, None]
     axis = np.eye(3)[np.argmin(abs(normals).max(axis=0))] if tangent is None else tangent
     try:
         frames = tangent_frames(normals, axis.tolist())
     except InputError as error:
-        where = f"contact '{name}', {pairs.where}"
-        raise InputError(error.what, where, error.measured, error.expected, "give another --tangent") from None
-    difference = (_selection(pairs.nodes[:, 0], labels) - _selection(pairs.nodes[:, 1], labels)).tocsr()
-    _check_dofs(name, pairs, difference, labels)
+        place = f"contact '{name}', {where}"
+        raise InputError(error.what, place, error.measured, error.expected, "give another --tangent") from None
+    difference = (_selection(both[:, 0], labels) - _selection(both[:, 1], labels)).tocsr()
+    _check_dofs(name, both, where, difference, labels)
     B = (sp.block_diag(list(frames)) @ difference).tocsr()
     B.eliminate_zeros()
-    positions = None if nodes is None else nodes.coordinates[nodes.places(pairs.nodes[:, 0])]
-    return ContactMap(name, B, positions, pairs.areas, frames, pairs.nodes)
+    points = None if nodes is None else nodes.coordinates[nodes.places(both[:, 0])]
+    return Pairs(B, areas=areas, points=points, frames=frames, nodes=both)
 
 
 def _selection(numbers: IntArray, labels: IntArray) -> sp.csr_matrix:
@@ -158,14 +163,14 @@ def _selection(numbers: IntArray, labels: IntArray) -> sp.csr_matrix:
     return sp.csr_matrix((np.ones(len(rows)), (rows, columns[rows])), shape=(len(wanted), len(labels)))
 
 
-def _check_dofs(name: str, pairs: Pairs, difference: sp.csr_matrix, labels: IntArray) -> None:
+def _check_dofs(name: str, both: IntArray, where: str, difference: sp.csr_matrix, labels: IntArray) -> None:
     entries = np.diff(difference.indptr).reshape(-1, 3).sum(axis=1)
     dead = np.flatnonzero(entries == 0)
     if len(dead):
-        a, b = pairs.nodes[dead[0]]
+        a, b = both[dead[0]]
         raise InputError(
             f"a pair of contact '{name}' cannot move",
-            pairs.where,
+            where,
             f"nodes {a} and {b or 'ground'} have no dof among the {len(labels)} of the matrices; {len(dead)} such",
             "a free dof on one side at least",
             "check the node numbers; nodes that are held are no rows of the matrices",

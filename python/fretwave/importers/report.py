@@ -11,12 +11,11 @@ import numpy.typing as npt
 from scipy.sparse.csgraph import connected_components
 
 from ..errors import FretwaveError
-from ..results.model_file import FileModel
+from ..model.structure import Structure
 from .entries import counted
 
 if TYPE_CHECKING:
     from mpi4py import MPI
-
 
 Array = npt.NDArray[np.float64]
 
@@ -39,24 +38,25 @@ class Report:
         return "\n".join([*self.lines, *(f"warning: {warning}" for warning in self.warnings)])
 
 
-def rigid_motions(model: FileModel) -> Array | None:
+def rigid_motions(model: Structure) -> Array | None:
     """Translations along and rotations about x, y, z (n_dof, 6), None without coordinates of all nodes."""
-    if model.node is None or model.direction is None or model.coordinates is None or model.node_numbers is None:
+    if model.labels is None or model.coordinates is None or model.node_numbers is None:
         return None
+    node, direction = model.labels.T
     order = np.argsort(model.node_numbers)
-    place = order[np.clip(np.searchsorted(model.node_numbers[order], model.node), 0, len(order) - 1)]
-    if (model.node_numbers[place] != model.node).any() or model.direction.min() < 1 or model.direction.max() > 6:
+    place = order[np.clip(np.searchsorted(model.node_numbers[order], node), 0, len(order) - 1)]
+    if (model.node_numbers[place] != node).any() or direction.min() < 1 or direction.max() > 6:
         return None
     x = model.coordinates - model.coordinates.mean(axis=0)
-    motions = np.zeros((model.size, 6))
-    motions[np.arange(model.size), model.direction - 1] = 1.0
-    moved = np.flatnonzero(model.direction <= 3)
+    motions = np.zeros((model.n_dof, 6))
+    motions[np.arange(model.n_dof), direction - 1] = 1.0
+    moved = np.flatnonzero(direction <= 3)
     turned = np.cross(np.eye(3), x[place[moved], None])  # (dof, axis of rotation, direction)
-    motions[moved, 3:] = turned[np.arange(len(moved)), :, model.direction[moved] - 1]
+    motions[moved, 3:] = turned[np.arange(len(moved)), :, direction[moved] - 1]
     return motions
 
 
-def expected_rigid(model: FileModel, motions: Array) -> tuple[int, int]:
+def expected_rigid(model: Structure, motions: Array) -> tuple[int, int]:
     """Rigid modes that the geometry allows, and the number of separate bodies (what K joins)."""
     count, body = connected_components(model.K, directed=False)
     largest = float(abs(model.K.diagonal()).max())
@@ -70,7 +70,7 @@ def expected_rigid(model: FileModel, motions: Array) -> tuple[int, int]:
     return free, int(count)
 
 
-def check(model: FileModel, symmetry: dict[str, str], notes: Sequence[str], modes: int, comm: MPI.Comm) -> Report:
+def check(model: Structure, symmetry: dict[str, str], notes: Sequence[str], modes: int, comm: MPI.Comm) -> Report:
     """Everything that can be said without a law of contact. Collective.
 
     Parameters
@@ -83,8 +83,8 @@ def check(model: FileModel, symmetry: dict[str, str], notes: Sequence[str], mode
         Frequencies to show beside the rigid modes.
     """
     report = Report()
-    nodes = "" if model.node is None else f" at {len(np.unique(model.node))} nodes"
-    report.lines.append(f"{model.size} dofs{nodes}")
+    nodes = "" if model.labels is None else f" at {len(np.unique(model.labels[:, 0]))} nodes"
+    report.lines.append(f"{model.n_dof} dofs{nodes}")
     for letter, said in symmetry.items():
         report.lines.append(f"{letter}: {getattr(model, letter).nnz} entries, {said}")
     report.lines.extend(notes)
@@ -97,13 +97,13 @@ def check(model: FileModel, symmetry: dict[str, str], notes: Sequence[str], mode
     return report
 
 
-def _contacts(model: FileModel, report: Report) -> None:
-    for contact in model.contacts.values():
-        area = "areas not given" if contact.areas is None else f"area {contact.areas.sum():.6g} in all"
-        report.lines.append(f"contact '{contact.name}': {counted(contact.pairs, 'pair')}, {area}")
+def _contacts(model: Structure, report: Report) -> None:
+    for name, pairs in model.pairs.items():
+        area = "areas not given" if pairs.areas is None else f"area {pairs.areas.sum():.6g} in all"
+        report.lines.append(f"contact '{name}': {counted(pairs.n_pairs, 'pair')}, {area}")
 
 
-def _mass(model: FileModel, motions: Array | None, report: Report) -> None:
+def _mass(model: Structure, motions: Array | None, report: Report) -> None:
     diagonal = model.M.diagonal()
     report.lines.append(f"M: diagonal {diagonal.min():.4g} to {diagonal.max():.4g}")
     _diagonal(model, diagonal, "mass", report)
@@ -111,7 +111,7 @@ def _mass(model: FileModel, motions: Array | None, report: Report) -> None:
         report.lines.append("mass of the body: not known without coordinates and a table of dofs")
         return
     masses = _masses(model, motions)
-    absent = len(np.setdiff1d(model.node_numbers, model.node))  # type: ignore[arg-type]
+    absent = len(np.setdiff1d(model.node_numbers, model.labels[:, 0]))  # type: ignore[arg-type,index]
     held = f" (without the {absent} nodes that have no dof)" if absent else ""
     report.lines.append("mass: " + ", ".join(f"{m:.6g} along {a}" for m, a in zip(masses, "xyz")) + held)
     if np.ptp(masses) > MASS_SPREAD * masses.max():
@@ -120,20 +120,20 @@ def _mass(model: FileModel, motions: Array | None, report: Report) -> None:
         )
 
 
-def _masses(model: FileModel, motions: Array) -> Array:
+def _masses(model: Structure, motions: Array) -> Array:
     """t^T M t of the three translations."""
     return np.asarray(np.einsum("ik,ik->k", motions[:, :3], model.M @ motions[:, :3]))
 
 
-def _diagonal(model: FileModel, diagonal: Array, quantity: str, report: Report) -> None:
+def _diagonal(model: Structure, diagonal: Array, quantity: str, report: Report) -> None:
     """Mass and stiffness of every dof are above zero."""
     for wrong, kind in ((diagonal < 0, "negative"), (diagonal == 0, "no")):
         if wrong.any():
-            first = model.names[int(np.argmax(wrong))]
+            first = model.dof_names[int(np.argmax(wrong))]
             report.warnings.append(f"{counted(int(wrong.sum()), 'dof')} with {kind} {quantity}, the first is {first}")
 
 
-def _frequencies(model: FileModel, motions: Array | None, modes: int, comm: MPI.Comm, report: Report) -> None:
+def _frequencies(model: Structure, motions: Array | None, modes: int, comm: MPI.Comm, report: Report) -> None:
     from ..model.model import Model
     from ..model.modes import linear_modes
 
@@ -165,15 +165,15 @@ def _frequencies(model: FileModel, motions: Array | None, modes: int, comm: MPI.
     report.lines.append("first frequencies [1/time]: " + ", ".join(f"{value:.6g}" for value in elastic))
 
 
-def _units(model: FileModel, motions: Array | None, report: Report) -> None:
+def _units(model: Structure, motions: Array | None, report: Report) -> None:
     """Speed of sound and density as far as the mesh shows them; metals have about 5000 m/s and 2700 to 8900 kg/m^3."""
-    if motions is None or model.coordinates is None:
+    if motions is None or model.coordinates is None or model.labels is None:
         return
     size = np.ptp(model.coordinates, axis=0)
     if (size <= 0).any():
         return
     edge = float(np.cbrt(size.prod() / len(model.coordinates)))
-    translational = model.direction <= 3  # type: ignore[operator]
+    translational = model.labels[:, 1] <= 3
     stiff, heavy = (A.diagonal()[translational].sum() for A in (model.K, model.M))
     speed = edge * float(np.sqrt(stiff / heavy))
     density = _masses(model, motions).max() / float(size.prod())

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from ..errors import InputError
+from .sectors import Sparse
+
+Array = npt.NDArray[np.float64]
 
 #: Largest entry of A - A^T over the largest entry of A that still counts as rounding.
 SYMMETRY_TOLERANCE = 1e-10
@@ -29,65 +31,35 @@ DENSE_LIMIT = 600
 NAMES = {"M": "mass matrix", "K": "stiffness matrix", "C": "damping matrix"}
 
 
-@dataclass
-class Matrix:
-    """One matrix of the model.
-
-    Attributes
-    ----------
-    letter : str
-        M, K or C.
-    values : (n, n) sparse CSR
-    where : str
-        Where the case gives it.
-    digest : str
-        Content hash when it comes from a file, else "".
-    """
-
-    letter: str
-    values: Any
-    where: str
-    digest: str = ""
-
-    @property
-    def name(self) -> str:
-        return NAMES[self.letter]
-
-    @property
-    def size(self) -> int:
-        return int(self.values.shape[0])
-
-
-def check_entries(matrix: Matrix) -> InputError | None:
+def check_entries(letter: str, A: Sparse, where: str) -> InputError | None:
     """Every entry is a number whose square is one."""
-    entries = matrix.values.tocoo()
+    entries = A.tocoo()
     bad = np.flatnonzero(~(abs(entries.data) <= LARGEST_ENTRY))
     if not len(bad):
         return None
     row, column, value = int(entries.row[bad[0]]), int(entries.col[bad[0]]), float(entries.data[bad[0]])
     finite = bool(np.isfinite(value))
     return InputError(
-        f"the {matrix.name} has an entry that is {'too large' if finite else 'not a number'}",
-        where=matrix.where,
-        measured=f"{matrix.letter}[{row}][{column}] = {value}" + (f", and {len(bad) - 1} more" if len(bad) > 1 else ""),
+        f"the {NAMES[letter]} has an entry that is {'too large' if finite else 'not a number'}",
+        where=where,
+        measured=f"{letter}[{row}][{column}] = {value}" + (f", and {len(bad) - 1} more" if len(bad) > 1 else ""),
         expected=f"at most {LARGEST_ENTRY:g}, whose square is a number" if finite else "finite entries",
         fix="choose other units" if finite else "look at what wrote this entry",
     )
 
 
-def check_symmetric(matrix: Matrix, dofs: Sequence[str]) -> InputError | None:
+def check_symmetric(letter: str, A: Sparse, where: str, dofs: Sequence[str]) -> InputError | None:
     """Measured asymmetry and the worst pair of entries."""
-    difference = (matrix.values - matrix.values.T).tocoo()
-    scale = abs(matrix.values).max()
+    difference = (A - A.T).tocoo()
+    scale = abs(A).max()
     if not difference.nnz or abs(difference.data).max() <= SYMMETRY_TOLERANCE * scale:
         return None
     worst = int(np.argmax(abs(difference.data)))
     i, j = sorted((int(difference.row[worst]), int(difference.col[worst])))
-    letter = matrix.letter
     return InputError(
-        f"the {matrix.name} is not symmetric",
-        where=matrix.where,
-        measured=f"{letter}[{i}][{j}] = {matrix.values[i, j]:g} and {letter}[{j}][{i}] = {matrix.values[j, i]:g}"
+        f"the {NAMES[letter]} is not symmetric",
+        where=where,
+        measured=f"{letter}[{i}][{j}] = {A[i, j]:g} and {letter}[{j}][{i}] = {A[j, i]:g}"
         f" (dofs {dofs[i]}, {dofs[j]}); largest difference {abs(difference.data[worst]) / scale:.3g}"
         " of the largest entry",
         expected=f"{letter} = transpose of {letter} within {SYMMETRY_TOLERANCE:g} of the largest entry",
@@ -95,16 +67,16 @@ def check_symmetric(matrix: Matrix, dofs: Sequence[str]) -> InputError | None:
     )
 
 
-def check_mass(matrix: Matrix, dofs: Sequence[str]) -> InputError | None:
+def check_mass(M: Sparse, where: str, dofs: Sequence[str]) -> InputError | None:
     """Mass must be positive for every motion: a positive diagonal first, then the smallest eigenvalue."""
-    diagonal = matrix.values.diagonal()
+    diagonal = M.diagonal()
     worst = int(np.argmin(diagonal))
     fix = "give every dof a mass, or remove massless dofs by static condensation"
     if diagonal[worst] <= 0:
         kind = "negative" if diagonal[worst] < 0 else "zero"
         return InputError(
             f"the mass matrix has a {kind} diagonal entry",
-            where=matrix.where,
+            where=where,
             measured=f"M[{worst}][{worst}] = {diagonal[worst]:g} (dof {dofs[worst]})",
             expected="> 0 for every dof",
             fix="correct the sign" if diagonal[worst] < 0 else fix,
@@ -112,25 +84,27 @@ def check_mass(matrix: Matrix, dofs: Sequence[str]) -> InputError | None:
     if diagonal[worst] < 1 / LARGEST_ENTRY:
         return InputError(
             "the mass matrix has a diagonal entry that is too small",
-            where=matrix.where,
+            where=where,
             measured=f"M[{worst}][{worst}] = {diagonal[worst]:g} (dof {dofs[worst]})",
             expected=f"at least {1 / LARGEST_ENTRY:g}, whose square is a number",
             fix="choose other units",
         )
-    smallest, shape = smallest_eigenvalue(matrix.values)
+    smallest, shape = smallest_eigenvalue(M)
     if smallest > SINGULAR_TOLERANCE:
         return None
     dof = int(np.argmax(abs(shape)))
     return InputError(
         "the mass matrix is singular" if smallest > -1e-10 else "the mass matrix is not positive definite",
-        where=matrix.where,
+        where=where,
         measured=f"smallest eigenvalue {smallest:.3g} of the largest, in a motion led by dof {dofs[dof]}",
         expected="all eigenvalues > 0",
         fix=fix,
     )
 
 
-def check_stiffness(matrix: Matrix, dofs: Sequence[str], contact_rows: Any) -> tuple[InputError | None, str | None]:
+def check_stiffness(
+    K: Sparse, where: str, dofs: Sequence[str], contact_rows: Sparse
+) -> tuple[InputError | None, str | None]:
     """Stiffness with the contact stuck must be positive definite.
 
     Returns
@@ -139,23 +113,23 @@ def check_stiffness(matrix: Matrix, dofs: Sequence[str], contact_rows: Any) -> t
     note : str or None
         Said when only the contact holds the structure.
     """
-    if 0 < abs(matrix.values).max() < 1 / LARGEST_ENTRY:
+    if 0 < abs(K).max() < 1 / LARGEST_ENTRY:
         return (
             InputError(
                 "the stiffness matrix is too small",
-                where=matrix.where,
-                measured=f"its largest entry is {abs(matrix.values).max():g}",
+                where=where,
+                measured=f"its largest entry is {abs(K).max():g}",
                 expected=f"at least {1 / LARGEST_ENTRY:g}, whose square is a number",
                 fix="choose other units",
             ),
             None,
         )
-    free, _ = smallest_eigenvalue(matrix.values)
+    free, _ = smallest_eigenvalue(K)
     if free > SINGULAR_TOLERANCE:
         return None, None
     # Stuck contact holds relative motion; any stiffness of the matrix' own size shows whether that is enough.
-    stiffness = max(abs(matrix.values).max(), np.finfo(float).tiny)
-    stuck, shape = smallest_eigenvalue(matrix.values + stiffness * (contact_rows.T @ contact_rows))
+    stiffness = max(abs(K).max(), np.finfo(float).tiny)
+    stuck, shape = smallest_eigenvalue(K + stiffness * (contact_rows.T @ contact_rows))
     if stuck > SINGULAR_TOLERANCE:
         kind = "singular" if free > -1e-10 else "not positive definite"
         return None, f"K is {kind} without contact: no free asymptote, contact alone holds the structure"
@@ -166,7 +140,7 @@ def check_stiffness(matrix: Matrix, dofs: Sequence[str], contact_rows: Any) -> t
             "the stiffness matrix is negative for some motion"
             if indefinite
             else "the stiffness matrix is singular, also with the contact stuck",
-            where=matrix.where,
+            where=where,
             measured=f"smallest eigenvalue {stuck:.3g} of the largest, in a motion led by dof {dofs[dof]}",
             expected="all eigenvalues of K with stuck contact > 0",
             fix="the structure is statically unstable: check the signs"
@@ -177,7 +151,7 @@ def check_stiffness(matrix: Matrix, dofs: Sequence[str], contact_rows: Any) -> t
     )
 
 
-def smallest_eigenvalue(values: Any) -> tuple[float, Any]:
+def smallest_eigenvalue(values: Sparse) -> tuple[float, Array]:
     """Smallest eigenvalue of D^-1/2 A D^-1/2, D the size of A's diagonal, over the largest; and its vector.
 
     The scaling makes the answer independent of units. Large matrices are judged by their diagonal and,

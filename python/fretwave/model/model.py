@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from copy import copy
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -17,131 +15,13 @@ from petsc4py import PETSc
 from .. import _core
 from ..errors import InputError
 from ..mpi import guard as parallel
-from .laws import LawInfo, PythonLaw, Role, core_law, laws, python_law
+from .contact import Contact
+from .sectors import Given, Term, by_sector
 
 Array = npt.NDArray[np.float64]
 
 if MPI.COMM_WORLD.size > 1:
     parallel.install()  # in scripts too: one rank's exception ends all ranks, with one message
-
-
-def by_sector(given: Any) -> Mapping[int, Any]:
-    """{k: matrix on the sector k places ahead}, the own sector first; a plain matrix stands for {0: matrix}."""
-    if given is None:
-        return {}
-    if not isinstance(given, Mapping):
-        return {0: given}
-    if 0 not in given:
-        raise InputError("the own sector's matrix is missing", None, sorted(given), "0 among them", "give {0: ...}")
-    return {k: given[k] for k in sorted(given, key=lambda k: (k != 0, k))}
-
-
-@dataclass
-class Contact:
-    """Contact pairs of one law.
-
-    Parameters
-    ----------
-    law : str or PythonLaw
-        Name of a compiled law (see `fretwave.laws`), or a law written in Python.
-    B : (n_pairs * components, n_dof) sparse or dense, or dict
-        Relative displacement u = B x, rows pair by pair (normal, tangent, tangent for three components).
-        On a sector {0: B_0, 1: B_1}: u = B_0 x_j + B_1 x_{j+1} reaches the next sector's dofs.
-    parameters : dict
-        The law's parameters, a number or one per pair.
-    """
-
-    law: str | PythonLaw
-    B: Any
-    parameters: Mapping[str, Any] = field(default_factory=dict)
-    name: str = "contact"
-
-    def __repr__(self) -> str:
-        law = self.law if isinstance(self.law, str) else type(self.law).__name__
-        given = "".join(f", {name}={_span(value)}" for name, value in self.parameters.items())
-        rows, n_dof = np.shape(by_sector(self.B)[0])
-        return f"Contact({self.name}: {law}, {rows} rows of B on {n_dof} dofs{given})"
-
-    @property
-    def components(self) -> int:
-        """Relative displacements per pair."""
-        return self.law.components if isinstance(self.law, PythonLaw) else self.info.components
-
-    @property
-    def info(self) -> LawInfo:
-        """What is known of the law: its parameters with their roles, its normal direction."""
-        if isinstance(self.law, PythonLaw):
-            return self.law.info()
-        if self.law not in laws():
-            raise InputError(
-                "unknown contact law", f"contact '{self.name}'", self.law, ", ".join(laws()), "choose a known law"
-            )
-        return laws()[self.law]
-
-    def value(self, role: Role) -> Any:
-        """Value of the parameter with a role; None where the law has none."""
-        return self.info.value(role, self.parameters)
-
-    def states(self, u: Array, v: Array, f: Array) -> tuple[npt.NDArray[np.int8], Array]:
-        """What the law says of displacements, velocities and forces (n_samples, components, n_pairs) of a period.
-
-        Returns
-        -------
-        status, gap : (n_samples, n_pairs)
-            Stick 0, slip 1 or open 2; distance to contact [m], nan of a law without a normal direction.
-        """
-        samples = [np.ascontiguousarray(values, dtype=float) for values in (u, v, f)]
-        n_pairs = samples[0].shape[2]
-        found: tuple[npt.NDArray[np.int8], Array] = self.core_law(np.arange(n_pairs), n_pairs).states(*samples)
-        return found
-
-    def core_law(self, pairs: npt.NDArray[np.intp], n_pairs: int) -> Any:
-        """The compiled law with the parameters of these pairs."""
-        if isinstance(self.law, PythonLaw):
-            return python_law(copy(self.law), pairs)
-        return core_law(self.law, self._values(n_pairs), pairs)
-
-    def _values(self, n_pairs: int) -> dict[str, Array]:
-        known = {p.name: p for p in self.info.parameters}
-        for name in self.parameters:
-            if name not in known:
-                raise InputError(
-                    "unknown law parameter", f"contact '{self.name}'", name, ", ".join(known), "remove or rename it"
-                )
-        values = {}
-        for name, parameter in known.items():
-            value = self.parameters.get(name, parameter.default)
-            if value is None or np.size(value) not in (1, n_pairs):
-                raise InputError(
-                    f"law parameter '{name}' is missing or of the wrong length",
-                    f"contact '{self.name}'",
-                    "nothing" if value is None else f"{np.size(value)} values",
-                    f"1 or {n_pairs} values",
-                    "give one number, or one per pair",
-                )
-            values[name] = np.broadcast_to(np.asarray(value, dtype=float).ravel(), (n_pairs,))
-            self._check_bound(parameter, values[name])
-        return values
-
-    def _check_bound(self, parameter: Any, values: Array) -> None:
-        """Here and not in the core, which knows a rank's own numbers of the pairs."""
-        low, sign = parameter.lower, ">" if parameter.strict else ">="
-        good = np.isfinite(values) & ((values > low) if parameter.strict else (values >= low))
-        if not good.all():
-            pair = int(np.argmin(good))
-            raise InputError(
-                f"law parameter '{parameter.name}' is out of bounds",
-                f"contact '{self.name}', pair {pair}",
-                f"{values[pair]:g}",
-                f"a number {sign} {low:g} {parameter.unit}" if low > -1e300 else f"a number [{parameter.unit}]",
-                "give a value within the bound; leave out pairs that stand for no area",
-            )
-
-
-def _span(value: Any) -> str:
-    """A parameter in short: a number, or its least and largest over the pairs."""
-    low, high = float(np.min(value)), float(np.max(value))
-    return f"{low:g}" if low == high else f"{low:g} to {high:g}"
 
 
 class Model:
@@ -167,11 +47,11 @@ class Model:
 
     def __init__(
         self,
-        M: Any,
-        K: Any,
-        C: Any = None,
+        M: Term,
+        K: Term,
+        C: Term | None = None,
         contacts: Sequence[Contact] = (),
-        comm: Any = None,
+        comm: MPI.Comm | None = None,
         sectors: int = 1,
         nodal_diameter: int = 0,
         unit: int = 1,
@@ -191,7 +71,7 @@ class Model:
             [(A, *term[1:]) for A, term in zip(self._matrices, terms)], groups, theta, unit if unit > 1 else 0
         )
 
-    def _matrix(self, A: Any) -> PETSc.Mat:
+    def _matrix(self, A: Given) -> PETSc.Mat:
         if isinstance(A, PETSc.Mat):
             return A
         rows = sp.csr_matrix(A, dtype=float)

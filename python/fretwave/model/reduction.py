@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +16,10 @@ from petsc4py import PETSc
 from .. import _core
 from ..errors import InputError
 from .model import Model
+from .sectors import Given, Sparse
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
 
 Array = npt.NDArray[np.float64]
 
@@ -88,6 +92,31 @@ class Reduction:
         """n_r = n_kept + n_modes."""
         return len(self.K)
 
+    @property
+    def places(self) -> dict[int, int]:
+        """Reduced coordinate of each kept dof."""
+        return {int(dof): place for place, dof in enumerate(self.keep)}
+
+    def rows(self, B: Sparse) -> Sparse:
+        """B (n, n_r) on the reduced coordinates of rows (n, n_dof) that reach kept dofs alone.
+
+        Raises
+        ------
+        InputError
+            They reach another dof.
+        """
+        kept = sp.csr_matrix(B[:, self.keep])
+        check_all_kept(B, kept)
+        return sp.csr_matrix(sp.hstack([kept, sp.csr_matrix((kept.shape[0], len(self.component_hz)))]))
+
+    def names(self, dofs: Sequence[str]) -> list[str]:
+        """Names of the reduced coordinates: kept dofs keep theirs."""
+        return [*(dofs[k] for k in self.keep), *(f"component_{k + 1}" for k in range(len(self.component_hz)))]
+
+    def faces(self) -> dict[str, Any]:
+        """None: of a component."""
+        return {}
+
     def expand(self, x_r: npt.ArrayLike) -> Array:
         """Displacement of all dofs, on every rank. Collective.
 
@@ -121,7 +150,7 @@ class Reduction:
         reduced: Array = self._core.project(np.ascontiguousarray(self._model.distribute(rows)))
         return reduced if np.ndim(f) == 2 else reduced[:, 0]
 
-    def error(self, count: int = 5, K_contact: Any = None) -> FrequencyError:
+    def error(self, count: int = 5, K_contact: Given | None = None) -> FrequencyError:
         """Relative error of the lowest elastic frequencies. Collective.
 
         Parameters
@@ -180,7 +209,7 @@ class Reduction:
         n = len(self.keep)
         return float(np.sqrt(np.trace(self.K[:n, :n]) / np.trace(self.M[:n, :n])) / (2 * np.pi))
 
-    def _contact_stiffness(self, K_contact: Any) -> sp.csr_matrix:
+    def _contact_stiffness(self, K_contact: Given | None) -> sp.csr_matrix:
         n = self._model.n_dof
         extra = sp.csr_matrix((n, n)) if K_contact is None else sp.csr_matrix(K_contact, dtype=float)
         if extra.shape != (n, n):
@@ -217,13 +246,13 @@ class Reduction:
 
 
 def reduce(
-    M: Any,
-    K: Any,
-    C: Any = None,
+    M: Given,
+    K: Given,
+    C: Given | None = None,
     keep: npt.ArrayLike = (),
     modes: int | None = None,
     highest_hz: float | None = None,
-    comm: Any = None,
+    comm: MPI.Comm | None = None,
 ) -> Reduction:
     """Craig-Bampton reduction. Collective.
 
@@ -265,6 +294,18 @@ def reduce(
     owned = [mat for mat, given in zip(model._matrices, (A for A in (K, C, M) if A is not None)) if mat is not given]
     core = _core.Reduction(stiffness, mass, damping, kept.tolist(), count, highest)
     return Reduction(model, core, kept, owned, time.perf_counter() - start)
+
+
+def check_all_kept(B: Sparse, kept: Sparse) -> None:
+    """No entry of B has been left out."""
+    if abs(B).sum() > abs(kept).sum() * (1 + 1e-9):
+        raise InputError(
+            "contact pairs reach dofs that the reduction has not kept",
+            None,
+            f"{B.nnz - kept.nnz} of {B.nnz} entries of B",
+            "none",
+            "keep them (`Structure.kept`)",
+        )
 
 
 def _kept(keep: npt.ArrayLike) -> npt.NDArray[np.intp]:

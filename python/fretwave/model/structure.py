@@ -1,71 +1,51 @@
-"""Matrices, contacts, loads and places of a structure, as a builder or a model file gives them."""
+"""The structure: matrices, names of dofs, contact pairs, loads and places, of a component, a sector or a whole wheel.
+
+A builder returns it, a model file holds it, a case takes it up, a script makes it from matrices. Its methods leave it
+as it is and return another: a sector `tied` to its neighbours, the wheel `around`, that on a reduction's coordinates.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any, Optional
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, Optional
 
 import numpy as np
 import numpy.typing as npt
+import scipy.sparse as sp
+
+from ..errors import InputError
+from .consistency import complaint_of
+from .pairs import Pairs
+from .sectors import Indices, Parts, Sparse, Term, around, by_sector, check_balanced, check_number, combine, ties
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
+
+    from ..cyclic.reduction import SectorReduction
+    from .contact import Contact
+    from .model import Model
+    from .reduction import Reduction
 
 Array = npt.NDArray[np.float64]
 
-
-@dataclass
-class BuiltContact:
-    """Contact pairs of a built model; the case file names their law.
-
-    Attributes
-    ----------
-    B : (components * n_pairs, n_dof) sparse
-        u = B x, rows pair by pair: normal (> 0 closes) and two tangents, or one tangent alone.
-    components : int
-        Rows of B for each pair.
-    parameters : dict
-        Law parameters used where the case gives none: numbers or (n_pairs,).
-    areas : (n_pairs,), optional
-        Area a pair stands for [m^2], for parameters given per area.
-    points : (n_pairs, 3), optional
-        Places [m].
-    frames : (n_pairs, 3, 3), optional
-        Rows: directions of normal and tangents in space, for the resultant of the contact forces.
-    faces : sequence of str, optional
-        Name of the face that each pair lies on: a picture has one panel for each.
-    positions : (n_pairs, 2), optional
-        Places on the face [m], for pictures.
-    """
-
-    B: Any
-    components: int = 3
-    parameters: Mapping[str, Any] = field(default_factory=dict)
-    areas: Optional[Array] = None
-    points: Optional[Array] = None
-    frames: Optional[Array] = None
-    faces: Optional[Sequence[str]] = None
-    positions: Optional[Array] = None
-
-    def __repr__(self) -> str:
-        return f"BuiltContact({self.n_pairs} pairs of {self.components}, {', '.join(self.parameters)})"
-
-    @property
-    def n_pairs(self) -> int:
-        """Number of pairs."""
-        return int(self.B.shape[0]) // self.components
+#: The part of K that a mistuning varies unless it names another: all that the sector's own elements put into it.
+WHOLE = "sector"
 
 
 @dataclass
-class BuiltModel:
-    """What the function ``build(**options)`` of a builder returns.
+class Structure:
+    """M, K and C with names, contact pairs and loads; what the function ``build(**options)`` of a builder returns.
 
     Attributes
     ----------
-    M, K, C : (n_dof, n_dof) sparse [kg], [N/m], [N s/m]
-        Without contact; C may be None.
+    M, K, C : (n_dof, n_dof) sparse or dense [kg], [N/m], [N s/m]
+        Without contact; C may be None. Of a sector tied to its neighbours {k: (n_dof, n_dof)}, on the dofs of the
+        sector k places ahead.
     dofs : dict
         Dof numbers by the names that the case file may use (observation dofs); kept by a reduction.
-    contacts : dict
-        Contacts by the names that ``[[contact]]`` takes up.
+    pairs : dict
+        Contact pairs by the names that ``[[contact]]`` takes up.
     loads : dict
         Static loads (n_dof,) [N] by the names that ``[preload]`` takes up.
     coordinates : (n_nodes, 3), optional
@@ -77,98 +57,308 @@ class BuiltModel:
         `displacements` then number its rows, and the faces of a sector correspond as they are.
     hexahedra : (n_cells, 8, 20 or 27), optional
         Nodes of the cells in VTK's order, for pictures.
-    sectors : int, optional
-        The model is one sector of a wheel of this many.
+    sectors : int
+        The model is one sector of a wheel of this many, or with `whole` all of them, one after the other; 0: no wheel.
     low, high : (n_face,), optional
         Matching dofs of a sector's two faces (`fretwave.match_faces` finds nodes that match).
     axis : {"x", "y", "z"}, optional
         Dofs of the faces are triples of Cartesian components, and the wheel lies about this axis.
     parts : dict
         Shares of K (n_dof, n_dof) by the names that a mistuning may vary: a sector's K grows by its deviation times
-        the share. A blade's own stiffness is what the elements of the blade put into K.
+        the share. A blade's own stiffness is what the elements of the blade put into K. Of a tied sector they are on
+        the dofs of the uncut one, and "sector" is all of its K.
+    names : sequence of str, optional
+        Of all dofs, in the order of the matrices, numbers without it; those of `dofs` go before them.
+    stiffness_damping, mass_damping : float
+        Shares of K [s] and M [1/s] that are added to C.
+    resultants : dict, optional
+        Sum (3,) along x, y, z of the loads [N], where they are no longer on the dofs of nodes.
+    labels : (n_dof, 2), optional
+        Node number and direction (1 to 6) of each dof in the mesh's own numbers.
+    node_numbers : (n_nodes,), optional
+        Of `coordinates`.
+    ties : {k: (n_full, n_dof)}
+        Of a tied sector: dofs with both faces, x_full = sum_k ties[k] x_{j+k}.
+    cut : Structure, optional
+        Of a tied sector: what it was before, both faces free.
+    whole : bool
+        All sectors of a wheel.
+    deviations : (sectors,), optional
+        Relative stiffness deviations of a whole wheel's sectors; None for a tuned one.
     """
 
-    M: Any
-    K: Any
-    C: Any = None
+    M: Term
+    K: Term
+    C: Optional[Term] = None
     dofs: Mapping[str, int] = field(default_factory=dict)
-    contacts: Mapping[str, BuiltContact] = field(default_factory=dict)
+    pairs: Mapping[str, Pairs] = field(default_factory=dict)
     loads: Mapping[str, Array] = field(default_factory=dict)
     coordinates: Optional[Array] = None
-    displacements: Optional[npt.NDArray[np.intp]] = None
-    expansion: Optional[Any] = None
-    hexahedra: Optional[npt.NDArray[np.intp]] = None
-    sectors: Optional[int] = None
-    low: Optional[npt.NDArray[np.intp]] = None
-    high: Optional[npt.NDArray[np.intp]] = None
+    displacements: Optional[Indices] = None
+    expansion: Optional[Sparse] = None
+    hexahedra: Optional[Indices] = None
+    sectors: int = 0
+    low: Optional[Indices] = None
+    high: Optional[Indices] = None
     axis: Optional[str] = None
-    parts: Mapping[str, Any] = field(default_factory=dict)
+    parts: Mapping[str, Sparse] = field(default_factory=dict)
+    names: Optional[Sequence[str]] = None
+    stiffness_damping: float = 0.0
+    mass_damping: float = 0.0
+    resultants: Optional[Mapping[str, Array]] = None
+    labels: Optional[npt.NDArray[np.int64]] = None
+    node_numbers: Optional[npt.NDArray[np.int64]] = None
+    ties: Parts = field(default_factory=dict)
+    cut: Optional[Structure] = None
+    whole: bool = False
+    deviations: Optional[Array] = None
 
     def __repr__(self) -> str:
-        wheel = f", one of {self.sectors} sectors" if self.sectors else ""
-        return f"BuiltModel({self.M.shape[0]} dofs, contacts {list(self.contacts)}{wheel})"
+        kind = "all" if self.whole else "one"
+        wheel = f", {kind} of {self.sectors} sectors" if self.sectors else ""
+        return f"Structure({self.n_dof} dofs, pairs {list(self.pairs)}{wheel})"
 
-    def complaint(self) -> str | None:
-        """What is inconsistent, None when nothing is."""
-        n = self.M.shape[0]
-        if n == 0:
-            return "M has no dofs"
-        sizes = {"M": self.M, "K": self.K, **({} if self.C is None else {"C": self.C})}
-        sizes.update({f"part '{name}' of K": part for name, part in self.parts.items()})
-        for name, matrix in sizes.items():
-            if matrix.shape != (n, n):
-                return f"{name} is {matrix.shape[0]} x {matrix.shape[1]}, M is {n} x {n}"
+    @property
+    def n_dof(self) -> int:
+        """Number of dofs."""
+        return int(np.shape(by_sector(self.M)[0])[0])
+
+    @property
+    def unit(self) -> int:
+        """Dofs of a sector, where this is a whole wheel."""
+        return self.n_dof // self.sectors if self.whole else self.n_dof
+
+    @property
+    def dof_names(self) -> list[str]:
+        """Names of all dofs."""
+        names = [str(number) for number in range(self.n_dof)] if self.names is None else list(self.names)
         for name, number in self.dofs.items():
-            if not 0 <= number < n:
-                return f"dof '{name}' has the number {number} of {n}"
-        for name, load in self.loads.items():
-            if np.shape(load) != (n,):
-                return f"load '{name}' has the shape {np.shape(load)}, not ({n},)"
-            if not np.all(np.isfinite(load)):
-                return f"load '{name}' has an entry that is not a number"
-        return self._wrong_grid() or next(
-            (text for text in (_wrong(c, name, n) for name, c in self.contacts.items()) if text), None
+            names[number] = name
+        return names
+
+    def dof(self, name: str, sector: int = 0) -> int:
+        """Number of a dof; on a whole wheel that of a sector's."""
+        return self.dof_names.index(f"{name}@{sector}" if self.whole else name)
+
+    def places(self, name: str) -> list[int]:
+        """Numbers of a dof in all sectors of a whole wheel; of a structure or of one sector that of `dof` alone."""
+        first = self.dof(name)
+        return [first + j * self.unit for j in range(self.sectors)] if self.whole else [first]
+
+    @property
+    def kept(self) -> Indices:
+        """Dofs that a reduction keeps: those with a name in `dofs`, and those of the pairs."""
+        touched = [pairs.touched for pairs in self.pairs.values()]
+        return np.asarray(np.unique(np.concatenate([list(self.dofs.values()), *touched])), dtype=np.intp)
+
+    def own(self, letter: str) -> Sparse | None:
+        """M, K or C on the own sector's dofs; None for a C that there is not."""
+        given = getattr(self, letter)
+        return None if given is None else sp.csr_matrix(by_sector(given)[0], dtype=float)
+
+    def by_sector(self, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        """Values (N unit, ...) of all dofs of a whole wheel as (N, unit, ...)."""
+        return values.reshape(self.sectors, self.unit, *values.shape[1:])
+
+    def resultant(self, names: Sequence[str]) -> Array | None:
+        """Sum (3,) of loads along x, y, z [N]; None where it is not known which dof moves along which."""
+        known = self._totals()
+        return np.sum([known[name] for name in names], axis=0) if names and set(names) <= set(known) else None
+
+    def _totals(self) -> Mapping[str, Array]:
+        """Sum (3,) of each load along x, y, z [N]."""
+        if self.resultants is not None:
+            return self.resultants
+        if self.expansion is not None or self.whole or (self.displacements is None and self.n_dof % 3):
+            return {}
+        places = np.arange(self.n_dof).reshape(-1, 3) if self.displacements is None else np.asarray(self.displacements)
+        return {name: np.append(load, 0.0)[places].sum(axis=0) for name, load in self.loads.items()}
+
+    def sparse(self) -> Structure:
+        """The same with all matrices in CSR form of float."""
+        matrices: dict[str, Any] = {letter: _sparse(getattr(self, letter)) for letter in ("M", "K", "C")}
+        parts = {name: sp.csr_matrix(part, dtype=float) for name, part in self.parts.items()}
+        pairs = {name: replace(one, B=_sparse(one.B)) for name, one in self.pairs.items()}
+        return replace(self, **matrices, parts=parts, pairs=pairs)
+
+    def damped(self, dampers: Sequence[tuple[int, float]] = ()) -> Structure:
+        """The same with the shares of K and M, and viscous dampers (dof, c [N s/m]) to ground, in C."""
+        terms = {letter: by_sector(getattr(self, letter)) for letter in ("C", "K", "M")}
+        shares = {"C": 1.0, "K": self.stiffness_damping, "M": self.mass_damping}
+        total: dict[int, Sparse] = {}
+        for letter in (letter for letter, share in shares.items() if share):
+            for k, A in terms[letter].items():
+                part = shares[letter] * sp.csr_matrix(A, dtype=float)
+                total[k] = total[k] + part if k in total else part
+        if dampers:
+            places, values = zip(*dampers)
+            added = sp.csr_matrix((values, (places, places)), shape=(self.n_dof, self.n_dof))
+            total[0] = total[0] + added if 0 in total else added
+        return replace(self, C=_plain(total) if total else None, stiffness_damping=0.0, mass_damping=0.0)
+
+    def tied(self) -> Structure:
+        """A sector with its high face tied to the low face of the next one, and left out.
+
+        Raises
+        ------
+        InputError
+            It is no sector, its faces do not match, or there is no wheel of so many sectors.
+        """
+        if not self.sectors or self.low is None or self.high is None:
+            raise InputError("a sector of a wheel has no faces", None, None, "sectors, low and high", "give all three")
+        n = self.n_dof
+        T = ties(self.low, self.high, n, self.sectors, None if self.expansion is not None else self.axis)
+        matrices: dict[str, Any] = {letter: tie(getattr(self, letter), T) for letter in ("M", "K", "C")}
+        check_number(self.sectors)
+        for letter in ("K", "M", "C"):
+            check_balanced(matrices[letter], letter)
+        kept = np.setdiff1d(np.arange(n), self.high)
+        place, names = {int(old): new for new, old in enumerate(kept)}, self.dof_names
+        return replace(
+            self,
+            **matrices,
+            dofs={name: place[number] for name, number in self.dofs.items() if number in place},
+            pairs={name: pairs.tied(T) for name, pairs in self.pairs.items()},
+            loads={name: np.asarray(sum(part.T @ load for part in T.values())) for name, load in self.loads.items()},
+            parts={**self.parts, WHOLE: self.own("K")},
+            names=[names[k] for k in kept],
+            resultants=self._totals(),
+            **_NO_NODES,
+            low=None,
+            high=None,
+            ties=T,
+            cut=self,
         )
 
-    def _wrong_grid(self) -> str | None:
-        """What does not fit in nodes and cells."""
-        if self.coordinates is None:
-            return None if self.hexahedra is None else "there are hexahedra, but no coordinates"
-        given = self.displacements
-        dofs = self.M.shape[0]
-        if self.expansion is not None:
-            if np.shape(self.expansion)[1:] != (dofs,):
-                return f"expansion has the shape {np.shape(self.expansion)}, not (n_unreduced, {dofs})"
-            dofs = np.shape(self.expansion)[0]
-        n = dofs // 3 if given is None else len(given)
-        if np.shape(self.coordinates) != (n, 3):
-            return f"coordinates have the shape {np.shape(self.coordinates)}, not ({n}, 3)"
-        if given is not None and (np.shape(given) != (n, 3) or np.max(given) >= dofs):
-            return f"displacements have the shape {np.shape(given)} and the largest dof {np.max(given)}"
-        cells = self.hexahedra
-        if cells is None:
-            return None
-        if np.ndim(cells) != 2 or np.shape(cells)[1] not in (8, 20, 27):
-            return f"hexahedra have the shape {np.shape(cells)}, not (n_cells, 8, 20 or 27)"
-        outside = not 0 <= np.min(cells) <= np.max(cells) < n
-        return f"hexahedra have the nodes {np.min(cells)} to {np.max(cells)} of {n}" if outside else None
+    def around(
+        self,
+        deviations: Array | None = None,
+        of: str = WHOLE,
+        added: Mapping[str, Sparse] | None = None,
+    ) -> Structure:
+        """The whole wheel of a tied sector, sector after sector; its dofs are named ``tip@0``, ``tip@1``, ...
+
+        Parameters
+        ----------
+        deviations : (sectors,), optional
+            Relative deviations of a part of each sector's K: a mistuned wheel.
+        of : str
+            The part, a name in `parts`.
+        added : {"K": (N n_dof, N n_dof), ...}, optional
+            Added to the wheel's matrices.
+        """
+        n = self._sectors()
+        matrices = {letter: around(A, n) for letter in ("M", "K", "C") if (A := getattr(self, letter)) is not None}
+        changes = dict(added or {})
+        if deviations is not None:
+            matrices["K"] = sp.csr_matrix(matrices["K"] + self.stiffness_change(deviations, of))
+        for letter, A in changes.items():
+            matrices[letter] = matrices[letter] + A if letter in matrices else A
+        return Structure(
+            matrices["M"],
+            matrices["K"],
+            matrices.get("C"),
+            pairs={name: pairs.around(n) for name, pairs in self.pairs.items()},
+            loads={name: np.tile(load, n) for name, load in self.loads.items()},
+            sectors=n,
+            names=[f"{name}@{j}" for j in range(n) for name in self.dof_names],
+            stiffness_damping=self.stiffness_damping,
+            mass_damping=self.mass_damping,
+            whole=True,
+            deviations=deviations,
+        )
+
+    def stiffness_change(self, deviations: Array, of: str = WHOLE) -> Sparse:
+        """What deviations delta_j of a part of K add to the wheel's: sum_j delta_j T_j^T K_part T_j.
+
+        T_j gives the dofs of sector j, both faces among them, from those of the wheel: a part that reaches a face is
+        shared with the next sector.
+        """
+        if of not in self.parts:
+            raise InputError("there is no such part of the stiffness", None, of, ", ".join(self.parts), "name a part")
+        T = around(self.ties or {0: sp.identity(self.n_dof)}, self._sectors())
+        return sp.csr_matrix(T.T @ sp.kron(sp.diags(deviations), self.parts[of]) @ T)
+
+    def reduced(self, reduction: Reduction | SectorReduction) -> Structure:
+        """On the coordinates of a reduction of it, whose faces (of a sector) are free again. Collective.
+
+        Raises
+        ------
+        InputError
+            The reduction did not keep a dof of the pairs.
+        """
+        unit = reduction.expand(np.eye(reduction.size)) if self.parts and self.sectors else None
+        parts = {} if unit is None else {n: sp.csr_matrix(reduction.project(A @ unit)) for n, A in self.parts.items()}
+        M, K, C = (None if A is None else sp.csr_matrix(A) for A in (reduction.M, reduction.K, reduction.C))
+        return replace(
+            self,
+            M=M,
+            K=K,
+            C=C,
+            dofs={name: reduction.places[dof] for name, dof in self.dofs.items() if dof in reduction.places},
+            pairs={name: replace(pairs, B=reduction.rows(pairs.own)) for name, pairs in self.pairs.items()},
+            loads={name: reduction.project(load) for name, load in self.loads.items()},
+            resultants=self._totals(),
+            parts=parts,
+            names=reduction.names(self.dof_names),
+            **_NO_NODES,
+            **reduction.faces(),
+            axis=None,  # reduced faces correspond as they are
+        )
+
+    def model(self, contacts: Sequence[Contact] = (), comm: MPI.Comm | None = None, nodal_diameter: int = 0) -> Model:
+        """The equations, with contacts on the structure's dofs; of a tied sector in a wave. Collective.
+
+        Parameters
+        ----------
+        contacts : sequence of Contact
+            Such as ``fw.Contact("coulomb_3d", structure.pairs["root"], {"friction_coefficient": 0.3})``.
+        nodal_diameter : int
+            Of the wave, as `fretwave.Sector.model` takes it.
+
+        Raises
+        ------
+        InputError
+            A sector with free faces.
+        """
+        from .model import Model
+
+        if self.low is not None and not self.whole:
+            fix = "take the model of `structure.tied()`, or of `structure.tied().around()`"
+            raise InputError("the sector is not tied to its neighbours", repr(self), None, "a tied sector", fix)
+        if self.whole or not self.sectors:
+            C = self.damped().C
+            return Model(self.M, self.K, C, contacts, comm, unit=self.unit if self.whole else 1)
+        return Model(self.M, self.K, self.damped().C, contacts, comm, self.sectors, nodal_diameter)
+
+    def complaint(self) -> str | None:
+        """What is inconsistent in a structure as a builder gives it, None when nothing is."""
+        return complaint_of(self)
+
+    def _sectors(self) -> int:
+        if not self.sectors or self.whole:
+            raise InputError("the structure is no sector of a wheel", repr(self), None, "a tied sector", "give sectors")
+        return self.sectors
 
 
-def _wrong(contact: BuiltContact, name: str, n_dof: int) -> str | None:
-    rows, columns = contact.B.shape
-    if columns != n_dof or rows % contact.components or not rows:
-        return f"B of contact '{name}' is {rows} x {columns}, not {contact.components} n_pairs x {n_dof}"
-    if not np.all(np.isfinite(contact.B.data)):
-        return f"B of contact '{name}' has an entry that is not a number"
-    n = contact.n_pairs
-    shapes = {"areas": (n,), "points": (n, 3), "frames": (n, 3, 3), "faces": (n,), "positions": (n, 2)}
-    given = {key: getattr(contact, key) for key in shapes if getattr(contact, key) is not None}
-    for key, value in given.items():
-        if np.shape(value) != shapes[key]:
-            return f"{key} of contact '{name}' have the shape {np.shape(value)}, not {shapes[key]}"
-    for key, value in contact.parameters.items():
-        if np.shape(value) not in ((), (n,)):
-            return f"parameter {key} of contact '{name}' has the shape {np.shape(value)}, not ({n},)"
-        if not np.all(np.isfinite(np.asarray(value, dtype=float))):
-            return f"parameter {key} of contact '{name}' is not a number"
-    return None
+#: What belongs to nodes, and is left behind where dofs are no longer theirs.
+_NO_NODES: dict[str, Any] = dict.fromkeys(
+    ("coordinates", "displacements", "expansion", "hexahedra", "labels", "node_numbers")
+)
+
+
+def tie(A: Term | None, T: Parts) -> dict[int, Sparse] | None:
+    """A matrix of a sector on the dofs that its ties leave."""
+    return None if A is None else combine(T, {0: sp.csr_matrix(A, dtype=float)}, T, -1)
+
+
+def _sparse(given: Term | None) -> Term | None:
+    """In CSR form of float, by sector where it was."""
+    if isinstance(given, Mapping):
+        return {k: sp.csr_matrix(A, dtype=float) for k, A in given.items()}
+    return None if given is None else sp.csr_matrix(given, dtype=float)
+
+
+def _plain(terms: dict[int, Sparse]) -> Term:
+    """A matrix alone where no other sector is reached."""
+    return terms[0].tocsr() if list(terms) == [0] else terms

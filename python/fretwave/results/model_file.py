@@ -1,8 +1,8 @@
 """The native model file: matrices, names, nodes and contact maps in one HDF5 file.
 
-Written by ``fretwave import`` (or `write`), read by ``[model] file = "blade.h5"``. One rank reads and writes it with
-serial h5py calls; `fretwave.Model` distributes the rows. Numbers are float64 and int64 (indices of CSR: int32 or int64,
-from 0).
+Written by ``fretwave import`` (or `write_model`), read by ``[model] file = "blade.h5"`` (or `read_model`), by one rank
+with serial h5py calls; `fretwave.Model` distributes the rows. Numbers are float64 and int64 (indices of CSR: int32
+or int64, from 0).
 
 =========================  ===================================================================================
 place                      content
@@ -29,10 +29,11 @@ place                      content
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Union
 
 import numpy as np
 import numpy.typing as npt
@@ -41,45 +42,22 @@ import scipy.sparse as sp
 from ..errors import InputError
 from ..files.compressed import check_compressed
 from ..files.whole import Unfailing, check_whole, replaced, seal
+from ..model.pairs import Pairs
+from ..model.structure import Structure
 from ..texts import display, nearest
 
 if TYPE_CHECKING:
-    from ..model.structure import BuiltModel
+    import h5py
 
-Array = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
+#: An array of the file, None where it has none.
+Table = Union[npt.NDArray[Any], None]
 
 FORMAT, VERSION = "fretwave model", 1
+#: Arrays of dofs, nodes and cells.
+_TABLES = ("dofs/node", "dofs/direction", "dofs/kept", "nodes/number", "nodes/coordinates", "cells/hexahedra")
 #: Names of the directions 1 to 6 in a dof's name.
 DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
-
-
-@dataclass
-class ContactMap:
-    """Contact pairs of a model file, without a law.
-
-    Attributes
-    ----------
-    B : (3 n_pairs, n_dof) CSR
-        u = B x, rows (normal, tangent, tangent) pair by pair; u_n > 0 closes the contact.
-    positions : (n_pairs, 3) or None
-    areas : (n_pairs,) or None
-    frames : (n_pairs, 3, 3) or None
-        Rows: normal, from the first body to the second, and two tangents.
-    nodes : (n_pairs, 2) or None
-        First and second node of each pair, 0 for ground.
-    """
-
-    name: str
-    B: sp.csr_matrix
-    positions: Array | None = None
-    areas: Array | None = None
-    frames: Array | None = None
-    nodes: IntArray | None = None
-
-    @property
-    def pairs(self) -> int:
-        return int(self.B.shape[0] // 3)
 
 
 @dataclass(frozen=True)
@@ -94,69 +72,6 @@ class SourceFile:
     @classmethod
     def of(cls, role: str, path: Path) -> SourceFile:
         return cls(role, path.name, path.stat().st_size, digest(path))
-
-
-@dataclass
-class FileModel:
-    """What a model file holds.
-
-    Attributes
-    ----------
-    M, K, C : (n_dof, n_dof) CSR, C may be None
-    names : list of str
-        Of the dofs.
-    node, direction : (n_dof,) or None
-        Node number and direction (1 to 6) of each dof.
-    kept : (n,) or None
-        Dofs a reduction shall keep beside those of the contacts.
-    node_numbers, coordinates : (n_nodes,), (n_nodes, 3) or None
-    hexahedra : (n_cells, 8 or 20) or None
-        Rows of the nodes of each cell.
-    contacts : dict of ContactMap by name
-    """
-
-    M: sp.csr_matrix
-    K: sp.csr_matrix
-    C: sp.csr_matrix | None
-    names: list[str]
-    node: IntArray | None = None
-    direction: IntArray | None = None
-    kept: IntArray | None = None
-    node_numbers: IntArray | None = None
-    coordinates: Array | None = None
-    hexahedra: IntArray | None = None
-    contacts: dict[str, ContactMap] = field(default_factory=dict)
-    units: str = ""
-    sources: list[SourceFile] = field(default_factory=list)
-
-    @property
-    def size(self) -> int:
-        return int(self.M.shape[0])
-
-    def built(self) -> BuiltModel:
-        """As a builder gives it: contacts by name, and the dofs a reduction keeps."""
-        from ..model.structure import BuiltContact, BuiltModel
-
-        contacts = {
-            name: BuiltContact(c.B, 3, areas=c.areas, points=c.positions, frames=c.frames)
-            for name, c in self.contacts.items()
-        }
-        kept = {self.names[dof]: int(dof) for dof in (() if self.kept is None else self.kept)}
-        grid: dict[str, Any] = {}
-        if self.coordinates is not None and self.node is not None:
-            grid = dict(coordinates=self.coordinates, displacements=self._displacements(), hexahedra=self.hexahedra)
-        return BuiltModel(self.M, self.K, self.C, kept, contacts, **grid)
-
-    def _displacements(self) -> IntArray:
-        """Dof (n_nodes, 3) of each node along x, y and z, -1 where the matrices have none: it is held."""
-        assert self.node is not None and self.direction is not None and self.node_numbers is not None
-        order = np.argsort(self.node_numbers)
-        place = np.clip(np.searchsorted(self.node_numbers, self.node, sorter=order), 0, len(order) - 1)
-        rows, dofs = order[place], np.arange(self.size)
-        shown = (self.node_numbers[rows] == self.node) & (self.direction <= 3)
-        found = np.full((len(order), 3), -1, dtype=np.int64)
-        found[rows[shown], self.direction[shown] - 1] = dofs[shown]
-        return found
 
 
 def dof_name(node: int, direction: int) -> str:
@@ -174,8 +89,16 @@ def digest(path: Path) -> str:
     return found.hexdigest()
 
 
-def write(path: str | Path, model: FileModel) -> None:
+def write_model(path: str | Path, structure: Structure, units: str = "", sources: Sequence[SourceFile] = ()) -> None:
     """Write a model file. One rank only; an old file is replaced once the new one is complete.
+
+    Parameters
+    ----------
+    structure : Structure
+        As it was given: one that is no sector tied to its neighbours. `dofs` are those that a reduction shall keep.
+    units : str
+        Free text.
+    sources : what the matrices were read from
 
     Raises
     ------
@@ -184,7 +107,9 @@ def write(path: str | Path, model: FileModel) -> None:
     """
     import h5py
 
-    _check(model, str(path))
+    tables = _tables_of(structure)
+    _check_held(structure, str(path))
+    _check(structure, tables, str(path))
     path = Path(path)
     if path.is_dir() or not path.parent.is_dir():
         measured = "a folder of this name" if path.is_dir() else "no such folder"
@@ -193,39 +118,66 @@ def write(path: str | Path, model: FileModel) -> None:
     with replaced(path, own=True) as fresh:
         raw = Unfailing(fresh)
         with h5py.File(raw, "w") as file:
-            file.attrs.update(format=FORMAT, format_version=VERSION, units=model.units)
-            _write_parts(file, model)
+            file.attrs.update(format=FORMAT, format_version=VERSION, units=units)
+            _write_parts(file, structure, tables)
+            for key in ("role", "path", "sha256"):
+                file[f"sources/{key}"] = np.array([getattr(s, key).encode() for s in sources], dtype="S")
+            file["sources/bytes"] = np.array([s.bytes for s in sources], dtype="<i8")
         raw.close()
         seal(fresh)
 
 
-def _write_parts(file: Any, model: FileModel) -> None:
+#: What format version 1 has no place for.
+_NOT_HELD = ("loads", "parts", "ties", "sectors", "stiffness_damping", "mass_damping")
+
+
+def _check_held(structure: Structure, where: str) -> None:
+    """Nothing is left behind in silence."""
+    lost = [name for name in _NOT_HELD if getattr(structure, name)]
+    lost += [] if structure.expansion is None else ["expansion"]
+    lost += [f"pairs '{name}' of one component" for name, pairs in structure.pairs.items() if pairs.components != 3]
+    lost += [f"parameters of '{name}'" for name, pairs in structure.pairs.items() if pairs.parameters]
+    if lost:
+        fix = "leave them out, or give them by a builder"
+        raise InputError("a model file has no place for these", where, ", ".join(lost), None, fix)
+
+
+def _tables_of(structure: Structure) -> dict[str, Table]:
+    """Arrays of dofs, nodes and cells by their places in the file."""
+    labels = structure.labels
+    return {
+        "dofs/node": None if labels is None else labels[:, 0],
+        "dofs/direction": None if labels is None else labels[:, 1],
+        "dofs/kept": np.array(list(structure.dofs.values()), dtype=np.int64) if structure.dofs else None,
+        "nodes/number": structure.node_numbers,
+        "nodes/coordinates": structure.coordinates,
+        "cells/hexahedra": structure.hexahedra,
+    }
+
+
+def _write_parts(file: h5py.File, structure: Structure, tables: Mapping[str, Table]) -> None:
     for letter in ("M", "K", "C"):
-        if getattr(model, letter) is not None:
-            _write_sparse(file.create_group(letter), getattr(model, letter))
-    file["dofs/name"] = np.array([name.encode() for name in model.names])
-    _write_arrays(file, {table: getattr(model, name) for table, name in zip(_TABLES, _ARRAYS)})
-    for name, contact in model.contacts.items():
-        _write_sparse(file.create_group(f"contacts/{name}/B"), contact.B)
-        _write_arrays(file[f"contacts/{name}"], {key: getattr(contact, key) for key in _PAIR_ARRAYS})
-    for key in ("role", "path", "sha256"):
-        file[f"sources/{key}"] = np.array([getattr(s, key).encode() for s in model.sources], dtype="S")
-    file["sources/bytes"] = np.array([s.bytes for s in model.sources], dtype="<i8")
+        if getattr(structure, letter) is not None:
+            _write_sparse(file.create_group(letter), getattr(structure, letter))
+    file["dofs/name"] = np.array([name.encode() for name in structure.dof_names])
+    _write_arrays(file, tables)
+    for name, pairs in structure.pairs.items():
+        _write_sparse(file.create_group(f"contacts/{name}/B"), pairs.own)
+        _write_arrays(file[f"contacts/{name}"], {key: getattr(pairs, own) for key, own in _PAIR_ARRAYS.items()})
 
 
-_PAIR_ARRAYS = ("positions", "areas", "frames", "nodes")
-_ARRAYS = ("node", "direction", "kept", "node_numbers", "coordinates", "hexahedra")
-_TABLES = ("dofs/node", "dofs/direction", "dofs/kept", "nodes/number", "nodes/coordinates", "cells/hexahedra")
+#: Arrays of pairs by their names in the file, and as attributes of `Pairs`.
+_PAIR_ARRAYS = {"positions": "points", "areas": "areas", "frames": "frames", "nodes": "nodes"}
 
 
-def _write_arrays(group: Any, arrays: Mapping[str, Any]) -> None:
+def _write_arrays(group: h5py.Group, arrays: Mapping[str, Table]) -> None:
     for name, values in arrays.items():
         if values is not None:
             values = np.asarray(values)
             group[name] = values.astype("<f8" if values.dtype.kind == "f" else "<i8")
 
 
-def _write_sparse(group: Any, matrix: Any) -> None:
+def _write_sparse(group: h5py.Group, matrix: sp.spmatrix) -> None:
     rows = sp.csr_matrix(matrix, dtype=float)
     rows.sort_indices()
     group.attrs["shape"] = np.array(rows.shape, dtype="<i8")
@@ -233,7 +185,7 @@ def _write_sparse(group: Any, matrix: Any) -> None:
         group[key] = getattr(rows, key)
 
 
-def read(path: str | Path) -> FileModel:
+def read_model(path: str | Path) -> Structure:
     """Read a model file. One rank only (see `fretwave.mpi.guard.on_first_rank`).
 
     Raises
@@ -242,22 +194,62 @@ def read(path: str | Path) -> FileModel:
         The file is missing, is no model file, is of a later version or is damaged.
     """
     path = Path(path)
-    with _opened(path) as file:
-        try:
-            model = _read_parts(file)
-        except (KeyError, OSError, ValueError, TypeError, AttributeError, RuntimeError, OverflowError) as error:
-            raise InputError(
-                "the model file is damaged",
-                display(path),
-                str(error).strip("'\""),
-                f"the layout of format version {VERSION}",
-                "write it again with `fretwave import`",
-            ) from None
-    _check(model, display(path))
-    return model
+    with _opened(path) as file, _damaged(path):
+        structure, tables = _read_parts(file)
+    _check(structure, tables, display(path))
+    kept = tables["dofs/kept"]
+    names = structure.dof_names
+    dofs = {names[dof]: int(dof) for dof in (() if kept is None else kept)}
+    if structure.labels is None or structure.coordinates is None:  # not known which dof moves which node
+        return replace(structure, dofs=dofs, coordinates=None, hexahedra=None)
+    return replace(structure, dofs=dofs, displacements=_displacements(structure))
 
 
-def _opened(path: Path) -> Any:
+def read_sources(path: str | Path) -> tuple[str, list[SourceFile]]:
+    """Units and what a model file was made from. One rank only.
+
+    Raises
+    ------
+    InputError
+        As `read_model`.
+    """
+    path = Path(path)
+    with _opened(path) as file, _damaged(path):
+        group = file.get("sources", {})
+        columns = [group[key][()] for key in ("role", "path", "bytes", "sha256")] if len(group) else []
+        sources = [SourceFile(a.decode(), b.decode(), int(c), d.decode()) for a, b, c, d in zip(*columns)]
+        return str(file.attrs.get("units", "")), sources
+
+
+@contextmanager
+def _damaged(path: Path) -> Iterator[None]:
+    """Whatever h5py and SciPy say of a file that lacks or spoils something."""
+    try:
+        yield
+    except (KeyError, OSError, ValueError, TypeError, AttributeError, RuntimeError, OverflowError) as error:
+        raise InputError(
+            "the model file is damaged",
+            display(path),
+            str(error).strip("'\""),
+            f"the layout of format version {VERSION}",
+            "write it again with `fretwave import`",
+        ) from None
+
+
+def _displacements(structure: Structure) -> IntArray:
+    """Dof (n_nodes, 3) of each node along x, y and z, -1 where the matrices have none: it is held."""
+    assert structure.labels is not None and structure.node_numbers is not None
+    (node, direction), numbers = structure.labels.T, structure.node_numbers
+    order = np.argsort(numbers)
+    place = np.clip(np.searchsorted(numbers, node, sorter=order), 0, len(order) - 1)
+    rows, dofs = order[place], np.arange(structure.n_dof)
+    shown = (numbers[rows] == node) & (direction <= 3)
+    found = np.full((len(order), 3), -1, dtype=np.int64)
+    found[rows[shown], direction[shown] - 1] = dofs[shown]
+    return found
+
+
+def _opened(path: Path) -> h5py.File:
     import h5py
 
     fix = "write it with `fretwave import`"
@@ -284,71 +276,82 @@ def _opened(path: Path) -> Any:
     )
 
 
-def _read_parts(file: Any) -> FileModel:
-    matrices = {letter: _read_sparse(file[letter]) if letter in file else None for letter in ("M", "K", "C")}
+def _read_parts(file: h5py.File) -> tuple[Structure, dict[str, Table]]:
+    """The structure with its tables, as they stand in the file."""
+    matrices: dict[str, Any] = {
+        letter: _read_sparse(file[letter]) if letter in file else None for letter in ("M", "K", "C")
+    }
     missing = [letter for letter in ("M", "K") if matrices[letter] is None]
     if missing:
         raise KeyError(f"there is no matrix {missing[0]}")
-    sources = file.get("sources", {})
-    columns = [sources[key][()] for key in ("role", "path", "bytes", "sha256")] if len(sources) else []
-    return FileModel(
+    tables = {place: _array(file, place) for place in _TABLES}
+    node, direction = tables["dofs/node"], tables["dofs/direction"]
+    both = None if node is None or direction is None or len(node) != len(direction) else [node, direction]
+    structure = Structure(
         **matrices,
+        pairs={name: _read_pairs(group) for name, group in file.get("contacts", {}).items()},
         names=[name.decode() for name in file["dofs/name"][()]],
-        **dict(zip(_ARRAYS, (_array(file, table) for table in _TABLES))),
-        contacts={name: _read_contact(name, group) for name, group in file.get("contacts", {}).items()},
-        units=str(file.attrs.get("units", "")),
-        sources=[SourceFile(a.decode(), b.decode(), int(c), d.decode()) for a, b, c, d in zip(*columns)],
+        labels=None if both is None else np.column_stack(both),
+        node_numbers=tables["nodes/number"],
+        coordinates=tables["nodes/coordinates"],
+        hexahedra=tables["cells/hexahedra"],
     )
+    return structure, tables
 
 
-def _array(group: Any, name: str) -> Any:
+def _array(group: h5py.Group, name: str) -> Table:
     return group[name][()] if name in group else None
 
 
-def _read_contact(name: str, group: Any) -> ContactMap:
-    return ContactMap(name, _read_sparse(group["B"]), **{key: _array(group, key) for key in _PAIR_ARRAYS})
+def _read_pairs(group: h5py.Group) -> Pairs:
+    arrays: dict[str, Any] = {own: _array(group, key) for key, own in _PAIR_ARRAYS.items()}
+    return Pairs(_read_sparse(group["B"]), **arrays)
 
 
-def _read_sparse(group: Any) -> sp.csr_matrix:
+def _read_sparse(group: h5py.Group) -> sp.csr_matrix:
     parts = tuple(group[key][()] for key in ("data", "indices", "indptr"))
     matrix = sp.csr_matrix(parts, shape=tuple(int(n) for n in group.attrs["shape"]))
     check_compressed(matrix)
     return matrix
 
 
-def _check(model: FileModel, where: str) -> None:
+def _check(structure: Structure, tables: Mapping[str, Table], where: str) -> None:
     """The parts fit each other."""
-    n = model.size
+    n, names = structure.n_dof, structure.dof_names
 
     def wrong(what: str, measured: object, expected: object) -> InputError:
         return InputError(what, where, measured, expected, "write the file again with matching parts")
 
     for letter in ("M", "K", "C"):
-        matrix = getattr(model, letter)
+        matrix = getattr(structure, letter)
         if matrix is not None and matrix.shape != (n, n):
             raise wrong(f"{letter} does not fit M", f"{matrix.shape}", f"{(n, n)}")
-    if len(model.names) != n or len(set(model.names)) != n:
-        raise wrong("the names of the dofs do not fit", f"{len(set(model.names))} different names", f"{n}, one per dof")
-    for name, values, length in _lengths(model):
-        if values is not None and len(values) != length:
-            raise wrong(f"{name} does not fit", f"{len(values)} values", length)
-    cells, nodes = model.hexahedra, 0 if model.node_numbers is None else len(model.node_numbers)
+    if len(names) != n or len(set(names)) != n:
+        raise wrong("the names of the dofs do not fit", f"{len(set(names))} different names", f"{n}, one per dof")
+    for name, length, expected in _lengths(structure, tables):
+        if length != expected:
+            raise wrong(f"{name} does not fit", f"{length} values", expected)
+    cells, nodes = tables["cells/hexahedra"], _count(tables["nodes/number"])
     if cells is not None and cells.size and not 0 <= cells.min() <= cells.max() < nodes:
         raise wrong("a node of a cell does not exist", f"{cells.min()} to {cells.max()}", f"0 to {nodes - 1}")
-    if model.kept is not None and len(model.kept) and not 0 <= min(model.kept) <= max(model.kept) < n:
-        raise wrong("a kept dof does not exist", f"{min(model.kept)} to {max(model.kept)}", f"0 to {n - 1}")
+    kept = tables["dofs/kept"]
+    if kept is not None and len(kept) and not 0 <= min(kept) <= max(kept) < n:
+        raise wrong("a kept dof does not exist", f"{min(kept)} to {max(kept)}", f"0 to {n - 1}")
 
 
-def _lengths(model: FileModel) -> Sequence[tuple[str, Any, int]]:
-    """Every array with the length it must have."""
-    nodes = 0 if model.node_numbers is None else len(model.node_numbers)
-    table: list[tuple[str, Any, int]] = [
-        ("dofs/node", model.node, model.size),
-        ("dofs/direction", model.direction, model.size),
-    ]
-    table.append(("nodes/coordinates", model.coordinates, nodes))
-    for contact in model.contacts.values():
-        table.append((f"contacts/{contact.name}/B", range(contact.B.shape[1]), model.size))
-        table.append((f"contacts/{contact.name}/B", range(contact.B.shape[0]), 3 * contact.pairs))
-        table += [(f"contacts/{contact.name}/{key}", getattr(contact, key), contact.pairs) for key in _PAIR_ARRAYS]
+def _lengths(structure: Structure, tables: Mapping[str, Table]) -> list[tuple[str, int, int]]:
+    """Every array with the length it has and the one it must have."""
+    n, nodes = structure.n_dof, _count(tables["nodes/number"])
+    expected = {"dofs/node": n, "dofs/direction": n, "nodes/coordinates": nodes}
+    table = [(name, len(values), expected[name]) for name in expected if (values := tables[name]) is not None]
+    for name, pairs in structure.pairs.items():
+        rows, columns = pairs.own.shape
+        place = f"contacts/{name}"
+        table += [(f"{place}/B", columns, n), (f"{place}/B", rows, pairs.components * pairs.n_pairs)]
+        arrays = {key: getattr(pairs, own) for key, own in _PAIR_ARRAYS.items()}
+        table += [(f"{place}/{key}", len(v), pairs.n_pairs) for key, v in arrays.items() if v is not None]
     return table
+
+
+def _count(values: Table) -> int:
+    return 0 if values is None else len(values)

@@ -18,11 +18,10 @@ import numpy.typing as npt
 
 from ..case.load import Case
 from ..case.reduce import reduction_of
-from ..case.reduce_sector import sector_reduction_of
-from ..cyclic.faces import rotation
 from ..errors import InputError
 from ..fe.mesh import VTK_LATTICE
-from ..model.structure import BuiltModel
+from ..model.sectors import rotation
+from ..model.structure import Structure
 from ..texts import display
 from .choice import Choice
 from .vtkhdf import HEXAHEDRON, QUADRATIC_HEXAHEDRON, TRIQUADRATIC_HEXAHEDRON, VERTEX, linear_cells
@@ -161,25 +160,26 @@ def scene_of(case: Case, choice: Choice, nodes: Array, sectors: Sequence[int] = 
     """
     from mpi4py import MPI
 
+    from ..cyclic.reduction import SectorReduction
+
     neighbours = case.neighbours
     around = neighbours.sectors if neighbours else 1
     ties: Any = neighbours.ties if neighbours else None
     expand: Expand = _unchanged
     with ExitStack() as stack:
-        if case.reduction is not None and neighbours is not None:
-            sector = stack.enter_context(sector_reduction_of(case, MPI.COMM_SELF))
-            expand, ties = sector.expand, sector.sector().ties
-            size = (sector.size - sector.n_interface) * (around if choice.wheel else 1)
-            _check_same(case, choice, size, sector.component_hz)
-        elif case.reduction is not None:
-            reduction = stack.enter_context(reduction_of(case, case.reduction, MPI.COMM_SELF))
-            expand = reduction.expand
-            _check_same(case, choice, reduction.size, reduction.component_hz)
-        built, shown = geometry(case), _shown(case, around, sectors)
-        yield Scene(nodes, choice, _to_nodes(built, len(nodes), expand), shown, ties, around, built.axis or "z")
+        if case.reduction is not None:
+            reduction = reduction_of(case, MPI.COMM_SELF)
+            stack.callback(reduction.destroy)
+            expand, size = reduction.expand, reduction.size
+            if isinstance(reduction, SectorReduction):
+                ties = reduction.sector().ties
+                size = (size - reduction.n_interface) * (around if choice.wheel else 1)
+            _check_same(case, choice, size, reduction.component_hz)
+        given, shown = geometry(case), _shown(case, around, sectors)
+        yield Scene(nodes, choice, _to_nodes(given, len(nodes), expand), shown, ties, around, given.axis or "z")
 
 
-def geometry(case: Case) -> BuiltModel:
+def geometry(case: Case) -> Structure:
     """Nodes, cells and pairs of the model as it was given: of a sector, with both its faces.
 
     Raises
@@ -187,23 +187,22 @@ def geometry(case: Case) -> BuiltModel:
     InputError
         There are no nodes.
     """
-    built = case.built if case.neighbours is None else case.neighbours.cut.origin.built
-    if built is None or built.coordinates is None:
-        matrices = "only matrices" if built is None else "no coordinates of nodes with three displacements each"
+    given = case.structure.cut or case.structure
+    if given.coordinates is None:
         raise InputError(
             "the model cannot be drawn: it has no nodes",
             display(case.path),
-            matrices,
+            "no coordinates of nodes with three displacements each",
             "a builder that gives coordinates (and hexahedra), or a model file with coordinates",
-            "give BuiltModel its coordinates, or import with --coordinates; `fretwave plot` needs neither",
+            "give Structure its coordinates, or import with --coordinates; `fretwave plot` needs neither",
         )
-    return built
+    return given
 
 
 def mesh_of(case: Case, linear: bool = False) -> tuple[Array, tuple[IntArray, int]]:
     """Nodes (n_nodes, 3), and cells (n_cells, m) with VTK's number of their kind; points where there are no cells."""
-    built = geometry(case)
-    nodes, cells = np.asarray(built.coordinates), built.hexahedra
+    given = geometry(case)
+    nodes, cells = np.asarray(given.coordinates), given.hexahedra
     if cells is None:
         return nodes, (np.arange(len(nodes))[:, None], VERTEX)
     if cells.shape[1] == 27 and linear:
@@ -215,15 +214,15 @@ def _unchanged(columns: Any) -> Array:
     return np.asarray(columns)
 
 
-def _to_nodes(built: BuiltModel, n_nodes: int, expand: Expand) -> ToNodes:
+def _to_nodes(given: Structure, n_nodes: int, expand: Expand) -> ToNodes:
     """Through the case's reduction and the builder's own."""
 
     def displacements(columns: Array) -> Array:
         columns = expand(np.ascontiguousarray(columns))
-        if built.expansion is not None:
-            columns = built.expansion @ columns
-        if built.displacements is not None:  # held dofs, -1, read the row of zeros
-            columns = np.vstack([columns, np.zeros(columns.shape[1])])[built.displacements.ravel()]
+        if given.expansion is not None:
+            columns = given.expansion @ columns
+        if given.displacements is not None:  # held dofs, -1, read the row of zeros
+            columns = np.vstack([columns, np.zeros(columns.shape[1])])[given.displacements.ravel()]
         return np.asarray(columns.reshape(n_nodes, 3, -1))
 
     return displacements
@@ -236,7 +235,7 @@ def _shown(case: Case, around: int, asked: Sequence[int]) -> list[int]:
         expected = f"0 to {around - 1}" if around > 1 else "a model with sectors"
         raise InputError("there is no such sector", "--sectors", wrong[0], expected, "--sectors 0")
     if case.neighbours is not None and geometry(case).axis is None and chosen != [0]:
-        fix = "give BuiltModel its axis, or show one sector with --sectors 0"
+        fix = "give Structure its axis, or show one sector with --sectors 0"
         raise InputError("the wheel cannot be drawn: it has no axis", display(case.path), fix=fix)
     return chosen
 

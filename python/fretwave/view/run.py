@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 
 from ..case.kept import reload_case
 from ..case.load import Case
-from ..model.structure import BuiltContact
+from ..model.pairs import Pairs
 from ..post.contact_history import OPEN, SLIP, STICK, ContactHistory
 from ..post.motion import complex_amplitudes
 from ..results.results import open_results
@@ -102,7 +102,7 @@ def write_grid(path: Path, scene: Scene, cells: tuple[IntArray, int], scale: flo
                 numbers(0, part, np.full(len(shape.nodes), sector))
 
 
-def write_pairs(path: Path, scene: Scene, placed: Mapping[str, BuiltContact], scale: float) -> list[int]:
+def write_pairs(path: Path, scene: Scene, placed: Mapping[str, Pairs], scale: float) -> list[int]:
     """Contact pairs as points that move with the node next to them; returns the sectors whose pairs are shown.
 
     Other sectors of a wave are shown where their delay is a whole number of samples.
@@ -129,7 +129,7 @@ def write_pairs(path: Path, scene: Scene, placed: Mapping[str, BuiltContact], sc
 
 
 def _pair_fields(
-    grid: GridFile, names: Sequence[str], contacts: Sequence[BuiltContact], choice: Choice
+    grid: GridFile, names: Sequence[str], contacts: Sequence[Pairs], choice: Choice
 ) -> Callable[..., None]:
     """Of every step: forces, gap, status; of every period: shares of the status, dissipated work."""
     first = [history for name in names for history in choice.contacts[name]]
@@ -182,9 +182,9 @@ def _write_states(grid: GridFile, choice: Choice) -> None:
     grid.field_data("phase", np.tile(choice.phases, len(choice.points)))
 
 
-def _placed(case: Case, choice: Choice, say: Callable[[str], None]) -> dict[str, BuiltContact]:
+def _placed(case: Case, choice: Choice, say: Callable[[str], None]) -> dict[str, Pairs]:
     """Contacts with known places of their pairs."""
-    built = geometry(case).contacts
+    built = geometry(case).pairs
     for name in choice.contacts:
         if name not in built or built[name].points is None:
             say(f"contact '{name}' is not shown: the model has no places of its pairs")

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -17,15 +17,11 @@ from scipy.spatial import Delaunay, QhullError
 from ..case.contacts import wear_areas
 from ..case.load import Case
 from ..errors import InputError
-from ..model.structure import BuiltContact
+from ..model.pairs import Pairs
 from ..results.results import open_results
 from ..texts import display
 from .choice import ViewOptions
 from .vtkhdf import TRIANGLE, VERTEX, GridFile
-
-if TYPE_CHECKING:
-    import h5py
-
 
 Array = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.intp]
@@ -72,16 +68,16 @@ def view_wear(folder: Path, case: Case, name: str, options: ViewOptions, say: Ca
     return written
 
 
-def _placed(case: Case, name: str) -> dict[str, BuiltContact]:
-    built = case.built.contacts if case.built else {}
-    found = {key: built[key] for key in wear_areas(case.contacts, built) if built[key].points is not None}
+def _placed(case: Case, name: str) -> dict[str, Pairs]:
+    pairs = case.structure.pairs
+    found = {key: pairs[key] for key in wear_areas(case.contacts) if pairs[key].points is not None}
     if not found:
-        fix = "give BuiltContact its points; `fretwave plot` draws histories without them"
+        fix = "give Pairs their points; `fretwave plot` draws histories without them"
         raise InputError("the model has no places of its contact pairs", f"analysis '{name}'", None, "points", fix)
     return found
 
 
-def _chosen(group: h5py.Group, options: ViewOptions, where: str) -> list[IntArray]:
+def _chosen(group: Any, options: ViewOptions, where: str) -> list[IntArray]:
     """Rows of the lines whose amplitudes are asked for."""
     number, amplitude = group["points/line"][()], group["points/amplitude"][()]
     lines = [np.flatnonzero(number == k) for k in np.unique(number)]
@@ -96,9 +92,7 @@ def _chosen(group: h5py.Group, options: ViewOptions, where: str) -> list[IntArra
     return [lines[int(np.argmin(np.abs(given - asked)))] for asked in options.amplitudes]
 
 
-def _write(
-    path: Path, group: h5py.Group, rows: IntArray, placed: Mapping[str, BuiltContact], scale: float | None
-) -> float:
+def _write(path: Path, group: Any, rows: IntArray, placed: Mapping[str, Pairs], scale: float | None) -> float:
     """One line; returns the factor on the depths in the field warp."""
     steps, table = np.arange(len(rows)), group["points"]
     arrays = {key: _over_steps(group, key, rows, placed) for key in FIELDS}
@@ -123,13 +117,13 @@ def _write(
     return scale
 
 
-def _over_steps(group: h5py.Group, key: str, rows: IntArray, placed: Mapping[str, BuiltContact]) -> Array:
+def _over_steps(group: Any, key: str, rows: IntArray, placed: Mapping[str, Pairs]) -> Array:
     """(n_steps, n_pairs of all contacts)."""
     parts = [np.asarray(group[f"{key}_{name}"][rows[0] : rows[-1] + 1])[rows - rows[0]] for name in placed]
     return np.concatenate(parts, axis=1)
 
 
-def surface(contact: BuiltContact) -> tuple[IntArray, int]:
+def surface(contact: Pairs) -> tuple[IntArray, int]:
     """Cells on the pairs with VTK's number of their kind: triangles on each face, single points where that fails."""
     vertices = np.arange(contact.n_pairs)[:, None], VERTEX
     if contact.positions is None:
@@ -142,7 +136,7 @@ def surface(contact: BuiltContact) -> tuple[IntArray, int]:
     return np.concatenate(cells), TRIANGLE
 
 
-def _faces(contact: BuiltContact) -> tuple[list[str], IntArray]:
+def _faces(contact: Pairs) -> tuple[list[str], IntArray]:
     """Names of the faces, and the number of each pair's."""
     given = list(contact.faces) if contact.faces is not None else [""] * contact.n_pairs
     names = list(dict.fromkeys(str(face) for face in given))

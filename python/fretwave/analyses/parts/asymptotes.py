@@ -53,7 +53,7 @@ def closed_stiffness(context: AnalysisContext[AnalysisSection], tangential: bool
         for row in range(contact.components):
             value = contact.value(contact.info.stiffness_along(row))
             if value is not None and (tangential or row == contact.info.normal):
-                rows = contact.rows[row :: contact.components]
+                rows = contact.pairs.own[row :: contact.components]
                 stiffness = np.broadcast_to(value, (contact.n_pairs,))
                 total = total + rows.T @ sp.diags(stiffness) @ rows
     return total

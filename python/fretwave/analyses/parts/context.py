@@ -15,11 +15,11 @@ from ...case.analysis import AnalysisSection
 from ...case.harmonic import nodal_diameter, with_flow_forces
 from ...case.kept import belongs
 from ...case.load import Case
-from ...case.wheel import Wheel
 from ...columns import Column
 from ...console import Console
 from ...errors import InputError
 from ...files.whole import replace_text
+from ...model.structure import Structure
 from ...mpi.guard import on_first_rank
 from ...results.results import AnalysisWriter, Field, has_results, open_results
 from ...texts import display
@@ -117,10 +117,16 @@ class AnalysisContext(Generic[Section]):
         return self.analysis.name
 
     @property
-    def wheel(self) -> Wheel:
+    def wheel(self) -> Structure:
         """Of an analysis of a whole wheel."""
         assert self.case.wheel is not None
         return self.case.wheel
+
+    @property
+    def tuned(self) -> Case:
+        """Of an analysis of a whole wheel: the case of the tuned sector."""
+        assert self.case.sector is not None
+        return self.case.sector
 
     @property
     def prefix(self) -> str:

@@ -10,10 +10,11 @@ import numpy as np
 import scipy.sparse.linalg
 
 from ...case.analysis import AnalysisSection
-from ...case.contacts import ContactSpec, closed_contacts
+from ...case.contacts import closed_contacts
 from ...case.harmonic import HarmonicSection, nodal_diameter
 from ...case.schema import PreloadSection
 from ...errors import InputError
+from ...model.contact import Contact
 from ...model.laws import Role, own_load
 from .asymptotes import closed_stiffness
 from .context import AnalysisContext
@@ -66,10 +67,10 @@ def loaded_state(context: AnalysisContext[AnalysisSection], factor: float = 1.0)
     return static_preload(context.model, load, reference, closed=closed)
 
 
-def just_touching(contacts: Sequence[ContactSpec], section: PreloadSection) -> bool:
+def just_touching(contacts: Sequence[Contact], section: PreloadSection) -> bool:
     """Pairs with a normal direction, none with a gap or with a load of its own."""
 
-    def has(contact: ContactSpec, role: Role) -> bool:
+    def has(contact: Contact, role: Role) -> bool:
         value = contact.value(role)
         return value is not None and bool(np.any(value))
 
@@ -145,10 +146,9 @@ def retained(
 
 def keep_pairs(context: AnalysisContext[AnalysisSection], writer: AnalysisWriter) -> None:
     """Keep with the results where the contact pairs are, for the pictures."""
-    built = context.case.built.contacts if context.case.built else {}
     for contact in context.case.contacts:
-        given = built.get(contact.name)
-        if given is None or given.positions is None:
+        given = contact.pairs
+        if given.positions is None:
             continue
         faces = list(given.faces) if given.faces is not None else [contact.name] * given.n_pairs
         friction = contact.value(Role.FRICTION_COEFFICIENT)

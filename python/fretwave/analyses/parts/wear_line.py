@@ -49,15 +49,15 @@ class Line:
 
 def wear_areas(case: Case) -> dict[str, Any]:
     """Nodal areas (n_pairs,) [m^2] of the contacts that wear."""
-    return contacts.wear_areas(case.contacts, case.built.contacts if case.built else {})
+    return contacts.wear_areas(case.contacts)
 
 
 def faces_of(case: Case) -> list[tuple[str, str, Any]]:
     """(name of the face, contact, which of its pairs (n_pairs,) bool) of all faces that wear."""
     out = []
     for name, areas in wear_areas(case).items():
-        built = case.built.contacts[name] if case.built else None
-        faces = np.array([name] * len(areas) if built is None or built.faces is None else list(built.faces))
+        given = case.structure.pairs[name].faces
+        faces = np.array([name] * len(areas) if given is None else list(given))
         out += [(str(face), name, faces == face) for face in dict.fromkeys(faces.tolist())]
     return out
 

@@ -73,7 +73,7 @@ class WheelShape:
         self, context: AnalysisContext[AnalysisSection], dof: str, tuned_amplitude: float, mode: LinearMode
     ) -> None:
         self.wheel, self.M, self.tuned = context.wheel, context.case.M, tuned_amplitude
-        self.dof = self.wheel.sector.dof(dof)
+        self.dof = context.tuned.dof(dof)
         phi = mode.shape + 1j * mode.imaginary
         # what forces are measured in, per displacement (`reference_stiffness` of the core)
         self.stiffness = mode.omega**2 * np.real(phi.conj() @ (self.M @ phi)) / np.linalg.norm(phi) ** 2

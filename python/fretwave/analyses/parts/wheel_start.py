@@ -109,7 +109,7 @@ def tuned_sector(context: AnalysisContext[Harmonic]) -> Iterator[AnalysisContext
     from ...case.build import build_model
 
     analysis = context.analysis
-    case = context.wheel.sector
+    case = context.tuned
     preload, flow = case.preload_of(analysis), analysis.aerodynamics
     with build_model(case, analysis.dampers, context.comm, preload, nodal_diameter(analysis), flow) as model:
         yield replace(context, model=model, case=case, arrays={})
@@ -126,7 +126,7 @@ def _tuned(context: AnalysisContext[ModeAnalysis]) -> tuple[LinearMode, dict[str
 def tuned_amplitude(context: AnalysisContext[ModeAnalysis], tuned: LinearMode) -> float:
     """Of the normalised dof in each sector of the wheel in the tuned travelling wave of unit modal mass."""
     analysis = context.analysis
-    dof = context.wheel.sector.dof(analysis.normalise)
+    dof = context.tuned.dof(analysis.normalise)
     return float(abs(tuned.shape[dof] + 1j * tuned.imaginary[dof]) / np.sqrt(context.wheel.sectors))
 
 
@@ -138,7 +138,7 @@ def _family(context: AnalysisContext[ModeAnalysis], mode: LinearMode) -> ModeAna
     analysis = context.analysis
     wheel = context.wheel
     shape = wheel.by_sector(mode.shape)
-    M = sp.csr_matrix(wheel.sector.M)
+    M = sp.csr_matrix(context.tuned.M)
     waves = np.fft.ifft(shape, axis=0)[: wheel.sectors // 2 + 1]
     diameters = int(np.argmax([np.real(c.conj() @ (M @ c)) for c in waves]))
     named = analysis.model_copy(update={"nodal_diameter": diameters})
@@ -196,7 +196,7 @@ def uneven_samples(samples: int, sectors: int, diameters: int) -> Optional[str]:
 def _largest(context: AnalysisContext[ModeAnalysis], mode: LinearMode) -> int:
     """Sector in which the normalised dof moves most."""
     analysis = context.analysis
-    dof = context.wheel.sector.dof(analysis.normalise)
+    dof = context.tuned.dof(analysis.normalise)
     return int(np.argmax(np.abs(context.wheel.by_sector(mode.shape)[:, dof])))
 
 

@@ -1,0 +1,65 @@
+"""Whether the parts of a structure fit each other: sizes, numbers of dofs and nodes, entries that are numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from .structure import Structure
+
+
+def complaint_of(structure: Structure) -> str | None:
+    """What is inconsistent in a structure as a builder gives it, None when nothing is."""
+    terms = {"M": structure.M, "K": structure.K, "C": structure.C}
+    terms.update({f"B of '{name}'": pairs.B for name, pairs in structure.pairs.items()})
+    for name, term in terms.items():
+        if isinstance(term, Mapping):
+            return f"{name} has parts on other sectors: give the sector with both its faces, low and high"
+    n = structure.n_dof
+    if n == 0:
+        return "M has no dofs"
+    sizes = {"M": structure.M, "K": structure.K, **({} if structure.C is None else {"C": structure.C})}
+    sizes.update({f"part '{name}' of K": part for name, part in structure.parts.items()})
+    for name, matrix in sizes.items():
+        if np.shape(matrix) != (n, n):
+            return f"{name} is {np.shape(matrix)[0]} x {np.shape(matrix)[1]}, M is {n} x {n}"
+    for name, number in structure.dofs.items():
+        if not 0 <= number < n:
+            return f"dof '{name}' has the number {number} of {n}"
+    if structure.names is not None and (len(structure.names), len(set(structure.names))) != (n, n):
+        return f"{len(structure.names)} names, {len(set(structure.names))} of them different, of {n} dofs"
+    for name, load in structure.loads.items():
+        if np.shape(load) != (n,):
+            return f"load '{name}' has the shape {np.shape(load)}, not ({n},)"
+        if not np.all(np.isfinite(load)):
+            return f"load '{name}' has an entry that is not a number"
+    return _wrong_grid(structure) or next(
+        (text for text in (pairs.complaint(name, n) for name, pairs in structure.pairs.items()) if text), None
+    )
+
+
+def _wrong_grid(structure: Structure) -> str | None:
+    """What does not fit in nodes and cells."""
+    if structure.coordinates is None:
+        return None if structure.hexahedra is None else "there are hexahedra, but no coordinates"
+    given = structure.displacements
+    dofs = structure.n_dof
+    if structure.expansion is not None:
+        if np.shape(structure.expansion)[1:] != (dofs,):
+            return f"expansion has the shape {np.shape(structure.expansion)}, not (n_unreduced, {dofs})"
+        dofs = np.shape(structure.expansion)[0]
+    n = dofs // 3 if given is None else len(given)
+    if np.shape(structure.coordinates) != (n, 3):
+        return f"coordinates have the shape {np.shape(structure.coordinates)}, not ({n}, 3)"
+    if given is not None and (np.shape(given) != (n, 3) or np.max(given) >= dofs):
+        return f"displacements have the shape {np.shape(given)} and the largest dof {np.max(given)}"
+    cells = structure.hexahedra
+    if cells is None:
+        return None
+    if np.ndim(cells) != 2 or np.shape(cells)[1] not in (8, 20, 27):
+        return f"hexahedra have the shape {np.shape(cells)}, not (n_cells, 8, 20 or 27)"
+    outside = not 0 <= np.min(cells) <= np.max(cells) < n
+    return f"hexahedra have the nodes {np.min(cells)} to {np.max(cells)} of {n}" if outside else None

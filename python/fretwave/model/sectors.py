@@ -1,0 +1,142 @@
+"""Matrices of one sector by the sector they act on, {k: A_k} for the one k places ahead: tied, and put round a wheel.
+
+Scipy alone; `fretwave.cyclic.sector` says what a wave on such terms is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+import scipy.sparse as sp
+
+from ..errors import InputError
+
+if TYPE_CHECKING:
+    from typing import TypeAlias
+
+Array = npt.NDArray[np.float64]
+Indices = npt.NDArray[np.intp]
+Sparse: TypeAlias = sp.csr_matrix
+#: A matrix as users may give it: sparse, dense, rows of numbers, or petsc4py's.
+Given: TypeAlias = sp.spmatrix
+#: A matrix, or {k: that on the sector k places ahead}.
+Term: TypeAlias = sp.spmatrix
+Parts = Mapping[int, Given]
+
+
+def by_sector(given: Term | None) -> Parts:
+    """{k: matrix on the sector k places ahead}, the own sector first; a plain matrix stands for {0: matrix}."""
+    if given is None:
+        return {}
+    if not isinstance(given, Mapping):
+        return {0: given}
+    if 0 not in given:
+        raise InputError("the own sector's matrix is missing", None, sorted(given), "0 among them", "give {0: ...}")
+    return {k: given[k] for k in sorted(given, key=lambda k: (k != 0, k))}
+
+
+def around(given: Term, sectors: int) -> Sparse:
+    """Block-circulant matrix of the wheel, from the own part of a sector and those on the sectors k places ahead."""
+    ahead = sp.csr_matrix(np.roll(np.eye(sectors), 1, axis=1))  # row j has its 1 in column j + 1
+    behind = sp.csr_matrix(ahead.T)
+    parts = by_sector(given).items()
+    return sp.csr_matrix(sum(sp.kron((ahead if k > 0 else behind) ** abs(k), sp.csr_matrix(A)) for k, A in parts))
+
+
+def combine(left: Parts, middle: Parts, right: Parts, sign: int) -> dict[int, Sparse]:
+    """Sum of left_a^T middle_b right_c by the sector c + b + sign a it acts on."""
+    out: dict[int, Sparse] = {}
+    for a, L in left.items():
+        for b, A in middle.items():
+            for c, R in right.items():
+                part = sp.csr_matrix(L.T @ sp.csr_matrix(A) @ R)
+                k = c + b + sign * a
+                if part.nnz or k == 0:
+                    out[k] = out[k] + part if k in out else part
+    return out
+
+
+def check_number(sectors: int) -> None:
+    """A wheel has neighbours."""
+    if sectors < 2:
+        raise InputError("a wheel has two sectors or more", None, sectors, ">= 2", "give their number")
+
+
+def check_balanced(given: Term | None, name: str) -> None:
+    """Action and reaction: what the next sector does to this one, this one does to the next (K_-k = K_k^T).
+
+    C may have an unsymmetric (gyroscopic) part, but no one-sided coupling.
+    """
+    parts = {k: sp.csr_matrix(A) for k, A in by_sector(given).items()}
+    for k, A in parts.items():
+        other = parts.get(-k)
+        wrong = other is None or (name != "C" and abs(A - other.T).max() > 1e-9 * max(abs(A).max(), abs(other).max()))
+        if wrong:
+            raise InputError(
+                f"the coupling of {name} between sectors is one-sided",
+                f"{name}[{k}]",
+                "no counterpart" if other is None else f"{name}[{k}] - {name}[{-k}].T is not zero",
+                f"{name}[{-k}] = {name}[{k}].T",
+                f"give {{0: {name}_0, {k}: {name}_k, {-k}: {name}_k.T}}",
+            )
+
+
+def rotation(angle: float, axis: str = "z") -> Array:
+    """Rotation (3, 3) by `angle` [rad] about a Cartesian axis, positive by the right-hand rule."""
+    if axis not in ("x", "y", "z"):
+        raise InputError("unknown axis of rotation", None, axis, "x, y or z", 'use axis="z"')
+    i, c, s = "xyz".index(axis), np.cos(angle), np.sin(angle)
+    turn = np.zeros((3, 3))
+    turn[i, i] = 1.0
+    j, k = (i + 1) % 3, (i + 2) % 3
+    turn[[j, j, k, k], [j, k, j, k]] = [c, -s, s, c]
+    return turn
+
+
+def ties(low: npt.ArrayLike, high: npt.ArrayLike, n: int, sectors: int, axis: str | None) -> dict[int, Sparse]:
+    """x_full = ties[0] x_j + ties[1] x_{j+1}: the high face is the next sector's low face, turned about the axis.
+
+    Parameters
+    ----------
+    n : dofs of the sector with both its faces
+    """
+    low, high = _indices("low", low), _indices("high", high)
+    _check_faces(low, high, n, axis is not None)
+    turn = rotation(2 * np.pi / sectors, axis) if axis else np.eye(1)
+    kept = np.setdiff1d(np.arange(n), high)
+    place = np.full(n, -1, dtype=np.intp)
+    place[kept] = np.arange(len(kept))
+    own = sp.csr_matrix((np.ones(len(kept)), (kept, place[kept])), (n, len(kept)))
+    face = sp.csr_matrix(sp.kron(sp.identity(len(low) // len(turn)), turn))
+    pick = sp.csr_matrix((np.ones(len(high)), (high, np.arange(len(high)))), (n, len(high)))
+    take = sp.csr_matrix((np.ones(len(low)), (np.arange(len(low)), place[low])), (len(low), len(kept)))
+    return {0: own, 1: sp.csr_matrix(pick @ face @ take)}
+
+
+def _indices(name: str, dofs: npt.ArrayLike) -> Indices:
+    given = np.asarray(dofs).ravel()
+    if not np.issubdtype(given.dtype, np.integer):
+        raise InputError(
+            f"dofs of the {name} face are not whole numbers", None, given.dtype, "integers", "give dof numbers"
+        )
+    return given.astype(np.intp)
+
+
+def _check_faces(low: Indices, high: Indices, n: int, triples: bool) -> None:
+    """Matching lists of different dofs of the sector."""
+    both = np.concatenate([low, high])
+    values, counts = np.unique(both, return_counts=True)
+    problem = None
+    if len(low) != len(high):
+        problem = (f"{len(low)} low and {len(high)} high dofs", "as many on both")
+    elif len(both) and (both.min() < 0 or both.max() >= n):
+        problem = (f"dof {both.min() if both.min() < 0 else both.max()}", f"0 .. {n - 1}")
+    elif counts.max(initial=0) > 1:
+        problem = (f"dof {values[np.argmax(counts)]} stands {counts.max()} times", "each dof once, on one face")
+    elif triples and len(low) % 3:
+        problem = (f"{len(low)} dofs a face", "three Cartesian components a node")
+    if problem:
+        raise InputError("the faces of the sector do not match", None, *problem, "give matching dofs of both faces")
