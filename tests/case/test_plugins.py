@@ -266,6 +266,11 @@ WRONG = {
         "a key has the name of a method",
         "bad.py:8",
     ),
+    "draws with nothing": (
+        ANALYSIS.format(name="Idle", body='type: Literal["idle"]\n    pictures = ("x",)\n    def run(self, c): ...'),
+        "its pictures are not there",
+        "bad.py:8",
+    ),
     "takes a name of the package": (
         ANALYSIS.format(name="Idle", body='type: Literal["mode"]\n    def run(self, c): ...'),
         "two files register a type of analysis 'mode'",
@@ -298,6 +303,32 @@ def test_what_a_plugin_does_wrong_is_said_with_its_line(slip: str, tmp_path, cap
     told = capfd.readouterr().err
     assert what in told and where in told and "fix:" in told and "Traceback" not in told
     assert told.count("error") == 1, "not also all that it would have added"
+
+
+def test_what_a_plugin_raises_in_a_run_is_not_called_a_defect_of_ours(tmp_path, launch) -> None:
+    case = put(tmp_path)
+    plugin = tmp_path / "toy_analysis.py"
+    text = plugin.read_text().replace("        writer.close(", "        raise KeyError('lost')\n        writer.close(")
+    plugin.write_text(text)
+    line = 1 + text[: text.index("raise KeyError")].count("\n")
+    run = launch(
+        1, "-m", "fretwave", "run", str(case), "--out", str(tmp_path / "run"), "--only", "rest,line", timeout=300
+    )
+    assert run.returncode == 1 and "Traceback" not in run.stderr
+    assert f"toy_analysis.py:{line}" in run.stderr and "correct the plug-in" in run.stderr
+    assert "defect of fretwave" not in run.stderr
+
+
+def test_a_picture_that_fails_leaves_the_others(run: Path, tmp_path, capfd) -> None:
+    shutil.copytree(run.parent, tmp_path / "all")
+    folder, plugin = tmp_path / "all" / "run", tmp_path / "all" / "toy_analysis.py"
+    (folder / "run.json").write_text((folder / "run.json").read_text().replace(str(run.parent), str(tmp_path / "all")))
+    (folder / "mode_map_pads.png").unlink(missing_ok=True)
+    forget_all()
+    plugin.write_text(plugin.read_text().replace("yield f", "yield no_such_name, f"))
+    assert call("plot", folder) == 0
+    assert "no picture 'receptance' of these results: NameError" in capfd.readouterr().out
+    assert (folder / "mode_map_pads.png").exists()
 
 
 @pytest.mark.parametrize(

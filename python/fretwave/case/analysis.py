@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Optional, TypeVar, get_args
 
@@ -184,6 +185,9 @@ def kind_of(kind: object) -> str:
     hidden = [name for name in hidden if hasattr(AnalysisSection, name)]
     if hidden:
         raise wrong("a key has the name of a method", ", ".join(hidden), "other names", "rename the key")
+    unknown = [name for name in kind.pictures if find_spec(f"fretwave.plots.{name}") is None]
+    if unknown:
+        raise wrong("its pictures are not there", ", ".join(unknown), "modules of fretwave.plots", "draw in `figures`")
     if kind.run is AnalysisSection.run:
         raise wrong("it has no `run`", None, "a method that computes it", "`def run(self, context): ...`")
     return given[0]

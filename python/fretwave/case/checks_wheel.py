@@ -11,6 +11,7 @@ from .reporter import Reporter
 from .schema import MistuningSection
 
 if TYPE_CHECKING:
+    from ..model.structure import Structure
     from .facts import Facts
     from .harmonic import HarmonicSection
 

@@ -126,13 +126,13 @@ def _build(
         structure, contacts = tie(section, source, structure, contacts, found)
         dofs = structure.dof_names
         neighbours = structure if structure.cut else None
-        check_aerodynamics(source, flow, neighbours.sectors if neighbours else None, dofs, found)
+        check_aerodynamics(source, flow, neighbours.sectors if neighbours else None, dofs or [], found)
     blade = flow.dof if flow else None
     keep = _kept(structure, analyses, blade) if structure and reduction else {}
     known = set(dofs or ())  # of a sector, dofs of the high face are kept, and left out
     facts = Facts(
         source=source,
-        model_known=structure is not None,
+        model_known=section is not None and structure is not None,
         dofs=dofs,
         named=[name for name in keep.values() if name in known] if keep else dofs,
         least_dofs=len(keep) if reduction else len(dofs or ()),

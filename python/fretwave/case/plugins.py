@@ -19,6 +19,7 @@ from typing import Any
 from .. import registry
 from ..errors import FretwaveError, InputError
 from ..model.laws import forget_law
+from ..mpi.guard import PLUGIN
 from ..texts import display, is_there, nearest, shortened, toml
 from .toml.source import Source
 
@@ -50,7 +51,7 @@ class Plugin:
     @property
     def module(self) -> str:
         """Name under which Python knows it."""
-        return f"fretwave_plugin_{Path(self.path).stem}_{self.digest}"
+        return f"{PLUGIN}{Path(self.path).stem}_{self.digest}"
 
     def plain(self) -> dict[str, str]:
         """For run.json."""

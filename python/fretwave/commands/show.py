@@ -34,6 +34,10 @@ def show_run(folder: Path) -> None:
     if "study" in record:
         _show_study(folder, record)
         return
+    if record.get("case", {}).get("plugins"):  # they say what their sweeps tell
+        from ..case.plugins import load_recorded
+
+        load_recorded(record)
     with open_results(folder / "results.h5") as file:
         title = str(file.attrs.get("title", ""))
         names = [name for name in _in_order(folder, list(file)) if "type" in file[name].attrs]

@@ -11,11 +11,13 @@ import sys
 import time
 import traceback
 from collections.abc import Callable
+from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from ..errors import EXIT_OTHER, FretwaveError, exit_code_of
 from ..files.whole import file_error
+from ..texts import display
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -28,6 +30,8 @@ AGREEMENT_WAIT = 1.0
 RANK_DELAY = 0.25
 #: Environment variable that adds the traceback to the message of an unexpected error.
 TRACEBACK = "FRETWAVE_TRACEBACK"
+#: How Python knows files that a case brings, and what to do about an exception of theirs.
+PLUGIN, CORRECT = "fretwave_plugin_", f"correct the plug-in; {TRACEBACK}=1 shows how it was called"
 
 
 def world() -> MPI.Comm | None:
@@ -92,9 +96,17 @@ def describe(error: BaseException, rank: int | None = None, traced: bool = False
         text = "".join(traceback.format_exception(type(error), error, error.__traceback__)) + text
         return f"{text}  fix:      this is a defect of the script, or of fretwave; report it with the lines above"
     frames = traceback.extract_tb(error.__traceback__)
+    theirs = [frame for frame in frames if frame.filename in _plugins()]
+    if theirs:
+        return f"{text}  where:    {display(Path(theirs[-1].filename))}:{theirs[-1].lineno}\n  fix:      {CORRECT}"
     if frames:
         text += f"  where:    {os.path.basename(frames[-1].filename)}:{frames[-1].lineno}, {frames[-1].name}\n"
     return f"{text}  fix:      this is a defect of fretwave; report it with what {TRACEBACK}=1 adds to this message"
+
+
+def _plugins() -> set[str]:
+    """Files that a case has brought (`fretwave.case.plugins`)."""
+    return {str(module.__file__) for name, module in list(sys.modules.items()) if name.startswith(PLUGIN)}
 
 
 def in_words(error: BaseException) -> FretwaveError | None:

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
     Family = Callable[[Run], Iterator[tuple[str, Figure]]]
 
+#: Raised where results are too few or too extreme for a picture.
+OF_RESULTS = (ArithmeticError, ValueError, IndexError, LinAlgError)
 #: Of no analysis.
 OTHERS = ("study",)
 
@@ -56,10 +58,14 @@ def plot_run(run_folder: str | Path, only: Sequence[str] | None = None, failed: 
                 for name, figure in figures(run):
                     if only is None or family in only or _of_analysis(name, run, only):
                         written.append(style.save(figure, run.folder / f"{name}.png"))
-            except (ArithmeticError, ValueError, IndexError, LinAlgError) as error:
-                if failed is None:
+            except Exception as error:
+                own = (
+                    figures.__module__.partition(".")[0] == "fretwave"
+                )  # what a user's file raises is no defect of ours
+                if failed is None or (own and not isinstance(error, OF_RESULTS)):
                     raise
-                failed.append(f"no picture '{family}' of these results: {error}")
+                kind = "" if own else f"{type(error).__name__}: "
+                failed.append(f"no picture '{family}' of these results: {kind}{error}")
     return written
 
 

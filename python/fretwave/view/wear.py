@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -22,10 +22,6 @@ from ..results.results import open_results
 from ..texts import display
 from .choice import ViewOptions
 from .vtkhdf import TRIANGLE, VERTEX, GridFile
-
-if TYPE_CHECKING:
-    import h5py
-
 
 Array = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.intp]
@@ -81,7 +77,7 @@ def _placed(case: Case, name: str) -> dict[str, Pairs]:
     return found
 
 
-def _chosen(group: h5py.Group, options: ViewOptions, where: str) -> list[IntArray]:
+def _chosen(group: Any, options: ViewOptions, where: str) -> list[IntArray]:
     """Rows of the lines whose amplitudes are asked for."""
     number, amplitude = group["points/line"][()], group["points/amplitude"][()]
     lines = [np.flatnonzero(number == k) for k in np.unique(number)]
