@@ -270,7 +270,7 @@ class Model:
 
     def destroy(self) -> None:
         """Free the matrices. Collective."""
-        self.core = None
+        self.core = None  # type: ignore[assignment]
         for mat in self._matrices:
             mat.destroy()
 

@@ -263,4 +263,4 @@ class Continuation:
     def destroy(self) -> None:
         """Free the solver. Collective."""
         self._last, self._over = None, True
-        self._core = None
+        self._core = None  # type: ignore[assignment]

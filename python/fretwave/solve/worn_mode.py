@@ -234,7 +234,7 @@ class WornMode:
     def destroy(self) -> None:
         """Free the solver; the contacts are as new again."""
         self.wear(np.zeros(len(self.areas)))
-        self._newton = None
+        self._newton = None  # type: ignore[assignment]
         self._row.destroy()
 
     def __enter__(self) -> WornMode:
