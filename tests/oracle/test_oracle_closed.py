@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq
+from scipy.optimize import newton
 
 from oracle import Coulomb, Flow, Jenkins, ModeOrbit, System, Unilateral, forced_orbit, mode_orbit
 
@@ -73,7 +73,7 @@ def test_a_one_sided_stop_has_its_frequency():
         x, v = motion(a).state
         return v**2 / 2 + 5 * x**2 + 25 * max(0.0, x - 0.01) ** 2
 
-    a = brentq(lambda a: energy(a) / 0.00650108331626 - 1, 0.02, 0.04, rtol=1e-14)
+    a = newton(lambda a: energy(a) / 0.00650108331626 - 1, 0.03, x1=0.0301, tol=1e-16, rtol=1e-14)
     assert motion(a).omega0 / (2 * np.pi) == pytest.approx(0.6466310406398371, rel=1e-12)
 
 

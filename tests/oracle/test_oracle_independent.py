@@ -22,6 +22,11 @@ def paper(level, omega):
     return System(*PAPER, [DAMPER], np.array([level, 0.0]), omega=omega)
 
 
+def lightly():
+    """The paper's oscillator in partial slip."""
+    return paper(7.0, 24.5)
+
+
 def rubbing():
     """A block on a one-sided spring under a swinging load: sticks, slips, lifts off and lands again."""
     normal = Unilateral(np.array([1.0, 0.0, 0.0]), 50.0, -0.02)
@@ -31,10 +36,22 @@ def rubbing():
     return System(M, 0.4 * np.eye(3), K, [normal, friction], P, p, omega=3.0)
 
 
+def rigid(omega=0.25, second=0.7):
+    """Three masses, two of them on rigid friction that holds them for a while."""
+    K, along = np.array([[3.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 2.0]]), np.eye(3)
+    contacts = [Coulomb(along[0], 1.0), Coulomb(along[2], second)]
+    return System(np.eye(3), 0.05 * np.eye(3), K, contacts, np.array([2.0, 0, 1j]), omega=omega)
+
+
+def turning():
+    """The same, but friction only turns them."""
+    return rigid(0.9, 0.2)
+
+
 @cache
 def orbits():
     """One of each, to be looked at by several tests."""
-    return {"paper": forced_orbit(paper(7.0, 24.5)), "rubbing": forced_orbit(rubbing())}
+    return {made.__name__: forced_orbit(made()) for made in (lightly, rubbing, rigid, turning)}
 
 
 def runge_kutta(system, orbit, force, rate):
@@ -90,7 +107,7 @@ def test_runge_kutta_closes_a_period_with_lift_off():
     assert end == pytest.approx(orbit.state, rel=1e-7, abs=1e-7)
 
 
-@pytest.mark.parametrize("name", ["paper", "rubbing"])
+@pytest.mark.parametrize("name", ["lightly", "rubbing", "rigid", "turning"])
 def test_nothing_depends_on_the_steps_and_no_event_is_missed(name):
     orbit = orbits()[name]
     for share in (0.5, 0.21):
@@ -100,7 +117,7 @@ def test_nothing_depends_on_the_steps_and_no_event_is_missed(name):
         assert [e.t for e in finer.events] == pytest.approx([e.t for e in orbit.events], abs=1e-11)
 
 
-@pytest.mark.parametrize("name", ["paper", "rubbing"])
+@pytest.mark.parametrize("name", ["lightly", "rubbing", "rigid", "turning"])
 def test_the_monodromy_is_the_derivative_of_the_period(name):
     """Central differences over a period and a quarter, through every kind of event."""
     orbit = orbits()[name]
