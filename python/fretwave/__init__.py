@@ -48,10 +48,10 @@ if TYPE_CHECKING:
     from .solve.continuation import Continuation, Point
     from .solve.follow import follow
     from .solve.preload import balanced, static_preload
-    from .solve.steps import StepControl
+    from .solve.steps import StepControl, WearControl
     from .solve.sweep import Sweep, sweep
     from .solve.transient import Transient
-    from .solve.wear import Wear, WearControl, WearPoint
+    from .solve.wear import Wear, WearPoint
     from .solve.wear_march import WearMarch, wear
     from .solve.worn_mode import WornMode
 
@@ -77,7 +77,7 @@ _HOMES = {
     "solve.branch": ("Branch",),
     "solve.follow": ("follow",),
     "solve.continuation": ("Continuation", "Point"),
-    "solve.steps": ("StepControl",),
+    "solve.steps": ("StepControl", "WearControl"),
     "cyclic.sector": ("Sector",),
     "cyclic.reduction": ("SectorReduction", "reduce_sector"),
     "cyclic.waves": ("WaveError",),
@@ -95,7 +95,7 @@ _HOMES = {
     "model.reduction": ("FrequencyError", "Reduction", "reduce"),
     "hb.reduction_error": ("NonlinearError", "nonlinear_error"),
     "solve.transient": ("Transient",),
-    "solve.wear": ("Wear", "WearControl", "WearPoint"),
+    "solve.wear": ("Wear", "WearPoint"),
     "solve.worn_mode": ("WornMode",),
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}

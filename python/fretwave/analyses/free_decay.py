@@ -13,6 +13,7 @@ from ..columns import Column
 from ..post.cycles import extract
 from ..post.decays import decay_rows, largest_differences
 from ..post.mode_curve import ModeCurve
+from ..solve.steps import TIME_TOLERANCE
 from .mode import ModeAnalysis
 from .parts.context import AnalysisContext, Outcome
 from .parts.starts import Starts
@@ -35,7 +36,7 @@ class TransientSection(AnalysisSection):
     amplitude: list[Positive] = key("start amplitudes", "m", "[0.05, 0.3, 2.5]", min_length=1)
     periods: Whole = key("vibration periods to integrate", example="30", ge=1)
     samples_per_period: Whole = key("output samples of a period", example="64", default=64, ge=8)
-    tolerance: Positive = key("relative tolerance of the time integration", "-", "1e-10", default=1e-10, lt=1)
+    tolerance: Positive = key("relative tolerance of the time integration", "-", "1e-10", default=TIME_TOLERANCE, lt=1)
 
     def needs(self) -> list[str]:
         return [self.mode]

@@ -23,6 +23,7 @@ from ..files.dimensions import names_of_data
 from ..mpi import groups
 from ..mpi.guard import on_first_rank
 from ..results.results import AnalysisWriter, has_results, open_results
+from ..solve.steps import WearControl
 from .mode import ModeAnalysis
 from .parts.context import AnalysisContext, Outcome
 from .parts.rest import keep_pairs
@@ -59,13 +60,20 @@ class WearAnalysis(AnalysisSection):
     stepper: Literal["heun", "bogacki_shampine", "trapezoidal", "tr_bdf2"] = key(
         "step over wear cycles: explicit of order 2 or 3, implicit of order 2 (two)",
         example='"tr_bdf2"',
-        default="bogacki_shampine",
+        default=WearControl.stepper,
     )
     tolerance: Positive = key(
-        "estimated error of a step, as normal load lost relative to the mean", "-", "1e-4", default=1e-3, lt=1
+        "estimated error of a step, as normal load lost relative to the mean",
+        "-",
+        "1e-4",
+        default=WearControl.tolerance,
+        lt=1,
     )
     pressure_change: Positive = key(
-        "largest change of a pair's contact pressure in a step, relative to the mean", "-", "0.1", default=0.2
+        "largest change of a pair's contact pressure in a step, relative to the mean",
+        "-",
+        "0.1",
+        default=WearControl.pressure_change,
     )
     report_at: list[Positive] = key(
         "normalised cycles at which the motion of a period is kept", "-", "[10.0, 40.0]", default_factory=list

@@ -9,8 +9,11 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal, Optional, Union
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema
 from pydantic_core import PydanticKnownError
+
+from ..model.sizes import COMPARED_MODES, COMPONENT_MODES, INTERFACE_TOLERANCE, INTERFACE_WAVES
+from ..solve.steps import StepControl
 
 #: Longest name: results are files of that name, whose systems allow 255 characters with all that is added.
 LONGEST_NAME = 100
@@ -30,6 +33,7 @@ Whole = Annotated[int, AfterValidator(_of_the_core)]
 Dof = Annotated[
     str,
     BeforeValidator(lambda value: str(value) if type(value) is int else value),
+    WithJsonSchema({"type": ["string", "integer"]}),
     Field(pattern=r"^[^\x00-\x1f\x7f]{1,100}$"),
 ]
 Name = Annotated[str, Field(max_length=LONGEST_NAME)]
@@ -86,9 +90,13 @@ class ModelSection(Section):
 class ReductionSection(Section):
     """``[reduction]``: Craig-Bampton; kept are the dofs of contacts and those that the case or its builder names."""
 
-    modes: Optional[Whole] = key("number of component modes (10 unless told)", example="10", default=None, ge=0)
+    modes: Optional[Whole] = key(
+        f"number of component modes ({COMPONENT_MODES} unless told)", example="10", default=None, ge=0
+    )
     up_to_hz: Optional[Positive] = key("instead of modes: all component modes up to here", "Hz", "5000.0", default=None)
-    compare: Whole = key("linear modes compared with the unreduced model, 0 for none", example="5", default=5, ge=0)
+    compare: Whole = key(
+        "linear modes compared with the unreduced model, 0 for none", example="5", default=COMPARED_MODES, ge=0
+    )
     interface: Literal["whole", "modes"] = key(
         "faces of a sector: kept whole, or moving in modes that waves of the unreduced sector give",
         example='"modes"',
@@ -97,9 +105,15 @@ class ReductionSection(Section):
     interface_diameters: Optional[list[Annotated[Whole, Field(ge=0)]]] = key(
         "nodal diameters of the waves that give interface modes", example="[4, 12]", default=None, min_length=1
     )
-    interface_waves: Whole = key("lowest waves of each, stuck and as many sliding", example="10", default=10, ge=1)
+    interface_waves: Whole = key(
+        "lowest waves of each, stuck and as many sliding", example="10", default=INTERFACE_WAVES, ge=1
+    )
     interface_tolerance: Positive = key(
-        "singular values of interface modes that are kept, over the largest", "-", "1e-5", default=1e-5, lt=1
+        "singular values of interface modes that are kept, over the largest",
+        "-",
+        "1e-5",
+        default=INTERFACE_TOLERANCE,
+        lt=1,
     )
     compare_diameters: Optional[list[Annotated[Whole, Field(ge=0)]]] = key(
         "nodal diameters compared (those of the analyses and of the interface modes)", example="[4, 8]", default=None
@@ -166,14 +180,18 @@ class ContactSection(BaseModel):
 class StepSection(Section):
     """Step control of the continuation."""
 
-    initial: Positive = key("length of the first arclength step", "-", "0.05", default=0.05)
-    minimum: Positive = key("shortest step, but over a corner", "-", "1e-9", default=1e-9)
-    maximum: Positive = key("longest step", "-", "0.3", default=0.3)
-    max_angle: Positive = key("largest turn of the branch in one step", "rad", "0.6", default=0.6, le=3.2)
-    max_error: Positive = key(
-        "largest distance of the branch from the curve through its points", "-", "5e-4", default=5e-4
+    initial: Positive = key("length of the first arclength step", "-", "0.05", default=StepControl.initial)
+    minimum: Positive = key("shortest step, but over a corner", "-", "1e-9", default=StepControl.minimum)
+    maximum: Positive = key("longest step", "-", "0.3", default=StepControl.maximum)
+    max_angle: Positive = key(
+        "largest turn of the branch in one step", "rad", "0.6", default=StepControl.max_angle, le=3.2
     )
-    max_points: Whole = key("largest number of points of the branch", example="5000", default=5000, ge=2)
+    max_error: Positive = key(
+        "largest distance of the branch from the curve through its points", "-", "5e-4", default=StepControl.max_error
+    )
+    max_points: Whole = key(
+        "largest number of points of the branch", example="5000", default=StepControl.max_points, ge=2
+    )
 
 
 class Damper(Section):

@@ -1,4 +1,4 @@
-"""``fretwave check --keys``: every key of a case file with its default, unit and meaning."""
+"""``fretwave check --keys``: every key of a case file with its default, unit and meaning; ``--schema``: for editors."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from ..case.analysis import AnalysisSection
+from ..case.json_schema import json_text
 from ..case.plugins import read_plugins
 from ..case.schema import (
     TOP_LEVEL,
@@ -62,6 +63,15 @@ def key_lines(case: Path | None = None) -> Iterator[str]:
     for title, nested in tables.items():
         yield title
         yield from _section(nested)
+
+
+def schema_text(case: Path | None = None) -> str:
+    """The JSON schema of case files; with the analyses and laws of a case's plug-ins."""
+    if case is not None:
+        _load_plugins(case)
+    from ..model.laws import laws
+
+    return json_text(laws())
 
 
 def _load_plugins(case: Path) -> None:

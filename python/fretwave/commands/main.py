@@ -64,6 +64,7 @@ def parser() -> argparse.ArgumentParser:
     check = commands.add_parser("check", help="check a case and say what would run")
     _add_case(check, optional=True)
     check.add_argument("--keys", action="store_true", help="list all keys instead, with those of a case's plug-ins")
+    check.add_argument("--schema", action="store_true", help="print the JSON schema of case files instead, for editors")
     check.set_defaults(command=_check)
     _add_sweep(commands)
     resume = commands.add_parser("resume", help="go on with a run that was cut off, on any number of ranks")
@@ -244,6 +245,11 @@ def _check(options: argparse.Namespace) -> int:
         from .keys import key_lines
 
         print("\n".join(key_lines(options.case)))
+        return EXIT_DONE
+    if options.schema:
+        from .keys import schema_text
+
+        print(schema_text(options.case), end="")
         return EXIT_DONE
     if options.case is None:
         raise InputError("no case is given", "fretwave check", fix="`fretwave check cases/two_dof/case.toml`")

@@ -27,13 +27,13 @@ from ..errors import InputError
 from ..model.contact import Contact
 from ..model.reduction import RIGID_SHARE, Reduction, check_all_kept, reduce
 from ..model.sectors import Given, by_sector
+from ..model.sizes import COMPARED_MODES, INTERFACE_TOLERANCE, INTERFACE_WAVES
 from .interface import Interface
 from .sector import Sector
 from .waves import STATES, SectorWaves, WaveError
 
 Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.intp]
-INTERFACE_WAVES, INTERFACE_TOLERANCE = 10, 1e-5
 
 
 class SectorReduction:
@@ -126,7 +126,7 @@ class SectorReduction:
         """Reduced load (n_r,) or (n_r, n) of forces on all dofs. Collective."""
         return self._inner.project(self._P.T @ np.asarray(f, dtype=float))
 
-    def error(self, diameters: Iterable[int] | None = None, count: int = 5) -> list[WaveError]:
+    def error(self, diameters: Iterable[int] | None = None, count: int = COMPARED_MODES) -> list[WaveError]:
         """Error of the lowest waves, stuck and sliding. Collective.
 
         Parameters

@@ -17,6 +17,7 @@ from .. import _core
 from ..errors import InputError
 from .model import Model
 from .sectors import Given, Sparse
+from .sizes import COMPARED_MODES, COMPONENT_MODES
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -25,7 +26,6 @@ Array = npt.NDArray[np.float64]
 
 #: Frequencies below this share of the lowest component frequency are rigid motions, without a relative error.
 RIGID_SHARE = 1e-3
-DEFAULT_MODES = 10
 
 
 @dataclass(frozen=True)
@@ -150,7 +150,7 @@ class Reduction:
         reduced: Array = self._core.project(np.ascontiguousarray(self._model.distribute(rows)))
         return reduced if np.ndim(f) == 2 else reduced[:, 0]
 
-    def error(self, count: int = 5, K_contact: Given | None = None) -> FrequencyError:
+    def error(self, count: int = COMPARED_MODES, K_contact: Given | None = None) -> FrequencyError:
         """Relative error of the lowest elastic frequencies. Collective.
 
         Parameters
@@ -330,4 +330,4 @@ def _count(modes: int | None, highest_hz: float | None) -> int:
         raise InputError(
             "highest_hz is no frequency", None, highest_hz, "> 0 Hz", "give a frequency, or a number of modes"
         )
-    return DEFAULT_MODES if modes is None else modes
+    return COMPONENT_MODES if modes is None else modes

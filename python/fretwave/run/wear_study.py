@@ -218,7 +218,8 @@ class _Solver:
 
     def _march(self, context: AnalysisContext[ModeAnalysis], settings: WearSettings) -> WearOutcome | str:
         from ..hb.problems import NonlinearMode
-        from ..solve.wear import Wear, WearControl
+        from ..solve.steps import WearControl
+        from ..solve.wear import Wear
         from ..solve.worn_mode import WornMode
 
         mode, a, unit = context.analysis, self.analysis, self.unit

@@ -1,10 +1,18 @@
-"""How long the steps of a branch are."""
+"""Lengths of steps along a branch, over wear cycles and in time. Their defaults stand here alone; case files take them from here."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from .. import _core
+from ..errors import InputError
+
+if TYPE_CHECKING:
+    from .. import _core
+
+#: Relative tolerance of integrations in time.
+TIME_TOLERANCE = 1e-10
 
 
 @dataclass(frozen=True)
@@ -16,6 +24,11 @@ class StepControl:
     minimum : shortest step before a branch is given up, but over the corner where a sample of contact changes state
     max_angle : largest turn [rad] of the branch in one step; longer steps are halved
     max_error : largest distance between the branch and the cubic through its points and tangents; likewise
+
+    Raises
+    ------
+    InputError
+        A value is not a positive number.
     """
 
     initial: float = 0.05
@@ -25,9 +38,54 @@ class StepControl:
     max_error: float = 5e-4
     max_points: int = 5000
 
+    def __post_init__(self) -> None:
+        for name, value in vars(self).items():
+            _positive("step", name, value)
+        if self.max_points < 2:
+            raise InputError("a branch needs two points", "step.max_points", self.max_points, ">= 2", "allow more")
+
     def core(self) -> _core.StepControl:
         """The compiled twin."""
+        from .. import _core
+
         steps = _core.StepControl()
         for name, value in vars(self).items():
             setattr(steps, name, value)
         return steps
+
+
+@dataclass(frozen=True)
+class WearControl:
+    """How long the steps over wear cycles are.
+
+    Attributes
+    ----------
+    stepper : name in `fretwave.solve.steppers.STEPPERS`
+    tolerance : largest estimated error of a step's depths, as loss of normal load relative to the mean at the start
+    pressure_change : largest change of a pair's mean normal force in a step, relative to the same
+    first, fixed : length of the first step [cycles]; `fixed` for all steps, without control
+
+    Raises
+    ------
+    InputError
+        A value is not a positive number.
+    """
+
+    stepper: str = "bogacki_shampine"
+    tolerance: float = 1e-3
+    pressure_change: float = 0.2
+    first: float | None = None
+    fixed: bool = False
+
+    def __post_init__(self) -> None:
+        _positive("wear", "tolerance", self.tolerance)
+        _positive("wear", "pressure_change", self.pressure_change)
+        if self.first is not None:
+            _positive("wear", "first", self.first)
+
+
+def _positive(section: str, name: str, value: float) -> None:
+    if not (math.isfinite(value) and value > 0):
+        raise InputError(
+            "the step control cannot be used", f"{section}.{name}", value, "a number > 0", "give a positive number"
+        )

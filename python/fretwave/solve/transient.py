@@ -11,6 +11,7 @@ import numpy.typing as npt
 from .. import _core
 from ..errors import InputError
 from ..model.model import Model
+from .steps import TIME_TOLERANCE
 
 Array = npt.NDArray[np.float64]
 
@@ -71,7 +72,7 @@ class Transient:
         v0: Array,
         t_end: float,
         dt_out: float,
-        rtol: float = 1e-8,
+        rtol: float = TIME_TOLERANCE,
         limit: float = float("inf"),
         most_steps: float = MOST_STEPS,
     ) -> dict[str, Any]:

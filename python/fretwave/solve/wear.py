@@ -13,6 +13,7 @@ from petsc4py import PETSc
 
 from ..errors import InputError
 from .steppers import STEPPERS, StageFailed, take
+from .steps import WearControl
 from .worn_mode import WornMode, WornState
 
 Array = npt.NDArray[np.float64]
@@ -25,25 +26,6 @@ LAST_TRY = 1e-2
 GROWTH, SHRINKING, SAFETY = 3.0, 0.1, 0.85
 #: Lengths that a step may have in every factor of two.
 GRID = 16
-
-
-@dataclass(frozen=True)
-class WearControl:
-    """How long the steps over wear cycles are.
-
-    Attributes
-    ----------
-    stepper : name in `fretwave.solve.steppers.STEPPERS`
-    tolerance : largest estimated error of a step's depths, as loss of normal load relative to the mean at the start
-    pressure_change : largest change of a pair's mean normal force in a step, relative to the same
-    first, fixed : length of the first step [cycles]; `fixed` for all steps, without control
-    """
-
-    stepper: str = "bogacki_shampine"
-    tolerance: float = 1e-4
-    pressure_change: float = 0.2
-    first: float | None = None
-    fixed: bool = False
 
 
 @dataclass

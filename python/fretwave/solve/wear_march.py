@@ -12,8 +12,9 @@ from ..columns import Column, columns_named
 from ..errors import InputError
 from ..hb.problems import HarmonicProblem
 from .branch import Branch
+from .steps import WearControl
 from .table import Table
-from .wear import Wear, WearControl, WearPoint
+from .wear import Wear, WearPoint
 from .worn_mode import WornMode
 
 Array = npt.NDArray[np.float64]

@@ -148,7 +148,8 @@ class _Marcher:
 
     def _open(self, mode: WornMode) -> tuple[Wear, Iterator[WearPoint]]:
         """The march from its start, or from where a killed run left it."""
-        from ...solve.wear import Wear, WearControl
+        from ...solve.steps import WearControl
+        from ...solve.wear import Wear
 
         a, unit = self.analysis, self.unit
         control = WearControl(a.stepper, a.tolerance, a.pressure_change)
