@@ -59,7 +59,7 @@ def test_they_say_what_matters(index, words):
 
 def test_every_public_class_has_words_of_its_own():
     """No address, and no array written out: a generated text is for plain numbers and words alone."""
-    plain = {"int", "float", "str", "bool", "None", "Role", "Limit", "Optional[int]"}
+    plain = {"int", "float", "str", "list[str]", "bool", "None", "Role", "Limit", "Optional[int]"}
     for name in fw.__all__:
         kind = getattr(fw, name)
         if not isinstance(kind, type) or kind is fw.LawInfo:

@@ -40,7 +40,8 @@ PLACES = {
 LOADED = (
     "analyses.mode",
     "analyses.forced",
-    "analyses.transient",
+    "analyses.free_decay",
+    "analyses.limit_cycle",
     "run.sweep_analysis",
     "commands.sweep",
     "commands.study",

@@ -79,7 +79,7 @@ def most_alike(modes: Sequence[LinearMode], wave: LinearMode, M: Any) -> LinearM
     return modes[int(np.flatnonzero(shares > (1 - ALIKE) * shares.max())[0])]
 
 
-def deviations(sectors: int, standard_deviation: float, seed: int) -> Array:
+def deviations(sectors: int, standard_deviation: float, seed: int = 1) -> Array:
     """Relative deviations (N,) of the sectors: normally distributed (PCG64), less their mean.
 
     Without its mean a pattern leaves the family's mean frequency, to first order, where it was.

@@ -13,16 +13,18 @@ Of the fundamental amplitudes a_j (complex) of one dof in all sectors j = 0 .. N
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from ..model.modes import LinearMode
 from ..model.sectors import around
 from ..post.wave_content import participation, wave_content
 from .engine_order import folded
-from .sector import Sector
+
+if TYPE_CHECKING:
+    from ..model.modes import LinearMode
+    from .sector import Sector
 
 Complex = npt.NDArray[np.complex128]
 

@@ -1,4 +1,7 @@
-"""Lengths of steps along a branch, over wear cycles and in time. Their defaults stand here alone; case files take them from here."""
+"""Lengths of steps along a branch, over wear cycles and in time.
+
+Their defaults stand here alone; case files take them from here.
+"""
 
 from __future__ import annotations
 

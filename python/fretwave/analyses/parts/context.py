@@ -112,6 +112,10 @@ class AnalysisContext(Generic[Section]):
     writers: list[AnalysisWriter] = field(default_factory=list)
     afterwards: list[Callable[[], None]] = field(default_factory=list)
 
+    def __repr__(self) -> str:
+        ranks = f"{self.comm.size} rank{'s' * (self.comm.size > 1)}"
+        return f"AnalysisContext('{self.name}' of {self.case.name}, on {ranks}, in {self.folder})"
+
     @property
     def name(self) -> str:
         return self.analysis.name
