@@ -1,0 +1,124 @@
+/// Derivatives of a harmonic problem: products, and the entries of its matrix.
+#include <algorithm>
+
+#include "hb/harmonic_problem.h"
+
+namespace fretwave::hb {
+
+namespace {
+
+/// y += f x for exponents.
+void add(Exponents& y, double f, Exponents const& x) {
+  for (size_t i = 0; i < y.s.size(); ++i) y.s[i] += f * x.s[i];
+  y.inertia_damping += f * x.inertia_damping;
+}
+
+}  // namespace
+
+/// Line searches evaluate elsewhere: the point of linearisation is y, whatever was evaluated last, and the
+/// laws are as they are now, whichever problem of the model has changed them.
+void HarmonicProblem::linearise(Vec y) {
+  PetscBool same = PETSC_FALSE;
+  if (linearised_ && contact_version_ == residual_.contact_version()) check(VecEqual(y, last_, &same));
+  if (same) return;
+  VecHandle unused = equations();
+  residual(y, unused);
+}
+
+// Q = Q_static + a q: dQ = a (dq + q dlog a); r = R / (k a): dr = dR / (k a) - r dlog a
+void HarmonicProblem::product(Vec y, Vec dy, Vec dr) {
+  linearise(y);
+  const auto dz = scalars(dy);
+  Exponents de{std::vector<complex>(harmonics().count()), 0};
+  double dlog = 0, load = 0;
+  for (int j = 0; j < scalars_; ++j) {
+    add(de, dz[j], motion_.dexponents[j]);
+    dlog += dz[j] * motion_.dlog_amplitude[j];
+    load += dz[j] * dload(j);
+  }
+  {
+    ReadArray in(dy);
+    std::copy_n(in.data(), local_block_, WriteArray(dQ_).data());
+  }
+  const auto along = components(dQ_);
+  check(VecAXPBY(dQ_, motion_.amplitude * dlog, motion_.amplitude, q_));
+  residual_.product(dQ_, &de, dR_);
+  check(VecAXPY(dR_, -load, excitation_));
+  add_stand_off(scalars_ - 1, dz[scalars_ - 1], dR_);
+  check(VecAXPBY(dR_, -dlog, 1 / (stiffness_ * motion_.amplitude), R_));
+  WriteArray out(dr);
+  ReadArray in(dR_);
+  std::copy_n(in.data(), local_block_, out.data());
+  border(dz, along, out.data());
+}
+
+void HarmonicProblem::pattern(std::vector<PetscInt>& rows, std::vector<PetscInt>& cols) {
+  residual_.pattern(rows, cols);
+  const PetscInt first = model().first_dof() * harmonics().block_size(),
+                 all = model().dofs() * harmonics().block_size();
+  for (int j = 0; j < unfoldings() + scalars_; ++j)
+    for (PetscInt i = 0; i < local_block_; ++i) rows.push_back(first + i), cols.push_back(all + j);
+  for (int j = 0; j < unfoldings(); ++j)
+    for (PetscInt i = 0; i < local_block_; ++i) rows.push_back(all + 2 + j), cols.push_back(first + i);
+  if (!normalised()) return;
+  for (int j = 0; j < 2; ++j)
+    for (auto const& [dof, weight] : mine())
+      rows.push_back(all + j),
+          cols.push_back(dof * harmonics().block_size() + harmonics().offset(harmonics().fundamental()) + j);
+}
+
+/// dR += dR/d(stand-off) d(stand-off)/dz_j dz.
+void HarmonicProblem::add_stand_off(int j, double dz, Vec dR) {
+  if (j != scalars_ - 1 || motion_.dstand_off == 0) return;
+  VecHandle wider = like(dR);
+  residual_.stand_off_product(wider);
+  check(VecAXPY(dR, dz * motion_.dstand_off, wider));
+}
+
+void HarmonicProblem::column(int j, double* v) {
+  const double dlog = motion_.dlog_amplitude[j];
+  check(VecCopy(q_, dQ_));
+  check(VecScale(dQ_, dlog * motion_.amplitude));
+  residual_.product(dlog ? Vec(dQ_) : nullptr, &motion_.dexponents[j], dR_);
+  check(VecAXPY(dR_, -dload(j), excitation_));
+  add_stand_off(j, 1, dR_);
+  check(VecAXPBY(dR_, -dlog, 1 / (stiffness_ * motion_.amplitude), R_));
+  ReadArray in(dR_);
+  std::copy_n(in.data(), local_block_, v);
+}
+
+void HarmonicProblem::values(Vec y, std::span<double> v) {
+  linearise(y);
+  double* next = residual_.values(1 / stiffness_, v.data());
+  for (auto const& g : unfold_) next = std::copy_n(ReadArray(g).data(), local_block_, next);
+  for (int j = 0; j < scalars_; ++j, next += local_block_) column(j, next);
+  for (auto const& g : unfold_) next = std::copy_n(ReadArray(g).data(), local_block_, next);
+  for (int j = 0; normalised() && j < 2; ++j)
+    for (auto const& [dof, weight] : mine()) *next++ = weight;
+}
+
+VecHandle HarmonicProblem::scalar_column(Vec y, int j) {
+  linearise(y);
+  VecHandle out = like(q_);
+  column(j, WriteArray(out).data());
+  return out;
+}
+
+std::vector<PairTangents> HarmonicProblem::pair_tangents(Vec y) {
+  linearise(y);
+  return residual_.pair_tangents();
+}
+
+VecHandle HarmonicProblem::gap_product(Vec y, PerContact const& dgap) {
+  linearise(y);
+  residual_.gap_product(dgap, dR_);
+  VecHandle out = equations();
+  check(VecSet(out, 0));
+  ReadArray in(dR_);
+  const double scale = 1 / (stiffness_ * motion_.amplitude);
+  std::transform(in.data(), in.data() + local_block_, WriteArray(out).data(),
+                 [&](double r) { return scale * r; });
+  return out;
+}
+
+}  // namespace fretwave::hb
