@@ -97,7 +97,7 @@ class Reduction:
         """Reduced coordinate of each kept dof."""
         return {int(dof): place for place, dof in enumerate(self.keep)}
 
-    def rows(self, B: Sparse) -> Sparse:
+    def rows(self, B: Sparse | npt.ArrayLike) -> Sparse:
         """B (n, n_r) on the reduced coordinates of rows (n, n_dof) that reach kept dofs alone.
 
         Raises
@@ -105,8 +105,9 @@ class Reduction:
         InputError
             They reach another dof.
         """
-        kept = sp.csr_matrix(B[:, self.keep])
-        check_all_kept(B, kept)
+        full = sp.csr_matrix(B)
+        kept = sp.csr_matrix(full[:, self.keep])
+        check_all_kept(full, kept)
         return sp.csr_matrix(sp.hstack([kept, sp.csr_matrix((kept.shape[0], len(self.component_hz)))]))
 
     def names(self, dofs: Sequence[str]) -> list[str]:
