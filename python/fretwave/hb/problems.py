@@ -11,14 +11,13 @@ import numpy.typing as npt
 from petsc4py import PETSc
 
 from .. import _core
+from ..arrays import Array
 from ..errors import InputError
 from ..model.model import Model
 from ..model.modes import LinearMode
 from ..model.rest import Rest
 from ..post.contact_history import MOTION
 from .states import ForcedState, ModalState, State
-
-Array = npt.NDArray[np.float64]
 
 
 class Harmonics:

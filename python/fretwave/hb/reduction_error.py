@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 from petsc4py import PETSc
 
+from ..arrays import Array, Complex
 from ..errors import InputError, NotConverged
 from ..model.reduction import Reduction
 from .problems import NonlinearMode
@@ -18,8 +19,6 @@ from .problems import NonlinearMode
 if TYPE_CHECKING:
     from mpi4py import MPI
 
-Array = npt.NDArray[np.float64]
-Complex = npt.NDArray[np.complex128]
 
 #: Left of the interior residual when its correction is taken as solved, and the rounds given to it.
 TOLERANCE, MOST_ROUNDS = 1e-4, 30

@@ -13,13 +13,12 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from .. import _core
+from ..arrays import Array
 from ..errors import InputError
 from ..mpi import guard as parallel
 from .contact import Contact
 from .rest import Rest
 from .sectors import Given, Term, by_sector
-
-Array = npt.NDArray[np.float64]
 
 if MPI.COMM_WORLD.size > 1:
     parallel.install()  # in scripts too: one rank's exception ends all ranks, with one message

@@ -8,10 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from .. import _core
+from ..arrays import Array
 from ..errors import InputError
 from .model import Model
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ import scipy.sparse as sp
 from petsc4py import PETSc
 
 from .. import _core
+from ..arrays import Array
 from ..errors import InputError
 from .model import Model
 from .sectors import Given, Sparse
@@ -22,7 +23,6 @@ from .sizes import COMPARED_MODES, COMPONENT_MODES
 if TYPE_CHECKING:
     from mpi4py import MPI
 
-Array = npt.NDArray[np.float64]
 
 #: Frequencies below this share of the lowest component frequency are rigid motions, without a relative error.
 RIGID_SHARE = 1e-3

@@ -7,17 +7,15 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from petsc4py import PETSc
 
 from .. import _core
+from ..arrays import Array
 from ..errors import InputError
 from ..hb.problems import HarmonicProblem
 from .starting import far_from_start, starts
 from .steps import StepControl
 from .trace import Knot
-
-Array = npt.NDArray[np.float64]
 
 #: Relative change of the force's harmonics on doubled samples above which a failure is put down to sampling.
 ALIASING_LIMIT = 1e-3

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-import numpy.typing as npt
 from petsc4py import PETSc
 
 from .. import _core
+from ..arrays import Array
 from ..errors import InputError, NotConverged
 from ..hb.problems import HarmonicProblem, Harmonics
 from ..hb.suspects import suspects
@@ -18,8 +18,6 @@ from ..model.modes import LinearMode, linear_modes
 from ..model.rest import Rest
 from .continuation import Continuation
 from .steps import StepControl
-
-Array = npt.NDArray[np.float64]
 
 #: What is kept of each contact.
 TOLD = ("u", "f", "status", "gap")

@@ -7,12 +7,10 @@ from pathlib import Path
 from typing import Any, overload
 
 import numpy as np
-import numpy.typing as npt
 
+from ..arrays import AnyArray
 from ..columns import Column, Value, csv_header, csv_line
 from ..files.whole import replaced
-
-Array = npt.NDArray[Any]
 
 #: Rows that a table's text shows before it leaves out its middle.
 SHOWN = 12
@@ -67,10 +65,10 @@ class Table:
         return name in self._values
 
     @overload
-    def __getitem__(self, key: str) -> Array: ...
+    def __getitem__(self, key: str) -> AnyArray: ...
     @overload
     def __getitem__(self, key: int) -> dict[str, Value]: ...
-    def __getitem__(self, key: str | int) -> Array | dict[str, Value]:
+    def __getitem__(self, key: str | int) -> AnyArray | dict[str, Value]:
         """A column by its name, or a row by its number."""
         if isinstance(key, str):
             if key not in self._values:

@@ -9,11 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from .. import _core
+from ..arrays import Array
 from ..errors import InputError
 from ..model.model import Model
 from .steps import TIME_TOLERANCE
-
-Array = npt.NDArray[np.float64]
 
 #: Of one run, unless told: a minute of a small model.
 MOST_STEPS = 400_000

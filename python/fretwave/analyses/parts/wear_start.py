@@ -6,8 +6,8 @@ import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
+from ...arrays import Array
 from ...errors import NotConverged
 from ...model.laws import Role
 from .branch import mode_problem, points_of, step_control
@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from ...solve.worn_mode import WornMode
     from ..mode import ModeAnalysis
     from ..wear import WearAnalysis
-
-Array = npt.NDArray[np.float64]
 
 
 def unworn_starts(context: AnalysisContext[ModeAnalysis], analysis: WearAnalysis) -> dict[str, Any]:
