@@ -9,7 +9,8 @@ from typing import Any, overload
 import numpy as np
 
 from ..arrays import AnyArray
-from ..columns import Column, Value, csv_header, csv_line
+from ..columns import Column, Value
+from ..files.csv_table import header_line, row_line
 from ..files.whole import replaced
 
 #: Rows that a table's text shows before it leaves out its middle.
@@ -82,7 +83,7 @@ class Table:
     def to_csv(self, path: str | Path) -> None:
         """Write it as the table of a run is written: shortest text that gives the same numbers back."""
         with replaced(Path(path)) as fresh:
-            text = "".join([csv_header(self.columns), *(csv_line(self.columns, row) for row in self)])
+            text = "".join([header_line(self.columns), *(row_line(self.columns, row) for row in self)])
             fresh.write_text(text, encoding="utf-8")
 
     def text(self) -> str:
