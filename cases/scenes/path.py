@@ -57,7 +57,7 @@ def complaints(run: Any) -> list[str]:
     """What is wrong with a branch that ended with exit 0."""
     if broken(run):
         return [] if len(run.Q) else ["no rows"]
-    return [*_ends(run), *_reports(run), *_folds(run), *_retraced(run), *_jumps(run)]
+    return [*_ends(run), *_reports(run), *_folds(run), *retraced(run), *jumps(run)]
 
 
 def _asked(run: Any) -> tuple[float, float]:
@@ -112,7 +112,7 @@ def coordinates(run: Any) -> Any:
     return np.column_stack([motion, c["beta"] / c["omega0"][0], c["omega"] / c["omega0"][0], np.log(c["amplitude"])])
 
 
-def _retraced(run: Any) -> list[str]:
+def retraced(run: Any) -> list[str]:
     """Points that come back along earlier pieces of the branch, the other way."""
     z = coordinates(run)
     rows = np.flatnonzero(np.r_[True, np.linalg.norm(np.diff(z, axis=0), axis=1) > 1e-12])
@@ -146,7 +146,7 @@ def _same_piece(run: Any, rows: Any, i: int, j: int, along: float) -> bool:
     return bool(np.linalg.norm(off) < 1e-3 * np.linalg.norm(chord))
 
 
-def _jumps(run: Any, most: int = 4) -> list[str]:
+def jumps(run: Any, most: int = 4) -> list[str]:
     """The longest and most turning steps are bisected: a branch closes in on them, two branches keep their gap."""
     z = coordinates(run)
     d = np.diff(z, axis=0)

@@ -32,6 +32,8 @@ if TYPE_CHECKING:
     from .cyclic.wheel_shape import WheelShape
     from .hb.problems import ForcedResponse, Harmonics, NonlinearMode, choose_harmonics
     from .hb.reduction_error import NonlinearError, nonlinear_error
+    from .importers.entries import Entries
+    from .importers.formats import register_format
     from .model.contact import Contact
     from .model.laws import LawInfo, Limit, ParameterInfo, PythonLaw, Role, laws, register_law
     from .model.model import Model
@@ -87,6 +89,8 @@ _HOMES = {
     "solve.sweep": ("Sweep", "sweep"),
     "solve.wear_march": ("WearMarch", "wear"),
     "cyclic.faces": ("match_faces",),
+    "importers.entries": ("Entries",),
+    "importers.formats": ("register_format",),
     "model.laws": ("LawInfo", "Limit", "ParameterInfo", "PythonLaw", "Role", "laws", "register_law"),
     "model.contact": ("Contact",),
     "model.model": ("Model",),
@@ -108,6 +112,7 @@ __all__ = [
     "Column",
     "Contact",
     "Continuation",
+    "Entries",
     "ForcedResponse",
     "FrequencyError",
     "FretwaveError",
@@ -165,6 +170,7 @@ __all__ = [
     "reduce_case",
     "reduce_sector",
     "register_analysis",
+    "register_format",
     "register_law",
     "rotation",
     "standing_wave",

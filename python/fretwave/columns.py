@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Union
 
@@ -115,13 +115,3 @@ FORCED = ("point", "level", "omega", "frequency_hz", "amplitude", "phase", *_SHA
 def columns_named(names: Sequence[str | Column]) -> list[Column]:
     """Columns by name; an analysis may bring columns of its own."""
     return [name if isinstance(name, Column) else COLUMNS[name] for name in names]
-
-
-def csv_line(columns: Sequence[Column], row: Mapping[str, Value]) -> str:
-    """One line of a table."""
-    return ",".join(column.text(row[column.name]) for column in columns) + "\n"
-
-
-def csv_header(columns: Sequence[Column]) -> str:
-    """First line of a table."""
-    return ",".join(column.name for column in columns) + "\n"

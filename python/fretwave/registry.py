@@ -18,9 +18,9 @@ from .errors import InputError
 if TYPE_CHECKING:
     from .case.analysis import AnalysisSection
 
-ANALYSIS, LAW = "type of analysis", "contact law"
-#: What was added, and its class.
-Added = tuple[str, type[Any]]
+ANALYSIS, LAW, FORMAT = "type of analysis", "contact law", "format of matrices"
+#: What was added, and its class or function.
+Added = tuple[str, Any]
 
 _registered: dict[str, type[AnalysisSection]] = {}
 _noting: list[list[Added]] = []
@@ -74,8 +74,8 @@ def noted() -> Iterator[list[Added]]:
         _noting.remove(added)
 
 
-def admit(what: str, name: str, known: Mapping[str, type[Any]], new: type[Any]) -> None:
-    """Let a class have a name, unless another file has given it to something else."""
+def admit(what: str, name: str, known: Mapping[str, Any], new: Any) -> None:
+    """Let a class or function have a name, unless another file has given it to something else."""
     if name in known and file_of(known[name]) != file_of(new):
         places = f"{file_of(known[name])} and {file_of(new)}"
         raise InputError(f"two files register a {what} '{name}'", file_of(new), places, "each name once", "rename one")
@@ -83,9 +83,9 @@ def admit(what: str, name: str, known: Mapping[str, type[Any]], new: type[Any]) 
         added.append((what, new))
 
 
-def file_of(kind: type[Any]) -> str:
-    """The file that defines a class, else its module's name."""
+def file_of(kind: Any) -> str:
+    """The file that defines a class or function, else its module's name."""
     try:
         return inspect.getfile(kind)
     except (OSError, TypeError):
-        return kind.__module__
+        return str(kind.__module__)

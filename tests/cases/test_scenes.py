@@ -173,8 +173,8 @@ def circle(angles):
 
 def test_a_branch_that_retraces_itself_and_one_that_stops_early_are_wrong():
     out, back = np.arange(0.0, 1.5, 0.1), np.arange(1.43, 0.0, -0.1)
-    assert not path._retraced(circle(np.r_[out]))
-    assert path._retraced(circle(np.r_[out, back]))
+    assert not path.retraced(circle(np.r_[out]))
+    assert path.retraced(circle(np.r_[out, back]))
     run = dataclasses.replace(
         circle(out), scene=dataclasses.replace(scene("jenkins"), analysis=mode(amplitude=(1.0, 5.0)))
     )
@@ -190,8 +190,8 @@ def test_a_table_that_goes_over_to_another_branch_jumps(monkeypatch):
     monkeypatch.setattr(path, "distance", nearer)
     eq = Equations(np.eye(1), np.eye(1), None, [], [1], 16, "CNM")
     states = [(np.array([[a, 0.0]]), 0.0, 2.0 if a < 1.35 else 3.0) for a in np.arange(1.0, 2.0, 0.1)]
-    assert any("between rows 3 and 4" in line for line in path._jumps(table(eq, "CNM", states)))
-    assert not path._jumps(table(eq, "CNM", states[:4]))
+    assert any("between rows 3 and 4" in line for line in path.jumps(table(eq, "CNM", states)))
+    assert not path.jumps(table(eq, "CNM", states[:4]))
 
 
 def test_a_table_with_values_that_cannot_be_is_wrong():

@@ -20,7 +20,7 @@ from test_results import fill, writer
 
 from fretwave.errors import InputError
 from fretwave.files.isolated import call_isolated
-from fretwave.files.whole import _LENGTH, FileError, check_whole, replace_bytes, replaced, seal, sealed_size
+from fretwave.files.whole import SEAL_LENGTH, FileError, check_whole, replace_bytes, replaced, seal, sealed_size
 from fretwave.importers import read_matrix
 from fretwave.model.structure import Structure
 from fretwave.results import model_file
@@ -53,11 +53,11 @@ def test_every_byte_of_results_counts(results: Path, tmp_path: Path) -> None:
     """Changed anywhere, cut anywhere: never read as if it were whole."""
     content = (results / "results.h5").read_bytes()
     random, path = np.random.default_rng(0), tmp_path / "results.h5"
-    for at in random.integers(len(content) - _LENGTH, size=40):
+    for at in random.integers(len(content) - SEAL_LENGTH, size=40):
         path.write_bytes(content[:at] + bytes([content[at] ^ 1 << int(random.integers(8))]) + content[at + 1 :])
         with pytest.raises(InputError, match=r"results\.h5 (is damaged|cannot be opened)"):
             open_results(path)
-    for size in (0, 7, 2000, len(content) - _LENGTH - 1, len(content) - 1):
+    for size in (0, 7, 2000, len(content) - SEAL_LENGTH - 1, len(content) - 1):
         path.write_bytes(content[:size])
         with pytest.raises(InputError, match=r"results\.h5 (is damaged|cannot be opened)"):
             open_results(path)
@@ -120,7 +120,7 @@ def test_damaged_model_files_are_named(tmp_path: Path) -> None:
     random = np.random.default_rng(2)
     for _ in range(10):
         path.write_bytes(damaged(content, random)[1])
-        if path.read_bytes() != content and path.read_bytes() != content[:-_LENGTH]:
+        if path.read_bytes() != content and path.read_bytes() != content[:-SEAL_LENGTH]:
             with pytest.raises(InputError):
                 model_file.read_model(path)
 

@@ -137,7 +137,8 @@ def test_jumps_are_marked(run):
     assert names == ["a = 2.5 µm", wear.JUMP]
     lines = [replace(line, amplitude=a, jumps=np.full(k, 4.0)) for k, a in enumerate((1e-6, 2e-6, 3e-6))]
     figure = wear.draw_modal_map(analysis, lines)
-    assert figure._suptitle.get_text().endswith(f"red marks: {wear.JUMP}")
+    (title,) = figure.texts
+    assert title.get_text().endswith(f"red marks: {wear.JUMP}")
     assert sum(len(mark.get_xdata()) for mark in figure.axes[0].lines) == 3
 
 

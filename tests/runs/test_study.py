@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fretwave.results.study_report import markdown, write_csv
+from fretwave.files.csv_table import write_rows
+from fretwave.results.study_report import markdown
 from fretwave.run.study_plan import Outcome, Plan, Settings, Study, common_amplitudes
 
 pytestmark = pytest.mark.ranks(1)
@@ -73,7 +74,8 @@ def test_without_the_finest_run_there_is_no_table():
 
 def test_table_is_written_as_csv_and_as_markdown(tmp_path):
     rows = run_study()[0].table()
-    lines = write_csv(rows, tmp_path / "study.csv").read_text().splitlines()
+    write_rows(tmp_path / "study.csv", rows)
+    lines = (tmp_path / "study.csv").read_text().splitlines()
     assert lines[0].startswith("sweep,harmonics,samples,tolerance,points,newton,wall_s,omega_error,zeta_error,")
     assert len(lines) == 1 + len(rows)
     text = markdown(rows, ["a note"]).splitlines()

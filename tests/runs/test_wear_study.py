@@ -14,7 +14,8 @@ from models.wear_case import write_case
 from fretwave.case.load import load_case
 from fretwave.plots.study import figures
 from fretwave.results.reader import Run
-from fretwave.results.study_report import LEGEND_OF_WEAR, PRINTED_OF_WEAR, markdown, write_csv
+from fretwave.files.csv_table import write_rows
+from fretwave.results.study_report import LEGEND_OF_WEAR, PRINTED_OF_WEAR, markdown
 from fretwave.run.wear_study import TOLERANCES, WearOutcome, WearPlan, WearSettings, wear_plan
 
 pytestmark = pytest.mark.ranks(1)
@@ -57,7 +58,7 @@ def test_table_and_picture(tmp_path):
     text = markdown(rows, ["a note"], PRINTED_OF_WEAR, LEGEND_OF_WEAR).splitlines()
     assert len({len(line) for line in text[: 2 + len(rows)]}) == 1 and text[-1] == "a note"
     assert "2.20000" in text[2]
-    write_csv(rows, tmp_path / "study.csv")
+    write_rows(tmp_path / "study.csv", rows)
     ((name, figure),) = figures(Run(tmp_path))
     assert name == "study" and [axes.get_title() for axes in figure.axes] == ["Damping", "Frequency", "Worn volume"]
     volume = {line.get_label(): line.get_ydata() for line in figure.axes[2].lines}

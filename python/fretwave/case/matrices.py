@@ -13,6 +13,7 @@ import scipy.sparse.linalg
 
 from ..errors import FretwaveError, InputError
 from ..files.compressed import check_compressed
+from ..importers import Entries, formats
 from ..model.checks import NAMES
 from ..model.sectors import Sparse
 from ..texts import display, is_there, nearest, shortened
@@ -90,6 +91,8 @@ def _read(path: Path, letter: str, where: str) -> Sparse:
 
 
 def _read_known(path: Path, letter: str) -> Any:
+    if (format := formats.registered(path)) is not None:
+        return _as_given(format.read(path, letter, None))
     if path.suffix == ".mtx":
         return scipy.io.mmread(str(path))
     if path.suffix != ".npz":
@@ -100,6 +103,15 @@ def _read_known(path: Path, letter: str) -> Any:
     matrix = scipy.sparse.load_npz(path)
     check_compressed(matrix)
     return matrix
+
+
+def _as_given(found: Any) -> Any:
+    """The matrix of a registered reader; what has to be put in order is the importer's."""
+    if not isinstance(found, Entries):
+        return found
+    if found.labels is not None or found.held is not None or found.half:
+        raise ValueError("it numbers its dofs by nodes; bring it into a model file with `fretwave import`")
+    return scipy.sparse.csr_matrix((found.values, (found.rows, found.columns)), shape=found.shape)
 
 
 def _check_square(letter: str, values: Sparse, where: str) -> None:

@@ -1,4 +1,4 @@
-"""Python files that a case names under `plugins`: each adds contact laws and kinds of analysis.
+"""Python files that a case names under `plugins`: each adds contact laws, kinds of analysis, formats of matrices.
 
 A file is executed once for its text, on every rank: what is sent between ranks brings the files it needs. Their hashes
 are among the values that decide the results, and run.json keeps their texts, so that a finished run can be drawn where
@@ -18,18 +18,20 @@ from typing import Any
 
 from .. import registry
 from ..errors import FretwaveError, InputError
+from ..importers.formats import forget_format
 from ..model.laws import forget_law
 from ..mpi.guard import PLUGIN
 from ..texts import display, is_there, nearest, shortened, toml
 from .toml.source import Source
 
+FORGET = {registry.ANALYSIS: registry.forget, registry.LAW: forget_law, registry.FORMAT: forget_format}
 #: What each file that is loaded has added, by its place.
 _loaded: dict[str, tuple[Plugin, list[registry.Added]]] = {}
 
 
 @dataclass(frozen=True)
 class Plugin:
-    """A file that adds laws or analyses.
+    """A file that adds laws, analyses or formats.
 
     Attributes
     ----------
@@ -84,13 +86,26 @@ def load(name: str, path: str, text: str) -> Plugin:
                 raise InputError(
                     "the plug-in adds nothing",
                     display(Path(path)),
-                    expected="a contact law or an analysis",
-                    fix="put `@fw.register_law` or `@fw.register_analysis` before its class",
+                    expected="a contact law, an analysis or a format of matrices",
+                    fix="put `@fw.register_law`, `@fw.register_analysis` or `@fw.register_format(...)` before it",
                 )
         except (Exception, SystemExit) as error:  # whatever a user's file may do, it is not a defect of ours
             forget(path)
             raise _blame(error, Path(path)) from None
     return plugin
+
+
+def load_file(path: Path) -> Plugin:
+    """Load a plug-in that no case names.
+
+    Raises
+    ------
+    InputError
+    """
+    try:
+        return load(path.name, str(path.resolve()), path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError("the plug-in cannot be read", display(path), str(error), "a Python file in UTF-8") from None
 
 
 def loaded() -> list[Plugin]:
@@ -102,7 +117,7 @@ def forget(path: str) -> None:
     """Take back what a plug-in has added, if it is loaded."""
     plugin, added = _loaded.pop(path, (None, []))
     for what, kind in added:
-        (registry.forget if what == registry.ANALYSIS else forget_law)(kind)
+        FORGET[what](kind)
     if plugin is not None:
         sys.modules.pop(plugin.module, None)
 

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..arrays import Indices
 from ..errors import FretwaveError, InputError
 from ..model.contact import Contact
-from ..model.sectors import Indices
 from ..model.structure import Structure
 from ..texts import nearest, toml
 from .contacts import on

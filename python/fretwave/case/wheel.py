@@ -8,8 +8,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
+from ..arrays import Array
 from ..model.structure import WHOLE
 from .schema import MistuningSection
 
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from .analysis import AnalysisSection
     from .load import Case
 
-Array = npt.NDArray[np.float64]
 
 #: Iterations before GMRES restarts on a tuned wheel.
 FIRST_RESTART = 100

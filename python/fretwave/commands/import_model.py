@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from ..case.plugins import load_file
 from ..errors import EXIT_DONE, InputError
 from ..importers.calculix import SUFFIXES, read_dofs
 from ..importers.entries import Assembled, assemble
@@ -48,6 +49,8 @@ def read_parts(options: argparse.Namespace) -> tuple[Structure, Assembled]:
     InputError
         A file or an option is wrong.
     """
+    for plugin in options.plugin:
+        load_file(plugin)
     _check_place(options.out, [options.mass, options.stiffness, options.damping])
     paths = {letter: getattr(options, role) for letter, role in ROLES.items() if getattr(options, role)}
     given = {letter: read_matrix(path, letter) for letter, path in paths.items()}
@@ -75,6 +78,7 @@ def _sources(options: argparse.Namespace) -> list[SourceFile]:
     files = [(role, split(getattr(options, role))[0]) for role in ROLES.values() if getattr(options, role)]
     tables = [("coordinates", options.coordinates), ("dofs", options.dofs)]
     files += [(role, path) for role, path in tables if path]
+    files += [("plugin", path) for path in options.plugin]
     files += [("pairs", Path(words[0].rpartition("=")[2])) for words in options.pairs if len(words) == 1]
     beside = {path.with_suffix(".dof") for _, path in files if path.suffix.lower() in SUFFIXES}
     files += [("dofs", path) for path in sorted(beside) if path.is_file()]

@@ -169,6 +169,7 @@ def _add_import(commands: _SubParsers) -> None:
     add.add_argument("--mass", required=True, metavar="FILE", help="mass matrix")
     add.add_argument("--stiffness", required=True, metavar="FILE", help="stiffness matrix")
     add.add_argument("--damping", metavar="FILE", help="viscous damping matrix")
+    add.add_argument("--plugin", type=Path, action="append", default=[], metavar="FILE.py", help="a reader of your own")
     add.add_argument("--symmetric", choices=("auto", "lower", "upper", "full"), default="auto", help="what files hold")
     add.add_argument("--dofs", type=Path, metavar="FILE", help="node and direction of each row (.dof, or CSV)")
     add.add_argument("--coordinates", type=Path, metavar="FILE", help="nodes, sets and cells: CSV, .npz or input deck")

@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING, Any
 from ..case.load import changed_keys
 from ..console import Console
 from ..errors import EXIT_DONE, FretwaveError, InputError, NotConverged
+from ..files.csv_table import write_rows
 from ..mpi import groups
 from ..mpi.guard import on_first_rank
 from ..mpi.interrupt import say_how_to_go_on
 from ..post.grid import Plan
 from ..results.runfolder import CASE_COPY, RunFolder, new_record, peak_memory_mb, read_copy
 from ..results.sweep_summary import landmarks, summary_of
-from ..results.sweeps import write_summary, write_sweep
+from ..results.sweeps import write_sweep
 from ..run.order import RunOptions
 from ..run.runner import Runner, plot
 from ..run.sweep import Checked, Sweep
@@ -134,7 +135,7 @@ def _write(
     if summary:
         lead = [*sweep.plan.keys, "value", "analysis"]
         ordered = [{key: row[key] for key in (*lead, *(k for k in row if k not in lead))} for row in summary]
-        write_summary(folder.path / "summary.csv", ordered)
+        write_rows(folder.path / "summary.csv", ordered)
     sweep.forget_others()
     return outcomes, lines
 

@@ -6,11 +6,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
 
+from ..arrays import Array, Indices
 from ..errors import InputError
 from ..model.sectors import rotation
-
-Array = npt.NDArray[np.float64]
-Indices = npt.NDArray[np.intp]
 
 #: Distance of matching nodes, as a share of the face's extent.
 TOLERANCE = 1e-6

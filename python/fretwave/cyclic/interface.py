@@ -9,11 +9,9 @@ import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
 
+from ..arrays import Array, Indices
 from ..model.contact import Contact
 from ..model.sectors import by_sector, rotation
-
-Array = npt.NDArray[np.float64]
-Indices = npt.NDArray[np.intp]
 
 
 @dataclass

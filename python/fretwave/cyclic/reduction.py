@@ -23,6 +23,7 @@ import numpy.typing as npt
 import scipy.sparse as sp
 from mpi4py import MPI
 
+from ..arrays import Array, Indices
 from ..errors import InputError
 from ..model.contact import Contact
 from ..model.reduction import RIGID_SHARE, Reduction, check_all_kept, reduce
@@ -31,9 +32,6 @@ from ..model.sizes import COMPARED_MODES, INTERFACE_TOLERANCE, INTERFACE_WAVES
 from .interface import Interface
 from .sector import Sector
 from .waves import STATES, SectorWaves, WaveError
-
-Array = npt.NDArray[np.float64]
-Indices = npt.NDArray[np.intp]
 
 
 class SectorReduction:

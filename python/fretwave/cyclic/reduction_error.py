@@ -13,16 +13,14 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import scipy.sparse as sp
 from petsc4py import PETSc
 
+from ..arrays import Array, Complex
 from ..hb.problems import NonlinearMode
 from ..hb.reduction_error import NonlinearError, _harmonics, _reduced_step
 from .reduction import SectorReduction
 
-Array = npt.NDArray[np.float64]
-Complex = npt.NDArray[np.complex128]
 Terms = Mapping[int, Any]
 
 

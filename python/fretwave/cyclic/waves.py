@@ -7,19 +7,16 @@ from dataclasses import dataclass, replace
 from typing import Any, Optional, Tuple
 
 import numpy as np
-import numpy.typing as npt
 import scipy.sparse as sp
 from mpi4py import MPI
 
+from ..arrays import Array, Complex, Indices
 from ..model.contact import Contact
 from ..model.laws import PythonLaw, Role, springs
 from ..model.modes import linear_modes
 from ..model.sectors import by_sector
 from .sector import Sector
 
-Array = npt.NDArray[np.float64]
-Complex = npt.NDArray[np.complex128]
-Indices = npt.NDArray[np.intp]
 #: Nodal diameters, and the state of the contact.
 Wave = Tuple[int, str]
 

@@ -11,14 +11,11 @@ from collections.abc import Sequence
 from typing import Any, Optional
 
 import numpy as np
-import numpy.typing as npt
 
+from ..arrays import Array, Complex
 from ..model.modes import LinearMode
 from ..model.sectors import around
 from .sector import Sector, wave_mode
-
-Array = npt.NDArray[np.float64]
-Complex = npt.NDArray[np.complex128]
 
 #: Modes of a mistuned wheel whose shares in a tuned wave differ by less are alike in it: the lower one is taken.
 ALIKE = 1e-3

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from ..arrays import Complex
 from ..model.sectors import around
 from ..post.wave_content import participation, wave_content
 from .engine_order import folded
@@ -25,8 +26,6 @@ from .engine_order import folded
 if TYPE_CHECKING:
     from ..model.modes import LinearMode
     from .sector import Sector
-
-Complex = npt.NDArray[np.complex128]
 
 
 class WheelShape:

@@ -10,10 +10,9 @@ import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
 
+from ..arrays import Array
 from ..errors import InputError
 from .mesh import Mesh
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

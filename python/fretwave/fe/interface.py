@@ -6,15 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 import scipy.sparse as sp
 
+from ..arrays import Array, Indices
 from ..errors import InputError
 from .lagrange import tensor_gauss
 from .mesh import Mesh
-
-Array = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.intp]
 
 
 @dataclass(frozen=True)
@@ -35,14 +32,14 @@ class ContactPatch:
         Displacement of the contact point = weights @ nodal displacements: the centre node, or the mean of the cell.
     """
 
-    nodes: IntArray
+    nodes: Indices
     points: Array
     normals: Array
     areas: Array
     weights: sp.csr_matrix
 
 
-def surface_vectors(mesh: Mesh, faces: IntArray) -> tuple[Array, Array]:
+def surface_vectors(mesh: Mesh, faces: Indices) -> tuple[Array, Array]:
     """Integrals over each face (.., m, m).
 
     Returns
@@ -60,7 +57,7 @@ def surface_vectors(mesh: Mesh, faces: IntArray) -> tuple[Array, Array]:
     return shares, np.einsum("q,fqx->fx", weights, normal)
 
 
-def nodal_areas(mesh: Mesh, faces: IntArray) -> Array:
+def nodal_areas(mesh: Mesh, faces: Indices) -> Array:
     """Area that belongs to each node (n_nodes,) [m^2]: integral of its shape function over the faces."""
     shares, _ = surface_vectors(mesh, faces)
     return np.bincount(faces.ravel(), shares.ravel(), minlength=len(mesh.nodes)).astype(float)

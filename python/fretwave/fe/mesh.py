@@ -16,11 +16,9 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
+from ..arrays import Array, Indices
 from ..errors import InputError
 from .lagrange import lagrange, tensor, tensor_gauss
-
-Array = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.intp]
 
 #: Nodes closer than this share of the shortest distance between neighbours of one block are one node.
 MERGE_SHARE = 1e-3
@@ -88,9 +86,9 @@ class Mesh:
     """
 
     nodes: Array
-    cells: IntArray
+    cells: Indices
     order: int
-    lattice: Mapping[str, IntArray] = field(repr=False)
+    lattice: Mapping[str, Indices] = field(repr=False)
 
     @property
     def n_dof(self) -> int:
@@ -98,7 +96,7 @@ class Mesh:
         return 3 * len(self.nodes)
 
     @property
-    def vtk_cells(self) -> IntArray:
+    def vtk_cells(self) -> Indices:
         """Node numbers (n_cells, 8 or 27) in VTK's order: hexahedron or triquadratic hexahedron."""
         order = np.array(VTK_LATTICE if self.order == 2 else VTK_LATTICE[:8]) * self.order // 2
         return self.cells[:, order[:, 0], order[:, 1], order[:, 2]]
@@ -115,14 +113,14 @@ class Mesh:
         return float((self.jacobians() @ tensor_gauss(self.order, 3)[2]).sum())
 
     @cached_property
-    def boundary_faces(self) -> IntArray:
+    def boundary_faces(self) -> Indices:
         """Node lattices (n_faces, m, m) of the faces that belong to one element, seen from outside."""
         faces = np.concatenate([side_faces(self.cells, axis, end) for axis in range(3) for end in (0, 1)])
         corners = np.sort(faces[:, :: self.order, :: self.order].reshape(len(faces), 4))
         _, which, count = np.unique(corners, axis=0, return_inverse=True, return_counts=True)
         return np.asarray(faces[count[which] == 1])
 
-    def block_side(self, name: str, axis: int, end: int) -> IntArray:
+    def block_side(self, name: str, axis: int, end: int) -> Indices:
         """Node numbers on one side of a block, on the grid of its two other axes.
 
         Parameters
@@ -134,12 +132,12 @@ class Mesh:
             raise InputError("the mesh has no such block", None, name, ", ".join(self.lattice), "name one of these")
         return np.asarray(np.take(self.lattice[name], -end, axis=axis))
 
-    def block_faces(self, name: str, axis: int, end: int) -> IntArray:
+    def block_faces(self, name: str, axis: int, end: int) -> Indices:
         """Faces (n_a, n_b, m, m) on one side of a block, each seen from outside; parameters as `block_side`."""
         windows = np.lib.stride_tricks.sliding_window_view(self.block_side(name, axis, end), (self.order + 1,) * 2)
         return _oriented(windows[:: self.order, :: self.order], axis, end)
 
-    def faces_where(self, predicate: Callable[[Array], npt.NDArray[np.bool_]]) -> IntArray:
+    def faces_where(self, predicate: Callable[[Array], npt.NDArray[np.bool_]]) -> Indices:
         """Boundary faces (n, m, m) all of whose nodes have coordinates (n, 3) that satisfy the predicate."""
         inside = np.asarray(predicate(self.nodes))
         return np.asarray(self.boundary_faces[inside[self.boundary_faces].all(axis=(1, 2))])
@@ -177,12 +175,12 @@ class Mesh:
         return list(self.lattice)[int(np.searchsorted(np.cumsum(sizes), element, side="right"))]
 
 
-def side_faces(cells: IntArray, axis: int, end: int) -> IntArray:
+def side_faces(cells: Indices, axis: int, end: int) -> Indices:
     """One face (n_cells, m, m) of each element, oriented so that first x second direction points outwards."""
     return _oriented(np.take(cells, -end, axis=axis + 1), axis, end)
 
 
-def _oriented(faces: IntArray, axis: int, end: int) -> IntArray:
+def _oriented(faces: Indices, axis: int, end: int) -> Indices:
     return faces if (axis == 1) != (end == 1) else faces.swapaxes(-1, -2)
 
 
@@ -217,7 +215,7 @@ def join(blocks: Sequence[Block], order: int = 2, tolerance: float | None = None
     return mesh
 
 
-def merge(points: Array, tolerance: float) -> tuple[Array, IntArray]:
+def merge(points: Array, tolerance: float) -> tuple[Array, Indices]:
     """Distinct points (n, 3) in order of first appearance, and the number (n_points,) of each given point."""
     pairs = cKDTree(points).query_pairs(tolerance, output_type="ndarray")
     graph = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(points),) * 2)
@@ -231,7 +229,7 @@ def _shortest(grid: Array) -> float:
     return min(float(np.linalg.norm(np.diff(grid, axis=axis), axis=-1).min()) for axis in range(3))
 
 
-def _cells(grid: IntArray, order: int) -> IntArray:
+def _cells(grid: Indices, order: int) -> Indices:
     windows = np.lib.stride_tricks.sliding_window_view(grid, (order + 1,) * 3)
     return windows[::order, ::order, ::order].reshape(-1, order + 1, order + 1, order + 1)
 

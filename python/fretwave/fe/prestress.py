@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 import scipy.sparse as sp
 
+from ..arrays import Array
 from ..errors import InputError
 from .elasticity import Material
 from .lagrange import tensor_gauss
 from .mesh import Mesh
-
-Array = npt.NDArray[np.float64]
 
 
 def stresses(mesh: Mesh, material: Material, displacement: Array) -> Array:

@@ -142,7 +142,8 @@ def bring_to_disk(path: Path) -> None:
 # Seals
 
 _SEAL = "\nfretwave seal {:08x} {:020d}\n"
-_LENGTH = len(_SEAL.format(0, 0))
+#: Bytes of a seal.
+SEAL_LENGTH = len(_SEAL.format(0, 0))
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 #: Files found whole: (device, inode, size, time of change) by path.
 _whole: dict[Path, tuple[int, ...]] = {}
@@ -157,7 +158,7 @@ def seal(path: Path) -> None:
 
 def sealed_size(path: Path) -> int | None:
     """Bytes before the seal, None without one."""
-    size = path.stat().st_size - _LENGTH
+    size = path.stat().st_size - SEAL_LENGTH
     if size < 0:
         return None
     with path.open("rb") as file:
@@ -230,7 +231,7 @@ def _unsealed_trouble(path: Path) -> str:
     except InputError as error:
         return str(error.measured)
     rest = path.stat().st_size - int(end)
-    return f"{rest} bytes stand behind its end and are no seal" if 0 < rest <= _LENGTH else ""
+    return f"{rest} bytes stand behind its end and are no seal" if 0 < rest <= SEAL_LENGTH else ""
 
 
 def read_through(path: str) -> int:

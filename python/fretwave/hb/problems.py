@@ -11,14 +11,14 @@ import numpy.typing as npt
 from petsc4py import PETSc
 
 from .. import _core
+from ..arrays import Array
 from ..errors import InputError
 from ..model.model import Model
 from ..model.modes import LinearMode
 from ..model.rest import Rest
+from ..mpi.gather import on_rank_0
 from ..post.contact_history import MOTION
 from .states import ForcedState, ModalState, State
-
-Array = npt.NDArray[np.float64]
 
 
 class Harmonics:
@@ -156,9 +156,9 @@ class HarmonicProblem:
     def coefficients(self, y: PETSc.Vec) -> Array | None:
         """Harmonic coefficients Q (n_dof, m) in physical units, columns `harmonics.labels`, on rank 0. Collective."""
         Q = self.core.coefficients(y)
-        parts = self.model.comm.gather(Q.getArray(readonly=True).copy())
+        whole = on_rank_0(self.model.comm, Q)
         Q.destroy()
-        return None if parts is None else np.concatenate(parts).reshape(-1, self.harmonics.block_size)
+        return None if whole is None else whole.reshape(-1, self.harmonics.block_size)
 
     def local_coefficients(self, y: PETSc.Vec) -> Array:
         """This rank's rows of `coefficients`. Collective."""

@@ -11,15 +11,15 @@ import numpy as np
 import numpy.typing as npt
 from petsc4py import PETSc
 
+from ..arrays import Array, Complex
 from ..errors import InputError, NotConverged
 from ..model.reduction import Reduction
+from ..mpi.gather import on_all_ranks
 from .problems import NonlinearMode
 
 if TYPE_CHECKING:
     from mpi4py import MPI
 
-Array = npt.NDArray[np.float64]
-Complex = npt.NDArray[np.complex128]
 
 #: Left of the interior residual when its correction is taken as solved, and the rounds given to it.
 TOLERANCE, MOST_ROUNDS = 1e-4, 30
@@ -120,7 +120,7 @@ def _reduced_step(problem: NonlinearMode, y: PETSc.Vec, rows: Array) -> dict[str
     for row in range(begin, end):
         columns, values = J.getRow(row)
         local[row - begin, columns] = values
-    whole = np.concatenate(problem.model.comm.allgather(local))
+    whole = on_all_ranks(problem.model.comm, local)
     J.destroy()
     right = np.zeros(len(whole))
     right[: rows.size] = rows.ravel() / (problem.core.stiffness_scale * before["amplitude"])

@@ -6,14 +6,13 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
+from ..arrays import Array
 from ..model.laws import Role
 
 if TYPE_CHECKING:
     from ..model.contact import Contact
 
-Array = npt.NDArray[np.float64]
 
 #: Contact stiffness over the structure's from which one sample's change of state changes all forces.
 STIFF = 1e4

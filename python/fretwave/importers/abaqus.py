@@ -13,9 +13,10 @@ from pathlib import Path
 import numpy as np
 import scipy.sparse as sp
 
+from ..arrays import Array, IntArray
 from ..errors import InputError
 from ..texts import display
-from .entries import Array, Entries, IntArray, order_of
+from .entries import Entries, order_of
 from .text import columns_of, first_data_line, triplets
 
 #: A diagonal entry from here on is Abaqus' penalty 1e36 on a held dof.

@@ -13,9 +13,10 @@ from pathlib import Path
 
 import numpy as np
 
+from ..arrays import IntArray
 from ..errors import InputError
 from ..texts import display
-from .entries import Entries, IntArray
+from .entries import Entries
 from .text import columns_of, triplets
 
 SUFFIXES = (".sti", ".mas")

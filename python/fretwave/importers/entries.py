@@ -10,13 +10,11 @@ import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
 
+from ..arrays import IntArray
 from ..errors import InputError
 from ..files.compressed import check_compressed
 from ..model.checks import check_symmetric
 from ..results.model_file import dof_name
-
-Array = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 #: Share of entries of the rarer triangle below which they count as strays beside the other triangle.
 STRAY_SHARE = 0.5

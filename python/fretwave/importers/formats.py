@@ -1,27 +1,122 @@
-"""Which reader a matrix file needs."""
+"""Which reader a matrix file needs: formats of the package, and those that users register."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, Callable, TypeVar
 
+from .. import registry
 from ..errors import InputError
 from ..files.isolated import call_isolated
 from ..texts import display, nearest
 from . import abaqus, calculix, matlab, matrix_market, npz, petsc_binary
 from .entries import Entries
 
-FORMATS = (
-    "NumPy (.npz, .npy)",
-    "Matrix Market (.mtx)",
-    "MATLAB 5 to 7.3 (.mat)",
-    "PETSc binary",
-    "CalculiX (.sti, .mas)",
-    "Abaqus (.mtx)",
-)
-
 HDF5 = b"\x89HDF\r\n\x1a\n"
+#: A function of path, letter and variable that gives `Entries`; a registered one may give a matrix.
+Reader = TypeVar("Reader", bound=Callable[[Path, str, "str | None"], Any])
+
+
+@dataclass(frozen=True)
+class Format:
+    """A format of matrix files.
+
+    Attributes
+    ----------
+    name : str
+        As a message lists it.
+    tells : callable
+        Whether a file is of it, from its first 520 bytes and its path.
+    read : callable
+        Its `Reader`.
+    """
+
+    name: str
+    tells: Callable[[bytes, Path], bool]
+    read: Callable[[Path, str, str | None], Any]
+
+
+def _matlab(path: Path, letter: str, variable: str | None) -> Entries:
+    """In a process of its own: SciPy and HDF5 can crash on a damaged file."""
+    with path.open("rb") as file:
+        function = "read_v5" if file.read(10) == b"MATLAB 5.0" else "read_v73"
+    found: Entries = call_isolated(matlab.__name__, function, path, letter, variable, size=path.stat().st_size)
+    return found
+
+
+def _is_matlab(head: bytes, path: Path) -> bool:
+    return head.startswith((b"MATLAB 7.3", b"MATLAB 5.0")) or HDF5 in (head[:8], head[512:520])
+
+
+#: Asked in this order, after the registered ones.
+FORMATS = (
+    Format("NumPy (.npz, .npy)", lambda head, path: head.startswith((b"PK\x03\x04", b"\x93NUMPY")), npz.read),
+    Format(
+        "Matrix Market (.mtx)",
+        lambda head, path: head.startswith(b"%%MatrixMarket"),
+        lambda path, letter, variable: matrix_market.read(path),
+    ),
+    Format("MATLAB 5 to 7.3 (.mat)", _is_matlab, _matlab),
+    Format(
+        "PETSc binary",
+        lambda head, path: bool(petsc_binary.integer_type(head)),
+        lambda path, letter, variable: petsc_binary.read(path),
+    ),
+    Format(
+        "CalculiX (.sti, .mas)",
+        lambda head, path: path.suffix.lower() in calculix.SUFFIXES,
+        lambda path, letter, variable: calculix.read(path),
+    ),
+    Format(
+        "Abaqus (.mtx)",
+        lambda head, path: abaqus.looks_like(head),
+        lambda path, letter, variable: abaqus.read(path),
+    ),
+)
+_registered: dict[str, Format] = {}
+_readers: dict[str, Any] = {}
+
+
+def register_format(suffix: str) -> Callable[[Reader], Reader]:
+    """Decorator that makes a reader of matrix files known by their suffix, to cases and to ``fretwave import``.
+
+    Parameters
+    ----------
+    suffix : str
+        ``".xyz"``; goes before the formats of the package.
+
+    The reader takes the path, the letter (M, K, C) and the variable named behind a colon (or None); it gives a dense or
+    SciPy matrix, or `Entries` with node and direction of each row. It may raise anything on a damaged file.
+
+    Raises
+    ------
+    InputError
+        Another file has a reader of this suffix, or it is no suffix.
+    """
+    if not suffix.startswith(".") or len(suffix) < 2:
+        raise InputError("it is no suffix", f"register_format({suffix!r})", suffix, "as in '.xyz'", "begin with a dot")
+
+    def register(reader: Reader) -> Reader:
+        registry.admit(registry.FORMAT, suffix, _readers, reader)
+        _readers[suffix] = reader
+        _registered[suffix] = Format(suffix, lambda head, path: path.suffix.lower() == suffix.lower(), reader)
+        return reader
+
+    return register
+
+
+def forget_format(reader: Any) -> None:
+    """The inverse of `register_format`."""
+    for suffix in [suffix for suffix, known in _readers.items() if known is reader]:
+        del _readers[suffix], _registered[suffix]
+
+
+def registered(path: Path) -> Format | None:
+    """The format that a user has registered for this file."""
+    return next((one for one in _registered.values() if one.tells(b"", path)), None)
 
 
 def read_matrix(given: str, letter: str) -> Entries:
@@ -70,12 +165,6 @@ def readable(path: Path, what: str) -> Iterator[None]:
         raise InputError(f"the {what} cannot be read", display(path), measured, None, fix) from None
 
 
-def _isolated(function: str, path: Path, letter: str, variable: str | None) -> Entries:
-    """A reader of `matlab` in a process of its own: SciPy and HDF5 can crash on a damaged file."""
-    found: Entries = call_isolated(matlab.__name__, function, path, letter, variable, size=path.stat().st_size)
-    return found
-
-
 def split(given: str) -> tuple[Path, str | None]:
     """``model.mat:Kred`` -> (model.mat, Kred); a path that exists is never split."""
     name, colon, variable = given.rpartition(":")
@@ -85,24 +174,14 @@ def split(given: str) -> tuple[Path, str | None]:
 
 
 def _read(path: Path, head: bytes, variable: str | None, letter: str) -> Entries:
-    if head.startswith((b"PK\x03\x04", b"\x93NUMPY")):
-        return npz.read(path, letter, variable)
-    if head.startswith(b"%%MatrixMarket"):
-        return matrix_market.read(path)
-    if head.startswith(b"MATLAB 7.3") or HDF5 in (head[:8], head[512:520]):
-        return _isolated("read_v73", path, letter, variable)
-    if head.startswith(b"MATLAB 5.0"):
-        return _isolated("read_v5", path, letter, variable)
-    if petsc_binary.integer_type(head):
-        return petsc_binary.read(path)
-    if path.suffix.lower() in calculix.SUFFIXES:
-        return calculix.read(path)
-    if abaqus.looks_like(head):
-        return abaqus.read(path)
+    for one in (*_registered.values(), *FORMATS):
+        if one.tells(head, path):
+            found = one.read(path, letter, variable)
+            return found if isinstance(found, Entries) else Entries.of(found, display(path), one.name)
     raise InputError(
         f"the format of the file of {letter} is not known",
         display(path),
         f"it begins with {head[:24]!r}",
-        ", ".join(FORMATS),
+        ", ".join(one.name for one in (*FORMATS, *_registered.values())),
         "write it with scipy.sparse.save_npz or scipy.io.mmwrite",
     )

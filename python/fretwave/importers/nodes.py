@@ -15,15 +15,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
+from ..arrays import Array, IntArray
 from ..errors import InputError
 from ..texts import display, nearest
 from .text import columns_of
-
-Array = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
-
 
 #: Solid elements of Abaqus and CalculiX with 8 or 20 nodes: C3D8, C3D8R, C3D8I, C3D20, C3D20R, ...
 _HEXAHEDRON = re.compile(r"C3D(8|20)[A-Z]*", re.IGNORECASE)

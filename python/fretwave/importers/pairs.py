@@ -9,19 +9,16 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
+from ..arrays import Array, IntArray
 from ..errors import InputError
 from ..fe.interface import tangent_frames
 from ..model.pairs import Pairs
 from ..texts import display
 from .nodes import Nodes
 from .text import first_data_line
-
-Array = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 
 #: Nodes of a pair are this close, over the diagonal of the mesh, unless told.
 TOLERANCE = 1e-6

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 from scipy.sparse.csgraph import connected_components
 
+from ..arrays import Array
 from ..errors import FretwaveError
 from ..model.structure import Structure
 from .entries import counted
@@ -17,7 +17,6 @@ from .entries import counted
 if TYPE_CHECKING:
     from mpi4py import MPI
 
-Array = npt.NDArray[np.float64]
 
 #: omega^2 of a rigid motion is rounding: below this share of trace K / trace M.
 RIGID = 1e-12

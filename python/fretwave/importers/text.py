@@ -5,14 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
+from ..arrays import Array
 from ..errors import InputError
 from ..texts import display
 from .entries import Entries
-
-Array = npt.NDArray[np.float64]
-
 
 COMMENTS = ("*", "#", "%")
 #: Rows for each entry from which on an index is wrong: mass and stiffness have an entry in every row.

@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
+from ..arrays import Array
 from ..errors import InputError
 from .sectors import Sparse
-
-Array = npt.NDArray[np.float64]
 
 #: Largest entry of A - A^T over the largest entry of A that still counts as rounding.
 SYMMETRY_TOLERANCE = 1e-10

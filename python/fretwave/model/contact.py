@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ..arrays import Array
 from ..errors import InputError
 from .laws import LawInfo, ParameterInfo, PythonLaw, Role, core_law, laws, python_law
 from .pairs import Pairs, Values, repeated
 from .sectors import Term, by_sector
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(init=False)

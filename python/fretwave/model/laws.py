@@ -16,10 +16,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ..arrays import Array
 from ..errors import InputError
 from ..registry import LAW, admit
-
-Array = npt.NDArray[np.float64]
 
 #: States of a pair at a sample, as the core counts them (src/contact/law.h); UNKNOWN where results keep none.
 STICK, SLIP, OPEN, UNKNOWN = 0, 1, 2, -1

@@ -13,13 +13,13 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from .. import _core
+from ..arrays import Array
 from ..errors import InputError
 from ..mpi import guard as parallel
+from ..mpi.gather import on_all_ranks
 from .contact import Contact
 from .rest import Rest
 from .sectors import Given, Term, by_sector
-
-Array = npt.NDArray[np.float64]
 
 if MPI.COMM_WORLD.size > 1:
     parallel.install()  # in scripts too: one rank's exception ends all ranks, with one message
@@ -156,7 +156,7 @@ class Model:
     def inertia(self, x: Array) -> Array:
         """M x (n_dof,) of a displacement given whole, on every rank. Collective."""
         mass = next(A for A, order, k in self._terms if (order, k) == (2, 0))
-        whole: Array = np.concatenate(self.comm.allgather(self._product(mass, self.distribute(x))))
+        whole: Array = on_all_ranks(self.comm, self._product(mass, self.distribute(x)))
         return whole
 
     def form(self, order: int, q: npt.NDArray[np.complex128], n: int = 1) -> float:

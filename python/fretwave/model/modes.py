@@ -8,10 +8,10 @@ import numpy as np
 import numpy.typing as npt
 
 from .. import _core
+from ..arrays import Array
 from ..errors import InputError
+from ..mpi.gather import on_all_ranks
 from .model import Model
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ def linear_modes(model: Model, count: int = 6, contact: str = "stuck", near: flo
         given, fix = f"near={near}, contact={contact}", "give a frequency above 0, and stuck or free contact"
         raise InputError("modes near a frequency are those without damping", None, given, "near > 0 [rad/s]", fix)
     found = _core.linear_modes(model.core, count, getattr(_core.ContactState, contact), near)
-    shapes = [_whole(model, re) + 1j * _whole(model, im) for _, _, re, im in found]
+    shapes = [on_all_ranks(model.comm, re) + 1j * on_all_ranks(model.comm, im) for _, _, re, im in found]
     for _, _, *parts in found:
         for part in parts:
             part.destroy()
@@ -86,7 +86,3 @@ def _aligned(phi: npt.NDArray[np.complex128]) -> npt.NDArray[np.complex128]:
     """The same shape with its largest entry real and positive."""
     largest = phi[np.argmax(np.abs(phi) > (1 - 1e-6) * np.abs(phi).max())]
     return np.asarray(phi * (abs(largest) / largest))
-
-
-def _whole(model: Model, vec: object) -> Array:
-    return np.concatenate(model.comm.allgather(vec.getArray(readonly=True).copy()))  # type: ignore[attr-defined]

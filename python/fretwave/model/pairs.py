@@ -10,9 +10,9 @@ import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
 
+from ..arrays import Array
 from .sectors import Parts, Term, around, by_sector, combine
 
-Array = npt.NDArray[np.float64]
 #: A law's parameters: a number, or one per pair.
 Values = Mapping[str, Union[float, npt.ArrayLike]]
 

@@ -14,7 +14,9 @@ import scipy.sparse as sp
 from petsc4py import PETSc
 
 from .. import _core
+from ..arrays import Array
 from ..errors import InputError
+from ..mpi.gather import on_all_ranks
 from .model import Model
 from .sectors import Given, Sparse
 from .sizes import COMPARED_MODES, COMPONENT_MODES
@@ -22,7 +24,6 @@ from .sizes import COMPARED_MODES, COMPONENT_MODES
 if TYPE_CHECKING:
     from mpi4py import MPI
 
-Array = npt.NDArray[np.float64]
 
 #: Frequencies below this share of the lowest component frequency are rigid motions, without a relative error.
 RIGID_SHARE = 1e-3
@@ -132,7 +133,7 @@ class Reduction:
         """
         rows = self._rows(x_r, self.size)
         local = self._core.expand(rows)
-        full: Array = np.concatenate(self._model.comm.allgather(local))
+        full: Array = on_all_ranks(self._model.comm, local)
         return full if np.ndim(x_r) == 2 else full[:, 0]
 
     def project(self, f: npt.ArrayLike) -> Array:

@@ -12,13 +12,12 @@ import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
 
+from ..arrays import Array, Indices
 from ..errors import InputError
 
 if TYPE_CHECKING:
     from typing import TypeAlias
 
-Array = npt.NDArray[np.float64]
-Indices = npt.NDArray[np.intp]
 Sparse: TypeAlias = sp.csr_matrix
 #: A matrix as users may give it: sparse, dense, rows of numbers, or petsc4py's.
 Given: TypeAlias = sp.spmatrix

@@ -14,10 +14,11 @@ import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
 
+from ..arrays import Array, Indices
 from ..errors import InputError
 from .consistency import complaint_of
 from .pairs import Pairs
-from .sectors import Indices, Parts, Sparse, Term, around, by_sector, check_balanced, check_number, combine, ties
+from .sectors import Parts, Sparse, Term, around, by_sector, check_balanced, check_number, combine, ties
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -27,7 +28,6 @@ if TYPE_CHECKING:
     from .model import Model
     from .reduction import Reduction
 
-Array = npt.NDArray[np.float64]
 
 #: The part of K that a mistuning varies unless it names another: all that the sector's own elements put into it.
 WHOLE = "sector"

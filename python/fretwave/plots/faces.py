@@ -9,8 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from ..arrays import Array
 from ..model.laws import OPEN, SLIP, STICK
-from ..results.reader import Analysis, Array, Run
+from ..results.reader import Analysis, Run
 from . import style
 
 #: amplitudes of a map

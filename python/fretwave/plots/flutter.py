@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ..arrays import AnyArray
 from ..post.flutter_waves import with_sign
 from ..post.mode_curve import NO_DAMPING
 from ..results.reader import Analysis, Run
@@ -29,7 +30,7 @@ def diameters(flutter: Analysis) -> list[int]:
     return [int(d) for d in np.unique(flutter.columns["nodal_diameter"])]
 
 
-def wave(flutter: Analysis, diameter: int) -> tuple[style.Array, style.Array]:
+def wave(flutter: Analysis, diameter: int) -> tuple[AnyArray, AnyArray]:
     """Amplitude and damping [%] along the branch of a wave, its points among them."""
     curve = flutter.curve()
     rows = curve["nodal_diameter"] == diameter
@@ -85,7 +86,7 @@ def limits(flutter: Analysis) -> Figure:
     return figure
 
 
-def spans(amplitude: style.Array, zeta: style.Array) -> list[tuple[float, float, float]]:
+def spans(amplitude: AnyArray, zeta: AnyArray) -> list[tuple[float, float, float]]:
     """Ranges of amplitude between sign changes of the damping [%] along a branch: (low, high, sign)."""
     signs = np.sign(zeta)
     signs[np.abs(zeta) < 100.0 * NO_DAMPING] = 0  # located limit cycles belong to both sides

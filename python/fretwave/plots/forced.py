@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.interpolate import PchipInterpolator
 
+from ..arrays import AnyArray
 from ..post.response_peaks import curve_length
 from ..results.reader import Analysis, Run, Table
 from . import style
@@ -55,7 +56,7 @@ def _level(axes: Axes, forced: Analysis, times: Table | None, level: float, colo
         axes.plot(frequency, amplitude / scale, "o", zorder=4, **look)
 
 
-def response(forced: Analysis, level: float) -> tuple[style.Array, style.Array]:
+def response(forced: Analysis, level: float) -> tuple[AnyArray, AnyArray]:
     """Frequency [Hz] and amplitude [m] along the branch of a level.
 
     The observed dof's amplitude lies on the branch's cubic. The largest one of a wheel's blades is no function of the
@@ -69,7 +70,7 @@ def response(forced: Analysis, level: float) -> tuple[style.Array, style.Array]:
     return smooth(forced.columns["frequency_hz"][rows], forced.columns["largest_amplitude"][rows])
 
 
-def smooth(frequency: style.Array, amplitude: style.Array) -> tuple[style.Array, style.Array]:
+def smooth(frequency: AnyArray, amplitude: AnyArray) -> tuple[AnyArray, AnyArray]:
     """Monotone piecewise cubics through the points of a response, over the length along it (it may fold)."""
     length = curve_length(frequency, amplitude)
     keep = np.concatenate([[True], np.diff(length) > 1e-9 * length[-1]])
@@ -80,7 +81,7 @@ def smooth(frequency: style.Array, amplitude: style.Array) -> tuple[style.Array,
     return tuple(PchipInterpolator(length[keep], points)(fine).T)
 
 
-def _amplitude(forced: Analysis) -> style.Array:
+def _amplitude(forced: Analysis) -> AnyArray:
     """Of the observed dof; of a wheel in the sector where it is largest."""
     return forced.columns.get("largest_amplitude", forced.columns["amplitude"])
 

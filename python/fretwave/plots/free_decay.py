@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ..arrays import AnyArray
 from ..results.reader import Analysis, Run, Table
 from . import style
 
@@ -36,7 +37,7 @@ def draw(mode: Analysis, decay: Analysis) -> Figure:
     return figure
 
 
-def _cycles(axes: Axes, table: Table, rows: style.Array, values: style.Array, colour: str, name: str) -> None:
+def _cycles(axes: Axes, table: Table, rows: AnyArray, values: AnyArray, colour: str, name: str) -> None:
     look = {"markerfacecolor": "none", "markeredgecolor": colour, "markersize": 6, "label": name}
     axes.plot(table["amplitude"][rows], values[rows], "o", zorder=3, **look)
 

@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ..arrays import AnyArray
 from ..post.motion import motion
 from ..results.reader import Analysis, Run, Table
 from . import style
@@ -93,7 +94,7 @@ def phase_planes(mode: Analysis, motions: Analysis) -> Figure:
     return figure
 
 
-def predicted_orbits(mode: Analysis) -> list[tuple[str, style.Array, style.Array]]:
+def predicted_orbits(mode: Analysis) -> list[tuple[str, AnyArray, AnyArray]]:
     """Closed orbits of the normalised dof at the zeros of the damping, from the nearest point scaled to the zero."""
     orbits = []
     for crossing in mode.mode_curve().crossings() if mode.labels else []:

@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ..arrays import AnyArray
 from ..model.laws import Role
 from ..results.reader import Analysis, Run
 from . import style
@@ -65,7 +66,7 @@ def busiest(mode: Analysis, contact: str, point: int) -> dict[str, int]:
     return {str(name): int(np.argmax(np.where(faces == name, work, -1.0))) for name in dict.fromkeys(faces)}
 
 
-def _direction(mode: Analysis, contact: str, point: int, pair: int) -> style.Array:
+def _direction(mode: Analysis, contact: str, point: int, pair: int) -> AnyArray:
     """Unit vector (2,) along which the pair slides most."""
     u = mode.loop(contact, point)["u"][:, 1:, pair]
     direction = np.linalg.svd(u - u.mean(axis=0))[2][0]

@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ..arrays import AnyArray
 from ..results.reader import Analysis, Run, motion_of
 from . import style
 from .trajectories import FEW_DOFS, other_dof, spread
@@ -90,7 +91,7 @@ def _busiest(mode: Analysis, contact: str, point: int) -> tuple[int, int]:
     return int(component), int(pair)
 
 
-def _closed(mode: Analysis, contact: str, point: int, where: tuple[int, int]) -> tuple[style.Array, style.Array]:
+def _closed(mode: Analysis, contact: str, point: int, where: tuple[int, int]) -> tuple[AnyArray, AnyArray]:
     motion = mode.loop(contact, point)
     u, f = (motion[key][:, where[0], where[1]] for key in ("u", "f"))
     return np.append(u, u[0]), np.append(f, f[0])

@@ -9,16 +9,14 @@ from typing import Any
 
 import matplotlib
 import numpy as np
-import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
+from ..arrays import AnyArray
 from ..files.whole import replaced
-
-Array = npt.NDArray[Any]
 
 #: Okabe and Ito's palette: distinguishable under every common colour-vision deficiency
 BLUE, ORANGE, GREEN, RED, SKY, PURPLE = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#56B4E9", "#CC79A7"
@@ -95,7 +93,7 @@ def apart(values: Sequence[float]) -> Callable[[float], str]:
     return lambda value: number(value, digits)
 
 
-def log_amplitude(axes: Axes, values: Array | Sequence[float]) -> None:
+def log_amplitude(axes: Axes, values: AnyArray | Sequence[float]) -> None:
     """Logarithmic amplitude axis with plain numbers at 1, 2, 5 of each decade, fitted to the values."""
     low, high = float(np.min(values)), float(np.max(values))
     axes.set_xscale("log")
@@ -103,7 +101,7 @@ def log_amplitude(axes: Axes, values: Array | Sequence[float]) -> None:
     plain_numbers(axes.xaxis)
 
 
-def fit_values(axes: Axes, x: Array, y: Array, shown: Sequence[float], others: Array) -> None:
+def fit_values(axes: Axes, x: AnyArray, y: AnyArray, shown: Sequence[float], others: AnyArray) -> None:
     """Fit the value axis to what of a curve lies between two abscissas, and to all other values."""
     inside = np.concatenate([y[(x >= shown[0]) & (x <= shown[1])], others])
     inside = inside[np.isfinite(inside)]
@@ -112,7 +110,7 @@ def fit_values(axes: Axes, x: Array, y: Array, shown: Sequence[float], others: A
         axes.set_ylim(inside.min() - room, inside.max() + room)
 
 
-def plain_numbers(axis: Axis, values: Array | Sequence[float] = (1.0, 10.0)) -> None:
+def plain_numbers(axis: Axis, values: AnyArray | Sequence[float] = (1.0, 10.0)) -> None:
     """Ticks of a logarithmic axis at 1, 2, 5 of each decade (closer within one), as 0.05 and not as a power."""
     short = np.max(values) < 8.0 * np.min(values)
     axis.set_major_locator(LogLocator(base=10.0, subs=(1.0, 1.5, 2.0, 3.0, 4.0, 6.0) if short else (1.0, 2.0, 5.0)))

@@ -13,7 +13,8 @@ from matplotlib.colors import ListedColormap, LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
-from ..results.reader import Analysis, Array, Run
+from ..arrays import Array
+from ..results.reader import Analysis, Run
 from . import style
 from .wear_lines import MM, WearLine, amplitude_label, amplitude_text, amplitudes, cycle_label, power, wears
 

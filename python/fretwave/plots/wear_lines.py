@@ -7,8 +7,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..arrays import Array
 from ..model.laws import Role
-from ..results.reader import Analysis, Array, Run, Table
+from ..results.reader import Analysis, Run, Table
 from . import style
 
 MM, MICRON = 1e3, 1e6

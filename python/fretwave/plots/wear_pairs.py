@@ -9,7 +9,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..results.reader import Analysis, Array, Run, Table
+from ..arrays import Array
+from ..results.reader import Analysis, Run, Table
 from . import style
 from .faces import place_face
 from .wear_lines import (

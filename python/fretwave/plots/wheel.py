@@ -5,18 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ..arrays import Complex
 from ..cyclic.engine_order import folded
 from ..post.mode_curve import NO_DAMPING
 from ..post.motion import complex_amplitudes
 from ..post.wave_content import wave_content
 from ..results.reader import Analysis, Run
 from . import style
-
-Complex = npt.NDArray[np.complex128]
 
 #: points of a branch that are drawn
 SHOWN = 4

@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-import numpy.typing as npt
 
+from ..arrays import Array
 from .response_peaks import NOWHERE, Peak, amplitude_peak
-
-Array = npt.NDArray[np.float64]
 
 
 def blade_tables(

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ..arrays import Array
 from ..model.laws import OPEN, SLIP, STICK, UNKNOWN
 
-Array = npt.NDArray[np.float64]
 States = npt.NDArray[np.int8]
 
 #: What is kept of a contact's period, by name: unit, long name, type and the value of rows that lack it.

@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.interpolate import CubicHermiteSpline
 
-Array = npt.NDArray[np.float64]
+from ..arrays import Array
 
 #: samples of a cycle in the projection on its fundamental; the trapezoidal rule is spectrally accurate there
 PROJECTION_SAMPLES = 128

@@ -6,13 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from ..arrays import Array
 from ..errors import InputError
 from .cycles import Cycles
 from .mode_curve import Crossing, ModeCurve
-
-Array = npt.NDArray[np.float64]
 
 #: a start diverges when it exceeds this many times the larger of itself and the largest predicted limit cycle
 DIVERGED = 2.0

@@ -6,12 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.interpolate import PchipInterpolator
 
+from ..arrays import Array
 from ..errors import InputError
-
-Array = npt.NDArray[np.float64]
 
 #: weights of (log amplitude, relative frequency, damping ratio) in the length along the curve: all of order one
 LENGTH_WEIGHTS = (1.0, 10.0, 20.0)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from ..arrays import Array
 
 
 def complex_amplitudes(labels: Sequence[str], coefficients: Array) -> dict[int, npt.NDArray[np.complex128]]:

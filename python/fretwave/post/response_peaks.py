@@ -9,9 +9,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import PchipInterpolator
 
+from ..arrays import Array
 from .mode_curve import ModeCurve
-
-Array = npt.NDArray[np.float64]
 
 #: share of the largest amplitude above which a point counts as near the peak; below it a response may not slip at all,
 #: and a motion without damping takes thousands of periods to become steady

@@ -13,11 +13,9 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from ..arrays import Array
 from ..model.laws import Limit, Role, kept_laws
-
-Array = npt.NDArray[np.float64]
 
 
 def slip_factor(forces: Array, limit: Any = None, friction: Any = None, each: bool = False) -> float:

@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
-Complex = npt.NDArray[np.complex128]
-
+from ..arrays import Array, Complex
 
 #: How far the cut of a phase lies beside pi [rad], where sectors that move against each other stand to rounding.
 CUT = 1e-6

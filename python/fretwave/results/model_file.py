@@ -39,6 +39,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
 
+from ..arrays import IntArray
 from ..errors import InputError
 from ..files.compressed import check_compressed
 from ..files.whole import Unfailing, check_whole, replaced, seal
@@ -49,7 +50,6 @@ from ..texts import display, nearest
 if TYPE_CHECKING:
     import h5py
 
-IntArray = npt.NDArray[np.int64]
 #: An array of the file, None where it has none.
 Table = Union[npt.NDArray[Any], None]
 

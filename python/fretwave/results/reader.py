@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from ..arrays import Array
 from ..columns import COLUMNS
 from ..errors import InputError
 from ..files.dimensions import names_of_data
@@ -25,7 +25,6 @@ from ..solve.table import Table as Reading
 from .file import has_results, open_results
 from .slopes import curves_of, read_slopes
 
-Array = npt.NDArray[np.float64]
 Table = dict[str, Array]
 
 

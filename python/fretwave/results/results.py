@@ -16,7 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from ..columns import Column, Value, columns_named, csv_header, csv_line
+from ..columns import Column, Value, columns_named
+from ..files.csv_table import header_line, row_line
 from ..files.whole import replace_bytes, told, write_all
 from ..post.contact_history import MOTION
 from .field import Field
@@ -130,7 +131,7 @@ class AnalysisWriter:
         if self.rows == 0:
             self._before_first()
         if self.active:
-            self._write(self._record(row, coefficients, motions, fields), csv_line(self.columns, row))
+            self._write(self._record(row, coefficients, motions, fields), row_line(self.columns, row))
         self.rows += 1
         self.reported += bool(motions)
         if self.active and state is not None:
@@ -153,7 +154,7 @@ class AnalysisWriter:
             with told(self.folder):
                 self.folder.mkdir(parents=True, exist_ok=True)
             self._journal.begin(self._layout(), record)
-            self._open_table(csv_header(self.columns) + line)
+            self._open_table(header_line(self.columns) + line)
             return
         self._journal.append(record)
         with told(self.folder / f"{self.name}.csv"):
@@ -250,8 +251,8 @@ class AnalysisWriter:
         self.fields = kept.fields
         self.rows, self.reported = len(kept), len(kept.reported)
         self._journal.go_on(kept.size, kept.token)
-        lines = [csv_line(self.columns, values) for values in kept.values()]
-        self._open_table("".join([csv_header(self.columns), *lines]))
+        lines = [row_line(self.columns, values) for values in kept.values()]
+        self._open_table("".join([header_line(self.columns), *lines]))
         return state[1]
 
     def __del__(self) -> None:

@@ -12,16 +12,14 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from ..arrays import Array
 from ..columns import COLUMNS, Column
 from ..hb.states import ForcedState, ModalState, State, described, state_of
 from ..solve.curve import Curve
 from ..solve.hermite import Cubic
 from ..solve.table import Table
 from .field import Field
-
-Array = npt.NDArray[np.float64]
 
 NAME = "slopes"
 #: Of the step.

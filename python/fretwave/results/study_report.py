@@ -2,12 +2,7 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping, Sequence
-from io import StringIO
-from pathlib import Path
-
-from ..files.whole import replace_text
 
 Row = Mapping[str, "float | int | str"]
 
@@ -33,16 +28,6 @@ LEGEND = (
     "all runs meet exactly once, divided by the peak; of omega the largest relative one over the same. The estimate is "
     "the largest error_estimate there: the share of the contact force outside the retained harmonics."
 )
-
-
-def write_csv(rows: Sequence[Row], path: Path) -> Path:
-    """All columns, full digits."""
-    text = StringIO()
-    writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    replace_text(path, text.getvalue())
-    return path
 
 
 #: the same of a study of wear

@@ -13,19 +13,17 @@
 
 from __future__ import annotations
 
-import csv
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from io import StringIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..columns import COLUMNS, Column
+from ..files.csv_table import plain, write_columns, write_rows
 from ..files.dimensions import name_dimensions
-from ..files.whole import replace_text
 from ..post.grid import Plan
 from ..texts import toml
 from .results import has_results, open_results, rewritten
@@ -123,9 +121,9 @@ def write_sweep(
     kind = str(branches[0].attributes["type"]) if branches else ""
     points = _points(plan, branches)
     rows = _summary(kind, plan, branches)
-    write_rows(folder / f"{name}.csv", {column.name: values for column, values in points})
+    write_columns(folder / f"{name}.csv", {column.name: values for column, values in points})
     if summary is not None:
-        write_summary(summary, rows)
+        write_rows(summary, rows)
     with rewritten(folder / "results.h5", name) as file:
         file.attrs["title"] = title
         group = file.create_group(name)
@@ -137,26 +135,6 @@ def write_sweep(
         for branch in branches:
             _copy_branch(branch, of, group.create_group(f"values/{branch.number:04d}"))
     return rows
-
-
-def write_summary(path: Path, rows: Sequence[dict[str, Any]]) -> None:
-    """Rows of a summary as CSV, empty where a row has no such column."""
-    names = list(dict.fromkeys(name for row in rows for name in row))
-    write_rows(path, {name: [row.get(name, "") for row in rows] for name in names})
-
-
-def write_rows(path: Path, columns: Mapping[str, Any]) -> None:
-    """A table as CSV, written in one step: numbers with all digits, texts quoted where they must be."""
-    text = StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(columns)
-    writer.writerows(zip(*([_plain(value) for value in values] for values in columns.values())))
-    replace_text(path, text.getvalue())
-
-
-def _plain(value: Any) -> Any:
-    plain = value.item() if isinstance(value, np.generic) else value
-    return plain.decode() if isinstance(plain, bytes) else repr(plain) if isinstance(plain, float) else plain
 
 
 def key_values(values: Sequence[Any]) -> Any:
@@ -189,7 +167,7 @@ def _summary(kind: str, plan: Plan, branches: Sequence[Branch]) -> list[dict[str
     """A row for each branch; a table of a value has one, or one for each level or nodal diameter."""
     rows, split = [], split_of(kind)
     for branch in branches:
-        keys = {key: _plain(_key_column(plan, key)[branch.number]) for key in plan.keys}
+        keys = {key: plain(_key_column(plan, key)[branch.number]) for key in plan.keys}
         column = branch.table.get(split)
         for part in [None] if column is None else np.unique(column):
             chosen = np.full(branch.points, True) if part is None else column == part

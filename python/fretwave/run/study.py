@@ -24,11 +24,12 @@ from ..case.reduce import reduce_case
 from ..case.wheel import on_wheel, solver_room
 from ..console import Console
 from ..errors import EXIT_DONE, InputError, NotConverged
+from ..files.csv_table import write_rows
 from ..files.whole import replace_text
 from ..mpi.guard import on_first_rank
 from ..mpi.petsc_options import AnalysisOptions
 from ..results.runfolder import read_copy
-from ..results.study_report import markdown, write_csv
+from ..results.study_report import markdown
 from .study_folder import StudyFolder
 from .study_plan import Outcome, Plan, Settings, Study, common_amplitudes
 
@@ -190,7 +191,7 @@ def _write(study: Study, folder: Path, console: Console) -> None:
     from ..plots import plot_run
 
     rows, notes = study.table(), _notes(study)
-    write_csv(rows, folder / "study.csv")
+    write_rows(folder / "study.csv", rows)
     replace_text(folder / "study.md", markdown(rows, notes))
     pictures = plot_run(folder, ["study"])
     for line in markdown(rows, notes).splitlines():

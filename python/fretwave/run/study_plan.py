@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from ..arrays import Array
 
 #: a reported point belongs to an amplitude when it is this near; a loose Newton tolerance lets it miss by about itself
 MATCH = 1e-2

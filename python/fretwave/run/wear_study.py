@@ -24,10 +24,11 @@ from ..case.load import Case
 from ..case.reduce import reduce_case
 from ..console import Console
 from ..errors import EXIT_DONE, FretwaveError, NotConverged
+from ..files.csv_table import write_rows
 from ..files.whole import replace_text
 from ..mpi.guard import caught_by_all
 from ..mpi.petsc_options import AnalysisOptions
-from ..results.study_report import LEGEND_OF_WEAR, PRINTED_OF_WEAR, markdown, write_csv
+from ..results.study_report import LEGEND_OF_WEAR, PRINTED_OF_WEAR, markdown
 from .study_folder import StudyFolder
 
 if TYPE_CHECKING:
@@ -258,7 +259,7 @@ def _write(plan: WearPlan, amplitude: float, analysis: WearAnalysis, folder: Pat
     notes = [f"{analysis.name}, a = {amplitude:g} m, {analysis.stepper}, after {analysis.cycles:g} cycles."]
     notes += [f"No whole march with {_text(settings)}: {reason}." for settings, reason in plan.failures.items()]
     text = markdown(rows, notes, PRINTED_OF_WEAR, LEGEND_OF_WEAR)
-    write_csv(rows, folder / "study.csv")
+    write_rows(folder / "study.csv", rows)
     replace_text(folder / "study.md", text)
     pictures = plot_run(folder, ["study"])
     for line in text.splitlines():

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from ..arrays import Array
 from ..columns import Column
 from ..errors import FretwaveError, InputError
 from ..hb.states import State
@@ -27,8 +28,6 @@ if TYPE_CHECKING:
 
     from ..hb.problems import HarmonicProblem
     from .unknowns import Unknowns
-
-Array = npt.NDArray[np.float64]
 
 
 class Event(NamedTuple):

@@ -7,17 +7,16 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from petsc4py import PETSc
 
 from .. import _core
+from ..arrays import Array
 from ..errors import InputError
 from ..hb.problems import HarmonicProblem
+from ..mpi.gather import on_rank_0
 from .starting import far_from_start, starts
 from .steps import StepControl
 from .trace import Knot
-
-Array = npt.NDArray[np.float64]
 
 #: Relative change of the force's harmonics on doubled samples above which a failure is put down to sampling.
 ALIASING_LIMIT = 1e-3
@@ -214,10 +213,10 @@ class Continuation:
         state = dict(self._core.anchor())
         comm = self.problem.model.comm
         vectors = [name for name in _VECTORS if name in state]
-        parts = {name: comm.gather(state[name].getArray(readonly=True).copy()) for name in vectors}
+        whole = {name: on_rank_0(comm, state[name]) for name in vectors}
         if comm.rank:
             return None
-        return {**state, **{name: np.concatenate(p) for name, p in parts.items() if p is not None}}
+        return {**state, **whole}
 
     @classmethod
     def restore(

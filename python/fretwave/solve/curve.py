@@ -12,14 +12,12 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from ..arrays import Array
 from ..errors import InputError
 from ..hb.states import State
 from .hermite import Cubic
 from .table import PLACE, Table
-
-Array = npt.NDArray[np.float64]
 
 #: Parts of a step in which a value is looked for on its cubic, and is drawn.
 PARTS = 8

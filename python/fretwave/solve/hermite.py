@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from ..arrays import Array
 
 #: Cosine of the turn within a step past which it is a corner, and its cubic a straight line.
 CORNER = 0.2

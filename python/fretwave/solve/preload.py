@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-import numpy.typing as npt
 from petsc4py import PETSc
 
 from .. import _core
+from ..arrays import Array
 from ..errors import InputError, NotConverged
 from ..hb.problems import HarmonicProblem, Harmonics
 from ..hb.suspects import suspects
@@ -16,10 +16,9 @@ from ..model.laws import own_load
 from ..model.model import Model
 from ..model.modes import LinearMode, linear_modes
 from ..model.rest import Rest
+from ..mpi.gather import on_all_ranks
 from .continuation import Continuation
 from .steps import StepControl
-
-Array = npt.NDArray[np.float64]
 
 #: What is kept of each contact.
 TOLD = ("u", "f", "status", "gap")
@@ -148,19 +147,20 @@ def _settled(problem: StaticPreload, y: PETSc.Vec, load: Array, history: list[li
 
     That rest, small beside the load, would be large beside the forces of a small motion.
     """
-    rest = _whole(problem.model, problem.residual(y)) * problem.force_scale
+    rest = _of_dofs(problem.model, problem.residual(y)) * problem.force_scale
     size = float(np.linalg.norm(load)) or float(np.linalg.norm(load + rest)) or 1.0
     load = load + rest
     contact = problem.diagnostics(y)
     periods = problem.contact_history(y)
     on_first = problem.model.comm.rank == 0
     contacts = [{key: np.asarray(c[key])[0] for key in TOLD} for c in periods] if on_first else None
-    blocks = _whole(problem.model, problem.core.coefficients(y))
+    blocks = _of_dofs(problem.model, problem.core.coefficients(y))
     problem.core.settle(y, history or [])
     imbalance = float(np.linalg.norm(rest)) / size
     sliders = problem.model.sliders()
     return Rest(blocks, load, sliders, contact["stick"], contact["slip"], contact["open"], imbalance, contacts)
 
 
-def _whole(model: Model, v: PETSc.Vec) -> Array:
-    return np.concatenate(model.comm.allgather(v.getArray(readonly=True)[: model.core.local_dofs].copy()))
+def _of_dofs(model: Model, v: PETSc.Vec) -> Array:
+    """The entries of the dofs, on every rank. Collective."""
+    return on_all_ranks(model.comm, v.getArray(readonly=True)[: model.core.local_dofs].copy())

@@ -7,12 +7,10 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
-import numpy.typing as npt
 
+from ..arrays import Array
 from ..post.cycles import harmonic_amplitude
 from ..post.motion import complex_amplitudes
-
-Array = npt.NDArray[np.float64]
 
 #: periods integrated between two looks at the amplitude of a forced motion
 PIECE = 10

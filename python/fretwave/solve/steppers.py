@@ -13,9 +13,9 @@ from functools import partial
 from typing import Protocol
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from ..arrays import Array
+
 #: Past differences that Anderson's acceleration keeps, and the iterations after which a stage is given up.
 WINDOW, MOST = 8, 40
 

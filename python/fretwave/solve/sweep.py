@@ -7,16 +7,14 @@ from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
+from ..arrays import Array
 from ..errors import FretwaveError, InputError
 from ..mpi import groups
 from .branch import Branch
 
 if TYPE_CHECKING:
     from mpi4py import MPI
-
-Array = npt.NDArray[np.float64]
 
 
 class Sweep:

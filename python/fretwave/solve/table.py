@@ -7,12 +7,11 @@ from pathlib import Path
 from typing import Any, overload
 
 import numpy as np
-import numpy.typing as npt
 
-from ..columns import Column, Value, csv_header, csv_line
+from ..arrays import AnyArray
+from ..columns import Column, Value
+from ..files.csv_table import header_line, row_line
 from ..files.whole import replaced
-
-Array = npt.NDArray[Any]
 
 #: Rows that a table's text shows before it leaves out its middle.
 SHOWN = 12
@@ -67,10 +66,10 @@ class Table:
         return name in self._values
 
     @overload
-    def __getitem__(self, key: str) -> Array: ...
+    def __getitem__(self, key: str) -> AnyArray: ...
     @overload
     def __getitem__(self, key: int) -> dict[str, Value]: ...
-    def __getitem__(self, key: str | int) -> Array | dict[str, Value]:
+    def __getitem__(self, key: str | int) -> AnyArray | dict[str, Value]:
         """A column by its name, or a row by its number."""
         if isinstance(key, str):
             if key not in self._values:
@@ -84,7 +83,7 @@ class Table:
     def to_csv(self, path: str | Path) -> None:
         """Write it as the table of a run is written: shortest text that gives the same numbers back."""
         with replaced(Path(path)) as fresh:
-            text = "".join([csv_header(self.columns), *(csv_line(self.columns, row) for row in self)])
+            text = "".join([header_line(self.columns), *(row_line(self.columns, row) for row in self)])
             fresh.write_text(text, encoding="utf-8")
 
     def text(self) -> str:

@@ -6,12 +6,10 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from ..arrays import Array
 from .hermite import Cubic, derivatives
 from .unknowns import Unknowns
-
-Array = npt.NDArray[np.float64]
 
 
 class Knot(NamedTuple):

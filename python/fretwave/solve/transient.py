@@ -9,11 +9,11 @@ import numpy as np
 import numpy.typing as npt
 
 from .. import _core
+from ..arrays import Array
 from ..errors import InputError
 from ..model.model import Model
+from ..mpi.gather import on_all_ranks
 from .steps import TIME_TOLERANCE
-
-Array = npt.NDArray[np.float64]
 
 #: Of one run, unless told: a minute of a small model.
 MOST_STEPS = 400_000
@@ -92,6 +92,5 @@ class Transient:
         t, x, v, steps, implicit, finished, reason = self._core.run(
             self.model.vector(x0), self.model.vector(v0), t_end, dt_out, rtol, limit, float(most_steps)
         )
-        gather = self.model.comm.allgather
-        whole = {name: np.concatenate(gather(local), axis=1) for name, local in (("x", x), ("v", v))}
+        whole = {name: on_all_ranks(self.model.comm, local, axis=1) for name, local in (("x", x), ("v", v))}
         return {"t": t, **whole, "steps": steps, "implicit": implicit, "finished": finished, "reason": reason}

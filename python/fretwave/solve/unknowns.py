@@ -5,16 +5,14 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from ..arrays import Array
 from .hermite import between, derivatives, piece, slopes
 
 if TYPE_CHECKING:
     from petsc4py import PETSc
 
     from ..hb.problems import HarmonicProblem
-
-Array = npt.NDArray[np.float64]
 
 
 class Unknowns:

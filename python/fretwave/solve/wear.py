@@ -8,15 +8,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from petsc4py import PETSc
 
+from ..arrays import Array
 from ..errors import InputError
 from .steppers import STEPPERS, StageFailed, take
 from .steps import WearControl
 from .worn_mode import WornMode, WornState
-
-Array = npt.NDArray[np.float64]
 
 #: Shortest step as a share of all cycles.
 SHORTEST = 1e-10

@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from ..arrays import Array
 from ..columns import Column, columns_named
 from ..errors import InputError
 from ..hb.problems import HarmonicProblem
@@ -16,8 +16,6 @@ from .steps import WearControl
 from .table import Table
 from .wear import Wear, WearPoint
 from .worn_mode import WornMode
-
-Array = npt.NDArray[np.float64]
 
 #: What the table of a march says beside its points' own numbers.
 STATE = ("omega", "omega0", "frequency_hz", "beta", "zeta", "stick", "slip", "open", "work", "energy_error")

@@ -6,18 +6,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from petsc4py import PETSc
 
 from .. import _core
+from ..arrays import Array
 from ..errors import InputError
 from ..hb.problems import HarmonicProblem
 from ..model.laws import Role, law_like
 from .continuation import Continuation
 from .steppers import StageFailed
 from .steps import StepControl
-
-Array = npt.NDArray[np.float64]
 
 #: Changes of log amplitude from which a solution on another sheet is looked for, and points to reach it by.
 DETOURS, DETOUR_POINTS = (1e-3, -1e-3, 1e-2, -1e-2, 3e-2, -3e-2), 40

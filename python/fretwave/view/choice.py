@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
+from ..arrays import Array, Indices
 from ..case.harmonic import nodal_diameter
 from ..case.kept import belongs
 from ..case.load import Case
@@ -23,9 +23,6 @@ from ..texts import display, nearest
 if TYPE_CHECKING:
     import h5py
 
-
-Array = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.intp]
 
 #: Columns of the branch that go with a picture.
 SHOWN = ("point", "amplitude", "cycles", "frequency_hz", "zeta", "level", "stick", "slip", "open")
@@ -106,7 +103,7 @@ class Choice:
     coefficients: Array
     labels: list[str]
     rest: Array
-    samples: IntArray
+    samples: Indices
     phases: Array
     contacts: dict[str, list[ContactHistory]]
     without: list[int]
@@ -121,7 +118,7 @@ class Choice:
         return np.concatenate([number + self.phases / (2 * np.pi) for number in range(len(self.points))])
 
     @property
-    def point_of_step(self) -> IntArray:
+    def point_of_step(self) -> Indices:
         """(n_steps,) place in `points`."""
         return np.repeat(np.arange(len(self.points)), len(self.phases))
 
@@ -231,13 +228,13 @@ def analysis_name(file: h5py.File, folder: Path, case: Case, asked: str | None) 
     )
 
 
-def _held(group: h5py.Group) -> IntArray:
+def _held(group: h5py.Group) -> Indices:
     """Points of which all is kept: where there are contacts, those at which their motion is."""
     with_contacts = any(name.startswith("contact_") for name in group)
     return np.asarray(group["reported"][()] if with_contacts else np.arange(len(group["coefficients"])), dtype=np.intp)
 
 
-def _points(group: h5py.Group, kept: IntArray, options: ViewOptions, where: str) -> list[tuple[int, str]]:
+def _points(group: h5py.Group, kept: Indices, options: ViewOptions, where: str) -> list[tuple[int, str]]:
     """Numbers of points, each with a word on what was asked for; without a wish that of the largest amplitude.
 
     Parameters
@@ -258,7 +255,7 @@ def _points(group: h5py.Group, kept: IntArray, options: ViewOptions, where: str)
     return chosen or [(int(kept[np.argmax(amplitude[kept])]), ", the kept point of the largest amplitude")]
 
 
-def _not_kept(what: str, where: str, measured: str, kept: IntArray, amplitude: Array, near: int) -> InputError:
+def _not_kept(what: str, where: str, measured: str, kept: Indices, amplitude: Array, near: int) -> InputError:
     """Names the kept points around the nearest one."""
     place = int(np.flatnonzero(kept == near)[0])
     begin = max(0, min(place - NAMED // 2, len(kept) - NAMED))

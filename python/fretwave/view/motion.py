@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ..arrays import Array, Indices
 from ..case.load import Case
 from ..errors import InputError
 from ..fe.mesh import VTK_LATTICE
@@ -25,8 +26,6 @@ from ..texts import display
 from .choice import Choice
 from .vtkhdf import HEXAHEDRON, QUADRATIC_HEXAHEDRON, TRIQUADRATIC_HEXAHEDRON, VERTEX, linear_cells
 
-Array = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.intp]
 #: Displacements (n_nodes, 3, n) of all nodes from columns (n_dof, n) on the model's dofs, both faces of a sector free.
 ToNodes = Callable[[Array], Array]
 Expand = Callable[[Any], Array]
@@ -219,7 +218,7 @@ def geometry(case: Case) -> Structure:
     return given
 
 
-def mesh_of(case: Case, linear: bool = False) -> tuple[Array, tuple[IntArray, int]]:
+def mesh_of(case: Case, linear: bool = False) -> tuple[Array, tuple[Indices, int]]:
     """Nodes (n_nodes, 3), and cells (n_cells, m) with VTK's number of their kind; points where there are no cells."""
     given = geometry(case)
     nodes, cells = np.asarray(given.coordinates), given.hexahedra

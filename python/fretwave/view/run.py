@@ -12,9 +12,9 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 from scipy.spatial import cKDTree
 
+from ..arrays import Array, Indices
 from ..case.kept import reload_case
 from ..case.load import Case
 from ..errors import InputError
@@ -27,9 +27,6 @@ from ..texts import display
 from .choice import Choice, ViewOptions, analysis_name, read_choice
 from .motion import Scene, Shape, geometry, mesh_of, scene_of
 from .vtkhdf import VERTEX, GridFile
-
-Array = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.intp]
 
 #: Highest harmonic shown as fields of its own.
 SHOWN_HARMONICS = 3
@@ -91,7 +88,7 @@ def _size(scene: Scene, count: int, what: str) -> str:
     return f"{sectors}{count} {what}"
 
 
-def write_grid(path: Path, scene: Scene, cells: tuple[IntArray, int], scale: float) -> None:
+def write_grid(path: Path, scene: Scene, cells: tuple[Indices, int], scale: float) -> None:
     """The grid with its displacement, that at rest, and the complex amplitudes of the lowest harmonics."""
     choice, labels = scene.choice, scene.choice.labels
     with GridFile(path, choice.times) as grid:
@@ -178,12 +175,12 @@ def _pair_fields(
     return write
 
 
-def _motion(grid: GridFile, scale: float) -> Callable[[int, Shape, slice | IntArray], None]:
+def _motion(grid: GridFile, scale: float) -> Callable[[int, Shape, slice | Indices], None]:
     """Writes the true displacement of a part, and the one from rest enlarged for the eye."""
     steps = np.arange(grid.steps)
     true, warp = grid.field("displacement", 3, steps), grid.field("warp", 3, steps, "f4")
 
-    def write(part: int, shape: Shape, chosen: slice | IntArray) -> None:
+    def write(part: int, shape: Shape, chosen: slice | Indices) -> None:
         for step, x in enumerate(shape.displacements(chosen)):
             true(step, part, x)
             warp(step, part, scale * (x - shape.rest[chosen]))

@@ -12,9 +12,9 @@ from typing import Any
 
 import h5py
 import numpy as np
-import numpy.typing as npt
 from scipy.spatial import Delaunay, QhullError
 
+from ..arrays import Array, Indices
 from ..case.contacts import wear_areas
 from ..case.load import Case
 from ..errors import InputError
@@ -23,9 +23,6 @@ from ..results.results import open_results
 from ..texts import display
 from .choice import ViewOptions
 from .vtkhdf import TRIANGLE, VERTEX, GridFile
-
-Array = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.intp]
 
 #: Columns of the table that go with each step.
 SHOWN = ("cycles", "vibrations", "amplitude", "frequency_hz", "zeta", "stick", "slip", "open", "work")
@@ -78,7 +75,7 @@ def _placed(case: Case, name: str) -> dict[str, Pairs]:
     return found
 
 
-def _chosen(group: Any, options: ViewOptions, where: str) -> list[IntArray]:
+def _chosen(group: Any, options: ViewOptions, where: str) -> list[Indices]:
     """Rows of the lines whose amplitudes are asked for."""
     number, amplitude = group["points/line"][()], group["points/amplitude"][()]
     lines = [np.flatnonzero(number == k) for k in np.unique(number)]
@@ -93,7 +90,7 @@ def _chosen(group: Any, options: ViewOptions, where: str) -> list[IntArray]:
     return [lines[int(np.argmin(np.abs(given - asked)))] for asked in options.amplitudes]
 
 
-def _write(path: Path, group: h5py.Group, rows: IntArray, placed: Mapping[str, Pairs], scale: float | None) -> float:
+def _write(path: Path, group: h5py.Group, rows: Indices, placed: Mapping[str, Pairs], scale: float | None) -> float:
     """One line; returns the factor on the depths in the field warp."""
     steps, table = np.arange(len(rows)), group["points"]
     arrays = {key: _over_steps(group, key, rows, placed) for key in FIELDS}
@@ -118,13 +115,13 @@ def _write(path: Path, group: h5py.Group, rows: IntArray, placed: Mapping[str, P
     return scale
 
 
-def _over_steps(group: h5py.Group, key: str, rows: IntArray, placed: Mapping[str, Pairs]) -> Array:
+def _over_steps(group: h5py.Group, key: str, rows: Indices, placed: Mapping[str, Pairs]) -> Array:
     """(n_steps, n_pairs of all contacts)."""
     parts = [np.asarray(group[f"{key}_{name}"][rows[0] : rows[-1] + 1])[rows - rows[0]] for name in placed]
     return np.concatenate(parts, axis=1)
 
 
-def surface(contact: Pairs) -> tuple[IntArray, int]:
+def surface(contact: Pairs) -> tuple[Indices, int]:
     """Cells on the pairs with VTK's number of their kind: triangles on each face, single points where that fails."""
     vertices = np.arange(contact.n_pairs)[:, None], VERTEX
     if contact.positions is None:
@@ -137,14 +134,14 @@ def surface(contact: Pairs) -> tuple[IntArray, int]:
     return np.concatenate(cells), TRIANGLE
 
 
-def _faces(contact: Pairs) -> tuple[list[str], IntArray]:
+def _faces(contact: Pairs) -> tuple[list[str], Indices]:
     """Names of the faces, and the number of each pair's."""
     given = list(contact.faces) if contact.faces is not None else [""] * contact.n_pairs
     names = list(dict.fromkeys(str(face) for face in given))
     return names, np.array([names.index(str(face)) for face in given])
 
 
-def _triangles(positions: Array, pairs: IntArray) -> IntArray:
+def _triangles(positions: Array, pairs: Indices) -> Indices:
     """Of a face's pairs (n, 3), without those that bridge gaps."""
     places = np.asarray(positions, dtype=float)[pairs]
     if len(pairs) < 3:

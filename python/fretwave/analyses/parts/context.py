@@ -18,7 +18,7 @@ from ...case.load import Case
 from ...columns import Column
 from ...console import Console
 from ...errors import InputError
-from ...files.whole import replace_text
+from ...files.csv_table import write_columns
 from ...model.structure import Structure
 from ...mpi.guard import on_first_rank
 from ...results.results import AnalysisWriter, Field, has_results, open_results
@@ -229,14 +229,9 @@ class AnalysisContext(Generic[Section]):
 
     def write_table(self, suffix: str, columns: Mapping[str, Any]) -> None:
         """A further table ``<name>_<suffix>.csv``, written as a whole by rank 0."""
-        if self.comm.rank:
-            return
-        names = list(columns)
-        lines = [",".join(names)]
-        for row in range(len(columns[names[0]]) if names else 0):
-            values = [np.asarray(columns[name])[row].item() for name in names]
-            lines.append(",".join(value if isinstance(value, str) else repr(value) for value in values))
-        replace_text(self.folder / f"{self.name}_{suffix}.csv", "\n".join(lines) + "\n")
+        if self.comm.rank == 0:
+            arrays = {name: np.asarray(values) for name, values in columns.items()}
+            write_columns(self.folder / f"{self.name}_{suffix}.csv", arrays)
 
     def _read(self, name: str, what: Callable[[h5py.Group], Found]) -> Found:
         with open_results(self.folder / "results.h5") as file:

@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
+from ...arrays import Array
 from ...post.response_peaks import points_around_peak
 from ...solve.steady import SteadyState, steady_motion
 from .context import AnalysisContext
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from ...model.model import Model
     from ..forced import ForcedAnalysis
 
-Array = npt.NDArray[np.float64]
 
 SAMPLES = 64
 #: of the time integration: tight enough that results do not depend on the number of ranks beyond 1e-9

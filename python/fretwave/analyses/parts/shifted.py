@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
 
+from ...arrays import Array
 from ...case.analysis import AnalysisSection
 from ...post.mode_curve import ModeCurve
 from ...post.motion import complex_amplitudes
@@ -16,8 +17,6 @@ from .context import AnalysisContext
 
 if TYPE_CHECKING:
     from ..mode import ModeAnalysis
-
-Array = npt.NDArray[np.float64]
 
 
 def added_ratio(phi: npt.NDArray[np.complex128], omega0: float, M: sp.spmatrix, C: sp.spmatrix) -> float:

@@ -15,6 +15,7 @@ from ...case.harmonic import nodal_diameter
 from ...case.load import Case
 from ...columns import COLUMNS, Column, Value
 from ...console import Console
+from ...mpi.gather import on_rank_0
 from ...results.results import AnalysisWriter, Field
 from .branch import finished_table, mode_problem, open_branch
 from .context import AnalysisContext
@@ -186,10 +187,10 @@ class _Marcher:
         if point.event:
             names = [contact.name for contact in self.problem.model.contacts]
             motions = dict(zip(names, self.problem.contact_history(y)))
-        parts = self.comm.gather(y.getArray(readonly=True).copy())
+        whole = on_rank_0(self.comm, y)
         kept = None
-        if parts is not None:
-            kept = {"y": np.concatenate(parts), "depth": state.depth, "at": point.cycles, "step": march.step}
+        if whole is not None:
+            kept = {"y": whole, "depth": state.depth, "at": point.cycles, "step": march.step}
             kept["load_scale"] = march.load_scale
         self.writer.append(
             row, self.problem.coefficients(y), motions if self.writer.active else None, kept, per_contact

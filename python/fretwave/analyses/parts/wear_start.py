@@ -6,10 +6,11 @@ import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
+from ...arrays import Array
 from ...errors import NotConverged
 from ...model.laws import Role
+from ...mpi.gather import on_all_ranks
 from .branch import mode_problem, points_of, step_control
 from .context import AnalysisContext
 from .rest import retained, start_mode
@@ -20,8 +21,6 @@ if TYPE_CHECKING:
     from ...solve.worn_mode import WornMode
     from ..mode import ModeAnalysis
     from ..wear import WearAnalysis
-
-Array = npt.NDArray[np.float64]
 
 
 def unworn_starts(context: AnalysisContext[ModeAnalysis], analysis: WearAnalysis) -> dict[str, Any]:
@@ -64,7 +63,7 @@ def _take(context: AnalysisContext[ModeAnalysis], analysis: WearAnalysis, point:
     """Keep the unknowns of a point that lies on an amplitude, the first on a branch that folds. Collective."""
     if point.event == "":
         return
-    whole = np.concatenate(context.comm.allgather(point.y.getArray(readonly=True).copy()))
+    whole = on_all_ranks(context.comm, point.y)
     for number, amplitude in enumerate(analysis.amplitude):
         if math.isclose(point.parameter, amplitude, rel_tol=1e-9) and f"y_{number}" not in found:
             found[f"y_{number}"] = whole

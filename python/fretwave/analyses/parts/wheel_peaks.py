@@ -11,16 +11,14 @@ from collections.abc import Mapping
 from typing import Optional
 
 import numpy as np
-import numpy.typing as npt
 
+from ...arrays import Array
 from ...post.blade_peaks import blade_tables, whitehead
 from ...post.mode_curve import ModeCurve
 from ...post.response_peaks import Peak, distance
 from ...results.results import AnalysisWriter
 from .branch import points_of
 from .excitation import Excitation, tuned_excitation
-
-Array = npt.NDArray[np.float64]
 
 
 def blade_by_blade(

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Optional
 import numpy as np
 import numpy.typing as npt
 
+from ...arrays import Array, Complex
 from ...columns import Column
 from ...cyclic.engine_order import folded
 from ...cyclic.wheel_shape import WheelShape as Shape
@@ -27,8 +28,6 @@ if TYPE_CHECKING:
     from ..mode import ModeAnalysis
     from .wheel_start import Start
 
-Array = npt.NDArray[np.float64]
-Complex = npt.NDArray[np.complex128]
 
 #: So many folds within this share of one amplitude are those of single sectors.
 MANY_FOLDS, SAME_AMPLITUDE = 8, 0.01

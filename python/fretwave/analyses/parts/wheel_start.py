@@ -9,9 +9,9 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Optional, TypeVar
 
 import numpy as np
-import numpy.typing as npt
 import scipy.sparse as sp
 
+from ...arrays import Complex
 from ...case.analysis import AnalysisSection
 from ...case.harmonic import HarmonicSection, nodal_diameter
 from .asymptotes import most_alike as omega_most_alike
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 
 Harmonic = TypeVar("Harmonic", bound=HarmonicSection)
 
-Complex = npt.NDArray[np.complex128]
 
 #: Families of the tuned sector looked through for that of a wheel's mode, beyond its number over N.
 MORE_FAMILIES = 3

@@ -1,0 +1,57 @@
+"""Tables as CSV: numbers with all digits, texts quoted where they must be."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterable, Mapping, Sequence
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..columns import Column, Value
+from .whole import replace_text
+
+
+def header_line(columns: Sequence[Column]) -> str:
+    """First line of a table."""
+    return _lines([[column.name for column in columns]])
+
+
+def row_line(columns: Sequence[Column], row: Mapping[str, Value]) -> str:
+    """A row of a table, for what is written a row at a time."""
+    return _lines([[column.text(row[column.name]) for column in columns]])
+
+
+def write_columns(path: Path, columns: Mapping[str, Any]) -> None:
+    """A table by its columns, written in one step.
+
+    Raises
+    ------
+    FileError
+    """
+    replace_text(path, _lines([columns, *zip(*columns.values())]))
+
+
+def write_rows(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
+    """A table by its rows, empty where a row has no such column, written in one step.
+
+    Raises
+    ------
+    FileError
+    """
+    names = list(dict.fromkeys(name for row in rows for name in row))
+    write_columns(path, {name: [row.get(name, "") for row in rows] for name in names})
+
+
+def _lines(rows: Iterable[Iterable[Any]]) -> str:
+    text = StringIO()
+    csv.writer(text, lineterminator="\n").writerows([plain(value) for value in row] for row in rows)
+    return text.getvalue()
+
+
+def plain(value: Any) -> Any:
+    """The value as Python's own, a number as the text with all its digits."""
+    own = value.item() if isinstance(value, np.generic) else value
+    return own.decode() if isinstance(own, bytes) else repr(own) if isinstance(own, float) else own

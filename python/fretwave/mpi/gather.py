@@ -1,0 +1,37 @@
+"""Vectors and arrays that lie in parts on the ranks, as a whole."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..arrays import AnyArray
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
+    from petsc4py import PETSc
+
+
+def on_all_ranks(comm: MPI.Comm, local: PETSc.Vec | AnyArray, axis: int = 0) -> AnyArray:
+    """The parts of all ranks in their order, on every rank. Collective.
+
+    Parameters
+    ----------
+    local : PETSc.Vec or array
+        A vector gives its local part.
+    axis : int
+        Along which an array is cut.
+    """
+    return np.concatenate(comm.allgather(_part(local)), axis=axis)
+
+
+def on_rank_0(comm: MPI.Comm, local: PETSc.Vec | AnyArray) -> AnyArray | None:
+    """The parts of all ranks in their order, on rank 0; None on the others. Collective."""
+    parts = comm.gather(_part(local))
+    return None if parts is None else np.concatenate(parts)
+
+
+def _part(local: PETSc.Vec | AnyArray) -> AnyArray:
+    part: AnyArray = local if isinstance(local, np.ndarray) else local.getArray(readonly=True).copy()
+    return part
