@@ -13,6 +13,7 @@ import scipy.sparse as sp
 from ..errors import InputError
 from ..files.compressed import check_compressed
 from ..model.checks import check_symmetric
+from ..model.sectors import Given
 from ..results.model_file import dof_name
 
 Array = npt.NDArray[np.float64]
@@ -57,7 +58,7 @@ class Entries:
     half: bool = False
 
     @classmethod
-    def of(cls, matrix: Any, where: str, kind: str, mirrored: str = "") -> Entries:
+    def of(cls, matrix: Given, where: str, kind: str, mirrored: str = "") -> Entries:
         """From a dense or SciPy sparse matrix."""
         check_compressed(matrix)
         found = sp.coo_matrix(matrix)
