@@ -30,7 +30,7 @@ class Column:
     kind: str = "f"
 
     @property
-    def dtype(self) -> Any:
+    def dtype(self) -> str:
         """Type of the column in results.h5."""
         return {"f": "f8", "i": "i8", "s": f"S{EVENT_LENGTH}"}[self.kind]
 
@@ -44,10 +44,11 @@ class Column:
         """The value as results.h5 has it."""
         return np.array(str(value).encode()[:EVENT_LENGTH] if self.kind == "s" else value, self.dtype)
 
-    def loaded(self, value: Any) -> Value:
+    def loaded(self, value: np.generic) -> Value:
         """The inverse of `stored`."""
-        plain: Value = value.decode() if self.kind == "s" else value.item()
-        return plain
+        plain = value.item()
+        loaded: Value = plain.decode() if self.kind == "s" else plain
+        return loaded
 
 
 _ALL = (

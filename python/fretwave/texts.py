@@ -5,9 +5,8 @@ from __future__ import annotations
 import difflib
 import json
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
 
 
 def shortened(text: str, longest: int = 200) -> str:
@@ -15,11 +14,11 @@ def shortened(text: str, longest: int = 200) -> str:
     return text if len(text) <= longest else text[: longest - 3] + "..."
 
 
-def nearest(word: str, known: Sequence[str], say: Any = "did you mean `{}`?".format) -> str | None:
+def nearest(word: str, known: Sequence[str], say: Callable[[str], str] = "did you mean `{}`?".format) -> str | None:
     """A fix line with the nearest known word (one it begins, or one of like letters), None when nothing is near."""
     begun = [other for other in known if len(word) > 1 and other.startswith(word)]
     found = begun or difflib.get_close_matches(word, known, n=1, cutoff=0.65)
-    return str(say(found[0])) if found else None
+    return say(found[0]) if found else None
 
 
 def display(path: Path) -> str:

@@ -76,6 +76,7 @@ def test_every_row_is_there_before_the_table_is_closed(tmp_path: Path) -> None:
             assert len(file["mode/points/zeta"]) == count
             assert file["mode"].attrs["status"] == "running"
             assert file.attrs["title"] == "a case"
+            assert file.get("other") is None  # as of any mapping, also where there is no results.h5 yet
         assert len((copy / "mode.csv").read_text().splitlines()) == count + 1
     table.abandon()
 

@@ -7,7 +7,7 @@ import importlib.util
 import inspect
 import traceback
 import typing
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 from types import ModuleType
@@ -62,7 +62,7 @@ def _import(path: Path, source: Source) -> ModuleType:
     return module
 
 
-def known_options(module: ModuleType, function: Any) -> dict[str, Any] | None:
+def known_options(module: ModuleType, function: Callable[..., object]) -> dict[str, Any] | None:
     """Options of a builder with their types: arguments of build; for ``**options`` the fields of `Options`.
 
     None when any option is taken.
@@ -80,7 +80,11 @@ def known_options(module: ModuleType, function: Any) -> dict[str, Any] | None:
 
 
 def _checked(
-    module: ModuleType, function: Any, options: Mapping[str, Any], source: Source, found: list[FretwaveError]
+    module: ModuleType,
+    function: Callable[..., object],
+    options: Mapping[str, Any],
+    source: Source,
+    found: list[FretwaveError],
 ) -> dict[str, Any]:
     """Options of known names, converted to the types that the builder says."""
     known = known_options(module, function)

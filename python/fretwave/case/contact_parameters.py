@@ -6,13 +6,17 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from ..errors import FretwaveError, InputError
+from ..model.laws import LawInfo, ParameterInfo
 from ..model.pairs import Pairs
 from ..texts import nearest, toml
 from .schema import ContactSection
 from .toml.source import Source
 from .toml.validation import at
+
+Array = npt.NDArray[np.float64]
 
 #: A parameter's name with this ending is given per area; the pair's area comes with the model.
 PER_AREA = "_per_area"
@@ -20,8 +24,8 @@ LARGEST = float(np.finfo(float).max)
 
 
 def law_of(
-    source: Source, number: int, section: ContactSection, laws: Mapping[str, Any], found: list[FretwaveError]
-) -> Any:
+    source: Source, number: int, section: ContactSection, laws: Mapping[str, LawInfo], found: list[FretwaveError]
+) -> LawInfo | None:
     """The law that a contact names; None when there is no such law."""
     if section.law in laws:
         return laws[section.law]
@@ -42,23 +46,23 @@ def law_of(
 _FIX = {2: "give the key `tangents` beside `pairs`", 3: "such contacts come with a model that is built or imported"}
 
 
-def fits(source: Source, number: int, law: Any, here: int, given: Pairs | None, found: list[FretwaveError]) -> bool:
+def fits(source: Source, number: int, law: LawInfo, here: int, given: Pairs | None, found: list[FretwaveError]) -> bool:
     """Law and pairs have the same number of components (`here` of the pairs)."""
-    wanted = getattr(law, "components", 1)
+    wanted = law.components
     if here != wanted:
         text = "component" if here == 1 else "components"
         measured = f"{law.name} has {wanted}, the pairs have {here} {text}"
         fix = "choose another law" if given else _FIX.get(wanted, "leave out the key `tangents`")
         where = source.where(("contact", number, "law"))
         found.append(InputError("the law does not fit the contact pairs", where, measured, "the same number", fix))
-    return bool(here == wanted)
+    return here == wanted
 
 
 def parameters_of(
     source: Source,
     number: int,
     section: ContactSection,
-    law: Any,
+    law: LawInfo,
     given: Pairs | None,
     found: list[FretwaveError],
 ) -> dict[str, Any] | None:
@@ -72,9 +76,10 @@ def parameters_of(
         if key not in known and key not in per_area:
             found.append(_unknown_parameter(source, (*path, key), section.law, [*known, *per_area]))
     n_pairs = given.n_pairs if given and section.pairs is None else len(section.pairs or [])
-    extra, values = section.model_extra or {}, {}
+    extra = section.model_extra or {}
+    values: dict[str, float | Array | None] = {}
     for name, parameter in known.items():
-        if name + PER_AREA in extra and name + PER_AREA in per_area:
+        if areas is not None and name + PER_AREA in extra and name + PER_AREA in per_area:
             if name in extra:
                 where, fix = source.where((*path, name + PER_AREA)), "keep one of them"
                 found.append(InputError(f"'{name}' is given twice, once per area", where, fix=fix))
@@ -87,8 +92,8 @@ def parameters_of(
     return values if len(found) == before else None
 
 
-def _plain(value: Any) -> Any:
-    return float(value) if np.ndim(value) == 0 else np.asarray(value, dtype=float)
+def _plain(value: npt.ArrayLike) -> float | Array:
+    return float(np.asarray(value).item()) if np.ndim(value) == 0 else np.asarray(value, dtype=float)
 
 
 def _unknown_parameter(source: Source, path: tuple[Any, ...], law: str, known: Sequence[str]) -> InputError:
@@ -102,7 +107,9 @@ def _unknown_parameter(source: Source, path: tuple[Any, ...], law: str, known: S
     )
 
 
-def _value(source: Source, path: tuple[Any, ...], parameter: Any, n_pairs: int, found: list[FretwaveError]) -> Any:
+def _value(
+    source: Source, path: tuple[Any, ...], parameter: ParameterInfo, n_pairs: int, found: list[FretwaveError]
+) -> float | Array | None:
     """A parameter as number or (n_pairs,) array."""
     value = at(source.data, path)
     sign = ">" if parameter.strict else ">="
@@ -135,7 +142,7 @@ def _value(source: Source, path: tuple[Any, ...], parameter: Any, n_pairs: int, 
     return float(value) if not isinstance(value, list) else np.array(value, dtype=float)
 
 
-def _wrong_number(value: Any, parameter: Any, n_pairs: int) -> str | None:
+def _wrong_number(value: Any, parameter: ParameterInfo, n_pairs: int) -> str | None:
     values = value if isinstance(value, list) else [value]
     if not all(isinstance(entry, (int, float)) and not isinstance(entry, bool) for entry in values):
         return "is not a number"

@@ -12,7 +12,7 @@ import scipy.sparse
 
 from ..errors import FretwaveError, InputError
 from ..model.contact import Contact
-from ..model.laws import law_like
+from ..model.laws import LawInfo, law_like
 from ..model.pairs import Pairs
 from ..model.sectors import Sparse
 from ..model.structure import Structure
@@ -59,7 +59,7 @@ def wear_areas(contacts: Sequence[Contact]) -> dict[str, npt.NDArray[np.float64]
 def read_contacts(
     source: Source,
     dofs: Sequence[str] | None,
-    laws: Mapping[str, Any],
+    laws: Mapping[str, LawInfo],
     found: list[FretwaveError],
     built: Mapping[str, Pairs] | None = None,
 ) -> list[Contact]:

@@ -17,10 +17,11 @@ WHOLE = re.compile("-?[0-9]{1,9}")
 
 if TYPE_CHECKING:
     from ..cyclic.aerodynamics import Aerodynamics
+    from ..model.sectors import Term
     from .load import Case
 
 
-def with_flow(case: Case, K: Any, C: Any, nodal_diameter: int) -> tuple[Any, Any]:
+def with_flow(case: Case, K: Term, C: Term | None, nodal_diameter: int) -> tuple[Term, Term | None]:
     """K and C of a sector in a wave, or of the wheel that a case was put on, with what the flow adds to them."""
     from ..cyclic.aerodynamics import period_of, with_terms
     from ..model.sectors import around

@@ -15,7 +15,6 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 OLDEST_PYTHON = (3, 9)
 OLDEST_PETSC = (3, 18)
@@ -57,7 +56,7 @@ def check_petsc_version(version: Sequence[int]) -> Check:
     return Check("PETSc", ok, dotted(version), f">= {dotted(OLDEST_PETSC)}", fix)
 
 
-def check_scalar_type(scalar: Any) -> Check:
+def check_scalar_type(scalar: object) -> Check:
     """fretwave's unknowns are (cos, sin) pairs of real numbers: a complex PETSc cannot hold them."""
     name = getattr(scalar, "__name__", str(scalar))
     fix = "unset PETSC_DIR PETSC_ARCH; if it stays complex: apt-get install petsc-dev python3-petsc4py"
@@ -296,7 +295,7 @@ def examine() -> Iterator[Check]:
         yield from guarded(name, find)
 
 
-def check_runtime(scalar: Any = None) -> None:
+def check_runtime(scalar: object = None) -> None:
     """Refuse a complex PETSc before anything of fretwave touches it; cheap, for the start of the package.
 
     Raises

@@ -29,16 +29,17 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Optional
+from typing import Optional
 
 import numpy as np
 import scipy.sparse as sp
 
 from ..errors import InputError
-from ..model.sectors import by_sector
+from ..model.sectors import Term, by_sector
 from .engine_order import folded
 
-Term = dict[int, sp.csr_matrix]
+#: {k: what the flow adds on the sector k places ahead}.
+Added = dict[int, sp.csr_matrix]
 
 #: Coefficients below this share of the largest are rounding of the transform, not a coupling.
 NOTHING = 1e-13
@@ -91,7 +92,7 @@ class Aerodynamics:
         theta = 2 * np.pi * nodal_diameter / sectors
         return complex(sum(L * np.exp(-1j * k * theta) for k, L in self.influence.items()))
 
-    def terms(self, M: Any, period: int | None = None) -> dict[str, Term]:
+    def terms(self, M: Term, period: int | None = None) -> dict[str, Added]:
         """{"K": {k: (n_dof, n_dof)}, "C": {k: ...}} to be added to those of a sector.
 
         Parameters
@@ -101,7 +102,7 @@ class Aerodynamics:
         period : int, optional
             Of one wave: blades so many places apart move alike in all its harmonics, and their terms are one.
         """
-        added: dict[str, Term] = {"K": {}, "C": {}}
+        added: dict[str, Added] = {"K": {}, "C": {}}
         for k, L in self.influence.items():
             for ahead, shape in self._shape(M).items():
                 place = k + ahead if period is None else folded(k + ahead, period)
@@ -110,7 +111,7 @@ class Aerodynamics:
                         add_to(added[letter], place, value * shape)
         return added
 
-    def _shape(self, M: Any) -> Term:
+    def _shape(self, M: Term) -> Added:
         """What the force is distributed like."""
         mass = {k: sp.csr_matrix(part, dtype=float) for k, part in by_sector(M).items()}
         if self.dof is None:
@@ -126,12 +127,12 @@ def period_of(nodal_diameter: int, sectors: int) -> int:
     return sectors // math.gcd(nodal_diameter, sectors)
 
 
-def add_to(parts: Term, k: int, matrix: sp.csr_matrix) -> None:
+def add_to(parts: Added, k: int, matrix: sp.csr_matrix) -> None:
     """Add a matrix to the term of the sector k places ahead."""
     parts[k] = sp.csr_matrix(parts[k] + matrix) if k in parts else matrix
 
 
-def with_terms(given: Any, added: Mapping[int, Any]) -> Any:
+def with_terms(given: Term | None, added: Mapping[int, sp.csr_matrix]) -> Term | None:
     """A term as `fretwave.Model` takes it, plus further parts."""
     if not added:
         return given

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Optional, Tuple
+from typing import Optional, Tuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -68,7 +68,9 @@ class WaveError:
 class SectorWaves:
     """Linear waves of a sector, stuck and sliding; each is computed by one rank and kept."""
 
-    def __init__(self, sector: Sector, comm: Any, diameters: tuple[int, ...], contacts: Sequence[Contact] = ()) -> None:
+    def __init__(
+        self, sector: Sector, comm: MPI.Comm, diameters: tuple[int, ...], contacts: Sequence[Contact] = ()
+    ) -> None:
         self.sector, self.comm, self.diameters, self.contacts = sector, comm, diameters, list(contacts)
         self._hz: dict[Wave, Array] = {}
 

@@ -8,13 +8,13 @@ one of the pair is avoided (`fretwave.NonlinearMode`).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Optional
+from typing import Optional
 
 import numpy as np
 
 from ..arrays import Array, Complex
 from ..model.modes import LinearMode
-from ..model.sectors import around
+from ..model.sectors import Sparse, around
 from .sector import Sector, wave_mode
 
 #: Modes of a mistuned wheel whose shares in a tuned wave differ by less are alike in it: the lower one is taken.
@@ -61,7 +61,7 @@ def standing_wave(
     return LinearMode(mode.omega, mode.beta, phi.real.copy(), np.zeros(len(phi))), phi.imag + 0j
 
 
-def most_alike(modes: Sequence[LinearMode], wave: LinearMode, M: Any) -> LinearMode:
+def most_alike(modes: Sequence[LinearMode], wave: LinearMode, M: Sparse | Sector) -> LinearMode:
     """Of modes of a mistuned wheel the one with the largest share in a tuned wave (`Sector.around`) and its pair.
 
     Parameters

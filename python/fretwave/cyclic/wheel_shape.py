@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..arrays import Complex
-from ..model.sectors import around
+from ..model.sectors import Given, around
 from ..post.wave_content import participation, wave_content
 from .engine_order import folded
 
@@ -50,7 +50,7 @@ class WheelShape:
     (0.666666666667, 1, 1.414213562373)
     """
 
-    def __init__(self, M: Any, sectors: int, dof: int, tuned_amplitude: float) -> None:
+    def __init__(self, M: Given, sectors: int, dof: int, tuned_amplitude: float) -> None:
         self.M, self.sectors, self.dof, self.tuned_amplitude = M, sectors, dof, tuned_amplitude
 
     @classmethod

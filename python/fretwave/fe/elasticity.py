@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from types import ModuleType
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +14,9 @@ import scipy.sparse as sp
 from ..arrays import Array
 from ..errors import InputError
 from .mesh import Mesh
+
+if TYPE_CHECKING:
+    import skfem
 
 
 @dataclass(frozen=True)
@@ -86,11 +90,11 @@ def _scalar_matrices(mesh: Mesh) -> tuple[sp.csr_matrix, dict[tuple[int, int], s
 
     Elasticity needs no more, and six scalar forms take a small part of the time of one vector form.
     """
-    skfem = _skfem()
-    basis, number = _basis(skfem, mesh)
+    library = _skfem()
+    basis, number = _basis(library, mesh)
 
-    def assembled(form: Any) -> sp.csr_matrix:
-        A = skfem.BilinearForm(form).assemble(basis).tocoo()
+    def assembled(form: Callable[..., Array]) -> sp.csr_matrix:
+        A = library.BilinearForm(form).assemble(basis).tocoo()
         return sp.csr_matrix((A.data, (number[A.row], number[A.col])), shape=A.shape)
 
     stiffness = {
@@ -99,28 +103,28 @@ def _scalar_matrices(mesh: Mesh) -> tuple[sp.csr_matrix, dict[tuple[int, int], s
     return assembled(lambda u, v, w: u * v), stiffness
 
 
-def _basis(skfem: Any, mesh: Mesh) -> tuple[Any, npt.NDArray[np.intp]]:
+def _basis(library: ModuleType, mesh: Mesh) -> tuple[skfem.Basis, npt.NDArray[np.intp]]:
     """scikit-fem's basis on this mesh, and our node of each of its dofs."""
     corners, t = np.unique(mesh.cells[:, :: mesh.order, :: mesh.order, :: mesh.order], return_inverse=True)
-    element = skfem.ElementHex2() if mesh.order == 2 else skfem.ElementHex1()
-    t = t.reshape(len(mesh.cells), 8).T[_positions(skfem.ElementHex1(), 1)]
+    element = library.ElementHex2() if mesh.order == 2 else library.ElementHex1()
+    t = t.reshape(len(mesh.cells), 8).T[_positions(library.ElementHex1(), 1)]
     t = np.ascontiguousarray(t)
-    linear = skfem.MeshHex(np.ascontiguousarray(mesh.nodes[corners].T), t)
-    dofs = skfem.assembly.Dofs(linear, element).element_dofs
+    linear = library.MeshHex(np.ascontiguousarray(mesh.nodes[corners].T), t)
+    dofs = library.assembly.Dofs(linear, element).element_dofs
     number = np.empty(len(mesh.nodes), dtype=np.intp)
     number[dofs] = mesh.cells.reshape(len(mesh.cells), -1).T[_positions(element, mesh.order)]
-    curved = skfem.MeshHex2(np.ascontiguousarray(mesh.nodes[number].T), t) if mesh.order == 2 else linear
+    curved = library.MeshHex2(np.ascontiguousarray(mesh.nodes[number].T), t) if mesh.order == 2 else linear
     # Two points per axis for trilinear, three for triquadratic elements: exact on parallelepipeds.
-    return skfem.Basis(curved, element, intorder=2 * mesh.order + 1), number
+    return library.Basis(curved, element, intorder=2 * mesh.order + 1), number
 
 
-def _positions(element: Any, order: int) -> npt.NDArray[np.intp]:
+def _positions(element: skfem.Element, order: int) -> npt.NDArray[np.intp]:
     """Place of each of scikit-fem's local dofs on our lattice, in C order."""
     lattice = np.rint(element.doflocs * order).astype(np.intp)
     return np.asarray(np.ravel_multi_index(tuple(lattice.T), (order + 1,) * 3))
 
 
-def _skfem() -> Any:
+def _skfem() -> ModuleType:
     try:
         import skfem
         import skfem.assembly
@@ -132,7 +136,8 @@ def _skfem() -> Any:
             "the optional package scikit-fem",
             "pip install scikit-fem",
         ) from None
-    return skfem
+    library: ModuleType = skfem
+    return library
 
 
 def centrifugal_load(

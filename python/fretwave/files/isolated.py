@@ -25,7 +25,7 @@ MEMORY = 4 << 30
 MEMORY_TIMES = 64
 
 
-def call_isolated(module: str, function: str, *arguments: Any, size: int = 0) -> Any:
+def call_isolated(module: str, function: str, *arguments: object, size: int = 0) -> Any:
     """``module.function(*arguments)``, run in a child process.
 
     Parameters

@@ -10,7 +10,7 @@ import errno
 import os
 import shutil
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -238,7 +238,7 @@ def read_through(path: str) -> int:
     """Read every dataset and attribute of an HDF5 file; gives where HDF5 says that it ends."""
     import h5py
 
-    def read(_: str, item: Any) -> None:
+    def read(_: str, item: h5py.Group | h5py.Dataset) -> None:
         dict(item.attrs)
         if isinstance(item, h5py.Dataset):
             step = max(1, BLOCK // max(1, item.dtype.itemsize * (item.size // max(1, len(item)) if item.shape else 1)))
@@ -269,7 +269,7 @@ class Unfailing:
         with told(path):
             self._file: Any = path.open(mode, buffering=0)
 
-    def write(self, data: Any) -> int:
+    def write(self, data: bytes | memoryview) -> int:
         """All of it, as far as HDF5 can tell."""
         self._try(lambda: write_all(self._file.fileno(), data))
         return len(data)
@@ -279,7 +279,7 @@ class Unfailing:
         self._try(lambda: os.ftruncate(self._file.fileno(), size))
         return size
 
-    def readinto(self, buffer: Any) -> int:
+    def readinto(self, buffer: bytearray | memoryview) -> int:
         """After a failure HDF5 reads on in what it believes to have written."""
         count = self._file.readinto(buffer) or 0
         return len(buffer) if self.error is not None else count
@@ -305,7 +305,7 @@ class Unfailing:
         if self.error is not None:
             raise file_error(self.error, self.path)
 
-    def _try(self, work: Any) -> None:
+    def _try(self, work: Callable[[], object]) -> None:
         if self.error is None:
             try:
                 work()

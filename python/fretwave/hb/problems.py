@@ -105,8 +105,11 @@ class HarmonicProblem:
 
     #: What its scalar unknowns mean; None where no table says.
     meaning: State | None = None
+    core: _core.HarmonicProblem
 
-    def __init__(self, model: Model, harmonics: Harmonics, prefix: str, core: Any, rest: Rest | None = None) -> None:
+    def __init__(
+        self, model: Model, harmonics: Harmonics, prefix: str, core: _core.HarmonicProblem, rest: Rest | None = None
+    ) -> None:
         self.model, self.harmonics, self.prefix, self.core, self.rest = model, harmonics, prefix, core, rest
         if rest is not None:
             self.preload(rest.displacement, rest.load)
@@ -243,7 +246,7 @@ class HarmonicProblem:
 
     def destroy(self) -> None:
         """Free the solver's vectors. Collective."""
-        self.core = None
+        self.core = None  # type: ignore[assignment]
 
     def __enter__(self) -> HarmonicProblem:
         return self
@@ -274,6 +277,8 @@ class NonlinearMode(HarmonicProblem):
         The static state that the motion is about (`fretwave.static_preload`), its own whatever other problems of the
         model are about; without it that of the model (`Model.settle`), and no static load.
     """
+
+    core: _core.NonlinearMode
 
     def __init__(
         self,
@@ -332,6 +337,8 @@ class ForcedResponse(HarmonicProblem):
         The static state that the motion is about (`fretwave.static_preload`), its own whatever other problems of the
         model are about; without it that of the model (`Model.settle`), and no static load.
     """
+
+    core: _core.ForcedResponse
 
     def __init__(
         self,

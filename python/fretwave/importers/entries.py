@@ -14,6 +14,7 @@ from ..arrays import IntArray
 from ..errors import InputError
 from ..files.compressed import check_compressed
 from ..model.checks import check_symmetric
+from ..model.sectors import Given
 from ..results.model_file import dof_name
 
 #: Share of entries of the rarer triangle below which they count as strays beside the other triangle.
@@ -55,7 +56,7 @@ class Entries:
     half: bool = False
 
     @classmethod
-    def of(cls, matrix: Any, where: str, kind: str, mirrored: str = "") -> Entries:
+    def of(cls, matrix: Given, where: str, kind: str, mirrored: str = "") -> Entries:
         """From a dense or SciPy sparse matrix."""
         check_compressed(matrix)
         found = sp.coo_matrix(matrix)

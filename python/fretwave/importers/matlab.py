@@ -22,6 +22,7 @@ from .npz import choose
 
 if TYPE_CHECKING:
     import h5py
+    import numpy.typing as npt
 
 
 NUMERIC = ("sparse", "double", "single", "int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64")
@@ -47,7 +48,7 @@ def read_v73(path: Path, letter: str, variable: str | None = None) -> Entries:
     return Entries.of(matrix, where, "MATLAB 7.3")
 
 
-def _is_matrix(item: Any) -> bool:
+def _is_matrix(item: h5py.Group | h5py.Dataset) -> bool:
     if hasattr(item, "keys"):
         return "MATLAB_sparse" in item.attrs and "jc" in item
     return item.ndim == 2 and (item.dtype.kind in "fiu" or item.dtype.names == ("real", "imag"))
@@ -61,5 +62,5 @@ def _sparse(group: h5py.Group) -> sp.csc_matrix:
     return sp.csc_matrix((_real_or_complex(group["data"][()]), group["ir"][()].astype(np.int64), starts), shape=shape)
 
 
-def _real_or_complex(values: Any) -> Any:
+def _real_or_complex(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
     return values["real"] + 1j * values["imag"] if values.dtype.names else values

@@ -6,7 +6,7 @@ a pair (stick, slip, open) where the law was asked: of the core, or of the resul
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from enum import Enum
@@ -190,7 +190,7 @@ def _parameter(
     return ParameterInfo(name, unit, doc, lower, strict, default, Role(role))
 
 
-def law_like(wanted: Any) -> str:
+def law_like(wanted: Callable[[LawInfo], bool]) -> str:
     """Name of the first law that `wanted` accepts, for advice in messages."""
     return next(name for name, info in laws().items() if wanted(info))
 
@@ -200,7 +200,7 @@ def own_load(contacts: Sequence[Any]) -> str | None:
     return next(filter(None, (contact.info.named(Role.LOAD) for contact in contacts)), None)
 
 
-def springs(stiffness: Any) -> tuple[str, dict[str, Any]]:
+def springs(stiffness: float | Array) -> tuple[str, dict[str, Any]]:
     """Law and parameters of linear springs [N/m] on one component: sliders, which stuck modes never see slip."""
     return "jenkins", {"tangential_stiffness": stiffness, "friction_limit": 1.0}
 
@@ -246,7 +246,7 @@ class PythonLaw:
     def __init__(self, **values: Array) -> None:
         self.__dict__.update(values)
 
-    def __init_subclass__(cls, **given: Any) -> None:
+    def __init_subclass__(cls, **given: object) -> None:
         super().__init_subclass__(**given)
         if cls.components > 1 and "normal" not in vars(cls) and cls.normal is None:
             cls.normal = 0
@@ -272,7 +272,7 @@ class PythonLaw:
         return np.where(self.status(u, v, f) == OPEN, np.nan, 0.0 if self.normal is not None else np.nan)
 
     @staticmethod
-    def at_limit(force: Any, limit: Any) -> Any:
+    def at_limit(force: Array, limit: Array) -> npt.NDArray[np.bool_]:
         """Whether tangential forces are at their limit, by the one tolerance that all laws share."""
         from .. import _core
 
@@ -304,7 +304,7 @@ class PythonLaw:
         return _contiguous(self.status(u, v, f)), _contiguous(self.gap(u, v, f))
 
 
-def _contiguous(values: Any) -> Array:
+def _contiguous(values: npt.ArrayLike) -> Array:
     return np.ascontiguousarray(values, dtype=float)
 
 

@@ -75,13 +75,14 @@ class Reduction:
     """
 
     def __init__(
-        self, model: Model, core: Any, keep: npt.NDArray[np.intp], owned: Sequence[PETSc.Mat], wall: float
+        self, model: Model, core: _core.Reduction, keep: npt.NDArray[np.intp], owned: Sequence[PETSc.Mat], wall: float
     ) -> None:
         self._model, self._core, self._owned = model, core, list(owned)
         self.keep = keep
-        self.M: Array = core.M
-        self.K: Array = core.K
-        self.C: Array | None = core.C
+        self.M: Array = np.asarray(core.M)
+        self.K: Array = np.asarray(core.K)
+        damping = core.C
+        self.C: Array | None = None if damping is None else np.asarray(damping)
         self.component_hz: Array = np.asarray(core.component_omega) / (2 * np.pi)
         self.wall_s: dict[str, float] = {**core.times, "total": wall}
 
@@ -185,7 +186,7 @@ class Reduction:
 
     def destroy(self) -> None:
         """Free matrices and modes; the reduced matrices stay. Collective."""
-        self._core = None
+        self._core = None  # type: ignore[assignment]
         for mat in self._owned:
             mat.destroy()
         self._owned = []

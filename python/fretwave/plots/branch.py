@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,6 +12,7 @@ from ..columns import COLUMNS
 from ..plots import style
 
 if TYPE_CHECKING:
+    from ..arrays import Array
     from ..solve.branch import Branch
 
 #: What is drawn over what: abscissa, and the columns of the two pictures.
@@ -46,7 +47,7 @@ def _name(column: str) -> str:
     return {"zeta": "Damping ratio", "frequency_hz": "Frequency", "amplitude": "Amplitude", "phase": "Phase"}[column]
 
 
-def _events(axes: Axes, branch: Branch, x: Any, y: Any) -> None:
+def _events(axes: Axes, branch: Branch, x: Array, y: Array) -> None:
     names = [name for name in dict.fromkeys(event.name for event in branch.events) if name not in PLAIN]
     for name, mark in zip(names, MARKS):
         rows = branch.met(name)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import product
-from typing import Any
+from typing import Any, Tuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,6 +14,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
 
+from ..arrays import Array
 from ..files.dimensions import names_of_data
 from ..post.grid import Plan, short_names
 from ..results.file import open_results
@@ -195,7 +196,7 @@ def _legend(figure: Figure, axes: Axes) -> None:
         style.legend_outside(figure, axes, columns=max(1, min(5, len(names), 125 // (max(map(len, names)) + 9))))
 
 
-def _amplitudes(axes: Axes, x: Any, table: Table, number: int) -> None:
+def _amplitudes(axes: Axes, x: Array, table: Table, number: int) -> None:
     """Where slip begins, where damping sets in and where it is largest."""
     line = LINES[number % len(LINES)]
     name = (lambda text: None) if number else (lambda text: text)
@@ -213,7 +214,7 @@ def _amplitudes(axes: Axes, x: Any, table: Table, number: int) -> None:
             axes.plot(x, cycle, **more, **look)
 
 
-def _one(axes: Axes, x: Any, table: Table, number: int, column: str, coloured: bool = False) -> None:
+def _one(axes: Axes, x: Array, table: Table, number: int, column: str, coloured: bool = False) -> None:
     """One quantity; beside amplitudes in the colour that the largest damping has there."""
     factor = 100.0 if column == "largest_zeta" else 1.0
     colour = style.PALETTE[number % len(style.PALETTE)] if coloured else style.RED
@@ -221,6 +222,7 @@ def _one(axes: Axes, x: Any, table: Table, number: int, column: str, coloured: b
 
 
 #: label and unit of an axis, whether it starts at 0, and what draws a line on it
+Panel = Tuple[str, str, bool, Callable[[Axes, Array, Table, int], None]]
 MODE_PANELS = (
     ("Modal amplitude", "m", False, _amplitudes),
     ("Largest damping ratio ζ", "%", True, partial(_one, column="largest_zeta")),
@@ -231,7 +233,7 @@ FORCED_PANELS = (
 )
 
 
-def overview(swept: Swept, panels: Any) -> Figure:
+def overview(swept: Swept, panels: Sequence[Panel]) -> Figure:
     """Quantities over the key with most values, a line for each combination of the others (and each level)."""
     figure, axes = style.new_figure(4.4, columns=len(panels))
     key = swept.plan.keys[swept.main]
@@ -263,7 +265,7 @@ def _others(swept: Swept) -> list[str]:
     return Plan(over).labels() if over else [""]
 
 
-def _scales(axes: Axes, x: Any, texts: list[str], from_zero: bool) -> None:
+def _scales(axes: Axes, x: Array, texts: list[str], from_zero: bool) -> None:
     if texts:
         axes.set_xticks(x, texts)
     elif x.min() > 0 and x.max() > LINEAR_UP_TO * x.min():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import reduce
 from typing import Any
@@ -63,7 +63,7 @@ class ContactHistory:
         """Of some pairs alone."""
         return self._each(lambda values: values[..., pairs])
 
-    def _each(self, change: Any) -> ContactHistory:
+    def _each(self, change: Callable[[npt.NDArray[Any]], npt.NDArray[Any]]) -> ContactHistory:
         told = [None if kept is None else change(kept) for kept in (self.kept_status, self.kept_gap)]
         return ContactHistory(change(self.u), change(self.v), change(self.f), told[0], told[1], self.normal)
 

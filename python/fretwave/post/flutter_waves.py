@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from .limit_cycles import limit_cycles
 from .mode_curve import NO_DAMPING
@@ -28,7 +29,7 @@ def describe_waves(table: Mapping[str, Any], diameters: Sequence[int]) -> list[d
     return [_wave(table, diameter, points) for diameter, points in rows.items() if len(points)]
 
 
-def _wave(table: Mapping[str, Any], diameter: int, rows: Any) -> dict[str, Any]:
+def _wave(table: Mapping[str, Any], diameter: int, rows: npt.NDArray[np.intp]) -> dict[str, Any]:
     part = {key: np.asarray(table[key])[rows] for key in ("amplitude", "frequency_hz", "zeta", "event")}
     amplitude, zeta = part["amplitude"], part["zeta"]
     top = int(np.argmax(zeta))
@@ -57,7 +58,7 @@ def _folds(part: Mapping[str, Any], point: int) -> list[float] | None:
     return sorted([float(part["amplitude"][before[-1]]), float(part["amplitude"][behind[0]])])
 
 
-def verdict(zeta: Any) -> str:
+def verdict(zeta: npt.ArrayLike) -> str:
     """From the signs of the damping along a branch that begins with the contact stuck.
 
     Returns

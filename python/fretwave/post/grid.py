@@ -62,6 +62,6 @@ def short_names(keys: Sequence[str]) -> dict[str, str]:
     return {key: name if last.count(name) == 1 else key for key, name in zip(keys, last)}
 
 
-def value_text(value: Any) -> str:
+def value_text(value: object) -> str:
     """As TOML reads it back, whole."""
     return toml(value, longest=1 << 30)

@@ -18,7 +18,9 @@ from ..arrays import Array
 from ..model.laws import Limit, Role, kept_laws
 
 
-def slip_factor(forces: Array, limit: Any = None, friction: Any = None, each: bool = False) -> float:
+def slip_factor(
+    forces: Array, limit: float | Array | None = None, friction: float | Array | None = None, each: bool = False
+) -> float:
     """Factor on a sticking motion at which the first pair slips; inf when no amplitude makes it slip.
 
     Parameters
@@ -37,8 +39,10 @@ def slip_factor(forces: Array, limit: Any = None, friction: Any = None, each: bo
     mean = forces.mean(axis=0)
     swing = forces - mean
     if forces.shape[1] == 1:
+        assert limit is not None
         tangent, rest, moves, holds = swing, mean, 0.0, np.broadcast_to(limit, mean.shape[1:])
     else:
+        assert friction is not None
         tangent, rest = swing[:, 1:], mean[1:]
         moves, holds = friction * swing[:, 0], friction * mean[0]
     # |rest + s tangent|^2 = (holds + s moves)^2

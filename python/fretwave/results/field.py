@@ -31,7 +31,7 @@ class Field:
         return {"shape": list(self.shape), "axes": {k: list(v) for k, v in self.axes.items()}, "attributes": told_of}
 
     @classmethod
-    def of(cls, described: Any) -> Field:
+    def of(cls, described: list[Any] | Mapping[str, Any]) -> Field:
         """The inverse; journals of earlier versions have a list."""
         if isinstance(described, list):
             shape, unit, long_name = described

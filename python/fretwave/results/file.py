@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,6 +21,10 @@ from ..post.contact_history import MOTION
 from ..texts import display
 from .field import Field
 from .journal import Record, read_records, unfinished
+
+if TYPE_CHECKING:
+    import h5py
+    import numpy.typing as npt
 
 #: Rows of one HDF5 chunk: a branch of usual length allocates no chunk while it grows.
 CHUNK_ROWS = 256
@@ -117,7 +121,7 @@ def attributes_of(given: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, A
     return plain, arrays
 
 
-def build_group(file: Any, name: str, rows: Rows) -> None:
+def build_group(file: h5py.File, name: str, rows: Rows) -> None:
     """Make the group of an analysis from its journal."""
     told_of, arrays = rows.layout.values, rows.layout.arrays
     file.attrs.update(told_of["file_attributes"])
@@ -135,15 +139,21 @@ def build_group(file: Any, name: str, rows: Rows) -> None:
 
 
 def _growing(
-    group: Any, name: str, rows: int, shape: Any, most: int, dtype: Any = "f8", missing: float | None = None
-) -> Any:
+    group: h5py.Group,
+    name: str,
+    rows: int,
+    shape: tuple[int, ...],
+    most: int,
+    dtype: str = "f8",
+    missing: float | None = None,
+) -> h5py.Dataset:
     """A dataset (rows, *shape) that other programs may add to."""
     size = 8 * int(np.prod(shape, dtype=np.int64))
     chunk = (max(1, min(most, CHUNK_BYTES // max(size, 1))), *(max(1, n) for n in shape))
     return group.create_dataset(name, (rows, *shape), dtype, maxshape=(None, *shape), chunks=chunk, fillvalue=missing)
 
 
-def _create_points(group: Any, rows: Rows) -> None:
+def _create_points(group: h5py.Group, rows: Rows) -> None:
     points, columns = group.create_group("points"), rows.columns
     table = list(rows.values())
     first = columns[0]
@@ -161,7 +171,7 @@ def _create_points(group: Any, rows: Rows) -> None:
     points[first.name].make_scale(first.name)
 
 
-def _create_coefficients(group: Any, rows: Rows) -> None:
+def _create_coefficients(group: h5py.Group, rows: Rows) -> None:
     dofs, labels = rows.layout.values["dofs"], rows.layout.values["labels"]
     if not labels:
         return
@@ -171,14 +181,14 @@ def _create_coefficients(group: Any, rows: Rows) -> None:
     name_dimensions(group, data, [rows.columns[0].name, "dof", "harmonic"])
 
 
-def _create_field(group: Any, rows: Rows, name: str, kept: Field) -> None:
+def _create_field(group: h5py.Group, rows: Rows, name: str, kept: Field) -> None:
     data = group.create_dataset(name, (len(rows), *kept.shape), "f8")
     data.attrs.update({"units": kept.unit, "long_name": kept.long_name, **kept.attributes})
     _name_axes(group, kept.axes)
     name_dimensions(group, data, [rows.columns[0].name, *kept.axes])
 
 
-def _name_axes(group: Any, axes: Mapping[str, Sequence[str]]) -> None:
+def _name_axes(group: h5py.Group, axes: Mapping[str, Sequence[str]]) -> None:
     """Coordinates of axes that have names."""
     from h5py import string_dtype
 
@@ -187,7 +197,7 @@ def _name_axes(group: Any, axes: Mapping[str, Sequence[str]]) -> None:
             group.create_dataset(name, data=list(texts), dtype=string_dtype())
 
 
-def _fill(group: Any, rows: Rows) -> None:
+def _fill(group: h5py.Group, rows: Rows) -> None:
     """Arrays of the rows, one after the other."""
     group.create_dataset("reported", data=np.array(rows.reported, "i8"), maxshape=(None,), chunks=(CHUNK_ROWS,))
     group["reported"].make_scale("reported")
@@ -203,7 +213,7 @@ def _fill(group: Any, rows: Rows) -> None:
                 group[name.removeprefix("field/")][row] = values
 
 
-def _put_motion(group: Any, rows: Rows, contact: str, key: str, values: Any, place: int) -> None:
+def _put_motion(group: h5py.Group, rows: Rows, contact: str, key: str, values: npt.NDArray[Any], place: int) -> None:
     holder = group.require_group(f"contact_{contact}")
     if key not in holder:
         unit, long_name, dtype, missing = MOTION[key]
@@ -234,11 +244,11 @@ class NewResults:
                 if size is not None:
                     os.truncate(self._fresh, size)
         self._raw = Unfailing(self._fresh, "r+b" if path.exists() else "w+b")
-        self.file: Any = h5py.File(self._raw, "r+" if path.exists() else "w")
+        self.file: h5py.File = h5py.File(self._raw, "r+" if path.exists() else "w")
         if name in self.file:
             del self.file[name]
 
-    def array(self, group: str, name: str, values: Any, attributes: Mapping[str, Any]) -> None:
+    def array(self, group: str, name: str, values: npt.ArrayLike, attributes: Mapping[str, Any]) -> None:
         """Put a further array into a group."""
         put_array(self.file[group], name, values, attributes)
 
@@ -274,7 +284,7 @@ class NewResults:
 
 
 @contextmanager
-def rewritten(path: Path, name: str) -> Iterator[Any]:
+def rewritten(path: Path, name: str) -> Iterator[h5py.File]:
     """results.h5 to write to, without its group `name`; the new file takes the old one's place at the end."""
     new = NewResults(path, name)
     try:
@@ -287,7 +297,7 @@ def rewritten(path: Path, name: str) -> Iterator[Any]:
 class Results(Mapping[str, Any]):
     """The groups of results.h5 and those that are still in journals, to be read; close it or use ``with``."""
 
-    def __init__(self, file: Any, journals: Mapping[str, Any]) -> None:
+    def __init__(self, file: h5py.File | None, journals: Mapping[str, h5py.File]) -> None:
         self.file, self.journals = file, dict(journals)
 
     @property
@@ -297,7 +307,11 @@ class Results(Mapping[str, Any]):
 
     def __getitem__(self, name: str) -> Any:
         first = name.strip("/").split("/")[0]
-        return self.journals[first][name] if first in self.journals else self.file[name]
+        if first in self.journals:
+            return self.journals[first][name]
+        if self.file is None:
+            raise KeyError(name)
+        return self.file[name]
 
     def __iter__(self) -> Iterator[str]:
         there = [] if self.file is None else [name for name in self.file if name not in self.journals]
@@ -354,7 +368,7 @@ def _open_all(path: Path) -> Results:
     return found
 
 
-def _superseded(rows: Rows, file: Any, name: str) -> bool:
+def _superseded(rows: Rows, file: h5py.File | None, name: str) -> bool:
     """Killed between the writing of results.h5 and the removal of the journal: it is there already."""
     if file is None or name not in file:
         return False
@@ -363,7 +377,7 @@ def _superseded(rows: Rows, file: Any, name: str) -> bool:
     return run is not None and there.get("run_id") == run and there.get("status") in ("done", "stopped")
 
 
-def _in_memory(name: str, rows: Rows) -> Any:
+def _in_memory(name: str, rows: Rows) -> h5py.File:
     import h5py
 
     file = h5py.File(uuid.uuid4().hex, "w", driver="core", backing_store=False)
@@ -371,7 +385,7 @@ def _in_memory(name: str, rows: Rows) -> Any:
     return file
 
 
-def _open_file(path: Path) -> Any:
+def _open_file(path: Path) -> h5py.File:
     import h5py
 
     if not path.exists():

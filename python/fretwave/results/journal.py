@@ -23,7 +23,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 
@@ -99,7 +99,7 @@ def read_records(path: Path) -> Iterator[tuple[int, Record]]:
             place += _HEAD.size + len(body)
 
 
-def _check_torn(file: Any, path: Path, place: int) -> None:
+def _check_torn(file: BinaryIO, path: Path, place: int) -> None:
     """Nothing whole follows what is spoilt at `place`: then it was the last and is torn."""
     file.seek(place + 1)
     rest = file.read()

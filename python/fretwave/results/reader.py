@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -24,6 +24,9 @@ from ..solve.curve import PARTS, Curve
 from ..solve.table import Table as Reading
 from .file import has_results, open_results
 from .slopes import curves_of, read_slopes
+
+if TYPE_CHECKING:
+    import h5py
 
 Table = dict[str, Array]
 
@@ -309,7 +312,7 @@ def motion_of(analysis: Analysis, point: int) -> tuple[Array, Array]:
     return motion(analysis.labels, analysis.coefficients([point])[0], float(beta), float(omega))
 
 
-def _analysis(group: Any, path: Path) -> Analysis:
+def _analysis(group: h5py.Group, path: Path) -> Analysis:
     points = group["points"] if "points" in group else {}
     order = [key for key in COLUMNS if key in points] + [key for key in points if key not in COLUMNS]
     columns = {key: np.asarray(points[key]) for key in order if key != "event"}
@@ -333,15 +336,15 @@ def _analysis(group: Any, path: Path) -> Analysis:
     )
 
 
-def _texts(values: Any) -> list[str]:
+def _texts(values: Iterable[object]) -> list[str]:
     return [str(_text(value)) for value in values]
 
 
-def _text(value: Any) -> Any:
+def _text(value: object) -> Any:
     return value.decode() if isinstance(value, bytes) else value
 
 
-def _attribute(value: Any) -> Any:
+def _attribute(value: object) -> Any:
     """An attribute; lists are kept as JSON."""
     text = _text(value)
     if isinstance(text, str) and text[:1] in ("[", "{"):

@@ -12,7 +12,7 @@ import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,6 +23,10 @@ from ..post.contact_history import MOTION
 from .field import Field
 from .file import NewResults, Rows, attributes_of, build_group, has_results, open_results, rewritten
 from .journal import Journal, Record, journal_path
+
+if TYPE_CHECKING:
+    import h5py
+    import numpy.typing as npt
 
 Motion = Mapping[str, Mapping[str, Any]]
 State = Mapping[str, Any]
@@ -88,7 +92,7 @@ class AnalysisWriter:
         self._new: NewResults | None = None
 
     @property
-    def group(self) -> Any:
+    def group(self) -> h5py.Group:
         """The group of the new results.h5 as it will be (on the writing rank, after the last row)."""
         if self._new is None:
             self._new = NewResults(self.folder / "results.h5", self.name)
@@ -103,7 +107,7 @@ class AnalysisWriter:
     def append(
         self,
         row: Mapping[str, Value],
-        coefficients: Any = None,
+        coefficients: npt.ArrayLike | None = None,
         motions: Motion | None = None,
         state: State | None = None,
         fields: Mapping[str, Any] | None = None,
@@ -138,7 +142,11 @@ class AnalysisWriter:
             self._journal.keep_state(self.rows, state)
 
     def _record(
-        self, row: Mapping[str, Value], coefficients: Any, motions: Motion | None, fields: Mapping[str, Any] | None
+        self,
+        row: Mapping[str, Value],
+        coefficients: npt.ArrayLike | None,
+        motions: Motion | None,
+        fields: Mapping[str, Any] | None,
     ) -> Record:
         values = {column.name: column.loaded(column.stored(row[column.name])[()]) for column in self.columns}
         arrays = {f"field/{name}": np.asarray((fields or {})[name], dtype=float) for name in self.fields}
@@ -184,7 +192,7 @@ class AnalysisWriter:
         with told(path):
             self._table = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CLOEXEC)
 
-    def dataset(self, name: str, values: Any, **attributes: Any) -> None:
+    def dataset(self, name: str, values: npt.ArrayLike, **attributes: Value) -> None:
         """Keep a further array (time histories, peaks) in the group, replacing one of the same name."""
         if not self.active:
             return
@@ -192,7 +200,7 @@ class AnalysisWriter:
         if self._new is not None:
             self._new.array(self.name, name, values, attributes)
 
-    def close(self, status: str, reason: str, **attributes: Any) -> None:
+    def close(self, status: str, reason: str, **attributes: Value) -> None:
         """End the table; `status` is ``done`` or ``stopped``. Without any row nothing is written."""
         if not self.active or not self.rows:
             return

@@ -11,13 +11,16 @@ import uuid
 import zlib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
 from ..files.lock import FolderLock, check_free
 from ..files.whole import replace_text, told, write_all
 from ..texts import display
 from .record import RECORD, read_record, write_record
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
 
 CASE_COPY = "case.toml"
 
@@ -196,7 +199,7 @@ def versions() -> dict[str, str]:
     }
 
 
-def peak_memory_mb(comm: Any) -> dict[str, float]:
+def peak_memory_mb(comm: MPI.Comm) -> dict[str, float]:
     """Largest resident size of a rank and the sum over ranks [MB]. Collective."""
     unit = 1 if sys.platform == "darwin" else 1024
     sizes = comm.allgather(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 1e6)

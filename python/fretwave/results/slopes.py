@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,6 +20,11 @@ from ..solve.curve import Curve
 from ..solve.hermite import Cubic
 from ..solve.table import Table
 from .field import Field
+
+if TYPE_CHECKING:
+    import h5py
+
+    from ..solve.trace import Knot
 
 NAME = "slopes"
 #: Of the step.
@@ -36,7 +41,7 @@ def slope_fields(meaning: State) -> dict[str, Field]:
     return {NAME: Field(shape, "", text, axes, known)}
 
 
-def slopes_of(meaning: State, knot: Any) -> dict[str, Array]:
+def slopes_of(meaning: State, knot: Knot) -> dict[str, Array]:
     """A point's arrays, in physical units."""
     factors = meaning.factors
     return {NAME: factors * np.array([knot.begin, knot.end])[:, : len(factors)]}
@@ -46,7 +51,7 @@ def _physical(meaning: State) -> State:
     return ModalState(meaning.method) if isinstance(meaning, ModalState) else ForcedState(meaning.level)
 
 
-def read_slopes(group: Any) -> tuple[State | None, Array | None]:
+def read_slopes(group: h5py.Group) -> tuple[State | None, Array | None]:
     """What the scalars of an analysis mean, and (n_points, 2, k) derivatives; None without.
 
     A sweep has those of its values one after the other. Results of earlier versions have none.

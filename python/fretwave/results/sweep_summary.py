@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,6 +17,9 @@ from ..post.limit_cycles import limit_cycles
 from ..post.mode_curve import ModeCurve
 from ..post.slip_threshold import slip_threshold
 from ..registry import kind_named
+
+if TYPE_CHECKING:
+    import h5py
 
 #: Damping has set in where this share of its rise to the maximum is reached.
 ONSET = 0.1
@@ -165,7 +168,7 @@ def landmarks(name: str, plan: Plan, rows: Sequence[Row], of: Summary) -> list[s
     return [f"{name}: {labels[row['value']]}{_part(row, of)}: {of.words(row)}" for row in rows]
 
 
-def read_landmarks(name: str, group: Any) -> list[str]:
+def read_landmarks(name: str, group: h5py.Group) -> list[str]:
     """The same from a sweep's group in results.h5."""
     plan = Plan(json.loads(group.attrs["over"]))
     data = {key: values[()] for key, values in group["summary"].items()}

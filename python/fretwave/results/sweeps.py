@@ -17,7 +17,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -28,6 +28,9 @@ from ..post.grid import Plan
 from ..texts import toml
 from .results import has_results, open_results, rewritten
 from .sweep_summary import columns_of, split_of, summarise
+
+if TYPE_CHECKING:
+    import h5py
 
 #: State of the solver: a finished branch has no use for it.
 STATES = ("state_0", "state_1")
@@ -80,7 +83,7 @@ def read_branch(folder: Path, name: str, number: int, run_id: str) -> Branch | N
         return Branch(number, folder, ordered, units, dict(group.attrs), _start_forces(group, table))
 
 
-def _start_forces(group: Any, table: Mapping[str, Any]) -> dict[int, dict[str, Any]]:
+def _start_forces(group: h5py.Group, table: Mapping[str, Any]) -> dict[int, dict[str, Any]]:
     """Forces of the contacts at rows with the event `start`."""
     contacts = [key for key in group if key.startswith("contact_")]
     reported = group["reported"][()] if "reported" in group else ()
@@ -187,21 +190,23 @@ def _shared(branches: Sequence[Branch]) -> dict[str, Any]:
     }
 
 
-def _write_points(group: Any, points: Sequence[tuple[Column, Any]]) -> None:
+def _write_points(group: h5py.Group, points: Sequence[tuple[Column, Any]]) -> None:
     for column, values in points:
         data = group.create_dataset(column.name, data=values)
         data.attrs.update({"units": column.unit, "long_name": column.long_name})
         name_dimensions(group.parent, data, ["row"])
 
 
-def _write_over(group: Any, plan: Plan) -> list[Any]:
+def _write_over(group: h5py.Group, plan: Plan) -> list[h5py.Dataset]:
     for key, values in plan.over.items():
         group.create_dataset(key, data=key_values(values))
         group[key].make_scale(key)
     return [group[key] for key in plan.keys]
 
 
-def _write_summary(group: Any, kind: str, plan: Plan, rows: Sequence[Mapping[str, Any]], scales: Sequence[Any]) -> None:
+def _write_summary(
+    group: h5py.Group, kind: str, plan: Plan, rows: Sequence[Mapping[str, Any]], scales: Sequence[h5py.Dataset]
+) -> None:
     split = split_of(kind)
     parts = sorted({row[split] for row in rows if split in row})
     for scale in scales:
@@ -220,7 +225,7 @@ def _write_summary(group: Any, kind: str, plan: Plan, rows: Sequence[Mapping[str
         name_dimensions(group, data, names)
 
 
-def _copy_branch(branch: Branch, of: str, group: Any) -> None:
+def _copy_branch(branch: Branch, of: str, group: h5py.Group) -> None:
     """Everything but the solver's state; HDF5's copy loses the references of dimension scales."""
     with open_results(branch.folder / "results.h5") as file:
         group.attrs.update(branch.attributes)
@@ -231,13 +236,15 @@ def _copy_branch(branch: Branch, of: str, group: Any) -> None:
         file[of].visititems(lambda key, source: _attach_scales(source, group.get(key), group, file[of].name))
 
 
-def _forget_scales(_: str, item: Any) -> None:
+def _forget_scales(_: str, item: h5py.Group | h5py.Dataset) -> None:
     for name in ("DIMENSION_LIST", "REFERENCE_LIST", "CLASS", "NAME"):
         if name in item.attrs:
             del item.attrs[name]
 
 
-def _attach_scales(source: Any, copy: Any, group: Any, root: str) -> None:
+def _attach_scales(
+    source: h5py.Group | h5py.Dataset, copy: h5py.Group | h5py.Dataset | None, group: h5py.Group, root: str
+) -> None:
     """Give a copy the scales of its source, by their places below the root."""
     from h5py import h5ds
 

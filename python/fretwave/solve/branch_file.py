@@ -5,9 +5,10 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
 from ..columns import COLUMNS, Column
 from ..errors import InputError
@@ -16,13 +17,18 @@ from ..files.whole import replaced
 from ..hb.states import described, state_of
 from .hermite import Cubic
 
-Branch = TypeVar("Branch")
+if TYPE_CHECKING:
+    import h5py
+
+    from .branch import Branch
+
+Made = TypeVar("Made")
 
 #: What the file says it is.
 FORMAT = "fretwave branch 1"
 
 
-def write(branch: Any, path: Path) -> None:
+def write(branch: Branch, path: Path) -> None:
     """Table over `point`, curve over `point`, `piece` and `scalar`; the rest as attributes."""
     import h5py
 
@@ -44,7 +50,7 @@ def write(branch: Any, path: Path) -> None:
         )
 
 
-def read(kind: Callable[..., Branch], path: Path) -> Branch:
+def read(kind: Callable[..., Made], path: Path) -> Made:
     """The branch that `write` wrote, made by `kind`.
 
     Raises
@@ -84,7 +90,7 @@ _BEGIN = Column("slope_begin", "1", "derivative of the scalars by the share of a
 _END = Column("slope_end", "1", "derivative of the scalars by the share of a step, at its end")
 
 
-def _put(file: Any, column: Column, values: Any, dimensions: list[str]) -> None:
+def _put(file: h5py.File, column: Column, values: npt.NDArray[Any], dimensions: list[str]) -> None:
     """A variable on its dimensions, which are made with the first variable that has them."""
     import h5py
 

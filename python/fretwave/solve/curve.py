@@ -86,7 +86,9 @@ class Curve:
             state["phase"] += 2 * math.pi * round((near - state["phase"]) / (2 * math.pi))
         return state
 
-    def _asked(self, value: Any, where: Mapping[str, Any]) -> tuple[str, Array]:
+    def _asked(
+        self, value: float | Sequence[float] | None, where: Mapping[str, float | Sequence[float]]
+    ) -> tuple[str, Array]:
         given = {**({} if value is None else {self.meaning.parameter: value}), **where}
         known = [name for name in self._names if name != "level"]
         if len(given) != 1 or not set(given) <= set(known):

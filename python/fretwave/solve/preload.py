@@ -40,6 +40,8 @@ class StaticPreload(HarmonicProblem):
         Scales the unknowns.
     """
 
+    core: _core.StaticPreload
+
     def __init__(
         self, model: Model, load: Array, reference: LinearMode, constant: Array | None = None, prefix: str = "static_"
     ) -> None:

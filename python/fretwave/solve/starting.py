@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Union
 
 from petsc4py import PETSc
 
@@ -14,6 +14,9 @@ from .steps import StepControl
 
 if TYPE_CHECKING:
     from .continuation import Continuation
+
+    #: A homotopy of the core.
+    Start = Union[_core.ForcedStart, _core.ModeStart]
 
 #: Amplitudes below the first one, each a hundredth of the one before, at which a mode is tried.
 SMALLER = 5
@@ -31,7 +34,7 @@ Follow = Callable[..., Any]
 class Way(HarmonicProblem):
     """The homotopy to a first point as a problem of its own."""
 
-    def __init__(self, problem: HarmonicProblem, core: Any) -> None:
+    def __init__(self, problem: HarmonicProblem, core: Start) -> None:
         super().__init__(problem.model, problem.harmonics, problem.prefix, core)
 
 
@@ -78,12 +81,14 @@ def _raised(
     yield from _led(follow, problem, way, "raising the excitation from zero", reasons)
 
 
-def _closed(follow: Follow, problem: HarmonicProblem, way: Any, reasons: list[str]) -> Iterator[tuple[str, PETSc.Vec]]:
+def _closed(
+    follow: Follow, problem: HarmonicProblem, way: Start, reasons: list[str]
+) -> Iterator[tuple[str, PETSc.Vec]]:
     """Gaps close that were too wide to touch."""
     yield from _led(follow, problem, way, CLOSING, reasons)
 
 
-def mode_start(problem: NonlinearMode, y0: PETSc.Vec) -> Any:
+def mode_start(problem: NonlinearMode, y0: PETSc.Vec) -> _core.ModeStart:
     """The way with closing gaps at the amplitude of y0. Collective."""
     method, amplitude = getattr(_core.Method, problem.method), _parameter(problem, y0)
     re, im = (problem.model.vector(part) for part in (problem.start.shape, problem.start.imaginary))
@@ -94,7 +99,7 @@ def mode_start(problem: NonlinearMode, y0: PETSc.Vec) -> Any:
 
 
 def _led(
-    follow: Follow, problem: HarmonicProblem, core: Any, how: str, reasons: list[str]
+    follow: Follow, problem: HarmonicProblem, core: Start, how: str, reasons: list[str]
 ) -> Iterator[tuple[str, PETSc.Vec]]:
     """The solution at the end of a homotopy: an excitation that is whole (t = 1), or gaps that are no wider (t = 0)."""
     way = Way(problem, core)
@@ -104,7 +109,7 @@ def _led(
     branch = follow(way, core.initial(), stop, control, upwards=not closing, helped=False)
     last, count = _last(branch)
     if branch.converged and last is not None:
-        y = core.response(last) if isinstance(problem, ForcedResponse) else core.mode(last)
+        y = core.response(last) if isinstance(core, _core.ForcedStart) else core.mode(last)
         branch.destroy()
         yield f"by {how} in {count} steps", y
         return

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from ..arrays import Array
 from .hermite import Cubic, derivatives
 from .unknowns import Unknowns
+
+if TYPE_CHECKING:
+    from petsc4py import PETSc
+
+    from ..hb.problems import HarmonicProblem
 
 
 class Knot(NamedTuple):
@@ -32,11 +37,11 @@ class Trace:
         Which measures the steps, and may keep all points.
     """
 
-    def __init__(self, problem: Any, unknowns: Unknowns | None = None) -> None:
+    def __init__(self, problem: HarmonicProblem, unknowns: Unknowns | None = None) -> None:
         self.problem, self.unknowns = problem, unknowns or Unknowns(problem, False)
         self._last: tuple[Array, Array] | None = None
 
-    def add(self, y: Any, tangent: Any) -> Knot:
+    def add(self, y: PETSc.Vec, tangent: PETSc.Vec) -> Knot:
         """The next point, with its unit tangent. Collective."""
         self.unknowns.add(y, tangent)
         z, dz = self.problem.scalars(y), self.problem.scalars(tangent)

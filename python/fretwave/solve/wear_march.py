@@ -41,16 +41,26 @@ class WearMarch(Table):
         Why it ended.
     """
 
-    def __init__(self, columns: Sequence[Column], values: Mapping[str, Any], **attributes: Any) -> None:
+    def __init__(
+        self,
+        columns: Sequence[Column],
+        values: Mapping[str, Any],
+        *,
+        contacts: dict[str, slice],
+        depth: Array,
+        rate: Array,
+        load: Array,
+        areas: Array,
+        cycle_unit: float,
+        converged: bool,
+        reason: str,
+    ) -> None:
         super().__init__(columns, values)
-        self.contacts: dict[str, slice] = attributes["contacts"]
-        self.depth: Array = attributes["depth"]
-        self.rate: Array = attributes["rate"]
-        self.load: Array = attributes["load"]
-        self.areas: Array = attributes["areas"]
-        self.cycle_unit: float = attributes["cycle_unit"]
-        self.converged: bool = attributes["converged"]
-        self.reason: str = attributes["reason"]
+        self.contacts = contacts
+        self.depth, self.rate, self.load = depth, rate, load
+        self.areas = areas
+        self.cycle_unit = cycle_unit
+        self.converged, self.reason = converged, reason
 
     @property
     def volume(self) -> Array:
@@ -128,9 +138,18 @@ def wear(
         names = [problem.model.contacts[k].name for k in mode.contacts]
         contacts, sizes = dict(zip(names, mode.slices)), mode.areas
     depth, rate, load = (np.array(part) for part in zip(*states))
-    ended = {"converged": march.converged, "reason": march.reason, "cycle_unit": unit}
-    told = {"contacts": contacts, "areas": sizes, "depth": depth, "rate": rate, "load": load, **ended}
-    return WearMarch(COLUMNS, {c.name: [row[c.name] for row in rows] for c in COLUMNS}, **told)
+    return WearMarch(
+        COLUMNS,
+        {c.name: [row[c.name] for row in rows] for c in COLUMNS},
+        contacts=contacts,
+        depth=depth,
+        rate=rate,
+        load=load,
+        areas=sizes,
+        cycle_unit=unit,
+        converged=march.converged,
+        reason=march.reason,
+    )
 
 
 def wear_row(problem: HarmonicProblem, point: WearPoint, unit: float) -> dict[str, Any]:

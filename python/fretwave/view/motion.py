@@ -20,7 +20,7 @@ from ..arrays import Array, Indices
 from ..case.load import Case
 from ..errors import InputError
 from ..fe.mesh import VTK_LATTICE
-from ..model.sectors import rotation
+from ..model.sectors import Parts, rotation
 from ..model.structure import Structure
 from ..texts import display
 from .choice import Choice
@@ -28,7 +28,7 @@ from .vtkhdf import HEXAHEDRON, QUADRATIC_HEXAHEDRON, TRIQUADRATIC_HEXAHEDRON, V
 
 #: Displacements (n_nodes, 3, n) of all nodes from columns (n_dof, n) on the model's dofs, both faces of a sector free.
 ToNodes = Callable[[Array], Array]
-Expand = Callable[[Any], Array]
+Expand = Callable[[npt.ArrayLike], Array]
 
 #: Largest displacement as drawn, as a share of the model's size, where no scale is given.
 DRAWN = 0.1
@@ -82,7 +82,7 @@ class Scene:
     choice: Choice
     to_nodes: ToNodes
     sectors: Sequence[int]
-    ties: Any = None
+    ties: Parts | None = None
     around: int = 1
     axis: str = "z"
 
@@ -158,7 +158,7 @@ def scene_of(case: Case, choice: Choice, nodes: Array, sectors: Sequence[int] = 
     """
     neighbours = case.neighbours
     around = neighbours.sectors if neighbours else 1
-    ties: Any = neighbours.ties if neighbours else None
+    ties = neighbours.ties if neighbours else None
     expand: Expand = _unchanged
     with ExitStack() as stack:
         if case.reduction is not None:
@@ -168,7 +168,9 @@ def scene_of(case: Case, choice: Choice, nodes: Array, sectors: Sequence[int] = 
         yield Scene(nodes, choice, _to_nodes(given, len(nodes), expand), shown, ties, around, given.axis or "z")
 
 
-def _expansion(case: Case, choice: Choice, around: int, ties: Any, stack: ExitStack) -> tuple[Expand, Any, int, Array]:
+def _expansion(
+    case: Case, choice: Choice, around: int, ties: Parts | None, stack: ExitStack
+) -> tuple[Expand, Parts | None, int, Array]:
     """Of a reduced model: to all its dofs, ties of sectors, number of coordinates and component frequencies [Hz].
 
     Raises
@@ -229,7 +231,7 @@ def mesh_of(case: Case, linear: bool = False) -> tuple[Array, tuple[Indices, int
     return nodes, (cells, {8: HEXAHEDRON, 20: QUADRATIC_HEXAHEDRON, 27: TRIQUADRATIC_HEXAHEDRON}[cells.shape[1]])
 
 
-def _unchanged(columns: Any) -> Array:
+def _unchanged(columns: npt.ArrayLike) -> Array:
     return np.asarray(columns)
 
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
 
 import h5py
 import numpy as np
@@ -75,7 +74,7 @@ def _placed(case: Case, name: str) -> dict[str, Pairs]:
     return found
 
 
-def _chosen(group: Any, options: ViewOptions, where: str) -> list[Indices]:
+def _chosen(group: h5py.Group, options: ViewOptions, where: str) -> list[Indices]:
     """Rows of the lines whose amplitudes are asked for."""
     number, amplitude = group["points/line"][()], group["points/amplitude"][()]
     lines = [np.flatnonzero(number == k) for k in np.unique(number)]

@@ -15,7 +15,7 @@ from ...case.analysis import AnalysisSection
 from ...case.harmonic import nodal_diameter, with_flow_forces
 from ...case.kept import belongs
 from ...case.load import Case
-from ...columns import Column
+from ...columns import Column, Value
 from ...console import Console
 from ...errors import InputError
 from ...files.csv_table import write_columns
@@ -152,7 +152,7 @@ class AnalysisContext(Generic[Section]):
         self,
         columns: Sequence[str | Column],
         labels: Sequence[str] = (),
-        **attributes: Any,
+        **attributes: Value | None,
     ) -> AnalysisWriter:
         """The table of this analysis; see :class:`fretwave.results.results.AnalysisWriter`.
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...columns import Column
+from ...columns import Column, Value
 from ...errors import InputError, NotConverged
 from ...post.decays import mode_state
 from ...solve.steady import STEPS_PER_PERIOD, Motion, free_motion, start_state
@@ -85,7 +85,7 @@ class Starts:
             self.writer.dataset(f"motion_{number}", history, rows="t [s], x [m], v [m/s]")
         return rows
 
-    def finish(self, lines: list[str], **attributes: Any) -> Outcome:
+    def finish(self, lines: list[str], **attributes: Value) -> Outcome:
         """Close the table."""
         reason = "; ".join(self.stopped) or "all starts integrated"
         self.writer.close("stopped" if self.stopped else "done", reason, **attributes)

@@ -142,7 +142,7 @@ class Source:
             return
         self._override(address.strip(), value, origin)
 
-    def _override(self, address: str, value: Any, origin: str) -> None:
+    def _override(self, address: str, value: object, origin: str) -> None:
         path = self._path(address.split("."), origin)
         if path is None:
             return
@@ -190,7 +190,7 @@ def _part(text: str) -> str | int:
     return int(text) if re.fullmatch("[0-9]{1,9}", text) else text
 
 
-def _step_into(holder: Any, part: str | int, following: str | int) -> Any:
+def _step_into(holder: object, part: str | int, following: str | int) -> Any:
     """The table or array at `part`, made when it is not there."""
     if isinstance(holder, dict):
         return holder.setdefault(part, [] if isinstance(following, int) else {})
