@@ -10,6 +10,7 @@ import h5py
 import numpy as np
 import pytest
 from models.cyclic_models import chain_crossings
+from tolerances import REPEATED, ROUNDING, SOLVED
 
 import fretwave as fw
 from fretwave.analyses import flutter
@@ -100,7 +101,7 @@ def test_every_wave_has_the_limit_cycles_of_the_closed_form(write, shared_tmp, c
     with h5py.File(out / "results.h5") as file:
         points = file["flutter/points"]
         events, zeta = points["event"][()], points["zeta"][()]
-        assert (np.abs(zeta[events == b"zero_damping"]) < 1e-9).all()
+        assert (np.abs(zeta[events == b"zero_damping"]) < SOLVED).all()
 
 
 def test_wave_on_the_whole_wheel_from_the_case_file(write, shared_tmp, comm):
@@ -116,7 +117,7 @@ def test_wave_on_the_whole_wheel_from_the_case_file(write, shared_tmp, comm):
     assert len(whole) == len(alone) == 2
     for one, other in zip(whole, alone):
         for key in ("amplitude", "frequency_hz"):
-            assert float(one[key]) == pytest.approx(float(other[key]), rel=1e-8)
+            assert float(one[key]) == pytest.approx(float(other[key]), rel=REPEATED)
 
 
 @pytest.mark.ranks(1)
@@ -158,7 +159,7 @@ def test_pictures_show_every_wave(write, tmp_path, comm):
     spans = pictures.spans(amplitude, zeta)
     assert [sign for *_, sign in spans] == [-1, 1, -1]
     cycles = [cycle["amplitude"] for cycle in run.attributes["events"] if cycle["nodal_diameter"] == 1]
-    assert [high for _, high, _ in spans[:2]] == pytest.approx(cycles, rel=1e-12)
+    assert [high for _, high, _ in spans[:2]] == pytest.approx(cycles, rel=ROUNDING)
 
 
 @pytest.mark.ranks(1)

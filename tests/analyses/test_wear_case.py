@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from test_built import BUILDER, TEXT
 from test_resume import command, kill_at, without_time
+from tolerances import LAST_DIGITS, REPEATED, ROUNDING
 
 from fretwave.case.load import load_case
 from fretwave.commands.main import main
@@ -61,23 +62,23 @@ def test_table_has_a_line_for_each_amplitude(run: Path) -> None:
     table = rows(run)
     for number, amplitude in enumerate((1.8e-6, 2.1e-6)):
         line = [row for row in table if int(row["line"]) == number]
-        assert [float(row["amplitude"]) for row in line] == pytest.approx([amplitude] * len(line), rel=1e-12)
+        assert [float(row["amplitude"]) for row in line] == pytest.approx([amplitude] * len(line), rel=ROUNDING)
         cycles, worn = (np.array([float(row[key]) for row in line]) for key in ("cycles", "worn_1"))
-        assert cycles[0] == 0 and (np.diff(cycles) > 0).all() and cycles[-1] == pytest.approx(3.0, rel=1e-14)
+        assert cycles[0] == 0 and (np.diff(cycles) > 0).all() and cycles[-1] == pytest.approx(3.0, rel=LAST_DIGITS)
         assert worn[0] == 0 and (np.diff(worn) >= 0).all() and worn[-1] > 0
         assert [row["event"] for row in line if row["event"]] == ["start", "report", "stop"]
-        assert max(abs(float(row["energy_error"])) for row in line) < 1e-8
+        assert max(abs(float(row["energy_error"])) for row in line) < REPEATED
 
 
 def test_arrays_belong_to_the_rows(run: Path) -> None:
     with h5py.File(run / "results.h5") as file:
         wear = file["wear"]
         areas, depth = wear["pairs_pads/area"][()], wear["depth_pads"][()]
-        assert depth @ areas == pytest.approx(wear["points/worn_1"][()], rel=1e-12)
+        assert depth @ areas == pytest.approx(wear["points/worn_1"][()], rel=ROUNDING)
         assert (wear["rate_pads"][()] >= 0).all() and (wear["load_pads"][()] > 0).all()
         assert wear["coefficients"].shape[0] == len(depth) and len(wear["reported"]) == 6
         vibrations = wear["points/cycles"][()] * wear.attrs["cycle_unit"]
-        assert wear["points/vibrations"][()] == pytest.approx(vibrations, rel=1e-12)
+        assert wear["points/vibrations"][()] == pytest.approx(vibrations, rel=ROUNDING)
     assert not list(run.glob(".wear*"))
     assert json.loads((run / "run.json").read_text())["analyses"]["wear"]["status"] == "done"
 

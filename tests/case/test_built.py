@@ -14,6 +14,7 @@ import pytest
 from command_line import call
 from models.chain_case import BUILDER, CHAIN
 from test_resume import command, kill_at, rows, without_time
+from tolerances import LAST_BIT, REPEATED, TIGHT
 
 from fretwave.case.load import load_case
 from fretwave.errors import CaseErrors, InputError
@@ -89,7 +90,7 @@ def test_parameters_come_from_the_case_then_the_builder(write) -> None:
     pads = case.contacts[0]
     assert (pads.n_pairs, pads.components, case.dof("tip")) == (2, 3, 16)
     assert np.array_equal(pads.parameters["normal_stiffness"], [1e7, 2e7])
-    assert np.allclose(pads.parameters["tangential_stiffness"], 2e10 * 2e-4, rtol=1e-15)
+    assert np.allclose(pads.parameters["tangential_stiffness"], 2e10 * 2e-4, rtol=LAST_BIT)
     assert pads.parameters["friction_coefficient"] == 0.4
     assert (case.structure.stiffness_damping, case.structure.mass_damping) == (0.0, 2.0)
     assert case.keep == [0, 1, 2, 15, 16, 17]
@@ -99,7 +100,7 @@ def test_parameters_come_from_the_case_then_the_builder(write) -> None:
 def test_damping_has_shares_of_both_matrices(write) -> None:
     case = load_case(write(), ["model.stiffness_damping=1e-6"])
     wanted = 1e-6 * case.K + 2.0 * case.M
-    assert abs(case.damping_with(()) - wanted).max() <= 1e-15 * abs(wanted).max()
+    assert abs(case.damping_with(()) - wanted).max() <= LAST_BIT * abs(wanted).max()
 
 
 def test_options_reach_the_builder_with_their_types(write) -> None:
@@ -187,7 +188,7 @@ def run(tmp_path_factory) -> Path:
 def test_static_forces_carry_the_weight(run: Path) -> None:
     factor, normal = column(run, "static", "factor"), column(run, "static", "normal_force")
     for value in (0.5, 1.0):
-        assert normal[factor == value].sum() == pytest.approx(30.0 * value, rel=1e-10)
+        assert normal[factor == value].sum() == pytest.approx(30.0 * value, rel=TIGHT)
     assert {row["status"] for row in table(run, "static")} == {"stick"}
     assert np.all(column(run, "static", "gap") == 0)
 
@@ -206,8 +207,8 @@ def test_stuck_part_of_the_mode_is_linear(run: Path) -> None:
     assert abs(stuck / omega - 1) <= max(error["relative"][0] * 1.01, 1e-10)
     stick = column(run, "mode", "stick") == 1
     assert stick.sum() > 2
-    assert np.abs(column(run, "mode", "omega0")[stick] / stuck - 1).max() < 1e-8
-    assert np.abs(column(run, "mode", "beta")[stick] - 1).max() < 1e-8
+    assert np.abs(column(run, "mode", "omega0")[stick] / stuck - 1).max() < REPEATED
+    assert np.abs(column(run, "mode", "beta")[stick] - 1).max() < REPEATED
 
 
 def test_slip_lowers_the_frequency_and_damps(run: Path) -> None:
@@ -262,7 +263,7 @@ def test_all_component_modes_change_nothing(write, tmp_path: Path) -> None:
     assert call("run", str(path), "--out", str(out[1]), "--no-plots") == 0
     for key in ("omega", "zeta"):
         one, other = (np.interp(1e-6, column(o, "mode", "amplitude"), column(o, "mode", key)) for o in out)
-        assert one == pytest.approx(other, rel=1e-8)
+        assert one == pytest.approx(other, rel=REPEATED)
 
 
 def test_two_ranks_give_the_same(run: Path, launch, tmp_path: Path) -> None:
@@ -278,7 +279,7 @@ def test_two_ranks_give_the_same(run: Path, launch, tmp_path: Path) -> None:
 def test_a_changed_builder_is_a_changed_case(write, tmp_path: Path, capsys) -> None:
     path, out = write(), tmp_path / "run"
     assert call("run", str(path), "--only", "static", "--out", str(out), "--set", "model.options.weight=10") == 0
-    assert column(out, "static", "normal_force")[-2:].sum() == pytest.approx(10.0, rel=1e-10)
+    assert column(out, "static", "normal_force")[-2:].sum() == pytest.approx(10.0, rel=TIGHT)
     assert call("resume", str(out)) == 0
     write(("AREA = 4e6, 2e-4", "AREA = 5e6, 2e-4"))
     capsys.readouterr()

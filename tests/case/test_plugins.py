@@ -14,6 +14,7 @@ from command_line import call
 from models import three_pads
 from models.three_pads import CONTACT, FRICTION, LIFTED, SPRINGS
 from models.vtkhdf_files import read_step
+from tolerances import SOLVED
 
 from fretwave import registry
 from fretwave.case import plugins
@@ -121,7 +122,7 @@ def expected(frequency: float) -> complex:
 def test_an_analysis_of_one_file_is_right_in_its_table(run: Path) -> None:
     table = Run(run).table("line")
     assert table["frequency_hz"].tolist() == FREQUENCIES
-    assert table["amplitude"] == pytest.approx([abs(expected(f)) for f in FREQUENCIES], rel=1e-9)
+    assert table["amplitude"] == pytest.approx([abs(expected(f)) for f in FREQUENCIES], rel=SOLVED)
     assert "rest, line, mode" in (run / "run.log").read_text().splitlines()[1], "after the analysis that it needs"
     assert "line: 3 frequencies, 3 pairs at rest" in (run / "run.log").read_text()
 
@@ -137,7 +138,7 @@ def test_its_figure_has_the_table_s_values(run: Path) -> None:
     call("plot", run, "--only", "none_of_them")  # knows the plug-ins from then on
     figures = dict(registry.kinds()["receptance"].figures(Run(run)))
     (line,) = figures["line_receptance"].axes[0].get_lines()
-    assert line.get_xydata()[:, 1] == pytest.approx([abs(expected(f)) for f in FREQUENCIES], rel=1e-9)
+    assert line.get_xydata()[:, 1] == pytest.approx([abs(expected(f)) for f in FREQUENCIES], rel=SOLVED)
 
 
 def test_an_analysis_of_one_file_is_right_in_the_view(run: Path) -> None:
@@ -146,8 +147,8 @@ def test_an_analysis_of_one_file_is_right_in_the_view(run: Path) -> None:
     for phase in range(4):
         moved = read_step(run / "line.vtkhdf", phase)["displacement"]
         x = (expected(FREQUENCIES[2]) * np.exp(1j * phase * np.pi / 2)).real
-        assert moved[0, 1] == pytest.approx(x, rel=1e-9)
-        assert np.abs(np.delete(moved.ravel(), 1)).max() <= 1e-9 * abs(x)
+        assert moved[0, 1] == pytest.approx(x, rel=SOLVED)
+        assert np.abs(np.delete(moved.ravel(), 1)).max() <= SOLVED * abs(x)
 
 
 def test_a_law_of_one_file_is_right_in_table_picture_and_view(run: Path) -> None:
@@ -155,7 +156,7 @@ def test_a_law_of_one_file_is_right_in_table_picture_and_view(run: Path) -> None
     words = ["stick", "slip", "open"]
     table = Run(run).table("rest")
     assert table["status"].tolist() == words
-    assert table["gap"] == pytest.approx([0.0, 0.0, LIFTED], rel=1e-9, abs=1e-18)
+    assert table["gap"] == pytest.approx([0.0, 0.0, LIFTED], rel=SOLVED, abs=1e-18)
     assert (run / "mode_map_pads.png").exists()
     assert call("view", run, "--analysis", "mode", "--phases", "4") == 0
     for phase in range(4):
@@ -186,7 +187,7 @@ def test_two_ranks_know_the_plugins(tmp_path, launch) -> None:
     put(tmp_path)
     run = launch(2, "-m", "fretwave", "run", str(tmp_path / "case.toml"), "--out", str(tmp_path / "run"), timeout=300)
     assert run.returncode == 0, run.stderr
-    assert Run(tmp_path / "run").table("line")["amplitude"][1] == pytest.approx(abs(expected(100.0)), rel=1e-9)
+    assert Run(tmp_path / "run").table("line")["amplitude"][1] == pytest.approx(abs(expected(100.0)), rel=SOLVED)
     assert Run(tmp_path / "run").table("rest")["status"].tolist() == ["stick", "slip", "open"]
 
 
@@ -221,7 +222,7 @@ def test_a_plugin_s_analysis_is_swept(tmp_path) -> None:
     with h5py.File(tmp_path / "run" / "results.h5") as file:
         points, amplitude = file["losses/summary/points"][()], file["losses/points/amplitude"][()]
     assert points.tolist() == [3, 3]
-    assert amplitude[:3] == pytest.approx([abs(expected(f)) for f in FREQUENCIES], rel=1e-9)
+    assert amplitude[:3] == pytest.approx([abs(expected(f)) for f in FREQUENCIES], rel=SOLVED)
     assert (amplitude[3:] < amplitude[:3]).all()
 
 

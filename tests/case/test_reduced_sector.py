@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from command_line import call
 from models.rubbing_sector import BUILDER, SECTOR
+from tolerances import REPEATED, SOLVED
 
 import fretwave as fw
 from fretwave.case.build import build_model
@@ -61,7 +62,7 @@ def test_a_reduction_that_leaves_nothing_out_changes_nothing(tmp_path):
     ]
     assert len(picked[0]) == 2 and picked[0][1]["slip"] > 0.1
     for a, b in zip(*picked):
-        assert b["omega"] == pytest.approx(a["omega"], rel=1e-8)
+        assert b["omega"] == pytest.approx(a["omega"], rel=REPEATED)
         assert b["beta"] == pytest.approx(a["beta"], rel=1e-6)
 
 
@@ -109,7 +110,7 @@ def test_the_wheel_of_a_reduced_sector(shared_tmp, comm):
     with build_model(around, (), comm) as model:
         found = np.array([mode.omega for mode in fw.linear_modes(model, 8, "free")])
     assert len(around.dofs) == 6 * len(case.dofs) and "tip@5" in around.dofs
-    assert np.abs(found / (tuned * np.sqrt(1.1)) - 1).min() < 1e-9
+    assert np.abs(found / (tuned * np.sqrt(1.1)) - 1).min() < SOLVED
 
 
 #: (text in the case, its replacement, what is said)

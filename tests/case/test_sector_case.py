@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from models.cyclic_models import MASSES, NEIGHBOUR, blisk_stiffness, lumped_blisk
+from tolerances import TIGHT
 
 import fretwave as fw
 from fretwave.case.build import build_model
@@ -90,8 +91,8 @@ def test_model_of_the_case_is_that_of_the_sector(write, tmp_path, comm):
     for state in ("stuck", "linearised"):
         with build_model(case, (), comm, nodal_diameter=-4) as a, expected.model(-4, comm) as b:
             for found, wanted in zip(fw.linear_modes(a, 3, state), fw.linear_modes(b, 3, state)):
-                assert found.omega == pytest.approx(wanted.omega, rel=1e-10)
-                assert found.beta == pytest.approx(wanted.beta, abs=1e-10 * wanted.omega)
+                assert found.omega == pytest.approx(wanted.omega, rel=TIGHT)
+                assert found.beta == pytest.approx(wanted.beta, abs=TIGHT * wanted.omega)
                 assert np.allclose(found.shape + 1j * found.imaginary, wanted.shape + 1j * wanted.imaginary, atol=1e-7)
 
 

@@ -14,6 +14,7 @@ from models.core_models import dense, unknowns, whole
 from models.cyclic_models import BLADE_1, BLADE_2, MASSES, NEIGHBOUR, blisk_stiffness
 from mpi4py import MPI
 from petsc4py import PETSc
+from tolerances import LAST_BIT, LAST_DIGITS, REPEATED, ROUNDING, SOLVED, TIGHT
 
 import fretwave as fw
 from fretwave.analyses.parts.context import AnalysisContext
@@ -133,10 +134,10 @@ def test_tuned_wheel_follows_its_sector(comm, tmp_path):
     omega = found["sector"]["omega"][0]
     for name in ("wheel", "backward"):
         for key in ("omega", "beta"):
-            assert at_reports(found[name], key) == pytest.approx(at_reports(found["sector"], key), abs=1e-8 * omega)
-        assert len(at_reports(found[name], "omega")) == 2 and found[name]["unfolding"].max() < 1e-12
+            assert at_reports(found[name], key) == pytest.approx(at_reports(found["sector"], key), abs=REPEATED * omega)
+        assert len(at_reports(found[name], "omega")) == 2 and found[name]["unfolding"].max() < ROUNDING
         for key in ("participation", "diameters_share", "amplification"):
-            assert found[name][key][0] == pytest.approx(1.0, abs=1e-9)
+            assert found[name][key][0] == pytest.approx(1.0, abs=SOLVED)
     assert set(found["wheel"]["diameters"]) == {2} and set(found["backward"]["diameters"]) == {-2}
     assert max(found["wheel"]["zeta"]) > 1e-3 and min(found["wheel"]["stick"]) < 0.5
     record = json.loads((out / "run.json").read_text())["analyses"]["wheel"]["wheel"]
@@ -151,7 +152,7 @@ def test_every_point_of_the_wheel_lies_on_the_branch_of_its_sector(comm, tmp_pat
     sector = run(comm, tmp_path, f"sector.report_at={inside}", sector="nodal_diameter = 2")[0]["sector"]
     for a, omega, beta in zip(*(wheel[key] for key in ("amplitude", "omega", "beta"))):
         apart = np.maximum(np.abs(sector["omega"] - omega), np.abs(sector["beta"] - beta)) / omega
-        assert apart[np.isclose(sector["amplitude"], a, rtol=1e-12)].min() < 1e-8
+        assert apart[np.isclose(sector["amplitude"], a, rtol=ROUNDING)].min() < REPEATED
 
 
 @pytest.mark.ranks(1)
@@ -161,10 +162,10 @@ def test_standing_wave_is_free_of_its_unfolding(comm, tmp_path):
     standing, waves = found["standing"], table(out / "standing_diameters.csv")
     assert standing["unfolding"].max() < 1e-11 and max(standing["zeta"]) > 1e-3
     assert set(standing["largest_sector"]) == {1}  # and 4, as large
-    assert standing["participation"][0] == pytest.approx(2 / 3, rel=1e-9)
-    assert standing["amplification"][0] == pytest.approx(np.sqrt(2), rel=1e-9)
+    assert standing["participation"][0] == pytest.approx(2 / 3, rel=SOLVED)
+    assert standing["amplification"][0] == pytest.approx(np.sqrt(2), rel=SOLVED)
     forward, backward = (waves["share"][waves["nodal_diameter"] == k] for k in (2, -2))
-    assert forward == pytest.approx(backward, rel=1e-9) and forward.min() > 0.49
+    assert forward == pytest.approx(backward, rel=SOLVED) and forward.min() > 0.49
 
 
 @pytest.mark.ranks(2, 3, 4)
@@ -174,7 +175,7 @@ def test_mistuned_branch_is_the_same_on_any_number_of_ranks(comm, tmp_path):
     alone = comm.bcast(alone)
     assert at_reports(alone, "omega").size == 2 and max(alone["zeta"]) > 1e-3
     for key in ("omega", "beta"):
-        assert at_reports(found, key) == pytest.approx(at_reports(alone, key), abs=1e-8 * alone["omega"][0])
+        assert at_reports(found, key) == pytest.approx(at_reports(alone, key), abs=REPEATED * alone["omega"][0])
     for key in ("amplification", "participation", "diameters_share"):
         assert at_reports(found, key) == pytest.approx(at_reports(alone, key), rel=1e-7)
 
@@ -187,17 +188,17 @@ def test_mistuned_branch_starts_from_the_mode_most_like_the_wave(comm, tmp_path)
     own = scipy.linalg.eigh(sector_stiffness(2), np.diag(MASSES))[1][:, 0]
     pair = np.kron(np.exp(-4j * np.pi * np.arange(N) / N), own) / np.sqrt(N)
     chosen = int(np.argmax(np.abs(pair.conj() @ np.kron(np.eye(N), np.diag(MASSES)) @ shapes)))
-    assert found["mode"]["omega"][0] == pytest.approx(omega[chosen], rel=1e-10)
+    assert found["mode"]["omega"][0] == pytest.approx(omega[chosen], rel=TIGHT)
     assert found["mode"]["stick"][0] == 1
     with h5py.File(out / "results.h5", "r") as file:
         group = file["mode"]
         q, place = group["coefficients"][0][:, 0], [t.decode() for t in group["dof"]].index(group.attrs["normalise"])
-    assert q == pytest.approx(1e-5 * shapes[:, chosen] / shapes[place, chosen], abs=1e-12)
+    assert q == pytest.approx(1e-5 * shapes[:, chosen] / shapes[place, chosen], abs=ROUNDING)
     blades = np.abs(shapes[2::3, chosen])
     assert place == 3 * np.argmax(blades) + 2
-    assert found["mode"]["participation"][0] == pytest.approx(participation(blades), rel=1e-8)
+    assert found["mode"]["participation"][0] == pytest.approx(participation(blades), rel=REPEATED)
     tip = abs(own[2]) / np.sqrt(N)
-    assert found["mode"]["amplification"][0] == pytest.approx(blades.max() / tip, rel=1e-8)
+    assert found["mode"]["amplification"][0] == pytest.approx(blades.max() / tip, rel=REPEATED)
 
 
 @pytest.mark.ranks(1)
@@ -234,7 +235,7 @@ def test_modes_of_a_mistuned_wheel_by_number(comm, tmp_path):
     expected = dense_wheel(deviations_of(load_case(tmp_path / "case.toml").analyses["m1"].mistuning, N))[0]
     for name in numbered:
         assert table(tmp_path / "out" / f"{name}.csv")["omega"][0] == pytest.approx(
-            expected[int(name[1:]) - 1], rel=1e-9
+            expected[int(name[1:]) - 1], rel=SOLVED
         )
 
 
@@ -265,7 +266,7 @@ def test_stiffness_of_a_mistuned_wheel(comm, tmp_path):
     for j, d in enumerate(delta):
         places = [3 * j, 3 * j + 1, 3 * j + 2, 3 * ((j + 1) % N)]
         expected[np.ix_(places, places)] += (1 + d) * STIFFNESS
-    assert np.allclose(case.K.toarray(), expected, rtol=1e-14, atol=1e-6)
+    assert np.allclose(case.K.toarray(), expected, rtol=LAST_DIGITS, atol=1e-6)
     assert case.dofs[3:6] == ["disk@1", "blade@1", "tip@1"] and case.places("tip") == list(range(2, 18, 3))
     damper = type("D", (), {"dof": "tip", "c": 2.0})
     assert case.damping_with([damper]).diagonal().tolist() == [0, 0, 2.0] * N
@@ -284,7 +285,7 @@ def test_measures_of_a_shape():
     j = np.arange(12)
     for diameters in (3, -3):
         content = np.abs(wave_content(2.0 * np.exp(-2j * np.pi * diameters * j / 12)))
-        assert content[diameters] == pytest.approx(2.0) and np.delete(content, diameters).max() < 1e-15
+        assert content[diameters] == pytest.approx(2.0) and np.delete(content, diameters).max() < LAST_BIT
     assert participation(np.exp(1j * j)) == pytest.approx(1.0)
     assert participation(np.cos(2 * np.pi * j / 12) + 0j) == pytest.approx(2 / 3)
     assert participation((j == 4) + 0j) == pytest.approx(1 / 12)
@@ -295,7 +296,7 @@ def test_measures_of_a_shape():
 def test_no_phase_jumps_where_sectors_move_against_each_other():
     """On either side of the cut by rounding, or exactly on it."""
     a = -np.exp(1j * np.array([-1e-15, 0.0, 1e-15, 0.5, -0.5]))
-    assert phases(a) == pytest.approx(np.pi + np.array([0.0, 0.0, 0.0, 0.5 - 2.0 * np.pi, -0.5]), abs=1e-14)
+    assert phases(a) == pytest.approx(np.pi + np.array([0.0, 0.0, 0.0, 0.5 - 2.0 * np.pi, -0.5]), abs=LAST_DIGITS)
     assert phases(np.array([1.0, 1j, -1j])) == pytest.approx([0.0, np.pi / 2.0, -np.pi / 2.0])
 
 
@@ -332,10 +333,10 @@ def test_pictures_show_the_tables(comm, tmp_path):
     left, right = (figure.axes[k].patches for k in (0, 1))
     first = sectors["sector_amplitude"][sectors["point"] == 0]
     heights = np.array([bar.get_height() for bar in left])
-    assert heights / heights.max() == pytest.approx(first / first.max(), rel=1e-9)
-    assert heights.max() == pytest.approx(table(out / "mode.csv")["amplification"][0], rel=1e-9)
+    assert heights / heights.max() == pytest.approx(first / first.max(), rel=SOLVED)
+    assert heights.max() == pytest.approx(table(out / "mode.csv")["amplification"][0], rel=SOLVED)
     shares = waves["share"][waves["point"] == 0]
-    assert [bar.get_height() for bar in right] == pytest.approx(list(shares), abs=1e-12)
+    assert [bar.get_height() for bar in right] == pytest.approx(list(shares), abs=ROUNDING)
 
 
 #: (keys of the analysis, what is said)
@@ -392,7 +393,7 @@ def test_committed_wheel_lies_on_the_branch_of_its_sector(comm, tmp_path):
             branch = fw.Continuation(problem, unknowns(problem, y), (0.5 * a, 2 * a))
             point = next(iter(branch))
             state, slope = problem.state(point.y), min(1.0, abs(whole(point.tangent)[-1]))  # 0 at a fold
-            assert state["amplitude"] == pytest.approx(a, rel=1e-12)
-            assert state["omega"] == pytest.approx(omega, rel=1e-8 / slope)
-            assert state["beta"] == pytest.approx(beta, abs=1e-8 * omega / slope)
+            assert state["amplitude"] == pytest.approx(a, rel=ROUNDING)
+            assert state["omega"] == pytest.approx(omega, rel=REPEATED / slope)
+            assert state["beta"] == pytest.approx(beta, abs=REPEATED * omega / slope)
     assert len(coefficients) > 20 and wheel["unfolding"].max() < 1e-11 and max(wheel["zeta"]) > 5e-3

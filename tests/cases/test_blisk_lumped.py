@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import scipy.linalg
 from models.core_models import solve_at, states
+from tolerances import ROUNDING, SOLVED
 
 import fretwave as fw
 
@@ -86,7 +87,7 @@ def test_inertia_of_the_ring_outweighs_its_stiffness(case, comm):
     options = case.Options()
     problem, stuck = wave(case, comm)
     free = fw.linear_modes(problem.model, 4, "free")
-    assert free[1].frequency_hz == pytest.approx(options.ring_omega / (2 * np.pi), rel=1e-9)
+    assert free[1].frequency_hz == pytest.approx(options.ring_omega / (2 * np.pi), rel=SOLVED)
     assert options.ring_omega / (2 * np.pi) == pytest.approx(437.145, rel=1e-5)
     assert case.ring_stiffness(options, stuck.omega, DIAMETERS) == pytest.approx(-1.126e6, rel=1e-3)
     assert stuck.frequency_hz == pytest.approx(1031.644, rel=1e-6)
@@ -106,10 +107,10 @@ def test_trends_of_the_paper(case, comm, method):
     omega, zeta = (np.array([p[key] for p in points]) for key in ("omega", "zeta"))
     bottom, peak = int(np.argmin(omega)), int(np.argmax(zeta))
     assert 0 < bottom < peak < len(points) - 1
-    assert omega[bottom] < stuck.omega * (1 - 2e-4) and (np.diff(omega[: bottom + 1]) <= 1e-9 * omega[0]).all()
+    assert omega[bottom] < stuck.omega * (1 - 2e-4) and (np.diff(omega[: bottom + 1]) <= SOLVED * omega[0]).all()
     assert (np.diff(omega[bottom : peak + 1]) > 0).all()
     assert omega[-1] == pytest.approx(free.omega, rel=2e-5)
-    assert zeta[0] == pytest.approx(0, abs=1e-12) and 7.5e-3 < zeta[peak] < 8e-3 and zeta[-1] < 1e-4
+    assert zeta[0] == pytest.approx(0, abs=ROUNDING) and 7.5e-3 < zeta[peak] < 8e-3 and zeta[-1] < 1e-4
 
 
 @pytest.mark.ranks(1)
@@ -121,7 +122,7 @@ def test_friction_scales_amplitudes_and_nothing_else(case, comm):
         problem = fw.NonlinearMode(model, fw.Harmonics((1, 3), 480), "CNM", 0, fw.linear_modes(model, FAMILY)[-1])
         points = states(problem, 5e-4 * mu, (5e-4 * mu, 5e-3 * mu), [1e-3 * mu, 3e-3 * mu])
         found.append([p[key] for p in points for key in ("omega", "zeta")])
-    assert found[1] == pytest.approx(found[0], rel=1e-9) and found[2] == pytest.approx(found[0], rel=1e-9)
+    assert found[1] == pytest.approx(found[0], rel=SOLVED) and found[2] == pytest.approx(found[0], rel=SOLVED)
 
 
 @pytest.mark.ranks(1)
@@ -130,7 +131,7 @@ def test_forward_and_backward_waves_are_alike_without_rotation(case, comm):
     for diameters in (DIAMETERS, -DIAMETERS, case.SECTORS - DIAMETERS):
         problem, _ = wave(case, comm, (1, 3), diameters=diameters)
         found.append(list(problem.state(reported(problem, 1e-4, [3e-4])[0]).values()))
-    assert found[1] == pytest.approx(found[0], rel=1e-9) and found[2] == pytest.approx(found[0], rel=1e-9)
+    assert found[1] == pytest.approx(found[0], rel=SOLVED) and found[2] == pytest.approx(found[0], rel=SOLVED)
 
 
 def test_the_full_wheel_follows_the_branch_of_one_sector(case, comm):
@@ -145,7 +146,7 @@ def test_the_full_wheel_follows_the_branch_of_one_sector(case, comm):
             expected, found = one.state(a), around.state(b)
             for key in ("omega", "beta"):
                 assert found[key] == pytest.approx(expected[key], abs=1e-11 * expected["omega"])
-            assert np.abs(around.unfolding(b)).max() < 1e-12
+            assert np.abs(around.unfolding(b)).max() < ROUNDING
 
 
 def printed(launch, script: str) -> list[list[float]]:

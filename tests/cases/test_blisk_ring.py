@@ -12,6 +12,7 @@ import pytest
 import scipy.linalg
 from models.core_models import unknowns, whole
 from test_cyclic import on_the_wheel
+from tolerances import LAST_BIT, REPEATED, ROUNDING, SOLVED, TIGHT
 
 import fretwave as fw
 from fretwave.cyclic.faces import rotation
@@ -103,7 +104,7 @@ def test_the_low_face_turned_is_the_high_face(blisk):
     nodes = blisk["coordinates"][blisk["free"]]
     low, high = (nodes[blisk[name][::3] // 3] for name in ("low", "high"))
     assert len(low) > 50
-    assert np.allclose(low @ rotation(2 * np.pi / 36, "z").T, high, rtol=0, atol=1e-12)
+    assert np.allclose(low @ rotation(2 * np.pi / 36, "z").T, high, rtol=0, atol=ROUNDING)
 
 
 def test_masses_rigid_motions_and_normal_load(blisk):
@@ -113,10 +114,10 @@ def test_masses_rigid_motions_and_normal_load(blisk):
     area = np.pi / 36 * (outer**2 - (outer - o.ring_height) ** 2)
     assert blisk["ring_mass"] == pytest.approx(o.ring_density * area * width, rel=1e-6)
     assert blisk["areas"].sum() == pytest.approx(2 * np.pi / 36 * outer * width, rel=1e-5)
-    assert blisk["rigid_residual"].max() < 1e-12
+    assert blisk["rigid_residual"].max() < ROUNDING
     load = case.contact_parameters(o, blisk)["normal_load"]
     expected = blisk["ring_mass"] * (outer - o.ring_height / 2) * (3000 * np.pi / 30) ** 2
-    assert load.sum() == pytest.approx(expected, rel=1e-12)
+    assert load.sum() == pytest.approx(expected, rel=ROUNDING)
 
 
 def test_pairs_measure_the_ring_against_the_groove(blisk):
@@ -126,13 +127,13 @@ def test_pairs_measure_the_ring_against_the_groove(blisk):
     radial /= np.linalg.norm(radial, axis=1)[:, None]
     u = (blisk["B"] @ (radial * ring[:, None]).ravel()).reshape(-1, 3)
     assert np.allclose(u, [1.0, 0.0, 0.0], rtol=0, atol=1e-2)  # the normal is the mean over a cell
-    assert np.allclose(blisk["B"] @ radial.ravel(), 0.0, rtol=0, atol=1e-12)
+    assert np.allclose(blisk["B"] @ radial.ravel(), 0.0, rtol=0, atol=ROUNDING)
 
 
 def test_frequencies_do_not_depend_on_the_waves_direction(sector):
     with sector.model(DIAMETERS) as forward, sector.model(-DIAMETERS) as backward:
         found = [[mode.omega for mode in fw.linear_modes(model, 5)] for model in (forward, backward)]
-    assert found[0] == pytest.approx(found[1], rel=1e-9)
+    assert found[0] == pytest.approx(found[1], rel=SOLVED)
 
 
 @pytest.mark.parametrize("state", ["stuck", "free"])
@@ -147,9 +148,9 @@ def test_waves_of_all_nodal_diameters_are_the_modes_of_the_wheel(sector, state):
     expected = np.sort(waves)[:14]
     held = expected < 2 * case.checked_options(SMALL).ring_hold
     assert np.count_nonzero(held) == (2 if state == "free" else 0)  # axial shift and rotation
-    assert modes[~held] == pytest.approx(expected[~held], rel=1e-9)
+    assert modes[~held] == pytest.approx(expected[~held], rel=SOLVED)
     highest = scipy.linalg.eigvalsh(sector.K[0].toarray(), sector.M[0].toarray())[-1]
-    assert modes[held] ** 2 == pytest.approx(expected[held] ** 2, rel=0, abs=1e-15 * highest)
+    assert modes[held] ** 2 == pytest.approx(expected[held] ** 2, rel=0, abs=LAST_BIT * highest)
 
 
 def test_the_reduction_keeps_the_lowest_waves(small, sector):
@@ -173,12 +174,12 @@ def test_a_slipping_wave_of_the_sector_solves_the_wheel(small, sector):
         branch = fw.Continuation(one, one.initial(5e-6), (5e-6, 1e-3), report_at=amplitudes)
         points = [point for point in branch if point.event == "report"]
         assert branch.converged and len(points) == 2, branch.reason
-        assert one.state(points[0].y)["zeta"] < 1e-9 < 1e-5 < one.state(points[1].y)["zeta"]
+        assert one.state(points[0].y)["zeta"] < SOLVED < 1e-5 < one.state(points[1].y)["zeta"]
         shape = sector.wave(stuck.shape + 1j * stuck.imaginary, DIAMETERS).ravel()
         around = fw.NonlinearMode(wheel, harmonics, "CNM", tip, fw.LinearMode(stuck.omega, 0, shape.real, shape.imag))
         for point in points:
             r = whole(around.residual(unknowns(around, on_the_wheel(sector, DIAMETERS, one, point.y, orders))))
-            assert np.abs(r).max() < 1e-8
+            assert np.abs(r).max() < REPEATED
 
 
 def test_friction_scales_amplitude(small):
@@ -197,7 +198,7 @@ def test_friction_scales_amplitude(small):
             )
             found += [mode.state(point.y) for point in branch if point.event == "report"]
     assert len(found) == 2
-    assert found[1]["omega"] == pytest.approx(found[0]["omega"], rel=1e-10)
+    assert found[1]["omega"] == pytest.approx(found[0]["omega"], rel=TIGHT)
     assert found[1]["zeta"] == pytest.approx(found[0]["zeta"], rel=1e-7)
 
 
@@ -211,7 +212,7 @@ def test_the_papers_picture_with_variable_load(quick):
         stuck, table = branch_of(quick, friction)
         hz, zeta = (np.array([row[key] for row in table]) for key in ("frequency_hz", "zeta"))
         lowest, largest = int(np.argmin(hz)), int(np.argmax(zeta))
-        assert table[0]["stick"] == 1 and zeta[0] < 1e-9 and hz[0] == pytest.approx(stuck, rel=1e-9)
+        assert table[0]["stick"] == 1 and zeta[0] < SOLVED and hz[0] == pytest.approx(stuck, rel=SOLVED)
         assert hz[lowest] < stuck - 5 and stuck + 20 < hz[-1] and lowest < largest < len(table) - 1
         assert zeta[largest] > 4e-3 and zeta[-1] < 0.95 * zeta[largest]
         amplitude = np.array([row["amplitude"] for row in table])
@@ -245,7 +246,7 @@ def test_the_second_bending_has_one_node_along_the_span(blisk):
     frequencies, shapes, _ = case.blade_modes(blisk)
     M = blisk["M"][dofs][:, dofs]
     assert frequencies[0] < frequency < frequencies[-1]
-    assert abs(shapes[:, 0] @ M @ shape) < 1e-8
+    assert abs(shapes[:, 0] @ M @ shape) < REPEATED
 
 
 def test_unknown_options_are_refused():

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tolerances import ROUNDING
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "cases"))
 
@@ -48,21 +49,21 @@ def test_coulomb_in_three_dimensions_on_a_straight_path_is_a_jenkins_element():
     p = {k: np.array([v]) for k, v in PAD.items()}
     f = laws.coulomb_3d(u, p, np.zeros((2, 1)))
     line = laws.jenkins((3 * np.cos(TAU)).reshape(-1, 1, 1).astype(complex), SLIDER, np.zeros((1, 1)))
-    np.testing.assert_allclose(f[:, 1:, 0], line[:, 0] * [0.6, 0.8], atol=1e-12)
+    np.testing.assert_allclose(f[:, 1:, 0], line[:, 0] * [0.6, 0.8], atol=ROUNDING)
 
 
 def test_a_pad_that_lifts_off_has_no_force_and_reaches_the_unilateral_spring():
     u = np.zeros((1024, 3, 1), complex)
     u[:, 0, 0] = 3 * np.cos(TAU)
     f = laws.coulomb_3d(u, {k: np.array([v]) for k, v in PAD.items()}, np.zeros((2, 1)))
-    np.testing.assert_allclose(f[:, 0, 0], np.maximum(0, 2 + 6 * np.cos(TAU)), atol=1e-12)
+    np.testing.assert_allclose(f[:, 0, 0], np.maximum(0, 2 + 6 * np.cos(TAU)), atol=ROUNDING)
 
 
 def test_a_slider_in_shakedown_rests_on_the_point_nearest_to_its_start():
     centres = np.array([[1.0, 0.0], [0.0, 1.0], [0.5, 0.5]])
     at = laws.nearest_common(centres, np.array([0.9, 0.9, 5.0]), np.zeros(2))
     gap = np.linalg.norm(at - centres[:2], axis=1)
-    np.testing.assert_allclose(gap, 0.9, atol=1e-12)
+    np.testing.assert_allclose(gap, 0.9, atol=ROUNDING)
     assert np.linalg.norm(at) < np.linalg.norm([0.5, 0.5])
 
 

@@ -9,6 +9,7 @@ import pytest
 from models.core_models import unknowns, whole
 from models.cyclic_models import rich_sector
 from petsc4py import PETSc
+from tolerances import REPEATED
 
 import fretwave as fw
 from fretwave import _core
@@ -74,7 +75,7 @@ def test_a_wheel_whose_contact_does_not_repeat_falls_back(comm, rubbing, dof_of)
             newton.system.close(row, np.log(0.4))
             assert newton.solve(y)[0]
             found[route] = whole(y)
-    assert np.allclose(found["krylov"], found["direct"], rtol=0, atol=1e-8)
+    assert np.allclose(found["krylov"], found["direct"], rtol=0, atol=REPEATED)
 
 
 def test_a_wheel_that_repeats_is_dealt_with_by_its_waves(comm):

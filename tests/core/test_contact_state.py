@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from models.core_models import chain, unknowns, whole
+from tolerances import LAST_BIT, REPEATED, ROUNDING, SOLVED
 
 import fretwave as fw
 
@@ -53,7 +54,7 @@ def test_derivative_where_a_slider_comes_back_to_its_rest_after_lift_off(comm, l
     step = 1e-6
     expected = (residual(problem, y + step * dy) - residual(problem, y - step * dy)) / (2 * step)
     assert problem.diagnostics(unknowns(problem, y))["open"] > 0.1
-    assert np.allclose(product(problem, y, dy), expected, rtol=0, atol=1e-9 * np.abs(expected).max())
+    assert np.allclose(product(problem, y, dy), expected, rtol=0, atol=SOLVED * np.abs(expected).max())
 
 
 @pytest.mark.parametrize("law", LAWS)
@@ -65,7 +66,7 @@ def test_derivative_where_a_slider_slips_and_comes_back(comm, law):
     step = 1e-6
     expected = (residual(problem, y + step * dy) - residual(problem, y - step * dy)) / (2 * step)
     assert problem.diagnostics(unknowns(problem, y))["slip"] > 0.1
-    assert np.allclose(product(problem, y, dy), expected, rtol=0, atol=1e-8 * np.abs(expected).max())
+    assert np.allclose(product(problem, y, dy), expected, rtol=0, atol=REPEATED * np.abs(expected).max())
 
 
 def test_preload_is_set_not_added(comm):
@@ -80,7 +81,7 @@ def test_preload_is_set_not_added(comm):
     assert np.array_equal(residual(problem, whole(y)), r)
     if once is not None:
         assert np.array_equal(problem.coefficients(y), once)
-        assert once[:, 0] == pytest.approx(state, abs=1e-15)
+        assert once[:, 0] == pytest.approx(state, abs=LAST_BIT)
     else:
         problem.coefficients(y)
 
@@ -132,7 +133,7 @@ def test_sliders_close_their_period(comm, law):
     y = unknowns(problem, point(problem, (0, 1, 0.2), (1, 2, 0.9), (2, 1, 0.7), (2, 4, 0.3)))
     found = problem.diagnostics(y)
     assert found["slip_path"] > 0.5
-    assert 0 <= found["unclosed"] < 1e-12 * found["slip_path"]
+    assert 0 <= found["unclosed"] < ROUNDING * found["slip_path"]
 
 
 @pytest.mark.ranks(1)

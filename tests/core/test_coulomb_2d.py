@@ -7,6 +7,7 @@ import csv
 import numpy as np
 import pytest
 from models.core_models import chain, dense, unknowns, whole
+from tolerances import LAST_DIGITS, REPEATED, ROUNDING, SOLVED
 
 import fretwave as fw
 
@@ -38,10 +39,10 @@ def test_it_is_the_law_in_space_with_one_tangent_held(comm, seed):
         lambda p: whole(p.jacobian_product(unknowns(p, y), unknowns(p, dy))),
         lambda p: dense(p.jacobian(unknowns(p, y))),
     ):
-        np.testing.assert_allclose(act(plane), act(space), rtol=0, atol=1e-14)
+        np.testing.assert_allclose(act(plane), act(space), rtol=0, atol=LAST_DIGITS)
     one, other = (p.diagnostics(unknowns(p, y)) for p in (plane, space))
     assert one["slip"] > 0 and one["open"] > 0
-    assert one == pytest.approx(other, rel=1e-12)
+    assert one == pytest.approx(other, rel=ROUNDING)
 
 
 def test_derivatives(comm):
@@ -56,7 +57,7 @@ def test_derivatives(comm):
         [sum(w * residual(y + k * step * e) for k, w in weights.items()) / step for e in np.eye(len(y))]
     )
     J = dense(problem.jacobian(unknowns(problem, y)))
-    assert np.allclose(J, expected, rtol=0, atol=1e-8 * np.abs(expected).max())
+    assert np.allclose(J, expected, rtol=0, atol=REPEATED * np.abs(expected).max())
 
 
 @pytest.mark.ranks(1)
@@ -71,7 +72,7 @@ def test_sliders_of_a_pair_in_a_plane(comm):
     contact = fw.Contact("coulomb_2d", [[0.0, 0.0], [0.0, 1.0]], PARAMETERS, "pad")
     with fw.Model(np.eye(2), 2 * np.eye(2), None, [contact], comm) as model:
         rest = fw.static_preload(model, [0.0, 0.3], sliders={"pad": [[0.02]]})
-    assert rest.displacement[1] == pytest.approx((0.3 + 5 * 0.02) / 7, rel=1e-12)
+    assert rest.displacement[1] == pytest.approx((0.3 + 5 * 0.02) / 7, rel=ROUNDING)
     assert rest.sliders["pad"] == pytest.approx(0.02) and rest.sliders["pad"].shape == (1, 1)
 
 
@@ -145,7 +146,7 @@ def test_a_case_names_pairs_in_a_plane_stops_and_cubic_springs(comm, launch, tmp
     own = branch[branch.met("report")[0]]
     assert own["slip"] > 0
     for name in ("omega", "zeta", "slip", "open"):
-        assert own[name] == pytest.approx(float(row[name]), rel=1e-9)
+        assert own[name] == pytest.approx(float(row[name]), rel=SOLVED)
 
 
 @pytest.mark.ranks(1)

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from models.core_models import chain, dense, everywhere, mode_problem, solve_at, unknowns, whole
 from mpi4py import MPI
+from tolerances import LAST_DIGITS, REPEATED, ROUNDING, SOLVED, TIGHT
 
 import fretwave as fw
 
@@ -64,7 +65,7 @@ def shifted(q, samples):
 def test_force_stays_in_the_friction_cone(law, q, load, gap):
     """N = max(0, N0 + kn (u_n - gap)): no tension; |T| <= mu N, in all directions or tangent by tangent."""
     u, f = period(pair(law, normal_load=load, gap=gap), q)
-    assert np.allclose(f[:, 0], np.maximum(0, load + KN * (u[:, 0] - gap)), rtol=1e-14, atol=1e-14)
+    assert np.allclose(f[:, 0], np.maximum(0, load + KN * (u[:, 0] - gap)), rtol=LAST_DIGITS, atol=LAST_DIGITS)
     size = np.hypot(f[:, 1], f[:, 2]) if law == "coulomb_3d" else np.abs(f[:, 1:]).max(axis=1)
     assert (f[:, 0] >= 0).all()
     assert (size <= MU * f[:, 0] * (1 + 1e-14)).all()
@@ -78,7 +79,7 @@ def test_dissipation_is_not_negative(law, q, load, gap):
     problem, y = imposed(pair(law, normal_load=load, gap=gap), q)
     found = problem.diagnostics(y)
     assert found["work"] >= 0
-    assert found["stick"] + found["slip"] + found["open"] == pytest.approx(1, abs=1e-14)
+    assert found["stick"] + found["slip"] + found["open"] == pytest.approx(1, abs=LAST_DIGITS)
 
 
 @pytest.mark.parametrize("law", LAWS)
@@ -103,7 +104,7 @@ def test_coupled_and_uncoupled_are_equal_along_one_tangent(q, load):
         line = np.array(q)
         line[still] = 0
         forces = [period(pair(law, normal_load=load), line)[1] for law in LAWS]
-        assert np.allclose(*forces, rtol=0, atol=1e-14 * (1 + np.abs(forces[0]).max()))
+        assert np.allclose(*forces, rtol=0, atol=LAST_DIGITS * (1 + np.abs(forces[0]).max()))
         assert np.abs(forces[0][:, still]).max() == 0
 
 
@@ -111,7 +112,7 @@ def test_coupled_and_uncoupled_differ_along_a_diagonal():
     """The square admits sqrt(2) mu N."""
     q = motion((0,), (0, 5.0), (0, 5.0))
     sizes = [np.hypot(*period(pair(law), q)[1][:, 1:].T).max() for law in LAWS]
-    assert sizes == pytest.approx([MU, np.sqrt(2) * MU], rel=1e-14)
+    assert sizes == pytest.approx([MU, np.sqrt(2) * MU], rel=LAST_DIGITS)
 
 
 @given(q=motions, load=loads, angle=st.floats(-3.2, 3.2))
@@ -144,7 +145,7 @@ def test_slider_follows_while_open(law):
     closed = np.nonzero(u[:, 0] > 0)[0]
     landing = SAMPLES + 1 - np.argmax(u[::-1, 0] <= 0) - 1  # first closed sample of the run that ends the period
     last_open = u[landing - 1, 1]
-    assert f[closed, 1] == pytest.approx(KT * (u[closed, 1] - last_open), rel=1e-12, abs=1e-12)
+    assert f[closed, 1] == pytest.approx(KT * (u[closed, 1] - last_open), rel=ROUNDING, abs=ROUNDING)
 
 
 @given(st.lists(st.floats(-3.0, 3.0), min_size=7, max_size=7), st.floats(0.1, 5.0))
@@ -158,7 +159,7 @@ def test_constant_normal_load_is_the_jenkins_element(q, load):
     assert np.allclose(f[:, 1], expected, rtol=0, atol=1e-13)
     assert (f[:, 0] == load).all()
     coupled, y = imposed(pair(normal_load=load), motion((0,), q))
-    assert coupled.diagnostics(y)["work"] == pytest.approx(problem.diagnostics(y)["work"], rel=1e-11, abs=1e-12)
+    assert coupled.diagnostics(y)["work"] == pytest.approx(problem.diagnostics(y)["work"], rel=1e-11, abs=ROUNDING)
 
 
 @pytest.mark.parametrize("law", LAWS)
@@ -265,7 +266,7 @@ def test_many_pairs_are_as_each_alone(law):
 
     together = evaluated(list(range(pairs)))
     for chosen in (0, 63, 64, pairs - 1):
-        assert np.allclose(together[:, [chosen]], evaluated([chosen]), rtol=0, atol=1e-12)
+        assert np.allclose(together[:, [chosen]], evaluated([chosen]), rtol=0, atol=ROUNDING)
 
 
 def test_few_harmonics_by_table_and_many_by_fft_are_the_same():
@@ -307,8 +308,8 @@ def test_jacobian_of_a_mode_is_exact(law, method):
         product = np.column_stack([whole(problem.jacobian_product(point, unknowns(problem, e))) for e in identity])
         sides = [[whole(problem.residual(unknowns(problem, y + s * step * e))) for e in identity] for s in (1, -1)]
         difference = (np.array(sides[0]) - np.array(sides[1])).T / (2 * step)
-        assert np.allclose(product, J, rtol=0, atol=1e-14 * np.abs(J).max())
-        assert np.allclose(difference, J, rtol=0, atol=1e-9 * np.abs(J).max())
+        assert np.allclose(product, J, rtol=0, atol=LAST_DIGITS * np.abs(J).max())
+        assert np.allclose(difference, J, rtol=0, atol=SOLVED * np.abs(J).max())
 
 
 #: Pairs that do not move along their tangents, and carry nothing there: (parameters, normal motion).
@@ -342,7 +343,7 @@ def test_mean_block_is_regular_when_stuck_under_preload(law):
     y[3 + 1], y[-2:] = 1.0, [1.0, np.log(0.1)]
     J = dense(problem.jacobian(unknowns(problem, y)))[0:9:3, 0:9:3]
     k_ref = start.omega**2 / np.sum(start.shape**2)
-    assert np.allclose(J * k_ref, 2 * np.diag([KN, KT, KT]), rtol=0, atol=1e-12)
+    assert np.allclose(J * k_ref, 2 * np.diag([KN, KT, KT]), rtol=0, atol=ROUNDING)
 
 
 def unilateral(comm, highest, samples=1024):
@@ -358,7 +359,7 @@ def test_unilateral_spring(comm, amplitude):
     problem = unilateral(comm, 15)
     state = problem.state(solve_at(problem, amplitude))
     assert state["omega0"] == pytest.approx(4 / 3, abs=1e-7)
-    assert abs(state["zeta"]) < 1e-12
+    assert abs(state["zeta"]) < ROUNDING
 
 
 def test_unilateral_spring_converges_with_the_harmonics(comm):
@@ -384,7 +385,7 @@ def test_stuck_mode_is_linear(comm, law, method):
         y = solve_at(problem, amplitude)
         state = problem.state(y)
         assert problem.diagnostics(y)["stick"] == 1
-        assert state["omega0"] == pytest.approx(start.omega, rel=1e-10) and abs(state["zeta"]) < 1e-11
+        assert state["omega0"] == pytest.approx(start.omega, rel=TIGHT) and abs(state["zeta"]) < 1e-11
 
 
 def test_parameters_belong_to_their_pairs(comm):
@@ -425,8 +426,8 @@ def test_extremes_of_the_parameters(comm, law, which):
     problem = fw.NonlinearMode(model, fw.Harmonics([0, 1, 2, 3], 64), "EPMC", 0, start)
     problem.preload(np.zeros(4), contact.B[0] * contact.parameters["normal_load"])
     y = solve_at(problem, 0.2)
-    assert problem.state(y)["omega0"] == pytest.approx(expected, rel=1e-8)
-    assert abs(problem.state(y)["zeta"]) < 1e-10 and problem.diagnostics(y)["work"] < 1e-12
+    assert problem.state(y)["omega0"] == pytest.approx(expected, rel=REPEATED)
+    assert abs(problem.state(y)["zeta"]) < TIGHT and problem.diagnostics(y)["work"] < ROUNDING
 
 
 @pytest.mark.parametrize("law", LAWS)
@@ -437,8 +438,8 @@ def test_contact_without_load_or_gap(comm, law):
     found = [problem.state(solve_at(problem, a)) for a in (1e-3, 1.0, 1e3)]
     assert found[0]["zeta"] > 0.01
     for state in found[1:]:
-        assert state["omega0"] == pytest.approx(found[0]["omega0"], rel=1e-9)
-        assert state["zeta"] == pytest.approx(found[0]["zeta"], rel=1e-8)
+        assert state["omega0"] == pytest.approx(found[0]["omega0"], rel=SOLVED)
+        assert state["zeta"] == pytest.approx(found[0]["zeta"], rel=REPEATED)
 
 
 GOOD = {"normal_stiffness": 1.0, "tangential_stiffness": 1.0, "friction_coefficient": 0.3}

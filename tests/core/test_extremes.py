@@ -12,6 +12,7 @@ import scipy.linalg
 from petsc4py import PETSc
 from test_built import BUILDER, TEXT
 from test_krylov import ROOT, SUPPORT, TIP, beam, blade, preloaded, root_map
+from tolerances import REPEATED, ROUNDING, SOLVED
 
 import fretwave as fw
 from fretwave.commands.main import main
@@ -74,7 +75,7 @@ def test_without_load_a_pair_is_a_unilateral_spring(comm, amplitude, method, rou
     case = {"route": route, "method": method, "highest": 15, "samples": 256}
     point = first_point(model, along(0, 1.4), at_rest(model), amplitude, **case)
     assert point["omega"] == pytest.approx(4 / 3, rel=2e-5)
-    assert point["zeta"] == pytest.approx(0, abs=1e-9)
+    assert point["zeta"] == pytest.approx(0, abs=SOLVED)
 
 
 @METHODS
@@ -84,7 +85,7 @@ def test_a_gap_never_reached_leaves_the_free_mode(comm, method):
         free = np.sqrt((1.0, 1.2, 1.5)[axis])
         point = first_point(model, along(axis, free), at_rest(model), 10.0, method=method, dof=axis)
         assert point["open"] == 1
-        assert point["omega"] == pytest.approx(free, rel=1e-12) and point["zeta"] == pytest.approx(0, abs=1e-12)
+        assert point["omega"] == pytest.approx(free, rel=ROUNDING) and point["zeta"] == pytest.approx(0, abs=ROUNDING)
 
 
 @pytest.mark.parametrize("amplitude", [1e-9, 0.5])
@@ -98,8 +99,8 @@ def test_no_friction_and_much_friction_are_linear(comm, friction, axis, square, 
         rest = fw.static_preload(model, np.array([1.0, 0, 0]), along(0)) if "gap" in load else at_rest(model)
         point = first_point(model, along(axis, np.sqrt(square)), rest, amplitude, dof=axis)
         rounding = np.finfo(float).eps * 2.0 / amplitude  # of the load, beside forces k a
-        assert point["omega"] == pytest.approx(np.sqrt(square), rel=1e-9 + rounding)
-        assert point["zeta"] == pytest.approx(0, abs=1e-9 + rounding)
+        assert point["omega"] == pytest.approx(np.sqrt(square), rel=SOLVED + rounding)
+        assert point["zeta"] == pytest.approx(0, abs=SOLVED + rounding)
 
 
 @pytest.mark.parametrize("stiffness, square", [(1e2, 1e9), (1e14, 1e14)])
@@ -138,8 +139,8 @@ def test_small_motion_is_linear(comm, changes, normal, tangential, route):
     """Also where rounding keeps the residual above its tolerance: the frequency is that of the springs."""
     model = blade(comm, **changes)
     found = first_point(model, *preloaded(model), 1e-6, route, dof=TIP)
-    assert found["omega"] == pytest.approx(blade_omega(normal, tangential), rel=1e-8)
-    assert found["zeta"] == pytest.approx(0, abs=1e-9)
+    assert found["omega"] == pytest.approx(blade_omega(normal, tangential), rel=REPEATED)
+    assert found["zeta"] == pytest.approx(0, abs=SOLVED)
     assert found["residual"] < 1e-5 and found["open"] == 0
 
 
@@ -149,14 +150,14 @@ def test_a_nanometre_beside_a_preload_of_kilonewtons(comm, route, method):
     """Forces cancel that are 1e7 times those of the motion: Newton ends at rounding and says so."""
     model = blade(comm)
     found = first_point(model, *preloaded(model), 1e-9, route, method, TIP)
-    assert found["omega"] == pytest.approx(blade_omega(KN, KT), rel=1e-8)
+    assert found["omega"] == pytest.approx(blade_omega(KN, KT), rel=REPEATED)
     assert 1e-10 < found["residual"] < 1e-5
 
 
 def test_a_load_a_million_times_the_others_on_one_pair(comm):
     model = blade(comm, normal_load=2e3 * ONE)
     found = first_point(model, *preloaded(model), 1e-4, dof=TIP)
-    assert found["omega"] == pytest.approx(blade_omega(KN, KT), rel=1e-8)
+    assert found["omega"] == pytest.approx(blade_omega(KN, KT), rel=REPEATED)
 
 
 def test_a_pair_that_slips_at_rest_sticks_in_a_small_motion(comm):
@@ -180,7 +181,7 @@ def test_twice_the_pairs_of_half_the_size_are_the_same(comm):
         found.append(first_point(model, *preloaded(model), 2.5e-3, dof=TIP, highest=3, samples=64))
     assert 0 < found[0]["slip"] < 1
     for key in ("omega", "beta", "slip"):
-        assert found[1][key] == pytest.approx(found[0][key], rel=1e-8)
+        assert found[1][key] == pytest.approx(found[0][key], rel=REPEATED)
 
 
 @ROUTES
@@ -194,7 +195,7 @@ def test_a_mode_that_moves_no_pair(comm, route):
     start = fw.LinearMode(np.sqrt(2), 0.0, shape, np.zeros(9))
     for amplitude in (1e-6, 10.0):
         point = first_point(model, start, balanced(model, start), amplitude, route, dof=1)
-        assert point["stick"] == 1 and point["omega"] == pytest.approx(np.sqrt(2), rel=1e-9)
+        assert point["stick"] == 1 and point["omega"] == pytest.approx(np.sqrt(2), rel=SOLVED)
 
 
 def test_long_steps_still_end_at_the_stop_value(comm):
@@ -207,7 +208,7 @@ def test_long_steps_still_end_at_the_stop_value(comm):
     branch = fw.Continuation(problem, problem.initial(1e-9), (1e-9, 6e-3), steps)
     points = list(branch)
     assert branch.converged, branch.reason
-    assert points[-1].event == "stop" and points[-1].parameter == pytest.approx(6e-3, rel=1e-12)
+    assert points[-1].event == "stop" and points[-1].parameter == pytest.approx(6e-3, rel=ROUNDING)
     assert problem.diagnostics(points[-1].y)["slip"] > 0.5
 
 

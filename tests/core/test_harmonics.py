@@ -16,6 +16,7 @@ from models.core_models import (
     unknowns,
     whole,
 )
+from tolerances import LAST_BIT, LAST_DIGITS
 
 import fretwave as fw
 
@@ -88,10 +89,10 @@ def test_period_samples_are_the_fourier_series(comm):
     waves = [np.exp(1j * n * tau)[:, None] * (Q[:, 2 * n - 1] - 1j * Q[:, 2 * n]) for n in (1, 2)]
     x = Q[:, 0] + sum(wave.real for wave in waves)
     v = sum((n * lambda_ * wave).real for n, wave in zip((1, 2), waves))
-    assert np.allclose(period[0]["u"][:, 0], x, rtol=0, atol=1e-14)
-    assert np.allclose(period[0]["v"][:, 0], v, rtol=0, atol=1e-14)
+    assert np.allclose(period[0]["u"][:, 0], x, rtol=0, atol=LAST_DIGITS)
+    assert np.allclose(period[0]["v"][:, 0], v, rtol=0, atol=LAST_DIGITS)
     dofs = everywhere(problem, problem.dof_period(y, 8))
-    assert np.allclose(dofs["x"], x, rtol=0, atol=1e-14) and np.allclose(dofs["v"], v, rtol=0, atol=1e-14)
+    assert np.allclose(dofs["x"], x, rtol=0, atol=LAST_DIGITS) and np.allclose(dofs["v"], v, rtol=0, atol=LAST_DIGITS)
 
 
 @pytest.mark.ranks(1, 2, 3)
@@ -128,8 +129,8 @@ def cubic_diagnostics(comm, orders, samples):
 
 def test_error_estimate_is_the_share_outside_by_parseval(comm):
     """cos^3 = 3/4 cos + 1/4 cos 3: a share of (1/4) / sqrt(9/16 + 1/16) = 1/sqrt(10) falls outside one harmonic."""
-    assert cubic_diagnostics(comm, [1], 16)["error_estimate"] == pytest.approx(1 / np.sqrt(10), rel=1e-14)
-    assert cubic_diagnostics(comm, [1, 3], 16)["error_estimate"] < 1e-15
+    assert cubic_diagnostics(comm, [1], 16)["error_estimate"] == pytest.approx(1 / np.sqrt(10), rel=LAST_DIGITS)
+    assert cubic_diagnostics(comm, [1, 3], 16)["error_estimate"] < LAST_BIT
 
 
 @pytest.mark.parametrize("highest", [1, 3, 7, 21])
@@ -144,8 +145,8 @@ def test_error_estimate_of_coulomb_friction_is_that_of_a_square_wave(comm, highe
 
 def test_aliasing_is_what_doubled_samples_change(comm):
     """On 4 samples cos 3 is seen as cos: the coefficient is 1, and 3/4 on 8 samples."""
-    assert cubic_diagnostics(comm, [1], 4)["aliasing"] == pytest.approx(0.25, rel=1e-14)
-    assert cubic_diagnostics(comm, [1], 8)["aliasing"] < 1e-15
+    assert cubic_diagnostics(comm, [1], 4)["aliasing"] == pytest.approx(0.25, rel=LAST_DIGITS)
+    assert cubic_diagnostics(comm, [1], 8)["aliasing"] < LAST_BIT
 
 
 def test_half_a_period_gives_the_residual_and_jacobian_of_the_whole(two_dof, comm):
@@ -159,7 +160,7 @@ def test_half_a_period_gives_the_residual_and_jacobian_of_the_whole(two_dof, com
     residuals = [whole(p.residual(y)) for p in problems]
     products = [whole(p.jacobian_product(y, dy)) for p in problems]
     for half, full in (residuals, products):
-        assert np.allclose(half, full, rtol=0, atol=1e-14 * np.abs(full).max())
+        assert np.allclose(half, full, rtol=0, atol=LAST_DIGITS * np.abs(full).max())
 
 
 @pytest.mark.parametrize("method", ["CNM", "EPMC"])

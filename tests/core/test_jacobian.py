@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from models.core_models import CoupledLaw, LinearLaw, chain, dense, friction, unknowns, whole
 from models.cyclic_models import rich_sector
+from tolerances import ROUNDING, SOLVED
 
 import fretwave as fw
 
@@ -108,14 +109,14 @@ def test_assembled_jacobian_is_the_derivative_of_the_residual(problem, variant):
     J = dense(problem.jacobian(unknowns(problem, y)))
     expected = np.column_stack([difference(residual_of(problem), y, e) for e in np.eye(len(y))])
     assert J.shape == (len(y) - 1, len(y))
-    assert np.allclose(J, expected, rtol=0, atol=1e-9 * np.abs(expected).max())
+    assert np.allclose(J, expected, rtol=0, atol=SOLVED * np.abs(expected).max())
 
 
 def test_product_is_the_derivative_along_a_direction(problem, variant):
     y, dy = (random_point(problem, variant, seed) for seed in (0, 1))
     product = whole(problem.jacobian_product(unknowns(problem, y), unknowns(problem, dy)))
     expected = difference(residual_of(problem), y, dy)
-    assert np.allclose(product, expected, rtol=0, atol=1e-9 * np.abs(expected).max())
+    assert np.allclose(product, expected, rtol=0, atol=SOLVED * np.abs(expected).max())
 
 
 def test_product_equals_the_assembled_jacobian_to_rounding(problem, variant):
@@ -125,7 +126,7 @@ def test_product_equals_the_assembled_jacobian_to_rounding(problem, variant):
     for seed in range(3):
         dy = np.random.default_rng(seed + 10).standard_normal(len(y))
         product = whole(problem.jacobian_product(unknowns(problem, y), unknowns(problem, dy)))
-        assert np.allclose(product, J @ dy, rtol=0, atol=1e-12 * np.abs(J @ dy).max())
+        assert np.allclose(product, J @ dy, rtol=0, atol=ROUNDING * np.abs(J @ dy).max())
 
 
 def test_product_belongs_to_its_own_point(problem, variant):
@@ -179,7 +180,7 @@ def test_bordered_system_is_the_derivative_of_the_augmented_map(problem, variant
     product = problem.core.unknowns()
     newton.system.product(unknowns(problem, y), unknowns(problem, dy), product)
     expected = difference(augmented(problem, newton), y, dy)
-    assert np.allclose(whole(product), expected, rtol=0, atol=1e-9 * np.abs(expected).max())
+    assert np.allclose(whole(product), expected, rtol=0, atol=SOLVED * np.abs(expected).max())
     J = dense(newton.system.jacobian(unknowns(problem, y)))
     assert J.shape == (len(y), len(y))
-    assert np.allclose(whole(product), J @ dy, rtol=0, atol=1e-12 * np.abs(J @ dy).max())
+    assert np.allclose(whole(product), J @ dy, rtol=0, atol=ROUNDING * np.abs(J @ dy).max())

@@ -8,6 +8,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from models.core_models import everywhere, mode_problem, single_dof, solve_at, unknowns, whole
 from mpi4py import MPI
+from tolerances import LAST_BIT, LAST_DIGITS, ROUNDING, SOLVED, TIGHT
 
 import fretwave as fw
 
@@ -77,7 +78,7 @@ def test_dissipated_work_is_the_closed_form(ratio, stiffness, limit):
     a = ratio * limit / stiffness
     problem, y = imposed(jenkins(stiffness=stiffness, limit=limit), (0, a, 0, 0, 0, 0, 0))
     expected = 4 * limit * (a - limit / stiffness)
-    assert problem.diagnostics(y)["work"] == pytest.approx(expected, rel=1e-12, abs=1e-12 * limit * a)
+    assert problem.diagnostics(y)["work"] == pytest.approx(expected, rel=ROUNDING, abs=ROUNDING * limit * a)
 
 
 def test_loss_is_largest_at_twice_the_slip_amplitude():
@@ -105,11 +106,11 @@ def test_parallel_elements_obey_masing(q):
     order = (np.arange(256) + bottom) % 256
     up, down = order[rise], order[~rise]
     swing = 2 * initial_loading([(x[top] - x[bottom]) / 2], stiffness, limit)
-    assert f[top] - f[bottom] == pytest.approx(swing[0], rel=1e-12)
+    assert f[top] - f[bottom] == pytest.approx(swing[0], rel=ROUNDING)
     loading = f[bottom] + 2 * initial_loading((x[up] - x[bottom]) / 2, stiffness, limit)
     unloading = f[top] - 2 * initial_loading((x[top] - x[down]) / 2, stiffness, limit)
-    assert np.allclose(f[up], loading, rtol=0, atol=1e-12)
-    assert np.allclose(f[down], unloading, rtol=0, atol=1e-12)
+    assert np.allclose(f[up], loading, rtol=0, atol=ROUNDING)
+    assert np.allclose(f[down], unloading, rtol=0, atol=ROUNDING)
 
 
 @given(coefficients, positive, positive)
@@ -121,7 +122,7 @@ def test_force_is_bounded_and_dissipation_not_negative(q, stiffness, limit):
     found = problem.diagnostics(y)
     assert (np.abs(period(contact, q)[1]) <= limit).all()
     assert found["work"] >= 0
-    assert found["stick"] + found["slip"] == pytest.approx(1, abs=1e-15) and found["open"] == 0
+    assert found["stick"] + found["slip"] == pytest.approx(1, abs=LAST_BIT) and found["open"] == 0
 
 
 @given(coefficients, positive, positive)
@@ -134,7 +135,9 @@ def test_work_is_the_area_of_the_loop(q, stiffness, limit):
     w = u - f / stiffness
     after, dw = np.roll(f, -1), np.roll(w, -1) - w
     area = np.sum(after * dw)
-    assert problem.diagnostics(y)["work"] == pytest.approx(area, rel=1e-10, abs=1e-12 * limit * (1 + np.abs(u).max()))
+    assert problem.diagnostics(y)["work"] == pytest.approx(
+        area, rel=TIGHT, abs=ROUNDING * limit * (1 + np.abs(u).max())
+    )
 
 
 @given(coefficients, st.integers(1, 63))
@@ -164,7 +167,7 @@ def march(u, stiffness, limit):
 @DRAWN
 def test_force_is_the_slider_s_recursion(q, stiffness, limit):
     u, f = period(jenkins(stiffness=stiffness, limit=limit), q)
-    assert np.allclose(f[:, 0], march(u[:, 0], stiffness, limit)[0], rtol=0, atol=1e-12 * limit + 1e-14 * stiffness)
+    assert np.allclose(f[:, 0], march(u[:, 0], stiffness, limit)[0], rtol=0, atol=ROUNDING * limit + 1e-14 * stiffness)
 
 
 @given(coefficients, st.integers(0, 1000))
@@ -178,7 +181,7 @@ def test_tangent_is_the_derivative_away_from_kinks(q, seed):
     dy = np.concatenate([np.random.default_rng(seed).standard_normal(7), [0, 0, 0]])
     plus, minus = (whole(problem.residual(unknowns(problem, y + s * step * dy))) for s in (1, -1))
     product = whole(problem.jacobian_product(y0, unknowns(problem, dy)))
-    assert np.allclose((plus - minus) / (2 * step), product, rtol=0, atol=1e-9 * np.abs(product).max())
+    assert np.allclose((plus - minus) / (2 * step), product, rtol=0, atol=SOLVED * np.abs(product).max())
 
 
 @pytest.mark.parametrize("limit", [0.0, 1.0])
@@ -187,7 +190,7 @@ def test_tangent_of_a_slider_without_friction_is_zero(limit):
     problem, y = imposed(jenkins(limit=limit), np.zeros(7))
     along_mean = unknowns(problem, np.eye(10)[0])
     found = whole(problem.jacobian_product(y, along_mean))
-    assert found[0] == pytest.approx(1.0 + (limit > 0), rel=1e-14)  # ground spring 1, and kt = 1 if it sticks
+    assert found[0] == pytest.approx(1.0 + (limit > 0), rel=LAST_DIGITS)  # ground spring 1, and kt = 1 if it sticks
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -196,8 +199,8 @@ def test_stuck_element_is_a_spring(comm, method):
     problem = mode_problem(single_dof(comm, 2.0, 3.0, law=jenkins(stiffness=5.0)), [1, 3], 64, method, start="free")
     y = solve_at(problem, 0.199)
     state, contact = problem.state(y), problem.diagnostics(y)
-    assert state["omega0"] == pytest.approx(2.0, rel=1e-10)
-    assert abs(state["zeta"]) < 1e-12 and contact["work"] == 0 and contact["stick"] == 1
+    assert state["omega0"] == pytest.approx(2.0, rel=TIGHT)
+    assert abs(state["zeta"]) < ROUNDING and contact["work"] == 0 and contact["stick"] == 1
 
 
 #: REFERENCE: m = k = kt = R = 1, a = 2: (w0, zeta).
@@ -268,7 +271,7 @@ def wheel_mode(comm, n, diameters, samples):
     assert point is not None, branch.reason
     state, Q = problem.state(point.y), everywhere(problem, problem.coefficients(point.y))
     wave = amplitude * np.exp(2j * np.pi * diameters * np.arange(n) / n)
-    assert np.allclose(Q[:, 0] - 1j * Q[:, 1], wave, rtol=0, atol=1e-9 * amplitude)
+    assert np.allclose(Q[:, 0] - 1j * Q[:, 1], wave, rtol=0, atol=SOLVED * amplitude)
     return np.array([state["omega0"], state["zeta"]]), exact
 
 

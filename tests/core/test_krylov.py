@@ -7,6 +7,7 @@ from itertools import groupby
 import numpy as np
 import pytest
 from petsc4py import PETSc
+from tolerances import REPEATED, ROUNDING, SOLVED
 
 import fretwave as fw
 from fretwave.solve.preload import balanced, static_preload
@@ -141,8 +142,8 @@ def test_both_routes_find_the_same_branch(case, method):
     assert len(found["direct"]) == len(found["krylov"]) == len(AMPLITUDES)
     assert found["direct"][0]["slip"] == 0 and found["direct"][-1]["slip"] > 0.3 and found["direct"][-1]["open"] > 0
     for direct, krylov in zip(found["direct"], found["krylov"]):
-        assert krylov["omega"] == pytest.approx(direct["omega"], rel=1e-9)
-        assert krylov["beta"] == pytest.approx(direct["beta"], rel=1e-9, abs=1e-9 * direct["omega"])
+        assert krylov["omega"] == pytest.approx(direct["omega"], rel=SOLVED)
+        assert krylov["beta"] == pytest.approx(direct["beta"], rel=SOLVED, abs=SOLVED * direct["omega"])
 
 
 def test_stuck_regime_needs_at_most_three_iterations(case):
@@ -187,8 +188,8 @@ def test_a_contact_far_stiffer_than_the_structure(comm):
 def test_stuck_asymptote_is_the_linear_mode(krylov, case):
     """Issue 3: to 1e-8."""
     assert krylov[0]["stick"] == 1
-    assert krylov[0]["omega"] == pytest.approx(case[1].omega, rel=1e-8)
-    assert krylov[0]["zeta"] == pytest.approx(0, abs=1e-12)
+    assert krylov[0]["omega"] == pytest.approx(case[1].omega, rel=REPEATED)
+    assert krylov[0]["zeta"] == pytest.approx(0, abs=ROUNDING)
 
 
 def test_branch_has_the_shape_of_a_blade_root(krylov):
@@ -196,7 +197,7 @@ def test_branch_has_the_shape_of_a_blade_root(krylov):
     zeta, omega = (np.array([p[k] for p in krylov]) for k in ("zeta", "omega"))
     peak = int(np.argmax(zeta))
     assert 0 < peak < len(zeta) - 1 and zeta[peak] > 0.01
-    assert (np.diff(omega[: peak + 1]) <= 1e-9 * omega[0]).all()
+    assert (np.diff(omega[: peak + 1]) <= SOLVED * omega[0]).all()
 
 
 def test_stuck_rest_is_the_linear_static_solution(comm):

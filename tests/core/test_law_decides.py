@@ -14,6 +14,7 @@ from command_line import call
 from models import three_pads
 from models.three_pads import CONTACT, FRICTION, LIFTED
 from models.vtkhdf_files import read_step
+from tolerances import LAST_DIGITS, SOLVED
 
 import fretwave as fw
 from fretwave.model.laws import Limit, ParameterInfo, PythonLaw, Role, forget_law
@@ -125,10 +126,10 @@ def test_the_static_table_has_the_law_s_word(runs, law: str) -> None:
     folder, words = runs[law], CONTACTS[law][1]
     table = Run(folder).table("rest")
     assert table["status"].tolist() == words
-    assert table["gap"] == pytest.approx([0.0, 0.0, LIFTED], rel=1e-9, abs=1e-18)
-    assert table["normal_force"] == pytest.approx([100.0, 100.0, 0.0], rel=1e-9)
+    assert table["gap"] == pytest.approx([0.0, 0.0, LIFTED], rel=SOLVED, abs=1e-18)
+    assert table["normal_force"] == pytest.approx([100.0, 100.0, 0.0], rel=SOLVED)
     if words[0] == "stick":
-        assert table["tangential_force"][0] == pytest.approx(40 * np.sqrt(2), rel=1e-9)
+        assert table["tangential_force"][0] == pytest.approx(40 * np.sqrt(2), rel=SOLVED)
 
 
 @pytest.mark.parametrize("law", STILL)
@@ -153,7 +154,7 @@ def test_the_view_has_the_law_s_word(runs, law: str) -> None:
     for step in range(4):
         found = read_step(folder / "mode_contact.vtkhdf", step)
         assert found["status"].tolist() == [number[word] for word in words]
-        assert found["gap"] == pytest.approx([0.0, 0.0, LIFTED], rel=1e-9, abs=1e-18)
+        assert found["gap"] == pytest.approx([0.0, 0.0, LIFTED], rel=SOLVED, abs=1e-18)
         for word in number:
             assert found[f"share_{word}"].tolist() == [float(w == word) for w in words]
 
@@ -178,8 +179,8 @@ def test_parameters_of_a_registered_law_go_with_their_pairs(comm) -> None:
     problem = fw.NonlinearMode(model, fw.Harmonics([0, 1], 16), "EPMC", 0, start)
     told = comm.bcast(problem.contact_history(problem.initial(1.0))[0])
     stiffness, gap = np.array(given["squeeze"]), np.array(given["air"])
-    assert told["f"][:, 0] == pytest.approx(np.maximum(0.0, stiffness * (told["u"][:, 0] - gap)), abs=1e-14)
-    assert told["gap"] == pytest.approx(np.maximum(0.0, gap - told["u"][:, 0]), abs=1e-14)
+    assert told["f"][:, 0] == pytest.approx(np.maximum(0.0, stiffness * (told["u"][:, 0] - gap)), abs=LAST_DIGITS)
+    assert told["gap"] == pytest.approx(np.maximum(0.0, gap - told["u"][:, 0]), abs=LAST_DIGITS)
     assert np.array_equal(told["status"] == OPEN, told["u"][:, 0] <= gap) and told["status"].dtype == np.int8
 
 
@@ -245,7 +246,7 @@ def test_stiffnesses_by_role_are_what_a_stuck_pair_has(comm, law: str) -> None:
     with fw.Model(np.eye(info.components), np.eye(info.components), contacts=[contact], comm=comm) as model:
         found = [mode.omega**2 - 1 for mode in fw.linear_modes(model, info.components, "stuck")]
     expected = [size[info.stiffness_along(component)] for component in range(info.components)]
-    assert sorted(found) == pytest.approx(sorted(expected), rel=1e-9)
+    assert sorted(found) == pytest.approx(sorted(expected), rel=SOLVED)
 
 
 def test_a_law_may_not_give_two_parameters_one_role() -> None:

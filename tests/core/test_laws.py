@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from models.core_models import LinearLaw, TanhLaw, friction, single_dof, unknowns, whole
 from mpi4py import MPI
+from tolerances import LAST_BIT, LAST_DIGITS, SOLVED
 
 import fretwave as fw
 
@@ -40,13 +41,13 @@ def period(contact, q):
 def test_force_is_regularised_coulomb(q, limit, velocity):
     """mu N tanh(v / eps) (Laxalde et al. 2008, eq. 2b)."""
     found = period(friction([[1.0]], limit, velocity), q)
-    assert np.allclose(found["f"], limit * np.tanh(found["v"] / velocity), rtol=1e-14, atol=1e-14 * limit)
+    assert np.allclose(found["f"], limit * np.tanh(found["v"] / velocity), rtol=LAST_DIGITS, atol=LAST_DIGITS * limit)
 
 
 def test_force_tends_to_coulomb_friction():
     """REFERENCE: as eps -> 0 the force is mu N sign(v)."""
     found = period(friction([[1.0]], 5.0, 1e-6), [0, 1.0, 0.5, 0, 0, 0, 0])
-    assert np.allclose(found["f"], 5.0 * np.sign(found["v"]), rtol=0, atol=1e-15)
+    assert np.allclose(found["f"], 5.0 * np.sign(found["v"]), rtol=0, atol=LAST_BIT)
 
 
 @given(coefficients)
@@ -77,7 +78,7 @@ def test_tangent_is_the_derivative_of_the_force(law):
     y[-2], dy[-3:] = 1.0, 0.0
     plus, minus = (whole(p.residual(unknowns(p, y + s * step * dy))) for s in (1, -1))
     product = whole(p.jacobian_product(unknowns(p, y), unknowns(p, dy)))
-    assert np.allclose((plus - minus) / (2 * step), product, rtol=0, atol=1e-9 * np.abs(product).max())
+    assert np.allclose((plus - minus) / (2 * step), product, rtol=0, atol=SOLVED * np.abs(product).max())
 
 
 def test_tangent_of_a_python_law_may_be_left_to_differences():
@@ -93,7 +94,7 @@ def test_tangent_of_a_python_law_may_be_left_to_differences():
     for law in (TanhLaw(2.0, 0.7), WithoutTangent(2.0, 0.7)):
         p = problem(fw.Contact(law, [[1.0]]))
         products.append(whole(p.jacobian_product(unknowns(p, y), unknowns(p, dy))))
-    assert np.allclose(*products, rtol=0, atol=1e-9 * np.abs(products[0]).max())
+    assert np.allclose(*products, rtol=0, atol=SOLVED * np.abs(products[0]).max())
 
 
 def test_slip_and_stick_are_counted_by_velocity():
@@ -102,7 +103,7 @@ def test_slip_and_stick_are_counted_by_velocity():
     found = p.diagnostics(motion(p, [0, 1, 0, 0, 0, 0, 0]))
     slipping = np.count_nonzero(np.abs(np.sin(2 * np.pi * np.arange(SAMPLES) / SAMPLES)) > 0.5) / SAMPLES
     assert found["slip"] == slipping and found["open"] == 0
-    assert found["slip"] + found["stick"] == pytest.approx(1, abs=1e-15)
+    assert found["slip"] + found["stick"] == pytest.approx(1, abs=LAST_BIT)
 
 
 def test_parameters_belong_to_their_pairs(comm):
@@ -111,7 +112,7 @@ def test_parameters_belong_to_their_pairs(comm):
     model = fw.Model(np.eye(3), np.eye(3), None, [friction(np.eye(3), limits, velocities)], comm)
     p = fw.NonlinearMode(model, fw.Harmonics([1], 8), "EPMC", 0, fw.LinearMode(1.0, 0.0, np.ones(3), np.zeros(3)))
     found = comm.bcast(p.contact_period(p.initial(1.0))[0])
-    assert np.allclose(found["f"], limits * np.tanh(found["v"] / velocities), rtol=1e-14, atol=0)
+    assert np.allclose(found["f"], limits * np.tanh(found["v"] / velocities), rtol=LAST_DIGITS, atol=0)
 
 
 def test_table_of_laws_tells_units_bounds_and_components():

@@ -11,6 +11,7 @@ import test_krylov as beam
 from models.hexahedra import bar
 from petsc4py import PETSc
 from scipy.sparse.linalg import spsolve
+from tolerances import SOLVED
 
 import fretwave as fw
 from fretwave.solve.preload import balanced, static_preload
@@ -75,8 +76,8 @@ def solve(problem, parameters):
 
 def assert_same(found, expected):
     for a, b in zip(found, expected):
-        assert a["omega"] == pytest.approx(b["omega"], rel=1e-9)
-        assert a["beta"] == pytest.approx(b["beta"], abs=1e-9 * b["omega"])
+        assert a["omega"] == pytest.approx(b["omega"], rel=SOLVED)
+        assert a["beta"] == pytest.approx(b["beta"], abs=SOLVED * b["omega"])
 
 
 def test_solid_model_takes_sparse_factors_and_few_iterations(comm):
@@ -142,7 +143,7 @@ def test_forced_response_has_no_normalisation(comm):
         assert branch.converged, branch.reason
     assert found["krylov"]["slip"] > 0.02
     for key in ("amplitude", "phase"):
-        assert found["krylov"][key] == pytest.approx(found["direct"][key], rel=1e-9)
+        assert found["krylov"][key] == pytest.approx(found["direct"][key], rel=SOLVED)
 
 
 def test_static_preload_of_a_solid_model_is_direct(comm):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from models.core_models import UnilateralLaw, chain, dense, everywhere, single_dof, solve_at, unknowns, whole
 from scipy.special import ellipk
+from tolerances import LAST_DIGITS, REPEATED, ROUNDING, SOLVED
 
 import fretwave as fw
 
@@ -26,8 +27,8 @@ def test_duffing_with_one_harmonic(comm, k3):
     """omega^2 = omega0^2 + 3/4 k3 a^2 / m."""
     with duffing(comm, k3) as model:
         branch = fw.follow(fw.NonlinearMode(model, fw.Harmonics([1], 32)), 1e-3, 0.9, report_at=[0.3, 0.6])
-    np.testing.assert_allclose(branch["omega"] ** 2, K / M + 0.75 * k3 * branch["amplitude"] ** 2 / M, rtol=1e-9)
-    assert np.abs(branch["zeta"]).max() < 1e-12 and (branch["stick"] == 1).all()
+    np.testing.assert_allclose(branch["omega"] ** 2, K / M + 0.75 * k3 * branch["amplitude"] ** 2 / M, rtol=SOLVED)
+    assert np.abs(branch["zeta"]).max() < ROUNDING and (branch["stick"] == 1).all()
 
 
 @pytest.mark.ranks(1)
@@ -38,7 +39,7 @@ def test_duffing_with_many_harmonics_is_the_elliptic_integral(comm):
         y = solve_at(problem, 1.0)
         A, omega = np.abs(problem.dof_period(y, 4096)["x"]).max(), problem.state(y)["omega"]
     mu = K3 * A**2 / (2 * (K + K3 * A**2))
-    assert omega == pytest.approx(np.pi * np.sqrt((K + K3 * A**2) / M) / (2 * ellipk(mu)), rel=1e-9)
+    assert omega == pytest.approx(np.pi * np.sqrt((K + K3 * A**2) / M) / (2 * ellipk(mu)), rel=SOLVED)
 
 
 @pytest.mark.ranks(1)
@@ -59,26 +60,26 @@ def test_static_load_on_a_stop(comm, load):
     with stop(comm, 0.4) as model:
         rest = fw.static_preload(model, [load], fw.linear_modes(model, 1, "free")[0])
     closed = load > K * 0.4
-    assert rest.displacement == pytest.approx((load + KN * 0.4) / (K + KN) if closed else load / K, rel=1e-12)
+    assert rest.displacement == pytest.approx((load + KN * 0.4) / (K + KN) if closed else load / K, rel=ROUNDING)
     assert (rest.stick, rest.open) == (closed, not closed)
 
 
 def test_linear_modes_have_the_stop_as_it_is_at_rest(comm):
     """Open with a gap, closed by an interference, closed by a load."""
     with stop(comm, 0.1) as model:
-        assert fw.linear_modes(model, 1)[0].omega == pytest.approx(np.sqrt(K / M), rel=1e-9)
+        assert fw.linear_modes(model, 1)[0].omega == pytest.approx(np.sqrt(K / M), rel=SOLVED)
         fw.static_preload(model, [3.0])
-        assert fw.linear_modes(model, 1)[0].omega == pytest.approx(np.sqrt((K + KN) / M), rel=1e-9)
+        assert fw.linear_modes(model, 1)[0].omega == pytest.approx(np.sqrt((K + KN) / M), rel=SOLVED)
     with stop(comm, -0.1) as model:
-        assert fw.linear_modes(model, 1)[0].omega == pytest.approx(np.sqrt((K + KN) / M), rel=1e-9)
+        assert fw.linear_modes(model, 1)[0].omega == pytest.approx(np.sqrt((K + KN) / M), rel=SOLVED)
 
 
 def test_a_cubic_spring_under_load_is_stiff_by_its_tangent(comm):
     """K x + k3 x^3 = P; omega^2 = (K + 3 k3 x^2) / M."""
     with duffing(comm) as model:
         x = fw.static_preload(model, [8.0]).displacement[0]
-        assert K * x + K3 * x**3 == pytest.approx(8.0, rel=1e-12)
-        assert fw.linear_modes(model, 1)[0].omega == pytest.approx(np.sqrt((K + 3 * K3 * x**2) / M), rel=1e-9)
+        assert K * x + K3 * x**3 == pytest.approx(8.0, rel=ROUNDING)
+        assert fw.linear_modes(model, 1)[0].omega == pytest.approx(np.sqrt((K + 3 * K3 * x**2) / M), rel=SOLVED)
 
 
 def test_a_stop_says_where_it_is_open_and_how_far(comm):
@@ -88,8 +89,8 @@ def test_a_stop_says_where_it_is_open_and_how_far(comm):
         told = everywhere(problem, problem.contact_history(y))[0]
     u = np.cos(2 * np.pi * np.arange(64) / 64)
     np.testing.assert_array_equal(told["status"][:, 0], np.where(u > 0.3, 0, 2))
-    np.testing.assert_allclose(told["gap"][:, 0], np.maximum(0.3 - u, 0.0), atol=1e-14)
-    np.testing.assert_allclose(told["f"][:, 0, 0], KN * np.maximum(u - 0.3, 0.0), atol=1e-12)
+    np.testing.assert_allclose(told["gap"][:, 0], np.maximum(0.3 - u, 0.0), atol=LAST_DIGITS)
+    np.testing.assert_allclose(told["f"][:, 0, 0], KN * np.maximum(u - 0.3, 0.0), atol=ROUNDING)
 
 
 def test_a_stop_is_the_law_written_in_python(comm):
@@ -102,7 +103,7 @@ def test_a_stop_is_the_law_written_in_python(comm):
             start = fw.linear_modes(model, 1, "free")[0]
             problem = fw.NonlinearMode(model, fw.Harmonics([0, 1, 2], 64), start=start)
             found.append(whole(problem.residual(unknowns(problem, np.array([0.1, 1, 0, 0.2, -0.1, 0, 1.1, -0.3])))))
-    np.testing.assert_allclose(found[0], found[1], atol=1e-14)
+    np.testing.assert_allclose(found[0], found[1], atol=LAST_DIGITS)
 
 
 @pytest.mark.ranks(1, 2, 3)
@@ -128,7 +129,7 @@ def test_derivatives(comm, law, parameters):
             [sum(w * residual(y + k * step * e) for k, w in weights.items()) / step for e in np.eye(len(y))]
         )
         J = dense(problem.jacobian(unknowns(problem, y)))
-        assert np.allclose(J, expected, rtol=0, atol=1e-8 * np.abs(expected).max())
+        assert np.allclose(J, expected, rtol=0, atol=REPEATED * np.abs(expected).max())
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import scipy.linalg
 from models.cyclic_models import chain_crossings, jenkins_chain, rich_sector
+from tolerances import LAST_BIT, REPEATED
 
 import fretwave as fw
 from fretwave.cyclic.aerodynamics import Aerodynamics, period_of
@@ -59,7 +60,7 @@ def test_limit_cycle_of_one_sector_is_that_of_the_whole_wheel(comm):
     for one, all_sectors in zip(alone, whole):
         for key in ("amplitude", "omega"):
             # samples are a multiple of the sectors: all see the slider's kinks between the same ones
-            assert all_sectors[key] == pytest.approx(one[key], rel=1e-8), key
+            assert all_sectors[key] == pytest.approx(one[key], rel=REPEATED), key
 
 
 def eigenvalues(M: np.ndarray, K: np.ndarray, C: np.ndarray) -> np.ndarray:
@@ -89,7 +90,7 @@ def test_flow_on_a_wheel_is_the_sum_over_its_blades(dof, comm):
     expected = eigenvalues(M, K - force.real, C - force.imag / omega)
     with replace(plain, aerodynamics=flow).wheel(comm, changes) as model:
         for mode in fw.linear_modes(model, 4, "linearised"):
-            assert abs(expected - complex(-mode.beta, mode.omega)).min() < 1e-8 * mode.omega
+            assert abs(expected - complex(-mode.beta, mode.omega)).min() < REPEATED * mode.omega
 
 
 @pytest.mark.parametrize("sectors", [5, 6])
@@ -120,7 +121,7 @@ def test_terms_of_blades_that_move_alike_are_one():
                 sum(np.exp(-2j * np.pi * k * n * 2 / 6) * A.toarray() for k, A in terms[letter].items())
                 for terms in (whole, fewer)
             ]
-            assert np.allclose(*factors, atol=1e-15)
+            assert np.allclose(*factors, atol=LAST_BIT)
 
 
 @pytest.mark.ranks(1)

@@ -9,6 +9,7 @@ import scipy.sparse as sp
 from models.core_models import filled, friction, solve_at, unknowns, whole
 from models.cyclic_models import MASSES, SECTORS, blisk_stiffness, jenkins_chain, lumped_blisk, rich_sector
 from petsc4py import PETSc
+from tolerances import REPEATED, ROUNDING, SOLVED, TIGHT
 
 import fretwave as fw
 
@@ -33,8 +34,8 @@ def test_positive_nodal_diameters_are_forward_waves(comm, nodal_diameter):
     """Analytic wave: a system that tells the directions apart, x_j(t) = x_0(t - j theta / omega)."""
     with gyroscopic_chain(7).model(nodal_diameter, comm) as model:
         mode = fw.linear_modes(model, 1, "linearised")[0]
-    assert mode.omega == pytest.approx(gyroscopic_omega(2 * np.pi * nodal_diameter / 7), rel=1e-12)
-    assert mode.beta == pytest.approx(0, abs=1e-12)
+    assert mode.omega == pytest.approx(gyroscopic_omega(2 * np.pi * nodal_diameter / 7), rel=ROUNDING)
+    assert mode.beta == pytest.approx(0, abs=ROUNDING)
 
 
 @pytest.mark.parametrize("method", ["CNM", "EPMC"])
@@ -45,7 +46,7 @@ def test_nonlinear_modes_run_the_same_way(comm, method):
         mode = fw.linear_modes(model, 1, "linearised")[0]
         problem = fw.NonlinearMode(model, fw.Harmonics([1], 4), method, 0, mode)
         y = solve_at(problem, 1.0)
-        assert problem.state(y)["omega"] == pytest.approx(gyroscopic_omega(0.8 * np.pi), rel=1e-12)
+        assert problem.state(y)["omega"] == pytest.approx(gyroscopic_omega(0.8 * np.pi), rel=ROUNDING)
     t = np.linspace(0, 5, 40)
     wave = sector.wave([1.0], 2)[:, 0, None] * np.exp(1j * mode.omega * t)
     assert np.allclose(wave.real, np.cos(mode.omega * t - 0.8 * np.pi * np.arange(5)[:, None]), atol=1e-13)
@@ -74,9 +75,9 @@ def test_lumped_blisk_has_its_closed_form_frequencies(comm, nodal_diameter):
     with lumped_blisk().model(nodal_diameter, comm) as model:
         modes = fw.linear_modes(model, 5)
     expected = np.sqrt(scipy.linalg.eigvalsh(blisk_stiffness(nodal_diameter), np.diag(MASSES)))
-    assert [mode.omega for mode in modes] == pytest.approx(expected, rel=1e-9)
+    assert [mode.omega for mode in modes] == pytest.approx(expected, rel=SOLVED)
     if nodal_diameter in REFERENCE_HZ:
-        assert [mode.frequency_hz for mode in modes] == pytest.approx(REFERENCE_HZ[nodal_diameter], rel=1e-8)
+        assert [mode.frequency_hz for mode in modes] == pytest.approx(REFERENCE_HZ[nodal_diameter], rel=REPEATED)
 
 
 @pytest.mark.parametrize("state", ["free", "stuck"])
@@ -92,7 +93,7 @@ def test_modes_of_all_nodal_diameters_are_those_of_the_wheel(comm, state):
     with sector.wheel(comm) as wheel:
         expected = [mode.omega for mode in fw.linear_modes(wheel, 18, state)]
     assert len(found) == len(expected) == (18 if state == "free" else 12)
-    assert sorted(found) == pytest.approx(expected, rel=1e-9)
+    assert sorted(found) == pytest.approx(expected, rel=SOLVED)
 
 
 def test_shapes_of_a_travelling_wave_are_modes_of_the_wheel(comm):
@@ -102,8 +103,8 @@ def test_shapes_of_a_travelling_wave_are_modes_of_the_wheel(comm):
         modes = fw.linear_modes(model, 3, "free")
         phi = np.array([sector.wave(mode.shape + 1j * mode.imaginary, 3).ravel() for mode in modes]).T
         K, M = (np.column_stack([whole(A * wheel.vector(e)) for e in np.eye(21)]) for A in wheel._matrices[::2])
-    assert np.allclose(K @ phi, M @ phi * [mode.omega**2 for mode in modes], atol=1e-9)
-    assert np.allclose(phi.conj().T @ M @ phi / 7, np.eye(3), atol=1e-10)
+    assert np.allclose(K @ phi, M @ phi * [mode.omega**2 for mode in modes], atol=SOLVED)
+    assert np.allclose(phi.conj().T @ M @ phi / 7, np.eye(3), atol=TIGHT)
 
 
 @pytest.mark.parametrize("nodal_diameter", [0, 2, 5])
@@ -128,10 +129,10 @@ def test_damped_waves_with_contact_tangents(comm, nodal_diameter):
     expected = sorted((v for v in found if v.imag > 0), key=lambda v: v.imag)
     with sector.model(nodal_diameter, comm) as model:
         modes = fw.linear_modes(model, 3, "linearised")
-    assert np.allclose([complex(-m.beta, m.omega) for m in modes], expected, rtol=1e-10)
+    assert np.allclose([complex(-m.beta, m.omega) for m in modes], expected, rtol=TIGHT)
     for mode in modes:
         value, phi = complex(-mode.beta, mode.omega), mode.shape + 1j * mode.imaginary
-        assert np.linalg.norm((value**2 * M + value * C + K) @ phi) < 1e-9 * np.linalg.norm(phi)
+        assert np.linalg.norm((value**2 * M + value * C + K) @ phi) < SOLVED * np.linalg.norm(phi)
 
 
 def kappa(a: float) -> complex:
@@ -151,7 +152,7 @@ def test_travelling_wave_on_a_chain_has_its_closed_form(comm, sectors, nodal_dia
         stuck = fw.linear_modes(model, 1, "stuck")[0]
         problem = fw.NonlinearMode(model, fw.Harmonics([1], SAMPLES), method, 0, stuck)
         state = problem.state(solve_at(problem, amplitude))
-    assert stuck.omega == pytest.approx(np.sqrt(1 + 4 * sine**2), rel=1e-12)
+    assert stuck.omega == pytest.approx(np.sqrt(1 + 4 * sine**2), rel=ROUNDING)
     if method == "EPMC":
         omega0, zeta = np.sqrt(stiffness.real), stiffness.imag / (2 * stiffness.real)
     else:
@@ -203,10 +204,10 @@ def test_a_sectors_solution_solves_the_full_wheel(comm, method):
         around = fw.NonlinearMode(wheel, h, method, 2, fw.LinearMode(stuck.omega, 0, shape.real, shape.imag))
         points = branch(problem, 1e-5, (1e-5, 1e-2), [2e-5, 1e-4, 1.3e-4, 1e-3])
         zeta = [problem.state(p.y)["zeta"] for p in points]
-        assert abs(zeta[0]) < 1e-9 and max(zeta) > 0.01
+        assert abs(zeta[0]) < SOLVED and max(zeta) > 0.01
         for point in points:
             r = whole(around.residual(unknowns(around, on_the_wheel(sector, 2, problem, point.y, orders))))
-            assert np.abs(r).max() < 1e-9
+            assert np.abs(r).max() < SOLVED
 
 
 @pytest.mark.parametrize("nodal_diameter", [1, 3, -2])
@@ -227,7 +228,7 @@ def test_residual_of_a_sector_is_that_of_the_wheel(comm, nodal_diameter):
         expected = on_the_wheel(sector, nodal_diameter, problem, force, orders)[: 7 * n * h.block_size]
         wheel_y = unknowns(around, on_the_wheel(sector, nodal_diameter, problem, y, orders))
         found = whole(around.residual(wheel_y))[: 7 * n * h.block_size]
-        assert np.allclose(found * wheel_scale(sector, n), expected, rtol=0, atol=1e-12 * np.abs(expected).max())
+        assert np.allclose(found * wheel_scale(sector, n), expected, rtol=0, atol=ROUNDING * np.abs(expected).max())
 
 
 def wheel_scale(sector, n) -> float:
@@ -252,5 +253,5 @@ def test_both_routes_find_the_same_wave(comm, method):
             found[route] = [problem.state(p.y) for p in branch(problem, 5e-5, (5e-5, 1e-2), [1e-4, 2e-4, 1e-3])]
     assert found["direct"][1]["zeta"] > 0.01
     for direct, krylov in zip(found["direct"], found["krylov"]):
-        assert krylov["omega"] == pytest.approx(direct["omega"], rel=1e-9)
-        assert krylov["beta"] == pytest.approx(direct["beta"], rel=1e-9, abs=1e-9 * direct["omega"])
+        assert krylov["omega"] == pytest.approx(direct["omega"], rel=SOLVED)
+        assert krylov["beta"] == pytest.approx(direct["beta"], rel=SOLVED, abs=SOLVED * direct["omega"])

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 from models.cyclic_models import lumped_blisk
+from tolerances import ROUNDING, SOLVED, TIGHT
 
 import fretwave as fw
 from fretwave.cyclic.faces import rotation
@@ -105,7 +106,7 @@ def test_expanded_waves_solve_the_unreduced_equations(built, comm, faces):
     theta = 2 * np.pi * 2 / built.sectors
     turn = rotation(2 * np.pi / built.sectors, "z")
     moved = np.exp(-1j * theta) * x[built.low].reshape(-1, 3) @ turn.T
-    assert x[built.high].reshape(-1, 3) == pytest.approx(moved, rel=0, abs=1e-12 * np.abs(x).max())
+    assert x[built.high].reshape(-1, 3) == pytest.approx(moved, rel=0, abs=ROUNDING * np.abs(x).max())
     forces = (built.K - mode.omega**2 * built.M) @ x
     ties = unreduced(built).ties
     rest = sum(np.exp(1j * k * theta) * (T.T @ forces) for k, T in ties.items())
@@ -124,10 +125,10 @@ def test_kept_dofs_stand_for_themselves(comm):
         x_r = np.random.default_rng(1).standard_normal(reduction.size)
         x = reduction.expand(x_r)
         for dof, place in reduction.places.items():
-            assert x[dof] == pytest.approx(x_r[place], rel=1e-12)
-        assert reduction.contacts[0].B[0] @ x_r == pytest.approx(pads(built).B @ x, rel=1e-10, abs=1e-12)
+            assert x[dof] == pytest.approx(x_r[place], rel=ROUNDING)
+        assert reduction.contacts[0].B[0] @ x_r == pytest.approx(pads(built).B @ x, rel=TIGHT, abs=ROUNDING)
         load = built.loads["weight"]
-        assert reduction.project(load) @ x_r == pytest.approx(load @ x, rel=1e-10)
+        assert reduction.project(load) @ x_r == pytest.approx(load @ x, rel=TIGHT)
 
 
 @pytest.mark.ranks(1, 2, 3)
@@ -139,7 +140,7 @@ def test_the_reduction_does_not_depend_on_the_number_of_ranks(built, comm):
     with reduced(built, comm, **options) as shared, reduced(built, MPI.COMM_SELF, **options) as own:
         assert shared.n_interface == own.n_interface
         for found, wanted in ((shared.K, own.K), (shared.M, own.M)):
-            assert found == pytest.approx(wanted, rel=0, abs=1e-10 * np.abs(wanted).max())
+            assert found == pytest.approx(wanted, rel=0, abs=TIGHT * np.abs(wanted).max())
 
 
 def test_a_lumped_sector_without_axis(comm):
@@ -153,7 +154,7 @@ def test_a_lumped_sector_without_axis(comm):
         assert reduction.places == {0: 0, 3: 1} and reduction.size == 4
         with reduction.sector().model(4, comm) as a, one.model(4, comm) as b:
             found, wanted = ([m.omega for m in fw.linear_modes(model, 3)] for model in (a, b))
-        assert found == pytest.approx(wanted, rel=1e-10)
+        assert found == pytest.approx(wanted, rel=TIGHT)
 
 
 @pytest.mark.ranks(1)
@@ -167,4 +168,4 @@ def test_damping_is_reduced_alike(built, comm):
     C = sp.csr_matrix(1e-6 * built.K + 2.0 * built.M)
     with reduced(built, comm, C=C, modes=4) as reduction:
         wanted = 1e-6 * reduction.K + 2.0 * reduction.M
-        assert pytest.approx(wanted, rel=0, abs=1e-9 * np.abs(wanted).max()) == reduction.C
+        assert pytest.approx(wanted, rel=0, abs=SOLVED * np.abs(wanted).max()) == reduction.C

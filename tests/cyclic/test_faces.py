@@ -7,6 +7,7 @@ import pytest
 import scipy.linalg
 from models.core_models import friction
 from models.cyclic_models import lumped_blisk
+from tolerances import SOLVED
 
 import fretwave as fw
 from fretwave.cyclic.faces import rotation
@@ -63,7 +64,7 @@ def test_waves_of_a_turned_sector_are_the_modes_of_the_assembled_wheel(comm, axi
     for nodal_diameter in range(SECTORS):
         with sector.model(nodal_diameter, comm) as model:
             found += [mode.omega for mode in fw.linear_modes(model, 24)]
-    assert sorted(found) == pytest.approx(list(expected), rel=1e-9)
+    assert sorted(found) == pytest.approx(list(expected), rel=SOLVED)
 
 
 def test_matching_finds_the_turned_partner():

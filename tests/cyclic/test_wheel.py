@@ -9,6 +9,7 @@ from models.core_models import dense, filled, unknowns, whole
 from models.cyclic_models import MASSES, NEIGHBOUR, lumped_blisk, rich_sector
 from petsc4py import PETSc
 from test_jacobian import difference
+from tolerances import ROUNDING, SOLVED, TIGHT
 
 import fretwave as fw
 
@@ -49,8 +50,8 @@ def test_the_wheel_follows_the_branch_of_its_sector(comm, method):
         around = unfolded(wheel, sector.around(stuck, DIAMETERS), method)
         for a, b in zip(reported(one), reported(around)):
             expected, found = one.state(a.y), around.state(b.y)
-            assert found["omega"] == pytest.approx(expected["omega"], rel=1e-12)
-            assert found["beta"] == pytest.approx(expected["beta"], abs=1e-12 * expected["omega"])
+            assert found["omega"] == pytest.approx(expected["omega"], rel=ROUNDING)
+            assert found["beta"] == pytest.approx(expected["beta"], abs=ROUNDING * expected["omega"])
             assert np.abs(around.unfolding(b.y)).max() < 1e-13
         assert max(one.state(p.y)["zeta"] for p in reported(one)) > 0.01
 
@@ -63,9 +64,9 @@ def test_a_wave_of_the_sector_starts_the_wheel(comm):
         pair = fw.linear_modes(wheel, 6)
     phi = around.shape + 1j * around.imaginary
     M = np.kron(np.eye(SECTORS), sector.M)
-    assert phi.conj() @ M @ phi == pytest.approx(1.0, rel=1e-12)
-    assert phi @ M @ phi == pytest.approx(0.0, abs=1e-12)
-    assert sum(abs(mode.omega / around.omega - 1) < 1e-9 for mode in pair) == 2
+    assert phi.conj() @ M @ phi == pytest.approx(1.0, rel=ROUNDING)
+    assert phi @ M @ phi == pytest.approx(0.0, abs=ROUNDING)
+    assert sum(abs(mode.omega / around.omega - 1) < SOLVED for mode in pair) == 2
 
 
 @pytest.mark.ranks(1)
@@ -78,7 +79,7 @@ def test_unfolding_keeps_the_equations_of_a_double_mode_regular(comm):
         for amplitude in (1e-6, 1e-5):
             for problem, defect in ((plain, 2), (unfolded(wheel, start), 0)):
                 sizes = np.linalg.svd(dense(problem.jacobian(problem.initial(amplitude))), compute_uv=False)
-                assert np.count_nonzero(sizes < 1e-12 * sizes[0]) == defect
+                assert np.count_nonzero(sizes < ROUNDING * sizes[0]) == defect
                 assert sizes[len(sizes) - 1 - defect] > 1e-5 * sizes[0]
 
 
@@ -99,10 +100,10 @@ def test_unfolded_jacobian_is_the_derivative_of_the_residual(comm):
     assert J.shape == (49, 50)
     residual = lambda v: whole(problem.residual(unknowns(problem, v)))  # noqa: E731
     expected = np.column_stack([difference(residual, y, e) for e in np.eye(50)])
-    assert np.allclose(J, expected, rtol=0, atol=1e-9 * np.abs(expected).max())
+    assert np.allclose(J, expected, rtol=0, atol=SOLVED * np.abs(expected).max())
     dy = np.random.default_rng(6).standard_normal(50)
     product = whole(problem.jacobian_product(unknowns(problem, y), unknowns(problem, dy)))
-    assert np.allclose(product, J @ dy, rtol=0, atol=1e-12 * np.abs(J @ dy).max())
+    assert np.allclose(product, J @ dy, rtol=0, atol=ROUNDING * np.abs(J @ dy).max())
 
 
 def test_the_rows_are_the_component_on_the_avoided_mode(comm):
@@ -119,7 +120,7 @@ def test_the_rows_are_the_component_on_the_avoided_mode(comm):
         r = whole(problem.residual(filled(problem.core.unknowns(), y)))
         length = np.linalg.norm(M @ np.column_stack([counter.real, counter.imag]))
         assert complex(r[-2], -r[-1]) * length == pytest.approx(
-            counter.conj() @ M @ (Q[:, 0] - 1j * Q[:, 1]), rel=1e-10
+            counter.conj() @ M @ (Q[:, 0] - 1j * Q[:, 1]), rel=TIGHT
         )
 
 
@@ -150,7 +151,7 @@ def test_modes_of_a_mistuned_wheel_are_those_of_its_matrices(comm):
     expected = np.sqrt(scipy.linalg.eigvalsh(K, np.kron(np.eye(SECTORS), np.diag(MASSES))))
     with rubbing_blisk().wheel(comm, {"K": changes}) as wheel:
         found = [mode.omega for mode in fw.linear_modes(wheel, 18, "free")]
-    assert found == pytest.approx(list(expected), rel=1e-10)
+    assert found == pytest.approx(list(expected), rel=TIGHT)
     assert min(np.diff(found) / found[:-1]) > 1e-9
 
 
@@ -198,8 +199,8 @@ def test_the_krylov_route_finds_the_same_branch(comm, method):
                 if route == "krylov":
                     assert max(p.linear / max(1, p.newton) for p in points) < 40
             for direct, krylov in zip(found["direct"], found["krylov"]):
-                assert krylov["omega"] == pytest.approx(direct["omega"], rel=1e-9)
-                assert krylov["beta"] == pytest.approx(direct["beta"], rel=1e-9, abs=1e-9 * direct["omega"])
+                assert krylov["omega"] == pytest.approx(direct["omega"], rel=SOLVED)
+                assert krylov["beta"] == pytest.approx(direct["beta"], rel=SOLVED, abs=SOLVED * direct["omega"])
 
 
 @pytest.mark.ranks(1, 2)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 from scipy.sparse.linalg import eigsh, spsolve
+from tolerances import LAST_DIGITS, ROUNDING, TIGHT
 
 from fretwave import fe
 from fretwave.errors import InputError
@@ -67,7 +68,7 @@ def test_patch_of_constant_strain_is_exact(order):
     inside = np.setdiff1d(np.arange(mesh.n_dof), held)
     assert len(inside) > 0
     found = spsolve(K[inside][:, inside].tocsc(), -K[inside][:, held] @ exact[held])
-    assert abs(found - exact[inside]).max() < 1e-10 * abs(exact).max()
+    assert abs(found - exact[inside]).max() < TIGHT * abs(exact).max()
     strain = (gradient + gradient.T) / 2
     first, shear = STEEL.lame
     energy = first * np.trace(strain) ** 2 + 2 * shear * (strain**2).sum()
@@ -102,10 +103,10 @@ def test_mass_symmetry_and_rigid_motions(order):
     M, K = fe.assemble(mesh, STEEL)
     report = fe.check_matrices(mesh, STEEL, M, K)
     assert report.mass_error < 1e-13
-    assert report.asymmetry < 1e-14
+    assert report.asymmetry < LAST_DIGITS
     assert report.rigid_residual < 1e-13
     energies = np.linalg.eigvalsh(K.toarray()) / abs(K).max()
-    assert (abs(energies) < 1e-12).sum() == 6 and energies[6] > 1e-9
+    assert (abs(energies) < ROUNDING).sum() == 6 and energies[6] > 1e-9
 
 
 def test_volume_of_a_curved_block_converges_to_the_cylinder():
@@ -172,7 +173,9 @@ def test_contact_patch_and_the_rows_of_b(order, average):
     mesh = fe.join([fe.Block("b", (4, 6, 2), bent)], order)
     patch = fe.contact_patch(mesh, "b", 0, 1, (3, 1), average)
     frames = fe.tangent_frames(patch.normals, (0, 0, 1))
-    assert np.einsum("nij,nkj->nik", frames, frames) == pytest.approx(np.broadcast_to(np.eye(3), (3, 3, 3)), abs=1e-14)
+    assert np.einsum("nij,nkj->nik", frames, frames) == pytest.approx(
+        np.broadcast_to(np.eye(3), (3, 3, 3)), abs=LAST_DIGITS
+    )
     assert np.linalg.det(frames) == pytest.approx(1.0)
     assert (patch.normals[:, 0] > 0.5).all()
     assert patch.areas.sum() == pytest.approx(fe.nodal_areas(mesh, mesh.block_faces("b", 0, 1)).sum())

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.sparse.linalg import eigsh, spsolve
+from tolerances import LAST_DIGITS, ROUNDING, SOLVED, TIGHT
 
 from fretwave import fe
 from fretwave.errors import InputError
@@ -38,7 +39,7 @@ def test_stress_of_a_linear_displacement_is_exact(order):
     stress = fe.stresses(mesh, STEEL, nodal(mesh, 1e-3 * x + 4e-4 * y))
     wanted = 1e-3 * np.diag([first + 2 * shear, first, first])
     wanted[0, 1] = wanted[1, 0] = 4e-4 * shear
-    assert np.abs(stress - wanted).max() < 1e-9 * np.abs(wanted).max()
+    assert np.abs(stress - wanted).max() < SOLVED * np.abs(wanted).max()
 
 
 @pytest.mark.parametrize("order", [1, 2])
@@ -52,8 +53,8 @@ def test_tension_holds_a_string(order):
         K = fe.stress_stiffness(mesh, CORK, stretched)
         v = nodal(mesh, z=np.sin(np.pi * x / LENGTH))
         errors.append(v @ K @ v / (tension * np.pi**2 / (2 * LENGTH)) - 1)
-        assert abs(K @ nodal(mesh, 1.0, 2.0, 3.0)).max() < 1e-12 * abs(K).max()
-        assert abs(K - K.T).max() < 1e-14 * abs(K).max()
+        assert abs(K @ nodal(mesh, 1.0, 2.0, 3.0)).max() < ROUNDING * abs(K).max()
+        assert abs(K - K.T).max() < LAST_DIGITS * abs(K).max()
     assert np.log2(errors[0] / errors[1]) == pytest.approx(2 * order, abs=0.1)
 
 
@@ -92,8 +93,8 @@ def test_rotating_bar_flaps_with_the_speed_and_lags_with_none():
     stiffening = fe.stress_stiffness(mesh, CORK, displacement)
     softening = fe.spin_softening(M, speed, (0, 0, 2.0))
     flap, lag = nodal(mesh, z=x), nodal(mesh, y=x)
-    assert flap @ (stiffening + softening) @ flap / (flap @ M @ flap) == pytest.approx(speed**2, rel=1e-10)
-    assert abs(lag @ (stiffening + softening) @ lag) < 1e-10 * speed**2 * (lag @ M @ lag)
+    assert flap @ (stiffening + softening) @ flap / (flap @ M @ flap) == pytest.approx(speed**2, rel=TIGHT)
+    assert abs(lag @ (stiffening + softening) @ lag) < TIGHT * speed**2 * (lag @ M @ lag)
 
 
 def test_wrong_displacement_is_refused():

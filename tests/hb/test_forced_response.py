@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from models.core_models import CubicLaw, LinearLaw, everywhere, oscillator, single_dof
+from tolerances import LAST_DIGITS, REPEATED, ROUNDING, SOLVED
 
 import fretwave as fw
 
@@ -38,8 +39,8 @@ def test_linear_single_dof_has_its_frequency_response(comm, force):
     for p in points:
         s = problem.state(p.y)
         exact = 3.0 * force / (K - M * s["omega"] ** 2 + 1j * C * s["omega"])
-        assert s["amplitude"] == pytest.approx(abs(exact), rel=1e-9)
-        assert wrapped(s["phase"] - np.angle(exact)) == pytest.approx(0, abs=1e-9)
+        assert s["amplitude"] == pytest.approx(abs(exact), rel=SOLVED)
+        assert wrapped(s["phase"] - np.angle(exact)) == pytest.approx(0, abs=SOLVED)
 
 
 def test_parameter_is_the_angular_frequency(comm):
@@ -47,9 +48,9 @@ def test_parameter_is_the_angular_frequency(comm):
     problem = forced(single_dof(comm, M, K, C), [1], {1: np.array([1.0])}, 1.0)
     points = follow(problem, 0.5 * RESONANCE, 2 * RESONANCE, report_at=wanted)
     states = [problem.state(p.y) for p in points if p.event == "report"]
-    assert [s["omega"] for s in states] == pytest.approx(wanted, rel=1e-14)
-    assert states[1]["phase"] == pytest.approx(-np.pi / 2, abs=1e-9)
-    assert states[1]["frequency_hz"] == pytest.approx(RESONANCE / (2 * np.pi), rel=1e-14)
+    assert [s["omega"] for s in states] == pytest.approx(wanted, rel=LAST_DIGITS)
+    assert states[1]["phase"] == pytest.approx(-np.pi / 2, abs=SOLVED)
+    assert states[1]["frequency_hz"] == pytest.approx(RESONANCE / (2 * np.pi), rel=LAST_DIGITS)
 
 
 def test_several_harmonics_of_a_linear_model(two_dof, comm):
@@ -65,7 +66,7 @@ def test_several_harmonics_of_a_linear_model(two_dof, comm):
         found = Q[:, 0] if n == 0 else Q[:, 2 * n - 1] - 1j * Q[:, 2 * n]
         s = 11.0j * n
         expected = np.linalg.solve(two_dof.K + s * damping + s**2 * two_dof.M, 0.5 * P)
-        assert np.allclose(found, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
+        assert np.allclose(found, expected, rtol=0, atol=ROUNDING * np.abs(expected).max())
 
 
 def test_linear_law_adds_to_the_frequency_response(comm):
@@ -75,7 +76,7 @@ def test_linear_law_adds_to_the_frequency_response(comm):
     for p in follow(problem, 3.0, 8.0):
         s = problem.state(p.y)
         exact = 1 / (K + 10.0 - M * s["omega"] ** 2 + 1j * (C + 0.2) * s["omega"])
-        assert s["amplitude"] == pytest.approx(abs(exact), rel=1e-9)
+        assert s["amplitude"] == pytest.approx(abs(exact), rel=SOLVED)
 
 
 def friction_points(two_dof, comm, level, damping=None):
@@ -98,7 +99,7 @@ def test_work_of_the_force_is_what_friction_dissipates(two_dof, comm, level):
     for p in points[::3]:
         Q = everywhere(problem, problem.coefficients(p.y))
         fed = work_of_the_force(Q, problem.harmonics.labels, np.array([level, 0.0]))
-        assert problem.diagnostics(p.y)["work"] == pytest.approx(fed, rel=1e-8)
+        assert problem.diagnostics(p.y)["work"] == pytest.approx(fed, rel=REPEATED)
 
 
 def test_work_is_shared_by_friction_and_viscous_damping(two_dof, comm):
@@ -111,7 +112,7 @@ def test_work_is_shared_by_friction_and_viscous_damping(two_dof, comm):
         orders = np.array(problem.harmonics.orders)
         viscous = np.pi * p.parameter * np.einsum("in,ij,jn,n->", q.conj(), damping, q, orders**2).real
         fed = work_of_the_force(Q, problem.harmonics.labels, np.array([level, 0.0]))
-        assert problem.diagnostics(p.y)["work"] + viscous == pytest.approx(fed, rel=1e-8)
+        assert problem.diagnostics(p.y)["work"] + viscous == pytest.approx(fed, rel=REPEATED)
 
 
 @pytest.mark.ranks(1)
@@ -136,8 +137,8 @@ def test_forced_duffing_resonates_on_the_undamped_backbone(comm):
     for s in states:
         a, w = s["amplitude"], s["omega"]
         stiffness = 1 - w**2 + 0.75 * a**2 + 0.05j * w
-        assert a * abs(stiffness) == pytest.approx(0.1, rel=1e-8)
-        assert s["phase"] == pytest.approx(-np.angle(stiffness), abs=1e-8)
+        assert a * abs(stiffness) == pytest.approx(0.1, rel=REPEATED)
+        assert s["phase"] == pytest.approx(-np.angle(stiffness), abs=REPEATED)
     assert max(s["amplitude"] for s in states) > 1.0
 
 

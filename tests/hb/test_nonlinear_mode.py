@@ -17,6 +17,7 @@ from models.core_models import (
     states,
 )
 from scipy.special import ellipk
+from tolerances import LAST_BIT, LAST_DIGITS, ROUNDING, SOLVED, TIGHT
 
 import fretwave as fw
 
@@ -68,9 +69,9 @@ def test_columns_of_a_state_belong_together(two_dof, comm):
     """lambda = -beta + i w, w0 = |lambda|, zeta = beta / w0 (DESIGN section 1), in both methods."""
     for method in METHODS:
         for s, _ in paper_branch(two_dof, comm, method):
-            assert s["omega0"] == pytest.approx(np.hypot(s["beta"], s["omega"]), rel=1e-14)
-            assert s["beta"] == pytest.approx(s["zeta"] * s["omega0"], rel=1e-14)
-            assert s["frequency_hz"] == pytest.approx(s["omega"] / (2 * np.pi), rel=1e-15)
+            assert s["omega0"] == pytest.approx(np.hypot(s["beta"], s["omega"]), rel=LAST_DIGITS)
+            assert s["beta"] == pytest.approx(s["zeta"] * s["omega0"], rel=LAST_DIGITS)
+            assert s["frequency_hz"] == pytest.approx(s["omega"] / (2 * np.pi), rel=LAST_BIT)
 
 
 def viscous_singularity(two_dof, method, state):
@@ -110,7 +111,7 @@ def test_coulomb_slider_on_a_single_dof(comm, method):
         problem = mode_problem(single_dof(comm, m, k, law=friction([[1.0]], limit, eps)), [1], 4096, method)
         state = problem.state(solve_at(problem, a))
         errors.append(state["zeta"] - 2 * limit / (np.pi * k * a))
-        assert state["omega0"] == pytest.approx(np.sqrt(k / m), rel=1e-12)
+        assert state["omega0"] == pytest.approx(np.sqrt(k / m), rel=ROUNDING)
     assert np.log2(np.divide(errors[:-1], errors[1:])) == pytest.approx([2, 2], abs=0.01)
     assert abs(errors[-1]) < 2e-6
 
@@ -125,9 +126,9 @@ def test_one_harmonic_of_a_velocity_law_makes_cnm_and_epmc_equal(comm):
         f = everywhere(problem, problem.contact_period(y))[0]["f"][:, 0, 0]
         force = 2 / 256 * abs(np.exp(-2j * np.pi * np.arange(256) / 256) @ f)
         state = problem.state(y)
-        assert state["zeta"] == pytest.approx(force / (2 * 3.0 * 1.5), rel=1e-12)
+        assert state["zeta"] == pytest.approx(force / (2 * 3.0 * 1.5), rel=ROUNDING)
         found.append((state["omega0"], state["zeta"]))
-    assert found[0] == pytest.approx(found[1], rel=1e-12)
+    assert found[0] == pytest.approx(found[1], rel=ROUNDING)
 
 
 def duffing_frequency(a, g=1.0):
@@ -157,12 +158,12 @@ def test_undamped_duffing_converges_spectrally(comm, method):
     """Each further odd harmonic divides the error by more than 20, down to rounding; no damping comes out."""
     errors, damping = zip(*(duffing_error(comm, method, H, 1.0) for H in (1, 3, 5, 7, 9, 11)))
     assert all(later < earlier / 20 for earlier, later in zip(errors, errors[1:]))
-    assert errors[-1] < 5e-11 and max(damping) < 1e-14
+    assert errors[-1] < 5e-11 and max(damping) < LAST_DIGITS
 
 
 @pytest.mark.parametrize("amplitude", [0.5, 2.0, 10.0])
 def test_undamped_duffing_at_small_and_large_amplitude(comm, amplitude):
-    assert duffing_error(comm, "CNM", 31, amplitude)[0] < 1e-12
+    assert duffing_error(comm, "CNM", 31, amplitude)[0] < ROUNDING
 
 
 def unilateral(comm, highest, amplitude=1.0):
@@ -181,7 +182,7 @@ def test_unilateral_spring_converges_to_its_closed_form(comm):
 @pytest.mark.ranks(1)
 def test_unilateral_spring_has_one_frequency_at_every_amplitude(comm):
     """The law is homogeneous of degree one."""
-    assert [unilateral(comm, 7, a) for a in (1e-3, 1e3)] == pytest.approx([unilateral(comm, 7)] * 2, rel=1e-12)
+    assert [unilateral(comm, 7, a) for a in (1e-3, 1e3)] == pytest.approx([unilateral(comm, 7)] * 2, rel=ROUNDING)
 
 
 @pytest.mark.ranks(1)
@@ -191,8 +192,8 @@ def test_mass_proportional_damping_added_afterwards_is_exact_in_epmc(two_dof, co
     without = at_event(paper_branch(two_dof, comm, "EPMC"), "report")
     damped = at_event(paper_branch(two_dof, comm, "EPMC", alpha * two_dof.M), "report")
     for a, b in zip(without, damped):
-        assert b["omega0"] == pytest.approx(a["omega0"], rel=1e-10)
-        assert b["zeta"] == pytest.approx(a["zeta"] + alpha / (2 * a["omega0"]), abs=1e-10)
+        assert b["omega0"] == pytest.approx(a["omega0"], rel=TIGHT)
+        assert b["zeta"] == pytest.approx(a["zeta"] + alpha / (2 * a["omega0"]), abs=TIGHT)
 
 
 @pytest.mark.ranks(1)
@@ -213,7 +214,7 @@ def test_zero_damping_is_the_same_limit_cycle_in_both_methods(two_dof, comm):
     assert len(cycles[0]) == len(cycles[1]) == 2
     for cnm, epmc in zip(*cycles):
         for key in ("amplitude", "omega"):
-            assert cnm[key] == pytest.approx(epmc[key], rel=1e-9)
+            assert cnm[key] == pytest.approx(epmc[key], rel=SOLVED)
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -224,4 +225,4 @@ def test_law_copied_in_python_gives_the_same_branch(two_dof, comm, method):
         problem = mode_problem(oscillator(two_dof, comm, law=law), [1, 3, 5], 256, method, start="stuck")
         found.append(states(problem, 0.05, (0.05, 1.0), [0.1, 0.2, 0.6]))
     for compiled, python in zip(*found):
-        assert list(python.values()) == pytest.approx(list(compiled.values()), rel=1e-10)
+        assert list(python.values()) == pytest.approx(list(compiled.values()), rel=TIGHT)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from models.core_models import chain, dense, friction, unknowns, whole
+from tolerances import ROUNDING, SOLVED, TIGHT
 
 import fretwave as fw
 
@@ -47,16 +48,16 @@ def test_a_row_gives_the_same_mode_over_another_amplitude(comm):
         over_row = fw.follow(mode_of(model, ROW), 0.05, 6.0, report_at=[abs(ROW @ shape)])
         one, other = (branch[branch.met("report")[0]] for branch in (over_dof, over_row))
         q = over_row.shape(over_row.met("report")[0])
-    assert other["omega"] == pytest.approx(one["omega"], rel=1e-9)
+    assert other["omega"] == pytest.approx(one["omega"], rel=SOLVED)
     assert other["zeta"] == pytest.approx(one["zeta"], rel=1e-7)
-    assert ROW @ q == pytest.approx(other["amplitude"], rel=1e-9), "(a, 0): real"
+    assert ROW @ q == pytest.approx(other["amplitude"], rel=SOLVED), "(a, 0): real"
 
 
 def test_a_row_is_observed_in_a_response(comm):
     with model_of(comm) as model:
         branch = fw.follow(response_of(model, ROW), 0.2, 0.5)
         q = branch.shape(len(branch) // 2)
-    assert abs(ROW @ q) == pytest.approx(branch["amplitude"][len(branch) // 2], rel=1e-10)
+    assert abs(ROW @ q) == pytest.approx(branch["amplitude"][len(branch) // 2], rel=TIGHT)
 
 
 def test_a_modal_coordinate_is_that_of_unit_modal_mass(comm):
@@ -65,8 +66,8 @@ def test_a_modal_coordinate_is_that_of_unit_modal_mass(comm):
         second = fw.linear_modes(model, 2)[1]
         mode = fw.NonlinearMode(model, fw.Harmonics([1], 16), dof=second, start=second)
         branch = fw.follow(mode, 0.1, 1.0)
-        np.testing.assert_allclose(branch["omega"], second.omega, rtol=1e-10)
-        np.testing.assert_allclose(branch.shape(0), 0.1 * second.shape, atol=1e-10)
+        np.testing.assert_allclose(branch["omega"], second.omega, rtol=TIGHT)
+        np.testing.assert_allclose(branch.shape(0), 0.1 * second.shape, atol=TIGHT)
         assert "coordinate" in repr(mode)
 
 
@@ -85,10 +86,10 @@ def test_derivatives_with_a_row(comm, method):
 
         differences = [sum(w * residual(y + k * STEP * e) for k, w in weights.items()) / STEP for e in np.eye(len(y))]
         J, expected = dense(mode.jacobian(unknowns(mode, y))), np.column_stack(differences)
-        assert np.allclose(J, expected, rtol=0, atol=1e-9 * np.abs(expected).max())
+        assert np.allclose(J, expected, rtol=0, atol=SOLVED * np.abs(expected).max())
         dy = rng.standard_normal(len(y))
         product = whole(mode.jacobian_product(unknowns(mode, y), unknowns(mode, dy)))
-        assert np.allclose(product, J @ dy, rtol=0, atol=1e-12 * np.abs(J @ dy).max())
+        assert np.allclose(product, J @ dy, rtol=0, atol=ROUNDING * np.abs(J @ dy).max())
 
 
 @pytest.mark.parametrize("blocks", ["dense", "sparse"])
@@ -105,7 +106,7 @@ def test_both_preconditioners_take_a_row(comm, blocks):
         finally:
             options.delValue("row_route"), options.delValue("row_blocks")
     one, other = (branch[branch.met("report")[0]] for branch in (direct, krylov))
-    assert other["omega"] == pytest.approx(one["omega"], rel=1e-9)
+    assert other["omega"] == pytest.approx(one["omega"], rel=SOLVED)
     assert krylov["linear"].sum() <= 12 * krylov["newton"].sum()
 
 
@@ -134,9 +135,9 @@ def test_observed_columns_are_those_of_the_motion(comm, tmp_path):
         q = branch.shape(len(branch) - 1)
         coordinate = model.inertia(first.shape) @ q
     last = branch[len(branch) - 1]
-    assert last["tip"] == pytest.approx(abs(q[5]), rel=1e-12)
-    assert last["relative"] == pytest.approx(abs(ROW @ q), rel=1e-12)
-    assert last["first"] == pytest.approx(abs(coordinate), rel=1e-12)
+    assert last["tip"] == pytest.approx(abs(q[5]), rel=ROUNDING)
+    assert last["relative"] == pytest.approx(abs(ROW @ q), rel=ROUNDING)
+    assert last["first"] == pytest.approx(abs(coordinate), rel=ROUNDING)
     assert branch.units["energy"] == "J" and branch.names[-4:] == ["tip", "relative", "first", "energy"]
     path = comm.bcast(tmp_path) / "branch.h5"
     branch.save(path)
@@ -150,13 +151,13 @@ def test_energy_of_a_linear_mode_is_half_k_a_squared(comm):
         second = fw.linear_modes(model, 2)[1]
         mode = fw.NonlinearMode(model, fw.Harmonics([1, 3], 16), dof=second, start=second)
         branch = fw.follow(mode, 0.1, 1.0, observe={"energy": "energy"})
-    np.testing.assert_allclose(branch["energy"], second.omega**2 * branch["amplitude"] ** 2 / 2, rtol=1e-9)
+    np.testing.assert_allclose(branch["energy"], second.omega**2 * branch["amplitude"] ** 2 / 2, rtol=SOLVED)
     with fw.Model([[2.0]], [[8.0]], comm=comm) as model:
         start = fw.linear_modes(model, 1)[0]
         response = fw.ForcedResponse(model, fw.Harmonics([1], 16), {1: [1.0]}, 1.0, 0, start)
         branch = fw.follow(response, 0.5, 1.0, observe={"energy": "energy"})
     wanted = (2 * branch["omega"] ** 2 + 8) * branch["amplitude"] ** 2 / 4
-    np.testing.assert_allclose(branch["energy"], wanted, rtol=1e-10)
+    np.testing.assert_allclose(branch["energy"], wanted, rtol=TIGHT)
 
 
 def test_energy_of_a_sectors_wave_is_that_of_the_wheel_over_its_sectors(comm):
@@ -170,8 +171,8 @@ def test_energy_of_a_sectors_wave_is_that_of_the_wheel_over_its_sectors(comm):
             fw.NonlinearMode(wheel, fw.Harmonics([1], 24), start=start, avoid=other),
         ]
         energy = [fw.follow(mode, 0.5, 1.0, observe={"energy": "energy"})["energy"][0] for mode in modes]
-    assert energy[0] == pytest.approx(one.omega**2 * 0.5**2 / 2, rel=1e-9)
-    assert energy[1] == pytest.approx(12 * energy[0], rel=1e-9)
+    assert energy[0] == pytest.approx(one.omega**2 * 0.5**2 / 2, rel=SOLVED)
+    assert energy[1] == pytest.approx(12 * energy[0], rel=SOLVED)
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ import scipy.linalg
 import scipy.sparse as sp
 from models import hexahedra
 from models.matrix_files import write_npz
+from tolerances import LAST_BIT, SOLVED
 
 import fretwave as fw
 from fretwave.commands.main import main
@@ -119,12 +120,12 @@ def test_pairs_of_coincident_nodes_join_two_bodies(tmp_path: Path, capfd) -> Non
     moved[: len(two.first.nodes), 0] = 1.0
     np.testing.assert_allclose((joint.B @ moved.ravel()).reshape(-1, 3), np.broadcast_to([1.0, 0, 0], (6, 3)))
     rotation = np.cross([0.3, 0.5, 0.7], two.nodes).ravel()
-    assert abs(joint.B @ rotation).max() < 1e-15
+    assert abs(joint.B @ rotation).max() < LAST_BIT
     T = scipy.linalg.null_space(joint.B.toarray())
     K, M, whole = T.T @ model.K @ T, T.T @ model.M @ T, two.whole
     joined = scipy.linalg.eigh(K, M, eigvals_only=True)[6:]
     np.testing.assert_allclose(
-        joined, scipy.linalg.eigh(whole.K.toarray(), whole.M.toarray(), eigvals_only=True)[6:], rtol=1e-9
+        joined, scipy.linalg.eigh(whole.K.toarray(), whole.M.toarray(), eigvals_only=True)[6:], rtol=SOLVED
     )
 
 

@@ -10,6 +10,7 @@ import pytest
 import scipy.linalg
 import scipy.sparse as sp
 from models.matrix_files import EXACT, Held, write_calculix, write_npz, write_petsc, write_v5, write_v73
+from tolerances import ROUNDING
 
 import fretwave as fw
 from fretwave.commands.main import main
@@ -50,7 +51,7 @@ def test_one_model_through_every_format(held: Held, kind: str, tmp_path: Path) -
         assert abs(A - was).max() <= (0 if kind in EXACT else 5e-14) * abs(was).max()
         assert abs(A - A.T).max() == 0
     np.testing.assert_allclose(
-        frequencies(model.K, model.M), frequencies(held.K, held.M), rtol=1e-12 + digits(held, kind)
+        frequencies(model.K, model.M), frequencies(held.K, held.M), rtol=ROUNDING + digits(held, kind)
     )
     if kind in ("CalculiX", "Abaqus, matrix input"):
         assert model.dof_names[0] == "n7x"

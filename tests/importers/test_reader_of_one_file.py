@@ -10,6 +10,7 @@ import pytest
 import scipy.sparse as sp
 from command_line import call
 from models import toy_format
+from tolerances import SOLVED
 
 from fretwave.case import plugins
 from fretwave.errors import InputError
@@ -68,7 +69,7 @@ def test_a_case_reads_it(tmp_path: Path) -> None:
     assert call("run", put(tmp_path), "--out", tmp_path / "run", "--no-plots") == 0
     stuck = K + np.diag([0.0, 0.0, 1e3])
     omega = np.sqrt(np.linalg.eigvals(np.linalg.solve(M, stuck)).real.min())
-    assert Run(tmp_path / "run").table("mode")["omega"] == pytest.approx(omega, rel=1e-9)
+    assert Run(tmp_path / "run").table("mode")["omega"] == pytest.approx(omega, rel=SOLVED)
 
 
 def test_the_importer_reads_it(tmp_path: Path) -> None:

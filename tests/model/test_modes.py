@@ -7,6 +7,7 @@ import pytest
 import scipy.sparse as sp
 from models.core_models import LinearLaw, chain, friction, oscillator, single_dof
 from petsc4py import PETSc
+from tolerances import LAST_BIT, ROUNDING, SOLVED, TIGHT
 
 import fretwave as fw
 
@@ -35,15 +36,15 @@ def test_stuck_and_free_asymptotes_of_the_paper_s_oscillator(two_dof, comm):
     model = oscillator(two_dof, comm)
     stuck, free = fw.linear_modes(model, 2, "stuck"), fw.linear_modes(model, 2, "free")
     high = np.sqrt(1320.0 + np.sqrt(1320.0**2 - 1.2e6))
-    assert [mode.omega for mode in stuck] == pytest.approx([two_dof.omega_stuck], rel=1e-12)
-    assert [mode.omega for mode in free] == pytest.approx([two_dof.omega_free, high], rel=1e-12)
+    assert [mode.omega for mode in stuck] == pytest.approx([two_dof.omega_stuck], rel=ROUNDING)
+    assert [mode.omega for mode in free] == pytest.approx([two_dof.omega_free, high], rel=ROUNDING)
     assert [two_dof.omega_free, high] == pytest.approx([24.1562, 45.3484], abs=5e-5)
 
 
 def test_stuck_shape_keeps_the_contact_closed(two_dof, comm):
     """The tanh law is rigid when stuck: m2 does not move, and m1 = 1 has unit modal mass."""
     shape = fw.linear_modes(oscillator(two_dof, comm), 1, "stuck")[0].shape
-    assert np.abs(shape) == pytest.approx([1.0, 0.0], abs=1e-12)
+    assert np.abs(shape) == pytest.approx([1.0, 0.0], abs=ROUNDING)
 
 
 def test_elastic_contact_adds_its_stiffness_when_stuck(comm):
@@ -89,8 +90,8 @@ def test_shapes_have_unit_modal_mass_and_are_orthogonal(comm):
     model = fw.Model(M3, K3, comm=comm)
     modes = fw.linear_modes(model, 3, "free")
     shapes = np.column_stack([mode.shape for mode in modes])
-    assert np.allclose(shapes.T @ M3 @ shapes, np.eye(3), rtol=0, atol=1e-12)
-    assert np.allclose(shapes.T @ K3 @ shapes, np.diag([m.omega**2 for m in modes]), rtol=0, atol=1e-12 * 200)
+    assert np.allclose(shapes.T @ M3 @ shapes, np.eye(3), rtol=0, atol=ROUNDING)
+    assert np.allclose(shapes.T @ K3 @ shapes, np.diag([m.omega**2 for m in modes]), rtol=0, atol=ROUNDING * 200)
     assert [mode.zeta for mode in modes] == [0, 0, 0]
 
 
@@ -101,7 +102,7 @@ def test_rigid_body_mode_has_no_frequency(comm):
     K[0, 0] = K[-1, -1] = 100.0
     modes = fw.linear_modes(fw.Model(np.eye(n), K, comm=comm), 3, "free")
     assert modes[0].omega < 1e-5
-    assert np.abs(modes[0].shape) == pytest.approx(np.full(n, 1 / np.sqrt(n)), rel=1e-9)
+    assert np.abs(modes[0].shape) == pytest.approx(np.full(n, 1 / np.sqrt(n)), rel=SOLVED)
     assert [m.omega for m in modes[1:]] == pytest.approx(20 * np.sin(np.pi * np.array([1, 2]) / (2 * n)), rel=1e-11)
 
 
@@ -117,11 +118,11 @@ def test_double_mode_is_found_twice(comm):
 
 def check_quadratic_modes(modes, M, C, K):
     expected = state_eigenvalues(M, C, K)
-    assert [-m.beta + 1j * m.omega for m in modes] == pytest.approx(expected, rel=1e-10)
+    assert [-m.beta + 1j * m.omega for m in modes] == pytest.approx(expected, rel=TIGHT)
     for mode in modes:
         s, phi = -mode.beta + 1j * mode.omega, mode.shape + 1j * mode.imaginary
         residual = (K + s * C + s**2 * M) @ phi
-        assert np.abs(residual).max() < 1e-9 * np.abs(K).max() * np.abs(phi).max()
+        assert np.abs(residual).max() < SOLVED * np.abs(K).max() * np.abs(phi).max()
 
 
 def test_damped_modes_are_those_of_the_state_matrix(comm):
@@ -140,14 +141,14 @@ def test_damping_ratio_and_frequency_of_a_single_dof(comm):
     """lambda = -c/(2m) +- i sqrt(k/m - c^2/(4m^2))."""
     m, k, c = 2.0, 50.0, 0.8
     mode = fw.linear_modes(single_dof(comm, m, k, c), 1, "linearised")[0]
-    assert (mode.beta, mode.zeta) == pytest.approx((c / (2 * m), c / (2 * np.sqrt(k * m))), rel=1e-12)
-    assert mode.omega == pytest.approx(np.sqrt(k / m - (c / (2 * m)) ** 2), rel=1e-12)
-    assert mode.frequency_hz == pytest.approx(mode.omega / (2 * np.pi), rel=1e-15)
+    assert (mode.beta, mode.zeta) == pytest.approx((c / (2 * m), c / (2 * np.sqrt(k * m))), rel=ROUNDING)
+    assert mode.omega == pytest.approx(np.sqrt(k / m - (c / (2 * m)) ** 2), rel=ROUNDING)
+    assert mode.frequency_hz == pytest.approx(mode.omega / (2 * np.pi), rel=LAST_BIT)
 
 
 def test_negative_damping_is_reported_as_such(comm):
     mode = fw.linear_modes(single_dof(comm, 1.0, 1.0, -0.04), 1, "linearised")[0]
-    assert mode.zeta == pytest.approx(-0.02, rel=1e-12)
+    assert mode.zeta == pytest.approx(-0.02, rel=ROUNDING)
 
 
 def test_no_more_modes_than_degrees_of_freedom(comm):

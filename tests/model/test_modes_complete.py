@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from models.core_models import chain, single_dof
 from petsc4py import PETSc
+from tolerances import REPEATED, ROUNDING, SOLVED
 
 import fretwave as fw
 from fretwave.errors import FretwaveError
@@ -53,9 +54,9 @@ def check(comm, K, M, count):
     expected = np.maximum(squares(K, M), 0.0)[:count]
     size = squares(K, M)[-1]
     assert len(modes) == min(count, len(K))
-    assert np.allclose([mode.omega**2 for mode in modes], expected, rtol=1e-9, atol=1e-12 * size)
+    assert np.allclose([mode.omega**2 for mode in modes], expected, rtol=SOLVED, atol=ROUNDING * size)
     shapes = np.column_stack([mode.shape for mode in modes])
-    assert np.allclose(shapes.T @ M @ shapes, np.eye(len(modes)), rtol=0, atol=1e-8)
+    assert np.allclose(shapes.T @ M @ shapes, np.eye(len(modes)), rtol=0, atol=REPEATED)
 
 
 @pytest.mark.ranks(1, 2, 3)

@@ -14,6 +14,7 @@ import scipy.sparse.linalg
 from models.hexahedra import Bar, bar
 from mpi4py import MPI
 from petsc4py import PETSc
+from tolerances import REPEATED, ROUNDING, SOLVED, TIGHT
 
 from fretwave.errors import InputError
 from fretwave.model.reduction import Reduction, reduce
@@ -66,7 +67,7 @@ def test_all_component_modes_give_the_exact_frequencies(block: Bar) -> None:
     with reduced(block, modes=n - len(root_and_tip(block))) as reduction:
         assert reduction.size == n
         found = np.sqrt(squares(reduction.K + on_kept(extra, reduction), reduction.M))
-    np.testing.assert_allclose(found, exact, rtol=1e-10)
+    np.testing.assert_allclose(found, exact, rtol=TIGHT)
 
 
 def test_frequencies_fall_to_the_exact_ones_as_modes_are_added(block: Bar) -> None:
@@ -75,7 +76,7 @@ def test_frequencies_fall_to_the_exact_ones_as_modes_are_added(block: Bar) -> No
         with reduced(block, modes=modes) as reduction:
             errors.append(reduction.error(4, held(block)).relative)
     assert np.all(np.array(errors) > -1e-10)
-    assert np.all(np.diff(errors, axis=0) < 1e-10)
+    assert np.all(np.diff(errors, axis=0) < TIGHT)
     assert np.all(errors[0] > 1e-4) and errors[0].max() > 1e-2
     assert np.all(errors[-1] < 1e-5)
 
@@ -87,7 +88,7 @@ def test_static_response_is_exact(block: Bar) -> None:
     exact = scipy.sparse.linalg.spsolve((block.K + extra).tocsc(), load)
     with reduced(block, modes=3) as reduction:
         found = reduction.expand(np.linalg.solve(reduction.K + on_kept(extra, reduction), reduction.project(load)))
-    np.testing.assert_allclose(found, exact, rtol=0, atol=1e-12 * np.abs(exact).max())
+    np.testing.assert_allclose(found, exact, rtol=0, atol=ROUNDING * np.abs(exact).max())
 
 
 def test_rigid_motions_are_reproduced(block: Bar) -> None:
@@ -95,10 +96,10 @@ def test_rigid_motions_are_reproduced(block: Bar) -> None:
     with reduced(block, modes=4) as reduction:
         x_r = np.zeros((reduction.size, 6))
         x_r[: len(reduction.keep)] = motions[reduction.keep]
-        np.testing.assert_allclose(reduction.expand(x_r), motions, atol=1e-12)
-        np.testing.assert_allclose(reduction.K @ x_r, 0, atol=1e-12 * np.abs(block.K).max())
+        np.testing.assert_allclose(reduction.expand(x_r), motions, atol=ROUNDING)
+        np.testing.assert_allclose(reduction.K @ x_r, 0, atol=ROUNDING * np.abs(block.K).max())
         mass = motions.T @ block.M @ motions
-        np.testing.assert_allclose(x_r.T @ reduction.M @ x_r, mass, atol=1e-12 * mass.max())
+        np.testing.assert_allclose(x_r.T @ reduction.M @ x_r, mass, atol=ROUNDING * mass.max())
 
 
 def test_reduced_matrices_are_the_congruence_with_the_expanded_unit_vectors(block: Bar) -> None:
@@ -107,9 +108,9 @@ def test_reduced_matrices_are_the_congruence_with_the_expanded_unit_vectors(bloc
         T, n = reduction.expand(np.eye(reduction.size)), len(reduction.keep)
         for found, A in ((reduction.K, block.K), (reduction.M, block.M), (reduction.C, C)):
             expected = T.T @ (A @ T)
-            np.testing.assert_allclose(found, expected, atol=1e-9 * np.abs(expected).max())
+            np.testing.assert_allclose(found, expected, atol=SOLVED * np.abs(expected).max())
         np.testing.assert_array_equal(T[reduction.keep], np.eye(n, reduction.size))
-        np.testing.assert_allclose(reduction.project(block.M @ T), reduction.M, atol=1e-9)
+        np.testing.assert_allclose(reduction.project(block.M @ T), reduction.M, atol=SOLVED)
         for A in (reduction.K, reduction.M):
             np.testing.assert_array_equal(A, A.T)
         np.testing.assert_array_equal(reduction.K[:n, n:], 0)
@@ -122,7 +123,9 @@ def test_kept_dofs_stand_in_the_order_given(block: Bar) -> None:
     order = np.random.default_rng(2).permutation(len(keep))
     with reduced(block, modes=3) as plain, reduced(block, keep=keep[order], modes=3) as mixed:
         full_order = np.append(order, len(keep) + np.arange(3))
-        np.testing.assert_allclose(mixed.M, plain.M[np.ix_(full_order, full_order)], atol=1e-9 * np.abs(plain.M).max())
+        np.testing.assert_allclose(
+            mixed.M, plain.M[np.ix_(full_order, full_order)], atol=SOLVED * np.abs(plain.M).max()
+        )
         np.testing.assert_array_equal(mixed.keep, keep[order])
 
 
@@ -139,8 +142,8 @@ def test_component_modes_by_count_and_by_frequency(model: str, request: pytest.F
     exact = fixed_interface_hz(made, 12)
     limit = 0.5 * (exact[7] + exact[8]) if exact[8] > 1.001 * exact[7] else 0.5 * (exact[8] + exact[9])
     with reduced(made, modes=9) as by_count, reduced(made, highest_hz=limit) as by_frequency:
-        np.testing.assert_allclose(by_count.component_hz, exact[:9], rtol=1e-9)
-        np.testing.assert_allclose(by_frequency.component_hz, exact[exact < limit], rtol=1e-9)
+        np.testing.assert_allclose(by_count.component_hz, exact[:9], rtol=SOLVED)
+        np.testing.assert_allclose(by_frequency.component_hz, exact[exact < limit], rtol=SOLVED)
 
 
 def test_one_factorisation_serves_constraint_and_component_modes(blade: Bar) -> None:
@@ -165,13 +168,13 @@ def test_reduction_is_the_same_on_every_number_of_ranks(model: str, keep: str, r
     dofs = made.layer(0.0) if keep == "root" else root_and_tip(made)
     options = {"keep": dofs, "modes": 9, "C": 1e-6 * made.K}
     with reduced(made, **options) as shared, reduced(made, comm=MPI.COMM_SELF, **options) as alone:
-        np.testing.assert_allclose(shared.component_hz, alone.component_hz, rtol=1e-10)
+        np.testing.assert_allclose(shared.component_hz, alone.component_hz, rtol=TIGHT)
         for name in ("K", "M", "C"):
             ours, theirs = getattr(shared, name), getattr(alone, name)
-            np.testing.assert_allclose(ours, theirs, atol=1e-8 * np.abs(theirs).max(), err_msg=name)
+            np.testing.assert_allclose(ours, theirs, atol=REPEATED * np.abs(theirs).max(), err_msg=name)
         unit = np.eye(shared.size)
         for T, other in zip(shared.expand(unit).T, alone.expand(unit).T):
-            np.testing.assert_allclose(T, other, atol=1e-8 * np.abs(other).max())
+            np.testing.assert_allclose(T, other, atol=REPEATED * np.abs(other).max())
 
 
 def test_square_section_has_double_component_modes(blade: Bar) -> None:
@@ -185,7 +188,7 @@ def test_error_finds_the_elastic_modes_of_a_free_model(block: Bar) -> None:
         error = reduction.error(3)
         assert error.largest == np.abs(error.relative).max() < 1e-2
         assert error.wall_s > 0 and reduction.wall_s["total"] > 0
-    np.testing.assert_allclose(error.full_hz, exact, rtol=1e-8)
+    np.testing.assert_allclose(error.full_hz, exact, rtol=REPEATED)
 
 
 @pytest.mark.ranks(1, 2, 3)
@@ -195,7 +198,7 @@ def test_most_dofs_may_be_kept(block: Bar) -> None:
     with reduced(block, keep=np.arange(n - 3)) as reduction:
         assert reduction.size == n
         found = squares(reduction.K, reduction.M)
-    np.testing.assert_allclose(found[6:], squares(block.K.toarray(), block.M.toarray())[6:], rtol=1e-9)
+    np.testing.assert_allclose(found[6:], squares(block.K.toarray(), block.M.toarray())[6:], rtol=SOLVED)
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import scipy.linalg
 import scipy.sparse as sp
+from tolerances import LAST_BIT, LAST_DIGITS, REPEATED, SOLVED
 
 import fretwave as fw
 
@@ -62,11 +63,11 @@ def test_wheel_is_the_sum_of_its_sectors() -> None:
     tied, given = cut().tied(), cut()
     whole = tied.around(deviations, "blade")
     expected = wheel_of(given.K) + wheel_of(given.parts["blade"], deviations)
-    np.testing.assert_allclose(whole.own("K").toarray(), expected, rtol=0, atol=1e-15)
-    np.testing.assert_allclose(whole.own("M").toarray(), wheel_of(given.M), rtol=0, atol=1e-15)
-    np.testing.assert_allclose(whole.own("C").toarray(), wheel_of(given.C), rtol=0, atol=1e-15)
+    np.testing.assert_allclose(whole.own("K").toarray(), expected, rtol=0, atol=LAST_BIT)
+    np.testing.assert_allclose(whole.own("M").toarray(), wheel_of(given.M), rtol=0, atol=LAST_BIT)
+    np.testing.assert_allclose(whole.own("C").toarray(), wheel_of(given.C), rtol=0, atol=LAST_BIT)
     all_of_it = tied.around(deviations).own("K").toarray()
-    np.testing.assert_allclose(all_of_it, wheel_of(given.K, 1 + deviations), rtol=0, atol=1e-14)
+    np.testing.assert_allclose(all_of_it, wheel_of(given.K, 1 + deviations), rtol=0, atol=LAST_DIGITS)
     B = whole.pairs["shroud"].own.toarray()
     for j in range(N):
         row = np.zeros(2 * N)
@@ -87,13 +88,13 @@ def test_waves_of_the_sector_are_the_modes_of_the_wheel(comm, contact: str) -> N
     for diameters in range(-(N // 2) + 1, N // 2 + 1):
         with tied.model([fw.Contact("jenkins", tied.pairs["shroud"])], comm, diameters) as model:
             found += [mode.omega for mode in fw.linear_modes(model, 2, contact)]
-    np.testing.assert_allclose(np.sort(found), exact, rtol=1e-9)
+    np.testing.assert_allclose(np.sort(found), exact, rtol=SOLVED)
     whole = tied.around()
     with whole.model([fw.Contact("jenkins", whole.pairs["shroud"])], comm) as model:
-        np.testing.assert_allclose([m.omega for m in fw.linear_modes(model, 2 * N, contact)], exact, rtol=1e-9)
+        np.testing.assert_allclose([m.omega for m in fw.linear_modes(model, 2 * N, contact)], exact, rtol=SOLVED)
     sector = fw.Sector.of(tied, [fw.Contact("jenkins", tied.pairs["shroud"])])
     with sector.wheel(comm) as model:
-        np.testing.assert_allclose([m.omega for m in fw.linear_modes(model, 2 * N, contact)], exact, rtol=1e-9)
+        np.testing.assert_allclose([m.omega for m in fw.linear_modes(model, 2 * N, contact)], exact, rtol=SOLVED)
 
 
 @pytest.mark.ranks(1)
@@ -105,7 +106,7 @@ def test_damping_has_shares_and_dampers() -> None:
     np.testing.assert_array_equal(again.own("C").toarray(), given.damped().own("C").toarray())
     tied = given.tied().damped()
     np.testing.assert_allclose(
-        tied.around().own("C").toarray(), wheel_of(given.damped().own("C").toarray()), atol=1e-15
+        tied.around().own("C").toarray(), wheel_of(given.damped().own("C").toarray()), atol=LAST_BIT
     )
     assert replace(cut(), C=None).damped().C is None
 
@@ -134,9 +135,9 @@ def test_reduced_to_all_its_modes_is_the_same(comm) -> None:
         contact = fw.Contact("coulomb_3d", one.pairs["pads"], {"friction_coefficient": 0.3})
         with one.model([contact], comm) as model:
             omegas.append([mode.omega for mode in fw.linear_modes(model, 8)])
-    np.testing.assert_allclose(*omegas, rtol=1e-8)
+    np.testing.assert_allclose(*omegas, rtol=REPEATED)
     x, x_r = (np.linalg.solve(one.own("K").toarray(), one.loads["pull"]) for one in (full, small))
-    np.testing.assert_allclose(x_r[small.dof("tip")], x[4], rtol=1e-9)
+    np.testing.assert_allclose(x_r[small.dof("tip")], x[4], rtol=SOLVED)
     expected = (full.loads["pull"] + full.loads["push"]).reshape(-1, 3).sum(axis=0)
     for one in (full, small):
         np.testing.assert_allclose(one.resultant(["pull", "push"]), expected, rtol=1e-13)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 from petsc4py import PETSc
+from tolerances import ROUNDING
 
 from fretwave.errors import InputError, NotConverged
 from fretwave.mpi import groups
@@ -39,7 +40,7 @@ def test_results_are_those_of_one_rank_in_order_and_on_every_rank(comm, n_tasks)
     found = groups.run(comm, tasks, solved)
     assert [result["word"] for result in found] == [f"{task:g}" for task in tasks]
     for task, result in zip(tasks, found):
-        assert result["x"] == pytest.approx(np.arange(6) / task, rel=1e-12)
+        assert result["x"] == pytest.approx(np.arange(6) / task, rel=ROUNDING)
 
 
 def test_every_task_is_done_once_and_every_rank_works(comm):

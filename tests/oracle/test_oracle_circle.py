@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from tolerances import REPEATED, ROUNDING, SOLVED, TIGHT
 
 from oracle import Flow, System
 from oracle.circle import Block, Pair, Passage3d, orbit_3d
@@ -31,10 +32,10 @@ def test_a_straight_path_is_that_of_the_exact_oracle():
     orbit = orbits()["rubbing"]
     state = np.insert(orbit.state, [3, 6, 7], 0.0)
     passage = Passage3d(block(orbit.system), state, ("slip",), orbit.period)
-    assert passage.y == pytest.approx(state, abs=1e-12)
+    assert passage.y == pytest.approx(state, abs=ROUNDING)
     assert [event.after for event in passage.events] == ["open", "slip", "stick", "slip"]
     times = [event.t for event in orbit.events]
-    assert all(min(abs(event.t - t) for t in times) < 1e-8 for event in passage.events)
+    assert all(min(abs(event.t - t) for t in times) < REPEATED for event in passage.events)
 
 
 def test_runge_kutta_follows_the_bent_path():
@@ -64,7 +65,7 @@ def test_runge_kutta_follows_the_bent_path():
             z[8:] = 0.4 * (1 + 50 * z[0]) * d / np.linalg.norm(d)
         z = solve_ivp(slope, (begin, end), z, "DOP853", rtol=1e-12, atol=1e-14, args=(word,)).y[:, -1]
         begin = end
-    assert passage.y == pytest.approx(z, abs=1e-9)
+    assert passage.y == pytest.approx(z, abs=SOLVED)
     half = Passage3d(b, state, ("stick",), 2 * np.pi / b.omega, share=0.5)
     assert half.y == pytest.approx(passage.y, abs=1e-11)
 
@@ -90,4 +91,4 @@ def test_a_motion_that_lifts_off_has_no_step_left_out():
     b = block(system)
     flow = Flow(system).passage(system.extended(np.zeros(7)), system.start, 2 * np.pi / 3)
     passage = Passage3d(b, np.zeros(10), ("stick",), 2 * np.pi / 3)
-    assert np.delete(passage.y, [3, 7, 9]) == pytest.approx(flow.end[:7], abs=1e-10)
+    assert np.delete(passage.y, [3, 7, 9]) == pytest.approx(flow.end[:7], abs=TIGHT)

@@ -7,6 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from tolerances import REPEATED, ROUNDING, SOLVED
 
 from oracle import Coulomb, Flow, Jenkins, LoadedJenkins, System, Unilateral, forced_orbit
 from oracle.orbit import nodes
@@ -79,8 +80,8 @@ def test_runge_kutta_closes_the_period_of_the_paper_s_oscillator(level, omega):
         return np.array([0.0 if limit else 400.0 * v[1]])
 
     end = runge_kutta(orbit.system, orbit, lambda x, s: np.array([0.0, s[0]]), rate)
-    assert orbit.defect < 1e-12 and len(orbit.events) >= 4
-    assert end == pytest.approx(orbit.state, rel=1e-8, abs=1e-9)
+    assert orbit.defect < ROUNDING and len(orbit.events) >= 4
+    assert end == pytest.approx(orbit.state, rel=REPEATED, abs=SOLVED)
 
 
 def test_runge_kutta_closes_a_period_with_lift_off():
@@ -103,7 +104,7 @@ def test_runge_kutta_closes_a_period_with_lift_off():
 
     end = runge_kutta(orbit.system, orbit, lambda x, s: np.array([load(x), 0, 0]) + B * s, rate)
     assert {event.after for event in orbit.events} == {"open", "closed", "stick", "+", "-"}
-    assert orbit.defect < 1e-12
+    assert orbit.defect < ROUNDING
     assert end == pytest.approx(orbit.state, rel=1e-7, abs=1e-7)
 
 
@@ -112,7 +113,7 @@ def test_nothing_depends_on_the_steps_and_no_event_is_missed(name):
     orbit = orbits()[name]
     for share in (0.5, 0.21):
         finer = forced_orbit(orbit.system, orbit.state, orbit.pattern, share=share)
-        assert finer.state == pytest.approx(orbit.state, rel=1e-11, abs=1e-12)
+        assert finer.state == pytest.approx(orbit.state, rel=1e-11, abs=ROUNDING)
         assert [(e.contact, e.after) for e in finer.events] == [(e.contact, e.after) for e in orbit.events]
         assert [e.t for e in finer.events] == pytest.approx([e.t for e in orbit.events], abs=1e-11)
 
@@ -147,10 +148,10 @@ def test_a_chain_of_twenty_with_every_law_closes_and_balances_its_energy():
     K = 100 * (2 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1))
     system = System(np.eye(n), 0.02 * np.eye(n) + 1e-3 * K, K, contacts, 6 * along[0] + 2j * along[7], omega=4.4)
     orbit = forced_orbit(system)
-    assert orbit.defect < 1e-12 and {event.contact for event in orbit.events} == set(range(6))
+    assert orbit.defect < ROUNDING and {event.contact for event in orbit.events} == set(range(6))
     q = orbit.harmonics([system.displacement(k) for k in range(n)], 1)[:, 1]
     _, weight, y = nodes(orbit.passage, 22)
     v = y[:, n : 2 * n]
     damped = weight @ ((v @ system.C) * v).sum(axis=1)
-    assert damped + orbit.work().sum() == pytest.approx(np.pi * (q.conj() @ system.P).imag, rel=1e-12)
-    assert orbit.work()[[2, 3]] == pytest.approx(0, abs=1e-12 * damped)
+    assert damped + orbit.work().sum() == pytest.approx(np.pi * (q.conj() @ system.P).imag, rel=ROUNDING)
+    assert orbit.work()[[2, 3]] == pytest.approx(0, abs=ROUNDING * damped)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tolerances import LAST_DIGITS, ROUNDING, SOLVED
 
 from oracle import Jenkins, System, hysteresis, mode_orbit, series_motion
 
@@ -60,10 +61,10 @@ def test_one_harmonic_has_its_closed_form():
     th = np.arccos(1 - 2 * 0.5)
     kappa = (th - np.sin(2 * th) / 2) / np.pi + 2j / np.pi * 0.5
     epmc = series_motion(system, "EPMC", 1, amplitude=2.0)
-    assert epmc.omega0 == pytest.approx(np.sqrt(1 + kappa.real), rel=1e-14)
-    assert epmc.zeta == pytest.approx(kappa.imag / (2 * (1 + kappa.real)), rel=1e-14)
+    assert epmc.omega0 == pytest.approx(np.sqrt(1 + kappa.real), rel=LAST_DIGITS)
+    assert epmc.zeta == pytest.approx(kappa.imag / (2 * (1 + kappa.real)), rel=LAST_DIGITS)
     cnm = series_motion(system, "CNM", 1, amplitude=2.0)
-    assert cnm.lambda_ == pytest.approx(1j * np.sqrt(1 + kappa), rel=1e-14)
+    assert cnm.lambda_ == pytest.approx(1j * np.sqrt(1 + kappa), rel=LAST_DIGITS)
     assert (cnm.omega0, cnm.zeta) == pytest.approx((1.238306, 0.104362), abs=1e-6)
 
 
@@ -73,9 +74,9 @@ def test_the_series_tends_to_the_orbit(a):
     coarse = series_motion(PAPER, "EPMC", 21, amplitude=a)
     fine = series_motion(PAPER, "EPMC", 201, amplitude=a, guess=coarse)
     orbit = mode_orbit(PAPER, 0, a, coarse.omega0, coarse.zeta, coarse.state(0.3), phase=0.3)
-    assert orbit.defect < 1e-12
-    assert fine.omega0 == pytest.approx(orbit.omega0, rel=1e-9)
-    assert fine.zeta == pytest.approx(orbit.zeta, abs=1e-9)
+    assert orbit.defect < ROUNDING
+    assert fine.omega0 == pytest.approx(orbit.omega0, rel=SOLVED)
+    assert fine.zeta == pytest.approx(orbit.zeta, abs=SOLVED)
     turned = np.exp(-0.3j * np.arange(10))
     q = orbit.harmonics([orbit.system.displacement(k) for k in range(2)], 9) * turned
     off = [abs(motion.q[:, :10] - q).max() for motion in (coarse, fine)]

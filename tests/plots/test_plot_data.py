@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from models.duffing import C, mode, response, stiffness
 from models.kept_branches import relative, write_branches
+from tolerances import ROUNDING, SOLVED
 
 from fretwave.columns import FORCED, MODE, Column
 from fretwave.plots import (
@@ -190,14 +191,14 @@ def test_trajectories_and_phase_planes_are_the_ellipses_of_the_coefficients(tmp_
     left, right = trajectories.draw(found).axes
     for line, a in zip(left.lines, (0.1, 0.2, 0.4)):
         x, y = line.get_xydata().T
-        np.testing.assert_allclose((x / a) ** 2 + (2 * y / a) ** 2, 1, rtol=1e-12)
+        np.testing.assert_allclose((x / a) ** 2 + (2 * y / a) ** 2, 1, rtol=ROUNDING)
     assert left.get_xlabel() == "Displacement of one [m]" and left.get_ylabel() == "Displacement of two [m]"
-    np.testing.assert_allclose(right.lines[0].get_xydata(), right.lines[2].get_xydata(), atol=1e-12)
+    np.testing.assert_allclose(right.lines[0].get_xydata(), right.lines[2].get_xydata(), atol=ROUNDING)
     upper, lower = phase_planes.planes(found).axes[::2]
     for line, unit, a in zip(upper.lines, lower.lines, (0.1, 0.2, 0.4)):
         x, v = line.get_xydata().T
-        np.testing.assert_allclose((x / a) ** 2 + (v / (3.0 * a)) ** 2, 1, rtol=1e-12)
-        np.testing.assert_allclose(np.hypot(*unit.get_xydata().T), 1, rtol=1e-12)
+        np.testing.assert_allclose((x / a) ** 2 + (v / (3.0 * a)) ** 2, 1, rtol=ROUNDING)
+        np.testing.assert_allclose(np.hypot(*unit.get_xydata().T), 1, rtol=ROUNDING)
     assert upper.get_ylabel() == "Velocity of one [m/s]"
 
 
@@ -205,10 +206,10 @@ def test_hysteresis_is_that_of_the_pair_that_works(tmp_path):
     left, right = phase_planes.loops(write_ellipses(tmp_path), "pad").axes
     for line, a in zip(left.lines, (0.1, 0.2, 0.4)):
         x, y = line.get_xydata().T
-        np.testing.assert_allclose((x / a) ** 2 + (y / 7.0) ** 2, 1, rtol=1e-12)
+        np.testing.assert_allclose((x / a) ** 2 + (y / 7.0) ** 2, 1, rtol=ROUNDING)
         assert (x[0], y[0]) == (x[-1], y[-1]) and len(x) == 65
     assert left.get_ylabel() == "Contact force [N]"
-    np.testing.assert_allclose(np.hypot(*right.lines[0].get_xydata().T), 1, rtol=1e-12)
+    np.testing.assert_allclose(np.hypot(*right.lines[0].get_xydata().T), 1, rtol=ROUNDING)
 
 
 def test_loops_in_space_are_in_microns_along_the_slip_and_under_the_normal_force(tmp_path):
@@ -224,9 +225,9 @@ def test_loops_in_space_are_in_microns_along_the_slip_and_under_the_normal_force
     upper, lower = loops.draw(Run(tmp_path)["mode"], "pad").axes
     for line, other, a in zip(upper.lines, lower.lines, (1.0, 2.0, 4.0)):
         x, y = line.get_xydata().T
-        np.testing.assert_allclose((x / a) ** 2 + (y / 5) ** 2, 1, rtol=1e-9)
+        np.testing.assert_allclose((x / a) ** 2 + (y / 5) ** 2, 1, rtol=SOLVED)
         n, f = other.get_xydata().T
-        np.testing.assert_allclose(((n - 50) / 10) ** 2 + (f / 5) ** 2, 1, rtol=1e-9)
+        np.testing.assert_allclose(((n - 50) / 10) ** 2 + (f / 5) ** 2, 1, rtol=SOLVED)
     assert upper.get_xlabel() == "Tangential displacement [µm]" and lower.get_xlabel() == "Normal force [N]"
 
 
@@ -284,7 +285,7 @@ def test_responses_of_blades_pass_through_their_points(tmp_path):
     for name, expected in (("other", blades[0]), ("sector 1", blades[1])):
         f, a = line_named(upper, name)
         for point, value in zip(hertz, expected):
-            assert a[np.argmin(np.abs(f - point))] == pytest.approx(value, rel=1e-9)
+            assert a[np.argmin(np.abs(f - point))] == pytest.approx(value, rel=SOLVED)
         assert a.max() <= expected.max() * (1 + 1e-12)
     np.testing.assert_allclose(lower.lines[0].get_xydata(), [[0, 0.7], [1, 1.3]])
     bound = forced_blades.whitehead(2)

@@ -6,6 +6,7 @@ import json
 
 import numpy as np
 import pytest
+from tolerances import ROUNDING
 
 from fretwave.columns import FORCED, MODE
 from fretwave.plots import (
@@ -164,8 +165,8 @@ def test_velocity_of_a_phase_plane_includes_the_decay_for_cnm_only(run):
     _, cnm = phase_planes.motion_of(run.analyses["mode"], 15)
     _, epmc = phase_planes.motion_of(run.analyses["mode_epmc"], 15)
     columns, amplitude = run.analyses["mode"].columns, run.analyses["mode"].columns["amplitude"][15]
-    assert cnm[0, 0] == pytest.approx(-columns["beta"][15] * amplitude * 1.03, rel=1e-12)
-    assert epmc[0, 0] == pytest.approx(0.0, abs=1e-12)
+    assert cnm[0, 0] == pytest.approx(-columns["beta"][15] * amplitude * 1.03, rel=ROUNDING)
+    assert epmc[0, 0] == pytest.approx(0.0, abs=ROUNDING)
 
 
 def test_hysteresis_loops_are_closed(run):

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from command_line import call
 from models.wear_case import write_case
+from tolerances import ROUNDING
 
 from fretwave.plots import plot_run, wear, wear_lines, wear_pairs
 from fretwave.results.reader import Run
@@ -57,8 +58,8 @@ def test_the_map_is_cut_where_its_legend_says(folder, run):
     for curve, cycle in ((cuts.lines[0], 0.0), (cuts.lines[3], 2.0), (cuts.lines[-1], 8.0)):
         met = np.isclose(rows["cycles"].astype(float), cycle)
         expected = [100 * float(rows["zeta"][met & (rows["line"] == number)][0]) for number in ("1", "2")]
-        assert curve.get_ydata()[1:] == pytest.approx(expected, rel=1e-12)
-        assert curve.get_ydata()[0] == pytest.approx(100 * float(rows["zeta"][rows["line"] == "0"][0]), rel=1e-12)
+        assert curve.get_ydata()[1:] == pytest.approx(expected, rel=ROUNDING)
+        assert curve.get_ydata()[0] == pytest.approx(100 * float(rows["zeta"][rows["line"] == "0"][0]), rel=ROUNDING)
     assert cuts.lines[0].get_xdata() == pytest.approx([1.0, 2.0, 3.0])
     assert figure.axes[0].get_ylabel() == "Modal amplitude of tip [µm]"
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tolerances import LAST_BIT, LAST_DIGITS, ROUNDING, TIGHT
 
 import fretwave as fw
 from fretwave.model.laws import Role
@@ -29,10 +30,10 @@ def test_status_of_a_law_is_its_own(two_dof, comm, law: str) -> None:
     told = problem.diagnostics(last.y)
     history = ContactHistory.of(problem.contact_history(last.y)[0], contact.info.normal)
     for status, word in ((STICK, "stick"), (SLIP, "slip"), (OPEN, "open")):
-        assert history.share(status).mean() == pytest.approx(told[word], abs=1e-14)
+        assert history.share(status).mean() == pytest.approx(told[word], abs=LAST_DIGITS)
     assert 0.05 < told["slip"] < 0.95
     # Jenkins' own sum over its slips is of first order in the sample distance.
-    assert history.work.sum() == pytest.approx(told["work"], rel=1e-10 if law == "regularised_coulomb" else 1e-2)
+    assert history.work.sum() == pytest.approx(told["work"], rel=TIGHT if law == "regularised_coulomb" else 1e-2)
 
 
 def test_gap_is_what_is_missing_to_contact() -> None:
@@ -48,7 +49,7 @@ def test_gap_is_what_is_missing_to_contact() -> None:
     missing = gap - load / kn - u[:, 0]
     assert found == pytest.approx(np.maximum(missing, 0.0), abs=1e-18)
     assert np.array_equal(status == OPEN, missing >= 0) and not np.any(status == SLIP)
-    assert np.abs(ContactHistory(u, 0 * u, f, status, found, 0).work).max() < 1e-12 * load * 1e-3
+    assert np.abs(ContactHistory(u, 0 * u, f, status, found, 0).work).max() < ROUNDING * load * 1e-3
 
 
 def test_worn_depth_is_gap(comm) -> None:
@@ -64,8 +65,8 @@ def test_worn_depth_is_gap(comm) -> None:
         kept = problem.contact_history(problem.initial(1.0))[0]
         normal, u = kept["f"][:, 0], kept["u"][:, 0]
         missing = 0.01 + depth - 0.25 - u
-        assert normal == pytest.approx(np.maximum(-2.0 * missing, 0.0), abs=1e-14)
-        assert kept["gap"] == pytest.approx(np.maximum(missing, 0.0), abs=1e-15)
+        assert normal == pytest.approx(np.maximum(-2.0 * missing, 0.0), abs=LAST_DIGITS)
+        assert kept["gap"] == pytest.approx(np.maximum(missing, 0.0), abs=LAST_BIT)
         assert np.array_equal(kept["status"] == OPEN, normal <= 0)
         gaps[depth] = kept["gap"].max()
     assert gaps[0.2] - gaps[0.0] == pytest.approx(0.2) and gaps[0.0] > 0.5

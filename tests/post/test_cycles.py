@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tolerances import ROUNDING
 
 from fretwave.post.cycles import extract, harmonic_amplitude, peaks
 from fretwave.post.mode_curve import ModeCurve, fold_interval
@@ -88,7 +89,7 @@ def test_coulomb_slider_has_frequency_of_the_spring_and_damping_2R_over_pi_k_a()
 
 def test_harmonic_amplitude_is_that_of_the_fundamental():
     phase = 2.0 * np.pi * np.arange(64) / 64
-    assert harmonic_amplitude(0.5 + 3.0 * np.cos(phase + 1.0) + np.sin(3.0 * phase)) == pytest.approx(3.0, rel=1e-12)
+    assert harmonic_amplitude(0.5 + 3.0 * np.cos(phase + 1.0) + np.sin(3.0 * phase)) == pytest.approx(3.0, rel=ROUNDING)
 
 
 def folded(count=400):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tolerances import ROUNDING
 
 import fretwave as fw
 from fretwave.analyses.parts.shifted import added_ratio
@@ -37,7 +38,7 @@ def branch():
 def test_state_between_points_has_the_wanted_fundamental():
     columns, coefficients = branch()
     q, beta, omega = mode_state(columns, coefficients, 0.3, "CNM")
-    assert q == pytest.approx(0.3 * coefficients[0] / 0.1, rel=1e-12)
+    assert q == pytest.approx(0.3 * coefficients[0] / 0.1, rel=ROUNDING)
     assert omega == pytest.approx(24.7, rel=1e-4)
     assert beta == pytest.approx(0.02 * 24.8, rel=1e-4)
     _, beta, omega = mode_state(columns, coefficients, 0.3, "EPMC")
@@ -96,9 +97,9 @@ def test_slow_cycles_alone_are_compared_with_the_mode():
     rows = decay_rows(0, cycles_of(0.9 * 0.9 ** np.arange(20)), mode)
     omega, zeta = largest_differences(rows)
     assert omega == pytest.approx(max(abs(25.0 / (25.0 - row["amplitude"]) - 1.0) for row in rows[1:-1]), rel=1e-3)
-    assert zeta == pytest.approx(0.0, abs=1e-12)
+    assert zeta == pytest.approx(0.0, abs=ROUNDING)
     rows[10]["zeta"] = 0.03  # one that jumps takes its neighbours out as well
-    assert largest_differences(rows)[1] == pytest.approx(0.0, abs=1e-12)
+    assert largest_differences(rows)[1] == pytest.approx(0.0, abs=ROUNDING)
     assert [row["cycle"] for row in cycle_rows(0, cycles_of([1.0, 1.0]))] == [1, 2]
 
 

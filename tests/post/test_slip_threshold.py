@@ -6,6 +6,7 @@ import json
 
 import numpy as np
 import pytest
+from tolerances import SOLVED
 
 import fretwave as fw
 from fretwave.post.slip_threshold import slip_factor, slip_threshold
@@ -34,7 +35,7 @@ def excess(f: np.ndarray, factor: float) -> float:
 def test_the_friction_cone_is_met_at_the_threshold_and_not_before(seed: int, swing: float) -> None:
     f = forces(seed, swing)
     factor = slip_factor(f, friction=MU)
-    assert abs(excess(f, factor)) < 1e-9
+    assert abs(excess(f, factor)) < SOLVED
     assert max(excess(f, share * factor) for share in np.linspace(0, 0.999, 40)) < 0
 
 
@@ -78,6 +79,6 @@ def test_tangents_that_are_limited_one_by_one_slip_later(seed: int) -> None:
         g = f.mean(axis=0) + share * (f - f.mean(axis=0))
         return float((np.abs(g[:, 1:]).max(axis=1) - MU * g[:, 0]).max())
 
-    assert abs(over(factor)) < 1e-9
+    assert abs(over(factor)) < SOLVED
     assert max(over(share * factor) for share in np.linspace(0, 0.999, 40)) < 0
     assert factor >= slip_factor(f, friction=MU)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from models.duffing import C, mode, response, steps, stiffness
 from models.kept_branches import write_branches
+from tolerances import ROUNDING, SOLVED
 
 import fretwave as fw
 from fretwave.analyses.parts.branch import points_of, record
@@ -20,7 +21,7 @@ AMPLITUDES = [0.1, 0.37, 1.234, 2.9, 4.0]
 def test_mode_is_read_as_the_closed_form(shared_tmp, comm, method):
     found = write_branches(shared_tmp, comm, "mode", [mode(method)], (0.1, 4.0), method=method).at(AMPLITUDES)
     omega0 = np.sqrt(stiffness(AMPLITUDES))
-    np.testing.assert_allclose(found["amplitude"], AMPLITUDES, rtol=1e-12)
+    np.testing.assert_allclose(found["amplitude"], AMPLITUDES, rtol=ROUNDING)
     np.testing.assert_allclose(found["omega0"], omega0, rtol=1e-6)
     np.testing.assert_allclose(found["zeta"], C / 2 / omega0, rtol=1e-6)
 
@@ -30,7 +31,7 @@ def test_interrupted_branch_keeps_the_same_cubic(shared_tmp, comm, rows):
     """Behind the first point, and in the middle; the step over the interruption is no straight line."""
     whole = write_branches(shared_tmp / "whole", comm, "mode", [mode()], (0.1, 4.0), 0.2)
     halves = write_branches(shared_tmp / "halves", comm, "mode", [mode()], (0.1, 4.0), 0.2, rows)
-    np.testing.assert_allclose(halves.curve()["omega"], whole.curve()["omega"], rtol=1e-9)
+    np.testing.assert_allclose(halves.curve()["omega"], whole.curve()["omega"], rtol=SOLVED)
     assert len(whole) > 16 and not np.isnan(halves.slopes[1:]).any()
 
 
@@ -42,7 +43,7 @@ def test_script_and_run_read_the_same(shared_tmp, comm):
         mine, its = read(branch), read(kept)
         assert sorted(mine.names) == sorted(its.names) and len(mine) == len(its) > 1
         for name in mine.names:
-            np.testing.assert_allclose(its[name], mine[name], rtol=1e-9, atol=1e-12)
+            np.testing.assert_allclose(its[name], mine[name], rtol=SOLVED, atol=ROUNDING)
 
 
 def test_levels_of_a_response_are_branches_of_their_own(shared_tmp, comm):
@@ -69,7 +70,7 @@ def test_results_without_slopes_are_read_by_chords(shared_tmp, comm):
     assert old.slopes is None and len(old.curve()) == len(old)
     (found,) = old.at(0.5)
     x = np.interp(0.5, kept["amplitude"], kept["omega0"])
-    assert found["omega0"] == pytest.approx(x, rel=1e-12) and abs(x - np.sqrt(stiffness(0.5))) > 1e-5
+    assert found["omega0"] == pytest.approx(x, rel=ROUNDING) and abs(x - np.sqrt(stiffness(0.5))) > 1e-5
 
 
 @pytest.mark.ranks(1)

@@ -12,6 +12,7 @@ import h5py
 import numpy as np
 import pytest
 from conftest import own_environment
+from tolerances import LAST_DIGITS
 
 import fretwave
 from fretwave.results.reader import Run
@@ -73,7 +74,7 @@ def test_a_column_is_two_lines_and_its_producer(tmp_path: Path) -> None:
     )
     assert done.returncode == 0, done.stderr
     table = Run(tmp_path / "run").table("mode")
-    assert table["period"] == pytest.approx(2 * np.pi / table["omega"], rel=1e-14)
+    assert table["period"] == pytest.approx(2 * np.pi / table["omega"], rel=LAST_DIGITS)
     with h5py.File(tmp_path / "run" / "results.h5") as file:
         period = file["mode/points/period"]
         assert period[()].tolist() == table["period"].tolist()

@@ -12,6 +12,7 @@ import pytest
 import scipy.linalg
 import scipy.sparse as sp
 from models import hexahedra
+from tolerances import TIGHT
 
 import fretwave as fw
 from fretwave.case.load import load_case
@@ -136,7 +137,7 @@ def test_modes_on_any_number_of_ranks(comm, path: Path) -> None:
     with fw.Model(found.M, found.K, contacts=[contact], comm=comm) as model:
         modes = fw.linear_modes(model, 12, "stuck")
     exact = np.sqrt(scipy.linalg.eigh(stuck.toarray(), BAR.M.toarray(), eigvals_only=True)[:12])
-    np.testing.assert_allclose([mode.omega for mode in modes], exact, rtol=1e-10)
+    np.testing.assert_allclose([mode.omega for mode in modes], exact, rtol=TIGHT)
 
 
 def damaged(path: Path, change) -> None:

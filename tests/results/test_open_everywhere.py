@@ -12,6 +12,7 @@ import pytest
 from h5py import h5ds
 from models.chain_case import CHAIN
 from models.wear_case import write_case
+from tolerances import ROUNDING
 
 import fretwave as fw
 from fretwave.files.dimensions import put_array
@@ -211,5 +212,5 @@ def test_results_are_a_tree_of_datasets(run):
     assert coefficients.dims == ("point", "dof", "harmonic")
     assert coefficients.sel(dof="m1", harmonic="1s").shape == zeta.shape
     amplitude = np.hypot(coefficients.sel(dof="m1", harmonic="1c"), coefficients.sel(dof="m1", harmonic="1s"))
-    np.testing.assert_allclose(amplitude, mode["points"]["amplitude"], rtol=1e-12)
+    np.testing.assert_allclose(amplitude, mode["points"]["amplitude"], rtol=ROUNDING)
     assert mode["contact_damper"]["f"].dims == ("reported", "sample", "component", "pair")

@@ -10,6 +10,7 @@ import sys
 import time
 from pathlib import Path
 
+from tolerances import SOLVED
 import h5py
 import numpy as np
 import pytest
@@ -136,8 +137,8 @@ def test_thresholds_are_proportional_to_the_limit_and_the_largest_damping_does_n
         assert found["amplitude_of_largest_zeta"] == pytest.approx(
             limit * fine[top], rel=1e-2
         )  # flat: sqrt of zeta's error
-        assert found["stuck_hz"] == pytest.approx(np.sqrt(2) / (2 * np.pi), rel=1e-9)
-        assert found["free_hz"] == pytest.approx(1 / (2 * np.pi), rel=1e-9)
+        assert found["stuck_hz"] == pytest.approx(np.sqrt(2) / (2 * np.pi), rel=SOLVED)
+        assert found["free_hz"] == pytest.approx(1 / (2 * np.pi), rel=SOLVED)
 
 
 def test_limit_cycles_over_the_value(case: Path, tmp_path: Path) -> None:

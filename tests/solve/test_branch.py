@@ -14,6 +14,7 @@ import pytest
 from models.core_models import dense, mode_problem, oscillator, whole
 from models.duffing import C, G, K, mode, response, steps, stiffness
 from petsc4py import PETSc
+from tolerances import ROUNDING, SOLVED, TIGHT
 
 import fretwave as fw
 from fretwave.columns import FORCED, MODE
@@ -25,7 +26,7 @@ def test_every_column_of_a_reading_is_the_closed_form():
     a = np.array([0.1, 0.37, 1.234, 2.9, 4.0])
     found = branch.at(a)
     omega0 = np.sqrt(stiffness(a))
-    np.testing.assert_allclose(found["amplitude"], a, rtol=1e-12)
+    np.testing.assert_allclose(found["amplitude"], a, rtol=ROUNDING)
     np.testing.assert_allclose(found["beta"], C / 2, rtol=1e-7)
     np.testing.assert_allclose(found["omega0"], omega0, rtol=1e-6)
     np.testing.assert_allclose(found["omega"], np.sqrt(stiffness(a) - C**2 / 4), rtol=1e-6)
@@ -77,12 +78,12 @@ def test_unknowns_between_points_nearly_solve_the_equations(two_dof, comm):
     for row in branch.at([0.05, 0.134, 0.3, 2.0]):
         y = branch.unknowns(row["place"])
         state = problem.state(y)
-        assert all(state[name] == pytest.approx(row[name], rel=1e-12) for name in state)
+        assert all(state[name] == pytest.approx(row[name], rel=ROUNDING) for name in state)
         assert np.linalg.norm(whole(problem.residual(y))) < 2e-3
         y.destroy()
     last = branch.coefficients(len(branch) - 1)
     assert (last is None) == (comm.rank > 0)
-    assert last is None or last[0, 0] == pytest.approx(3.0, rel=1e-9)
+    assert last is None or last[0, 0] == pytest.approx(3.0, rel=SOLVED)
     folds = branch["amplitude"][branch.met("fold")]
     assert len(folds) == 2
     assert [len(branch.at(a)) for a in (0.9 * folds.min(), folds.mean(), 1.1 * folds.max())] == [1, 3, 1]
@@ -94,7 +95,7 @@ def test_cubic_is_ten_times_nearer_to_points_solved_between_than_the_chord(two_d
     branch = fw.follow(problem, 0.02, 3.0, unknowns=False)
     middle = {name: branch.curve(2)[name][1::2] for name in ("amplitude", "zeta")}
     solved = fw.follow(problem, 0.02, 3.0, report_at=middle["amplitude"], unknowns=False)
-    reported = {a: solved["zeta"][np.isclose(solved["amplitude"], a, rtol=1e-9)] for a in middle["amplitude"]}
+    reported = {a: solved["zeta"][np.isclose(solved["amplitude"], a, rtol=SOLVED)] for a in middle["amplitude"]}
     cubic, chord = [], []
     for k, (a, zeta) in enumerate(zip(middle["amplitude"], middle["zeta"])):
         truth = min(reported[a], key=lambda found, zeta=zeta: abs(found - zeta))
@@ -111,7 +112,7 @@ def test_table_is_that_of_a_run_on_every_rank(comm):
     branch = fw.follow(mode("EPMC"), 0.1, 2.0, report_at=[0.5, 1.0], tell=told.append)
     assert branch.names == list(MODE) and len(branch) == len(told) and branch[3].items() <= told[3].items()
     assert [event.name for event in branch.events] == ["start", "report", "report", "stop"]
-    np.testing.assert_allclose(branch["amplitude"][branch.met("report")], [0.5, 1.0], rtol=1e-12)
+    np.testing.assert_allclose(branch["amplitude"][branch.met("report")], [0.5, 1.0], rtol=ROUNDING)
     assert branch.converged and branch.reason == "stop value reached" and branch.missed == []
     assert comm.allgather(branch["omega"].tobytes()) == comm.size * [branch["omega"].tobytes()]
     assert "stop value reached" in repr(branch) and "frequency_hz" in repr(branch)
@@ -124,7 +125,7 @@ def test_downwards_and_from_given_unknowns():
     assert down["amplitude"][0] == pytest.approx(2.0) and down["amplitude"][-1] == pytest.approx(0.5)
     y = down.unknowns(3)
     up = fw.follow(problem, y, (0.5, 4.0))
-    assert up["amplitude"][0] == pytest.approx(down["amplitude"][3], rel=1e-12)
+    assert up["amplitude"][0] == pytest.approx(down["amplitude"][3], rel=ROUNDING)
     y.destroy()
 
 
@@ -269,7 +270,7 @@ def test_residual_and_jacobian_fill_what_is_given(two_dof, comm):
     assert problem.jacobian_product(with_slip, with_stick, dr) is dr
     np.testing.assert_array_equal(whole(r), whole(problem.residual(with_slip)))
     np.testing.assert_array_equal(dense(J), dense(problem.jacobian(with_slip)))
-    np.testing.assert_allclose(whole(dr), dense(J) @ whole(with_stick), rtol=1e-10, atol=1e-12)
+    np.testing.assert_allclose(whole(dr), dense(J) @ whole(with_stick), rtol=TIGHT, atol=ROUNDING)
 
 
 @pytest.mark.ranks(1)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from models.core_models import friction, mode_problem, oscillator, single_dof, whole
+from tolerances import REPEATED, ROUNDING, SOLVED, TIGHT
 
 import fretwave as fw
 from fretwave import _core
@@ -34,13 +35,13 @@ def test_every_crossing_of_a_reported_value_is_found(two_dof, comm, maximum):
     """One step of 0.3 passes the value three times."""
     branch, points = follow(epmc(two_dof, comm), 0.13, 0.15, [THREE], maximum=maximum)
     assert branch.converged and branch.missed == []
-    assert named(points, "report") == pytest.approx([THREE] * 3, rel=1e-12)
+    assert named(points, "report") == pytest.approx([THREE] * 3, rel=ROUNDING)
 
 
 @pytest.mark.ranks(1)
 def test_two_folds_in_a_step_are_found_at_the_same_places_as_by_short_steps(two_dof, comm):
     long, short = (named(follow(epmc(two_dof, comm), LOW, 0.2, maximum=m)[1], "fold") for m in (0.3, 0.02))
-    assert len(long) == 2 and long == pytest.approx(short, rel=1e-9)
+    assert len(long) == 2 and long == pytest.approx(short, rel=SOLVED)
 
 
 @pytest.mark.ranks(1)
@@ -48,7 +49,7 @@ def test_a_branch_that_comes_back_has_not_arrived(two_dof, comm):
     """With 50 % damping and H = 21 the complex mode returns to small amplitudes on another sheet."""
     problem = mode_problem(oscillator(two_dof, comm, np.diag([25.3, 0.0])), range(1, 22, 2), 1024, start="stuck")
     branch, points = follow(problem, LOW, HIGH)
-    assert not branch.converged and points[-1].parameter == pytest.approx(LOW / 2, rel=1e-9)
+    assert not branch.converged and points[-1].parameter == pytest.approx(LOW / 2, rel=SOLVED)
     assert branch.reason.startswith("the branch comes back to amplitude 0.02, where it began, without reaching")
 
 
@@ -80,7 +81,7 @@ def test_the_peak_of_a_response_does_not_depend_on_the_step(two_dof, comm):
         branch, points = follow(problem, 22.0, 27.0, maximum=maximum)
         assert branch.converged
         found.append([(p.parameter, problem.state(p.y)["amplitude"]) for p in points if p.event == "peak"])
-    assert len(found[0]) == 1 and np.allclose(found[0], found[1], rtol=1e-8, atol=0)
+    assert len(found[0]) == 1 and np.allclose(found[0], found[1], rtol=REPEATED, atol=0)
 
 
 # Den Hartog's oscillator with a limit of 0.3: most frequencies start in a motion that Newton does not find from zero.
@@ -96,7 +97,7 @@ def test_a_textbook_response_starts(comm, law, stiffness, omega):
     problem, branch = response(model, 1.0, (omega, 1.001 * omega), (1, 3, 5, 7), 256)
     first = next(iter(branch))
     assert problem.state(first.y)["amplitude"] > 0.9  # it slides: 1 / (1 - omega^2) less what friction takes
-    assert first.residual < 1e-10
+    assert first.residual < TIGHT
 
 
 def test_raising_the_excitation_leads_to_the_response(comm):
@@ -106,9 +107,9 @@ def test_raising_the_excitation_leads_to_the_response(comm):
     reasons: list[str] = []
     ((how, y),) = starts(fw.Continuation, problem, problem.initial(0.7), reasons)
     assert how.startswith("by raising the excitation from zero in ") and reasons == []
-    assert np.linalg.norm(whole(problem.residual(y))) < 1e-9
+    assert np.linalg.norm(whole(problem.residual(y))) < SOLVED
     first = next(iter(branch))
-    assert problem.state(first.y)["amplitude"] == pytest.approx(problem.state(y)["amplitude"], rel=1e-8)
+    assert problem.state(first.y)["amplitude"] == pytest.approx(problem.state(y)["amplitude"], rel=REPEATED)
 
 
 @pytest.mark.ranks(1)
@@ -141,7 +142,7 @@ def test_stiff_sliders_are_followed_from_piece_to_piece(two_dof, comm, stiffness
     assert states[-1]["omega0"] == pytest.approx(two_dof.omega_free, rel=1e-3)
     assert max(s["zeta"] for s in states) == pytest.approx(0.0368, rel=5e-3)  # of both, 7 harmonics
     # rounding of forces kt u against inertia k a
-    assert max(p.residual for p in points) < 1e-9 + 8 * np.finfo(float).eps * stiffness / 640
+    assert max(p.residual for p in points) < SOLVED + 8 * np.finfo(float).eps * stiffness / 640
 
 
 def stop(comm, stiffness, gap=0.0):
@@ -163,7 +164,7 @@ def test_a_response_at_a_stiff_stop_starts_by_closing_its_gap(comm):
     problem, branch = response(stop(comm, 1e4), 1.0, (0.9, 0.91), range(8), 128)
     first = next(iter(branch))
     assert branch.started.startswith("by closing the gaps from where nothing touches in ")
-    assert np.linalg.norm(whole(problem.residual(first.y))) < 1e-8
+    assert np.linalg.norm(whole(problem.residual(first.y))) < REPEATED
 
 
 @pytest.mark.ranks(1)
@@ -206,7 +207,7 @@ def test_ways_to_a_start_have_exact_derivatives(comm):
         assembled = way.jacobian(there).convert("dense").getDenseArray() @ step
         differences = (residual(values + 1e-7 * step) - residual(values - 1e-7 * step)) / 2e-7
         assert np.allclose(exact, differences, rtol=0, atol=1e-5 * abs(exact).max())
-        assert np.allclose(exact, assembled, rtol=0, atol=1e-12 * abs(exact).max())
+        assert np.allclose(exact, assembled, rtol=0, atol=ROUNDING * abs(exact).max())
         # the law they share stands where it stood once the problem itself is evaluated
         problem.residual(y)
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from models.core_models import TanhLaw, dense, mode_problem, oscillator, single_dof, whole
 from petsc4py import PETSc
+from tolerances import LAST_BIT, LAST_DIGITS, REPEATED, ROUNDING, TIGHT
 
 import fretwave as fw
 
@@ -52,8 +53,8 @@ def test_every_point_solves_the_equations_to_the_tolerance(two_dof, comm):
     problem = problem_of(two_dof, comm)
     _, points = follow(problem)
     for p in points:
-        assert np.linalg.norm(whole(problem.residual(p.y))) <= 1e-10
-        assert p.residual <= 1e-10
+        assert np.linalg.norm(whole(problem.residual(p.y))) <= TIGHT
+        assert p.residual <= TIGHT
 
 
 def test_tangent_lies_in_the_null_space_of_the_jacobian(two_dof, comm):
@@ -62,7 +63,7 @@ def test_tangent_lies_in_the_null_space_of_the_jacobian(two_dof, comm):
     _, points = follow(problem)
     for p in points[::7]:
         J, t = dense(problem.jacobian(p.y)), whole(p.tangent)
-        assert np.abs(J @ t).max() < 1e-12 * np.abs(J).max()
+        assert np.abs(J @ t).max() < ROUNDING * np.abs(J).max()
 
 
 def test_amplitude_is_stationary_at_a_fold(two_dof, comm):
@@ -70,7 +71,7 @@ def test_amplitude_is_stationary_at_a_fold(two_dof, comm):
     _, points = follow(problem_of(two_dof, comm))
     folds = named(points, "fold")
     assert len(folds) == 2
-    assert max(abs(whole(p.tangent)[-1]) for p in folds) < 1e-8
+    assert max(abs(whole(p.tangent)[-1]) for p in folds) < REPEATED
     assert abs(whole(points[0].tangent)[-1]) > 0.1
 
 
@@ -87,9 +88,9 @@ def test_same_folds_from_above(two_dof, comm):
     """The branch does not know its direction."""
     up = named(follow(problem_of(two_dof, comm))[1], "fold")
     branch, points = follow(problem_of(two_dof, comm), start=HIGH)
-    assert branch.converged and points[-1].parameter == pytest.approx(LOW, rel=1e-14)
+    assert branch.converged and points[-1].parameter == pytest.approx(LOW, rel=LAST_DIGITS)
     down = [p.parameter for p in named(points, "fold")]
-    assert down[::-1] == pytest.approx([p.parameter for p in up], rel=1e-10)
+    assert down[::-1] == pytest.approx([p.parameter for p in up], rel=TIGHT)
 
 
 @pytest.mark.ranks(1)
@@ -99,7 +100,7 @@ def test_events_do_not_depend_on_the_step(two_dof, comm, event):
     found = []
     for maximum in (0.3, 0.02):
         found.append([p.parameter for p in named(follow(problem_of(two_dof, comm), maximum=maximum)[1], event)])
-    assert found[0] == pytest.approx(found[1], rel=1e-8)
+    assert found[0] == pytest.approx(found[1], rel=REPEATED)
 
 
 @pytest.mark.ranks(1)
@@ -117,7 +118,7 @@ def test_zero_damping_is_located(two_dof, comm):
     _, points = follow(problem)
     crossings = named(points, "zero_damping")
     assert len(crossings) == 2
-    assert max(abs(problem.state(p.y)["zeta"]) for p in crossings) < 1e-10
+    assert max(abs(problem.state(p.y)["zeta"]) for p in crossings) < TIGHT
     signs = [[np.sign(problem.state(points[p.index + k].y)["zeta"]) for k in (-1, 1)] for p in crossings]
     assert signs == [[-1, 1], [1, -1]]
 
@@ -126,8 +127,8 @@ def test_reported_and_stop_values_are_met_exactly(two_dof, comm):
     """Newton runs at the parameter itself; exp(log a) is all the rounding there is."""
     wanted = [0.05, 0.1, 0.5, 2.5]
     _, points = follow(problem_of(two_dof, comm), report_at=wanted)
-    assert [p.parameter for p in named(points, "report")] == pytest.approx(wanted, rel=1e-15)
-    assert points[-1].parameter == pytest.approx(HIGH, rel=1e-15)
+    assert [p.parameter for p in named(points, "report")] == pytest.approx(wanted, rel=LAST_BIT)
+    assert points[-1].parameter == pytest.approx(HIGH, rel=LAST_BIT)
 
 
 @pytest.mark.parametrize("maximum", [0.3, pytest.param(0.02, marks=pytest.mark.ranks(1))])
@@ -135,7 +136,7 @@ def test_amplitude_between_the_folds_is_reported_on_each_of_the_three_sheets(two
     """a = 0.1343 is passed upwards, back, and upwards again; zeta grows all along."""
     problem = problem_of(two_dof, comm)
     _, points = follow(problem, report_at=[0.1343], maximum=maximum)
-    assert [p.parameter for p in named(points, "report")] == pytest.approx([0.1343] * 3, rel=1e-14)
+    assert [p.parameter for p in named(points, "report")] == pytest.approx([0.1343] * 3, rel=LAST_DIGITS)
     zeta = [problem.state(p.y)["zeta"] for p in points if 0.1 < p.parameter < 0.15]
     assert (np.diff(zeta) > 0).all()
 
@@ -229,7 +230,10 @@ def test_linear_mode_takes_at_most_two_newton_iterations(comm):
     assert branch.converged and max(p.newton for p in points) <= 2
     for p in points:
         state = problem.state(p.y)
-        assert (state["omega"], state["zeta"]) == (pytest.approx(np.sqrt(1.5), rel=1e-12), pytest.approx(0, abs=1e-12))
+        assert (state["omega"], state["zeta"]) == (
+            pytest.approx(np.sqrt(1.5), rel=ROUNDING),
+            pytest.approx(0, abs=ROUNDING),
+        )
 
 
 def test_bad_inputs_are_refused(two_dof, comm):

@@ -7,6 +7,7 @@ import pytest
 from models.core_models import CubicLaw, chain
 from petsc4py import PETSc
 from test_krylov import TIP, blade, preloaded
+from tolerances import REPEATED, SOLVED
 
 import fretwave as fw
 from fretwave.solve.preload import StaticPreload
@@ -58,8 +59,8 @@ def test_a_slider_of_any_stiffness_has_its_closed_form(comm, kt, method):
         p = problem.state(point.y)
         omega, zeta = closed_form(method, hysteresis(kt, p["amplitude"], samples))
         cancelled = 1e-16 * kt * p["amplitude"] / LIMIT  # of the slider's force where it sticks
-        assert p["omega0"] == pytest.approx(omega, rel=1e-8 + cancelled)
-        assert p["zeta"] == pytest.approx(zeta, rel=1e-6 + cancelled, abs=1e-9)
+        assert p["omega0"] == pytest.approx(omega, rel=REPEATED + cancelled)
+        assert p["zeta"] == pytest.approx(zeta, rel=1e-6 + cancelled, abs=SOLVED)
         assert point.accepted or point.rounding > 1e-10
     assert branch.converged, branch.reason
 
@@ -175,7 +176,7 @@ def test_a_linear_solve_that_fails_is_solved_in_a_dearer_way(comm, rung, iterati
     assert not any(found["usual_"][1][key] for key in ("rebuilt", "condensed", "whole"))
     assert found["cut_"][1]["rebuilt"] and found["cut_"][1][rung] and "factorised" in found["cut_"][1]["said"]
     for key in ("omega", "zeta"):
-        assert found["cut_"][0][key] == pytest.approx(found["usual_"][0][key], rel=1e-8)
+        assert found["cut_"][0][key] == pytest.approx(found["usual_"][0][key], rel=REPEATED)
 
 
 def test_a_motion_that_does_not_oscillate_has_no_frequency(comm):

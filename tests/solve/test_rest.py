@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from models.core_models import unknowns, whole
+from tolerances import LAST_BIT, ROUNDING, SOLVED, TIGHT
 
 import fretwave as fw
 
@@ -34,8 +35,8 @@ def test_sliders_before_the_load_shift_the_state(comm, law, w):
     """K x + KT (x - w) = P while it sticks."""
     with held(comm, law) as model:
         rest = fw.static_preload(model, [LOAD], sliders=history(law, w))
-        assert rest.displacement == pytest.approx((LOAD + KT * w) / (K + KT), rel=1e-12)
-        assert rest.sliders["pad"][0, 0] == pytest.approx(w, abs=1e-15) and rest.stick == 1
+        assert rest.displacement == pytest.approx((LOAD + KT * w) / (K + KT), rel=ROUNDING)
+        assert rest.sliders["pad"][0, 0] == pytest.approx(w, abs=LAST_BIT) and rest.stick == 1
         assert model.sliders()["pad"][0, 0] == rest.sliders["pad"][0, 0]
 
 
@@ -44,8 +45,8 @@ def test_sliders_too_far_off_are_dragged_along(comm):
     with held(comm, "jenkins") as model:
         rest = fw.static_preload(model, [LOAD], sliders=history("jenkins", -2.0))
         x = (LOAD - LIMIT) / K
-        assert rest.displacement == pytest.approx(x, abs=1e-12) and rest.slip == 1
-        assert rest.sliders["pad"][0, 0] == pytest.approx(x - LIMIT / KT, rel=1e-12)
+        assert rest.displacement == pytest.approx(x, abs=ROUNDING) and rest.slip == 1
+        assert rest.sliders["pad"][0, 0] == pytest.approx(x - LIMIT / KT, rel=ROUNDING)
 
 
 def backbone(model, rest):
@@ -83,7 +84,7 @@ def test_the_mean_shakes_down_from_the_given_state(comm, law, w):
     whole_reach = a <= LIMIT / KT
     shaken = (LOAD - np.sign(held_by) * (LIMIT - KT * a)) / K
     assert stuck.any() and (whole_reach & ~stuck).any()
-    np.testing.assert_allclose(means[stuck], x, rtol=1e-9)
+    np.testing.assert_allclose(means[stuck], x, rtol=SOLVED)
     np.testing.assert_allclose(means[whole_reach & ~stuck], shaken[whole_reach & ~stuck], rtol=2e-4)
 
 
@@ -110,7 +111,7 @@ def test_a_forced_response_moves_about_its_state(comm):
         response = fw.ForcedResponse(model, fw.Harmonics([0, 1], 64), {1: [1e-3]}, 1.0, 0, start, rest=rest)
         branch = fw.follow(response, 0.8, 1.2)
         mean = comm.bcast(branch.coefficients(0))[0, 0]
-    assert mean == pytest.approx((LOAD + KT * 0.2) / (K + KT), rel=1e-10)
+    assert mean == pytest.approx((LOAD + KT * 0.2) / (K + KT), rel=TIGHT)
 
 
 @pytest.mark.parametrize(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from models.core_models import chain, everywhere, solve_at, unknowns, whole
+from tolerances import LAST_BIT, LAST_DIGITS, ROUNDING, SOLVED, TIGHT
 
 import fretwave as fw
 from fretwave.solve.preload import balanced, static_preload
@@ -45,8 +46,8 @@ def test_spring_with_a_gap(comm, load):
     """k x + kn max(0, x - gap) = P, gap 0.4: open below P = 0.8."""
     rest = at_rest(normal_support(comm, gap=0.4), load)
     expected = load / K if load < 0.8 else (load + KN * 0.4) / (K + KN)
-    assert rest.displacement == pytest.approx(expected, rel=1e-12)
-    assert rest.load == pytest.approx(load, rel=1e-14)
+    assert rest.displacement == pytest.approx(expected, rel=ROUNDING)
+    assert rest.load == pytest.approx(load, rel=LAST_DIGITS)
     assert (rest.stick, rest.slip, rest.open) == ((0, 0, 1) if load < 0.8 else (1, 0, 0))
 
 
@@ -54,9 +55,9 @@ def test_interference_is_a_normal_load(comm):
     """A negative gap g presses with kn |g| at zero displacement, as N0 = kn |g| does."""
     by_gap = at_rest(normal_support(comm, gap=-0.5), 1.0)
     by_load = at_rest(normal_support(comm, normal_load=0.5 * KN), 1.0)
-    assert by_gap.displacement == pytest.approx(1.0 / (K + KN), rel=1e-12)
-    assert by_gap.displacement == pytest.approx(by_load.displacement, rel=1e-14)
-    assert by_gap.load == pytest.approx(by_load.load, rel=1e-14)
+    assert by_gap.displacement == pytest.approx(1.0 / (K + KN), rel=ROUNDING)
+    assert by_gap.displacement == pytest.approx(by_load.displacement, rel=LAST_DIGITS)
+    assert by_gap.load == pytest.approx(by_load.load, rel=LAST_DIGITS)
 
 
 @pytest.mark.parametrize("law", ["coulomb_3d", "coulomb_3d_uncoupled", "jenkins"])
@@ -66,7 +67,7 @@ def test_spring_held_by_friction(comm, law, load):
     rest = at_rest(tangential_support(comm, law), load)
     sticks = KT * abs(load) / (K + KT) <= MU * N0
     expected = load / (K + KT) if sticks else (load - np.sign(load) * MU * N0) / K
-    assert rest.displacement == pytest.approx(expected, rel=1e-12)
+    assert rest.displacement == pytest.approx(expected, rel=ROUNDING)
     assert (rest.stick, rest.slip, rest.open) == ((1, 0, 0) if sticks else (0, 1, 0))
 
 
@@ -75,7 +76,7 @@ def test_slip_under_two_tangential_loads_is_along_their_resultant(comm):
     model = fw.Model(np.eye(2), K * np.eye(2), None, [contact([[0, 0], [1, 0], [0, 1]], normal_load=N0)], comm)
     load = 5.0 * np.array([0.6, -0.8])
     rest = static_preload(model, load, first(model))
-    assert rest.displacement == pytest.approx(load * (5.0 - MU * N0) / 5.0 / K, rel=1e-12)
+    assert rest.displacement == pytest.approx(load * (5.0 - MU * N0) / 5.0 / K, rel=ROUNDING)
     assert rest.slip == 1
 
 
@@ -92,7 +93,7 @@ def test_given_normal_loads_are_balanced_as_they_are(comm):
     model = normal_support(comm, normal_load=N0)
     rest = balanced(model, first(model))
     assert rest.displacement == 0
-    assert rest.load == pytest.approx(N0, rel=1e-14)
+    assert rest.load == pytest.approx(N0, rel=LAST_DIGITS)
     assert (rest.stick, rest.slip, rest.open) == (1, 0, 0)
 
 
@@ -113,8 +114,8 @@ def test_solving_again_gives_the_same_state(comm, law):
     """The contact starts untouched, whatever was solved on the model before."""
     model = tangential_support(comm, law)
     before, again = at_rest(model, 5.0), at_rest(model, 5.0)
-    assert again.displacement == pytest.approx(before.displacement, rel=1e-12)
-    assert again.load == pytest.approx(before.load, rel=1e-14)
+    assert again.displacement == pytest.approx(before.displacement, rel=ROUNDING)
+    assert again.load == pytest.approx(before.load, rel=LAST_DIGITS)
 
 
 @pytest.mark.parametrize("load, carried", [([0.0, 4.0], 0.25), ([0.0, -2.0], 0.5)])
@@ -132,7 +133,7 @@ def test_body_pulled_off_its_contact(comm):
     model = normal_support(comm, k=0.0, normal_load=N0)
     with pytest.raises(fw.NotConverged, match="load factor 0.5"):
         at_rest(model, -2 * N0)
-    assert at_rest(model, -0.5 * N0).displacement == pytest.approx(-0.5 * N0 / KN, rel=1e-12)
+    assert at_rest(model, -0.5 * N0).displacement == pytest.approx(-0.5 * N0 / KN, rel=ROUNDING)
 
 
 def test_a_short_branch_is_told_too(comm):
@@ -144,13 +145,13 @@ def test_a_short_branch_is_told_too(comm):
 def test_rest_decides_what_stuck_modes_hold(comm):
     """A gap closed by the load holds, a pair pulled open does not."""
     model = normal_support(comm, gap=0.4)
-    assert first(model).omega == pytest.approx(np.sqrt(K), rel=1e-12)
+    assert first(model).omega == pytest.approx(np.sqrt(K), rel=ROUNDING)
     at_rest(model, 3.0)
-    assert first(model).omega == pytest.approx(np.sqrt(K + KN), rel=1e-12)
+    assert first(model).omega == pytest.approx(np.sqrt(K + KN), rel=ROUNDING)
     pressed = normal_support(comm, normal_load=N0)
-    assert first(pressed).omega == pytest.approx(np.sqrt(K + KN), rel=1e-12)
+    assert first(pressed).omega == pytest.approx(np.sqrt(K + KN), rel=ROUNDING)
     at_rest(pressed, -2 * N0)
-    assert first(pressed).omega == pytest.approx(np.sqrt(K), rel=1e-12)
+    assert first(pressed).omega == pytest.approx(np.sqrt(K), rel=ROUNDING)
 
 
 def mode_about(model, rest, orders=(0, 1), samples=64, method="EPMC", dof=0):
@@ -171,9 +172,9 @@ def test_stuck_motion_keeps_the_mean_tangential_force(comm, law):
     state, found = problem.state(y), everywhere(problem, problem.contact_period(y))[0]["f"]
     force = found[:, 0 if law == "jenkins" else 1, 0]
     assert problem.diagnostics(y)["stick"] == 1
-    assert force.mean() == pytest.approx(static, rel=1e-10)
-    assert np.ptp(force) == pytest.approx(2 * KT * 0.2, rel=1e-10)
-    assert state["omega"] == pytest.approx(np.sqrt(K + KT), rel=1e-10) and abs(state["zeta"]) < 1e-12
+    assert force.mean() == pytest.approx(static, rel=TIGHT)
+    assert np.ptp(force) == pytest.approx(2 * KT * 0.2, rel=TIGHT)
+    assert state["omega"] == pytest.approx(np.sqrt(K + KT), rel=TIGHT) and abs(state["zeta"]) < ROUNDING
 
 
 @pytest.mark.parametrize("amplitude, slips", [(0.26, False), (0.28, True)])
@@ -193,10 +194,10 @@ def test_slip_settles_the_slider_once(comm):
     problem = mode_about(model, rest)
     y = solve_at(problem, 0.4)
     found = everywhere(problem, problem.contact_period(y))[0]["f"][:, 1, 0]
-    assert found.max() == pytest.approx(MU * N0, rel=1e-10)
-    assert found.min() == pytest.approx(MU * N0 - 2 * KT * 0.4, rel=1e-9)
-    assert problem.diagnostics(y)["work"] == pytest.approx(0, abs=1e-12)
-    assert abs(problem.state(y)["zeta"]) < 1e-12
+    assert found.max() == pytest.approx(MU * N0, rel=TIGHT)
+    assert found.min() == pytest.approx(MU * N0 - 2 * KT * 0.4, rel=SOLVED)
+    assert problem.diagnostics(y)["work"] == pytest.approx(0, abs=ROUNDING)
+    assert abs(problem.state(y)["zeta"]) < ROUNDING
 
 
 def test_motion_about_a_rest_is_measured_from_it(comm):
@@ -206,8 +207,8 @@ def test_motion_about_a_rest_is_measured_from_it(comm):
     assert rest.stick == 1
     problem = mode_about(model, rest, (0, 1, 2))
     Q = everywhere(problem, problem.coefficients(problem.initial(1e-6)))
-    assert np.allclose(Q[:, 0], rest.displacement, rtol=0, atol=1e-15)
-    assert np.abs(whole(problem.residual(problem.initial(1e-2)))).max() < 1e-10
+    assert np.allclose(Q[:, 0], rest.displacement, rtol=0, atol=LAST_BIT)
+    assert np.abs(whole(problem.residual(problem.initial(1e-2)))).max() < TIGHT
 
 
 def test_error_of_the_static_part_does_not_hide_a_small_motion(comm):
@@ -219,7 +220,7 @@ def test_error_of_the_static_part_does_not_hide_a_small_motion(comm):
     rest = static_preload(model, np.array([0.0, 1.0]), first(model))
     problem = mode_about(model, rest)
     assert rest.stick == 1
-    assert np.linalg.norm(whole(problem.residual(problem.initial(1e-4)))) < 1e-10
+    assert np.linalg.norm(whole(problem.residual(problem.initial(1e-4)))) < TIGHT
 
 
 def test_forced_response_moves_about_the_rest(comm):
@@ -231,7 +232,7 @@ def test_forced_response_moves_about_the_rest(comm):
     problem.preload(rest.displacement, rest.load)
     point = next(iter(fw.Continuation(problem, problem.initial(1.0), (0.9, 1.1))))
     Q = everywhere(problem, problem.coefficients(point.y))
-    assert Q[0] == pytest.approx([1.0 / (K + KT), 0.1 / (K + KT - 1.0), 0.0], abs=1e-10)
+    assert Q[0] == pytest.approx([1.0 / (K + KT), 0.1 / (K + KT - 1.0), 0.0], abs=TIGHT)
 
 
 @pytest.mark.ranks(1)
@@ -260,4 +261,4 @@ def test_residual_of_the_static_problem_is_the_balance(comm):
     for x in (0.2, 1.0):
         r = whole(problem.residual(unknowns(problem, np.array([x / size, 0.5]))))
         balance = K * x + KN * max(0.0, x - 0.4) - 0.5 * 2.0
-        assert r == pytest.approx(balance / problem.force_scale, rel=1e-12)
+        assert r == pytest.approx(balance / problem.force_scale, rel=ROUNDING)

@@ -6,6 +6,7 @@ import pickle
 
 import numpy as np
 import pytest
+from tolerances import REPEATED, ROUNDING, SOLVED
 
 import fretwave as fw
 
@@ -23,7 +24,7 @@ def test_the_grid_runs_its_last_parameter_fastest(comm):
     found = fw.sweep(lambda **values: backbone(comm=comm, **values), limit=[1.0, 2.0], mass=[1.0, 4.0, 9.0])
     assert found.shape == (2, 3) and len(found) == 6
     omega = found.each(lambda branch: branch["omega"][0])
-    np.testing.assert_allclose(omega, np.tile(np.sqrt((K + KT) / np.array([1.0, 4.0, 9.0])), (2, 1)), rtol=1e-9)
+    np.testing.assert_allclose(omega, np.tile(np.sqrt((K + KT) / np.array([1.0, 4.0, 9.0])), (2, 1)), rtol=SOLVED)
     assert [values["mass"] for values, _ in found] == [1.0, 4.0, 9.0] * 2
 
 
@@ -32,9 +33,9 @@ def test_groups_of_ranks_find_the_same(comm):
     limits = [1.0, 2.0, 3.0]
     groups = fw.sweep(backbone, comm=comm, limit=limits)
     damping = groups.each(lambda branch: branch["zeta"].max())
-    np.testing.assert_allclose(damping, damping[0], rtol=1e-9)
+    np.testing.assert_allclose(damping, damping[0], rtol=SOLVED)
     alone = backbone(3.0, comm=comm)
-    np.testing.assert_allclose(groups[2].at([1.0, 2.0])["zeta"], alone.at([1.0, 2.0])["zeta"], rtol=1e-8)
+    np.testing.assert_allclose(groups[2].at([1.0, 2.0])["zeta"], alone.at([1.0, 2.0])["zeta"], rtol=REPEATED)
 
 
 def test_a_value_that_fails_leaves_the_others(comm):
@@ -61,7 +62,7 @@ def test_a_branch_travels_without_its_unknowns(comm):
 def test_shape_is_the_complex_fundamental(comm):
     branch = backbone(1.0, comm=comm)
     place = float(branch.at(0.9)["place"][0])
-    assert branch.shape(place) == pytest.approx(0.9, rel=1e-9)
+    assert branch.shape(place) == pytest.approx(0.9, rel=SOLVED)
     with pytest.raises(fw.InputError, match="not retained"):
         branch.shape(0, order=2)
 
@@ -71,6 +72,6 @@ def test_rows_of_a_reduction_leave_the_motion_as_it_is(comm):
     B = np.array([[1.0, 0.0, -1.0]])
     with fw.reduce(np.eye(3), K, keep=[0, 2], modes=1, comm=comm) as reduction:
         x = np.array([0.3, -0.2, 0.7])
-        assert reduction.rows(B) @ x == pytest.approx(B @ reduction.expand(x), rel=1e-12)
+        assert reduction.rows(B) @ x == pytest.approx(B @ reduction.expand(x), rel=ROUNDING)
         with pytest.raises(fw.InputError, match="not kept"):
             reduction.rows([[0.0, 1.0, 0.0]])

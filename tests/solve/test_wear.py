@@ -7,6 +7,7 @@ import pytest
 from models.core_models import chain, solve_at, unknowns, whole
 from test_coulomb_3d import KN, KT, LAWS, MU, STEADY, imposed, motion, pair, random_mode
 from test_krylov import ROOT, blade, mode, preloaded
+from tolerances import REPEATED, ROUNDING, SOLVED
 
 import fretwave as fw
 from fretwave.solve.steppers import STEPPERS
@@ -54,11 +55,11 @@ def test_closed_form_of_one_node(comm, stepper, tolerance):
     assert found[100.0][1][0] == pytest.approx(1.33576005, abs=1e-6)
     assert found[1000.0][1][0] == pytest.approx(0.10417001, abs=1e-6)
     assert found[274.653][1][0] == pytest.approx(A / (2 * B), abs=2e-6)
-    assert found[274.653][3] == pytest.approx(1.0, abs=1e-9)
+    assert found[274.653][3] == pytest.approx(1.0, abs=SOLVED)
     assert max(p[3] for p in found.values()) <= 1 + 1e-12
     for eta, load, depth, work, _ in found.values():
         assert load[0] == pytest.approx(worn_load(eta), abs=1e-6)
-        assert depth[0] == pytest.approx(P0 - load[0], abs=1e-12)
+        assert depth[0] == pytest.approx(P0 - load[0], abs=ROUNDING)
         assert work == pytest.approx(4 * B * load[0] * (A - B * load[0]), abs=1e-11)
 
 
@@ -210,7 +211,7 @@ def test_wear_of_a_travelling_wave(comm):
     problem = fw.NonlinearMode(model, fw.Harmonics([0, 1, 2, 3], 64), "CNM", dof, start)
     y = solve_at(problem, 1.0)
     assert problem.diagnostics(y)["slip"] > 0.05
-    assert abs(problem.energy(y)["error"]) < 1e-9 and problem.energy(y)["contact"] > 0
+    assert abs(problem.energy(y)["error"]) < SOLVED and problem.energy(y)["contact"] > 0
     pairs, step = model.pairs_of(0), 1e-7
 
     def at(depth):
@@ -271,7 +272,7 @@ def test_energy_of_a_period_is_in_balance(comm, method):
     for state in (worn_mode.solve(np.zeros(2), y), worn_mode.solve(np.array([0.1, 0.02]), y)):
         worn_mode.wear(state.depth)
         Q, found, modal = problem.coefficients(state.y), problem.energy(state.y), problem.state(state.y)
-        assert abs(found["error"]) < 1e-9 and found["contact"] > 0
+        assert abs(found["error"]) < SOLVED and found["contact"] > 0
         if Q is None:
             continue
         q = {k: Q[:, 2 * k - 1] - 1j * Q[:, 2 * k] for k in orders[1:]}
@@ -283,11 +284,11 @@ def test_energy_of_a_period_is_in_balance(comm, method):
             release = 2 * np.pi * modal["zeta"] * modal["omega0"] ** 2 * sum(k**2 * square[k] for k in q)
             frequency = modal["omega0"]
         taken = np.pi * frequency * sum(k**2 * np.vdot(q[k], damping @ q[k]).real for k in q)
-        assert found["modal"] == pytest.approx(release, rel=1e-12)
-        assert found["damping"] == pytest.approx(taken, rel=1e-12)
+        assert found["modal"] == pytest.approx(release, rel=ROUNDING)
+        assert found["damping"] == pytest.approx(taken, rel=ROUNDING)
         dissipated.append((found["contact"], release - taken))
     for contact_work, balance in dissipated:
-        assert contact_work == pytest.approx(balance, rel=1e-8)
+        assert contact_work == pytest.approx(balance, rel=REPEATED)
 
 
 @pytest.mark.ranks(1, 2)
@@ -300,7 +301,7 @@ def test_wear_of_a_blade(comm, stepper):
     for point in march:
         depths.append(point.state.depth.copy())
         stuck &= point.state.rate == 0
-        assert abs(mode.problem.energy(point.state.y)["error"]) < 1e-8
+        assert abs(mode.problem.energy(point.state.y)["error"]) < REPEATED
     assert march.converged and len(depths) > 5
     steps = np.diff(depths, axis=0)
     assert (steps >= 0).all() and depths[-1].max() > 0.1 * ROOT["normal_load"] / ROOT["normal_stiffness"]
@@ -332,7 +333,7 @@ def test_detours_come_back_to_the_amplitude(comm):
     mode, y = worn_blade(comm)
     depth = 2e-5 * np.ones(6)
     direct, around = mode.solve(depth, y), mode.elsewhere(depth, y)
-    assert np.allclose(whole(around.y), whole(direct.y), rtol=0, atol=1e-9)
+    assert np.allclose(whole(around.y), whole(direct.y), rtol=0, atol=SOLVED)
 
 
 def test_steppers_agree(comm):

@@ -12,6 +12,7 @@ import pytest
 from command_line import call
 from models.chain_case import BUILDER, CHAIN
 from models.vtkhdf_files import read_step
+from tolerances import LAST_BIT, LAST_DIGITS, ROUNDING, SOLVED
 
 from fretwave.case.load import load_case
 from fretwave.post.contact_history import OPEN, SLIP, STICK
@@ -91,10 +92,10 @@ def test_displacement_is_the_sum_of_harmonics(run: Path, viewed) -> None:
     for step in range(16):
         found, phase = read_step(grid, step), 2 * np.pi * step / 16
         sums = [(np.sin if text[-1] == "s" else np.cos)(int(text.rstrip("cs")) * phase) for text in labels]
-        assert found["phase"] == pytest.approx(phase, rel=1e-15) and found["amplitude"] == row["amplitude"]
-        assert found["displacement"][-1, 1] == pytest.approx(Q @ sums, rel=1e-12)
+        assert found["phase"] == pytest.approx(phase, rel=LAST_BIT) and found["amplitude"] == row["amplitude"]
+        assert found["displacement"][-1, 1] == pytest.approx(Q @ sums, rel=ROUNDING)
     first = read_step(grid, 0)["displacement"][-1, 1]
-    assert first == pytest.approx(sum(q for q, text in zip(Q, labels) if text[-1] != "s"), rel=1e-12)
+    assert first == pytest.approx(sum(q for q, text in zip(Q, labels) if text[-1] != "s"), rel=ROUNDING)
 
 
 def test_expanded_motion_solves_the_unreduced_equations(run: Path, viewed) -> None:
@@ -135,7 +136,7 @@ def test_status_and_work_of_the_pairs(run: Path, viewed) -> None:
     name, grid, pairs, row = viewed
     found = read_step(pairs, 5)
     for word in ("stick", "slip", "open"):
-        assert found[f"share_{word}"].mean() == pytest.approx(row[word], abs=1e-14)
+        assert found[f"share_{word}"].mean() == pytest.approx(row[word], abs=LAST_DIGITS)
     assert row["slip"] > 0.05
     case = load_case(run.parent / "case.toml")
     C, s = case.damping_with(()), -row["beta"] + 1j * row["omega"]
@@ -157,7 +158,7 @@ def test_steps_show_the_samples(run: Path, viewed) -> None:
     for step in (0, 3, 15):
         found = read_step(pairs, step)
         assert found["normal_force"].tolist() == f[8 * step, 0].tolist()
-        assert found["tangential_force"] == pytest.approx(np.hypot(f[8 * step, 1], f[8 * step, 2]), rel=1e-14)
+        assert found["tangential_force"] == pytest.approx(np.hypot(f[8 * step, 1], f[8 * step, 2]), rel=LAST_DIGITS)
         assert set(found["status"]) <= {STICK, SLIP, OPEN}
 
 
@@ -172,10 +173,10 @@ def test_points_follow_each_other_on_one_grid(run: Path, tmp_path: Path, capfd) 
         assert file["VTKHDF/Steps/Values"][()].tolist() == (np.arange(16) / 8).tolist()
     for step, amplitude in ((0, 1e-6), (7, 1e-6), (8, 2e-6), (15, 2e-6)):
         found = read_step(out, step)
-        assert found["harmonic_1_real"][-1, 1] == pytest.approx(amplitude, rel=1e-9)
-        assert found["amplitude"] == pytest.approx(amplitude, rel=1e-9)
+        assert found["harmonic_1_real"][-1, 1] == pytest.approx(amplitude, rel=SOLVED)
+        assert found["amplitude"] == pytest.approx(amplitude, rel=SOLVED)
         moved = found["displacement"] - found["rest_displacement"]
-        assert found["warp"] == pytest.approx(100 * moved, rel=1e-6, abs=1e-12)
+        assert found["warp"] == pytest.approx(100 * moved, rel=1e-6, abs=ROUNDING)
 
 
 def test_every_solved_point_can_be_shown(run: Path, tmp_path: Path, capfd) -> None:
@@ -192,7 +193,7 @@ def test_every_solved_point_can_be_shown(run: Path, tmp_path: Path, capfd) -> No
     peak, found = int(np.argmax(amplitude)), read_step(out, 5)
     assert 0 < peak < len(amplitude) - 1 and found["point"] == peak
     q = found["harmonic_1_real"] + 1j * found["harmonic_1_imag"]
-    assert abs(q[-1, 1]) == pytest.approx(amplitude[peak], rel=1e-9)
+    assert abs(q[-1, 1]) == pytest.approx(amplitude[peak], rel=SOLVED)
 
 
 @pytest.mark.parametrize(
@@ -297,4 +298,4 @@ def test_an_imported_model_brings_its_mesh(tmp_path: Path) -> None:
     with h5py.File(tmp_path / "run" / "results.h5") as file:
         names = file["mode/dof"][()].tolist()
         Q = file["mode/coefficients"][-1]
-        assert found["displacement"][9, 2] == pytest.approx(Q[names.index(b"n10z"), :2].sum(), rel=1e-12)
+        assert found["displacement"][9, 2] == pytest.approx(Q[names.index(b"n10z"), :2].sum(), rel=ROUNDING)

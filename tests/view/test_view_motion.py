@@ -15,6 +15,7 @@ import scipy.sparse as sp
 from command_line import call
 from models.rubbing_sector import BUILDER, SECTOR
 from models.vtkhdf_files import read_step, skewed_mesh
+from tolerances import ROUNDING, SOLVED
 
 import fretwave as fw
 from fretwave.cyclic.faces import rotation
@@ -98,7 +99,7 @@ def check_faces(path: Path) -> None:
             values = by_sector(found[name])
             size = np.abs(values).max()
             assert size > 0
-            assert np.roll(values[:, low], -1, axis=0) == pytest.approx(values[:, high], rel=0, abs=1e-9 * size)
+            assert np.roll(values[:, low], -1, axis=0) == pytest.approx(values[:, high], rel=0, abs=SOLVED * size)
         assert not by_sector(found["displacement"])[:, held].any()
         assert found["sector"].tolist() == np.repeat(np.arange(SECTORS), len(held)).tolist()
 
@@ -117,7 +118,7 @@ def test_a_mistuned_wheel_shows_each_sectors_own_motion(tmp_path: Path) -> None:
         Q = file["mode/coefficients"][-1, [names.index(f"tip@{j}".encode()) for j in range(SECTORS)]]
         cosines = [k for k, text in enumerate(file["mode/harmonic"][()]) if not text.endswith(b"s")]
     tips = by_sector(read_step(folder / "mode.vtkhdf", 0)["displacement"])[:, tip_node(), 2]
-    assert tips == pytest.approx(Q[:, cosines].sum(axis=1), rel=1e-9)
+    assert tips == pytest.approx(Q[:, cosines].sum(axis=1), rel=SOLVED)
     assert np.ptp(np.abs(tips)) > 0.1 * np.abs(tips).max()
 
 
@@ -145,7 +146,7 @@ def test_the_tip_moves_as_solved(viewed: Path) -> None:
     for step in (0, 5, 17):
         phase = 2 * np.pi * step / PHASES
         sums = [(np.sin if text[-1] == "s" else np.cos)(int(text.rstrip("cs")) * phase) for text in labels]
-        assert read_step(viewed, step)["displacement"][tip_node(), 2] == pytest.approx(Q @ sums, rel=1e-9)
+        assert read_step(viewed, step)["displacement"][tip_node(), 2] == pytest.approx(Q @ sums, rel=SOLVED)
 
 
 def test_all_variants_show_the_same_motion(viewed: Path, plain: Path, tmp_path: Path) -> None:
@@ -173,7 +174,7 @@ def test_points_may_have_nodal_diameters_of_their_own(plain: Path, tmp_path: Pat
     assert call("view", str(folder), "--phases", str(PHASES)) == 0
     tip = [by_sector(read_step(folder / "mode.vtkhdf", s)["displacement"])[:, tip_node(), 2] for s in range(PHASES)]
     first, second = np.array(tip).T[:2]
-    assert second == pytest.approx(np.roll(first, -DELAY), rel=1e-6, abs=1e-12)
+    assert second == pytest.approx(np.roll(first, -DELAY), rel=1e-6, abs=ROUNDING)
     assert np.abs(second - np.roll(first, DELAY)).max() > 0.1 * np.abs(first).max()
 
 

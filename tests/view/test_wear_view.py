@@ -11,6 +11,7 @@ import scipy.sparse as sp
 from command_line import call
 from models.wear_case import write_case
 from test_view import read_step
+from tolerances import LAST_BIT, LAST_DIGITS, SOLVED
 
 import fretwave as fw
 from fretwave.post.contact_history import OPEN, SLIP
@@ -53,7 +54,7 @@ def test_steps_are_the_points_of_the_largest_amplitude(run, capfd):
         assert found["points"].tolist() == [[0, 0, 0], [0.1, 0, 0]] and found["types"].tolist() == [VERTEX, VERTEX]
         assert found["depth"].tolist() == fields["depth"][step].tolist()
         assert found["wear_rate"].tolist() == fields["rate"][step].tolist()
-        assert found["mean_pressure"] == pytest.approx(fields["load"][step] / AREA, rel=1e-15)
+        assert found["mean_pressure"] == pytest.approx(fields["load"][step] / AREA, rel=LAST_BIT)
         assert found["slip_share"].tolist() == fields["slip"][step].tolist()
         assert found["open_share"].tolist() == fields["open"][step].tolist()
         assert found["warp"] == pytest.approx(-1000 * np.outer(fields["depth"][step], [1, 0, 0]), rel=1e-6)
@@ -64,7 +65,7 @@ def test_steps_are_the_points_of_the_largest_amplitude(run, capfd):
 def test_shares_of_slip_are_the_table_s(run):
     """The mean over the pairs, all of one contact, is what the law itself counted."""
     table, fields = line_of(run, 2)
-    assert fields["slip"].mean(axis=1) == pytest.approx(table["slip"], abs=1e-14) and table["slip"].min() > 0.1
+    assert fields["slip"].mean(axis=1) == pytest.approx(table["slip"], abs=LAST_DIGITS) and table["slip"].min() > 0.1
 
 
 def test_amplitudes_asked_for_are_files_of_their_own(run, tmp_path, capfd):
@@ -84,7 +85,7 @@ def test_the_motion_of_a_worn_point_is_shown_with_the_law_s_word_on_it(run, tmp_
     with h5py.File(run / "results.h5") as file:
         u, f = (file[f"wear/contact_pads/{key}"][-1][:, 0] for key in "uf")
         status = file["wear/contact_pads/status"][-1]
-    assert f == pytest.approx(np.maximum(np.array([1e7, 2e7]) * (u - depth), 0.0), rel=1e-9, abs=1e-9)
+    assert f == pytest.approx(np.maximum(np.array([1e7, 2e7]) * (u - depth), 0.0), rel=SOLVED, abs=SOLVED)
     assert depth.max() > 1e-6 and np.mean(status == SLIP, axis=0).tolist() == fields["slip"][-1].tolist()
     shutil.copytree(run, tmp_path / "run")
     with h5py.File(tmp_path / "run" / "results.h5", "r+") as file:

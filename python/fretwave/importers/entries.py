@@ -21,7 +21,7 @@ from ..results.model_file import dof_name
 STRAY_SHARE = 0.5
 
 
-@dataclass
+@dataclass(repr=False)
 class Entries:
     """One matrix as its file gives it.
 
@@ -54,6 +54,9 @@ class Entries:
     mirrored: str = ""
     held: npt.NDArray[np.bool_] | None = None
     half: bool = False
+
+    def __repr__(self) -> str:
+        return f"Entries({self.shape[0]} x {self.shape[1]}, {len(self.values)} entries, {self.kind}, {self.where!r})"
 
     @classmethod
     def of(cls, matrix: Given, where: str, kind: str, mirrored: str = "") -> Entries:
