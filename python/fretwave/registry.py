@@ -7,7 +7,7 @@ knows no kind itself; the package's are imported when first asked for.
 from __future__ import annotations
 
 import inspect
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import cache
 from importlib import import_module
@@ -74,7 +74,7 @@ def noted() -> Iterator[list[Added]]:
         _noting.remove(added)
 
 
-def admit(what: str, name: str, known: Mapping[str, Any], new: Any) -> None:
+def admit(what: str, name: str, known: Mapping[str, Any], new: type | Callable[..., Any]) -> None:
     """Let a class or function have a name, unless another file has given it to something else."""
     if name in known and file_of(known[name]) != file_of(new):
         places = f"{file_of(known[name])} and {file_of(new)}"
@@ -83,7 +83,7 @@ def admit(what: str, name: str, known: Mapping[str, Any], new: Any) -> None:
         added.append((what, new))
 
 
-def file_of(kind: Any) -> str:
+def file_of(kind: type | Callable[..., Any]) -> str:
     """The file that defines a class or function, else its module's name."""
     try:
         return inspect.getfile(kind)

@@ -105,7 +105,7 @@ def _read_known(path: Path, letter: str) -> Any:
     return matrix
 
 
-def _as_given(found: Any) -> Any:
+def _as_given(found: object) -> Any:
     """The matrix of a registered reader; what has to be put in order is the importer's."""
     if not isinstance(found, Entries):
         return found

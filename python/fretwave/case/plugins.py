@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import sys
 import traceback
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
@@ -24,7 +24,11 @@ from ..mpi.guard import PLUGIN
 from ..texts import display, is_there, nearest, shortened, toml
 from .toml.source import Source
 
-FORGET = {registry.ANALYSIS: registry.forget, registry.LAW: forget_law, registry.FORMAT: forget_format}
+FORGET: dict[str, Callable[..., None]] = {
+    registry.ANALYSIS: registry.forget,
+    registry.LAW: forget_law,
+    registry.FORMAT: forget_format,
+}
 #: What each file that is loaded has added, by its place.
 _loaded: dict[str, tuple[Plugin, list[registry.Added]]] = {}
 

@@ -51,7 +51,7 @@ def _lines(rows: Iterable[Iterable[Any]]) -> str:
     return text.getvalue()
 
 
-def plain(value: Any) -> Any:
+def plain(value: object) -> Any:
     """The value as Python's own, a number as the text with all its digits."""
     own = value.item() if isinstance(value, np.generic) else value
     return own.decode() if isinstance(own, bytes) else repr(own) if isinstance(own, float) else own

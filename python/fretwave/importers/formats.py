@@ -108,7 +108,7 @@ def register_format(suffix: str) -> Callable[[Reader], Reader]:
     return register
 
 
-def forget_format(reader: Any) -> None:
+def forget_format(reader: Reader) -> None:
     """The inverse of `register_format`."""
     for suffix in [suffix for suffix, known in _readers.items() if known is reader]:
         del _readers[suffix], _registered[suffix]
