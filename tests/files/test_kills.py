@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -21,6 +22,7 @@ from kills import Counting
 from small_runs import Scene, begins_like, differences
 
 from fretwave.files.lock import FolderLock, check_free
+from fretwave.results import journal
 from fretwave.results.results import open_results
 from fretwave.texts import display
 
@@ -69,8 +71,16 @@ def child(arguments: list[str], before=lambda: None) -> int:
     return os.waitstatus_to_exitcode(os.waitpid(process, 0)[1])
 
 
+@pytest.fixture(scope="module", autouse=True)
+def the_same_calls_in_every_run() -> Iterator[None]:
+    """States are forced onto the disk after so many seconds: on a busy machine one run makes calls another does not."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(journal, "SAFE_EVERY", float("inf"))
+        yield
+
+
 @pytest.fixture(scope="module")
-def whole(known, tmp_path_factory) -> dict[str, tuple[Path, int]]:
+def whole(the_same_calls_in_every_run, known, tmp_path_factory) -> dict[str, tuple[Path, int]]:
     """Of each scene the uninterrupted folder, and how many calls changed files on the way."""
     small_runs.load()
     for module in LOADED:
