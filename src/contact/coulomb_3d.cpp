@@ -254,12 +254,7 @@ Entry entry(std::string name, std::string doc) {
                           .role = Role::load,
                           .lower = 0,
                           .standard = 0.0},
-                         {.name = "gap",
-                          .unit = "m",
-                          .doc = "initial gap; negative is an interference",
-                          .role = Role::gap,
-                          .lower = -std::numeric_limits<double>::max(),
-                          .standard = 0.0}},
+                         gap_parameter()},
           .make = [](Parameters const& p) {
             return std::make_unique<Coulomb3d<Coupled>>(
                 Coulomb3dParameters{p.at("normal_stiffness"), p.at("tangential_stiffness"),

@@ -33,6 +33,16 @@ struct Parameter {
   std::optional<double> standard = {};
 };
 
+/// The gap, the same in every law that opens.
+inline Parameter gap_parameter() {
+  return {.name = "gap",
+          .unit = "m",
+          .doc = "initial gap; negative is an interference",
+          .role = Role::gap,
+          .lower = -std::numeric_limits<double>::max(),
+          .standard = 0.0};
+}
+
 /// One value per pair for each parameter name.
 using Parameters = std::map<std::string, std::vector<double>>;
 

@@ -68,12 +68,7 @@ Entry unilateral_spring_entry() {
                           .role = Role::normal_stiffness,
                           .lower = 0,
                           .strict = true},
-                         {.name = "gap",
-                          .unit = "m",
-                          .doc = "initial gap; negative is an interference",
-                          .role = Role::gap,
-                          .lower = -std::numeric_limits<double>::max(),
-                          .standard = 0.0}},
+                         gap_parameter()},
           .make = [](Parameters const& p) {
             return std::make_unique<UnilateralSpring>(p.at("normal_stiffness"), p.at("gap"));
           }};

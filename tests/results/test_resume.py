@@ -138,19 +138,14 @@ def test_resuming_on_two_ranks(whole: Path, tmp_path: Path, launch) -> None:
         assert np.allclose(one, two, rtol=RANK_TOLERANCE, atol=0.0), name
 
 
+#: A mode of a few points.
+SHORT = ["--set", "mode.amplitude=[0.02, 0.03]", "--set", "mode.report_at=[]", "--only", "mode", "--no-plots"]
+
+
 def test_changed_case_is_refused(tmp_path: Path, launch) -> None:
     case, folder = tmp_path / "case.toml", tmp_path / "run"
     case.write_text(CASE.read_text())
-    short = [
-        "--set",
-        "mode.amplitude=[0.02, 0.03]",
-        "--set",
-        "mode.report_at=[]",
-        "--only",
-        "mode",
-        "--no-plots",
-    ]
-    assert launch(1, "-m", "fretwave", "run", str(case), "--out", str(folder), *short).returncode == 0
+    assert launch(1, "-m", "fretwave", "run", str(case), "--out", str(folder), *SHORT).returncode == 0
     before = {path.name: path.read_bytes() for path in folder.iterdir()}
     case.write_text(CASE.read_text().replace("friction_limit = 5.0", "friction_limit = 4.0"))
     done = launch(1, "-m", "fretwave", "resume", str(folder))
@@ -163,15 +158,6 @@ def test_changed_case_is_refused(tmp_path: Path, launch) -> None:
 def test_resume_without_the_case_file_uses_the_copy(tmp_path: Path, launch) -> None:
     case, folder = tmp_path / "case.toml", tmp_path / "run"
     case.write_text(CASE.read_text())
-    short = [
-        "--set",
-        "mode.amplitude=[0.02, 0.03]",
-        "--set",
-        "mode.report_at=[]",
-        "--only",
-        "mode",
-        "--no-plots",
-    ]
-    assert launch(1, "-m", "fretwave", "run", str(case), "--out", str(folder), *short).returncode == 0
+    assert launch(1, "-m", "fretwave", "run", str(case), "--out", str(folder), *SHORT).returncode == 0
     case.unlink()
     assert launch(1, "-m", "fretwave", "resume", str(folder)).returncode == 0

@@ -68,14 +68,14 @@ def parser() -> argparse.ArgumentParser:
     check.set_defaults(command=_check)
     _add_sweep(commands)
     resume = commands.add_parser("resume", help="go on with a run that was cut off, on any number of ranks")
-    resume.add_argument("folder", type=Path, metavar="RUNDIR", help="folder of the run")
-    resume.add_argument("--no-plots", action="store_true", help="make no pictures")
+    _add_folder(resume)
+    _add_no_plots(resume)
     resume.set_defaults(command=_resume)
     show = commands.add_parser("show", help="show the results of a run")
-    show.add_argument("folder", type=Path, metavar="RUNDIR", help="folder of the run")
+    _add_folder(show)
     show.set_defaults(command=_show)
     plot = commands.add_parser("plot", help="make the pictures of a run again")
-    plot.add_argument("folder", type=Path, metavar="RUNDIR", help="folder of the run")
+    _add_folder(plot)
     plot.add_argument("--only", type=_names, default=[], metavar="NAME,...", help="analyses or kinds of picture")
     plot.set_defaults(command=_plot)
     _add_view(commands)
@@ -104,12 +104,25 @@ def _add_case(command: argparse.ArgumentParser, optional: bool = False) -> None:
     command.add_argument("--quick", action="store_true", help="the short form: overrides of the table [quick]")
 
 
+def _add_folder(command: argparse.ArgumentParser) -> None:
+    command.add_argument("folder", type=Path, metavar="RUNDIR", help="folder of the run")
+
+
+def _add_no_plots(command: argparse.ArgumentParser) -> None:
+    command.add_argument("--no-plots", action="store_true", help="make no pictures")
+
+
+def _add_doing(command: argparse.ArgumentParser, out: str) -> None:
+    """Options of what computes: where to, and how."""
+    command.add_argument("--out", type=Path, metavar="DIR", help=out)
+    _add_no_plots(command)
+    command.add_argument("--petsc", default="", metavar="OPTIONS", help='PETSc options: "-snes_rtol 1e-10"')
+
+
 def _add_run(commands: _SubParsers) -> None:
     run = commands.add_parser("run", help="run the analyses of a case")
     _add_case(run)
-    run.add_argument("--out", type=Path, metavar="DIR", help="run folder (default runs/<case>)")
-    run.add_argument("--no-plots", action="store_true", help="make no pictures")
-    run.add_argument("--petsc", default="", metavar="OPTIONS", help='PETSc options: "-snes_rtol 1e-10"')
+    _add_doing(run, "run folder (default runs/<case>)")
     run.set_defaults(command=_run)
 
 
@@ -130,9 +143,7 @@ def _add_sweep(commands: _SubParsers) -> None:
         help="values of a key, addressed as --set does: model.options.friction=0.1,0.2,0.5; once for each key",
     )
     sweep.add_argument("--groups", type=int, metavar="G", help="groups of ranks (default: as many as ranks and values)")
-    sweep.add_argument("--out", type=Path, metavar="DIR", help="folder (default runs/<case>_sweep)")
-    sweep.add_argument("--no-plots", action="store_true", help="make no pictures")
-    sweep.add_argument("--petsc", default="", metavar="OPTIONS", help='PETSc options: "-snes_rtol 1e-10"')
+    _add_doing(sweep, "folder (default runs/<case>_sweep)")
     sweep.set_defaults(command=_sweep)
 
 
@@ -145,7 +156,7 @@ def _add_view(commands: _SubParsers) -> None:
         " Of a sector the whole wheel is written, sector by sector."
         " Of wear without --point: <analysis>_wear.vtkhdf, the pairs with worn depth and pressure over wear cycles.",
     )
-    view.add_argument("folder", type=Path, metavar="RUNDIR", help="folder of the run")
+    _add_folder(view)
     view.add_argument("--analysis", metavar="NAME", help="mode, forced response or wear (default: the first)")
     which = view.add_mutually_exclusive_group()
     which.add_argument("--point", type=int, nargs="+", default=[], metavar="N", help="points of the branch")

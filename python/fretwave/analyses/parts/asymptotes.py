@@ -37,13 +37,13 @@ def other_asymptote(context: AnalysisContext[HarmonicSection], stuck: LinearMode
 
     count = min(context.model.n_dof, context.analysis.linear_mode + MORE_MODES)
     if all(contact.components == 1 for contact in context.case.contacts):
-        return {"free_omega": most_alike(context, context.linear_mode("free", count), stuck)}
+        return {"free_omega": omega_most_alike(context, context.linear_mode("free", count), stuck)}
     if context.case.neighbours is not None:
         context.leave_out(["the closed and sliding asymptote (not computed for a sector of a wheel)"])
         return {}
     K = context.case.K + closed_stiffness(context)
     with Model(context.case.M, K, comm=context.comm) as model:
-        return {"sliding_omega": most_alike(context, linear_modes(model, count, contact="free"), stuck)}
+        return {"sliding_omega": omega_most_alike(context, linear_modes(model, count, contact="free"), stuck)}
 
 
 def closed_stiffness(context: AnalysisContext[AnalysisSection], tangential: bool = False) -> sp.csr_matrix:
@@ -67,7 +67,9 @@ def asymptote_line(name: str, stuck: float, other: dict[str, float]) -> str:
     return f"{name}: asymptotes: {', '.join(texts)}"
 
 
-def most_alike(context: AnalysisContext[AnalysisSection], modes: Sequence[LinearMode], stuck: LinearMode) -> float:
+def omega_most_alike(
+    context: AnalysisContext[AnalysisSection], modes: Sequence[LinearMode], stuck: LinearMode
+) -> float:
     """Frequency of the mode most like another [rad/s]."""
     M, wanted = context.case.M, stuck.shape + 1j * stuck.imaginary
     shapes = [mode.shape + 1j * mode.imaginary for mode in modes]

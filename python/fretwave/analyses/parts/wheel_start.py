@@ -14,8 +14,7 @@ import scipy.sparse as sp
 from ...arrays import Complex
 from ...case.analysis import AnalysisSection
 from ...case.harmonic import HarmonicSection, nodal_diameter
-from .asymptotes import most_alike as omega_most_alike
-from .asymptotes import other_asymptote
+from .asymptotes import omega_most_alike, other_asymptote
 from .context import AnalysisContext
 from .rest import rest_state, start_mode
 
