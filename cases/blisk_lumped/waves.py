@@ -31,7 +31,7 @@ COLUMNS = (
     "zeta",
     "stick",
     "slip",
-    "error_estimate",
+    "force_outside",
 )
 
 

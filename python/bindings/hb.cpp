@@ -1,4 +1,5 @@
 #include "casters.h"
+#include "hb/discretisation_error.h"
 #include "hb/forced_response.h"
 #include "hb/nonlinear_mode.h"
 #include "hb/static_preload.h"
@@ -11,7 +12,7 @@ nb::dict contact_summary(hb::ContactSummary const& s) {
   const double samples = std::max(1.0, s.stick + s.slip + s.open);
   nb::dict out;
   out["stick"] = s.stick / samples, out["slip"] = s.slip / samples, out["open"] = s.open / samples;
-  out["error_estimate"] = s.total > 0 ? std::sqrt(s.truncated / s.total) : 0.0;
+  out["force_outside"] = s.total > 0 ? std::sqrt(s.truncated / s.total) : 0.0;
   out["aliasing"] = s.retained > 0 ? std::sqrt(s.aliased / s.retained) : 0.0;
   out["work"] = s.work, out["unclosed"] = s.unclosed, out["slip_path"] = s.path;
   return out;
@@ -138,6 +139,16 @@ void bind_hb(nb::module_& m) {
           nb::keep_alive<1, 2>())
       .def_prop_ro("reference_amplitude", &ForcedResponse::reference_amplitude)
       .def("initial", [](ForcedResponse& p, double omega) { return handed(p.initial(omega)); });
+  nb::class_<DiscretisationError>(m, "DiscretisationError")
+      .def(nb::init<HarmonicProblem&, std::string const&>(), nb::keep_alive<1, 2>())
+      .def_prop_ro("orders", &DiscretisationError::orders)
+      .def_prop_ro("samples", &DiscretisationError::samples)
+      .def_prop_ro("route", &DiscretisationError::route)
+      .def("at", [](DiscretisationError& e, Petsc<Vec> y, Petsc<Vec> tangent) -> std::optional<nb::tuple> {
+        const auto out = e.at(y.object, tangent.object);
+        if (!out) return {};
+        return nb::make_tuple(out->all, out->harmonics, out->samples, out->solver);
+      });
 }
 
 }  // namespace fretwave::python

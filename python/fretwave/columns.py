@@ -82,7 +82,19 @@ _ALL = (
     Column("stick", "1", "share of contact pairs and samples that stick"),
     Column("slip", "1", "share of contact pairs and samples that slip"),
     Column("open", "1", "share of contact pairs and samples without contact"),
-    Column("error_estimate", "1", "share of the contact force outside the retained harmonics"),
+    Column("omega_error", "rad/s", "estimated error of omega: modulus of that of lambda"),
+    Column("zeta_error", "1", "estimated error of zeta: that of lambda over omega0"),
+    Column("amplitude_error", "m", "estimated error of the complex amplitude, modulus"),
+    *(
+        Column(f"{what}_error_{source}", unit, f"estimated error of {name} by {why}")
+        for what, unit, name in (("lambda", "1/s", "lambda"), ("amplitude", "m", "the complex amplitude"))
+        for source, why in (
+            ("harmonics", "the harmonics that are not retained"),
+            ("samples", "the number of samples"),
+            ("solver", "what the solver left"),
+        )
+    ),
+    Column("force_outside", "1", "share of the varying contact force outside the retained harmonics; no error"),
     Column("residual", "1", "norm of the scaled residual"),
     Column("newton", "1", "Newton iterations", "i"),
     Column("linear", "1", "linear iterations", "i"),
@@ -98,7 +110,7 @@ _SHARED = (
     "stick",
     "slip",
     "open",
-    "error_estimate",
+    "force_outside",
     "residual",
     "newton",
     "linear",
@@ -108,9 +120,18 @@ _SHARED = (
     "unclosed",
     "event",
 )
-MODE = ("point", "amplitude", "omega", "omega0", "frequency_hz", "beta", "zeta", *_SHARED)
+_SOURCES = ("harmonics", "samples", "solver")
+MODE = (
+    *("point", "amplitude", "omega", "omega0", "frequency_hz", "beta", "zeta", "omega_error", "zeta_error"),
+    *(f"lambda_error_{source}" for source in _SOURCES),
+    *_SHARED,
+)
 FLUTTER = ("point", "nodal_diameter", *MODE[1:])
-FORCED = ("point", "level", "omega", "frequency_hz", "amplitude", "phase", *_SHARED)
+FORCED = (
+    *("point", "level", "omega", "frequency_hz", "amplitude", "phase", "amplitude_error"),
+    *(f"amplitude_error_{source}" for source in _SOURCES),
+    *_SHARED,
+)
 
 
 def columns_named(names: Sequence[str | Column]) -> list[Column]:

@@ -203,14 +203,19 @@ contact::Motion Aft::whole(ContactPeriod const& period, Exponents const& e) cons
   return motion;
 }
 
+FourierTransform const& Aft::whole_transform() const {
+  if (!whole_transform_)
+    whole_transform_ = std::make_shared<FourierTransform>(harmonics_, columns_, law_->components());
+  return *whole_transform_;
+}
+
 ContactPeriod Aft::period(double const* U, Exponents const& e) const {
   ContactPeriod out;
   for (auto* samples : {&out.u, &out.v, &out.f}) samples->resize(size_t(harmonics_.samples()) * columns_);
   std::vector<double> V(size_t(columns_) * harmonics_.block_size());
   multiply(harmonics_, e.s, U, V.data(), columns_);
-  const FourierTransform transform(harmonics_, columns_, law_->components());
-  transform.to_time(U, out.u.data());
-  transform.to_time(V.data(), out.v.data());
+  whole_transform().to_time(U, out.u.data());
+  whole_transform().to_time(V.data(), out.v.data());
   contact::Record record;
   if (columns_) law_->force(whole(out, e), out.f.data(), record);
   out.unclosed = record.unclosed;
@@ -269,18 +274,19 @@ ContactSummary Aft::summarise(double const* U, Exponents const& e) {
   const size_t n = size_t(columns_) * harmonics_.block_size();
   std::vector<double> F(n), finer(n);
   const ContactPeriod now = period(U, e);
-  const FourierTransform transform(harmonics_, columns_, law_->components());
-  transform.to_harmonics(now.f.data(), F.data());
-  std::tie(summary.truncated, summary.total) = transform.truncated_energy(now.f.data(), F.data());
+  whole_transform().to_harmonics(now.f.data(), F.data());
+  std::tie(summary.truncated, summary.total) = whole_transform().truncated_energy(now.f.data(), F.data());
   summary.unclosed = now.unclosed;
 
   count(diagnosis(now, e, false), summary);
 
-  Aft doubled(Harmonics(harmonics_.orders(), 2 * harmonics_.samples()), law_);
-  doubled.force(U, e, finer.data());
+  if (!doubled_)
+    doubled_ = std::make_shared<Aft>(Harmonics(harmonics_.orders(), 2 * harmonics_.samples()), law_);
+  doubled_->force(U, e, finer.data());
+  const size_t m = harmonics_.block_size(), mean = harmonics_.orders()[0] == 0;
   for (size_t k = 0; k < n; ++k) {
     summary.aliased += (finer[k] - F[k]) * (finer[k] - F[k]);
-    summary.retained += F[k] * F[k];
+    summary.retained += k % m < mean ? 0 : F[k] * F[k];
   }
   return summary;
 }

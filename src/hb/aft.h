@@ -7,9 +7,9 @@ namespace fretwave::hb {
 /// Contact quality of one motion: energies for the truncated share, and what the law diagnoses.
 struct ContactSummary {
   double stick = 0, slip = 0, open = 0;  ///< pair-samples
-  double truncated = 0, total = 0;       ///< force energy outside the retained orders, and in all
+  double truncated = 0, total = 0;  ///< of the varying force: energy outside the retained orders, and in all
   double aliased = 0,
-         retained = 0;  ///< squared change of the coefficients on doubled samples, and their square
+         retained = 0;  ///< squared change of the coefficients on doubled samples, and their square (n > 0)
   double work = 0;      ///< dissipated energy per period [J]
   double unclosed = 0;  ///< largest |w(T) - w(0)| of a slider [m]
   double path = 0;      ///< longest slip path of a pair in the period [m], to measure it with
@@ -69,6 +69,8 @@ class Aft {
   FourierTransform const& transform(Tile const& tile) const {
     return tile.pairs == tiles_.front().pairs ? transform_ : last_transform_;
   }
+  /// Of all pairs at once, for who reads a period; made when first asked for, as the tables take longer.
+  FourierTransform const& whole_transform() const;
   void mirror(std::vector<double>& samples, double sign, int columns) const;
   void by_columns(double* D) const;
   void toeplitz_hankel(std::vector<double> const& tangent, std::vector<double>& T) const;
@@ -79,6 +81,8 @@ class Aft {
   std::vector<Tile> tiles_;            ///< of one size but for the last
   FourierTransform transform_, last_transform_, tangent_transform_;
   std::vector<double> velocity_, u_, v_, f_;
+  mutable std::shared_ptr<FourierTransform> whole_transform_;
+  std::shared_ptr<Aft> doubled_;  ///< on twice the samples
 };
 
 }  // namespace fretwave::hb

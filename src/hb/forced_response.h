@@ -14,6 +14,10 @@ class ForcedResponse : public HarmonicProblem {
   /// Zero motion at angular frequency w: Newton's first step is then the linear response. Collective.
   VecHandle initial(double omega);
   double reference_amplitude() const { return amplitude_; }
+  using HarmonicProblem::on;
+  std::unique_ptr<HarmonicProblem> on(Harmonics const& h) const override {
+    return std::unique_ptr<HarmonicProblem>(new ForcedResponse(*this, h));
+  }
 
   double parameter_value(double entry) const override { return entry * omega_reference_; }
   double parameter_entry(double value) const override { return value / omega_reference_; }
@@ -27,6 +31,11 @@ class ForcedResponse : public HarmonicProblem {
   std::vector<solve::TestFunction> tests(Vec y, Vec tangent) override;
 
  private:
+  ForcedResponse(ForcedResponse const& same, Harmonics const& h)
+      : HarmonicProblem(same, h),
+        level_(same.level_),
+        omega_reference_(same.omega_reference_),
+        amplitude_(same.amplitude_) {}
   ScaledMotion motion(std::vector<double> const& z) const override;
   double metric_weight(int) const override { return 100; }  // a step of 0.1 is 1 % of the frequency
   double level_, omega_reference_, amplitude_ = 1;

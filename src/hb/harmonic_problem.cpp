@@ -45,6 +45,25 @@ HarmonicProblem::HarmonicProblem(model::Model const& model, Harmonics const& h, 
   last_ = unknowns();
 }
 
+HarmonicProblem::HarmonicProblem(HarmonicProblem const& same, Harmonics const& h)
+    : HarmonicProblem(same.model(), h, same.scalars_, same.row_, same.stiffness_) {
+  excitation_ = same.on(*this, same.excitation_);
+  static_ = same.on(*this, same.static_), static_load_ = same.on(*this, same.static_load_);
+  for (auto const& g : same.unfold_) unfold_.push_back(same.on(*this, g));
+  sliders_ = same.sliders_, owner_ = same.owner_;
+  last_ = unknowns();
+}
+
+VecHandle HarmonicProblem::on(HarmonicProblem const& other, Vec x) const {
+  const PetscInt tail = local_size(x) - local_block_;
+  VecHandle out = make_vector(comm(), other.local_block_ + tail);
+  const ReadArray from(x);
+  const WriteArray to(out);
+  embed(harmonics(), from.data(), other.harmonics(), to.data(), int(model().local_dofs()));
+  std::copy_n(from.data() + local_block_, tail, to.data() + other.local_block_);
+  return out;
+}
+
 std::span<std::pair<PetscInt, double> const> HarmonicProblem::mine() const {
   const PetscInt first = model().first_dof(), end = first + model().local_dofs();
   const auto before = [](auto const& entry, PetscInt dof) { return entry.first < dof; };

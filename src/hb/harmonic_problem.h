@@ -92,8 +92,15 @@ class HarmonicProblem : public solve::Problem {
   std::vector<Wearing> wearing(Vec y) { return residual_.wearing(coefficients(y), exponents(y)); }
   EnergyBalance energy(Vec y);
   Exponents exponents(Vec y) { return motion(scalars(y)).exponents; }
+  /// The same problem, its loads and what stands at rest, on another set of harmonics; none where there is no
+  /// other. Collective.
+  virtual std::unique_ptr<HarmonicProblem> on(Harmonics const&) const { return nullptr; }
+  /// Unknowns or equations of this problem as those of the same one on another set: what is new is zero.
+  VecHandle on(HarmonicProblem const& other, Vec x) const;
 
  protected:
+  /// Of `on`.
+  HarmonicProblem(HarmonicProblem const& same, Harmonics const&);
   virtual ScaledMotion motion(std::vector<double> const& z) const = 0;
   virtual double metric_weight(int /*scalar*/) const { return 1; }
   /// Force rows are measured in k a from now on; true if that changed them.

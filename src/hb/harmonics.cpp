@@ -39,6 +39,18 @@ std::vector<complex> conjugate(std::vector<complex> factor) {
   return factor;
 }
 
+void embed(Harmonics const& from, double const* x, Harmonics const& to, double* y, int columns) {
+  std::fill_n(y, size_t(columns) * to.block_size(), 0.0);
+  for (int i = 0; i < from.count(); ++i) {
+    const int n = from.orders()[i];
+    const auto at = std::find(to.orders().begin(), to.orders().end(), n);
+    if (at == to.orders().end()) continue;
+    const int a = from.offset(i), b = to.offset(int(at - to.orders().begin()));
+    for (int c = 0; c < columns; ++c)
+      std::copy_n(x + size_t(c) * from.block_size() + a, n ? 2 : 1, y + size_t(c) * to.block_size() + b);
+  }
+}
+
 void multiply(Harmonics const& h, std::vector<complex> const& s, double const* x, double* y, int columns) {
   const int m = h.block_size();
   for (int c = 0; c < columns; ++c)
@@ -212,14 +224,19 @@ complex const* FourierTransform::spectrum(double const* samples) const {
 
 std::pair<double, double> FourierTransform::truncated_energy(double const* samples,
                                                              double const* blocks) const {
-  const size_t size = size_t(harmonics_.samples()) * columns_;
-  std::vector<double> retained(size);
+  const size_t n = size_t(columns_);
+  std::vector<double> left(samples, samples + harmonics_.samples() * n), retained(left.size());
   to_time(blocks, retained.data());
   double outside = 0, total = 0;
-  for (size_t k = 0; k < size; ++k) {
-    outside += (samples[k] - retained[k]) * (samples[k] - retained[k]);
-    total += samples[k] * samples[k];
-  }
+  const auto varying = [&](std::vector<double> const& x, size_t c) {
+    double mean = 0, square = 0;
+    for (size_t k = c; k < x.size(); k += n) mean += x[k] / harmonics_.samples();
+    for (size_t k = c; k < x.size(); k += n) square += (x[k] - mean) * (x[k] - mean);
+    return square;
+  };
+  for (size_t c = 0; c < n; ++c) total += varying(left, c);
+  for (size_t k = 0; k < left.size(); ++k) left[k] -= retained[k];
+  for (size_t c = 0; c < n; ++c) outside += varying(left, c);
   return {outside, total};
 }
 

@@ -46,6 +46,9 @@ struct Exponents {
 /// y = s x on harmonic blocks: columns x block size, real (cos, sin) pairs.
 void multiply(Harmonics const&, std::vector<complex> const& s, double const* x, double* y, int columns);
 std::vector<complex> conjugate(std::vector<complex> factor);
+/// Harmonic blocks of one set in those of another: orders that it has not retained are left out, those that
+/// are new are zero.
+void embed(Harmonics const& from, double const* x, Harmonics const& to, double* y, int columns);
 
 /// Between harmonic blocks (pairs x components x block size) and time samples (samples x components x pairs,
 /// pairs innermost): by a table of cosines and sines for few harmonics, by FFT for many.
@@ -55,7 +58,8 @@ class FourierTransform {
   void to_time(double const* blocks, double* samples) const;
   /// Coefficients of sampled columns; overwrites nothing of `samples`.
   void to_harmonics(double const* samples, double* blocks) const;
-  /// Sums of squares over the samples: what the retained orders leave, and all.
+  /// Sums of squares over the samples, each column about its mean (a static load is no part of a motion):
+  /// what the retained orders leave, and all.
   std::pair<double, double> truncated_energy(double const* samples, double const* blocks) const;
   /// One-sided complex spectrum: (samples/2 + 1) x columns, unnormalised.
   complex const* spectrum(double const* samples) const;

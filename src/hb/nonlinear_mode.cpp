@@ -70,6 +70,15 @@ NonlinearMode::NonlinearMode(model::Model const& model, Harmonics const& h, Meth
   check(VecAXPBYPCZ(imaginary_, scale.imag(), scale.real(), 0, shape, imaginary));
 }
 
+NonlinearMode::NonlinearMode(NonlinearMode const& same, Harmonics const& h)
+    : HarmonicProblem(same, h),
+      method_(same.method_),
+      omega_reference_(same.omega_reference_),
+      starting_stiffness_(same.starting_stiffness_),
+      mass_(model().sum(2)),
+      shape_(solve::copy(same.shape_)),
+      imaginary_(solve::copy(same.imaginary_)) {}
+
 VecHandle NonlinearMode::initial(double amplitude) {
   if (!(amplitude > 0))
     throw InputError("modal amplitude is not positive", std::to_string(amplitude), "> 0",

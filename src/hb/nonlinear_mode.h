@@ -20,6 +20,10 @@ class NonlinearMode : public HarmonicProblem {
   /// The linear mode at amplitude a. Collective.
   VecHandle initial(double amplitude);
   Method method() const { return method_; }
+  using HarmonicProblem::on;
+  std::unique_ptr<HarmonicProblem> on(Harmonics const& h) const override {
+    return std::unique_ptr<HarmonicProblem>(new NonlinearMode(*this, h));
+  }
   /// k_ref of the motion at y in place of the starting mode's, by powers of 16: a contact far stiffer than
   /// what moves once it slips would hide every other force behind its own.
   bool scale(Vec y) override;
@@ -36,6 +40,7 @@ class NonlinearMode : public HarmonicProblem {
   ScaledMotion motion(std::vector<double> const& z) const override;
 
  private:
+  NonlinearMode(NonlinearMode const& same, Harmonics const&);
   Method method_;
   double omega_reference_, starting_stiffness_;
   MatHandle mass_;

@@ -131,7 +131,7 @@ PetscErrorCode LinearSolver::shell_precondition(PC pc, Vec x, Vec y) {
 /// have cost as much as building; at once, if even its first reuse cost more the last time.
 void LinearSolver::count_iterations() {
   PetscInt iterations = 0;
-  check(KSPGetIterationNumber(ksp_of(snes_), &iterations));
+  check(KSPGetIterationNumber(beside_ ? KSP(tangent_) : ksp_of(snes_), &iterations));
   const double cost = preconditioner().build_cost();
   if (fresh_ < 0) {
     fresh_ = int(iterations);
@@ -156,7 +156,7 @@ bool LinearSolver::linearise(Vec y, bool newton) {
   uncounted_ = false;
   built_here_ = stale_;
   if (stale_ && !build()) return false;
-  uncounted_ = newton;
+  uncounted_ = newton || beside_;
   check(MatAssemblyBegin(J_, MAT_FINAL_ASSEMBLY));
   check(MatAssemblyEnd(J_, MAT_FINAL_ASSEMBLY));
   return true;
@@ -172,6 +172,11 @@ bool LinearSolver::build() {
   stale_ = false;
   fresh_ = -1, excess_ = 0;
   return true;
+}
+
+void LinearSolver::serve_beside(double tolerance) {
+  beside_ = true;
+  check(KSPSetTolerances(tangent_, tolerance, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT));
 }
 
 bool LinearSolver::climb() {

@@ -39,6 +39,8 @@ class LinearSolver {
   bool linearise(Vec y, bool newton);
   /// J x = b from x where the Krylov route is taken, to the tangent's tolerance. Collective.
   bool solve(Vec b, Vec x);
+  /// No Newton steps are asked for, but solves beside them alone, to this relative tolerance.
+  void serve_beside(double tolerance);
   /// The next linearisation builds the preconditioner anew.
   void renew() { stale_ = true; }
   /// After a failure at the last linearisation: the next one tries another way; false if there is none left.
@@ -69,7 +71,7 @@ class LinearSolver {
   KspHandle tangent_;
   VecHandle point_;
   std::unique_ptr<Preconditioner> own_, fallback_;
-  bool stale_ = true, uncounted_ = false;
+  bool stale_ = true, uncounted_ = false, beside_ = false;
   int fresh_ = -1;          ///< Krylov iterations of the first solve after a build; -1: none yet
   int excess_ = 0;          ///< iterations beyond that, of all solves since
   double first_reuse_ = 0;  ///< iterations beyond it that the first reuse cost when it was last tried, halved

@@ -234,4 +234,16 @@ bool Newton::linear(Vec y, Vec b, Vec x) {
   return false;
 }
 
+bool Newton::linear(Vec y, std::span<VecHandle const> b, std::span<VecHandle const> x) {
+  const auto all = [&] {
+    for (size_t k = 0; k < b.size(); ++k)
+      if (!linear_->solve(b[k], x[k])) return false;
+    return true;
+  };
+  do {
+    if (linear_->linearise(y, false) && all()) return true;
+  } while (linear_->climb());
+  return false;
+}
+
 }  // namespace fretwave::solve

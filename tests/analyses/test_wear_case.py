@@ -99,7 +99,7 @@ def test_without_a_coefficient_there_is_the_mode(folder: Path, tmp_path: Path) -
     assert len(table) == 2
     for row in table:
         mode = expected[float(row["amplitude"])]
-        for key in ("omega", "omega0", "beta", "zeta", "stick", "slip", "open", "error_estimate"):
+        for key in ("omega", "omega0", "beta", "zeta", "stick", "slip", "open", "force_outside"):
             assert row[key] == mode[key], key
         assert (row["newton"], row["linear"], row["residual"]) == (mode["newton"], mode["linear"], mode["residual"])
 

@@ -127,19 +127,19 @@ def cubic_diagnostics(comm, orders, samples):
     return problem.diagnostics(problem.initial(AMPLITUDE))
 
 
-def test_error_estimate_is_the_share_outside_by_parseval(comm):
+def test_force_outside_is_the_share_outside_by_parseval(comm):
     """cos^3 = 3/4 cos + 1/4 cos 3: a share of (1/4) / sqrt(9/16 + 1/16) = 1/sqrt(10) falls outside one harmonic."""
-    assert cubic_diagnostics(comm, [1], 16)["error_estimate"] == pytest.approx(1 / np.sqrt(10), rel=LAST_DIGITS)
-    assert cubic_diagnostics(comm, [1, 3], 16)["error_estimate"] < LAST_BIT
+    assert cubic_diagnostics(comm, [1], 16)["force_outside"] == pytest.approx(1 / np.sqrt(10), rel=LAST_DIGITS)
+    assert cubic_diagnostics(comm, [1, 3], 16)["force_outside"] < LAST_BIT
 
 
 @pytest.mark.parametrize("highest", [1, 3, 7, 21])
-def test_error_estimate_of_coulomb_friction_is_that_of_a_square_wave(comm, highest):
+def test_force_outside_of_coulomb_friction_is_that_of_a_square_wave(comm, highest):
     """As eps -> 0 the force is a square wave: outside H lies 1 - (8/pi^2) sum 1/n^2 of its energy, n odd up to H."""
     model = fw.Model([[1.0]], [[1.0]], None, [friction([[1.0]], 1.0, 1e-9)], comm)
     problem = mode(model, fw.Harmonics(range(1, highest + 1, 2), 8192))
     inside = 8 / np.pi**2 * sum(1 / n**2 for n in range(1, highest + 1, 2))
-    found = problem.diagnostics(problem.initial(1.0))["error_estimate"]
+    found = problem.diagnostics(problem.initial(1.0))["force_outside"]
     assert found**2 == pytest.approx(1 - inside, abs=4 / 8192)  # two samples of a period lie on the jumps
 
 

@@ -139,7 +139,7 @@ def test_branch_converges_with_the_samples(two_dof, comm):
 
 
 @SERIAL
-def test_error_estimate_falls_with_the_harmonics(two_dof, comm):
+def test_force_outside_falls_with_the_harmonics(two_dof, comm):
     """On a slipping motion of the branch, as on an imposed one: more harmonics, less of the force outside."""
     model = oscillator(two_dof, comm)
     reference = fw.linear_modes(model, 1, "stuck")[0]
@@ -147,5 +147,5 @@ def test_error_estimate_falls_with_the_harmonics(two_dof, comm):
     for H in (1, 3, 7, 21, 41):
         problem = fw.NonlinearMode(model, fw.Harmonics(range(1, H + 1, 2), 1024), "EPMC", 0, reference)
         branch = fw.Continuation(problem, problem.initial(0.05), (0.05, 0.3), report_at=[0.2])
-        estimates.append([problem.diagnostics(p.y)["error_estimate"] for p in branch if p.event == "report"][0])
+        estimates.append([problem.diagnostics(p.y)["force_outside"] for p in branch if p.event == "report"][0])
     assert estimates == sorted(estimates, reverse=True) and estimates[-1] < estimates[0] / 4

@@ -169,7 +169,7 @@ class _Wave:
             branch = self._branch(problem, snapshot, go_on)
             for point in points_of(branch):
                 own = {"wave_number": self.number}
-                self._say(record(writer, problem, point, branch.snapshot(), own, self._column))
+                self._say(record(writer, problem, point, branch.snapshot(), own, self._column, self.analysis.errors))
             tell(self.context, branch, f"{self.context.name}: nodal diameter {self.diameter}")
             stopped = "" if branch.converged else f"nodal diameter {self.diameter}: {branch.reason}"
             branch.destroy()

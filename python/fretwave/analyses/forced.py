@@ -195,7 +195,7 @@ def _one_level(
     excitation.phase = phase if go_on else None
     for point in points_of(branch):
         own = {"level_number": number, **({} if excitation.phase is None else {"phase": excitation.phase})}
-        row = record(writer, problem, point, branch.snapshot(), own, excitation.row)
+        row = record(writer, problem, point, branch.snapshot(), own, excitation.row, analysis.errors)
         share = (number + (row["omega"] - low) / (high - low)) / len(analysis.levels)
         context.console.point(
             point_line(context.name, row), _short(row), share, _notable(row["event"]) or bool(closure_note(row))
@@ -235,7 +235,7 @@ def point_line(name: str, row: dict[str, Any]) -> str:
     return (
         f"{name} {row['point']:4d}  level {row['level']:6.4g}  f {row['frequency_hz']:9.5g} Hz"
         f"  a {row['amplitude']:9.4g} m  phase {math.degrees(row['phase']):7.2f} deg"
-        f"  stick {100 * row['stick']:3.0f} %  error {row['error_estimate']:.1e}"
+        f"  stick {100 * row['stick']:3.0f} %  error {row['amplitude_error']:.1e} m"
         f"  newton {row['newton']:2d}  {row['wall_s']:.3f} s"
         + (f"  {row['event'].replace('_', ' ')}" if row["event"] else "")
         + closure_note(row)

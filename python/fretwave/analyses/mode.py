@@ -135,7 +135,7 @@ def _follow(
         describe = WheelShape(context, analysis.normalise, tuned, start.mode).row
     with context.console.progress(context.name):
         for point in points_of(branch):
-            row = record(writer, problem, point, branch.snapshot(), {}, describe)
+            row = record(writer, problem, point, branch.snapshot(), {}, describe, context.analysis.errors)
             if error_at is not None and math.isclose(row["amplitude"], error_at, rel_tol=1e-9):
                 context.console.line(_reduction_error(context, problem, point, row))
             share = math.log(row["amplitude"] / low) / math.log(high / low)
@@ -185,8 +185,8 @@ def point_line(name: str, row: dict[str, Any]) -> str:
     """One plain line of progress."""
     return (
         f"{name} {row['point']:4d}  a {row['amplitude']:9.4g} m  f {row['frequency_hz']:9.5g} Hz"
-        f"  zeta {_percent(row['zeta'], 4):>8} %  stick {100 * row['stick']:3.0f} %"
-        f"  error {row['error_estimate']:.1e}  newton {row['newton']:2d}  {row['wall_s']:.3f} s"
+        f"  stick {100 * row['stick']:3.0f} %  zeta {_percent(row['zeta'], 4):>8} %"
+        f" +- {100 * row['zeta_error']:<7.1g}  newton {row['newton']:2d}  {row['wall_s']:.3f} s"
         + ("  overdamped" if abs(row["zeta"]) >= 1 else "")
         + (f"  {row['event'].replace('_', ' ')}" if row["event"] else "")
         + closure_note(row)
@@ -212,7 +212,7 @@ def summarise(name: str, table: dict[str, Any]) -> list[str]:
         f"{name}: {len(zeta)} points, a {amplitude[0]:.4g} to {amplitude[-1]:.4g} m,"
         f" largest damping {100 * zeta[top]:.4g} % at a = {amplitude[top]:.4g} m,"
         f" {folds} fold{'s' * (folds != 1)},"
-        f" error estimate up to {table['error_estimate'].max():.1e}, {table['wall_s'].sum():.2f} s"
+        f" error of zeta up to {100 * np.nanmax(table['zeta_error']):.2g} %, {table['wall_s'].sum():.2f} s"
     ]
     words = {True: "stable (damping rises)", False: "unstable (damping falls)", None: "stability unknown (branch end)"}
     for cycle in limit_cycles(table):

@@ -40,6 +40,7 @@ class HarmonicSection(AnalysisSection):
         default=None,
         ge=0,
     )
+    errors: bool = key("estimate the errors of every point", example="false", default=True)
     step: StepSection = key("step control", example="{ initial = 0.05, maximum = 0.3 }", default_factory=StepSection)
     preload: Optional[PreloadSection] = key("in place of [preload]", example="{ pair_loads = true }", default=None)
 

@@ -87,7 +87,6 @@ def describe(name: str, group: h5py.Group) -> tuple[str, ...]:
     table = {key: points[key][()] for key in points}
     kind = str(group.attrs["type"])
     method = group.attrs.get("method")
-    error = f"{np.max(table['error_estimate']):.1e}" if "error_estimate" in table and len(points["event"]) else ""
     return (
         name,
         f"{kind} {method}" if method else kind.replace("_", " "),
@@ -96,9 +95,18 @@ def describe(name: str, group: h5py.Group) -> tuple[str, ...]:
         _range(table),
         _largest(table),
         str(_count(table, "fold")) if "event" in table else "",
-        error,
+        _error(table),
         f"{table['wall_s'].sum():.2f} s" if "wall_s" in table else "",
     )
+
+
+def _error(table: dict[str, Any]) -> str:
+    """The largest estimated one, where there is one."""
+    for name, text in (("zeta_error", "{:.2g} % zeta"), ("amplitude_error", "{:.2g} m")):
+        found = table.get(name, np.empty(0))
+        if np.isfinite(found).any():
+            return text.format((100 if "%" in text else 1) * np.nanmax(found))
+    return ""
 
 
 def _range(table: dict[str, Any]) -> str:

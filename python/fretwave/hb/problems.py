@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import operator
+import time
 from collections.abc import Mapping, Sequence
 from typing import Any, Union, cast
 
@@ -111,6 +112,9 @@ class HarmonicProblem:
         self, model: Model, harmonics: Harmonics, prefix: str, core: _core.HarmonicProblem, rest: Rest | None = None
     ) -> None:
         self.model, self.harmonics, self.prefix, self.core, self.rest = model, harmonics, prefix, core, rest
+        self._error: _core.DiscretisationError | None = None
+        #: What `errors` has taken [s].
+        self.errors_wall_s = 0.0
         if rest is not None:
             self.preload(rest.displacement, rest.load)
             model.settle(rest)
@@ -176,12 +180,38 @@ class HarmonicProblem:
         Returns
         -------
         dict
-            stick, slip, open : shares of all pair-samples; error_estimate : share (2-norm) of the contact force outside
-            the retained harmonics; aliasing : relative change of the retained force coefficients on doubled samples;
+            stick, slip, open : shares of all pair-samples; force_outside : share (2-norm) of the varying contact force
+            outside the retained harmonics, no error; aliasing : relative change of the retained force
+            coefficients on doubled samples;
             work : energy dissipated by contact in a period; unclosed : largest distance [m] of a slider from where it
             began its period, rounding unless its closure failed; slip_path : longest slip path of a pair [m].
         """
         return dict(self.core.summary(y))
+
+    def errors(self, y: PETSc.Vec, tangent: PETSc.Vec | None) -> dict[str, float]:
+        """Estimated errors at a converged point, in the units of what they are errors of. Collective.
+
+        One Newton step on the harmonics up to 2 H + 1 and four times the samples, read at the same amplitude or
+        frequency: see `src/hb/discretisation_error.h`. Of the reduction of a model nothing is known here. Without the
+        branch's tangent none is estimated, all are nan.
+
+        Returns
+        -------
+        dict
+            Modes: omega_error [rad/s], zeta_error, and lambda_error_harmonics, _samples, _solver [1/s], the changes of
+            lambda = -beta + i omega by each source. Responses: amplitude_error and the same by source [m]. nan where
+            the refined system is singular; empty for a problem that has no table.
+        """
+        if self.meaning is None:
+            return {}
+        began, z, found = time.perf_counter(), self.scalars(y), None
+        if tangent is not None:
+            if self._error is None:
+                self._error = _core.DiscretisationError(self.core, f"{self.prefix}error_")
+            found = self._error.at(y, tangent)
+        self.errors_wall_s += time.perf_counter() - began
+        changes = [np.full_like(z, np.nan)] * 4 if found is None else [np.array(change) for change in found]
+        return self.meaning.errors(z, changes)
 
     def energy(self, y: PETSc.Vec) -> dict[str, float]:
         """Where the energy of a period goes [J]. Collective.
@@ -246,6 +276,7 @@ class HarmonicProblem:
 
     def destroy(self) -> None:
         """Free the solver's vectors. Collective."""
+        self._error = None
         self.core = None  # type: ignore[assignment]
 
     def __enter__(self) -> HarmonicProblem:

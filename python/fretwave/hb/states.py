@@ -7,7 +7,7 @@ The scalars of unknowns y are linear in y: the problem's own (frequency, ...), t
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, ClassVar, Union
 
@@ -15,6 +15,9 @@ import numpy as np
 import numpy.typing as npt
 
 from ..arrays import Array
+
+#: Of a point's error.
+SOURCES = ("harmonics", "samples", "solver")
 
 
 @dataclass(frozen=True)
@@ -45,6 +48,23 @@ class ModalState:
         """The inverse in physical units (n, 3), from columns of n states."""
         w = table["omega0" if self.method == "EPMC" else "omega"]
         return np.column_stack([table["beta"], w, np.log(table["amplitude"])])
+
+    def errors(self, z: Array, changes: Sequence[Array]) -> dict[str, float]:
+        """Errors of these scalars in columns, from their changes by all sources and by each of `SOURCES`.
+
+        Of the complex eigenvalue by source [1/s]; of omega and zeta those of its modulus, |d omega| <= |d lambda| and
+        |d zeta| <= |d lambda| / omega0, for an error of zeta by itself changes its sign along a branch.
+        """
+        here = self.eigenvalue(z)
+        error, *parts = (abs(self.eigenvalue(z + change) - here) for change in changes)
+        omega0 = abs(here)
+        own = {f"lambda_error_{source}": part for source, part in zip(SOURCES, parts)}
+        return {"omega_error": error, "zeta_error": error / omega0 if omega0 else math.nan, **own}
+
+    def eigenvalue(self, z: npt.ArrayLike) -> complex:
+        """lambda = -beta + i omega [1/s]."""
+        row = self(z)
+        return complex(-row["beta"], row["omega"])
 
     def __call__(self, z: npt.ArrayLike) -> dict[str, float]:
         """The columns of these scalars."""
@@ -81,6 +101,11 @@ class ForcedState:
         """The inverse in physical units (n, 3), from columns of n states."""
         amplitude, phase = np.asarray(table["amplitude"]), np.asarray(table["phase"])
         return np.column_stack([table["omega"], amplitude * np.cos(phase), -amplitude * np.sin(phase)])
+
+    def errors(self, z: Array, changes: Sequence[Array]) -> dict[str, float]:
+        """Errors of the complex amplitude [m] in columns, from changes of the scalars by all sources and by each."""
+        error, *parts = (self.amplitude_reference * math.hypot(change[1], change[2]) for change in changes)
+        return {"amplitude_error": error, **{f"amplitude_error_{name}": part for name, part in zip(SOURCES, parts)}}
 
     def __call__(self, z: npt.ArrayLike) -> dict[str, float]:
         """The columns of these scalars."""

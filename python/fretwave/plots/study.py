@@ -45,7 +45,7 @@ def draw(table: Table) -> Figure:
         style.plain_numbers(plane.xaxis, table["wall_s"])
     axes[0].set_ylabel("Relative error of the last cycle" if of_wear else "Error against the finest run")
     if not of_wear:
-        axes[0].plot([], [], "o-", color=style.GREY, alpha=0.35, label="error estimate of the run")
+        axes[0].plot([], [], "o-", color=style.GREY, alpha=0.35, label="as the run estimates it")
     style.legend_outside(figure, axes[0], columns=4)
     return figure
 
@@ -56,8 +56,8 @@ def _sweep(axes: Axes, table: Table, sweep: str, symbol: str, column: str, line:
         return
     time, error = table["wall_s"][rows], np.maximum(table[column][rows], FLOOR)
     axes.plot(time, error, line, color=colour, label=f"{sweep.replace('_', ' ')} ({symbol})")
-    if column == "zeta_error" and "error_estimate" in table:
-        axes.plot(time, table["error_estimate"][rows], line, color=colour, alpha=0.35)
+    if column == "zeta_error" and "zeta_error_estimate" in table:
+        axes.plot(time, np.maximum(table["zeta_error_estimate"][rows], FLOOR), line, color=colour, alpha=0.35)
     for row, x, y in zip(rows, time, error):
         value = table[sweep][row]
         text = f"{value:.0e}".replace("e-0", "e-") if sweep == "tolerance" else f"{value:g}"

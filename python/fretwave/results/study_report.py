@@ -20,13 +20,16 @@ PRINTED = {
     "error of peak": "{peak_zeta_error:.1e}",
     "error of zeta": "{zeta_error:.1e}",
     "error of omega": "{omega_error:.1e}",
-    "estimate": "{error_estimate:.1e}",
+    "estimated": "{zeta_error_estimate:.1e}",
+    "within 3": "{within_3:.0%}",
+    "within 10": "{within_10:.0%}",
 }
 
 LEGEND = (
     "Errors are against the finest run (marked): of peak zeta relative; of zeta the largest over the amplitudes that "
-    "all runs meet exactly once, divided by the peak; of omega the largest relative one over the same. The estimate is "
-    "the largest error_estimate there: the share of the contact force outside the retained harmonics."
+    "all runs meet exactly once, divided by the peak; of omega the largest relative one over the same. Estimated "
+    "is the error of zeta as the run itself estimates it; within 3 and 10: the share of the amplitudes at which the "
+    "estimated error of lambda is within that factor of the error, where this is above 1e-8 1/s."
 )
 
 

@@ -174,7 +174,7 @@ class _Solver:
 def _row(problem: NonlinearMode, point: Point) -> dict[str, Any]:
     state = problem.state(point.y)
     reported = "report" in point.event
-    estimate = problem.diagnostics(point.y)["error_estimate"] if reported else np.nan
+    estimate = problem.errors(point.y, point.tangent)["omega_error"] if reported else np.nan
     return {**{key: state[key] for key in ("amplitude", "omega", "zeta")}, "estimate": estimate, "reported": reported}
 
 

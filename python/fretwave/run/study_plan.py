@@ -13,6 +13,8 @@ from ..arrays import Array
 
 #: a reported point belongs to an amplitude when it is this near; a loose Newton tolerance lets it miss by about itself
 MATCH = 1e-2
+#: of lambda [1/s]: below it a difference of two runs is what their solvers leave
+LEAST_ERROR = 1e-8
 
 
 @dataclass(frozen=True)
@@ -38,7 +40,8 @@ class Outcome:
 
     Attributes
     ----------
-    amplitude, omega, zeta, error_estimate : (n,) at the reported points, in the order of the branch
+    amplitude, omega, zeta : (n,) at the reported points, in the order of the branch
+    estimate : (n,) estimated error of lambda there [1/s]
     peak_zeta, peak_amplitude : largest damping ratio and where it is
     wall_s : time of the whole branch [s]
     """
@@ -46,7 +49,7 @@ class Outcome:
     amplitude: Array
     omega: Array
     zeta: Array
-    error_estimate: Array
+    estimate: Array
     peak_zeta: float
     peak_amplitude: float
     points: int
@@ -129,6 +132,7 @@ class Study:
         run = self.outcomes[settings]
         omega, zeta, estimate = _values(run, self.compared)
         omega_true, zeta_true, _ = _values(reference, self.compared)
+        within = _calibration(estimate, np.abs(_eigenvalue(omega, zeta) - _eigenvalue(omega_true, zeta_true)))
         return {
             "sweep": sweep,
             "harmonics": settings.harmonics,
@@ -142,10 +146,26 @@ class Study:
             "peak_zeta": run.peak_zeta,
             "peak_amplitude": run.peak_amplitude,
             "peak_zeta_error": abs(run.peak_zeta / reference.peak_zeta - 1.0),
-            "error_estimate": _largest(estimate),
+            "zeta_error_estimate": _largest(estimate / omega_true) / abs(reference.peak_zeta),
+            **within,
             "component_modes": -1 if settings.component_modes is None else settings.component_modes,
             "reference": int(settings == self.plan.reference),
         }
+
+
+def _eigenvalue(omega: Array, zeta: Array) -> npt.NDArray[np.complex128]:
+    """lambda = -beta + i omega [1/s] of damped frequencies."""
+    return np.asarray(omega * (1j - zeta / np.sqrt(1 - zeta**2)))
+
+
+def _calibration(estimate: Array, error: Array) -> dict[str, float]:
+    """Shares of the points at which an estimate is within a factor of the error, where that can be told."""
+    told = error > LEAST_ERROR
+    ratio = estimate[told] / error[told]
+    return {
+        f"within_{factor}": float(np.mean((ratio <= factor) & (ratio >= 1 / factor))) if told.any() else np.nan
+        for factor in (3, 10)
+    }
 
 
 def common_amplitudes(first: float, last: float, count: int) -> Array:
@@ -159,7 +179,7 @@ def _at(run: Outcome, amplitude: float) -> npt.NDArray[np.intp]:
 
 def _values(run: Outcome, amplitudes: Iterable[float]) -> tuple[Array, Array, Array]:
     rows = [int(_at(run, a)[0]) for a in amplitudes]
-    return run.omega[rows], run.zeta[rows], run.error_estimate[rows]
+    return run.omega[rows], run.zeta[rows], run.estimate[rows]
 
 
 def _largest(values: Array) -> float:

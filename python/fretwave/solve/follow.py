@@ -28,6 +28,7 @@ def follow(
     steps: StepControl | None = None,
     report_at: Sequence[float] = (),
     unknowns: bool = True,
+    errors: bool = True,
     observe: Mapping[str, Observed | str] | None = None,
     tell: Callable[[dict[str, Any]], None] | None = None,
 ) -> Branch:
@@ -48,6 +49,8 @@ def follow(
     unknowns : bool
         Keep the unknowns of all points (2 x 8 bytes for each of every point's), for `Branch.unknowns` and
         `Branch.coefficients`.
+    errors : bool
+        Estimate the errors of every point (`HarmonicProblem.errors`); their columns are nan without.
     observe : dict, optional
         Further columns by name: the fundamental's amplitude of a dof, of a row (n_dof,) or of a linear mode's
         coordinate, or "energy", the mechanical energy of the vibration, mean over a period [J].
@@ -97,7 +100,7 @@ def follow(
         knots.append(trace.add(point.y, point.tangent))
         # each rank has measured its own wall time
         seen = observer(point.y) if observe else {}
-        rows.append(problem.model.comm.bcast({**row_of(problem, point, len(rows)), **seen}))
+        rows.append(problem.model.comm.bcast({**row_of(problem, point, len(rows), errors), **seen}))
         if tell is not None:
             tell(rows[-1])
     ended = continuation.converged, continuation.reason, continuation.missed, continuation.started
@@ -112,10 +115,11 @@ def follow(
     return Branch(columns, values, problem.meaning, curves, *ended, kept if unknowns else None, problem.model.comm)
 
 
-def row_of(problem: HarmonicProblem, point: Point, number: int) -> dict[str, Any]:
-    """What the table of a branch says of a point. Collective."""
+def row_of(problem: HarmonicProblem, point: Point, number: int, errors: bool = True) -> dict[str, Any]:
+    """What the table of a branch says of a point; `errors` are estimated, or nan. Collective."""
     return {
         **problem.state(point.y),
+        **problem.errors(point.y, point.tangent if errors else None),
         **problem.diagnostics(point.y),
         "point": number,
         "residual": point.residual,

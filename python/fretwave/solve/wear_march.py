@@ -19,7 +19,7 @@ from .worn_mode import WornMode
 
 #: What the table of a march says beside its points' own numbers.
 STATE = ("omega", "omega0", "frequency_hz", "beta", "zeta", "stick", "slip", "open", "work", "energy_error")
-SOLVER = ("step_error", "error_estimate", "residual", "newton", "linear", "event")
+SOLVER = ("step_error", "force_outside", "residual", "newton", "linear", "event")
 COLUMNS = columns_named(["cycles", "vibrations", "step", "amplitude", *STATE, *SOLVER])
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ...case.analysis import AnalysisSection
+from ...case.harmonic import HarmonicSection
 from ...case.schema import StepSection
 from ...results.results import AnalysisWriter
 from ...results.slopes import slope_fields, slopes_of
@@ -67,6 +68,7 @@ def record(
     snapshot: Mapping[str, Any] | None,
     extra: Mapping[str, Any],
     describe: Describe | None = None,
+    errors: bool = True,
 ) -> dict[str, Any]:
     """Write one continuation point. Collective.
 
@@ -74,6 +76,7 @@ def record(
     ----------
     extra : the analysis' own part of the state to go on from
     describe : further columns from problem, y and (on the writing rank) coefficients (n_dof, m). Collective
+    errors : estimate them
 
     Returns
     -------
@@ -84,7 +87,7 @@ def record(
     from ...solve.follow import row_of
 
     _core.fault_point("record")
-    row = row_of(problem, point, writer.rows)
+    row = row_of(problem, point, writer.rows, errors)
     motions = None
     if point.event not in PLAIN_EVENTS:
         periods = problem.contact_history(point.y)
@@ -125,7 +128,7 @@ def mode_problem(
     return NonlinearMode(context.model, harmonics, analysis.method, number, mode, context.prefix, avoid, rest)
 
 
-def tell(context: AnalysisContext[AnalysisSection], branch: Continuation, name: str = "") -> None:
+def tell(context: AnalysisContext[HarmonicSection], branch: Continuation, name: str = "") -> None:
     """Say how a branch began, how well a resumed one meets its last point, and what it could not have. Collective.
 
     Kept in run.json too, under `branches`.
@@ -138,6 +141,10 @@ def tell(context: AnalysisContext[AnalysisSection], branch: Continuation, name: 
             f"resumed at {last.parameter:.6g}; its last point is solved again to a residual of {last.residual:.1e}"
         )
     lines += [f"missed: {text}" for text in branch.missed]
+    if not context.analysis.errors:
+        lines.append("errors are not estimated (errors = false)")
+    elif branch.problem.errors_wall_s:
+        lines.append(f"error estimates took {branch.problem.errors_wall_s:.2g} s")
     for line in lines:
         context.console.line(f"{name}: {line}")
     if lines:

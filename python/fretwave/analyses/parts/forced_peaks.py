@@ -6,6 +6,8 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+
 from ...case.analysis import AnalysisSection
 from ...post.mode_curve import ModeCurve
 from ...post.response_peaks import peak_table
@@ -28,7 +30,7 @@ def write_peaks(
     context.write_table("peaks", peaks)
     lines = [
         f"{context.name}: {len(table['level'])} points, {len(peaks['level'])} levels,"
-        f" error estimate up to {table['error_estimate'].max():.1e}, {table['wall_s'].sum():.2f} s"
+        f" error of the amplitude up to {np.nanmax(table['amplitude_error']):.2g} m, {table['wall_s'].sum():.2f} s"
     ]
     for row in range(len(peaks["level"])):
         lines.append(_peak_line(context.name, {key: float(value[row]) for key, value in peaks.items()}, list(curves)))

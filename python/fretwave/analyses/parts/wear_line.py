@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 #: Name of a line's table in its own folder.
 LINE = "line"
 SHARED = ("omega", "omega0", "frequency_hz", "beta", "zeta", "stick", "slip", "open", "work", "energy_error")
-SOLVER = ("step_error", "error_estimate", "residual", "newton", "linear", "wall_s", "event")
+SOLVER = ("step_error", "force_outside", "residual", "newton", "linear", "wall_s", "event")
 
 
 @dataclass(frozen=True)

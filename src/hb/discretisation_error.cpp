@@ -1,0 +1,107 @@
+#include "hb/discretisation_error.h"
+
+#include <algorithm>
+
+#include "error.h"
+#include "solve/vectors.h"
+
+namespace fretwave::hb {
+
+namespace {
+
+constexpr double tolerance = 1e-4;  // of the linear systems: an error is wanted to a digit or two
+constexpr double reach = 0.3;  // arclength along the branch, in the unit of a step: the default longest one
+
+/// Whether it is so for the contacts of all ranks.
+template <class Predicate>
+bool all_laws(model::Model const& model, Predicate is) {
+  int every = 1;
+  for (auto const& contact : model.contacts()) every = every && is(*contact.law);
+  MPI_Allreduce(MPI_IN_PLACE, &every, 1, MPI_INT, MPI_LAND, model.comm());
+  return every;
+}
+
+/// Up to 2 H + 1, odd orders alone where no others arise.
+std::vector<int> finer(Harmonics const& h, model::Model const& model) {
+  const bool odd = h.odd_only() && all_laws(model, [](auto const& law) { return law.odd(); });
+  const int step = odd ? 2 : 1;
+  std::vector<int> orders;
+  for (int n = step - 1; n <= 2 * h.highest() + 1; n += step) orders.push_back(n);
+  return orders;
+}
+
+std::unique_ptr<HarmonicProblem> refined(HarmonicProblem const& problem, std::vector<int> const& orders,
+                                         int samples) {
+  auto out = problem.on(Harmonics(orders, samples));
+  if (!out)
+    throw InputError("the problem has no discretisation to be refined", "a way to another problem",
+                     "a nonlinear mode or a forced response", "estimate the error of its goal");
+  return out;
+}
+
+}  // namespace
+
+DiscretisationError::DiscretisationError(HarmonicProblem& problem, std::string const& prefix)
+    : problem_(problem) {
+  const std::vector<int> orders = finer(problem.harmonics(), problem.model());
+  const int enough = 8 * orders.back();
+  finer_ = refined(problem, orders, std::max(4 * problem.harmonics().samples(), 2 * enough));
+  if (!all_laws(problem.model(), [](auto const& law) { return !law.hereditary(); }))
+    sampled_ = std::exchange(finer_, refined(problem, orders, enough));
+  newton_ = std::make_unique<solve::Newton>(*finer_, prefix);
+  newton_->solve_beside(tolerance);
+}
+
+/// The rows of the finer equations that the problem itself has, the others zero.
+VecHandle DiscretisationError::retained(Vec r) const { return problem_.on(*finer_, finer_->on(problem_, r)); }
+
+/// -r, and zero in the closing row.
+VecHandle DiscretisationError::right_side(Vec r) const {
+  VecHandle b = solve::zero_like(finer_->unknowns());
+  const PetscInt n = local_size(r);
+  const ReadArray in(r);
+  const WriteArray out(b);
+  std::transform(in.data(), in.data() + n, out.data(), [](double v) { return -v; });
+  return b;
+}
+
+void DiscretisationError::close(Vec y, Vec tangent) {
+  VecHandle weights = problem_.unknowns();
+  problem_.metric(y, weights);
+  newton_->system().close(problem_.on(*finer_, solve::weighted(weights, tangent)), 0);
+}
+
+namespace {
+
+/// Scalars of dy' + s t without a change of the last of `count`, the parameter.
+std::vector<double> at_parameter(std::vector<double> change, std::vector<double> const& tangent, int count) {
+  const double s = -change[count - 1] / tangent[count - 1];
+  for (size_t j = 0; j < change.size(); ++j) change[j] += std::clamp(s, -reach, reach) * tangent[j];
+  return change;
+}
+
+}  // namespace
+
+std::optional<LeftOut> DiscretisationError::at(Vec y, Vec tangent) {
+  VecHandle r = problem_.equations(), finer = finer_->equations();
+  problem_.residual(y, r);
+  VecHandle point = problem_.on(*finer_, y), left = problem_.on(*finer_, r);
+  check(VecScale(left, problem_.stiffness_scale() / finer_->stiffness_scale()));
+  (sampled_ ? *sampled_ : *finer_).residual(point, finer);
+  VecHandle same = retained(finer);
+  check(VecAXPY(finer, -1, same));  // harmonics: r'_new
+  check(VecAXPY(same, -1, left));   // samples: r'_old - r
+  VecHandle b[] = {right_side(finer), right_side(same), right_side(left)}, x[3];
+  for (auto& v : x) v = solve::zero_like(b[0]);
+  close(y, tangent);
+  if (!newton_->linear(point, b, x)) return {};
+  const auto along = problem_.scalars(tangent);
+  const auto change = [&](Vec v) { return at_parameter(finer_->scalars(v), along, problem_.scalar_count()); };
+  LeftOut out{change(x[0]), change(x[1]), change(x[2]), {}};
+  check(VecAXPY(x[0], 1, x[1]));
+  check(VecAXPY(x[0], 1, x[2]));
+  out.all = change(x[0]);
+  return out;
+}
+
+}  // namespace fretwave::hb

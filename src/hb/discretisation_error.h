@@ -1,0 +1,48 @@
+#pragma once
+#include <optional>
+
+#include "hb/harmonic_problem.h"
+#include "solve/newton.h"
+
+namespace fretwave::hb {
+
+/// Changes of a point's scalars (HarmonicProblem::scalars) at the same parameter, by what is left out, and by
+/// all of it.
+struct LeftOut {
+  std::vector<double> harmonics, samples, solver, all;
+};
+
+/// What a point's discretisation leaves out of it. With ' for the same problem on the orders up to 2 H + 1
+/// and four times the samples, and the point embedded there with zeros, one Newton step of its equations is
+///
+///   J' dy' = -r',   r' = (r'_old, r'_new),
+///
+/// closed as the continuation's: at a right angle to the branch's tangent t, for at a fold there may be
+/// nothing at the same parameter. From there the branch leads to it: dy = dy' + s t with no change of the
+/// last entry, as far as a straight line goes (|s| <= `reach`). Harmonics left out answer for -r'_new, the
+/// contact force outside the retained orders, samples for r - r'_old, the change of the retained rows on more
+/// samples, and the solver for -r, what it left. Error estimation by a hierarchical basis (Bank & Smith
+/// 1993): what the estimate misses is as much smaller as the finer set is better, and the square of the
+/// error. The tangent of a law with memory is a march for each coefficient, and decides a factor, not an
+/// order: J' takes it on fewer samples.
+class DiscretisationError {
+ public:
+  /// `prefix`: of the PETSc options of J' dy' = b. Collective.
+  DiscretisationError(HarmonicProblem&, std::string const& prefix);
+  std::vector<int> const& orders() const { return finer_->harmonics().orders(); }
+  int samples() const { return (sampled_ ? sampled_ : finer_)->harmonics().samples(); }
+  std::string route() const { return newton_->route(); }
+  /// At a converged point with its tangent; none where J' is singular. Collective.
+  std::optional<LeftOut> at(Vec y, Vec tangent);
+
+ private:
+  VecHandle retained(Vec r) const;
+  VecHandle right_side(Vec r) const;
+  void close(Vec y, Vec tangent);
+
+  HarmonicProblem& problem_;
+  std::unique_ptr<HarmonicProblem> finer_, sampled_;  ///< of J', and of r' where its samples are others
+  std::unique_ptr<solve::Newton> newton_;
+};
+
+}  // namespace fretwave::hb

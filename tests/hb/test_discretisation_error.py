@@ -1,0 +1,183 @@
+"""Estimated errors of points against what the exact oracle says they are."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from oracle import Jenkins, SeriesMotion, System, forced_orbit, series_motion
+from petsc4py import PETSc
+from tolerances import ROUNDING
+
+import fretwave as fw
+
+M, K = np.diag([1.0, 0.02]), np.array([[640.0, -40.0], [-40.0, 40.0]])
+KT, LIMIT = 400.0, 5.0
+AMPLITUDES = [0.137, 0.145, 0.155, 0.2, 0.5, 2.0]
+PAPER = System(M, np.zeros((2, 2)), K, [Jenkins(np.array([0.0, 1.0]), KT, LIMIT)])
+SERIAL = pytest.mark.ranks(1)
+
+
+def model(comm=MPI.COMM_SELF):
+    slider = fw.Contact("jenkins", [[0.0, 1.0]], {"tangential_stiffness": KT, "friction_limit": LIMIT})
+    return fw.Model(M, K, None, [slider], comm)
+
+
+def tanh_model(velocity=0.2):
+    damper = fw.Contact(
+        "regularised_coulomb", [[0.0, 1.0]], {"friction_limit": LIMIT, "regularisation_velocity": velocity}
+    )
+    return fw.Model(M, K, None, [damper])
+
+
+def chain(comm):
+    """The mode of five masses, the first and the last of which rub."""
+    K = 20.0 * np.eye(5) + 100.0 * (2 * np.eye(5) - np.eye(5, k=1) - np.eye(5, k=-1))
+    given = {"tangential_stiffness": [50.0, 80.0], "friction_limit": [5.0, 8.0]}
+    rubbing = fw.Model(np.eye(5), K, None, [fw.Contact("jenkins", np.eye(5)[[0, 4]], given)], comm)
+    return fw.NonlinearMode(rubbing, fw.choose_harmonics(rubbing, 5), "EPMC", 2, fw.linear_modes(rubbing, 1)[0])
+
+
+def reported(problem, amplitudes, ends=(0.1, 3.0)):
+    """Rows of the branch's first passage of each amplitude."""
+    branch = fw.follow(problem, ends[0], ends[1], report_at=list(amplitudes), unknowns=False)
+    assert branch.converged, branch.reason
+    key = "omega" if "level" in branch.names else "amplitude"
+    rows = [branch[row] for row in branch.met("report")]
+    return [next(row for row in rows if row[key] == pytest.approx(a, rel=1e-6)) for a in amplitudes]
+
+
+def eigenvalue(row):
+    return complex(-row["beta"], row["omega"])
+
+
+@pytest.fixture(scope="module")
+def exact():
+    """lambda at AMPLITUDES: complex modes with 401 harmonics in continuous time, right to 1e-9 or better."""
+    problem = fw.NonlinearMode(model(), fw.choose_harmonics(model(), 21, 1024), "CNM", 0)
+    branch, found = fw.follow(problem, 0.1, 3.0, report_at=AMPLITUDES), {}
+    for a in AMPLITUDES:
+        row = next(row for row in branch.met("report") if branch["amplitude"][row] == pytest.approx(a, rel=1e-6))
+        Q, q = branch.coefficients(row), np.zeros((2, 22), complex)
+        for k, n in enumerate(problem.harmonics.orders):
+            q[:, n] = Q[:, 2 * k] - 1j * Q[:, 2 * k + 1]
+        guess = SeriesMotion(PAPER, "CNM", q, eigenvalue(branch[row]), 0.0, 0.0, [])
+        found[a] = series_motion(PAPER, "CNM", 401, amplitude=a, guess=guess).lambda_
+    return found
+
+
+@SERIAL
+@pytest.mark.parametrize("H, samples", [(5, 512), (9, 64), (9, 512), (21, 512)])
+def test_the_error_of_a_mode_is_estimated(exact, H, samples):
+    """From the onset of slip to full slip, at most one of six beyond a factor of 3 and none beyond 10."""
+    problem = fw.NonlinearMode(model(), fw.choose_harmonics(model(), H, samples), "CNM", 0)
+    rows = zip(AMPLITUDES, reported(problem, AMPLITUDES))
+    ratios = [row["omega_error"] / abs(eigenvalue(row) - exact[a]) for a, row in rows]
+    assert sum(not 1 / 3 < ratio < 3 for ratio in ratios) <= 1
+    assert all(0.1 < ratio < 10 for ratio in ratios), ratios
+
+
+@SERIAL
+def test_sources_are_told_apart():
+    """The fewest samples for 21 harmonics add an error of their own, and leave that of the harmonics as it is."""
+    few, many = (
+        reported(fw.NonlinearMode(tanh_model(), fw.choose_harmonics(tanh_model(), 21, n), "EPMC", 0), [0.5, 2.0])
+        for n in (44, 1024)
+    )
+    for coarse, fine in zip(few, many):
+        assert coarse["lambda_error_samples"] == pytest.approx(abs(eigenvalue(coarse) - eigenvalue(fine)), rel=0.1)
+        assert fine["lambda_error_samples"] < 0.1 * fine["lambda_error_harmonics"]
+    assert few[0]["lambda_error_harmonics"] == pytest.approx(many[0]["lambda_error_harmonics"], rel=0.1)
+
+
+@SERIAL
+def test_the_fewest_samples_are_seen():
+    """N_t = 2 H + 2: nothing lies outside the retained orders, and zeta is off by more than a tenth."""
+    fine = fw.NonlinearMode(tanh_model(), fw.choose_harmonics(tanh_model(), 41, 4096), "EPMC", 0)
+    coarse = fw.NonlinearMode(tanh_model(), fw.choose_harmonics(tanh_model(), 7, 16), "EPMC", 0)
+    places = [0.3, 0.5, 1.0, 2.0]
+    for row, right in zip(reported(coarse, places), reported(fine, places)):
+        assert row["force_outside"] < 1e-10
+        assert row["omega_error"] == pytest.approx(abs(eigenvalue(row) - eigenvalue(right)), rel=2.0)
+        assert row["omega_error"] > abs(eigenvalue(row) - eigenvalue(right)) / 3
+
+
+@SERIAL
+@pytest.mark.parametrize("level, omega", [(9.0, 24.2), (8.5, 25.2), (7.0, 24.5)])
+def test_the_error_of_a_response_is_estimated(level, omega):
+    m = model()
+    h, start = fw.choose_harmonics(m, 9, 512), fw.linear_modes(m, 1)[0]
+    problem = fw.ForcedResponse(m, h, {1: np.array([1.0, 0.0])}, level, 0, start)
+    row = reported(problem, [omega], (26.5, 24.18))[0]
+    system = System(M, np.zeros((2, 2)), K, PAPER.contacts, np.array([level, 0.0]), omega=omega)
+    orbit = forced_orbit(system)
+    exact = orbit.harmonics(orbit.system.displacement(0), 1)[1]
+    error = abs(row["amplitude"] * np.exp(1j * row["phase"]) - exact)
+    assert error / 3 < row["amplitude_error"] < 3 * error
+
+
+@SERIAL
+def test_a_linear_model_has_none():
+    linear = fw.Model(M, K, 1e-3 * K)
+    branch = fw.follow(fw.NonlinearMode(linear, fw.Harmonics([1, 3], 16), "CNM", 0), 0.1, 1.0)
+    assert np.all(branch["omega_error"] < ROUNDING * branch["omega0"])
+
+
+@SERIAL
+def test_static_loads_do_not_enter():
+    """One pair whose friction limit stays 5 N while its normal load grows: the same errors, to rounding."""
+    found = []
+    for load in (10.0, 1e3, 1e5):
+        given = {
+            "normal_stiffness": 1e5,
+            "tangential_stiffness": 1e5,
+            "friction_coefficient": 5.0 / load,
+            "normal_load": load,
+        }
+        pair = fw.Contact("coulomb_3d", np.eye(3), given)
+        block = fw.Model(np.eye(3), np.diag([5e6, 1e6, 2e6]), contacts=[pair])
+        mode = fw.NonlinearMode(block, fw.Harmonics(range(4), 128), "CNM", 1, fw.linear_modes(block, 1)[0])
+        branch = fw.follow(mode, 1e-5, 4e-4, report_at=[2e-4])
+        found.append(branch[branch.met("report")[0]])
+    assert 1e-3 < found[0]["slip"] < 1 and found[0]["omega_error"] > 1e-6 * found[0]["omega"]
+    for row in found[1:]:
+        assert abs(row["omega_error"] - found[0]["omega_error"]) < ROUNDING * row["omega"]
+        assert row["force_outside"] == pytest.approx(found[0]["force_outside"], rel=1e-9)
+
+
+@SERIAL
+def test_a_fold_has_a_finite_error():
+    """At the same amplitude there is nothing beyond it; what is read is as far as the branch runs straight."""
+    sharp = tanh_model(0.05)
+    mode = fw.NonlinearMode(sharp, fw.choose_harmonics(sharp, 21, 1024), "CNM", 0)
+    branch = fw.follow(mode, 0.05, 1.0)
+    folds = branch.met("fold")
+    assert len(folds) >= 2
+    for row in folds:
+        assert branch["zeta_error"][row] < 3 * branch["zeta"].max()
+
+
+def test_the_same_on_any_number_of_ranks(comm):
+    one, many = (reported(chain(on), [2.0], (0.1, 4.0))[0] for on in (MPI.COMM_SELF, comm))
+    assert many["omega_error"] > 1e-6 * many["omega"]
+    for name in ("omega_error", "zeta_error", "lambda_error_harmonics", "lambda_error_samples"):
+        assert many[name] == pytest.approx(one[name], rel=1e-4)
+
+
+@SERIAL
+def test_the_krylov_route_gives_the_same():
+    direct = reported(chain(MPI.COMM_SELF), [2.0], (0.1, 4.0))[0]
+    options = PETSc.Options()
+    options["mode_error_route"] = "krylov"
+    try:
+        krylov = reported(chain(MPI.COMM_SELF), [2.0], (0.1, 4.0))[0]
+    finally:
+        options.delValue("mode_error_route")
+    assert krylov["omega_error"] == pytest.approx(direct["omega_error"], rel=0.03)
+
+
+@SERIAL
+def test_errors_can_be_left_out():
+    mode = fw.NonlinearMode(model(), fw.choose_harmonics(model(), 3), "CNM", 0)
+    branch = fw.follow(mode, 0.1, 1.0, errors=False)
+    assert np.isnan(branch["zeta_error"]).all() and np.isfinite(branch["zeta"]).all()
