@@ -131,7 +131,7 @@ def _write(
             rows = write_sweep(folder.path, name, name, sweep.plan, branches, attributes, first.title)
             summary += [{"analysis": name, **row} for row in rows]
             of = summary_of(str(branches[0].attributes["type"]))
-            lines += landmarks(name, sweep.plan, rows, of)
+            lines += landmarks(name, sweep.plan, rows, of, branches[0].amplitude_unit)
     if summary:
         lead = [*sweep.plan.keys, "value", "analysis"]
         ordered = [{key: row[key] for key in (*lead, *(k for k in row if k not in lead))} for row in summary]

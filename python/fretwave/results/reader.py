@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     import h5py
 
 Table = dict[str, Array]
+#: Dataset of the weights of the dofs in an amplitude that is of no dof.
+ROW = "amplitude_row"
 
 
 @dataclass
@@ -140,10 +142,28 @@ class Analysis:
         """Points at which an event happened."""
         return [i for i, text in enumerate(self.events) if event in text.split()]
 
-    def normalised_dof(self) -> int:
-        """Index of the dof that carries the modal amplitude (or is observed)."""
+    def observed(self) -> str:
+        """Name of what the amplitude is of: a dof, a row of dofs, the coordinate of a linear mode."""
         name = self.attributes.get("normalise", self.attributes.get("observe"))
-        return self.dofs.index(name) if name in self.dofs else 0
+        return str(name) if name else (self.dofs or [""])[0]
+
+    def normalised_dof(self) -> int:
+        """Index of the dof that carries the modal amplitude (or is observed), or has the largest weight in it."""
+        if self._weights is not None:
+            return int(np.argmax(np.abs(self._weights)))
+        return self.dofs.index(self.observed()) if self.observed() in self.dofs else 0
+
+    def along(self, motion: Array) -> Array:
+        """What the amplitude is of, (n,), in motions of all dofs (n, n_dof)."""
+        return np.asarray(motion[:, self.normalised_dof()] if self._weights is None else motion @ self._weights)
+
+    @cached_property
+    def _weights(self) -> Array | None:
+        """Of all dofs in the amplitude, where it is that of a row or a coordinate."""
+        if self.observed() in self.dofs or not has_results(self.path.parent):
+            return None
+        with open_results(self.path) as file:
+            return np.asarray(file[self.name][ROW]) if ROW in file[self.name] else None
 
     def method(self) -> str:
         return str(self.attributes.get("method", ""))
@@ -152,6 +172,10 @@ class Analysis:
         """Unit of a column; "" for a pure number or an unknown one."""
         unit = self.units.get(column, "")
         return "" if unit in ("1", "-") else unit
+
+    def length_unit(self) -> str:
+        """Of displacements; "" where the results tell no units."""
+        return "m" if self.unit("amplitude") else ""
 
     def asymptote(self, contact: str) -> float | None:
         """Linear angular frequency with the contact "stuck" or "free" [rad/s]."""

@@ -67,6 +67,11 @@ class Branch:
     def points(self) -> int:
         return len(next(iter(self.table.values())))
 
+    @property
+    def amplitude_unit(self) -> str:
+        """Of the amplitudes in its table and its summary."""
+        return self.units.get("amplitude", ("m", ""))[0]
+
 
 def read_branch(folder: Path, name: str, number: int, run_id: str) -> Branch | None:
     """What the run of a value found, None when it found nothing (or what is there belongs to another run)."""
@@ -134,7 +139,8 @@ def write_sweep(
         group.attrs.update({**_shared(branches), **described, **attributes})
         _write_points(group.create_group("points"), points)
         scales = _write_over(group.create_group("over"), plan)
-        _write_summary(group.create_group("summary"), kind, plan, rows, scales)
+        unit = branches[0].amplitude_unit if branches else "m"
+        _write_summary(group.create_group("summary"), kind, plan, rows, scales, unit)
         for branch in branches:
             _copy_branch(branch, of, group.create_group(f"values/{branch.number:04d}"))
     return rows
@@ -205,7 +211,12 @@ def _write_over(group: h5py.Group, plan: Plan) -> list[h5py.Dataset]:
 
 
 def _write_summary(
-    group: h5py.Group, kind: str, plan: Plan, rows: Sequence[Mapping[str, Any]], scales: Sequence[h5py.Dataset]
+    group: h5py.Group,
+    kind: str,
+    plan: Plan,
+    rows: Sequence[Mapping[str, Any]],
+    scales: Sequence[h5py.Dataset],
+    unit: str,
 ) -> None:
     split = split_of(kind)
     parts = sorted({row[split] for row in rows if split in row})
@@ -221,7 +232,8 @@ def _write_summary(
             place = np.unravel_index(row["value"], plan.shape)
             values[(*place, *([parts.index(row[split])] if parts else []))] = row[column.name]
         data = group.create_dataset(column.name, data=values)
-        data.attrs.update({"units": column.unit, "long_name": column.long_name})
+        own = unit if column.unit == "m" else column.unit  # all lengths are amplitudes
+        data.attrs.update({"units": own, "long_name": column.long_name})
         name_dimensions(group, data, names)
 
 

@@ -70,7 +70,10 @@ def run_sweep(sweep: Sweep, name: str, comm: MPI.Comm, console: Console, folder:
             summary = folder.path / f"{name}_summary.csv"
             rows = write_sweep(folder.path, name, of, sweep.plan, branches, attributes, title, summary)
         sweep.forget_others()
-        lines = landmarks(name, sweep.plan, rows, summary_of(str(branches[0].attributes["type"]))) if branches else []
+        lines = []
+        if branches:
+            kind = summary_of(str(branches[0].attributes["type"]))
+            lines = landmarks(name, sweep.plan, rows, kind, branches[0].amplitude_unit)
         points = sum(branch.points for branch in branches)
         advice = next((error.fix for error in errors if error is not None and error.fix), "")
         return Outcome(points, reason, not bad, lines, f"{len(sweep.plan)} whole branches", advice)
