@@ -124,6 +124,25 @@ def blocked(*words) -> subprocess.CompletedProcess[str]:
     return subprocess.run(call, capture_output=True, text=True, timeout=300)
 
 
+def test_straight_lines_through_the_curve_of_a_branch_are_the_branch(run):
+    """What a reader of plain CSV draws or interpolates, against the cubic; twice as far off by the points alone."""
+    found = fw.open_run(run)
+    for name in ("mode", "flutter", "forced"):
+        analysis, table = found[name], found.table(f"{name}_curve")
+        assert len(analysis) < len(table["place"]) < 5 * len(analysis)
+        fine, quantity = analysis.curve(16), "amplitude" if name == "forced" else "zeta"
+        levels = fine["level"] if name == "forced" else np.zeros(len(fine))
+        for level in np.unique(levels):
+            here = levels == level
+            place, coarse = fine["place"][here], fine["place"][here] % 1 == 0
+            for column in ("frequency_hz", quantity):
+                values = fine[column][here]
+                lines = np.interp(place, table["place"], table[column]) - values
+                chords = np.interp(place, place[coarse], values[coarse]) - values
+                assert np.abs(lines).max() <= (1 + ROUNDING) * 1e-3 * np.ptp(values)
+                assert column == "frequency_hz" or np.abs(chords).max() > 2e-3 * np.ptp(values)
+
+
 @pytest.mark.parametrize("reduced", [False, True])
 def test_a_motion_is_viewed_without_mpi_and_petsc(tmp_path, reduced):
     """The same files, value by value; those of a reduced model as those of a reduction that is made again."""

@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     import h5py
 
 Table = dict[str, Array]
+#: Of a column's range, what straight lines between the rows of <name>_curve.csv are off at most.
+CURVE = 1e-3
 #: Dataset of the weights of the dofs in an amplitude that is of no dof.
 ROW = "amplitude_row"
 
@@ -225,6 +227,10 @@ class Analysis:
         """Its branches for drawing, one under the other: all points, and n - 1 places of the cubic between two."""
         return self._joined(lambda curve: curve.drawn(n))
 
+    def straight(self, error: float = CURVE) -> Reading:
+        """Its branches for a reader that draws straight lines, which stay within a share of each column's range."""
+        return self._joined(lambda curve: curve.straight(error))
+
     def _joined(self, read: Callable[[Curve], Reading]) -> Reading:
         if self.meaning is None or not len(self):
             what, fix = self.kind if self.meaning is None else "no points", "mode, forced, flutter, or a sweep of these"
@@ -262,6 +268,13 @@ def open_run(folder: str | Path) -> Run:
     if not has_results(Path(folder)):
         raise InputError("there are no results here", str(folder), fix="give the folder of a run")
     return Run(folder)
+
+
+def write_curve(folder: Path, name: str) -> None:
+    """``<name>_curve.csv``: the branches of an analysis for readers without the cubic; one rank only."""
+    analysis = Run(folder).analyses.get(name)
+    if analysis is not None and analysis.slopes is not None and len(analysis):
+        analysis.straight().to_csv(folder / f"{name}_curve.csv")
 
 
 class Run:

@@ -16,6 +16,7 @@ import numpy as np
 from ..arrays import Array
 from ..columns import COLUMNS, Column, over
 from ..hb.states import ForcedState, ModalState, State, described, state_of
+from ..solve.curve import APART as OF_A_RUN
 from ..solve.curve import Curve
 from ..solve.hermite import Cubic
 from ..solve.table import Table
@@ -30,7 +31,7 @@ NAME = "slopes"
 #: Of the step.
 ENDS = ("begin", "end")
 #: What tells the branches of one table apart.
-APART = ("level", "nodal_diameter", "value")
+APART = (*OF_A_RUN, "value")
 
 
 def slope_fields(meaning: State) -> dict[str, Field]:

@@ -25,6 +25,7 @@ from ..mpi.interrupt import say_how_to_go_on
 from ..mpi.petsc_options import AnalysisOptions
 from ..results.basis_file import LARGEST, NAME, basis_of
 from ..results.journal import Journal
+from ..results.reader import write_curve
 from ..results.results import has_results, open_results
 from ..results.runfolder import RECORD, RunFolder, new_record, peak_memory_mb, read_record
 from ..texts import display
@@ -264,6 +265,8 @@ class Runner:
                 outcome = Outcome(0, reason, False, goal=str(error.expected), advice=error.fix or "")
         entry = {"left_out": context.left_out, **context.entry}
         self._note(analysis.name, outcome, time.perf_counter() - began, entry)
+        if not self.console.quiet:
+            on_first_rank(self.comm, lambda: write_curve(self.folder.path, analysis.name))
         context.publish()  # last of all: from here on a resumed run leaves the analysis as it is
 
     def _sweep(self, name: str, sweep: Sweep) -> None:
