@@ -65,6 +65,7 @@ def label_of(observed: Union[str, ObservedTable]) -> str:
         return f"mode {observed.mode}"
     terms = [_term(w, dof) for w, dof in zip(observed.weights or (), observed.dofs or ())]
     text = " ".join(f"{sign} {size}" for sign, size in terms[:SHOWN]).removeprefix("+ ")
+    text = text.replace("- ", "-", 1) if text.startswith("- ") else text
     return text if len(terms) <= SHOWN else f"{text} + ... ({len(terms)} dofs)"
 
 

@@ -3,6 +3,7 @@
 ::
 
     basis                      (n_dof, n_r) x = T x_r; float64, since strain is a small difference of displacements
+    model                      (4,) what tells the model that was reduced from another
     ties/<k>/row, dof, value   of a sector, on its reduced coordinates: dofs with both faces from those k places ahead
 
 Kept once a run, beside results.h5: it belongs to all analyses.
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 
     from ..cyclic.reduction import SectorReduction
     from ..model.reduction import Reduction
+    from ..model.structure import Structure
 
 NAME = "reduction.h5"
 #: Bytes of a basis above which a run does not keep it.
@@ -45,6 +47,8 @@ class Basis:
     Attributes
     ----------
     T : (n_dof, n_r)
+    model : (4,)
+        `marks_of` the model that was reduced.
     highest_component_hz : of the last component mode, 0 without one
     n_interface : coordinates of one face of a sector, 0 for a structure
     ties : {k: (n_r, n)}
@@ -52,6 +56,7 @@ class Basis:
     """
 
     T: Array
+    model: Array
     highest_component_hz: float
     n_interface: int = 0
     ties: Mapping[int, Sparse] = field(default_factory=dict)
@@ -79,6 +84,7 @@ class Basis:
             with h5py.File(fresh, "w") as file:
                 data = file.create_dataset("basis", data=self.T)
                 data.attrs.update({"units": "1", "long_name": "dofs by reduced coordinates"})
+                file.create_dataset("model", data=self.model)
                 file.attrs.update(highest_component_hz=self.highest_component_hz, n_interface=self.n_interface)
                 for k, T in self.ties.items():
                     entries = sp.coo_matrix(T)
@@ -89,8 +95,17 @@ class Basis:
             seal(fresh)
 
 
-def basis_of(reduction: Union[Reduction, SectorReduction], comm: MPI.Comm) -> Basis | None:
-    """On the first rank, None elsewhere. Collective."""
+def marks_of(full: Structure) -> Array:
+    """(4,) of an unreduced model: dofs, and sums of the magnitudes in K, M and the coordinates of the nodes.
+
+    A builder may read what neither the case nor its own text tells.
+    """
+    sums = [float(abs(A).sum()) for A in (full.own("K"), full.own("M")) if A is not None]
+    return np.array([full.n_dof, *sums, float(np.abs(full.coordinates).sum()) if full.coordinates is not None else 0.0])
+
+
+def basis_of(reduction: Union[Reduction, SectorReduction], full: Structure, comm: MPI.Comm) -> Basis | None:
+    """Of a reduction of a model; on the first rank, None elsewhere. Collective."""
     from ..cyclic.reduction import SectorReduction
 
     n, blocks = reduction.size, []
@@ -103,9 +118,9 @@ def basis_of(reduction: Union[Reduction, SectorReduction], comm: MPI.Comm) -> Ba
         return None
     hz = float(reduction.component_hz[-1]) if len(reduction.component_hz) else 0.0
     if not isinstance(reduction, SectorReduction):
-        return Basis(np.hstack(blocks), hz)
+        return Basis(np.hstack(blocks), marks_of(full), hz)
     ties = {k: sp.csr_matrix(T) for k, T in by_sector(reduction.sector().ties).items()}
-    return Basis(np.hstack(blocks), hz, reduction.n_interface, ties)
+    return Basis(np.hstack(blocks), marks_of(full), hz, reduction.n_interface, ties)
 
 
 def read_basis(path: Path) -> Basis | None:
@@ -125,7 +140,7 @@ def read_basis(path: Path) -> Basis | None:
         with h5py.File(path, "r") as file:
             ties = {int(k): _matrix(group) for k, group in file.get("ties", {}).items()}
             hz, faces = float(file.attrs["highest_component_hz"]), int(file.attrs["n_interface"])
-            return Basis(file["basis"][()], hz, faces, ties)
+            return Basis(file["basis"][()], file["model"][()], hz, faces, ties)
     except (OSError, KeyError) as error:
         fix = "remove it: the reduction is then made again, with MPI and PETSc"
         raise InputError(f"{NAME} cannot be read", display(path), str(error), None, fix) from None

@@ -24,7 +24,7 @@ from ..errors import InputError
 from ..fe.mesh import VTK_LATTICE
 from ..model.sectors import Parts, rotation
 from ..model.structure import Structure
-from ..results.basis_file import NAME, read_basis
+from ..results.basis_file import NAME, marks_of, read_basis
 from ..texts import display
 from .choice import Choice
 from .vtkhdf import HEXAHEDRON, QUADRATIC_HEXAHEDRON, TRIQUADRATIC_HEXAHEDRON, VERTEX, linear_cells
@@ -167,6 +167,8 @@ def scene_of(case: Case, choice: Choice, nodes: Array, folder: Path, sectors: Se
     with ExitStack() as stack:
         if case.reduction is not None:
             kept = read_basis(folder / NAME)
+            if kept is not None:
+                _check_model(case, kept.model)
             basis = made_again(case, stack) if kept is None else kept
             expand, ties = basis.expand, basis.ties or ties
             _check_same(case, choice, basis, around)
@@ -295,6 +297,20 @@ def _shown(case: Case, around: int, asked: Sequence[int]) -> list[int]:
         fix = "give Structure its axis, or show one sector with --sectors 0"
         raise InputError("the wheel cannot be drawn: it has no axis", display(case.path), fix=fix)
     return chosen
+
+
+def _check_model(case: Case, then: Array) -> None:
+    """The model is that which was reduced: its motion is the run's own, its nodes are the case's."""
+    now = marks_of(geometry(case))
+    if not np.allclose(now, then, rtol=SAME, atol=0):
+        found, expected = (f"{m[0]:.0f} dofs, sum of |K| {m[1]:.9g} N/m" for m in (now, then))
+        raise InputError(
+            "the model is no longer that of the run",
+            display(case.path),
+            found,
+            f"{expected}, as in the run",
+            "run it again",
+        )
 
 
 def _check_same(case: Case, choice: Choice, basis: Expansion, around: int) -> None:
