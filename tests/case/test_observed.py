@@ -208,6 +208,7 @@ def test_what_cannot_be_is_refused(tmp_path: Path, name: str) -> None:
         load_case(path)
     [problem] = [p for p in caught.value.problems if "time integration" not in p.what]  # which knows no Jenkins element
     assert said in problem.what and problem.where and problem.expected and problem.fix
+    assert '{"' not in problem.render(), "tables as TOML writes them"
 
 
 @pytest.mark.ranks(1)

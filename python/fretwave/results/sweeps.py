@@ -67,11 +67,6 @@ class Branch:
     def points(self) -> int:
         return len(next(iter(self.table.values())))
 
-    @property
-    def amplitude_unit(self) -> str:
-        """Of the amplitudes in its table and its summary."""
-        return self.units.get("amplitude", ("m", ""))[0]
-
 
 def read_branch(folder: Path, name: str, number: int, run_id: str) -> Branch | None:
     """What the run of a value found, None when it found nothing (or what is there belongs to another run)."""
@@ -139,11 +134,15 @@ def write_sweep(
         group.attrs.update({**_shared(branches), **described, **attributes})
         _write_points(group.create_group("points"), points)
         scales = _write_over(group.create_group("over"), plan)
-        unit = branches[0].amplitude_unit if branches else "m"
-        _write_summary(group.create_group("summary"), kind, plan, rows, scales, unit)
+        _write_summary(group.create_group("summary"), kind, plan, rows, scales, amplitude_unit(branches))
         for branch in branches:
             _copy_branch(branch, of, group.create_group(f"values/{branch.number:04d}"))
     return rows
+
+
+def amplitude_unit(branches: Sequence[Branch]) -> str:
+    """Of the amplitudes in the tables and in the summary, the same for all values."""
+    return branches[0].units.get("amplitude", ("m", ""))[0] if branches else "m"
 
 
 def key_values(values: Sequence[Any]) -> Any:
