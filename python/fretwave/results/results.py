@@ -257,7 +257,7 @@ class AnalysisWriter:
         if state is None:
             return None
         kept = rows.first(state[0])
-        self.fields = kept.fields
+        self.fields, self.columns = kept.fields, kept.columns  # of the version that began it
         self.rows, self.reported = len(kept), len(kept.reported)
         self._journal.go_on(kept.size, kept.token)
         lines = [row_line(self.columns, values) for values in kept.values()]
