@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Union
 
 import numpy as np
@@ -132,6 +132,24 @@ FORCED = (
     *(f"amplitude_error_{source}" for source in _SOURCES),
     *_SHARED,
 )
+
+
+#: Of a linear mode's coordinate phi^T M x with phi^T M phi = 1 kg.
+MODAL_UNIT = "sqrt(kg) m"
+
+
+def over(columns: Sequence[Column], unit: str, what: str = "") -> list[Column]:
+    """The same columns, their amplitude in a unit of its own, and of something that is no dof."""
+    own = {"unit": unit, **({"long_name": f"fundamental amplitude of {what}"} if what else {})}
+    error = {"unit": unit}
+    return [
+        replace(column, **own)
+        if column.name == "amplitude"
+        else replace(column, **error)
+        if column.name.startswith("amplitude_error")
+        else column
+        for column in columns
+    ]
 
 
 def columns_named(names: Sequence[str | Column]) -> list[Column]:

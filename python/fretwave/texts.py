@@ -5,7 +5,8 @@ from __future__ import annotations
 import difflib
 import json
 import os
-from collections.abc import Callable, Sequence
+import re
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 
@@ -38,7 +39,17 @@ def is_there(path: Path) -> bool:
 def toml(value: object, longest: int = 60) -> str:
     """A value as TOML writes it, cut when long."""
     try:
-        text = str(value) if isinstance(value, float) else json.dumps(value, default=str, ensure_ascii=False)
+        text = _inline(value)
     except (ValueError, RecursionError):  # integers of more than 4300 digits, arrays nested without end
         text = "(too long to show)"
     return text if len(text) <= longest else text[: longest - 3] + "..."
+
+
+def _inline(value: object) -> str:
+    """A table inline and without what is not set; all else is as in JSON."""
+    if isinstance(value, Mapping):
+        named = ((key if re.fullmatch("[A-Za-z0-9_-]+", key) else json.dumps(key), one) for key, one in value.items())
+        return "{ " + ", ".join(f"{key} = {_inline(one)}" for key, one in named if one is not None) + " }"
+    if isinstance(value, list) and any(isinstance(one, Mapping) for one in value):
+        return "[" + ", ".join(map(_inline, value)) + "]"
+    return str(value) if isinstance(value, float) else json.dumps(value, default=str, ensure_ascii=False)

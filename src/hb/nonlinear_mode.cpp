@@ -60,6 +60,9 @@ NonlinearMode::NonlinearMode(model::Model const& model, Harmonics const& h, Meth
   check(VecNorm(shape, NORM_INFINITY, &largest));
   check(VecNorm(imaginary, NORM_INFINITY, &largest_imaginary));
   largest = std::max(largest, largest_imaginary);
+  double heaviest = 0;  // weights may have any unit
+  for (auto const& [dof, weight] : this->row()) heaviest = std::max(heaviest, std::abs(weight));
+  largest *= heaviest;
   const complex normal(at_dof[0], at_dof[1]);
   if (std::abs(normal) < 1e-10 * largest)
     throw InputError("what is normalised does not move in the starting mode",

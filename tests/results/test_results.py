@@ -10,7 +10,7 @@ import h5py
 import numpy as np
 import pytest
 
-from fretwave.columns import COLUMNS, MODE
+from fretwave.columns import COLUMNS, MODE, Column
 from fretwave.errors import InputError
 from fretwave.results.results import AnalysisWriter, open_results
 
@@ -177,6 +177,22 @@ def test_going_on_gives_the_same_files(tmp_path: Path) -> None:
             "contact_damper/f",
         ):
             assert np.array_equal(one["mode"][name], two["mode"][name])
+
+
+def test_a_table_goes_on_with_the_columns_that_it_was_begun_with(tmp_path: Path) -> None:
+    """A later version may have more of them, and its rows then bring what the table does not have."""
+    table = writer(tmp_path)
+    fill(table, 3)
+    table.abandon()
+    later = writer(tmp_path)
+    later.columns = [*later.columns, Column("energy", "J", "of a later version")]
+    assert later.go_on() is not None
+    fill(later, 2)
+    later.close("done", "")
+    header, *lines = (tmp_path / "mode.csv").read_text().splitlines()
+    assert "energy" not in header and len(lines) == 5
+    with open_results(tmp_path / "results.h5") as file:
+        assert "energy" not in file["mode/points"]
 
 
 @pytest.mark.parametrize("spoilt", ["state", "rows"])

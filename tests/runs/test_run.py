@@ -44,6 +44,7 @@ def column(folder: Path, name: str, key: str) -> np.ndarray:
 def test_files_of_a_run(run: Path) -> None:
     names = {path.name for path in run.iterdir()}
     tables = {"mode.csv", "mode_epmc.csv", "flutter.csv", "forced.csv", "forced_peaks.csv"}
+    tables |= {f"{name}_curve.csv" for name in ("mode", "mode_epmc", "flutter", "forced")}
     assert names == tables | {"results.h5", "run.json", "run.log", "case.toml"}
     assert (run / "case.toml").read_text() == CASE.read_text()
 
@@ -53,7 +54,7 @@ def test_columns_are_those_of_the_contract(run: Path) -> None:
     assert header == (
         "point,amplitude,omega,omega0,frequency_hz,beta,zeta,omega_error,zeta_error,"
         "lambda_error_harmonics,lambda_error_samples,lambda_error_solver,stick,slip,open,"
-        "force_outside,residual,newton,linear,wall_s,rounding,accepted,unclosed,event"
+        "force_outside,residual,newton,linear,wall_s,rounding,accepted,unclosed,energy,event"
     )
     header = (run / "forced.csv").read_text().splitlines()[0]
     assert header.startswith("point,level,omega,frequency_hz,amplitude,phase,")

@@ -1,4 +1,4 @@
-"""Sweeps: closed forms over the value, one result with its dimensions, the same on any ranks, resumed, and refused."""
+"""Sweeps: closed forms over the value, one result with its dimensions, the same on any ranks, and resumed."""
 
 from __future__ import annotations
 
@@ -15,60 +15,17 @@ import h5py
 import numpy as np
 import pytest
 from conftest import own_environment
+from models.swept_case import CASE, LIMITS, MEMORYLESS, OVER, fretwave
 
-from fretwave.analyses.sweep import SweepAnalysis
 from fretwave.case.load import load_case
-from fretwave.commands.main import main
-from fretwave.errors import CaseErrors, InputError
-from fretwave.post.grid import Plan
 from fretwave.files.dimensions import names_of_data
 from fretwave.results.sweep_summary import summarise
 from fretwave.run.order import RunOptions
 from fretwave.run.runner import Runner
 from fretwave.run.sweep_analysis import analysis_sweep
-from fretwave.run.sweep_plan import plan_of
 
 pytestmark = pytest.mark.ranks(1)
 
-#: A mass on a spring and a Jenkins element, m = k = kt = 1 (REFERENCE: single dof, one harmonic).
-CASE = """
-[model]
-dofs = ["x"]
-M = [[1.0]]
-K = [[1.0]]
-
-[[contact]]
-name = "slider"
-law = "jenkins"
-pairs = ["x"]
-tangential_stiffness = 1.0
-friction_limit = 1.0
-
-[[analysis]]
-name = "mode"
-type = "mode"
-method = "EPMC"
-harmonics = 1
-samples = 512
-normalise = "x"
-amplitude = [0.05, 60.0]
-step = { maximum = 0.1 }
-
-[[analysis]]
-name = "limits"
-type = "sweep"
-of = "mode"
-over.contact.slider.friction_limit = [0.2, 1.0, 5.0]
-overrides.mode.amplitude = [0.1, 30.0]
-"""
-LIMITS = (0.2, 1.0, 5.0)
-#: The law that time integration knows in place of one with memory.
-MEMORYLESS = (
-    'law = "jenkins"\npairs = ["x"]\ntangential_stiffness = 1.0',
-    'law = "regularised_coulomb"\npairs = ["x"]\nregularisation_velocity = 0.1',
-)
-OVER_LINE = 1 + CASE[: CASE.index("over.contact")].count("\n")
-OVER = ["--over", "contact.slider.friction_limit=0.2,1.0,5.0"]
 #: Differences between numbers of ranks come from the order of additions.
 RANK_TOLERANCE = 1e-8
 
@@ -78,15 +35,6 @@ def case(tmp_path_factory) -> Path:
     path = tmp_path_factory.mktemp("slider") / "slider.toml"
     path.write_text(CASE)
     return path
-
-
-def fretwave(*arguments: object) -> int:
-    """The command in this process."""
-    hook = sys.excepthook
-    try:
-        return main([str(argument) for argument in arguments])
-    finally:
-        sys.excepthook = hook
 
 
 @pytest.fixture(scope="module")
@@ -386,54 +334,6 @@ def test_a_smaller_sweep_in_the_same_folder_forgets_the_others(case: Path, tmp_p
     assert set(column(tmp_path / "mode.csv", "contact.slider.friction_limit")) == {3.0}
 
 
-# What is refused, before anything runs
-
-
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (["--over", "contact.slider.friction_limt=1,2"], "--over contact.slider.friction_limt=1"),
-        (["--over", "contact.slider.friction_limit=1,-2"], "--over contact.slider.friction_limit=-2"),
-        (["--over", "mode.samples=5,64"], "write `samples = 6`"),
-        (["--over", "mod.samples=64"], "did you mean `mode.samples`?"),
-        (["--over", "mode.samples=64,64"], "has the value 64 twice"),
-        (["--over", "mode.samples="], "gives no array of values"),
-        (["--over", "mode.samples"], "is not KEY=value"),
-        (["--over", "mode.samples=64", "--over", "mode.samples=128"], "a second time"),
-        (["--over", "mode.samples=64", "--groups", "5"], "so many groups"),
-        (["--over", "mode.samples=64", "--only", "limits"], "there is no analysis 'limits'"),
-        (["--over", "mode.harmonics=1,40"], "with harmonics = 40: mode.samples is too small"),
-        ([], "--over KEY=v1,v2"),
-    ],
-)
-def test_wrong_command_lines_run_nothing(case: Path, tmp_path: Path, capsys, arguments, said) -> None:
-    shorter = ["--set", "mode.samples=64"] if "harmonics=1,40" in str(arguments) else []
-    assert fretwave("sweep", case, *arguments, *shorter, "--out", tmp_path / "out") == 2
-    assert said in capsys.readouterr().err
-    assert not (tmp_path / "out").exists()
-
-
-@pytest.mark.parametrize(
-    ("wrong", "said"),
-    [
-        (("friction_limit = [0.2, 1.0, 5.0]", "friction_limt = [0.2]"), f"slider.toml:{OVER_LINE} (limits.over)"),
-        (("overrides.mode.amplitude", "overrides.mode.ampltude"), f"slider.toml:{OVER_LINE + 1} (limits.overrides)"),
-        (("[0.2, 1.0, 5.0]", "0.2"), "gives no array of values"),
-        (("[0.2, 1.0, 5.0]", "[]"), "gives no array of values"),
-        (('of = "mode"', 'of = "limits"'), "limits.of is no analysis to sweep"),
-        (('of = "mode"', 'of = "mod"'), "did you mean `mode`?"),
-        (('of = "mode"', 'of = "mode"\ndampers = [{ dof = "x", c = 1.0 }]'), "give them to 'mode'"),
-    ],
-)
-def test_wrong_sweeps_of_a_case(tmp_path: Path, capsys, wrong, said) -> None:
-    path = tmp_path / "slider.toml"
-    path.write_text(CASE.replace(*wrong))
-    for command in (["check", path], ["run", path, "--out", tmp_path / "out"]):
-        assert fretwave(*command) == 2
-        assert said in capsys.readouterr().err
-    assert not (tmp_path / "out").exists()
-
-
 def test_a_changed_case_is_not_resumed(swept: Path, case: Path, capsys) -> None:
     text = case.read_text()
     try:
@@ -442,22 +342,3 @@ def test_a_changed_case_is_not_resumed(swept: Path, case: Path, capsys) -> None:
     finally:
         case.write_text(text)
     assert "mode.samples: 512 then, 256 now" in capsys.readouterr().err
-
-
-def test_plans() -> None:
-    plan = plan_of(["a.b=1, 2", 'c="x",[1.0, 2.0]', "d=y, true"])
-    assert (len(plan), plan.shape) == (8, (2, 2, 2))
-    assert list(plan.values())[3] == {"a.b": 1, "c": [1.0, 2.0], "d": True}
-    assert plan.overrides()[4] == ["a.b=2", 'c="x"', 'd="y"']
-    assert plan.labels()[4] == 'b = 2, c = "x", d = "y"'
-    assert Plan({"a.b": [1], "c.b": [2]}).labels() == ["a.b = 1, c.b = 2"]
-    assert SweepAnalysis(name="s", type="sweep", of="m", over={"a.b": [1], "c": {"d": [2]}}).plan().keys == ["a.b", "c.d"]
-    assert len(Plan({"a": [1, 2, 3], "b": [True, False]})) == 6
-
-
-def test_problems_of_values_can_be_sent_between_ranks(case: Path) -> None:
-    import pickle
-
-    with pytest.raises(CaseErrors) as caught:
-        load_case(case, ["mode.samples=5"])
-    assert isinstance(pickle.loads(pickle.dumps(caught.value)), InputError)

@@ -164,6 +164,22 @@ def test_all_variants_show_the_same_motion(viewed: Path, plain: Path, tmp_path: 
         assert np.abs(pairs[0][name] - pairs[1][name]).max() <= 2 * limit * size
 
 
+def test_a_reduction_that_is_made_again_shows_the_same(viewed: Path, tmp_path: Path) -> None:
+    """A run whose basis was too large to be kept."""
+    kept = viewed.parent / "reduction.h5"
+    assert kept.exists() == ("[reduction]" in (viewed.parent / "case.toml").read_text())
+    if not kept.exists():
+        return
+    folder = tmp_path / "run"
+    shutil.copytree(viewed.parent, folder, ignore=shutil.ignore_patterns(kept.name))
+    assert call("view", str(folder), "--phases", str(PHASES)) == 0
+    for step in (0, 7):
+        found, again = read_step(viewed, step), read_step(folder / viewed.name, step)
+        for name, values in found.items():
+            size = np.abs(values).max() if np.issubdtype(np.asarray(values).dtype, np.floating) else 0.0
+            np.testing.assert_allclose(again[name], values, rtol=0, atol=ROUNDING * size, err_msg=name)
+
+
 def test_points_may_have_nodal_diameters_of_their_own(plain: Path, tmp_path: Path) -> None:
     """Where the table has such a column: here -2, which turns the wave around."""
     folder = tmp_path / "run"

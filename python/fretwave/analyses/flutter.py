@@ -19,7 +19,8 @@ from ..case.analysis import register_analysis
 from ..case.checks_common import about
 from ..case.flow import WHOLE
 from ..case.harmonic import HarmonicSection, check_range
-from ..case.schema import Dof, Positive, Whole, key
+from ..case.observed import Observed, check_observed, dofs_of, label_of
+from ..case.schema import Positive, Whole, key
 from ..columns import FLUTTER
 from ..post.flutter_waves import STABLE, describe_waves, with_sign, words
 from ..results.results import AnalysisWriter
@@ -27,6 +28,7 @@ from ..results.sweep_summary import FLUTTER_WAVES
 from .mode import point_line
 from .parts.branch import closure_note, finished_table, mode_problem, open_branch, points_of, record, step_control, tell
 from .parts.context import AnalysisContext, Outcome
+from .parts.observed import named
 from .parts.rest import retained, start_mode
 
 if TYPE_CHECKING:
@@ -47,7 +49,7 @@ class FlutterAnalysis(HarmonicSection):
     method: Literal["CNM", "EPMC"] = key(
         "complex nonlinear mode (decaying) or extended periodic motion", example='"CNM"', default="CNM"
     )
-    normalise: Dof = key("dof whose fundamental harmonic is the modal amplitude", example='"m1"')
+    normalise: Observed = key("dof whose fundamental harmonic is the modal amplitude; or weighted dofs", example='"m1"')
     amplitude: list[Positive] = key("first and last modal amplitude", "m", "[1e-5, 1e-2]", min_length=2, max_length=2)
     nodal_diameters: Optional[list[Whole]] = key(
         "waves looked at, negative for backward ones; all unless told", example="[-4, 3, 4]", default=None, min_length=1
@@ -63,14 +65,17 @@ class FlutterAnalysis(HarmonicSection):
         return list(range(-((sectors - 1) // 2), sectors // 2 + 1))
 
     def kept_dofs(self) -> list[str]:
-        return [*super().kept_dofs(), self.normalise]
+        return [*super().kept_dofs(), *dofs_of(self.normalise)]
+
+    def observed(self) -> tuple[str, Observed]:
+        return "normalise", self.normalise
 
     def follows_waves(self) -> bool:
         return True
 
     def check(self, report: Reporter, facts: Facts) -> None:
         super().check(report, facts)
-        report.dof(("normalise",), self.normalise, facts.named)
+        check_observed(report, "normalise", self.normalise, self, facts)
         check_range(report, "amplitude", self.amplitude, self.report_at)
         if facts.model_known and facts.neighbours is None:
             about(report, "type", "is of a wheel", "a model with sectors", "give [model] its sectors")
@@ -107,14 +112,14 @@ class FlutterAnalysis(HarmonicSection):
         low, high = self.amplitude
         named = ", ".join(map(str, self.nodal_diameters or [])) or "all"
         start = f"flutter ({self.method}), nodal diameters {named}, linear mode {self.linear_mode}"
-        return f"{start}, a = {low:g} to {high:g} m of {self.normalise}"
+        return f"{start}, a = {low:g} to {high:g} m of {label_of(self.normalise)}"
 
     def run(self, context: AnalysisContext[FlutterAnalysis]) -> Outcome:
         """Follow the mode of every nodal diameter over its amplitude. Collective."""
         assert context.case.neighbours is not None
         harmonics = retained(context)
         context.leave_out([*harmonics.left_out, "stability of the limit cycles against waves of other nodal diameters"])
-        writer = context.writer(FLUTTER, labels=harmonics.labels, samples=harmonics.samples)
+        writer = context.writer(named(FLUTTER, self.normalise), labels=harmonics.labels, samples=harmonics.samples)
         try:
             return _all_waves(context, self.waves(context.case.neighbours.sectors), harmonics, writer)
         finally:

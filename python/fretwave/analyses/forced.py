@@ -9,6 +9,7 @@ import numpy as np
 
 from ..case.analysis import register_analysis
 from ..case.harmonic import HarmonicSection, check_range
+from ..case.observed import Observed, check_observed, dofs_of, given_to, label_of, unit_of
 from ..case.schema import Dof, Positive, Whole, key
 from ..columns import FORCED
 from ..cyclic.engine_order import folded
@@ -16,11 +17,13 @@ from ..hb.suspects import suspects
 from ..post.motion import complex_amplitudes
 from ..results.results import AnalysisWriter
 from ..results.sweep_summary import FORCED_LEVELS
+from ..texts import toml
 from .parts.branch import closure_note, finished_table, open_branch, points_of, record, tell
 from .parts.context import AnalysisContext, Outcome
 from .parts.excitation import Excitation, excitation_of
 from .parts.forced_peaks import curves_of, write_peaks
 from .parts.forced_time import time_points
+from .parts.observed import keep_row, named
 from .parts.rest import retained
 from .parts.wheel_peaks import blade_amplitudes, blade_by_blade
 
@@ -61,7 +64,9 @@ class ForcedAnalysis(HarmonicSection):
     frequency: list[Positive] = key(
         "first and last excitation frequency", "Hz", "[3.0, 5.0]", min_length=2, max_length=2
     )
-    observe: Dof = key("dof whose fundamental harmonic is reported", example='"m1"')
+    observe: Observed = key(
+        "dof whose fundamental harmonic is reported; or weighted dofs, or a linear mode's coordinate", example='"m1"'
+    )
     report_at: list[Positive] = key(
         "frequencies at which the motion of a period is kept", "Hz", "[3.9]", default_factory=list
     )
@@ -77,7 +82,10 @@ class ForcedAnalysis(HarmonicSection):
         return self.backbones()
 
     def kept_dofs(self) -> list[str]:
-        return [*super().kept_dofs(), self.observe, *self.force]
+        return [*super().kept_dofs(), *dofs_of(self.observe), *self.force]
+
+    def observed(self) -> tuple[str, Observed]:
+        return "observe", self.observe
 
     def integrates(self) -> str:
         return "time_points" if self.time_points > 0 else ""
@@ -106,7 +114,7 @@ class ForcedAnalysis(HarmonicSection):
     def check(self, report: Reporter, facts: Facts) -> None:
         super().check(report, facts)
         check_range(report, "frequency", self.frequency, self.report_at)
-        report.dof(("observe",), self.observe, facts.named)
+        check_observed(report, "observe", self.observe, self, facts)
         for dof in self.force:
             report.dof(("force", dof), dof, facts.named)
         if not any(self.force.values()):
@@ -115,13 +123,19 @@ class ForcedAnalysis(HarmonicSection):
             )
         listed, modes = isinstance(self.backbone, list), facts.analyses_of("mode")
         for index, name in enumerate(self.backbones()):
-            report.mode(("backbone", index) if listed else ("backbone",), name, modes)
+            place: tuple[Any, ...] = ("backbone", index) if listed else ("backbone",)
+            report.mode(place, name, modes)
+            over, own = (given_to(facts, one, key) for one, key in ((name, "normalise"), (self.name, "observe")))
+            known = isinstance(over, dict) or over in (facts.named or ())
+            if name in modes and known and over != own:
+                what = "is over another amplitude than the peaks"
+                report.wrong(place, what, f"a mode with `normalise = {toml(own)}`", f"`observe = {toml(over)}`")
 
     def headline(self) -> str:
         low, high = self.frequency
         levels = ", ".join(f"{level:g}" for level in self.levels)
         order = f" to engine order {self.engine_order}" if self.engine_order else ""
-        return f"forced response of {self.observe}{order}, {low:g} to {high:g} Hz, levels {levels}"
+        return f"forced response of {label_of(self.observe)}{order}, {low:g} to {high:g} Hz, levels {levels}"
 
     def run(self, context: AnalysisContext[ForcedAnalysis]) -> Outcome:
         """Follow the response of every level over the frequency range. Collective."""
@@ -130,7 +144,7 @@ class ForcedAnalysis(HarmonicSection):
         left_out = [] if self.time_points else ["check by time integration (time_points = 0)"]
         context.leave_out([*harmonics.left_out, *_missing_backbones(context), *left_out])
         writer = context.writer(
-            [*FORCED[:-1], *excitation.columns(), FORCED[-1]],
+            [*named(FORCED[:-1], self.observe), *excitation.columns(), FORCED[-1]],
             labels=harmonics.labels,
             samples=harmonics.samples,
             stuck_omega=excitation.reference.omega,
@@ -147,11 +161,13 @@ def _attributes(context: AnalysisContext[ForcedAnalysis]) -> dict[str, Any]:
     analysis, wheel = context.analysis, context.case.wheel
     if wheel is None:
         return {}
-    observed = f"{analysis.observe}@{analysis.sector or 0}"
+    observed = f"{label_of(analysis.observe)}@{analysis.sector or 0}"
     return {"observe": observed, "sectors": wheel.sectors, "sector_dofs": wheel.unit}
 
 
 def _all_levels(context: AnalysisContext[ForcedAnalysis], excitation: Excitation, writer: AnalysisWriter) -> Outcome:
+    from ..hb.problems import row_of
+
     analysis = context.analysis
     snapshot, own, found = open_branch(context.comm, writer, context.resuming)
     first = int(own.get("level_number", 0))
@@ -165,11 +181,18 @@ def _all_levels(context: AnalysisContext[ForcedAnalysis], excitation: Excitation
     table = finished_table(writer)
     wheel = context.case.wheel is not None and writer.rows > 0
     blades = blade_amplitudes(excitation, writer) if wheel and writer.active else None
+    row = row_of(context.model, excitation.observed)
+    if table:
+        keep_row(context, writer, analysis.observe, row)
     writer.close("stopped" if stopped else "done", reason, events="[]")
     curves = curves_of(context, analysis.backbones())
-    summary = blade_by_blade(excitation, table, blades, curves) if wheel else write_peaks(context, table, curves)
+    summary = (
+        blade_by_blade(excitation, table, blades, curves)
+        if wheel
+        else write_peaks(context, table, curves, unit_of(analysis.observe))
+    )
     if analysis.time_points and writer.rows:
-        lines, given_up = time_points(context, table, analysis.time_points)
+        lines, given_up = time_points(context, table, analysis.time_points, excitation.observed)
         summary += lines
         if given_up and not stopped:
             fix = f"--set {context.name}.time_points=0, or a smoother contact law"
@@ -190,7 +213,7 @@ def _one_level(
     """Follow one response, on from a phase if it was begun; returns why it stopped early, or nothing. Collective."""
     context, analysis = excitation.context, excitation.analysis
     low, high = (2.0 * math.pi * hertz for hertz in analysis.frequency)
-    problem = excitation.problem(analysis.levels[number])
+    problem, unit = excitation.problem(analysis.levels[number]), unit_of(analysis.observe)
     branch = excitation.branch(problem, snapshot, go_on)
     excitation.phase = phase if go_on else None
     for point in points_of(branch):
@@ -198,7 +221,10 @@ def _one_level(
         row = record(writer, problem, point, branch.snapshot(), own, excitation.row, analysis.errors)
         share = (number + (row["omega"] - low) / (high - low)) / len(analysis.levels)
         context.console.point(
-            point_line(context.name, row), _short(row), share, _notable(row["event"]) or bool(closure_note(row))
+            point_line(context.name, row, unit),
+            _short(row, unit),
+            share,
+            _notable(row["event"]) or bool(closure_note(row)),
         )
     tell(context, branch, f"{context.name}: level {analysis.levels[number]:g}")
     stopped = "" if branch.converged else f"level {analysis.levels[number]:g}: {branch.reason}"
@@ -230,20 +256,22 @@ def _notable(event: str) -> bool:
     return bool(event) and event not in ("start", "stop")
 
 
-def point_line(name: str, row: dict[str, Any]) -> str:
+def point_line(name: str, row: dict[str, Any], unit: str) -> str:
     """One plain line of progress."""
     return (
         f"{name} {row['point']:4d}  level {row['level']:6.4g}  f {row['frequency_hz']:9.5g} Hz"
-        f"  a {row['amplitude']:9.4g} m  phase {math.degrees(row['phase']):7.2f} deg"
-        f"  stick {100 * row['stick']:3.0f} %  error {row['amplitude_error']:.1e} m"
+        f"  a {row['amplitude']:9.4g} {unit}  phase {math.degrees(row['phase']):7.2f} deg"
+        f"  stick {100 * row['stick']:3.0f} %  error {row['amplitude_error']:.1e} {unit}"
         f"  newton {row['newton']:2d}  {row['wall_s']:.3f} s"
         + (f"  {row['event'].replace('_', ' ')}" if row["event"] else "")
         + closure_note(row)
     )
 
 
-def _short(row: dict[str, Any]) -> str:
-    return f"point {row['point']}: level {row['level']:g}, {row['frequency_hz']:.5g} Hz, a {row['amplitude']:.4g} m"
+def _short(row: dict[str, Any], unit: str) -> str:
+    return (
+        f"point {row['point']}: level {row['level']:g}, {row['frequency_hz']:.5g} Hz, a {row['amplitude']:.4g} {unit}"
+    )
 
 
 def _missing_backbones(context: AnalysisContext[ForcedAnalysis]) -> list[str]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from ..case.analysis import AnalysisSection, register_analysis
+from ..case.observed import check_displaced
 from ..case.schema import Damper, Positive, Whole, key
 from ..columns import Column
 from ..post.cycles import extract
@@ -55,6 +56,7 @@ class TransientSection(AnalysisSection):
     def check(self, report: Reporter, facts: Facts) -> None:
         super().check(report, facts)
         report.mode(("mode",), self.mode, facts.analyses_of("mode"))
+        check_displaced(report, "mode", self.mode, facts)
 
     def least_memory(self, facts: Facts) -> Mapping[str, float]:
         count = self.periods * self.samples_per_period

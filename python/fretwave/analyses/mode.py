@@ -5,15 +5,17 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
-from typing import TYPE_CHECKING, Any, Literal
+from functools import partial
+from typing import TYPE_CHECKING, Any, Literal, Optional
 
 import numpy as np
 
 from ..case.analysis import register_analysis
 from ..case.checks_wheel import check_needs_wheel
 from ..case.harmonic import HarmonicSection, check_range
-from ..case.schema import Dof, Positive, key
-from ..columns import MODE
+from ..case.observed import Observed, check_observed, dof_of, dofs_of, label_of, unit_of
+from ..case.schema import Positive, key
+from ..columns import MODE, Column
 from ..hb.suspects import suspects
 from ..post.limit_cycles import limit_cycles
 from ..results.results import AnalysisWriter
@@ -21,15 +23,22 @@ from ..results.sweep_summary import MODE_BRANCH
 from .parts.asymptotes import asymptote_line
 from .parts.branch import closure_note, finished_table, mode_problem, open_branch, points_of, record, step_control, tell
 from .parts.context import AnalysisContext, Outcome
+from .parts.observed import keep_row, named
 from .parts.rest import keep_pairs, retained
 from .parts.wheel_shape import WHEEL, WheelShape, finish_wheel, one_by_one
 from .parts.wheel_start import Start, start_of, uneven_samples
 
 if TYPE_CHECKING:
+    from petsc4py import PETSc
+
+    from ..arrays import Array
     from ..case.facts import Facts
     from ..case.reporter import Reporter
     from ..hb.problems import NonlinearMode
     from ..solve.continuation import Continuation, Point
+    from .parts.branch import Describe
+
+ENERGY = Column("energy", "J", "mechanical energy of the vibration, mean over a period")
 
 
 @register_analysis
@@ -49,18 +58,29 @@ class ModeAnalysis(HarmonicSection):
         example='"standing"',
         default="travelling",
     )
-    normalise: Dof = key("dof whose fundamental harmonic is the modal amplitude", example='"m1"')
-    amplitude: list[Positive] = key("first and last modal amplitude", "m", "[0.02, 3.0]", min_length=2, max_length=2)
+    normalise: Observed = key(
+        "dof whose fundamental harmonic is the modal amplitude; or weighted dofs, or a linear mode's coordinate",
+        example='"m1"',
+    )
+    amplitude: list[Positive] = key(
+        "first and last modal amplitude", "m, or sqrt(kg) m", "[0.02, 3.0]", min_length=2, max_length=2
+    )
     report_at: list[Positive] = key(
-        "amplitudes at which the motion of a period is kept", "m", "[0.1, 0.5]", default_factory=list
+        "amplitudes at which the motion of a period is kept",
+        "m, or sqrt(kg) m",
+        "[0.1, 0.5]",
+        default_factory=list,
     )
 
     def kept_dofs(self) -> list[str]:
-        return [*super().kept_dofs(), self.normalise]
+        return [*super().kept_dofs(), *dofs_of(self.normalise)]
+
+    def observed(self) -> tuple[str, Observed]:
+        return "normalise", self.normalise
 
     def check(self, report: Reporter, facts: Facts) -> None:
         super().check(report, facts)
-        report.dof(("normalise",), self.normalise, facts.named)
+        check_observed(report, "normalise", self.normalise, self, facts)
         check_range(report, "amplitude", self.amplitude, self.report_at)
         if self.wave == "standing" and facts.model_known:
             check_needs_wheel(report, self, "wave")
@@ -81,7 +101,7 @@ class ModeAnalysis(HarmonicSection):
     def headline(self) -> str:
         low, high = self.amplitude
         start = f"nonlinear mode ({self.method}) from linear mode {self.linear_mode}"
-        return f"{start}, a = {low:g} to {high:g} m of {self.normalise}"
+        return f"{start}, a = {low:g} to {high:g} {unit_of(self.normalise)} of {label_of(self.normalise)}"
 
     def wave_word(self) -> str:
         return "standing wave" if self.wave == "standing" else "wave"
@@ -98,7 +118,7 @@ class ModeAnalysis(HarmonicSection):
                 context.console.line(f"note: {context.name}: {note}")
         problem = mode_problem(context, harmonics, start.mode, start.rest, start.dof, start.avoid)
         writer = context.writer(
-            [*MODE[:-1], *(WHEEL if context.case.wheel else ()), MODE[-1]],
+            [*named(MODE[:-1], self.normalise), ENERGY, *(WHEEL if context.case.wheel else ()), MODE[-1]],
             labels=harmonics.labels,
             samples=harmonics.samples,
             stuck_omega=start.mode.omega,
@@ -119,6 +139,7 @@ def _follow(
 
     analysis = context.analysis
     low, high = analysis.amplitude
+    unit = unit_of(analysis.normalise)
     reduction = context.case.reduction
     estimated = context.case.unreduced is not None and context.case.wheel is None
     error_at = reduction.error_at if reduction is not None and estimated else None
@@ -129,26 +150,35 @@ def _follow(
         branch = Continuation.restore(problem, snapshot, **settings)
     else:
         branch = Continuation(problem, problem.initial(low), **settings)
-    describe = None
+    around = None
     if context.case.wheel is not None:
         tuned = start.attributes["tuned_amplitude"]
-        describe = WheelShape(context, analysis.normalise, tuned, start.mode).row
+        around = WheelShape(context, dof_of(analysis.normalise), tuned, start.mode).row
     with context.console.progress(context.name):
         for point in points_of(branch):
-            row = record(writer, problem, point, branch.snapshot(), {}, describe, context.analysis.errors)
+            described = partial(_described, around)
+            row = record(writer, problem, point, branch.snapshot(), {}, described, context.analysis.errors)
             if error_at is not None and math.isclose(row["amplitude"], error_at, rel_tol=1e-9):
                 context.console.line(_reduction_error(context, problem, point, row))
             share = math.log(row["amplitude"] / low) / math.log(high / low)
             context.console.point(
-                point_line(context.name, row), _short(row), share, bool(row["event"] or closure_note(row))
+                point_line(context.name, row, unit), _short(row, unit), share, bool(row["event"] or closure_note(row))
             )
     tell(context, branch)
-    outcome = _finish(context, writer, branch, start)
+    outcome = _finish(context, writer, branch, start, problem)
     if not branch.converged:
         outcome.reason += suspects(context.model.contacts, problem.core.stiffness_scale)
-    outcome.goal = f"amplitude {high:g} m"
+    outcome.goal = f"amplitude {high:g} {unit}"
     branch.destroy()
     return outcome
+
+
+def _described(around: Optional[Describe], problem: NonlinearMode, y: PETSc.Vec, Q: Optional[Array]) -> dict[str, Any]:
+    """Further columns of a point. Collective."""
+    from ..hb.observe import mechanical_energy
+
+    more = {} if around is None else around(problem, y, Q)
+    return {"energy": mechanical_energy(problem, y), **more}
 
 
 def _reduction_error(
@@ -159,32 +189,38 @@ def _reduction_error(
 
     error = nonlinear_error_at(context.case, context.analysis, problem, point.y)
     context.entry["reduction_error"] = {"amplitude": row["amplitude"], **dataclasses.asdict(error)}
+    place = f"{row['amplitude']:.4g} {unit_of(context.analysis.normalise)}"
     return (
-        f"{context.name}: at {row['amplitude']:.4g} m the unreduced model would change omega by"
+        f"{context.name}: at {place} the unreduced model would change omega by"
         f" {error.omega / row['omega']:+.1e} of itself and zeta by {100 * error.zeta:+.1e} %"
         f" (estimated, {error.wall_s:.1f} s)"
     )
 
 
 def _finish(
-    context: AnalysisContext[ModeAnalysis], writer: AnalysisWriter, branch: Continuation, start: Start
+    context: AnalysisContext[ModeAnalysis],
+    writer: AnalysisWriter,
+    branch: Continuation,
+    start: Start,
+    problem: NonlinearMode,
 ) -> Outcome:
     table = finished_table(writer)
-    summary = summarise(context.name, table) if table else []
+    summary = summarise(context.name, table, unit_of(context.analysis.normalise)) if table else []
     summary += finish_wheel(context, writer, start) if context.case.wheel is not None else []
     summary.append(f"linear systems: {branch.route}")
     events = json.dumps(limit_cycles(table)) if table else "[]"
     if table:
         keep_pairs(context, writer)
+        keep_row(context, writer, context.analysis.normalise, problem.row)
     writer.close("done" if branch.converged else "stopped", branch.reason, events=events)
     advice = one_by_one(table) if table and context.case.wheel is not None and not branch.converged else ""
     return Outcome(writer.rows, branch.reason, branch.converged, summary, advice=advice)
 
 
-def point_line(name: str, row: dict[str, Any]) -> str:
+def point_line(name: str, row: dict[str, Any], unit: str = "m") -> str:
     """One plain line of progress."""
     return (
-        f"{name} {row['point']:4d}  a {row['amplitude']:9.4g} m  f {row['frequency_hz']:9.5g} Hz"
+        f"{name} {row['point']:4d}  a {row['amplitude']:9.4g} {unit}  f {row['frequency_hz']:9.5g} Hz"
         f"  stick {100 * row['stick']:3.0f} %  zeta {_percent(row['zeta'], 4):>8} %"
         f" +- {100 * row['zeta_error']:<7.1g}  newton {row['newton']:2d}  {row['wall_s']:.3f} s"
         + ("  overdamped" if abs(row["zeta"]) >= 1 else "")
@@ -193,8 +229,8 @@ def point_line(name: str, row: dict[str, Any]) -> str:
     )
 
 
-def _short(row: dict[str, Any]) -> str:
-    text = f"point {row['point']}: a {row['amplitude']:.4g} m, {row['frequency_hz']:.5g} Hz"
+def _short(row: dict[str, Any], unit: str) -> str:
+    text = f"point {row['point']}: a {row['amplitude']:.4g} {unit}, {row['frequency_hz']:.5g} Hz"
     return f"{text}, zeta {_percent(row['zeta'], 3)} %"
 
 
@@ -203,21 +239,21 @@ def _percent(value: float, digits: int) -> str:
     return f"{round(100 * value, digits) + 0.0:.{digits}f}"
 
 
-def summarise(name: str, table: dict[str, Any]) -> list[str]:
+def summarise(name: str, table: dict[str, Any], unit: str) -> list[str]:
     """The branch in a line, and a line for each limit cycle."""
     amplitude, zeta = table["amplitude"], table["zeta"]
     top = int(np.argmax(zeta))
     folds = sum("fold" in event.split() for event in table["event"])
     lines = [
-        f"{name}: {len(zeta)} points, a {amplitude[0]:.4g} to {amplitude[-1]:.4g} m,"
-        f" largest damping {100 * zeta[top]:.4g} % at a = {amplitude[top]:.4g} m,"
+        f"{name}: {len(zeta)} points, a {amplitude[0]:.4g} to {amplitude[-1]:.4g} {unit},"
+        f" largest damping {100 * zeta[top]:.4g} % at a = {amplitude[top]:.4g} {unit},"
         f" {folds} fold{'s' * (folds != 1)},"
         f" error of zeta up to {100 * np.nanmax(table['zeta_error']):.2g} %, {table['wall_s'].sum():.2f} s"
     ]
     words = {True: "stable (damping rises)", False: "unstable (damping falls)", None: "stability unknown (branch end)"}
     for cycle in limit_cycles(table):
         lines.append(
-            f"{name}: limit cycle at a = {cycle['amplitude']:.5g} m, {cycle['frequency_hz']:.5g} Hz: "
+            f"{name}: limit cycle at a = {cycle['amplitude']:.5g} {unit}, {cycle['frequency_hz']:.5g} Hz: "
             + words[cycle["stable"]]
         )
     return lines

@@ -17,6 +17,7 @@ import numpy as np
 from ..case.analysis import AnalysisSection, register_analysis
 from ..case.checks_size import harmonic_memory
 from ..case.contacts import wear_areas as areas_of
+from ..case.observed import check_displaced, label_of
 from ..case.schema import Positive, Whole, key
 from ..errors import FretwaveError, InputError
 from ..files.dimensions import names_of_data
@@ -95,6 +96,7 @@ class WearAnalysis(AnalysisSection):
     def check(self, report: Reporter, facts: Facts) -> None:
         super().check(report, facts)
         report.mode(("mode",), self.mode, facts.analyses_of("mode"))
+        check_displaced(report, "mode", self.mode, facts)
         for index, value in enumerate(self.report_at):
             if value > self.cycles:
                 expected = f"at most cycles = {self.cycles:g}"
@@ -198,6 +200,7 @@ def _writer(context: AnalysisContext[WearAnalysis], unit: float, marched: dict[s
     return context.writer(
         columns(context.case),
         labels=str(marched.get("labels", "")).split(),
+        normalise=label_of(context.analysis.settings(context.case).normalise),
         cycle_unit=unit,
         wear_coefficient=context.analysis.coefficient,
         samples=marched.get("samples"),

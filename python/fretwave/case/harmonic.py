@@ -14,6 +14,7 @@ from .schema import MistuningSection, PreloadSection, StepSection, Whole, key
 if TYPE_CHECKING:
     from ..model.model import Model
     from .facts import Facts
+    from .observed import Observed
     from .reporter import Reporter
 
 
@@ -49,6 +50,10 @@ class HarmonicSection(AnalysisSection):
 
     def harmonic(self) -> Optional[HarmonicSection]:
         return self
+
+    def observed(self) -> Optional[tuple[str, Observed]]:
+        """Its key that says what its amplitude is of, and what that is; None where it has no such key."""
+        return None
 
     def follows_waves(self) -> bool:
         """It looks at waves that it names in another way than by `nodal_diameter`, each on one sector."""

@@ -11,6 +11,7 @@ from ..results.runfolder import CASE_COPY, read_copy, read_record
 from ..texts import display
 from .analysis import AnalysisSection
 from .load import Case, changed_keys, load_case
+from .observed import label_of
 
 if TYPE_CHECKING:
     import h5py
@@ -56,6 +57,10 @@ def reload_case(folder: Path, kept: bool = False) -> tuple[Case, dict[str, Any]]
 def described(analysis: AnalysisSection, case: Case, run_id: str) -> dict[str, Any]:
     """Attributes every group has: the analysis' own keys, and the values that decided its results."""
     keys = analysis.model_dump(exclude={"name", "dampers", "petsc", "step", "force", "preload"})
+    section = analysis.harmonic()
+    observed = section.observed() if section is analysis else None
+    if observed is not None:
+        keys[observed[0]] = label_of(observed[1])
     plain = {key: value for key, value in keys.items() if value is not None and not isinstance(value, dict)}
     shown = {key: json.dumps(value) if isinstance(value, list) else value for key, value in plain.items()}
     reduction = {"reduction": json.dumps(case.reduced.plain())} if case.reduced else {}

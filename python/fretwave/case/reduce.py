@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, cast
 
@@ -33,13 +33,20 @@ def kept_dofs(structure: Structure, analyses: Mapping[int, AnalysisSection]) -> 
     return sorted(numbers.union(structure.kept.tolist()))
 
 
-def reduce_case(case: Case, comm: MPI.Comm, modes: int | None = None) -> Case:
+def reduce_case(
+    case: Case,
+    comm: MPI.Comm,
+    modes: int | None = None,
+    look: Callable[[Reduction | SectorReduction], None] | None = None,
+) -> Case:
     """The case on its reduced matrices, itself when it asks for no reduction. Collective.
 
     Parameters
     ----------
     modes : int, optional
         Component modes, in place of the case's.
+    look : callable, optional
+        Gets the reduction while it lives. Collective.
     """
     section = case.reduction
     if section is None:
@@ -50,6 +57,8 @@ def reduce_case(case: Case, comm: MPI.Comm, modes: int | None = None) -> Case:
         small = full.reduced(reduction) if full.cut is None else full.cut.reduced(reduction).tied()
         reduced = replace(case, structure=small, contacts=on(case.contacts, small))
         report = report_of(case, reduced, reduction, time.perf_counter() - began, comm)
+        if look is not None:
+            look(reduction)
     return replace(reduced, reduced=report, unreduced=full if section.error_at is not None else None)
 
 

@@ -10,6 +10,7 @@ from pydantic.fields import FieldInfo
 
 from ..case.analysis import AnalysisSection
 from ..case.json_schema import json_text
+from ..case.observed import ObservedTable
 from ..case.plugins import read_plugins
 from ..case.schema import (
     TOP_LEVEL,
@@ -58,6 +59,7 @@ def key_lines(case: Path | None = None) -> Iterator[str]:
         "step = { ... }": StepSection,
         "mistuning = { ... }": MistuningSection,
         "dampers = [{ ... }]": Damper,
+        "normalise = { ... }, observe = { ... }": ObservedTable,
         "[study]": StudySection,
     }
     for title, nested in tables.items():

@@ -83,7 +83,7 @@ def _heading(folder: Path, title: str) -> list[str]:
 
 def describe(name: str, group: h5py.Group) -> tuple[str, ...]:
     """One row of the table."""
-    points = group["points"]
+    points, unit = group["points"], _unit(group)
     table = {key: points[key][()] for key in points}
     kind = str(group.attrs["type"])
     method = group.attrs.get("method")
@@ -92,25 +92,30 @@ def describe(name: str, group: h5py.Group) -> tuple[str, ...]:
         f"{kind} {method}" if method else kind.replace("_", " "),
         str(group.attrs["status"]),
         str(len(next(iter(table.values())))),
-        _range(table),
-        _largest(table),
+        _range(table, unit),
+        _largest(table, unit),
         str(_count(table, "fold")) if "event" in table else "",
-        _error(table),
+        _error(table, unit),
         f"{table['wall_s'].sum():.2f} s" if "wall_s" in table else "",
     )
 
 
-def _error(table: dict[str, Any]) -> str:
+def _error(table: dict[str, Any], unit: str) -> str:
     """The largest estimated one, where there is one."""
-    for name, text in (("zeta_error", "{:.2g} % zeta"), ("amplitude_error", "{:.2g} m")):
+    for name, text in (("zeta_error", "{:.2g} % zeta"), ("amplitude_error", "{:.2g} " + unit)):
         found = table.get(name, np.empty(0))
         if np.isfinite(found).any():
             return text.format((100 if "%" in text else 1) * np.nanmax(found))
     return ""
 
 
-def _range(table: dict[str, Any]) -> str:
-    key, unit = ("frequency_hz", "Hz") if "level" in table else ("amplitude", "m")
+def _unit(group: h5py.Group) -> str:
+    """Of the amplitudes."""
+    return str(group["points/amplitude"].attrs.get("units", "m")) if "points/amplitude" in group else "m"
+
+
+def _range(table: dict[str, Any], of_amplitude: str) -> str:
+    key, unit = ("frequency_hz", "Hz") if "level" in table else ("amplitude", of_amplitude)
     values = table.get(key, np.empty(0))
     if not len(values):
         return ""
@@ -119,16 +124,16 @@ def _range(table: dict[str, Any]) -> str:
     return f"{text}, {table['cycles'].max():.4g} cycles" if "cycles" in table else text
 
 
-def _largest(table: dict[str, Any]) -> str:
+def _largest(table: dict[str, Any], unit: str) -> str:
     if "zeta" in table and "omega0" in table and len(table["zeta"]):
         top = int(np.argmax(table["zeta"]))
         if "cycles" in table:
             worn = 1e9 * np.sum([table[name] for name in table if name.startswith("worn_")], axis=0).max()
             return f"zeta {100 * table['zeta'][top]:.3g} %, {table['cycles'][top]:.3g} cycles; worn {worn:.3g} mm^3"
-        return f"zeta {100 * table['zeta'][top]:.3g} %, {table['amplitude'][top]:.4g} m"
+        return f"zeta {100 * table['zeta'][top]:.3g} %, {table['amplitude'][top]:.4g} {unit}"
     if "level" in table and len(table["amplitude"]):
         top = int(np.argmax(table["amplitude"]))
-        return f"a {table['amplitude'][top]:.4g} m, {table['frequency_hz'][top]:.4g} Hz"
+        return f"a {table['amplitude'][top]:.4g} {unit}, {table['frequency_hz'][top]:.4g} Hz"
     return ""
 
 
@@ -151,8 +156,8 @@ def _notes(name: str, group: h5py.Group) -> list[str]:
     else:
         notes = []
     notes += [
-        f"{name}: {_wave(cycle)}limit cycle at a = {cycle['amplitude']:.5g} m, {cycle['frequency_hz']:.5g} Hz: "
-        + words[cycle["stable"]]
+        f"{name}: {_wave(cycle)}limit cycle at a = {cycle['amplitude']:.5g} {_unit(group)},"
+        f" {cycle['frequency_hz']:.5g} Hz: " + words[cycle["stable"]]
         for cycle in json.loads(group.attrs.get("events", "[]"))
     ]
     status, reason = str(group.attrs["status"]), str(group.attrs["reason"])

@@ -17,7 +17,7 @@ from ..mpi.interrupt import say_how_to_go_on
 from ..post.grid import Plan
 from ..results.runfolder import CASE_COPY, RunFolder, new_record, peak_memory_mb, read_copy
 from ..results.sweep_summary import landmarks, summary_of
-from ..results.sweeps import write_sweep
+from ..results.sweeps import amplitude_unit, write_sweep
 from ..run.order import RunOptions
 from ..run.runner import Runner, plot
 from ..run.sweep import Checked, Sweep
@@ -131,7 +131,7 @@ def _write(
             rows = write_sweep(folder.path, name, name, sweep.plan, branches, attributes, first.title)
             summary += [{"analysis": name, **row} for row in rows]
             of = summary_of(str(branches[0].attributes["type"]))
-            lines += landmarks(name, sweep.plan, rows, of)
+            lines += landmarks(name, sweep.plan, rows, of, amplitude_unit(branches))
     if summary:
         lead = [*sweep.plan.keys, "value", "analysis"]
         ordered = [{key: row[key] for key in (*lead, *(k for k in row if k not in lead))} for row in summary]

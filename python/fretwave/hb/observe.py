@@ -10,7 +10,7 @@ from petsc4py import PETSc
 
 from ..columns import COLUMNS, Column
 from ..errors import InputError
-from .problems import HarmonicProblem, Observed, row_of
+from .problems import HarmonicProblem, Observed, row_of, unit_of
 
 #: The word for `mechanical_energy` among what is observed.
 ENERGY = "energy"
@@ -70,7 +70,7 @@ def _column(name: str, what: Union[Observed, str]) -> Column:
     if name in COLUMNS and name != ENERGY:
         raise InputError("a column of this name is there already", "observe", name, None, "choose another name")
     if not isinstance(what, str):
-        return Column(name, "m", "fundamental amplitude of what is observed")
+        return Column(name, unit_of(what), "fundamental amplitude of what is observed")
     if what != ENERGY:
         raise InputError(
             "this cannot be observed", f"observe '{name}'", what, f'a dof, row, mode or "{ENERGY}"', ENERGY

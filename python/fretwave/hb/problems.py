@@ -13,6 +13,7 @@ from petsc4py import PETSc
 
 from .. import _core
 from ..arrays import Array
+from ..columns import MODAL_UNIT
 from ..errors import InputError
 from ..model.model import Model
 from ..model.modes import LinearMode
@@ -95,6 +96,11 @@ def row_of(model: Model, observed: Observed) -> list[tuple[int, float]]:
     return [(int(k), float(row[k])) for k in np.flatnonzero(row)]
 
 
+def unit_of(observed: Observed) -> str:
+    """Of the amplitude of what is observed."""
+    return MODAL_UNIT if isinstance(observed, LinearMode) else "m"
+
+
 def _named(observed: Observed) -> str:
     if isinstance(observed, LinearMode):
         return f"the coordinate of {observed.frequency_hz:.6g} Hz"
@@ -106,6 +112,8 @@ class HarmonicProblem:
 
     #: What its scalar unknowns mean; None where no table says.
     meaning: State | None = None
+    #: What its amplitude is of.
+    dof: Observed = 0
     core: _core.HarmonicProblem
 
     def __init__(

@@ -167,7 +167,7 @@ def _limit_cycles(upper: Axes, lower: Axes, mode: Analysis) -> None:
 def _finish(figure: Figure, upper: Axes, lower: Axes, modes: Sequence[Analysis]) -> None:
     mode = modes[0]
     amplitude = np.concatenate([m.columns["amplitude"] for m in modes])
-    dof = mode.dofs[mode.normalised_dof()] if mode.dofs else ""
+    dof = mode.observed()
     style.log_amplitude(lower, amplitude)
     upper.set_ylabel(style.label("Frequency ω/2π", "Hz"))
     lower.set_ylabel(style.label("Damping ratio ζ", "%"))
@@ -198,12 +198,18 @@ def _unstable(mode: Analysis) -> bool:
 def _same_mode(modes: Sequence[Analysis]) -> list[list[Analysis]]:
     groups: list[list[Analysis]] = []
     for mode in modes:
-        match = [group for group in groups if _close(group[0].asymptote("stuck"), mode.asymptote("stuck"))]
+        match = [group for group in groups if _alike(group[0], mode)]
         if match:
             match[0].append(mode)
         else:
             groups.append([mode])
     return groups
+
+
+def _alike(one: Analysis, other: Analysis) -> bool:
+    """The same linear mode over the same amplitude, of a wheel in any sector."""
+    over = [mode.observed().partition("@")[0] for mode in (one, other)]
+    return over[0] == over[1] and _close(one.asymptote("stuck"), other.asymptote("stuck"))
 
 
 def _close(one: float | None, other: float | None) -> bool:

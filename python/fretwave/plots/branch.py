@@ -8,7 +8,6 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..columns import COLUMNS
 from ..plots import style
 
 if TYPE_CHECKING:
@@ -35,8 +34,8 @@ def draw(branch: Branch) -> Figure:
             place.plot(curve[abscissa], line, color=style.BLUE, label=branch.meaning.kind)
             place.plot(branch[abscissa], rows, ".", color=style.BLUE, markersize=4, label="points")
             _events(place, branch, branch[abscissa], rows)
-            place.set_ylabel(style.label(_name(column), COLUMNS[column].unit))
-        axes[1].set_xlabel(style.label(_name(abscissa), COLUMNS[abscissa].unit))
+            place.set_ylabel(style.label(_name(column), branch.units[column]))
+        axes[1].set_xlabel(style.label(_name(abscissa), branch.units[abscissa]))
         if branch.meaning.kind == "mode" and len(branch) > 1:
             style.log_amplitude(axes[1], branch[abscissa])
         style.legend_outside(figure, axes[0])

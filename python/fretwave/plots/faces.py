@@ -68,7 +68,7 @@ def draw_load(static: Analysis, contact: str, table: dict[str, Array]) -> Figure
 def draw_map(mode: Analysis, contact: str) -> Figure:
     """Shares of the period that each pair sticks, slips and is open, at several amplitudes, below the shares of all."""
     points = chosen_points(mode)
-    pairs = mode.pairs(contact)
+    pairs, (scale, unit) = mode.pairs(contact), amplitude_scale(mode)
     names = list(dict.fromkeys(pairs["face"]))
     figure, _ = style.new_figure(3.6 + 1.25 * len(points))
     figure.clear()
@@ -80,11 +80,16 @@ def draw_map(mode: Analysis, contact: str) -> Figure:
             axes = figure.add_subplot(grid[1 + row, column])
             mine = pairs["face"] == name
             _pies(axes, pairs["position"][mine], shares[:, mine])
-            place_face(axes, f"{name}, {MM * mode.columns['amplitude'][point]:.3g} mm", pairs["position"])
+            place_face(axes, f"{name}, {scale * mode.columns['amplitude'][point]:.3g} {unit}", pairs["position"])
             axes.tick_params(labelbottom=row == len(points) - 1, labelleft=column == 0)
     figure.supxlabel("Along the face [mm]; each disc is one contact pair, cut by its shares of a period", fontsize=10)
     figure.supylabel("Up the face [mm]", fontsize=10, y=0.36)
     return figure
+
+
+def amplitude_scale(mode: Analysis) -> tuple[float, str]:
+    """Factor and unit in which an amplitude is shown: millimetres, but for a modal coordinate."""
+    return (MM, "mm") if mode.unit("amplitude") in ("", "m") else (1.0, mode.unit("amplitude"))
 
 
 def chosen_points(mode: Analysis) -> list[int]:
@@ -101,16 +106,15 @@ def status_shares(status: Array) -> Array:
 
 def _shares(axes: Axes, mode: Analysis, points: Sequence[int]) -> None:
     """Stick, slip and open of all pairs over the amplitude."""
-    amplitude = MM * mode.columns["amplitude"]
+    scale, unit = amplitude_scale(mode)
+    amplitude = scale * mode.columns["amplitude"]
     order = np.argsort(amplitude)
     values = [100 * mode.columns[word][order] for word in STATUS]
     axes.stackplot(amplitude[order], *values, colors=STATUS.values(), alpha=0.85)
     for point in points:
         axes.axvline(amplitude[point], color=style.INK, linewidth=0.8, linestyle=":")
     axes.set(xlim=(amplitude.min(), amplitude.max()), ylim=(0, 100), ylabel="Share of time [%]")
-    axes.set_xlabel(
-        f"Modal amplitude of {mode.dofs[mode.normalised_dof()]} [mm], {mode.method()}; dotted: the maps below"
-    )
+    axes.set_xlabel(f"Modal amplitude of {mode.observed()} [{unit}], {mode.method()}; dotted: the maps below")
     axes.grid(False)
     handles = [Line2D([], [], marker="o", linestyle="", color=colour, label=word) for word, colour in STATUS.items()]
     axes.legend(handles=handles, loc="lower left", ncols=3)

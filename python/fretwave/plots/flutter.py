@@ -110,5 +110,5 @@ def _cycles(axes: Axes, flutter: Analysis, place: object) -> None:
 
 
 def _amplitude(flutter: Analysis) -> str:
-    dof = flutter.dofs[flutter.normalised_dof()] if flutter.dofs else ""
+    dof = flutter.observed()
     return style.label(f"Modal amplitude of {dof}".rstrip(" of"), flutter.unit("amplitude"))

@@ -87,7 +87,7 @@ def _amplitude(forced: Analysis) -> AnyArray:
 
 
 def _dof(forced: Analysis) -> str:
-    name = forced.dofs[forced.normalised_dof()] if forced.dofs else ""
+    name = forced.observed()
     return f"{name.split('@')[0]}, largest of all sectors" if "largest_amplitude" in forced.columns else name
 
 

@@ -51,6 +51,6 @@ def _finish(figure: Figure, upper: Axes, lower: Axes, mode: Analysis, table: Tab
     style.log_amplitude(lower, _shown(table))
     upper.set_ylabel(style.label("Frequency ω/2π", "Hz"))
     lower.set_ylabel(style.label("Damping ratio ζ", "%"))
-    dof = mode.dofs[mode.normalised_dof()] if mode.dofs else ""
+    dof = mode.observed()
     lower.set_xlabel(style.label(f"Amplitude of {dof}", mode.unit("amplitude")))
     style.legend_outside(figure, upper, columns=3)

@@ -41,7 +41,7 @@ def envelopes(mode: Analysis, motions: Analysis) -> Figure:
     _predicted(axes, mode)
     axes.set(yscale="log", xlim=(0.0, _settled(table)), ylim=_visible(mode, motions))
     axes.set_xlabel(style.label("Time", "s"))
-    dof = mode.dofs[mode.normalised_dof()] if mode.dofs else ""
+    dof = mode.observed()
     axes.set_ylabel(style.label(f"Amplitude of {dof} per cycle", mode.unit("amplitude")))
     style.plain_numbers(axes.yaxis)
     style.legend_outside(figure, axes, columns=3)
@@ -102,8 +102,7 @@ def predicted_orbits(mode: Analysis) -> list[tuple[str, AnyArray, AnyArray]]:
         point = int(np.argmin(away))
         coefficients = mode.coefficients([point])[0] * crossing.amplitude / mode.columns["amplitude"][point]
         x, v = motion(mode.labels, coefficients, 0.0, crossing.omega)
-        dof = mode.normalised_dof()
-        orbits.append(("stable" if crossing.stable else "unstable", x[:, dof], v[:, dof]))
+        orbits.append(("stable" if crossing.stable else "unstable", mode.along(x), mode.along(v)))
     return orbits
 
 

@@ -45,7 +45,7 @@ def _plane(upper: Axes, lower: Axes, mode: Analysis, points: Sequence[int], dof:
         a, omega = mode.columns["amplitude"][point], mode.columns["omega"][point]
         upper.plot(x[:, dof], v[:, dof], color=colour, label=amplitude_name(mode, point))
         lower.plot(x[:, dof] / a, v[:, dof] / (a * omega), color=colour)
-    unit, name = mode.unit("amplitude"), mode.dofs[dof]
+    unit, name = mode.length_unit(), mode.dofs[dof]
     upper.set_xlabel(style.label(f"Displacement of {name}", unit))
     upper.set_ylabel(style.label(f"Velocity of {name}", f"{unit}/s" if unit else ""))
     lower.set(xlabel=f"Displacement of {name} / a", ylabel=f"Velocity of {name} / (a ω)")
@@ -60,7 +60,7 @@ def loops(mode: Analysis, contact: str) -> Figure:
         u, f = _closed(mode, contact, point, pair)
         left.plot(u, f, color=colour, label=amplitude_name(mode, point))
         right.plot(u / np.abs(u).max(), f / max(np.abs(f).max(), 1e-300), color=colour)
-    left.set_xlabel(style.label("Relative displacement", mode.unit("amplitude")))
+    left.set_xlabel(style.label("Relative displacement", mode.length_unit()))
     left.set_ylabel(style.label("Contact force", "N"))
     right.set(xlabel="Relative displacement / its maximum", ylabel="Contact force / its maximum")
     title = f"Contact {contact}{'' if pair[1] == 0 else f', pair {pair[1]}'}: modal amplitude, {mode.method()}"

@@ -65,6 +65,10 @@ class Swept:
                 branches.append((number, place, {name: curve[name][rows] for name in curve.names}))
         return cls(analysis, plan, branches, summary, split, parts)
 
+    def unit(self, unit: str) -> str:
+        """Of a panel; that of an amplitude where it is a length."""
+        return self.analysis.unit("amplitude") or unit if unit == "m" else unit
+
     @property
     def main(self) -> int:
         """The key with most values: shown by colour, or on an axis."""
@@ -128,7 +132,7 @@ def backbones(swept: Swept) -> Figure:
     upper.set_ylabel(style.label("Frequency ω/2π", "Hz"))
     lower.set_ylabel(style.label("Damping ratio ζ", "%"))
     dof = swept.analysis.attributes.get("normalise", "")
-    lower.set_xlabel(style.label(f"Modal amplitude of {dof}".rstrip(" of"), "m"))
+    lower.set_xlabel(style.label(f"Modal amplitude of {dof}".rstrip(" of"), swept.unit("m")))
     _name(figure, [upper, lower], swept)
     return figure
 
@@ -143,7 +147,7 @@ def responses(swept: Swept) -> Figure:
         axes.set_yscale("log")
     axes.set_xlabel(style.label("Excitation frequency", "Hz"))
     dof = swept.analysis.attributes.get("observe", "")
-    axes.set_ylabel(style.label(f"Amplitude of {dof}".rstrip(" of"), "m"))
+    axes.set_ylabel(style.label(f"Amplitude of {dof}".rstrip(" of"), swept.unit("m")))
     _name(figure, [axes], swept)
     return figure
 
@@ -247,7 +251,7 @@ def overview(swept: Swept, panels: Sequence[Panel]) -> Figure:
     for plane, (text, unit, from_zero, draw) in zip(axes, panels):
         for number in range(len(others)):
             draw(plane, x[order], {name: data[:, number] for name, data in lines.items()}, number)
-        plane.set_ylabel(style.label(text, unit))
+        plane.set_ylabel(style.label(text, swept.unit(unit)))
         plane.set_xlabel(short_names(swept.plan.keys)[key].replace("_", " "))
         _scales(plane, x[order], [] if numeric else [str(values[k]) for k in order], from_zero)
     for number, name in enumerate(others if len(others) > 1 else ()):

@@ -33,7 +33,7 @@ def draw(mode: Analysis) -> Figure:
         name = f"{style.number(amplitude)} {mode.unit('amplitude')}".strip()
         left.plot(x[:, across], x[:, up], color=colour, label=name)
         right.plot(x[:, across] / amplitude, x[:, up] / amplitude, color=colour)
-    unit = mode.unit("amplitude")
+    unit = mode.length_unit()
     left.set(xlabel=style.label(f"Displacement of {mode.dofs[across]}", unit))
     left.set(ylabel=style.label(f"Displacement of {mode.dofs[up]}", unit))
     right.set(xlabel=f"{mode.dofs[across]} / modal amplitude", ylabel=f"{mode.dofs[up]} / modal amplitude")

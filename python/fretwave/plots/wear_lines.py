@@ -177,7 +177,8 @@ def amplitude_text(line: WearLine) -> str:
 def amplitude_label(wear: Analysis, unit: str) -> str:
     """Axis label with the dof that the mode normalises."""
     case = wear.attributes.get("case", {})
-    name = case.get(f"{wear.attributes.get('mode')}.normalise", "") if isinstance(case, dict) else ""
+    of_case = case.get(f"{wear.attributes.get('mode')}.normalise", "") if isinstance(case, dict) else ""
+    name = wear.attributes.get("normalise", of_case)  # results of an earlier version have it in the case alone
     return style.label(f"Modal amplitude of {name}" if name else "Modal amplitude", unit)
 
 

@@ -29,6 +29,10 @@ if TYPE_CHECKING:
     import h5py
 
 Table = dict[str, Array]
+#: Of a column's range, what straight lines between the rows of <name>_curve.csv are off at most.
+CURVE = 1e-3
+#: Dataset of the weights of the dofs in an amplitude that is of no dof.
+ROW = "amplitude_row"
 
 
 @dataclass
@@ -140,10 +144,28 @@ class Analysis:
         """Points at which an event happened."""
         return [i for i, text in enumerate(self.events) if event in text.split()]
 
-    def normalised_dof(self) -> int:
-        """Index of the dof that carries the modal amplitude (or is observed)."""
+    def observed(self) -> str:
+        """Name of what the amplitude is of: a dof, a row of dofs, the coordinate of a linear mode."""
         name = self.attributes.get("normalise", self.attributes.get("observe"))
-        return self.dofs.index(name) if name in self.dofs else 0
+        return str(name) if name else (self.dofs or [""])[0]
+
+    def normalised_dof(self) -> int:
+        """Index of the dof that carries the modal amplitude (or is observed), or has the largest weight in it."""
+        if self._weights is not None:
+            return int(np.argmax(np.abs(self._weights)))
+        return self.dofs.index(self.observed()) if self.observed() in self.dofs else 0
+
+    def along(self, motion: Array) -> Array:
+        """What the amplitude is of, (n,), in motions of all dofs (n, n_dof)."""
+        return np.asarray(motion[:, self.normalised_dof()] if self._weights is None else motion @ self._weights)
+
+    @cached_property
+    def _weights(self) -> Array | None:
+        """Of all dofs in the amplitude, where it is that of a row or a coordinate."""
+        if self.observed() in self.dofs or not has_results(self.path.parent):
+            return None
+        with open_results(self.path) as file:
+            return np.asarray(file[self.name][ROW]) if ROW in file[self.name] else None
 
     def method(self) -> str:
         return str(self.attributes.get("method", ""))
@@ -152,6 +174,10 @@ class Analysis:
         """Unit of a column; "" for a pure number or an unknown one."""
         unit = self.units.get(column, "")
         return "" if unit in ("1", "-") else unit
+
+    def length_unit(self) -> str:
+        """Of displacements; "" where the results tell no units."""
+        return "m" if self.unit("amplitude") else ""
 
     def asymptote(self, contact: str) -> float | None:
         """Linear angular frequency with the contact "stuck" or "free" [rad/s]."""
@@ -201,6 +227,10 @@ class Analysis:
         """Its branches for drawing, one under the other: all points, and n - 1 places of the cubic between two."""
         return self._joined(lambda curve: curve.drawn(n))
 
+    def straight(self, error: float = CURVE) -> Reading:
+        """Its branches for a reader that draws straight lines, which stay within a share of each column's range."""
+        return self._joined(lambda curve: curve.straight(error))
+
     def _joined(self, read: Callable[[Curve], Reading]) -> Reading:
         if self.meaning is None or not len(self):
             what, fix = self.kind if self.meaning is None else "no points", "mode, forced, flutter, or a sweep of these"
@@ -238,6 +268,13 @@ def open_run(folder: str | Path) -> Run:
     if not has_results(Path(folder)):
         raise InputError("there are no results here", str(folder), fix="give the folder of a run")
     return Run(folder)
+
+
+def write_curve(folder: Path, name: str) -> None:
+    """``<name>_curve.csv``: the branches of an analysis for readers without the cubic; one rank only."""
+    analysis = Run(folder).analyses.get(name)
+    if analysis is not None and analysis.slopes is not None and len(analysis):
+        analysis.straight().to_csv(folder / f"{name}_curve.csv")
 
 
 class Run:

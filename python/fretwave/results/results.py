@@ -21,8 +21,9 @@ from ..files.csv_table import header_line, row_line
 from ..files.whole import replace_bytes, told, write_all
 from ..post.contact_history import MOTION
 from .field import Field
-from .file import NewResults, Rows, attributes_of, build_group, has_results, open_results, rewritten
+from .file import NewResults, has_results, open_results, rewritten
 from .journal import Journal, Record, journal_path
+from .rows import Rows, attributes_of, build_group
 
 if TYPE_CHECKING:
     import h5py
@@ -256,7 +257,7 @@ class AnalysisWriter:
         if state is None:
             return None
         kept = rows.first(state[0])
-        self.fields = kept.fields
+        self.fields, self.columns = kept.fields, kept.columns  # of the version that began it
         self.rows, self.reported = len(kept), len(kept.reported)
         self._journal.go_on(kept.size, kept.token)
         lines = [row_line(self.columns, values) for values in kept.values()]

@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..arrays import Array
-from ..columns import COLUMNS, Column
+from ..columns import COLUMNS, Column, over
 from ..hb.states import ForcedState, ModalState, State, described, state_of
+from ..solve.curve import APART as OF_A_RUN
 from ..solve.curve import Curve
 from ..solve.hermite import Cubic
 from ..solve.table import Table
@@ -30,7 +31,7 @@ NAME = "slopes"
 #: Of the step.
 ENDS = ("begin", "end")
 #: What tells the branches of one table apart.
-APART = ("level", "nodal_diameter", "value")
+APART = (*OF_A_RUN, "value")
 
 
 def slope_fields(meaning: State) -> dict[str, Field]:
@@ -78,7 +79,8 @@ def curves_of(
             new[1:] |= np.diff(columns[name]) != 0
     new[:1] = True
     ends = [*np.flatnonzero(new).tolist(), count]
-    kinds = [COLUMNS.get(name, Column(name, units.get(name, ""), "")) for name in columns]
+    known = [COLUMNS.get(name, Column(name, units.get(name, ""), "")) for name in columns]
+    kinds = over(known, units.get("amplitude") or "m")
     found = []
     for first, last in zip(ends, ends[1:]):
         table = Table(kinds, {name: values[first:last] for name, values in columns.items()})

@@ -65,7 +65,7 @@ class Summary:
         Their values by name, from the columns of the branch (n_points,), the attributes of its group, and the forces of
         the contacts over the period of its first point, where they are kept.
     words : callable
-        A row of the summary in words, for the terminal.
+        A row of the summary in words, for the terminal; `unit` in it is that of the amplitudes.
     split : str
         Column of the table whose values tell several branches of one run apart; empty where there is one.
     """
@@ -162,10 +162,11 @@ def _forced(table: Table, attributes: Table, forces: Table) -> dict[str, float]:
     }
 
 
-def landmarks(name: str, plan: Plan, rows: Sequence[Row], of: Summary) -> list[str]:
-    """A line for each row of a sweep's summary, for the terminal."""
+def landmarks(name: str, plan: Plan, rows: Sequence[Row], of: Summary, unit: str = "m") -> list[str]:
+    """A line for each row of a sweep's summary, for the terminal; `unit` of the amplitudes."""
     labels = plan.labels()
-    return [f"{name}: {labels[row['value']]}{_part(row, of)}: {of.words(row)}" for row in rows]
+    told = [{**row, "unit": unit} for row in rows]
+    return [f"{name}: {labels[row['value']]}{_part(row, of)}: {of.words(row)}" for row in told]
 
 
 def read_landmarks(name: str, group: h5py.Group) -> list[str]:
@@ -179,7 +180,8 @@ def read_landmarks(name: str, group: h5py.Group) -> list[str]:
         row = {key: float(values.reshape(len(plan), -1)[number, k]) for key, values in data.items()}
         if not math.isnan(row["points"]):
             rows.append({"value": number, **part, **row})
-    return landmarks(name, plan, rows, of)
+    unit = str(group["points/amplitude"].attrs["units"]) if "points/amplitude" in group else "m"
+    return landmarks(name, plan, rows, of, unit)
 
 
 def _part(row: Row, of: Summary) -> str:
@@ -188,18 +190,19 @@ def _part(row: Row, of: Summary) -> str:
 
 
 def _mode_words(row: Row) -> str:
+    unit = row["unit"]
     starts = next((row[key] for key in ("slip_threshold", "slip_from") if math.isfinite(row[key])), None)
-    slip = "no slip" if starts is None else f"slip from {starts:.4g} m"
-    top = f"largest zeta {100 * row['largest_zeta']:.4g} % at {row['amplitude_of_largest_zeta']:.4g} m"
+    slip = "no slip" if starts is None else f"slip from {starts:.4g} {unit}"
+    top = f"largest zeta {100 * row['largest_zeta']:.4g} % at {row['amplitude_of_largest_zeta']:.4g} {unit}"
     words = [slip, top, f"lowest {row['lowest_frequency_hz']:.6g} Hz"]
     for word in ("stable", "unstable"):
         amplitude = row[f"{word}_limit_cycle"]
-        words += [] if math.isnan(amplitude) else [f"{word} limit cycle at {amplitude:.4g} m"]
+        words += [] if math.isnan(amplitude) else [f"{word} limit cycle at {amplitude:.4g} {unit}"]
     return ", ".join(words)
 
 
 def _forced_words(row: Row) -> str:
-    return f"largest {row['largest_amplitude']:.4g} m at {row['frequency_of_largest_amplitude']:.6g} Hz"
+    return f"largest {row['largest_amplitude']:.4g} {row['unit']} at {row['frequency_of_largest_amplitude']:.6g} Hz"
 
 
 MODE_BRANCH = Summary(MODE, _mode, _mode_words)

@@ -134,10 +134,15 @@ def write_sweep(
         group.attrs.update({**_shared(branches), **described, **attributes})
         _write_points(group.create_group("points"), points)
         scales = _write_over(group.create_group("over"), plan)
-        _write_summary(group.create_group("summary"), kind, plan, rows, scales)
+        _write_summary(group.create_group("summary"), kind, plan, rows, scales, amplitude_unit(branches))
         for branch in branches:
             _copy_branch(branch, of, group.create_group(f"values/{branch.number:04d}"))
     return rows
+
+
+def amplitude_unit(branches: Sequence[Branch]) -> str:
+    """Of the amplitudes in the tables and in the summary, the same for all values."""
+    return branches[0].units.get("amplitude", ("m", ""))[0] if branches else "m"
 
 
 def key_values(values: Sequence[Any]) -> Any:
@@ -205,7 +210,12 @@ def _write_over(group: h5py.Group, plan: Plan) -> list[h5py.Dataset]:
 
 
 def _write_summary(
-    group: h5py.Group, kind: str, plan: Plan, rows: Sequence[Mapping[str, Any]], scales: Sequence[h5py.Dataset]
+    group: h5py.Group,
+    kind: str,
+    plan: Plan,
+    rows: Sequence[Mapping[str, Any]],
+    scales: Sequence[h5py.Dataset],
+    unit: str,
 ) -> None:
     split = split_of(kind)
     parts = sorted({row[split] for row in rows if split in row})
@@ -221,7 +231,8 @@ def _write_summary(
             place = np.unravel_index(row["value"], plan.shape)
             values[(*place, *([parts.index(row[split])] if parts else []))] = row[column.name]
         data = group.create_dataset(column.name, data=values)
-        data.attrs.update({"units": column.unit, "long_name": column.long_name})
+        own = unit if column.unit == "m" else column.unit  # all lengths are amplitudes
+        data.attrs.update({"units": own, "long_name": column.long_name})
         name_dimensions(group, data, names)
 
 

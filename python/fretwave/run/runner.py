@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,7 +23,9 @@ from ..errors import EXIT_DONE, InputError, NotConverged
 from ..mpi.guard import on_first_rank
 from ..mpi.interrupt import say_how_to_go_on
 from ..mpi.petsc_options import AnalysisOptions
+from ..results.basis_file import LARGEST, NAME, basis_of
 from ..results.journal import Journal
+from ..results.reader import write_curve
 from ..results.results import has_results, open_results
 from ..results.runfolder import RECORD, RunFolder, new_record, peak_memory_mb, read_record
 from ..texts import display
@@ -33,6 +35,8 @@ from .stopped import joined, not_converged
 if TYPE_CHECKING:
     from mpi4py import MPI
 
+    from ..cyclic.reduction import SectorReduction
+    from ..model.reduction import Reduction
     from .sweep import Sweep
 
 
@@ -42,6 +46,8 @@ ENDED = ("done", "stopped")
 
 def run_case(path: Path, options: RunOptions, comm: MPI.Comm) -> int:
     """Run a case from its start; returns the exit code. Collective."""
+    from .. import _core  # noqa: F401  # PETSc starts on all ranks at once, not with what one of them does alone
+
     case = on_first_rank(comm, lambda: load_case(path, options.overrides, options.quick))
     folder = options.out or Path("runs") / case.name
     record = comm.bcast(new_record(options.given(path, case), comm.size) if comm.rank == 0 else None)
@@ -56,11 +62,17 @@ def resume_run(folder: Path, comm: MPI.Comm, plots: bool = True) -> int:
     InputError
         The folder holds no run, or its case has changed since.
     """
+    from .. import _core  # noqa: F401
+
     case, record = on_first_rank(comm, lambda: reload_case(folder))
     given = record["case"]
     options = RunOptions(folder, given["overrides"], given["only"], given["quick"], plots, given["petsc"])
     record["ranks"], record["status"] = comm.size, "running"
     return Runner(case, options, folder, record, comm, resuming=True).run()
+
+
+def _nothing() -> None:
+    """Nothing is to be written."""
 
 
 class Runner:
@@ -81,6 +93,7 @@ class Runner:
         self.folder = RunFolder(folder, record, case.text, active, resuming)
         self.console = Console(active, self.folder.log, quiet=quiet)
         self.failures: list[NotConverged] = []
+        self._basis: Callable[[], None] = _nothing
         if resuming:
             on_first_rank(comm, self._check_readable)
             self._start()
@@ -94,6 +107,7 @@ class Runner:
         """Collective."""
         on_first_rank(self.comm, self.folder.start)
         self.folder.started = True
+        self._write_basis()
         if not self.console.quiet:
             say_how_to_go_on(self.comm, self.folder.path)
 
@@ -143,11 +157,33 @@ class Runner:
 
     def _reduce(self) -> None:
         """Solve on the reduced model from here on, when the case asks for one; its error is kept."""
-        self.case = reduce_case(self.case, self.comm)
+        self.case = reduce_case(self.case, self.comm, look=self._keep_basis)
         if self.case.reduced is not None:
             for line in self.case.reduced.lines():
                 self.console.line(line)
             self.folder.record["reduction"] = self.case.reduced.plain()
+
+    def _keep_basis(self, reduction: Reduction | SectorReduction) -> None:
+        """For `fretwave view`: of a model with nodes, and not of the runs of a sweep. Collective."""
+        full = self.case.structure.cut or self.case.structure
+        path, size = self.folder.path / NAME, 8 * full.n_dof * reduction.size
+        if self.console.quiet or full.coordinates is None or (self.resuming and path.exists()):
+            return
+        if size > LARGEST:
+            text = f"{size / 1e6:.0f} MB, more than {LARGEST / 1e6:.0f}"
+            self.console.line(f"the basis of the reduction is not kept ({text}): `fretwave view` will make it again")
+            self._basis = lambda: path.unlink(missing_ok=True)  # of another run
+            return
+        basis = basis_of(reduction, full, self.comm)
+        self._basis = lambda: None if basis is None else basis.write(path)
+        self.console.line(f"the basis of the reduction is kept for `fretwave view` ({size / 1e6:.1f} MB)")
+        if self.folder.started:
+            self._write_basis()
+
+    def _write_basis(self) -> None:
+        """Collective."""
+        write, self._basis = self._basis, _nothing
+        on_first_rank(self.comm, write)
 
     def _check_needs(self, names: Sequence[str]) -> None:
         """Analyses whose results another needs: of this run, or kept in the folder."""
@@ -229,6 +265,8 @@ class Runner:
                 outcome = Outcome(0, reason, False, goal=str(error.expected), advice=error.fix or "")
         entry = {"left_out": context.left_out, **context.entry}
         self._note(analysis.name, outcome, time.perf_counter() - began, entry)
+        if not self.console.quiet:
+            on_first_rank(self.comm, lambda: write_curve(self.folder.path, analysis.name))
         context.publish()  # last of all: from here on a resumed run leaves the analysis as it is
 
     def _sweep(self, name: str, sweep: Sweep) -> None:

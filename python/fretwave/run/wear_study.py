@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..analyses.mode import ModeAnalysis
+from ..analyses.parts.branch import mode_problem
 from ..analyses.parts.context import AnalysisContext
 from ..analyses.parts.rest import retained, start_mode
 from ..analyses.parts.wear_line import wear_areas
@@ -218,16 +219,13 @@ class _Solver:
         return replace(runs[0], wall_s=min(run.wall_s for run in runs)) if runs else str(tried[0])
 
     def _march(self, context: AnalysisContext[ModeAnalysis], settings: WearSettings) -> WearOutcome | str:
-        from ..hb.problems import NonlinearMode
         from ..solve.steps import WearControl
         from ..solve.wear import Wear
         from ..solve.worn_mode import WornMode
 
         mode, a, unit = context.analysis, self.analysis, self.unit
         start, rest = start_mode(context, mode.linear_mode)
-        problem = NonlinearMode(
-            self.model, retained(context), mode.method, self.case.dof(mode.normalise), start, context.prefix, rest=rest
-        )
+        problem = mode_problem(context, retained(context), start, rest)
         areas = wear_areas(self.case)
         with problem, WornMode(problem, a.coefficient, areas) as worn:
             y = problem.core.unknowns()

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from ..columns import COLUMNS, Column
+from ..columns import COLUMNS, Column, over
 from ..errors import InputError
 from ..files.dimensions import name_dimensions
 from ..files.whole import replaced
@@ -71,7 +71,8 @@ def read(kind: Callable[..., Made], path: Path) -> Made:
     if found.get("format") != FORMAT:
         measured = str(found.get("format", "another format"))
         raise InputError("the file holds no branch", str(path), measured, FORMAT, "give a file of Branch.save")
-    columns = [COLUMNS.get(name) or Column(name, *said[name]) for name in json.loads(found["columns"])]
+    named = [COLUMNS.get(name) or Column(name, *said[name]) for name in json.loads(found["columns"])]
+    columns = over(named, said["amplitude"][0])
     values["event"] = np.array([text.decode() for text in values["event"]], dtype=str)
     return kind(
         columns,

@@ -19,6 +19,10 @@ from ..hb.states import State
 from .hermite import Cubic
 from .table import PLACE, Table
 
+#: Columns that tell the branches of one table apart.
+APART = ("level", "nodal_diameter")
+#: Columns of the state that are looked at.
+DRAWN = ("amplitude", "frequency_hz", "zeta", "phase")
 #: Parts of a step in which a value is looked for on its cubic, and is drawn.
 PARTS = 8
 #: A value this close to that of an end, relative, is met there.
@@ -54,6 +58,29 @@ class Curve:
     def drawn(self, n: int = PARTS) -> Table:
         """All points, and n - 1 places of the cubic between two; between straight lines none is needed."""
         return self.read(np.arange(float(len(self.table))) if self.cubic is None else self.cubic.places(n))
+
+    def straight(self, error: float) -> Table:
+        """All points, and so many places of the cubic between two that straight lines will do for a reader.
+
+        Parameters
+        ----------
+        error : of the range that each column of the state has along the branch, that of the amplitude of a mode in
+            decades; a step has at most 2 `PARTS` parts
+        """
+        fine = self.drawn(2 * PARTS)
+        if self.cubic is None or not len(fine):
+            return self._of_state(fine)
+        shown = np.array([_scaled(fine, name) for name in DRAWN if name in self._names])
+        steps = [shown[:, k : k + 2 * PARTS + 1] for k in range(0, shown.shape[1] - 1, 2 * PARTS)]
+        shares = [np.arange(parts) / parts for parts in (_parts_of(step, error) for step in steps)]
+        places = np.concatenate([*(k + share for k, share in enumerate(shares)), [len(self.table) - 1.0]])
+        return self._of_state(self.read(places))
+
+    def _of_state(self, table: Table) -> Table:
+        """Without columns that are no functions of the unknowns, but for those that tell branches apart."""
+        kept = {PLACE.name, *APART, *self._names}
+        columns = [column for column in table.columns if column.name in kept]
+        return Table(columns, {column.name: table[column.name] for column in columns})
 
     def read(self, places: Sequence[float] | Array) -> Table:
         """State and other columns at some places: 3.25 is a quarter of the step from row 3 to row 4."""
@@ -123,3 +150,21 @@ class Curve:
     @cached_property
     def _parts(self) -> Table:
         return self.drawn(PARTS)
+
+
+def _scaled(table: Table, name: str) -> Array:
+    """A column over its range."""
+    values = np.asarray(table[name], dtype=float)
+    if name == "amplitude" and "zeta" in table and (values > 0).all():
+        values = np.log(values)
+    return np.asarray(values / (np.ptp(values) or 1.0))
+
+
+def _parts_of(step: Array, error: float) -> int:
+    """Least number of straight lines, a power of two, that stay within an error of a step (k, 2 PARTS + 1)."""
+    share = np.arange(step.shape[1])
+    for width in (2 * PARTS >> k for k in range((2 * PARTS).bit_length() - 1)):
+        ends = share[::width]
+        if all(np.abs(np.interp(share, ends, row[ends]) - row).max() <= error for row in step):
+            return 2 * PARTS // width
+    return 2 * PARTS

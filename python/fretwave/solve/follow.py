@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
-from ..columns import FORCED, MODE, columns_named
+from ..columns import FORCED, MODE, columns_named, over
 from ..errors import InputError
 from ..hb.observe import Observer
-from ..hb.problems import HarmonicProblem, Observed
+from ..hb.problems import HarmonicProblem, Observed, unit_of
 from .branch import Branch
 from .continuation import Continuation, Point
 from .steps import StepControl
@@ -108,7 +108,8 @@ def follow(
     trace.close()
     if not own:
         y0.destroy()
-    columns = [*columns_named(MODE if problem.meaning.kind == "mode" else FORCED), *observer.columns]
+    known = columns_named(MODE if problem.meaning.kind == "mode" else FORCED)
+    columns = [*over(known, unit_of(problem.dof)), *observer.columns]
     table = Table.of_rows(columns, rows)
     values = {name: table[name] for name in table.names}
     curves = cubic_of(knots)

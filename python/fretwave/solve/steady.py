@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, Union
 
 import numpy as np
 
@@ -40,7 +40,7 @@ class TimeIntegrator(Protocol):
 
 @dataclass(frozen=True)
 class Motion:
-    """Motion of one dof (n,) each; `diverged` when it was stopped by the limit, `stopped` says why before its end."""
+    """What is seen of a motion, (n,) each; `diverged` when the limit stopped it, `stopped` says why before its end."""
 
     t: Array
     x: Array
@@ -72,7 +72,7 @@ def start_state(labels: list[str], coefficients: Array, beta: float, omega: floa
 def free_motion(
     integrator: TimeIntegrator,
     state: tuple[Array, Array],
-    dof: int,
+    seen: Union[int, Array],
     step: float,
     count: int,
     tolerance: float,
@@ -84,12 +84,20 @@ def free_motion(
     Parameters
     ----------
     state : displacement and velocity (n_dof,) at t = 0
+    seen : a dof, or weights (n_dof,)
     step : between outputs [s]
     most_steps : of the integrator itself
     """
     run = integrator.run(*state, count * step, step, rtol=tolerance, limit=limit, most_steps=most_steps)
     t, x, v = (np.asarray(run[key], dtype=float) for key in ("t", "x", "v"))
-    return Motion(t, x[:, dof], v[:, dof], run["reason"] == "limit", _stopped(run, count * step), run["implicit"])
+    return Motion(
+        t, _along(x, seen), _along(v, seen), run["reason"] == "limit", _stopped(run, count * step), run["implicit"]
+    )
+
+
+def _along(x: Array, seen: Union[int, Array]) -> Array:
+    """(n,) of motions (n, n_dof)."""
+    return np.asarray(x[:, seen] if isinstance(seen, int) else x @ seen)
 
 
 def _stopped(run: Mapping[str, Any], end: float) -> str:
@@ -102,12 +110,18 @@ def _stopped(run: Mapping[str, Any], end: float) -> str:
 
 
 def steady_motion(
-    integrator: TimeIntegrator, state: tuple[Array, Array], dof: int, omega: float, samples: int, tolerance: float
+    integrator: TimeIntegrator,
+    state: tuple[Array, Array],
+    seen: Union[int, Array],
+    omega: float,
+    samples: int,
+    tolerance: float,
 ) -> SteadyState:
-    """Integrate a forced motion period by period until the fundamental of the dof is steady. Collective.
+    """Integrate a forced motion period by period until the fundamental of what is seen is steady. Collective.
 
     Parameters
     ----------
+    seen : a dof, or weights (n_dof,)
     integrator : its force has the angular frequency `omega` [rad/s] and phase zero at t = 0
     """
     period = 2.0 * np.pi / omega
@@ -121,7 +135,7 @@ def steady_motion(
             return SteadyState(amplitude, len(amplitudes), False, state, stopped)
         # the integrator may give one sample beyond the end
         state = piece["x"][PIECE * samples], piece["v"][PIECE * samples]
-        motion = np.asarray(piece["x"])[: PIECE * samples, dof].reshape(PIECE, samples)
+        motion = _along(np.asarray(piece["x"])[: PIECE * samples], seen).reshape(PIECE, samples)
         amplitudes += [harmonic_amplitude(one) for one in motion]
     return SteadyState(amplitudes[-1], len(amplitudes), _is_steady(amplitudes), state)
 

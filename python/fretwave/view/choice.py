@@ -94,6 +94,7 @@ class Choice:
     diameters : nodal diameters of the wave on one sector, per point; 0 for a structure
     wheel : the coordinates are those of all sectors of a wheel, one after the other
     sample_count : of a period
+    unit : of the amplitude
     """
 
     name: str
@@ -111,6 +112,7 @@ class Choice:
     diameters: Sequence[int] = ()
     wheel: bool = False
     sample_count: int = 1
+    unit: str = "m"
 
     @property
     def times(self) -> Array:
@@ -160,7 +162,7 @@ class Choice:
         """Which points are shown, each in a line."""
         for row, (point, asked) in enumerate(zip(self.points, self.asked)):
             amplitude, frequency = self.states["amplitude"][row], self.states["frequency_hz"][row]
-            yield f"{self.name}: point {point}, amplitude {amplitude:.6g} m, {frequency:.6g} Hz{asked}"
+            yield f"{self.name}: point {point}, amplitude {amplitude:.6g} {self.unit}, {frequency:.6g} Hz{asked}"
         if self.without:
             numbers = ", ".join(str(point) for point in self.without)
             yield f"{self.name}: no contact pairs are shown: their motion is not kept at point {numbers}"
@@ -200,6 +202,7 @@ def read_choice(file: h5py.File, folder: Path, case: Case, options: ViewOptions)
         diameters=_diameters(group, case, name, rows),
         wheel=case.neighbours is not None and section is not None and section.wheel,
         sample_count=count,
+        unit=_unit(group),
     )
 
 
@@ -234,6 +237,11 @@ def _held(group: h5py.Group) -> Indices:
     return np.asarray(group["reported"][()] if with_contacts else np.arange(len(group["coefficients"])), dtype=np.intp)
 
 
+def _unit(group: h5py.Group) -> str:
+    """Of the amplitude."""
+    return str(group["points/amplitude"].attrs.get("units", "m"))
+
+
 def _points(group: h5py.Group, kept: Indices, options: ViewOptions, where: str) -> list[tuple[int, str]]:
     """Numbers of points, each with a word on what was asked for; without a wish that of the largest amplitude.
 
@@ -241,25 +249,29 @@ def _points(group: h5py.Group, kept: Indices, options: ViewOptions, where: str) 
     ----------
     kept : points that an amplitude may choose
     """
-    amplitude = group["points/amplitude"][()]
+    amplitude, unit = group["points/amplitude"][()], _unit(group)
     for point in options.points:
         if not 0 <= point < len(amplitude):
             near = kept[np.argmin(np.abs(kept - point))]
-            raise _not_kept("there is no such point", where, f"point {point}", kept, amplitude, near)
+            raise _not_kept("there is no such point", where, f"point {point}", kept, amplitude, near, unit)
     chosen = [(int(point), "") for point in options.points]
     for asked in options.amplitudes:
         near = kept[np.argmin(np.abs(amplitude[kept] - asked))]
         if not amplitude.min() <= asked <= amplitude.max():
-            raise _not_kept("the branch does not reach this amplitude", where, f"{asked:g} m", kept, amplitude, near)
-        chosen.append((int(near), f", the kept point nearest to {asked:g} m"))
+            raise _not_kept(
+                "the branch does not reach this amplitude", where, f"{asked:g} {unit}", kept, amplitude, near, unit
+            )
+        chosen.append((int(near), f", the kept point nearest to {asked:g} {unit}"))
     return chosen or [(int(kept[np.argmax(amplitude[kept])]), ", the kept point of the largest amplitude")]
 
 
-def _not_kept(what: str, where: str, measured: str, kept: Indices, amplitude: Array, near: int) -> InputError:
+def _not_kept(
+    what: str, where: str, measured: str, kept: Indices, amplitude: Array, near: int, unit: str
+) -> InputError:
     """Names the kept points around the nearest one."""
     place = int(np.flatnonzero(kept == near)[0])
     begin = max(0, min(place - NAMED // 2, len(kept) - NAMED))
-    named = ", ".join(f"{point} ({amplitude[point]:.4g} m)" for point in kept[begin : begin + NAMED])
+    named = ", ".join(f"{point} ({amplitude[point]:.4g} {unit})" for point in kept[begin : begin + NAMED])
     more = f" ({len(kept)} in all)" if len(kept) > NAMED else ""
     expected = f"a point from 0 to {len(amplitude) - 1}, best one of {named}{more}"
     return InputError(what, where, measured, expected, f"--point {near}")

@@ -2,7 +2,8 @@
 
 A wave on one sector is that of sector 0 in sector j, turned by 2 pi j / N about the axis and delayed by j theta
 (`fretwave.cyclic.sector`). A whole wheel's results have each sector's own motion, in the frame that is turned with it.
-A run does not keep its reduction: it is made again from the case, and is the same.
+A reduced motion reaches the nodes by the basis that the run keeps; a basis too large for that is made again from the
+case, and is the same.
 """
 
 from __future__ import annotations
@@ -11,7 +12,8 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from pathlib import Path
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -22,6 +24,7 @@ from ..errors import InputError
 from ..fe.mesh import VTK_LATTICE
 from ..model.sectors import Parts, rotation
 from ..model.structure import Structure
+from ..results.basis_file import NAME, marks_of, read_basis
 from ..texts import display
 from .choice import Choice
 from .vtkhdf import HEXAHEDRON, QUADRATIC_HEXAHEDRON, TRIQUADRATIC_HEXAHEDRON, VERTEX, linear_cells
@@ -144,11 +147,12 @@ class Scene:
 
 
 @contextmanager
-def scene_of(case: Case, choice: Choice, nodes: Array, sectors: Sequence[int] = ()) -> Iterator[Scene]:
+def scene_of(case: Case, choice: Choice, nodes: Array, folder: Path, sectors: Sequence[int] = ()) -> Iterator[Scene]:
     """The scene of a choice; reductions live as long as it does. One rank only.
 
     Parameters
     ----------
+    folder : of the run
     sectors : those shown of a wheel; empty for all
 
     Raises
@@ -162,21 +166,56 @@ def scene_of(case: Case, choice: Choice, nodes: Array, sectors: Sequence[int] = 
     expand: Expand = _unchanged
     with ExitStack() as stack:
         if case.reduction is not None:
-            expand, ties, size, component_hz = _expansion(case, choice, around, ties, stack)
-            _check_same(case, choice, size, component_hz)
+            kept = read_basis(folder / NAME)
+            if kept is not None:
+                _check_model(case, kept.model)
+            basis = made_again(case, stack) if kept is None else kept
+            expand, ties = basis.expand, basis.ties or ties
+            _check_same(case, choice, basis, around)
         given, shown = geometry(case), _shown(case, around, sectors)
         yield Scene(nodes, choice, _to_nodes(given, len(nodes), expand), shown, ties, around, given.axis or "z")
 
 
-def _expansion(
-    case: Case, choice: Choice, around: int, ties: Parts | None, stack: ExitStack
-) -> tuple[Expand, Parts | None, int, Array]:
-    """Of a reduced model: to all its dofs, ties of sectors, number of coordinates and component frequencies [Hz].
+class Expansion(Protocol):
+    """What is used of a reduction, made again or kept."""
+
+    @property
+    def size(self) -> int: ...
+
+    @property
+    def n_interface(self) -> int: ...
+
+    @property
+    def highest_component_hz(self) -> float: ...
+
+    @property
+    def ties(self) -> Parts: ...
+
+    def expand(self, x_r: npt.ArrayLike, /) -> Array: ...
+
+
+@dataclass(frozen=True)
+class MadeAgain:
+    """The reduction of a run, from its case."""
+
+    reduction: Any
+    size: int
+    n_interface: int
+    highest_component_hz: float
+    ties: Parts
+
+    def expand(self, x_r: npt.ArrayLike, /) -> Array:
+        """Motion of all dofs."""
+        return np.asarray(self.reduction.expand(x_r))
+
+
+def made_again(case: Case, stack: ExitStack) -> Expansion:
+    """Of a run that does not keep the basis of its reduction; it lives as long as the stack.
 
     Raises
     ------
     InputError
-        There is neither MPI nor PETSc, with which the reduction is made again.
+        There is neither MPI nor PETSc.
     """
     try:
         from mpi4py import MPI
@@ -187,17 +226,16 @@ def _expansion(
         raise InputError(
             "the motion of a reduced model cannot be shown here",
             display(case.path),
-            f"no {error.name or 'solver'}",
+            f"no {error.name or 'solver'}, and no {NAME} in the folder of the run",
             "mpi4py and PETSc: the reduction is made again to reach the nodes that the run does not keep",
             "view it where the case was run; `fretwave show` and `fretwave plot` need neither",
         ) from None
     reduction = reduction_of(case, MPI.COMM_SELF)
     stack.callback(reduction.destroy)
-    size = reduction.size
+    hz = float(reduction.component_hz[-1:].sum())
     if isinstance(reduction, SectorReduction):
-        ties = reduction.sector().ties
-        size = (size - reduction.n_interface) * (around if choice.wheel else 1)
-    return reduction.expand, ties, size, reduction.component_hz
+        return MadeAgain(reduction, reduction.size, reduction.n_interface, hz, reduction.sector().ties)
+    return MadeAgain(reduction, reduction.size, 0, hz, {})
 
 
 def geometry(case: Case) -> Structure:
@@ -261,9 +299,24 @@ def _shown(case: Case, around: int, asked: Sequence[int]) -> list[int]:
     return chosen
 
 
-def _check_same(case: Case, choice: Choice, size: int, component_hz: Array) -> None:
+def _check_model(case: Case, then: Array) -> None:
+    """The model is that which was reduced: its motion is the run's own, its nodes are the case's."""
+    now = marks_of(geometry(case))
+    if not np.allclose(now, then, rtol=SAME, atol=0):
+        found, expected = (f"{m[0]:.0f} dofs, sum of |K| {m[1]:.9g} N/m" for m in (now, then))
+        raise InputError(
+            "the model is no longer that of the run",
+            display(case.path),
+            found,
+            f"{expected}, as in the run",
+            "run it again",
+        )
+
+
+def _check_same(case: Case, choice: Choice, basis: Expansion, around: int) -> None:
     """The last component mode tells whether this is the run's model: a builder may read what a case cannot tell."""
-    then, now = choice.highest_component_hz, component_hz[-1:].sum()
+    size = (basis.size - basis.n_interface) * (around if choice.wheel else 1)
+    then, now = choice.highest_component_hz, basis.highest_component_hz
     if size != len(choice.rest) or abs(now - then) > SAME * then:
         found = f"{size} coordinates, highest component mode {now:.9g} Hz"
         expected = f"{len(choice.rest)} coordinates, {then:.9g} Hz, as in the run"

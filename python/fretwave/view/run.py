@@ -56,7 +56,7 @@ def view_run(folder: Path, options: ViewOptions, say: Callable[[str], None] = pr
         say(line)
     out = options.out or folder / f"{choice.name}.vtkhdf"
     pairs = out.with_name(f"{out.stem}_contact{out.suffix}")
-    with scene_of(case, choice, nodes, options.sectors) as scene:
+    with scene_of(case, choice, nodes, folder, options.sectors) as scene:
         scale = options.scale if options.scale is not None else scene.natural_scale()
         write_grid(out, scene, cells, scale)
         say(f"{display(out)}: {_size(scene, len(nodes), 'nodes')}, {len(cells[0])} cells, {len(choice.times)} steps")

@@ -10,15 +10,18 @@ import numpy.typing as npt
 
 from ...case.analysis import AnalysisSection
 from ...case.harmonic import HarmonicSection
+from ...case.observed import label_of
 from ...case.schema import StepSection
+from ...errors import InputError
 from ...results.results import AnalysisWriter
 from ...results.slopes import slope_fields, slopes_of
+from .observed import observed_by
 
 if TYPE_CHECKING:
     from mpi4py import MPI
     from petsc4py import PETSc
 
-    from ...hb.problems import HarmonicProblem, Harmonics, NonlinearMode
+    from ...hb.problems import HarmonicProblem, Harmonics, NonlinearMode, Observed
     from ...model.modes import LinearMode
     from ...model.rest import Rest
     from ...solve.continuation import Continuation, Point
@@ -110,7 +113,7 @@ def mode_problem(
     harmonics: Harmonics,
     mode: LinearMode,
     rest: Optional[Rest],
-    dof: Optional[int] = None,
+    dof: Optional[Observed] = None,
     avoid: Optional[npt.NDArray[np.complex128]] = None,
 ) -> NonlinearMode:
     """The nonlinear mode of an analysis about its static state. Collective.
@@ -118,14 +121,18 @@ def mode_problem(
     Parameters
     ----------
     mode, rest : linear mode to start from, and static state (or None)
-    dof : normalised; by default the one that the analysis names
+    dof : normalised; by default what the analysis names
     avoid : as in `fretwave.NonlinearMode`
     """
     from ...hb.problems import NonlinearMode
 
     analysis = context.analysis
-    number = context.case.dof(analysis.normalise) if dof is None else dof
-    return NonlinearMode(context.model, harmonics, analysis.method, number, mode, context.prefix, avoid, rest)
+    observed = observed_by(context, analysis.normalise, mode) if dof is None else dof
+    try:
+        return NonlinearMode(context.model, harmonics, analysis.method, observed, mode, context.prefix, avoid, rest)
+    except InputError as error:  # on all ranks
+        where = error.where or f"analysis '{context.name}', normalised by {label_of(analysis.normalise)}"
+        raise InputError(error.what, where, error.measured, error.expected, error.fix) from None
 
 
 def tell(context: AnalysisContext[HarmonicSection], branch: Continuation, name: str = "") -> None:

@@ -6,23 +6,26 @@ import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Optional
 
 import numpy as np
 import numpy.typing as npt
 
 from ...case.harmonic import nodal_diameter
+from ...case.observed import dof_of
 from ...cyclic.engine_order import speed_rpm
 from ...post.motion import complex_amplitudes
 from .branch import step_control
 from .context import AnalysisContext
+from .observed import observed_by
 from .rest import rest_state, start_mode
 from .wheel_start import tuned_sector
 
 if TYPE_CHECKING:
     from petsc4py import PETSc
 
-    from ...hb.problems import ForcedResponse, HarmonicProblem, Harmonics
+    from ...hb.problems import ForcedResponse, HarmonicProblem, Harmonics, Observed
     from ...model.modes import LinearMode
     from ...model.rest import Rest
     from ...solve.continuation import Continuation
@@ -62,17 +65,22 @@ class Excitation:
                 force[place] = amplitude * np.exp(-j * turn)
         return force
 
+    @cached_property
+    def observed(self) -> Observed:
+        """As the problems take it. Collective the first time."""
+        analysis = self.analysis
+        return observed_by(self.context, analysis.observe, self.reference, analysis.sector or 0)
+
     def problem(self, level: float) -> ForcedResponse:
         """Steady response at a level. Collective."""
         from ...hb.problems import ForcedResponse
 
-        case = self.context.case
         return ForcedResponse(
             self.context.model,
             self.harmonics,
             force={1: self.force()},
             level=level,
-            dof=case.dof(self.analysis.observe, self.analysis.sector or 0),
+            dof=self.observed,
             reference=self.reference,
             prefix=self.context.prefix,
             rest=self.rest,
@@ -111,7 +119,7 @@ class Excitation:
         if order:
             row["speed_rpm"] = speed_rpm(state["omega"], order)
         if self.context.case.wheel is not None and coefficients is not None:
-            observed = coefficients[self.context.case.places(self.analysis.observe)]
+            observed = coefficients[self.context.case.places(dof_of(self.analysis.observe))]
             blades = np.abs(complex_amplitudes(self.harmonics.labels, observed)[1])
             row = {**row, "largest_amplitude": float(blades.max()), "largest_sector": int(np.argmax(blades))}
         return row

@@ -21,7 +21,7 @@ def curves_of(context: AnalysisContext[AnalysisSection], backbones: Sequence[str
 
 
 def write_peaks(
-    context: AnalysisContext[AnalysisSection], table: dict[str, Any], curves: dict[str, ModeCurve]
+    context: AnalysisContext[AnalysisSection], table: dict[str, Any], curves: dict[str, ModeCurve], unit: str
 ) -> list[str]:
     """Write the peaks of all levels with their distance from the backbones; a line for each level."""
     if not table:
@@ -30,17 +30,19 @@ def write_peaks(
     context.write_table("peaks", peaks)
     lines = [
         f"{context.name}: {len(table['level'])} points, {len(peaks['level'])} levels,"
-        f" error of the amplitude up to {np.nanmax(table['amplitude_error']):.2g} m, {table['wall_s'].sum():.2f} s"
+        f" error of the amplitude up to {np.nanmax(table['amplitude_error']):.2g} {unit}, {table['wall_s'].sum():.2f} s"
     ]
     for row in range(len(peaks["level"])):
-        lines.append(_peak_line(context.name, {key: float(value[row]) for key, value in peaks.items()}, list(curves)))
+        lines.append(
+            _peak_line(context.name, {key: float(value[row]) for key, value in peaks.items()}, list(curves), unit)
+        )
     return lines
 
 
-def _peak_line(name: str, peak: dict[str, float], curves: list[str]) -> str:
+def _peak_line(name: str, peak: dict[str, float], curves: list[str], unit: str) -> str:
     text = f"{name}: level {peak['level']:g}: "
     if not math.isfinite(peak["amplitude"]):
         return text + "no peak within the frequency range"
-    text += f"peak a = {peak['amplitude']:.4g} m at {peak['frequency_hz']:.5g} Hz"
+    text += f"peak a = {peak['amplitude']:.4g} {unit} at {peak['frequency_hz']:.5g} Hz"
     distances = [f"{100 * peak[f'distance_{curve}']:+.3f} % from {curve}" for curve in curves]
     return text + (", frequency " + ", ".join(distances) if distances else "")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Union
 
 import numpy as np
 
@@ -11,9 +11,11 @@ from ...arrays import Array
 from ...post.response_peaks import points_around_peak
 from ...solve.steady import SteadyState, steady_motion
 from .context import AnalysisContext
+from .observed import dense
 from .whole import integrated_model
 
 if TYPE_CHECKING:
+    from ...hb.problems import Observed
     from ...model.model import Model
     from ..forced import ForcedAnalysis
 
@@ -24,7 +26,7 @@ TOLERANCE = 1e-10
 
 
 def time_points(
-    context: AnalysisContext[ForcedAnalysis], table: Mapping[str, Any], count: int
+    context: AnalysisContext[ForcedAnalysis], table: Mapping[str, Any], count: int, observed: Observed
 ) -> tuple[list[str], str]:
     """Integrate `count` points per level to their steady state and write `<name>_time.csv`. Collective.
 
@@ -34,6 +36,7 @@ def time_points(
     Parameters
     ----------
     table : columns of the finished analysis; only rank 0 needs to have them
+    observed : whose amplitude is compared
 
     Returns
     -------
@@ -42,7 +45,7 @@ def time_points(
     columns = ("level", "omega", "amplitude")
     numbers = context.comm.bcast({key: np.asarray(table[key]) for key in columns} if context.comm.rank == 0 else None)
     with integrated_model(context) as model:
-        rows = list(_integrated(context, model, numbers, count))
+        rows = list(_integrated(context, model, numbers, count, dense(context.model, observed)))
     stopped = next((str(row["stopped"]) for row in rows if row["stopped"]), "")
     context.write_table("time", {key: [row[key] for row in rows] for key in rows[0] if key != "stopped"})
     worst = max((abs(row["relative_difference"]) for row in rows if row["steady"]), default=np.nan)
@@ -52,15 +55,18 @@ def time_points(
 
 
 def _integrated(
-    context: AnalysisContext[ForcedAnalysis], model: Model, table: Mapping[str, Array], count: int
+    context: AnalysisContext[ForcedAnalysis],
+    model: Model,
+    table: Mapping[str, Array],
+    count: int,
+    seen: Union[int, Array],
 ) -> Iterator[dict[str, Any]]:
-    dof = context.case.dof(context.analysis.observe)
     for level in np.unique(table["level"]):
         rows = {key: values[table["level"] == level] for key, values in table.items()}
         state = np.zeros(model.n_dof), np.zeros(model.n_dof)
         for point in points_around_peak(rows["amplitude"], rows["omega"], count):
             omega, expected = float(rows["omega"][point]), float(rows["amplitude"][point])
-            found = _steady(context, model, state, dof, float(level), omega)
+            found = _steady(context, model, state, seen, float(level), omega)
             state = found.end
             context.console.line(f"{context.name}: level {level:g}, {omega / (2 * np.pi):.5g} Hz in time")
             yield {
@@ -79,7 +85,7 @@ def _steady(
     context: AnalysisContext[ForcedAnalysis],
     model: Model,
     state: tuple[Array, Array],
-    dof: int,
+    seen: Union[int, Array],
     level: float,
     omega: float,
 ) -> SteadyState:
@@ -89,4 +95,4 @@ def _steady(
     for name, value in context.analysis.force.items():
         force[1][context.case.dof(name)] = value
     integrator = Transient(model, force=force, level=level, omega=omega, prefix=f"{context.prefix}time_")
-    return steady_motion(integrator, state, dof, omega, SAMPLES, TOLERANCE)
+    return steady_motion(integrator, state, seen, omega, SAMPLES, TOLERANCE)

@@ -106,13 +106,12 @@ def start_mode(
         )
         context.arrays["rest_displacement"] = rest.displacement
     try:
-        modes = context.linear_mode("stuck", linear_mode)
+        start = context.linear_mode("stuck", linear_mode)[linear_mode - 1]
     except InputError:
         if not or_free:
             raise
         context.console.line(f"{context.name}: contact that sticks leaves nothing to move: the mode without contact")
         return context.linear_mode("free", linear_mode)[linear_mode - 1], rest
-    start = modes[linear_mode - 1]
     if start.omega <= RIGID * closed_mode(context).omega:
         is_open = 1.0 if rest is None else rest.open
         load_name = own_load(context.case.contacts)
@@ -125,6 +124,14 @@ def start_mode(
             fix=f"load the contact ({by}[preload] loads), hold the structure, or take a higher linear_mode",
         )
     return start, rest
+
+
+def stuck_or_free(context: AnalysisContext[AnalysisSection], number: int) -> LinearMode:
+    """A linear mode as `start_mode` has it, of a contact that is at rest already. Collective."""
+    try:
+        return context.linear_mode("stuck", number)[number - 1]
+    except InputError:
+        return context.linear_mode("free", number)[number - 1]
 
 
 def retained(

@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...case.observed import label_of
 from ...columns import Column, Value
 from ...errors import InputError, NotConverged
 from ...post.decays import mode_state
 from ...solve.steady import STEPS_PER_PERIOD, Motion, free_motion, start_state
 from .context import AnalysisContext, Outcome
+from .observed import row_on
 from .whole import integrated_model
 
 if TYPE_CHECKING:
@@ -30,11 +32,12 @@ class Starts:
         context.leave_out([])
         self.table = context.table(self.mode.name)
         self.labels, self.coefficients = context.coefficients(self.mode.name)
-        self.dof = context.case.dof(self.mode.normalise)
+        given, case = self.mode.normalise, context.case
+        self.seen = case.dof(given) if isinstance(given, str) else row_on(case, given)
         self._model = ExitStack()
         model = self._model.enter_context(integrated_model(context))
         self.integrator = Transient(model, prefix=context.prefix)
-        self.writer = context.writer(columns, normalise=self.mode.normalise)
+        self.writer = context.writer(columns, normalise=label_of(self.mode.normalise))
         self.stopped: list[str] = []
 
     def __enter__(self) -> Starts:
@@ -69,7 +72,7 @@ class Starts:
         count = section.periods * section.samples_per_period
         limit = factor * float(np.abs(coefficients).max())
         most = section.periods * STEPS_PER_PERIOD
-        motion = free_motion(self.integrator, state, self.dof, step, count, section.tolerance, limit, most)
+        motion = free_motion(self.integrator, state, self.seen, step, count, section.tolerance, limit, most)
         if motion.implicit:
             self.context.console.line(f"{self.context.name}: the contact is stiff: implicit steps")
         if motion.stopped:

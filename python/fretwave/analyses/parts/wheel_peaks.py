@@ -13,6 +13,7 @@ from typing import Optional
 import numpy as np
 
 from ...arrays import Array
+from ...case.observed import dof_of
 from ...post.blade_peaks import blade_tables, whitehead
 from ...post.mode_curve import ModeCurve
 from ...post.response_peaks import Peak, distance
@@ -61,7 +62,7 @@ def _line(row: Mapping[str, float]) -> str:
 def blade_amplitudes(excitation: Excitation, writer: AnalysisWriter) -> Array:
     """Fundamental amplitudes (points, N) [m] of the observed dof in all sectors (writing rank)."""
     labels = excitation.harmonics.labels
-    dofs = excitation.context.case.places(excitation.analysis.observe)
+    dofs = excitation.context.case.places(dof_of(excitation.analysis.observe))
     stored = writer.group["coefficients"][:, dofs[0] : dofs[-1] + 1 : dofs[1] - dofs[0], :]
     return np.asarray(np.hypot(stored[:, :, labels.index("1c")], stored[:, :, labels.index("1s")]))
 

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ...arrays import Array, Complex
+from ...case.observed import dof_of
 from ...columns import Column
 from ...cyclic.engine_order import folded
 from ...cyclic.wheel_shape import WheelShape as Shape
@@ -118,7 +119,7 @@ def _sector_amplitudes(
     context: AnalysisContext[ModeAnalysis], writer: AnalysisWriter, points: npt.NDArray[np.intp]
 ) -> Complex:
     """Of the observed dof at some points, (points, N), from the coefficients written."""
-    places = context.case.places(context.analysis.normalise)
+    places = context.case.places(dof_of(context.analysis.normalise))
     labels = [text.decode() for text in writer.group["harmonic"][()]]
     kept = [writer.group["coefficients"][int(point)][places] for point in points]
     return np.array([complex_amplitudes(labels, Q)[1] for Q in kept])

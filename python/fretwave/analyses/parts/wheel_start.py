@@ -14,11 +14,14 @@ import scipy.sparse as sp
 from ...arrays import Complex
 from ...case.analysis import AnalysisSection
 from ...case.harmonic import HarmonicSection, nodal_diameter
+from ...case.observed import dof_of
 from .asymptotes import omega_most_alike, other_asymptote
 from .context import AnalysisContext
+from .observed import observed_by
 from .rest import rest_state, start_mode
 
 if TYPE_CHECKING:
+    from ...hb.problems import Observed
     from ...model.modes import LinearMode
     from ...model.rest import Rest
     from ..mode import ModeAnalysis
@@ -41,7 +44,7 @@ class Start:
     rest : Rest or None
     asymptotes : dict
         As `other_asymptote` gives them.
-    dof : int
+    dof : int, (n_dof,), or LinearMode
         Normalised.
     avoid : (N n_dof,) complex, optional
         The other mode of a double one (`fretwave.NonlinearMode`).
@@ -54,7 +57,7 @@ class Start:
     mode: LinearMode
     rest: Optional[Rest]
     asymptotes: dict[str, float]
-    dof: int
+    dof: Observed
     avoid: Optional[Complex] = None
     tuned: Optional[LinearMode] = None
     attributes: dict[str, Any] = field(default_factory=dict)
@@ -66,7 +69,8 @@ def start_of(context: AnalysisContext[ModeAnalysis]) -> Start:
         return _on_wheel(context)
     analysis = context.analysis
     stuck, rest = start_mode(context, analysis.linear_mode, or_free=True)
-    return Start(stuck, rest, other_asymptote(context, stuck), context.case.dof(analysis.normalise))
+    observed = observed_by(context, analysis.normalise, stuck)
+    return Start(stuck, rest, other_asymptote(context, stuck), observed)
 
 
 def _on_wheel(context: AnalysisContext[ModeAnalysis]) -> Start:
@@ -88,7 +92,7 @@ def _on_wheel(context: AnalysisContext[ModeAnalysis]) -> Start:
     else:
         sector = analysis.sector or 0
         mode, avoid = _wave(context, tuned, sector)
-    dof = context.case.dof(analysis.normalise, sector)
+    dof = context.case.dof(dof_of(analysis.normalise), sector)
     attributes = {
         "normalise": context.case.dofs[dof],
         "sectors": wheel.sectors,
@@ -123,7 +127,7 @@ def _tuned(context: AnalysisContext[ModeAnalysis]) -> tuple[LinearMode, dict[str
 def tuned_amplitude(context: AnalysisContext[ModeAnalysis], tuned: LinearMode) -> float:
     """Of the normalised dof in each sector of the wheel in the tuned travelling wave of unit modal mass."""
     analysis = context.analysis
-    dof = context.tuned.dof(analysis.normalise)
+    dof = context.tuned.dof(dof_of(analysis.normalise))
     return float(abs(tuned.shape[dof] + 1j * tuned.imaginary[dof]) / np.sqrt(context.wheel.sectors))
 
 
@@ -156,7 +160,7 @@ def _wave(
     wheel, diameters = context.wheel, nodal_diameter(analysis)
     if analysis.wave == "travelling":
         return travelling_wave(tuned, diameters, wheel.sectors)
-    return standing_wave(tuned, diameters, wheel.sectors, context.tuned.dof(analysis.normalise), sector)
+    return standing_wave(tuned, diameters, wheel.sectors, context.tuned.dof(dof_of(analysis.normalise)), sector)
 
 
 def uneven_samples(samples: int, sectors: int, diameters: int) -> Optional[str]:
@@ -181,7 +185,7 @@ def uneven_samples(samples: int, sectors: int, diameters: int) -> Optional[str]:
 def _largest(context: AnalysisContext[ModeAnalysis], mode: LinearMode) -> int:
     """Sector in which the normalised dof moves most."""
     analysis = context.analysis
-    dof = context.tuned.dof(analysis.normalise)
+    dof = context.tuned.dof(dof_of(analysis.normalise))
     return int(np.argmax(np.abs(context.wheel.by_sector(mode.shape)[:, dof])))
 
 

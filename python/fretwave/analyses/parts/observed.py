@@ -1,0 +1,83 @@
+"""What an analysis normalises by or observes, on its model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Optional, Union
+
+import numpy as np
+
+from ...arrays import Array
+from ...case.analysis import AnalysisSection
+from ...case.harmonic import HarmonicSection
+from ...case.observed import ObservedTable, label_of, unit_of
+from ...columns import Column, columns_named, over
+from ...results.reader import ROW
+from ...results.results import AnalysisWriter
+from .context import AnalysisContext
+from .rest import stuck_or_free
+
+if TYPE_CHECKING:
+    from ...case.load import Case
+    from ...hb.problems import Observed
+    from ...model.model import Model
+    from ...model.modes import LinearMode
+
+
+def observed_by(
+    context: AnalysisContext[HarmonicSection], given: Union[str, ObservedTable], start: LinearMode, sector: int = 0
+) -> Observed:
+    """As the problems of harmonic balance take it. Collective.
+
+    Parameters
+    ----------
+    start : the linear mode of the analysis, whose contact is as at rest
+    sector : of a wheel
+    """
+    case = context.case
+    if isinstance(given, str):
+        return case.dof(given, sector)
+    if given.mode is None:
+        return row_on(case, given)
+    return start if given.mode == context.analysis.linear_mode else stuck_or_free(context, given.mode)
+
+
+def row_on(case: Case, given: ObservedTable) -> Array:
+    """Weights (n_dof,) of dofs."""
+    entries = [(case.dof(dof), weight) for dof, weight in zip(given.dofs or (), given.weights or ())]
+    return _spread(entries, len(case.dofs))
+
+
+def dense(model: Model, observed: Observed) -> Union[int, Array]:
+    """A dof's number, or weights (n_dof,). Collective."""
+    from ...hb.problems import row_of
+
+    return observed if isinstance(observed, int) else _spread(row_of(model, observed), model.n_dof)
+
+
+def _spread(row: Sequence[tuple[int, float]], n_dof: int) -> Array:
+    weights = np.zeros(n_dof)
+    for dof, weight in row:
+        weights[dof] = weight
+    return weights
+
+
+def named(columns: Sequence[str], given: Union[str, ObservedTable]) -> list[Column]:
+    """Columns whose amplitude is what the analysis looks at."""
+    known = columns_named(columns)
+    return known if isinstance(given, str) else over(known, unit_of(given), label_of(given))
+
+
+def keep_row(
+    context: AnalysisContext[AnalysisSection],
+    writer: AnalysisWriter,
+    given: Union[str, ObservedTable],
+    row: Optional[Sequence[tuple[int, float]]],
+) -> None:
+    """Keep with the results the weights (n_dof,) of what is no dof, for the pictures."""
+    if isinstance(given, str) or row is None:
+        return
+    unit = "1" if given.mode is None else "sqrt(kg)"
+    writer.dataset(
+        ROW, _spread(row, len(context.case.dofs)), units=unit, long_name="weights of the dofs in the amplitude"
+    )

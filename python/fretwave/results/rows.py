@@ -1,0 +1,219 @@
+"""A journal as a group of results.h5: what it holds, and the datasets made of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..columns import Column, Value
+from ..errors import InputError
+from ..files.dimensions import name_dimensions, put_array
+from ..post.contact_history import MOTION
+from ..texts import display
+from .field import Field
+from .journal import Record, read_records
+
+if TYPE_CHECKING:
+    import h5py
+    import numpy.typing as npt
+
+#: Rows of one HDF5 chunk: a branch of usual length allocates no chunk while it grows.
+CHUNK_ROWS = 256
+CHUNK_BYTES = 1 << 20
+
+
+@dataclass
+class Rows:
+    """What a journal holds: its layout and where its rows and arrays are.
+
+    Attributes
+    ----------
+    layout : Record
+    places : list of (place in the file, place behind it, number of the row or -1 for an array)
+    reported : list of int
+        Rows with the contacts' motion.
+    """
+
+    path: Path
+    layout: Record
+    places: list[tuple[int, int, int]]
+    reported: list[int]
+    size: int
+
+    @classmethod
+    def of(cls, path: Path) -> Rows:
+        """Read a journal through.
+
+        Raises
+        ------
+        InputError
+            It is damaged in its middle, or has not even its first row, which is there from its beginning.
+        """
+        layout: Record | None = None
+        places: list[tuple[int, int, int]] = []
+        reported, row = [], 0
+        for place, record in read_records(path):
+            if layout is None:
+                layout = record
+                continue
+            is_row = record.kind == "row"
+            places.append((place, place + record.length, row if is_row else -1))
+            if is_row and any(name.startswith("motion/") for name in record.arrays):
+                reported.append(row)
+            row += is_row
+        if layout is None or not row:
+            size, fix = f"{path.stat().st_size} bytes", "restore it from a copy, or run the case anew"
+            raise InputError("the journal of an analysis is damaged", display(path), size, "a row at least", fix)
+        return cls(path, layout, places, reported, places[-1][1])
+
+    def __len__(self) -> int:
+        return sum(row >= 0 for _, _, row in self.places)
+
+    @property
+    def token(self) -> str:
+        return str(self.layout.values["token"])
+
+    @property
+    def columns(self) -> list[Column]:
+        return [Column(*given) for given in self.layout.values["columns"]]
+
+    @property
+    def fields(self) -> dict[str, Field]:
+        return {name: Field.of(described) for name, described in self.layout.values["fields"].items()}
+
+    def first(self, count: int) -> Rows:
+        """Only so many rows, and the arrays before the next one."""
+        end = next((k for k, (_, _, row) in enumerate(self.places) if row == count), len(self.places))
+        places = self.places[:end]
+        return replace(self, places=places, reported=[r for r in self.reported if r < count], size=places[-1][1])
+
+    def records(self) -> Iterator[tuple[int, Record]]:
+        """Number of the row, -1 for an array, and record of each."""
+        ends = {place: row for place, _, row in self.places}
+        for place, record in read_records(self.path):
+            if place in ends:
+                yield ends[place], record
+
+    def values(self) -> Iterator[dict[str, Value]]:
+        """Of each row, by column."""
+        return (record.values for row, record in self.records() if row >= 0)
+
+
+def attributes_of(given: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Attributes as plain values and as arrays."""
+    plain, arrays = {}, {}
+    for name, value in given.items():
+        value = value.item() if isinstance(value, np.generic) else value
+        if isinstance(value, (str, bool, int, float)):
+            plain[name] = value
+        else:
+            array = np.asarray(value)
+            arrays[name] = np.char.encode(array) if array.dtype.kind == "U" else array
+    return plain, arrays
+
+
+def build_group(file: h5py.File, name: str, rows: Rows) -> None:
+    """Make the group of an analysis from its journal."""
+    told_of, arrays = rows.layout.values, rows.layout.arrays
+    file.attrs.update(told_of["file_attributes"])
+    group = file.create_group(name)
+    group.attrs.update(told_of["attributes"])
+    group.attrs.update({key[len("attribute/") :]: a for key, a in arrays.items() if key.startswith("attribute/")})
+    _create_points(group, rows)
+    _create_coefficients(group, rows)
+    for key, kept in rows.fields.items():
+        _create_field(group, rows, key, kept)
+    for key, values in arrays.items():
+        if key.startswith("array/"):
+            put_array(group, key[len("array/") :], values, {"units": "m"})
+    _fill(group, rows)
+
+
+def _growing(
+    group: h5py.Group,
+    name: str,
+    rows: int,
+    shape: tuple[int, ...],
+    most: int,
+    dtype: str = "f8",
+    missing: float | None = None,
+) -> h5py.Dataset:
+    """A dataset (rows, *shape) that other programs may add to."""
+    size = 8 * int(np.prod(shape, dtype=np.int64))
+    chunk = (max(1, min(most, CHUNK_BYTES // max(size, 1))), *(max(1, n) for n in shape))
+    return group.create_dataset(name, (rows, *shape), dtype, maxshape=(None, *shape), chunks=chunk, fillvalue=missing)
+
+
+def _create_points(group: h5py.Group, rows: Rows) -> None:
+    points, columns = group.create_group("points"), rows.columns
+    table = list(rows.values())
+    first = columns[0]
+    scale = _growing(group, first.name, len(rows), (), CHUNK_ROWS, first.dtype)
+    scale[...] = np.array([first.stored(row[first.name]) for row in table], first.dtype)
+    scale.attrs.update({"units": first.unit, "long_name": first.long_name})
+    scale.make_scale(first.name)
+    for column in columns:
+        data = _growing(points, column.name, len(rows), (), CHUNK_ROWS, column.dtype)
+        data[...] = np.array([column.stored(row[column.name]) for row in table], column.dtype)
+        data.attrs.update({"units": column.unit, "long_name": column.long_name})
+        if column is not first:
+            name_dimensions(points, data, [first.name])
+    # a column of the dimension's name is its coordinate, and a scale
+    points[first.name].make_scale(first.name)
+
+
+def _create_coefficients(group: h5py.Group, rows: Rows) -> None:
+    dofs, labels = rows.layout.values["dofs"], rows.layout.values["labels"]
+    if not labels:
+        return
+    data = _growing(group, "coefficients", len(rows), (len(dofs), len(labels)), CHUNK_ROWS)
+    data.attrs.update({"units": "m", "long_name": "harmonic coefficients of the displacement"})
+    _name_axes(group, {"dof": dofs, "harmonic": labels})
+    name_dimensions(group, data, [rows.columns[0].name, "dof", "harmonic"])
+
+
+def _create_field(group: h5py.Group, rows: Rows, name: str, kept: Field) -> None:
+    data = group.create_dataset(name, (len(rows), *kept.shape), "f8")
+    data.attrs.update({"units": kept.unit, "long_name": kept.long_name, **kept.attributes})
+    _name_axes(group, kept.axes)
+    name_dimensions(group, data, [rows.columns[0].name, *kept.axes])
+
+
+def _name_axes(group: h5py.Group, axes: Mapping[str, Sequence[str]]) -> None:
+    """Coordinates of axes that have names."""
+    from h5py import string_dtype
+
+    for name, texts in axes.items():
+        if name not in group:
+            group.create_dataset(name, data=list(texts), dtype=string_dtype())
+
+
+def _fill(group: h5py.Group, rows: Rows) -> None:
+    """Arrays of the rows, one after the other."""
+    group.create_dataset("reported", data=np.array(rows.reported, "i8"), maxshape=(None,), chunks=(CHUNK_ROWS,))
+    group["reported"].make_scale("reported")
+    for row, record in rows.records():
+        if row < 0:
+            put_array(group, record.values["name"], record.arrays["values"], record.values["attributes"])
+            continue
+        for name, values in record.arrays.items():
+            if name.startswith("motion/"):
+                _, contact, key = name.split("/")
+                _put_motion(group, rows, contact, key, values, rows.reported.index(row))
+            else:
+                group[name.removeprefix("field/")][row] = values
+
+
+def _put_motion(group: h5py.Group, rows: Rows, contact: str, key: str, values: npt.NDArray[Any], place: int) -> None:
+    holder = group.require_group(f"contact_{contact}")
+    if key not in holder:
+        unit, long_name, dtype, missing = MOTION[key]
+        data = _growing(holder, key, len(rows.reported), values.shape, 1, dtype, missing)
+        data.attrs.update({"units": unit, "long_name": long_name})
+        axes = ["reported", "sample", "component", "pair"] if values.ndim == 3 else ["reported", "sample", "pair"]
+        name_dimensions(holder, data, axes)
+    holder[key][place] = values

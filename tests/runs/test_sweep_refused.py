@@ -1,0 +1,87 @@
+"""Sweeps that cannot be: named with their place before anything runs, by the command line and in a case."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from models.swept_case import CASE, OVER_LINE, fretwave
+
+from fretwave.analyses.sweep import SweepAnalysis
+from fretwave.case.load import load_case
+from fretwave.errors import CaseErrors, InputError
+from fretwave.post.grid import Plan
+from fretwave.run.sweep_plan import plan_of
+
+pytestmark = pytest.mark.ranks(1)
+
+
+@pytest.fixture(scope="module")
+def case(tmp_path_factory) -> Path:
+    path = tmp_path_factory.mktemp("slider") / "slider.toml"
+    path.write_text(CASE)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--over", "contact.slider.friction_limt=1,2"], "--over contact.slider.friction_limt=1"),
+        (["--over", "contact.slider.friction_limit=1,-2"], "--over contact.slider.friction_limit=-2"),
+        (["--over", "mode.samples=5,64"], "write `samples = 6`"),
+        (["--over", "mod.samples=64"], "did you mean `mode.samples`?"),
+        (["--over", "mode.samples=64,64"], "has the value 64 twice"),
+        (["--over", "mode.samples="], "gives no array of values"),
+        (["--over", "mode.samples"], "is not KEY=value"),
+        (["--over", "mode.samples=64", "--over", "mode.samples=128"], "a second time"),
+        (["--over", "mode.samples=64", "--groups", "5"], "so many groups"),
+        (["--over", "mode.samples=64", "--only", "limits"], "there is no analysis 'limits'"),
+        (["--over", "mode.harmonics=1,40"], "with harmonics = 40: mode.samples is too small"),
+        ([], "--over KEY=v1,v2"),
+    ],
+)
+def test_wrong_command_lines_run_nothing(case: Path, tmp_path: Path, capsys, arguments, said) -> None:
+    shorter = ["--set", "mode.samples=64"] if "harmonics=1,40" in str(arguments) else []
+    assert fretwave("sweep", case, *arguments, *shorter, "--out", tmp_path / "out") == 2
+    assert said in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        (("friction_limit = [0.2, 1.0, 5.0]", "friction_limt = [0.2]"), f"slider.toml:{OVER_LINE} (limits.over)"),
+        (("overrides.mode.amplitude", "overrides.mode.ampltude"), f"slider.toml:{OVER_LINE + 1} (limits.overrides)"),
+        (("[0.2, 1.0, 5.0]", "0.2"), "gives no array of values"),
+        (("[0.2, 1.0, 5.0]", "[]"), "gives no array of values"),
+        (('of = "mode"', 'of = "limits"'), "limits.of is no analysis to sweep"),
+        (('of = "mode"', 'of = "mod"'), "did you mean `mode`?"),
+        (('of = "mode"', 'of = "mode"\ndampers = [{ dof = "x", c = 1.0 }]'), "give them to 'mode'"),
+    ],
+)
+def test_wrong_sweeps_of_a_case(tmp_path: Path, capsys, wrong, said) -> None:
+    path = tmp_path / "slider.toml"
+    path.write_text(CASE.replace(*wrong))
+    for command in (["check", path], ["run", path, "--out", tmp_path / "out"]):
+        assert fretwave(*command) == 2
+        assert said in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_plans() -> None:
+    plan = plan_of(["a.b=1, 2", 'c="x",[1.0, 2.0]', "d=y, true"])
+    assert (len(plan), plan.shape) == (8, (2, 2, 2))
+    assert list(plan.values())[3] == {"a.b": 1, "c": [1.0, 2.0], "d": True}
+    assert plan.overrides()[4] == ["a.b=2", 'c="x"', 'd="y"']
+    assert plan.labels()[4] == 'b = 2, c = "x", d = "y"'
+    assert Plan({"a.b": [1], "c.b": [2]}).labels() == ["a.b = 1, c.b = 2"]
+    assert SweepAnalysis(name="s", type="sweep", of="m", over={"a.b": [1], "c": {"d": [2]}}).plan().keys == ["a.b", "c.d"]
+    assert len(Plan({"a": [1, 2, 3], "b": [True, False]})) == 6
+
+
+def test_problems_of_values_can_be_sent_between_ranks(case: Path) -> None:
+    import pickle
+
+    with pytest.raises(CaseErrors) as caught:
+        load_case(case, ["mode.samples=5"])
+    assert isinstance(pickle.loads(pickle.dumps(caught.value)), InputError)
