@@ -44,8 +44,7 @@ def coulomb_3d(u, p, rest):
     p : parameters, (lanes,) each
     rest : (2, lanes) sliders in the static state; of the periods that close without slip the one nearest to it counts
     """
-    elastic = p["normal_load"] + p["normal_stiffness"] * (u[:, 0] - p["gap"])
-    normal = np.where(elastic.real > 0, elastic, 0.0)
+    normal = p["normal_load"] + p["normal_stiffness"] * (u[:, 0] - p["gap"])  # below zero where it is open
     size = abs(u[:, 1:].real).max(axis=(0, 1)) + abs(rest).max(axis=0) + TINY
     pace = abs(u.imag).max() + TINY
     w = rest + 0j * u[0, 1:]
@@ -56,29 +55,65 @@ def coulomb_3d(u, p, rest):
             break
     left = ~slipped & np.any(w.real != rest, axis=0)
     for lane in np.flatnonzero(left):
-        radius = p["friction_coefficient"][lane] / p["tangential_stiffness"][lane] * normal[:, lane]
+        radius = p["friction_coefficient"][lane] / p["tangential_stiffness"][lane] * _positive(normal[:, lane])
         w[:, lane] = nearest_common(u[:, 1:, lane], radius, rest[:, lane])
     f = np.empty_like(u)
     _march(u, normal, w, p, f)
     return f
 
 
+def _positive(x):
+    return np.where(x.real > 0, x, 0.0)
+
+
+def _length(d):
+    square = d[0] * d[0] + d[1] * d[1]
+    return np.sqrt(np.where(square.real > 0, square, TINY))
+
+
 def _march(u, normal, w, p, f=None):
-    """One period of sliders w (2, lanes): their end, and which of them slipped by more than rounding."""
+    """One period of sliders w (2, lanes), which the last sample's disc pulls in first: their end, and which of them
+    slipped by more than rounding. Between samples u and the normal force go straight, from where it closes."""
     kt = p["tangential_stiffness"]
     reach = p["friction_coefficient"] / kt
     slipped = np.zeros(u.shape[2], dtype=bool)
+    radius, d = reach * _positive(normal[-1]), u[-1, 1:] - w
+    w = np.where(_length(d).real > radius.real, u[-1, 1:] - d * (radius / _length(d)), w)
     for t in range(len(u)):
-        radius, d = reach * normal[t], u[t, 1:] - w
-        square = d[0] * d[0] + d[1] * d[1]
-        outside = (square.real > radius.real**2) | (radius.real == 0)
-        length = np.sqrt(np.where(square.real > 0, square, 1.0))
-        kept = np.where(outside, d * (radius / length), d)
-        w = np.where(outside, w + d - kept, w)
-        slipped |= (radius.real == 0) | (length.real > radius.real * (1 + 1e-12)) & outside
+        was, now, R0, R1 = normal[t - 1], normal[t], radius, reach * _positive(normal[t])
+        radius, opened, lands = R1, now.real <= 0, (was.real <= 0) & (now.real > 0)
+        share = np.where(lands, now / np.where(lands, now - was, 1.0), 1.0)
+        v, d = share * (u[t, 1:] - u[t - 1, 1:]), np.where(lands, 0.0, u[t - 1, 1:] - w)
+        sticks = (_length(d + v).real <= R1.real) & (R1.real > 0)
+        kept = np.where(opened, 0.0, np.where(sticks, d + v, _pulled(d, v, R0, R1, lands)))
+        w = np.where(sticks & ~lands, w, u[t, 1:] - kept)
+        slipped |= (R1.real == 0) | ~sticks & (_length(d + v).real > R1.real * (1 + 1e-12))
         if f is not None:
-            f[t, 0], f[t, 1:] = normal[t], kt * kept
+            f[t, 0], f[t, 1:] = _positive(now), kt * kept
     return w, slipped
+
+
+def _pulled(d, v, R0, R1, lands):
+    """The arm d = u - w at the end of a step in which it slips: u goes by v, the radius of its disc from R0 to R1.
+
+    It sticks until |d + s v| = R0 + s (R1 - R0); from there tan(phi / 2) falls by exp(-x), phi the angle from v to
+    the arm, x the way over the mean radius, and sinh x is summed to its third term.
+    """
+    rise, way = R1 - R0, _length(v)
+    a, b, c = way * way - rise * rise, d[0] * v[0] + d[1] * v[1] - R0 * rise, d[0] * d[0] + d[1] * d[1] - R0 * R0
+    square = b * b - a * c
+    root = np.sqrt(np.where(square.real > 0, square, 0.0))
+    early = b.real > 0
+    s = np.where(early, -c, root - b) / np.where(early, b + root, np.where(a.real > 0, a, 1.0))
+    s = np.where(lands | (s.real > 1), 1.0, np.where(s.real > 0, s, 0.0))
+    at = d + s * v
+    r = _length(at)
+    x = 2 * (1 - s) * way / np.where((R1 + r).real > 0, R1 + r, 1.0)
+    sinh = x + x**3 / 6 + x**5 / 120
+    e, n = v / way, at / r
+    half = (e[0] * n[1] - e[1] * n[0]) / (1 + e[0] * n[0] + e[1] * n[1]) / (sinh + np.sqrt(1 + sinh * sinh))
+    turned = (1 - half * half) * e + 2 * half * np.stack([-e[1], e[0]])
+    return R1 * np.where(way.real > TINY**0.5, turned / (1 + half * half), n)
 
 
 def nearest_common(centres, radii, rest):

@@ -32,11 +32,11 @@ PairConstants Coulomb3d<Coupled>::constants(int first) const {
           p_.normal_load.data() + first, p_.gap.data() + first};
 }
 
-/// One step of the march.
+/// A march of one sample.
 template <bool Coupled>
 void Coulomb3d<Coupled>::set_rest(double const* u) {
   const int n = pairs();
-  std::vector<double> f(3 * size_t(n)), record(record_arrays * size_t(n));
+  std::vector<double> f(3 * size_t(n)), record(record_arrays<Coupled> * size_t(n));
   march<Coupled>(constants(0), 1, n, u, slider_.data(), f.data(), record.data());
   for (int i = 0; i < n; ++i) closed_[i] = f[i] > 0;
 }
@@ -59,11 +59,13 @@ void Coulomb3d<Coupled>::force(Motion const& motion, double* f, Record& record) 
   std::vector<double> w(2 * size_t(n));
   for (int i = 0; i < 2 * n; ++i) w[i] = slider_[(i < n ? 0 : pairs() - n) + motion.first + i];
   const std::vector<double> rest = w;
-  record.march.resize(size_t(record_arrays) * samples * n);
+  record.march.resize(size_t(record_arrays<Coupled>) * samples * n);
   record.start.assign(n, {}), record.unclosed = 0;
   march<Coupled>(p, samples, n, motion.u, w.data(), f, record.march.data());
   std::vector<double> left(n);
   left_rest<Coupled>(samples, n, record.march.data(), left.data());
+  if constexpr (Coupled)  // pulled in as the period began
+    for (int i = 0; i < n; ++i) left[i] = w[i] != rest[i] || w[n + i] != rest[n + i] ? 1.0 : left[i];
   if (std::ranges::count(left, 0.0) == n) return;
   if constexpr (Coupled)
     close(motion, rest, left, f, w, record);
@@ -79,7 +81,7 @@ template <bool Coupled>
 void Coulomb3d<Coupled>::last_slip(Motion const& motion, Record& record) const {
   const int n = motion.pairs;
   double const *r = record.march.data(), *kn = p_.normal_stiffness.data() + motion.first;
-  for (int t = 0; t < motion.samples; ++t, r += record_arrays * n)
+  for (int t = 0; t < motion.samples; ++t, r += record_arrays<Coupled> * n)
     for (int i = 0; i < n; ++i)
       for (int c = 0; c < 2; ++c) {
         const double code = r[(c + 1) * n + i];
@@ -173,6 +175,17 @@ void Coulomb3d<Coupled>::pair_product(Motion const& motion, Record const& record
   linearised(motion, record, pair, columns, du, df);
 }
 
+/// Share of the step between two samples over which a pair is open. The uncoupled law's sliders are free
+/// until the sample that finds them closed.
+template <bool Coupled>
+double Coulomb3d<Coupled>::flight(int pair, double before, double now) const {
+  if constexpr (!Coupled) return 0;
+  const double rest = p_.normal_load[pair] - p_.normal_stiffness[pair] * p_.gap[pair];
+  const double was = rest + p_.normal_stiffness[pair] * before, is = rest + p_.normal_stiffness[pair] * now;
+  if (was <= 0 && is <= 0) return 1;
+  return was <= 0 ? was / (was - is) : is <= 0 ? is / (is - was) : 0;
+}
+
 template <bool Coupled>
 void Coulomb3d<Coupled>::diagnose(Motion const& motion, double const* f, Diagnosis& out) const {
   const int n = motion.pairs, samples = motion.samples;
@@ -182,10 +195,11 @@ void Coulomb3d<Coupled>::diagnose(Motion const& motion, double const* f, Diagnos
     double const *now = f + size_t(t) * 3 * n, *then = f + size_t(t ? t - 1 : samples - 1) * 3 * n;
     for (int i = 0; i < n; ++i) {
       const double kt = p_.tangential_stiffness[i], limit = p_.friction_coefficient[i] * now[i];
+      const double held = 1 - flight(i, before[i], u[i]);
       double moved[2], path = 0, size = 0;
       for (int c = 0; c < 2; ++c) {
         const size_t k = size_t(c + 1) * n + i;
-        moved[c] = u[k] - before[k] - (now[k] - then[k]) / kt;  // of the slider w = u - T/kt
+        moved[c] = held * (u[k] - before[k]) - (now[k] - then[k]) / kt;  // of the slider w = u - T/kt
         path += moved[c] * moved[c];
         size = Coupled ? std::hypot(size, now[k]) : std::max(size, std::abs(now[k]));
       }
@@ -200,10 +214,11 @@ void Coulomb3d<Coupled>::diagnose(Motion const& motion, double const* f, Diagnos
       const double size_u = std::hypot(u[n + i], u[2 * n + i]) + limit / kt;
       if (!out.archard.empty() && (open || slips) && std::sqrt(path) > 1e-12 * size_u)
         out.archard[i] += (now[i] + then[i]) / 2 * std::sqrt(path);
-      if (!slips) continue;
+      if (Coupled ? !slips && !(open && then[i] > 0) : !slips) continue;
       out.slip_path[i] += std::sqrt(path);
       // never negative: the slider moves along the force, by rounding only where it just touches the limit
-      out.work[i] += std::max(0.0, now[n + i] * moved[0] + now[2 * n + i] * moved[1]);
+      out.work[i] += Coupled ? p_.friction_coefficient[i] * (now[i] + then[i]) / 2 * std::sqrt(path)
+                             : std::max(0.0, now[n + i] * moved[0] + now[2 * n + i] * moved[1]);
     }
   }
 }
@@ -216,7 +231,7 @@ std::uint64_t Coulomb3d<Coupled>::piece(Motion const& motion, Record const& reco
   if (std::ranges::any_of(p_.friction_coefficient, [](double mu) { return mu > 0; })) return 0;
   std::vector<double> states(size_t(motion.samples) * n);
   double const* r = record.march.data();
-  for (int t = 0; t < motion.samples; ++t, r += record_arrays * n)
+  for (int t = 0; t < motion.samples; ++t, r += record_arrays<Coupled> * n)
     for (int i = 0; i < n; ++i) states[size_t(t) * n + i] = Coupled ? r[i] >= 0 : r[i];
   return number_of(states, motion.first);
 }

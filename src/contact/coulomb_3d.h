@@ -42,6 +42,7 @@ class Coulomb3d : public Law {
 
  private:
   PairConstants constants(int first) const;
+  double flight(int pair, double before, double now) const;
   void last_slip(Motion const&, Record&) const;
   void close(Motion const&, std::vector<double> const& rest, std::vector<double> const& left, double const* f,
              std::vector<double>& w, Record&) const;

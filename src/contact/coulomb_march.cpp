@@ -3,23 +3,18 @@
 #include <cmath>
 #include <limits>
 
+#include "contact/tractrix.h"
 #include "contact/vectorise.h"
 
 namespace fretwave::contact {
 
 namespace {
 
-/// A projection onto a disc of radius R about d = u - w: d shrinks by s = R / |d|.
-struct Projection {
-  double s, e1, e2;
-};
-
-FRETWAVE_INLINE Projection project(double d1, double d2, double R) {
-  const double size2 = d1 * d1 + d2 * d2;
-  const double inverse = 1 / std::sqrt(size2 + std::numeric_limits<double>::min());  // d = 0 too
-  const bool stick = size2 <= R * R && R > 0;  // without friction nothing sticks
-  const double along = stick || R == 0 ? 0.0 : inverse;
-  return {stick ? 1.0 : R * inverse, d1 * along, d2 * along};
+/// Pulls w onto the disc of radius R about u.
+FRETWAVE_INLINE void pull_in(double u1, double u2, double R, double& w1, double& w2) {
+  const double d1 = u1 - w1, d2 = u2 - w2, size2 = d1 * d1 + d2 * d2;
+  const double s = size2 <= R * R ? 1.0 : R / std::sqrt(size2);
+  w1 += d1 - s * d1, w2 += d2 - s * d2;
 }
 
 /// Clipped d, and the uncoupled law's record.
@@ -33,45 +28,109 @@ FRETWAVE_INLINE Clip clip(double d, double R) {
   return {stick ? d : std::copysign(R, d), stick ? 2.0 : sign};
 }
 
-template <bool Coupled>
-FRETWAVE_INLINE void march_loop(PairConstants const& p, int samples, int n, double const* u, double* w,
+FRETWAVE_INLINE void coupled_loop(PairConstants const& p, int samples, int n, double const* u, double* w,
+                                  double* f, double* record) {
+  double const *kn = p.kn, *kt = p.kt, *reach = p.reach, *load = p.load, *gap = p.gap;
+  double const* before = u + size_t(samples - 1) * 3 * n;
+  constexpr double tiny = std::numeric_limits<double>::min();
+#pragma omp simd
+  for (int i = 0; i < n; ++i) {
+    const double elastic = load[i] + kn[i] * (before[i] - gap[i]);
+    pull_in(before[n + i], before[2 * n + i], elastic > 0 ? reach[i] * elastic : 0.0, w[i], w[n + i]);
+  }
+  for (int t = 0; t < samples; ++t, before = u, u += 3 * n, f += 3 * n, record += record_arrays<true> * n)
+#pragma omp simd
+    for (int i = 0; i < n; ++i) {
+      const double was = load[i] + kn[i] * (before[i] - gap[i]), is = load[i] + kn[i] * (u[i] - gap[i]);
+      const double u1 = u[n + i], u2 = u[2 * n + i], w1 = w[i], w2 = w[n + i];
+      const double all1 = u1 - before[n + i], all2 = u2 - before[2 * n + i];
+      const double arm1 = before[n + i] - w1, arm2 = before[2 * n + i] - w2;
+      // of the step its closed part; what was open has its slider at u
+      const bool open = is <= 0, lands = (was <= 0) & !open;
+      const double normal = open ? 0.0 : is, below = was < 0 ? was : 0.0;
+      const double landing = lands ? 1.0 : 0.0, held = 1 - landing, per_rise = 1 / (normal - below + tiny);
+      const double share = held + landing * (normal * per_rise);
+      const double R0 = reach[i] * (was > 0 ? was : 0.0), R1 = reach[i] * normal;
+      const double v1 = share * all1, v2 = share * all2, far1 = u1 - w1, far2 = u2 - w2;
+      const double d1 = lands ? v1 : far1, d2 = lands ? v2 : far2;
+      const bool stick = (d1 * d1 + d2 * d2 <= R1 * R1) & (R1 > 0), still = stick & !lands;
+      const Slip to = slip(held * arm1, held * arm2, v1, v2, R0, R1, landing);
+      const double slid1 = R1 * to.m1, slid2 = R1 * to.m2;
+      const double kept1 = open ? 0.0 : stick ? d1 : slid1, kept2 = open ? 0.0 : stick ? d2 : slid2;
+      const double moved1 = u1 - kept1, moved2 = u2 - kept2;
+      w[i] = still ? w1 : moved1, w[n + i] = still ? w2 : moved2;
+      f[i] = normal, f[n + i] = kt[i] * kept1, f[2 * n + i] = kt[i] * kept2;
+
+      const bool rests = open | stick, touches = stick & lands;  // d = share (u - u') there
+      const double slope = rests ? 0.0 : reach[i] * kn[i], rate = touches ? kn[i] * per_rise : 0.0;
+      record[i] = open ? -1.0 : stick ? share : 0.0;
+      record[n + i] = touches ? all2 : rests ? 0.0 : to.m1;
+      record[2 * n + i] = touches ? -all1 : rests ? 0.0 : to.m2;
+      record[3 * n + i] = rests ? 0.0 : to.A1, record[4 * n + i] = rests ? 0.0 : to.A2;
+      record[5 * n + i] = rests ? 0.0 : share * to.B1, record[6 * n + i] = rests ? 0.0 : share * to.B2;
+      const double r0 = lands | rests ? 0.0 : slope * to.r0, r1 = rests ? 0.0 : slope * to.r1;
+      record[7 * n + i] = share * rate + r0, record[8 * n + i] = (1 - share) * rate + r1;
+    }
+}
+
+FRETWAVE_INLINE void alone_loop(PairConstants const& p, int samples, int n, double const* u, double* w,
                                 double* f, double* record) {
   double const *kn = p.kn, *kt = p.kt, *reach = p.reach, *load = p.load, *gap = p.gap;
-  for (int t = 0; t < samples; ++t, u += 3 * n, f += 3 * n, record += 3 * n)
+  for (int t = 0; t < samples; ++t, u += 3 * n, f += 3 * n, record += record_arrays<false> * n)
 #pragma omp simd
     for (int i = 0; i < n; ++i) {
       const double elastic = load[i] + kn[i] * (u[i] - gap[i]), normal = elastic > 0 ? elastic : 0.0;
       const double R = reach[i] * normal, d1 = u[n + i] - w[i], d2 = u[2 * n + i] - w[n + i];
-      double kept1, kept2;
-      if constexpr (Coupled) {
-        const Projection to = project(d1, d2, R);
-        kept1 = to.s * d1, kept2 = to.s * d2;
-        record[i] = elastic > 0 ? to.s : -1.0, record[n + i] = to.e1, record[2 * n + i] = to.e2;
-      } else {
-        const Clip one = clip(d1, R), two = clip(d2, R);
-        kept1 = one.d, kept2 = two.d;
-        record[i] = elastic > 0 ? 1.0 : 0.0, record[n + i] = one.code, record[2 * n + i] = two.code;
-      }
-      w[i] += d1 - kept1, w[n + i] += d2 - kept2;  // by exactly nothing where it sticks
-      f[i] = normal, f[n + i] = kt[i] * kept1, f[2 * n + i] = kt[i] * kept2;
+      const Clip one = clip(d1, R), two = clip(d2, R);
+      record[i] = elastic > 0 ? 1.0 : 0.0, record[n + i] = one.code, record[2 * n + i] = two.code;
+      w[i] += d1 - one.d, w[n + i] += d2 - two.d;  // by exactly nothing where it sticks
+      f[i] = normal, f[n + i] = kt[i] * one.d, f[2 * n + i] = kt[i] * two.d;
     }
+}
+
+/// What a linearised step takes and gives: the motion now and before, the slider, the tangential force / kt.
+struct Arm {
+  double y1, y2, closed;
+};
+
+FRETWAVE_INLINE Arm coupled_step(double const* r, int pairs, int k, double reach, double kn, double dn0,
+                                 double dn1, double d1, double d2, double v1, double v2) {
+  const double s = r[k], m1 = r[pairs + k], m2 = r[2 * pairs + k], kept = s > 0 ? s : 0.0;
+  const double across = r[3 * pairs + k] * d1 + r[4 * pairs + k] * d2 + r[5 * pairs + k] * v1 +
+                        r[6 * pairs + k] * v2 + r[7 * pairs + k] * dn0 + r[8 * pairs + k] * dn1;
+  const double along = s == 0 ? reach * kn * dn1 : 0.0;
+  return {kept * (d1 + v1) + m1 * along - m2 * across, kept * (d2 + v2) + m2 * along + m1 * across,
+          s < 0 ? 0.0 : 1.0};
+}
+
+/// s of a tangent alone is 1 (stick), else its slip direction counts.
+FRETWAVE_INLINE Arm alone_step(double const* r, int pairs, int k, double reach, double kn, double dn,
+                               double x1, double x2) {
+  const double closed = r[k], one = r[pairs + k], two = r[2 * pairs + k], dR = reach * (closed * kn * dn);
+  return {(one == 2 ? x1 : 0.0) + (one == 2 ? 0.0 : one) * dR,
+          (two == 2 ? x2 : 0.0) + (two == 2 ? 0.0 : two) * dR, closed};
 }
 
 template <bool Coupled, bool OnePair, bool Force>
 FRETWAVE_INLINE void linear_loop(PairConstants const& p, int samples, int pairs, int pair, int n,
                                  double const* record, double const* du, double* dw, double* df) {
-  double const *kn = p.kn, *kt = p.kt, *reach = p.reach;
-  for (int t = 0; t < samples; ++t, du += 3 * n, df += Force ? 3 * n : 0, record += 3 * pairs)
+  double const *kn = p.kn, *kt = p.kt, *reach = p.reach, *before = du + size_t(samples - 1) * 3 * n;
+  for (int t = 0; t < samples;
+       ++t, before = du, du += 3 * n, df += Force ? 3 * n : 0, record += record_arrays<Coupled> * pairs)
 #pragma omp simd
     for (int i = 0; i < n; ++i) {
       const int k = OnePair ? pair : i;
-      const SampleTangent r = sample_tangent<Coupled>(record[k], record[pairs + k], record[2 * pairs + k]);
-      const double dN = r.closed * kn[k] * du[i], dR = reach[k] * dN;
       const double x1 = du[n + i] - dw[i], x2 = du[2 * n + i] - dw[n + i];
-      const double along = Coupled ? r.e1 * x1 + r.e2 * x2 : 0.0;
-      const double y1 = r.s1 * (x1 - r.e1 * along) + r.e1 * dR, y2 = r.s2 * (x2 - r.e2 * along) + r.e2 * dR;
-      dw[i] += x1 - y1, dw[n + i] += x2 - y2;
-      if constexpr (Force) df[i] = dN, df[n + i] = kt[k] * y1, df[2 * n + i] = kt[k] * y2;
+      Arm to;
+      if constexpr (Coupled)
+        to = coupled_step(record, pairs, k, reach[k], kn[k], before[i], du[i], before[n + i] - dw[i],
+                          before[2 * n + i] - dw[n + i], du[n + i] - before[n + i],
+                          du[2 * n + i] - before[2 * n + i]);
+      else
+        to = alone_step(record, pairs, k, reach[k], kn[k], du[i], x1, x2);
+      dw[i] += x1 - to.y1, dw[n + i] += x2 - to.y2;
+      if constexpr (Force)
+        df[i] = to.closed * kn[k] * du[i], df[n + i] = kt[k] * to.y1, df[2 * n + i] = kt[k] * to.y2;
     }
 }
 
@@ -88,12 +147,12 @@ FRETWAVE_INLINE void linear_choice(PairConstants const& p, int samples, int pair
     linear_loop<Coupled, false, false>(p, samples, pairs, pair, n, record, du, dw, df);
 }
 
-/// A sample that sticks is (1, 0, 0) in the coupled record, (1, 2, 2) in the other.
+/// A sample that sticks begins with (1, 0, 0) in the coupled record, with (1, 2, 2) in the other.
 template <bool Coupled>
 FRETWAVE_INLINE void left_loop(int samples, int n, double const* record, double* left) {
   constexpr double stuck = Coupled ? 0 : 2;
   for (int i = 0; i < n; ++i) left[i] = 0;
-  for (int t = 0; t < samples; ++t, record += record_arrays * n)
+  for (int t = 0; t < samples; ++t, record += record_arrays<Coupled> * n)
 #pragma omp simd
     for (int i = 0; i < n; ++i) {
       const bool sticks = record[i] == 1 && record[n + i] == stuck && record[2 * n + i] == stuck;
@@ -111,11 +170,11 @@ FRETWAVE_VECTORISE void left_alone(int samples, int n, double const* record, dou
 }
 FRETWAVE_VECTORISE void march_coupled(PairConstants const& p, int samples, int n, double const* u, double* w,
                                       double* f, double* record) {
-  march_loop<true>(p, samples, n, u, w, f, record);
+  coupled_loop(p, samples, n, u, w, f, record);
 }
 FRETWAVE_VECTORISE void march_alone(PairConstants const& p, int samples, int n, double const* u, double* w,
                                     double* f, double* record) {
-  march_loop<false>(p, samples, n, u, w, f, record);
+  alone_loop(p, samples, n, u, w, f, record);
 }
 FRETWAVE_VECTORISE void linear_coupled(PairConstants const& p, int samples, int pairs, int pair, int n,
                                        double const* record, double const* du, double* dw, double* df) {
@@ -126,17 +185,27 @@ FRETWAVE_VECTORISE void linear_alone(PairConstants const& p, int samples, int pa
   linear_choice<false>(p, samples, pairs, pair, n, record, du, dw, df);
 }
 
-FRETWAVE_VECTORISE void shoot(int samples, int n, double const* discs, double* w, double* A) {
-  for (int i = 0; i < n; ++i) A[i] = A[3 * n + i] = 1, A[n + i] = A[2 * n + i] = 0;
-  for (int t = 0; t < samples; ++t, discs += 3 * n)
+FRETWAVE_VECTORISE void shoot(int samples, int n, double const* discs, double* start, double* end,
+                              double* A) {
+  double const* before = discs + size_t(samples - 1) * 3 * n;
+#pragma omp simd
+  for (int i = 0; i < n; ++i) {
+    pull_in(before[i], before[n + i], before[2 * n + i], start[i], start[n + i]);
+    end[i] = start[i], end[n + i] = start[n + i];
+    A[i] = A[3 * n + i] = 1, A[n + i] = A[2 * n + i] = 0;
+  }
+  for (int t = 0; t < samples; ++t, before = discs, discs += 3 * n)
 #pragma omp simd
     for (int i = 0; i < n; ++i) {
-      const double d1 = discs[i] - w[i], d2 = discs[n + i] - w[n + i];
-      const Projection to = project(d1, d2, discs[2 * n + i]);
-      w[i] += d1 - to.s * d1, w[n + i] += d2 - to.s * d2;
-      const double one = to.e1 * A[i] + to.e2 * A[2 * n + i], two = to.e1 * A[n + i] + to.e2 * A[3 * n + i];
-      A[i] = to.s * (A[i] - to.e1 * one), A[n + i] = to.s * (A[n + i] - to.e1 * two);
-      A[2 * n + i] = to.s * (A[2 * n + i] - to.e2 * one), A[3 * n + i] = to.s * (A[3 * n + i] - to.e2 * two);
+      const double w1 = end[i], w2 = end[n + i], R = discs[2 * n + i];
+      const double d1 = discs[i] - w1, d2 = discs[n + i] - w2;
+      const bool stick = (d1 * d1 + d2 * d2 <= R * R) & (R > 0);
+      const Slip to = slip(before[i] - w1, before[n + i] - w2, discs[i] - before[i],
+                           discs[n + i] - before[n + i], before[2 * n + i], R, 0);
+      end[i] = stick ? w1 : discs[i] - R * to.m1, end[n + i] = stick ? w2 : discs[n + i] - R * to.m2;
+      const double one = to.A1 * A[i] + to.A2 * A[2 * n + i], two = to.A1 * A[n + i] + to.A2 * A[3 * n + i];
+      A[i] = stick ? A[i] : -to.m2 * one, A[n + i] = stick ? A[n + i] : -to.m2 * two;
+      A[2 * n + i] = stick ? A[2 * n + i] : to.m1 * one, A[3 * n + i] = stick ? A[3 * n + i] : to.m1 * two;
     }
 }
 

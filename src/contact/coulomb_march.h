@@ -3,9 +3,11 @@
 
 /// The inner loops of 3-D Coulomb contact: pairs innermost, no branches, no memory but their arguments.
 ///
-/// A slider w with T = kt (u - w) is a point inside the disc of radius R = mu N / kt about u: it stays while
-/// it is inside and is else projected onto the disc (each tangent onto its own interval in the uncoupled
-/// law).
+/// A slider w with T = kt (u - w) is a point inside the disc of radius R = mu N / kt about u. Between two
+/// samples u goes straight and N linearly until it opens or from where it closes, and the slider is pulled
+/// along its exact path (`slip`): of second order in the step also where the path bends. Projecting it onto
+/// the last disc instead (implicit Euler) is of first order there. In the uncoupled law each tangent is
+/// clipped to its own interval.
 namespace fretwave::contact {
 
 /// Of the pairs in a march, one value each; reach = mu / kt.
@@ -13,27 +15,16 @@ struct PairConstants {
   double const *kn, *kt, *reach, *load, *gap;
 };
 
-/// Arrays of the record, samples x these x pairs. Coupled: s = R / |u - w| (1 stick, -1 open) and the slip
-/// direction e (0 unless it slips). Uncoupled: 1 if closed; for each tangent 2 stick, +-1 slip, 0 open.
-constexpr int record_arrays = 3;
-
-/// What the linearised march does at a sample: dT / kt = s (I - e e^T) (du - dw) + e reach dN; alone: without
-/// e e^T.
-struct SampleTangent {
-  double closed, s1, s2, e1, e2;
-};
+/// Arrays of the record, samples x these x pairs. Coupled, of the step that ends at the sample, for the arm
+/// d = u - w with dv = du - du', dd' = du' - dw' of the sample before:
+///   dd = s (dd' + dv) + reach dN m + m' (A dd' + B dv + r' du_n' + r du_n),  m' = (-m2, m1)
+/// s (1 stick, less where it closes within the step, 0 slip, -1 open), m, A, B, r', r; the term in dN for s =
+/// 0 alone. Uncoupled: 1 if closed; for each tangent 2 stick, +-1 slip, 0 open.
 template <bool Coupled>
-inline SampleTangent sample_tangent(double a, double b, double c) {
-  if constexpr (Coupled) {
-    const double s = a < 0 ? 0.0 : a;
-    return {a < 0 ? 0.0 : 1.0, s, s, b, c};
-  } else {
-    return {a, b == 2 ? 1.0 : 0.0, c == 2 ? 1.0 : 0.0, b == 2 ? 0.0 : b, c == 2 ? 0.0 : c};
-  }
-}
+constexpr int record_arrays = Coupled ? 9 : 3;
 
 /// Forces and record over one period of u (samples x 3 x n); sliders w (2 x n) at its start in, at its end
-/// out.
+/// out. The coupled period starts at its last sample, whose disc pulls sliders in that lie outside.
 using March = void(PairConstants const&, int samples, int n, double const* u, double* w, double* f,
                    double* record);
 March march_coupled, march_alone;
@@ -56,9 +47,9 @@ constexpr LinearMarch* linear_march = Coupled ? linear_coupled : linear_alone;
 template <bool Coupled>
 constexpr LeftRest* left_rest = Coupled ? left_coupled : left_alone;
 
-/// Sliders over one period of discs (samples x (x, y, R) x n) and the derivative A (2 x 2 x n) of their end
-/// by their start.
-void shoot(int samples, int n, double const* discs, double* w, double* A);
+/// Sliders over one period of discs (samples x (x, y, R) x n) from `start` (2 x n), which the last disc pulls
+/// in, to `end`, and the derivative A (2 x 2 x n) of their end by their start.
+void shoot(int samples, int n, double const* discs, double* start, double* end, double* A);
 
 /// The disc that w is farthest outside of, by distance squared less radius squared.
 void farthest(int samples, int n, double const* discs, double const* w, double* excess, double* sample);

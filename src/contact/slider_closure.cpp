@@ -160,8 +160,8 @@ void SliderClosure::cycle(std::vector<double>& w, std::vector<SliderStart>& star
   for (int step = 0, n = pairs_; step < most_periods && !lanes.empty(); ++step) {
     if (int(lanes.size()) < n) keep(lanes, n, discs_), keep(lanes, n, at);
     n = int(lanes.size());
-    lanes.clear(), end = at, A.resize(4 * size_t(n));
-    shoot(samples_, n, discs_.data(), end.data(), A.data());
+    lanes.clear(), end.resize(at.size()), A.resize(4 * size_t(n));
+    shoot(samples_, n, discs_.data(), at.data(), end.data(), A.data());
     for (int j = 0; j < n; ++j) {
       State now = states[j];
       SliderStart& start = starts[now.pair];

@@ -5,10 +5,12 @@ namespace fretwave::contact {
 
 /// Pairs of the coupled law whose sliders leave their rest position and never open, pairs innermost.
 ///
-/// One period is a map P of the slider: projections onto convex discs, so P never takes two sliders apart.
-/// Its fixed points are either the common points of all discs (a convex set: shakedown, nothing slips) or a
-/// single cycle that slips, for discs are strictly convex. Of the common points the one nearest to rest is
-/// taken, which is what two periods give on a straight path and does not ask where the period begins.
+/// One period is a map P of the slider: it is swept by a convex disc, so P never takes two sliders apart, and
+/// it starts inside the disc of the last sample. A slider inside the discs of two samples is inside all
+/// between them, for |u - w| - R is convex on a step. Its fixed points are either the common points of all
+/// discs (a convex set: shakedown, nothing slips) or a single cycle that slips, for discs are strictly
+/// convex. Of the common points the one nearest to rest is taken, which is what two periods give on a
+/// straight path and does not ask where the period begins.
 class SliderClosure {
  public:
   SliderClosure(int samples, int pairs);

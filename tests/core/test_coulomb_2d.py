@@ -62,7 +62,7 @@ def test_derivatives(comm):
 
 @pytest.mark.ranks(1)
 def test_a_branch_is_that_of_the_law_in_space(comm):
-    branches = [fw.follow(problem_of(comm, law), 0.02, 1.0) for law in ("coulomb_2d", "coulomb_3d")]
+    branches = [fw.follow(problem_of(comm, law), 0.02, 1.0) for law in ("coulomb_2d", "coulomb_3d_uncoupled")]
     for name in ("omega", "zeta"):
         np.testing.assert_allclose(branches[0].at([0.1, 0.5])[name], branches[1].at([0.1, 0.5])[name], rtol=1e-6)
 

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 from scipy.integrate import solve_ivp
 from tolerances import REPEATED, ROUNDING, SOLVED, TIGHT
 
+import fretwave as fw
 from oracle import Flow, System
 from oracle.circle import Block, Pair, Passage3d, orbit_3d
 from oracle.test_oracle_independent import orbits, rubbing
@@ -92,3 +94,29 @@ def test_a_motion_that_lifts_off_has_no_step_left_out():
     flow = Flow(system).passage(system.extended(np.zeros(7)), system.start, 2 * np.pi / 3)
     passage = Passage3d(b, np.zeros(10), ("stick",), 2 * np.pi / 3)
     assert np.delete(passage.y, [3, 7, 9]) == pytest.approx(flow.end[:7], abs=TIGHT)
+
+
+#: Forces along the normal and both tangents. What lifts off takes longer: cases/accuracy/friction_3d.py
+BENT = {"constant": (0.0, 1.5j, 1.2 - 0.7j), "varies": (0.9, 1.5j, 1.2 - 0.7j)}
+
+
+@pytest.mark.parametrize("load", BENT)
+def test_sampled_friction_on_a_bent_path_is_of_second_order(load):
+    """Harmonic balance of a rubbing block tends to its exact motion as N_t^-2, whatever its load does."""
+    K = np.array([[20.0, 2.0, 0.0], [2.0, 15.0, 0.0], [0.0, 0.0, 6.0]])
+    if load == "constant":
+        K[0, 1] = K[1, 0] = 0.0
+    contact = Pair(np.eye(3), kn=50.0, kt=40.0, mu=0.4, N0=1.0)
+    b = Block(np.eye(3), 0.4 * np.eye(3), K, [contact], np.array(BENT[load]), np.array([1.0, 0.0, 0.0]), 3.0)
+    exact, errors = orbit_3d(b, settle=4).harmonics(1)[:3, 1], []
+    law = {"normal_stiffness": 50.0, "tangential_stiffness": 40.0, "friction_coefficient": 0.4, "normal_load": 1.0}
+    with fw.Model(b.M, b.K, b.C, [fw.Contact("coulomb_3d", np.eye(3), law)], MPI.COMM_WORLD) as model:
+        for samples in (64, 128, 256):
+            problem = fw.ForcedResponse(
+                model, fw.choose_harmonics(model, 15, samples), {0: b.p, 1: b.P}, 1.0, 1, fw.linear_modes(model, 1)[0]
+            )
+            first = next(iter(fw.Continuation(problem, problem.initial(3.0), (1.5, 6.0))))
+            Q = problem.coefficients(first.y)
+            errors.append(np.linalg.norm(Q[:, 1] - 1j * Q[:, 2] - exact) / np.linalg.norm(exact))
+    assert errors[2] < 5e-4
+    assert np.log2(errors[0] / errors[2]) > 3.5
