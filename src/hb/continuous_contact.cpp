@@ -15,9 +15,8 @@ namespace {
 constexpr double period = 2 * std::numbers::pi;
 constexpr int tile = 32;  // pairs whose times fit the cache
 
-/// Times at which changes are looked for: 8 and more in the shortest wave, so that two of a kind in between
-/// are rare, and found by find_roots where there are two. Not the contact's samples: what is found does not
-/// depend on them.
+/// Times at which changes are looked for first: 8 and more in the shortest wave, so that find_roots seldom
+/// has to look between them. They are not the contact's samples: what is found does not depend on them.
 Harmonics search_times(Harmonics const& h) { return {h.orders(), 8 * (h.highest() + 1)}; }
 
 /// q_k of a dof's block, about its mean.
@@ -144,7 +143,7 @@ void ContinuousContact::find_spans(Pair& pair, int place) {
   for (int t = 0; t < N; ++t)
     wave_[t] = load + grid_.values[size_t(t) * step + size_t(normal_) * tile_ + place];
   std::vector<Root> roots;
-  find_roots(pair.approach, 0, wave_.data(), N, 1, roots);
+  find_roots(pair.approach, 0, wave_.data(), N, roots);
   pair.closed = roots.empty() && wave_[0] > 0;
   for (size_t i = 0; i < roots.size(); ++i) {
     if (!roots[i].rising) continue;
@@ -177,7 +176,7 @@ void ContinuousContact::find_play(Pair& pair, int tangent, int place) {
       wave_[t] = rate[size_t(tangent + (normal_ >= 0)) * tile_];
       if (reach > 0) wave_[t] -= side * reach * rate[size_t(normal_) * tile_];
     }
-    find_roots(now.walls.wall(side), 1, wave_.data(), N, 1, turns);
+    find_roots(now.walls.wall(side), 1, wave_.data(), N, turns);
   }
   if (pair.closed)
     now.play.close(now.walls, law.slider[tangent] - now.mean);

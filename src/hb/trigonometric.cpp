@@ -22,12 +22,12 @@ struct Powers {
 
 Series::Jet Series::at(double tau) const {
   Powers e(tau);
-  Jet out{{q[0].real(), 0, 0, 0}};
+  Jet out{{q[0].real(), 0, 0}};
   for (size_t n = 1; n < q.size(); ++n) {
     e.next();
     const double re = q[n].real(), im = q[n].imag(), k = double(n);
     const double a = re * e.x - im * e.y, b = k * (re * e.y + im * e.x);
-    out.d[0] += a, out.d[1] -= b, out.d[2] -= k * k * a, out.d[3] += k * k * b;
+    out.d[0] += a, out.d[1] -= b, out.d[2] -= k * k * a;
   }
   return out;
 }
@@ -79,14 +79,27 @@ double Arc::integral_from_begin(Series const& p) const {
 
 namespace {
 
-/// Of one function on the grid.
+/// Roots of one function, isolated by a bound on its second derivative.
 struct Search {
   Series const& p;
   int derivative;
   std::vector<Root>& out;
+  double bent = 0;
 
-  /// Between two times at which the function has these values.
-  void between(double low, double high, double below, double above) const {
+  /// Between two times at which the function has these values. None where both have one sign and are farther
+  /// from zero than it can bend; one where they differ and it cannot turn between; else each half is asked.
+  void between(double low, double high, double below, double above, int halvings = 10) {
+    const double step = high - low, bend = step * step * bent;
+    if ((below < 0) == (above < 0)) {
+      if (halvings == 0 || std::min(std::abs(below), std::abs(above)) > bend / 8) return;
+    } else if (halvings == 0 || std::abs(above - below) > bend) {
+      return refine(low, high, below, above);
+    }
+    const double middle = low + step / 2, value = p.at(middle).d[derivative];
+    between(low, middle, below, value, halvings - 1), between(middle, high, value, above, halvings - 1);
+  }
+
+  void refine(double low, double high, double below, double above) {
     const auto f = [this](double tau) {
       const Series::Jet jet = p.at(tau);
       return std::pair(jet.d[derivative], jet.d[derivative + 1]);
@@ -94,40 +107,24 @@ struct Search {
     const double guess = low + (high - low) * (below / (below - above));
     out.push_back({root(f, low, high, guess, below < 0 ? 1 : -1, 1), below < 0});
   }
-
-  /// The extremum between, if it lies beyond zero: two roots.
-  void beyond(double low, double high, double below, double above) const {
-    const auto slope = [this](double tau) {
-      const Series::Jet jet = p.at(tau);
-      return std::pair(jet.d[derivative + 1], jet.d[derivative + 2]);
-    };
-    const double top = root(slope, low, high, (low + high) / 2, below < 0 ? -1 : 1, 1);
-    const double value = p.at(top).d[derivative];
-    if ((value < 0) == (below < 0)) return;
-    between(low, top, below, value), between(top, high, value, above);
-  }
 };
 
 }  // namespace
 
-void find_roots(Series const& p, int derivative, double const* samples, int count, size_t stride,
-                std::vector<Root>& out) {
+void find_roots(Series const& p, int derivative, double const* samples, int count, std::vector<Root>& out) {
   out.clear();
   if (p.q.size() < 2) return;
-  const Search search{p, derivative, out};
+  Search search{p, derivative, out};
+  for (size_t k = 1; k < p.q.size(); ++k)
+    search.bent += std::pow(double(k), derivative + 2) * std::abs(p.q[k]);
   const double step = 2 * std::numbers::pi / count;
-  const auto at = [&](int t) { return samples[size_t((t + count) % count) * stride]; };
-  for (int t = 0; t < count; ++t) {
-    const double before = at(t - 1), here = at(t), after = at(t + 1);
-    if ((here < 0) != (after < 0))
-      search.between(t * step, (t + 1) * step, here, after);
-    else if ((before < 0) == (here < 0) && std::abs(here) < std::abs(before) &&
-             std::abs(here) <= std::abs(after))
-      search.beyond((t - 1) * step, (t + 1) * step, before, after);
+  for (int t = 0; t < count; ++t)
+    search.between(t * step, (t + 1) * step, samples[t], samples[t + 1 < count ? t + 1 : 0]);
+  // the last one may lie at the period's end by a rounding
+  if (out.size() && out.back().at >= 2 * std::numbers::pi) {
+    out.back().at -= 2 * std::numbers::pi;
+    std::rotate(out.begin(), out.end() - 1, out.end());
   }
-  const double period = 2 * std::numbers::pi;
-  for (Root& r : out) r.at -= r.at >= period ? period : r.at < 0 ? -period : 0;
-  std::ranges::sort(out, {}, &Root::at);
 }
 
 }  // namespace fretwave::hb

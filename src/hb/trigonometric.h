@@ -9,9 +9,9 @@ namespace fretwave::hb {
 /// p(tau) = Re sum_k q_k e^{i k tau}, k = 0 .. H: a motion known at every time of its period.
 struct Series {
   std::vector<complex> q;
-  /// p and its first three derivatives at tau.
+  /// p and its first two derivatives at tau.
   struct Jet {
-    double d[4];
+    double d[3];
   };
   Jet at(double tau) const;
   /// p(tau + s) - p(tau) without the rounding of the two, and p'(tau + s).
@@ -64,10 +64,8 @@ double root(Function f, double low, double high, double x, int sign, double size
   return x;
 }
 
-/// Roots of the derivative of this order, in their order over [0, 2 pi), from its samples at 2 pi t / count:
-/// changes of sign, and the pairs of them between two samples that the third derivative lets be seen, where
-/// the modulus of a sample is below its neighbours'.
-void find_roots(Series const&, int derivative, double const* samples, int count, size_t stride,
-                std::vector<Root>& out);
+/// All roots over [0, 2 pi) of the derivative of this order (0 or 1), in their order, from its samples at
+/// 2 pi t / count. However close: a bound on how it bends says where two may hide between samples.
+void find_roots(Series const&, int derivative, double const* samples, int count, std::vector<Root>& out);
 
 }  // namespace fretwave::hb

@@ -132,7 +132,7 @@ def elastic_slider(comm, two_dof, stiffness):
 
 
 @pytest.mark.ranks(1)
-@pytest.mark.parametrize("stiffness", [1e4, 1e6, 1e8, 1e10, 1e12])
+@pytest.mark.parametrize("stiffness", [1e6, 1e8, 1e10, 1e12])
 def test_stiff_sliders_are_followed(two_dof, comm, stiffness):
     """From stuck to free, by a first slip over 5 N / kt. Zeta at the peak is that of the oracle."""
     problem = mode_problem(elastic_slider(comm, two_dof, stiffness), [1, 3, 5, 7], 256, start="stuck")
@@ -142,26 +142,24 @@ def test_stiff_sliders_are_followed(two_dof, comm, stiffness):
     assert states[0]["omega0"] == pytest.approx(two_dof.omega_stuck, rel=1e-4)
     assert states[-1]["omega0"] == pytest.approx(two_dof.omega_free, rel=1e-3)
     peak = max(range(len(states)), key=lambda k: states[k]["zeta"])
-    exact = in_continuous_time(two_dof, stiffness, problem, points[peak].y)
-    # the oracle's own rounding, of forces kt u
-    rounding = SOLVED + 10 * np.finfo(float).eps * stiffness / 640
+    rounding = 1e-11 + 1e-18 * stiffness  # the oracle's own, of forces kt u
+    exact = in_continuous_time(two_dof, stiffness, problem, points[peak].y, rounding)
     for name in ("omega0", "zeta"):
-        assert states[peak][name] == pytest.approx(getattr(exact, name), rel=rounding)
+        assert states[peak][name] == pytest.approx(getattr(exact, name), rel=SOLVED + 10 * rounding)
     # rounding of forces kt u against inertia k a
     assert max(p.residual for p in points) < SOLVED + 8 * np.finfo(float).eps * stiffness / 640
 
 
-def in_continuous_time(two_dof, stiffness, problem, y):
+def in_continuous_time(two_dof, stiffness, problem, y, tolerance):
     """The oracle's complex mode at a point's amplitude, in the same harmonics."""
     state, Q, orders = problem.state(y), problem.coefficients(y), problem.harmonics.orders
     q = np.zeros((2, orders[-1] + 1), complex)
     q[:, orders] = Q[:, ::2] - 1j * Q[:, 1::2]
-    system = System(
-        two_dof.M, np.zeros((2, 2)), two_dof.K, [Jenkins(two_dof.B[0], stiffness, 5.0)], np.zeros(2), omega=1
-    )
+    damper = Jenkins(two_dof.B[0], stiffness, 5.0)
+    system = System(two_dof.M, np.zeros((2, 2)), two_dof.K, [damper], np.zeros(2), omega=1)
     exponent = state["omega0"] * complex(-state["zeta"], np.sqrt(1 - state["zeta"] ** 2))
     guess = SeriesMotion(system, "CNM", q, exponent, 2 * state["zeta"] * state["omega0"], 0.0, [])
-    return series_motion(system, "CNM", orders[-1], amplitude=state["amplitude"], guess=guess, tolerance=1e-6)
+    return series_motion(system, "CNM", orders[-1], amplitude=state["amplitude"], guess=guess, tolerance=tolerance)
 
 
 def stop(comm, stiffness, gap=0.0):
