@@ -64,7 +64,7 @@ def measured(law: str, H: int, samples: int, roughness: float) -> tuple[float, f
 
 def main() -> None:
     print(
-        "| law | motion | H | N_t | force [us] | first product [us] | product [us] |\n|---|---|---:|---:|---:|---:|---:|"
+        "| law | motion | H | N_t | force [us] | first product [us] | product [us] |\n" + "|---" * 2 + "|---:" * 5 + "|"
     )
     for law in LAWS if len(sys.argv) < 2 else sys.argv[1:]:
         for name, roughness in {"smooth, n^-3": 3.0, "rough, n^-1.5": 1.5}.items():

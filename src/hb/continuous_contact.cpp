@@ -168,7 +168,8 @@ void ContinuousContact::find_play(Pair& pair, int tangent, int place) {
   for (const int side : {1, -1}) {
     std::vector<Root>& turns = now.walls.turns[side > 0 ? 0 : 1];
     if (side < 0 && reach == 0) {
-      turns = now.walls.turns[0];
+      turns = now.walls.turns[0];  // the walls are 2 R apart
+      for (Root& turn : turns) turn.value += 2 * now.walls.radius.q[0].real();
       continue;
     }
     for (int t = 0; t < N; ++t) {
@@ -220,14 +221,16 @@ void ContinuousContact::tangential_force(Pair const& pair, Tangent const& now, d
     const double area = piece.share * limit * piece.length + kt * arc.integral_from_begin(now.u);
     add_mean(harmonics_, area / period, F);
   }
+  stick.add_force(now.u, kt, F);
+  const double slope = law.friction_coefficient * law.normal_stiffness;
   for (Play::Slip const& piece : now.play.slips) {
+    add_mean(harmonics_, piece.side * law.friction_limit * piece.length / period, F);
+    if (slope == 0) continue;
     arc.set(2 * harmonics_.highest(), piece.begin, piece.length);
     slip.add(arc, piece.side);
-    add_mean(harmonics_, piece.side * kt * arc.integral(now.walls.radius) / period, F);
+    add_mean(harmonics_, piece.side * slope * arc.integral(pair.approach) / period, F);
   }
-  stick.add_force(now.u, kt, F);
-  if (law.friction_coefficient > 0)
-    slip.add_force(pair.approach, law.friction_coefficient * law.normal_stiffness, F);
+  if (slope > 0) slip.add_force(pair.approach, slope, F);
 }
 
 void ContinuousContact::linearise() {
@@ -267,27 +270,28 @@ void ContinuousContact::tangential_blocks(Pair const& pair, int tangent, double*
                normal = block(0, normal_ < 0 ? 0 : normal_);
   Indicator stick(harmonics_), slip(harmonics_);
   Arc arc;
+  if (now.play.stuck) stick.fill();
   for (Play::Stick const& piece : now.play.sticks) {
     Indicator here(harmonics_);
     if (now.play.stuck) {
       here.fill();
     } else {
       arc.set(2 * harmonics_.highest(), piece.begin, piece.length);
-      here.add(arc, 1);
+      here.add(arc, 1), stick.add(arc, 1);
     }
-    here.add_multiplication(kt, D + at * ld + at, ld);
     if (!piece.follows) continue;
     std::vector<double> force(m);
     here.add_coefficients(kt, force.data());
     const std::vector<double> wave = waves(harmonics_, piece.begin);
+    const double share = piece.share * slope / kt;
     for (int r = 0; r < m; ++r) {
       double* row = D + (at + r) * ld;
       for (int c = 0; c < m; ++c) row[at + c] -= force[r] * wave[c];
-      for (int c = 0; c < m && slope > 0; ++c)
-        row[normal + c] += piece.share * slope / kt * force[r] * wave[c];
-      by_gap[at + r] -= piece.share * slope / kt * force[r];
+      for (int c = 0; c < m && share != 0; ++c) row[normal + c] += share * force[r] * wave[c];
+      by_gap[at + r] -= share * force[r];
     }
   }
+  stick.add_multiplication(kt, D + at * ld + at, ld);
   if (slope == 0) return;
   for (Play::Slip const& piece : now.play.slips) {
     arc.set(2 * harmonics_.highest(), piece.begin, piece.length);

@@ -9,20 +9,26 @@ void Indicator::add(Arc const& arc, double weight) {
     G_[p] += weight / (2 * std::numbers::pi) * std::conj(arc.integral(int(p)));
 }
 
-/// i n f_n = sum_k G_{n-k} x_k + G_{n+k} conj(x_k), x_k = i k p_k
+/// i n f_n = sum_k G_{n-k} x_k + G_{n+k} conj(x_k), x_k = i k p_k. In real arrays, G of orders -H .. 2H, of
+/// which several can be taken at once.
 void Indicator::add_force(Series const& p, double weight, double* F) const {
+  const int H = harmonics_.highest();
+  std::vector<double> arrays(2 * size_t(3 * H + 1) + 2 * size_t(H + 1));
+  double *re = arrays.data() + H, *im = re + 3 * H + 1, *x = im + 2 * H + 1, *y = x + H + 1;
+  for (int n = -H; n <= 2 * H; ++n) re[n] = (*this)(n).real(), im[n] = (*this)(n).imag();
+  for (int k = 1; k <= H; ++k) x[k] = -k * p.q[k].imag(), y[k] = k * p.q[k].real();
   for (int i = 0; i < harmonics_.count(); ++i) {
     const int n = harmonics_.orders()[i];
     if (n == 0) continue;
-    double re = 0, im = 0;
-    for (size_t k = 1; k < p.q.size(); ++k) {
-      const complex minus = (*this)(n - int(k)), plus = (*this)(n + int(k));
-      const double x = -double(k) * p.q[k].imag(), y = double(k) * p.q[k].real();
-      re += (minus.real() + plus.real()) * x - (minus.imag() - plus.imag()) * y;
-      im += (minus.real() - plus.real()) * y + (minus.imag() + plus.imag()) * x;
+    double real = 0, imaginary = 0;
+#pragma omp simd reduction(+ : real, imaginary)
+    for (int k = 1; k <= H; ++k) {
+      real += (re[n - k] + re[n + k]) * x[k] - (im[n - k] - im[n + k]) * y[k];
+      imaginary += (re[n - k] - re[n + k]) * y[k] + (im[n - k] + im[n + k]) * x[k];
     }
-    F[harmonics_.offset(i)] += weight * im / n;  // Fc_n - i Fs_n = (re + i im) / (i n)
-    F[harmonics_.offset(i) + 1] += weight * re / n;
+    // Fc_n - i Fs_n = (real + i imaginary) / (i n)
+    F[harmonics_.offset(i)] += weight * imaginary / n;
+    F[harmonics_.offset(i) + 1] += weight * real / n;
   }
 }
 

@@ -12,33 +12,32 @@ constexpr double period = 2 * std::numbers::pi;
 
 }  // namespace
 
-/// From a wall's minima to the maxima behind (lower wall; upper: the reverse). In a span its ends count.
-void Play::pushes(Walls const& walls, int side, double begin, double end, bool periodic) {
-  Series const& wall = walls.wall(side);
+/// From a wall's minima to the maxima behind (lower wall; upper: the reverse).
+void Play::periodic_pushes(Walls const& walls, int side) {
   std::vector<Root> const& turns = walls.of(side);
-  const auto at = [&](double tau) {  // both walls are at u where the pair closes or opens
-    const double here = wall.at(tau).d[0];
-    return periodic || (tau != begin && tau != end) ? here : (here + walls.wall(-side).at(tau).d[0]) / 2;
-  };
-  const auto add = [&](double from, double to) { pushes_.push_back({from, to, side, at(from), at(to)}); };
-  const auto turns_away = [side](Root const& turn) { return turn.rising == (side < 0); };
-  if (periodic) {
-    const size_t n = turns.size();
-    for (size_t i = 0; i < n; ++i)
-      if (turns_away(turns[i])) add(i ? turns[i - 1].at : turns[n - 1].at - period, turns[i].at);
-    if (n == 0) add(0, 0);  // a wall that stands still
-    return;
+  for (size_t i = 0; i < turns.size(); ++i) {
+    Root const &to = turns[i], &from = turns[i ? i - 1 : turns.size() - 1];
+    if (to.rising == (side < 0))
+      pushes_.push_back({i ? from.at : from.at - period, to.at, side, from.value, to.value});
   }
-  double from = begin;
-  bool any = false;
+  if (turns.size()) return;
+  const double still = walls.wall(side).at(0).d[0];  // a wall that stands
+  pushes_.push_back({0, 0, side, still, still});
+}
+
+/// The same in a span, whose ends count. There both walls are at u.
+void Play::pushes(Walls const& walls, int side, Span const& span, double first, double last) {
+  const double end = span.begin + span.length;
+  Root from{span.begin, walls.wall(side).at(span.begin + span.length / 2).d[1] > 0, first};
+  bool towards = from.rising == (side > 0);  // where it does not turn at all
   for (const double shift : {0.0, period})
-    for (Root const& turn : turns) {
-      const double tau = turn.at + shift;
-      if (tau <= begin || tau >= end) continue;
-      if (turns_away(turn)) add(from, tau);
-      from = tau, any = !turns_away(turn);
+    for (Root turn : walls.of(side)) {
+      turn.at += shift;
+      if (turn.at <= span.begin || turn.at >= end) continue;
+      if (turn.rising == (side < 0)) pushes_.push_back({from.at, turn.at, side, from.value, turn.value});
+      towards = turn.rising == (side > 0), from = turn;
     }
-  if (any || (from == begin && side * wall.at((begin + end) / 2).d[1] > 0)) add(from, end);
+  if (towards) pushes_.push_back({from.at, end, side, from.value, last});
 }
 
 /// How long the slider stands until the push moves it: its wall has to come to it, from where both were then.
@@ -70,7 +69,7 @@ void Play::slip(Walls const& walls, Push const& push, State& now) {
 /// Two periods: a slider forgets all before its last slip, so that one closes it.
 void Play::close(Walls const& walls, double rest) {
   clear(), pushes_.clear();
-  for (const int side : {1, -1}) pushes(walls, side, 0, period, true);
+  for (const int side : {1, -1}) periodic_pushes(walls, side);
   std::ranges::sort(pushes_, {}, &Push::end);
   State now{0, rest, 0, 0, false};
   for (Push const& push : pushes_)
@@ -87,12 +86,14 @@ void Play::close(Walls const& walls, std::vector<Span> const& spans) {
   clear();
   for (Span const& span : spans) {
     const double end = span.begin + span.length;
-    pushes_.clear();
-    for (const int side : {1, -1}) pushes(walls, side, span.begin, end, false);
-    std::ranges::sort(pushes_, {}, &Push::end);
     const Series::Jet lower = walls.lower.at(span.begin), upper = walls.upper.at(span.begin);
-    const double parting = walls.radius.at(span.begin).d[1], drift = (upper.d[1] + lower.d[1]) / 2;
-    State now{span.begin, (lower.d[0] + upper.d[0]) / 2, 0, parting > 0 ? drift / parting : 0.0, true};
+    const double first = (lower.d[0] + upper.d[0]) / 2, drift = (lower.d[1] + upper.d[1]) / 2;
+    const double last = (walls.lower.at(end).d[0] + walls.upper.at(end).d[0]) / 2;
+    pushes_.clear();
+    for (const int side : {1, -1}) pushes(walls, side, span, first, last);
+    std::ranges::sort(pushes_, {}, &Push::end);
+    const double parting = walls.radius.at(span.begin).d[1];
+    State now{span.begin, first, 0, parting > 0 ? drift / parting : 0.0, true};
     for (Push const& push : pushes_)
       if (drags(push, now)) slip(walls, push, now);
     stick(now, end - now.since);

@@ -57,7 +57,8 @@ class Play {
     double share;
     bool follows;
   };
-  void pushes(Walls const&, int side, double begin, double end, bool periodic);
+  void periodic_pushes(Walls const&, int side);
+  void pushes(Walls const&, int side, Span const&, double first, double last);
   static bool drags(Push const& push, State const& now) { return push.side * (push.to - now.slider) > 0; }
   double waiting(Walls const&, Push const&, State const&) const;
   void slip(Walls const&, Push const&, State&);

@@ -10,6 +10,8 @@ namespace {
 
 /// e^{i k tau} for k = 1, 2, ...
 struct Powers {
+  Powers(double re, double im, double step_re, double step_im)
+      : cosine(step_re), sine(step_im), x(re), y(im) {}
   explicit Powers(double tau) : cosine(std::cos(tau)), sine(std::sin(tau)) {}
   void next() {
     const double re = x * cosine - y * sine;
@@ -20,15 +22,21 @@ struct Powers {
 
 }  // namespace
 
+/// Odd and even orders apart: neither chain of powers waits for the other.
 Series::Jet Series::at(double tau) const {
-  Powers e(tau);
-  Jet out{{q[0].real(), 0, 0}};
-  for (size_t n = 1; n < q.size(); ++n) {
-    e.next();
+  const double c = std::cos(tau), s = std::sin(tau), c2 = c * c - s * s, s2 = 2 * c * s;
+  Powers odd(c, s, c2, s2), even(c2, s2, c2, s2);
+  Jet out{{q[0].real(), 0, 0}}, other{};
+  const auto add = [this](size_t n, Powers& e, Jet& to) {
     const double re = q[n].real(), im = q[n].imag(), k = double(n);
     const double a = re * e.x - im * e.y, b = k * (re * e.y + im * e.x);
-    out.d[0] += a, out.d[1] -= b, out.d[2] -= k * k * a;
-  }
+    to.d[0] += a, to.d[1] -= b, to.d[2] -= k * k * a;
+    e.next();
+  };
+  size_t n = 1;
+  for (; n + 1 < q.size(); n += 2) add(n, odd, out), add(n + 1, even, other);
+  if (n < q.size()) add(n, odd, out);
+  for (int k = 0; k < 3; ++k) out.d[k] += other.d[k];
   return out;
 }
 
@@ -100,12 +108,15 @@ struct Search {
   }
 
   void refine(double low, double high, double below, double above) {
-    const auto f = [this](double tau) {
+    double value = 0;
+    const auto f = [this, &value](double tau) {
       const Series::Jet jet = p.at(tau);
+      value = jet.d[0];
       return std::pair(jet.d[derivative], jet.d[derivative + 1]);
     };
     const double guess = low + (high - low) * (below / (below - above));
-    out.push_back({root(f, low, high, guess, below < 0 ? 1 : -1, 1), below < 0});
+    const double at = root(f, low, high, guess, below < 0 ? 1 : -1, 1);
+    out.push_back({at, below < 0, value});
   }
 };
 
@@ -115,11 +126,16 @@ void find_roots(Series const& p, int derivative, double const* samples, int coun
   out.clear();
   if (p.q.size() < 2) return;
   Search search{p, derivative, out};
-  for (size_t k = 1; k < p.q.size(); ++k)
-    search.bent += std::pow(double(k), derivative + 2) * std::abs(p.q[k]);
-  const double step = 2 * std::numbers::pi / count;
-  for (int t = 0; t < count; ++t)
-    search.between(t * step, (t + 1) * step, samples[t], samples[t + 1 < count ? t + 1 : 0]);
+  for (size_t k = 1; k < p.q.size(); ++k) {
+    const double size = std::abs(p.q[k].real()) + std::abs(p.q[k].imag());
+    search.bent += double(k * k) * (derivative ? double(k) : 1.0) * size;
+  }
+  const double step = 2 * std::numbers::pi / count, far = step * step * search.bent / 8;
+  for (int t = 0; t < count; ++t) {
+    const double here = samples[t], after = samples[t + 1 < count ? t + 1 : 0];
+    if ((here > far && after > far) || (here < -far && after < -far)) continue;
+    search.between(t * step, (t + 1) * step, here, after);
+  }
   // the last one may lie at the period's end by a rounding
   if (out.size() && out.back().at >= 2 * std::numbers::pi) {
     out.back().at -= 2 * std::numbers::pi;

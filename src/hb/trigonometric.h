@@ -38,28 +38,29 @@ class Arc {
   std::vector<double> sine_, cosine_;  ///< of k h
 };
 
-/// Where a function changes its sign.
+/// Where a derivative of a series changes its sign, and the series itself there.
 struct Root {
   double at;
   bool rising;
+  double value;
 };
 
 /// Root of f, which gives value and slope, between `low` and `high`, where it rises (1) or falls (-1) through
 /// zero: Newton from `x`, halved where that leaves what is left of the bracket. To the last digits of x, or
-/// of `size` if that is larger.
+/// of `size` if that is larger: a last step of 1e-10 of it leaves an error of some 1e-20.
 template <class Function>
 double root(Function f, double low, double high, double x, int sign, double size = 0) {
   constexpr int most = 60;
-  constexpr double rounding = 4e-16;
+  constexpr double last = 1e-10;
   for (int k = 0; k < most; ++k) {
     const auto [value, slope] = f(x);
     if (value == 0) return x;
     (sign * value < 0 ? low : high) = x;
-    double next = x - value / slope;
-    if (!(next > low && next < high)) next = low + (high - low) / 2;
-    const bool done = std::abs(next - x) <= rounding * std::max(std::abs(x), size);
-    x = next;
-    if (done) break;
+    const double next = x - value / slope, allowed = last * std::max(std::abs(x), size);
+    const bool inside = next >= low && next <= high;
+    if (inside && std::abs(next - x) <= allowed) return next;
+    x = inside && next != x ? next : low + (high - low) / 2;
+    if (high - low <= 1e-6 * allowed) break;
   }
   return x;
 }
