@@ -19,12 +19,9 @@ class Coulomb2d : public Law {
   double stuck_stiffness(int component, int pair) const override {
     return space_.stuck_stiffness(component, pair);
   }
-  void force(Motion const&, double* f, Record&) const override;
-  void product(Motion const&, Record const&, double const* du, double const* dv, double* df) const override;
-  void pair_product(Motion const&, Record const&, int pair, int columns, double const* du,
-                    double* df) const override;
+  bool piecewise_linear() const override { return true; }
+  LinearPair linear_pair(int pair) const override { return space_.linear_pair(pair); }
   void diagnose(Motion const&, double const* f, Diagnosis&) const override;
-  std::uint64_t piece(Motion const&, Record const&) const override;
 
  protected:
   void set_rest(double const* u) override;

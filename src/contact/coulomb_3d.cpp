@@ -27,6 +27,15 @@ double Coulomb3d<Coupled>::stuck_stiffness(int component, int pair) const {
 }
 
 template <bool Coupled>
+LinearPair Coulomb3d<Coupled>::linear_pair(int i) const {
+  return {.normal_stiffness = p_.normal_stiffness[i],
+          .load = p_.normal_load[i] - p_.normal_stiffness[i] * p_.gap[i],
+          .tangential_stiffness = p_.tangential_stiffness[i],
+          .friction_coefficient = p_.friction_coefficient[i],
+          .slider = {slider_[i], slider_[pairs() + i]}};
+}
+
+template <bool Coupled>
 PairConstants Coulomb3d<Coupled>::constants(int first) const {
   return {p_.normal_stiffness.data() + first, p_.tangential_stiffness.data() + first, reach_.data() + first,
           p_.normal_load.data() + first, p_.gap.data() + first};

@@ -27,6 +27,8 @@ class Coulomb3d : public Law {
   int normal() const override { return 0; }
   Limit limit() const override { return Coupled ? Limit::circle : Limit::each; }
   double stuck_stiffness(int component, int pair) const override;
+  bool piecewise_linear() const override { return !Coupled; }
+  LinearPair linear_pair(int pair) const override;
   void force(Motion const&, double* f, Record&) const override;
   void product(Motion const&, Record const&, double const* du, double const* dv, double* df) const override;
   void pair_product(Motion const&, Record const&, int pair, int columns, double const* du,

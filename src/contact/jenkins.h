@@ -16,20 +16,15 @@ class Jenkins : public Law {
   bool odd() const override;
   std::vector<double> sliders() const override { return slider_; }
   double stuck_stiffness(int, int pair) const override { return stiffness_[pair]; }
-  void force(Motion const&, double* f, Record&) const override;
-  void product(Motion const&, Record const&, double const* du, double const* dv, double* df) const override;
-  void pair_product(Motion const&, Record const&, int pair, int columns, double const* du,
-                    double* df) const override;
+  bool piecewise_linear() const override { return true; }
+  LinearPair linear_pair(int pair) const override;
   void diagnose(Motion const&, double const* f, Diagnosis&) const override;
-  std::uint64_t piece(Motion const&, Record const&) const override;
 
  protected:
   void set_rest(double const* u) override;
   void set_sliders(std::vector<double> const& sliders) override { slider_ = sliders; }
 
  private:
-  void linearised(Motion const&, Record const&, int pair, int n, double const* du, double* df) const;
-
   std::vector<double> stiffness_, limit_, slider_;  ///< slider_: w at rest
 };
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cstddef>
+#include <stdexcept>
 
 #include "scramble.h"
 
@@ -26,6 +27,10 @@ void add_tangent_product(Motion const& motion, std::vector<double> const& tangen
 }
 
 }  // namespace
+
+void Law::force(Motion const&, double*, Record&) const {
+  throw std::logic_error("this contact law is not known by samples");
+}
 
 void Law::product(Motion const& motion, Record const& record, double const* du, double const* dv,
                   double* df) const {

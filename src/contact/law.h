@@ -59,6 +59,15 @@ struct Diagnosis {
   std::vector<double> gap = {};
 };
 
+/// A pair whose force is linear in its motion but where it changes its state:
+///   N = max(0, load + kn u_n),  T = kt (u_t - w),  |T| <= limit + mu N, each tangent by itself.
+struct LinearPair {
+  double normal_stiffness = 0, load = 0;
+  double tangential_stiffness = 0, friction_coefficient = 0, friction_limit = 0;
+  double slider[2] = {};  ///< w at rest
+  bool rubs() const { return friction_coefficient > 0 || friction_limit > 0; }
+};
+
 /// A contact law with its parameters for the pairs of this rank.
 class Law {
  public:
@@ -116,8 +125,13 @@ class Law {
     return std::numeric_limits<double>::infinity();
   }
 
+  /// Its pairs are `LinearPair`s: harmonic balance takes their constants and finds the changes of state in
+  /// continuous time. Of what follows it asks such a law for `diagnose` alone.
+  virtual bool piecewise_linear() const { return false; }
+  virtual LinearPair linear_pair(int /*pair*/) const { return {}; }
+
   /// Force on the pairs, and what its linearisation needs.
-  virtual void force(Motion const&, double* f, Record&) const = 0;
+  virtual void force(Motion const&, double* f, Record&) const;
   /// Linearised force for a motion perturbed by (du, dv), null where the law ignores it. Of the motion only
   /// the sizes are read here and in what follows but `diagnose`: the rest is in the record.
   virtual void product(Motion const&, Record const&, double const* du, double const* dv, double* df) const;

@@ -36,11 +36,6 @@ void UnilateralSpring::diagnose(Motion const& motion, double const* f, Diagnosis
     }
 }
 
-/// Which samples are open.
-std::uint64_t UnilateralSpring::piece(Motion const& motion, Record const& record) const {
-  return number_of(record.df_du, motion.first);
-}
-
 void CubicSpring::force(Motion const& motion, double* f, Record& record) const {
   const int n = motion.pairs;
   record.df_du.resize(motion.size());

@@ -13,9 +13,13 @@ class UnilateralSpring : public Law {
   int normal() const override { return 0; }
   bool stands_off() const override { return true; }
   double stuck_stiffness(int, int pair) const override { return closed_[pair] ? stiffness_[pair] : 0; }
+  /// For what asks for one moment of it: integration in time, linear modes.
   void force(Motion const&, double* f, Record&) const override;
   void diagnose(Motion const&, double const* f, Diagnosis&) const override;
-  std::uint64_t piece(Motion const&, Record const& record) const override;
+  bool piecewise_linear() const override { return true; }
+  LinearPair linear_pair(int i) const override {
+    return {.normal_stiffness = stiffness_[i], .load = -stiffness_[i] * (gap_[i] + stand_off_)};
+  }
 
  protected:
   void set_rest(double const* u) override;

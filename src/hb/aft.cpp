@@ -28,6 +28,10 @@ Aft::Aft(Harmonics const& h, std::shared_ptr<contact::Law const> law)
       transform_(h, law_->components() * tiles_.front().pairs, law_->components()),
       last_transform_(h, law_->components() * tiles_.back().pairs, law_->components()),
       tangent_transform_(h, law_->hereditary() ? 0 : tangent_columns(*law_)) {
+  if (law_->piecewise_linear()) {
+    continuous_.emplace(h, *law_);
+    return;
+  }
   const size_t columns = law_->components() * tiles_.front().pairs, n = h.samples() * columns;
   f_.resize(n);
   if (law_->uses_displacement()) u_.resize(n);
@@ -62,6 +66,7 @@ void Aft::mirror(std::vector<double>& samples, double sign, int columns) const {
 
 void Aft::force(double const* U, Exponents const& e, double* F) {
   if (columns_ == 0) return;
+  if (continuous_) return continuous_->force(U, F);
   for (Tile& tile : tiles_) {
     const int columns = tile.pairs * law_->components();
     const size_t at = size_t(tile.first) * law_->components() * harmonics_.block_size();
@@ -77,6 +82,7 @@ void Aft::force(double const* U, Exponents const& e, double* F) {
 }
 
 std::uint64_t Aft::piece() const {
+  if (continuous_) return continuous_->piece();
   std::uint64_t sum = 0;
   for (Tile const& tile : tiles_) sum += columns_ ? law_->piece(motion(tile, 1), tile.record) : 0;
   return sum;
@@ -84,6 +90,7 @@ std::uint64_t Aft::piece() const {
 
 void Aft::product(double const* dU, double const* dV, double* dF) {
   if (columns_ == 0) return;
+  if (continuous_) return continuous_->product(dU, dF);
   for (Tile const& tile : tiles_) {
     const size_t at = size_t(tile.first) * law_->components() * harmonics_.block_size();
     if (law_->uses_displacement()) transform(tile).to_time(dU + at, u_.data());
@@ -97,6 +104,7 @@ void Aft::product(double const* dU, double const* dV, double* dF) {
 
 void Aft::gap_product(double const* dgap, double* dF) {
   if (columns_ == 0) return;
+  if (continuous_) return continuous_->gap_product(dgap, dF);
   for (Tile const& tile : tiles_) {
     const int d = law_->components(), normal = std::max(law_->normal(), 0);
     const contact::Motion motion = this->motion(tile, 1);
@@ -168,6 +176,7 @@ void Aft::by_columns(double* D) const {
 
 void Aft::blocks(Exponents const& e, double* D) {
   if (columns_ == 0) return;
+  if (continuous_) return void(std::ranges::copy(continuous_->blocks(), D));
   const int m = harmonics_.block_size(), d = law_->components();
   const size_t size = size_t(pairs_) * d * m * d * m;
   if (law_->hereditary()) return by_columns(D);
@@ -209,6 +218,13 @@ FourierTransform const& Aft::whole_transform() const {
   return *whole_transform_;
 }
 
+/// The pieces of a motion and its force, beside those of the last one.
+ContinuousContact Aft::found(double const* U, double* F) const {
+  ContinuousContact out(harmonics_, *law_);
+  out.force(U, F);
+  return out;
+}
+
 ContactPeriod Aft::period(double const* U, Exponents const& e) const {
   ContactPeriod out;
   for (auto* samples : {&out.u, &out.v, &out.f}) samples->resize(size_t(harmonics_.samples()) * columns_);
@@ -216,8 +232,13 @@ ContactPeriod Aft::period(double const* U, Exponents const& e) const {
   multiply(harmonics_, e.s, U, V.data(), columns_);
   whole_transform().to_time(U, out.u.data());
   whole_transform().to_time(V.data(), out.v.data());
+  if (columns_ == 0) return out;
+  if (continuous_) {
+    found(U, V.data()).sample(harmonics_.samples(), out.u.data(), out.f.data());
+    return out;
+  }
   contact::Record record;
-  if (columns_) law_->force(whole(out, e), out.f.data(), record);
+  law_->force(whole(out, e), out.f.data(), record);
   out.unclosed = record.unclosed;
   return out;
 }
@@ -241,12 +262,16 @@ void count(contact::Diagnosis const& diagnosis, ContactSummary& summary) {
 
 }  // namespace
 
-contact::Diagnosis Aft::diagnosis(ContactPeriod const& period, Exponents const& e, bool archard) const {
+contact::Diagnosis Aft::diagnosis(double const* U, ContactPeriod const& period, Exponents const& e,
+                                  bool archard) const {
   const contact::Motion whole = this->whole(period, e);
   contact::Diagnosis out{std::vector<contact::Status>(size_t(whole.samples) * pairs_),
                          std::vector<double>(pairs_), std::vector<double>(pairs_),
                          std::vector<double>(archard ? pairs_ : 0)};
   law_->diagnose(whole, period.f.data(), out);
+  if (!continuous_) return out;
+  std::vector<double> F(size_t(columns_) * harmonics_.block_size());
+  found(U, F.data()).measure(out);
   return out;
 }
 
@@ -255,7 +280,7 @@ Wearing Aft::wearing(double const* U, Exponents const& e) const {
   Wearing out{none, none, none, none};
   if (columns_ == 0 || !law_->wears() || law_->normal() < 0) return out;
   const ContactPeriod now = period(U, e);
-  const contact::Diagnosis found = diagnosis(now, e, true);
+  const contact::Diagnosis found = diagnosis(U, now, e, true);
   const double share = 1.0 / harmonics_.samples();
   out.archard = found.archard;
   for (int t = 0; t < harmonics_.samples(); ++t)
@@ -274,15 +299,22 @@ ContactSummary Aft::summarise(double const* U, Exponents const& e) {
   const size_t n = size_t(columns_) * harmonics_.block_size();
   std::vector<double> F(n), finer(n);
   const ContactPeriod now = period(U, e);
-  whole_transform().to_harmonics(now.f.data(), F.data());
+  if (continuous_)
+    found(U, F.data());
+  else
+    whole_transform().to_harmonics(now.f.data(), F.data());
   std::tie(summary.truncated, summary.total) = whole_transform().truncated_energy(now.f.data(), F.data());
   summary.unclosed = now.unclosed;
 
-  count(diagnosis(now, e, false), summary);
+  count(diagnosis(U, now, e, false), summary);
 
-  if (!doubled_)
-    doubled_ = std::make_shared<Aft>(Harmonics(harmonics_.orders(), 2 * harmonics_.samples()), law_);
-  doubled_->force(U, e, finer.data());
+  if (continuous_) {
+    finer = F;
+  } else {
+    if (!doubled_)
+      doubled_ = std::make_shared<Aft>(Harmonics(harmonics_.orders(), 2 * harmonics_.samples()), law_);
+    doubled_->force(U, e, finer.data());
+  }
   const size_t m = harmonics_.block_size(), mean = harmonics_.orders()[0] == 0;
   for (size_t k = 0; k < n; ++k) {
     summary.aliased += (finer[k] - F[k]) * (finer[k] - F[k]);

@@ -1,6 +1,8 @@
 #pragma once
+#include <optional>
 #include "contact/law.h"
-#include "hb/harmonics.h"
+
+#include "hb/continuous_contact.h"
 
 namespace fretwave::hb {
 
@@ -31,7 +33,8 @@ struct Wearing {
 };
 
 /// Alternating frequency-time for the contact pairs of this rank: harmonic blocks of relative displacement
-/// in, of force out. Blocks are (pairs x components) x block size. Never communicates.
+/// in, of force out. Blocks are (pairs x components) x block size. Never communicates. Laws that are
+/// piecewise linear are not sampled: ContinuousContact has their force; samples are for those who look.
 class Aft {
  public:
   Aft(Harmonics const&, std::shared_ptr<contact::Law const>);
@@ -65,7 +68,8 @@ class Aft {
   static std::vector<Tile> tiles(contact::Law const&, int samples);
   contact::Motion motion(Tile const&, double omega) const;
   contact::Motion whole(ContactPeriod const&, Exponents const&) const;
-  contact::Diagnosis diagnosis(ContactPeriod const&, Exponents const&, bool archard) const;
+  contact::Diagnosis diagnosis(double const* U, ContactPeriod const&, Exponents const&, bool archard) const;
+  ContinuousContact found(double const* U, double* F) const;
   FourierTransform const& transform(Tile const& tile) const {
     return tile.pairs == tiles_.front().pairs ? transform_ : last_transform_;
   }
@@ -78,7 +82,8 @@ class Aft {
   Harmonics harmonics_;
   std::shared_ptr<contact::Law const> law_;
   int pairs_, columns_, law_samples_;  ///< law_samples: half a period when half-wave symmetric
-  std::vector<Tile> tiles_;            ///< of one size but for the last
+  std::optional<ContinuousContact> continuous_;
+  std::vector<Tile> tiles_;  ///< of one size but for the last
   FourierTransform transform_, last_transform_, tangent_transform_;
   std::vector<double> velocity_, u_, v_, f_;
   mutable std::shared_ptr<FourierTransform> whole_transform_;

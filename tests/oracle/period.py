@@ -127,7 +127,8 @@ def hysteresis(law: Jenkins, u: Complex, rest: float = 0.0) -> Hysteresis:
     """The closed period of a slider that stands at `rest` (f = kt (u - rest)) before it is first moved."""
     series = Series(u)
     H = len(u) - 1
-    tau = turning_points(series, max(512, 1 << int(np.ceil(np.log2(16 * H)))))
+    # where a stiff slider drags, u may turn twice within a thousandth of the period
+    tau = turning_points(series, max(1 << 14, 1 << int(np.ceil(np.log2(16 * H)))))
     if not tau:
         raise ValueError("the motion stands still")
     times = [*tau, tau[0] + 2 * np.pi]

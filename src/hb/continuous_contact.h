@@ -1,0 +1,70 @@
+#pragma once
+#include "contact/law.h"
+#include "hb/play.h"
+
+namespace fretwave::hb {
+
+/// Contact whose force is linear in its motion but where a pair changes its state (contact::LinearPair). The
+/// motion is known at every time from its harmonics: the changes are found between samples, to the last
+/// digit, and the force's harmonics are integrals over the pieces between them. So F(U) has no error of
+/// sampling and is as smooth as the law is. Blocks are those of Aft.
+class ContinuousContact {
+ public:
+  ContinuousContact(Harmonics const&, contact::Law const&);
+
+  void force(double const* U, double* F);
+  /// dF/dU at the last force, pairs x (components m) x (components m).
+  std::vector<double> const& blocks();
+  void product(double const* dU, double* dF);
+  /// dF for gaps that grow by dgap (pairs) [m].
+  void gap_product(double const* dgap, double* dF);
+  /// Number of the sequences of states, whenever they begin: it changes where a piece comes or goes.
+  std::uint64_t piece() const;
+  /// f (samples x components x pairs) of the last force at the samples u.
+  void sample(int samples, double const* u, double* f) const;
+  /// Work, slip path and Archard's integral of the last force: sums over slips, not over samples.
+  void measure(contact::Diagnosis&) const;
+
+ private:
+  struct Tangent {
+    Series u;  ///< about its mean
+    double mean = 0;
+    Play::Walls walls;
+    Play play;
+  };
+  struct Pair {
+    contact::LinearPair law;
+    Series approach;          ///< N = kn approach where > 0
+    bool closed = true;       ///< all the period
+    std::vector<Span> spans;  ///< closed in these otherwise
+    std::vector<Tangent> tangents;
+  };
+  /// Of the pairs of a tile, at the times of the grid: samples x components x pairs.
+  struct Grid {
+    std::vector<double> U, V, values, rates;
+  };
+  size_t block(int pair, int component) const {
+    return (size_t(pair) * components_ + component) * harmonics_.block_size();
+  }
+  void evaluate(double const* U, int first, int pairs);
+  void take(double const* U, int pair);
+  void find_spans(Pair&, int place);
+  void find_play(Pair&, int tangent, int place);
+  void normal_force(Pair const&, double* F) const;
+  void tangential_force(Pair const&, Tangent const&, double* F) const;
+  void normal_blocks(Pair const&, double* D, double* by_gap) const;
+  void tangential_blocks(Pair const&, int tangent, double* D, double* by_gap) const;
+  void linearise();
+
+  Harmonics harmonics_, times_;
+  contact::Law const& law_;
+  int components_, normal_, tile_;
+  FourierTransform transform_;
+  Grid grid_;
+  std::vector<double> wave_;  ///< one pair's samples of what is searched for roots
+  std::vector<Pair> pairs_;
+  std::vector<double> D_, by_gap_;
+  bool linearised_ = false;
+};
+
+}  // namespace fretwave::hb

@@ -1,0 +1,146 @@
+#include "hb/trigonometric.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace fretwave::hb {
+
+namespace {
+
+/// e^{i k tau} for k = 1, 2, ...
+struct Powers {
+  Powers(double re, double im, double step_re, double step_im)
+      : cosine(step_re), sine(step_im), x(re), y(im) {}
+  explicit Powers(double tau) : cosine(std::cos(tau)), sine(std::sin(tau)) {}
+  void next() {
+    const double re = x * cosine - y * sine;
+    y = x * sine + y * cosine, x = re;
+  }
+  double cosine, sine, x = 1, y = 0;
+};
+
+}  // namespace
+
+/// Odd and even orders apart: neither chain of powers waits for the other.
+Series::Jet Series::at(double tau) const {
+  const double c = std::cos(tau), s = std::sin(tau), c2 = c * c - s * s, s2 = 2 * c * s;
+  Powers odd(c, s, c2, s2), even(c2, s2, c2, s2);
+  Jet out{{q[0].real(), 0, 0}}, other{};
+  const auto add = [this](size_t n, Powers& e, Jet& to) {
+    const double re = q[n].real(), im = q[n].imag(), k = double(n);
+    const double a = re * e.x - im * e.y, b = k * (re * e.y + im * e.x);
+    to.d[0] += a, to.d[1] -= b, to.d[2] -= k * k * a;
+    e.next();
+  };
+  size_t n = 1;
+  for (; n + 1 < q.size(); n += 2) add(n, odd, out), add(n + 1, even, other);
+  if (n < q.size()) add(n, odd, out);
+  for (int k = 0; k < 3; ++k) out.d[k] += other.d[k];
+  return out;
+}
+
+/// e^{i k (tau + s)} - e^{i k tau} = 2 i sin(k s / 2) e^{i k (tau + s / 2)}
+std::pair<double, double> Series::difference(double tau, double s) const {
+  Powers middle(tau + s / 2), half(s / 2);
+  double value = 0, slope = 0;
+  for (size_t n = 1; n < q.size(); ++n) {
+    middle.next(), half.next();
+    const double re = q[n].real() * middle.x - q[n].imag() * middle.y;
+    const double im = q[n].real() * middle.y + q[n].imag() * middle.x;
+    value -= 2 * half.y * im;
+    slope -= double(n) * (im * half.x + re * half.y);
+  }
+  return {value, slope};
+}
+
+void Arc::set(int highest, double begin, double length) {
+  half_ = length / 2;
+  middle_.resize(highest + 1), sine_.resize(highest + 1), cosine_.resize(highest + 1);
+  middle_[0] = 1, sine_[0] = 0, cosine_[0] = 1;
+  Powers middle(begin + half_), half(half_);
+  for (int k = 1; k <= highest; ++k) {
+    middle.next(), half.next();
+    middle_[k] = {middle.x, middle.y}, sine_[k] = half.y, cosine_[k] = half.x;
+  }
+}
+
+double Arc::integral(Series const& p) const {
+  double sum = p.q[0].real() * length();
+  for (size_t k = 1; k < p.q.size(); ++k) sum += (p.q[k] * integral(int(k))).real();
+  return sum;
+}
+
+/// Of e^{i k c} (e^{i k s} - e^{-i k h}), s from -h to h: 2 h e^{i k c} (sin(x) / x - cos(x) + i sin(x)), x =
+/// k h.
+double Arc::integral_from_begin(Series const& p) const {
+  double sum = 0;
+  for (size_t k = 1; k < p.q.size(); ++k) {
+    const double x = double(k) * half_, x2 = x * x;
+    const double even =
+        x2 > 0.01 ? sine_[k] / x - cosine_[k] : x2 / 3 * (1 - x2 / 10 * (1 - x2 / 28 * (1 - x2 / 54)));
+    const complex at = p.q[k] * middle_[k];
+    sum += at.real() * even - at.imag() * sine_[k];
+  }
+  return length() * sum;
+}
+
+namespace {
+
+/// Roots of one function, isolated by a bound on its second derivative.
+struct Search {
+  Series const& p;
+  int derivative;
+  std::vector<Root>& out;
+  double bent = 0;
+
+  /// Between two times at which the function has these values. None where both have one sign and are farther
+  /// from zero than it can bend; one where they differ and it cannot turn between; else each half is asked.
+  void between(double low, double high, double below, double above, int halvings = 10) {
+    const double step = high - low, bend = step * step * bent;
+    if ((below < 0) == (above < 0)) {
+      if (halvings == 0 || std::min(std::abs(below), std::abs(above)) > bend / 8) return;
+    } else if (halvings == 0 || std::abs(above - below) > bend) {
+      return refine(low, high, below, above);
+    }
+    const double middle = low + step / 2, value = p.at(middle).d[derivative];
+    between(low, middle, below, value, halvings - 1), between(middle, high, value, above, halvings - 1);
+  }
+
+  void refine(double low, double high, double below, double above) {
+    double value = 0;
+    const auto f = [this, &value](double tau) {
+      const Series::Jet jet = p.at(tau);
+      value = jet.d[0];
+      return std::pair(jet.d[derivative], jet.d[derivative + 1]);
+    };
+    const double guess = low + (high - low) * (below / (below - above));
+    const double at = root(f, low, high, guess, below < 0 ? 1 : -1, 1);
+    out.push_back({at, below < 0, value});
+  }
+};
+
+}  // namespace
+
+void find_roots(Series const& p, int derivative, double const* samples, int count, std::vector<Root>& out) {
+  out.clear();
+  if (p.q.size() < 2) return;
+  Search search{p, derivative, out};
+  for (size_t k = 1; k < p.q.size(); ++k) {
+    const double size = std::abs(p.q[k].real()) + std::abs(p.q[k].imag());
+    search.bent += double(k * k) * (derivative ? double(k) : 1.0) * size;
+  }
+  const double step = 2 * std::numbers::pi / count, far = step * step * search.bent / 8;
+  for (int t = 0; t < count; ++t) {
+    const double here = samples[t], after = samples[t + 1 < count ? t + 1 : 0];
+    if ((here > far && after > far) || (here < -far && after < -far)) continue;
+    search.between(t * step, (t + 1) * step, here, after);
+  }
+  // the last one may lie at the period's end by a rounding
+  if (out.size() && out.back().at >= 2 * std::numbers::pi) {
+    out.back().at -= 2 * std::numbers::pi;
+    std::rotate(out.begin(), out.end() - 1, out.end());
+  }
+}
+
+}  // namespace fretwave::hb

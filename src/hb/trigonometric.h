@@ -1,0 +1,72 @@
+#pragma once
+#include <algorithm>
+#include <cmath>
+
+#include "hb/harmonics.h"
+
+namespace fretwave::hb {
+
+/// p(tau) = Re sum_k q_k e^{i k tau}, k = 0 .. H: a motion known at every time of its period.
+struct Series {
+  std::vector<complex> q;
+  /// p and its first two derivatives at tau.
+  struct Jet {
+    double d[3];
+  };
+  Jet at(double tau) const;
+  /// p(tau + s) - p(tau) without the rounding of the two, and p'(tau + s).
+  std::pair<double, double> difference(double tau, double s) const;
+};
+
+/// e^{i k tau} over an arc of the period, k = 0 .. highest, about its middle c with half its length h.
+class Arc {
+ public:
+  Arc(int highest, double begin, double length) { set(highest, begin, length); }
+  Arc() = default;
+  void set(int highest, double begin, double length);
+  double length() const { return 2 * half_; }
+  /// Of e^{i k tau}.
+  complex integral(int k) const { return k ? middle_[k] * (2 * sine_[k] / k) : complex(2 * half_); }
+  /// Of p.
+  double integral(Series const&) const;
+  /// Of p - p(begin), without the rounding of the two.
+  double integral_from_begin(Series const&) const;
+
+ private:
+  double half_ = 0;
+  std::vector<complex> middle_;        ///< e^{i k c}
+  std::vector<double> sine_, cosine_;  ///< of k h
+};
+
+/// Where a derivative of a series changes its sign, and the series itself there.
+struct Root {
+  double at;
+  bool rising;
+  double value;
+};
+
+/// Root of f, which gives value and slope, between `low` and `high`, where it rises (1) or falls (-1) through
+/// zero: Newton from `x`, halved where that leaves what is left of the bracket. To the last digits of x, or
+/// of `size` if that is larger: a last step of 1e-10 of it leaves an error of some 1e-20.
+template <class Function>
+double root(Function f, double low, double high, double x, int sign, double size = 0) {
+  constexpr int most = 60;
+  constexpr double last = 1e-10;
+  for (int k = 0; k < most; ++k) {
+    const auto [value, slope] = f(x);
+    if (value == 0) return x;
+    (sign * value < 0 ? low : high) = x;
+    const double next = x - value / slope, allowed = last * std::max(std::abs(x), size);
+    const bool inside = next >= low && next <= high;
+    if (inside && std::abs(next - x) <= allowed) return next;
+    x = inside && next != x ? next : low + (high - low) / 2;
+    if (high - low <= 1e-6 * allowed) break;
+  }
+  return x;
+}
+
+/// All roots over [0, 2 pi) of the derivative of this order (0 or 1), in their order, from its samples at
+/// 2 pi t / count. However close: a bound on how it bends says where two may hide between samples.
+void find_roots(Series const&, int derivative, double const* samples, int count, std::vector<Root>& out);
+
+}  // namespace fretwave::hb
