@@ -73,7 +73,8 @@ def _length(d):
 
 def _march(u, normal, w, p, f=None):
     """One period of sliders w (2, lanes), which the last sample's disc pulls in first: their end, and which of them
-    slipped by more than rounding. Between samples u and the normal force go straight, from where it closes."""
+    slipped by more than rounding. Between samples u and the normal force go straight, from where it closes; only the
+    direction in which the slider is pulled turns with the path."""
     kt = p["tangential_stiffness"]
     reach = p["friction_coefficient"] / kt
     slipped = np.zeros(u.shape[2], dtype=bool)
@@ -84,8 +85,9 @@ def _march(u, normal, w, p, f=None):
         radius, opened, lands = R1, now.real <= 0, (was.real <= 0) & (now.real > 0)
         share = np.where(lands, now / np.where(lands, now - was, 1.0), 1.0)
         v, d = share * (u[t, 1:] - u[t - 1, 1:]), np.where(lands, 0.0, u[t - 1, 1:] - w)
+        gain = u[(t + 1) % len(u), 1:] - 2 * u[t, 1:] + u[t - 1, 1:]
         sticks = (_length(d + v).real <= R1.real) & (R1.real > 0)
-        kept = np.where(opened, 0.0, np.where(sticks, d + v, _pulled(d, v, R0, R1, lands)))
+        kept = np.where(opened, 0.0, np.where(sticks, d + v, _pulled(d, v, gain, R0, R1, lands)))
         w = np.where(sticks & ~lands, w, u[t, 1:] - kept)
         slipped |= (R1.real == 0) | ~sticks & (_length(d + v).real > R1.real * (1 + 1e-12))
         if f is not None:
@@ -93,11 +95,13 @@ def _march(u, normal, w, p, f=None):
     return w, slipped
 
 
-def _pulled(d, v, R0, R1, lands):
+def _pulled(d, v, gain, R0, R1, lands):
     """The arm d = u - w at the end of a step in which it slips: u goes by v, the radius of its disc from R0 to R1.
+    The next v is larger by `gain`.
 
     It sticks until |d + s v| = R0 + s (R1 - R0); from there tan(phi / 2) falls by exp(-x), phi the angle from v to
-    the arm, x the way over the mean radius, and sinh x is summed to its third term.
+    the arm, x the way over the mean radius, and sinh x is summed to its third term. v is turned before towards the
+    path's direction at the step's end, all the way where x is large.
     """
     rise, way = R1 - R0, _length(v)
     a, b, c = way * way - rise * rise, d[0] * v[0] + d[1] * v[1] - R0 * rise, d[0] * d[0] + d[1] * d[1] - R0 * R0
@@ -108,7 +112,11 @@ def _pulled(d, v, R0, R1, lands):
     s = np.where(lands | (s.real > 1), 1.0, np.where(s.real > 0, s, 0.0))
     at = d + s * v
     r = _length(at)
-    x = 2 * (1 - s) * way / np.where((R1 + r).real > 0, R1 + r, 1.0)
+    per = 2 * (1 - s) / np.where((R1 + r).real > 0, R1 + r, 1.0)
+    tilt = per * (v[0] * gain[1] - v[1] * gain[0]) / (2 * way * (3 + np.sqrt(9 + (per * way) ** 2)))
+    v = v + tilt * np.stack([-v[1], v[0]])
+    way = _length(v)
+    x = per * way
     sinh = x + x**3 / 6 + x**5 / 120
     e, n = v / way, at / r
     half = (e[0] * n[1] - e[1] * n[0]) / (1 + e[0] * n[0] + e[1] * n[1]) / (sinh + np.sqrt(1 + sinh * sinh))

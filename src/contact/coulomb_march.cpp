@@ -31,19 +31,21 @@ FRETWAVE_INLINE Clip clip(double d, double R) {
 FRETWAVE_INLINE void coupled_loop(PairConstants const& p, int samples, int n, double const* u, double* w,
                                   double* f, double* record) {
   double const *kn = p.kn, *kt = p.kt, *reach = p.reach, *load = p.load, *gap = p.gap;
-  double const* before = u + size_t(samples - 1) * 3 * n;
+  double const *before = u + size_t(samples - 1) * 3 * n, *first = u;
   constexpr double tiny = std::numeric_limits<double>::min();
 #pragma omp simd
   for (int i = 0; i < n; ++i) {
     const double elastic = load[i] + kn[i] * (before[i] - gap[i]);
     pull_in(before[n + i], before[2 * n + i], elastic > 0 ? reach[i] * elastic : 0.0, w[i], w[n + i]);
   }
-  for (int t = 0; t < samples; ++t, before = u, u += 3 * n, f += 3 * n, record += record_arrays<true> * n)
+  for (int t = 0; t < samples; ++t, before = u, u += 3 * n, f += 3 * n, record += record_arrays<true> * n) {
+    double const* next = t + 1 < samples ? u + 3 * n : first;
 #pragma omp simd
     for (int i = 0; i < n; ++i) {
       const double was = load[i] + kn[i] * (before[i] - gap[i]), is = load[i] + kn[i] * (u[i] - gap[i]);
       const double u1 = u[n + i], u2 = u[2 * n + i], w1 = w[i], w2 = w[n + i];
       const double all1 = u1 - before[n + i], all2 = u2 - before[2 * n + i];
+      const double gain1 = (next[n + i] - u1) - all1, gain2 = (next[2 * n + i] - u2) - all2;
       const double arm1 = before[n + i] - w1, arm2 = before[2 * n + i] - w2;
       // of the step its closed part; what was open has its slider at u
       const bool open = is <= 0, lands = (was <= 0) & !open;
@@ -54,7 +56,7 @@ FRETWAVE_INLINE void coupled_loop(PairConstants const& p, int samples, int n, do
       const double v1 = share * all1, v2 = share * all2, far1 = u1 - w1, far2 = u2 - w2;
       const double d1 = lands ? v1 : far1, d2 = lands ? v2 : far2;
       const bool stick = (d1 * d1 + d2 * d2 <= R1 * R1) & (R1 > 0), still = stick & !lands;
-      const Slip to = slip(held * arm1, held * arm2, v1, v2, R0, R1, landing);
+      const Slip to = slip(held * arm1, held * arm2, v1, v2, gain1, gain2, R0, R1, landing);
       const double slid1 = R1 * to.m1, slid2 = R1 * to.m2;
       const double kept1 = open ? 0.0 : stick ? d1 : slid1, kept2 = open ? 0.0 : stick ? d2 : slid2;
       const double moved1 = u1 - kept1, moved2 = u2 - kept2;
@@ -69,8 +71,10 @@ FRETWAVE_INLINE void coupled_loop(PairConstants const& p, int samples, int n, do
       record[3 * n + i] = rests ? 0.0 : to.A1, record[4 * n + i] = rests ? 0.0 : to.A2;
       record[5 * n + i] = rests ? 0.0 : share * to.B1, record[6 * n + i] = rests ? 0.0 : share * to.B2;
       const double r0 = lands | rests ? 0.0 : slope * to.r0, r1 = rests ? 0.0 : slope * to.r1;
-      record[7 * n + i] = share * rate + r0, record[8 * n + i] = (1 - share) * rate + r1;
+      record[7 * n + i] = rests ? 0.0 : to.G1, record[8 * n + i] = rests ? 0.0 : to.G2;
+      record[9 * n + i] = share * rate + r0, record[10 * n + i] = (1 - share) * rate + r1;
     }
+  }
 }
 
 FRETWAVE_INLINE void alone_loop(PairConstants const& p, int samples, int n, double const* u, double* w,
@@ -94,10 +98,12 @@ struct Arm {
 };
 
 FRETWAVE_INLINE Arm coupled_step(double const* r, int pairs, int k, double reach, double kn, double dn0,
-                                 double dn1, double d1, double d2, double v1, double v2) {
+                                 double dn1, double d1, double d2, double v1, double v2, double a1,
+                                 double a2) {
   const double s = r[k], m1 = r[pairs + k], m2 = r[2 * pairs + k], kept = s > 0 ? s : 0.0;
   const double across = r[3 * pairs + k] * d1 + r[4 * pairs + k] * d2 + r[5 * pairs + k] * v1 +
-                        r[6 * pairs + k] * v2 + r[7 * pairs + k] * dn0 + r[8 * pairs + k] * dn1;
+                        r[6 * pairs + k] * v2 + r[7 * pairs + k] * a1 + r[8 * pairs + k] * a2 +
+                        r[9 * pairs + k] * dn0 + r[10 * pairs + k] * dn1;
   const double along = s == 0 ? reach * kn * dn1 : 0.0;
   return {kept * (d1 + v1) + m1 * along - m2 * across, kept * (d2 + v2) + m2 * along + m1 * across,
           s < 0 ? 0.0 : 1.0};
@@ -114,24 +120,29 @@ FRETWAVE_INLINE Arm alone_step(double const* r, int pairs, int k, double reach, 
 template <bool Coupled, bool OnePair, bool Force>
 FRETWAVE_INLINE void linear_loop(PairConstants const& p, int samples, int pairs, int pair, int n,
                                  double const* record, double const* du, double* dw, double* df) {
-  double const *kn = p.kn, *kt = p.kt, *reach = p.reach, *before = du + size_t(samples - 1) * 3 * n;
+  double const *kn = p.kn, *kt = p.kt, *reach = p.reach, *before = du + size_t(samples - 1) * 3 * n,
+               *first = du;
   for (int t = 0; t < samples;
-       ++t, before = du, du += 3 * n, df += Force ? 3 * n : 0, record += record_arrays<Coupled> * pairs)
+       ++t, before = du, du += 3 * n, df += Force ? 3 * n : 0, record += record_arrays<Coupled> * pairs) {
+    double const* next = t + 1 < samples ? du + 3 * n : first;
 #pragma omp simd
     for (int i = 0; i < n; ++i) {
       const int k = OnePair ? pair : i;
       const double x1 = du[n + i] - dw[i], x2 = du[2 * n + i] - dw[n + i];
       Arm to;
-      if constexpr (Coupled)
+      if constexpr (Coupled) {
+        const double v1 = du[n + i] - before[n + i], v2 = du[2 * n + i] - before[2 * n + i];
         to = coupled_step(record, pairs, k, reach[k], kn[k], before[i], du[i], before[n + i] - dw[i],
-                          before[2 * n + i] - dw[n + i], du[n + i] - before[n + i],
-                          du[2 * n + i] - before[2 * n + i]);
-      else
+                          before[2 * n + i] - dw[n + i], v1, v2, next[n + i] - du[n + i] - v1,
+                          next[2 * n + i] - du[2 * n + i] - v2);
+      } else {
         to = alone_step(record, pairs, k, reach[k], kn[k], du[i], x1, x2);
+      }
       dw[i] += x1 - to.y1, dw[n + i] += x2 - to.y2;
       if constexpr (Force)
         df[i] = to.closed * kn[k] * du[i], df[n + i] = kt[k] * to.y1, df[2 * n + i] = kt[k] * to.y2;
     }
+  }
 }
 
 template <bool Coupled>
@@ -187,26 +198,29 @@ FRETWAVE_VECTORISE void linear_alone(PairConstants const& p, int samples, int pa
 
 FRETWAVE_VECTORISE void shoot(int samples, int n, double const* discs, double* start, double* end,
                               double* A) {
-  double const* before = discs + size_t(samples - 1) * 3 * n;
+  double const *before = discs + size_t(samples - 1) * 3 * n, *first = discs;
 #pragma omp simd
   for (int i = 0; i < n; ++i) {
     pull_in(before[i], before[n + i], before[2 * n + i], start[i], start[n + i]);
     end[i] = start[i], end[n + i] = start[n + i];
     A[i] = A[3 * n + i] = 1, A[n + i] = A[2 * n + i] = 0;
   }
-  for (int t = 0; t < samples; ++t, before = discs, discs += 3 * n)
+  for (int t = 0; t < samples; ++t, before = discs, discs += 3 * n) {
+    double const* next = t + 1 < samples ? discs + 3 * n : first;
 #pragma omp simd
     for (int i = 0; i < n; ++i) {
       const double w1 = end[i], w2 = end[n + i], R = discs[2 * n + i];
       const double d1 = discs[i] - w1, d2 = discs[n + i] - w2;
       const bool stick = (d1 * d1 + d2 * d2 <= R * R) & (R > 0);
-      const Slip to = slip(before[i] - w1, before[n + i] - w2, discs[i] - before[i],
-                           discs[n + i] - before[n + i], before[2 * n + i], R, 0);
+      const double v1 = discs[i] - before[i], v2 = discs[n + i] - before[n + i];
+      const Slip to = slip(before[i] - w1, before[n + i] - w2, v1, v2, next[i] - discs[i] - v1,
+                           next[n + i] - discs[n + i] - v2, before[2 * n + i], R, 0);
       end[i] = stick ? w1 : discs[i] - R * to.m1, end[n + i] = stick ? w2 : discs[n + i] - R * to.m2;
       const double one = to.A1 * A[i] + to.A2 * A[2 * n + i], two = to.A1 * A[n + i] + to.A2 * A[3 * n + i];
       A[i] = stick ? A[i] : -to.m2 * one, A[n + i] = stick ? A[n + i] : -to.m2 * two;
       A[2 * n + i] = stick ? A[2 * n + i] : to.m1 * one, A[3 * n + i] = stick ? A[3 * n + i] : to.m1 * two;
     }
+  }
 }
 
 FRETWAVE_VECTORISE void farthest(int samples, int n, double const* discs, double const* w, double* excess,

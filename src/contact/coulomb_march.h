@@ -3,11 +3,11 @@
 
 /// The inner loops of 3-D Coulomb contact: pairs innermost, no branches, no memory but their arguments.
 ///
-/// A slider w with T = kt (u - w) is a point inside the disc of radius R = mu N / kt about u. Between two
-/// samples u goes straight and N linearly until it opens or from where it closes, and the slider is pulled
-/// along its exact path (`slip`): of second order in the step also where the path bends. Projecting it onto
-/// the last disc instead (implicit Euler) is of first order there. In the uncoupled law each tangent is
-/// clipped to its own interval.
+/// A slider w with T = kt (u - w) is a point inside the disc of radius R = mu N / kt about u, which sweeps it
+/// (Moreau). Between two samples u goes straight and N linearly until the pair opens or from where it closes,
+/// and the slider follows its exact path (`slip`). Projecting it onto each sample's disc instead (implicit
+/// Euler) is of first order where the path bends. In the uncoupled law each tangent is clipped to its own
+/// interval.
 namespace fretwave::contact {
 
 /// Of the pairs in a march, one value each; reach = mu / kt.
@@ -17,11 +17,12 @@ struct PairConstants {
 
 /// Arrays of the record, samples x these x pairs. Coupled, of the step that ends at the sample, for the arm
 /// d = u - w with dv = du - du', dd' = du' - dw' of the sample before:
-///   dd = s (dd' + dv) + reach dN m + m' (A dd' + B dv + r' du_n' + r du_n),  m' = (-m2, m1)
-/// s (1 stick, less where it closes within the step, 0 slip, -1 open), m, A, B, r', r; the term in dN for s =
-/// 0 alone. Uncoupled: 1 if closed; for each tangent 2 stick, +-1 slip, 0 open.
+///   dd = s (dd' + dv) + reach dN m + m' (A dd' + B dv + G da + r' du_n' + r du_n),  m' = (-m2, m1)
+/// s (1 stick, less where it closes within the step, 0 slip, -1 open), m, A, B, G, r', r; the term in dN for
+/// s = 0 alone; a is what v gains until the next sample. Uncoupled: 1 if closed; for each tangent 2 stick,
+/// +-1 slip, 0 open.
 template <bool Coupled>
-constexpr int record_arrays = Coupled ? 9 : 3;
+constexpr int record_arrays = Coupled ? 11 : 3;
 
 /// Forces and record over one period of u (samples x 3 x n); sliders w (2 x n) at its start in, at its end
 /// out. The coupled period starts at its last sample, whose disc pulls sliders in that lie outside.
