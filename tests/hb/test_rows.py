@@ -60,7 +60,7 @@ def test_a_row_is_observed_in_a_response(comm):
     assert abs(ROW @ q) == pytest.approx(branch["amplitude"][len(branch) // 2], rel=TIGHT)
 
 
-def test_a_modal_coordinate_is_that_of_unit_modal_mass(comm):
+def test_a_modal_coordinate_is_that_of_unit_modal_mass(comm, shared_tmp):
     """Of the linear mode itself phi^T M (a phi) = a: omega as without contact, motion a phi."""
     with fw.Model(np.diag(np.arange(1.0, N + 1)), chain(N), comm=comm) as model:
         second = fw.linear_modes(model, 2)[1]
@@ -69,6 +69,11 @@ def test_a_modal_coordinate_is_that_of_unit_modal_mass(comm):
         np.testing.assert_allclose(branch["omega"], second.omega, rtol=TIGHT)
         np.testing.assert_allclose(branch.shape(0), 0.1 * second.shape, atol=TIGHT)
         assert "coordinate" in repr(mode)
+        branch.save(shared_tmp / "branch.h5")
+    comm.barrier()
+    for one in (branch, branch.at(0.5), fw.Branch.load(shared_tmp / "branch.h5")):
+        assert one.units["amplitude"] == "sqrt(kg) m" and one.units["omega"] == "rad/s"
+    assert branch.plot().axes[1].get_xlabel() == "Amplitude [sqrt(kg) m]"
 
 
 @pytest.mark.ranks(1, 2, 3)
