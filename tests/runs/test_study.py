@@ -19,7 +19,7 @@ def solve(settings: Settings, extra=()) -> Outcome:
     amplitude = np.concatenate([common_amplitudes(0.1, 1.0, 5), extra])
     zeta = 0.04 * amplitude * (1.0 + 1.0 / settings.harmonics**2)
     omega = np.full_like(amplitude, 25.0 * (1.0 + 1.0 / settings.samples))
-    estimate = np.full_like(amplitude, 25.0 * 0.008 / settings.harmonics**2)
+    estimate = np.outer(np.full_like(amplitude, 25.0 * 0.008 / settings.harmonics**2), [1.0, 0.0, 0.0])
     return Outcome(amplitude, omega, zeta, estimate, float(zeta.max()), 1.0, 50, 150, 0.01 * settings.harmonics)
 
 
@@ -52,6 +52,8 @@ def test_errors_are_measured_against_the_finest_run():
     # at the five amplitudes zeta is off by 0.04 a (1 - 1/49), an estimate of 0.008 is 0.3 to 1.4 of that
     ratios = 0.008 / (0.04 * study.amplitudes * (1.0 - 1.0 / 49.0))
     assert first["within_3"] == np.mean((ratios < 3) & (ratios > 1 / 3)) < 1 == first["within_10"]
+    rows = [row for row in study.calibration() if row["sweep"] == "harmonics" and row["harmonics"] == 1]
+    assert [row["estimate"] / row["error"] for row in rows] == pytest.approx(ratios, rel=1e-2)  # zeta is small
     samples = next(row for row in study.table() if row["sweep"] == "samples")
     assert samples["omega_error"] == pytest.approx((1.0 + 1.0 / 64.0) / (1.0 + 1.0 / 256.0) - 1.0)
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 #: Raised where results are too few or too extreme for a picture.
 OF_RESULTS = (ArithmeticError, ValueError, IndexError, LinAlgError)
 #: Of no analysis.
-OTHERS = ("study",)
+OTHERS = ("study", "calibration")
 
 
 def families() -> list[tuple[str, Family]]:

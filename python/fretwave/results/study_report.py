@@ -61,7 +61,7 @@ def markdown(
     """Aligned Markdown table with its legend; readable as plain text too."""
     reduced = any(row.get("component_modes", -1) != -1 for row in rows)
     shown = {name: form for name, form in printed.items() if name != "modes" or reduced}
-    body = [[form.format(**row) for form in shown.values()] for row in rows]
+    body = [[form.format(**row).replace("nan%", "-") for form in shown.values()] for row in rows]
     for cells, row in zip(body, rows):
         cells[0] += " (finest)" if row["reference"] else ""
     widths = [max(len(line[i]) for line in (list(shown), *body)) for i in range(len(shown))]

@@ -26,6 +26,7 @@ from ..console import Console
 from ..errors import EXIT_DONE, InputError, NotConverged
 from ..files.csv_table import write_rows
 from ..files.whole import replace_text
+from ..hb.states import SOURCES
 from ..mpi.guard import on_first_rank
 from ..mpi.petsc_options import AnalysisOptions
 from ..results.runfolder import read_copy
@@ -174,7 +175,8 @@ class _Solver:
 def _row(problem: NonlinearMode, point: Point) -> dict[str, Any]:
     state = problem.state(point.y)
     reported = "report" in point.event
-    estimate = problem.errors(point.y, point.tangent)["omega_error"] if reported else np.nan
+    found = problem.errors(point.y, point.tangent if reported else None)
+    estimate = [found[f"lambda_error_{source}"] for source in SOURCES]
     return {**{key: state[key] for key in ("amplitude", "omega", "zeta")}, "estimate": estimate, "reported": reported}
 
 
@@ -192,11 +194,13 @@ def _write(study: Study, folder: Path, console: Console) -> None:
 
     rows, notes = study.table(), _notes(study)
     write_rows(folder / "study.csv", rows)
+    write_rows(folder / "calibration.csv", study.calibration())
     replace_text(folder / "study.md", markdown(rows, notes))
-    pictures = plot_run(folder, ["study"])
+    pictures = plot_run(folder, ["study", "calibration"])
     for line in markdown(rows, notes).splitlines():
         console.line(line)
-    console.line(f"written: {', '.join(str(path) for path in (folder / 'study.csv', folder / 'study.md', *pictures))}")
+    written = [*(folder / name for name in ("study.csv", "study.md", "calibration.csv")), *pictures]
+    console.line(f"written: {', '.join(str(path) for path in written)}")
 
 
 def _notes(study: Study) -> list[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -10,11 +10,14 @@ import numpy as np
 import numpy.typing as npt
 
 from ..arrays import Array
+from ..hb.states import SOURCES
 
 #: a reported point belongs to an amplitude when it is this near; a loose Newton tolerance lets it miss by about itself
 MATCH = 1e-2
 #: of lambda [1/s]: below it a difference of two runs is what their solvers leave
 LEAST_ERROR = 1e-8
+#: What a sweep's runs differ by from the finest
+SOURCE_OF = {"harmonics": "harmonics", "samples": "samples", "tolerance": "solver"}
 
 
 @dataclass(frozen=True)
@@ -41,7 +44,7 @@ class Outcome:
     Attributes
     ----------
     amplitude, omega, zeta : (n,) at the reported points, in the order of the branch
-    estimate : (n,) estimated error of lambda there [1/s]
+    estimate : (n, 3) estimated errors of lambda there [1/s], by `SOURCES`
     peak_zeta, peak_amplitude : largest damping ratio and where it is
     wall_s : time of the whole branch [s]
     """
@@ -132,7 +135,6 @@ class Study:
         run = self.outcomes[settings]
         omega, zeta, estimate = _values(run, self.compared)
         omega_true, zeta_true, _ = _values(reference, self.compared)
-        within = _calibration(estimate, np.abs(_eigenvalue(omega, zeta) - _eigenvalue(omega_true, zeta_true)))
         return {
             "sweep": sweep,
             "harmonics": settings.harmonics,
@@ -146,11 +148,33 @@ class Study:
             "peak_zeta": run.peak_zeta,
             "peak_amplitude": run.peak_amplitude,
             "peak_zeta_error": abs(run.peak_zeta / reference.peak_zeta - 1.0),
-            "zeta_error_estimate": _largest(estimate / omega_true) / abs(reference.peak_zeta),
-            **within,
+            "zeta_error_estimate": _largest(estimate.sum(axis=1) / omega_true) / abs(reference.peak_zeta),
+            **_shares(self._ratios(sweep, settings, reference)),
             "component_modes": -1 if settings.component_modes is None else settings.component_modes,
             "reference": int(settings == self.plan.reference),
         }
+
+    def calibration(self) -> list[dict[str, Any]]:
+        """Estimated and true error of lambda [1/s] by run and amplitude, of the source that the sweep is over.
+
+        What the others add is the same in a run and in the finest, to which it is compared.
+        """
+        reference = self.outcomes.get(self.plan.reference)
+        known = [(sweep, settings) for sweep, settings in self.plan.sweeps() if settings in self.outcomes]
+        if reference is None:
+            return []
+        return [row for sweep, settings in known for row in self._ratios(sweep, settings, reference)]
+
+    def _ratios(self, sweep: str, settings: Settings, reference: Outcome) -> list[dict[str, Any]]:
+        if sweep not in SOURCE_OF or settings == self.plan.reference:
+            return []
+        omega, zeta, estimate = _values(self.outcomes[settings], self.compared)
+        omega_true, zeta_true, _ = _values(reference, self.compared)
+        error = np.abs(_eigenvalue(omega, zeta) - _eigenvalue(omega_true, zeta_true))
+        own = {"sweep": sweep, "harmonics": settings.harmonics, "samples": settings.samples}
+        own["tolerance"] = settings.tolerance
+        guessed = estimate[:, SOURCES.index(SOURCE_OF[sweep])]
+        return [{**own, "amplitude": a, "error": e, "estimate": g} for a, e, g in zip(self.compared, error, guessed)]
 
 
 def _eigenvalue(omega: Array, zeta: Array) -> npt.NDArray[np.complex128]:
@@ -158,12 +182,11 @@ def _eigenvalue(omega: Array, zeta: Array) -> npt.NDArray[np.complex128]:
     return np.asarray(omega * (1j - zeta / np.sqrt(1 - zeta**2)))
 
 
-def _calibration(estimate: Array, error: Array) -> dict[str, float]:
+def _shares(rows: Sequence[Mapping[str, Any]]) -> dict[str, float]:
     """Shares of the points at which an estimate is within a factor of the error, where that can be told."""
-    told = error > LEAST_ERROR
-    ratio = estimate[told] / error[told]
+    ratio = np.array([row["estimate"] / row["error"] for row in rows if row["error"] > LEAST_ERROR])
     return {
-        f"within_{factor}": float(np.mean((ratio <= factor) & (ratio >= 1 / factor))) if told.any() else np.nan
+        f"within_{factor}": float(np.mean((ratio <= factor) & (ratio >= 1 / factor))) if len(ratio) else np.nan
         for factor in (3, 10)
     }
 
