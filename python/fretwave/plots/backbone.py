@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ..arrays import AnyArray
 from ..post.mode_curve import NO_DAMPING
 from ..results.reader import Analysis, Run, Table
 from . import style
@@ -57,10 +58,20 @@ def _curves(axes: Axes, modes: Sequence[Analysis], column: str) -> None:
     for mode, colour, line in zip(modes, style.PALETTE, LINES):
         curve = mode.curve()
         axes.plot(curve["amplitude"], factor * curve[column], color=colour, linestyle=line, label=_name(mode))
+        error = error_of(curve, column)
+        if error is not None:
+            style.error_band(axes, curve["amplitude"], factor * curve[column], factor * error, colour)
     points = modes[0].met("fold")
     if points:
         amplitude, values = modes[0].columns["amplitude"][points], factor * modes[0].columns[column][points]
         axes.plot(amplitude, values, "D", color=style.INK, markersize=4.5, label="fold in amplitude", zorder=5)
+
+
+def error_of(table: Mapping[str, AnyArray] | Table, column: str) -> AnyArray | None:
+    """The estimated error of frequency or damping in their own unit; results of before have none."""
+    if column == "zeta":
+        return table["zeta_error"] if "zeta_error" in table else None
+    return table["omega_error"] / (2 * np.pi) if "omega_error" in table else None
 
 
 def _close_up(axes: Axes, modes: Sequence[Analysis], column: str, place: tuple[float, ...]) -> None:

@@ -110,6 +110,20 @@ def fit_values(axes: Axes, x: AnyArray, y: AnyArray, shown: Sequence[float], oth
         axes.set_ylim(inside.min() - room, inside.max() + room)
 
 
+#: of the values' range, beyond which a band of errors is not drawn: the axis is the curve's
+BEYOND = 0.3
+
+
+def error_band(axes: Axes, x: AnyArray, y: AnyArray, error: AnyArray, colour: Any) -> None:
+    """The estimated error about a curve; nothing where it is not known."""
+    known = np.isfinite(error)
+    if not known.any():
+        return
+    room = BEYOND * float(np.ptp(y))
+    around = [np.clip(y + sign * np.where(known, error, 0.0), y.min() - room, y.max() + room) for sign in (-1, 1)]
+    axes.fill_between(x, *around, where=known.tolist(), color=colour, alpha=0.22, lw=0, zorder=1)
+
+
 def plain_numbers(axis: Axis, values: AnyArray | Sequence[float] = (1.0, 10.0)) -> None:
     """Ticks of a logarithmic axis at 1, 2, 5 of each decade (closer within one), as 0.05 and not as a power."""
     short = np.max(values) < 8.0 * np.min(values)

@@ -21,6 +21,7 @@ from ..results.file import open_results
 from ..results.reader import Analysis, Run, Table
 from ..results.sweep_summary import split_of
 from . import style
+from .backbone import error_of
 
 #: more branches than these are told apart by a colour bar
 NAMED = 10
@@ -123,8 +124,12 @@ def backbones(swept: Swept) -> Figure:
     """Frequency above damping, over a common logarithmic amplitude axis."""
     figure, (upper, lower) = style.new_figure(6.6, rows=2, sharex=True)
     for number, part, table in swept.branches:
-        upper.plot(table["amplitude"], table["frequency_hz"], **swept.look(number, part))
-        lower.plot(table["amplitude"], 100.0 * table["zeta"], **swept.look(number, part))
+        look = swept.look(number, part)
+        for axes, column, factor in ((upper, "frequency_hz", 1.0), (lower, "zeta", 100.0)):
+            axes.plot(table["amplitude"], factor * table[column], **look)
+            error = error_of(table, column)
+            if error is not None:
+                style.error_band(axes, table["amplitude"], factor * table[column], factor * error, look["color"])
     if (swept.analysis.columns["zeta"] < -TINY).any():
         lower.axhline(0.0, color=style.INK, linewidth=1.0, zorder=1)
     _asymptotes(upper, swept)
