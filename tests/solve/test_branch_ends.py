@@ -135,7 +135,7 @@ def elastic_slider(comm, two_dof, stiffness):
 @pytest.mark.parametrize("stiffness", [1e6, 1e8, 1e10, 1e12])
 def test_stiff_sliders_are_followed(two_dof, comm, stiffness):
     """From stuck to free, by a first slip over 5 N / kt. Zeta at the peak is that of the oracle."""
-    problem = mode_problem(elastic_slider(comm, two_dof, stiffness), [1, 3, 5, 7], 256, start="stuck")
+    problem = mode_problem(elastic_slider(comm, two_dof, stiffness), [1, 3, 5, 7], 16, start="stuck")
     branch, points = follow(problem, LOW, HIGH)
     assert branch.converged, branch.reason
     states = [problem.state(p.y) for p in points]
