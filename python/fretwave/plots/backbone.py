@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from ..arrays import AnyArray
 from ..post.mode_curve import NO_DAMPING
 from ..results.reader import Analysis, Run, Table
+from ..solve.table import Table as Reading
 from . import style
 
 #: analyses belong in one picture when their stuck asymptotes agree to this relative difference
@@ -67,7 +68,7 @@ def _curves(axes: Axes, modes: Sequence[Analysis], column: str) -> None:
         axes.plot(amplitude, values, "D", color=style.INK, markersize=4.5, label="fold in amplitude", zorder=5)
 
 
-def error_of(table: Mapping[str, AnyArray] | Table, column: str) -> AnyArray | None:
+def error_of(table: Reading | Table, column: str) -> AnyArray | None:
     """The estimated error of frequency or damping in their own unit; results of before have none."""
     if column == "zeta":
         return table["zeta_error"] if "zeta_error" in table else None
@@ -183,6 +184,8 @@ def _finish(figure: Figure, upper: Axes, lower: Axes, modes: Sequence[Analysis])
     upper.set_ylabel(style.label("Frequency ω/2π", "Hz"))
     lower.set_ylabel(style.label("Damping ratio ζ", "%"))
     lower.set_xlabel(style.label(f"Modal amplitude of {dof}".rstrip(" of"), mode.unit("amplitude")))
+    if any("zeta_error" in m.columns and np.isfinite(m.columns["zeta_error"]).any() for m in modes):
+        style.band_entry(lower)
     style.legend_outside(figure, lower, columns=2)
 
 

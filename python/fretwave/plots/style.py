@@ -124,6 +124,11 @@ def error_band(axes: Axes, x: AnyArray, y: AnyArray, error: AnyArray, colour: An
     axes.fill_between(x, *around, where=known.tolist(), color=colour, alpha=0.22, lw=0, zorder=1)
 
 
+def band_entry(axes: Axes) -> None:
+    """The legend's word on error bands."""
+    axes.plot([], [], color=GREY, alpha=0.3, linewidth=9, label="estimated error")
+
+
 def plain_numbers(axis: Axis, values: AnyArray | Sequence[float] = (1.0, 10.0)) -> None:
     """Ticks of a logarithmic axis at 1, 2, 5 of each decade (closer within one), as 0.05 and not as a power."""
     short = np.max(values) < 8.0 * np.min(values)

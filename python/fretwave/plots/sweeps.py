@@ -138,6 +138,8 @@ def backbones(swept: Swept) -> Figure:
     lower.set_ylabel(style.label("Damping ratio ζ", "%"))
     dof = swept.analysis.attributes.get("normalise", "")
     lower.set_xlabel(style.label(f"Modal amplitude of {dof}".rstrip(" of"), swept.unit("m")))
+    if any("zeta_error" in table and np.isfinite(table["zeta_error"]).any() for _, _, table in swept.branches):
+        style.band_entry(upper)
     _name(figure, [upper, lower], swept)
     return figure
 
