@@ -1,0 +1,132 @@
+#!/usr/bin/env python3
+"""Error of omega and zeta against time, and error estimates against errors, of every case: makes cases/ACCURACY.md.
+
+    OMP_NUM_THREADS=1 .venv/bin/python cases/accuracy/page.py [NAME ...] [--out FOLDER]
+
+from the top folder runs `fretwave study` on every scene below (or on those named) into FOLDER (runs/accuracy), one
+process each; what is there already is taken as it is. The page and its pictures are written from all of them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import platform
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+HERE = Path(__file__).parent
+TOP = HERE.parents[1]
+PAGE, PICTURES = HERE.parent / "ACCURACY.md", HERE / "pictures"
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A study: case, analysis, and what it sweeps."""
+
+    title: str
+    case: str
+    analysis: str
+    options: tuple[str, ...] = ()
+    says: str = ""
+
+
+FEW = ("--tolerance", "1e-10", "--repeats", "1")
+SCENES = {
+    "two_dof": Scene("Two-dof oscillator, complex mode, tanh friction", "two_dof", "mode", ("--repeats", "1")),
+    "two_dof_epmc": Scene("The same, EPMC", "two_dof", "mode_epmc", ("--repeats", "1")),
+    "blisk_lumped": Scene(
+        "Lumped blisk, a wave of 4 nodal diameters, Jenkins sliders",
+        "blisk_lumped",
+        "mode",
+        ("--harmonics", "3,7,15,31", "--samples", "128,512,2048", *FEW),
+        "The changes of these sliders are found in continuous time: no number of samples changes a digit.",
+    ),
+    "blade_root": Scene(
+        "Blade in a dovetail, reduced, three-dimensional friction (short form of the mesh)",
+        "blade_root_retained",
+        "mode",
+        ("--quick", "--harmonics", "3,5,9", "--samples", "64,128,256", *FEW),
+    ),
+    "blisk_ring": Scene(
+        "Blisk with a friction ring, a travelling wave on the sector (short form of the mesh)",
+        "blisk_ring",
+        "mode",
+        ("--quick", "--harmonics", "3,5,9", "--samples", "90,180,360", *FEW),
+    ),
+}
+
+HEAD = """# How far results are from the truth
+
+Every point of a branch says how wrong it may be: `omega_error`, `zeta_error`, `amplitude_error`, and by source what
+harmonics, samples and solver add (`lambda_error_*`, `amplitude_error_*`). The estimate is one Newton step on the
+harmonics up to 2 H + 1 and four times the samples, at the same amplitude
+([`discretisation_error.h`](../src/hb/discretisation_error.h)). Here it is held against the error itself: each run of
+a sweep against the finest one of the study (whose own error is in the column `estimated`), at 24 amplitudes from
+stick to full slip. Against *exact* motions, with no finer run in between, see [accuracy](accuracy/README.md).
+
+`within 3` is the share of amplitudes at which the estimated error of lambda is within a factor of 3 of the error,
+source by source. Errors of zeta are the largest of all amplitudes over the peak. Pictures: error over time left and
+right, estimate over error below.
+"""
+
+
+def study(name: str, scene: Scene, folder: Path) -> str:
+    """Run it, unless it is there; returns why it has no table, or nothing."""
+    out = folder / name
+    if (out / "study.md").exists():
+        return ""
+    command = [sys.executable, "-m", "fretwave", "study", str(TOP / "cases" / scene.case / "case.toml")]
+    done = subprocess.run(
+        [*command, "--analysis", scene.analysis, *scene.options, "--out", str(out)], capture_output=True, text=True
+    )
+    print(done.stdout, end="")
+    return "" if (out / "study.md").exists() else done.stderr.strip() or f"ended with code {done.returncode}"
+
+
+def section(name: str, scene: Scene, folder: Path) -> list[str]:
+    """Heading, table and pictures."""
+    lines = [f"## {scene.title}", "", *([scene.says, ""] if scene.says else [])]
+    table, _, notes = (folder / name / "study.md").read_text().partition("\n\n")
+    command = " ".join(["fretwave study", f"cases/{scene.case}/case.toml --analysis {scene.analysis}", *scene.options])
+    lines += ["```bash", command, "```", "", table, ""]
+    lines += [line for line in notes.splitlines()[1:] if line.strip()] + [""]
+    for kind in ("study", "calibration"):
+        if (folder / name / f"{kind}.png").exists():
+            shutil.copyfile(folder / name / f"{kind}.png", PICTURES / f"{name}_{kind}.png")
+            lines += [f"![{scene.title}: {kind}](accuracy/pictures/{name}_{kind}.png)", ""]
+    return lines
+
+
+def machine(folder: Path) -> str:
+    """Where it was measured."""
+    record = json.loads(next(iter(sorted(folder.glob("*/run.json")))).read_text())
+    versions = ", ".join(f"{what} {number}" for what, number in record.get("versions", {}).items())
+    return f"Measured on one thread of {platform.machine()}, {platform.system()}; {versions}."
+
+
+def main() -> None:
+    """Studies, then the page."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("names", nargs="*", choices=[[], *SCENES])
+    parser.add_argument("--out", type=Path, default=TOP / "runs" / "accuracy")
+    options = parser.parse_args()
+    failed = {}
+    for name in options.names or SCENES:
+        why = study(name, SCENES[name], options.out)
+        if why:
+            failed[name] = why
+    made = [name for name in SCENES if (options.out / name / "study.md").exists()]
+    lines = [HEAD, *(line for name in made for line in section(name, SCENES[name], options.out))]
+    lines += ["## What failed", ""]
+    lines += [f"* {SCENES[name].title}: {why}" for name, why in failed.items()] or ["No study."]
+    lines += ["", machine(options.out), ""]
+    PAGE.write_text("\n".join(lines))
+    print(f"written: {PAGE}")
+
+
+if __name__ == "__main__":
+    main()
