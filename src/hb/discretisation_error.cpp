@@ -9,7 +9,8 @@ namespace fretwave::hb {
 
 namespace {
 
-constexpr double tolerance = 1e-4;  // of the linear systems: an error is wanted to a digit or two
+constexpr double tolerance = 1e-4;   // of the linear systems: an error is wanted to a digit or two
+constexpr double negligible = 1e-6;  // share of the residual, below which a source is not solved for
 constexpr double reach = 0.3;  // arclength along the branch, in the unit of a step: the default longest one
 
 /// Whether it is so for the contacts of all ranks.
@@ -73,6 +74,12 @@ void DiscretisationError::close(Vec y, Vec tangent) {
 
 namespace {
 
+double norm(Vec v) {
+  double length;
+  check(VecNorm(v, NORM_2, &length));
+  return length;
+}
+
 /// Scalars of dy' + s t without a change of the last of `count`, the parameter.
 std::vector<double> at_parameter(std::vector<double> change, std::vector<double> const& tangent, int count) {
   const double s = -change[count - 1] / tangent[count - 1];
@@ -91,16 +98,19 @@ std::optional<LeftOut> DiscretisationError::at(Vec y, Vec tangent) {
   VecHandle same = retained(finer);
   check(VecAXPY(finer, -1, same));  // harmonics: r'_new
   check(VecAXPY(same, -1, left));   // samples: r'_old - r
+  const double share = norm(left) / (norm(finer) + norm(same));
+  const size_t sources = share <= negligible ? 2 : 3;
   VecHandle b[] = {right_side(finer), right_side(same), right_side(left)}, x[3];
   for (auto& v : x) v = solve::zero_like(b[0]);
   close(y, tangent);
-  if (!newton_->linear(point, b, x)) return {};
+  if (!newton_->linear(point, std::span(b, sources), std::span(x, sources))) return {};
   const auto along = problem_.scalars(tangent);
   const auto change = [&](Vec v) { return at_parameter(finer_->scalars(v), along, problem_.scalar_count()); };
   LeftOut out{change(x[0]), change(x[1]), change(x[2]), {}};
-  check(VecAXPY(x[0], 1, x[1]));
-  check(VecAXPY(x[0], 1, x[2]));
+  for (size_t k = 1; k < sources; ++k) check(VecAXPY(x[0], 1, x[k]));
   out.all = change(x[0]);
+  if (sources == 2)  // by the size of its residual
+    std::transform(out.all.begin(), out.all.end(), out.solver.begin(), [=](double v) { return share * v; });
   return out;
 }
 

@@ -27,9 +27,10 @@ PRINTED = {
 
 LEGEND = (
     "Errors are against the finest run (marked): of peak zeta relative; of zeta the largest over the amplitudes that "
-    "all runs meet exactly once, divided by the peak; of omega the largest relative one over the same. Estimated "
-    "is the error of zeta as the run itself estimates it; within 3 and 10: the share of the amplitudes at which the "
-    "estimated error of lambda is within that factor of the error, where this is above 1e-8 1/s."
+    "all runs meet exactly once, divided by the peak; of omega the largest relative one over the same. Estimated is "
+    "the error of zeta by what the sweep changes, of the finest run by all, as the run itself says; within 3 and 10: "
+    "the share of the amplitudes at which the estimated error of lambda is within that factor of the error, where "
+    "this is above 1e-8 1/s."
 )
 
 

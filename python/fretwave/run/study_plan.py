@@ -135,6 +135,8 @@ class Study:
         run = self.outcomes[settings]
         omega, zeta, estimate = _values(run, self.compared)
         omega_true, zeta_true, _ = _values(reference, self.compared)
+        of_all = settings == self.plan.reference or sweep not in SOURCE_OF
+        guessed = estimate.sum(axis=1) if of_all else estimate[:, SOURCES.index(SOURCE_OF[sweep])]
         return {
             "sweep": sweep,
             "harmonics": settings.harmonics,
@@ -148,7 +150,7 @@ class Study:
             "peak_zeta": run.peak_zeta,
             "peak_amplitude": run.peak_amplitude,
             "peak_zeta_error": abs(run.peak_zeta / reference.peak_zeta - 1.0),
-            "zeta_error_estimate": _largest(estimate.sum(axis=1) / omega_true) / abs(reference.peak_zeta),
+            "zeta_error_estimate": _largest(guessed / omega_true) / abs(reference.peak_zeta),
             **_shares(self._ratios(sweep, settings, reference)),
             "component_modes": -1 if settings.component_modes is None else settings.component_modes,
             "reference": int(settings == self.plan.reference),
