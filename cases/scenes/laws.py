@@ -87,7 +87,9 @@ def _march(u, normal, w, p, f=None):
         v, d = share * (u[t, 1:] - u[t - 1, 1:]), np.where(lands, 0.0, u[t - 1, 1:] - w)
         gain = u[(t + 1) % len(u), 1:] - 2 * u[t, 1:] + u[t - 1, 1:]
         sticks = (_length(d + v).real <= R1.real) & (R1.real > 0)
-        kept = np.where(opened, 0.0, np.where(sticks, d + v, _pulled(d, v, gain, R0, R1, lands)))
+        with np.errstate(all="ignore"):  # lanes that do not slip
+            pulled = _pulled(d, v, gain, R0, R1, lands)
+        kept = np.where(opened, 0.0, np.where(sticks, d + v, np.where(R1.real > 0, pulled, 0.0)))
         w = np.where(sticks & ~lands, w, u[t, 1:] - kept)
         slipped |= (R1.real == 0) | ~sticks & (_length(d + v).real > R1.real * (1 + 1e-12))
         if f is not None:
@@ -112,7 +114,8 @@ def _pulled(d, v, gain, R0, R1, lands):
     s = np.where(lands | (s.real > 1), 1.0, np.where(s.real > 0, s, 0.0))
     at = d + s * v
     r = _length(at)
-    per = 2 * (1 - s) / np.where((R1 + r).real > 0, R1 + r, 1.0)
+    most = 1e-12 * abs(way) + TINY  # of an arm that is none, x is large enough
+    per = 2 * (1 - s) / np.where((R1 + r).real > most, R1 + r, most)
     tilt = per * (v[0] * gain[1] - v[1] * gain[0]) / (2 * way * (3 + np.sqrt(9 + (per * way) ** 2)))
     v = v + tilt * np.stack([-v[1], v[0]])
     way = _length(v)
