@@ -18,6 +18,7 @@ from . import laws
 
 STEP = 1e-30  #: of complex differentiation
 LARGEST = 4e6  #: numbers in one march
+MANY = 1 << 11  #: samples of a law that the solver does not sample
 
 
 @dataclass
@@ -93,13 +94,21 @@ class Equations:
         self.maps = [sp.csr_matrix(contact.B) for contact in self.contacts]
         self.m = sum(2 if n else 1 for n in self.orders)
         self.column = {n: sum(2 if k else 1 for k in self.orders if k < n) for n in self.orders}
-        tau = 2 * np.pi * np.arange(self.samples) / self.samples
-        rows = [[np.cos(n * tau), np.sin(n * tau)] if n else [np.ones_like(tau)] for n in self.orders]
-        self.synthesis = np.array(sum(rows, [])).T
-        weight = np.array(sum([[2, 2] if n else [1] for n in self.orders], []))
-        self.analysis = (self.synthesis * weight / self.samples).T
+        self.transforms = {n: self.transform(n) for n in {self.sampled(contact) for contact in self.contacts}}
 
     # Pieces
+
+    def sampled(self, contact):
+        """Samples of its march: for a law that the solver has in continuous time many, whose error is 4e-3 of 128's."""
+        return max(MANY, self.samples) if contact.law == "jenkins" else self.samples
+
+    def transform(self, samples):
+        """Waves at samples (samples, m), and what takes samples back to coefficients."""
+        tau = 2 * np.pi * np.arange(samples) / samples
+        rows = [[np.cos(n * tau), np.sin(n * tau)] if n else [np.ones_like(tau)] for n in self.orders]
+        synthesis = np.array(sum(rows, [])).T
+        weight = np.array(sum([[2, 2] if n else [1] for n in self.orders], []))
+        return synthesis, (synthesis * weight / samples).T
 
     def complex_of(self, Q, n):
         """q_n of coefficients (rows, m[, lanes])."""
@@ -130,7 +139,9 @@ class Equations:
         p = {k: np.repeat(v, lanes) for k, v in contact.full().items()}
         motion = self.velocity(U, beta, omega) if contact.law == "regularised_coulomb" else U
         motion = motion.reshape(pairs, c, self.m, lanes).transpose(2, 1, 0, 3).reshape(self.m, -1)
-        u = (self.synthesis @ motion).reshape(self.samples, c, pairs * lanes)
+        samples = self.sampled(contact)
+        synthesis, analysis = self.transforms[samples]
+        u = (synthesis @ motion).reshape(samples, c, pairs * lanes)
         rest = np.zeros((max(1, c - 1), pairs * lanes))
         if contact.law == "regularised_coulomb":
             f = laws.regularised_coulomb(u, p)
@@ -138,7 +149,7 @@ class Equations:
             f = laws.jenkins(u, p, rest)
         else:
             f = laws.coulomb_3d(u, p, rest)
-        F = (self.analysis @ f.reshape(self.samples, -1)).reshape(self.m, c, pairs, lanes)
+        F = (analysis @ f.reshape(samples, -1)).reshape(self.m, c, pairs, lanes)
         return F.transpose(2, 1, 0, 3).reshape(pairs * c, self.m, lanes)
 
     def static_load(self):
@@ -237,5 +248,5 @@ class Equations:
 
     def batch(self):
         """States that fit in one march."""
-        lanes = sum(x.pairs * x.components * (x.components * self.m + 2) for x in self.contacts) * self.samples
+        lanes = sum(x.pairs * x.components * (x.components * self.m + 2) * self.sampled(x) for x in self.contacts)
         return int(np.clip(LARGEST / max(lanes, 1), 1, 64))
