@@ -206,7 +206,7 @@ def test_branch_keeps_its_orientation_past_kinks(comm, tmp_path):
     """A second blade begins to slip beside its resonance: a kink that turns the branch by more than a right angle.
 
     On a piecewise smooth path the determinant of the Jacobian over the tangent keeps its sign (Allgower and Georg,
-    Numerical Continuation Methods, 1990, chapter 15); here the branch turns back at 5.3e-5 m.
+    Numerical Continuation Methods, 1990, chapter 15); here the branch turns back at 4.05e-5 m, on at 3.08e-5 m, and arrives.
     """
     case, analysis = tuned(comm, tmp_path, MISTUNED)
     case = on_wheel(case, analysis)
@@ -219,8 +219,9 @@ def test_branch_keeps_its_orientation_past_kinks(comm, tmp_path):
         points = [p for p in branch if not p.event]  # those located inside a step have no orientation
         signs = {np.sign(np.linalg.det(np.vstack([dense(problem.jacobian(p.y)), whole(p.tangent)]))) for p in points}
         tangents = [whole(p.tangent) / np.linalg.norm(whole(p.tangent)) for p in points]
-    assert branch.reason == "largest number of points" and len(signs) == 1
-    assert points[-1].parameter < 5.2e-5 < max(p.parameter for p in points)
+    assert branch.converged and len(signs) == 1
+    amplitudes = np.array([p.parameter for p in points])
+    assert (np.diff(amplitudes) < 0).any() and amplitudes[-1] == amplitudes.max()
     assert min(a @ b for a, b in zip(tangents, tangents[1:])) < -0.1
 
 
