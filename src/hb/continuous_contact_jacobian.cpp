@@ -1,0 +1,111 @@
+/// Derivatives of contact in continuous time.
+#include <cmath>
+
+#include "hb/continuous_contact.h"
+#include "hb/indicator.h"
+#include "lapack.h"
+
+namespace fretwave::hb {
+
+namespace {
+
+/// 1, cos k tau, sin k tau
+std::vector<double> waves(Harmonics const& h, double tau) {
+  std::vector<double> out(h.block_size(), 1.0);
+  for (int i = 0; i < h.count(); ++i)
+    if (const int n = h.orders()[i])
+      out[h.offset(i)] = std::cos(n * tau), out[h.offset(i) + 1] = std::sin(n * tau);
+  return out;
+}
+
+}  // namespace
+
+void ContinuousContact::linearise() {
+  if (linearised_) return;
+  const size_t size = block(1, 0);
+  D_.assign(pairs_.size() * size * size, 0.0), by_gap_.assign(pairs_.size() * size, 0.0);
+  for (size_t k = 0; k < pairs_.size(); ++k) {
+    if (normal_ >= 0) normal_blocks(pairs_[k], &D_[k * size * size], &by_gap_[k * size]);
+    for (size_t t = 0; t < pairs_[k].tangents.size(); ++t)
+      tangential_blocks(pairs_[k], int(t), &D_[k * size * size], &by_gap_[k * size]);
+  }
+  linearised_ = true;
+}
+
+/// Force is continuous where the state changes, so that the times of the changes leave the derivative.
+void ContinuousContact::normal_blocks(Pair const& pair, double* D, double* by_gap) const {
+  const double kn = pair.law.normal_stiffness;
+  const size_t at = block(0, normal_), ld = block(1, 0);
+  Indicator closed(harmonics_);
+  if (pair.closed) closed.fill();
+  Arc arc;
+  for (Span const& span : pair.spans) {
+    arc.set(2 * harmonics_.highest(), span.begin, span.length);
+    closed.add(arc, 1);
+  }
+  closed.add_multiplication(kn, D + at * ld + at, ld);
+  closed.add_coefficients(-kn, by_gap + at);
+}
+
+/// dT = kt (du - dw) in stick, with dw = du - share dR at its begin, +- mu dN in slip.
+void ContinuousContact::tangential_blocks(Pair const& pair, int tangent, double* D, double* by_gap) const {
+  Tangent const& now = pair.tangents[tangent];
+  contact::LinearPair const& law = pair.law;
+  const double kt = law.tangential_stiffness, slope = law.friction_coefficient * law.normal_stiffness;
+  const int m = harmonics_.block_size();
+  const size_t ld = block(1, 0), at = block(0, tangent + (normal_ >= 0)),
+               normal = block(0, normal_ < 0 ? 0 : normal_);
+  Indicator stick(harmonics_), slip(harmonics_);
+  Arc arc;
+  if (now.play.stuck) stick.fill();
+  for (Play::Stick const& piece : now.play.sticks) {
+    Indicator here(harmonics_);
+    if (now.play.stuck) {
+      here.fill();
+    } else {
+      arc.set(2 * harmonics_.highest(), piece.begin, piece.length);
+      here.add(arc, 1), stick.add(arc, 1);
+    }
+    if (!piece.follows) continue;
+    std::vector<double> force(m);
+    here.add_coefficients(kt, force.data());
+    const std::vector<double> wave = waves(harmonics_, piece.begin);
+    const double share = piece.share * slope / kt;
+    for (int r = 0; r < m; ++r) {
+      double* row = D + (at + r) * ld;
+      for (int c = 0; c < m; ++c) row[at + c] -= force[r] * wave[c];
+      for (int c = 0; c < m && share != 0; ++c) row[normal + c] += share * force[r] * wave[c];
+      by_gap[at + r] -= share * force[r];
+    }
+  }
+  stick.add_multiplication(kt, D + at * ld + at, ld);
+  if (slope == 0) return;
+  for (Play::Slip const& piece : now.play.slips) {
+    arc.set(2 * harmonics_.highest(), piece.begin, piece.length);
+    slip.add(arc, piece.side);
+  }
+  slip.add_multiplication(slope, D + at * ld + normal, ld);
+  slip.add_coefficients(-slope, by_gap + at);
+}
+
+std::vector<double> const& ContinuousContact::blocks() {
+  linearise();
+  return D_;
+}
+
+void ContinuousContact::product(double const* dU, double* dF) {
+  linearise();
+  const int size = int(block(1, 0)), step = 1;
+  const double one = 1, zero = 0;
+  for (size_t k = 0; k < pairs_.size(); ++k)
+    dgemv_("T", &size, &size, &one, &D_[k * size * size], &size, dU + k * size, &step, &zero, dF + k * size,
+           &step);
+}
+
+void ContinuousContact::gap_product(double const* dgap, double* dF) {
+  linearise();
+  const size_t size = block(1, 0);
+  for (size_t k = 0; k < by_gap_.size(); ++k) dF[k] = by_gap_[k] * dgap[k / size];
+}
+
+}  // namespace fretwave::hb
