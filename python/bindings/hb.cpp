@@ -141,9 +141,7 @@ void bind_hb(nb::module_& m) {
       .def("initial", [](ForcedResponse& p, double omega) { return handed(p.initial(omega)); });
   nb::class_<DiscretisationError>(m, "DiscretisationError")
       .def(nb::init<HarmonicProblem&, std::string const&>(), nb::keep_alive<1, 2>())
-      .def_prop_ro("orders", &DiscretisationError::orders)
-      .def_prop_ro("samples", &DiscretisationError::samples)
-      .def_prop_ro("route", &DiscretisationError::route)
+      .def_prop_ro("left_out", &DiscretisationError::left_out)
       .def("at", [](DiscretisationError& e, Petsc<Vec> y, Petsc<Vec> tangent) -> std::optional<nb::tuple> {
         const auto out = e.at(y.object, tangent.object);
         if (!out) return {};

@@ -3,14 +3,16 @@
 #include <algorithm>
 
 #include "error.h"
+#include "solve/memory.h"
 #include "solve/vectors.h"
 
 namespace fretwave::hb {
 
 namespace {
 
-constexpr double tolerance = 1e-4;   // of the linear systems: an error is wanted to a digit or two
-constexpr double negligible = 1e-6;  // share of the residual, below which a source is not solved for
+constexpr double tolerance = 1e-4;    // of the linear systems: an error is wanted to a digit or two
+constexpr double memory_share = 0.5;  // of what is free, for the factors of J'
+constexpr double negligible = 1e-6;   // share of the residual, below which a source is not solved for
 constexpr double reach = 0.3;  // arclength along the branch, in the unit of a step: the default longest one
 
 /// Whether it is so for the contacts of all ranks.
@@ -40,11 +42,31 @@ std::unique_ptr<HarmonicProblem> refined(HarmonicProblem const& problem, std::ve
   return out;
 }
 
+/// A complex factor for each order: of reduced models dense, else filled twelvefold, as of three-dimensional
+/// meshes.
+double factor_bytes(model::Model const& model, size_t orders) {
+  double entries = 0;
+  for (auto const& term : model.terms()) {
+    MatInfo info;
+    check(MatGetInfo(term.A, MAT_GLOBAL_SUM, &info));
+    entries = std::max(entries, info.nz_used);
+  }
+  const double dense = double(model.dofs()) * double(model.dofs());
+  return sizeof(complex) * double(orders) * std::min(12 * entries, dense);
+}
+
 }  // namespace
 
 DiscretisationError::DiscretisationError(HarmonicProblem& problem, std::string const& prefix)
-    : problem_(problem) {
-  const std::vector<int> orders = finer(problem.harmonics(), problem.model());
+    : problem_(problem), orders_(hb::finer(problem.harmonics(), problem.model())) {
+  const std::vector<int>& orders = orders_;
+  const double bytes = factor_bytes(problem.model(), orders.size()),
+               free = solve::available_bytes(problem.comm());
+  if (bytes > memory_share * free) {
+    left_out_ = "factors of " + std::to_string(orders.size()) + " harmonics would take about " +
+                solve::gigabytes(bytes) + ", of " + solve::gigabytes(free) + " free";
+    return;
+  }
   const int enough = 8 * orders.back();
   finer_ = refined(problem, orders, std::max(4 * problem.harmonics().samples(), 2 * enough));
   const auto quick = [](auto const& law) { return !law.hereditary() || law.piecewise_linear(); };
@@ -90,6 +112,7 @@ std::vector<double> at_parameter(std::vector<double> change, std::vector<double>
 }  // namespace
 
 std::optional<LeftOut> DiscretisationError::at(Vec y, Vec tangent) {
+  if (!finer_) return {};
   VecHandle r = problem_.equations(), finer = finer_->equations();
   problem_.residual(y, r);
   VecHandle point = problem_.on(*finer_, y), left = problem_.on(*finer_, r);

@@ -29,9 +29,8 @@ class DiscretisationError {
  public:
   /// `prefix`: of the PETSc options of J' dy' = b. Collective.
   DiscretisationError(HarmonicProblem&, std::string const& prefix);
-  std::vector<int> const& orders() const { return finer_->harmonics().orders(); }
-  int samples() const { return (sampled_ ? sampled_ : finer_)->harmonics().samples(); }
-  std::string route() const { return newton_->route(); }
+  /// Why nothing is estimated: its factors would not fit the memory; empty if they do.
+  std::string const& left_out() const { return left_out_; }
   /// At a converged point with its tangent; none where J' is singular. Collective.
   std::optional<LeftOut> at(Vec y, Vec tangent);
 
@@ -41,6 +40,8 @@ class DiscretisationError {
   void close(Vec y, Vec tangent);
 
   HarmonicProblem& problem_;
+  std::vector<int> orders_;
+  std::string left_out_;
   std::unique_ptr<HarmonicProblem> finer_, sampled_;  ///< of J', and of r' where its samples are others
   std::unique_ptr<solve::Newton> newton_;
 };

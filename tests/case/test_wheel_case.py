@@ -206,7 +206,7 @@ def test_branch_keeps_its_orientation_past_kinks(comm, tmp_path):
     """A second blade begins to slip beside its resonance: a kink that turns the branch by more than a right angle.
 
     On a piecewise smooth path the determinant of the Jacobian over the tangent keeps its sign (Allgower and Georg,
-    Numerical Continuation Methods, 1990, chapter 15); here the branch turns back at 4.05e-5 m, on at 3.08e-5 m, and arrives.
+    Numerical Continuation Methods, 1990, chapter 15); here the branch turns back at 4.05e-5 m and on at 3.08e-5 m.
     """
     case, analysis = tuned(comm, tmp_path, MISTUNED)
     case = on_wheel(case, analysis)

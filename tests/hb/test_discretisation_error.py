@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import resource
+
 import numpy as np
 import pytest
+import scipy.sparse as sp
 from mpi4py import MPI
 from oracle import Jenkins, SeriesMotion, System, forced_orbit, series_motion
 from petsc4py import PETSc
@@ -181,3 +184,23 @@ def test_errors_can_be_left_out():
     mode = fw.NonlinearMode(model(), fw.choose_harmonics(model(), 3), "CNM", 0)
     branch = fw.follow(mode, 0.1, 1.0, errors=False)
     assert np.isnan(branch["zeta_error"]).all() and np.isfinite(branch["zeta"]).all()
+
+
+@SERIAL
+def test_what_does_not_fit_the_memory_is_left_out():
+    """204 factors of a chain of 40,000 masses would take 4.7 GB, more than half of a limit of 6 GB."""
+    n = 40_000
+    ones = np.ones(n)
+    K = sp.diags([-ones[1:], 2.001 * ones, -ones[1:]], [-1, 0, 1], format="csr")
+    B = sp.csr_matrix(([1.0], ([0], [0])), (1, n))
+    slider = fw.Contact("jenkins", B, {"tangential_stiffness": 1.0, "friction_limit": 1.0})
+    long = fw.Model(sp.identity(n, format="csr"), K, contacts=[slider])
+    start = fw.LinearMode(1.0, 0.0, ones, 0 * ones)
+    mode = fw.NonlinearMode(long, fw.Harmonics(range(102), 256), "CNM", 0, start)
+    y, before = mode.initial(0.1), resource.getrlimit(resource.RLIMIT_AS)
+    resource.setrlimit(resource.RLIMIT_AS, (6 * 10**9, before[1]))
+    try:
+        found = mode.errors(y, y)
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, before)
+    assert np.isnan(found["zeta_error"]) and "factors of 204 harmonics" in mode.errors_left_out

@@ -208,7 +208,8 @@ class HarmonicProblem:
         dict
             Modes: omega_error [rad/s], zeta_error, and lambda_error_harmonics, _samples, _solver [1/s], the changes of
             lambda = -beta + i omega by each source. Responses: amplitude_error and the same by source [m]. nan where
-            the refined system is singular; empty for a problem that has no table.
+            the refined system is singular or does not fit the memory (`errors_left_out`); empty for a problem that has
+            no table.
         """
         if self.meaning is None:
             return {}
@@ -220,6 +221,11 @@ class HarmonicProblem:
         self.errors_wall_s += time.perf_counter() - began
         changes = [np.full_like(z, np.nan)] * 4 if found is None else [np.array(change) for change in found]
         return self.meaning.errors(z, changes)
+
+    @property
+    def errors_left_out(self) -> str:
+        """Why `errors` estimates nothing: its factors would not fit the memory; empty if they do."""
+        return "" if self._error is None else self._error.left_out
 
     def energy(self, y: PETSc.Vec) -> dict[str, float]:
         """Where the energy of a period goes [J]. Collective.

@@ -150,6 +150,8 @@ def tell(context: AnalysisContext[HarmonicSection], branch: Continuation, name: 
     lines += [f"missed: {text}" for text in branch.missed]
     if not context.analysis.errors:
         lines.append("errors are not estimated (errors = false)")
+    elif branch.problem.errors_left_out:
+        lines.append(f"errors are not estimated: {branch.problem.errors_left_out}")
     elif branch.problem.errors_wall_s:
         lines.append(f"error estimates took {branch.problem.errors_wall_s:.2g} s")
     for line in lines:
