@@ -57,8 +57,8 @@ SCENES = {
         "mode",
         ("--quick", "--set", "mode.amplitude=[1e-5,2.5e-4]", "--set", "mode.report_at=[]")
         + ("--harmonics", "3,5,9", "--samples", "90,180,360", *FEW),
-        "Up to 0.25 mm, past first slip: beyond lie lift-offs where H = 9 takes hundreds of points. The finest run's own"
-        " error is near those of H = 3 and 5 here, so that what is said of their estimates is too little to judge by.",
+        "Up to 0.25 mm, past first slip: beyond lie lift-offs where H = 9 takes hundreds of points. The finest run's"
+        " own error is near those of H = 3 and 5 here: what is said of their estimates is too little to judge by.",
     ),
 }
 

@@ -26,7 +26,7 @@ STEPS = (
         '    Column("zeta", "1", "modal damping ratio"),\n',
         '    Column("period", "s", "period of the mode"),\n',
     ),
-    ("columns.py", 'MODE = ("point", "amplitude", "omega", "omega0", "frequency_hz", "beta", "zeta", ', '"period", '),
+    ("columns.py", '    *("point", "amplitude", "omega", "omega0", "frequency_hz", "beta", "zeta"', ', "period"'),
     ("hb/states.py", '("amplitude", "omega", "omega0", "frequency_hz", "beta", "zeta"', ', "period"'),
     ("hb/states.py", "(math.exp(v[2]), omega, omega0, omega / (2 * math.pi), beta, zeta", ", 2 * math.pi / omega"),
 )

@@ -114,7 +114,7 @@ def fit_values(axes: Axes, x: AnyArray, y: AnyArray, shown: Sequence[float], oth
 BEYOND = 0.3
 
 
-def error_band(axes: Axes, x: AnyArray, y: AnyArray, error: AnyArray, colour: Any) -> None:
+def error_band(axes: Axes, x: AnyArray, y: AnyArray, error: AnyArray, colour: str | tuple[float, ...]) -> None:
     """The estimated error about a curve; nothing where it is not known."""
     known = np.isfinite(error)
     if not known.any():

@@ -138,8 +138,6 @@ def backbones(swept: Swept) -> Figure:
     lower.set_ylabel(style.label("Damping ratio ζ", "%"))
     dof = swept.analysis.attributes.get("normalise", "")
     lower.set_xlabel(style.label(f"Modal amplitude of {dof}".rstrip(" of"), swept.unit("m")))
-    if any("zeta_error" in table and np.isfinite(table["zeta_error"]).any() for _, _, table in swept.branches):
-        style.band_entry(upper)
     _name(figure, [upper, lower], swept)
     return figure
 
@@ -189,7 +187,10 @@ def _name(figure: Figure, axes: list[Axes], swept: Swept) -> None:
     if len(swept.plan) <= NAMED or swept.crossed():
         for label, look in names:
             axes[0].plot([], [], label=label, **look)
-        _legend(figure, axes[0])
+    if any("zeta_error" in table and np.isfinite(table["zeta_error"]).any() for _, _, table in swept.branches):
+        style.band_entry(axes[0])
+    _legend(figure, axes[0])
+    if len(swept.plan) <= NAMED or swept.crossed():
         return
     norm = BoundaryNorm(np.arange(len(swept.plan) + 1) - 0.5, len(swept.plan))
     colours = ListedColormap(style.shades(len(swept.plan)))
