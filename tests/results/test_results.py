@@ -82,7 +82,7 @@ def test_every_row_is_there_before_the_table_is_closed(tmp_path: Path) -> None:
 
 
 def test_a_torn_row_is_left_out_and_all_before_it_are_there(tmp_path: Path) -> None:
-    """Every length that the journal can have after a kill in a write."""
+    """Lengths that the journal can have after a kill in a write: about the end of each row, and many between."""
     table = writer(tmp_path)
     ends = []
     for _ in range(4):
@@ -90,7 +90,8 @@ def test_a_torn_row_is_left_out_and_all_before_it_are_there(tmp_path: Path) -> N
         ends.append((tmp_path / ".mode.rows").stat().st_size)
     table.abandon()
     whole = (tmp_path / ".mode.rows").read_bytes()
-    for size in range(ends[0], ends[-1], 7):
+    near = {end + beside for end in ends for beside in range(-4, 5)}
+    for size in sorted(near.union(range(ends[0], ends[-1], 31)).intersection(range(ends[0], ends[-1]))):
         (tmp_path / ".mode.rows").write_bytes(whole[:size])
         with open_results(tmp_path / "results.h5") as file:
             assert len(file["mode/points/zeta"]) == sum(end <= size for end in ends)
