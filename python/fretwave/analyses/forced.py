@@ -18,7 +18,7 @@ from ..post.motion import complex_amplitudes
 from ..results.results import AnalysisWriter
 from ..results.sweep_summary import FORCED_LEVELS
 from ..texts import toml
-from .parts.branch import closure_note, finished_table, open_branch, points_of, record, tell
+from .parts.branch import closure_note, error_text, finished_table, open_branch, points_of, record, tell
 from .parts.context import AnalysisContext, Outcome
 from .parts.excitation import Excitation, excitation_of
 from .parts.forced_peaks import curves_of, write_peaks
@@ -260,8 +260,8 @@ def point_line(name: str, row: dict[str, Any], unit: str) -> str:
     """One plain line of progress."""
     return (
         f"{name} {row['point']:4d}  level {row['level']:6.4g}  f {row['frequency_hz']:9.5g} Hz"
-        f"  a {row['amplitude']:9.4g} {unit}  phase {math.degrees(row['phase']):7.2f} deg"
-        f"  stick {100 * row['stick']:3.0f} %  error {row['amplitude_error']:.1e} {unit}"
+        f"  a {row['amplitude']:9.4g}{error_text(row['amplitude_error'])} {unit}"
+        f"  phase {math.degrees(row['phase']):7.2f} deg  stick {100 * row['stick']:3.0f} %"
         f"  newton {row['newton']:2d}  {row['wall_s']:.3f} s"
         + (f"  {row['event'].replace('_', ' ')}" if row["event"] else "")
         + closure_note(row)

@@ -21,7 +21,18 @@ from ..post.limit_cycles import limit_cycles
 from ..results.results import AnalysisWriter
 from ..results.sweep_summary import MODE_BRANCH
 from .parts.asymptotes import asymptote_line
-from .parts.branch import closure_note, finished_table, mode_problem, open_branch, points_of, record, step_control, tell
+from .parts.branch import (
+    closure_note,
+    error_text,
+    finished_table,
+    largest_error,
+    mode_problem,
+    open_branch,
+    points_of,
+    record,
+    step_control,
+    tell,
+)
 from .parts.context import AnalysisContext, Outcome
 from .parts.observed import keep_row, named
 from .parts.rest import keep_pairs, retained
@@ -222,7 +233,7 @@ def point_line(name: str, row: dict[str, Any], unit: str = "m") -> str:
     return (
         f"{name} {row['point']:4d}  a {row['amplitude']:9.4g} {unit}  f {row['frequency_hz']:9.5g} Hz"
         f"  stick {100 * row['stick']:3.0f} %  zeta {_percent(row['zeta'], 4):>8} %"
-        f" +- {100 * row['zeta_error']:<7.1g}  newton {row['newton']:2d}  {row['wall_s']:.3f} s"
+        f"{error_text(100 * row['zeta_error'])}  newton {row['newton']:2d}  {row['wall_s']:.3f} s"
         + ("  overdamped" if abs(row["zeta"]) >= 1 else "")
         + (f"  {row['event'].replace('_', ' ')}" if row["event"] else "")
         + closure_note(row)
@@ -248,7 +259,7 @@ def summarise(name: str, table: dict[str, Any], unit: str) -> list[str]:
         f"{name}: {len(zeta)} points, a {amplitude[0]:.4g} to {amplitude[-1]:.4g} {unit},"
         f" largest damping {100 * zeta[top]:.4g} % at a = {amplitude[top]:.4g} {unit},"
         f" {folds} fold{'s' * (folds != 1)},"
-        f" error of zeta up to {100 * np.nanmax(table['zeta_error']):.2g} %, {table['wall_s'].sum():.2f} s"
+        f"{largest_error('zeta', 100 * table['zeta_error'], '%')} {table['wall_s'].sum():.2f} s"
     ]
     words = {True: "stable (damping rises)", False: "unstable (damping falls)", None: "stability unknown (branch end)"}
     for cycle in limit_cycles(table):

@@ -49,6 +49,17 @@ def closure_note(row: Mapping[str, Any]) -> str:
     return f"  note: a slider ends {unclosed:.1e} m from where it began ({share})"
 
 
+def error_text(error: float) -> str:
+    """What a point's line says of an estimated error; empty where there is none."""
+    return f" +- {error:<7.1g}" if np.isfinite(error) else ""
+
+
+def largest_error(what: str, errors: npt.NDArray[np.float64], unit: str) -> str:
+    """The same of a branch."""
+    known = errors[np.isfinite(errors)]
+    return f" error of {what} up to {known.max():.2g} {unit}," if len(known) else ""
+
+
 #: What was done when GMRES failed.
 FALLBACKS = {
     "rebuilt": "preconditioner rebuilt",

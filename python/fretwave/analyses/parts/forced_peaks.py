@@ -6,11 +6,10 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
-
 from ...case.analysis import AnalysisSection
 from ...post.mode_curve import ModeCurve
 from ...post.response_peaks import peak_table
+from .branch import largest_error
 from .context import AnalysisContext
 
 
@@ -30,7 +29,7 @@ def write_peaks(
     context.write_table("peaks", peaks)
     lines = [
         f"{context.name}: {len(table['level'])} points, {len(peaks['level'])} levels,"
-        f" error of the amplitude up to {np.nanmax(table['amplitude_error']):.2g} {unit}, {table['wall_s'].sum():.2f} s"
+        f"{largest_error('the amplitude', table['amplitude_error'], unit)} {table['wall_s'].sum():.2f} s"
     ]
     for row in range(len(peaks["level"])):
         lines.append(
