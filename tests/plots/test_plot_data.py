@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from models.duffing import C, mode, response, stiffness
 from models.kept_branches import relative, write_branches
+from models.table_rows import SHARED as COMMON
 from tolerances import ROUNDING, SOLVED
 
-from fretwave.columns import COLUMNS, FORCED, MODE, Column
+from fretwave.columns import FORCED, MODE, Column
 from fretwave.plots import (
     backbone,
     flutter,
@@ -34,17 +35,7 @@ from fretwave.results.sweeps import read_branch, write_sweep
 pytestmark = pytest.mark.ranks(1)
 #: Cubics err by less, chords between the same points by more.
 CUBIC, CHORD = 2e-5, 2e-4
-ERRORS = [name for name in COLUMNS if "_error" in name and name not in ("energy_error", "step_error")]
-SHARED = {
-    **dict.fromkeys(ERRORS, 1e-4),
-    "stick": 0.5,
-    "slip": 0.5,
-    "open": 0.0,
-    "force_outside": 1e-3,
-    "unclosed": 0.0,
-    "residual": 1e-12,
-}
-SHARED |= {"newton": 3, "linear": 3, "rounding": 1e-14, "accepted": 1, "wall_s": 0.01, "event": ""}
+SHARED = {**COMMON, "wall_s": 0.01, "event": ""}
 TAU = 2 * np.pi * np.arange(64) / 64
 
 

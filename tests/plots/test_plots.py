@@ -6,9 +6,10 @@ import json
 
 import numpy as np
 import pytest
+from models.table_rows import SHARED
 from tolerances import ROUNDING
 
-from fretwave.columns import COLUMNS, FORCED, MODE
+from fretwave.columns import FORCED, MODE
 from fretwave.plots import (
     backbone,
     faces,
@@ -27,17 +28,6 @@ from fretwave.results.results import AnalysisWriter
 pytestmark = pytest.mark.ranks(1)
 
 REPORTED = (3, 10, 16, 20, 26)
-ERRORS = [name for name in COLUMNS if "_error" in name and name not in ("energy_error", "step_error")]
-SHARED = {
-    **dict.fromkeys(ERRORS, 1e-4),
-    "stick": 0.5,
-    "slip": 0.5,
-    "open": 0.0,
-    "force_outside": 1e-3,
-    "unclosed": 0.0,
-    "residual": 1e-12,
-}
-SHARED |= {"newton": 3, "linear": 3, "rounding": 1e-14, "accepted": 1}
 
 
 def write_mode(folder, name="mode", method="CNM", shift=0.0):
