@@ -11,9 +11,8 @@ namespace {
 
 int tangent_columns(contact::Law const& law) { return law.components() * law.components() * law.pairs(); }
 
-/// The fundamental's Im s: the angular frequency that turns sample numbers into time.
-double angular_frequency(Harmonics const& h, Exponents const& e) {
-  return h.fundamental() < 0 ? 1.0 : e.s[h.fundamental()].imag();
+int sampled_columns(contact::Law const& law, int pairs) {
+  return law.piecewise_linear() ? 0 : law.components() * pairs;
 }
 
 }  // namespace
@@ -25,8 +24,8 @@ Aft::Aft(Harmonics const& h, std::shared_ptr<contact::Law const> law)
       columns_(law_->components() * pairs_),
       law_samples_(h.odd_only() && law_->odd() && !law_->hereditary() ? h.samples() / 2 : h.samples()),
       tiles_(tiles(*law_, h.samples())),
-      transform_(h, law_->components() * tiles_.front().pairs, law_->components()),
-      last_transform_(h, law_->components() * tiles_.back().pairs, law_->components()),
+      transform_(h, sampled_columns(*law_, tiles_.front().pairs), law_->components()),
+      last_transform_(h, sampled_columns(*law_, tiles_.back().pairs), law_->components()),
       tangent_transform_(h, law_->hereditary() ? 0 : tangent_columns(*law_)) {
   if (law_->piecewise_linear()) {
     continuous_.emplace(h, *law_);
@@ -45,6 +44,11 @@ std::vector<Aft::Tile> Aft::tiles(contact::Law const& law, int samples) {
   for (int first = 0; first == 0 || first < pairs; first += size)
     out.push_back({first, std::min(size, pairs - first), {}});
   return out;
+}
+
+/// The fundamental's Im s turns sample numbers into time.
+double Aft::angular_frequency(Exponents const& e) const {
+  return harmonics_.fundamental() < 0 ? 1.0 : e.s[harmonics_.fundamental()].imag();
 }
 
 contact::Motion Aft::motion(Tile const& tile, double omega) const {
@@ -75,7 +79,7 @@ void Aft::force(double const* U, Exponents const& e, double* F) {
       multiply(harmonics_, e.s, U + at, velocity_.data(), columns);
       transform(tile).to_time(velocity_.data(), v_.data());
     }
-    law_->force(motion(tile, angular_frequency(harmonics_, e)), f_.data(), tile.record);
+    law_->force(motion(tile, angular_frequency(e)), f_.data(), tile.record);
     mirror(f_, -1, columns);
     transform(tile).to_harmonics(f_.data(), F + at);
   }
@@ -202,125 +206,6 @@ void Aft::blocks(Exponents const& e, double* D) {
         D[k] += a * T[k] - b * T[k + 1];
         D[k + 1] += b * T[k] + a * T[k + 1];
       }
-}
-
-/// All pairs at once over the whole period.
-contact::Motion Aft::whole(ContactPeriod const& period, Exponents const& e) const {
-  contact::Motion motion = this->motion({0, pairs_, {}}, angular_frequency(harmonics_, e));
-  motion.samples = harmonics_.samples();
-  motion.u = period.u.data(), motion.v = period.v.data();
-  return motion;
-}
-
-FourierTransform const& Aft::whole_transform() const {
-  if (!whole_transform_)
-    whole_transform_ = std::make_shared<FourierTransform>(harmonics_, columns_, law_->components());
-  return *whole_transform_;
-}
-
-/// The pieces of a motion and its force, beside those of the last one.
-ContinuousContact Aft::found(double const* U, double* F) const {
-  ContinuousContact out(harmonics_, *law_);
-  out.force(U, F);
-  return out;
-}
-
-ContactPeriod Aft::period(double const* U, Exponents const& e) const {
-  ContactPeriod out;
-  for (auto* samples : {&out.u, &out.v, &out.f}) samples->resize(size_t(harmonics_.samples()) * columns_);
-  std::vector<double> V(size_t(columns_) * harmonics_.block_size());
-  multiply(harmonics_, e.s, U, V.data(), columns_);
-  whole_transform().to_time(U, out.u.data());
-  whole_transform().to_time(V.data(), out.v.data());
-  if (columns_ == 0) return out;
-  if (continuous_) {
-    found(U, V.data()).sample(harmonics_.samples(), out.u.data(), out.f.data());
-    return out;
-  }
-  contact::Record record;
-  law_->force(whole(out, e), out.f.data(), record);
-  out.unclosed = record.unclosed;
-  return out;
-}
-
-ContactPeriod Aft::told_period(double const* U, Exponents const& e) const {
-  ContactPeriod out = period(U, e);
-  if (columns_ == 0) return out;
-  contact::Diagnosis found = contact::states(*law_, whole(out, e), out.f.data());
-  out.status = std::move(found.status), out.gap = std::move(found.gap);
-  return out;
-}
-
-namespace {
-
-void count(contact::Diagnosis const& diagnosis, ContactSummary& summary) {
-  double* shares[] = {&summary.stick, &summary.slip, &summary.open};
-  for (auto s : diagnosis.status) *shares[int(s)] += 1;
-  for (double w : diagnosis.work) summary.work += w;
-  for (double path : diagnosis.slip_path) summary.path = std::max(summary.path, path);
-}
-
-}  // namespace
-
-contact::Diagnosis Aft::diagnosis(double const* U, ContactPeriod const& period, Exponents const& e,
-                                  bool archard) const {
-  const contact::Motion whole = this->whole(period, e);
-  contact::Diagnosis out{std::vector<contact::Status>(size_t(whole.samples) * pairs_),
-                         std::vector<double>(pairs_), std::vector<double>(pairs_),
-                         std::vector<double>(archard ? pairs_ : 0)};
-  law_->diagnose(whole, period.f.data(), out);
-  if (!continuous_) return out;
-  std::vector<double> F(size_t(columns_) * harmonics_.block_size());
-  found(U, F.data()).measure(out);
-  return out;
-}
-
-Wearing Aft::wearing(double const* U, Exponents const& e) const {
-  const std::vector<double> none(pairs_, 0.0);
-  Wearing out{none, none, none, none};
-  if (columns_ == 0 || !law_->wears() || law_->normal() < 0) return out;
-  const ContactPeriod now = period(U, e);
-  const contact::Diagnosis found = diagnosis(U, now, e, true);
-  const double share = 1.0 / harmonics_.samples();
-  out.archard = found.archard;
-  for (int t = 0; t < harmonics_.samples(); ++t)
-    for (int i = 0; i < pairs_; ++i) {
-      const auto status = found.status[size_t(t) * pairs_ + i];
-      out.load[i] += share * now.f[size_t(t) * columns_ + size_t(law_->normal()) * pairs_ + i];
-      out.slip[i] += status == contact::Status::slip ? share : 0;
-      out.open[i] += status == contact::Status::open ? share : 0;
-    }
-  return out;
-}
-
-ContactSummary Aft::summarise(double const* U, Exponents const& e) {
-  ContactSummary summary;
-  if (columns_ == 0) return summary;
-  const size_t n = size_t(columns_) * harmonics_.block_size();
-  std::vector<double> F(n), finer(n);
-  const ContactPeriod now = period(U, e);
-  if (continuous_)
-    found(U, F.data());
-  else
-    whole_transform().to_harmonics(now.f.data(), F.data());
-  std::tie(summary.truncated, summary.total) = whole_transform().truncated_energy(now.f.data(), F.data());
-  summary.unclosed = now.unclosed;
-
-  count(diagnosis(U, now, e, false), summary);
-
-  if (continuous_) {
-    finer = F;
-  } else {
-    if (!doubled_)
-      doubled_ = std::make_shared<Aft>(Harmonics(harmonics_.orders(), 2 * harmonics_.samples()), law_);
-    doubled_->force(U, e, finer.data());
-  }
-  const size_t m = harmonics_.block_size(), mean = harmonics_.orders()[0] == 0;
-  for (size_t k = 0; k < n; ++k) {
-    summary.aliased += (finer[k] - F[k]) * (finer[k] - F[k]);
-    summary.retained += k % m < mean ? 0 : F[k] * F[k];
-  }
-  return summary;
 }
 
 }  // namespace fretwave::hb

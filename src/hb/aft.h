@@ -1,7 +1,7 @@
 #pragma once
 #include <optional>
-#include "contact/law.h"
 
+#include "contact/law.h"
 #include "hb/continuous_contact.h"
 
 namespace fretwave::hb {
@@ -20,7 +20,7 @@ struct ContactSummary {
 /// Time samples of a period: samples x components x pairs.
 struct ContactPeriod {
   std::vector<double> u, v, f;
-  std::vector<contact::Status> status;  ///< samples x pairs, as is the gap [m]; empty: not asked for
+  std::vector<contact::Status> status;  ///< samples x pairs, as is the gap [m]
   std::vector<double> gap;
   double unclosed = 0;  ///< as in ContactSummary
 };
@@ -55,8 +55,6 @@ class Aft {
 
   ContactSummary summarise(double const* U, Exponents const&);
   ContactPeriod period(double const* U, Exponents const&) const;
-  /// The period with the law's word on each pair and sample.
-  ContactPeriod told_period(double const* U, Exponents const&) const;
   Wearing wearing(double const* U, Exponents const&) const;
 
  private:
@@ -68,8 +66,16 @@ class Aft {
   static std::vector<Tile> tiles(contact::Law const&, int samples);
   contact::Motion motion(Tile const&, double omega) const;
   contact::Motion whole(ContactPeriod const&, Exponents const&) const;
-  contact::Diagnosis diagnosis(double const* U, ContactPeriod const&, Exponents const&, bool archard) const;
-  ContinuousContact found(double const* U, double* F) const;
+  double angular_frequency(Exponents const&) const;
+  /// A motion beside the last one: its samples without the law's word, the force's harmonics, its pieces.
+  struct Found {
+    ContactPeriod samples;
+    std::vector<double> F;
+    std::optional<ContinuousContact> pieces;
+  };
+  Found find(double const* U, Exponents const&) const;
+  contact::Diagnosis diagnosis(Found const&, Exponents const&, bool archard) const;
+  std::vector<double> on_doubled_samples(double const* U, Exponents const&, std::vector<double> F);
   FourierTransform const& transform(Tile const& tile) const {
     return tile.pairs == tiles_.front().pairs ? transform_ : last_transform_;
   }

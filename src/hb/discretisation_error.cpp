@@ -25,7 +25,7 @@ bool all_laws(model::Model const& model, Predicate is) {
 }
 
 /// Up to 2 H + 1, odd orders alone where no others arise.
-std::vector<int> finer(Harmonics const& h, model::Model const& model) {
+std::vector<int> enlarged(Harmonics const& h, model::Model const& model) {
   const bool odd = h.odd_only() && all_laws(model, [](auto const& law) { return law.odd(); });
   const int step = odd ? 2 : 1;
   std::vector<int> orders;
@@ -45,21 +45,15 @@ std::unique_ptr<HarmonicProblem> refined(HarmonicProblem const& problem, std::ve
 /// A complex factor for each order: of reduced models dense, else filled twelvefold, as of three-dimensional
 /// meshes.
 double factor_bytes(model::Model const& model, size_t orders) {
-  double entries = 0;
-  for (auto const& term : model.terms()) {
-    MatInfo info;
-    check(MatGetInfo(term.A, MAT_GLOBAL_SUM, &info));
-    entries = std::max(entries, info.nz_used);
-  }
   const double dense = double(model.dofs()) * double(model.dofs());
-  return sizeof(complex) * double(orders) * std::min(12 * entries, dense);
+  return sizeof(complex) * double(orders) * std::min(12 * model.largest_term(), dense);
 }
 
 }  // namespace
 
 DiscretisationError::DiscretisationError(HarmonicProblem& problem, std::string const& prefix)
-    : problem_(problem), orders_(hb::finer(problem.harmonics(), problem.model())) {
-  const std::vector<int>& orders = orders_;
+    : problem_(problem) {
+  const std::vector<int> orders = enlarged(problem.harmonics(), problem.model());
   const double bytes = factor_bytes(problem.model(), orders.size()),
                free = solve::available_bytes(problem.comm());
   if (bytes > memory_share * free) {
@@ -96,12 +90,6 @@ void DiscretisationError::close(Vec y, Vec tangent) {
 
 namespace {
 
-double norm(Vec v) {
-  double length;
-  check(VecNorm(v, NORM_2, &length));
-  return length;
-}
-
 /// Scalars of dy' + s t without a change of the last of `count`, the parameter.
 std::vector<double> at_parameter(std::vector<double> change, std::vector<double> const& tangent, int count) {
   const double s = -change[count - 1] / tangent[count - 1];
@@ -121,10 +109,12 @@ std::optional<LeftOut> DiscretisationError::at(Vec y, Vec tangent) {
   VecHandle same = retained(finer);
   check(VecAXPY(finer, -1, same));  // harmonics: r'_new
   check(VecAXPY(same, -1, left));   // samples: r'_old - r
-  const double share = norm(left) / (norm(finer) + norm(same));
+  const double share = solve::norm(left) / (solve::norm(finer) + solve::norm(same));
   const size_t sources = share <= negligible ? 2 : 3;
-  VecHandle b[] = {right_side(finer), right_side(same), right_side(left)}, x[3];
-  for (auto& v : x) v = solve::zero_like(b[0]);
+  const VecHandle rights[] = {right_side(finer), right_side(same), right_side(left)};
+  const VecHandle changes[] = {solve::zero_like(rights[0]), solve::zero_like(rights[0]),
+                               solve::zero_like(rights[0])};
+  const Vec b[] = {rights[0], rights[1], rights[2]}, x[] = {changes[0], changes[1], changes[2]};
   close(y, tangent);
   if (!newton_->linear(point, std::span(b, sources), std::span(x, sources))) return {};
   const auto along = problem_.scalars(tangent);

@@ -40,7 +40,6 @@ class DiscretisationError {
   void close(Vec y, Vec tangent);
 
   HarmonicProblem& problem_;
-  std::vector<int> orders_;
   std::string left_out_;
   std::unique_ptr<HarmonicProblem> finer_, sampled_;  ///< of J', and of r' where its samples are others
   std::unique_ptr<solve::Newton> newton_;

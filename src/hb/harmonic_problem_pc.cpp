@@ -17,13 +17,7 @@ namespace {
 bool suits_dense(model::Model const& model) {
   constexpr double always = 200, largest = 3000, share = 0.25;  // dofs, dofs, of nonzero entries
   const double n = double(model.dofs());
-  double entries = 0;
-  for (auto const& term : model.terms()) {
-    MatInfo info;
-    check(MatGetInfo(term.A, MAT_GLOBAL_SUM, &info));
-    entries = std::max(entries, info.nz_used);
-  }
-  return n <= always || (n <= largest && entries > share * n * n);
+  return n <= always || (n <= largest && model.largest_term() > share * n * n);
 }
 
 [[noreturn]] void refuse(std::string const& blocks, std::string const& problem) {

@@ -107,6 +107,7 @@ FRETWAVE_VECTORISE void fold(int half, int columns, double const* x, double cons
 
 FourierTransform::FourierTransform(Harmonics const& h, int columns, int components)
     : harmonics_(h), columns_(columns), rows_(h.samples() / 2 + 1), table_(by_table(h)) {
+  if (columns == 0) return;
   const int m = h.block_size(), N = h.samples(), pairs = columns / components;
   for (int c = 0; c < columns; ++c) block_.push_back((size_t(c % pairs) * components + c / pairs) * m);
   synthesis_.resize(size_t(N) * m), analysis_.resize(synthesis_.size());

@@ -134,7 +134,7 @@ std::vector<ContactPeriod> Residual::periods(Vec Q, Exponents const& e) {
   together(model_.comm(), "contact samples", [&] {
     fault::point("contact samples");
     for (size_t k = 0; k < groups_.size(); ++k)
-      out.push_back(groups_[k].aft.told_period(ReadArray(U[k]).data(), e));
+      out.push_back(groups_[k].aft.period(ReadArray(U[k]).data(), e));
   });
   return out;
 }

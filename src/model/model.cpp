@@ -67,6 +67,16 @@ MatHandle Model::sum(int order) const {
   return total;
 }
 
+double Model::largest_term() const {
+  double entries = 0;
+  for (auto const& term : terms_) {
+    MatInfo info;
+    check(MatGetInfo(term.A, MAT_GLOBAL_SUM, &info));
+    entries = std::max(entries, info.nz_used);
+  }
+  return entries;
+}
+
 VecHandle Model::displacement() const { return make_vector(comm_, local_); }
 
 bool Model::travelling() const {

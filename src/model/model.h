@@ -54,6 +54,8 @@ class Model {
   std::vector<Contact> const& contacts() const { return contacts_; }
   /// Sum of all terms of one order with no phase; empty handle if there is none.
   MatHandle sum(int order) const;
+  /// Nonzero entries of the fullest term. Collective.
+  double largest_term() const;
   /// A vector of one entry per dof.
   VecHandle displacement() const;
   /// A phase makes the fundamental's equations complex: a travelling wave, whose mode shapes are complex.

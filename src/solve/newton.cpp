@@ -227,14 +227,9 @@ bool Newton::tangent(Vec y, Vec t) {
   return linear(y, right_side_, t);
 }
 
-bool Newton::linear(Vec y, Vec b, Vec x) {
-  do {
-    if (linear_->linearise(y, false) && linear_->solve(b, x)) return true;
-  } while (linear_->climb());
-  return false;
-}
+bool Newton::linear(Vec y, Vec b, Vec x) { return linear(y, {&b, 1}, {&x, 1}); }
 
-bool Newton::linear(Vec y, std::span<VecHandle const> b, std::span<VecHandle const> x) {
+bool Newton::linear(Vec y, std::span<Vec const> b, std::span<Vec const> x) {
   const auto all = [&] {
     for (size_t k = 0; k < b.size(); ++k)
       if (!linear_->solve(b[k], x[k])) return false;

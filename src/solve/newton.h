@@ -35,7 +35,7 @@ class Newton {
   bool tangent(Vec y, Vec t);
   /// J x = b at y with the closing row, from x where the Krylov route is taken. Collective.
   bool linear(Vec y, Vec b, Vec x);
-  bool linear(Vec y, std::span<VecHandle const> b, std::span<VecHandle const> x);
+  bool linear(Vec y, std::span<Vec const> b, std::span<Vec const> x);
   /// For one that `linear` alone is asked of: how exactly, relative to b.
   void solve_beside(double tolerance) { linear_->serve_beside(tolerance); }
 

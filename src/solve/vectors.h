@@ -21,6 +21,12 @@ inline double dot(Vec a, Vec b) {
   return sum;
 }
 
+inline double norm(Vec v) {
+  double length;
+  check(VecNorm(v, NORM_2, &length));
+  return length;
+}
+
 /// W v for diagonal weights W.
 inline VecHandle weighted(Vec weights, Vec v) {
   VecHandle w = like(v);

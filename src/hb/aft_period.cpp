@@ -1,0 +1,120 @@
+/// What is read of a motion beside the last one: samples of its period, and what the law says of them.
+#include <algorithm>
+
+#include "hb/aft.h"
+
+namespace fretwave::hb {
+
+/// All pairs at once over the whole period.
+contact::Motion Aft::whole(ContactPeriod const& period, Exponents const& e) const {
+  contact::Motion motion = this->motion({0, pairs_, {}}, angular_frequency(e));
+  motion.samples = harmonics_.samples();
+  motion.u = period.u.data(), motion.v = period.v.data();
+  return motion;
+}
+
+FourierTransform const& Aft::whole_transform() const {
+  if (!whole_transform_)
+    whole_transform_ = std::make_shared<FourierTransform>(harmonics_, columns_, law_->components());
+  return *whole_transform_;
+}
+
+Aft::Found Aft::find(double const* U, Exponents const& e) const {
+  Found out;
+  ContactPeriod& period = out.samples;
+  if (columns_ == 0) return out;
+  for (auto* samples : {&period.u, &period.v, &period.f})
+    samples->resize(size_t(harmonics_.samples()) * columns_);
+  out.F.resize(size_t(columns_) * harmonics_.block_size());
+  std::vector<double> V(out.F.size());
+  multiply(harmonics_, e.s, U, V.data(), columns_);
+  whole_transform().to_time(U, period.u.data());
+  whole_transform().to_time(V.data(), period.v.data());
+  if (continuous_) {
+    out.pieces.emplace(harmonics_, *law_);
+    out.pieces->force(U, out.F.data());
+    out.pieces->sample(harmonics_.samples(), period.u.data(), period.f.data());
+    return out;
+  }
+  contact::Record record;
+  law_->force(whole(period, e), period.f.data(), record);
+  whole_transform().to_harmonics(period.f.data(), out.F.data());
+  period.unclosed = record.unclosed;
+  return out;
+}
+
+ContactPeriod Aft::period(double const* U, Exponents const& e) const {
+  ContactPeriod out = find(U, e).samples;
+  if (columns_ == 0) return out;
+  contact::Diagnosis told = contact::states(*law_, whole(out, e), out.f.data());
+  out.status = std::move(told.status), out.gap = std::move(told.gap);
+  return out;
+}
+
+contact::Diagnosis Aft::diagnosis(Found const& found, Exponents const& e, bool archard) const {
+  const contact::Motion whole = this->whole(found.samples, e);
+  contact::Diagnosis out{std::vector<contact::Status>(size_t(whole.samples) * pairs_),
+                         std::vector<double>(pairs_), std::vector<double>(pairs_),
+                         std::vector<double>(archard ? pairs_ : 0)};
+  law_->diagnose(whole, found.samples.f.data(), out);
+  if (found.pieces) found.pieces->measure(out);
+  return out;
+}
+
+Wearing Aft::wearing(double const* U, Exponents const& e) const {
+  const std::vector<double> none(pairs_, 0.0);
+  Wearing out{none, none, none, none};
+  if (columns_ == 0 || !law_->wears() || law_->normal() < 0) return out;
+  const Found found = find(U, e);
+  const contact::Diagnosis told = diagnosis(found, e, true);
+  const double share = 1.0 / harmonics_.samples();
+  out.archard = told.archard;
+  for (int t = 0; t < harmonics_.samples(); ++t)
+    for (int i = 0; i < pairs_; ++i) {
+      const auto status = told.status[size_t(t) * pairs_ + i];
+      out.load[i] += share * found.samples.f[size_t(t) * columns_ + size_t(law_->normal()) * pairs_ + i];
+      out.slip[i] += status == contact::Status::slip ? share : 0;
+      out.open[i] += status == contact::Status::open ? share : 0;
+    }
+  return out;
+}
+
+namespace {
+
+void count(contact::Diagnosis const& diagnosis, ContactSummary& summary) {
+  double* shares[] = {&summary.stick, &summary.slip, &summary.open};
+  for (auto s : diagnosis.status) *shares[int(s)] += 1;
+  for (double w : diagnosis.work) summary.work += w;
+  for (double path : diagnosis.slip_path) summary.path = std::max(summary.path, path);
+}
+
+}  // namespace
+
+/// Force of the same motion on twice the samples; the same force where there are none.
+std::vector<double> Aft::on_doubled_samples(double const* U, Exponents const& e, std::vector<double> F) {
+  if (continuous_) return F;
+  if (!doubled_)
+    doubled_ = std::make_shared<Aft>(Harmonics(harmonics_.orders(), 2 * harmonics_.samples()), law_);
+  doubled_->force(U, e, F.data());
+  return F;
+}
+
+ContactSummary Aft::summarise(double const* U, Exponents const& e) {
+  ContactSummary summary;
+  if (columns_ == 0) return summary;
+  const Found found = find(U, e);
+  std::tie(summary.truncated, summary.total) =
+      whole_transform().truncated_energy(found.samples.f.data(), found.F.data());
+  summary.unclosed = found.samples.unclosed;
+  count(diagnosis(found, e, false), summary);
+  const std::vector<double> finer = on_doubled_samples(U, e, found.F);
+  const size_t m = harmonics_.block_size(), mean = harmonics_.orders()[0] == 0;
+  for (size_t k = 0; k < finer.size(); ++k) {
+    const double F = found.F[k];
+    summary.aliased += (finer[k] - F) * (finer[k] - F);
+    summary.retained += k % m < mean ? 0 : F * F;
+  }
+  return summary;
+}
+
+}  // namespace fretwave::hb
