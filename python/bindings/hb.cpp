@@ -90,6 +90,14 @@ void bind_hb(nb::module_& m) {
           [](HarmonicProblem& p, Petsc<Vec> y, PerContact const& from) { p.settle(y.object, from); },
           nb::arg(), nb::arg("sliders") = PerContact{})
       .def("stand", &HarmonicProblem::stand)
+      .def(  // the model is kept, not the problem: a branch may go through many
+          "on", [](HarmonicProblem const& p, model::Model const&, Harmonics const& h) { return p.on(h); },
+          nb::arg("model"), nb::arg("harmonics"), nb::keep_alive<0, 2>())
+      .def("embedded",
+           [](HarmonicProblem const& p, HarmonicProblem const& other, Petsc<Vec> x) {
+             VecHandle out = p.on(other, x.object);
+             return handed(out);
+           })
       .def("exponents", [](HarmonicProblem& p, Petsc<Vec> y) { return p.exponents(y.object).s; });
   nb::enum_<Method>(m, "Method").value("CNM", Method::CNM).value("EPMC", Method::EPMC);
   nb::class_<NonlinearMode, HarmonicProblem>(m, "NonlinearMode")

@@ -87,6 +87,14 @@ void bind_solve(nb::module_& m) {
              };
              return to_python(c.restore(anchor(at), anchor(before), emitted, upwards, began));
            })
+      .def("take_over",
+           [](Continuation& c, Petsc<Vec> y, Petsc<Vec> tangent, double step, int index, bool wary,
+              std::string const& event, bool upwards, double began) {
+             Continuation::Anchor from;
+             from.y = copy(y.object), from.tangent = copy(tangent.object);
+             from.step = step, from.index = index, from.wary = wary;
+             return to_python(c.take_over(std::move(from), event, upwards, began));
+           })
       .def("next", [](Continuation& c) { return to_python(c.next()); })
       .def_prop_ro("reason", &Continuation::reason)
       .def_prop_ro("converged", &Continuation::converged)
@@ -100,7 +108,7 @@ void bind_solve(nb::module_& m) {
         out["y"] = Petsc<Vec>{a.y}, out["tangent"] = Petsc<Vec>{a.tangent};
         if (b.y) out["before_y"] = Petsc<Vec>{b.y}, out["before_tangent"] = Petsc<Vec>{b.tangent};
         out["step"] = a.step, out["index"] = a.index, out["wary"] = a.wary, out["emitted"] = c.emitted();
-        out["upwards"] = c.upwards(), out["began"] = c.began();
+        out["next_step"] = c.next_step(), out["upwards"] = c.upwards(), out["began"] = c.began();
         return out;
       });
 }

@@ -94,6 +94,8 @@ _ALL = (
             ("solver", "what the solver left"),
         )
     ),
+    Column("harmonics", "1", "highest harmonic retained", "i"),
+    Column("samples", "1", "time samples of a period", "i"),
     Column("force_outside", "1", "share of the varying contact force outside the retained harmonics; no error"),
     Column("residual", "1", "norm of the scaled residual"),
     Column("newton", "1", "Newton iterations", "i"),
@@ -150,6 +152,11 @@ def over(columns: Sequence[Column], unit: str, what: str = "") -> list[Column]:
         else column
         for column in columns
     ]
+
+
+def with_discretisation(names: Sequence[Any]) -> list[Any]:
+    """Columns of a branch whose harmonics and samples change along it."""
+    return [*names[:-1], "harmonics", "samples", names[-1]]
 
 
 def columns_named(names: Sequence[str | Column]) -> list[Column]:

@@ -127,6 +127,25 @@ std::optional<Point> Continuation::restore(Anchor anchor, Anchor before, int emi
   return std::move(batch_[emitted_ - 1].second);
 }
 
+std::optional<Point> Continuation::take_over(Anchor from, std::string const& event, bool upwards,
+                                             double began) {
+  anchor_ = std::move(from);
+  upwards_ = upwards, began_ = began, taken_over_ = true;
+  open_the_range();
+  prepare_row();
+  Trial trial = at(copy(anchor_.y));
+  const bool given = event == "start" || event == "report" || event == "stop";
+  const double value = given ? last_entry(trial.y) : row_value_;
+  if (!correct(trial, given ? parameter_row_ : row_, value, row_)) return {};
+  anchor_.y = copy(trial.y), anchor_.tangent = copy(trial.tangent);
+  prepare_row();
+  signs_.clear();
+  for (auto const& test : anchor_tests_)  // what was met is not met again
+    signs_.push_back(event.find(test.name) == std::string::npos ? test_sign(test.value) : 0);
+  (void)trail_.add(anchor_.y, anchor_.tangent);
+  return point(std::move(trial), event, 0);
+}
+
 /// A branch may fold back over the end it began at and come in again: it is followed some way outside.
 void Continuation::open_the_range() {
   const double low = problem_.parameter_entry(given_low_), high = problem_.parameter_entry(given_high_),

@@ -48,6 +48,10 @@ class Continuation {
   /// The last state of an earlier run; `before` may be empty. Returns what was the last point handed out.
   /// Collective.
   std::optional<Point> restore(Anchor anchor, Anchor before, int emitted, bool upwards, double began);
+  /// The branch of the same problem in another discretisation, from a point (`event`) of its branch there:
+  /// met at a right angle to that one's tangent, or at its parameter where that was asked for. No point where
+  /// the corrector fails. Collective.
+  std::optional<Point> take_over(Anchor from, std::string const& event, bool upwards, double began);
   /// The next point, or none with a reason. Collective.
   std::optional<Point> next();
 
@@ -59,6 +63,8 @@ class Continuation {
   Anchor const& anchor() const { return anchor_; }
   Anchor const& before() const { return before_; }
   int emitted() const { return emitted_; }
+  /// Length of the step after the present one.
+  double next_step() const { return after_.y ? after_.step : anchor_.step; }
   bool upwards() const { return upwards_; }
   double began() const { return began_; }
 
@@ -141,7 +147,8 @@ class Continuation {
   std::vector<std::string> missed_;
   Trail trail_;
   int emitted_ = 0, meetings_ = 0, crawled_ = 0;
-  bool upwards_ = true, turned_ = false, wary_ = false, finished_ = false, converged_ = false;
+  bool upwards_ = true, taken_over_ = false, turned_ = false, wary_ = false, finished_ = false,
+       converged_ = false;
   std::string ending_;  ///< reason to stop once the batch is handed out
   bool arrived_ = false;
   std::string reason_;

@@ -10,13 +10,10 @@ namespace fretwave::solve {
 namespace {
 
 constexpr int nodes = 8;               // parts of a step in which its cubic is looked at
-constexpr double test_noise = 1e-11;   // a test function closer to zero than this has no sign
 constexpr double near_zero = 0.3;      // of the smaller end value: so low a minimum may hide two zeros
 constexpr double jump = 0.1;           // of the end values: what is left where a test function jumps
 constexpr double value_error = 1e-9;   // relative, of a reported value reached along the branch
 constexpr double off_the_curve = 0.5;  // of the step: a solution farther from the cubic is another branch
-
-int sign_of(double value) { return value > test_noise ? 1 : value < -test_noise ? -1 : 0; }
 
 /// Zero of the straight line between two places.
 double secant(double a, double fa, double b, double fb) { return (a * fb - b * fa) / (fb - fa); }
@@ -53,7 +50,7 @@ void Continuation::locate_events(Trial const& end, double length) {
   }
   if (signs_.size() != scans.size()) {
     signs_.clear();
-    for (auto const& test : anchor_tests_) signs_.push_back(sign_of(test.value));
+    for (auto const& test : anchor_tests_) signs_.push_back(test_sign(test.value));
   }
   for (size_t k = 0; k < scans.size(); ++k) locate(k, scans[k], curve, length);
   locate_values(end, curve, length);
@@ -64,8 +61,8 @@ void Continuation::locate_events(Trial const& end, double length) {
 std::string Continuation::events_of_corner(Trial const& end) {
   std::string found;
   for (size_t k = 0; k < end.tests.size(); ++k) {
-    const int before = k < signs_.size() ? signs_[k] : sign_of(anchor_tests_[k].value),
-              now = sign_of(end.tests[k].value);
+    const int before = k < signs_.size() ? signs_[k] : test_sign(anchor_tests_[k].value),
+              now = test_sign(end.tests[k].value);
     if (now && k < signs_.size()) signs_[k] = now;
     if (before * now < 0 && !(end.tests[k].falling_only && before < 0))
       found += (found.empty() ? "" : " ") + end.tests[k].name;
@@ -110,10 +107,10 @@ void Continuation::locate(size_t which, std::vector<Place> const& scan, Hermite 
     const double value = actual(at);
     if (std::isfinite(value)) places.insert(places.end() - 1, {at, value});
   };
-  const bool ends_differ = sign_of(scan.front().value) * sign_of(scan.back().value) < 0;
+  const bool ends_differ = test_sign(scan.front().value) * test_sign(scan.back().value) < 0;
   std::vector<double> changes;  // of sign on the cubic
   for (size_t i = 0; i + 1 < scan.size(); ++i)
-    if (sign_of(scan[i].value) * sign_of(scan[i + 1].value) < 0)
+    if (test_sign(scan[i].value) * test_sign(scan[i + 1].value) < 0)
       changes.push_back(secant(scan[i].at, scan[i].value, scan[i + 1].at, scan[i + 1].value));
   if (changes.size() > 1)
     for (size_t i = 0; i + 1 < changes.size(); ++i) visit((changes[i] + changes[i + 1]) / 2);
@@ -122,13 +119,13 @@ void Continuation::locate(size_t which, std::vector<Place> const& scan, Hermite 
       return std::abs(a.value) < std::abs(b.value);
     });
     const double ends = std::min(std::abs(scan.front().value), std::abs(scan.back().value));
-    if (ends > test_noise && std::abs(lowest->value) < near_zero * ends && lowest->at > 0 &&
+    if (test_sign(ends) > 0 && std::abs(lowest->value) < near_zero * ends && lowest->at > 0 &&
         lowest->at < length)
       visit(lowest->at);
   }
   int before = signs_[which];
   for (size_t i = 0; i + 1 < places.size(); ++i) {
-    const int now = sign_of(places[i + 1].value);
+    const int now = test_sign(places[i + 1].value);
     if (now == 0) continue;
     if (before * now < 0) {
       double guess = secant(places[i].at, places[i].value, places[i + 1].at, places[i + 1].value);
@@ -192,7 +189,7 @@ void Continuation::locate_values(Trial const& end, Hermite const& curve, double 
     for (size_t i = 0; i + 1 < places.size(); ++i) {
       const double from = places[i].value, to = places[i + 1].value;
       if ((from < target) == (to < target) || from == to) continue;
-      if (outside && i == 0 && from == target) continue;  // the branch starts here
+      if ((outside || taken_over_) && i == 0 && from == target) continue;  // the branch starts here
       reach(value, event, places[i], places[i + 1], curve, length);
     }
   };

@@ -20,6 +20,12 @@ struct TestFunction {
   bool extremum = false;
 };
 
+/// Sign of a test function's value; none (0) next to zero.
+inline int test_sign(double value) {
+  constexpr double noise = 1e-11;
+  return value > noise ? 1 : value < -noise ? -1 : 0;
+}
+
 /// N equations in N + 1 unknowns y = (u, p): the parameter p is the last entry of y, on the last rank.
 /// A rank's part of y is its part of the residual, and one entry more on the last rank.
 class Problem {

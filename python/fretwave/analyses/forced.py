@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
     from ..case.facts import Facts
     from ..case.reporter import Reporter
-    from ..hb.problems import ForcedResponse
+    from ..hb.problems import HarmonicProblem
 
 
 @register_analysis
@@ -144,7 +144,7 @@ class ForcedAnalysis(HarmonicSection):
         left_out = [] if self.time_points else ["check by time integration (time_points = 0)"]
         context.leave_out([*harmonics.left_out, *_missing_backbones(context), *left_out])
         writer = context.writer(
-            [*named(FORCED[:-1], self.observe), *excitation.columns(), FORCED[-1]],
+            self.columns_of([*named(FORCED[:-1], self.observe), *excitation.columns(), FORCED[-1]]),
             labels=harmonics.labels,
             samples=harmonics.samples,
             stuck_omega=excitation.reference.omega,
@@ -218,7 +218,8 @@ def _one_level(
     excitation.phase = phase if go_on else None
     for point in points_of(branch):
         own = {"level_number": number, **({} if excitation.phase is None else {"phase": excitation.phase})}
-        row = record(writer, problem, point, branch.snapshot(), own, excitation.row, analysis.errors)
+        now = branch.problem
+        row = record(writer, now, point, branch.snapshot(), own, excitation.row, analysis.errors)
         share = (number + (row["omega"] - low) / (high - low)) / len(analysis.levels)
         context.console.point(
             point_line(context.name, row, unit),
@@ -229,7 +230,7 @@ def _one_level(
     tell(context, branch, f"{context.name}: level {analysis.levels[number]:g}")
     stopped = "" if branch.converged else f"level {analysis.levels[number]:g}: {branch.reason}"
     if "without bound" in stopped:
-        most = _bounded(excitation, problem, branch.anchor)
+        most = _bounded(excitation, branch.problem, branch.anchor)
         stopped += f": damping and friction take at most the work of level {most:.4g}"
     elif stopped:
         stopped += suspects(context.model.contacts, problem.core.stiffness_scale)
@@ -238,7 +239,7 @@ def _one_level(
     return stopped
 
 
-def _bounded(excitation: Excitation, problem: ForcedResponse, y: PETSc.Vec) -> float:
+def _bounded(excitation: Excitation, problem: HarmonicProblem, y: PETSc.Vec) -> float:
     """Level whose work damping and friction still take in the shape of the motion at y. Collective.
 
     The work that a force at level 1 does at most, at a right angle to the motion, is pi |q_1^H P| per period.
@@ -247,7 +248,7 @@ def _bounded(excitation: Excitation, problem: ForcedResponse, y: PETSc.Vec) -> f
     coefficients = problem.coefficients(y)
     work = None
     if coefficients is not None:
-        q = complex_amplitudes(excitation.harmonics.labels, coefficients)[1]
+        q = complex_amplitudes(problem.harmonics.labels, coefficients)[1]
         work = math.pi * abs(np.vdot(q, excitation.force()))
     return float((taken["contact"] + taken["damping"]) / excitation.context.comm.bcast(work))
 

@@ -6,7 +6,7 @@ import dataclasses
 import json
 import math
 from functools import partial
-from typing import TYPE_CHECKING, Any, Literal, Optional
+from typing import TYPE_CHECKING, Any, Literal, Optional, cast
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from ..results.sweep_summary import MODE_BRANCH
 from .parts.asymptotes import asymptote_line
 from .parts.branch import (
     closure_note,
+    continuation,
     error_text,
     finished_table,
     largest_error,
@@ -30,7 +31,6 @@ from .parts.branch import (
     open_branch,
     points_of,
     record,
-    step_control,
     tell,
 )
 from .parts.context import AnalysisContext, Outcome
@@ -129,7 +129,9 @@ class ModeAnalysis(HarmonicSection):
                 context.console.line(f"note: {context.name}: {note}")
         problem = mode_problem(context, harmonics, start.mode, start.rest, start.dof, start.avoid)
         writer = context.writer(
-            [*named(MODE[:-1], self.normalise), ENERGY, *(WHEEL if context.case.wheel else ()), MODE[-1]],
+            self.columns_of(
+                [*named(MODE[:-1], self.normalise), ENERGY, *(WHEEL if context.case.wheel else ()), MODE[-1]]
+            ),
             labels=harmonics.labels,
             samples=harmonics.samples,
             stuck_omega=start.mode.omega,
@@ -146,8 +148,6 @@ class ModeAnalysis(HarmonicSection):
 def _follow(
     context: AnalysisContext[ModeAnalysis], problem: NonlinearMode, writer: AnalysisWriter, start: Start
 ) -> Outcome:
-    from ..solve.continuation import Continuation
-
     analysis = context.analysis
     low, high = analysis.amplitude
     unit = unit_of(analysis.normalise)
@@ -155,12 +155,8 @@ def _follow(
     estimated = context.case.unreduced is not None and context.case.wheel is None
     error_at = reduction.error_at if reduction is not None and estimated else None
     reports = sorted({*analysis.report_at, *([] if error_at is None else [error_at])})
-    settings: dict[str, Any] = {"stop": (low, high), "steps": step_control(analysis.step), "report_at": reports}
     snapshot, _, found = open_branch(context.comm, writer, context.resuming)
-    if found:
-        branch = Continuation.restore(problem, snapshot, **settings)
-    else:
-        branch = Continuation(problem, problem.initial(low), **settings)
+    branch = continuation(context, problem, (low, high), reports, snapshot, found)
     around = None
     if context.case.wheel is not None:
         tuned = start.attributes["tuned_amplitude"]
@@ -168,9 +164,10 @@ def _follow(
     with context.console.progress(context.name):
         for point in points_of(branch):
             described = partial(_described, around)
-            row = record(writer, problem, point, branch.snapshot(), {}, described, context.analysis.errors)
+            now = cast("NonlinearMode", branch.problem)
+            row = record(writer, now, point, branch.snapshot(), {}, described, context.analysis.errors)
             if error_at is not None and math.isclose(row["amplitude"], error_at, rel_tol=1e-9):
-                context.console.line(_reduction_error(context, problem, point, row))
+                context.console.line(_reduction_error(context, now, point, row))
             share = math.log(row["amplitude"] / low) / math.log(high / low)
             context.console.point(
                 point_line(context.name, row, unit), _short(row, unit), share, bool(row["event"] or closure_note(row))

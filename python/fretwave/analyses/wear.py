@@ -88,7 +88,8 @@ class WearAnalysis(AnalysisSection):
         """Its mode, with what it gives in place of the mode's."""
         mode = case.analyses.of(ModeAnalysis)[self.mode]
         own = {name: getattr(self, name) for name in ("harmonics", "samples") if getattr(self, name) is not None}
-        return mode.model_copy(update={**own, "name": self.name, "dampers": self.dampers or mode.dampers})
+        own |= {"name": self.name, "dampers": self.dampers or mode.dampers, "accuracy": None}
+        return mode.model_copy(update=own)
 
     def decided_by(self) -> list[str]:
         return [self.mode]
@@ -97,6 +98,10 @@ class WearAnalysis(AnalysisSection):
         super().check(report, facts)
         report.mode(("mode",), self.mode, facts.analyses_of("mode"))
         check_displaced(report, "mode", self.mode, facts)
+        by_accuracy = {str(entry.get("name")) for entry in facts.source.entries("analysis") if "accuracy" in entry}
+        if self.harmonics is None and self.mode in by_accuracy:
+            expected, fix = "a set for all cycles: the mode chooses its own", "add for example `harmonics = 7`"
+            report.wrong(("harmonics",), "is missing beside a mode with `accuracy`", expected, fix)
         for index, value in enumerate(self.report_at):
             if value > self.cycles:
                 expected = f"at most cycles = {self.cycles:g}"

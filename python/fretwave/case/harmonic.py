@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Literal, Optional
+from typing import TYPE_CHECKING, Any, Literal, Optional
 
+from pydantic import ConfigDict, model_validator
+
+from ..columns import with_discretisation
 from ..texts import toml
 from .analysis import AnalysisSection
 from .checks_size import harmonic_memory
 from .checks_wheel import check_wave, check_wheel
-from .schema import MistuningSection, PreloadSection, StepSection, Whole, key
+from .schema import MistuningSection, Positive, PreloadSection, StepSection, Whole, key
 
 if TYPE_CHECKING:
     from ..model.model import Model
@@ -18,10 +21,29 @@ if TYPE_CHECKING:
     from .reporter import Reporter
 
 
+#: The least set, which an accuracy begins with.
+LEAST_HARMONICS, LEAST_SAMPLES = 5, 128
+
+
+def _either(schema: dict[str, Any]) -> None:
+    """Of the JSON schema: one of the two keys must be there."""
+    schema["required"] = [name for name in schema["required"] if name != "harmonics"]
+    schema["anyOf"] = [{"required": ["harmonics"]}, {"required": ["accuracy"]}]
+
+
 class HarmonicSection(AnalysisSection):
     """Keys of the analyses in the frequency domain."""
 
+    model_config = ConfigDict(json_schema_extra=_either)
+
     harmonics: Whole = key("highest harmonic", example="21", ge=1)
+    accuracy: Optional[Positive] = key(
+        "relative accuracy of damping and frequency, or of the amplitude of a response: it chooses harmonics and "
+        "samples point by point, in place of the keys",
+        example="1e-3",
+        default=None,
+        lt=1,
+    )
     retain: Literal["auto", "odd", "all"] = key(
         "which harmonics up to the highest are kept", example='"auto"', default="auto"
     )
@@ -45,8 +67,20 @@ class HarmonicSection(AnalysisSection):
     step: StepSection = key("step control", example="{ initial = 0.05, maximum = 0.3 }", default_factory=StepSection)
     preload: Optional[PreloadSection] = key("in place of [preload]", example="{ pair_loads = true }", default=None)
 
+    @model_validator(mode="before")
+    @classmethod
+    def _first_set(cls, given: Any) -> Any:
+        """An accuracy stands in place of the harmonics."""
+        if isinstance(given, Mapping) and given.get("accuracy") is not None:
+            return {"harmonics": LEAST_HARMONICS, **given}
+        return given
+
     def own_preload(self) -> Optional[PreloadSection]:
         return self.preload
+
+    def columns_of(self, columns: Sequence[Any]) -> list[Any]:
+        """Columns of its table; with an accuracy also the harmonics and samples of each point."""
+        return list(columns) if self.accuracy is None else with_discretisation(columns)
 
     def harmonic(self) -> Optional[HarmonicSection]:
         return self
@@ -77,8 +111,11 @@ class HarmonicSection(AnalysisSection):
         from ..hb.problems import choose_harmonics
 
         lines = super().details(model)
-        harmonics = choose_harmonics(model, self.harmonics, self.samples, self.retain)
+        sizes = (self.harmonics, self.samples) if self.accuracy is None else (LEAST_HARMONICS, LEAST_SAMPLES)
+        harmonics = choose_harmonics(model, *sizes, self.retain)
         n_dof = model.n_dof * (model.sectors if self.wheel else 1)
+        if self.accuracy is not None:
+            lines.append(f"accuracy {self.accuracy:g}: harmonics and samples follow from it, at the least")
         lines.append(
             f"harmonics {_orders(harmonics.orders)}, {harmonics.samples} samples a period,"
             f" {n_dof} x {harmonics.block_size} = {n_dof * harmonics.block_size} coefficients"
@@ -131,6 +168,8 @@ def check_harmonics(report: Reporter, analysis: HarmonicSection, dofs: Optional[
         report.wrong(
             ("linear_mode",), "does not exist", f"1 to {len(dofs)}, the number of dofs", "write `linear_mode = 1`"
         )
+    if analysis.accuracy is not None and not analysis.errors:
+        report.wrong(("errors",), "takes away what `accuracy` is judged by", "errors = true", "remove one of the keys")
     step = analysis.step
     if not step.minimum <= step.initial <= step.maximum:
         report.wrong(

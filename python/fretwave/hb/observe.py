@@ -31,14 +31,14 @@ class Observer:
     """
 
     def __init__(self, problem: HarmonicProblem, observe: Mapping[str, Union[Observed, str]]) -> None:
-        self.problem, self.columns = problem, [_column(name, what) for name, what in observe.items()]
+        self.columns = [_column(name, what) for name, what in observe.items()]
         self.rows = {name: row_of(problem.model, what) for name, what in observe.items() if not isinstance(what, str)}
         self.energies = [name for name, what in observe.items() if isinstance(what, str)]
         self.first, self.end = problem.model.ownership
 
-    def __call__(self, y: PETSc.Vec) -> dict[str, float]:
+    def __call__(self, y: PETSc.Vec, problem: HarmonicProblem) -> dict[str, float]:
         """By column: amplitude of the fundamental of each row [m], energy [J]."""
-        labels, local = self.problem.harmonics.labels, self.problem.local_coefficients(y)
+        labels, local = problem.harmonics.labels, problem.local_coefficients(y)
         q = local[:, labels.index("1c")] - 1j * local[:, labels.index("1s")]
         sums = np.array(
             [
@@ -46,8 +46,8 @@ class Observer:
                 for row in self.rows.values()
             ]
         )
-        sums = np.asarray(self.problem.model.comm.allreduce(sums))
-        energy = mechanical_energy(self.problem, y) if self.energies else 0.0
+        sums = np.asarray(problem.model.comm.allreduce(sums))
+        energy = mechanical_energy(problem, y) if self.energies else 0.0
         return {**dict(zip(self.rows, np.abs(sums).tolist())), **dict.fromkeys(self.energies, energy)}
 
 

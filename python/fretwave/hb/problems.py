@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import operator
 import time
 from collections.abc import Mapping, Sequence
@@ -20,7 +21,7 @@ from ..model.modes import LinearMode
 from ..model.rest import Rest
 from ..mpi.gather import on_rank_0
 from ..post.contact_history import MOTION
-from .states import ForcedState, ModalState, State
+from .states import Estimate, ForcedState, ModalState, State
 
 
 class Harmonics:
@@ -39,6 +40,16 @@ class Harmonics:
         self.block_size: int = self.core.block_size
         self.labels = [label for n in self.orders for label in (["0"] if n == 0 else [f"{n}c", f"{n}s"])]
         self.left_out: list[str] = []
+
+    def up_to(self, highest: int, samples: int) -> Harmonics:
+        """A set of the same kind (odd, with the mean) up to another order; samples double until they suffice."""
+        step = 2 if all(n % 2 for n in self.orders) else 1
+        highest += step == 2 and highest % 2 == 0
+        while samples < 2 * highest + 2:
+            samples *= 2
+        other = Harmonics(range(self.orders[0], highest + 1, step), samples)
+        other.left_out = list(self.left_out)
+        return other
 
     def __repr__(self) -> str:
         step = self.orders[1] - self.orders[0] if len(self.orders) > 1 else 1
@@ -140,6 +151,19 @@ class HarmonicProblem:
         with self.model.vectors(displacement, load) as vectors:
             self.core.preload(*vectors)
 
+    def on(self, harmonics: Harmonics) -> HarmonicProblem:
+        """The same problem, with its loads and what stands at rest, on another set of harmonics. Collective."""
+        other = copy.copy(self)
+        other.core, other.harmonics, other._error = self.core.on(self.model.core, harmonics.core), harmonics, None
+        return other
+
+    def embedded(self, other: HarmonicProblem, v: PETSc.Vec) -> PETSc.Vec:
+        """Unknowns, tangent or equations of this problem as those of `other`, the same one `on` another set.
+
+        What is new is zero. A Vec of the caller's. Collective.
+        """
+        return self.core.embedded(other.core, v)
+
     def residual(self, y: PETSc.Vec, r: PETSc.Vec | None = None) -> PETSc.Vec:
         """r(y), dimensionless, N entries, in `r` where one is given. Collective."""
         r = self.core.equations() if r is None else r
@@ -213,19 +237,31 @@ class HarmonicProblem:
         """
         if self.meaning is None:
             return {}
-        began, z, found = time.perf_counter(), self.scalars(y), None
-        if tangent is not None:
-            if self._error is None:
-                self._error = _core.DiscretisationError(self.core, f"{self.prefix}error_")
-            found = self._error.at(y, tangent)
+        found = None if tangent is None else self.estimate(y, tangent)
+        return (found or Estimate.none(self.meaning)).columns
+
+    def estimate(self, y: PETSc.Vec, tangent: PETSc.Vec) -> Estimate | None:
+        """What `errors` are made of; None where nothing is known. Collective."""
+        assert self.meaning is not None
+        began = time.perf_counter()
+        if self._error is None:
+            self._error = _core.DiscretisationError(self.core, f"{self.prefix}error_")
+        changes = self._error.at(y, tangent)
+        found = None
+        if changes is not None:
+            z, along = self.scalars(y), self.scalars(tangent)
+            found = Estimate(self.meaning, z, along, [np.array(change) for change in changes])
         self.errors_wall_s += time.perf_counter() - began
-        changes = [np.full_like(z, np.nan)] * 4 if found is None else [np.array(change) for change in found]
-        return self.meaning.errors(z, changes)
+        return found
 
     @property
     def errors_left_out(self) -> str:
         """Why `errors` estimates nothing: its factors would not fit the memory; empty if they do."""
         return "" if self._error is None else self._error.left_out
+
+    def forget_errors(self) -> None:
+        """Free what estimates them. Collective."""
+        self._error = None
 
     def energy(self, y: PETSc.Vec) -> dict[str, float]:
         """Where the energy of a period goes [J]. Collective.

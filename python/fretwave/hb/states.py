@@ -18,6 +18,12 @@ from ..arrays import Array
 
 #: Of a point's error.
 SOURCES = ("harmonics", "samples", "solver")
+#: A smaller damping ratio is known accurately enough when it is known to a share of this one.
+ZETA_FLOOR = 1e-4
+#: Where a mode's damping is steep over the amplitude, its point may be off by 1 / STRICT of the accuracy.
+STRICT = 10.0
+#: Of a resonance, relative to its frequency: a response's frequency is known accurately when to a share of this.
+BANDWIDTH = 0.01
 
 
 @dataclass(frozen=True)
@@ -36,6 +42,9 @@ class ModalState:
     columns: ClassVar[tuple[str, ...]] = ("amplitude", "omega", "omega0", "frequency_hz", "beta", "zeta")
     #: The scalars by name, in physical units [1/s, rad/s, 1] as `factors` gives them.
     scalars: ClassVar[tuple[str, ...]] = ("beta", "w", "log_amplitude")
+    #: Columns of the error of lambda by all sources, and by one.
+    error: ClassVar[str] = "omega_error"
+    error_by: ClassVar[str] = "lambda_error_{}"
     method: str
     omega_reference: float = 1.0
 
@@ -58,8 +67,19 @@ class ModalState:
         here = self.eigenvalue(z)
         error, *parts = (abs(self.eigenvalue(z + change) - here) for change in changes)
         omega0 = abs(here)
-        own = {f"lambda_error_{source}": part for source, part in zip(SOURCES, parts)}
+        own = {self.error_by.format(source): part for source, part in zip(SOURCES, parts)}
         return {"omega_error": error, "zeta_error": error / omega0 if omega0 else math.nan, **own}
+
+    def relative(self, z: Array, dz: Array) -> Array:
+        """A change of the scalars, of relative size: amplitude (times `STRICT`), lambda over zeta omega0 (3,).
+
+        So it is what an accuracy of the damping, and of the frequency with it, is judged by. A zeta below `ZETA_FLOOR`
+        is measured in that, for it begins at zero where slip does.
+        """
+        here, small = self(z), 1e-4
+        change = (self.eigenvalue(z + small * dz) - self.eigenvalue(z - small * dz)) / (2 * small)
+        change /= here["omega0"] * min(max(abs(here["zeta"]), ZETA_FLOOR), 1.0)
+        return np.array([STRICT * dz[2], change.real, change.imag])
 
     def eigenvalue(self, z: npt.ArrayLike) -> complex:
         """lambda = -beta + i omega [1/s]."""
@@ -88,6 +108,9 @@ class ForcedState:
     parameter: ClassVar[str] = "omega"
     columns: ClassVar[tuple[str, ...]] = ("level", "omega", "frequency_hz", "amplitude", "phase")
     scalars: ClassVar[tuple[str, ...]] = ("omega", "cosine", "sine")
+    #: Columns of the error of the complex amplitude by all sources, and by one.
+    error: ClassVar[str] = "amplitude_error"
+    error_by: ClassVar[str] = "amplitude_error_{}"
     level: float
     omega_reference: float = 1.0
     amplitude_reference: float = 1.0
@@ -105,7 +128,11 @@ class ForcedState:
     def errors(self, z: Array, changes: Sequence[Array]) -> dict[str, float]:
         """Errors of the complex amplitude [m] in columns, from changes of the scalars by all sources and by each."""
         error, *parts = (self.amplitude_reference * math.hypot(change[1], change[2]) for change in changes)
-        return {"amplitude_error": error, **{f"amplitude_error_{name}": part for name, part in zip(SOURCES, parts)}}
+        return {self.error: error, **{self.error_by.format(name): part for name, part in zip(SOURCES, parts)}}
+
+    def relative(self, z: Array, dz: Array) -> Array:
+        """A change of the scalars, of relative size: of the frequency over `BANDWIDTH`, and of the amplitude (3,)."""
+        return np.array([dz[0] / (BANDWIDTH * z[0]), *dz[1:3] / np.hypot(*z[1:3])])
 
     def __call__(self, z: npt.ArrayLike) -> dict[str, float]:
         """The columns of these scalars."""
@@ -117,6 +144,44 @@ class ForcedState:
 
 
 State = Union[ModalState, ForcedState]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Errors of a point: changes of its scalars at the same parameter by all sources and by each of `SOURCES`.
+
+    Attributes
+    ----------
+    z, along : scalars of the point, and of its branch's unit tangent
+    """
+
+    meaning: State
+    z: Array
+    along: Array
+    changes: list[Array]
+
+    @classmethod
+    def none(cls, meaning: State) -> Estimate:
+        """Nothing is known."""
+        unknown = np.full(3, np.nan)
+        return cls(meaning, unknown, unknown, [unknown] * (1 + len(SOURCES)))
+
+    @property
+    def columns(self) -> dict[str, float]:
+        """As a table has them."""
+        return self.meaning.errors(self.z, self.changes)
+
+    def distances(self) -> dict[str, float]:
+        """Relative distance of the point from the true branch, by "all" sources and by each.
+
+        Along the branch a change is none: where it is steep, at a fold, nothing lies at the same parameter.
+        """
+        v = self.meaning.relative(self.z, self.along)
+        found = []
+        for change in self.changes:
+            u = self.meaning.relative(self.z, change)
+            found.append(float(np.linalg.norm(u - (u @ v) / (v @ v) * v)))
+        return dict(zip(("all", *SOURCES), found))
 
 
 def described(state: State) -> dict[str, Any]:

@@ -23,7 +23,7 @@ from ..post.contact_history import MOTION
 from .field import Field
 from .file import NewResults, has_results, open_results, rewritten
 from .journal import Journal, Record, journal_path
-from .rows import Rows, attributes_of, build_group
+from .rows import LABELS, Rows, attributes_of, build_group
 
 if TYPE_CHECKING:
     import h5py
@@ -112,6 +112,7 @@ class AnalysisWriter:
         motions: Motion | None = None,
         state: State | None = None,
         fields: Mapping[str, Any] | None = None,
+        labels: Sequence[str] = (),
     ) -> None:
         """Add a row; it is there when this returns. Collective.
 
@@ -127,6 +128,8 @@ class AnalysisWriter:
             Arrays from which the analysis can go on after this row.
         fields : mapping, optional
             The arrays of the row.
+        labels : sequence of str, optional
+            Of its coefficients where they are others than the table's; one begins with the other.
 
         Raises
         ------
@@ -136,7 +139,7 @@ class AnalysisWriter:
         if self.rows == 0:
             self._before_first()
         if self.active:
-            self._write(self._record(row, coefficients, motions, fields), row_line(self.columns, row))
+            self._write(self._record(row, coefficients, motions, fields, labels), row_line(self.columns, row))
         self.rows += 1
         self.reported += bool(motions)
         if self.active and state is not None:
@@ -148,11 +151,16 @@ class AnalysisWriter:
         coefficients: npt.ArrayLike | None,
         motions: Motion | None,
         fields: Mapping[str, Any] | None,
+        labels: Sequence[str],
     ) -> Record:
-        values = {column.name: column.loaded(column.stored(row[column.name])[()]) for column in self.columns}
+        values: dict[str, Any] = {
+            column.name: column.loaded(column.stored(row[column.name])[()]) for column in self.columns
+        }
         arrays = {f"field/{name}": np.asarray((fields or {})[name], dtype=float) for name in self.fields}
         if coefficients is not None and self._labels:
             arrays["coefficients"] = np.asarray(coefficients, dtype=float)
+            if len(labels) > len(self._labels):
+                values[LABELS] = list(labels)
         for contact, motion in (motions or {}).items():
             arrays.update({f"motion/{contact}/{key}": values for key, values in _kept(motion)})
         return Record("row", values, arrays)

@@ -26,6 +26,10 @@ CHUNK_ROWS = 256
 CHUNK_BYTES = 1 << 20
 
 
+#: Of a row whose coefficients are more than those of the first ones: entry of its record.
+LABELS = "labels of its coefficients"
+
+
 @dataclass
 class Rows:
     """What a journal holds: its layout and where its rows and arrays are.
@@ -170,6 +174,7 @@ def _create_coefficients(group: h5py.Group, rows: Rows) -> None:
     dofs, labels = rows.layout.values["dofs"], rows.layout.values["labels"]
     if not labels:
         return
+    labels = max([labels, *(row[LABELS] for row in rows.values() if LABELS in row)], key=len)
     data = _growing(group, "coefficients", len(rows), (len(dofs), len(labels)), CHUNK_ROWS)
     data.attrs.update({"units": "m", "long_name": "harmonic coefficients of the displacement"})
     _name_axes(group, {"dof": dofs, "harmonic": labels})
@@ -204,6 +209,8 @@ def _fill(group: h5py.Group, rows: Rows) -> None:
             if name.startswith("motion/"):
                 _, contact, key = name.split("/")
                 _put_motion(group, rows, contact, key, values, rows.reported.index(row))
+            elif name == "coefficients":
+                group[name][row, :, : values.shape[1]] = values
             else:
                 group[name.removeprefix("field/")][row] = values
 

@@ -127,7 +127,7 @@ class Branch(Table):
 
     @property
     def problem(self) -> HarmonicProblem:
-        """What it is a branch of.
+        """What it is a branch of; where harmonics changed along it, with the most that were taken.
 
         Raises
         ------

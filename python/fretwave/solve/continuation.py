@@ -39,6 +39,7 @@ class Point:
     rounding : error of the residual that rounding leaves, expected
     accepted : 1 where the residual is below the tolerance, 0 where rounding let it fall no further
     knot : its scalars and their derivatives over the step, where they are traced
+    errors : as `HarmonicProblem.errors` gives them, where the continuation has asked for them
     """
 
     index: int
@@ -54,6 +55,7 @@ class Point:
     rounding: float = 0.0
     accepted: int = 1
     knot: Knot | None = None
+    errors: dict[str, float] | None = None
 
     def __repr__(self) -> str:
         what = f" {self.event}" if self.event else ""
@@ -226,6 +228,7 @@ class Continuation:
         stop: tuple[float, float],
         steps: StepControl | None = None,
         report_at: Sequence[float] = (),
+        **own: Any,
     ) -> Continuation:
         """Goes on after the snapshot's point, on any number of ranks; rank 0 alone needs the snapshot. Collective.
 
@@ -237,7 +240,7 @@ class Continuation:
         assert snapshot is not None
         vectors = {name: cls._scatter(problem, np.asarray(snapshot[name])) for name in _VECTORS if name in snapshot}
         upwards, began = bool(snapshot.get("upwards", True)), float(snapshot.get("began", np.nan))
-        branch = cls(problem, vectors["y"], stop, steps, report_at, upwards)
+        branch = cls(problem, vectors["y"], stop, steps, report_at, upwards, **own)
         before = [vectors[name] for name in _VECTORS[2:] if name in vectors]
         step, index, emitted = float(snapshot["step"]), int(snapshot["index"]), int(snapshot["emitted"])
         wary, now = bool(snapshot.get("wary", False)), [vectors["y"], vectors["tangent"]]

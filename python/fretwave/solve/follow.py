@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 from petsc4py import PETSc
 
-from ..columns import FORCED, MODE, columns_named, over
+from ..columns import FORCED, MODE, columns_named, over, with_discretisation
 from ..errors import InputError
 from ..hb.observe import Observer
 from ..hb.problems import HarmonicProblem, Observed, unit_of
 from .branch import Branch
 from .continuation import Continuation, Point
+from .refining import RefiningContinuation
 from .steps import StepControl
 from .table import Table
 from .trace import Knot, Trace, cubic_of
@@ -29,6 +30,7 @@ def follow(
     report_at: Sequence[float] = (),
     unknowns: bool = True,
     errors: bool = True,
+    accuracy: float | None = None,
     observe: Mapping[str, Observed | str] | None = None,
     tell: Callable[[dict[str, Any]], None] | None = None,
 ) -> Branch:
@@ -51,6 +53,11 @@ def follow(
         `Branch.coefficients`.
     errors : bool
         Estimate the errors of every point (`HarmonicProblem.errors`); their columns are nan without.
+    accuracy : float, optional
+        Relative, of zeta and omega of a mode (zeta below 1e-4: of that), of the complex amplitude of a response: the
+        branch takes as many harmonics and samples as that needs, no less than the problem's, and other ones along its
+        way (columns `harmonics` and `samples`). It is converged if no more than 5 % of its points miss it by their
+        estimated error.
     observe : dict, optional
         Further columns by name: the fundamental's amplitude of a dof, of a row (n_dof,) or of a linear mode's
         coordinate, or "energy", the mechanical energy of the vibration, mean over a period [J].
@@ -90,25 +97,31 @@ def follow(
     y0: PETSc.Vec = start if own else problem.initial(float(start))
     first = problem.core.parameter_value(problem.last_entry(y0)) if own else float(start)
     low, high, upwards = _range(first, stop)
-    continuation = Continuation(problem, y0, (low, high), steps, report_at, upwards)
+    settings: dict[str, Any] = {"stop": (low, high), "steps": steps, "report_at": report_at, "upwards": upwards}
+    if accuracy is None:
+        continuation = Continuation(problem, y0, **settings)
+    else:
+        continuation = RefiningContinuation(problem, y0, **settings, accuracy=accuracy)
     kept = Unknowns(problem, unknowns)
     trace = Trace(problem, kept)
     observer = Observer(problem, observe or {})
     rows: list[dict[str, Any]] = []
     knots: list[Knot] = []
     for point in points_of(continuation):
-        knots.append(trace.add(point.y, point.tangent))
+        now = continuation.problem
+        knots.append(trace.add(point.y, point.tangent, now))
         # each rank has measured its own wall time
-        seen = observer(point.y) if observe else {}
-        rows.append(problem.model.comm.bcast({**row_of(problem, point, len(rows), errors), **seen}))
+        seen = observer(point.y, now) if observe else {}
+        rows.append(problem.model.comm.bcast({**row_of(now, point, len(rows), errors), **seen}))
         if tell is not None:
             tell(rows[-1])
     ended = continuation.converged, continuation.reason, continuation.missed, continuation.started
+    trace.close(continuation.largest if isinstance(continuation, RefiningContinuation) else problem)
     continuation.destroy()
-    trace.close()
     if not own:
         y0.destroy()
-    known = columns_named(MODE if problem.meaning.kind == "mode" else FORCED)
+    names = MODE if problem.meaning.kind == "mode" else FORCED
+    known = columns_named(names if accuracy is None else with_discretisation(names))
     columns = [*over(known, unit_of(problem.dof)), *observer.columns]
     table = Table.of_rows(columns, rows)
     values = {name: table[name] for name in table.names}
@@ -120,7 +133,7 @@ def row_of(problem: HarmonicProblem, point: Point, number: int, errors: bool = T
     """What the table of a branch says of a point; `errors` are estimated, or nan. Collective."""
     return {
         **problem.state(point.y),
-        **problem.errors(point.y, point.tangent if errors else None),
+        **(point.errors or problem.errors(point.y, point.tangent if errors else None)),
         **problem.diagnostics(point.y),
         "point": number,
         "residual": point.residual,
@@ -129,6 +142,8 @@ def row_of(problem: HarmonicProblem, point: Point, number: int, errors: bool = T
         "wall_s": point.wall_s,
         "rounding": point.rounding,
         "accepted": point.accepted,
+        "harmonics": problem.harmonics.orders[-1],
+        "samples": problem.harmonics.samples,
         "event": point.event,
     }
 

@@ -41,19 +41,20 @@ class Trace:
         self.problem, self.unknowns = problem, unknowns or Unknowns(problem, False)
         self._last: tuple[Array, Array] | None = None
 
-    def add(self, y: PETSc.Vec, tangent: PETSc.Vec) -> Knot:
-        """The next point, with its unit tangent. Collective."""
-        self.unknowns.add(y, tangent)
-        z, dz = self.problem.scalars(y), self.problem.scalars(tangent)
+    def add(self, y: PETSc.Vec, tangent: PETSc.Vec, problem: HarmonicProblem | None = None) -> Knot:
+        """The next point, with its unit tangent; of this problem where its harmonics are others. Collective."""
+        problem = problem or self.problem
+        self.unknowns.add(y, tangent, problem)
+        z, dz = problem.scalars(y), problem.scalars(tangent)
         begin, end = np.full((2, len(z)), np.nan)
         if self._last is not None:
             begin, end = derivatives(self.unknowns.slopes[-1], *self._last, z, dz)
         self._last = z, dz
         return Knot(z, begin, end)
 
-    def close(self) -> None:
-        """No more points. Collective."""
-        self.unknowns.close()
+    def close(self, problem: HarmonicProblem | None = None) -> None:
+        """No more points; kept ones are of this problem from now on. Collective."""
+        self.unknowns.close(problem)
 
 
 def cubic_of(knots: Sequence[Knot]) -> Cubic:

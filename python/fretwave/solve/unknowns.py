@@ -25,6 +25,8 @@ class Unknowns:
 
     Attributes
     ----------
+    problem : HarmonicProblem
+        Of the last point; of all when closed.
     slopes : list
         Of each step, the factors that make its two tangents derivatives (`hermite.slopes`).
     """
@@ -34,26 +36,39 @@ class Unknowns:
         self.y: list[Array] = []
         self.tangents: list[Array] = []
         self.slopes: list[tuple[float, float] | None] = []
+        self._of: list[HarmonicProblem] = []
         self._row = np.empty(0)
         self._weights = problem.core.unknowns()
 
-    def add(self, y: PETSc.Vec, tangent: PETSc.Vec) -> None:
-        """The next point. Collective."""
+    def add(self, y: PETSc.Vec, tangent: PETSc.Vec, problem: HarmonicProblem | None = None) -> None:
+        """The next point, maybe on another set of harmonics than the one before. Collective."""
+        problem = problem or self.problem
         y_here, t_here = y.getArray(readonly=True).copy(), tangent.getArray(readonly=True).copy()
         if self.y:
-            mine = np.array([self._row @ (y_here - self.y[-1]), self._row @ t_here])
-            length, along = self.problem.model.comm.allreduce(mine)
+            before, row = (_embedded(values, self._of[-1], problem) for values in (self.y[-1], self._row))
+            length, along = problem.model.comm.allreduce(np.array([row @ (y_here - before), row @ t_here]))
             self.slopes.append(slopes(float(length), float(along)))
-        self.problem.core.metric(y, self._weights)
+        if problem is not self.problem:
+            self._weights.destroy()
+            self.problem, self._weights = problem, problem.core.unknowns()
+        problem.core.metric(y, self._weights)
         self._row = self._weights.getArray(readonly=True) * t_here
         if not self.keep:
-            self.y, self.tangents, self.slopes = [], [], self.slopes[-1:]
+            self.y, self.tangents, self._of, self.slopes = [], [], [], self.slopes[-1:]
         self.y.append(y_here)
         self.tangents.append(t_here)
+        self._of.append(problem)
 
-    def close(self) -> None:
-        """No more points. Collective."""
+    def close(self, problem: HarmonicProblem | None = None) -> None:
+        """No more points: all are unknowns of this problem from now on, which has the most harmonics. Collective."""
         self._weights.destroy()
+        self.problem = problem or self.problem
+        if self.keep:
+            self.y, self.tangents = (
+                [_embedded(values, one, self.problem) for values, one in zip(kept, self._of)]
+                for kept in (self.y, self.tangents)
+            )
+        self._of = []
 
     def vector(self, place: float) -> PETSc.Vec:
         """Unknowns at a place. Collective."""
@@ -66,3 +81,16 @@ class Unknowns:
         vector = self.problem.core.unknowns()
         vector.setArray(values)
         return vector
+
+
+def _embedded(values: Array, one: HarmonicProblem, other: HarmonicProblem) -> Array:
+    """This rank's part of a vector of one problem, as that of another one. Collective."""
+    if one is other:
+        return values
+    v = one.core.unknowns()
+    v.setArray(values)
+    w = one.embedded(other, v)
+    found: Array = w.getArray(readonly=True).copy()
+    v.destroy()
+    w.destroy()
+    return found

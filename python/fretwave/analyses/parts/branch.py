@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Optional, Union
 
 import numpy as np
@@ -104,7 +104,8 @@ def record(
     row = row_of(problem, point, writer.rows, errors)
     motions = None
     if point.event not in PLAIN_EVENTS:
-        periods = problem.contact_history(point.y)
+        every = problem.harmonics.samples // int(writer.attributes["samples"])
+        periods = [_thinned(period, every) for period in problem.contact_history(point.y)]
         names = [contact.name for contact in problem.model.contacts]
         motions = dict(zip(names, periods)) if writer.active else None
     kept = None if snapshot is None else {**snapshot, **{f"own_{key}": value for key, value in extra.items()}}
@@ -115,8 +116,42 @@ def record(
     if point.knot is not None and problem.meaning is not None:
         writer.keep(slope_fields(problem.meaning))
         slopes = slopes_of(problem.meaning, point.knot)
-    writer.append(row, coefficients, motions, kept, slopes)
+    writer.append(row, coefficients, motions, kept, slopes, problem.harmonics.labels)
     return row
+
+
+def _thinned(period: Mapping[str, Any], every: int) -> dict[str, Any]:
+    """Every so manieth sample alone: where a table has more samples at some points than at others."""
+    return {name: None if values is None else values[::every] for name, values in period.items()}
+
+
+def continuation(
+    context: AnalysisContext[HarmonicSection],
+    problem: HarmonicProblem,
+    ends: tuple[float, float],
+    report_at: Sequence[float],
+    snapshot: Mapping[str, Any] | None,
+    go_on: bool,
+    name: str = "",
+) -> Continuation:
+    """The branch of an analysis from its first end, or on from a snapshot. Collective.
+
+    Parameters
+    ----------
+    name : of the branch, in the log, where an analysis has several
+    """
+    from ...solve.continuation import Continuation
+    from ...solve.refining import RefiningContinuation
+
+    analysis, name = context.analysis, name or context.name
+    settings: dict[str, Any] = {"stop": ends, "steps": step_control(analysis.step), "report_at": list(report_at)}
+    kind: type[Continuation] = Continuation
+    if analysis.accuracy is not None:
+        kind = RefiningContinuation
+        settings |= {"accuracy": analysis.accuracy, "tell": lambda text: context.console.line(f"{name}: {text}")}
+    if go_on:
+        return kind.restore(problem, None if snapshot is None else dict(snapshot), **settings)
+    return kind(problem, problem.initial(ends[0]), **settings)
 
 
 def mode_problem(
@@ -151,6 +186,8 @@ def tell(context: AnalysisContext[HarmonicSection], branch: Continuation, name: 
 
     Kept in run.json too, under `branches`.
     """
+    from ...solve.refining import RefiningContinuation
+
     name = name or context.name
     lines = [f"started: {branch.started}"] if branch.started else []
     if branch.repeated is not None:
@@ -159,6 +196,8 @@ def tell(context: AnalysisContext[HarmonicSection], branch: Continuation, name: 
             f"resumed at {last.parameter:.6g}; its last point is solved again to a residual of {last.residual:.1e}"
         )
     lines += [f"missed: {text}" for text in branch.missed]
+    if isinstance(branch, RefiningContinuation):
+        lines.append(branch.accuracy_text)
     if not context.analysis.errors:
         lines.append("errors are not estimated (errors = false)")
     elif branch.problem.errors_left_out:
@@ -199,9 +238,9 @@ def points_of(branch: Continuation) -> Iterator[Point]:
     if branch.resumed_at is not None:
         trace.add(*branch.resumed_at)
     for point in points_of(branch):
-        point.knot = trace.add(point.y, point.tangent)
+        point.knot = trace.add(point.y, point.tangent, branch.problem)
         yield point
-    trace.close()
+    trace.close(branch.problem)
 
 
 def split_state(state: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:

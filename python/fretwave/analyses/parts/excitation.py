@@ -16,7 +16,7 @@ from ...case.harmonic import nodal_diameter
 from ...case.observed import dof_of
 from ...cyclic.engine_order import speed_rpm
 from ...post.motion import complex_amplitudes
-from .branch import step_control
+from .branch import continuation
 from .context import AnalysisContext
 from .observed import observed_by
 from .rest import rest_state, start_mode
@@ -90,16 +90,10 @@ class Excitation:
         self, problem: ForcedResponse, snapshot: Optional[dict[str, Any]] = None, go_on: bool = False
     ) -> Continuation:
         """From the first to the last frequency, or from where a snapshot was taken. Collective."""
-        from ...solve.continuation import Continuation
-
         low, high = (2.0 * math.pi * hertz for hertz in self.analysis.frequency)
-        steps, report_at = (
-            step_control(self.analysis.step),
-            [2.0 * math.pi * hertz for hertz in self.analysis.report_at],
-        )
-        if go_on:
-            return Continuation.restore(problem, snapshot, (low, high), steps, report_at)
-        return Continuation(problem, problem.initial(low), (low, high), steps, report_at)
+        report_at = [2.0 * math.pi * hertz for hertz in self.analysis.report_at]
+        name = f"{self.context.name}: level {problem.level:g}"
+        return continuation(self.context, problem, (low, high), report_at, snapshot, go_on, name)
 
     def columns(self) -> list[str]:
         """Further columns of the table."""
@@ -120,7 +114,7 @@ class Excitation:
             row["speed_rpm"] = speed_rpm(state["omega"], order)
         if self.context.case.wheel is not None and coefficients is not None:
             observed = coefficients[self.context.case.places(dof_of(self.analysis.observe))]
-            blades = np.abs(complex_amplitudes(self.harmonics.labels, observed)[1])
+            blades = np.abs(complex_amplitudes(problem.harmonics.labels, observed)[1])
             row = {**row, "largest_amplitude": float(blades.max()), "largest_sector": int(np.argmax(blades))}
         return row
 

@@ -11,7 +11,7 @@ import scipy.sparse.linalg
 
 from ...case.analysis import AnalysisSection
 from ...case.contacts import closed_contacts
-from ...case.harmonic import HarmonicSection, nodal_diameter
+from ...case.harmonic import LEAST_HARMONICS, LEAST_SAMPLES, HarmonicSection, nodal_diameter
 from ...case.schema import PreloadSection
 from ...errors import InputError
 from ...model.contact import Contact
@@ -148,6 +148,8 @@ def retained(
     analysis, retain = context.analysis, context.analysis.retain
     if retain == "auto" and context.case.preload_of(analysis) is not None:
         retain = "all"
+    if analysis.accuracy is not None and highest is None:  # it begins with the least set
+        highest, samples = LEAST_HARMONICS, LEAST_SAMPLES
     return choose_harmonics(context.model, highest or analysis.harmonics, samples or analysis.samples, retain)
 
 

@@ -74,7 +74,7 @@ def tuned_responses(excitation: Excitation) -> dict[str, Array]:
         problem = excitation.problem(level)
         branch = excitation.branch(problem)
         for point in points_of(branch):
-            state = problem.state(point.y)
+            state = branch.problem.state(point.y)
             rows.append((level, state["frequency_hz"], state["amplitude"], point.event))
         branch.destroy()
         problem.destroy()
