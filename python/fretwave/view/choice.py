@@ -18,6 +18,7 @@ from ..errors import InputError
 from ..files.dimensions import names_of_data
 from ..model.laws import kept_laws
 from ..post.contact_history import ContactHistory
+from ..results.file import unit_of_amplitudes
 from ..texts import display, nearest
 
 if TYPE_CHECKING:
@@ -202,7 +203,7 @@ def read_choice(file: h5py.File, folder: Path, case: Case, options: ViewOptions)
         diameters=_diameters(group, case, name, rows),
         wheel=case.neighbours is not None and section is not None and section.wheel,
         sample_count=count,
-        unit=_unit(group),
+        unit=unit_of_amplitudes(group),
     )
 
 
@@ -237,11 +238,6 @@ def _held(group: h5py.Group) -> Indices:
     return np.asarray(group["reported"][()] if with_contacts else np.arange(len(group["coefficients"])), dtype=np.intp)
 
 
-def _unit(group: h5py.Group) -> str:
-    """Of the amplitude."""
-    return str(group["points/amplitude"].attrs.get("units", "m"))
-
-
 def _points(group: h5py.Group, kept: Indices, options: ViewOptions, where: str) -> list[tuple[int, str]]:
     """Numbers of points, each with a word on what was asked for; without a wish that of the largest amplitude.
 
@@ -249,7 +245,7 @@ def _points(group: h5py.Group, kept: Indices, options: ViewOptions, where: str) 
     ----------
     kept : points that an amplitude may choose
     """
-    amplitude, unit = group["points/amplitude"][()], _unit(group)
+    amplitude, unit = group["points/amplitude"][()], unit_of_amplitudes(group)
     for point in options.points:
         if not 0 <= point < len(amplitude):
             near = kept[np.argmin(np.abs(kept - point))]
