@@ -51,6 +51,14 @@ class Column:
         return loaded
 
 
+_WHY = {
+    "harmonics": "the harmonics that are not retained",
+    "samples": "the number of samples",
+    "solver": "what the solver left",
+}
+#: Of a point's error.
+SOURCES = tuple(_WHY)
+
 _ALL = (
     Column("point", "1", "number of the point on its branch", "i"),
     Column("nodal_diameter", "1", "nodal diameters of the wave, negative for a backward one", "i"),
@@ -88,11 +96,7 @@ _ALL = (
     *(
         Column(f"{what}_error_{source}", unit, f"estimated error of {name} by {why}")
         for what, unit, name in (("lambda", "1/s", "lambda"), ("amplitude", "m", "the complex amplitude"))
-        for source, why in (
-            ("harmonics", "the harmonics that are not retained"),
-            ("samples", "the number of samples"),
-            ("solver", "what the solver left"),
-        )
+        for source, why in _WHY.items()
     ),
     Column("force_outside", "1", "share of the varying contact force outside the retained harmonics; no error"),
     Column("residual", "1", "norm of the scaled residual"),
@@ -120,16 +124,15 @@ _SHARED = (
     "unclosed",
     "event",
 )
-_SOURCES = ("harmonics", "samples", "solver")
 MODE = (
     *("point", "amplitude", "omega", "omega0", "frequency_hz", "beta", "zeta", "omega_error", "zeta_error"),
-    *(f"lambda_error_{source}" for source in _SOURCES),
+    *(f"lambda_error_{source}" for source in SOURCES),
     *_SHARED,
 )
 FLUTTER = ("point", "nodal_diameter", *MODE[1:])
 FORCED = (
     *("point", "level", "omega", "frequency_hz", "amplitude", "phase", "amplitude_error"),
-    *(f"amplitude_error_{source}" for source in _SOURCES),
+    *(f"amplitude_error_{source}" for source in SOURCES),
     *_SHARED,
 )
 
@@ -140,16 +143,15 @@ MODAL_UNIT = "sqrt(kg) m"
 
 def over(columns: Sequence[Column], unit: str, what: str = "") -> list[Column]:
     """The same columns, their amplitude in a unit of its own, and of something that is no dof."""
-    own = {"unit": unit, **({"long_name": f"fundamental amplitude of {what}"} if what else {})}
-    error = {"unit": unit}
-    return [
-        replace(column, **own)
-        if column.name == "amplitude"
-        else replace(column, **error)
-        if column.name.startswith("amplitude_error")
-        else column
-        for column in columns
-    ]
+
+    def own(column: Column) -> Column:
+        if column.name == "amplitude" and what:
+            return replace(column, unit=unit, long_name=f"fundamental amplitude of {what}")
+        if column.name == "amplitude" or column.name.startswith("amplitude_error"):
+            return replace(column, unit=unit)
+        return column
+
+    return [own(column) for column in columns]
 
 
 def columns_named(names: Sequence[str | Column]) -> list[Column]:

@@ -15,9 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..arrays import Array
-
-#: Of a point's error.
-SOURCES = ("harmonics", "samples", "solver")
+from ..columns import SOURCES
 
 
 @dataclass(frozen=True)

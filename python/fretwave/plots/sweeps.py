@@ -21,7 +21,7 @@ from ..results.file import open_results
 from ..results.reader import Analysis, Run, Table
 from ..results.sweep_summary import split_of
 from . import style
-from .backbone import error_of
+from .backbone import error_of, tells_error
 
 #: more branches than these are told apart by a colour bar
 NAMED = 10
@@ -187,7 +187,7 @@ def _name(figure: Figure, axes: list[Axes], swept: Swept) -> None:
     if len(swept.plan) <= NAMED or swept.crossed():
         for label, look in names:
             axes[0].plot([], [], label=label, **look)
-    if any("zeta_error" in table and np.isfinite(table["zeta_error"]).any() for _, _, table in swept.branches):
+    if any(tells_error(table) for _, _, table in swept.branches):
         style.band_entry(axes[0])
     _legend(figure, axes[0])
     if len(swept.plan) <= NAMED or swept.crossed():

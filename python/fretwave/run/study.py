@@ -22,11 +22,11 @@ from ..case.harmonic import nodal_diameter
 from ..case.load import Case, load_case
 from ..case.reduce import reduce_case
 from ..case.wheel import on_wheel, solver_room
+from ..columns import SOURCES
 from ..console import Console
 from ..errors import EXIT_DONE, InputError, NotConverged
 from ..files.csv_table import write_rows
 from ..files.whole import replace_text
-from ..hb.states import SOURCES
 from ..mpi.guard import on_first_rank
 from ..mpi.petsc_options import AnalysisOptions
 from ..results.runfolder import read_copy
