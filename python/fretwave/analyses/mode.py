@@ -186,7 +186,7 @@ def _follow(
 
 def _described(around: Optional[Describe], problem: NonlinearMode, y: PETSc.Vec, Q: Optional[Array]) -> dict[str, Any]:
     """Further columns of a point. Collective."""
-    from ..hb.observe import mechanical_energy
+    from ..hb.observer import mechanical_energy
 
     more = {} if around is None else around(problem, y, Q)
     return {"energy": mechanical_energy(problem, y), **more}

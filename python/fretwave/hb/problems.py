@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import operator
 import time
 from collections.abc import Mapping, Sequence
-from typing import Any, Union, cast
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -13,13 +12,13 @@ from petsc4py import PETSc
 
 from .. import _core
 from ..arrays import Array
-from ..columns import MODAL_UNIT
 from ..errors import InputError
 from ..model.model import Model
 from ..model.modes import LinearMode
 from ..model.rest import Rest
 from ..mpi.gather import on_rank_0
 from ..post.contact_history import MOTION
+from .observed import Observed, named, row_of
 from .states import ForcedState, ModalState, State
 
 
@@ -68,43 +67,6 @@ def choose_harmonics(model: Model, highest: int, samples: int | None = None, ret
     if odd:
         harmonics.left_out.append("even harmonics and the mean (the contact laws are odd, there is no preload)")
     return harmonics
-
-
-#: What is normalised or observed: a dof's number, a row (n_dof,), or a linear mode's coordinate.
-Observed = Union[int, Sequence[float], Array, LinearMode]
-
-
-def row_of(model: Model, observed: Observed) -> list[tuple[int, float]]:
-    """Entries (dof, weight) of what is observed, on every rank. Collective.
-
-    Raises
-    ------
-    InputError
-        The row does not fit the model.
-    """
-    if isinstance(observed, LinearMode):
-        if np.any(observed.imaginary):
-            fix = "take a real mode, or a dof"
-            raise InputError("a complex mode has no one coordinate", None, repr(observed), "a standing wave", fix)
-        return row_of(model, model.inertia(observed.shape))
-    if np.ndim(observed) == 0:
-        return [(operator.index(cast(int, observed)), 1.0)]
-    row = np.asarray(observed, dtype=float)
-    if row.shape != (model.n_dof,) or not np.isfinite(row).all():
-        fix = "give one weight a dof"
-        raise InputError("the row does not fit the model", None, row.shape, f"({model.n_dof},), finite", fix)
-    return [(int(k), float(row[k])) for k in np.flatnonzero(row)]
-
-
-def unit_of(observed: Observed) -> str:
-    """Of the amplitude of what is observed."""
-    return MODAL_UNIT if isinstance(observed, LinearMode) else "m"
-
-
-def _named(observed: Observed) -> str:
-    if isinstance(observed, LinearMode):
-        return f"the coordinate of {observed.frequency_hz:.6g} Hz"
-    return f"dof {observed!r}" if np.ndim(observed) == 0 else "a row"
 
 
 class HarmonicProblem:
@@ -354,7 +316,7 @@ class NonlinearMode(HarmonicProblem):
         self.meaning = ModalState(method, start.omega)
 
     def _what(self) -> str:
-        return f"{self.method} from {self.start.frequency_hz:.6g} Hz, amplitude of {_named(self.dof)}, "
+        return f"{self.method} from {self.start.frequency_hz:.6g} Hz, amplitude of {named(self.dof)}, "
 
     def initial(self, amplitude: float) -> PETSc.Vec:
         """The linear mode at this amplitude. Collective."""
@@ -426,7 +388,7 @@ class ForcedResponse(HarmonicProblem):
         return PETSc.Vec().createWithArray(local, comm=model.comm)
 
     def _what(self) -> str:
-        return f"level {self.level:g}, {_named(self.dof)}, "
+        return f"level {self.level:g}, {named(self.dof)}, "
 
     def initial(self, omega: float) -> PETSc.Vec:
         """Zero motion at this angular frequency: Newton's first step is the linear response. Collective."""

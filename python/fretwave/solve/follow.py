@@ -10,8 +10,9 @@ from petsc4py import PETSc
 
 from ..columns import FORCED, MODE, columns_named, over
 from ..errors import InputError
-from ..hb.observe import Observer
-from ..hb.problems import HarmonicProblem, Observed, unit_of
+from ..hb.observed import Observed, unit_of
+from ..hb.observer import Observer
+from ..hb.problems import HarmonicProblem
 from .branch import Branch
 from .continuation import Continuation, Point
 from .steps import StepControl

@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     from mpi4py import MPI
     from petsc4py import PETSc
 
-    from ...hb.problems import HarmonicProblem, Harmonics, NonlinearMode, Observed
+    from ...hb.observed import Observed
+    from ...hb.problems import HarmonicProblem, Harmonics, NonlinearMode
     from ...model.modes import LinearMode
     from ...model.rest import Rest
     from ...solve.continuation import Continuation, Point

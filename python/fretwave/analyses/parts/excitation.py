@@ -25,7 +25,8 @@ from .wheel_start import tuned_sector
 if TYPE_CHECKING:
     from petsc4py import PETSc
 
-    from ...hb.problems import ForcedResponse, HarmonicProblem, Harmonics, Observed
+    from ...hb.observed import Observed
+    from ...hb.problems import ForcedResponse, HarmonicProblem, Harmonics
     from ...model.modes import LinearMode
     from ...model.rest import Rest
     from ...solve.continuation import Continuation

@@ -10,7 +10,8 @@ from petsc4py import PETSc
 
 from ..columns import COLUMNS, Column
 from ..errors import InputError
-from .problems import HarmonicProblem, Observed, row_of, unit_of
+from .observed import Observed, row_of, unit_of
+from .problems import HarmonicProblem
 
 #: The word for `mechanical_energy` among what is observed.
 ENERGY = "energy"
