@@ -36,13 +36,19 @@ def is_there(path: Path) -> bool:
         return False
 
 
+def names_beside(path: Path, pattern: str = "*") -> list[str]:
+    """Names in the folder of a file, none where there is no such folder."""
+    folder = path.parent
+    return sorted(entry.name for entry in folder.glob(pattern)) if is_there(folder) and folder.is_dir() else []
+
+
 def toml(value: object, longest: int = 60) -> str:
     """A value as TOML writes it, cut when long."""
     try:
         text = _inline(value)
     except (ValueError, RecursionError):  # integers of more than 4300 digits, arrays nested without end
         text = "(too long to show)"
-    return text if len(text) <= longest else text[: longest - 3] + "..."
+    return shortened(text, longest)
 
 
 def _inline(value: object) -> str:

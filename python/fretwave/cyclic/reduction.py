@@ -26,7 +26,7 @@ from mpi4py import MPI
 from ..arrays import Array, Indices
 from ..errors import InputError
 from ..model.contact import Contact
-from ..model.reduction import RIGID_SHARE, Reduction, check_all_kept, reduce
+from ..model.reduction import RIGID_SHARE, Reduction, reduce
 from ..model.sectors import Given, by_sector
 from ..model.sizes import COMPARED_MODES, INTERFACE_TOLERANCE, INTERFACE_WAVES
 from .interface import Interface
@@ -91,10 +91,7 @@ class SectorReduction:
         InputError
             They reach another dof.
         """
-        moved = (sp.csr_matrix(B, dtype=float) @ self._P).tocsc()
-        kept = moved[:, self._inner.keep]
-        check_all_kept(moved, kept)
-        return sp.csr_matrix(sp.hstack([kept, sp.csr_matrix((kept.shape[0], len(self.component_hz)))]))
+        return self._inner.rows((sp.csr_matrix(B, dtype=float) @ self._P).tocsc())
 
     def names(self, dofs: Sequence[str]) -> list[str]:
         """Names of the reduced coordinates: kept dofs keep theirs."""

@@ -130,6 +130,10 @@ class HarmonicProblem:
         local = y.getArray(readonly=True)
         return float(self.model.comm.bcast(local[-1] if len(local) else 0.0, root=self.model.comm.size - 1))
 
+    def parameter(self, y: PETSc.Vec) -> float:
+        """The continuation parameter of unknowns: amplitude [m], or omega [rad/s]. Collective."""
+        return float(self.core.parameter_value(self.last_entry(y)))
+
     def coefficients(self, y: PETSc.Vec) -> Array | None:
         """Harmonic coefficients Q (n_dof, m) in physical units, columns `harmonics.labels`, on rank 0. Collective."""
         Q = self.core.coefficients(y)

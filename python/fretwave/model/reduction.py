@@ -109,7 +109,7 @@ class Reduction:
         """
         full = sp.csr_matrix(B)
         kept = sp.csr_matrix(full[:, self.keep])
-        check_all_kept(full, kept)
+        _check_all_kept(full, kept)
         return sp.csr_matrix(sp.hstack([kept, sp.csr_matrix((kept.shape[0], len(self.component_hz)))]))
 
     def names(self, dofs: Sequence[str]) -> list[str]:
@@ -299,7 +299,7 @@ def reduce(
     return Reduction(model, core, kept, owned, time.perf_counter() - start)
 
 
-def check_all_kept(B: Sparse, kept: Sparse) -> None:
+def _check_all_kept(B: Sparse, kept: Sparse) -> None:
     """No entry of B has been left out."""
     if abs(B).sum() > abs(kept).sum() * (1 + 1e-9):
         raise InputError(

@@ -89,7 +89,7 @@ def follow(
         raise InputError("the problem has no branch with a table", None, given, "NonlinearMode or ForcedResponse", fix)
     own = isinstance(start, PETSc.Vec)
     y0: PETSc.Vec = start if own else problem.initial(float(start))
-    first = problem.core.parameter_value(problem.last_entry(y0)) if own else float(start)
+    first = problem.parameter(y0) if own else float(start)
     low, high, upwards = _range(first, stop)
     continuation = Continuation(problem, y0, (low, high), steps, report_at, upwards)
     kept = Unknowns(problem, unknowns)

@@ -174,7 +174,7 @@ class WornMode:
             None of the detours comes back to the amplitude.
         """
         self.wear(depth)
-        target = float(self.problem.core.parameter_value(self.log_amplitude(guess)))
+        target = self.problem.parameter(guess)
         for change in DETOURS:
             y = guess.copy()
             self._set_last(y, self.log_amplitude(guess) + change)
@@ -205,9 +205,7 @@ class WornMode:
 
     def log_amplitude(self, y: PETSc.Vec) -> float:
         """The parameter's entry, on every rank."""
-        comm = self.model.comm
-        local = y.getArray(readonly=True)
-        return float(comm.bcast(local[-1] if comm.rank == comm.size - 1 else None, root=comm.size - 1))
+        return self.problem.last_entry(y)
 
     def gap_product(self, y: PETSc.Vec, change: Array) -> PETSc.Vec:
         """dr/dw times a change of the depths (n_pairs,) at the present depths: worn depth is gap."""
