@@ -29,12 +29,13 @@ from ..model.contact import Contact
 from ..model.reduction import RIGID_SHARE, Reduction, reduce
 from ..model.sectors import Given, by_sector
 from ..model.sizes import COMPARED_MODES, INTERFACE_TOLERANCE, INTERFACE_WAVES
+from ..mpi.destroyable import Destroyable
 from .interface import Interface
 from .sector import Sector
 from .waves import STATES, SectorWaves, WaveError
 
 
-class SectorReduction:
+class SectorReduction(Destroyable):
     """x = P T x_r of one sector with both faces; made by `reduce_sector`.
 
     Reduced coordinates: kept dofs in ascending order, low face, high face, component modes.
@@ -82,6 +83,11 @@ class SectorReduction:
     def n_interface(self) -> int:
         """Coordinates of one face."""
         return len(self.low)
+
+    @property
+    def highest_component_hz(self) -> float:
+        """Of the last component mode [Hz], 0 without one."""
+        return self._inner.highest_component_hz
 
     def rows(self, B: Given) -> sp.csr_matrix:
         """B (n, n_r) on the reduced coordinates of rows (n, n_dof) that reach kept dofs alone.
@@ -141,12 +147,6 @@ class SectorReduction:
     def destroy(self) -> None:
         """Free the component modes; the reduced matrices stay. Collective."""
         self._inner.destroy()
-
-    def __enter__(self) -> SectorReduction:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.destroy()
 
     def _on(self, contact: Contact) -> Contact:
         """The contact on reduced coordinates, which contain all that it touches."""

@@ -16,8 +16,10 @@ from ..errors import InputError
 from ..model.model import Model
 from ..model.modes import LinearMode
 from ..model.rest import Rest
+from ..mpi.destroyable import Destroyable
 from ..mpi.gather import on_rank_0
 from ..post.contact_history import MOTION
+from ..post.motion import complex_amplitudes
 from .observed import Observed, named, row_of
 from .states import ForcedState, ModalState, State
 
@@ -69,7 +71,7 @@ def choose_harmonics(model: Model, highest: int, samples: int | None = None, ret
     return harmonics
 
 
-class HarmonicProblem:
+class HarmonicProblem(Destroyable):
     """N equations in N + 1 unknowns y: scaled harmonic coefficients, then scalars, the continuation parameter last."""
 
     #: What its scalar unknowns mean; None where no table says.
@@ -235,11 +237,9 @@ class HarmonicProblem:
             return None
         tau = 2 * np.pi * np.arange(n) / n
         x, v = np.zeros((n, len(Q))), np.zeros((n, len(Q)))
-        column = 0
+        amplitudes = complex_amplitudes(self.harmonics.labels, Q)
         for order, exponent in zip(self.harmonics.orders, s):
-            q = Q[:, column] - (1j * Q[:, column + 1] if order else 0)
-            column += 2 if order else 1
-            wave = np.exp(1j * order * tau)[:, None] * q
+            wave = np.exp(1j * order * tau)[:, None] * amplitudes[order]
             x += wave.real
             v += (exponent * wave).real
         return {"x": x, "v": v}
@@ -258,12 +258,6 @@ class HarmonicProblem:
         """Free the solver's vectors. Collective."""
         self._error = None
         self.core = None  # type: ignore[assignment]
-
-    def __enter__(self) -> HarmonicProblem:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.destroy()
 
 
 class NonlinearMode(HarmonicProblem):

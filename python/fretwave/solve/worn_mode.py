@@ -13,6 +13,7 @@ from ..arrays import Array
 from ..errors import InputError
 from ..hb.problems import HarmonicProblem
 from ..model.laws import Role, law_like
+from ..mpi.destroyable import Destroyable
 from .continuation import Continuation
 from .steppers import StageFailed
 from .steps import StepControl
@@ -48,7 +49,7 @@ class WornState:
     residual: float = 0.0
 
 
-class WornMode:
+class WornMode(Destroyable):
     """A mode at fixed amplitude as a function of worn depths. Collective, as all methods.
 
     Parameters
@@ -232,9 +233,3 @@ class WornMode:
         self.wear(np.zeros(len(self.areas)))
         self._newton = None  # type: ignore[assignment]
         self._row.destroy()
-
-    def __enter__(self) -> WornMode:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.destroy()
