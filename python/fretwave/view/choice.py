@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 SHOWN = ("point", "amplitude", "cycles", "frequency_hz", "zeta", "level", "stick", "slip", "open")
 #: Points named in a message.
 NAMED = 12
+#: The largest displacement or depth as drawn, as a share of what is shown, where no scale is given.
+DRAWN = 0.1
 
 
 @dataclass(frozen=True)
@@ -72,6 +74,11 @@ class ViewOptions:
         if factor is not None and not np.isfinite(factor):
             raise InputError("the scale is no number", "--scale", scale, "auto or a number", "--scale auto")
         return cls(scale=factor, phases=phases, **others)
+
+
+def natural_scale(size: float, largest: float) -> float:
+    """Factor that draws the largest displacement as a share of the size of what is shown [m]."""
+    return float(f"{DRAWN * size / largest:.2g}") if largest > 0 and size > 0 else 1.0
 
 
 @dataclass(frozen=True)
