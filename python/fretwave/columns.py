@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Union
 
@@ -33,6 +33,11 @@ class Column:
     def dtype(self) -> str:
         """Type of the column in results.h5."""
         return {"f": "f8", "i": "i8", "s": f"S{EVENT_LENGTH}"}[self.kind]
+
+    @property
+    def attributes(self) -> dict[str, str]:
+        """Of the column in results.h5."""
+        return {"units": self.unit, "long_name": self.long_name}
 
     def text(self, value: Value) -> str:
         """The value as the CSV has it: shortest text that gives the same number back."""
@@ -141,6 +146,10 @@ FORCED = (
 MODAL_UNIT = "sqrt(kg) m"
 
 
+#: Of what is observed beside the amplitude.
+ENERGY = Column("energy", "J", "mechanical energy of the vibration, mean over a period")
+
+
 def over(columns: Sequence[Column], unit: str, what: str = "") -> list[Column]:
     """The same columns, their amplitude in a unit of its own, and of something that is no dof."""
 
@@ -152,6 +161,12 @@ def over(columns: Sequence[Column], unit: str, what: str = "") -> list[Column]:
         return column
 
     return [own(column) for column in columns]
+
+
+def table_order(names: Iterable[str]) -> list[str]:
+    """Names of columns as tables have them; an analysis' own come last."""
+    given = list(names)
+    return [name for name in COLUMNS if name in given] + [name for name in given if name not in COLUMNS]
 
 
 def columns_named(names: Sequence[str | Column]) -> list[Column]:

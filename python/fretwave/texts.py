@@ -15,6 +15,11 @@ def shortened(text: str, longest: int = 200) -> str:
     return text if len(text) <= longest else text[: longest - 3] + "..."
 
 
+def counted(number: int, word: str) -> str:
+    """``1 dof``, ``2 dofs``."""
+    return f"{number} {word}{'s' * (number != 1)}"
+
+
 def nearest(word: str, known: Sequence[str], say: Callable[[str], str] = "did you mean `{}`?".format) -> str | None:
     """A fix line with the nearest known word (one it begins, or one of like letters), None when nothing is near."""
     begun = [other for other in known if len(word) > 1 and other.startswith(word)]

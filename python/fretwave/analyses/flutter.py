@@ -26,7 +26,7 @@ from ..post.flutter_waves import STABLE, describe_waves, with_sign, words
 from ..results.results import AnalysisWriter
 from ..results.sweep_summary import FLUTTER_WAVES
 from .mode import point_line
-from .parts.branch import closure_note, finished_table, mode_problem, open_branch, points_of, record, step_control, tell
+from .parts.branch import begun, closure_note, finished_table, mode_problem, open_branch, points_of, record, tell
 from .parts.context import AnalysisContext, Outcome
 from .parts.observed import named
 from .parts.rest import retained, start_mode
@@ -35,7 +35,6 @@ if TYPE_CHECKING:
     from ..case.facts import Facts
     from ..case.reporter import Reporter
     from ..hb.problems import Harmonics, NonlinearMode
-    from ..solve.continuation import Continuation
 
 
 @register_analysis
@@ -171,7 +170,7 @@ class _Wave:
         preload, comm = case.preload_of(analysis), self.context.comm
         with build_model(case, analysis.dampers, comm, preload, self.diameter, aerodynamics=True) as model:
             problem = self._problem(self.context.of(analysis, model=model))
-            branch = self._branch(problem, snapshot, go_on)
+            branch = begun(problem, analysis.amplitude, analysis.step, analysis.report_at, snapshot, go_on)
             for point in points_of(branch):
                 own = {"wave_number": self.number}
                 self._say(record(writer, problem, point, branch.snapshot(), own, self._column, self.analysis.errors))
@@ -188,15 +187,6 @@ class _Wave:
         """Started from the mode of the structure alone; the flow bends it little."""
         start, rest = start_mode(context, self.analysis.linear_mode)
         return mode_problem(context, self.harmonics, start, rest)
-
-    def _branch(self, problem: NonlinearMode, snapshot: Optional[dict[str, Any]], go_on: bool) -> Continuation:
-        from ..solve.continuation import Continuation
-
-        low, high = self.analysis.amplitude
-        steps, report_at = step_control(self.analysis.step), list(self.analysis.report_at)
-        if go_on:
-            return Continuation.restore(problem, snapshot, (low, high), steps, report_at)
-        return Continuation(problem, problem.initial(low), (low, high), steps, report_at)
 
     def _say(self, row: Mapping[str, Any]) -> None:
         low, high = self.analysis.amplitude

@@ -15,13 +15,15 @@ from ..case.checks_wheel import check_needs_wheel
 from ..case.harmonic import HarmonicSection, check_range
 from ..case.observed import Observed, check_observed, dof_of, dofs_of, label_of, unit_of
 from ..case.schema import Positive, key
-from ..columns import MODE, Column
+from ..columns import ENERGY, MODE
 from ..hb.suspects import suspects
 from ..post.limit_cycles import limit_cycles
 from ..results.results import AnalysisWriter
 from ..results.sweep_summary import MODE_BRANCH
+from ..texts import counted
 from .parts.asymptotes import asymptote_line
 from .parts.branch import (
+    begun,
     closure_note,
     error_text,
     finished_table,
@@ -30,7 +32,6 @@ from .parts.branch import (
     open_branch,
     points_of,
     record,
-    step_control,
     tell,
 )
 from .parts.context import AnalysisContext, Outcome
@@ -48,8 +49,6 @@ if TYPE_CHECKING:
     from ..hb.problems import NonlinearMode
     from ..solve.continuation import Continuation, Point
     from .parts.branch import Describe
-
-ENERGY = Column("energy", "J", "mechanical energy of the vibration, mean over a period")
 
 
 @register_analysis
@@ -146,8 +145,6 @@ class ModeAnalysis(HarmonicSection):
 def _follow(
     context: AnalysisContext[ModeAnalysis], problem: NonlinearMode, writer: AnalysisWriter, start: Start
 ) -> Outcome:
-    from ..solve.continuation import Continuation
-
     analysis = context.analysis
     low, high = analysis.amplitude
     unit = unit_of(analysis.normalise)
@@ -155,12 +152,8 @@ def _follow(
     estimated = context.case.unreduced is not None and context.case.wheel is None
     error_at = reduction.error_at if reduction is not None and estimated else None
     reports = sorted({*analysis.report_at, *([] if error_at is None else [error_at])})
-    settings: dict[str, Any] = {"stop": (low, high), "steps": step_control(analysis.step), "report_at": reports}
     snapshot, _, found = open_branch(context.comm, writer, context.resuming)
-    if found:
-        branch = Continuation.restore(problem, snapshot, **settings)
-    else:
-        branch = Continuation(problem, problem.initial(low), **settings)
+    branch = begun(problem, analysis.amplitude, analysis.step, reports, snapshot, found)
     around = None
     if context.case.wheel is not None:
         tuned = start.attributes["tuned_amplitude"]
@@ -258,7 +251,7 @@ def summarise(name: str, table: dict[str, Any], unit: str) -> list[str]:
     lines = [
         f"{name}: {len(zeta)} points, a {amplitude[0]:.4g} to {amplitude[-1]:.4g} {unit},"
         f" largest damping {100 * zeta[top]:.4g} % at a = {amplitude[top]:.4g} {unit},"
-        f" {folds} fold{'s' * (folds != 1)},"
+        f" {counted(folds, 'fold')},"
         f"{largest_error('zeta', 100 * table['zeta_error'], '%')} {table['wall_s'].sum():.2f} s"
     ]
     words = {True: "stable (damping rises)", False: "unstable (damping falls)", None: "stability unknown (branch end)"}

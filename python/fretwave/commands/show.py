@@ -13,7 +13,7 @@ from ..console import on_terminal
 from ..files.lock import is_taken
 from ..results.file import open_results, unit_of_amplitudes
 from ..results.record import RECORD, read_record
-from ..texts import display
+from ..texts import counted, display
 
 if TYPE_CHECKING:
     import h5py
@@ -74,7 +74,7 @@ def _heading(folder: Path, title: str) -> list[str]:
     if not (folder / RECORD).exists():
         return [title] if title else []
     record = read_record(folder)
-    ranks = f"{record['ranks']} rank{'s' * (record['ranks'] > 1)}"
+    ranks = counted(record["ranks"], "rank")
     started = record["started"][:16].replace("T", " ")
     going = "running now" if is_taken(folder) else "not finished"
     status = going if record["status"] == "running" else record["status"]

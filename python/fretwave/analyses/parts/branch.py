@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Optional, Union
 
 import numpy as np
-import numpy.typing as npt
 
+from ...arrays import Array, Complex
 from ...case.analysis import AnalysisSection
 from ...case.harmonic import HarmonicSection
 from ...case.observed import label_of
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
     ModeLike = Union[ModeAnalysis, FlutterAnalysis]
     #: Further columns of a point, from problem, y and (on the writing rank) coefficients (n_dof, m).
-    Describe = Callable[[Any, PETSc.Vec, Optional[npt.NDArray[np.float64]]], Mapping[str, Any]]
+    Describe = Callable[[Any, PETSc.Vec, Optional[Array]], Mapping[str, Any]]
 
 #: Events at which the contact's motion over a period is kept.
 PLAIN_EVENTS = ("", "step")
@@ -55,7 +55,7 @@ def error_text(error: float) -> str:
     return f" +- {error:<7.1g}" if np.isfinite(error) else ""
 
 
-def largest_error(what: str, errors: npt.NDArray[np.float64], unit: str) -> str:
+def largest_error(what: str, errors: Array, unit: str) -> str:
     """The same of a branch."""
     known = errors[np.isfinite(errors)]
     return f" error of {what} up to {known.max():.2g} {unit}," if len(known) else ""
@@ -74,6 +74,23 @@ def step_control(step: StepSection) -> StepControl:
     from ...solve.steps import StepControl
 
     return StepControl(**step.model_dump())
+
+
+def begun(
+    problem: HarmonicProblem,
+    ends: Sequence[float],
+    step: StepSection,
+    report_at: Sequence[float],
+    snapshot: dict[str, Any] | None,
+    go_on: bool,
+) -> Continuation:
+    """A branch from the lower end of its range, or from where a snapshot was taken. Collective."""
+    from ...solve.continuation import Continuation
+
+    low, high = ends
+    if go_on:
+        return Continuation.restore(problem, snapshot, (low, high), step_control(step), report_at)
+    return Continuation(problem, problem.initial(low), (low, high), step_control(step), report_at)
 
 
 def record(
@@ -126,7 +143,7 @@ def mode_problem(
     mode: LinearMode,
     rest: Optional[Rest],
     dof: Optional[Observed] = None,
-    avoid: Optional[npt.NDArray[np.complex128]] = None,
+    avoid: Optional[Complex] = None,
 ) -> NonlinearMode:
     """The nonlinear mode of an analysis about its static state. Collective.
 

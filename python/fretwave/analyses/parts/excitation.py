@@ -10,13 +10,13 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Optional
 
 import numpy as np
-import numpy.typing as npt
 
+from ...arrays import Array, Complex
 from ...case.harmonic import nodal_diameter
 from ...case.observed import dof_of
 from ...cyclic.engine_order import speed_rpm
 from ...post.motion import complex_amplitudes
-from .branch import step_control
+from .branch import begun
 from .context import AnalysisContext
 from .observed import observed_by
 from .rest import rest_state, start_mode
@@ -56,7 +56,7 @@ class Excitation:
     def analysis(self) -> ForcedAnalysis:
         return self.context.analysis
 
-    def force(self) -> npt.NDArray[np.complex128]:
+    def force(self) -> Complex:
         """Amplitudes (n_dof,) [N] at level 1; on sector j of a wheel with the delay of the wave, e^{-i j theta}."""
         case = self.context.case
         force = np.zeros(len(case.dofs), dtype=complex)
@@ -91,25 +91,16 @@ class Excitation:
         self, problem: ForcedResponse, snapshot: Optional[dict[str, Any]] = None, go_on: bool = False
     ) -> Continuation:
         """From the first to the last frequency, or from where a snapshot was taken. Collective."""
-        from ...solve.continuation import Continuation
-
         low, high = (2.0 * math.pi * hertz for hertz in self.analysis.frequency)
-        steps, report_at = (
-            step_control(self.analysis.step),
-            [2.0 * math.pi * hertz for hertz in self.analysis.report_at],
-        )
-        if go_on:
-            return Continuation.restore(problem, snapshot, (low, high), steps, report_at)
-        return Continuation(problem, problem.initial(low), (low, high), steps, report_at)
+        report_at = [2.0 * math.pi * hertz for hertz in self.analysis.report_at]
+        return begun(problem, (low, high), self.analysis.step, report_at, snapshot, go_on)
 
     def columns(self) -> list[str]:
         """Further columns of the table."""
         names = ["speed_rpm"] if self.analysis.engine_order else []
         return names + (["largest_amplitude", "largest_sector"] if self.context.case.wheel else [])
 
-    def row(
-        self, problem: HarmonicProblem, y: PETSc.Vec, coefficients: Optional[npt.NDArray[np.float64]]
-    ) -> dict[str, Any]:
+    def row(self, problem: HarmonicProblem, y: PETSc.Vec, coefficients: Optional[Array]) -> dict[str, Any]:
         """Their values at a point; of the blades on the rank that has coefficients. Collective."""
         order = self.analysis.engine_order
         state = problem.state(y)
