@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Union
 
@@ -34,6 +34,11 @@ class Column:
         """Type of the column in results.h5."""
         return {"f": "f8", "i": "i8", "s": f"S{EVENT_LENGTH}"}[self.kind]
 
+    @property
+    def attributes(self) -> dict[str, str]:
+        """Of the column in results.h5."""
+        return {"units": self.unit, "long_name": self.long_name}
+
     def text(self, value: Value) -> str:
         """The value as the CSV has it: shortest text that gives the same number back."""
         if self.kind == "i":
@@ -50,6 +55,14 @@ class Column:
         loaded: Value = plain.decode() if self.kind == "s" else plain
         return loaded
 
+
+_WHY = {
+    "harmonics": "the harmonics that are not retained",
+    "samples": "the number of samples",
+    "solver": "what the solver left",
+}
+#: Of a point's error.
+SOURCES = tuple(_WHY)
 
 _ALL = (
     Column("point", "1", "number of the point on its branch", "i"),
@@ -88,11 +101,7 @@ _ALL = (
     *(
         Column(f"{what}_error_{source}", unit, f"estimated error of {name} by {why}")
         for what, unit, name in (("lambda", "1/s", "lambda"), ("amplitude", "m", "the complex amplitude"))
-        for source, why in (
-            ("harmonics", "the harmonics that are not retained"),
-            ("samples", "the number of samples"),
-            ("solver", "what the solver left"),
-        )
+        for source, why in _WHY.items()
     ),
     Column("harmonics", "1", "highest harmonic retained", "i"),
     Column("samples", "1", "time samples of a period", "i"),
@@ -122,16 +131,15 @@ _SHARED = (
     "unclosed",
     "event",
 )
-_SOURCES = ("harmonics", "samples", "solver")
 MODE = (
     *("point", "amplitude", "omega", "omega0", "frequency_hz", "beta", "zeta", "omega_error", "zeta_error"),
-    *(f"lambda_error_{source}" for source in _SOURCES),
+    *(f"lambda_error_{source}" for source in SOURCES),
     *_SHARED,
 )
 FLUTTER = ("point", "nodal_diameter", *MODE[1:])
 FORCED = (
     *("point", "level", "omega", "frequency_hz", "amplitude", "phase", "amplitude_error"),
-    *(f"amplitude_error_{source}" for source in _SOURCES),
+    *(f"amplitude_error_{source}" for source in SOURCES),
     *_SHARED,
 )
 
@@ -140,18 +148,27 @@ FORCED = (
 MODAL_UNIT = "sqrt(kg) m"
 
 
+#: Of what is observed beside the amplitude.
+ENERGY = Column("energy", "J", "mechanical energy of the vibration, mean over a period")
+
+
 def over(columns: Sequence[Column], unit: str, what: str = "") -> list[Column]:
     """The same columns, their amplitude in a unit of its own, and of something that is no dof."""
-    own = {"unit": unit, **({"long_name": f"fundamental amplitude of {what}"} if what else {})}
-    error = {"unit": unit}
-    return [
-        replace(column, **own)
-        if column.name == "amplitude"
-        else replace(column, **error)
-        if column.name.startswith("amplitude_error")
-        else column
-        for column in columns
-    ]
+
+    def own(column: Column) -> Column:
+        if column.name == "amplitude" and what:
+            return replace(column, unit=unit, long_name=f"fundamental amplitude of {what}")
+        if column.name == "amplitude" or column.name.startswith("amplitude_error"):
+            return replace(column, unit=unit)
+        return column
+
+    return [own(column) for column in columns]
+
+
+def table_order(names: Iterable[str]) -> list[str]:
+    """Names of columns as tables have them; an analysis' own come last."""
+    given = list(names)
+    return [name for name in COLUMNS if name in given] + [name for name in given if name not in COLUMNS]
 
 
 def with_discretisation(names: Sequence[Any]) -> list[Any]:

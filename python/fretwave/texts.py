@@ -15,6 +15,11 @@ def shortened(text: str, longest: int = 200) -> str:
     return text if len(text) <= longest else text[: longest - 3] + "..."
 
 
+def counted(number: int, word: str) -> str:
+    """``1 dof``, ``2 dofs``."""
+    return f"{number} {word}{'s' * (number != 1)}"
+
+
 def nearest(word: str, known: Sequence[str], say: Callable[[str], str] = "did you mean `{}`?".format) -> str | None:
     """A fix line with the nearest known word (one it begins, or one of like letters), None when nothing is near."""
     begun = [other for other in known if len(word) > 1 and other.startswith(word)]
@@ -36,13 +41,19 @@ def is_there(path: Path) -> bool:
         return False
 
 
+def names_beside(path: Path, pattern: str = "*") -> list[str]:
+    """Names in the folder of a file, none where there is no such folder."""
+    folder = path.parent
+    return sorted(entry.name for entry in folder.glob(pattern)) if is_there(folder) and folder.is_dir() else []
+
+
 def toml(value: object, longest: int = 60) -> str:
     """A value as TOML writes it, cut when long."""
     try:
         text = _inline(value)
     except (ValueError, RecursionError):  # integers of more than 4300 digits, arrays nested without end
         text = "(too long to show)"
-    return text if len(text) <= longest else text[: longest - 3] + "..."
+    return shortened(text, longest)
 
 
 def _inline(value: object) -> str:

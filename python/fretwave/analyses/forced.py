@@ -166,7 +166,7 @@ def _attributes(context: AnalysisContext[ForcedAnalysis]) -> dict[str, Any]:
 
 
 def _all_levels(context: AnalysisContext[ForcedAnalysis], excitation: Excitation, writer: AnalysisWriter) -> Outcome:
-    from ..hb.problems import row_of
+    from ..hb.observed import row_of
 
     analysis = context.analysis
     snapshot, own, found = open_branch(context.comm, writer, context.resuming)

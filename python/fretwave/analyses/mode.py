@@ -15,11 +15,12 @@ from ..case.checks_wheel import check_needs_wheel
 from ..case.harmonic import HarmonicSection, check_range
 from ..case.observed import Observed, check_observed, dof_of, dofs_of, label_of, unit_of
 from ..case.schema import Positive, key
-from ..columns import MODE, Column
+from ..columns import ENERGY, MODE
 from ..hb.suspects import suspects
 from ..post.limit_cycles import limit_cycles
 from ..results.results import AnalysisWriter
 from ..results.sweep_summary import MODE_BRANCH
+from ..texts import counted
 from .parts.asymptotes import asymptote_line
 from .parts.branch import (
     closure_note,
@@ -48,8 +49,6 @@ if TYPE_CHECKING:
     from ..hb.problems import NonlinearMode
     from ..solve.continuation import Continuation, Point
     from .parts.branch import Describe
-
-ENERGY = Column("energy", "J", "mechanical energy of the vibration, mean over a period")
 
 
 @register_analysis
@@ -183,7 +182,7 @@ def _follow(
 
 def _described(around: Optional[Describe], problem: NonlinearMode, y: PETSc.Vec, Q: Optional[Array]) -> dict[str, Any]:
     """Further columns of a point. Collective."""
-    from ..hb.observe import mechanical_energy
+    from ..hb.observer import mechanical_energy
 
     more = {} if around is None else around(problem, y, Q)
     return {"energy": mechanical_energy(problem, y), **more}
@@ -255,7 +254,7 @@ def summarise(name: str, table: dict[str, Any], unit: str) -> list[str]:
     lines = [
         f"{name}: {len(zeta)} points, a {amplitude[0]:.4g} to {amplitude[-1]:.4g} {unit},"
         f" largest damping {100 * zeta[top]:.4g} % at a = {amplitude[top]:.4g} {unit},"
-        f" {folds} fold{'s' * (folds != 1)},"
+        f" {counted(folds, 'fold')},"
         f"{largest_error('zeta', 100 * table['zeta_error'], '%')} {table['wall_s'].sum():.2f} s"
     ]
     words = {True: "stable (damping rises)", False: "unstable (damping falls)", None: "stability unknown (branch end)"}

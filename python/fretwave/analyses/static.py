@@ -6,14 +6,15 @@ from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, Literal, Optional
 
 import numpy as np
-import numpy.typing as npt
 
+from ..arrays import Array
 from ..case.analysis import AnalysisSection, register_analysis
 from ..case.schema import Positive, PreloadSection, key
 from ..columns import Column
 from ..errors import NotConverged
 from ..model.contact import Contact
-from ..post.contact_history import OPEN, SLIP, STICK, normal_force, tangential_force
+from ..model.laws import STATUS
+from ..post.contact_history import normal_force, tangential_force
 from .parts.context import AnalysisContext, Outcome
 from .parts.rest import keep_pairs, loaded_state
 
@@ -36,7 +37,7 @@ COLUMNS = (
     Column("gap", "m", "distance to contact of an open pair"),
 )
 #: Names of the states as the laws number them.
-WORDS = {STICK: "stick", SLIP: "slip", OPEN: "open"}
+WORDS = {state: word for word, state in STATUS.items()}
 
 
 @register_analysis
@@ -141,7 +142,7 @@ def _summary(context: AnalysisContext[StaticAnalysis], rest: Rest, factor: float
     return lines
 
 
-def _resultant(context: AnalysisContext[StaticAnalysis], spec: Contact, f: npt.NDArray[np.float64]) -> list[str]:
+def _resultant(context: AnalysisContext[StaticAnalysis], spec: Contact, f: Array) -> list[str]:
     """Sum of the contact forces in space, beside that of the loads."""
     frames, loads = spec.pairs.frames, context.case.structure.resultant(section_loads(context))
     if frames is None or loads is None:

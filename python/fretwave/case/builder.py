@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import importlib.util
 import inspect
-import traceback
 import typing
 from collections.abc import Callable, Mapping
 from dataclasses import fields, is_dataclass
@@ -17,7 +16,8 @@ from pydantic import TypeAdapter, ValidationError
 
 from ..errors import FretwaveError, InputError
 from ..model.structure import Structure
-from ..texts import display, is_there, nearest, shortened, toml
+from ..texts import display, nearest, shortened, toml
+from .python_file import check_there, line_of
 from .toml.source import Source
 from .toml.validation import at
 
@@ -50,11 +50,7 @@ def builder_digest(given: str, source: Source) -> str:
 
 def _import(path: Path, source: Source) -> ModuleType:
     where = source.where(("model", "builder"))
-    if path.suffix != ".py" or not is_there(path) or not path.is_file():
-        folder = path.parent
-        files = sorted(entry.name for entry in folder.glob("*.py")) if is_there(folder) and folder.is_dir() else []
-        near = nearest(path.name, files) or (f"there is {', '.join(files)}" if files else "check the path")
-        raise InputError("there is no such builder", where, display(path), "a Python file beside the case", near)
+    check_there(path, "there is no such builder", where, "a Python file beside the case")
     spec = importlib.util.spec_from_file_location(f"fretwave_builder_{path.stem}", path)
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
@@ -111,12 +107,10 @@ def _checked(
 
 def _blame(error: BaseException, path: Path, source: Source) -> InputError:
     """An exception of the builder as bad input, with the builder's line that raised it or led to it."""
-    frames = [f for f in traceback.extract_tb(error.__traceback__) if Path(f.filename) == path]
-    where = f"{display(path)}:{frames[-1].lineno}" if frames else source.where(("model", "builder"))
-    if isinstance(error, SyntaxError):
-        where = f"{display(path)}:{error.lineno}"
+    line = line_of(error, path)
+    where = f"{display(path)}:{line}" if line else source.where(("model", "builder"))
     if isinstance(error, FretwaveError):
-        place = error.where if error.where and not frames else where
+        place = error.where if error.where and not line else where
         return InputError(error.what, place, error.measured, error.expected, error.fix)
     what = f"the builder failed: {type(error).__name__}: {shortened(str(error))}"
     return InputError(what, where, fix="correct the builder, or the options in [model.options]")

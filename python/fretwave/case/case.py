@@ -9,9 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import numpy.typing as npt
-
+from ..arrays import Array
 from ..model.contact import Contact
 from ..model.sectors import Sparse
 from ..model.structure import Structure
@@ -128,7 +126,7 @@ class Case:
         return self.structure.own("C")
 
     @property
-    def loads(self) -> Mapping[str, npt.NDArray[np.float64]]:
+    def loads(self) -> Mapping[str, Array]:
         """Static loads (n_dof,) [N] by name."""
         return self.structure.loads
 

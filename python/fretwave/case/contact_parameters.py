@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ..arrays import Array
 from ..errors import FretwaveError, InputError
 from ..model.laws import LawInfo, ParameterInfo
 from ..model.pairs import Pairs
@@ -15,8 +16,6 @@ from ..texts import nearest, toml
 from .schema import ContactSection
 from .toml.source import Source
 from .toml.validation import at
-
-Array = npt.NDArray[np.float64]
 
 #: A parameter's name with this ending is given per area; the pair's area comes with the model.
 PER_AREA = "_per_area"

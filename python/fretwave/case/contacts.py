@@ -7,9 +7,9 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import scipy.sparse
 
+from ..arrays import Array
 from ..errors import FretwaveError, InputError
 from ..model.contact import Contact
 from ..model.laws import LawInfo, law_like
@@ -33,7 +33,7 @@ def closed_contacts(contacts: Sequence[Contact]) -> list[Contact]:
     return [contact.closed() for contact in contacts]
 
 
-def wear_areas(contacts: Sequence[Contact]) -> dict[str, npt.NDArray[np.float64]]:
+def wear_areas(contacts: Sequence[Contact]) -> dict[str, Array]:
     """Nodal areas (n_pairs,) [m^2] of the contacts that can wear: those whose law has a normal direction.
 
     Raises

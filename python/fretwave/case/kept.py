@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
+from ..results.file import has_results, open_results
 from ..results.runfolder import CASE_COPY, read_copy, read_record
 from ..texts import display
 from .analysis import AnalysisSection
@@ -71,6 +72,14 @@ def described(analysis: AnalysisSection, case: Case, run_id: str) -> dict[str, A
 def _deciding(case: Case, name: str) -> dict[str, Any]:
     decisive = (*COMMON, name, *case.analyses[name].decided_by())
     return {key: value for key, value in case.resolved.items() if key.split(".")[0] in decisive}
+
+
+def has_analysis(folder: Path, case: Case, name: str) -> bool:
+    """Whether there are results of an analysis in a run folder that belong to this very case."""
+    if not has_results(folder):
+        return False
+    with open_results(folder / "results.h5") as file:
+        return name in file and belongs(file[name], case, name)
 
 
 def belongs(group: h5py.Group, case: Case, name: str) -> bool:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import hashlib
 import sys
-import traceback
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,7 +20,8 @@ from ..errors import FretwaveError, InputError
 from ..importers.formats import forget_format
 from ..model.laws import forget_law
 from ..mpi.guard import PLUGIN
-from ..texts import display, is_there, nearest, shortened, toml
+from ..texts import display, is_there, shortened, toml
+from .python_file import check_there, line_of
 from .toml.source import Source
 
 FORGET: dict[str, Callable[..., None]] = {
@@ -128,8 +128,7 @@ def forget(path: str) -> None:
 
 def _blame(error: BaseException, path: Path) -> InputError:
     """What went wrong as bad input, with the line of the plug-in that raised it or led to it."""
-    frames = [frame for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(path)]
-    line = error.lineno if isinstance(error, SyntaxError) else frames[-1].lineno if frames else None
+    line = line_of(error, path)
     where = display(path) + (f":{line}" if line else "")
     if isinstance(error, FretwaveError):
         return InputError(error.what, where, error.measured, error.expected, error.fix)
@@ -164,16 +163,13 @@ def read_plugins(
 
 
 def _read(path: Path, source: Source, number: int) -> str:
-    where, shown = source.where(("plugins", number)), display(path)
-    if path.suffix != ".py" or not is_there(path) or not path.is_file():
-        folder = path.parent
-        files = sorted(entry.name for entry in folder.glob("*.py")) if is_there(folder) and folder.is_dir() else []
-        near = nearest(path.name, files) or (f"there is {', '.join(files)}" if files else "check the path")
-        raise InputError("there is no such plug-in", where, shown, "a Python file, by its place from the case", near)
+    where = source.where(("plugins", number))
+    check_there(path, "there is no such plug-in", where, "a Python file, by its place from the case")
     try:
         return path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError("the plug-in cannot be read", where, f"{shown}: {error}", "a Python file in UTF-8") from None
+        measured = f"{display(path)}: {error}"
+        raise InputError("the plug-in cannot be read", where, measured, "a Python file in UTF-8") from None
 
 
 def load_recorded(record: Mapping[str, Any]) -> list[str]:

@@ -97,7 +97,7 @@ def report_of(
     began = time.perf_counter()
     common: dict[str, Any] = {
         "component_modes": len(reduction.component_hz),
-        "highest_component_hz": float(reduction.component_hz[-1]) if len(reduction.component_hz) else 0.0,
+        "highest_component_hz": reduction.highest_component_hz,
         "wall_s": round(wall, 3),
     }
     if case.structure.cut is not None:

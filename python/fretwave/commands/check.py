@@ -6,18 +6,16 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-import numpy.typing as npt
-
 from ..case import checks
 from ..case.build import build_model
 from ..case.load import Case, load_case
 from ..case.reduce import reduce_case
 from ..errors import EXIT_DONE
+from ..model.contact import span
 from ..mpi.guard import on_first_rank
 from ..run.order import RunOptions, in_order
 from ..run.runner import check_sweeps
-from ..texts import display
+from ..texts import counted, display
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -54,17 +52,11 @@ def _report(case: Case, described: dict[str, list[str]]) -> list[str]:
     shown = ", ".join(case.dofs[:8]) + (", ..." if len(case.dofs) > 8 else "")
     lines.append(f"  {len(case.dofs)} dofs: {shown}")
     for contact in case.contacts:
-        count = contact.n_pairs
-        values = ", ".join(f"{key} = {_short(value)}" for key, value in contact.parameters.items())
-        lines.append(f"  contact '{contact.name}': {contact.law}, {count} contact pair{'s' * (count != 1)}, {values}")
+        values = ", ".join(f"{key} = {span(value)}" for key, value in contact.parameters.items())
+        lines.append(f"  contact '{contact.name}': {contact.law}, {counted(contact.n_pairs, 'contact pair')}, {values}")
     lines.extend(f"  {line}" for line in (case.reduced.lines() if case.reduced else ()))
     lines.extend(f"  note: {note}" for note in case.notes)
     for name, texts in described.items():
         lines.append(f"  {name}: {texts[0]}")
         lines.extend(f"    {text}" for text in texts[1:])
     return [line for line in lines if line]
-
-
-def _short(value: npt.ArrayLike) -> str:
-    low, high = float(np.min(value)), float(np.max(value))
-    return f"{low:g}" if low == high else f"{low:g} to {high:g}"

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from ..arrays import Array, IntArray
 from ..case.plugins import load_file
 from ..errors import EXIT_DONE, InputError
 from ..importers.calculix import SUFFIXES, read_dofs
@@ -94,7 +94,7 @@ def _check_place(out: Path, inputs: Iterable[str | None]) -> None:
         raise InputError("the folder of the model file does not exist", display(out), fix=fix)
 
 
-def _labels(options: argparse.Namespace, found: Assembled, nodes: Nodes | None) -> npt.NDArray[np.int64] | None:
+def _labels(options: argparse.Namespace, found: Assembled, nodes: Nodes | None) -> IntArray | None:
     """Node and direction of each dof: from --dofs, the matrices, or node by node as the coordinates stand."""
     if options.dofs:
         with readable(options.dofs, "table of dofs"):
@@ -116,7 +116,7 @@ def _labels(options: argparse.Namespace, found: Assembled, nodes: Nodes | None) 
     return labels if found.rows is None else labels[found.rows]
 
 
-def _node_by_node(found: Assembled, nodes: Nodes) -> npt.NDArray[np.int64]:
+def _node_by_node(found: Assembled, nodes: Nodes) -> IntArray:
     """Three or six dofs for each node, in the order of the coordinates."""
     per_node, rest = divmod(found.given_size, len(nodes.numbers))
     if rest or per_node not in (3, 6):
@@ -132,7 +132,7 @@ def _node_by_node(found: Assembled, nodes: Nodes) -> npt.NDArray[np.int64]:
     return np.column_stack([np.repeat(nodes.numbers, per_node), directions])
 
 
-def _read_table(path: Path) -> npt.NDArray[np.int64]:
+def _read_table(path: Path) -> IntArray:
     """CalculiX' ``node.direction``, or a CSV of ``node,direction``."""
     if not path.is_file():
         raise InputError("the table of dofs does not exist", display(path), fix="check the path")
@@ -162,9 +162,7 @@ def _names(known: Sequence[str], given: list[str]) -> tuple[list[str], dict[str,
     return names, {names[dof]: dof for dof in kept}
 
 
-def _pairs(
-    options: argparse.Namespace, labels: npt.NDArray[np.int64] | None, nodes: Nodes | None
-) -> Iterator[tuple[str, Pairs]]:
+def _pairs(options: argparse.Namespace, labels: IntArray | None, nodes: Nodes | None) -> Iterator[tuple[str, Pairs]]:
     """Contact pairs by name."""
     seen: set[str] = set()
     for number, words in enumerate(options.pairs):
@@ -190,7 +188,7 @@ def _pairs(
         yield name, found
 
 
-def _axis(text: str | None) -> npt.NDArray[np.float64] | None:
+def _axis(text: str | None) -> Array | None:
     if text is None:
         return None
     try:

@@ -11,9 +11,9 @@ import numpy as np
 
 from ..console import on_terminal
 from ..files.lock import is_taken
+from ..results.file import open_results, unit_of_amplitudes
 from ..results.record import RECORD, read_record
-from ..results.results import open_results
-from ..texts import display
+from ..texts import counted, display
 
 if TYPE_CHECKING:
     import h5py
@@ -74,7 +74,7 @@ def _heading(folder: Path, title: str) -> list[str]:
     if not (folder / RECORD).exists():
         return [title] if title else []
     record = read_record(folder)
-    ranks = f"{record['ranks']} rank{'s' * (record['ranks'] > 1)}"
+    ranks = counted(record["ranks"], "rank")
     started = record["started"][:16].replace("T", " ")
     going = "running now" if is_taken(folder) else "not finished"
     status = going if record["status"] == "running" else record["status"]
@@ -83,7 +83,7 @@ def _heading(folder: Path, title: str) -> list[str]:
 
 def describe(name: str, group: h5py.Group) -> tuple[str, ...]:
     """One row of the table."""
-    points, unit = group["points"], _unit(group)
+    points, unit = group["points"], unit_of_amplitudes(group)
     table = {key: points[key][()] for key in points}
     kind = str(group.attrs["type"])
     method = group.attrs.get("method")
@@ -107,11 +107,6 @@ def _error(table: dict[str, Any], unit: str) -> str:
         if np.isfinite(found).any():
             return text.format((100 if "%" in text else 1) * np.nanmax(found))
     return ""
-
-
-def _unit(group: h5py.Group) -> str:
-    """Of the amplitudes."""
-    return str(group["points/amplitude"].attrs.get("units", "m")) if "points/amplitude" in group else "m"
 
 
 def _range(table: dict[str, Any], of_amplitude: str) -> str:
@@ -155,8 +150,9 @@ def _notes(name: str, group: h5py.Group) -> list[str]:
         notes = read_landmarks(name, group)
     else:
         notes = []
+    unit = unit_of_amplitudes(group)
     notes += [
-        f"{name}: {_wave(cycle)}limit cycle at a = {cycle['amplitude']:.5g} {_unit(group)},"
+        f"{name}: {_wave(cycle)}limit cycle at a = {cycle['amplitude']:.5g} {unit},"
         f" {cycle['frequency_hz']:.5g} Hz: " + words[cycle["stable"]]
         for cycle in json.loads(group.attrs.get("events", "[]"))
     ]

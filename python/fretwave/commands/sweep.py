@@ -21,7 +21,7 @@ from ..results.sweeps import amplitude_unit, write_sweep
 from ..run.order import RunOptions
 from ..run.runner import Runner, plot
 from ..run.sweep import Checked, Sweep
-from ..texts import display
+from ..texts import counted, display
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -61,7 +61,7 @@ def resume_sweep(folder: Path, record: dict[str, Any], comm: MPI.Comm, plots: bo
         The case has changed since.
     """
     given, asked = record["case"], record["sweep"]
-    options = RunOptions(folder, given["overrides"], given["only"], given["quick"], plots, given["petsc"])
+    options = RunOptions.of_record(folder, record, plots)
     path = Path(given["path"])
     text = None if path.exists() else on_first_rank(comm, lambda: read_copy(folder, record))
     sweep = Sweep(Runner, path, Plan(asked["over"]), options, folder / "values", asked["groups"], text)
@@ -96,7 +96,7 @@ def _run_sweep(sweep: Sweep, first: Checked, folder: RunFolder, comm: MPI.Comm) 
 def _do_sweep(sweep: Sweep, first: Checked, folder: RunFolder, console: Console, comm: MPI.Comm) -> int:
     began = time.perf_counter()
     count = groups.group_count(comm.size, len(sweep.plan), sweep.n_groups)
-    ranks = f"{comm.size} rank{'s' * (comm.size > 1)} in {count} group{'s' * (count > 1)}"
+    ranks = f"{counted(comm.size, 'rank')} in {counted(count, 'group')}"
     over = f"{len(sweep.plan)} values of {' x '.join(sweep.plan.keys)}"
     console.line(f"sweep of {', '.join(first.analyses)}, {over}, {ranks}, results in {display(folder.path)}")
     on_first_rank(comm, folder.start)

@@ -26,15 +26,16 @@ from mpi4py import MPI
 from ..arrays import Array, Indices
 from ..errors import InputError
 from ..model.contact import Contact
-from ..model.reduction import RIGID_SHARE, Reduction, check_all_kept, reduce
+from ..model.reduction import RIGID_SHARE, Reduction, reduce
 from ..model.sectors import Given, by_sector
 from ..model.sizes import COMPARED_MODES, INTERFACE_TOLERANCE, INTERFACE_WAVES
+from ..mpi.destroyable import Destroyable
 from .interface import Interface
 from .sector import Sector
 from .waves import STATES, SectorWaves, WaveError
 
 
-class SectorReduction:
+class SectorReduction(Destroyable):
     """x = P T x_r of one sector with both faces; made by `reduce_sector`.
 
     Reduced coordinates: kept dofs in ascending order, low face, high face, component modes.
@@ -83,6 +84,11 @@ class SectorReduction:
         """Coordinates of one face."""
         return len(self.low)
 
+    @property
+    def highest_component_hz(self) -> float:
+        """Of the last component mode [Hz], 0 without one."""
+        return self._inner.highest_component_hz
+
     def rows(self, B: Given) -> sp.csr_matrix:
         """B (n, n_r) on the reduced coordinates of rows (n, n_dof) that reach kept dofs alone.
 
@@ -91,10 +97,7 @@ class SectorReduction:
         InputError
             They reach another dof.
         """
-        moved = (sp.csr_matrix(B, dtype=float) @ self._P).tocsc()
-        kept = moved[:, self._inner.keep]
-        check_all_kept(moved, kept)
-        return sp.csr_matrix(sp.hstack([kept, sp.csr_matrix((kept.shape[0], len(self.component_hz)))]))
+        return self._inner.rows((sp.csr_matrix(B, dtype=float) @ self._P).tocsc())
 
     def names(self, dofs: Sequence[str]) -> list[str]:
         """Names of the reduced coordinates: kept dofs keep theirs."""
@@ -144,12 +147,6 @@ class SectorReduction:
     def destroy(self) -> None:
         """Free the component modes; the reduced matrices stay. Collective."""
         self._inner.destroy()
-
-    def __enter__(self) -> SectorReduction:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.destroy()
 
     def _on(self, contact: Contact) -> Contact:
         """The contact on reduced coordinates, which contain all that it touches."""

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import copy
-import operator
 import time
 from collections.abc import Mapping, Sequence
-from typing import Any, Union, cast
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -14,13 +13,15 @@ from petsc4py import PETSc
 
 from .. import _core
 from ..arrays import Array
-from ..columns import MODAL_UNIT
 from ..errors import InputError
 from ..model.model import Model
 from ..model.modes import LinearMode
 from ..model.rest import Rest
+from ..mpi.destroyable import Destroyable
 from ..mpi.gather import on_rank_0
 from ..post.contact_history import MOTION
+from ..post.motion import complex_amplitudes
+from .observed import Observed, named, row_of
 from .states import Estimate, ForcedState, ModalState, State
 
 
@@ -81,44 +82,7 @@ def choose_harmonics(model: Model, highest: int, samples: int | None = None, ret
     return harmonics
 
 
-#: What is normalised or observed: a dof's number, a row (n_dof,), or a linear mode's coordinate.
-Observed = Union[int, Sequence[float], Array, LinearMode]
-
-
-def row_of(model: Model, observed: Observed) -> list[tuple[int, float]]:
-    """Entries (dof, weight) of what is observed, on every rank. Collective.
-
-    Raises
-    ------
-    InputError
-        The row does not fit the model.
-    """
-    if isinstance(observed, LinearMode):
-        if np.any(observed.imaginary):
-            fix = "take a real mode, or a dof"
-            raise InputError("a complex mode has no one coordinate", None, repr(observed), "a standing wave", fix)
-        return row_of(model, model.inertia(observed.shape))
-    if np.ndim(observed) == 0:
-        return [(operator.index(cast(int, observed)), 1.0)]
-    row = np.asarray(observed, dtype=float)
-    if row.shape != (model.n_dof,) or not np.isfinite(row).all():
-        fix = "give one weight a dof"
-        raise InputError("the row does not fit the model", None, row.shape, f"({model.n_dof},), finite", fix)
-    return [(int(k), float(row[k])) for k in np.flatnonzero(row)]
-
-
-def unit_of(observed: Observed) -> str:
-    """Of the amplitude of what is observed."""
-    return MODAL_UNIT if isinstance(observed, LinearMode) else "m"
-
-
-def _named(observed: Observed) -> str:
-    if isinstance(observed, LinearMode):
-        return f"the coordinate of {observed.frequency_hz:.6g} Hz"
-    return f"dof {observed!r}" if np.ndim(observed) == 0 else "a row"
-
-
-class HarmonicProblem:
+class HarmonicProblem(Destroyable):
     """N equations in N + 1 unknowns y: scaled harmonic coefficients, then scalars, the continuation parameter last."""
 
     #: What its scalar unknowns mean; None where no table says.
@@ -191,6 +155,10 @@ class HarmonicProblem:
         """The parameter's entry of unknowns or a tangent, on every rank. Collective."""
         local = y.getArray(readonly=True)
         return float(self.model.comm.bcast(local[-1] if len(local) else 0.0, root=self.model.comm.size - 1))
+
+    def parameter(self, y: PETSc.Vec) -> float:
+        """The continuation parameter of unknowns: amplitude [m], or omega [rad/s]. Collective."""
+        return float(self.core.parameter_value(self.last_entry(y)))
 
     def coefficients(self, y: PETSc.Vec) -> Array | None:
         """Harmonic coefficients Q (n_dof, m) in physical units, columns `harmonics.labels`, on rank 0. Collective."""
@@ -305,11 +273,9 @@ class HarmonicProblem:
             return None
         tau = 2 * np.pi * np.arange(n) / n
         x, v = np.zeros((n, len(Q))), np.zeros((n, len(Q)))
-        column = 0
+        amplitudes = complex_amplitudes(self.harmonics.labels, Q)
         for order, exponent in zip(self.harmonics.orders, s):
-            q = Q[:, column] - (1j * Q[:, column + 1] if order else 0)
-            column += 2 if order else 1
-            wave = np.exp(1j * order * tau)[:, None] * q
+            wave = np.exp(1j * order * tau)[:, None] * amplitudes[order]
             x += wave.real
             v += (exponent * wave).real
         return {"x": x, "v": v}
@@ -328,12 +294,6 @@ class HarmonicProblem:
         """Free the solver's vectors. Collective."""
         self._error = None
         self.core = None  # type: ignore[assignment]
-
-    def __enter__(self) -> HarmonicProblem:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.destroy()
 
 
 class NonlinearMode(HarmonicProblem):
@@ -390,7 +350,7 @@ class NonlinearMode(HarmonicProblem):
         self.meaning = ModalState(method, start.omega)
 
     def _what(self) -> str:
-        return f"{self.method} from {self.start.frequency_hz:.6g} Hz, amplitude of {_named(self.dof)}, "
+        return f"{self.method} from {self.start.frequency_hz:.6g} Hz, amplitude of {named(self.dof)}, "
 
     def initial(self, amplitude: float) -> PETSc.Vec:
         """The linear mode at this amplitude. Collective."""
@@ -462,7 +422,7 @@ class ForcedResponse(HarmonicProblem):
         return PETSc.Vec().createWithArray(local, comm=model.comm)
 
     def _what(self) -> str:
-        return f"level {self.level:g}, {_named(self.dof)}, "
+        return f"level {self.level:g}, {named(self.dof)}, "
 
     def initial(self, omega: float) -> PETSc.Vec:
         """Zero motion at this angular frequency: Newton's first step is the linear response. Collective."""

@@ -15,9 +15,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ..arrays import Array
+from ..columns import SOURCES
 
-#: Of a point's error.
-SOURCES = ("harmonics", "samples", "solver")
 #: A smaller damping ratio is known accurately enough when it is known to a share of this one.
 ZETA_FLOOR = 1e-4
 #: Where a mode's damping is steep over the amplitude, its point may be off by 1 / STRICT of the accuracy.

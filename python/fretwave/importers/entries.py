@@ -16,6 +16,7 @@ from ..files.compressed import check_compressed
 from ..model.checks import check_symmetric
 from ..model.sectors import Given
 from ..results.model_file import dof_name
+from ..texts import counted
 
 #: Share of entries of the rarer triangle below which they count as strays beside the other triangle.
 STRAY_SHARE = 0.5
@@ -196,11 +197,6 @@ def _union(labelled: dict[str, Entries], notes: list[str]) -> IntArray:
             example = dof_name(*(int(part) for part in union[absent[0]]))
             notes.append(f"{counted(len(absent), 'dof')} without an entry in {letter}, the first is {example}")
     return union
-
-
-def counted(number: int, word: str) -> str:
-    """``1 dof``, ``2 dofs``."""
-    return f"{number} {word}{'s' * (number != 1)}"
 
 
 def order_of(labels: IntArray) -> IntArray:

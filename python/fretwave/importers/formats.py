@@ -11,7 +11,7 @@ from typing import Any, Callable, TypeVar
 from .. import registry
 from ..errors import InputError
 from ..files.isolated import call_isolated
-from ..texts import display, nearest
+from ..texts import display, names_beside, nearest
 from . import abaqus, calculix, matlab, matrix_market, npz, petsc_binary
 from .entries import Entries
 
@@ -136,8 +136,7 @@ def read_matrix(given: str, letter: str) -> Entries:
     """
     path, variable = split(given)
     if not path.is_file():
-        names = sorted(entry.name for entry in path.parent.iterdir()) if path.parent.is_dir() else []
-        fix = nearest(path.name, names) or "check the path"
+        fix = nearest(path.name, names_beside(path)) or "check the path"
         raise InputError(f"the file of {letter} does not exist", display(path), None, "a matrix file", fix)
     with readable(path, f"file of {letter}"):
         with path.open("rb") as file:

@@ -12,7 +12,7 @@ from scipy.sparse.csgraph import connected_components
 from ..arrays import Array
 from ..errors import FretwaveError
 from ..model.structure import Structure
-from .entries import counted
+from ..texts import counted
 
 if TYPE_CHECKING:
     from mpi4py import MPI

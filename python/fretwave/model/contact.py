@@ -67,7 +67,7 @@ class Contact:
 
     def __repr__(self) -> str:
         law = self.law if isinstance(self.law, str) else type(self.law).__name__
-        given = "".join(f", {name}={_span(value)}" for name, value in self.parameters.items())
+        given = "".join(f", {name}={span(value)}" for name, value in self.parameters.items())
         rows, n_dof = np.shape(by_sector(self.B)[0])
         return f"Contact({self.name}: {law}, {rows} rows of B on {n_dof} dofs{given})"
 
@@ -181,7 +181,7 @@ class Contact:
             )
 
 
-def _span(value: npt.ArrayLike) -> str:
+def span(value: npt.ArrayLike) -> str:
     """A parameter in short: a number, or its least and largest over the pairs."""
     low, high = float(np.min(value)), float(np.max(value))
     return f"{low:g}" if low == high else f"{low:g} to {high:g}"

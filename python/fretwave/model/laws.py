@@ -22,6 +22,7 @@ from ..registry import LAW, admit
 
 #: States of a pair at a sample, as the core counts them (src/contact/law.h); UNKNOWN where results keep none.
 STICK, SLIP, OPEN, UNKNOWN = 0, 1, 2, -1
+STATUS = {"stick": STICK, "slip": SLIP, "open": OPEN}
 
 
 class Role(str, Enum):

@@ -16,6 +16,7 @@ from .. import _core
 from ..arrays import Array
 from ..errors import InputError
 from ..mpi import guard as parallel
+from ..mpi.destroyable import Destroyable
 from ..mpi.gather import on_all_ranks
 from .contact import Contact
 from .rest import Rest
@@ -30,7 +31,7 @@ def _tangents(contact: Contact) -> int:
     return contact.components - (contact.info.normal is not None)
 
 
-class Model:
+class Model(Destroyable):
     """M x'' + C x' + K x + sum B^T f(B x, B x') = 0. Collective.
 
     Parameters
@@ -273,9 +274,3 @@ class Model:
         self.core = None  # type: ignore[assignment]
         for mat in self._matrices:
             mat.destroy()
-
-    def __enter__(self) -> Model:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.destroy()

@@ -16,6 +16,7 @@ from petsc4py import PETSc
 from .. import _core
 from ..arrays import Array
 from ..errors import InputError
+from ..mpi.destroyable import Destroyable
 from ..mpi.gather import on_all_ranks
 from .model import Model
 from .sectors import Given, Sparse
@@ -56,7 +57,7 @@ class FrequencyError:
         return float(np.abs(self.relative).max())
 
 
-class Reduction:
+class Reduction(Destroyable):
     """x = T x_r with T = [I 0; Psi Phi] over (kept, internal) dofs; made by `reduce`.
 
     Reduced coordinates are the kept dofs in the order given, then the component modes (unit modal mass). Signs and
@@ -95,6 +96,11 @@ class Reduction:
         return len(self.K)
 
     @property
+    def highest_component_hz(self) -> float:
+        """Of the last component mode [Hz], 0 without one."""
+        return float(self.component_hz[-1]) if len(self.component_hz) else 0.0
+
+    @property
     def places(self) -> dict[int, int]:
         """Reduced coordinate of each kept dof."""
         return {int(dof): place for place, dof in enumerate(self.keep)}
@@ -109,7 +115,7 @@ class Reduction:
         """
         full = sp.csr_matrix(B)
         kept = sp.csr_matrix(full[:, self.keep])
-        check_all_kept(full, kept)
+        _check_all_kept(full, kept)
         return sp.csr_matrix(sp.hstack([kept, sp.csr_matrix((kept.shape[0], len(self.component_hz)))]))
 
     def names(self, dofs: Sequence[str]) -> list[str]:
@@ -190,12 +196,6 @@ class Reduction:
         for mat in self._owned:
             mat.destroy()
         self._owned = []
-
-    def __enter__(self) -> Reduction:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.destroy()
 
     def _rows(self, values: npt.ArrayLike, expected: int) -> Array:
         rows = np.asarray(values, dtype=float)
@@ -299,7 +299,7 @@ def reduce(
     return Reduction(model, core, kept, owned, time.perf_counter() - start)
 
 
-def check_all_kept(B: Sparse, kept: Sparse) -> None:
+def _check_all_kept(B: Sparse, kept: Sparse) -> None:
     """No entry of B has been left out."""
     if abs(B).sum() > abs(kept).sum() * (1 + 1e-9):
         raise InputError(

@@ -75,6 +75,12 @@ def error_of(table: Reading | Table, column: str) -> AnyArray | None:
     return table["omega_error"] / (2 * np.pi) if "omega_error" in table else None
 
 
+def tells_error(table: Reading | Table) -> bool:
+    """Whether the error of frequency and damping is known at any point."""
+    error = error_of(table, "zeta")
+    return error is not None and bool(np.isfinite(error).any())
+
+
 def _close_up(axes: Axes, modes: Sequence[Analysis], column: str, place: tuple[float, ...]) -> None:
     """Inset around the folds, which are too narrow to be seen on the whole axis."""
     folds = modes[0].columns["amplitude"][modes[0].met("fold")]
@@ -184,7 +190,7 @@ def _finish(figure: Figure, upper: Axes, lower: Axes, modes: Sequence[Analysis])
     upper.set_ylabel(style.label("Frequency ω/2π", "Hz"))
     lower.set_ylabel(style.label("Damping ratio ζ", "%"))
     lower.set_xlabel(style.label(f"Modal amplitude of {dof}".rstrip(" of"), mode.unit("amplitude")))
-    if any("zeta_error" in m.columns and np.isfinite(m.columns["zeta_error"]).any() for m in modes):
+    if any(tells_error(m.columns) for m in modes):
         style.band_entry(lower)
     style.legend_outside(figure, lower, columns=2)
 

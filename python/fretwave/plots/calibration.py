@@ -5,17 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-import numpy.typing as npt
 from matplotlib.figure import Figure
 
+from ..arrays import Indices
+from ..post.calibration import FACTORS, can_be_told, share_within
 from ..results.reader import Run, Table
 from . import style
 
-Indices = npt.NDArray[np.intp]
-
-SOURCES = {"harmonics": "o", "samples": "s", "tolerance": "^"}
-#: [1/s], below which a difference of two runs is what their solvers leave
-LEAST_ERROR = 1e-8
+MARKS = {"harmonics": "o", "samples": "s", "tolerance": "^"}
+FACTOR = FACTORS[0]
 
 
 def figures(run: Run) -> Iterator[tuple[str, Figure]]:
@@ -26,23 +24,24 @@ def figures(run: Run) -> Iterator[tuple[str, Figure]]:
 
 
 def _told(table: Table) -> Indices:
-    return np.flatnonzero((table["error"] > LEAST_ERROR) & (table["estimate"] > 0))
+    return np.flatnonzero(can_be_told(table["error"]) & (table["estimate"] > 0))
 
 
 def draw(table: Table) -> Figure:
-    """One mark a point, the diagonal, and the band within a factor of 3; the share within it is the title."""
+    """One mark a point, the diagonal, and the band within a factor; the share within it is the title."""
     figure, plane = style.new_figure(5.0)
     rows = _told(table)
     error, estimate = table["error"][rows], table["estimate"][rows]
     ends = np.array([0.5 * error.min(), 2 * error.max()])
-    plane.fill_between(ends, ends / 3, ends * 3, color=style.GREY, alpha=0.25, lw=0, label="within a factor of 3")
+    words = f"within a factor of {FACTOR}"
+    plane.fill_between(ends, ends / FACTOR, ends * FACTOR, color=style.GREY, alpha=0.25, lw=0, label=words)
     plane.plot(ends, ends, color=style.GREY, lw=1)
-    for (sweep, mark), colour in zip(SOURCES.items(), style.PALETTE):
+    for (sweep, mark), colour in zip(MARKS.items(), style.PALETTE):
         own = table["sweep"][rows] == sweep
         if own.any():
             plane.plot(error[own], estimate[own], mark, ms=4, alpha=0.7, color=colour, label=f"by {sweep}")
-    within = np.mean((estimate < 3 * error) & (estimate > error / 3))
-    plane.set(xscale="log", yscale="log", title=f"{100 * within:.0f} % of {len(rows)} points within a factor of 3")
+    within = share_within(estimate, error, FACTOR)
+    plane.set(xscale="log", yscale="log", title=f"{100 * within:.0f} % of {len(rows)} points {words}")
     plane.set_xlabel(style.label("True error of λ", "1/s"))
     plane.set_ylabel(style.label("Estimated error of λ", "1/s"))
     style.legend_outside(figure, plane, columns=2)

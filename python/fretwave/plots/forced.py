@@ -15,8 +15,6 @@ from ..results.reader import Analysis, Run, Table
 from . import style
 
 BACKBONES = (("--", style.INK), (":", style.RED))
-#: peaks that differ by more than this factor are drawn on a logarithmic axis
-LINEAR_UP_TO = 8.0
 
 
 def figures(run: Run) -> Iterator[tuple[str, Figure]]:
@@ -99,7 +97,7 @@ def _finish(figure: Figure, left: Axes, right: Axes, forced: Analysis) -> None:
             axes.set_xlim(frequency.min(), frequency.max())
         axes.set_xlabel(style.label("Excitation frequency", "Hz"))
     peaks = [amplitude[forced.columns["level"] == level].max() for level in np.unique(forced.columns["level"])]
-    if max(peaks) > LINEAR_UP_TO * min(peaks):
+    if max(peaks) > style.LINEAR_UP_TO * min(peaks):
         left.set(yscale="log", ylim=(0.7 * amplitude.min(), 1.5 * amplitude.max()))
         right.set(yscale="log")
     else:

@@ -12,7 +12,8 @@ from ..arrays import AnyArray
 from ..model.laws import Role
 from ..results.reader import Analysis, Run
 from . import style
-from .phase_planes import amplitude_name, kept_points
+from .phase_planes import kept_points
+from .trajectories import amplitude_name
 
 UM = 1e6
 LEGEND_COLUMNS = 4

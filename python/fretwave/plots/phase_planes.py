@@ -11,9 +11,7 @@ from matplotlib.figure import Figure
 from ..arrays import AnyArray
 from ..results.reader import Analysis, Run, motion_of
 from . import style
-from .trajectories import FEW_DOFS, other_dof, spread
-
-CURVES = 7
+from .trajectories import CURVES, FEW_DOFS, amplitude_name, other_dof, spread
 
 
 def figures(run: Run) -> Iterator[tuple[str, Figure]]:
@@ -66,11 +64,6 @@ def loops(mode: Analysis, contact: str) -> Figure:
     title = f"Contact {contact}{'' if pair[1] == 0 else f', pair {pair[1]}'}: modal amplitude, {mode.method()}"
     style.legend_outside(figure, left, columns=CURVES, title=title)
     return figure
-
-
-def amplitude_name(mode: Analysis, point: int) -> str:
-    """The point's amplitude with its unit."""
-    return f"{style.number(mode.columns['amplitude'][point])} {mode.unit('amplitude')}".strip()
 
 
 def kept_points(mode: Analysis) -> list[int]:

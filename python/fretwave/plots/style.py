@@ -93,6 +93,10 @@ def apart(values: Sequence[float]) -> Callable[[float], str]:
     return lambda value: number(value, digits)
 
 
+#: values that differ by more than this factor stand on a logarithmic axis
+LINEAR_UP_TO = 8.0
+
+
 def log_amplitude(axes: Axes, values: AnyArray | Sequence[float]) -> None:
     """Logarithmic amplitude axis with plain numbers at 1, 2, 5 of each decade, fitted to the values."""
     low, high = float(np.min(values)), float(np.max(values))

@@ -21,12 +21,10 @@ from ..results.file import open_results
 from ..results.reader import Analysis, Run, Table
 from ..results.sweep_summary import split_of
 from . import style
-from .backbone import error_of
+from .backbone import error_of, tells_error
 
 #: more branches than these are told apart by a colour bar
 NAMED = 10
-#: values that differ by more than this factor stand on a logarithmic axis
-LINEAR_UP_TO = 8.0
 #: damping below zero by more than rounding
 TINY = 1e-9
 #: asymptotes are common to all branches when they agree to this relative difference
@@ -148,7 +146,7 @@ def responses(swept: Swept) -> Figure:
     for number, part, table in swept.branches:
         axes.plot(table["frequency_hz"], table["amplitude"], **swept.look(number, part))
     peaks = swept.summary["largest_amplitude"]
-    if np.nanmax(peaks) > LINEAR_UP_TO * np.nanmin(peaks):
+    if np.nanmax(peaks) > style.LINEAR_UP_TO * np.nanmin(peaks):
         axes.set_yscale("log")
     axes.set_xlabel(style.label("Excitation frequency", "Hz"))
     dof = swept.analysis.attributes.get("observe", "")
@@ -187,7 +185,7 @@ def _name(figure: Figure, axes: list[Axes], swept: Swept) -> None:
     if len(swept.plan) <= NAMED or swept.crossed():
         for label, look in names:
             axes[0].plot([], [], label=label, **look)
-    if any("zeta_error" in table and np.isfinite(table["zeta_error"]).any() for _, _, table in swept.branches):
+    if any(tells_error(table) for _, _, table in swept.branches):
         style.band_entry(axes[0])
     _legend(figure, axes[0])
     if len(swept.plan) <= NAMED or swept.crossed():
@@ -280,7 +278,7 @@ def _others(swept: Swept) -> list[str]:
 def _scales(axes: Axes, x: Array, texts: list[str], from_zero: bool) -> None:
     if texts:
         axes.set_xticks(x, texts)
-    elif x.min() > 0 and x.max() > LINEAR_UP_TO * x.min():
+    elif x.min() > 0 and x.max() > style.LINEAR_UP_TO * x.min():
         axes.set_xscale("log")
         style.plain_numbers(axes.xaxis, x)
     shown = np.concatenate([line.get_ydata() for line in axes.get_lines()])
@@ -289,6 +287,6 @@ def _scales(axes: Axes, x: Array, texts: list[str], from_zero: bool) -> None:
         low, high = min(0.0, *shown), max(0.0, *shown)
         margin = 0.08 * (high - low)
         axes.set_ylim(low - margin * (low < 0), high + margin)
-    elif len(shown) and shown.min() > 0 and shown.max() > LINEAR_UP_TO * shown.min():
+    elif len(shown) and shown.min() > 0 and shown.max() > style.LINEAR_UP_TO * shown.min():
         axes.set_yscale("log")
         style.plain_numbers(axes.yaxis, shown)

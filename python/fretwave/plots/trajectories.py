@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from ..results.reader import Analysis, Run, motion_of
 from . import style
 
+#: amplitudes in one picture
 CURVES = 7
 #: up to this number a reader knows each dof by its name
 FEW_DOFS = 12
@@ -30,8 +31,7 @@ def draw(mode: Analysis) -> Figure:
     for point, colour in zip(points, style.shades(len(points))):
         amplitude = mode.columns["amplitude"][point]
         x, _ = motion_of(mode, point)
-        name = f"{style.number(amplitude)} {mode.unit('amplitude')}".strip()
-        left.plot(x[:, across], x[:, up], color=colour, label=name)
+        left.plot(x[:, across], x[:, up], color=colour, label=amplitude_name(mode, point))
         right.plot(x[:, across] / amplitude, x[:, up] / amplitude, color=colour)
     unit = mode.length_unit()
     left.set(xlabel=style.label(f"Displacement of {mode.dofs[across]}", unit))
@@ -39,6 +39,11 @@ def draw(mode: Analysis) -> Figure:
     right.set(xlabel=f"{mode.dofs[across]} / modal amplitude", ylabel=f"{mode.dofs[up]} / modal amplitude")
     style.legend_outside(figure, left, columns=CURVES, title=f"Modal amplitude, {mode.method()}")
     return figure
+
+
+def amplitude_name(mode: Analysis, point: int) -> str:
+    """The point's amplitude with its unit."""
+    return f"{style.number(mode.columns['amplitude'][point])} {mode.unit('amplitude')}".strip()
 
 
 def other_dof(mode: Analysis) -> int:

@@ -16,6 +16,7 @@ from matplotlib.ticker import FuncFormatter, MaxNLocator
 from ..arrays import Array
 from ..results.reader import Analysis, Run
 from . import style
+from .faces import STATUS
 from .wear_lines import MM, WearLine, amplitude_label, amplitude_text, amplitudes, cycle_label, power, wears
 
 #: fewer amplitudes than this make no map
@@ -160,10 +161,8 @@ def _cuts(axes: Axes, lines: Sequence[WearLine], column: str, factor: float) -> 
 
 
 def _shares(axes: Axes, line: WearLine) -> None:
-    words = {"stick": style.BLUE, "slip": style.ORANGE, "open": "#dddddd"}
-    axes.stackplot(
-        line.cycles, *(100 * line.columns[w] for w in words), colors=words.values(), labels=words, alpha=0.85
-    )
+    shares = (100 * line.columns[word] for word in STATUS)
+    axes.stackplot(line.cycles, *shares, colors=STATUS.values(), labels=STATUS, alpha=0.85)
     axes.set(ylim=(0, 100), ylabel="Share of time [%]")
     axes.legend(loc="upper right", ncols=3)
     axes.grid(False)

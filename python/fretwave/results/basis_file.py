@@ -116,7 +116,7 @@ def basis_of(reduction: Union[Reduction, SectorReduction], full: Structure, comm
             blocks.append(block)
     if comm.rank:
         return None
-    hz = float(reduction.component_hz[-1]) if len(reduction.component_hz) else 0.0
+    hz = reduction.highest_component_hz
     if not isinstance(reduction, SectorReduction):
         return Basis(np.hstack(blocks), marks_of(full), hz)
     ties = {k: sp.csr_matrix(T) for k, T in by_sector(reduction.sector().ties).items()}

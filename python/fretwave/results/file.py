@@ -139,6 +139,11 @@ def has_results(folder: Path) -> bool:
     return (folder / "results.h5").exists() or bool(unfinished(folder))
 
 
+def unit_of_amplitudes(group: h5py.Group) -> str:
+    """Of an analysis; metres where the results tell none."""
+    return str(group["points/amplitude"].attrs.get("units", "m")) if "points/amplitude" in group else "m"
+
+
 def open_results(path: Path) -> Results:
     """The results of a run folder, those of unfinished analyses included, to be read.
 

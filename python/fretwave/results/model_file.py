@@ -45,7 +45,7 @@ from ..files.compressed import check_compressed
 from ..files.whole import Unfailing, check_whole, replaced, seal
 from ..model.pairs import Pairs
 from ..model.structure import Structure
-from ..texts import display, nearest
+from ..texts import display, names_beside, nearest
 
 if TYPE_CHECKING:
     import h5py
@@ -254,8 +254,8 @@ def _opened(path: Path) -> h5py.File:
 
     fix = "write it with `fretwave import`"
     if not path.is_file():
-        names = sorted(entry.name for entry in path.parent.iterdir()) if path.parent.is_dir() else []
-        raise InputError("the model file does not exist", display(path), fix=nearest(path.name, names) or fix)
+        near = nearest(path.name, names_beside(path))
+        raise InputError("the model file does not exist", display(path), fix=near or fix)
     try:
         check_whole(path, "the model file")
         file = h5py.File(path, "r")

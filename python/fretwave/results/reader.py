@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..arrays import Array
-from ..columns import COLUMNS
+from ..columns import table_order
 from ..errors import InputError
 from ..files.dimensions import names_of_data
 from ..hb.states import State
@@ -351,8 +351,7 @@ def motion_of(analysis: Analysis, point: int) -> tuple[Array, Array]:
 
 def _analysis(group: h5py.Group, path: Path) -> Analysis:
     points = group["points"] if "points" in group else {}
-    order = [key for key in COLUMNS if key in points] + [key for key in points if key not in COLUMNS]
-    columns = {key: np.asarray(points[key]) for key in order if key != "event"}
+    columns = {key: np.asarray(points[key]) for key in table_order(points) if key != "event"}
     numbers = {key: value.astype(float) for key, value in columns.items() if value.dtype.kind in "fiub"}
     meaning, slopes = read_slopes(group)
     events = _texts(points["event"][()]) if "event" in points else [""] * len(next(iter(numbers.values()), []))

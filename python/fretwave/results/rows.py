@@ -158,12 +158,12 @@ def _create_points(group: h5py.Group, rows: Rows) -> None:
     first = columns[0]
     scale = _growing(group, first.name, len(rows), (), CHUNK_ROWS, first.dtype)
     scale[...] = np.array([first.stored(row[first.name]) for row in table], first.dtype)
-    scale.attrs.update({"units": first.unit, "long_name": first.long_name})
+    scale.attrs.update(first.attributes)
     scale.make_scale(first.name)
     for column in columns:
         data = _growing(points, column.name, len(rows), (), CHUNK_ROWS, column.dtype)
         data[...] = np.array([column.stored(row[column.name]) for row in table], column.dtype)
-        data.attrs.update({"units": column.unit, "long_name": column.long_name})
+        data.attrs.update(column.attributes)
         if column is not first:
             name_dimensions(points, data, [first.name])
     # a column of the dimension's name is its coordinate, and a scale

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from ..post.calibration import FACTORS, LEAST_ERROR
+
 Row = Mapping[str, "float | int | str"]
 
 #: heading of the printed table -> how a row fills it
@@ -21,16 +23,15 @@ PRINTED = {
     "error of zeta": "{zeta_error:.1e}",
     "error of omega": "{omega_error:.1e}",
     "estimated": "{zeta_error_estimate:.1e}",
-    "within 3": "{within_3:.0%}",
-    "within 10": "{within_10:.0%}",
+    **{f"within {factor}": f"{{within_{factor}:.0%}}" for factor in FACTORS},
 }
 
 LEGEND = (
     "Errors are against the finest run (marked): of peak zeta relative; of zeta the largest over the amplitudes that "
     "all runs meet exactly once, divided by the peak; of omega the largest relative one over the same. Estimated is "
-    "the error of zeta by what the sweep changes, of the finest run by all, as the run itself says; within 3 and 10: "
-    "the share of the amplitudes at which the estimated error of lambda is within that factor of the error, where "
-    "this is above 1e-8 1/s."
+    "the error of zeta by what the sweep changes, of the finest run by all, as the run itself says; within "
+    f"{' and '.join(map(str, FACTORS))}: the share of the amplitudes at which the estimated error of lambda is within "
+    f"that factor of the error, where this is above {f'{LEAST_ERROR:.0e}'.replace('e-0', 'e-')} 1/s."
 )
 
 

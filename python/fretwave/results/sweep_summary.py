@@ -17,6 +17,7 @@ from ..post.limit_cycles import limit_cycles
 from ..post.mode_curve import ModeCurve
 from ..post.slip_threshold import slip_threshold
 from ..registry import kind_named
+from .file import unit_of_amplitudes
 
 if TYPE_CHECKING:
     import h5py
@@ -180,8 +181,7 @@ def read_landmarks(name: str, group: h5py.Group) -> list[str]:
         row = {key: float(values.reshape(len(plan), -1)[number, k]) for key, values in data.items()}
         if not math.isnan(row["points"]):
             rows.append({"value": number, **part, **row})
-    unit = str(group["points/amplitude"].attrs["units"]) if "points/amplitude" in group else "m"
-    return landmarks(name, plan, rows, of, unit)
+    return landmarks(name, plan, rows, of, unit_of_amplitudes(group))
 
 
 def _part(row: Row, of: Summary) -> str:

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..columns import COLUMNS, Column
+from ..columns import Column, table_order
 from ..files.csv_table import plain, write_columns, write_rows
 from ..files.dimensions import name_dimensions
 from ..post.grid import Plan
@@ -78,8 +78,7 @@ def read_branch(folder: Path, name: str, number: int, run_id: str) -> Branch | N
         group = file[name]
         table = {key: data[()] for key, data in group["points"].items()}
         units = {key: (data.attrs["units"], data.attrs["long_name"]) for key, data in group["points"].items()}
-        order = [key for key in COLUMNS if key in table] + [key for key in table if key not in COLUMNS]
-        ordered = {key: table[key] for key in order}
+        ordered = {key: table[key] for key in table_order(table)}
         return Branch(number, folder, ordered, units, dict(group.attrs), _start_forces(group, table))
 
 
@@ -198,7 +197,7 @@ def _shared(branches: Sequence[Branch]) -> dict[str, Any]:
 def _write_points(group: h5py.Group, points: Sequence[tuple[Column, Any]]) -> None:
     for column, values in points:
         data = group.create_dataset(column.name, data=values)
-        data.attrs.update({"units": column.unit, "long_name": column.long_name})
+        data.attrs.update(column.attributes)
         name_dimensions(group.parent, data, ["row"])
 
 

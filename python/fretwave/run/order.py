@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -37,6 +37,12 @@ class RunOptions:
     def of(cls, told: argparse.Namespace) -> RunOptions:
         """From the command line."""
         return cls(told.out, told.overrides, told.only, told.quick, not told.no_plots, told.petsc)
+
+    @classmethod
+    def of_record(cls, folder: Path, record: Mapping[str, Any], plots: bool) -> RunOptions:
+        """From run.json, to go on with a run."""
+        given = record["case"]
+        return cls(folder, given["overrides"], given["only"], given["quick"], plots, given["petsc"])
 
     def given(self, path: Path, case: Case) -> dict[str, Any]:
         """How the case was given, for run.json."""

@@ -13,7 +13,7 @@ from ..case import checks
 from ..case.analysis import AnalysisSection
 from ..case.build import build_model
 from ..case.harmonic import nodal_diameter, with_flow_forces
-from ..case.kept import belongs, described, reload_case
+from ..case.kept import described, has_analysis, reload_case
 from ..case.load import Case, load_case
 from ..case.plugins import load_recorded
 from ..case.reduce import reduce_case
@@ -28,7 +28,7 @@ from ..results.journal import Journal
 from ..results.reader import write_curve
 from ..results.results import has_results, open_results
 from ..results.runfolder import RECORD, RunFolder, new_record, peak_memory_mb, read_record
-from ..texts import display
+from ..texts import counted, display
 from .order import RunOptions, in_order
 from .stopped import joined, not_converged
 
@@ -65,8 +65,7 @@ def resume_run(folder: Path, comm: MPI.Comm, plots: bool = True) -> int:
     from .. import _core  # noqa: F401
 
     case, record = on_first_rank(comm, lambda: reload_case(folder))
-    given = record["case"]
-    options = RunOptions(folder, given["overrides"], given["only"], given["quick"], plots, given["petsc"])
+    options = RunOptions.of_record(folder, record, plots)
     record["ranks"], record["status"] = comm.size, "running"
     return Runner(case, options, folder, record, comm, resuming=True).run()
 
@@ -140,7 +139,7 @@ class Runner:
         return EXIT_DONE
 
     def _greet(self, names: Sequence[str]) -> None:
-        ranks = f"{self.comm.size} rank{'s' * (self.comm.size > 1)}"
+        ranks = counted(self.comm.size, "rank")
         verb = "resumed" if self.resuming else "run"
         title = f": {self.case.title}" if self.case.title else ""
         self.console.line(f"{self.case.name}{title}")
@@ -198,10 +197,7 @@ class Runner:
                     )
 
     def _kept(self, name: str) -> bool:
-        if not has_results(self.folder.path):
-            return False
-        with open_results(self.folder.path / "results.h5") as file:
-            return name in file and belongs(file[name], self.case, name)
+        return has_analysis(self.folder.path, self.case, name)
 
     def _is_done(self, name: str) -> bool:
         def look() -> str | None:
@@ -323,5 +319,5 @@ def plot(folder: Path, console: Console, only: Sequence[str] | None = None) -> i
     files = plot_run(folder, only, failed)
     for line in failed:
         console.line(line)
-    console.line(f"{len(files)} picture{'s' * (len(files) != 1)} in {display(folder)}")
+    console.line(f"{counted(len(files), 'picture')} in {display(folder)}")
     return len(files)

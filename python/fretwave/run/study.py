@@ -22,16 +22,14 @@ from ..case.harmonic import nodal_diameter
 from ..case.load import Case, load_case
 from ..case.reduce import reduce_case
 from ..case.wheel import on_wheel, solver_room
+from ..columns import SOURCES
 from ..console import Console
 from ..errors import EXIT_DONE, InputError, NotConverged
-from ..files.csv_table import write_rows
-from ..files.whole import replace_text
-from ..hb.states import SOURCES
 from ..mpi.guard import on_first_rank
 from ..mpi.petsc_options import AnalysisOptions
 from ..results.runfolder import read_copy
 from ..results.study_report import markdown
-from .study_folder import StudyFolder
+from .study_folder import StudyFolder, publish
 from .study_plan import Outcome, Plan, Settings, Study, common_amplitudes
 
 if TYPE_CHECKING:
@@ -87,9 +85,10 @@ def _study_mode(
         lambda settings: folder.solved(numbers[settings], Outcome, lambda: solver.solve(settings)),
         lambda sweep, settings: console.line(_progress(study, sweep, settings)),
     )
-    if not study.table():
+    tables = {"study": study.table(), "calibration": study.calibration()}
+    if not tables["study"]:
         raise _no_reference(study)
-    folder.finish(lambda path: _write(study, path, console))
+    folder.finish(lambda path: publish(path, tables, markdown(tables["study"], _notes(study)), console))
     return EXIT_DONE
 
 
@@ -187,20 +186,6 @@ def _outcome(rows: list[dict[str, Any]], newton: int, wall: float) -> Outcome:
         np.array([row[key] for row in reported]) for key in ("amplitude", "omega", "zeta", "estimate")
     )
     return Outcome(amplitude, omega, zeta, estimate, top["zeta"], top["amplitude"], len(rows), newton, wall)
-
-
-def _write(study: Study, folder: Path, console: Console) -> None:
-    from ..plots import plot_run
-
-    rows, notes = study.table(), _notes(study)
-    write_rows(folder / "study.csv", rows)
-    write_rows(folder / "calibration.csv", study.calibration())
-    replace_text(folder / "study.md", markdown(rows, notes))
-    pictures = plot_run(folder, ["study", "calibration"])
-    for line in markdown(rows, notes).splitlines():
-        console.line(line)
-    written = [*(folder / name for name in ("study.csv", "study.md", "calibration.csv")), *pictures]
-    console.line(f"written: {', '.join(str(path) for path in written)}")
 
 
 def _notes(study: Study) -> list[str]:

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from ..case.load import Case, changed_keys
+from ..console import Console
 from ..errors import InputError
+from ..files.csv_table import write_rows
+from ..files.whole import replace_text
 from ..mpi.groups import Kept
 from ..mpi.guard import on_first_rank
 from ..mpi.interrupt import say_how_to_go_on
@@ -98,6 +101,26 @@ class StudyFolder:
             self._folder.close()
 
         on_first_rank(self.comm, work)
+
+
+def publish(folder: Path, tables: Mapping[str, Sequence[Mapping[str, Any]]], text: str, console: Console) -> None:
+    """Write a study's tables, ``study.csv`` the first, its text and its pictures, and say what there is. One rank only.
+
+    Parameters
+    ----------
+    tables : rows by the table's name; pictures are those of the same names
+    text : Markdown
+    """
+    from ..plots import plot_run
+
+    for name, rows in tables.items():
+        write_rows(folder / f"{name}.csv", rows)
+    replace_text(folder / "study.md", text)
+    pictures = plot_run(folder, list(tables))
+    for line in text.splitlines():
+        console.line(line)
+    first, *others = (folder / f"{name}.csv" for name in tables)
+    console.line(f"written: {', '.join(str(path) for path in (first, folder / 'study.md', *others, *pictures))}")
 
 
 def _check_unchanged(path: Path, case: Case, record: dict[str, Any]) -> None:

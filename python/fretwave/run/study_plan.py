@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from ..arrays import Array
-from ..hb.states import SOURCES
+from ..arrays import Array, Complex, Indices
+from ..columns import SOURCES
+from ..post.calibration import FACTORS, share_within
 
 #: a reported point belongs to an amplitude when it is this near; a loose Newton tolerance lets it miss by about itself
 MATCH = 1e-2
-#: of lambda [1/s]: below it a difference of two runs is what their solvers leave
-LEAST_ERROR = 1e-8
 #: What a sweep's runs differ by from the finest
 SOURCE_OF = {"harmonics": "harmonics", "samples": "samples", "tolerance": "solver"}
 
@@ -135,8 +133,10 @@ class Study:
         run = self.outcomes[settings]
         omega, zeta, estimate = _values(run, self.compared)
         omega_true, zeta_true, _ = _values(reference, self.compared)
-        of_all = settings == self.plan.reference or sweep not in SOURCE_OF
-        guessed = estimate.sum(axis=1) if of_all else estimate[:, SOURCES.index(SOURCE_OF[sweep])]
+        source = self._source(sweep, settings)
+        guessed = estimate.sum(axis=1) if source is None else estimate[:, source]
+        ratios = self._ratios(sweep, settings, reference)
+        known, true = (np.array([row[name] for row in ratios]) for name in ("estimate", "error"))
         return {
             "sweep": sweep,
             "harmonics": settings.harmonics,
@@ -151,7 +151,7 @@ class Study:
             "peak_amplitude": run.peak_amplitude,
             "peak_zeta_error": abs(run.peak_zeta / reference.peak_zeta - 1.0),
             "zeta_error_estimate": _largest(guessed / omega_true) / abs(reference.peak_zeta),
-            **_shares(self._ratios(sweep, settings, reference)),
+            **{f"within_{factor}": share_within(known, true, factor) for factor in FACTORS},
             "component_modes": -1 if settings.component_modes is None else settings.component_modes,
             "reference": int(settings == self.plan.reference),
         }
@@ -168,29 +168,26 @@ class Study:
         return [row for sweep, settings in known for row in self._ratios(sweep, settings, reference)]
 
     def _ratios(self, sweep: str, settings: Settings, reference: Outcome) -> list[dict[str, Any]]:
-        if sweep not in SOURCE_OF or settings == self.plan.reference:
+        source = self._source(sweep, settings)
+        if source is None:
             return []
         omega, zeta, estimate = _values(self.outcomes[settings], self.compared)
         omega_true, zeta_true, _ = _values(reference, self.compared)
         error = np.abs(_eigenvalue(omega, zeta) - _eigenvalue(omega_true, zeta_true))
         own = {"sweep": sweep, "harmonics": settings.harmonics, "samples": settings.samples}
         own["tolerance"] = settings.tolerance
-        guessed = estimate[:, SOURCES.index(SOURCE_OF[sweep])]
-        return [{**own, "amplitude": a, "error": e, "estimate": g} for a, e, g in zip(self.compared, error, guessed)]
+        found = zip(self.compared, error, estimate[:, source])
+        return [{**own, "amplitude": a, "error": e, "estimate": guessed} for a, e, guessed in found]
+
+    def _source(self, sweep: str, settings: Settings) -> int | None:
+        """Column of `Outcome.estimate` that is of what a run differs by from the finest; None where none is."""
+        differs = settings != self.plan.reference and sweep in SOURCE_OF
+        return SOURCES.index(SOURCE_OF[sweep]) if differs else None
 
 
-def _eigenvalue(omega: Array, zeta: Array) -> npt.NDArray[np.complex128]:
+def _eigenvalue(omega: Array, zeta: Array) -> Complex:
     """lambda = -beta + i omega [1/s] of damped frequencies."""
     return np.asarray(omega * (1j - zeta / np.sqrt(1 - zeta**2)))
-
-
-def _shares(rows: Sequence[Mapping[str, Any]]) -> dict[str, float]:
-    """Shares of the points at which an estimate is within a factor of the error, where that can be told."""
-    ratio = np.array([row["estimate"] / row["error"] for row in rows if row["error"] > LEAST_ERROR])
-    return {
-        f"within_{factor}": float(np.mean((ratio <= factor) & (ratio >= 1 / factor))) if len(ratio) else np.nan
-        for factor in (3, 10)
-    }
 
 
 def common_amplitudes(first: float, last: float, count: int) -> Array:
@@ -198,7 +195,7 @@ def common_amplitudes(first: float, last: float, count: int) -> Array:
     return np.geomspace(first, last, count + 2)[1:-1]
 
 
-def _at(run: Outcome, amplitude: float) -> npt.NDArray[np.intp]:
+def _at(run: Outcome, amplitude: float) -> Indices:
     return np.flatnonzero(np.abs(run.amplitude / amplitude - 1.0) < MATCH)
 
 

@@ -24,7 +24,7 @@ from ..mpi.guard import on_first_rank
 from ..post.grid import Plan
 from ..results.runfolder import RECORD, new_record, read_record
 from ..results.sweeps import Branch, read_branch
-from ..texts import display
+from ..texts import counted, display
 from .order import RunOptions, in_order
 
 if TYPE_CHECKING:
@@ -160,7 +160,7 @@ class Sweep:
         for same, problem in kept.items():
             count = len(numbers[same])
             if same[2] is None and count > 1:
-                problem.measured = f"{problem.measured}, and with {count - 1} more value{'s' * (count > 2)}"
+                problem.measured = f"{problem.measured}, and with {counted(count - 1, 'more value')}"
             elif same[2] is not None and count < len(self.plan):
                 problem.what = f"with {labels[numbers[same][0]]}: {problem.what}"
         return list(kept.values())
@@ -196,7 +196,7 @@ class Sweep:
         except NotConverged as stopped:
             error = stopped
         word = "done" if error is None else f"stopped: {error.measured}"
-        seconds, ranks = time.perf_counter() - began, f"{group.size} rank{'s' * (group.size > 1)}"
+        seconds, ranks = time.perf_counter() - began, counted(group.size, "rank")
         say(group, f"{label}: {word} ({seconds:.1f} s, {ranks})")
         return error
 

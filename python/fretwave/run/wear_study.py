@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from ..analyses.mode import ModeAnalysis
 from ..analyses.parts.branch import mode_problem
@@ -19,18 +18,17 @@ from ..analyses.parts.rest import retained, start_mode
 from ..analyses.parts.wear_line import wear_areas
 from ..analyses.parts.wear_start import unworn_starts
 from ..analyses.wear import WearAnalysis
+from ..arrays import Array
 from ..case.build import build_model
 from ..case.harmonic import nodal_diameter
 from ..case.load import Case
 from ..case.reduce import reduce_case
 from ..console import Console
 from ..errors import EXIT_DONE, FretwaveError, NotConverged
-from ..files.csv_table import write_rows
-from ..files.whole import replace_text
 from ..mpi.guard import caught_by_all
 from ..mpi.petsc_options import AnalysisOptions
 from ..results.study_report import LEGEND_OF_WEAR, PRINTED_OF_WEAR, markdown
-from .study_folder import StudyFolder
+from .study_folder import StudyFolder, publish
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -237,7 +235,7 @@ class _Solver:
             return _follow(march, problem, np.concatenate(list(areas.values())))
 
 
-def _follow(march: Wear, problem: NonlinearMode, areas: npt.NDArray[np.float64]) -> WearOutcome | str:
+def _follow(march: Wear, problem: NonlinearMode, areas: Array) -> WearOutcome | str:
     """The end of a march; where wear has stopped before the last cycle, the values stay."""
     began = time.perf_counter()
     newton = [point.newton for point in march]
@@ -251,18 +249,10 @@ def _follow(march: Wear, problem: NonlinearMode, areas: npt.NDArray[np.float64])
 
 
 def _write(plan: WearPlan, amplitude: float, analysis: WearAnalysis, folder: Path, console: Console) -> None:
-    from ..plots import plot_run
-
     rows = plan.table()
     notes = [f"{analysis.name}, a = {amplitude:g} m, {analysis.stepper}, after {analysis.cycles:g} cycles."]
     notes += [f"No whole march with {_text(settings)}: {reason}." for settings, reason in plan.failures.items()]
-    text = markdown(rows, notes, PRINTED_OF_WEAR, LEGEND_OF_WEAR)
-    write_rows(folder / "study.csv", rows)
-    replace_text(folder / "study.md", text)
-    pictures = plot_run(folder, ["study"])
-    for line in text.splitlines():
-        console.line(line)
-    console.line(f"written: {', '.join(str(path) for path in (folder / 'study.csv', folder / 'study.md', *pictures))}")
+    publish(folder, {"study": rows}, markdown(rows, notes, PRINTED_OF_WEAR, LEGEND_OF_WEAR), console)
 
 
 def _progress(settings: WearSettings, found: WearOutcome | str) -> str:

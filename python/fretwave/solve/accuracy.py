@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from math import isfinite, log
 
+from ..columns import SOURCES
 from ..hb.problems import Harmonics
-from ..hb.states import SOURCES
 
 #: Shares of the accuracy: what a new set aims at, and above which a smaller one is not tried.
 AIM, LOW = 0.6, 0.5

@@ -100,7 +100,7 @@ class Continuation:
             problem.core, problem.prefix, low, high, (steps or StepControl()).core(), list(report_at)
         )
         if upwards is None:
-            start = self._parameter(y0)
+            start = problem.parameter(y0)
             upwards = bool(start < 0.5 * (low + high))
         self._upwards, self._begun, self._advice = upwards, False, ""
         self.repeated: Point | None = None
@@ -113,9 +113,6 @@ class Continuation:
         if self._core is None:
             return "Continuation(destroyed)"
         return f"Continuation({self._low:g} to {self._high:g}: {self.reason or 'under way'}, of {self.problem})"
-
-    def _parameter(self, y: PETSc.Vec) -> float:
-        return float(self.problem.core.parameter_value(self.problem.last_entry(y)))
 
     def last_entry(self, y: PETSc.Vec) -> float:
         """The parameter's entry of unknowns or a tangent, on every rank. Collective."""

@@ -10,8 +10,9 @@ from petsc4py import PETSc
 
 from ..columns import FORCED, MODE, columns_named, over, with_discretisation
 from ..errors import InputError
-from ..hb.observe import Observer
-from ..hb.problems import HarmonicProblem, Observed, unit_of
+from ..hb.observed import Observed, unit_of
+from ..hb.observer import Observer
+from ..hb.problems import HarmonicProblem
 from .branch import Branch
 from .continuation import Continuation, Point
 from .refining import RefiningContinuation
@@ -95,7 +96,7 @@ def follow(
         raise InputError("the problem has no branch with a table", None, given, "NonlinearMode or ForcedResponse", fix)
     own = isinstance(start, PETSc.Vec)
     y0: PETSc.Vec = start if own else problem.initial(float(start))
-    first = problem.core.parameter_value(problem.last_entry(y0)) if own else float(start)
+    first = problem.parameter(y0) if own else float(start)
     low, high, upwards = _range(first, stop)
     settings: dict[str, Any] = {"stop": (low, high), "steps": steps, "report_at": report_at, "upwards": upwards}
     if accuracy is None:

@@ -90,7 +90,7 @@ def _closed(
 
 def mode_start(problem: NonlinearMode, y0: PETSc.Vec) -> _core.ModeStart:
     """The way with closing gaps at the amplitude of y0. Collective."""
-    method, amplitude = getattr(_core.Method, problem.method), _parameter(problem, y0)
+    method, amplitude = getattr(_core.Method, problem.method), problem.parameter(y0)
     re, im = (problem.model.vector(part) for part in (problem.start.shape, problem.start.imaginary))
     model, harmonics = problem.model.core, problem.harmonics.core
     way = _core.ModeStart(model, harmonics, method, problem.row, problem.start.omega, re, im, amplitude)
@@ -117,15 +117,11 @@ def _led(
     branch.destroy()
 
 
-def _parameter(problem: HarmonicProblem, y: PETSc.Vec) -> float:
-    return float(problem.core.parameter_value(problem.last_entry(y)))
-
-
 def _grown(
     follow: Follow, problem: NonlinearMode, y0: PETSc.Vec, reasons: list[str], far: bool
 ) -> Iterator[tuple[str, PETSc.Vec]]:
     """The mode grows from an amplitude at which the linear one solves it."""
-    amplitude = _parameter(problem, y0)
+    amplitude = problem.parameter(y0)
     for power in range(1, SMALLER + 1):
         small = amplitude / 100**power
         control = StepControl(maximum=1.0, max_points=WAY_POINTS)

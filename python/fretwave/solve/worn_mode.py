@@ -13,6 +13,7 @@ from ..arrays import Array
 from ..errors import InputError
 from ..hb.problems import HarmonicProblem
 from ..model.laws import Role, law_like
+from ..mpi.destroyable import Destroyable
 from .continuation import Continuation
 from .steppers import StageFailed
 from .steps import StepControl
@@ -48,7 +49,7 @@ class WornState:
     residual: float = 0.0
 
 
-class WornMode:
+class WornMode(Destroyable):
     """A mode at fixed amplitude as a function of worn depths. Collective, as all methods.
 
     Parameters
@@ -174,7 +175,7 @@ class WornMode:
             None of the detours comes back to the amplitude.
         """
         self.wear(depth)
-        target = float(self.problem.core.parameter_value(self.log_amplitude(guess)))
+        target = self.problem.parameter(guess)
         for change in DETOURS:
             y = guess.copy()
             self._set_last(y, self.log_amplitude(guess) + change)
@@ -205,9 +206,7 @@ class WornMode:
 
     def log_amplitude(self, y: PETSc.Vec) -> float:
         """The parameter's entry, on every rank."""
-        comm = self.model.comm
-        local = y.getArray(readonly=True)
-        return float(comm.bcast(local[-1] if comm.rank == comm.size - 1 else None, root=comm.size - 1))
+        return self.problem.last_entry(y)
 
     def gap_product(self, y: PETSc.Vec, change: Array) -> PETSc.Vec:
         """dr/dw times a change of the depths (n_pairs,) at the present depths: worn depth is gap."""
@@ -234,9 +233,3 @@ class WornMode:
         self.wear(np.zeros(len(self.areas)))
         self._newton = None  # type: ignore[assignment]
         self._row.destroy()
-
-    def __enter__(self) -> WornMode:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.destroy()

@@ -18,6 +18,7 @@ from ..errors import InputError
 from ..files.dimensions import names_of_data
 from ..model.laws import kept_laws
 from ..post.contact_history import ContactHistory
+from ..results.file import unit_of_amplitudes
 from ..texts import display, nearest
 
 if TYPE_CHECKING:
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
 SHOWN = ("point", "amplitude", "cycles", "frequency_hz", "zeta", "level", "stick", "slip", "open")
 #: Points named in a message.
 NAMED = 12
+#: The largest displacement or depth as drawn, as a share of what is shown, where no scale is given.
+DRAWN = 0.1
 
 
 @dataclass(frozen=True)
@@ -71,6 +74,11 @@ class ViewOptions:
         if factor is not None and not np.isfinite(factor):
             raise InputError("the scale is no number", "--scale", scale, "auto or a number", "--scale auto")
         return cls(scale=factor, phases=phases, **others)
+
+
+def natural_scale(size: float, largest: float) -> float:
+    """Factor that draws the largest displacement as a share of the size of what is shown [m]."""
+    return float(f"{DRAWN * size / largest:.2g}") if largest > 0 and size > 0 else 1.0
 
 
 @dataclass(frozen=True)
@@ -202,7 +210,7 @@ def read_choice(file: h5py.File, folder: Path, case: Case, options: ViewOptions)
         diameters=_diameters(group, case, name, rows),
         wheel=case.neighbours is not None and section is not None and section.wheel,
         sample_count=count,
-        unit=_unit(group),
+        unit=unit_of_amplitudes(group),
     )
 
 
@@ -237,11 +245,6 @@ def _held(group: h5py.Group) -> Indices:
     return np.asarray(group["reported"][()] if with_contacts else np.arange(len(group["coefficients"])), dtype=np.intp)
 
 
-def _unit(group: h5py.Group) -> str:
-    """Of the amplitude."""
-    return str(group["points/amplitude"].attrs.get("units", "m"))
-
-
 def _points(group: h5py.Group, kept: Indices, options: ViewOptions, where: str) -> list[tuple[int, str]]:
     """Numbers of points, each with a word on what was asked for; without a wish that of the largest amplitude.
 
@@ -249,7 +252,7 @@ def _points(group: h5py.Group, kept: Indices, options: ViewOptions, where: str) 
     ----------
     kept : points that an amplitude may choose
     """
-    amplitude, unit = group["points/amplitude"][()], _unit(group)
+    amplitude, unit = group["points/amplitude"][()], unit_of_amplitudes(group)
     for point in options.points:
         if not 0 <= point < len(amplitude):
             near = kept[np.argmin(np.abs(kept - point))]

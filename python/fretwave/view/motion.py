@@ -26,15 +26,13 @@ from ..model.sectors import Parts, rotation
 from ..model.structure import Structure
 from ..results.basis_file import NAME, marks_of, read_basis
 from ..texts import display
-from .choice import Choice
+from .choice import Choice, natural_scale
 from .vtkhdf import HEXAHEDRON, QUADRATIC_HEXAHEDRON, TRIQUADRATIC_HEXAHEDRON, VERTEX, linear_cells
 
 #: Displacements (n_nodes, 3, n) of all nodes from columns (n_dof, n) on the model's dofs, both faces of a sector free.
 ToNodes = Callable[[Array], Array]
 Expand = Callable[[npt.ArrayLike], Array]
 
-#: Largest displacement as drawn, as a share of the model's size, where no scale is given.
-DRAWN = 0.1
 #: Relative difference of a frequency that rounding explains.
 SAME = 1e-6
 
@@ -110,7 +108,7 @@ class Scene:
         size = float(np.linalg.norm(np.ptp(corners, axis=0)))
         different = self.sectors if self.choice.wheel else self.sectors[:1]  # in a wave all sectors move alike
         largest = max(self.shape(sector).largest() for sector in different)
-        return float(f"{DRAWN * size / largest:.2g}") if largest > 0 and size > 0 else 1.0
+        return natural_scale(size, largest)
 
     @cached_property
     def _first(self) -> Array:
@@ -232,7 +230,7 @@ def made_again(case: Case, stack: ExitStack) -> Expansion:
         ) from None
     reduction = reduction_of(case, MPI.COMM_SELF)
     stack.callback(reduction.destroy)
-    hz = float(reduction.component_hz[-1:].sum())
+    hz = reduction.highest_component_hz
     if isinstance(reduction, SectorReduction):
         return MadeAgain(reduction, reduction.size, reduction.n_interface, hz, reduction.sector().ties)
     return MadeAgain(reduction, reduction.size, 0, hz, {})

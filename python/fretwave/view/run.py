@@ -18,9 +18,9 @@ from ..arrays import Array, Indices
 from ..case.kept import reload_case
 from ..case.load import Case
 from ..errors import InputError
-from ..model.laws import learn_laws
+from ..model.laws import STATUS, learn_laws
 from ..model.pairs import Pairs
-from ..post.contact_history import OPEN, SLIP, STICK, ContactHistory
+from ..post.contact_history import ContactHistory
 from ..post.motion import complex_amplitudes
 from ..results.results import has_results, open_results
 from ..texts import display
@@ -30,7 +30,6 @@ from .vtkhdf import VERTEX, GridFile
 
 #: Highest harmonic shown as fields of its own.
 SHOWN_HARMONICS = 3
-STATUS = {"stick": STICK, "slip": SLIP, "open": OPEN}
 
 
 def view_run(folder: Path, options: ViewOptions, say: Callable[[str], None] = print) -> list[Path]:

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from ..arrays import AnyArray, Array, IntArray
 from ..errors import InputError
 from ..texts import display
 
@@ -46,7 +47,7 @@ class GridFile:
         What ParaView calls time.
     """
 
-    def __init__(self, path: Path, values: Sequence[float] | npt.NDArray[np.float64]) -> None:
+    def __init__(self, path: Path, values: Sequence[float] | Array) -> None:
         self.path, self.steps = path, len(values)
         self._unfinished = path.with_name(f".{path.name}.new")
         self._file = _create(self._unfinished)
@@ -63,7 +64,7 @@ class GridFile:
         self._missing: dict[str, int] = {}
         self._steps(np.asarray(values, dtype=float))
 
-    def _steps(self, values: npt.NDArray[np.float64]) -> None:
+    def _steps(self, values: Array) -> None:
         steps = self._root.create_group("Steps")
         steps.attrs["NSteps"] = np.int64(self.steps)
         steps["Values"] = values
@@ -103,7 +104,7 @@ class GridFile:
             _append(self._root[name], values)
 
     def point_field(
-        self, name: str, pieces: Iterable[npt.NDArray[Any]], of_step: npt.ArrayLike | None = None, dtype: str = "f8"
+        self, name: str, pieces: Iterable[AnyArray], of_step: npt.ArrayLike | None = None, dtype: str = "f8"
     ) -> None:
         """A field on the points.
 
@@ -121,14 +122,13 @@ class GridFile:
                 data = self._table(self._root["PointData"], name, columns, dtype, self.n_points)
             _append(data, piece)
             rows += len(piece)
-        shown = np.zeros(self.steps, dtype="i8") if of_step is None else np.asarray(of_step, dtype="i8")
+        shown = self._shown(name, of_step)
         if len(shown) != self.steps or rows != self.n_points * (int(shown.max()) + 1):
             raise ValueError(f"field {name}: {rows} rows for {shown.max() + 1} states of {self.n_points} points")
-        self._root[f"Steps/PointDataOffsets/{name}"] = shown * self.n_points
 
     def field(
         self, name: str, columns: int = 0, of_step: npt.ArrayLike | None = None, dtype: str = "f8"
-    ) -> Callable[[int, int, npt.NDArray[Any]], None]:
+    ) -> Callable[[int, int, AnyArray], None]:
         """A field on the points that is written part by part, in any order, after all parts were added.
 
         Parameters
@@ -142,19 +142,24 @@ class GridFile:
         callable
             write(state, part, values): values (n,) or (n, columns) on the n points of a part.
         """
-        shown = np.zeros(self.steps, dtype="i8") if of_step is None else np.asarray(of_step, dtype="i8")
+        shown = self._shown(name, of_step)
         data = self._table(self._root["PointData"], name, columns, dtype, self.n_points)
         data.resize((int(shown.max()) + 1) * self.n_points, axis=0)
-        self._root[f"Steps/PointDataOffsets/{name}"] = shown * self.n_points
         begins = np.append(0, np.cumsum(self._root["NumberOfPoints"][()]))
         self._missing[name] = len(data)
 
-        def write(state: int, part: int, values: npt.NDArray[Any]) -> None:
+        def write(state: int, part: int, values: AnyArray) -> None:
             start = state * begins[-1] + begins[part]
             data[start : start + begins[part + 1] - begins[part]] = values
             self._missing[name] -= len(values)
 
         return write
+
+    def _shown(self, name: str, of_step: npt.ArrayLike | None) -> IntArray:
+        """State of a field that each step shows (n_steps,), told to the file once all parts are there."""
+        shown = np.zeros(self.steps, dtype="i8") if of_step is None else np.asarray(of_step, dtype="i8")
+        self._root[f"Steps/PointDataOffsets/{name}"] = shown * self.n_points
+        return shown
 
     def field_data(self, name: str, values: npt.ArrayLike) -> None:
         """A number for each step, beside the grid."""
@@ -185,7 +190,7 @@ class GridFile:
         return group.create_dataset(name, (0, *tail), dtype, maxshape=(None, *tail), chunks=(chunk, *tail))
 
 
-def linear_cells(triquadratic: npt.NDArray[Any], lattice: Sequence[tuple[int, int, int]]) -> npt.NDArray[np.int64]:
+def linear_cells(triquadratic: AnyArray, lattice: Sequence[tuple[int, int, int]]) -> IntArray:
     """Eight hexahedra (8 n, 8) on the nodes of each triquadratic one (n, 27).
 
     Parameters
@@ -198,7 +203,7 @@ def linear_cells(triquadratic: npt.NDArray[Any], lattice: Sequence[tuple[int, in
     return np.asarray(triquadratic, dtype="i8")[:, picked].reshape(-1, 8)
 
 
-def _append(data: h5py.Dataset, rows: npt.NDArray[Any]) -> None:
+def _append(data: h5py.Dataset, rows: AnyArray) -> None:
     start = len(data)
     data.resize(start + len(rows), axis=0)
     data[start:] = rows

@@ -20,7 +20,7 @@ from ..errors import InputError
 from ..model.pairs import Pairs
 from ..results.results import open_results
 from ..texts import display
-from .choice import ViewOptions
+from .choice import ViewOptions, natural_scale
 from .vtkhdf import TRIANGLE, VERTEX, GridFile
 
 #: Columns of the table that go with each step.
@@ -33,8 +33,6 @@ FIELDS = {
     "slip": "slip_share",
     "open": "open_share",
 }
-#: Largest depth as drawn, as a share of the extent of the pairs, where no scale is given.
-DRAWN = 0.1
 #: A triangle with a side longer than the median of the longest sides by this bridges a gap between pairs.
 BRIDGE = 3.0
 
@@ -153,4 +151,4 @@ def _triangles(positions: Array, pairs: Indices) -> Indices:
 def _natural_scale(points: Array, depth: Array) -> float:
     """Draws the largest depth as a tenth of the extent of the pairs."""
     size, largest = float(np.linalg.norm(np.ptp(points, axis=0))), float(depth.max(initial=0.0))
-    return float(f"{DRAWN * size / largest:.2g}") if largest > 0 and size > 0 else 1.0
+    return natural_scale(size, largest)

@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Optional, Union
 
 import numpy as np
-import numpy.typing as npt
 
+from ...arrays import Array, Complex
 from ...case.analysis import AnalysisSection
 from ...case.harmonic import HarmonicSection
 from ...case.observed import label_of
@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     from mpi4py import MPI
     from petsc4py import PETSc
 
-    from ...hb.problems import HarmonicProblem, Harmonics, NonlinearMode, Observed
+    from ...hb.observed import Observed
+    from ...hb.problems import HarmonicProblem, Harmonics, NonlinearMode
     from ...model.modes import LinearMode
     from ...model.rest import Rest
     from ...solve.continuation import Continuation, Point
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
 
     ModeLike = Union[ModeAnalysis, FlutterAnalysis]
     #: Further columns of a point, from problem, y and (on the writing rank) coefficients (n_dof, m).
-    Describe = Callable[[Any, PETSc.Vec, Optional[npt.NDArray[np.float64]]], Mapping[str, Any]]
+    Describe = Callable[[Any, PETSc.Vec, Optional[Array]], Mapping[str, Any]]
 
 #: Events at which the contact's motion over a period is kept.
 PLAIN_EVENTS = ("", "step")
@@ -54,7 +55,7 @@ def error_text(error: float) -> str:
     return f" +- {error:<7.1g}" if np.isfinite(error) else ""
 
 
-def largest_error(what: str, errors: npt.NDArray[np.float64], unit: str) -> str:
+def largest_error(what: str, errors: Array, unit: str) -> str:
     """The same of a branch."""
     known = errors[np.isfinite(errors)]
     return f" error of {what} up to {known.max():.2g} {unit}," if len(known) else ""
@@ -160,7 +161,7 @@ def mode_problem(
     mode: LinearMode,
     rest: Optional[Rest],
     dof: Optional[Observed] = None,
-    avoid: Optional[npt.NDArray[np.complex128]] = None,
+    avoid: Optional[Complex] = None,
 ) -> NonlinearMode:
     """The nonlinear mode of an analysis about its static state. Collective.
 

@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, Optional, TypeVar
 
 import numpy as np
-import numpy.typing as npt
 
+from ...arrays import Array
 from ...case.analysis import AnalysisSection
 from ...case.harmonic import nodal_diameter, with_flow_forces
-from ...case.kept import belongs
+from ...case.kept import belongs, has_analysis
 from ...case.load import Case
 from ...columns import Column, Value
 from ...console import Console
@@ -21,8 +21,8 @@ from ...errors import InputError
 from ...files.csv_table import write_columns
 from ...model.structure import Structure
 from ...mpi.guard import on_first_rank
-from ...results.results import AnalysisWriter, Field, has_results, open_results
-from ...texts import display
+from ...results.results import AnalysisWriter, Field, open_results
+from ...texts import counted, display
 
 if TYPE_CHECKING:
     import h5py
@@ -113,7 +113,7 @@ class AnalysisContext(Generic[Section]):
     afterwards: list[Callable[[], None]] = field(default_factory=list)
 
     def __repr__(self) -> str:
-        ranks = f"{self.comm.size} rank{'s' * (self.comm.size > 1)}"
+        ranks = counted(self.comm.size, "rank")
         return f"AnalysisContext('{self.name}' of {self.case.name}, on {ranks}, in {self.folder})"
 
     @property
@@ -204,12 +204,10 @@ class AnalysisContext(Generic[Section]):
         """
         return on_first_rank(self.comm, lambda: self._read(name, _columns))
 
-    def coefficients(
-        self, name: str, points: Optional[Sequence[int]] = None
-    ) -> tuple[list[str], npt.NDArray[np.float64]]:
+    def coefficients(self, name: str, points: Optional[Sequence[int]] = None) -> tuple[list[str], Array]:
         """Harmonic labels and coefficients (points, n_dof, m) of a finished analysis. Collective."""
 
-        def read(group: h5py.Group) -> tuple[list[str], npt.NDArray[np.float64]]:
+        def read(group: h5py.Group) -> tuple[list[str], Array]:
             labels = [text.decode() for text in group["harmonic"][()]]
             data = group["coefficients"]
             return labels, data[()] if points is None else np.stack([data[point] for point in points])
@@ -218,14 +216,7 @@ class AnalysisContext(Generic[Section]):
 
     def has_results(self, name: str) -> bool:
         """Whether an analysis has rows in the run folder that belong to this very case. Collective."""
-
-        def look() -> bool:
-            if not has_results(self.folder):
-                return False
-            with open_results(self.folder / "results.h5") as file:
-                return name in file and belongs(file[name], self.case, name)
-
-        return on_first_rank(self.comm, look)
+        return on_first_rank(self.comm, lambda: has_analysis(self.folder, self.case, name))
 
     def write_table(self, suffix: str, columns: Mapping[str, Any]) -> None:
         """A further table ``<name>_<suffix>.csv``, written as a whole by rank 0."""

@@ -10,8 +10,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Optional
 
 import numpy as np
-import numpy.typing as npt
 
+from ...arrays import Array, Complex
 from ...case.harmonic import nodal_diameter
 from ...case.observed import dof_of
 from ...cyclic.engine_order import speed_rpm
@@ -25,7 +25,8 @@ from .wheel_start import tuned_sector
 if TYPE_CHECKING:
     from petsc4py import PETSc
 
-    from ...hb.problems import ForcedResponse, HarmonicProblem, Harmonics, Observed
+    from ...hb.observed import Observed
+    from ...hb.problems import ForcedResponse, HarmonicProblem, Harmonics
     from ...model.modes import LinearMode
     from ...model.rest import Rest
     from ...solve.continuation import Continuation
@@ -55,7 +56,7 @@ class Excitation:
     def analysis(self) -> ForcedAnalysis:
         return self.context.analysis
 
-    def force(self) -> npt.NDArray[np.complex128]:
+    def force(self) -> Complex:
         """Amplitudes (n_dof,) [N] at level 1; on sector j of a wheel with the delay of the wave, e^{-i j theta}."""
         case = self.context.case
         force = np.zeros(len(case.dofs), dtype=complex)
@@ -100,9 +101,7 @@ class Excitation:
         names = ["speed_rpm"] if self.analysis.engine_order else []
         return names + (["largest_amplitude", "largest_sector"] if self.context.case.wheel else [])
 
-    def row(
-        self, problem: HarmonicProblem, y: PETSc.Vec, coefficients: Optional[npt.NDArray[np.float64]]
-    ) -> dict[str, Any]:
+    def row(self, problem: HarmonicProblem, y: PETSc.Vec, coefficients: Optional[Array]) -> dict[str, Any]:
         """Their values at a point; of the blades on the rank that has coefficients. Collective."""
         order = self.analysis.engine_order
         state = problem.state(y)

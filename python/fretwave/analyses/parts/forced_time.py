@@ -15,7 +15,7 @@ from .observed import dense
 from .whole import integrated_model
 
 if TYPE_CHECKING:
-    from ...hb.problems import Observed
+    from ...hb.observed import Observed
     from ...model.model import Model
     from ..forced import ForcedAnalysis
 

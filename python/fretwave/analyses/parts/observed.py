@@ -19,7 +19,7 @@ from .rest import stuck_or_free
 
 if TYPE_CHECKING:
     from ...case.load import Case
-    from ...hb.problems import Observed
+    from ...hb.observed import Observed
     from ...model.model import Model
     from ...model.modes import LinearMode
 
@@ -50,7 +50,7 @@ def row_on(case: Case, given: ObservedTable) -> Array:
 
 def dense(model: Model, observed: Observed) -> Union[int, Array]:
     """A dof's number, or weights (n_dof,). Collective."""
-    from ...hb.problems import row_of
+    from ...hb.observed import row_of
 
     return observed if isinstance(observed, int) else _spread(row_of(model, observed), model.n_dof)
 

@@ -17,6 +17,7 @@ from ...columns import COLUMNS, Column, Value
 from ...console import Console
 from ...mpi.gather import on_rank_0
 from ...results.results import AnalysisWriter, Field
+from ...texts import counted
 from .branch import finished_table, mode_problem, open_branch
 from .context import AnalysisContext
 from .rest import retained, start_mode
@@ -240,5 +241,5 @@ def _told(table: dict[str, Any]) -> str:
     jumps = sum("jump" in event.split() for event in table["event"])
     return (
         f"; zeta {zeta[0]:.4f} % when new, largest {zeta[top]:.4f} % at {table['cycles'][top]:.3g}, {zeta[-1]:.4f} %"
-        f" at the end" + (f"; {jumps} jump{'s' * (jumps > 1)} to another sheet of the mode" if jumps else "")
+        f" at the end" + (f"; {counted(jumps, 'jump')} to another sheet of the mode" if jumps else "")
     )

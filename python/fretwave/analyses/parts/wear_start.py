@@ -7,9 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...arrays import Array
 from ...errors import NotConverged
-from ...model.laws import Role
 from ...mpi.gather import on_all_ranks
 from .branch import mode_problem, points_of, step_control
 from .context import AnalysisContext
@@ -18,7 +16,6 @@ from .wear_line import wear_areas
 
 if TYPE_CHECKING:
     from ...solve.continuation import Point
-    from ...solve.worn_mode import WornMode
     from ..mode import ModeAnalysis
     from ..wear import WearAnalysis
 
@@ -42,8 +39,8 @@ def unworn_starts(context: AnalysisContext[ModeAnalysis], analysis: WearAnalysis
     with WornMode(problem, analysis.coefficient, areas) as mode, context.console.progress(context.name):
         for point in points_of(branch):
             if "cycle_unit" not in found:
-                found["cycle_unit"] = analysis.cycle_unit or normal_cycle(
-                    mode, mode.measure(point.y, np.zeros(len(mode.areas))).load
+                found["cycle_unit"] = analysis.cycle_unit or mode.normal_cycle(
+                    mode.measure(point.y, np.zeros(len(mode.areas))).load
                 )
             _take(context, analysis, point, found)
             if len(found) == 1 + 2 * len(analysis.amplitude):
@@ -68,26 +65,3 @@ def _take(context: AnalysisContext[ModeAnalysis], analysis: WearAnalysis, point:
         if math.isclose(point.parameter, amplitude, rel_tol=1e-9) and f"y_{number}" not in found:
             found[f"y_{number}"] = whole
             found[f"outcome_{number}"] = np.array([point.newton, point.linear, point.residual])
-
-
-def normal_cycle(mode: WornMode, load: Array) -> float:
-    """Vibration cycles in which sliding four stick limits mu N0/kt a cycle leaves 1/e of a normal load.
-
-    N' = -kn k_w/I N s with s = 4 mu N0/kt, in means over the loaded pairs; 1 where nothing can wear.
-    """
-    contacts = [mode.model.contacts[k] for k in mode.contacts]
-    loaded = load > 0
-
-    def values(role: Role) -> Array:
-        parts = [
-            np.broadcast_to(np.asarray(contact.value(role), dtype=float), (part.stop - part.start,))
-            for contact, part in zip(contacts, mode.slices)
-        ]
-        return np.asarray(np.concatenate(parts)[loaded])
-
-    if not loaded.any():
-        return 1.0
-    friction, stiffness = values(Role.FRICTION_COEFFICIENT), values(Role.TANGENTIAL_STIFFNESS)
-    slip = 4 * np.mean(friction * load[loaded] / stiffness)
-    rate = mode.coefficient * np.mean(mode.stiffness[loaded] / mode.areas[loaded]) * slip
-    return float(1 / rate) if rate > 0 else 1.0

@@ -21,7 +21,7 @@ from .observed import observed_by
 from .rest import rest_state, start_mode
 
 if TYPE_CHECKING:
-    from ...hb.problems import Observed
+    from ...hb.observed import Observed
     from ...model.modes import LinearMode
     from ...model.rest import Rest
     from ..mode import ModeAnalysis

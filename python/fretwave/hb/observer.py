@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Union
 
 import numpy as np
 from petsc4py import PETSc
 
-from ..columns import COLUMNS, Column
+from ..columns import COLUMNS, ENERGY, Column
 from ..errors import InputError
-from .problems import HarmonicProblem, Observed, row_of, unit_of
-
-#: The word for `mechanical_energy` among what is observed.
-ENERGY = "energy"
+from ..post.motion import complex_amplitudes
+from .observed import Observed, row_of, unit_of
+from .problems import HarmonicProblem
 
 
 class Observer:
@@ -38,8 +38,7 @@ class Observer:
 
     def __call__(self, y: PETSc.Vec, problem: HarmonicProblem) -> dict[str, float]:
         """By column: amplitude of the fundamental of each row [m], energy [J]."""
-        labels, local = problem.harmonics.labels, problem.local_coefficients(y)
-        q = local[:, labels.index("1c")] - 1j * local[:, labels.index("1s")]
+        q = complex_amplitudes(problem.harmonics.labels, problem.local_coefficients(y))[1]
         sums = np.array(
             [
                 sum((w * q[dof - self.first] for dof, w in row if self.first <= dof < self.end), 0j)
@@ -57,22 +56,22 @@ def mechanical_energy(problem: HarmonicProblem, y: PETSc.Vec) -> float:
     sum_n>0 (|s_n|^2 q_n^H M q_n + q_n^H K q_n) / 4 on the periodic motion. What contact stores and the mean
     displacement are left out. Of one sector where the model is one.
     """
-    labels, local = problem.harmonics.labels, problem.local_coefficients(y)
+    amplitudes = complex_amplitudes(problem.harmonics.labels, problem.local_coefficients(y))
     total = 0.0
     for n, s in zip(problem.harmonics.orders, problem.core.exponents(y)):
         if n:
-            q = local[:, labels.index(f"{n}c")] - 1j * local[:, labels.index(f"{n}s")]
+            q = amplitudes[n]
             total += abs(s) ** 2 * problem.model.form(2, q, n) / 4 + problem.model.form(0, q, n) / 4
     return total
 
 
 def _column(name: str, what: Union[Observed, str]) -> Column:
-    if name in COLUMNS and name != ENERGY:
+    if name in COLUMNS:
         raise InputError("a column of this name is there already", "observe", name, None, "choose another name")
     if not isinstance(what, str):
         return Column(name, unit_of(what), "fundamental amplitude of what is observed")
-    if what != ENERGY:
+    if what != ENERGY.name:
         raise InputError(
-            "this cannot be observed", f"observe '{name}'", what, f'a dof, row, mode or "{ENERGY}"', ENERGY
+            "this cannot be observed", f"observe '{name}'", what, f'a dof, row, mode or "{ENERGY.name}"', ENERGY.name
         )
-    return Column(name, "J", "mechanical energy of the vibration, mean over a period")
+    return replace(ENERGY, name=name)

@@ -1,0 +1,52 @@
+"""What an amplitude is of, normalised or observed: a dof, a row of displacements, a linear mode's coordinate."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Sequence
+from typing import Union, cast
+
+import numpy as np
+
+from ..arrays import Array
+from ..columns import MODAL_UNIT
+from ..errors import InputError
+from ..model.model import Model
+from ..model.modes import LinearMode
+
+#: What is normalised or observed: a dof's number, a row (n_dof,), or a linear mode's coordinate.
+Observed = Union[int, Sequence[float], Array, LinearMode]
+
+
+def row_of(model: Model, observed: Observed) -> list[tuple[int, float]]:
+    """Entries (dof, weight) of what is observed, on every rank. Collective.
+
+    Raises
+    ------
+    InputError
+        The row does not fit the model.
+    """
+    if isinstance(observed, LinearMode):
+        if np.any(observed.imaginary):
+            fix = "take a real mode, or a dof"
+            raise InputError("a complex mode has no one coordinate", None, repr(observed), "a standing wave", fix)
+        return row_of(model, model.inertia(observed.shape))
+    if np.ndim(observed) == 0:
+        return [(operator.index(cast(int, observed)), 1.0)]
+    row = np.asarray(observed, dtype=float)
+    if row.shape != (model.n_dof,) or not np.isfinite(row).all():
+        fix = "give one weight a dof"
+        raise InputError("the row does not fit the model", None, row.shape, f"({model.n_dof},), finite", fix)
+    return [(int(k), float(row[k])) for k in np.flatnonzero(row)]
+
+
+def unit_of(observed: Observed) -> str:
+    """Of the amplitude of what is observed."""
+    return MODAL_UNIT if isinstance(observed, LinearMode) else "m"
+
+
+def named(observed: Observed) -> str:
+    """As a problem's text has it."""
+    if isinstance(observed, LinearMode):
+        return f"the coordinate of {observed.frequency_hz:.6g} Hz"
+    return f"dof {observed!r}" if np.ndim(observed) == 0 else "a row"
