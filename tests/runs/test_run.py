@@ -7,10 +7,10 @@ import json
 import sys
 from pathlib import Path
 
-from tolerances import SOLVED
 import h5py
 import numpy as np
 import pytest
+from tolerances import SOLVED
 
 from fretwave.case.load import load_case
 from fretwave.commands.main import main

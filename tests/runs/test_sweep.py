@@ -10,12 +10,12 @@ import sys
 import time
 from pathlib import Path
 
-from tolerances import SOLVED
 import h5py
 import numpy as np
 import pytest
 from conftest import own_environment
 from models.swept_case import CASE, LIMITS, MEMORYLESS, OVER, fretwave
+from tolerances import SOLVED
 
 from fretwave.case.load import load_case
 from fretwave.files.dimensions import names_of_data

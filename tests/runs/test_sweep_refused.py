@@ -75,7 +75,10 @@ def test_plans() -> None:
     assert plan.overrides()[4] == ["a.b=2", 'c="x"', 'd="y"']
     assert plan.labels()[4] == 'b = 2, c = "x", d = "y"'
     assert Plan({"a.b": [1], "c.b": [2]}).labels() == ["a.b = 1, c.b = 2"]
-    assert SweepAnalysis(name="s", type="sweep", of="m", over={"a.b": [1], "c": {"d": [2]}}).plan().keys == ["a.b", "c.d"]
+    assert SweepAnalysis(name="s", type="sweep", of="m", over={"a.b": [1], "c": {"d": [2]}}).plan().keys == [
+        "a.b",
+        "c.d",
+    ]
     assert len(Plan({"a": [1, 2, 3], "b": [True, False]})) == 6
 
 

@@ -8,13 +8,13 @@ from types import SimpleNamespace
 
 import pytest
 from command_line import call
-from mpi4py import MPI
 from models.wear_case import write_case
+from mpi4py import MPI
 
 from fretwave.case.load import load_case
+from fretwave.files.csv_table import write_rows
 from fretwave.plots.study import figures
 from fretwave.results.reader import Run
-from fretwave.files.csv_table import write_rows
 from fretwave.results.study_report import LEGEND_OF_WEAR, PRINTED_OF_WEAR, markdown
 from fretwave.run.wear_study import TOLERANCES, WearOutcome, WearPlan, WearSettings, wear_plan
 
