@@ -25,7 +25,8 @@ Aft::Aft(Harmonics const& h, std::shared_ptr<contact::Law const> law)
       law_samples_(h.odd_only() && law_->odd() && !law_->hereditary() ? h.samples() / 2 : h.samples()),
       tiles_(tiles(*law_, h.samples())),
       transform_(h, sampled_columns(*law_, tiles_.front().pairs), law_->components()),
-      last_transform_(h, sampled_columns(*law_, tiles_.back().pairs), law_->components()),
+      last_transform_(h, tiles_.size() > 1 ? sampled_columns(*law_, tiles_.back().pairs) : 0,
+                      law_->components()),
       tangent_transform_(h, law_->hereditary() ? 0 : tangent_columns(*law_)) {
   if (law_->piecewise_linear()) {
     continuous_.emplace(h, *law_);

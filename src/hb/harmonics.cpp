@@ -107,40 +107,70 @@ FRETWAVE_VECTORISE void fold(int half, int columns, double const* x, double cons
 
 FourierTransform::FourierTransform(Harmonics const& h, int columns, int components)
     : harmonics_(h), columns_(columns), rows_(h.samples() / 2 + 1), table_(by_table(h)) {
-  if (columns == 0) return;
-  const int m = h.block_size(), N = h.samples(), pairs = columns / components;
+  const int m = h.block_size(), pairs = columns / components;
   for (int c = 0; c < columns; ++c) block_.push_back((size_t(c % pairs) * components + c / pairs) * m);
-  synthesis_.resize(size_t(N) * m), analysis_.resize(synthesis_.size());
-  for (int t = 0; t < N; ++t)
+  if (columns && table_) make_halves();
+}
+
+namespace {
+
+/// visit(sample, place in the block, order, 1 or cosine or sine, its weight in to_harmonics) for the first
+/// `count` samples: Laxalde et al. 2008, eq. 9a-c.
+template <class Visit>
+void each_entry(Harmonics const& h, int count, Visit visit) {
+  const int N = h.samples();
+  std::vector<double> circle[2];  // cos and sin of 2 pi k / N
+  for (long k = 0; k < N; ++k)
+    circle[0].push_back(cosine(4 * k, N)), circle[1].push_back(cosine(4 * k - N, N));
+  for (int t = 0; t < count; ++t)
     for (int i = 0; i < h.count(); ++i) {
       const int n = h.orders()[i];
-      const double scale = (n ? 2.0 : 1.0) / N;
-      const long p = 4L * n * t;
-      double const values[2] = {cosine(p, N), cosine(p - N, N)};
-      for (int part = 0; part < (n ? 2 : 1); ++part) {  // Laxalde et al. 2008, eq. 9a-c
-        const size_t place = h.offset(i) + part;
-        synthesis_[size_t(t) * m + place] = values[part];
-        analysis_[size_t(t) * m + place] = scale * values[part];
-        Half& half = halves_[n % 2];
-        if (t == 0) half.places.push_back(place);
-        if (t >= N / 2) continue;
-        half.synthesis.push_back(values[part]);
-        half.analysis.push_back(scale * values[part]);
+      for (int part = 0; part < (n ? 2 : 1); ++part) {
+        const double value = circle[part][long(n) * t % N];
+        visit(t, size_t(h.offset(i) + part), n, value, (n ? 2.0 : 1.0) / N * value);
       }
     }
 }
 
+}  // namespace
+
+void FourierTransform::make_halves() {
+  const int half = harmonics_.samples() / 2;
+  for (int i = 0; i < harmonics_.count(); ++i)
+    for (int part = 0; part < (harmonics_.orders()[i] ? 2 : 1); ++part)
+      halves_[harmonics_.orders()[i] % 2].places.push_back(size_t(harmonics_.offset(i) + part));
+  double *synthesis[2], *analysis[2];
+  for (int parity = 0; parity < 2; ++parity) {
+    Half& now = halves_[parity];
+    now.synthesis.resize(now.places.size() * half), now.analysis.resize(now.synthesis.size());
+    synthesis[parity] = now.synthesis.data(), analysis[parity] = now.analysis.data();
+  }
+  each_entry(harmonics_, half, [&](int, size_t, int n, double value, double weight) {
+    *synthesis[n % 2]++ = value, *analysis[n % 2]++ = weight;
+  });
+}
+
+void FourierTransform::make_tables() const {
+  const size_t m = harmonics_.block_size();
+  synthesis_.resize(harmonics_.samples() * m), analysis_.resize(synthesis_.size());
+  each_entry(harmonics_, harmonics_.samples(), [&](int t, size_t place, int, double value, double weight) {
+    synthesis_[t * m + place] = value, analysis_[t * m + place] = weight;
+  });
+}
+
 /// ESTIMATE: the same plan, hence the same rounding, in every run and on every rank count.
-void FourierTransform::plan() const {
-  if (spectrum_ || columns_ == 0) return;
+void FourierTransform::plan(bool forward) const {
+  auto& plan = forward ? forward_ : backward_;
+  if (plan || columns_ == 0) return;
   int n = harmonics_.samples();
   std::unique_ptr<double, FreeMemory> time(fftw_alloc_real(size_t(n) * columns_));
-  spectrum_.reset(fftw_alloc_complex(size_t(rows_) * columns_));
-  backward_.reset(fftw_plan_many_dft_c2r(1, &n, columns_, spectrum_.get(), nullptr, columns_, 1, time.get(),
-                                         nullptr, columns_, 1, FFTW_ESTIMATE | FFTW_UNALIGNED));
-  forward_.reset(fftw_plan_many_dft_r2c(1, &n, columns_, time.get(), nullptr, columns_, 1, spectrum_.get(),
-                                        nullptr, columns_, 1,
-                                        FFTW_ESTIMATE | FFTW_PRESERVE_INPUT | FFTW_UNALIGNED));
+  if (!spectrum_) spectrum_.reset(fftw_alloc_complex(size_t(rows_) * columns_));
+  plan.reset(forward
+                 ? fftw_plan_many_dft_r2c(1, &n, columns_, time.get(), nullptr, columns_, 1, spectrum_.get(),
+                                          nullptr, columns_, 1,
+                                          FFTW_ESTIMATE | FFTW_PRESERVE_INPUT | FFTW_UNALIGNED)
+                 : fftw_plan_many_dft_c2r(1, &n, columns_, spectrum_.get(), nullptr, columns_, 1, time.get(),
+                                          nullptr, columns_, 1, FFTW_ESTIMATE | FFTW_UNALIGNED));
 }
 
 /// Even orders repeat after half a period, odd ones change sign: x(t), x(t + T/2) = even(t) +- odd(t).
@@ -187,7 +217,7 @@ void FourierTransform::from_halves(double const* samples, double* blocks) const 
 void FourierTransform::to_time(double const* blocks, double* samples) const {
   if (columns_ == 0) return;
   if (table_) return by_halves(blocks, samples);
-  plan();
+  plan(false);
   auto* spectrum = reinterpret_cast<complex*>(spectrum_.get());
   std::fill_n(spectrum, size_t(rows_) * columns_, complex(0));
   for (int i = 0; i < harmonics_.count(); ++i) {
@@ -218,7 +248,7 @@ void FourierTransform::to_harmonics(double const* samples, double* blocks) const
 }
 
 complex const* FourierTransform::spectrum(double const* samples) const {
-  plan();
+  plan(true);
   if (columns_) fftw_execute_dft_r2c(forward_.get(), const_cast<double*>(samples), spectrum_.get());
   return reinterpret_cast<complex const*>(spectrum_.get());
 }

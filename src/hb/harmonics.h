@@ -64,8 +64,8 @@ class FourierTransform {
   /// One-sided complex spectrum: (samples/2 + 1) x columns, unnormalised.
   complex const* spectrum(double const* samples) const;
   /// 1, cos n tau, sin n tau, and the same as weights of to_harmonics: samples x block size.
-  std::vector<double> const& synthesis() const { return synthesis_; }
-  std::vector<double> const& analysis() const { return analysis_; }
+  std::vector<double> const& synthesis() const { return tables(synthesis_); }
+  std::vector<double> const& analysis() const { return tables(analysis_); }
 
  private:
   struct FreePlan {
@@ -79,15 +79,21 @@ class FourierTransform {
     std::vector<size_t> places;  ///< in the harmonic block
     std::vector<double> synthesis, analysis;
   };
+  void make_halves();
+  void make_tables() const;
+  std::vector<double> const& tables(std::vector<double> const& wanted) const {
+    if (wanted.empty()) make_tables();
+    return wanted;
+  }
   void by_halves(double const* blocks, double* samples) const;
   void from_halves(double const* samples, double* blocks) const;
-  void plan() const;
+  void plan(bool forward) const;
 
   Harmonics harmonics_;
   int columns_, rows_;
   bool table_;
-  std::vector<size_t> block_;  ///< where a time column's harmonic block begins
-  std::vector<double> synthesis_, analysis_;
+  std::vector<size_t> block_;                         ///< where a time column's harmonic block begins
+  mutable std::vector<double> synthesis_, analysis_;  ///< only if asked for
   Half halves_[2];
   mutable std::vector<double> packed_, sums_, middle_;
   mutable std::unique_ptr<fftw_complex, FreeMemory> spectrum_;  ///< only if asked for, as the plans
