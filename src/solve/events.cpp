@@ -189,7 +189,9 @@ void Continuation::locate_values(Trial const& end, Hermite const& curve, double 
     for (size_t i = 0; i + 1 < places.size(); ++i) {
       const double from = places[i].value, to = places[i + 1].value;
       if ((from < target) == (to < target) || from == to) continue;
-      if ((outside || taken_over_) && i == 0 && from == target) continue;  // the branch starts here
+      if (outside && i == 0 && from == target) continue;  // the branch starts here
+      if (taken_over_ && i == 0 && std::abs(from - target) <= value_error * std::max(1.0, std::abs(target)))
+        continue;  // met already
       reach(value, event, places[i], places[i + 1], curve, length);
     }
   };

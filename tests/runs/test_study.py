@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import csv
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -119,3 +122,38 @@ def test_component_modes_are_swept_like_any_setting():
     study.run(solve, lambda sweep, settings: None)
     assert "| modes " in markdown(study.table())
     assert "modes" not in markdown(run_study()[0].table())
+
+
+def test_an_accuracy_is_held_against_the_quickest_set_that_keeps_it():
+    """At H = 7 zeta is off by nothing, at 3 by 9 % of itself, at 1 by 96 %: 0.1 asks for 3, 0.01 for 7."""
+
+    def choosing(settings: Settings) -> Outcome:
+        return solve(settings) if settings.accuracy is None else replace(solve(settings), harmonics=5, samples=128)
+
+    plan = replace(PLAN, samples=(256,), accuracy=(1e-2, 1e-1))
+    study = Study(plan, common_amplitudes(0.1, 1.0, 5))
+    study.run(choosing, lambda sweep, settings: None)
+    rows = [row for row in study.table() if row["sweep"] == "accuracy"]
+    assert [row["accuracy"] for row in rows] == [1e-1, 1e-2] and {row["harmonics"] for row in rows} == {5}
+    assert [row["best_fixed_s"] for row in rows] == [pytest.approx(0.03), pytest.approx(0.07)]
+    assert [row["kept"] for row in rows] == [1.0, 1.0]  # they are the finest run here
+    sets = [(s.harmonics, s.samples) for sweep, s in plan.sweeps() if sweep == "set"]
+    assert sets == [(1, 64), (3, 64), (7, 128)]
+    text = markdown(study.table())
+    assert "| kept " in text and "nan" not in text
+
+
+@pytest.mark.ranks(1)
+def test_a_study_asks_a_case_for_accuracies(tmp_path):
+    from pathlib import Path
+
+    from fretwave.commands import study as command
+
+    case = Path(__file__).parents[2] / "cases" / "two_dof" / "case.toml"
+    choice = ["--harmonics", "7,41", "--samples", "1024", "--tolerance", "1e-10", "--accuracy", "1e-1,3e-2"]
+    assert command.main([str(case), "--out", str(tmp_path), *choice, "--repeats", "1"]) == 0
+    with open(tmp_path / "study.csv", newline="") as file:
+        rows = [row for row in csv.DictReader(file) if row["sweep"] == "accuracy"]
+    assert [float(row["accuracy"]) for row in rows] == [1e-1, 3e-2]
+    assert all(float(row["kept"]) >= 0.95 for row in rows)
+    assert 5 <= int(rows[0]["harmonics"]) < int(rows[1]["harmonics"]) <= 41

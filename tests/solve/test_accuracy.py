@@ -88,13 +88,13 @@ def test_samples_follow_too_where_a_law_is_sampled():
 
 @SERIAL
 def test_events_and_reports_come_once():
-    reports = [0.13, 0.14, 0.2, 1.0]
-    branch = fw.follow(mode(tanh(0.05)), 0.05, 3.0, report_at=reports, accuracy=1e-2)
+    reports = [0.13, 0.14, 0.2, *np.geomspace(0.3, 2.8, 12)]
+    branch = fw.follow(mode(tanh(0.05)), 0.05, 3.0, report_at=reports, accuracy=5e-3)
     fine = fw.follow(mode(tanh(0.05), 61, 1024), 0.05, 3.0, report_at=reports, errors=False)
     assert len(set(branch["harmonics"])) > 3
     assert [name for name, _ in branch.events] == [name for name, _ in fine.events]
     np.testing.assert_allclose(branch["amplitude"][branch.met("report")], reports, rtol=ROUNDING)
-    np.testing.assert_allclose(branch["amplitude"][branch.met("fold")], fine["amplitude"][fine.met("fold")], rtol=1e-2)
+    np.testing.assert_allclose(branch["amplitude"][branch.met("fold")], fine["amplitude"][fine.met("fold")], rtol=5e-3)
     assert branch["point"].tolist() == list(range(len(branch)))
 
 
@@ -144,8 +144,8 @@ def test_a_branch_goes_on_from_a_snapshot_with_the_set_it_had():
     def points(branch, most=None):
         return [(p.parameter, branch.problem.harmonics.orders[-1], p.event) for _, p in zip(range(most or 999), branch)]
 
-    problem, settings = mode(jenkins()), {"stop": (0.1, 3.0), "report_at": [0.2], "accuracy": 1e-3}
-    first = RefiningContinuation(problem, problem.initial(0.1), **settings)
+    problem, settings = mode(jenkins()), {"stop": (0.1, 3.0), "report_at": [0.2]}
+    first = RefiningContinuation(problem, problem.initial(0.1), **settings, accuracy=1e-3)
     begun = points(first, 14)
     state = first.snapshot()
     rest = points(first)

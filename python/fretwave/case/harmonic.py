@@ -69,7 +69,7 @@ class HarmonicSection(AnalysisSection):
 
     @model_validator(mode="before")
     @classmethod
-    def _first_set(cls, given: Any) -> Any:
+    def _first_set(cls, given: object) -> object:
         """An accuracy stands in place of the harmonics."""
         if isinstance(given, Mapping) and given.get("accuracy") is not None:
             return {"harmonics": LEAST_HARMONICS, **given}

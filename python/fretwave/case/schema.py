@@ -231,6 +231,9 @@ class StudySection(Section):
     tolerance: Optional[list[Positive]] = key(
         "residual norms at which Newton stops", "-", "[1e-4, 1e-7, 1e-10]", default=None, min_length=2
     )
+    accuracy: Optional[list[Positive]] = key(
+        "accuracies that runs are asked for, in place of harmonics and samples", "-", "[1e-2, 1e-3]", default=None
+    )
     wear_tolerance: Optional[list[Positive]] = key(
         "tolerances of a step over wear cycles", "-", "[1e-1, 1e-2, 1e-3]", default=None, min_length=2
     )

@@ -52,6 +52,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--tolerance", type=_list(float), metavar="T,...", help="tolerances to sweep (of wear: of a step)"
     )
+    parser.add_argument("--accuracy", type=_list(float), metavar="A,...", help="accuracies to ask for")
     parser.add_argument(
         "--component-modes", type=_list(int), metavar="N,...", help="numbers of component modes to sweep"
     )

@@ -22,7 +22,7 @@ from ..mpi.gather import on_rank_0
 from ..post.contact_history import MOTION
 from ..post.motion import complex_amplitudes
 from .observed import Observed, named, row_of
-from .states import Estimate, ForcedState, ModalState, State
+from .states import Estimate, ForcedState, ModalState, State, default_samples
 
 
 class Harmonics:
@@ -65,7 +65,7 @@ def choose_harmonics(model: Model, highest: int, samples: int | None = None, ret
 
     Parameters
     ----------
-    samples : default: the power of two from 16 `highest` up, 64 at least.
+    samples : default: `default_samples`.
     retain : {"auto", "odd", "all"}
         auto keeps odd harmonics only when every law is odd and nothing preloads the contact.
     """
@@ -74,9 +74,7 @@ def choose_harmonics(model: Model, highest: int, samples: int | None = None, ret
     if retain not in ("auto", "odd", "all"):
         raise InputError("unknown choice of harmonics", None, retain, "auto, odd or all", 'use retain="auto"')
     odd = retain == "odd" or (retain == "auto" and model.odd)
-    harmonics = Harmonics(
-        [n for n in range(highest + 1) if n % 2 or not odd], samples or max(64, 1 << (16 * highest - 1).bit_length())
-    )
+    harmonics = Harmonics([n for n in range(highest + 1) if n % 2 or not odd], samples or default_samples(highest))
     if odd:
         harmonics.left_out.append("even harmonics and the mean (the contact laws are odd, there is no preload)")
     return harmonics

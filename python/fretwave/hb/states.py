@@ -25,6 +25,11 @@ STRICT = 10.0
 BANDWIDTH = 0.01
 
 
+def default_samples(highest: int) -> int:
+    """Time samples of a period where none are given: the power of two from 16 `highest` up, 64 at least."""
+    return max(64, 1 << (16 * highest - 1).bit_length())
+
+
 @dataclass(frozen=True)
 class ModalState:
     """Scalars (beta / w_ref, w / w_ref, log a, ...) of a nonlinear mode; w = w0 for EPMC.

@@ -16,6 +16,7 @@ SWEEPS = {
     "samples": ("$N_t$", "s--"),
     "tolerance": ("tol", "^:"),
     "component_modes": ("modes", "v-."),
+    "accuracy": ("asked for", "D-"),
     "pressure_change": ("of a step", "s--"),
 }
 ERRORS = {"zeta_error": "Damping: largest error / peak ζ", "omega_error": "Frequency: largest relative error"}
@@ -60,6 +61,6 @@ def _sweep(axes: Axes, table: Table, sweep: str, symbol: str, column: str, line:
         axes.plot(time, np.maximum(table["zeta_error_estimate"][rows], FLOOR), line, color=colour, alpha=0.35)
     for row, x, y in zip(rows, time, error):
         value = table[sweep][row]
-        text = f"{value:.0e}".replace("e-0", "e-") if sweep == "tolerance" else f"{value:g}"
+        text = f"{value:.0e}".replace("e-0", "e-") if sweep in ("tolerance", "accuracy") else f"{value:g}"
         place = (-4, -12) if sweep == "pressure_change" else (4, 4)
         axes.annotate(text, (x, y), place, textcoords="offset points", fontsize=9, color=colour)

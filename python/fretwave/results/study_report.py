@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Mapping, Sequence
 
 from ..post.calibration import FACTORS, LEAST_ERROR
@@ -15,6 +17,9 @@ PRINTED = {
     "N_t": "{samples}",
     "tolerance": "{tolerance:.0e}",
     "modes": "{component_modes}",
+    "accuracy": "{accuracy:.0e}",
+    "kept": "{kept:.0%}",
+    "best fixed [s]": "{best_fixed_s:.3f}",
     "points": "{points}",
     "Newton": "{newton}",
     "time [s]": "{wall_s:.3f}",
@@ -26,12 +31,19 @@ PRINTED = {
     **{f"within {factor}": f"{{within_{factor}:.0%}}" for factor in FACTORS},
 }
 
+NOT_A_NUMBER = re.compile("^nan%?$")
+
 LEGEND = (
     "Errors are against the finest run (marked): of peak zeta relative; of zeta the largest over the amplitudes that "
     "all runs meet exactly once, divided by the peak; of omega the largest relative one over the same. Estimated is "
     "the error of zeta by what the sweep changes, of the finest run by all, as the run itself says; within "
     f"{' and '.join(map(str, FACTORS))}: the share of the amplitudes at which the estimated error of lambda is within "
     f"that factor of the error, where this is above {f'{LEAST_ERROR:.0e}'.replace('e-0', 'e-')} 1/s."
+)
+LEGEND_OF_ACCURACY = (
+    "Of a run that chooses its harmonics and samples, the most it took; its time is with that of the estimates. Kept: "
+    "the share of the amplitudes at which lambda is that accurate, over zeta omega0; best fixed: the time of the "
+    "quickest run with one set that keeps it at 95 % of them (its estimates not counted)."
 )
 
 
@@ -62,14 +74,17 @@ def markdown(
 ) -> str:
     """Aligned Markdown table with its legend; readable as plain text too."""
     reduced = any(row.get("component_modes", -1) != -1 for row in rows)
-    shown = {name: form for name, form in printed.items() if name != "modes" or reduced}
-    body = [[form.format(**row).replace("nan%", "-") for form in shown.values()] for row in rows]
+    asked = any(row.get("accuracy", math.nan) == row.get("accuracy") for row in rows)
+    hidden = set() if reduced else {"modes"}
+    hidden |= set() if asked else {"accuracy", "kept", "best fixed [s]"}
+    shown = {name: form for name, form in printed.items() if name not in hidden}
+    body = [[NOT_A_NUMBER.sub("-", form.format(**row)) for form in shown.values()] for row in rows]
     for cells, row in zip(body, rows):
         cells[0] += " (finest)" if row["reference"] else ""
     widths = [max(len(line[i]) for line in (list(shown), *body)) for i in range(len(shown))]
     lines = [_line(shown, widths), "|" + "|".join("-" * (width + 1) + ":" for width in widths) + "|"]
     lines += [_line(cells, widths) for cells in body]
-    return "\n".join([*lines, "", legend, *notes, ""])
+    return "\n".join([*lines, "", legend, *([LEGEND_OF_ACCURACY] if asked else []), *notes, ""])
 
 
 def _line(cells: Sequence[str] | Mapping[str, str], widths: Sequence[int]) -> str:

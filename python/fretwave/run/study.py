@@ -18,7 +18,7 @@ from ..analyses.parts.rest import retained
 from ..analyses.parts.wheel_start import Start, start_of
 from ..analyses.wear import WearAnalysis
 from ..case.build import build_model
-from ..case.harmonic import nodal_diameter
+from ..case.harmonic import LEAST_HARMONICS, LEAST_SAMPLES, nodal_diameter
 from ..case.load import Case, load_case
 from ..case.reduce import reduce_case
 from ..case.wheel import on_wheel, solver_room
@@ -35,7 +35,7 @@ from .study_plan import Outcome, Plan, Settings, Study, common_amplitudes
 if TYPE_CHECKING:
     from mpi4py import MPI
 
-    from ..hb.problems import NonlinearMode
+    from ..hb.problems import HarmonicProblem, NonlinearMode
     from ..solve.continuation import Point
 
 
@@ -129,7 +129,9 @@ class _Solver:
 
         analysis = self.analysis
         context, start = self._model(settings.component_modes)
-        harmonics = retained(context, settings.harmonics, settings.samples)
+        asked = settings.accuracy is not None
+        least = (LEAST_HARMONICS, LEAST_SAMPLES) if asked else (settings.harmonics, settings.samples)
+        harmonics = retained(context, *least)
         options = AnalysisOptions("study_", [analysis.petsc, f"-snes_atol {settings.tolerance!r}"])
         with options.inserted(), solver_room(context.case, analysis, "study_"):
             problem = NonlinearMode(
@@ -143,40 +145,45 @@ class _Solver:
                 rest=start.rest,
             )
             try:
-                return self._follow(problem)
+                return self._follow(problem, settings.accuracy)
             finally:
                 problem.destroy()
 
-    def _follow(self, problem: NonlinearMode) -> Outcome | str:
-        """Only the time spent between points counts: diagnostics are not part of the solution."""
+    def _follow(self, problem: NonlinearMode, accuracy: float | None) -> Outcome | str:
+        """Only the time spent between points counts: diagnostics are not part of the solution.
+
+        Estimates of errors are, where harmonics and samples follow from them.
+        """
         from ..solve.continuation import Continuation
+        from ..solve.refining import RefiningContinuation
 
         low, high = self.analysis.amplitude
         rows, newton, wall = [], 0, 0.0
         began = time.perf_counter()
-        branch = Continuation(
-            problem,
-            problem.initial(low),
-            stop=(low, high),
-            steps=step_control(self.analysis.step),
-            report_at=[float(a) for a in self.study.amplitudes],
-        )
+        settings: dict[str, Any] = {"stop": (low, high), "steps": step_control(self.analysis.step)}
+        settings["report_at"] = [float(a) for a in self.study.amplitudes]
+        if accuracy is None:
+            branch = Continuation(problem, problem.initial(low), **settings)
+        else:
+            branch = RefiningContinuation(problem, problem.initial(low), **settings, accuracy=accuracy)
         for point in branch:
             wall += time.perf_counter() - began
             newton += point.newton
-            rows.append(_row(problem, point))
+            rows.append(_row(branch.problem, point))
             began = time.perf_counter()
         converged, reason = branch.converged, branch.reason
         branch.destroy()
         return _outcome(rows, newton, wall) if converged else str(reason)
 
 
-def _row(problem: NonlinearMode, point: Point) -> dict[str, Any]:
+def _row(problem: HarmonicProblem, point: Point) -> dict[str, Any]:
     state = problem.state(point.y)
     reported = "report" in point.event
-    found = problem.errors(point.y, point.tangent if reported else None)
+    found = point.errors or problem.errors(point.y, point.tangent if reported else None)
     estimate = [found[f"lambda_error_{source}"] for source in SOURCES]
-    return {**{key: state[key] for key in ("amplitude", "omega", "zeta")}, "estimate": estimate, "reported": reported}
+    sizes = {"harmonics": problem.harmonics.orders[-1], "samples": problem.harmonics.samples}
+    own = {"estimate": estimate, "reported": reported}
+    return {**{key: state[key] for key in ("amplitude", "omega", "zeta")}, **sizes, **own}
 
 
 def _outcome(rows: list[dict[str, Any]], newton: int, wall: float) -> Outcome:
@@ -185,7 +192,8 @@ def _outcome(rows: list[dict[str, Any]], newton: int, wall: float) -> Outcome:
     amplitude, omega, zeta, estimate = (
         np.array([row[key] for row in reported]) for key in ("amplitude", "omega", "zeta", "estimate")
     )
-    return Outcome(amplitude, omega, zeta, estimate, top["zeta"], top["amplitude"], len(rows), newton, wall)
+    most = {key: int(max(row[key] for row in rows)) for key in ("harmonics", "samples")}
+    return Outcome(amplitude, omega, zeta, estimate, top["zeta"], top["amplitude"], len(rows), newton, wall, **most)
 
 
 def _notes(study: Study) -> list[str]:
@@ -207,6 +215,8 @@ def _progress(study: Study, sweep: str, settings: Settings) -> str:
 
 def _text(settings: Settings) -> str:
     modes = "" if settings.component_modes is None else f", {settings.component_modes} component modes"
+    if settings.accuracy is not None:
+        return f"accuracy {settings.accuracy:.0e}, tolerance {settings.tolerance:.0e}{modes}"
     return f"H = {settings.harmonics}, N_t = {settings.samples}, tolerance {settings.tolerance:.0e}{modes}"
 
 
@@ -232,7 +242,7 @@ def _analysis(case: Case, name: str | None) -> ModeAnalysis:
 def _plan(case: Case, options: argparse.Namespace) -> Plan:
     """Sweeps of the command line, else of the case's table [study], else the defaults."""
     plan = Plan()
-    for name in ("harmonics", "samples", "tolerance", "component_modes"):
+    for name in ("harmonics", "samples", "tolerance", "component_modes", "accuracy"):
         values = getattr(options, name) or getattr(case.study, name)
         if name == "component_modes" and values and case.reduction is None:
             raise InputError(

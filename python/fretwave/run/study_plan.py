@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -10,7 +11,9 @@ import numpy as np
 
 from ..arrays import Array, Complex, Indices
 from ..columns import SOURCES
+from ..hb.states import ZETA_FLOOR, default_samples
 from ..post.calibration import FACTORS, share_within
+from ..solve.accuracy import TOLERATED
 
 #: a reported point belongs to an amplitude when it is this near; a loose Newton tolerance lets it miss by about itself
 MATCH = 1e-2
@@ -22,13 +25,15 @@ SOURCE_OF = {"harmonics": "harmonics", "samples": "samples", "tolerance": "solve
 class Settings:
     """Numerical settings of one run; `tolerance` is the norm of the dimensionless residual at which Newton stops.
 
-    `component_modes` of a reduced model, None for the model as the case has it.
+    `component_modes` of a reduced model, None for the model as the case has it. With an `accuracy` the run
+    chooses its harmonics and samples.
     """
 
     harmonics: int
     samples: int
     tolerance: float
     component_modes: int | None = None
+    accuracy: float | None = None
 
     def possible(self) -> bool:
         """At least two samples per period of the highest harmonic."""
@@ -45,6 +50,7 @@ class Outcome:
     estimate : (n, 3) estimated errors of lambda there [1/s], by `SOURCES`
     peak_zeta, peak_amplitude : largest damping ratio and where it is
     wall_s : time of the whole branch [s]
+    harmonics, samples : the most that it took, where it has chosen them
     """
 
     amplitude: Array
@@ -56,16 +62,23 @@ class Outcome:
     points: int
     newton: int
     wall_s: float
+    harmonics: int = 0
+    samples: int = 0
 
 
 @dataclass(frozen=True)
 class Plan:
-    """Sweeps of one setting at a time, the others at their finest: the common reference is the finest of all."""
+    """Sweeps of one setting at a time, the others at their finest: the common reference is the finest of all.
+
+    Beside accuracies that a run is asked for stand runs of each number of harmonics with its default samples: what they
+    are held against is the quickest of all runs with a fixed set that is as accurate.
+    """
 
     harmonics: Sequence[int] = (1, 3, 7, 21, 41)
     samples: Sequence[int] = (64, 128, 256, 512, 1024, 2048)
     tolerance: Sequence[float] = (1e-3, 1e-4, 1e-6, 1e-8, 1e-10)
     component_modes: Sequence[int] = ()
+    accuracy: Sequence[float] = ()
 
     @property
     def reference(self) -> Settings:
@@ -78,7 +91,11 @@ class Plan:
         finest = self.reference
         values: dict[str, Sequence[Any]] = {"harmonics": sorted(self.harmonics), "samples": sorted(self.samples)}
         values |= {"tolerance": sorted(self.tolerance)[::-1], "component_modes": sorted(self.component_modes)}
+        values |= {"accuracy": sorted(self.accuracy)[::-1]}
         rows = [(name, replace(finest, **{name: value})) for name, swept in values.items() for value in swept]
+        if self.accuracy:
+            sets = [(highest, default_samples(highest)) for highest in sorted(self.harmonics)]
+            rows += [("set", replace(finest, harmonics=highest, samples=count)) for highest, count in sets]
         return [(name, settings) for name, settings in rows if settings.possible()]
 
 
@@ -139,8 +156,8 @@ class Study:
         known, true = (np.array([row[name] for row in ratios]) for name in ("estimate", "error"))
         return {
             "sweep": sweep,
-            "harmonics": settings.harmonics,
-            "samples": settings.samples,
+            "harmonics": run.harmonics or settings.harmonics,
+            "samples": run.samples or settings.samples,
             "tolerance": settings.tolerance,
             "points": run.points,
             "newton": run.newton,
@@ -153,8 +170,24 @@ class Study:
             "zeta_error_estimate": _largest(guessed / omega_true) / abs(reference.peak_zeta),
             **{f"within_{factor}": share_within(known, true, factor) for factor in FACTORS},
             "component_modes": -1 if settings.component_modes is None else settings.component_modes,
+            "accuracy": math.nan if settings.accuracy is None else settings.accuracy,
+            "kept": math.nan if settings.accuracy is None else self._kept(settings, settings.accuracy),
+            "best_fixed_s": math.nan if settings.accuracy is None else self._best_fixed(settings.accuracy),
             "reference": int(settings == self.plan.reference),
         }
+
+    def _kept(self, settings: Settings, accuracy: float) -> float:
+        """Share of the amplitudes at which a run is as accurate, in lambda over zeta omega0."""
+        omega, zeta, _ = _values(self.outcomes[settings], self.compared)
+        true = _eigenvalue(*_values(self.outcomes[self.plan.reference], self.compared)[:2])
+        allowed = accuracy * np.maximum(-true.real, ZETA_FLOOR * np.abs(true))
+        return float(np.mean(np.abs(_eigenvalue(omega, zeta) - true) <= allowed)) if len(true) else math.nan
+
+    def _best_fixed(self, accuracy: float) -> float:
+        """Time [s] of the quickest run of one set that keeps an accuracy at 95 % of the amplitudes; nan without any."""
+        fixed = [settings for settings in self.outcomes if settings.accuracy is None]
+        times = [self.outcomes[s].wall_s for s in fixed if self._kept(s, accuracy) >= 1 - TOLERATED]
+        return min(times, default=math.nan)
 
     def calibration(self) -> list[dict[str, Any]]:
         """Estimated and true error of lambda [1/s] by run and amplitude, of the source that the sweep is over.

@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from math import isfinite, log
+from typing import TYPE_CHECKING
 
 from ..columns import SOURCES
-from ..hb.problems import Harmonics
+
+if TYPE_CHECKING:
+    from ..hb.problems import Harmonics
 
 #: Shares of the accuracy: what a new set aims at, and above which a smaller one is not tried.
 AIM, LOW = 0.6, 0.5
@@ -21,6 +24,8 @@ ROUNDS, SMALLER = 3, 20
 FACTOR = 3
 #: No more harmonics and samples than these.
 MOST_HARMONICS, MOST_SAMPLES = 255, 1 << 14
+#: Share of a branch's points that may miss the accuracy.
+TOLERATED = 0.05
 #: Steps on a set before a smaller one is tried.
 PATIENCE = 3
 

@@ -225,7 +225,6 @@ class Continuation:
         stop: tuple[float, float],
         steps: StepControl | None = None,
         report_at: Sequence[float] = (),
-        **own: Any,
     ) -> Continuation:
         """Goes on after the snapshot's point, on any number of ranks; rank 0 alone needs the snapshot. Collective.
 
@@ -233,20 +232,25 @@ class Continuation:
         or a preconditioner of another age) to the tolerance of the corrector. `repeated` is the last point handed out
         before, solved again, to measure that by; `resumed_at` are unknowns and tangent there.
         """
-        snapshot = problem.model.comm.bcast(snapshot)
-        assert snapshot is not None
-        vectors = {name: cls._scatter(problem, np.asarray(snapshot[name])) for name in _VECTORS if name in snapshot}
-        upwards, began = bool(snapshot.get("upwards", True)), float(snapshot.get("began", np.nan))
-        branch = cls(problem, vectors["y"], stop, steps, report_at, upwards, **own)
-        before = [vectors[name] for name in _VECTORS[2:] if name in vectors]
-        step, index, emitted = float(snapshot["step"]), int(snapshot["index"]), int(snapshot["emitted"])
-        wary, now = bool(snapshot.get("wary", False)), [vectors["y"], vectors["tangent"]]
-        point = branch._core.restore(now, before, step, index, wary, emitted, upwards, began)
-        branch.repeated = None if point is None else Point(**point)
-        anchor = branch._core.anchor()
-        branch.resumed_at = (point["y"], point["tangent"]) if point is not None else (anchor["y"], anchor["tangent"])
-        branch._begun = True
+        given = problem.model.comm.bcast(snapshot)
+        y0 = cls._scatter(problem, np.asarray(given["y"]))
+        branch = cls(problem, y0, stop, steps, report_at, bool(given.get("upwards", True)))
+        branch._go_on(given)
         return branch
+
+    def _go_on(self, snapshot: dict[str, Any]) -> None:
+        """Stand where the snapshot was taken. Collective."""
+        found = [name for name in _VECTORS if name in snapshot]
+        vectors = {name: self._scatter(self.problem, np.asarray(snapshot[name])) for name in found}
+        before = [vectors[name] for name in _VECTORS[2:] if name in vectors]
+        began, wary = float(snapshot.get("began", np.nan)), bool(snapshot.get("wary", False))
+        step, index, emitted = float(snapshot["step"]), int(snapshot["index"]), int(snapshot["emitted"])
+        now = [vectors["y"], vectors["tangent"]]
+        point = self._core.restore(now, before, step, index, wary, emitted, self._upwards, began)
+        self.repeated = None if point is None else Point(**point)
+        anchor = self._core.anchor()
+        self.resumed_at = (point["y"], point["tangent"]) if point is not None else (anchor["y"], anchor["tangent"])
+        self._begun = True
 
     @staticmethod
     def _scatter(problem: HarmonicProblem, whole: Array) -> PETSc.Vec:

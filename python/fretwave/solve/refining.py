@@ -12,12 +12,10 @@ from petsc4py import PETSc
 from .. import _core
 from ..hb.problems import HarmonicProblem, Harmonics
 from ..hb.states import Estimate
-from .accuracy import MOST_HARMONICS, MOST_SAMPLES, ROUNDS, Aim, limiting
+from .accuracy import MOST_HARMONICS, MOST_SAMPLES, ROUNDS, TOLERATED, Aim, limiting
 from .continuation import Continuation, Point
 from .steps import StepControl
 
-#: Share of a branch's points that may miss the accuracy.
-TOLERATED = 0.05
 #: Points so near to each other (relative, in the parameter) tell how two sets differ.
 NEAR = 0.02
 #: What a point has cost, also where it was refused.
@@ -44,7 +42,11 @@ class RefiningContinuation(Continuation):
         Relative, of zeta and omega of a mode, of the complex amplitude of a response.
     least : Harmonics, optional
         The smallest set that is taken; by default the problem's.
-    tell : told in words of each change of the set
+
+    Attributes
+    ----------
+    tell : callable
+        Told in words of each change of the set.
     """
 
     def __init__(
@@ -58,11 +60,11 @@ class RefiningContinuation(Continuation):
         *,
         accuracy: float,
         least: Harmonics | None = None,
-        tell: Callable[[str], None] = lambda text: None,
     ) -> None:
         super().__init__(problem, y0, stop, steps, report_at, upwards)
         self.accuracy, self.least, self.largest = accuracy, least or problem.harmonics, problem
-        self._settings, self._tell = ((steps or StepControl()).core(), list(report_at)), tell
+        self._settings = (steps or StepControl()).core(), list(report_at)
+        self.tell: Callable[[str], None] = lambda text: None
         self._given, self._aim = problem, Aim()
         self._present: Point | None = None  # the last point handed out, and what it solves
         self._of = problem
@@ -144,7 +146,7 @@ class RefiningContinuation(Continuation):
         self.problem, self._core = problem, core
         if problem.harmonics.block_size >= self.largest.harmonics.block_size:
             self.largest = problem
-        self._tell(f"{_place(problem, point)}: harmonics up to {harmonics.orders[-1]}, {harmonics.samples} samples")
+        self.tell(f"{_place(problem, point)}: harmonics up to {harmonics.orders[-1]}, {harmonics.samples} samples")
         return Point(**{**found, "index": point.index, "step": point.step})
 
     @property
@@ -181,7 +183,12 @@ class RefiningContinuation(Continuation):
         if found is None:
             return None
         harmonics, missed = self.problem.harmonics, [self.missed_by.get(source, 0) for source in LIMITS]
-        sizes = {"harmonics": harmonics.orders[-1], "samples": harmonics.samples, "points": self.points}
+        sizes: dict[str, float] = {
+            "harmonics": harmonics.orders[-1],
+            "samples": harmonics.samples,
+            "points": self.points,
+        }
+        sizes["accuracy"] = self.accuracy
         return {**found, **sizes, "aim": np.array(self._aim.state), "missed_by": np.array(missed)}
 
     @classmethod
@@ -192,12 +199,14 @@ class RefiningContinuation(Continuation):
         stop: tuple[float, float],
         steps: StepControl | None = None,
         report_at: Sequence[float] = (),
-        **own: Any,
     ) -> RefiningContinuation:
+        """Goes on on the snapshot's set, `problem` having the least. Collective."""
         given = problem.model.comm.bcast(snapshot)
-        harmonics = problem.harmonics.up_to(int(given["harmonics"]), int(given["samples"]))
-        branch = super().restore(problem.on(harmonics), given, stop, steps, report_at, least=problem.harmonics, **own)
-        assert isinstance(branch, RefiningContinuation)
+        now = problem.on(problem.harmonics.up_to(int(given["harmonics"]), int(given["samples"])))
+        y0, accuracy = cls._scatter(now, np.asarray(given["y"])), float(given["accuracy"])
+        ways = bool(given["upwards"])
+        branch = cls(now, y0, stop, steps, report_at, ways, accuracy=accuracy, least=problem.harmonics)
+        branch._go_on(given)
         branch._given, branch._aim, branch.points = problem, Aim.of(given["aim"]), int(given["points"])
         branch.missed_by = {source: int(n) for source, n in zip(LIMITS, given["missed_by"]) if n}
         branch._present, branch._of = branch.repeated, branch.problem

@@ -105,7 +105,7 @@ def record(
     row = row_of(problem, point, writer.rows, errors)
     motions = None
     if point.event not in PLAIN_EVENTS:
-        every = problem.harmonics.samples // int(writer.attributes["samples"])
+        every = problem.harmonics.samples // int(writer.attributes.get("samples", problem.harmonics.samples))
         periods = [_thinned(period, every) for period in problem.contact_history(point.y)]
         names = [contact.name for contact in problem.model.contacts]
         motions = dict(zip(names, periods)) if writer.active else None
@@ -146,13 +146,20 @@ def continuation(
 
     analysis, name = context.analysis, name or context.name
     settings: dict[str, Any] = {"stop": ends, "steps": step_control(analysis.step), "report_at": list(report_at)}
-    kind: type[Continuation] = Continuation
-    if analysis.accuracy is not None:
-        kind = RefiningContinuation
-        settings |= {"accuracy": analysis.accuracy, "tell": lambda text: context.console.line(f"{name}: {text}")}
-    if go_on:
-        return kind.restore(problem, None if snapshot is None else dict(snapshot), **settings)
-    return kind(problem, problem.initial(ends[0]), **settings)
+    kept = None if snapshot is None else dict(snapshot)
+    if analysis.accuracy is None:
+        return (
+            Continuation.restore(problem, kept, **settings)
+            if go_on
+            else Continuation(problem, problem.initial(ends[0]), **settings)
+        )
+    refining = (
+        RefiningContinuation.restore(problem, kept, **settings)
+        if go_on
+        else RefiningContinuation(problem, problem.initial(ends[0]), **settings, accuracy=analysis.accuracy)
+    )
+    refining.tell = lambda text: context.console.line(f"{name}: {text}")
+    return refining
 
 
 def mode_problem(
