@@ -33,8 +33,8 @@ LOADS = {"stick": 100.0, "slip": 4.0, "lift-off": 1.0}
 TRAFFIC, ONE_PASS = 3 * 8, (3 + 3 + 3) * 8
 #: Libraries and functions that perf names, and what they do.
 PARTS = {
-    "march, force": r"march_coupled|SliderClosure|shoot|farthest|Coulomb3d.*::(force|close)",
-    "march, product": r"linear_coupled|Coulomb3d.*::(linearised|product)",
+    "march, force": r"contact::(march|left_rest|shoot|farthest|extent)\b|SliderClosure|Coulomb3d::(force|close)",
+    "march, product": r"contact::linear_march\b|Coulomb3d::(linearised|product)",
     "march, tangents": r"Coulomb3d",
     "Fourier transforms": r"libfftw|FourierTransform",
     "dense algebra (BLAS, LAPACK)": r"libopenblas|libblas|liblapack",

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 
+#include "contact/coulomb.h"
 #include "contact/tractrix.h"
 #include "contact/vectorise.h"
 
@@ -17,19 +18,50 @@ FRETWAVE_INLINE void pull_in(double u1, double u2, double R, double& w1, double&
   w1 += d1 - s * d1, w2 += d2 - s * d2;
 }
 
-/// Clipped d, and the uncoupled law's record.
-struct Clip {
-  double d, code;
+/// What a linearised step gives: the arm u - w, which is the tangential force / kt, and 1 where closed.
+struct Arm {
+  double y1, y2, closed;
 };
 
-FRETWAVE_INLINE Clip clip(double d, double R) {
-  const bool stick = std::abs(d) <= R && R > 0;
-  const double sign = std::copysign(R > 0 ? 1.0 : 0.0, d);
-  return {stick ? d : std::copysign(R, d), stick ? 2.0 : sign};
+FRETWAVE_INLINE Arm linear_step(double const* r, int pairs, int k, double reach, double kn, double dn0,
+                                double dn1, double d1, double d2, double v1, double v2, double a1,
+                                double a2) {
+  const double s = r[k], m1 = r[pairs + k], m2 = r[2 * pairs + k], kept = s > 0 ? s : 0.0;
+  const double across = r[3 * pairs + k] * d1 + r[4 * pairs + k] * d2 + r[5 * pairs + k] * v1 +
+                        r[6 * pairs + k] * v2 + r[7 * pairs + k] * a1 + r[8 * pairs + k] * a2 +
+                        r[9 * pairs + k] * dn0 + r[10 * pairs + k] * dn1;
+  const double along = s == 0 ? reach * kn * dn1 : 0.0;
+  return {kept * (d1 + v1) + m1 * along - m2 * across, kept * (d2 + v2) + m2 * along + m1 * across,
+          s < 0 ? 0.0 : 1.0};
 }
 
-FRETWAVE_INLINE void coupled_loop(PairConstants const& p, int samples, int n, double const* u, double* w,
-                                  double* f, double* record) {
+template <bool OnePair, bool Force>
+FRETWAVE_INLINE void linear_loop(PairConstants const& p, int samples, int pairs, int pair, int n,
+                                 double const* record, double const* du, double* dw, double* df) {
+  double const *kn = p.kn, *kt = p.kt, *reach = p.reach, *before = du + size_t(samples - 1) * 3 * n,
+               *first = du;
+  for (int t = 0; t < samples;
+       ++t, before = du, du += 3 * n, df += Force ? 3 * n : 0, record += record_arrays * pairs) {
+    double const* next = t + 1 < samples ? du + 3 * n : first;
+#pragma omp simd
+    for (int i = 0; i < n; ++i) {
+      const int k = OnePair ? pair : i;
+      const double x1 = du[n + i] - dw[i], x2 = du[2 * n + i] - dw[n + i];
+      const double v1 = du[n + i] - before[n + i], v2 = du[2 * n + i] - before[2 * n + i];
+      const Arm to = linear_step(record, pairs, k, reach[k], kn[k], before[i], du[i], before[n + i] - dw[i],
+                                 before[2 * n + i] - dw[n + i], v1, v2, next[n + i] - du[n + i] - v1,
+                                 next[2 * n + i] - du[2 * n + i] - v2);
+      dw[i] += x1 - to.y1, dw[n + i] += x2 - to.y2;
+      if constexpr (Force)
+        df[i] = to.closed * kn[k] * du[i], df[n + i] = kt[k] * to.y1, df[2 * n + i] = kt[k] * to.y2;
+    }
+  }
+}
+
+}  // namespace
+
+FRETWAVE_VECTORISE void march(PairConstants const& p, int samples, int n, double const* u, double* w,
+                              double* f, double* record) {
   double const *kn = p.kn, *kt = p.kt, *reach = p.reach, *load = p.load, *gap = p.gap;
   double const *before = u + size_t(samples - 1) * 3 * n, *first = u;
   constexpr double tiny = std::numeric_limits<double>::min();
@@ -38,7 +70,7 @@ FRETWAVE_INLINE void coupled_loop(PairConstants const& p, int samples, int n, do
     const double elastic = load[i] + kn[i] * (before[i] - gap[i]);
     pull_in(before[n + i], before[2 * n + i], elastic > 0 ? reach[i] * elastic : 0.0, w[i], w[n + i]);
   }
-  for (int t = 0; t < samples; ++t, before = u, u += 3 * n, f += 3 * n, record += record_arrays<true> * n) {
+  for (int t = 0; t < samples; ++t, before = u, u += 3 * n, f += 3 * n, record += record_arrays * n) {
     double const* next = t + 1 < samples ? u + 3 * n : first;
 #pragma omp simd
     for (int i = 0; i < n; ++i) {
@@ -77,123 +109,27 @@ FRETWAVE_INLINE void coupled_loop(PairConstants const& p, int samples, int n, do
   }
 }
 
-FRETWAVE_INLINE void alone_loop(PairConstants const& p, int samples, int n, double const* u, double* w,
-                                double* f, double* record) {
-  double const *kn = p.kn, *kt = p.kt, *reach = p.reach, *load = p.load, *gap = p.gap;
-  for (int t = 0; t < samples; ++t, u += 3 * n, f += 3 * n, record += record_arrays<false> * n)
-#pragma omp simd
-    for (int i = 0; i < n; ++i) {
-      const double elastic = load[i] + kn[i] * (u[i] - gap[i]), normal = elastic > 0 ? elastic : 0.0;
-      const double R = reach[i] * normal, d1 = u[n + i] - w[i], d2 = u[2 * n + i] - w[n + i];
-      const Clip one = clip(d1, R), two = clip(d2, R);
-      record[i] = elastic > 0 ? 1.0 : 0.0, record[n + i] = one.code, record[2 * n + i] = two.code;
-      w[i] += d1 - one.d, w[n + i] += d2 - two.d;  // by exactly nothing where it sticks
-      f[i] = normal, f[n + i] = kt[i] * one.d, f[2 * n + i] = kt[i] * two.d;
-    }
-}
-
-/// What a linearised step takes and gives: the motion now and before, the slider, the tangential force / kt.
-struct Arm {
-  double y1, y2, closed;
-};
-
-FRETWAVE_INLINE Arm coupled_step(double const* r, int pairs, int k, double reach, double kn, double dn0,
-                                 double dn1, double d1, double d2, double v1, double v2, double a1,
-                                 double a2) {
-  const double s = r[k], m1 = r[pairs + k], m2 = r[2 * pairs + k], kept = s > 0 ? s : 0.0;
-  const double across = r[3 * pairs + k] * d1 + r[4 * pairs + k] * d2 + r[5 * pairs + k] * v1 +
-                        r[6 * pairs + k] * v2 + r[7 * pairs + k] * a1 + r[8 * pairs + k] * a2 +
-                        r[9 * pairs + k] * dn0 + r[10 * pairs + k] * dn1;
-  const double along = s == 0 ? reach * kn * dn1 : 0.0;
-  return {kept * (d1 + v1) + m1 * along - m2 * across, kept * (d2 + v2) + m2 * along + m1 * across,
-          s < 0 ? 0.0 : 1.0};
-}
-
-/// s of a tangent alone is 1 (stick), else its slip direction counts.
-FRETWAVE_INLINE Arm alone_step(double const* r, int pairs, int k, double reach, double kn, double dn,
-                               double x1, double x2) {
-  const double closed = r[k], one = r[pairs + k], two = r[2 * pairs + k], dR = reach * (closed * kn * dn);
-  return {(one == 2 ? x1 : 0.0) + (one == 2 ? 0.0 : one) * dR,
-          (two == 2 ? x2 : 0.0) + (two == 2 ? 0.0 : two) * dR, closed};
-}
-
-template <bool Coupled, bool OnePair, bool Force>
-FRETWAVE_INLINE void linear_loop(PairConstants const& p, int samples, int pairs, int pair, int n,
-                                 double const* record, double const* du, double* dw, double* df) {
-  double const *kn = p.kn, *kt = p.kt, *reach = p.reach, *before = du + size_t(samples - 1) * 3 * n,
-               *first = du;
-  for (int t = 0; t < samples;
-       ++t, before = du, du += 3 * n, df += Force ? 3 * n : 0, record += record_arrays<Coupled> * pairs) {
-    double const* next = t + 1 < samples ? du + 3 * n : first;
-#pragma omp simd
-    for (int i = 0; i < n; ++i) {
-      const int k = OnePair ? pair : i;
-      const double x1 = du[n + i] - dw[i], x2 = du[2 * n + i] - dw[n + i];
-      Arm to;
-      if constexpr (Coupled) {
-        const double v1 = du[n + i] - before[n + i], v2 = du[2 * n + i] - before[2 * n + i];
-        to = coupled_step(record, pairs, k, reach[k], kn[k], before[i], du[i], before[n + i] - dw[i],
-                          before[2 * n + i] - dw[n + i], v1, v2, next[n + i] - du[n + i] - v1,
-                          next[2 * n + i] - du[2 * n + i] - v2);
-      } else {
-        to = alone_step(record, pairs, k, reach[k], kn[k], du[i], x1, x2);
-      }
-      dw[i] += x1 - to.y1, dw[n + i] += x2 - to.y2;
-      if constexpr (Force)
-        df[i] = to.closed * kn[k] * du[i], df[n + i] = kt[k] * to.y1, df[2 * n + i] = kt[k] * to.y2;
-    }
-  }
-}
-
-template <bool Coupled>
-FRETWAVE_INLINE void linear_choice(PairConstants const& p, int samples, int pairs, int pair, int n,
-                                   double const* record, double const* du, double* dw, double* df) {
+FRETWAVE_VECTORISE void linear_march(PairConstants const& p, int samples, int pairs, int pair, int n,
+                                     double const* record, double const* du, double* dw, double* df) {
   if (pair >= 0 && df)
-    linear_loop<Coupled, true, true>(p, samples, pairs, pair, n, record, du, dw, df);
+    linear_loop<true, true>(p, samples, pairs, pair, n, record, du, dw, df);
   else if (pair >= 0)
-    linear_loop<Coupled, true, false>(p, samples, pairs, pair, n, record, du, dw, df);
+    linear_loop<true, false>(p, samples, pairs, pair, n, record, du, dw, df);
   else if (df)
-    linear_loop<Coupled, false, true>(p, samples, pairs, pair, n, record, du, dw, df);
+    linear_loop<false, true>(p, samples, pairs, pair, n, record, du, dw, df);
   else
-    linear_loop<Coupled, false, false>(p, samples, pairs, pair, n, record, du, dw, df);
+    linear_loop<false, false>(p, samples, pairs, pair, n, record, du, dw, df);
 }
 
-/// A sample that sticks begins with (1, 0, 0) in the coupled record, with (1, 2, 2) in the other.
-template <bool Coupled>
-FRETWAVE_INLINE void left_loop(int samples, int n, double const* record, double* left) {
-  constexpr double stuck = Coupled ? 0 : 2;
+/// The record of a sample that sticks begins with (1, 0, 0).
+FRETWAVE_VECTORISE void left_rest(int samples, int n, double const* record, double* left) {
   for (int i = 0; i < n; ++i) left[i] = 0;
-  for (int t = 0; t < samples; ++t, record += record_arrays<Coupled> * n)
+  for (int t = 0; t < samples; ++t, record += record_arrays * n)
 #pragma omp simd
     for (int i = 0; i < n; ++i) {
-      const bool sticks = record[i] == 1 && record[n + i] == stuck && record[2 * n + i] == stuck;
+      const bool sticks = record[i] == 1 && record[n + i] == 0 && record[2 * n + i] == 0;
       left[i] = sticks ? left[i] : 1.0;
     }
-}
-
-}  // namespace
-
-FRETWAVE_VECTORISE void left_coupled(int samples, int n, double const* record, double* left) {
-  left_loop<true>(samples, n, record, left);
-}
-FRETWAVE_VECTORISE void left_alone(int samples, int n, double const* record, double* left) {
-  left_loop<false>(samples, n, record, left);
-}
-FRETWAVE_VECTORISE void march_coupled(PairConstants const& p, int samples, int n, double const* u, double* w,
-                                      double* f, double* record) {
-  coupled_loop(p, samples, n, u, w, f, record);
-}
-FRETWAVE_VECTORISE void march_alone(PairConstants const& p, int samples, int n, double const* u, double* w,
-                                    double* f, double* record) {
-  alone_loop(p, samples, n, u, w, f, record);
-}
-FRETWAVE_VECTORISE void linear_coupled(PairConstants const& p, int samples, int pairs, int pair, int n,
-                                       double const* record, double const* du, double* dw, double* df) {
-  linear_choice<true>(p, samples, pairs, pair, n, record, du, dw, df);
-}
-FRETWAVE_VECTORISE void linear_alone(PairConstants const& p, int samples, int pairs, int pair, int n,
-                                     double const* record, double const* du, double* dw, double* df) {
-  linear_choice<false>(p, samples, pairs, pair, n, record, du, dw, df);
 }
 
 FRETWAVE_VECTORISE void shoot(int samples, int n, double const* discs, double* start, double* end,

@@ -25,19 +25,11 @@ LinearPair Jenkins::linear_pair(int pair) const {
 
 void Jenkins::diagnose(Motion const& motion, double const* f, Diagnosis& out) const {
   const int n = motion.pairs;
-  for (int t = 0; t < motion.samples; ++t) {
-    const int before = t ? t - 1 : motion.samples - 1;
+  for (int t = 0; t < motion.samples; ++t)
     for (int i = 0; i < n; ++i) {
-      const size_t now = size_t(t) * n + i, then = size_t(before) * n + i;
-      const bool slips = at_limit(std::abs(f[now]), limit_[i]);
-      out.status[now] = slips ? Status::slip : Status::stick;
-      if (!slips) continue;
-      // the slider w = u - f/k moves under the force of the slip's end
-      const double moved = motion.u[now] - motion.u[then] - (f[now] - f[then]) / stiffness_[i];
-      out.slip_path[i] += std::abs(moved);
-      out.work[i] += std::max(0.0, f[now] * moved);  // by rounding only where it just touches the limit
+      const size_t k = size_t(t) * n + i;
+      out.status[k] = at_limit(std::abs(f[k]), limit_[i]) ? Status::slip : Status::stick;
     }
-  }
 }
 
 Entry jenkins_entry() {

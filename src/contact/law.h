@@ -126,7 +126,8 @@ class Law {
   }
 
   /// Its pairs are `LinearPair`s: harmonic balance takes their constants and finds the changes of state in
-  /// continuous time. Of what follows it asks such a law for `diagnose` alone.
+  /// continuous time. Of what follows it asks such a law for `diagnose` alone, for states and gaps; paths and
+  /// wear count there only where two tangents slip, all else is measured between samples, the work too.
   virtual bool piecewise_linear() const { return false; }
   virtual LinearPair linear_pair(int /*pair*/) const { return {}; }
 

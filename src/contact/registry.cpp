@@ -4,6 +4,7 @@
 
 #include "contact/coulomb_2d.h"
 #include "contact/coulomb_3d.h"
+#include "contact/coulomb_3d_uncoupled.h"
 #include "contact/jenkins.h"
 #include "contact/regularised_coulomb.h"
 #include "contact/springs.h"

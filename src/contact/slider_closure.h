@@ -3,7 +3,7 @@
 
 namespace fretwave::contact {
 
-/// Pairs of the coupled law whose sliders leave their rest position and never open, pairs innermost.
+/// Pairs of `coulomb_3d` whose sliders leave their rest position and never open, pairs innermost.
 ///
 /// One period is a map P of the slider: it is swept by a convex disc, so P never takes two sliders apart, and
 /// it starts inside the disc of the last sample. A slider inside the discs of two samples is inside all

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from models.core_models import chain, derivative, unknowns, whole
-from tolerances import LAST_BIT, REPEATED, ROUNDING, SOLVED
+from tolerances import LAST_BIT, LAST_DIGITS, REPEATED, ROUNDING, SOLVED
 
 import fretwave as fw
 
@@ -65,6 +65,22 @@ def test_derivative_where_a_slider_slips_and_comes_back(comm, law):
     expected = derivative(lambda at: residual(problem, at), y, dy, 1e-6)
     assert problem.diagnostics(unknowns(problem, y))["slip"] > 0.1
     assert np.allclose(product(problem, y, dy), expected, rtol=0, atol=REPEATED * np.abs(expected).max())
+
+
+@pytest.mark.ranks(1)
+@pytest.mark.parametrize("law", [*LAWS, "coulomb_2d"])
+def test_one_step_to_rest(law):
+    """From sliders at zero to u: those within R = mu N / kt of it stay, others are dragged there, in a circle or
+    tangent by tangent; to u itself where the pair is open."""
+    n, d = 300, fw.laws()[law].components
+    u = np.random.default_rng(5).standard_normal((d, n))
+    at_rest = fw.Contact(law, np.eye(d), {**STIFFNESS, "normal_load": 1.0, "gap": 0.2}).core_law(np.arange(n), n)
+    at_rest.rest(u.ravel().tolist())
+    w, normal = np.reshape(at_rest.sliders, (d - 1, n)), np.maximum(0, 1 + 2.0 * (u[0] - 0.2))
+    R, size = 0.4 * normal / 1.5, np.linalg.norm(u[1:], axis=0) if law == "coulomb_3d" else np.abs(u[1:])
+    assert np.allclose(w, u[1:] * (1 - np.minimum(1, R / size)), rtol=0, atol=LAST_DIGITS)
+    within = np.broadcast_to(size <= R, w.shape)
+    assert within.any() and (w[within] == 0).all() and (normal == 0).any()
 
 
 def test_preload_is_set_not_added(comm):

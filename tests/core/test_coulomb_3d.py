@@ -1,62 +1,16 @@
-"""3-D Coulomb contact: its cone, energy, symmetries and limits under imposed motion, and modes that carry it."""
+"""3-D Coulomb contact under imposed motion: its cone, energy, symmetries and limits."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
-from models.core_models import chain, dense, derivative, everywhere, mode_problem, solve_at, unknowns, whole
-from mpi4py import MPI
-from tolerances import LAST_DIGITS, REPEATED, ROUNDING, SOLVED, TIGHT
+from models.core_models import dense, everywhere, unknowns, whole
+from models.coulomb_pair import DRAWN, KN, KT, LAWS, MU, SAMPLES, imposed, loads, motion, motions, pair, period
+from tolerances import LAST_DIGITS, ROUNDING
 
 import fretwave as fw
-
-KN, KT, MU = 2.0, 1.5, 0.4
-SAMPLES = 64
-LAWS = ["coulomb_3d", "coulomb_3d_uncoupled"]
-#: On several ranks each must draw the same examples.
-DRAWN = settings(max_examples=25, deadline=None, derandomize=True, database=None)
-motions = st.lists(st.floats(-2.0, 2.0), min_size=21, max_size=21).map(lambda q: np.reshape(q, (3, 7)))
-loads = st.floats(0.0, 3.0)
-
-
-def pair(law="coulomb_3d", B=((1, 0, 0), (0, 1, 0), (0, 0, 1)), **changes):
-    parameters = {"normal_stiffness": KN, "tangential_stiffness": KT, "friction_coefficient": MU, "normal_load": 1.0}
-    return fw.Contact(law, np.array(B, dtype=float), {**parameters, **changes})
-
-
-def imposed(contact, q, orders=(0, 1, 2, 3), samples=SAMPLES):
-    """A problem and its unknowns for the motion with coefficients q (dofs, m), frequency 1, no decay."""
-    n = np.shape(contact.B)[1]
-    model = fw.Model(np.eye(n), np.eye(n), None, [contact], MPI.COMM_WORLD)
-    start = fw.LinearMode(1.0, 0.0, np.ones(n), np.zeros(n))
-    problem = fw.NonlinearMode(model, fw.Harmonics(orders, samples), "EPMC", 0, start)
-    return problem, unknowns(problem, np.concatenate([np.ravel(q), [0.0, 1.0, 0.0]]))
-
-
-def period(contact, q, **options):
-    """u, f (samples, 3) of a single pair over one period, on every rank."""
-    problem, y = imposed(contact, q, **options)
-    found = everywhere(problem, problem.contact_period(y))[0]
-    return found["u"][:, :, 0], found["f"][:, :, 0]
-
-
-def motion(normal=(0,), tangent=(0,), other=(0,)):
-    """Coefficients (3, 7) from the leading ones of each direction."""
-    q = np.zeros((3, 7))
-    for row, values in zip(q, (normal, tangent, other)):
-        row[: len(values)] = values
-    return q
-
-
-def shifted(q, samples):
-    """The motion read from another sample on."""
-    out = np.array(q)
-    for n in range(1, (np.shape(q)[1] - 1) // 2 + 1):
-        c = (out[:, 2 * n - 1] - 1j * out[:, 2 * n]) * np.exp(2j * np.pi * n * samples / SAMPLES)
-        out[:, 2 * n - 1], out[:, 2 * n] = c.real, -c.imag
-    return out
 
 
 @pytest.mark.parametrize("law", LAWS)
@@ -188,106 +142,6 @@ def test_without_friction_there_is_no_tangential_force(law):
     assert (f[:, 1:] == 0).all() and (f[:, 0] > 0).all()
 
 
-def independent_of_the_first_sample(contact, q, tolerance):
-    f = period(contact, q)[1]
-    for samples in (5, 20, 40, 63):
-        later = period(contact, shifted(q, samples))[1]
-        assert np.abs(np.roll(later, samples, axis=0) - f).max() <= tolerance * np.abs(f).max()
-
-
-@given(q=motions, load=loads)
-@DRAWN
-def test_uncoupled_law_does_not_depend_on_the_first_sample(q, load):
-    """Started from rest and read on the second period (DESIGN fact 3)."""
-    independent_of_the_first_sample(pair("coulomb_3d_uncoupled", normal_load=load), q, 1e-13)
-
-
-@given(q=motions, load=loads)
-@DRAWN
-def test_coupled_law_does_not_depend_on_the_first_sample(q, load):
-    """Its sliders close the period, after lift-off, in slip on curved paths and in shakedown alike."""
-    independent_of_the_first_sample(pair(normal_load=load), q, 1e-11)
-
-
-@given(q=motions, angle=st.floats(-3.2, 3.2))
-@DRAWN
-def test_coupled_law_does_not_depend_on_the_first_sample_along_a_line(q, angle):
-    line = motion(q[0], np.cos(angle) * q[1], np.sin(angle) * q[1])
-    independent_of_the_first_sample(pair(), line, 1e-12)
-
-
-@pytest.mark.parametrize("size", [0.267, 0.28, 0.35, 0.5, 1.0])
-def test_coupled_law_does_not_depend_on_the_first_sample_of_an_orbit(size):
-    """An elliptic orbit just beyond the stick limit 0.26667, where a marched slider takes many periods to settle."""
-    independent_of_the_first_sample(pair(), motion((0,), (0, 0, size), (0, 0.6 * size)), 1e-11)
-
-
-REACH = MU / KT  #: the slider's disc at N0 = 1
-
-
-def test_shakedown_takes_the_periodic_slider_nearest_to_rest():
-    """A circle of radius r < R about c far from rest: all discs hold the one of radius R - r about c, and w is its
-    point nearest to 0, c - (R - r), on the disc of the sample where u = c + r."""
-    c, r = 1.0, 0.1
-    u, f = period(pair(), motion((0,), (c, r), (0, 0, r)))
-    w = c - (REACH - r)
-    assert np.allclose(f[:, 1:], KT * (u[:, 1:] - [w, 0]), rtol=0, atol=1e-13)
-
-
-@pytest.mark.parametrize("r", [1.1 * REACH, 1.0, 3.0])
-def test_slider_on_a_circle_is_a_tractrix(r):
-    """Pulled along a circle of radius r > R at distance R it moves along itself, on the circle of radius
-    sqrt(r^2 - R^2): work per period 2 pi mu N sqrt(r^2 - R^2), and the force leads the motion by acos(R / r); both
-    errors fall as 1/N_t^2."""
-    path, lead = motion((0,), (0, r), (0, 0, r)), np.arccos(REACH / r)
-    work, errors = 2 * np.pi * MU * np.sqrt(r**2 - REACH**2), []
-    for samples in (256, 1024, 4096):
-        problem, y = imposed(pair(), path, samples=samples)
-        u, f = period(pair(), path, samples=samples)
-        found = np.mean((f[:, 1] + 1j * f[:, 2]) * (u[:, 1] - 1j * u[:, 2])) / r
-        errors.append([abs(problem.diagnostics(y)["work"] / work - 1), abs(found / (MU * np.exp(1j * lead)) - 1)])
-    assert (np.array(errors[2]) < 3e-5).all() and (np.log2(np.divide(errors[:-1], errors[1:])) > 3.8).all()
-
-
-#: Motions of a pair that never opens: which sliders close its period.
-STEADY = {
-    "shakedown on one disc": motion((0, 0.05), (1.0, 0.1), (0.3, 0, 0.1)),
-    "shakedown on two discs": motion((0, 0, 0.02), (0.2, 0, 0, 0.05), (0.1, 0.24, 0.03)),
-    "cycle near its onset": motion((0, 0, 0.02), (0.02, 0, 0.29), (0.05, 0.17)),
-    "cycle": motion((0, 0.1, 0.1), (0.3, 0, 0.5, 0.2), (0.2, 0.6)),
-}
-
-
-@pytest.mark.parametrize("which", list(STEADY))
-def test_tangent_of_the_closed_slider_is_exact(which):
-    """Against central differences, in all directions of the motion; the period closes from any sample."""
-    q = STEADY[which]
-    independent_of_the_first_sample(pair(), q, 1e-11)
-    problem, y0 = imposed(pair(), q)
-    y, step, slip = whole(y0), 1e-6, problem.diagnostics(y0)["slip"]
-    assert slip > 4 / SAMPLES if which.startswith("cycle") else 0 < slip <= 2 / SAMPLES
-    for e in np.eye(len(y))[:21]:
-        sides = [whole(problem.residual(unknowns(problem, y + s * step * e))) for s in (1, -1)]
-        found = whole(problem.jacobian_product(y0, unknowns(problem, e)))
-        assert np.allclose((sides[0] - sides[1]) / (2 * step), found, rtol=0, atol=2e-9 * np.abs(found).max())
-
-
-@pytest.mark.parametrize("seed", range(8))
-def test_tangent_on_a_bent_path_with_lift_off_is_exact(seed):
-    """Random motions that stick, slip on bent paths under a varying load, open and land, against central differences;
-    the assembled block too."""
-    rng = np.random.default_rng(seed)
-    problem, y0 = imposed(pair(), 0.35 * rng.standard_normal((3, 7)))
-    y, step, states = whole(y0), 1e-7, problem.diagnostics(y0)
-    assert min(states["stick"], states["slip"], states["open"]) > 0
-    J = dense(problem.jacobian(y0))
-    for dy in rng.standard_normal((4, 24)) * (np.arange(24) < 21):
-        sides = [whole(problem.residual(unknowns(problem, y + s * step * dy))) for s in (1, -1)]
-        found = whole(problem.jacobian_product(y0, unknowns(problem, dy)))
-        assert np.allclose((sides[0] - sides[1]) / (2 * step), found, rtol=0, atol=1e-7 * np.abs(found).max())
-        assert np.allclose(J @ dy, found, rtol=0, atol=ROUNDING * np.abs(found).max())
-
-
 @pytest.mark.parametrize("law", [*LAWS, "jenkins"])
 def test_many_pairs_are_as_each_alone(law):
     """Marched in tiles of up to 64 pairs: residual, product and assembled Jacobian of the pairs beside the joints."""
@@ -321,41 +175,6 @@ def test_few_harmonics_by_table_and_many_by_fft_are_the_same():
     assert np.allclose(*found, rtol=0, atol=1e-13)
 
 
-def random_map(pairs, n, seed=3):
-    return 0.5 * np.random.default_rng(seed).standard_normal((3 * pairs, n))
-
-
-def random_mode(law, method, seed, n=5):
-    """A mode problem of 3 pairs seen through a full B, and a point where they stick, slip and open."""
-    rng = np.random.default_rng(seed)
-    model = fw.Model(np.eye(n), chain(n), 0.02 * chain(n), [pair(law, random_map(3, n))], MPI.COMM_WORLD)
-    start = fw.LinearMode(1.0, 0.0, np.ones(n), np.zeros(n))
-    problem = fw.NonlinearMode(model, fw.Harmonics([0, 1, 2], 32), method, 0, start)
-    return problem, np.concatenate([0.5 * rng.standard_normal(5 * n), [0.05, 1.1, -0.2]])
-
-
-def residual_of(problem):
-    return lambda y: whole(problem.residual(unknowns(problem, y)))
-
-
-@pytest.mark.ranks(1, 2, 3)
-@pytest.mark.parametrize("method", ["CNM", "EPMC"])
-@pytest.mark.parametrize("law", LAWS)
-def test_jacobian_of_a_mode_is_exact(law, method):
-    """Assembled against the product to rounding, and both against central differences, in stick, slip and lift-off."""
-    for seed in range(3):
-        problem, y = random_mode(law, method, seed)
-        point = unknowns(problem, y)
-        contact = problem.diagnostics(point)
-        assert min(contact["stick"], contact["slip"], contact["open"]) > 0.01
-        J, identity = dense(problem.jacobian(point)), np.eye(len(y))
-        product = np.column_stack([whole(problem.jacobian_product(point, unknowns(problem, e))) for e in identity])
-        step = 1e-6 if law == "coulomb_3d" else 3e-5  # the former has kinks where a sample changes its state
-        difference = np.column_stack([derivative(residual_of(problem), y, e, step) for e in identity])
-        assert np.allclose(product, J, rtol=0, atol=LAST_DIGITS * np.abs(J).max())
-        assert np.allclose(difference, J, rtol=0, atol=SOLVED * np.abs(J).max())
-
-
 #: Pairs that do not move along their tangents, and carry nothing there: (parameters, normal motion).
 CARRIES_NOTHING = {
     "no friction": ({"friction_coefficient": 0.0}, (0, 0.3)),
@@ -376,62 +195,6 @@ def test_tangent_is_zero_where_no_tangential_force_can_be(law, which):
     assert np.abs(np.delete(found, 7)).max() < 1e-13
 
 
-@pytest.mark.parametrize("law", LAWS)
-def test_mean_block_is_regular_when_stuck_under_preload(law):
-    """DESIGN fact 3: a body held by contact alone. The mean's block is the stuck stiffness, kn and kt, not singular."""
-    contact = pair(law, np.vstack([np.eye(3), np.diag([-1.0, 1.0, 1.0])]))
-    model = fw.Model(np.eye(3), np.zeros((3, 3)), None, [contact], MPI.COMM_WORLD)
-    start = fw.linear_modes(model, 1, "stuck")[0]
-    problem = fw.NonlinearMode(model, fw.Harmonics([0, 1], 32), "EPMC", 1, start)
-    y = np.zeros(12)
-    y[3 + 1], y[-2:] = 1.0, [1.0, np.log(0.1)]
-    J = dense(problem.jacobian(unknowns(problem, y)))[0:9:3, 0:9:3]
-    k_ref = start.omega**2 / np.sum(start.shape**2)
-    assert np.allclose(J * k_ref, 2 * np.diag([KN, KT, KT]), rtol=0, atol=ROUNDING)
-
-
-def unilateral(comm, highest, samples=1024):
-    """REFERENCE: k = 1, kn = 3, m = 1, zero gap, no friction."""
-    contact = pair(B=((1.0,), (0.0,), (0.0,)), normal_stiffness=3.0, friction_coefficient=0.0, normal_load=0.0)
-    model = fw.Model([[1.0]], [[1.0]], None, [contact], comm)
-    return mode_problem(model, range(highest + 1), samples, "EPMC", start="free")
-
-
-@pytest.mark.parametrize("amplitude", [1e-3, 1.0, 1e3])
-def test_unilateral_spring(comm, amplitude):
-    """REFERENCE: w = 2 w1 w2/(w1 + w2) = 4/3 at any amplitude, no damping."""
-    problem = unilateral(comm, 15)
-    state = problem.state(solve_at(problem, amplitude))
-    assert state["omega0"] == pytest.approx(4 / 3, abs=1e-7)
-    assert abs(state["zeta"]) < ROUNDING
-
-
-def test_unilateral_spring_converges_with_the_harmonics(comm):
-    """Acceleration is continuous, its slope is not: the error of the frequency falls as H^-4 and faster."""
-    errors = []
-    for highest in (3, 7, 15, 31):
-        problem = unilateral(comm, highest, 4096)
-        errors.append(abs(problem.state(solve_at(problem, 1.0))["omega0"] - 4 / 3))
-    assert (np.log2(np.divide(errors[:-1], errors[1:])) > 4.5).all()
-    assert errors[-1] < 3e-9
-
-
-@pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize("method", ["CNM", "EPMC"])
-def test_stuck_mode_is_linear(comm, law, method):
-    """No slip, no lift-off: the linear stuck mode, undamped, at every amplitude below the threshold."""
-    contact = pair(law, np.random.default_rng(0).standard_normal((3, 4)), normal_load=50.0)
-    model = fw.Model(np.eye(4), chain(4), None, [contact], comm)
-    start = fw.linear_modes(model, 1, "stuck")[0]
-    problem = fw.NonlinearMode(model, fw.Harmonics([0, 1, 2], 64), method, 0, start)
-    problem.preload(np.zeros(4), np.asarray(contact.B)[0] * 50.0)
-    for amplitude in (1e-3, 0.1, 1.0):
-        y = solve_at(problem, amplitude)
-        state = problem.state(y)
-        assert problem.diagnostics(y)["stick"] == 1
-        assert state["omega0"] == pytest.approx(start.omega, rel=TIGHT) and abs(state["zeta"]) < 1e-11
-
-
 def test_parameters_belong_to_their_pairs(comm):
     """One value per pair, whichever rank holds the pair: forces of 4 pairs at rest displaced by one unit."""
     kn, kt, gap = np.array([1.0, 2.0, 3.0, 4.0]), np.array([5.0, 6.0, 7.0, 8.0]), np.array([0.0, 0.1, -0.2, 9.0])
@@ -444,46 +207,6 @@ def test_parameters_belong_to_their_pairs(comm):
     f = everywhere(problem, problem.contact_period(unknowns(problem, y)))[0]["f"]
     normal = np.maximum(0, 1.0 + kn * (1 - gap))
     assert np.allclose(f, [normal, kt * (normal > 0), kt * (normal > 0)], rtol=1e-13, atol=0)
-
-
-#: Parameters at their ends, and which stiffness then holds: shares of (kn, kt).
-EXTREMES = {
-    "open everywhere": ({"normal_load": 0.0, "gap": 1e3}, (0, 0)),
-    "no friction": ({"friction_coefficient": 0.0}, (1, 0)),
-    "rough": ({"friction_coefficient": 1e3}, (1, 1)),
-    "soft": ({"normal_stiffness": 1e-6, "tangential_stiffness": 1e-6}, (1, 1)),
-    "stiff": ({"normal_stiffness": 1e5, "tangential_stiffness": 1e5, "normal_load": 1e6}, (1, 1)),
-}
-
-
-@pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize("which", list(EXTREMES))
-def test_extremes_of_the_parameters(comm, law, which):
-    """Issue 3. Each keeps one state of contact, so the mode is that linear structure's, undamped."""
-    changes, (normal, tangential) = EXTREMES[which]
-    contact = pair(law, random_map(1, 4), **changes)
-    kn, kt = (normal * contact.parameters["normal_stiffness"], tangential * contact.parameters["tangential_stiffness"])
-    stiffness = chain(4, ground=0.1)
-    expected = np.sqrt(np.linalg.eigvalsh(stiffness + (contact.B.T * [kn, kt, kt]) @ contact.B)[0])
-    model = fw.Model(np.eye(4), stiffness, None, [contact], comm)
-    start = fw.linear_modes(model, 1, "stuck")[0]
-    problem = fw.NonlinearMode(model, fw.Harmonics([0, 1, 2, 3], 64), "EPMC", 0, start)
-    problem.preload(np.zeros(4), contact.B[0] * contact.parameters["normal_load"])
-    y = solve_at(problem, 0.2)
-    assert problem.state(y)["omega0"] == pytest.approx(expected, rel=REPEATED)
-    assert abs(problem.state(y)["zeta"]) < TIGHT and problem.diagnostics(y)["work"] < ROUNDING
-
-
-@pytest.mark.parametrize("law", LAWS)
-def test_contact_without_load_or_gap(comm, law):
-    """N0 = 0: scale-free, like the unilateral spring: frequency and damping do not depend on the amplitude."""
-    model = fw.Model(np.eye(4), chain(4, ground=0.1), None, [pair(law, random_map(1, 4), normal_load=0.0)], comm)
-    problem = mode_problem(model, range(4), 64, "EPMC")
-    found = [problem.state(solve_at(problem, a)) for a in (1e-3, 1.0, 1e3)]
-    assert found[0]["zeta"] > 0.01
-    for state in found[1:]:
-        assert state["omega0"] == pytest.approx(found[0]["omega0"], rel=SOLVED)
-        assert state["zeta"] == pytest.approx(found[0]["zeta"], rel=REPEATED)
 
 
 GOOD = {"normal_stiffness": 1.0, "tangential_stiffness": 1.0, "friction_coefficient": 0.3}

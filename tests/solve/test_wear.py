@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from models.core_models import chain, solve_at, unknowns, whole
-from test_coulomb_3d import KN, KT, LAWS, MU, STEADY, imposed, motion, pair, random_mode
+from models.coulomb_pair import KN, KT, LAWS, MU, STEADY, imposed, motion, pair, random_mode
 from test_krylov import ROOT, blade, mode, preloaded
 from tolerances import REPEATED, ROUNDING, SOLVED
 
