@@ -51,6 +51,10 @@ class Contact:
             k: np.broadcast_to(np.asarray(v, float), self.pairs) for k, v in {**standard, **self.parameters}.items()
         }
 
+    def frictionless(self) -> bool:
+        """Pairs that are stops: their force is known at every time, as the solver knows it."""
+        return self.components == 3 and not np.any(self.full()["friction_coefficient"])
+
     def stuck(self) -> np.ndarray:
         """Stiffness of each row of B when nothing slips and what touches at rest stays closed."""
         p = self.full()
@@ -104,11 +108,15 @@ class Equations:
 
     def transform(self, samples):
         """Waves at samples (samples, m), and what takes samples back to coefficients."""
-        tau = 2 * np.pi * np.arange(samples) / samples
+        synthesis = self.waves(2 * np.pi * np.arange(samples) / samples)
+        return synthesis, (synthesis * self.weight() / samples).T
+
+    def waves(self, tau):
         rows = [[np.cos(n * tau), np.sin(n * tau)] if n else [np.ones_like(tau)] for n in self.orders]
-        synthesis = np.array(sum(rows, [])).T
-        weight = np.array(sum([[2, 2] if n else [1] for n in self.orders], []))
-        return synthesis, (synthesis * weight / samples).T
+        return np.array(sum(rows, [])).T
+
+    def weight(self):
+        return np.array(sum([[2, 2] if n else [1] for n in self.orders], []))
 
     def complex_of(self, Q, n):
         """q_n of coefficients (rows, m[, lanes])."""
@@ -136,6 +144,8 @@ class Equations:
     def law(self, contact, U, beta, omega, parameters=None):
         """Force coefficients (rows, m, lanes) for relative coefficients U (rows, m, lanes); rows pair by pair."""
         c, pairs, lanes = contact.components, contact.pairs, U.shape[2]
+        if contact.frictionless():
+            return self.stops(contact, U)
         p = {k: np.repeat(v, lanes) for k, v in contact.full().items()}
         motion = self.velocity(U, beta, omega) if contact.law == "regularised_coulomb" else U
         motion = motion.reshape(pairs, c, self.m, lanes).transpose(2, 1, 0, 3).reshape(self.m, -1)
@@ -151,6 +161,19 @@ class Equations:
             f = laws.coulomb_3d(u, p, rest)
         F = (analysis @ f.reshape(samples, -1)).reshape(self.m, c, pairs, lanes)
         return F.transpose(2, 1, 0, 3).reshape(pairs * c, self.m, lanes)
+
+    def stops(self, contact, U):
+        """Force coefficients of pairs without friction, exact in time; lanes of one motion share their spans."""
+        F, p = np.zeros_like(U), contact.full()
+        same = np.r_[True, np.any(U[:, :, 1:].real != U[:, :, :-1].real, axis=(0, 1))]
+        motions = np.split(np.arange(U.shape[2]), np.flatnonzero(same)[1:])
+        for pair in range(contact.pairs):
+            kn = p["normal_stiffness"][pair]
+            load = p["normal_load"][pair] - kn * p["gap"][pair]
+            for lanes in motions:
+                integral = laws.stop(U[3 * pair][:, lanes], kn, load, self.waves)
+                F[3 * pair][:, lanes] = self.weight()[:, None] / (2 * np.pi) * integral
+        return F
 
     def static_load(self):
         """B^T f(0): what balances the pairs' own normal loads."""

@@ -8,6 +8,7 @@ imaginary part. Nothing here is shared with the solver.
 from __future__ import annotations
 
 import numpy as np
+from scipy.optimize import brentq
 
 CLOSED = 1e-13  #: of a motion's size: a slider that comes back this near to its start has closed its period
 MOST_PERIODS = 400
@@ -33,6 +34,50 @@ def jenkins(u, p, rest):
             f[t, 0] = np.where(slips, np.sign(trial.real) * limit, trial)
             w = np.where(slips, u[t, 0] - f[t, 0] / kt, w)
     return f
+
+
+def stop(coefficients, stiffness, load, waves):
+    """f = max(0, load + k u) at every time of the period: from root to root by Gauss's quadrature.
+
+    The ends of a contact do not move its force, which is zero there: only real parts say where they are.
+
+    Parameters
+    ----------
+    coefficients : (m, lanes) of u
+    stiffness, load : numbers
+    waves : callable
+        (times, m) from times: 1, cos n tau, sin n tau
+
+    Returns
+    -------
+    (m, lanes) integrals of f and the waves over the period
+    """
+    first, out = coefficients[:, :1].real, np.zeros_like(coefficients)
+    nodes, weights = np.polynomial.legendre.leggauss(4 * len(coefficients) + 24)
+    for begin, end in _closed_spans(lambda tau: load + stiffness * (waves(tau) @ first)[:, 0], len(coefficients)):
+        tau, half = (begin + end) / 2 + (end - begin) / 2 * nodes, (end - begin) / 2
+        wave = waves(tau)
+        out += half * (wave * weights[:, None]).T @ (load + stiffness * (wave @ coefficients))
+    return out
+
+
+def _closed_spans(f, m):
+    """Where f > 0 in a period: between its roots, looked for between the extrema of a fine grid's parabolas."""
+    grid = 2 * np.pi * np.arange(64 * m + 1) / (64 * m)
+    value = f(grid)
+    low, here, high = value[:-2], value[1:-1], value[2:]
+    peak = (here - low) * (high - here) < 0
+    bent = np.where(peak, low - 2 * here + high, 1.0)
+    extrema = grid[1:-1] + np.where(peak, (low - high) / (2 * bent), 0.0) * grid[1]
+    tau = np.unique(np.r_[grid, extrema[peak]])
+    value = f(tau)
+    turns = np.flatnonzero((value[:-1] > 0) != (value[1:] > 0))
+    if not len(turns):
+        return [(0.0, 2 * np.pi)] if value[0] > 0 else []
+    ends = [brentq(lambda t: f(np.array([t]))[0], tau[i], tau[i + 1], xtol=1e-300, rtol=1e-15) for i in turns]
+    if value[0] > 0:
+        ends = [ends[-1] - 2 * np.pi, *ends[:-1]]
+    return list(zip(ends[::2], ends[1::2]))
 
 
 def coulomb_3d(u, p, rest):

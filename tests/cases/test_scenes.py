@@ -59,6 +59,24 @@ def test_a_pad_that_lifts_off_has_no_force_and_reaches_the_unilateral_spring():
     np.testing.assert_allclose(f[:, 0, 0], np.maximum(0, 2 + 6 * np.cos(TAU)), atol=ROUNDING)
 
 
+def test_a_stop_is_its_closed_form_to_rounding():
+    """k max(0, cos tau - cos c): k / pi (sin c - c cos c), k / pi (c - sin c cos c); complex steps: dF/da, twice D."""
+
+    def waves(tau):
+        return np.array([np.ones_like(tau), np.cos(tau), np.sin(tau)]).T
+
+    for c in (1e-3, 0.3, 1.5, 3.0):
+        a = np.array([[0.0], [1.0 + 1e-30j], [0.0]])
+        mean, first, other = laws.stop(a, 3.0, -3.0 * np.cos(c), waves)[:, 0] / np.pi
+        assert mean.real == pytest.approx(6 / np.pi * (np.sin(c) - c * np.cos(c)), rel=ROUNDING, abs=1e-15)
+        assert first.real == pytest.approx(3 / np.pi * (c - np.sin(c) * np.cos(c)), rel=ROUNDING, abs=1e-15)
+        assert first.imag / 1e-30 == pytest.approx(3 / np.pi * (c + np.sin(c) * np.cos(c)), rel=1e-9)
+        assert other.real == pytest.approx(0, rel=ROUNDING, abs=1e-15)
+    for load in (7.0, -7.0):  # closed all the time, and never
+        force = laws.stop(np.array([[0.5], [1.0], [0.0]], complex), 3.0, load, waves)[:, 0] / np.pi
+        np.testing.assert_allclose(force, [2 * load + 3.0, 3.0, 0.0] if load > 0 else 0, atol=1e-14)
+
+
 def test_a_slider_in_shakedown_rests_on_the_point_nearest_to_its_start():
     centres = np.array([[1.0, 0.0], [0.0, 1.0], [0.5, 0.5]])
     at = laws.nearest_common(centres, np.array([0.9, 0.9, 5.0]), np.zeros(2))
