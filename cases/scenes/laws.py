@@ -7,6 +7,8 @@ imaginary part. Nothing here is shared with the solver.
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 from scipy.optimize import brentq
 
@@ -73,9 +75,12 @@ def jenkins(coefficients, rates, stiffness, limit, waves):
     return out
 
 
+_nodes = cache(np.polynomial.legendre.leggauss)
+
+
 def _gauss(begin, end, m, waves):
     """Nodes, weights and waves of a quadrature that is exact for products of two motions."""
-    nodes, weights = np.polynomial.legendre.leggauss(4 * m + 24)
+    nodes, weights = _nodes(4 * m + 24)
     half = (end - begin) / 2
     tau = (begin + end) / 2 + half * nodes
     return tau, half * weights, waves(tau)
