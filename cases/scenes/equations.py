@@ -18,7 +18,6 @@ from . import laws
 
 STEP = 1e-30  #: of complex differentiation
 LARGEST = 4e6  #: numbers in one march
-MANY = 1 << 11  #: samples of a law that the solver does not sample
 
 
 @dataclass
@@ -50,6 +49,10 @@ class Contact:
         return {
             k: np.broadcast_to(np.asarray(v, float), self.pairs) for k, v in {**standard, **self.parameters}.items()
         }
+
+    def continuous(self) -> bool:
+        """Sliders in one direction, and pads that are stops: their force is known at every time, as to the solver."""
+        return self.law == "jenkins" or self.components == 3 and not np.any(self.full()["friction_coefficient"])
 
     def stuck(self) -> np.ndarray:
         """Stiffness of each row of B when nothing slips and what touches at rest stays closed."""
@@ -94,21 +97,19 @@ class Equations:
         self.maps = [sp.csr_matrix(contact.B) for contact in self.contacts]
         self.m = sum(2 if n else 1 for n in self.orders)
         self.column = {n: sum(2 if k else 1 for k in self.orders if k < n) for n in self.orders}
-        self.transforms = {n: self.transform(n) for n in {self.sampled(contact) for contact in self.contacts}}
+        synthesis = self.waves(2 * np.pi * np.arange(self.samples) / self.samples)
+        self.transform = synthesis, (synthesis * self.weight() / self.samples).T
 
     # Pieces
 
-    def sampled(self, contact):
-        """Samples of its march: for a law that the solver has in continuous time many, whose error is 4e-3 of 128's."""
-        return max(MANY, self.samples) if contact.law == "jenkins" else self.samples
-
-    def transform(self, samples):
-        """Waves at samples (samples, m), and what takes samples back to coefficients."""
-        tau = 2 * np.pi * np.arange(samples) / samples
+    def waves(self, tau):
+        """1, cos n tau, sin n tau at these times (times, m)."""
         rows = [[np.cos(n * tau), np.sin(n * tau)] if n else [np.ones_like(tau)] for n in self.orders]
-        synthesis = np.array(sum(rows, [])).T
-        weight = np.array(sum([[2, 2] if n else [1] for n in self.orders], []))
-        return synthesis, (synthesis * weight / samples).T
+        return np.array(sum(rows, [])).T
+
+    def weight(self):
+        """Of the means of a function times the waves, its coefficients (m,)."""
+        return np.array(sum([[2, 2] if n else [1] for n in self.orders], []))
 
     def complex_of(self, Q, n):
         """q_n of coefficients (rows, m[, lanes])."""
@@ -136,21 +137,39 @@ class Equations:
     def law(self, contact, U, beta, omega, parameters=None):
         """Force coefficients (rows, m, lanes) for relative coefficients U (rows, m, lanes); rows pair by pair."""
         c, pairs, lanes = contact.components, contact.pairs, U.shape[2]
+        if contact.continuous():
+            return self.in_time(contact, U)
         p = {k: np.repeat(v, lanes) for k, v in contact.full().items()}
         motion = self.velocity(U, beta, omega) if contact.law == "regularised_coulomb" else U
         motion = motion.reshape(pairs, c, self.m, lanes).transpose(2, 1, 0, 3).reshape(self.m, -1)
-        samples = self.sampled(contact)
-        synthesis, analysis = self.transforms[samples]
+        samples, (synthesis, analysis) = self.samples, self.transform
         u = (synthesis @ motion).reshape(samples, c, pairs * lanes)
         rest = np.zeros((max(1, c - 1), pairs * lanes))
         if contact.law == "regularised_coulomb":
             f = laws.regularised_coulomb(u, p)
-        elif contact.law == "jenkins":
-            f = laws.jenkins(u, p, rest)
         else:
             f = laws.coulomb_3d(u, p, rest)
         F = (analysis @ f.reshape(samples, -1)).reshape(self.m, c, pairs, lanes)
         return F.transpose(2, 1, 0, 3).reshape(pairs * c, self.m, lanes)
+
+    def in_time(self, contact, U):
+        """Force coefficients of pairs that are not sampled; lanes of one motion share the times of their changes."""
+        F, p, c = np.zeros_like(U), contact.full(), contact.components
+        rates = self.velocity(U.reshape(len(U), self.m, -1), 0.0, 1.0)
+        same = np.r_[True, np.any(U[:, :, 1:].real != U[:, :, :-1].real, axis=(0, 1))]
+        motions = np.split(np.arange(U.shape[2]), np.flatnonzero(same)[1:])
+        for pair in range(contact.pairs):
+            for lanes in motions:
+                u = U[c * pair][:, lanes]
+                if contact.law == "jenkins":
+                    kt, limit = p["tangential_stiffness"][pair], p["friction_limit"][pair]
+                    integral = laws.jenkins(u, rates[pair][:, lanes], kt, limit, self.waves)
+                else:
+                    kn = p["normal_stiffness"][pair]
+                    load = p["normal_load"][pair] - kn * p["gap"][pair]
+                    integral = laws.stop(u, kn, load, self.waves)
+                F[c * pair][:, lanes] = self.weight()[:, None] / (2 * np.pi) * integral
+        return F
 
     def static_load(self):
         """B^T f(0): what balances the pairs' own normal loads."""
@@ -248,5 +267,5 @@ class Equations:
 
     def batch(self):
         """States that fit in one march."""
-        lanes = sum(x.pairs * x.components * (x.components * self.m + 2) * self.sampled(x) for x in self.contacts)
+        lanes = sum(x.pairs * x.components * (x.components * self.m + 2) * self.samples for x in self.contacts)
         return int(np.clip(LARGEST / max(lanes, 1), 1, 64))

@@ -7,11 +7,16 @@ imaginary part. Nothing here is shared with the solver.
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
+from scipy.optimize import brentq
 
 CLOSED = 1e-13  #: of a motion's size: a slider that comes back this near to its start has closed its period
 MOST_PERIODS = 400
+PATIENCE = 8  #: periods after which a slider that still creeps is looked for where it would come to
 TINY = 1e-300
+FIRST = 0.0123  #: time at which a period is begun, where motions that are measured from their phase have no root
 
 
 def regularised_coulomb(v, p):
@@ -22,17 +27,111 @@ def regularised_coulomb(v, p):
     return p["friction_limit"] * np.tanh(inside)
 
 
-def jenkins(u, p, rest):
-    """Elastic Coulomb slider: f = kt (u - w), |f| <= limit; read on the second period from the rest state."""
-    kt, limit = p["tangential_stiffness"], p["friction_limit"]
-    w, f = rest[0] + 0j * u[0, 0], np.empty_like(u)
-    for _ in range(2):
-        for t in range(len(u)):
-            trial = kt * (u[t, 0] - w)
-            slips = (abs(trial.real) > limit) | (limit == 0)
-            f[t, 0] = np.where(slips, np.sign(trial.real) * limit, trial)
-            w = np.where(slips, u[t, 0] - f[t, 0] / kt, w)
-    return f
+def jenkins(coefficients, rates, stiffness, limit, waves):
+    """Elastic Coulomb slider: f = kt (u - w), |f| <= limit, at every time of the second period from rest.
+
+    From one turning point of u to the next it sticks until |u - w| is the reach, limit / kt, and slips from there on.
+    Neither those points nor the ends of sticking move the force, which has no jump: real parts say where they are.
+
+    Parameters
+    ----------
+    coefficients, rates : (m, lanes) of u and of du/dtau
+    stiffness, limit : numbers
+    waves : callable
+        (times, m) from times: 1, cos n tau, sin n tau
+
+    Returns
+    -------
+    (m, lanes) integrals of f and the waves over the period
+    """
+    m, reach, out = len(coefficients), limit / stiffness, np.zeros_like(coefficients)
+
+    def u(tau):
+        return waves(np.atleast_1d(tau)) @ coefficients
+
+    def first(tau):
+        return float((waves(np.atleast_1d(tau)) @ coefficients[:, 0].real)[0])
+
+    def add(begin, end, force):
+        tau, weight, wave = _gauss(begin, end, m, waves)
+        out[...] += (wave * weight[:, None]).T @ force(tau)
+
+    turns = _roots(lambda tau: waves(tau) @ rates[:, 0].real, m)
+    turns = np.r_[turns, turns[0] + 2 * np.pi] if len(turns) else np.array([FIRST, FIRST + 2 * np.pi])
+    w = 0j * coefficients[0]
+    for second in (False, True):
+        for begin, end in zip(turns[:-1], turns[1:]):
+            away = first(end) - w[0].real
+            side, onset = np.sign(away), end
+            if abs(away) > reach:
+                goal = w[0].real + side * reach
+                late = side * (first(begin) - goal) >= 0
+                onset = begin if late else brentq(lambda t, g=goal: first(t) - g, begin, end, xtol=1e-300, rtol=1e-15)
+            if second:
+                add(begin, onset, lambda tau, w=w: stiffness * (u(tau) - w))
+                add(onset, end, lambda tau, f=side * limit: np.full((len(tau), 1), f))
+            if abs(away) > reach:
+                w = u(end)[0] - side * reach
+    return out
+
+
+_nodes = cache(np.polynomial.legendre.leggauss)
+
+
+def _gauss(begin, end, m, waves):
+    """Nodes, weights and waves of a quadrature that is exact for products of two motions."""
+    nodes, weights = _nodes(4 * m + 24)
+    half = (end - begin) / 2
+    tau = (begin + end) / 2 + half * nodes
+    return tau, half * weights, waves(tau)
+
+
+def stop(coefficients, stiffness, load, waves):
+    """f = max(0, load + k u) at every time of the period: from root to root by Gauss's quadrature.
+
+    The ends of a contact do not move its force, which is zero there: only real parts say where they are.
+
+    Parameters
+    ----------
+    coefficients : (m, lanes) of u
+    stiffness, load : numbers
+    waves : callable
+        (times, m) from times: 1, cos n tau, sin n tau
+
+    Returns
+    -------
+    (m, lanes) integrals of f and the waves over the period
+    """
+    first, out = coefficients[:, :1].real, np.zeros_like(coefficients)
+    for begin, end in _closed_spans(lambda tau: load + stiffness * (waves(tau) @ first)[:, 0], len(coefficients)):
+        _, weight, wave = _gauss(begin, end, len(coefficients), waves)
+        out += (wave * weight[:, None]).T @ (load + stiffness * (wave @ coefficients))
+    return out
+
+
+def _roots(f, m):
+    """Roots of f in a period: sign changes between the points of a fine grid and the extrema of its parabolas."""
+    grid = FIRST + 2 * np.pi * np.arange(-1, 64 * m + 2) / (64 * m)
+    value = f(grid)
+    low, here, high = value[:-2], value[1:-1], value[2:]
+    peak = (here - low) * (high - here) < 0
+    bent = np.where(peak, low - 2 * here + high, 1.0)
+    extrema = (grid[1:-1] + np.where(peak, (low - high) / (2 * bent), 0.0) * (grid[1] - grid[0]))[peak]
+    tau = np.unique(np.r_[grid[1:-1], extrema[(extrema > FIRST) & (extrema < FIRST + 2 * np.pi)]])
+    value = f(tau)
+    turns = np.flatnonzero((value[:-1] > 0) != (value[1:] > 0))
+    return np.array([brentq(lambda t: f(np.array([t]))[0], tau[i], tau[i + 1], xtol=1e-300, rtol=1e-15) for i in turns])
+
+
+def _closed_spans(f, m):
+    """Where f > 0 in a period."""
+    ends = _roots(f, m)
+    closed = f(np.array([FIRST]))[0] > 0
+    if not len(ends):
+        return [(0.0, 2 * np.pi)] if closed else []
+    if closed:
+        ends = np.r_[ends[-1] - 2 * np.pi, ends[:-1]]
+    return list(zip(ends[::2], ends[1::2]))
 
 
 def coulomb_3d(u, p, rest):
@@ -51,15 +150,24 @@ def coulomb_3d(u, p, rest):
     for period in range(MOST_PERIODS):
         start, (w, slipped) = w, _march(u, normal, w, p)
         off = w - start
-        if np.all(abs(off.real).max(axis=0) <= CLOSED * size) and (not period or abs(off.imag).max() <= 1e-10 * pace):
+        creeps = abs(off.real).max(axis=0) > CLOSED * size
+        if not np.any(creeps) and (not period or abs(off.imag).max() <= 1e-10 * pace):
             break
-    left = ~slipped & np.any(w.real != rest, axis=0)
-    for lane in np.flatnonzero(left):
-        radius = p["friction_coefficient"][lane] / p["tangential_stiffness"][lane] * _positive(normal[:, lane])
-        w[:, lane] = nearest_common(u[:, 1:, lane], radius, rest[:, lane])
+        if period == PATIENCE:  # towards a place that it reaches only in the limit: there is none nearer to rest
+            _shake_down(u, normal, w, p, rest, np.flatnonzero(creeps))
+    _shake_down(u, normal, w, p, rest, np.flatnonzero(~slipped & np.any(w.real != rest, axis=0)))
     f = np.empty_like(u)
     _march(u, normal, w, p, f)
     return f
+
+
+def _shake_down(u, normal, w, p, rest, lanes):
+    """Sliders of these lanes to the place nearest to rest where nothing slips, if there is one."""
+    for lane in lanes:
+        radius = p["friction_coefficient"][lane] / p["tangential_stiffness"][lane] * _positive(normal[:, lane])
+        if np.all(radius.real > 0):
+            place = nearest_common(u[:, 1:, lane], radius, rest[:, lane])
+            w[:, lane] = w[:, lane] if place is None else place
 
 
 def _positive(x):
@@ -128,7 +236,7 @@ def _pulled(d, v, gain, R0, R1, lands):
 
 
 def nearest_common(centres, radii, rest):
-    """The point nearest to `rest` that lies in all discs: on one circle, or where two of them meet.
+    """The point nearest to `rest` that lies in all discs, None if none does: on one circle, or where two of them meet.
 
     Parameters
     ----------
@@ -152,7 +260,7 @@ def nearest_common(centres, radii, rest):
     distance = np.linalg.norm(points.real[:, None] - centres.real[None], axis=2) - radii.real
     size = abs(centres.real).max() + radii.real.max()
     points = points[np.all(distance <= 1e-12 * size, axis=1)]
-    return points[np.argmin(np.linalg.norm(points.real - rest, axis=1))]
+    return None if not len(points) else points[np.argmin(np.linalg.norm(points.real - rest, axis=1))]
 
 
 def _tightest(centres, radii, most=40):

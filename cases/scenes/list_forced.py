@@ -39,7 +39,8 @@ def stops() -> Iterator[Scene]:
             analysis = forced((0.4, 1.2), H=7, samples=256, retain="all")
             contact = pad(kn, 1.0, 0.0, 0.0, gap, B)
             name = f"stop_kn_{number(kn)}_gap_{gap:g}"
-            yield Scene(axis, name, np.eye(1), np.eye(1), [contact], analysis, C=0.1 * np.eye(1), preload=True)
+            damper, quick = 0.1 * np.eye(1), kn == 1e8 and gap == 1.0
+            yield Scene(axis, name, np.eye(1), np.eye(1), [contact], analysis, C=damper, preload=True, quick=quick)
 
 
 def first_slip() -> Iterator[Scene]:
@@ -50,7 +51,9 @@ def first_slip() -> Iterator[Scene]:
             name = f"first_slip_{law}_level_{level:g}"
             if law == "jenkins":
                 K = np.array([[2.0, -1.0], [-1.0, 1.0]])
-                yield two_dof(axis, name, analysis, jenkins(1e14, 0.5, [0.0, 1.0]), M=np.eye(2), K=K, C=0.02 * K)
+                yield two_dof(
+                    axis, name, analysis, jenkins(1e14, 0.5, [0.0, 1.0]), M=np.eye(2), K=K, C=0.02 * K, quick=level > 1
+                )
             else:
                 scene = block(axis, name, analysis, pad(1e14, 1e14, 0.5, 1.0, 0.0, BLOCK_B))
                 scene.C = 0.02 * scene.K

@@ -23,6 +23,14 @@ double Coulomb::stuck_stiffness(int component, int pair) const {
   return closed_[pair] * (component ? p_.tangential_stiffness[pair] : p_.normal_stiffness[pair]);
 }
 
+LinearPair Coulomb::linear_pair(int i) const {
+  return {.normal_stiffness = p_.normal_stiffness[i],
+          .load = p_.normal_load[i] - p_.normal_stiffness[i] * p_.gap[i],
+          .tangential_stiffness = p_.tangential_stiffness[i],
+          .friction_coefficient = p_.friction_coefficient[i],
+          .slider = {slider_[i], components() > 2 ? slider_[pairs() + i] : 0.0}};
+}
+
 PairConstants Coulomb::constants(int first) const {
   return {p_.normal_stiffness.data() + first, p_.tangential_stiffness.data() + first, reach_.data() + first,
           p_.normal_load.data() + first, p_.gap.data() + first};

@@ -29,6 +29,7 @@ class Coulomb : public Law {
   int normal() const override { return 0; }
   Limit limit() const override = 0;
   double stuck_stiffness(int component, int pair) const override;
+  LinearPair linear_pair(int pair) const override;
   void diagnose(Motion const&, double const* f, Diagnosis&) const override;
 
  protected:

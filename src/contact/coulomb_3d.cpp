@@ -8,6 +8,10 @@
 
 namespace fretwave::contact {
 
+bool Coulomb3d::piecewise_linear() const {
+  return std::ranges::all_of(p_.friction_coefficient, [](double mu) { return mu == 0; });
+}
+
 /// A march of one sample.
 void Coulomb3d::set_rest(double const* u) {
   const int n = pairs();

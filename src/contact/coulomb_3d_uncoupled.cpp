@@ -28,14 +28,6 @@ void Coulomb3dUncoupled::set_rest(double const* u) {
   drag(constants(0), components() - 1, pairs(), u, slider_.data(), closed_.data());
 }
 
-LinearPair Coulomb3dUncoupled::linear_pair(int i) const {
-  return {.normal_stiffness = p_.normal_stiffness[i],
-          .load = p_.normal_load[i] - p_.normal_stiffness[i] * p_.gap[i],
-          .tangential_stiffness = p_.tangential_stiffness[i],
-          .friction_coefficient = p_.friction_coefficient[i],
-          .slider = {slider_[i], components() > 2 ? slider_[pairs() + i] : 0.0}};
-}
-
 Entry coulomb_3d_uncoupled_entry() {
   return coulomb_entry(
       "coulomb_3d_uncoupled", "as coulomb_3d, with each tangent limited by itself", 3,

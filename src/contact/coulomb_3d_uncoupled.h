@@ -10,7 +10,6 @@ class Coulomb3dUncoupled : public Coulomb {
   explicit Coulomb3dUncoupled(CoulombParameters p) : Coulomb3dUncoupled(std::move(p), 2) {}
   Limit limit() const override { return Limit::each; }
   bool piecewise_linear() const override { return true; }
-  LinearPair linear_pair(int pair) const override;
 
  protected:
   Coulomb3dUncoupled(CoulombParameters p, int tangents) : Coulomb(std::move(p), tangents) {}

@@ -11,24 +11,20 @@ namespace {
 
 int tangent_columns(contact::Law const& law) { return law.components() * law.components() * law.pairs(); }
 
-int sampled_columns(contact::Law const& law, int pairs) {
-  return law.piecewise_linear() ? 0 : law.components() * pairs;
-}
-
 }  // namespace
 
-Aft::Aft(Harmonics const& h, std::shared_ptr<contact::Law const> law)
+Aft::Aft(Harmonics const& h, std::shared_ptr<contact::Law const> law, bool continuous)
     : harmonics_(h),
       law_(std::move(law)),
       pairs_(law_->pairs()),
       columns_(law_->components() * pairs_),
       law_samples_(h.odd_only() && law_->odd() && !law_->hereditary() ? h.samples() / 2 : h.samples()),
       tiles_(tiles(*law_, h.samples())),
-      transform_(h, sampled_columns(*law_, tiles_.front().pairs), law_->components()),
-      last_transform_(h, tiles_.size() > 1 ? sampled_columns(*law_, tiles_.back().pairs) : 0,
+      transform_(h, continuous ? 0 : law_->components() * tiles_.front().pairs, law_->components()),
+      last_transform_(h, continuous || tiles_.size() == 1 ? 0 : law_->components() * tiles_.back().pairs,
                       law_->components()),
       tangent_transform_(h, law_->hereditary() ? 0 : tangent_columns(*law_)) {
-  if (law_->piecewise_linear()) {
+  if (continuous) {
     continuous_.emplace(h, *law_);
     return;
   }

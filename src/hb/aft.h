@@ -37,8 +37,15 @@ struct Wearing {
 /// piecewise linear are not sampled: ContinuousContact has their force; samples are for those who look.
 class Aft {
  public:
-  Aft(Harmonics const&, std::shared_ptr<contact::Law const>);
+  /// `continuous`: the law's pairs are piecewise linear, on all ranks.
+  Aft(Harmonics const&, std::shared_ptr<contact::Law const>, bool continuous);
   int columns() const { return columns_; }
+  /// Force of rounding in a displacement, per metre of it: a stiffness, where it is known by the share of the
+  /// period in which the last force follows it (stick, contact).
+  double stiffness(int pair, int component) const {
+    return continuous_ ? continuous_->mean_stiffness(pair, component)
+                       : law_->stuck_stiffness(component, pair);
+  }
 
   /// F(U, s) and its linearisation for what follows.
   void force(double const* U, Exponents const&, double* F);

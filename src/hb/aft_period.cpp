@@ -94,7 +94,7 @@ void count(contact::Diagnosis const& diagnosis, ContactSummary& summary) {
 std::vector<double> Aft::on_doubled_samples(double const* U, Exponents const& e, std::vector<double> F) {
   if (continuous_) return F;
   if (!doubled_)
-    doubled_ = std::make_shared<Aft>(Harmonics(harmonics_.orders(), 2 * harmonics_.samples()), law_);
+    doubled_ = std::make_shared<Aft>(Harmonics(harmonics_.orders(), 2 * harmonics_.samples()), law_, false);
   doubled_->force(U, e, F.data());
   return F;
 }

@@ -162,7 +162,7 @@ void ContinuousContact::find_play(Pair& pair, int tangent, int place) {
     now.play.close(now.walls, pair.spans);
 }
 
-/// N' = kn u_n' where closed.
+/// N = kn u_n where closed.
 void ContinuousContact::normal_force(Pair const& pair, double* F) const {
   const double kn = pair.law.normal_stiffness;
   if (pair.closed) {
@@ -177,7 +177,7 @@ void ContinuousContact::normal_force(Pair const& pair, double* F) const {
     closed.add(arc, 1);
     add_mean(harmonics_, kn * arc.integral(pair.approach) / period, F);
   }
-  closed.add_force(pair.approach, kn, F);
+  closed.add_product(pair.approach, kn, F);
 }
 
 /// T' = kt u_t' in stick, +- mu kn u_n' in slip.

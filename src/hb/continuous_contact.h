@@ -18,6 +18,8 @@ class ContinuousContact {
   void product(double const* dU, double* dF);
   /// dF for gaps that grow by dgap (pairs) [m].
   void gap_product(double const* dgap, double* dF);
+  /// Of the last force over the period: the share of contact or stick, times its stiffness.
+  double mean_stiffness(int pair, int component) const;
   /// Number of the sequences of states, whenever they begin: it changes where a piece comes or goes.
   std::uint64_t piece() const;
   /// f (samples x components x pairs) of the last force at the samples u.

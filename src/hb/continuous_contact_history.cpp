@@ -26,6 +26,17 @@ double integral(Arc const& arc, Series const& p, Series const& q) {
 
 }  // namespace
 
+double ContinuousContact::mean_stiffness(int number, int component) const {
+  Pair const& pair = pairs_[number];
+  double length = 0;
+  if (component == normal_) {
+    for (Span const& span : pair.spans) length += span.length;
+    return pair.law.normal_stiffness * (pair.closed ? 1.0 : length / period);
+  }
+  for (auto const& piece : pair.tangents[component - (normal_ >= 0)].play.sticks) length += piece.length;
+  return pair.law.tangential_stiffness * length / period;
+}
+
 /// By the states that follow each other in the period, wherever it begins.
 std::uint64_t ContinuousContact::piece() const {
   std::uint64_t sum = 0;
@@ -86,9 +97,9 @@ void ContinuousContact::measure(contact::Diagnosis& out) const {
   std::ranges::fill(out.work, 0.0);
   for (size_t k = 0; k < pairs_.size(); ++k) {
     contact::LinearPair const& law = pairs_[k].law;
-    // what two tangents do together is left as it was sampled
+    // what two tangents do together, and what nothing holds, is left as it was sampled
     const auto slips = [](Tangent const& now) { return now.play.slips.size() > 0; };
-    const bool straight = std::ranges::count_if(pairs_[k].tangents, slips) < 2;
+    const bool straight = law.rubs() && std::ranges::count_if(pairs_[k].tangents, slips) < 2;
     if (straight) out.slip_path[k] = 0;
     if (straight && out.archard.size()) out.archard[k] = 0;
     for (Tangent const& now : pairs_[k].tangents)

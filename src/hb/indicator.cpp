@@ -9,27 +9,46 @@ void Indicator::add(Arc const& arc, double weight) {
     G_[p] += weight / (2 * std::numbers::pi) * std::conj(arc.integral(int(p)));
 }
 
-/// i n f_n = sum_k G_{n-k} x_k + G_{n+k} conj(x_k), x_k = i k p_k. In real arrays, G of orders -H .. 2H, of
-/// which several can be taken at once.
-void Indicator::add_force(Series const& p, double weight, double* F) const {
+/// Of orders 0 .. H, in real arrays: G of orders -H .. 2H, of which several can be taken at once.
+std::vector<complex> Indicator::times(std::vector<complex> const& x) const {
   const int H = harmonics_.highest();
   std::vector<double> arrays(2 * size_t(3 * H + 1) + 2 * size_t(H + 1));
-  double *re = arrays.data() + H, *im = re + 3 * H + 1, *x = im + 2 * H + 1, *y = x + H + 1;
+  double *re = arrays.data() + H, *im = re + 3 * H + 1, *a = im + 2 * H + 1, *b = a + H + 1;
   for (int n = -H; n <= 2 * H; ++n) re[n] = (*this)(n).real(), im[n] = (*this)(n).imag();
-  for (int k = 1; k <= H; ++k) x[k] = -k * p.q[k].imag(), y[k] = k * p.q[k].real();
-  for (int i = 0; i < harmonics_.count(); ++i) {
-    const int n = harmonics_.orders()[i];
-    if (n == 0) continue;
+  for (int k = 1; k <= H; ++k) a[k] = x[k].real(), b[k] = x[k].imag();
+  std::vector<complex> y(H + 1);
+  for (int n : harmonics_.orders()) {
     double real = 0, imaginary = 0;
 #pragma omp simd reduction(+ : real, imaginary)
     for (int k = 1; k <= H; ++k) {
-      real += (re[n - k] + re[n + k]) * x[k] - (im[n - k] - im[n + k]) * y[k];
-      imaginary += (re[n - k] - re[n + k]) * y[k] + (im[n - k] + im[n + k]) * x[k];
+      real += (re[n - k] + re[n + k]) * a[k] - (im[n - k] - im[n + k]) * b[k];
+      imaginary += (re[n - k] - re[n + k]) * b[k] + (im[n - k] + im[n + k]) * a[k];
     }
-    // Fc_n - i Fs_n = (real + i imaginary) / (i n)
-    F[harmonics_.offset(i)] += weight * imaginary / n;
-    F[harmonics_.offset(i) + 1] += weight * real / n;
+    y[n] = {real, imaginary};
   }
+  return y;
+}
+
+/// i n f_n = y_n of x_k = i k p_k, Fc_n - i Fs_n = f_n
+void Indicator::add_force(Series const& p, double weight, double* F) const {
+  std::vector<complex> rate(p.q);
+  for (size_t k = 0; k < rate.size(); ++k) rate[k] *= complex(0, double(k));
+  const std::vector<complex> y = times(rate);
+  for (int i = 0; i < harmonics_.count(); ++i)
+    if (const int n = harmonics_.orders()[i]) {
+      F[harmonics_.offset(i)] += weight * y[n].imag() / n;
+      F[harmonics_.offset(i) + 1] += weight * y[n].real() / n;
+    }
+}
+
+void Indicator::add_product(Series const& p, double weight, double* F) const {
+  const std::vector<complex> y = times(p.q);
+  for (int i = 0; i < harmonics_.count(); ++i)
+    if (const int n = harmonics_.orders()[i]) {
+      const complex f = y[n] + 2.0 * G_[n] * p.q[0].real();
+      F[harmonics_.offset(i)] += weight * f.real();
+      F[harmonics_.offset(i) + 1] -= weight * f.imag();
+    }
 }
 
 /// f_n = 2 G_n x_0 + sum_k G_{n-k} x_k + G_{n+k} conj(x_k)

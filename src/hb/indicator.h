@@ -17,12 +17,18 @@ class Indicator {
   /// F += weight x the coefficients (orders > 0) of f with f' = g p': a continuous force of which p moves a
   /// share.
   void add_force(Series const& p, double weight, double* F) const;
+  /// The same of f = g p, which must be continuous too: where p is zero at the ends of a short piece, what
+  /// rounding leaves of p there counts no more than the piece is long.
+  void add_product(Series const& p, double weight, double* F) const;
   /// D += weight x the matrix that takes the coefficients of x to those of g x; rows of length ld.
   void add_multiplication(double weight, double* D, size_t ld) const;
   /// Coefficients of g.
   void add_coefficients(double weight, double* F) const;
 
  private:
+  /// sum_k G_{n-k} x_k + G_{n+k} conj(x_k), k > 0
+  std::vector<complex> times(std::vector<complex> const& x) const;
+
   Harmonics const& harmonics_;
   std::vector<complex> G_;
 };

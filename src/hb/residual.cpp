@@ -9,12 +9,21 @@
 
 namespace fretwave::hb {
 
+namespace {
+
+bool everywhere(bool here, MPI_Comm comm) {
+  MPI_Allreduce(MPI_IN_PLACE, &here, 1, MPI_CXX_BOOL, MPI_LAND, comm);
+  return here;
+}
+
+}  // namespace
+
 Residual::Residual(model::Model const& model, Harmonics const& h)
     : model_(model), harmonics_(h), stiffness_(model, h), Q_(vector()) {
   for (auto const& contact : model.contacts()) {
     groups_.push_back({.contact = &contact,
                        .maps = {},
-                       .aft = Aft(h, contact.law),
+                       .aft = Aft(h, contact.law, everywhere(contact.law->piecewise_linear(), model.comm())),
                        .U = {},
                        .F = {},
                        .dV = {},
@@ -180,7 +189,8 @@ double Residual::rounding() const {
             std::abs(w.value) * size(&Q.data()[dof * m]);
     }
     for (size_t row = 0; row < motion.size(); ++row) {
-      const double k = law.stuck_stiffness(int(row % law.components()), int(row / law.components()));
+      const int pair = int(row) / law.components(), component = int(row) % law.components();
+      const double k = group.aft.stiffness(pair, component);
       const double force = size(&F.data()[row * m]) + (std::isfinite(k) ? k * motion[row] : 0);
       square += force * force;
     }

@@ -18,6 +18,7 @@ constexpr int certain = 3;            // meetings with earlier points of the bra
 constexpr double grid = 16;           // lengths of steps in every factor of two
 constexpr double at_the_end = 1e-9;   // relative: a branch that starts here starts at the end of its range
 constexpr double leash = 0.25;        // of the range, by which a branch may leave it where it began
+constexpr double farthest = 4;        // times its end, or its end over it, at the most
 
 /// On a coarse grid: what a solution's last digits (of which no two numbers of ranks have the same) do to a
 /// length would be handed on from step to step and grow with the steps.
@@ -153,9 +154,9 @@ void Continuation::open_the_range() {
   const auto at_end = [&](double end) { return std::abs(began_ - end) <= at_the_end * std::abs(end); };
   low_ = given_low_, high_ = given_high_;
   if (upwards_ && at_end(low_))
-    low_ = std::max(problem_.parameter_value(low - room), low_ > 0 ? low_ / 2 : -INFINITY);
+    low_ = std::max(problem_.parameter_value(low - room), low_ > 0 ? low_ / farthest : -INFINITY);
   if (!upwards_ && at_end(high_))
-    high_ = std::min(problem_.parameter_value(high + room), high_ > 0 ? 2 * high_ : INFINITY);
+    high_ = std::min(problem_.parameter_value(high + room), high_ > 0 ? farthest * high_ : INFINITY);
 }
 
 /// Closing row W t at the anchor: row . (y - y_anchor) is the arclength.

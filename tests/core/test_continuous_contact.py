@@ -242,6 +242,49 @@ def test_without_friction_nothing_is_carried_along_the_tangent(law):
     assert not forces(Q)[-7:].any() and not forces.tangent(Q)[-7:].any()
 
 
+@pytest.mark.parametrize("load, gap", [(0.0, 0.2), (2.0, 0.3), (20.0, 0.0), (0.0, 9.0)])
+def test_a_pad_without_friction_is_a_stop(load, gap):
+    """Open, closed and both in turn: at the least number of samples the stop's exact force, nothing along the plane."""
+    free = {**PAD, "friction_coefficient": 0.0, "normal_load": load, "gap": gap}
+    pad, stop = (
+        Forces("coulomb_3d", free, range(6)),
+        Forces("unilateral_spring", {**STOP, "gap": gap - load / 8.0}, range(6)),
+    )
+    Q = motion(5, 5, 3)
+    expected = np.concatenate([stop(Q[0]), np.zeros(22)])
+    assert np.allclose(pad(Q), expected, rtol=0, atol=LAST_DIGITS * (1 + np.abs(expected).max()))
+    D = pad.tangent(Q)
+    assert np.allclose(D[:11, :11], stop.tangent(Q[0]), rtol=0, atol=LAST_DIGITS * 8)
+    assert not D[11:].any() and not D[:, 11:].any()
+
+
+@pytest.mark.ranks(2)
+def test_pads_without_friction_beside_others_are_one_law_on_any_number_of_ranks():
+    """A rank whose pads have none takes them as the other rank has to take its own."""
+    start = fw.LinearMode(1.0, 0.0, np.ones(6), np.zeros(6))
+    pads = {**PAD, "friction_coefficient": np.array([0.0, 0.4]), "normal_load": 2.0, "gap": 0.3}
+    Q, found = motion(6, 3, 6), []
+    for comm in (MPI.COMM_WORLD, MPI.COMM_SELF):
+        model = fw.Model(np.eye(6), np.eye(6), None, [fw.Contact("coulomb_3d", np.eye(6), pads)], comm)
+        problem = fw.NonlinearMode(model, fw.Harmonics(range(4), 64), "EPMC", 0, start)
+        found.append(whole(problem.residual(unknowns(problem, np.concatenate([Q.ravel(), [0.0, 1.0, 0.0]])))))
+    assert np.allclose(*found, rtol=0, atol=LAST_DIGITS * np.abs(found[1]).max())
+
+
+@pytest.mark.parametrize("half", [0.1, 1e-3, 1e-5])
+def test_a_short_contact_keeps_its_digits(half):
+    """cos tau - cos c on k, k u some c^-3 times the force: rounding of u counts for as long as the contact lasts."""
+    k, gap = 1e12, np.cos(half)
+    c = 2 * np.arcsin(np.sqrt((1 - gap) / 2))  # of the gap as it is rounded
+    node, weight = np.polynomial.legendre.leggauss(20)
+    tau, n = c * node, np.arange(8)[:, None]
+    F = k * c / np.pi * (np.cos(n * tau) * 2 * np.sin((c + tau) / 2) * np.sin((c - tau) / 2)) @ weight
+    expected = np.zeros(15)
+    expected[0], expected[1::2] = F[0] / 2, F[1:]
+    found = Forces("unilateral_spring", {"normal_stiffness": k, "gap": gap}, range(8))(np.eye(15)[1])
+    assert np.allclose(found, expected, rtol=ROUNDING, atol=LAST_BIT * k * c)
+
+
 def test_a_motion_that_stands_still():
     """Within the limit a spring; beyond it the limit, whatever the mean; nothing turns or divides by zero."""
     kt, limit = SLIDER.values()

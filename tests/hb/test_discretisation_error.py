@@ -13,6 +13,7 @@ from petsc4py import PETSc
 from tolerances import ROUNDING
 
 import fretwave as fw
+from fretwave.hb.states import ModalState
 
 M, K = np.diag([1.0, 0.02]), np.array([[640.0, -40.0], [-40.0, 40.0]])
 KT, LIMIT = 400.0, 5.0
@@ -204,3 +205,13 @@ def test_what_does_not_fit_the_memory_is_left_out():
     finally:
         resource.setrlimit(resource.RLIMIT_AS, before)
     assert np.isnan(found["zeta_error"]) and "factors of 204 harmonics" in mode.errors_left_out
+
+
+@pytest.mark.ranks(1)
+@pytest.mark.parametrize("method", ["CNM", "EPMC"])
+def test_an_estimate_that_goes_far_beyond_any_amplitude_still_has_its_errors(method):
+    """Beside a fold the linearised step in the logarithm of the amplitude may have any length; no error asks for it."""
+    state, step = ModalState(method, 10.0), np.array([3e-3, -4e-3, 1e4])
+    errors = state.errors(np.array([0.3, 1.0, 0.0]), [step, 0 * step, 0 * step, step])
+    near = state.errors(np.array([0.3, 1.0, 0.0]), [step * [1, 1, 0], 0 * step, 0 * step, step * [1, 1, 0]])
+    assert errors == near and 0.03 < errors["omega_error"] < 0.06

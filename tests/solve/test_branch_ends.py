@@ -46,12 +46,20 @@ def test_two_folds_in_a_step_are_found_at_the_same_places_as_by_short_steps(two_
 
 
 @pytest.mark.ranks(1)
-def test_a_branch_that_comes_back_has_not_arrived(two_dof, comm):
-    """With 50 % damping and H = 21 the complex mode returns to small amplitudes on another sheet."""
+def test_a_branch_that_comes_back_has_not_arrived_until_it_turns_again(two_dof, comm):
+    """With 50 % damping and H = 21 the complex mode goes over to that of the second mass: the first one's amplitude
+    falls to 0.0078 m before it grows again. From 0.05 m that is too far outside, from 0.02 m it is passed."""
     problem = mode_problem(oscillator(two_dof, comm, np.diag([25.3, 0.0])), range(1, 22, 2), 1024, start="stuck")
+    branch, points = follow(problem, 0.05, HIGH)
+    assert not branch.converged
+    assert points[-1].parameter == pytest.approx(0.05 * (0.05 / HIGH) ** 0.25, rel=SOLVED)
+    assert branch.reason.startswith("the branch comes back to amplitude 0.05, where it began, without reaching")
     branch, points = follow(problem, LOW, HIGH)
-    assert not branch.converged and points[-1].parameter == pytest.approx(LOW / 2, rel=SOLVED)
-    assert branch.reason.startswith("the branch comes back to amplitude 0.02, where it began, without reaching")
+    assert branch.converged and points[-1].parameter == pytest.approx(HIGH, rel=SOLVED)
+    least = min(p.parameter for p in points)
+    assert least == pytest.approx(0.0078, abs=1e-4)
+    free = problem.state(points[-1].y)["omega"]
+    assert free == pytest.approx(np.sqrt(40.0 / 0.02), rel=0.02)  # of the second mass on its spring
 
 
 def response(model, level, omega, orders=(1, 3, 5), samples=128):

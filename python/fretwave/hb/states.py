@@ -87,11 +87,17 @@ class ModalState:
 
     def eigenvalue(self, z: npt.ArrayLike) -> complex:
         """lambda = -beta + i omega [1/s]."""
-        row = self(z)
-        return complex(-row["beta"], row["omega"])
+        beta, omega, _, _ = self._oscillation(z)
+        return complex(-beta, omega)
 
     def __call__(self, z: npt.ArrayLike) -> dict[str, float]:
         """The columns of these scalars."""
+        beta, omega, omega0, zeta = self._oscillation(z)
+        values = (math.exp(float(np.asarray(z)[2])), omega, omega0, omega / (2 * math.pi), beta, zeta)
+        return dict(zip(self.columns, values))
+
+    def _oscillation(self, z: npt.ArrayLike) -> tuple[float, float, float, float]:
+        """beta, omega, omega0 [1/s] and zeta, whatever the amplitude."""
         v: list[float] = np.asarray(z, dtype=float).tolist()
         beta, w = v[0] * self.omega_reference, v[1] * self.omega_reference
         omega, omega0 = w, float(np.hypot(beta, w))
@@ -100,8 +106,7 @@ class ModalState:
             # above 1 the free motion creeps back: its frequency is zero
             omega0, zeta = w, beta / w
             omega = w * math.sqrt(max(0.0, (1 - zeta) * (1 + zeta)))
-        values = (math.exp(v[2]), omega, omega0, omega / (2 * math.pi), beta, zeta)
-        return dict(zip(self.columns, values))
+        return beta, omega, omega0, zeta
 
 
 @dataclass(frozen=True)
