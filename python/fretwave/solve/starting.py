@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 #: Amplitudes below the first one, each a hundredth of the one before, at which a mode is tried.
 SMALLER = 5
+#: Longest steps of a mode that grows: where long ones lose their way, those of any branch.
+GROWTH = (1.0, 0.3)
 #: Points of a way at the most: a sampled contact turns a corner wherever one of its samples begins to slip.
 WAY_POINTS = 20000
 #: Relative distance in frequency from the linear mode beyond which a first point may be of another mode.
@@ -124,14 +126,17 @@ def _grown(
     amplitude = problem.parameter(y0)
     for power in range(1, SMALLER + 1):
         small = amplitude / 100**power
-        control = StepControl(maximum=1.0, max_points=WAY_POINTS)
-        branch = follow(problem, problem.initial(small), (0.5 * small, amplitude), control, upwards=True, helped=False)
-        last, count = _last(branch, nearby=True)
-        converged, reason = branch.converged, branch.reason
-        branch.destroy()
-        if converged and last is not None:
-            yield f"the mode was followed from amplitude {small:.3g} in {count} steps", last
-            return
+        for maximum in GROWTH:
+            control, span = StepControl(maximum=maximum, max_points=WAY_POINTS), (0.5 * small, amplitude)
+            branch = follow(problem, problem.initial(small), span, control, upwards=True, helped=False)
+            last, count = _last(branch, nearby=True)
+            converged, reason = branch.converged, branch.reason
+            branch.destroy()
+            if converged and last is not None:
+                yield f"the mode was followed from amplitude {small:.3g} in {count} steps", last
+                return
+            if not count:
+                break
         if count:
             reasons.append(f"following the mode from amplitude {small:.3g}: {reason}")
             return
