@@ -71,7 +71,8 @@ def test_record_and_log(run: Path) -> None:
         assert entry["peak_memory_mb"]["all_ranks"] > 0
         assert any("even harmonics" in text for text in entry["left_out"])
     log = (run / "run.log").read_text()
-    assert log.count("left out: even harmonics") == 4
+    assert log.count(": left out: even harmonics") == 4, "each analysis at its start"
+    assert log.count("\nleft out: even harmonics") == 1, "the run at its end"
     assert log.count("\nmode  ") == len(column(run, "mode", "point"))
 
 

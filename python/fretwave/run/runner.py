@@ -29,6 +29,7 @@ from ..results.reader import write_curve
 from ..results.results import has_results, open_results
 from ..results.runfolder import RECORD, RunFolder, new_record, peak_memory_mb, read_record
 from ..texts import counted, display
+from .left_out import left_out_lines
 from .order import RunOptions, in_order
 from .stopped import joined, not_converged
 
@@ -133,6 +134,7 @@ class Runner:
                 self._sweep(name, sweeps[name])
             else:
                 self._run_one(self.case.analyses[name])
+        self._say_left_out(names)
         self._finish()
         if self.failures:
             raise self.failures[0] if len(self.failures) == 1 else joined(self.failures)
@@ -290,6 +292,14 @@ class Runner:
         on_first_rank(self.comm, self.folder.save)
         if not outcome.converged:
             self.failures.append(not_converged(name, outcome))
+
+    def _say_left_out(self, names: Sequence[str]) -> None:
+        if self.console.quiet:
+            return
+        told = left_out_lines(self.case, names, self.folder.record["analyses"], self.options.plots)
+        self.folder.record["left_out"] = told
+        for line in told:
+            self.console.line(line)
 
     def _finish(self) -> None:
         self.folder.record["status"] = "stopped" if self.failures else "done"

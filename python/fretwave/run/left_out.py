@@ -1,0 +1,64 @@
+"""What a run as a whole left out, and why: said at its end."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from ..analyses.wear import WearAnalysis
+from ..case.analysis import AnalysisSection
+from ..case.load import Case
+
+
+def left_out_lines(
+    case: Case, names: Sequence[str], entries: Mapping[str, Mapping[str, Any]], plots: bool
+) -> list[str]:
+    """A line of what all analyses left out, and one for each set of them that left out more.
+
+    Parameters
+    ----------
+    case : as it was solved, reduced where it asks for that
+    names : the run's analyses
+    entries : what run.json says of each
+    """
+    by_reason: dict[str, list[str]] = {}
+    for name in names:
+        own = entries.get(name, {}).get("left_out", [])
+        for reason in [*own, *_of_an_analysis(case, case.analyses[name])]:
+            by_reason.setdefault(reason, []).append(name)
+    lines = {tuple(names): [reason for reason, found in by_reason.items() if found == list(names)]}
+    for reason, found in by_reason.items():
+        if found != list(names):
+            lines.setdefault(tuple(found), []).append(reason)
+    lines[tuple(names)] += _of_the_run(case, [case.analyses[name] for name in names], list(by_reason), plots)
+    return [_line("" if found == tuple(names) else f" of {', '.join(found)}", told) for found, told in lines.items()]
+
+
+def _line(where: str, reasons: Sequence[str]) -> str:
+    return f"left out{where}: {'; '.join(reasons)}" if reasons else "nothing was left out"
+
+
+def _of_an_analysis(case: Case, analysis: AnalysisSection) -> list[str]:
+    """What it does not say itself."""
+    harmonic, found = analysis.settings(case).harmonic(), []
+    if harmonic is None:
+        return []
+    if case.neighbours is not None and not harmonic.wheel:
+        others = case.neighbours.sectors - 1
+        found.append(f"{others} of {others + 1} sectors (a wave moves them as this one, each a phase later)")
+    if not harmonic.errors:
+        found.append("errors of the points (errors = false)")
+    return found
+
+
+def _of_the_run(case: Case, analyses: Sequence[AnalysisSection], said: Sequence[str], plots: bool) -> list[str]:
+    """What no analysis did."""
+    unasked = []
+    if case.reduced is None:
+        unasked.append("reduction")
+    if not any(isinstance(one, WearAnalysis) for one in analyses):
+        unasked.append("wear")
+    if not any(one.integrates() for one in analyses) and not any("time integration" in reason for reason in said):
+        unasked.append("time integration")
+    found = [f"{', '.join(unasked)} (not asked for)"] if unasked else []
+    return found if plots else [*found, "pictures (--no-plots)"]

@@ -1,0 +1,69 @@
+"""What fretwave leaves out changes nothing beyond rounding when forced on: cases/benchmarks/left_out.py, small."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tolerances import LAST_DIGITS, TIGHT
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "cases" / "benchmarks"))
+import left_out  # noqa: E402
+
+#: Evaluated once in two forms; the others are solved to less than their tolerance.
+EVALUATED = ("mean", "velocity", "sticking", "mass_off_diagonal")
+SOLVED_SMALL = ("reduction", "wear")
+RUNS = ("pictures", "time_integration")
+
+
+def both(name: str, comm) -> list[left_out.Found]:
+    row = left_out.ROWS[name]
+    return [row.of(forced, row.small, comm) for forced in (True, False)]
+
+
+def test_every_row_is_held_by_a_test():
+    """Rows that are not below name another file, which there is."""
+    tests = Path(__file__).parents[1]
+    for name, row in left_out.ROWS.items():
+        if name not in (*EVALUATED, *SOLVED_SMALL, *RUNS):
+            assert list(tests.rglob(row.held_by.split(":")[0])), name
+
+
+@pytest.mark.parametrize("name", EVALUATED)
+def test_forced_on_gives_the_same_residual_and_product(name, comm):
+    assert left_out.distance(*both(name, comm)) < LAST_DIGITS
+
+
+@pytest.mark.parametrize("name", SOLVED_SMALL)
+def test_forced_on_gives_the_same_mode(name, comm):
+    forced, left = both(name, comm)
+    assert left_out.distance(forced, left) < TIGHT
+    assert np.ptp(left[1]) > 0.1 * np.abs(left[1]).max(), "friction damps by the amplitude"
+
+
+@pytest.mark.ranks(1)
+@pytest.mark.parametrize("name", RUNS)
+def test_forced_on_leaves_the_table_of_a_run_to_the_last_digit(name, comm):
+    assert left_out.distance(*both(name, comm)) == 0
+
+
+@pytest.mark.ranks(1)
+def test_what_a_run_leaves_out_it_does_not_load(launch, tmp_path):
+    """No picture, no reduction, no wear, no time integration: none of their modules."""
+    case = Path(__file__).parents[2] / "cases" / "two_dof" / "case.toml"
+    arguments = ["run", str(case), "--quick", "--no-plots", "--only", "mode", "--out", str(tmp_path)]
+    modules = ["matplotlib", "fretwave.model.reduction", "fretwave.solve.wear", "fretwave.solve.transient"]
+    program = (
+        f"import sys; from fretwave.commands.main import main; code = main({arguments!r});"
+        f"print('loaded', [name for name in {modules!r} if name in sys.modules], code)"
+    )
+    assert launch(1, "-c", program).stdout.splitlines()[-1] == "loaded [] 0"
+
+
+def test_a_difference_is_seen():
+    """`distance` takes each array by its own size, zeros by 1."""
+    a = [np.array([1e3, 2e3]), np.array([0.0])]
+    assert left_out.distance([np.array([1e3, 2e3 + 1e-3]), np.array([0.0])], a) == pytest.approx(5e-7)
+    assert left_out.distance([a[0], np.array([1e-3])], a) == 1e-3
