@@ -273,7 +273,8 @@ ROWS = {
         Row(
             "velocity in time",
             "1,024 cubic springs, H = 7, N_t = 256: residual and product",
-            "left out for laws that do not read it; forced on by a law in Python, whose arrays are part of its cost",
+            "left out for laws that do not read it; forced on by a law in Python, whose arrays are part of "
+            "its cost: an upper bound",
             velocity,
             32,
             2,
@@ -282,7 +283,7 @@ ROWS = {
             "record of pairs that stick",
             "512 stuck `coulomb_3d` pairs, H = 7, N_t = 256: residual and product",
             "**not left out**: `coulomb_3d` keeps 11 numbers a pair and sample, also in stick; here by springs in K. "
-            "The other friction laws keep no samples at all",
+            "`jenkins`, `coulomb_2d` and `coulomb_3d_uncoupled` keep no samples",
             sticking,
             16,
             2,
@@ -298,7 +299,7 @@ ROWS = {
         ),
         Row(
             "zeros of a diagonal mass matrix",
-            "steel bar of 1,125 nodes, mass lumped, H = 7: residual and product",
+            "steel bar of 2,025 nodes, mass lumped, H = 7: residual and product",
             "left out as far as the matrix does not store them: what is stored is worked on",
             mass_off_diagonal,
             8,
@@ -307,7 +308,7 @@ ROWS = {
         Row(
             "pictures and matplotlib",
             "`two_dof --quick`, mode, whole process",
-            "left out with `--no-plots`; nothing else loads matplotlib",
+            "left out with `--no-plots`; a run loads matplotlib to draw, for nothing else",
             pictures,
             1,
             0,
@@ -322,7 +323,7 @@ ROWS = {
         ),
         Row(
             "reduction",
-            "steel bar of 160 nodes on `coulomb_3d` pads, mode, H = 3",
+            "steel bar of 160 nodes on 16 `coulomb_3d` pads, mode, H = 3",
             "left out unless `[reduction]` asks; forced on with all component modes",
             reduction,
             3,
@@ -330,7 +331,7 @@ ROWS = {
         ),
         Row(
             "wear",
-            "the same bar",
+            "steel bar of 325 nodes on 25 `coulomb_3d` pads, mode, H = 3",
             "left out unless an analysis of wear asks; forced on with k_w = 0 at every point: such a march ends as it "
             "begins, so that this measures that nothing is paid, not what a march costs",
             wear,
