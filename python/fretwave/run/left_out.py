@@ -30,7 +30,7 @@ def left_out_lines(
     for reason, found in by_reason.items():
         if found != list(names):
             lines.setdefault(tuple(found), []).append(reason)
-    lines[tuple(names)] += _of_the_run(case, [case.analyses[name] for name in names], list(by_reason), plots)
+    lines[tuple(names)] += _of_the_run(case, names, list(by_reason), plots)
     return [_line("" if found == tuple(names) else f" of {', '.join(found)}", told) for found, told in lines.items()]
 
 
@@ -51,14 +51,16 @@ def _of_an_analysis(case: Case, analysis: AnalysisSection) -> list[str]:
     return found
 
 
-def _of_the_run(case: Case, analyses: Sequence[AnalysisSection], said: Sequence[str], plots: bool) -> list[str]:
+def _of_the_run(case: Case, names: Sequence[str], said: Sequence[str], plots: bool) -> list[str]:
     """What no analysis did."""
     unasked = []
     if case.reduced is None:
         unasked.append("reduction")
-    if not any(isinstance(one, WearAnalysis) for one in analyses):
+    if not set(case.analyses.of(WearAnalysis)) & set(names):
         unasked.append("wear")
-    if not any(one.integrates() for one in analyses) and not any("time integration" in reason for reason in said):
+    if not any(case.analyses[name].integrates() for name in names) and not any(
+        "time integration" in reason for reason in said
+    ):
         unasked.append("time integration")
     found = [f"{', '.join(unasked)} (not asked for)"] if unasked else []
     return found if plots else [*found, "pictures (--no-plots)"]
