@@ -28,7 +28,7 @@ STEPS = (
     ),
     ("columns.py", '    *("point", "amplitude", "omega", "omega0", "frequency_hz", "beta", "zeta"', ', "period"'),
     ("hb/states.py", '("amplitude", "omega", "omega0", "frequency_hz", "beta", "zeta"', ', "period"'),
-    ("hb/states.py", "(math.exp(v[2]), omega, omega0, omega / (2 * math.pi), beta, zeta", ", 2 * math.pi / omega"),
+    ("hb/states.py", ", omega, omega0, omega / (2 * math.pi), beta, zeta", ", 2 * math.pi / omega"),
 )
 CASE = """
 [model]
