@@ -279,6 +279,7 @@ std::optional<Continuation::Trial> Continuation::step(double& length, double& ne
       wary_ = !on_piece(here, length) && on_piece(here, sparse * length);
     }
   }
+  if (failure.last.empty()) failure.last = "corners of the branch lie closer together than the smallest step";
   finish("step too small: " + (failure.explained.empty() ? failure.last : failure.explained), false);
   return {};
 }
