@@ -9,6 +9,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from ..hb.states import default_samples
+
 if TYPE_CHECKING:
     from ..model.contact import Contact
     from .facts import Facts
@@ -40,7 +42,7 @@ def harmonic_memory(harmonics: int, samples: int | None, copies: int, facts: Fac
     copies : sectors that are solved
     """
     n_dof, columns = facts.least_dofs, contact_columns(facts.contacts)
-    count = samples or max(64, 1 << (16 * harmonics - 1).bit_length())
+    count = samples or default_samples(harmonics)
     return {
         f"harmonics: {VECTORS} vectors of {n_dof * copies} dofs": float(NUMBER) * VECTORS * n_dof * copies * harmonics,
         f"{'samples' if samples else 'harmonics'}: {count} samples of {columns * copies} contact motions": (

@@ -26,7 +26,7 @@ FACTOR = 3
 MOST_HARMONICS, MOST_SAMPLES = 255, 1 << 14
 #: Share of a branch's points that may miss the accuracy.
 TOLERATED = 0.05
-#: Steps on a set before a smaller one is tried.
+#: Points of a branch before a smaller set is tried.
 PATIENCE = 3
 
 
@@ -38,7 +38,7 @@ class Aim:
     ----------
     harmonics, samples : share of the allowed error at the last point; `before` at the one before it
     order_harmonics, order_samples : of convergence, as two sets at one point have shown it
-    steps : points on this set
+    steps : points so far
     smaller : how often a smaller set was taken
     """
 

@@ -65,7 +65,7 @@ class RefiningContinuation(Continuation):
         self.accuracy, self.least, self.largest = accuracy, least or problem.harmonics, problem
         self._settings = (steps or StepControl()).core(), list(report_at)
         self.tell: Callable[[str], None] = lambda text: None
-        self._given, self._aim = problem, Aim()
+        self._aim = Aim()
         self._present: Point | None = None  # the last point handed out, and what it solves
         self._of = problem
         self._missed_before: list[str] = []
@@ -101,14 +101,14 @@ class RefiningContinuation(Continuation):
 
         Step control then sees the branch of that set, as the cubic through the points does.
         """
-        kept = self.problem, self._core
+        kept = self.problem, self._core, self._missed_before, self._helped_before
         found = self._move(harmonics, self._present or point, "step")
         if found is not None and self._present is not None:
             try:
                 found = super().__next__()
             except StopIteration:
                 found, self._over = None, False
-                self.problem, self._core = kept
+                self.problem, self._core, self._missed_before, self._helped_before = kept
         if found is None:
             return None
         point.y.destroy()
@@ -187,8 +187,8 @@ class RefiningContinuation(Continuation):
             "harmonics": harmonics.orders[-1],
             "samples": harmonics.samples,
             "points": self.points,
+            "accuracy": self.accuracy,
         }
-        sizes["accuracy"] = self.accuracy
         return {**found, **sizes, "aim": np.array(self._aim.state), "missed_by": np.array(missed)}
 
     @classmethod
@@ -207,15 +207,14 @@ class RefiningContinuation(Continuation):
         ways = bool(given["upwards"])
         branch = cls(now, y0, stop, steps, report_at, ways, accuracy=accuracy, least=problem.harmonics)
         branch._go_on(given)
-        branch._given, branch._aim, branch.points = problem, Aim.of(given["aim"]), int(given["points"])
+        branch._aim, branch.points = Aim.of(given["aim"]), int(given["points"])
         branch.missed_by = {source: int(n) for source, n in zip(LIMITS, given["missed_by"]) if n}
         branch._present, branch._of = branch.repeated, branch.problem
         return branch
 
     def destroy(self) -> None:
-        """Free the solver, and the problems that were made. Collective."""
-        if self.problem is not self._given:
-            self.problem.forget_errors()
+        """Free the solver, and what estimates errors. Collective."""
+        self.problem.forget_errors()
         super().destroy()
 
 
