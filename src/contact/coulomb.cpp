@@ -54,7 +54,7 @@ double Coulomb::flight(int pair, double before, double now) const {
 }
 
 /// Where each tangent is limited by itself its slider is free until the sample that finds the pair closed,
-/// and no work is counted: that is measured between samples (`Law::piecewise_linear`).
+/// and no work is counted: that is measured between samples (`Law::integration`).
 void Coulomb::diagnose(Motion const& motion, double const* f, Diagnosis& out) const {
   const int n = motion.pairs, samples = motion.samples, d = components();
   const bool circle = limit() == Limit::circle;

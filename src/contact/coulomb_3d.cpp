@@ -8,8 +8,9 @@
 
 namespace fretwave::contact {
 
-bool Coulomb3d::piecewise_linear() const {
-  return std::ranges::all_of(p_.friction_coefficient, [](double mu) { return mu == 0; });
+Integration Coulomb3d::integration() const {
+  const bool slides = std::ranges::all_of(p_.friction_coefficient, [](double mu) { return mu == 0; });
+  return slides ? Integration::pieces : Integration::samples;
 }
 
 /// A march of one sample.

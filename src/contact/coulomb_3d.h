@@ -10,7 +10,7 @@ class Coulomb3d : public Coulomb {
   explicit Coulomb3d(CoulombParameters p) : Coulomb(std::move(p), 2) {}
   Limit limit() const override { return Limit::circle; }
   /// Without friction: stops, whose sliders hold nothing.
-  bool piecewise_linear() const override;
+  Integration integration() const override;
   void force(Motion const&, double* f, Record&) const override;
   void product(Motion const&, Record const&, double const* du, double const* dv, double* df) const override;
   void pair_product(Motion const&, Record const&, int pair, int columns, double const* du,

@@ -9,7 +9,7 @@ class Coulomb3dUncoupled : public Coulomb {
  public:
   explicit Coulomb3dUncoupled(CoulombParameters p) : Coulomb3dUncoupled(std::move(p), 2) {}
   Limit limit() const override { return Limit::each; }
-  bool piecewise_linear() const override { return true; }
+  Integration integration() const override { return Integration::pieces; }
 
  protected:
   Coulomb3dUncoupled(CoulombParameters p, int tangents) : Coulomb(std::move(p), tangents) {}

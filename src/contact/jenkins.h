@@ -16,7 +16,7 @@ class Jenkins : public Law {
   bool odd() const override;
   std::vector<double> sliders() const override { return slider_; }
   double stuck_stiffness(int, int pair) const override { return stiffness_[pair]; }
-  bool piecewise_linear() const override { return true; }
+  Integration integration() const override { return Integration::pieces; }
   LinearPair linear_pair(int pair) const override;
   void diagnose(Motion const&, double const* f, Diagnosis&) const override;
 

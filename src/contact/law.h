@@ -42,6 +42,10 @@ enum class Status : std::uint8_t { stick, slip, open };
 /// interval.
 enum class Limit : std::uint8_t { none, circle, each };
 
+/// How harmonic balance takes the harmonics of a law's force: from samples; or in continuous time, by the
+/// pieces between its changes of state (`LinearPair`).
+enum class Integration : std::uint8_t { samples, pieces };
+
 /// A tangential force this near to its limit has reached it. The only tolerance on it, of all laws.
 constexpr double limit_tolerance = 1e-12;
 inline bool at_limit(double force, double limit) { return force >= limit * (1 - limit_tolerance); }
@@ -125,10 +129,10 @@ class Law {
     return std::numeric_limits<double>::infinity();
   }
 
-  /// Its pairs are `LinearPair`s: harmonic balance takes their constants and finds the changes of state in
-  /// continuous time. Of what follows it asks such a law for `diagnose` alone, for states and gaps; paths and
-  /// wear count there only where two tangents slip, all else is measured between samples, the work too.
-  virtual bool piecewise_linear() const { return false; }
+  /// The same on all ranks. In continuous time harmonic balance asks a law for its constants, and of what
+  /// follows for `diagnose` alone, for states and gaps; paths and wear count there only where two tangents
+  /// slip, all else is measured between samples, the work too.
+  virtual Integration integration() const { return Integration::samples; }
   virtual LinearPair linear_pair(int /*pair*/) const { return {}; }
 
   /// Force on the pairs, and what its linearisation needs.

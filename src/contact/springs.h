@@ -16,7 +16,7 @@ class UnilateralSpring : public Law {
   /// For what asks for one moment of it: integration in time, linear modes.
   void force(Motion const&, double* f, Record&) const override;
   void diagnose(Motion const&, double const* f, Diagnosis&) const override;
-  bool piecewise_linear() const override { return true; }
+  Integration integration() const override { return Integration::pieces; }
   LinearPair linear_pair(int i) const override {
     return {.normal_stiffness = stiffness_[i], .load = -stiffness_[i] * (gap_[i] + stand_off_)};
   }

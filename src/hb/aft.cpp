@@ -25,7 +25,8 @@ Aft::Aft(Harmonics const& h, std::shared_ptr<contact::Law const> law, bool conti
                       law_->components()),
       tangent_transform_(h, law_->hereditary() ? 0 : tangent_columns(*law_)) {
   if (continuous) {
-    continuous_.emplace(h, *law_);
+    if (law_->uses_velocity()) velocity_.resize(size_t(columns_) * h.block_size());
+    continuous_ = continuous_force(h, *law_);
     return;
   }
   const size_t columns = law_->components() * tiles_.front().pairs, n = h.samples() * columns;
@@ -67,7 +68,10 @@ void Aft::mirror(std::vector<double>& samples, double sign, int columns) const {
 
 void Aft::force(double const* U, Exponents const& e, double* F) {
   if (columns_ == 0) return;
-  if (continuous_) return continuous_->force(U, F);
+  if (continuous_) {
+    if (law_->uses_velocity()) multiply(harmonics_, e.s, U, velocity_.data(), columns_);
+    return continuous_->force(U, law_->uses_velocity() ? velocity_.data() : nullptr, F);
+  }
   for (Tile& tile : tiles_) {
     const int columns = tile.pairs * law_->components();
     const size_t at = size_t(tile.first) * law_->components() * harmonics_.block_size();
@@ -91,7 +95,7 @@ std::uint64_t Aft::piece() const {
 
 void Aft::product(double const* dU, double const* dV, double* dF) {
   if (columns_ == 0) return;
-  if (continuous_) return continuous_->product(dU, dF);
+  if (continuous_) return continuous_->product(dU, dV, dF);
   for (Tile const& tile : tiles_) {
     const size_t at = size_t(tile.first) * law_->components() * harmonics_.block_size();
     if (law_->uses_displacement()) transform(tile).to_time(dU + at, u_.data());
@@ -177,7 +181,7 @@ void Aft::by_columns(double* D) const {
 
 void Aft::blocks(Exponents const& e, double* D) {
   if (columns_ == 0) return;
-  if (continuous_) return void(std::ranges::copy(continuous_->blocks(), D));
+  if (continuous_) return continuous_->blocks(e, D);
   const int m = harmonics_.block_size(), d = law_->components();
   const size_t size = size_t(pairs_) * d * m * d * m;
   if (law_->hereditary()) return by_columns(D);

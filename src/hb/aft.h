@@ -1,8 +1,6 @@
 #pragma once
-#include <optional>
-
 #include "contact/law.h"
-#include "hb/continuous_contact.h"
+#include "hb/continuous_force.h"
 
 namespace fretwave::hb {
 
@@ -34,10 +32,11 @@ struct Wearing {
 
 /// Alternating frequency-time for the contact pairs of this rank: harmonic blocks of relative displacement
 /// in, of force out. Blocks are (pairs x components) x block size. Never communicates. Laws that are
-/// piecewise linear are not sampled: ContinuousContact has their force; samples are for those who look.
+/// integrated in continuous time are not sampled: ContinuousForce has their force; samples are for those who
+/// look.
 class Aft {
  public:
-  /// `continuous`: the law's pairs are piecewise linear, on all ranks.
+  /// `continuous`: the law's force is integrated in continuous time, on all ranks.
   Aft(Harmonics const&, std::shared_ptr<contact::Law const>, bool continuous);
   int columns() const { return columns_; }
   /// Force of rounding in a displacement, per metre of it: a stiffness, where it is known by the share of the
@@ -78,7 +77,7 @@ class Aft {
   struct Found {
     ContactPeriod samples;
     std::vector<double> F;
-    std::optional<ContinuousContact> pieces;
+    std::unique_ptr<ContinuousForce> exact;  ///< null where sampled
   };
   Found find(double const* U, Exponents const&) const;
   contact::Diagnosis diagnosis(Found const&, Exponents const&, bool archard) const;
@@ -95,7 +94,7 @@ class Aft {
   Harmonics harmonics_;
   std::shared_ptr<contact::Law const> law_;
   int pairs_, columns_, law_samples_;  ///< law_samples: half a period when half-wave symmetric
-  std::optional<ContinuousContact> continuous_;
+  std::unique_ptr<ContinuousForce> continuous_;
   std::vector<Tile> tiles_;  ///< of one size but for the last
   FourierTransform transform_, last_transform_, tangent_transform_;
   std::vector<double> velocity_, u_, v_, f_;

@@ -31,9 +31,9 @@ Aft::Found Aft::find(double const* U, Exponents const& e) const {
   whole_transform().to_time(U, period.u.data());
   whole_transform().to_time(V.data(), period.v.data());
   if (continuous_) {
-    out.pieces.emplace(harmonics_, *law_);
-    out.pieces->force(U, out.F.data());
-    out.pieces->sample(harmonics_.samples(), period.u.data(), period.f.data());
+    out.exact = continuous_force(harmonics_, *law_);
+    out.exact->force(U, V.data(), out.F.data());
+    out.exact->sample(harmonics_.samples(), period.u.data(), period.v.data(), period.f.data());
     return out;
   }
   contact::Record record;
@@ -57,7 +57,7 @@ contact::Diagnosis Aft::diagnosis(Found const& found, Exponents const& e, bool a
                          std::vector<double>(pairs_), std::vector<double>(pairs_),
                          std::vector<double>(archard ? pairs_ : 0)};
   law_->diagnose(whole, found.samples.f.data(), out);
-  if (found.pieces) found.pieces->measure(out);
+  if (found.exact) found.exact->measure(out);
   return out;
 }
 

@@ -76,7 +76,7 @@ void ContinuousContact::evaluate(double const* U, int first, int pairs) {
   transform_.to_time(grid_.V.data(), grid_.rates.data());
 }
 
-void ContinuousContact::force(double const* U, double* F) {
+void ContinuousContact::force(double const* U, double const*, double* F) {
   linearised_ = false;
   for (int first = 0; first < int(pairs_.size()); first += tile_) {
     const int pairs = std::min(tile_, int(pairs_.size()) - first);

@@ -1,31 +1,24 @@
 #pragma once
-#include "contact/law.h"
+#include "hb/continuous_force.h"
 #include "hb/play.h"
 
 namespace fretwave::hb {
 
-/// Contact whose force is linear in its motion but where a pair changes its state (contact::LinearPair). The
-/// motion is known at every time from its harmonics: the changes are found between samples, to the last
-/// digit, and the force's harmonics are integrals over the pieces between them. So F(U) has no error of
-/// sampling and is as smooth as the law is. Blocks are those of Aft.
-class ContinuousContact {
+/// Contact whose force is linear in its motion but where a pair changes its state (contact::LinearPair): the
+/// changes are found between samples, to the last digit, and the force's harmonics are integrals over the
+/// pieces between them. So F(U) has no error of sampling and is as smooth as the law is.
+class ContinuousContact : public ContinuousForce {
  public:
   ContinuousContact(Harmonics const&, contact::Law const&);
 
-  void force(double const* U, double* F);
-  /// dF/dU at the last force, pairs x (components m) x (components m).
-  std::vector<double> const& blocks();
-  void product(double const* dU, double* dF);
-  /// dF for gaps that grow by dgap (pairs) [m].
-  void gap_product(double const* dgap, double* dF);
-  /// Of the last force over the period: the share of contact or stick, times its stiffness.
-  double mean_stiffness(int pair, int component) const;
-  /// Number of the sequences of states, whenever they begin: it changes where a piece comes or goes.
-  std::uint64_t piece() const;
-  /// f (samples x components x pairs) of the last force at the samples u.
-  void sample(int samples, double const* u, double* f) const;
-  /// Work, slip path and Archard's integral of the last force: sums over slips, not over samples.
-  void measure(contact::Diagnosis&) const;
+  void force(double const* U, double const* V, double* F) override;
+  void blocks(Exponents const&, double* D) override;
+  void product(double const* dU, double const* dV, double* dF) override;
+  void gap_product(double const* dgap, double* dF) override;
+  double mean_stiffness(int pair, int component) const override;
+  std::uint64_t piece() const override;
+  void sample(int samples, double const* u, double const* v, double* f) const override;
+  void measure(contact::Diagnosis&) const override;
 
  private:
   struct Tangent {

@@ -58,7 +58,7 @@ std::uint64_t ContinuousContact::piece() const {
   return sum;
 }
 
-void ContinuousContact::sample(int samples, double const* u, double* f) const {
+void ContinuousContact::sample(int samples, double const* u, double const*, double* f) const {
   const size_t n = pairs_.size(), step = n * components_;
   std::fill_n(f, size_t(samples) * step, 0.0);
   for (size_t k = 0; k < n; ++k) {

@@ -1,4 +1,5 @@
 /// Derivatives of contact in continuous time.
+#include <algorithm>
 #include <cmath>
 
 #include "hb/continuous_contact.h"
@@ -88,12 +89,12 @@ void ContinuousContact::tangential_blocks(Pair const& pair, int tangent, double*
   slip.add_coefficients(-slope, by_gap + at);
 }
 
-std::vector<double> const& ContinuousContact::blocks() {
+void ContinuousContact::blocks(Exponents const&, double* D) {
   linearise();
-  return D_;
+  std::ranges::copy(D_, D);
 }
 
-void ContinuousContact::product(double const* dU, double* dF) {
+void ContinuousContact::product(double const* dU, double const*, double* dF) {
   linearise();
   const int size = int(block(1, 0)), step = 1;
   const double one = 1, zero = 0;

@@ -63,7 +63,9 @@ DiscretisationError::DiscretisationError(HarmonicProblem& problem, std::string c
   }
   const int enough = 8 * orders.back();
   finer_ = refined(problem, orders, std::max(4 * problem.harmonics().samples(), 2 * enough));
-  const auto quick = [](auto const& law) { return !law.hereditary() || law.piecewise_linear(); };
+  const auto quick = [](auto const& law) {
+    return !law.hereditary() || law.integration() != contact::Integration::samples;
+  };
   if (!all_laws(problem.model(), quick)) sampled_ = std::exchange(finer_, refined(problem, orders, enough));
   newton_ = std::make_unique<solve::Newton>(*finer_, prefix);
   newton_->solve_beside(tolerance);

@@ -1,0 +1,34 @@
+#pragma once
+#include <memory>
+
+#include "contact/law.h"
+#include "hb/harmonics.h"
+
+namespace fretwave::hb {
+
+/// The force of a rank's pairs at every time of the period: the motion is known there from its harmonics, and
+/// the force's harmonics are integrals, not sums over samples. What `contact::Law::integration` names is how
+/// they are taken. Blocks are those of Aft; V are those of the velocity, null where the law ignores it.
+class ContinuousForce {
+ public:
+  virtual ~ContinuousForce() = default;
+  virtual void force(double const* U, double const* V, double* F) = 0;
+  /// dF/dU at the last force, with the velocity's share through s: pairs x (components m) x (components m).
+  virtual void blocks(Exponents const&, double* D) = 0;
+  virtual void product(double const* dU, double const* dV, double* dF) = 0;
+  /// dF for gaps that grow by dgap (pairs) [m].
+  virtual void gap_product(double const* dgap, double* dF) = 0;
+  /// Of the last force over the period: the share of contact or stick, times its stiffness.
+  virtual double mean_stiffness(int pair, int component) const = 0;
+  /// Number of the sequences of states, whenever they begin: it changes where a piece comes or goes.
+  virtual std::uint64_t piece() const = 0;
+  /// f (samples x components x pairs) of the last force at the samples u and v.
+  virtual void sample(int samples, double const* u, double const* v, double* f) const = 0;
+  /// Work, slip path and Archard's integral of the last force: integrals, not sums over samples.
+  virtual void measure(contact::Diagnosis&) const = 0;
+};
+
+/// Null where the law is sampled.
+std::unique_ptr<ContinuousForce> continuous_force(Harmonics const&, contact::Law const&);
+
+}  // namespace fretwave::hb
