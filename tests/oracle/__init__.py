@@ -10,10 +10,12 @@ SciPy only; not one line of the solver is used.
     mode = mode_orbit(system, dof, a, omega0, zeta, state)          # EPMC: .omega0, .zeta
     motion = series_motion(system, "CNM", 601, dof, a)              # what has no differential equation: .lambda_
     orbit = orbit_3d(Block(M, C, K, [Pair(B, kn, kt, mu, N0)], P, p, w))   # friction on a circle
+    F = forces(Q, kn, kt, mu, N0)                                   # the same under a given motion, by its harmonics
 """
 
 from .circle import Block, Orbit3d, Pair, orbit_3d
 from .flow import Event, Flow, OracleError
+from .friction_3d import forces
 from .laws import Coulomb, Jenkins, LoadedJenkins, Unilateral
 from .mode import ModeOrbit, mode_orbit
 from .orbit import Orbit, forced_orbit
@@ -38,6 +40,7 @@ __all__ = [
     "System",
     "Unilateral",
     "forced_orbit",
+    "forces",
     "hysteresis",
     "mode_orbit",
     "orbit_3d",
