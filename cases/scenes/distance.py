@@ -43,19 +43,17 @@ def ratio(beta, omega, method):
     return beta / np.hypot(beta, omega) if method == "CNM" else beta / omega
 
 
-def distance(eq, Q, beta, omega, enough=None, first=None):
+def distance(eq, Q, beta, omega, enough=None):
     """Errors of coefficients Q (n_dof, m) with decay beta and frequency omega (EPMC: w0; forced: beta = 0).
 
     Parameters
     ----------
     enough : callable, optional
         Says whether the first step is small enough to need no iteration.
-    first : (R, acting, J), optional
-        The equations at the point, if they are known.
     """
     start = now = (Q, beta, omega)
     size = np.linalg.norm(_dynamic(eq, Q)) or 1.0
-    R, acting, J = first or eq.linearise([now])[0]
+    R, acting, J = eq.linearise(now)
     balance, least, errors = _balance(eq, R, acting), _norm(R, acting), None
     for _ in range(ENOUGH):
         step = least_step(eq, J, R, now, size)
@@ -72,7 +70,7 @@ def distance(eq, Q, beta, omega, enough=None, first=None):
             found = _errors(eq, start, now, size, balance, True)
             found.solution = now
             return found
-        R, acting, J = eq.linearise([now])[0]
+        R, acting, J = eq.linearise(now)
     return errors
 
 

@@ -17,7 +17,6 @@ import scipy.sparse as sp
 from . import laws
 
 STEP = 1e-30  #: of complex differentiation
-LARGEST = 4e6  #: numbers in one march
 
 
 @dataclass
@@ -50,10 +49,6 @@ class Contact:
             k: np.broadcast_to(np.asarray(v, float), self.pairs) for k, v in {**standard, **self.parameters}.items()
         }
 
-    def continuous(self) -> bool:
-        """Sliders in one direction, and pads that are stops: their force is known at every time, as to the solver."""
-        return self.law == "jenkins" or self.components == 3 and not np.any(self.full()["friction_coefficient"])
-
     def stuck(self) -> np.ndarray:
         """Stiffness of each row of B when nothing slips and what touches at rest stays closed."""
         p = self.full()
@@ -73,7 +68,6 @@ class Equations:
     Attributes
     ----------
     orders : retained harmonics
-    samples : of a period
     method : "CNM", "EPMC" or "forced"
     dof : normalised
     force : (n_dof,) amplitude of cos(w t)
@@ -85,7 +79,6 @@ class Equations:
     C: Any
     contacts: list[Contact]
     orders: list[int]
-    samples: int
     method: str
     dof: int = 0
     force: Any = None
@@ -97,8 +90,6 @@ class Equations:
         self.maps = [sp.csr_matrix(contact.B) for contact in self.contacts]
         self.m = sum(2 if n else 1 for n in self.orders)
         self.column = {n: sum(2 if k else 1 for k in self.orders if k < n) for n in self.orders}
-        synthesis = self.waves(2 * np.pi * np.arange(self.samples) / self.samples)
-        self.transform = synthesis, (synthesis * self.weight() / self.samples).T
 
     # Pieces
 
@@ -134,42 +125,27 @@ class Equations:
             V[:, k + 1] = decay * U[:, k + 1] - turn * U[:, k]
         return V
 
-    def law(self, contact, U, beta, omega, parameters=None):
-        """Force coefficients (rows, m, lanes) for relative coefficients U (rows, m, lanes); rows pair by pair."""
-        c, pairs, lanes = contact.components, contact.pairs, U.shape[2]
-        if contact.continuous():
-            return self.in_time(contact, U)
-        p = {k: np.repeat(v, lanes) for k, v in contact.full().items()}
-        motion = self.velocity(U, beta, omega) if contact.law == "regularised_coulomb" else U
-        motion = motion.reshape(pairs, c, self.m, lanes).transpose(2, 1, 0, 3).reshape(self.m, -1)
-        samples, (synthesis, analysis) = self.samples, self.transform
-        u = (synthesis @ motion).reshape(samples, c, pairs * lanes)
-        rest = np.zeros((max(1, c - 1), pairs * lanes))
-        if contact.law == "regularised_coulomb":
-            f = laws.regularised_coulomb(u, p)
-        else:
-            f = laws.coulomb_3d(u, p, rest)
-        F = (analysis @ f.reshape(samples, -1)).reshape(self.m, c, pairs, lanes)
-        return F.transpose(2, 1, 0, 3).reshape(pairs * c, self.m, lanes)
+    def law(self, contact, U, beta, omega):
+        """Force coefficients (rows, m, lanes) for relative coefficients U (rows, m, lanes); rows pair by pair.
 
-    def in_time(self, contact, U):
-        """Force coefficients of pairs that are not sampled; lanes of one motion share the times of their changes."""
+        Lanes are one motion with different complex steps: they share the times at which its states change.
+        """
         F, p, c = np.zeros_like(U), contact.full(), contact.components
-        rates = self.velocity(U.reshape(len(U), self.m, -1), 0.0, 1.0)
-        same = np.r_[True, np.any(U[:, :, 1:].real != U[:, :, :-1].real, axis=(0, 1))]
-        motions = np.split(np.arange(U.shape[2]), np.flatnonzero(same)[1:])
+        moved = self.velocity(U, beta, omega) if contact.law == "regularised_coulomb" else U
         for pair in range(contact.pairs):
-            for lanes in motions:
-                u = U[c * pair][:, lanes]
-                if contact.law == "jenkins":
-                    kt, limit = p["tangential_stiffness"][pair], p["friction_limit"][pair]
-                    integral = laws.jenkins(u, rates[pair][:, lanes], kt, limit, self.waves)
-                else:
-                    kn = p["normal_stiffness"][pair]
-                    load = p["normal_load"][pair] - kn * p["gap"][pair]
-                    integral = laws.stop(u, kn, load, self.waves)
-                F[c * pair][:, lanes] = self.weight()[:, None] / (2 * np.pi) * integral
+            rows = slice(c * pair, c * (pair + 1))
+            integral = self.integral(contact.law, moved[rows], {k: float(v[pair]) for k, v in p.items()})
+            F[rows] = self.weight()[:, None] / (2 * np.pi) * integral
         return F
+
+    def integral(self, law, u, p):
+        """Of the force of one pair and the waves over a period, (components, m, lanes)."""
+        if law == "coulomb_3d":
+            return laws.coulomb_3d(u, p, self.orders)
+        if law == "regularised_coulomb":
+            return laws.regularised_coulomb(u[0], p["friction_limit"], p["regularisation_velocity"], self.waves)[None]
+        rates = self.velocity(u, 0.0, 1.0)
+        return laws.jenkins(u[0], rates[0], p["tangential_stiffness"], p["friction_limit"], self.waves)[None]
 
     def static_load(self):
         """B^T f(0): what balances the pairs' own normal loads."""
@@ -208,21 +184,18 @@ class Equations:
             acting[:, place] = sum(abs(part) for part in parts)
         return R, acting
 
-    def linearise(self, states):
-        """(R, acting, J) of each state (Q, beta, omega), J = dR / d(Q, beta, omega) sparse (n_dof m, n_dof m + 2).
+    def linearise(self, state):
+        """(R, acting, J) of a state (Q, beta, omega), J = dR / d(Q, beta, omega) sparse (n_dof m, n_dof m + 2).
 
-        The contact's part comes from complex steps, all unknowns of all pairs of many states in one march.
+        The contact's part comes from a lane of complex steps for each unknown of a pair.
         """
-        linear = [self._linear(*state) for state in states]
-        forces = [np.zeros_like(Q) for Q, _, _ in states]
+        J, force = self._linear(*state), np.zeros_like(state[0])
         for contact, B in zip(self.contacts, self.maps):
             big = sp.kron(B, sp.identity(self.m), format="csr")
-            for number, (F, D, tail) in enumerate(self._contact(contact, B, states)):
-                forces[number] += B.T @ F
-                linear[number] = linear[number] + sp.hstack(
-                    [big.T @ D @ big, sp.csr_matrix(big.T @ tail)], format="csr"
-                )
-        return [(*self.balance(*state, force), J) for state, force, J in zip(states, forces, linear)]
+            F, D, tail = self._contact(contact, B, *state)
+            force += B.T @ F
+            J = J + sp.hstack([big.T @ D @ big, sp.csr_matrix(big.T @ tail)], format="csr")
+        return *self.balance(*state, force), J
 
     def _linear(self, Q, beta, omega):
         """The part of M, C and K."""
@@ -246,26 +219,18 @@ class Equations:
         J = sp.csr_matrix((np.concatenate([b.data for b, _, _ in blocks]), (rows, cols)), shape=(size, size))
         return sp.hstack([J, sp.csr_matrix(tail.reshape(size, 2))], format="csr")
 
-    def _contact(self, contact, B, states):
-        """F, dF/dU (block diagonal by pairs) and dF/d(beta, omega) of each state: a lane for each unknown of a pair."""
+    def _contact(self, contact, B, Q, beta, omega):
+        """F, dF/dU (block diagonal by pairs) and dF/d(beta, omega)."""
         c, m, pairs = contact.components, self.m, contact.pairs
         lanes = c * m + 2
-        lifted = np.stack([B @ Q for Q, _, _ in states], axis=-1).astype(complex)
-        lifted = np.repeat(lifted[..., None], lanes, axis=3)
+        lifted = np.repeat((B @ Q)[..., None].astype(complex), lanes, axis=2)
         for component in range(c):
             for k in range(m):
-                lifted[component::c, k, :, component * m + k] += 1j * STEP
-        beta, omega = (np.repeat(np.array([state[i] for state in states], complex)[:, None], lanes, 1) for i in (1, 2))
-        beta[:, -2] += 1j * STEP
-        omega[:, -1] += 1j * STEP
-        found = self.law(contact, lifted.reshape(pairs * c, m, -1), beta.ravel(), omega.ravel())
-        found = found.reshape(pairs, c * m, len(states), lanes)
-        for number in range(len(states)):
-            d = found[:, :, number].imag / STEP
-            D = sp.block_diag(list(d[:, :, :-2]), format="csr")
-            yield found[:, :, number, 0].real.reshape(pairs * c, m), D, d[:, :, -2:].reshape(-1, 2)
-
-    def batch(self):
-        """States that fit in one march."""
-        lanes = sum(x.pairs * x.components * (x.components * self.m + 2) * self.samples for x in self.contacts)
-        return int(np.clip(LARGEST / max(lanes, 1), 1, 64))
+                lifted[component::c, k, component * m + k] += 1j * STEP
+        beta, omega = (np.full(lanes, x, complex) for x in (beta, omega))
+        beta[-2] += 1j * STEP
+        omega[-1] += 1j * STEP
+        found = self.law(contact, lifted, beta, omega).reshape(pairs, c * m, lanes)
+        d = found.imag / STEP
+        D = sp.block_diag(list(d[:, :, :-2]), format="csr")
+        return found[:, :, 0].real.reshape(pairs * c, m), D, d[:, :, -2:].reshape(-1, 2)

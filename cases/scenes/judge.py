@@ -90,7 +90,7 @@ def read(scene: Scene, done: Finished) -> list[Run]:
         columns = {name: data[()] for name, data in group["points"].items()}
         columns["event"] = np.array([text.decode() for text in columns["event"]])
         orders = sorted({int("".join(filter(str.isdigit, label.decode()))) for label in group["harmonic"][()]})
-        Q, samples = group["coefficients"][()], int(group.attrs["samples"])
+        Q = group["coefficients"][()]
     method = scene.analysis.get("method", "CNM") if scene.analysis["type"] == "mode" else "forced"
     dof = int(scene.analysis["normalise" if method != "forced" else "observe"][1:])
     C = scene.C
@@ -104,7 +104,7 @@ def read(scene: Scene, done: Finished) -> list[Run]:
         for name, value in scene.analysis.get("force", {}).items():
             force[int(name[1:])] = value * level
         eq = Equations(
-            scene.M, scene.K, C, scene.contacts, orders, samples, method, dof, force if level else None, scene.preload
+            scene.M, scene.K, C, scene.contacts, orders, method, dof, force if level else None, scene.preload
         )
         runs.append(Run(scene, {k: v[rows] for k, v in columns.items()}, Q[rows], eq, method))
     return runs
@@ -179,18 +179,14 @@ def _points(run: Run, verdict: Verdict) -> list[str]:
         return bad
     begin, worst, rows = time.thread_time(), None, _order(run)
     while rows and (verdict.judged < 4 or time.thread_time() - begin < SECONDS):
-        batch, rows = rows[: run.equations.batch()], rows[run.equations.batch() :]
-        known = run.equations.linearise([run.state(row) for row in batch])
-        for row, first in zip(batch, known):
-            found = distance(run.equations, *run.state(row), lambda d: not errors(run, row, d), first)  # noqa: B023
-            verdict.judged += 1
-            for key in ("omega", "zeta", "motion", "balance"):
-                verdict.worst[key] = max(verdict.worst.get(key, 0.0), getattr(found, key))
-            wrong = errors(run, row, found)
-            if wrong and (worst is None or found.motion > worst[1].motion):
-                worst = (row, found, wrong)
-            if time.thread_time() - begin > 2 * SECONDS and verdict.judged >= 4:
-                break
+        row = rows.pop(0)
+        found = distance(run.equations, *run.state(row), lambda d, row=row: not errors(run, row, d))
+        verdict.judged += 1
+        for key in ("omega", "zeta", "motion", "balance"):
+            verdict.worst[key] = max(verdict.worst.get(key, 0.0), getattr(found, key))
+        wrong = errors(run, row, found)
+        if wrong and (worst is None or found.motion > worst[1].motion):
+            worst = (row, found, wrong)
     if worst is None:
         return []
     row, found, wrong = worst

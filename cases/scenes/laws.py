@@ -1,8 +1,9 @@
-"""Contact laws for the judge, written from their definitions (DESIGN, section 6) and differentiated by complex steps.
+"""Contact laws for the judge, written from their definitions (DESIGN, section 6), at every time of the period.
 
-Every function takes one period of motion as (samples, components, lanes) arrays and is analytic in it except at
-changes of state, which real parts decide: a motion u + 1e-30 i du gives the force's exact derivative along du in the
-imaginary part. Nothing here is shared with the solver.
+Every function takes one period of motion as coefficients (m, lanes), or (3, m, lanes), of waves. Lanes share their real
+part, which says where states change; a motion u + 1e-30 i du gives the force's exact derivative along du in the
+imaginary part: complex steps where the force is analytic, equations of variation in `circle`. Nothing here is
+shared with the solver.
 """
 
 from __future__ import annotations
@@ -12,19 +13,48 @@ from functools import cache
 import numpy as np
 from scipy.optimize import brentq
 
-CLOSED = 1e-13  #: of a motion's size: a slider that comes back this near to its start has closed its period
-MOST_PERIODS = 400
-PATIENCE = 8  #: periods after which a slider that still creeps is looked for where it would come to
-TINY = 1e-300
+from .circle import CLOSED, TURN, Slider, waves
+
+ROUNDED = 1e-3  #: size of a motion that its rounding, in arms, is CLOSED of
+MOST_PERIODS = 60  #: Newton steps until a slider closes its period
+NO_SLIP = 1e-13  #: of a motion's size: a slider within all its discs but for this does not slip
+PANEL = 20  #: points of Gauss in a panel of tanh
 FIRST = 0.0123  #: time at which a period is begun, where motions that are measured from their phase have no root
 
 
-def regularised_coulomb(v, p):
-    """mu N tanh(v / eps); v (samples, 1, lanes)."""
-    ratio = v / p["regularisation_velocity"]
-    # Beyond 20 the tanh is 1 and its derivative 0 to 1e-17; complex exponentials would overflow there.
+def regularised_coulomb(V, limit, eps, waves):
+    """limit tanh(v / eps) at every time of the period: Gauss's quadrature on panels over which v / eps changes little.
+
+    Parameters
+    ----------
+    V : (m, lanes) of the velocity
+    limit, eps : numbers
+    waves : callable
+        (times, m) from times: 1, cos n tau, sin n tau
+
+    Returns
+    -------
+    (m, lanes) integrals of f and the waves over the period
+    """
+    node, weight = _nodes(PANEL)
+    first, count = V[:, 0].real / eps, 4 * len(V)
+    middle, half, done = FIRST + TURN * (np.arange(count) + 0.5) / count, np.full(count, np.pi / count), []
+    while len(half):
+        tau = middle[:, None] + half[:, None] * node
+        ratio = (waves(tau.ravel()) @ first).reshape(tau.shape)
+        least, change = abs(ratio).min(axis=1), np.ptp(ratio, axis=1)
+        # tanh is 1 beyond 20, and has its poles at i pi / 2: a panel that sees none of either converges in few points
+        fine = (change < 2) | (least > 20 + change) | (half < 1e-14)
+        done.append((middle[fine], half[fine]))
+        middle, half = middle[~fine], half[~fine] / 2
+        middle, half = np.r_[middle - half, middle + half], np.r_[half, half]
+    middle, half = (np.concatenate(x) for x in zip(*done))
+    tau, share = (middle[:, None] + half[:, None] * node).ravel(), (half[:, None] * weight).ravel()
+    wave = waves(tau)
+    ratio = wave @ (V / eps)
+    # complex exponentials would overflow beyond
     inside = np.clip(ratio.real, -20.0, 20.0) + 1j * np.where(abs(ratio.real) < 20.0, ratio.imag, 0.0)
-    return p["friction_limit"] * np.tanh(inside)
+    return limit * ((wave * share[:, None]).T @ np.tanh(inside))
 
 
 def jenkins(coefficients, rates, stiffness, limit, waves):
@@ -134,105 +164,151 @@ def _closed_spans(f, m):
     return list(zip(ends[::2], ends[1::2]))
 
 
-def coulomb_3d(u, p, rest):
-    """3-D Coulomb contact with elastic stiffness, lift-off and circular slip limit, on the period its sliders close.
+def coulomb_3d(U, p, orders, rest=(0.0, 0.0)):
+    """3-D Coulomb contact with elastic stiffness, lift-off and circular slip limit, on the period its slider closes.
 
     Parameters
     ----------
-    u : (samples, 3, lanes), u[:, 0] > 0 closes
-    p : parameters, (lanes,) each
-    rest : (2, lanes) sliders in the static state; of the periods that close without slip the one nearest to it counts
+    U : (3, m, lanes), lanes with the same real part; U[0] > 0 closes
+    p : parameters of the pair
+    orders : of the waves
+    rest : slider in the static state; of the periods that close without slip the one nearest to it counts
+
+    Returns
+    -------
+    (3, m, lanes) integrals of N, T1, T2 and the waves over the period
     """
-    normal = p["normal_load"] + p["normal_stiffness"] * (u[:, 0] - p["gap"])  # below zero where it is open
-    size = abs(u[:, 1:].real).max(axis=(0, 1)) + abs(rest).max(axis=0) + TINY
-    pace = abs(u.imag).max() + TINY
-    w = rest + 0j * u[0, 1:]
-    for period in range(MOST_PERIODS):
-        start, (w, slipped) = w, _march(u, normal, w, p)
-        off = w - start
-        creeps = abs(off.real).max(axis=0) > CLOSED * size
-        if not np.any(creeps) and (not period or abs(off.imag).max() <= 1e-10 * pace):
+    if orders[0]:
+        return coulomb_3d(np.pad(U, ((0, 0), (1, 0), (0, 0))), p, [0, *orders], rest)[:, 1:]
+    kn, kt, mu = p["normal_stiffness"], p["tangential_stiffness"], p["friction_coefficient"]
+    load = p["normal_load"] - kn * p["gap"]
+    out = np.zeros_like(U)
+    out[0] = stop(U[0], kn, load, lambda tau: waves(orders, tau))
+    path = np.stack([U[1], U[2], mu * kn / kt * U[0]])
+    path[2, 0] += mu / kt * load
+    slider = Slider(orders, path[:, :, 0].real.copy(), bool(np.any(U.imag)))
+    spans = _closed_spans(lambda tau: load + kn * (waves(orders, tau) @ U[0, :, 0].real), U.shape[1])
+    if mu and len(spans) == 1 and spans[0][1] - spans[0][0] == TURN:
+        integral, varied = _never_opens(slider, np.asarray(rest, float))
+    else:
+        for begin, end in spans if mu else []:
+            slider.land(begin, end)
+        integral, varied = slider.integral, slider.varied[:, :, 2:]
+    out[1:] = kt * integral[:, :, None]
+    if slider.vary:
+        m = U.shape[1]
+        out[1:] += 1j * kt * np.tensordot(varied.reshape(2, m, 3, m), path.imag, 2)
+    return out
+
+
+def _never_opens(slider, rest):
+    """Integrals and derivatives of the period without slip that is nearest to rest; without one, of the only one."""
+    place, varied = common_point(slider, rest)
+    if place is None:
+        return _cycle(slider, rest)
+    m = slider.U.shape[1]
+    norm = np.r_[TURN, np.full(m - 1, np.pi)]
+    off, D = np.outer(place, np.eye(m)[0]), np.zeros((2, m, 3, m))
+    if not slider.vary:
+        return (slider.U[:2] - off) * norm, D
+    for row in range(2):
+        D[row, :, row] = np.diag(norm)
+    D[:, 0] -= TURN * varied.reshape(2, 3, m)
+    return (slider.U[:2] - off) * norm, D.reshape(2, m, 3 * m)
+
+
+def _cycle(slider, rest):
+    """The period that closes, by Newton on the arm at its begin, and how that arm goes with the coefficients."""
+    trial, size = Slider(slider.orders, slider.U, False), abs(slider.U[2]).max() + ROUNDED * abs(slider.U).max()
+    begin, end, d, last = FIRST, FIRST + TURN, slider.at(FIRST)[:2] - rest, np.inf
+    for _ in range(MOST_PERIODS):
+        after, A = trial.march(begin, d, np.eye(2), end)
+        gain, I_A = after - d, np.eye(2) - A
+        if np.hypot(*gain) <= CLOSED * size:
             break
-        if period == PATIENCE:  # towards a place that it reaches only in the limit: there is none nearer to rest
-            _shake_down(u, normal, w, p, rest, np.flatnonzero(creeps))
-    _shake_down(u, normal, w, p, rest, np.flatnonzero(~slipped & np.any(w.real != rest, axis=0)))
-    f = np.empty_like(u)
-    _march(u, normal, w, p, f)
-    return f
+        newton = np.hypot(*gain) < 0.9 * last and abs(np.linalg.det(I_A)) > 1e-12
+        d, last = after + (A @ np.linalg.solve(I_A, gain) if newton else 0.0), np.hypot(*gain)
+    slider.forget()
+    start = np.zeros((2, slider.directions))
+    start[:, :2] = np.eye(2)
+    _, D = slider.march(begin, d, start, end)
+    by = np.linalg.lstsq(np.eye(2) - D[:, :2], D[:, 2:], rcond=1e-13)[0]
+    return slider.integral, slider.varied[:, :, 2:] + slider.varied[:, :, :2] @ by
 
 
-def _shake_down(u, normal, w, p, rest, lanes):
-    """Sliders of these lanes to the place nearest to rest where nothing slips, if there is one."""
-    for lane in lanes:
-        radius = p["friction_coefficient"][lane] / p["tangential_stiffness"][lane] * _positive(normal[:, lane])
-        if np.all(radius.real > 0):
-            place = nearest_common(u[:, 1:, lane], radius, rest[:, lane])
-            w[:, lane] = w[:, lane] if place is None else place
+def common_point(slider, rest):
+    """The point nearest to rest with |u - w| <= R at all times, and its derivatives (2, 3 m); None if there is none."""
+    m, size = slider.U.shape[1], abs(slider.U).max()
+    grid = FIRST + TURN * np.arange(32 * slider.orders[-1] + 64) / (32 * slider.orders[-1] + 64)
+    step = grid[1] - grid[0]
+
+    def over(tau, w):
+        x = slider.at(tau)
+        return np.hypot(x[0] - w[0], x[1] - w[1]) - x[2]
+
+    def rises(tau, w):
+        x, v = slider.at(tau), slider.at(tau, slider.V)
+        return (x[0] - w[0]) * v[0] + (x[1] - w[1]) * v[1] - v[2] * np.hypot(x[0] - w[0], x[1] - w[1])
+
+    def peaks(w):
+        """Times at which |u - w| - R has its maxima, the largest first."""
+        value = over(grid, w)
+        top = np.flatnonzero((value >= np.roll(value, 1)) & (value > np.roll(value, -1)))
+        out = []
+        for t in grid[top[np.argsort(-value[top])][:4]] if len(top) else grid[:1]:
+            inside = rises(t - step, w) > 0 > rises(t + step, w)
+            out.append(brentq(rises, t - step, t + step, (w,), xtol=1e-300, rtol=1e-15) if inside else t)
+        return np.array(out)[np.argsort(-over(np.array(out), w))]
+
+    def discs(times):
+        x = slider.at(np.array(times))
+        return x[:2].T, x[2]
+
+    times = [peaks(rest)[0]]
+    if over(times[0], rest) <= 0:
+        return rest, np.zeros((2, 3 * m))
+    w = nearest_common(*discs(times), rest)
+    if over(peaks(w), w)[0] <= NO_SLIP * size:
+        return w, _one(slider, times[0], rest)
+    for _ in range(40):
+        times += [t for t in peaks(w) if over(t, w) > NO_SLIP * size and min(abs(t - np.array(times))) > 1e-9]
+        near = nearest_common(*discs(times), rest)
+        if near is None:
+            return None, None
+        moved, w = np.hypot(*(near - w)), near
+        if moved < 1e-6 * size:
+            break
+    for _ in range(20):
+        pair = peaks(w)[:2]
+        if len(pair) < 2:
+            return None, None
+        u, _ = discs(pair)
+        n = (w - u) / np.linalg.norm(w - u, axis=1)[:, None]
+        step_w = np.linalg.lstsq(n, -over(pair, w), rcond=1e-14)[0]
+        w = w + step_w
+        if np.hypot(*step_w) < 1e-15 * size:
+            break
+    if not (np.hypot(*step_w) < 1e-11 * size and np.hypot(*(w - near)) < 1e-4 * size):
+        return None, None
+    if over(peaks(w), w)[0] > 10 * NO_SLIP * size:
+        return None, None
+    varied = slider.variation(slider.wave(pair))[:, :, 2:]
+    return w, np.linalg.lstsq(n, np.einsum("ij,ijk->ik", n, varied[:, :2]) + varied[:, 2], rcond=1e-14)[0]
 
 
-def _positive(x):
-    return np.where(x.real > 0, x, 0.0)
-
-
-def _length(d):
-    square = d[0] * d[0] + d[1] * d[1]
-    return np.sqrt(np.where(square.real > 0, square, TINY))
-
-
-def _march(u, normal, w, p, f=None):
-    """One period of sliders w (2, lanes), which the last sample's disc pulls in first: their end, and which of them
-    slipped by more than rounding. Between samples u and the normal force go straight, from where it closes; only the
-    direction in which the slider is pulled turns with the path."""
-    kt = p["tangential_stiffness"]
-    reach = p["friction_coefficient"] / kt
-    slipped = np.zeros(u.shape[2], dtype=bool)
-    radius, d = reach * _positive(normal[-1]), u[-1, 1:] - w
-    w = np.where(_length(d).real > radius.real, u[-1, 1:] - d * (radius / _length(d)), w)
-    for t in range(len(u)):
-        was, now, R0, R1 = normal[t - 1], normal[t], radius, reach * _positive(normal[t])
-        radius, opened, lands = R1, now.real <= 0, (was.real <= 0) & (now.real > 0)
-        share = np.where(lands, now / np.where(lands, now - was, 1.0), 1.0)
-        v, d = share * (u[t, 1:] - u[t - 1, 1:]), np.where(lands, 0.0, u[t - 1, 1:] - w)
-        gain = u[(t + 1) % len(u), 1:] - 2 * u[t, 1:] + u[t - 1, 1:]
-        sticks = (_length(d + v).real <= R1.real) & (R1.real > 0)
-        with np.errstate(all="ignore"):  # lanes that do not slip
-            pulled = _pulled(d, v, gain, R0, R1, lands)
-        kept = np.where(opened, 0.0, np.where(sticks, d + v, np.where(R1.real > 0, pulled, 0.0)))
-        w = np.where(sticks & ~lands, w, u[t, 1:] - kept)
-        slipped |= (R1.real == 0) | ~sticks & (_length(d + v).real > R1.real * (1 + 1e-12))
-        if f is not None:
-            f[t, 0], f[t, 1:] = _positive(now), kt * kept
-    return w, slipped
-
-
-def _pulled(d, v, gain, R0, R1, lands):
-    """The arm d = u - w at the end of a step in which it slips: u goes by v, the radius of its disc from R0 to R1.
-    The next v is larger by `gain`.
-
-    It sticks until |d + s v| = R0 + s (R1 - R0); from there tan(phi / 2) falls by exp(-x), phi the angle from v to
-    the arm, x the way over the mean radius, and sinh x is summed to its third term. v is turned before towards the
-    path's direction at the step's end, all the way where x is large.
-    """
-    rise, way = R1 - R0, _length(v)
-    a, b, c = way * way - rise * rise, d[0] * v[0] + d[1] * v[1] - R0 * rise, d[0] * d[0] + d[1] * d[1] - R0 * R0
-    square = b * b - a * c
-    root = np.sqrt(np.where(square.real > 0, square, 0.0))
-    early = b.real > 0
-    s = np.where(early, -c, root - b) / np.where(early, b + root, np.where(a.real > 0, a, 1.0))
-    s = np.where(lands | (s.real > 1), 1.0, np.where(s.real > 0, s, 0.0))
-    at = d + s * v
-    r = _length(at)
-    most = 1e-12 * abs(way) + TINY  # of an arm that is none, x is large enough
-    per = 2 * (1 - s) / np.where((R1 + r).real > most, R1 + r, most)
-    tilt = per * (v[0] * gain[1] - v[1] * gain[0]) / (2 * way * (3 + np.sqrt(9 + (per * way) ** 2)))
-    v = v + tilt * np.stack([-v[1], v[0]])
-    way = _length(v)
-    x = per * way
-    sinh = x + x**3 / 6 + x**5 / 120
-    e, n = v / way, at / r
-    half = (e[0] * n[1] - e[1] * n[0]) / (1 + e[0] * n[0] + e[1] * n[1]) / (sinh + np.sqrt(1 + sinh * sinh))
-    turned = (1 - half * half) * e + 2 * half * np.stack([-e[1], e[0]])
-    return R1 * np.where(way.real > TINY**0.5, turned / (1 + half * half), n)
+def _one(slider, tau, rest):
+    """Derivatives of the point of the disc at tau that is nearest to rest; tau is where |u - rest| - R is largest."""
+    x, v, a = (slider.at(tau, C) for C in (slider.U, slider.V, slider.W))
+    varied, late = (slider.variation(wave)[0, :, 2:] for wave in (slider.wave(tau), slider.slopes(tau)))
+    away = rest - x[:2]
+    far = np.hypot(*away)
+    n = away / far
+    across = np.eye(2) - np.outer(n, n)
+    dn, nt = -across @ varied[:2] / far, -across @ v[:2] / far
+    ds = -v[:2] @ dn - n @ late[:2] - late[2]
+    st = -nt @ v[:2] - n @ a[:2] - a[2]
+    wt = v[:2] + v[2] * n + x[2] * nt
+    return varied[:2] + np.outer(n, varied[2]) + x[2] * dn - np.outer(wt, ds / st)
 
 
 def nearest_common(centres, radii, rest):
@@ -240,10 +316,8 @@ def nearest_common(centres, radii, rest):
 
     Parameters
     ----------
-    centres : (discs, 2), radii : (discs,), rest : (2,); complex parts of centres and radii are carried along
+    centres : (discs, 2), radii : (discs,), rest : (2,)
     """
-    keep = _tightest(centres.real, radii.real)
-    centres, radii = centres[keep], radii[keep]
     away = rest - centres
     one = centres + away * (radii / np.sqrt((away * away).sum(axis=1)))[:, None]
     candidates = [one]
@@ -252,26 +326,12 @@ def nearest_common(centres, radii, rest):
     square = (apart * apart).sum(axis=1)
     along = (1 + (radii[i] ** 2 - radii[j] ** 2) / square) / 2
     across = radii[i] ** 2 / square - along**2
-    meet = across.real >= 0
+    meet = across >= 0
     i, apart, along, across = i[meet], apart[meet], along[meet, None], np.sqrt(across[meet])[:, None]
     turned = np.stack([-apart[:, 1], apart[:, 0]], axis=1)
     candidates += [centres[i] + along * apart + sign * across * turned for sign in (1, -1)]
     points = np.concatenate(candidates)
-    distance = np.linalg.norm(points.real[:, None] - centres.real[None], axis=2) - radii.real
-    size = abs(centres.real).max() + radii.real.max()
+    distance = np.linalg.norm(points[:, None] - centres[None], axis=2) - radii
+    size = abs(centres).max() + radii.max()
     points = points[np.all(distance <= 1e-12 * size, axis=1)]
-    return None if not len(points) else points[np.argmin(np.linalg.norm(points.real - rest, axis=1))]
-
-
-def _tightest(centres, radii, most=40):
-    """Of many discs those nearest to excluding something: the others are redundant for a smooth motion."""
-    if len(radii) <= most:
-        return np.arange(len(radii))
-    middle = centres[np.argmin(radii)]
-    for _ in range(200):  # a point of the intersection, by projection onto the disc it is farthest outside of
-        distance = np.linalg.norm(middle - centres, axis=1) - radii
-        worst = int(np.argmax(distance))
-        if distance[worst] <= 0:
-            break
-        middle = centres[worst] + (middle - centres[worst]) * radii[worst] / (distance[worst] + radii[worst])
-    return np.sort(np.argsort(np.linalg.norm(middle - centres, axis=1) - radii)[-most:])
+    return None if not len(points) else points[np.argmin(np.linalg.norm(points - rest, axis=1))]
