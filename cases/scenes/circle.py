@@ -20,7 +20,8 @@ from scipy.optimize import brentq
 TURN = 2 * np.pi
 POINTS = 16  #: of Radau in a panel
 SMOOTH = 1e-12  #: last Legendre coefficient of the angle in a panel that is short enough
-LEFT = 1e-9  #: of a period before lift-off, where R phi' = u' . e_phi is singular and the force as good as gone
+LEFT = 1e-7  #: of a period before lift-off, where R phi' = u' . e_phi is singular and the force as good as gone
+AT_ONCE = 1e-9  #: R over the speed of u, time in which a drag takes its direction, below which it does so at once
 MOST = 4000  #: panels of a drag
 CLOSED = 1e-13  #: of R: an arm that comes back this near to its start has closed its period
 
@@ -55,6 +56,14 @@ def rate(orders, U):
             out[..., k], out[..., k + 1] = n * U[..., k + 1], -n * U[..., k]
         k += 2 if n else 1
     return out
+
+
+def zero(f, low, high):
+    """Where f changes its sign, to rounding; the end at which it is nearer to zero, if rounding lets it not change."""
+    a, b = f(low), f(high)
+    if (a > 0) == (b > 0):
+        return low if abs(a) < abs(b) else high
+    return brentq(f, low, high, xtol=1e-300, rtol=1e-15, maxiter=1000, disp=False)
 
 
 @cache
@@ -153,7 +162,7 @@ class Slider:
             if slips:
                 e = d / np.hypot(*d)
                 turn = np.array([-e[1], e[0]]) @ D / self.at(tau)[2]
-                tau, d, D = self.slip(tau, np.arctan2(d[1], d[0]), turn, end)
+                tau, d, D = self.slip(tau, *self.settle(tau, np.arctan2(d[1], d[0]), turn), end)
             else:
                 tau, d, D = self.stick(tau, d, D, end)
             slips = not slips
@@ -205,12 +214,14 @@ class Slider:
             return value, (d[0] + x[0]) * v[0] + (d[1] + x[1]) * v[1] - (R + x[2]) * v[2]
 
         span, count = end - tau, 12 * self.orders[-1] + 48
-        s = np.r_[span * np.geomspace(1e-10, 1 / count, 48)[:-1], span * np.arange(1, count + 1) / count]
+        way = np.hypot(*self.at(tau, self.V)[:2]) * span
+        least = 1e-10 * min(1.0, 1e7 * abs(R) / way) if way > 0 and R > 0 else 1e-10
+        s = np.r_[span * np.geomspace(least, 1 / count, 64)[:-1], span * np.arange(1, count + 1) / count]
         value, slope = beyond(s)
         near = value > -0.3 * (R * R + abs(self.U[2]).max() ** 2)
         for k in np.flatnonzero((slope[:-1] > 0) & (slope[1:] <= 0) & (value[:-1] <= 0) & (near[:-1] | near[1:])):
             if value[k + 1] <= 0:  # a maximum between two times, perhaps above
-                top = brentq(lambda x: beyond(x)[1][0], s[k], s[k + 1], xtol=1e-300, rtol=1e-14)
+                top = zero(lambda x: beyond(x)[1][0], s[k], s[k + 1])
                 if beyond(top)[0][0] > 0:
                     s, value = np.insert(s, k + 1, top), np.insert(value, k + 1, beyond(top)[0][0])
                     break
@@ -218,9 +229,26 @@ class Slider:
         if not len(out):
             return span
         k = out[0]
-        return brentq(lambda x: beyond(x)[0][0], s[k - 1], s[k], xtol=1e-300, rtol=1e-15) if k else s[0]
+        return zero(lambda x: beyond(x)[0][0], s[k - 1], s[k]) if k else s[0]
 
     # The slider is dragged
+
+    def settle(self, tau, phi, turn, always=False):
+        """Angle and variation at a drag's begin: those it has in no time where R is small to rounding.
+
+        There phi - psi, psi of u', falls by tan(x / 2) ~ exp(-v t / R): to no force, but onsets move in time.
+        """
+        (*v, _), (*a, _), R = self.at(tau, self.V), self.at(tau, self.W), self.at(tau)[2]
+        speed = np.hypot(*v)
+        if not (AT_ONCE * speed > R or always):
+            return phi, turn
+        e, n = np.array(v) / speed, np.array([-v[1], v[0]]) / speed
+        begun = np.array([np.cos(phi), np.sin(phi)])
+        sine = begun @ n
+        per = (begun - e) / sine if abs(sine) > 1e-6 else n
+        wave, late = self.wave(tau), self.variation(self.slopes(np.array([tau])))[0]
+        self.varied += R * R / speed * per[:, None, None] * wave[0][None, :, None] * turn
+        return np.arctan2(*e[::-1]) - R * (n @ a) / speed**2, n @ late[:2] / speed
 
     def slip(self, tau, phi, turn, end):
         lifts = self.at(end)[2] <= 1e-12 * abs(self.U[2]).max()
@@ -237,8 +265,10 @@ class Slider:
                 return tau, *self.ends(tau, phi, turn)
             h = min(h, longest, left / 2 if lifts else left)
             solved = self.panel(tau, h, phi, F)
-            if solved is None and h > 1e-12:
+            if solved is None:
                 h /= 4
+                if h < 1e-13:
+                    (phi, turn), h = self.settle(tau, phi, turn, always=True), longest
                 continue
             ended = self.speed_ends(tau, h, solved[0])
             if ended == 0.0:
@@ -280,7 +310,9 @@ class Slider:
             if moved < 1e-14:
                 break
         angle = np.r_[phi, phi + h * (A @ F)]
-        if check and not (moved < 1e-11 and abs(transform @ angle)[-2:].max() < SMOOTH):
+        # rounding of a motion that all but stands, and of an R that is almost zero, turns the direction
+        noise = 1e-14 * abs(self.V[:2]).sum() / max(np.hypot(*v).min(), 1e-300) + 1e-15 * abs(self.U[2]).sum() / R.min()
+        if check and not (moved < 10 * SMOOTH + noise and abs(transform @ angle)[-2:].max() < SMOOTH + noise):
             return None
         return angle, F, J
 
@@ -298,7 +330,7 @@ class Slider:
         low, high = np.r_[0.0, x][below[0]], x[below[0]]
         if speed(np.array([low]), _within(low) @ angle)[0] <= 0:
             return low
-        return brentq(lambda t: speed(np.array([t]), _within(t) @ angle)[0], low, high, xtol=1e-300, rtol=1e-15)
+        return zero(lambda t: speed(np.array([t]), _within(t) @ angle)[0], low, high)
 
     def take(self, tau, h, solved, phi, turn):
         """Integrals and variations of a panel."""

@@ -124,9 +124,17 @@ def reason_of(done: Finished) -> str:
     return " | ".join(lines[-3:])
 
 
-@np.errstate(all="ignore")
 def judge(scene: Scene, done: Finished) -> Verdict:
-    """Verdict on a finished run; tables that hold infinities are read as they are."""
+    """Verdict on a finished run; where the judge's own integration fails it says so, and does not say right."""
+    try:
+        return _judge(scene, done)
+    except ArithmeticError as error:
+        return Verdict("wrong", [f"the judge fails: {error}"], done.seconds)
+
+
+@np.errstate(all="ignore")
+def _judge(scene: Scene, done: Finished) -> Verdict:
+    """The same; tables that hold infinities are read as they are."""
     reason = reason_of(done)
     if done.code is None:
         return Verdict("hung", [f"not ended after {scene.timeout:g} s of processor time"], done.seconds)
