@@ -14,7 +14,7 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "cases"))
 
 from oracle import forces  # noqa: E402
 from scenes import laws, path  # noqa: E402
-from scenes.circle import rate  # noqa: E402
+from scenes.circle import Slider, rate  # noqa: E402
 from scenes.circle import waves as all_waves
 from scenes.closed import jenkins_stiffness  # noqa: E402
 from scenes.distance import Distance, distance  # noqa: E402
@@ -123,6 +123,24 @@ def test_friction_on_a_bent_path_is_that_of_the_exact_oracle_and_its_derivative_
     h = 1e-6
     difference = (pad(BENT + h * varied, p, rest=rest) - pad(BENT - h * varied, p, rest=rest)).real / (2 * h)
     np.testing.assert_allclose(found.imag, difference, atol=1e-6 * abs(difference).max())
+
+
+def test_a_slider_that_hardly_creeps_is_closed_and_tends_to_where_nothing_slips():
+    """Below the load at which all discs begin to have a common point the force goes there linearly, in few periods."""
+    Q = np.array([[0.2, 0.3, 0.1, 0.05, -0.1], [0.0, 1.0, 0.1, -0.4, 0.1], [0.1, -0.1, 1.0, 0.1, 0.4]])
+    law = {"normal_stiffness": 1.0, "tangential_stiffness": 1.0, "friction_coefficient": 0.5, "gap": 0.0}
+
+    def stands(load):
+        path = np.stack([Q[1], Q[2], 0.5 * (Q[0] + load * np.eye(5)[0])])
+        return laws.common_point(Slider([0, 1, 2], path, False), np.zeros(2))[0] is not None
+
+    low, high = 1.0, 10.0
+    for _ in range(50):
+        middle = (low + high) / 2
+        low, high = (low, middle) if stands(middle) else (middle, high)
+    at = pad(Q, law | {"normal_load": high}).real
+    off = [abs(pad(Q, law | {"normal_load": high * (1 - e)}).real - at).max() for e in (1e-4, 1e-6, 1e-8)]
+    assert off[0] / off[1] == pytest.approx(100, rel=0.1) and off[1] / off[2] == pytest.approx(100, rel=0.1)
 
 
 def test_a_pad_that_lifts_off_has_no_force_and_reaches_the_unilateral_spring():
