@@ -10,7 +10,7 @@ namespace fretwave::contact {
 
 Integration Coulomb3d::integration() const {
   const bool slides = std::ranges::all_of(p_.friction_coefficient, [](double mu) { return mu == 0; });
-  return slides ? Integration::pieces : Integration::samples;
+  return slides ? Integration::pieces : Integration::circle;
 }
 
 /// A march of one sample.

@@ -43,8 +43,8 @@ enum class Status : std::uint8_t { stick, slip, open };
 enum class Limit : std::uint8_t { none, circle, each };
 
 /// How harmonic balance takes the harmonics of a law's force: from samples; or in continuous time, by the
-/// pieces between its changes of state (`LinearPair`).
-enum class Integration : std::uint8_t { samples, pieces };
+/// pieces between its changes of state (`LinearPair`), the same with its two tangents on one circle.
+enum class Integration : std::uint8_t { samples, pieces, circle };
 
 /// A tangential force this near to its limit has reached it. The only tolerance on it, of all laws.
 constexpr double limit_tolerance = 1e-12;
@@ -64,11 +64,14 @@ struct Diagnosis {
 };
 
 /// A pair whose force is linear in its motion but where it changes its state:
-///   N = max(0, load + kn u_n),  T = kt (u_t - w),  |T| <= limit + mu N, each tangent by itself.
+///   N = max(0, load + kn u_n),  T = kt (u_t - w),  |T| <= limit + mu N, each tangent by itself or both as
+/// one vector.
 struct LinearPair {
   double normal_stiffness = 0, load = 0;
   double tangential_stiffness = 0, friction_coefficient = 0, friction_limit = 0;
   double slider[2] = {};  ///< w at rest
+  /// dR/du_n of the distance R at which the limit mu N holds the slider.
+  double reach() const { return friction_coefficient * normal_stiffness / tangential_stiffness; }
   bool rubs() const { return friction_coefficient > 0 || friction_limit > 0; }
 };
 

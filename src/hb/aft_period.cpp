@@ -34,6 +34,7 @@ Aft::Found Aft::find(double const* U, Exponents const& e) const {
     out.exact = continuous_force(harmonics_, *law_);
     out.exact->force(U, V.data(), out.F.data());
     out.exact->sample(harmonics_.samples(), period.u.data(), period.v.data(), period.f.data());
+    period.unclosed = out.exact->unclosed();
     return out;
   }
   contact::Record record;

@@ -17,32 +17,10 @@ constexpr int tile = 32;  // pairs whose times fit the cache
 /// has to look between them. They are not the contact's samples: what is found does not depend on them.
 Harmonics search_times(Harmonics const& h) { return {h.orders(), 8 * (h.highest() + 1)}; }
 
-/// q_k of a dof's block, about its mean.
-Series series(Harmonics const& h, double const* block) {
-  Series out{std::vector<complex>(h.highest() + 1)};
-  for (int i = 0; i < h.count(); ++i)
-    if (h.orders()[i]) out.q[h.orders()[i]] = {block[h.offset(i)], -block[h.offset(i) + 1]};
-  return out;
-}
-
-double mean(Harmonics const& h, double const* block) { return h.orders()[0] == 0 ? block[0] : 0.0; }
-
 /// a + factor b
 Series sum(Series a, double factor, Series const& b) {
   for (size_t k = 0; k < a.q.size(); ++k) a.q[k] += factor * b.q[k];
   return a;
-}
-
-void add_series(Harmonics const& h, Series const& p, double factor, double* F) {
-  for (int i = 0; i < h.count(); ++i)
-    if (const int n = h.orders()[i]) {
-      F[h.offset(i)] += factor * p.q[n].real();
-      F[h.offset(i) + 1] -= factor * p.q[n].imag();
-    }
-}
-
-void add_mean(Harmonics const& h, double value, double* F) {
-  if (h.orders()[0] == 0) F[0] += value;
 }
 
 }  // namespace
@@ -86,7 +64,7 @@ void ContinuousContact::force(double const* U, double const*, double* F) {
       take(U, first + i);
       find_spans(pair, i);
       std::fill_n(F + block(first + i, 0), block(1, 0), 0.0);
-      if (normal_ >= 0) normal_force(pair, F + block(first + i, normal_));
+      if (normal_ >= 0) pair.normal.add_force(harmonics_, F + block(first + i, normal_));
       for (size_t t = 0; t < pair.tangents.size(); ++t) {
         find_play(pair, int(t), i);
         tangential_force(pair, pair.tangents[t], F + block(first + i, int(t) + (normal_ >= 0)));
@@ -101,8 +79,9 @@ void ContinuousContact::take(double const* U, int number) {
   pair.law = law_.linear_pair(number);
   if (normal_ >= 0) {
     double const* u = U + block(number, normal_);
-    pair.approach = series(harmonics_, u);
-    pair.approach.q[0] = pair.law.load / pair.law.normal_stiffness + mean(harmonics_, u);
+    pair.normal.stiffness = pair.law.normal_stiffness;
+    pair.normal.approach = series(harmonics_, u);
+    pair.normal.approach.q[0] = pair.law.load / pair.law.normal_stiffness + mean(harmonics_, u);
   }
   for (size_t t = 0; t < pair.tangents.size(); ++t) {
     double const* u = U + block(number, int(t) + (normal_ >= 0));
@@ -111,22 +90,14 @@ void ContinuousContact::take(double const* U, int number) {
   }
 }
 
-/// When the pair is closed: between the roots of its approach.
+/// When the pair is closed.
 void ContinuousContact::find_spans(Pair& pair, int place) {
-  pair.spans.clear(), pair.closed = true;
   if (normal_ < 0) return;
   const int N = times_.samples(), step = components_ * tile_;
   const double load = pair.law.load / pair.law.normal_stiffness;
   for (int t = 0; t < N; ++t)
     wave_[t] = load + grid_.values[size_t(t) * step + size_t(normal_) * tile_ + place];
-  std::vector<Root> roots;
-  find_roots(pair.approach, 0, wave_.data(), N, roots);
-  pair.closed = roots.empty() && wave_[0] > 0;
-  for (size_t i = 0; i < roots.size(); ++i) {
-    if (!roots[i].rising) continue;
-    const double end = i + 1 < roots.size() ? roots[i + 1].at : roots[0].at + period;
-    pair.spans.push_back({roots[i].at, end - roots[i].at});
-  }
+  pair.normal.find_spans(wave_.data(), N);
 }
 
 /// Walls u -+ R with R = (limit + mu N) / kt, about the mean of u, and the play between them.
@@ -136,9 +107,9 @@ void ContinuousContact::find_play(Pair& pair, int tangent, int place) {
   const double reach = law.friction_coefficient * law.normal_stiffness / law.tangential_stiffness;
   now.walls.radius.q.assign(harmonics_.highest() + 1, 0.0);
   now.walls.radius.q[0] = law.friction_limit / law.tangential_stiffness;
-  if (reach > 0) now.walls.radius = sum(now.walls.radius, reach, pair.approach);
+  if (reach > 0) now.walls.radius = sum(now.walls.radius, reach, pair.normal.approach);
   now.play.clear();
-  if (!law.rubs() || !(pair.closed || pair.spans.size())) return;
+  if (!law.rubs() || !pair.normal.touches()) return;
   now.walls.lower = sum(now.u, -1, now.walls.radius), now.walls.upper = sum(now.u, 1, now.walls.radius);
   const int N = times_.samples(), step = components_ * tile_;
   double const* rates = grid_.rates.data() + place;
@@ -156,28 +127,10 @@ void ContinuousContact::find_play(Pair& pair, int tangent, int place) {
     }
     find_roots(now.walls.wall(side), 1, wave_.data(), N, turns);
   }
-  if (pair.closed)
+  if (pair.normal.closed)
     now.play.close(now.walls, law.slider[tangent] - now.mean);
   else
-    now.play.close(now.walls, pair.spans);
-}
-
-/// N = kn u_n where closed.
-void ContinuousContact::normal_force(Pair const& pair, double* F) const {
-  const double kn = pair.law.normal_stiffness;
-  if (pair.closed) {
-    add_series(harmonics_, pair.approach, kn, F);
-    add_mean(harmonics_, kn * pair.approach.q[0].real(), F);
-    return;
-  }
-  Indicator closed(harmonics_);
-  Arc arc;
-  for (Span const& span : pair.spans) {
-    arc.set(2 * harmonics_.highest(), span.begin, span.length);
-    closed.add(arc, 1);
-    add_mean(harmonics_, kn * arc.integral(pair.approach) / period, F);
-  }
-  closed.add_product(pair.approach, kn, F);
+    now.play.close(now.walls, pair.normal.spans);
 }
 
 /// T' = kt u_t' in stick, +- mu kn u_n' in slip.
@@ -205,9 +158,9 @@ void ContinuousContact::tangential_force(Pair const& pair, Tangent const& now, d
     if (slope == 0) continue;
     arc.set(2 * harmonics_.highest(), piece.begin, piece.length);
     slip.add(arc, piece.side);
-    add_mean(harmonics_, piece.side * slope * arc.integral(pair.approach) / period, F);
+    add_mean(harmonics_, piece.side * slope * arc.integral(pair.normal.approach) / period, F);
   }
-  if (slope > 0) slip.add_force(pair.approach, slope, F);
+  if (slope > 0) slip.add_force(pair.normal.approach, slope, F);
 }
 
 }  // namespace fretwave::hb

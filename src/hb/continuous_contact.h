@@ -1,5 +1,6 @@
 #pragma once
 #include "hb/continuous_force.h"
+#include "hb/normal_contact.h"
 #include "hb/play.h"
 
 namespace fretwave::hb {
@@ -29,9 +30,7 @@ class ContinuousContact : public ContinuousForce {
   };
   struct Pair {
     contact::LinearPair law;
-    Series approach;          ///< N = kn approach where > 0
-    bool closed = true;       ///< all the period
-    std::vector<Span> spans;  ///< closed in these otherwise
+    NormalContact normal;
     std::vector<Tangent> tangents;
   };
   /// Of the pairs of a tile, at the times of the grid: samples x components x pairs.
@@ -45,9 +44,7 @@ class ContinuousContact : public ContinuousForce {
   void take(double const* U, int pair);
   void find_spans(Pair&, int place);
   void find_play(Pair&, int tangent, int place);
-  void normal_force(Pair const&, double* F) const;
   void tangential_force(Pair const&, Tangent const&, double* F) const;
-  void normal_blocks(Pair const&, double* D, double* by_gap) const;
   void tangential_blocks(Pair const&, int tangent, double* D, double* by_gap) const;
   void linearise();
 

@@ -29,10 +29,7 @@ double integral(Arc const& arc, Series const& p, Series const& q) {
 double ContinuousContact::mean_stiffness(int number, int component) const {
   Pair const& pair = pairs_[number];
   double length = 0;
-  if (component == normal_) {
-    for (Span const& span : pair.spans) length += span.length;
-    return pair.law.normal_stiffness * (pair.closed ? 1.0 : length / period);
-  }
+  if (component == normal_) return pair.normal.mean_stiffness();
   for (auto const& piece : pair.tangents[component - (normal_ >= 0)].play.sticks) length += piece.length;
   return pair.law.tangential_stiffness * length / period;
 }
@@ -43,7 +40,7 @@ std::uint64_t ContinuousContact::piece() const {
   for (size_t k = 0; k < pairs_.size(); ++k) {
     Pair const& pair = pairs_[k];
     const std::uint64_t own = scrambled(k);
-    sum += scrambled(own + (pair.closed ? 1 : 2 + pair.spans.size()));
+    sum += scrambled(own + (pair.normal.closed ? 1 : 2 + pair.normal.spans.size()));
     for (size_t t = 0; t < pair.tangents.size(); ++t) {
       Play const& play = pair.tangents[t].play;
       std::vector<std::pair<double, int>> states;
@@ -108,7 +105,7 @@ void ContinuousContact::measure(contact::Diagnosis& out) const {
         out.work[k] += law.friction_limit * piece.path;
         if (law.friction_coefficient == 0) continue;
         const Arc arc(2 * harmonics_.highest(), piece.begin, piece.length);
-        const double along = integral(arc, pairs_[k].approach, now.walls.wall(piece.side));
+        const double along = integral(arc, pairs_[k].normal.approach, now.walls.wall(piece.side));
         const double wear = std::max(0.0, piece.side * law.normal_stiffness * along);
         out.work[k] += law.friction_coefficient * wear;
         if (straight && out.archard.size()) out.archard[k] += wear;

@@ -8,44 +8,17 @@
 
 namespace fretwave::hb {
 
-namespace {
-
-/// 1, cos k tau, sin k tau
-std::vector<double> waves(Harmonics const& h, double tau) {
-  std::vector<double> out(h.block_size(), 1.0);
-  for (int i = 0; i < h.count(); ++i)
-    if (const int n = h.orders()[i])
-      out[h.offset(i)] = std::cos(n * tau), out[h.offset(i) + 1] = std::sin(n * tau);
-  return out;
-}
-
-}  // namespace
-
 void ContinuousContact::linearise() {
   if (linearised_) return;
   const size_t size = block(1, 0);
   D_.assign(pairs_.size() * size * size, 0.0), by_gap_.assign(pairs_.size() * size, 0.0);
   for (size_t k = 0; k < pairs_.size(); ++k) {
-    if (normal_ >= 0) normal_blocks(pairs_[k], &D_[k * size * size], &by_gap_[k * size]);
-    for (size_t t = 0; t < pairs_[k].tangents.size(); ++t)
-      tangential_blocks(pairs_[k], int(t), &D_[k * size * size], &by_gap_[k * size]);
+    double *D = &D_[k * size * size], *by_gap = &by_gap_[k * size];
+    const size_t normal = normal_ < 0 ? 0 : block(0, normal_);
+    if (normal_ >= 0) pairs_[k].normal.add_blocks(harmonics_, D + normal * (size + 1), size, by_gap + normal);
+    for (size_t t = 0; t < pairs_[k].tangents.size(); ++t) tangential_blocks(pairs_[k], int(t), D, by_gap);
   }
   linearised_ = true;
-}
-
-/// Force is continuous where the state changes, so that the times of the changes leave the derivative.
-void ContinuousContact::normal_blocks(Pair const& pair, double* D, double* by_gap) const {
-  const double kn = pair.law.normal_stiffness;
-  const size_t at = block(0, normal_), ld = block(1, 0);
-  Indicator closed(harmonics_);
-  if (pair.closed) closed.fill();
-  Arc arc;
-  for (Span const& span : pair.spans) {
-    arc.set(2 * harmonics_.highest(), span.begin, span.length);
-    closed.add(arc, 1);
-  }
-  closed.add_multiplication(kn, D + at * ld + at, ld);
-  closed.add_coefficients(-kn, by_gap + at);
 }
 
 /// dT = kt (du - dw) in stick, with dw = du - share dR at its begin, +- mu dN in slip.
@@ -70,7 +43,8 @@ void ContinuousContact::tangential_blocks(Pair const& pair, int tangent, double*
     if (!piece.follows) continue;
     std::vector<double> force(m);
     here.add_coefficients(kt, force.data());
-    const std::vector<double> wave = waves(harmonics_, piece.begin);
+    std::vector<double> wave(m);
+    waves(harmonics_, piece.begin, wave.data());
     const double share = piece.share * slope / kt;
     for (int r = 0; r < m; ++r) {
       double* row = D + (at + r) * ld;

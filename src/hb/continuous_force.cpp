@@ -1,10 +1,12 @@
 #include "hb/continuous_force.h"
 
+#include "hb/circular_contact.h"
 #include "hb/continuous_contact.h"
 
 namespace fretwave::hb {
 
 std::unique_ptr<ContinuousForce> continuous_force(Harmonics const& h, contact::Law const& law) {
+  if (law.integration() == contact::Integration::circle) return std::make_unique<CircularContact>(h, law);
   return std::make_unique<ContinuousContact>(h, law);
 }
 

@@ -24,6 +24,8 @@ class ContinuousForce {
   virtual std::uint64_t piece() const = 0;
   /// f (samples x components x pairs) of the last force at the samples u and v.
   virtual void sample(int samples, double const* u, double const* v, double* f) const = 0;
+  /// Largest |w(T) - w(0)| of a slider in that period [m].
+  virtual double unclosed() const { return 0; }
   /// Work, slip path and Archard's integral of the last force: integrals, not sums over samples.
   virtual void measure(contact::Diagnosis&) const = 0;
 };

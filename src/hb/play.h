@@ -3,11 +3,6 @@
 
 namespace fretwave::hb {
 
-/// A time in which a pair is closed.
-struct Span {
-  double begin, length;
-};
-
 /// A slider of one tangent in continuous time: the play operator. Where the pair is closed, w stands (stick)
 /// but where one of two walls drags it (slip): the lower one, u - R, up and the upper one, u + R, down, with
 /// R = (limit + mu N) / kt. Where it is open, w = u.

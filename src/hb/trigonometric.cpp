@@ -22,6 +22,37 @@ struct Powers {
 
 }  // namespace
 
+Series series(Harmonics const& h, double const* block) {
+  Series out{std::vector<complex>(h.highest() + 1)};
+  for (int i = 0; i < h.count(); ++i)
+    if (h.orders()[i]) out.q[h.orders()[i]] = {block[h.offset(i)], -block[h.offset(i) + 1]};
+  return out;
+}
+
+double mean(Harmonics const& h, double const* block) { return h.orders()[0] == 0 ? block[0] : 0.0; }
+
+void add_series(Harmonics const& h, Series const& p, double factor, double* F) {
+  for (int i = 0; i < h.count(); ++i)
+    if (const int n = h.orders()[i]) {
+      F[h.offset(i)] += factor * p.q[n].real();
+      F[h.offset(i) + 1] -= factor * p.q[n].imag();
+    }
+}
+
+void add_mean(Harmonics const& h, double value, double* F) {
+  if (h.orders()[0] == 0) F[0] += value;
+}
+
+void waves(Harmonics const& h, double tau, double* out) {
+  Powers e(tau);
+  int n = 0;
+  for (int i = 0; i < h.count(); ++i) {
+    for (; n < h.orders()[i]; ++n) e.next();
+    out[h.offset(i)] = n ? e.x : 1;
+    if (n) out[h.offset(i) + 1] = e.y;
+  }
+}
+
 /// Odd and even orders apart: neither chain of powers waits for the other.
 Series::Jet Series::at(double tau) const {
   const double c = std::cos(tau), s = std::sin(tau), c2 = c * c - s * s, s2 = 2 * c * s;

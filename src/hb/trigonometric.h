@@ -6,6 +6,11 @@
 
 namespace fretwave::hb {
 
+/// A time in which a pair is closed.
+struct Span {
+  double begin, length;
+};
+
 /// p(tau) = Re sum_k q_k e^{i k tau}, k = 0 .. H: a motion known at every time of its period.
 struct Series {
   std::vector<complex> q;
@@ -17,6 +22,15 @@ struct Series {
   /// p(tau + s) - p(tau) without the rounding of the two, and p'(tau + s).
   std::pair<double, double> difference(double tau, double s) const;
 };
+
+/// q_k of a dof's block, about its mean; the mean.
+Series series(Harmonics const&, double const* block);
+double mean(Harmonics const&, double const* block);
+/// 1, cos n tau, sin n tau of the retained orders.
+void waves(Harmonics const&, double tau, double* out);
+/// F += factor x the coefficients of p but its mean; of a constant.
+void add_series(Harmonics const&, Series const& p, double factor, double* F);
+void add_mean(Harmonics const&, double value, double* F);
 
 /// e^{i k tau} over an arc of the period, k = 0 .. highest, about its middle c with half its length h.
 class Arc {

@@ -1,0 +1,109 @@
+/// What is read from friction on a circle in continuous time: states, samples, work and slip.
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "hb/circular_contact.h"
+#include "scramble.h"
+
+namespace fretwave::hb {
+
+namespace {
+
+constexpr double period = 2 * std::numbers::pi;
+
+}  // namespace
+
+double CircularContact::mean_stiffness(int number, int component) const {
+  Pair const& pair = pairs_[number];
+  if (component == 0) return pair.normal.mean_stiffness();
+  double length = pair.slider.stands() ? period : 0;
+  for (auto const& piece : pair.slider.path.sticks) length += piece.length;
+  return pair.law.tangential_stiffness * length / period;
+}
+
+double CircularContact::unclosed() const {
+  double most = 0;
+  for (Pair const& pair : pairs_) most = std::max(most, pair.slider.unclosed);
+  return most;
+}
+
+/// By how often a pair opens, and by what follows what: stick that goes on, stick from closing, slip that
+/// does not follow slip.
+std::uint64_t CircularContact::piece() const {
+  std::uint64_t sum = 0;
+  for (size_t k = 0; k < pairs_.size(); ++k) {
+    Pair const& pair = pairs_[k];
+    const std::uint64_t own = scrambled(k);
+    sum += scrambled(own + (pair.normal.closed ? 1 : 2 + pair.normal.spans.size()));
+    SweptSlider const& path = pair.slider.path;
+    std::uint64_t sticks = 0, landings = 0;
+    for (auto const& piece : path.sticks) {
+      sticks += piece.start != SweptSlider::Start::given;
+      landings += piece.start == SweptSlider::Start::closes;
+    }
+    sum += scrambled(own + 1000 * (1 + sticks) + 1000000 * landings + (path.slips.empty() ? 0 : 500));
+  }
+  return sum;
+}
+
+void CircularContact::sample(int samples, double const* u, double const*, double* f) const {
+  const size_t n = pairs_.size(), step = 3 * n;
+  std::fill_n(f, size_t(samples) * step, 0.0);
+  for (size_t k = 0; k < n; ++k) {
+    Pair const& pair = pairs_[k];
+    contact::LinearPair const& law = pair.law;
+    for (int t = 0; t < samples; ++t)
+      f[t * step + k] = std::max(0.0, law.load + law.normal_stiffness * u[t * step + k]);
+    /// Runs body(t, tau) for the samples of a piece.
+    const auto each = [samples](double begin, double length, auto body) {
+      const double first = std::ceil(begin * samples / period),
+                   end = std::ceil((begin + length) * samples / period);
+      for (double t = first; t < end; ++t) {
+        const int place = int(t) % samples;
+        body(size_t(place < 0 ? place + samples : place), t * period / samples);
+      }
+    };
+    const auto hold = [&](size_t t, double const* w) {
+      double* now = f + t * step + k;
+      double arm[2], size = 0;
+      for (int c = 0; c < 2; ++c) {
+        arm[c] = law.tangential_stiffness * (u[t * step + (c + 1) * n + k] - pair.mean[c] - w[c]);
+        size = std::hypot(size, arm[c]);
+      }
+      const double limit = law.friction_coefficient * now[0], share = size > limit ? limit / size : 1;
+      for (int c = 0; c < 2; ++c) now[(c + 1) * n] = share * arm[c];
+    };
+    if (pair.slider.stands())
+      for (int t = 0; t < samples; ++t) hold(t, pair.slider.w);
+    for (auto const& piece : pair.slider.path.sticks)
+      each(piece.begin, piece.length, [&](size_t t, double) { hold(t, piece.w); });
+    for (auto const& piece : pair.slider.path.slips)
+      each(piece.begin, piece.length, [&](size_t t, double tau) {
+        const auto e = piece.direction((tau - piece.begin) / piece.length);
+        double* now = f + t * step + k;
+        for (int c = 0; c < 2; ++c) now[(c + 1) * n] = law.friction_coefficient * now[0] * e[c];
+      });
+  }
+}
+
+/// Over slip the slider moves by l = u'.e - R': its path, the work mu N l, and Archard's N l.
+void CircularContact::measure(contact::Diagnosis& out) const {
+  for (size_t k = 0; k < pairs_.size(); ++k) {
+    contact::LinearPair const& law = pairs_[k].law;
+    if (pairs_[k].slider.kind == SliderPeriod::Kind::loose) continue;
+    double way = 0, worn = 0;
+    for (SweptSlider::Slip const& piece : pairs_[k].slider.path.slips)
+      for (int j = 0; j < Radau::stages; ++j) {
+        const auto e = piece.direction(j);
+        MovingDisc::Instant const& at = piece.at[j];
+        const double moved = std::max(0.0, at.v[0] * e[0] + at.v[1] * e[1] - at.dR);
+        const double now = piece.length * radau().weights[j] * moved;
+        way += now, worn += now * at.R / law.reach() * law.normal_stiffness;
+      }
+    out.slip_path[k] = way, out.work[k] = law.friction_coefficient * worn;
+    if (out.archard.size()) out.archard[k] = worn;
+  }
+}
+
+}  // namespace fretwave::hb

@@ -1,0 +1,171 @@
+#include "hb/slider_derivative.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace fretwave::hb {
+
+namespace {
+
+constexpr int stages = Radau::stages;
+
+/// Solves A X = B in place of the rows of B (stages x columns).
+void solve(std::array<Radau::Stages, stages>& A, double* B, int columns) {
+  const auto row = [&](int i) { return B + size_t(i) * columns; };
+  for (int k = 0; k < stages; ++k) {
+    int best = k;
+    for (int i = k + 1; i < stages; ++i)
+      if (std::abs(A[i][k]) > std::abs(A[best][k])) best = i;
+    if (best != k) std::swap(A[k], A[best]), std::swap_ranges(row(k), row(k) + columns, row(best));
+    for (int i = k + 1; i < stages; ++i) {
+      const double factor = A[i][k] / A[k][k];
+      for (int j = k + 1; j < stages; ++j) A[i][j] -= factor * A[k][j];
+      double *to = row(i), *from = row(k);
+      for (int c = 0; c < columns; ++c) to[c] -= factor * from[c];
+    }
+  }
+  for (int k = stages - 1; k >= 0; --k) {
+    double* to = row(k);
+    for (int j = k + 1; j < stages; ++j) {
+      double* from = row(j);
+      for (int c = 0; c < columns; ++c) to[c] -= A[k][j] * from[c];
+    }
+    for (int c = 0; c < columns; ++c) to[c] /= A[k][k];
+  }
+}
+
+}  // namespace
+
+void SliderDerivative::set_time(double tau) {
+  if (!harmonics_) return;
+  waves(*harmonics_, tau, wave_.data());
+  rate_[0] = 0;
+  for (int i = 0; i < harmonics_->count(); ++i)
+    if (const int n = harmonics_->orders()[i]) {
+      const int at = harmonics_->offset(i);
+      rate_[at] = -n * wave_[at + 1], rate_[at + 1] = n * wave_[at];
+    }
+}
+
+void SliderDerivative::add(double* row, std::vector<double> const& wave, double const* a, double b) const {
+  double *normal = row, *first = row + m_, *second = first + m_;
+  for (int k = 0; k < m_; ++k)
+    normal[k] += b * reach_ * wave[k], first[k] += a[0] * wave[k], second[k] += a[1] * wave[k];
+}
+
+void SliderDerivative::add_value(double* row, double const* a, double b) const {
+  add(row, wave_, a, b);
+  row[3 * m_] -= b * reach_;
+}
+
+void SliderDerivative::add_rate(double* row, double const* a, double b) const { add(row, rate_, a, b); }
+
+/// dphi at a slip's begin: from stick the arm's part across e; closing, where R phi' = u'.e' has one solution
+/// that is regular, R' phi' = u''.e' - |u'| phi'; behind u, of its direction alone.
+void SliderDerivative::begin_slip(SweptSlider::Slip const& slip, MovingDisc const& disc) {
+  using Start = SweptSlider::Start;
+  if (slip.start == Start::follows && !slip.onset) return;
+  const int n = columns();
+  const double across[2] = {-slip.e[1], slip.e[0]};
+  set_time(slip.begin);
+  dphi_.assign(n, 0.0);
+  const Series::Jet x = disc.u[0].at(slip.begin), y = disc.u[1].at(slip.begin),
+                    r = disc.radius.at(slip.begin);
+  if (slip.start == Start::follows || slip.start == Start::given) {
+    add_value(dphi_.data(), across, 0);
+    for (int c = 0; c < n; ++c) dphi_[c] = (dphi_[c] - across[0] * dw_[c] - across[1] * dw_[n + c]) / r.d[0];
+    return;
+  }
+  const double speed = std::hypot(x.d[1], y.d[1]);
+  add_rate(dphi_.data(), across, 0);
+  if (slip.start == Start::closes) {
+    const double turn = (x.d[2] * across[0] + y.d[2] * across[1]) / (r.d[1] + speed), none[2] = {0, 0};
+    add_value(dphi_.data(), none, -turn);
+  }
+  for (double& value : dphi_) value /= speed;
+}
+
+void SliderDerivative::slip(SweptSlider::Slip const& slip, MovingDisc const& disc, bool ends) {
+  Radau const& method = radau();
+  const int n = columns();
+  const double h = slip.length, across0[2] = {-slip.e[1], slip.e[0]};
+  begin_slip(slip, disc);
+  std::array<Radau::Stages, stages> A;
+  Row dp(size_t(stages) * n, 0.0), dR(size_t(stages) * n, 0.0);
+  std::vector<double> waves;
+  const double none[2] = {0, 0};
+  for (int j = 0; j < stages; ++j) {
+    MovingDisc::Instant const& at = slip.at[j];
+    const double R = std::max(at.R, 0.0), p = slip.p[j];
+    const double along = h * (at.v[0] * slip.e[0] + at.v[1] * slip.e[1]);
+    const double across = h * (at.v[0] * across0[0] + at.v[1] * across0[1]);
+    double rate = 0;
+    for (int i = 0; i < stages; ++i) rate += method.derivative[j][i] * slip.p[i];
+    for (int i = 0; i < stages; ++i) A[j][i] = R * method.derivative[j][i];
+    A[j][j] += along + across * p;
+    double *row = &dp[size_t(j) * n], *radius = &dR[size_t(j) * n];
+    const double half = (1 - p * p) / 2;
+    const double by_rate[2] = {h * (half * across0[0] - p * slip.e[0]),
+                               h * (half * across0[1] - p * slip.e[1])};
+    set_time(slip.begin + method.nodes[j] * h);
+    waves.insert(waves.end(), wave_.begin(), wave_.end());
+    add_value(radius, none, 1);
+    add_rate(row, by_rate, 0);
+    const double by_phi = -half * along - p * across;
+    for (int c = 0; c < n; ++c) row[c] += by_phi * dphi_[c] - rate * radius[c];
+  }
+  solve(A, dp.data(), n);
+  for (int j = 0; j < stages; ++j) {
+    double *row = &dp[size_t(j) * n], *radius = &dR[size_t(j) * n];
+    const double p = slip.p[j], turn = 2 / (1 + p * p);
+    for (int c = 0; c < n; ++c) row[c] = dphi_[c] + turn * row[c];
+    if (!m_) continue;
+    const std::array<double, 2> e = slip.direction(j);
+    const double R = std::max(slip.at[j].R, 0.0), weight = h * method.weights[j];
+    for (int k = 0; k < m_; ++k) weights.push_back(weight * waves[size_t(j) * m_ + k]);
+    for (int c = 0; c < n; ++c) arms.push_back(e[0] * radius[c] - R * e[1] * row[c]);
+    for (int c = 0; c < n; ++c) arms.push_back(e[1] * radius[c] + R * e[0] * row[c]);
+    ++nodes;
+  }
+  std::copy_n(&dp[size_t(stages - 1) * n], n, dphi_.begin());
+  if (!ends) return;
+  // w = u - R e; the panel's last node is its end
+  const std::array<double, 2> e = slip.direction(stages - 1);
+  const double R = slip.at[stages - 1].R, unit[2][2] = {{1, 0}, {0, 1}};
+  std::ranges::fill(dw_, 0.0);
+  for (int c = 0; c < 2; ++c) add_value(&dw_[size_t(c) * n], unit[c], -e[c]);
+  for (int c = 0; c < n; ++c) dw_[c] += R * e[1] * dphi_[c], dw_[n + c] -= R * e[0] * dphi_[c];
+}
+
+void SliderDerivative::go(SweptSlider const& path, MovingDisc const& disc) {
+  const int n = columns();
+  sticks.clear(), weights.clear(), arms.clear(), nodes = 0;
+  dw_.assign(2 * size_t(n), 0.0), dphi_.assign(n, 0.0);
+  dw_[n - 2] = dw_[2 * n - 1] = 1;
+  for (size_t k = 0; k < path.pieces.size(); ++k) {
+    SweptSlider::Piece const& piece = path.pieces[k];
+    if (piece.slips) {
+      const bool last = k + 1 == path.pieces.size() || !path.pieces[k + 1].slips;
+      slip(path.slips[piece.number], disc, last);
+      continue;
+    }
+    SweptSlider::Stick const& stick = path.sticks[piece.number];
+    if (stick.start == SweptSlider::Start::closes) {
+      // w = u at R = 0, whose time moves by -dR / R'
+      const MovingDisc::Instant at = disc.at(stick.begin);
+      const double unit[2][2] = {{1, 0}, {0, 1}};
+      set_time(stick.begin);
+      std::ranges::fill(dw_, 0.0);
+      for (int c = 0; c < 2; ++c) add_value(&dw_[size_t(c) * n], unit[c], -at.v[c] / at.dR);
+    }
+    if (m_) sticks.push_back(dw_);
+  }
+}
+
+void SliderDerivative::of_start(SweptSlider const& path, MovingDisc const& disc, double (&A)[2][2]) {
+  go(path, disc);
+  for (int row = 0; row < 2; ++row)
+    for (int col = 0; col < 2; ++col) A[row][col] = dw_[size_t(row) * columns() + 1 + col];
+}
+
+}  // namespace fretwave::hb

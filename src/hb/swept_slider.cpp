@@ -1,0 +1,221 @@
+#include "hb/swept_slider.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace fretwave::hb {
+
+namespace {
+
+using Slip = SweptSlider::Slip;
+using Instant = MovingDisc::Instant;
+constexpr int stages = Radau::stages;
+constexpr double touching = 1e-13;  // of R: a slider this near to the edge is on it
+constexpr double shortest = 1e-11;  // panel: what e forgets sooner counts for nothing in a force
+constexpr int most_chatter = 4;
+constexpr double coarse = 1e6;    // of what is allowed: even so a derivative is good to some digits
+constexpr double falling = 1e-9;  // last coefficient of a panel's series; what it neglects is smaller
+
+/// Rate at which the slider moves, l = u'.e - R'.
+double drag(Instant const& now, std::array<double, 2> const& e) {
+  return now.v[0] * e[0] + now.v[1] * e[1] - now.dR;
+}
+
+/// Gauss elimination of a small system; false where it is singular.
+bool solve(std::array<Radau::Stages, stages>& A, Radau::Stages& b) {
+  for (int k = 0; k < stages; ++k) {
+    int best = k;
+    for (int i = k + 1; i < stages; ++i)
+      if (std::abs(A[i][k]) > std::abs(A[best][k])) best = i;
+    if (A[best][k] == 0) return false;
+    std::swap(A[k], A[best]), std::swap(b[k], b[best]);
+    for (int i = k + 1; i < stages; ++i) {
+      const double factor = A[i][k] / A[k][k];
+      for (int j = k + 1; j < stages; ++j) A[i][j] -= factor * A[k][j];
+      b[i] -= factor * b[k];
+    }
+  }
+  for (int k = stages - 1; k >= 0; --k) {
+    for (int j = k + 1; j < stages; ++j) b[k] -= A[k][j] * b[j];
+    b[k] /= A[k][k];
+  }
+  return true;
+}
+
+}  // namespace
+
+std::array<double, 2> Slip::turned(double p) const {
+  const double c = (1 - p * p) / (1 + p * p), s = 2 * p / (1 + p * p);
+  return {c * e[0] - s * e[1], c * e[1] + s * e[0]};
+}
+
+std::array<double, 2> Slip::direction(double x) const { return turned(radau().at(p, x)); }
+
+/// Newton's method for the panel's p.
+double SweptSlider::collocate(MovingDisc const& disc, Slip& slip) const {
+  constexpr int most = 12;
+  Radau const& method = radau();
+  const double begin = slip.begin / disc.grid->length(), first = std::round(begin);
+  if (begin == first && slip.length == disc.grid->length())
+    for (int j = 0; j < stages; ++j) slip.at[j] = disc.node(int(first) * stages + j);
+  else
+    for (int j = 0; j < stages; ++j) slip.at[j] = disc.at(slip.begin + method.nodes[j] * slip.length);
+  Radau::Stages along, across;
+  for (int j = 0; j < stages; ++j) {
+    double const* v = slip.at[j].v;
+    along[j] = slip.length * (v[0] * slip.e[0] + v[1] * slip.e[1]);
+    across[j] = slip.length * (v[1] * slip.e[0] - v[0] * slip.e[1]);
+  }
+  slip.p.fill(0);
+  double step = 1;
+  for (int k = 0; k < most && step > 1e-9; ++k) {
+    std::array<Radau::Stages, stages> A;
+    Radau::Stages b;
+    for (int j = 0; j < stages; ++j) {
+      const double R = std::max(slip.at[j].R, 0.0), p = slip.p[j];
+      double rate = 0;
+      for (int i = 0; i < stages; ++i) rate += method.derivative[j][i] * slip.p[i];
+      b[j] = across[j] * (1 - p * p) / 2 - along[j] * p - R * rate;
+      for (int i = 0; i < stages; ++i) A[j][i] = R * method.derivative[j][i];
+      A[j][j] += along[j] + across[j] * p;
+    }
+    if (!solve(A, b)) return INFINITY;
+    step = 0;
+    for (int j = 0; j < stages; ++j) slip.p[j] += b[j], step = std::max(step, std::abs(b[j]));
+    if (!(step < 2)) return INFINITY;
+  }
+  double last = 0, before = 0;
+  for (int j = 0; j < stages; ++j) {
+    if (std::abs(slip.p[j]) > 1) return INFINITY;
+    last += method.last[j] * slip.p[j], before += method.last_but_one[j] * slip.p[j];
+  }
+  return step <= 1e-9 ? std::max(std::abs(last), std::abs(before) / 30) / falling : INFINITY;
+}
+
+/// Cuts a panel, whose slider would be pushed back at its node `first`, where it stops: l = 0.
+void SweptSlider::stop(MovingDisc const& disc, Slip& slip, int first) const {
+  constexpr int most = 40;
+  Radau const& method = radau();
+  double low = first ? method.nodes[first - 1] * slip.length : 0, high = method.nodes[first] * slip.length;
+  const Slip whole = slip;
+  // on the panel's polynomial first
+  const auto guess = [&](double s) {
+    return drag(disc.at(whole.begin + s), whole.direction(s / whole.length));
+  };
+  double below = low, above = high;
+  for (int k = 0; k < most && above - below > 1e-6 * high; ++k) {
+    const double middle = (below + above) / 2;
+    (guess(middle) > 0 ? below : above) = middle;
+  }
+  double x = (below + above) / 2;
+  for (int k = 0; k < most; ++k) {
+    slip.length = x;
+    collocate(disc, slip);
+    const double end = slip.begin + x;
+    const std::array<double, 2> e = slip.direction(stages - 1);
+    const Series::Jet jets[3] = {disc.u[0].at(end), disc.u[1].at(end), disc.radius.at(end)};
+    const double value = jets[0].d[1] * e[0] + jets[1].d[1] * e[1] - jets[2].d[1];
+    const double side = jets[1].d[1] * e[0] - jets[0].d[1] * e[1];
+    const double slope = jets[0].d[2] * e[0] + jets[1].d[2] * e[1] - jets[2].d[2] +
+                         side * side / std::max(jets[2].d[0], 1e-300);
+    (value > 0 ? low : high) = x;
+    const double next = x - value / slope;
+    const bool inside = next >= low && next <= high;
+    if (inside && std::abs(next - x) <= 1e-10 * std::max(x, 1e-3)) {
+      slip.length = next;
+      collocate(disc, slip);
+      return;
+    }
+    x = inside ? next : (low + high) / 2;
+    if (high - low <= 1e-15) return;
+  }
+}
+
+void SweptSlider::stick(MovingDisc const& disc, double end, State& now) {
+  const double until = disc.exit(now.tau, end, now.w, now.at_edge);
+  pieces.push_back({false, int(sticks.size())});
+  sticks.push_back({now.start, now.tau, until - now.tau, {now.w[0], now.w[1]}});
+  now.tau = until;
+  if (until >= end) return;
+  const Instant here = disc.at(until);
+  const double x = here.u[0] - now.w[0], y = here.u[1] - now.w[1], d = std::hypot(x, y);
+  now.e[0] = x / d, now.e[1] = y / d;
+  now.slips = now.onset = true, now.start = Start::follows;
+}
+
+/// One panel, at most to the next line of the grid.
+void SweptSlider::slip(MovingDisc const& disc, double end, State& now, double& trial) {
+  const double length = disc.grid->length();
+  const double line = std::floor(now.tau / length + 1e-9) * length;
+  if (std::abs(now.tau - line) < 1e-9 * length) now.tau = line;
+  const double left = std::min(end, line + length) - now.tau;
+  const double next = trial >= left ? left : std::min(trial, left / 2);
+  Slip piece{now.start, now.tau, next, {now.e[0], now.e[1]}, {}, {}, now.onset};
+  double error = collocate(disc, piece);
+  // where the pair opens e is forgotten: it counts by its force, R e, alone
+  if (end_opens_ && error < coarse && piece.begin + piece.length >= end)
+    error *= std::min(1.0, piece.length * std::abs(piece.at[0].R) / radius_);
+  if (error > 1 && now.start != Start::trails) {
+    trial = next * (error < 1e9 ? std::max(0.1, 0.8 * std::pow(error, -1.0 / stages)) : 0.1);
+    if (trial > shortest) return;
+    const Instant here = disc.at(now.tau);
+    const double speed = std::hypot(here.v[0], here.v[1]);
+    if (speed > 0) now.e[0] = here.v[0] / speed, now.e[1] = here.v[1] / speed;
+    now.start = Start::trails, trial = 100 * shortest;
+    return;
+  }
+  if (!(error < 1e9)) piece.p.fill(0);  // too fine a turn to be seen
+  const double factor = 0.8 * std::pow(std::max(error, 1e-9), -1.0 / stages);
+  int back = 0;
+  while (back < stages && drag(piece.at[back], piece.direction(back)) >= 0) ++back;
+  const bool stops = back < stages && now.chatter < most_chatter;
+  if (stops) stop(disc, piece, back);
+  now.chatter = piece.length < shortest ? now.chatter + 1 : 0;
+  pieces.push_back({true, int(slips.size())});
+  slips.push_back(piece);
+  const std::array<double, 2> e = piece.direction(stages - 1);
+  now.tau = piece.begin + piece.length, trial = std::clamp(factor, 0.5, 8.0) * piece.length;
+  now.e[0] = e[0], now.e[1] = e[1];
+  now.start = Start::follows, now.onset = false;
+  for (int c = 0; c < 2; ++c) now.w[c] = piece.at[stages - 1].u[c] - piece.at[stages - 1].R * e[c];
+  if (stops) now.slips = false, now.at_edge = true, trial = length;
+}
+
+std::array<double, 2> SweptSlider::go(MovingDisc const& disc, double end, State now) {
+  double trial = disc.grid->length();
+  while (end - now.tau > 1e-15 * std::max(1.0, std::abs(end))) {
+    if (now.slips)
+      slip(disc, end, now, trial);
+    else
+      stick(disc, end, now);
+  }
+  return {now.w[0], now.w[1]};
+}
+
+std::array<double, 2> SweptSlider::march(MovingDisc const& disc, double begin, double end,
+                                         std::array<double, 2> w) {
+  end_opens_ = false;
+  const Instant here = disc.at(begin);
+  const double x = here.u[0] - w[0], y = here.u[1] - w[1], d = std::hypot(x, y);
+  State now{
+      .tau = begin, .slips = false, .start = Start::given, .w = {w[0], w[1]}, .e = {}, .at_edge = false};
+  if (d >= here.R * (1 - touching) && d > 0) {
+    now.e[0] = x / d, now.e[1] = y / d;
+    for (int c = 0; c < 2; ++c) now.w[c] = here.u[c] - here.R * now.e[c];
+    now.slips = now.onset = drag(here, {now.e[0], now.e[1]}) > 0, now.at_edge = true;
+  }
+  return go(disc, end, now);
+}
+
+void SweptSlider::land(MovingDisc const& disc, double begin, double end) {
+  end_opens_ = true, radius_ = 0;
+  for (Instant const& node : disc.at_nodes) radius_ = std::max(radius_, node.R);
+  const Instant here = disc.at(begin);
+  const double speed = std::hypot(here.v[0], here.v[1]);
+  State now{
+      .tau = begin, .slips = speed > here.dR, .start = Start::closes, .w = {here.u[0], here.u[1]}, .e = {}};
+  if (now.slips) now.e[0] = here.v[0] / speed, now.e[1] = here.v[1] / speed;
+  go(disc, end, now);
+}
+
+}  // namespace fretwave::hb
