@@ -11,14 +11,14 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from scipy.optimize import brentq
 
-from .circle import CLOSED, TURN, Slider, waves
+from .circle import CLOSED, TURN, Slider, waves, zero
 
 ROUNDED = 1e-3  #: size of a motion that its rounding, in arms, is CLOSED of
 MOST_PERIODS = 60  #: Newton steps until a slider closes its period
 NO_SLIP = 1e-13  #: of a motion's size: a slider within all its discs but for this does not slip
 PANEL = 20  #: points of Gauss in a panel of tanh
+TINY = 1e-300
 FIRST = 0.0123  #: time at which a period is begun, where motions that are measured from their phase have no root
 
 
@@ -96,7 +96,7 @@ def jenkins(coefficients, rates, stiffness, limit, waves):
             if abs(away) > reach:
                 goal = w[0].real + side * reach
                 late = side * (first(begin) - goal) >= 0
-                onset = begin if late else brentq(lambda t, g=goal: first(t) - g, begin, end, xtol=1e-300, rtol=1e-15)
+                onset = begin if late else zero(lambda t, g=goal: first(t) - g, begin, end)
             if second:
                 add(begin, onset, lambda tau, w=w: stiffness * (u(tau) - w))
                 add(onset, end, lambda tau, f=side * limit: np.full((len(tau), 1), f))
@@ -150,7 +150,7 @@ def _roots(f, m):
     tau = np.unique(np.r_[grid[1:-1], extrema[(extrema > FIRST) & (extrema < FIRST + 2 * np.pi)]])
     value = f(tau)
     turns = np.flatnonzero((value[:-1] > 0) != (value[1:] > 0))
-    return np.array([brentq(lambda t: f(np.array([t]))[0], tau[i], tau[i + 1], xtol=1e-300, rtol=1e-15) for i in turns])
+    return np.array([zero(lambda t: f(np.array([t]))[0], tau[i], tau[i + 1]) for i in turns])
 
 
 def _closed_spans(f, m):
@@ -186,10 +186,12 @@ def coulomb_3d(U, p, orders, rest=(0.0, 0.0)):
     out[0] = stop(U[0], kn, load, lambda tau: waves(orders, tau))
     path = np.stack([U[1], U[2], mu * kn / kt * U[0]])
     path[2, 0] += mu / kt * load
-    slider = Slider(orders, path[:, :, 0].real.copy(), bool(np.any(U.imag)))
+    base = path[:, :, 0].real.copy()
+    rest, base[:2, 0] = np.asarray(rest, float) - base[:2, 0], 0.0  # arms may be 1e-16 of where they are
+    slider = Slider(orders, base, bool(np.any(U.imag)))
     spans = _closed_spans(lambda tau: load + kn * (waves(orders, tau) @ U[0, :, 0].real), U.shape[1])
     if mu and len(spans) == 1 and spans[0][1] - spans[0][0] == TURN:
-        integral, varied = _never_opens(slider, np.asarray(rest, float))
+        integral, varied = _never_opens(slider, rest)
     else:
         for begin, end in spans if mu else []:
             slider.land(begin, end)
@@ -246,19 +248,23 @@ def common_point(slider, rest):
         x = slider.at(tau)
         return np.hypot(x[0] - w[0], x[1] - w[1]) - x[2]
 
+    def order(tau, w):
+        x = slider.at(tau)
+        return farther(x[:2].T, w) - x[2]
+
     def rises(tau, w):
         x, v = slider.at(tau), slider.at(tau, slider.V)
         return (x[0] - w[0]) * v[0] + (x[1] - w[1]) * v[1] - v[2] * np.hypot(x[0] - w[0], x[1] - w[1])
 
     def peaks(w):
         """Times at which |u - w| - R has its maxima, the largest first."""
-        value = over(grid, w)
+        value = order(grid, w)
         top = np.flatnonzero((value >= np.roll(value, 1)) & (value > np.roll(value, -1)))
         out = []
         for t in grid[top[np.argsort(-value[top])][:4]] if len(top) else grid[:1]:
             inside = rises(t - step, w) > 0 > rises(t + step, w)
-            out.append(brentq(rises, t - step, t + step, (w,), xtol=1e-300, rtol=1e-15) if inside else t)
-        return np.array(out)[np.argsort(-over(np.array(out), w))]
+            out.append(zero(lambda x: rises(x, w), t - step, t + step) if inside else t)
+        return np.array(out)[np.argsort(-order(np.array(out), w))]
 
     def discs(times):
         x = slider.at(np.array(times))
@@ -334,4 +340,9 @@ def nearest_common(centres, radii, rest):
     distance = np.linalg.norm(points[:, None] - centres[None], axis=2) - radii
     size = abs(centres).max() + radii.max()
     points = points[np.all(distance <= 1e-12 * size, axis=1)]
-    return None if not len(points) else points[np.argmin(np.linalg.norm(points - rest, axis=1))]
+    return None if not len(points) else points[np.argmin(farther(points, rest))]
+
+
+def farther(x, w):
+    """|x - w| - |w| for each of the points x (points, 2), with all digits where w is far away."""
+    return ((x * x).sum(axis=1) - 2 * x @ w) / (np.linalg.norm(x - w, axis=1) + np.hypot(*w) + TINY)

@@ -229,6 +229,10 @@ def common_point(pad: Pad, rest: Array) -> Optional[Array]:
         return np.hypot(x[0] - w[0], x[1] - w[1]) - x[2]
 
     size, grid = abs(pad.path.c).max(), TURN * np.arange(2048) / 2048
+    if np.linalg.norm(rest) > 1e6 * size:
+        raise OracleError(
+            f"the slider's rest is {np.linalg.norm(rest) / size:.0e} motions away: no digits are left"
+        )
     times = peaks(rest)
     if over(times[0], rest) <= 0:
         return rest
@@ -309,6 +313,7 @@ def forces(
     """
     Q = coefficients(u) if callable(u) else np.asarray(u, float)
     c = np.concatenate([Q[:, :1], Q[:, 1::2] - 1j * Q[:, 2::2]], axis=1)
+    rest, c[1:, 0] = np.asarray(rest, float) - Q[1:, 0], 0.0  # arms may be far shorter than the way to them
     load = kn * c[0]
     load[0] += N0 - kn * gap
     pad = Pad(Series(np.stack([c[1], c[2], mu / kt * load])), harmonics)
@@ -322,7 +327,6 @@ def forces(
         tau = begin + (end - begin) * (node + 1) / 2
         out[0] += waves(harmonics, tau) @ (normal(tau)[0] * weight * (end - begin) / 2)
     if mu > 0 and not changes:
-        rest = np.asarray(rest, float)
         stands = common_point(pad, rest)
         if stands is None:
             w = cycle(pad, rest)
