@@ -1,10 +1,12 @@
 #include "hb/continuous_force.h"
 
 #include "hb/continuous_contact.h"
+#include "hb/velocity_force.h"
 
 namespace fretwave::hb {
 
 std::unique_ptr<ContinuousForce> continuous_force(Harmonics const& h, contact::Law const& law) {
+  if (law.integration() == contact::Integration::panels) return std::make_unique<VelocityForce>(h, law);
   return std::make_unique<ContinuousContact>(h, law);
 }
 

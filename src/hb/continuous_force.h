@@ -24,8 +24,9 @@ class ContinuousForce {
   virtual std::uint64_t piece() const = 0;
   /// f (samples x components x pairs) of the last force at the samples u and v.
   virtual void sample(int samples, double const* u, double const* v, double* f) const = 0;
-  /// Work, slip path and Archard's integral of the last force: integrals, not sums over samples.
-  virtual void measure(contact::Diagnosis&) const = 0;
+  /// Work, slip path and Archard's integral of the last force: integrals, not sums over samples; at this
+  /// angular frequency [rad/s].
+  virtual void measure(contact::Diagnosis&, double omega) const = 0;
 };
 
 /// Null where the law is sampled.
