@@ -265,7 +265,14 @@ void Grading::divide(SeriesFrom const& v, double length, std::vector<Panel>& out
     double half = guess(here, direction);
     half = 2 * half < rest ? half : half < rest ? rest / 2 : rest;
     Panel panel{0, half};
-    while (half > std::max(flat, least) && !smooth(v.jet(direction * (s + half)), half)) half *= 0.7;
+    // by what the parabola from here says, then by what is there
+    const auto middle = [&](double x) {
+      return Series::Jet{
+          {here.d[0] + x * (here.d[1] + x * here.d[2] / 2), here.d[1] + x * here.d[2], here.d[2]}};
+    };
+    const double enough = std::max(flat, least);
+    while (half > enough && !smooth(middle(direction * half), half)) half *= 0.9;
+    while (half > enough && !smooth(v.jet(direction * (s + half)), half)) half *= 0.85;
     if (flat >= half) half = flat, panel.side = here.d[0] > 0 ? 1 : -1;
     panel.middle = direction * (s + half), panel.half = half;
     s = half < rest ? s + 2 * half : all;
