@@ -43,8 +43,9 @@ enum class Status : std::uint8_t { stick, slip, open };
 enum class Limit : std::uint8_t { none, circle, each };
 
 /// How harmonic balance takes the harmonics of a law's force: from samples; or in continuous time, by the
-/// pieces between its changes of state (`LinearPair`), the same with its two tangents on one circle.
-enum class Integration : std::uint8_t { samples, pieces, circle };
+/// pieces between its changes of state (`LinearPair`), the same with its two tangents on one circle, or by
+/// panels graded towards steep changes (`VelocityLayer`).
+enum class Integration : std::uint8_t { samples, pieces, circle, panels };
 
 /// A tangential force this near to its limit has reached it. The only tolerance on it, of all laws.
 constexpr double limit_tolerance = 1e-12;
@@ -73,6 +74,14 @@ struct LinearPair {
   /// dR/du_n of the distance R at which the limit mu N holds the slider.
   double reach() const { return friction_coefficient * normal_stiffness / tangential_stiffness; }
   bool rubs() const { return friction_coefficient > 0 || friction_limit > 0; }
+};
+
+/// A pair whose force follows its velocity alone, smooth but steep about zero: f(v) is analytic but beyond
+/// v = +-i width, and constant to rounding where |v| >= end.
+struct VelocityLayer {
+  double width;                                          ///< [m/s]
+  double end = std::numeric_limits<double>::infinity();  ///< [m/s]
+  double slip = 0;  ///< |v| from which the pair slips [m/s], as `diagnose` has it
 };
 
 /// A contact law with its parameters for the pairs of this rank.
@@ -137,6 +146,10 @@ class Law {
   /// slip, all else is measured between samples, the work too.
   virtual Integration integration() const { return Integration::samples; }
   virtual LinearPair linear_pair(int /*pair*/) const { return {}; }
+  virtual VelocityLayer velocity_layer(int /*pair*/) const { return {1}; }
+  /// Of a law by panels, which has one component: f and df/dv of a pair at `count` velocities.
+  virtual void at_velocities(int /*pair*/, int /*count*/, double const* /*v*/, double* /*f*/,
+                             double* /*df_dv*/) const {}
 
   /// Force on the pairs, and what its linearisation needs.
   virtual void force(Motion const&, double* f, Record&) const;

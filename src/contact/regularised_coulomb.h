@@ -12,8 +12,12 @@ class RegularisedCoulomb : public Law {
   int pairs() const override { return int(limit_.size()); }
   bool uses_displacement() const override { return false; }
   bool odd() const override { return true; }
+  Integration integration() const override { return Integration::panels; }
+  VelocityLayer velocity_layer(int pair) const override;
+  void at_velocities(int pair, int count, double const* v, double* f, double* df_dv) const override;
+  /// For what asks for one moment of it: integration in time.
   void force(Motion const&, double* f, Record&) const override;
-  /// A sample slips where |v| > 2 eps, i.e. where the force has reached 96 % of mu N.
+  /// It slips where |v| > 2 eps, i.e. where the force has reached 96 % of mu N.
   void diagnose(Motion const&, double const* f, Diagnosis&) const override;
 
  private:

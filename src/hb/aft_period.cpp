@@ -58,7 +58,7 @@ contact::Diagnosis Aft::diagnosis(Found const& found, Exponents const& e, bool a
                          std::vector<double>(pairs_), std::vector<double>(pairs_),
                          std::vector<double>(archard ? pairs_ : 0)};
   law_->diagnose(whole, found.samples.f.data(), out);
-  if (found.exact) found.exact->measure(out);
+  if (found.exact) found.exact->measure(out, angular_frequency(e));
   return out;
 }
 

@@ -80,7 +80,7 @@ void CircularContact::sample(int samples, double const* u, double const*, double
       each(piece.begin, piece.length, [&](size_t t, double) { hold(t, piece.w); });
     for (auto const& piece : pair.slider.path.slips)
       each(piece.begin, piece.length, [&](size_t t, double tau) {
-        const auto e = piece.direction((tau - piece.begin) / piece.length);
+        const auto e = SweptSlider::direction(pair.disc, piece, tau);
         double* now = f + t * step + k;
         for (int c = 0; c < 2; ++c) now[(c + 1) * n] = law.friction_coefficient * now[0] * e[c];
       });
@@ -88,7 +88,7 @@ void CircularContact::sample(int samples, double const* u, double const*, double
 }
 
 /// Over slip the slider moves by l = u'.e - R': its path, the work mu N l, and Archard's N l.
-void CircularContact::measure(contact::Diagnosis& out) const {
+void CircularContact::measure(contact::Diagnosis& out, double) const {
   for (size_t k = 0; k < pairs_.size(); ++k) {
     contact::LinearPair const& law = pairs_[k].law;
     if (pairs_[k].slider.kind == SliderPeriod::Kind::loose) continue;

@@ -19,7 +19,7 @@ class ContinuousContact : public ContinuousForce {
   double mean_stiffness(int pair, int component) const override;
   std::uint64_t piece() const override;
   void sample(int samples, double const* u, double const* v, double* f) const override;
-  void measure(contact::Diagnosis&) const override;
+  void measure(contact::Diagnosis&, double omega) const override;
 
  private:
   struct Tangent {

@@ -90,7 +90,7 @@ void ContinuousContact::sample(int samples, double const* u, double const*, doub
   }
 }
 
-void ContinuousContact::measure(contact::Diagnosis& out) const {
+void ContinuousContact::measure(contact::Diagnosis& out, double /*omega*/) const {
   std::ranges::fill(out.work, 0.0);
   for (size_t k = 0; k < pairs_.size(); ++k) {
     contact::LinearPair const& law = pairs_[k].law;

@@ -2,11 +2,13 @@
 
 #include "hb/circular_contact.h"
 #include "hb/continuous_contact.h"
+#include "hb/velocity_force.h"
 
 namespace fretwave::hb {
 
 std::unique_ptr<ContinuousForce> continuous_force(Harmonics const& h, contact::Law const& law) {
   if (law.integration() == contact::Integration::circle) return std::make_unique<CircularContact>(h, law);
+  if (law.integration() == contact::Integration::panels) return std::make_unique<VelocityForce>(h, law);
   return std::make_unique<ContinuousContact>(h, law);
 }
 

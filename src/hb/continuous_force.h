@@ -26,8 +26,9 @@ class ContinuousForce {
   virtual void sample(int samples, double const* u, double const* v, double* f) const = 0;
   /// Largest |w(T) - w(0)| of a slider in that period [m].
   virtual double unclosed() const { return 0; }
-  /// Work, slip path and Archard's integral of the last force: integrals, not sums over samples.
-  virtual void measure(contact::Diagnosis&) const = 0;
+  /// Work, slip path and Archard's integral of the last force: integrals, not sums over samples; at this
+  /// angular frequency [rad/s].
+  virtual void measure(contact::Diagnosis&, double omega) const = 0;
 };
 
 /// Null where the law is sampled.

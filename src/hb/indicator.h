@@ -12,6 +12,10 @@ class Indicator {
   void fill() { G_[0] += 1; }
   /// `weight` over an arc.
   void add(Arc const& arc, double weight);
+  /// What is not constant, by its G_p itself.
+  void add(std::vector<complex> const& G) {
+    for (size_t p = 0; p < G_.size(); ++p) G_[p] += G[p];
+  }
   complex operator()(int p) const { return p < 0 ? std::conj(G_[-p]) : G_[p]; }
 
   /// F += weight x the coefficients (orders > 0) of f with f' = g p': a continuous force of which p moves a

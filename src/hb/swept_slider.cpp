@@ -13,8 +13,8 @@ constexpr int stages = Radau::stages;
 constexpr double touching = 1e-13;  // of R: a slider this near to the edge is on it
 constexpr double shortest = 1e-11;  // panel: what e forgets sooner counts for nothing in a force
 constexpr int most_chatter = 4;
-constexpr double coarse = 1e6;    // of what is allowed: even so a derivative is good to some digits
-constexpr double falling = 1e-9;  // last coefficient of a panel's series; what it neglects is smaller
+constexpr double coarse = 1e5;    // of what is allowed: even so a derivative is good to some digits
+constexpr double falling = 1e-8;  // last coefficient of a panel's series; what it neglects is smaller
 
 /// Rate at which the slider moves, l = u'.e - R'.
 double drag(Instant const& now, std::array<double, 2> const& e) {
@@ -49,10 +49,16 @@ std::array<double, 2> Slip::turned(double p) const {
   return {c * e[0] - s * e[1], c * e[1] + s * e[0]};
 }
 
-std::array<double, 2> Slip::direction(double x) const { return turned(radau().at(p, x)); }
+std::array<double, 2> SweptSlider::direction(MovingDisc const& disc, Slip const& slip, double tau) {
+  Slip part = slip;
+  part.length = tau - slip.begin;
+  if (!(part.length > shortest)) return {slip.e[0], slip.e[1]};
+  const bool solved = collocate(disc, part) < INFINITY;
+  return solved ? part.direction(stages - 1) : slip.turned(radau().at(slip.p, part.length / slip.length));
+}
 
 /// Newton's method for the panel's p.
-double SweptSlider::collocate(MovingDisc const& disc, Slip& slip) const {
+double SweptSlider::collocate(MovingDisc const& disc, Slip& slip) {
   constexpr int most = 12;
   Radau const& method = radau();
   const double begin = slip.begin / disc.grid->length(), first = std::round(begin);
@@ -92,15 +98,34 @@ double SweptSlider::collocate(MovingDisc const& disc, Slip& slip) const {
   return step <= 1e-9 ? std::max(std::abs(last), std::abs(before) / 30) / falling : INFINITY;
 }
 
-/// Cuts a panel, whose slider would be pushed back at its node `first`, where it stops: l = 0.
-void SweptSlider::stop(MovingDisc const& disc, Slip& slip, int first) const {
+/// Shares of a panel between which its slider would begin to be pushed back, l < 0: at its nodes, or where
+/// the parabola of three dips. False if nowhere.
+bool SweptSlider::pushed_back(MovingDisc const& disc, Slip const& slip, double& low, double& high) {
+  Radau::Stages const& x = radau().nodes;
+  Radau::Stages l;
+  for (int j = 0; j < stages; ++j) {
+    l[j] = drag(slip.at[j], slip.direction(j));
+    low = j ? x[j - 1] : 0;
+    if (l[j] < 0) return high = x[j], true;
+    if (j < 2 || !(l[j - 1] < l[j - 2] && l[j - 1] <= l[j])) continue;
+    const double before = (l[j - 1] - l[j - 2]) / (x[j - 1] - x[j - 2]),
+                 after = (l[j] - l[j - 1]) / (x[j] - x[j - 1]);
+    const double bend = (after - before) / (x[j] - x[j - 2]);
+    low = x[j - 2], high = (x[j - 2] + x[j - 1]) / 2 - before / (2 * bend);
+    if (l[j - 2] + (high - low) * (before + bend * (high - x[j - 1])) > 0.2 * l[j - 2]) continue;
+    if (drag(disc.at(slip.begin + high * slip.length), slip.turned(radau().at(slip.p, high))) < 0)
+      return true;
+  }
+  return false;
+}
+
+/// Cuts a panel where its slider stops: l = 0 between these times from its begin.
+void SweptSlider::stop(MovingDisc const& disc, Slip& slip, double low, double high) {
   constexpr int most = 40;
-  Radau const& method = radau();
-  double low = first ? method.nodes[first - 1] * slip.length : 0, high = method.nodes[first] * slip.length;
   const Slip whole = slip;
   // on the panel's polynomial first
   const auto guess = [&](double s) {
-    return drag(disc.at(whole.begin + s), whole.direction(s / whole.length));
+    return drag(disc.at(whole.begin + s), whole.turned(radau().at(whole.p, s / whole.length)));
   };
   double below = low, above = high;
   for (int k = 0; k < most && above - below > 1e-6 * high; ++k) {
@@ -166,10 +191,9 @@ void SweptSlider::slip(MovingDisc const& disc, double end, State& now, double& t
   }
   if (!(error < 1e9)) piece.p.fill(0);  // too fine a turn to be seen
   const double factor = 0.8 * std::pow(std::max(error, 1e-9), -1.0 / stages);
-  int back = 0;
-  while (back < stages && drag(piece.at[back], piece.direction(back)) >= 0) ++back;
-  const bool stops = back < stages && now.chatter < most_chatter;
-  if (stops) stop(disc, piece, back);
+  double low, high;
+  const bool stops = now.chatter < most_chatter && pushed_back(disc, piece, low, high);
+  if (stops) stop(disc, piece, low * piece.length, high * piece.length);
   now.chatter = piece.length < shortest ? now.chatter + 1 : 0;
   pieces.push_back({true, int(slips.size())});
   slips.push_back(piece);

@@ -26,8 +26,6 @@ class SweptSlider {
     Radau::Stages p;
     std::array<Instant, Radau::stages> at;
     bool onset;  ///< from stick
-    /// e at the panel's share x of its length.
-    std::array<double, 2> direction(double x) const;
     std::array<double, 2> direction(int node) const { return turned(p[node]); }
     std::array<double, 2> turned(double p) const;
   };
@@ -40,6 +38,8 @@ class SweptSlider {
   std::vector<Slip> slips;
   std::vector<Piece> pieces;
 
+  /// e in a slip at any of its times, as exact as at its end: the last node of a panel that ends there.
+  static std::array<double, 2> direction(MovingDisc const&, Slip const&, double tau);
   void clear() { sticks.clear(), slips.clear(), pieces.clear(); }
   /// From w at `begin`, inside or on the edge; where it stands at `end`.
   std::array<double, 2> march(MovingDisc const&, double begin, double end, std::array<double, 2> w);
@@ -59,8 +59,9 @@ class SweptSlider {
   void stick(MovingDisc const&, double end, State&);
   void slip(MovingDisc const&, double end, State&, double& trial);
   /// Of the panel's error to what is allowed; infinite where there is no solution.
-  double collocate(MovingDisc const&, Slip&) const;
-  void stop(MovingDisc const&, Slip&, int first) const;
+  static double collocate(MovingDisc const&, Slip&);
+  static bool pushed_back(MovingDisc const&, Slip const&, double& low, double& high);
+  static void stop(MovingDisc const&, Slip&, double low, double high);
 
   bool end_opens_ = false;
   double radius_ = 0;  ///< largest R

@@ -59,16 +59,15 @@ def test_derivatives(comm):
 
 @pytest.mark.ranks(1)
 def test_a_branch_is_that_of_the_law_in_space(comm):
-    """Which is sampled and comes nearer as samples grow; in a plane their least number gives what any other does."""
+    """Whatever the number of samples: neither law is sampled."""
 
     def branch(law, samples):
         found = fw.follow(problem_of(comm, law, samples=samples), 0.02, 0.51, report_at=[0.1, 0.5], errors=False)
         return np.array([[found[k][name] for name in ("omega", "zeta")] for k in found.met("report")])
 
     exact = branch("coulomb_2d", 6)
-    assert exact == pytest.approx(branch("coulomb_2d", 64), abs=SOLVED)
-    coarse, fine = (np.abs(branch("coulomb_3d", n) - exact).max() for n in (64, 1024))
-    assert fine < 1e-5 and fine < coarse / 8
+    for law, samples in (("coulomb_2d", 64), ("coulomb_3d", 6), ("coulomb_3d", 64)):
+        assert exact == pytest.approx(branch(law, samples), abs=SOLVED)
 
 
 def test_sliders_of_a_pair_in_a_plane(comm):

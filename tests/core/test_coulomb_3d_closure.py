@@ -58,7 +58,7 @@ def test_coupled_law_does_not_depend_on_the_first_sample_of_an_orbit(size):
 
 def test_shakedown_takes_the_periodic_slider_nearest_to_rest():
     """A circle of radius r < R about c far from rest: all discs hold the one of radius R - r about c, and w is its
-    point nearest to 0, c - (R - r), on the disc of the sample where u = c + r."""
+    point nearest to 0, c - (R - r), on the disc of the time when u = c + r."""
     c, r = 1.0, 0.1
     u, f = period(pair(), motion((0,), (c, r), (0, 0, r)))
     w = c - (REACH - r)
@@ -68,26 +68,26 @@ def test_shakedown_takes_the_periodic_slider_nearest_to_rest():
 @pytest.mark.parametrize("r", [1.1 * REACH, 1.0, 3.0])
 def test_slider_on_a_circle_is_a_tractrix(r):
     """Pulled along a circle of radius r > R at distance R it moves along itself, on the circle of radius
-    sqrt(r^2 - R^2): work per period 2 pi mu N sqrt(r^2 - R^2), and the force leads the motion by acos(R / r); both
-    errors fall as 1/N_t^2."""
+    sqrt(r^2 - R^2): work per period 2 pi mu N sqrt(r^2 - R^2), and the force leads the motion by acos(R / r)."""
     path, lead = motion((0,), (0, r), (0, 0, r)), np.arccos(REACH / r)
-    work, errors = 2 * np.pi * MU * np.sqrt(r**2 - REACH**2), []
-    for samples in (256, 1024, 4096):
+    work = 2 * np.pi * MU * np.sqrt(r**2 - REACH**2)
+    for samples in (8, 64, 256):
         problem, y = imposed(pair(), path, samples=samples)
         u, f = period(pair(), path, samples=samples)
         found = np.mean((f[:, 1] + 1j * f[:, 2]) * (u[:, 1] - 1j * u[:, 2])) / r
-        errors.append([abs(problem.diagnostics(y)["work"] / work - 1), abs(found / (MU * np.exp(1j * lead)) - 1)])
-    assert (np.array(errors[2]) < 3e-5).all() and (np.log2(np.divide(errors[:-1], errors[1:])) > 3.8).all()
+        assert problem.diagnostics(y)["work"] == pytest.approx(work, rel=ROUNDING)
+        assert found == pytest.approx(MU * np.exp(1j * lead), rel=ROUNDING)
 
 
 @pytest.mark.parametrize("which", list(STEADY))
 def test_tangent_of_the_closed_slider_is_exact(which):
-    """Against central differences, in all directions of the motion; the period closes from any sample."""
+    """Against central differences, in all directions of the motion; the period closes from any sample. In shakedown
+    the slider touches its limit at one time or two, between samples, and does not slip."""
     q = STEADY[which]
     independent_of_the_first_sample(pair(), q, 1e-11)
     problem, y0 = imposed(pair(), q)
     y, step, slip = whole(y0), 1e-6, problem.diagnostics(y0)["slip"]
-    assert slip > 4 / SAMPLES if which.startswith("cycle") else 0 < slip <= 2 / SAMPLES
+    assert slip > 4 / SAMPLES if which.startswith("cycle") else slip <= 2 / SAMPLES
     for e in np.eye(len(y))[:21]:
         sides = [whole(problem.residual(unknowns(problem, y + s * step * e))) for s in (1, -1)]
         found = whole(problem.jacobian_product(y0, unknowns(problem, e)))

@@ -7,6 +7,7 @@ import resource
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from models.core_models import TanhLaw, friction
 from mpi4py import MPI
 from oracle import Jenkins, SeriesMotion, System, forced_orbit, series_motion
 from petsc4py import PETSc
@@ -28,10 +29,8 @@ def model(comm=MPI.COMM_SELF):
 
 
 def tanh_model(velocity=0.2):
-    damper = fw.Contact(
-        "regularised_coulomb", [[0.0, 1.0]], {"friction_limit": LIMIT, "regularisation_velocity": velocity}
-    )
-    return fw.Model(M, K, None, [damper])
+    """Sampled, as every law in Python."""
+    return fw.Model(M, K, None, [fw.Contact(TanhLaw(LIMIT, velocity), [[0.0, 1.0]])])
 
 
 def chain(comm):
@@ -152,7 +151,7 @@ def test_static_loads_do_not_enter():
 @SERIAL
 def test_a_fold_has_a_finite_error():
     """At the same amplitude there is nothing beyond it; what is read is as far as the branch runs straight."""
-    sharp = tanh_model(0.05)
+    sharp = fw.Model(M, K, None, [friction([[0.0, 1.0]], LIMIT, 0.05)])
     mode = fw.NonlinearMode(sharp, fw.choose_harmonics(sharp, 21, 1024), "CNM", 0)
     branch = fw.follow(mode, 0.05, 1.0)
     folds = branch.met("fold")

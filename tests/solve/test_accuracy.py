@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from models.core_models import TanhLaw
 from mpi4py import MPI
 from oracle import Jenkins, SeriesMotion, System, series_motion
 from tolerances import REPEATED, ROUNDING, SOLVED
@@ -78,7 +79,9 @@ def test_more_is_taken_only_where_it_is_needed():
 
 @SERIAL
 def test_samples_follow_too_where_a_law_is_sampled():
-    branch = fw.follow(mode(tanh()), 0.05, 3.0, accuracy=1e-4)
+    """In Python, beside the same law in continuous time."""
+    sampled = fw.Model(M, K, None, [fw.Contact(TanhLaw(LIMIT, 0.2), [[0.0, 1.0]])])
+    branch = fw.follow(mode(sampled), 0.05, 3.0, accuracy=1e-4)
     fine = fw.follow(mode(tanh(), 81, 2048), 0.15, 3.0, errors=False)
     assert branch.converged and branch["samples"].max() > branch["samples"].min() == 128
     for a in (0.2, 0.5, 1.5, 2.9):
