@@ -230,9 +230,7 @@ def common_point(pad: Pad, rest: Array) -> Optional[Array]:
 
     size, grid = abs(pad.path.c).max(), TURN * np.arange(2048) / 2048
     if np.linalg.norm(rest) > 1e6 * size:
-        raise OracleError(
-            f"the slider's rest is {np.linalg.norm(rest) / size:.0e} motions away: no digits are left"
-        )
+        raise OracleError(f"the slider's rest is {np.linalg.norm(rest) / size:.0e} motions away: no digits are left")
     times = peaks(rest)
     if over(times[0], rest) <= 0:
         return rest
