@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from . import laws
+from . import laws, pads
 
 STEP = 1e-30  #: of complex differentiation
 
@@ -141,7 +141,7 @@ class Equations:
     def integral(self, law, u, p):
         """Of the force of one pair and the waves over a period, (components, m, lanes)."""
         if law == "coulomb_3d":
-            return laws.coulomb_3d(u, p, self.orders)
+            return pads.coulomb_3d(u, p, self.orders)
         if law == "regularised_coulomb":
             return laws.regularised_coulomb(u[0], p["friction_limit"], p["regularisation_velocity"], self.waves)[None]
         rates = self.velocity(u, 0.0, 1.0)

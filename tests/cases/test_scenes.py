@@ -13,7 +13,7 @@ from tolerances import ROUNDING
 sys.path.insert(0, str(Path(__file__).parents[2] / "cases"))
 
 from oracle import forces  # noqa: E402
-from scenes import laws, path  # noqa: E402
+from scenes import laws, pads, path  # noqa: E402
 from scenes.circle import Slider, rate  # noqa: E402
 from scenes.circle import waves as all_waves
 from scenes.closed import jenkins_stiffness  # noqa: E402
@@ -51,7 +51,7 @@ def test_a_jenkins_element_has_its_complex_stiffness():
 def pad(Q, law=PAD, varied=0.0, rest=(0.0, 0.0)):
     """Coefficients of the force (3, m) for those of a motion; imaginary parts: the derivative along `varied`."""
     Q = np.asarray(Q, float)
-    f = laws.coulomb_3d((Q + 1e-30j * varied)[..., None], law, list(range(Q.shape[1] // 2 + 1)), rest)[..., 0] / np.pi
+    f = pads.coulomb_3d((Q + 1e-30j * varied)[..., None], law, list(range(Q.shape[1] // 2 + 1)), rest)[..., 0] / np.pi
     f[:, 0] /= 2
     return f.real + 1j * f.imag / 1e-30
 
@@ -132,7 +132,7 @@ def test_a_slider_that_hardly_creeps_is_closed_and_tends_to_where_nothing_slips(
 
     def stands(load):
         path = np.stack([Q[1], Q[2], 0.5 * (Q[0] + load * np.eye(5)[0])])
-        return laws.common_point(Slider([0, 1, 2], path, False), np.zeros(2))[0] is not None
+        return pads.common_point(Slider([0, 1, 2], path, False), np.zeros(2))[0] is not None
 
     low, high = 1.0, 10.0
     for _ in range(50):
@@ -169,7 +169,7 @@ def test_a_stop_is_its_closed_form_to_rounding():
 
 def test_a_slider_in_shakedown_rests_on_the_point_nearest_to_its_start():
     centres = np.array([[1.0, 0.0], [0.0, 1.0], [0.5, 0.5]])
-    at = laws.nearest_common(centres, np.array([0.9, 0.9, 5.0]), np.zeros(2))
+    at = pads.nearest_common(centres, np.array([0.9, 0.9, 5.0]), np.zeros(2))
     gap = np.linalg.norm(at - centres[:2], axis=1)
     np.testing.assert_allclose(gap, 0.9, atol=ROUNDING)
     assert np.linalg.norm(at) < np.linalg.norm([0.5, 0.5])
