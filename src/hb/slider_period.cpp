@@ -92,16 +92,28 @@ bool SliderPeriod::enter(Held const& added, double const* rest, double size) {
 /// On one disc w = u + R (rest - u)/|rest - u|; on two e_k (dw - du_k) + dR_k = 0 with e_k from w to u_k.
 /// That the times move counts for nothing: they are those of the largest excess.
 void SliderPeriod::follow(MovingDisc const& disc, double const* rest) {
+  constexpr int most = 4;
   touching = int(held_.size());
-  double e[2][2] = {};
-  for (int k = 0; k < touching; ++k) {
-    Held const& d = held_[k];
-    const double x = d.u[0] - w[0], y = d.u[1] - w[1], length = std::hypot(x, y);
-    e[k][0] = x / length, e[k][1] = y / length, times[k] = d.tau;
-  }
-  const double det = e[0][0] * e[1][1] - e[0][1] * e[1][0];
+  double e[2][2] = {}, det = 0;
+  for (int k = 0; k < touching; ++k) times[k] = held_[k].tau;
   std::fill_n(&gain_of_rates[0][0], 6, 0.0);
   if (touching == 1) return follow_one(disc, rest);
+  // the times to their last digits, and w where both circles meet then
+  for (int step = 0; step <= most; ++step) {
+    double inside[2];
+    for (int k = 0; k < 2; ++k) {
+      const MovingDisc::Excess now = disc.excess(times[k], w);
+      const double later = now.bend < 0 ? -now.rate / now.bend : 0;
+      if (step < most && std::abs(later) < one_disc) times[k] += later;
+      const MovingDisc::Instant at = disc.at(times[k]);
+      const double x = at.u[0] - w[0], y = at.u[1] - w[1], length = std::hypot(x, y);
+      e[k][0] = x / length, e[k][1] = y / length, inside[k] = length - at.R;
+    }
+    det = e[0][0] * e[1][1] - e[0][1] * e[1][0];
+    if (step == most || std::abs(det) < parallel) break;
+    w[0] += (e[1][1] * inside[0] - e[0][1] * inside[1]) / det;
+    w[1] += (e[0][0] * inside[1] - e[1][0] * inside[0]) / det;
+  }
   if (std::abs(det) < parallel) {
     // opposite directions: they have one point in common, which moves along the line of centres
     touching = 1;
@@ -120,18 +132,28 @@ void SliderPeriod::follow(MovingDisc const& disc, double const* rest) {
 }
 
 void SliderPeriod::follow_one(MovingDisc const& disc, double const* rest) {
-  const Series::Jet x = disc.u[0].at(times[0]), y = disc.u[1].at(times[0]), r = disc.radius.at(times[0]);
-  const double D = std::hypot(x.d[0] - rest[0], y.d[0] - rest[1]), s = r.d[0] / D;
-  const double n[2] = {(x.d[0] - rest[0]) / D, (y.d[0] - rest[1]) / D}, t[2] = {-n[1], n[0]};
-  const double across = t[0] * x.d[1] + t[1] * y.d[1];
-  const double bend = n[0] * x.d[2] + n[1] * y.d[2] + across * across / D - r.d[2];
-  const double turn = bend < 0 ? -(1 - s) * across / bend : 0;  // of h n by h'
-  for (int row = 0; row < 2; ++row) {
-    gain[0][row][0] = -n[row], gain_of_rates[row][0] = -turn * t[row];
-    for (int col = 0; col < 2; ++col) {
-      gain[0][row][col + 1] = (row == col) - s * t[row] * t[col] + turn * t[row] * t[col] * across / D;
-      gain_of_rates[row][col + 1] = turn * t[row] * n[col];
+  constexpr int most = 8;
+  for (int k = 0;; ++k) {
+    const Series::Jet x = disc.u[0].at(times[0]), y = disc.u[1].at(times[0]), r = disc.radius.at(times[0]);
+    const double D = std::hypot(x.d[0] - rest[0], y.d[0] - rest[1]), s = r.d[0] / D;
+    const double n[2] = {(x.d[0] - rest[0]) / D, (y.d[0] - rest[1]) / D}, t[2] = {-n[1], n[0]};
+    const double along = n[0] * x.d[1] + n[1] * y.d[1], across = t[0] * x.d[1] + t[1] * y.d[1];
+    const double bend = n[0] * x.d[2] + n[1] * y.d[2] + across * across / D - r.d[2];
+    const double step = bend < 0 ? -(along - r.d[1]) / bend : 0;
+    if (k < most && std::abs(step) > 1e-14 && std::abs(step) < one_disc) {
+      times[0] += step;
+      continue;
     }
+    for (int c = 0; c < 2; ++c) w[c] = rest[c] + (D - r.d[0]) * n[c];
+    const double turn = bend < 0 ? -(1 - s) * across / bend : 0;  // of h n by h'
+    for (int row = 0; row < 2; ++row) {
+      gain[0][row][0] = -n[row], gain_of_rates[row][0] = -turn * t[row];
+      for (int col = 0; col < 2; ++col) {
+        gain[0][row][col + 1] = (row == col) - s * t[row] * t[col] + turn * t[row] * t[col] * across / D;
+        gain_of_rates[row][col + 1] = turn * t[row] * n[col];
+      }
+    }
+    return;
   }
 }
 

@@ -17,15 +17,6 @@ constexpr int tile = 32;  // pairs whose times fit the cache
 /// Times at which roots are looked for first; what is found does not depend on them.
 Harmonics search_times(Harmonics const& h) { return {h.orders(), 8 * (h.highest() + 1)}; }
 
-Series series(Harmonics const& h, double const* block) {
-  Series out{std::vector<complex>(h.highest() + 1)};
-  for (int i = 0; i < h.count(); ++i) {
-    const int n = h.orders()[i];
-    out.q[n] = n ? complex(block[h.offset(i)], -block[h.offset(i) + 1]) : complex(block[0]);
-  }
-  return out;
-}
-
 double norm(double const* x, int size) {
   double square = 0;
   for (int k = 0; k < size; ++k) square += x[k] * x[k];
@@ -63,6 +54,7 @@ void VelocityForce::force(double const* U, double const* V, double* F) {
   for (int number = 0; number < int(pairs_.size()); ++number) {
     Pair& pair = pairs_[number];
     pair.v = series(harmonics_, V + block(number));
+    pair.v.q[0] = mean(harmonics_, V + block(number));
     const double u = norm(U + block(number), m), v = norm(V + block(number), m);
     pair.rate = u > 0 ? v / u : 0;
     pair.parts.clear(), pair.share = 1, pair.mean_slope = 0;
