@@ -65,6 +65,30 @@ def test_it_is_what_small_steps_tend_to(N0):
     assert errors[0] > 7 * errors[1]
 
 
+#: Nearly straight, kt 8e5 N/m: a drag of 0.016 on a shrinking circle, so that what its direction is off by grows.
+NEARLY_STRAIGHT = np.array(
+    [
+        [-2.56043e-10, -1.684725e-08, -5.055485e-09, 0, 0, 5.0753e-10, 3.6233e-10, 0, 0, -1.1688e-10, -4.0261e-11],
+        [
+            *(-6.118616393704122e-03, 1.651893927687593e-02, -2.869601431742364e-02, 5.59577656306384e-06),
+            *(-3.554722119083375e-05, 3.139307351293408e-03, 1.031553373868571e-03, -3.44580258157938e-06),
+            *(1.011967836743308e-05, -6.964763610412225e-04, -2.698171057398385e-04),
+        ],
+        [
+            *(1.594986250114293e-02, -5.209705514991e-02, 8.80451139492159e-02, -1.93822853184317e-05),
+            *(1.066489591913011e-04, -9.57051979969449e-03, -3.775040787516634e-03, 1.097973989317325e-05),
+            *(-3.290930299877986e-05, 2.265116142684762e-03, 8.487653310911455e-04),
+        ],
+    ]
+)
+
+
+def test_a_short_drag_before_a_reversal_is_there():
+    law = {"kn": 1e6, "kt": 8e5, "mu": 0.5, "N0": 1.0}
+    steps = by_steps(NEARLY_STRAIGHT, **law, harmonics=5, count=1 << 16, periods=2)
+    assert forces(NEARLY_STRAIGHT, **law, harmonics=5) == pytest.approx(steps, abs=1e-4)
+
+
 def test_it_is_the_force_of_an_exact_orbit():
     """A block that sticks and slips under a changing load: its displacement's harmonics give its traction's."""
     K = np.array([[20.0, 2.0, 0.0], [2.0, 15.0, 0.0], [0.0, 0.0, 6.0]])
