@@ -28,18 +28,22 @@ LAWS: dict[str, dict[str, float]] = {
     "coulomb_2d": PAD,
     "coulomb_3d": PAD,
     "unilateral_spring": {"normal_stiffness": 8.0},
+    "regularised_coulomb, wide": {"friction_limit": 1.0, "regularisation_velocity": 3.0},
+    "regularised_coulomb": {"friction_limit": 1.0, "regularisation_velocity": 0.1},
+    "regularised_coulomb, thin": {"friction_limit": 1.0, "regularisation_velocity": 1e-6},
 }
 
 
-def pairs_alone(law: str, H: int, samples: int, roughness: float) -> tuple[Any, PETSc.Vec, PETSc.Vec]:
+def pairs_alone(name: str, H: int, samples: int, roughness: float) -> tuple[Any, PETSc.Vec, PETSc.Vec]:
     """Pairs on a mass each, and a motion whose coefficients fall as n^-roughness; 2.0 of the fundamental slips."""
+    law = name.split(",")[0]
     d, m = fw.laws()[law].components, 2 * H + 1
     n = d * PAIRS
     rng = np.random.default_rng(0)
     q = 0.3 * rng.standard_normal((n, m)) / np.repeat(np.arange(H + 1), 2)[1:].clip(1) ** roughness
     q[:, 1:3] += rng.choice([-2.0, 2.0], (n, 2))
     B = sp.identity(n, format="csr")
-    model = fw.Model(B, B, None, [fw.Contact(law, B, LAWS[law])], MPI.COMM_SELF)
+    model = fw.Model(B, B, None, [fw.Contact(law, B, LAWS[name])], MPI.COMM_SELF)
     start = fw.LinearMode(1.0, 0.0, np.ones(n), np.zeros(n))
     problem = fw.NonlinearMode(model, fw.Harmonics(range(H + 1), samples), "EPMC", 0, start, "bench_")
     y = problem.core.unknowns()

@@ -42,7 +42,6 @@ VelocityForce::VelocityForce(Harmonics const& h, contact::Law const& law)
       grading_(h.highest()),
       blocks_(size_t(tile_) * h.block_size()),
       values_(size_t(tile_) * times_.samples()),
-      wave_(times_.samples()),
       V_(size_t(law.pairs()) * h.block_size()),
       F_(V_.size()),
       pairs_(law.pairs()) {}
@@ -67,27 +66,37 @@ void VelocityForce::force(double const* U, double const* V, double* F) {
   std::copy_n(F, F_.size(), F_.data());
 }
 
-/// Roots of a pair's velocity, between its samples.
-std::vector<Root> VelocityForce::roots(Series const& v, int number) {
-  std::vector<Root> out;
-  if (std::ranges::all_of(v.q, [](complex q) { return q == 0.0; })) return out;
+/// Roots of a pair's velocity, from each two samples between which its sign changes. Panels are measured from
+/// them; they find layers without them too, so that those that hide in pairs between samples may be left out.
+std::vector<double> VelocityForce::roots(Series const& v, int number) {
   if (const int first = number - number % tile_; tile_at_ != first) {
     tile_at_ = first;
     std::ranges::fill(blocks_, 0.0);
     std::copy_n(&V_[block(first)], std::min(blocks_.size(), V_.size() - block(first)), blocks_.data());
     transform_.to_time(blocks_.data(), values_.data());
   }
-  for (size_t t = 0; t < wave_.size(); ++t) wave_[t] = values_[t * tile_ + number % tile_];
-  find_roots(v, 0, wave_.data(), times_.samples(), out);
+  const auto f = [&v](double tau) {
+    const Series::Jet jet = v.at(tau);
+    return std::pair(jet.d[0], jet.d[1]);
+  };
+  const int N = times_.samples();
+  const auto at = [&](int t) { return values_[size_t(t % N) * tile_ + number % tile_]; };
+  std::vector<double> out;
+  for (int t = 0; t < N; ++t) {
+    const double here = at(t), after = at(t + 1), low = t * period / N, high = (t + 1) * period / N;
+    if ((here < 0) == (after < 0)) continue;
+    const double guess = low + (high - low) * (here / (here - after));
+    out.push_back(root(f, low, high, guess, here < 0 ? 1 : -1, 1));
+  }
   return out;
 }
 
 /// Roots that come again half a period later.
-bool VelocityForce::mirrored(std::vector<Root> const& roots) const {
+bool VelocityForce::mirrored(std::vector<double> const& roots) const {
   const size_t half = roots.size() / 2;
   if (!half_wave_ || roots.size() % 4 != 2) return false;
   for (size_t i = 0; i < half; ++i)
-    if (std::abs(roots[i + half].at - roots[i].at - period / 2) > 1e-6) return false;
+    if (std::abs(roots[i + half] - roots[i] - period / 2) > 1e-6) return false;
   return true;
 }
 
@@ -104,7 +113,7 @@ void VelocityForce::divide(Pair& pair, int number) {
       pair.parts.back().panels.push_back({(i + 0.5) * period / count, period / count / 2, 0, true});
     return;
   }
-  const std::vector<Root> roots = this->roots(pair.v, number);
+  const std::vector<double> roots = this->roots(pair.v, number);
   if (roots.empty()) {
     pair.parts.push_back(whole());
     return grading_.divide(pair.parts.back().v, period, pair.parts.back().panels);
@@ -112,10 +121,10 @@ void VelocityForce::divide(Pair& pair, int number) {
   const size_t count = roots.size(), taken = mirrored(roots) ? count / 2 : count;
   pair.share = double(taken) / double(count);
   const auto gap = [&](size_t i) {
-    return i + 1 < count ? roots[i + 1].at - roots[i].at : roots[0].at + period - roots[i].at;
+    return i + 1 < count ? roots[i + 1] - roots[i] : roots[0] + period - roots[i];
   };
   for (size_t i = 0; i < taken; ++i) {
-    pair.parts.push_back({SeriesFrom(pair.v, roots[i].at, 0), {}, {}});
+    pair.parts.push_back({SeriesFrom(pair.v, roots[i], 0), {}, {}});
     Part& part = pair.parts.back();
     grading_.divide(part.v, -gap(i ? i - 1 : count - 1) / 2, part.panels);
     grading_.divide(part.v, gap(i) / 2, part.panels);

@@ -38,8 +38,8 @@ class VelocityForce : public ContinuousForce {
   };
   size_t block(int pair) const { return size_t(pair) * harmonics_.block_size(); }
   void divide(Pair&, int number);
-  std::vector<Root> roots(Series const& v, int number);
-  bool mirrored(std::vector<Root> const&) const;
+  std::vector<double> roots(Series const& v, int number);
+  bool mirrored(std::vector<double> const& roots) const;
   void integrate(Pair&, int number, double* F);
   void linearise();
   double slip_path(Pair const&, double threshold) const;
@@ -50,8 +50,8 @@ class VelocityForce : public ContinuousForce {
   int tile_, tile_at_ = -1;  ///< its size; the first pair of the one that is evaluated
   FourierTransform transform_;
   Grading grading_;
-  std::vector<double> blocks_, values_, wave_;  ///< of a tile, at the times of the grid; of one pair
-  std::vector<double> V_, F_;                   ///< of the last force
+  std::vector<double> blocks_, values_;  ///< of a tile, at the times of the grid
+  std::vector<double> V_, F_;            ///< of the last force
   std::vector<Pair> pairs_;
   std::vector<double> D_;  ///< dF/dV
   bool linearised_ = false;
