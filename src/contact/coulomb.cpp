@@ -31,11 +31,6 @@ LinearPair Coulomb::linear_pair(int i) const {
           .slider = {slider_[i], components() > 2 ? slider_[pairs() + i] : 0.0}};
 }
 
-PairConstants Coulomb::constants(int first) const {
-  return {p_.normal_stiffness.data() + first, p_.tangential_stiffness.data() + first, reach_.data() + first,
-          p_.normal_load.data() + first, p_.gap.data() + first};
-}
-
 void Coulomb::set_wear(double const* depth) {
   for (int i = 0; i < pairs(); ++i) worn_[i] = unworn_[i] + depth[i];
   p_.gap = worn_;

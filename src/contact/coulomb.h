@@ -8,11 +8,6 @@ struct CoulombParameters {
   std::vector<double> normal_stiffness, tangential_stiffness, friction_coefficient, normal_load, gap;
 };
 
-/// Those that a loop over pairs reads, one value each; reach = mu / kt.
-struct PairConstants {
-  double const *kn, *kt, *reach, *load, *gap;
-};
-
 /// Elastic Coulomb contact: components (normal, one tangent or two), u_n > 0 closes.
 ///   N = max(0, N0 + kn (u_n - gap)),  T = kt (u_t - w),  |T| <= mu N,  T = 0 and w free when open.
 /// Worn depth adds to the gap. What |T| <= mu N is to two tangents, and how their sliders w move within it,
@@ -36,7 +31,6 @@ class Coulomb : public Law {
   void set_sliders(std::vector<double> const& sliders) override { slider_ = sliders; }
   void set_wear(double const* depth) override;
   void set_stand_off(double distance) override;
-  PairConstants constants(int first) const;
 
   CoulombParameters p_;                  ///< their gap with wear and stand-off
   std::vector<double> reach_;            ///< mu / kt [m/N]

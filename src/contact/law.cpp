@@ -1,11 +1,8 @@
 #include "contact/law.h"
 
 #include <algorithm>
-#include <bit>
 #include <cstddef>
 #include <stdexcept>
-
-#include "scramble.h"
 
 namespace fretwave::contact {
 
@@ -37,13 +34,6 @@ void Law::product(Motion const& motion, Record const& record, double const* du, 
   std::fill_n(df, motion.size(), 0.0);
   if (du && !record.df_du.empty()) add_tangent_product(motion, record.df_du, du, df);
   if (dv && !record.df_dv.empty()) add_tangent_product(motion, record.df_dv, dv, df);
-}
-
-std::uint64_t number_of(std::vector<double> const& states, int first) {
-  std::uint64_t sum = 0;
-  for (size_t k = 0; k < states.size(); ++k)
-    sum += scrambled(scrambled(k + (std::uint64_t(first) << 32)) + std::bit_cast<std::uint64_t>(states[k]));
-  return sum;
 }
 
 Diagnosis states(Law const& law, Motion const& motion, double const* f) {

@@ -12,28 +12,16 @@ namespace fretwave::contact {
 struct Motion {
   int samples = 0;  ///< samples held here (half a period when the motion is half-wave symmetric)
   int components = 0, pairs = 0;
-  int first =
-      0;  ///< of the law's pairs, the one that stands first here (hereditary laws are marched in tiles)
   double const* u = nullptr;  ///< relative displacement [m]; null if the law ignores it
   double const* v = nullptr;  ///< relative velocity [m/s]; null if the law ignores it
   double step = 0;            ///< time between samples [s]
   std::size_t size() const { return std::size_t(samples) * components * pairs; }
 };
 
-/// How a slider at the start of the period follows a perturbation x of the motion: gain x(sample), twice, and
-/// periodic b with b the slider's end after a linearised period from zero.
-struct SliderStart {
-  int sample[2] = {0, 0};
-  double gain[2][2][3] = {}, periodic[2][2] = {};
-};
-
 /// What a force evaluation leaves for its linearisation.
 struct Record {
   std::vector<double> df_du,
       df_dv;  ///< instantaneous tangents, samples x components x components x pairs; empty if zero
-  std::vector<double> march;       ///< a hereditary law's own flags and directions along its closed period
-  std::vector<SliderStart> start;  ///< of its pairs
-  double unclosed = 0;             ///< largest |w(T) - w(0)| of a slider in that period [m]
 };
 
 enum class Status : std::uint8_t { stick, slip, open };
@@ -93,8 +81,8 @@ class Law {
   virtual bool uses_displacement() const { return true; }
   virtual bool uses_velocity() const { return true; }
   /// The force depends on the path of the displacement (never on the velocity). Such a law is read on a
-  /// period that its sliders close, of all such the one nearest to the rest state: DESIGN fact 3 without the
-  /// transient.
+  /// period that its sliders close, of all such the one nearest to the rest state (DESIGN fact 3 without the
+  /// transient), in continuous time: it has `integration` and is not sampled.
   virtual bool hereditary() const { return false; }
   /// The static state the dynamics start from: relative displacement components x pairs, reached in one step
   /// from sliders that stand at zero, or at `from` (tangents x pairs).
@@ -156,14 +144,7 @@ class Law {
   /// Linearised force for a motion perturbed by (du, dv), null where the law ignores it. Of the motion only
   /// the sizes are read here and in what follows but `diagnose`: the rest is in the record.
   virtual void product(Motion const&, Record const&, double const* du, double const* dv, double* df) const;
-  /// A hereditary law's linearised force on one pair under many perturbations: samples x components x
-  /// columns.
-  virtual void pair_product(Motion const&, Record const&, int /*pair*/, int /*columns*/, double const* /*du*/,
-                            double* /*df*/) const {}
   virtual void diagnose(Motion const&, double const* f, Diagnosis&) const = 0;
-  /// Number of the smooth piece that the last force lies on: another one where any sample is in another state
-  /// (stick, slip, open). The same everywhere for a law that is smooth.
-  virtual std::uint64_t piece(Motion const&, Record const&) const { return 0; }
 
  protected:
   virtual void set_rest(double const* /*u*/) {}
@@ -175,9 +156,6 @@ class Law {
   double stand_off_ = 0;
   unsigned version_ = 0, owner_ = 0;
 };
-
-/// Number of a pattern of states, given as record entries (any values that differ from state to state).
-std::uint64_t number_of(std::vector<double> const& states, int first);
 
 /// Status and gap of all pairs for any motion and its forces.
 Diagnosis states(Law const&, Motion const&, double const* f);

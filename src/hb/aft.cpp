@@ -13,35 +13,19 @@ int tangent_columns(contact::Law const& law) { return law.components() * law.com
 
 }  // namespace
 
-Aft::Aft(Harmonics const& h, std::shared_ptr<contact::Law const> law, bool continuous)
+Aft::Aft(Harmonics const& h, std::shared_ptr<contact::Law const> law)
     : harmonics_(h),
       law_(std::move(law)),
       pairs_(law_->pairs()),
       columns_(law_->components() * pairs_),
-      law_samples_(h.odd_only() && law_->odd() && !law_->hereditary() ? h.samples() / 2 : h.samples()),
-      tiles_(tiles(*law_, h.samples())),
-      transform_(h, continuous ? 0 : law_->components() * tiles_.front().pairs, law_->components()),
-      last_transform_(h, continuous || tiles_.size() == 1 ? 0 : law_->components() * tiles_.back().pairs,
-                      law_->components()),
-      tangent_transform_(h, law_->hereditary() ? 0 : tangent_columns(*law_)) {
-  if (continuous) {
-    if (law_->uses_velocity()) velocity_.resize(size_t(columns_) * h.block_size());
-    continuous_ = continuous_force(h, *law_);
-    return;
-  }
-  const size_t columns = law_->components() * tiles_.front().pairs, n = h.samples() * columns;
+      law_samples_(h.odd_only() && law_->odd() ? h.samples() / 2 : h.samples()),
+      continuous_(continuous_force(h, *law_)),
+      transform_(h, continuous_ ? 0 : columns_, law_->components()),
+      tangent_transform_(h, continuous_ ? 0 : tangent_columns(*law_)) {
+  const size_t n = continuous_ ? 0 : size_t(h.samples()) * columns_;
   f_.resize(n);
   if (law_->uses_displacement()) u_.resize(n);
-  if (law_->uses_velocity()) v_.resize(n), velocity_.resize(columns * h.block_size());
-}
-
-/// Only a law with memory is cut: it goes over its samples twice and keeps a record.
-std::vector<Aft::Tile> Aft::tiles(contact::Law const& law, int samples) {
-  const int pairs = law.pairs(), size = law.hereditary() ? (samples <= 128 ? 64 : 32) : std::max(1, pairs);
-  std::vector<Tile> out;
-  for (int first = 0; first == 0 || first < pairs; first += size)
-    out.push_back({first, std::min(size, pairs - first), {}});
-  return out;
+  if (law_->uses_velocity()) v_.resize(n), velocity_.resize(size_t(columns_) * h.block_size());
 }
 
 /// The fundamental's Im s turns sample numbers into time.
@@ -49,11 +33,10 @@ double Aft::angular_frequency(Exponents const& e) const {
   return harmonics_.fundamental() < 0 ? 1.0 : e.s[harmonics_.fundamental()].imag();
 }
 
-contact::Motion Aft::motion(Tile const& tile, double omega) const {
+contact::Motion Aft::motion(double omega) const {
   return {.samples = law_samples_,
           .components = law_->components(),
-          .pairs = tile.pairs,
-          .first = tile.first,
+          .pairs = pairs_,
           .u = u_.empty() ? nullptr : u_.data(),
           .v = v_.empty() ? nullptr : v_.data(),
           .step = 2 * std::numbers::pi / (omega * harmonics_.samples())};
@@ -68,58 +51,38 @@ void Aft::mirror(std::vector<double>& samples, double sign, int columns) const {
 
 void Aft::force(double const* U, Exponents const& e, double* F) {
   if (columns_ == 0) return;
-  if (continuous_) {
-    if (law_->uses_velocity()) multiply(harmonics_, e.s, U, velocity_.data(), columns_);
-    return continuous_->force(U, law_->uses_velocity() ? velocity_.data() : nullptr, F);
-  }
-  for (Tile& tile : tiles_) {
-    const int columns = tile.pairs * law_->components();
-    const size_t at = size_t(tile.first) * law_->components() * harmonics_.block_size();
-    if (law_->uses_displacement()) transform(tile).to_time(U + at, u_.data());
-    if (law_->uses_velocity()) {
-      multiply(harmonics_, e.s, U + at, velocity_.data(), columns);
-      transform(tile).to_time(velocity_.data(), v_.data());
-    }
-    law_->force(motion(tile, angular_frequency(e)), f_.data(), tile.record);
-    mirror(f_, -1, columns);
-    transform(tile).to_harmonics(f_.data(), F + at);
-  }
+  if (law_->uses_velocity()) multiply(harmonics_, e.s, U, velocity_.data(), columns_);
+  if (continuous_) return continuous_->force(U, law_->uses_velocity() ? velocity_.data() : nullptr, F);
+  if (law_->uses_displacement()) transform_.to_time(U, u_.data());
+  if (law_->uses_velocity()) transform_.to_time(velocity_.data(), v_.data());
+  law_->force(motion(angular_frequency(e)), f_.data(), record_);
+  mirror(f_, -1, columns_);
+  transform_.to_harmonics(f_.data(), F);
 }
 
-std::uint64_t Aft::piece() const {
-  if (continuous_) return continuous_->piece();
-  std::uint64_t sum = 0;
-  for (Tile const& tile : tiles_) sum += columns_ ? law_->piece(motion(tile, 1), tile.record) : 0;
-  return sum;
-}
+std::uint64_t Aft::piece() const { return continuous_ ? continuous_->piece() : 0; }
 
 void Aft::product(double const* dU, double const* dV, double* dF) {
   if (columns_ == 0) return;
   if (continuous_) return continuous_->product(dU, dV, dF);
-  for (Tile const& tile : tiles_) {
-    const size_t at = size_t(tile.first) * law_->components() * harmonics_.block_size();
-    if (law_->uses_displacement()) transform(tile).to_time(dU + at, u_.data());
-    if (law_->uses_velocity()) transform(tile).to_time(dV + at, v_.data());
-    const contact::Motion motion = this->motion(tile, 1);
-    law_->product(motion, tile.record, motion.u, motion.v, f_.data());
-    mirror(f_, -1, tile.pairs * law_->components());
-    transform(tile).to_harmonics(f_.data(), dF + at);
-  }
+  if (law_->uses_displacement()) transform_.to_time(dU, u_.data());
+  if (law_->uses_velocity()) transform_.to_time(dV, v_.data());
+  const contact::Motion motion = this->motion(1);
+  law_->product(motion, record_, motion.u, motion.v, f_.data());
+  mirror(f_, -1, columns_);
+  transform_.to_harmonics(f_.data(), dF);
 }
 
 void Aft::gap_product(double const* dgap, double* dF) {
   if (columns_ == 0) return;
   if (continuous_) return continuous_->gap_product(dgap, dF);
-  for (Tile const& tile : tiles_) {
-    const int d = law_->components(), normal = std::max(law_->normal(), 0);
-    const contact::Motion motion = this->motion(tile, 1);
-    std::fill_n(u_.data(), motion.size(), 0.0);
-    for (int t = 0; t < motion.samples; ++t)
-      for (int i = 0; i < tile.pairs; ++i)
-        u_[(size_t(t) * d + normal) * tile.pairs + i] = -dgap[tile.first + i];
-    law_->product(motion, tile.record, motion.u, nullptr, f_.data());
-    transform(tile).to_harmonics(f_.data(), dF + size_t(tile.first) * d * harmonics_.block_size());
-  }
+  const int d = law_->components(), normal = std::max(law_->normal(), 0);
+  const contact::Motion motion = this->motion(1);
+  std::fill_n(u_.data(), motion.size(), 0.0);
+  for (int t = 0; t < motion.samples; ++t)
+    for (int i = 0; i < pairs_; ++i) u_[(size_t(t) * d + normal) * pairs_ + i] = -dgap[i];
+  law_->product(motion, record_, motion.u, nullptr, f_.data());
+  transform_.to_harmonics(f_.data(), dF);
 }
 
 /// T[pair][row][col] (m x m each): f_n = 2 G_n x_0 + sum_k G_{n-k} x_k + G_{n+k} conj(x_k) for f(t) = g(t)
@@ -160,40 +123,19 @@ void Aft::toeplitz_hankel(std::vector<double> const& tangent, std::vector<double
   }
 }
 
-/// For a law with memory: the linearised march of a pair for all its coefficients at once, columns innermost.
-void Aft::by_columns(double* D) const {
-  const int m = harmonics_.block_size(), d = law_->components(), ld = d * m, N = harmonics_.samples(),
-            row = d * ld;
-  const double one = 1, zero = 0;
-  std::vector<double> du(size_t(N) * row), df(du.size());
-  for (int t = 0; t < N; ++t)
-    for (int c = 0; c < d; ++c)
-      std::copy_n(transform_.synthesis().data() + size_t(t) * m, m,
-                  du.data() + size_t(t) * row + c * ld + c * m);
-  for (Tile const& tile : tiles_)
-    for (int i = 0; i < tile.pairs; ++i, D += size_t(ld) * ld) {
-      law_->pair_product(motion(tile, 1), tile.record, i, ld, du.data(), df.data());
-      for (int c = 0; c < d; ++c)  // rows of component c: analysis^T df, in columns
-        dgemm_("N", "T", &ld, &m, &N, &one, df.data() + c * ld, &row, transform_.analysis().data(), &m, &zero,
-               D + size_t(c) * m * ld, &ld);
-    }
-}
-
 void Aft::blocks(Exponents const& e, double* D) {
   if (columns_ == 0) return;
   if (continuous_) return continuous_->blocks(e, D);
   const int m = harmonics_.block_size(), d = law_->components();
   const size_t size = size_t(pairs_) * d * m * d * m;
-  if (law_->hereditary()) return by_columns(D);
   std::fill_n(D, size, 0.0);
   std::vector<double> T(size);
-  contact::Record const& record = tiles_.front().record;
-  if (!record.df_du.empty()) {
-    toeplitz_hankel(record.df_du, T);
+  if (!record_.df_du.empty()) {
+    toeplitz_hankel(record_.df_du, T);
     std::copy(T.begin(), T.end(), D);
   }
-  if (record.df_dv.empty()) return;
-  toeplitz_hankel(record.df_dv, T);
+  if (record_.df_dv.empty()) return;
+  toeplitz_hankel(record_.df_dv, T);
   // D += T S: columns of the velocity's block recombined by the 2x2 of s_k
   for (size_t row = 0; row < size_t(pairs_) * d * m; ++row)
     for (int col = 0; col < d; ++col)

@@ -36,8 +36,7 @@ struct Wearing {
 /// look.
 class Aft {
  public:
-  /// `continuous`: the law's force is integrated in continuous time, on all ranks.
-  Aft(Harmonics const&, std::shared_ptr<contact::Law const>, bool continuous);
+  Aft(Harmonics const&, std::shared_ptr<contact::Law const>);
   int columns() const { return columns_; }
   /// Force of rounding in a displacement, per metre of it: a stiffness, where it is known by the share of the
   /// period in which the last force follows it (stick, contact).
@@ -64,13 +63,7 @@ class Aft {
   Wearing wearing(double const* U, Exponents const&) const;
 
  private:
-  /// Pairs whose time samples fit the cache, and the record of their last force.
-  struct Tile {
-    int first, pairs;
-    contact::Record record;
-  };
-  static std::vector<Tile> tiles(contact::Law const&, int samples);
-  contact::Motion motion(Tile const&, double omega) const;
+  contact::Motion motion(double omega) const;
   contact::Motion whole(ContactPeriod const&, Exponents const&) const;
   double angular_frequency(Exponents const&) const;
   /// A motion beside the last one: its samples without the law's word, the force's harmonics, its pieces.
@@ -82,21 +75,17 @@ class Aft {
   Found find(double const* U, Exponents const&) const;
   contact::Diagnosis diagnosis(Found const&, Exponents const&, bool archard) const;
   std::vector<double> on_doubled_samples(double const* U, Exponents const&, std::vector<double> F);
-  FourierTransform const& transform(Tile const& tile) const {
-    return tile.pairs == tiles_.front().pairs ? transform_ : last_transform_;
-  }
-  /// Of all pairs at once, for who reads a period; made when first asked for, as the tables take longer.
+  /// For who reads a period of what is not sampled; made when first asked for, as the tables take longer.
   FourierTransform const& whole_transform() const;
   void mirror(std::vector<double>& samples, double sign, int columns) const;
-  void by_columns(double* D) const;
   void toeplitz_hankel(std::vector<double> const& tangent, std::vector<double>& T) const;
 
   Harmonics harmonics_;
   std::shared_ptr<contact::Law const> law_;
   int pairs_, columns_, law_samples_;  ///< law_samples: half a period when half-wave symmetric
   std::unique_ptr<ContinuousForce> continuous_;
-  std::vector<Tile> tiles_;  ///< of one size but for the last
-  FourierTransform transform_, last_transform_, tangent_transform_;
+  contact::Record record_;  ///< of the last force
+  FourierTransform transform_, tangent_transform_;
   std::vector<double> velocity_, u_, v_, f_;
   mutable std::shared_ptr<FourierTransform> whole_transform_;
   std::shared_ptr<Aft> doubled_;  ///< on twice the samples

@@ -7,13 +7,14 @@ namespace fretwave::hb {
 
 /// All pairs at once over the whole period.
 contact::Motion Aft::whole(ContactPeriod const& period, Exponents const& e) const {
-  contact::Motion motion = this->motion({0, pairs_, {}}, angular_frequency(e));
+  contact::Motion motion = this->motion(angular_frequency(e));
   motion.samples = harmonics_.samples();
   motion.u = period.u.data(), motion.v = period.v.data();
   return motion;
 }
 
 FourierTransform const& Aft::whole_transform() const {
+  if (!continuous_) return transform_;
   if (!whole_transform_)
     whole_transform_ = std::make_shared<FourierTransform>(harmonics_, columns_, law_->components());
   return *whole_transform_;
@@ -40,7 +41,6 @@ Aft::Found Aft::find(double const* U, Exponents const& e) const {
   contact::Record record;
   law_->force(whole(period, e), period.f.data(), record);
   whole_transform().to_harmonics(period.f.data(), out.F.data());
-  period.unclosed = record.unclosed;
   return out;
 }
 
@@ -95,7 +95,7 @@ void count(contact::Diagnosis const& diagnosis, ContactSummary& summary) {
 std::vector<double> Aft::on_doubled_samples(double const* U, Exponents const& e, std::vector<double> F) {
   if (continuous_) return F;
   if (!doubled_)
-    doubled_ = std::make_shared<Aft>(Harmonics(harmonics_.orders(), 2 * harmonics_.samples()), law_, false);
+    doubled_ = std::make_shared<Aft>(Harmonics(harmonics_.orders(), 2 * harmonics_.samples()), law_);
   doubled_->force(U, e, F.data());
   return F;
 }

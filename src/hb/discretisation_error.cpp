@@ -61,12 +61,7 @@ DiscretisationError::DiscretisationError(HarmonicProblem& problem, std::string c
                 solve::gigabytes(bytes) + ", of " + solve::gigabytes(free) + " free";
     return;
   }
-  const int enough = 8 * orders.back();
-  finer_ = refined(problem, orders, std::max(4 * problem.harmonics().samples(), 2 * enough));
-  const auto quick = [](auto const& law) {
-    return !law.hereditary() || law.integration() != contact::Integration::samples;
-  };
-  if (!all_laws(problem.model(), quick)) sampled_ = std::exchange(finer_, refined(problem, orders, enough));
+  finer_ = refined(problem, orders, std::max(4 * problem.harmonics().samples(), 16 * orders.back()));
   newton_ = std::make_unique<solve::Newton>(*finer_, prefix);
   newton_->solve_beside(tolerance);
 }
@@ -107,7 +102,7 @@ std::optional<LeftOut> DiscretisationError::at(Vec y, Vec tangent) {
   problem_.residual(y, r);
   VecHandle point = problem_.on(*finer_, y), left = problem_.on(*finer_, r);
   check(VecScale(left, problem_.stiffness_scale() / finer_->stiffness_scale()));
-  (sampled_ ? *sampled_ : *finer_).residual(point, finer);
+  finer_->residual(point, finer);
   VecHandle same = retained(finer);
   check(VecAXPY(finer, -1, same));  // harmonics: r'_new
   check(VecAXPY(same, -1, left));   // samples: r'_old - r

@@ -23,8 +23,7 @@ struct LeftOut {
 /// contact force outside the retained orders, samples for r - r'_old, the change of the retained rows on more
 /// samples, and the solver for -r, what it left (its share of r' where that is next to nothing). Error
 /// estimation by a hierarchical basis (Bank & Smith 1993): what the estimate misses is as much smaller as the
-/// finer set is better, and the square of the error. The tangent of a law with memory is a march for each
-/// coefficient, and decides a factor, not an order: J' takes it on fewer samples.
+/// finer set is better, and the square of the error.
 class DiscretisationError {
  public:
   /// `prefix`: of the PETSc options of J' dy' = b. Collective.
@@ -41,7 +40,7 @@ class DiscretisationError {
 
   HarmonicProblem& problem_;
   std::string left_out_;
-  std::unique_ptr<HarmonicProblem> finer_, sampled_;  ///< of J', and of r' where its samples are others
+  std::unique_ptr<HarmonicProblem> finer_;
   std::unique_ptr<solve::Newton> newton_;
 };
 

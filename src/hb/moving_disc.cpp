@@ -83,28 +83,72 @@ MovingDisc::Excess MovingDisc::farthest(double const* w) const {
   return most;
 }
 
-double MovingDisc::exit(double begin, double end, double const* w, bool at_edge) const {
-  const auto rising = [&](double low, double high) {
-    const auto f = [&](double tau) {
-      const Excess now = excess(tau, w);
+namespace {
+
+/// Bound of a derivative of a series.
+double bound(Series const& p, int derivative) {
+  double sum = 0;
+  for (size_t n = 1; n < p.q.size(); ++n) sum += std::pow(double(n), derivative) * std::abs(p.q[n]);
+  return sum;
+}
+
+/// First time between two at which a slider that stands comes to the edge: however short it is outside, for
+/// its excess bends down by no more than 2 (|d| |u''| + R'^2 + R |R''|).
+struct Exit {
+  MovingDisc const& disc;
+  double const* w;
+  double bend_u, bend_R;
+  struct Probe {
+    MovingDisc::Excess excess;
+    double arm, R, dR;
+  };
+  Probe probe(double tau, MovingDisc::Instant const& at) const {
+    return {MovingDisc::excess(tau, at, w), std::hypot(at.u[0] - w[0], at.u[1] - w[1]), at.R,
+            std::abs(at.dR)};
+  }
+
+  /// NaN if there is none.
+  double between(Probe const& a, Probe const& b, int halvings) const {
+    const double h = b.excess.tau - a.excess.tau;
+    // between the two |d| and R are at most the larger one and their own bending; where outside, |d| = R
+    const double R = std::max(a.R, b.R) + h * h * bend_R / 8, dR = std::max(a.dR, b.dR) + h * bend_R / 2;
+    const double arm = std::max(a.arm, b.arm) + h * h * bend_u / 8;
+    const double bend = 2 * (arm * bend_u + dR * dR + std::abs(R) * bend_R);
+    const bool leaves = b.excess.value > 0;
+    if (!leaves && std::max(a.excess.value, b.excess.value) + h * h * bend / 8 <= 0) return NAN;
+    if (leaves && (halvings == 0 || a.excess.rate > h * bend)) return rising(a.excess.tau, b.excess.tau);
+    if (halvings == 0) return NAN;
+    const double middle = a.excess.tau + h / 2;
+    const Probe m = probe(middle, disc.at(middle));
+    const double first = between(a, m, halvings - 1);
+    return std::isnan(first) && m.excess.value <= 0 ? between(m, b, halvings - 1) : first;
+  }
+  double rising(double low, double high) const {
+    const auto f = [this](double tau) {
+      const MovingDisc::Excess now = disc.excess(tau, w);
       return std::pair(now.value, now.rate);
     };
     return root(f, low, high, high, 1, 1);
-  };
-  Excess before = excess(begin, w);
+  }
+};
+
+}  // namespace
+
+double MovingDisc::exit(double begin, double end, double const* w, bool at_edge) const {
+  constexpr int most = 10;
+  const Exit search{*this, w, std::hypot(bound(u[0], 2), bound(u[1], 2)), bound(radius, 2)};
+  Exit::Probe before = search.probe(begin, at(begin));
   // what says otherwise is rounding
-  before.value = std::min(before.value, 0.0);
-  if (at_edge) before.rate = std::min(before.rate, 0.0);
+  before.excess.value = std::min(before.excess.value, 0.0);
+  if (at_edge) before.excess.rate = std::min(before.excess.rate, 0.0);
   const int stages = Radau::stages, panel = int(std::floor(begin / grid->length()));
-  for (int k = panel * stages; before.tau < end; ++k) {
+  for (int k = panel * stages; before.excess.tau < end; ++k) {
     const double tau = grid->time(k);
     if (tau <= begin) continue;
-    const Excess after = tau < end ? excess(tau, node(k), w) : excess(end, w);
-    if (after.value > 0) return rising(before.tau, after.tau);
-    if (before.rate > 0 && after.rate < 0 && room(before, after) > 0) {
-      const Excess top = highest(before, after, w);
-      if (top.value > 0) return rising(before.tau, top.tau);
-    }
+    const Exit::Probe after = tau < end ? search.probe(tau, node(k)) : search.probe(end, at(end));
+    const double out = search.between(before, after, most);
+    if (!std::isnan(out)) return out;
+    if (after.excess.value > 0) return after.excess.tau;
     before = after;
   }
   return end;

@@ -9,28 +9,17 @@
 
 namespace fretwave::hb {
 
-namespace {
-
-bool everywhere(bool here, MPI_Comm comm) {
-  MPI_Allreduce(MPI_IN_PLACE, &here, 1, MPI_CXX_BOOL, MPI_LAND, comm);
-  return here;
-}
-
-}  // namespace
-
 Residual::Residual(model::Model const& model, Harmonics const& h)
     : model_(model), harmonics_(h), stiffness_(model, h), Q_(vector()) {
   for (auto const& contact : model.contacts()) {
-    groups_.push_back(
-        {.contact = &contact,
-         .maps = {},
-         .aft = Aft(h, contact.law,
-                    everywhere(contact.law->integration() != contact::Integration::samples, model.comm())),
-         .U = {},
-         .F = {},
-         .dV = {},
-         .places = {},
-         .weights = {}});
+    groups_.push_back({.contact = &contact,
+                       .maps = {},
+                       .aft = Aft(h, contact.law),
+                       .U = {},
+                       .F = {},
+                       .dV = {},
+                       .places = {},
+                       .weights = {}});
     Group& group = groups_.back();
     group.maps.push_back(make_map(contact.B, 0));
     for (auto const& map : contact.ahead) group.maps.push_back(make_map(map.B, map.phase));

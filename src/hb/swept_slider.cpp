@@ -90,12 +90,16 @@ double SweptSlider::collocate(MovingDisc const& disc, Slip& slip) {
     for (int j = 0; j < stages; ++j) slip.p[j] += b[j], step = std::max(step, std::abs(b[j]));
     if (!(step < 2)) return INFINITY;
   }
-  double last = 0, before = 0;
+  // where the slider is pushed ahead, u'.e < 0, what lies beside it grows: that must be seen, however small
+  double last = 0, before = 0, growth = 0;
   for (int j = 0; j < stages; ++j) {
     if (std::abs(slip.p[j]) > 1) return INFINITY;
+    const double ahead = along[j] + across[j] * slip.p[j];
+    if (ahead < 0) growth = std::max(growth, -ahead / std::max(slip.at[j].R, 1e-300));
     last += method.last[j] * slip.p[j], before += method.last_but_one[j] * slip.p[j];
   }
-  return step <= 1e-9 ? std::max(std::abs(last), std::abs(before) / 30) / falling : INFINITY;
+  if (step > 1e-9) return INFINITY;
+  return std::max(std::max(std::abs(last), std::abs(before) / 30) / falling, std::pow(growth, stages));
 }
 
 /// Shares of a panel between which its slider would begin to be pushed back, l < 0: at its nodes, or where
