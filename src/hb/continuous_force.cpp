@@ -7,9 +7,17 @@
 namespace fretwave::hb {
 
 std::unique_ptr<ContinuousForce> continuous_force(Harmonics const& h, contact::Law const& law) {
-  if (law.integration() == contact::Integration::circle) return std::make_unique<CircularContact>(h, law);
-  if (law.integration() == contact::Integration::panels) return std::make_unique<VelocityForce>(h, law);
-  return std::make_unique<ContinuousContact>(h, law);
+  switch (law.integration()) {
+    case contact::Integration::pieces:
+      return std::make_unique<ContinuousContact>(h, law);
+    case contact::Integration::circle:
+      return std::make_unique<CircularContact>(h, law);
+    case contact::Integration::panels:
+      return std::make_unique<VelocityForce>(h, law);
+    case contact::Integration::samples:
+      break;
+  }
+  return nullptr;
 }
 
 }  // namespace fretwave::hb

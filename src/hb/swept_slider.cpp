@@ -13,8 +13,9 @@ constexpr int stages = Radau::stages;
 constexpr double touching = 1e-13;  // of R: a slider this near to the edge is on it
 constexpr double shortest = 1e-11;  // panel: what e forgets sooner counts for nothing in a force
 constexpr int most_chatter = 4;
-constexpr double coarse = 1e5;    // of what is allowed: even so a derivative is good to some digits
-constexpr double falling = 1e-8;  // last coefficient of a panel's series; what it neglects is smaller
+constexpr size_t most_pieces = 20000;  // what is cut finer than that is not resolved
+constexpr double coarse = 1e5;         // of what is allowed: even so a derivative is good to some digits
+constexpr double falling = 1e-8;       // last coefficient of a panel's series; what it neglects is smaller
 
 /// Rate at which the slider moves, l = u'.e - R'.
 double drag(Instant const& now, std::array<double, 2> const& e) {
@@ -178,13 +179,14 @@ void SweptSlider::slip(MovingDisc const& disc, double end, State& now, double& t
   const double line = std::floor(now.tau / length + 1e-9) * length;
   if (std::abs(now.tau - line) < 1e-9 * length) now.tau = line;
   const double left = std::min(end, line + length) - now.tau;
+  if (pieces.size() >= most_pieces) trial = length;
   const double next = trial >= left ? left : std::min(trial, left / 2);
   Slip piece{now.start, now.tau, next, {now.e[0], now.e[1]}, {}, {}, now.onset};
   double error = collocate(disc, piece);
   // where the pair opens e is forgotten: it counts by its force, R e, alone
   if (end_opens_ && error < coarse && piece.begin + piece.length >= end)
     error *= std::min(1.0, piece.length * std::abs(piece.at[0].R) / radius_);
-  if (error > 1 && now.start != Start::trails) {
+  if (error > 1 && now.start != Start::trails && pieces.size() < most_pieces) {
     trial = next * (error < 1e9 ? std::max(0.1, 0.8 * std::pow(error, -1.0 / stages)) : 0.1);
     if (trial > shortest) return;
     const Instant here = disc.at(now.tau);
@@ -196,7 +198,8 @@ void SweptSlider::slip(MovingDisc const& disc, double end, State& now, double& t
   if (!(error < 1e9)) piece.p.fill(0);  // too fine a turn to be seen
   const double factor = 0.8 * std::pow(std::max(error, 1e-9), -1.0 / stages);
   double low, high;
-  const bool stops = now.chatter < most_chatter && pushed_back(disc, piece, low, high);
+  const bool stops =
+      now.chatter < most_chatter && pieces.size() < most_pieces && pushed_back(disc, piece, low, high);
   if (stops) stop(disc, piece, low * piece.length, high * piece.length);
   now.chatter = piece.length < shortest ? now.chatter + 1 : 0;
   pieces.push_back({true, int(slips.size())});

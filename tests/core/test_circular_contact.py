@@ -97,7 +97,7 @@ PUSHED_AHEAD = np.array(  # fmt: skip
 
 @pytest.mark.ranks(1)
 def test_force_is_the_oracle_s_on_a_path_that_is_nearly_straight():
-    """Where it reverses the load falls and the slider is pushed ahead of the motion: what lies beside the path grows."""
+    """Where it reverses the load falls and the slider is pushed ahead: what lies beside the path grows."""
     law = {"kn": 1e6, "kt": 8e5, "mu": 0.5, "N0": 1.0}
     assert core(NEARLY_STRAIGHT, law) == pytest.approx(PUSHED_AHEAD, abs=1e-9)
 
