@@ -137,7 +137,7 @@ def worn(contact, q, samples):
 @pytest.mark.parametrize("law", LAWS)
 def test_integral_under_varying_normal_load(law):
     """u_n = c cos, u_t = a cos: N = N0 + nu u with nu = kn c / a, the slider is u - R and u + R with R = mu N / kt, and
-    slip begins where it leaves its place at the last turn. The sampled law's error falls as 1/N_t^2."""
+    slip begins where it leaves its place at the last turn."""
     a, c, load = 2.0, 0.2, 1.0
     nu, reach = KN * c / a, MU / KT
     R0, rho = reach * load, reach * nu
@@ -145,11 +145,8 @@ def test_integral_under_varying_normal_load(law):
     exact = (1 - rho) * (load * (a - up) + nu * (a**2 - up**2) / 2)
     exact += (1 + rho) * (load * (down + a) + nu * (down**2 - a**2) / 2)
     contact, q = pair(law, normal_load=load), motion((0, c), (0, a))
-    errors = [abs(worn(contact, q, samples)[0] / exact - 1) for samples in (64, 256, 1024, 4096)]
-    if law == "coulomb_3d":
-        assert errors[-1] < 1e-5 and np.log2(errors[0] / errors[-1]) / 6 > 1.8
-    else:
-        assert max(errors) < ROUNDING
+    for samples in (8, 64, 256):
+        assert worn(contact, q, samples)[0] == pytest.approx(exact, rel=ROUNDING)
     assert worn(contact, q, 64)[1] == pytest.approx(load, rel=1e-13)
 
 
