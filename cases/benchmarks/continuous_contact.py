@@ -1,11 +1,13 @@
-"""What contact costs whose changes lie between samples: force and linearised force of a pair, for H and N_t.
+"""What contact costs that is integrated in continuous time: force and linearised force of a pair, by H.
 
-Run it on one core from the top folder:  OMP_NUM_THREADS=1 .venv/bin/python cases/benchmarks/continuous_contact.py
-Times are processor time of this process. Laws that are sampled are measured with each N_t, the others once.
+Run it on one core from the top folder:
+  OMP_NUM_THREADS=1 .venv/bin/python cases/benchmarks/continuous_contact.py [laws] [--samples 128 1024]
+Times are processor time of this process. N_t changes nothing here; builds that sampled a law take it as they did.
 """
 
 from __future__ import annotations
 
+import argparse
 import sys
 from pathlib import Path
 from typing import Any
@@ -21,12 +23,14 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from kernels import fastest  # noqa: E402
 
-PAIRS, HIGHEST, SAMPLES = 256, (3, 7, 15, 31), (128, 256, 1024)
+PAIRS, HIGHEST = 256, (3, 7, 15, 31)
 PAD = {"normal_stiffness": 8.0, "tangential_stiffness": 5.0, "friction_coefficient": 0.4, "normal_load": 3.0}
 LAWS: dict[str, dict[str, float]] = {
     "jenkins": {"tangential_stiffness": 5.0, "friction_limit": 1.0},
     "coulomb_2d": PAD,
-    "coulomb_3d": PAD,
+    "coulomb_3d, slip": {**PAD, "tangential_stiffness": 50.0, "normal_load": 30.0},
+    "coulomb_3d, lift-off": {**PAD, "tangential_stiffness": 50.0},
+    "coulomb_3d, stick": {**PAD, "normal_load": 1e3},
     "unilateral_spring": {"normal_stiffness": 8.0},
     "regularised_coulomb, wide": {"friction_limit": 1.0, "regularisation_velocity": 3.0},
     "regularised_coulomb": {"friction_limit": 1.0, "regularisation_velocity": 0.1},
@@ -51,8 +55,8 @@ def pairs_alone(name: str, H: int, samples: int, roughness: float) -> tuple[Any,
     return problem, y, y.copy()
 
 
-def measured(law: str, H: int, samples: int, roughness: float) -> tuple[float, float, float]:
-    """Microseconds a pair: force, the first product after it (with what a linearisation costs once), any other."""
+def measured(law: str, H: int, samples: int, roughness: float) -> tuple[tuple[float, ...], str]:
+    """Microseconds a pair: force, the first product after it (with what is made once), any other; what pairs do."""
     problem, y, dy = pairs_alone(law, H, samples, roughness)
     out = y.duplicate()
     force = fastest(lambda: problem.core.residual(y, out), 3)
@@ -63,22 +67,24 @@ def measured(law: str, H: int, samples: int, roughness: float) -> tuple[float, f
         problem.core.product(y, dy, out)
 
     once = fastest(both, 3) - force
-    return tuple(1e6 * t / PAIRS for t in (force, once, product))  # type: ignore[return-value]
+    found = problem.diagnostics(y)
+    shares = "/".join(f"{found[name]:.2f}" for name in ("stick", "slip", "open"))
+    return tuple(1e6 * t / PAIRS for t in (force, once, product)), shares
 
 
 def main() -> None:
-    print(
-        "| law | motion | H | N_t | force [us] | first product [us] | product [us] |\n" + "|---" * 2 + "|---:" * 5 + "|"
-    )
-    for law in LAWS if len(sys.argv) < 2 else sys.argv[1:]:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("laws", nargs="*", metavar="laws", help=f"of {'; '.join(LAWS)} (default: all)")
+    parser.add_argument("--samples", type=int, nargs="+", default=[128], metavar="N_t")
+    options = parser.parse_args()
+    print("| law | motion | H | N_t | force | first product | product | shares |\n" + "|---" * 2 + "|---:" * 6 + "|")
+    for law in options.laws or LAWS:
         for name, roughness in {"smooth, n^-3": 3.0, "rough, n^-1.5": 1.5}.items():
             for H in HIGHEST:
-                for samples in SAMPLES:
-                    times = measured(law, H, samples, roughness)
-                    print(
-                        f"| {law} | {name} | {H} | {samples} | " + " | ".join(f"{t:.2f}" for t in times) + " |",
-                        flush=True,
-                    )
+                for samples in options.samples:
+                    times, shares = measured(law, H, samples, roughness)
+                    cells = " | ".join(f"{t:.2f}" for t in times)
+                    print(f"| {law} | {name} | {H} | {samples} | {cells} | {shares} |", flush=True)
 
 
 if __name__ == "__main__":

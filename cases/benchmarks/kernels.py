@@ -1,7 +1,8 @@
-"""What contact costs: the march of 3-D Coulomb contact beside the machine's limits, and a point of a synthetic model.
+"""What a point of a branch costs on a synthetic model with contact in three dimensions, and where its time goes.
 
-Run it on one core from the top folder:  OMP_NUM_THREADS=1 .venv/bin/python cases/benchmarks/kernels.py [march | point]
+Run it on one core from the top folder:  OMP_NUM_THREADS=1 .venv/bin/python cases/benchmarks/kernels.py
 Times are processor time of this process, the same as wall time on an idle machine. Shares by function need `perf`.
+What a pair costs alone is in CONTACT.md.
 """
 
 from __future__ import annotations
@@ -24,18 +25,12 @@ from petsc4py import PETSc
 import fretwave as fw
 from fretwave import balanced
 
-PAIRS, SAMPLES, HARMONICS = (48, 192, 768, 3072), 128, 7
-LAW = {"normal_stiffness": 2.0, "tangential_stiffness": 1.5, "friction_coefficient": 0.4}
-#: Normal loads under the same motion: every pair sticks; slips on a curved path; slips and lifts off.
-LOADS = {"stick": 100.0, "slip": 4.0, "lift-off": 1.0}
-#: Doubles that leave the caches for a pair and a sample: the record, written by the force and read by the product
-#: (displacements and forces live in tiles). All of it in one pass would be 3 displacements and 3 forces more.
-TRAFFIC, ONE_PASS = 3 * 8, (3 + 3 + 3) * 8
 #: Libraries and functions that perf names, and what they do.
 PARTS = {
-    "march, force": r"contact::(march|left_rest|shoot|farthest|extent)\b|SliderClosure|Coulomb3d::(force|close)",
-    "march, product": r"contact::linear_march\b|Coulomb3d::(linearised|product)",
-    "march, tangents": r"Coulomb3d",
+    "contact, linearised force": r"SliderDerivative|CircularContact::(linearise|add_\w*blocks)",
+    "contact, products": r"CircularContact::(blocks|product)",
+    "contact, integrals of the force": r"CircularContact::|Indicator|Arc::",
+    "contact, motion of the sliders": r"SweptSlider|SliderPeriod|MovingDisc|PanelGrid|Radau|NormalContact",
     "Fourier transforms": r"libfftw|FourierTransform",
     "dense algebra (BLAS, LAPACK)": r"libopenblas|libblas|liblapack",
     "PETSc": r"libpetsc",
@@ -57,78 +52,8 @@ def timed(run: Callable[[], Any]) -> float:
     return time.process_time() - began
 
 
-def limits() -> tuple[float, float, float]:
-    """Memory bandwidth of b + s c far beyond the caches [B/s], flops of dgemm [1/s], 1 / sqrt(x) in the cache [1/s]."""
-    n, size, few = 8_000_000, 800, 4096
-    a, b, c = (np.ones(n) for _ in range(3))
-    A, B = np.ones((2, size, size))
-    x, y = np.ones((2, few))
-
-    def triad() -> None:
-        np.multiply(c, 3.0, out=a)
-        np.add(a, b, out=a)
-
-    def direction() -> None:
-        np.sqrt(x, out=y)
-        np.divide(1.0, y, out=y)
-
-    return 5 * 8 * n / fastest(triad, 3), 2 * size**3 / fastest(lambda: A @ B, 3), few / fastest(direction, 3)
-
-
-def pairs_alone(pairs: int, samples: int, load: float) -> tuple[Any, PETSc.Vec, PETSc.Vec]:
-    """Pairs on a mass each: contact and transforms only, and a motion of the first four orders."""
-    n, m = 3 * pairs, 2 * HARMONICS + 1
-    unit = sp.identity(n, format="csr")
-    model = fw.Model(unit, unit, None, [fw.Contact("coulomb_3d", unit, {**LAW, "normal_load": load})])
-    start = fw.LinearMode(1.0, 0.0, np.ones(n), np.zeros(n))
-    problem = fw.NonlinearMode(model, fw.Harmonics(range(HARMONICS + 1), samples), "EPMC", 0, start)
-    y, dy = (problem.core.unknowns() for _ in range(2))
-    rng = np.random.default_rng(0)
-    motion = np.where(np.arange(m) < 7, 0.5, 0.0) * rng.standard_normal((n, m))
-    y.setArray(np.concatenate([motion.ravel(), [0, 1, 0]]))
-    dy.setArray(np.concatenate([rng.standard_normal(n * m), [0, 0, 0]]))
-    return problem, y, dy
-
-
-def march(options: argparse.Namespace) -> None:
-    """Residual and Jacobian product of pairs alone, and inside them the march and the transforms."""
-    bandwidth, flops, directions = limits()
-    m = 2 * HARMONICS + 1
-    print(f"machine: triad {1e-9 * bandwidth:.1f} GB/s, dgemm {1e-9 * flops:.1f} Gflop/s, "
-          f"1/sqrt(x) {1e-9 * directions:.2f} G/s (one core, as it is now)")  # fmt: skip
-    print(f"limits a pair and sample: memory {1e9 * TRAFFIC / bandwidth:.1f} ns for the record alone ({TRAFFIC} B; "
-          f"{1e9 * ONE_PASS / bandwidth:.1f} ns if nothing were tiled), slip directions {1e9 / directions:.1f} ns a "
-          f"march, transforms {1e9 * 12 * m / flops:.1f} ns ({12 * m} flops, H = {HARMONICS})")  # fmt: skip
-    print(f"ns per pair and sample of the period (N_t = {SAMPLES}); the march alone by perf:")
-    print("   pairs  motion      residual  product   force  d force  transforms   stick/slip/open")
-    for name, load in LOADS.items():
-        for pairs in PAIRS:
-            problem, y, dy = pairs_alone(pairs, SAMPLES, load)
-            times = (1e9 * t / (pairs * SAMPLES) for t in evaluation_times(problem, y, dy))
-            status = "/".join(f"{problem.diagnostics(y)[k]:.2f}" for k in ("stick", "slip", "open"))
-            inside = "  ".join(f"{part:7.1f}" for part in march_alone(pairs, load)) or "(no perf)"
-            print(f"{pairs:8d}  {name:10s}" + "".join(f"{t:10.1f}" for t in times) + f"{inside}   {status}", flush=True)
-
-
-def evaluation_times(problem: Any, y: PETSc.Vec, dy: PETSc.Vec) -> tuple[float, float]:
-    """Processor time [s] of a residual and of a Jacobian product."""
-    r = problem.core.equations()
-    return fastest(lambda: problem.core.residual(y, r)), fastest(lambda: problem.core.product(y, dy, r))
-
-
-def workload(options: argparse.Namespace) -> None:
-    """What `perf` looks into: one size of pairs, residuals and products in turn."""
-    problem, y, dy = pairs_alone(options.pairs, options.samples, options.load)
-    r, calls = problem.core.equations(), max(1, int(3e7 / (options.pairs * options.samples)))
-    began = time.process_time()
-    for _ in range(calls):
-        problem.core.residual(y, r)
-        problem.core.product(y, dy, r)
-    print(f"{1e9 * (time.process_time() - began) / (calls * options.pairs * options.samples):.3f}")
-
-
-def shares_of(arguments: list[str]) -> tuple[dict[str, float], str] | None:
-    """Shares of a run's processor time by part, and what it printed; None without perf."""
+def shares_of(arguments: list[str]) -> dict[str, float] | None:
+    """Shares of a run's processor time by part; None without perf."""
     if not shutil.which("perf"):
         return None
     with tempfile.TemporaryDirectory() as folder:
@@ -154,18 +79,7 @@ def shares_of(arguments: list[str]) -> tuple[dict[str, float], str] | None:
     for share, name in re.findall(r"^\s*([\d.]+)%\s+(.*)$", report, re.M):
         part = next((part for part, pattern in PARTS.items() if re.search(pattern, name)), list(shares)[-1])
         shares[part] += float(share) / 100
-    return shares, done.stdout
-
-
-def march_alone(pairs: int, load: float) -> list[float]:
-    """[ns] of the law's force, of its linearisation and of a pair of transforms; nothing without perf."""
-    found = shares_of(["--workload", "--pairs", str(pairs), "--samples", str(SAMPLES), "--load", str(load)])
-    if found is None:
-        return []
-    shares, printed = found
-    scale = float(printed) / (1 - shares["all else (Python, start, system)"])
-    transforms = (shares["Fourier transforms"] + shares["dense algebra (BLAS, LAPACK)"]) / 2  # of force and product
-    return [scale * share for share in (shares["march, force"], shares["march, product"], transforms)]
+    return shares
 
 
 def brick(size: Any, young: float = 1.1e11, poisson: float = 0.3) -> tuple[Any, Any]:
@@ -275,21 +189,17 @@ def followed(problem: Any, options: argparse.Namespace) -> list[dict[str, Any]]:
 
 def report_shares(highest: int, options: argparse.Namespace) -> None:
     """The same branch under perf, in a process of its own."""
-    found = shares_of(["point", "--no-shares", "--harmonics", str(highest), "--route", options.route])
+    found = shares_of(["--no-shares", "--harmonics", str(highest), "--route", options.route])
     if found is None:
         print("   perf is not available here")
         return
-    for part, share in sorted(found[0].items(), key=lambda item: -item[1]):
+    for part, share in sorted(found.items(), key=lambda item: -item[1]):
         print(f"   {100 * share:5.1f} %  {part}")
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", nargs="?", default="all", choices=["all", "march", "point"])
-    parser.add_argument("--workload", action="store_true", help=argparse.SUPPRESS)
-    parser.add_argument("--pairs", type=int, default=768)
     parser.add_argument("--samples", type=int, default=128)
-    parser.add_argument("--load", type=float, default=1.0, help=argparse.SUPPRESS)
     parser.add_argument("--harmonics", type=int, nargs="+", default=[3, 15])
     parser.add_argument("--points", type=int, default=30)
     parser.add_argument("--start", type=float, default=1e-4)
@@ -297,12 +207,7 @@ def main() -> None:
     parser.add_argument("--no-shares", dest="shares", action="store_false", help="without perf")
     parser.add_argument("--verbose", action="store_true")
     options = parser.parse_args()
-    if options.workload:
-        return workload(options)
-    if options.what != "point":
-        march(options)
-    if options.what != "march":
-        point(options)
+    point(options)
 
 
 if __name__ == "__main__":

@@ -108,7 +108,7 @@ def velocity(forced: bool, size: int, comm: MPI.Comm) -> Found:
 
 
 def sticking(forced: bool, size: int, comm: MPI.Comm) -> Found:
-    """Pairs far from slip, sample by sample or as the springs that they are; all but the load that they bear."""
+    """Pairs far from slip, or the springs that they are; all but the load that they bear."""
     n = 3 * 32 * size
     eye, contact = sp.identity(n, format="csr"), []
     K = 1e3 * eye
@@ -254,8 +254,8 @@ ROWS = {
     row.of.__name__: row
     for row in (
         Row(
-            "even harmonics and the mean, and half of the samples",
-            "`two_dof`, mode, H = 21, N_t = 1024",
+            "even harmonics and the mean, and half of the period",
+            "`two_dof`, mode, H = 21",
             "left out where every law is odd and nothing preloads it (`retain`)",
             even_harmonics,
             21,
@@ -263,8 +263,8 @@ ROWS = {
             "test_harmonics.py: forced on, half a period",
         ),
         Row(
-            "harmonic 0 alone, and half of the samples",
-            "1,024 `regularised_coulomb` pairs, 1, 3, 5, 7, N_t = 256: residual and product",
+            "harmonic 0 alone, and half of the period",
+            "1,024 `regularised_coulomb` pairs, 1, 3, 5, 7: residual and product",
             "with the even harmonics",
             mean,
             32,
@@ -280,10 +280,10 @@ ROWS = {
             2,
         ),
         Row(
-            "record of pairs that stick",
-            "512 stuck `coulomb_3d` pairs, H = 7, N_t = 256: residual and product",
-            "**not left out**: `coulomb_3d` keeps 11 numbers a pair and sample, also in stick; here by springs in K. "
-            "`jenkins`, `coulomb_2d` and `coulomb_3d_uncoupled` keep no samples",
+            "slip of pairs that stick",
+            "512 stuck `coulomb_3d` pairs, H = 7: residual and product",
+            "left out as long as a pair stands: no nodes, no slider to follow. Nothing forces it on, so that this is what "
+            "is left of such pairs (whether they stand, a dense block each) beside springs in K",
             sticking,
             16,
             2,

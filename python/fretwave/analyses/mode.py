@@ -17,6 +17,7 @@ from ..case.observed import Observed, check_observed, dof_of, dofs_of, label_of,
 from ..case.schema import Positive, key
 from ..columns import ENERGY, MODE
 from ..hb.suspects import suspects
+from ..model.laws import PythonLaw
 from ..post.limit_cycles import limit_cycles
 from ..results.results import AnalysisWriter
 from ..results.sweep_summary import MODE_BRANCH
@@ -124,7 +125,7 @@ class ModeAnalysis(HarmonicSection):
         context.leave_out(harmonics.left_out)
         if start.avoid is not None:
             note = uneven_samples(harmonics.samples, context.wheel.sectors, self.nodal_diameter or 0)
-            if note is not None:
+            if note is not None and any(isinstance(contact.law, PythonLaw) for contact in context.model.contacts):
                 context.console.line(f"note: {context.name}: {note}")
         problem = mode_problem(context, harmonics, start.mode, start.rest, start.dof, start.avoid)
         writer = context.writer(

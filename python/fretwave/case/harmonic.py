@@ -47,7 +47,13 @@ class HarmonicSection(AnalysisSection):
     retain: Literal["auto", "odd", "all"] = key(
         "which harmonics up to the highest are kept", example='"auto"', default="auto"
     )
-    samples: Optional[Whole] = key("time samples of a period in the contact law", example="1024", default=None, ge=4)
+    samples: Optional[Whole] = key(
+        "time samples of a period that pictures and tables are drawn from; of the forces cubic springs and laws in Python "
+        "alone are sampled",
+        example="1024",
+        default=None,
+        ge=4,
+    )
     linear_mode: Whole = key("linear mode to start from, 1 is the lowest", example="1", default=1, ge=1)
     nodal_diameter: Optional[Whole] = key(
         "nodal diameters of the wave on a sector, negative for a backward wave", example="4", default=None

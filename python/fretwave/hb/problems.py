@@ -31,7 +31,8 @@ class Harmonics:
     Parameters
     ----------
     orders : ascending, with 1 among them (0 is the mean)
-    samples : even, at least 2 max(orders) + 2
+    samples : even, at least 2 max(orders) + 2. What a period is shown by; of the forces cubic springs and laws in Python
+        alone are sampled, all others are integrated in continuous time.
     """
 
     def __init__(self, orders: Sequence[int], samples: int) -> None:
@@ -180,7 +181,7 @@ class HarmonicProblem(Destroyable):
         dict
             stick, slip, open : shares of all pair-samples; force_outside : share (2-norm) of the varying contact force
             outside the retained harmonics, no error; aliasing : relative change of the retained force
-            coefficients on doubled samples;
+            coefficients of sampled laws on doubled samples;
             work : energy dissipated by contact in a period; unclosed : largest distance [m] of a slider from where it
             began its period, rounding unless its closure failed; slip_path : longest slip path of a pair [m].
         """

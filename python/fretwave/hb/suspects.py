@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from ..model.contact import Contact
 
 
-#: Contact stiffness over the structure's from which one sample's change of state changes all forces.
+#: Contact stiffness over the structure's from which a pair that opens, sticks or slips changes all forces.
 STIFF = 1e4
 #: Contact stiffness over the structure's below which it holds nothing.
 SOFT = 1e-6
@@ -67,8 +67,8 @@ def _stiffness(name: str, values: Array, stiffness: float) -> Iterator[str]:
     ratio = values / stiffness
     if np.max(ratio) > STIFF:
         yield (
-            f"has {name} {np.max(values):.3g} N/m, {np.max(ratio):.1g} times the structure's {stiffness:.2g}: one"
-            " sample that opens, sticks or slips changes all forces; a softer contact or more samples help"
+            f"has {name} {np.max(values):.3g} N/m, {np.max(ratio):.1g} times the structure's {stiffness:.2g}: a"
+            " pair that opens, sticks or slips changes all forces; a softer contact helps"
         )
     if np.min(ratio) < SOFT:
         yield (

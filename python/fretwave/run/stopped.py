@@ -31,15 +31,13 @@ def _advice(name: str, reason: str) -> str:
         return "hold the structure where contact alone cannot (a spring, an axial stop), or load its contact more"
     if "linear solve" in reason or "LINEAR_SOLVE" in reason:
         return (
-            f"more samples, or another start; --petsc '-ksp_monitor -{name.replace('-', '_')}_snes_monitor' shows why"
+            f"another start, or shorter steps; --petsc '-ksp_monitor -{name.replace('-', '_')}_snes_monitor' shows why"
         )
     if "at the start" in reason:
         return (
             "another start (amplitude or frequency) where the motion is nearly linear; --petsc -snes_monitor shows why"
         )
-    return (
-        f"more samples, or shorter steps (--set {name}.step.minimum=1e-11); --petsc -snes_monitor shows Newton's steps"
-    )
+    return f"shorter steps (--set {name}.step.minimum=1e-11); --petsc -snes_monitor shows Newton's steps"
 
 
 def joined(failures: Sequence[NotConverged]) -> NotConverged:

@@ -18,7 +18,7 @@ from .starting import far_from_start, starts
 from .steps import StepControl
 from .trace import Knot
 
-#: Relative change of the force's harmonics on doubled samples above which a failure is put down to sampling.
+#: Relative change of sampled forces' harmonics on doubled samples above which a failure is put down to sampling.
 ALIASING_LIMIT = 1e-3
 
 
@@ -158,7 +158,7 @@ class Continuation:
         return Point(**point)
 
     def _advise(self, y: PETSc.Vec) -> None:
-        """A branch that breaks off often does so at a force that changes within a sample."""
+        """Where a law is sampled, a branch often breaks off at a force that changes within a sample."""
         aliasing = self.problem.diagnostics(y)["aliasing"]
         if aliasing > ALIASING_LIMIT:
             self._advice = (

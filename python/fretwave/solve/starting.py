@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 SMALLER = 5
 #: Longest steps of a mode that grows: where long ones lose their way, those of any branch.
 GROWTH = (1.0, 0.3)
-#: Points of a way at the most: a sampled contact turns a corner wherever one of its samples begins to slip.
+#: Points of a way at the most: it turns a corner wherever a pair opens or closes.
 WAY_POINTS = 20000
 #: Relative distance in frequency from the linear mode beyond which a first point may be of another mode.
 FAR = 0.02

@@ -24,7 +24,7 @@ class StepControl:
 
     Attributes
     ----------
-    minimum : shortest step before a branch is given up, but over the corner where a sample of contact changes state
+    minimum : shortest step before a branch is given up, but over a corner where a pair changes its state
     max_angle : largest turn [rad] of the branch in one step; longer steps are halved
     max_error : largest distance between the branch and the cubic through its points and tangents; likewise
 

@@ -167,7 +167,8 @@ def uneven_samples(samples: int, sectors: int, diameters: int) -> Optional[str]:
     """What to say when the sectors of a wave see its period at different samples; None when all see the same.
 
     The delay from one sector to the next, ND/N of a period, must be a whole number of samples. If not, each sector
-    meets the kinks of its contact forces between other samples, and the wheel differs from one sector by aliasing.
+    meets the kinks of a law in Python between other samples, and the wheel differs from one sector by aliasing. Forces
+    in continuous time are the same in all, whatever the samples are.
     """
     from ...cyclic.aerodynamics import period_of
 
