@@ -282,7 +282,7 @@ ROWS = {
         Row(
             "slip of pairs that stick",
             "512 stuck `coulomb_3d` pairs, H = 7: residual and product",
-            "left out as long as a pair stands: no nodes, no slider to follow. Nothing forces it on, so that this is what "
+            "left out as long as a pair stands: no nodes, no slider to follow. Nothing forces it on: what "
             "is left of such pairs (whether they stand, a dense block each) beside springs in K",
             sticking,
             16,

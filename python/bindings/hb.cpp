@@ -9,17 +9,17 @@ namespace fretwave::python {
 namespace {
 
 nb::dict contact_summary(hb::ContactSummary const& s) {
-  const double samples = std::max(1.0, s.stick + s.slip + s.open);
+  const double pairs = std::max(1.0, s.stick + s.slip + s.open);
   nb::dict out;
-  out["stick"] = s.stick / samples, out["slip"] = s.slip / samples, out["open"] = s.open / samples;
+  out["stick"] = s.stick / pairs, out["slip"] = s.slip / pairs, out["open"] = s.open / pairs;
   out["force_outside"] = s.total > 0 ? std::sqrt(s.truncated / s.total) : 0.0;
   out["aliasing"] = s.retained > 0 ? std::sqrt(s.aliased / s.retained) : 0.0;
   out["work"] = s.work, out["unclosed"] = s.unclosed, out["slip_path"] = s.path;
   return out;
 }
 
-/// This rank's samples, one (u, v, f, status, gap) a contact, the first three samples x components x pairs,
-/// the last two samples x pairs.
+/// This rank's samples, one (u, v, f, status, gap, work, shares) a contact, the first three samples x
+/// components x pairs, the next two samples x pairs; of the period work per pair, shares 3 x pairs.
 nb::list contact_periods(hb::HarmonicProblem& problem, Petsc<Vec> y) {
   nb::list out;
   const auto periods = problem.contact_periods(y.object);
@@ -28,10 +28,11 @@ nb::list contact_periods(hb::HarmonicProblem& problem, Petsc<Vec> y) {
     const std::vector<size_t> shape = {size_t(problem.harmonics().samples()), size_t(law.components()),
                                        size_t(law.pairs())};
     const std::vector<size_t> of_pairs = {shape[0], shape[2]};
-    out.append(nb::make_tuple(numpy_copy(periods[k].u.data(), shape), numpy_copy(periods[k].v.data(), shape),
-                              numpy_copy(periods[k].f.data(), shape),
-                              numpy_bytes(periods[k].status, of_pairs),
-                              numpy_copy(periods[k].gap.data(), of_pairs)));
+    out.append(nb::make_tuple(
+        numpy_copy(periods[k].u.data(), shape), numpy_copy(periods[k].v.data(), shape),
+        numpy_copy(periods[k].f.data(), shape), numpy_bytes(periods[k].status, of_pairs),
+        numpy_copy(periods[k].gap.data(), of_pairs), numpy_copy(periods[k].work.data(), {shape[2]}),
+        numpy_copy(periods[k].shares.data(), {3, shape[2]})));
   }
   return out;
 }

@@ -40,16 +40,8 @@ void Coulomb::set_stand_off(double distance) {
   for (int i = 0; i < pairs(); ++i) p_.gap[i] = worn_[i] + distance;
 }
 
-/// Share of the step between two samples over which a pair is open.
-double Coulomb::flight(int pair, double before, double now) const {
-  const double rest = p_.normal_load[pair] - p_.normal_stiffness[pair] * p_.gap[pair];
-  const double was = rest + p_.normal_stiffness[pair] * before, is = rest + p_.normal_stiffness[pair] * now;
-  if (was <= 0 && is <= 0) return 1;
-  return was <= 0 ? was / (was - is) : is <= 0 ? is / (is - was) : 0;
-}
-
-/// Where each tangent is limited by itself its slider is free until the sample that finds the pair closed,
-/// and no work is counted: that is measured between samples (`Law::integration`).
+/// Paths and wear are those of two tangents that are limited each by itself: all else is measured between
+/// samples (`Law::integration`). A slider is free until the sample that finds the pair closed.
 void Coulomb::diagnose(Motion const& motion, double const* f, Diagnosis& out) const {
   const int n = motion.pairs, samples = motion.samples, d = components();
   const bool circle = limit() == Limit::circle;
@@ -58,12 +50,10 @@ void Coulomb::diagnose(Motion const& motion, double const* f, Diagnosis& out) co
     double const *u = motion.u + here, *before = motion.u + last, *now = f + here, *then = f + last;
     for (int i = 0; i < n; ++i) {
       const double kt = p_.tangential_stiffness[i], limit = p_.friction_coefficient[i] * now[i];
-      const double held = circle ? 1 - flight(i, before[i], u[i]) : 1;
       double square = 0, size = 0, size_u = 0;
       for (int c = 1; c < d; ++c) {
         const size_t k = size_t(c) * n + i;
-        const double moved =
-            held * (u[k] - before[k]) - (now[k] - then[k]) / kt;  // of the slider w = u - T/kt
+        const double moved = u[k] - before[k] - (now[k] - then[k]) / kt;  // of the slider w = u - T/kt
         square += moved * moved;
         size = circle ? std::hypot(size, now[k]) : std::max(size, std::abs(now[k]));
         size_u = std::hypot(size_u, u[k]);
@@ -79,9 +69,7 @@ void Coulomb::diagnose(Motion const& motion, double const* f, Diagnosis& out) co
       const double path = std::sqrt(square), load = (now[i] + then[i]) / 2;
       if (!out.archard.empty() && (open || slips) && path > 1e-12 * (size_u + limit / kt))
         out.archard[i] += load * path;
-      const bool opens = circle && open && then[i] > 0;
-      if (slips || opens) out.slip_path[i] += path;
-      if (circle && (slips || opens)) out.work[i] += p_.friction_coefficient[i] * load * path;
+      if (slips) out.slip_path[i] += path;
     }
   }
 }

@@ -37,8 +37,6 @@ class Coulomb : public Law {
   std::vector<double> slider_, closed_;  ///< at rest: w (tangents x pairs), 1 where closed
 
  private:
-  double flight(int pair, double before, double now) const;
-
   int tangents_;
   std::vector<double> unworn_, worn_;  ///< gap without wear, and with it [m]
 };

@@ -50,7 +50,14 @@ struct Diagnosis {
   /// Distance to contact where open, 0 where closed [m], nan without a normal direction; samples x pairs;
   /// empty: not asked for.
   std::vector<double> gap = {};
+  /// Of the period in stick, slip and open: 3 x pairs.
+  std::vector<double> shares = {};
 };
+
+/// Of a diagnosis' shares those of one pair: in contact, and there in slip, of the period as 1. One that is
+/// always in contact and never moves its slider is left what its law says of the samples: a load at rest may
+/// hold it at its limit.
+void set_shares(Diagnosis& diagnosis, size_t pair, double contact, double slip);
 
 /// A pair whose force is linear in its motion but where it changes its state:
 ///   N = max(0, load + kn u_n),  T = kt (u_t - w),  |T| <= limit + mu N, each tangent by itself or both as
@@ -130,8 +137,8 @@ class Law {
   }
 
   /// The same on all ranks. In continuous time harmonic balance asks a law for its constants, and of what
-  /// follows for `diagnose` alone, for states and gaps; paths and wear count there only where two tangents
-  /// slip, all else is measured between samples, the work too.
+  /// follows for `diagnose` alone, for states and gaps at samples; paths and wear count there only where two
+  /// tangents slip, all else is measured between samples: shares of the states, and the work too.
   virtual Integration integration() const { return Integration::samples; }
   virtual LinearPair linear_pair(int /*pair*/) const { return {}; }
   virtual VelocityLayer velocity_layer(int /*pair*/) const { return {1}; }

@@ -6,7 +6,7 @@ namespace fretwave::hb {
 
 /// Contact quality of one motion: energies for the truncated share, and what the law diagnoses.
 struct ContactSummary {
-  double stick = 0, slip = 0, open = 0;  ///< pair-samples
+  double stick = 0, slip = 0, open = 0;  ///< pairs, each by its shares of the period
   double truncated = 0, total = 0;  ///< of the varying force: energy outside the retained orders, and in all
   double aliased = 0,
          retained = 0;  ///< squared change of the coefficients on doubled samples, and their square (n > 0)
@@ -20,7 +20,8 @@ struct ContactPeriod {
   std::vector<double> u, v, f;
   std::vector<contact::Status> status;  ///< samples x pairs, as is the gap [m]
   std::vector<double> gap;
-  double unclosed = 0;  ///< as in ContactSummary
+  std::vector<double> work, shares;  ///< per pair [J]; of the period in stick, slip and open, 3 x pairs
+  double unclosed = 0;               ///< as in ContactSummary
 };
 
 /// What wears a contact over a period, per pair.
@@ -73,7 +74,8 @@ class Aft {
     std::unique_ptr<ContinuousForce> exact;  ///< null where sampled
   };
   Found find(double const* U, Exponents const&) const;
-  contact::Diagnosis diagnosis(Found const&, Exponents const&, bool archard) const;
+  contact::Diagnosis diagnosis(Found const&, Exponents const&, bool archard,
+                               std::vector<double> gap = {}) const;
   std::vector<double> on_doubled_samples(double const* U, Exponents const&, std::vector<double> F);
   /// For who reads a period of what is not sampled; made when first asked for, as the tables take longer.
   FourierTransform const& whole_transform() const;

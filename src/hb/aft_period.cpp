@@ -1,5 +1,6 @@
 /// What is read of a motion beside the last one: samples of its period, and what the law says of them.
 #include <algorithm>
+#include <limits>
 
 #include "hb/aft.h"
 
@@ -45,19 +46,28 @@ Aft::Found Aft::find(double const* U, Exponents const& e) const {
 }
 
 ContactPeriod Aft::period(double const* U, Exponents const& e) const {
-  ContactPeriod out = find(U, e).samples;
-  if (columns_ == 0) return out;
-  contact::Diagnosis told = contact::states(*law_, whole(out, e), out.f.data());
+  Found found = find(U, e);
+  if (columns_ == 0) return std::move(found.samples);
+  ContactPeriod out = found.samples;
+  out.gap.assign(size_t(harmonics_.samples()) * pairs_, std::numeric_limits<double>::quiet_NaN());
+  contact::Diagnosis told = diagnosis(found, e, false, std::move(out.gap));
   out.status = std::move(told.status), out.gap = std::move(told.gap);
+  out.work = std::move(told.work), out.shares = std::move(told.shares);
   return out;
 }
 
-contact::Diagnosis Aft::diagnosis(Found const& found, Exponents const& e, bool archard) const {
+contact::Diagnosis Aft::diagnosis(Found const& found, Exponents const& e, bool archard,
+                                  std::vector<double> gap) const {
   const contact::Motion whole = this->whole(found.samples, e);
   contact::Diagnosis out{std::vector<contact::Status>(size_t(whole.samples) * pairs_),
-                         std::vector<double>(pairs_), std::vector<double>(pairs_),
-                         std::vector<double>(archard ? pairs_ : 0)};
+                         std::vector<double>(pairs_),
+                         std::vector<double>(pairs_),
+                         std::vector<double>(archard ? pairs_ : 0),
+                         std::move(gap),
+                         std::vector<double>(3 * size_t(pairs_))};
   law_->diagnose(whole, found.samples.f.data(), out);
+  for (size_t k = 0; k < out.status.size(); ++k) out.shares[size_t(out.status[k]) * pairs_ + k % pairs_] += 1;
+  for (double& share : out.shares) share /= whole.samples;
   if (found.exact) found.exact->measure(out, angular_frequency(e));
   return out;
 }
@@ -68,15 +78,11 @@ Wearing Aft::wearing(double const* U, Exponents const& e) const {
   if (columns_ == 0 || !law_->wears() || law_->normal() < 0) return out;
   const Found found = find(U, e);
   const contact::Diagnosis told = diagnosis(found, e, true);
-  const double share = 1.0 / harmonics_.samples();
   out.archard = told.archard;
-  for (int t = 0; t < harmonics_.samples(); ++t)
-    for (int i = 0; i < pairs_; ++i) {
-      const auto status = told.status[size_t(t) * pairs_ + i];
-      out.load[i] += share * found.samples.f[size_t(t) * columns_ + size_t(law_->normal()) * pairs_ + i];
-      out.slip[i] += status == contact::Status::slip ? share : 0;
-      out.open[i] += status == contact::Status::open ? share : 0;
-    }
+  std::copy_n(&told.shares[pairs_], pairs_, out.slip.data());
+  std::copy_n(&told.shares[2 * size_t(pairs_)], pairs_, out.open.data());
+  for (int i = 0; i < pairs_; ++i)
+    out.load[i] = found.F[(size_t(i) * law_->components() + law_->normal()) * harmonics_.block_size()];
   return out;
 }
 
@@ -84,7 +90,8 @@ namespace {
 
 void count(contact::Diagnosis const& diagnosis, ContactSummary& summary) {
   double* shares[] = {&summary.stick, &summary.slip, &summary.open};
-  for (auto s : diagnosis.status) *shares[int(s)] += 1;
+  const size_t pairs = diagnosis.work.size();
+  for (size_t k = 0; k < 3 * pairs; ++k) *shares[k / pairs] += diagnosis.shares[k];
   for (double w : diagnosis.work) summary.work += w;
   for (double path : diagnosis.slip_path) summary.path = std::max(summary.path, path);
 }

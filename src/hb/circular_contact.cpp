@@ -38,8 +38,7 @@ void CircularContact::force(double const* U, double const*, double* F) {
   const int m = harmonics_.block_size();
   for (size_t k = 0; k < pairs_.size(); ++k, U += size(), F += size()) {
     Pair& pair = pairs_[k];
-    const double sum =
-        std::accumulate(U, U + 3 * m, 0.0, [](double a, double b) { return a + std::abs(b); });
+    const double sum = std::accumulate(U, U + 3 * m, 0.0, [](double a, double b) { return a + std::abs(b); });
     if (!std::isfinite(sum)) {  // a step of Newton's that fails
       pair.slider.clear(), pair.normal.spans.clear();
       std::fill_n(F, size(), sum);

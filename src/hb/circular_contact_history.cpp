@@ -83,9 +83,11 @@ void CircularContact::sample(int samples, double const* u, double const*, double
 void CircularContact::measure(contact::Diagnosis& out, double) const {
   for (size_t k = 0; k < pairs_.size(); ++k) {
     contact::LinearPair const& law = pairs_[k].law;
-    if (pairs_[k].slider.kind == SliderPeriod::Kind::loose) continue;
-    double way = 0, worn = 0;
-    for (SweptSlider::Slip const& piece : pairs_[k].slider.path.slips)
+    const bool loose = pairs_[k].slider.kind == SliderPeriod::Kind::loose;
+    const double contact = pairs_[k].normal.length() / period;
+    double way = 0, worn = 0, slip = 0;
+    for (SweptSlider::Slip const& piece : pairs_[k].slider.path.slips) {
+      slip += piece.length;
       for (int j = 0; j < Radau::stages; ++j) {
         const auto e = piece.direction(j);
         MovingDisc::Instant const& at = piece.at[j];
@@ -93,6 +95,9 @@ void CircularContact::measure(contact::Diagnosis& out, double) const {
         const double now = piece.length * radau().weights[j] * moved;
         way += now, worn += now * at.R / law.reach() * law.normal_stiffness;
       }
+    }
+    contact::set_shares(out, k, contact, loose ? contact : slip / period);
+    if (loose) continue;
     out.slip_path[k] = way, out.work[k] = law.friction_coefficient * worn;
     if (out.archard.size()) out.archard[k] = worn;
   }

@@ -24,6 +24,25 @@ double integral(Arc const& arc, Series const& p, Series const& q) {
   return sum / 2;
 }
 
+/// Of the period in any of these, wherever they begin.
+double union_length(std::vector<Span> spans) {
+  for (size_t i = spans.size(); i-- > 0;) {
+    Span& span = spans[i];
+    span.begin -= period * std::floor(span.begin / period);
+    const double beyond = span.begin + span.length - period;
+    if (beyond <= 0) continue;
+    span.length -= beyond;
+    spans.push_back({0, beyond});
+  }
+  std::ranges::sort(spans, {}, &Span::begin);
+  double sum = 0, end = 0;
+  for (Span const& span : spans) {
+    sum += std::max(0.0, span.begin + span.length - std::max(end, span.begin));
+    end = std::max(end, span.begin + span.length);
+  }
+  return sum;
+}
+
 }  // namespace
 
 double ContinuousContact::mean_stiffness(int number, int component) const {
@@ -96,6 +115,12 @@ void ContinuousContact::measure(contact::Diagnosis& out, double /*omega*/) const
     contact::LinearPair const& law = pairs_[k].law;
     // what two tangents do together, and what nothing holds, is left as it was sampled
     const auto slips = [](Tangent const& now) { return now.play.slips.size() > 0; };
+    std::vector<Span> slip;
+    for (Tangent const& now : pairs_[k].tangents)
+      for (Play::Slip const& piece : now.play.slips) slip.push_back({piece.begin, piece.length});
+    const double contact = normal_ < 0 ? 1 : pairs_[k].normal.length() / period;
+    const bool free = pairs_[k].tangents.size() && !law.rubs();
+    contact::set_shares(out, k, contact, free ? contact : union_length(std::move(slip)) / period);
     const bool straight = law.rubs() && std::ranges::count_if(pairs_[k].tangents, slips) < 2;
     if (straight) out.slip_path[k] = 0;
     if (straight && out.archard.size()) out.archard[k] = 0;

@@ -24,10 +24,10 @@ void NormalContact::find_spans(double const* approach_at, int count) {
   }
 }
 
-double NormalContact::mean_stiffness() const {
-  double length = closed ? period : 0;
-  for (Span const& span : spans) length += span.length;
-  return stiffness * length / period;
+double NormalContact::length() const {
+  double sum = closed ? period : 0;
+  for (Span const& span : spans) sum += span.length;
+  return sum;
 }
 
 void NormalContact::add_force(Harmonics const& h, double* F) const {

@@ -1,4 +1,6 @@
 #pragma once
+#include <numbers>
+
 #include "hb/trigonometric.h"
 
 namespace fretwave::hb {
@@ -13,7 +15,9 @@ struct NormalContact {
   bool touches() const { return closed || spans.size(); }
   /// When it is closed: between the roots of its approach, known at 2 pi t / count.
   void find_spans(double const* approach_at, int count);
-  double mean_stiffness() const;
+  /// How long of the period it is closed.
+  double length() const;
+  double mean_stiffness() const { return stiffness * length() / (2 * std::numbers::pi); }
   /// F += coefficients of N.
   void add_force(Harmonics const&, double* F) const;
   /// D += dN/du_n, rows of length ld; by_gap -= dN.

@@ -48,8 +48,8 @@ class HarmonicSection(AnalysisSection):
         "which harmonics up to the highest are kept", example='"auto"', default="auto"
     )
     samples: Optional[Whole] = key(
-        "time samples of a period that pictures and tables are drawn from; of the forces cubic springs and laws in Python "
-        "alone are sampled",
+        "time samples of a period that pictures and tables are drawn from; of the forces cubic springs and laws in "
+        "Python alone are sampled",
         example="1024",
         default=None,
         ge=4,

@@ -31,8 +31,8 @@ class Harmonics:
     Parameters
     ----------
     orders : ascending, with 1 among them (0 is the mean)
-    samples : even, at least 2 max(orders) + 2. What a period is shown by; of the forces cubic springs and laws in Python
-        alone are sampled, all others are integrated in continuous time.
+    samples : even, at least 2 max(orders) + 2. What a period is shown by; of the forces cubic springs and laws in
+        Python alone are sampled, all others are integrated in continuous time.
     """
 
     def __init__(self, orders: Sequence[int], samples: int) -> None:
@@ -179,8 +179,8 @@ class HarmonicProblem(Destroyable):
         Returns
         -------
         dict
-            stick, slip, open : shares of all pair-samples; force_outside : share (2-norm) of the varying contact force
-            outside the retained harmonics, no error; aliasing : relative change of the retained force
+            stick, slip, open : shares of the period, mean of all pairs; force_outside : share (2-norm) of the varying
+            contact force outside the retained harmonics, no error; aliasing : relative change of the retained force
             coefficients of sampled laws on doubled samples;
             work : energy dissipated by contact in a period; unclosed : largest distance [m] of a slider from where it
             began its period, rounding unless its closure failed; slip_path : longest slip path of a pair [m].
@@ -258,7 +258,8 @@ class HarmonicProblem(Destroyable):
     def contact_history(self, y: PETSc.Vec) -> list[dict[str, Array | None]]:
         """`contact_period` with what the law says of each pair and sample, on rank 0. Collective.
 
-        (n_samples, n_pairs): status (stick 0, slip 1, open 2) and gap [m] (nan without a normal direction).
+        (n_samples, n_pairs): status (stick 0, slip 1, open 2) and gap [m] (nan without a normal direction). Of the
+        whole period, however many samples: work (n_pairs) [J] and shares (3, n_pairs) of stick, slip and open.
         """
         return [
             {name: self.model.gather_pairs(k, samples) for name, samples in zip(MOTION, period)}

@@ -75,7 +75,8 @@ def draw_map(mode: Analysis, contact: str) -> Figure:
     grid = figure.add_gridspec(1 + len(points), len(names), height_ratios=[1.9, *(1.0 for _ in points)])
     _shares(figure.add_subplot(grid[0, :]), mode, points)
     for row, point in enumerate(points):
-        shares = status_shares(mode.loop(contact, point)["status"])
+        kept = mode.loop(contact, point)
+        shares = kept["shares"] if "shares" in kept else status_shares(kept["status"])
         for column, name in enumerate(names):
             axes = figure.add_subplot(grid[1 + row, column])
             mine = pairs["face"] == name

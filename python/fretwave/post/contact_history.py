@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import reduce
 from typing import Any
 
@@ -14,6 +14,7 @@ from ..arrays import Array
 from ..model.laws import OPEN, SLIP, STICK, UNKNOWN
 
 States = npt.NDArray[np.int8]
+Change = Callable[[npt.NDArray[Any]], npt.NDArray[Any]]
 
 #: What is kept of a contact's period, by name: unit, long name, type and the value of rows that lack it.
 MOTION: Mapping[str, tuple[str, str, str, float]] = {
@@ -22,7 +23,19 @@ MOTION: Mapping[str, tuple[str, str, str, float]] = {
     "f": ("N", "contact force over one period", "f8", 0),
     "status": ("1", "status over one period: stick 0, slip 1, open 2, not kept -1", "i1", UNKNOWN),
     "gap": ("m", "distance to contact over one period, 0 where closed", "f8", np.nan),
+    "work": ("J", "energy dissipated in one period", "f8", np.nan),
+    "shares": ("1", "of the period in stick, slip and open", "f8", np.nan),
 }
+SAMPLED, BY_PAIR = ("sample", "component", "pair"), ("sample", "pair")
+#: Its axes.
+AXES: Mapping[str, tuple[str, ...]] = {
+    **dict.fromkeys("uvf", SAMPLED),
+    **dict.fromkeys(("status", "gap"), BY_PAIR),
+    "work": ("pair",),
+    "shares": ("state", "pair"),
+}
+#: Of those the ones that are not of samples: what is measured of the whole period.
+MEASURED = ("work", "shares")
 
 
 @dataclass(frozen=True)
@@ -37,6 +50,8 @@ class ContactHistory:
         As the law told them; None where they are not kept.
     normal : int or None
         Component along the normal, > 0 closing.
+    kept_work, kept_shares : (n_pairs,) [J] and (3, n_pairs), optional
+        As measured of the whole period, not of its samples; None in results of an earlier version.
     """
 
     u: Array
@@ -45,11 +60,14 @@ class ContactHistory:
     kept_status: States | None = None
     kept_gap: Array | None = None
     normal: int | None = None
+    kept_work: Array | None = None
+    kept_shares: Array | None = None
 
     @classmethod
     def of(cls, motion: Mapping[str, Any], normal: int | None) -> ContactHistory:
         """From what is kept of a period, by the names of `MOTION`."""
-        return cls(motion["u"], motion["v"], motion["f"], motion.get("status"), motion.get("gap"), normal)
+        told = (motion.get(name) for name in ("work", "shares"))
+        return cls(motion["u"], motion["v"], motion["f"], motion.get("status"), motion.get("gap"), normal, *told)
 
     @property
     def n_pairs(self) -> int:
@@ -57,15 +75,26 @@ class ContactHistory:
 
     def delayed(self, samples: int) -> ContactHistory:
         """The same motion so many samples later."""
-        return self._each(lambda values: np.roll(values, samples, axis=0))
+        return self._each(lambda values: np.roll(values, samples, axis=0), lambda measured: measured)
 
     def of_pairs(self, pairs: slice) -> ContactHistory:
         """Of some pairs alone."""
-        return self._each(lambda values: values[..., pairs])
+        return self._each(lambda values: values[..., pairs], lambda measured: measured[..., pairs])
 
-    def _each(self, change: Callable[[npt.NDArray[Any]], npt.NDArray[Any]]) -> ContactHistory:
-        told = [None if kept is None else change(kept) for kept in (self.kept_status, self.kept_gap)]
-        return ContactHistory(change(self.u), change(self.v), change(self.f), told[0], told[1], self.normal)
+    def _each(self, change: Change, change_measured: Change) -> ContactHistory:
+        def told(change: Change, kept: npt.NDArray[Any] | None) -> npt.NDArray[Any] | None:
+            return None if kept is None else change(kept)
+
+        return replace(
+            self,
+            u=change(self.u),
+            v=change(self.v),
+            f=change(self.f),
+            kept_status=told(change, self.kept_status),
+            kept_gap=told(change, self.kept_gap),
+            kept_work=told(change_measured, self.kept_work),
+            kept_shares=told(change_measured, self.kept_shares),
+        )
 
     @property
     def normal_force(self) -> Array:
@@ -90,15 +119,19 @@ class ContactHistory:
 
     def share(self, status: int) -> Array:
         """(n_pairs,): share of the period in a status."""
-        return np.asarray(np.mean(self.status == status, axis=0))
+        return np.asarray(
+            np.mean(self.status == status, axis=0) if self.kept_shares is None else self.kept_shares[status]
+        )
 
     @property
     def work(self) -> Array:
         """(n_pairs,) [J]: work done against the force over the period, that is, dissipated.
 
-        The integral of f . du with the exact derivative of the sampled u, which has finitely many harmonics: the sum
-        over all pairs is then in exact balance with the harmonic equations.
+        As measured, or the integral of f . du with the exact derivative of the sampled u, which has finitely many
+        harmonics: the sum over all pairs is then in balance with the harmonic equations.
         """
+        if self.kept_work is not None:
+            return self.kept_work
         n = len(self.u)
         orders = np.arange(n // 2 + 1)[:, None, None]
         slope = np.fft.irfft(1j * orders * np.fft.rfft(self.u, axis=0), n, axis=0)
@@ -116,4 +149,4 @@ def tangential_force(f: Array, normal: int | None) -> Array:
     return np.asarray(reduce(np.hypot, parts))
 
 
-__all__ = ["MOTION", "OPEN", "SLIP", "STICK", "ContactHistory", "normal_force", "tangential_force"]
+__all__ = ["AXES", "MEASURED", "MOTION", "OPEN", "SLIP", "STICK", "ContactHistory", "normal_force", "tangential_force"]

@@ -89,7 +89,8 @@ class Analysis:
     def loop(self, contact: str, point: int) -> Table:
         """Motion of a contact over one period: u, v, f (n_samples, components, n_pairs).
 
-        With them what is kept of its law's word on each pair and sample, status and gap (n_samples, n_pairs).
+        With them what is kept of its law's word on each pair and sample, status and gap (n_samples, n_pairs), and of
+        the whole period, work (n_pairs) [J] and shares of stick, slip and open (3, n_pairs).
         """
         row = self.reported.index(point)
         with open_results(self.path) as file:

@@ -12,7 +12,7 @@ import numpy as np
 from ..columns import Column, Value
 from ..errors import InputError
 from ..files.dimensions import name_dimensions, put_array
-from ..post.contact_history import MOTION
+from ..post.contact_history import AXES, MOTION
 from ..texts import display
 from .field import Field
 from .journal import Record, read_records
@@ -221,6 +221,5 @@ def _put_motion(group: h5py.Group, rows: Rows, contact: str, key: str, values: n
         unit, long_name, dtype, missing = MOTION[key]
         data = _growing(holder, key, len(rows.reported), values.shape, 1, dtype, missing)
         data.attrs.update({"units": unit, "long_name": long_name})
-        axes = ["reported", "sample", "component", "pair"] if values.ndim == 3 else ["reported", "sample", "pair"]
-        name_dimensions(holder, data, axes)
+        name_dimensions(holder, data, ["reported", *AXES[key]])
     holder[key][place] = values

@@ -13,6 +13,7 @@ from ...case.harmonic import HarmonicSection
 from ...case.observed import label_of
 from ...case.schema import StepSection
 from ...errors import InputError
+from ...post.contact_history import MEASURED
 from ...results.results import AnalysisWriter
 from ...results.slopes import slope_fields, slopes_of
 from .observed import observed_by
@@ -123,7 +124,7 @@ def record(
 
 def _thinned(period: Mapping[str, Any], every: int) -> dict[str, Any]:
     """Every so manieth sample alone: where a table has more samples at some points than at others."""
-    return {name: None if values is None else values[::every] for name, values in period.items()}
+    return {name: values if values is None or name in MEASURED else values[::every] for name, values in period.items()}
 
 
 def continuation(
