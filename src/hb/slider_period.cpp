@@ -65,7 +65,7 @@ bool SliderPeriod::shake_down(MovingDisc const& disc, double const* rest, double
 /// Nearest point to rest on the new disc and inside those that hold; false if they have none in common.
 bool SliderPeriod::enter(Held const& added, double const* rest, double size) {
   std::vector<Held> best;
-  double at[2], least = std::numeric_limits<double>::infinity();
+  double at[2] = {}, least = std::numeric_limits<double>::infinity();
   const auto offer = [&](double x, double y, std::vector<Held> holding) {
     const double point[2] = {x, y};
     for (Held const& d : held_)
