@@ -12,7 +12,7 @@ namespace {
 
 constexpr double tolerance = 1e-4;    // of the linear systems: an error is wanted to a digit or two
 constexpr double memory_share = 0.5;  // of what is free, for the factors of J'
-constexpr double negligible = 1e-6;   // share of the residual, below which a source is not solved for
+constexpr double negligible = 1e-6;   // share of the residual, up to which a source is not solved for
 constexpr double reach = 0.3;  // arclength along the branch, in the unit of a step: the default longest one
 
 /// Whether it is so for the contacts of all ranks.
@@ -106,21 +106,31 @@ std::optional<LeftOut> DiscretisationError::at(Vec y, Vec tangent) {
   VecHandle same = retained(finer);
   check(VecAXPY(finer, -1, same));  // harmonics: r'_new
   check(VecAXPY(same, -1, left));   // samples: r'_old - r
-  const double share = solve::norm(left) / (solve::norm(finer) + solve::norm(same));
-  const size_t sources = share <= negligible ? 2 : 3;
-  const VecHandle rights[] = {right_side(finer), right_side(same), right_side(left)};
-  const VecHandle changes[] = {solve::zero_like(rights[0]), solve::zero_like(rights[0]),
-                               solve::zero_like(rights[0])};
-  const Vec b[] = {rights[0], rights[1], rights[2]}, x[] = {changes[0], changes[1], changes[2]};
+  Vec const residuals[] = {finer, same, left};
+  double sizes[3], sum = 0;
+  for (size_t k = 0; k < 3; ++k) sum += sizes[k] = solve::norm(residuals[k]);
+  std::vector<VecHandle> rights, changes;
+  std::vector<Vec> b, x;
+  std::vector<size_t> sources;
+  for (size_t k = 0; k < 3; ++k) {
+    if (sizes[k] <= negligible * sum) continue;
+    rights.push_back(right_side(residuals[k])), changes.push_back(solve::zero_like(rights.back()));
+    b.push_back(rights.back()), x.push_back(changes.back()), sources.push_back(k);
+  }
+  LeftOut out;
   close(y, tangent);
-  if (!newton_->linear(point, std::span(b, sources), std::span(x, sources))) return {};
+  if (!newton_->linear(point, b, x)) return {};
   const auto along = problem_.scalars(tangent);
   const auto change = [&](Vec v) { return at_parameter(finer_->scalars(v), along, problem_.scalar_count()); };
-  LeftOut out{change(x[0]), change(x[1]), change(x[2]), {}};
-  for (size_t k = 1; k < sources; ++k) check(VecAXPY(x[0], 1, x[k]));
-  out.all = change(x[0]);
-  if (sources == 2)  // by the size of its residual
-    std::transform(out.all.begin(), out.all.end(), out.solver.begin(), [=](double v) { return share * v; });
+  std::vector<double>* const by_source[] = {&out.harmonics, &out.samples, &out.solver};
+  for (size_t k = 0; k < x.size(); ++k) *by_source[sources[k]] = change(x[k]);
+  for (size_t k = 1; k < x.size(); ++k) check(VecAXPY(x[0], 1, x[k]));
+  out.all = x.empty() ? std::vector<double>(along.size(), 0.0) : change(x[0]);
+  for (size_t k = 0; k < 3; ++k)  // by the size of its residual
+    if (by_source[k]->empty()) {
+      *by_source[k] = out.all;
+      for (double& v : *by_source[k]) v *= sum > 0 ? sizes[k] / sum : 0;
+    }
   return out;
 }
 
