@@ -129,6 +129,7 @@ class HarmonicProblem : public solve::Problem {
   PetscInt local_block_;
   double stiffness_;
   VecHandle q_, Q_, dQ_, R_, dR_, excitation_, static_, static_load_, last_;
+  std::vector<VecHandle> columns_;  ///< of the scalars at `last_`, once a product has asked for them
   std::vector<VecHandle> unfold_;
   std::optional<PerContact> sliders_;
   unsigned owner_ = 0;  ///< of the sliders, as the laws know it

@@ -5,16 +5,6 @@
 
 namespace fretwave::hb {
 
-namespace {
-
-/// y += f x for exponents.
-void add(Exponents& y, double f, Exponents const& x) {
-  for (size_t i = 0; i < y.s.size(); ++i) y.s[i] += f * x.s[i];
-  y.inertia_damping += f * x.inertia_damping;
-}
-
-}  // namespace
-
 /// Line searches evaluate elsewhere: the point of linearisation is y, whatever was evaluated last, and the
 /// laws are as they are now, whichever problem of the model has changed them.
 void HarmonicProblem::linearise(Vec y) {
@@ -28,24 +18,21 @@ void HarmonicProblem::linearise(Vec y) {
 // Q = Q_static + a q: dQ = a (dq + q dlog a); r = R / (k a): dr = dR / (k a) - r dlog a
 void HarmonicProblem::product(Vec y, Vec dy, Vec dr) {
   linearise(y);
+  if (columns_.empty())
+    for (int j = 0; j < scalars_; ++j) {
+      VecHandle out = like(q_);
+      column(j, WriteArray(out).data());
+      columns_.push_back(std::move(out));
+    }
   const auto dz = scalars(dy);
-  Exponents de{std::vector<complex>(harmonics().count()), 0};
-  double dlog = 0, load = 0;
-  for (int j = 0; j < scalars_; ++j) {
-    add(de, dz[j], motion_.dexponents[j]);
-    dlog += dz[j] * motion_.dlog_amplitude[j];
-    load += dz[j] * dload(j);
-  }
   {
     ReadArray in(dy);
     std::copy_n(in.data(), local_block_, WriteArray(dQ_).data());
   }
   const auto along = components(dQ_);
-  check(VecAXPBY(dQ_, motion_.amplitude * dlog, motion_.amplitude, q_));
-  residual_.product(dQ_, &de, dR_);
-  check(VecAXPY(dR_, -load, excitation_));
-  add_stand_off(scalars_ - 1, dz[scalars_ - 1], dR_);
-  check(VecAXPBY(dR_, -dlog, 1 / (stiffness_ * motion_.amplitude), R_));
+  residual_.product(dQ_, nullptr, dR_);
+  check(VecScale(dR_, 1 / stiffness_));
+  for (int j = 0; j < scalars_; ++j) check(VecAXPY(dR_, dz[j], columns_[j]));
   WriteArray out(dr);
   ReadArray in(dR_);
   std::copy_n(in.data(), local_block_, out.data());
