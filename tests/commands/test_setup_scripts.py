@@ -9,6 +9,7 @@ import json
 import os
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -233,3 +234,21 @@ def test_every_file_runs_once_however_many_share_them(tmp_path: Path, launch) ->
     assert "1 rank: 17 passed, 1 failed (expected 18)" in done.stdout, done.stdout + done.stderr
     assert "assert 2 < 2" in done.stdout, done.stdout
     assert done.stdout.splitlines()[-1] == "17 passed, 1 failed"
+
+
+def test_a_package_whose_other_file_is_run_elsewhere_is_torn_down(tmp_path: Path) -> None:
+    """The first file's last test is told that the second follows, which stands in the same package; the third does."""
+    shutil.copy2(ROOT / "tests" / "conftest.py", tmp_path)
+    (tmp_path / "pytest.ini").write_text("[pytest]\n", encoding="utf-8")
+    claims = tmp_path / "claims"
+    claims.mkdir()
+    (tmp_path / "package").mkdir()
+    (tmp_path / "package" / "__init__.py").touch()
+    for name in ("package/test_a.py", "package/test_b.py", "test_c.py"):
+        (tmp_path / name).write_text("def test_it():\n    pass\n", encoding="utf-8")
+    (claims / "package--test_b.py").touch()
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "package", "test_c.py"]
+    environment = {**os.environ, "FRETWAVE_TEST_CLAIMS": str(claims)}
+    environment.pop("FRETWAVE_TEST_EVENTS", None)
+    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0 and "2 passed" in done.stdout, done.stdout
