@@ -21,9 +21,9 @@ struct LeftOut {
 /// nothing at the same parameter. From there the branch leads to it: dy = dy' + s t with no change of the
 /// last entry, as far as a straight line goes (|s| <= `reach`). Harmonics left out answer for -r'_new, the
 /// contact force outside the retained orders, samples for r - r'_old, the change of the retained rows on more
-/// samples (rounding in continuous time), and the solver for -r, what it left; a source next to nothing is not
-/// solved for and has its share of r'. Error estimation by a hierarchical basis (Bank & Smith 1993): what the
-/// estimate misses is as much smaller as the finer set is better, and the square of the error.
+/// samples (rounding in continuous time), and the solver for -r, what it left; a source next to nothing is
+/// not solved for and has its share of r'. Error estimation by a hierarchical basis (Bank & Smith 1993): what
+/// the estimate misses is as much smaller as the finer set is better, and the square of the error.
 class DiscretisationError {
  public:
   /// `prefix`: of the PETSc options of J' dy' = b. Collective.
