@@ -6,17 +6,14 @@
 namespace fretwave::contact {
 
 Coulomb::Coulomb(CoulombParameters p, int tangents)
-    : p_(std::move(p)),
-      reach_(p_.gap.size()),
-      slider_(size_t(tangents) * p_.gap.size(), 0.0),
-      closed_(p_.gap.size()),
+    : slider_(size_t(tangents) * p.gap.size(), 0.0),
       tangents_(tangents),
+      p_(std::move(p)),
+      closed_(p_.gap.size()),
       unworn_(p_.gap),
       worn_(p_.gap) {
-  for (size_t i = 0; i < closed_.size(); ++i) {
-    reach_[i] = p_.friction_coefficient[i] / p_.tangential_stiffness[i];
+  for (size_t i = 0; i < closed_.size(); ++i)
     closed_[i] = p_.normal_load[i] - p_.normal_stiffness[i] * p_.gap[i] > 0;
-  }
 }
 
 double Coulomb::stuck_stiffness(int component, int pair) const {
@@ -29,6 +26,14 @@ LinearPair Coulomb::linear_pair(int i) const {
           .tangential_stiffness = p_.tangential_stiffness[i],
           .friction_coefficient = p_.friction_coefficient[i],
           .slider = {slider_[i], components() > 2 ? slider_[pairs() + i] : 0.0}};
+}
+
+void Coulomb::set_rest(double const* u) {
+  for (int i = 0; i < pairs(); ++i) {
+    const double N = p_.normal_load[i] + p_.normal_stiffness[i] * (u[i] - p_.gap[i]);
+    hold(i, u, p_.friction_coefficient[i] / p_.tangential_stiffness[i] * std::max(N, 0.0));
+    closed_[i] = N > 0;
+  }
 }
 
 void Coulomb::set_wear(double const* depth) {

@@ -11,7 +11,7 @@ struct CoulombParameters {
 /// Elastic Coulomb contact: components (normal, one tangent or two), u_n > 0 closes.
 ///   N = max(0, N0 + kn (u_n - gap)),  T = kt (u_t - w),  |T| <= mu N,  T = 0 and w free when open.
 /// Worn depth adds to the gap. What |T| <= mu N is to two tangents, and how their sliders w move within it,
-/// is each law's own: `limit`.
+/// is each law's own: `limit`, `hold`.
 class Coulomb : public Law {
  public:
   Coulomb(CoulombParameters, int tangents);
@@ -28,16 +28,20 @@ class Coulomb : public Law {
   void diagnose(Motion const&, double const* f, Diagnosis&) const override;
 
  protected:
+  /// One step to u: the sliders of a pair to where they are no farther from it than R = mu N / kt, by exactly
+  /// nothing where they stick.
+  virtual void hold(int pair, double const* u, double R) = 0;
+  void set_rest(double const* u) override;
   void set_sliders(std::vector<double> const& sliders) override { slider_ = sliders; }
   void set_wear(double const* depth) override;
   void set_stand_off(double distance) override;
 
-  CoulombParameters p_;                  ///< their gap with wear and stand-off
-  std::vector<double> reach_;            ///< mu / kt [m/N]
-  std::vector<double> slider_, closed_;  ///< at rest: w (tangents x pairs), 1 where closed
+  std::vector<double> slider_;  ///< w at rest, tangents x pairs
 
  private:
   int tangents_;
+  CoulombParameters p_;                ///< their gap with wear and stand-off
+  std::vector<double> closed_;         ///< 1 where closed at rest
   std::vector<double> unworn_, worn_;  ///< gap without wear, and with it [m]
 };
 

@@ -12,7 +12,7 @@ class Coulomb3d : public Coulomb {
   Integration integration() const override { return Integration::circle; }
 
  protected:
-  void set_rest(double const* u) override;
+  void hold(int pair, double const* u, double R) override;
 };
 
 Entry coulomb_3d_entry();

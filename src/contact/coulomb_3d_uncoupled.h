@@ -13,7 +13,7 @@ class Coulomb3dUncoupled : public Coulomb {
 
  protected:
   Coulomb3dUncoupled(CoulombParameters p, int tangents) : Coulomb(std::move(p), tangents) {}
-  void set_rest(double const* u) override;
+  void hold(int pair, double const* u, double R) override;
 };
 
 Entry coulomb_3d_uncoupled_entry();
