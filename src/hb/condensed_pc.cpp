@@ -88,9 +88,8 @@ void CondensedPreconditioner::border(Vec y, Vec row) {
   };
   VecHandle padded = problem_.unknowns();
   for (int j = 0; j < scalars_; ++j) {
-    VecHandle column = problem_.scalar_column(y, j);
     {
-      ReadArray in(column);
+      const ReadArray in(problem_.scalar_column(y, j));
       std::copy(in.span().begin(), in.span().end(), WriteArray(padded).data());
     }
     fetch(padded, C_);

@@ -139,7 +139,7 @@ void HarmonicProblem::residual(Vec y, Vec r) {
   check(VecAXPBYPCZ(R_, -motion_.load, -1, 1, excitation_, static_load_));
   check(VecScale(R_, 1 / (stiffness_ * motion_.amplitude)));
   check(VecCopy(y, last_));
-  columns_.clear();
+  columns_ = std::vector<VecHandle>(scalars_);
   linearised_ = true, contact_version_ = residual_.contact_version();
   const auto along = components(q_);
   WriteArray out(r);

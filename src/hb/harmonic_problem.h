@@ -70,8 +70,8 @@ class HarmonicProblem : public solve::Problem {
   int scalar_count() const { return scalars_; }
   double stiffness_scale() const { return stiffness_; }
   DynamicStiffness const& stiffness() const { return residual_.stiffness(); }
-  /// Column dr/dz_j at y, on the harmonic rows. Collective.
-  VecHandle scalar_column(Vec y, int j);
+  /// Column dr/dz_j at y, on the harmonic rows; until the next point of linearisation. Collective.
+  Vec scalar_column(Vec y, int j);
   /// Linearised contact of this rank's pairs at y. Collective.
   std::vector<PairTangents> pair_tangents(Vec y);
   std::unique_ptr<solve::Preconditioner> preconditioner(std::string const& blocks) override;
@@ -118,9 +118,9 @@ class HarmonicProblem : public solve::Problem {
   bool condensable() const;
   void linearise(Vec y);
   void unpack(Vec y);
-  void column(int j, double* v);
+  Vec column(int j);
   void set_mean(Vec per_dof, Vec blocks);
-  void add_stand_off(int j, double dz, Vec dR);
+  void add_stand_off(int j, Vec dR);
   double dload(int j) const { return motion_.dload.empty() ? 0 : motion_.dload[j]; }
 
   Residual residual_;
@@ -129,7 +129,7 @@ class HarmonicProblem : public solve::Problem {
   PetscInt local_block_;
   double stiffness_;
   VecHandle q_, Q_, dQ_, R_, dR_, excitation_, static_, static_load_, last_;
-  std::vector<VecHandle> columns_;  ///< of the scalars at `last_`, once a product has asked for them
+  std::vector<VecHandle> columns_;  ///< of the scalars at `last_`, each once it has been asked for
   std::vector<VecHandle> unfold_;
   std::optional<PerContact> sliders_;
   unsigned owner_ = 0;  ///< of the sliders, as the laws know it

@@ -18,12 +18,6 @@ void HarmonicProblem::linearise(Vec y) {
 // Q = Q_static + a q: dQ = a (dq + q dlog a); r = R / (k a): dr = dR / (k a) - r dlog a
 void HarmonicProblem::product(Vec y, Vec dy, Vec dr) {
   linearise(y);
-  if (columns_.empty())
-    for (int j = 0; j < scalars_; ++j) {
-      VecHandle out = like(q_);
-      column(j, WriteArray(out).data());
-      columns_.push_back(std::move(out));
-    }
   const auto dz = scalars(dy);
   {
     ReadArray in(dy);
@@ -32,7 +26,7 @@ void HarmonicProblem::product(Vec y, Vec dy, Vec dr) {
   const auto along = components(dQ_);
   residual_.product(dQ_, nullptr, dR_);
   check(VecScale(dR_, 1 / stiffness_));
-  for (int j = 0; j < scalars_; ++j) check(VecAXPY(dR_, dz[j], columns_[j]));
+  for (int j = 0; j < scalars_; ++j) check(VecAXPY(dR_, dz[j], column(j)));
   WriteArray out(dr);
   ReadArray in(dR_);
   std::copy_n(in.data(), local_block_, out.data());
@@ -54,41 +48,42 @@ void HarmonicProblem::pattern(std::vector<PetscInt>& rows, std::vector<PetscInt>
           cols.push_back(dof * harmonics().block_size() + harmonics().offset(harmonics().fundamental()) + j);
 }
 
-/// dR += dR/d(stand-off) d(stand-off)/dz_j dz.
-void HarmonicProblem::add_stand_off(int j, double dz, Vec dR) {
+/// dR += dR/d(stand-off) d(stand-off)/dz_j.
+void HarmonicProblem::add_stand_off(int j, Vec dR) {
   if (j != scalars_ - 1 || motion_.dstand_off == 0) return;
   VecHandle wider = like(dR);
   residual_.stand_off_product(wider);
-  check(VecAXPY(dR, dz * motion_.dstand_off, wider));
+  check(VecAXPY(dR, motion_.dstand_off, wider));
 }
 
-void HarmonicProblem::column(int j, double* v) {
+/// dr/dz_j at the point of linearisation, on the harmonic rows.
+Vec HarmonicProblem::column(int j) {
+  if (columns_[j]) return columns_[j];
+  VecHandle out = like(q_);
   const double dlog = motion_.dlog_amplitude[j];
   check(VecCopy(q_, dQ_));
   check(VecScale(dQ_, dlog * motion_.amplitude));
-  residual_.product(dlog ? Vec(dQ_) : nullptr, &motion_.dexponents[j], dR_);
-  check(VecAXPY(dR_, -dload(j), excitation_));
-  add_stand_off(j, 1, dR_);
-  check(VecAXPBY(dR_, -dlog, 1 / (stiffness_ * motion_.amplitude), R_));
-  ReadArray in(dR_);
-  std::copy_n(in.data(), local_block_, v);
+  residual_.product(dlog ? Vec(dQ_) : nullptr, &motion_.dexponents[j], out);
+  check(VecAXPY(out, -dload(j), excitation_));
+  add_stand_off(j, out);
+  check(VecAXPBY(out, -dlog, 1 / (stiffness_ * motion_.amplitude), R_));
+  return columns_[j] = std::move(out);
 }
 
 void HarmonicProblem::values(Vec y, std::span<double> v) {
   linearise(y);
   double* next = residual_.values(1 / stiffness_, v.data());
-  for (auto const& g : unfold_) next = std::copy_n(ReadArray(g).data(), local_block_, next);
-  for (int j = 0; j < scalars_; ++j, next += local_block_) column(j, next);
-  for (auto const& g : unfold_) next = std::copy_n(ReadArray(g).data(), local_block_, next);
+  const auto add = [&](Vec x) { next = std::copy_n(ReadArray(x).data(), local_block_, next); };
+  for (auto const& g : unfold_) add(g);
+  for (int j = 0; j < scalars_; ++j) add(column(j));
+  for (auto const& g : unfold_) add(g);
   for (int j = 0; normalised() && j < 2; ++j)
     for (auto const& [dof, weight] : mine()) *next++ = weight;
 }
 
-VecHandle HarmonicProblem::scalar_column(Vec y, int j) {
+Vec HarmonicProblem::scalar_column(Vec y, int j) {
   linearise(y);
-  VecHandle out = like(q_);
-  column(j, WriteArray(out).data());
-  return out;
+  return column(j);
 }
 
 std::vector<PairTangents> HarmonicProblem::pair_tangents(Vec y) {
