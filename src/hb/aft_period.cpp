@@ -48,9 +48,9 @@ Aft::Found Aft::find(double const* U, Exponents const& e) const {
 ContactPeriod Aft::period(double const* U, Exponents const& e) const {
   Found found = find(U, e);
   if (columns_ == 0) return std::move(found.samples);
-  ContactPeriod out = found.samples;
-  out.gap.assign(size_t(harmonics_.samples()) * pairs_, std::numeric_limits<double>::quiet_NaN());
-  contact::Diagnosis told = diagnosis(found, e, false, std::move(out.gap));
+  std::vector<double> gap(size_t(harmonics_.samples()) * pairs_, std::numeric_limits<double>::quiet_NaN());
+  contact::Diagnosis told = diagnosis(found, e, false, std::move(gap));
+  ContactPeriod out = std::move(found.samples);
   out.status = std::move(told.status), out.gap = std::move(told.gap);
   out.work = std::move(told.work), out.shares = std::move(told.shares);
   return out;
