@@ -12,8 +12,6 @@ namespace fretwave::hb {
 
 namespace {
 
-constexpr double period = 2 * std::numbers::pi;
-
 /// values (count) = waves (count x m) block
 void evaluate(std::vector<double> const& waves, int m, double const* block, double* values) {
   const int count = int(waves.size()) / m, step = 1;
@@ -24,17 +22,17 @@ void evaluate(std::vector<double> const& waves, int m, double const* block, doub
 }  // namespace
 
 CircularContact::CircularContact(Harmonics const& h, contact::Law const& law)
-    : harmonics_(h), law_(law), grid_(h), times_(8 * (h.highest() + 1)), pairs_(law.pairs()) {
-  for (int t = 0; t < times_; ++t)
-    for (int i = 0; i < h.count(); ++i) {
-      const double tau = h.orders()[i] * period * t / times_;
-      search_.push_back(std::cos(tau));
-      if (h.orders()[i]) search_.push_back(std::sin(tau));
-    }
+    : harmonics_(h),
+      law_(law),
+      grid_(h),
+      times_(search_times(h).samples()),
+      search_(size_t(times_) * h.block_size()),
+      pairs_(law.pairs()) {
+  for (int t = 0; t < times_; ++t) waves(h, period * t / times_, &search_[size_t(t) * h.block_size()]);
 }
 
 void CircularContact::force(double const* U, double const*, double* F) {
-  linearised_ = false;
+  blocks_.made = false;
   const int m = harmonics_.block_size();
   for (size_t k = 0; k < pairs_.size(); ++k, U += size(), F += size()) {
     Pair& pair = pairs_[k];
@@ -55,18 +53,14 @@ void CircularContact::force(double const* U, double const*, double* F) {
 
 /// Its motion, and when it is closed.
 void CircularContact::take(double const* U, Pair& pair) {
-  const int m = harmonics_.block_size();
-  const double load = pair.law.load / pair.law.normal_stiffness;
-  pair.normal.stiffness = pair.law.normal_stiffness;
-  pair.normal.approach = series(harmonics_, U);
-  pair.normal.approach.q[0] = load + mean(harmonics_, U);
-  double swing = 0;
-  for (size_t n = 1; n < pair.normal.approach.q.size(); ++n) swing += std::abs(pair.normal.approach.q[n]);
-  pair.normal.spans.clear(), pair.normal.closed = pair.normal.approach.q[0].real() > swing;
+  pair.normal.take(harmonics_, pair.law, U);
+  Series const& approach = pair.normal.approach;
+  pair.normal.spans.clear(), pair.normal.closed = approach.q[0].real() > approach.bound();
   if (pair.normal.closed) return;
   std::vector<double> values(times_);
-  evaluate(search_, m, U, values.data());
-  for (double& value : values) value += load;
+  evaluate(search_, harmonics_.block_size(), U, values.data());
+  const double interference = pair.law.interference();
+  for (double& value : values) value += interference;
   pair.normal.find_spans(values.data(), times_);
 }
 
@@ -84,11 +78,10 @@ void CircularContact::find(double const* U, Pair& pair) {
   for (int c = 0; c < 2; ++c) {
     disc.u[c] = series(harmonics_, U + (c + 1) * m), pair.mean[c] = mean(harmonics_, U + (c + 1) * m);
     rest[c] = law.slider[c] - pair.mean[c];
-    for (auto const& q : disc.u[c].q) swing += std::abs(q);
+    swing += disc.u[c].bound();
   }
-  double radius = disc.radius.q[0].real();
-  for (size_t n = 1; n < disc.radius.q.size(); ++n) radius -= std::abs(disc.radius.q[n]);
-  if (std::abs(rest[0]) + std::abs(rest[1]) + swing < radius) return slider.rest_at(rest);
+  const double least = disc.radius.q[0].real() - disc.radius.bound();
+  if (std::abs(rest[0]) + std::abs(rest[1]) + swing < least) return slider.rest_at(rest);
   take_nodes(U, pair);
   if (pair.normal.closed)
     slider.close(disc, {rest[0], rest[1]});

@@ -1,18 +1,11 @@
 /// What is read from friction on a circle in continuous time: states, samples, work and slip.
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "hb/circular_contact.h"
 #include "scramble.h"
 
 namespace fretwave::hb {
-
-namespace {
-
-constexpr double period = 2 * std::numbers::pi;
-
-}  // namespace
 
 double CircularContact::mean_stiffness(int number, int component) const {
   Pair const& pair = pairs_[number];
@@ -32,10 +25,7 @@ double CircularContact::unclosed() const {
 /// every step: what that bends is no corner to be walked to.
 std::uint64_t CircularContact::piece() const {
   std::uint64_t sum = 0;
-  for (size_t k = 0; k < pairs_.size(); ++k) {
-    NormalContact const& normal = pairs_[k].normal;
-    sum += scrambled(scrambled(k) + (normal.closed ? 1 : 2 + normal.spans.size()));
-  }
+  for (size_t k = 0; k < pairs_.size(); ++k) sum += scrambled(scrambled(k) + pairs_[k].normal.sequence());
   return sum;
 }
 
@@ -47,15 +37,6 @@ void CircularContact::sample(int samples, double const* u, double const*, double
     contact::LinearPair const& law = pair.law;
     for (int t = 0; t < samples; ++t)
       f[t * step + k] = std::max(0.0, law.load + law.normal_stiffness * u[t * step + k]);
-    /// Runs body(t, tau) for the samples of a piece.
-    const auto each = [samples](double begin, double length, auto body) {
-      const double first = std::ceil(begin * samples / period),
-                   end = std::ceil((begin + length) * samples / period);
-      for (double t = first; t < end; ++t) {
-        const int place = int(t) % samples;
-        body(size_t(place < 0 ? place + samples : place), t * period / samples);
-      }
-    };
     const auto hold = [&](size_t t, double const* w) {
       double* now = f + t * step + k;
       double arm[2], size = 0;
@@ -69,9 +50,9 @@ void CircularContact::sample(int samples, double const* u, double const*, double
     if (pair.slider.stands())
       for (int t = 0; t < samples; ++t) hold(t, pair.slider.w);
     for (auto const& piece : pair.slider.path.sticks)
-      each(piece.begin, piece.length, [&](size_t t, double) { hold(t, piece.w); });
+      for_samples(samples, piece.begin, piece.length, [&](size_t t, double) { hold(t, piece.w); });
     for (auto const& piece : pair.slider.path.slips)
-      each(piece.begin, piece.length, [&](size_t t, double tau) {
+      for_samples(samples, piece.begin, piece.length, [&](size_t t, double tau) {
         const auto e = SweptSlider::direction(pair.disc, piece, tau);
         double* now = f + t * step + k;
         for (int c = 0; c < 2; ++c) now[(c + 1) * n] = law.friction_coefficient * now[0] * e[c];

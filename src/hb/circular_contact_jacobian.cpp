@@ -1,5 +1,4 @@
 /// Derivatives of friction on a circle in continuous time.
-#include <algorithm>
 #include <numbers>
 
 #include "hb/circular_contact.h"
@@ -10,18 +9,16 @@
 namespace fretwave::hb {
 
 void CircularContact::linearise() {
-  if (linearised_) return;
   const size_t n = size(), m = harmonics_.block_size();
-  D_.assign(pairs_.size() * n * n, 0.0), by_gap_.assign(pairs_.size() * n, 0.0);
+  blocks_.clear(pairs_.size(), int(n));
   for (size_t k = 0; k < pairs_.size(); ++k) {
-    double *D = &D_[k * n * n], *by_gap = &by_gap_[k * n];
+    double *D = blocks_.of(k), *by_gap = blocks_.by_gap_of(k);
     pairs_[k].normal.add_blocks(harmonics_, D, n, by_gap);
     if (pairs_[k].slider.stands())
       add_standing_blocks(pairs_[k], D + m * n, by_gap + m);
     else if (pairs_[k].slider.kind != SliderPeriod::Kind::loose)
       add_friction_blocks(pairs_[k], D + m * n, by_gap + m);
   }
-  linearised_ = true;
 }
 
 /// dT = kt (du - dw) with w at rest, or as its discs hold it.
@@ -91,24 +88,6 @@ void CircularContact::add_friction_blocks(Pair const& pair, double* D, double* b
     by_gap[r] += row[n];
   }
   for (int c = 0; c < 2; ++c) stick.add_multiplication(kt, D + size_t(c) * m * n + (c + 1) * m, n);
-}
-
-void CircularContact::blocks(Exponents const&, double* D) {
-  linearise();
-  std::ranges::copy(D_, D);
-}
-
-void CircularContact::product(double const* dU, double const*, double* dF) {
-  linearise();
-  const int n = int(size()), step = 1;
-  const double one = 1, zero = 0;
-  for (size_t k = 0; k < pairs_.size(); ++k)
-    dgemv_("T", &n, &n, &one, &D_[k * n * n], &n, dU + k * n, &step, &zero, dF + k * n, &step);
-}
-
-void CircularContact::gap_product(double const* dgap, double* dF) {
-  linearise();
-  for (size_t k = 0; k < by_gap_.size(); ++k) dF[k] = by_gap_[k] * dgap[k / size()];
 }
 
 }  // namespace fretwave::hb

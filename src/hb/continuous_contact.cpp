@@ -1,8 +1,6 @@
 #include "hb/continuous_contact.h"
 
 #include <algorithm>
-#include <cmath>
-#include <numbers>
 
 #include "hb/indicator.h"
 
@@ -10,12 +8,7 @@ namespace fretwave::hb {
 
 namespace {
 
-constexpr double period = 2 * std::numbers::pi;
 constexpr int tile = 32;  // pairs whose times fit the cache
-
-/// Times at which changes are looked for first: 8 and more in the shortest wave, so that find_roots seldom
-/// has to look between them. They are not the contact's samples: what is found does not depend on them.
-Harmonics search_times(Harmonics const& h) { return {h.orders(), 8 * (h.highest() + 1)}; }
 
 /// a + factor b
 Series sum(Series a, double factor, Series const& b) {
@@ -55,7 +48,7 @@ void ContinuousContact::evaluate(double const* U, int first, int pairs) {
 }
 
 void ContinuousContact::force(double const* U, double const*, double* F) {
-  linearised_ = false;
+  blocks_.made = false;
   for (int first = 0; first < int(pairs_.size()); first += tile_) {
     const int pairs = std::min(tile_, int(pairs_.size()) - first);
     evaluate(U, first, pairs);
@@ -77,12 +70,7 @@ void ContinuousContact::force(double const* U, double const*, double* F) {
 void ContinuousContact::take(double const* U, int number) {
   Pair& pair = pairs_[number];
   pair.law = law_.linear_pair(number);
-  if (normal_ >= 0) {
-    double const* u = U + block(number, normal_);
-    pair.normal.stiffness = pair.law.normal_stiffness;
-    pair.normal.approach = series(harmonics_, u);
-    pair.normal.approach.q[0] = pair.law.load / pair.law.normal_stiffness + mean(harmonics_, u);
-  }
+  if (normal_ >= 0) pair.normal.take(harmonics_, pair.law, U + block(number, normal_));
   for (size_t t = 0; t < pair.tangents.size(); ++t) {
     double const* u = U + block(number, int(t) + (normal_ >= 0));
     pair.tangents[t].u = series(harmonics_, u);
@@ -94,9 +82,9 @@ void ContinuousContact::take(double const* U, int number) {
 void ContinuousContact::find_spans(Pair& pair, int place) {
   if (normal_ < 0) return;
   const int N = times_.samples(), step = components_ * tile_;
-  const double load = pair.law.load / pair.law.normal_stiffness;
+  const double interference = pair.law.interference();
   for (int t = 0; t < N; ++t)
-    wave_[t] = load + grid_.values[size_t(t) * step + size_t(normal_) * tile_ + place];
+    wave_[t] = interference + grid_.values[size_t(t) * step + size_t(normal_) * tile_ + place];
   pair.normal.find_spans(wave_.data(), N);
 }
 
@@ -104,7 +92,7 @@ void ContinuousContact::find_spans(Pair& pair, int place) {
 void ContinuousContact::find_play(Pair& pair, int tangent, int place) {
   Tangent& now = pair.tangents[tangent];
   contact::LinearPair const& law = pair.law;
-  const double reach = law.friction_coefficient * law.normal_stiffness / law.tangential_stiffness;
+  const double reach = law.reach();
   now.walls.radius.q.assign(harmonics_.highest() + 1, 0.0);
   now.walls.radius.q[0] = law.friction_limit / law.tangential_stiffness;
   if (reach > 0) now.walls.radius = sum(now.walls.radius, reach, pair.normal.approach);

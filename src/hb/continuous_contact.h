@@ -8,14 +8,11 @@ namespace fretwave::hb {
 /// Contact whose force is linear in its motion but where a pair changes its state (contact::LinearPair): the
 /// changes are found between samples, to the last digit, and the force's harmonics are integrals over the
 /// pieces between them. So F(U) has no error of sampling and is as smooth as the law is.
-class ContinuousContact : public ContinuousForce {
+class ContinuousContact : public DisplacementForce {
  public:
   ContinuousContact(Harmonics const&, contact::Law const&);
 
   void force(double const* U, double const* V, double* F) override;
-  void blocks(Exponents const&, double* D) override;
-  void product(double const* dU, double const* dV, double* dF) override;
-  void gap_product(double const* dgap, double* dF) override;
   double mean_stiffness(int pair, int component) const override;
   std::uint64_t piece() const override;
   void sample(int samples, double const* u, double const* v, double* f) const override;
@@ -46,7 +43,7 @@ class ContinuousContact : public ContinuousForce {
   void find_play(Pair&, int tangent, int place);
   void tangential_force(Pair const&, Tangent const&, double* F) const;
   void tangential_blocks(Pair const&, int tangent, double* D, double* by_gap) const;
-  void linearise();
+  void linearise() override;
 
   Harmonics harmonics_, times_;
   contact::Law const& law_;
@@ -55,8 +52,6 @@ class ContinuousContact : public ContinuousForce {
   Grid grid_;
   std::vector<double> wave_;  ///< one pair's samples of what is searched for roots
   std::vector<Pair> pairs_;
-  std::vector<double> D_, by_gap_;
-  bool linearised_ = false;
 };
 
 }  // namespace fretwave::hb

@@ -1,7 +1,6 @@
 /// What is read from contact in continuous time: its sequence of states, samples, work and slip.
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "hb/continuous_contact.h"
 #include "scramble.h"
@@ -9,8 +8,6 @@
 namespace fretwave::hb {
 
 namespace {
-
-constexpr double period = 2 * std::numbers::pi;
 
 /// Integral over an arc of p q': 2 Re(a) Re(b) = Re(a b + a conj(b)).
 double integral(Arc const& arc, Series const& p, Series const& q) {
@@ -59,7 +56,7 @@ std::uint64_t ContinuousContact::piece() const {
   for (size_t k = 0; k < pairs_.size(); ++k) {
     Pair const& pair = pairs_[k];
     const std::uint64_t own = scrambled(k);
-    sum += scrambled(own + (pair.normal.closed ? 1 : 2 + pair.normal.spans.size()));
+    sum += scrambled(own + pair.normal.sequence());
     for (size_t t = 0; t < pair.tangents.size(); ++t) {
       Play const& play = pair.tangents[t].play;
       std::vector<std::pair<double, int>> states;
@@ -89,22 +86,14 @@ void ContinuousContact::sample(int samples, double const* u, double const*, doub
     for (size_t c = 0; c < pair.tangents.size(); ++c) {
       Tangent const& now = pair.tangents[c];
       const size_t at = (c + (normal_ >= 0)) * n + k;
-      /// Runs body(t) for the samples of a piece.
-      const auto each = [samples](double begin, double length, auto body) {
-        const double first = std::ceil(begin * samples / period);
-        const double end = std::ceil((begin + length) * samples / period);
-        for (double t = first; t < end; ++t) {
-          const int place = int(t) % samples;
-          body(size_t(place < 0 ? place + samples : place));
-        }
-      };
       for (auto const& piece : now.play.sticks)
-        each(piece.begin, piece.length, [&](size_t t) {
+        for_samples(samples, piece.begin, piece.length, [&](size_t t, double) {
           const double force = law.tangential_stiffness * (u[t * step + at] - now.mean - piece.slider);
           f[t * step + at] = std::clamp(force, -limit[t], limit[t]);
         });
       for (auto const& piece : now.play.slips)
-        each(piece.begin, piece.length, [&](size_t t) { f[t * step + at] = piece.side * limit[t]; });
+        for_samples(samples, piece.begin, piece.length,
+                    [&](size_t t, double) { f[t * step + at] = piece.side * limit[t]; });
     }
   }
 }

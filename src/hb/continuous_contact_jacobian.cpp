@@ -1,24 +1,17 @@
 /// Derivatives of contact in continuous time.
-#include <algorithm>
-#include <cmath>
-
 #include "hb/continuous_contact.h"
 #include "hb/indicator.h"
-#include "lapack.h"
 
 namespace fretwave::hb {
 
 void ContinuousContact::linearise() {
-  if (linearised_) return;
-  const size_t size = block(1, 0);
-  D_.assign(pairs_.size() * size * size, 0.0), by_gap_.assign(pairs_.size() * size, 0.0);
+  const size_t size = block(1, 0), normal = normal_ < 0 ? 0 : block(0, normal_);
+  blocks_.clear(pairs_.size(), int(size));
   for (size_t k = 0; k < pairs_.size(); ++k) {
-    double *D = &D_[k * size * size], *by_gap = &by_gap_[k * size];
-    const size_t normal = normal_ < 0 ? 0 : block(0, normal_);
+    double *D = blocks_.of(k), *by_gap = blocks_.by_gap_of(k);
     if (normal_ >= 0) pairs_[k].normal.add_blocks(harmonics_, D + normal * (size + 1), size, by_gap + normal);
     for (size_t t = 0; t < pairs_[k].tangents.size(); ++t) tangential_blocks(pairs_[k], int(t), D, by_gap);
   }
-  linearised_ = true;
 }
 
 /// dT = kt (du - dw) in stick, with dw = du - share dR at its begin, +- mu dN in slip.
@@ -45,7 +38,7 @@ void ContinuousContact::tangential_blocks(Pair const& pair, int tangent, double*
     here.add_coefficients(kt, force.data());
     std::vector<double> wave(m);
     waves(harmonics_, piece.begin, wave.data());
-    const double share = piece.share * slope / kt;
+    const double share = piece.share * law.reach();
     for (int r = 0; r < m; ++r) {
       double* row = D + (at + r) * ld;
       for (int c = 0; c < m; ++c) row[at + c] -= force[r] * wave[c];
@@ -61,26 +54,6 @@ void ContinuousContact::tangential_blocks(Pair const& pair, int tangent, double*
   }
   slip.add_multiplication(slope, D + at * ld + normal, ld);
   slip.add_coefficients(-slope, by_gap + at);
-}
-
-void ContinuousContact::blocks(Exponents const&, double* D) {
-  linearise();
-  std::ranges::copy(D_, D);
-}
-
-void ContinuousContact::product(double const* dU, double const*, double* dF) {
-  linearise();
-  const int size = int(block(1, 0)), step = 1;
-  const double one = 1, zero = 0;
-  for (size_t k = 0; k < pairs_.size(); ++k)
-    dgemv_("T", &size, &size, &one, &D_[k * size * size], &size, dU + k * size, &step, &zero, dF + k * size,
-           &step);
-}
-
-void ContinuousContact::gap_product(double const* dgap, double* dF) {
-  linearise();
-  const size_t size = block(1, 0);
-  for (size_t k = 0; k < by_gap_.size(); ++k) dF[k] = by_gap_[k] * dgap[k / size];
 }
 
 }  // namespace fretwave::hb

@@ -1,8 +1,10 @@
 #pragma once
+#include <algorithm>
 #include <memory>
 
 #include "contact/law.h"
 #include "hb/harmonics.h"
+#include "hb/pair_blocks.h"
 
 namespace fretwave::hb {
 
@@ -29,6 +31,25 @@ class ContinuousForce {
   /// Work, slip path and Archard's integral of the last force: integrals, not sums over samples; at this
   /// angular frequency [rad/s].
   virtual void measure(contact::Diagnosis&, double omega) const = 0;
+};
+
+/// One that follows the displacement alone: its derivatives are its pairs' blocks as they are.
+class DisplacementForce : public ContinuousForce {
+ public:
+  void blocks(Exponents const&, double* D) override { std::ranges::copy(linearised().D, D); }
+  void product(double const* dU, double const*, double* dF) override { linearised().multiply(dU, dF); }
+  void gap_product(double const* dgap, double* dF) override { linearised().multiply_gaps(dgap, dF); }
+
+ protected:
+  /// Makes the blocks at the last force.
+  virtual void linearise() = 0;
+  PairBlocks blocks_;
+
+ private:
+  PairBlocks const& linearised() {
+    if (!blocks_.made) linearise();
+    return blocks_;
+  }
 };
 
 /// Null where the law is sampled.

@@ -4,6 +4,7 @@
 #include <numbers>
 
 #include "contact/vectorise.h"
+#include "hb/legendre.h"
 
 namespace fretwave::hb {
 
@@ -29,19 +30,14 @@ Rule even_rule() {
   return out;
 }
 
-/// Gauss and Legendre's, by Newton on the recurrence of P_n.
+/// Gauss and Legendre's, by Newton on P_n.
 Rule gauss() {
   Rule out;
   for (int j = 0; j < n; ++j) {
     double x = -std::cos(std::numbers::pi * (j + 0.75) / (n + 0.5)), slope = 1;
     for (int step = 0; step < 8; ++step) {
-      double before = 1, here = x;
-      for (int k = 2; k <= n; ++k) {
-        const double next = ((2 * k - 1) * x * here - (k - 1) * before) / k;
-        before = here, here = next;
-      }
-      slope = n * (x * here - before) / (x * x - 1);
-      x -= here / slope;
+      const auto [value, rate] = legendre(n, x);
+      slope = rate, x -= value / slope;
     }
     out.x[j] = x, out.weight[j] = 2 / ((1 - x * x) * slope * slope);
   }

@@ -2,27 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 namespace fretwave::hb {
-
-namespace {
-
-constexpr double period = 2 * std::numbers::pi;
-
-}  // namespace
 
 /// Three panels in the shortest wave: the product of force and wave goes through 2/3 of its own in each.
 PanelGrid::PanelGrid(Harmonics const& h) : panels_(3 * (h.highest() + 1)), length_(period / panels_) {
   const int m = h.block_size();
-  waves_.assign(size_t(nodes()) * m, 1.0), rates_.assign(waves_.size(), 0.0);
-  for (int k = 0; k < nodes(); ++k)
-    for (int i = 0; i < h.count(); ++i)
-      if (const int n = h.orders()[i]) {
-        const double c = std::cos(n * time(k)), s = std::sin(n * time(k));
-        const size_t at = size_t(k) * m + h.offset(i);
-        waves_[at] = c, waves_[at + 1] = s, rates_[at] = -n * s, rates_[at + 1] = n * c;
-      }
+  waves_.resize(size_t(nodes()) * m), rates_.resize(waves_.size());
+  for (int k = 0; k < nodes(); ++k) {
+    double* now = &waves_[size_t(k) * m];
+    hb::waves(h, time(k), now), hb::rates(h, now, &rates_[size_t(k) * m]);
+  }
 }
 
 double PanelGrid::time(int node) const {
@@ -85,13 +75,6 @@ MovingDisc::Excess MovingDisc::farthest(double const* w) const {
 
 namespace {
 
-/// Bound of a derivative of a series.
-double bound(Series const& p, int derivative) {
-  double sum = 0;
-  for (size_t n = 1; n < p.q.size(); ++n) sum += std::pow(double(n), derivative) * std::abs(p.q[n]);
-  return sum;
-}
-
 /// First time between two at which a slider that stands comes to the edge: however short it is outside, for
 /// its excess bends down by no more than 2 (|d| |u''| + R'^2 + R |R''|).
 struct Exit {
@@ -136,7 +119,7 @@ struct Exit {
 
 double MovingDisc::exit(double begin, double end, double const* w, bool at_edge) const {
   constexpr int most = 10;
-  const Exit search{*this, w, std::hypot(bound(u[0], 2), bound(u[1], 2)), bound(radius, 2)};
+  const Exit search{*this, w, std::hypot(u[0].bound(2), u[1].bound(2)), radius.bound(2)};
   Exit::Probe before = search.probe(begin, at(begin));
   // what says otherwise is rounding
   before.excess.value = std::min(before.excess.value, 0.0);

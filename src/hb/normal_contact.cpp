@@ -1,27 +1,20 @@
 #include "hb/normal_contact.h"
 
-#include <numbers>
-
 #include "hb/indicator.h"
 
 namespace fretwave::hb {
 
-namespace {
-
-constexpr double period = 2 * std::numbers::pi;
-
-}  // namespace
+void NormalContact::take(Harmonics const& h, contact::LinearPair const& law, double const* u) {
+  stiffness = law.normal_stiffness;
+  approach = series(h, u);
+  approach.q[0] = law.interference() + mean(h, u);
+}
 
 void NormalContact::find_spans(double const* approach_at, int count) {
-  spans.clear();
   std::vector<Root> roots;
   find_roots(approach, 0, approach_at, count, roots);
   closed = roots.empty() && approach_at[0] > 0;
-  for (size_t i = 0; i < roots.size(); ++i) {
-    if (!roots[i].rising) continue;
-    const double end = i + 1 < roots.size() ? roots[i + 1].at : roots[0].at + period;
-    spans.push_back({roots[i].at, end - roots[i].at});
-  }
+  spans = positive_spans(roots);
 }
 
 double NormalContact::length() const {

@@ -1,6 +1,5 @@
 #pragma once
-#include <numbers>
-
+#include "contact/law.h"
 #include "hb/trigonometric.h"
 
 namespace fretwave::hb {
@@ -13,11 +12,15 @@ struct NormalContact {
   std::vector<Span> spans;  ///< closed in these otherwise
 
   bool touches() const { return closed || spans.size(); }
+  /// Its motion, by the coefficients of u_n.
+  void take(Harmonics const&, contact::LinearPair const&, double const* u);
   /// When it is closed: between the roots of its approach, known at 2 pi t / count.
   void find_spans(double const* approach_at, int count);
+  /// Number of its sequence of states, whenever it begins.
+  std::uint64_t sequence() const { return closed ? 1 : 2 + spans.size(); }
   /// How long of the period it is closed.
   double length() const;
-  double mean_stiffness() const { return stiffness * length() / (2 * std::numbers::pi); }
+  double mean_stiffness() const { return stiffness * length() / period; }
   /// F += coefficients of N.
   void add_force(Harmonics const&, double* F) const;
   /// D += dN/du_n, rows of length ld; by_gap -= dN.

@@ -2,15 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 namespace fretwave::hb {
-
-namespace {
-
-constexpr double period = 2 * std::numbers::pi;
-
-}  // namespace
 
 /// From a wall's minima to the maxima behind (lower wall; upper: the reverse).
 void Play::periodic_pushes(Walls const& walls, int side) {

@@ -2,23 +2,14 @@
 
 #include <cmath>
 #include <numbers>
-#include <utility>
+
+#include "hb/legendre.h"
 
 namespace fretwave::hb {
 
 namespace {
 
 constexpr int s = Radau::stages;
-
-/// P_n and P_n' at x
-std::pair<double, double> legendre(int n, double x) {
-  double before = 1, now = x;
-  for (int k = 2; k <= n; ++k) {
-    const double next = ((2 * k - 1) * x * now - (k - 1) * before) / k;
-    before = now, now = next;
-  }
-  return {now, n * (x * now - before) / (x * x - 1)};
-}
 
 }  // namespace
 

@@ -9,42 +9,12 @@ namespace {
 
 constexpr int stages = Radau::stages;
 
-/// Solves A X = B in place of the rows of B (stages x columns).
-void solve(std::array<Radau::Stages, stages>& A, double* B, int columns) {
-  const auto row = [&](int i) { return B + size_t(i) * columns; };
-  for (int k = 0; k < stages; ++k) {
-    int best = k;
-    for (int i = k + 1; i < stages; ++i)
-      if (std::abs(A[i][k]) > std::abs(A[best][k])) best = i;
-    if (best != k) std::swap(A[k], A[best]), std::swap_ranges(row(k), row(k) + columns, row(best));
-    for (int i = k + 1; i < stages; ++i) {
-      const double factor = A[i][k] / A[k][k];
-      for (int j = k + 1; j < stages; ++j) A[i][j] -= factor * A[k][j];
-      double *to = row(i), *from = row(k);
-      for (int c = 0; c < columns; ++c) to[c] -= factor * from[c];
-    }
-  }
-  for (int k = stages - 1; k >= 0; --k) {
-    double* to = row(k);
-    for (int j = k + 1; j < stages; ++j) {
-      double* from = row(j);
-      for (int c = 0; c < columns; ++c) to[c] -= A[k][j] * from[c];
-    }
-    for (int c = 0; c < columns; ++c) to[c] /= A[k][k];
-  }
-}
-
 }  // namespace
 
 void SliderDerivative::set_time(double tau) {
   if (!harmonics_) return;
   waves(*harmonics_, tau, wave_.data());
-  rate_[0] = 0;
-  for (int i = 0; i < harmonics_->count(); ++i)
-    if (const int n = harmonics_->orders()[i]) {
-      const int at = harmonics_->offset(i);
-      rate_[at] = -n * wave_[at + 1], rate_[at + 1] = n * wave_[at];
-    }
+  rates(*harmonics_, wave_.data(), rate_.data());
 }
 
 void SliderDerivative::add(double* row, std::vector<double> const& wave, double const* a, double b) const {
@@ -114,7 +84,7 @@ void SliderDerivative::slip(SweptSlider::Slip const& slip, MovingDisc const& dis
     const double by_phi = -half * along - p * across;
     for (int c = 0; c < n; ++c) row[c] += by_phi * dphi_[c] - rate * radius[c];
   }
-  solve(A, dp.data(), n);
+  if (!solve_stages(A, dp.data(), n)) std::ranges::fill(dp, NAN);
   for (int j = 0; j < stages; ++j) {
     double *row = &dp[size_t(j) * n], *radius = &dR[size_t(j) * n];
     const double p = slip.p[j], turn = 2 / (1 + p * p);

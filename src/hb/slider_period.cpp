@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
 #include "hb/slider_derivative.h"
 
@@ -11,7 +10,6 @@ namespace fretwave::hb {
 
 namespace {
 
-constexpr double period = 2 * std::numbers::pi;
 constexpr double rounding = 1e-14;  // of a march, relative to the size of its motion
 constexpr double parallel = 1e-7;   // sine between two discs' directions: half the digits are left
 constexpr double one_disc = 1e-4;

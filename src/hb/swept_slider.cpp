@@ -22,27 +22,6 @@ double drag(Instant const& now, std::array<double, 2> const& e) {
   return now.v[0] * e[0] + now.v[1] * e[1] - now.dR;
 }
 
-/// Gauss elimination of a small system; false where it is singular.
-bool solve(std::array<Radau::Stages, stages>& A, Radau::Stages& b) {
-  for (int k = 0; k < stages; ++k) {
-    int best = k;
-    for (int i = k + 1; i < stages; ++i)
-      if (std::abs(A[i][k]) > std::abs(A[best][k])) best = i;
-    if (A[best][k] == 0) return false;
-    std::swap(A[k], A[best]), std::swap(b[k], b[best]);
-    for (int i = k + 1; i < stages; ++i) {
-      const double factor = A[i][k] / A[k][k];
-      for (int j = k + 1; j < stages; ++j) A[i][j] -= factor * A[k][j];
-      b[i] -= factor * b[k];
-    }
-  }
-  for (int k = stages - 1; k >= 0; --k) {
-    for (int j = k + 1; j < stages; ++j) b[k] -= A[k][j] * b[j];
-    b[k] /= A[k][k];
-  }
-  return true;
-}
-
 }  // namespace
 
 std::array<double, 2> Slip::turned(double p) const {
@@ -86,7 +65,7 @@ double SweptSlider::collocate(MovingDisc const& disc, Slip& slip) {
       for (int i = 0; i < stages; ++i) A[j][i] = R * method.derivative[j][i];
       A[j][j] += along[j] + across[j] * p;
     }
-    if (!solve(A, b)) return INFINITY;
+    if (!solve_stages(A, b.data())) return INFINITY;
     step = 0;
     for (int j = 0; j < stages; ++j) slip.p[j] += b[j], step = std::max(step, std::abs(b[j]));
     if (!(step < 2)) return INFINITY;

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 namespace fretwave::hb {
 
@@ -53,6 +52,14 @@ void waves(Harmonics const& h, double tau, double* out) {
   }
 }
 
+void rates(Harmonics const& h, double const* waves, double* out) {
+  for (int i = 0; i < h.count(); ++i) {
+    const int n = h.orders()[i], at = h.offset(i);
+    out[at] = n ? -n * waves[at + 1] : 0;
+    if (n) out[at + 1] = n * waves[at];
+  }
+}
+
 /// Odd and even orders apart: neither chain of powers waits for the other.
 Series::Jet Series::at(double tau) const {
   const double c = std::cos(tau), s = std::sin(tau), c2 = c * c - s * s, s2 = 2 * c * s;
@@ -83,6 +90,12 @@ std::pair<double, double> Series::difference(double tau, double s) const {
     slope -= double(n) * (im * half.x + re * half.y);
   }
   return {value, slope};
+}
+
+double Series::bound(int order) const {
+  double sum = 0;
+  for (size_t k = 1; k < q.size(); ++k) sum += std::pow(double(k), order) * std::abs(q[k]);
+  return sum;
 }
 
 void Arc::set(int highest, double begin, double length) {
@@ -153,6 +166,8 @@ struct Search {
 
 }  // namespace
 
+Harmonics search_times(Harmonics const& h) { return {h.orders(), 8 * (h.highest() + 1)}; }
+
 void find_roots(Series const& p, int derivative, double const* samples, int count, std::vector<Root>& out) {
   out.clear();
   if (p.q.size() < 2) return;
@@ -161,17 +176,27 @@ void find_roots(Series const& p, int derivative, double const* samples, int coun
     const double size = std::abs(p.q[k].real()) + std::abs(p.q[k].imag());
     search.bent += double(k * k) * (derivative ? double(k) : 1.0) * size;
   }
-  const double step = 2 * std::numbers::pi / count, far = step * step * search.bent / 8;
+  const double step = period / count, far = step * step * search.bent / 8;
   for (int t = 0; t < count; ++t) {
     const double here = samples[t], after = samples[t + 1 < count ? t + 1 : 0];
     if ((here > far && after > far) || (here < -far && after < -far)) continue;
     search.between(t * step, (t + 1) * step, here, after);
   }
   // the last one may lie at the period's end by a rounding
-  if (out.size() && out.back().at >= 2 * std::numbers::pi) {
-    out.back().at -= 2 * std::numbers::pi;
+  if (out.size() && out.back().at >= period) {
+    out.back().at -= period;
     std::rotate(out.begin(), out.end() - 1, out.end());
   }
+}
+
+std::vector<Span> positive_spans(std::vector<Root> const& roots) {
+  std::vector<Span> out;
+  for (size_t i = 0; i < roots.size(); ++i) {
+    if (!roots[i].rising) continue;
+    const double end = i + 1 < roots.size() ? roots[i + 1].at : roots[0].at + period;
+    out.push_back({roots[i].at, end - roots[i].at});
+  }
+  return out;
 }
 
 }  // namespace fretwave::hb

@@ -1,12 +1,16 @@
 #pragma once
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "hb/harmonics.h"
 
 namespace fretwave::hb {
 
-/// A time in which a pair is closed.
+/// Of tau.
+constexpr double period = 2 * std::numbers::pi;
+
+/// A piece of the period.
 struct Span {
   double begin, length;
 };
@@ -21,13 +25,16 @@ struct Series {
   Jet at(double tau) const;
   /// p(tau + s) - p(tau) without the rounding of the two, and p'(tau + s).
   std::pair<double, double> difference(double tau, double s) const;
+  /// Of the derivative of this order, p about its mean: sum_k k^order |q_k| over k > 0.
+  double bound(int order = 0) const;
 };
 
 /// q_k of a dof's block, about its mean; the mean.
 Series series(Harmonics const&, double const* block);
 double mean(Harmonics const&, double const* block);
-/// 1, cos n tau, sin n tau of the retained orders.
+/// 1, cos n tau, sin n tau of the retained orders; their rates by tau.
 void waves(Harmonics const&, double tau, double* out);
+void rates(Harmonics const&, double const* waves, double* out);
 /// F += factor x the coefficients of p but its mean; of a constant.
 void add_series(Harmonics const&, Series const& p, double factor, double* F);
 void add_mean(Harmonics const&, double value, double* F);
@@ -79,8 +86,27 @@ double root(Function f, double low, double high, double x, int sign, double size
   return x;
 }
 
+/// Times at which roots are looked for first: 8 and more in the shortest wave, so that find_roots seldom has
+/// to look between them. What is found does not depend on them.
+Harmonics search_times(Harmonics const&);
+
 /// All roots over [0, 2 pi) of the derivative of this order (0 or 1), in their order, from its samples at
 /// 2 pi t / count. However close: a bound on how it bends says where two may hide between samples.
 void find_roots(Series const&, int derivative, double const* samples, int count, std::vector<Root>& out);
+
+/// When a series with these roots is positive: from each that rises to the next.
+std::vector<Span> positive_spans(std::vector<Root> const&);
+
+/// Runs body(t, tau) for the samples in a piece of the period: t of 0 .. samples - 1, tau perhaps in another
+/// period.
+template <class Body>
+void for_samples(int samples, double begin, double length, Body body) {
+  const double first = std::ceil(begin * samples / period),
+               end = std::ceil((begin + length) * samples / period);
+  for (double t = first; t < end; ++t) {
+    const int place = int(t) % samples;
+    body(size_t(place < 0 ? place + samples : place), t * period / samples);
+  }
+}
 
 }  // namespace fretwave::hb

@@ -2,20 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "hb/indicator.h"
-#include "lapack.h"
 
 namespace fretwave::hb {
 
 namespace {
 
-constexpr double period = 2 * std::numbers::pi;
 constexpr int tile = 32;  // pairs whose times fit the cache
-
-/// Times at which roots are looked for first; what is found does not depend on them.
-Harmonics search_times(Harmonics const& h) { return {h.orders(), 8 * (h.highest() + 1)}; }
 
 double norm(double const* x, int size) {
   double square = 0;
@@ -47,7 +41,7 @@ VelocityForce::VelocityForce(Harmonics const& h, contact::Law const& law)
       pairs_(law.pairs()) {}
 
 void VelocityForce::force(double const* U, double const* V, double* F) {
-  linearised_ = false, tile_at_ = -1;
+  slopes_.made = false, tile_at_ = -1;
   std::copy_n(V, V_.size(), V_.data());
   const int m = harmonics_.block_size();
   for (int number = 0; number < int(pairs_.size()); ++number) {
@@ -167,9 +161,9 @@ void VelocityForce::integrate(Pair& pair, int number, double* F) {
 
 /// By G_p = (1 / 2 pi) int df/dv e^{-i p tau}; over half a period those of even orders, which alone count.
 void VelocityForce::linearise() {
-  if (linearised_) return;
+  if (slopes_.made) return;
   const int m = harmonics_.block_size(), highest = 2 * harmonics_.highest();
-  D_.assign(pairs_.size() * m * m, 0.0);
+  slopes_.clear(pairs_.size(), m);
   std::vector<complex> sum(highest + 1), own(highest + 1);
   for (size_t number = 0; number < pairs_.size(); ++number) {
     Pair const& pair = pairs_[number];
@@ -183,23 +177,19 @@ void VelocityForce::linearise() {
     for (complex& G : sum) G = std::conj(G);
     Indicator slope(harmonics_);
     slope.add(sum);
-    slope.add_multiplication(1, &D_[number * m * m], m);
+    slope.add_multiplication(1, slopes_.of(number), m);
   }
-  linearised_ = true;
 }
 
 /// dF/dV with its columns recombined by the 2 x 2 of s_k.
 void VelocityForce::blocks(Exponents const& e, double* D) {
   linearise();
-  multiply(harmonics_, conjugate(e.s), D_.data(), D, int(D_.size()) / harmonics_.block_size());
+  multiply(harmonics_, conjugate(e.s), slopes_.D.data(), D, int(slopes_.by_gap.size()));
 }
 
 void VelocityForce::product(double const*, double const* dV, double* dF) {
   linearise();
-  const int m = harmonics_.block_size(), step = 1;
-  const double one = 1, zero = 0;
-  for (size_t k = 0; k < pairs_.size(); ++k)
-    dgemv_("T", &m, &m, &one, &D_[k * m * m], &m, dV + k * m, &step, &zero, dF + k * m, &step);
+  slopes_.multiply(dV, dF);
 }
 
 void VelocityForce::gap_product(double const*, double* dF) { std::fill_n(dF, F_.size(), 0.0); }
@@ -241,10 +231,8 @@ double VelocityForce::slip_path(Pair const& pair, double threshold) const {
     std::vector<Root> roots;
     find_roots(above, 0, samples.data(), N, roots);
     if (roots.empty() && samples[0] > 0) sum += period * (above.q[0].real() + threshold);
-    for (size_t i = 0; i < roots.size(); ++i) {
-      if (!roots[i].rising) continue;
-      const double end = i + 1 < roots.size() ? roots[i + 1].at : roots[0].at + period;
-      const Arc arc(harmonics_.highest(), roots[i].at, end - roots[i].at);
+    for (Span const& span : positive_spans(roots)) {
+      const Arc arc(harmonics_.highest(), span.begin, span.length);
       sum += arc.integral(above) + threshold * arc.length();
     }
   }

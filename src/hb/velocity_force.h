@@ -1,6 +1,7 @@
 #pragma once
 #include "hb/continuous_force.h"
 #include "hb/graded_panels.h"
+#include "hb/pair_blocks.h"
 
 namespace fretwave::hb {
 
@@ -53,8 +54,7 @@ class VelocityForce : public ContinuousForce {
   std::vector<double> blocks_, values_;  ///< of a tile, at the times of the grid
   std::vector<double> V_, F_;            ///< of the last force
   std::vector<Pair> pairs_;
-  std::vector<double> D_;  ///< dF/dV
-  bool linearised_ = false;
+  PairBlocks slopes_;  ///< dF/dV
 };
 
 }  // namespace fretwave::hb
