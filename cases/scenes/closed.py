@@ -112,7 +112,12 @@ def at_amplitude(a: float, exact: float, tolerance: float) -> Form:
 
 
 def closed_modes(scene: Any, sliding: bool = False) -> Any:
-    """Angular frequencies of the structure with stuck contact, or closed and sliding without friction, by LAPACK.
+    """Angular frequencies of the structure with stuck contact, or closed and sliding without friction, by LAPACK."""
+    return linear_modes(scene, sliding)[0]
+
+
+def linear_modes(scene: Any, sliding: bool = False) -> tuple[Any, Any]:
+    """The same with their shapes, column by column.
 
     From K^-1: its largest eigenvalues do not feel the rounding of contact 1e14 times as stiff as the rest.
     """
@@ -126,4 +131,5 @@ def closed_modes(scene: Any, sliding: bool = False) -> Any:
             k[np.arange(len(k)) % contact.components > 0] = 0.0
         K = K + (B.T * k) @ B
     flexibility = scipy.linalg.cho_solve(scipy.linalg.cho_factor(K), np.eye(len(K)))
-    return 1 / np.sqrt(scipy.linalg.eigvalsh(M @ flexibility @ M, M)[::-1])
+    values, shapes = scipy.linalg.eigh(M @ flexibility @ M, M)
+    return 1 / np.sqrt(values[::-1]), shapes[:, ::-1]

@@ -10,6 +10,7 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 
 from .circle import TURN, zero
 
@@ -71,11 +72,14 @@ def jenkins(coefficients, rates, stiffness, limit, waves):
     """
     m, reach, out = len(coefficients), limit / stiffness, np.zeros_like(coefficients)
 
-    def u(tau):
-        return waves(np.atleast_1d(tau)) @ coefficients
+    def stretch(tau, held):
+        """u - w at these times: since a time of `held`, at which the slider was dragged; from rest without one."""
+        if held is None:
+            return waves(tau) @ coefficients
+        return _risen(waves, tau, held[0]) @ coefficients + held[1] * reach
 
-    def first(tau):
-        return float((waves(np.atleast_1d(tau)) @ coefficients[:, 0].real)[0])
+    def first(tau, held):
+        return float(stretch(np.atleast_1d(tau), held)[0, 0].real)
 
     def add(begin, end, force):
         tau, weight, wave = _gauss(begin, end, m, waves)
@@ -83,20 +87,30 @@ def jenkins(coefficients, rates, stiffness, limit, waves):
 
     turns = _roots(lambda tau: waves(tau) @ rates[:, 0].real, m)
     turns = np.r_[turns, turns[0] + 2 * np.pi] if len(turns) else np.array([FIRST, FIRST + 2 * np.pi])
-    w = 0j * coefficients[0]
+    held = None
     for second in (False, True):
         for begin, end in zip(turns[:-1], turns[1:]):
-            away = first(end) - w[0].real
+            away = first(end, held)
             side, onset = np.sign(away), end
             if abs(away) > reach:
-                goal = w[0].real + side * reach
-                late = side * (first(begin) - goal) >= 0
-                onset = begin if late else zero(lambda t, g=goal: first(t) - g, begin, end)
+                late = side * first(begin, held) >= reach
+                onset = begin if late else zero(lambda t, h=held, s=side: first(t, h) - s * reach, begin, end)
             if second:
-                add(begin, onset, lambda tau, w=w: stiffness * (u(tau) - w))
+                add(begin, onset, lambda tau, held=held: stiffness * stretch(tau, held))
                 add(onset, end, lambda tau, f=side * limit: np.full((len(tau), 1), f))
             if abs(away) > reach:
-                w = u(end)[0] - side * reach
+                held = (end, side)
+        held = held and (held[0] - 2 * np.pi, held[1])
+    return out
+
+
+def _risen(waves, tau, since):
+    """Waves less what they were at a time, to all digits of so small a difference (times, m)."""
+    middle, half = waves((tau + since) / 2), waves((tau - since) / 2)
+    constant = middle.shape[1] % 2
+    out = np.zeros_like(middle)
+    out[:, constant::2] = -2 * middle[:, constant + 1 :: 2] * half[:, constant + 1 :: 2]
+    out[:, constant + 1 :: 2] = 2 * middle[:, constant::2] * half[:, constant + 1 :: 2]
     return out
 
 
@@ -135,17 +149,24 @@ def stop(coefficients, stiffness, load, waves):
 
 
 def _roots(f, m):
-    """Roots of f in a period: sign changes between the points of a fine grid and the extrema of its parabolas."""
+    """Roots of f in a period: sign changes between the points of a fine grid and the extrema between them."""
     grid = FIRST + 2 * np.pi * np.arange(-1, 64 * m + 2) / (64 * m)
     value = f(grid)
     low, here, high = value[:-2], value[1:-1], value[2:]
     peak = (here - low) * (high - here) < 0
-    bent = np.where(peak, low - 2 * here + high, 1.0)
-    extrema = (grid[1:-1] + np.where(peak, (low - high) / (2 * bent), 0.0) * (grid[1] - grid[0]))[peak]
-    tau = np.unique(np.r_[grid[1:-1], extrema[(extrema > FIRST) & (extrema < FIRST + 2 * np.pi)]])
+    extrema = [_extremum(f, grid[i : i + 3], np.sign(here[i]) or 1.0) for i in np.flatnonzero(peak)]
+    tau = np.unique(np.r_[grid[1:-1], [x for x in extrema if FIRST < x < FIRST + 2 * np.pi]])
     value = f(tau)
     turns = np.flatnonzero((value[:-1] > 0) != (value[1:] > 0))
     return np.array([zero(lambda t: f(np.array([t]))[0], tau[i], tau[i + 1]) for i in turns])
+
+
+def _extremum(f, three, sign):
+    """Where sign f is least between three times: two roots may lie nearer to one another than a parabola tells."""
+    found = minimize_scalar(
+        lambda t: sign * f(np.array([t]))[0], bounds=(three[0], three[2]), method="bounded", options={"xatol": 1e-10}
+    )
+    return float(found.x)
 
 
 def closed_spans(f, m):

@@ -14,6 +14,8 @@ SAME = 1e-9  #: relative, of a reported value
 BACK = 0.05  #: of a step: a later point this near to an earlier piece of the branch retraces it
 SECONDS = 1.0  #: for the search for jumps
 TWICE = 3  #: consecutive points that retrace
+ABREAST = 6  #: corrections that bring an earlier piece abreast of a row
+APART = 1e-5  #: of a step: what lies nearer is one branch
 
 
 def values(run: Any) -> list[str]:
@@ -135,15 +137,35 @@ def retraced(run: Any) -> list[str]:
 
 
 def _same_piece(run: Any, rows: Any, i: int, j: int, along: float) -> bool:
-    """Whether row i lies on the branch between rows j and j + 1: at a corner two pieces may lie a degree apart."""
-    start, end, here = (run.state(int(rows[k])) for k in (j, j + 1, i))
-    found = distance(run.equations, *(x + along * (y - x) for x, y in zip(start, end)))
-    if not found.found:
-        return True
+    """Whether row i lies on the branch between rows j and j + 1: behind a fold pieces may be side by side.
+
+    The earlier piece is solved abreast of the row, where the chord has no part of what lies between the two.
+    """
+    first = max(0, min(j - 1, i - 4))
+    near = [run.state(int(k)) for k in rows[first : first + 4]]
+    start, end, here = near[j - first], near[j - first + 1], run.state(int(rows[i]))
     chord = (end[0] - start[0]).ravel()
-    off = (here[0] - found.solution[0]).ravel()
-    off -= chord * (off @ chord) / (chord @ chord)
-    return bool(np.linalg.norm(off) < 1e-3 * np.linalg.norm(chord))
+    square = chord @ chord
+    for _ in range(ABREAST):
+        found = distance(run.equations, *_between(near, j - first, along))
+        if not found.found:
+            return True
+        off = (here[0] - found.solution[0]).ravel()
+        missed = (off @ chord) / square
+        if abs(missed) < APART:
+            break
+        along += missed
+    off -= chord * missed
+    return bool(np.linalg.norm(off) < APART * np.sqrt(square))
+
+
+def _between(states: list[Any], k: int, along: float) -> tuple[Any, ...]:
+    """By the cubic through four states over the length of their chords, between the k-th and the next."""
+    chords = [np.linalg.norm(b[0] - a[0]) for a, b in zip(states, states[1:])]
+    at = np.r_[0, np.cumsum(chords)]
+    t = at[k] + along * chords[k]
+    shares = [np.prod([(t - at[m]) / (at[n] - at[m]) for m in range(4) if m != n]) for n in range(4)]
+    return tuple(sum(share * state[part] for share, state in zip(shares, states)) for part in range(3))
 
 
 def jumps(run: Any, most: int = 4) -> list[str]:

@@ -114,6 +114,7 @@ class Continuation {
   bool leads_back(Trial const&);
   bool on_piece(std::uint64_t here, double at);
   std::optional<double> facet(double reach);
+  bool fits(Vec y);
   double within_piece(Vec y, Vec tangent, double reach);
   std::optional<Trial> turn_corner(double beyond, double reach);
 

@@ -25,6 +25,7 @@ constexpr double one_facet = 0.98;       // least cosine between the two vectors
 constexpr double sharpness = 1e-6;       // relative, of the place where a piece ends
 constexpr double shortest = 1e-13;       // length of a piece that can be told from a point
 constexpr double no_corner = 1e-6;       // 1 - cosine of the angle between the tangents
+constexpr double no_force = 1e-3;        // of a tangent on the other piece, in forces that act
 constexpr int halvings = 60;
 
 struct Entry {
@@ -99,6 +100,14 @@ std::optional<double> Continuation::facet(double reach) {
   return std::max(reach, shortest);
 }
 
+/// Whether the anchor's tangent is one at y too: the metric does not see a corner at which only the mean
+/// turns. A determinant that changes its sign all the same is a branch point. Collective.
+bool Continuation::fits(Vec y) {
+  VecHandle entering = problem_.equations();
+  problem_.product(y, anchor_.tangent, entering);
+  return dot(entering, entering) < no_force * no_force;
+}
+
 /// How far, at most `reach`, a tangent leads from y within one piece, halved so that it ends well inside.
 double Continuation::within_piece(Vec y, Vec tangent, double reach) {
   const auto here = problem_.piece(y);
@@ -119,8 +128,7 @@ std::optional<Continuation::Trial> Continuation::turn_corner(double beyond, doub
   const double size = weighted_norm(weights_, tangent);
   if (!std::isfinite(size)) return {};
   check(VecScale(tangent, 1 / size));
-  const bool straight =
-      dot(row_, tangent) > 1 - no_corner;  // a determinant that changes its sign is a branch point
+  const bool straight = dot(row_, tangent) > 1 - no_corner && fits(there);
   if (straight && on_piece(problem_.piece(anchor_.y), beyond)) return {};
   const int sign = straight ? 1 : orientation(there, tangent);
   if (sign == 0) return {};
