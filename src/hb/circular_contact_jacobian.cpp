@@ -76,12 +76,13 @@ void CircularContact::add_friction_blocks(Pair const& pair, double* D, double* b
           all[(size_t(c) * m + r) * columns + j] += force[r] * derivative.sticks[k][size_t(c) * columns + j];
   }
   double const* b[2] = {derivative.end(), derivative.end() + columns};
+  double periodic[2][2];
+  SliderPeriod::invert({{b[0][n + 1], b[0][n + 2]}, {b[1][n + 1], b[1][n + 2]}}, periodic);
   for (int r = 0; r < 2 * m; ++r) {
     double* row = &all[size_t(r) * columns];
     if (slider.kind == SliderPeriod::Kind::cycles) {
       double by_start[2];
-      for (int k = 0; k < 2; ++k)
-        by_start[k] = row[n + 1] * slider.periodic[0][k] + row[n + 2] * slider.periodic[1][k];
+      for (int k = 0; k < 2; ++k) by_start[k] = row[n + 1] * periodic[0][k] + row[n + 2] * periodic[1][k];
       for (int j = 0; j <= n; ++j) row[j] += by_start[0] * b[0][j] + by_start[1] * b[1][j];
     }
     for (int j = 0; j < n; ++j) D[size_t(r) * n + j] += row[j];

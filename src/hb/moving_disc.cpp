@@ -22,7 +22,7 @@ double PanelGrid::time(int node) const {
 }
 
 MovingDisc::Instant MovingDisc::at(double tau) const {
-  const Series::Jet x = u[0].at(tau), y = u[1].at(tau), r = radius.at(tau);
+  const auto [x, y, r] = jets(tau);
   return {{x.d[0], y.d[0]}, {x.d[1], y.d[1]}, r.d[0], r.d[1]};
 }
 
@@ -32,7 +32,7 @@ MovingDisc::Excess MovingDisc::excess(double tau, Instant const& now, double con
 }
 
 MovingDisc::Excess MovingDisc::excess(double tau, double const* w) const {
-  const Series::Jet x = u[0].at(tau), y = u[1].at(tau), r = radius.at(tau);
+  const auto [x, y, r] = jets(tau);
   Excess out = excess(tau, {{x.d[0], y.d[0]}, {x.d[1], y.d[1]}, r.d[0], r.d[1]}, w);
   const double speed2 = x.d[1] * x.d[1] + y.d[1] * y.d[1] - r.d[1] * r.d[1];
   out.bend = 2 * (speed2 + (x.d[0] - w[0]) * x.d[2] + (y.d[0] - w[1]) * y.d[2] - r.d[0] * r.d[2]);

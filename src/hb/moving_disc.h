@@ -36,6 +36,8 @@ struct MovingDisc {
   PanelGrid const* grid = nullptr;
   std::vector<Instant> at_nodes;
 
+  /// u and R with their first two rates.
+  std::array<Series::Jet, 3> jets(double tau) const { return hb::jets<3>({&u[0], &u[1], &radius}, tau); }
   Instant at(double tau) const;
   Instant const& node(int k) const { return at_nodes[size_t(k) % at_nodes.size()]; }
   Excess excess(double tau, double const* w) const;

@@ -39,8 +39,7 @@ void SliderDerivative::begin_slip(SweptSlider::Slip const& slip, MovingDisc cons
   const double across[2] = {-slip.e[1], slip.e[0]};
   set_time(slip.begin);
   dphi_.assign(n, 0.0);
-  const Series::Jet x = disc.u[0].at(slip.begin), y = disc.u[1].at(slip.begin),
-                    r = disc.radius.at(slip.begin);
+  const auto [x, y, r] = disc.jets(slip.begin);
   if (slip.start == Start::follows || slip.start == Start::given) {
     add_value(dphi_.data(), across, 0);
     for (int c = 0; c < n; ++c) dphi_[c] = (dphi_[c] - across[0] * dw_[c] - across[1] * dw_[n + c]) / r.d[0];
@@ -112,6 +111,10 @@ void SliderDerivative::go(SweptSlider const& path, MovingDisc const& disc) {
   sticks.clear(), weights.clear(), arms.clear(), nodes = 0;
   dw_.assign(2 * size_t(n), 0.0), dphi_.assign(n, 0.0);
   dw_[n - 2] = dw_[2 * n - 1] = 1;
+  if (m_) {
+    const size_t most = path.slips.size() * stages;
+    weights.reserve(most * m_), arms.reserve(most * 2 * n), sticks.reserve(path.sticks.size());
+  }
   for (size_t k = 0; k < path.pieces.size(); ++k) {
     SweptSlider::Piece const& piece = path.pieces[k];
     if (piece.slips) {

@@ -132,7 +132,7 @@ void SliderPeriod::follow(MovingDisc const& disc, double const* rest) {
 void SliderPeriod::follow_one(MovingDisc const& disc, double const* rest) {
   constexpr int most = 8;
   for (int k = 0;; ++k) {
-    const Series::Jet x = disc.u[0].at(times[0]), y = disc.u[1].at(times[0]), r = disc.radius.at(times[0]);
+    const auto [x, y, r] = disc.jets(times[0]);
     const double D = std::hypot(x.d[0] - rest[0], y.d[0] - rest[1]), s = r.d[0] / D;
     const double n[2] = {(x.d[0] - rest[0]) / D, (y.d[0] - rest[1]) / D}, t[2] = {-n[1], n[0]};
     const double along = n[0] * x.d[1] + n[1] * y.d[1], across = t[0] * x.d[1] + t[1] * y.d[1];
@@ -167,16 +167,12 @@ void SliderPeriod::cycle(MovingDisc const& disc, double const* rest, double size
   for (int step = 0; step < most_periods; ++step) {
     path.clear();
     const std::array<double, 2> end = path.march(disc, 0, period, at);
-    double A[2][2];
-    derivative.of_start(path, disc, A);
     const double r[2] = {end[0] - at[0], end[1] - at[1]}, now = std::hypot(r[0], r[1]);
-    const double a = 1 - A[0][0], b = -A[0][1], c = -A[1][0], d = 1 - A[1][1];
-    const double det =
-        std::max(a * d - b * c, rounding);  // A contracts: det >= 0, and 0 at the onset of slip
-    periodic[0][0] = d / det, periodic[0][1] = -b / det, periodic[1][0] = -c / det, periodic[1][1] = a / det;
     w[0] = at[0], w[1] = at[1], unclosed = now;
     if (now <= rounding * size) return;
     if (last == plain || now < least) {
+      double A[2][2], periodic[2][2];
+      derivative.of_start(path, disc, A), invert(A, periodic);
       damping = last == plain ? damping : std::min(1.0, 2 * damping);
       last = newton, least = now;
       for (int row = 0; row < 2; ++row) {
@@ -189,6 +185,12 @@ void SliderPeriod::cycle(MovingDisc const& disc, double const* rest, double size
       for (int row = 0; row < 2; ++row) at[row] = last == smoothed ? end[row] : after[row];
     }
   }
+}
+
+void SliderPeriod::invert(double const (&A)[2][2], double (&inverse)[2][2]) {
+  const double a = 1 - A[0][0], b = -A[0][1], c = -A[1][0], d = 1 - A[1][1];
+  const double det = std::max(a * d - b * c, rounding);  // A contracts: det >= 0, and 0 at the onset of slip
+  inverse[0][0] = d / det, inverse[0][1] = -b / det, inverse[1][0] = -c / det, inverse[1][1] = a / det;
 }
 
 }  // namespace fretwave::hb

@@ -16,10 +16,12 @@ class SliderPeriod {
   double w[2] = {0, 0};  ///< where it stands all the period, or as the period begins
   double unclosed = 0;   ///< |P(w) - w|
   /// How a shaken w follows (R, u) at the times when `touching` discs hold it, where that is one also their
-  /// rates; how a cycle's follows what
-  /// the period makes of a slider that does not.
+  /// rates.
   int touching = 0;
-  double times[2] = {0, 0}, gain[2][2][3] = {}, gain_of_rates[2][3] = {}, periodic[2][2] = {};
+  double times[2] = {0, 0}, gain[2][2][3] = {}, gain_of_rates[2][3] = {};
+
+  /// (1 - A)^-1 of A = dP/dw: how a cycle's slider follows what the period makes of one that does not.
+  static void invert(double const (&A)[2][2], double (&inverse)[2][2]);
 
   void clear();
   /// Does not move all the period.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace fretwave::hb {
 
@@ -106,27 +107,34 @@ bool SweptSlider::pushed_back(MovingDisc const& disc, Slip const& slip, double& 
 /// Cuts a panel where its slider stops: l = 0 between these times from its begin.
 void SweptSlider::stop(MovingDisc const& disc, Slip& slip, double low, double high) {
   constexpr int most = 40;
+  constexpr double near = 1e-4;
   const Slip whole = slip;
   // on the panel's polynomial first
   const auto guess = [&](double s) {
     return drag(disc.at(whole.begin + s), whole.turned(radau().at(whole.p, s / whole.length)));
   };
-  double below = low, above = high;
-  for (int k = 0; k < most && above - below > 1e-6 * high; ++k) {
-    const double middle = (below + above) / 2;
-    (guess(middle) > 0 ? below : above) = middle;
+  double below = low, above = high, ahead = guess(low), behind = guess(high), x = high;
+  for (int k = 0; k < most && above - below > near * high; ++k) {
+    const bool secant = ahead > 0 && behind < 0;
+    const double before =
+        std::exchange(x, below + (above - below) * (secant ? ahead / (ahead - behind) : 0.5));
+    const double value = guess(x);
+    if (std::abs(x - before) <= near * high) break;
+    // Illinois: an end that stays counts for half
+    if (value > 0)
+      below = x, ahead = value, behind /= 2;
+    else
+      above = x, behind = value, ahead /= 2;
   }
-  double x = (below + above) / 2;
   for (int k = 0; k < most; ++k) {
     slip.length = x;
     collocate(disc, slip);
     const double end = slip.begin + x;
     const std::array<double, 2> e = slip.direction(stages - 1);
-    const Series::Jet jets[3] = {disc.u[0].at(end), disc.u[1].at(end), disc.radius.at(end)};
-    const double value = jets[0].d[1] * e[0] + jets[1].d[1] * e[1] - jets[2].d[1];
-    const double side = jets[1].d[1] * e[0] - jets[0].d[1] * e[1];
-    const double slope = jets[0].d[2] * e[0] + jets[1].d[2] * e[1] - jets[2].d[2] +
-                         side * side / std::max(jets[2].d[0], 1e-300);
+    const auto [ux, uy, r] = disc.jets(end);
+    const double value = ux.d[1] * e[0] + uy.d[1] * e[1] - r.d[1];
+    const double side = uy.d[1] * e[0] - ux.d[1] * e[1];
+    const double slope = ux.d[2] * e[0] + uy.d[2] * e[1] - r.d[2] + side * side / std::max(r.d[0], 1e-300);
     (value > 0 ? low : high) = x;
     const double next = x - value / slope;
     const bool inside = next >= low && next <= high;

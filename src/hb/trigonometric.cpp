@@ -61,22 +61,33 @@ void rates(Harmonics const& h, double const* waves, double* out) {
 }
 
 /// Odd and even orders apart: neither chain of powers waits for the other.
-Series::Jet Series::at(double tau) const {
+template <size_t count>
+std::array<Series::Jet, count> jets(std::array<Series const*, count> const& all, double tau) {
   const double c = std::cos(tau), s = std::sin(tau), c2 = c * c - s * s, s2 = 2 * c * s;
   Powers odd(c, s, c2, s2), even(c2, s2, c2, s2);
-  Jet out{{q[0].real(), 0, 0}}, other{};
-  const auto add = [this](size_t n, Powers& e, Jet& to) {
-    const double re = q[n].real(), im = q[n].imag(), k = double(n);
-    const double a = re * e.x - im * e.y, b = k * (re * e.y + im * e.x);
-    to.d[0] += a, to.d[1] -= b, to.d[2] -= k * k * a;
+  std::array<Series::Jet, count> out{}, other{};
+  for (size_t j = 0; j < count; ++j) out[j].d[0] = all[j]->q[0].real();
+  const auto add = [&all](size_t n, Powers& e, std::array<Series::Jet, count>& to) {
+    const double k = double(n);
+    for (size_t j = 0; j < count; ++j) {
+      const double re = all[j]->q[n].real(), im = all[j]->q[n].imag();
+      const double a = re * e.x - im * e.y, b = k * (re * e.y + im * e.x);
+      to[j].d[0] += a, to[j].d[1] -= b, to[j].d[2] -= k * k * a;
+    }
     e.next();
   };
+  const size_t size = all[0]->q.size();
   size_t n = 1;
-  for (; n + 1 < q.size(); n += 2) add(n, odd, out), add(n + 1, even, other);
-  if (n < q.size()) add(n, odd, out);
-  for (int k = 0; k < 3; ++k) out.d[k] += other.d[k];
+  for (; n + 1 < size; n += 2) add(n, odd, out), add(n + 1, even, other);
+  if (n < size) add(n, odd, out);
+  for (size_t j = 0; j < count; ++j)
+    for (int k = 0; k < 3; ++k) out[j].d[k] += other[j].d[k];
   return out;
 }
+
+template std::array<Series::Jet, 3> jets(std::array<Series const*, 3> const&, double);
+
+Series::Jet Series::at(double tau) const { return jets<1>({this}, tau)[0]; }
 
 /// e^{i k (tau + s)} - e^{i k tau} = 2 i sin(k s / 2) e^{i k (tau + s / 2)}
 std::pair<double, double> Series::difference(double tau, double s) const {

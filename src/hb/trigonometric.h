@@ -1,5 +1,6 @@
 #pragma once
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -28,6 +29,10 @@ struct Series {
   /// Of the derivative of this order, p about its mean: sum_k k^order |q_k| over k > 0.
   double bound(int order = 0) const;
 };
+
+/// Of several series of as many terms each, at the price of the waves of one.
+template <size_t count>
+std::array<Series::Jet, count> jets(std::array<Series const*, count> const&, double tau);
 
 /// q_k of a dof's block, about its mean; the mean.
 Series series(Harmonics const&, double const* block);
