@@ -28,6 +28,8 @@ FIRST_FACTOR = 1e-2
 
 #: A tangent with less load than this (displacement and load are of one size) is a motion that nothing holds.
 UNHELD = 1e-10
+#: Of the reference mode's stiffness: what is softer than that is rounding of the stiff contact beside it.
+SOFTEST = 1e-8
 
 
 class StaticPreload(HarmonicProblem):
@@ -134,7 +136,9 @@ def static_preload(
             reason = "the structure moves without load: nothing holds it in some direction"
             break
     if branch.converged:
-        return _settled(problem, y, rest.load + load, history)
+        if not _moves_freely(problem, y):
+            return _settled(problem, y, rest.load + load, history)
+        reason = "it is not the only equilibrium: nothing holds the structure in a direction without load"
     raise NotConverged(
         "no static equilibrium under the full load",
         None,
@@ -142,6 +146,27 @@ def static_preload(
         "1",
         "hold the structure where contact alone cannot (an axial stop), or lower the load",
     )
+
+
+def _moves_freely(problem: StaticPreload, y: PETSc.Vec) -> bool:
+    """Whether nothing holds a direction. Collective.
+
+    Asked of J^-1 b, b of a sign for each unknown: whether a singular J can be factorised differs by its pivots, and so
+    by ranks.
+    """
+    newton = _core.Newton(problem.core, problem.prefix, past_kinks=False)
+    load_factor, b = y.duplicate(), y.duplicate()
+    load_factor.set(0.0)
+    first, end = y.getOwnershipRange()
+    b.setArray(1.0 - 2.0 * (np.arange(first, end) * 2654435761 % 2**32 // 2**31))
+    if end == y.getSize():
+        load_factor.setValue(end - 1, 1.0)
+        b.setValue(end - 1, 0.0)
+    for vector in (load_factor, b):
+        vector.assemble()
+    newton.system.close(load_factor, 0.0)
+    x = y.duplicate()
+    return not newton.linear(y, b, x) or not b.norm() > SOFTEST * x.norm()
 
 
 def _settled(problem: StaticPreload, y: PETSc.Vec, load: Array, history: list[list[float]] | None = None) -> Rest:
