@@ -1,4 +1,7 @@
-"""Columns of the result tables: unit, long name and kind, said once."""
+"""Columns of the result tables: unit, long name and kind, said once.
+
+Units are those of quantities (:mod:`fretwave.units`); who writes or shows a table says in which system it is.
+"""
 
 from __future__ import annotations
 
@@ -8,8 +11,12 @@ from typing import Any, Union
 
 import numpy as np
 
+from .units import SI, UnitSystem
+
 Value = Union[float, int, str]
 
+#: Units of a pure number and of a text.
+PURE = ("", "1", "-")
 #: Longest event text kept in results.h5.
 EVENT_LENGTH = 48
 
@@ -20,14 +27,19 @@ class Column:
 
     Attributes
     ----------
+    unit : str
+        Of the quantity, as "force/length".
     kind : str
         ``f`` number, ``i`` integer, ``s`` text.
+    units : UnitSystem
+        The system that its numbers are in.
     """
 
     name: str
     unit: str
     long_name: str
     kind: str = "f"
+    units: UnitSystem = SI
 
     @property
     def dtype(self) -> str:
@@ -37,7 +49,21 @@ class Column:
     @property
     def attributes(self) -> dict[str, str]:
         """Of the column in results.h5."""
-        return {"units": self.unit, "long_name": self.long_name}
+        return {"units": self.symbol, "long_name": self.long_name}
+
+    def in_units(self, units: UnitSystem) -> Column:
+        """The same of numbers in a system."""
+        return replace(self, units=units)
+
+    @property
+    def symbol(self) -> str:
+        """Its unit in the symbols of the system."""
+        return self.units(self.unit)
+
+    @property
+    def heading(self) -> str:
+        """As the first line of a CSV has it: the name alone in SI, in another system with the unit."""
+        return self.name if self.units == SI or self.unit in PURE else f"{self.name} [{self.symbol}]"
 
     def text(self, value: Value) -> str:
         """The value as the CSV has it: shortest text that gives the same number back."""
@@ -71,7 +97,7 @@ _ALL = (
     Column("start", "1", "number of the start", "i"),
     Column("cycle", "1", "number of the cycle", "i"),
     Column("time", "s", "time in the middle of the cycle"),
-    Column("amplitude", "m", "fundamental amplitude of the observed dof"),
+    Column("amplitude", "length", "fundamental amplitude of the observed dof"),
     Column(
         "omega", "rad/s", "angular frequency, Im lambda; 0 where the motion does not oscillate (EPMC, zeta above 1)"
     ),
@@ -79,7 +105,9 @@ _ALL = (
     Column("omega_mode", "rad/s", "angular frequency of the mode at this amplitude"),
     Column("frequency_hz", "Hz", "frequency, omega / 2 pi"),
     Column("speed_rpm", "rev/min", "speed at which the engine order excites this frequency"),
-    Column("largest_amplitude", "m", "fundamental amplitude of the observed dof in the sector where it is largest"),
+    Column(
+        "largest_amplitude", "length", "fundamental amplitude of the observed dof in the sector where it is largest"
+    ),
     Column("largest_sector", "1", "sector that moves most", "i"),
     Column("phase", "rad", "phase of the fundamental against the force"),
     Column("beta", "1/s", "decay rate, - Re lambda"),
@@ -89,7 +117,7 @@ _ALL = (
     Column("cycles", "1", "normalised wear cycles"),
     Column("vibrations", "1", "vibration cycles"),
     Column("step", "1", "length of the step in normalised wear cycles"),
-    Column("work", "J", "energy that contact dissipates in a period"),
+    Column("work", "energy", "energy that contact dissipates in a period"),
     Column("energy_error", "1", "imbalance of the period's energy, relative to that released by the decay"),
     Column("step_error", "1", "estimated error of the step, as normal load relative to the mean"),
     Column("stick", "1", "share of the period that contact pairs stick"),
@@ -97,10 +125,10 @@ _ALL = (
     Column("open", "1", "share of the period that contact pairs are open"),
     Column("omega_error", "rad/s", "estimated error of omega: modulus of that of lambda"),
     Column("zeta_error", "1", "estimated error of zeta: that of lambda over omega0"),
-    Column("amplitude_error", "m", "estimated error of the complex amplitude, modulus"),
+    Column("amplitude_error", "length", "estimated error of the complex amplitude, modulus"),
     *(
         Column(f"{what}_error_{source}", unit, f"estimated error of {name} by {why}")
-        for what, unit, name in (("lambda", "1/s", "lambda"), ("amplitude", "m", "the complex amplitude"))
+        for what, unit, name in (("lambda", "1/s", "lambda"), ("amplitude", "length", "the complex amplitude"))
         for source, why in _WHY.items()
     ),
     Column("harmonics", "1", "highest harmonic retained", "i"),
@@ -112,7 +140,7 @@ _ALL = (
     Column("wall_s", "s", "wall time of the point"),
     Column("rounding", "1", "what rounding leaves in the scaled residual, expected"),
     Column("accepted", "1", "1: residual below the tolerance; 0: at rounding, without effect on the result", "i"),
-    Column("unclosed", "m", "largest distance of a slider from where it began its period"),
+    Column("unclosed", "length", "largest distance of a slider from where it began its period"),
     Column("event", "", "what was met at the point", "s"),
 )
 COLUMNS = {column.name: column for column in _ALL}
@@ -144,12 +172,12 @@ FORCED = (
 )
 
 
-#: Of a linear mode's coordinate phi^T M x with phi^T M phi = 1 kg.
-MODAL_UNIT = "sqrt(kg) m"
+#: Of a linear mode's coordinate phi^T M x with phi^T M phi of one unit of mass.
+MODAL_UNIT = "sqrt(mass) length"
 
 
 #: Of what is observed beside the amplitude.
-ENERGY = Column("energy", "J", "mechanical energy of the vibration, mean over a period")
+ENERGY = Column("energy", "energy", "mechanical energy of the vibration, mean over a period")
 
 
 def over(columns: Sequence[Column], unit: str, what: str = "") -> list[Column]:
@@ -176,6 +204,26 @@ def with_discretisation(names: Sequence[Any]) -> list[Any]:
     return [*names[:-1], "harmonics", "samples", names[-1]]
 
 
-def columns_named(names: Sequence[str | Column]) -> list[Column]:
+def columns_named(names: Sequence[str | Column], units: UnitSystem = SI) -> list[Column]:
     """Columns by name; an analysis may bring columns of its own."""
-    return [name if isinstance(name, Column) else COLUMNS[name] for name in names]
+    return [(name if isinstance(name, Column) else COLUMNS[name]).in_units(units) for name in names]
+
+
+#: Of tables beside those of the analyses.
+_FURTHER = (
+    *(Column(f"{name}amplitude", "length", "") for name in ("at_", "last_", "sector_", "tuned_", "quadrature_")),
+    Column("amplitude_hb", "length", "amplitude by harmonic balance"),
+    *(Column(f"{name}frequency_hz", "Hz", "") for name in ("tuned_", "quadrature_")),
+)
+
+
+def headings(names: Iterable[str], units: UnitSystem, lengths: str = "length") -> dict[str, str]:
+    """Headings of a further table's columns, whose lengths are amplitudes of this unit; unknown ones have no unit."""
+    known = {**COLUMNS, **{column.name: column for column in _FURTHER}}
+    found = (replace(known[name], units=units) for name in names if name in known)
+    return {c.name: (replace(c, unit=lengths) if c.unit == "length" else c).heading for c in found}
+
+
+def name_of(heading: str) -> str:
+    """The inverse of `Column.heading`."""
+    return heading.partition(" [")[0]

@@ -42,7 +42,7 @@ class Coulomb : public Law {
   int tangents_;
   CoulombParameters p_;                ///< their gap with wear and stand-off
   std::vector<double> closed_;         ///< 1 where closed at rest
-  std::vector<double> unworn_, worn_;  ///< gap without wear, and with it [m]
+  std::vector<double> unworn_, worn_;  ///< gap without wear, and with it [length]
 };
 
 /// A law of these parameters by its name.

@@ -12,8 +12,8 @@ namespace fretwave::contact {
 struct Motion {
   int samples = 0;  ///< samples held here (half a period when the motion is half-wave symmetric)
   int components = 0, pairs = 0;
-  double const* u = nullptr;  ///< relative displacement [m]; null if the law ignores it
-  double const* v = nullptr;  ///< relative velocity [m/s]; null if the law ignores it
+  double const* u = nullptr;  ///< relative displacement [length]; null if the law ignores it
+  double const* v = nullptr;  ///< relative velocity [length/s]; null if the law ignores it
   double step = 0;            ///< time between samples [s]
   std::size_t size() const { return std::size_t(samples) * components * pairs; }
 };
@@ -43,11 +43,11 @@ inline bool at_limit(double force, double limit) { return force >= limit * (1 - 
 /// a law says whether a pair sticks, slips or is open.
 struct Diagnosis {
   std::vector<Status> status;     ///< samples x pairs
-  std::vector<double> work;       ///< dissipated energy [J], pairs
-  std::vector<double> slip_path;  ///< length of the slider's path [m], pairs
+  std::vector<double> work;       ///< dissipated energy [energy], pairs
+  std::vector<double> slip_path;  ///< length of the slider's path [length], pairs
   /// Archard's integral of N |d slider| [N m], pairs (Laxalde et al. 2008, eq. 13); empty: not asked for.
   std::vector<double> archard = {};
-  /// Distance to contact where open, 0 where closed [m], nan without a normal direction; samples x pairs;
+  /// Distance to contact where open, 0 where closed [length], nan without a normal direction; samples x pairs;
   /// empty: not asked for.
   std::vector<double> gap = {};
   /// Of the period in stick, slip and open: 3 x pairs.
@@ -76,9 +76,9 @@ struct LinearPair {
 /// A pair whose force follows its velocity alone, smooth but steep about zero: f(v) is analytic but beyond
 /// v = +-i width, and constant to rounding where |v| >= end.
 struct VelocityLayer {
-  double width;                                          ///< [m/s]
-  double end = std::numeric_limits<double>::infinity();  ///< [m/s]
-  double slip = 0;  ///< |v| from which the pair slips [m/s], as `diagnose` has it
+  double width;                                          ///< [length/s]
+  double end = std::numeric_limits<double>::infinity();  ///< [length/s]
+  double slip = 0;  ///< |v| from which the pair slips [length/s], as `diagnose` has it
 };
 
 /// A contact law with its parameters for the pairs of this rank.
@@ -99,7 +99,7 @@ class Law {
     set_sliders(from.empty() ? std::vector<double>(sliders().size(), 0.0) : from);
     set_rest(u), owner_ = 0, ++version_;
   }
-  /// Where the sliders stand at rest [m], tangents x pairs; none without memory.
+  /// Where the sliders stand at rest [length], tangents x pairs; none without memory.
   virtual std::vector<double> sliders() const { return {}; }
   /// Puts them there, as they are. For an `owner` who has put them there last, nothing is to be done (the
   /// same on every rank, as a comparison of the sliders would not be).
@@ -114,13 +114,13 @@ class Law {
   virtual bool wears() const { return false; }
   /// `stand_off` widens its gaps.
   virtual bool stands_off() const { return wears(); }
-  /// Worn depth of each pair [m], in place of what was set before; the rest state stays as it is. Null: as
+  /// Worn depth of each pair [length], in place of what was set before; the rest state stays as it is. Null: as
   /// they are.
   void wear(double const* depth) {
     if (depth) set_wear(depth);
     ++version_;
   }
-  /// Widens the gaps of all pairs by a distance [m] that is no wear; the rest state stays as it is.
+  /// Widens the gaps of all pairs by a distance [length] that is no wear; the rest state stays as it is.
   void stand_off(double distance) {
     if (distance == stand_off_) return;
     stand_off_ = distance;
@@ -132,7 +132,7 @@ class Law {
   unsigned version() const { return version_; }
   /// f(-u, -v) = -f(u, v): the motion may keep odd harmonics only.
   virtual bool odd() const { return false; }
-  /// Stiffness of the contact when stuck in its rest state [N/m] (0 for a pair that is open there); infinite
+  /// Stiffness of the contact when stuck in its rest state [force/length] (0 for a pair that is open there); infinite
   /// means no relative motion at all.
   virtual double stuck_stiffness(int /*component*/, int /*pair*/) const {
     return std::numeric_limits<double>::infinity();

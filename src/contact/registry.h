@@ -24,7 +24,7 @@ enum class Role {
   regularisation
 };
 
-/// One parameter of a law: the only place of its unit, bound and meaning.
+/// One parameter of a law: the only place of its unit (of a quantity, "force/length"), bound and meaning.
 struct Parameter {
   std::string name, unit, doc;
   Role role = Role::none;
@@ -36,7 +36,7 @@ struct Parameter {
 /// The gap, the same in every law that opens.
 inline Parameter gap_parameter() {
   return {.name = "gap",
-          .unit = "m",
+          .unit = "length",
           .doc = "initial gap; negative is an interference",
           .role = Role::gap,
           .lower = -std::numeric_limits<double>::max(),

@@ -49,7 +49,7 @@ class CubicSpring : public Law {
   void set_rest(double const* u) override { rest_.assign(u, u + rest_.size()); }
 
  private:
-  std::vector<double> cubic_, rest_;  ///< [N/m^3], u at rest [m]
+  std::vector<double> cubic_, rest_;  ///< [force/length^3], u at rest [length]
 };
 
 Entry unilateral_spring_entry();

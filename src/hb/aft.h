@@ -10,24 +10,24 @@ struct ContactSummary {
   double truncated = 0, total = 0;  ///< of the varying force: energy outside the retained orders, and in all
   double aliased = 0,
          retained = 0;  ///< squared change of the coefficients on doubled samples, and their square (n > 0)
-  double work = 0;      ///< dissipated energy per period [J]
-  double unclosed = 0;  ///< largest |w(T) - w(0)| of a slider [m]
-  double path = 0;      ///< longest slip path of a pair in the period [m], to measure it with
+  double work = 0;      ///< dissipated energy per period [energy]
+  double unclosed = 0;  ///< largest |w(T) - w(0)| of a slider [length]
+  double path = 0;      ///< longest slip path of a pair in the period [length], to measure it with
 };
 
 /// Time samples of a period: samples x components x pairs.
 struct ContactPeriod {
   std::vector<double> u, v, f;
-  std::vector<contact::Status> status;  ///< samples x pairs, as is the gap [m]
+  std::vector<contact::Status> status;  ///< samples x pairs, as is the gap [length]
   std::vector<double> gap;
-  std::vector<double> work, shares;  ///< per pair [J]; of the period in stick, slip and open, 3 x pairs
+  std::vector<double> work, shares;  ///< per pair [energy]; of the period in stick, slip and open, 3 x pairs
   double unclosed = 0;               ///< as in ContactSummary
 };
 
 /// What wears a contact over a period, per pair.
 struct Wearing {
   std::vector<double> archard;     ///< integral of N |d slider| [N m]; zero for a law that does not wear
-  std::vector<double> load;        ///< mean normal force [N]
+  std::vector<double> load;        ///< mean normal force [force]
   std::vector<double> slip, open;  ///< shares of the period
 };
 
@@ -39,7 +39,7 @@ class Aft {
  public:
   Aft(Harmonics const&, std::shared_ptr<contact::Law const>);
   int columns() const { return columns_; }
-  /// Force of rounding in a displacement, per metre of it: a stiffness, where it is known by the share of the
+  /// Force of rounding in a displacement, per length of it: a stiffness, where it is known by the share of the
   /// period in which the last force follows it (stick, contact).
   double stiffness(int pair, int component) const {
     return continuous_ ? continuous_->mean_stiffness(pair, component)
@@ -50,7 +50,7 @@ class Aft {
   void force(double const* U, Exponents const&, double* F);
   /// dF for dU and dV, the harmonic blocks of the velocity's perturbation.
   void product(double const* dU, double const* dV, double* dF);
-  /// dF for gaps that grow by dgap (pairs) [m]: N = kn (u_n - gap) sees them as normal displacements that
+  /// dF for gaps that grow by dgap (pairs) [length]: N = kn (u_n - gap) sees them as normal displacements that
   /// fall.
   void gap_product(double const* dgap, double* dF);
   /// Dense dF/dU of each pair, pairs x (components m) x (components m), with the velocity's share through s.

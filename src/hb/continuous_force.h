@@ -18,7 +18,7 @@ class ContinuousForce {
   /// dF/dU at the last force, with the velocity's share through s: pairs x (components m) x (components m).
   virtual void blocks(Exponents const&, double* D) = 0;
   virtual void product(double const* dU, double const* dV, double* dF) = 0;
-  /// dF for gaps that grow by dgap (pairs) [m].
+  /// dF for gaps that grow by dgap (pairs) [length].
   virtual void gap_product(double const* dgap, double* dF) = 0;
   /// Of the last force over the period: the share of contact or stick, times its stiffness.
   virtual double mean_stiffness(int pair, int component) const = 0;
@@ -26,7 +26,7 @@ class ContinuousForce {
   virtual std::uint64_t piece() const = 0;
   /// f (samples x components x pairs) of the last force at the samples u and v.
   virtual void sample(int samples, double const* u, double const* v, double* f) const = 0;
-  /// Largest |w(T) - w(0)| of a slider in that period [m].
+  /// Largest |w(T) - w(0)| of a slider in that period [length].
   virtual double unclosed() const { return 0; }
   /// Work, slip path and Archard's integral of the last force: integrals, not sums over samples; at this
   /// angular frequency [rad/s].

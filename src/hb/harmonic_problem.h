@@ -21,7 +21,7 @@ struct ScaledMotion {
   std::vector<Exponents> dexponents;     ///< d s_n / dz_j
   double load = 1;                       ///< factor on the excitation P
   std::vector<double> dload = {};        ///< d load / dz_j; empty if constant
-  double stand_off = 0, dstand_off = 0;  ///< by which all gaps are widened [m], and by the last scalar
+  double stand_off = 0, dstand_off = 0;  ///< by which all gaps are widened [length], and by the last scalar
 };
 
 /// A row of displacements w . x: (dof, weight), dofs ascending, the whole row on every rank.
@@ -85,9 +85,9 @@ class HarmonicProblem : public solve::Problem {
   /// Sliders at rest of this problem, whatever others of the model do with the laws' (Residual::place).
   void stand(PerContact sliders);
   std::vector<ContactPeriod> contact_periods(Vec y);
-  /// Worn depths of this rank's pairs [m], contact by contact, from now on (Residual::wear).
+  /// Worn depths of this rank's pairs [length], contact by contact, from now on (Residual::wear).
   void wear(PerContact const& depth);
-  /// dr for gaps that grow by dgap [m], the derivative of r by worn depths. Collective.
+  /// dr for gaps that grow by dgap [length], the derivative of r by worn depths. Collective.
   VecHandle gap_product(Vec y, PerContact const& dgap);
   std::vector<Wearing> wearing(Vec y) { return residual_.wearing(coefficients(y), exponents(y)); }
   EnergyBalance energy(Vec y);

@@ -32,7 +32,7 @@ double reference_stiffness(model::Model const& model, double omega, Vec shape, V
   const double k = inertia_per_displacement(model.sum(2), omega, shape, imaginary);
   if (!(k > 0) || !(omega > 0))
     throw InputError("the starting mode has no modal mass or no frequency",
-                     std::to_string(k) + " N/m, " + std::to_string(omega) + " rad/s", "both > 0",
+                     "stiffness " + std::to_string(k) + ", " + std::to_string(omega) + " rad/s", "both > 0",
                      "start from an elastic mode of the model");
   return k;
 }

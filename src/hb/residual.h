@@ -20,7 +20,7 @@ struct PairTangents {
   std::vector<double> D;               ///< pairs x (components m) x (components m)
 };
 
-/// Where the energy of a period goes [J]: pi sum_n n Im(q_n^H p_n) of each force p.
+/// Where the energy of a period goes [energy]: pi sum_n n Im(q_n^H p_n) of each force p.
 struct EnergyBalance {
   double contact = 0;  ///< dissipated by contact
   double damping = 0;  ///< dissipated by C
@@ -59,10 +59,10 @@ class Residual {
   /// Of the last evaluated point. Collective.
   EnergyBalance energy();
 
-  /// Worn depths of the pairs [m], in the laws, which all residuals of the model share; empty for a contact
+  /// Worn depths of the pairs [length], in the laws, which all residuals of the model share; empty for a contact
   /// that does not wear.
   void wear(PerContact const& depth);
-  /// Widens all gaps by a distance [m] that is no wear, in the laws, which all residuals of the model share.
+  /// Widens all gaps by a distance [length] that is no wear, in the laws, which all residuals of the model share.
   void stand_off(double distance);
   /// dR for gaps that all grow by 1 m, at the last evaluated point. Collective.
   void stand_off_product(Vec dR);

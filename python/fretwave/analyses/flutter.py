@@ -49,12 +49,14 @@ class FlutterAnalysis(HarmonicSection):
         "complex nonlinear mode (decaying) or extended periodic motion", example='"CNM"', default="CNM"
     )
     normalise: Observed = key("dof whose fundamental harmonic is the modal amplitude; or weighted dofs", example='"m1"')
-    amplitude: list[Positive] = key("first and last modal amplitude", "m", "[1e-5, 1e-2]", min_length=2, max_length=2)
+    amplitude: list[Positive] = key(
+        "first and last modal amplitude", "length", "[1e-5, 1e-2]", min_length=2, max_length=2
+    )
     nodal_diameters: Optional[list[Whole]] = key(
         "waves looked at, negative for backward ones; all unless told", example="[-4, 3, 4]", default=None, min_length=1
     )
     report_at: list[Positive] = key(
-        "amplitudes at which the motion of a period is kept", "m", "[1e-4]", default_factory=list
+        "amplitudes at which the motion of a period is kept", "length", "[1e-4]", default_factory=list
     )
 
     def waves(self, sectors: int) -> list[int]:
@@ -111,7 +113,7 @@ class FlutterAnalysis(HarmonicSection):
         low, high = self.amplitude
         named = ", ".join(map(str, self.nodal_diameters or [])) or "all"
         start = f"flutter ({self.method}), nodal diameters {named}, linear mode {self.linear_mode}"
-        return f"{start}, a = {low:g} to {high:g} m of {label_of(self.normalise)}"
+        return f"{start}, a = {low:g} to {high:g} {self.units('length')} of {label_of(self.normalise)}"
 
     def run(self, context: AnalysisContext[FlutterAnalysis]) -> Outcome:
         """Follow the mode of every nodal diameter over its amplitude. Collective."""
@@ -144,8 +146,9 @@ def _all_waves(
     _write(context, waves, cycles)
     writer.close("stopped" if stopped else "done", reason, events=json.dumps(cycles), waves=json.dumps(waves))
     context.entry["waves"] = waves
-    summary = [f"{context.name}: {words(wave)}" for wave in waves]
-    goal = f"amplitude {context.analysis.amplitude[1]:g} m in every wave"
+    unit = context.units("length")
+    summary = [f"{context.name}: {words(wave, unit)}" for wave in waves]
+    goal = f"amplitude {context.analysis.amplitude[1]:g} {unit} in every wave"
     return Outcome(writer.rows, reason, not stopped, summary, goal)
 
 
@@ -195,8 +198,9 @@ class _Wave:
     def _say(self, row: Mapping[str, Any]) -> None:
         low, high = self.analysis.amplitude
         share = (self.number + math.log(row["amplitude"] / low) / math.log(high / low)) / self.count
-        line = point_line(f"{self.context.name} ND {with_sign(self.diameter):>3}", dict(row))
-        notable = row["event"] not in ("", "start", "stop") or bool(closure_note(row))
+        units = self.context.units
+        line = point_line(f"{self.context.name} ND {with_sign(self.diameter):>3}", dict(row), units, units("length"))
+        notable = row["event"] not in ("", "start", "stop") or bool(closure_note(row, units))
         self.context.console.point(line, line, share, notable)
 
 

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from ..case.facts import Facts
     from ..case.reporter import Reporter
     from ..hb.problems import HarmonicProblem
+    from ..units import UnitSystem
 
 
 @register_analysis
@@ -50,7 +51,7 @@ class ForcedAnalysis(HarmonicSection):
     )
     force: dict[Dof, float] = key(
         "force amplitude of each excited dof, cosine at harmonic 1, delayed from sector to sector of a wheel",
-        "N",
+        "force",
         "{ m1 = 1.0 }",
         min_length=1,
     )
@@ -213,7 +214,8 @@ def _one_level(
     """Follow one response, on from a phase if it was begun; returns why it stopped early, or nothing. Collective."""
     context, analysis = excitation.context, excitation.analysis
     low, high = (2.0 * math.pi * hertz for hertz in analysis.frequency)
-    problem, unit = excitation.problem(analysis.levels[number]), unit_of(analysis.observe)
+    problem, units = excitation.problem(analysis.levels[number]), context.units
+    unit = units(unit_of(analysis.observe))
     branch = excitation.branch(problem, snapshot, go_on)
     excitation.phase = phase if go_on else None
     for point in points_of(branch):
@@ -222,10 +224,10 @@ def _one_level(
         row = record(writer, now, point, branch.snapshot(), own, excitation.row, analysis.errors)
         share = (number + (row["omega"] - low) / (high - low)) / len(analysis.levels)
         context.console.point(
-            point_line(context.name, row, unit),
+            point_line(context.name, row, units, unit),
             _short(row, unit),
             share,
-            _notable(row["event"]) or bool(closure_note(row)),
+            _notable(row["event"]) or bool(closure_note(row, units)),
         )
     tell(context, branch, f"{context.name}: level {analysis.levels[number]:g}")
     stopped = "" if branch.converged else f"level {analysis.levels[number]:g}: {branch.reason}"
@@ -233,7 +235,7 @@ def _one_level(
         most = _bounded(excitation, branch.problem, branch.anchor)
         stopped += f": damping and friction take at most the work of level {most:.4g}"
     elif stopped:
-        stopped += suspects(context.model.contacts, problem.core.stiffness_scale)
+        stopped += suspects(context.model.contacts, problem.core.stiffness_scale, units)
     branch.destroy()
     problem.destroy()
     return stopped
@@ -257,7 +259,7 @@ def _notable(event: str) -> bool:
     return bool(event) and event not in ("start", "stop")
 
 
-def point_line(name: str, row: dict[str, Any], unit: str) -> str:
+def point_line(name: str, row: dict[str, Any], units: UnitSystem, unit: str) -> str:
     """One plain line of progress."""
     return (
         f"{name} {row['point']:4d}  level {row['level']:6.4g}  f {row['frequency_hz']:9.5g} Hz"
@@ -265,7 +267,7 @@ def point_line(name: str, row: dict[str, Any], unit: str) -> str:
         f"  phase {math.degrees(row['phase']):7.2f} deg  stick {100 * row['stick']:3.0f} %"
         f"  newton {row['newton']:2d}  {row['wall_s']:.3f} s"
         + (f"  {row['event'].replace('_', ' ')}" if row["event"] else "")
-        + closure_note(row)
+        + closure_note(row, units)
     )
 
 

@@ -34,7 +34,7 @@ class TransientSection(AnalysisSection):
     """Keys of the analyses by direct time integration."""
 
     mode: str = key("mode analysis to start from and compare with", example='"mode"')
-    amplitude: list[Positive] = key("start amplitudes", "m", "[0.05, 0.3, 2.5]", min_length=1)
+    amplitude: list[Positive] = key("start amplitudes", "length", "[0.05, 0.3, 2.5]", min_length=1)
     periods: Whole = key("vibration periods to integrate", example="30", ge=1)
     samples_per_period: Whole = key("output samples of a period", example="64", default=64, ge=8)
     tolerance: Positive = key("relative tolerance of the time integration", "-", "1e-10", default=TIME_TOLERANCE, lt=1)
@@ -63,9 +63,9 @@ class TransientSection(AnalysisSection):
         return {f"periods: {count} samples of {facts.least_dofs} dofs": 2.0 * NUMBER * facts.least_dofs * count}
 
     def headline(self) -> str:
-        starts = ", ".join(f"{amplitude:g}" for amplitude in self.amplitude)
+        starts = ", ".join(f"{amplitude:g}" for amplitude in self.amplitude) + f" {self.units('length')}"
         kind = super().headline()
-        return f"{kind} by time integration from '{self.mode}', starts a = {starts} m, {self.periods} periods"
+        return f"{kind} by time integration from '{self.mode}', starts a = {starts}, {self.periods} periods"
 
 
 @register_analysis

@@ -41,7 +41,7 @@ class LimitCycleAnalysis(TransientSection):
                 starts.write(number, motion, cycle_rows(number, cycles))
                 found = ending(cycles, motion.diverged)
                 endings.append({"start": amplitude, **vars(found), **compare(found, crossings)})
-                lines.append(_ending_line(context.name, amplitude, found, crossings))
+                lines.append(_ending_line(context.name, amplitude, found, crossings, context.units("length")))
             done = starts.finish(lines, endings=json.dumps(endings))
         # only now: results.h5 can be read again when the writer has closed it
         done.summary += shifted_damping(
@@ -50,13 +50,13 @@ class LimitCycleAnalysis(TransientSection):
         return done
 
 
-def _ending_line(name: str, start: float, found: Ending, crossings: Sequence[Crossing]) -> str:
+def _ending_line(name: str, start: float, found: Ending, crossings: Sequence[Crossing], unit: str) -> str:
     differences = compare(found, crossings)
-    line = f"{name}: from a = {start:g} m: {found.text}, a = {found.amplitude:.5g} m, "
+    line = f"{name}: from a = {start:g} {unit}: {found.text}, a = {found.amplitude:.5g} {unit}, "
     line += f"{found.omega / (2.0 * np.pi):.5g} Hz"
     if not np.isfinite(differences["predicted"]):
         return line
     return line + (
-        f"; predicted {differences['predicted']:.5g} m: amplitude {differences['amplitude_difference']:+.1e}, "
+        f"; predicted {differences['predicted']:.5g} {unit}: amplitude {differences['amplitude_difference']:+.1e}, "
         f"frequency {differences['frequency_difference']:+.1e} (relative)"
     )

@@ -49,6 +49,7 @@ if TYPE_CHECKING:
     from ..case.reporter import Reporter
     from ..hb.problems import NonlinearMode
     from ..solve.continuation import Continuation, Point
+    from ..units import UnitSystem
     from .parts.branch import Describe
 
 
@@ -74,11 +75,11 @@ class ModeAnalysis(HarmonicSection):
         example='"m1"',
     )
     amplitude: list[Positive] = key(
-        "first and last modal amplitude", "m, or sqrt(kg) m", "[0.02, 3.0]", min_length=2, max_length=2
+        "first and last modal amplitude", "length, or sqrt(mass) length", "[0.02, 3.0]", min_length=2, max_length=2
     )
     report_at: list[Positive] = key(
         "amplitudes at which the motion of a period is kept",
-        "m, or sqrt(kg) m",
+        "length, or sqrt(mass) length",
         "[0.1, 0.5]",
         default_factory=list,
     )
@@ -112,7 +113,7 @@ class ModeAnalysis(HarmonicSection):
     def headline(self) -> str:
         low, high = self.amplitude
         start = f"nonlinear mode ({self.method}) from linear mode {self.linear_mode}"
-        return f"{start}, a = {low:g} to {high:g} {unit_of(self.normalise)} of {label_of(self.normalise)}"
+        return f"{start}, a = {low:g} to {high:g} {self.units(unit_of(self.normalise))} of {label_of(self.normalise)}"
 
     def wave_word(self) -> str:
         return "standing wave" if self.wave == "standing" else "wave"
@@ -150,7 +151,7 @@ def _follow(
 ) -> Outcome:
     analysis = context.analysis
     low, high = analysis.amplitude
-    unit = unit_of(analysis.normalise)
+    units, unit = context.units, context.units(unit_of(analysis.normalise))
     reduction = context.case.reduction
     estimated = context.case.unreduced is not None and context.case.wheel is None
     error_at = reduction.error_at if reduction is not None and estimated else None
@@ -170,12 +171,15 @@ def _follow(
                 context.console.line(_reduction_error(context, now, point, row))
             share = math.log(row["amplitude"] / low) / math.log(high / low)
             context.console.point(
-                point_line(context.name, row, unit), _short(row, unit), share, bool(row["event"] or closure_note(row))
+                point_line(context.name, row, units, unit),
+                _short(row, unit),
+                share,
+                bool(row["event"] or closure_note(row, units)),
             )
     tell(context, branch)
     outcome = _finish(context, writer, branch, start, problem)
     if not branch.converged:
-        outcome.reason += suspects(context.model.contacts, problem.core.stiffness_scale)
+        outcome.reason += suspects(context.model.contacts, problem.core.stiffness_scale, units)
     outcome.goal = f"amplitude {high:g} {unit}"
     branch.destroy()
     return outcome
@@ -197,7 +201,7 @@ def _reduction_error(
 
     error = nonlinear_error_at(context.case, context.analysis, problem, point.y)
     context.entry["reduction_error"] = {"amplitude": row["amplitude"], **dataclasses.asdict(error)}
-    place = f"{row['amplitude']:.4g} {unit_of(context.analysis.normalise)}"
+    place = f"{row['amplitude']:.4g} {context.units(unit_of(context.analysis.normalise))}"
     return (
         f"{context.name}: at {place} the unreduced model would change omega by"
         f" {error.omega / row['omega']:+.1e} of itself and zeta by {100 * error.zeta:+.1e} %"
@@ -213,7 +217,7 @@ def _finish(
     problem: NonlinearMode,
 ) -> Outcome:
     table = finished_table(writer)
-    summary = summarise(context.name, table, unit_of(context.analysis.normalise)) if table else []
+    summary = summarise(context.name, table, context.units(unit_of(context.analysis.normalise))) if table else []
     summary += finish_wheel(context, writer, start) if context.case.wheel is not None else []
     summary.append(f"linear systems: {branch.route}")
     events = json.dumps(limit_cycles(table)) if table else "[]"
@@ -225,7 +229,7 @@ def _finish(
     return Outcome(writer.rows, branch.reason, branch.converged, summary, advice=advice)
 
 
-def point_line(name: str, row: dict[str, Any], unit: str = "m") -> str:
+def point_line(name: str, row: dict[str, Any], units: UnitSystem, unit: str) -> str:
     """One plain line of progress."""
     return (
         f"{name} {row['point']:4d}  a {row['amplitude']:9.4g} {unit}  f {row['frequency_hz']:9.5g} Hz"
@@ -233,7 +237,7 @@ def point_line(name: str, row: dict[str, Any], unit: str = "m") -> str:
         f"{error_text(100 * row['zeta_error'])}  newton {row['newton']:2d}  {row['wall_s']:.3f} s"
         + ("  overdamped" if abs(row["zeta"]) >= 1 else "")
         + (f"  {row['event'].replace('_', ' ')}" if row["event"] else "")
-        + closure_note(row)
+        + closure_note(row, units)
     )
 
 

@@ -28,13 +28,13 @@ COLUMNS = (
     Column("factor", "1", "factor on the loads"),
     Column("contact", "", "name of the contact", "s"),
     Column("pair", "1", "number of the pair", "i"),
-    Column("x", "m", "place of the pair"),
-    Column("y", "m", "place of the pair"),
-    Column("z", "m", "place of the pair"),
-    Column("normal_force", "N", "compressive normal force"),
-    Column("tangential_force", "N", "magnitude of the tangential force"),
+    Column("x", "length", "place of the pair"),
+    Column("y", "length", "place of the pair"),
+    Column("z", "length", "place of the pair"),
+    Column("normal_force", "force", "compressive normal force"),
+    Column("tangential_force", "force", "magnitude of the tangential force"),
     Column("status", "", "stick, slip or open", "s"),
-    Column("gap", "m", "distance to contact of an open pair"),
+    Column("gap", "length", "distance to contact of an open pair"),
 )
 #: Names of the states as the laws number them.
 WORDS = {state: word for word, state in STATUS.items()}
@@ -125,7 +125,7 @@ def pair_state(spec: Contact, state: Mapping[str, Any], pair: int) -> dict[str, 
 
 def _summary(context: AnalysisContext[StaticAnalysis], rest: Rest, factor: float) -> list[str]:
     """Status of the pairs and balance of the forces."""
-    lines = []
+    lines, unit = [], context.units("force")
     contacts = context.comm.bcast(rest.contacts)
     for spec, state in zip(context.case.contacts, contacts):
         rows = [pair_state(spec, state, pair) for pair in range(spec.n_pairs)]
@@ -135,7 +135,7 @@ def _summary(context: AnalysisContext[StaticAnalysis], rest: Rest, factor: float
             f"{number} {word}" for word, number in count.items()
         )
         if spec.info.normal is not None:
-            text += f"; normal forces {forces.min():.4g} to {forces.max():.4g} N, sum {forces.sum():.6g} N"
+            text += f"; normal forces {forces.min():.4g} to {forces.max():.4g} {unit}, sum {forces.sum():.6g} {unit}"
         lines += [text, *_resultant(context, spec, state["f"])]
     if section_loads(context):
         lines.append(f"{context.name}: imbalance of the forces {rest.imbalance:.1e} of the load")
@@ -148,5 +148,6 @@ def _resultant(context: AnalysisContext[StaticAnalysis], spec: Contact, f: Array
     if frames is None or loads is None:
         return []
     total = np.einsum("kcx,ck->x", frames, f)
-    shown = [", ".join(f"{value:.5g}" for value in vector) for vector in (total, loads)]
-    return [f"{context.name}: contact carries ({shown[0]}) N along x, y, z of the loads' ({shown[1]}) N at factor 1"]
+    unit = context.units("force")
+    found, given = (f"({', '.join(f'{value:.5g}' for value in vector)}) {unit}" for vector in (total, loads))
+    return [f"{context.name}: contact carries {found} along x, y, z of the loads' {given} at factor 1"]

@@ -49,9 +49,9 @@ class WearAnalysis(AnalysisSection):
 
     type: Literal["wear"]
     mode: str = key("mode analysis whose settings and branch this one takes", example='"mode"')
-    amplitude: list[Positive] = key("fixed modal amplitudes, one or a grid", "m", "[1.2e-3]", min_length=1)
+    amplitude: list[Positive] = key("fixed modal amplitudes, one or a grid", "length", "[1.2e-3]", min_length=1)
     cycles: Positive = key("normalised wear cycles to march", "-", "40.0")
-    coefficient: float = key("wear coefficient k_w", "1/Pa", "1e-14", ge=0, allow_inf_nan=False)
+    coefficient: float = key("wear coefficient k_w", "1/pressure", "1e-14", ge=0, allow_inf_nan=False)
     cycle_unit: Optional[Positive] = key(
         "vibration cycles in a normalised one (by default: in which sliding 4 mu N0/kt a cycle leaves 1/e of the load)",
         "-",
@@ -123,7 +123,9 @@ class WearAnalysis(AnalysisSection):
 
     def headline(self) -> str:
         amplitudes = ", ".join(f"{amplitude:g}" for amplitude in self.amplitude)
-        return f"wear of '{self.mode}' at a = {amplitudes} m over {self.cycles:g} normalised cycles"
+        return (
+            f"wear of '{self.mode}' at a = {amplitudes} {self.units('length')} over {self.cycles:g} normalised cycles"
+        )
 
     def run(self, context: AnalysisContext[WearAnalysis]) -> Outcome:
         """March all amplitudes. Collective."""
@@ -182,7 +184,7 @@ def _collect(
             keep_pairs(context, writer)
             for name, areas in wear_areas(context.case).items():
                 if f"pairs_{name}" in writer.group:
-                    writer.dataset(f"pairs_{name}/area", areas, units="m^2", long_name="nodal area")
+                    writer.dataset(f"pairs_{name}/area", areas, units="length^2", long_name="nodal area")
         writer.close("stopped" if failures else "done", reason)
     finally:
         writer.abandon()
@@ -196,7 +198,8 @@ def _failures(analysis: WearAnalysis, lines: list[Line], results: list[Any]) -> 
     """Amplitudes whose line did not end as it should, with the reason."""
     why = {line.number: _why(result) for line, result in zip(lines, results)}
     reasons = [why.get(number, "not reached by the mode") for number in range(len(analysis.amplitude))]
-    return [f"a = {amplitude:g} m: {text}" for amplitude, text in zip(analysis.amplitude, reasons) if text]
+    unit = analysis.units("length")
+    return [f"a = {amplitude:g} {unit}: {text}" for amplitude, text in zip(analysis.amplitude, reasons) if text]
 
 
 def _writer(context: AnalysisContext[WearAnalysis], unit: float, marched: dict[str, Any]) -> AnalysisWriter:

@@ -12,9 +12,12 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Optional, TypeVar, get_args
 
+from pydantic import PrivateAttr
+
 from .. import registry
 from ..errors import InputError
 from ..results.sweep_summary import COUNTS, Summary
+from ..units import SI, UnitSystem
 from .checks_common import check_common
 from .schema import Damper, Name, PreloadSection, Section, key
 
@@ -65,6 +68,17 @@ class AnalysisSection(Section):
         default_factory=list,
     )
     petsc: str = key("PETSc options of this analysis", example='"-snes_rtol 1e-9"', default="")
+
+    _units: UnitSystem = PrivateAttr(default=SI)
+
+    @property
+    def units(self) -> UnitSystem:
+        """The system that the case's numbers are in; ``units("length")`` is its symbol of a length."""
+        return self._units
+
+    def read_in(self, units: UnitSystem) -> None:
+        """Say which system its numbers are in."""
+        self._units = units
 
     # What the rest of the case must do for it
 
@@ -132,7 +146,8 @@ class AnalysisSection(Section):
         """Further lines of `fretwave check`. Collective."""
         if not self.dampers:
             return []
-        return ["added dampers: " + ", ".join(f"{damper.c:g} N s/m at {damper.dof}" for damper in self.dampers)]
+        unit = self.units("force s/length")
+        return ["added dampers: " + ", ".join(f"{damper.c:g} {unit} at {damper.dof}" for damper in self.dampers)]
 
     # The run, and what comes of it
 

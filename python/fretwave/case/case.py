@@ -14,6 +14,7 @@ from ..model.contact import Contact
 from ..model.sectors import Sparse
 from ..model.structure import Structure
 from ..texts import toml
+from ..units import UnitSystem
 from .analysis import Analyses, AnalysisSection
 from .reduction_report import ReductionReport
 from .schema import (
@@ -112,23 +113,28 @@ class Case:
 
     @property
     def M(self) -> Sparse:
-        """(n_dof, n_dof) [kg], of a sector its own part."""
+        """(n_dof, n_dof) [mass], of a sector its own part."""
         return self.structure.own("M")
 
     @property
     def K(self) -> Sparse:
-        """(n_dof, n_dof) [N/m], of a sector its own part."""
+        """(n_dof, n_dof) [force/length], of a sector its own part."""
         return self.structure.own("K")
 
     @property
     def C(self) -> Sparse | None:
-        """(n_dof, n_dof) [N s/m] as it is given, of a sector its own part; None where it is not."""
+        """(n_dof, n_dof) [force s/length] as it is given, of a sector its own part; None where it is not."""
         return self.structure.own("C")
 
     @property
     def loads(self) -> Mapping[str, Array]:
-        """Static loads (n_dof,) [N] by name."""
+        """Static loads (n_dof,) [force] by name."""
         return self.structure.loads
+
+    @property
+    def units(self) -> UnitSystem:
+        """The system that all its numbers are in."""
+        return self.structure.unit_system
 
     @property
     def neighbours(self) -> Structure | None:

@@ -13,6 +13,7 @@ from ..errors import FretwaveError, InputError
 from ..model.laws import LawInfo, ParameterInfo
 from ..model.pairs import Pairs
 from ..texts import nearest, toml
+from ..units import quantity
 from .schema import ContactSection
 from .toml.source import Source
 from .toml.validation import at
@@ -69,7 +70,9 @@ def parameters_of(
     path = ("contact", number)
     known = {parameter.name: parameter for parameter in law.parameters}
     areas = given.areas if given else None
-    per_area = [] if areas is None else [name + PER_AREA for name, p in known.items() if p.unit.startswith("N")]
+    per_area = (
+        [] if areas is None else [name + PER_AREA for name, p in known.items() if quantity(p.unit).startswith("force")]
+    )
     before = len(found)
     for key in section.model_extra or {}:
         if key not in known and key not in per_area:
@@ -114,7 +117,7 @@ def _value(
     sign = ">" if parameter.strict else ">="
     bounded = parameter.lower is not None and np.isfinite(parameter.lower)
     bound = f" {sign} {parameter.lower:g}" if bounded else ""
-    expected = f"a number{bound}, or one per pair ({n_pairs}): {parameter.doc} [{parameter.unit}]"
+    expected = f"a number{bound}, or one per pair ({n_pairs}): {parameter.doc} [{source.units(parameter.unit)}]"
     if value is None:
         if parameter.default is None:
             found.append(

@@ -34,7 +34,7 @@ def closed_contacts(contacts: Sequence[Contact]) -> list[Contact]:
 
 
 def wear_areas(contacts: Sequence[Contact]) -> dict[str, Array]:
-    """Nodal areas (n_pairs,) [m^2] of the contacts that can wear: those whose law has a normal direction.
+    """Nodal areas (n_pairs,) [length^2] of the contacts that can wear: those whose law has a normal direction.
 
     Raises
     ------

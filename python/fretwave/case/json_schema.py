@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from pydantic import BaseModel
 
 from ..registry import kinds
+from ..units import quantity
 from .contact_parameters import PER_AREA
 from .schema import (
     TOP_LEVEL,
@@ -134,5 +135,5 @@ def _parameter(parameter: ParameterInfo, per_area: str) -> Schema:
     number: Schema = {"type": "number"}
     if parameter.lower > -1e300:
         number["exclusiveMinimum" if parameter.strict else "minimum"] = parameter.lower
-    text = f"{parameter.doc}{per_area} [{parameter.unit}{'/m2' if per_area else ''}]"
+    text = f"{parameter.doc}{per_area} [{quantity(parameter.unit)}{'/length^2' if per_area else ''}]"
     return {"description": text, "anyOf": [number, {"type": "array", "items": number, "minItems": 1}]}

@@ -33,6 +33,7 @@ from .schema import (
 from .sector import tie
 from .toml.source import Source
 from .toml.validation import validate
+from .units import in_units
 
 Table = TypeVar("Table", bound=Section)
 
@@ -112,6 +113,11 @@ def _build(
     study = _table(StudySection, "study", source, found)
     given = load_origin(section, source, found) if section else None
     structure, places, identity = given or (None, {}, {})
+    notes: list[str] = []
+    if section and structure:
+        structure, identity = in_units(section, source, structure, identity, notes, found)
+        for analysis in analyses.values():
+            analysis.read_in(structure.unit_system)
     dofs = structure.dof_names if structure else None
     built = structure.pairs if structure else {}
     contacts = read_contacts(source, dofs, laws, found, built)
@@ -148,7 +154,6 @@ def _build(
     checks.check_analyses(source, analyses, facts, found)
     check_reduction(source, reduction, analyses, facts.sectors, found)
     check_preload(source, preload, facts.loads, found)
-    notes: list[str] = []
     if structure is not None:
         rows = [contact.pairs.own for contact in contacts] if facts.complete else None
         check_physics(structure, places, rows, notes, found)

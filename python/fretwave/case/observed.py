@@ -74,8 +74,8 @@ def _term(weight: float, dof: str) -> tuple[str, str]:
 
 
 def unit_of(observed: Union[str, ObservedTable]) -> str:
-    """Of its amplitude."""
-    return "m" if isinstance(observed, str) or observed.mode is None else MODAL_UNIT
+    """Of its amplitude, as a quantity."""
+    return "length" if isinstance(observed, str) or observed.mode is None else MODAL_UNIT
 
 
 def given_to(facts: Facts, name: str, key: str) -> Any:
@@ -85,7 +85,7 @@ def given_to(facts: Facts, name: str, key: str) -> Any:
 
 
 def check_displaced(report: Reporter, key: str, name: str, facts: Facts) -> None:
-    """The mode analysis that a key names is over a displacement [m]."""
+    """The mode analysis that a key names is over a displacement [length]."""
     given = given_to(facts, name, "normalise")
     if isinstance(given, dict) and "mode" in given:
         expected = "a mode over a displacement: a dof, or a row of dofs"

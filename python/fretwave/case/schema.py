@@ -1,4 +1,4 @@
-"""What may stand in a case file: every key with its one-line doc, unit and default.
+"""What may stand in a case file: every key with its one-line doc, unit (of a quantity) and default.
 
 The models below are the only place where keys, defaults and plain bounds are written, but for those of an analysis,
 which stand in its own file (:mod:`fretwave.analyses`). Checks that need matrices or other entries are in
@@ -14,6 +14,7 @@ from pydantic_core import PydanticKnownError
 
 from ..model.sizes import COMPARED_MODES, COMPONENT_MODES, INTERFACE_TOLERANCE, INTERFACE_WAVES
 from ..solve.steps import StepControl
+from ..units import MM_T_S, SI, SYSTEMS
 
 #: Longest name: results are files of that name, whose systems allow 255 characters with all that is added.
 LONGEST_NAME = 100
@@ -36,6 +37,7 @@ Dof = Annotated[
     WithJsonSchema({"type": ["string", "integer"]}),
     Field(pattern=r"^[^\x00-\x1f\x7f]{1,100}$"),
 ]
+UnitName = Annotated[str, WithJsonSchema({"type": "string", "enum": list(SYSTEMS)})]
 Name = Annotated[str, Field(max_length=LONGEST_NAME)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Matrix = Union[str, list[list[float]]]
@@ -60,12 +62,14 @@ class ModelSection(Section):
     dofs: Optional[list[Dof]] = key(
         "names of the dofs, in the order of the matrices", example='["m1", "m2"]', default=None
     )
-    M: Optional[Matrix] = key("mass matrix, rows or a .npz/.mtx file", "kg", "[[1.0, 0.0], [0.0, 0.02]]", default=None)
+    M: Optional[Matrix] = key(
+        "mass matrix, rows or a .npz/.mtx file", "mass", "[[1.0, 0.0], [0.0, 0.02]]", default=None
+    )
     K: Optional[Matrix] = key(
-        "stiffness matrix, rows or a .npz/.mtx file", "N/m", "[[2.0, -1.0], [-1.0, 1.0]]", default=None
+        "stiffness matrix, rows or a .npz/.mtx file", "force/length", "[[2.0, -1.0], [-1.0, 1.0]]", default=None
     )
     C: Optional[Matrix] = key(
-        "damping matrix, rows or a .npz/.mtx file", "N s/m", "[[0.1, 0.0], [0.0, 0.1]]", default=None
+        "damping matrix, rows or a .npz/.mtx file", "force s/length", "[[0.1, 0.0], [0.0, 0.1]]", default=None
     )
     builder: Optional[str] = key(
         "Python file whose build(**options) gives the model, in place of matrices", example='"model.py"', default=None
@@ -82,6 +86,12 @@ class ModelSection(Section):
     low: Optional[list[Dof]] = key("dofs of the sector's low face", example='["rim_0"]', default=None, min_length=1)
     high: Optional[list[Dof]] = key(
         "dofs of its high face, which move like the low face of the next sector", example='["rim_1"]', default=None
+    )
+    units: Optional[UnitName] = key(
+        f"unit system of all numbers of the case and its model: one of {', '.join(SYSTEMS)} (by default that of the "
+        f"model, else {SI.name})",
+        example=f'"{MM_T_S.name}"',
+        default=None,
     )
     stiffness_damping: float = key("C grows by this times K", "s", "2e-6", default=0.0, ge=0, allow_inf_nan=False)
     mass_damping: float = key("C grows by this times M", "1/s", "0.1", default=0.0, ge=0, allow_inf_nan=False)
@@ -119,7 +129,7 @@ class ReductionSection(Section):
         "nodal diameters compared (those of the analyses and of the interface modes)", example="[4, 8]", default=None
     )
     error_at: Optional[Positive] = key(
-        "amplitude at which each mode's error against the unreduced model is estimated", "m", "1e-3", default=None
+        "amplitude at which each mode's error against the unreduced model is estimated", "length", "1e-3", default=None
     )
 
 
@@ -140,7 +150,7 @@ class AerodynamicsSection(Section):
     frequency: Positive = key("vibration frequency at which they hold", "Hz", "194.3")
     influence: Optional[dict[str, list[float]]] = key(
         "complex force on a blade by the unit motion of the blade k places ahead: k = [real, imaginary]",
-        "N/m at a dof, 1/s2 modal",
+        "force/length at a dof, 1/s^2 modal",
         "{ 0 = [0.0, -20.0], 1 = [-8.0, 3.0], -1 = [8.0, 3.0] }",
         default=None,
         min_length=1,
@@ -198,7 +208,7 @@ class Damper(Section):
     """A viscous damper from one dof to ground, added in one analysis."""
 
     dof: Dof = key("dof the damper acts on", example='"m1"')
-    c: float = key("damper constant, negative to destabilise", "N s/m", "-1.0", allow_inf_nan=False)
+    c: float = key("damper constant, negative to destabilise", "force s/length", "-1.0", allow_inf_nan=False)
 
 
 class MistuningSection(Section):

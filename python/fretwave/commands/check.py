@@ -51,6 +51,7 @@ def _report(case: Case, described: dict[str, list[str]]) -> list[str]:
     lines = [f"{display(case.path)}: no errors", case.title]
     shown = ", ".join(case.dofs[:8]) + (", ..." if len(case.dofs) > 8 else "")
     lines.append(f"  {len(case.dofs)} dofs: {shown}")
+    lines.append(f"  units: {case.units.described()}")
     for contact in case.contacts:
         values = ", ".join(f"{key} = {span(value)}" for key, value in contact.parameters.items())
         lines.append(f"  contact '{contact.name}': {contact.law}, {counted(contact.n_pairs, 'contact pair')}, {values}")

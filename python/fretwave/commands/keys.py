@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from pathlib import Path
 
 from pydantic import BaseModel
@@ -35,10 +35,11 @@ def key_lines(case: Path | None = None) -> Iterator[str]:
 
     Parameters
     ----------
-    case : whose plug-ins' analyses are listed too
+    case : whose plug-ins' analyses are listed too, and in whose units; without it units are of quantities
     """
     if case is not None:
         _load_plugins(case)
+    units = str if case is None else Source(case).units
     yield "top level"
     yield from (f"  {name:<18} {'':<12} {text}" for name, text in TOP_LEVEL.items() if name in ("title", "plugins"))
     sections: dict[str, type[BaseModel]] = {
@@ -51,10 +52,10 @@ def key_lines(case: Path | None = None) -> Iterator[str]:
     }
     for title, section in sections.items():
         yield title
-        yield from _section(section)
+        yield from _section(section, units)
     for kind, analysis in kinds().items():
         yield f'[[analysis]] with type = "{kind}"'
-        yield from _section(analysis, without=set(AnalysisSection.model_fields))
+        yield from _section(analysis, units, without=set(AnalysisSection.model_fields))
     tables: dict[str, type[BaseModel]] = {
         "step = { ... }": StepSection,
         "mistuning = { ... }": MistuningSection,
@@ -64,7 +65,7 @@ def key_lines(case: Path | None = None) -> Iterator[str]:
     }
     for title, nested in tables.items():
         yield title
-        yield from _section(nested)
+        yield from _section(nested, units)
 
 
 def schema_text(case: Path | None = None) -> str:
@@ -83,10 +84,10 @@ def _load_plugins(case: Path) -> None:
         raise CaseErrors(found, source.label)
 
 
-def _section(section: type[BaseModel], without: Collection[str] = ()) -> Iterator[str]:
+def _section(section: type[BaseModel], units: Callable[[str], str], without: Collection[str] = ()) -> Iterator[str]:
     for name, field in section.model_fields.items():
         if name not in without:
-            yield f"  {name:<18} {_default(field):<12} {describe(field)}"
+            yield f"  {name:<18} {_default(field):<12} {describe(field, units)}"
 
 
 def _default(field: FieldInfo) -> str:

@@ -160,7 +160,9 @@ def _add_view(commands: _SubParsers) -> None:
     view.add_argument("--analysis", metavar="NAME", help="mode, forced response or wear (default: the first)")
     which = view.add_mutually_exclusive_group()
     which.add_argument("--point", type=int, nargs="+", default=[], metavar="N", help="points of the branch")
-    which.add_argument("--amplitude", type=float, nargs="+", default=[], metavar="A", help="nearest kept points [m]")
+    which.add_argument(
+        "--amplitude", type=float, nargs="+", default=[], metavar="A", help="nearest kept points [length]"
+    )
     view.add_argument("--sectors", type=int, nargs="+", default=[], metavar="J", help="of a wheel (default: all)")
     view.add_argument("--phases", type=int, default=32, metavar="N", help="steps of a period (default 32)")
     view.add_argument("--scale", default="auto", metavar="X", help="enlargement in the field warp (default auto)")

@@ -14,6 +14,7 @@ from ..files.lock import is_taken
 from ..results.file import open_results, unit_of_amplitudes
 from ..results.record import RECORD, read_record
 from ..texts import counted, display
+from ..units import UnitSystem, units_of
 
 if TYPE_CHECKING:
     import h5py
@@ -93,7 +94,7 @@ def describe(name: str, group: h5py.Group) -> tuple[str, ...]:
         str(group.attrs["status"]),
         str(len(next(iter(table.values())))),
         _range(table, unit),
-        _largest(table, unit),
+        _largest(table, unit, units_of(group.attrs)),
         str(_count(table, "fold")) if "event" in table else "",
         _error(table, unit),
         f"{table['wall_s'].sum():.2f} s" if "wall_s" in table else "",
@@ -119,12 +120,13 @@ def _range(table: dict[str, Any], of_amplitude: str) -> str:
     return f"{text}, {table['cycles'].max():.4g} cycles" if "cycles" in table else text
 
 
-def _largest(table: dict[str, Any], unit: str) -> str:
+def _largest(table: dict[str, Any], unit: str, units: UnitSystem) -> str:
     if "zeta" in table and "omega0" in table and len(table["zeta"]):
         top = int(np.argmax(table["zeta"]))
         if "cycles" in table:
-            worn = 1e9 * np.sum([table[name] for name in table if name.startswith("worn_")], axis=0).max()
-            return f"zeta {100 * table['zeta'][top]:.3g} %, {table['cycles'][top]:.3g} cycles; worn {worn:.3g} mm^3"
+            factor, cubic = units.of_volumes
+            worn = factor * np.sum([table[name] for name in table if name.startswith("worn_")], axis=0).max()
+            return f"zeta {100 * table['zeta'][top]:.3g} %, {table['cycles'][top]:.3g} cycles; worn {worn:.3g} {cubic}"
         return f"zeta {100 * table['zeta'][top]:.3g} %, {table['amplitude'][top]:.4g} {unit}"
     if "level" in table and len(table["amplitude"]):
         top = int(np.argmax(table["amplitude"]))

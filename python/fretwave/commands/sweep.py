@@ -17,7 +17,7 @@ from ..mpi.interrupt import say_how_to_go_on
 from ..post.grid import Plan
 from ..results.runfolder import CASE_COPY, RunFolder, new_record, peak_memory_mb, read_copy
 from ..results.sweep_summary import landmarks, summary_of
-from ..results.sweeps import amplitude_unit, write_sweep
+from ..results.sweeps import amplitude_unit, summary_headings, write_sweep
 from ..run.order import RunOptions
 from ..run.runner import Runner, plot
 from ..run.sweep import Checked, Sweep
@@ -122,7 +122,7 @@ def _write(
 ) -> tuple[list[dict[str, Any]], list[str]]:
     """One group, one table for each analysis, one summary of all; lines to print. One rank only."""
     run_id = folder.record["run_id"]
-    outcomes, summary, lines = sweep.outcomes(run_id, errors), [], []
+    outcomes, summary, lines, headings = sweep.outcomes(run_id, errors), [], [], dict[str, str]()
     for name in first.analyses:
         branches = sweep.branches(name, run_id)
         if branches:
@@ -130,12 +130,13 @@ def _write(
             attributes = {"run_id": run_id, "status": "done" if complete else "stopped", "reason": ""}
             rows = write_sweep(folder.path, name, name, sweep.plan, branches, attributes, first.title)
             summary += [{"analysis": name, **row} for row in rows]
-            of = summary_of(str(branches[0].attributes["type"]))
+            kind = str(branches[0].attributes["type"])
+            of, headings = summary_of(kind), {**headings, **summary_headings(kind, branches)}
             lines += landmarks(name, sweep.plan, rows, of, amplitude_unit(branches))
     if summary:
         lead = [*sweep.plan.keys, "value", "analysis"]
         ordered = [{key: row[key] for key in (*lead, *(k for k in row if k not in lead))} for row in summary]
-        write_rows(folder.path / "summary.csv", ordered)
+        write_rows(folder.path / "summary.csv", ordered, headings)
     sweep.forget_others()
     return outcomes, lines
 

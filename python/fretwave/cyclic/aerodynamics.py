@@ -88,7 +88,7 @@ class Aerodynamics:
         return cls({folded(k, sectors): complex(parts[k]) for k in kept}, omega)
 
     def wave(self, nodal_diameter: int, sectors: int) -> complex:
-        """L(theta) of a wave, [N/m] at a dof, [1/s^2] modal."""
+        """L(theta) of a wave, [force/length] at a dof, [1/s^2] modal."""
         theta = 2 * np.pi * nodal_diameter / sectors
         return complex(sum(L * np.exp(-1j * k * theta) for k, L in self.influence.items()))
 

@@ -22,7 +22,7 @@ def match_faces(
 
     Parameters
     ----------
-    xyz : (n_nodes, 3) [m]
+    xyz : (n_nodes, 3) [length]
     low, high : node numbers of the faces, in any order
 
     Returns
@@ -47,8 +47,8 @@ def match_faces(
             "the faces of the sector do not match",
             _listed("low", points, alone_low) + "; " + _listed("high", points, alone_high),
             f"{len(alone_low)} of {len(low)} low and {len(alone_high)} of {len(high)} high nodes without a partner, "
-            f"the farthest {max(gap.max(), back.max()):.3g} m away",
-            f"the low face turned by 360/{sectors} degrees about {axis} on the high face, to {limit:.2g} m",
+            f"the farthest {max(gap.max(), back.max()):.3g} away",
+            f"the low face turned by 360/{sectors} degrees about {axis} on the high face, to {limit:.2g}",
             "mesh both faces alike, check the number of sectors and the axis, or swap low and high",
         )
     return low, high[partner]

@@ -64,6 +64,7 @@ class Sector:
     contacts: Sequence[Contact] = ()
     ties: Parts = field(default_factory=dict)
     aerodynamics: Aerodynamics | None = None
+    units: str | None = None
 
     def __post_init__(self) -> None:
         check_number(self.sectors)
@@ -91,6 +92,7 @@ class Sector:
         C: Given | None = None,
         contacts: Sequence[Contact] = (),
         axis: str | None = None,
+        units: str | None = None,
     ) -> Sector:
         """A sector cut out of a wheel, its high face tied to the low face of the next one.
 
@@ -108,8 +110,10 @@ class Sector:
             Dofs of the faces come in triples of Cartesian components, and the sectors lie about this axis: the high
             face moves like the low one turned by 2 pi / N. Without it dofs correspond as they are (scalars, or
             components that are radial, circumferential and axial already).
+        units : str, optional
+            Name of the system of units (`fretwave.units`); without it SI.
         """
-        cut = Structure(M, K, C, sectors=sectors, low=np.asarray(low), high=np.asarray(high), axis=axis)
+        cut = Structure(M, K, C, sectors=sectors, low=np.asarray(low), high=np.asarray(high), axis=axis, units=units)
         tied = cut.tied()
         return cls.of(tied, [replace(contact, pairs=contact.pairs.tied(tied.ties)) for contact in contacts])
 
@@ -119,18 +123,19 @@ class Sector:
     ) -> Sector:
         """Of a structure that is a tied sector (`fretwave.Structure.tied`), with contacts on its dofs."""
         M, K, C = structure.M, structure.K, structure.damped().C
-        return cls(M, K, structure.sectors, C, contacts, structure.ties, aerodynamics)
+        return cls(M, K, structure.sectors, C, contacts, structure.ties, aerodynamics, structure.units)
 
     @property
     def structure(self) -> Structure:
         """Its terms with those of the flow, and the ties."""
         terms = self._terms()
-        return Structure(terms["M"], terms["K"], terms["C"], sectors=self.sectors, ties=self.ties)
+        return Structure(terms["M"], terms["K"], terms["C"], sectors=self.sectors, ties=self.ties, units=self.units)
 
     def model(self, nodal_diameter: int, comm: MPI.Comm | None = None) -> Model:
         """The equations of one sector in a wave of this many nodal diameters (negative: backward). Collective."""
         terms = self._terms(period_of(nodal_diameter, self.sectors))
-        return Model(terms["M"], terms["K"], terms["C"], self.contacts, comm, self.sectors, nodal_diameter)
+        units = self.structure.unit_system
+        return Model(terms["M"], terms["K"], terms["C"], self.contacts, comm, self.sectors, nodal_diameter, units=units)
 
     def wheel(self, comm: MPI.Comm | None = None, changes: Mapping[str, Sequence[Any]] | None = None) -> Model:
         """The whole wheel, sector after sector, N n_dof dofs; ranks take whole sectors. Collective.

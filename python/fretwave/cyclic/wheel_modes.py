@@ -67,7 +67,7 @@ def most_alike(modes: Sequence[LinearMode], wave: LinearMode, M: Sparse | Sector
     Parameters
     ----------
     M : (N n_dof, N n_dof) sparse, or Sector
-        Mass of the wheel [kg].
+        Mass of the wheel [mass].
     """
     if isinstance(M, Sector):
         M = around(M.M, M.sectors)

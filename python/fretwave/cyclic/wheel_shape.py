@@ -34,7 +34,7 @@ class WheelShape:
     Parameters
     ----------
     M : (N n_dof, N n_dof) sparse
-        Mass of the wheel [kg].
+        Mass of the wheel [mass].
     sectors : int
         N.
     dof : int

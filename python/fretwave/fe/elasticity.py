@@ -23,19 +23,23 @@ if TYPE_CHECKING:
 class Material:
     """Isotropic, linear elastic."""
 
-    youngs_modulus: float  #: [Pa]
+    youngs_modulus: float  #: [pressure]
     poisson_ratio: float
-    density: float  #: [kg/m^3]
+    density: float  #: [mass/length^3]
 
     def __post_init__(self) -> None:
         if self.youngs_modulus <= 0 or self.density <= 0 or not -1 < self.poisson_ratio < 0.5:
             raise InputError(
-                "the material is not physical", None, self, "E > 0, rho > 0, -1 < nu < 0.5", "use SI units"
+                "the material is not physical",
+                None,
+                self,
+                "E > 0, rho > 0, -1 < nu < 0.5",
+                "use one consistent system of units",
             )
 
     @property
     def lame(self) -> tuple[float, float]:
-        """lambda and mu [Pa]."""
+        """lambda and mu [pressure]."""
         E, nu = self.youngs_modulus, self.poisson_ratio
         return E * nu / (1 + nu) / (1 - 2 * nu), E / 2 / (1 + nu)
 
@@ -48,8 +52,8 @@ TITANIUM = Material(youngs_modulus=114e9, poisson_ratio=0.33, density=4430.0)
 class MatrixReport:
     """What `check_matrices` measured; all shares are relative to the largest entry."""
 
-    mass: float  #: [kg], from M
-    volume: float  #: [m^3], from the mesh
+    mass: float  #: [mass], from M
+    volume: float  #: [length^3], from the mesh
     mass_error: float  #: |mass - rho V| / (rho V)
     asymmetry: float  #: of K and M
     rigid_residual: float  #: largest |K r| over the largest sum of |K| |r| over a row, six rigid modes
@@ -61,7 +65,7 @@ def assemble(mesh: Mesh, material: Material) -> tuple[sp.csr_matrix, sp.csr_matr
     Returns
     -------
     M, K : (n_dof, n_dof) CSR
-        [kg] and [N/m], dof = 3 * node + axis.
+        [mass] and [force/length], dof = 3 * node + axis.
 
     Raises
     ------
@@ -143,18 +147,18 @@ def _skfem() -> ModuleType:
 def centrifugal_load(
     M: sp.spmatrix, nodes: Array, speed: float, point: Sequence[float], direction: Sequence[float]
 ) -> Array:
-    """Consistent nodal forces (n_dof,) [N] of the body load rho Omega^2 r.
+    """Consistent nodal forces (n_dof,) [force] of the body load rho Omega^2 r.
 
     Parameters
     ----------
     M : (n_dof, n_dof)
-        Consistent mass [kg]. M r is exact, because r lies in the space of an isoparametric element.
+        Consistent mass [mass]. M r is exact, because r lies in the space of an isoparametric element.
     nodes : (n_nodes, 3)
-        [m]
+        [length]
     speed : float
         Omega [rad/s].
     point, direction : (3,)
-        The axis of rotation passes through the point [m] along the direction (any length).
+        The axis of rotation passes through the point [length] along the direction (any length).
     """
     axis = np.asarray(direction, dtype=float)
     if not np.linalg.norm(axis) > 0:

@@ -23,11 +23,11 @@ class ContactPatch:
     nodes : (n,)
         The mesh node at the centre of each cell.
     points : (n, 3)
-        Its coordinates [m].
+        Its coordinates [length].
     normals : (n, 3)
         Outward unit normals, mean over the cell.
     areas : (n,)
-        Area of the cell [m^2].
+        Area of the cell [length^2].
     weights : (n, n_nodes) CSR
         Displacement of the contact point = weights @ nodal displacements: the centre node, or the mean of the cell.
     """
@@ -45,9 +45,9 @@ def surface_vectors(mesh: Mesh, faces: Indices) -> tuple[Array, Array]:
     Returns
     -------
     shares : (n_faces, m^2)
-        Of each shape function: the area that belongs to each node [m^2].
+        Of each shape function: the area that belongs to each node [length^2].
     vectors : (n_faces, 3)
-        Of the outward unit normal [m^2].
+        Of the outward unit normal [length^2].
     """
     values, gradients, weights = tensor_gauss(mesh.order, 2)
     corners = mesh.nodes[faces.reshape(-1, values.shape[1])]
@@ -58,7 +58,7 @@ def surface_vectors(mesh: Mesh, faces: Indices) -> tuple[Array, Array]:
 
 
 def nodal_areas(mesh: Mesh, faces: Indices) -> Array:
-    """Area that belongs to each node (n_nodes,) [m^2]: integral of its shape function over the faces."""
+    """Area that belongs to each node (n_nodes,) [length^2]: integral of its shape function over the faces."""
     shares, _ = surface_vectors(mesh, faces)
     return np.bincount(faces.ravel(), shares.ravel(), minlength=len(mesh.nodes)).astype(float)
 

@@ -45,7 +45,7 @@ class Block:
     cells : (int, int, int)
         Number of elements along the three axes of the cube.
     mapping : callable (n, 3) -> (n, 3)
-        Points of the unit cube to coordinates [m]; right-handed.
+        Points of the unit cube to coordinates [length]; right-handed.
     """
 
     name: str
@@ -53,7 +53,7 @@ class Block:
     mapping: Callable[[Array], Array]
 
     def points(self, order: int) -> Array:
-        """Coordinates (order n_1 + 1, order n_2 + 1, order n_3 + 1, 3) of the block's nodes [m]."""
+        """Coordinates (order n_1 + 1, order n_2 + 1, order n_3 + 1, 3) of the block's nodes [length]."""
         if len(self.cells) != 3 or min(self.cells) < 1:
             raise InputError(f"block '{self.name}' has no cells", None, self.cells, "three numbers >= 1", "give cells")
         axes = [np.linspace(0.0, 1.0, order * n + 1) for n in self.cells]
@@ -68,7 +68,7 @@ class Quality:
     ratio: float  #: of the worst element
     element: int
     block: str
-    centre: tuple[float, float, float]  #: [m]
+    centre: tuple[float, float, float]  #: [length]
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ class Mesh:
     Attributes
     ----------
     nodes : (n_nodes, 3)
-        Coordinates [m].
+        Coordinates [length].
     cells : (n_cells, m, m, m)
         Node numbers of each element on its lattice, m = order + 1.
     lattice : dict of (order n_1 + 1, order n_2 + 1, order n_3 + 1) arrays
@@ -102,14 +102,14 @@ class Mesh:
         return self.cells[:, order[:, 0], order[:, 1], order[:, 2]]
 
     def jacobians(self, points: Sequence[Array] | None = None) -> Array:
-        """Determinants (n_cells, n_points) [m^3] at a grid of points of the unit cube, or at the Gauss points."""
+        """Determinants (n_cells, n_points) [length^3] at a grid of points of the unit cube, or at the Gauss points."""
         gradients = tensor(self.order, list(points))[1] if points else tensor_gauss(self.order, 3)[1]
         corners = self.nodes[self.cells.reshape(len(self.cells), -1)]
         return np.asarray(np.linalg.det(np.einsum("qni,enx->eqxi", gradients, corners, optimize=True)))
 
     @property
     def volume(self) -> float:
-        """Of all elements [m^3], exact for the isoparametric map."""
+        """Of all elements [length^3], exact for the isoparametric map."""
         return float((self.jacobians() @ tensor_gauss(self.order, 3)[2]).sum())
 
     @cached_property
@@ -143,7 +143,7 @@ class Mesh:
         return np.asarray(self.boundary_faces[inside[self.boundary_faces].all(axis=(1, 2))])
 
     def nearest(self, point: Sequence[float]) -> int:
-        """The node nearest to a point [m]."""
+        """The node nearest to a point [length]."""
         return int(np.argmin(np.linalg.norm(self.nodes - np.asarray(point), axis=1)))
 
     def quality(self) -> Quality:
@@ -162,7 +162,7 @@ class Mesh:
             x, y, z = worst.centre
             raise InputError(
                 "an element is folded" if worst.ratio <= 0 else "an element is badly distorted",
-                f"block '{worst.block}', element {worst.element} at ({x:.4g}, {y:.4g}, {z:.4g}) m",
+                f"block '{worst.block}', element {worst.element} at ({x:.4g}, {y:.4g}, {z:.4g})",
                 f"smallest Jacobian {worst.ratio:.3g} of the element's largest",
                 f">= {smallest:g}",
                 "smooth the block's map, or swap two of its axes if the whole block is left-handed",
@@ -192,7 +192,7 @@ def join(blocks: Sequence[Block], order: int = 2, tolerance: float | None = None
     order : int
         1 for hex8, 2 for hex27.
     tolerance : float, optional
-        Distance [m] below which nodes are one. Default: 1e-3 of the shortest distance between neighbours.
+        Distance [length] below which nodes are one. Default: 1e-3 of the shortest distance between neighbours.
 
     Raises
     ------
@@ -247,7 +247,7 @@ def _check_conforming(mesh: Mesh, tolerance: float) -> None:
         x, y, z = samples[hanging][0]
         raise InputError(
             "two blocks touch without sharing their nodes",
-            f"({x:.6g}, {y:.6g}, {z:.6g}) m",
+            f"({x:.6g}, {y:.6g}, {z:.6g})",
             "a node on an element edge that does not own it",
             "the same number of cells and the same map on both sides of a joint",
             "give both blocks the same cells there, or leave a gap between them",

@@ -15,7 +15,7 @@ from .mesh import Mesh
 
 
 def stresses(mesh: Mesh, material: Material, displacement: Array) -> Array:
-    """Cauchy stress of a small displacement (n_dof,) at the Gauss points, (n_cells, n_points, 3, 3) [Pa]."""
+    """Cauchy stress of a small displacement (n_dof,) at the Gauss points, (n_cells, n_points, 3, 3) [pressure]."""
     gradients, _ = _gradients(mesh)
     u = np.asarray(displacement, dtype=float).reshape(-1, 3)
     if len(u) != len(mesh.nodes):
@@ -28,14 +28,14 @@ def stresses(mesh: Mesh, material: Material, displacement: Array) -> Array:
 
 
 def stress_stiffness(mesh: Mesh, material: Material, displacement: Array) -> sp.csr_matrix:
-    """Geometric stiffness (n_dof, n_dof) [N/m] of the stress in a statically displaced body.
+    """Geometric stiffness (n_dof, n_dof) [force/length] of the stress in a statically displaced body.
 
     K_G = integral of dN_i/dx_a sigma_ab dN_j/dx_b dV, the same for the three directions of motion (Zienkiewicz and
     Taylor, The Finite Element Method, vol. 2, section on initial stress). To be added to the elastic stiffness.
 
     Parameters
     ----------
-    displacement : (n_dof,) static displacement [m], small
+    displacement : (n_dof,) static displacement [length], small
     """
     gradients, volume = _gradients(mesh)
     stress = stresses(mesh, material, displacement)
@@ -48,7 +48,7 @@ def stress_stiffness(mesh: Mesh, material: Material, displacement: Array) -> sp.
 
 
 def spin_softening(M: sp.spmatrix, speed: float, direction: Sequence[float]) -> sp.csr_matrix:
-    """Change of stiffness (n_dof, n_dof) [N/m], -Omega^2 M in the plane of rotation: the body load follows the motion.
+    """Change of stiffness (n_dof, n_dof) [force/length], -Omega^2 M in the plane of rotation: the load follows.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def spin_softening(M: sp.spmatrix, speed: float, direction: Sequence[float]) -> 
 
 
 def _gradients(mesh: Mesh) -> tuple[Array, Array]:
-    """dN/dx (n_cells, n_points, n_nodes, 3) [1/m] and the volume (n_cells, n_points) [m^3] of each Gauss point."""
+    """dN/dx (n_cells, n_points, n_nodes, 3) [1/length] and volumes (n_cells, n_points) [length^3] of Gauss points."""
     _, local, weights = tensor_gauss(mesh.order, 3)
     corners = mesh.nodes[mesh.cells.reshape(len(mesh.cells), -1)]
     jacobian = np.einsum("qni,enx->eqxi", local, corners, optimize=True)  # dx / d(unit cube)

@@ -6,6 +6,7 @@ import csv
 from collections.abc import Iterable, Mapping, Sequence
 from io import StringIO
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -13,10 +14,14 @@ import numpy as np
 from ..columns import Column, Value
 from .whole import replace_text
 
+#: Headings of columns by name where they are not the names.
+Headings = Mapping[str, str]
+_NAMES: Headings = MappingProxyType({})
+
 
 def header_line(columns: Sequence[Column]) -> str:
-    """First line of a table."""
-    return _lines([[column.name for column in columns]])
+    """First line of a table: names, with their units where they are not SI's."""
+    return _lines([[column.heading for column in columns]])
 
 
 def row_line(columns: Sequence[Column], row: Mapping[str, Value]) -> str:
@@ -24,17 +29,17 @@ def row_line(columns: Sequence[Column], row: Mapping[str, Value]) -> str:
     return _lines([[column.text(row[column.name]) for column in columns]])
 
 
-def write_columns(path: Path, columns: Mapping[str, Any]) -> None:
+def write_columns(path: Path, columns: Mapping[str, Any], headings: Headings = _NAMES) -> None:
     """A table by its columns, written in one step.
 
     Raises
     ------
     FileError
     """
-    replace_text(path, _lines([columns, *zip(*columns.values())]))
+    replace_text(path, _lines([[headings.get(name, name) for name in columns], *zip(*columns.values())]))
 
 
-def write_rows(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
+def write_rows(path: Path, rows: Sequence[Mapping[str, Any]], headings: Headings = _NAMES) -> None:
     """A table by its rows, empty where a row has no such column, written in one step.
 
     Raises
@@ -42,7 +47,7 @@ def write_rows(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
     FileError
     """
     names = list(dict.fromkeys(name for row in rows for name in row))
-    write_columns(path, {name: [row.get(name, "") for row in rows] for name in names})
+    write_columns(path, {name: [row.get(name, "") for row in rows] for name in names}, headings)
 
 
 def _lines(rows: Iterable[Iterable[Any]]) -> str:

@@ -41,8 +41,8 @@ def row_of(model: Model, observed: Observed) -> list[tuple[int, float]]:
 
 
 def unit_of(observed: Observed) -> str:
-    """Of the amplitude of what is observed."""
-    return MODAL_UNIT if isinstance(observed, LinearMode) else "m"
+    """Of the amplitude of what is observed, as a quantity."""
+    return MODAL_UNIT if isinstance(observed, LinearMode) else "length"
 
 
 def named(observed: Observed) -> str:

@@ -37,7 +37,7 @@ class Observer:
         self.first, self.end = problem.model.ownership
 
     def __call__(self, y: PETSc.Vec, problem: HarmonicProblem) -> dict[str, float]:
-        """By column: amplitude of the fundamental of each row [m], energy [J]."""
+        """By column: amplitude of the fundamental of each row [length], energy [energy]."""
         q = complex_amplitudes(problem.harmonics.labels, problem.local_coefficients(y))[1]
         sums = np.array(
             [
@@ -51,7 +51,7 @@ class Observer:
 
 
 def mechanical_energy(problem: HarmonicProblem, y: PETSc.Vec) -> float:
-    """Energy of the vibration [J], mean over a period: of M moving and K strained. Collective.
+    """Energy of the vibration [energy], mean over a period: of M moving and K strained. Collective.
 
     sum_n>0 (|s_n|^2 q_n^H M q_n + q_n^H K q_n) / 4 on the periodic motion. What contact stores and the mean
     displacement are left out. Of one sector where the model is one.

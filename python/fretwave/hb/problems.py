@@ -156,7 +156,7 @@ class HarmonicProblem(Destroyable):
         return float(self.model.comm.bcast(local[-1] if len(local) else 0.0, root=self.model.comm.size - 1))
 
     def parameter(self, y: PETSc.Vec) -> float:
-        """The continuation parameter of unknowns: amplitude [m], or omega [rad/s]. Collective."""
+        """The continuation parameter of unknowns: amplitude [length], or omega [rad/s]. Collective."""
         return float(self.core.parameter_value(self.last_entry(y)))
 
     def coefficients(self, y: PETSc.Vec) -> Array | None:
@@ -182,8 +182,8 @@ class HarmonicProblem(Destroyable):
             stick, slip, open : shares of the period, mean of all pairs; force_outside : share (2-norm) of the varying
             contact force outside the retained harmonics, no error; aliasing : relative change of the retained force
             coefficients of sampled laws on doubled samples;
-            work : energy dissipated by contact in a period; unclosed : largest distance [m] of a slider from where it
-            began its period, rounding unless its closure failed; slip_path : longest slip path of a pair [m].
+            work : energy dissipated by contact in a period; unclosed : largest distance [length] of a slider from where
+            it began its period, rounding unless its closure failed; slip_path : longest slip path of a pair [length].
         """
         return dict(self.core.summary(y))
 
@@ -198,9 +198,9 @@ class HarmonicProblem(Destroyable):
         -------
         dict
             Modes: omega_error [rad/s], zeta_error, and lambda_error_harmonics, _samples, _solver [1/s], the changes of
-            lambda = -beta + i omega by each source. Responses: amplitude_error and the same by source [m]. nan where
-            the refined system is singular or does not fit the memory (`errors_left_out`); empty for a problem that has
-            no table.
+            lambda = -beta + i omega by each source. Responses: amplitude_error and the same by source [length]. nan
+            where the refined system is singular or does not fit the memory (`errors_left_out`); empty for a problem
+            that has no table.
         """
         if self.meaning is None:
             return {}
@@ -231,7 +231,7 @@ class HarmonicProblem(Destroyable):
         self._error = None
 
     def energy(self, y: PETSc.Vec) -> dict[str, float]:
-        """Where the energy of a period goes [J]. Collective.
+        """Where the energy of a period goes [energy]. Collective.
 
         Of each force p the work pi sum_n n Im(q_n^H p_n) on the periodic motion, so that the harmonic equations balance
         it exactly (q_n^H times their n-th row). With s_n = n (-beta + i w) (CNM) the inertia releases
@@ -258,8 +258,8 @@ class HarmonicProblem(Destroyable):
     def contact_history(self, y: PETSc.Vec) -> list[dict[str, Array | None]]:
         """`contact_period` with what the law says of each pair and sample, on rank 0. Collective.
 
-        (n_samples, n_pairs): status (stick 0, slip 1, open 2) and gap [m] (nan without a normal direction). Of the
-        whole period, however many samples: work (n_pairs) [J] and shares (3, n_pairs) of stick, slip and open.
+        (n_samples, n_pairs): status (stick 0, slip 1, open 2) and gap [length] (nan without a normal direction). Of the
+        whole period, however many samples: work (n_pairs) [energy] and shares (3, n_pairs) of stick, slip and open.
         """
         return [
             {name: self.model.gather_pairs(k, samples) for name, samples in zip(MOTION, period)}

@@ -126,7 +126,7 @@ class ForcedState:
 
     @property
     def factors(self) -> Array:
-        """That bring the scalars to physical units [rad/s, m, m] (3,)."""
+        """That bring the scalars to physical units [rad/s, length, length] (3,)."""
         return np.array([self.omega_reference, self.amplitude_reference, self.amplitude_reference])
 
     def scalars_of(self, table: Mapping[str, Any]) -> Array:
@@ -135,7 +135,7 @@ class ForcedState:
         return np.column_stack([table["omega"], amplitude * np.cos(phase), -amplitude * np.sin(phase)])
 
     def errors(self, z: Array, changes: Sequence[Array]) -> dict[str, float]:
-        """Errors of the complex amplitude [m] in columns, from changes of the scalars by all sources and by each."""
+        """Errors of the complex amplitude [length] in columns, from changes of the scalars by all sources and each."""
         error, *parts = (self.amplitude_reference * math.hypot(change[1], change[2]) for change in changes)
         return {self.error: error, **{self.error_by.format(name): part for name, part in zip(SOURCES, parts)}}
 

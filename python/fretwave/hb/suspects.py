@@ -9,6 +9,7 @@ import numpy as np
 
 from ..arrays import Array
 from ..model.laws import Role
+from ..units import UnitSystem
 
 if TYPE_CHECKING:
     from ..model.contact import Contact
@@ -22,27 +23,29 @@ SOFT = 1e-6
 UNBALANCED = 0.1
 
 
-def suspects(contacts: Sequence[Contact], stiffness: float) -> str:
+def suspects(contacts: Sequence[Contact], stiffness: float | None, units: UnitSystem) -> str:
     """What is extreme in the contacts' parameters, contact by contact, or nothing.
 
     Parameters
     ----------
     contacts : contacts of the model
-    stiffness : of the structure [N/m]
+    stiffness : of the structure [force/length], None where it is not known
+    units : that they are in
     """
-    return "".join(f"; contact '{c.name}' {words}" for c in contacts for words in _extremes(c, stiffness))
+    return "".join(f"; contact '{c.name}' {words}" for c in contacts for words in _extremes(c, stiffness, units))
 
 
-def _extremes(contact: Contact, stiffness: float) -> Iterator[str]:
+def _extremes(contact: Contact, stiffness: float | None, units: UnitSystem) -> Iterator[str]:
     given = {role: np.atleast_1d(np.asarray(value, dtype=float)) for role, value in _values(contact)}
     limit = given.get(Role.FRICTION_COEFFICIENT, given.get(Role.FRICTION_LIMIT))
     if limit is not None and not np.any(limit):
         yield "has no friction: nothing holds the structure along it"
     if Role.LOAD in given:
-        yield from _loads(str(contact.info.named(Role.LOAD)), given[Role.LOAD], given.get(Role.GAP, np.zeros(1)))
+        name, gap = str(contact.info.named(Role.LOAD)), given.get(Role.GAP, np.zeros(1))
+        yield from _loads(name, given[Role.LOAD], gap, units("force"))
     for role in (Role.NORMAL_STIFFNESS, Role.TANGENTIAL_STIFFNESS):
-        if role in given:
-            yield from _stiffness(str(contact.info.named(role)), given[role], stiffness)
+        if role in given and stiffness is not None:
+            yield from _stiffness(str(contact.info.named(role)), given[role], stiffness, units("force/length"))
 
 
 def _values(contact: Contact) -> Iterator[tuple[Role, Any]]:
@@ -53,25 +56,25 @@ def _values(contact: Contact) -> Iterator[tuple[Role, Any]]:
             yield parameter.role, value
 
 
-def _loads(name: str, load: Array, gap: Array) -> Iterator[str]:
+def _loads(name: str, load: Array, gap: Array, unit: str) -> Iterator[str]:
     if not np.any(load) and np.all(gap >= 0):
         yield f"has no {name} of its own: only an outer load presses its pairs, and none sticks without"
     elif np.ptp(load) > UNBALANCED * np.max(load):
         yield (
-            f"has normal loads from {np.min(load):.3g} to {np.max(load):.3g} N: given pair by pair they are taken as"
-            " balanced, whatever their resultant"
+            f"has normal loads from {np.min(load):.3g} to {np.max(load):.3g} {unit}: given pair by pair they are taken"
+            " as balanced, whatever their resultant"
         )
 
 
-def _stiffness(name: str, values: Array, stiffness: float) -> Iterator[str]:
+def _stiffness(name: str, values: Array, stiffness: float, unit: str) -> Iterator[str]:
     ratio = values / stiffness
     if np.max(ratio) > STIFF:
         yield (
-            f"has {name} {np.max(values):.3g} N/m, {np.max(ratio):.1g} times the structure's {stiffness:.2g}: a"
+            f"has {name} {np.max(values):.3g} {unit}, {np.max(ratio):.1g} times the structure's {stiffness:.2g}: a"
             " pair that opens, sticks or slips changes all forces; a softer contact helps"
         )
     if np.min(ratio) < SOFT:
         yield (
-            f"has {name} {np.min(values):.3g} N/m, {np.min(ratio):.1g} times the structure's {stiffness:.2g}: it holds"
-            " nothing"
+            f"has {name} {np.min(values):.3g} {unit}, {np.min(ratio):.1g} times the structure's {stiffness:.2g}: it"
+            " holds nothing"
         )

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..units import SYSTEMS
+
 if TYPE_CHECKING:
     from .structure import Structure
 
@@ -18,6 +20,8 @@ def complaint_of(structure: Structure) -> str | None:
     for name, term in terms.items():
         if isinstance(term, Mapping):
             return f"{name} has parts on other sectors: give the sector with both its faces, low and high"
+    if structure.units is not None and structure.units not in SYSTEMS:
+        return f"its unit system '{structure.units}' is none of {', '.join(SYSTEMS)}"
     n = structure.n_dof
     if n == 0:
         return "M has no dofs"

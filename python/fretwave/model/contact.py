@@ -131,7 +131,7 @@ class Contact:
         Returns
         -------
         status, gap : (n_samples, n_pairs)
-            Stick 0, slip 1 or open 2; distance to contact [m], nan of a law without a normal direction.
+            Stick 0, slip 1 or open 2; distance to contact [length], nan of a law without a normal direction.
         """
         samples = [np.ascontiguousarray(values, dtype=float) for values in (u, v, f)]
         n_pairs = samples[0].shape[2]
@@ -176,7 +176,7 @@ class Contact:
                 f"law parameter '{parameter.name}' is out of bounds",
                 f"contact '{self.name}', pair {pair}",
                 f"{values[pair]:g}",
-                f"a number {sign} {low:g} {parameter.unit}" if low > -1e300 else f"a number [{parameter.unit}]",
+                f"a number{f' {sign} {low:g}' if low > -1e300 else ''} [{parameter.unit}]",
                 "give a value within the bound; leave out pairs that stand for no area",
             )
 

@@ -202,7 +202,7 @@ def own_load(contacts: Sequence[Any]) -> str | None:
 
 
 def springs(stiffness: float | Array) -> tuple[str, dict[str, Any]]:
-    """Law and parameters of linear springs [N/m] on one component: sliders, which stuck modes never see slip."""
+    """Law and parameters of linear springs [force/length] on one component: sliders that stuck modes never see slip."""
     return "jenkins", {"tangential_stiffness": stiffness, "friction_limit": 1.0}
 
 
@@ -230,7 +230,7 @@ class PythonLaw:
     odd : bool
         f(-u, -v) = -f(u, v): even harmonics may be left out.
     stuck_stiffness : float
-        Stiffness of the closed contact [N/m] in stuck linear modes; infinite means no relative motion.
+        Stiffness of the closed contact [force/length] in stuck linear modes; infinite means no relative motion.
     pairs : array of int
         Which pairs (rows of B) the arrays hold, on this rank; set by the model.
     """
@@ -269,7 +269,7 @@ class PythonLaw:
         return np.where(shut, SLIP, OPEN)
 
     def gap(self, u: Array, v: Array, f: Array) -> Array:
-        """Distance to contact [m] (n_samples, n_pairs), 0 where closed; by default not known (nan) where open."""
+        """Distance to contact [length] (n_samples, n_pairs), 0 where closed; by default not known (nan) where open."""
         return np.where(self.status(u, v, f) == OPEN, np.nan, 0.0 if self.normal is not None else np.nan)
 
     @staticmethod

@@ -18,6 +18,7 @@ from ..errors import InputError
 from ..mpi import guard as parallel
 from ..mpi.destroyable import Destroyable
 from ..mpi.gather import on_all_ranks
+from ..units import SI, UnitSystem, unit_system
 from .contact import Contact
 from .rest import Rest
 from .sectors import Given, Term, by_sector
@@ -38,8 +39,8 @@ class Model(Destroyable):
     ----------
     M, K, C : (n_dof, n_dof) or dict
         SciPy sparse or dense matrices, the same on every rank, or distributed petsc4py matrices of one row layout.
-        Any consistent set of units. Of one sector of a wheel {0: K_0, 1: K_1, -1: K_1.T}: K_k acts on the dofs of the
-        sector k places ahead; `fretwave.Sector` makes them.
+        In one consistent system of units. Of one sector of a wheel {0: K_0, 1: K_1, -1: K_1.T}: K_k acts on the dofs of
+        the sector k places ahead; `fretwave.Sector` makes them.
     contacts : sequence of Contact
     comm : mpi4py communicator, optional
         Default: of the petsc4py matrices, or COMM_WORLD.
@@ -50,6 +51,8 @@ class Model(Destroyable):
         theta = 2 pi nodal_diameter / sectors.
     unit : int
         Ranks take whole groups of this many dofs of matrices given whole: a wheel is cut between its sectors.
+    units : str or UnitSystem
+        The system that all numbers are in, which labels follow (`fretwave.units`).
     """
 
     def __init__(
@@ -62,7 +65,9 @@ class Model(Destroyable):
         sectors: int = 1,
         nodal_diameter: int = 0,
         unit: int = 1,
+        units: str | UnitSystem = SI,
     ) -> None:
+        self.units = unit_system(units) if isinstance(units, str) else units
         terms = [(A, order, k) for order, given in enumerate((K, C, M)) for k, A in by_sector(given).items()]
         first = terms[0][0]
         if comm is None:
@@ -235,7 +240,7 @@ class Model(Destroyable):
                 law.place(self.local_sliders(rest.sliders)[k])
 
     def sliders(self) -> dict[str, Array]:
-        """Where the sliders of each contact with a memory stand at rest [m], (n_pairs, n_tangents). Collective."""
+        """Where the sliders of each contact with a memory stand at rest [length], (n_pairs, n_tangents). Collective."""
         found = {}
         for k, (contact, law) in enumerate(zip(self.contacts, self._laws)):
             if contact.info.memory:

@@ -31,16 +31,16 @@ class Pairs:
     parameters : dict
         Law parameters used where none is given: numbers or (n_pairs,).
     areas : (n_pairs,), optional
-        Area a pair stands for [m^2], for parameters given per area, and for wear.
+        Area a pair stands for [length^2], for parameters given per area, and for wear.
     points : (n_pairs, 3), optional
-        Places [m].
+        Places [length].
     frames : (n_pairs, 3, 3), optional
         Rows: directions of normal and tangents in space, for the resultant of the contact forces. Of two bodies the
         normal points from the first to the second.
     faces : sequence of str, optional
         Name of the face that each pair lies on: a picture has one panel for each.
     positions : (n_pairs, 2), optional
-        Places on the face [m], for pictures.
+        Places on the face [length], for pictures.
     nodes : (n_pairs, 2), optional
         First and second node of each pair in the mesh's own numbers, 0 for ground.
     """

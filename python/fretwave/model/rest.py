@@ -21,12 +21,12 @@ class Rest:
 
     Attributes
     ----------
-    displacement : (n_dof,) [m]
+    displacement : (n_dof,) [length]
         On every rank.
-    load : (n_dof,) [N]
+    load : (n_dof,) [force]
         The static load that it balances, contact included.
     sliders : dict, optional
-        Contact name -> (n_pairs, n_tangents) [m], where the sliders of contacts with a memory stand, in the directions
+        Contact name -> (n_pairs, n_tangents) [length], where the sliders of contacts with a memory stand, in directions
         of B's tangents: the tangential force of a pair that sticks is kt (u - w). Without it those that the
         displacement brings about from zero, in one step.
     stick, slip, open : float
@@ -35,7 +35,7 @@ class Rest:
         What the solver left of the load, relative to it.
     contacts : list of dict, on rank 0
         Relative displacement u and force f (components, n_pairs) of each contact, and what its law says of each
-        pair: status (stick 0, slip 1, open 2) and gap [m].
+        pair: status (stick 0, slip 1, open 2) and gap [length].
     """
 
     displacement: Array

@@ -16,6 +16,7 @@ import scipy.sparse as sp
 
 from ..arrays import Array, Indices
 from ..errors import InputError
+from ..units import SI, UnitSystem, unit_system
 from .consistency import complaint_of
 from .pairs import Pairs
 from .sectors import Parts, Sparse, Term, around, by_sector, check_balanced, check_number, combine, ties
@@ -39,7 +40,7 @@ class Structure:
 
     Attributes
     ----------
-    M, K, C : (n_dof, n_dof) sparse or dense [kg], [N/m], [N s/m]
+    M, K, C : (n_dof, n_dof) sparse or dense [mass], [force/length], [force s/length]
         Without contact; C may be None. Of a sector tied to its neighbours {k: (n_dof, n_dof)}, on the dofs of the
         sector k places ahead.
     dofs : dict
@@ -47,9 +48,9 @@ class Structure:
     pairs : dict
         Contact pairs by the names that ``[[contact]]`` takes up.
     loads : dict
-        Static loads (n_dof,) [N] by the names that ``[preload]`` takes up.
+        Static loads (n_dof,) [force] by the names that ``[preload]`` takes up.
     coordinates : (n_nodes, 3), optional
-        Nodes [m], for pictures and resultants.
+        Nodes [length], for pictures and resultants.
     displacements : (n_nodes, 3), optional
         Dof of each node along x, y and z, -1 where it is held; without it 3 * node + axis.
     expansion : (n_unreduced, n_dof), optional
@@ -72,7 +73,7 @@ class Structure:
     stiffness_damping, mass_damping : float
         Shares of K [s] and M [1/s] that are added to C.
     resultants : dict, optional
-        Sum (3,) along x, y, z of the loads [N], where they are no longer on the dofs of nodes.
+        Sum (3,) along x, y, z of the loads [force], where they are no longer on the dofs of nodes.
     labels : (n_dof, 2), optional
         Node number and direction (1 to 6) of each dof in the mesh's own numbers.
     node_numbers : (n_nodes,), optional
@@ -85,6 +86,8 @@ class Structure:
         All sectors of a wheel.
     deviations : (sectors,), optional
         Relative stiffness deviations of a whole wheel's sectors; None for a tuned one.
+    units : str, optional
+        Name of the system of units that all numbers are in (`fretwave.units`); without it SI.
     """
 
     M: Term
@@ -112,6 +115,7 @@ class Structure:
     cut: Optional[Structure] = None
     whole: bool = False
     deviations: Optional[Array] = None
+    units: Optional[str] = None
 
     def __repr__(self) -> str:
         kind = "all" if self.whole else "one"
@@ -127,6 +131,11 @@ class Structure:
     def unit(self) -> int:
         """Dofs of a sector, where this is a whole wheel."""
         return self.n_dof // self.sectors if self.whole else self.n_dof
+
+    @property
+    def unit_system(self) -> UnitSystem:
+        """The system that all numbers are in."""
+        return unit_system(self.units or SI.name)
 
     @property
     def dof_names(self) -> list[str]:
@@ -161,12 +170,12 @@ class Structure:
         return values.reshape(self.sectors, self.unit, *values.shape[1:])
 
     def resultant(self, names: Sequence[str]) -> Array | None:
-        """Sum (3,) of loads along x, y, z [N]; None where it is not known which dof moves along which."""
+        """Sum (3,) of loads along x, y, z [force]; None where it is not known which dof moves along which."""
         known = self._totals()
         return np.sum([known[name] for name in names], axis=0) if names and set(names) <= set(known) else None
 
     def _totals(self) -> Mapping[str, Array]:
-        """Sum (3,) of each load along x, y, z [N]."""
+        """Sum (3,) of each load along x, y, z [force]."""
         if self.resultants is not None:
             return self.resultants
         if self.expansion is not None or self.whole or (self.displacements is None and self.n_dof % 3):
@@ -182,7 +191,7 @@ class Structure:
         return replace(self, **matrices, parts=parts, pairs=pairs)
 
     def damped(self, dampers: Sequence[tuple[int, float]] = ()) -> Structure:
-        """The same with the shares of K and M, and viscous dampers (dof, c [N s/m]) to ground, in C."""
+        """The same with the shares of K and M, and viscous dampers (dof, c [force s/length]) to ground, in C."""
         terms = {letter: by_sector(getattr(self, letter)) for letter in ("C", "K", "M")}
         shares = {"C": 1.0, "K": self.stiffness_damping, "M": self.mass_damping}
         total: dict[int, Sparse] = {}
@@ -266,6 +275,7 @@ class Structure:
             mass_damping=self.mass_damping,
             whole=True,
             deviations=deviations,
+            units=self.units,
         )
 
     def stiffness_change(self, deviations: Array, of: str = WHOLE) -> Sparse:
@@ -328,8 +338,9 @@ class Structure:
             raise InputError("the sector is not tied to its neighbours", repr(self), None, "a tied sector", fix)
         if self.whole or not self.sectors:
             C = self.damped().C
-            return Model(self.M, self.K, C, contacts, comm, unit=self.unit if self.whole else 1)
-        return Model(self.M, self.K, self.damped().C, contacts, comm, self.sectors, nodal_diameter)
+            return Model(self.M, self.K, C, contacts, comm, unit=self.unit if self.whole else 1, units=self.unit_system)
+        C = self.damped().C
+        return Model(self.M, self.K, C, contacts, comm, self.sectors, nodal_diameter, units=self.unit_system)
 
     def complaint(self) -> str | None:
         """What is inconsistent in a structure as a builder gives it, None when nothing is."""

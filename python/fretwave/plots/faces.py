@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 
 from ..arrays import Array
 from ..model.laws import OPEN, SLIP, STICK
-from ..results.reader import Analysis, Run
+from ..results.reader import Analysis, Run, Table
 from . import style
 
 #: amplitudes of a map
@@ -22,7 +22,6 @@ MARGIN = 0.22
 #: smaller shares than this are too thin to draw
 SEEN = 0.005
 STATUS = {"stick": style.BLUE, "slip": style.ORANGE, "open": "#dddddd"}
-MM = 1e3
 
 
 def figures(run: Run) -> Iterator[tuple[str, Figure]]:
@@ -41,7 +40,7 @@ def draw_load(static: Analysis, contact: str, table: dict[str, Array]) -> Figure
     """Normal force of every pair at the largest load factor; the shape of the mark tells its status."""
     rows = (table["contact"] == contact) & (table["factor"] == table["factor"].max())
     force, status = table["normal_force"][rows], table["status"][rows]
-    pairs = static.pairs(contact)
+    (pairs, unit), newton = placed_pairs(static, contact), static.unit_system("force")
     names = list(dict.fromkeys(pairs["face"]))
     figure, panels = style.new_figure(1.2 + 1.9 * len(names), rows=len(names), sharex=True, squeeze=False)
     marks = {"stick": "s", "slip": "o", "open": "x"}
@@ -50,17 +49,16 @@ def draw_load(static: Analysis, contact: str, table: dict[str, Array]) -> Figure
         for word, mark in marks.items():
             here = mine & (status == word)
             look = {"vmin": 0.0, "vmax": force.max(), "cmap": "viridis", "marker": mark, "s": 130}
-            dots = axes.scatter(*(MM * pairs["position"][here].T), c=force[here], **look)
+            dots = axes.scatter(*pairs["position"][here].T, c=force[here], **look)
         for place, value in zip(pairs["position"][mine], force[mine]):
-            axes.annotate(f"{value:.0f}", MM * place, (0, 8), textcoords="offset points", fontsize=8, ha="center")
+            axes.annotate(f"{value:.0f}", place, (0, 8), textcoords="offset points", fontsize=8, ha="center")
         place_face(axes, name, pairs["position"])
-        axes.set_ylabel("Up the face [mm]")
-    panels[-1, 0].set_xlabel("Along the face [mm]")
-    figure.colorbar(dots, ax=panels, label=style.label("Normal force", "N"), shrink=0.8)
+        axes.set_ylabel(style.label("Up the face", unit))
+    panels[-1, 0].set_xlabel(style.label("Along the face", unit))
+    figure.colorbar(dots, ax=panels, label=style.label("Normal force", newton), shrink=0.8)
     counts = ", ".join(f"{int((status == word).sum())} {word}" for word in marks)
-    text = (
-        f"Contact {contact} at rest, load factor {table['factor'].max():g}: normal forces {force.sum():.4g} N; {counts}"
-    )
+    total = f"normal forces {force.sum():.4g} {newton}"
+    text = f"Contact {contact} at rest, load factor {table['factor'].max():g}: {total}; {counts}"
     figure.suptitle(text, fontsize=11.5)
     return figure
 
@@ -68,7 +66,7 @@ def draw_load(static: Analysis, contact: str, table: dict[str, Array]) -> Figure
 def draw_map(mode: Analysis, contact: str) -> Figure:
     """Shares of the period that each pair sticks, slips and is open, at several amplitudes, below the shares of all."""
     points = chosen_points(mode)
-    pairs, (scale, unit) = mode.pairs(contact), amplitude_scale(mode)
+    (pairs, of_face), (scale, unit) = placed_pairs(mode, contact), amplitude_scale(mode)
     names = list(dict.fromkeys(pairs["face"]))
     figure, _ = style.new_figure(3.6 + 1.25 * len(points))
     figure.clear()
@@ -83,14 +81,22 @@ def draw_map(mode: Analysis, contact: str) -> Figure:
             _pies(axes, pairs["position"][mine], shares[:, mine])
             place_face(axes, f"{name}, {scale * mode.columns['amplitude'][point]:.3g} {unit}", pairs["position"])
             axes.tick_params(labelbottom=row == len(points) - 1, labelleft=column == 0)
-    figure.supxlabel("Along the face [mm]; each disc is one contact pair, cut by its shares of a period", fontsize=10)
-    figure.supylabel("Up the face [mm]", fontsize=10, y=0.36)
+    along = style.label("Along the face", of_face)
+    figure.supxlabel(f"{along}; each disc is one contact pair, cut by its shares of a period", fontsize=10)
+    figure.supylabel(style.label("Up the face", of_face), fontsize=10, y=0.36)
     return figure
 
 
 def amplitude_scale(mode: Analysis) -> tuple[float, str]:
-    """Factor and unit in which an amplitude is shown: millimetres, but for a modal coordinate."""
-    return (MM, "mm") if mode.unit("amplitude") in ("", "m") else (1.0, mode.unit("amplitude"))
+    """Factor and unit in which an amplitude is shown: as places on a face, but for a modal coordinate."""
+    unit = mode.unit("amplitude")
+    return mode.unit_system.of_faces if unit in ("", mode.unit_system("length")) else (1.0, unit)
+
+
+def placed_pairs(analysis: Analysis, contact: str) -> tuple[Table, str]:
+    """`Analysis.pairs` with positions in the unit of places on a face, and that unit."""
+    pairs, (scale, unit) = analysis.pairs(contact), analysis.unit_system.of_faces
+    return {**pairs, "position": scale * pairs["position"]}, unit
 
 
 def chosen_points(mode: Analysis) -> list[int]:
@@ -123,7 +129,7 @@ def _shares(axes: Axes, mode: Analysis, points: Sequence[int]) -> None:
 
 def _pies(axes: Axes, places: Array, shares: Array) -> None:
     """One disc per pair, cut into its shares, of one size on paper whatever the scale of the axes."""
-    for place, parts in zip(MM * places, shares.T):
+    for place, parts in zip(places, shares.T):
         parts = np.where(parts < SEEN, 0.0, parts)
         ends = 2 * np.pi * np.concatenate([[0.0], np.cumsum(parts / parts.sum())])
         for begin, end, colour in zip(ends, ends[1:], STATUS.values()):
@@ -136,8 +142,8 @@ def _pies(axes: Axes, places: Array, shares: Array) -> None:
 
 
 def place_face(axes: Axes, title: str, places: Array) -> None:
-    """Axes of a face that hold all these places (n_pairs, 2) [m], in millimetres."""
-    low, high = MM * places.min(axis=0), MM * places.max(axis=0)
+    """Axes of a face that hold all these places (n_pairs, 2)."""
+    low, high = places.min(axis=0), places.max(axis=0)
     reach = MARGIN * np.where(high > low, high - low, max(*(high - low), 1.0))
     axes.set(xlim=(low[0] - reach[0], high[0] + reach[0]), ylim=(low[1] - reach[1], high[1] + reach[1]))
     axes.set_title(title, fontsize=10)

@@ -55,7 +55,7 @@ def _level(axes: Axes, forced: Analysis, times: Table | None, level: float, colo
 
 
 def response(forced: Analysis, level: float) -> tuple[AnyArray, AnyArray]:
-    """Frequency [Hz] and amplitude [m] along the branch of a level.
+    """Frequency [Hz] and amplitude [length] along the branch of a level.
 
     The observed dof's amplitude lies on the branch's cubic. The largest one of a wheel's blades is no function of the
     scalar unknowns and is drawn through its points.

@@ -15,7 +15,6 @@ from . import style
 from .phase_planes import kept_points
 from .trajectories import amplitude_name
 
-UM = 1e6
 LEGEND_COLUMNS = 4
 
 
@@ -29,7 +28,7 @@ def figures(run: Run) -> Iterator[tuple[str, Figure]]:
 
 def draw(mode: Analysis, contact: str) -> Figure:
     """Above friction force against tangential displacement, below against normal force; a column per face."""
-    points = kept_points(mode)
+    points, (scale, unit), force = kept_points(mode), mode.unit_system.of_depths, mode.unit_system("force")
     chosen = busiest(mode, contact, points[-1])
     figure, axes = style.new_figure(7.0, rows=2, columns=len(chosen), sharey=True, squeeze=False)
     for (name, pair), (upper, lower) in zip(chosen.items(), axes.T):
@@ -37,14 +36,14 @@ def draw(mode: Analysis, contact: str) -> Figure:
         for point, colour in zip(points, style.shades(len(points))):
             motion = mode.loop(contact, point)
             u, f = (np.append(motion[key][:, :, pair], motion[key][:1, :, pair], axis=0) for key in "uf")
-            upper.plot(UM * u[:, 1:] @ tangent, f[:, 1:] @ tangent, color=colour, label=amplitude_name(mode, point))
+            upper.plot(scale * u[:, 1:] @ tangent, f[:, 1:] @ tangent, color=colour, label=amplitude_name(mode, point))
             lower.plot(f[:, 0], f[:, 1:] @ tangent, color=colour)
         upper.set_title(f"{name}, pair {pair}", fontsize=10.5)
-        upper.set_xlabel(style.label("Tangential displacement", "µm"))
-        lower.set_xlabel(style.label("Normal force", "N"))
+        upper.set_xlabel(style.label("Tangential displacement", unit))
+        lower.set_xlabel(style.label("Normal force", force))
         _limits(lower, mode, contact, pair)
     for first in axes[:, 0]:
-        first.set_ylabel(style.label("Friction force", "N"))
+        first.set_ylabel(style.label("Friction force", force))
     style.legend_outside(figure, axes[0, 0], columns=LEGEND_COLUMNS, title=f"Modal amplitude, {mode.method()}")
     return figure
 

@@ -59,7 +59,7 @@ def loops(mode: Analysis, contact: str) -> Figure:
         left.plot(u, f, color=colour, label=amplitude_name(mode, point))
         right.plot(u / np.abs(u).max(), f / max(np.abs(f).max(), 1e-300), color=colour)
     left.set_xlabel(style.label("Relative displacement", mode.length_unit()))
-    left.set_ylabel(style.label("Contact force", "N"))
+    left.set_ylabel(style.label("Contact force", mode.unit_system("force")))
     right.set(xlabel="Relative displacement / its maximum", ylabel="Contact force / its maximum")
     title = f"Contact {contact}{'' if pair[1] == 0 else f', pair {pair[1]}'}: modal amplitude, {mode.method()}"
     style.legend_outside(figure, left, columns=CURVES, title=title)

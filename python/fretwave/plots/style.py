@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from ..arrays import AnyArray
+from ..columns import PURE
 from ..files.whole import replaced
 
 #: Okabe and Ito's palette: distinguishable under every common colour-vision deficiency
@@ -71,8 +72,13 @@ def save(figure: Figure, path: Path) -> Path:
 
 
 def label(text: str, unit: str = "") -> str:
-    """Axis label with its unit: "Amplitude of m1 [m]"; no bracket for a pure number."""
-    return f"{text} [{unit}]" if unit and unit not in ("1", "-") else text
+    """Axis label with its unit: "Amplitude of m1 [length]"; no bracket for a pure number."""
+    return f"{text} [{symbol(unit)}]" if unit not in PURE else text
+
+
+def symbol(unit: str) -> str:
+    """A unit with raised powers: "mm³"."""
+    return unit.replace("^2", "²").replace("^3", "³")
 
 
 def shades(count: int) -> list[Any]:

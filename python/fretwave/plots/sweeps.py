@@ -66,7 +66,7 @@ class Swept:
 
     def unit(self, unit: str) -> str:
         """Of a panel; that of an amplitude where it is a length."""
-        return self.analysis.unit("amplitude") or unit if unit == "m" else unit
+        return self.analysis.unit("amplitude") or self.analysis.unit_system(unit) if unit == "length" else unit
 
     @property
     def main(self) -> int:
@@ -135,7 +135,7 @@ def backbones(swept: Swept) -> Figure:
     upper.set_ylabel(style.label("Frequency ω/2π", "Hz"))
     lower.set_ylabel(style.label("Damping ratio ζ", "%"))
     dof = swept.analysis.attributes.get("normalise", "")
-    lower.set_xlabel(style.label(f"Modal amplitude of {dof}".rstrip(" of"), swept.unit("m")))
+    lower.set_xlabel(style.label(f"Modal amplitude of {dof}".rstrip(" of"), swept.unit("length")))
     _name(figure, [upper, lower], swept)
     return figure
 
@@ -150,7 +150,7 @@ def responses(swept: Swept) -> Figure:
         axes.set_yscale("log")
     axes.set_xlabel(style.label("Excitation frequency", "Hz"))
     dof = swept.analysis.attributes.get("observe", "")
-    axes.set_ylabel(style.label(f"Amplitude of {dof}".rstrip(" of"), swept.unit("m")))
+    axes.set_ylabel(style.label(f"Amplitude of {dof}".rstrip(" of"), swept.unit("length")))
     _name(figure, [axes], swept)
     return figure
 
@@ -234,11 +234,11 @@ def _one(axes: Axes, x: Array, table: Table, number: int, column: str, coloured:
 #: label and unit of an axis, whether it starts at 0, and what draws a line on it
 Panel = Tuple[str, str, bool, Callable[[Axes, Array, Table, int], None]]
 MODE_PANELS = (
-    ("Modal amplitude", "m", False, _amplitudes),
+    ("Modal amplitude", "length", False, _amplitudes),
     ("Largest damping ratio ζ", "%", True, partial(_one, column="largest_zeta")),
 )
 FORCED_PANELS = (
-    ("Largest amplitude", "m", True, partial(_one, column="largest_amplitude", coloured=True)),
+    ("Largest amplitude", "length", True, partial(_one, column="largest_amplitude", coloured=True)),
     ("Frequency there", "Hz", False, partial(_one, column="frequency_of_largest_amplitude", coloured=True)),
 )
 

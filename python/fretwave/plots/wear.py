@@ -17,7 +17,7 @@ from ..arrays import Array
 from ..results.reader import Analysis, Run
 from . import style
 from .faces import STATUS
-from .wear_lines import MM, WearLine, amplitude_label, amplitude_text, amplitudes, cycle_label, power, wears
+from .wear_lines import WearLine, amplitude_label, amplitude_text, amplitudes, cycle_label, power, wears
 
 #: fewer amplitudes than this make no map
 GRID = 3
@@ -85,10 +85,10 @@ def draw_modal(wear: Analysis, lines: Sequence[WearLine]) -> Figure:
 
 def draw_volume_map(wear: Analysis, lines: Sequence[WearLine]) -> Figure:
     """Worn volume of every face: maps above, curves over the cycles below, on the same scales."""
-    faces = _faces(wear)
+    faces, (factor, cubic) = _faces(wear), wear.unit_system.of_volumes
     figure, axes = style.new_figure(7.2, rows=2, columns=len(faces), sharex=True, sharey="row", squeeze=False)
     cycles = np.linspace(0.0, _last(lines), COLUMNS)
-    values = {face: np.stack([line.at(MM**3 * line.columns[face], cycles) for line in lines]) for face in faces}
+    values = {face: np.stack([line.at(factor * line.columns[face], cycles) for line in lines]) for face in faces}
     levels, norm = volume_levels(np.stack(list(values.values())))
     amplitude, unit = amplitudes(lines)
     scale = ScalarMappable(Normalize(amplitude[0], amplitude[-1]), ListedColormap(style.shades(256)))
@@ -96,16 +96,16 @@ def draw_volume_map(wear: Analysis, lines: Sequence[WearLine]) -> Figure:
         filled = _map(upper, cycles, lines, values[face], levels, norm)
         upper.set_title(name)
         for line, colour in zip(lines, scale.to_rgba(amplitude)):
-            lower.plot(line.cycles, MM**3 * line.columns[face], color=colour)
-    look = {"format": FuncFormatter(lambda x, _: f"{x:g}"), "label": style.label("Worn volume", "mm³"), "pad": 0.02}
+            lower.plot(line.cycles, factor * line.columns[face], color=colour)
+    look = {"format": FuncFormatter(lambda x, _: f"{x:g}"), "label": style.label("Worn volume", cubic), "pad": 0.02}
     figure.colorbar(filled, ax=axes[0, :], ticks=None if norm is None else levels, **look)
     if norm is not None:
         axes[1, 0].set(yscale="log", ylim=(levels[0], 1.3 * max(volumes.max() for volumes in values.values())))
         axes[1, 0].yaxis.set_major_formatter(look["format"])
-    bar = figure.colorbar(scale, ax=axes[1, :], label=f"Modal amplitude [{unit}]", pad=0.02)
+    bar = figure.colorbar(scale, ax=axes[1, :], label=style.label("Modal amplitude", unit), pad=0.02)
     bar.ax.hlines(amplitude, 0, 1, transform=bar.ax.get_yaxis_transform(), color="white")
     axes[0, 0].set_ylabel(amplitude_label(wear, unit))
-    axes[1, 0].set_ylabel(style.label("Worn volume", "mm³"))
+    axes[1, 0].set_ylabel(style.label("Worn volume", cubic))
     figure.supxlabel(cycle_label(wear), fontsize=11)
     _heading(figure, wear, lines)
     return figure
@@ -113,18 +113,18 @@ def draw_volume_map(wear: Analysis, lines: Sequence[WearLine]) -> Figure:
 
 def draw_volume(wear: Analysis, lines: Sequence[WearLine]) -> Figure:
     """Worn volume of every face, and how fast it grows."""
-    faces = _faces(wear)
+    faces, (factor, cubic) = _faces(wear), wear.unit_system.of_volumes
     figure, (upper, lower) = style.new_figure(6.0, rows=2, sharex=True)
     for line, dash in zip(lines, ("-", "--")):
         for (face, name), colour in zip(faces.items(), style.PALETTE):
-            volume = MM**3 * line.columns[face]
+            volume = factor * line.columns[face]
             text = name if len(lines) == 1 else f"{name}, {amplitude_text(line)}"
             upper.plot(line.cycles, volume, dash, color=colour, label=text)
             lower.stairs(
                 np.diff(volume) / np.diff(line.cycles), line.cycles, baseline=None, linestyle=dash, color=colour
             )
-    upper.set_ylabel(style.label("Worn volume", "mm³"))
-    lower.set_ylabel("Growth [mm³ per wear cycle]")
+    upper.set_ylabel(style.label("Worn volume", cubic))
+    lower.set_ylabel(style.label("Growth", f"{cubic} per wear cycle"))
     lower.set_xlabel(cycle_label(wear))
     lower.set(xlim=(0.0, _last(lines)))
     lower.set_ylim(bottom=0.0)
@@ -197,5 +197,8 @@ def _faces(wear: Analysis) -> dict[str, str]:
 def _heading(figure: Figure, wear: Analysis, lines: Sequence[WearLine]) -> None:
     coefficient = float(wear.attributes.get("wear_coefficient", np.nan))
     note = f"; red marks: {JUMP}" if len(lines) >= GRID and any(len(line.jumps) for line in lines) else ""
-    figure.suptitle(f"Fretting wear ({wear.name}), $k_w$ = {power(coefficient)} 1/Pa{note}", fontsize=11.5)
+    figure.suptitle(
+        f"Fretting wear ({wear.name}), $k_w$ = {power(coefficient)} {wear.unit_system('1/pressure')}{note}",
+        fontsize=11.5,
+    )
     figure.align_ylabels()

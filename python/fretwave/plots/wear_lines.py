@@ -10,11 +10,11 @@ import numpy as np
 from ..arrays import Array
 from ..model.laws import Role
 from ..results.reader import Analysis, Run, Table
+from ..units import UnitSystem
 from . import style
 
-MM, MICRON = 1e3, 1e6
-#: of amplitudes, from which they are at least 0.1
-UNITS = ((1.0, "m"), (MM, "mm"), (MICRON, "µm"))
+#: an amplitude is shown in the first unit from which it is at least this
+SHOWN = 0.1
 #: slack of the rule by which wear has stopped: each amplitude has its own scale of the normal load, the first is kept
 SLACK = 2.0
 #: shares of the deepest depth, and of a pair's own largest rate, that count as nothing
@@ -41,9 +41,10 @@ class WearLine:
     ----------
     columns : of its table, (n,) each
     depth, rate, load : contact -> (n, n_pairs)
-        Worn depth [m], its growth in a vibration cycle [m], mean normal force [N].
+        Worn depth [length], its growth in a vibration cycle [length], mean normal force [force].
     jumps : (n_jumps,)
         Cycles at which the mode went over to another sheet.
+    units : of all numbers
     """
 
     amplitude: float
@@ -51,6 +52,7 @@ class WearLine:
     depth: Table
     rate: Table
     load: Table
+    units: UnitSystem
     jumps: Array = field(default_factory=lambda: np.empty(0))
 
     @property
@@ -81,7 +83,7 @@ def lines_of(wear: Analysis) -> list[WearLine]:
             columns["cycles"][-1] = last
         jumps = np.array([wear.columns["cycles"][row] for row in rows if wear.events[row] == "jump"])
         parts = {key: {name: values[rows] for name, values in table.items()} for key, table in fields.items()}
-        found.append(WearLine(float(columns["amplitude"][0]), columns, **parts, jumps=jumps))
+        found.append(WearLine(float(columns["amplitude"][0]), columns, **parts, units=wear.unit_system, jumps=jumps))
     return sorted(found, key=lambda line: line.amplitude)
 
 
@@ -164,7 +166,8 @@ def telling_line(lines: Sequence[WearLine], contact: str) -> WearLine:
 def amplitudes(lines: Sequence[WearLine]) -> tuple[Array, str]:
     """Of all lines in a unit that suits the largest, and the unit."""
     values = np.array([line.amplitude for line in lines])
-    scale, unit = next((scale, unit) for scale, unit in UNITS if values.max() * scale >= 0.1 or scale == UNITS[-1][0])
+    shown = lines[0].units.lengths
+    scale, unit = next(((scale, unit) for scale, unit in shown if values.max() * scale >= SHOWN), shown[-1])
     return scale * values, unit
 
 

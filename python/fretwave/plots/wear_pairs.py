@@ -12,11 +12,9 @@ from matplotlib.figure import Figure
 from ..arrays import Array
 from ..results.reader import Analysis, Run, Table
 from . import style
-from .faces import place_face
+from .faces import place_face, placed_pairs
 from .wear_lines import (
     KINDS,
-    MICRON,
-    MM,
     RULE,
     WearLine,
     amplitude_text,
@@ -29,7 +27,7 @@ from .wear_lines import (
 
 #: side of a pair's mark [pt^2]
 MARK = 150.0
-#: decimals of millimetres that tell rows of pairs apart
+#: decimals that tell rows of pairs apart
 ROUND = 6
 
 
@@ -38,10 +36,10 @@ def figures(run: Run) -> Iterator[tuple[str, Figure]]:
     for wear, lines in wears(run):
         for contact in wear.worn_contacts():
             line = telling_line(lines, contact)
-            pairs = wear.pairs(contact) if contact in wear.placed() else None
+            pairs, unit = placed_pairs(wear, contact) if contact in wear.placed() else (None, "")
             yield f"{wear.name}_pairs_{contact}", draw_histories(wear, line, contact, pairs)
             if pairs is not None:
-                yield f"{wear.name}_profile_{contact}", draw_profiles(line, contact, pairs)
+                yield f"{wear.name}_profile_{contact}", draw_profiles(line, contact, pairs, unit)
 
 
 def draw_histories(wear: Analysis, line: WearLine, contact: str, pairs: Table | None) -> Figure:
@@ -54,37 +52,39 @@ def draw_histories(wear: Analysis, line: WearLine, contact: str, pairs: Table | 
     grid = figure.add_gridspec(3 if faces else 2, max(len(faces), 1), height_ratios=[2, 1.6, 0.9][: 3 if faces else 2])
     upper = figure.add_subplot(grid[0, :])
     lower = figure.add_subplot(grid[1, :], sharex=upper)
-    _histories(upper, line.cycles, MICRON * line.depth[contact], words, chosen)
+    scale, unit = line.units.of_depths
+    _histories(upper, line.cycles, scale * line.depth[contact], words, chosen)
     _histories(lower, line.cycles, line.load[contact], words, chosen)
-    upper.set_ylabel(style.label("Worn depth", "µm"))
+    upper.set_ylabel(style.label("Worn depth", unit))
     missing = ", ".join(kind for kind in KINDS if kind not in chosen)
     text = f"{amplitude_text(line)}, {len(words)} pairs of {contact}"
     upper.set_title(text + (f"; left out, for there is none: {missing}" if missing else ""))
-    lower.set_ylabel(style.label("Mean normal force", "N"))
+    lower.set_ylabel(style.label("Mean normal force", line.units("force")))
     lower.set_xlabel(cycle_label(wear))
     lower.set(xlim=(0.0, line.cycles[-1]))
     for column, face in enumerate(faces):
-        _places(figure.add_subplot(grid[2, column]), pairs or {}, face, words, chosen)
+        _places(figure.add_subplot(grid[2, column]), pairs or {}, line.units.of_faces[1], face, words, chosen)
     figure.supxlabel(RULE, fontsize=9, color=style.GREY)
     style.legend_outside(figure, upper, columns=2)
     return figure
 
 
-def draw_profiles(line: WearLine, contact: str, pairs: Table) -> Figure:
+def draw_profiles(line: WearLine, contact: str, pairs: Table, of_face: str) -> Figure:
     """Depth at the last cycle: maps of the faces on one colour scale, and profiles along each row of pairs."""
-    depth, faces = MICRON * line.depth[contact][-1], list(dict.fromkeys(pairs["face"]))
-    rows, deepest = _rows(MM * pairs["position"][:, 1]), float(depth.max()) or 1.0
+    scale, unit = line.units.of_depths
+    depth, faces = scale * line.depth[contact][-1], list(dict.fromkeys(pairs["face"]))
+    rows, deepest = _rows(pairs["position"][:, 1]), float(depth.max()) or 1.0
     figure, axes = style.new_figure(5.8, rows=2, columns=len(faces), sharex=True, sharey="row", squeeze=False)
     for (upper, lower), face in zip(axes.T, faces):
         mine = pairs["face"] == face
-        dots = _depths(upper, MM * pairs["position"][mine], depth[mine], deepest)
+        dots = _depths(upper, pairs["position"][mine], depth[mine], deepest)
         place_face(upper, face, pairs["position"])
-        _profiles(lower, MM * pairs["position"][mine], depth[mine], rows)
-        lower.set_xlabel("Along the face [mm]")
-    axes[0, 0].set_ylabel("Up the face [mm]")
-    axes[1, 0].set_ylabel(style.label("Worn depth", "µm"))
+        _profiles(lower, pairs["position"][mine], depth[mine], rows, of_face)
+        lower.set_xlabel(style.label("Along the face", of_face))
+    axes[0, 0].set_ylabel(style.label("Up the face", of_face))
+    axes[1, 0].set_ylabel(style.label("Worn depth", unit))
     axes[1, 0].set_ylim(0.0, 1.08 * deepest)
-    figure.colorbar(dots, ax=axes[0, :], label=style.label("Worn depth", "µm"), pad=0.02)
+    figure.colorbar(dots, ax=axes[0, :], label=style.label("Worn depth", unit), pad=0.02)
     text = f"Worn profiles of {contact} after {line.cycles[-1]:.4g} wear cycles at {amplitude_text(line)}"
     style.legend_outside(figure, axes[1, 0], columns=4, title=text)
     return figure
@@ -99,12 +99,12 @@ def _depths(axes: Axes, places: Array, depth: Array, deepest: float) -> Any:
     return axes.scatter(*places.T, c=depth, edgecolors=style.GREY, **look)
 
 
-def _profiles(axes: Axes, places: Array, depth: Array, rows: Array) -> None:
+def _profiles(axes: Axes, places: Array, depth: Array, rows: Array, unit: str) -> None:
     """Depth along each row of pairs; single dots where pairs do not stand in rows."""
     for row, colour in zip(rows, style.shades(len(rows))):
         here = np.flatnonzero(np.isclose(places[:, 1], row, rtol=0.0, atol=10.0**-ROUND))
         here = here[np.argsort(places[here, 0])]
-        axes.plot(places[here, 0], depth[here], "o-", color=colour, label=f"{row:.3g} mm up the face", markersize=4)
+        axes.plot(places[here, 0], depth[here], "o-", color=colour, label=f"{row:.3g} {unit} up the face", markersize=4)
     if not len(rows):
         axes.plot(places[:, 0], depth, "o", color=style.BLUE)
 
@@ -125,10 +125,10 @@ def _histories(axes: Axes, cycles: Array, values: Array, words: list[str], chose
     axes.set_ylim(bottom=0.0)
 
 
-def _places(axes: Axes, pairs: Table, face: str, words: list[str], chosen: dict[str, int]) -> None:
+def _places(axes: Axes, pairs: Table, unit: str, face: str, words: list[str], chosen: dict[str, int]) -> None:
     """Kind of each pair of a face; the pairs drawn in front have a ring."""
     for pair in np.flatnonzero(pairs["face"] == face):
         ring = pair in chosen.values()
         look = {"markeredgecolor": style.INK if ring else style.GREY, "markeredgewidth": 2.0 if ring else 0.4}
-        axes.plot(*(MM * pairs["position"][pair]), "o", color=KINDS[words[pair]], markersize=10, **look)
-    place_face(axes, f"{face} [mm]", pairs["position"])
+        axes.plot(*pairs["position"][pair], "o", color=KINDS[words[pair]], markersize=10, **look)
+    place_face(axes, style.label(face, unit), pairs["position"])

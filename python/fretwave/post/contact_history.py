@@ -16,14 +16,14 @@ from ..model.laws import OPEN, SLIP, STICK, UNKNOWN
 States = npt.NDArray[np.int8]
 Change = Callable[[npt.NDArray[Any]], npt.NDArray[Any]]
 
-#: What is kept of a contact's period, by name: unit, long name, type and the value of rows that lack it.
+#: What is kept of a contact's period, by name: unit (of the quantity), long name, type, value of rows that lack it.
 MOTION: Mapping[str, tuple[str, str, str, float]] = {
-    "u": ("m", "relative displacement over one period", "f8", 0),
-    "v": ("m/s", "relative velocity over one period", "f8", 0),
-    "f": ("N", "contact force over one period", "f8", 0),
+    "u": ("length", "relative displacement over one period", "f8", 0),
+    "v": ("length/s", "relative velocity over one period", "f8", 0),
+    "f": ("force", "contact force over one period", "f8", 0),
     "status": ("1", "status over one period: stick 0, slip 1, open 2, not kept -1", "i1", UNKNOWN),
-    "gap": ("m", "distance to contact over one period, 0 where closed", "f8", np.nan),
-    "work": ("J", "energy dissipated in one period", "f8", np.nan),
+    "gap": ("length", "distance to contact over one period, 0 where closed", "f8", np.nan),
+    "work": ("energy", "energy dissipated in one period", "f8", np.nan),
     "shares": ("1", "of the period in stick, slip and open", "f8", np.nan),
 }
 SAMPLED, BY_PAIR = ("sample", "component", "pair"), ("sample", "pair")
@@ -45,12 +45,12 @@ class ContactHistory:
     Attributes
     ----------
     u, v, f : (n_samples, components, n_pairs)
-        Relative displacement [m] and velocity [m/s], and force [N].
+        Relative displacement [length] and velocity [length/s], and force [force].
     kept_status, kept_gap : (n_samples, n_pairs), optional
         As the law told them; None where they are not kept.
     normal : int or None
         Component along the normal, > 0 closing.
-    kept_work, kept_shares : (n_pairs,) [J] and (3, n_pairs), optional
+    kept_work, kept_shares : (n_pairs,) [energy] and (3, n_pairs), optional
         As measured of the whole period, not of its samples; None in results of an earlier version.
     """
 
@@ -98,17 +98,17 @@ class ContactHistory:
 
     @property
     def normal_force(self) -> Array:
-        """(n_samples, n_pairs) [N], > 0 compressive; nan for a law without one."""
+        """(n_samples, n_pairs) [force], > 0 compressive; nan for a law without one."""
         return normal_force(self.f, self.normal)
 
     @property
     def tangential_force(self) -> Array:
-        """(n_samples, n_pairs) [N], its magnitude."""
+        """(n_samples, n_pairs) [force], its magnitude."""
         return tangential_force(self.f, self.normal)
 
     @property
     def gap(self) -> Array:
-        """(n_samples, n_pairs) [m]: distance to contact, 0 where closed; nan for a law without one."""
+        """(n_samples, n_pairs) [length]: distance to contact, 0 where closed; nan for a law without one."""
         return np.full_like(self.f[:, 0], np.nan) if self.kept_gap is None else self.kept_gap
 
     @property
@@ -125,7 +125,7 @@ class ContactHistory:
 
     @property
     def work(self) -> Array:
-        """(n_pairs,) [J]: work done against the force over the period, that is, dissipated.
+        """(n_pairs,) [energy]: work done against the force over the period, that is, dissipated.
 
         As measured, or the integral of f . du with the exact derivative of the sampled u, which has finitely many
         harmonics: the sum over all pairs is then in balance with the harmonic equations.

@@ -50,7 +50,7 @@ def _wave(table: Mapping[str, Any], diameter: int, rows: npt.NDArray[np.intp]) -
 
 
 def _folds(part: Mapping[str, Any], point: int) -> list[float] | None:
-    """Amplitudes [m] of the folds before and behind a point between which the branch runs back."""
+    """Amplitudes [length] of the folds before and behind a point between which the branch runs back."""
     turns = np.flatnonzero(["fold" in str(event).split() for event in part["event"]])
     before, behind = turns[turns < point], turns[turns > point]
     if len(before) % 2 == 0 or not len(behind):
@@ -79,11 +79,11 @@ def verdict(zeta: npt.ArrayLike) -> str:
     return "bounded" if signs[-1] > 0 else "bounded below"
 
 
-def words(wave: Mapping[str, Any]) -> str:
-    """A wave's fate in one line."""
-    cycles = "; ".join(map(_cycle, wave["limit_cycles"]))
-    peak = f"largest damping {100 * wave['largest_zeta']:+.3g} % at a = {wave['at_amplitude']:.3g} m"
-    last = f"{wave['last_amplitude']:.3g} m"
+def words(wave: Mapping[str, Any], unit: str) -> str:
+    """A wave's fate in one line; `unit` of its amplitudes."""
+    cycles = "; ".join(_cycle(cycle, unit) for cycle in wave["limit_cycles"])
+    peak = f"largest damping {100 * wave['largest_zeta']:+.3g} % at a = {wave['at_amplitude']:.3g} {unit}"
+    last = f"{wave['last_amplitude']:.3g} {unit}"
     fate = {
         "neutral": "neither damped nor fed",
         "stable": f"stable at every amplitude up to {last}",
@@ -101,8 +101,9 @@ def with_sign(diameters: int) -> str:
     return f"{diameters:+d}" if diameters else "0"
 
 
-def _cycle(cycle: Mapping[str, Any]) -> str:
-    text = f"{STABLE[cycle['stable']]} limit cycle at a = {cycle['amplitude']:.4g} m, {cycle['frequency_hz']:.5g} Hz"
+def _cycle(cycle: Mapping[str, Any], unit: str) -> str:
+    place = f"a = {cycle['amplitude']:.4g} {unit}, {cycle['frequency_hz']:.5g} Hz"
+    text = f"{STABLE[cycle['stable']]} limit cycle at {place}"
     if cycle["folds"]:
-        text += f" (on a branch that runs back between {cycle['folds'][0]:.5g} and {cycle['folds'][1]:.5g} m)"
+        text += f" (on a branch that runs back between {cycle['folds'][0]:.5g} and {cycle['folds'][1]:.5g} {unit})"
     return text

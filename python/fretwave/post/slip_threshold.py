@@ -26,9 +26,9 @@ def slip_factor(
     Parameters
     ----------
     forces : (n_samples, components, n_pairs)
-        Over a period; with three components the first is normal, > 0 in contact [N].
+        Over a period; with three components the first is normal, > 0 in contact [force].
     limit : float or (n_pairs,)
-        Friction limit of sliders with one component [N].
+        Friction limit of sliders with one component [force].
     friction : float or (n_pairs,)
         Coefficient of friction of pairs with three components.
     each : bool
@@ -63,7 +63,7 @@ def _root(a: Array, b: Array, c: Array) -> list[float]:
 
 
 def slip_threshold(amplitude: float, forces: Mapping[str, Array], attributes: Mapping[str, Any]) -> float:
-    """Threshold [m] from a point at which all pairs stick; nan when a law has none, inf when no amplitude is enough.
+    """Threshold [length] from a point at which all pairs stick; nan where a law has none, inf when none is enough.
 
     Parameters
     ----------

@@ -14,6 +14,7 @@ from ..errors import InputError
 from ..files.dimensions import put_array
 from ..files.whole import Unfailing, beside, bring_to_disk, check_whole, seal, sealed_size, told
 from ..texts import display
+from ..units import units_of
 from .journal import unfinished
 from .rows import Rows, build_group
 
@@ -140,8 +141,9 @@ def has_results(folder: Path) -> bool:
 
 
 def unit_of_amplitudes(group: h5py.Group) -> str:
-    """Of an analysis; metres where the results tell none."""
-    return str(group["points/amplitude"].attrs.get("units", "m")) if "points/amplitude" in group else "m"
+    """Of an analysis; that of its lengths where the results tell none."""
+    of_lengths = units_of(group.attrs)("length")
+    return str(group["points/amplitude"].attrs.get("units", of_lengths)) if "points/amplitude" in group else of_lengths
 
 
 def open_results(path: Path) -> Results:

@@ -7,7 +7,8 @@ or int64, from 0).
 =========================  ===================================================================================
 place                      content
 =========================  ===================================================================================
-``/`` (attributes)         ``format`` = "fretwave model", ``format_version`` = 1, ``units`` (free text)
+``/`` (attributes)         ``format`` = "fretwave model", ``format_version`` = 1, ``units``: name of the unit
+                           system (`fretwave.units`), empty where it was not told (then SI)
 ``/M``, ``/K``, ``/C``     groups ``data``, ``indices``, ``indptr`` of the CSR form, attribute ``shape``; both triangles
                            are stored; ``/C`` is optional
 ``/dofs/name``             (n_dof,) unique names, in the order of the rows
@@ -46,6 +47,7 @@ from ..files.whole import Unfailing, check_whole, replaced, seal
 from ..model.pairs import Pairs
 from ..model.structure import Structure
 from ..texts import display, names_beside, nearest
+from ..units import SYSTEMS, unit_system
 
 if TYPE_CHECKING:
     import h5py
@@ -89,24 +91,29 @@ def digest(path: Path) -> str:
     return found.hexdigest()
 
 
-def write_model(path: str | Path, structure: Structure, units: str = "", sources: Sequence[SourceFile] = ()) -> None:
+def write_model(
+    path: str | Path, structure: Structure, units: str | None = None, sources: Sequence[SourceFile] = ()
+) -> None:
     """Write a model file. One rank only; an old file is replaced once the new one is complete.
 
     Parameters
     ----------
     structure : Structure
         As it was given: one that is no sector tied to its neighbours. `dofs` are those that a reduction shall keep.
-    units : str
-        Free text.
+    units : str, optional
+        Name of the unit system; default that of the structure.
     sources : what the matrices were read from
 
     Raises
     ------
     InputError
-        The parts do not fit each other.
+        The parts do not fit each other, or there is no such unit system.
     """
     import h5py
 
+    told = units or structure.units or ""
+    if told:
+        unit_system(told)
     tables = _tables_of(structure)
     _check_held(structure, str(path))
     _check(structure, tables, str(path))
@@ -118,7 +125,7 @@ def write_model(path: str | Path, structure: Structure, units: str = "", sources
     with replaced(path, own=True) as fresh:
         raw = Unfailing(fresh)
         with h5py.File(raw, "w") as file:
-            file.attrs.update(format=FORMAT, format_version=VERSION, units=units)
+            file.attrs.update(format=FORMAT, format_version=VERSION, units=told)
             _write_parts(file, structure, tables)
             for key in ("role", "path", "sha256"):
                 file[f"sources/{key}"] = np.array([getattr(s, key).encode() for s in sources], dtype="S")
@@ -295,8 +302,15 @@ def _read_parts(file: h5py.File) -> tuple[Structure, dict[str, Table]]:
         node_numbers=tables["nodes/number"],
         coordinates=tables["nodes/coordinates"],
         hexahedra=tables["cells/hexahedra"],
+        units=_units_of(file),
     )
     return structure, tables
+
+
+def _units_of(file: h5py.File) -> str | None:
+    """The system that it tells; None where it tells none, or has a note of an earlier version in its place."""
+    told = str(file.attrs.get("units", ""))
+    return told if told in SYSTEMS else None
 
 
 def _array(group: h5py.Group, name: str) -> Table:

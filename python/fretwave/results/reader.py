@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..arrays import Array
-from ..columns import table_order
+from ..columns import name_of, table_order
 from ..errors import InputError
 from ..files.dimensions import names_of_data
 from ..hb.states import State
@@ -22,6 +22,7 @@ from ..post.mode_curve import ModeCurve
 from ..post.motion import motion
 from ..solve.curve import PARTS, Curve
 from ..solve.table import Table as Reading
+from ..units import UnitSystem, units_of
 from .file import has_results, open_results
 from .slopes import curves_of, read_slopes
 
@@ -81,7 +82,7 @@ class Analysis:
         return f"Analysis('{self.name}', {self.kind}, {len(self)} points, {status}: {', '.join(self.columns)})"
 
     def coefficients(self, points: Sequence[int] | None = None) -> Array:
-        """Harmonic coefficients (len(points), n_dof, m) [m] of some points or all; axes as `dofs` and `labels`."""
+        """Harmonic coefficients (len(points), n_dof, m) [length] of some points or all; axes as `dofs` and `labels`."""
         with open_results(self.path) as file:
             found = file[self.name]["coefficients"]
             return np.asarray(found) if points is None else np.stack([found[p] for p in points])
@@ -90,7 +91,7 @@ class Analysis:
         """Motion of a contact over one period: u, v, f (n_samples, components, n_pairs).
 
         With them what is kept of its law's word on each pair and sample, status and gap (n_samples, n_pairs), and of
-        the whole period, work (n_pairs) [J] and shares of stick, slip and open (3, n_pairs).
+        the whole period, work (n_pairs) [energy] and shares of stick, slip and open (3, n_pairs).
         """
         row = self.reported.index(point)
         with open_results(self.path) as file:
@@ -120,7 +121,7 @@ class Analysis:
             return [key[len("pairs_") :] for key in file[self.name] if key.startswith("pairs_")]
 
     def pairs(self, contact: str) -> Table:
-        """Of each pair of a contact: position (n_pairs, 2) on its face [m], face, friction coefficient."""
+        """Of each pair of a contact: position (n_pairs, 2) on its face [length], face, friction coefficient."""
         with open_results(self.path) as file:
             group = file[self.name]["pairs_" + contact]
             table = {key: group[key][()] for key in group}
@@ -178,7 +179,12 @@ class Analysis:
 
     def length_unit(self) -> str:
         """Of displacements; "" where the results tell no units."""
-        return "m" if self.unit("amplitude") else ""
+        return self.unit_system("length") if self.unit("amplitude") else ""
+
+    @property
+    def unit_system(self) -> UnitSystem:
+        """The system that all its numbers are in."""
+        return units_of(self.attributes)
 
     def asymptote(self, contact: str) -> float | None:
         """Linear angular frequency with the contact "stuck" or "free" [rad/s]."""
@@ -245,7 +251,7 @@ class Analysis:
     @cached_property
     def _curves(self) -> list[tuple[int, Curve]]:
         assert self.meaning is not None
-        return curves_of(self.columns, self.units, self.events, self.meaning, self.slopes)
+        return curves_of(self.columns, self.units, self.unit_system, self.events, self.meaning, self.slopes)
 
     def mode_curve(self) -> ModeCurve:
         """Modal values as functions of amplitude, as the tables of comparisons read them."""
@@ -313,7 +319,7 @@ class Run:
         return [a for a in self.analyses.values() if a.kind == kind and len(a)]
 
     def table(self, name: str) -> Table | None:
-        """Columns of `<name>.csv`; numbers where they are numbers. None when there is no such table."""
+        """Columns of `<name>.csv` by name, without units; numbers where they are numbers. None when there is none."""
         path = self.folder / f"{name}.csv"
         if not path.exists():
             return None
@@ -321,7 +327,7 @@ class Run:
             rows = list(csv.DictReader(file))
         if not rows:
             return None
-        return {key: _numbers([row[key] for row in rows]) for key in rows[0]}
+        return {name_of(key): _numbers([row[key] for row in rows]) for key in rows[0]}
 
     def tables(self) -> list[str]:
         """Names of the tables in the folder."""

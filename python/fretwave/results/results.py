@@ -20,10 +20,11 @@ from ..columns import Column, Value, columns_named
 from ..files.csv_table import header_line, row_line
 from ..files.whole import replace_bytes, told, write_all
 from ..post.contact_history import MOTION
+from ..units import units_of
 from .field import Field
 from .file import NewResults, has_results, open_results, rewritten
 from .journal import Journal, Record, journal_path
-from .rows import LABELS, Rows, attributes_of, build_group
+from .rows import LABELS, Rows, attributes_of, build_group, in_units
 
 if TYPE_CHECKING:
     import h5py
@@ -45,7 +46,8 @@ class AnalysisWriter:
     columns : sequence of str or Column
         Columns of the table.
     attributes : mapping
-        Attributes of the group.
+        Attributes of the group; `unit_system` says which symbols the units of columns, fields and arrays are written
+        in, SI without it.
     dofs, labels : sequence of str
         Names along the axes of the coefficients; without `labels` there are none.
     active : bool
@@ -55,7 +57,7 @@ class AnalysisWriter:
     file_attributes : mapping, optional
         Attributes of results.h5 itself.
     arrays : mapping, optional
-        Arrays [m] of the group that are there from the first row on.
+        Arrays [length] of the group that are there from the first row on.
     fields : mapping, optional
         Arrays that every row brings.
     publish_later : bool
@@ -78,8 +80,8 @@ class AnalysisWriter:
         publish_later: bool = False,
     ) -> None:
         self.folder, self.name, self.active = folder, name, active
-        self.columns = columns_named(columns)
-        self.attributes = dict(attributes)
+        self.attributes, self.units = dict(attributes), units_of(attributes)
+        self.columns = columns_named(columns, self.units)
         self.rows = 0
         self.reported = 0
         self.publish_later = publish_later
@@ -202,12 +204,15 @@ class AnalysisWriter:
             self._table = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CLOEXEC)
 
     def dataset(self, name: str, values: npt.ArrayLike, **attributes: Value) -> None:
-        """Keep a further array (time histories, peaks) in the group, replacing one of the same name."""
+        """Keep a further array (time histories, peaks) in the group, replacing one of the same name.
+
+        Its attribute `units` is of a quantity, as that of a column.
+        """
         if not self.active:
             return
         self._journal.append(Record("array", {"name": name, "attributes": attributes}, {"values": values}))
         if self._new is not None:
-            self._new.array(self.name, name, values, attributes)
+            self._new.array(self.name, name, values, in_units(attributes, self.units))
 
     def close(self, status: str, reason: str, **attributes: Value) -> None:
         """End the table; `status` is ``done`` or ``stopped``. Without any row nothing is written."""

@@ -14,6 +14,7 @@ from ..errors import InputError
 from ..files.dimensions import name_dimensions, put_array
 from ..post.contact_history import AXES, MOTION
 from ..texts import display
+from ..units import UnitSystem, units_of
 from .field import Field
 from .journal import Record, read_records
 
@@ -82,8 +83,13 @@ class Rows:
         return str(self.layout.values["token"])
 
     @property
+    def units(self) -> UnitSystem:
+        """The system that its numbers are in; the units that it keeps are of quantities."""
+        return units_of(self.layout.values["attributes"])
+
+    @property
     def columns(self) -> list[Column]:
-        return [Column(*given) for given in self.layout.values["columns"]]
+        return [Column(*given).in_units(self.units) for given in self.layout.values["columns"]]
 
     @property
     def fields(self) -> dict[str, Field]:
@@ -133,8 +139,13 @@ def build_group(file: h5py.File, name: str, rows: Rows) -> None:
         _create_field(group, rows, key, kept)
     for key, values in arrays.items():
         if key.startswith("array/"):
-            put_array(group, key[len("array/") :], values, {"units": "m"})
+            put_array(group, key[len("array/") :], values, {"units": rows.units("length")})
     _fill(group, rows)
+
+
+def in_units(attributes: Mapping[str, Any], units: UnitSystem) -> dict[str, Any]:
+    """Attributes of an array, its unit in symbols of a system."""
+    return {key: units(value) if key == "units" else value for key, value in attributes.items()}
 
 
 def _growing(
@@ -176,14 +187,14 @@ def _create_coefficients(group: h5py.Group, rows: Rows) -> None:
         return
     labels = max([labels, *(row[LABELS] for row in rows.values() if LABELS in row)], key=len)
     data = _growing(group, "coefficients", len(rows), (len(dofs), len(labels)), CHUNK_ROWS)
-    data.attrs.update({"units": "m", "long_name": "harmonic coefficients of the displacement"})
+    data.attrs.update({"units": rows.units("length"), "long_name": "harmonic coefficients of the displacement"})
     _name_axes(group, {"dof": dofs, "harmonic": labels})
     name_dimensions(group, data, [rows.columns[0].name, "dof", "harmonic"])
 
 
 def _create_field(group: h5py.Group, rows: Rows, name: str, kept: Field) -> None:
     data = group.create_dataset(name, (len(rows), *kept.shape), "f8")
-    data.attrs.update({"units": kept.unit, "long_name": kept.long_name, **kept.attributes})
+    data.attrs.update(in_units({"units": kept.unit, "long_name": kept.long_name, **kept.attributes}, rows.units))
     _name_axes(group, kept.axes)
     name_dimensions(group, data, [rows.columns[0].name, *kept.axes])
 
@@ -203,7 +214,8 @@ def _fill(group: h5py.Group, rows: Rows) -> None:
     group["reported"].make_scale("reported")
     for row, record in rows.records():
         if row < 0:
-            put_array(group, record.values["name"], record.arrays["values"], record.values["attributes"])
+            attributes = in_units(record.values["attributes"], rows.units)
+            put_array(group, record.values["name"], record.arrays["values"], attributes)
             continue
         for name, values in record.arrays.items():
             if name.startswith("motion/"):
@@ -220,6 +232,6 @@ def _put_motion(group: h5py.Group, rows: Rows, contact: str, key: str, values: n
     if key not in holder:
         unit, long_name, dtype, missing = MOTION[key]
         data = _growing(holder, key, len(rows.reported), values.shape, 1, dtype, missing)
-        data.attrs.update({"units": unit, "long_name": long_name})
+        data.attrs.update({"units": rows.units(unit), "long_name": long_name})
         name_dimensions(holder, data, ["reported", *AXES[key]])
     holder[key][place] = values

@@ -14,12 +14,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..arrays import Array
-from ..columns import COLUMNS, Column, over
+from ..columns import COLUMNS, Column, columns_named, over
 from ..hb.states import ForcedState, ModalState, State, described, state_of
 from ..solve.curve import APART as OF_A_RUN
 from ..solve.curve import Curve
 from ..solve.hermite import Cubic
 from ..solve.table import Table
+from ..units import UnitSystem
 from .field import Field
 
 if TYPE_CHECKING:
@@ -68,9 +69,14 @@ def read_slopes(group: h5py.Group) -> tuple[State | None, Array | None]:
 
 
 def curves_of(
-    columns: Mapping[str, Array], units: Mapping[str, str], events: list[str], meaning: State, slopes: Array | None
+    columns: Mapping[str, Array],
+    units: Mapping[str, str],
+    system: UnitSystem,
+    events: list[str],
+    meaning: State,
+    slopes: Array | None,
 ) -> list[tuple[int, Curve]]:
-    """The branches of a table, each with the number of its first row."""
+    """The branches of a table in a system of units, each with the number of its first row."""
     count = len(events)
     starts = ["start" in text.split() for text in events]
     new = np.array(starts, dtype=bool) if slopes is None else np.isnan(slopes).any(axis=(1, 2))
@@ -80,7 +86,7 @@ def curves_of(
     new[:1] = True
     ends = [*np.flatnonzero(new).tolist(), count]
     known = [COLUMNS.get(name, Column(name, units.get(name, ""), "")) for name in columns]
-    kinds = over(known, units.get("amplitude") or "m")
+    kinds = columns_named(over(known, units.get("amplitude") or "length"), system)
     found = []
     for first, last in zip(ends, ends[1:]):
         table = Table(kinds, {name: values[first:last] for name, values in columns.items()})

@@ -33,20 +33,20 @@ COMMON = (
 MODE = (
     Column("stuck_hz", "Hz", "linear frequency with the contact stuck"),
     Column("free_hz", "Hz", "linear frequency without friction (contact free, or closed and sliding)"),
-    Column("slip_threshold", "m", "amplitude at which the first pair slips"),
-    Column("stick_until", "m", "last amplitude of the branch before any slip"),
-    Column("slip_from", "m", "first amplitude of the branch with slip"),
-    Column("onset_amplitude", "m", "amplitude at which a tenth of the damping's rise is reached"),
+    Column("slip_threshold", "length", "amplitude at which the first pair slips"),
+    Column("stick_until", "length", "last amplitude of the branch before any slip"),
+    Column("slip_from", "length", "first amplitude of the branch with slip"),
+    Column("onset_amplitude", "length", "amplitude at which a tenth of the damping's rise is reached"),
     Column("largest_zeta", "1", "largest modal damping ratio"),
-    Column("amplitude_of_largest_zeta", "m", "amplitude of the largest damping"),
+    Column("amplitude_of_largest_zeta", "length", "amplitude of the largest damping"),
     Column("lowest_frequency_hz", "Hz", "lowest frequency of the branch"),
-    Column("amplitude_of_lowest_frequency", "m", "amplitude of the lowest frequency, nan at an end of the branch"),
+    Column("amplitude_of_lowest_frequency", "length", "amplitude of the lowest frequency, nan at an end of the branch"),
     Column("last_frequency_hz", "Hz", "frequency at the end of the branch"),
-    Column("stable_limit_cycle", "m", "smallest amplitude at which damping rises through zero"),
-    Column("unstable_limit_cycle", "m", "smallest amplitude at which damping falls through zero"),
+    Column("stable_limit_cycle", "length", "smallest amplitude at which damping rises through zero"),
+    Column("unstable_limit_cycle", "length", "smallest amplitude at which damping falls through zero"),
 )
 FORCED = (
-    Column("largest_amplitude", "m", "largest amplitude of the response"),
+    Column("largest_amplitude", "length", "largest amplitude of the response"),
     Column("frequency_of_largest_amplitude", "Hz", "frequency of the largest amplitude"),
 )
 
@@ -163,7 +163,7 @@ def _forced(table: Table, attributes: Table, forces: Table) -> dict[str, float]:
     }
 
 
-def landmarks(name: str, plan: Plan, rows: Sequence[Row], of: Summary, unit: str = "m") -> list[str]:
+def landmarks(name: str, plan: Plan, rows: Sequence[Row], of: Summary, unit: str) -> list[str]:
     """A line for each row of a sweep's summary, for the terminal; `unit` of the amplitudes."""
     labels = plan.labels()
     told = [{**row, "unit": unit} for row in rows]

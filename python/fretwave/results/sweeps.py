@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,6 +26,7 @@ from ..files.csv_table import plain, write_columns, write_rows
 from ..files.dimensions import name_dimensions
 from ..post.grid import Plan
 from ..texts import toml
+from ..units import ATTRIBUTE, SI, UnitSystem, quantity, units_of
 from .results import has_results, open_results, rewritten
 from .sweep_summary import columns_of, split_of, summarise
 
@@ -35,7 +36,17 @@ if TYPE_CHECKING:
 #: State of the solver: a finished branch has no use for it.
 STATES = ("state_0", "state_1")
 #: Attributes of a value's group that the sweep's group has when they are the same for all values.
-SHARED = ("method", "harmonics", "samples", "normalise", "observe", "nodal_diameter", "retain", "linear_mode")
+SHARED = (
+    "method",
+    "harmonics",
+    "samples",
+    "normalise",
+    "observe",
+    "nodal_diameter",
+    "retain",
+    "linear_mode",
+    ATTRIBUTE,
+)
 
 
 @dataclass
@@ -53,7 +64,7 @@ class Branch:
     attributes : dict
         Of the analysis' group.
     start_forces : dict
-        By row that starts a branch: of each contact over its period (n_samples, components, n_pairs) [N], where kept.
+        By row that starts a branch: of each contact over its period (n_samples, components, n_pairs) [force], if kept.
     """
 
     number: int
@@ -62,6 +73,11 @@ class Branch:
     units: dict[str, tuple[str, str]]
     attributes: dict[str, Any]
     start_forces: dict[int, dict[str, Any]]
+
+    @property
+    def system(self) -> UnitSystem:
+        """Of units."""
+        return units_of(self.attributes)
 
     @property
     def points(self) -> int:
@@ -123,9 +139,9 @@ def write_sweep(
     kind = str(branches[0].attributes["type"]) if branches else ""
     points = _points(plan, branches)
     rows = _summary(kind, plan, branches)
-    write_columns(folder / f"{name}.csv", {column.name: values for column, values in points})
+    write_columns(folder / f"{name}.csv", {column.heading: values for column, values in points})
     if summary is not None:
-        write_rows(summary, rows)
+        write_rows(summary, rows, summary_headings(kind, branches))
     with rewritten(folder / "results.h5", name) as file:
         file.attrs["title"] = title
         group = file.create_group(name)
@@ -133,7 +149,9 @@ def write_sweep(
         group.attrs.update({**_shared(branches), **described, **attributes})
         _write_points(group.create_group("points"), points)
         scales = _write_over(group.create_group("over"), plan)
-        _write_summary(group.create_group("summary"), kind, plan, rows, scales, amplitude_unit(branches))
+        _write_summary(
+            group.create_group("summary"), kind, plan, rows, scales, system_of(branches), amplitude_unit(branches)
+        )
         for branch in branches:
             _copy_branch(branch, of, group.create_group(f"values/{branch.number:04d}"))
     return rows
@@ -141,7 +159,20 @@ def write_sweep(
 
 def amplitude_unit(branches: Sequence[Branch]) -> str:
     """Of the amplitudes in the tables and in the summary, the same for all values."""
-    return branches[0].units.get("amplitude", ("m", ""))[0] if branches else "m"
+    of_lengths = system_of(branches)("length")
+    return branches[0].units.get("amplitude", (of_lengths, ""))[0] if branches else of_lengths
+
+
+def system_of(branches: Sequence[Branch]) -> UnitSystem:
+    """Of the units of all values."""
+    return branches[0].system if branches else SI
+
+
+def summary_headings(kind: str, branches: Sequence[Branch]) -> dict[str, str]:
+    """Of the summary's columns, whose lengths are amplitudes."""
+    units, unit = system_of(branches), amplitude_unit(branches)
+    columns = (replace(c, unit=unit) if quantity(c.unit) == "length" else c for c in columns_of(kind))
+    return {column.name: column.in_units(units).heading for column in columns}
 
 
 def key_values(values: Sequence[Any]) -> Any:
@@ -166,7 +197,12 @@ def _points(plan: Plan, branches: Sequence[Branch]) -> list[tuple[Column, Any]]:
     columns.append((Column("value", "1", "number of the combination of values", "i"), numbers))
     for key in branches[0].table if branches else ():
         unit, long_name = branches[0].units[key]
-        columns.append((Column(key, unit, long_name), np.concatenate([branch.table[key] for branch in branches])))
+        columns.append(
+            (
+                Column(key, unit, long_name, units=branches[0].system),
+                np.concatenate([branch.table[key] for branch in branches]),
+            )
+        )
     return columns
 
 
@@ -214,6 +250,7 @@ def _write_summary(
     plan: Plan,
     rows: Sequence[Mapping[str, Any]],
     scales: Sequence[h5py.Dataset],
+    units: UnitSystem,
     unit: str,
 ) -> None:
     split = split_of(kind)
@@ -230,7 +267,7 @@ def _write_summary(
             place = np.unravel_index(row["value"], plan.shape)
             values[(*place, *([parts.index(row[split])] if parts else []))] = row[column.name]
         data = group.create_dataset(column.name, data=values)
-        own = unit if column.unit == "m" else column.unit  # all lengths are amplitudes
+        own = unit if quantity(column.unit) == "length" else units(column.unit)  # all lengths are amplitudes
         data.attrs.update({"units": own, "long_name": column.long_name})
         name_dimensions(group, data, names)
 

@@ -28,6 +28,7 @@ from ..errors import EXIT_DONE, FretwaveError, NotConverged
 from ..mpi.guard import caught_by_all
 from ..mpi.petsc_options import AnalysisOptions
 from ..results.study_report import LEGEND_OF_WEAR, PRINTED_OF_WEAR, markdown
+from ..units import UnitSystem
 from .study_folder import StudyFolder, publish
 
 if TYPE_CHECKING:
@@ -58,7 +59,7 @@ class WearSettings:
 
 @dataclass(frozen=True)
 class WearOutcome:
-    """What one run found after the last cycle: omega [rad/s], zeta and the worn volume [m^3]; and its cost."""
+    """What one run found after the last cycle: omega [rad/s], zeta and the worn volume [length^3]; and its cost."""
 
     omega: float
     zeta: float
@@ -73,6 +74,7 @@ class WearPlan:
     """Sweeps of one setting at a time, the others as in the analysis; each has its own reference, its finest."""
 
     base: WearSettings
+    units: UnitSystem
     harmonics: Sequence[int] = ()
     tolerance: Sequence[float] = ()
     pressure_change: Sequence[float] = ()
@@ -92,8 +94,9 @@ class WearPlan:
 
     def table(self) -> list[dict[str, float | int | str]]:
         """One row per run and sweep; sweeps without their reference are left out."""
+        volume = self.units.cubic_millimetres
         return [
-            _row(name, settings, self.outcomes[settings], self.outcomes[swept[-1]], settings == swept[-1])
+            _row(name, settings, self.outcomes[settings], self.outcomes[swept[-1]], settings == swept[-1], volume)
             for name, swept in self.sweeps()
             for settings in swept
             if settings in self.outcomes and swept[-1] in self.outcomes
@@ -101,7 +104,12 @@ class WearPlan:
 
 
 def _row(
-    sweep: str, settings: WearSettings, run: WearOutcome, finest: WearOutcome, is_finest: bool
+    sweep: str,
+    settings: WearSettings,
+    run: WearOutcome,
+    finest: WearOutcome,
+    is_finest: bool,
+    cubic_millimetres: float,
 ) -> dict[str, float | int | str]:
     errors = {
         f"{name}_error": abs(getattr(run, name) - getattr(finest, name)) / (abs(getattr(finest, name)) or 1.0)
@@ -117,7 +125,7 @@ def _row(
         "wall_s": run.wall_s,
         "frequency_hz": run.omega / (2 * np.pi),
         "zeta_percent": 100 * run.zeta,
-        "worn_mm3": 1e9 * run.worn,
+        "worn_mm3": cubic_millimetres * run.worn,
         **errors,
         "reference": int(is_finest),
     }
@@ -128,7 +136,7 @@ def study_wear(case: Case, options: argparse.Namespace, comm: MPI.Comm, console:
     analysis = case.analyses.of(WearAnalysis)[options.analysis]
     plan = wear_plan(case, analysis, options)
     amplitude = max(analysis.amplitude)
-    console.line(f"study of '{analysis.name}' at a = {amplitude:g} m: {len(plan.runs())} runs")
+    console.line(f"study of '{analysis.name}' at a = {amplitude:g} {case.units('length')}: {len(plan.runs())} runs")
     solver = _Solver(case, analysis, comm, console, options.repeats)
     unit = folder.solved(len(plan.runs()), CycleUnit, lambda: solver.cycle_unit(plan.runs()[0]))
     solver.unit = 0.0 if isinstance(unit, str) else unit.vibrations
@@ -138,7 +146,7 @@ def study_wear(case: Case, options: argparse.Namespace, comm: MPI.Comm, console:
             plan.failures[settings] = found
         else:
             plan.outcomes[settings] = found
-        console.line(_progress(settings, found))
+        console.line(_progress(settings, found, case.units))
     solver.destroy()
     if not plan.table():
         reasons = "; ".join(plan.failures.values())
@@ -160,7 +168,7 @@ def wear_plan(case: Case, analysis: WearAnalysis, options: argparse.Namespace) -
     chosen = {name: tuple(values or ()) for name, values in given.items()}
     if not any(chosen.values()):
         chosen["tolerance"] = TOLERANCES
-    return WearPlan(base, chosen["harmonics"], chosen["tolerance"], chosen["pressure_change"])
+    return WearPlan(base, case.units, chosen["harmonics"], chosen["tolerance"], chosen["pressure_change"])
 
 
 class _Solver:
@@ -250,16 +258,19 @@ def _follow(march: Wear, problem: NonlinearMode, areas: Array) -> WearOutcome | 
 
 def _write(plan: WearPlan, amplitude: float, analysis: WearAnalysis, folder: Path, console: Console) -> None:
     rows = plan.table()
-    notes = [f"{analysis.name}, a = {amplitude:g} m, {analysis.stepper}, after {analysis.cycles:g} cycles."]
+    notes = [
+        f"{analysis.name}, a = {amplitude:g} {analysis.units('length')}, {analysis.stepper},"
+        f" after {analysis.cycles:g} cycles."
+    ]
     notes += [f"No whole march with {_text(settings)}: {reason}." for settings, reason in plan.failures.items()]
     publish(folder, {"study": rows}, markdown(rows, notes, PRINTED_OF_WEAR, LEGEND_OF_WEAR), console)
 
 
-def _progress(settings: WearSettings, found: WearOutcome | str) -> str:
+def _progress(settings: WearSettings, found: WearOutcome | str, units: UnitSystem) -> str:
     if isinstance(found, str):
         return f"{_text(settings)}: {found}"
     cost = f"{found.steps} steps, {found.newton} Newton iterations, {found.wall_s:.3f} s"
-    return f"{_text(settings)}: {cost}, worn {1e9 * found.worn:.5g} mm^3"
+    return f"{_text(settings)}: {cost}, worn {units.cubic_millimetres * found.worn:.5g} mm^3"
 
 
 def _text(settings: WearSettings) -> str:

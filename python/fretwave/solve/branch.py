@@ -147,7 +147,7 @@ class Branch(Table):
         return self._kept().vector(place)
 
     def coefficients(self, place: float) -> Array | None:
-        """Harmonic coefficients (n_dof, m) [m] at a place, columns `harmonics.labels`, on rank 0. Collective."""
+        """Harmonic coefficients (n_dof, m) [length] at a place, columns `harmonics.labels`, on rank 0. Collective."""
         kept = self._kept()
         y = kept.vector(place)
         found: Array | None = kept.problem.coefficients(y)
@@ -155,7 +155,7 @@ class Branch(Table):
         return found
 
     def shape(self, place: float, order: int = 1) -> npt.NDArray[np.complex128]:
-        """Complex amplitudes q_n (n_dof,) [m] of a harmonic at a place, on every rank. Collective.
+        """Complex amplitudes q_n (n_dof,) [length] of a harmonic at a place, on every rank. Collective.
 
         x = Re sum q_n e^{i n tau}.
 
@@ -211,11 +211,7 @@ class Branch(Table):
         import xarray  # type: ignore[import-not-found,unused-ignore]
 
         return xarray.Dataset(
-            {
-                c.name: ("point", self[c.name], {"units": c.unit, "long_name": c.long_name})
-                for c in self.columns
-                if c.name != "point"
-            },
+            {c.name: ("point", self[c.name], c.attributes) for c in self.columns if c.name != "point"},
             coords={"point": self["point"]},
             attrs={"converged": int(self.converged), "reason": self.reason},
         )

@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from ..columns import COLUMNS, Column, over
+from ..columns import COLUMNS, Column, columns_named, over
 from ..errors import InputError
 from ..files.dimensions import name_dimensions
 from ..files.whole import replaced
 from ..hb.states import described, state_of
+from ..units import ATTRIBUTE, units_of
 from .hermite import Cubic
 
 if TYPE_CHECKING:
@@ -47,6 +48,7 @@ def write(branch: Branch, path: Path) -> None:
             reason=branch.reason,
             missed=json.dumps(branch.missed),
             started=branch.started,
+            **{ATTRIBUTE: branch.unit_system.name},
         )
 
 
@@ -71,8 +73,9 @@ def read(kind: Callable[..., Made], path: Path) -> Made:
     if found.get("format") != FORMAT:
         measured = str(found.get("format", "another format"))
         raise InputError("the file holds no branch", str(path), measured, FORMAT, "give a file of Branch.save")
+    units = units_of(found)
     named = [COLUMNS.get(name) or Column(name, *said[name]) for name in json.loads(found["columns"])]
-    columns = over(named, said["amplitude"][0])
+    columns = columns_named(over(named, said["amplitude"][0]), units)
     values["event"] = np.array([text.decode() for text in values["event"]], dtype=str)
     return kind(
         columns,
@@ -98,5 +101,5 @@ def _put(file: h5py.File, column: Column, values: npt.NDArray[Any], dimensions: 
     text = column.kind == "s"
     data = np.array([str(value) for value in values], dtype=object) if text else np.asarray(values)
     variable = file.create_dataset(column.name, data=data, dtype=h5py.string_dtype() if text else None)
-    variable.attrs.update(units=column.unit, long_name=column.long_name)
+    variable.attrs.update(column.attributes)
     name_dimensions(file, variable, dimensions)

@@ -42,7 +42,7 @@ def follow(
     Parameters
     ----------
     start : float or Vec
-        Amplitude [m] or omega [rad/s] of the first point, or unknowns from which Newton finds it.
+        Amplitude [length] or omega [rad/s] of the first point, or unknowns from which Newton finds it.
     stop : float or (low, high)
         Where the branch shall end: beyond the start in its direction, or the range that it shall not leave.
     steps : StepControl, optional
@@ -61,7 +61,7 @@ def follow(
         estimated error.
     observe : dict, optional
         Further columns by name: the fundamental's amplitude of a dof, of a row (n_dof,) or of a linear mode's
-        coordinate, or "energy", the mechanical energy of the vibration, mean over a period [J].
+        coordinate, or "energy", the mechanical energy of the vibration, mean over a period [energy].
     tell : callable, optional
         Given every row when it is found, on every rank: a dict by column, with the other `diagnostics`.
 
@@ -123,7 +123,7 @@ def follow(
         y0.destroy()
     names = MODE if problem.meaning.kind == "mode" else FORCED
     known = columns_named(names if accuracy is None else with_discretisation(names))
-    columns = [*over(known, unit_of(problem.dof)), *observer.columns]
+    columns = columns_named([*over(known, unit_of(problem.dof)), *observer.columns], problem.model.units)
     table = Table.of_rows(columns, rows)
     values = {name: table[name] for name in table.names}
     curves = cubic_of(knots)

@@ -53,7 +53,7 @@ class StaticPreload(HarmonicProblem):
             raise InputError(
                 "the mode that forces are measured by is a rigid motion: nothing holds the structure at rest",
                 None,
-                f"{reference.omega:g} rad/s{suspects(model.contacts, 1.0) if model.contacts else ''}",
+                f"{reference.omega:g} rad/s{suspects(model.contacts, None, model.units)}",
                 "an elastic mode",
                 f"load the contact{by}, hold the structure, or take a mode with closed contact",
             )
@@ -104,12 +104,12 @@ def static_preload(
 
     Parameters
     ----------
-    load : (n_dof,) [N]
+    load : (n_dof,) [force]
     reference : LinearMode, optional
         Scales the unknowns; by default the lowest one with stuck contact.
     sliders : dict, optional
-        Contact name -> (n_pairs, n_tangents) [m], where the sliders stand before the load comes: a history. By default
-        at zero.
+        Contact name -> (n_pairs, n_tangents) [length], where the sliders stand before the load comes: a history. By
+        default at zero.
     closed : (n_dof,), optional
         Displacement under the full load with all pairs closed: start from a small share of it. For pairs that just
         touch when unloaded: a structure that they alone hold has no stiffness there.
@@ -142,7 +142,8 @@ def static_preload(
     raise NotConverged(
         "no static equilibrium under the full load",
         None,
-        f"load factor {reached:.4g}: {reason or branch.reason}{suspects(model.contacts, problem.stiffness)}",
+        f"load factor {reached:.4g}: {reason or branch.reason}"
+        + suspects(model.contacts, problem.stiffness, model.units),
         "1",
         "hold the structure where contact alone cannot (an axial stop), or lower the load",
     )

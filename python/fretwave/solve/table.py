@@ -12,6 +12,7 @@ from ..arrays import AnyArray
 from ..columns import Column, Value
 from ..files.csv_table import header_line, row_line
 from ..files.whole import replaced
+from ..units import UnitSystem
 
 #: Rows that a table's text shows before it leaves out its middle.
 SHOWN = 12
@@ -56,8 +57,13 @@ class Table:
 
     @property
     def units(self) -> dict[str, str]:
-        """Unit of each column, "1" for a pure number."""
-        return {column.name: column.unit for column in self.columns}
+        """Unit of each column in symbols, "1" for a pure number."""
+        return {column.name: column.symbol for column in self.columns}
+
+    @property
+    def unit_system(self) -> UnitSystem:
+        """The system that its numbers are in."""
+        return self.columns[0].units
 
     def __len__(self) -> int:
         return len(next(iter(self._values.values()), ()))

@@ -57,7 +57,7 @@ class Wear:
     cycles : float
         Where to stop.
     report_at : cycles that are met exactly
-    depth, at, step, load_scale : (n_pairs,), cycles, length, [N]
+    depth, at, step, load_scale : (n_pairs,), cycles, length, [force]
         To go on from an earlier march's point; by default the surfaces are new.
     outcome : Newton and linear iterations and residual that y was found with
     """

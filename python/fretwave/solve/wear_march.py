@@ -30,9 +30,9 @@ class WearMarch(Table):
     ----------
     contacts : dict
         Contact name -> where its pairs stand in the arrays.
-    depth, rate, load : (n_points, n_pairs) [m], [m], [N]
+    depth, rate, load : (n_points, n_pairs) [length], [length], [force]
         Worn depth of the pairs of all wearing contacts, its growth in a vibration cycle, mean normal force.
-    areas : (n_pairs,) [m^2]
+    areas : (n_pairs,) [length^2]
     cycle_unit : float
         Vibration cycles in a normalised one.
     converged : bool
@@ -64,7 +64,7 @@ class WearMarch(Table):
 
     @property
     def volume(self) -> Array:
-        """Worn volume (n_points,) [m^3]."""
+        """Worn volume (n_points,) [length^3]."""
         return np.asarray(self.depth @ self.areas)
 
     def __repr__(self) -> str:
@@ -92,12 +92,12 @@ def wear(
     ----------
     branch : Branch
         Of a nonlinear mode, with its unknowns.
-    amplitude : float [m]
+    amplitude : float [length]
         The first place of the branch there.
-    coefficient : float [1/Pa]
+    coefficient : float [1/pressure]
         k_w.
     areas : dict
-        Contact name -> nodal areas (n_pairs,) [m^2]; contacts without an entry do not wear.
+        Contact name -> nodal areas (n_pairs,) [length^2]; contacts without an entry do not wear.
     cycles, report_at : float, sequence of float
         Where to stop, and where points shall lie; in normalised cycles, as all cycles here.
     cycle_unit : float, optional
@@ -116,8 +116,10 @@ def wear(
     """
     places = branch.at(amplitude=amplitude)
     if not len(places):
-        span = f"{branch['amplitude'].min():g} to {branch['amplitude'].max():g} m"
-        raise InputError("the branch does not pass this amplitude", None, f"{amplitude:g} m", span, "take one within")
+        length = branch.units["amplitude"]
+        span = f"{branch['amplitude'].min():g} to {branch['amplitude'].max():g} {length}"
+        measured = f"{amplitude:g} {length}"
+        raise InputError("the branch does not pass this amplitude", None, measured, span, "take one within")
     first, guess = branch.unknowns(0), branch.unknowns(float(places["place"][0]))
     problem, rows, states = branch.problem, [], []
     with WornMode(problem, coefficient, areas) as mode:
@@ -139,7 +141,7 @@ def wear(
         contacts, sizes = dict(zip(names, mode.slices)), mode.areas
     depth, rate, load = (np.array(part) for part in zip(*states))
     return WearMarch(
-        COLUMNS,
+        columns_named(COLUMNS, branch.unit_system),
         {c.name: [row[c.name] for row in rows] for c in COLUMNS},
         contacts=contacts,
         depth=depth,

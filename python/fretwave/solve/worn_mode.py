@@ -31,9 +31,9 @@ class WornState:
     Attributes
     ----------
     depth, load : (n_pairs,)
-        Worn depth [m] and mean normal force [N] of the pairs of all wearing contacts, one after the other.
+        Worn depth [length] and mean normal force [force] of the pairs of all wearing contacts, one after the other.
     rate : (n_pairs,)
-        Growth of the depth in a cycle [m], k_w / I times the integral of |P_N| |d slider| (eq. 13).
+        Growth of the depth in a cycle [length], k_w / I times the integral of |P_N| |d slider| (eq. 13).
     slip, open : (n_pairs,)
         Shares of the period.
     """
@@ -57,9 +57,9 @@ class WornMode(Destroyable):
     problem : NonlinearMode
         With contacts that have a normal direction, whose depths it takes over.
     coefficient : float
-        k_w [1/Pa].
+        k_w [1/pressure].
     areas : dict
-        Contact name -> nodal areas I (n_pairs,) [m^2]; contacts without an entry do not wear.
+        Contact name -> nodal areas I (n_pairs,) [length^2]; contacts without an entry do not wear.
     """
 
     def __init__(self, problem: HarmonicProblem, coefficient: float, areas: Mapping[str, Array]) -> None:
@@ -122,7 +122,7 @@ class WornMode(Destroyable):
 
         Parameters
         ----------
-        load : (n_pairs,) [N]
+        load : (n_pairs,) [force]
             Of the new surfaces.
         """
         loaded = load > 0

@@ -20,6 +20,7 @@ from ..model.laws import kept_laws
 from ..post.contact_history import ContactHistory
 from ..results.file import unit_of_amplitudes
 from ..texts import display, nearest
+from ..units import SI, UnitSystem, units_of
 
 if TYPE_CHECKING:
     import h5py
@@ -40,7 +41,7 @@ class ViewOptions:
     Attributes
     ----------
     points : numbers of points of the branch
-    amplitudes : modal amplitudes [m]; the nearest kept points are shown
+    amplitudes : modal amplitudes [length]; the nearest kept points are shown
     phases : number of steps of a period
     scale : factor on the displacement in the field ``warp``; None chooses one
     linear : eight linear hexahedra in place of a triquadratic one
@@ -77,7 +78,7 @@ class ViewOptions:
 
 
 def natural_scale(size: float, largest: float) -> float:
-    """Factor that draws the largest displacement as a share of the size of what is shown [m]."""
+    """Factor that draws the largest displacement as a share of the size of what is shown [length]."""
     return float(f"{DRAWN * size / largest:.2g}") if largest > 0 and size > 0 else 1.0
 
 
@@ -90,9 +91,9 @@ class Choice:
     points : numbers on the branch
     asked : what the command line said of each, "" for nothing
     states : columns of the branch at these points, by name
-    coefficients : (n_points, n_coordinates, m) [m], as solved
+    coefficients : (n_points, n_coordinates, m) [length], as solved
     labels : of the m columns
-    rest : (n_coordinates,) displacement at rest [m]
+    rest : (n_coordinates,) displacement at rest [length]
     samples : (n_phases,)
         Numbers of the contacts' samples at which the motion is shown.
     phases : (n_phases,) [rad]
@@ -103,6 +104,7 @@ class Choice:
     wheel : the coordinates are those of all sectors of a wheel, one after the other
     sample_count : of a period
     unit : of the amplitude
+    units : of all numbers
     """
 
     name: str
@@ -120,7 +122,8 @@ class Choice:
     diameters: Sequence[int] = ()
     wheel: bool = False
     sample_count: int = 1
-    unit: str = "m"
+    unit: str = ""
+    units: UnitSystem = SI
 
     @property
     def times(self) -> Array:
@@ -211,6 +214,7 @@ def read_choice(file: h5py.File, folder: Path, case: Case, options: ViewOptions)
         wheel=case.neighbours is not None and section is not None and section.wheel,
         sample_count=count,
         unit=unit_of_amplitudes(group),
+        units=units_of(group.attrs),
     )
 
 

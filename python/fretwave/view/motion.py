@@ -43,9 +43,9 @@ class Shape:
 
     Attributes
     ----------
-    nodes : (n_nodes, 3) [m]
-    rest : (n_nodes, 3) displacement at rest [m]
-    coefficients : (n_points, n_nodes, 3, m) [m]
+    nodes : (n_nodes, 3) [length]
+    rest : (n_nodes, 3) displacement at rest [length]
+    coefficients : (n_points, n_nodes, 3, m) [length]
     basis : (n_phases, m)
         Value of each coefficient's function of time.
     """
@@ -60,7 +60,7 @@ class Shape:
         return (values[chosen] @ row for values in self.coefficients for row in self.basis)
 
     def largest(self) -> float:
-        """Largest displacement from rest [m]."""
+        """Largest displacement from rest [length]."""
         return max(float(np.linalg.norm(x - self.rest, axis=1).max()) for x in self.displacements())
 
 
@@ -70,7 +70,7 @@ class Scene:
 
     Attributes
     ----------
-    nodes : (n_nodes, 3) of sector 0 [m]
+    nodes : (n_nodes, 3) of sector 0 [length]
     sectors : numbers of those shown
     ties : {k: (n_dof, n)}
         Dofs with both faces from those of the sector k places ahead, as solved; None for a structure.
@@ -301,7 +301,8 @@ def _check_model(case: Case, then: Array) -> None:
     """The model is that which was reduced: its motion is the run's own, its nodes are the case's."""
     now = marks_of(geometry(case))
     if not np.allclose(now, then, rtol=SAME, atol=0):
-        found, expected = (f"{m[0]:.0f} dofs, sum of |K| {m[1]:.9g} N/m" for m in (now, then))
+        unit = case.units("force/length")
+        found, expected = (f"{m[0]:.0f} dofs, sum of |K| {m[1]:.9g} {unit}" for m in (now, then))
         raise InputError(
             "the model is no longer that of the run",
             display(case.path),

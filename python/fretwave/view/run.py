@@ -67,6 +67,7 @@ def view_run(folder: Path, options: ViewOptions, say: Callable[[str], None] = pr
             say(f"{display(pairs)}: {f'{len(shown)} times ' * (len(shown) > 1)}{count} contact pairs{alone}")
         else:
             pairs.unlink(missing_ok=True)  # of another point
+    say(f"units: {case.units.described()}")
     say(f"ParaView (5.12 or later): 'Warp By Vector' with the field warp draws displacements {scale:g} times as large")
     return [out, pairs] if placed else [out]
 
@@ -90,7 +91,7 @@ def _size(scene: Scene, count: int, what: str) -> str:
 def write_grid(path: Path, scene: Scene, cells: tuple[Indices, int], scale: float) -> None:
     """The grid with its displacement, that at rest, and the complex amplitudes of the lowest harmonics."""
     choice, labels = scene.choice, scene.choice.labels
-    with GridFile(path, choice.times) as grid:
+    with GridFile(path, choice.times, choice.units) as grid:
         for sector in scene.sectors:
             grid.part(scene.nodes @ scene.turn(sector).T, *cells)
         _write_states(grid, choice)
@@ -121,7 +122,7 @@ def write_pairs(path: Path, scene: Scene, placed: Mapping[str, Pairs], scale: fl
     choice, contacts = scene.choice, list(placed.values())
     sectors = list(scene.sectors) if choice.whole_delays(scene.around) else [0]
     near = [cKDTree(scene.nodes).query(np.asarray(contact.points))[1] for contact in contacts]
-    with GridFile(path, choice.times) as grid:
+    with GridFile(path, choice.times, choice.units) as grid:
         for sector in sectors:
             for contact in contacts:
                 grid.part(

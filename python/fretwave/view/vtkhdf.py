@@ -19,6 +19,7 @@ import numpy.typing as npt
 from ..arrays import AnyArray, Array, IntArray
 from ..errors import InputError
 from ..texts import display
+from ..units import ATTRIBUTE, UnitSystem
 
 if TYPE_CHECKING:
     import h5py
@@ -45,12 +46,15 @@ class GridFile:
     path : Path
     values : (n_steps,)
         What ParaView calls time.
+    units : UnitSystem
+        The system of all numbers, kept as an attribute of the file.
     """
 
-    def __init__(self, path: Path, values: Sequence[float] | Array) -> None:
+    def __init__(self, path: Path, values: Sequence[float] | Array, units: UnitSystem) -> None:
         self.path, self.steps = path, len(values)
         self._unfinished = path.with_name(f".{path.name}.new")
         self._file = _create(self._unfinished)
+        self._file.attrs[ATTRIBUTE] = units.name
         self._root = self._file.create_group("VTKHDF", track_order=True)
         self._root.attrs["Version"] = np.array(VERSION, dtype="i8")
         _text_attribute(self._root, "Type", "UnstructuredGrid")
@@ -86,7 +90,7 @@ class GridFile:
 
         Parameters
         ----------
-        points : (n, 3) [m]
+        points : (n, 3) [length]
         cells : (n_cells, m)
             Numbers of this part's points, in VTK's order.
         kind : int

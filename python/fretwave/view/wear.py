@@ -20,6 +20,7 @@ from ..errors import InputError
 from ..model.pairs import Pairs
 from ..results.results import open_results
 from ..texts import display
+from ..units import UnitSystem, units_of
 from .choice import ViewOptions, natural_scale
 from .vtkhdf import TRIANGLE, VERTEX, GridFile
 
@@ -52,13 +53,15 @@ def view_wear(folder: Path, case: Case, name: str, options: ViewOptions, say: Ca
         lines = _chosen(file[name], options, f"analysis '{name}' in {display(folder)}")
         for number, rows in enumerate(lines, 1):
             path = out if len(lines) == 1 else out.with_name(f"{out.stem}_{number}{out.suffix}")
-            scale = _write(path, file[name], rows, placed, options.scale)
+            scale = _write(path, file[name], rows, placed, options.scale, case.units)
             amplitude, cycles = (file[name]["points"][key][rows[-1]] for key in ("amplitude", "cycles"))
-            say(f"{display(path)}: amplitude {amplitude:.6g} m, {len(rows)} steps to {cycles:.6g} wear cycles")
+            shown = f"amplitude {amplitude:.6g} {case.units('length')}, {len(rows)} steps to {cycles:.6g} wear cycles"
+            say(f"{display(path)}: {shown}")
             say(f"  {sum(contact.n_pairs for contact in placed.values())} contact pairs; warp draws depths x {scale:g}")
             whole = ", ".join(str(row) for row in file[name]["reported"][()] if row in rows)
             say(f"  `--point N` shows the motion at a point, with its pairs at the points {whole}")
             written.append(path)
+    say(f"units: {case.units.described()}")
     say("ParaView (5.12 or later): time is the wear cycle")
     return written
 
@@ -81,19 +84,26 @@ def _chosen(group: h5py.Group, options: ViewOptions, where: str) -> list[Indices
         return [lines[int(np.argmax(given))]]
     for asked in options.amplitudes:
         if not given.min() * (1 - 1e-6) <= asked <= given.max() * (1 + 1e-6):
-            known = ", ".join(f"{a:g}" for a in given)
+            known, unit = ", ".join(f"{a:g}" for a in given), units_of(group.attrs)("length")
             near = given[np.argmin(np.abs(given - asked))]
-            raise InputError("no wear at this amplitude", where, f"{asked:g} m", known, f"--amplitude {near:g}")
+            raise InputError("no wear at this amplitude", where, f"{asked:g} {unit}", known, f"--amplitude {near:g}")
     return [lines[int(np.argmin(np.abs(given - asked)))] for asked in options.amplitudes]
 
 
-def _write(path: Path, group: h5py.Group, rows: Indices, placed: Mapping[str, Pairs], scale: float | None) -> float:
+def _write(
+    path: Path,
+    group: h5py.Group,
+    rows: Indices,
+    placed: Mapping[str, Pairs],
+    scale: float | None,
+    units: UnitSystem,
+) -> float:
     """One line; returns the factor on the depths in the field warp."""
     steps, table = np.arange(len(rows)), group["points"]
     arrays = {key: _over_steps(group, key, rows, placed) for key in FIELDS}
     points = np.concatenate([np.asarray(contact.points) for contact in placed.values()])
     scale = _natural_scale(points, arrays["depth"]) if scale is None else scale
-    with GridFile(path, table["cycles"][()][rows]) as grid:
+    with GridFile(path, table["cycles"][()][rows], units) as grid:
         for contact in placed.values():
             grid.part(np.asarray(contact.points), *surface(contact))
         for key, name in FIELDS.items():

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from ...model.rest import Rest
     from ...solve.continuation import Continuation, Point
     from ...solve.steps import StepControl
+    from ...units import UnitSystem
     from ..flutter import FlutterAnalysis
     from ..mode import ModeAnalysis
     from .context import AnalysisContext
@@ -42,13 +43,13 @@ PLAIN_EVENTS = ("", "step")
 UNCLOSED_OF_PATH, UNCLOSED_OF_AMPLITUDE = 1e-6, 1e-12
 
 
-def closure_note(row: Mapping[str, Any]) -> str:
+def closure_note(row: Mapping[str, Any], units: UnitSystem) -> str:
     """What a point's line says of sliders that do not close their period; empty where they do."""
     unclosed, path = row["unclosed"], row["slip_path"]
     if not unclosed > max(UNCLOSED_OF_PATH * path, UNCLOSED_OF_AMPLITUDE * abs(row["amplitude"])):
         return ""
     share = f"{100 * unclosed / path:.2g} % of the longest slip path" if path > 0 else "no slip in the period"
-    return f"  note: a slider ends {unclosed:.1e} m from where it began ({share})"
+    return f"  note: a slider ends {unclosed:.1e} {units('length')} from where it began ({share})"
 
 
 def error_text(error: float) -> str:

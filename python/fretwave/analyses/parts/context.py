@@ -15,7 +15,7 @@ from ...case.analysis import AnalysisSection
 from ...case.harmonic import nodal_diameter, with_flow_forces
 from ...case.kept import belongs, has_analysis
 from ...case.load import Case
-from ...columns import Column, Value
+from ...columns import Column, Value, headings
 from ...console import Console
 from ...errors import InputError
 from ...files.csv_table import write_columns
@@ -23,6 +23,7 @@ from ...model.structure import Structure
 from ...mpi.guard import on_first_rank
 from ...results.results import AnalysisWriter, Field, open_results
 from ...texts import counted, display
+from ...units import ATTRIBUTE, UnitSystem
 
 if TYPE_CHECKING:
     import h5py
@@ -85,7 +86,7 @@ class AnalysisContext(Generic[Section]):
     left_out : list of str
         What this analysis does not compute, and why; filled by :meth:`leave_out`.
     arrays : dict
-        Arrays [m] put into the group of the results.
+        Arrays [length] put into the group of the results.
     fields : dict
         Arrays that every row of the table brings.
     entry : dict
@@ -119,6 +120,11 @@ class AnalysisContext(Generic[Section]):
     @property
     def name(self) -> str:
         return self.analysis.name
+
+    @property
+    def units(self) -> UnitSystem:
+        """The system that all numbers are in; ``units("length")`` is its symbol of a length."""
+        return self.case.units
 
     @property
     def wheel(self) -> Structure:
@@ -170,12 +176,12 @@ class AnalysisContext(Generic[Section]):
             self.folder,
             self.name,
             columns,
-            {**self.attributes, "left_out": json.dumps(self.left_out), **described},
+            {**self.attributes, ATTRIBUTE: self.units.name, "left_out": json.dumps(self.left_out), **described},
             dofs=self.case.dofs,
             labels=labels,
             active=self.comm.rank == 0,
             before_first=self.before_first,
-            file_attributes={"title": self.case.title},
+            file_attributes={"title": self.case.title, ATTRIBUTE: self.units.name},
             arrays=self.arrays,
             fields=self.fields,
             publish_later=True,
@@ -218,11 +224,17 @@ class AnalysisContext(Generic[Section]):
         """Whether an analysis has rows in the run folder that belong to this very case. Collective."""
         return on_first_rank(self.comm, lambda: has_analysis(self.folder, self.case, name))
 
-    def write_table(self, suffix: str, columns: Mapping[str, Any]) -> None:
-        """A further table ``<name>_<suffix>.csv``, written as a whole by rank 0."""
+    def write_table(self, suffix: str, columns: Mapping[str, Any], lengths: str = "length") -> None:
+        """A further table ``<name>_<suffix>.csv``, written as a whole by rank 0.
+
+        Parameters
+        ----------
+        lengths : unit of its amplitudes, as a quantity
+        """
         if self.comm.rank == 0:
             arrays = {name: np.asarray(values) for name, values in columns.items()}
-            write_columns(self.folder / f"{self.name}_{suffix}.csv", arrays)
+            known = headings(columns, self.units, lengths)
+            write_columns(self.folder / f"{self.name}_{suffix}.csv", arrays, known)
 
     def _read(self, name: str, what: Callable[[h5py.Group], Found]) -> Found:
         with open_results(self.folder / "results.h5") as file:

@@ -57,7 +57,7 @@ class Excitation:
         return self.context.analysis
 
     def force(self) -> Complex:
-        """Amplitudes (n_dof,) [N] at level 1; on sector j of a wheel with the delay of the wave, e^{-i j theta}."""
+        """Amplitudes (n_dof,) [force] at level 1; on sector j of a wheel with the delay of the wave, e^{-i j theta}."""
         case = self.context.case
         force = np.zeros(len(case.dofs), dtype=complex)
         turn = 2j * np.pi * (self.analysis.nodal_diameter or 0) / (case.wheel.sectors if case.wheel else 1)

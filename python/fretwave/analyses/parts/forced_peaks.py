@@ -20,13 +20,19 @@ def curves_of(context: AnalysisContext[AnalysisSection], backbones: Sequence[str
 
 
 def write_peaks(
-    context: AnalysisContext[AnalysisSection], table: dict[str, Any], curves: dict[str, ModeCurve], unit: str
+    context: AnalysisContext[AnalysisSection], table: dict[str, Any], curves: dict[str, ModeCurve], lengths: str
 ) -> list[str]:
-    """Write the peaks of all levels with their distance from the backbones; a line for each level."""
+    """Write the peaks of all levels with their distance from the backbones; a line for each level.
+
+    Parameters
+    ----------
+    lengths : unit of the amplitudes, as a quantity
+    """
+    unit = context.units(lengths)
     if not table:
         return []
     peaks = peak_table({key: table[key] for key in ("level", "omega", "amplitude", "phase", "event")}, curves)
-    context.write_table("peaks", peaks)
+    context.write_table("peaks", peaks, lengths)
     lines = [
         f"{context.name}: {len(table['level'])} points, {len(peaks['level'])} levels,"
         f"{largest_error('the amplitude', table['amplitude_error'], unit)} {table['wall_s'].sum():.2f} s"

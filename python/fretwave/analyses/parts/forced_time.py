@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Union
 import numpy as np
 
 from ...arrays import Array
+from ...case.observed import unit_of
 from ...post.response_peaks import points_around_peak
 from ...solve.steady import SteadyState, steady_motion
 from .context import AnalysisContext
@@ -47,7 +48,8 @@ def time_points(
     with integrated_model(context) as model:
         rows = list(_integrated(context, model, numbers, count, dense(context.model, observed)))
     stopped = next((str(row["stopped"]) for row in rows if row["stopped"]), "")
-    context.write_table("time", {key: [row[key] for row in rows] for key in rows[0] if key != "stopped"})
+    lengths = unit_of(context.analysis.observe)
+    context.write_table("time", {key: [row[key] for row in rows] for key in rows[0] if key != "stopped"}, lengths)
     worst = max((abs(row["relative_difference"]) for row in rows if row["steady"]), default=np.nan)
     unsteady = sum(not row["steady"] for row in rows)
     line = f"{context.name}: {len(rows)} points by time integration, amplitude differs by up to {worst:.1e} (relative)"

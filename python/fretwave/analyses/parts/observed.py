@@ -77,7 +77,7 @@ def keep_row(
     """Keep with the results the weights (n_dof,) of what is no dof, for the pictures."""
     if isinstance(given, str) or row is None:
         return
-    unit = "1" if given.mode is None else "sqrt(kg)"
+    unit = "1" if given.mode is None else "sqrt(mass)"
     writer.dataset(
         ROW, _spread(row, len(context.case.dofs)), units=unit, long_name="weights of the dofs in the amplitude"
     )

@@ -163,6 +163,6 @@ def keep_pairs(context: AnalysisContext[AnalysisSection], writer: AnalysisWriter
         friction = contact.value(Role.FRICTION_COEFFICIENT)
         friction = np.broadcast_to(np.nan if friction is None else friction, (given.n_pairs,))
         place = f"pairs_{contact.name}"
-        writer.dataset(f"{place}/position", given.positions, units="m", long_name="place on the face")
+        writer.dataset(f"{place}/position", given.positions, units="length", long_name="place on the face")
         writer.dataset(f"{place}/face", np.array([str(face).encode() for face in faces]))
         writer.dataset(f"{place}/{Role.FRICTION_COEFFICIENT.value}", friction, units="1")

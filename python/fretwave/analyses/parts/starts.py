@@ -67,7 +67,9 @@ class Starts:
             ) from None
         state = start_state(self.labels, coefficients, beta, omega)
         section = self.section
-        self.context.console.line(f"{self.context.name}: start {number} from a = {amplitude:g} m")
+        self.context.console.line(
+            f"{self.context.name}: start {number} from a = {amplitude:g} {self.context.units('length')}"
+        )
         step = 2.0 * np.pi / omega / section.samples_per_period
         count = section.periods * section.samples_per_period
         limit = factor * float(np.abs(coefficients).max())
@@ -84,8 +86,11 @@ class Starts:
         for row in rows:
             self.writer.append(row)
         if rows:
+            units = self.context.units
             history = np.stack([motion.t, motion.x, motion.v])
-            self.writer.dataset(f"motion_{number}", history, rows="t [s], x [m], v [m/s]")
+            self.writer.dataset(
+                f"motion_{number}", history, rows=f"t [s], x [{units('length')}], v [{units('length/s')}]"
+            )
         return rows
 
     def finish(self, lines: list[str], **attributes: Value) -> Outcome:

@@ -18,6 +18,7 @@ from ...console import Console
 from ...mpi.gather import on_rank_0
 from ...results.results import AnalysisWriter, Field
 from ...texts import counted
+from ...units import ATTRIBUTE
 from .branch import finished_table, mode_problem, open_branch
 from .context import AnalysisContext
 from .rest import retained, start_mode
@@ -50,7 +51,7 @@ class Line:
 
 
 def wear_areas(case: Case) -> dict[str, Any]:
-    """Nodal areas (n_pairs,) [m^2] of the contacts that wear."""
+    """Nodal areas (n_pairs,) [length^2] of the contacts that wear."""
     return contacts.wear_areas(case.contacts)
 
 
@@ -67,7 +68,7 @@ def faces_of(case: Case) -> list[tuple[str, str, Any]]:
 def columns(case: Case) -> list[Column]:
     """The table: one worn volume for each face."""
     worn = [
-        Column(f"worn_{number}", "m^3", f"worn volume of {face}")
+        Column(f"worn_{number}", "length^3", f"worn volume of {face}")
         for number, (face, _, _) in enumerate(faces_of(case), 1)
     ]
     first = [COLUMNS[name] for name in ("point", "line", "amplitude", "cycles", "vibrations", "step")]
@@ -79,9 +80,9 @@ def fields(case: Case) -> dict[str, Field]:
     out = {}
     for name, areas in wear_areas(case).items():
         shape = (len(areas),)
-        out[f"depth_{name}"] = Field(shape, "m", "worn depth")
-        out[f"rate_{name}"] = Field(shape, "m", "growth of the worn depth in a vibration cycle")
-        out[f"load_{name}"] = Field(shape, "N", "mean normal force of a period")
+        out[f"depth_{name}"] = Field(shape, "length", "worn depth")
+        out[f"rate_{name}"] = Field(shape, "length", "growth of the worn depth in a vibration cycle")
+        out[f"load_{name}"] = Field(shape, "force", "mean normal force of a period")
         out[f"slip_{name}"] = Field(shape, "1", "share of the period in slip")
         out[f"open_{name}"] = Field(shape, "1", "share of the period without contact")
     return out
@@ -128,7 +129,7 @@ class _Marcher:
             line.folder,
             LINE,
             columns(own.case),
-            {"run_id": context.attributes["run_id"]},
+            {"run_id": context.attributes["run_id"], ATTRIBUTE: context.units.name},
             dofs=own.case.dofs,
             labels=problem.harmonics.labels,
             active=self.comm.rank == 0,
@@ -209,24 +210,25 @@ class _Marcher:
     def _say(self, row: dict[str, Any]) -> None:
         if self.comm.rank:
             return
+        units = self.context.units
         worn = " ".join(f"{row[f'worn_{number}']:.3e}" for number in range(1, len(self.faces) + 1))
         self.context.console.line(
-            f"{self.context.name} a {row['amplitude']:.4g} m  {row['cycles']:8.4g} cycles"
+            f"{self.context.name} a {row['amplitude']:.4g} {units('length')}  {row['cycles']:8.4g} cycles"
             f"  f {row['frequency_hz']:9.6g} Hz  zeta {100 * row['zeta']:7.4f} %"
             f"  slip {100 * row['slip']:3.0f} %  open {100 * row['open']:3.0f} %"
-            f"  worn {worn} m^3  newton {row['newton']:2d}  {row['wall_s']:.2f} s"
+            f"  worn {worn} {units('length^3')}  newton {row['newton']:2d}  {row['wall_s']:.2f} s"
         )
 
     def _close(self, march: Wear) -> dict[str, Any]:
         status = "done" if march.converged else "stopped"
         told = _told(finished_table(self.writer))
         self.writer.abandon()  # its journal stays until the common table is done: a resumed run finds the line there
-        end = march.eta / self.unit
+        end, length = march.eta / self.unit, self.context.units("length")
         return {
             "status": status,
             "reason": march.reason,
-            "summary": f"{self.context.name}: a = {self.line.amplitude:g} m: {self.writer.rows} points to {end:.4g}"
-            f" normalised cycles, {march.reason}{told}",
+            "summary": f"{self.context.name}: a = {self.line.amplitude:g} {length}: {self.writer.rows} points to"
+            f" {end:.4g} normalised cycles, {march.reason}{told}",
             "labels": " ".join(self.problem.harmonics.labels),
             "samples": self.problem.harmonics.samples,
             "load_scale": march.load_scale,

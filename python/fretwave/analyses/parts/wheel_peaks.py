@@ -46,21 +46,22 @@ def blade_by_blade(
     rows = [{key: float(values[k]) for key, values in peaks.items()} for k in range(len(peaks["level"]))]
     context.entry["peaks"] = rows
     bound = whitehead(context.case.wheel.sectors) if context.case.wheel else np.nan
-    return [f"{context.name}: {_line(row)} (Whitehead's bound {bound:.3f})" for row in rows]
+    unit = context.units("length")
+    return [f"{context.name}: {_line(row, unit)} (Whitehead's bound {bound:.3f})" for row in rows]
 
 
-def _line(row: Mapping[str, float]) -> str:
+def _line(row: Mapping[str, float], unit: str) -> str:
     if not np.isfinite(row["amplitude"]):
         return f"level {row['level']:g}: no peak within the frequency range"
     return (
-        f"level {row['level']:g}: largest peak a = {row['amplitude']:.4g} m at {row['frequency_hz']:.5g} Hz in sector"
-        f" {row['sector']:.0f}, {row['amplification']:.4f} times the tuned {row['tuned_amplitude']:.4g} m at"
-        f" {row['tuned_frequency_hz']:.5g} Hz"
+        f"level {row['level']:g}: largest peak a = {row['amplitude']:.4g} {unit} at {row['frequency_hz']:.5g} Hz in"
+        f" sector {row['sector']:.0f}, {row['amplification']:.4f} times the tuned {row['tuned_amplitude']:.4g} {unit}"
+        f" at {row['tuned_frequency_hz']:.5g} Hz"
     )
 
 
 def blade_amplitudes(excitation: Excitation, writer: AnalysisWriter) -> Array:
-    """Fundamental amplitudes (points, N) [m] of the observed dof in all sectors (writing rank)."""
+    """Fundamental amplitudes (points, N) [length] of the observed dof in all sectors (writing rank)."""
     labels = excitation.harmonics.labels
     dofs = excitation.context.case.places(dof_of(excitation.analysis.observe))
     stored = writer.group["coefficients"][:, dofs[0] : dofs[-1] + 1 : dofs[1] - dofs[0], :]

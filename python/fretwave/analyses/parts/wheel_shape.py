@@ -112,7 +112,7 @@ def finish_wheel(context: AnalysisContext[ModeAnalysis], writer: AnalysisWriter,
         "smallest_participation": float(points["participation"].min()),
         "largest_unfolding": float(points["unfolding"].max()) if start.avoid is not None else None,
     }
-    return _lines(context.name, points, start)
+    return _lines(context.name, points, start, context.units("length"))
 
 
 def _sector_amplitudes(
@@ -125,12 +125,12 @@ def _sector_amplitudes(
     return np.array([complex_amplitudes(labels, Q)[1] for Q in kept])
 
 
-def _lines(name: str, points: dict[str, Any], start: Start) -> list[str]:
+def _lines(name: str, points: dict[str, Any], start: Start, unit: str) -> list[str]:
     lines = []
     shown = [0, *np.flatnonzero(points["event"] == b"report").tolist(), len(points["point"]) - 1]
     for k in dict.fromkeys(shown):
         lines.append(
-            f"{name}: at a = {points['amplitude'][k]:.4g} m amplification {points['amplification'][k]:.4g},"
+            f"{name}: at a = {points['amplitude'][k]:.4g} {unit} amplification {points['amplification'][k]:.4g},"
             f" participation ratio {points['participation'][k]:.4g}, sector {points['largest_sector'][k]} moves most,"
             f" {100 * points['diameters_share'][k]:.3g} % is the wave of {points['diameters'][k]} nodal diameters"
         )

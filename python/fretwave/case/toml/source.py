@@ -10,6 +10,7 @@ from typing import Any
 
 from ...errors import FretwaveError, InputError
 from ...texts import display, nearest, shortened
+from ...units import SI, SYSTEMS, UnitSystem
 from .locate import Locator
 from .locate import Path as KeyPath
 from .plain import check_plain
@@ -40,6 +41,8 @@ class Source:
         What ``tomllib`` gives, overrides applied.
     problems : list of FretwaveError
         Overrides that could not be applied.
+    units_of_model : UnitSystem
+        As the builder or the model file says, once it is read.
 
     Raises
     ------
@@ -54,8 +57,16 @@ class Source:
         self.data: dict[str, Any] = _parse(self.text, self.label)
         check_plain(self.data, self.label)
         self.problems: list[FretwaveError] = []
+        self.units_of_model = SI
         self._locator = Locator(self.text)
         self._origin: dict[KeyPath, str] = {}
+
+    @property
+    def units(self) -> UnitSystem:
+        """The system that messages write units in: that of the case, or of its model, or SI."""
+        given = self.data.get("model", {})
+        declared = given.get("units") if isinstance(given, dict) else None
+        return SYSTEMS.get(str(declared), self.units_of_model)
 
     def where(self, path: KeyPath) -> str:
         """``file:line (key)`` of a value, or the ``--set`` that gave it."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, Optional, TypeVar, cast
 
 from pydantic import BaseModel, ValidationError
@@ -119,7 +119,7 @@ def _problem(
         f"{source.name(whole)} has a wrong value",
         where=source.where(whole),
         measured=toml(at(source.data, whole)),
-        expected=" or ".join(rules) + (f": {describe(field)}" if field else ""),
+        expected=" or ".join(rules) + (f": {describe(field, source.units)}" if field else ""),
         fix=_example(name, field),
     )
 
@@ -135,7 +135,7 @@ def _missing(kind: type[BaseModel], source: Source, path: KeyPath, inside: KeyPa
     return InputError(
         f"the key '{key}' is missing in {source.name(holder)}",
         where=source.where(holder),
-        expected=describe(field) if field else None,
+        expected=describe(field, source.units) if field else None,
         fix=_example(name, field, "add"),
     )
 
@@ -153,9 +153,9 @@ def unknown_key(source: Source, path: KeyPath, known: list[str]) -> InputError:
     )
 
 
-def describe(field: FieldInfo) -> str:
-    """A field's doc with its unit."""
-    unit = _extra(field, "unit")
+def describe(field: FieldInfo, units: Callable[[str], str] = str) -> str:
+    """A field's doc with its unit: of the quantity, or in symbols of a system."""
+    unit = units(_extra(field, "unit") or "")
     return f"{field.description} [{unit}]" if unit and unit != "-" else str(field.description)
 
 
