@@ -56,6 +56,7 @@ if TYPE_CHECKING:
     from .solve.wear import Wear, WearPoint
     from .solve.wear_march import WearMarch, wear
     from .solve.worn_mode import WornMode
+    from .units import UnitSystem, unit_system
 
 #: Where each public name lives; loaded when first used, so that `fretwave --help` starts without PETSc.
 _HOMES = {
@@ -101,6 +102,7 @@ _HOMES = {
     "solve.transient": ("Transient",),
     "solve.wear": ("Wear", "WearPoint"),
     "solve.worn_mode": ("WornMode",),
+    "units": ("UnitSystem", "unit_system"),
 }
 _HOME_OF = {name: home for home, names in _HOMES.items() for name in names}
 
@@ -141,6 +143,7 @@ __all__ = [
     "Structure",
     "Sweep",
     "Transient",
+    "UnitSystem",
     "WaveError",
     "Wear",
     "WearControl",
@@ -177,6 +180,7 @@ __all__ = [
     "static_preload",
     "sweep",
     "travelling_wave",
+    "unit_system",
     "wear",
     "write_model",
 ]

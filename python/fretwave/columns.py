@@ -41,6 +41,9 @@ class Column:
     kind: str = "f"
     units: UnitSystem = SI
 
+    def __repr__(self) -> str:
+        return f"Column('{self.name}', '{self.symbol}': {self.long_name})"
+
     @property
     def dtype(self) -> str:
         """Type of the column in results.h5."""

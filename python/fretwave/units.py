@@ -54,6 +54,9 @@ class UnitSystem:
     kilograms: float
     finer: tuple[tuple[float, str], tuple[float, str]]
 
+    def __repr__(self) -> str:
+        return f"UnitSystem({self.described()})"
+
     def __call__(self, unit: str) -> str:
         """The unit of quantities in these symbols; what names none of them stays: "1", "rad/s", "Hz"."""
         return _WORD.sub(lambda found: self._symbol(found.group()), quantity(unit))

@@ -45,10 +45,10 @@ struct Diagnosis {
   std::vector<Status> status;     ///< samples x pairs
   std::vector<double> work;       ///< dissipated energy [energy], pairs
   std::vector<double> slip_path;  ///< length of the slider's path [length], pairs
-  /// Archard's integral of N |d slider| [N m], pairs (Laxalde et al. 2008, eq. 13); empty: not asked for.
+  /// Archard's integral of N |d slider| [energy], pairs (Laxalde et al. 2008, eq. 13); empty: not asked for.
   std::vector<double> archard = {};
-  /// Distance to contact where open, 0 where closed [length], nan without a normal direction; samples x pairs;
-  /// empty: not asked for.
+  /// Distance to contact where open, 0 where closed [length], nan without a normal direction; samples x
+  /// pairs; empty: not asked for.
   std::vector<double> gap = {};
   /// Of the period in stick, slip and open: 3 x pairs.
   std::vector<double> shares = {};
@@ -114,8 +114,8 @@ class Law {
   virtual bool wears() const { return false; }
   /// `stand_off` widens its gaps.
   virtual bool stands_off() const { return wears(); }
-  /// Worn depth of each pair [length], in place of what was set before; the rest state stays as it is. Null: as
-  /// they are.
+  /// Worn depth of each pair [length], in place of what was set before; the rest state stays as it is. Null:
+  /// as they are.
   void wear(double const* depth) {
     if (depth) set_wear(depth);
     ++version_;
@@ -132,8 +132,8 @@ class Law {
   unsigned version() const { return version_; }
   /// f(-u, -v) = -f(u, v): the motion may keep odd harmonics only.
   virtual bool odd() const { return false; }
-  /// Stiffness of the contact when stuck in its rest state [force/length] (0 for a pair that is open there); infinite
-  /// means no relative motion at all.
+  /// Stiffness of the contact when stuck in its rest state [force/length] (0 for a pair that is open there);
+  /// infinite means no relative motion at all.
   virtual double stuck_stiffness(int /*component*/, int /*pair*/) const {
     return std::numeric_limits<double>::infinity();
   }

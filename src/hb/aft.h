@@ -26,7 +26,7 @@ struct ContactPeriod {
 
 /// What wears a contact over a period, per pair.
 struct Wearing {
-  std::vector<double> archard;     ///< integral of N |d slider| [N m]; zero for a law that does not wear
+  std::vector<double> archard;     ///< integral of N |d slider| [energy]; zero for a law that does not wear
   std::vector<double> load;        ///< mean normal force [force]
   std::vector<double> slip, open;  ///< shares of the period
 };
@@ -39,8 +39,8 @@ class Aft {
  public:
   Aft(Harmonics const&, std::shared_ptr<contact::Law const>);
   int columns() const { return columns_; }
-  /// Force of rounding in a displacement, per length of it: a stiffness, where it is known by the share of the
-  /// period in which the last force follows it (stick, contact).
+  /// Force of rounding in a displacement, per length of it: a stiffness, where it is known by the share of
+  /// the period in which the last force follows it (stick, contact).
   double stiffness(int pair, int component) const {
     return continuous_ ? continuous_->mean_stiffness(pair, component)
                        : law_->stuck_stiffness(component, pair);
@@ -50,8 +50,8 @@ class Aft {
   void force(double const* U, Exponents const&, double* F);
   /// dF for dU and dV, the harmonic blocks of the velocity's perturbation.
   void product(double const* dU, double const* dV, double* dF);
-  /// dF for gaps that grow by dgap (pairs) [length]: N = kn (u_n - gap) sees them as normal displacements that
-  /// fall.
+  /// dF for gaps that grow by dgap (pairs) [length]: N = kn (u_n - gap) sees them as normal displacements
+  /// that fall.
   void gap_product(double const* dgap, double* dF);
   /// Dense dF/dU of each pair, pairs x (components m) x (components m), with the velocity's share through s.
   void blocks(Exponents const&, double* D);

@@ -70,8 +70,8 @@ class ModeStart : public NonlinearMode {
   double amplitude_;
 };
 
-/// phi^H M phi w^2 / phi^H phi: the inertia force per displacement that force rows are measured in [force/length]; of
-/// a sector's mass its own part alone. `imaginary` may be null. Collective.
+/// phi^H M phi w^2 / phi^H phi: the inertia force per displacement that force rows are measured in
+/// [force/length]; of a sector's mass its own part alone. `imaginary` may be null. Collective.
 double reference_stiffness(model::Model const&, double omega, Vec shape, Vec imaginary = nullptr);
 
 }  // namespace fretwave::hb

@@ -59,10 +59,11 @@ class Residual {
   /// Of the last evaluated point. Collective.
   EnergyBalance energy();
 
-  /// Worn depths of the pairs [length], in the laws, which all residuals of the model share; empty for a contact
-  /// that does not wear.
+  /// Worn depths of the pairs [length], in the laws, which all residuals of the model share; empty for a
+  /// contact that does not wear.
   void wear(PerContact const& depth);
-  /// Widens all gaps by a distance [length] that is no wear, in the laws, which all residuals of the model share.
+  /// Widens all gaps by a distance [length] that is no wear, in the laws, which all residuals of the model
+  /// share.
   void stand_off(double distance);
   /// dR for gaps that all grow by 1 m, at the last evaluated point. Collective.
   void stand_off_product(Vec dR);

@@ -79,7 +79,7 @@ def test_report_warns_of_what_cannot_be(held: Held, tmp_path: Path, capfd) -> No
 
 
 def test_damping_names_and_tables(held: Held, tmp_path: Path, capfd) -> None:
-    """C beside M and K; a table of dofs as CSV; coordinates as CSV; a note on units; what was read."""
+    """C beside M and K; a table of dofs as CSV; coordinates as CSV; the units; what was read."""
     C = sp.tril(1e-6 * held.K).tocsr()
     parts = [write_npz(tmp_path, A, letter, held.labels) for letter, A in (("M", held.M), ("K", held.K), ("C", C))]
     np.savetxt(tmp_path / "dofs.csv", held.labels, fmt="%d", delimiter=",")
@@ -93,12 +93,12 @@ def test_damping_names_and_tables(held: Held, tmp_path: Path, capfd) -> None:
     )
     command = ["import", str(tmp_path / "m.h5"), "--mass", parts[0], "--stiffness", parts[1], "--damping", parts[2]]
     tables = ["--dofs", str(tmp_path / "dofs.csv"), "--coordinates", str(tmp_path / "nodes.csv")]
-    assert main([*command, *tables, "--units", "kg, N, m", "--name", "tip=24z", "--name", "side=n24y"]) == 0
+    assert main([*command, *tables, "--units", "m-kg-s", "--name", "tip=24z", "--name", "side=n24y"]) == 0
     model = model_file.read_model(tmp_path / "m.h5")
     assert abs(model.C - 1e-6 * held.K).max() == 0
     assert model.dof_names[-3:] == ["n24x", "side", "tip"] and model.dofs == {"tip": 53, "side": 52}
     units, sources = model_file.read_sources(tmp_path / "m.h5")
-    assert units == "kg, N, m"
+    assert units == "m-kg-s"
     assert [(s.role, s.path) for s in sources][2:4] == [("damping", "C.npz"), ("coordinates", "nodes.csv")]
     assert sources[0].bytes == (tmp_path / "M.npz").stat().st_size and len(sources[0].sha256) == 64
     np.testing.assert_array_equal(model.coordinates, held.bar.nodes)

@@ -79,7 +79,7 @@ def test_matrices_that_calculix_wrote(tmp_path: Path, capfd) -> None:
         "without the 4 nodes that have no dof",
     ):
         assert said in text
-    assert "SI (m, kg, s)" in text and "warning" not in text
+    assert "units: like m-kg-s for a solid" in text and "warning" not in text
 
 
 #: Of CalculiX, *FREQUENCY on the deck of block.inp.

@@ -47,7 +47,7 @@ def model_of_a_bar() -> fw.Structure:
 @pytest.fixture
 def path(comm, shared_tmp: Path) -> Path:
     written = shared_tmp / "bar.h5"
-    on_first_rank(comm, lambda: model_file.write_model(written, model_of_a_bar(), "kg, N, m", SOURCES))
+    on_first_rank(comm, lambda: model_file.write_model(written, model_of_a_bar(), "m-kg-s", SOURCES))
     return written
 
 
@@ -62,7 +62,7 @@ def test_what_goes_in_comes_out(path: Path) -> None:
         np.testing.assert_array_equal(getattr(was.pairs["flank"], key), getattr(found.pairs["flank"], key))
     assert (was.pairs["flank"].B != found.pairs["flank"].B).nnz == 0
     assert (found.names, found.dofs) == (was.names, was.dofs)
-    assert model_file.read_sources(path) == ("kg, N, m", SOURCES)
+    assert model_file.read_sources(path) == ("m-kg-s", SOURCES)
     assert not path.with_name("bar.h5.unfinished").exists()
 
 

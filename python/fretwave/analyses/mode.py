@@ -225,7 +225,8 @@ def _finish(
         keep_pairs(context, writer)
         keep_row(context, writer, context.analysis.normalise, problem.row)
     writer.close("done" if branch.converged else "stopped", branch.reason, events=events)
-    advice = one_by_one(table) if table and context.case.wheel is not None and not branch.converged else ""
+    folded = table and context.case.wheel is not None and not branch.converged
+    advice = one_by_one(table, context.units("length")) if folded else ""
     return Outcome(writer.rows, branch.reason, branch.converged, summary, advice=advice)
 
 

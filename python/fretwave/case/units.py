@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 from ..errors import FretwaveError, InputError
+from ..importers.units import Evidence, check_declared, evidence_of
 from ..model.structure import Structure
 from ..results.model_file import read_sources
 from ..units import SI, SYSTEMS, unit_system, unknown
@@ -38,14 +39,29 @@ def in_units(
         fix = f'write `units = "{of_model}"` or remove the key, or make the model in {declared}'
         what = f"the case and its {origin} declare different unit systems"
         found.append(InputError(what, where, f'units = "{declared}"', f'"{of_model}", as the {origin} says', fix))
-    elif section.file and not of_model:
-        notes += _note(section.file, source, declared or SI.name)
+    elif section.file:
+        evidence = evidence_of(structure)
+        try:
+            check_declared(declared or of_model or SI.name, evidence if declared else [], where, _fix)
+        except InputError as error:
+            found.append(error)
+        if not of_model:
+            notes += _notes(section.file, source, declared, evidence)
     name = of_model or (declared if declared in SYSTEMS else None) or SI.name
     source.units_of_model = unit_system(name)
     return replace(structure, units=name), identity if name == SI.name else {**identity, "model.units": name}
 
 
-def _note(file: str, source: Source, name: str) -> list[str]:
-    """A note of an earlier version's import in place of a system, where there is one."""
-    text = read_sources(source.path.parent / file)[0]
-    return [f"the model file's note on its units, '{text}', names no unit system: read as {name}"] if text else []
+def _fix(name: str) -> str:
+    return f'write `units = "{name}"`'
+
+
+def _notes(file: str, source: Source, declared: str | None, evidence: Sequence[Evidence]) -> list[str]:
+    """Of a model file without a unit system: what it was read as, where that may be wrong."""
+    name, text = declared or SI.name, read_sources(source.path.parent / file)[0]
+    notes = [f"the model file's note on its units, '{text}', names no unit system: read as {name}"] if text else []
+    others = [one for one in evidence if one.fits and name not in one.fits]
+    notes += [
+        f"units: read as {name}, but like {' or '.join(one.fits)} ({one.text}): {_fix(one.fits[0])}" for one in others
+    ]
+    return notes

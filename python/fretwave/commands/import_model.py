@@ -15,14 +15,16 @@ from ..errors import EXIT_DONE, InputError
 from ..importers.calculix import SUFFIXES, read_dofs
 from ..importers.entries import Assembled, assemble
 from ..importers.formats import read_matrix, readable, split
-from ..importers.nodes import Nodes, read_nodes
+from ..importers.nodes import Material, Nodes, read_nodes
 from ..importers.pairs import match, read_pairs
 from ..importers.report import check
+from ..importers.units import Evidence, check_declared, evidence_of
 from ..model.pairs import Pairs
 from ..model.structure import Structure
 from ..mpi.guard import on_first_rank
 from ..results.model_file import SourceFile, write_model
 from ..texts import display, nearest
+from ..units import SYSTEMS, unknown
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -32,17 +34,26 @@ ROLES = {"M": "mass", "K": "stiffness", "C": "damping"}
 
 def import_model(options: argparse.Namespace, comm: MPI.Comm) -> int:
     """Read, check, write, report. Collective; rank 0 reads and writes."""
-    model, found = on_first_rank(comm, lambda: read_parts(options))
-    report = check(model, found.symmetry, found.notes, options.modes, comm)
-    on_first_rank(comm, lambda: write_model(options.out, model, options.units, _sources(options)))
+    model, found, materials = on_first_rank(comm, lambda: read_parts(options))
+    evidence = on_first_rank(comm, lambda: _checked_units(model, materials))
+    report = check(model, found.symmetry, found.notes, evidence, options.modes, comm)
+    on_first_rank(comm, lambda: write_model(options.out, model, sources=_sources(options)))
     if comm.rank == 0:
         print(report.text())
         print(f"wrote {display(options.out)}")
     return EXIT_DONE
 
 
-def read_parts(options: argparse.Namespace) -> tuple[Structure, Assembled]:
-    """The model that the options describe. One rank.
+def _checked_units(model: Structure, materials: Sequence[Material]) -> list[Evidence]:
+    """What tells the model's units, which does not contradict those declared. One rank."""
+    evidence = evidence_of(model, materials)
+    if model.units:
+        check_declared(model.units, evidence, f"--units {model.units}", lambda name: f"--units {name}")
+    return evidence
+
+
+def read_parts(options: argparse.Namespace) -> tuple[Structure, Assembled, list[Material]]:
+    """The model that the options describe, and materials that tell its units. One rank.
 
     Raises
     ------
@@ -51,6 +62,8 @@ def read_parts(options: argparse.Namespace) -> tuple[Structure, Assembled]:
     """
     for plugin in options.plugin:
         load_file(plugin)
+    if options.units is not None and options.units not in SYSTEMS:
+        raise unknown(options.units, "--units")
     _check_place(options.out, [options.mass, options.stiffness, options.damping])
     paths = {letter: getattr(options, role) for letter, role in ROLES.items() if getattr(options, role)}
     given = {letter: read_matrix(path, letter) for letter, path in paths.items()}
@@ -65,12 +78,13 @@ def read_parts(options: argparse.Namespace) -> tuple[Structure, Assembled]:
     model = Structure(
         found.matrices["M"], found.matrices["K"], found.matrices.get("C"), dofs=dofs, names=names, labels=labels
     )
+    model.units = options.units
     if nodes is not None:
         model.node_numbers, model.coordinates = nodes.numbers, nodes.coordinates
         if nodes.hexahedra is not None:
             model.hexahedra = nodes.places(nodes.hexahedra.ravel()).reshape(nodes.hexahedra.shape)
     model.pairs = dict(_pairs(options, labels, nodes))
-    return model, found
+    return model, found, [] if nodes is None else nodes.materials
 
 
 def _sources(options: argparse.Namespace) -> list[SourceFile]:

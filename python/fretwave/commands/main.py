@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from ..errors import EXIT_DONE, InputError
 from ..mpi.guard import guarded, install
 from ..texts import display, is_there
+from ..units import SYSTEMS
 from .parser import Parser
 from .world import world, world_if_any
 
@@ -161,7 +162,7 @@ def _add_view(commands: _SubParsers) -> None:
     which = view.add_mutually_exclusive_group()
     which.add_argument("--point", type=int, nargs="+", default=[], metavar="N", help="points of the branch")
     which.add_argument(
-        "--amplitude", type=float, nargs="+", default=[], metavar="A", help="nearest kept points [length]"
+        "--amplitude", type=float, nargs="+", default=[], metavar="A", help="nearest kept points, in the case's units"
     )
     view.add_argument("--sectors", type=int, nargs="+", default=[], metavar="J", help="of a wheel (default: all)")
     view.add_argument("--phases", type=int, default=32, metavar="N", help="steps of a period (default 32)")
@@ -198,7 +199,7 @@ def _add_import(commands: _SubParsers) -> None:
     add.add_argument("--tangent", metavar="X,Y,Z", help="first tangent (default: the axis most across the normals)")
     add.add_argument("--tolerance", type=float, metavar="LENGTH", help="largest distance of two nodes of a pair")
     add.add_argument("--name", action="append", default=[], metavar="NAME=DOF", help="name a dof: tip=n17y; it is kept")
-    add.add_argument("--units", default="", metavar="TEXT", help='a note, for example "kg, N, m"')
+    add.add_argument("--units", metavar="SYSTEM", help=f"unit system of all numbers: {', '.join(SYSTEMS)}")
     add.add_argument("--modes", type=int, default=6, metavar="N", help="frequencies to report (default 6)")
     add.set_defaults(command=_import)
 

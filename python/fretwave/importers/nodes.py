@@ -4,7 +4,7 @@ CSV: lines "node, x, y, z". NPZ: ``coordinates`` (n_nodes, 3), optionally ``node
 ... otherwise); every other array of whole numbers is a node set of its name.
 Deck (SIMULIA, Abaqus Keywords Reference, *NODE, *NSET, *INCLUDE; G. Dhondt, CalculiX CrunchiX User's Manual): names and
 keywords in any case; ``*NSET, GENERATE`` gives first, last, step; a set may name other sets. ``*ELEMENT`` of types C3D8
-and C3D20 gives the cells, for pictures alone.
+and C3D20 gives the cells, for pictures alone; ``*ELASTIC`` and ``*DENSITY`` of a ``*MATERIAL`` tell its units.
 """
 
 from __future__ import annotations
@@ -26,6 +26,16 @@ _HEXAHEDRON = re.compile(r"C3D(8|20)[A-Z]*", re.IGNORECASE)
 
 
 @dataclass
+class Material:
+    """The first numbers of a material, None where the deck has none: Young's modulus and density."""
+
+    name: str
+    where: str
+    modulus: float | None = None
+    density: float | None = None
+
+
+@dataclass
 class Nodes:
     """Nodes of a mesh.
 
@@ -39,6 +49,8 @@ class Nodes:
         The file, as a user would name it.
     hexahedra : (n_cells, 8 or 20) or None
         Node numbers of cells with 8 or 20 nodes, in the order of C3D8 and C3D20.
+    materials : list of Material
+        With a modulus or a density.
     """
 
     numbers: IntArray
@@ -46,6 +58,7 @@ class Nodes:
     where: str
     sets: dict[str, IntArray] = field(default_factory=dict)
     hexahedra: IntArray | None = None
+    materials: list[Material] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         different, count = np.unique(self.numbers, return_counts=True)
@@ -129,6 +142,7 @@ class Deck:
         self.rows: list[tuple[int, float, float, float]] = []
         self.members: dict[str, list[int | str]] = {}
         self.cells: list[IntArray] = []
+        self.materials: list[Material] = []
         for keyword, options, data in _blocks(path):
             if keyword == "NODE":
                 self._add_nodes(options, data)
@@ -136,6 +150,8 @@ class Deck:
                 self._add_set(options, data)
             elif keyword == "ELEMENT" and (solid := _HEXAHEDRON.fullmatch(options.get("TYPE", ""))):
                 self._add_cells(int(solid.group(1)), data)
+            elif keyword in ("MATERIAL", "ELASTIC", "DENSITY"):
+                self._add_material(keyword, options, data)
             elif keyword == "INSTANCE" and data:
                 fix = "write the deck flat (Abaqus/CAE: do not use parts and assemblies in input files)"
                 raise InputError("an instance is moved", f"{self.where}:{data[0][0]}", data[0][1], "no movement", fix)
@@ -183,6 +199,20 @@ class Deck:
         table = np.array([int(word) for _, word in words], dtype=np.int64).reshape(-1, 1 + nodes)
         self.cells.append(table[:, 1:])
 
+    def _add_material(self, keyword: str, options: dict[str, str], data: list[tuple[int, str]]) -> None:
+        """A material's name, or its first modulus or density, as far as it is a number."""
+        if keyword == "MATERIAL":
+            self.materials.append(Material(options.get("NAME", "a material"), self.where))
+            return
+        try:
+            value = float(data[0][1].partition(",")[0])
+        except (IndexError, ValueError):
+            return
+        if self.materials and value > 0:
+            now = self.materials[-1]
+            now.where = f"{self.where}:{data[0][0]}"
+            setattr(now, "modulus" if keyword == "ELASTIC" else "density", value)
+
     def _hexahedra(self) -> IntArray | None:
         """All of them with as many nodes as the smallest has: the corners come first."""
         count = min((cells.shape[1] for cells in self.cells), default=0)
@@ -204,7 +234,8 @@ class Deck:
         table = np.array([row[1:] for row in self.rows])
         numbers = np.array([row[0] for row in self.rows], dtype=np.int64)
         sets = {name: np.unique(np.array(self._expand(name), dtype=np.int64)) for name in self.members}
-        return Nodes(numbers, table, self.where, sets, self._hexahedra())
+        materials = [one for one in self.materials if one.modulus is not None or one.density is not None]
+        return Nodes(numbers, table, self.where, sets, self._hexahedra(), materials)
 
 
 def _blocks(path: Path) -> Iterator[tuple[str, dict[str, str], list[tuple[int, str]]]]:

@@ -13,6 +13,7 @@ from ..arrays import Array
 from ..errors import FretwaveError
 from ..model.structure import Structure
 from ..texts import counted
+from .units import Evidence, words
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -69,7 +70,14 @@ def expected_rigid(model: Structure, motions: Array) -> tuple[int, int]:
     return free, int(count)
 
 
-def check(model: Structure, symmetry: dict[str, str], notes: Sequence[str], modes: int, comm: MPI.Comm) -> Report:
+def check(
+    model: Structure,
+    symmetry: dict[str, str],
+    notes: Sequence[str],
+    evidence: Sequence[Evidence],
+    modes: int,
+    comm: MPI.Comm,
+) -> Report:
     """Everything that can be said without a law of contact. Collective.
 
     Parameters
@@ -78,6 +86,8 @@ def check(model: Structure, symmetry: dict[str, str], notes: Sequence[str], mode
         What was found of each matrix, by letter.
     notes : sequence of str
         What the import did.
+    evidence : sequence of Evidence
+        Of its units.
     modes : int
         Frequencies to show beside the rigid modes.
     """
@@ -92,7 +102,9 @@ def check(model: Structure, symmetry: dict[str, str], notes: Sequence[str], mode
     _mass(model, motions, report)
     _diagonal(model, model.K.diagonal(), "stiffness", report)
     _frequencies(model, motions, modes, comm, report)
-    _units(model, motions, report)
+    lines, warnings = words(model.units, evidence)
+    report.lines += lines
+    report.warnings += warnings
     return report
 
 
@@ -109,10 +121,10 @@ def _mass(model: Structure, motions: Array | None, report: Report) -> None:
     if motions is None:
         report.lines.append("mass of the body: not known without coordinates and a table of dofs")
         return
-    masses = _masses(model, motions)
+    masses, unit = _masses(model, motions), f" [{model.unit_system('mass')}]" if model.units else ""
     absent = len(np.setdiff1d(model.node_numbers, model.labels[:, 0]))  # type: ignore[arg-type,index]
     held = f" (without the {absent} nodes that have no dof)" if absent else ""
-    report.lines.append("mass: " + ", ".join(f"{m:.6g} along {a}" for m, a in zip(masses, "xyz")) + held)
+    report.lines.append("mass: " + ", ".join(f"{m:.6g} along {a}" for m, a in zip(masses, "xyz")) + unit + held)
     if np.ptp(masses) > MASS_SPREAD * masses.max():
         report.warnings.append(
             "the mass differs along x, y and z: dofs are held or missing, or M has entries that belong elsewhere"
@@ -161,25 +173,5 @@ def _frequencies(model: Structure, motions: Array | None, modes: int, comm: MPI.
     if (squares < -RIGID * scale).any():
         report.warnings.append(f"K is negative for a motion: omega^2 = {squares.min():.4g}")
     elastic = np.sqrt(squares[squares >= RIGID * scale])[:modes] / (2 * np.pi)
-    report.lines.append("first frequencies [1/time]: " + ", ".join(f"{value:.6g}" for value in elastic))
-
-
-def _units(model: Structure, motions: Array | None, report: Report) -> None:
-    """Speed of sound and density as far as the mesh shows them; metals have about 5000 m/s and 2700 to 8900 kg/m^3."""
-    if motions is None or model.coordinates is None or model.labels is None:
-        return
-    size = np.ptp(model.coordinates, axis=0)
-    if (size <= 0).any():
-        return
-    edge = float(np.cbrt(size.prod() / len(model.coordinates)))
-    translational = model.labels[:, 1] <= 3
-    stiff, heavy = (A.diagonal()[translational].sum() for A in (model.K, model.M))
-    speed = edge * float(np.sqrt(stiff / heavy))
-    density = _masses(model, motions).max() / float(size.prod())
-    known = {"SI (m, kg, s)": (5e3, 4e3), "mm, t, s": (5e6, 4e-9), "mm, g, ms": (5e3, 4e-3), "mm, kg, ms": (5e3, 4e-6)}
-    fits = [name for name, (c, rho) in known.items() if c / 10 < speed < 10 * c and rho / 100 < density < 5 * rho]
-    guess = f"speed of sound about {speed:.1e}, density at least {density:.1e}"
-    if fits:
-        report.lines.append(f"units: like {' or '.join(fits)} for a metal ({guess})")
-    else:
-        report.warnings.append(f"units: no consistent set that is usual for a metal ({guess}): is M in the units of K?")
+    unit = "Hz" if model.units else "1/time"
+    report.lines.append(f"first frequencies [{unit}]: " + ", ".join(f"{value:.6g}" for value in elastic))

@@ -12,6 +12,7 @@ from matplotlib.lines import Line2D
 from ..arrays import Array
 from ..model.laws import OPEN, SLIP, STICK
 from ..results.reader import Analysis, Run, Table
+from ..units import UnitSystem
 from . import style
 
 #: amplitudes of a map
@@ -40,7 +41,7 @@ def draw_load(static: Analysis, contact: str, table: dict[str, Array]) -> Figure
     """Normal force of every pair at the largest load factor; the shape of the mark tells its status."""
     rows = (table["contact"] == contact) & (table["factor"] == table["factor"].max())
     force, status = table["normal_force"][rows], table["status"][rows]
-    (pairs, unit), newton = placed_pairs(static, contact), static.unit_system("force")
+    (pairs, unit), newton = placed(static.pairs(contact), static.unit_system), static.unit_system("force")
     names = list(dict.fromkeys(pairs["face"]))
     figure, panels = style.new_figure(1.2 + 1.9 * len(names), rows=len(names), sharex=True, squeeze=False)
     marks = {"stick": "s", "slip": "o", "open": "x"}
@@ -66,7 +67,7 @@ def draw_load(static: Analysis, contact: str, table: dict[str, Array]) -> Figure
 def draw_map(mode: Analysis, contact: str) -> Figure:
     """Shares of the period that each pair sticks, slips and is open, at several amplitudes, below the shares of all."""
     points = chosen_points(mode)
-    (pairs, of_face), (scale, unit) = placed_pairs(mode, contact), amplitude_scale(mode)
+    (pairs, of_face), (scale, unit) = placed(mode.pairs(contact), mode.unit_system), amplitude_scale(mode)
     names = list(dict.fromkeys(pairs["face"]))
     figure, _ = style.new_figure(3.6 + 1.25 * len(points))
     figure.clear()
@@ -93,9 +94,9 @@ def amplitude_scale(mode: Analysis) -> tuple[float, str]:
     return mode.unit_system.of_faces if unit in ("", mode.unit_system("length")) else (1.0, unit)
 
 
-def placed_pairs(analysis: Analysis, contact: str) -> tuple[Table, str]:
+def placed(pairs: Table, units: UnitSystem) -> tuple[Table, str]:
     """`Analysis.pairs` with positions in the unit of places on a face, and that unit."""
-    pairs, (scale, unit) = analysis.pairs(contact), analysis.unit_system.of_faces
+    scale, unit = units.of_faces
     return {**pairs, "position": scale * pairs["position"]}, unit
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from ..arrays import Array
 from ..model.laws import Role
 from ..results.reader import Analysis, Run, Table
-from ..units import UnitSystem
+from ..units import SI, UnitSystem
 from . import style
 
 #: an amplitude is shown in the first unit from which it is at least this
@@ -44,7 +44,7 @@ class WearLine:
         Worn depth [length], its growth in a vibration cycle [length], mean normal force [force].
     jumps : (n_jumps,)
         Cycles at which the mode went over to another sheet.
-    units : of all numbers
+    units : that all numbers are in
     """
 
     amplitude: float
@@ -52,8 +52,8 @@ class WearLine:
     depth: Table
     rate: Table
     load: Table
-    units: UnitSystem
     jumps: Array = field(default_factory=lambda: np.empty(0))
+    units: UnitSystem = SI
 
     @property
     def cycles(self) -> Array:

@@ -11,8 +11,9 @@ from matplotlib.figure import Figure
 
 from ..arrays import Array
 from ..results.reader import Analysis, Run, Table
+from ..units import UnitSystem
 from . import style
-from .faces import place_face, placed_pairs
+from .faces import place_face, placed
 from .wear_lines import (
     KINDS,
     RULE,
@@ -36,10 +37,10 @@ def figures(run: Run) -> Iterator[tuple[str, Figure]]:
     for wear, lines in wears(run):
         for contact in wear.worn_contacts():
             line = telling_line(lines, contact)
-            pairs, unit = placed_pairs(wear, contact) if contact in wear.placed() else (None, "")
+            pairs = wear.pairs(contact) if contact in wear.placed() else None
             yield f"{wear.name}_pairs_{contact}", draw_histories(wear, line, contact, pairs)
             if pairs is not None:
-                yield f"{wear.name}_profile_{contact}", draw_profiles(line, contact, pairs, unit)
+                yield f"{wear.name}_profile_{contact}", draw_profiles(line, contact, pairs)
 
 
 def draw_histories(wear: Analysis, line: WearLine, contact: str, pairs: Table | None) -> Figure:
@@ -63,15 +64,15 @@ def draw_histories(wear: Analysis, line: WearLine, contact: str, pairs: Table | 
     lower.set_xlabel(cycle_label(wear))
     lower.set(xlim=(0.0, line.cycles[-1]))
     for column, face in enumerate(faces):
-        _places(figure.add_subplot(grid[2, column]), pairs or {}, line.units.of_faces[1], face, words, chosen)
+        _places(figure.add_subplot(grid[2, column]), pairs or {}, line.units, face, words, chosen)
     figure.supxlabel(RULE, fontsize=9, color=style.GREY)
     style.legend_outside(figure, upper, columns=2)
     return figure
 
 
-def draw_profiles(line: WearLine, contact: str, pairs: Table, of_face: str) -> Figure:
+def draw_profiles(line: WearLine, contact: str, pairs: Table) -> Figure:
     """Depth at the last cycle: maps of the faces on one colour scale, and profiles along each row of pairs."""
-    scale, unit = line.units.of_depths
+    (scale, unit), (pairs, of_face) = line.units.of_depths, placed(pairs, line.units)
     depth, faces = scale * line.depth[contact][-1], list(dict.fromkeys(pairs["face"]))
     rows, deepest = _rows(pairs["position"][:, 1]), float(depth.max()) or 1.0
     figure, axes = style.new_figure(5.8, rows=2, columns=len(faces), sharex=True, sharey="row", squeeze=False)
@@ -125,8 +126,9 @@ def _histories(axes: Axes, cycles: Array, values: Array, words: list[str], chose
     axes.set_ylim(bottom=0.0)
 
 
-def _places(axes: Axes, pairs: Table, unit: str, face: str, words: list[str], chosen: dict[str, int]) -> None:
+def _places(axes: Axes, pairs: Table, units: UnitSystem, face: str, words: list[str], chosen: dict[str, int]) -> None:
     """Kind of each pair of a face; the pairs drawn in front have a ring."""
+    pairs, unit = placed(pairs, units)
     for pair in np.flatnonzero(pairs["face"] == face):
         ring = pair in chosen.values()
         look = {"markeredgecolor": style.INK if ring else style.GREY, "markeredgewidth": 2.0 if ring else 0.4}

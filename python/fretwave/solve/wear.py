@@ -41,7 +41,7 @@ class WearPoint:
     def __repr__(self) -> str:
         what = f" {self.event}" if self.event else ""
         deepest = float(self.state.depth.max(initial=0.0))
-        return f"WearPoint({self.cycles:.6g} cycles{what}: {deepest:.3g} m at most, step error {self.error:.1e})"
+        return f"WearPoint({self.cycles:.6g} cycles{what}: deepest {deepest:.3g}, step error {self.error:.1e})"
 
 
 class Wear:

@@ -80,7 +80,8 @@ class WornMode(Destroyable):
         self._set_last(self._row, 1.0)
 
     def __repr__(self) -> str:
-        return f"WornMode({len(self.areas)} pairs, k_w = {self.coefficient:g} 1/Pa, of {self.problem})"
+        unit = self.problem.model.units("1/pressure")
+        return f"WornMode({len(self.areas)} pairs, k_w = {self.coefficient:g} {unit}, of {self.problem})"
 
     def _check(self, name: str, names: list[str]) -> None:
         if name not in names:

@@ -142,7 +142,7 @@ def _lines(name: str, points: dict[str, Any], start: Start, unit: str) -> list[s
     return lines
 
 
-def one_by_one(table: dict[str, Any]) -> str:
+def one_by_one(table: dict[str, Any], unit: str) -> str:
     """Advice on a branch that folds again and again at one amplitude; empty when it does not.
 
     A friction contact whose force falls steeply where slip begins is bistable there. In a wave that runs all sectors
@@ -157,7 +157,7 @@ def one_by_one(table: dict[str, Any]) -> str:
     if near < MANY_FOLDS:
         return ""
     return (
-        f"{near} folds lie within {100 * SAME_AMPLITUDE:g} % of a = {middle:.4g} m: sectors that move almost alike"
+        f"{near} folds lie within {100 * SAME_AMPLITUDE:g} % of a = {middle:.4g} {unit}: sectors that move almost alike"
         " begin to slip one after another, each with a fold of its own; begin above this amplitude, deviate more, or"
         " follow a travelling wave"
     )
