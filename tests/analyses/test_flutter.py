@@ -199,7 +199,7 @@ def test_a_limit_cycle_on_a_branch_that_runs_back_names_its_folds():
     (wave,) = describe_waves({**columns, "event": events}, [3, 4])
     (cycle,) = wave["limit_cycles"]
     assert cycle["folds"] == [1.0, 1.2] and cycle["stable"] is False and wave["verdict"] == "bounded"
-    assert "runs back between 1 and 1.2 m" in words(wave)
+    assert "runs back between 1 and 1.2 mm" in words(wave, "mm")
 
 
 @pytest.mark.ranks(1)

@@ -217,3 +217,12 @@ def test_a_model_file_and_its_case_agree(imported: Path, capsys: pytest.CaptureF
     assert load_case(of_file(folder)).units == SI
     assert call("check", of_file(folder, "mm-t-s")) == 2
     assert '"m-kg-s", as the model file says' in capsys.readouterr().err
+
+
+def test_a_sweep_is_in_one_system(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Its tables would hold two: refused before anything runs."""
+    command = ["sweep", write(tmp_path, "mm-t-s"), "--over", "model.units=mm-t-s,m-kg-s", "--out", tmp_path / "out"]
+    assert call(*command) == 2
+    error = capsys.readouterr().err
+    assert "a sweep goes through several unit systems" in error and "measured: mm-t-s, m-kg-s" in error
+    assert not (tmp_path / "out").exists()

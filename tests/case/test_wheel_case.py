@@ -314,9 +314,9 @@ def test_samples_that_differ_from_sector_to_sector_are_told(samples, sectors, di
 @pytest.mark.ranks(1)
 def test_folds_at_one_amplitude_are_explained():
     table = {"amplitude": np.array([1e-4, *(2e-4 + 1e-8 * np.arange(9))]), "event": np.array(["start"] + 9 * ["fold"])}
-    assert "one after another" in one_by_one(table)
+    assert "one after another" in one_by_one(table, "m")
     spread = {**table, "amplitude": np.geomspace(1e-4, 1e-3, 10)}
-    assert one_by_one(spread) == "" and one_by_one({k: v[:5] for k, v in table.items()}) == ""
+    assert one_by_one(spread, "m") == "" and one_by_one({k: v[:5] for k, v in table.items()}, "m") == ""
 
 
 @pytest.mark.ranks(1)

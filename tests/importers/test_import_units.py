@@ -24,7 +24,7 @@ HELD = sp.csr_matrix(BAR.K + 1e-3 * sp.diags(BAR.K.diagonal()))
 
 
 def matrices(folder: Path, system: str, materials: str = "") -> list[object]:
-    """A titanium bar on soft ground in a system: the command that imports it, with a deck of its nodes and materials."""
+    """A titanium bar on soft ground in a system: the command that imports it, with a deck of nodes and materials."""
     units = SYSTEMS[system]
     M, K, nodes = BAR.M / units.kilograms, HELD / units.kilograms, BAR.nodes / units.metres
     parts = [write_npz(folder, A, letter, np.zeros(0)) for letter, A in (("M", M), ("K", K))]

@@ -11,7 +11,7 @@ import fretwave as fw
 COLUMNS = (
     fw.Column("point", "1", "number of the point", "i"),
     fw.Column("frequency_hz", "Hz", "frequency of the force"),
-    fw.Column("amplitude", "m", "amplitude of the observed dof"),
+    fw.Column("amplitude", "length", "amplitude of the observed dof"),
 )
 
 

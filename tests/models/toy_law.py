@@ -15,11 +15,11 @@ class ToyPad(fw.PythonLaw):
     limit = Limit.EACH
     stuck_stiffness = 1e6
     parameters = (
-        ParameterInfo("squeeze", "N/m", "along the normal", 0.0, True, None, Role.NORMAL_STIFFNESS),
-        ParameterInfo("shear", "N/m", "along the tangents", 0.0, True, None, Role.TANGENTIAL_STIFFNESS),
+        ParameterInfo("squeeze", "force/length", "along the normal", 0.0, True, None, Role.NORMAL_STIFFNESS),
+        ParameterInfo("shear", "force/length", "along the tangents", 0.0, True, None, Role.TANGENTIAL_STIFFNESS),
         ParameterInfo("rub", "-", "friction", 0.0, False, None, Role.FRICTION_COEFFICIENT),
-        ParameterInfo("push", "N", "load", 0.0, False, 7.0, Role.LOAD),
-        ParameterInfo("air", "m", "gap", -1.0, False, 0.0, Role.GAP),
+        ParameterInfo("push", "force", "load", 0.0, False, 7.0, Role.LOAD),
+        ParameterInfo("air", "length", "gap", -1.0, False, 0.0, Role.GAP),
     )
 
     def force(self, u, v):

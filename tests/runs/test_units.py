@@ -163,6 +163,18 @@ def test_a_run_of_another_system_is_another_case(runs: dict[str, Path], capsys: 
         case.write_text(text)
 
 
+def test_a_study_of_wear_is_in_cubic_millimetres(runs: dict[str, Path], tmp_path: Path) -> None:
+    """Whatever the system is: the same column has the same numbers."""
+    worn = []
+    for system, folder in runs.items():
+        out = tmp_path / system
+        case = folder.parent / "case.toml"
+        assert call("study", case, "--analysis", "wear", "--tolerance", "1e-1,1e-2", "--out", out) == 0
+        assert f" {SYSTEMS[system].length}, " in (out / "study.md").read_text()
+        worn.append(np.array(table(out / "study.csv")["worn_mm3"], dtype=float))
+    np.testing.assert_allclose(worn[1], worn[0], rtol=SOLVED)
+
+
 def test_a_builder_says_its_units(tmp_path: Path) -> None:
     assert (
         call("run", write_case(tmp_path / "own", "mm-t-s", declares=True), "--only", "rest", "--out", tmp_path / "r")

@@ -56,9 +56,9 @@ class Aerodynamics:
     omega : float [rad/s]
         Frequency at which they hold.
     dof : int, optional
-        Of a sector, which the force acts on and whose motion causes it: L_k [force/length]. Without it they are modal, L_k in
-        1/s^2: forces distributed like the inertia of the sector, L_k M x_{j+k}, so that L(theta) is the force on a mode
-        of unit modal mass in unit modal motion, whatever its shape.
+        Of a sector, which the force acts on and whose motion causes it: L_k [force/length]. Without it they are modal,
+        L_k [1/s^2]: forces distributed like the inertia of the sector, L_k M x_{j+k}, so that L(theta) is the force on
+        a mode of unit modal mass in unit modal motion, whatever its shape.
     """
 
     influence: Mapping[int, complex]

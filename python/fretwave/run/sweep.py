@@ -36,6 +36,7 @@ class Checked:
     """What is known of a value before it runs; only the first brings more than its hash."""
 
     digest: str
+    units: str
     resolved: dict[str, Any] = field(default_factory=dict)
     title: str = ""
     name: str = ""
@@ -93,7 +94,7 @@ class Sweep:
             found = [error]
         others = range(1, len(self.plan))
         found += groups.run(comm, others, lambda k, group: on_first_rank(group, partial(self._checked, k)))
-        problems = self._problems(found)
+        problems = self._problems(found) or self._of_units(found)
         if problems:
             raise CaseErrors(problems, f"the sweep of {display(self.path)}")
         return found
@@ -143,8 +144,20 @@ class Sweep:
         case = self._case(number)
         names = in_order(case, choose(swept_names(case), self.options.only))
         if number:
-            return Checked(case.digest)
-        return Checked(case.digest, case.resolved, case.title, case.name, case.text, names, case.analyses.plugins)
+            return Checked(case.digest, case.units.name)
+        units = case.units.name
+        return Checked(
+            case.digest, units, case.resolved, case.title, case.name, case.text, names, case.analyses.plugins
+        )
+
+    def _of_units(self, found: Sequence[Checked]) -> list[FretwaveError]:
+        """The tables of a sweep are in one system."""
+        systems = list(dict.fromkeys(one.units for one in found))
+        fix = "sweep in one system; fretwave converts no numbers"
+        what, measured = "a sweep goes through several unit systems", ", ".join(systems)
+        return (
+            [InputError(what, self.where or "--over", measured, "the same for all values", fix)] if systems[1:] else []
+        )
 
     def _problems(self, found: Sequence[Any]) -> list[FretwaveError]:
         """Each problem once, with the first of the values that have it."""

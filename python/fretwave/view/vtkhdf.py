@@ -19,7 +19,7 @@ import numpy.typing as npt
 from ..arrays import AnyArray, Array, IntArray
 from ..errors import InputError
 from ..texts import display
-from ..units import ATTRIBUTE, UnitSystem
+from ..units import ATTRIBUTE, SI, UnitSystem
 
 if TYPE_CHECKING:
     import h5py
@@ -50,7 +50,7 @@ class GridFile:
         The system of all numbers, kept as an attribute of the file.
     """
 
-    def __init__(self, path: Path, values: Sequence[float] | Array, units: UnitSystem) -> None:
+    def __init__(self, path: Path, values: Sequence[float] | Array, units: UnitSystem = SI) -> None:
         self.path, self.steps = path, len(values)
         self._unfinished = path.with_name(f".{path.name}.new")
         self._file = _create(self._unfinished)
