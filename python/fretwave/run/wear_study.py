@@ -28,7 +28,7 @@ from ..errors import EXIT_DONE, FretwaveError, NotConverged
 from ..mpi.guard import caught_by_all
 from ..mpi.petsc_options import AnalysisOptions
 from ..results.study_report import LEGEND_OF_WEAR, PRINTED_OF_WEAR, markdown
-from ..units import UnitSystem
+from ..units import SI, UnitSystem
 from .study_folder import StudyFolder, publish
 
 if TYPE_CHECKING:
@@ -74,12 +74,12 @@ class WearPlan:
     """Sweeps of one setting at a time, the others as in the analysis; each has its own reference, its finest."""
 
     base: WearSettings
-    units: UnitSystem
     harmonics: Sequence[int] = ()
     tolerance: Sequence[float] = ()
     pressure_change: Sequence[float] = ()
     outcomes: dict[WearSettings, WearOutcome] = field(default_factory=dict)
     failures: dict[WearSettings, str] = field(default_factory=dict)
+    units: UnitSystem = SI
 
     def sweeps(self) -> Iterator[tuple[str, list[WearSettings]]]:
         """(swept setting, all settings of the sweep), coarse to fine."""
@@ -168,7 +168,8 @@ def wear_plan(case: Case, analysis: WearAnalysis, options: argparse.Namespace) -
     chosen = {name: tuple(values or ()) for name, values in given.items()}
     if not any(chosen.values()):
         chosen["tolerance"] = TOLERANCES
-    return WearPlan(base, case.units, chosen["harmonics"], chosen["tolerance"], chosen["pressure_change"])
+    swept = chosen["harmonics"], chosen["tolerance"], chosen["pressure_change"]
+    return WearPlan(base, *swept, units=case.units)
 
 
 class _Solver:
