@@ -163,9 +163,10 @@ def test_a_slider_far_from_its_rest_closes_its_period(comm, swing):
 def test_an_unclosed_period_is_said(comm):
     """The words a point's line gets, and none where the distance is rounding."""
     from fretwave.analyses.parts.branch import closure_note
+    from fretwave.units import MM_T_S
 
     row = {"amplitude": 1e-3, "unclosed": 2e-6, "slip_path": 1e-4}
-    assert "2 % of the longest slip path" in closure_note(row)
-    assert closure_note({**row, "unclosed": 1e-11}) == ""
-    assert closure_note({**row, "unclosed": 1e-18, "slip_path": 0.0}) == ""
-    assert "no slip" in closure_note({**row, "slip_path": 0.0})
+    assert "2.0e-06 mm from where it began (2 % of the longest slip path" in closure_note(row, MM_T_S)
+    assert closure_note({**row, "unclosed": 1e-11}, MM_T_S) == ""
+    assert closure_note({**row, "unclosed": 1e-18, "slip_path": 0.0}, MM_T_S) == ""
+    assert "no slip" in closure_note({**row, "slip_path": 0.0}, MM_T_S)

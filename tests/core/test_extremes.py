@@ -218,7 +218,9 @@ def test_long_steps_still_end_at_the_stop_value(comm):
 def test_a_pair_without_stiffness_is_named(comm):
     """By its number in the case, on any rank."""
     stiffness = np.array([KN] * 5 + [0.0])
-    with pytest.raises(fw.InputError, match=r"(?s)normal_stiffness.*out of bounds.*contact 'root', pair 5.*> 0 N/m"):
+    with pytest.raises(
+        fw.InputError, match=r"(?s)normal_stiffness.*out of bounds.*contact 'root', pair 5.*> 0 \[force/length\]"
+    ):
         blade(comm, normal_stiffness=stiffness)
 
 

@@ -122,8 +122,8 @@ def test_table_of_laws_tells_units_bounds_and_components():
     info = fw.laws()["regularised_coulomb"]
     limit, velocity = info.parameters
     assert info.components == 1
-    assert (limit.name, limit.unit, limit.lower, limit.strict) == ("friction_limit", "N", 0, False)
-    assert (velocity.name, velocity.unit) == ("regularisation_velocity", "m/s")
+    assert (limit.name, limit.unit, limit.lower, limit.strict) == ("friction_limit", "force", 0, False)
+    assert (velocity.name, velocity.unit) == ("regularisation_velocity", "length/s")
     assert (velocity.lower, velocity.strict) == (0, True)
 
 

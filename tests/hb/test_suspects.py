@@ -11,6 +11,7 @@ from test_krylov import ROOT, TIP, beam, root_map
 import fretwave as fw
 from fretwave.hb.suspects import suspects
 from fretwave.solve.preload import static_preload
+from fretwave.units import MM_T_S
 
 LOAD = np.tile([100.0, 1.0, 0, 0, 0, 0], 5)  #: a pull along the blade, a push across [N]
 
@@ -26,8 +27,8 @@ def free_blade(comm, **changes):
     "changes, words",
     [
         ({"friction_coefficient": 0.0}, "contact 'root' has no friction"),
-        ({"normal_stiffness": 1e12}, "normal_stiffness 1e.12 N/m"),
-        ({"tangential_stiffness": 1e-3}, "tangential_stiffness 0.001 N/m, .*holds nothing"),
+        ({"normal_stiffness": 1e12}, "normal_stiffness 1e.12 N/mm"),
+        ({"tangential_stiffness": 1e-3}, "tangential_stiffness 0.001 N/mm, .*holds nothing"),
         ({"normal_load": 0.0}, "has no normal_load"),
         ({"normal_load": np.array([4000.0] * 3 + [1000.0] * 3)}, "normal loads from 1e.03 to 4e.03 N"),
     ],
@@ -35,10 +36,10 @@ def free_blade(comm, **changes):
 )
 def test_each_extreme_parameter_has_its_own_words(comm, changes, words):
     model = free_blade(comm, **changes)
-    found = suspects(model.contacts, 1e6)
+    found = suspects(model.contacts, 1e6, MM_T_S)
     assert found.count("contact 'root'") == 1
     assert re.search(words, found), found
-    assert suspects(free_blade(comm).contacts, 1e6) == ""
+    assert suspects(free_blade(comm).contacts, 1e6, MM_T_S) == ""
 
 
 def test_no_friction_is_named_where_the_preload_fails(comm):
