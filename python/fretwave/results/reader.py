@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..arrays import Array
-from ..columns import name_of, table_order
+from ..columns import PURE, name_of, table_order
 from ..errors import InputError
 from ..files.dimensions import names_of_data
 from ..hb.states import State
@@ -174,8 +174,7 @@ class Analysis:
 
     def unit(self, column: str) -> str:
         """Unit of a column; "" for a pure number or an unknown one."""
-        unit = self.units.get(column, "")
-        return "" if unit in ("1", "-") else unit
+        return "" if self.units.get(column) in PURE else self.units.get(column, "")
 
     def length_unit(self) -> str:
         """Of displacements; "" where the results tell no units."""
@@ -390,9 +389,7 @@ def _text(value: object) -> Any:
 def _attribute(value: object) -> Any:
     """An attribute; lists are kept as JSON."""
     text = _text(value)
-    if isinstance(text, str) and text[:1] in ("[", "{"):
-        return json.loads(text)
-    return text
+    return json.loads(text) if isinstance(text, str) and text[:1] in ("[", "{") else text
 
 
 def _numbers(values: list[str]) -> Any:
