@@ -24,21 +24,61 @@ SPEED, DENSITY_OF_BOX = (500.0, 5e4), (40.0, 2e4)
 
 
 @dataclass(frozen=True)
+class Number:
+    """A number that tells units: what it is, in which unit of SI, and between which bounds it is a solid's there."""
+
+    name: str
+    value: float
+    unit: str
+    bounds: tuple[float, float]
+
+    def in_si(self, units: UnitSystem) -> float:
+        """As a number of this system."""
+        by_unit = {
+            "Pa": units.kilograms / units.metres,
+            "kg/m^3": units.kilograms / units.metres**3,
+            "m/s": units.metres,
+        }
+        return self.value * by_unit[self.unit]
+
+    def fits(self, units: UnitSystem) -> bool:
+        """It is a solid's as a number of this system."""
+        return self.bounds[0] < self.in_si(units) < self.bounds[1]
+
+
+@dataclass(frozen=True)
 class Evidence:
-    """Numbers that tell units.
+    """Numbers that tell units together.
 
     Attributes
     ----------
-    text : what they are, as they stand
+    of : what they are numbers of
     where : file and line, or empty
-    expected : what they are of a solid, in SI
-    fits : names of the systems that they can be in
     """
 
-    text: str
-    where: str
-    expected: str
-    fits: tuple[str, ...]
+    numbers: Sequence[Number]
+    of: str
+    where: str = ""
+
+    @property
+    def text(self) -> str:
+        """As they stand."""
+        return ", ".join(f"{one.name} {one.value:.3g}" for one in self.numbers) + f" {self.of}"
+
+    @property
+    def expected(self) -> str:
+        """Of a solid."""
+        return "a solid's " + ", ".join(f"{one.bounds[0]:g} to {one.bounds[1]:g} {one.unit}" for one in self.numbers)
+
+    @property
+    def fits(self) -> tuple[str, ...]:
+        """Names of the systems that they can be in."""
+        return tuple(name for name, units in SYSTEMS.items() if all(one.fits(units) for one in self.numbers))
+
+    def read_in(self, system: str) -> str:
+        """What they are as numbers of a system."""
+        values = ", ".join(f"{one.in_si(SYSTEMS[system]):.3g} {one.unit}" for one in self.numbers)
+        return f"{self.text}, which in {system} are {values}"
 
 
 def evidence_of(model: Structure, materials: Sequence[Material] = ()) -> list[Evidence]:
@@ -63,8 +103,8 @@ def check_declared(declared: str, evidence: Sequence[Evidence], where: str, fix:
         return
     first = telling[0]
     place = ", ".join(filter(None, (where, first.where)))
-    read = f"{first.text}, in {declared}"
-    raise InputError("the numbers contradict the declared units", place, read, first.expected, fix(first.fits[0]))
+    what, read = "the numbers contradict the declared units", first.read_in(declared)
+    raise InputError(what, place, read, first.expected, fix(first.fits[0]))
 
 
 def words(declared: str | None, evidence: Sequence[Evidence]) -> tuple[list[str], list[str]]:
@@ -84,16 +124,9 @@ def words(declared: str | None, evidence: Sequence[Evidence]) -> tuple[list[str]
 
 def _of_material(material: Material) -> Evidence:
     modulus, density = material.modulus, material.density
-    given = {"Young's modulus": modulus, "density": density}
-    parts = [f"{name} {value:.4g}" for name, value in given.items() if value is not None]
-    expected = f"{_range(MODULUS)} Pa, {_range(DENSITY)} kg/m^3"
-
-    def fits(units: UnitSystem) -> bool:
-        pascals = units.kilograms / units.metres
-        solid = modulus is None or _within(modulus * pascals, MODULUS)
-        return solid and (density is None or _within(density * _density(units), DENSITY))
-
-    return Evidence(f"{', '.join(parts)} of {material.name}", material.where, expected, _systems(fits))
+    numbers = [] if modulus is None else [Number("Young's modulus", modulus, "Pa", MODULUS)]
+    numbers += [] if density is None else [Number("density", density, "kg/m^3", DENSITY)]
+    return Evidence(numbers, f"of {material.name}", material.where)
 
 
 def _of_matrices(model: Structure) -> Iterator[Evidence]:
@@ -109,27 +142,8 @@ def _of_matrices(model: Structure) -> Iterator[Evidence]:
         return
     speed = float(np.cbrt(size.prod() / len(model.coordinates)) * np.sqrt(stiff / heavy))
     density = float(np.einsum("ik,ik->k", moves, M @ moves).max() / size.prod())
-    text = f"speed of sound about {speed:.1e}, density at least {density:.1e} by mass, stiffness and size"
-    expected = f"{_range(SPEED)} m/s, {_range(DENSITY_OF_BOX)} kg/m^3"
-
-    def fits(units: UnitSystem) -> bool:
-        return _within(speed * units.metres, SPEED) and _within(density * _density(units), DENSITY_OF_BOX)
-
-    yield Evidence(text, "", expected, _systems(fits))
-
-
-def _systems(fits: Callable[[UnitSystem], bool]) -> tuple[str, ...]:
-    return tuple(name for name, units in SYSTEMS.items() if fits(units))
-
-
-def _density(units: UnitSystem) -> float:
-    """A unit of density [kg/m^3]."""
-    return units.kilograms / units.metres**3
-
-
-def _within(value: float, bounds: tuple[float, float]) -> bool:
-    return bounds[0] < value < bounds[1]
-
-
-def _range(bounds: tuple[float, float]) -> str:
-    return f"{bounds[0]:g} to {bounds[1]:g}"
+    numbers = [
+        Number("speed of sound about", speed, "m/s", SPEED),
+        Number("density at least", density, "kg/m^3", DENSITY_OF_BOX),
+    ]
+    yield Evidence(numbers, "by mass, stiffness and size")
