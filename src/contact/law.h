@@ -68,7 +68,7 @@ struct LinearPair {
   double slider[2] = {};  ///< w at rest
   /// dR/du_n of the distance R at which the limit mu N holds the slider.
   double reach() const { return friction_coefficient * normal_stiffness / tangential_stiffness; }
-  /// Of the two surfaces at u_n = 0 [m].
+  /// Of the two surfaces at u_n = 0 [length].
   double interference() const { return load / normal_stiffness; }
   bool rubs() const { return friction_coefficient > 0 || friction_limit > 0; }
 };
