@@ -47,7 +47,7 @@ def draw(modes: Sequence[Analysis], shifted: Mapping[str, Table] | None = None) 
         _limit_cycles(upper, lower, modes[0])
     for mode, colour in zip(modes, style.PALETTE):
         _peak(lower, mode, colour)
-    _close_up(upper, modes, "frequency_hz", (0.60, 0.34, 0.34, 0.46))
+    _close_up(upper, modes, "frequency_hz", (0.60, 0.26, 0.34, _below_asymptotes(upper, modes[0]) - 0.26))
     _close_up(lower, modes, "zeta", (0.72, 0.44, 0.26, 0.50))
     _finish(figure, upper, lower, modes)
     return figure
@@ -99,6 +99,14 @@ def _close_up(axes: Axes, modes: Sequence[Analysis], column: str, place: tuple[f
     inset.locator_params("x", nbins=2)  # amplitudes that differ little have long numbers
     inset.locator_params("y", nbins=4)
     inset.set_title("around the folds", fontsize=9.5)
+
+
+def _below_asymptotes(axes: Axes, mode: Analysis) -> float:
+    """Height, as a share of the axis, up to which a close-up is clear of the lines above the curve and their names."""
+    low, high = axes.get_ylim()
+    lines = [line.get_ydata()[0] for line in axes.lines if line.get_color() == style.GREY]
+    above = [(y - low) / (high - low) for y in lines if y >= np.mean(mode.columns["frequency_hz"])]
+    return float(min([0.80, *(share - 0.18 for share in above if share > 0.66)]))
 
 
 def _asymptotes(axes: Axes, mode: Analysis) -> None:
