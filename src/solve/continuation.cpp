@@ -17,7 +17,7 @@ constexpr double seen_angle = 0.05;   // [rad] in a longer one: it may hide a co
 constexpr int certain = 3;            // meetings with earlier points of the branch in a row
 constexpr double grid = 16;           // lengths of steps in every factor of two
 constexpr double at_the_end = 1e-9;   // relative: a branch that starts here starts at the end of its range
-constexpr double leash = 0.25;        // of the range, by which a branch may leave it where it began
+constexpr double leash = 1.0 / 3;     // of the range, by which a branch may leave it where it began
 constexpr double farthest = 4;        // times its end, or its end over it, at the most
 
 /// On a coarse grid: what a solution's last digits (of which no two numbers of ranks have the same) do to a

@@ -74,7 +74,7 @@ class Continuation:
         First guess; Newton runs at its parameter.
     stop : (low, high)
         The last point lies on the value the branch reaches. One that begins at an end may fold back over it and come
-        in again: it is followed a quarter of the range outside (a quarter of the end, or four times it, at the most),
+        in again: it is followed a third of the range outside (a quarter of the end, or four times it, at the most),
         and its points are kept.
     report_at : parameter values at which points are located
     upwards : the parameter grows at first
