@@ -16,6 +16,7 @@ SECONDS = 1.0  #: for the search for jumps
 TWICE = 3  #: consecutive points that retrace
 ABREAST = 6  #: corrections that bring an earlier piece abreast of a row
 APART = 1e-5  #: of a step: what lies nearer is one branch
+SHORT = 0.02  #: of a step: shorter ones beside it tell nothing of how it bends
 
 
 def values(run: Any) -> list[str]:
@@ -155,6 +156,8 @@ def _same_piece(run: Any, rows: Any, i: int, j: int, along: float) -> bool:
         if abs(missed) < APART:
             break
         along += missed
+        if not -1 < along < 2:  # it is nowhere abreast
+            return False
     off -= chord * missed
     return bool(np.linalg.norm(off) < APART * np.sqrt(square))
 
@@ -162,6 +165,8 @@ def _same_piece(run: Any, rows: Any, i: int, j: int, along: float) -> bool:
 def _between(states: list[Any], k: int, along: float) -> tuple[Any, ...]:
     """By the cubic through four states over the length of their chords, between the k-th and the next."""
     chords = [np.linalg.norm(b[0] - a[0]) for a, b in zip(states, states[1:])]
+    if min(chords) < SHORT * chords[k]:  # an event beside a point: the cubic would swing
+        return tuple(x + along * (y - x) for x, y in zip(states[k], states[k + 1]))
     at = np.r_[0, np.cumsum(chords)]
     t = at[k] + along * chords[k]
     shares = [np.prod([(t - at[m]) / (at[n] - at[m]) for m in range(4) if m != n]) for n in range(4)]
