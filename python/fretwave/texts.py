@@ -7,7 +7,16 @@ import json
 import os
 import re
 from collections.abc import Callable, Mapping, Sequence
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+
+
+def own_version() -> str:
+    """Of the package that is installed."""
+    try:
+        return version("fretwave")
+    except PackageNotFoundError:
+        return "not installed"
 
 
 def shortened(text: str, longest: int = 200) -> str:

@@ -106,6 +106,12 @@ def test_arguments_are_refused() -> None:
     assert lines == ["error: `fretwave doctor` takes no arguments\nfix: fretwave doctor"]
 
 
+def test_help_says_what_it_does() -> None:
+    lines: list[str] = []
+    assert doctor.main(["--help"], lines.append) == 0
+    assert "usage: fretwave doctor" in lines[0] and "PROBLEM" in lines[0]
+
+
 def test_report_on_this_machine(launch) -> None:
     """Where the tests run, nothing that fretwave needs is missing, mpirun included."""
     done = launch(1, "-m", "fretwave.commands.doctor")

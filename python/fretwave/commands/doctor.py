@@ -21,6 +21,12 @@ OLDEST_PETSC = (3, 18)
 #: Reference BLAS gives 2.4 GFlop/s on one core of 2020s hardware, an optimised one more than 20.
 SLOW_BLAS = 5.0
 SET_UP_AGAIN = "rm -rf .venv && .ci/setup"
+HELP = """usage: fretwave doctor [-h]
+
+Says what is installed (Python, PETSc, SLEPc, MUMPS, MPI, HDF5, BLAS, the core), whether it fits together,
+and of each PROBLEM what to do about it. Takes no arguments.
+
+exit codes: 0 fretwave can run, 1 it cannot"""
 
 
 @dataclass(frozen=True)
@@ -317,6 +323,9 @@ def check_runtime(scalar: object = None) -> None:
 
 def main(argv: Sequence[str] | None = None, write: Callable[[str], object] = print) -> int:
     """Print the report; 0 when fretwave can run, 1 otherwise."""
+    if argv and argv[0] in ("-h", "--help"):
+        write(HELP)
+        return 0
     if argv:
         write("error: `fretwave doctor` takes no arguments\nfix: fretwave doctor")
         return 2

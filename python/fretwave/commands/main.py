@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import EXIT_DONE, InputError
-from ..mpi.guard import guarded, install
-from ..texts import display, is_there
+from ..mpi.guard import guarded, install, launched_rank
+from ..texts import display, is_there, own_version
 from ..units import SYSTEMS
 from .parser import Parser
 from .world import world, world_if_any
@@ -29,10 +29,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _dispatch(arguments: list[str]) -> int:
+    if not arguments:
+        parser().print_help()
+        return EXIT_DONE
     if arguments[:1] == ["doctor"]:
         from . import doctor
 
-        return doctor.main(arguments[1:])
+        return doctor.main(arguments[1:], _said_once)
     if arguments[:1] == ["study"]:
         from . import study
 
@@ -43,6 +46,12 @@ def _dispatch(arguments: list[str]) -> int:
     options = parser().parse_args(_joined_petsc(arguments))
     code: int = options.command(options)
     return code
+
+
+def _said_once(text: str) -> None:
+    """Print on the first rank, also before MPI is started."""
+    if launched_rank() == 0:
+        print(text)
 
 
 def _joined_petsc(arguments: list[str]) -> list[str]:
@@ -60,6 +69,7 @@ def parser() -> argparse.ArgumentParser:
         description="Nonlinear modes, forced response and limit cycles of structures with friction contact.",
         epilog="exit codes: 0 done, 2 bad input, 3 did not converge (what was found is kept), 1 anything else",
     )
+    top.add_argument("--version", action="version", version=f"fretwave {own_version()}", help="print the version")
     commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True, parser_class=Parser)
     _add_run(commands)
     check = commands.add_parser("check", help="check a case and say what would run")

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import InputError
 from ..files.lock import FolderLock, check_free
 from ..files.whole import replace_text, told, write_all
-from ..texts import display
+from ..texts import display, own_version
 from .record import RECORD, read_record, write_record
 
 if TYPE_CHECKING:
@@ -172,8 +172,6 @@ __all__ = ["CASE_COPY", "RECORD", "RunFolder", "new_record", "peak_memory_mb", "
 
 def versions() -> dict[str, str]:
     """Versions of everything that decides the numbers."""
-    from importlib.metadata import PackageNotFoundError, version
-
     import h5py
     import numpy
     import petsc4py
@@ -181,12 +179,8 @@ def versions() -> dict[str, str]:
     from mpi4py import MPI
     from petsc4py import PETSc
 
-    try:
-        own = version("fretwave")
-    except PackageNotFoundError:
-        own = "not installed"
     return {
-        "fretwave": own,
+        "fretwave": own_version(),
         "python": platform.python_version(),
         "petsc": ".".join(str(part) for part in PETSc.Sys.getVersion()),
         "petsc4py": petsc4py.__version__,

@@ -1,0 +1,38 @@
+"""What a stranger types first: nothing, ``--version``, ``--help`` of each command; said once, whatever the ranks."""
+
+from __future__ import annotations
+
+from importlib.metadata import version
+
+import pytest
+from command_line import call
+
+pytestmark = pytest.mark.ranks(1)
+
+COMMANDS = ("run", "check", "sweep", "resume", "show", "plot", "view", "import", "study", "doctor")
+
+
+def test_nothing_is_the_help(capfd) -> None:
+    assert call() == 0
+    said = capfd.readouterr()
+    assert said.out.startswith("usage: fretwave") and said.err == ""
+    for name in COMMANDS:
+        assert f"\n    {name}" in said.out
+
+
+def test_version(capfd) -> None:
+    assert call("--version") == 0
+    assert capfd.readouterr().out == f"fretwave {version('fretwave')}\n"
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_has_its_help(name: str, capfd) -> None:
+    assert call(name, "--help") == 0
+    assert f"usage: fretwave {name}" in capfd.readouterr().out
+
+
+def test_two_ranks_say_it_once(launch) -> None:
+    for words, said in (([], "usage: fretwave "), (["--version"], "fretwave 0"), (["doctor", "--help"], "usage: ")):
+        done = launch(2, "-m", "fretwave", *words)
+        assert done.returncode == 0, done.stderr
+        assert done.stdout.count(said) == 1
