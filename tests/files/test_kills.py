@@ -172,7 +172,7 @@ def test_a_run_on_another_host_counts_as_long_as_it_gives_signs_of_life(tmp_path
 def test_told_to_end_it_says_how_to_go_on(known, tmp_path: Path, ranks: int, number: int) -> None:
     folder = tmp_path / "run"
     launcher = ["mpirun", "-n", str(ranks)] if ranks > 1 else []
-    command = [*launcher, sys.executable, "-m", "fretwave", *known["run"].start(folder)]
+    command = [*launcher, sys.executable, "-m", "fretwave", *known["run"].start(folder), "-v"]
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
     # As Python knows the environment: MPI of this process has added to it what confuses mpirun. A suite in the
     # background ignores SIGINT, and a run started so keeps to that.

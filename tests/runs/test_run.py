@@ -14,7 +14,6 @@ from tolerances import SOLVED
 
 from fretwave.case.load import load_case
 from fretwave.commands.main import main
-from fretwave.console import Console
 from fretwave.post.limit_cycles import limit_cycles
 from fretwave.run.order import in_order
 
@@ -154,15 +153,3 @@ def test_show_lists_the_branches(run: Path, capsys) -> None:
     text = capsys.readouterr().out
     for said in ("mode CNM", "mode EPMC", "forced", "stable", "unstable"):
         assert said in text
-
-
-def test_progress_on_a_terminal_keeps_the_notable_points(capsys) -> None:
-    lines: list[str] = []
-    console = Console(True, lines.append, terminal=True)
-    with console.progress("mode"):
-        console.point("mode 0 plain", "short", 0.1)
-        console.point("mode 1 fold", "short", 0.2, notable=True)
-    shown = capsys.readouterr().out
-    assert lines == ["mode 0 plain", "mode 1 fold"]
-    assert "mode 1 fold" in shown
-    assert "mode 0 plain" not in shown

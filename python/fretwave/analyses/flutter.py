@@ -26,7 +26,7 @@ from ..post.flutter_waves import STABLE, describe_waves, with_sign, words
 from ..results.results import AnalysisWriter
 from ..results.sweep_summary import FLUTTER_WAVES
 from .mode import point_line
-from .parts.branch import closure_note, continuation, finished_table, mode_problem, open_branch, points_of, record, tell
+from .parts.branch import continuation, finished_table, mode_problem, notable, open_branch, points_of, record, tell
 from .parts.context import AnalysisContext, Outcome
 from .parts.observed import named
 from .parts.rest import retained, start_mode
@@ -200,8 +200,7 @@ class _Wave:
         share = (self.number + math.log(row["amplitude"] / low) / math.log(high / low)) / self.count
         units = self.context.units
         line = point_line(f"{self.context.name} ND {with_sign(self.diameter):>3}", dict(row), units, units("length"))
-        notable = row["event"] not in ("", "start", "stop") or bool(closure_note(row, units))
-        self.context.console.point(line, line, share, notable)
+        self.context.console.point(line, line, share, notable(row, units))
 
 
 def _write(

@@ -18,7 +18,7 @@ from ..post.motion import complex_amplitudes
 from ..results.results import AnalysisWriter
 from ..results.sweep_summary import FORCED_LEVELS
 from ..texts import toml
-from .parts.branch import closure_note, error_text, finished_table, open_branch, points_of, record, tell
+from .parts.branch import closure_note, error_text, finished_table, notable, open_branch, points_of, record, tell
 from .parts.context import AnalysisContext, Outcome
 from .parts.excitation import Excitation, excitation_of
 from .parts.forced_peaks import curves_of, write_peaks
@@ -227,7 +227,7 @@ def _one_level(
             point_line(context.name, row, units, unit),
             _short(row, unit),
             share,
-            _notable(row["event"]) or bool(closure_note(row, units)),
+            notable(row, units),
         )
     tell(context, branch, f"{context.name}: level {analysis.levels[number]:g}")
     stopped = "" if branch.converged else f"level {analysis.levels[number]:g}: {branch.reason}"
@@ -253,10 +253,6 @@ def _bounded(excitation: Excitation, problem: HarmonicProblem, y: PETSc.Vec) -> 
         q = complex_amplitudes(problem.harmonics.labels, coefficients)[1]
         work = math.pi * abs(np.vdot(q, excitation.force()))
     return float((taken["contact"] + taken["damping"]) / excitation.context.comm.bcast(work))
-
-
-def _notable(event: str) -> bool:
-    return bool(event) and event not in ("start", "stop")
 
 
 def point_line(name: str, row: dict[str, Any], units: UnitSystem, unit: str) -> str:

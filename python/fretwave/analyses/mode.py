@@ -30,6 +30,7 @@ from .parts.branch import (
     finished_table,
     largest_error,
     mode_problem,
+    notable,
     open_branch,
     points_of,
     record,
@@ -174,7 +175,7 @@ def _follow(
                 point_line(context.name, row, units, unit),
                 _short(row, unit),
                 share,
-                bool(row["event"] or closure_note(row, units)),
+                notable(row, units),
             )
     tell(context, branch)
     outcome = _finish(context, writer, branch, start, problem)
@@ -219,7 +220,7 @@ def _finish(
     table = finished_table(writer)
     summary = summarise(context.name, table, context.units(unit_of(context.analysis.normalise))) if table else []
     summary += finish_wheel(context, writer, start) if context.case.wheel is not None else []
-    summary.append(f"linear systems: {branch.route}")
+    context.console.detail(f"{context.name}: linear systems: {branch.route}")
     events = json.dumps(limit_cycles(table)) if table else "[]"
     if table:
         keep_pairs(context, writer)

@@ -13,7 +13,7 @@ from ..errors import EXIT_DONE, InputError
 from ..mpi.guard import guarded, install, launched_rank
 from ..texts import display, is_there, own_version
 from ..units import SYSTEMS
-from .parser import Parser
+from .parser import Parser, add_shown
 from .world import world, world_if_any
 
 if TYPE_CHECKING:
@@ -81,6 +81,7 @@ def parser() -> argparse.ArgumentParser:
     resume = commands.add_parser("resume", help="go on with a run that was cut off, on any number of ranks")
     _add_folder(resume)
     _add_no_plots(resume)
+    add_shown(resume)
     resume.set_defaults(command=_resume)
     show = commands.add_parser("show", help="show the results of a run")
     _add_folder(show)
@@ -125,6 +126,7 @@ def _add_no_plots(command: argparse.ArgumentParser) -> None:
 
 def _add_doing(command: argparse.ArgumentParser, out: str) -> None:
     """Options of what computes: where to, and how."""
+    add_shown(command)
     command.add_argument("--out", type=Path, metavar="DIR", help=out)
     _add_no_plots(command)
     command.add_argument("--petsc", default="", metavar="OPTIONS", help='PETSc options: "-snes_rtol 1e-10"')
@@ -259,10 +261,10 @@ def _resume(options: argparse.Namespace) -> int:
         if "study" in record:
             from .study import resume_study
 
-            return resume_study(options.folder, record, comm)
+            return resume_study(options.folder, record, comm, options.shown)
         if "sweep" in record:
-            return resume_sweep(options.folder, record, comm, not options.no_plots)
-        return resume_run(options.folder, comm, not options.no_plots)
+            return resume_sweep(options.folder, record, comm, not options.no_plots, options.shown)
+        return resume_run(options.folder, comm, not options.no_plots, options.shown)
 
 
 def _check(options: argparse.Namespace) -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, NoReturn
 
+from ..console import Shown
 from ..errors import InputError
 from ..mpi.guard import launched_rank
 
@@ -23,3 +24,13 @@ class Parser(argparse.ArgumentParser):
     def _print_message(self, message: str, file: SupportsWrite[str] | None = None) -> None:
         if launched_rank() == 0:
             super()._print_message(message, file)
+
+
+def add_shown(command: argparse.ArgumentParser) -> None:
+    """Options of what computes: how much it prints."""
+    either = command.add_mutually_exclusive_group()
+    for names, shown, said in (
+        (("-q", "--quiet"), Shown.NOTHING, "print nothing but what went wrong"),
+        (("-v", "--verbose"), Shown.ALL, "print every point and what else is in run.log"),
+    ):
+        either.add_argument(*names, action="store_const", dest="shown", const=shown, default=Shown.SHORT, help=said)

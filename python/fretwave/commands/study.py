@@ -7,8 +7,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..console import Shown
 from ..run.study import REPEATS, run_study
-from .parser import Parser
+from .parser import Parser, add_shown
 from .world import world
 
 if TYPE_CHECKING:
@@ -25,11 +26,11 @@ def main(arguments: Sequence[str]) -> int:
         return run_study(options, arguments, comm)
 
 
-def resume_study(folder: Path, record: dict[str, Any], comm: MPI.Comm) -> int:
+def resume_study(folder: Path, record: dict[str, Any], comm: MPI.Comm, shown: Shown) -> int:
     """Go on with a study that was cut off; returns the exit code. Collective."""
     arguments = record["study"]["arguments"]
     options = _parser().parse_args(arguments)
-    options.case, options.out = Path(record["case"]["path"]), folder
+    options.case, options.out, options.shown = Path(record["case"]["path"]), folder, shown
     return run_study(options, arguments, comm, record)
 
 
@@ -61,4 +62,5 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--repeats", type=int, default=REPEATS, help="times each run is repeated (default 3)")
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder (default runs/<case>_study)")
+    add_shown(parser)
     return parser

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..case.load import changed_keys
-from ..console import Console
+from ..console import Console, Shown
 from ..errors import EXIT_DONE, FretwaveError, InputError, NotConverged
 from ..files.csv_table import write_rows
 from ..mpi import groups
@@ -52,7 +52,9 @@ def sweep_case(path: Path, options: RunOptions, plan: Plan, n_groups: int | None
     return _run_sweep(sweep, first, RunFolder(folder, record, first.text, comm.rank == 0), comm)
 
 
-def resume_sweep(folder: Path, record: dict[str, Any], comm: MPI.Comm, plots: bool = True) -> int:
+def resume_sweep(
+    folder: Path, record: dict[str, Any], comm: MPI.Comm, plots: bool = True, shown: Shown = Shown.SHORT
+) -> int:
     """Go on with the values of a sweep that are not done; returns the exit code. Collective.
 
     Raises
@@ -61,7 +63,7 @@ def resume_sweep(folder: Path, record: dict[str, Any], comm: MPI.Comm, plots: bo
         The case has changed since.
     """
     given, asked = record["case"], record["sweep"]
-    options = RunOptions.of_record(folder, record, plots)
+    options = RunOptions.of_record(folder, record, plots, shown)
     path = Path(given["path"])
     text = None if path.exists() else on_first_rank(comm, lambda: read_copy(folder, record))
     sweep = Sweep(Runner, path, Plan(asked["over"]), options, folder / "values", asked["groups"], text)
@@ -83,7 +85,7 @@ def resume_sweep(folder: Path, record: dict[str, Any], comm: MPI.Comm, plots: bo
 
 def _run_sweep(sweep: Sweep, first: Checked, folder: RunFolder, comm: MPI.Comm) -> int:
     """Run, put together, draw, and say what did not come to its end."""
-    console = Console(comm.rank == 0, folder.log)
+    console = Console(comm.rank == 0, folder.log, shown=sweep.options.shown)
     on_first_rank(comm, folder.check_free)
     folder.record["selected"] = first.analyses
     console.line(f"{first.name}{': ' * bool(first.title)}{first.title}")

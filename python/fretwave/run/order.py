@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..case.analysis import AnalysisSection
 from ..case.load import Case
+from ..console import Shown
 
 if TYPE_CHECKING:
     import argparse
@@ -24,6 +25,8 @@ class RunOptions:
         Analyses to run; empty for all.
     petsc : str
         PETSc options for every analysis.
+    shown : Shown
+        How much is printed.
     """
 
     out: Path | None = None
@@ -32,17 +35,18 @@ class RunOptions:
     quick: bool = False
     plots: bool = True
     petsc: str = ""
+    shown: Shown = Shown.SHORT
 
     @classmethod
     def of(cls, told: argparse.Namespace) -> RunOptions:
         """From the command line."""
-        return cls(told.out, told.overrides, told.only, told.quick, not told.no_plots, told.petsc)
+        return cls(told.out, told.overrides, told.only, told.quick, not told.no_plots, told.petsc, told.shown)
 
     @classmethod
-    def of_record(cls, folder: Path, record: Mapping[str, Any], plots: bool) -> RunOptions:
+    def of_record(cls, folder: Path, record: Mapping[str, Any], plots: bool, shown: Shown = Shown.SHORT) -> RunOptions:
         """From run.json, to go on with a run."""
         given = record["case"]
-        return cls(folder, given["overrides"], given["only"], given["quick"], plots, given["petsc"])
+        return cls(folder, given["overrides"], given["only"], given["quick"], plots, given["petsc"], shown)
 
     def given(self, path: Path, case: Case) -> dict[str, Any]:
         """How the case was given, for run.json."""

@@ -18,7 +18,7 @@ from ..case.load import Case, load_case
 from ..case.plugins import load_recorded
 from ..case.reduce import reduce_case
 from ..case.wheel import on_wheel, solver_room
-from ..console import Console
+from ..console import Console, Estimate, Shown, duration
 from ..errors import EXIT_DONE, InputError, NotConverged
 from ..mpi.guard import on_first_rank
 from ..mpi.interrupt import say_how_to_go_on
@@ -55,7 +55,7 @@ def run_case(path: Path, options: RunOptions, comm: MPI.Comm) -> int:
     return Runner(case, options, folder, record, comm).run()
 
 
-def resume_run(folder: Path, comm: MPI.Comm, plots: bool = True) -> int:
+def resume_run(folder: Path, comm: MPI.Comm, plots: bool = True, shown: Shown = Shown.SHORT) -> int:
     """Go on with a run that was cut off; returns the exit code. Collective.
 
     Raises
@@ -66,7 +66,7 @@ def resume_run(folder: Path, comm: MPI.Comm, plots: bool = True) -> int:
     from .. import _core  # noqa: F401
 
     case, record = on_first_rank(comm, lambda: reload_case(folder))
-    options = RunOptions.of_record(folder, record, plots)
+    options = RunOptions.of_record(folder, record, plots, shown)
     record["ranks"], record["status"] = comm.size, "running"
     return Runner(case, options, folder, record, comm, resuming=True).run()
 
@@ -76,7 +76,7 @@ def _nothing() -> None:
 
 
 class Runner:
-    """One run of some analyses of a case; `quiet` when it is part of another that speaks for it."""
+    """One run of some analyses of a case; `part` when it is one of a sweep, which speaks for it."""
 
     def __init__(
         self,
@@ -86,12 +86,13 @@ class Runner:
         record: dict[str, Any],
         comm: MPI.Comm,
         resuming: bool = False,
-        quiet: bool = False,
+        part: bool = False,
     ) -> None:
         self.case, self.options, self.comm, self.resuming = case, options, comm, resuming
         active = comm.rank == 0
         self.folder = RunFolder(folder, record, case.text, active, resuming)
-        self.console = Console(active, self.folder.log, quiet=quiet)
+        self.console = Console(active, self.folder.log, shown=Shown.NOTHING if part else options.shown)
+        self.part, self.time = part, Estimate()
         self.failures: list[NotConverged] = []
         self._basis: Callable[[], None] = _nothing
         if resuming:
@@ -108,7 +109,7 @@ class Runner:
         on_first_rank(self.comm, self.folder.start)
         self.folder.started = True
         self._write_basis()
-        if not self.console.quiet:
+        if not self.part:
             say_how_to_go_on(self.comm, self.folder.path)
 
     def run(self) -> int:
@@ -127,9 +128,11 @@ class Runner:
         self.folder.record["selected"] = names
         self._greet(names)
         self._reduce()
-        for name in names:
+        for number, name in enumerate(names, 1):
             if self.resuming and self._is_done(name):
                 continue
+            if len(names) > 1:
+                self.console.line(f"{name}: {number} of {len(names)} analyses")
             if name in sweeps:
                 self._sweep(name, sweeps[name])
             else:
@@ -168,7 +171,7 @@ class Runner:
         """For `fretwave view`: of a model with nodes, and not of the runs of a sweep. Collective."""
         full = self.case.structure.cut or self.case.structure
         path, size = self.folder.path / NAME, 8 * full.n_dof * reduction.size
-        if self.console.quiet or full.coordinates is None or (self.resuming and path.exists()):
+        if self.part or full.coordinates is None or (self.resuming and path.exists()):
             return
         if size > LARGEST:
             text = f"{size / 1e6:.0f} MB, more than {LARGEST / 1e6:.0f}"
@@ -263,7 +266,7 @@ class Runner:
                 outcome = Outcome(0, reason, False, goal=str(error.expected), advice=error.fix or "")
         entry = {"left_out": context.left_out, **context.entry}
         self._note(analysis.name, outcome, time.perf_counter() - began, entry)
-        if not self.console.quiet:
+        if not self.part:
             on_first_rank(self.comm, lambda: write_curve(self.folder.path, analysis.name))
         context.publish()  # last of all: from here on a resumed run leaves the analysis as it is
 
@@ -294,7 +297,7 @@ class Runner:
             self.failures.append(not_converged(name, outcome))
 
     def _say_left_out(self, names: Sequence[str]) -> None:
-        if self.console.quiet:
+        if self.part:
             return
         told = left_out_lines(self.case, names, self.folder.record["analyses"], self.options.plots)
         self.folder.record["left_out"] = told
@@ -306,6 +309,10 @@ class Runner:
         self.folder.record["peak_memory_mb"] = peak_memory_mb(self.comm)
         if self.options.plots and self.folder.started:
             on_first_rank(self.comm, lambda: plot(self.folder.path, self.console))
+        word, seconds = self.folder.record["status"], self.time.passed()
+        self.console.line(
+            f"{word} after {duration(seconds)}; `fretwave show {display(self.folder.path)}` lists the results"
+        )
         on_first_rank(self.comm, self.folder.close)
 
 

@@ -53,7 +53,7 @@ def run_study(
     worn = options.analysis in case.analyses.of(WearAnalysis)
     chosen = None if worn else _analysis(case, options.analysis)
     with StudyFolder(case, options, arguments, comm, record) as folder:
-        console = Console(comm.rank == 0, folder.log)
+        console = Console(comm.rank == 0, folder.log, shown=options.shown)
         if chosen is not None:
             return _study_mode(case, chosen, options, comm, console, folder)
         from .wear_study import study_wear

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 from ..case.checks import choose
 from ..case.load import Case, load_case
 from ..case.plugins import Plugin
+from ..console import Estimate, Shown
 from ..errors import CaseErrors, FretwaveError, InputError, NotConverged
 from ..mpi import groups
 from ..mpi.guard import on_first_rank
@@ -78,6 +79,7 @@ class Sweep:
     text: str | None = None
     where: str | None = None
     places: dict[str, str] = field(default_factory=dict)
+    _time: Estimate | None = None
 
     def check(self, comm: MPI.Comm) -> list[Checked]:
         """Load the case with every value, several at a time. Collective.
@@ -195,14 +197,15 @@ class Sweep:
         began, label = time.perf_counter(), self.plan.labels()[number]
         earlier = on_first_rank(group, lambda: self._record(number, run_id))
         if earlier is not None and earlier["status"] != "running":
-            say(group, f"{label}: already {earlier['status']}")
+            self._say(group, f"{label}: already {earlier['status']}")
             return None
+        self._time = self._time or Estimate(number / len(self.plan))  # others have taken the values before
         case = on_first_rank(group, lambda: self._case(number))
         overrides = [*self.options.overrides, *self.plan.overrides()[number]]
         options = replace(self.options, out=self.value_folder(number), overrides=overrides, plots=False)
         record = earlier or group.bcast(new_record(options.given(self.path, case), group.size))
         record.update({"part_of": run_id, "ranks": group.size, "status": "running"})
-        runner = self.runner(case, options, self.value_folder(number), record, group, earlier is not None, quiet=True)
+        runner = self.runner(case, options, self.value_folder(number), record, group, earlier is not None, part=True)
         try:
             runner.run()
             error: NotConverged | None = None
@@ -210,14 +213,14 @@ class Sweep:
             error = stopped
         word = "done" if error is None else f"stopped: {error.measured}"
         seconds, ranks = time.perf_counter() - began, counted(group.size, "rank")
-        say(group, f"{label}: {word} ({seconds:.1f} s, {ranks})")
+        left = self._time.left((number + 1) / len(self.plan)) if number + 1 < len(self.plan) else ""
+        self._say(group, f"{label}: {word} ({', '.join(filter(None, (f'{seconds:.1f} s', ranks, left)))})")
         return error
 
-
-def say(group: MPI.Comm, text: str) -> None:
-    """A line from a group, from its first rank."""
-    if group.rank == 0:
-        print(text, flush=True)
+    def _say(self, group: MPI.Comm, text: str) -> None:
+        """A line from a group, from its first rank."""
+        if group.rank == 0 and self.options.shown > Shown.NOTHING:
+            print(text, flush=True)
 
 
 def swept_names(case: Case) -> list[str]:

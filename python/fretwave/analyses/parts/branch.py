@@ -52,6 +52,11 @@ def closure_note(row: Mapping[str, Any], units: UnitSystem) -> str:
     return f"  note: a slider ends {unclosed:.1e} {units('length')} from where it began ({share})"
 
 
+def notable(row: Mapping[str, Any], units: UnitSystem) -> bool:
+    """Whether a point's line is printed, not only kept in run.log: its ends are in the summary."""
+    return row["event"] not in ("", "start", "stop") or bool(closure_note(row, units))
+
+
 def error_text(error: float) -> str:
     """What a point's line says of an estimated error; empty where there is none."""
     return f" +- {error:<7.1g}" if np.isfinite(error) else ""
@@ -160,7 +165,7 @@ def continuation(
         if go_on
         else RefiningContinuation(problem, problem.initial(ends[0]), **settings, accuracy=analysis.accuracy)
     )
-    refining.tell = lambda text: context.console.line(f"{name}: {text}")
+    refining.tell = lambda text: context.console.detail(f"{name}: {text}")
     return refining
 
 
@@ -199,7 +204,7 @@ def tell(context: AnalysisContext[HarmonicSection], branch: Continuation, name: 
     from ...solve.refining import RefiningContinuation
 
     name = name or context.name
-    lines = [f"started: {branch.started}"] if branch.started else []
+    lines, took = [f"started: {branch.started}"] if branch.started else [], ""
     if branch.repeated is not None:
         last = branch.repeated
         lines.append(
@@ -213,11 +218,12 @@ def tell(context: AnalysisContext[HarmonicSection], branch: Continuation, name: 
     elif branch.problem.errors_left_out:
         lines.append(f"errors are not estimated: {branch.problem.errors_left_out}")
     elif branch.problem.errors_wall_s:
-        lines.append(f"error estimates took {branch.problem.errors_wall_s:.2g} s")
+        took = f"error estimates took {branch.problem.errors_wall_s:.2g} s"
+        context.console.detail(f"{name}: {took}")
     for line in lines:
         context.console.line(f"{name}: {line}")
-    if lines:
-        context.entry.setdefault("branches", {})[name] = lines
+    if lines or took:
+        context.entry.setdefault("branches", {})[name] = [*lines, *([took] if took else [])]
     tell_fallbacks(context, branch)
 
 

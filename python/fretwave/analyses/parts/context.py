@@ -152,7 +152,7 @@ class AnalysisContext(Generic[Section]):
         """Say in one line what is left out and why."""
         self.left_out.extend(reasons)
         if self.left_out:
-            self.console.line(f"{self.name}: left out: {'; '.join(self.left_out)}")
+            self.console.detail(f"{self.name}: left out: {'; '.join(self.left_out)}")
 
     def writer(
         self,

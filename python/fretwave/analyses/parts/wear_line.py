@@ -212,7 +212,7 @@ class _Marcher:
             return
         units = self.context.units
         worn = " ".join(f"{row[f'worn_{number}']:.3e}" for number in range(1, len(self.faces) + 1))
-        self.context.console.line(
+        self.context.console.detail(
             f"{self.context.name} a {row['amplitude']:.4g} {units('length')}  {row['cycles']:8.4g} cycles"
             f"  f {row['frequency_hz']:9.6g} Hz  zeta {100 * row['zeta']:7.4f} %"
             f"  slip {100 * row['slip']:3.0f} %  open {100 * row['open']:3.0f} %"

@@ -1,0 +1,141 @@
+"""What is printed of a run: little that says something; run.log has every line, whatever is printed."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+from command_line import call
+
+from fretwave import console as module
+from fretwave.console import Console, Estimate, Shown, duration
+
+pytestmark = pytest.mark.ranks(1)
+
+CASE = Path(__file__).parents[2] / "cases" / "two_dof" / "case.toml"
+ARGUMENTS = ["run", CASE, "--quick", "--no-plots", "--only", "mode,flutter"]
+
+
+@pytest.fixture(scope="module")
+def printed(tmp_path_factory) -> dict[str, tuple[list[str], list[str]]]:
+    """Of each option what a run prints, and its run.log, without times."""
+    found = {}
+    for option in ("", "-q", "-v"):
+        folder = tmp_path_factory.mktemp("run")
+        capture = pytest.MonkeyPatch()
+        lines: list[str] = []
+        capture.setattr(module, "_print", lines.append)
+        assert call(*ARGUMENTS, *option.split(), "--out", folder) == 0
+        capture.undo()
+        found[option] = lines, (folder / "run.log").read_text().splitlines()
+    return found
+
+
+def test_verbose_prints_the_log(printed) -> None:
+    lines, log = printed["-v"]
+    assert lines == log and len(log) > 100
+
+
+def test_quiet_prints_nothing(printed) -> None:
+    assert printed["-q"][0] == []
+
+
+def test_the_log_is_the_same_whatever_is_printed(printed) -> None:
+    plain = [[re.sub(r"[-+\d.e ]+", "#", line) for line in log] for _, log in printed.values()]
+    assert plain[0] == plain[1] == plain[2]
+
+
+def test_the_short_form_has_what_happened(printed) -> None:
+    lines, log = printed[""]
+    assert set(lines) < set(log) and len(lines) < len(log) / 3
+    points = [line for line in lines if line.startswith(("mode  ", "flutter  "))]
+    words = ("fold", "report", "peak damping", "zero damping")
+    assert points == [line for line in log if line.startswith(("mode  ", "flutter  ")) and line.endswith(words)]
+    for said in ("mode: 1 of 2 analyses", "limit cycle at a = 0.137", "largest damping 3.703 %", "done after"):
+        assert any(said in line for line in lines), said
+
+
+def test_resume_and_sweep_are_quiet_too(tmp_path: Path, capfd) -> None:
+    folder = tmp_path / "sweep"
+    short = [
+        "--quick",
+        "--no-plots",
+        "--only",
+        "mode",
+        "--set",
+        "mode.amplitude=[0.02,0.03]",
+        "--set",
+        "mode.report_at=[]",
+    ]
+    assert call("sweep", CASE, *short, "--over", "mode.harmonics=3,5", "-q", "--out", folder) == 0
+    assert call("resume", folder, "-q", "--no-plots") == 0
+    assert capfd.readouterr().out == ""
+    assert call("resume", folder, "--no-plots") == 0
+    assert "harmonics = 3: already done" in capfd.readouterr().out
+
+
+def test_both_at_once_are_refused(capfd) -> None:
+    assert call(*ARGUMENTS, "-q", "-v") == 2
+    assert "not allowed with" in capfd.readouterr().err
+
+
+def points(console: Console) -> None:
+    with console.progress("mode"):
+        console.point("mode 0 plain", "a 1", 0.25)
+        console.point("mode 1 fold", "a 2", 0.5, notable=True)
+
+
+@pytest.mark.parametrize("shown", list(Shown))
+@pytest.mark.parametrize("terminal", [True, False])
+def test_points_that_stay(capsys, terminal: bool, shown: Shown) -> None:
+    lines: list[str] = []
+    points(Console(True, lines.append, terminal, shown))
+    said = capsys.readouterr().out
+    assert lines == ["mode 0 plain", "mode 1 fold"]
+    assert ("mode 1 fold" in said) == (shown > Shown.NOTHING)
+    assert ("mode 0 plain" in said) == (shown is Shown.ALL)
+
+
+def test_other_ranks_say_nothing(capsys) -> None:
+    lines: list[str] = []
+    points(Console(False, lines.append, True, Shown.ALL))
+    assert (capsys.readouterr().out, lines) == ("", [])
+
+
+class Clock:
+    now = 100.0
+
+    def perf_counter(self) -> float:
+        return self.now
+
+
+def test_time_that_is_left(monkeypatch) -> None:
+    clock = Clock()
+    monkeypatch.setattr(module, "time", clock)
+    estimate = Estimate()
+    assert estimate.left(0.2) == ""  # a run that goes on from here
+    clock.now += 30.0
+    assert estimate.left(0.21) == ""
+    assert estimate.left(0.4) == "about 1 min 30 s left"
+
+
+def test_long_analyses_say_how_far_they_are_more_and_more_seldom(monkeypatch, capsys) -> None:
+    clock = Clock()
+    monkeypatch.setattr(module, "time", clock)
+    console = Console(True, terminal=False)
+    with console.progress("mode"):
+        for second in range(12 * 3600):
+            console.point("a plain point", "a 1 m", second / (12 * 3600))
+            clock.now += 1.0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "mode: 0 % of the way after 30 s, a 1 m"
+    assert lines[-1] == "mode: 69 % of the way after 8 h 18 min, a 1 m, about 3 h 41 min left"
+    assert len(lines) == 18
+
+
+@pytest.mark.parametrize(
+    ("seconds", "said"), [(0.4, "0 s"), (59.7, "1 min 0 s"), (3599, "59 min 59 s"), (7500, "2 h 05 min")]
+)
+def test_durations(seconds: float, said: str) -> None:
+    assert duration(seconds) == said
