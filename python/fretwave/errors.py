@@ -8,6 +8,8 @@ EXIT_DONE = 0
 EXIT_OTHER = 1
 EXIT_BAD_INPUT = 2
 EXIT_NOT_CONVERGED = 3
+#: Told to end, by Ctrl-C or otherwise: as shells count SIGINT. Open MPI's mpirun answers 1 to its own Ctrl-C.
+EXIT_INTERRUPTED = 130
 #: Of a message: longer values are cut.
 LONGEST_LINE = 1000
 
@@ -120,4 +122,6 @@ class CaseErrors(InputError):
 
 def exit_code_of(error: BaseException) -> int:
     """The process exit code that belongs to an exception."""
+    if isinstance(error, KeyboardInterrupt):
+        return EXIT_INTERRUPTED
     return error.exit_code if isinstance(error, FretwaveError) else EXIT_OTHER

@@ -168,24 +168,55 @@ def test_a_run_on_another_host_counts_as_long_as_it_gives_signs_of_life(tmp_path
 # Told to end
 
 
-@pytest.mark.parametrize(("ranks", "number"), [(1, signal.SIGINT), (2, signal.SIGTERM)])
-def test_told_to_end_it_says_how_to_go_on(known, tmp_path: Path, ranks: int, number: int) -> None:
-    folder = tmp_path / "run"
+def told_to_end(arguments: list[str], ranks: int, number: int, after: str, all_ranks: bool = False) -> str:
+    """What a command says whose ranks, or mpirun, get a signal once it has printed a line with these words.
+
+    Its exit code is 130; that of Open MPI's mpirun is 1 when it is told itself, whatever its ranks answer.
+    """
     launcher = ["mpirun", "-n", str(ranks)] if ranks > 1 else []
-    command = [*launcher, sys.executable, "-m", "fretwave", *known["run"].start(folder), "-v"]
+    command = [*launcher, sys.executable, "-m", "fretwave", *arguments]
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
     # As Python knows the environment: MPI of this process has added to it what confuses mpirun. A suite in the
     # background ignores SIGINT, and a run started so keeps to that.
     heard = partial(signal.signal, number, signal.SIG_DFL)
     with subprocess.Popen(command, env={**os.environ}, preexec_fn=heard, **pipes) as process:  # type: ignore[call-overload]
         assert process.stdout is not None
-        for line in process.stdout:
-            if line.startswith("mode    3"):
-                break
-        process.send_signal(number)
+        assert any(after in line for line in process.stdout)
+        for told in children(process.pid) if all_ranks else [process.pid]:
+            os.kill(told, number)
         _, said = process.communicate(timeout=60)
-    assert process.returncode == 1
+    assert process.returncode == (1 if ranks > 1 and not all_ranks else 130), said
+    return said
+
+
+def children(process: int) -> list[int]:
+    return [int(text) for text in Path(f"/proc/{process}/task/{process}/children").read_text().split()]
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_ranks_that_hear_it_themselves_answer_130(known, tmp_path: Path, number: int) -> None:
+    """As launchers that pass signals on have it."""
+    said = told_to_end([*known["run"].start(tmp_path / "run"), "-v"], 2, number, "mode    3", all_ranks=True)
+    assert said.count(f"interrupted by {signal.Signals(number).name}") == 1
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_told_to_end_it_says_how_to_go_on(known, tmp_path: Path, ranks: int, number: int) -> None:
+    folder = tmp_path / "run"
+    said = told_to_end([*known["run"].start(folder), "-v"], ranks, number, "mode    3")
     assert said.count("interrupted by SIG") == 1 and f"`fretwave resume {display(folder)}`" in said
     assert "Traceback" not in said
     with open_results(folder / "results.h5") as file:
         assert len(file["mode/points/amplitude"]) > 3  # what it had told of
+
+
+@pytest.mark.parametrize("ranks", [1, 2])
+def test_a_resumed_run_and_a_sweep_told_to_end(known, whole, tmp_path: Path, ranks: int) -> None:
+    folder = tmp_path / "run"
+    assert child(known["run"].start(folder), Counting(whole["run"][1] // 8, False).install) == -signal.SIGKILL
+    said = told_to_end(["resume", str(folder), "-v"], ranks, signal.SIGINT, "newton")
+    assert f"finished points are kept in {display(folder)}" in said and "Traceback" not in said
+    folder = tmp_path / "sweep"
+    said = told_to_end(known["sweep"].start(folder), ranks, signal.SIGINT, ": done (")
+    assert f"finished points are kept in {display(folder)}" in said and "Traceback" not in said

@@ -8,14 +8,14 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..errors import EXIT_OTHER
+from ..errors import EXIT_INTERRUPTED
 from ..texts import display
 
 if TYPE_CHECKING:
     from mpi4py import MPI
 
 #: mpirun is given this long to read the last words [s]; it ends its ranks a second after it was told to end.
-LAST_WAIT = 0.4
+LAST_WAIT = 0.8
 #: The progress bar hides the cursor.
 SHOW_CURSOR = "\x1b[?25h"
 
@@ -26,7 +26,7 @@ def ending_in_words(comm: MPI.Comm) -> Iterator[None]:
     from .. import _core
 
     _say(comm, ": nothing has been written yet\n  fix:      start again")
-    _core.end_on_signals(EXIT_OTHER, LAST_WAIT if comm.size > 1 else 0.0)
+    _core.end_on_signals(EXIT_INTERRUPTED, LAST_WAIT if comm.size > 1 else 0.0)
     try:
         yield
     finally:
