@@ -13,7 +13,7 @@ from ..errors import EXIT_DONE, InputError
 from ..mpi.guard import guarded, install, launched_rank
 from ..texts import display, is_there, own_version
 from ..units import SYSTEMS
-from .parser import Parser, add_shown
+from .parser import Parser, add_force, add_shown
 from .world import world, world_if_any
 
 if TYPE_CHECKING:
@@ -67,7 +67,8 @@ def parser() -> argparse.ArgumentParser:
     top = Parser(
         prog="fretwave",
         description="Nonlinear modes, forced response and limit cycles of structures with friction contact.",
-        epilog="exit codes: 0 done, 2 bad input, 3 did not converge, 130 interrupted (what was found is kept), 1 anything else",
+        epilog="exit codes: 0 done, 2 bad input, 3 did not converge, 130 interrupted (what was found is kept),"
+        " 1 anything else",
     )
     top.add_argument("--version", action="version", version=f"fretwave {own_version()}", help="print the version")
     commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True, parser_class=Parser)
@@ -129,6 +130,7 @@ def _add_doing(command: argparse.ArgumentParser, out: str) -> None:
     add_shown(command)
     command.add_argument("--out", type=Path, metavar="DIR", help=out)
     _add_no_plots(command)
+    add_force(command)
     command.add_argument("--petsc", default="", metavar="OPTIONS", help='PETSc options: "-snes_rtol 1e-10"')
 
 

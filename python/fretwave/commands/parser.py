@@ -34,3 +34,9 @@ def add_shown(command: argparse.ArgumentParser) -> None:
         (("-v", "--verbose"), Shown.ALL, "print every point and what else is in run.log"),
     ):
         either.add_argument(*names, action="store_const", dest="shown", const=shown, default=Shown.SHORT, help=said)
+
+
+def add_force(command: argparse.ArgumentParser) -> None:
+    """Option of what writes into a folder."""
+    said = "replace results of another case in the folder (default: refused)"
+    command.add_argument("--force", action="store_true", help=said)

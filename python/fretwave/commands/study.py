@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..console import Shown
 from ..run.study import REPEATS, run_study
-from .parser import Parser, add_shown
+from .parser import Parser, add_force, add_shown
 from .world import world
 
 if TYPE_CHECKING:
@@ -63,4 +63,5 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--repeats", type=int, default=REPEATS, help="times each run is repeated (default 3)")
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder (default runs/<case>_study)")
     add_shown(parser)
+    add_force(parser)
     return parser

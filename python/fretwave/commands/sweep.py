@@ -49,7 +49,7 @@ def sweep_case(path: Path, options: RunOptions, plan: Plan, n_groups: int | None
     record = comm.bcast(new_record(given, comm.size) if comm.rank == 0 else None)
     digests = [one.digest for one in checked]
     record["sweep"] = {"over": dict(plan.over), "groups": n_groups, "digests": digests}
-    return _run_sweep(sweep, first, RunFolder(folder, record, first.text, comm.rank == 0), comm)
+    return _run_sweep(sweep, first, RunFolder(folder, record, first.text, comm.rank == 0, force=options.force), comm)
 
 
 def resume_sweep(

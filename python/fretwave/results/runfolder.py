@@ -17,6 +17,7 @@ from ..errors import InputError
 from ..files.lock import FolderLock, check_free
 from ..files.whole import replace_text, told, write_all
 from ..texts import display, own_version
+from .journal import Journal, unfinished
 from .record import RECORD, read_record, write_record
 
 if TYPE_CHECKING:
@@ -40,20 +41,50 @@ class RunFolder:
         True on rank 0.
     resumed : bool
         The folder is that of this very run: its log is continued.
+    force : bool
+        Replace results of another case; they are refused otherwise.
     """
 
-    def __init__(self, path: Path, record: dict[str, Any], case_text: str, active: bool, resumed: bool = False) -> None:
+    def __init__(
+        self,
+        path: Path,
+        record: dict[str, Any],
+        case_text: str,
+        active: bool,
+        resumed: bool = False,
+        force: bool = False,
+    ) -> None:
         self.path, self.record, self.active = path, record, active
         self._case_text = case_text
         self._waiting: list[str] = []
         self._log: Any = None
-        self._resumed = resumed
+        self._resumed, self._force = resumed, force
         self._lock = FolderLock(path)
         self.started = False
 
     def check_free(self) -> None:
-        """Refuse a folder that another run has. One rank only."""
+        """Refuse a folder that another run has, or results of another case. One rank only."""
         check_free(self.path)
+        other = None if self._force else self._other_case()
+        if other is not None:
+            raise InputError(
+                "this folder holds the results of another case",
+                display(self.path),
+                display(Path(other["path"])),
+                display(Path(self.record["case"]["path"])),
+                "choose another folder with --out, or replace the results with --force",
+            )
+
+    def _other_case(self) -> dict[str, Any] | None:
+        """How the case was given whose results are here, if it is another file with another content."""
+        own = self.record["case"]
+        if self._resumed or "part_of" in self.record or not (self.path / RECORD).exists():
+            return None
+        try:
+            earlier: dict[str, Any] = read_record(self.path)["case"]
+        except InputError:
+            return None  # a damaged record says nothing of its case
+        return None if earlier["path"] == own["path"] or earlier.get("digest") == own["digest"] else earlier
 
     def start(self) -> None:
         """Lock the folder, write the record and open the log; called when the first point is there.
@@ -72,7 +103,10 @@ class RunFolder:
             self.path.mkdir(parents=True, exist_ok=True)
         self._lock.take()
         self.started = True
-        self._keep_earlier()
+        if self._other_case() is None:
+            self._keep_earlier()
+        else:
+            self._forget_earlier()
         replace_text(self.path / CASE_COPY, self._case_text)
         self.record["case"]["text_checksum"] = text_checksum(self._case_text.encode("utf-8"))
         self.save()
@@ -89,6 +123,12 @@ class RunFolder:
             return  # of a damaged record nothing is kept: a new one is written
         kept = {name: entry for name, entry in earlier.items() if self._resumed or name not in self.record["selected"]}
         self.record["analyses"] = {**kept, **self.record["analyses"]}
+
+    def _forget_earlier(self) -> None:
+        """Remove results of another case; its tables and pictures stay until others take their names."""
+        (self.path / "results.h5").unlink(missing_ok=True)
+        for name in unfinished(self.path):
+            Journal(self.path, name).remove()
 
     def log(self, line: str) -> None:
         """One line of run.log, kept back until the run starts."""

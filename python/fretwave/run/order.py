@@ -27,6 +27,8 @@ class RunOptions:
         PETSc options for every analysis.
     shown : Shown
         How much is printed.
+    force : bool
+        Replace results of another case in the folder.
     """
 
     out: Path | None = None
@@ -36,11 +38,14 @@ class RunOptions:
     plots: bool = True
     petsc: str = ""
     shown: Shown = Shown.SHORT
+    force: bool = False
 
     @classmethod
     def of(cls, told: argparse.Namespace) -> RunOptions:
         """From the command line."""
-        return cls(told.out, told.overrides, told.only, told.quick, not told.no_plots, told.petsc, told.shown)
+        return cls(
+            told.out, told.overrides, told.only, told.quick, not told.no_plots, told.petsc, told.shown, told.force
+        )
 
     @classmethod
     def of_record(cls, folder: Path, record: Mapping[str, Any], plots: bool, shown: Shown = Shown.SHORT) -> RunOptions:

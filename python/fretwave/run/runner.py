@@ -90,7 +90,7 @@ class Runner:
     ) -> None:
         self.case, self.options, self.comm, self.resuming = case, options, comm, resuming
         active = comm.rank == 0
-        self.folder = RunFolder(folder, record, case.text, active, resuming)
+        self.folder = RunFolder(folder, record, case.text, active, resuming, options.force)
         self.console = Console(active, self.folder.log, shown=Shown.NOTHING if part else options.shown)
         self.part, self.time = part, Estimate()
         self.failures: list[NotConverged] = []

@@ -61,7 +61,7 @@ class StudyFolder:
             _check_unchanged(self.path, case, record)
         record.update(status="running", ranks=comm.size)
         self.record = record
-        self._folder = RunFolder(self.path, record, case.text, comm.rank == 0, resumed)
+        self._folder = RunFolder(self.path, record, case.text, comm.rank == 0, resumed, options.force)
         self._kept = Kept(self.path / ".runs", str(record["run_id"]))
         on_first_rank(comm, self._folder.check_free)
 
