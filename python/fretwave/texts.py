@@ -10,6 +10,21 @@ from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+#: Keys that papers write as symbols, in small letters without their underscore; the first that is known is meant.
+SYMBOLS = {
+    **{"m": ("M",), "k": ("K",), "c": ("C",), "alpha": ("mass_damping",), "beta": ("stiffness_damping",)},
+    **{"kn": ("normal_stiffness",), "kt": ("tangential_stiffness",), "k3": ("cubic_stiffness",)},
+    **{
+        "n0": ("normal_load",),
+        "fn": ("normal_load",),
+        "g0": ("gap",),
+        "mu": ("friction_coefficient", "friction_limit"),
+    },
+    **{"mun": ("friction_limit",), "mun0": ("friction_limit",), "eps": ("regularisation_velocity",)},
+    **{"kw": ("coefficient",), "nh": ("harmonics",), "nt": ("samples",), "zeta": ("damping",)},
+    **{"nd": ("nodal_diameter", "nodal_diameters"), "eo": ("engine_order",)},
+}
+
 
 def own_version() -> str:
     """Of the package that is installed."""
@@ -30,8 +45,10 @@ def counted(number: int, word: str) -> str:
 
 
 def nearest(word: str, known: Sequence[str], say: Callable[[str], str] = "did you mean `{}`?".format) -> str | None:
-    """A fix line with the nearest known word (one it begins, or one of like letters), None when nothing is near."""
-    begun = [other for other in known if len(word) > 1 and other.startswith(word)]
+    """A fix line with the nearest known word (its symbol, its begin, like letters), None when nothing is near."""
+    symbol = word.lower().replace("_", "")
+    meant = [other for other in SYMBOLS.get(symbol, ()) if other in known]
+    begun = meant or [other for other in known if len(word) > 1 and other.startswith(word)]
     found = begun or difflib.get_close_matches(word, known, n=1, cutoff=0.65)
     return say(found[0]) if found else None
 

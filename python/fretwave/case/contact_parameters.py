@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, Optional
 
 import numpy as np
 import numpy.typing as npt
@@ -73,10 +73,11 @@ def parameters_of(
     per_area = (
         [] if areas is None else [name + PER_AREA for name, p in known.items() if quantity(p.unit).startswith("force")]
     )
-    before = len(found)
+    before, meant = len(found), set[Optional[str]]()
     for key in section.model_extra or {}:
         if key not in known and key not in per_area:
-            found.append(_unknown_parameter(source, (*path, key), section.law, [*known, *per_area]))
+            found.append(_unknown_parameter(source, (*path, key), section.law, known, per_area))
+            meant.add(nearest(key, [*known], str))
     n_pairs = given.n_pairs if given and section.pairs is None else len(section.pairs or [])
     extra = section.model_extra or {}
     values: dict[str, float | Array | None] = {}
@@ -87,6 +88,8 @@ def parameters_of(
                 found.append(InputError(f"'{name}' is given twice, once per area", where, fix=fix))
             value = _value(source, (*path, name + PER_AREA), parameter, n_pairs, found)
             values[name] = None if value is None else value * areas
+        elif name in meant and name not in extra:
+            values[name] = None  # one message is enough
         elif given and name not in extra and name in given.parameters:
             values[name] = _plain(given.parameters[name])
         else:
@@ -98,14 +101,18 @@ def _plain(value: npt.ArrayLike) -> float | Array:
     return float(np.asarray(value).item()) if np.ndim(value) == 0 else np.asarray(value, dtype=float)
 
 
-def _unknown_parameter(source: Source, path: tuple[Any, ...], law: str, known: Sequence[str]) -> InputError:
-    keys = [*ContactSection.model_fields, *known]
+def _unknown_parameter(
+    source: Source, path: tuple[Any, ...], law: str, known: Mapping[str, ParameterInfo], per_area: Sequence[str]
+) -> InputError:
+    own = [*known, *per_area]
+    near = nearest(str(path[-1]), [*ContactSection.model_fields, *own], str)
+    said = f" It is {known[near].doc} [{source.units(known[near].unit)}]" if near is not None and near in known else ""
     return InputError(
         f"unknown key '{path[-1]}' in {source.name(path[:-1])}",
         where=source.where(path),
         measured=f"{path[-1]} = {toml(at(source.data, path))}",
-        expected=f"a parameter of {law} ({', '.join(known)}) or one of {', '.join(ContactSection.model_fields)}",
-        fix=nearest(str(path[-1]), keys) or "remove the key",
+        expected=f"a parameter of {law} ({', '.join(own)}) or one of {', '.join(ContactSection.model_fields)}",
+        fix=f"did you mean `{near}`?{said}" if near else "remove the key",
     )
 
 
