@@ -51,7 +51,7 @@ def test_parameter_of_a_law(law, symbol, long, said, tmp_path: Path, capfd) -> N
     assert call("check", case_with(tmp_path, law, long, symbol)) == 2
     told = capfd.readouterr().err
     assert f"unknown key '{symbol}' in contact.damper" in told
-    assert re.search(rf"fix: +did you mean `{long}`\? It is {re.escape(said)}", told), told
+    assert re.search(rf"fix: +did you mean `{long}`\? \({re.escape(said)}", told), told
     assert told.count("error: ") == 1 and "is missing" not in told and "2. " not in told
 
 

@@ -82,6 +82,42 @@ def test_plans() -> None:
     assert len(Plan({"a": [1, 2, 3], "b": [True, False]})) == 6
 
 
+@pytest.mark.parametrize(
+    ("text", "values"),
+    [
+        ("1:4", [1, 2, 3, 4]),
+        ("3:-1", [3, 2, 1, 0, -1]),
+        ("7:7", [7]),
+        ("1:3,9,-5:-4", [1, 2, 3, 9, -5, -4]),
+        ("0.1:0.5:n=5", [0.1, 0.2, 0.3, 0.4, 0.5]),
+        ("1e-3:.1:log=3", [0.001, 0.01, 0.1]),
+        ("100:1:log=3", [100.0, 10.0, 1.0]),
+        ("a.npz:K,2:3", ["a.npz:K", 2, 3]),
+    ],
+)
+def test_ranges(text: str, values: list) -> None:
+    found = plan_of([f"key={text}"]).over["key"]
+    assert found == values and [type(value) for value in found] == [type(value) for value in values]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("0.1:0.5", "not whole, without their count"),
+        ("0.1:0.5:5", "ends in ':5'"),
+        ("1:10:step=2", "ends in ':step=2'"),
+        ("1:10:n=1", "2 to 100000 values"),
+        ("0:10:log=3", "not positive"),
+        ("1:999999", "999999 values"),
+        ("1:3,2", "has the value 2 twice"),
+    ],
+)
+def test_wrong_ranges(text: str, said: str) -> None:
+    with pytest.raises(InputError) as found:
+        plan_of([f"key={text}"])
+    assert said in str(found.value) and f"--over key={text}" in str(found.value)
+
+
 def test_problems_of_values_can_be_sent_between_ranks(case: Path) -> None:
     import pickle
 

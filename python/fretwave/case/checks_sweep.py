@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 from ..post.grid import value_text
 
 
@@ -13,5 +15,5 @@ def complaint(values: object) -> tuple[str, str] | None:
     texts = [value_text(value) for value in values]
     if any(isinstance(value, dict) for value in values):
         return "has a table among the values", expected
-    twice = [text for text in texts if texts.count(text) > 1]
+    twice = [text for text, count in Counter(texts).items() if count > 1]
     return (f"has the value {twice[0]} twice", expected) if twice else None

@@ -106,7 +106,7 @@ def _unknown_parameter(
 ) -> InputError:
     own = [*known, *per_area]
     near = nearest(str(path[-1]), [*ContactSection.model_fields, *own], str)
-    said = f" It is {known[near].doc} [{source.units(known[near].unit)}]" if near is not None and near in known else ""
+    said = f" ({known[near].doc} [{source.units(known[near].unit)}])" if near is not None and near in known else ""
     return InputError(
         f"unknown key '{path[-1]}' in {source.name(path[:-1])}",
         where=source.where(path),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -12,7 +13,10 @@ from ..post.grid import Plan, value_text
 
 
 def plan_of(texts: Sequence[str]) -> Plan:
-    """The plan of ``--over KEY=v1,v2,...``.
+    """The plan of ``--over KEY=v1,v2,...``; a value may be a range.
+
+    ``1:200`` are the whole numbers from 1 to 200, ``0.1:0.5:n=5`` five numbers with equal steps between them,
+    ``1:100:log=3`` three with equal ratios; first and last are among them.
 
     Raises
     ------
@@ -48,11 +52,51 @@ def _wrong(text: str, what: str, expected: str) -> InputError:
 
 
 def _listed(text: str, whole: str) -> list[Any]:
-    """Values between commas: TOML, or plain words."""
+    """Values between commas: TOML, or plain words and ranges."""
     try:
         return list(parse_value(f"[{text}]"))
     except TomlError:
         try:
-            return [parse_value(part) for part in text.split(",")]
+            return [value for part in text.split(",") for value in _one_or_range(part.strip(), whole)]
         except TomlError as error:
             raise _wrong(whole, f"has a value that is not TOML ({error})", "numbers, words or arrays") from None
+
+
+_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+_RANGE = re.compile(rf"({_NUMBER}):({_NUMBER})(?::(.*))?")
+_RANGES = "FIRST:LAST of whole numbers, FIRST:LAST:n=COUNT (equal steps) or FIRST:LAST:log=COUNT (equal ratios)"
+#: More values are a slip of the pen.
+MOST = 100_000
+
+
+def _one_or_range(text: str, whole: str) -> list[Any]:
+    found = _RANGE.fullmatch(text)
+    if found is None:
+        return [parse_value(text)]
+    first, last, how = found.groups()
+    if how is None:
+        return _whole_numbers(first, last, whole)
+    kind, _, count = how.partition("=")
+    if kind not in ("n", "log") or not re.fullmatch(r"\d{1,9}", count) or not 2 <= int(count) <= MOST:
+        raise _wrong(whole, f"has a range that ends in ':{how}'", f"{_RANGES}, 2 to {MOST} values")
+    if kind == "log" and min(float(first), float(last)) <= 0.0:
+        raise _wrong(whole, "has equal ratios between numbers that are not positive", "FIRST and LAST above zero")
+    return _between(float(first), float(last), int(count), kind == "log")
+
+
+def _whole_numbers(first: str, last: str, whole: str) -> list[Any]:
+    """One by one, up or down."""
+    if not all(re.fullmatch(r"[+-]?\d{1,15}", text) for text in (first, last)):
+        raise _wrong(whole, "has a range between numbers that are not whole, without their count", _RANGES)
+    low, high = int(first), int(last)
+    if abs(high - low) >= MOST:
+        raise _wrong(whole, f"has a range of {abs(high - low) + 1} values", f"at most {MOST}")
+    step = 1 if high >= low else -1
+    return list(range(low, high + step, step))
+
+
+def _between(first: float, last: float, count: int, ratios: bool) -> list[float]:
+    """Rounded where only the last bits say more: 0.1 + 2 * 0.1 is 0.3."""
+    shares = [k / (count - 1) for k in range(1, count - 1)]
+    steps = [first * (last / first) ** share if ratios else first + (last - first) * share for share in shares]
+    return [first, *(float(f"{value:.14g}") for value in steps), last]
