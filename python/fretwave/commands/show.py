@@ -11,7 +11,7 @@ import numpy as np
 
 from ..console import on_terminal
 from ..files.lock import is_taken
-from ..results.file import open_results, unit_of_amplitudes
+from ..results.file import OVERRIDES, open_results, unit_of_amplitudes
 from ..results.record import RECORD, read_record
 from ..texts import counted, display
 from ..units import UnitSystem, units_of
@@ -43,6 +43,7 @@ def show_run(folder: Path) -> None:
         title = str(file.attrs.get("title", ""))
         names = [name for name in _in_order(folder, list(file)) if "type" in file[name].attrs]
         rows = [describe(name, file[name]) for name in names]
+        changed = {name: str(file[name].attrs.get(OVERRIDES, "")) for name in names}
         notes = [note for name in names for note in _notes(name, file[name])]
     for line in _heading(folder, title):
         print(line)
@@ -50,8 +51,15 @@ def show_run(folder: Path) -> None:
         _print_rich(rows)
     else:
         _print_plain([HEADINGS, *rows])
-    for note in notes:
+    for note in [*_overridden(changed), *notes]:
         print(note)
+
+
+def _overridden(changed: Mapping[str, str]) -> list[str]:
+    """What was not as in the case file; said once where it is the same for all analyses."""
+    if len(changed) > 1 and len(set(changed.values())) == 1:
+        changed = {"all": next(iter(changed.values()))}
+    return [f"{name}: with {text}" for name, text in changed.items() if text]
 
 
 def _show_study(folder: Path, record: Mapping[str, Any]) -> None:

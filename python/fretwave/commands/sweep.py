@@ -15,6 +15,7 @@ from ..mpi import groups
 from ..mpi.guard import on_first_rank
 from ..mpi.interrupt import say_how_to_go_on
 from ..post.grid import Plan
+from ..results.file import OVERRIDES
 from ..results.runfolder import CASE_COPY, RunFolder, new_record, peak_memory_mb, read_copy
 from ..results.sweep_summary import landmarks, summary_of
 from ..results.sweeps import amplitude_unit, summary_headings, write_sweep
@@ -130,6 +131,7 @@ def _write(
         if branches:
             complete = len(branches) == len(sweep.plan) and all(b.attributes["status"] == "done" for b in branches)
             attributes = {"run_id": run_id, "status": "done" if complete else "stopped", "reason": ""}
+            attributes[OVERRIDES] = sweep.options.changing(name, first.analyses)
             rows = write_sweep(folder.path, name, name, sweep.plan, branches, attributes, first.title)
             summary += [{"analysis": name, **row} for row in rows]
             kind = str(branches[0].attributes["type"])

@@ -22,6 +22,9 @@ if TYPE_CHECKING:
     import h5py
     import numpy.typing as npt
 
+#: Attribute of an analysis: what the command line changed of the case, as it was typed.
+OVERRIDES = "command_line"
+
 
 class NewResults:
     """results.h5 as it will be, beside the present one and without its group `name`.

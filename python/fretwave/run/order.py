@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import shlex
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -53,11 +54,24 @@ class RunOptions:
         given = record["case"]
         return cls(folder, given["overrides"], given["only"], given["quick"], plots, given["petsc"], shown)
 
+    def changing(self, name: str, analyses: Collection[str]) -> str:
+        """What was said on the command line that changes one analysis of these, as it is typed; for `show`."""
+        of_others = [override for override in self.overrides if _addressed(override) in {*analyses} - {name}]
+        words = ["--quick"] if self.quick else []
+        words += [f"--set {shlex.quote(override)}" for override in self.overrides if override not in of_others]
+        return " ".join([*words, *([f"--petsc {shlex.quote(self.petsc)}"] if self.petsc else [])])
+
     def given(self, path: Path, case: Case) -> dict[str, Any]:
         """How the case was given, for run.json."""
         told = {key: getattr(self, key) for key in ("overrides", "quick", "only", "petsc")}
         brought = {"plugins": [plugin.plain() for plugin in case.analyses.plugins]} if case.analyses.plugins else {}
         return {"path": str(path.resolve()), **told, "digest": case.digest, "resolved": case.resolved, **brought}
+
+
+def _addressed(override: str) -> str:
+    """Name of an analysis, if an override is of one's key."""
+    parts = override.partition("=")[0].strip().split(".")
+    return parts[1] if parts[0] == "analysis" and len(parts) > 1 else parts[0]
 
 
 def in_order(case: Case, names: Sequence[str]) -> list[str]:

@@ -24,6 +24,7 @@ from ..mpi.guard import on_first_rank
 from ..mpi.interrupt import say_how_to_go_on
 from ..mpi.petsc_options import AnalysisOptions
 from ..results.basis_file import LARGEST, NAME, basis_of
+from ..results.file import OVERRIDES
 from ..results.journal import Journal
 from ..results.reader import write_curve
 from ..results.results import has_results, open_results
@@ -257,7 +258,10 @@ class Runner:
                 self.console,
                 resuming=self._is_begun(analysis.name),
                 before_first=before_first,
-                attributes=described(analysis, self.case, self.folder.record["run_id"]),
+                attributes={
+                    **described(analysis, self.case, self.folder.record["run_id"]),
+                    OVERRIDES: self.options.changing(analysis.name, self.case.analyses),
+                },
             )
             try:
                 outcome = analysis.run(context)

@@ -13,6 +13,7 @@ from ..case.load import Case
 from ..case.toml.source import Source
 from ..console import Console
 from ..mpi.guard import on_first_rank
+from ..results.file import OVERRIDES
 from ..results.runfolder import RunFolder
 from ..results.sweep_summary import landmarks, summary_of
 from ..results.sweeps import amplitude_unit, write_sweep
@@ -67,6 +68,8 @@ def run_sweep(sweep: Sweep, name: str, comm: MPI.Comm, console: Console, folder:
         reason = "; ".join(f"{labels[k]}: {outcomes[k]['reason']}" for k in bad) or "all values done"
         if branches:
             attributes = {"run_id": run_id, "status": "stopped" if bad else "done", "reason": reason}
+            typed = replace(sweep.options, overrides=[o for o in sweep.options.overrides if o not in sweep.places])
+            attributes[OVERRIDES] = typed.changing(of, typed.only)
             summary = folder.path / f"{name}_summary.csv"
             rows = write_sweep(folder.path, name, of, sweep.plan, branches, attributes, title, summary)
         sweep.forget_others()
