@@ -72,6 +72,9 @@ def parser() -> argparse.ArgumentParser:
     )
     top.add_argument("--version", action="version", version=f"fretwave {own_version()}", help="print the version")
     commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True, parser_class=Parser)
+    init = commands.add_parser("init", help="write a small case with comments to begin with")
+    init.add_argument("folder", type=Path, metavar="FOLDER", nargs="?", default=Path(), help="for its case.toml (here)")
+    init.set_defaults(command=_init)
     _add_run(commands)
     check = commands.add_parser("check", help="check a case and say what would run")
     _add_case(check, optional=True)
@@ -224,6 +227,15 @@ def _run_folder(path: Path) -> Path:
     if is_there(path) and not path.is_dir():
         raise InputError("this is a file, not the folder of a run", display(path), fix="give the folder it is in")
     return path
+
+
+def _init(options: argparse.Namespace) -> int:
+    from .init import write_template
+
+    if launched_rank() == 0:
+        path = display(write_template(options.folder))
+        print(f"written: {path}\nnext: `fretwave check {path}`, then `fretwave run {path}`")
+    return EXIT_DONE
 
 
 def _run(options: argparse.Namespace) -> int:
