@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -54,6 +56,18 @@ def test_the_short_form_has_what_happened(printed) -> None:
     assert points == [line for line in log if line.startswith(("mode  ", "flutter  ")) and line.endswith(words)]
     for said in ("mode: 1 of 2 analyses", "limit cycle at a = 0.137", "largest damping 3.703 %", "done after"):
         assert any(said in line for line in lines), said
+
+
+def test_a_reader_who_leaves_is_told_in_words(tmp_path: Path) -> None:
+    """`fretwave run ... -v | head -1`: it ended in PETSc's report of a fault."""
+    command = [sys.executable, "-m", "fretwave", *map(str, ARGUMENTS), "-v", "--out", str(tmp_path / "run")]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    assert process.stdout is not None and process.stderr is not None
+    lines = [process.stdout.readline() for _ in range(6)]
+    process.stdout.close()
+    said = process.stderr.read()
+    assert process.wait(timeout=60) == 1 and "nobody reads the output any more" in said
+    assert "PETSC ERROR" not in said and all(lines)
 
 
 def test_resume_and_sweep_are_quiet_too(tmp_path: Path, capfd) -> None:

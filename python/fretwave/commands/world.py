@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from typing import Any
 
 
@@ -16,6 +17,7 @@ def world() -> Any:
     check_room()
     from .. import _core  # noqa: F401
 
+    signal.signal(signal.SIGPIPE, signal.SIG_IGN)  # PETSc takes it for a fault; Python then raises BrokenPipeError
     return MPI.COMM_WORLD
 
 
