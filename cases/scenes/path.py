@@ -16,6 +16,7 @@ SECONDS = 1.0  #: for the search for jumps
 TWICE = 3  #: consecutive points that retrace
 ABREAST = 6  #: corrections that bring an earlier piece abreast of a row
 APART = 1e-5  #: of a step: what lies nearer is one branch
+FAR = 100  #: steps off, at which nothing was solved
 SHORT = 0.02  #: of a step: shorter ones beside it tell nothing of how it bends
 
 
@@ -156,7 +157,7 @@ def _same_piece(run: Any, rows: Any, i: int, j: int, along: float) -> bool:
         if abs(missed) < APART:
             break
         along += missed
-        if not -1 < along < 2:  # it is nowhere abreast
+        if not abs(along) < FAR:  # it is nowhere abreast
             return False
     off -= chord * missed
     return bool(np.linalg.norm(off) < APART * np.sqrt(square))

@@ -11,7 +11,10 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from enum import IntEnum
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rich.progress import Progress
 
 #: Where nobody sees a bar, how far an analysis is is said after so long, then whenever that much more time has passed.
 FIRST_WORD, LATER = 30.0, 1.5
@@ -154,7 +157,7 @@ class _Words:
 class _Bar:
     """The same beside a bar of `rich`."""
 
-    def __init__(self, progress: Any, name: str) -> None:
+    def __init__(self, progress: Progress, name: str) -> None:
         self.progress, self.estimate = progress, Estimate()
         self.task = progress.add_task(name, total=1.0, shown="", left="")
 

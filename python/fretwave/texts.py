@@ -10,17 +10,9 @@ from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-#: Keys that papers write as symbols, in small letters without their underscore; the first that is known is meant.
+#: Keys that papers write as symbols, in small letters without their underscore. Laws say theirs themselves.
 SYMBOLS = {
     **{"m": ("M",), "k": ("K",), "c": ("C",), "alpha": ("mass_damping",), "beta": ("stiffness_damping",)},
-    **{"kn": ("normal_stiffness",), "kt": ("tangential_stiffness",), "k3": ("cubic_stiffness",)},
-    **{
-        "n0": ("normal_load",),
-        "fn": ("normal_load",),
-        "g0": ("gap",),
-        "mu": ("friction_coefficient", "friction_limit"),
-    },
-    **{"mun": ("friction_limit",), "mun0": ("friction_limit",), "eps": ("regularisation_velocity",)},
     **{"kw": ("coefficient",), "nh": ("harmonics",), "nt": ("samples",), "zeta": ("damping",)},
     **{"nd": ("nodal_diameter", "nodal_diameters"), "eo": ("engine_order",)},
 }

@@ -211,12 +211,11 @@ def test_told_to_end_it_says_how_to_go_on(known, tmp_path: Path, ranks: int, num
         assert len(file["mode/points/amplitude"]) > 3  # what it had told of
 
 
-@pytest.mark.parametrize("ranks", [1, 2])
-def test_a_resumed_run_and_a_sweep_told_to_end(known, whole, tmp_path: Path, ranks: int) -> None:
+def test_a_resumed_run_and_a_sweep_told_to_end(known, whole, tmp_path: Path) -> None:
     folder = tmp_path / "run"
     assert child(known["run"].start(folder), Counting(whole["run"][1] // 8, False).install) == -signal.SIGKILL
-    said = told_to_end(["resume", str(folder), "-v"], ranks, signal.SIGINT, "newton")
+    said = told_to_end(["resume", str(folder), "-v"], 1, signal.SIGINT, "newton")
     assert f"finished points are kept in {display(folder)}" in said and "Traceback" not in said
     folder = tmp_path / "sweep"
-    said = told_to_end(known["sweep"].start(folder), ranks, signal.SIGINT, ": done (")
+    said = told_to_end(known["sweep"].start(folder), 1, signal.SIGINT, ": done (")
     assert f"finished points are kept in {display(folder)}" in said and "Traceback" not in said

@@ -10,6 +10,8 @@ import h5py
 import pytest
 from command_line import call
 
+from fretwave.texts import display
+
 pytestmark = pytest.mark.ranks(1)
 
 CASE = Path(__file__).parents[2] / "cases" / "two_dof" / "case.toml"
@@ -69,7 +71,14 @@ def test_another_case_is_refused_before_anything_is_written(command, folder, oth
     assert call(command, other, *more[command], "--out", folder) == 2
     said = capfd.readouterr().err
     assert "error: this folder holds the results of another case" in said
-    for line in (f"where:    {folder}", "measured: ", "two_dof/case.toml", f"expected: {other}", "fix: ", "--force"):
+    for line in (
+        f"where:    {display(folder)}",
+        "measured: ",
+        "two_dof/case.toml",
+        f"expected: {display(other)}",
+        "fix: ",
+        "--force",
+    ):
         assert line in said
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
 

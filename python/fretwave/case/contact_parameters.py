@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any, Optional
 
@@ -21,6 +22,7 @@ from .toml.validation import at
 #: A parameter's name with this ending is given per area; the pair's area comes with the model.
 PER_AREA = "_per_area"
 LARGEST = float(np.finfo(float).max)
+LONGEST_SYMBOL = 4
 
 
 def law_of(
@@ -77,7 +79,7 @@ def parameters_of(
     for key in section.model_extra or {}:
         if key not in known and key not in per_area:
             found.append(_unknown_parameter(source, (*path, key), section.law, known, per_area))
-            meant.add(nearest(key, [*known], str))
+            meant.add(_meant(key, known))
     n_pairs = given.n_pairs if given and section.pairs is None else len(section.pairs or [])
     extra = section.model_extra or {}
     values: dict[str, float | Array | None] = {}
@@ -101,11 +103,21 @@ def _plain(value: npt.ArrayLike) -> float | Array:
     return float(np.asarray(value).item()) if np.ndim(value) == 0 else np.asarray(value, dtype=float)
 
 
+def _meant(key: str, known: Mapping[str, ParameterInfo], others: Sequence[str] = ()) -> str | None:
+    """The parameter whose symbol this is, as its doc has it (kn, "sliding force mu N"), or is spelt so."""
+    symbol = key.lower().replace("_", "")
+    for name, parameter in known.items():
+        words = re.findall(r"[a-z]\w*", parameter.doc.lower())
+        if len(symbol) <= LONGEST_SYMBOL and symbol in {*words, *map("".join, zip(words, words[1:]))}:
+            return name
+    return nearest(key, [*others, *known], str)
+
+
 def _unknown_parameter(
     source: Source, path: tuple[Any, ...], law: str, known: Mapping[str, ParameterInfo], per_area: Sequence[str]
 ) -> InputError:
     own = [*known, *per_area]
-    near = nearest(str(path[-1]), [*ContactSection.model_fields, *own], str)
+    near = _meant(str(path[-1]), known, [*ContactSection.model_fields, *per_area])
     said = f" ({known[near].doc} [{source.units(known[near].unit)}])" if near is not None and near in known else ""
     return InputError(
         f"unknown key '{path[-1]}' in {source.name(path[:-1])}",
