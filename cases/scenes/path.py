@@ -16,7 +16,6 @@ SECONDS = 1.0  #: for the search for jumps
 TWICE = 3  #: consecutive points that retrace
 ABREAST = 6  #: corrections that bring an earlier piece abreast of a row
 APART = 1e-5  #: of a step: what lies nearer is one branch
-FAR = 100  #: steps off, at which nothing was solved
 SHORT = 0.02  #: of a step: shorter ones beside it tell nothing of how it bends
 
 
@@ -157,8 +156,8 @@ def _same_piece(run: Any, rows: Any, i: int, j: int, along: float) -> bool:
         if abs(missed) < APART:
             break
         along += missed
-        if not abs(along) < FAR:  # it is nowhere abreast
-            return False
+        if not -1 < along < 2:  # beside the chord there is nothing to be solved
+            break
     off -= chord * missed
     return bool(np.linalg.norm(off) < APART * np.sqrt(square))
 
