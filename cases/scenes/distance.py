@@ -89,6 +89,11 @@ def step_size(step, now, size):
     return np.linalg.norm(dQ) / size + np.hypot(dbeta, domega) / abs(now[2])
 
 
+def between(a, b, share):
+    """The state at a share of the way from one to another; beyond it for more than 1."""
+    return tuple(x + share * (y - x) for x, y in zip(a, b))
+
+
 def _take(now, step, share):
     return tuple(x + share * dx for x, dx in zip(now, step))
 

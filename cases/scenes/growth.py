@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from .closed import linear_modes, near
-from .distance import distance
+from .distance import between, distance
 
 LONGEST, SHORTEST = 0.1, 1e-6  #: steps, of the motion's size
 TURN = 0.9  #: cosine of the angle between two steps; farther turned ones are halved
@@ -44,7 +44,7 @@ def _linear(run: Any, which: int, amplitude: float) -> State:
 
 def _walk(eq: Any, here: State, goal: float) -> State | None:
     """Along the branch by secants as long as they turn little, to an amplitude; None where it loses its way."""
-    before, step = tuple(x * (1 - LONGEST) if i == 0 else x for i, x in enumerate(here)), LONGEST
+    before, step = (here[0] * (1 - LONGEST), *here[1:]), LONGEST
     for _ in range(MOST):
         found = distance(eq, *_ahead(before, here, step))
         if not found.found or not _onwards(before, here, found.solution, step):
@@ -58,19 +58,14 @@ def _walk(eq: Any, here: State, goal: float) -> State | None:
     return None
 
 
-def _vector(state: State, size: float, scale: float) -> Any:
-    return np.r_[state[0].ravel() / size, state[1] / scale, state[2] / scale]
-
-
 def _difference(a: State, b: State) -> Any:
     """From a to b, in units of the motion and of the frequency."""
-    size, scale = np.linalg.norm(b[0]), abs(b[2])
-    return _vector(b, size, scale) - _vector(a, size, scale)
+    dQ, dbeta, domega = (y - x for x, y in zip(a, b))
+    return np.r_[dQ.ravel() / np.linalg.norm(b[0]), dbeta / abs(b[2]), domega / abs(b[2])]
 
 
 def _ahead(before: State, here: State, step: float) -> State:
-    ratio = step / np.linalg.norm(_difference(before, here))
-    return tuple(y + ratio * (y - x) for x, y in zip(before, here))
+    return between(before, here, 1 + step / np.linalg.norm(_difference(before, here)))
 
 
 def _onwards(before: State, here: State, there: State, step: float) -> bool:
@@ -92,8 +87,7 @@ def _at(eq: Any, low: State, high: State, goal: float) -> State | None:
         a, b = _amplitude(eq, low), _amplitude(eq, high)
         if abs(b / goal - 1) < 1e-9:
             return high
-        share = (goal - a) / (b - a)
-        found = distance(eq, *(x + share * (y - x) for x, y in zip(low, high)))
+        found = distance(eq, *between(low, high, (goal - a) / (b - a)))
         if not found.found:
             return None
         low, high = high, found.solution

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from .distance import distance
+from .distance import between, distance
 
 STOP = 1e-6  #: relative distance of the last row from the asked end
 SAME = 1e-9  #: relative, of a reported value
@@ -148,7 +148,7 @@ def _same_piece(run: Any, rows: Any, i: int, j: int, along: float) -> bool:
     chord = (end[0] - start[0]).ravel()
     square = chord @ chord
     for _ in range(ABREAST):
-        found = distance(run.equations, *_between(near, j - first, along))
+        found = distance(run.equations, *_by_cubic(near, j - first, along))
         if not found.found:
             return True
         off = (here[0] - found.solution[0]).ravel()
@@ -162,11 +162,11 @@ def _same_piece(run: Any, rows: Any, i: int, j: int, along: float) -> bool:
     return bool(np.linalg.norm(off) < APART * np.sqrt(square))
 
 
-def _between(states: list[Any], k: int, along: float) -> tuple[Any, ...]:
+def _by_cubic(states: list[Any], k: int, along: float) -> tuple[Any, ...]:
     """By the cubic through four states over the length of their chords, between the k-th and the next."""
     chords = [np.linalg.norm(b[0] - a[0]) for a, b in zip(states, states[1:])]
     if min(chords) < SHORT * chords[k]:  # an event beside a point: the cubic would swing
-        return tuple(x + along * (y - x) for x, y in zip(states[k], states[k + 1]))
+        return between(states[k], states[k + 1], along)
     at = np.r_[0, np.cumsum(chords)]
     t = at[k] + along * chords[k]
     shares = [np.prod([(t - at[m]) / (at[n] - at[m]) for m in range(4) if m != n]) for n in range(4)]
@@ -206,8 +206,7 @@ def _gap(run: Any, row: int, halvings: int = 14) -> float | None:
 
     whole, before = chord(*ends), run.state(row - 1) if row else None
     for _ in range(halvings):
-        middle = tuple((x + y) / 2 for x, y in zip(*ends))
-        found = distance(eq, *middle)
+        found = distance(eq, *between(*ends, 0.5))
         if not found.found:
             return None
         parts = [chord(ends[0], found.solution), chord(found.solution, ends[1])]
@@ -223,8 +222,7 @@ def _walks(eq: Any, before: Any, here: Any, goal: Any, chord: Any, share: float 
     """Whether short steps along the secant lead from one solution to another, without a detour."""
     length = share * chord(here, goal)
     for _ in range(most):
-        ratio = length / chord(before, here)
-        found = distance(eq, *(y + ratio * (y - x) for x, y in zip(before, here)))
+        found = distance(eq, *between(before, here, 1 + length / chord(before, here)))
         if not found.found:
             return False
         before, here = here, found.solution

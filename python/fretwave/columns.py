@@ -11,7 +11,7 @@ from typing import Any, Union
 
 import numpy as np
 
-from .units import SI, UnitSystem
+from .units import SI, UnitSystem, quantity
 
 Value = Union[float, int, str]
 
@@ -57,6 +57,10 @@ class Column:
     def in_units(self, units: UnitSystem) -> Column:
         """The same of numbers in a system."""
         return replace(self, units=units)
+
+    def as_amplitude(self, unit: str) -> Column:
+        """The same in a table whose lengths are all amplitudes of this unit."""
+        return replace(self, unit=unit) if quantity(self.unit) == "length" else self
 
     @property
     def symbol(self) -> str:
@@ -223,8 +227,7 @@ _FURTHER = (
 def headings(names: Iterable[str], units: UnitSystem, lengths: str = "length") -> dict[str, str]:
     """Headings of a further table's columns, whose lengths are amplitudes of this unit; unknown ones have no unit."""
     known = {**COLUMNS, **{column.name: column for column in _FURTHER}}
-    found = (replace(known[name], units=units) for name in names if name in known)
-    return {c.name: (replace(c, unit=lengths) if c.unit == "length" else c).heading for c in found}
+    return {name: known[name].as_amplitude(lengths).in_units(units).heading for name in names if name in known}
 
 
 def name_of(heading: str) -> str:

@@ -105,7 +105,11 @@ std::pair<double, double> Series::difference(double tau, double s) const {
 
 double Series::bound(int order) const {
   double sum = 0;
-  for (size_t k = 1; k < q.size(); ++k) sum += std::pow(double(k), order) * std::abs(q[k]);
+  for (size_t k = 1; k < q.size(); ++k) {
+    double size = std::abs(q[k]);
+    for (int n = 0; n < order; ++n) size *= double(k);
+    sum += size;
+  }
   return sum;
 }
 

@@ -60,7 +60,7 @@ def _notes(file: str, source: Source, declared: str | None, evidence: Sequence[E
     """Of a model file without a unit system: what it was read as, where that may be wrong."""
     name, text = declared or SI.name, read_sources(source.path.parent / file)[0]
     notes = [f"the model file's note on its units, '{text}', names no unit system: read as {name}"] if text else []
-    others = [one for one in evidence if one.fits and name not in one.fits]
+    others = [one for one in evidence if one.contradicts(name)]
     notes += [
         f"units: read as {name}, but like {' or '.join(one.fits)} ({one.text}): {_fix(one.fits[0])}" for one in others
     ]

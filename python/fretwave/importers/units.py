@@ -75,6 +75,10 @@ class Evidence:
         """Names of the systems that they can be in."""
         return tuple(name for name, units in SYSTEMS.items() if all(one.fits(units) for one in self.numbers))
 
+    def contradicts(self, system: str) -> bool:
+        """They can be in a known system, but not in this one."""
+        return bool(self.fits) and system not in self.fits
+
     def read_in(self, system: str) -> str:
         """What they are as numbers of a system."""
         values = ", ".join(f"{one.in_si(SYSTEMS[system]):.3g} {one.unit}" for one in self.numbers)
@@ -116,7 +120,7 @@ def words(declared: str | None, evidence: Sequence[Evidence]) -> tuple[list[str]
             lines.append(f"units: like {' or '.join(one.fits)} for a solid ({one.text})")
         else:
             warnings.append(f"units: no known system in which this is a solid ({one.text}): is M in the units of K?")
-        if one.fits and (declared or SI.name) not in one.fits:
+        if one.contradicts(declared or SI.name):
             system = declared or f"{SI.name}, for none is declared"
             warnings.append(f"units: read as {system}, but like {' or '.join(one.fits)}: give --units {one.fits[0]}")
     return lines, warnings

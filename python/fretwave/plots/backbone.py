@@ -38,7 +38,7 @@ def draw(modes: Sequence[Analysis], shifted: Mapping[str, Table] | None = None) 
     figure, (upper, lower) = style.new_figure(6.6, rows=2, sharex=True)
     _curves(upper, modes, "frequency_hz")
     _curves(lower, modes, "zeta")
-    _asymptotes(upper, modes[0])
+    named = _asymptotes(upper, modes[0])
     for (method, table), line in zip((shifted or {}).items(), ("--", ":")):
         look = {"linestyle": line, "color": style.ORANGE, "linewidth": 1.4, "zorder": 1.5}
         name = f"{method} without dampers, damping added afterwards"
@@ -47,7 +47,7 @@ def draw(modes: Sequence[Analysis], shifted: Mapping[str, Table] | None = None) 
         _limit_cycles(upper, lower, modes[0])
     for mode, colour in zip(modes, style.PALETTE):
         _peak(lower, mode, colour)
-    _close_up(upper, modes, "frequency_hz", (0.60, 0.26, 0.34, _below_asymptotes(upper, modes[0]) - 0.26))
+    _close_up(upper, modes, "frequency_hz", (0.60, 0.26, 0.34, _clear_of(upper, named) - 0.26))
     _close_up(lower, modes, "zeta", (0.72, 0.44, 0.26, 0.50))
     _finish(figure, upper, lower, modes)
     return figure
@@ -101,19 +101,18 @@ def _close_up(axes: Axes, modes: Sequence[Analysis], column: str, place: tuple[f
     inset.set_title("around the folds", fontsize=9.5)
 
 
-def _below_asymptotes(axes: Axes, mode: Analysis) -> float:
+def _clear_of(axes: Axes, above: Sequence[float]) -> float:
     """Height, as a share of the axis, up to which a close-up is clear of the lines above the curve and their names."""
     low, high = axes.get_ylim()
-    lines = [line.get_ydata()[0] for line in axes.lines if line.get_color() == style.GREY]
-    above = [(y - low) / (high - low) for y in lines if y >= np.mean(mode.columns["frequency_hz"])]
-    return float(min([0.80, *(share - 0.18 for share in above if share > 0.66)]))
+    shares = [(frequency - low) / (high - low) for frequency in above]
+    return float(min([0.80, *(share - 0.18 for share in shares if share > 0.66)]))
 
 
-def _asymptotes(axes: Axes, mode: Analysis) -> None:
-    """Linear frequencies with the contact stuck (dashed), and free or sliding (dash-dotted)."""
+def _asymptotes(axes: Axes, mode: Analysis) -> list[float]:
+    """Linear frequencies with the contact stuck (dashed), and free or sliding (dash-dotted); those above the curve."""
     kinds = (("stuck", "stuck", "--"), ("free", "free", "-."), ("sliding", "closed and sliding", "-."))
     known = {key: omega / (2.0 * np.pi) for key, *_ in kinds if (omega := mode.asymptote(key)) is not None}
-    text = style.apart(list(known.values()))
+    text, named = style.apart(list(known.values())), []
     for key, name, line in kinds:
         if key not in known:
             continue
@@ -124,6 +123,7 @@ def _asymptotes(axes: Axes, mode: Analysis) -> None:
             continue
         axes.axhline(frequency, color=style.GREY, linestyle=line, linewidth=1.2, zorder=1)
         above = frequency >= np.mean(mode.columns["frequency_hz"])
+        named += [frequency] if above else []
         axes.annotate(
             f"{name} {text(frequency)} Hz",
             (1.0 if above else 0.0, frequency),
@@ -135,6 +135,7 @@ def _asymptotes(axes: Axes, mode: Analysis) -> None:
             color=style.GREY,
             fontsize=10,
         )
+    return named
 
 
 def _below(axes: Axes, text: str) -> None:

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,7 +26,7 @@ from ..files.csv_table import plain, write_columns, write_rows
 from ..files.dimensions import name_dimensions
 from ..post.grid import Plan
 from ..texts import toml
-from ..units import ATTRIBUTE, SI, UnitSystem, quantity, units_of
+from ..units import ATTRIBUTE, SI, UnitSystem, units_of
 from .results import has_results, open_results, rewritten
 from .sweep_summary import columns_of, split_of, summarise
 
@@ -149,9 +149,7 @@ def write_sweep(
         group.attrs.update({**_shared(branches), **described, **attributes})
         _write_points(group.create_group("points"), points)
         scales = _write_over(group.create_group("over"), plan)
-        _write_summary(
-            group.create_group("summary"), kind, plan, rows, scales, system_of(branches), amplitude_unit(branches)
-        )
+        _write_summary(group.create_group("summary"), kind, plan, rows, scales, summary_columns(kind, branches))
         for branch in branches:
             _copy_branch(branch, of, group.create_group(f"values/{branch.number:04d}"))
     return rows
@@ -168,11 +166,15 @@ def system_of(branches: Sequence[Branch]) -> UnitSystem:
     return branches[0].system if branches else SI
 
 
-def summary_headings(kind: str, branches: Sequence[Branch]) -> dict[str, str]:
-    """Of the summary's columns, whose lengths are amplitudes."""
+def summary_columns(kind: str, branches: Sequence[Branch]) -> list[Column]:
+    """Of the summary, whose lengths are amplitudes."""
     units, unit = system_of(branches), amplitude_unit(branches)
-    columns = (replace(c, unit=unit) if quantity(c.unit) == "length" else c for c in columns_of(kind))
-    return {column.name: column.in_units(units).heading for column in columns}
+    return [column.as_amplitude(unit).in_units(units) for column in columns_of(kind)]
+
+
+def summary_headings(kind: str, branches: Sequence[Branch]) -> dict[str, str]:
+    """Of the same."""
+    return {column.name: column.heading for column in summary_columns(kind, branches)}
 
 
 def key_values(values: Sequence[Any]) -> Any:
@@ -250,8 +252,7 @@ def _write_summary(
     plan: Plan,
     rows: Sequence[Mapping[str, Any]],
     scales: Sequence[h5py.Dataset],
-    units: UnitSystem,
-    unit: str,
+    columns: Sequence[Column],
 ) -> None:
     split = split_of(kind)
     parts = sorted({row[split] for row in rows if split in row})
@@ -261,14 +262,13 @@ def _write_summary(
         group.create_dataset(split, data=parts)
     names = [*plan.keys, *([split] if parts else [])]
     shape = (*plan.shape, *([len(parts)] if parts else []))
-    for column in columns_of(kind) if rows else ():
+    for column in columns if rows else ():
         values = np.full(shape, np.nan)
         for row in rows:
             place = np.unravel_index(row["value"], plan.shape)
             values[(*place, *([parts.index(row[split])] if parts else []))] = row[column.name]
         data = group.create_dataset(column.name, data=values)
-        own = unit if quantity(column.unit) == "length" else units(column.unit)  # all lengths are amplitudes
-        data.attrs.update({"units": own, "long_name": column.long_name})
+        data.attrs.update(column.attributes)
         name_dimensions(group, data, names)
 
 
