@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import subprocess
 import sys
@@ -68,6 +69,20 @@ def test_a_reader_who_leaves_is_told_in_words(tmp_path: Path) -> None:
     said = process.stderr.read()
     assert process.wait(timeout=60) == 1 and "nobody reads the output any more" in said
     assert "PETSC ERROR" not in said and all(lines)
+
+
+@pytest.mark.parametrize("command", ("--version", "check", "run"))
+def test_output_that_nobody_reads_ends_in_words_before_python_does(tmp_path: Path, command: str) -> None:
+    """What Python had kept to print at its end made exit code 120 and "Exception ignored"."""
+    words = {"--version": [], "check": [CASE], "run": [CASE, "--quick", "--only", "mode", "--out", tmp_path / "run"]}
+    reader, writer = os.pipe()
+    os.close(reader)
+    kept = {key: value for key, value in os.environ.items() if key != "PYTHONUNBUFFERED"}
+    process = [sys.executable, "-m", "fretwave", command, *map(str, words[command])]
+    done = subprocess.run(process, stdout=writer, stderr=subprocess.PIPE, text=True, env=kept)
+    os.close(writer)
+    assert done.returncode == 1 and done.stderr.count("nobody reads the output any more") == 1
+    assert "Exception" not in done.stderr
 
 
 def test_resume_and_sweep_are_quiet_too(tmp_path: Path, capfd) -> None:

@@ -174,11 +174,25 @@ def guarded(main: Callable[[], int]) -> int:
         The exit code of the process.
     """
     try:
-        return main()
+        return _all_printed(main)
     except SystemExit as exit_:
         return _lone_exit(exit_)
+    except BrokenPipeError as error:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # else what is left unread is an error again
+        return end_all_ranks(error)
     except BaseException as error:
         return end_all_ranks(error)
+
+
+def _all_printed(main: Callable[[], int]) -> int:
+    """Its exit code, with nothing left to be printed at Python's end, where an error has no words."""
+    try:
+        code = main()
+    except SystemExit:  # of --help, --version
+        sys.stdout.flush()
+        raise
+    sys.stdout.flush()
+    return code
 
 
 def _excepthook(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
