@@ -15,6 +15,10 @@ void CheckedPreconditioner::build(Vec y, Vec row) {
   }
 }
 
+void CheckedPreconditioner::follow(Vec y) {
+  if (failure_.empty()) inner_->follow(y);
+}
+
 void CheckedPreconditioner::apply(Vec x, Vec z) {
   if (failure_.empty()) return inner_->apply(x, z);
   check(VecSet(z, std::numeric_limits<double>::quiet_NaN()));

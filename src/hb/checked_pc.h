@@ -13,6 +13,7 @@ class CheckedPreconditioner : public solve::Preconditioner {
   explicit CheckedPreconditioner(std::unique_ptr<solve::Preconditioner> inner, std::string note = "")
       : inner_(std::move(inner)), note_(std::move(note)) {}
   void build(Vec y, Vec row) override;
+  void follow(Vec y) override;
   void apply(Vec x, Vec z) override;
   double build_cost() const override { return inner_->build_cost(); }
   std::string describe() const override { return inner_->describe() + note_; }

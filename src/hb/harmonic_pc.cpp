@@ -76,7 +76,7 @@ void HarmonicPreconditioner::prepare(Exponents const& e, Vec y, Vec row) {
   bordered_ = bordered_block(e, y, row);
 }
 
-std::unique_ptr<HarmonicInverse> HarmonicPreconditioner::inverse(int harmonic, Exponents const& e) const {
+std::unique_ptr<HarmonicBlock> HarmonicPreconditioner::inverse(int harmonic, Exponents const& e) const {
   if (harmonic == problem_.harmonics().fundamental())
     return invert_bordered(place(harmonic), bordered_, scalars_);
   return invert(place(harmonic), block(harmonic, e));

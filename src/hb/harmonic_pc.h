@@ -13,7 +13,7 @@ class HarmonicPreconditioner : public PairwisePreconditioner {
 
  private:
   void prepare(Exponents const&, Vec y, Vec row) override;
-  std::unique_ptr<HarmonicInverse> inverse(int harmonic, Exponents const&) const override;
+  std::unique_ptr<HarmonicBlock> inverse(int harmonic, Exponents const&) const override;
   std::vector<complex> structure(int harmonic, Exponents const&) const;
   std::vector<complex> block(int harmonic, Exponents const&) const;
   std::vector<double> bordered_block(Exponents const&, Vec y, Vec row) const;

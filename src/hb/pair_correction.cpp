@@ -1,12 +1,21 @@
 #include "hb/pair_correction.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "lapack.h"
 
 namespace fretwave::hb {
 
 namespace {
+
+constexpr double negligible = 1e-7;  // of D: single precision has no more
+
+double largest(std::vector<double> const& D) {
+  double most = 0;
+  for (const double d : D) most = std::max(most, std::abs(d));
+  return most;
+}
 
 /// Calls visit(row, col, value) for the entries of a pair's per-harmonic 2x2 blocks in its (d m)^2 block.
 template <class Visit>
@@ -43,25 +52,30 @@ std::vector<Rotation> harmonic_tangents(Harmonics const& h, int d, double const*
 
 PairCorrection::PairCorrection(Harmonics const& h, int d, std::vector<double> D, Rotation const* tangents,
                                Rotation const* G)
-    : size_(d * h.block_size()), E_(std::move(D)) {
+    : size_(d * h.block_size()) {
   const size_t n = size_;
-  for_entries(h, d, tangents, [&](int row, int col, double t) { E_[row * n + col] -= t; });
+  const double all = largest(D);
+  for_entries(h, d, tangents, [&](int row, int col, double t) { D[row * n + col] -= t; });
+  if (!(largest(D) > negligible * all)) return;
   // Column-major sight of the row-major dD is dD^T: (I + dD^T G^T) E^T = dD^T.
   std::vector<double> T(n * n, 0.0);
   for (size_t k = 0; k < n; ++k) T[k * n + k] = 1;
   for_entries(h, d, G, [&](int row, int col, double g) {
-    for (size_t i = 0; i < n; ++i) T[row * n + i] += g * E_[col * n + i];
+    for (size_t i = 0; i < n; ++i) T[row * n + i] += g * D[col * n + i];
   });
   std::vector<int> pivots(n);
   int info;
-  dgesv_(&size_, &size_, T.data(), &size_, pivots.data(), E_.data(), &size_, &info);
-  if (info != 0) std::fill(E_.begin(), E_.end(), 0.0);  // the harmonic blocks alone serve this pair
+  dgesv_(&size_, &size_, T.data(), &size_, pivots.data(), D.data(), &size_, &info);
+  if (info == 0) E_.assign(D.begin(), D.end());  // else the harmonic blocks alone serve this pair
 }
 
 void PairCorrection::apply(double const* u, double* f) const {
   const int step = 1;
-  const double one = 1, zero = 0;
-  dgemv_("T", &size_, &size_, &one, E_.data(), &size_, u, &step, &zero, f, &step);
+  const float one = 1, zero = 0;
+  const std::vector<float> in(u, u + size_);
+  std::vector<float> out(size_);
+  sgemv_("T", &size_, &size_, &one, E_.data(), &size_, in.data(), &step, &zero, out.data(), &step);
+  std::copy(out.begin(), out.end(), f);
 }
 
 }  // namespace fretwave::hb

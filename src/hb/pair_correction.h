@@ -1,5 +1,5 @@
 #pragma once
-#include "hb/harmonic_inverse.h"
+#include "hb/harmonic_block.h"
 #include "hb/residual.h"
 
 namespace fretwave::hb {
@@ -10,21 +10,23 @@ namespace fretwave::hb {
 std::vector<Rotation> harmonic_tangents(Harmonics const&, int components, double const* D,
                                         bool real_fundamental);
 
-/// The rest, D - (harmonic tangents), is eliminated pair by pair by Woodbury's formula with the compliance G
-/// of the pair alone: J^-1 ~ P^-1 - P^-1 B^T E B P^-1, E = dD (I + G dD)^-1. Without it slipping pairs, whose
-/// stiffness changes within a period between that of the contact and none, cost 100 iterations.
+/// The rest, dD = D - (harmonic tangents), of one pair as its own compliance G lets it act: by Woodbury's
+/// formula its force is f = E u, E = dD (I + G dD)^-1, u its motion without dD. Without it slipping pairs,
+/// whose stiffness changes within a period between that of the contact and none, cost 100 iterations. Single
+/// precision, as blocks.
 class PairCorrection {
  public:
   /// G: as harmonic_tangents, of B P^-1 B^T.
   PairCorrection(Harmonics const&, int components, std::vector<double> D, Rotation const* tangents,
                  Rotation const* G);
-  /// f = E u, blocks of one pair.
+  /// dD is nothing: the pair sticks, or is open.
+  bool idle() const { return E_.empty(); }
+  /// f = E u, blocks of one pair that is not idle.
   void apply(double const* u, double* f) const;
-  int size() const { return size_; }
 
  private:
   int size_;
-  std::vector<double> E_;  ///< row-major
+  std::vector<float> E_;  ///< row-major
 };
 
 }  // namespace fretwave::hb

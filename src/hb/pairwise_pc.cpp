@@ -79,10 +79,35 @@ std::vector<Rotation> PairwisePreconditioner::compliance() const {
   return G;
 }
 
-void PairwisePreconditioner::correct_pairs(std::vector<PairTangents>&& contacts) {
-  corrections_.clear();
+/// Rows of pairs that are not idle, numbered over all ranks; the pair of each.
+std::vector<int> PairwisePreconditioner::number_rows() {
+  std::vector<int> busy, pair_of;
+  for (auto const& correction : corrections_) busy.push_back(!correction.idle());
+  const auto all = gathered(std::span<int const>(busy), problem_.comm());
+  for (size_t p = 0; p < pairs_.size(); ++p) {
+    pairs_[p].first_row = all[p] ? int(pair_of.size()) : -1;
+    if (all[p]) pair_of.insert(pair_of.end(), pairs_[p].components, int(p));
+  }
+  return pair_of;
+}
+
+/// visit(weight, row) for the rows of pairs that are not idle.
+template <class Visit>
+void PairwisePreconditioner::for_rows(Visit visit) const {
+  for (Pair const& pair : pairs_)
+    for (size_t k = pair.first_weight; pair.first_row >= 0 && k < pair.end_weight; ++k)
+      visit(weights_[k], pair.first_row + weights_[k].component);
+}
+
+std::vector<ContactEntry> PairwisePreconditioner::entries(int harmonic) const {
+  std::vector<ContactEntry> B;
+  for_rows([&](Weight const& w, int row) { B.push_back({row, int(w.dof), w.value * phase(w, harmonic)}); });
+  return B;
+}
+
+void PairwisePreconditioner::couple(std::vector<PairTangents>&& contacts) {
+  corrections_.clear(), coupled_.reset();
   if (pairs_.empty()) return;
-  const auto G = compliance();
   together(problem_.comm(), "correcting contact pairs", [&] {
     for (auto const& contact : contacts) {
       const size_t ld = size_t(contact.components) * m_;
@@ -91,18 +116,34 @@ void PairwisePreconditioner::correct_pairs(std::vector<PairTangents>&& contacts)
         double const* D = &contact.D[p * ld * ld];
         fault::point("pair correction");
         corrections_.emplace_back(problem_.harmonics(), contact.components,
-                                  std::vector<double>(D, D + ld * ld), &tangents_[at], &G[at]);
+                                  std::vector<double>(D, D + ld * ld), &tangents_[at], &G_[at]);
       }
     }
   });
+  const auto pair_of = number_rows();
+  if (pair_of.empty()) return;
+  std::vector<CoupledPairs::Own> own;
+  for (size_t p = 0; p < corrections_.size(); ++p)
+    if (!corrections_[p].idle())
+      own.push_back({size_t(pairs_[first_pair_ + p].first_row) * m_, &corrections_[p]});
+  std::vector<std::unique_ptr<HarmonicBlock>> between;
+  for (int i = 0; i < problem_.harmonics().count(); ++i)
+    if (mine(i)) between.push_back(inverses_[i]->between_pairs(entries(i), pair_of));
+  coupled_ = std::make_unique<CoupledPairs>(problem_.comm(), int(pair_of.size()) * m_, std::move(own),
+                                            std::move(between));
+}
+
+std::vector<PairTangents> PairwisePreconditioner::contacts(Vec y) {
+  auto contacts = problem_.pair_tangents(y);
+  for (auto& contact : contacts)
+    for (double& d : contact.D) d /= problem_.stiffness_scale();
+  return contacts;
 }
 
 void PairwisePreconditioner::build(Vec y, Vec row) {
   Harmonics const& h = problem_.harmonics();
   const Exponents e = problem_.exponents(y);
-  auto contacts = problem_.pair_tangents(y);
-  for (auto& contact : contacts)
-    for (double& d : contact.D) d /= problem_.stiffness_scale();
+  auto contacts = this->contacts(y);
   tangents_ = gather_contact(contacts);
   inverses_.clear(), inverses_.resize(h.count());
   prepare(e, y, row);
@@ -110,8 +151,11 @@ void PairwisePreconditioner::build(Vec y, Vec row) {
     for (int i = 0; i < h.count(); ++i)
       if (mine(i)) inverses_[i] = inverse(i, e);
   });
-  correct_pairs(std::move(contacts));
+  if (!pairs_.empty()) G_ = compliance();
+  couple(std::move(contacts));
 }
+
+void PairwisePreconditioner::follow(Vec y) { couple(contacts(y)); }
 
 /// P^-1 x
 std::vector<double> PairwisePreconditioner::solve(std::vector<double> const& x) const {
@@ -138,25 +182,19 @@ void PairwisePreconditioner::add_turned(Weight const& w, bool conjugate, double 
   for (int k = 0; k < m_; ++k) to[k] += turned[k];
 }
 
-/// B^H E B y
-std::vector<double> PairwisePreconditioner::correction(std::vector<double> const& y) const {
-  std::vector<double> out(y.size(), 0.0), u, f;
-  for (size_t p = 0; p < corrections_.size(); ++p) {
-    Pair const& pair = pairs_[first_pair_ + p];
-    const auto weights = std::span(weights_).subspan(pair.first_weight, pair.end_weight - pair.first_weight);
-    u.assign(corrections_[p].size(), 0.0), f.resize(u.size());
-    for (Weight const& w : weights) add_turned(w, false, &y[w.dof * m_], &u[w.component * m_]);
-    corrections_[p].apply(u.data(), f.data());
-    for (Weight const& w : weights) add_turned(w, true, &f[w.component * m_], &out[w.dof * m_]);
-  }
-  sum_over_ranks(out, problem_.comm());
+/// B^H F B y
+std::vector<double> PairwisePreconditioner::contact_forces(std::vector<double> const& y) const {
+  std::vector<double> u(coupled_->size(), 0.0), out(y.size(), 0.0);
+  for_rows([&](Weight const& w, int row) { add_turned(w, false, &y[w.dof * m_], &u[size_t(row) * m_]); });
+  const auto f = coupled_->forces(u);
+  for_rows([&](Weight const& w, int row) { add_turned(w, true, &f[size_t(row) * m_], &out[w.dof * m_]); });
   return out;
 }
 
 void PairwisePreconditioner::apply(Vec x, Vec z) {
   auto y = solve(gathered(x));
-  if (!pairs_.empty()) {
-    const auto corrected = solve(correction(y));
+  if (coupled_) {
+    const auto corrected = solve(contact_forces(y));
     for (size_t k = 0; k < y.size(); ++k) y[k] -= corrected[k];
   }
   PetscInt begin;

@@ -156,6 +156,7 @@ bool LinearSolver::linearise(Vec y, bool newton) {
   uncounted_ = false;
   built_here_ = stale_;
   if (stale_ && !build()) return false;
+  if (!built_here_) preconditioner().follow(point_);
   uncounted_ = newton || beside_;
   check(MatAssemblyBegin(J_, MAT_FINAL_ASSEMBLY));
   check(MatAssemblyEnd(J_, MAT_FINAL_ASSEMBLY));

@@ -34,6 +34,7 @@ class LinearSolver {
   Mat jacobian() const { return J_; }
   /// "direct" or "krylov", with the reason of the choice.
   std::string route() const;
+  bool krylov() const { return bool(own_); }
   /// Point and factors of the solves that follow; false where it is singular. `newton`: one of Newton's
   /// follows. Collective.
   bool linearise(Vec y, bool newton);

@@ -13,6 +13,8 @@ class Preconditioner {
   /// Factorise at y with the closing row; `SingularBlock` on every rank, or a failure, if that cannot be.
   /// Collective.
   virtual void build(Vec y, Vec row) = 0;
+  /// Takes from y what is cheap to, and keeps the factors. Collective.
+  virtual void follow(Vec) {}
   virtual void apply(Vec x, Vec z) = 0;
   /// Why the last build gave nothing to apply (a singular block), the same on every rank; empty if it did.
   virtual std::string failure() const { return {}; }

@@ -1,4 +1,7 @@
 #pragma once
+#include <memory>
+#include <span>
+
 #include "hb/harmonics.h"
 
 namespace fretwave::hb {
@@ -29,6 +32,7 @@ struct Rotation {
 struct Place {
   int dofs, block, offset;
   bool mean;
+  Place of_rows(int rows) const { return {rows, block, offset, mean}; }
   /// Its coefficients q = qc - i qs of all dofs.
   template <class T = double>
   std::vector<std::complex<T>> gather(double const* x) const {
@@ -49,22 +53,31 @@ struct Place {
   }
 };
 
-/// Inverse of one harmonic's dense block; acts on that harmonic's coefficients of harmonic-block vectors.
-/// Explicit, because it multiplies single vectors often and its entries are asked for (a triangular solve of
-/// one vector is three times slower); kept in single precision, because reading it is what an application
-/// costs.
-class HarmonicInverse {
+/// Entry of the contact's B at one harmonic, U = B Q: with the phase of the sector that the dof is in.
+struct ContactEntry {
+  int row, dof;
+  complex factor;
+};
+
+/// A dense operator on one harmonic's coefficients in harmonic-block vectors: the inverse of its block, or
+/// what contact sees of it. Explicit, because it multiplies single vectors often and its entries are asked
+/// for (a triangular solve of one vector is three times slower); kept in single precision, because reading it
+/// is what an application costs.
+class HarmonicBlock {
  public:
-  virtual ~HarmonicInverse() = default;
-  /// z = A^-1 x on this harmonic's entries; `x`, `z` are whole bordered vectors.
+  virtual ~HarmonicBlock() = default;
+  /// z = A x on this harmonic's entries; `x`, `z` are whole vectors.
   virtual void apply(double const* x, double* z) const = 0;
-  /// Entry (i, j) of the inverse.
   virtual Rotation entry(int i, int j) const = 0;
+  /// B A B^H without what pairs of contact see of themselves, on harmonic blocks of the contact's rows;
+  /// `pair`: of each row.
+  virtual std::unique_ptr<HarmonicBlock> between_pairs(std::span<ContactEntry const> B,
+                                                       std::span<int const> pair) const = 0;
 };
 
 /// Inverse of the n x n block A (column-major). `SingularBlock` if it is.
-std::unique_ptr<HarmonicInverse> invert(Place, std::vector<complex> A);
+std::unique_ptr<HarmonicBlock> invert(Place, std::vector<complex> A);
 /// Inverse of the real block over (qc, qs, scalars), (2 n + scalars) squared, column-major.
-std::unique_ptr<HarmonicInverse> invert_bordered(Place, std::vector<double> A, int scalars);
+std::unique_ptr<HarmonicBlock> invert_bordered(Place, std::vector<double> A, int scalars);
 
 }  // namespace fretwave::hb
