@@ -10,6 +10,7 @@ namespace {
 // A turn that is left in so short a step is a kink (a sample changes state), not curvature.
 constexpr double kink_length = 1e-4;
 constexpr int crawl = 300;            // steps below the smallest in a row, over pieces that thin
+constexpr double often = 0.3;         // of a step: a shorter one has failed twice
 constexpr double sparse = 1.0 / 32;   // of a step: corners farther than that apart are walked to one by one
 constexpr double before_end = 0.999;  // of the way to the end of a piece
 constexpr double kink_angle = 0.02;   // [rad] in so short a step
@@ -68,9 +69,9 @@ std::vector<TestFunction> Continuation::tests(Vec y, Vec tangent) {
 }
 
 /// Newton on the system closed by row . y = value, then the unit tangent there, oriented along `tangent_row`.
-bool Continuation::correct(Trial& trial, Vec row, double value, Vec tangent_row) {
+bool Continuation::correct(Trial& trial, Vec row, double value, Vec tangent_row, Effort effort) {
   newton_.system().close(row, value);
-  trial.outcome = newton_.solve(trial.y);
+  trial.outcome = newton_.solve(trial.y, effort);
   if (!trial.outcome.converged) return false;
   if (const std::string why = problem_.impossible(trial.y); !why.empty()) {
     trial.outcome.reason = why;
@@ -244,9 +245,11 @@ std::optional<Continuation::Trial> Continuation::attempt(double& length, bool wa
   if (wary)
     if (auto behind = turn_next_corner(length)) return behind;
   Trial trial = at(moved(anchor_.y, length, anchor_.tangent));
-  newton_.search_past_kinks(!wary || !may_shorten);
-  const bool solved = correct(trial, row_, row_value_ + length, row_);
-  newton_.search_past_kinks(true);
+  const bool shortened = length < often * anchor_.step;
+  const Effort effort = may_shorten && !shortened && newton_.dear() ? Effort::brief
+                        : wary && may_shorten                       ? Effort::plain
+                                                                    : Effort::full;
+  const bool solved = correct(trial, row_, row_value_ + length, row_, effort);
   failure.last = solved ? complaint(trial, length, may_shorten) : trial.outcome.reason;
   if (failure.last.empty()) return trial;
   if (!solved && failure.last.ends_with(')')) failure.explained = failure.last;

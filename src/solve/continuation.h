@@ -88,7 +88,7 @@ class Continuation {
   Trial at(VecHandle y) const {
     return {.y = std::move(y), .tangent = {}, .outcome = {}, .tests = {}, .error = 0};
   }
-  bool correct(Trial&, Vec row, double value, Vec tangent_row);
+  bool correct(Trial&, Vec row, double value, Vec tangent_row, Effort = Effort::full);
   std::vector<TestFunction> tests(Vec y, Vec tangent);
   void open_the_range();
   void prepare_row();

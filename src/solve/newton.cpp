@@ -15,6 +15,7 @@ constexpr double small_effect = 1e-8;    // on what is read (Problem::effect) of
 constexpr double largest_effect = 1e-6;  // the same, where rounding lets the residual fall no further
 constexpr double far = 1e5;              // length of a step over the residual, where J is nearly singular
 constexpr int patience = 10;             // iterations after which a residual below the tolerance is enough
+constexpr double creeping = 0.6;         // of the residual left by as many iterations as are remembered
 constexpr int rescalings = 4;            // of the rows, as the motion that is solved for becomes known
 
 }  // namespace
@@ -42,6 +43,7 @@ PetscErrorCode Newton::converged(SNES snes, PetscInt iteration, PetscReal unknow
   auto& newton = *static_cast<Newton*>(context);
   const double before = std::exchange(newton.residual_before_, residual);
   newton.step_from_ = iteration == 0 ? residual : before;
+  const bool creeps = newton.creeps(iteration, residual);
   PetscErrorCode code = SNESConvergedDefault(snes, iteration, unknowns, step, residual, reason, nullptr);
   if (code || *reason < 0) return code;
   if (iteration == 0) {
@@ -52,11 +54,18 @@ PetscErrorCode Newton::converged(SNES snes, PetscInt iteration, PetscReal unknow
   code = SNESGetSolution(snes, &y);
   if (code) return code;
   return newton.linear_->guard().run([&] {
-    if (*reason == 0)
+    if (*reason == 0) {
       *reason = newton.judge(y, std::max(unknowns, 1.0), step, residual, before);
-    else if (iteration < patience && newton.matters(y, residual, before))
+      if (*reason == 0 && creeps) *reason = SNES_DIVERGED_MAX_IT;
+    } else if (iteration < patience && newton.matters(y, residual, before))
       *reason = SNES_CONVERGED_ITERATING;
   });
+}
+
+/// Whether the iterations are better spent on a nearer guess.
+bool Newton::creeps(int iteration, double residual) {
+  const double before = std::exchange(last_[iteration % last_.size()], residual);
+  return effort_ == Effort::brief && iteration >= int(last_.size()) && residual > creeping * before;
 }
 
 /// Whether what a residual below its tolerance leaves shows in what is read from the point (the damping at
@@ -130,8 +139,9 @@ PetscErrorCode Newton::form_jacobian(SNES snes, Vec y, Mat, Mat, void* context) 
 
 /// The rows are measured in the forces that act at y: those of the guess first, those of the solution once it
 /// is known.
-Outcome Newton::solve(Vec y) {
+Outcome Newton::solve(Vec y, Effort effort) {
   Outcome out;
+  effort_ = effort;
   if (bordered_.problem().scale(y)) linear_->renew();
   for (int k = 0; k < rescalings; ++k) {
     const Outcome before = std::exchange(out, solve_past_kinks(y));
@@ -152,7 +162,7 @@ Outcome Newton::solve_past_kinks(Vec y) {
   Outcome out = solve_persistently(y);
   check(SNESGetLineSearch(snes_, &search));
   check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(search), SNESLINESEARCHBT, &backtracks));
-  if (!past_kinks_ || !search_ || out.converged || out.linear_failure || !backtracks ||
+  if (!past_kinks_ || effort_ != Effort::full || out.converged || out.linear_failure || !backtracks ||
       !std::isfinite(out.residual))
     return out;
   check(VecCopy(guess, y));

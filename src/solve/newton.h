@@ -1,4 +1,5 @@
 #pragma once
+#include <array>
 #include <string>
 
 #include "solve/linear_solver.h"
@@ -15,6 +16,10 @@ struct Outcome {
   bool linear_failure = false;  ///< the last linear system was not solved, or was singular
 };
 
+/// What a guess is worth. `brief`: given up once the residual creeps; `plain`: PETSc's iterations; `full`:
+/// those again with the search past kinks.
+enum class Effort { brief, plain, full };
+
 /// SNES on a bordered problem, whose linear systems `LinearSolver` solves.
 class Newton {
  public:
@@ -26,10 +31,11 @@ class Newton {
   SNES snes() const { return snes_; }
   /// "direct" or "krylov", with the reason of the choice.
   std::string route() const { return linear_->route(); }
+  /// An iteration costs more than what is done with a point.
+  bool dear() const { return linear_->krylov(); }
   Fallbacks const& fallbacks() const { return linear_->fallbacks(); }
   /// Solves from y, in place; y is the last iterate when it does not converge. Collective.
-  Outcome solve(Vec y);
-  void search_past_kinks(bool on) { search_ = on; }
+  Outcome solve(Vec y, Effort = Effort::full);
   /// Tangent at y: J t = 0, row . t = 1 with the closing row. t holds a guess (zero, or the last tangent),
   /// from which the Krylov route starts. Collective.
   bool tangent(Vec y, Vec t);
@@ -52,15 +58,18 @@ class Newton {
   bool below_tolerance(double residual, bool started) const;
   bool matters(Vec y, double residual, double before);
   bool stuck_at_rounding(Vec y);
+  bool creeps(int iteration, double residual);
   double last_effect(Vec y);
 
   Bordered bordered_;
   SnesHandle snes_;
   std::unique_ptr<LinearSolver> linear_;
   VecHandle right_side_;
-  bool past_kinks_, search_ = true;
-  double residual_before_ = 0;  ///< at the iteration before
-  double step_from_ = 0;        ///< residual where the last step began
+  bool past_kinks_;
+  Effort effort_ = Effort::full;
+  std::array<double, 4> last_{};  ///< residuals of the last iterations, the k-th at k mod 4
+  double residual_before_ = 0;    ///< at the iteration before
+  double step_from_ = 0;          ///< residual where the last step began
 };
 
 }  // namespace fretwave::solve
