@@ -2,13 +2,15 @@
 
 #include <algorithm>
 
+#include "log.h"
+
 namespace fretwave::hb {
 
 namespace {
 
 constexpr double tolerance = 1e-3;
 constexpr int most =
-    400;  // iterations, none forgotten: they creep until as many modes of the pairs are found
+    400;  // iterations, none forgotten: they creep until enough of the pairs' modes are found
 
 }  // namespace
 
@@ -50,6 +52,8 @@ PetscErrorCode CoupledPairs::product(Mat A, Vec f, Vec out) {
 }
 
 std::vector<double> CoupledPairs::forces(std::span<double const> b) const {
+  static const log::Event coupling("FwPairs");
+  const log::Span span(coupling);
   multiply_pairs(b.data(), WriteArray(right_).data());
   check(KSPSolve(ksp_, right_, f_));
   const ReadArray f(f_);

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "error.h"
+#include "log.h"
 #include "solve/memory.h"
 #include "solve/vectors.h"
 
@@ -98,6 +99,8 @@ std::vector<double> at_parameter(std::vector<double> change, std::vector<double>
 
 std::optional<LeftOut> DiscretisationError::at(Vec y, Vec tangent) {
   if (!finer_) return {};
+  static const log::Event estimate("FwErrorEstimate");
+  const log::Span span(estimate);
   VecHandle r = problem_.equations(), finer = finer_->equations();
   problem_.residual(y, r);
   VecHandle point = problem_.on(*finer_, y), left = problem_.on(*finer_, r);

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "lapack.h"
+#include "log.h"
 
 namespace fretwave::hb {
 
@@ -72,6 +73,8 @@ std::vector<complex> DynamicStiffness::coefficient_derivatives(model::Term const
 
 /// y += A (c x): with blocks innermost, Y^T (m x local) += X^T (m x all) A^T.
 void DynamicStiffness::accumulate(std::vector<complex> const& c, Blocked const& A, Vec x, Vec y) {
+  static const log::Event structure("FwStructure");
+  const log::Span span(structure);
   {
     ReadArray in(x);
     WriteArray out(work_);

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "fault.h"
+#include "log.h"
 #include "together.h"
 
 namespace fretwave::hb {
@@ -84,12 +85,14 @@ void Residual::add_force(Group const& group, Vec F, Vec R) const {
 }
 
 void Residual::evaluate(Vec Q, Exponents const& e, Vec R) {
+  static const log::Event forces("FwContactForce");
   if (Q != Q_) check(VecCopy(Q, Q_));
   e_ = e;
   check(VecSet(R, 0));
   stiffness_.multiply_add(e, Q_, R);
   for (Group& group : groups_) relative_motion(group, Q_, group.U);
   together(model_.comm(), "contact forces", [&] {
+    const log::Span span(forces);
     for (Group& group : groups_) {
       fault::point("contact force");
       WriteArray F(group.F);
@@ -109,6 +112,8 @@ void Residual::product(Vec dQ, Exponents const* de, Vec dR) {
 
 // dV = s dU + ds U: the velocity's coefficients are s U (Laxalde et al. 2008, step 1 of the AFT)
 void Residual::contact_product(Group& group, Vec dQ, Exponents const* de, Vec dR) {
+  static const log::Event products("FwContactJacob");
+  const log::Span span(products);
   const int columns = group.aft.columns();
   VecHandle dU = like(group.U), dF = like(group.F);
   if (dQ)

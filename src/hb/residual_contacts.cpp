@@ -5,6 +5,7 @@
 #include "error.h"
 #include "fault.h"
 #include "hb/residual.h"
+#include "log.h"
 #include "scramble.h"
 #include "together.h"
 
@@ -78,6 +79,8 @@ std::vector<Wearing> Residual::wearing(Vec Q, Exponents const& e) {
 }
 
 ContactSummary Residual::summarise(Vec Q, Exponents const& e) {
+  static const log::Event summary("FwSummary");
+  const log::Span span(summary);
   double sums[8] = {}, largest[2] = {};
   const auto U = relative_motions(Q);
   together(model_.comm(), "reading contacts", [&] {

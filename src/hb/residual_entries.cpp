@@ -3,6 +3,7 @@
 
 #include "fault.h"
 #include "hb/residual.h"
+#include "log.h"
 #include "together.h"
 
 namespace fretwave::hb {
@@ -41,6 +42,8 @@ void Residual::contact_pattern(Group& group, std::vector<PetscInt>& rows, std::v
 }
 
 std::vector<PairTangents> Residual::pair_tangents() {
+  static const log::Event tangents("FwContactBlocks");
+  const log::Span span(tangents);
   std::vector<PairTangents> out;
   together(model_.comm(), "linearising contacts", [&] {
     fault::point("contact tangents");

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "error.h"
+#include "log.h"
 #include "solve/direct.h"
 #include "solve/memory.h"
 
@@ -156,14 +157,22 @@ bool LinearSolver::linearise(Vec y, bool newton) {
   uncounted_ = false;
   built_here_ = stale_;
   if (stale_ && !build()) return false;
-  if (!built_here_) preconditioner().follow(point_);
+  if (!built_here_) follow();
   uncounted_ = newton || beside_;
   check(MatAssemblyBegin(J_, MAT_FINAL_ASSEMBLY));
   check(MatAssemblyEnd(J_, MAT_FINAL_ASSEMBLY));
   return true;
 }
 
+void LinearSolver::follow() {
+  static const log::Event following("FwPCFollow");
+  const log::Span span(following);
+  preconditioner().follow(point_);
+}
+
 bool LinearSolver::build() {
+  static const log::Event building("FwPCBuild");
+  const log::Span span(building);
   try {
     preconditioner().build(point_, bordered_.row());
   } catch (SingularBlock const&) {

@@ -58,6 +58,7 @@ class LinearSolver {
   void choose_route();
   void use_krylov();
   bool build();
+  void follow();
   bool solve_once(Vec b, Vec x);
   bool take_fallback();
   bool take_whole();

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import subprocess
 import sys
 from pathlib import Path
 
@@ -113,6 +114,20 @@ def test_right_option_is_used_and_taken_back(tmp_path: Path) -> None:
     options = ["--petsc", "-snes_max_it 30 -snes_atol 1e-12"]
     assert main(["run", str(CASE), "--out", str(tmp_path / "run"), *SHORT, *RANGE, *options]) == 0
     assert not PETSc.Options().hasName("mode_snes_max_it")
+
+
+def test_where_the_time_goes_is_told_by_petsc(tmp_path: Path) -> None:
+    """An analysis is a stage of -log_view; what a point costs stands there by name."""
+    told = tmp_path / "log.txt"
+    options = ["--set", "mode.petsc=-route krylov", "--petsc", f"-log_view :{told}"]
+    run = ["run", str(CASE), "--out", str(tmp_path / "run"), *SHORT, *RANGE, *options]
+    subprocess.run([sys.executable, "-m", "fretwave", *run], check=True, capture_output=True)
+    text = told.read_text()
+    stage = text[text.index("Event Stage 2: mode") :]
+    counts = {line.split()[0]: int(line.split()[1]) for line in stage.splitlines() if line.startswith("Fw")}
+    parts = ("FwContactForce", "FwContactJacob", "FwContactBlocks", "FwStructure", "FwPCBuild", "FwPCFollow")
+    assert all(counts[name] > 0 for name in (*parts, "FwPairs", "FwErrorEstimate", "FwSummary"))
+    assert counts["FwSummary"] < counts["FwContactForce"] < counts["FwStructure"]
 
 
 def test_failure_before_the_first_point_makes_no_folder(tmp_path: Path, capfd) -> None:

@@ -19,6 +19,9 @@ COMMON = (
 )
 
 
+#: Options of PETSc itself, which it reads at its end: the same for all analyses.
+WHOLE = ("log_view", "log_view_memory")
+
 #: What a complaint of PETSc says of the value it wants.
 WANTED = (
     ("no numeric value", "a number"),
@@ -83,7 +86,7 @@ def parse(text: str) -> list[tuple[str, str | None]]:
 
 
 class AnalysisOptions:
-    """Options of one analysis in PETSc's database.
+    """Options of one analysis in PETSc's database; its work is a stage of -log_view by its name.
 
     Parameters
     ----------
@@ -98,7 +101,8 @@ class AnalysisOptions:
         self.pairs = {}
         for text in texts:
             for name, value in parse(text):
-                self.pairs[name if name.startswith(prefix) else prefix + name] = value
+                own = name if name in WHOLE or name.startswith(prefix) else prefix + name
+                self.pairs[own] = value
 
     @contextmanager
     def inserted(self) -> Iterator[None]:
@@ -108,6 +112,10 @@ class AnalysisOptions:
         database: Any = PETSc.Options()
         for name, value in self.pairs.items():
             database.setValue(name, value)
+        if not set(WHOLE).isdisjoint(self.pairs):
+            PETSc.Log.begin()
+        stage = PETSc.Log.Stage(self.prefix.rstrip("_"))
+        stage.push()
         try:
             yield
         except (PetscError, PETSc.Error) as error:
@@ -115,8 +123,10 @@ class AnalysisOptions:
                 raise
             raise self._blamed(" ".join(PETSc.Error._traceback_[-1:])) from error
         finally:
+            stage.pop()
             for name in self.pairs:
-                database.delValue(name)
+                if name not in WHOLE:
+                    database.delValue(name)
 
     def _blamed(self, complaint: str) -> InputError:
         """PETSc failed under the user's options: the one that its complaint speaks of, or all."""
@@ -147,7 +157,7 @@ class AnalysisOptions:
         if not self.pairs:
             return
         names = {re.split(r"[ =]", text.lstrip("-"))[0] for text in unused()}
-        wrong = [name for name in self.pairs if name in names]
+        wrong = [name for name in self.pairs if name in names and name not in WHOLE]
         if not wrong:
             return
         plain = wrong[0][len(self.prefix) :]
