@@ -28,11 +28,6 @@ def on(contacts: Sequence[Contact], structure: Structure) -> list[Contact]:
     return [replace(contact, pairs=structure.pairs[contact.name]) for contact in contacts]
 
 
-def closed_contacts(contacts: Sequence[Contact]) -> list[Contact]:
-    """The same contacts with every pair closed at rest, whatever its load and gap."""
-    return [contact.closed() for contact in contacts]
-
-
 def wear_areas(contacts: Sequence[Contact]) -> dict[str, Array]:
     """Nodal areas (n_pairs,) [length^2] of the contacts that can wear: those whose law has a normal direction.
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
+from ..model.contact import in_limit
 from .checks_tables import waves_of
-from .contacts import closed_contacts
 from .schema import ReductionSection
 
 if TYPE_CHECKING:
@@ -125,7 +125,7 @@ def _stuck_hz(case: Case, count: int, comm: MPI.Comm) -> list[float]:
     from ..model.modes import linear_modes
 
     plain = replace(case.structure, C=None, stiffness_damping=0.0, mass_damping=0.0)
-    with plain.model(closed_contacts(case.contacts), comm) as model:
+    with plain.model(in_limit(case.contacts, "stuck"), comm) as model:
         return [float(mode.frequency_hz) for mode in linear_modes(model, count, "stuck")]
 
 

@@ -30,7 +30,7 @@ from ..errors import InputError
 from ..model.contact import Contact
 from ..model.model import Model
 from ..model.modes import LinearMode
-from ..model.sectors import Given, Parts, Term, by_sector, check_balanced, check_number
+from ..model.sectors import Given, Parts, Term, by_sector, check_balanced, check_number, in_wave
 from ..model.structure import Structure
 from .aerodynamics import Aerodynamics, period_of, with_terms
 
@@ -173,7 +173,7 @@ class Sector:
         if not self.ties:
             return np.asarray(q, dtype=complex)
         theta = 2 * np.pi * order * nodal_diameter / self.sectors
-        return np.asarray(sum(np.exp(-1j * k * theta) * (T @ np.asarray(q)) for k, T in self.ties.items()))
+        return in_wave(self.ties, q, theta)
 
 
 def wave(q: npt.ArrayLike, index: int, sectors: int) -> npt.NDArray[np.complex128]:

@@ -7,14 +7,11 @@ from dataclasses import dataclass, replace
 from typing import Optional, Tuple
 
 import numpy as np
-import scipy.sparse as sp
 from mpi4py import MPI
 
 from ..arrays import Array, Complex, Indices
-from ..model.contact import Contact
-from ..model.laws import PythonLaw, Role, springs
+from ..model.contact import Contact, in_limit
 from ..model.modes import linear_modes
-from ..model.sectors import by_sector
 from .sector import Sector
 
 #: Nodal diameters, and the state of the contact.
@@ -97,26 +94,8 @@ class SectorWaves:
 
     def _one(self, wave: Wave, count: int, dofs: Indices) -> tuple[Array, list[Complex]]:
         diameter, state = wave
-        contacts = [_closed(c) if state == "stuck" else _sliding(c) for c in self.sector.contacts]
-        sector = replace(self.sector, contacts=[c for c in contacts if c is not None])
+        sector = replace(self.sector, contacts=in_limit(self.sector.contacts, state))
         with sector.model(diameter, MPI.COMM_SELF) as model:
             modes = linear_modes(model, count, "stuck")
         shapes = [sector.expand(m.shape + 1j * m.imaginary, diameter)[dofs] for m in modes]
         return np.array([mode.frequency_hz for mode in modes]), shapes
-
-
-def _closed(contact: Contact) -> Contact:
-    """Closed at rest, whatever its load and gap."""
-    if isinstance(contact.law, PythonLaw) or contact.info.normal is None:
-        return contact
-    return replace(contact, parameters={**contact.parameters, **contact.info.closing()})
-
-
-def _sliding(contact: Contact) -> Contact | None:
-    """What is left of a closed contact without tangential forces: its normal springs, as sliders that never slip."""
-    stiffness, normal = contact.value(Role.NORMAL_STIFFNESS), contact.info.normal
-    if normal is None or stiffness is None:
-        return None
-    normals = {k: sp.csr_matrix(B)[normal :: contact.components] for k, B in by_sector(contact.B).items()}
-    law, parameters = springs(stiffness)
-    return Contact(law, normals, parameters, contact.name)

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import scipy.sparse as sp
 
 from ..arrays import Array
 from ..errors import InputError
-from .laws import LawInfo, ParameterInfo, PythonLaw, Role, core_law, laws, python_law
+from .laws import LawInfo, ParameterInfo, PythonLaw, Role, core_law, laws, python_law, springs
 from .pairs import Pairs, Values, repeated
 from .sectors import Term, by_sector
 
@@ -84,6 +86,15 @@ class Contact:
     def closed(self) -> Contact:
         """Every pair closed at rest, whatever its load and gap."""
         return replace(self, parameters={**self.parameters, **self.info.closing()})
+
+    def sliding(self) -> Contact | None:
+        """What is left of it closed and without friction: springs along the normals; None of a law without any."""
+        stiffness, normal = self.value(Role.NORMAL_STIFFNESS), self.info.normal
+        if normal is None or stiffness is None:
+            return None
+        normals = {k: sp.csr_matrix(B)[normal :: self.components] for k, B in by_sector(self.B).items()}
+        law, parameters = springs(stiffness)
+        return Contact(law, normals, parameters, self.name)
 
     def around(self, sectors: int) -> Contact:
         """The pairs of all sectors of a wheel, one after the other."""
@@ -179,6 +190,18 @@ class Contact:
                 f"a number{f' {sign} {low:g}' if low > -1e300 else ''} [{parameter.unit}]",
                 "give a value within the bound; leave out pairs that stand for no area",
             )
+
+
+#: Linear limits of a contact: every pair closed and stuck, closed and sliding without friction, no contact at all.
+LIMITS = ("stuck", "sliding", "free")
+
+
+def in_limit(contacts: Sequence[Contact], limit: str) -> list[Contact]:
+    """Contacts whose stuck linear modes are those of the given ones in a limit (`LIMITS`)."""
+    if limit == "stuck":
+        return [contact.closed() for contact in contacts]
+    left = [contact.sliding() for contact in contacts] if limit == "sliding" else []
+    return [contact for contact in left if contact is not None]
 
 
 def span(value: npt.ArrayLike) -> str:

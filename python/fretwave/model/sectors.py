@@ -37,6 +37,12 @@ def by_sector(given: Term | None) -> Parts:
     return {k: given[k] for k in sorted(given, key=lambda k: (k != 0, k))}
 
 
+def in_wave(given: Term | None, q: npt.ArrayLike, theta: float) -> npt.NDArray[np.complex128]:
+    """sum_k A_k q e^{-i k theta}: terms on the complex amplitudes of a wave, theta later from sector to sector."""
+    parts = by_sector(given).items()
+    return np.asarray(sum(np.exp(-1j * k * theta) * (A @ np.asarray(q)) for k, A in parts))
+
+
 def around(given: Term, sectors: int) -> Sparse:
     """Block-circulant matrix of the wheel, from the own part of a sector and those on the sectors k places ahead."""
     ahead = sp.csr_matrix(np.roll(np.eye(sectors), 1, axis=1))  # row j has its 1 in column j + 1

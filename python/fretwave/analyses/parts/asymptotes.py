@@ -4,16 +4,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
 
 from ...case.analysis import AnalysisSection
-from ...case.harmonic import HarmonicSection
+from ...case.harmonic import HarmonicSection, nodal_diameter
+from ...model.contact import in_limit
 from .context import AnalysisContext
 
 if TYPE_CHECKING:
+    from mpi4py import MPI
+
+    from ...case.load import Case
+    from ...model.model import Model
     from ...model.modes import LinearMode
 
 #: Modes looked through for the one most like the stuck mode, beyond its own number.
@@ -32,27 +38,29 @@ def other_asymptote(context: AnalysisContext[HarmonicSection], stuck: LinearMode
     """
     if not context.case.contacts:
         return {}
-    from ...model.model import Model
-    from ...model.modes import linear_modes
-
     count = min(context.model.n_dof, context.analysis.linear_mode + MORE_MODES)
     if all(contact.components == 1 for contact in context.case.contacts):
-        return {"free_omega": omega_most_alike(context, context.linear_mode("free", count), stuck)}
-    if context.case.neighbours is not None:
-        context.leave_out(["the closed and sliding asymptote (not computed for a sector of a wheel)"])
-        return {}
-    K = context.case.K + closed_stiffness(context)
-    with Model(context.case.M, K, comm=context.comm) as model:
-        return {"sliding_omega": omega_most_alike(context, linear_modes(model, count, contact="free"), stuck)}
+        return {"free_omega": most_like(context, context.linear_mode("free", count), stuck).omega}
+    from ...model.modes import linear_modes
+
+    with limit_model(context.case, context.comm, "sliding", nodal_diameter(context.analysis)) as model:
+        return {"sliding_omega": most_like(context, linear_modes(model, count), stuck).omega}
 
 
-def closed_stiffness(context: AnalysisContext[AnalysisSection], tangential: bool = False) -> sp.csr_matrix:
-    """Stiffness of all pairs closed, on the dofs: sum kn b_n b_n^T, and kt b_t b_t^T when they do not slide."""
+def limit_model(case: Case, comm: MPI.Comm, limit: str, diameters: int = 0) -> Model:
+    """The model with its contacts in a linear limit (`fretwave.model.contact.LIMITS`), in a wave. Collective."""
+    from ...case.build import build_model
+
+    return build_model(replace(case, contacts=in_limit(case.contacts, limit)), (), comm, nodal_diameter=diameters)
+
+
+def closed_stiffness(context: AnalysisContext[AnalysisSection]) -> sp.csr_matrix:
+    """Stiffness of all pairs closed and stuck, on the dofs: sum k_b b b^T over normals and tangents."""
     total = sp.csr_matrix(context.case.K.shape)
     for contact in context.case.contacts:
         for row in range(contact.components):
             value = contact.value(contact.info.stiffness_along(row))
-            if value is not None and (tangential or row == contact.info.normal):
+            if value is not None:
                 rows = contact.pairs.own[row :: contact.components]
                 stiffness = np.broadcast_to(value, (contact.n_pairs,))
                 total = total + rows.T @ sp.diags(stiffness) @ rows
@@ -67,11 +75,9 @@ def asymptote_line(name: str, stuck: float, other: dict[str, float]) -> str:
     return f"{name}: asymptotes: {', '.join(texts)}"
 
 
-def omega_most_alike(
-    context: AnalysisContext[AnalysisSection], modes: Sequence[LinearMode], stuck: LinearMode
-) -> float:
-    """Frequency of the mode most like another [rad/s]."""
+def most_like(context: AnalysisContext[AnalysisSection], modes: Sequence[LinearMode], stuck: LinearMode) -> LinearMode:
+    """The mode most like another, by the product of their shapes with M."""
     M, wanted = context.case.M, stuck.shape + 1j * stuck.imaginary
     shapes = [mode.shape + 1j * mode.imaginary for mode in modes]
     likeness = [abs(phi.conj() @ (M @ wanted)) / math.sqrt((phi.conj() @ (M @ phi)).real) for phi in shapes]
-    return float(modes[int(np.argmax(likeness))].omega)
+    return modes[int(np.argmax(likeness))]

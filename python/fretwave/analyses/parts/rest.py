@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING, Optional
 
 import numpy as np
 import scipy.sparse.linalg
 
 from ...case.analysis import AnalysisSection
-from ...case.contacts import closed_contacts
 from ...case.harmonic import LEAST_HARMONICS, LEAST_SAMPLES, HarmonicSection, nodal_diameter
 from ...case.schema import PreloadSection
 from ...errors import InputError
 from ...model.contact import Contact
 from ...model.laws import Role, own_load
-from .asymptotes import closed_stiffness
+from .asymptotes import closed_stiffness, limit_model
 from .context import AnalysisContext
 
 if TYPE_CHECKING:
@@ -62,7 +60,7 @@ def loaded_state(context: AnalysisContext[AnalysisSection], factor: float = 1.0)
     load = factor * np.sum([context.case.loads[name] for name in section.loads], axis=0)
     closed = None
     if context.case.neighbours is None and just_touching(context.case.contacts, section):
-        stuck = context.case.K + closed_stiffness(context, tangential=True)
+        stuck = context.case.K + closed_stiffness(context)
         closed = scipy.sparse.linalg.spsolve(stuck.tocsc(), load)
     return static_preload(context.model, load, reference, closed=closed)
 
@@ -81,11 +79,9 @@ def just_touching(contacts: Sequence[Contact], section: PreloadSection) -> bool:
 
 def closed_mode(context: AnalysisContext[AnalysisSection]) -> LinearMode:
     """Lowest linear mode with every pair stuck, also those that do not touch before the load: a scale. Collective."""
-    from ...case.build import build_model
     from ...model.modes import linear_modes
 
-    case = replace(context.case, contacts=closed_contacts(context.case.contacts))
-    with build_model(case, (), context.comm, nodal_diameter=nodal_diameter(context.analysis)) as model:
+    with limit_model(context.case, context.comm, "stuck", nodal_diameter(context.analysis)) as model:
         return linear_modes(model, 1)[0]
 
 

@@ -15,7 +15,7 @@ from ...arrays import Complex
 from ...case.analysis import AnalysisSection
 from ...case.harmonic import HarmonicSection, nodal_diameter
 from ...case.observed import dof_of
-from .asymptotes import omega_most_alike, other_asymptote
+from .asymptotes import most_like, other_asymptote
 from .context import AnalysisContext
 from .observed import observed_by
 from .rest import rest_state, start_mode
@@ -206,7 +206,7 @@ def _free(context: AnalysisContext[ModeAnalysis], mode: LinearMode) -> dict[str,
     if any(contact.components > 1 for contact in context.case.contacts) or not context.case.contacts:
         return {}
     free = nearest_modes(context, mode.omega, context.wheel.sectors, "free")
-    return {"free_omega": omega_most_alike(context, free, mode)}
+    return {"free_omega": most_like(context, free, mode).omega}
 
 
 def nearest_modes(
