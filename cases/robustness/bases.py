@@ -87,11 +87,12 @@ def two_dof() -> dict[str, Any]:
 
 
 def blisk() -> dict[str, Any]:
-    """Sector, wheel, mistuned wheel and flutter of the lumped blisk, on few points."""
+    """Sector, wheel, mistuned wheel, flutter and linear waves of the lumped blisk, on few points."""
     case = load(BLISK)[0]
     for analysis in case["analysis"]:
-        analysis.update(harmonics=1, samples=48, step={"max_points": 2})
-        if analysis["type"] == "flutter":
+        if "harmonics" in analysis:
+            analysis.update(harmonics=1, samples=48, step={"max_points": 2})
+        if analysis["type"] in ("flutter", "linear"):
             analysis["nodal_diameters"] = [4]
     case["quick"] = {"mode.harmonics": 1}
     return case

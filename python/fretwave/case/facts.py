@@ -38,6 +38,8 @@ class Facts:
         Known contact laws.
     loads : sequence of str, optional
         Static loads of the model; None where it could not be read.
+    parts : sequence of str, optional
+        Parts of the model's stiffness (`Structure.parts`); None where it could not be read.
     preload, flow :
         Tables of the case; None where there are none, or where they are wrong.
     """
@@ -52,6 +54,7 @@ class Facts:
     complete: bool = False
     laws: Mapping[str, Any] = field(default_factory=dict)
     loads: Optional[Sequence[str]] = None
+    parts: Optional[Sequence[str]] = None
     preload: Optional[PreloadSection] = None
     flow: Optional[AerodynamicsSection] = None
 

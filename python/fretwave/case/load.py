@@ -147,6 +147,7 @@ def _build(
         complete=len(contacts) == len(source.entries("contact")),
         laws=laws,
         loads=list(structure.loads) if structure else None,
+        parts=list(structure.parts) if structure else None,
         preload=preload,
         flow=flow,
     )

@@ -119,7 +119,8 @@ def _error(table: dict[str, Any], unit: str) -> str:
 
 
 def _range(table: dict[str, Any], of_amplitude: str) -> str:
-    key, unit = ("frequency_hz", "Hz") if "level" in table else ("amplitude", of_amplitude)
+    over_frequency = "level" in table or "other_hz" in table  # responses, linear modes
+    key, unit = ("frequency_hz", "Hz") if over_frequency else ("amplitude", of_amplitude)
     values = table.get(key, np.empty(0))
     if not len(values):
         return ""

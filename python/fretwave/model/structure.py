@@ -284,10 +284,21 @@ class Structure:
         T_j gives the dofs of sector j, both faces among them, from those of the wheel: a part that reaches a face is
         shared with the next sector.
         """
+        T = around(self.ties or {0: sp.identity(self.n_dof)}, self._sectors())
+        return sp.csr_matrix(T.T @ sp.kron(sp.diags(deviations), self._part(of)) @ T)
+
+    def stiffened(self, of: str, factor: float) -> Structure:
+        """The same with K grown by a factor times a part of it, in every sector alike."""
+        added = tie(factor * self._part(of), self.ties or {0: sp.identity(self.n_dof)}) or {}
+        K = dict(by_sector(self.K))
+        for k, A in added.items():
+            K[k] = sp.csr_matrix(K[k] + A if k in K else A)
+        return replace(self, K=_plain(K))
+
+    def _part(self, of: str) -> Sparse:
         if of not in self.parts:
             raise InputError("there is no such part of the stiffness", None, of, ", ".join(self.parts), "name a part")
-        T = around(self.ties or {0: sp.identity(self.n_dof)}, self._sectors())
-        return sp.csr_matrix(T.T @ sp.kron(sp.diags(deviations), self.parts[of]) @ T)
+        return sp.csr_matrix(self.parts[of])
 
     def reduced(self, reduction: Reduction | SectorReduction) -> Structure:
         """On the coordinates of a reduction of it, whose faces (of a sector) are free again. Collective.
@@ -297,7 +308,7 @@ class Structure:
         InputError
             The reduction did not keep a dof of the pairs.
         """
-        unit = reduction.expand(np.eye(reduction.size)) if self.parts and self.sectors else None
+        unit = reduction.expand(np.eye(reduction.size)) if self.parts else None
         parts = {} if unit is None else {n: sp.csr_matrix(reduction.project(A @ unit)) for n, A in self.parts.items()}
         M, K, C = (None if A is None else sp.csr_matrix(A) for A in (reduction.M, reduction.K, reduction.C))
         return replace(

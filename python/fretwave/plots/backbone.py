@@ -147,29 +147,29 @@ def _below(axes: Axes, text: str) -> None:
 
 
 def _peak(axes: Axes, mode: Analysis, colour: str) -> None:
-    point = _peak_point(mode)
-    if not _is_peak(mode, point):
+    point = peak_point(mode)
+    if not is_peak(mode, point):
         return
     peak = [mode.columns["amplitude"][point]], [100.0 * mode.columns["zeta"][point]]
-    axes.plot(*peak, "*", color=colour, markeredgecolor=style.INK, markersize=12, zorder=6)
+    axes.plot(*peak, **{**style.PEAK, "color": colour})
 
 
-def _peak_point(mode: Analysis) -> int:
+def peak_point(mode: Analysis) -> int:
     """Point of largest damping: the located one when there is one."""
     zeta = mode.columns["zeta"]
     return max(mode.met("peak_damping") or range(len(zeta)), key=lambda i: float(zeta[i]))
 
 
-def _is_peak(mode: Analysis, point: int) -> bool:
+def is_peak(mode: Analysis, point: int) -> bool:
     """Not where the branch ends with damping still growing."""
     return 0 < point < len(mode) - 1
 
 
 def _name(mode: Analysis) -> str:
     """Method, harmonics and the peak's numbers."""
-    point = _peak_point(mode)
+    point = peak_point(mode)
     zeta, amplitude = 100.0 * mode.columns["zeta"][point], mode.columns["amplitude"][point]
-    word = "peak" if _is_peak(mode, point) else "up to"
+    word = "peak" if is_peak(mode, point) else "up to"
     return f"{mode.method()}, {_harmonics(mode)}: {word} ζ {zeta:.3g} % at {amplitude:.3g} {mode.unit('amplitude')}"
 
 

@@ -25,6 +25,16 @@ PALETTE = (BLUE, ORANGE, GREEN, RED, PURPLE, SKY)
 GREY = "#666666"
 INK = "#222222"
 
+#: Marker of a largest damping.
+PEAK: dict[str, Any] = {
+    "marker": "*",
+    "linestyle": "",
+    "color": ORANGE,
+    "markeredgecolor": INK,
+    "markersize": 12,
+    "zorder": 6,
+}
+
 WIDTH = 8.0  # [inch]; with DPI 130 about 1040 pixels, a README shows 800 to 900
 DPI = 130
 

@@ -1,0 +1,190 @@
+"""``type = "linear"``: frequencies and shapes with the contact stuck, sliding and free, and what engine orders meet.
+
+The three limits are those that the backbone of a nonlinear mode runs between: every pair closed and stuck, closed and
+sliding without friction, and no contact at all. Pairs count as closed whatever the loads at rest are.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Optional
+
+import numpy as np
+from pydantic import Field
+
+from ..case.analysis import AnalysisSection, register_analysis
+from ..case.checks_common import about
+from ..case.schema import Positive, Whole, key
+from ..model.contact import LIMITS
+from ..post.engine_orders import usual_orders
+from ..texts import counted, nearest
+from .parts.context import AnalysisContext, Outcome
+from .parts.linear_waves import columns_of, crossings_of, modes_of_wave
+
+if TYPE_CHECKING:
+    from ..case.facts import Facts
+    from ..case.reporter import Reporter
+
+#: Time samples of a period in views.
+SAMPLES = 96
+#: Crossings told on the terminal.
+TOLD = 3
+
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+
+
+@register_analysis
+class LinearAnalysis(AnalysisSection):
+    """``type = "linear"``: linear modes, of a sector over nodal diameters; crossings with engine orders."""
+
+    pictures = ("safe", "campbell")
+
+    type: Literal["linear"]
+    modes: Whole = key("linear modes of each contact and wave, from the lowest", example="6", default=6, ge=1)
+    contact: Optional[list[Literal["stuck", "sliding", "free"]]] = key(
+        "every pair closed and stuck, closed and sliding without friction, or no contact; all that differ unless told",
+        example='["stuck", "free"]',
+        default=None,
+        min_length=1,
+    )
+    nodal_diameters: Optional[list[Annotated[Whole, Field(ge=0)]]] = key(
+        "waves of a sector, all unless told", example="[0, 1, 2, 3]", default=None, min_length=1
+    )
+    speed_rpm: Optional[Positive] = key("operating speed of the crossings' margins", "rev/min", "3000.0", default=None)
+    up_to_rpm: Optional[Positive] = key(
+        "highest speed of the Campbell diagram (1.25 times speed_rpm unless told)", "rev/min", "4000.0", default=None
+    )
+    engine_orders: Optional[list[Annotated[Whole, Field(ge=1)]]] = key(
+        "orders whose crossings are sought; unless told ND and N - ND of each wave, of a structure 1 to 6",
+        example="[4, 20]",
+        default=None,
+        min_length=1,
+    )
+    spin_stiffness: Optional[str] = key(
+        "part K2 that the builder gives [mass]: K + Omega^2 K2 is the stiffness of the turning structure",
+        example='"spin"',
+        default=None,
+    )
+    speeds_rpm: Optional[list[NotNegative]] = key(
+        "speeds at which modes are found with spin_stiffness",
+        "rev/min",
+        "[0.0, 1500.0, 3000.0]",
+        default=None,
+        min_length=2,
+    )
+
+    def limits(self, normal: bool, any_contact: bool) -> list[str]:
+        """Linear limits of the contact that it looks at: those it names, or all that differ."""
+        if self.contact is not None:
+            return [limit for limit in LIMITS if limit in self.contact]
+        differ = {"stuck": any_contact, "sliding": normal, "free": True}
+        return [limit for limit in LIMITS if differ[limit]]
+
+    def waves(self, sectors: int) -> list[int]:
+        """Nodal diameters that it looks at, ascending; of a structure (no sectors) 0."""
+        if not sectors:
+            return [0]
+        return sorted(set(self.nodal_diameters or range(sectors // 2 + 1)))
+
+    def speeds(self) -> list[float]:
+        """Speeds [rev/min] at which it finds modes: 0 where they are the same at all."""
+        return [0.0] if self.speeds_rpm is None else list(self.speeds_rpm)
+
+    def orders(self, sectors: int) -> list[int]:
+        """Engine orders whose crossings it seeks; none without an operating speed."""
+        if self.speed_rpm is None:
+            return []
+        return sorted(set(self.engine_orders or usual_orders(self.waves(sectors), sectors)))
+
+    def check(self, report: Reporter, facts: Facts) -> None:
+        super().check(report, facts)
+        if facts.model_known and facts.sectors is None and self.nodal_diameters is not None:
+            fix = "remove the key, or give [model] its sectors"
+            about(report, "nodal_diameters", "are of no sector of a wheel", "a model with sectors", fix)
+        for index, diameters in enumerate(self.nodal_diameters or []):
+            if facts.sectors is not None and diameters > facts.sectors // 2:
+                expected = f"0 .. {facts.sectors // 2} of {facts.sectors} sectors"
+                report.wrong(("nodal_diameters", index), "is no wave of this wheel", expected, "take it out")
+        if facts.complete and not facts.contacts and set(self.contact or ()) - {"free"}:
+            report.wrong(("contact",), "is of a model without contact", '["free"]', "remove the key")
+        self._check_operating_speed(report)
+        self._check_spin(report, facts)
+
+    def _check_operating_speed(self, report: Reporter) -> None:
+        if self.speed_rpm is None:
+            for name in ("engine_orders", "up_to_rpm"):
+                if getattr(self, name) is not None:
+                    what, fix = (
+                        "says no operating speed to measure margins from",
+                        "add for example `speed_rpm = 3000.0`",
+                    )
+                    report.wrong((name,), what, "speed_rpm beside it", fix)
+        elif self.up_to_rpm is not None and not self.up_to_rpm > self.speed_rpm:
+            fix = f"write `up_to_rpm = {1.25 * self.speed_rpm:g}`, or leave the key out"
+            report.wrong(("up_to_rpm",), "leaves out the operating speed", f"more than {self.speed_rpm:g}", fix)
+
+    def _check_spin(self, report: Reporter, facts: Facts) -> None:
+        given, speeds = self.spin_stiffness, self.speeds_rpm
+        if (given is None) != (speeds is None):
+            name, other = ("speeds_rpm", "spin_stiffness") if given is None else ("spin_stiffness", "speeds_rpm")
+            report.wrong((name,), f"needs {other}", "both keys", f"add `{other}`, or remove the key")
+        if speeds is not None and any(not before < after for before, after in zip(speeds, speeds[1:])):
+            report.wrong(("speeds_rpm",), "is out of order", "ascending speeds", f"write {sorted(set(speeds))}")
+        if given is not None and facts.parts is not None and given not in facts.parts:
+            fix = nearest(given, facts.parts) or "name a part that the builder gives (Structure.parts)"
+            known = ", ".join(facts.parts) or "(there is none)"
+            report.wrong(("spin_stiffness",), "is no part of the stiffness", f"one of {known}", fix)
+
+    def headline(self) -> str:
+        named = "" if self.nodal_diameters is None else f", nodal diameters {', '.join(map(str, self.nodal_diameters))}"
+        contact = "each contact that differs" if self.contact is None else f"contact {', '.join(self.contact)}"
+        about_speed = "" if self.speed_rpm is None else f", crossings about {self.speed_rpm:g} rev/min"
+        over = "" if self.speeds_rpm is None else f", at {counted(len(self.speeds_rpm), 'speed')}"
+        return f"{counted(self.modes, 'linear mode')} of {contact}{named}{over}{about_speed}"
+
+    def run(self, context: AnalysisContext[LinearAnalysis]) -> Outcome:
+        """Solve every wave in every limit of the contact, at every speed. Collective."""
+        neighbours = context.case.neighbours
+        sectors = neighbours.sectors if neighbours else 0
+        columns, orders = columns_of(sectors, self.spin_stiffness is not None), json.dumps(self.orders(sectors))
+        writer = context.writer(columns, ["1c", "1s"], samples=SAMPLES, sectors=sectors, engine_orders=orders)
+        rows: list[dict[str, Any]] = []
+        for diameters in self.waves(sectors):
+            for speed in self.speeds():
+                for row, mode in modes_of_wave(context, diameters, speed):
+                    rows.append({"point": writer.rows, **row})
+                    writer.append(rows[-1], np.column_stack([mode.shape, -mode.imaginary]))
+        writer.close("done", "all modes")
+        return Outcome(writer.rows, "all modes", True, [*_summary(context, rows), *_meet(context, rows, sectors)])
+
+
+def _summary(context: AnalysisContext[LinearAnalysis], rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """A line for each limit of the contact."""
+    lines = []
+    for limit in dict.fromkeys(row["contact"] for row in rows):
+        own = [row for row in rows if row["contact"] == limit]
+        waves = len({row["nodal_diameter"] for row in own})
+        over = f" in {counted(waves, 'wave')}" if context.case.neighbours else ""
+        low, high = (end(row["frequency_hz"] for row in own) for end in (min, max))
+        lines.append(f"{context.name}: {limit}: {counted(len(own), 'mode')}{over}, {low:.6g} to {high:.6g} Hz")
+    return lines
+
+
+def _meet(context: AnalysisContext[LinearAnalysis], rows: Sequence[Mapping[str, Any]], sectors: int) -> list[str]:
+    """Write ``<name>_crossings.csv``; a line for each of the nearest."""
+    speed = context.analysis.speed_rpm
+    if speed is None:
+        return []
+    names, found = crossings_of(rows, context.analysis.orders(sectors), sectors, speed)
+    context.write_table("crossings", {name: [one[name] for one in found] for name in names})
+    near = sorted(found, key=lambda one: abs(one["margin"]))[:TOLD]
+    return [f"{context.name}: {_told(one)}" for one in near]
+
+
+def _told(one: Mapping[str, Any]) -> str:
+    wave = f" of {counted(one['nodal_diameter'], 'nodal diameter')}" if "nodal_diameter" in one else ""
+    return (
+        f"engine order {one['engine_order']} meets mode {one['mode']}{wave}, {one['contact']}, at"
+        f" {one['speed_rpm']:.5g} rev/min ({100 * one['margin']:+.3g} % of the operating speed)"
+    )

@@ -1,0 +1,126 @@
+"""Linear modes of a wave with its contacts in every limit, as rows of a table, and what engine orders meet."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, Optional
+
+import numpy as np
+
+from ...columns import MODAL_UNIT, Column
+from ...errors import InputError
+from ...model.sectors import Term, in_wave
+from ...post.engine_orders import exciting, margins
+from .asymptotes import MORE_MODES, limit_model, most_like
+from .context import AnalysisContext
+
+if TYPE_CHECKING:
+    from ...case.load import Case
+    from ...model.modes import LinearMode
+    from ..linear import LinearAnalysis
+
+#: A mode below this share of the highest is a rigid motion: no engine order meets it.
+RIGID = 1e-6
+#: Of a crossing, after what tells its mode.
+CROSSING = ("engine_order", "speed_rpm", "frequency_hz", "margin")
+TO_OMEGA = 2 * np.pi / 60
+
+COLUMNS = (
+    Column("mode", "1", "number of the mode of this contact and wave, 1 is the lowest", "i"),
+    Column("amplitude", "length", f"largest amplitude of a dof where the mode's coordinate is 1 {MODAL_UNIT}"),
+    "omega",
+    "frequency_hz",
+    Column("zeta", "1", "damping ratio by C, to first order: phi* C phi / (2 omega phi* M phi)"),
+    Column("other_hz", "Hz", "of a stuck mode: frequency of the mode most like it with contact sliding, else free"),
+)
+
+
+def columns_of(sectors: int, spins: bool) -> list[str | Column]:
+    """Columns of the table, of a sector and with stiffness that depends on the speed."""
+    first = [Column("point", "1", "number of the row", "i"), Column("contact", "", "stuck, sliding or free", "s")]
+    if sectors:
+        first.append(Column("nodal_diameter", "1", "nodal diameters of the wave", "i"))
+    if spins:
+        first.append(Column("speed_rpm", "rev/min", "speed of the wheel"))
+    return [*first, *COLUMNS]
+
+
+def modes_of_wave(
+    context: AnalysisContext[LinearAnalysis], diameters: int, speed_rpm: float
+) -> Iterator[tuple[dict[str, Any], LinearMode]]:
+    """Rows of a wave at a speed and their modes, limit by limit. Collective."""
+    case, neighbours = _spinning(context, speed_rpm), context.case.neighbours
+    theta = 2 * np.pi * diameters / neighbours.sectors if neighbours else 0.0
+    C = context.case.damped(context.analysis.dampers).C
+    found = {limit: _modes(context, case, limit, diameters) for limit in _limits(context)}
+    loose = next((found[limit] for limit in ("sliding", "free") if limit in found), [])
+    for limit, modes in found.items():
+        for number, mode in enumerate(modes[: context.analysis.modes], 1):
+            yield (
+                {
+                    "contact": limit,
+                    "nodal_diameter": diameters,
+                    "speed_rpm": speed_rpm,
+                    "mode": number,
+                    "amplitude": float(np.hypot(mode.shape, mode.imaginary).max()),
+                    "omega": mode.omega,
+                    "frequency_hz": mode.frequency_hz,
+                    "zeta": damping_ratio(mode, C, theta),
+                    "other_hz": most_like(context, loose, mode).frequency_hz if limit == "stuck" and loose else np.nan,
+                },
+                mode,
+            )
+
+
+def _spinning(context: AnalysisContext[LinearAnalysis], speed_rpm: float) -> Case:
+    part = context.analysis.spin_stiffness
+    if part is None:
+        return context.case
+    return replace(context.case, structure=context.case.structure.stiffened(part, (TO_OMEGA * speed_rpm) ** 2))
+
+
+def _limits(context: AnalysisContext[LinearAnalysis]) -> list[str]:
+    contacts = context.case.contacts
+    return context.analysis.limits(any(contact.sliding() is not None for contact in contacts), bool(contacts))
+
+
+def _modes(context: AnalysisContext[LinearAnalysis], case: Case, limit: str, diameters: int) -> list[LinearMode]:
+    """Modes of a wave; where another's likeness is sought among them, more than are told. Maybe none. Collective."""
+    from ...model.modes import linear_modes
+
+    with limit_model(case, context.comm, limit, diameters) as model:
+        count = min(model.n_dof, context.analysis.modes + (MORE_MODES if limit != "stuck" else 0))
+        try:
+            return linear_modes(model, count)
+        except InputError:
+            if limit != "stuck" or context.analysis.contact == ["stuck"]:
+                raise
+            context.console.line(f"{context.name}: contact that sticks leaves nothing to move")
+            return []
+
+
+def damping_ratio(mode: LinearMode, C: Optional[Term], theta: float = 0.0) -> float:
+    """Modal damping ratio of an undamped mode of unit modal mass, to first order in C; theta of a sector's wave."""
+    if C is None or not mode.omega:
+        return 0.0
+    phi = mode.shape + 1j * mode.imaginary
+    return float((phi.conj() @ in_wave(C, phi, theta)).real / (2 * mode.omega))
+
+
+def crossings_of(
+    rows: Sequence[Mapping[str, Any]], orders: Sequence[int], sectors: int, speed_rpm: float
+) -> tuple[list[str], list[dict[str, Any]]]:
+    """Columns and rows of the table of crossings: every mode with the orders that excite its wave."""
+    highest = max((row["frequency_hz"] for row in rows), default=0.0)
+    names = ["contact", "nodal_diameter", "mode"] if sectors else ["contact", "mode"]
+    modes: dict[tuple[Any, ...], list[Mapping[str, Any]]] = {}
+    for row in rows:
+        modes.setdefault(tuple(row[name] for name in ("contact", "nodal_diameter", "mode")), []).append(row)
+    found = []
+    for (_, diameters, _), mode in modes.items():
+        hz = np.array([row["frequency_hz"] for row in mode])
+        if hz.max() > RIGID * highest:
+            speeds, known = np.array([row["speed_rpm"] for row in mode]), {name: mode[0][name] for name in names}
+            found += margins(known, speeds, hz, exciting(orders, diameters, sectors), speed_rpm)
+    return [*names, *CROSSING], found

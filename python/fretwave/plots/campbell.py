@@ -1,0 +1,150 @@
+"""Campbell diagram: frequencies over the rotor's speed, engine orders, and where they meet."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ..post.engine_orders import crossing_speeds, exciting
+from ..results.reader import Analysis, Run
+from . import style
+from .linear_bands import PEAK_NAME, Band, Peak, bands, highest, other_entry, peaks
+
+#: Waves in a picture: those whose crossings are nearest to the operating speed.
+WAVES = 6
+#: Highest speed over the operating speed, unless told.
+UP_TO = 1.25
+#: Crossings nearer to the operating speed than this share of it have their margin written.
+NEAR = 0.2
+#: Height of a panel over its highest mode, and at most over what its engine orders reach; points of a curve.
+ABOVE, OVER_ORDERS, POINTS = 1.06, 1.6, 101
+#: Least distance of the names of engine orders, as a share of a panel's height.
+APART = 0.09
+
+
+def figures(run: Run) -> Iterator[tuple[str, Figure]]:
+    """One picture per linear analysis with an operating speed."""
+    for linear in run.of_kind("linear"):
+        if linear.attributes.get("engine_orders"):
+            yield f"{linear.name}_campbell", draw(run, linear)
+
+
+def draw(run: Run, linear: Analysis) -> Figure:
+    """A panel for each of the waves that the engine orders excite nearest to the operating speed."""
+    drawn, found = bands(run, linear), list(peaks(run, bands(run, linear)))
+    waves = _nearest(linear, drawn)
+    columns = min(len(waves), 2)
+    rows = -(-len(waves) // columns)
+    figure, axes = style.new_figure(5.0 if rows == 1 else 2.9 * rows, rows, columns, squeeze=False, sharex=True)
+    for panel, diameter in zip(axes.flat, waves):
+        own = [peak for peak in found if peak.diameter == diameter]
+        _panel(panel, linear, [band for band in drawn if band.diameter == diameter], own)
+        if linear.attributes["sectors"]:
+            panel.set_title(f"{diameter} nodal diameter{'s' * (diameter != 1)}")
+    if found:
+        axes.flat[0].plot([], [], **style.PEAK, label=PEAK_NAME)
+    _labels(list(axes.flat), columns, len(waves))
+    left = len({band.diameter for band in drawn}) - len(waves)
+    title = f"The {len(waves)} of {len(waves) + left} waves with crossings nearest to the operating speed"
+    style.legend_outside(figure, axes.flat[0], columns=3, title=title if left else None)
+    return figure
+
+
+def _labels(panels: Sequence[Axes], columns: int, count: int) -> None:
+    """Of the axes at the left and below; panels beyond the count are none."""
+    for number, panel in enumerate(panels):
+        panel.set_visible(number < count)
+        if number + columns >= count:
+            panel.set_xlabel(style.label("Speed", "rev/min"))
+            panel.tick_params(labelbottom=True)
+        if number % columns == 0:
+            panel.set_ylabel(style.label("Frequency", "Hz"))
+
+
+def _speed(linear: Analysis) -> float:
+    return float(linear.attributes["speed_rpm"])
+
+
+def _orders(linear: Analysis, diameter: int) -> list[int]:
+    """Engine orders that excite a wave; of a structure all of them."""
+    return exciting(linear.attributes["engine_orders"], diameter, int(linear.attributes["sectors"]))
+
+
+def _nearest(linear: Analysis, drawn: Sequence[Band]) -> list[int]:
+    """Waves with a panel, ascending."""
+    distance: dict[int, float] = {}
+    for band in drawn:
+        met = [
+            speed for order in _orders(linear, band.diameter) for speed in crossing_speeds(band.speeds, band.hz, order)
+        ]
+        away = min((abs(speed / _speed(linear) - 1.0) for speed in met), default=np.inf)
+        distance[band.diameter] = min(away, distance.get(band.diameter, np.inf))
+    return sorted(sorted(distance, key=lambda diameter: distance[diameter])[:WAVES])
+
+
+def _panel(axes: Axes, linear: Analysis, own: Sequence[Band], found: Sequence[Peak]) -> None:
+    speed, orders = _speed(linear), _orders(linear, own[0].diameter)
+    last = float(linear.attributes.get("up_to_rpm", UP_TO * speed))
+    reached = OVER_ORDERS * max(orders) * last / 60.0
+    top = max(min(ABOVE * highest(own), reached), *(ABOVE * peak.hz for peak in found), 0.0)
+    for band in own:
+        _band(axes, band, last)
+    other_entry(axes, own)
+    for band in own:
+        for order in orders:
+            _crossings(axes, band, order, speed, last)
+    _engine_orders(axes, orders, last, top)
+    axes.axvline(speed, color=style.INK, linewidth=1.0, linestyle=":", label=f"operating speed, {speed:g} rev/min")
+    for peak in found:
+        axes.plot([speed], [peak.hz], **style.PEAK)
+    axes.set_xlim(0.0, last)
+    axes.set_ylim(0.0, top)
+
+
+def _band(axes: Axes, band: Band, last: float) -> None:
+    speeds = np.linspace(0.0, last, POINTS)
+    hz, other = band.at(speeds)
+    axes.plot(speeds, hz, color=band.colour, linewidth=1.4, label=f"mode {band.number}, {band.contact}")
+    if np.isfinite(other).any():
+        axes.fill_between(speeds, hz, other, color=band.colour, alpha=0.2, linewidth=0, zorder=0.5)
+        axes.plot(speeds, other, "--", color=band.colour, linewidth=1.0)
+
+
+def _engine_orders(axes: Axes, orders: Sequence[int], last: float, top: float) -> None:
+    """Their lines from standstill, named where they leave the panel: at the right apart from each other, or above."""
+    text = {"textcoords": "offset points", "fontsize": 8.5, "color": style.GREY, "annotation_clip": False}
+    lowest = -np.inf
+    for order in sorted(orders):
+        end = min(last, 60.0 * top / order)
+        axes.plot([0.0, end], [0.0, order * end / 60.0], color=style.GREY, linewidth=0.9, zorder=1)
+        if end < last:
+            axes.annotate(f"EO {order}", (end, top), (0, 2), ha="center", va="bottom", **text)
+            continue
+        lowest = max(order * last / 60.0, lowest + APART * top)
+        axes.annotate(f"EO {order}", (last, lowest), (3, 0), ha="left", va="center", **text)
+
+
+def _crossings(axes: Axes, band: Band, order: int, speed: float, last: float) -> None:
+    """Where an engine order meets a band; by how much that lies above the operating speed, where it is near."""
+    look = {"marker": "o", "markeredgecolor": style.INK, "linestyle": ""}
+    kinds = (
+        (band.hz, band.contact, {"markerfacecolor": style.INK, "markersize": 3.0, "zorder": 5}),
+        (band.other_hz, band.other, {"markerfacecolor": "white", "markersize": 6.0, "zorder": 4.5}),
+    )
+    for hz, limit, face in kinds:
+        for met in crossing_speeds(band.speeds, hz, order):
+            axes.plot([met], [order * met / 60.0], label=f"crossing, {limit}", **look, **face)
+    for met in crossing_speeds(band.speeds, band.hz, order):
+        if abs(met / speed - 1.0) < NEAR and met < last:
+            _margin(axes, met, order * met / 60.0, met / speed - 1.0)
+
+
+def _margin(axes: Axes, speed: float, hz: float, margin: float) -> None:
+    """Its text beside a crossing, away from the operating speed and from the engine order's line."""
+    text = f"{100 * margin:+.2g} %".replace("-", "\N{MINUS SIGN}")
+    box = {"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 0.8}
+    place, side, end = ((-5, 5), "right", "bottom") if margin < 0 else ((5, -5), "left", "top")
+    axes.annotate(text, (speed, hz), place, textcoords="offset points", ha=side, va=end, fontsize=9, bbox=box, zorder=4)

@@ -1,0 +1,99 @@
+"""What the diagrams of a linear analysis share: each mode's band from stuck to sliding, and where damping peaks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from ..arrays import AnyArray
+from ..post.engine_orders import frequency_at
+from ..results.reader import Analysis, Run
+from . import style
+from .backbone import is_peak, peak_point
+
+#: A nonlinear mode belongs to a linear one when their stuck frequencies agree to this relative difference.
+SAME = 1e-3
+PEAK_NAME = "largest damping of a nonlinear mode"
+
+
+@dataclass(frozen=True)
+class Band:
+    """A linear mode in one wave; of a structure in the only one.
+
+    Attributes
+    ----------
+    number : of the mode, 1 is the lowest
+    contact, other : limits of the contact that `hz` and `other_hz` belong to
+    diameter : nodal diameters
+    speeds : (S,) ascending [rev/min]; one where the frequencies do not depend on it
+    hz, other_hz : (S,) [Hz]
+        `other_hz` of the mode most like it in the other limit, or nan.
+    """
+
+    number: int
+    contact: str
+    other: str
+    diameter: int
+    speeds: AnyArray
+    hz: AnyArray
+    other_hz: AnyArray
+
+    @property
+    def colour(self) -> str:
+        """Of its lines and its area."""
+        return style.PALETTE[(self.number - 1) % len(style.PALETTE)]
+
+    def at(self, speed: float | AnyArray) -> tuple[AnyArray, AnyArray]:
+        """Both frequencies at other speeds."""
+        return frequency_at(self.speeds, self.hz, speed), frequency_at(self.speeds, self.other_hz, speed)
+
+
+@dataclass(frozen=True)
+class Peak:
+    """Frequency [Hz] at which the damping of a nonlinear mode is largest."""
+
+    diameter: int
+    hz: float
+
+
+def bands(run: Run, linear: Analysis) -> list[Band]:
+    """Of the modes with contact stuck, or where there are none in the first of the other limits; by mode and wave."""
+    table = run.table(linear.name)
+    if table is None:
+        return []
+    contact, none = str(table["contact"][0]), np.zeros(len(table["mode"]))
+    waves, speeds = table.get("nodal_diameter", none), table.get("speed_rpm", none)
+    other = "sliding" if "sliding" in table["contact"] else "free"
+    own, found = table["contact"] == contact, []
+    for number in np.unique(table["mode"][own]):
+        for diameter in np.unique(waves[own & (table["mode"] == number)]):
+            rows = own & (table["mode"] == number) & (waves == diameter)
+            values = (speeds[rows], table["frequency_hz"][rows], table["other_hz"][rows])
+            found.append(Band(int(number), contact, other, int(diameter), *values))
+    return found
+
+
+def other_entry(axes: Axes, drawn: Sequence[Band]) -> None:
+    """The legend's word on the other ends of the bands."""
+    if any(np.isfinite(band.other_hz).any() for band in drawn):
+        axes.plot([], [], "--", color=style.GREY, linewidth=1.0, label=f"the mode most like it, {drawn[0].other}")
+
+
+def highest(drawn: Sequence[Band]) -> float:
+    """The largest frequency [Hz] of all bands."""
+    return float(np.nanmax([np.nanmax([band.hz, band.other_hz]) for band in drawn]))
+
+
+def peaks(run: Run, drawn: Sequence[Band]) -> Iterator[Peak]:
+    """Of the nonlinear modes in the folder that are done and begin in one of the bands."""
+    for mode in run.of_kind("mode"):
+        stuck, diameter = mode.asymptote("stuck"), abs(int(mode.attributes.get("nodal_diameter", 0)))
+        if stuck is None or mode.attributes.get("wheel") or mode.attributes.get("status") != "done":
+            continue
+        of_wave = np.array([hz for band in drawn if band.diameter == diameter for hz in band.hz])
+        point = peak_point(mode)
+        if is_peak(mode, point) and (np.abs(of_wave - stuck / (2 * np.pi)) < SAME * of_wave).any():
+            yield Peak(diameter, float(mode.columns["frequency_hz"][point]))
