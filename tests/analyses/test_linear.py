@@ -14,7 +14,7 @@ from fretwave.case.load import load_case
 from fretwave.commands.check import check_case
 from fretwave.errors import CaseErrors
 from fretwave.plots import campbell, safe
-from fretwave.plots.linear_bands import bands
+from fretwave.plots.linear_bands import bands, peaks
 from fretwave.post.engine_orders import crossing_speeds, excited_by, frequency_at, usual_orders
 from fretwave.results.reader import Run
 from fretwave.run.order import RunOptions
@@ -204,6 +204,20 @@ def test_a_backbone_of_a_sector_has_the_same_limits(solve):
     assert mode.asymptote("sliding") == pytest.approx(by_hand(wave_of_two + np.diag([KN, 0.0, 0.0]))[1], rel=TIGHT)
     other = column(table(out), "other_hz", contact="stuck", nodal_diameter=2, mode=2)
     assert other == pytest.approx([mode.asymptote("sliding") / (2 * np.pi)], rel=TIGHT)
+
+
+@pytest.mark.ranks(1)
+def test_the_largest_damping_of_a_nonlinear_mode_is_marked_in_its_wave(solve):
+    over = MODE.replace("linear_mode = 2", "linear_mode = 1").replace('"t"', '"mass"')
+    out = solve(ring(6) + over.replace("[1e-4, 1e-3]", "[0.5, 50.0]"))
+    run = Run(out)
+    top = int(np.argmax(run["mode"]["zeta"]))
+    assert 0 < top < len(run["mode"]) - 1
+    (peak,) = peaks(run, bands(run, run["linear"]))
+    assert (peak.diameter, peak.speed, peak.hz) == (2, None, run["mode"]["frequency_hz"][top])
+    ((_, figure),) = safe.figures(run)
+    (star,) = [line for line in figure.axes[0].get_lines() if line.get_marker() == "*"]
+    assert star.get_xydata().tolist() == [[2, peak.hz]]
 
 
 @pytest.mark.ranks(1)

@@ -99,7 +99,7 @@ def _panel(axes: Axes, linear: Analysis, own: Sequence[Band], found: Sequence[Pe
     _engine_orders(axes, orders, last, top)
     axes.axvline(speed, color=style.INK, linewidth=1.0, linestyle=":", label=f"operating speed, {speed:g} rev/min")
     for peak in found:
-        axes.plot([speed], [peak.hz], **style.PEAK)
+        axes.plot([speed if peak.speed is None else peak.speed], [peak.hz], **style.PEAK, clip_on=False)
     axes.set_xlim(0.0, last)
     axes.set_ylim(0.0, top)
 

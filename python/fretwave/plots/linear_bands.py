@@ -53,9 +53,16 @@ class Band:
 
 @dataclass(frozen=True)
 class Peak:
-    """Frequency [Hz] at which the damping of a nonlinear mode is largest."""
+    """Frequency [Hz] at which the damping of a nonlinear mode is largest.
+
+    Attributes
+    ----------
+    diameter : nodal diameters
+    speed : at which its band has the mode's stuck frequency [rev/min]; None where the bands do not depend on it
+    """
 
     diameter: int
+    speed: float | None
     hz: float
 
 
@@ -91,9 +98,13 @@ def peaks(run: Run, drawn: Sequence[Band]) -> Iterator[Peak]:
     """Of the nonlinear modes in the folder that are done and begin in one of the bands."""
     for mode in run.of_kind("mode"):
         stuck, diameter = mode.asymptote("stuck"), abs(int(mode.attributes.get("nodal_diameter", 0)))
+        point = peak_point(mode)
         if stuck is None or mode.attributes.get("wheel") or mode.attributes.get("status") != "done":
             continue
-        of_wave = np.array([hz for band in drawn if band.diameter == diameter for hz in band.hz])
-        point = peak_point(mode)
-        if is_peak(mode, point) and (np.abs(of_wave - stuck / (2 * np.pi)) < SAME * of_wave).any():
-            yield Peak(diameter, float(mode.columns["frequency_hz"][point]))
+        if not is_peak(mode, point):
+            continue
+        for band in drawn:
+            near = np.abs(band.hz - stuck / (2 * np.pi)) < SAME * band.hz
+            if band.diameter == diameter and near.any():
+                speed = float(band.speeds[near][0]) if len(band.speeds) > 1 else None
+                yield Peak(diameter, speed, float(mode.columns["frequency_hz"][point]))
