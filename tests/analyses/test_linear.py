@@ -305,7 +305,6 @@ builder = "ring.py"
 name = "linear"
 type = "linear"
 speed_rpm = 10.0
-spin_stiffness = "spin"
 speeds_rpm = [0.0, 8.0, 16.0]
 """
 
@@ -359,8 +358,8 @@ WRONG = {
     "no speed for the diagram": ("up_to_rpm = 2.0\n", "up_to_rpm", "speed_rpm beside it"),
     "a diagram that ends too soon": ("speed_rpm = 6.0\nup_to_rpm = 5.0\n", "up_to_rpm", "more than 6"),
     "order nought": ("speed_rpm = 6.0\nengine_orders = [0]\n", "engine_orders", "a value >= 1"),
-    "speeds without a dependence": ("speeds_rpm = [0.0, 1.0]\n", "speeds_rpm", "both keys"),
-    "no such part": ('spin_stiffness = "spni"\nspeeds_rpm = [0.0, 1.0]\n', "spin_stiffness", "one of sector"),
+    "speeds without a dependence": ("speeds_rpm = [0.0, 1.0]\n", "speeds_rpm", "a part 'spin'"),
+    "a dependence without speeds": ('spin_stiffness = "spin"\n', "spin_stiffness", "speeds_rpm beside it"),
     "no such contact": ('contact = ["open"]\n', "contact", "stuck"),
 }
 

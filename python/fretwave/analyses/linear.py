@@ -17,8 +17,9 @@ from ..case.analysis import AnalysisSection, register_analysis
 from ..case.checks_common import about
 from ..case.schema import Positive, Whole, key
 from ..model.contact import LIMITS
+from ..model.structure import SPIN
 from ..post.engine_orders import usual_orders
-from ..texts import counted, nearest
+from ..texts import counted, nearest, toml
 from .parts.context import AnalysisContext, Outcome
 from .parts.linear_waves import columns_of, crossings_of, modes_of_wave
 
@@ -61,17 +62,15 @@ class LinearAnalysis(AnalysisSection):
         default=None,
         min_length=1,
     )
-    spin_stiffness: Optional[str] = key(
-        "part K2 that the builder gives [mass]: K + Omega^2 K2 is the stiffness of the turning structure",
-        example='"spin"',
-        default=None,
-    )
     speeds_rpm: Optional[list[NotNegative]] = key(
-        "speeds at which modes are found with spin_stiffness",
+        "speeds at which modes are found, of a model whose stiffness depends on it ([model] at_speed)",
         "rev/min",
         "[0.0, 1500.0, 3000.0]",
         default=None,
         min_length=2,
+    )
+    spin_stiffness: str = key(
+        "part K2 of the model's stiffness [mass] with speeds_rpm: K + Omega^2 K2", example='"spin"', default=SPIN
     )
 
     def limits(self, normal: bool, any_contact: bool) -> list[str]:
@@ -125,16 +124,25 @@ class LinearAnalysis(AnalysisSection):
             report.wrong(("up_to_rpm",), "leaves out the operating speed", f"more than {self.speed_rpm:g}", fix)
 
     def _check_spin(self, report: Reporter, facts: Facts) -> None:
-        given, speeds = self.spin_stiffness, self.speeds_rpm
-        if (given is None) != (speeds is None):
-            name, other = ("speeds_rpm", "spin_stiffness") if given is None else ("spin_stiffness", "speeds_rpm")
-            report.wrong((name,), f"needs {other}", "both keys", f"add `{other}`, or remove the key")
-        if speeds is not None and any(not before < after for before, after in zip(speeds, speeds[1:])):
-            report.wrong(("speeds_rpm",), "is out of order", "ascending speeds", f"write {sorted(set(speeds))}")
-        if given is not None and facts.parts is not None and given not in facts.parts:
-            fix = nearest(given, facts.parts) or "name a part that the builder gives (Structure.parts)"
-            known = ", ".join(facts.parts) or "(there is none)"
-            report.wrong(("spin_stiffness",), "is no part of the stiffness", f"one of {known}", fix)
+        speeds, parts = self.speeds_rpm, facts.parts
+        if speeds is None:
+            if "spin_stiffness" in self.model_fields_set:
+                fix = "add for example `speeds_rpm = [0.0, 3000.0]`, or remove the key"
+                report.wrong(("spin_stiffness",), "acts at no speed", "speeds_rpm beside it", fix)
+            return
+        if any(not before < after for before, after in zip(speeds, speeds[1:])):
+            report.wrong(
+                ("speeds_rpm",),
+                "is out of order",
+                "ascending speeds",
+                f"write `speeds_rpm = {toml(sorted(set(speeds)))}`",
+            )
+        if parts is not None and self.spin_stiffness not in parts:
+            fix = (
+                nearest(self.spin_stiffness, parts) or 'add for example `at_speed = { 3000 = "K3000.mtx" }` to [model]'
+            )
+            what, name = "needs a model whose stiffness depends on the speed", self.spin_stiffness
+            report.wrong(("speeds_rpm",), what, f"a part '{name}', from [model] at_speed or the builder", fix)
 
     def headline(self) -> str:
         named = "" if self.nodal_diameters is None else f", nodal diameters {', '.join(map(str, self.nodal_diameters))}"
@@ -147,7 +155,7 @@ class LinearAnalysis(AnalysisSection):
         """Solve every wave in every limit of the contact, at every speed. Collective."""
         neighbours = context.case.neighbours
         sectors = neighbours.sectors if neighbours else 0
-        columns, orders = columns_of(sectors, self.spin_stiffness is not None), json.dumps(self.orders(sectors))
+        columns, orders = columns_of(sectors, self.speeds_rpm is not None), json.dumps(self.orders(sectors))
         writer = context.writer(columns, ["1c", "1s"], samples=SAMPLES, sectors=sectors, engine_orders=orders)
         rows: list[dict[str, Any]] = []
         for diameters in self.waves(sectors):

@@ -14,6 +14,7 @@ from ..model.pairs import Pairs
 from ..model.structure import Structure
 from . import checks
 from .analysis import Analyses, AnalysisSection
+from .at_speed import with_speeds
 from .case import Case, Tables, changed_keys
 from .checks_tables import check_preload, check_reduction
 from .contacts import read_contacts
@@ -116,6 +117,7 @@ def _build(
     notes: list[str] = []
     if section and structure:
         structure, identity = in_units(section, source, structure, identity, notes, found)
+        structure, identity = with_speeds(section, source, structure, identity, notes, found)
         for analysis in analyses.values():
             analysis.read_in(structure.unit_system)
     dofs = structure.dof_names if structure else None

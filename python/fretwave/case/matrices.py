@@ -17,24 +17,34 @@ from ..importers import Entries, formats
 from ..model.checks import NAMES
 from ..model.sectors import Sparse
 from ..texts import display, is_there, nearest, shortened
+from .toml.locate import Path as KeyPath
 from .toml.source import Source
 
 
 def load(
-    letter: str, given: Union[str, list[list[float]]], source: Source, found: list[FretwaveError]
+    letter: str,
+    given: Union[str, list[list[float]]],
+    source: Source,
+    found: list[FretwaveError],
+    key: KeyPath | None = None,
 ) -> tuple[Sparse, str, str] | None:
     """A matrix of ``[model]``, square with finite entries, with its place and its hash, "" for rows.
 
     None (and an entry in `found`) when something is wrong.
+
+    Parameters
+    ----------
+    key : where it stands, unless under its letter
     """
-    where, digest = source.where(("model", letter)), ""
+    key = key or ("model", letter)
+    where, digest = source.where(key), ""
     try:
         if isinstance(given, str):
             path = source.path.parent / given
             values, place = _read(path, letter, where), f"{where}, {display(path)}"
             digest = "sha256:" + hashlib.sha256(path.read_bytes()).hexdigest()
         else:
-            values, place = _from_rows(letter, given, source), where
+            values, place = _from_rows(letter, given, source, key), where
         _check_square(letter, values, place)
     except InputError as problem:
         found.append(problem)
@@ -42,13 +52,13 @@ def load(
     return values, place, digest
 
 
-def _from_rows(letter: str, rows: list[list[float]], source: Source) -> Sparse:
+def _from_rows(letter: str, rows: list[list[float]], source: Source, key: KeyPath) -> Sparse:
     lengths = [len(row) for row in rows]
     if len(set(lengths)) != 1 or not lengths[0]:
         odd = next((i for i, length in enumerate(lengths) if length != lengths[0]), 0)
         raise InputError(
             f"the rows of the {NAMES[letter]} differ in length",
-            where=source.where(("model", letter, odd)),
+            where=source.where((*key, odd)),
             measured=f"row {odd} has {lengths[odd] if lengths else 0} entries",
             expected=f"{len(rows)} entries in each of the {len(rows)} rows",
             fix="complete the row",

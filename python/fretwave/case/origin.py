@@ -16,6 +16,7 @@ from ..texts import display, toml
 from . import matrices
 from .builder import builder_digest, run_builder
 from .schema import ModelSection
+from .toml.locate import Path as KeyPath
 from .toml.source import Source
 from .toml.validation import missing_key
 
@@ -60,20 +61,26 @@ def _from_builder(section: ModelSection, source: Source, found: Found) -> Given 
 
 def _from_file(section: ModelSection, source: Source, found: Found) -> Given | None:
     assert section.file is not None
+    read = read_file(section.file, ("model", "file"), source, found)
+    if read is None:
+        return None
+    structure, digest = read
     where = source.where(("model", "file"))
-    path = source.path.parent / section.file
+    return structure, {letter: f"{where}, {letter}" for letter in "MKC"}, {"model.file": digest}
+
+
+def read_file(file: str, key: KeyPath, source: Source, found: Found) -> tuple[Structure, str] | None:
+    """The structure of a model file that a key names, and what identifies it; None when something is wrong."""
+    where, path = source.where(key), source.path.parent / file
     try:
-        structure = model_file.read_model(path)
+        return model_file.read_model(path), f"{file} {model_file.digest(path)[:16]}"
     except InputError as error:
         place = f"{where}, {error.where}"
         found.append(InputError(error.what, place, error.measured, error.expected, error.fix))
-        return None
     except OSError as error:
         problem = f"{display(path)}: {error.strerror}"
         found.append(InputError("the model file cannot be read", where, problem, "a file of `fretwave import`"))
-        return None
-    resolved = {"model.file": f"{section.file} {model_file.digest(path)[:16]}"}
-    return structure, {letter: f"{where}, {letter}" for letter in "MKC"}, resolved
+    return None
 
 
 def _from_matrices(section: ModelSection, source: Source, found: Found) -> Given | None:

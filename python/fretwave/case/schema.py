@@ -71,6 +71,15 @@ class ModelSection(Section):
     C: Optional[Matrix] = key(
         "damping matrix, rows or a .npz/.mtx file", "force s/length", "[[0.1, 0.0], [0.0, 0.1]]", default=None
     )
+    at_speed: Optional[dict[str, Matrix]] = key(
+        "stiffness at one or two speeds [rev/min], K being that at rest: rows, or a .npz, .mtx or model file; "
+        "K + Omega^2 K2 is put through them, K2 the part `spin`",
+        "force/length",
+        '{ 3000 = "K3000.mtx" }',
+        default=None,
+        min_length=1,
+        max_length=2,
+    )
     builder: Optional[str] = key(
         "Python file whose build(**options) gives the model, in place of matrices", example='"model.py"', default=None
     )

@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 
 #: The part of K that a mistuning varies unless it names another: all that the sector's own elements put into it.
 WHOLE = "sector"
+#: The part K2 of K + Omega^2 K2, the stiffness of a turning structure [mass].
+SPIN = "spin"
 
 
 @dataclass

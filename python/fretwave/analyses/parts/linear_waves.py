@@ -74,10 +74,10 @@ def modes_of_wave(
 
 
 def _spinning(context: AnalysisContext[LinearAnalysis], speed_rpm: float) -> Case:
-    part = context.analysis.spin_stiffness
-    if part is None:
+    if context.analysis.speeds_rpm is None:
         return context.case
-    return replace(context.case, structure=context.case.structure.stiffened(part, (TO_OMEGA * speed_rpm) ** 2))
+    added = context.case.structure.stiffened(context.analysis.spin_stiffness, (TO_OMEGA * speed_rpm) ** 2)
+    return replace(context.case, structure=added)
 
 
 def _limits(context: AnalysisContext[LinearAnalysis]) -> list[str]:

@@ -1,0 +1,137 @@
+"""Stiffness of a turning model from the matrices that another code gives at rest and at one or two speeds."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from command_line import call
+from tolerances import ROUNDING, SOLVED, TIGHT
+
+import fretwave as fw
+from fretwave.case.load import load_case
+from fretwave.errors import CaseErrors
+from fretwave.results.model_file import write_model
+
+pytestmark = pytest.mark.ranks(1)
+
+M = np.diag([2.0, 1.0])
+K = np.array([[50.0, -20.0], [-20.0, 30.0]])
+K2 = np.array([[0.5, -0.1], [-0.1, 0.3]])
+ANALYSIS = """
+[[analysis]]
+name = "linear"
+type = "linear"
+speeds_rpm = [0.0, 45.0]
+"""
+
+
+def at(speed: float, second: float = 0.0) -> np.ndarray:
+    """Stiffness [N/m] at a speed [rev/min], with a share that does not follow its square."""
+    omega = 2 * np.pi * speed / 60
+    return K + omega**2 * K2 + second * omega**4 * np.eye(2)
+
+
+def inline(**stiffness: np.ndarray) -> str:
+    given = ", ".join(f"{speed.strip('n')} = {A.tolist()}" for speed, A in stiffness.items())
+    return f"[model]\nM = {M.tolist()}\nK = {K.tolist()}\nat_speed = {{ {given} }}\n"
+
+
+def written(folder: Path, text: str) -> Path:
+    path = folder / "case.toml"
+    path.write_text(text + ANALYSIS, encoding="utf-8")
+    return path
+
+
+def rows_of(out: Path) -> list[dict[str, str]]:
+    with open(out / "linear.csv", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def spin_of(path: Path) -> np.ndarray:
+    return load_case(path).structure.parts["spin"].toarray()
+
+
+def test_one_speed_gives_the_part_that_grows_with_its_square(tmp_path):
+    assert np.abs(spin_of(written(tmp_path, inline(n30=at(30.0)))) - K2).max() < ROUNDING
+
+
+def test_frequencies_between_the_speeds_are_those_of_the_matrices_there(tmp_path):
+    path = written(tmp_path, inline(n30=at(30.0), n60=at(60.0)))
+    assert call("run", path, "--no-plots", "--out", tmp_path / "run") == 0
+    rows = rows_of(tmp_path / "run")
+    for speed in (0.0, 45.0):
+        found = [float(row["omega"]) for row in rows if float(row["speed_rpm"]) == speed]
+        expected = np.sqrt(np.sort(np.linalg.eigvals(np.linalg.solve(M, at(speed))).real))
+        assert found == pytest.approx(expected, rel=TIGHT)
+
+
+def test_two_speeds_are_fitted_and_what_is_left_is_said(tmp_path):
+    """Least squares of w K2' = w K2 + s w^2 1, w = Omega^2: K2' = K2 + s sum w^3 / sum w^2 1."""
+    path = written(tmp_path, inline(n30=at(30.0, 1e-3), n60=at(60.0, 1e-3)))
+    w = (2 * np.pi * np.array([30.0, 60.0]) / 60) ** 2
+    expected = K2 + 1e-3 * (w**3).sum() / (w**2).sum() * np.eye(2)
+    assert np.abs(spin_of(path) - expected).max() < ROUNDING
+    (note,) = [note for note in load_case(path).notes if "at speed" in note]
+    change = at(30.0, 1e-3) - K
+    left = np.linalg.norm(change - w[0] * expected) / np.linalg.norm(change)
+    assert f"leaves {100 * left:.2g} % of its change" in note
+
+
+def test_model_files_of_one_mesh(tmp_path):
+    for name, stiffness in (("rest", K), ("turning", at(30.0))):
+        write_model(tmp_path / f"{name}.h5", fw.Structure(sp.csr_matrix(M), sp.csr_matrix(stiffness)))
+    path = written(tmp_path, '[model]\nfile = "rest.h5"\nat_speed = { 30 = "turning.h5" }\n')
+    assert np.abs(spin_of(path) - K2).max() < ROUNDING
+    assert load_case(path).resolved["model.at_speed.30"].startswith("turning.h5 ")
+
+
+WRONG = {
+    "no speed": (inline(fast=at(30.0)), "'fast' is no speed"),
+    "at rest": (inline(n0=at(0.0)), "'0' is no speed"),
+    "other dofs": (inline(n30=np.eye(3)), "is of another model"),
+    "not symmetric": (inline(n30=np.array([[50.0, 1.0], [-1.0, 30.0]])), "is not symmetric"),
+    "no file": ('[model]\nfile = "rest.h5"\nat_speed = { 30 = "none.h5" }\n', "none.h5"),
+    "another mass": ('[model]\nfile = "rest.h5"\nat_speed = { 30 = "other.h5" }\n', "its mass differs by 1e+02 %"),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_what_is_no_stiffness_at_a_speed_is_refused(name, tmp_path):
+    for file, factor in (("rest", 1.0), ("other", 2.0)):
+        write_model(tmp_path / f"{file}.h5", fw.Structure(sp.csr_matrix(factor * M), sp.csr_matrix(K)))
+    text, said = WRONG[name]
+    with pytest.raises(CaseErrors) as caught:
+        load_case(written(tmp_path, text))
+    assert said in str(caught.value) and str(caught.value).count("at_speed") >= 1
+
+
+#: A sector of a ring: a mass on the rim, tied to the next one, that carries a blade of two.
+RIM = """
+[model]
+dofs = ["rim", "root", "tip", "next"]
+M = [[2.0, 0, 0, 0], [0, 1.0, 0, 0], [0, 0, 0.5, 0], [0, 0, 0, 0]]
+K = [[95.0, -40.0, 0, -30.0], [-40.0, 60.0, -20.0, 0], [0, -20.0, 20.0, 0], [-30.0, 0, 0, 30.0]]
+at_speed = { 60 = [[95.0, -40.0, 0, -30.0], [-40.0, 80.0, -25.0, 0], [0, -25.0, 45.0, 0], [-30.0, 0, 0, 30.0]] }
+sectors = 6
+low = ["rim"]
+high = ["next"]
+"""
+
+
+@pytest.mark.parametrize("sector, modes", [(True, 1), (False, 3)])
+def test_a_reduction_with_all_component_modes_keeps_the_turning_model(sector, modes, tmp_path):
+    text, found = RIM, []
+    if not sector:
+        text = RIM[: RIM.index("sectors")].replace("[0, 0, 0, 0]", "[0, 0, 0, 1.0]")
+    damper = 'dampers = [{ dof = "tip", c = 0.0 }]\n'  # keeps the tip
+    for number, reduction in enumerate(("", f"[reduction]\nmodes = {modes}\ncompare = 0\n")):
+        path, out = written(tmp_path, text + reduction), tmp_path / f"run{number}"
+        path.write_text(path.read_text(encoding="utf-8") + damper, encoding="utf-8")
+        assert call("run", path, "--no-plots", "--out", out) == 0
+        found.append([float(row["omega"]) for row in rows_of(out)])
+    assert found[1] == pytest.approx(found[0], rel=SOLVED)
+    assert np.ptp(found[0]) > 5.0 and len(found[0]) == (24 if sector else 8)
