@@ -37,9 +37,11 @@ def with_speeds(
 
     Of two speeds K2 is the least-squares fit, weighted as Omega^2 is; a note says what it leaves.
     """
-    at_rest, known = sp.csr_matrix(structure.own("K")), dict(identity)
+    at_rest, known = structure.own("K"), dict(identity)
+    if section.at_speed is None or at_rest is None:  # told where K is read
+        return structure, identity
     squares, changes = [], []
-    for text, given in (section.at_speed or {}).items():
+    for text, given in section.at_speed.items():
         key = ("model", "at_speed", text)
         square, read = _square(text, key, source, found), _stiffness(given, key, structure, source, found)
         if square is not None and read is not None:
@@ -53,6 +55,12 @@ def with_speeds(
     if len(changes) > 1:
         notes.append(f"stiffness at speed: K + Omega^2 K2 leaves {100 * left:.2g} % of its change")
     return replace(structure, parts={**structure.parts, SPIN: sp.csr_matrix(K2)}), known
+
+
+def known_parts(section: ModelSection, structure: Structure) -> list[str] | None:
+    """Names of the parts of the stiffness; None where stiffness at speed could not be read."""
+    lacks = section.at_speed is not None and SPIN not in structure.parts
+    return None if lacks else list(structure.parts)
 
 
 def _size(A: Sparse) -> float:
@@ -88,7 +96,7 @@ def _stiffness(
         if loaded is None:
             return None
         K, digest = loaded[0], loaded[2] or given
-        complaint = "" if K.shape[0] == structure.n_dof else f"{K.shape[0]} dofs, at rest {structure.n_dof}"
+        complaint = _other_size(structure, K)
     if complaint:
         fix = "take the same mesh, with the same dofs in the same order"
         found.append(InputError("the stiffness at speed is of another model", source.where(key), complaint, None, fix))
@@ -99,12 +107,17 @@ def _stiffness(
     return None if asymmetry else (K, digest)
 
 
+def _other_size(structure: Structure, K: Sparse) -> str:
+    n = len(structure.dof_names)
+    return "" if K.shape[0] == n else f"{K.shape[0]} dofs, at rest {n}"
+
+
 def _other_model(structure: Structure, other: Structure) -> str:
     """In what another structure is not the same at another speed, empty when it is."""
-    if other.n_dof != structure.n_dof:
-        return f"{other.n_dof} dofs, at rest {structure.n_dof}"
     if (other.units or structure.units) != structure.units:
         return f"units {other.units}, at rest {structure.units}"
-    M, same = sp.csr_matrix(structure.own("M")), sp.csr_matrix(other.own("M"))
+    M, same = structure.own("M"), sp.csr_matrix(other.own("M"))
+    if M is None or M.shape != same.shape:
+        return _other_size(structure, same)
     away = _size(M - same) / _size(M)
     return f"its mass differs by {100 * away:.2g} %" if away > SAME_MASS else ""

@@ -14,7 +14,7 @@ from ..model.pairs import Pairs
 from ..model.structure import Structure
 from . import checks
 from .analysis import Analyses, AnalysisSection
-from .at_speed import with_speeds
+from .at_speed import known_parts, with_speeds
 from .case import Case, Tables, changed_keys
 from .checks_tables import check_preload, check_reduction
 from .contacts import read_contacts
@@ -149,7 +149,7 @@ def _build(
         complete=len(contacts) == len(source.entries("contact")),
         laws=laws,
         loads=list(structure.loads) if structure else None,
-        parts=list(structure.parts) if structure else None,
+        parts=known_parts(section, structure) if section and structure else None,
         preload=preload,
         flow=flow,
     )

@@ -165,7 +165,7 @@ def _asymptotes(axes: Axes, swept: Swept) -> None:
         stuck, above = word == "stuck", frequency >= max(common.values())
         axes.axhline(frequency, color=style.GREY, linestyle="--" if stuck else "-.", linewidth=1.2, zorder=1)
         axes.annotate(
-            f"{word} {frequency:.6g} Hz",
+            f"{'stuck' if stuck else 'without friction'} {frequency:.6g} Hz",  # free, or closed and sliding
             # curves meet the stuck line at small amplitudes and the free one at large: each is named at its other end
             (amplitude.max() if stuck else amplitude.min(), frequency),
             (-4 if stuck else 4, 4 if above else -4),
