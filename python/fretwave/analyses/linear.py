@@ -18,7 +18,7 @@ from ..case.checks_common import about
 from ..case.schema import Positive, Whole, key
 from ..model.contact import LIMITS
 from ..model.structure import SPIN
-from ..post.engine_orders import usual_orders
+from ..post.engine_orders import excited_by, usual_orders
 from ..texts import counted, nearest, toml
 from .parts.context import AnalysisContext, Outcome
 from .parts.linear_waves import columns_of, crossings_of, modes_of_wave
@@ -98,17 +98,28 @@ class LinearAnalysis(AnalysisSection):
 
     def check(self, report: Reporter, facts: Facts) -> None:
         super().check(report, facts)
-        if facts.model_known and facts.sectors is None and self.nodal_diameters is not None:
-            fix = "remove the key, or give [model] its sectors"
-            about(report, "nodal_diameters", "are of no sector of a wheel", "a model with sectors", fix)
-        for index, diameters in enumerate(self.nodal_diameters or []):
-            if facts.sectors is not None and diameters > facts.sectors // 2:
-                expected = f"0 .. {facts.sectors // 2} of {facts.sectors} sectors"
-                report.wrong(("nodal_diameters", index), "is no wave of this wheel", expected, "take it out")
+        self._check_waves(report, facts)
         if facts.complete and not facts.contacts and set(self.contact or ()) - {"free"}:
             report.wrong(("contact",), "is of a model without contact", '["free"]', "remove the key")
         self._check_operating_speed(report)
         self._check_spin(report, facts)
+
+    def _check_waves(self, report: Reporter, facts: Facts) -> None:
+        if facts.model_known and facts.sectors is None and self.nodal_diameters is not None:
+            fix = "remove the key, or give [model] its sectors"
+            about(
+                report, "nodal_diameters", "has nodal diameters, but no sector of a wheel", "a model with sectors", fix
+            )
+        for index, diameters in enumerate(self.nodal_diameters or []):
+            if facts.sectors is not None and diameters > facts.sectors // 2:
+                expected = f"0 .. {facts.sectors // 2} of {facts.sectors} sectors"
+                report.wrong(("nodal_diameters", index), "is no wave of this wheel", expected, "take it out")
+        for index, order in enumerate(self.engine_orders or []):
+            excited = excited_by(order, facts.sectors) if facts.sectors else None
+            if excited is not None and excited not in self.waves(facts.sectors or 0):
+                fix = f"take it out, or add {excited} to nodal_diameters"
+                expected = f"an order of its waves; {order} excites {counted(excited, 'nodal diameter')}"
+                report.wrong(("engine_orders", index), "excites none of the waves", expected, fix)
 
     def _check_operating_speed(self, report: Reporter) -> None:
         if self.speed_rpm is None:

@@ -39,11 +39,12 @@ def draw(run: Run, linear: Analysis) -> Figure:
     columns = min(len(waves), 2)
     rows = -(-len(waves) // columns)
     figure, axes = style.new_figure(5.0 if rows == 1 else 2.9 * rows, rows, columns, squeeze=False, sharex=True)
-    for panel, diameter in zip(axes.flat, waves):
-        own = [peak for peak in found if peak.diameter == diameter]
-        _panel(panel, linear, [band for band in drawn if band.diameter == diameter], own)
-        if linear.attributes["sectors"]:
-            panel.set_title(f"{diameter} nodal diameter{'s' * (diameter != 1)}")
+    panels = {diameter: _Panel(linear, diameter, drawn, found) for diameter in waves}
+    for number in sorted({band.number for panel in panels.values() for band in panel.shown}):
+        band = next(band for band in drawn if band.number == number)
+        axes.flat[0].plot([], [], color=band.colour, linewidth=1.4, label=f"mode {number}, {band.contact}")
+    for place, panel in zip(axes.flat, panels.values()):
+        panel.draw(place)
     if found:
         axes.flat[0].plot([], [], **style.PEAK, label=PEAK_NAME)
     _labels(list(axes.flat), columns, len(waves))
@@ -77,37 +78,49 @@ def _nearest(linear: Analysis, drawn: Sequence[Band]) -> list[int]:
     """Waves with a panel, ascending."""
     distance: dict[int, float] = {}
     for band in drawn:
-        met = [
-            speed for order in _orders(linear, band.diameter) for speed in crossing_speeds(band.speeds, band.hz, order)
-        ]
+        orders = _orders(linear, band.diameter)
+        met = [speed for order in orders for speed in crossing_speeds(band.speeds, band.hz, order)]
         away = min((abs(speed / _speed(linear) - 1.0) for speed in met), default=np.inf)
-        distance[band.diameter] = min(away, distance.get(band.diameter, np.inf))
+        if orders:
+            distance[band.diameter] = min(away, distance.get(band.diameter, np.inf))
     return sorted(sorted(distance, key=lambda diameter: distance[diameter])[:WAVES])
 
 
-def _panel(axes: Axes, linear: Analysis, own: Sequence[Band], found: Sequence[Peak]) -> None:
-    speed, orders = _speed(linear), _orders(linear, own[0].diameter)
-    last = float(linear.attributes.get("up_to_rpm", UP_TO * speed))
-    reached = OVER_ORDERS * max(orders) * last / 60.0
-    top = max(min(ABOVE * highest(own), reached), *(ABOVE * peak.hz for peak in found), 0.0)
-    for band in own:
-        _band(axes, band, last)
-    other_entry(axes, own)
-    for band in own:
-        for order in orders:
-            _crossings(axes, band, order, speed, last)
-    _engine_orders(axes, orders, last, top)
-    axes.axvline(speed, color=style.INK, linewidth=1.0, linestyle=":", label=f"operating speed, {speed:g} rev/min")
-    for peak in found:
-        axes.plot([speed if peak.speed is None else peak.speed], [peak.hz], **style.PEAK, clip_on=False)
-    axes.set_xlim(0.0, last)
-    axes.set_ylim(0.0, top)
+class _Panel:
+    """One wave: its bands up to a height that the engine orders reach and the marks of nonlinear modes need."""
+
+    def __init__(self, linear: Analysis, diameter: int, drawn: Sequence[Band], found: Sequence[Peak]) -> None:
+        self.diameter, self.speed, self.orders = diameter, _speed(linear), _orders(linear, diameter)
+        self.title = f"{diameter} nodal diameter{'s' * (diameter != 1)}" if linear.attributes["sectors"] else ""
+        self.last = float(linear.attributes.get("up_to_rpm", UP_TO * self.speed))
+        self.peaks = [peak for peak in found if peak.diameter == diameter]
+        own = [band for band in drawn if band.diameter == diameter]
+        reached = OVER_ORDERS * max(self.orders) * self.last / 60.0
+        self.top = max(min(ABOVE * highest(own), reached), *(ABOVE * peak.hz for peak in self.peaks), 0.0)
+        self.shown = [band for band in own if np.nanmin([band.hz, band.other_hz]) < self.top]
+
+    def draw(self, axes: Axes) -> None:
+        """Bands, engine orders, where they meet, and the operating speed."""
+        for band in self.shown:
+            _band(axes, band, self.last)
+        other_entry(axes, self.shown)
+        for band in self.shown:
+            for order in self.orders:
+                _crossings(axes, band, order, self.speed, self.last)
+        _engine_orders(axes, self.orders, self.last, self.top)
+        name = f"operating speed, {self.speed:g} rev/min"
+        axes.axvline(self.speed, color=style.INK, linewidth=1.0, linestyle=":", label=name)
+        for peak in self.peaks:
+            axes.plot([self.speed if peak.speed is None else peak.speed], [peak.hz], **style.PEAK, clip_on=False)
+        axes.set_xlim(0.0, self.last)
+        axes.set_ylim(0.0, self.top)
+        axes.set_title(self.title)
 
 
 def _band(axes: Axes, band: Band, last: float) -> None:
     speeds = np.linspace(0.0, last, POINTS)
     hz, other = band.at(speeds)
-    axes.plot(speeds, hz, color=band.colour, linewidth=1.4, label=f"mode {band.number}, {band.contact}")
+    axes.plot(speeds, hz, color=band.colour, linewidth=1.4)
     if np.isfinite(other).any():
         axes.fill_between(speeds, hz, other, color=band.colour, alpha=0.2, linewidth=0, zorder=0.5)
         axes.plot(speeds, other, "--", color=band.colour, linewidth=1.0)

@@ -85,8 +85,9 @@ def bands(run: Run, linear: Analysis) -> list[Band]:
 
 def other_entry(axes: Axes, drawn: Sequence[Band]) -> None:
     """The legend's word on the other ends of the bands."""
-    if any(np.isfinite(band.other_hz).any() for band in drawn):
-        axes.plot([], [], "--", color=style.GREY, linewidth=1.0, label=f"the mode most like it, {drawn[0].other}")
+    others = [band.other for band in drawn if np.isfinite(band.other_hz).any()]
+    if others:
+        axes.plot([], [], "--", color=style.GREY, linewidth=1.0, label=f"the mode most like it, {others[0]}")
 
 
 def highest(drawn: Sequence[Band]) -> float:
