@@ -8,72 +8,15 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from models.linear_cases import CONTACT, GROUND, KN, KT, MASS, MASS_SHARE, NEXT, POINT, STIFFNESS_SHARE, K, M, ring
 from tolerances import ROUNDING, TIGHT
 
-from fretwave.case.load import load_case
-from fretwave.commands.check import check_case
-from fretwave.errors import CaseErrors
 from fretwave.plots import campbell, safe
 from fretwave.plots.linear_bands import bands, peaks
 from fretwave.post.engine_orders import crossing_speeds, excited_by, frequency_at, usual_orders
 from fretwave.results.reader import Run
 from fretwave.run.order import RunOptions
 from fretwave.run.runner import run_case
-
-#: One mass that moves along the normal and the tangent of its contact, and a second one behind it.
-M, KN, KT = np.diag([2.0, 2.0, 1.0]), 30.0, 7.0
-K = np.array([[50.0, 4.0, -10.0], [4.0, 40.0, -8.0], [-10.0, -8.0, 25.0]])
-MASS_SHARE, STIFFNESS_SHARE = 0.02, 1e-3
-POINT = f"""
-[model]
-dofs = ["n", "t", "m"]
-M = {M.tolist()}
-K = {K.tolist()}
-mass_damping = {MASS_SHARE}
-stiffness_damping = {STIFFNESS_SHARE}
-
-[[contact]]
-name = "face"
-law = "coulomb_2d"
-pairs = ["n"]
-tangents = ["t"]
-normal_stiffness = {KN}
-tangential_stiffness = {KT}
-friction_coefficient = 0.3
-normal_load = 1.0
-
-[[analysis]]
-name = "linear"
-type = "linear"
-"""
-#: A ring of N masses on ground springs, a spring and a Jenkins element to the next one.
-MASS, GROUND, NEXT, CONTACT = 1.3, 2.0, 0.7, 0.4
-
-
-def ring(sectors: int) -> str:
-    coupling = NEXT * np.array([[1.0, -1.0], [-1.0, 1.0]])
-    return f"""
-[model]
-dofs = ["mass", "next"]
-M = [[{MASS}, 0.0], [0.0, 0.0]]
-K = {(np.diag([GROUND, 0.0]) + coupling).tolist()}
-C = [[0.01, 0.0], [0.0, 0.0]]
-sectors = {sectors}
-low = ["mass"]
-high = ["next"]
-
-[[contact]]
-name = "between"
-law = "jenkins"
-pairs = [["mass", "next"]]
-tangential_stiffness = {CONTACT}
-friction_limit = 1.0
-
-[[analysis]]
-name = "linear"
-type = "linear"
-speed_rpm = 6.0
-"""
 
 
 @pytest.fixture
@@ -347,62 +290,3 @@ def test_curves_of_the_turning_ring_are_drawn_through_its_speeds(turning):
     speeds, hz = curve.get_xydata().T
     omega = np.sqrt(GROUND / MASS + (2 * np.pi * speeds / 60) ** 2 * SPIN / MASS)
     assert hz == pytest.approx(omega / (2 * np.pi), rel=TIGHT) and speeds[-1] == 12.5
-
-
-WRONG = {
-    "no modes": ("modes = 0\n", "modes", "a value >= 1"),
-    "no such wave": ("nodal_diameters = [1, 5]\n", r"nodal_diameters\[1\]", "0 .. 4 of 8 sectors"),
-    "a backward wave": ("nodal_diameters = [-1]\n", "nodal_diameters", "a value >= 0"),
-    "a speed of nothing": ("speed_rpm = 0.0\n", "speed_rpm", "a value > 0"),
-    "no speed for orders": ("engine_orders = [2]\n", "engine_orders", "speed_rpm beside it"),
-    "no speed for the diagram": ("up_to_rpm = 2.0\n", "up_to_rpm", "speed_rpm beside it"),
-    "a diagram that ends too soon": ("speed_rpm = 6.0\nup_to_rpm = 5.0\n", "up_to_rpm", "more than 6"),
-    "order nought": ("speed_rpm = 6.0\nengine_orders = [0]\n", "engine_orders", "a value >= 1"),
-    "speeds without a dependence": ("speeds_rpm = [0.0, 1.0]\n", "speeds_rpm", "a part 'spin'"),
-    "a dependence without speeds": ('spin_stiffness = "spin"\n', "spin_stiffness", "speeds_rpm beside it"),
-    "an order of another wave": (
-        "speed_rpm = 6.0\nengine_orders = [3, 6]\nnodal_diameters = [3]\n",
-        r"engine_orders\[1\]",
-        "6 excites 2 nodal diameters",
-    ),
-    "no such contact": ('contact = ["open"]\n', "contact", "stuck"),
-}
-
-
-@pytest.mark.ranks(1)
-@pytest.mark.parametrize("name", WRONG)
-def test_what_cannot_be_is_refused_with_one_fix(name, tmp_path):
-    keys, place, expected = WRONG[name]
-    path = tmp_path / "case.toml"
-    path.write_text(ring(8).replace("speed_rpm = 6.0\n", keys), encoding="utf-8")
-    with pytest.raises(CaseErrors, match=place) as caught:
-        load_case(path)
-    text = str(caught.value)
-    assert expected in text and text.count("fix:") == 1 and "case.toml:" in text
-
-
-@pytest.mark.ranks(1)
-def test_waves_are_of_sectors(tmp_path):
-    path = tmp_path / "case.toml"
-    path.write_text(POINT + "nodal_diameters = [1]\n", encoding="utf-8")
-    with pytest.raises(CaseErrors, match="has nodal diameters, but no sector"):
-        load_case(path)
-
-
-@pytest.mark.ranks(1)
-def test_stuck_contact_needs_contact(tmp_path):
-    path = tmp_path / "case.toml"
-    text = POINT[: POINT.index("[[contact]]")] + POINT[POINT.index("[[analysis]]") :]
-    path.write_text(text + 'contact = ["stuck"]\n', encoding="utf-8")
-    with pytest.raises(CaseErrors, match="is of a model without contact"):
-        load_case(path)
-
-
-@pytest.mark.ranks(1)
-def test_check_says_what_it_would_do(tmp_path, comm, capsys):
-    path = tmp_path / "case.toml"
-    path.write_text(ring(8) + "modes = 1\nnodal_diameters = [2]\n", encoding="utf-8")
-    assert check_case(path, (), (), False, comm) == 0
-    assert "1 linear mode of each contact that differs, nodal diameters 2, crossings about 6 rev/min" in (
-        capsys.readouterr().out
-    )
