@@ -165,15 +165,15 @@ def test_stuck_regime_needs_at_most_three_iterations(case):
     assert steps >= 1 and iterations <= 3 * steps, f"{iterations} GMRES iterations in {steps} Newton steps"
 
 
-def test_iterations_stay_below_25_up_to_30_percent_slip(krylov, comm):
-    """Issue 3: GMRES iterations per Newton step (the mean of each point), printed with the slip share."""
+def test_iterations_do_not_grow_with_slip(krylov, comm):
+    """GMRES iterations per Newton step (the mean of each point): 9.5 with pairs that do not know of each other."""
     moving = [p for p in krylov if p["newton"]]
     if comm.rank == 0:
         for share, points in groupby(sorted(moving, key=lambda p: p["slip"]), key=lambda p: round(p["slip"], 1)):
             counts = [p["linear"] / p["newton"] for p in points]
             print(f"slip {share:.1f}: {min(counts):.1f} to {max(counts):.1f} GMRES iterations per Newton step")
-    partial = [p["linear"] / p["newton"] for p in moving if p["slip"] <= 0.3]
-    assert partial and max(partial) <= 25
+    assert max(p["slip"] for p in moving) > 0.75
+    assert max(p["linear"] / p["newton"] for p in moving) <= 7
 
 
 def test_a_contact_far_stiffer_than_the_structure(comm):
@@ -182,7 +182,7 @@ def test_a_contact_far_stiffer_than_the_structure(comm):
     model = blade(comm, **stiff)
     points = branch(mode(model, *preloaded(model), "krylov", highest=7), (1.5e-3, 2.6e-3), ())
     partial = [p["linear"] / p["newton"] for p in points if p["newton"] and p["slip"] > 0.1]
-    assert partial and max(partial) <= 45
+    assert partial and max(partial) <= 10, max(partial)  # 31 with pairs that do not know of each other
 
 
 def test_stuck_asymptote_is_the_linear_mode(krylov, case):
