@@ -9,7 +9,8 @@ from command_line import call
 
 pytestmark = pytest.mark.ranks(1)
 
-COMMANDS = ("init", "run", "check", "sweep", "resume", "show", "plot", "view", "import", "study", "doctor")
+COMMANDS = ("init", "run", "check", "sweep", "resume", "show", "plot", "probe", "view", "import", "study")
+COMMANDS = (*COMMANDS, "doctor")
 
 
 def test_nothing_is_the_help(capfd) -> None:

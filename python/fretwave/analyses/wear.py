@@ -28,7 +28,7 @@ from ..solve.steps import WearControl
 from .mode import ModeAnalysis
 from .parts.context import AnalysisContext, Outcome
 from .parts.rest import keep_pairs
-from .parts.wear_line import LINE, Line, columns, fields, march_line, wear_areas
+from .parts.wear_line import LINE, Line, columns, fields, march_line
 from .parts.wear_start import unworn_starts
 
 if TYPE_CHECKING:
@@ -182,9 +182,6 @@ def _collect(
             _copy(context, writer, line)
         if writer.rows and writer.active:
             keep_pairs(context, writer)
-            for name, areas in wear_areas(context.case).items():
-                if f"pairs_{name}" in writer.group:
-                    writer.dataset(f"pairs_{name}/area", areas, units="length^2", long_name="nodal area")
         writer.close("stopped" if failures else "done", reason)
     finally:
         writer.abandon()

@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING
 
 from ..errors import EXIT_DONE, InputError
 from ..mpi.guard import guarded, install, launched_rank
-from ..texts import display, is_there, own_version
+from ..texts import display, own_version
 from ..units import SYSTEMS
-from .parser import Parser, add_force, add_shown
-from .world import world, world_if_any
+from .parser import Parser, add_folder, add_force, add_shown, names, run_folder
+from .reading import add_reading
+from .world import world
 
 if TYPE_CHECKING:
     from argparse import _SubParsersAction
@@ -83,26 +84,15 @@ def parser() -> argparse.ArgumentParser:
     check.set_defaults(command=_check)
     _add_sweep(commands)
     resume = commands.add_parser("resume", help="go on with a run that was cut off, on any number of ranks")
-    _add_folder(resume)
+    add_folder(resume)
     _add_no_plots(resume)
     add_shown(resume)
     resume.set_defaults(command=_resume)
-    show = commands.add_parser("show", help="show the results of a run")
-    _add_folder(show)
-    show.set_defaults(command=_show)
-    plot = commands.add_parser("plot", help="make the pictures of a run again")
-    _add_folder(plot)
-    plot.add_argument("--only", type=_names, default=[], metavar="NAME,...", help="analyses or kinds of picture")
-    plot.set_defaults(command=_plot)
-    _add_view(commands)
+    add_reading(commands)
     _add_import(commands)
     commands.add_parser("study", help="error against run time of a case over harmonics, samples and tolerance")
     commands.add_parser("doctor", help="what is installed, whether it fits together, and what to do about it")
     return top
-
-
-def _names(text: str) -> list[str]:
-    return [name.strip() for name in text.split(",") if name.strip()]
 
 
 def _add_case(command: argparse.ArgumentParser, optional: bool = False) -> None:
@@ -116,12 +106,8 @@ def _add_case(command: argparse.ArgumentParser, optional: bool = False) -> None:
         dest="overrides",
         help="override a value: mode.harmonics=7, contact.damper.friction_limit=3, 'model.M=[[1.0]]'",
     )
-    command.add_argument("--only", type=_names, default=[], metavar="NAME,...", help="only these analyses")
+    command.add_argument("--only", type=names, default=[], metavar="NAME,...", help="only these analyses")
     command.add_argument("--quick", action="store_true", help="the short form: overrides of the table [quick]")
-
-
-def _add_folder(command: argparse.ArgumentParser) -> None:
-    command.add_argument("folder", type=Path, metavar="RUNDIR", help="folder of the run")
 
 
 def _add_no_plots(command: argparse.ArgumentParser) -> None:
@@ -166,30 +152,6 @@ def _add_sweep(commands: _SubParsers) -> None:
     sweep.set_defaults(command=_sweep)
 
 
-def _add_view(commands: _SubParsers) -> None:
-    view = commands.add_parser(
-        "view",
-        help="write the motion over a period and the contact pairs for ParaView",
-        description="Writes <analysis>.vtkhdf, the mesh with its displacement at phases of the period, and"
-        " <analysis>_contact.vtkhdf, the contact pairs with forces, status and work. Several points follow each other."
-        " Of a sector the whole wheel is written, sector by sector."
-        " Of wear without --point: <analysis>_wear.vtkhdf, the pairs with worn depth and pressure over wear cycles.",
-    )
-    _add_folder(view)
-    view.add_argument("--analysis", metavar="NAME", help="mode, forced response or wear (default: the first)")
-    which = view.add_mutually_exclusive_group()
-    which.add_argument("--point", type=int, nargs="+", default=[], metavar="N", help="points of the branch")
-    which.add_argument(
-        "--amplitude", type=float, nargs="+", default=[], metavar="A", help="nearest kept points, in the case's units"
-    )
-    view.add_argument("--sectors", type=int, nargs="+", default=[], metavar="J", help="of a wheel (default: all)")
-    view.add_argument("--phases", type=int, default=32, metavar="N", help="steps of a period (default 32)")
-    view.add_argument("--scale", default="auto", metavar="X", help="enlargement in the field warp (default auto)")
-    view.add_argument("--linear", action="store_true", help="eight linear hexahedra for each triquadratic one")
-    view.add_argument("--out", type=Path, metavar="FILE.vtkhdf", help="file to write (default: in the run folder)")
-    view.set_defaults(command=_view)
-
-
 def _add_import(commands: _SubParsers) -> None:
     add = commands.add_parser(
         "import",
@@ -220,13 +182,6 @@ def _add_import(commands: _SubParsers) -> None:
     add.add_argument("--units", metavar="SYSTEM", help=f"unit system of all numbers: {', '.join(SYSTEMS)}")
     add.add_argument("--modes", type=int, default=6, metavar="N", help="frequencies to report (default 6)")
     add.set_defaults(command=_import)
-
-
-def _run_folder(path: Path) -> Path:
-    """The folder of a run; what is in it is looked at later."""
-    if is_there(path) and not path.is_dir():
-        raise InputError("this is a file, not the folder of a run", display(path), fix="give the folder it is in")
-    return path
 
 
 def _init(options: argparse.Namespace) -> int:
@@ -260,7 +215,7 @@ def _sweep(options: argparse.Namespace) -> int:
 
 
 def _resume(options: argparse.Namespace) -> int:
-    _run_folder(options.folder)
+    run_folder(options.folder)
     comm = world()
     from ..files.lock import check_free
     from ..mpi.guard import on_first_rank
@@ -306,48 +261,3 @@ def _import(options: argparse.Namespace) -> int:
     from .import_model import import_model
 
     return import_model(options, comm)
-
-
-def _view(options: argparse.Namespace) -> int:
-    _run_folder(options.folder)
-    comm = world_if_any()
-    from ..view.choice import ViewOptions
-    from ..view.run import view_run
-
-    chosen = ViewOptions.checked(
-        options.scale,
-        options.phases,
-        analysis=options.analysis,
-        points=options.point,
-        amplitudes=options.amplitude,
-        linear=options.linear,
-        sectors=options.sectors,
-        out=options.out,
-    )
-    if comm is None:
-        view_run(options.folder, chosen)
-        return EXIT_DONE
-    from ..mpi.guard import on_first_rank
-
-    on_first_rank(comm, lambda: view_run(options.folder, chosen))
-    return EXIT_DONE
-
-
-def _show(options: argparse.Namespace) -> int:
-    _run_folder(options.folder)
-    from .show import show_run
-
-    show_run(options.folder)
-    return EXIT_DONE
-
-
-def _plot(options: argparse.Namespace) -> int:
-    _run_folder(options.folder)
-    from ..console import Console
-    from ..results.results import open_results
-    from ..run.runner import plot
-
-    if not (options.folder / "study.csv").exists():
-        open_results(options.folder / "results.h5").close()
-    plot(options.folder, Console(True), options.only or None)
-    return EXIT_DONE

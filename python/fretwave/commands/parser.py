@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
 from ..console import Shown
 from ..errors import InputError
 from ..mpi.guard import launched_rank
+from ..texts import display, is_there
 
 if TYPE_CHECKING:
     from _typeshed import SupportsWrite
@@ -40,3 +42,20 @@ def add_force(command: argparse.ArgumentParser) -> None:
     """Option of what writes into a folder."""
     said = "replace results of another case in the folder (default: refused)"
     command.add_argument("--force", action="store_true", help=said)
+
+
+def add_folder(command: argparse.ArgumentParser) -> None:
+    """Argument of what reads or goes on with a run."""
+    command.add_argument("folder", type=Path, metavar="RUNDIR", help="folder of the run")
+
+
+def run_folder(path: Path) -> Path:
+    """The folder of a run; what is in it is looked at later."""
+    if is_there(path) and not path.is_dir():
+        raise InputError("this is a file, not the folder of a run", display(path), fix="give the folder it is in")
+    return path
+
+
+def names(text: str) -> list[str]:
+    """Of a list with commas."""
+    return [name.strip() for name in text.split(",") if name.strip()]

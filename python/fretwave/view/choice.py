@@ -46,6 +46,7 @@ class ViewOptions:
     scale : factor on the displacement in the field ``warp``; None chooses one
     linear : eight linear hexahedra in place of a triquadratic one
     sectors : those shown of a wheel; empty for all
+    how : a point is asked for, in messages
     """
 
     analysis: str | None = None
@@ -56,6 +57,7 @@ class ViewOptions:
     linear: bool = False
     sectors: Sequence[int] = ()
     out: Path | None = None
+    how: str = "--point {}"
 
     @classmethod
     def checked(cls, scale: str, phases: int, **others: Any) -> ViewOptions:
@@ -189,10 +191,10 @@ def read_choice(file: h5py.File, folder: Path, case: Case, options: ViewOptions)
     """
     group = file[analysis_name(file, folder, case, options.analysis)]
     name = group.name.strip("/")
-    held = _held(group)
+    held = kept_points(group)
     # A mode is shown where its contacts are kept; a response is sought at its peaks, where they are not.
     offered = held if case.analyses[name].shown_where_kept and len(held) else np.arange(len(group["coefficients"]))
-    chosen = _points(group, offered, options, f"analysis '{name}' in {display(folder)}")
+    chosen = points_asked(group, offered, options, f"analysis '{name}' in {display(folder)}")
     count = int(group.attrs["samples"])
     samples = np.unique(np.arange(options.phases) * count // options.phases)
     rows, section = [row for row, _ in chosen], case.analyses[name].harmonic()
@@ -243,13 +245,13 @@ def analysis_name(file: h5py.File, folder: Path, case: Case, asked: str | None) 
     )
 
 
-def _held(group: h5py.Group) -> Indices:
+def kept_points(group: h5py.Group) -> Indices:
     """Points of which all is kept: where there are contacts, those at which their motion is."""
     with_contacts = any(name.startswith("contact_") for name in group)
     return np.asarray(group["reported"][()] if with_contacts else np.arange(len(group["coefficients"])), dtype=np.intp)
 
 
-def _points(group: h5py.Group, kept: Indices, options: ViewOptions, where: str) -> list[tuple[int, str]]:
+def points_asked(group: h5py.Group, kept: Indices, options: ViewOptions, where: str) -> list[tuple[int, str]]:
     """Numbers of points, each with a word on what was asked for; without a wish that of the largest amplitude.
 
     Parameters
@@ -260,28 +262,26 @@ def _points(group: h5py.Group, kept: Indices, options: ViewOptions, where: str) 
     for point in options.points:
         if not 0 <= point < len(amplitude):
             near = kept[np.argmin(np.abs(kept - point))]
-            raise _not_kept("there is no such point", where, f"point {point}", kept, amplitude, near, unit)
+            raise not_kept("there is no such point", where, f"point {point}", kept, group, near, options.how)
     chosen = [(int(point), "") for point in options.points]
     for asked in options.amplitudes:
         near = kept[np.argmin(np.abs(amplitude[kept] - asked))]
         if not amplitude.min() <= asked <= amplitude.max():
-            raise _not_kept(
-                "the branch does not reach this amplitude", where, f"{asked:g} {unit}", kept, amplitude, near, unit
-            )
+            what = "the branch does not reach this amplitude"
+            raise not_kept(what, where, f"{asked:g} {unit}", kept, group, near, options.how)
         chosen.append((int(near), f", the kept point nearest to {asked:g} {unit}"))
     return chosen or [(int(kept[np.argmax(amplitude[kept])]), ", the kept point of the largest amplitude")]
 
 
-def _not_kept(
-    what: str, where: str, measured: str, kept: Indices, amplitude: Array, near: int, unit: str
-) -> InputError:
-    """Names the kept points around the nearest one."""
+def not_kept(what: str, where: str, measured: str, kept: Indices, group: h5py.Group, near: int, how: str) -> InputError:
+    """Names the kept points around the nearest one, and how to ask for that."""
+    amplitude, unit = group["points/amplitude"][()], unit_of_amplitudes(group)
     place = int(np.flatnonzero(kept == near)[0])
     begin = max(0, min(place - NAMED // 2, len(kept) - NAMED))
     named = ", ".join(f"{point} ({amplitude[point]:.4g} {unit})" for point in kept[begin : begin + NAMED])
     more = f" ({len(kept)} in all)" if len(kept) > NAMED else ""
     expected = f"a point from 0 to {len(amplitude) - 1}, best one of {named}{more}"
-    return InputError(what, where, measured, expected, f"--point {near}")
+    return InputError(what, where, measured, expected, how.format(near))
 
 
 def _contacts(group: h5py.Group, case: Case, rows: Sequence[int]) -> dict[str, list[ContactHistory]]:

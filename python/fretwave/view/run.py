@@ -41,7 +41,7 @@ def view_run(folder: Path, options: ViewOptions, say: Callable[[str], None] = pr
         The folder holds no run, its case has changed, the model has no nodes, or there is no such analysis, point or
         sector.
     """
-    _learn_laws(folder)
+    learn_kept_laws(folder)
     case, _ = reload_case(folder, kept=True)
     with open_results(folder / "results.h5") as file:
         name = analysis_name(file, folder, case, options.analysis)
@@ -72,7 +72,7 @@ def view_run(folder: Path, options: ViewOptions, say: Callable[[str], None] = pr
     return [out, pairs] if placed else [out]
 
 
-def _learn_laws(folder: Path) -> None:
+def learn_kept_laws(folder: Path) -> None:
     """A case is read with the laws that its results keep, where the core that knows them is missing."""
     if not has_results(folder):
         return

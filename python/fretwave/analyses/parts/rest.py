@@ -162,3 +162,5 @@ def keep_pairs(context: AnalysisContext[AnalysisSection], writer: AnalysisWriter
         writer.dataset(f"{place}/position", given.positions, units="length", long_name="place on the face")
         writer.dataset(f"{place}/face", np.array([str(face).encode() for face in faces]))
         writer.dataset(f"{place}/{Role.FRICTION_COEFFICIENT.value}", friction, units="1")
+        if given.areas is not None:
+            writer.dataset(f"{place}/area", given.areas, units="length^2", long_name="nodal area")

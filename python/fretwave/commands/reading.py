@@ -1,0 +1,143 @@
+"""Sub-commands that read results and solve nothing: show, plot, probe, view."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ..errors import EXIT_DONE
+from .parser import Parser, add_folder, names, run_folder
+from .world import world_if_any
+
+if TYPE_CHECKING:
+    from argparse import _SubParsersAction
+
+    _SubParsers = _SubParsersAction[Parser]
+
+
+def add_reading(commands: _SubParsers) -> None:
+    """All of them."""
+    show = commands.add_parser("show", help="show the results of a run")
+    add_folder(show)
+    show.add_argument("--json", action="store_true", help="the same for programs: one JSON object")
+    show.set_defaults(command=_show)
+    plot = commands.add_parser("plot", help="make the pictures of a run again")
+    add_folder(plot)
+    plot.add_argument("--only", type=names, default=[], metavar="NAME,...", help="analyses or kinds of picture")
+    plot.set_defaults(command=_plot)
+    _add_probe(commands)
+    _add_view(commands)
+
+
+def _add_probe(commands: _SubParsers) -> None:
+    probe = commands.add_parser(
+        "probe",
+        help="contact pairs, a node or a dof at one point of a branch",
+        description="--pairs: a CSV with work per period, normal force (and pressure where areas are known), slip, gap"
+        " and shares of stick, slip and open of each contact pair. --node, --dof: amplitude and phase of each harmonic"
+        " along x, y, z; a reduced model is expanded, of a wheel one sector is looked at. CSV goes to standard output,"
+        " with a line on which point it is on standard error.",
+    )
+    add_folder(probe)
+    what = probe.add_mutually_exclusive_group(required=True)
+    what.add_argument("--pairs", action="store_true", help="a table of all contact pairs")
+    what.add_argument("--node", type=int, metavar="N", help="a node, in the mesh's own numbers, else counted from 0")
+    what.add_argument("--dof", metavar="NAME", help="a dof of the model that was solved")
+    probe.add_argument("--analysis", metavar="NAME", help="mode, forced response or wear (default: the first)")
+    probe.add_argument(
+        "--at",
+        nargs="+",
+        default=["peak"],
+        metavar="POINT",
+        help="peak (largest damping, or response; default), start, end, an amplitude (the nearest point), or row N",
+    )
+    probe.add_argument("--sector", type=int, default=0, metavar="J", help="of a wheel, of --node (default 0)")
+    probe.add_argument("--csv", action="store_true", help="the harmonics of --node or --dof as CSV")
+    probe.add_argument("--steps", type=int, metavar="N", help="in their place the motion at N instants of the period")
+    probe.add_argument("--out", type=Path, metavar="FILE", help="write the CSV here")
+    probe.set_defaults(command=_probe)
+
+
+def _add_view(commands: _SubParsers) -> None:
+    view = commands.add_parser(
+        "view",
+        help="write the motion over a period and the contact pairs for ParaView",
+        description="Writes <analysis>.vtkhdf, the mesh with its displacement at phases of the period, and"
+        " <analysis>_contact.vtkhdf, the contact pairs with forces, status and work. Several points follow each other."
+        " Of a sector the whole wheel is written, sector by sector."
+        " Of wear without --point: <analysis>_wear.vtkhdf, the pairs with worn depth and pressure over wear cycles.",
+    )
+    add_folder(view)
+    view.add_argument("--analysis", metavar="NAME", help="mode, forced response or wear (default: the first)")
+    which = view.add_mutually_exclusive_group()
+    which.add_argument("--point", type=int, nargs="+", default=[], metavar="N", help="points of the branch")
+    which.add_argument(
+        "--amplitude", type=float, nargs="+", default=[], metavar="A", help="nearest kept points, in the case's units"
+    )
+    view.add_argument("--sectors", type=int, nargs="+", default=[], metavar="J", help="of a wheel (default: all)")
+    view.add_argument("--phases", type=int, default=32, metavar="N", help="steps of a period (default 32)")
+    view.add_argument("--scale", default="auto", metavar="X", help="enlargement in the field warp (default auto)")
+    view.add_argument("--linear", action="store_true", help="eight linear hexahedra for each triquadratic one")
+    view.add_argument("--out", type=Path, metavar="FILE.vtkhdf", help="file to write (default: in the run folder)")
+    view.set_defaults(command=_view)
+
+
+def _show(options: argparse.Namespace) -> int:
+    run_folder(options.folder)
+    from .show import show_run
+
+    show_run(options.folder, options.json)
+    return EXIT_DONE
+
+
+def _plot(options: argparse.Namespace) -> int:
+    run_folder(options.folder)
+    from ..console import Console
+    from ..results.results import open_results
+    from ..run.runner import plot
+
+    if not (options.folder / "study.csv").exists():
+        open_results(options.folder / "results.h5").close()
+    plot(options.folder, Console(True), options.only or None)
+    return EXIT_DONE
+
+
+def _probe(options: argparse.Namespace) -> int:
+    run_folder(options.folder)
+    comm = world_if_any()
+    from .probe import probe
+
+    _on_first_rank(comm, lambda: probe(options))
+    return EXIT_DONE
+
+
+def _view(options: argparse.Namespace) -> int:
+    run_folder(options.folder)
+    comm = world_if_any()
+    from ..view.choice import ViewOptions
+    from ..view.run import view_run
+
+    chosen = ViewOptions.checked(
+        options.scale,
+        options.phases,
+        analysis=options.analysis,
+        points=options.point,
+        amplitudes=options.amplitude,
+        linear=options.linear,
+        sectors=options.sectors,
+        out=options.out,
+    )
+    _on_first_rank(comm, lambda: view_run(options.folder, chosen))
+    return EXIT_DONE
+
+
+def _on_first_rank(comm: Any, work: Callable[[], object]) -> None:
+    """What reads results, on one rank; also where there is no MPI."""
+    if comm is None:
+        work()
+        return
+    from ..mpi.guard import on_first_rank
+
+    on_first_rank(comm, work)

@@ -1,0 +1,85 @@
+"""``fretwave show --json``: what `show` prints, for programs."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_line import call
+from tolerances import ROUNDING
+
+import fretwave as fw
+from fretwave.results.results import AnalysisWriter
+
+pytestmark = pytest.mark.ranks(1)
+
+CASE = Path(__file__).parents[2] / "cases" / "two_dof" / "case.toml"
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("show") / "run"
+    only = "mode,flutter,forced"
+    short = ("--quick", "--only", only, "--set", "forced.time_points=0", "--no-plots", "-q")
+    assert call("run", CASE, *short, "--out", folder) == 0
+    return folder
+
+
+def told(folder: Path, capsys) -> dict:
+    assert call("show", folder, "--json") == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def printed(folder: Path, capsys) -> list[str]:
+    assert call("show", folder) == 0
+    return capsys.readouterr().out.splitlines()
+
+
+def test_it_holds_what_show_prints(run: Path, capsys) -> None:
+    found, lines = told(run, capsys), printed(run, capsys)
+    assert lines[0] == found["title"] and lines[1].startswith(f"{found['status']}, {found['ranks']} rank")
+    rows = {line.split()[0]: line for line in lines[3 : 3 + len(found["analyses"])]}
+    assert list(rows) == [one["name"] for one in found["analyses"]] == ["mode", "flutter", "forced"]
+    for one in found["analyses"]:
+        line, top, span = rows[one["name"]], one["peak"], one["range"]
+        assert f"{span['low']:.4g} - {span['high']:.4g} {span['unit']}" in line
+        assert f" {one['points']} " in line and f"{one['wall_s']:.2f} s" in line
+        share = f"zeta {100 * top['zeta']:.3g} %" if one["type"] == "mode" else f"{top['frequency_hz']:.4g} Hz"
+        assert share in line and one["status"] == "done" and one["overrides"].startswith("--quick")
+    assert lines[3 + len(rows) :] == found["notes"]
+    assert sum("limit cycle at" in note for note in found["notes"]) == len(found["analyses"][1]["limit_cycles"]) == 2
+    assert [cycle["stable"] for cycle in found["analyses"][1]["limit_cycles"]] == [True, False]
+
+
+def test_its_numbers_are_the_tables(run: Path, capsys) -> None:
+    found, tables = told(run, capsys), fw.open_run(run)
+    for one in found["analyses"]:
+        table, top = tables[one["name"]], dict(one["peak"])
+        point = top.pop("point")
+        assert top == {name: table[name][point] for name in top}
+        assert one["points"] == len(table) and one["unit"] == table.units["amplitude"]
+        of = f"{one['error']['of']}_error"
+        assert one["error"]["value"] == np.nanmax(table[of])
+        assert one["wall_s"] == pytest.approx(table["wall_s"].sum(), rel=ROUNDING)
+
+
+def test_of_a_run_that_is_not_finished(run: Path, tmp_path: Path, capsys) -> None:
+    """What a killed run leaves: a journal in the place of results.h5."""
+    writer = AnalysisWriter(tmp_path, "mode", ["point", "amplitude", "zeta", "omega0"], {"type": "mode"})
+    writer.append({"point": 0, "amplitude": 0.5, "zeta": float("nan"), "omega0": 3.0})
+    writer.append({"point": 1, "amplitude": 0.7, "zeta": 0.02, "omega0": 3.0})
+    assert not (tmp_path / "results.h5").exists()
+    found = told(tmp_path, capsys)
+    (one,) = found["analyses"]
+    assert one["status"] == "running" and one["points"] == 2 and found["status"] == ""
+    assert one["peak"]["zeta"] == 0.02  # what is not known is not the largest
+    assert any("not finished" in note for note in found["notes"])
+    writer.abandon()
+
+
+def test_a_folder_without_results_is_refused(tmp_path: Path, capsys) -> None:
+    assert call("show", tmp_path, "--json") == 2
+    said = capsys.readouterr()
+    assert said.out == "" and said.err.count("fix:") == 1

@@ -1,0 +1,272 @@
+"""``fretwave probe``: pairs, nodes and dofs at a point of a branch, against results.h5 and the equations."""
+
+from __future__ import annotations
+
+import csv
+import io
+import shutil
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from command_line import call
+from models.chain_case import BUILDER, CHAIN
+from tolerances import LAST_DIGITS, ROUNDING, SOLVED, TIGHT
+
+import fretwave as fw
+from fretwave.case.load import load_case
+from fretwave.post.contact_history import ContactHistory
+from fretwave.post.pair_values import pair_values, slip_range
+
+pytestmark = pytest.mark.ranks(1)
+
+TWO_DOF = Path(__file__).parents[2] / "cases" / "two_dof" / "case.toml"
+ANALYSES = """
+[[analysis]]
+name = "mode"
+type = "mode"
+method = "EPMC"
+harmonics = 5
+samples = 256
+normalise = "tip"
+amplitude = [2e-7, 4e-6]
+report_at = [2e-6, 3e-6]
+
+[[analysis]]
+name = "forced"
+type = "forced"
+harmonics = 3
+samples = 64
+observe = "tip"
+force = { tip = 0.05 }
+frequency = [205.0, 220.0]
+levels = [1.0]
+
+[[analysis]]
+name = "wear"
+type = "wear"
+mode = "mode"
+amplitude = [2e-6, 3e-6]
+cycles = 4.0
+coefficient = 1e-13
+report_at = [2.0]
+"""
+#: Rounding of the contact's own sum over a period against the harmonic equations.
+BALANCE = 1e-6
+#: No pictures, no check in time.
+SHORT = ("--set", "forced.time_points=0", "--no-plots", "-q")
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory) -> dict[str, Path]:
+    """The chain reduced, with all its component modes, and as it is."""
+    base = tmp_path_factory.mktemp("probe")
+    shutil.copy(BUILDER, base / "model.py")
+    begin, end = CHAIN.index("[reduction]"), CHAIN.index("[preload]")
+    found = {}
+    for name, text in (("reduced", CHAIN), ("whole", CHAIN[:begin] + CHAIN[end:])):
+        (base / f"{name}.toml").write_text(text + ANALYSES)
+        assert call("run", base / f"{name}.toml", "--no-plots", "-q", "--out", base / name) == 0
+        found[name] = base / name
+    return found
+
+
+@pytest.fixture(scope="module")
+def two_dof_run(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("probe") / "two_dof"
+    assert call("run", TWO_DOF, "--quick", "--only", "mode,forced", *SHORT, "--out", folder) == 0
+    return folder
+
+
+def rows_of(capsys, *words: object) -> list[dict[str, float | str]]:
+    """The CSV that a probe prints."""
+    capsys.readouterr()
+    assert call("probe", *words) == 0
+    return table_of(capsys.readouterr().out)
+
+
+def table_of(text: str) -> list[dict[str, float | str]]:
+    def number(value: str) -> float | str:
+        try:
+            return float(value)
+        except ValueError:
+            return value
+
+    return [{key: number(value) for key, value in row.items()} for row in csv.DictReader(io.StringIO(text))]
+
+
+@pytest.mark.parametrize("at", [("peak",), ("start",), ("end",), ("row", "7"), ("0.5",)])
+def test_a_dof_is_its_coefficients(two_dof_run: Path, capsys, at: tuple[str, ...]) -> None:
+    mode = fw.open_run(two_dof_run)["mode"]
+    amplitude = mode["amplitude"]
+    (point,) = {
+        "peak": [np.argmax(mode["zeta"])],
+        "start": [0],
+        "end": [len(mode) - 1],
+        "row": [7],
+    }.get(at[0], [np.argmin(np.abs(amplitude - 0.5))])
+    rows = rows_of(capsys, two_dof_run, "--dof", "m2", "--csv", "--at", *at)
+    with h5py.File(two_dof_run / "results.h5") as file:
+        values = dict(zip(mode.labels, file["mode/coefficients"][point, mode.dofs.index("m2")]))
+    assert [row["harmonic"] for row in rows] == [1, 3, 5, 7]
+    for row in rows:
+        n = f"{row['harmonic']:.0f}"
+        turn = np.exp(1j * np.radians(row["m2_phase_deg"]))
+        q = row["m2_amplitude"] * turn
+        assert abs(q - (values[f"{n}c"] - 1j * values[f"{n}s"])) <= LAST_DIGITS * row["m2_amplitude"]
+        assert row["frequency_hz"] == pytest.approx(int(n) * mode["frequency_hz"][point], rel=LAST_DIGITS)
+
+
+def test_the_normalised_dof_has_the_tables_amplitude(two_dof_run: Path, capsys) -> None:
+    for name in ("mode", "forced"):
+        table = fw.open_run(two_dof_run)[name]
+        row = next(iter(rows_of(capsys, two_dof_run, "--analysis", name, "--dof", "m1", "--csv")))
+        top = np.argmax(table["zeta"] if name == "mode" else table["amplitude"])
+        assert row["m1_amplitude"] == pytest.approx(table["amplitude"][top], rel=ROUNDING)
+        phase = 0.0 if name == "mode" else table["phase"][top]
+        assert np.radians(row["m1_phase_deg"]) == pytest.approx(phase, abs=ROUNDING)
+
+
+def test_motion_over_the_period_is_that_of_the_harmonics(runs, capsys) -> None:
+    node = (runs["reduced"], "--node", 3, "--at", "end")
+    harmonics, motion = rows_of(capsys, *node, "--csv"), rows_of(capsys, *node, "--steps", 8)
+    assert len(motion) == 8
+    for row in motion:
+        tau = 2 * np.pi * row["period"]
+        for name in "xyz":
+            waves = [
+                h[f"{name}_amplitude"] * np.cos(h["harmonic"] * tau + np.radians(h[f"{name}_phase_deg"]))
+                for h in harmonics
+            ]
+            assert row[name] == pytest.approx(sum(waves), abs=ROUNDING * 4e-6)
+
+
+def test_a_node_of_a_reduced_model_moves_as_without_reduction(runs, capsys) -> None:
+    """All component modes are kept: both are the same equations, solved twice."""
+    for node in (0, 2, 5):
+        reduced, whole = (rows_of(capsys, runs[name], "--node", node, "--csv", "--at", "end") for name in runs)
+        assert len(reduced) == len(whole) == 6
+        for one, other in zip(reduced, whole):
+            for name in "xyz":
+                q, p = (r[f"{name}_amplitude"] * np.exp(1j * np.radians(r[f"{name}_phase_deg"])) for r in (one, other))
+                assert abs(q - p) <= SOLVED * 4e-6
+
+
+def test_a_dof_of_a_model_without_reduction_is_its_node(runs, capsys) -> None:
+    dof, node = (rows_of(capsys, runs["whole"], *words, "--csv") for words in (("--dof", "tip"), ("--node", 5)))
+    for one, other in zip(dof, node):
+        assert (one["tip_amplitude"], one["tip_phase_deg"]) == (other["y_amplitude"], other["y_phase_deg"])
+
+
+def test_work_of_the_pairs_is_what_the_table_says(runs, capsys) -> None:
+    """The wear table has the contact's work; every row that keeps its pairs."""
+    wear = fw.open_run(runs["reduced"])["wear"]
+    assert len(wear.reported) > 3
+    for row in wear.reported:
+        pairs = rows_of(capsys, runs["reduced"], "--analysis", "wear", "--pairs", "--at", "row", row)
+        assert sum(pair["work"] for pair in pairs) == pytest.approx(wear["work"][row], rel=ROUNDING)
+
+
+def test_work_of_the_pairs_balances_the_artificial_damping(runs, capsys) -> None:
+    """EPMC: contact takes what 2 zeta w0 M - C feeds, pi n^2 w0 q_n^H (2 zeta w0 M - C) q_n over all harmonics."""
+    mode = fw.open_run(runs["whole"])["mode"]
+    case = load_case(runs["whole"].parent / "whole.toml")
+    point = len(mode) - 1
+    zeta, omega = mode["zeta"][point], mode["omega0"][point]
+    D = (2 * zeta * omega * case.M - case.damping_with(())).toarray()
+    fed = 0.0
+    coefficients = dict(zip(mode.labels, mode.coefficients([point])[0].T))
+    for n in range(1, 6):
+        q = coefficients[f"{n}c"] - 1j * coefficients[f"{n}s"]
+        fed += np.pi * n**2 * omega * np.real(np.conj(q) @ D @ q)
+    pairs = rows_of(capsys, runs["whole"], "--pairs", "--at", "end")
+    assert sum(pair["work"] for pair in pairs) == pytest.approx(fed, rel=BALANCE) and fed > 0
+
+
+def test_values_of_the_pairs_are_those_of_the_kept_period(runs, capsys) -> None:
+    mode = fw.open_run(runs["reduced"])["mode"]
+    point = len(mode) - 1
+    kept, pairs = mode.loop("pads", point), rows_of(capsys, runs["reduced"], "--pairs", "--at", "end")
+    force = kept["f"]
+    for k, pair in enumerate(pairs):
+        assert pair["normal_largest"] == force[:, 0, k].max() and pair["normal_least"] == force[:, 0, k].min()
+        assert pair["pressure_largest"] == pytest.approx(force[:, 0, k].max() / 2e-4, rel=LAST_DIGITS)
+        assert pair["tangential_largest"] == np.hypot(force[:, 1, k], force[:, 2, k]).max()
+        assert [pair[word] for word in ("stick", "slip", "open")] == kept["shares"][:, k].tolist()
+        assert (pair["contact"], pair["face"], pair["along"]) == ("pads", "pads", [0.0, 0.1][k])
+    stuck, slides = pairs
+    assert stuck["slip_range"] <= ROUNDING * slides["slip_range"] and stuck["work"] == 0.0 < slides["work"]
+    # one tangent moves: the work is that of friction mu N over the slip path, twice the range
+    assert slides["work"] == pytest.approx(0.4 * slides["normal_mean"] * 2 * slides["slip_range"], rel=2e-3)
+
+
+def jenkins(amplitude: float, n: int = 4096) -> tuple[np.ndarray, np.ndarray]:
+    """Displacement and force of a slider with kt = 2 and the limit 1, after a period from rest."""
+    u, w, f = amplitude * np.cos(2 * np.pi * np.arange(2 * n) / n), 0.0, []
+    for x in u:
+        w += np.sign(2 * (x - w)) * max(0.0, abs(x - w) - 0.5)
+        f.append(2 * (x - w))
+    return u[n:], np.array(f[n:])
+
+
+@pytest.mark.parametrize(("amplitude", "slips"), [(0.4, 0.0), (0.5, 0.0), (1.5, 2.0)])
+def test_range_of_a_slider(amplitude: float, slips: float) -> None:
+    """Of a Jenkins element 2 (a - R / kt), in one tangent and in any direction of two."""
+    u, f = jenkins(amplitude)
+    one = ContactHistory(u[:, None, None], 0 * u[:, None, None], f[:, None, None])
+    assert slip_range(one, np.array([2.0]))[0] == pytest.approx(slips, abs=1e-5)
+    turned = np.array([0.0, 0.6, 0.8])[:, None]
+    two = ContactHistory(u[:, None, None] * turned, 0 * u[:, None, None] * turned, f[:, None, None] * turned, normal=0)
+    assert slip_range(two, np.array([2.0]))[0] == pytest.approx(slips, rel=2e-4, abs=LAST_DIGITS)
+    assert slip_range(one)[0] == pytest.approx(2 * amplitude, rel=TIGHT)
+
+
+def test_open_pairs_do_not_slip() -> None:
+    """The displacement of an open pair moves no slider."""
+    u, closed = np.linspace(0.0, 1.0, 5)[:, None, None], np.zeros((5, 1, 1))
+    status = np.array([[0], [0], [2], [2], [2]], dtype=np.int8)
+    values = pair_values(ContactHistory(u, closed, closed, status))
+    assert values["slip_range"][0] == 0.25 and values["open"][0] == pytest.approx(0.6, rel=LAST_DIGITS)
+    assert "normal_mean" not in values and "pressure_mean" not in values
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--node", "50"], "one of 6 nodes, 0 to 5"),
+        (["--dof", "tpi"], "--dof tip"),
+        (["--dof", "zz"], "component_1"),
+        (["--pairs", "--at", "row", "3"], "not kept at this point"),
+        (["--pairs", "--at", "row", "3000"], "there is no such point"),
+        (["--pairs", "--at", "1.0"], "does not reach this amplitude"),
+        (["--pairs", "--at", "pek"], "--at peak"),
+        (["--pairs", "--analysis", "mod"], "did you mean `mode`?"),
+        (["--node", "1", "--sector", "2"], "no such sector"),
+        (["--node", "1", "--steps", "0"], "--steps 64"),
+        (["--pairs", "--node", "1"], "not allowed with"),
+        ([], "--pairs --node --dof"),
+    ],
+)
+def test_wrong_words_are_told_with_one_fix(runs, capsys, words: list[str], said: str) -> None:
+    assert call("probe", runs["reduced"], *words) == 2
+    told = capsys.readouterr()
+    assert told.out == "" and told.err.count("fix:") == 1 and said in told.err
+
+
+def test_a_fix_works(runs, capsys) -> None:
+    assert call("probe", runs["reduced"], "--pairs", "--at", "row", 3) == 2
+    fix = capsys.readouterr().err.rpartition("fix:")[2].split()
+    assert call("probe", runs["reduced"], "--pairs", *fix) == 0
+
+
+def test_it_goes_to_a_file_and_to_the_screen(runs, tmp_path: Path, capsys) -> None:
+    printed = rows_of(capsys, runs["reduced"], "--pairs")
+    assert call("probe", runs["reduced"], "--pairs", "--out", tmp_path / "pairs.csv") == 0
+    said = capsys.readouterr().out
+    assert "mode: point" in said and "2 rows" in said
+    assert table_of((tmp_path / "pairs.csv").read_text()) == printed
+    assert call("probe", runs["reduced"], "--node", 5) == 0
+    screen = capsys.readouterr().out.splitlines()
+    top = rows_of(capsys, runs["reduced"], "--node", 5, "--csv")[1]
+    assert f"{top['y_amplitude']:.4g}" in screen[4] and f"{top['frequency_hz']:.6g}" in screen[4]
