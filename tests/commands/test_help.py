@@ -9,7 +9,7 @@ from command_line import call
 
 pytestmark = pytest.mark.ranks(1)
 
-COMMANDS = ("init", "run", "check", "sweep", "resume", "show", "plot", "probe", "view", "import", "study")
+COMMANDS = ("init", "run", "check", "sweep", "resume", "show", "report", "plot", "probe", "view", "import", "study")
 COMMANDS = (*COMMANDS, "doctor")
 
 

@@ -108,14 +108,16 @@ def files(run, tmp_path_factory) -> list[Path]:
     return sorted([run / "results.h5", *base.rglob("results.h5")])
 
 
-@pytest.mark.parametrize("command", ["show", "plot"])
+@pytest.mark.parametrize("command", ["show", "plot", "report"])
 def test_a_run_is_shown_without_mpi_and_petsc(run, command):
     done = blocked(command, run)
     assert done.returncode == 0, done.stderr
     if command == "show":
         assert "limit cycle at a = 0.1375" in done.stdout
-    else:
+    elif command == "plot":
         assert (run / "mode_backbone.png").exists()
+    else:
+        assert "regularisation_velocity 0.05 m/s" in (run / "report.html").read_text()  # the case could be read
 
 
 def blocked(*words) -> subprocess.CompletedProcess[str]:
@@ -158,6 +160,8 @@ def test_a_motion_is_viewed_without_mpi_and_petsc(tmp_path, reduced):
             out = tmp_path / place / f"{name}.vtkhdf"
             done = view("view", folder, "--analysis", name, "--phases", "8", "--out", out)
             assert done == 0 if place == "with" else done.returncode == 0, done.stderr
+        probed = view("probe", folder, "--node", "3", "--csv", "--out", tmp_path / f"{place}.csv")
+        assert probed == 0 if place == "with" else probed.returncode == 0
         assert (folder / "reduction.h5").exists() == (reduced and place == "without")
         (folder / "reduction.h5").unlink(missing_ok=True)
     made = {place: sorted((tmp_path / place).iterdir()) for place in ("with", "without")}

@@ -1,18 +1,21 @@
-"""Sub-commands that read results and solve nothing: show, plot, probe, view."""
+"""Sub-commands that read results and solve nothing: show, report, plot, probe, view."""
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from ..errors import EXIT_DONE
+from ..texts import display
 from .parser import Parser, add_folder, names, run_folder
 from .world import world_if_any
 
 if TYPE_CHECKING:
     from argparse import _SubParsersAction
+
+    from mpi4py import MPI
 
     _SubParsers = _SubParsersAction[Parser]
 
@@ -23,6 +26,15 @@ def add_reading(commands: _SubParsers) -> None:
     add_folder(show)
     show.add_argument("--json", action="store_true", help="the same for programs: one JSON object")
     show.set_defaults(command=_show)
+    report = commands.add_parser(
+        "report",
+        help="a run on one page of HTML, to be read, printed or sent",
+        description="Writes one file that needs nothing beside it: model, settings, checks, results with their errors,"
+        " why branches ended, pictures, versions and digests. Also of a run that is not finished.",
+    )
+    add_folder(report)
+    report.add_argument("--out", type=Path, metavar="FILE", help="file to write (default: report.html in the folder)")
+    report.set_defaults(command=_report)
     plot = commands.add_parser("plot", help="make the pictures of a run again")
     add_folder(plot)
     plot.add_argument("--only", type=names, default=[], metavar="NAME,...", help="analyses or kinds of picture")
@@ -92,6 +104,15 @@ def _show(options: argparse.Namespace) -> int:
     return EXIT_DONE
 
 
+def _report(options: argparse.Namespace) -> int:
+    run_folder(options.folder)
+    from ..report.report import report_run
+
+    path = report_run(options.folder, options.out)
+    print(f"{display(path)}: {path.stat().st_size / 1e6:.2g} MB")
+    return EXIT_DONE
+
+
 def _plot(options: argparse.Namespace) -> int:
     run_folder(options.folder)
     from ..console import Console
@@ -133,7 +154,7 @@ def _view(options: argparse.Namespace) -> int:
     return EXIT_DONE
 
 
-def _on_first_rank(comm: Any, work: Callable[[], object]) -> None:
+def _on_first_rank(comm: MPI.Comm | None, work: Callable[[], object]) -> None:
     """What reads results, on one rank; also where there is no MPI."""
     if comm is None:
         work()

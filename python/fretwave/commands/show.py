@@ -25,6 +25,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ..console import on_terminal
 from ..files.lock import is_taken
 from ..results.file import open_results
@@ -113,7 +115,7 @@ def _study_json(folder: Path, record: Mapping[str, Any]) -> None:
     print(json.dumps(told, indent=2, allow_nan=False))
 
 
-def _number(value: Any) -> Any:
+def _number(value: np.generic) -> object:
     """Python's own; JSON knows no nan."""
     own = value.item()
     return None if own != own else own

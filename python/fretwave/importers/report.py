@@ -11,6 +11,7 @@ from scipy.sparse.csgraph import connected_components
 
 from ..arrays import Array
 from ..errors import FretwaveError
+from ..model.sectors import Sparse
 from ..model.structure import Structure
 from ..texts import counted
 from .units import Evidence, words
@@ -121,19 +122,19 @@ def _mass(model: Structure, motions: Array | None, report: Report) -> None:
     if motions is None:
         report.lines.append("mass of the body: not known without coordinates and a table of dofs")
         return
-    masses, unit = _masses(model, motions), f" [{model.unit_system('mass')}]" if model.units else ""
+    found, unit = masses(model.M, motions), f" [{model.unit_system('mass')}]" if model.units else ""
     absent = len(np.setdiff1d(model.node_numbers, model.labels[:, 0]))  # type: ignore[arg-type,index]
     held = f" (without the {absent} nodes that have no dof)" if absent else ""
-    report.lines.append("mass: " + ", ".join(f"{m:.6g} along {a}" for m, a in zip(masses, "xyz")) + unit + held)
-    if np.ptp(masses) > MASS_SPREAD * masses.max():
+    report.lines.append("mass: " + ", ".join(f"{m:.6g} along {a}" for m, a in zip(found, "xyz")) + unit + held)
+    if np.ptp(found) > MASS_SPREAD * found.max():
         report.warnings.append(
             "the mass differs along x, y and z: dofs are held or missing, or M has entries that belong elsewhere"
         )
 
 
-def _masses(model: Structure, motions: Array) -> Array:
-    """t^T M t of the three translations."""
-    return np.asarray(np.einsum("ik,ik->k", motions[:, :3], model.M @ motions[:, :3]))
+def masses(M: Sparse, motions: Array) -> Array:
+    """t^T M t (3,) [mass] of the three translations, the first columns of motions (n_dof, 3 or more)."""
+    return np.asarray(np.einsum("ik,ik->k", motions[:, :3], M @ motions[:, :3]))
 
 
 def _diagonal(model: Structure, diagonal: Array, quantity: str, report: Report) -> None:

@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, TypeVar, cast
 
 import numpy as np
 from numpy.linalg import LinAlgError
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     Family = Callable[[Run], Iterator[tuple[str, Figure]]]
 
+Saved = TypeVar("Saved")
 #: Raised where results are too few or too extreme for a picture.
 OF_RESULTS = (ArithmeticError, ValueError, IndexError, LinAlgError)
 #: Of no analysis.
@@ -50,14 +51,25 @@ def plot_run(run_folder: str | Path, only: Sequence[str] | None = None, failed: 
     from . import style
 
     run = Run(run_folder)
-    written = []
+    return list(drawn(run, lambda name, figure: style.save(figure, run.folder / f"{name}.png"), only, failed))
+
+
+def drawn(
+    run: Run,
+    save: Callable[[str, Figure], Saved],
+    only: Sequence[str] | None = None,
+    failed: list[str] | None = None,
+) -> Iterator[Saved]:
+    """What `save` makes of the name and the figure of each picture; see `plot_run`."""
+    from . import style
+
     with style.rules(), np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of ranges without a width and values without a logarithm
         for family, figures in families():
             try:
                 for name, figure in figures(run):
-                    if only is None or family in only or _of_analysis(name, run, only):
-                        written.append(style.save(figure, run.folder / f"{name}.png"))
+                    if only is None or family in only or picture_of(name, run) in only:
+                        yield save(name, figure)
             except Exception as error:
                 own = (
                     figures.__module__.partition(".")[0] == "fretwave"
@@ -66,14 +78,13 @@ def plot_run(run_folder: str | Path, only: Sequence[str] | None = None, failed: 
                     raise
                 kind = "" if own else f"{type(error).__name__}: "
                 failed.append(f"no picture '{family}' of these results: {kind}{error}")
-    return written
 
 
 def _family(name: str) -> Family:
     return cast("Family", import_module(f"{__name__}.{name}").figures)
 
 
-def _of_analysis(picture: str, run: Run, only: Sequence[str]) -> bool:
-    """The longest analysis name that the picture's name starts with is the analysis it shows."""
+def picture_of(picture: str, run: Run) -> str:
+    """The analysis or table that a picture shows: the longest name that its own starts with; "" for none."""
     owners = [name for name in (*run.analyses, *run.tables()) if picture == name or picture.startswith(name + "_")]
-    return bool(owners) and max(owners, key=len) in only
+    return max(owners, key=len, default="")

@@ -118,7 +118,7 @@ class Overview:
         return [f"stopped early: {self.reason}"] if self.status == "stopped" else []
 
 
-def _plain(value: Any) -> Any:
+def _plain(value: object) -> object:
     """JSON knows no nan."""
     if isinstance(value, Mapping):
         return {key: _plain(one) for key, one in value.items()}

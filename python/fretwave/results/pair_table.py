@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
-from ..arrays import Array
+from ..arrays import AnyArray, Array
 from ..columns import Column
 from ..model.laws import Role, kept_laws
 from ..post.contact_history import ContactHistory
@@ -59,7 +60,7 @@ def _pairs_of(analysis: Analysis, contact: str, point: int) -> dict[str, Any]:
     return {**places, **pair_values(history, kt, spread.get("area"))}
 
 
-def _spread(values: Any, count: int) -> Any:
+def _spread(values: npt.ArrayLike, count: int) -> AnyArray:
     """Of one sector's pairs for those of all sectors of a wheel, or one value for all."""
-    values = np.atleast_1d(values)
-    return np.concatenate([values] * (count // len(values)))
+    one = np.atleast_1d(values)
+    return np.concatenate([one] * (count // len(one)))

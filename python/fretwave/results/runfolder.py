@@ -216,6 +216,7 @@ def versions() -> dict[str, str]:
     import numpy
     import petsc4py
     import scipy
+    import slepc4py
     from mpi4py import MPI
     from petsc4py import PETSc
 
@@ -224,6 +225,7 @@ def versions() -> dict[str, str]:
         "python": platform.python_version(),
         "petsc": ".".join(str(part) for part in PETSc.Sys.getVersion()),
         "petsc4py": petsc4py.__version__,
+        "slepc4py": slepc4py.__version__,
         "numpy": numpy.__version__,
         "scipy": scipy.__version__,
         "h5py": h5py.__version__,

@@ -14,7 +14,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -210,17 +210,22 @@ def _points(plan: Plan, branches: Sequence[Branch]) -> list[tuple[Column, Any]]:
 
 def _summary(kind: str, plan: Plan, branches: Sequence[Branch]) -> list[dict[str, Any]]:
     """A row for each branch; a table of a value has one, or one for each level or nodal diameter."""
-    rows, split = [], split_of(kind)
+    rows = []
     for branch in branches:
         keys = {key: plain(_key_column(plan, key)[branch.number]) for key in plan.keys}
-        column = branch.table.get(split)
-        for part in [None] if column is None else np.unique(column):
-            chosen = np.full(branch.points, True) if part is None else column == part
-            table = {key: values[chosen] for key, values in branch.table.items()}
-            head = {**keys, "value": branch.number, **({} if part is None else {split: part.item()})}
-            forces = branch.start_forces.get(int(np.argmax(chosen)), {})
-            rows.append({**head, **summarise(kind, table, branch.attributes, forces)})
+        rows += [{**keys, "value": branch.number, **part, **values} for part, values in parts_of(kind, branch)]
     return rows
+
+
+def parts_of(kind: str, branch: Branch) -> Iterator[tuple[dict[str, Any], dict[str, float]]]:
+    """Which branch of the table, empty where there is one, and what is said of it."""
+    split = split_of(kind)
+    column = branch.table.get(split)
+    for part in [None] if column is None else np.unique(column):
+        chosen = np.full(branch.points, True) if part is None else column == part
+        table = {key: values[chosen] for key, values in branch.table.items()}
+        forces = branch.start_forces.get(int(np.argmax(chosen)), {})
+        yield {} if part is None else {split: part.item()}, summarise(kind, table, branch.attributes, forces)
 
 
 def _shared(branches: Sequence[Branch]) -> dict[str, Any]:

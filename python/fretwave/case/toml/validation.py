@@ -155,8 +155,14 @@ def unknown_key(source: Source, path: KeyPath, known: list[str]) -> InputError:
 
 def describe(field: FieldInfo, units: Callable[[str], str] = str) -> str:
     """A field's doc with its unit: of the quantity, or in symbols of a system."""
+    unit = unit_of(field, units)
+    return f"{field.description} [{unit}]" if unit else str(field.description)
+
+
+def unit_of(field: FieldInfo, units: Callable[[str], str] = str) -> str:
+    """A field's unit; empty for a pure number and for what is none."""
     unit = units(_extra(field, "unit") or "")
-    return f"{field.description} [{unit}]" if unit and unit != "-" else str(field.description)
+    return "" if unit == "-" else unit
 
 
 def _example(name: str, field: Optional[FieldInfo], verb: str = "write") -> str | None:
