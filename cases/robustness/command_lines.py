@@ -79,8 +79,16 @@ COMMANDS: dict[str, tuple[tuple[str, ...], dict[str, tuple[str, ...] | None]]] =
     "run": (FILES, RUN),
     "sweep": (FILES, {**RUN, "--over": SWEPT, "--groups": NUMBERS}),
     "resume": (FILES, {"--no-plots": None, "--quick": None}),
-    "show": (FILES, {"--all": None}),
+    "show": (FILES, {"--all": None, "--json": None}),
     "plot": (FILES, {"--only": NAMES}),
+    "report": (FILES, {"--out": OUTS}),
+    "probe": (
+        FILES,
+        {
+            **{"--pairs": None, "--node": NUMBERS, "--dof": NAMES, "--analysis": NAMES, "--csv": None, "--out": OUTS},
+            **{"--at": ("peak", "start", "pea", "1e9", "0.02", "row", "row 3", "nan", ""), "--steps": NUMBERS},
+        },
+    ),
     "view": (
         FILES,
         {
@@ -129,7 +137,7 @@ def command(seed: int, number: int) -> list[str]:
         if values is not None and random.random() < 0.95:
             value = random.choice(values)
             line[-1:] = [f"{flag}={value}"] if random.random() < 0.3 else [flag, value]
-    if name in ("resume", "show", "plot", "view") and random.random() < 0.5:
+    if name in ("resume", "show", "plot", "report", "probe", "view") and random.random() < 0.5:
         line[1:2] = ["run"]
     if name == "run" and "--only" not in line and random.random() < 0.8:
         line += ["--only", "mode"]

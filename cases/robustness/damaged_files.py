@@ -34,6 +34,7 @@ class Target:
 
 
 RESULTS = [["show", "{folder}/run"], ["resume", "{folder}/run", "--no-plots"], ["plot", "{folder}/run"]]
+RESULTS += [["report", "{folder}/run", "--out", "{folder}/page.html"], ["probe", "{folder}/run", "--pairs"]]
 
 
 def targets() -> list[Target]:

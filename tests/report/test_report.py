@@ -242,6 +242,13 @@ def test_it_goes_where_it_is_told(run: Path, tmp_path: Path, capsys) -> None:
     assert "page.html" in capsys.readouterr().out and (tmp_path / "page.html").stat().st_size > 1e5
 
 
+@pytest.mark.parametrize("out", [".", ""])
+def test_a_folder_is_no_file(run: Path, capsys, out: str) -> None:
+    for words in (["report", run], ["probe", run, "--pairs"]):
+        assert call(*words, f"--out={out}") == 2
+        assert "fix:      --out " in capsys.readouterr().err
+
+
 def test_text_is_no_markup() -> None:
     odd = '<b>&"</td>'
     made = page.page(

@@ -260,6 +260,25 @@ def test_a_fix_works(runs, capsys) -> None:
     assert call("probe", runs["reduced"], "--pairs", *fix) == 0
 
 
+def test_labels_are_in_the_units_of_the_case(tmp_path: Path, capsys) -> None:
+    """Of numbers in mm-t-s: every heading that has a unit says it."""
+    short = ("--quick", "--only", "mode", "--set", 'model.units="mm-t-s"', "--no-plots", "-q")
+    assert call("run", TWO_DOF, *short, "--out", tmp_path) == 0
+    for words, expected in (
+        (["--pairs"], ["work [mJ]", "tangential_largest [N]", "slip_range [mm]"]),
+        (["--dof", "m2", "--csv"], ["frequency_hz [Hz]", "m2_amplitude [mm]", "m2_phase_deg [deg]"]),
+        (["--dof", "m2", "--steps", "2"], ["m2 [mm]"]),
+    ):
+        (row, *_) = rows_of(capsys, tmp_path, *words)
+        assert [name for name in row if "[" in name] == expected
+    assert call("probe", tmp_path, "--dof", "m2") == 0
+    said = capsys.readouterr().out
+    assert "amplitude [mm]" in said and " mm, " in said.splitlines()[0]
+    assert call("report", tmp_path) == 0
+    text = (tmp_path / "report.html").read_text()
+    assert "amplitude [mm]" in text and "regularisation_velocity 0.05 mm/s" in text and "[m]" not in text
+
+
 def test_it_goes_to_a_file_and_to_the_screen(runs, tmp_path: Path, capsys) -> None:
     printed = rows_of(capsys, runs["reduced"], "--pairs")
     assert call("probe", runs["reduced"], "--pairs", "--out", tmp_path / "pairs.csv") == 0

@@ -224,6 +224,37 @@ def test_pairs_of_one_sector_where_delays_are_no_whole_samples(plain: Path, tmp_
         assert file["VTKHDF/Points"].shape == (3, 3)
 
 
+def test_a_probed_node_moves_as_the_view_shows_it(viewed: Path, tmp_path: Path) -> None:
+    """In all directions of space, over the period, in several sectors: waves, reductions, the whole wheel."""
+    point = int(read_step(viewed, 0)["point"])
+    moved = np.stack([by_sector(read_step(viewed, step)["displacement"]) for step in range(PHASES)])
+    for node, sector in ((0, 0), (7, 1), (moved.shape[2] - 1, 5)):
+        out = tmp_path / f"{node}.csv"
+        words = ["--node", node, "--sector", sector, "--steps", PHASES, "--at", "row", point, "--out", out]
+        assert call("probe", viewed.parent, *words) == 0
+        found = np.loadtxt(out, delimiter=",", skiprows=1)
+        np.testing.assert_allclose(found[:, 0], np.arange(PHASES) / PHASES, rtol=0, atol=ROUNDING)
+        scale = np.abs(moved[:, sector, node]).max()
+        np.testing.assert_allclose(found[:, 1:], moved[:, sector, node], rtol=0, atol=ROUNDING * scale)
+
+
+def test_pairs_of_a_wheel_are_those_of_its_sectors(plain: Path, tmp_path: Path) -> None:
+    """Each sector's pairs dissipate and slip as the sector's alone; places are repeated."""
+    wheel, found = solved(tmp_path, "wheel"), []
+    for folder in (plain, wheel):
+        out = tmp_path / "pairs.csv"
+        assert call("probe", folder, "--pairs", "--at", "end", "--out", out) == 0
+        found.append(np.genfromtxt(out, delimiter=",", names=True, dtype=None, encoding="utf-8"))
+    one, all_of_them = found
+    assert len(all_of_them) == SECTORS * len(one)
+    for name in ("work", "normal_largest", "slip_range", "slip"):
+        values = all_of_them[name].reshape(SECTORS, -1)
+        np.testing.assert_allclose(
+            values, np.tile(one[name], (SECTORS, 1)), rtol=0, atol=1e-4 * np.abs(one[name]).max()
+        )
+    assert one["slip_range"].max() > 0 and one["work"].max() > 0
+
+
 def test_some_sectors(plain: Path, tmp_path: Path, capfd) -> None:
     """One, or a few; the motion is theirs."""
     paths = [tmp_path / f"{name}.vtkhdf" for name in ("all", "some")]

@@ -59,3 +59,10 @@ def run_folder(path: Path) -> Path:
 def names(text: str) -> list[str]:
     """Of a list with commas."""
     return [name.strip() for name in text.split(",") if name.strip()]
+
+
+def file_to_write(path: Path | None, example: str) -> Path | None:
+    """Where a file goes that the command line names; a folder is refused."""
+    if path is not None and (is_there(path) and path.is_dir()):
+        raise InputError("this is a folder", "--out", display(path), "a file to write", f"--out {path / example}")
+    return path

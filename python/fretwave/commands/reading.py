@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import EXIT_DONE
+from ..mpi.guard import launched_rank
 from ..texts import display
-from .parser import Parser, add_folder, names, run_folder
+from .parser import Parser, add_folder, file_to_write, names, run_folder
 from .world import world_if_any
 
 if TYPE_CHECKING:
@@ -22,7 +23,15 @@ if TYPE_CHECKING:
 
 def add_reading(commands: _SubParsers) -> None:
     """All of them."""
-    show = commands.add_parser("show", help="show the results of a run")
+    show = commands.add_parser(
+        "show",
+        help="show the results of a run",
+        description="Prints a line for each analysis: points, range, largest damping or response, folds, largest"
+        " estimated error; then what the command line had changed, limit cycles, and why an analysis is not complete."
+        " --json has the same with all digits: folder, title, status, ranks, started, units, notes, and analyses, each"
+        " with name, type, method, status, reason, points, unit, range, peak, folds, error, wall_s, limit_cycles,"
+        " overrides, notes.",
+    )
     add_folder(show)
     show.add_argument("--json", action="store_true", help="the same for programs: one JSON object")
     show.set_defaults(command=_show)
@@ -106,9 +115,11 @@ def _show(options: argparse.Namespace) -> int:
 
 def _report(options: argparse.Namespace) -> int:
     run_folder(options.folder)
+    if launched_rank():
+        return EXIT_DONE
     from ..report.report import report_run
 
-    path = report_run(options.folder, options.out)
+    path = report_run(options.folder, file_to_write(options.out, "report.html"))
     print(f"{display(path)}: {path.stat().st_size / 1e6:.2g} MB")
     return EXIT_DONE
 
@@ -130,6 +141,7 @@ def _probe(options: argparse.Namespace) -> int:
     comm = world_if_any()
     from .probe import probe
 
+    options.out = file_to_write(options.out, "probe.csv")
     _on_first_rank(comm, lambda: probe(options))
     return EXIT_DONE
 

@@ -206,5 +206,5 @@ def in_limit(contacts: Sequence[Contact], limit: str) -> list[Contact]:
 
 def span(value: npt.ArrayLike) -> str:
     """A parameter in short: a number, or its least and largest over the pairs."""
-    low, high = float(np.min(value)), float(np.max(value))
-    return f"{low:g}" if low == high else f"{low:g} to {high:g}"
+    low, high = f"{float(np.min(value)):g}", f"{float(np.max(value)):g}"
+    return low if low == high else f"{low} to {high}"

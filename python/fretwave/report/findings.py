@@ -40,7 +40,8 @@ def points_table(analysis: Analysis, overview: Overview) -> str:
     """The rows of interest, with what each is."""
     marks, more = _chosen(marked(analysis, overview))
     swept = _swept(analysis)
-    others = [name for name in SHOWN if name != "value"] if swept else SHOWN
+    without = {"value"} if swept else {"force_outside"} if "cycles" in analysis.columns else set()
+    others = [name for name in SHOWN if name not in without]
     names = [*swept, *others, *(name for name in analysis.columns if name.startswith("worn_"))]
     names = [name for name in names if name in analysis.columns and _tells(analysis, name, marks)]
     head = ["what", "row", *(_heading(analysis, name) for name in names)]

@@ -83,9 +83,9 @@ def _facts(run: Run, record: Mapping[str, Any], case: Case | None, units: UnitSy
 def _origin(key: str, value: object) -> str:
     """What the case says of its model; a matrix in rows is not written out."""
     name = key.split(".")[-1]
-    if isinstance(value, list):
+    if isinstance(value, list) and ".options." not in key:
         return f"{len(value)} x {len(value)} in the case"
-    return f"{name} = {toml(value)}" if ".options." in key else str(value)
+    return f"{name} = {toml(value, LONGEST)}" if ".options." in key else str(value)
 
 
 def _dofs(run: Run, record: Mapping[str, Any], case: Case | None) -> str:
