@@ -24,3 +24,15 @@ law = "coulomb_3d"
 friction_coefficient = 0.4
 tangential_stiffness_per_area = 2e10
 """
+#: A response of it through resonance.
+FORCED = """
+[[analysis]]
+name = "forced"
+type = "forced"
+harmonics = 3
+samples = 64
+observe = "tip"
+force = { tip = 0.05 }
+frequency = [205.0, 220.0]
+levels = [1.0]
+"""

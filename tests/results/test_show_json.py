@@ -79,6 +79,15 @@ def test_of_a_run_that_is_not_finished(run: Path, tmp_path: Path, capsys) -> Non
     writer.abandon()
 
 
+def test_two_ranks_say_it_once(run: Path, launch) -> None:
+    done = launch(2, "-m", "fretwave", "show", str(run), "--json")
+    assert done.returncode == 0, done.stderr
+    assert [one["name"] for one in json.loads(done.stdout)["analyses"]] == ["mode", "flutter", "forced"]
+    for words, said in (["report"], "report.html"), (["probe", "--dof", "m1"], "dof m1, amplitude"):
+        done = launch(2, "-m", "fretwave", words[0], str(run), *words[1:])
+        assert done.returncode == 0 and done.stdout.count(said) == 1, done.stderr
+
+
 def test_a_folder_without_results_is_refused(tmp_path: Path, capsys) -> None:
     assert call("show", tmp_path, "--json") == 2
     said = capsys.readouterr()

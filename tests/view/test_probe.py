@@ -11,7 +11,7 @@ import h5py
 import numpy as np
 import pytest
 from command_line import call
-from models.chain_case import BUILDER, CHAIN
+from models.chain_case import BUILDER, CHAIN, FORCED
 from tolerances import LAST_DIGITS, ROUNDING, SOLVED, TIGHT
 
 import fretwave as fw
@@ -32,16 +32,6 @@ samples = 256
 normalise = "tip"
 amplitude = [2e-7, 4e-6]
 report_at = [2e-6, 3e-6]
-
-[[analysis]]
-name = "forced"
-type = "forced"
-harmonics = 3
-samples = 64
-observe = "tip"
-force = { tip = 0.05 }
-frequency = [205.0, 220.0]
-levels = [1.0]
 
 [[analysis]]
 name = "wear"
@@ -66,7 +56,7 @@ def runs(tmp_path_factory) -> dict[str, Path]:
     begin, end = CHAIN.index("[reduction]"), CHAIN.index("[preload]")
     found = {}
     for name, text in (("reduced", CHAIN), ("whole", CHAIN[:begin] + CHAIN[end:])):
-        (base / f"{name}.toml").write_text(text + ANALYSES)
+        (base / f"{name}.toml").write_text(text + ANALYSES + FORCED)
         assert call("run", base / f"{name}.toml", "--no-plots", "-q", "--out", base / name) == 0
         found[name] = base / name
     return found

@@ -10,7 +10,7 @@ import h5py
 import numpy as np
 import pytest
 from command_line import call
-from models.chain_case import BUILDER, CHAIN
+from models.chain_case import BUILDER, CHAIN, FORCED
 from models.vtkhdf_files import read_step
 from tolerances import LAST_BIT, LAST_DIGITS, ROUNDING, SOLVED
 
@@ -41,17 +41,8 @@ samples = 128
 normalise = "tip"
 amplitude = [2e-7, 2.2e-6]
 report_at = [1e-6, 2e-6]
-
-[[analysis]]
-name = "forced"
-type = "forced"
-harmonics = 3
-samples = 64
-observe = "tip"
-force = { tip = 0.05 }
-frequency = [205.0, 220.0]
-levels = [1.0]
 """
+    + FORCED
 )
 METHODS = ["mode", "periodic"]
 #: Newton's rest, relative to the largest force of the fundamental.

@@ -109,18 +109,22 @@ def _show(options: argparse.Namespace) -> int:
     run_folder(options.folder)
     from .show import show_run
 
-    show_run(options.folder, options.json)
+    if launched_rank() == 0:
+        show_run(options.folder, options.json)
     return EXIT_DONE
 
 
 def _report(options: argparse.Namespace) -> int:
     run_folder(options.folder)
-    if launched_rank():
-        return EXIT_DONE
+    out = file_to_write(options.out, "report.html")
+    comm = world_if_any()  # what reads the case loads MPI, which all ranks must start
     from ..report.report import report_run
 
-    path = report_run(options.folder, file_to_write(options.out, "report.html"))
-    print(f"{display(path)}: {path.stat().st_size / 1e6:.2g} MB")
+    def write() -> None:
+        path = report_run(options.folder, out)
+        print(f"{display(path)}: {path.stat().st_size / 1e6:.2g} MB")
+
+    _on_first_rank(comm, write)
     return EXIT_DONE
 
 
