@@ -42,8 +42,6 @@ cycles = 4.0
 coefficient = 1e-13
 report_at = [2.0]
 """
-#: Rounding of the contact's own sum over a period against the harmonic equations.
-BALANCE = 1e-6
 #: No pictures, no check in time.
 SHORT = ("--set", "forced.time_points=0", "--no-plots", "-q")
 
@@ -171,7 +169,7 @@ def test_work_of_the_pairs_balances_the_artificial_damping(runs, capsys) -> None
         q = coefficients[f"{n}c"] - 1j * coefficients[f"{n}s"]
         fed += np.pi * n**2 * omega * np.real(np.conj(q) @ D @ q)
     pairs = rows_of(capsys, runs["whole"], "--pairs", "--at", "end")
-    assert sum(pair["work"] for pair in pairs) == pytest.approx(fed, rel=BALANCE) and fed > 0
+    assert sum(pair["work"] for pair in pairs) == pytest.approx(fed, rel=TIGHT) and fed > 0
 
 
 def test_values_of_the_pairs_are_those_of_the_kept_period(runs, capsys) -> None:

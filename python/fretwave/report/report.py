@@ -12,6 +12,7 @@ from typing import Any
 
 from ..case.plugins import load_recorded
 from ..files.whole import replace_text
+from ..results.file import journals_made_once
 from ..results.overview import HEADINGS, Overview, overridden, overviews, status_of
 from ..results.reader import Run
 from ..results.results import has_results
@@ -40,7 +41,9 @@ def report_run(folder: Path, out: Path | None = None) -> Path:
         The disk does not take it.
     """
     path = out or folder / NAME
-    replace_text(path, report_text(folder))
+    with journals_made_once():
+        text = report_text(folder)
+    replace_text(path, text)
     return path
 
 
