@@ -14,6 +14,7 @@ from tolerances import ROUNDING, TIGHT
 from fretwave.plots import campbell, safe
 from fretwave.plots.linear_bands import bands, peaks
 from fretwave.post.engine_orders import crossing_speeds, excited_by, frequency_at, usual_orders
+from fretwave.report.report import report_run
 from fretwave.results.reader import Run
 from fretwave.run.order import RunOptions
 from fretwave.run.runner import run_case
@@ -290,3 +291,17 @@ def test_curves_of_the_turning_ring_are_drawn_through_its_speeds(turning):
     speeds, hz = curve.get_xydata().T
     omega = np.sqrt(GROUND / MASS + (2 * np.pi * speeds / 60) ** 2 * SPIN / MASS)
     assert hz == pytest.approx(omega / (2 * np.pi), rel=TIGHT) and speeds[-1] == 12.5
+
+
+@pytest.mark.ranks(1)
+def test_a_report_names_every_stuck_mode(solve):
+    """With what it becomes; `contact` is a column of words."""
+    out = solve(ring(6) + MODE.replace("linear_mode = 2", "linear_mode = 1").replace('"t"', '"mass"'))
+    linear = Run(out)["linear"]
+    stuck = np.flatnonzero(linear["contact"] == "stuck")
+    assert 0 < len(stuck) < len(linear)
+    text = report_run(out).read_text(encoding="utf-8")
+    for row in stuck:
+        assert f">stuck, mode {linear['mode'][row]:.0f}<" in text
+        assert f'data-from="linear/frequency_hz/{row}"' in text and f'data-from="linear/other_hz/{row}"' in text
+    assert ">free, mode" not in text

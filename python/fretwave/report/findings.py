@@ -19,7 +19,19 @@ PARTS = ("value", "level", "nodal_diameter", "line", "start")
 #: Columns shown of a row, in this order, where a table has them.
 SHOWN = (
     *("value", "level", "nodal_diameter", "line", "start", "factor", "pair", "cycle", "cycles", "time"),
-    *("amplitude", "largest_amplitude", "frequency_hz", "omega_error", "zeta", "phase", "stick", "slip", "open"),
+    *(
+        "speed_rpm",
+        "amplitude",
+        "largest_amplitude",
+        "frequency_hz",
+        "other_hz",
+        "omega_error",
+        "zeta",
+        "phase",
+        "stick",
+        "slip",
+        "open",
+    ),
     *("normal_force", "tangential_force", "gap", "work", "force_outside"),
 )
 #: Shares, shown in percent.
@@ -118,6 +130,10 @@ def _branches(analysis: Analysis) -> Iterator[Indices]:
 def _of_branch(analysis: Analysis, rows: Indices) -> Iterator[tuple[int, str]]:
     """Rows of one branch that a reader asks for."""
     columns = analysis.columns
+    if "contact" in analysis.words:  # linear modes: those of the first limit have beside them what they become
+        own = rows[analysis["contact"][rows] == analysis["contact"][0]]
+        yield from ((int(row), f"{analysis['contact'][row]}, mode {columns['mode'][row]:.0f}") for row in own)
+        return
     yield int(rows[0]), "first row"
     if "slip" in columns and "amplitude" in columns:
         slips = np.flatnonzero(columns["slip"][rows] > 0)

@@ -44,6 +44,7 @@ class Analysis:
     ----------
     columns : numbers of its table, one array per column
     events : what was met at each point, "" for nothing
+    words : further columns that are no numbers
     labels : of the harmonic coefficients, e.g. "1c", "1s"
     dofs : names of the degrees of freedom
     reported : points for which the contacts' motion is kept
@@ -65,14 +66,16 @@ class Analysis:
     path: Path = Path()
     meaning: State | None = None
     slopes: Array | None = None
+    words: dict[str, list[str]] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values()), ()))
 
     def __getitem__(self, column: str) -> Any:
-        """A column of the table, "event" among them."""
-        if column == "event":
-            return np.array(self.events)
+        """A column of the table, "event" and others of words among them."""
+        words = {**self.words, "event": self.events}
+        if column in words:
+            return np.array(words[column])
         if column not in self.columns:
             raise KeyError(f"no column '{column}' in '{self.name}'; there are {', '.join(self.columns)}")
         return self.columns[column]
@@ -375,6 +378,7 @@ def _analysis(group: h5py.Group, path: Path) -> Analysis:
         path=path,
         meaning=meaning,
         slopes=slopes,
+        words={key: _texts(value) for key, value in columns.items() if key not in numbers},
     )
 
 
