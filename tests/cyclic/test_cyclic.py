@@ -241,8 +241,9 @@ def wheel_scale(sector, n) -> float:
 @pytest.mark.ranks(1, 2, 3)
 @pytest.mark.parametrize("method", ["CNM", "EPMC"])
 def test_both_routes_find_the_same_wave(comm, method):
-    """Direct and Krylov with phases in the linear terms and in the contact."""
-    sector = lumped_blisk(24, [shroud()])
+    """Direct and Krylov with phases in the linear terms and in the contact, of which two pairs feel each other."""
+    rim = fw.Contact("jenkins", [[1.0, 0, 0]], {"tangential_stiffness": 5e5, "friction_limit": 20.0}, "rim")
+    sector = lumped_blisk(24, [shroud(), rim])
     found = {}
     for route in ("direct", "krylov"):
         PETSc.Options()[f"{route}_route"] = route
