@@ -14,14 +14,18 @@ constexpr int most =
 
 }  // namespace
 
-CoupledPairs::CoupledPairs(MPI_Comm comm, int size, std::vector<Own> own,
+CoupledPairs::CoupledPairs(MPI_Comm comm, std::vector<PairCorrection const*> own,
                            std::vector<std::unique_ptr<HarmonicBlock>> between)
-    : comm_(comm), size_(size), own_(std::move(own)), between_(std::move(between)) {
+    : comm_(comm), own_(std::move(own)), between_(std::move(between)) {
   PC pc;
-  right_ = make_vector(PETSC_COMM_SELF, size), f_ = like(right_);
-  check(MatCreateShell(PETSC_COMM_SELF, size, size, size, size, this, A_.out()));
-  check(MatShellSetOperation(A_, MATOP_MULT, reinterpret_cast<void (*)(void)>(product)));
-  check(KSPCreate(PETSC_COMM_SELF, ksp_.out()));
+  PetscInt local = 0;
+  for (auto const* E : own_) local += E->size();
+  right_ = make_vector(comm, local), f_ = like(right_);
+  check(VecGetOwnershipRange(f_, &begin_, nullptr));
+  check(VecGetSize(f_, &size_));
+  check(MatCreateShell(comm, local, local, size_, size_, this, A_.out()));
+  check(MatShellSetOperation(A_, MATOP_MULT, reinterpret_cast<void (*)(void)>(shell_product)));
+  check(KSPCreate(comm, ksp_.out()));
   check(KSPSetOperators(ksp_, A_, A_));
   check(KSPSetType(ksp_, KSPGMRES));
   check(KSPGMRESSetRestart(ksp_, most));
@@ -30,34 +34,40 @@ CoupledPairs::CoupledPairs(MPI_Comm comm, int size, std::vector<Own> own,
   check(PCSetType(pc, PCNONE));
 }
 
-/// f = E b
-void CoupledPairs::multiply_pairs(double const* b, double* f) const {
-  std::fill_n(f, size_, 0.0);
-  for (auto const& [first, E] : own_) E->apply(b + first, f + first);
-  sum_over_ranks(std::span(f, size_), comm_);
+/// f = E b, f of this rank's pairs, b of all.
+void CoupledPairs::multiply_pairs(std::vector<double> const& b, double* f) const {
+  double const* from = b.data() + begin_;
+  for (auto const* E : own_) {
+    E->apply(from, f);
+    from += E->size(), f += E->size();
+  }
 }
 
-PetscErrorCode CoupledPairs::product(Mat A, Vec f, Vec out) {
-  CoupledPairs const* pairs;
+PetscErrorCode CoupledPairs::shell_product(Mat A, Vec f, Vec out) {
+  CoupledPairs* pairs;
   const PetscErrorCode code = MatShellGetContext(A, &pairs);
   if (code) return code;
-  std::vector<double> u(pairs->size_, 0.0);
-  const ReadArray in(f);
-  for (auto const& G : pairs->between_) G->apply(in.data(), u.data());
-  sum_over_ranks(u, pairs->comm_);
-  const WriteArray to(out);
-  pairs->multiply_pairs(u.data(), to.data());
-  for (int k = 0; k < pairs->size_; ++k) to[k] += in[k];
-  return 0;
+  return pairs->guard_.run([&] { pairs->product(f, out); });
 }
 
-std::vector<double> CoupledPairs::forces(std::span<double const> b) const {
+/// out = f + E (G - G_pp) f
+void CoupledPairs::product(Vec f, Vec out) const {
+  const auto in = gathered(f);
+  std::vector<double> u(in.size(), 0.0);
+  for (auto const& G : between_) G->apply(in.data(), u.data());
+  sum_over_ranks(u, comm_);
+  multiply_pairs(u, WriteArray(out).data());
+  check(VecAXPY(out, 1, f));
+}
+
+std::vector<double> CoupledPairs::forces(std::vector<double> const& b) {
   static const log::Event coupling("FwPairs");
   const log::Span span(coupling);
-  multiply_pairs(b.data(), WriteArray(right_).data());
-  check(KSPSolve(ksp_, right_, f_));
-  const ReadArray f(f_);
-  return {f.data(), f.data() + size_};
+  multiply_pairs(b, WriteArray(right_).data());
+  const PetscErrorCode code = KSPSolve(ksp_, right_, f_);
+  guard_.rethrow();
+  check(code);
+  return gathered(f_);
 }
 
 }  // namespace fretwave::hb

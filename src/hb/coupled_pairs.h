@@ -6,6 +6,7 @@
 #include "hb/harmonic_block.h"
 #include "hb/pair_correction.h"
 #include "petsc.h"
+#include "solve/guard.h"
 
 namespace fretwave::hb {
 
@@ -15,33 +16,33 @@ namespace fretwave::hb {
 ///
 ///     (I + E (G - G_pp)) f = E b.
 ///
-/// GMRES in the contact's coefficients, every vector whole on every rank; a rank has its pairs' E and its
-/// harmonics' G. An iteration reads those, in single precision, and nothing of the size of the structure.
+/// GMRES in the contact's coefficients, a rank's those of its pairs; it has their E, and its harmonics' G. An
+/// iteration reads those, in single precision, and nothing of the size of the structure.
 class CoupledPairs {
  public:
-  /// A pair of this rank: its first entry among all coefficients.
-  struct Own {
-    size_t first;
-    PairCorrection const* E;
-  };
-  /// `between`: G - G_pp at this rank's harmonics.
-  CoupledPairs(MPI_Comm, int size, std::vector<Own>, std::vector<std::unique_ptr<HarmonicBlock>> between);
+  /// `own`: of this rank's pairs, in the order of their coefficients; `between`: G - G_pp at its harmonics.
+  /// Collective.
+  CoupledPairs(MPI_Comm, std::vector<PairCorrection const*> own,
+               std::vector<std::unique_ptr<HarmonicBlock>> between);
   CoupledPairs(CoupledPairs const&) = delete;
+  /// Coefficients of all ranks' pairs.
   size_t size() const { return size_; }
-  /// f of b, both over all coefficients. Collective.
-  std::vector<double> forces(std::span<double const> b) const;
+  /// f of b, both whole on every rank. Collective.
+  std::vector<double> forces(std::vector<double> const& b);
 
  private:
-  static PetscErrorCode product(Mat, Vec f, Vec out);
-  void multiply_pairs(double const* b, double* f) const;
+  static PetscErrorCode shell_product(Mat, Vec f, Vec out);
+  void product(Vec f, Vec out) const;
+  void multiply_pairs(std::vector<double> const& b, double* f) const;
 
   MPI_Comm comm_;
-  int size_;
-  std::vector<Own> own_;
+  PetscInt begin_ = 0, size_ = 0;
+  std::vector<PairCorrection const*> own_;
   std::vector<std::unique_ptr<HarmonicBlock>> between_;
   MatHandle A_;
   KspHandle ksp_;
   VecHandle right_, f_;
+  solve::Guard guard_;
 };
 
 }  // namespace fretwave::hb

@@ -21,6 +21,7 @@ class PairCorrection {
                  Rotation const* G);
   /// dD is nothing: the pair sticks, or is open.
   bool idle() const { return E_.empty(); }
+  int size() const { return size_; }
   /// f = E u, blocks of one pair that is not idle.
   void apply(double const* u, double* f) const;
 

@@ -122,15 +122,13 @@ void PairwisePreconditioner::couple(std::vector<PairTangents>&& contacts) {
   });
   const auto pair_of = number_rows();
   if (pair_of.empty()) return;
-  std::vector<CoupledPairs::Own> own;
-  for (size_t p = 0; p < corrections_.size(); ++p)
-    if (!corrections_[p].idle())
-      own.push_back({size_t(pairs_[first_pair_ + p].first_row) * m_, &corrections_[p]});
+  std::vector<PairCorrection const*> own;
+  for (auto const& correction : corrections_)
+    if (!correction.idle()) own.push_back(&correction);
   std::vector<std::unique_ptr<HarmonicBlock>> between;
   for (int i = 0; i < problem_.harmonics().count(); ++i)
     if (mine(i)) between.push_back(inverses_[i]->between_pairs(entries(i), pair_of));
-  coupled_ = std::make_unique<CoupledPairs>(problem_.comm(), int(pair_of.size()) * m_, std::move(own),
-                                            std::move(between));
+  coupled_ = std::make_unique<CoupledPairs>(problem_.comm(), std::move(own), std::move(between));
 }
 
 std::vector<PairTangents> PairwisePreconditioner::contacts(Vec y) {

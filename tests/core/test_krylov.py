@@ -182,7 +182,7 @@ def test_a_contact_far_stiffer_than_the_structure(comm):
     model = blade(comm, **stiff)
     points = branch(mode(model, *preloaded(model), "krylov", highest=7), (1.5e-3, 2.6e-3), ())
     partial = [p["linear"] / p["newton"] for p in points if p["newton"] and p["slip"] > 0.1]
-    assert partial and max(partial) <= 10, max(partial)  # 31 with pairs that do not know of each other
+    assert partial and max(partial) <= 15, max(partial)  # 31 with pairs that do not know of each other
 
 
 def test_stuck_asymptote_is_the_linear_mode(krylov, case):

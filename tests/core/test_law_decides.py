@@ -270,7 +270,11 @@ def test_a_law_may_not_take_the_name_of_a_compiled_one() -> None:
 KNOWN = {"model/laws.py", "case/schema.py", "commands/main.py"}
 #: The distance of an open pair is a result too, a column and a field of that name.
 RESULTS = {
-    ("gap", name) for name in ("analyses/static.py", "view/run.py", "post/contact_history.py", "solve/preload.py")
+    ("gap", name)
+    for name in (
+        *("analyses/static.py", "view/run.py", "post/contact_history.py", "solve/preload.py"),
+        "report/findings.py",
+    )
 }
 
 
