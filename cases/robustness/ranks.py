@@ -53,18 +53,25 @@ def difference(one: Table, other: Table) -> tuple[float, str]:
         except ValueError:
             apart = 0.0 if one[name] == other[name] else np.inf
         else:
-            apart = apart_by(a, b)
+            apart = apart_by(a, b, size_of(one, name))
         if apart > worst:
             worst, where = apart, name
     return worst, where
 
 
-def apart_by(a: Array, b: Array) -> float:
+def size_of(table: Table, name: str) -> float:
+    """Largest number of a column; of an error by source that of all its sources: one of them may be rounding."""
+    stem, by_source, _ = name.partition("_error_")
+    names = [other for other in table if other.startswith(f"{stem}_error_")] if by_source else [name]
+    numbers = np.abs([float(v) for other in names for v in table[other]])
+    return float(np.max(numbers, where=np.isfinite(numbers), initial=0.0)) or 1.0
+
+
+def apart_by(a: Array, b: Array, size: float) -> float:
     """Of two columns; inf where one has a number and the other none."""
     number = np.isfinite(a) & np.isfinite(b)
     if not np.array_equal(a[~number], b[~number], equal_nan=True):
         return np.inf
-    size = np.abs(a[number]).max(initial=0.0) or 1.0
     return float(np.abs(a[number] - b[number]).max(initial=0.0) / size)
 
 
