@@ -1,7 +1,5 @@
 #include "hb/coupled_pairs.h"
 
-#include <algorithm>
-
 #include "log.h"
 
 namespace fretwave::hb {
@@ -9,14 +7,13 @@ namespace fretwave::hb {
 namespace {
 
 constexpr double tolerance = 1e-3;
-constexpr int most =
-    400;  // iterations, none forgotten: they creep until enough of the pairs' modes are found
+constexpr int most = 400;  // iterations, none forgotten: they creep until modes enough are found
 
 }  // namespace
 
 CoupledPairs::CoupledPairs(MPI_Comm comm, std::vector<PairCorrection const*> own,
-                           std::vector<std::unique_ptr<HarmonicBlock>> between)
-    : comm_(comm), own_(std::move(own)), between_(std::move(between)) {
+                           std::vector<std::unique_ptr<HarmonicBlock>> const& between)
+    : comm_(comm), own_(std::move(own)), between_(between) {
   PC pc;
   PetscInt local = 0;
   for (auto const* E : own_) local += E->size();

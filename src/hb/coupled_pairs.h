@@ -1,6 +1,5 @@
 #pragma once
 #include <memory>
-#include <span>
 #include <vector>
 
 #include "hb/harmonic_block.h"
@@ -20,10 +19,10 @@ namespace fretwave::hb {
 /// iteration reads those, in single precision, and nothing of the size of the structure.
 class CoupledPairs {
  public:
-  /// `own`: of this rank's pairs, in the order of their coefficients; `between`: G - G_pp at its harmonics.
-  /// Collective.
+  /// `own`: of this rank's pairs, in the order of their coefficients; `between`: G - G_pp at its harmonics,
+  /// kept elsewhere. Collective.
   CoupledPairs(MPI_Comm, std::vector<PairCorrection const*> own,
-               std::vector<std::unique_ptr<HarmonicBlock>> between);
+               std::vector<std::unique_ptr<HarmonicBlock>> const& between);
   CoupledPairs(CoupledPairs const&) = delete;
   /// Coefficients of all ranks' pairs.
   size_t size() const { return size_; }
@@ -38,7 +37,7 @@ class CoupledPairs {
   MPI_Comm comm_;
   PetscInt begin_ = 0, size_ = 0;
   std::vector<PairCorrection const*> own_;
-  std::vector<std::unique_ptr<HarmonicBlock>> between_;
+  std::vector<std::unique_ptr<HarmonicBlock>> const& between_;
   MatHandle A_;
   KspHandle ksp_;
   VecHandle right_, f_;

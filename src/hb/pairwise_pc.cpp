@@ -125,10 +125,13 @@ void PairwisePreconditioner::couple(std::vector<PairTangents>&& contacts) {
   std::vector<PairCorrection const*> own;
   for (auto const& correction : corrections_)
     if (!correction.idle()) own.push_back(&correction);
-  std::vector<std::unique_ptr<HarmonicBlock>> between;
-  for (int i = 0; i < problem_.harmonics().count(); ++i)
-    if (mine(i)) between.push_back(inverses_[i]->between_pairs(entries(i), pair_of));
-  coupled_ = std::make_unique<CoupledPairs>(problem_.comm(), std::move(own), std::move(between));
+  if (pair_of != pair_of_) {  // or the inverses are new
+    between_.clear();
+    for (int i = 0; i < problem_.harmonics().count(); ++i)
+      if (mine(i)) between_.push_back(inverses_[i]->between_pairs(entries(i), pair_of));
+    pair_of_ = pair_of;
+  }
+  coupled_ = std::make_unique<CoupledPairs>(problem_.comm(), std::move(own), between_);
 }
 
 std::vector<PairTangents> PairwisePreconditioner::contacts(Vec y) {
@@ -144,6 +147,7 @@ void PairwisePreconditioner::build(Vec y, Vec row) {
   auto contacts = this->contacts(y);
   tangents_ = gather_contact(contacts);
   inverses_.clear(), inverses_.resize(h.count());
+  pair_of_.clear();
   prepare(e, y, row);
   together(problem_.comm(), "inverting harmonic blocks", [&] {
     for (int i = 0; i < h.count(); ++i)

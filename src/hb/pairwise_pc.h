@@ -80,6 +80,8 @@ class PairwisePreconditioner : public solve::Preconditioner {
   std::vector<std::unique_ptr<HarmonicBlock>> inverses_;  ///< null for other ranks' harmonics
   std::vector<Rotation> G_;                               ///< of each pair alone
   std::vector<PairCorrection> corrections_;               ///< of this rank's pairs
+  std::vector<int> pair_of_;                              ///< of the rows that `between_` is of
+  std::vector<std::unique_ptr<HarmonicBlock>> between_;   ///< what pairs feel of each other, own harmonics
   std::unique_ptr<CoupledPairs> coupled_;                 ///< none where all pairs are idle
 };
 

@@ -41,7 +41,7 @@ Newton::Newton(Problem& problem, std::string const& prefix, bool past_kinks)
 PetscErrorCode Newton::converged(SNES snes, PetscInt iteration, PetscReal unknowns, PetscReal step,
                                  PetscReal residual, SNESConvergedReason* reason, void* context) {
   auto& newton = *static_cast<Newton*>(context);
-  const double before = std::exchange(newton.residual_before_, residual);
+  const double before = newton.last_[(iteration + newton.last_.size() - 1) % newton.last_.size()];
   newton.step_from_ = iteration == 0 ? residual : before;
   const bool creeps = newton.creeps(iteration, residual);
   PetscErrorCode code = SNESConvergedDefault(snes, iteration, unknowns, step, residual, reason, nullptr);

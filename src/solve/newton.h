@@ -68,7 +68,6 @@ class Newton {
   bool past_kinks_;
   Effort effort_ = Effort::full;
   std::array<double, 4> last_{};  ///< residuals of the last iterations, the k-th at k mod 4
-  double residual_before_ = 0;    ///< at the iteration before
   double step_from_ = 0;          ///< residual where the last step began
 };
 

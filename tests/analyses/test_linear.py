@@ -157,7 +157,7 @@ def test_the_largest_damping_of_a_nonlinear_mode_is_marked_in_its_wave(solve):
     run = Run(out)
     top = int(np.argmax(run["mode"]["zeta"]))
     assert 0 < top < len(run["mode"]) - 1
-    (peak,) = peaks(run, bands(run, run["linear"]))
+    (peak,) = peaks(run, bands(run["linear"]))
     assert (peak.diameter, peak.speed, peak.hz) == (2, None, run["mode"]["frequency_hz"][top])
     ((_, figure),) = safe.figures(run)
     (star,) = [line for line in figure.axes[0].get_lines() if line.get_marker() == "*"]
@@ -207,7 +207,7 @@ engine_orders = [2]
 def test_the_diagrams_draw_the_table(solve):
     out = solve(ring(8))
     run = Run(out)
-    hz = [band.hz[0] for band in bands(run, run["linear"])]
+    hz = [band.hz[0] for band in bands(run["linear"])]
     assert hz == pytest.approx(wave(8, np.arange(5), NEXT + CONTACT) / (2 * np.pi), rel=TIGHT)
     (name, figure), *more = safe.figures(run)
     assert name == "linear_safe" and not more

@@ -130,7 +130,7 @@ class AnalysisOptions:
 
     def _blamed(self, complaint: str) -> InputError:
         """PETSc failed under the user's options: the one that its complaint speaks of, or all."""
-        plain = {name[len(self.prefix) :]: value or "" for name, value in self.pairs.items()}
+        plain = {name.removeprefix(self.prefix): value or "" for name, value in self.pairs.items()}
         words = re.split(r"[\s,;:'\"()]+", complaint)
         named = [name for name, value in plain.items() if name in words or (value and value in words)]
         shown = named or list(plain)
@@ -160,11 +160,11 @@ class AnalysisOptions:
         wrong = [name for name in self.pairs if name in names and name not in WHOLE]
         if not wrong:
             return
-        plain = wrong[0][len(self.prefix) :]
+        plain = wrong[0].removeprefix(self.prefix)
         raise InputError(
             f"no solver reads the PETSc option -{plain}",
             where=where,
-            measured=", ".join(f"-{name[len(self.prefix) :]}" for name in wrong),
+            measured=", ".join(f"-{name.removeprefix(self.prefix)}" for name in wrong),
             expected="options of the solvers in use (a prefix is added by fretwave)",
             fix="remove it: this solver is not in use here (`-snes_view` shows those that are)"
             if plain in COMMON

@@ -34,7 +34,8 @@ def figures(run: Run) -> Iterator[tuple[str, Figure]]:
 
 def draw(run: Run, linear: Analysis) -> Figure:
     """A panel for each of the waves that the engine orders excite nearest to the operating speed."""
-    drawn, found = bands(run, linear), list(peaks(run, bands(run, linear)))
+    drawn = bands(linear)
+    found = list(peaks(run, drawn))
     waves = _nearest(linear, drawn)
     columns = min(len(waves), 2)
     rows = -(-len(waves) // columns)

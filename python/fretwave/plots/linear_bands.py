@@ -66,15 +66,13 @@ class Peak:
     hz: float
 
 
-def bands(run: Run, linear: Analysis) -> list[Band]:
+def bands(linear: Analysis) -> list[Band]:
     """Of the modes with contact stuck, or where there are none in the first of the other limits; by mode and wave."""
-    table = run.table(linear.name)
-    if table is None:
-        return []
-    contact, none = str(table["contact"][0]), np.zeros(len(table["mode"]))
+    table, none = linear.columns, np.zeros(len(linear))
     waves, speeds = table.get("nodal_diameter", none), table.get("speed_rpm", none)
-    other = "sliding" if "sliding" in table["contact"] else "free"
-    own, found = table["contact"] == contact, []
+    limits, found = linear["contact"], []
+    contact, other = str(limits[0]), "sliding" if "sliding" in limits else "free"
+    own = limits == contact
     for number in np.unique(table["mode"][own]):
         for diameter in np.unique(waves[own & (table["mode"] == number)]):
             rows = own & (table["mode"] == number) & (waves == diameter)

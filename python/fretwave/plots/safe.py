@@ -34,7 +34,7 @@ def figures(run: Run) -> Iterator[tuple[str, Figure]]:
 def draw(run: Run, linear: Analysis) -> Figure:
     """Each mode's band from stuck to sliding over the nodal diameters, and the line of the engine orders."""
     figure, axes = style.new_figure(5.8)
-    drawn, sectors = bands(run, linear), int(linear.attributes["sectors"])
+    drawn, sectors = bands(linear), int(linear.attributes["sectors"])
     speed = float(linear.attributes.get("speed_rpm", 0.0))
     for _, family in groupby(drawn, lambda band: band.number):
         _family(axes, list(family), speed)
