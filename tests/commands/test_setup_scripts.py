@@ -132,6 +132,33 @@ def test_root_may_start_ranks(clone: Path) -> None:
     assert setup_function_call(clone, code).stdout == "1 1\n"
 
 
+def prepared(clone: Path, script: str) -> subprocess.CompletedProcess[str]:
+    """The case with a script prepare, in a clone where all is set up and fretwave only says its arguments."""
+    with (clone / ".ci" / "setup").open("a", encoding="utf-8") as file:
+        file.write("fretwave_setup() { :; }\n")
+    binaries = clone / ".venv" / "bin"
+    binaries.mkdir(parents=True)
+    (binaries / "fretwave").write_text('#!/bin/sh\necho fretwave "$@"\n', encoding="utf-8")
+    (binaries / "fretwave").chmod(0o755)
+    (clone / "cases" / "beam" / "prepare").write_text(script, encoding="utf-8")
+    return call(clone, "cases/run", "beam", "--quick")
+
+
+def test_a_case_makes_its_model_first(clone: Path) -> None:
+    """With the fretwave of the environment on its path; what it says is kept, the run's own words are shown."""
+    done = prepared(clone, f'fretwave import >"{clone}/model"\necho made\n')
+    assert done.returncode == 0, done.stderr
+    assert (clone / "model").read_text(encoding="utf-8") == "fretwave import\n"
+    assert done.stdout.startswith("fretwave run ") and done.stdout.endswith("--quick\n")
+    assert (clone / ".build" / "prepare-beam.log").read_text(encoding="utf-8") == "made\n"
+
+
+def test_a_case_whose_model_cannot_be_made_is_not_run(clone: Path) -> None:
+    done = prepared(clone, "echo no such deck >&2\nexit 201\n")
+    assert done.returncode == 2 and done.stdout == ""
+    assert "no such deck" in done.stderr and done.stderr.count("fix: ") == 1
+
+
 def events(folder: Path, *ranks: dict[str, str], share: int = 0) -> dict[str, str]:
     folder = folder / f"share_{share}"
     folder.mkdir()
