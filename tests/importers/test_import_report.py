@@ -9,7 +9,7 @@ import pytest
 import scipy.linalg
 import scipy.sparse as sp
 from models import hexahedra
-from models.matrix_files import Held, write_coordinate, write_npz
+from models.matrix_files import Held, write_calculix, write_coordinate, write_npz
 from tolerances import LAST_BIT
 
 from fretwave.commands.main import main
@@ -40,6 +40,24 @@ def report_of(folder: Path, M: sp.spmatrix, K: sp.spmatrix, nodes: np.ndarray, c
     command = ["import", str(folder / "m.h5"), "--mass", parts[0], "--stiffness", parts[1]]
     assert main([*command, "--coordinates", str(folder / "nodes.npz")]) == 0
     return capfd.readouterr().out
+
+
+def test_dofs_inside_elements_do_not_move_rigidly(held: Held, tmp_path: Path, capfd) -> None:
+    """A node numbered beyond the mesh's, pushed by strain alone, as an incompatible mode: mass and motions stay."""
+    bar, n = held.bar, len(held.bar.nodes)
+    pushed, heavy = bar.K[:, :3], bar.M[:3, :3]
+    K = sp.bmat([[bar.K, pushed], [pushed.T, 2 * bar.K[:3, :3]]], format="csr")
+    M = sp.bmat([[bar.M, bar.M[:, :3]], [bar.M[:3], 2 * heavy]], format="csr")
+    labels = np.column_stack([np.repeat([*range(1, n + 1), 900], 3), np.tile([1, 2, 3], n + 1)])
+    parts = [write_calculix(tmp_path, sp.csr_matrix(A), letter, labels) for letter, A in (("M", M), ("K", K))]
+    np.savez(tmp_path / "nodes.npz", coordinates=bar.nodes)
+    command = ["import", str(tmp_path / "m.h5"), "--mass", parts[0], "--stiffness", parts[1], "--units", "m-kg-s"]
+    assert main([*command, "--coordinates", str(tmp_path / "nodes.npz")]) == 0
+    text = capfd.readouterr().out
+    mass = hexahedra.DENSITY * 0.06 * 0.02 * 0.01
+    assert f"at {n + 1} nodes, 1 of them inside elements" in text
+    assert f"mass: {mass:.6g} along x, {mass:.6g} along y, {mass:.6g} along z [kg]\n" in text
+    assert "rigid modes: 6 found, expected 6" in text and "warning" not in text
 
 
 def test_report_warns_of_a_mechanism(tmp_path: Path, capfd) -> None:

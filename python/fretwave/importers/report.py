@@ -14,6 +14,7 @@ from ..errors import FretwaveError
 from ..model.sectors import Sparse
 from ..model.structure import Structure
 from ..texts import counted
+from .internal import internal_dofs, internal_nodes
 from .units import Evidence, words
 
 if TYPE_CHECKING:
@@ -40,20 +41,24 @@ class Report:
 
 
 def rigid_motions(model: Structure) -> Array | None:
-    """Translations along and rotations about x, y, z (n_dof, 6), None without coordinates of all nodes."""
+    """Translations along and rotations about x, y, z (n_dof, 6), None without coordinates of all nodes.
+
+    Dofs inside elements do not move in them.
+    """
     if model.labels is None or model.coordinates is None or model.node_numbers is None:
         return None
-    node, direction = model.labels.T
+    meshed = np.flatnonzero(~internal_dofs(model))
+    node, direction = model.labels[meshed].T
     order = np.argsort(model.node_numbers)
     place = order[np.clip(np.searchsorted(model.node_numbers[order], node), 0, len(order) - 1)]
-    if (model.node_numbers[place] != node).any() or direction.min() < 1 or direction.max() > 6:
+    if (model.node_numbers[place] != node).any() or direction.min(initial=1) < 1 or direction.max(initial=1) > 6:
         return None
     x = model.coordinates - model.coordinates.mean(axis=0)
     motions = np.zeros((model.n_dof, 6))
-    motions[np.arange(model.n_dof), direction - 1] = 1.0
+    motions[meshed, direction - 1] = 1.0
     moved = np.flatnonzero(direction <= 3)
     turned = np.cross(np.eye(3), x[place[moved], None])  # (dof, axis of rotation, direction)
-    motions[moved, 3:] = turned[np.arange(len(moved)), :, direction[moved] - 1]
+    motions[meshed[moved], 3:] = turned[np.arange(len(moved)), :, direction[moved] - 1]
     return motions
 
 
@@ -94,7 +99,9 @@ def check(
     """
     report = Report()
     nodes = "" if model.labels is None else f" at {len(np.unique(model.labels[:, 0]))} nodes"
-    report.lines.append(f"{model.n_dof} dofs{nodes}")
+    inside = len(internal_nodes(model))
+    more = f", {inside} of them inside elements (numbered beyond the mesh's)" if inside else ""
+    report.lines.append(f"{model.n_dof} dofs{nodes}{more}")
     for letter, said in symmetry.items():
         report.lines.append(f"{letter}: {getattr(model, letter).nnz} entries, {said}")
     report.lines.extend(notes)

@@ -15,6 +15,7 @@ import scipy.sparse as sp
 from ..errors import InputError
 from ..model.structure import Structure
 from ..units import SI, SYSTEMS, UnitSystem
+from .internal import internal_dofs
 from .nodes import Material
 
 #: Of solids: Young's modulus [Pa] and density [kg/m^3].
@@ -141,6 +142,7 @@ def _of_matrices(model: Structure) -> Iterator[Evidence]:
     M, K = sp.csr_matrix(model.M), sp.csr_matrix(model.K)
     direction = model.labels[:, 1]
     moves = (direction[:, None] == (1, 2, 3)).astype(float)
+    moves[internal_dofs(model)] = 0.0
     stiff, heavy = (float(A.diagonal() @ moves.sum(axis=1)) for A in (K, M))
     if (size <= 0).any() or not (stiff > 0 and heavy > 0):
         return
