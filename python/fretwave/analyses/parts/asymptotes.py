@@ -22,8 +22,9 @@ if TYPE_CHECKING:
     from ...model.model import Model
     from ...model.modes import LinearMode
 
-#: Modes looked through for the one most like the stuck mode, beyond its own number.
-MORE_MODES = 2
+#: Modes looked through for the one most like the stuck mode, beyond its own number: two, and the six rigid motions of a
+#: body that friction alone holds.
+MORE_MODES = 8
 
 
 def other_asymptote(context: AnalysisContext[HarmonicSection], stuck: LinearMode) -> dict[str, float]:
