@@ -51,22 +51,6 @@ def test_deck(tmp_path: Path) -> None:
     }
 
 
-def test_hexahedra_of_a_deck(tmp_path: Path) -> None:
-    """C3D20 over two lines; beside C3D8 the corners alone are kept. Other elements are passed over."""
-    numbers = list(range(1, 29))
-    rows = "".join(f"{n}, {n}., 0., 0.\n" for n in numbers)
-    first, second = (", ".join(str(n) for n in part) for part in (numbers[:15], numbers[15:20]))
-    quadratic = f"*ELEMENT, TYPE=C3D20R, ELSET=A\n7, {first},\n {second}\n"
-    linear = "*ELEMENT, type=c3d8\n8, 21, 22, 23, 24, 25, 26, 27, 28\n*ELEMENT, TYPE=C3D4\n9, 1, 2, 3, 4\n"
-    deck = tmp_path / "deck.inp"
-    deck.write_text(f"*NODE\n{rows}{quadratic}")
-    assert read_nodes(deck).hexahedra.tolist() == [numbers[:20]]
-    deck.write_text(f"*NODE\n{rows}{quadratic}{linear}")
-    assert read_nodes(deck).hexahedra.tolist() == [numbers[:8], numbers[20:]]
-    deck.write_text(f"*NODE\n{rows}*ELEMENT, TYPE=C3D4\n9, 1, 2, 3, 4\n")
-    assert read_nodes(deck).hexahedra is None
-
-
 @pytest.mark.parametrize(
     ("text", "said"),
     [

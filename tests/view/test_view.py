@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import shutil
+import subprocess
 from pathlib import Path
 
 import h5py
@@ -15,6 +16,7 @@ from models.vtkhdf_files import read_step
 from tolerances import LAST_BIT, LAST_DIGITS, ROUNDING, SOLVED
 
 from fretwave.case.load import load_case
+from fretwave.model.cells import KINDS
 from fretwave.post.contact_history import OPEN, SLIP, STICK
 from fretwave.view.vtkhdf import HEXAHEDRON
 
@@ -290,3 +292,37 @@ def test_an_imported_model_brings_its_mesh(tmp_path: Path) -> None:
         names = file["mode/dof"][()].tolist()
         Q = file["mode/coefficients"][-1]
         assert found["displacement"][9, 2] == pytest.approx(Q[names.index(b"n10z"), :2].sum(), rel=ROUNDING)
+
+
+#: The first of the block's two boxes in six tetrahedra about its diagonal, the second in two wedges.
+CUT = """*ELEMENT, TYPE=C3D4, ELSET=SOLID
+1, 1, 5, 7, 8
+2, 1, 7, 3, 8
+3, 1, 3, 4, 8
+4, 1, 4, 2, 8
+5, 1, 2, 6, 8
+6, 1, 6, 5, 8
+*ELEMENT, TYPE=C3D6, ELSET=SOLID
+7, 5, 9, 11, 6, 10, 12
+8, 5, 11, 7, 6, 12, 8
+"""
+
+
+def test_tetrahedra_and_wedges_of_an_imported_model(tmp_path: Path) -> None:
+    """A deck of both, its matrices by CalculiX: cells of two kinds in one grid, wedges in VTK's order."""
+    deck = (Path(__file__).parents[1] / "data" / "calculix" / "block.inp").read_text()
+    begin, end = deck.index("*ELEMENT"), deck.index("*NSET, NSET=HELD")
+    (tmp_path / "cut.inp").write_text(deck[:begin] + CUT + "*NSET, NSET=END\n9, 10, 11, 12\n" + deck[end:])
+    done = subprocess.run(["ccx", "cut"], cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout
+    files = [f"--{role}={tmp_path / name}" for role, name in (("mass", "cut.mas"), ("stiffness", "cut.sti"))]
+    wishes = ["--pairs", "pad=END", "GROUND", "--normal=1,0,0", "--name", "tip=n12z", "--modes", "2"]
+    place = f"--coordinates={tmp_path / 'cut.inp'}"
+    assert call("import", str(tmp_path / "block.h5"), *files, place, *wishes) == 0
+    (tmp_path / "case.toml").write_text(IMPORTED)
+    assert call("run", str(tmp_path / "case.toml"), "--out", str(tmp_path / "run"), "--no-plots") == 0
+    assert call("view", str(tmp_path / "run"), "--phases", "4") == 0
+    found = read_step(tmp_path / "run" / "mode.vtkhdf", 0)
+    tetrahedron, wedge = KINDS["tetrahedron"].vtk, KINDS["wedge"].vtk
+    assert found["types"].tolist() == [tetrahedron] * 6 + [wedge] * 2
+    assert found["cells"][0].tolist() == [0, 4, 6, 7] and found["cells"][6].tolist() == [5, 9, 11, 4, 8, 10]

@@ -19,8 +19,11 @@ from tolerances import ROUNDING, SOLVED
 
 import fretwave as fw
 from fretwave.cyclic.faces import rotation
+from fretwave.model.cells import KINDS
 from fretwave.view.motion import Scene, mesh_of
-from fretwave.view.vtkhdf import HEXAHEDRON, TRIQUADRATIC_HEXAHEDRON, VERTEX
+from fretwave.view.vtkhdf import HEXAHEDRON, VERTEX
+
+TRIQUADRATIC_HEXAHEDRON = KINDS["triquadratic_hexahedron"].vtk
 
 pytestmark = pytest.mark.ranks(1)
 pytest.importorskip("skfem")
@@ -301,12 +304,14 @@ def test_cells_of_a_built_model() -> None:
     n, cells = skewed.n_dof, skewed.vtk_cells
     model = fw.Structure(sp.identity(n, format="csr"), sp.identity(n, format="csr"), coordinates=skewed.nodes)
     case = SimpleNamespace(structure=model, path=Path("case.toml"))
-    assert (mesh_of(case)[1][0].shape, mesh_of(case)[1][1]) == ((n // 3, 1), VERTEX)
+    shown = [(table.shape, kind) for table, kind in mesh_of(case)[1]]
+    assert shown == [((n // 3, 1), VERTEX)]
     model.hexahedra = cells
-    assert model.complaint() is None and mesh_of(case)[1][1] == TRIQUADRATIC_HEXAHEDRON
-    assert (mesh_of(case, linear=True)[1][0].shape, mesh_of(case, linear=True)[1][1]) == ((16, 8), HEXAHEDRON)
+    assert model.complaint() is None and mesh_of(case)[1][0][1] == TRIQUADRATIC_HEXAHEDRON
+    ((cut, kind),) = mesh_of(case, linear=True)[1]
+    assert (cut.shape, kind) == ((16, 8), HEXAHEDRON)
     model.hexahedra = cells[:, :8]
-    assert model.complaint() is None and mesh_of(case, linear=True)[1][1] == HEXAHEDRON
+    assert model.complaint() is None and mesh_of(case, linear=True)[1][0][1] == HEXAHEDRON
     model.hexahedra = cells[:, :19]
     assert "(2, 19), not (n_cells, 8, 20 or 27)" in model.complaint()
     model.hexahedra = cells + 1

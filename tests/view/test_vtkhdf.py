@@ -13,7 +13,10 @@ from models.vtkhdf_files import read_step, skewed_mesh
 from fretwave import fe
 from fretwave.errors import InputError
 from fretwave.fe.mesh import VTK_LATTICE
-from fretwave.view.vtkhdf import TRIQUADRATIC_HEXAHEDRON, VERTEX, GridFile, linear_cells
+from fretwave.model.cells import KINDS
+from fretwave.view.vtkhdf import VERTEX, GridFile, linear_cells
+
+TRIQUADRATIC_HEXAHEDRON = KINDS["triquadratic_hexahedron"].vtk
 
 pytestmark = pytest.mark.ranks(1)
 
@@ -28,8 +31,8 @@ def test_layout_follows_the_specification(tmp_path: Path, skewed: fe.Mesh) -> No
     path, n = tmp_path / "two.vtkhdf", len(skewed.nodes)
     changing = np.arange(3.0 * (n + 2)).reshape(3, n + 2)
     with GridFile(path, [0.0, 0.5, 1.0]) as grid:
-        grid.part(skewed.nodes, skewed.vtk_cells, TRIQUADRATIC_HEXAHEDRON)
-        grid.part([[0.0, 0, 0], [1, 1, 1]], [[0], [1]], VERTEX)
+        grid.part(skewed.nodes, (skewed.vtk_cells, TRIQUADRATIC_HEXAHEDRON))
+        grid.part([[0.0, 0, 0], [1, 1, 1]], ([[0], [1]], VERTEX))
         grid.point_field("still", [skewed.nodes, np.zeros((2, 3))])
         grid.point_field("changing", changing, np.arange(3), "f4")
         grid.point_field("state", [np.zeros(n + 2), np.ones(n + 2)], [0, 1, 1])
@@ -59,9 +62,9 @@ def test_a_failure_leaves_the_old_file(tmp_path: Path, skewed: fe.Mesh) -> None:
     path = tmp_path / "grid.vtkhdf"
     path.write_text("old")
     with pytest.raises(InputError, match="a node that does not exist"), GridFile(path, [0.0]) as grid:
-        grid.part(skewed.nodes[:-1], skewed.vtk_cells, TRIQUADRATIC_HEXAHEDRON)
+        grid.part(skewed.nodes[:-1], (skewed.vtk_cells, TRIQUADRATIC_HEXAHEDRON))
     with pytest.raises(ValueError, match="rows"), GridFile(path, [0.0, 1.0]) as grid:
-        grid.part(skewed.nodes, skewed.vtk_cells, TRIQUADRATIC_HEXAHEDRON)
+        grid.part(skewed.nodes, (skewed.vtk_cells, TRIQUADRATIC_HEXAHEDRON))
         grid.point_field("short", [skewed.nodes], [0, 1])
     assert path.read_text() == "old" and [entry.name for entry in tmp_path.iterdir()] == ["grid.vtkhdf"]
 
@@ -83,7 +86,7 @@ def test_a_field_comes_part_by_part_in_any_order(tmp_path: Path) -> None:
         fails = nullcontext() if complete else pytest.raises(ValueError, match="not written")
         with fails, GridFile(path, range(4)) as grid:
             for n in (2, 3):
-                grid.part(np.zeros((n, 3)), np.arange(n)[:, None], VERTEX)
+                grid.part(np.zeros((n, 3)), (np.arange(n)[:, None], VERTEX))
             write, still = grid.field("moving", 0, [0, 1, 1, 2]), grid.field("still", 3, dtype="f4")
             for part, rows in ((1, slice(2, 5)), (0, slice(0, 2))):
                 still(0, part, np.full((rows.stop - rows.start, 3), part))

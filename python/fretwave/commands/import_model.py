@@ -15,7 +15,7 @@ from ..errors import EXIT_DONE, InputError
 from ..importers.calculix import SUFFIXES, read_dofs
 from ..importers.entries import Assembled, assemble
 from ..importers.formats import read_matrix, readable, split
-from ..importers.nodes import Material, Nodes, read_nodes
+from ..importers.nodes import Material, Nodes, cells_of, read_nodes
 from ..importers.pairs import match, read_pairs
 from ..importers.report import check
 from ..importers.units import Evidence, check_declared, evidence_of
@@ -81,8 +81,7 @@ def read_parts(options: argparse.Namespace) -> tuple[Structure, Assembled, list[
     model.units = options.units
     if nodes is not None:
         model.node_numbers, model.coordinates = nodes.numbers, nodes.coordinates
-        if nodes.hexahedra is not None:
-            model.hexahedra = nodes.places(nodes.hexahedra.ravel()).reshape(nodes.hexahedra.shape)
+        model.hexahedra, model.cells = cells_of(nodes)
     model.pairs = dict(_pairs(options, labels, nodes))
     return model, found, [] if nodes is None else nodes.materials
 

@@ -3,13 +3,12 @@
 CSV: lines "node, x, y, z". NPZ: ``coordinates`` (n_nodes, 3), optionally ``nodes`` (n_nodes,) with their numbers (1, 2,
 ... otherwise); every other array of whole numbers is a node set of its name.
 Deck (SIMULIA, Abaqus Keywords Reference, *NODE, *NSET, *INCLUDE; G. Dhondt, CalculiX CrunchiX User's Manual): names and
-keywords in any case; ``*NSET, GENERATE`` gives first, last, step; a set may name other sets. ``*ELEMENT`` of types C3D8
-and C3D20 gives the cells, for pictures alone; ``*ELASTIC`` and ``*DENSITY`` of a ``*MATERIAL`` tell its units.
+keywords in any case; ``*NSET, GENERATE`` gives first, last, step; a set may name other sets. ``*ELEMENT`` and
+``*SURFACE`` give cells and faces (`cells`); ``*ELASTIC`` and ``*DENSITY`` of a ``*MATERIAL`` tell its units.
 """
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -19,10 +18,8 @@ import numpy as np
 from ..arrays import Array, IntArray
 from ..errors import InputError
 from ..texts import display, nearest
+from .cells import Elements
 from .text import columns_of
-
-#: Solid elements of Abaqus and CalculiX with 8 or 20 nodes: C3D8, C3D8R, C3D8I, C3D20, C3D20R, ...
-_HEXAHEDRON = re.compile(r"C3D(8|20)[A-Z]*", re.IGNORECASE)
 
 
 @dataclass
@@ -47,8 +44,8 @@ class Nodes:
         Node numbers by the set's name in capitals.
     where : str
         The file, as a user would name it.
-    hexahedra : (n_cells, 8 or 20) or None
-        Node numbers of cells with 8 or 20 nodes, in the order of C3D8 and C3D20.
+    elements : Elements
+        Of a deck, with their sets and surfaces.
     materials : list of Material
         With a modulus or a density.
     """
@@ -57,7 +54,7 @@ class Nodes:
     coordinates: Array
     where: str
     sets: dict[str, IntArray] = field(default_factory=dict)
-    hexahedra: IntArray | None = None
+    elements: Elements = field(default_factory=Elements)
     materials: list[Material] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -121,6 +118,15 @@ def read_nodes(path: Path) -> Nodes:
     return Nodes(table[:, 0].astype(np.int64), table[:, 1:], display(path))
 
 
+def cells_of(nodes: Nodes) -> tuple[IntArray | None, dict[str, IntArray]]:
+    """Hexahedra of one kind, and the other cells by kind: places of their nodes (n_cells, m) in VTK's order."""
+    found = {
+        kind: nodes.places(numbers.ravel()).reshape(numbers.shape) for kind, numbers in nodes.elements.vtk().items()
+    }
+    kind = "hexahedron" if "hexahedron" in found else "quadratic_hexahedron"
+    return found.pop(kind, None), found
+
+
 def _from_npz(path: Path) -> Nodes:
     where = display(path)
     with np.load(path) as archive:
@@ -135,21 +141,25 @@ def _from_npz(path: Path) -> Nodes:
 
 
 class Deck:
-    """Nodes, node sets and hexahedra of an input deck; every other keyword is passed over."""
+    """Nodes, elements, their sets and surfaces of an input deck; every other keyword is passed over."""
 
     def __init__(self, path: Path) -> None:
         self.where = display(path)
         self.rows: list[tuple[int, float, float, float]] = []
         self.members: dict[str, list[int | str]] = {}
-        self.cells: list[IntArray] = []
+        self.elements = Elements()
         self.materials: list[Material] = []
         for keyword, options, data in _blocks(path):
             if keyword == "NODE":
                 self._add_nodes(options, data)
             elif keyword == "NSET":
-                self._add_set(options, data)
-            elif keyword == "ELEMENT" and (solid := _HEXAHEDRON.fullmatch(options.get("TYPE", ""))):
-                self._add_cells(int(solid.group(1)), data)
+                self._add_set(self.members, "NSET", options, data)
+            elif keyword == "ELSET":
+                self._add_set(self.elements.sets, "ELSET", options, data)
+            elif keyword == "ELEMENT":
+                self.elements.add(options, data, self.where)
+            elif keyword == "SURFACE":
+                self._add_surface(options, data)
             elif keyword in ("MATERIAL", "ELASTIC", "DENSITY"):
                 self._add_material(keyword, options, data)
             elif keyword == "INSTANCE" and data:
@@ -172,8 +182,18 @@ class Deck:
         if "NSET" in options:
             self.members.setdefault(options["NSET"].upper(), []).extend(row[0] for row in self.rows[before:])
 
-    def _add_set(self, options: dict[str, str], data: list[tuple[int, str]]) -> None:
-        members = self.members.setdefault(options.get("NSET", "").upper(), [])
+    def _add_surface(self, options: dict[str, str], data: list[tuple[int, str]]) -> None:
+        """Faces of elements, or nodes: a node set of its name."""
+        if options.get("TYPE", "ELEMENT").upper() == "NODE":
+            lines = [(line, text.partition(",")[0]) for line, text in data]  # without the areas that may follow
+            self._add_set(self.members, "NAME", options, lines)
+        else:
+            self.elements.add_surface(options.get("NAME", ""), data)
+
+    def _add_set(
+        self, sets: dict[str, list[int | str]], key: str, options: dict[str, str], data: list[tuple[int, str]]
+    ) -> None:
+        members = sets.setdefault(options.get(key, "").upper(), [])
         for line, text in data:
             words = [word.strip() for word in text.split(",") if word.strip()]
             try:
@@ -183,21 +203,9 @@ class Deck:
                 else:
                     members.extend(int(word) if word.lstrip("-").isdigit() else word.upper() for word in words)
             except ValueError:
-                expected = "first, last, step" if "GENERATE" in options else "node numbers or names of sets"
-                fix = "correct the line"
-                raise InputError("this is no node set", f"{self.where}:{line}", text, expected, fix) from None
-
-    def _add_cells(self, nodes: int, data: list[tuple[int, str]]) -> None:
-        """Element number and nodes; an element may go over several lines."""
-        words = [(line, word.strip()) for line, text in data for word in text.split(",") if word.strip()]
-        wrong = next((line for line, word in words if not word.isdigit()), None)
-        if wrong is None and len(words) % (1 + nodes):
-            wrong = data[-1][0]
-        if wrong is not None:
-            expected = f"element, {nodes} nodes"
-            raise InputError("this is no element", f"{self.where}:{wrong}", None, expected, "correct the line")
-        table = np.array([int(word) for _, word in words], dtype=np.int64).reshape(-1, 1 + nodes)
-        self.cells.append(table[:, 1:])
+                expected = "first, last, step" if "GENERATE" in options else "numbers or names of sets"
+                fix, kind = "correct the line", "element" if key == "ELSET" else "node"
+                raise InputError(f"this is no {kind} set", f"{self.where}:{line}", text, expected, fix) from None
 
     def _add_material(self, keyword: str, options: dict[str, str], data: list[tuple[int, str]]) -> None:
         """A material's name, or its first modulus or density, as far as it is a number."""
@@ -212,11 +220,6 @@ class Deck:
             now = self.materials[-1]
             now.where = f"{self.where}:{data[0][0]}"
             setattr(now, "modulus" if keyword == "ELASTIC" else "density", value)
-
-    def _hexahedra(self) -> IntArray | None:
-        """All of them with as many nodes as the smallest has: the corners come first."""
-        count = min((cells.shape[1] for cells in self.cells), default=0)
-        return np.concatenate([cells[:, :count] for cells in self.cells]) if count else None
 
     def _expand(self, name: str, above: tuple[str, ...] = ()) -> list[int]:
         if name not in self.members or name in above:
@@ -235,7 +238,7 @@ class Deck:
         numbers = np.array([row[0] for row in self.rows], dtype=np.int64)
         sets = {name: np.unique(np.array(self._expand(name), dtype=np.int64)) for name in self.members}
         materials = [one for one in self.materials if one.modulus is not None or one.density is not None]
-        return Nodes(numbers, table, self.where, sets, self._hexahedra(), materials)
+        return Nodes(numbers, table, self.where, sets, self.elements, materials)
 
 
 def _blocks(path: Path) -> Iterator[tuple[str, dict[str, str], list[tuple[int, str]]]]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..units import SYSTEMS
+from .cells import wrong_cells
 
 if TYPE_CHECKING:
     from .structure import Structure
@@ -48,7 +49,7 @@ def complaint_of(structure: Structure) -> str | None:
 def _wrong_grid(structure: Structure) -> str | None:
     """What does not fit in nodes and cells."""
     if structure.coordinates is None:
-        return None if structure.hexahedra is None else "there are hexahedra, but no coordinates"
+        return "there are cells, but no coordinates" if structure.cells or structure.hexahedra is not None else None
     given = structure.displacements
     dofs = structure.n_dof
     if structure.expansion is not None:
@@ -62,8 +63,10 @@ def _wrong_grid(structure: Structure) -> str | None:
         return f"displacements have the shape {np.shape(given)} and the largest dof {np.max(given)}"
     cells = structure.hexahedra
     if cells is None:
-        return None
+        return wrong_cells(structure.cells, n)
     if np.ndim(cells) != 2 or np.shape(cells)[1] not in (8, 20, 27):
         return f"hexahedra have the shape {np.shape(cells)}, not (n_cells, 8, 20 or 27)"
     outside = not 0 <= np.min(cells) <= np.max(cells) < n
-    return f"hexahedra have the nodes {np.min(cells)} to {np.max(cells)} of {n}" if outside else None
+    if outside:
+        return f"hexahedra have the nodes {np.min(cells)} to {np.max(cells)} of {n}"
+    return wrong_cells(structure.cells, n)

@@ -60,6 +60,8 @@ class Structure:
         `displacements` then number its rows, and the faces of a sector correspond as they are.
     hexahedra : (n_cells, 8, 20 or 27), optional
         Nodes of the cells in VTK's order, for pictures.
+    cells : dict
+        Further cells of other kinds, by their names (`fretwave.model.cells`), in VTK's order.
     sectors : int
         The model is one sector of a wheel of this many, or with `whole` all of them, one after the other; 0: no wheel.
     low, high : (n_face,), optional
@@ -102,6 +104,7 @@ class Structure:
     displacements: Optional[Indices] = None
     expansion: Optional[Sparse] = None
     hexahedra: Optional[Indices] = None
+    cells: Mapping[str, Indices] = field(default_factory=dict)
     sectors: int = 0
     low: Optional[Indices] = None
     high: Optional[Indices] = None
@@ -368,7 +371,7 @@ class Structure:
 #: What belongs to nodes, and is left behind where dofs are no longer theirs.
 _NO_NODES: dict[str, Any] = dict.fromkeys(
     ("coordinates", "displacements", "expansion", "hexahedra", "labels", "node_numbers")
-)
+) | {"cells": {}}
 
 
 def tie(A: Term | None, T: Parts) -> dict[int, Sparse] | None:

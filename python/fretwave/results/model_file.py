@@ -18,6 +18,8 @@ place                      content
 ``/nodes/number``          (n_nodes,) node numbers, optional
 ``/nodes/coordinates``     (n_nodes, 3), optional, with ``number``
 ``/cells/hexahedra``       (n_cells, 8 or 20) places in ``/nodes``, in the order of C3D8 and C3D20 (and VTK), optional
+``/cells/<kind>``          (n_cells, m) cells of other kinds by their names (`fretwave.model.cells`), in VTK's order,
+                           optional
 ``/contacts/<name>/B``     CSR group as the matrices, (3 n_pairs, n_dof): u = B x, rows (normal, tangent, tangent) pair
                            by pair, u_n > 0 closes the contact
 ``/contacts/<name>/...``   ``positions`` (n_pairs, 3), ``areas`` (n_pairs,), ``frames`` (n_pairs, 3, 3) with rows normal
@@ -44,6 +46,7 @@ from ..arrays import IntArray
 from ..errors import InputError
 from ..files.compressed import check_compressed
 from ..files.whole import Unfailing, check_whole, replaced, seal
+from ..model.cells import KINDS, wrong_cells
 from ..model.pairs import Pairs
 from ..model.structure import Structure
 from ..texts import display, names_beside, nearest
@@ -159,6 +162,7 @@ def _tables_of(structure: Structure) -> dict[str, Table]:
         "nodes/number": structure.node_numbers,
         "nodes/coordinates": structure.coordinates,
         "cells/hexahedra": structure.hexahedra,
+        **{f"cells/{kind}": table for kind, table in structure.cells.items()},
     }
 
 
@@ -208,7 +212,7 @@ def read_model(path: str | Path) -> Structure:
     names = structure.dof_names
     dofs = {names[dof]: int(dof) for dof in (() if kept is None else kept)}
     if structure.labels is None or structure.coordinates is None:  # not known which dof moves which node
-        return replace(structure, dofs=dofs, coordinates=None, hexahedra=None)
+        return replace(structure, dofs=dofs, coordinates=None, hexahedra=None, cells={})
     return replace(structure, dofs=dofs, displacements=_displacements(structure))
 
 
@@ -302,6 +306,7 @@ def _read_parts(file: h5py.File) -> tuple[Structure, dict[str, Table]]:
         node_numbers=tables["nodes/number"],
         coordinates=tables["nodes/coordinates"],
         hexahedra=tables["cells/hexahedra"],
+        cells={kind: file["cells"][kind][()] for kind in file.get("cells", {}) if kind in KINDS},
         units=_units_of(file),
     )
     return structure, tables
@@ -348,6 +353,9 @@ def _check(structure: Structure, tables: Mapping[str, Table], where: str) -> Non
     cells, nodes = tables["cells/hexahedra"], _count(tables["nodes/number"])
     if cells is not None and cells.size and not 0 <= cells.min() <= cells.max() < nodes:
         raise wrong("a node of a cell does not exist", f"{cells.min()} to {cells.max()}", f"0 to {nodes - 1}")
+    complaint = wrong_cells(structure.cells, nodes)
+    if complaint:
+        raise wrong("the cells do not fit", complaint, f"nodes 0 to {nodes - 1}")
     kept = tables["dofs/kept"]
     if kept is not None and len(kept) and not 0 <= min(kept) <= max(kept) < n:
         raise wrong("a kept dof does not exist", f"{min(kept)} to {max(kept)}", f"0 to {n - 1}")

@@ -18,16 +18,17 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from ..arrays import Array, Indices
+from ..arrays import Array
 from ..case.load import Case
 from ..errors import InputError
 from ..fe.mesh import VTK_LATTICE
+from ..model.cells import HEXAHEDRA, KINDS
 from ..model.sectors import Parts, rotation
 from ..model.structure import Structure
 from ..results.basis_file import NAME, marks_of, read_basis
 from ..texts import display
 from .choice import Choice, natural_scale
-from .vtkhdf import HEXAHEDRON, QUADRATIC_HEXAHEDRON, TRIQUADRATIC_HEXAHEDRON, VERTEX, linear_cells
+from .vtkhdf import HEXAHEDRON, VERTEX, Cells, linear_cells
 
 #: Displacements (n_nodes, 3, n) of all nodes from columns (n_dof, n) on the model's dofs, both faces of a sector free.
 ToNodes = Callable[[Array], Array]
@@ -256,15 +257,16 @@ def geometry(case: Case) -> Structure:
     return given
 
 
-def mesh_of(case: Case, linear: bool = False) -> tuple[Array, tuple[Indices, int]]:
+def mesh_of(case: Case, linear: bool = False) -> tuple[Array, list[Cells]]:
     """Nodes (n_nodes, 3), and cells (n_cells, m) with VTK's number of their kind; points where there are no cells."""
     given = geometry(case)
     nodes, cells = np.asarray(given.coordinates), given.hexahedra
-    if cells is None:
-        return nodes, (np.arange(len(nodes))[:, None], VERTEX)
-    if cells.shape[1] == 27 and linear:
-        return nodes, (linear_cells(cells, VTK_LATTICE), HEXAHEDRON)
-    return nodes, (cells, {8: HEXAHEDRON, 20: QUADRATIC_HEXAHEDRON, 27: TRIQUADRATIC_HEXAHEDRON}[cells.shape[1]])
+    found: list[Cells] = [(table, KINDS[kind].vtk) for kind, table in given.cells.items() if len(table)]
+    if cells is not None:
+        cut = linear and cells.shape[1] == 27
+        first = (linear_cells(cells, VTK_LATTICE), HEXAHEDRON) if cut else (cells, HEXAHEDRA[cells.shape[1]])
+        found.insert(0, first)
+    return nodes, found or [(np.arange(len(nodes))[:, None], VERTEX)]
 
 
 def _unchanged(columns: npt.ArrayLike) -> Array:

@@ -26,7 +26,7 @@ from ..results.results import has_results, open_results
 from ..texts import display
 from .choice import Choice, ViewOptions, analysis_name, read_choice
 from .motion import Scene, Shape, geometry, mesh_of, scene_of
-from .vtkhdf import VERTEX, GridFile
+from .vtkhdf import VERTEX, Cells, GridFile
 
 #: Highest harmonic shown as fields of its own.
 SHOWN_HARMONICS = 3
@@ -58,7 +58,8 @@ def view_run(folder: Path, options: ViewOptions, say: Callable[[str], None] = pr
     with scene_of(case, choice, nodes, folder, options.sectors) as scene:
         scale = options.scale if options.scale is not None else scene.natural_scale()
         write_grid(out, scene, cells, scale)
-        say(f"{display(out)}: {_size(scene, len(nodes), 'nodes')}, {len(cells[0])} cells, {len(choice.times)} steps")
+        count = sum(len(table) for table, _ in cells)
+        say(f"{display(out)}: {_size(scene, len(nodes), 'nodes')}, {count} cells, {len(choice.times)} steps")
         placed = _placed(case, choice, say)
         if placed:
             shown = write_pairs(pairs, scene, placed, scale)
@@ -88,7 +89,7 @@ def _size(scene: Scene, count: int, what: str) -> str:
     return f"{sectors}{count} {what}"
 
 
-def write_grid(path: Path, scene: Scene, cells: tuple[Indices, int], scale: float) -> None:
+def write_grid(path: Path, scene: Scene, cells: Sequence[Cells], scale: float) -> None:
     """The grid with its displacement, that at rest, and the complex amplitudes of the lowest harmonics."""
     choice, labels = scene.choice, scene.choice.labels
     with GridFile(path, choice.times, choice.units) as grid:
@@ -125,9 +126,8 @@ def write_pairs(path: Path, scene: Scene, placed: Mapping[str, Pairs], scale: fl
     with GridFile(path, choice.times, choice.units) as grid:
         for sector in sectors:
             for contact in contacts:
-                grid.part(
-                    np.asarray(contact.points) @ scene.turn(sector).T, np.arange(contact.n_pairs)[:, None], VERTEX
-                )
+                places = np.asarray(contact.points) @ scene.turn(sector).T
+                grid.part(places, (np.arange(contact.n_pairs)[:, None], VERTEX))
         _write_states(grid, choice)
         write_motion, write_pair = _motion(grid, scale), _pair_fields(grid, list(placed), contacts, choice)
         for place, sector in enumerate(sectors):

@@ -16,8 +16,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from ..arrays import AnyArray, Array, IntArray
+from ..arrays import AnyArray, Array, Indices, IntArray
 from ..errors import InputError
+from ..model.cells import KINDS
 from ..texts import display
 from ..units import ATTRIBUTE, SI, UnitSystem
 
@@ -25,8 +26,10 @@ if TYPE_CHECKING:
     import h5py
 
 
-#: VTK's numbers of cell types by name (vtkCellType.h).
-VERTEX, TRIANGLE, HEXAHEDRON, QUADRATIC_HEXAHEDRON, TRIQUADRATIC_HEXAHEDRON = 1, 5, 12, 25, 29
+#: VTK's numbers of cell types that are no cells of a mesh, and of what a triquadratic hexahedron is cut into.
+VERTEX, TRIANGLE, HEXAHEDRON = 1, KINDS["triangle"].vtk, KINDS["hexahedron"].vtk
+#: Cells (n_cells, m) of one kind with VTK's number of it.
+Cells = tuple[Indices, int]
 #: The lowest version with steps: any reader of a later 2.x takes it.
 VERSION = (2, 0)
 #: Rows of one HDF5 chunk: a step of a small grid, some 100 kB of vectors of a large one.
@@ -85,25 +88,25 @@ class GridFile:
         """Points of all parts so far."""
         return len(self._root["Points"])
 
-    def part(self, points: npt.ArrayLike, cells: npt.ArrayLike, kind: int) -> None:
-        """Add a part of the grid with cells of one kind.
+    def part(self, points: npt.ArrayLike, *blocks: Cells) -> None:
+        """Add a part of the grid.
 
         Parameters
         ----------
         points : (n, 3) [length]
-        cells : (n_cells, m)
-            Numbers of this part's points, in VTK's order.
-        kind : int
-            VTK's number of the cell type.
+        blocks : ((n_cells, m), int) each
+            Numbers of this part's points in VTK's order, and VTK's number of the cell type.
         """
-        points, cells = np.asarray(points, dtype=float), np.asarray(cells, dtype="i8")
-        count, nodes = cells.shape
-        if cells.size and not 0 <= cells.min() <= cells.max() < len(points):
-            found, wanted = f"{cells.min()} to {cells.max()}", f"0 to {len(points) - 1}"
+        points = np.asarray(points, dtype=float)
+        tables = [np.asarray(cells, dtype="i8") for cells, _ in blocks]
+        ids = np.concatenate([cells.ravel() for cells in tables])
+        if ids.size and not 0 <= ids.min() <= ids.max() < len(points):
+            found, wanted = f"{ids.min()} to {ids.max()}", f"0 to {len(points) - 1}"
             raise InputError("a cell has a node that does not exist", display(self.path), found, wanted)
-        arrays = {"Points": points, "Connectivity": cells.ravel(), "Types": np.full(count, kind, dtype="u1")}
-        arrays["Offsets"] = nodes * np.arange(count + 1)
-        sizes = {"NumberOfPoints": len(points), "NumberOfCells": count, "NumberOfConnectivityIds": cells.size}
+        widths = np.concatenate([np.full(len(cells), cells.shape[1]) for cells in tables])
+        types = np.concatenate([np.full(len(cells), kind, "u1") for cells, (_, kind) in zip(tables, blocks)])
+        arrays = {"Points": points, "Connectivity": ids, "Types": types, "Offsets": np.append(0, np.cumsum(widths))}
+        sizes = {"NumberOfPoints": len(points), "NumberOfCells": len(types), "NumberOfConnectivityIds": ids.size}
         for name, values in {**arrays, **{name: np.array([size]) for name, size in sizes.items()}}.items():
             _append(self._root[name], values)
 

@@ -105,7 +105,7 @@ def _write(
     scale = _natural_scale(points, arrays["depth"]) if scale is None else scale
     with GridFile(path, table["cycles"][()][rows], units) as grid:
         for contact in placed.values():
-            grid.part(np.asarray(contact.points), *surface(contact))
+            grid.part(np.asarray(contact.points), surface(contact))
         for key, name in FIELDS.items():
             grid.point_field(name, arrays[key], steps)
         areas = np.concatenate([np.asarray(contact.areas) for contact in placed.values()])
