@@ -82,7 +82,7 @@ def read_parts(options: argparse.Namespace) -> tuple[Structure, Assembled, list[
     if nodes is not None:
         model.node_numbers, model.coordinates = nodes.numbers, nodes.coordinates
         model.hexahedra, model.cells = cells_of(nodes)
-    model.pairs = dict(_pairs(options, labels, nodes))
+    model.pairs = dict(_pairs(options, labels, nodes, found.notes))
     return model, found, [] if nodes is None else nodes.materials
 
 
@@ -175,8 +175,10 @@ def _names(known: Sequence[str], given: list[str]) -> tuple[list[str], dict[str,
     return names, {names[dof]: dof for dof in kept}
 
 
-def _pairs(options: argparse.Namespace, labels: IntArray | None, nodes: Nodes | None) -> Iterator[tuple[str, Pairs]]:
-    """Contact pairs by name."""
+def _pairs(
+    options: argparse.Namespace, labels: IntArray | None, nodes: Nodes | None, notes: list[str]
+) -> Iterator[tuple[str, Pairs]]:
+    """Contact pairs by name; what was done is added to the notes."""
     seen: set[str] = set()
     for number, words in enumerate(options.pairs):
         name, equals, first = words[0].partition("=")
@@ -192,12 +194,13 @@ def _pairs(options: argparse.Namespace, labels: IntArray | None, nodes: Nodes | 
         tangent = _axis(options.tangent)
         if len(words) == 1:
             with readable(Path(first), "file of the pairs"):
-                found = read_pairs(name, Path(first), labels, nodes, tangent)
+                found = read_pairs(name, Path(first), labels, nodes, tangent, options.tolerance)
         elif nodes is None:
             fix = "give --coordinates FILE with the sets, or a CSV of pairs"
             raise InputError("the node sets are not known", where, None, "nodes with sets", fix)
         else:
-            found = match(name, nodes, first, words[1], _axis(options.normal), labels, options.tolerance, tangent)
+            normal = _axis(options.normal)
+            found = match(name, nodes, first, words[1], normal, labels, options.tolerance, tangent, notes)
         yield name, found
 
 

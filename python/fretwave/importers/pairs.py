@@ -1,4 +1,4 @@
-"""Contact pairs of matching meshes: node to node, or node to ground.
+"""Contact pairs: node to node, node to the other side's faces where meshes do not match, or node to ground.
 
 The relative displacement of a pair is u = R (x_a - x_b), R the frame (normal, tangent, tangent), the normal pointing
 from the first body to the second: u_n > 0 closes the contact. A direction that is no dof (held) does not move.
@@ -6,6 +6,7 @@ from the first body to the second: u_n > 0 closes the contact. A direction that 
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -18,14 +19,40 @@ from ..fe.interface import tangent_frames
 from ..model.pairs import Pairs
 from ..texts import display
 from .nodes import Nodes
+from .projection import project
+from .surfaces import Side, check_facing, normals_of, side_of
 from .text import first_data_line
 
 #: Nodes of a pair are this close, over the diagonal of the mesh, unless told.
 TOLERANCE = 1e-6
+#: What is this many tolerances apart was not meant as a pair.
+FAR = 1e3
 #: The second set of pairs with ground.
 GROUND = "GROUND"
 #: Unmatched nodes that a message names.
 SHOWN = 8
+
+
+@dataclass(frozen=True)
+class Found:
+    """Nodes of pairs (n_pairs, 2), 0 for ground, the weights of the second side's nodes, and what is to be said.
+
+    Attributes
+    ----------
+    others : (n_others,)
+        Nodes of the second side.
+    weights : (n_pairs, n_others)
+    """
+
+    both: IntArray
+    others: IntArray
+    weights: sp.csr_matrix
+    note: str = ""
+
+
+def reach_of(nodes: Nodes, tolerance: float | None) -> float:
+    """Largest distance of two nodes of a pair [length]."""
+    return TOLERANCE * float(np.linalg.norm(np.ptp(nodes.coordinates, axis=0))) if tolerance is None else tolerance
 
 
 def match(
@@ -37,61 +64,114 @@ def match(
     labels: IntArray,
     tolerance: float | None = None,
     tangent: Array | None = None,
+    notes: list[str] | None = None,
 ) -> Pairs:
-    """Pairs of coincident nodes of two sets, or of one set with ``GROUND``.
+    """Pairs of two sides: coincident nodes, or the first's nodes on the second's faces; or of one side with ``GROUND``.
 
     Parameters
     ----------
     name : of the contact
-    normal : (3,)
-        From the first body to the second.
+    first, second : surfaces of element faces, or node sets
+    normal : (3,), optional
+        From the first body to the second; default: those of the first side's faces.
     labels : (n_dof, 2)
         Node and direction of each dof.
     tangent : (3,), optional
         The first tangent is this direction made orthogonal to the normal; default: the axis most across it.
     tolerance : float, optional
-        Largest distance of two nodes of a pair; default 1e-6 of the mesh's diagonal.
+        Largest distance of two nodes of a pair, or of a node and the other side's faces; default 1e-6 of the mesh's
+        diagonal.
+    notes : what was done is added
 
     Raises
     ------
     InputError
-        A node has no partner, or two nodes share one.
+        A node has no partner, or two nodes share one; sides are far apart or do not look at each other.
     """
     where = f"{nodes.where}, sets {first} and {second}"
-    if normal is None:
-        fix = "give --normal X,Y,Z, from the first body to the second, or a CSV of pairs with normals"
-        raise InputError("the pairs have no normal", where, None, "a direction", fix)
+    a = side_of(nodes, first)
+    normals = normals_of(a, normal)
     if second.upper() == GROUND and GROUND not in nodes.sets:
-        a = nodes.node_set(first)
-        grounded = np.column_stack([a, np.zeros_like(a)])
-        return _joined(name, grounded, np.broadcast_to(normal, (len(a), 3)), None, where, labels, nodes, tangent)
-    a, b = nodes.node_set(first), nodes.node_set(second)
-    both = np.intersect1d(a, b)
-    if len(both):
-        measured = f"{len(both)} nodes, the first is {both[0]}"
+        both = np.column_stack([a.numbers, np.zeros_like(a.numbers)])
+        found = Found(both, a.numbers[:0], sp.csr_matrix((len(both), 0)))
+    else:
+        found = _pair(a, side_of(nodes, second), normals, where, reach_of(nodes, tolerance))
+    if notes is not None and found.note:
+        notes.append(f"contact '{name}': {found.note}")
+    return _joined(name, found, normals, a.areas, where, labels, nodes, tangent)
+
+
+def _pair(a: Side, b: Side, normals: Array, where: str, reach: float) -> Found:
+    """Coincident nodes where all have a partner, else the first side's nodes on the second's faces."""
+    common = np.intersect1d(a.numbers, b.numbers)
+    if len(common):
+        measured = f"{len(common)} nodes, the first is {common[0]}"
         raise InputError("a node is in both sets", where, measured, "two nodes at one place", "split the mesh there")
-    xa, xb = (nodes.coordinates[nodes.places(numbers)] for numbers in (a, b))
-    reach = TOLERANCE * float(np.linalg.norm(np.ptp(nodes.coordinates, axis=0))) if tolerance is None else tolerance
-    distance, partner = cKDTree(xb).query(xa)
-    alone = [f"{n} ({d:.3g} away)" for n, d in zip(a[distance > reach], distance[distance > reach])]
-    left = np.setdiff1d(np.arange(len(b)), partner[distance <= reach])
-    distance_b = cKDTree(xa).query(xb[left])[0] if len(left) else []
-    alone += [f"{n} ({d:.3g} away)" for n, d in zip(b[left], distance_b)]
-    if alone or len(np.unique(partner)) != len(a):
-        shown = ", ".join(alone[:SHOWN]) + (f" and {len(alone) - SHOWN} more" if len(alone) > SHOWN else "")
+    distance, partner = cKDTree(b.points).query(a.points)
+    _check_near(a, b, distance, partner, where, reach)
+    both = np.column_stack([a.numbers, b.numbers[partner]])
+    check_facing(normals, b, partner)
+    alone = [f"{n} ({d:.3g} away)" for n, d in zip(a.numbers[distance > reach], distance[distance > reach])]
+    left = np.setdiff1d(np.arange(len(b.numbers)), partner[distance <= reach])
+    if not alone and not len(left) and len(both) == len(b.numbers):
+        weights = sp.csr_matrix((np.ones(len(both)), (np.arange(len(both)), partner)), shape=(len(both),) * 2)
+        return Found(both, b.numbers, weights)
+    if b.faces:
+        return _projected(a, b, both, where, reach)
+    distance_b = cKDTree(a.points).query(b.points[left])[0] if len(left) else []
+    alone += [f"{n} ({d:.3g} away)" for n, d in zip(b.numbers[left], distance_b)]
+    raise InputError(
+        "nodes of the contact have no partner" if alone else "two nodes share one partner",
+        where,
+        f"{len(alone)} of {len(a.numbers)} + {len(b.numbers)} nodes: {_shown(alone)}"
+        if alone
+        else f"{len(a.numbers)} and {len(b.numbers)} nodes",
+        f"one node of the other set within {reach:.3g}, or faces of elements under the second set",
+        "mesh both sides alike, name surfaces of the deck, widen --tolerance, or give a CSV of pairs",
+    )
+
+
+def _projected(a: Side, b: Side, both: IntArray, where: str, reach: float) -> Found:
+    weights, distance = project(a.points, b)
+    beside = distance > reach
+    if beside.any():
+        named = [f"{n} ({d:.3g} away)" for n, d in zip(a.numbers[beside], distance[beside])]
+        named = [text.replace("inf away", "beside all faces") for text in named]
         raise InputError(
-            "nodes of the contact have no partner" if alone else "two nodes share one partner",
+            "nodes of the first side do not lie on the second's faces",
             where,
-            f"{len(alone)} of {len(a)} + {len(b)} nodes: {shown}" if alone else f"{len(a)} and {len(b)} nodes",
-            f"one node of the other set within {reach:.3g}",
-            "mesh both sides alike, widen --tolerance, or give a CSV of pairs",
+            f"{len(named)} of {len(a.numbers)} nodes: {_shown(named)}",
+            f"each within {reach:.3g} of a face of {b.where}",
+            "name first the side that lies on the other all over, or widen --tolerance",
         )
-    both = np.column_stack([a, b[partner]])
-    return _joined(name, both, np.broadcast_to(normal, (len(a), 3)), None, where, labels, nodes, tangent)
+    faces = sum(len(table) for table in b.faces)
+    note = f"meshes do not match: {len(both)} nodes on {faces} faces, at most {distance.max():.2g} away"
+    return Found(both, b.numbers, weights, note)
+
+
+def _shown(named: list[str]) -> str:
+    return ", ".join(named[:SHOWN]) + (f" and {len(named) - SHOWN} more" if len(named) > SHOWN else "")
+
+
+def _check_near(a: Side, b: Side, distance: Array, partner: IntArray, where: str, reach: float) -> None:
+    """Two sides are not far apart as a whole: the nearest nodes, or the nearest node and face."""
+    least = int(np.argmin(distance))
+    closest = distance[least]
+    if closest > FAR * reach and b.faces:
+        closest = min(closest, project(a.points, b)[1].min())
+    if closest > FAR * reach:
+        measured = f"nodes {a.numbers[least]} and {b.numbers[partner[least]]} are nearest, {distance[least]:.3g} apart"
+        fix = "check the names of the sets, or that both bodies are in one unit and place; else widen --tolerance"
+        raise InputError("the two sides are far apart", where, measured, f"at most {reach:.3g}", fix)
 
 
 def read_pairs(
-    name: str, path: Path, labels: IntArray, nodes: Nodes | None = None, tangent: Array | None = None
+    name: str,
+    path: Path,
+    labels: IntArray,
+    nodes: Nodes | None = None,
+    tangent: Array | None = None,
+    tolerance: float | None = None,
 ) -> Pairs:
     """A CSV of ``node_a, node_b, nx, ny, nz, area``; node_b empty or 0 is ground, the area may be left out.
 
@@ -99,6 +179,13 @@ def read_pairs(
     ----------
     name, labels, tangent
         As `match`, the default tangent being the axis most across all normals.
+    tolerance
+        As `match`: nodes of a pair may be a thousand of it apart, for what a CSV pairs need not coincide.
+
+    Raises
+    ------
+    InputError
+        A line is no pair, or its nodes are far apart.
     """
     where = display(path)
     if not path.is_file():
@@ -117,12 +204,30 @@ def read_pairs(
             raise InputError("this is no pair", f"{where}:{number}", line, expected, "correct the line") from None
     table = np.array(rows, dtype=float).reshape(-1, 6)
     areas = None if np.isnan(table[:, 5]).any() else table[:, 5]
-    return _joined(name, table[:, :2].astype(np.int64), table[:, 2:5], areas, where, labels, nodes, tangent)
+    both = table[:, :2].astype(np.int64)
+    if nodes is not None:
+        _check_apart(both, nodes, where, reach_of(nodes, tolerance))
+    second = both[:, 1]
+    weights = sp.diags((second != 0).astype(float)).tocsr()
+    return _joined(name, Found(both, second, weights), table[:, 2:5], areas, where, labels, nodes, tangent)
+
+
+def _check_apart(both: IntArray, nodes: Nodes, where: str, reach: float) -> None:
+    """No pair of nodes is a thousand tolerances apart."""
+    rows = np.flatnonzero(both[:, 1])
+    xa, xb = (nodes.coordinates[nodes.places(both[rows, k])] for k in (0, 1))
+    apart = np.linalg.norm(xa - xb, axis=1)
+    if (apart > FAR * reach).any():
+        worst = int(np.argmax(apart))
+        a, b = both[rows[worst]]
+        measured = f"nodes {a} and {b} are {apart[worst]:.3g} apart; {int((apart > FAR * reach).sum())} such"
+        fix = f"check the node numbers, or give --tolerance {1.1 * apart[worst] / FAR:.2g} where they are meant"
+        raise InputError("nodes of a pair are far apart", where, measured, f"at most {FAR * reach:.3g}", fix)
 
 
 def _joined(
     name: str,
-    both: IntArray,
+    found: Found,
     normals: Array,
     areas: Array | None,
     where: str,
@@ -130,8 +235,8 @@ def _joined(
     nodes: Nodes | None,
     tangent: Array | None,
 ) -> Pairs:
-    """B and the geometry of pairs of nodes (n_pairs, 2), 0 for ground, with normals of any length."""
-    n = len(both)
+    """B and the geometry of pairs, with normals of any length."""
+    n, both = len(found.both), found.both
     length = np.linalg.norm(normals, axis=1)
     if not n or not (length > 0).all():
         measured = "no pair" if not n else f"pair {int(np.argmin(length)) + 1} has the normal (0, 0, 0)"
@@ -143,7 +248,8 @@ def _joined(
     except InputError as error:
         place = f"contact '{name}', {where}"
         raise InputError(error.what, place, error.measured, error.expected, "give another --tangent") from None
-    difference = (_selection(both[:, 0], labels) - _selection(both[:, 1], labels)).tocsr()
+    second = sp.kron(found.weights, sp.identity(3)) @ _selection(found.others, labels)
+    difference = (_selection(both[:, 0], labels) - second).tocsr()
     _check_dofs(name, both, where, difference, labels)
     B = (sp.block_diag(list(frames)) @ difference).tocsr()
     B.eliminate_zeros()

@@ -1,0 +1,186 @@
+"""Contact from faces of a deck: areas, normals, and nodes on faces of a mesh that does not match."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from tolerances import LAST_BIT, ROUNDING
+
+from fretwave.importers.cells import _EDGES
+from fretwave.importers.nodes import read_nodes
+from fretwave.importers.pairs import match
+from fretwave.importers.surfaces import side_of
+from fretwave.model.pairs import Pairs
+
+pytestmark = pytest.mark.ranks(1)
+
+#: The largest error that the issue allows a patch test.
+PATCH = 1e-10
+#: Corners of the elements that a unit box is cut into, by kind of element, on its corners in the order of C3D8.
+CUTS = {
+    "C3D8": [(0, 1, 2, 3, 4, 5, 6, 7)],
+    "C3D6": [(0, 1, 2, 4, 5, 6), (0, 2, 3, 4, 6, 7)],
+    "C3D4": [(0, 1, 2, 6), (0, 2, 3, 6), (0, 3, 7, 6), (0, 7, 4, 6), (0, 4, 5, 6), (0, 5, 1, 6)],
+}
+QUADRATIC = {"C3D8": ("C3D20", "quadratic_hexahedron"), "C3D6": ("C3D15", "quadratic_wedge")}
+QUADRATIC["C3D4"] = ("C3D10", "quadratic_tetrahedron")
+KINDS = [*CUTS, "C3D20", "C3D15", "C3D10"]
+
+
+@dataclass
+class Box:
+    """A box of nx x ny x nz cells between two corners, cut into elements of one kind, with distorted inner nodes."""
+
+    kind: str
+    cells: tuple[int, int, int]
+    low: tuple[float, float, float]
+    high: tuple[float, float, float]
+
+    def lines(self, first: int, elements: str) -> tuple[str, np.ndarray]:
+        """``*NODE`` and ``*ELEMENT`` with numbers from first on, and the coordinates."""
+        n = self.cells
+        axes = [np.linspace(a, b, k + 1) for a, b, k in zip(self.low, self.high, n)]
+        x = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+        size = np.subtract(self.high, self.low) / n
+        rng = np.random.default_rng(first)
+        x[1:-1, :, :, 0] += 0.2 * size[0] * rng.uniform(-1, 1, x[1:-1, :, :, 0].shape)
+        x[:, 1:-1, :, 1] += 0.2 * size[1] * rng.uniform(-1, 1, x[:, 1:-1, :, 1].shape)
+        number = np.arange(x[..., 0].size).reshape(x.shape[:3])
+        points = list(x.reshape(-1, 3))
+        corners = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
+        linear = next((own for own, (name, _) in QUADRATIC.items() if name == self.kind), self.kind)
+        table = [
+            [int(number[i + corners[c][0], j + corners[c][1], k + corners[c][2]]) for c in cut]
+            for i in range(n[0])
+            for j in range(n[1])
+            for k in range(n[2])
+            for cut in CUTS[linear]
+        ]
+        middle: dict[frozenset[int], int] = {}
+        for row in table if linear != self.kind else []:
+            for a, b in [(row[i - 1], row[j - 1]) for i, j in _EDGES[QUADRATIC[linear][1]]]:
+                if frozenset((a, b)) not in middle:
+                    middle[frozenset((a, b))] = len(points)
+                    points.append((points[a] + points[b]) / 2)
+                row.append(middle[frozenset((a, b))])
+        text = "*NODE\n" + "".join(f"{first + k}, {', '.join(map(repr, p.tolist()))}\n" for k, p in enumerate(points))
+        text += f"*ELEMENT, TYPE={self.kind}, ELSET={elements}\n"
+        for k, row in enumerate(table):
+            numbers = [", ".join(str(first + n) for n in part) for part in (row[:10], row[10:]) if part]
+            text += f"{first + k}, " + ",\n".join(numbers) + "\n"
+        return text, np.array(points)
+
+
+def node_set(name: str, first: int, chosen: np.ndarray) -> str:
+    return f"*NSET, NSET={name}\n" + "".join(f"{first + k}\n" for k in np.flatnonzero(chosen))
+
+
+class Stack:
+    """A box A whose top, on z = 1, lies on the underside of a box B with another mesh; a rigid turn puts both askew."""
+
+    def __init__(self, folder: Path, kind: str, other: str, fine: tuple[int, int, int] = (3, 2, 1)) -> None:
+        below, above = Box(kind, fine, (0, 0, 0), (2, 1, 1)), Box(other, (2, 3, 1), (-0.5, 0, 1), (2.5, 1, 2))
+        first, second = below.lines(1, "BELOW"), above.lines(1001, "ABOVE")
+        top, under = first[1][:, 2] == 1, second[1][:, 2] == 1
+        text = first[0] + second[0] + node_set("A", 1, top) + node_set("B", 1001, under)
+        (folder / "stack.inp").write_text(text)
+        self.nodes = read_nodes(folder / "stack.inp")
+        turn = np.linalg.qr(np.random.default_rng(5).normal(size=(3, 3)))[0]
+        self.turn = turn * np.linalg.det(turn)
+        self.nodes.coordinates = self.nodes.coordinates @ self.turn.T + [3.0, -2.0, 7.0]
+        self.labels = np.column_stack([np.repeat(self.nodes.numbers, 3), np.tile([1, 2, 3], len(self.nodes.numbers))])
+        self.notes: list[str] = []
+
+    def pairs(self) -> Pairs:
+        return match("joint", self.nodes, "A", "B", None, self.labels, notes=self.notes)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_areas_are_positive_and_add_up(kind: str, tmp_path: Path) -> None:
+    """To 2 x 1, for every kind of face; normals point out of them."""
+    stack = Stack(tmp_path, kind, "C3D8")
+    side = side_of(stack.nodes, "A")
+    assert side.areas.min() > 0
+    assert side.areas.sum() == pytest.approx(2.0, rel=ROUNDING)
+    np.testing.assert_allclose(side.normals, np.broadcast_to(stack.turn[:, 2], side.normals.shape), atol=ROUNDING)
+
+
+@pytest.mark.parametrize("other", KINDS)
+@pytest.mark.parametrize("kind", KINDS)
+def test_patch_of_meshes_that_do_not_match(kind: str, other: str, tmp_path: Path) -> None:
+    """A linear displacement common to both bodies, a rigid motion among them, gives no relative displacement."""
+    stack = Stack(tmp_path, kind, other)
+    joint = stack.pairs()
+    assert "meshes do not match" in stack.notes[0]
+    x = stack.nodes.coordinates
+    rng = np.random.default_rng(1)
+    for gradient in (rng.normal(size=(3, 3)), np.cross(np.eye(3), [0.3, -0.5, 0.7])):
+        assert abs(joint.B @ (x @ gradient + rng.normal(size=3)).ravel()).max() < PATCH
+    apart = np.zeros_like(x)
+    apart[stack.nodes.numbers < 1000] = stack.turn[:, 2]
+    u = (joint.B @ apart.ravel()).reshape(-1, 3)
+    np.testing.assert_allclose(u, np.broadcast_to([1.0, 0, 0], u.shape), atol=ROUNDING)  # closes the contact
+    assert np.diff(sp.csr_matrix(joint.B).indptr).max() > 6  # a row of several nodes of the other side
+
+
+def test_projection_of_a_matching_mesh_is_node_to_node(tmp_path: Path) -> None:
+    """Where the second side has more nodes, those under the first ones take all the weight."""
+    below, above = Box("C3D8", (2, 2, 1), (0, 0, 0), (2, 1, 1)), Box("C3D8", (3, 2, 1), (0, 0, 1), (3, 1, 2))
+    (first, x), (second, y) = below.lines(1, "BELOW"), above.lines(1001, "ABOVE")
+    y[:, 0] = np.round(y[:, 0])
+    x[:, :2], y[:, 1] = np.round(2 * x[:, :2]) / 2, np.round(2 * y[:, 1]) / 2
+    text = first + second + node_set("A", 1, x[:, 2] == 1) + node_set("B", 1001, y[:, 2] == 1)
+    (tmp_path / "deck.inp").write_text(text)
+    nodes = read_nodes(tmp_path / "deck.inp")
+    nodes.coordinates = np.vstack([x, y])
+    labels = np.column_stack([np.repeat(nodes.numbers, 3), np.tile([1, 2, 3], len(nodes.numbers))])
+    joint = match("joint", nodes, "A", "B", np.array([0, 0, 1.0]), labels)
+    assert joint.n_pairs == 9
+    assert sorted(abs(joint.B.data - np.sign(joint.B.data)).tolist())[-1] < LAST_BIT
+    assert np.diff(joint.B.indptr).tolist() == [2] * 27
+    places = nodes.coordinates[nodes.places(joint.nodes.ravel())].reshape(-1, 2, 3)
+    np.testing.assert_array_equal(places[:, 0], places[:, 1])
+
+
+def test_a_surface_names_faces(tmp_path: Path) -> None:
+    """The same pairs from surfaces as from the node sets; by element numbers, by an element set, by nodes."""
+    below, above = Box("C3D8", (2, 2, 1), (0, 0, 0), (2, 1, 1)), Box("C3D8", (3, 2, 1), (0, 0, 1), (2, 1, 2))
+    (first, x), (second, y) = below.lines(1, "BELOW"), above.lines(1001, "ABOVE")
+    text = first + second + node_set("A", 1, x[:, 2] == 1) + node_set("B", 1001, y[:, 2] == 1)
+    text += "*SURFACE, NAME=Top, TYPE=ELEMENT\n1, S2\n2, S2\n3, S2\n4, S2\n*SURFACE, NAME=UNDER\nABOVE, S1\n"
+    text += "*SURFACE, NAME=NODES, TYPE=NODE\nA, 1.\n*SURFACE, NAME=SIDE\nBELOW, S7\n"
+    (tmp_path / "deck.inp").write_text(text)
+    nodes = read_nodes(tmp_path / "deck.inp")
+    labels = np.column_stack([np.repeat(nodes.numbers, 3), np.tile([1, 2, 3], len(nodes.numbers))])
+    by_sets = match("joint", nodes, "A", "B", None, labels)
+    for first_name in ("top", "NODES"):
+        by_faces = match("joint", nodes, first_name, "UNDER", None, labels)
+        assert abs(by_faces.B - by_sets.B).max() == 0
+        np.testing.assert_array_equal(by_faces.areas, by_sets.areas)
+    with pytest.raises(Exception, match="has no face 'S7'"):
+        side_of(nodes, "SIDE")
+    with pytest.raises(Exception, match=r"there is no set or surface 'TOPP'"):
+        side_of(nodes, "TOPP")
+
+
+def test_curved_faces(tmp_path: Path) -> None:
+    """Two meshes of a cylinder's quarter: normals along the radius, the area within the chords' error."""
+    below, above = Box("C3D20", (2, 6, 1), (0, 0, 0.8), (1, 1, 1)), Box("C3D20", (2, 5, 1), (0, 0, 1), (1, 1, 1.2))
+    (first, x), (second, y) = below.lines(1, "BELOW"), above.lines(1001, "ABOVE")
+    text = first + second + node_set("A", 1, x[:, 2] == 1) + node_set("B", 1001, y[:, 2] == 1)
+    (tmp_path / "deck.inp").write_text(text)
+    nodes = read_nodes(tmp_path / "deck.inp")
+    axial, angle, radius = nodes.coordinates.T
+    angle = np.pi / 2 * angle
+    nodes.coordinates = np.column_stack([axial, -radius * np.cos(angle), radius * np.sin(angle)])
+    labels = np.column_stack([np.repeat(nodes.numbers, 3), np.tile([1, 2, 3], len(nodes.numbers))])
+    joint = match("joint", nodes, "A", "B", None, labels, tolerance=1e-3)
+    outwards = joint.points * [0, 1, 1]
+    assert np.einsum("nx,nx->n", joint.frames[:, 0], outwards).min() > 1 - 1e-3
+    assert joint.areas.sum() == pytest.approx(np.pi / 2, rel=1e-3)
+    turned = np.cross([1.0, 0, 0], nodes.coordinates).ravel()  # about the axis: what is off the face by its sagitta
+    assert abs(joint.B @ turned).max() < 1e-3
