@@ -57,7 +57,7 @@ def test_mode_past_its_largest_damping(prepared: Path, tmp_path: Path, launch) -
 
 
 def stuck(folder: Path, launch, cells: str, first: str, second: str) -> np.ndarray:
-    """Six frequencies, the second plate in other cells, with 3125 N/mm a mm^2 (1e5 N/mm a pair of the matching mesh)."""
+    """Six frequencies, the second plate in other cells, of 3125 N/mm a mm^2: 1e5 N/mm a pair in the mean."""
     deck = subprocess.run(
         [sys.executable, CASE / "deck.py", "--second", *cells.split()], capture_output=True, text=True, check=True
     ).stdout

@@ -7,9 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import scipy.linalg
-import scipy.sparse as sp
-from models import hexahedra
-from models.matrix_files import write_npz
+from models.two_bars import Two
 from tolerances import LAST_BIT, SOLVED
 
 import fretwave as fw
@@ -69,24 +67,6 @@ def test_wrong_decks(tmp_path: Path, text: str, said: str) -> None:
     (tmp_path / "deck.inp").write_text(text)
     with pytest.raises(fw.InputError, match=said):
         read_nodes(tmp_path / "deck.inp")
-
-
-class Two:
-    """Two bars end to end, not joined: the first one's end and the second one's begin coincide."""
-
-    def __init__(self) -> None:
-        self.first = hexahedra.bar((2, 2, 1), (0.04, 0.02, 0.01))
-        self.whole = hexahedra.bar((4, 2, 1), (0.08, 0.02, 0.01))
-        self.nodes = np.vstack([self.first.nodes, self.first.nodes + [0.04, 0, 0]])
-        self.ends = np.flatnonzero(np.isclose(self.nodes[:, 0], 0.04)) + 1
-        self.M, self.K = (sp.block_diag([A, A], format="csr") for A in (self.first.M, self.first.K))
-
-    def write(self, folder: Path) -> list[str]:
-        parts = [write_npz(folder, A, letter, np.zeros(0)) for letter, A in (("M", self.M), ("K", self.K))]
-        mine = self.ends <= len(self.first.nodes)
-        np.savez(folder / "n.npz", coordinates=self.nodes, left=self.ends[mine], right=np.flip(self.ends[~mine]))
-        coordinates = ["--coordinates", str(folder / "n.npz")]
-        return ["import", str(folder / "m.h5"), "--mass", parts[0], "--stiffness", parts[1], *coordinates]
 
 
 def test_pairs_of_coincident_nodes_join_two_bodies(tmp_path: Path, capfd) -> None:

@@ -10,6 +10,7 @@ import pytest
 import scipy.sparse as sp
 from tolerances import LAST_BIT, ROUNDING
 
+from fretwave.errors import InputError
 from fretwave.importers.cells import _EDGES
 from fretwave.importers.nodes import read_nodes
 from fretwave.importers.pairs import match
@@ -153,6 +154,7 @@ def test_a_surface_names_faces(tmp_path: Path) -> None:
     text = first + second + node_set("A", 1, x[:, 2] == 1) + node_set("B", 1001, y[:, 2] == 1)
     text += "*SURFACE, NAME=Top, TYPE=ELEMENT\n1, S2\n2, S2\n3, S2\n4, S2\n*SURFACE, NAME=UNDER\nABOVE, S1\n"
     text += "*SURFACE, NAME=NODES, TYPE=NODE\nA, 1.\n*SURFACE, NAME=SIDE\nBELOW, S7\n"
+    text += "*SURFACE, NAME=OVER\nABOVE, S2\n"
     (tmp_path / "deck.inp").write_text(text)
     nodes = read_nodes(tmp_path / "deck.inp")
     labels = np.column_stack([np.repeat(nodes.numbers, 3), np.tile([1, 2, 3], len(nodes.numbers))])
@@ -161,9 +163,11 @@ def test_a_surface_names_faces(tmp_path: Path) -> None:
         by_faces = match("joint", nodes, first_name, "UNDER", None, labels)
         assert abs(by_faces.B - by_sets.B).max() == 0
         np.testing.assert_array_equal(by_faces.areas, by_sets.areas)
-    with pytest.raises(Exception, match="has no face 'S7'"):
+    with pytest.raises(InputError, match="do not look at each other"):
+        match("joint", nodes, "TOP", "OVER", None, labels, tolerance=2.0)
+    with pytest.raises(InputError, match="has no face 'S7'"):
         side_of(nodes, "SIDE")
-    with pytest.raises(Exception, match=r"there is no set or surface 'TOPP'"):
+    with pytest.raises(InputError, match=r"there is no set or surface 'TOPP'"):
         side_of(nodes, "TOPP")
 
 

@@ -268,6 +268,17 @@ amplitude = [1e-8, 2e-8]
 """
 
 
+def shown(folder: Path, job: str) -> dict[str, np.ndarray]:
+    """First step of the view of a deck's mode, its matrices in job.mas and job.sti."""
+    files = [f"--mass={folder / job}.mas", f"--stiffness={folder / job}.sti", f"--coordinates={folder / job}.inp"]
+    wishes = ["--pairs", "pad=END", "GROUND", "--normal=1,0,0", "--name", "tip=n12z", "--modes", "2"]
+    assert call("import", str(folder / "block.h5"), *files, *wishes) == 0
+    (folder / "case.toml").write_text(IMPORTED)
+    assert call("run", str(folder / "case.toml"), "--out", str(folder / "run"), "--no-plots") == 0
+    assert call("view", str(folder / "run"), "--phases", "4") == 0
+    return read_step(folder / "run" / "mode.vtkhdf", 0)
+
+
 def test_an_imported_model_brings_its_mesh(tmp_path: Path) -> None:
     """Two elements C3D8 of a deck whose held side has no dofs in the matrices: it stays at rest."""
     data = Path(__file__).parents[1] / "data" / "calculix"
@@ -275,14 +286,7 @@ def test_an_imported_model_brings_its_mesh(tmp_path: Path) -> None:
         shutil.copy(data / name, tmp_path / name)
     deck = (data / "block.inp").read_text()
     (tmp_path / "block.inp").write_text(deck + "*NSET, NSET=END\n9, 10, 11, 12\n")
-    files = [f"--{role}={tmp_path / name}" for role, name in (("mass", "block.mas"), ("stiffness", "block.sti"))]
-    wishes = ["--pairs", "pad=END", "GROUND", "--normal=1,0,0", "--name", "tip=n12z", "--modes", "2"]
-    place = f"--coordinates={tmp_path / 'block.inp'}"
-    assert call("import", str(tmp_path / "block.h5"), *files, place, *wishes) == 0
-    (tmp_path / "case.toml").write_text(IMPORTED)
-    assert call("run", str(tmp_path / "case.toml"), "--out", str(tmp_path / "run"), "--no-plots") == 0
-    assert call("view", str(tmp_path / "run"), "--phases", "4") == 0
-    found = read_step(tmp_path / "run" / "mode.vtkhdf", 0)
+    found = shown(tmp_path, "block")
     assert found["types"].tolist() == [HEXAHEDRON] * 2
     assert found["cells"][1].tolist() == [4, 8, 10, 6, 5, 9, 11, 7]
     assert found["points"][[0, 11]].tolist() == [[0.0, 0.0, 0.0], [0.04, 0.03, 0.01]]
@@ -315,14 +319,7 @@ def test_tetrahedra_and_wedges_of_an_imported_model(tmp_path: Path) -> None:
     (tmp_path / "cut.inp").write_text(deck[:begin] + CUT + "*NSET, NSET=END\n9, 10, 11, 12\n" + deck[end:])
     done = subprocess.run(["ccx", "cut"], cwd=tmp_path, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout
-    files = [f"--{role}={tmp_path / name}" for role, name in (("mass", "cut.mas"), ("stiffness", "cut.sti"))]
-    wishes = ["--pairs", "pad=END", "GROUND", "--normal=1,0,0", "--name", "tip=n12z", "--modes", "2"]
-    place = f"--coordinates={tmp_path / 'cut.inp'}"
-    assert call("import", str(tmp_path / "block.h5"), *files, place, *wishes) == 0
-    (tmp_path / "case.toml").write_text(IMPORTED)
-    assert call("run", str(tmp_path / "case.toml"), "--out", str(tmp_path / "run"), "--no-plots") == 0
-    assert call("view", str(tmp_path / "run"), "--phases", "4") == 0
-    found = read_step(tmp_path / "run" / "mode.vtkhdf", 0)
+    found = shown(tmp_path, "cut")
     tetrahedron, wedge = KINDS["tetrahedron"].vtk, KINDS["wedge"].vtk
     assert found["types"].tolist() == [tetrahedron] * 6 + [wedge] * 2
     assert found["cells"][0].tolist() == [0, 4, 6, 7] and found["cells"][6].tolist() == [5, 9, 11, 4, 8, 10]

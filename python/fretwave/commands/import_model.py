@@ -13,7 +13,9 @@ from ..arrays import Array, IntArray
 from ..case.plugins import load_file
 from ..errors import EXIT_DONE, InputError
 from ..importers.calculix import SUFFIXES, read_dofs
+from ..importers.directions import check_directions
 from ..importers.entries import Assembled, assemble
+from ..importers.exchanged import check_one_model
 from ..importers.formats import read_matrix, readable, split
 from ..importers.nodes import Material, Nodes, cells_of, read_nodes
 from ..importers.pairs import match, read_pairs
@@ -68,6 +70,7 @@ def read_parts(options: argparse.Namespace) -> tuple[Structure, Assembled, list[
     paths = {letter: getattr(options, role) for letter, role in ROLES.items() if getattr(options, role)}
     given = {letter: read_matrix(path, letter) for letter, path in paths.items()}
     found = assemble(given, options.symmetric)
+    check_one_model(found, " and ".join(display(paths[letter]) for letter in "MK"))
     nodes = None
     if options.coordinates:
         with readable(options.coordinates, "file of the nodes"):
@@ -83,6 +86,7 @@ def read_parts(options: argparse.Namespace) -> tuple[Structure, Assembled, list[
         model.node_numbers, model.coordinates = nodes.numbers, nodes.coordinates
         model.hexahedra, model.cells = cells_of(nodes)
     model.pairs = dict(_pairs(options, labels, nodes, found.notes))
+    check_directions(model)
     return model, found, [] if nodes is None else nodes.materials
 
 

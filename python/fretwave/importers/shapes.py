@@ -21,52 +21,52 @@ _POWERS = {
 }
 
 
-def corners_of(m: int) -> int:
+def corners_of(count: int) -> int:
     """Corners of a face of so many nodes."""
-    return m if m < 5 else m // 2
+    return count if count < 5 else count // 2
 
 
-def node_places(m: int) -> Array:
-    """(m, 2)"""
-    corners = np.array(_CORNERS[corners_of(m)], dtype=float)
+def node_places(count: int) -> Array:
+    """(count, 2)"""
+    corners = np.array(_CORNERS[corners_of(count)], dtype=float)
     middle = (corners + np.roll(corners, -1, axis=0)) / 2
-    return np.vstack([corners, middle])[:m]
+    return np.vstack([corners, middle])[:count]
 
 
-def _polynomials(m: int, u: Array) -> tuple[Array, Array]:
-    """(n, m) and their derivatives (n, 2, m) at u (n, 2)."""
-    p = np.array(_POWERS[m])
+def _polynomials(count: int, u: Array) -> tuple[Array, Array]:
+    """(n, count) and their derivatives (n, 2, count) at u (n, 2)."""
+    p = np.array(_POWERS[count])
     x, y = u[:, :1], u[:, 1:]
     less = np.maximum(p - 1, 0)
     along_x, along_y = p[:, 0] * x ** less[:, 0] * y ** p[:, 1], p[:, 1] * x ** p[:, 0] * y ** less[:, 1]
     return x ** p[:, 0] * y ** p[:, 1], np.stack([along_x, along_y], axis=1)
 
 
-_SHAPES = {m: np.linalg.inv(_polynomials(m, node_places(m))[0]) for m in _POWERS}
+_SHAPES = {count: np.linalg.inv(_polynomials(count, node_places(count))[0]) for count in _POWERS}
 
 
-def shape_functions(m: int, u: Array) -> tuple[Array, Array]:
-    """Of a face of m nodes at u (n, 2): values (n, m) and gradients (n, 2, m)."""
-    values, gradients = _polynomials(m, u)
-    return values @ _SHAPES[m], gradients @ _SHAPES[m]
+def shape_functions(count: int, u: Array) -> tuple[Array, Array]:
+    """Of a face of count nodes at u (n, 2): values (n, count) and gradients (n, 2, count)."""
+    values, gradients = _polynomials(count, u)
+    return values @ _SHAPES[count], gradients @ _SHAPES[count]
 
 
-def outside(m: int, u: Array) -> Array:
+def outside(count: int, u: Array) -> Array:
     """How far u (n, 2) lies outside of a face, over its size; below zero inside."""
-    if corners_of(m) == 3:
+    if corners_of(count) == 3:
         return np.asarray(np.maximum(-u.min(axis=1), u.sum(axis=1) - 1))
     return np.asarray((abs(u).max(axis=1) - 1) / 2)
 
 
-def centre(m: int) -> Array:
+def centre(count: int) -> Array:
     """(2,)"""
-    return np.asarray(node_places(m)[: corners_of(m)].mean(axis=0))
+    return np.asarray(node_places(count)[: corners_of(count)].mean(axis=0))
 
 
-def gauss(m: int) -> tuple[Array, Array]:
+def gauss(count: int) -> tuple[Array, Array]:
     """Points (q, 2) and weights (q,) exact for squares of the shape functions on flat faces with straight edges."""
     x, w = np.sqrt(0.6) * np.array([-1.0, 0.0, 1.0]), np.array([5.0, 8.0, 5.0]) / 9
-    if corners_of(m) == 4:
+    if corners_of(count) == 4:
         return np.stack(np.meshgrid(x, x), axis=-1).reshape(-1, 2), np.outer(w, w).ravel()
     # D. A. Dunavant, Int. J. Numer. Methods Eng. 21 (1985), degree 4: two orbits of three points.
     orbits = ((0.445948490915965, 0.223381589678011), (0.091576213509771, 0.109951743655322))

@@ -1,0 +1,109 @@
+"""Wrong models that an import finds: nothing is written, exit code 2, one thing to do about it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from models import hexahedra
+from models.matrix_files import Held, write_calculix, write_npz
+from models.two_bars import Two
+
+from fretwave.commands.main import main
+
+pytestmark = pytest.mark.ranks(1)
+
+LEFT_RIGHT = ["--pairs", "joint=LEFT", "RIGHT"]
+#: Arguments, and what is said and to be done; of nodes with their elements, and of nodes alone.
+DIRECTIONS = {
+    "into": ([*LEFT_RIGHT, "--normal=-1,0,0"], "points into the first body", "turn it round"),
+    "exchanged": (["--pairs", "j=RIGHT", "LEFT", "--normal=1,0,0"], "points into the first body", "in the other order"),
+    "along": ([*LEFT_RIGHT, "--normal=0,1,0"], "lies along the face", ""),
+    "aslant": ([*LEFT_RIGHT, "--normal=0.2,1,0.3"], "lies along the face", ""),
+    "ground": (["--pairs", "wall=LEFT", "GROUND", "--normal=-1,0,0"], "points into the first body", "turn it round"),
+}
+
+
+def refused(command: list[str], folder: Path, capfd: pytest.CaptureFixture[str]) -> str:
+    """What is said; the parts of an error are all there, and no file is."""
+    assert main(command) == 2
+    text = capfd.readouterr().err
+    assert text.count("fix:") == 1 and "where:" in text and "measured:" in text and "expected:" in text
+    assert not (folder / "m.h5").exists()
+    return text
+
+
+@pytest.mark.parametrize("deck", [True, False], ids=["elements", "nodes"])
+@pytest.mark.parametrize("wrong", DIRECTIONS)
+def test_normals(wrong: str, deck: bool, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    arguments, said, fix = DIRECTIONS[wrong]
+    text = refused([*Two().write(tmp_path, deck), *arguments], tmp_path, capfd)
+    assert said in text and fix in text and "degrees" in text
+
+
+def table(folder: Path, normal: str, first: list[int], second: list[int]) -> str:
+    """A CSV of pairs."""
+    rows = [f"{a},{b},{normal}\n" for a, b in zip(first, second)]
+    (folder / "pairs.csv").write_text("".join(rows))
+    return str(folder / "pairs.csv")
+
+
+def test_normals_of_a_table(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """The right ones are taken, aslant by 40 degrees too."""
+    two = Two()
+    command, ends = two.write(tmp_path), two.ends.tolist()
+    for normal, said in (("-1,0,0", "points into the first body"), ("0,0,1", "lies along the face")):
+        text = refused([*command, "--pairs", table(tmp_path, normal, ends[:6], ends[6:])], tmp_path, capfd)
+        assert said in text
+    assert main([*command, "--pairs", table(tmp_path, "1,0.8,0", ends[:6], ends[6:])]) == 0
+
+
+@pytest.mark.parametrize("deck", [True, False], ids=["elements", "nodes"])
+def test_sides_far_apart(deck: bool, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """The second bar 1e5 tolerances away. Pairs of a table as well, unless that is told to be meant."""
+    two = Two()
+    two.nodes[len(two.first.nodes) :, 0] += 0.01
+    command, ends = two.write(tmp_path, deck), two.ends.tolist()
+    text = refused([*command, *LEFT_RIGHT, "--normal", "1,0,0"], tmp_path, capfd)
+    assert "the two sides are far apart" in text and "0.01 apart" in text
+    pairs = ["--pairs", table(tmp_path, "1,0,0", ends[:6], ends[6:])]
+    text = refused([*command, *pairs], tmp_path, capfd)
+    assert "nodes of a pair are far apart" in text and "6 such" in text
+    (fix,) = [line.split() for line in text.splitlines() if "fix:" in line]
+    assert main([*command, *pairs, "--tolerance", fix[fix.index("--tolerance") + 1]]) == 0
+
+
+def test_nodes_beside_the_faces(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """The second bar moved by half its width: one row of nodes hangs over."""
+    two = Two()
+    two.nodes[len(two.first.nodes) :, 1] += 0.005
+    text = refused([*two.write(tmp_path, True), *LEFT_RIGHT], tmp_path, capfd)
+    assert "do not lie on the second's faces" in text and "2 of 6 nodes" in text and "beside all faces" in text
+
+
+@pytest.mark.parametrize("labelled", [True, False])
+def test_mass_and_stiffness_exchanged(labelled: bool, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    held = Held()
+    write = write_calculix if labelled else write_npz
+    mass, stiffness = (write(tmp_path, A, letter, held.labels) for A, letter in ((held.M, "M"), (held.K, "K")))
+    command = ["import", str(tmp_path / "m.h5")]
+    text = refused([*command, "--mass", stiffness, "--stiffness", mass], tmp_path, capfd)
+    assert "seem exchanged" in text and "exchange --mass and --stiffness" in text
+    assert main([*command, "--mass", mass, "--stiffness", stiffness]) == 0
+
+
+@pytest.mark.parametrize("labelled", [True, False])
+def test_mass_and_stiffness_of_two_models(labelled: bool, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """As many dofs, other elements; one of fewer dofs is refused by its size."""
+    bars = [hexahedra.bar(cells, (0.06, 0.02, 0.01)) for cells in ((3, 2, 1), (2, 3, 1), (3, 1, 1))]
+    n = len(bars[0].nodes)
+    labels = np.column_stack([np.repeat(np.arange(1, n + 1), 3), np.tile([1, 2, 3], n)])
+    write = write_calculix if labelled else write_npz
+    parts = [write(tmp_path, A, letter, labels) for A, letter in ((bars[1].M, "M"), (bars[0].K, "K"))]
+    command = ["import", str(tmp_path / "m.h5"), "--stiffness", parts[1], "--mass"]
+    assert "are of two models" in refused([*command, parts[0]], tmp_path, capfd)
+    (tmp_path / "small").mkdir()
+    small = write_npz(tmp_path / "small", sp.csr_matrix(bars[2].M), "M", labels)
+    assert "differ in size" in refused([*command, small], tmp_path, capfd)
