@@ -86,6 +86,17 @@ def chain(tmp_path_factory) -> Path:
     return base / "run"
 
 
+def test_a_static_state_has_its_page(tmp_path: Path) -> None:
+    """Its table has names of contacts, as that of linear modes has: it is not one."""
+    case = write_case(tmp_path)
+    with case.open("a", encoding="utf-8") as file:
+        file.write('\n[[analysis]]\nname = "rest"\ntype = "static"\n')
+    assert call("run", case, "--only", "rest", "--no-plots", "-q", "--out", tmp_path / "run") == 0
+    found = page_of(tmp_path / "run")
+    assert not found.wrong and not found.open
+    assert "largest normal force" in found.text
+
+
 def test_every_tag_closes_and_nothing_comes_from_elsewhere(run: Path, chain: Path) -> None:
     for folder in (run, chain):
         found = page_of(folder)
