@@ -166,18 +166,28 @@ def _add_import(commands: _SubParsers) -> None:
     add.add_argument("--plugin", type=Path, action="append", default=[], metavar="FILE.py", help="a reader of your own")
     add.add_argument("--symmetric", choices=("auto", "lower", "upper", "full"), default="auto", help="what files hold")
     add.add_argument("--dofs", type=Path, metavar="FILE", help="node and direction of each row (.dof, or CSV)")
-    add.add_argument("--coordinates", type=Path, metavar="FILE", help="nodes, sets and cells: CSV, .npz or input deck")
+    add.add_argument(
+        "--coordinates", type=Path, metavar="FILE", help="nodes, sets, elements, surfaces: CSV, .npz or input deck"
+    )
     add.add_argument(
         "--pairs",
         nargs="+",
         action="append",
         default=[],
         metavar="[NAME=]SET",
-        help="contact: two sets of coincident nodes, SET GROUND, or one CSV of node_a,node_b,nx,ny,nz,area",
+        help="contact: two node sets or surfaces (where meshes differ, nodes of the first on faces of the second), "
+        "SET GROUND, or one CSV of node_a,node_b,nx,ny,nz,area",
     )
-    add.add_argument("--normal", metavar="X,Y,Z", help="from the first set to the second")
+    add.add_argument(
+        "--normal", metavar="X,Y,Z", help="from the first set to the second (default: out of the first one's faces)"
+    )
     add.add_argument("--tangent", metavar="X,Y,Z", help="first tangent (default: the axis most across the normals)")
-    add.add_argument("--tolerance", type=float, metavar="LENGTH", help="largest distance of two nodes of a pair")
+    add.add_argument(
+        "--tolerance",
+        type=float,
+        metavar="LENGTH",
+        help="largest distance of two nodes of a pair, or of a node and a face (default: 1e-6 of the mesh's diagonal)",
+    )
     add.add_argument("--name", action="append", default=[], metavar="NAME=DOF", help="name a dof: tip=n17y; it is kept")
     add.add_argument("--units", metavar="SYSTEM", help=f"unit system of all numbers: {', '.join(SYSTEMS)}")
     add.add_argument("--modes", type=int, default=6, metavar="N", help="frequencies to report (default 6)")

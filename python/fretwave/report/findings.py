@@ -130,9 +130,8 @@ def _branches(analysis: Analysis) -> Iterator[Indices]:
 def _of_branch(analysis: Analysis, rows: Indices) -> Iterator[tuple[int, str]]:
     """Rows of one branch that a reader asks for."""
     columns = analysis.columns
-    if (
-        "contact" in analysis.words and "mode" in columns
-    ):  # linear modes: those of the first limit have beside them what they become
+    # Linear modes: those of the first limit have beside them what they become.
+    if "contact" in analysis.words and "mode" in columns:
         own = rows[analysis["contact"][rows] == analysis["contact"][0]]
         yield from ((int(row), f"{analysis['contact'][row]}, mode {columns['mode'][row]:.0f}") for row in own)
         return
