@@ -28,14 +28,15 @@ Array = npt.NDArray[np.float64]
 
 
 def read(path: Path) -> Table:
+    """Columns by name, without the units that a case not in SI writes beside."""
     with path.open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
-    return {name: [row[name] for row in rows] for name in (rows[0] if rows else {})}
+    return {name.partition(" [")[0]: [row[name] for row in rows] for name in (rows[0] if rows else {})}
 
 
 def run(case: str, ranks: int, out: Path, full: bool) -> int:
-    command = ["mpirun", "-n", str(ranks)] if ranks > 1 else []
-    command += [str(ROOT / ".venv/bin/fretwave"), "run", str(ROOT / "cases" / case / "case.toml"), "--out", str(out)]
+    """By cases/run, which makes the model of a case that begins with a deck."""
+    command = [str(ROOT / "cases/run"), case, "-n", str(ranks), "--out", str(out)]
     done = subprocess.run([*command, "--no-plots", *([] if full else ["--quick"])], capture_output=True, text=True)
     if done.returncode:
         print(done.stderr[-2000:])
