@@ -171,6 +171,28 @@ def test_a_surface_names_faces(tmp_path: Path) -> None:
         side_of(nodes, "TOPP")
 
 
+def test_sides_of_shells(tmp_path: Path) -> None:
+    """S3 and S4 in one surface: SPOS is along the elements' own normal, SNEG against it, a node set as SPOS."""
+    corners = "1, 0, 0, 0\n2, 1, 0, 0\n3, 1, 2, 0\n4, 0, 2, 0\n5, 2, 0, 0\n"
+    text = f"*NODE\n{corners}*ELEMENT, TYPE=S4R, ELSET=ALL\n1, 1, 2, 3, 4\n*ELEMENT, TYPE=S3, ELSET=ALL\n2, 2, 5, 3\n"
+    text += "*SURFACE, NAME=OVER\nALL, SPOS\n*SURFACE, NAME=UNDER\nALL, SNEG\n*NSET, NSET=NODES, GENERATE\n1, 5\n"
+    (tmp_path / "deck.inp").write_text(text)
+    nodes = read_nodes(tmp_path / "deck.inp")
+    for name, up in (("OVER", 1.0), ("UNDER", -1.0), ("NODES", 1.0)):
+        side = side_of(nodes, name)
+        np.testing.assert_allclose(side.areas, [1 / 2, 1 / 2 + 1 / 3, 1 / 2 + 1 / 3, 1 / 2, 1 / 3], rtol=ROUNDING)
+        np.testing.assert_allclose(side.normals, np.broadcast_to([0, 0, up], (5, 3)), atol=LAST_BIT)
+
+
+def test_pairs_keep_the_order_of_an_npz(tmp_path: Path) -> None:
+    """As parameters given pair by pair have it."""
+    np.savez(tmp_path / "n.npz", coordinates=np.eye(3), nodes=[7, 3, 5], wall=[5, 7, 3])
+    nodes = read_nodes(tmp_path / "n.npz")
+    labels = np.column_stack([np.repeat([3, 5, 7], 3), np.tile([1, 2, 3], 3)])
+    wall = match("wall", nodes, "wall", "ground", np.array([1.0, 1, 1]), labels)
+    assert wall.nodes[:, 0].tolist() == [5, 7, 3] and wall.points.tolist() == np.eye(3)[[2, 0, 1]].tolist()
+
+
 def test_curved_faces(tmp_path: Path) -> None:
     """Two meshes of a cylinder's quarter: normals along the radius, the area within the chords' error."""
     below, above = Box("C3D20", (2, 6, 1), (0, 0, 0.8), (1, 1, 1)), Box("C3D20", (2, 5, 1), (0, 0, 1), (1, 1, 1.2))

@@ -87,7 +87,8 @@ def side_of(nodes: Nodes, name: str) -> Side:
         numbers = _node_set(nodes, name)
         tables = nodes.elements.free_faces(numbers)
     covered = np.isin(numbers, np.concatenate([table.ravel() for table in tables])) if tables else np.array(False)
-    places = [np.searchsorted(numbers, table) for table in tables] if covered.all() else []
+    order = np.argsort(numbers)
+    places = [order[np.searchsorted(numbers, table, sorter=order)] for table in tables] if covered.all() else []
     return Side(where, numbers, nodes.coordinates[nodes.places(numbers)], places)
 
 
@@ -96,7 +97,7 @@ def _node_set(nodes: Nodes, name: str) -> IntArray:
         known = sorted({*nodes.sets, *nodes.elements.surfaces})
         fix = nearest(name.upper(), known) or "check the name"
         raise InputError(f"there is no set or surface '{name}'", nodes.where, None, f"one of {', '.join(known)}", fix)
-    return np.unique(nodes.node_set(name))
+    return nodes.node_set(name)
 
 
 def nodal_areas(x: Array) -> Array:

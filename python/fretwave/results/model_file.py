@@ -306,7 +306,7 @@ def _read_parts(file: h5py.File) -> tuple[Structure, dict[str, Table]]:
         node_numbers=tables["nodes/number"],
         coordinates=tables["nodes/coordinates"],
         hexahedra=tables["cells/hexahedra"],
-        cells={kind: file["cells"][kind][()] for kind in file.get("cells", {}) if kind in KINDS},
+        cells={kind: file["cells"][kind][()].astype("i8") for kind in file.get("cells", {}) if kind in KINDS},
         units=_units_of(file),
     )
     return structure, tables
