@@ -216,6 +216,20 @@ bool orthonormalise(Mat M, std::vector<VecHandle> const& found, bool travelling,
   return true;
 }
 
+/// The lowest pairs of a pencil that may have rigid motions next to its shift, just below zero. Their inverse
+/// is so large there that its rounding spoils the shapes far above them; from as far below zero as the first
+/// elastic one lies above, it is not.
+std::vector<EigenPair> lowest_beside_rigid(Pencil pencil, PetscInt count) {
+  constexpr double far = 100;
+  auto found = lowest_pairs(pencil, count);
+  const double reach = std::abs(pencil.shift);
+  const auto elastic =
+      std::find_if(found.begin(), found.end(), [&](auto const& pair) { return pair.value > far * reach; });
+  if (found.empty() || std::abs(found.front().value) > reach || elastic == found.end()) return found;
+  pencil.shift = -elastic->value;
+  return lowest_pairs(pencil, count);
+}
+
 /// (K + B^H kt B) phi = w^2 M phi, with B phi = 0 where the stuck contact is rigid.
 std::vector<LinearMode> undamped(Model const& model, int count, bool stuck, std::optional<double> near) {
   const bool travelling = model.travelling();
@@ -244,7 +258,8 @@ std::vector<LinearMode> undamped(Model const& model, int count, bool stuck, std:
                          .constraints = rows_of(G),
                          .shift = near ? (1 - 1e-9) * *near * *near : -1e-8 * scale,
                          .rounding = rounding(K, M)};
-  const auto pairs = near ? nearest_pairs(pencil, copies * wanted) : lowest_pairs(pencil, copies * wanted);
+  const auto pairs =
+      near ? nearest_pairs(pencil, copies * wanted) : lowest_beside_rigid(pencil, copies * wanted);
   std::vector<LinearMode> modes;
   std::vector<VecHandle> found;
   for (auto const& [value, vector] : pairs) {

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import scipy.linalg
 import scipy.sparse as sp
 from models.core_models import LinearLaw, chain, friction, oscillator, single_dof
+from models.hexahedra import bar
 from petsc4py import PETSc
 from tolerances import LAST_BIT, ROUNDING, SOLVED, TIGHT
 
@@ -104,6 +106,17 @@ def test_rigid_body_mode_has_no_frequency(comm):
     assert modes[0].omega < 1e-5
     assert np.abs(modes[0].shape) == pytest.approx(np.full(n, 1 / np.sqrt(n)), rel=SOLVED)
     assert [m.omega for m in modes[1:]] == pytest.approx(20 * np.sin(np.pi * np.array([1, 2]) / (2 * n)), rel=1e-11)
+
+
+def test_modes_above_rigid_motions_are_those_of_a_dense_solver(comm):
+    """A free bar beside heavy oscillators (component modes of a reduced model): the shift is next to zero."""
+    body = bar((8, 2, 1), (0.16, 0.02, 0.004))
+    parts = [1e-4 * body.K.toarray(), np.diag(1e9 * np.arange(1.0, 9.0))], [1e-4 * body.M.toarray(), np.eye(8)]
+    K, M = (scipy.linalg.block_diag((A + A.T) / 2, B) for A, B in parts)
+    found = [mode.omega for mode in fw.linear_modes(fw.Model(M, K, comm=comm), 10, "free")]
+    exact = np.sqrt(scipy.linalg.eigh(K, M, eigvals_only=True, subset_by_index=[6, 9]))
+    np.testing.assert_allclose(found[6:], exact, rtol=SOLVED)
+    assert max(found[:6]) < 1e-5 * exact[0]
 
 
 def test_double_mode_is_found_twice(comm):
