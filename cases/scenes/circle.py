@@ -23,6 +23,7 @@ SMOOTH = 1e-12  #: last Legendre coefficient of the angle in a panel that is sho
 LEFT = 1e-7  #: of a period before lift-off, where R phi' = u' . e_phi is singular and the force as good as gone
 AT_ONCE = 1e-9  #: R over the speed of u, time in which a drag takes its direction, below which it does so at once
 MOST = 4000  #: panels of a drag
+INSTANT = 1e-13  #: of time, before a lift-off that rounding lets come a little late
 CLOSED = 1e-13  #: of R: an arm that comes back this near to its start has closed its period
 
 
@@ -158,7 +159,7 @@ class Slider:
         slips = size >= R * (1 - 1e-13) and d @ v[:2] > v[2] * size
         if slips:
             d = d * (R / size)
-        while tau < end:
+        while end - tau > INSTANT:
             if slips:
                 e = d / np.hypot(*d)
                 turn = np.array([-e[1], e[0]]) @ D / self.at(tau)[2]
@@ -180,7 +181,7 @@ class Slider:
             turn = (n @ a[:2]) / (speed + r)
             by = (n @ late[:2] - varied[2] * turn) / speed
             tau, d, D = self.slip(begin, np.arctan2(e[1], e[0]), by, end)
-        if tau < end:
+        if end - tau > INSTANT:
             self.march(tau, d, D, end)
 
     def slopes(self, tau):

@@ -15,6 +15,7 @@ constexpr double sparse = 1.0 / 32;   // of a step: corners farther than that ap
 constexpr double before_end = 0.999;  // of the way to the end of a piece
 constexpr double kink_angle = 0.02;   // [rad] in so short a step
 constexpr double seen_angle = 0.05;   // [rad] in a longer one: it may hide a corner
+constexpr int walk = 8;               // steps to a place where the branch seems to have been
 constexpr int certain = 3;            // meetings with earlier points of the branch in a row
 constexpr double grid = 16;           // lengths of steps in every factor of two
 constexpr double at_the_end = 1e-9;   // relative: a branch that starts here starts at the end of its range
@@ -110,7 +111,7 @@ std::optional<Point> Continuation::start(Vec y0, bool upwards) {
   began_ = parameter_of(trial.y);
   open_the_range();
   prepare_row();
-  (void)trail_.add(anchor_.y, anchor_.tangent);
+  trail_.add(anchor_.y, anchor_.tangent);
   return point(std::move(trial), "start", 0);
 }
 
@@ -120,7 +121,7 @@ std::optional<Point> Continuation::restore(Anchor anchor, Anchor before, int emi
   upwards_ = upwards, began_ = began;
   open_the_range();
   prepare_row();
-  (void)trail_.add(anchor_.y, anchor_.tangent);
+  trail_.add(anchor_.y, anchor_.tangent);
   if (emitted == 0) return {};
   make_batch();
   emitted_ = std::min(emitted, int(batch_.size()));
@@ -144,7 +145,7 @@ std::optional<Point> Continuation::take_over(Anchor from, std::string const& eve
   signs_.clear();
   for (auto const& test : anchor_tests_)  // what was met is not met again
     signs_.push_back(event.find(test.name) == std::string::npos ? test_sign(test.value) : 0);
-  (void)trail_.add(anchor_.y, anchor_.tangent);
+  trail_.add(anchor_.y, anchor_.tangent);
   return point(std::move(trial), event, 0);
 }
 
@@ -207,7 +208,9 @@ std::string Continuation::complaint(Trial& trial, double length, bool may_shorte
   if (may_shorten && (trial.error = interpolation_error(trial, length)) > steps_.max_error)
     return "the branch bends more than a step resolves";
   if (may_shorten)
-    return angle > seen_angle && leads_back(trial) ? "the corrector lands on another branch" : "";
+    return (angle > seen_angle && leads_back(trial)) || fell_back(trial)
+               ? "the corrector lands on another branch"
+               : "";
   if (angle < kink_angle) return "";
   const int sign = orientation(trial.y, trial.tangent);
   if (sign == 0) return angle > steps_.max_angle ? "the branch turns too sharply" : "";
@@ -301,7 +304,8 @@ double Continuation::next_step(Trial const& trial, double length, double intende
 /// Whether the branch passes places again where it has been; it ends then. Each suspicion is confirmed by
 /// Newton on the plane through such a place, and three in a row are certainty: sheets may lie side by side.
 bool Continuation::been_here(Trial const& trial) {
-  const auto meeting = trail_.add(trial.y, trial.tangent);
+  const auto meeting = trail_.meeting(trial.y, trial.tangent);
+  trail_.add(trial.y, trial.tangent);
   if (!meeting || !passes(trial, *meeting)) {
     meetings_ = 0;
     return false;
@@ -314,14 +318,29 @@ bool Continuation::been_here(Trial const& trial) {
   return true;
 }
 
+/// Whether a trial lies on an older piece of the branch, passed the other way: sheets that lie side by side
+/// behind a fold are nearer to each other than a step is long.
+bool Continuation::fell_back(Trial const& trial) {
+  const auto meeting = trail_.meeting(trial.y, trial.tangent);
+  return meeting && !meeting->forwards && passes(trial, *meeting);
+}
+
+/// Walks from the trial to the remembered place along the branch, in steps short enough not to fall onto a sheet
+/// beside it.
 bool Continuation::passes(Trial const& trial, Trail::Meeting const& meeting) {
-  Trial there = at(moved(trial.y, meeting.along, trial.tangent));
-  const VecHandle expected = copy(there.y);
   VecHandle row = like(trial.y);
   Trail::fill(row, meeting.functional);
-  if (!correct(there, row, meeting.place[meeting.functional], row_)) return false;
-  const double off = weighted_norm(weights_, moved(there.y, -1, expected));
-  return off <= 0.1 * std::abs(meeting.along) + 1e-8 && Trail::same(there.y, meeting.place);
+  const double length = meeting.along / walk;
+  Trial there = at(copy(trial.y));
+  there.tangent = copy(trial.tangent);
+  for (int k = 1; k <= walk; ++k) {
+    const VecHandle expected = moved(there.y, length, there.tangent);
+    const double value = meeting.place[meeting.functional] - (walk - k) * length * dot(row, trial.tangent);
+    there.y = copy(expected);
+    if (!correct(there, row, value, row_)) return false;
+    if (!(weighted_norm(weights_, moved(there.y, -1, expected)) <= 0.1 * std::abs(length) + 1e-8)) return false;
+  }
+  return Trail::same(there.y, meeting.place);
 }
 
 /// The branch has left its range at this end.

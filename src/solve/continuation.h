@@ -106,6 +106,7 @@ class Continuation {
   void make_batch();
   void arrive(double reached);
   bool been_here(Trial const&);
+  bool fell_back(Trial const&);
   bool passes(Trial const&, Trail::Meeting const&);
 
   // Corners of the branch (corner.cpp)

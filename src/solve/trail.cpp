@@ -11,7 +11,7 @@ namespace {
 constexpr size_t recent = 3;         // steps just made are near by nature
 constexpr double parallel = 0.98;    // cosine between directions of the same piece of a branch
 constexpr double nearness = 0.1;     // of a step's length: the chord's distance from a bent branch
-constexpr double same_place = 1e-6;  // relative
+constexpr double same_place = 1e-9;  // relative
 
 /// Uniform in (-1, 1) by the entry's global number and the functional's.
 double weight(PetscInt entry, int functional) {
@@ -60,10 +60,9 @@ bool Trail::same(Vec y, Projection const& place) {
   return length(minus(project(y), place)) <= same_place * (1 + length(place));
 }
 
-std::optional<Trail::Meeting> Trail::add(Vec y, Vec tangent) {
+std::optional<Trail::Meeting> Trail::meeting(Vec y, Vec tangent) const {
   const Step now{project(y), project(tangent)};
-  std::optional<Meeting> found;
-  for (size_t i = 0; i + 1 + recent < steps_.size() && !found; ++i) {
+  for (size_t i = 0; i + 1 + recent < steps_.size(); ++i) {
     Projection const &a = steps_[i].y, chord = minus(steps_[i + 1].y, a);
     const double square = inner(chord, chord);
     if (!(square > 0)) continue;
@@ -77,10 +76,9 @@ std::optional<Trail::Meeting> Trail::add(Vec y, Vec tangent) {
     int best = 0;
     for (int k = 1; k < count; ++k)
       if (std::abs(now.t[k]) > std::abs(now.t[best])) best = k;
-    found = {a, best, -offset[best] / now.t[best], cosine > 0};
+    return Meeting{a, best, -offset[best] / now.t[best], cosine > 0};
   }
-  steps_.push_back(now);
-  return found;
+  return {};
 }
 
 }  // namespace fretwave::solve

@@ -21,8 +21,10 @@ class Trail {
     bool forwards;   ///< passed in the same direction
   };
 
-  /// Adds a point with its unit tangent; returns a meeting with an earlier part of the branch. Collective.
-  std::optional<Meeting> add(Vec y, Vec tangent);
+  /// Adds a point with its unit tangent. Collective.
+  void add(Vec y, Vec tangent) { steps_.push_back({project(y), project(tangent)}); }
+  /// A meeting with an earlier part of the branch, at a point with its unit tangent. Collective.
+  std::optional<Meeting> meeting(Vec y, Vec tangent) const;
   /// Whether y is the remembered place. Collective.
   static bool same(Vec y, Projection const& place);
   static Projection project(Vec v);
