@@ -11,10 +11,10 @@ import numpy as np
 import numpy.typing as npt
 from petsc4py import PETSc
 
+from .. import _core
 from ..arrays import Array, Complex
 from ..errors import InputError, NotConverged
 from ..model.reduction import Reduction
-from ..mpi.gather import on_all_ranks
 from .problems import NonlinearMode
 
 if TYPE_CHECKING:
@@ -112,23 +112,28 @@ def _square(comm: MPI.Comm, v: Complex) -> float:
 
 
 def _reduced_step(problem: NonlinearMode, y: PETSc.Vec, rows: Array) -> dict[str, float]:
-    """Change of the state by J_r dy = -rows, at the same amplitude."""
+    """Change of the state by J_r dy = -rows, at the same amplitude. Collective."""
     before = problem.state(y)
-    J = problem.jacobian(y)
-    begin, end = J.getOwnershipRange()
-    local = np.zeros((end - begin, J.getSize()[1]))
-    for row in range(begin, end):
-        columns, values = J.getRow(row)
-        local[row - begin, columns] = values
-    whole = on_all_ranks(problem.model.comm, local)
-    J.destroy()
-    right = np.zeros(len(whole))
-    right[: rows.size] = rows.ravel() / (problem.core.stiffness_scale * before["amplitude"])
-    dy = np.append(-np.linalg.solve(whole[:, :-1], right), 0.0)
-    moved = y.duplicate()
-    moved.setArray(y.getArray(readonly=True) + dy[slice(*y.getOwnershipRange())])
-    after = problem.state(moved)
-    moved.destroy()
+    newton = _core.Newton(problem.core, problem.prefix, past_kinks=False)
+    row, right, change = y.duplicate(), y.duplicate(), y.duplicate()
+    begin, end = y.getOwnershipRange()
+    for vector in (row, right, change):
+        vector.set(0.0)
+    if end == y.getSize():
+        row.setValue(end - 1, 1.0)  # the amplitude
+    row.assemble()
+    last = min(end, rows.size)
+    if begin < last:
+        scale = problem.core.stiffness_scale * before["amplitude"]
+        right.setValues(np.arange(begin, last, dtype=PETSc.IntType), -rows.ravel()[begin:last] / scale)
+    right.assemble()
+    newton.system.close(row, 0.0)
+    if not newton.linear(y, right, change):
+        raise NotConverged("the linear system of the reduction's error is not solved")
+    change.axpy(1.0, y)
+    after = problem.state(change)
+    for vector in (row, right, change):
+        vector.destroy()
     return {key: after[key] - before[key] for key in ("omega", "beta", "zeta")}
 
 

@@ -23,12 +23,16 @@ def on_all_ranks(comm: MPI.Comm, local: PETSc.Vec | AnyArray, axis: int = 0) -> 
     axis : int
         Along which an array is cut.
     """
-    return np.concatenate(comm.allgather(_part(local)), axis=axis)
+    part = _part(local)  # alone it is the whole: a message has 2 GB at most
+    return part if comm.size == 1 else np.concatenate(comm.allgather(part), axis=axis)
 
 
 def on_rank_0(comm: MPI.Comm, local: PETSc.Vec | AnyArray) -> AnyArray | None:
     """The parts of all ranks in their order, on rank 0; None on the others. Collective."""
-    parts = comm.gather(_part(local))
+    part = _part(local)
+    if comm.size == 1:
+        return part
+    parts = comm.gather(part)
     return None if parts is None else np.concatenate(parts)
 
 
