@@ -77,12 +77,12 @@ void bind_solve(nb::module_& m) {
            [](Continuation& c, Petsc<Vec> y, bool upwards) { return to_python(c.start(y.object, upwards)); })
       .def("restore",
            [](Continuation& c, std::vector<Petsc<Vec>> const& at, std::vector<Petsc<Vec>> const& before,
-              double step, int index, bool wary, int emitted, bool upwards, double began) {
+              double step, int index, bool wary, bool smooth, int emitted, bool upwards, double began) {
              const auto anchor = [&](std::vector<Petsc<Vec>> const& pair) {
                Continuation::Anchor a;
                if (pair.empty()) return a;
                a.y = copy(pair[0].object), a.tangent = copy(pair[1].object);
-               a.step = step, a.index = index, a.wary = wary;
+               a.step = step, a.index = index, a.wary = wary, a.smooth = smooth;
                return a;
              };
              return to_python(c.restore(anchor(at), anchor(before), emitted, upwards, began));
@@ -107,7 +107,8 @@ void bind_solve(nb::module_& m) {
         nb::dict out;
         out["y"] = Petsc<Vec>{a.y}, out["tangent"] = Petsc<Vec>{a.tangent};
         if (b.y) out["before_y"] = Petsc<Vec>{b.y}, out["before_tangent"] = Petsc<Vec>{b.tangent};
-        out["step"] = a.step, out["index"] = a.index, out["wary"] = a.wary, out["emitted"] = c.emitted();
+        out["step"] = a.step, out["index"] = a.index, out["wary"] = a.wary, out["smooth"] = a.smooth,
+        out["emitted"] = c.emitted();
         out["next_step"] = c.next_step(), out["upwards"] = c.upwards(), out["began"] = c.began();
         return out;
       });

@@ -9,6 +9,7 @@ namespace {
 
 // A turn that is left in so short a step is a kink (a sample changes state), not curvature.
 constexpr double kink_length = 1e-4;
+constexpr double nearer = 0.5;        // distance of the cubic's guess over the tangent's, for it to be taken
 constexpr int crawl = 300;            // steps below the smallest in a row, over pieces that thin
 constexpr double often = 0.3;         // of a step: a shorter one has failed twice
 constexpr double sparse = 1.0 / 32;   // of a step: corners farther than that apart are walked to one by one
@@ -240,6 +241,26 @@ std::optional<Continuation::Trial> Continuation::turned(std::optional<Trial> beh
   return behind;
 }
 
+/// By the cubic through the last two points, on the plane at this length.
+VecHandle Continuation::by_cubic(double length) {
+  const double last = weighted_norm(weights_, moved(anchor_.y, -1, before_.y));
+  VecHandle y = Hermite(before_.y, before_.tangent, anchor_.y, anchor_.tangent, last).value(last + length);
+  check(VecAXPY(y, row_value_ + length - dot(row_, y), anchor_.tangent));
+  return y;
+}
+
+/// The next point's guess: by the tangent, or by the cubic where that has foretold the anchor better.
+VecHandle Continuation::predicted(double length) {
+  return anchor_.smooth ? by_cubic(length) : moved(anchor_.y, length, anchor_.tangent);
+}
+
+/// Whether the cubic foretells a point better than the tangent does, by far.
+bool Continuation::foretold(Vec y, double length) {
+  if (turned_ || !before_.y) return false;
+  const auto off = [&](VecHandle guess) { return weighted_norm(weights_, moved(y, -1, guess)); };
+  return off(by_cubic(length)) < nearer * off(moved(anchor_.y, length, anchor_.tangent));
+}
+
 /// A trial at `length` from the anchor, or why there is none. Where corners lie about, pieces are walked one
 /// by one; else a corner is looked for where no shorter step leads on.
 std::optional<Continuation::Trial> Continuation::attempt(double& length, bool wary, Failure& failure) {
@@ -247,7 +268,7 @@ std::optional<Continuation::Trial> Continuation::attempt(double& length, bool wa
   turned_ = false;
   if (wary)
     if (auto behind = turn_next_corner(length)) return behind;
-  Trial trial = at(moved(anchor_.y, length, anchor_.tangent));
+  Trial trial = at(predicted(length));
   const bool shortened = length < often * anchor_.step;
   const Effort effort = may_shorten && !shortened && newton_.dear() ? Effort::brief
                         : wary && may_shorten                       ? Effort::plain
@@ -325,8 +346,8 @@ bool Continuation::fell_back(Trial const& trial) {
   return meeting && !meeting->forwards && passes(trial, *meeting);
 }
 
-/// Walks from the trial to the remembered place along the branch, in steps short enough not to fall onto a sheet
-/// beside it.
+/// Walks from the trial to the remembered place along the branch, in steps short enough not to fall onto a
+/// sheet beside it.
 bool Continuation::passes(Trial const& trial, Trail::Meeting const& meeting) {
   VecHandle row = like(trial.y);
   Trail::fill(row, meeting.functional);
@@ -338,7 +359,8 @@ bool Continuation::passes(Trial const& trial, Trail::Meeting const& meeting) {
     const double value = meeting.place[meeting.functional] - (walk - k) * length * dot(row, trial.tangent);
     there.y = copy(expected);
     if (!correct(there, row, value, row_)) return false;
-    if (!(weighted_norm(weights_, moved(there.y, -1, expected)) <= 0.1 * std::abs(length) + 1e-8)) return false;
+    if (!(weighted_norm(weights_, moved(there.y, -1, expected)) <= 0.1 * std::abs(length) + 1e-8))
+      return false;
   }
   return Trail::same(there.y, meeting.place);
 }
@@ -372,7 +394,12 @@ void Continuation::make_batch() {
   else
     locate_events(*end, length);
   ending_ = problem_.beyond(end->y);
-  after_ = {.y = copy(end->y), .tangent = copy(end->tangent), .step = next_length, .index = 0, .wary = wary_};
+  after_ = {.y = copy(end->y),
+            .tangent = copy(end->tangent),
+            .step = next_length,
+            .index = 0,
+            .wary = wary_,
+            .smooth = foretold(end->y, length)};
   const double reached = last_entry(end->y);
   const bool outside =
       reached <= problem_.parameter_entry(low_) || reached >= problem_.parameter_entry(high_);

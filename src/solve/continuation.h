@@ -36,7 +36,8 @@ class Continuation {
     VecHandle y, tangent;
     double step = 0;
     int index = 0;
-    bool wary = false;  ///< corners lie about: pieces are walked one by one
+    bool wary = false;    ///< corners lie about: pieces are walked one by one
+    bool smooth = false;  ///< the cubic through the points before foretold it
   };
 
   Continuation(Problem&, std::string const& prefix, double low, double high, StepControl,
@@ -98,6 +99,9 @@ class Continuation {
   std::string complaint(Trial&, double length, bool may_shorten);
   std::optional<Trial> turn_next_corner(double& length);
   std::optional<Trial> turned(std::optional<Trial> behind, double& length);
+  VecHandle by_cubic(double length);
+  VecHandle predicted(double length);
+  bool foretold(Vec y, double length);
   std::optional<Trial> attempt(double& length, bool wary, Failure&);
   double next_step(Trial const&, double length, double intended);
   std::optional<Trial> step(double& length, double& next_length);

@@ -69,9 +69,10 @@ bool Newton::creeps(int iteration, double residual) {
 }
 
 /// Whether what a residual below its tolerance leaves shows in what is read from the point (the damping at
-/// first slip is as small as that), and another step can take it away.
+/// first slip is as small as that), and another step can take it away. What is left of the residual lies in
+/// other equations than what the step took, and may count for more.
 bool Newton::matters(Vec y, double residual, double before) {
-  return last_effect(y) * std::min(1.0, residual / before) > small_effect &&
+  return last_effect(y) * std::sqrt(std::min(1.0, residual / before)) > small_effect &&
          residual > bordered_.problem().rounding(y);
 }
 

@@ -244,10 +244,11 @@ class Continuation:
         found = [name for name in _VECTORS if name in snapshot]
         vectors = {name: self._scatter(self.problem, np.asarray(snapshot[name])) for name in found}
         before = [vectors[name] for name in _VECTORS[2:] if name in vectors]
-        began, wary = float(snapshot.get("began", np.nan)), bool(snapshot.get("wary", False))
+        began = float(snapshot.get("began", np.nan))
+        wary, smooth = bool(snapshot.get("wary", False)), bool(snapshot.get("smooth", False))
         step, index, emitted = float(snapshot["step"]), int(snapshot["index"]), int(snapshot["emitted"])
         now = [vectors["y"], vectors["tangent"]]
-        point = self._core.restore(now, before, step, index, wary, emitted, self._upwards, began)
+        point = self._core.restore(now, before, step, index, wary, smooth, emitted, self._upwards, began)
         self.repeated = None if point is None else Point(**point)
         anchor = self._core.anchor()
         self.resumed_at = (point["y"], point["tangent"]) if point is not None else (anchor["y"], anchor["tangent"])
