@@ -15,7 +15,7 @@ import numpy.typing as npt
 import scipy.sparse as sp
 from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
-from fretwave import InputError, Pairs, Structure, fe
+from fretwave import InputError, Pairs, Structure, fe, on_pair_coordinates
 from fretwave.fe import cached, default_folder, model_key
 
 Array = npt.NDArray[np.float64]
@@ -100,7 +100,7 @@ def build(**options: Any) -> Structure:
         faces=b["flank_names"][b["flank"]].tolist(),
         positions=b["flank_positions"],
     )
-    return Structure(
+    structure = Structure(
         M=b["M"],
         K=b["K"],
         dofs={"tip": b["observation_dof"]},
@@ -109,6 +109,7 @@ def build(**options: Any) -> Structure:
         coordinates=b["coordinates"],
         hexahedra=b["hexahedra"],
     )
+    return on_pair_coordinates(structure) if options.get("average") else structure
 
 
 def blade(cache: Union[Path, str, None] = "default", **options: Any) -> dict[str, Any]:

@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from .model.laws import LawInfo, Limit, ParameterInfo, PythonLaw, Role, laws, register_law
     from .model.model import Model
     from .model.modes import LinearMode, linear_modes
+    from .model.pair_coordinates import on_pair_coordinates
     from .model.pairs import Pairs
     from .model.reduction import FrequencyError, Reduction, reduce
     from .model.rest import Rest
@@ -73,6 +74,7 @@ _HOMES = {
     "results.reader": ("Run", "open_run"),
     "results.results": ("has_results", "open_results"),
     "cyclic.aerodynamics": ("Aerodynamics",),
+    "model.pair_coordinates": ("on_pair_coordinates",),
     "model.pairs": ("Pairs",),
     "model.sectors": ("by_sector", "rotation"),
     "model.structure": ("Structure",),
@@ -166,6 +168,7 @@ __all__ = [
     "match_faces",
     "most_alike",
     "nonlinear_error",
+    "on_pair_coordinates",
     "open_results",
     "open_run",
     "read_model",

@@ -187,6 +187,7 @@ bool LinearSolver::build() {
 void LinearSolver::serve_beside(double tolerance) {
   beside_ = true;
   check(KSPSetTolerances(tangent_, tolerance, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT));
+  check(KSPSetFromOptions(tangent_));
 }
 
 bool LinearSolver::climb() {
