@@ -93,7 +93,15 @@ def test_what_a_file_has_no_place_for_is_not_left_behind(tmp_path: Path) -> None
     was = model_of_a_bar()
     for lost, said in (
         (replace(was, loads={"pull": np.ones(was.n_dof)}), "loads"),
-        (replace(was, sectors=12), "sectors"),
+        (replace(was, sectors=12), "has no faces"),
+        (replace(was, sectors=12, low=np.arange(3), high=np.arange(997, 1000)), "the high face does not fit"),
+        (replace(was, sectors=12, low=np.arange(3), high=np.arange(3, 5)), "the high face does not fit"),
+        (replace(was, sectors=12, low=np.arange(3), high=np.arange(3, 6), axis="r"), "no such axis"),
+        (
+            replace(was, pairs={"far": fw.Pairs({0: np.ones((3, was.n_dof)), 1: np.ones((3, was.n_dof))})}),
+            "there is none",
+        ),
+        (replace(was, pairs={"far": fw.Pairs({0: np.ones((3, was.n_dof)), -1: np.ones((3, was.n_dof))})}), "beyond"),
         (replace(was, pairs={"one": fw.Pairs(np.ones((1, was.n_dof)), 1)}), "'one' of one component"),
     ):
         with pytest.raises(fw.InputError, match=said):
@@ -169,7 +177,7 @@ WRONG = {
     "kept": (put("dofs/kept", np.array([999])), "a kept dof does not exist"),
     "areas": (put("contacts/flank/areas", np.ones(3)), "contacts/flank/areas does not fit"),
     "size": (lambda file: file["C"].attrs.update(shape=[3, 3]), "damaged"),
-    "later version": (lambda file: file.attrs.update(format_version=2), "later version"),
+    "later version": (lambda file: file.attrs.update(format_version=3), "later version"),
     "another format": (lambda file: file.attrs.update(format="other"), "format 'other'"),
 }
 

@@ -169,7 +169,7 @@ def _build(
         contacts=contacts,
         analyses=Analyses({analysis.name: analysis for analysis in analyses.values()}, plugins),
         resolved={
-            **_resolve({**identity, **_faces(structure)}, source, section, contacts, analyses, tables),
+            **_resolve({**identity, **_faces(section, structure)}, source, section, contacts, analyses, tables),
             **{f"plugins.{plugin.name}": plugin.digest for plugin in plugins},
         },
         tables=Tables(reduction, preload, flow, study or StudySection()),
@@ -191,14 +191,14 @@ def _kept(structure: Structure, analyses: Mapping[int, AnalysisSection], blade: 
     return {k: names[k] for k in sorted(named.union(kept_dofs(given, analyses)))}
 
 
-def _faces(structure: Structure) -> dict[str, Any]:
+def _faces(section: ModelSection, structure: Structure) -> dict[str, Any]:
     """What says that the model is a sector, by address."""
     cut = structure.cut
     if cut is None or cut.low is None or cut.high is None:
         return {}
     names = cut.dof_names
     faces = {f"model.{name}": [names[k] for k in face] for name, face in (("low", cut.low), ("high", cut.high))}
-    return {"model.sectors": cut.sectors, **faces}
+    return {"model.sectors": cut.sectors, **faces, **({"model.axis": cut.axis} if section.axis else {})}
 
 
 def _table(kind: type[Table], name: str, source: Source, found: list[FretwaveError]) -> Table | None:

@@ -96,6 +96,11 @@ class ModelSection(Section):
     high: Optional[list[Dof]] = key(
         "dofs of its high face, which move like the low face of the next sector", example='["rim_1"]', default=None
     )
+    axis: Optional[Literal["x", "y", "z"]] = key(
+        "the wheel's axis, about which dofs of the faces along x, y and z turn from sector to sector",
+        example='"z"',
+        default=None,
+    )
     units: Optional[UnitName] = key(
         f"unit system of all numbers of the case and its model: one of {', '.join(SYSTEMS)} (by default that of the "
         f"model, else {SI.name})",

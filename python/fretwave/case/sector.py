@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..arrays import Indices
+from ..cyclic.frames import framed
 from ..errors import FretwaveError, InputError
 from ..model.contact import Contact
 from ..model.structure import Structure
@@ -24,25 +25,39 @@ def tie(
 ) -> tuple[Structure, list[Contact]]:
     """The model with its high face left out, when the case says that it is a sector; what is wrong goes to `found`."""
     number = section.sectors or structure.sectors
+    axis = section.axis or structure.axis
     faces = [_face(name, section, source, structure, found) for name in ("low", "high")]
     if not number:
-        if any(face is not None for face in faces):
-            _wrong(
-                source, "low" if section.low else "high", "without a number of sectors", "add `sectors = ...`", found
-            )
+        if section.axis or any(face is not None for face in faces):
+            key = "low" if section.low else "high" if section.high else "axis"
+            _wrong(source, key, "without a number of sectors", "add `sectors = ...`", found)
         return structure, contacts
-    if any(face is None for face in faces):
+    low, high = faces
+    if low is None or high is None:
         _wrong(source, "sectors", "needs both faces", 'add `low = ["..."]` and `high = ["..."]`', found)
         return structure, contacts
     if structure.M is None or structure.K is None:
         return structure, contacts
     try:
-        tied = replace(structure, sectors=number, low=faces[0], high=faces[1]).tied()
+        if any(getattr(section, key) is not None for key in ("sectors", "low", "high", "axis")):
+            low, high, axis = _framed(section, structure, low, high, number, axis)
+        tied = replace(structure, sectors=number, low=low, high=high, axis=axis).tied()
         return tied, on(contacts, tied)
     except InputError as error:
-        key = "high" if section.high else "sectors" if section.sectors else "builder"
-        found.append(InputError(error.what, source.where(("model", key)), error.measured, error.expected, error.fix))
+        keys = ("high", "sectors", "axis", "file")
+        key = next((key for key in keys if getattr(section, key) is not None), "builder")
+        where = ", ".join(filter(None, (source.where(("model", key)), error.where)))
+        found.append(InputError(error.what, where, error.measured, error.expected, error.fix))
         return structure, contacts
+
+
+def _framed(
+    section: ModelSection, structure: Structure, low: Indices, high: Indices, sectors: int, axis: str | None
+) -> tuple[Indices, Indices, str | None]:
+    """Faces of a case that says something of them; a builder's own that correspond as they are stay so."""
+    if axis is None and section.low is None and section.high is None:
+        return low, high, None
+    return framed(structure, low, high, sectors, axis)
 
 
 def _wrong(source: Source, key: str, what: str, fix: str, found: Found) -> None:

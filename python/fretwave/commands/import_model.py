@@ -18,8 +18,10 @@ from ..importers.entries import Assembled, assemble
 from ..importers.exchanged import check_one_model
 from ..importers.formats import read_matrix, readable, split
 from ..importers.nodes import Material, Nodes, cells_of, read_nodes
-from ..importers.pairs import match, read_pairs
+from ..importers.pairs import NEXT, match, read_pairs
 from ..importers.report import check
+from ..importers.sector import SectorFaces, make_sector, said_of, wheel_of
+from ..importers.surfaces import has_faces
 from ..importers.units import Evidence, check_declared, evidence_of
 from ..model.pairs import Pairs
 from ..model.structure import Structure
@@ -64,6 +66,7 @@ def read_parts(options: argparse.Namespace) -> tuple[Structure, Assembled, list[
     """
     for plugin in options.plugin:
         load_file(plugin)
+    _take_deck(options)
     if options.units is not None and options.units not in SYSTEMS:
         raise unknown(options.units, "--units")
     _check_place(options.out, [options.mass, options.stiffness, options.damping])
@@ -75,6 +78,7 @@ def read_parts(options: argparse.Namespace) -> tuple[Structure, Assembled, list[
     if options.coordinates:
         with readable(options.coordinates, "file of the nodes"):
             nodes = read_nodes(options.coordinates)
+        nodes.coordinates = nodes.coordinates - (0.0 if options.origin is None else _three("--origin", options.origin))
     labels = _labels(options, found, nodes)
     found.labels = labels
     names, dofs = _names(found.names, options.name)
@@ -85,9 +89,30 @@ def read_parts(options: argparse.Namespace) -> tuple[Structure, Assembled, list[
     if nodes is not None:
         model.node_numbers, model.coordinates = nodes.numbers, nodes.coordinates
         model.hexahedra, model.cells = cells_of(nodes)
-    model.pairs = dict(_pairs(options, labels, nodes, found.notes))
+    wheel = wheel_of(options)
+    if wheel is not None:
+        make_sector(model, wheel, nodes, options.tolerance)
+        found.notes.append(said_of(wheel, model))
+    model.pairs = dict(_pairs(options, labels, nodes, wheel, found.notes))
     check_directions(model)
     return model, found, [] if nodes is None else nodes.materials
+
+
+def _take_deck(options: argparse.Namespace) -> None:
+    """``import sector.inp``: CalculiX' matrices beside the deck, which has the nodes; the file takes its name."""
+    deck = options.out
+    if deck.suffix.lower() == ".inp":
+        options.out = deck.with_suffix(".h5")
+        options.coordinates = options.coordinates or deck
+        for role, suffix in (("mass", ".mas"), ("stiffness", ".sti")):
+            if getattr(options, role) is None and not (beside := deck.with_suffix(suffix)).is_file():
+                fix = f"put *FREQUENCY, SOLVER=MATRIXSTORAGE into its step and run `ccx {deck.stem}` there"
+                raise InputError(f"the {role} matrix of the deck is missing", display(deck), display(beside), None, fix)
+            setattr(options, role, getattr(options, role) or str(deck.with_suffix(suffix)))
+    for role in ("mass", "stiffness"):
+        if getattr(options, role) is None:
+            expected = "a file of the matrix, or CalculiX' deck in place of the model file"
+            raise InputError(f"no {role} matrix is given", f"--{role}", None, expected, f"add --{role} FILE")
 
 
 def _sources(options: argparse.Namespace) -> list[SourceFile]:
@@ -180,7 +205,11 @@ def _names(known: Sequence[str], given: list[str]) -> tuple[list[str], dict[str,
 
 
 def _pairs(
-    options: argparse.Namespace, labels: IntArray | None, nodes: Nodes | None, notes: list[str]
+    options: argparse.Namespace,
+    labels: IntArray | None,
+    nodes: Nodes | None,
+    wheel: SectorFaces | None,
+    notes: list[str],
 ) -> Iterator[tuple[str, Pairs]]:
     """Contact pairs by name; what was done is added to the notes."""
     seen: set[str] = set()
@@ -189,13 +218,13 @@ def _pairs(
         name, first = (name, first) if equals else ("contact" if not number else f"contact_{number + 1}", words[0])
         where = f"--pairs {' '.join(words)}"
         if not name.isidentifier() or name in seen or len(words) > 2:
-            expected = "[NAME=]SET_A SET_B, [NAME=]SET GROUND or [NAME=]FILE.csv, each with its own name"
+            expected = "[NAME=]SET_A SET_B[@next], [NAME=]SET GROUND or [NAME=]FILE.csv, each with its own name"
             raise InputError("contact pairs are not given so", where, None, expected, "--pairs root=BLADE DISK")
         if labels is None:
             fix = "give --dofs FILE or --coordinates FILE"
             raise InputError("the pairs name nodes, the matrices do not", where, None, "a table of dofs", fix)
         seen.add(name)
-        tangent = _axis(options.tangent)
+        tangent, normal = _axis("--tangent", options.tangent), _axis("--normal", options.normal)
         if len(words) == 1:
             with readable(Path(first), "file of the pairs"):
                 found = read_pairs(name, Path(first), labels, nodes, tangent, options.tolerance)
@@ -203,18 +232,28 @@ def _pairs(
             fix = "give --coordinates FILE with the sets, or a CSV of pairs"
             raise InputError("the node sets are not known", where, None, "nodes with sets", fix)
         else:
-            normal = _axis(options.normal)
-            found = match(name, nodes, first, words[1], normal, labels, options.tolerance, tangent, notes)
+            if normal is None and wheel is not None and words[1].lower().endswith(NEXT) and not has_faces(nodes, first):
+                normal = wheel.circumferential(first, nodes)
+                notes.append(f"contact '{name}': its normal is along the circumference, to the next sector")
+            turn = None if wheel is None else wheel.turn
+            found = match(name, nodes, first, words[1], normal, labels, options.tolerance, tangent, notes, turn)
         yield name, found
 
 
-def _axis(text: str | None) -> Array | None:
+def _axis(option: str, text: str | None) -> Array | None:
     if text is None:
         return None
+    axis = _three(option, text)
+    if np.linalg.norm(axis) > 0:
+        return axis
+    raise InputError("this is no direction", f"{option} {text}", text, "x,y,z", "for example 0,0,1")
+
+
+def _three(option: str, text: str) -> Array:
     try:
-        axis = np.array([float(word) for word in text.split(",")])
-        if axis.shape == (3,) and np.linalg.norm(axis) > 0:
-            return axis
+        values = np.array([float(word) for word in text.split(",")])
+        if values.shape == (3,) and np.isfinite(values).all():
+            return values
     except ValueError:
         pass
-    raise InputError("this is no direction", f"--normal or --tangent {text}", text, "x,y,z", "for example 0,0,1")
+    raise InputError("these are no three numbers", f"{option} {text}", text, "x,y,z", "for example 0,0,1")

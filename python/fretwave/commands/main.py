@@ -159,9 +159,15 @@ def _add_import(commands: _SubParsers) -> None:
         description="Matrices: NumPy .npz, Matrix Market, MATLAB .mat (5 to 7.3), PETSc binary, CalculiX .sti/.mas,"
         ' Abaqus .mtx; FILE:NAME picks a variable. In a case: [model] file = "OUT.h5".',
     )
-    add.add_argument("out", type=Path, metavar="OUT.h5", help="model file to write")
-    add.add_argument("--mass", required=True, metavar="FILE", help="mass matrix")
-    add.add_argument("--stiffness", required=True, metavar="FILE", help="stiffness matrix")
+    add.add_argument(
+        "out",
+        type=Path,
+        metavar="OUT.h5",
+        help="model file to write, or CalculiX' deck: sector.inp takes sector.mas and sector.sti beside it and writes"
+        " sector.h5",
+    )
+    add.add_argument("--mass", metavar="FILE", help="mass matrix")
+    add.add_argument("--stiffness", metavar="FILE", help="stiffness matrix")
     add.add_argument("--damping", metavar="FILE", help="viscous damping matrix")
     add.add_argument("--plugin", type=Path, action="append", default=[], metavar="FILE.py", help="a reader of your own")
     add.add_argument("--symmetric", choices=("auto", "lower", "upper", "full"), default="auto", help="what files hold")
@@ -176,22 +182,39 @@ def _add_import(commands: _SubParsers) -> None:
         default=[],
         metavar="[NAME=]SET",
         help="contact: two node sets or surfaces (where meshes differ, nodes of the first on faces of the second), "
-        "SET GROUND, or one CSV of node_a,node_b,nx,ny,nz,area",
+        "SET GROUND, SET SET@next (the next sector's), or one CSV of node_a,node_b,nx,ny,nz,area",
     )
     add.add_argument(
-        "--normal", metavar="X,Y,Z", help="from the first set to the second (default: out of the first one's faces)"
+        "--normal",
+        metavar="X,Y,Z",
+        help="from the first set to the second, --normal=-1,0,0 with a minus first (default: out of the first one's"
+        " faces; without elements, and with @next, along the circumference)",
     )
     add.add_argument("--tangent", metavar="X,Y,Z", help="first tangent (default: the axis most across the normals)")
     add.add_argument(
         "--tolerance",
         type=float,
         metavar="LENGTH",
-        help="largest distance of two nodes of a pair, or of a node and a face (default: 1e-6 of the mesh's diagonal)",
+        help="largest distance of two nodes of a pair, of a node and a face, or of a sector's faces (default: 1e-6 of"
+        " the mesh's diagonal)",
     )
+    _add_sector(add)
     add.add_argument("--name", action="append", default=[], metavar="NAME=DOF", help="name a dof: tip=n17y; it is kept")
     add.add_argument("--units", metavar="SYSTEM", help=f"unit system of all numbers: {', '.join(SYSTEMS)}")
     add.add_argument("--modes", type=int, default=6, metavar="N", help="frequencies to report (default 6)")
     add.set_defaults(command=_import)
+
+
+def _add_sector(add: argparse.ArgumentParser) -> None:
+    sector = add.add_argument_group(
+        "a sector of a wheel",
+        "The low face turned by 360/N degrees about the axis is the high face; the next sector begins there.",
+    )
+    sector.add_argument("--sectors", type=int, metavar="N", help="the mesh is one of N equal sectors")
+    sector.add_argument("--low", metavar="SET", help="nodes of its low face")
+    sector.add_argument("--high", metavar="SET", help="nodes of its high face")
+    sector.add_argument("--axis", choices=("x", "y", "z"), help="of the wheel")
+    sector.add_argument("--origin", metavar="X,Y,Z", help="a point of the axis, to be the origin (default 0,0,0)")
 
 
 def _init(options: argparse.Namespace) -> int:

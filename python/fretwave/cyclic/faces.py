@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
@@ -10,13 +12,33 @@ from ..arrays import Array, Indices
 from ..errors import InputError
 from ..model.sectors import rotation
 
-#: Distance of matching nodes, as a share of the face's extent.
+#: Distance of matching nodes, as a share of the faces' extent.
 TOLERANCE = 1e-6
+#: A number of sectors is whole to this share.
+WHOLE = 1e-6
 SHOWN = 5
 
 
+class _Nearest(NamedTuple):
+    """Nearest nodes of the low face, turned, and the high one."""
+
+    partner: Indices
+    low_gap: Array
+    high_gap: Array
+
+    @property
+    def farthest(self) -> float:
+        return float(max(self.low_gap.max(initial=0.0), self.high_gap.max(initial=0.0)))
+
+
 def match_faces(
-    xyz: npt.ArrayLike, low: npt.ArrayLike, high: npt.ArrayLike, sectors: int, axis: str = "z"
+    xyz: npt.ArrayLike,
+    low: npt.ArrayLike,
+    high: npt.ArrayLike,
+    sectors: int,
+    axis: str = "z",
+    tolerance: float | None = None,
+    numbers: npt.ArrayLike | None = None,
 ) -> tuple[Indices, Indices]:
     """Nodes of the two faces in matching order: the low face turned by 2 pi / N about the axis lies on the high one.
 
@@ -24,6 +46,10 @@ def match_faces(
     ----------
     xyz : (n_nodes, 3) [length]
     low, high : node numbers of the faces, in any order
+    tolerance : [length], optional
+        Largest distance of matching nodes; default 1e-6 of the faces' extent.
+    numbers : (n_nodes,), optional
+        What messages call the nodes; default their place.
 
     Returns
     -------
@@ -33,41 +59,89 @@ def match_faces(
     Raises
     ------
     InputError
-        With the nodes that have no partner; or for nodes on the axis, which both faces share.
+        With the nodes that have no partner, and what would match: the faces swapped, another number of sectors or
+        axis; or for nodes on the axis, which both faces share.
     """
     points, low, high = np.asarray(xyz, dtype=float), np.asarray(low, dtype=np.intp), np.asarray(high, dtype=np.intp)
-    _refuse_axis(points, low, axis)
-    turned = points[low] @ rotation(2 * np.pi / sectors, axis).T
-    limit = TOLERANCE * float(np.ptp(points[low], axis=0).max())
-    gap, partner = cKDTree(points[high]).query(turned)
-    back, _ = cKDTree(turned).query(points[high])
-    alone_low, alone_high = low[gap > limit], high[back > limit]
-    if len(alone_low) or len(alone_high) or len(low) != len(high):
-        raise InputError(
-            "the faces of the sector do not match",
-            _listed("low", points, alone_low) + "; " + _listed("high", points, alone_high),
-            f"{len(alone_low)} of {len(low)} low and {len(alone_high)} of {len(high)} high nodes without a partner, "
-            f"the farthest {max(gap.max(), back.max()):.3g} away",
-            f"the low face turned by 360/{sectors} degrees about {axis} on the high face, to {limit:.2g}",
-            "mesh both faces alike, check the number of sectors and the axis, or swap low and high",
-        )
-    return low, high[partner]
+    called = np.arange(len(points)) if numbers is None else np.asarray(numbers)
+    _check_given(points, low, high, axis, called)
+    extent = float(np.ptp(points[np.concatenate([low, high])], axis=0).max())
+    limit = TOLERANCE * extent if tolerance is None else tolerance
+    near = _nearest(points[low], points[high], 2 * np.pi / sectors, axis)
+    matched = near.farthest <= limit and len(low) == len(high) == len(np.unique(near.partner))
+    found, fix = ("", "") if matched else _explained(points[low], points[high], sectors, axis, limit)
+    if not found:
+        _refuse_axis(points, low, axis, called)
+    if matched:
+        return low, high[near.partner]
+    alone_low, alone_high = low[near.low_gap > limit], high[near.high_gap > limit]
+    raise InputError(
+        "the faces of the sector do not match",
+        _listed("low", points, alone_low, called) + "; " + _listed("high", points, alone_high, called),
+        f"{len(alone_low)} of {len(low)} low and {len(alone_high)} of {len(high)} high nodes without a partner, "
+        f"the farthest {near.farthest:.3g} away{found}",
+        f"the low face turned by 360/{sectors} degrees about {axis} on the high face, to {limit:.2g}",
+        fix,
+    )
 
 
-def _refuse_axis(points: Array, low: Indices, axis: str) -> None:
-    radius = np.linalg.norm(np.delete(points[low], "xyz".index(axis), axis=1), axis=1)
-    on_axis = low[radius <= TOLERANCE * radius.max(initial=0.0)]
+def _nearest(low: Array, high: Array, angle: float, axis: str) -> _Nearest:
+    turned = low @ rotation(angle, axis).T
+    low_gap, partner = cKDTree(high).query(turned)
+    high_gap, _ = cKDTree(turned).query(high)
+    return _Nearest(partner, low_gap, high_gap)
+
+
+def _explained(low: Array, high: Array, sectors: int, axis: str, limit: float) -> tuple[str, str]:
+    """What lies on the high face instead, added to what was measured, and the fix."""
+    found = [(about, angle) for about in "xyz" if (angle := _angle_between(low, high, about))]
+    found = [(about, angle) for about, angle in found if _nearest(low, high, angle, about).farthest <= limit]
+    # half a turn about another axis is the mirror image of a sector that has one
+    found = [(about, angle) for about, angle in found if about == axis or abs(angle) < 0.99 * np.pi]
+    if not found:
+        return "", "mesh both faces alike"
+    about, angle = min(found, key=lambda one: (abs(2 * np.pi / abs(one[1]) - sectors) > 0.5, one[0] != axis))
+    said = f"; turned by {np.degrees(angle):.6g} degrees about {about} it lies there"
+    number = 2 * np.pi / abs(angle)
+    if abs(number / round(number) - 1) > WHOLE:
+        return said, f"model a sector of 360/{sectors} degrees"
+    changes = ["swap low and high"] if angle < 0 else []
+    changes += [f"give {round(number)} sectors"] if round(number) != sectors else []
+    changes += [f"give the axis {about}"] if about != axis else []
+    return said, " and ".join(changes)
+
+
+def _angle_between(low: Array, high: Array, axis: str) -> float:
+    """From the middle of one face to that of the other about an axis, -pi to pi [rad]."""
+    first, second = (np.roll(face.mean(axis=0), -1 - "xyz".index(axis))[:2] for face in (low, high))
+    return float(np.angle(complex(*second) / complex(*first))) if np.any(first) else 0.0
+
+
+def _check_given(points: Array, low: Indices, high: Indices, axis: str, called: npt.NDArray[np.int64]) -> None:
+    both = np.intersect1d(low, high)
+    if len(low) and len(high) and not len(both):
+        return
+    _refuse_axis(points, both, axis, called)
+    measured = f"{len(low)} low and {len(high)} high nodes"
+    measured += f", {len(both)} of them on both, the first {called[both[0]]}" if len(both) else ""
+    fix = "give each node to one face" if len(both) else "name the nodes of both faces"
+    raise InputError("the faces of the sector are not two", None, measured, "different nodes on each", fix)
+
+
+def _refuse_axis(points: Array, face: Indices, axis: str, called: npt.NDArray[np.int64]) -> None:
+    radius = np.linalg.norm(np.delete(points, "xyz".index(axis), axis=1), axis=1)
+    on_axis = face[radius[face] <= TOLERANCE * radius.max(initial=0.0)]
     if len(on_axis):
         raise InputError(
             "nodes of the faces lie on the axis",
-            _listed("low", points, on_axis),
+            _listed("low", points, on_axis, called),
             f"{len(on_axis)} nodes",
             "none: all sectors would share them",
             "give the wheel a hole along its axis",
         )
 
 
-def _listed(face: str, points: Array, nodes: Indices) -> str:
-    shown = ", ".join(f"{node} ({', '.join(f'{x:.6g}' for x in points[node])})" for node in nodes[:SHOWN])
+def _listed(face: str, points: Array, nodes: Indices, called: npt.NDArray[np.int64]) -> str:
+    shown = ", ".join(f"{called[n]} ({', '.join(f'{x:.6g}' for x in points[n])})" for n in nodes[:SHOWN])
     more = f" and {len(nodes) - SHOWN} more" if len(nodes) > SHOWN else ""
     return f"{face} face: {shown or 'none'}{more}"

@@ -1,12 +1,13 @@
 """Contact pairs: node to node, node to the other side's faces where meshes do not match, or node to ground.
 
 The relative displacement of a pair is u = R (x_a - x_b), R the frame (normal, tangent, tangent), the normal pointing
-from the first body to the second: u_n > 0 closes the contact. A direction that is no dof (held) does not move.
+from the first body to the second: u_n > 0 closes the contact. A direction that is no dof (held) does not move. A node b
+of the next sector moves by T x_b in the frame of this one, T the turn by 2 pi / N: B = {0: R S_a, 1: -R T S_b}.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ from ..arrays import Array, IntArray
 from ..errors import InputError
 from ..fe.interface import tangent_frames
 from ..model.pairs import Pairs
+from ..model.sectors import Term
 from ..texts import display
 from .nodes import Nodes
 from .projection import project
@@ -29,6 +31,8 @@ TOLERANCE = 1e-6
 FAR = 1e3
 #: The second set of pairs with ground.
 GROUND = "GROUND"
+#: What follows the second set when it is the next sector's.
+NEXT = "@next"
 #: Unmatched nodes that a message names.
 SHOWN = 8
 
@@ -65,8 +69,11 @@ def match(
     tolerance: float | None = None,
     tangent: Array | None = None,
     notes: list[str] | None = None,
+    turn: Array | None = None,
 ) -> Pairs:
     """Pairs of two sides: coincident nodes, or the first's nodes on the second's faces; or of one side with ``GROUND``.
+
+    ``SET@next`` is the next sector's side.
 
     Parameters
     ----------
@@ -82,6 +89,8 @@ def match(
         Largest distance of two nodes of a pair, or of a node and the other side's faces; default 1e-6 of the mesh's
         diagonal.
     notes : what was done is added
+    turn : (3, 3), optional
+        Rotation from a sector to the next one.
 
     Raises
     ------
@@ -89,16 +98,41 @@ def match(
         A node has no partner, or two nodes share one; sides are far apart or do not look at each other.
     """
     where = f"{nodes.where}, sets {first} and {second}"
+    second, ahead = _without_next(second, turn, where)
     a = side_of(nodes, first)
     normals = normals_of(a, normal)
     if second.upper() == GROUND and GROUND not in nodes.sets:
         both = np.column_stack([a.numbers, np.zeros_like(a.numbers)])
         found = Found(both, a.numbers[:0], sp.csr_matrix((len(both), 0)))
     else:
-        found = _pair(a, side_of(nodes, second), normals, where, reach_of(nodes, tolerance))
+        b, reach = side_of(nodes, second), reach_of(nodes, tolerance)
+        if ahead is not None:
+            _check_ahead(a, b, ahead, reach, where)
+            b = replace(b, points=b.points @ ahead.T)
+        found = _pair(a, b, normals, where, reach)
     if notes is not None and found.note:
         notes.append(f"contact '{name}': {found.note}")
-    return _joined(name, found, normals, a.areas, where, labels, nodes, tangent)
+    return _joined(name, found, normals, a.areas, where, labels, nodes, tangent, ahead)
+
+
+def _without_next(second: str, turn: Array | None, where: str) -> tuple[str, Array | None]:
+    """The second set's name, and the turn when it is the next sector's."""
+    if not second.lower().endswith(NEXT):
+        return second, None
+    if turn is None:
+        fix = "give --sectors, --low, --high and --axis"
+        raise InputError("there is no next sector", where, None, "one sector of a wheel", fix)
+    return second[: -len(NEXT)], turn
+
+
+def _check_ahead(a: Side, b: Side, turn: Array, reach: float, where: str) -> None:
+    """The first side does not lie where the second one is of the sector before."""
+    if cKDTree(b.points @ turn).query(a.points)[0].max() > reach:
+        return
+    measured = f"{len(a.numbers)} nodes at the second side of the sector before"
+    first, second = (side.where.rpartition(" ")[2] for side in (a, b))
+    fix = f"write {second} {first}{NEXT}"
+    raise InputError("the sides are of the wrong sectors", where, measured, "the high end, then the next low end", fix)
 
 
 def _pair(a: Side, b: Side, normals: Array, where: str, reach: float) -> Found:
@@ -234,8 +268,15 @@ def _joined(
     labels: IntArray,
     nodes: Nodes | None,
     tangent: Array | None,
+    ahead: Array | None = None,
 ) -> Pairs:
-    """B and the geometry of pairs, with normals of any length."""
+    """B and the geometry of pairs, with normals of any length.
+
+    Parameters
+    ----------
+    ahead : (3, 3), optional
+        Turn to the next sector, where the second nodes are that one's.
+    """
     n, both = len(found.both), found.both
     length = np.linalg.norm(normals, axis=1)
     if not n or not (length > 0).all():
@@ -248,13 +289,21 @@ def _joined(
     except InputError as error:
         place = f"contact '{name}', {where}"
         raise InputError(error.what, place, error.measured, error.expected, "give another --tangent") from None
-    second = sp.kron(found.weights, sp.identity(3)) @ _selection(found.others, labels)
-    difference = (_selection(both[:, 0], labels) - second).tocsr()
-    _check_dofs(name, both, where, difference, labels)
-    B = (sp.block_diag(list(frames)) @ difference).tocsr()
-    B.eliminate_zeros()
+    own = _selection(both[:, 0], labels)
+    other = (sp.kron(found.weights, sp.identity(3)) @ _selection(found.others, labels)).tocsr()
+    _check_dofs(name, both, where, abs(own) + abs(other), labels)
+    R = sp.block_diag(list(frames))
+    B: Term = _stored(R @ (own - other))
+    if ahead is not None:
+        B = {0: _stored(R @ own), 1: _stored(-R @ sp.kron(sp.identity(n), ahead) @ other)}
     points = None if nodes is None else nodes.coordinates[nodes.places(both[:, 0])]
     return Pairs(B, areas=areas, points=points, frames=frames, nodes=both)
+
+
+def _stored(B: sp.spmatrix) -> sp.csr_matrix:
+    rows = sp.csr_matrix(B)
+    rows.eliminate_zeros()
+    return rows
 
 
 def _selection(numbers: IntArray, labels: IntArray) -> sp.csr_matrix:
@@ -266,8 +315,8 @@ def _selection(numbers: IntArray, labels: IntArray) -> sp.csr_matrix:
     return sp.csr_matrix((np.ones(len(rows)), (rows, columns[rows])), shape=(len(wanted), len(labels)))
 
 
-def _check_dofs(name: str, both: IntArray, where: str, difference: sp.csr_matrix, labels: IntArray) -> None:
-    entries = np.diff(difference.indptr).reshape(-1, 3).sum(axis=1)
+def _check_dofs(name: str, both: IntArray, where: str, reached: sp.csr_matrix, labels: IntArray) -> None:
+    entries = np.diff(reached.indptr).reshape(-1, 3).sum(axis=1)
     dead = np.flatnonzero(entries == 0)
     if len(dead):
         a, b = both[dead[0]]

@@ -182,4 +182,17 @@ def _frequencies(model: Structure, motions: Array | None, modes: int, comm: MPI.
         report.warnings.append(f"K is negative for a motion: omega^2 = {squares.min():.4g}")
     elastic = np.sqrt(squares[squares >= RIGID * scale])[:modes] / (2 * np.pi)
     unit = "Hz" if model.units else "1/time"
-    report.lines.append(f"first frequencies [{unit}]: " + ", ".join(f"{value:.6g}" for value in elastic))
+    faces = ", both faces free" if model.sectors else ""
+    report.lines.append(f"first frequencies{faces} [{unit}]: " + ", ".join(f"{value:.6g}" for value in elastic))
+    if model.sectors and modes:
+        _waves(model, modes, unit, comm, report)
+
+
+def _waves(model: Structure, modes: int, unit: str, comm: MPI.Comm, report: Report) -> None:
+    """Of the sector tied to its neighbours, all moving alike, without contact. Collective."""
+    from ..model.modes import linear_modes
+
+    with model.tied().model(comm=comm, nodal_diameter=0) as wheel:
+        found = [mode.omega / (2 * np.pi) for mode in linear_modes(wheel, modes, "free")]
+    values = ", ".join(f"{value:.6g}" for value in found)
+    report.lines.append(f"first frequencies of the wheel, 0 nodal diameters, no contact [{unit}]: {values}")

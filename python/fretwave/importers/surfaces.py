@@ -92,6 +92,11 @@ def side_of(nodes: Nodes, name: str) -> Side:
     return Side(where, numbers, nodes.coordinates[nodes.places(numbers)], places)
 
 
+def has_faces(nodes: Nodes, name: str) -> bool:
+    """A side's normals are known from elements."""
+    return bool(side_of(nodes, name).faces)
+
+
 def _node_set(nodes: Nodes, name: str) -> IntArray:
     if name.upper() not in nodes.sets and nodes.elements.surfaces:
         known = sorted({*nodes.sets, *nodes.elements.surfaces})

@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 def complaint_of(structure: Structure) -> str | None:
     """What is inconsistent in a structure as a builder gives it, None when nothing is."""
     terms = {"M": structure.M, "K": structure.K, "C": structure.C}
-    terms.update({f"B of '{name}'": pairs.B for name, pairs in structure.pairs.items()})
+    if not structure.sectors:  # pairs of a sector may reach the next one
+        terms.update({f"B of '{name}'": pairs.B for name, pairs in structure.pairs.items()})
     for name, term in terms.items():
         if isinstance(term, Mapping):
             return f"{name} has parts on other sectors: give the sector with both its faces, low and high"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Optional, Union
 
@@ -79,6 +79,11 @@ class Pairs:
         rows = int(np.shape(by_sector(self.B)[0])[0])
         return replace(self, B=combine({0: sp.identity(rows)}, by_sector(self.B), ties, +1))
 
+    def mapped(self, rows: Callable[[sp.csr_matrix], sp.csr_matrix]) -> Pairs:
+        """With every part of B on other coordinates."""
+        parts = {k: rows(sp.csr_matrix(B, dtype=float)) for k, B in by_sector(self.B).items()}
+        return replace(self, B=parts[0] if list(parts) == [0] else parts)
+
     def around(self, sectors: int) -> Pairs:
         """Those of all sectors of a wheel, one after the other; their places are those of one sector, and left out."""
         given = {name: repeated(value, sectors) for name, value in self.parameters.items()}
@@ -87,12 +92,12 @@ class Pairs:
 
     def complaint(self, name: str, n_dof: int) -> str | None:
         """What is inconsistent, None when nothing is."""
-        B = self.own
-        rows, columns = B.shape
-        if columns != n_dof or rows % self.components or not rows:
-            return f"B of contact '{name}' is {rows} x {columns}, not {self.components} n_pairs x {n_dof}"
-        if not np.all(np.isfinite(B.data)):
-            return f"B of contact '{name}' has an entry that is not a number"
+        for B in map(sp.csr_matrix, by_sector(self.B).values()):
+            rows, columns = B.shape
+            if columns != n_dof or rows % self.components or not rows or rows != self.own.shape[0]:
+                return f"B of contact '{name}' is {rows} x {columns}, not {self.components} n_pairs x {n_dof}"
+            if not np.all(np.isfinite(B.data)):
+                return f"B of contact '{name}' has an entry that is not a number"
         n = self.n_pairs
         shapes = {"areas": (n,), "points": (n, 3), "frames": (n, 3, 3), "faces": (n,), "positions": (n, 2)}
         given = {key: getattr(self, key) for key in shapes if getattr(self, key) is not None}

@@ -322,7 +322,7 @@ class Structure:
             K=K,
             C=C,
             dofs={name: reduction.places[dof] for name, dof in self.dofs.items() if dof in reduction.places},
-            pairs={name: replace(pairs, B=reduction.rows(pairs.own)) for name, pairs in self.pairs.items()},
+            pairs={name: pairs.mapped(reduction.rows) for name, pairs in self.pairs.items()},
             loads={name: reduction.project(load) for name, load in self.loads.items()},
             resultants=self._totals(),
             parts=parts,

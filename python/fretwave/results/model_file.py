@@ -7,8 +7,8 @@ or int64, from 0).
 =========================  ===================================================================================
 place                      content
 =========================  ===================================================================================
-``/`` (attributes)         ``format`` = "fretwave model", ``format_version`` = 1, ``units``: name of the unit
-                           system (`fretwave.units`), empty where it was not told (then SI)
+``/`` (attributes)         ``format`` = "fretwave model", ``format_version`` = 1, of a sector 2, ``units``: name of the
+                           unit system (`fretwave.units`), empty where it was not told (then SI)
 ``/M``, ``/K``, ``/C``     groups ``data``, ``indices``, ``indptr`` of the CSR form, attribute ``shape``; both triangles
                            are stored; ``/C`` is optional
 ``/dofs/name``             (n_dof,) unique names, in the order of the rows
@@ -25,6 +25,10 @@ place                      content
 ``/contacts/<name>/...``   ``positions`` (n_pairs, 3), ``areas`` (n_pairs,), ``frames`` (n_pairs, 3, 3) with rows normal
                            (from the first body to the second), tangent, tangent, ``nodes`` (n_pairs, 2), 0 for ground;
                            each optional
+``/contacts/<name>/B_next``  group as ``B``, optional: the part on the dofs of the next sector, in its own frame
+``/sector``                optional: attributes ``sectors`` (N), ``axis`` ("x", "y" or "z"; empty where nothing turns);
+                           ``low``, ``high`` (n_face,) matching dofs of the faces, with an axis x, y, z of each node:
+                           the high ones move as the next sector's low ones turned by 2 pi / N about the axis
 ``/sources``               what the file was made from: ``role``, ``path``, ``bytes``, ``sha256``, (n,) each
 =========================  ===================================================================================
 """
@@ -36,29 +40,27 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Union
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 import scipy.sparse as sp
 
 from ..arrays import IntArray
 from ..errors import InputError
 from ..files.compressed import check_compressed
 from ..files.whole import Unfailing, check_whole, replaced, seal
-from ..model.cells import KINDS, wrong_cells
+from ..model.cells import KINDS
 from ..model.pairs import Pairs
+from ..model.sectors import by_sector
 from ..model.structure import Structure
 from ..texts import display, names_beside, nearest
 from ..units import SYSTEMS, unit_system
+from .model_checks import PAIR_ARRAYS, PARTS, Table, check_parts
 
 if TYPE_CHECKING:
     import h5py
 
-#: An array of the file, None where it has none.
-Table = Union[npt.NDArray[Any], None]
-
-FORMAT, VERSION = "fretwave model", 1
+FORMAT, VERSION = "fretwave model", 2
 #: Arrays of dofs, nodes and cells.
 _TABLES = ("dofs/node", "dofs/direction", "dofs/kept", "nodes/number", "nodes/coordinates", "cells/hexahedra")
 #: Names of the directions 1 to 6 in a dof's name.
@@ -102,7 +104,7 @@ def write_model(
     Parameters
     ----------
     structure : Structure
-        As it was given: one that is no sector tied to its neighbours. `dofs` are those that a reduction shall keep.
+        As it was given: no sector tied to its neighbours. `dofs` are those that a reduction shall keep.
     units : str, optional
         Name of the unit system; default that of the structure.
     sources : what the matrices were read from
@@ -119,7 +121,7 @@ def write_model(
         unit_system(told)
     tables = _tables_of(structure)
     _check_held(structure, str(path))
-    _check(structure, tables, str(path))
+    check_parts(structure, tables, str(path))
     path = Path(path)
     if path.is_dir() or not path.parent.is_dir():
         measured = "a folder of this name" if path.is_dir() else "no such folder"
@@ -128,7 +130,8 @@ def write_model(
     with replaced(path, own=True) as fresh:
         raw = Unfailing(fresh)
         with h5py.File(raw, "w") as file:
-            file.attrs.update(format=FORMAT, format_version=VERSION, units=told)
+            version = VERSION if structure.sectors else 1
+            file.attrs.update(format=FORMAT, format_version=version, units=told)
             _write_parts(file, structure, tables)
             for key in ("role", "path", "sha256"):
                 file[f"sources/{key}"] = np.array([getattr(s, key).encode() for s in sources], dtype="S")
@@ -137,8 +140,8 @@ def write_model(
         seal(fresh)
 
 
-#: What format version 1 has no place for.
-_NOT_HELD = ("loads", "parts", "ties", "sectors", "stiffness_damping", "mass_damping")
+#: What the format has no place for.
+_NOT_HELD = ("loads", "parts", "ties", "whole", "stiffness_damping", "mass_damping")
 
 
 def _check_held(structure: Structure, where: str) -> None:
@@ -147,6 +150,7 @@ def _check_held(structure: Structure, where: str) -> None:
     lost += [] if structure.expansion is None else ["expansion"]
     lost += [f"pairs '{name}' of one component" for name, pairs in structure.pairs.items() if pairs.components != 3]
     lost += [f"parameters of '{name}'" for name, pairs in structure.pairs.items() if pairs.parameters]
+    lost += [f"pairs '{n}' beyond the next sector" for n, p in structure.pairs.items() if set(by_sector(p.B)) - {0, 1}]
     if lost:
         fix = "leave them out, or give them by a builder"
         raise InputError("a model file has no place for these", where, ", ".join(lost), None, fix)
@@ -173,12 +177,18 @@ def _write_parts(file: h5py.File, structure: Structure, tables: Mapping[str, Tab
     file["dofs/name"] = np.array([name.encode() for name in structure.dof_names])
     _write_arrays(file, tables)
     for name, pairs in structure.pairs.items():
-        _write_sparse(file.create_group(f"contacts/{name}/B"), pairs.own)
-        _write_arrays(file[f"contacts/{name}"], {key: getattr(pairs, own) for key, own in _PAIR_ARRAYS.items()})
+        for k, B in by_sector(pairs.B).items():
+            _write_sparse(file.create_group(f"contacts/{name}/{PARTS[k]}"), B)
+        _write_arrays(file[f"contacts/{name}"], {key: getattr(pairs, own) for key, own in PAIR_ARRAYS.items()})
+    _write_sector(file, structure)
 
 
-#: Arrays of pairs by their names in the file, and as attributes of `Pairs`.
-_PAIR_ARRAYS = {"positions": "points", "areas": "areas", "frames": "frames", "nodes": "nodes"}
+def _write_sector(file: h5py.File, structure: Structure) -> None:
+    if not structure.sectors:
+        return
+    group = file.create_group("sector")
+    group.attrs.update(sectors=structure.sectors, axis=structure.axis or "")
+    _write_arrays(group, {"low": structure.low, "high": structure.high})
 
 
 def _write_arrays(group: h5py.Group, arrays: Mapping[str, Table]) -> None:
@@ -207,7 +217,7 @@ def read_model(path: str | Path) -> Structure:
     path = Path(path)
     with _opened(path) as file, _damaged(path):
         structure, tables = _read_parts(file)
-    _check(structure, tables, display(path))
+    check_parts(structure, tables, display(path))
     kept = tables["dofs/kept"]
     names = structure.dof_names
     dofs = {names[dof]: int(dof) for dof in (() if kept is None else kept)}
@@ -308,8 +318,18 @@ def _read_parts(file: h5py.File) -> tuple[Structure, dict[str, Table]]:
         hexahedra=tables["cells/hexahedra"],
         cells={kind: file["cells"][kind][()].astype("i8") for kind in file.get("cells", {}) if kind in KINDS},
         units=_units_of(file),
+        **_read_sector(file),
     )
     return structure, tables
+
+
+def _read_sector(file: h5py.File) -> dict[str, Any]:
+    """What says that it is a sector, nothing where it is none."""
+    if "sector" not in file:
+        return {}
+    group = file["sector"]
+    number, axis = int(group.attrs["sectors"]), str(group.attrs["axis"])
+    return {"sectors": number, "low": group["low"][()], "high": group["high"][()], "axis": axis or None}
 
 
 def _units_of(file: h5py.File) -> str | None:
@@ -323,8 +343,9 @@ def _array(group: h5py.Group, name: str) -> Table:
 
 
 def _read_pairs(group: h5py.Group) -> Pairs:
-    arrays: dict[str, Any] = {own: _array(group, key) for key, own in _PAIR_ARRAYS.items()}
-    return Pairs(_read_sparse(group["B"]), **arrays)
+    arrays: dict[str, Any] = {own: _array(group, key) for key, own in PAIR_ARRAYS.items()}
+    parts = {k: _read_sparse(group[key]) for k, key in PARTS.items() if key in group}
+    return Pairs(parts if 1 in parts else parts[0], **arrays)
 
 
 def _read_sparse(group: h5py.Group) -> sp.csr_matrix:
@@ -332,48 +353,3 @@ def _read_sparse(group: h5py.Group) -> sp.csr_matrix:
     matrix = sp.csr_matrix(parts, shape=tuple(int(n) for n in group.attrs["shape"]))
     check_compressed(matrix)
     return matrix
-
-
-def _check(structure: Structure, tables: Mapping[str, Table], where: str) -> None:
-    """The parts fit each other."""
-    n, names = structure.n_dof, structure.dof_names
-
-    def wrong(what: str, measured: object, expected: object) -> InputError:
-        return InputError(what, where, measured, expected, "write the file again with matching parts")
-
-    for letter in ("M", "K", "C"):
-        matrix = getattr(structure, letter)
-        if matrix is not None and matrix.shape != (n, n):
-            raise wrong(f"{letter} does not fit M", f"{matrix.shape}", f"{(n, n)}")
-    if len(names) != n or len(set(names)) != n:
-        raise wrong("the names of the dofs do not fit", f"{len(set(names))} different names", f"{n}, one per dof")
-    for name, length, expected in _lengths(structure, tables):
-        if length != expected:
-            raise wrong(f"{name} does not fit", f"{length} values", expected)
-    cells, nodes = tables["cells/hexahedra"], _count(tables["nodes/number"])
-    if cells is not None and cells.size and not 0 <= cells.min() <= cells.max() < nodes:
-        raise wrong("a node of a cell does not exist", f"{cells.min()} to {cells.max()}", f"0 to {nodes - 1}")
-    complaint = wrong_cells(structure.cells, nodes)
-    if complaint:
-        raise wrong("the cells do not fit", complaint, f"nodes 0 to {nodes - 1}")
-    kept = tables["dofs/kept"]
-    if kept is not None and len(kept) and not 0 <= min(kept) <= max(kept) < n:
-        raise wrong("a kept dof does not exist", f"{min(kept)} to {max(kept)}", f"0 to {n - 1}")
-
-
-def _lengths(structure: Structure, tables: Mapping[str, Table]) -> list[tuple[str, int, int]]:
-    """Every array with the length it has and the one it must have."""
-    n, nodes = structure.n_dof, _count(tables["nodes/number"])
-    expected = {"dofs/node": n, "dofs/direction": n, "nodes/coordinates": nodes}
-    table = [(name, len(values), expected[name]) for name in expected if (values := tables[name]) is not None]
-    for name, pairs in structure.pairs.items():
-        rows, columns = pairs.own.shape
-        place = f"contacts/{name}"
-        table += [(f"{place}/B", columns, n), (f"{place}/B", rows, pairs.components * pairs.n_pairs)]
-        arrays = {key: getattr(pairs, own) for key, own in _PAIR_ARRAYS.items()}
-        table += [(f"{place}/{key}", len(v), pairs.n_pairs) for key, v in arrays.items() if v is not None]
-    return table
-
-
-def _count(values: Table) -> int:
-    return 0 if values is None else len(values)
