@@ -51,6 +51,15 @@ def test_pairs_reach_the_next_sector(comm, shared_tmp: Path, limit: str, axis: s
     np.testing.assert_allclose(all_waves(structure, limit, comm), Wheel().hz(limit), rtol=TIGHT)
 
 
+def test_the_wheel_of_an_imported_sector(comm, shared_tmp: Path) -> None:
+    """All sectors at once."""
+    tied = imported(comm, shared_tmp, Wheel(), *sector_of(), *PAIRS).tied().around()
+    contact = fw.Contact("coulomb_3d", tied.pairs["shroud"], {**PARAMETERS, "normal_load": 1.0})
+    with tied.model([contact], comm) as model:
+        found = [mode.frequency_hz for mode in fw.linear_modes(model, 12)]
+    np.testing.assert_allclose(found, Wheel().hz("stuck")[:12], rtol=TIGHT)
+
+
 @pytest.mark.ranks(1)
 def test_what_a_model_file_says_of_a_sector(comm, shared_tmp: Path) -> None:
     wheel = Wheel(0.2)
@@ -186,6 +195,7 @@ WRONG = {
     "part": (sector_of(high=""), "add --high\n"),
     "one": (sector_of(sectors="1"), "two sectors or more"),
     "pairs": ([*sector_of(), "--pairs", "s=SHROUDLOW", "SHROUDHIGH@next"], "write SHROUDHIGH SHROUDLOW@next"),
+    "tied": ([*sector_of(low="WHOLELOW", high="WHOLEHIGH"), *PAIRS], "leave them out of WHOLELOW and WHOLEHIGH"),
     "alone": (PAIRS, "there is no next sector"),
     "origin": ([*sector_of(), "--origin", "1,0"], "no three numbers"),
 }

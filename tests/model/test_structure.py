@@ -192,4 +192,10 @@ def test_what_cannot_be_is_refused() -> None:
         cut().tied().around(np.zeros(N), "blad")
     by_terms = replace(chain(), K={0: sp.identity(30), 1: sp.identity(30), -1: sp.identity(30)})
     assert "both its faces" in by_terms.complaint()
+    ahead = fw.Pairs({0: np.ones((3, 30)), 1: np.ones((3, 30))})
+    assert "both its faces" in replace(chain(), pairs={"shroud": ahead}).complaint()
+    reaching = {0: np.array([[0.0, 1.0, 0.0]]), 1: np.array([[-1.0, 0.0, 0.0]])}
+    assert replace(cut(), pairs={"shroud": fw.Pairs(reaching, 1)}).complaint() is None
+    narrow = fw.Pairs({**reaching, 1: np.ones((1, 2))}, 1)
+    assert "is 1 x 2, not" in replace(cut(), pairs={"shroud": narrow}).complaint()
     assert cut().complaint() is None

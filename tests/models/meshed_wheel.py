@@ -113,6 +113,9 @@ class Wheel:
         faces = {
             f"{part}{side}": mixed(self.face(part, side)) + 1 for part in ("rim", "shroud") for side in ("low", "high")
         }
+        faces |= {
+            f"whole{side}": np.concatenate([faces[f"rim{side}"], faces[f"shroud{side}"]]) for side in ("low", "high")
+        }
         np.savez(folder / "nodes.npz", coordinates=self.sector.nodes @ turn.T, **faces)
         given = ["--mass", "M.npz", "--stiffness", "K.npz", "--dofs", "dofs.csv", "--coordinates", "nodes.npz"]
         return ["import", str(folder / "m.h5"), *(str(folder / w) if "." in w else w for w in given)]

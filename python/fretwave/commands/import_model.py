@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -237,6 +237,8 @@ def _pairs(
                 notes.append(f"contact '{name}': its normal is along the circumference, to the next sector")
             turn = None if wheel is None else wheel.turn
             found = match(name, nodes, first, words[1], normal, labels, options.tolerance, tangent, notes, turn)
+            if wheel is not None and isinstance(found.B, Mapping):
+                wheel.check_apart(name, nodes, found)
         yield name, found
 
 

@@ -11,6 +11,7 @@ from ..arrays import Array, Indices, IntArray
 from ..cyclic.faces import match_faces
 from ..cyclic.frames import in_triples
 from ..errors import InputError
+from ..model.pairs import Pairs
 from ..model.sectors import check_number, rotation
 from ..model.structure import Structure
 from ..results.model_file import dof_name
@@ -76,6 +77,27 @@ class SectorFaces:
                 "give --normal X,Y,Z, from the first body to the second",
             )
         return np.asarray(normal / size)
+
+    def check_apart(self, name: str, nodes: Nodes, pairs: Pairs) -> None:
+        """No pair is of two nodes that the faces tie.
+
+        Raises
+        ------
+        InputError
+            They cannot move against each other.
+        """
+        assert pairs.nodes is not None
+        ends = zip(pairs.nodes.T, (self.high, self.low))
+        tied = np.all([np.isin(numbers, nodes.node_set(face)) for numbers, face in ends], axis=0)
+        if tied.any():
+            a, b = pairs.nodes[np.argmax(tied)]
+            raise InputError(
+                f"pairs of contact '{name}' are tied by the sector's faces",
+                f"{nodes.where}, sets {self.low} and {self.high}",
+                f"nodes {a} and {b}, {counted(int(tied.sum()), 'such pair')}",
+                "nodes that move against each other",
+                f"leave them out of {self.low} and {self.high}",
+            )
 
 
 def wheel_of(options: Namespace) -> SectorFaces | None:
