@@ -16,6 +16,8 @@ constexpr double sparse = 1.0 / 32;   // of a step: corners farther than that ap
 constexpr double before_end = 0.999;  // of the way to the end of a piece
 constexpr double kink_angle = 0.02;   // [rad] in so short a step
 constexpr double seen_angle = 0.05;   // [rad] in a longer one: it may hide a corner
+constexpr double unturned = 0.01;     // of a step: the way aside that its ends' tangents need not tell of
+constexpr int easy = 5;               // iterations: after more the corrector may have come to another branch
 constexpr int walk = 8;               // steps to a place where the branch seems to have been
 constexpr int certain = 3;            // meetings with earlier points of the branch in a row
 constexpr double grid = 16;           // lengths of steps in every factor of two
@@ -199,17 +201,20 @@ double Continuation::error_in_the_middle(Trial const& end, double length) {
   return weighted_norm(weights_, moved(middle.y, -1, expected));
 }
 
-/// What speaks against a corrected trial as the next point; nothing if it is one.
+/// What speaks against a corrected trial as the next point; nothing if it is one. An arc that turns by an
+/// angle over a length L leaves its first tangent by half of L times the angle, and by all of it at a kink:
+/// where the corrector came hard by a point farther aside, it is another branch's.
 std::string Continuation::complaint(Trial& trial, double length, bool may_shorten) {
-  const VecHandle predicted = moved(anchor_.y, length, anchor_.tangent);
-  if (!(weighted_norm(weights_, moved(trial.y, -1, predicted)) <= length))
+  const VecHandle along = moved(anchor_.y, length, anchor_.tangent);
+  const double aside = weighted_norm(weights_, moved(trial.y, -1, along)), angle = turn_of(trial);
+  const bool hard = trial.outcome.newton > easy;
+  if (!(aside <= length) || (may_shorten && hard && aside > (angle + unturned) * length))
     return "the corrector lands on another branch";
-  const double angle = turn_of(trial);
   if (may_shorten && angle > steps_.max_angle) return "the branch turns too sharply";
   if (may_shorten && (trial.error = interpolation_error(trial, length)) > steps_.max_error)
     return "the branch bends more than a step resolves";
   if (may_shorten)
-    return (angle > seen_angle && leads_back(trial)) || fell_back(trial)
+    return ((angle > seen_angle || hard) && leads_back(trial)) || fell_back(trial)
                ? "the corrector lands on another branch"
                : "";
   if (angle < kink_angle) return "";
