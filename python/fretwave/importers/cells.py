@@ -15,6 +15,7 @@ import numpy as np
 from ..arrays import IntArray
 from ..errors import InputError
 from ..texts import nearest
+from .keywords import Lines
 
 _SOLID = re.compile(r"C3D(4|6|8|10|15|20)[A-Z]*", re.IGNORECASE)
 _SHELL = re.compile(r"S([34])([A-Z][A-Z0-9]*)?", re.IGNORECASE)
@@ -103,25 +104,25 @@ class Elements:
     sets: dict[str, list[int | str]] = field(default_factory=dict)
     surfaces: dict[str, list[tuple[str, str]]] = field(default_factory=dict)
 
-    def add(self, options: dict[str, str], data: list[tuple[int, str]], where: str) -> None:
+    def add(self, options: dict[str, str], data: Lines) -> None:
         """The lines of an ``*ELEMENT``: number and nodes; an element may go over several lines. Others are left out."""
         kind, count = _kind(options.get("TYPE", ""))
         if not kind:
             return
-        words = [(line, word.strip()) for line, text in data for word in text.split(",") if word.strip()]
-        wrong = next((line for line, word in words if not word.isdigit()), None)
+        words = [(place, word.strip()) for place, text in data for word in text.split(",") if word.strip()]
+        wrong = next((place for place, word in words if not word.isdigit()), None)
         if wrong is None and len(words) % (1 + count):
             wrong = data[-1][0]
         if wrong is not None:
             expected = f"element, {count} nodes"
-            raise InputError("this is no element", f"{where}:{wrong}", None, expected, "correct the line")
+            raise InputError("this is no element", wrong, None, expected, "correct the line")
         table = np.array([int(word) for _, word in words], dtype=np.int64).reshape(-1, 1 + count)
         was = self.blocks.get(kind, Block(table[:0, 0], table[:0, 1:]))
         self.blocks[kind] = Block(np.append(was.numbers, table[:, 0]), np.vstack([was.nodes, table[:, 1:]]))
         if "ELSET" in options:
             self.sets.setdefault(options["ELSET"].upper(), []).extend(table[:, 0].tolist())
 
-    def add_surface(self, name: str, data: list[tuple[int, str]]) -> None:
+    def add_surface(self, name: str, data: Lines) -> None:
         """The lines of a ``*SURFACE, TYPE=ELEMENT``: element or set, face."""
         lines = self.surfaces.setdefault(name.upper(), [])
         for _, text in data:
@@ -141,16 +142,48 @@ class Elements:
         others = [self.members(str(m), where, (*above, name)) for m in self.sets[name] if not isinstance(m, int)]
         return np.asarray(np.unique(np.concatenate([np.array(own, dtype=np.int64), *others])))
 
+    def nodes_of(self, name: str, where: str) -> IntArray:
+        """Node numbers of an element set's elements."""
+        chosen = self.members(name, where)
+        tables = [block.nodes[np.isin(block.numbers, chosen)].ravel() for block in self.blocks.values()]
+        return np.asarray(np.unique(np.concatenate(tables)))
+
+    def check_numbers(self, where: str) -> None:
+        """Each element stands once.
+
+        Raises
+        ------
+        InputError
+            A number stands twice.
+        """
+        numbers = [block.numbers for block in self.blocks.values()]
+        different, count = np.unique(np.concatenate([*numbers, np.zeros(0, np.int64)]), return_counts=True)
+        if (count > 1).any():
+            measured, fix = int(different[np.argmax(count)]), "number the elements through"
+            raise InputError("an element number stands twice", where, measured, "each element once", fix)
+
     def faces(self, name: str, where: str) -> list[IntArray]:
-        """Node numbers (n_faces, m) of the faces of a surface, seen from outside, by kind of face."""
+        """Node numbers (n_faces, m) of the faces of a surface, each once, seen from outside, by kind of face."""
         found = []
         for first, face in self.surfaces[name]:
             numbers = np.array([int(first)]) if first.isdigit() else self.members(first, where)
+            self._check_there(numbers, f"{where}, surface {name}")
             for kind, block in self.blocks.items():
                 chosen = np.isin(block.numbers, numbers)
                 if chosen.any():
                     found.append(block.nodes[chosen][:, _face_of(kind, face, f"{where}, surface {name}")])
-        return _by_nodes(found)
+        return [np.unique(table, axis=0) for table in _by_nodes(found)]
+
+    def _check_there(self, numbers: IntArray, where: str) -> None:
+        missing = np.setdiff1d(
+            numbers, np.concatenate([np.zeros(0, np.int64), *(b.numbers for b in self.blocks.values())])
+        )
+        if len(missing):
+            measured, fix = (
+                f"{len(missing)} of them, the first is {missing[0]}",
+                "correct the surface or its element sets",
+            )
+            raise InputError("a surface names elements that are none", where, measured, "C3D or S elements", fix)
 
     def free_faces(self, nodes: IntArray) -> list[IntArray]:
         """Faces of one element alone whose nodes are all in a set, as `faces`."""

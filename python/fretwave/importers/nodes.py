@@ -9,7 +9,6 @@ keywords in any case; ``*NSET, GENERATE`` gives first, last, step; a set may nam
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -19,6 +18,7 @@ from ..arrays import Array, IntArray
 from ..errors import InputError
 from ..texts import display, nearest
 from .cells import Elements
+from .keywords import Lines, blocks, number
 from .text import columns_of
 
 
@@ -147,88 +147,117 @@ class Deck:
         self.where = display(path)
         self.rows: list[tuple[int, float, float, float]] = []
         self.members: dict[str, list[int | str]] = {}
+        self.surfaces: dict[str, list[int | str]] = {}
+        self.of_elements: list[tuple[str, str]] = []
+        self.parts: set[str] = set()
         self.elements = Elements()
         self.materials: list[Material] = []
-        for keyword, options, data in _blocks(path):
+        for keyword, options, data in blocks(path):
             if keyword == "NODE":
                 self._add_nodes(options, data)
             elif keyword == "NSET":
                 self._add_set(self.members, "NSET", options, data)
+                if "ELSET" in options:
+                    self.of_elements.append((options.get("NSET", "").upper(), options["ELSET"].upper()))
             elif keyword == "ELSET":
                 self._add_set(self.elements.sets, "ELSET", options, data)
             elif keyword == "ELEMENT":
-                self.elements.add(options, data, self.where)
+                self.elements.add(options, data)
             elif keyword == "SURFACE":
                 self._add_surface(options, data)
             elif keyword in ("MATERIAL", "ELASTIC", "DENSITY"):
                 self._add_material(keyword, options, data)
-            elif keyword == "INSTANCE" and data:
-                fix = "write the deck flat (Abaqus/CAE: do not use parts and assemblies in input files)"
-                raise InputError("an instance is moved", f"{self.where}:{data[0][0]}", data[0][1], "no movement", fix)
+            elif keyword == "INSTANCE":
+                self._add_instance(options, data)
+            elif keyword == "TRANSFORM":
+                fix = "take *TRANSFORM out and export the matrices again"
+                expected = "directions x, y, z at every node"
+                raise InputError("directions of nodes are turned", self.where, "*TRANSFORM", expected, fix)
 
-    def _add_nodes(self, options: dict[str, str], data: list[tuple[int, str]]) -> None:
+    def _add_instance(self, options: dict[str, str], data: Lines) -> None:
+        part = options.get("PART", "").upper()
+        if data or part in self.parts:
+            what = "an instance is moved" if data else "a part has two instances"
+            place, text = data[0] if data else (self.where, part)
+            fix = "write the deck flat (Abaqus/CAE: do not use parts and assemblies in input files)"
+            raise InputError(what, place, text, "each part once, where it is", fix)
+        self.parts.add(part)
+
+    def _add_nodes(self, options: dict[str, str], data: Lines) -> None:
         if options.get("SYSTEM", "R").upper() != "R":
             fix = "write rectangular coordinates"
             raise InputError("coordinates are not rectangular", self.where, f"SYSTEM={options['SYSTEM']}", "R", fix)
         before = len(self.rows)
-        for line, text in data:
-            words = [word.strip() for word in text.split(",") if word.strip()]
+        for place, text in data:
+            words = [word.strip() for word in text.split(",")]
             try:
-                x, y, z = [float(word) for word in words[1:4]] + [0.0] * (4 - len(words[:4]))
+                x, y, z = [number(word) for word in (words[1:4] + ["", "", ""])[:3]]
                 self.rows.append((int(words[0]), x, y, z))
             except ValueError:
                 fix = "correct the line"
-                raise InputError("this is no node", f"{self.where}:{line}", text, "node, x, y, z", fix) from None
+                raise InputError("this is no node", place, text, "node, x, y, z", fix) from None
         if "NSET" in options:
             self.members.setdefault(options["NSET"].upper(), []).extend(row[0] for row in self.rows[before:])
 
-    def _add_surface(self, options: dict[str, str], data: list[tuple[int, str]]) -> None:
+    def _add_surface(self, options: dict[str, str], data: Lines) -> None:
         """Faces of elements, or nodes: a node set of its name."""
         if options.get("TYPE", "ELEMENT").upper() == "NODE":
             lines = [(line, text.partition(",")[0]) for line, text in data]  # without the areas that may follow
-            self._add_set(self.members, "NAME", options, lines)
+            self._add_set(self.surfaces, "NAME", options, lines)
         else:
             self.elements.add_surface(options.get("NAME", ""), data)
 
-    def _add_set(
-        self, sets: dict[str, list[int | str]], key: str, options: dict[str, str], data: list[tuple[int, str]]
-    ) -> None:
+    def _add_set(self, sets: dict[str, list[int | str]], key: str, options: dict[str, str], data: Lines) -> None:
         members = sets.setdefault(options.get(key, "").upper(), [])
-        for line, text in data:
-            words = [word.strip() for word in text.split(",") if word.strip()]
+        for place, text in data:
+            words = [word.strip().strip('"') for word in text.split(",") if word.strip()]
             try:
                 if "GENERATE" in options:
-                    first, last, *step = (int(word) for word in words)
-                    members.extend(range(first, last + 1, *step))
+                    members.extend(_generated(*words))
                 else:
                     members.extend(int(word) if word.lstrip("-").isdigit() else word.upper() for word in words)
-            except ValueError:
+            except (TypeError, ValueError):
                 expected = "first, last, step" if "GENERATE" in options else "numbers or names of sets"
                 fix, kind = "correct the line", "element" if key == "ELSET" else "node"
-                raise InputError(f"this is no {kind} set", f"{self.where}:{line}", text, expected, fix) from None
+                raise InputError(f"this is no {kind} set", place, text, expected, fix) from None
 
-    def _add_material(self, keyword: str, options: dict[str, str], data: list[tuple[int, str]]) -> None:
+    def _add_material(self, keyword: str, options: dict[str, str], data: Lines) -> None:
         """A material's name, or its first modulus or density, as far as it is a number."""
         if keyword == "MATERIAL":
             self.materials.append(Material(options.get("NAME", "a material"), self.where))
             return
         try:
-            value = float(data[0][1].partition(",")[0])
+            value = number(data[0][1].partition(",")[0].strip())
         except (IndexError, ValueError):
             return
         if self.materials and value > 0:
             now = self.materials[-1]
-            now.where = f"{self.where}:{data[0][0]}"
+            now.where = data[0][0]
             setattr(now, "modulus" if keyword == "ELASTIC" else "density", value)
 
-    def _expand(self, name: str, above: tuple[str, ...] = ()) -> list[int]:
-        if name not in self.members or name in above:
-            known = ", ".join(sorted(self.members))
-            raise InputError(f"a node set names '{name}', which is none", self.where, None, f"one of {known}")
+    def _expand(self, members: list[int | str], above: tuple[str, ...] = ()) -> list[int]:
         found: list[int] = []
-        for member in self.members[name]:
-            found.extend([member] if isinstance(member, int) else self._expand(member, (*above, name)))
+        for member in members:
+            if isinstance(member, int):
+                found.append(member)
+            elif member in self.members and member not in above:
+                found.extend(self._expand(self.members[member], (*above, member)))
+            else:
+                known = ", ".join(sorted(self.members))
+                raise InputError(f"a node set names '{member}', which is none", self.where, None, f"one of {known}")
         return found
+
+    def _sets(self) -> dict[str, IntArray]:
+        """Node numbers of sets, and of surfaces of nodes, which may have the name of a set."""
+        for name, elements in self.of_elements:
+            self.members[name] += self.elements.nodes_of(elements, self.where).tolist()
+        sets, surfaces = (
+            {name: np.unique(np.array(self._expand(members), dtype=np.int64)) for name, members in table.items()}
+            for table in (self.members, self.surfaces)
+        )
+        for name in sets.keys() & surfaces.keys():
+            check_alike(name, sets[name], surfaces[name], self.where)
+        return {**sets, **surfaces}
 
     def nodes(self) -> Nodes:
         """What the deck holds."""
@@ -236,36 +265,34 @@ class Deck:
             raise InputError("the deck has no nodes", self.where, None, "*NODE", "give the deck with the mesh")
         table = np.array([row[1:] for row in self.rows])
         numbers = np.array([row[0] for row in self.rows], dtype=np.int64)
-        sets = {name: np.unique(np.array(self._expand(name), dtype=np.int64)) for name in self.members}
         materials = [one for one in self.materials if one.modulus is not None or one.density is not None]
-        return Nodes(numbers, table, self.where, sets, self.elements, materials)
+        found = Nodes(numbers, table, self.where, self._sets(), self.elements, materials)
+        self.elements.check_numbers(self.where)
+        return found
 
 
-def _blocks(path: Path) -> Iterator[tuple[str, dict[str, str], list[tuple[int, str]]]]:
-    """Keyword, options and data lines (number, text) of each block; ``*INCLUDE`` is followed."""
-    keyword, options, data = "", dict[str, str](), list[tuple[int, str]]()
-    lines = iter(enumerate(path.read_text(encoding="utf-8", errors="replace").splitlines(), 1))
-    for number, line in lines:
-        text = line.strip()
-        if not text or text.startswith("**"):
-            continue
-        if not text.startswith("*"):
-            data.append((number, text))
-            continue
-        while text.endswith(","):  # a keyword line goes on
-            text += next(lines, (0, ""))[1].strip() or " "
-        yield keyword, options, data
-        keyword, options, data = *_keyword(text), []
-        if keyword == "INCLUDE":
-            included = path.parent / options.get("INPUT", "")
-            if not included.is_file():
-                fix = "put the file beside the deck"
-                raise InputError("an included file does not exist", f"{display(path)}:{number}", text, None, fix)
-            yield from _blocks(included)
-    yield keyword, options, data
+def check_alike(name: str, one: IntArray, other: IntArray, where: str) -> None:
+    """A node set and a surface of one name have the same nodes.
+
+    Raises
+    ------
+    InputError
+        They have not: which is meant is not known.
+    """
+    if not np.array_equal(np.unique(one), np.unique(other)):
+        measured = f"{len(one)} nodes in the set, {len(other)} on the surface"
+        what, fix = f"a node set and a surface are both called '{name}'", "give one of them another name"
+        raise InputError(what, where, measured, "the same nodes", fix)
 
 
-def _keyword(text: str) -> tuple[str, dict[str, str]]:
-    words = [word.strip() for word in text[1:].split(",")]
-    pairs = [word.partition("=") for word in words[1:] if word]
-    return words[0].upper(), {name.strip().upper(): value.strip() for name, _, value in pairs}
+def _generated(first: str, last: str, step: str = "1") -> range:
+    """Of a line "first, last, step".
+
+    Raises
+    ------
+    ValueError
+        It has no members, or a step that does not go upwards.
+    """
+    if int(last) < int(first) or int(step) < 1:
+        raise ValueError
+    return range(int(first), int(last) + 1, int(step))

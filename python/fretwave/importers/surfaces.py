@@ -10,7 +10,7 @@ import numpy as np
 from ..arrays import Array, IntArray
 from ..errors import InputError
 from ..texts import nearest
-from .nodes import Nodes
+from .nodes import Nodes, check_alike
 from .shapes import centre, gauss, node_places, shape_functions
 
 #: Cosine of the largest angle between a node's faces and its normal, and between two sides that look at each other.
@@ -80,12 +80,15 @@ def side_of(nodes: Nodes, name: str) -> Side:
         where = f"{nodes.where}, surface {name}"
         tables = nodes.elements.faces(name.upper(), nodes.where)
         numbers = np.unique(np.concatenate([table.ravel() for table in tables] or [np.zeros(0, dtype=np.int64)]))
-        if not len(numbers):
-            raise InputError("a surface has no faces", where, None, "faces of C3D or S elements of the deck")
+        if name.upper() in nodes.sets:
+            check_alike(name, nodes.node_set(name), numbers, nodes.where)
     else:
         where = f"{nodes.where}, set {name}"
         numbers = _node_set(nodes, name)
         tables = nodes.elements.free_faces(numbers)
+    if not len(numbers):
+        expected, fix = "faces of C3D or S elements, or nodes", "check the set in the deck"
+        raise InputError("a side of the contact is empty", where, "no nodes", expected, fix)
     covered = np.isin(numbers, np.concatenate([table.ravel() for table in tables])) if tables else np.array(False)
     order = np.argsort(numbers)
     places = [order[np.searchsorted(numbers, table, sorter=order)] for table in tables] if covered.all() else []

@@ -1,0 +1,76 @@
+"""Keywords of an Abaqus or CalculiX input deck with their options and data lines.
+
+Layout (SIMULIA, Abaqus Keywords Reference, "Input syntax rules"; G. Dhondt, CalculiX CrunchiX User's Manual): a keyword
+line that ends in a comma goes on; ``**`` is a comment; the lines of an ``*INCLUDE`` stand in its place, within a set or
+table too; a blank field is zero; exponents are E or D.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from ..errors import InputError
+from ..texts import display
+
+#: Data lines: file and line, text.
+Lines = list[tuple[str, str]]
+
+
+def blocks(path: Path) -> Iterator[tuple[str, dict[str, str], Lines]]:
+    """Keyword, options and data lines of each block; ``*INCLUDE`` is followed.
+
+    Raises
+    ------
+    InputError
+        An included file does not exist, or includes itself.
+    """
+    keyword, options, data = "", dict[str, str](), Lines()
+    for place, text in _lines(path, ()):
+        if not text.startswith("*"):
+            data.append((place, text))
+            continue
+        yield keyword, options, data
+        keyword, options, data = *_keyword(text), []
+    yield keyword, options, data
+
+
+def number(word: str) -> float:
+    """Of a field, which may be blank, with the exponent E or D.
+
+    Raises
+    ------
+    ValueError
+        It is no number.
+    """
+    return float(word.upper().replace("D", "E") or 0)
+
+
+def _lines(path: Path, above: tuple[Path, ...]) -> Iterator[tuple[str, str]]:
+    """File and line, and text of each line that is no comment, keywords in one line."""
+    lines = iter(enumerate(path.read_text(encoding="utf-8", errors="replace").splitlines(), 1))
+    for count, line in lines:
+        text, place = line.strip(), f"{display(path)}:{count}"
+        if not text or text.startswith("**"):
+            continue
+        while text.startswith("*") and text.endswith(","):  # a keyword line goes on
+            text += next(lines, (0, ""))[1].strip() or " "
+        keyword, options = _keyword(text) if text.startswith("*") else ("", {})
+        if keyword == "INCLUDE":
+            yield from _included(path.parent / options.get("INPUT", ""), (*above, path.resolve()), place, text)
+        else:
+            yield place, text
+
+
+def _included(path: Path, above: tuple[Path, ...], place: str, text: str) -> Iterator[tuple[str, str]]:
+    if not path.is_file():
+        raise InputError("an included file does not exist", place, text, None, "put the file beside the deck")
+    if path.resolve() in above:
+        raise InputError("a file includes itself", place, text, "another file", "remove the line")
+    yield from _lines(path, above)
+
+
+def _keyword(text: str) -> tuple[str, dict[str, str]]:
+    words = [word.strip() for word in text[1:].split(",")]
+    pairs = [word.partition("=") for word in words[1:] if word]
+    return words[0].upper(), {name.strip().upper(): value.strip().strip('"') for name, _, value in pairs}
