@@ -9,11 +9,14 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 from models.meshed_wheel import PAIRS, SECTORS, STIFFNESS, Wheel, imported, sector_of
-from tolerances import TIGHT
+from tolerances import LAST_BIT, TIGHT
 
 import fretwave as fw
 from fretwave.commands.main import main
+from fretwave.importers.nodes import Nodes
+from fretwave.importers.pairs import match
 from fretwave.model.contact import in_limit
+from fretwave.model.sectors import rotation
 from fretwave.mpi.guard import on_first_rank
 from fretwave.results import model_file
 
@@ -255,6 +258,20 @@ def test_a_slanted_shroud_says_its_normal(tmp_path: Path, capfd) -> None:
     assert main([*command, *sector_of(), *PAIRS]) == 2
     assert "give --normal" in capfd.readouterr().err
     assert main([*command, *sector_of(), *PAIRS, "--normal=-0.6,0.7,-0.2"]) == 0
+
+
+@pytest.mark.ranks(1)
+@pytest.mark.parametrize("ends", [(1, 2), (2, 1)])
+def test_one_of_two_sectors(ends: tuple[int, int]) -> None:
+    """The next sector is the one before: both ends reach it, and a rigid turn moves no pair."""
+    points = np.array([[0.0, -2, 0.5], [0.0, 2, 0.5]])
+    nodes = Nodes(np.array([1, 2]), points, "two", {"LOW": np.array([ends[0]]), "HIGH": np.array([ends[1]])})
+    labels = np.column_stack([np.repeat([1, 2], 3), np.tile([1, 2, 3], 2)])
+    turn = rotation(np.pi, "z")
+    pairs = match("shroud", nodes, "HIGH", "LOW@next", np.array([1.0, 0, 0]), labels, turn=turn)
+    motion = np.cross([0, 0, 1.0], points).ravel()
+    assert abs(pairs.B[0] @ motion).max() == 2
+    np.testing.assert_allclose(pairs.B[0] @ motion + pairs.B[1] @ motion, 0, atol=LAST_BIT)
 
 
 @pytest.mark.ranks(1)

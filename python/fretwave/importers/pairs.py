@@ -126,8 +126,8 @@ def _without_next(second: str, turn: Array | None, where: str) -> tuple[str, Arr
 
 
 def _check_ahead(a: Side, b: Side, turn: Array, reach: float, where: str) -> None:
-    """The first side does not lie where the second one is of the sector before."""
-    if cKDTree(b.points @ turn).query(a.points)[0].max() > reach:
+    """The first side does not lie where the second one is of the sector before (of two sectors also the next)."""
+    if np.allclose(turn, turn.T) or cKDTree(b.points @ turn).query(a.points)[0].max() > reach:
         return
     measured = f"{len(a.numbers)} nodes at the second side of the sector before"
     first, second = (side.where.rpartition(" ")[2] for side in (a, b))
