@@ -12,6 +12,8 @@ from models.matrix_files import Held, write_calculix, write_npz
 from models.two_bars import Two
 
 from fretwave.commands.main import main
+from fretwave.errors import InputError
+from fretwave.importers.calculix import read_dofs
 
 pytestmark = pytest.mark.ranks(1)
 
@@ -107,3 +109,43 @@ def test_mass_and_stiffness_of_two_models(labelled: bool, tmp_path: Path, capfd:
     (tmp_path / "small").mkdir()
     small = write_npz(tmp_path / "small", sp.csr_matrix(bars[2].M), "M", labels)
     assert "differ in size" in refused([*command, small], tmp_path, capfd)
+
+
+@pytest.mark.parametrize("given", ["nan", "-1", "0", "inf"])
+def test_a_tolerance_that_is_no_length(given: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    assert "the tolerance is no length" in refused([*Two().write(tmp_path), f"--tolerance={given}"], tmp_path, capfd)
+
+
+def test_a_gap_is_said(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """Where the tolerance lets it pass."""
+    two = Two()
+    two.nodes[len(two.first.nodes) :, 0] += 0.002
+    assert main([*two.write(tmp_path, True), *LEFT_RIGHT, "--tolerance", "0.003"]) == 0
+    assert "contact 'joint': its nodes are up to 0.002 apart" in capfd.readouterr().out
+
+
+def test_nodes_that_depend_on_others(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """A direction of a contact's node that has no row is held by *BOUNDARY, or else it is that of an *EQUATION."""
+    two = Two()
+    command, nodes = two.write(tmp_path, True), len(two.nodes)
+    names = [f"{node}.{direction}" for node in range(1, nodes + 1) for direction in (1, 2, 3)]
+    kept = [k for k, name in enumerate(names) if name != f"{two.ends[0]}.2"]
+    (tmp_path / "rows.dof").write_text("".join(f"{names[k]}\n" for k in kept))
+    for letter, A in (("M", two.M), ("K", two.K)):
+        sp.save_npz(tmp_path / f"{letter}.npz", sp.csr_matrix(A[kept][:, kept]))
+    command = [*command[:2], "--mass", str(tmp_path / "M.npz"), "--stiffness", str(tmp_path / "K.npz"), *command[-2:]]
+    command += ["--dofs", str(tmp_path / "rows.dof"), *LEFT_RIGHT]
+    deck = (tmp_path / "n.inp").read_text() + "*EQUATION\n2\n5,2,1.,6,2,-1.\n"
+    (tmp_path / "n.inp").write_text(deck)
+    text = refused(command, tmp_path, capfd)
+    assert f"measured: n{two.ends[0]}y, 1 such dofs; the deck has *EQUATION" in text
+    (tmp_path / "n.inp").write_text(f"{deck}*BOUNDARY\n{two.ends[0]}, 2\n")
+    assert main(command) == 0
+
+
+def test_shells_of_calculix(tmp_path: Path) -> None:
+    """It makes solids of them: a node has several rows of one direction, and which is which is not known."""
+    (tmp_path / "job.dof").write_text("1.1\n1.2\n1.3\n1.1\n")
+    with pytest.raises(InputError, match="stands twice") as caught:
+        read_dofs(tmp_path / "job.dof")
+    assert "mesh shells and beams as solids" in (caught.value.fix or "")

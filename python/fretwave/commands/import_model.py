@@ -12,7 +12,7 @@ import numpy as np
 from ..arrays import Array, IntArray
 from ..case.plugins import load_file
 from ..errors import EXIT_DONE, InputError
-from ..importers.calculix import SUFFIXES, read_dofs
+from ..importers.calculix import SUFFIXES, check_once, read_dofs
 from ..importers.directions import check_directions
 from ..importers.entries import Assembled, assemble
 from ..importers.exchanged import check_one_model
@@ -69,6 +69,9 @@ def read_parts(options: argparse.Namespace) -> tuple[Structure, Assembled, list[
     _take_deck(options)
     if options.units is not None and options.units not in SYSTEMS:
         raise unknown(options.units, "--units")
+    if options.tolerance is not None and not 0 < options.tolerance < np.inf:
+        expected, fix = "a length above 0", "leave it out, or give the distance that is meant"
+        raise InputError("the tolerance is no length", "--tolerance", f"{options.tolerance:g}", expected, fix)
     _check_place(options.out, [options.mass, options.stiffness, options.damping])
     paths = {letter: getattr(options, role) for letter, role in ROLES.items() if getattr(options, role)}
     given = {letter: read_matrix(path, letter) for letter, path in paths.items()}
@@ -146,11 +149,7 @@ def _labels(options: argparse.Namespace, found: Assembled, nodes: Nodes | None) 
             fix = "give one line for each row of the matrices"
             measured, expected = f"{len(labels)} dofs", f"{found.given_size}, the size of the matrices"
             raise InputError("the table of dofs does not fit", where, measured, expected, fix)
-        different, count = np.unique(labels, axis=0, return_counts=True)
-        if count.max() > 1:
-            node, direction = different[np.argmax(count)]
-            measured, fix = f"node {node}, direction {direction}", "correct the table"
-            raise InputError("a dof stands twice in the table", where, measured, "each dof once", fix)
+        check_once(labels, where, "correct the table")
     elif found.labels is not None or nodes is None:
         return found.labels
     else:

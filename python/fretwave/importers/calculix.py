@@ -45,7 +45,24 @@ def read_dofs(path: Path) -> IntArray:
             "node.direction, one line for each row",
             "give the .dof file that CalculiX wrote beside the matrices",
         )
-    return np.array([(int(node), int(direction)) for node, _, direction in parts], dtype=np.int64).reshape(-1, 2)
+    labels = np.array([(int(node), int(direction)) for node, _, direction in parts], dtype=np.int64).reshape(-1, 2)
+    check_once(labels, display(path), "mesh shells and beams as solids: CalculiX makes solids of them")
+    return labels
+
+
+def check_once(labels: IntArray, where: str, fix: str) -> None:
+    """Each node and direction stands once among labels (n_dof, 2).
+
+    Raises
+    ------
+    InputError
+        One stands twice.
+    """
+    different, count = np.unique(labels, axis=0, return_counts=True)
+    if count.max(initial=1) > 1:
+        node, direction = different[np.argmax(count)]
+        measured = f"node {node}, direction {direction}"
+        raise InputError("a dof stands twice in the table", where, measured, "each dof once", fix)
 
 
 def _check_size(entries: Entries, beside: Path) -> None:

@@ -18,6 +18,7 @@ from ..arrays import Array, IntArray
 from ..errors import InputError
 from ..texts import display, nearest
 from .cells import Elements
+from .constraints import Constraints
 from .keywords import Lines, blocks, number
 from .text import columns_of
 
@@ -48,6 +49,8 @@ class Nodes:
         Of a deck, with their sets and surfaces.
     materials : list of Material
         With a modulus or a density.
+    constraints : Constraints
+        Of a deck.
     """
 
     numbers: IntArray
@@ -56,6 +59,7 @@ class Nodes:
     sets: dict[str, IntArray] = field(default_factory=dict)
     elements: Elements = field(default_factory=Elements)
     materials: list[Material] = field(default_factory=list)
+    constraints: Constraints = field(default_factory=Constraints)
 
     def __post_init__(self) -> None:
         different, count = np.unique(self.numbers, return_counts=True)
@@ -150,9 +154,11 @@ class Deck:
         self.surfaces: dict[str, list[int | str]] = {}
         self.of_elements: list[tuple[str, str]] = []
         self.parts: set[str] = set()
+        self.constraints = Constraints()
         self.elements = Elements()
         self.materials: list[Material] = []
         for keyword, options, data in blocks(path):
+            self.constraints.add(keyword, data)
             if keyword == "NODE":
                 self._add_nodes(options, data)
             elif keyword == "NSET":
@@ -266,7 +272,7 @@ class Deck:
         table = np.array([row[1:] for row in self.rows])
         numbers = np.array([row[0] for row in self.rows], dtype=np.int64)
         materials = [one for one in self.materials if one.modulus is not None or one.density is not None]
-        found = Nodes(numbers, table, self.where, self._sets(), self.elements, materials)
+        found = Nodes(numbers, table, self.where, self._sets(), self.elements, materials, self.constraints)
         self.elements.check_numbers(self.where)
         return found
 

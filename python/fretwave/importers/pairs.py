@@ -109,7 +109,7 @@ def match(
         if ahead is not None:
             _check_ahead(a, b, ahead, reach, where)
             b = replace(b, points=b.points @ ahead.T)
-        found = _pair(a, b, normals, where, reach)
+        found = _pair(a, b, normals, where, nodes, reach)
     if notes is not None and found.note:
         notes.append(f"contact '{name}': {found.note}")
     return _joined(name, found, normals, a.areas, where, labels, nodes, tangent, ahead)
@@ -135,7 +135,7 @@ def _check_ahead(a: Side, b: Side, turn: Array, reach: float, where: str) -> Non
     raise InputError("the sides are of the wrong sectors", where, measured, "the high end, then the next low end", fix)
 
 
-def _pair(a: Side, b: Side, normals: Array, where: str, reach: float) -> Found:
+def _pair(a: Side, b: Side, normals: Array, where: str, nodes: Nodes, reach: float) -> Found:
     """Coincident nodes where all have a partner, else the first side's nodes on the second's faces."""
     common = np.intersect1d(a.numbers, b.numbers)
     if len(common):
@@ -149,7 +149,8 @@ def _pair(a: Side, b: Side, normals: Array, where: str, reach: float) -> Found:
     left = np.setdiff1d(np.arange(len(b.numbers)), partner[distance <= reach])
     if not alone and not len(left) and len(both) == len(b.numbers):
         weights = sp.csr_matrix((np.ones(len(both)), (np.arange(len(both)), partner)), shape=(len(both),) * 2)
-        return Found(both, b.numbers, weights)
+        wide = distance.max() > reach_of(nodes, None)
+        return Found(both, b.numbers, weights, f"its nodes are up to {distance.max():.2g} apart" if wide else "")
     if b.faces:
         return _projected(a, b, both, where, reach)
     distance_b = cKDTree(a.points).query(b.points[left])[0] if len(left) else []
@@ -190,11 +191,14 @@ def _shown(named: list[str]) -> str:
 def _check_near(a: Side, b: Side, distance: Array, partner: IntArray, where: str, reach: float) -> None:
     """Two sides are not far apart as a whole: the nearest nodes, or the nearest node and face."""
     least = int(np.argmin(distance))
-    closest = distance[least]
+    closest, nearest = distance[least], f"nodes {a.numbers[least]} and {b.numbers[partner[least]]} are nearest"
     if closest > FAR * reach and b.faces:
-        closest = min(closest, project(a.points, b)[1].min())
+        onto = project(a.points, b)[1]
+        if onto.min() < closest:
+            least = int(np.argmin(onto))
+            closest, nearest = onto[least], f"node {a.numbers[least]} and a face are nearest"
     if closest > FAR * reach:
-        measured = f"nodes {a.numbers[least]} and {b.numbers[partner[least]]} are nearest, {distance[least]:.3g} apart"
+        measured = f"{nearest}, {closest:.3g} apart"
         fix = "check the names of the sets, or that both bodies are in one unit and place; else widen --tolerance"
         raise InputError("the two sides are far apart", where, measured, f"at most {reach:.3g}", fix)
 
@@ -291,6 +295,9 @@ def _joined(
         raise InputError(error.what, place, error.measured, error.expected, "give another --tangent") from None
     own = _selection(both[:, 0], labels)
     other = (sp.kron(found.weights, sp.identity(3)) @ _selection(found.others, labels)).tocsr()
+    if nodes is not None:
+        numbers = np.union1d(both[:, 0], found.others[found.others > 0]).tolist()
+        nodes.constraints.check(name, numbers, labels, nodes.sets, where)
     _check_dofs(name, both, where, abs(own) + abs(other), labels)
     R = sp.block_diag(list(frames))
     B: Term = _stored(R @ (own - other))

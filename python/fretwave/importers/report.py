@@ -112,7 +112,7 @@ def check(
     _frequencies(model, motions, modes, comm, report)
     lines, warnings = words(model.units, evidence)
     report.lines += lines
-    report.warnings += warnings
+    report.warnings += dict.fromkeys(warnings)
     return report
 
 
