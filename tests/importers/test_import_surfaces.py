@@ -193,6 +193,23 @@ def test_pairs_keep_the_order_of_an_npz(tmp_path: Path) -> None:
     assert wall.nodes[:, 0].tolist() == [5, 7, 3] and wall.points.tolist() == np.eye(3)[[2, 0, 1]].tolist()
 
 
+def test_faces_whose_corners_coincide(tmp_path: Path) -> None:
+    """C3D8 collapsed to wedges about a middle node, with a node of the other side on it: no tangents there."""
+    corners = [(0, 0), (2, 0), (2, 2), (0, 2)]
+    places = [(x, y, z) for z in (1, 2) for x, y in [(1, 1), *corners]]
+    text = "*NODE\n" + "".join(f"{k},{x},{y},{z}\n" for k, (x, y, z) in enumerate(places, 1))
+    cells = [(1, 2 + k, 2 + (k + 1) % 4, 1, 6, 7 + k, 7 + (k + 1) % 4, 6) for k in range(4)]
+    text += "*ELEMENT, TYPE=C3D8\n" + "".join(f"{k},{','.join(map(str, c))}\n" for k, c in enumerate(cells, 1))
+    text += "*NODE\n11,1,1,1\n12,1.5,1,1\n13,1.5,1.5,1\n14,1,1.5,1\n*NSET,NSET=B,GENERATE\n1,5\n"
+    text += "*ELEMENT, TYPE=S4\n5,11,12,13,14\n*NSET,NSET=A,GENERATE\n11,14\n"
+    (tmp_path / "deck.inp").write_text(text)
+    nodes = read_nodes(tmp_path / "deck.inp")
+    labels = np.column_stack([np.repeat(nodes.numbers, 3), np.tile([1, 2, 3], len(nodes.numbers))])
+    joint = match("joint", nodes, "A", "B", None, labels)
+    gradient = np.random.default_rng(1).normal(size=(3, 3))
+    assert abs(joint.B @ (nodes.coordinates @ gradient).ravel()).max() < PATCH
+
+
 def test_curved_faces(tmp_path: Path) -> None:
     """Two meshes of a cylinder's quarter: normals along the radius, the area within the chords' error."""
     below, above = Box("C3D20", (2, 6, 1), (0, 0, 0.8), (1, 1, 1)), Box("C3D20", (2, 5, 1), (0, 0, 1), (1, 1, 1.2))

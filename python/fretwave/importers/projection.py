@@ -19,6 +19,8 @@ from .surfaces import Side
 SLACK = 1e-2
 #: Steps of Gauss and Newton, and where they end.
 STEPS, SMALL = 30, 1e-14
+#: Keeps a metric regular where corners of a face coincide; what it leads to is the same.
+TINY = 1e-300
 #: Weights below are rounding.
 LEAST = 1e-12
 
@@ -62,7 +64,9 @@ def _closest(points: Array, faces: Array) -> Array:
         values, gradients = shape_functions(m, u)
         along = gradients @ faces
         away = points - np.einsum("nm,nmx->nx", values, faces)
-        step = np.linalg.solve(along @ along.swapaxes(1, 2), along @ away[:, :, None])[:, :, 0]
+        metric = along @ along.swapaxes(1, 2)
+        metric += (SMALL * np.trace(metric, axis1=1, axis2=2)[:, None, None] + TINY) * np.eye(2)
+        step = np.linalg.solve(metric, along @ away[:, :, None])[:, :, 0]
         u = np.clip(u + step, -3.0, 3.0)  # far beside a face it does not matter where
         if abs(step).max(initial=0.0) < SMALL:
             break
