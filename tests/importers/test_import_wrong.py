@@ -14,6 +14,7 @@ from models.two_bars import Two
 from fretwave.commands.main import main
 from fretwave.errors import InputError
 from fretwave.importers.calculix import read_dofs
+from fretwave.importers.nodes import read_nodes
 
 pytestmark = pytest.mark.ranks(1)
 
@@ -149,3 +150,41 @@ def test_shells_of_calculix(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="stands twice") as caught:
         read_dofs(tmp_path / "job.dof")
     assert "mesh shells and beams as solids" in (caught.value.fix or "")
+
+
+#: A change of each line "a,b,1,0,0,1e-5" of a table of pairs.
+TABLES = {
+    "no whole number": lambda a, b: f"{a}.7,{b},1,0,0\n",
+    "a pair stands twice": lambda a, b: 2 * f"{a},{b},1,0,0\n",
+    "of one node with itself": lambda a, b: f"{a},{a},1,0,0\n",
+    "an area below zero": lambda a, b: f"{a},{b},1,0,0,-1e-5\n",
+}
+
+
+@pytest.mark.parametrize("said", TABLES)
+def test_tables_of_pairs(said: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    two = Two()
+    ends = two.ends.tolist()
+    (tmp_path / "p.csv").write_text("".join(TABLES[said](a, b) for a, b in zip(ends[:6], ends[6:])))
+    assert said in refused([*two.write(tmp_path), "--pairs", str(tmp_path / "p.csv")], tmp_path, capfd)
+
+
+@pytest.mark.parametrize(("form", "said"), [("{0},{2}", "a direction of the table is none"), ("{0}.5,{1}", "whole")])
+def test_tables_of_dofs(form: str, said: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """Directions from 0 on would be others; nodes are not rounded."""
+    two = Two()
+    rows = [
+        form.format(node, direction, direction - 1) for node in range(1, len(two.nodes) + 1) for direction in (1, 2, 3)
+    ]
+    (tmp_path / "d.csv").write_text("\n".join(rows))
+    command = [*two.write(tmp_path), *LEFT_RIGHT, "--normal", "1,0,0", "--dofs", str(tmp_path / "d.csv")]
+    assert said in refused(command, tmp_path, capfd)
+
+
+def test_nodes_of_a_set_are_taken_once(tmp_path: Path) -> None:
+    """And nodes have whole numbers."""
+    np.savez(tmp_path / "n.npz", coordinates=np.eye(3), WALL=[3, 1, 3])
+    assert read_nodes(tmp_path / "n.npz").node_set("WALL").tolist() == [3, 1]
+    (tmp_path / "n.csv").write_text("1, 0, 0, 0\n1.5, 1, 0, 0\n")
+    with pytest.raises(InputError, match="no whole number"):
+        read_nodes(tmp_path / "n.csv")

@@ -22,6 +22,7 @@ from ..importers.pairs import NEXT, match, read_pairs
 from ..importers.report import check
 from ..importers.sector import SectorFaces, make_sector, said_of, wheel_of
 from ..importers.surfaces import has_faces
+from ..importers.text import columns_of, whole
 from ..importers.units import Evidence, check_declared, evidence_of
 from ..model.pairs import Pairs
 from ..model.structure import Structure
@@ -150,6 +151,11 @@ def _labels(options: argparse.Namespace, found: Assembled, nodes: Nodes | None) 
             measured, expected = f"{len(labels)} dofs", f"{found.given_size}, the size of the matrices"
             raise InputError("the table of dofs does not fit", where, measured, expected, fix)
         check_once(labels, where, "correct the table")
+        wrong = ~np.isin(labels[:, 1], range(1, 7))
+        if wrong.any():
+            node, direction = labels[np.argmax(wrong)]
+            measured, expected = f"direction {direction} of node {node}", "1, 2, 3 for x, y, z and 4, 5, 6 about them"
+            raise InputError("a direction of the table is none", where, measured, expected, "number them from 1")
     elif found.labels is not None or nodes is None:
         return found.labels
     else:
@@ -179,9 +185,7 @@ def _read_table(path: Path) -> IntArray:
         raise InputError("the table of dofs does not exist", display(path), fix="check the path")
     if "," not in path.read_text(encoding="utf-8"):
         return read_dofs(path)
-    from ..importers.text import columns_of
-
-    return columns_of(path, 2).astype(np.int64)
+    return whole(columns_of(path, 2), display(path))
 
 
 def _names(known: Sequence[str], given: list[str]) -> tuple[list[str], dict[str, int]]:

@@ -20,7 +20,7 @@ from ..texts import display, nearest
 from .cells import Elements
 from .constraints import Constraints
 from .keywords import Lines, blocks, number
-from .text import columns_of
+from .text import columns_of, whole
 
 
 @dataclass
@@ -119,7 +119,7 @@ def read_nodes(path: Path) -> Nodes:
     if head.lstrip().startswith(b"*"):
         return Deck(path).nodes()
     table = columns_of(path, 4)
-    return Nodes(table[:, 0].astype(np.int64), table[:, 1:], display(path))
+    return Nodes(whole(table[:, 0], display(path)), table[:, 1:], display(path))
 
 
 def cells_of(nodes: Nodes) -> tuple[IntArray | None, dict[str, IntArray]]:
@@ -140,8 +140,13 @@ def _from_npz(path: Path) -> Nodes:
         coordinates = np.atleast_2d(np.asarray(archive["coordinates"], dtype=float))
         numbers = archive["nodes"] if "nodes" in archive.files else np.arange(1, len(coordinates) + 1)
         others = {name.upper(): archive[name] for name in archive.files if name not in ("coordinates", "nodes")}
-    sets = {name: values.ravel().astype(np.int64) for name, values in others.items() if values.dtype.kind in "iu"}
-    return Nodes(numbers.astype(np.int64), coordinates, where, sets)
+    sets = {name: _once(values.ravel()) for name, values in others.items() if values.dtype.kind in "iu"}
+    return Nodes(whole(numbers, where), coordinates, where, sets)
+
+
+def _once(values: IntArray) -> IntArray:
+    """Different values, in the order in which they come first."""
+    return values[np.sort(np.unique(values, return_index=True)[1])].astype(np.int64)
 
 
 class Deck:
@@ -250,7 +255,8 @@ class Deck:
                 found.extend(self._expand(self.members[member], (*above, member)))
             else:
                 known = ", ".join(sorted(self.members))
-                raise InputError(f"a node set names '{member}', which is none", self.where, None, f"one of {known}")
+                what, fix = f"a node set names '{member}', which is none", "correct the set"
+                raise InputError(what, self.where, None, f"one of {known}", fix)
         return found
 
     def _sets(self) -> dict[str, IntArray]:

@@ -23,7 +23,7 @@ from ..texts import display
 from .nodes import Nodes
 from .projection import project
 from .surfaces import Side, check_facing, normals_of, side_of
-from .text import first_data_line
+from .text import first_data_line, whole
 
 #: Nodes of a pair are this close, over the diagonal of the mesh, unless told.
 TOLERANCE = 1e-6
@@ -242,12 +242,27 @@ def read_pairs(
             raise InputError("this is no pair", f"{where}:{number}", line, expected, "correct the line") from None
     table = np.array(rows, dtype=float).reshape(-1, 6)
     areas = None if np.isnan(table[:, 5]).any() else table[:, 5]
-    both = table[:, :2].astype(np.int64)
+    both = whole(table[:, :2], where)
+    _check_table(table, where)
     if nodes is not None:
         _check_apart(both, nodes, where, reach_of(nodes, tolerance))
     second = both[:, 1]
     weights = sp.diags((second != 0).astype(float)).tocsr()
     return _joined(name, Found(both, second, weights), table[:, 2:5], areas, where, labels, nodes, tangent)
+
+
+def _check_table(table: Array, where: str) -> None:
+    """Each pair (n, 6) stands once, is of two nodes, and has no area below zero."""
+    repeated = np.ones(len(table), dtype=bool)
+    repeated[np.unique(table[:, :5], axis=0, return_index=True)[1]] = False
+    for wrong, what, expected in (
+        (repeated, "a pair stands twice", "each pair once"),
+        (table[:, 0] == table[:, 1], "a pair is of one node with itself", "two nodes, or 0 for ground"),
+        (table[:, 5] < 0, "a pair has an area below zero", "zero or more"),
+    ):
+        if wrong.any():
+            measured = f"pair {np.argmax(wrong) + 1} ({', '.join(f'{x:g}' for x in table[np.argmax(wrong)])})"
+            raise InputError(what, where, f"{measured}, {wrong.sum()} such", expected, "correct the table")
 
 
 def _check_apart(both: IntArray, nodes: Nodes, where: str, reach: float) -> None:
@@ -285,7 +300,9 @@ def _joined(
     length = np.linalg.norm(normals, axis=1)
     if not n or not (length > 0).all():
         measured = "no pair" if not n else f"pair {int(np.argmin(length)) + 1} has the normal (0, 0, 0)"
-        raise InputError(f"contact '{name}' has no pairs or no normals", where, measured, "a direction each")
+        raise InputError(
+            f"contact '{name}' has no pairs or no normals", where, measured, "a direction each", "correct the pairs"
+        )
     normals = normals / length[:, None]
     axis = np.eye(3)[np.argmin(abs(normals).max(axis=0))] if tangent is None else tangent
     try:

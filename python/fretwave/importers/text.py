@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..arrays import Array
+from ..arrays import Array, IntArray
 from ..errors import InputError
 from ..texts import display
 from .entries import Entries
@@ -42,6 +42,23 @@ def columns_of(path: Path, width: int) -> Array:
             "the file is no table of numbers", display(path), measured, f"{width} columns", "check the file"
         )
     return np.asarray(table)
+
+
+def whole(values: Array | IntArray, where: str) -> IntArray:
+    """Numbers of nodes and directions, of any shape, as whole numbers.
+
+    Raises
+    ------
+    InputError
+        One is none.
+    """
+    with np.errstate(invalid="ignore"):
+        found = np.asarray(values).astype(np.int64)
+    wrong = np.argwhere(found != values)
+    if len(wrong):
+        measured = f"{np.asarray(values)[tuple(wrong[0])]:g} in entry {wrong[0][0] + 1}, {len(wrong)} such"
+        raise InputError("a node or direction is no whole number", where, measured, "whole numbers", "correct the file")
+    return found
 
 
 def triplets(table: Array, where: str, kind: str) -> Entries:
