@@ -23,6 +23,7 @@ GOOD = {
     "a face twice": "*SURFACE, NAME=TOP\nE, S2\n1, S2\n",
     "a surface twice": "*SURFACE, NAME=TOP\nE, S2\n*SURFACE, NAME=TOP\nE, S2\n",
     "lines of a set included": '*NSET, NSET=TOP\n5\n*INCLUDE, INPUT="more.txt"\n8\n',
+    "a skin of shells": TOP + "*ELEMENT, TYPE=S4\n2,8,7,6,5\n",
     "a part that stands once": TOP + "*INSTANCE, NAME=P-1, PART=P\n*END INSTANCE\n",
 }
 WRONG = {
@@ -36,6 +37,9 @@ WRONG = {
     "directions of nodes are turned": TOP + "*TRANSFORM, NSET=TOP, TYPE=C\n0,0,0,0,0,1\n",
     "a part has two instances": TOP + 2 * "*INSTANCE, NAME=P-1, PART=P\n*END INSTANCE\n",
 }
+#: Corners, then the middles of its edges.
+TETRAHEDRON = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]
+TETRAHEDRON += [(0.5, 0, 0), (0.5, 0.5, 0), (0, 0.5, 0), (0, 0, 0.5), (0.5, 0, 0.5), (0, 0.5, 0.5)]
 
 
 def read(folder: Path, text: str) -> Nodes:
@@ -70,3 +74,16 @@ def test_a_wrong_deck(said: str, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=said) as caught:
         side_of(read(tmp_path, WRONG[said]), "TOP")
     assert caught.value.where and caught.value.fix
+
+
+def test_a_skin_on_quadratic_solids(tmp_path: Path) -> None:
+    """Its triangles are the corners of a C3D10's faces: the area is counted once."""
+    nodes = "*NODE\n" + "".join(f"{k},{x},{y},{z}\n" for k, (x, y, z) in enumerate(TETRAHEDRON, 1))
+    text = (
+        nodes
+        + "*ELEMENT, TYPE=C3D10\n1,1,2,3,4,5,6,7,8,9,10\n*ELEMENT, TYPE=S3\n2,1,2,3\n*NSET, NSET=FOOT\n1,2,3,5,6,7\n"
+    )
+    (tmp_path / "deck.inp").write_text(text)
+    side = side_of(read_nodes(tmp_path / "deck.inp"), "FOOT")
+    assert side.areas.sum() == pytest.approx(1 / 2, rel=ROUNDING)
+    np.testing.assert_allclose(side.normals, [[0, 0, -1]] * 6, atol=ROUNDING)

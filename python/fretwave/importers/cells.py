@@ -16,6 +16,7 @@ from ..arrays import IntArray
 from ..errors import InputError
 from ..texts import nearest
 from .keywords import Lines
+from .shapes import corners_of
 
 _SOLID = re.compile(r"C3D(4|6|8|10|15|20)[A-Z]*", re.IGNORECASE)
 _SHELL = re.compile(r"S([34])([A-Z][A-Z0-9]*)?", re.IGNORECASE)
@@ -186,13 +187,15 @@ class Elements:
             raise InputError("a surface names elements that are none", where, measured, "C3D or S elements", fix)
 
     def free_faces(self, nodes: IntArray) -> list[IntArray]:
-        """Faces of one element alone whose nodes are all in a set, as `faces`."""
-        found = []
+        """Faces of one element alone whose nodes are all in a set, as `faces`; of solids where shells lie on them."""
+        solids, shells = list[IntArray](), list[IntArray]()
         for kind, block in self.blocks.items():
-            for face in FACES[kind][: 1 if kind in _SHELLS.values() else None]:
+            skin = kind in _SHELLS.values()
+            for face in FACES[kind][: 1 if skin else None]:
                 table = block.nodes[:, face]
-                found.append(table[np.isin(table, nodes).all(axis=1)])
-        return [_alone(table) for table in _by_nodes(found)]
+                (shells if skin else solids).append(table[np.isin(table, nodes).all(axis=1)])
+        bodies = _by_nodes(solids)
+        return _by_nodes([*map(_alone, bodies), *(_beside(_alone(table), bodies) for table in _by_nodes(shells))])
 
 
 def _kind(name: str) -> tuple[str, int]:
@@ -222,3 +225,13 @@ def _alone(table: IntArray) -> IntArray:
     """Without the faces that two elements share: those lie inside a body."""
     _, place, count = np.unique(np.sort(table, axis=1), axis=0, return_inverse=True, return_counts=True)
     return np.asarray(table[count[place.ravel()] == 1])
+
+
+def _beside(table: IntArray, others: list[IntArray]) -> IntArray:
+    """Without the faces whose corners are those of others."""
+    known = {row for other in others for row in _corners(other)}
+    return np.asarray(table[np.array([row not in known for row in _corners(table)], dtype=bool)])
+
+
+def _corners(table: IntArray) -> list[tuple[int, ...]]:
+    return [tuple(row) for row in np.sort(table[:, : corners_of(table.shape[1])], axis=1).tolist()]
