@@ -12,7 +12,7 @@ from tolerances import LAST_BIT, ROUNDING
 
 from fretwave.errors import InputError
 from fretwave.importers.cells import _EDGES
-from fretwave.importers.nodes import read_nodes
+from fretwave.importers.nodes import Nodes, read_nodes
 from fretwave.importers.pairs import match
 from fretwave.importers.surfaces import side_of
 from fretwave.model.pairs import Pairs
@@ -80,6 +80,11 @@ def node_set(name: str, first: int, chosen: np.ndarray) -> str:
     return f"*NSET, NSET={name}\n" + "".join(f"{first + k}\n" for k in np.flatnonzero(chosen))
 
 
+def labels_of(nodes: Nodes) -> np.ndarray:
+    """x, y, z of each node (n_dof, 2)."""
+    return np.column_stack([np.repeat(nodes.numbers, 3), np.tile([1, 2, 3], len(nodes.numbers))])
+
+
 class Stack:
     """A box A whose top, on z = 1, lies on the underside of a box B with another mesh; a rigid turn puts both askew."""
 
@@ -93,7 +98,7 @@ class Stack:
         turn = np.linalg.qr(np.random.default_rng(5).normal(size=(3, 3)))[0]
         self.turn = turn * np.linalg.det(turn)
         self.nodes.coordinates = self.nodes.coordinates @ self.turn.T + [3.0, -2.0, 7.0]
-        self.labels = np.column_stack([np.repeat(self.nodes.numbers, 3), np.tile([1, 2, 3], len(self.nodes.numbers))])
+        self.labels = labels_of(self.nodes)
         self.notes: list[str] = []
 
     def pairs(self) -> Pairs:
@@ -138,7 +143,7 @@ def test_projection_of_a_matching_mesh_is_node_to_node(tmp_path: Path) -> None:
     (tmp_path / "deck.inp").write_text(text)
     nodes = read_nodes(tmp_path / "deck.inp")
     nodes.coordinates = np.vstack([x, y])
-    labels = np.column_stack([np.repeat(nodes.numbers, 3), np.tile([1, 2, 3], len(nodes.numbers))])
+    labels = labels_of(nodes)
     joint = match("joint", nodes, "A", "B", np.array([0, 0, 1.0]), labels)
     assert joint.n_pairs == 9
     assert sorted(abs(joint.B.data - np.sign(joint.B.data)).tolist())[-1] < LAST_BIT
@@ -157,7 +162,7 @@ def test_a_surface_names_faces(tmp_path: Path) -> None:
     text += "*SURFACE, NAME=OVER\nABOVE, S2\n"
     (tmp_path / "deck.inp").write_text(text)
     nodes = read_nodes(tmp_path / "deck.inp")
-    labels = np.column_stack([np.repeat(nodes.numbers, 3), np.tile([1, 2, 3], len(nodes.numbers))])
+    labels = labels_of(nodes)
     by_sets = match("joint", nodes, "A", "B", None, labels)
     for first_name in ("top", "NODES"):
         by_faces = match("joint", nodes, first_name, "UNDER", None, labels)
@@ -204,7 +209,7 @@ def test_faces_whose_corners_coincide(tmp_path: Path) -> None:
     text += "*ELEMENT, TYPE=S4\n5,11,12,13,14\n*NSET,NSET=A,GENERATE\n11,14\n"
     (tmp_path / "deck.inp").write_text(text)
     nodes = read_nodes(tmp_path / "deck.inp")
-    labels = np.column_stack([np.repeat(nodes.numbers, 3), np.tile([1, 2, 3], len(nodes.numbers))])
+    labels = labels_of(nodes)
     joint = match("joint", nodes, "A", "B", None, labels)
     gradient = np.random.default_rng(1).normal(size=(3, 3))
     assert abs(joint.B @ (nodes.coordinates @ gradient).ravel()).max() < PATCH
@@ -220,7 +225,7 @@ def test_curved_faces(tmp_path: Path) -> None:
     axial, angle, radius = nodes.coordinates.T
     angle = np.pi / 2 * angle
     nodes.coordinates = np.column_stack([axial, -radius * np.cos(angle), radius * np.sin(angle)])
-    labels = np.column_stack([np.repeat(nodes.numbers, 3), np.tile([1, 2, 3], len(nodes.numbers))])
+    labels = labels_of(nodes)
     joint = match("joint", nodes, "A", "B", None, labels, tolerance=1e-3)
     outwards = joint.points * [0, 1, 1]
     assert np.einsum("nx,nx->n", joint.frames[:, 0], outwards).min() > 1 - 1e-3
