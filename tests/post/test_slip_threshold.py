@@ -9,7 +9,7 @@ import pytest
 from tolerances import SOLVED
 
 import fretwave as fw
-from fretwave.post.slip_threshold import slip_factor, slip_threshold
+from fretwave.post.slip_threshold import lasting_factors, slip_factor, slip_factors, slip_threshold
 
 pytestmark = pytest.mark.ranks(1)
 MU = np.array([0.3, 0.5, 0.2])
@@ -82,3 +82,45 @@ def test_tangents_that_are_limited_one_by_one_slip_later(seed: int) -> None:
     assert abs(over(factor)) < SOLVED
     assert max(over(share * factor) for share in np.linspace(0, 0.999, 40)) < 0
     assert factor >= slip_factor(f, friction=MU)
+
+
+def settled_work(f: np.ndarray, factor: float) -> np.ndarray:
+    """Work (n_pairs,) of one tangent in its 40th period, its slider moved sample by sample from where it is at rest."""
+    t, holds = (
+        factor * (f[:, 1] - f[:, 1].mean(axis=0)),
+        MU * (f[:, 0].mean(axis=0) + factor * (f[:, 0] - f[:, 0].mean(axis=0))),
+    )
+    shift = f[:, 1].mean(axis=0)
+    for _ in range(40):
+        work = np.zeros(t.shape[1])
+        for now, limit in zip(t, holds):
+            force = np.clip(now + shift, -limit, limit)
+            work += np.abs(force - now - shift) * limit
+            shift = force - now
+    return work
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_slip_lasts_where_no_slider_settles(seed: int) -> None:
+    """Shakedown in closed form, against sliders that are moved through forty periods."""
+    f = forces(seed, 1.0)[:, :2]
+    factors = lasting_factors(f, friction=MU)
+    for pair, factor in enumerate(factors):
+        assert settled_work(f, 0.999 * factor)[pair] == pytest.approx(0, abs=SOLVED)
+        assert settled_work(f, 1.001 * factor)[pair] > 1e-4
+    assert np.all(factors > slip_factors(f, friction=MU))
+
+
+def test_slip_that_lasts_in_a_circle_along_one_line() -> None:
+    """Both tangents move along one line, in phase with the normal force: mu N0 / T, whatever the line."""
+    tau = 2 * np.pi * np.arange(64) / 64
+    part = np.array([1.5, 3.0 * np.cos(1.1), 3.0 * np.sin(1.1)])
+    f = np.array([10.0, 0.4, -0.2])[:, None] + np.cos(tau)[:, None, None] * part[:, None]
+    assert lasting_factors(f, friction=0.3) == pytest.approx(0.3 * 10 / 3.0, rel=1.3e-3)  # pi / 64 between directions
+
+
+def test_slip_that_lasts_of_a_slider_is_its_first() -> None:
+    f = np.cos(2 * np.pi * np.arange(64) / 64)[:, None, None] * np.array([[2.0, 0.5]])
+    limits = np.array([3.0, 4.0])
+    assert lasting_factors(f, limit=limits) == pytest.approx([1.5, 8.0], rel=SOLVED)
+    assert slip_factors(f, limit=limits) == pytest.approx([1.5, 8.0], rel=SOLVED)

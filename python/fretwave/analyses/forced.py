@@ -13,11 +13,13 @@ from ..case.observed import Observed, check_observed, dofs_of, given_to, label_o
 from ..case.schema import Dof, Positive, Whole, key
 from ..columns import FORCED
 from ..cyclic.engine_order import folded
+from ..errors import InputError
 from ..hb.suspects import suspects
 from ..post.motion import complex_amplitudes
 from ..results.results import AnalysisWriter
 from ..results.sweep_summary import FORCED_LEVELS
 from ..texts import toml
+from .parts.at_rest import harmonic_at_rest
 from .parts.branch import closure_note, error_text, finished_table, notable, open_branch, points_of, record, tell
 from .parts.context import AnalysisContext, Outcome
 from .parts.excitation import Excitation, excitation_of
@@ -137,6 +139,9 @@ class ForcedAnalysis(HarmonicSection):
         levels = ", ".join(f"{level:g}" for level in self.levels)
         order = f" to engine order {self.engine_order}" if self.engine_order else ""
         return f"forced response of {label_of(self.observe)}{order}, {low:g} to {high:g} Hz, levels {levels}"
+
+    def at_rest(self, context: AnalysisContext[ForcedAnalysis]) -> tuple[list[str], list[InputError]]:
+        return harmonic_at_rest(context)
 
     def run(self, context: AnalysisContext[ForcedAnalysis]) -> Outcome:
         """Follow the response of every level over the frequency range. Collective."""

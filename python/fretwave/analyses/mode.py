@@ -16,6 +16,7 @@ from ..case.harmonic import HarmonicSection, check_range
 from ..case.observed import Observed, check_observed, dof_of, dofs_of, label_of, unit_of
 from ..case.schema import Positive, key
 from ..columns import ENERGY, MODE
+from ..errors import InputError
 from ..hb.suspects import suspects
 from ..model.laws import PythonLaw
 from ..post.limit_cycles import limit_cycles
@@ -23,6 +24,7 @@ from ..results.results import AnalysisWriter
 from ..results.sweep_summary import MODE_BRANCH
 from ..texts import counted
 from .parts.asymptotes import asymptote_line
+from .parts.at_rest import mode_at_rest
 from .parts.branch import (
     closure_note,
     continuation,
@@ -118,6 +120,9 @@ class ModeAnalysis(HarmonicSection):
 
     def wave_word(self) -> str:
         return "standing wave" if self.wave == "standing" else "wave"
+
+    def at_rest(self, context: AnalysisContext[ModeAnalysis]) -> tuple[list[str], list[InputError]]:
+        return mode_at_rest(context)
 
     def run(self, context: AnalysisContext[ModeAnalysis]) -> Outcome:
         """Continue the mode from its first to its last amplitude. Collective."""

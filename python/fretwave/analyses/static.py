@@ -11,10 +11,11 @@ from ..arrays import Array
 from ..case.analysis import AnalysisSection, register_analysis
 from ..case.schema import Positive, PreloadSection, key
 from ..columns import Column
-from ..errors import NotConverged
+from ..errors import InputError, NotConverged
 from ..model.contact import Contact
 from ..model.laws import STATUS
 from ..post.contact_history import normal_force, tangential_force
+from .parts.at_rest import static_at_rest
 from .parts.context import AnalysisContext, Outcome
 from .parts.rest import keep_pairs, loaded_state
 
@@ -62,6 +63,9 @@ class StaticAnalysis(AnalysisSection):
 
     def headline(self) -> str:
         return f"static state at load factors {', '.join(f'{factor:g}' for factor in self.factors)}"
+
+    def at_rest(self, context: AnalysisContext[StaticAnalysis]) -> tuple[list[str], list[InputError]]:
+        return static_at_rest(context, max(self.factors)) if context.case.contacts else ([], [])
 
     def run(self, context: AnalysisContext[StaticAnalysis]) -> Outcome:
         """Solve the static state at every load factor. Collective."""

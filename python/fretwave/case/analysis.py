@@ -149,6 +149,16 @@ class AnalysisSection(Section):
         unit = self.units("force s/length")
         return ["added dampers: " + ", ".join(f"{damper.c:g} {unit} at {damper.dof}" for damper in self.dampers)]
 
+    def at_rest(self, context: AnalysisContext[Any]) -> tuple[list[str], list[InputError]]:
+        """What `fretwave check` says of the state at rest once it is solved, and warnings. Collective.
+
+        Raises
+        ------
+        NotConverged
+            There is no such state.
+        """
+        return [], []
+
     # The run, and what comes of it
 
     def run(self: Own, context: AnalysisContext[Own]) -> Outcome:

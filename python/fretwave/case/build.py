@@ -9,12 +9,14 @@ from typing import TYPE_CHECKING, Any
 from ..model.contact import Contact
 from ..model.laws import Role
 from .flow import with_flow
+from .harmonic import nodal_diameter, with_flow_forces
 from .schema import Damper, PreloadSection
 
 if TYPE_CHECKING:
     from mpi4py import MPI
 
     from ..model.model import Model
+    from .analysis import AnalysisSection
     from .load import Case
 
 
@@ -39,6 +41,12 @@ def build_model(
         K, C = with_flow(case, structure.K, structure.C, nodal_diameter)
         structure = replace(structure, K=K, C=C)
     return structure.model(contacts, comm, nodal_diameter)
+
+
+def model_of(case: Case, analysis: AnalysisSection, comm: MPI.Comm) -> Model:
+    """``fretwave.Model`` of a case as an analysis takes it: its dampers, preload, wave and flow. Collective."""
+    wave, flow = nodal_diameter(analysis.settings(case)), with_flow_forces(analysis)
+    return build_model(case, analysis.acting_dampers(case), comm, case.preload_of(analysis), wave, flow)
 
 
 def acting_parameters(contact: Contact, preload: PreloadSection | None) -> dict[str, Any]:

@@ -10,9 +10,10 @@ from ..case import checks
 from ..case.build import build_model
 from ..case.load import Case, load_case
 from ..case.reduce import reduce_case
-from ..errors import EXIT_DONE
+from ..errors import EXIT_DONE, CaseErrors
 from ..model.contact import span
 from ..mpi.guard import on_first_rank
+from ..run.at_rest import at_rest
 from ..run.order import RunOptions, in_order
 from ..run.runner import check_sweeps
 from ..texts import counted, display
@@ -21,13 +22,17 @@ if TYPE_CHECKING:
     from mpi4py import MPI
 
 
-def check_case(path: Path, overrides: Sequence[str], only: Sequence[str], quick: bool, comm: MPI.Comm) -> int:
-    """Validate a case and print what would run. Collective.
+def check_case(
+    path: Path, overrides: Sequence[str], only: Sequence[str], quick: bool, comm: MPI.Comm, solve: bool = True
+) -> int:
+    """Validate a case, solve its states at rest and print what would run. Collective.
 
     Raises
     ------
     CaseErrors
         All that is wrong; with the short form of ``[quick]`` too, when the case has one.
+    NotConverged
+        Once all is printed: an analysis has no state at rest.
     """
     case = on_first_rank(comm, lambda: _load(path, overrides, quick))
     names = in_order(case, checks.choose(list(case.analyses), only))
@@ -35,8 +40,13 @@ def check_case(path: Path, overrides: Sequence[str], only: Sequence[str], quick:
     case = reduce_case(case, comm)
     with build_model(case, (), comm) as model:
         described = {name: [case.analyses[name].headline(), *case.analyses[name].details(model)] for name in names}
+    found = at_rest(case, names if solve else [], comm)
+    for name, lines in found.lines.items():
+        described[name] += lines
     if comm.rank == 0:
-        print("\n".join(_report(case, described)))
+        print("\n".join([*_report(case, described), *(f"\nwarning: {warning}" for warning in found.warnings)]))
+    if found.failures:
+        raise found.failures[0] if len(found.failures) == 1 else CaseErrors(found.failures, display(case.path))
     return EXIT_DONE
 
 

@@ -77,8 +77,15 @@ def parser() -> argparse.ArgumentParser:
     init.add_argument("folder", type=Path, metavar="FOLDER", nargs="?", default=Path(), help="for its case.toml (here)")
     init.set_defaults(command=_init)
     _add_run(commands)
-    check = commands.add_parser("check", help="check a case and say what would run")
+    check = commands.add_parser(
+        "check",
+        help="check a case and say what would run",
+        description="Checks a case, solves its state at rest and says what would run: pairs that stick, slip and are"
+        " open, the linear mode, the amplitude at which it expects the first pair to slip, and warnings about what"
+        " looks wrong, none of which changes the exit code. Of a whole wheel the state at rest is not solved.",
+    )
     _add_case(check, optional=True)
+    check.add_argument("--no-solve", action="store_true", help="leave out the state at rest")
     check.add_argument("--keys", action="store_true", help="list all keys instead, with those of a case's plug-ins")
     check.add_argument("--schema", action="store_true", help="print the JSON schema of case files instead, for editors")
     check.set_defaults(command=_check)
@@ -286,7 +293,7 @@ def _check(options: argparse.Namespace) -> int:
     comm = world()
     from .check import check_case
 
-    return check_case(options.case, options.overrides, options.only, options.quick, comm)
+    return check_case(options.case, options.overrides, options.only, options.quick, comm, not options.no_solve)
 
 
 def _import(options: argparse.Namespace) -> int:

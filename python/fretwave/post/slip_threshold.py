@@ -17,11 +17,24 @@ import numpy as np
 from ..arrays import Array
 from ..model.laws import Limit, Role, kept_laws
 
+#: Of two tangents, in which slip that lasts is looked for.
+DIRECTIONS = 64
+
 
 def slip_factor(
     forces: Array, limit: float | Array | None = None, friction: float | Array | None = None, each: bool = False
 ) -> float:
     """Factor on a sticking motion at which the first pair slips; inf when no amplitude makes it slip.
+
+    Parameters are those of `slip_factors`.
+    """
+    return float(min(slip_factors(forces, limit, friction, each), default=np.inf))
+
+
+def slip_factors(
+    forces: Array, limit: float | Array | None = None, friction: float | Array | None = None, each: bool = False
+) -> Array:
+    """Factor (n_pairs,) on a sticking motion at which each pair slips; inf where no amplitude makes it slip.
 
     Parameters
     ----------
@@ -35,7 +48,8 @@ def slip_factor(
         Each of two tangents is limited by itself, rather than both in a circle.
     """
     if each and forces.shape[1] == 3:
-        return min(slip_factor(forces[:, [0, row]], friction=friction) for row in (1, 2))
+        first, second = (slip_factors(forces[:, [0, row]], friction=friction) for row in (1, 2))
+        return np.minimum(first, second)
     mean = forces.mean(axis=0)
     swing = forces - mean
     if forces.shape[1] == 1:
@@ -49,17 +63,48 @@ def slip_factor(
     a = np.sum(tangent**2, axis=1) - moves**2
     b = np.sum(rest * tangent, axis=1) - holds * moves
     c = np.sum(rest**2, axis=0) - holds**2
-    return float(min(_root(a, b, c * np.ones_like(a)), default=np.inf))
+    return _roots(a, b, c * np.ones_like(a))
 
 
-def _root(a: Array, b: Array, c: Array) -> list[float]:
-    """Smallest positive s with a s^2 + 2 b s + c = 0 (c < 0: it sticks at rest), as a list without or with it."""
+def _roots(a: Array, b: Array, c: Array) -> Array:
+    """Smallest positive s of all samples with a s^2 + 2 b s + c = 0 (c < 0: it sticks at rest), inf without one."""
     with np.errstate(divide="ignore", invalid="ignore"):
         # of the two forms of the roots, the one that neither cancels nor divides by a = 0
         discriminant = np.sqrt(b**2 - a * c)
         s = -c / (b + discriminant)
-    good = s[np.isfinite(s) & (s > 0)]
-    return [float(good.min())] if good.size else []
+    return np.asarray(np.where(np.isfinite(s) & (s > 0), s, np.inf).min(axis=0))
+
+
+def lasting_factors(
+    forces: Array, limit: float | Array | None = None, friction: float | Array | None = None, each: bool = False
+) -> Array:
+    """Factor (n_pairs,) on a sticking motion from which each pair slips in every period, inf where none does.
+
+    Below it a pair that slipped once sticks with its slider elsewhere, its mean tangential force c another: it lasts
+    when no c has |c + s t| <= mu (N0 + s n) all over the period (shakedown, Melan). Along a direction that leaves
+    s (max(t - mu n) + max(-t - mu n)) <= 2 mu N0. Of two tangents in a circle the least over `DIRECTIONS` is taken,
+    which is exact where they move along one line. What the settled slider's force does through the structure, to the
+    normal force and to other pairs, is left out.
+
+    Parameters
+    ----------
+    forces, limit, friction, each : as for `slip_factors`
+    """
+    mean = forces.mean(axis=0)
+    swing = forces - mean
+    if forces.shape[1] == 1:
+        assert limit is not None
+        tangents, moves, holds = [swing[:, 0]], 0.0, np.broadcast_to(limit, mean.shape[1:])
+    else:
+        assert friction is not None
+        moves, holds = friction * swing[:, 0], friction * mean[0]
+        tangents = list(np.moveaxis(swing[:, 1:], 1, 0))
+    if len(tangents) == 2 and not each:
+        angles = np.pi * np.arange(DIRECTIONS) / DIRECTIONS
+        tangents = [np.cos(angle) * tangents[0] + np.sin(angle) * tangents[1] for angle in angles]
+    spans = [np.max(t - moves, axis=0) + np.max(-t - moves, axis=0) for t in tangents]
+    with np.errstate(divide="ignore"):
+        return np.asarray(np.where(holds > 0, 2 * holds / np.max(spans, axis=0), 0.0))
 
 
 def slip_threshold(amplitude: float, forces: Mapping[str, Array], attributes: Mapping[str, Any]) -> float:

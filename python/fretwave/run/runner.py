@@ -11,8 +11,7 @@ from ..analyses.parts.context import AnalysisContext, Outcome
 from ..analyses.sweep import SweepAnalysis
 from ..case import checks
 from ..case.analysis import AnalysisSection
-from ..case.build import build_model
-from ..case.harmonic import nodal_diameter, with_flow_forces
+from ..case.build import model_of
 from ..case.kept import described, has_analysis, reload_case
 from ..case.load import Case, load_case
 from ..case.plugins import load_recorded
@@ -245,9 +244,7 @@ class Runner:
             self._start()
 
         case = on_wheel(self.case, analysis)
-        preload, flow = case.preload_of(analysis), with_flow_forces(analysis)
-        wave = nodal_diameter(analysis.settings(case))
-        built = build_model(case, analysis.acting_dampers(case), self.comm, preload, wave, flow)
+        built = model_of(case, analysis, self.comm)
         with built as model, options.inserted(), solver_room(case, analysis, prefix):
             context = AnalysisContext(
                 model,

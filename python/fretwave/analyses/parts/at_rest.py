@@ -1,0 +1,183 @@
+"""What `fretwave check` says of an analysis before it runs: its state at rest, and where its first pair will slip."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, Optional
+
+import numpy as np
+
+from ...arrays import Array
+from ...case.harmonic import HarmonicSection, nodal_diameter
+from ...case.observed import label_of, unit_of
+from ...errors import InputError
+from ...model.contact import Contact
+from ...model.laws import STATUS, STICK, Limit, Role
+from ...model.sectors import in_wave
+from ...post.contact_history import normal_force
+from ...post.slip_threshold import lasting_factors, slip_factors
+from .context import AnalysisContext
+from .observed import observed_by
+from .rest import loaded_state, start_mode
+
+if TYPE_CHECKING:
+    from ...case.observed import ObservedTable
+    from ...model.modes import LinearMode
+    from ..mode import ModeAnalysis
+
+#: Of a period: they miss the extremes of a harmonic motion by (pi / SAMPLES)^2 / 2 of its amplitude.
+SAMPLES = 256
+
+States = list[dict[str, Array]]
+Told = tuple[list[str], list[InputError]]
+
+
+@dataclass(frozen=True)
+class FirstSlip:
+    """The pair of all that slips first as a linear mode grows.
+
+    Attributes
+    ----------
+    amplitude : of first slip, from the sliders at rest
+    lasting : from which some pair slips in every period; nearer to rest the sliders settle where all stick
+    """
+
+    amplitude: float
+    contact: str
+    pair: int
+    lasting: float
+
+
+def static_at_rest(context: AnalysisContext[Any], factor: float) -> Told:
+    """The static state at a factor on the loads. Collective."""
+    began = time.perf_counter()
+    states = context.comm.bcast(loaded_state(context, factor).contacts)
+    return [rest_line(context, states, time.perf_counter() - began)], []
+
+
+def harmonic_at_rest(context: AnalysisContext[HarmonicSection]) -> Told:
+    """State at rest and stuck frequency of an analysis of a structure or one sector. Collective."""
+    if not context.case.contacts or context.case.wheel is not None:
+        return [], []
+    states, mode, seconds = _solved(context)
+    return [rest_line(context, states, seconds), _stuck_line(context, mode)], []
+
+
+def mode_at_rest(context: AnalysisContext[ModeAnalysis]) -> Told:
+    """The same, and the amplitude of first slip that the linear mode expects against those of the analysis."""
+    if not context.case.contacts or context.case.wheel is not None:
+        return [], []
+    states, mode, seconds = _solved(context)
+    unit = unit_amplitude(context, context.analysis.normalise, mode)
+    slip = first_slip(context, states, mode, unit)
+    lines = [rest_line(context, states, seconds), _stuck_line(context, mode)]
+    return lines + _slip_lines(context, slip), _never_slips(context, slip)
+
+
+def _solved(context: AnalysisContext[Any]) -> tuple[States, LinearMode, float]:
+    began = time.perf_counter()
+    mode, rest = start_mode(context, context.analysis.linear_mode, or_free=True)
+    states = context.comm.bcast((rest or loaded_state(context)).contacts)
+    return states, mode, time.perf_counter() - began
+
+
+def rest_line(context: AnalysisContext[Any], states: States, seconds: float) -> str:
+    """How many pairs stick, slip and are open, and the sum of their normal forces."""
+    status = np.concatenate([state["status"] for state in states])
+    text = "at rest: " + ", ".join(f"{int(np.sum(status == code))} {word}" for word, code in STATUS.items())
+    normals = [(c.info.normal, s["f"]) for c, s in zip(context.case.contacts, states) if c.info.normal is not None]
+    if normals:
+        total = sum(float(np.sum(normal_force(f, normal))) for normal, f in normals)
+        text += f"; normal forces sum to {total:.5g} {context.units('force')}"
+    return f"{text} (solved in {seconds:.2g} s)"
+
+
+def _stuck_line(context: AnalysisContext[Any], mode: LinearMode) -> str:
+    return f"linear mode {context.analysis.linear_mode} with contact as at rest: {mode.frequency_hz:.6g} Hz"
+
+
+def unit_amplitude(context: AnalysisContext[Any], given: str | ObservedTable, mode: LinearMode) -> float:
+    """What an analysis sees of a linear mode as it is scaled. Collective."""
+    from ...hb.observed import row_of
+
+    phi = mode.shape + 1j * mode.imaginary
+    row = row_of(context.model, observed_by(context, given, mode))
+    return float(abs(sum(weight * phi[dof] for dof, weight in row)))
+
+
+def first_slip(context: AnalysisContext[Any], states: States, mode: LinearMode, unit: float) -> Optional[FirstSlip]:
+    """The pair that slips first; None where no pair sticks at rest under a law with a sharp limit.
+
+    Parameters
+    ----------
+    states : contacts of the state at rest, u and f (components, n_pairs), status (n_pairs,)
+    unit : amplitude of the mode as it is scaled
+    """
+    found = []
+    for contact, state in zip(context.case.contacts, states):
+        factors = pair_factors(context, contact, state, mode)
+        if factors is not None and np.any(state["status"] == STICK):
+            first, lasting = unit * factors
+            pair = int(np.argmin(first))
+            found.append(FirstSlip(float(first[pair]), contact.name, pair, float(np.min(lasting))))
+    if not found:
+        return None
+    lasting = min(slip.lasting for slip in found)
+    return replace(min(found, key=lambda slip: slip.amplitude), lasting=lasting)
+
+
+def pair_factors(
+    context: AnalysisContext[Any], contact: Contact, state: dict[str, Array], mode: LinearMode
+) -> Optional[Array]:
+    """Factors (2, n_pairs) on a linear mode at which each pair slips first, and from which in every period.
+
+    inf of pairs that do not stick at rest; None of a law without a sharp limit.
+    """
+    stiffness = [contact.value(contact.info.stiffness_along(row)) for row in range(contact.components)]
+    role = Role.FRICTION_LIMIT if contact.info.normal is None else Role.FRICTION_COEFFICIENT
+    bound = contact.value(role)
+    if contact.info.limit == Limit.NONE or bound is None or any(k is None for k in stiffness):
+        return None
+    swing = _swing(context, contact, mode) * np.stack([np.broadcast_to(k, contact.n_pairs) for k in stiffness])
+    each = contact.info.limit == Limit.EACH
+    first = slip_factors(state["f"] + swing, limit=bound, friction=bound, each=each)
+    lasting = lasting_factors(state["f"] + swing, limit=bound, friction=bound, each=each)
+    return np.where(state["status"] == STICK, [first, np.maximum(first, lasting)], np.inf)
+
+
+def _swing(context: AnalysisContext[Any], contact: Contact, mode: LinearMode) -> Array:
+    """Relative motion (samples, components, n_pairs) over a period."""
+    sectors = context.case.neighbours.sectors if context.case.neighbours is not None else 1
+    theta = 2 * np.pi * nodal_diameter(context.analysis) / sectors
+    u = in_wave(contact.B, mode.shape + 1j * mode.imaginary, theta).reshape(-1, contact.components).T
+    tau = 2 * np.pi * np.arange(SAMPLES) / SAMPLES
+    return np.asarray(np.real(np.exp(1j * tau)[:, None, None] * u))
+
+
+def _slip_lines(context: AnalysisContext[ModeAnalysis], slip: Optional[FirstSlip]) -> list[str]:
+    if slip is None:
+        return ["first slip: no pair sticks at rest with a sharp friction limit"]
+    if not np.isfinite(slip.amplitude):
+        return ["first slip: the linear mode makes no pair slip"]
+    unit, seen = context.units(unit_of(context.analysis.normalise)), label_of(context.analysis.normalise)
+    low, high = context.analysis.amplitude
+    side = "below" if slip.lasting < low else "above" if slip.lasting > high else "within"
+    return [
+        f"first slip expected at a = {slip.amplitude:.3g} {unit} of {seen} (pair {slip.pair} of '{slip.contact}'), in"
+        f" every period from about {slip.lasting:.3g} {unit}: {side} the amplitudes asked for"
+    ]
+
+
+def _never_slips(context: AnalysisContext[ModeAnalysis], slip: Optional[FirstSlip]) -> list[InputError]:
+    """A branch that ends before pairs slip in every period has the linear mode's frequency and damping."""
+    low, high = context.analysis.amplitude
+    if slip is None or not slip.lasting > high:
+        return []
+    unit, name = context.units(unit_of(context.analysis.normalise)), context.name
+    expected, fix = "a mode that moves pairs along their tangents", "another linear_mode, or other friction limits"
+    if np.isfinite(slip.lasting):
+        expected = f"more than about {slip.lasting:.3g} {unit}, from where the linear mode expects slip in every period"
+        fix = f"--set '{name}.amplitude=[{low:g}, {10 * slip.lasting:.2g}]'"
+    what = f"no amplitude of '{name}' is expected to make a pair slip in every period"
+    return [InputError(what, f"{name}.amplitude", f"at most {high:g} {unit}", expected, fix)]

@@ -1,0 +1,133 @@
+"""``fretwave check`` solves the state at rest: closed forms of first slip, against branches, and what it warns of."""
+
+from __future__ import annotations
+
+import csv
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_line import call
+from tolerances import SOLVED
+
+pytestmark = pytest.mark.ranks(1)
+LAP_JOINT = Path(__file__).parents[2] / "cases" / "lap_joint" / "case.toml"
+
+KN, KT, MU, N0 = 5.0, 4.0, 0.5, 2.0
+K = np.array([[3.0, 1.0], [1.0, 2.0]])
+CASE = f"""
+[model]
+dofs = ["x", "y"]
+M = [[1.0, 0.0], [0.0, 1.0]]
+K = {K.tolist()}
+
+[preload]
+pair_loads = true
+
+[[contact]]
+name = "pad"
+law = "coulomb_2d"
+pairs = ["y"]
+tangents = ["x"]
+normal_stiffness = {KN}
+tangential_stiffness = {KT}
+friction_coefficient = {MU}
+normal_load = {N0}
+
+[[analysis]]
+name = "mode"
+type = "mode"
+method = "CNM"
+harmonics = 5
+samples = 128
+normalise = "x"
+amplitude = [0.1, 3.0]
+step = {{ maximum = 0.1 }}
+"""
+NUMBER = r"([-+.e0-9]+)"
+
+
+def put(folder: Path, text: str = CASE) -> Path:
+    path = folder / "case.toml"
+    path.write_text(text)
+    return path
+
+
+def slips(said: str) -> list[float]:
+    """First slip and slip in every period."""
+    found = re.search(f"first slip expected at a = {NUMBER} m of x .*, in every period from about {NUMBER} m", said)
+    assert found, said
+    return [float(text) for text in found.groups()]
+
+
+def expected() -> tuple[float, float, float]:
+    """Of the pad in the lowest stuck mode: where mu N0 = (kt |x| + mu kn |y|), where mu N0 = kt |x|; frequency."""
+    values, shapes = np.linalg.eigh(K + np.diag([KT, KN]))
+    y = abs(shapes[1, 0] / shapes[0, 0])
+    return MU * N0 / (KT + MU * KN * y), MU * N0 / KT, float(np.sqrt(values[0]) / 2 / np.pi)
+
+
+def test_state_at_rest_and_first_slip_in_closed_form(tmp_path: Path, capfd) -> None:
+    assert call("check", put(tmp_path)) == 0
+    said = capfd.readouterr().out
+    first, lasting, hertz = expected()
+    assert "at rest: 1 stick, 0 slip, 0 open; normal forces sum to 2 N" in said
+    assert f"linear mode 1 with contact as at rest: {hertz:.6g} Hz" in said
+    assert slips(said) == pytest.approx([first, lasting], rel=5e-3)  # as printed
+    assert first < 0.9 * lasting and "within the amplitudes asked for" in said and "warning" not in said
+
+
+def settled() -> float:
+    """Where the branch is damped: mu N = kt |x|, N less by what the settled slider's mean force c = mu kn |y| takes.
+
+    That is kn c G, G = 1 / det of the structure with its closed pair, by which a tangential force moves the normal.
+    """
+    y, G = 1.0, 1 / np.linalg.det(K + np.diag([0.0, KN]))
+    return MU * N0 / (KT + MU * KN * G * MU * KN * y)
+
+
+def test_a_branch_is_damped_from_there(tmp_path: Path, capfd) -> None:
+    """Not from first slip on; the estimate leaves out what the settled slider does through the structure, 8 % here."""
+    assert call("run", put(tmp_path), "--no-plots", "-q", "--out", tmp_path / "run") == 0
+    with open(tmp_path / "run" / "mode.csv", newline="") as file:
+        rows = [(float(row["amplitude"]), float(row["zeta"])) for row in csv.DictReader(file)]
+    first, lasting, _ = expected()
+    assert settled() == pytest.approx(lasting, rel=0.08)
+    before = [zeta for a, zeta in rows if first < a < 0.9999 * settled()]
+    beyond = [zeta for a, zeta in rows if 1.0001 * settled() < a < lasting]
+    assert len(before) > 3 and max(map(abs, before)) < SOLVED
+    assert len(beyond) > 1 and min(beyond) > 1e-3
+
+
+def test_amplitudes_that_never_slip(tmp_path: Path, capfd) -> None:
+    assert call("check", put(tmp_path), "--set", "mode.amplitude=[0.01, 0.1]") == 0
+    said = capfd.readouterr().out
+    assert "warning: no amplitude of 'mode' is expected to make a pair slip in every period" in said
+    assert "measured: at most 0.1 m" in said and f"more than about {expected()[1]:.3g} m" in said and "  fix: " in said
+
+
+def test_without_solving(tmp_path: Path, capfd) -> None:
+    assert call("check", put(tmp_path), "--no-solve", "--set", "mode.amplitude=[0.01, 0.1]") == 0
+    said = capfd.readouterr().out
+    assert "no errors" in said and "at rest" not in said and "warning" not in said
+
+
+def test_no_state_at_rest_is_told_after_all_else(tmp_path: Path, capfd) -> None:
+    """A body that friction alone could hold, without a load: the mode is a rigid motion, in `run` as here."""
+    text = CASE.replace(f"K = {K.tolist()}", "K = [[0.0, 0.0], [0.0, 2.0]]").replace(f"load = {N0}", "load = 0.0")
+    assert call("check", put(tmp_path, text)) == 2
+    out, err = capfd.readouterr()
+    assert "harmonics 0, 1" in out
+    assert "nothing holds the structure at rest" in err and "analysis 'mode'" in err
+
+
+def test_on_two_ranks_as_on_one(launch) -> None:
+    told = []
+    for ranks in (1, 2):
+        done = launch(ranks, "-m", "fretwave", "check", str(LAP_JOINT), "--only", "rest,mode")
+        assert (done.returncode, done.stderr) == (0, "")
+        told.append([line for line in done.stdout.splitlines() if "reduction" not in line])
+    one, two = ([re.sub(r"\(solved in .*\)", "", line) for line in lines] for lines in told)
+    assert one == two
+    assert any("25 stick, 0 slip, 0 open; normal forces sum to 500 N" in line for line in one)
