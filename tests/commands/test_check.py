@@ -107,6 +107,57 @@ def test_amplitudes_that_never_slip(tmp_path: Path, capfd) -> None:
     assert "measured: at most 0.1 m" in said and f"more than about {expected()[1]:.3g} m" in said and "  fix: " in said
 
 
+def warned(capfd, path: Path, *overrides: str) -> str:
+    """What one warning says, with exit code 0."""
+    assert call("check", path, "--no-solve", *(word for text in overrides for word in ("--set", text))) == 0
+    said = capfd.readouterr().out
+    assert said.count("warning: ") == 1, said
+    warning = said.split("warning: ")[1]
+    assert all(f"  {label}:" in warning for label in ("where", "measured", "expected", "fix"))
+    return warning
+
+
+@pytest.mark.parametrize(
+    ("override", "words"),
+    [
+        ("contact.pad.normal_stiffness=1e6", ("far stiffer", "pad.normal_stiffness", "pair 0, 5e+05 times", "own 2")),
+        ("contact.pad.tangential_stiffness=1e-5", ("far softer", "pad.tangential_stiffness", "3e-06 times", "own 3")),
+        ("contact.pad.friction_coefficient=30.0", ("coefficient of friction", "pad.friction_coefficient", "at most 2")),
+        ("contact.pad.normal_load=0.0", ("no pair of contact 'pad' is loaded", "pad.normal_load", "0 in every pair")),
+    ],
+)
+def test_numbers_that_look_wrong_beside_others(tmp_path: Path, capfd, override: str, words: tuple[str, ...]) -> None:
+    warning = warned(capfd, put(tmp_path), override)
+    assert all(word in warning for word in words), warning
+
+
+@pytest.mark.parametrize(
+    "override",
+    ["contact.pad.normal_stiffness=1.9e4", "contact.pad.friction_coefficient=2.0", "contact.pad.gap=-1.0"],
+)
+def test_numbers_that_do_not(tmp_path: Path, capfd, override: str) -> None:
+    """Just below a bound; a load of 0 beside an interference."""
+    more = ("--set", "contact.pad.normal_load=0.0") if "gap" in override else ()
+    assert call("check", put(tmp_path), "--no-solve", "--set", override, *more) == 0
+    assert "warning" not in capfd.readouterr().out
+
+
+def test_the_wheel_that_stands_still_and_the_amplitude_of_its_size(capfd) -> None:
+    """Centrifugal loads at speed 0; metres for millimetres."""
+    cases = LAP_JOINT.parents[1]
+    warning = warned(capfd, cases / "blisk_lumped" / "case.toml", "model.options.speed_rpm=0.0")
+    assert "contact 'groove' is loaded" in warning and "model.options.speed_rpm = 0" in warning
+    assert "give a speed above 0" in warning
+    warning = warned(capfd, LAP_JOINT, "mode.amplitude=[0.1, 400.0]")
+    assert "'mode' goes to amplitudes of the model's own size" in warning and "400 mm" in warning
+
+
+@pytest.mark.parametrize("name", ["two_dof", "blisk_lumped", "blisk_ring", "lap_joint"])
+def test_cases_that_are_shipped_look_right(capfd, name: str) -> None:
+    assert call("check", LAP_JOINT.parents[1] / name / "case.toml") == 0
+    assert "warning" not in capfd.readouterr().out
+
+
 def test_without_solving(tmp_path: Path, capfd) -> None:
     assert call("check", put(tmp_path), "--no-solve", "--set", "mode.amplitude=[0.01, 0.1]") == 0
     said = capfd.readouterr().out

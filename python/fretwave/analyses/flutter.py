@@ -74,6 +74,9 @@ class FlutterAnalysis(HarmonicSection):
     def follows_waves(self) -> bool:
         return True
 
+    def largest_amplitude(self) -> Optional[float]:
+        return self.amplitude[1]
+
     def check(self, report: Reporter, facts: Facts) -> None:
         super().check(report, facts)
         check_observed(report, "normalise", self.normalise, self, facts)

@@ -93,6 +93,9 @@ class ModeAnalysis(HarmonicSection):
     def observed(self) -> tuple[str, Observed]:
         return "normalise", self.normalise
 
+    def largest_amplitude(self) -> Optional[float]:
+        return self.amplitude[1] if unit_of(self.normalise) == "length" else None
+
     def check(self, report: Reporter, facts: Facts) -> None:
         super().check(report, facts)
         check_observed(report, "normalise", self.normalise, self, facts)

@@ -118,6 +118,10 @@ class AnalysisSection(Section):
         """The key by which it integrates in time, empty where it does not: that needs a law of the present motion."""
         return ""
 
+    def largest_amplitude(self) -> Optional[float]:
+        """Largest displacement [length] that it asks for; None where it names none."""
+        return None
+
     # Is it right, and what would it do?
 
     def completed(self, report: Reporter, facts: Facts) -> AnalysisSection:

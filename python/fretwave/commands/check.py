@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from ..case import checks
 from ..case.build import build_model
 from ..case.load import Case, load_case
+from ..case.ratios import odd_ratios
 from ..case.reduce import reduce_case
 from ..errors import EXIT_DONE, CaseErrors
 from ..model.contact import span
@@ -37,6 +38,7 @@ def check_case(
     case = on_first_rank(comm, lambda: _load(path, overrides, quick))
     names = in_order(case, checks.choose(list(case.analyses), only))
     check_sweeps(case, names, RunOptions(overrides=list(overrides), quick=quick), comm)
+    warnings = odd_ratios(case)
     case = reduce_case(case, comm)
     with build_model(case, (), comm) as model:
         described = {name: [case.analyses[name].headline(), *case.analyses[name].details(model)] for name in names}
@@ -44,7 +46,11 @@ def check_case(
     for name, lines in found.lines.items():
         described[name] += lines
     if comm.rank == 0:
-        print("\n".join([*_report(case, described), *(f"\nwarning: {warning}" for warning in found.warnings)]))
+        print(
+            "\n".join(
+                [*_report(case, described), *(f"\nwarning: {warning}" for warning in [*warnings, *found.warnings])]
+            )
+        )
     if found.failures:
         raise found.failures[0] if len(found.failures) == 1 else CaseErrors(found.failures, display(case.path))
     return EXIT_DONE

@@ -1,0 +1,127 @@
+"""Numbers of a case that are allowed and look wrong beside each other: contact and structure, amplitude and size."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..arrays import Array
+from ..errors import InputError
+from ..hb.suspects import STIFF
+from ..model.contact import span
+from ..model.laws import Role
+from ..model.sectors import by_sector
+
+if TYPE_CHECKING:
+    from ..model.contact import Contact
+    from .analysis import AnalysisSection
+    from .case import Case
+
+#: Contact stiffness over the structure's below which its pairs hold nothing.
+SOFT = 1e-4
+#: Largest amplitude over the model's size: linear elasticity and contact of fixed pairs end before.
+LARGE = 0.1
+#: Of dry metals 0.1 to 1.5.
+LARGEST_FRICTION = 2.0
+
+
+def odd_ratios(case: Case) -> list[InputError]:
+    """Warnings about a case without errors, before it is reduced."""
+    found = [warning for contact in case.contacts for warning in _of_contact(case, contact)]
+    for analysis in case.analyses.values():
+        found += _of_amplitude(case, analysis)
+    return found
+
+
+def own_stiffness(case: Case, contact: Contact) -> Array:
+    """Stiffness (n_pairs, components) [force/length] of the structure along each row of B, all other dofs held.
+
+    1 / sum b_i^2 / K_ii, with K of the structure without contact; nan where it has none.
+    """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        softness = 1 / np.asarray(case.K.diagonal())
+        total = sum(sp.csr_matrix(B).power(2) @ softness for B in by_sector(contact.B).values())
+        stiffness = 1 / np.asarray(total)
+    stiffness[~np.isfinite(stiffness) | (stiffness <= 0)] = np.nan
+    return stiffness.reshape(-1, contact.components)
+
+
+def _of_contact(case: Case, contact: Contact) -> Iterator[InputError]:
+    own = own_stiffness(case, contact)
+    for row in range(min(contact.components, 2)):  # both tangents have one stiffness
+        yield from _of_stiffness(case, contact, contact.info.stiffness_along(row), own[:, row])
+    friction = contact.value(Role.FRICTION_COEFFICIENT)
+    if friction is not None and np.max(friction) > LARGEST_FRICTION:
+        yield InputError(
+            f"contact '{contact.name}' has an unusual coefficient of friction",
+            _key(contact, Role.FRICTION_COEFFICIENT),
+            span(friction),
+            f"at most {LARGEST_FRICTION:g}; of dry metals 0.1 to 1.5",
+            "look whether it is in percent, or an angle in degrees",
+        )
+    yield from _of_loads(case, contact)
+
+
+def _key(contact: Contact, role: Role) -> str:
+    return f"contact.{contact.name}.{contact.info.named(role)}"
+
+
+def _of_stiffness(case: Case, contact: Contact, role: Role, own: Array) -> Iterator[InputError]:
+    given = contact.value(role)
+    ratio = np.full(1, np.nan) if given is None else given / own
+    if np.all(np.isnan(ratio)):
+        return
+    for extreme, beyond, word, fix in (
+        (np.nanargmax, np.nanmax(ratio) > STIFF, "stiffer", "a softer contact, which solvers bear better"),
+        (np.nanargmin, np.nanmin(ratio) < SOFT, "softer", "a stiffer contact: this one holds nothing"),
+    ):
+        if beyond:
+            pair, unit = int(extreme(ratio)), case.units("force/length")
+            value = float(np.broadcast_to(given, own.shape)[pair])
+            yield InputError(
+                f"contact '{contact.name}' is far {word} than the structure at its pairs",
+                _key(contact, role),
+                f"{value:.3g} {unit} at pair {pair}, {ratio[pair]:.1g} times the structure's own {own[pair]:.3g}",
+                f"{SOFT:g} to {STIFF:g} times",
+                f"look at its units; else {fix}",
+            )
+
+
+def _of_loads(case: Case, contact: Contact) -> Iterator[InputError]:
+    """Pairs without load never stick: a limit of 0, or no load, no interference and no static load of the model."""
+    limit, load, gap = (contact.value(role) for role in (Role.FRICTION_LIMIT, Role.LOAD, Role.GAP))
+    sections = [case.preload_of(analysis) for analysis in case.analyses.values()]
+    pressed = any(section is not None and section.loads for section in sections)
+    unloaded = load is not None and not np.any(load) and (gap is None or np.min(gap) >= 0) and not pressed
+    if unloaded or (limit is not None and not np.any(limit)):
+        role = Role.LOAD if unloaded else Role.FRICTION_LIMIT
+        still = [f"{key} = 0" for key, value in case.resolved.items() if "speed" in key and value == 0]
+        yield InputError(
+            f"no pair of contact '{contact.name}' is loaded: none sticks, and friction does no work",
+            _key(contact, role),
+            " at ".join(["0 in every pair", *still]),
+            "> 0 in some pair" + (", a gap < 0, or static loads in [preload]" if unloaded else ""),
+            "give a speed above 0" if still else f"give {contact.info.named(role)} a value",
+        )
+
+
+def _of_amplitude(case: Case, analysis: AnalysisSection) -> Iterator[InputError]:
+    largest, size = analysis.largest_amplitude(), model_size(case)
+    if largest is not None and size and largest > LARGE * size:
+        unit = case.units("length")
+        yield InputError(
+            f"'{analysis.name}' goes to amplitudes of the model's own size",
+            f"{analysis.name}.amplitude",
+            f"{largest:g} {unit}, {largest / size:.2g} of the model's {size:.3g} {unit}",
+            f"at most {LARGE:g} of it",
+            "look at the units of both; else end the branch before",
+        )
+
+
+def model_size(case: Case) -> float:
+    """Diagonal [length] of the box around all nodes; 0 where the model has no places."""
+    nodes = case.structure.coordinates
+    return 0.0 if nodes is None else float(np.linalg.norm(np.ptp(nodes, axis=0)))
