@@ -100,6 +100,21 @@ def test_a_branch_is_damped_from_there(tmp_path: Path, capfd) -> None:
     assert len(beyond) > 1 and min(beyond) > 1e-3
 
 
+def test_normal_loads_are_balanced_unless_told_otherwise(tmp_path: Path, capfd) -> None:
+    """Without [preload] as with it, and a note says so; `balanced = false` gives (K + kn) x = -N0 at rest."""
+    path = put(tmp_path, CASE.replace("[preload]\npair_loads = true\n", ""))
+    assert call("check", path) == 0
+    said = capfd.readouterr().out
+    assert "normal forces sum to 2 N" in said and slips(said) == pytest.approx(expected()[:2], rel=5e-3)
+    assert "note: contact 'pad': its normal_load is taken as balanced" in said
+    assert call("check", path, "--set", "preload.balanced=false") == 0
+    said = capfd.readouterr().out
+    x, y = np.linalg.solve(K + np.diag([KT, KN]), [0.0, -N0])
+    assert f"normal forces sum to {N0 + KN * y:.5g} N" in said and "note" not in said
+    assert KT * abs(x) < MU * (N0 + KN * y), "it sticks"
+    assert "at rest: 1 stick" in said
+
+
 def test_amplitudes_that_never_slip(tmp_path: Path, capfd) -> None:
     assert call("check", put(tmp_path), "--set", "mode.amplitude=[0.01, 0.1]") == 0
     said = capfd.readouterr().out

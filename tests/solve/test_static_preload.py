@@ -97,6 +97,18 @@ def test_given_normal_loads_are_balanced_as_they_are(comm):
     assert (rest.stick, rest.slip, rest.open) == (1, 0, 0)
 
 
+@pytest.mark.parametrize("load", [0.0, 0.7, -1.0])
+def test_normal_loads_that_are_not_balanced_move_the_structure(comm, load):
+    """k x + N0 + kn x = P while closed: the pair is relieved, and the whole load is P; else x = P / k, open."""
+    model = normal_support(comm, normal_load=N0)
+    rest = static_preload(model, np.array([load]), first(model), balance=False)
+    expected = (load - N0) / (K + KN)
+    assert N0 + KN * expected > 0
+    assert rest.displacement == pytest.approx(expected, rel=ROUNDING)
+    assert rest.load == pytest.approx(load, abs=ROUNDING)
+    assert (rest.stick, rest.open) == (1, 0)
+
+
 def test_balance_of_a_structure(comm):
     """K x + B^T f = load, with f from the state's own slip pattern: pair 0 slips, pair 1 sticks."""
     model = clamped(comm)

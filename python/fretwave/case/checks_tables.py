@@ -5,12 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from ..model.laws import Role
 from .checks_common import check_loads
 from .reporter import Found, Reporter
 from .schema import PreloadSection, ReductionSection
 from .toml.source import Source
 
 if TYPE_CHECKING:
+    from ..model.contact import Contact
     from .analysis import AnalysisSection
 
 Analyses = Mapping[int, "AnalysisSection"]
@@ -58,3 +62,19 @@ def check_preload(source: Source, section: PreloadSection | None, loads: Sequenc
     """Loads come with the model (None: it is not known)."""
     if loads is not None:
         check_loads(Reporter(source, ("preload",), found), section, loads)
+
+
+def implied_preload(source: Source, contacts: Sequence[Contact], notes: list[str]) -> PreloadSection | None:
+    """Of a case without [preload]: normal loads given pair by pair are in balance as they are, which is noted.
+
+    Only of laws with a memory; others may be integrated in time, which knows no preload.
+    """
+    loaded = [c for c in contacts if c.info.memory and c.value(Role.LOAD) is not None and np.any(c.value(Role.LOAD))]
+    if "preload" in source.data or not loaded:
+        return None
+    notes += [
+        f"contact '{contact.name}': its {contact.info.named(Role.LOAD)} is taken as balanced, for there is no"
+        " [preload]; `[preload] balanced = false` lets it move the structure"
+        for contact in loaded
+    ]
+    return PreloadSection()

@@ -16,7 +16,7 @@ from . import checks
 from .analysis import Analyses, AnalysisSection
 from .at_speed import known_parts, with_speeds
 from .case import Case, Tables, changed_keys
-from .checks_tables import check_preload, check_reduction
+from .checks_tables import check_preload, check_reduction, implied_preload
 from .contacts import read_contacts
 from .facts import Facts
 from .flow import check_aerodynamics
@@ -162,6 +162,7 @@ def _build(
         check_physics(structure, places, rows, notes, found)
     if found or section is None or structure is None:
         return None
+    preload = preload or implied_preload(source, contacts, notes)
     tables = {"reduction": reduction, "preload": preload, "aerodynamics": flow}
     return Case(
         source=source,

@@ -151,8 +151,13 @@ class PreloadSection(Section):
     """``[preload]``: the static state that the dynamics move about."""
 
     pair_loads: bool = key(
-        "normal loads given pair by pair act, balanced as they are; false sets them to zero",
+        "normal loads given pair by pair act; false sets them to zero",
         example="true",
+        default=True,
+    )
+    balanced: bool = key(
+        "they are in balance as they are; false lets them move the structure until it is",
+        example="false",
         default=True,
     )
     loads: list[str] = key("static loads of the model that act", example='["centrifugal"]', default_factory=list)

@@ -97,6 +97,7 @@ def static_preload(
     steps: StepControl | None = None,
     closed: Array | None = None,
     sliders: Mapping[str, Array] | None = None,
+    balance: bool = True,
 ) -> Rest:
     """Static equilibrium under `load` and the normal loads given pair by pair. Collective.
 
@@ -113,6 +114,9 @@ def static_preload(
     closed : (n_dof,), optional
         Displacement under the full load with all pairs closed: start from a small share of it. For pairs that just
         touch when unloaded: a structure that they alone hold has no stiffness there.
+    balance : bool
+        The normal loads given pair by pair are in balance as they are. False: they move the structure until the load
+        alone balances them, on the way as it comes.
 
     Raises
     ------
@@ -122,6 +126,7 @@ def static_preload(
     load = np.asarray(load, dtype=float)
     reference = reference or linear_modes(model, 1)[0]
     rest = balanced(model, reference)
+    load = load if balance else load - rest.load
     problem = StaticPreload(model, load, reference, rest.load)
     history = None if sliders is None else model.local_sliders(sliders)
     if history is not None:

@@ -55,14 +55,15 @@ def loaded_state(context: AnalysisContext[AnalysisSection], factor: float = 1.0)
 
     section = context.case.preload_of(context.analysis)
     reference = closed_mode(context)
-    if section is None or not section.loads:
+    if section is None or (not section.loads and (section.balanced or not section.pair_loads)):
         return balanced(context.model, reference)
-    load = factor * np.sum([context.case.loads[name] for name in section.loads], axis=0)
+    given = [context.case.loads[name] for name in section.loads]
+    load = factor * np.sum([np.zeros(context.model.n_dof), *given], axis=0)
     closed = None
     if context.case.neighbours is None and just_touching(context.case.contacts, section):
         stuck = context.case.K + closed_stiffness(context)
         closed = scipy.sparse.linalg.spsolve(stuck.tocsc(), load)
-    return static_preload(context.model, load, reference, closed=closed)
+    return static_preload(context.model, load, reference, closed=closed, balance=section.balanced)
 
 
 def just_touching(contacts: Sequence[Contact], section: PreloadSection) -> bool:
