@@ -15,12 +15,15 @@ from ..model.laws import LawInfo, ParameterInfo
 from ..model.pairs import Pairs
 from ..texts import nearest, toml
 from ..units import quantity
+from .pair_values import PairTable
 from .schema import ContactSection
 from .toml.source import Source
 from .toml.validation import at
 
 #: A parameter's name with this ending is given per area; the pair's area comes with the model.
 PER_AREA = "_per_area"
+#: A text with this ending is a file with a value for each pair.
+TABLE = ".csv"
 LARGEST = float(np.finfo(float).max)
 LONGEST_SYMBOL = 4
 
@@ -136,7 +139,8 @@ def _value(
     sign = ">" if parameter.strict else ">="
     bounded = parameter.lower is not None and np.isfinite(parameter.lower)
     bound = f" {sign} {parameter.lower:g}" if bounded else ""
-    expected = f"a number{bound}, or one per pair ({n_pairs}): {parameter.doc} [{source.units(parameter.unit)}]"
+    unit = source.units(parameter.unit)
+    expected = f"a number{bound}, or one per pair ({n_pairs}), or a {TABLE} file of them: {parameter.doc} [{unit}]"
     if value is None:
         if parameter.default is None:
             found.append(
@@ -148,6 +152,13 @@ def _value(
                 )
             )
         return parameter.default
+    if isinstance(value, str) and value.lower().endswith(TABLE):
+        table = PairTable(source.path.parent / value, str(path[-1]), parameter, unit, source.where(path))
+        try:
+            return np.array(table.values(n_pairs))
+        except InputError as error:
+            found.append(error)
+            return None
     wrong = _wrong_number(value, parameter, n_pairs)
     if wrong:
         found.append(

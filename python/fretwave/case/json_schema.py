@@ -15,7 +15,7 @@ from pydantic import BaseModel
 
 from ..registry import kinds
 from ..units import quantity
-from .contact_parameters import PER_AREA
+from .contact_parameters import PER_AREA, TABLE
 from .schema import (
     TOP_LEVEL,
     AerodynamicsSection,
@@ -131,9 +131,10 @@ def _parameters(law: LawInfo) -> Schema:
 
 
 def _parameter(parameter: ParameterInfo, per_area: str) -> Schema:
-    """A number, or one for each pair."""
+    """A number, or one for each pair, as they are or in a table."""
     number: Schema = {"type": "number"}
+    table: Schema = {"type": "string", "pattern": rf"\{TABLE}$"}
     if parameter.lower > -1e300:
         number["exclusiveMinimum" if parameter.strict else "minimum"] = parameter.lower
     text = f"{parameter.doc}{per_area} [{quantity(parameter.unit)}{'/length^2' if per_area else ''}]"
-    return {"description": text, "anyOf": [number, {"type": "array", "items": number, "minItems": 1}]}
+    return {"description": text, "anyOf": [number, {"type": "array", "items": number, "minItems": 1}, table]}

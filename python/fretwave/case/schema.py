@@ -186,7 +186,10 @@ class AerodynamicsSection(Section):
 
 
 class ContactSection(BaseModel):
-    """``[[contact]]``: pairs that share a contact law; the law's parameters are further keys."""
+    """``[[contact]]``: pairs that share a contact law; the law's parameters are further keys.
+
+    Each is a number, an array with one for each pair, or a CSV file with the columns `pair` (from 0) and its own name.
+    """
 
     model_config = ConfigDict(extra="allow", strict=True)
 

@@ -1,0 +1,87 @@
+"""A contact's parameter from a CSV file: the same case as with the values written in it, and errors by line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_line import call
+
+import fretwave as fw
+from fretwave.case.load import load_case
+
+pytestmark = pytest.mark.ranks(1)
+
+CASE = """
+[model]
+dofs = ["a", "b", "c"]
+M = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+K = [[3.0, -1.0, 0.0], [-1.0, 3.0, -1.0], [0.0, -1.0, 3.0]]
+
+[[contact]]
+name = "pad"
+law = "jenkins"
+pairs = ["a", "b", "c"]
+tangential_stiffness = 1.5
+friction_limit = "limits.csv"
+
+[[analysis]]
+name = "mode"
+type = "mode"
+harmonics = 3
+samples = 64
+normalise = "a"
+amplitude = [0.01, 1.0]
+"""
+LIMITS = [0.5, 0.25, 2.0]
+TABLE = "pair,place,friction_limit [N]\n2,left,2.0\n0,right,0.5\n\n1,top,2.5e-1\n"
+
+
+def put(folder: Path, table: str = TABLE, case: str = CASE) -> Path:
+    (folder / "limits.csv").write_text(table)
+    (folder / "case.toml").write_text(case)
+    return folder / "case.toml"
+
+
+def test_as_written_in_the_case(tmp_path: Path) -> None:
+    """Rows in any order, other columns beside; what decides the results is the numbers."""
+    of_file = load_case(put(tmp_path))
+    written = load_case(put(tmp_path, case=CASE.replace('"limits.csv"', str(LIMITS))))
+    assert np.array_equal(of_file.contacts[0].parameters["friction_limit"], LIMITS)
+    assert of_file.digest == written.digest
+    assert load_case(put(tmp_path, TABLE.replace("2.0", "3.0"))).digest != written.digest
+
+
+def test_on_the_command_line(tmp_path: Path, capfd) -> None:
+    path = put(tmp_path, case=CASE.replace('"limits.csv"', "1.0"))
+    assert call("check", path, "--set", "contact.pad.friction_limit=limits.csv") == 0
+    assert "friction_limit = 0.25 to 2" in capfd.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("table", "words"),
+    [
+        ("pair,friction_limit\n0,0.5\n1,x\n2,1\n", ("has no such value", "limits.csv:3", "x", "a number >= 0")),
+        ("pair,friction_limit\n0,0.5\n1,-1\n2,1\n", ("has no such value", "limits.csv:3", "-1")),
+        ("pair,friction_limit\n0,0.5\n1,nan\n2,1\n", ("has no such value", "limits.csv:3", "nan")),
+        ("pair,friction_limit\n0,0.5\n3,1\n2,1\n", ("is of no pair", "limits.csv:3", "pair 3", "0 to 2")),
+        ("pair,friction_limit\n0,0.5\n0,1\n2,1\n", ("has a pair again", "limits.csv:3", "pair 0")),
+        ("pair,friction_limit\n0,0.5\n1\n", ("ends early", "limits.csv:3", "1 columns")),
+        ("pair,friction_limit\n0,0.5\n", ("lacks pairs", "none for pair 1 and 1 more", "3 lines")),
+        ("pair,friction_limit [kN]\n0,0.5\n", ("has other headings", "limits.csv:1", "pair,friction_limit [N]")),
+        ("0,0.5\n1,1\n", ("has other headings", "limits.csv:1")),
+        ("", ("has other headings", "nothing")),
+    ],
+)
+def test_errors_say_the_line(tmp_path: Path, table: str, words: tuple[str, ...]) -> None:
+    with pytest.raises(fw.InputError) as error:
+        load_case(put(tmp_path, table))
+    said = str(error.value)
+    assert all(word in said for word in (*words, "case.toml", "contact.pad.friction_limit", "fix:")), said
+
+
+def test_a_file_that_is_not_there(tmp_path: Path) -> None:
+    with pytest.raises(fw.InputError, match="does not exist") as error:
+        load_case(put(tmp_path, case=CASE.replace("limits", "limit")))
+    assert "did you mean `limits.csv`?" in str(error.value)
