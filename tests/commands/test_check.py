@@ -185,7 +185,7 @@ def test_no_state_at_rest_is_told_after_all_else(tmp_path: Path, capfd) -> None:
     assert call("check", put(tmp_path, text)) == 2
     out, err = capfd.readouterr()
     assert "harmonics 0, 1" in out
-    assert "nothing holds the structure at rest" in err and "analysis 'mode'" in err
+    assert "nothing holds the structure at rest" in err and "analysis 'mode'" in err and "dof x moves most" in err
 
 
 def test_on_two_ranks_as_on_one(launch) -> None:

@@ -140,6 +140,19 @@ def test_body_that_contact_cannot_hold(comm, load, carried):
     assert told == pytest.approx(carried, rel=1e-3)
 
 
+def test_the_body_that_is_free_is_named(comm):
+    """The second of three masses, alone without a spring, under a load that leaves it alone; then with one on it."""
+    stiffness = np.diag([1.0, 0.0, 2.0])
+    pads = contact([[1, 0, 0], [0, 1, 0], [0, 0, 1]], normal_load=0.0)
+    model = fw.Model(np.eye(3), stiffness, None, [pads], comm)
+    reference = first(fw.Model(np.eye(3), K * np.eye(3), None, [], comm))
+    for load in ([0.0, 0.0, 0.5], [0.0, 0.3, 0.5]):
+        with pytest.raises(fw.NotConverged, match="dof blade_2 most"):
+            static_preload(model, np.array(load), reference, names=["blade_1", "blade_2", "blade_3"])
+    with pytest.raises(fw.NotConverged, match="dof 1 most"):
+        static_preload(model, np.array([0.0, 0.0, 0.5]), reference)
+
+
 def test_body_pulled_off_its_contact(comm):
     """No spring: the contact lets go at the normal load."""
     model = normal_support(comm, k=0.0, normal_load=N0)

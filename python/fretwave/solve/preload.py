@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from petsc4py import PETSc
@@ -28,6 +28,8 @@ FIRST_FACTOR = 1e-2
 
 #: A tangent with less load than this (displacement and load are of one size) is a motion that nothing holds.
 UNHELD = 1e-10
+#: Of the reference mode's frequency: what is slower is a rigid motion.
+RIGID = 1e-6
 #: Of the reference mode's stiffness: what is softer than that is rounding of the stiff contact beside it.
 SOFTEST = 1e-8
 
@@ -98,6 +100,7 @@ def static_preload(
     closed: Array | None = None,
     sliders: Mapping[str, Array] | None = None,
     balance: bool = True,
+    names: Sequence[str] | None = None,
 ) -> Rest:
     """Static equilibrium under `load` and the normal loads given pair by pair. Collective.
 
@@ -117,6 +120,8 @@ def static_preload(
     balance : bool
         The normal loads given pair by pair are in balance as they are. False: they move the structure until the load
         alone balances them, on the way as it comes.
+    names : sequence of str, optional
+        Of the dofs, for the message about a body that is free.
 
     Raises
     ------
@@ -138,12 +143,17 @@ def static_preload(
     for point in branch:
         y, reached = point.y, point.parameter
         if point.event in ("", "start") and abs(branch.last_entry(point.tangent)) < UNHELD:
-            reason = "the structure moves without load: nothing holds it in some direction"
+            led = _led_by(_of_dofs(model, point.tangent), names)
+            reason = f"the structure moves without load{led}: nothing holds it in some direction"
             break
     if branch.converged:
-        if not _moves_freely(problem, y):
+        free = _free_motion(problem, y)
+        if free is None:
             return _settled(problem, y, rest.load + load, history)
-        reason = "it is not the only equilibrium: nothing holds the structure in a direction without load"
+        led = _led_by(free, names)
+        reason = f"it is not the only equilibrium: nothing holds the structure in a direction without load{led}"
+    elif y is None and (mode := linear_modes(model, 1)[0]).omega < RIGID * reference.omega:
+        reason = f"{branch.reason}: the structure moves without load{_led_by(mode.shape, names)}"
     raise NotConverged(
         "no static equilibrium under the full load",
         None,
@@ -154,8 +164,16 @@ def static_preload(
     )
 
 
-def _moves_freely(problem: StaticPreload, y: PETSc.Vec) -> bool:
-    """Whether nothing holds a direction. Collective.
+def _led_by(motion: Array, names: Sequence[str] | None) -> str:
+    """The dof that moves most, in words; nothing where the motion is not known."""
+    if not np.all(np.isfinite(motion)) or not np.any(motion):
+        return ""
+    dof = int(np.argmax(np.abs(motion)))
+    return f", dof {dof if names is None else names[dof]} most"
+
+
+def _free_motion(problem: StaticPreload, y: PETSc.Vec) -> Array | None:
+    """A motion (n_dof,) that nothing holds, None where all are held. Collective.
 
     Asked of J^-1 b, b of a sign for each unknown: whether a singular J can be factorised differs by its pivots, and so
     by ranks.
@@ -172,7 +190,9 @@ def _moves_freely(problem: StaticPreload, y: PETSc.Vec) -> bool:
         vector.assemble()
     newton.system.close(load_factor, 0.0)
     x = y.duplicate()
-    return not newton.linear(y, b, x) or not b.norm() > SOFTEST * x.norm()
+    if newton.linear(y, b, x) and b.norm() > SOFTEST * x.norm():
+        return None
+    return _of_dofs(problem.model, x)
 
 
 def _settled(problem: StaticPreload, y: PETSc.Vec, load: Array, history: list[list[float]] | None = None) -> Rest:

@@ -63,7 +63,8 @@ def loaded_state(context: AnalysisContext[AnalysisSection], factor: float = 1.0)
     if context.case.neighbours is None and just_touching(context.case.contacts, section):
         stuck = context.case.K + closed_stiffness(context)
         closed = scipy.sparse.linalg.spsolve(stuck.tocsc(), load)
-    return static_preload(context.model, load, reference, closed=closed, balance=section.balanced)
+    names = context.case.dofs
+    return static_preload(context.model, load, reference, closed=closed, balance=section.balanced, names=names)
 
 
 def just_touching(contacts: Sequence[Contact], section: PreloadSection) -> bool:
@@ -116,11 +117,17 @@ def start_mode(
         raise InputError(
             f"linear mode {linear_mode} is a rigid motion: nothing holds the structure at rest",
             where=f"analysis '{context.name}'",
-            measured=f"{start.frequency_hz:.3g} Hz, {100 * is_open:.3g} % of the pairs open at rest",
+            measured=f"{start.frequency_hz:.3g} Hz, dof {_leader(context, start)} moves most,"
+            f" {100 * is_open:.3g} % of the pairs open at rest",
             expected="an elastic mode",
             fix=f"load the contact ({by}[preload] loads), hold the structure, or take a higher linear_mode",
         )
     return start, rest
+
+
+def _leader(context: AnalysisContext[AnalysisSection], mode: LinearMode) -> str:
+    """Name of the dof that moves most."""
+    return context.case.dofs[int(np.argmax(np.hypot(mode.shape, mode.imaginary)))]
 
 
 def stuck_or_free(context: AnalysisContext[AnalysisSection], number: int) -> LinearMode:
