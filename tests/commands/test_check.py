@@ -188,6 +188,18 @@ def test_no_state_at_rest_is_told_after_all_else(tmp_path: Path, capfd) -> None:
     assert "nothing holds the structure at rest" in err and "analysis 'mode'" in err and "dof x moves most" in err
 
 
+def test_analyses_without_a_state_at_rest_end_as_their_run_does(tmp_path: Path, capfd) -> None:
+    """A pad that pushes itself off its own contact, in two analyses: one message, exit code 3, the free dof named."""
+    text = CASE.replace(f"K = {K.tolist()}", "K = [[3.0, 0.0], [0.0, 0.0]]").replace(
+        "pair_loads = true", "balanced = false"
+    )
+    again = text[text.index("[[analysis]]") :].replace('"mode"\ntype', '"again"\ntype')
+    assert call("check", put(tmp_path, text + again)) == 3
+    said = capfd.readouterr().err
+    assert said.count("error:") == 1 and "analysis 'mode'" in said and "analysis 'again'" in said
+    assert "no static equilibrium" in said and "dof y most" in said
+
+
 def test_on_two_ranks_as_on_one(launch) -> None:
     told = []
     for ranks in (1, 2):

@@ -11,12 +11,13 @@ from ..case.build import build_model
 from ..case.load import Case, load_case
 from ..case.ratios import odd_ratios
 from ..case.reduce import reduce_case
-from ..errors import EXIT_DONE, CaseErrors
+from ..errors import EXIT_DONE, CaseErrors, FretwaveError, NotConverged
 from ..model.contact import span
 from ..mpi.guard import on_first_rank
 from ..run.at_rest import at_rest
 from ..run.order import RunOptions, in_order
 from ..run.runner import check_sweeps
+from ..run.stopped import joined
 from ..texts import counted, display
 
 if TYPE_CHECKING:
@@ -52,8 +53,16 @@ def check_case(
             )
         )
     if found.failures:
-        raise found.failures[0] if len(found.failures) == 1 else CaseErrors(found.failures, display(case.path))
+        raise _one(found.failures, case)
     return EXIT_DONE
+
+
+def _one(failures: Sequence[FretwaveError], case: Case) -> FretwaveError:
+    """One message for several analyses, with the exit code that `run` has for them."""
+    unsolved = [failure for failure in failures if isinstance(failure, NotConverged)]
+    if len(failures) == 1:
+        return failures[0]
+    return joined(unsolved) if len(unsolved) == len(failures) else CaseErrors(failures, display(case.path))
 
 
 def _load(path: Path, overrides: Sequence[str], quick: bool) -> Case:

@@ -151,9 +151,12 @@ def static_preload(
         if free is None:
             return _settled(problem, y, rest.load + load, history)
         led = _led_by(free, names)
+        if not led:
+            problem.core.settle(y, history or [])
+            led = _led_by(_slowest(model, reference), names)
         reason = f"it is not the only equilibrium: nothing holds the structure in a direction without load{led}"
-    elif y is None and (mode := linear_modes(model, 1)[0]).omega < RIGID * reference.omega:
-        reason = f"{branch.reason}: the structure moves without load{_led_by(mode.shape, names)}"
+    elif y is None and (led := _led_by(_slowest(model, reference), names)):
+        reason = f"{branch.reason}: the structure moves without load{led}"
     raise NotConverged(
         "no static equilibrium under the full load",
         None,
@@ -170,6 +173,12 @@ def _led_by(motion: Array, names: Sequence[str] | None) -> str:
         return ""
     dof = int(np.argmax(np.abs(motion)))
     return f", dof {dof if names is None else names[dof]} most"
+
+
+def _slowest(model: Model, reference: LinearMode) -> Array:
+    """The lowest mode (n_dof,) with contact as at rest, zero unless it is a rigid motion. Collective."""
+    mode = linear_modes(model, 1)[0]
+    return mode.shape * (mode.omega < RIGID * reference.omega)
 
 
 def _free_motion(problem: StaticPreload, y: PETSc.Vec) -> Array | None:
