@@ -216,18 +216,30 @@ bool orthonormalise(Mat M, std::vector<VecHandle> const& found, bool travelling,
   return true;
 }
 
-/// The lowest pairs of a pencil that may have rigid motions next to its shift, just below zero. Their inverse
-/// is so large there that its rounding spoils the shapes far above them; from as far below zero as the first
-/// elastic one lies above, it is not.
-std::vector<EigenPair> lowest_beside_rigid(Pencil pencil, PetscInt count) {
-  constexpr double far = 100;
+/// The lowest pairs of a pencil, whose shift lies just below zero in the scale of the stiffest dof. Rigid
+/// motions next to it make the inverse so large that its rounding spoils the shapes far above them, and of
+/// motions all softer than it no more is known than a share of it: both kinds are found again from as far
+/// below zero as the first of their kind, or the last, lies above.
+std::vector<EigenPair> lowest_beside_zero(Pencil pencil, PetscInt count) {
+  const double far = 100 * std::abs(pencil.shift);
   auto found = lowest_pairs(pencil, count);
-  const double reach = std::abs(pencil.shift);
+  const auto wanted = found.begin() + std::min<std::ptrdiff_t>(count, std::ssize(found));
   const auto elastic =
-      std::find_if(found.begin(), found.end(), [&](auto const& pair) { return pair.value > far * reach; });
-  if (found.empty() || std::abs(found.front().value) > reach || elastic == found.end()) return found;
-  pencil.shift = -elastic->value;
-  return lowest_pairs(pencil, count);
+      std::find_if(found.begin(), wanted, [&](auto const& pair) { return pair.value > far; });
+  const PetscInt soft = PetscInt(elastic - found.begin());
+  if (soft == 0) return found;
+  EigenPair const& last = *(elastic - 1);
+  const double stiffest = last.value < uncertainty(pencil.K, last.vector) ? 0 : last.value;
+  if (elastic != wanted) {
+    pencil.shift = -elastic->value;
+    found = lowest_pairs(pencil, count);
+  }
+  if (stiffest > 0) {
+    pencil.shift = -stiffest;
+    auto again = lowest_pairs(pencil, soft);
+    std::move(again.begin(), again.begin() + soft, found.begin());
+  }
+  return found;
 }
 
 /// (K + B^H kt B) phi = w^2 M phi, with B phi = 0 where the stuck contact is rigid.
@@ -259,7 +271,7 @@ std::vector<LinearMode> undamped(Model const& model, int count, bool stuck, std:
                          .shift = near ? (1 - 1e-9) * *near * *near : -1e-8 * scale,
                          .rounding = rounding(K, M)};
   const auto pairs =
-      near ? nearest_pairs(pencil, copies * wanted) : lowest_beside_rigid(pencil, copies * wanted);
+      near ? nearest_pairs(pencil, copies * wanted) : lowest_beside_zero(pencil, copies * wanted);
   std::vector<LinearMode> modes;
   std::vector<VecHandle> found;
   for (auto const& [value, vector] : pairs) {
@@ -267,7 +279,8 @@ std::vector<LinearMode> undamped(Model const& model, int count, bool stuck, std:
     VecHandle x = like(vector);
     check(VecCopy(vector, x));
     if (!orthonormalise(AB[1], found, travelling, x)) continue;
-    modes.push_back({std::sqrt(std::max(value, 0.0)), 0, {}, {}});
+    const bool rigid = value < 1e-9 * scale && value < uncertainty(AB[0], x);
+    modes.push_back({rigid ? 0 : std::sqrt(value), 0, {}, {}});
     take_shape(model, AB, x, nullptr, modes.back());
     found.push_back(std::move(x));
   }

@@ -28,7 +28,11 @@ TO_OMEGA = 2 * np.pi / 60
 
 COLUMNS = (
     Column("mode", "1", "number of the mode of this contact and wave, 1 is the lowest", "i"),
-    Column("amplitude", "length", f"largest amplitude of a dof where the mode's coordinate is 1 {MODAL_UNIT}"),
+    Column(
+        "amplitude",
+        "length",
+        f"largest amplitude of a dof where the mode's coordinate is 1 {MODAL_UNIT}; none of a rigid motion",
+    ),
     "omega",
     "frequency_hz",
     Column("zeta", "1", "damping ratio by C, to first order: phi* C phi / (2 omega phi* M phi)"),
@@ -63,7 +67,7 @@ def modes_of_wave(
                     "nodal_diameter": diameters,
                     "speed_rpm": speed_rpm,
                     "mode": number,
-                    "amplitude": float(np.hypot(mode.shape, mode.imaginary).max()),
+                    "amplitude": float(np.hypot(mode.shape, mode.imaginary).max()) if mode.omega else np.nan,
                     "omega": mode.omega,
                     "frequency_hz": mode.frequency_hz,
                     "zeta": damping_ratio(mode, C, theta),
