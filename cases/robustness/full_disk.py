@@ -23,6 +23,8 @@ from small_runs import Ended, Scene, call, clean, differences
 
 #: Bytes of the tmpfs: a whole run and a half.
 DISK = 4 << 20
+#: Of a run: 436 MB of libraries and buffers to begin with, and what it works with [bytes].
+MEMORY = 700e6
 
 
 @contextmanager
@@ -116,7 +118,7 @@ def main() -> int:
                     elif kind == "size limit":
                         code, wrong = limited(scene, size_limit(int(part * largest)), target, whole, folder)
                     elif kind == "memory":
-                        code, wrong = limited(scene, memory_limit(int(part * 300e6)), target, whole, folder)
+                        code, wrong = limited(scene, memory_limit(int(part * MEMORY)), target, whole, folder)
                     else:
                         continue
                     codes[code] = codes.get(code, 0) + 1

@@ -38,6 +38,9 @@ def _dispatch(arguments: list[str]) -> int:
 
         return doctor.main(arguments[1:], _said_once)
     if arguments[:1] == ["study"]:
+        from ..files.memory import LIBRARIES, check_room
+
+        check_room(LIBRARIES)
         from . import study
 
         return int(study.main(arguments[1:]))

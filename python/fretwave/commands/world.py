@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import signal
+import sys
 from typing import Any
 
 
 def world() -> Any:
     """MPI with PETSc started on it; collective, so it comes before anything one rank could fail in alone."""
+    from ..files.memory import LIBRARIES, check_room
+
+    check_room(0 if "mpi4py.MPI" in sys.modules else LIBRARIES)
     from mpi4py import MPI
 
-    from ..files.memory import check_room
     from .doctor import check_runtime
 
     check_runtime()
-    check_room()
     from .. import _core  # noqa: F401
 
     signal.signal(signal.SIGPIPE, signal.SIG_IGN)  # PETSc takes it for a fault; Python then raises BrokenPipeError
