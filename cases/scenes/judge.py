@@ -104,7 +104,7 @@ def read(scene: Scene, done: Finished) -> list[Run]:
         for name, value in scene.analysis.get("force", {}).items():
             force[int(name[1:])] = value * level
         eq = Equations(
-            scene.M, scene.K, C, scene.contacts, orders, method, dof, force if level else None, scene.preload
+            scene.M, scene.K, C, scene.contacts, orders, method, dof, force if level else None, bool(scene.preload)
         )
         runs.append(Run(scene, {k: v[rows] for k, v in columns.items()}, Q[rows], eq, method))
     return runs

@@ -76,7 +76,16 @@ def kinks() -> Iterator[Scene]:
                     else:
                         contact = jenkins(1.0, 0.6, [0.0, 0.0, 1.0])
                     name = f"kink_{law}_{initial:g}_{maximum:g}_{angle:g}"
-                    yield Scene(axis, name, np.eye(3), K, [contact], analysis, C=0.02 * K, preload=law == "stop")
+                    yield Scene(
+                        axis,
+                        name,
+                        np.eye(3),
+                        K,
+                        [contact],
+                        analysis,
+                        C=0.02 * K,
+                        preload=True if law == "stop" else None,
+                    )
 
 
 def levels() -> Iterator[Scene]:

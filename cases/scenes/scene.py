@@ -57,7 +57,7 @@ class Scene:
     answer : "branch" to the asked end; "unbounded": there is none, and exit 3 names the level; "none": no mode at all
     closed : functions of a `judge.Run`, each giving what is wrong against a closed form
     folds, reports : numbers of folds, and of solutions at reported values, where known
-    preload : the pairs' own normal loads are balanced
+    preload : the pairs' own normal loads are balanced; None: there are none
     twin : the same scene in other units, and the factors (length, time) from this scene's units to the twin's
     quick : part of the short list of the tests
     """
@@ -73,7 +73,7 @@ class Scene:
     closed: Sequence[Callable[[Any], list[str]]] = ()
     folds: int | None = None
     reports: dict[float, int] = field(default_factory=dict)
-    preload: bool = False
+    preload: bool | None = None
     twin: tuple[Scene, float, float] | None = None
     quick: bool = False
     timeout: float = 30.0
@@ -115,8 +115,8 @@ def write(scene: Scene, folder: Path) -> Path:
     else:
         lines.append('builder = "model.py"')
         _write_builder(scene, folder)
-    if scene.preload:
-        lines += ["", "[preload]"]
+    if scene.preload is not None:
+        lines += ["", "[preload]", *([] if scene.preload else ["balanced = false"])]
     for contact in scene.contacts:
         lines += ["", "[[contact]]", f"name = {_toml(contact.name)}", f"law = {_toml(contact.law)}"]
         if inline:
