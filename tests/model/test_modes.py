@@ -133,10 +133,14 @@ def test_soft_motions_beside_stiff_contact_are_exact(comm, stiffness, count):
     """A chain of six, three held by stiff springs: 2 sin(pi (j - 1/2) / 7) of the other three, to 1 / stiffness."""
     K = 2 * np.eye(6) - np.eye(6, k=1) - np.eye(6, k=-1)
     K[5, 5] = 1.0
+    C = 0.01 * K
     K[:3, :3] += stiffness * np.eye(3)
-    found = [mode.omega for mode in fw.linear_modes(fw.Model(np.eye(6), K, comm=comm), count, "free")][:3]
-    exact = 2 * np.sin(np.pi * (np.arange(1, 4) - 0.5) / 7)[: len(found)]
-    np.testing.assert_allclose(found, exact, rtol=1 / stiffness + ROUNDING)
+    exact = 2 * np.sin(np.pi * (np.arange(1, 4) - 0.5) / 7)[: min(count, 3)]
+    found = fw.linear_modes(fw.Model(np.eye(6), K, comm=comm), count, "free")[:3]
+    np.testing.assert_allclose([mode.omega for mode in found], exact, rtol=1 / stiffness + ROUNDING)
+    damped = fw.linear_modes(fw.Model(np.eye(6), K, C, comm=comm), len(exact), "linearised")
+    np.testing.assert_allclose([np.hypot(mode.omega, mode.beta) for mode in damped], exact, rtol=1 / stiffness + ROUNDING)
+    np.testing.assert_allclose([mode.zeta for mode in damped], 0.005 * exact, rtol=1 / stiffness + SOLVED)
 
 
 def test_double_mode_is_found_twice(comm):
