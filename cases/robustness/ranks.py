@@ -31,6 +31,8 @@ ITERATED = {
     "lap_joint": ["forced", "mode"],
     "shrouded_sector": ["forced"],
 }
+#: What a column is a share of, where that is not its own largest: an error of wear is one of the mean normal load.
+SHARE = {"step_error": 1.0}
 Table = dict[str, list[str]]
 Array = npt.NDArray[np.float64]
 
@@ -72,6 +74,8 @@ def difference(one: Table, other: Table) -> tuple[float, str]:
 
 def size_of(table: Table, name: str) -> float:
     """Largest number of a column; of an error by source that of all its sources: one of them may be rounding."""
+    if name in SHARE:
+        return SHARE[name]
     stem, by_source, _ = name.partition("_error_")
     names = [other for other in table if other.startswith(f"{stem}_error_")] if by_source else [name]
     numbers = np.abs([float(v) for other in names for v in table[other]])
