@@ -14,6 +14,7 @@ import numpy as np
 
 from ..arrays import IntArray
 from ..errors import InputError
+from ..fe.solids import EDGES
 from ..texts import nearest
 from .keywords import Lines
 from .shapes import corners_of
@@ -37,21 +38,12 @@ _TO_VTK = {"wedge": [3, 4, 5, 0, 1, 2], "quadratic_wedge": [3, 4, 5, 0, 1, 2, 9,
 _TETRAHEDRON = ((1, 2, 3), (1, 4, 2), (2, 4, 3), (3, 4, 1))
 _WEDGE = ((1, 2, 3), (4, 6, 5), (1, 4, 5, 2), (2, 5, 6, 3), (3, 6, 4, 1))
 _HEXAHEDRON = ((1, 2, 3, 4), (5, 8, 7, 6), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 8, 4), (4, 8, 5, 1))
-#: Edges in the order of their middle nodes, which follow the corners.
-_EDGES = {
-    "quadratic_tetrahedron": ((1, 2), (2, 3), (3, 1), (1, 4), (2, 4), (3, 4)),
-    "quadratic_wedge": ((1, 2), (2, 3), (3, 1), (4, 5), (5, 6), (6, 4), (1, 4), (2, 5), (3, 6)),
-    "quadratic_hexahedron": (
-        *((1, 2), (2, 3), (3, 4), (4, 1), (5, 6), (6, 7), (7, 8), (8, 5)),
-        *((1, 5), (2, 6), (3, 7), (4, 8)),
-    ),
-}
 
 
 def _faces(kind: str, corners: tuple[tuple[int, ...], ...]) -> list[list[int]]:
     """Places of the nodes of each face, seen from outside: corners, then the middle nodes of the edges between them."""
-    edges = _EDGES.get(kind, ())
-    middle = {frozenset(edge): max(max(face) for face in corners) + k for k, edge in enumerate(edges)}
+    edges = EDGES.get(kind, ())
+    middle = {frozenset((a + 1, b + 1)): max(map(max, corners)) + k for k, (a, b) in enumerate(edges)}
     found = []
     for face in corners:
         outside = face[::-1]
@@ -131,8 +123,9 @@ class Elements:
             lines.append((first.strip().upper(), face.strip().strip(",").upper()))
 
     def vtk(self) -> dict[str, IntArray]:
-        """Node numbers (n, m) in VTK's order by kind."""
-        return {kind: block.nodes[:, _TO_VTK.get(kind, slice(None))] for kind, block in self.blocks.items()}
+        """Node numbers (n, m) in VTK's order by kind, cells in the order of their numbers."""
+        ordered = {kind: block.nodes[np.argsort(block.numbers)] for kind, block in self.blocks.items()}
+        return {kind: nodes[:, _TO_VTK.get(kind, slice(None))] for kind, nodes in ordered.items()}
 
     def members(self, name: str, where: str, above: tuple[str, ...] = ()) -> IntArray:
         """Element numbers of a set, of sets that it names too."""

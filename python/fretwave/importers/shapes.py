@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import Array
+from ..fe.solids import polynomials
 
 _CORNERS = {3: [(0, 0), (1, 0), (0, 1)], 4: [(-1, -1), (1, -1), (1, 1), (-1, 1)]}
 #: Powers of both coordinates in the polynomials of a face of so many nodes.
@@ -33,21 +34,12 @@ def node_places(count: int) -> Array:
     return np.vstack([corners, middle])[:count]
 
 
-def _polynomials(count: int, u: Array) -> tuple[Array, Array]:
-    """(n, count) and their derivatives (n, 2, count) at u (n, 2)."""
-    p = np.array(_POWERS[count])
-    x, y = u[:, :1], u[:, 1:]
-    less = np.maximum(p - 1, 0)
-    along_x, along_y = p[:, 0] * x ** less[:, 0] * y ** p[:, 1], p[:, 1] * x ** p[:, 0] * y ** less[:, 1]
-    return x ** p[:, 0] * y ** p[:, 1], np.stack([along_x, along_y], axis=1)
-
-
-_SHAPES = {count: np.linalg.inv(_polynomials(count, node_places(count))[0]) for count in _POWERS}
+_SHAPES = {count: np.linalg.inv(polynomials(_POWERS[count], node_places(count))[0]) for count in _POWERS}
 
 
 def shape_functions(count: int, u: Array) -> tuple[Array, Array]:
     """Of a face of count nodes at u (n, 2): values (n, count) and gradients (n, 2, count)."""
-    values, gradients = _polynomials(count, u)
+    values, gradients = polynomials(_POWERS[count], u)
     return values @ _SHAPES[count], gradients @ _SHAPES[count]
 
 
