@@ -26,6 +26,12 @@ def complex_amplitudes(labels: Sequence[str], coefficients: Array) -> dict[int, 
     return amplitudes
 
 
+def waves(labels: Sequence[str], phases: Array) -> Array:
+    """Value (n_phases, m) of each coefficient's function of time: x = sum Qc_n cos n tau + Qs_n sin n tau."""
+    found = [(np.sin if text.endswith("s") else np.cos, int(text.rstrip("cs"))) for text in labels]
+    return np.column_stack([wave(order * phases) for wave, order in found])
+
+
 def motion(labels: Sequence[str], coefficients: Array, beta: float, omega: float, n: int = 512) -> tuple[Array, Array]:
     """Displacement and velocity (n + 1, n_dof) over one closed period (first = last).
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +18,7 @@ from ..errors import InputError
 from ..files.dimensions import names_of_data
 from ..model.laws import kept_laws
 from ..post.contact_history import ContactHistory
+from ..post.motion import waves
 from ..results.file import unit_of_amplitudes
 from ..texts import display, nearest
 from ..units import SI, UnitSystem, units_of
@@ -139,8 +140,7 @@ class Choice:
 
     def basis(self) -> Array:
         """Value (n_phases, m) of each column's function of time: x = sum Qc_n cos n tau + Qs_n sin n tau."""
-        waves = [(np.sin if text.endswith("s") else np.cos, int(text.rstrip("cs"))) for text in self.labels]
-        return np.column_stack([wave(order * self.phases) for wave, order in waves])
+        return waves(self.labels, self.phases)
 
     @property
     def orders(self) -> list[int]:
@@ -220,6 +220,21 @@ def read_choice(file: h5py.File, folder: Path, case: Case, options: ViewOptions)
     )
 
 
+def at_point(choice: Choice, group: h5py.Group, case: Case, point: int) -> Choice:
+    """The same of another point alone, without its contacts."""
+    states = {key: group["points"][key][()][[point]].astype(float) for key in choice.states}
+    return replace(
+        choice,
+        points=[point],
+        asked=[""],
+        states=states,
+        coefficients=group["coefficients"][point][None],
+        contacts={},
+        without=[],
+        diameters=_diameters(group, case, choice.name, [point]),
+    )
+
+
 def _diameters(group: h5py.Group, case: Case, name: str, rows: Sequence[int]) -> list[int]:
     """Nodal diameters of the points: those of their rows, where an analysis has several, or of the analysis."""
     if case.neighbours is None:
@@ -231,8 +246,7 @@ def _diameters(group: h5py.Group, case: Case, name: str, rows: Sequence[int]) ->
 
 def analysis_name(file: h5py.File, folder: Path, case: Case, asked: str | None) -> str:
     """Name of the analysis asked for, or of the first that has a motion: in the order of the case."""
-    found = [name for name in case.analyses if name in file and "coefficients" in file[name]]
-    found = [name for name in found if belongs(file[name], case, name)]
+    found = analyses_that_move(file, case)
     if found and asked in (None, *found):
         return asked or found[0]
     listed = ", ".join(found) or "none"
@@ -243,6 +257,12 @@ def analysis_name(file: h5py.File, folder: Path, case: Case, asked: str | None) 
         "a mode or forced response of this run",
         (nearest(asked, found) if asked else None) or (f"--analysis {found[0]}" if found else "run such an analysis"),
     )
+
+
+def analyses_that_move(file: h5py.File, case: Case) -> list[str]:
+    """Names of those that keep harmonic coefficients, in the order of the case."""
+    found = [name for name in case.analyses if name in file and "coefficients" in file[name]]
+    return [name for name in found if belongs(file[name], case, name)]
 
 
 def kept_points(group: h5py.Group) -> Indices:
