@@ -16,10 +16,12 @@ from ..model.structure import Structure
 from ..texts import toml
 from ..units import UnitSystem
 from .analysis import Analyses, AnalysisSection
+from .gauges import Gauges
 from .reduction_report import ReductionReport
 from .schema import (
     AerodynamicsSection,
     Damper,
+    MaterialSection,
     PreloadSection,
     ReductionSection,
     StudySection,
@@ -37,12 +39,14 @@ class Tables:
     preload : the static state of all analyses without one of their own
     aerodynamics : forces of the flow on a sector's blades
     study : what ``fretwave study`` sweeps
+    gauges : what ``fretwave stress`` reads; no result depends on it
     """
 
     reduction: ReductionSection | None = None
     preload: PreloadSection | None = None
     aerodynamics: AerodynamicsSection | None = None
     study: StudySection = field(default_factory=StudySection)
+    gauges: Gauges = field(default_factory=lambda: Gauges(MaterialSection()))
 
 
 @dataclass

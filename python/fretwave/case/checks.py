@@ -38,9 +38,10 @@ def check_top_level(source: Source, found: Found) -> None:
     for key in source.data:
         if key not in TOP_LEVEL:
             found.append(unknown_key(source, (key,), list(TOP_LEVEL)))
-    tables = dict.fromkeys(("model", "reduction", "preload", "aerodynamics", "quick", "study"), dict)
-    shapes = {**tables, "contact": list, "analysis": list, "title": str}
-    writing = {**{name: f"[{name}]" for name in tables}, "contact": "[[contact]]", "analysis": "[[analysis]]"}
+    tables = dict.fromkeys(("model", "reduction", "preload", "aerodynamics", "material", "quick", "study"), dict)
+    arrays = dict.fromkeys(("contact", "gauge", "analysis"), list)
+    shapes = {**tables, **arrays, "title": str}
+    writing = {**{name: f"[{name}]" for name in tables}, **{name: f"[[{name}]]" for name in arrays}}
     for key, shape in shapes.items():
         value = source.data.get(key)
         bad = value is not None and not isinstance(value, shape)
@@ -78,7 +79,7 @@ def _unknown_type(source: Source, number: int, kind: object, known: list[str]) -
 
 def _check_names(source: Source, found: Found) -> None:
     """Names are addresses of ``--set`` and file names: unique, and none of the top-level keys."""
-    for kind in ("analysis", "contact"):
+    for kind in ("analysis", "contact", "gauge"):
         seen: dict[str, int] = {}
         for number in range(len(source.entries(kind))):
             name = source.entry_name(kind, number)

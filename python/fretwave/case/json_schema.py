@@ -20,6 +20,8 @@ from .schema import (
     TOP_LEVEL,
     AerodynamicsSection,
     ContactSection,
+    GaugeSection,
+    MaterialSection,
     ModelSection,
     PreloadSection,
     ReductionSection,
@@ -36,6 +38,7 @@ SECTIONS: Mapping[str, type[BaseModel]] = {
     "reduction": ReductionSection,
     "preload": PreloadSection,
     "aerodynamics": AerodynamicsSection,
+    "material": MaterialSection,
     "study": StudySection,
 }
 Schema = dict[str, Any]
@@ -50,6 +53,7 @@ def json_schema(laws: Mapping[str, LawInfo]) -> Schema:
     properties["title"]["type"] = "string"
     properties["plugins"].update(type="array", items={"type": "string"})
     properties["contact"].update(type="array", items=_contact(laws, definitions))
+    properties["gauge"].update(type="array", items=_section(GaugeSection, definitions))
     properties["analysis"].update(type="array", minItems=1, items=_analysis(definitions))
     properties["quick"]["type"] = "object"
     return {

@@ -20,6 +20,7 @@ from .checks_tables import check_preload, check_reduction, implied_preload
 from .contacts import read_contacts
 from .facts import Facts
 from .flow import check_aerodynamics
+from .gauges import read_gauges
 from .origin import check_physics, load_origin
 from .plugins import Plugin, read_plugins
 from .reduce import kept_dofs
@@ -157,6 +158,7 @@ def _build(
     checks.check_analyses(source, analyses, facts, found)
     check_reduction(source, reduction, analyses, facts.sectors, found)
     check_preload(source, preload, facts.loads, found)
+    gauges = read_gauges(source, (structure.cut or structure) if structure else None, found)
     if structure is not None:
         rows = [contact.pairs.own for contact in contacts] if facts.complete else None
         check_physics(structure, places, rows, notes, found)
@@ -173,7 +175,7 @@ def _build(
             **_resolve({**identity, **_faces(section, structure)}, source, section, contacts, analyses, tables),
             **{f"plugins.{plugin.name}": plugin.digest for plugin in plugins},
         },
-        tables=Tables(reduction, preload, flow, study or StudySection()),
+        tables=Tables(reduction, preload, flow, study or StudySection(), gauges),
         notes=[*notes, *_unused_contacts(built, contacts)],
         keep=list(keep),
     )

@@ -250,6 +250,38 @@ class MistuningSection(Section):
     )
 
 
+class MaterialSection(Section):
+    """``[material]``: what stress and its limit follow from in `fretwave stress`; nothing of it is solved with."""
+
+    youngs_modulus: Optional[Positive] = key("of all solid cells", "pressure", "210e9", default=None)
+    poisson_ratio: Optional[float] = key("of all solid cells", "-", "0.3", default=None, gt=-1, lt=0.5)
+    endurance_limit: Optional[Positive] = key(
+        "stress amplitude that is borne for ever without mean stress", "pressure", "250e6", default=None
+    )
+    ultimate_strength: Optional[Positive] = key(
+        "tensile strength: the mean stress that bears no amplitude", "pressure", "600e6", default=None
+    )
+
+
+class GaugeSection(Section):
+    """``[[gauge]]``: a strain gauge on a solid, read by `fretwave stress`."""
+
+    name: Name = key("name of the gauge", example='"root"', pattern=r"^[A-Za-z][A-Za-z0-9_]*$")
+    node: Optional[Whole] = key(
+        "node it lies on, in the mesh's own numbers, else counted from 0", example="690", default=None, ge=0
+    )
+    point: Optional[list[float]] = key(
+        "instead, a point of the surface", "length", "[0.01, 0.0, 0.002]", default=None, min_length=3, max_length=3
+    )
+    direction: list[float] = key(
+        "it measures along, of any length; in a sector further on it turns with the sector",
+        example="[1.0, 0.0, 0.0]",
+        min_length=3,
+        max_length=3,
+    )
+    sector: Whole = key("of a wheel of which all sectors are solved", example="0", default=0, ge=0)
+
+
 class StudySection(Section):
     """``[study]``: sweeps of ``fretwave study``, each with the others at their finest (of wear: as in the analysis)."""
 
@@ -283,6 +315,8 @@ TOP_LEVEL = {
     "preload": "the static state that the dynamics move about",
     "aerodynamics": "forces of the flow on the blades",
     "contact": "contact pairs that share a law ([[contact]], any number)",
+    "material": "elastic constants and limits of stress, for `fretwave stress`",
+    "gauge": "strain gauges, for `fretwave stress` ([[gauge]], any number)",
     "analysis": "what to compute ([[analysis]], at least one)",
     "quick": "overrides used by --quick, addressed as --set does",
     "study": "what fretwave study sweeps",

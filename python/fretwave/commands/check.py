@@ -81,6 +81,7 @@ def _report(case: Case, described: dict[str, list[str]]) -> list[str]:
         values = ", ".join(f"{key} = {span(value)}" for key, value in contact.parameters.items())
         lines.append(f"  contact '{contact.name}': {contact.law}, {counted(contact.n_pairs, 'contact pair')}, {values}")
     lines.extend(f"  {line}" for line in (case.reduced.lines() if case.reduced else ()))
+    lines.extend(f"  {line}" for line in case.tables.gauges.lines())
     lines.extend(f"  note: {note}" for note in case.notes)
     for name, texts in described.items():
         lines.append(f"  {name}: {texts[0]}")

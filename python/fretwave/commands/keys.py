@@ -17,6 +17,8 @@ from ..case.schema import (
     AerodynamicsSection,
     ContactSection,
     Damper,
+    GaugeSection,
+    MaterialSection,
     MistuningSection,
     ModelSection,
     PreloadSection,
@@ -48,6 +50,8 @@ def key_lines(case: Path | None = None) -> Iterator[str]:
         "[preload]": PreloadSection,
         "[aerodynamics]": AerodynamicsSection,
         "[[contact]] (and the parameters of its law)": ContactSection,
+        "[material]": MaterialSection,
+        "[[gauge]]": GaugeSection,
         "[[analysis]]": AnalysisSection,
     }
     for title, section in sections.items():

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..arrays import Array, Complex
+from ..case.gauges import node_numbers, row_of_node
 from ..case.kept import reload_case
 from ..columns import Column
 from ..errors import InputError
@@ -131,10 +132,9 @@ def of_node(folder: Path, analysis: str, number: int, point: int, sector: int = 
 
 def _row_of(given: Structure, count: int, number: int, folder: Path) -> int:
     """Place of a node among the coordinates."""
-    numbers = np.arange(count) if given.node_numbers is None else np.asarray(given.node_numbers)
-    found = np.flatnonzero(numbers == number)
-    if len(found):
-        return int(found[0])
+    row, numbers = row_of_node(given, number), node_numbers(given)
+    if row is not None:
+        return row
     near = numbers[np.argmin(np.abs(numbers - number))]
     kind = "counted from 0" if given.node_numbers is None else "in the mesh's own numbers"
     expected = f"one of {count} nodes, {numbers.min()} to {numbers.max()}, {kind}"

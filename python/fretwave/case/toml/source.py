@@ -78,12 +78,12 @@ class Source:
     def name(self, path: KeyPath) -> str:
         """A path as ``--set`` addresses it: ``mode.harmonics``, ``model.M[0][1]``."""
         parts: list[str | int] = list(path)
-        if len(parts) > 1 and parts[0] in ("analysis", "contact") and isinstance(parts[1], int):
+        if len(parts) > 1 and parts[0] in ("analysis", "contact", "gauge") and isinstance(parts[1], int):
             entry_name = self.entry_name(str(parts[0]), parts[1])
             if entry_name is None:
                 head = f"{parts[0]}[{parts[1]}]"
             else:
-                head = entry_name if parts[0] == "analysis" else f"contact.{entry_name}"
+                head = entry_name if parts[0] == "analysis" else f"{parts[0]}.{entry_name}"
             parts = [head, *parts[2:]]
         text = str(parts[0]) if parts else "case"
         for part in parts[1:]:
@@ -91,7 +91,7 @@ class Source:
         return text
 
     def entries(self, kind: str) -> list[dict[str, Any]]:
-        """Tables of ``[[analysis]]`` or ``[[contact]]`` (empty when the case has it wrong)."""
+        """Tables of ``[[analysis]]``, ``[[contact]]`` or ``[[gauge]]`` (empty when the case has it wrong)."""
         entries = self.data.get(kind, [])
         good = isinstance(entries, list) and all(isinstance(entry, dict) for entry in entries)
         return entries if good else []
@@ -176,9 +176,9 @@ class Source:
     def _path(self, parts: Sequence[str], origin: str) -> KeyPath | None:
         """Where an address points; analyses and contacts are addressed by name."""
         kind, rest = ("analysis", parts)
-        if parts[0] in ("title", "plugins", "model", "reduction", "preload", "aerodynamics"):
+        if parts[0] in ("title", "plugins", "model", "reduction", "preload", "aerodynamics", "material"):
             return tuple(parts)
-        if parts[0] in ("contact", "analysis") and len(parts) > 1:
+        if parts[0] in ("contact", "analysis", "gauge") and len(parts) > 1:
             kind, rest = parts[0], parts[1:]
         names = [self.entry_name(kind, number) for number in range(len(self.entries(kind)))]
         if rest[0] in names and len(rest) > 1:
