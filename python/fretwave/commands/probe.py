@@ -14,7 +14,7 @@ import numpy as np
 
 from ..columns import Column
 from ..errors import InputError
-from ..files.csv_table import header_line, row_line
+from ..files.csv_table import table_text
 from ..files.whole import replace_text
 from ..results.file import open_results
 from ..results.pair_table import pair_table
@@ -100,10 +100,7 @@ def _show_motion(moved: NodeMotion, line: str, options: argparse.Namespace) -> N
 
 
 def _csv(columns: Sequence[Column], rows: Sequence[Mapping[str, Any]]) -> str:
-    lines = [
-        row_line(columns, {column.name: row.get(column.name, _missing(column)) for column in columns}) for row in rows
-    ]
-    return "".join([header_line(columns), *lines])
+    return table_text(columns, ({c.name: row.get(c.name, _missing(c)) for c in columns} for row in rows))
 
 
 def _missing(column: Column) -> Any:

@@ -1,4 +1,4 @@
-"""Sub-commands that read results and solve nothing: show, report, plot, probe, view."""
+"""Sub-commands that read results and solve nothing: show, report, plot, probe, stress, view."""
 
 from __future__ import annotations
 
@@ -49,6 +49,7 @@ def add_reading(commands: _SubParsers) -> None:
     plot.add_argument("--only", type=names, default=[], metavar="NAME,...", help="analyses or kinds of picture")
     plot.set_defaults(command=_plot)
     _add_probe(commands)
+    _add_stress(commands)
     _add_view(commands)
 
 
@@ -79,6 +80,21 @@ def _add_probe(commands: _SubParsers) -> None:
     probe.add_argument("--steps", type=int, metavar="N", help="in their place the motion at N instants of the period")
     probe.add_argument("--out", type=Path, metavar="FILE", help="write the CSV here")
     probe.set_defaults(command=_probe)
+
+
+def _add_stress(commands: _SubParsers) -> None:
+    stress = commands.add_parser(
+        "stress",
+        help="strain gauges, the worst stress and Goodman's limit over a branch",
+        description="Writes <analysis>_gauges.csv: at every point of a branch the strain amplitude of each [[gauge]] of"
+        " the case over the period, and, with [material], the worst node with its von Mises stress amplitude, mean"
+        " stress and Goodman's factor; and <analysis>_goodman.csv: the amplitude (of a forced response the level) at"
+        " which that reaches 1. Both tables may be added to the case file after the run. A reduced model is expanded.",
+    )
+    add_folder(stress)
+    stress.add_argument("--analysis", metavar="NAME", help="mode or forced response (default: all)")
+    stress.add_argument("--out", type=Path, metavar="FILE", help="write the first of both tables here alone")
+    stress.set_defaults(command=_stress)
 
 
 def _add_view(commands: _SubParsers) -> None:
@@ -147,6 +163,16 @@ def _probe(options: argparse.Namespace) -> int:
 
     options.out = file_to_write(options.out, "probe.csv")
     _on_first_rank(comm, lambda: probe(options))
+    return EXIT_DONE
+
+
+def _stress(options: argparse.Namespace) -> int:
+    run_folder(options.folder)
+    comm = world_if_any()
+    from .stress import stress
+
+    out = file_to_write(options.out, "gauges.csv")
+    _on_first_rank(comm, lambda: stress(options.folder, options.analysis, out))
     return EXIT_DONE
 
 

@@ -29,6 +29,11 @@ def row_line(columns: Sequence[Column], row: Mapping[str, Value]) -> str:
     return _lines([[column.text(row[column.name]) for column in columns]])
 
 
+def table_text(columns: Sequence[Column], rows: Iterable[Mapping[str, Value]]) -> str:
+    """A table with its first line."""
+    return "".join([header_line(columns), *(row_line(columns, row) for row in rows)])
+
+
 def write_columns(path: Path, columns: Mapping[str, Any], headings: Headings = _NAMES) -> None:
     """A table by its columns, written in one step.
 

@@ -9,13 +9,12 @@ import numpy as np
 from ..arrays import Indices
 from ..post.grid import Plan
 from ..results.overview import STABILITY, Overview
+from ..results.parts import rows_of_branches
 from ..results.reader import Analysis
 from ..results.sweep_summary import columns_of
 from ..results.sweeps import parts_of, read_branch
 from . import page
 
-#: Columns that tell the branches of one table apart.
-PARTS = ("value", "level", "nodal_diameter", "line", "start")
 #: Columns shown of a row, in this order, where a table has them.
 SHOWN = (
     *("value", "level", "nodal_diameter", "line", "start", "factor", "pair", "cycle", "cycles", "time"),
@@ -103,7 +102,7 @@ def _number(analysis: Analysis, name: str, row: int) -> page.Number:
 def marked(analysis: Analysis, overview: Overview) -> Marks:
     """Words on rows of interest by row, in the order of the table."""
     found: Marks = {}
-    for rows in _branches(analysis):
+    for rows in rows_of_branches(analysis.columns):
         for row, word in _of_branch(analysis, rows):
             found.setdefault(row, []).append(word)
         for row in analysis.met("fold")[:MOST_FOLDS]:
@@ -113,18 +112,6 @@ def marked(analysis: Analysis, overview: Overview) -> Marks:
             if cycle.get("point") in rows:
                 found.setdefault(int(cycle["point"]), []).append(f"limit cycle, {STABILITY[cycle['stable']]}")
     return dict(sorted(found.items()))
-
-
-def _branches(analysis: Analysis) -> Iterator[Indices]:
-    """Rows of each branch of the table."""
-    parts = [analysis[name] for name in PARTS if name in analysis.columns]
-    if not parts:
-        yield np.arange(len(analysis))
-        return
-    keys = np.column_stack(parts)
-    firsts = np.sort(np.unique(keys, axis=0, return_index=True)[1])
-    for first in firsts:
-        yield np.flatnonzero((keys == keys[first]).all(axis=1))
 
 
 def _of_branch(analysis: Analysis, rows: Indices) -> Iterator[tuple[int, str]]:

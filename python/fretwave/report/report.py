@@ -21,6 +21,7 @@ from ..texts import counted, display, own_version
 from ..units import SI
 from . import page
 from .findings import derived_table, points_table
+from .gauges import gauges_part
 from .log import log_lines, shortened_log, warnings_of
 from .model import model_part, read_case
 from .pictures import Picture, pictures
@@ -162,6 +163,7 @@ def _analysis(run: Run, record: Mapping[str, Any], one: Overview, images: Sequen
         page.titled("Settings", settings),
         page.titled("Derived values", derived_table(analysis)),
         page.titled("Results", page.tag("p", said, "soft") + points if points else ""),
+        gauges_part(run, analysis),
         *(page.picture(image.mime, image.content, image.name.replace("_", " ")) for image in images),
         page.titled("What the run said", page.lines(shortened_log(log))),
     )

@@ -146,13 +146,21 @@ class Scene:
 
 
 @contextmanager
-def scene_of(case: Case, choice: Choice, nodes: Array, folder: Path, sectors: Sequence[int] = ()) -> Iterator[Scene]:
+def scene_of(
+    case: Case,
+    choice: Choice,
+    nodes: Array,
+    folder: Path,
+    sectors: Sequence[int] = (),
+    moving: Structure | None = None,
+) -> Iterator[Scene]:
     """The scene of a choice; reductions live as long as it does. One rank only.
 
     Parameters
     ----------
     folder : of the run
     sectors : those shown of a wheel; empty for all
+    moving : whose `displacements` are those of the nodes, by default the case's model
 
     Raises
     ------
@@ -171,7 +179,7 @@ def scene_of(case: Case, choice: Choice, nodes: Array, folder: Path, sectors: Se
             basis = made_again(case, stack) if kept is None else kept
             expand, ties = basis.expand, basis.ties or ties
             _check_same(case, choice, basis, around)
-        given, shown = geometry(case), _shown(case, around, sectors)
+        given, shown = moving or geometry(case), _shown(case, around, sectors)
         yield Scene(nodes, choice, _to_nodes(given, len(nodes), expand), shown, ties, around, given.axis or "z")
 
 

@@ -1,0 +1,89 @@
+"""``fretwave stress``: gauges, the worst stress and Goodman's limit over the points of a run's branches."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..columns import Column
+from ..errors import InputError
+from ..files.csv_table import table_text
+from ..files.whole import replace_text
+from ..texts import counted, display
+from ..view.endurance import AT_LIMIT, BEFORE, YES, endurance
+from ..view.stress import StressTable, stress_tables
+
+#: Names of the tables, behind that of the analysis.
+GAUGES, LIMITS = "gauges", "goodman"
+
+
+def stress(folder: Path, asked: str | None = None, out: Path | None = None) -> None:
+    """Write the tables and say what they tell. One rank only.
+
+    Raises
+    ------
+    InputError
+        As `stress_tables`; one file for several analyses.
+    """
+    tables = list(stress_tables(folder, asked))
+    if out is not None and len(tables) > 1:
+        names = ", ".join(table.name for table in tables)
+        raise InputError("one file cannot take several tables", "--out", names, "one analysis", "add --analysis NAME")
+    for table in tables:
+        path = out or folder / f"{table.name}_{GAUGES}.csv"
+        replace_text(path, table_text(table.columns, table.rows))
+        print(f"{table.name}: {counted(len(table.rows), 'point')}, {display(path)}")
+        print("\n".join(f"  {line}" for line in lines(table)))
+        columns, rows = endurance(table)
+        if rows and out is None:
+            replace_text(folder / f"{table.name}_{LIMITS}.csv", table_text(columns, rows))
+
+
+def lines(table: StressTable) -> Iterator[str]:
+    """What a reader asks for first."""
+    known = {column.name: column for column in table.columns}
+    for name in known:
+        if name.endswith("_strain") and len(table.rows):
+            yield _of_gauge(table, name, known["amplitude"])
+    if "stress_amplitude" in table and len(table.rows):
+        yield _of_stress(table, known)
+    columns, rows = endurance(table)
+    units = {column.name: column.symbol for column in columns}
+    yield from (_of_limit(row, units) for row in rows)
+    levels = {row["limit_level"] for row in rows if "limit_level" in row}
+    yield from (f"Goodman factor 1 at level {level:.5g} of the force" for level in levels if np.isfinite(level))
+
+
+def _at(table: StressTable, k: int, amplitude: Column) -> str:
+    return f"at point {k}, amplitude {table['amplitude'][k]:.5g} {amplitude.symbol}"
+
+
+def _of_gauge(table: StressTable, name: str, amplitude: Column) -> str:
+    values, gauge = table[name], name[: -len("_strain")]
+    k = int(np.argmax(values))
+    mean = table[f"{gauge}_mean"][k]
+    return f"gauge {gauge}: strain amplitude up to {values[k]:.5g} about {mean:.4g}, {_at(table, k, amplitude)}"
+
+
+def _of_stress(table: StressTable, known: Mapping[str, Column]) -> str:
+    k = int(np.argmax(table["goodman" if "goodman" in table else "stress_amplitude"]))
+    row, unit = table.rows[k], known["stress_amplitude"].symbol
+    sector = f" of sector {row['worst_sector']}" if "worst_sector" in row else ""
+    values = f"amplitude {row['stress_amplitude']:.5g} {unit} about a mean of {row['mean_stress']:.4g} {unit}"
+    return f"worst stress: {values}, node {row['worst_node']}{sector}, {_at(table, k, known['amplitude'])}"
+
+
+def _of_limit(row: Mapping[str, Any], units: Mapping[str, str]) -> str:
+    """Of one branch."""
+    parts = [f"{name.replace('_', ' ')} {row[name]:g}" for name in ("level", "nodal_diameter", "line") if name in row]
+    of = f"{', '.join(parts)}: " if parts else ""
+    largest = f"largest {row['largest_goodman']:.4g} at {row['at_amplitude']:.5g} {units['at_amplitude']}"
+    if row["reached"] == YES:
+        told = (f"{row[f'limit_{name}']:.6g} {units[f'limit_{name}']}" for name in AT_LIMIT if f"limit_{name}" in row)
+        return f"{of}Goodman factor 1 at {', '.join(told)}; {largest}"
+    if row["reached"] == BEFORE:
+        return f"{of}Goodman factor above 1 from the first point on; {largest}"
+    return f"{of}Goodman factor 1 is not reached; {largest}"
