@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import csv
+import os
 import re
 import shutil
 from pathlib import Path
@@ -12,8 +12,10 @@ import pytest
 from command_line import call
 from models import cantilever
 from models.cantilever import HEIGHT, LENGTH, STEEL
+from models.csv_columns import table
 from tolerances import ROUNDING, SOLVED
 
+from fretwave.plots import plot_run
 from fretwave.report.report import report_text
 
 pytestmark = pytest.mark.ranks(1)
@@ -81,14 +83,6 @@ def solved(folder: Path, text: str, *words: str) -> Path:
     (folder / "case.toml").write_text(text)
     assert call("run", folder / "case.toml", "--no-plots", "-q", "--out", folder / "run", *words) == 0
     return folder / "run"
-
-
-def table(path: Path) -> dict[str, np.ndarray]:
-    """Columns of a CSV by their names without units."""
-    with path.open(newline="") as file:
-        rows = list(csv.DictReader(file))
-    found = {key.partition(" [")[0]: [row[key] for row in rows] for key in rows[0]}
-    return {k: np.array(v if k == "reached" else [float(x) for x in v]) for k, v in found.items()}
 
 
 @pytest.fixture(scope="module")
@@ -185,6 +179,16 @@ def test_check_and_report_tell_of_gauges(run: Path, capfd) -> None:
     assert "gauge 'root': point (60, 0, 1.5) along (2, 0, 0)" in capfd.readouterr().out
     page = report_text(run)
     assert "Gauges and stress" in page and "limit amplitude" in page
+
+
+def test_pictures_are_drawn_until_the_results_are_newer(run: Path, tmp_path: Path) -> None:
+    shutil.copytree(run, tmp_path / "run")
+    drawn = plot_run(tmp_path / "run", ["gauges"])
+    assert sorted(path.name for path in drawn) == ["forced_gauges.png", "mode_gauges.png"]
+    then = (run / "mode_gauges.csv").stat().st_mtime + 10
+    os.utime(tmp_path / "run" / "results.h5", (then, then))
+    assert plot_run(tmp_path / "run", ["gauges"]) == []
+    assert "Gauges and stress" not in report_text(tmp_path / "run")
 
 
 @pytest.mark.parametrize(

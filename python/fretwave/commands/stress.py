@@ -18,6 +18,8 @@ from ..view.stress import StressTable, stress_tables
 
 #: Names of the tables, behind that of the analysis.
 GAUGES, LIMITS = "gauges", "goodman"
+#: Means below this share of the amplitude are printed as zero.
+SMALL = 1e-6
 
 
 def stress(folder: Path, asked: str | None = None, out: Path | None = None) -> None:
@@ -64,15 +66,21 @@ def _at(table: StressTable, k: int, amplitude: Column) -> str:
 def _of_gauge(table: StressTable, name: str, amplitude: Column) -> str:
     values, gauge = table[name], name[: -len("_strain")]
     k = int(np.argmax(values))
-    mean = table[f"{gauge}_mean"][k]
-    return f"gauge {gauge}: strain amplitude up to {values[k]:.5g} about {mean:.4g}, {_at(table, k, amplitude)}"
+    mean = _mean(table[f"{gauge}_mean"][k], values[k])
+    return f"gauge {gauge}: strain amplitude up to {values[k]:.5g} about {mean}, {_at(table, k, amplitude)}"
+
+
+def _mean(value: float, amplitude: float) -> str:
+    """What is rounding is zero."""
+    return f"{value:.4g}" if abs(value) > SMALL * amplitude else "0"
 
 
 def _of_stress(table: StressTable, known: Mapping[str, Column]) -> str:
     k = int(np.argmax(table["goodman" if "goodman" in table else "stress_amplitude"]))
     row, unit = table.rows[k], known["stress_amplitude"].symbol
     sector = f" of sector {row['worst_sector']}" if "worst_sector" in row else ""
-    values = f"amplitude {row['stress_amplitude']:.5g} {unit} about a mean of {row['mean_stress']:.4g} {unit}"
+    mean = _mean(row["mean_stress"], row["stress_amplitude"])
+    values = f"amplitude {row['stress_amplitude']:.5g} {unit} about a mean of {mean} {unit}"
     return f"worst stress: {values}, node {row['worst_node']}{sector}, {_at(table, k, known['amplitude'])}"
 
 

@@ -24,7 +24,7 @@ Saved = TypeVar("Saved")
 #: Raised where results are too few or too extreme for a picture.
 OF_RESULTS = (ArithmeticError, ValueError, IndexError, LinAlgError)
 #: Of no analysis.
-OTHERS = ("study", "calibration")
+OTHERS = ("study", "calibration", "gauges")
 
 
 def families() -> list[tuple[str, Family]]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 
@@ -17,7 +16,7 @@ STRESSES = ("stress_amplitude", "mean_stress")
 
 def gauges_part(run: Run, analysis: Analysis) -> str:
     """Both tables; nothing where there are none, or where they are older than the results."""
-    found, limits = (_newer(run, f"{analysis.name}_{end}") for end in ("gauges", "goodman"))
+    found, limits = (run.table_since(f"{analysis.name}_{end}") for end in ("gauges", "goodman"))
     if found is None:
         return ""
     rows = dict(_of_interest(found))
@@ -25,15 +24,6 @@ def gauges_part(run: Run, analysis: Analysis) -> str:
     if limits is not None:
         parts.append(_table(analysis, "goodman", limits, dict.fromkeys(range(len(limits["reached"])), "")))
     return page.titled("Gauges and stress", "\n".join(parts))
-
-
-def _newer(run: Run, name: str) -> Table | None:
-    path, results = run.folder / f"{name}.csv", run.folder / "results.h5"
-    return run.table(name) if path.exists() and _time(path) >= _time(results) else None
-
-
-def _time(path: Path) -> float:
-    return path.stat().st_mtime if path.exists() else 0.0
 
 
 def _of_interest(table: Table) -> Iterator[tuple[int, str]]:

@@ -331,6 +331,13 @@ class Run:
             return None
         return {name_of(key): _numbers([row[key] for row in rows]) for key in rows[0]}
 
+    def table_since(self, name: str) -> Table | None:
+        """As `table`, of what is made from the results afterwards; None where it is older than they are."""
+        path, results = self.folder / f"{name}.csv", self.folder / "results.h5"
+        if path.exists() and results.exists() and path.stat().st_mtime < results.stat().st_mtime:
+            return None
+        return self.table(name)
+
     def tables(self) -> list[str]:
         """Names of the tables in the folder."""
         return sorted(path.stem for path in self.folder.glob("*.csv"))

@@ -1,0 +1,85 @@
+"""What `fretwave stress` wrote: strain of gauges, the worst stress, and Goodman's factor with its limit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ..post.fatigue import first_reaching
+from ..results.parts import PARTS, rows_of_branches
+from ..results.reader import Analysis, Run, Table
+from . import style
+
+#: Microstrain of a strain.
+MICRO = 1e6
+
+
+def figures(run: Run) -> Iterator[tuple[str, Figure]]:
+    """Of each analysis with a table of gauges; of a forced response over frequency, of all others over amplitude."""
+    for analysis in run.analyses.values():
+        table = run.table_since(f"{analysis.name}_gauges")
+        if table is not None and len(table["amplitude"]) > 1:
+            yield f"{analysis.name}_gauges", draw(analysis, table)
+
+
+def draw(analysis: Analysis, table: Table) -> Figure:
+    """A panel each for strain, stress and Goodman's factor, as far as the table has them."""
+    gauges = [name for name in table if name.endswith("_strain")]
+    panels = [*(["strain"] if gauges else []), *(name for name in ("stress_amplitude", "goodman") if name in table)]
+    over = "frequency_hz" if analysis.kind == "forced" else "amplitude"
+    figure, axes = style.new_figure(1.2 + 2.6 * len(panels), rows=len(panels), sharex=True, squeeze=False)
+    branches = list(rows_of_branches(table))
+    for place, panel in zip(axes[:, 0], panels):
+        for number, rows in enumerate(branches):
+            branch = {name: values[rows] for name, values in table.items()}
+            _draw(place, panel, gauges, branch, over, number)
+            if panel == "goodman":
+                _limit(place, branch, over, number, analysis.unit("amplitude"))
+        place.set_ylim(bottom=0.0)
+    for place, panel in zip(axes[:, 0], panels):
+        place.set_ylabel(_label(analysis, panel))
+    if over == "amplitude":
+        style.log_amplitude(axes[-1, 0], table[over])
+    what = "Frequency" if over == "frequency_hz" else f"Amplitude of {analysis.observed()}"
+    axes[-1, 0].set_xlabel(style.label(what, analysis.unit(over)))
+    for place in axes[:, 0]:
+        if place.get_legend_handles_labels()[1]:
+            place.legend(loc="best")
+    return figure
+
+
+def _draw(place: Axes, panel: str, gauges: list[str], table: Table, over: str, number: int) -> None:
+    """One branch in one panel."""
+    said = ", ".join(f"{name.replace('_', ' ')} {table[name][0]:g}" for name in PARTS if name in table)
+    look = {"marker": ".", "markersize": 4, "lw": 1.2}
+    if panel == "strain":
+        for k, name in enumerate(gauges):
+            words = ", ".join(filter(None, [f"gauge {name[: -len('_strain')]}", said]))
+            colour = style.PALETTE[(k + number * len(gauges)) % len(style.PALETTE)]
+            place.plot(table[over], MICRO * table[name], color=colour, label=words, **look)
+        return
+    colour = style.PALETTE[number % len(style.PALETTE)]
+    place.plot(table[over], table[panel], color=colour, label=said or None, **look)
+    if panel == "stress_amplitude" and np.any(np.abs(table["mean_stress"]) > 1e-3 * table[panel].max()):
+        place.plot(table[over], np.maximum(table["mean_stress"], 0.0), ":", color=colour, label="tensile mean")
+
+
+def _limit(place: Axes, table: Table, over: str, number: int, unit: str) -> None:
+    """The line at 1, and where the branch first passes it."""
+    if number == 0:
+        place.axhline(1.0, color=style.RED, lw=1.2, ls="--", label="limit")
+    passed = first_reaching(table["goodman"], 1.0, table[over], table["amplitude"])
+    if passed is not None:
+        words = f"reached at an amplitude of {style.number(passed[1])} {unit}".rstrip()
+        place.plot(passed[0], 1.0, marker="*", ms=11, ls="", color=style.ORANGE, mec=style.INK, label=words)
+
+
+def _label(analysis: Analysis, panel: str) -> str:
+    if panel == "strain":
+        return style.label("Strain amplitude", "10⁻⁶")
+    if panel == "goodman":
+        return "Goodman's factor"
+    return style.label("Worst stress amplitude", analysis.unit_system("pressure"))
