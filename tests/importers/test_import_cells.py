@@ -100,6 +100,15 @@ def test_cells_of_several_kinds_are_kept(tmp_path: Path) -> None:
     }
 
 
+def test_cells_stand_in_the_order_of_their_numbers(tmp_path: Path) -> None:
+    """In which CalculiX numbers the inner nodes of C3D8I, whatever the deck's order is."""
+    rows = "".join(f"{n}, {n}., 0., 0.\n" for n in range(1, 13))
+    text = f"*NODE\n{rows}*ELEMENT, TYPE=C3D4\n9, 9, 10, 11, 12\n*ELEMENT, TYPE=C3D4\n7, 1, 2, 3, 4\n8, 5, 6, 7, 8\n"
+    (tmp_path / "deck.inp").write_text(text)
+    _, others = cells_of(read_nodes(tmp_path / "deck.inp"))
+    assert others["tetrahedron"].tolist() == [[0, 1, 2, 3], [4, 5, 6, 7], [8, 9, 10, 11]]
+
+
 def test_cells_of_a_model_file(tmp_path: Path) -> None:
     """Kept beside hexahedra; a cell that names no node is refused, in a file and of a builder."""
     n, eye = 12, np.eye(12)

@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from tolerances import LAST_BIT, ROUNDING
 
 from fretwave.errors import InputError
-from fretwave.importers.cells import _EDGES
+from fretwave.fe.solids import EDGES
 from fretwave.importers.nodes import Nodes, read_nodes
 from fretwave.importers.pairs import match
 from fretwave.importers.surfaces import side_of
@@ -63,7 +63,7 @@ class Box:
         ]
         middle: dict[frozenset[int], int] = {}
         for row in table if linear != self.kind else []:
-            for a, b in [(row[i - 1], row[j - 1]) for i, j in _EDGES[QUADRATIC[linear][1]]]:
+            for a, b in [(row[i], row[j]) for i, j in EDGES[QUADRATIC[linear][1]]]:
                 if frozenset((a, b)) not in middle:
                     middle[frozenset((a, b))] = len(points)
                     points.append((points[a] + points[b]) / 2)
