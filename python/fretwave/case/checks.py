@@ -8,6 +8,7 @@ from ..errors import FretwaveError, InputError
 from ..registry import kinds
 from ..texts import nearest, toml
 from .analysis import AnalysisSection
+from .checks_wheel import with_measured
 from .facts import Facts
 from .reporter import Reporter
 from .schema import TOP_LEVEL
@@ -113,7 +114,8 @@ def check_analyses(source: Source, analyses: dict[int, AnalysisSection], facts: 
 def complete_analyses(source: Source, analyses: dict[int, AnalysisSection], facts: Facts, found: Found) -> None:
     """Give every analysis what follows from the model."""
     for number, analysis in list(analyses.items()):
-        analyses[number] = analysis.completed(Reporter(source, ("analysis", number), found), facts)
+        report = Reporter(source, ("analysis", number), found)
+        analyses[number] = with_measured(report, analysis, facts).completed(report, facts)
 
 
 def choose(names: Sequence[str], only: Sequence[str], origin: str = "--only") -> list[str]:

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from ..errors import InputError
 from ..model.structure import Structure
 from ..texts import nearest
 from .checks_common import about
+from .pair_values import ValueTable
 from .reporter import Reporter
 from .schema import MistuningSection
 
 if TYPE_CHECKING:
-    from ..model.structure import Structure
+    from .analysis import AnalysisSection
     from .facts import Facts
     from .harmonic import HarmonicSection
 
@@ -30,6 +32,22 @@ def check_wave(report: Reporter, analysis: HarmonicSection, facts: Facts) -> Non
     what = "says no nodal diameter" if given is None else "has no such nodal diameter"
     expected = f"-{half} .. {half}, negative for backward waves"
     about(report, "nodal_diameter", what, expected, "add for example `nodal_diameter = 1`")
+
+
+def with_measured(report: Reporter, analysis: AnalysisSection, facts: Facts) -> AnalysisSection:
+    """The analysis with the deviations of its sectors that a table gives."""
+    section = analysis.harmonic()
+    mistuning = section.mistuning if section is not None else None
+    if mistuning is None or not isinstance(mistuning.deviations, str) or not facts.sectors:
+        return analysis
+    source, path = report.source, (*report.path, "mistuning", "deviations")
+    file = source.path.parent / mistuning.deviations
+    try:
+        values = ValueTable(file, "deviation", "", source.where(path), -1.0, True, "sector").values(facts.sectors)
+    except InputError as error:
+        report.found.append(error)
+        return analysis
+    return analysis.model_copy(update={"mistuning": mistuning.model_copy(update={"deviations": values})})
 
 
 def check_wheel(report: Reporter, analysis: HarmonicSection, facts: Facts) -> None:
@@ -76,6 +94,6 @@ def _check_mistuning(report: Reporter, mistuning: MistuningSection, neighbours: 
         for key in ("standard_deviation", "seed"):
             if key in mistuning.model_fields_set:
                 report.wrong((key,), "is given beside deviations", "deviations drawn, or given", "remove one of them")
-        if len(given) != neighbours.sectors:
+        if not isinstance(given, str) and len(given) != neighbours.sectors:
             expected = f"{neighbours.sectors} numbers, one for each sector"
             report.wrong(("deviations",), f"has {len(given)} numbers", expected, "give one for each sector")

@@ -15,15 +15,13 @@ from ..model.laws import LawInfo, ParameterInfo
 from ..model.pairs import Pairs
 from ..texts import nearest, toml
 from ..units import quantity
-from .pair_values import PairTable
+from .pair_values import TABLE, ValueTable
 from .schema import ContactSection
 from .toml.source import Source
 from .toml.validation import at
 
 #: A parameter's name with this ending is given per area; the pair's area comes with the model.
 PER_AREA = "_per_area"
-#: A text with this ending is a file with a value for each pair.
-TABLE = ".csv"
 LARGEST = float(np.finfo(float).max)
 LONGEST_SYMBOL = 4
 
@@ -153,7 +151,8 @@ def _value(
             )
         return parameter.default
     if isinstance(value, str) and value.lower().endswith(TABLE):
-        table = PairTable(source.path.parent / value, str(path[-1]), parameter, unit, source.where(path))
+        given, key = source.path.parent / value, str(path[-1])
+        table = ValueTable(given, key, unit, source.where(path), parameter.lower, parameter.strict)
         try:
             return np.array(table.values(n_pairs))
         except InputError as error:

@@ -15,7 +15,8 @@ from pydantic import BaseModel
 
 from ..registry import kinds
 from ..units import quantity
-from .contact_parameters import PER_AREA, TABLE
+from .contact_parameters import PER_AREA
+from .pair_values import TABLE
 from .schema import (
     TOP_LEVEL,
     AerodynamicsSection,

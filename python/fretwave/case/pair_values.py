@@ -1,39 +1,46 @@
-"""A law's parameter pair by pair from a table: ``normal_load = "loads.csv"``."""
+"""Numbers pair by pair, or sector by sector, from a table: ``normal_load = "loads.csv"``."""
 
 from __future__ import annotations
 
 import csv
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import NoReturn
 
 import numpy as np
 
 from ..errors import InputError
-from ..model.laws import ParameterInfo
 from ..texts import display, is_there, names_beside, nearest, shortened
 
-#: Heading of the column with the numbers of the pairs.
-PAIR = "pair"
+#: A text with this ending is a file with a value for each pair or sector.
+TABLE = ".csv"
 
 
-class PairTable:
-    """One column of a CSV file, a row for each pair in any order.
+@dataclass(frozen=True)
+class ValueTable:
+    """One column of a CSV file, a row for each pair (or sector) in any order.
 
-    Parameters
+    Attributes
     ----------
     path : Path
     key : heading of the column, with ``[unit]`` behind it or without
-    parameter : whose bound the values keep
-    unit : of the values, in the symbols of the case
+    unit : of the values, in the symbols of the case; empty for pure numbers
     where : place of the key in the case
+    lower, strict : bound of the values, which are above it where it is strict
+    row : what the rows are of, heading of the column with their numbers from 0
     """
 
-    def __init__(self, path: Path, key: str, parameter: ParameterInfo, unit: str, where: str) -> None:
-        self.path, self.key, self.parameter, self.unit, self.where = path, key, parameter, unit, where
+    path: Path
+    key: str
+    unit: str
+    where: str
+    lower: float
+    strict: bool = False
+    row: str = "pair"
 
-    def values(self, n_pairs: int) -> list[float]:
+    def values(self, count: int) -> list[float]:
         """Those of all pairs.
 
         Raises
@@ -42,20 +49,23 @@ class PairTable:
             The file, or a line of it, is wrong.
         """
         found: dict[int, float] = {}
-        for line, pair, value in self._rows():
-            if not pair.strip().isdecimal() or int(pair) >= n_pairs:
-                self._wrong("is of no pair", line, f"pair {pair}", f"0 to {n_pairs - 1}", "correct the number")
-            if int(pair) in found:
-                self._wrong("has a pair again", line, f"pair {pair}", "each pair once", "remove one of the lines")
-            found[int(pair)] = self._number(line, value)
-        missing = [pair for pair in range(n_pairs) if pair not in found]
+        row = self.row
+        for line, number, value in self._rows():
+            if not number.strip().isdecimal() or int(number) >= count:
+                self._wrong(f"is of no {row}", line, f"{row} {number}", f"0 to {count - 1}", "correct the number")
+            if int(number) in found:
+                self._wrong(
+                    f"has a {row} again", line, f"{row} {number}", f"each {row} once", "remove one of the lines"
+                )
+            found[int(number)] = self._number(line, value)
+        missing = [number for number in range(count) if number not in found]
         if missing:
-            measured = f"none for pair {missing[0]}" + (f" and {len(missing) - 1} more" if missing[1:] else "")
-            self._wrong("lacks pairs", None, measured, f"{n_pairs} lines, one for each pair", "add the lines")
-        return [found[pair] for pair in range(n_pairs)]
+            measured = f"none for {row} {missing[0]}" + (f" and {len(missing) - 1} more" if missing[1:] else "")
+            self._wrong(f"lacks {row}s", None, measured, f"{count} lines, one for each {row}", "add the lines")
+        return [found[number] for number in range(count)]
 
     def _rows(self) -> Iterator[tuple[int, str, str]]:
-        """Line, pair and value of each row that is not empty."""
+        """Line, number and value of each row that is not empty."""
         if not is_there(self.path):
             fix = (
                 nearest(self.path.name, names_beside(self.path)) or "check the path, which is relative to the case file"
@@ -74,15 +84,15 @@ class PairTable:
             yield line, row[places[0]], row[places[1]]
 
     def _places(self, headings: Sequence[str]) -> tuple[int, int]:
-        known = (self.key, f"{self.key} [{self.unit}]")
+        known = (self.key, f"{self.key} [{self.unit}]" if self.unit else self.key)
         place = next((k for k, text in enumerate(headings) if text in known), None)
-        if place is None or PAIR not in headings:
-            measured, expected = shortened(",".join(headings)) or "nothing", f"{PAIR},{known[1]}"
+        if place is None or self.row not in headings:
+            measured, expected = shortened(",".join(headings)) or "nothing", f"{self.row},{known[1]}"
             self._wrong("has other headings", 1, measured, expected, "write that as its first line")
-        return headings.index(PAIR), place
+        return headings.index(self.row), place
 
     def _number(self, line: int, text: str) -> float:
-        value, low, strict = np.nan, self.parameter.lower, self.parameter.strict
+        value, low, strict = np.nan, self.lower, self.strict
         with suppress(ValueError):
             value = float(text)
         if not np.isfinite(value) or value < low or (strict and value == low):

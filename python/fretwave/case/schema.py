@@ -42,6 +42,7 @@ Name = Annotated[str, Field(max_length=LONGEST_NAME)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Matrix = Union[str, list[list[float]]]
 Numbers = Union[float, list[float]]
+Deviations = Annotated[list[Annotated[float, Field(gt=-1, allow_inf_nan=False)]], Field(min_length=2)]
 
 
 def key(doc: str, unit: str | None = None, example: str | None = None, **rules: Any) -> Any:
@@ -245,8 +246,11 @@ class MistuningSection(Section):
         "of normally distributed deviations, less their mean", "-", "0.02", default=None, lt=0.3
     )
     seed: Whole = key("of the deviations that are drawn", example="1", default=1, ge=0)
-    deviations: Optional[list[Annotated[float, Field(gt=-1, allow_inf_nan=False)]]] = key(
-        "instead, one for each sector", "-", "[0.01, -0.02, 0.005]", default=None, min_length=2
+    deviations: Optional[Union[str, Deviations]] = key(
+        "instead, one for each sector, or a .csv file with the columns `sector` (from 0) and `deviation`",
+        "-",
+        "[0.01, -0.02, 0.005]",
+        default=None,
     )
 
 

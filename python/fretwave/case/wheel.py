@@ -68,7 +68,7 @@ def solver_room(case: Case, analysis: AnalysisSection, prefix: str) -> Iterator[
 def deviations_of(mistuning: MistuningSection, sectors: int) -> Array:
     """Relative stiffness deviations (N,): those given, or drawn ones."""
     if mistuning.deviations is not None:
-        return np.array(mistuning.deviations)
+        return np.array(mistuning.deviations, dtype=float)
     from ..cyclic.wheel_modes import deviations
 
     return deviations(sectors, mistuning.standard_deviation or 0.0, mistuning.seed)
