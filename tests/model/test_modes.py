@@ -139,7 +139,9 @@ def test_soft_motions_beside_stiff_contact_are_exact(comm, stiffness, count):
     found = fw.linear_modes(fw.Model(np.eye(6), K, comm=comm), count, "free")[:3]
     np.testing.assert_allclose([mode.omega for mode in found], exact, rtol=1 / stiffness + ROUNDING)
     damped = fw.linear_modes(fw.Model(np.eye(6), K, C, comm=comm), len(exact), "linearised")
-    np.testing.assert_allclose([np.hypot(mode.omega, mode.beta) for mode in damped], exact, rtol=1 / stiffness + ROUNDING)
+    np.testing.assert_allclose(
+        [np.hypot(mode.omega, mode.beta) for mode in damped], exact, rtol=1 / stiffness + ROUNDING
+    )
     np.testing.assert_allclose([mode.zeta for mode in damped], 0.005 * exact, rtol=1 / stiffness + SOLVED)
 
 

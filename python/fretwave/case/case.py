@@ -27,6 +27,7 @@ from .schema import (
     StudySection,
 )
 from .toml.source import Source
+from .uncertainty import Uncertainty
 
 
 @dataclass(frozen=True)
@@ -76,6 +77,8 @@ class Case:
         Before the reduction, where its error is asked for.
     sector : Case
         Of a case put on its whole wheel (`fretwave.case.wheel.on_wheel`), that of the tuned sector.
+    uncertainty : Uncertainty
+        What is drawn; None without ``[uncertainty]``.
     """
 
     source: Source
@@ -89,6 +92,7 @@ class Case:
     reduced: ReductionReport | None = None
     unreduced: Structure | None = None
     sector: Case | None = None
+    uncertainty: Uncertainty | None = None
 
     @property
     def path(self) -> Path:

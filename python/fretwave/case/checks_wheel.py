@@ -11,6 +11,7 @@ from .checks_common import about
 from .pair_values import ValueTable
 from .reporter import Reporter
 from .schema import MistuningSection
+from .wheel import deviations_of
 
 if TYPE_CHECKING:
     from .analysis import AnalysisSection
@@ -90,6 +91,9 @@ def _check_mistuning(report: Reporter, mistuning: MistuningSection, neighbours: 
     if given is None and drawn is None:
         fix = "add for example `standard_deviation = 0.02`"
         report.wrong((), "says no deviations", "standard_deviation, or deviations", fix)
+    if given is None and drawn is not None and deviations_of(mistuning, neighbours.sectors).min() <= -1.0:
+        fix = "take a smaller standard_deviation, or another seed"
+        report.wrong((), "draws a stiffness that is not positive", "deviations above -1", fix)
     if given is not None:
         for key in ("standard_deviation", "seed"):
             if key in mistuning.model_fields_set:

@@ -17,6 +17,7 @@ from ..texts import nearest, toml
 from ..units import quantity
 from .pair_values import TABLE, ValueTable
 from .schema import ContactSection
+from .toml.locate import Path as KeyPath
 from .toml.source import Source
 from .toml.validation import at
 
@@ -97,7 +98,23 @@ def parameters_of(
             values[name] = _plain(given.parameters[name])
         else:
             values[name] = _value(source, (*path, name), parameter, n_pairs, found)
+    _multiply(source, path, values, found)
     return values if len(found) == before else None
+
+
+def _multiply(
+    source: Source, path: KeyPath, values: dict[str, float | Array | None], found: list[FretwaveError]
+) -> None:
+    """Take the factors of ``[uncertainty]``, wherever the parameters come from."""
+    for place, (factor, where) in source.factors.items():
+        name = str(place[-1])
+        value = values.get(name) if place[:-1] == path else None
+        if value is not None:
+            values[name] = value * factor
+        elif place[:-1] == path and name not in values:
+            what, expected = f"a factor is drawn on no parameter of {source.name(path)}", f"one of {', '.join(values)}"
+            fix = nearest(name, list(values)) or "name a parameter of the law"
+            found.append(InputError(what, where, name, expected, fix))
 
 
 def _plain(value: npt.ArrayLike) -> float | Array:

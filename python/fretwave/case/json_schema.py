@@ -27,6 +27,7 @@ from .schema import (
     PreloadSection,
     ReductionSection,
     StudySection,
+    UncertaintySection,
 )
 
 if TYPE_CHECKING:
@@ -40,6 +41,7 @@ SECTIONS: Mapping[str, type[BaseModel]] = {
     "preload": PreloadSection,
     "aerodynamics": AerodynamicsSection,
     "material": MaterialSection,
+    "uncertainty": UncertaintySection,
     "study": StudySection,
 }
 Schema = dict[str, Any]

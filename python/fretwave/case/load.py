@@ -35,6 +35,7 @@ from .schema import (
 from .sector import tie
 from .toml.source import Source
 from .toml.validation import validate
+from .uncertainty import advise, draw_values
 from .units import in_units
 
 Table = TypeVar("Table", bound=Section)
@@ -79,14 +80,18 @@ def load_case(
         source.apply_quick()
     for assignment in overrides:
         source.apply_set(assignment)
+    uncertainty = draw_values(source)
     found: list[FretwaveError] = list(source.problems)
     loaded = read_plugins(source, found, plugins)
     if len(found) > len(source.problems):  # what they would have added is missing everywhere
         raise CaseErrors(_in_file_order(found), source.label)
     case = _build(source, _core_laws() if laws is None else laws, loaded, found)
     if found or case is None:
+        advise(found)
         raise CaseErrors(_in_file_order(found), source.label)
-    return case
+    if uncertainty is None:
+        return case
+    return replace(case, uncertainty=uncertainty, resolved={**case.resolved, **uncertainty.resolved()})
 
 
 def _core_laws() -> Mapping[str, Any]:

@@ -245,7 +245,12 @@ class MistuningSection(Section):
     standard_deviation: Optional[Positive] = key(
         "of normally distributed deviations, less their mean", "-", "0.02", default=None, lt=0.3
     )
-    seed: Whole = key("of the deviations that are drawn", example="1", default=1, ge=0)
+    seed: Whole = key(
+        "of the deviations that are drawn; unless given that of [uncertainty], if there is one",
+        example="1",
+        default=1,
+        ge=0,
+    )
     deviations: Optional[Union[str, Deviations]] = key(
         "instead, one for each sector, or a .csv file with the columns `sector` (from 0) and `deviation`",
         "-",
@@ -286,6 +291,42 @@ class GaugeSection(Section):
     sector: Whole = key("of a wheel of which all sectors are solved", example="0", default=0, ge=0)
 
 
+class UncertaintySection(Section):
+    """``[uncertainty]``: values of the case that are drawn from distributions, each in a stream of its own."""
+
+    seed: Optional[Whole] = key(
+        "of all draws; without it nothing is drawn, and the case is as it is written (`--over uncertainty.seed=1:200`)",
+        example="1",
+        default=None,
+        ge=0,
+    )
+    values: dict[str, Any] = key(
+        "distributions of keys' values, addressed as --set does",
+        example='{ contact.damper.friction_limit = { distribution = "lognormal", mean = 5, standard_deviation = 1 } }',
+        default_factory=dict,
+    )
+    factors: dict[str, Any] = key(
+        "distributions of factors on numbers of the case, and on parameters of contacts wherever they come from",
+        example='{ contact.damper.normal_load = { distribution = "uniform", low = 0.8, high = 1.2 } }',
+        default_factory=dict,
+    )
+
+
+class DistributionSection(Section):
+    """The distribution of a value, or of a factor, in ``[uncertainty]``."""
+
+    distribution: Literal["normal", "lognormal", "uniform"] = key("its kind", example='"lognormal"')
+    mean: Optional[float] = key(
+        "of a normal or lognormal value (of the value, not of its logarithm)",
+        example="0.3",
+        default=None,
+        allow_inf_nan=False,
+    )
+    standard_deviation: Optional[Positive] = key("of the same", example="0.05", default=None)
+    low: Optional[float] = key("least uniform value", example="0.2", default=None, allow_inf_nan=False)
+    high: Optional[float] = key("largest uniform value", example="0.4", default=None, allow_inf_nan=False)
+
+
 class StudySection(Section):
     """``[study]``: sweeps of ``fretwave study``, each with the others at their finest (of wear: as in the analysis)."""
 
@@ -322,6 +363,7 @@ TOP_LEVEL = {
     "material": "elastic constants and limits of stress, for `fretwave stress`",
     "gauge": "strain gauges, for `fretwave stress` ([[gauge]], any number)",
     "analysis": "what to compute ([[analysis]], at least one)",
+    "uncertainty": "distributions of values that are drawn with a seed",
     "quick": "overrides used by --quick, addressed as --set does",
     "study": "what fretwave study sweeps",
 }

@@ -69,6 +69,8 @@ def _load(path: Path, overrides: Sequence[str], quick: bool) -> Case:
     case = load_case(path, overrides, quick)
     if not quick and case.has_quick:
         load_case(path, overrides, True)
+    if case.uncertainty is not None and case.uncertainty.seed is None:
+        load_case(path, [*overrides, "uncertainty.seed=1"], quick)  # what is drawn fits where it is put
     return case
 
 
@@ -82,6 +84,7 @@ def _report(case: Case, described: dict[str, list[str]]) -> list[str]:
         lines.append(f"  contact '{contact.name}': {contact.law}, {counted(contact.n_pairs, 'contact pair')}, {values}")
     lines.extend(f"  {line}" for line in (case.reduced.lines() if case.reduced else ()))
     lines.extend(f"  {line}" for line in case.tables.gauges.lines())
+    lines.extend(f"  {line}" for line in (case.uncertainty.lines() if case.uncertainty else ()))
     lines.extend(f"  note: {note}" for note in case.notes)
     for name, texts in described.items():
         lines.append(f"  {name}: {texts[0]}")

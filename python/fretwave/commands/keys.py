@@ -17,6 +17,7 @@ from ..case.schema import (
     AerodynamicsSection,
     ContactSection,
     Damper,
+    DistributionSection,
     GaugeSection,
     MaterialSection,
     MistuningSection,
@@ -25,6 +26,7 @@ from ..case.schema import (
     ReductionSection,
     StepSection,
     StudySection,
+    UncertaintySection,
 )
 from ..case.toml.source import Source
 from ..case.toml.validation import describe
@@ -49,6 +51,7 @@ def key_lines(case: Path | None = None) -> Iterator[str]:
         "[reduction]": ReductionSection,
         "[preload]": PreloadSection,
         "[aerodynamics]": AerodynamicsSection,
+        "[uncertainty]": UncertaintySection,
         "[[contact]] (and the parameters of its law)": ContactSection,
         "[material]": MaterialSection,
         "[[gauge]]": GaugeSection,
@@ -65,6 +68,7 @@ def key_lines(case: Path | None = None) -> Iterator[str]:
         "mistuning = { ... }": MistuningSection,
         "dampers = [{ ... }]": Damper,
         "normalise = { ... }, observe = { ... }": ObservedTable,
+        "values.KEY = { ... }, factors.KEY = { ... } of [uncertainty]": DistributionSection,
         "[study]": StudySection,
     }
     for title, nested in tables.items():

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 from ..case.checks import choose
 from ..case.load import Case, load_case
 from ..case.plugins import Plugin
+from ..case.uncertainty import SEEDED
 from ..console import Estimate, Shown
 from ..errors import CaseErrors, FretwaveError, InputError, NotConverged
 from ..mpi import groups
@@ -182,6 +183,8 @@ class Sweep:
 
     def _place(self, where: str, number: int) -> tuple[str, bool]:
         """Where the user gave what a problem is about, and whether that is the value itself."""
+        if SEEDED in where:
+            return where, True
         given = where[len("--set ") :] if where.startswith("--set ") else ""
         if given in self.plan.overrides()[number]:
             return self.where or f"--over {given}", True

@@ -22,6 +22,8 @@ else:
 
 #: What `tomllib` raises besides its own error: numbers of more than 4300 digits, and arrays nested without end.
 TomlError = (tomllib.TOMLDecodeError, ValueError, RecursionError)
+#: Top-level keys that an address may begin with; other addresses begin with a name.
+TABLES = ("title", "plugins", "model", "reduction", "preload", "aerodynamics", "material", "uncertainty")
 _PLAIN_TEXT = re.compile(r"[A-Za-z_./-][^\[\]{}\"'\n]*")
 
 
@@ -43,6 +45,8 @@ class Source:
         Overrides that could not be applied.
     units_of_model : UnitSystem
         As the builder or the model file says, once it is read.
+    factors : dict
+        Of contacts' parameters, and where they were given.
 
     Raises
     ------
@@ -60,6 +64,7 @@ class Source:
         self.units_of_model = SI
         self._locator = Locator(self.text)
         self._origin: dict[KeyPath, str] = {}
+        self.factors: dict[KeyPath, tuple[float, str]] = {}
 
     @property
     def units(self) -> UnitSystem:
@@ -119,7 +124,7 @@ class Source:
             return
         for path, value in nested_leaves(quick):
             line = f"{self.label}:{self._locator.line(('quick', *path))} ([quick])"
-            self._override(".".join(str(part) for part in path), value, line)
+            self.override(".".join(str(part) for part in path), value, line)
 
     def apply_set(self, assignment: str) -> None:
         """Apply one ``key=value`` of ``--set``."""
@@ -151,10 +156,11 @@ class Source:
                 )
             )
             return
-        self._override(address.strip(), value, origin)
+        self.override(address.strip(), value, origin)
 
-    def _override(self, address: str, value: object, origin: str) -> None:
-        path = self._path(address.split("."), origin)
+    def override(self, address: str, value: object, origin: str) -> None:
+        """Put a value at an address; `origin` is its place in messages."""
+        path = self.path_of(address.split("."), origin)
         if path is None:
             return
         holder: Any = self.data
@@ -173,10 +179,10 @@ class Source:
             return
         self._origin[path] = origin
 
-    def _path(self, parts: Sequence[str], origin: str) -> KeyPath | None:
+    def path_of(self, parts: Sequence[str], origin: str) -> KeyPath | None:
         """Where an address points; analyses and contacts are addressed by name."""
         kind, rest = ("analysis", parts)
-        if parts[0] in ("title", "plugins", "model", "reduction", "preload", "aerodynamics", "material"):
+        if parts[0] in TABLES:
             return tuple(parts)
         if parts[0] in ("contact", "analysis", "gauge") and len(parts) > 1:
             kind, rest = parts[0], parts[1:]

@@ -1,0 +1,243 @@
+"""``[uncertainty]``: values of a case, and factors on them, drawn from distributions with a seed.
+
+Each key has a stream of its own (PCG64, seeded with the seed and the key), so that another key changes none of the
+others. What is drawn takes its place in the case before anything is checked: a run of a seed is the run of the case
+with these values.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..errors import FretwaveError, InputError
+from ..texts import toml
+from .schema import DistributionSection, UncertaintySection
+from .toml.locate import Path as KeyPath
+from .toml.source import Source
+from .toml.validation import at, validate
+
+Found = list[FretwaveError]
+#: Between the place of a distribution and the seed, in the places of errors about a value that was drawn.
+SEEDED = ", drawn with seed "
+_NARROWER = 'take `distribution = "lognormal"`, or a smaller standard_deviation'
+
+
+@dataclass(frozen=True)
+class Draw:
+    """One key's distribution and what was drawn from it, None without a seed.
+
+    Attributes
+    ----------
+    key : str
+        As ``--set`` addresses it.
+    factor : bool
+        The draw multiplies what the case, its builder or its model file gives.
+    """
+
+    key: str
+    factor: bool
+    given: DistributionSection
+    value: float | None = None
+
+    @property
+    def name(self) -> str:
+        """Of its column in a sweep's summary."""
+        return f"factors.{self.key}" if self.factor else self.key
+
+    def line(self) -> str:
+        """In words."""
+        g = self.given
+        even = g.distribution == "uniform"
+        numbers = (
+            f"{g.low:g} to {g.high:g}" if even else f"mean {g.mean:g}, standard deviation {g.standard_deviation:g}"
+        )
+        drawn = "" if self.value is None else f"; drawn: {self.value:.6g}"
+        return f"{'factor on ' if self.factor else ''}{self.key}: {g.distribution}, {numbers}{drawn}"
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """What of a case is drawn.
+
+    Attributes
+    ----------
+    wheels : tuple of str
+        Analyses whose mistuning takes the seed.
+    """
+
+    seed: int | None
+    draws: tuple[Draw, ...]
+    wheels: tuple[str, ...]
+
+    def lines(self) -> list[str]:
+        """In words, for ``fretwave check``."""
+        seed = "no seed, nothing is drawn" if self.seed is None else f"seed {self.seed}"
+        wheels = [f"{name}.mistuning.seed: that of [uncertainty]" for name in self.wheels]
+        return [f"uncertainty ({seed}): {line}" for line in [*(draw.line() for draw in self.draws), *wheels]]
+
+    def resolved(self) -> dict[str, Any]:
+        """What decides the results, by address; nothing without a seed."""
+        if self.seed is None:
+            return {}
+        tables = {True: "factors", False: "values"}
+        given = {
+            f"uncertainty.{tables[draw.factor]}.{draw.key}": draw.given.model_dump(exclude_none=True)
+            for draw in self.draws
+        }
+        return {"uncertainty.seed": self.seed, **given, **{f"{DRAWN}{d.name}": d.value for d in self.draws}}
+
+
+#: Begin of the addresses of what was drawn, in a resolved case.
+DRAWN = "uncertainty.drawn."
+
+
+def draws_of(resolved: Mapping[str, Any]) -> dict[str, float]:
+    """What was drawn for a run, by name, from its resolved case."""
+    return {key[len(DRAWN) :]: value for key, value in resolved.items() if key.startswith(DRAWN)}
+
+
+def draw_values(source: Source) -> Uncertainty | None:
+    """Draw what ``[uncertainty]`` asks for and put it into the case; what is wrong goes to the source's problems."""
+    if not isinstance(source.data.get("uncertainty"), dict):
+        return None
+    found = source.problems
+    section = validate(UncertaintySection, source, ("uncertainty",), found)
+    if section is None:
+        return None
+    draws = [_drawn(source, section.seed, *one) for one in _distributions(source, found)]
+    wheels = _seeded_wheels(source)
+    for name in wheels if section.seed is not None else ():
+        source.override(f"{name}.mistuning.seed", section.seed, f"{source.where(('uncertainty', 'seed'))}")
+    if not draws and not wheels and not found:
+        what, expected = "there is nothing to draw", "values, factors, or mistuning without a seed of its own"
+        fix = "add for example `values.contact.damper.friction_limit = { ... }` to [uncertainty]"
+        found.append(InputError(what, source.where(("uncertainty",)), None, expected, fix))
+    return Uncertainty(section.seed, tuple(draws), tuple(wheels))
+
+
+def draw(given: DistributionSection, key: str, seed: int) -> float:
+    """The value of a key for a seed.
+
+    A lognormal value has the mean and the standard deviation that are given, not its logarithm.
+    """
+    words = np.frombuffer(hashlib.sha256(key.encode()).digest(), dtype="<u4").tolist()
+    random = np.random.Generator(np.random.PCG64(np.random.SeedSequence([seed, *words])))
+    if given.distribution == "uniform":
+        low, high = given.low or 0.0, given.high or 0.0
+        return float(low + (high - low) * random.random())
+    mean, deviation, normal = given.mean or 0.0, given.standard_deviation or 0.0, random.standard_normal()
+    if given.distribution == "normal":
+        return float(mean + deviation * normal)
+    variance = math.log1p((deviation / mean) ** 2)  # of the logarithm
+    return float(mean * math.exp(math.sqrt(variance) * normal - variance / 2))
+
+
+def _distributions(source: Source, found: Found) -> Iterator[tuple[KeyPath, str, bool, DistributionSection]]:
+    """Place, key, whether it is a factor, and distribution of each draw."""
+    for table in ("values", "factors"):
+        given = at(source.data, ("uncertainty", table))
+        for inside, value in _leaves(given) if isinstance(given, dict) else ():
+            path: KeyPath = ("uncertainty", table, *inside)
+            if not isinstance(value, dict):
+                what, expected = f"{source.name(path)} is no distribution", "a table with its distribution"
+                fix = 'write for example `{ distribution = "lognormal", mean = 0.3, standard_deviation = 0.05 }`'
+                found.append(InputError(what, source.where(path), toml(value), expected, fix))
+                continue
+            distribution = validate(DistributionSection, source, path, found)
+            if distribution is not None and _fits(source, path, distribution, table == "factors", found):
+                yield path, ".".join(inside), table == "factors", distribution
+
+
+def _leaves(table: Mapping[str, Any], path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:
+    """Distributions, and what stands in place of one."""
+    for name, value in table.items():
+        if isinstance(value, dict) and value and not {*value} & {*DistributionSection.model_fields}:
+            yield from _leaves(value, (*path, name))
+        else:
+            yield (*path, name), value
+
+
+def _fits(source: Source, path: KeyPath, given: DistributionSection, factor: bool, found: Found) -> bool:
+    """It has the numbers of its kind, and they make a distribution."""
+    own = ("low", "high") if given.distribution == "uniform" else ("mean", "standard_deviation")
+    have = [key for key in ("mean", "standard_deviation", "low", "high") if getattr(given, key) is not None]
+    least = 0.0 if given.distribution == "lognormal" or factor else -math.inf
+    first = getattr(given, own[0])
+    if set(have) != set(own):
+        wrong = (f"is {given.distribution} and has {' and '.join(have) or 'no numbers'}", " and ".join(own))
+    elif given.low is not None and given.high is not None and not given.low < given.high:
+        wrong = ("is no range", "low < high")
+    elif first <= least:
+        wrong = (f"has {own[0]} {first:g}", "a number > 0, of a lognormal value and of a factor")
+    else:
+        return True
+    fix = "write for example `low = 0.2, high = 0.4`" if own[0] == "low" else "write for example `mean = 0.3`"
+    what = f"the distribution {source.name(path)} {wrong[0]}"
+    found.append(InputError(what, source.where(path), toml(at(source.data, path)), wrong[1], fix))
+    return False
+
+
+def _drawn(
+    source: Source, seed: int | None, place: KeyPath, key: str, factor: bool, given: DistributionSection
+) -> Draw:
+    """Draw, and put it into the case."""
+    where = source.where(place) + ("" if seed is None else f"{SEEDED}{seed}")
+    path = source.path_of(key.split("."), where)
+    value = None if seed is None else draw(given, key, seed)
+    if path is not None and factor:
+        _multiply(source, path, key, 1.0 if value is None else value, where)
+    elif path is not None and value is not None:
+        _set(source, path, key, value, where)
+    return Draw(key, factor, given, value)
+
+
+def _set(source: Source, path: KeyPath, key: str, value: float, where: str) -> None:
+    """In place of what the case says, but not of what the command line says."""
+    told = source.where(path)
+    if told.startswith("--set "):
+        what, fix = f"'{key}' is drawn, and given on the command line", "draw a factor on it, or do not give it"
+        source.problems.append(InputError(what, where, told, "one of both", fix))
+        return
+    source.override(key, value, where)
+
+
+def _multiply(source: Source, path: KeyPath, key: str, factor: float, where: str) -> None:
+    """What the case says; of a contact once its parameters are read."""
+    if factor <= 0.0:
+        source.problems.append(
+            InputError(f"the factor on {key} is not positive", where, f"{factor:g}", "> 0", _NARROWER)
+        )
+    elif path[0] == "contact":
+        source.factors[path] = (factor, where)
+    else:
+        value = at(source.data, path)
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            measured = "no such key in the case" if value is None else toml(value)
+            fix = f"draw it as a value (uncertainty.values.{key}), or write the key"
+            source.problems.append(InputError(f"a factor is drawn on {key}", where, measured, "a number", fix))
+        elif factor != 1.0:
+            source.override(key, value * factor, where)
+
+
+def _seeded_wheels(source: Source) -> list[str]:
+    """Analyses whose mistuning is drawn and has no seed of its own."""
+    found = []
+    for number, entry in enumerate(source.entries("analysis")):
+        name, given = source.entry_name("analysis", number), entry.get("mistuning")
+        if name and isinstance(given, dict) and "standard_deviation" in given and "seed" not in given:
+            found.append(name)
+    return found
+
+
+def advise(problems: list[FretwaveError]) -> None:
+    """Say of values that were drawn out of their bounds what to do about it."""
+    for problem in problems:
+        out = any(word in problem.what for word in ("is out of range", "has a wrong value"))
+        if out and SEEDED in (problem.where or ""):
+            problem.fix = _NARROWER
