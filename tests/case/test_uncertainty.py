@@ -109,6 +109,8 @@ def test_check_says_what_is_drawn(tmp_path: Path, capfd) -> None:
     said = capfd.readouterr().out
     assert "no seed, nothing is drawn" in said
     assert "contact.slider.friction_limit: lognormal, mean 2, standard deviation 0.5" in said
+    assert call("check", path, "--set", "contact.slider.friction_limit=3.0") == 0
+    assert "friction_limit = 3" in capfd.readouterr().out
     assert call("check", path, "--set", "uncertainty.seed=4") == 0
     said = capfd.readouterr().out
     value = load_case(path, ["uncertainty.seed=4"]).contacts[0].parameters["friction_limit"]
@@ -193,6 +195,14 @@ def test_values_drawn_beyond_their_bounds_are_refused(tmp_path: Path, line: str,
     said = capfd.readouterr().err
     assert f"and with {len(bad) - 1} more values" in said and "lognormal" in said, said
     assert not (tmp_path / "run").exists()
+
+
+def test_check_looks_whether_the_draws_fit(tmp_path: Path, capfd) -> None:
+    path = case_file(tmp_path, LIMIT.replace("friction_limit", "friktion_limit"))
+    assert load_case(path).uncertainty is not None
+    assert call("check", path) == 2
+    said = capfd.readouterr().err
+    assert "unknown key 'friktion_limit'" in said and "drawn with seed 1" in said and "did you mean" in said, said
 
 
 def test_what_is_drawn_is_not_given_too(tmp_path: Path) -> None:

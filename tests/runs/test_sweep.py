@@ -213,6 +213,7 @@ def test_products_of_keys_and_texts(case: Path, tmp_path: Path) -> None:
         zeta = file["mode/summary/largest_zeta"][()]
     assert np.ptp(zeta[0]) < 1e-5
     assert zeta[1] == pytest.approx(np.sin(np.arctan(2 * zeta[0]) / 2), abs=2e-5)
+    assert fretwave("show", tmp_path) == 0
     pictures = {path.name for path in tmp_path.glob("*.png")}
     assert pictures == {f"{n}.png" for n in ("mode_backbones", "mode_summary", "forced_responses", "forced_summary")}
 

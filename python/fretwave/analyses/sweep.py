@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 class SweepAnalysis(AnalysisSection):
     """``type = "sweep"``: another analysis for every value of some keys of the case."""
 
-    pictures = ("sweeps",)
+    pictures = ("sweeps", "quantiles")
     sweeps = True
 
     type: Literal["sweep"]

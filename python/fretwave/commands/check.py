@@ -70,7 +70,9 @@ def _load(path: Path, overrides: Sequence[str], quick: bool) -> Case:
     if not quick and case.has_quick:
         load_case(path, overrides, True)
     if case.uncertainty is not None and case.uncertainty.seed is None:
-        load_case(path, [*overrides, "uncertainty.seed=1"], quick)  # what is drawn fits where it is put
+        drawn = [draw.key for draw in case.uncertainty.draws]
+        kept = [override for override in overrides if override.partition("=")[0].strip() not in drawn]
+        load_case(path, [*kept, "uncertainty.seed=1"], quick)  # what would be drawn fits where it is put
     return case
 
 

@@ -17,8 +17,7 @@ from ..mpi.interrupt import say_how_to_go_on
 from ..post.grid import Plan
 from ..results.file import OVERRIDES
 from ..results.runfolder import CASE_COPY, RunFolder, new_record, peak_memory_mb, read_copy
-from ..results.sweep_summary import landmarks, summary_of
-from ..results.sweeps import amplitude_unit, summary_headings, write_sweep
+from ..results.sweeps import summary_columns, summary_lines, write_sweep
 from ..run.order import RunOptions
 from ..run.runner import Runner, plot
 from ..run.sweep import Checked, Sweep
@@ -135,8 +134,8 @@ def _write(
             rows = write_sweep(folder.path, name, name, sweep.plan, branches, attributes, first.title)
             summary += [{"analysis": name, **row} for row in rows]
             kind = str(branches[0].attributes["type"])
-            of, headings = summary_of(kind), {**headings, **summary_headings(kind, branches)}
-            lines += landmarks(name, sweep.plan, rows, of, amplitude_unit(branches))
+            headings.update({column.name: column.heading for column in summary_columns(kind, branches, rows)})
+            lines += summary_lines(name, sweep.plan, branches, rows)
     if summary:
         lead = [*sweep.plan.keys, "value", "analysis"]
         ordered = [{key: row[key] for key in (*lead, *(k for k in row if k not in lead))} for row in summary]

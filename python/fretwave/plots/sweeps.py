@@ -19,6 +19,7 @@ from ..files.dimensions import names_of_data
 from ..post.grid import Plan, short_names
 from ..results.file import open_results
 from ..results.reader import Analysis, Run, Table
+from ..results.sweep_quantiles import is_seed
 from ..results.sweep_summary import split_of
 from . import style
 from .backbone import error_of, tells_error
@@ -112,10 +113,11 @@ def figures(run: Run) -> Iterator[tuple[str, Figure]]:
         swept = Swept.of(analysis)
         if kind != "forced":
             yield f"{analysis.name}_backbones", backbones(swept)
-            yield f"{analysis.name}_summary", overview(swept, MODE_PANELS)
         else:
             yield f"{analysis.name}_responses", responses(swept)
-            yield f"{analysis.name}_summary", overview(swept, FORCED_PANELS)
+        if not is_seed(swept.plan.keys[swept.main]):  # nothing depends on the number of a draw
+            panels = MODE_PANELS if kind != "forced" else FORCED_PANELS
+            yield f"{analysis.name}_summary", overview(swept, panels)
 
 
 def backbones(swept: Swept) -> Figure:

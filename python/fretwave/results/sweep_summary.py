@@ -12,12 +12,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..columns import Column
+from ..files.dimensions import names_of_data
 from ..post.grid import Plan
 from ..post.limit_cycles import limit_cycles
 from ..post.mode_curve import ModeCurve
 from ..post.slip_threshold import slip_threshold
 from ..registry import kind_named
 from .file import unit_of_amplitudes
+from .sweep_quantiles import over_seeds, quantile_lines
 
 if TYPE_CHECKING:
     import h5py
@@ -26,6 +28,7 @@ if TYPE_CHECKING:
 ONSET = 0.1
 
 COMMON = (
+    Column("done", "1", "1: the branch came to its end; 0: it stopped early", "i"),
     Column("points", "1", "points of the branch", "i"),
     Column("newton", "1", "Newton iterations of the branch", "i"),
     Column("wall_s", "s", "wall time of the branch"),
@@ -45,9 +48,25 @@ MODE = (
     Column("stable_limit_cycle", "length", "smallest amplitude at which damping rises through zero"),
     Column("unstable_limit_cycle", "length", "smallest amplitude at which damping falls through zero"),
 )
+WHEEL_MODE = (
+    Column("largest_amplification", "1", "largest amplitude of a sector over that of the tuned wave, along the branch"),
+    Column("smallest_participation", "1", "smallest participation ratio of the sectors along the branch"),
+)
+#: Of each amplitude of `report_at`, which ends the name: ``zeta_at_0.0001``.
+AT = (
+    Column("frequency_hz_at_", "Hz", "frequency at this amplitude"),
+    Column("zeta_at_", "1", "modal damping ratio at this amplitude"),
+    Column("amplification_at_", "1", "largest amplitude of a sector over that of the tuned wave, at this amplitude"),
+)
 FORCED = (
     Column("largest_amplitude", "length", "largest amplitude of the response"),
     Column("frequency_of_largest_amplitude", "Hz", "frequency of the largest amplitude"),
+)
+WHEEL_FORCED = (
+    Column("largest_blade_amplitude", "length", "peak of the sector that moves most"),
+    Column("largest_blade_frequency_hz", "Hz", "frequency of that peak"),
+    Column("largest_blade", "1", "sector that moves most", "i"),
+    Column("blade_amplification", "1", "its peak over that of the tuned wheel"),
 )
 
 Table = Mapping[str, Any]
@@ -69,12 +88,18 @@ class Summary:
         A row of the summary in words, for the terminal; `unit` in it is that of the amplitudes.
     split : str
         Column of the table whose values tell several branches of one run apart; empty where there is one.
+    on_wheel : tuple of Column
+        Further ones that the branches of a whole wheel have.
+    spread : tuple of str
+        Columns whose quantiles are shown where a sweep goes over draws.
     """
 
     columns: tuple[Column, ...] = ()
     numbers: Callable[[Table, Table, Table], Mapping[str, float]] = lambda table, attributes, forces: {}
     words: Callable[[Row], str] = lambda row: f"{row['points']:.0f} points"
     split: str = ""
+    on_wheel: tuple[Column, ...] = ()
+    spread: tuple[str, ...] = ()
 
 
 COUNTS = Summary()
@@ -89,6 +114,21 @@ def summary_of(kind: str) -> Summary:
 def columns_of(kind: str) -> tuple[Column, ...]:
     """What is said of each branch in a sweep of this kind of analysis."""
     return (*COMMON, *summary_of(kind).columns)
+
+
+def columns_in(kind: str, rows: Sequence[Row]) -> list[Column]:
+    """Those that the rows of a summary have."""
+    here = dict.fromkeys(name for row in rows for name in row)
+    known = [*columns_of(kind), *summary_of(kind).on_wheel]
+    at = [replace(column, name=name) for column in AT for name in here if name.startswith(column.name)]
+    return [column for column in known if column.name in here] + at
+
+
+def spread_of(kind: str, columns: Sequence[Column]) -> list[Column]:
+    """Columns whose quantiles are shown; of a driven wheel those of the blade that moves most."""
+    of_wheel = any(column.name in (WHEEL_FORCED[0].name,) for column in columns)
+    names = [name for name in summary_of(kind).spread if not (of_wheel and name in _OF_ONE)]
+    return [column for column in columns if column.name in names or column.name.startswith(tuple(c.name for c in AT))]
 
 
 def split_of(kind: str) -> str:
@@ -109,6 +149,7 @@ def summarise(
     start_forces : of the contacts over the period of the first point, where they are kept
     """
     common = {
+        "done": int(attributes.get("status") == "done"),
         "points": len(next(iter(table.values()))),
         "newton": int(np.sum(table.get("newton", 0))),
         "wall_s": float(np.sum(table.get("wall_s", 0.0))),
@@ -135,12 +176,36 @@ def _mode(table: Table, attributes: Mapping[str, Any], forces: Mapping[str, Any]
         "amplitude_of_lowest_frequency": float(amplitude[low]) if 0 < low < len(zeta) - 1 else np.nan,
         "last_frequency_hz": float(frequency[-1]),
         **_limit_cycles(table),
+        **_wheel(table),
+        **_at_reports(table),
     }
 
 
+def _wheel(table: Table) -> dict[str, float]:
+    """Of a mode of a whole wheel."""
+    if "amplification" not in table:
+        return {}
+    largest, smallest = np.max(table["amplification"]), np.min(table["participation"])
+    return {"largest_amplification": float(largest), "smallest_participation": float(smallest)}
+
+
+def _at_reports(table: Table) -> dict[str, float]:
+    """At each amplitude that is reported, where the branch comes to it first."""
+    found: dict[str, float] = {}
+    for row in np.flatnonzero(["report" in event.split() for event in _events(table)]):
+        for column in AT:
+            quantity = column.name.removesuffix("_at_")
+            if quantity in table:
+                found.setdefault(f"{column.name}{table['amplitude'][row]:.6g}", float(table[quantity][row]))
+    return found
+
+
+def _events(table: Table) -> list[str]:
+    return [text.decode() if isinstance(text, bytes) else str(text) for text in table.get("event", ())]
+
+
 def _limit_cycles(table: Table) -> dict[str, float]:
-    events = [text.decode() if isinstance(text, bytes) else str(text) for text in table.get("event", ())]
-    cycles = limit_cycles({**table, "event": events})
+    cycles = limit_cycles({**table, "event": _events(table)})
     return {
         f"{word}_limit_cycle": min((c["amplitude"] for c in cycles if c["stable"] is stable), default=np.nan)
         for word, stable in (("stable", True), ("unstable", False))
@@ -160,7 +225,18 @@ def _forced(table: Table, attributes: Table, forces: Table) -> dict[str, float]:
     return {
         "largest_amplitude": float(table["amplitude"][top]),
         "frequency_of_largest_amplitude": float(table["frequency_hz"][top]),
+        **_largest_blade(table, attributes),
     }
+
+
+def _largest_blade(table: Table, attributes: Table) -> dict[str, float]:
+    """Of the level of a driven wheel, from the peaks of all its blades."""
+    level = float(table["level"][0])
+    peak = next((peak for peak in attributes.get("peaks", ()) if peak["level"] == level), None)
+    if peak is None:
+        return {}
+    own = ("amplitude", "frequency_hz", "sector", "amplification")
+    return {column.name: float(peak[key]) for column, key in zip(WHEEL_FORCED, own)}
 
 
 def landmarks(name: str, plan: Plan, rows: Sequence[Row], of: Summary, unit: str) -> list[str]:
@@ -172,16 +248,19 @@ def landmarks(name: str, plan: Plan, rows: Sequence[Row], of: Summary, unit: str
 
 def read_landmarks(name: str, group: h5py.Group) -> list[str]:
     """The same from a sweep's group in results.h5."""
-    plan = Plan(json.loads(group.attrs["over"]))
-    data = {key: values[()] for key, values in group["summary"].items()}
-    of = summary_of(str(group.attrs["of_type"]))
-    parts = [{of.split: part} for part in data.pop(of.split)] if of.split in data else [{}]
+    plan, kind = Plan(json.loads(group.attrs["over"])), str(group.attrs["of_type"])
+    summary, of = group["summary"], summary_of(kind)
+    data = {key: summary[key][()] for key in names_of_data(summary)}
+    parts = [{of.split: part} for part in summary[of.split][()]] if of.split in summary else [{}]
     rows = []
     for number, (k, part) in product(range(len(plan)), enumerate(parts)):
         row = {key: float(values.reshape(len(plan), -1)[number, k]) for key, values in data.items()}
         if not math.isnan(row["points"]):
             rows.append({"value": number, **part, **row})
-    return landmarks(name, plan, rows, of, unit_of_amplitudes(group))
+    if not over_seeds(plan):
+        return landmarks(name, plan, rows, of, unit_of_amplitudes(group))
+    columns = [replace(c, unit=summary[c.name].attrs["units"]) for c in columns_in(kind, rows)]
+    return quantile_lines(name, plan, rows, spread_of(kind, columns), of.split)
 
 
 def _part(row: Row, of: Summary) -> str:
@@ -205,6 +284,17 @@ def _forced_words(row: Row) -> str:
     return f"largest {row['largest_amplitude']:.4g} {row['unit']} at {row['frequency_of_largest_amplitude']:.6g} Hz"
 
 
-MODE_BRANCH = Summary(MODE, _mode, _mode_words)
+#: Of one dof, where a wheel has the blade that moves most.
+_OF_ONE = tuple(column.name for column in FORCED)
+MODE_BRANCH = Summary(
+    MODE, _mode, _mode_words, on_wheel=WHEEL_MODE, spread=("largest_zeta", "last_frequency_hz", "largest_amplification")
+)
 FLUTTER_WAVES = replace(MODE_BRANCH, split="nodal_diameter")
-FORCED_LEVELS = Summary(FORCED, _forced, _forced_words, "level")
+FORCED_LEVELS = Summary(
+    FORCED,
+    _forced,
+    _forced_words,
+    "level",
+    WHEEL_FORCED,
+    (*_OF_ONE, "largest_blade_amplitude", "largest_blade_frequency_hz", "blade_amplification"),
+)

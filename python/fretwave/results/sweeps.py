@@ -1,5 +1,7 @@
 """The results of a sweep in one group of results.h5 and two tables, put together from the runs of its values.
 
+A sweep over seeds (keys that end in `seed`) has a further table, ``<name>_quantiles.csv``.
+
 ::
 
     <name>/points/...           one after the other, the branches of all values: `value`, the keys, then the columns
@@ -15,7 +17,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -28,11 +30,14 @@ from ..post.grid import Plan
 from ..texts import toml
 from ..units import ATTRIBUTE, SI, UnitSystem, units_of
 from .results import has_results, open_results, rewritten
-from .sweep_summary import columns_of, split_of, summarise
+from .sweep_quantiles import over_seeds, quantile_lines, quantile_rows
+from .sweep_summary import COMMON, columns_in, landmarks, split_of, spread_of, summarise, summary_of
 
 if TYPE_CHECKING:
     import h5py
 
+#: Columns of a summary that say nothing of the motion.
+OF_COST = tuple(column.name for column in COMMON)
 #: State of the solver: a finished branch has no use for it.
 STATES = ("state_0", "state_1")
 #: Attributes of a value's group that the sweep's group has when they are the same for all values.
@@ -65,6 +70,10 @@ class Branch:
         Of the analysis' group.
     start_forces : dict
         By row that starts a branch: of each contact over its period (n_samples, components, n_pairs) [force], if kept.
+    draws : dict
+        What ``[uncertainty]`` drew, by name.
+    peaks : list of dict
+        Of the blades of a driven wheel by level, the largest.
     """
 
     number: int
@@ -73,6 +82,8 @@ class Branch:
     units: dict[str, tuple[str, str]]
     attributes: dict[str, Any]
     start_forces: dict[int, dict[str, Any]]
+    draws: dict[str, float] = field(default_factory=dict)
+    peaks: list[dict[str, float]] = field(default_factory=list)
 
     @property
     def system(self) -> UnitSystem:
@@ -140,8 +151,12 @@ def write_sweep(
     points = _points(plan, branches)
     rows = _summary(kind, plan, branches)
     write_columns(folder / f"{name}.csv", {column.heading: values for column, values in points})
+    columns = summary_columns(kind, branches, rows)
     if summary is not None:
-        write_rows(summary, rows, summary_headings(kind, branches))
+        write_rows(summary, rows, {column.name: column.heading for column in columns})
+    if over_seeds(plan):
+        told = [column for column in columns if column.kind == "f" and column.name not in OF_COST]
+        write_rows(folder / f"{name}_quantiles.csv", quantile_rows(plan, rows, told, split_of(kind)))
     with rewritten(folder / "results.h5", name) as file:
         file.attrs["title"] = title
         group = file.create_group(name)
@@ -149,7 +164,8 @@ def write_sweep(
         group.attrs.update({**_shared(branches), **described, **attributes})
         _write_points(group.create_group("points"), points)
         scales = _write_over(group.create_group("over"), plan)
-        _write_summary(group.create_group("summary"), kind, plan, rows, scales, summary_columns(kind, branches))
+        drawn = [Column(name, "", "drawn value") for branch in branches[:1] for name in branch.draws]
+        _write_summary(group.create_group("summary"), kind, plan, rows, scales, [*drawn, *columns])
         for branch in branches:
             _copy_branch(branch, of, group.create_group(f"values/{branch.number:04d}"))
     return rows
@@ -166,15 +182,19 @@ def system_of(branches: Sequence[Branch]) -> UnitSystem:
     return branches[0].system if branches else SI
 
 
-def summary_columns(kind: str, branches: Sequence[Branch]) -> list[Column]:
-    """Of the summary, whose lengths are amplitudes."""
+def summary_columns(kind: str, branches: Sequence[Branch], rows: Sequence[Mapping[str, Any]]) -> list[Column]:
+    """Of the summary with these rows, whose lengths are amplitudes."""
     units, unit = system_of(branches), amplitude_unit(branches)
-    return [column.as_amplitude(unit).in_units(units) for column in columns_of(kind)]
+    return [column.as_amplitude(unit).in_units(units) for column in columns_in(kind, rows)]
 
 
-def summary_headings(kind: str, branches: Sequence[Branch]) -> dict[str, str]:
-    """Of the same."""
-    return {column.name: column.heading for column in summary_columns(kind, branches)}
+def summary_lines(name: str, plan: Plan, branches: Sequence[Branch], rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """A sweep in words: a line for each value, of draws the quantiles."""
+    kind = str(branches[0].attributes["type"])
+    if not over_seeds(plan):
+        return landmarks(name, plan, rows, summary_of(kind), amplitude_unit(branches))
+    columns = spread_of(kind, summary_columns(kind, branches, rows))
+    return quantile_lines(name, plan, rows, columns, split_of(kind))
 
 
 def key_values(values: Sequence[Any]) -> Any:
@@ -213,19 +233,20 @@ def _summary(kind: str, plan: Plan, branches: Sequence[Branch]) -> list[dict[str
     rows = []
     for branch in branches:
         keys = {key: plain(_key_column(plan, key)[branch.number]) for key in plan.keys}
-        rows += [{**keys, "value": branch.number, **part, **values} for part, values in parts_of(kind, branch)]
+        lead = {**keys, "value": branch.number, **branch.draws}
+        rows += [{**lead, **part, **values} for part, values in parts_of(kind, branch)]
     return rows
 
 
 def parts_of(kind: str, branch: Branch) -> Iterator[tuple[dict[str, Any], dict[str, float]]]:
     """Which branch of the table, empty where there is one, and what is said of it."""
-    split = split_of(kind)
+    split, attributes = split_of(kind), {**branch.attributes, "peaks": branch.peaks}
     column = branch.table.get(split)
     for part in [None] if column is None else np.unique(column):
         chosen = np.full(branch.points, True) if part is None else column == part
         table = {key: values[chosen] for key, values in branch.table.items()}
         forces = branch.start_forces.get(int(np.argmax(chosen)), {})
-        yield {} if part is None else {split: part.item()}, summarise(kind, table, branch.attributes, forces)
+        yield {} if part is None else {split: part.item()}, summarise(kind, table, attributes, forces)
 
 
 def _shared(branches: Sequence[Branch]) -> dict[str, Any]:
@@ -271,7 +292,7 @@ def _write_summary(
         values = np.full(shape, np.nan)
         for row in rows:
             place = np.unravel_index(row["value"], plan.shape)
-            values[(*place, *([parts.index(row[split])] if parts else []))] = row[column.name]
+            values[(*place, *([parts.index(row[split])] if parts else []))] = row.get(column.name, np.nan)
         data = group.create_dataset(column.name, data=values)
         data.attrs.update(column.attributes)
         name_dimensions(group, data, names)

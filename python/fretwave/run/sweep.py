@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 from ..case.checks import choose
 from ..case.load import Case, load_case
 from ..case.plugins import Plugin
-from ..case.uncertainty import SEEDED
+from ..case.uncertainty import SEEDED, draws_of
 from ..console import Estimate, Shown
 from ..errors import CaseErrors, FretwaveError, InputError, NotConverged
 from ..mpi import groups
@@ -113,7 +113,10 @@ class Sweep:
         for number in range(len(self.plan)):
             record = self._record(number, run_id)
             branch = read_branch(self.value_folder(number), analysis, number, record["run_id"]) if record else None
-            found += [branch] if branch is not None else []
+            if record and branch is not None:
+                branch.draws = draws_of(record["case"]["resolved"])
+                branch.peaks = record["analyses"].get(analysis, {}).get("peaks", [])
+                found.append(branch)
         return found
 
     def outcomes(self, run_id: str, errors: Sequence[FretwaveError | None]) -> list[dict[str, Any]]:

@@ -15,8 +15,7 @@ from ..console import Console
 from ..mpi.guard import on_first_rank
 from ..results.file import OVERRIDES
 from ..results.runfolder import RunFolder
-from ..results.sweep_summary import landmarks, summary_of
-from ..results.sweeps import amplitude_unit, write_sweep
+from ..results.sweeps import summary_lines, write_sweep
 from .order import RunOptions, reads
 from .sweep import Sweep
 from .sweep_plan import table_overrides
@@ -73,10 +72,7 @@ def run_sweep(sweep: Sweep, name: str, comm: MPI.Comm, console: Console, folder:
             summary = folder.path / f"{name}_summary.csv"
             rows = write_sweep(folder.path, name, of, sweep.plan, branches, attributes, title, summary)
         sweep.forget_others()
-        lines = []
-        if branches:
-            kind = summary_of(str(branches[0].attributes["type"]))
-            lines = landmarks(name, sweep.plan, rows, kind, amplitude_unit(branches))
+        lines = summary_lines(name, sweep.plan, branches, rows) if branches else []
         points = sum(branch.points for branch in branches)
         advice = next((error.fix for error in errors if error is not None and error.fix), "")
         return Outcome(points, reason, not bad, lines, f"{len(sweep.plan)} whole branches", advice)

@@ -1,0 +1,105 @@
+"""Quantiles of what a sweep over seeds says of each value, in a table and in words."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..columns import PURE, Column
+from ..post.grid import Plan, value_text
+from ..post.quantiles import CONFIDENCE, least_count, quantiles
+
+Row = Mapping[str, Any]
+
+
+def is_seed(key: str) -> bool:
+    """A key whose values are draws."""
+    return key.rpartition(".")[2] == "seed"
+
+
+def over_seeds(plan: Plan) -> bool:
+    """A sweep over draws, alone or among others."""
+    return any(is_seed(key) for key in plan.keys)
+
+
+def groups_of(plan: Plan) -> list[tuple[dict[str, Any], list[int]]]:
+    """Each combination of the keys that are no seeds, and the numbers of the values with it: its draws."""
+    found: dict[str, tuple[dict[str, Any], list[int]]] = {}
+    for number, values in enumerate(plan.values()):
+        others = {key: value for key, value in values.items() if not is_seed(key)}
+        found.setdefault(value_text(list(others.values())), (others, []))[1].append(number)
+    return list(found.values())
+
+
+def samples(numbers: Sequence[int], rows: Sequence[Row], name: str) -> dict[int, float]:
+    """A quantity by the number of the value, of the values whose branch came to its end and has it."""
+    mine = {int(row["value"]): row for row in rows if row["value"] in numbers and row.get("done", 1) == 1}
+    known = {number: float(row.get(name, math.nan)) for number, row in mine.items()}
+    return {number: value for number, value in known.items() if math.isfinite(value)}
+
+
+def parts_in(rows: Sequence[Row], split: str) -> list[Any]:
+    """What tells the branches of one value apart; None where there is one."""
+    return sorted({row[split] for row in rows if split in row}) or [None]
+
+
+def quantile_rows(plan: Plan, rows: Sequence[Row], columns: Sequence[Column], split: str) -> list[dict[str, Any]]:
+    """The table: other keys, level or nodal diameter, quantity, unit, q, value, low, high, n, what is left out.
+
+    Left out are the values that failed, stopped, or do not have the quantity, by their numbers in the sweep.
+    """
+    found = []
+    for others, numbers in groups_of(plan):
+        for part in parts_in(rows, split):
+            mine = [row for row in rows if part is None or row[split] == part]
+            lead = {**others, **({} if part is None else {split: part})}
+            for column in columns:
+                found += [{**lead, **row} for row in _of_quantity(column, numbers, mine)]
+    return found
+
+
+def _of_quantity(column: Column, numbers: Sequence[int], rows: Sequence[Row]) -> Iterator[dict[str, Any]]:
+    known = samples(numbers, rows, column.name)
+    missing = [number for number in numbers if number not in known]
+    named = {"quantity": column.name, "unit": column.symbol}
+    left_out = {"n": len(known), "left_out": len(missing), "left_out_values": " ".join(map(str, missing))}
+    for one in quantiles(np.array(list(known.values()))):
+        interval = {"q": one.probability, "value": one.value, "low": one.low, "high": one.high}
+        yield {**named, **interval, **left_out}
+
+
+def quantile_lines(name: str, plan: Plan, rows: Sequence[Row], columns: Sequence[Column], split: str) -> list[str]:
+    """The same in words, for the terminal."""
+    table, lines = quantile_rows(plan, rows, columns, split), []
+    keys = [key for key in (*plan.keys, split) if table and key in table[0]]
+    heads = {value_text([row[key] for key in (*keys, "quantity")]): row for row in table}
+    for row in heads.values():
+        mine = [r for r in table if all(r[key] == row[key] for key in (*keys, "quantity"))]
+        place = "".join(f", {key.rpartition('.')[2].replace('_', ' ')} = {row[key]}" for key in keys)
+        lines.append(f"{name}{place}: {row['quantity']}: {'; '.join(map(_word, mine))} ({_count(row)})")
+    if lines:
+        lines.append(f"{name}: in brackets the {100 * CONFIDENCE:g} % confidence intervals of the quantiles")
+    done = {row["value"] for row in rows if row.get("done", 1) == 1}
+    bad = [label for number, label in enumerate(plan.labels()) if number not in done]
+    if bad:
+        shown = "; ".join(bad[:10]) + ("; ..." if bad[10:] else "")
+        lines.append(f"{name}: left out, for they failed or stopped early: {len(bad)} of {len(plan)} values: {shown}")
+    short = {row["q"]: row["n"] for row in table if not math.isfinite(row["low"] + row["high"])}
+    lines += [
+        f"{name}: {n} values are too few for both ends of the interval at q = {q:g}, which take {least_count(q)}"
+        for q, n in short.items()
+    ]
+    return lines
+
+
+def _word(row: Row) -> str:
+    low, high = (f"{row[key]:.5g}" if math.isfinite(row[key]) else "unknown" for key in ("low", "high"))
+    unit = "" if row["unit"] in PURE else f" {row['unit']}"
+    return f"{100 * row['q']:g} % {row['value']:.5g} [{low}, {high}]{unit}"
+
+
+def _count(row: Row) -> str:
+    return f"n = {row['n']}" + (f", {row['left_out']} left out" if row["left_out"] else "")

@@ -1,0 +1,164 @@
+"""Sweeps over seeds: draws in the summary, quantiles against a law in closed form, the blade that moves most."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from command_line import call
+from models.swept_case import CASE
+from scipy.stats import kstest, lognorm
+from test_engine_order import SECTORS, TEXT
+from tolerances import SOLVED
+
+from fretwave.plots.quantiles import figures
+from fretwave.post.quantiles import interval_ranks
+from fretwave.results.reader import Run
+
+pytestmark = pytest.mark.ranks(1)
+
+COUNT = 80
+MEAN, DEVIATION = 1.5, 0.6
+DRAWN = "contact.slider.tangential_stiffness"
+UNCERTAIN = f"""
+[uncertainty]
+values.{DRAWN} = {{ distribution = "lognormal", mean = {MEAN}, standard_deviation = {DEVIATION} }}
+"""
+
+
+def rows(path: Path) -> list[dict[str, str]]:
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def column(path: Path, key: str) -> np.ndarray:
+    return np.array([float(row[key]) for row in rows(path)])
+
+
+def stuck_law(q: float) -> float:
+    """Quantile of the stuck frequency of m = k = 1 with a lognormal stiffness beside k."""
+    sigma = np.sqrt(np.log(1 + (DEVIATION / MEAN) ** 2))
+    kt = lognorm.ppf(q, sigma, scale=MEAN * np.exp(-(sigma**2) / 2))
+    return float(np.sqrt(1 + kt) / (2 * np.pi))
+
+
+@pytest.fixture(scope="module")
+def swept(tmp_path_factory) -> Path:
+    """80 oscillators whose slider sticks: linear, of drawn stiffness."""
+    folder = tmp_path_factory.mktemp("seeds")
+    text = CASE.replace("amplitude = [0.05, 60.0]", "amplitude = [0.05, 0.2]\nreport_at = [0.1]")
+    text = text.replace("maximum = 0.1", "initial = 0.5, maximum = 0.7")
+    (folder / "case.toml").write_text(UNCERTAIN + text)
+    words = ["--over", f"uncertainty.seed=1:{COUNT}", "--only", "mode", "--out", folder / "run"]
+    assert call("sweep", folder / "case.toml", *words) == 0
+    return folder / "run"
+
+
+def test_each_draw_is_in_the_summary_and_gives_its_frequency(swept: Path) -> None:
+    found = {key: column(swept / "summary.csv", key) for key in ("stuck_hz", DRAWN, "frequency_hz_at_0.1")}
+    expected = np.sqrt(1 + found[DRAWN]) / (2 * np.pi)
+    assert len(expected) == COUNT == len(set(found[DRAWN]))
+    assert found["stuck_hz"] == pytest.approx(expected, rel=SOLVED)
+    assert found["frequency_hz_at_0.1"] == pytest.approx(expected, rel=SOLVED)
+    record = json.loads((swept / "values" / "0003" / "run.json").read_text())
+    assert record["case"]["resolved"][DRAWN] == found[DRAWN][3]
+    with h5py.File(swept / "results.h5") as file:
+        assert np.array_equal(file["mode/summary"][DRAWN][()], found[DRAWN])
+
+
+def test_frequencies_follow_the_law_of_the_stiffness(swept: Path) -> None:
+    """The law in closed form; quantiles are order statistics of these very draws, and hold the law's quantile."""
+    f = np.sort(column(swept / "summary.csv", "stuck_hz"))
+    grid = np.linspace(0.001, 0.999, 999)
+    law = lambda x: np.interp(x, [stuck_law(q) for q in grid], grid)  # noqa: E731
+    assert kstest(f, law).pvalue > 1e-2
+    table = [row for row in rows(swept / "mode_quantiles.csv") if row["quantity"] == "stuck_hz"]
+    assert [float(row["q"]) for row in table] == [0.05, 0.5, 0.95]
+    for row in table:
+        low, high = interval_ranks(COUNT, float(row["q"]))
+        assert (float(row["low"]), float(row["high"])) == (f[low - 1], f[high - 1])
+        assert float(row["low"]) <= float(row["value"]) <= float(row["high"])
+        assert float(row["low"]) <= stuck_law(float(row["q"])) <= float(row["high"])
+        assert (row["unit"], row["n"], row["left_out"], row["left_out_values"]) == ("Hz", str(COUNT), "0", "")
+
+
+def test_the_picture_shows_every_draw(swept: Path) -> None:
+    (figure,) = [figure for _, figure in figures(Run(swept))]
+    assert [axes.get_xlabel() for axes in figure.axes] == [
+        "Frequency at the end of the branch [Hz]",
+        "Frequency at 0.1 m [Hz]",
+    ]
+    x, share = figure.axes[1].lines[0].get_xydata().T
+    assert np.array_equal(x, np.sort(column(swept / "summary.csv", "frequency_hz_at_0.1")))
+    assert share == pytest.approx(np.arange(1, COUNT + 1) / COUNT)
+
+
+def test_pictures_and_words(swept: Path, capsys) -> None:
+    assert {path.name for path in swept.glob("*.png")} == {"mode_backbones.png", "mode_quantiles.png"}
+    assert call("show", swept) == 0
+    shown = capsys.readouterr().out
+    median = next(
+        row
+        for row in rows(swept / "mode_quantiles.csv")
+        if (row["quantity"], row["q"]) == ("frequency_hz_at_0.1", "0.5")
+    )
+    assert "mode: frequency_hz_at_0.1: 5 % " in shown
+    assert f"50 % {float(median['value']):.5g} [{float(median['low']):.5g}, {float(median['high']):.5g}] Hz" in shown
+    assert "95 % confidence intervals" in shown and "slip from" not in shown
+
+
+def test_failed_values_are_left_out_and_named_and_other_keys_stay_apart(tmp_path: Path, capsys) -> None:
+    """A branch that may have two points only stops early: with one of two values of the key all draws do."""
+    (tmp_path / "case.toml").write_text(UNCERTAIN + CASE)
+    words = ["--over", "uncertainty.seed=1:8", "--over", "mode.step.max_points=2,900", "--only", "mode", "--no-plots"]
+    assert call("sweep", tmp_path / "case.toml", *words, "--out", tmp_path / "run") == 3
+    said = "left out, for they failed or stopped early: 8 of 16 values: seed = 1, max_points = 2; seed = 2, "
+    assert said in capsys.readouterr().out
+    table = rows(tmp_path / "run" / "mode_quantiles.csv")
+    assert {row["mode.step.max_points"] for row in table} == {"900"}
+    assert {(row["n"], row["q"]) for row in table if row["quantity"] == "largest_zeta"} == {("8", "0.5")}
+    done = column(tmp_path / "run" / "summary.csv", "done")
+    assert list(done) == [0, 1] * 8
+    assert call("show", tmp_path / "run") == 0
+    assert said in capsys.readouterr().out
+
+
+# A wheel
+
+
+@pytest.fixture(scope="module")
+def wheels(tmp_path_factory) -> Path:
+    """Six wheels of the small bladed disk, mistuned by the seed of [uncertainty], driven by an engine order."""
+    folder = tmp_path_factory.mktemp("wheels")
+    text = TEXT.replace("engine_order = 8", "engine_order = 8\nwheel = true\nmistuning = { standard_deviation = 0.05 }")
+    factor = 'factors.contact.rub.friction_limit = { distribution = "normal", mean = 1.0, standard_deviation = 0.05 }'
+    text += f"\n[uncertainty]\n{factor}\n"
+    (folder / "case.toml").write_text(text.replace("harmonics = 3", "harmonics = 1"))
+    assert call("sweep", folder / "case.toml", "--over", "uncertainty.seed=1:6", "--out", folder / "run") == 0
+    return folder / "run"
+
+
+def test_the_largest_blade_is_the_largest_of_all_sectors(wheels: Path) -> None:
+    found = rows(wheels / "summary.csv")
+    for number, row in enumerate(found):
+        blades = rows(wheels / "values" / f"{number:04d}" / "forced_blades.csv")
+        amplitude = np.array([float(blade["amplitude"]) for blade in blades])
+        assert len(amplitude) == SECTORS
+        assert float(row["largest_blade_amplitude"]) == np.nanmax(amplitude)
+        assert int(float(row["largest_blade"])) == int(np.nanargmax(amplitude))
+    largest, observed = (column(wheels / "summary.csv", f"largest_{name}amplitude") for name in ("blade_", ""))
+    assert np.median(largest / observed) > 1.02, "sector 0 is one of six"
+    table = rows(wheels / "forced_quantiles.csv")
+    median = next(row for row in table if row["quantity"] == "largest_blade_amplitude")
+    assert float(median["value"]) == pytest.approx(np.median(largest))
+    assert (float(median["low"]), float(median["high"])) == (largest.min(), largest.max())
+
+
+def test_the_seed_decides_the_wheel(wheels: Path) -> None:
+    for number in (0, 5):
+        resolved = json.loads((wheels / "values" / f"{number:04d}" / "run.json").read_text())["case"]["resolved"]
+        assert resolved["forced.mistuning"]["seed"] == number + 1 == resolved["uncertainty.seed"]
