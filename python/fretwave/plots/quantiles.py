@@ -105,7 +105,7 @@ def _named(swept: Swept, others: dict[str, Any], part: int, count: int) -> str:
     return ", ".join([*words, f"{count} draws"])
 
 
-def _one(axes: Axes, values: Array, colour: Any, name: str) -> None:
+def _one(axes: Axes, values: Array, colour: str | tuple[float, ...], name: str) -> None:
     """Steps at the values with the band of the share, and quantiles with their intervals."""
     if not len(values):
         return
