@@ -69,7 +69,7 @@ def draw(swept: Swept, shown: list[Column]) -> Figure:
     for plane in axes.ravel()[len(shown) :]:
         plane.set_visible(False)
     band = f"{100 * CONFIDENCE:g} % interval, value by value"
-    axes[0, 0].fill_between([], [], color=style.GREY, alpha=0.25, label=band)
+    axes[0, 0].fill_between([], [], color=style.BLUE, alpha=0.2, linewidth=0, label=band)
     style.legend_outside(figure, axes[0, 0], columns=2)
     return figure
 
