@@ -1,0 +1,93 @@
+#include "model/eigenproblem.h"
+
+#include <cmath>
+#include <complex>
+
+#include "error.h"
+
+namespace fretwave::model {
+
+using namespace std::complex_literals;
+
+namespace {
+
+/// A^T D B for D diagonal by contact rows.
+MatHandle congruence(Mat A, Vec diagonal, Mat B) {
+  MatHandle DB, product;
+  check(MatDuplicate(B, MAT_COPY_VALUES, DB.out()));
+  check(MatDiagonalScale(DB, diagonal, nullptr));
+  check(MatTransposeMatMult(A, DB, MAT_INITIAL_MATRIX, PETSC_DEFAULT, product.out()));
+  return product;
+}
+
+constexpr PetscInt small = 500;
+
+}  // namespace
+
+void add_contact(std::vector<PhasedMap>& sum, Contact const& contact,
+                 std::function<double(int, int)> const& entry) {
+  VecHandle diagonal;
+  check(MatCreateVecs(contact.B, nullptr, diagonal.out()));
+  {
+    WriteArray d(diagonal);
+    const int components = contact.law->components();
+    for (int row = 0; row < components * contact.law->pairs(); ++row) {
+      const double value = entry(row % components, row / components);
+      d[row] = std::isfinite(value) ? value : 0;
+    }
+  }
+  const auto maps = maps_of(contact);
+  for (auto const& [A, behind] : maps)
+    for (auto const& [B, ahead] : maps) sum.push_back({congruence(A, diagonal, B), ahead - behind});
+}
+
+std::vector<PhasedMap> required(Model const& model, int order, char const* name) {
+  auto parts = terms_of(model, order);
+  if (parts.empty())
+    throw InputError(std::string("the model has no ") + name + " term", "none", "one at least",
+                     "give all of K and M");
+  return parts;
+}
+
+Operators operators(MPI_Comm comm, std::vector<MatHandle> matrices) {
+  PetscInt rows, first;
+  check(MatGetSize(matrices[0], &rows, nullptr));
+  check(MatGetOwnershipRange(matrices[0], &first, nullptr));
+  if (comm_size(comm) == 1 || rows > small) return {std::move(matrices), 0};
+  Operators out{{}, first};
+  for (auto const& A : matrices) {
+    out.matrices.emplace_back();
+    check(MatCreateRedundantMatrix(A, comm_size(comm), PETSC_COMM_SELF, MAT_INITIAL_MATRIX,
+                                   out.matrices.back().out()));
+  }
+  return out;
+}
+
+void take_shape(Model const& model, Operators const& operators, Vec re, Vec im, LinearMode& mode) {
+  mode.shape = model.displacement(), mode.imaginary = model.displacement();
+  WriteArray shape(mode.shape), imaginary(mode.imaginary);
+  const auto place = [&](Vec part, std::complex<double> unit) {
+    ReadArray in(part);
+    const int width = model.travelling() ? 2 : 1;
+    for (PetscInt i = 0; i < model.local_dofs(); ++i)
+      for (int k = 0; k < width; ++k) {
+        const std::complex<double> value = in[operators.offset + width * i + k] * unit * (k ? 1i : 1.0 + 0i);
+        shape[i] += value.real(), imaginary[i] += value.imag();
+      }
+  };
+  place(re, 1.0);
+  if (im) place(im, 1i);
+}
+
+double trace_ratio(Mat K, Mat M) {
+  VecHandle d;
+  double k, m;
+  check(MatCreateVecs(K, d.out(), nullptr));
+  check(MatGetDiagonal(K, d));
+  check(VecSum(d, &k));
+  check(MatGetDiagonal(M, d));
+  check(VecSum(d, &m));
+  return k / m;
+}
+
+}  // namespace fretwave::model

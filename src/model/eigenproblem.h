@@ -1,0 +1,39 @@
+#pragma once
+#include <functional>
+
+#include "model/modes.h"
+#include "model/phases.h"
+
+namespace fretwave::model {
+
+/// sum += B^H D B with one stiffness or damping per contact row, a function of (component, pair); rows that
+/// are not finite count as zero. Collective.
+void add_contact(std::vector<PhasedMap>& sum, Contact const&, std::function<double(int, int)> const& entry);
+
+/// The model's terms of an order in s; `InputError` names what is missing.
+std::vector<PhasedMap> required(Model const&, int order, char const* name);
+
+/// Matrices of an eigenproblem; a small one is held whole by each rank, which all solve the same: cheaper
+/// than to share it, and the Krylov space of a tiny problem, once exhausted, would end at another step on
+/// another rank.
+struct Operators {
+  std::vector<MatHandle> matrices;
+  PetscInt offset = 0;  ///< where this rank's rows begin in its part of a vector
+  Mat operator[](int k) const { return matrices[k]; }
+  MPI_Comm comm() const {
+    MPI_Comm comm;
+    check(PetscObjectGetComm(reinterpret_cast<PetscObject>(Mat(matrices[0])), &comm));
+    return comm;
+  }
+};
+
+Operators operators(MPI_Comm, std::vector<MatHandle> matrices);
+
+/// This rank's dofs of an eigenvector re + i im (im may be null), behind which the constraints stand; of a
+/// travelling wave in real form (x, y) the shape x + i y.
+void take_shape(Model const&, Operators const&, Vec re, Vec im, LinearMode&);
+
+/// A square of frequency [1/s^2] of the stiffest dofs: trace K / trace M. Collective.
+double trace_ratio(Mat K, Mat M);
+
+}  // namespace fretwave::model
