@@ -59,11 +59,11 @@ def swept(tmp_path_factory) -> Path:
 
 
 def test_each_draw_is_in_the_summary_and_gives_its_frequency(swept: Path) -> None:
-    found = {key: column(swept / "summary.csv", key) for key in ("stuck_hz", DRAWN, "frequency_hz_at_0.1")}
+    found = {key: column(swept / "summary.csv", key) for key in ("stuck_hz", DRAWN, "frequency_hz_at_1")}
     expected = np.sqrt(1 + found[DRAWN]) / (2 * np.pi)
     assert len(expected) == COUNT == len(set(found[DRAWN]))
     assert found["stuck_hz"] == pytest.approx(expected, rel=SOLVED)
-    assert found["frequency_hz_at_0.1"] == pytest.approx(expected, rel=SOLVED)
+    assert found["frequency_hz_at_1"] == pytest.approx(expected, rel=SOLVED)
     record = json.loads((swept / "values" / "0003" / "run.json").read_text())
     assert record["case"]["resolved"][DRAWN] == found[DRAWN][3]
     with h5py.File(swept / "results.h5") as file:
@@ -93,7 +93,7 @@ def test_the_picture_shows_every_draw(swept: Path) -> None:
         "Frequency at 0.1 m [Hz]",
     ]
     x, share = figure.axes[1].lines[0].get_xydata().T
-    assert np.array_equal(x, np.sort(column(swept / "summary.csv", "frequency_hz_at_0.1")))
+    assert np.array_equal(x, np.sort(column(swept / "summary.csv", "frequency_hz_at_1")))
     assert share == pytest.approx(np.arange(1, COUNT + 1) / COUNT)
 
 
@@ -102,11 +102,9 @@ def test_pictures_and_words(swept: Path, capsys) -> None:
     assert call("show", swept) == 0
     shown = capsys.readouterr().out
     median = next(
-        row
-        for row in rows(swept / "mode_quantiles.csv")
-        if (row["quantity"], row["q"]) == ("frequency_hz_at_0.1", "0.5")
+        row for row in rows(swept / "mode_quantiles.csv") if (row["quantity"], row["q"]) == ("frequency_hz_at_1", "0.5")
     )
-    assert "mode: frequency_hz_at_0.1: 5 % " in shown
+    assert "mode, at amplitude 0.1: frequency_hz_at_1: 5 % " in shown
     assert f"50 % {float(median['value']):.5g} [{float(median['low']):.5g}, {float(median['high']):.5g}] Hz" in shown
     assert "95 % confidence intervals" in shown and "slip from" not in shown
 

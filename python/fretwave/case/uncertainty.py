@@ -116,7 +116,7 @@ def draw_values(source: Source) -> Uncertainty | None:
         source.override(f"{name}.mistuning.seed", section.seed, f"{source.where(('uncertainty', 'seed'))}")
     if not draws and not wheels and not found:
         what, expected = "there is nothing to draw", "values, factors, or mistuning without a seed of its own"
-        fix = "add for example `values.contact.damper.friction_limit = { ... }` to [uncertainty]"
+        fix = "add for example `values.contact.damper.KEY = { ... }` to [uncertainty]"
         found.append(InputError(what, source.where(("uncertainty",)), None, expected, fix))
     return Uncertainty(section.seed, tuple(draws), tuple(wheels))
 

@@ -13,6 +13,8 @@ from ..post.grid import Plan, value_text
 from ..post.quantiles import CONFIDENCE, least_count, quantiles
 
 Row = Mapping[str, Any]
+#: Of a summary, before the number of the amplitude in the order of the branch.
+AMPLITUDE_AT = "amplitude_at_"
 
 
 def is_seed(key: str) -> bool:
@@ -79,6 +81,8 @@ def quantile_lines(name: str, plan: Plan, rows: Sequence[Row], columns: Sequence
     for row in heads.values():
         mine = [r for r in table if all(r[key] == row[key] for key in (*keys, "quantity"))]
         place = "".join(f", {key.rpartition('.')[2].replace('_', ' ')} = {row[key]}" for key in keys)
+        at = reported_at(row["quantity"], rows)
+        place += f", at amplitude {at:.6g}" if math.isfinite(at) else ""
         lines.append(f"{name}{place}: {row['quantity']}: {'; '.join(map(_word, mine))} ({_count(row)})")
     if lines:
         lines.append(f"{name}: in brackets the {100 * CONFIDENCE:g} % confidence intervals of the quantiles")
@@ -93,6 +97,13 @@ def quantile_lines(name: str, plan: Plan, rows: Sequence[Row], columns: Sequence
         for q, n in short.items()
     ]
     return lines
+
+
+def reported_at(name: str, rows: Sequence[Row]) -> float:
+    """The amplitude that a column ``<quantity>_at_<number>`` is at; NaN of another."""
+    number = name.partition("_at_")[2]
+    known = [row[AMPLITUDE_AT + number] for row in rows if row.get(AMPLITUDE_AT + number) is not None]
+    return float(known[0]) if number and known else math.nan
 
 
 def _word(row: Row) -> str:

@@ -19,7 +19,7 @@ from ..post.mode_curve import ModeCurve
 from ..post.slip_threshold import slip_threshold
 from ..registry import kind_named
 from .file import unit_of_amplitudes
-from .sweep_quantiles import over_seeds, quantile_lines
+from .sweep_quantiles import AMPLITUDE_AT, over_seeds, quantile_lines
 
 if TYPE_CHECKING:
     import h5py
@@ -52,8 +52,9 @@ WHEEL_MODE = (
     Column("largest_amplification", "1", "largest amplitude of a sector over that of the tuned wave, along the branch"),
     Column("smallest_participation", "1", "smallest participation ratio of the sectors along the branch"),
 )
-#: Of each amplitude of `report_at`, which ends the name: ``zeta_at_0.0001``.
+#: Of the amplitudes of `report_at`, by their numbers along the branch, which end the name: ``zeta_at_1``.
 AT = (
+    Column(AMPLITUDE_AT, "length", "amplitude that was asked for"),
     Column("frequency_hz_at_", "Hz", "frequency at this amplitude"),
     Column("zeta_at_", "1", "modal damping ratio at this amplitude"),
     Column("amplification_at_", "1", "largest amplitude of a sector over that of the tuned wave, at this amplitude"),
@@ -128,7 +129,8 @@ def spread_of(kind: str, columns: Sequence[Column]) -> list[Column]:
     """Columns whose quantiles are shown; of a driven wheel those of the blade that moves most."""
     of_wheel = any(column.name in (WHEEL_FORCED[0].name,) for column in columns)
     names = [name for name in summary_of(kind).spread if not (of_wheel and name in _OF_ONE)]
-    return [column for column in columns if column.name in names or column.name.startswith(tuple(c.name for c in AT))]
+    at = tuple(column.name for column in AT[1:])
+    return [column for column in columns if column.name in names or column.name.startswith(at)]
 
 
 def split_of(kind: str) -> str:
@@ -191,13 +193,15 @@ def _wheel(table: Table) -> dict[str, float]:
 
 def _at_reports(table: Table) -> dict[str, float]:
     """At each amplitude that is reported, where the branch comes to it first."""
-    found: dict[str, float] = {}
+    first: dict[str, int] = {}
     for row in np.flatnonzero(["report" in event.split() for event in _events(table)]):
-        for column in AT:
-            quantity = column.name.removesuffix("_at_")
-            if quantity in table:
-                found.setdefault(f"{column.name}{table['amplitude'][row]:.6g}", float(table[quantity][row]))
-    return found
+        first.setdefault(f"{table['amplitude'][row]:.6g}", row)
+    return {
+        f"{column.name}{number}": float(table[quantity][row])
+        for column in AT
+        for number, row in enumerate(first.values(), 1)
+        if (quantity := column.name.removesuffix("_at_")) in table
+    }
 
 
 def _events(table: Table) -> list[str]:
