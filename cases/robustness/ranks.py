@@ -4,7 +4,7 @@
 
 Runs each case in its short form and writes one line a table: rows on each number of ranks, and the largest difference
 of any entry from one rank with its column. Columns that say how a point was solved (iterations, residual, wall time)
-are left out. Estimates of errors are solved to 1e-10 instead of 1e-4 (EXACT). Exit 1 if a table differs.
+are left out. Estimates of errors are solved to 1e-10 instead of 1e-3 (EXACT). Exit 1 if a table differs.
 """
 
 from __future__ import annotations

@@ -59,7 +59,7 @@ nb::dict energy(hb::HarmonicProblem& problem, Petsc<Vec> y) {
 void bind_hb(nb::module_& m) {
   using namespace hb;
   nb::class_<Harmonics>(m, "Harmonics")
-      .def(nb::init<std::vector<int>, int>())
+      .def(nb::init<std::vector<int>, int, int>(), nb::arg(), nb::arg(), nb::arg("moving") = 0)
       .def_prop_ro("orders", &Harmonics::orders)
       .def_prop_ro("samples", &Harmonics::samples)
       .def_prop_ro("block_size", &Harmonics::block_size)

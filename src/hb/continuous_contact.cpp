@@ -93,7 +93,7 @@ void ContinuousContact::find_play(Pair& pair, int tangent, int place) {
   Tangent& now = pair.tangents[tangent];
   contact::LinearPair const& law = pair.law;
   const double reach = law.reach();
-  now.walls.radius.q.assign(harmonics_.highest() + 1, 0.0);
+  now.walls.radius.q.assign(harmonics_.moving() + 1, 0.0);
   now.walls.radius.q[0] = law.friction_limit / law.tangential_stiffness;
   if (reach > 0) now.walls.radius = sum(now.walls.radius, reach, pair.normal.approach);
   now.play.clear();

@@ -141,6 +141,17 @@ void HarmonicProblem::residual(Vec y, Vec r) {
   check(VecCopy(y, last_));
   columns_ = std::vector<VecHandle>(scalars_);
   linearised_ = true, contact_version_ = residual_.contact_version();
+  put_residual(r);
+}
+
+VecHandle HarmonicProblem::residual_at(Vec y) {
+  linearise(y);
+  VecHandle r = equations();
+  put_residual(r);
+  return r;
+}
+
+void HarmonicProblem::put_residual(Vec r) {
   const auto along = components(q_);
   WriteArray out(r);
   ReadArray in(R_);

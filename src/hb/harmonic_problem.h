@@ -39,6 +39,8 @@ class HarmonicProblem : public solve::Problem {
     return local_block_ + (last_rank() ? unfoldings() + scalars_ - 1 : 0);
   }
   void residual(Vec y, Vec r) override;
+  /// The same, which costs nothing at the point of linearisation. Collective.
+  VecHandle residual_at(Vec y);
   double rounding(Vec y) override;
   std::uint64_t piece(Vec y) override;
   void product(Vec y, Vec dy, Vec dr) override;
@@ -117,6 +119,7 @@ class HarmonicProblem : public solve::Problem {
   std::span<std::pair<PetscInt, double> const> mine() const;
   bool condensable() const;
   void linearise(Vec y);
+  void put_residual(Vec r);
   void unpack(Vec y);
   Vec column(int j);
   void set_mean(Vec per_dof, Vec blocks);

@@ -11,7 +11,8 @@
 
 namespace fretwave::hb {
 
-Harmonics::Harmonics(std::vector<int> orders, int samples) : orders_(std::move(orders)), samples_(samples) {
+Harmonics::Harmonics(std::vector<int> orders, int samples, int moving)
+    : orders_(std::move(orders)), samples_(samples), moving_(moving) {
   const bool ascending =
       std::adjacent_find(orders_.begin(), orders_.end(), std::greater_equal<int>()) == orders_.end();
   const auto one = std::find(orders_.begin(), orders_.end(), 1);
@@ -23,6 +24,7 @@ Harmonics::Harmonics(std::vector<int> orders, int samples) : orders_(std::move(o
     throw InputError("too few time samples, or an odd number of them", std::to_string(samples_),
                      "an even number >= " + std::to_string(2 * highest() + 2),
                      "give samples = a power of two above 4 H");
+  if (!moving_) moving_ = highest();
   if (!statics) fundamental_ = int(one - orders_.begin());
   for (int n : orders_) {
     offsets_.push_back(block_size_);

@@ -16,11 +16,13 @@ using complex = std::complex<double>;
 class Harmonics {
  public:
   /// Retained orders, ascending, each once, with 1 among them (or 0 alone: statics); samples >= 2 max + 2,
-  /// even.
-  Harmonics(std::vector<int> orders, int samples);
+  /// even. `moving`: the highest order of the motions that forces will be asked of, if that is not the
+  /// highest of all: coefficients above are zero then.
+  Harmonics(std::vector<int> orders, int samples, int moving = 0);
   std::vector<int> const& orders() const { return orders_; }
   int count() const { return int(orders_.size()); }
   int highest() const { return orders_.back(); }
+  int moving() const { return moving_; }
   int samples() const { return samples_; }
   int block_size() const { return block_size_; }
   /// Place of the cosine (or mean) coefficient of the i-th retained order in the block; the sine stands
@@ -33,7 +35,7 @@ class Harmonics {
 
  private:
   std::vector<int> orders_, offsets_;
-  int samples_, block_size_ = 0, fundamental_ = -1;
+  int samples_, moving_, block_size_ = 0, fundamental_ = -1;
 };
 
 /// Values of s_n at one point, q_n = Qc_n - i Qs_n and dx/dt <-> s_n q_n; `inertia_damping` g subtracts g s_n

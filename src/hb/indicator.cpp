@@ -9,18 +9,19 @@ void Indicator::add(Arc const& arc, double weight) {
     G_[p] += weight / (2 * std::numbers::pi) * std::conj(arc.integral(int(p)));
 }
 
-/// Of orders 0 .. H, in real arrays: G of orders -H .. 2H, of which several can be taken at once.
+/// y of orders 0 .. H from x of as many or fewer, in real arrays: G of orders -H .. 2H, of which several can
+/// be taken at once.
 std::vector<complex> Indicator::times(std::vector<complex> const& x) const {
-  const int H = harmonics_.highest();
+  const int H = harmonics_.highest(), last = int(x.size()) - 1;
   std::vector<double> arrays(2 * size_t(3 * H + 1) + 2 * size_t(H + 1));
   double *re = arrays.data() + H, *im = re + 3 * H + 1, *a = im + 2 * H + 1, *b = a + H + 1;
   for (int n = -H; n <= 2 * H; ++n) re[n] = (*this)(n).real(), im[n] = (*this)(n).imag();
-  for (int k = 1; k <= H; ++k) a[k] = x[k].real(), b[k] = x[k].imag();
+  for (int k = 1; k <= last; ++k) a[k] = x[k].real(), b[k] = x[k].imag();
   std::vector<complex> y(H + 1);
   for (int n : harmonics_.orders()) {
     double real = 0, imaginary = 0;
 #pragma omp simd reduction(+ : real, imaginary)
-    for (int k = 1; k <= H; ++k) {
+    for (int k = 1; k <= last; ++k) {
       real += (re[n - k] + re[n + k]) * a[k] - (im[n - k] - im[n + k]) * b[k];
       imaginary += (re[n - k] - re[n + k]) * b[k] + (im[n - k] + im[n + k]) * a[k];
     }

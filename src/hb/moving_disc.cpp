@@ -6,7 +6,7 @@
 namespace fretwave::hb {
 
 /// Three panels in the shortest wave: the product of force and wave goes through 2/3 of its own in each.
-PanelGrid::PanelGrid(Harmonics const& h) : panels_(3 * (h.highest() + 1)), length_(period / panels_) {
+PanelGrid::PanelGrid(Harmonics const& h) : panels_(3 * (h.moving() + 1)), length_(period / panels_) {
   const int m = h.block_size();
   waves_.resize(size_t(nodes()) * m), rates_.resize(waves_.size());
   for (int k = 0; k < nodes(); ++k) {

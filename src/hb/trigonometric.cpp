@@ -22,8 +22,8 @@ struct Powers {
 }  // namespace
 
 Series series(Harmonics const& h, double const* block) {
-  Series out{std::vector<complex>(h.highest() + 1)};
-  for (int i = 0; i < h.count(); ++i)
+  Series out{std::vector<complex>(h.moving() + 1)};
+  for (int i = 0; i < h.count() && h.orders()[i] <= h.moving(); ++i)
     if (h.orders()[i]) out.q[h.orders()[i]] = {block[h.offset(i)], -block[h.offset(i) + 1]};
   return out;
 }
@@ -31,7 +31,7 @@ Series series(Harmonics const& h, double const* block) {
 double mean(Harmonics const& h, double const* block) { return h.orders()[0] == 0 ? block[0] : 0.0; }
 
 void add_series(Harmonics const& h, Series const& p, double factor, double* F) {
-  for (int i = 0; i < h.count(); ++i)
+  for (int i = 0; i < h.count() && h.orders()[i] < int(p.q.size()); ++i)
     if (const int n = h.orders()[i]) {
       F[h.offset(i)] += factor * p.q[n].real();
       F[h.offset(i) + 1] -= factor * p.q[n].imag();
@@ -181,7 +181,7 @@ struct Search {
 
 }  // namespace
 
-Harmonics search_times(Harmonics const& h) { return {h.orders(), 8 * (h.highest() + 1)}; }
+Harmonics search_times(Harmonics const& h) { return {h.orders(), 8 * (h.moving() + 1)}; }
 
 void find_roots(Series const& p, int derivative, double const* samples, int count, std::vector<Root>& out) {
   out.clear();

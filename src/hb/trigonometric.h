@@ -34,7 +34,7 @@ struct Series {
 template <size_t count>
 std::array<Series::Jet, count> jets(std::array<Series const*, count> const&, double tau);
 
-/// q_k of a dof's block, about its mean; the mean.
+/// q_k of a dof's block, k = 0 .. moving(), about its mean; the mean.
 Series series(Harmonics const&, double const* block);
 double mean(Harmonics const&, double const* block);
 /// 1, cos n tau, sin n tau of the retained orders; their rates by tau.

@@ -47,6 +47,7 @@ void VelocityForce::force(double const* U, double const* V, double* F) {
   for (int number = 0; number < int(pairs_.size()); ++number) {
     Pair& pair = pairs_[number];
     pair.v = series(harmonics_, V + block(number));
+    pair.v.q.resize(harmonics_.highest() + 1);
     pair.v.q[0] = mean(harmonics_, V + block(number));
     const double u = norm(U + block(number), m), v = norm(V + block(number), m);
     pair.rate = u > 0 ? v / u : 0;
