@@ -10,7 +10,8 @@ import pytest
 
 from fretwave.files.csv_table import write_rows
 from fretwave.results.study_report import markdown
-from fretwave.run.study_plan import Outcome, Plan, Settings, Study, common_amplitudes
+from fretwave.run.study_outcomes import Outcome, ResponseOutcome
+from fretwave.run.study_plan import Plan, Settings, Study, common_amplitudes
 
 pytestmark = pytest.mark.ranks(1)
 
@@ -48,12 +49,12 @@ def test_fewer_than_two_samples_per_highest_harmonic_are_not_run():
 def test_errors_are_measured_against_the_finest_run():
     study, _ = run_study()
     first = study.table()[0]
-    peak = 0.04 * study.amplitudes[-1] * (1.0 + 1.0 / 49.0)
-    assert first["zeta_error"] == pytest.approx(0.04 * study.amplitudes[-1] * (1.0 - 1.0 / 49.0) / peak)
+    peak = 0.04 * study.places[-1] * (1.0 + 1.0 / 49.0)
+    assert first["zeta_error"] == pytest.approx(0.04 * study.places[-1] * (1.0 - 1.0 / 49.0) / peak)
     assert first["peak_zeta_error"] == pytest.approx(2.0 / (1.0 + 1.0 / 49.0) - 1.0)
     assert first["zeta_error_estimate"] == pytest.approx(0.008 / (1.0 + 1.0 / 256.0) / peak)
     # at the five amplitudes zeta is off by 0.04 a (1 - 1/49), an estimate of 0.008 is 0.3 to 1.4 of that
-    ratios = 0.008 / (0.04 * study.amplitudes * (1.0 - 1.0 / 49.0))
+    ratios = 0.008 / (0.04 * study.places * (1.0 - 1.0 / 49.0))
     assert first["within_3"] == np.mean((ratios < 3) & (ratios > 1 / 3)) < 1 == first["within_10"]
     rows = [row for row in study.calibration() if row["sweep"] == "harmonics" and row["harmonics"] == 1]
     assert [row["estimate"] / row["error"] for row in rows] == pytest.approx(ratios, rel=1e-2)  # zeta is small
@@ -157,3 +158,51 @@ def test_a_study_asks_a_case_for_accuracies(tmp_path):
     assert [float(row["accuracy"]) for row in rows] == [1e-1, 3e-2]
     assert all(float(row["kept"]) >= 0.95 for row in rows)
     assert 5 <= int(rows[0]["harmonics"]) < int(rows[1]["harmonics"]) <= 41
+
+
+def respond(settings: Settings) -> ResponseOutcome:
+    """A response of 2 m at its peak that is off by 0.2 / H m everywhere, which it says twofold."""
+    omega = np.linspace(20.0, 30.0, 7)[1:-1]
+    value = 2.0 / (1.0 + (omega - 25.0) ** 2) + 0.2j / settings.harmonics
+    estimate = np.outer(np.full_like(omega, 0.4 / settings.harmonics), [1.0, 0.0, 0.0])
+    peak = float(np.abs(value).max())
+    return ResponseOutcome(omega, value.real, -value.imag, estimate, peak, 25.0, 40, 90, 0.01 * settings.harmonics)
+
+
+def test_errors_of_a_response_are_those_of_its_complex_amplitude_over_the_peak():
+    study = Study(replace(PLAN, accuracy=(1e-1,)), np.linspace(20.0, 30.0, 7)[1:-1], "omega")
+    study.run(respond, lambda sweep, settings: None)
+    first, peak = study.table()[0], float(np.hypot(2.0, 0.2 / 7))
+    assert first["harmonics"] == 1 and first["peak_frequency_hz"] == pytest.approx(25.0 / (2 * np.pi))
+    assert first["amplitude_error"] == pytest.approx(0.2 * 6 / 7 / peak)
+    assert first["amplitude_error_estimate"] == pytest.approx(0.4 / peak)
+    assert first["peak_amplitude_error"] == pytest.approx(np.hypot(2.0, 0.2) / peak - 1)
+    rows = [row for row in study.calibration() if row["harmonics"] == 3 and row["sweep"] == "harmonics"]
+    assert [row["omega"] for row in rows] == pytest.approx(study.places)
+    assert [row["estimate"] / row["error"] for row in rows] == pytest.approx([0.4 / 3 / (0.2 / 3 - 0.2 / 7)] * 5)
+    # H = 3 is off by less than 0.1 of the amplitude at three of five frequencies only
+    asked = next(row for row in study.table() if row["sweep"] == "accuracy")
+    assert asked["kept"] == 1.0 and asked["best_fixed_s"] == pytest.approx(0.07)
+
+
+@pytest.mark.ranks(1, 2)
+def test_a_forced_response_is_studied_at_its_largest_level(tmp_path):
+    from pathlib import Path
+
+    from mpi4py import MPI
+
+    from fretwave.commands import study as command
+
+    folder = Path(MPI.COMM_WORLD.bcast(str(tmp_path)))
+    case = Path(__file__).parents[2] / "cases" / "two_dof" / "case.toml"
+    choice = ["--harmonics", "3,15,31", "--samples", "128", "--tolerance", "1e-10", "--repeats", "1"]
+    assert command.main([str(case), "--analysis", "forced", "--out", str(folder), *choice]) == 0
+    if MPI.COMM_WORLD.rank == 0:
+        with (folder / "study.csv").open(encoding="utf-8", newline="") as file:
+            rows = list(csv.DictReader(file))
+        # 0.2480 m with 61 and with 181 harmonics
+        assert float(rows[2]["peak_amplitude"]) == pytest.approx(0.2480, rel=2e-3)
+        assert float(rows[0]["peak_amplitude_error"]) == pytest.approx(0.67, abs=0.02)
+        assert float(rows[1]["amplitude_error"]) < 0.03 < 0.3 < float(rows[0]["amplitude_error"])
+        assert (folder / "study.png").exists() and (folder / "calibration.png").exists()
+        assert "error of amplitude" in (folder / "study.md").read_text()

@@ -1,4 +1,4 @@
-"""``fretwave study``: error against run time of a mode analysis over harmonics, samples, tolerance, modes."""
+"""``fretwave study``: error against run time over harmonics, samples, tolerance, modes: of a mode or a response."""
 
 from __future__ import annotations
 
@@ -45,7 +45,11 @@ def _list(kind: type) -> Any:
 def _parser() -> argparse.ArgumentParser:
     parser = Parser(prog="fretwave study", description=__doc__)
     parser.add_argument("case", type=Path, metavar="CASE", help="case file (TOML)")
-    parser.add_argument("--analysis", metavar="NAME", help="mode or wear to study (default: the first mode)")
+    parser.add_argument(
+        "--analysis",
+        metavar="NAME",
+        help="mode, forced response (largest level) or wear (default: the first mode)",
+    )
     parser.add_argument("--set", action="append", default=[], dest="overrides", metavar="KEY=VALUE", help="as for run")
     parser.add_argument("--quick", action="store_true", help="the short form of the case")
     parser.add_argument("--harmonics", type=_list(int), metavar="H,...", help="highest harmonics to sweep")

@@ -1,4 +1,4 @@
-"""Estimated over true error of lambda, point by point of a study."""
+"""Estimated over true error of lambda, or of a response's amplitude, point by point of a study."""
 
 from __future__ import annotations
 
@@ -42,7 +42,8 @@ def draw(table: Table) -> Figure:
             plane.plot(error[own], estimate[own], mark, ms=4, alpha=0.7, color=colour, label=f"by {sweep}")
     within = share_within(estimate, error, FACTOR)
     plane.set(xscale="log", yscale="log", title=f"{100 * within:.0f} % of {len(rows)} points {words}")
-    plane.set_xlabel(style.label("True error of λ", "1/s"))
-    plane.set_ylabel(style.label("Estimated error of λ", "1/s"))
+    of, unit = ("λ", "1/s") if "amplitude" in table else ("the amplitude / peak", "")
+    plane.set_xlabel(style.label(f"True error of {of}", unit))
+    plane.set_ylabel(style.label(f"Estimated error of {of}", unit))
     style.legend_outside(figure, plane, columns=2)
     return figure

@@ -20,6 +20,10 @@ SWEEPS = {
     "pressure_change": ("of a step", "s--"),
 }
 ERRORS = {"zeta_error": "Damping: largest error / peak ζ", "omega_error": "Frequency: largest relative error"}
+ERRORS_OF_RESPONSE = {
+    "amplitude_error": "Amplitude: largest error / peak",
+    "peak_amplitude_error": "Peak: relative error",
+}
 #: of wear, after the last cycle
 ERRORS_OF_WEAR = {"zeta_error": "Damping", "omega_error": "Frequency", "worn_error": "Worn volume"}
 #: an error of exactly zero cannot stand on a logarithmic axis
@@ -36,7 +40,7 @@ def figures(run: Run) -> Iterator[tuple[str, Figure]]:
 def draw(table: Table) -> Figure:
     """One axes per error, one line per swept setting; the reference run is left out."""
     of_wear = "worn_error" in table
-    errors = ERRORS_OF_WEAR if of_wear else ERRORS
+    errors = ERRORS_OF_WEAR if of_wear else ERRORS_OF_RESPONSE if "amplitude_error" in table else ERRORS
     figure, axes = style.new_figure(4.8, columns=len(errors))
     for plane, (column, title) in zip(axes, errors.items()):
         for (sweep, (symbol, line)), colour in zip(SWEEPS.items(), style.PALETTE):
@@ -57,8 +61,8 @@ def _sweep(axes: Axes, table: Table, sweep: str, symbol: str, column: str, line:
         return
     time, error = table["wall_s"][rows], np.maximum(table[column][rows], FLOOR)
     axes.plot(time, error, line, color=colour, label=f"{sweep.replace('_', ' ')} ({symbol})")
-    if column == "zeta_error" and "zeta_error_estimate" in table:
-        axes.plot(time, np.maximum(table["zeta_error_estimate"][rows], FLOOR), line, color=colour, alpha=0.35)
+    if f"{column}_estimate" in table:
+        axes.plot(time, np.maximum(table[f"{column}_estimate"][rows], FLOOR), line, color=colour, alpha=0.35)
     for row, x, y in zip(rows, time, error):
         value = table[sweep][row]
         text = f"{value:.0e}".replace("e-0", "e-") if sweep in ("tolerance", "accuracy") else f"{value:g}"

@@ -10,8 +10,8 @@ from ..post.calibration import FACTORS, LEAST_ERROR
 
 Row = Mapping[str, "float | int | str"]
 
-#: heading of the printed table -> how a row fills it
-PRINTED = {
+WITHIN = {f"within {factor}": f"{{within_{factor}:.0%}}" for factor in FACTORS}
+RUN = {
     "sweep": "{sweep}",
     "H": "{harmonics}",
     "N_t": "{samples}",
@@ -23,12 +23,25 @@ PRINTED = {
     "points": "{points}",
     "Newton": "{newton}",
     "time [s]": "{wall_s:.3f}",
+}
+#: heading of the printed table -> how a row fills it
+PRINTED = {
+    **RUN,
     "peak zeta": "{peak_zeta:.6f}",
     "error of peak": "{peak_zeta_error:.1e}",
     "error of zeta": "{zeta_error:.1e}",
     "error of omega": "{omega_error:.1e}",
     "estimated": "{zeta_error_estimate:.1e}",
-    **{f"within {factor}": f"{{within_{factor}:.0%}}" for factor in FACTORS},
+    **WITHIN,
+}
+#: the same of a forced response
+PRINTED_OF_RESPONSE = {
+    **RUN,
+    "peak": "{peak_amplitude:.6g}",
+    "error of peak": "{peak_amplitude_error:.1e}",
+    "error of amplitude": "{amplitude_error:.1e}",
+    "estimated": "{amplitude_error_estimate:.1e}",
+    **WITHIN,
 }
 
 NOT_A_NUMBER = re.compile("^nan%?$")
@@ -40,10 +53,17 @@ LEGEND = (
     f"{' and '.join(map(str, FACTORS))}: the share of the amplitudes at which the estimated error of lambda is within "
     f"that factor of the error, where this is above {f'{LEAST_ERROR:.0e}'.replace('e-0', 'e-')} 1/s."
 )
+LEGEND_OF_RESPONSE = (
+    "Errors are against the finest run (marked): of the peak relative; of the complex amplitude the largest over the "
+    "frequencies that all runs meet exactly once, divided by the peak. Estimated is that error by what the sweep "
+    "changes, of the finest run by all, as the run itself says; within "
+    f"{' and '.join(map(str, FACTORS))}: the share of the frequencies at which it is within that factor of the error, "
+    f"where this is above {f'{LEAST_ERROR:.0e}'.replace('e-0', 'e-')} of the peak."
+)
 LEGEND_OF_ACCURACY = (
     "Of a run that chooses its harmonics and samples, the most it took; its time is with that of the estimates. Kept: "
-    "the share of the amplitudes at which lambda is that accurate, over zeta omega0; best fixed: the time of the "
-    "quickest run with one set that keeps it at 95 % of them (its estimates not counted)."
+    "the share of these places at which lambda, over zeta omega0, or the complex amplitude is that accurate; best "
+    "fixed: the time of the quickest run with one set that keeps it at 95 % of them (its estimates not counted)."
 )
 
 

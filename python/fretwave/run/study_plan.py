@@ -3,19 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from ..arrays import Array, Complex, Indices
+from ..arrays import Array, Indices
 from ..columns import SOURCES
-from ..hb.states import ZETA_FLOOR, default_samples
+from ..hb.states import default_samples
 from ..post.calibration import FACTORS, share_within
 from ..solve.accuracy import TOLERATED
+from .study_outcomes import AnyOutcome
 
-#: a reported point belongs to an amplitude when it is this near; a loose Newton tolerance lets it miss by about itself
+#: Relative, of a place; a loose Newton tolerance lets an amplitude miss by about itself.
 MATCH = 1e-2
 #: What a sweep's runs differ by from the finest
 SOURCE_OF = {"harmonics": "harmonics", "samples": "samples", "tolerance": "solver"}
@@ -38,32 +40,6 @@ class Settings:
     def possible(self) -> bool:
         """At least two samples per period of the highest harmonic."""
         return self.samples > 2 * self.harmonics
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """What one run found.
-
-    Attributes
-    ----------
-    amplitude, omega, zeta : (n,) at the reported points, in the order of the branch
-    estimate : (n, 3) estimated errors of lambda there [1/s], by `SOURCES`
-    peak_zeta, peak_amplitude : largest damping ratio and where it is
-    wall_s : time of the whole branch [s]
-    harmonics, samples : the most that it took, where it has chosen them
-    """
-
-    amplitude: Array
-    omega: Array
-    zeta: Array
-    estimate: Array
-    peak_zeta: float
-    peak_amplitude: float
-    points: int
-    newton: int
-    wall_s: float
-    harmonics: int = 0
-    samples: int = 0
 
 
 @dataclass(frozen=True)
@@ -105,17 +81,19 @@ class Study:
 
     Attributes
     ----------
-    amplitudes : at which runs are compared
-    left_out : amplitudes of these at which some run has several solutions (between two folds) or none
+    places : amplitudes or frequencies at which runs are compared, ascending
+    over : what these are
+    left_out : places of these at which some run has several solutions (between two folds) or none
     failures : settings that found no whole branch, and why
     """
 
     plan: Plan
-    amplitudes: Array
-    outcomes: dict[Settings, Outcome] = field(default_factory=dict)
+    places: Array
+    over: str = "amplitude"
+    outcomes: dict[Settings, AnyOutcome] = field(default_factory=dict)
     failures: dict[Settings, str] = field(default_factory=dict)
 
-    def run(self, solve: Callable[[Settings], Outcome | str], report: Callable[[str, Settings], None]) -> None:
+    def run(self, solve: Callable[[Settings], AnyOutcome | str], report: Callable[[str, Settings], None]) -> None:
         """Solve every setting once; `solve` returns the reason as text when there is no whole branch."""
         for sweep, settings in self.plan.sweeps():
             if settings in self.outcomes or settings in self.failures:
@@ -129,14 +107,14 @@ class Study:
 
     @property
     def left_out(self) -> Array:
-        """Amplitudes that cannot be compared: a run meets them several times, or never."""
-        return np.array([a for a in self.amplitudes if a not in self.compared])
+        """Places that cannot be compared: a run meets them several times, or never."""
+        return np.array([a for a in self.places if a not in self.compared])
 
     @property
     def compared(self) -> Array:
-        """Amplitudes that every run meets exactly once."""
-        met = [[len(_at(run, a)) == 1 for a in self.amplitudes] for run in self.outcomes.values()]
-        return self.amplitudes[np.all(met, axis=0)] if met else self.amplitudes[:0]
+        """Places that every run meets exactly once."""
+        met = [[len(self._at(run, a)) == 1 for a in self.places] for run in self.outcomes.values()]
+        return self.places[np.all(met, axis=0)] if met else self.places[:0]
 
     def table(self) -> list[dict[str, float | int | str]]:
         """One row per run and sweep; empty when the reference itself failed."""
@@ -146,11 +124,11 @@ class Study:
         rows = self.plan.sweeps()
         return [self._row(sweep, settings, reference) for sweep, settings in rows if settings in self.outcomes]
 
-    def _row(self, sweep: str, settings: Settings, reference: Outcome) -> dict[str, float | int | str]:
+    def _row(self, sweep: str, settings: Settings, reference: AnyOutcome) -> dict[str, float | int | str]:
         run = self.outcomes[settings]
-        omega, zeta, estimate = _values(run, self.compared)
-        omega_true, zeta_true, _ = _values(reference, self.compared)
+        rows, its = self._rows(run), self._rows(reference)
         source = self._source(sweep, settings)
+        estimate = run.estimate[rows]
         guessed = estimate.sum(axis=1) if source is None else estimate[:, source]
         ratios = self._ratios(sweep, settings, reference)
         known, true = (np.array([row[name] for row in ratios]) for name in ("estimate", "error"))
@@ -162,12 +140,7 @@ class Study:
             "points": run.points,
             "newton": run.newton,
             "wall_s": run.wall_s,
-            "omega_error": _largest(np.abs(omega / omega_true - 1.0)),
-            "zeta_error": _largest(np.abs(zeta - zeta_true)) / abs(reference.peak_zeta),
-            "peak_zeta": run.peak_zeta,
-            "peak_amplitude": run.peak_amplitude,
-            "peak_zeta_error": abs(run.peak_zeta / reference.peak_zeta - 1.0),
-            "zeta_error_estimate": _largest(guessed / omega_true) / abs(reference.peak_zeta),
+            **run.errors(reference, rows, its, guessed),  # type: ignore[arg-type]
             **{f"within_{factor}": share_within(known, true, factor) for factor in FACTORS},
             "component_modes": -1 if settings.component_modes is None else settings.component_modes,
             "accuracy": math.nan if settings.accuracy is None else settings.accuracy,
@@ -176,21 +149,39 @@ class Study:
             "reference": int(settings == self.plan.reference),
         }
 
+    def _rows(self, run: AnyOutcome) -> Indices:
+        """Of a run where all are compared."""
+        return np.array([int(self._at(run, a)[0]) for a in self.compared], dtype=int)
+
+    def _at(self, run: AnyOutcome, place: float) -> Indices:
+        return np.flatnonzero(np.abs(run.parameter / place - 1.0) < self._match)
+
+    @cached_property
+    def _match(self) -> float:
+        """A point belongs to a place when it is this near."""
+        apart = np.diff(self.places) / self.places[1:]
+        return min(MATCH, float(apart.min()) / 3) if len(apart) else MATCH
+
+    def _errors(self, settings: Settings) -> Array:
+        """Of the values where all are compared."""
+        run, true = self.outcomes[settings], self.outcomes[self.plan.reference]
+        return np.abs(run.value[self._rows(run)] - true.value[self._rows(true)])
+
     def _kept(self, settings: Settings, accuracy: float) -> float:
-        """Share of the amplitudes at which a run is as accurate, in lambda over zeta omega0."""
-        omega, zeta, _ = _values(self.outcomes[settings], self.compared)
-        true = _eigenvalue(*_values(self.outcomes[self.plan.reference], self.compared)[:2])
-        allowed = accuracy * np.maximum(-true.real, ZETA_FLOOR * np.abs(true))
-        return float(np.mean(np.abs(_eigenvalue(omega, zeta) - true) <= allowed)) if len(true) else math.nan
+        """Share of the places at which a run is as accurate, of a mode in lambda over zeta omega0."""
+        true = self.outcomes[self.plan.reference]
+        allowed = accuracy * true.allowed(self._rows(true))
+        return float(np.mean(self._errors(settings) <= allowed)) if len(allowed) else math.nan
 
     def _best_fixed(self, accuracy: float) -> float:
-        """Time [s] of the quickest run of one set that keeps an accuracy at 95 % of the amplitudes; nan without any."""
+        """Time [s] of the quickest run of one set that keeps an accuracy at 95 % of the places; nan without any."""
         fixed = [settings for settings in self.outcomes if settings.accuracy is None]
         times = [self.outcomes[s].wall_s for s in fixed if self._kept(s, accuracy) >= 1 - TOLERATED]
         return min(times, default=math.nan)
 
     def calibration(self) -> list[dict[str, Any]]:
-        """Estimated and true error of lambda [1/s] by run and amplitude, of the source that the sweep is over.
+        """Estimated and true error by run and place, of the source that the sweep is over: of lambda [1/s], or of the
+        complex amplitude over the largest.
 
         What the others add is the same in a run and in the finest, to which it is compared.
         """
@@ -200,17 +191,15 @@ class Study:
             return []
         return [row for sweep, settings in known for row in self._ratios(sweep, settings, reference)]
 
-    def _ratios(self, sweep: str, settings: Settings, reference: Outcome) -> list[dict[str, Any]]:
+    def _ratios(self, sweep: str, settings: Settings, reference: AnyOutcome) -> list[dict[str, Any]]:
         source = self._source(sweep, settings)
         if source is None:
             return []
-        omega, zeta, estimate = _values(self.outcomes[settings], self.compared)
-        omega_true, zeta_true, _ = _values(reference, self.compared)
-        error = np.abs(_eigenvalue(omega, zeta) - _eigenvalue(omega_true, zeta_true))
+        run, unit = self.outcomes[settings], reference.unit
         own = {"sweep": sweep, "harmonics": settings.harmonics, "samples": settings.samples}
         own["tolerance"] = settings.tolerance
-        found = zip(self.compared, error, estimate[:, source])
-        return [{**own, "amplitude": a, "error": e, "estimate": guessed} for a, e, guessed in found]
+        found = zip(self.compared, self._errors(settings) / unit, run.estimate[self._rows(run), source] / unit)
+        return [{**own, self.over: a, "error": e, "estimate": guessed} for a, e, guessed in found]
 
     def _source(self, sweep: str, settings: Settings) -> int | None:
         """Column of `Outcome.estimate` that is of what a run differs by from the finest; None where none is."""
@@ -218,24 +207,6 @@ class Study:
         return SOURCES.index(SOURCE_OF[sweep]) if differs else None
 
 
-def _eigenvalue(omega: Array, zeta: Array) -> Complex:
-    """lambda = -beta + i omega [1/s] of damped frequencies."""
-    return np.asarray(omega * (1j - zeta / np.sqrt(1 - zeta**2)))
-
-
 def common_amplitudes(first: float, last: float, count: int) -> Array:
     """Even in log amplitude, strictly inside the branch."""
     return np.geomspace(first, last, count + 2)[1:-1]
-
-
-def _at(run: Outcome, amplitude: float) -> Indices:
-    return np.flatnonzero(np.abs(run.amplitude / amplitude - 1.0) < MATCH)
-
-
-def _values(run: Outcome, amplitudes: Iterable[float]) -> tuple[Array, Array, Array]:
-    rows = [int(_at(run, a)[0]) for a in amplitudes]
-    return run.omega[rows], run.zeta[rows], run.estimate[rows]
-
-
-def _largest(values: Array) -> float:
-    return float(values.max()) if len(values) else float("nan")

@@ -1,0 +1,223 @@
+"""Runs of a study: the whole branch of a mode or of a forced response at any settings."""
+
+from __future__ import annotations
+
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Union
+
+import numpy as np
+
+from ..analyses.forced import ForcedAnalysis
+from ..analyses.mode import ModeAnalysis
+from ..analyses.parts.branch import step_control
+from ..analyses.parts.context import AnalysisContext
+from ..analyses.parts.excitation import Excitation, excitation_of
+from ..analyses.parts.rest import retained
+from ..analyses.parts.wheel_start import Start, start_of
+from ..arrays import Array
+from ..case.build import build_model
+from ..case.harmonic import LEAST_HARMONICS, LEAST_SAMPLES, nodal_diameter
+from ..case.load import Case
+from ..case.reduce import reduce_case
+from ..case.wheel import on_wheel, solver_room
+from ..columns import SOURCES
+from ..console import Console
+from ..mpi.petsc_options import AnalysisOptions
+from .study_outcomes import AnyOutcome, Outcome, ResponseOutcome
+from .study_plan import Settings, common_amplitudes
+
+if TYPE_CHECKING:
+    from mpi4py import MPI
+
+    from ..hb.problems import HarmonicProblem, Harmonics
+    from ..solve.continuation import Point
+
+Studied = Union[ModeAnalysis, ForcedAnalysis]
+#: places at which runs are compared
+COUNT = 24
+
+
+class Solver(ABC):
+    """Solves the whole branch of one analysis at any settings."""
+
+    #: What runs are compared over
+    over = "amplitude"
+    outcome: type[AnyOutcome]
+    analysis: Studied
+
+    def __init__(self, case: Case, analysis: Studied, comm: MPI.Comm, console: Console, repeats: int):
+        self.case, self.analysis, self.comm, self.console, self.repeats = case, analysis, comm, console, repeats
+        self.prefix = f"{analysis.name}_"
+        self.places = self._places()
+        self._parts: tuple[int | None, AnalysisContext[Any], Any] | None = None
+
+    @abstractmethod
+    def _places(self) -> Array:
+        """At which runs are compared, ascending."""
+
+    @abstractmethod
+    def _started(self, context: AnalysisContext[Any]) -> Any:
+        """What all runs on a model begin with. Collective."""
+
+    @abstractmethod
+    def _problem(self, context: AnalysisContext[Any], started: Any, harmonics: Harmonics) -> HarmonicProblem:
+        """Collective."""
+
+    @abstractmethod
+    def _outcome(self, rows: Sequence[Mapping[str, Any]], newton: int, wall: float) -> AnyOutcome:
+        """Of the points' states (`row_of`)."""
+
+    def _model(self, component_modes: int | None) -> tuple[AnalysisContext[Any], Any]:
+        """Context and start with this many component modes; the last one is kept. Collective."""
+        if self._parts is None or self._parts[0] != component_modes:
+            if self._parts is not None:
+                self._parts[1].model.destroy()
+            analysis = self.analysis
+            case = on_wheel(reduce_case(self.case, self.comm, component_modes), analysis)
+            preload, diameters = case.preload_of(analysis), nodal_diameter(analysis)
+            model = build_model(case, analysis.dampers, self.comm, preload, diameters, analysis.aerodynamics)
+            context = AnalysisContext(model, case, analysis, self.comm, Path(), self.console)
+            self._parts = (component_modes, context, self._started(context))
+        return self._parts[1:]
+
+    def solve(self, settings: Settings) -> AnyOutcome | str:
+        """The branch's values where runs are compared, or why it has none. Collective."""
+        tried = [self._once(settings)]
+        while len(tried) < self.repeats and not isinstance(tried[0], str):
+            tried.append(self._once(settings))
+        first = tried[0]
+        if isinstance(first, str):
+            return first
+        return replace(first, wall_s=min(run.wall_s for run in tried if not isinstance(run, str)))
+
+    def _once(self, settings: Settings) -> AnyOutcome | str:
+        context, started = self._model(settings.component_modes)
+        asked = settings.accuracy is not None
+        least = (LEAST_HARMONICS, LEAST_SAMPLES) if asked else (settings.harmonics, settings.samples)
+        harmonics = retained(context, *least)
+        options = AnalysisOptions(self.prefix, [self.analysis.petsc, f"-snes_atol {settings.tolerance!r}"])
+        with options.inserted(), solver_room(context.case, self.analysis, self.prefix):
+            problem = self._problem(context, started, harmonics)
+            try:
+                return self._follow(problem, settings.accuracy)
+            finally:
+                problem.destroy()
+
+    def _follow(self, problem: HarmonicProblem, accuracy: float | None) -> AnyOutcome | str:
+        """Only the time spent between points counts: diagnostics are not part of the solution.
+
+        Estimates of errors are, where harmonics and samples follow from them.
+        """
+        from ..solve.continuation import Continuation
+        from ..solve.refining import RefiningContinuation
+
+        low, high = self._ends()
+        rows, newton, wall = [], 0, 0.0
+        began = time.perf_counter()
+        settings: dict[str, Any] = {"stop": (low, high), "steps": step_control(self.analysis.step)}
+        settings["report_at"] = [float(a) for a in self.places]
+        if accuracy is None:
+            branch = Continuation(problem, problem.initial(low), **settings)
+        else:
+            branch = RefiningContinuation(problem, problem.initial(low), **settings, accuracy=accuracy)
+        for point in branch:
+            wall += time.perf_counter() - began
+            newton += point.newton
+            rows.append(_row(branch.problem, point))
+            began = time.perf_counter()
+        converged, reason = branch.converged, branch.reason
+        branch.destroy()
+        return self._outcome(rows, newton, wall) if converged else str(reason)
+
+    @abstractmethod
+    def _ends(self) -> tuple[float, float]:
+        """First and last value of what the branch is over."""
+
+
+class ModeSolver(Solver):
+    """Of a nonlinear mode, over its amplitude."""
+
+    analysis: ModeAnalysis
+    outcome = Outcome
+
+    def _ends(self) -> tuple[float, float]:
+        return self.analysis.amplitude[0], self.analysis.amplitude[1]
+
+    def _places(self) -> Array:
+        low, high = sorted(self._ends())
+        return common_amplitudes(low, high, COUNT)
+
+    def _started(self, context: AnalysisContext[Any]) -> Start:
+        return start_of(context)
+
+    def _problem(self, context: AnalysisContext[Any], started: Start, harmonics: Harmonics) -> HarmonicProblem:
+        from ..hb.problems import NonlinearMode
+
+        return NonlinearMode(
+            context.model,
+            harmonics,
+            method=self.analysis.method,
+            dof=started.dof,
+            start=started.mode,
+            prefix=self.prefix,
+            avoid=started.avoid,
+            rest=started.rest,
+        )
+
+    def _outcome(self, rows: Sequence[Mapping[str, Any]], newton: int, wall: float) -> Outcome:
+        top = max(rows, key=lambda row: float(row["zeta"]))
+        amplitude, omega, zeta, estimate = columns(rows, "amplitude", "omega", "zeta", "estimate")
+        peak, at, sizes = top["zeta"], top["amplitude"], (most(rows, "harmonics"), most(rows, "samples"))
+        return Outcome(amplitude, omega, zeta, estimate, peak, at, len(rows), newton, wall, *sizes)
+
+
+class ResponseSolver(Solver):
+    """Of a forced response at its largest level, over the frequency."""
+
+    analysis: ForcedAnalysis
+    outcome = ResponseOutcome
+    over = "omega"
+
+    def _ends(self) -> tuple[float, float]:
+        first, last = (2 * np.pi * hertz for hertz in self.analysis.frequency)
+        return first, last
+
+    def _places(self) -> Array:
+        low, high = sorted(self._ends())
+        return np.linspace(low, high, COUNT + 2)[1:-1]
+
+    def _started(self, context: AnalysisContext[Any]) -> Excitation:
+        return excitation_of(context, retained(context))
+
+    def _problem(self, context: AnalysisContext[Any], started: Excitation, harmonics: Harmonics) -> HarmonicProblem:
+        return replace(started, harmonics=harmonics).problem(max(self.analysis.levels))
+
+    def _outcome(self, rows: Sequence[Mapping[str, Any]], newton: int, wall: float) -> ResponseOutcome:
+        top = max(rows, key=lambda row: float(row["amplitude"]))
+        omega, amplitude, phase, estimate = columns(rows, "omega", "amplitude", "phase", "estimate")
+        cosine, sine = amplitude * np.cos(phase), -amplitude * np.sin(phase)
+        peak, at, sizes = top["amplitude"], top["omega"], (most(rows, "harmonics"), most(rows, "samples"))
+        return ResponseOutcome(omega, cosine, sine, estimate, peak, at, len(rows), newton, wall, *sizes)
+
+
+def _row(problem: HarmonicProblem, point: Point) -> dict[str, Any]:
+    assert problem.meaning is not None
+    reported = "report" in point.event
+    found = point.errors or problem.errors(point.y, point.tangent if reported else None)
+    estimate = [found[problem.meaning.error_by.format(source)] for source in SOURCES]
+    sizes = {"harmonics": problem.harmonics.orders[-1], "samples": problem.harmonics.samples}
+    return {**problem.state(point.y), **sizes, "estimate": estimate, "reported": reported}
+
+
+def columns(rows: Sequence[Mapping[str, Any]], *names: str) -> list[Array]:
+    """Of the points that are compared."""
+    return [np.array([row[name] for row in rows if row["reported"]]) for name in names]
+
+
+def most(rows: Sequence[Mapping[str, Any]], name: str) -> int:
+    """Of the largest set."""
+    return max(int(row[name]) for row in rows)
