@@ -74,16 +74,17 @@ class ModalState:
         own = {self.error_by.format(source): part for source, part in zip(SOURCES, parts)}
         return {"omega_error": error, "zeta_error": error / omega0 if omega0 else math.nan, **own}
 
-    def relative(self, z: Array, dz: Array) -> Array:
-        """A change of the scalars, of relative size: amplitude (times `STRICT`), lambda over zeta omega0 (3,).
+    def relative(self, z: Array) -> Array:
+        """That takes a change of the scalars to its relative size: amplitude (times `STRICT`), lambda over zeta omega0.
 
-        So it is what an accuracy of the damping, and of the frequency with it, is judged by. A zeta below `ZETA_FLOOR`
-        is measured in that, for it begins at zero where slip does.
+        (3, 3). So it is what an accuracy of the damping, and of the frequency with it, is judged by. A zeta below
+        `ZETA_FLOOR` is measured in that, for it begins at zero where slip does.
         """
-        here, small = self(z), 1e-4
-        change = (self.eigenvalue(z + small * dz) - self.eigenvalue(z - small * dz)) / (2 * small)
-        change /= here["omega0"] * min(max(abs(here["zeta"]), ZETA_FLOOR), 1.0)
-        return np.array([STRICT * dz[2], change.real, change.imag])
+        beta, omega, omega0, zeta = self._oscillation(z)
+        size = omega0 * min(max(abs(zeta), ZETA_FLOOR), 1.0) / self.omega_reference
+        # omega^2 = w^2 - beta^2 for EPMC, above zeta = 1 it is zero
+        by_beta, by_w = (0.0, 1.0) if self.method == "CNM" else (-beta / omega, omega0 / omega) if omega else (0.0, 0.0)
+        return np.array([[0.0, 0.0, STRICT], [-1.0 / size, 0.0, 0.0], [by_beta / size, by_w / size, 0.0]])
 
     def eigenvalue(self, z: npt.ArrayLike) -> complex:
         """lambda = -beta + i omega [1/s]."""
@@ -139,9 +140,10 @@ class ForcedState:
         error, *parts = (self.amplitude_reference * math.hypot(change[1], change[2]) for change in changes)
         return {self.error: error, **{self.error_by.format(name): part for name, part in zip(SOURCES, parts)}}
 
-    def relative(self, z: Array, dz: Array) -> Array:
-        """A change of the scalars, of relative size: of the frequency over `BANDWIDTH`, and of the amplitude (3,)."""
-        return np.array([dz[0] / (BANDWIDTH * z[0]), *dz[1:3] / np.hypot(*z[1:3])])
+    def relative(self, z: Array) -> Array:
+        """That takes a change of the scalars to its relative size: frequency over `BANDWIDTH`, and amplitude (3, 3)."""
+        size = np.hypot(*z[1:3])
+        return np.diag([1.0 / (BANDWIDTH * z[0]), 1.0 / size, 1.0 / size])
 
     def __call__(self, z: npt.ArrayLike) -> dict[str, float]:
         """The columns of these scalars."""
@@ -185,12 +187,10 @@ class Estimate:
 
         Along the branch a change is none: where it is steep, at a fold, nothing lies at the same parameter.
         """
-        v = self.meaning.relative(self.z, self.along)
-        found = []
-        for change in self.changes:
-            u = self.meaning.relative(self.z, change)
-            found.append(float(np.linalg.norm(u - (u @ v) / (v @ v) * v)))
-        return dict(zip(("all", *SOURCES), found))
+        sized = self.meaning.relative(self.z)
+        v, found = sized @ self.along[:3], np.array([change[:3] for change in self.changes]) @ sized.T
+        aside = found - np.outer(found @ v / (v @ v), v)
+        return dict(zip(("all", *SOURCES), np.linalg.norm(aside, axis=1).tolist()))
 
 
 def described(state: State) -> dict[str, Any]:
