@@ -133,6 +133,7 @@ void bind_contact(nb::module_& m) {
       .def_prop_ro("odd", &contact::Law::odd)
       .def_prop_ro("pairs", &contact::Law::pairs)
       .def_prop_ro("sliders", &contact::Law::sliders)
+      .def("stuck_stiffness", &contact::Law::stuck_stiffness)
       .def("rest",
            [](contact::Law& law, std::vector<double> const& u) {
              if (u.size() != size_t(law.components()) * law.pairs())

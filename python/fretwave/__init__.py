@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from .importers.formats import register_format
     from .model.contact import Contact
     from .model.laws import LawInfo, Limit, ParameterInfo, PythonLaw, Role, laws, register_law
+    from .model.modal_damping import modal_damping
     from .model.model import Model
     from .model.modes import LinearMode, linear_modes
     from .model.pair_coordinates import on_pair_coordinates
@@ -96,6 +97,7 @@ _HOMES = {
     "importers.formats": ("register_format",),
     "model.laws": ("LawInfo", "Limit", "ParameterInfo", "PythonLaw", "Role", "laws", "register_law"),
     "model.contact": ("Contact",),
+    "model.modal_damping": ("modal_damping",),
     "model.model": ("Model",),
     "model.modes": ("LinearMode", "linear_modes"),
     "hb.problems": ("ForcedResponse", "Harmonics", "NonlinearMode", "choose_harmonics"),
@@ -166,6 +168,7 @@ __all__ = [
     "load_case",
     "main",
     "match_faces",
+    "modal_damping",
     "most_alike",
     "nonlinear_error",
     "on_pair_coordinates",

@@ -13,7 +13,7 @@ from pathlib import Path
 #: Keys that papers write as symbols, in small letters without their underscore. Laws say theirs themselves.
 SYMBOLS = {
     **{"m": ("M",), "k": ("K",), "c": ("C",), "alpha": ("mass_damping",), "beta": ("stiffness_damping",)},
-    **{"kw": ("coefficient",), "nh": ("harmonics",), "nt": ("samples",), "zeta": ("damping",)},
+    **{"kw": ("coefficient",), "nh": ("harmonics",), "nt": ("samples",), "zeta": ("damping",), "eta": ("loss_factor",)},
     **{"nd": ("nodal_diameter", "nodal_diameters"), "eo": ("engine_order",)},
 }
 

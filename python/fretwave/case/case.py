@@ -5,22 +5,26 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from ..arrays import Array
+from ..cyclic.aerodynamics import with_terms
 from ..model.contact import Contact
 from ..model.sectors import Sparse
 from ..model.structure import Structure
 from ..texts import toml
 from ..units import UnitSystem
 from .analysis import Analyses, AnalysisSection
+from .damping import around_wheel, damping_by_mode
 from .gauges import Gauges
 from .reduction_report import ReductionReport
 from .schema import (
     AerodynamicsSection,
     Damper,
+    DampingSection,
     MaterialSection,
     PreloadSection,
     ReductionSection,
@@ -38,6 +42,7 @@ class Tables:
     ----------
     reduction : how to reduce
     preload : the static state of all analyses without one of their own
+    damping : loss mode by mode
     aerodynamics : forces of the flow on a sector's blades
     study : what ``fretwave study`` sweeps
     gauges : what ``fretwave stress`` reads; no result depends on it
@@ -45,6 +50,7 @@ class Tables:
 
     reduction: ReductionSection | None = None
     preload: PreloadSection | None = None
+    damping: DampingSection | None = None
     aerodynamics: AerodynamicsSection | None = None
     study: StudySection = field(default_factory=StudySection)
     gauges: Gauges = field(default_factory=lambda: Gauges(MaterialSection()))
@@ -187,9 +193,21 @@ class Case:
         """Indices of a dof in all sectors of a wheel; of a structure or of one sector that of `dof` alone."""
         return self.structure.places(name)
 
+    @cached_property
+    def modal_damping(self) -> Mapping[int, Sparse]:
+        """What ``[damping]`` adds to C, of a wheel from its tuned sector; computed once."""
+        if self.tables.damping is None:
+            return {}
+        if self.sector is not None:
+            return around_wheel(self.sector.modal_damping, self.structure.sectors)
+        where = self.source.where(("damping",))
+        return damping_by_mode(self.tables.damping, self.structure, self.contacts, where)
+
     def damped(self, dampers: Sequence[Damper]) -> Structure:
-        """The structure with its shares of K and M and an analysis' viscous dampers to ground in C."""
-        return self.structure.damped([(place, damper.c) for damper in dampers for place in self.places(damper.dof)])
+        """The structure with its shares of K and M, its damping by mode and viscous dampers to ground in C."""
+        places = [(place, damper.c) for damper in dampers for place in self.places(damper.dof)]
+        damped = self.structure.damped(places)
+        return replace(damped, C=with_terms(damped.C, self.modal_damping))
 
     def damping_with(self, dampers: Sequence[Damper]) -> Sparse | None:
         """C of `damped`, of a sector its own part; None when there is no damping at all."""

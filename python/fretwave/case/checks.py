@@ -39,7 +39,7 @@ def check_top_level(source: Source, found: Found) -> None:
     for key in source.data:
         if key not in TOP_LEVEL:
             found.append(unknown_key(source, (key,), list(TOP_LEVEL)))
-    names = ("model", "reduction", "preload", "aerodynamics", "material", "uncertainty", "quick", "study")
+    names = ("model", "reduction", "preload", "damping", "aerodynamics", "material", "uncertainty", "quick", "study")
     tables = dict.fromkeys(names, dict)
     arrays = dict.fromkeys(("contact", "gauge", "analysis"), list)
     shapes = {**tables, **arrays, "title": str}

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import h5py
 
 #: Tables of the case that decide the results of every analysis.
-COMMON = ("model", "contact", "reduction", "preload", "aerodynamics", "plugins")
+COMMON = ("model", "contact", "reduction", "preload", "damping", "aerodynamics", "plugins")
 
 
 def reload_case(folder: Path, kept: bool = False) -> tuple[Case, dict[str, Any]]:

@@ -18,6 +18,7 @@ from .at_speed import known_parts, with_speeds
 from .case import Case, Tables, changed_keys
 from .checks_tables import check_preload, check_reduction, implied_preload
 from .contacts import read_contacts
+from .damping import check_damping
 from .facts import Facts
 from .flow import check_aerodynamics
 from .gauges import read_gauges
@@ -26,6 +27,7 @@ from .plugins import Plugin, read_plugins
 from .reduce import kept_dofs
 from .schema import (
     AerodynamicsSection,
+    DampingSection,
     ModelSection,
     PreloadSection,
     ReductionSection,
@@ -116,6 +118,7 @@ def _build(
     section = _table(ModelSection, "model", source, found)
     reduction = _table(ReductionSection, "reduction", source, found)
     preload = _table(PreloadSection, "preload", source, found)
+    damping = _table(DampingSection, "damping", source, found)
     flow = _table(AerodynamicsSection, "aerodynamics", source, found)
     study = _table(StudySection, "study", source, found)
     given = load_origin(section, source, found) if section else None
@@ -163,6 +166,7 @@ def _build(
     checks.check_analyses(source, analyses, facts, found)
     check_reduction(source, reduction, analyses, facts.sectors, found)
     check_preload(source, preload, facts.loads, found)
+    check_damping(source, damping, structure, reduction, found)
     gauges = read_gauges(source, (structure.cut or structure) if structure else None, found)
     if structure is not None:
         rows = [contact.pairs.own for contact in contacts] if facts.complete else None
@@ -170,7 +174,7 @@ def _build(
     if found or section is None or structure is None:
         return None
     preload = preload or implied_preload(source, contacts, notes)
-    tables = {"reduction": reduction, "preload": preload, "aerodynamics": flow}
+    tables = {"reduction": reduction, "preload": preload, "damping": damping, "aerodynamics": flow}
     return Case(
         source=source,
         structure=structure,
@@ -180,7 +184,7 @@ def _build(
             **_resolve({**identity, **_faces(section, structure)}, source, section, contacts, analyses, tables),
             **{f"plugins.{plugin.name}": plugin.digest for plugin in plugins},
         },
-        tables=Tables(reduction, preload, flow, study or StudySection(), gauges),
+        tables=Tables(reduction, preload, damping, flow, study or StudySection(), gauges),
         notes=[*notes, *_unused_contacts(built, contacts)],
         keep=list(keep),
     )

@@ -42,6 +42,12 @@ Name = Annotated[str, Field(max_length=LONGEST_NAME)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Matrix = Union[str, list[list[float]]]
 Numbers = Union[float, list[float]]
+Ratio = Annotated[float, Field(ge=0, lt=1, allow_inf_nan=False)]
+ByMode = Union[Ratio, Annotated[list[Ratio], Field(min_length=1)], Annotated[dict[str, Ratio], Field(min_length=1)]]
+Quality = Annotated[float, Field(gt=0.5, allow_inf_nan=False)]
+QByMode = Union[
+    Quality, Annotated[list[Quality], Field(min_length=1)], Annotated[dict[str, Quality], Field(min_length=1)]
+]
 Deviations = Annotated[list[Annotated[float, Field(gt=-1, allow_inf_nan=False)]], Field(min_length=2)]
 
 
@@ -162,6 +168,28 @@ class PreloadSection(Section):
         default=True,
     )
     loads: list[str] = key("static loads of the model that act", example='["centrifugal"]', default_factory=list)
+
+
+class DampingSection(Section):
+    """``[damping]``: structural loss mode by mode, in one of three forms, beside whatever else is in C."""
+
+    zeta: Optional[ByMode] = key(
+        "modal damping ratio: of all modes, a list of the lowest ones' or by the number of the mode; of a sector those "
+        "of each wave",
+        "-",
+        "0.002",
+        default=None,
+    )
+    Q: Optional[QByMode] = key("instead, quality factor 1 / (2 zeta)", "-", "250.0", default=None)
+    loss_factor: Optional[ByMode] = key(
+        "instead, structural loss factor 2 zeta, which a viscous damper equals at resonance", "-", "0.004", default=None
+    )
+    contact: Literal["stuck", "sliding", "free"] = key(
+        "linear limit of the contact whose modes these are: every pair closed and stuck, closed and sliding without "
+        "friction, or no contact",
+        example='"sliding"',
+        default="stuck",
+    )
 
 
 class AerodynamicsSection(Section):
@@ -358,6 +386,7 @@ TOP_LEVEL = {
     "model": "matrices and names of the degrees of freedom, or what makes them",
     "reduction": "Craig-Bampton reduction",
     "preload": "the static state that the dynamics move about",
+    "damping": "structural loss mode by mode",
     "aerodynamics": "forces of the flow on the blades",
     "contact": "contact pairs that share a law ([[contact]], any number)",
     "material": "elastic constants and limits of stress, for `fretwave stress`",

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from ..case import checks
 from ..case.build import build_model
+from ..case.damping import damping_line
 from ..case.load import Case, load_case
 from ..case.ratios import odd_ratios
 from ..case.reduce import reduce_case
@@ -85,6 +86,7 @@ def _report(case: Case, described: dict[str, list[str]]) -> list[str]:
         values = ", ".join(f"{key} = {span(value)}" for key, value in contact.parameters.items())
         lines.append(f"  contact '{contact.name}': {contact.law}, {counted(contact.n_pairs, 'contact pair')}, {values}")
     lines.extend(f"  {line}" for line in (case.reduced.lines() if case.reduced else ()))
+    lines.append(f"  {damping_line(case.tables.damping)}" if case.tables.damping else "")
     lines.extend(f"  {line}" for line in case.tables.gauges.lines())
     lines.extend(f"  {line}" for line in (case.uncertainty.lines() if case.uncertainty else ()))
     lines.extend(f"  note: {note}" for note in case.notes)

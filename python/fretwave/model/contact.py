@@ -87,6 +87,11 @@ class Contact:
         """Every pair closed at rest, whatever its load and gap."""
         return replace(self, parameters={**self.parameters, **self.info.closing()})
 
+    def stuck_stiffness(self) -> Array:
+        """Of a stuck pair along each row of B [force/length], (n_pairs, components); infinite where nothing gives."""
+        law, n_pairs = self.core_law(np.arange(self.n_pairs), self.n_pairs), self.n_pairs
+        return np.array([[law.stuck_stiffness(row, pair) for row in range(self.components)] for pair in range(n_pairs)])
+
     def sliding(self) -> Contact | None:
         """What is left of it closed and without friction: springs along the normals; None of a law without any."""
         stiffness, normal = self.value(Role.NORMAL_STIFFNESS), self.info.normal

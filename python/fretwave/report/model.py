@@ -75,7 +75,7 @@ def _facts(run: Run, record: Mapping[str, Any], case: Case | None, units: UnitSy
     for name, unit in (("stiffness_damping", "s"), ("mass_damping", "1/s")):
         value = resolved.get(f"model.{name}")
         yield name.replace("_", " "), f"{value:g} {unit}" if value else ""
-    for name in ("preload", "aerodynamics"):
+    for name in ("preload", "damping", "aerodynamics"):
         told = {key.partition(".")[2]: value for key, value in resolved.items() if key.startswith(f"{name}.")}
         yield name, ", ".join(f"{key} = {toml(value, LONGEST)}" for key, value in told.items() if value is not None)
 

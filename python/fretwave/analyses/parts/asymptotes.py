@@ -49,10 +49,15 @@ def other_asymptote(context: AnalysisContext[HarmonicSection], stuck: LinearMode
 
 
 def limit_model(case: Case, comm: MPI.Comm, limit: str, diameters: int = 0) -> Model:
-    """The model with its contacts in a linear limit (`fretwave.model.contact.LIMITS`), in a wave. Collective."""
+    """The model with its contacts in a linear limit (`fretwave.model.contact.LIMITS`), in a wave. Collective.
+
+    For undamped modes: without damping by mode, which is of the case's own contacts.
+    """
     from ...case.build import build_model
 
-    return build_model(replace(case, contacts=in_limit(case.contacts, limit)), (), comm, nodal_diameter=diameters)
+    undamped = replace(case.tables, damping=None)
+    changed = replace(case, contacts=in_limit(case.contacts, limit), tables=undamped)
+    return build_model(changed, (), comm, nodal_diameter=diameters)
 
 
 def closed_stiffness(context: AnalysisContext[AnalysisSection]) -> sp.csr_matrix:

@@ -56,7 +56,7 @@ def modes_of_wave(
     """Rows of a wave at a speed and their modes, limit by limit. Collective."""
     case, neighbours = _spinning(context, speed_rpm), context.case.neighbours
     theta = 2 * np.pi * diameters / neighbours.sectors if neighbours else 0.0
-    C = context.case.damped(context.analysis.dampers).C
+    C = case.damped(context.analysis.dampers).C
     found = {limit: _modes(context, case, limit, diameters) for limit in _limits(context)}
     loose = next((found[limit] for limit in ("sliding", "free") if limit in found), [])
     for limit, modes in found.items():

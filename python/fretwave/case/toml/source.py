@@ -23,7 +23,7 @@ else:
 #: What `tomllib` raises besides its own error: numbers of more than 4300 digits, and arrays nested without end.
 TomlError = (tomllib.TOMLDecodeError, ValueError, RecursionError)
 #: Top-level keys that an address may begin with; other addresses begin with a name.
-TABLES = ("title", "plugins", "model", "reduction", "preload", "aerodynamics", "material", "uncertainty")
+TABLES = ("title", "plugins", "model", "reduction", "preload", "damping", "aerodynamics", "material", "uncertainty")
 _PLAIN_TEXT = re.compile(r"[A-Za-z_./-][^\[\]{}\"'\n]*")
 
 
