@@ -57,6 +57,12 @@ class ForcedAnalysis(HarmonicSection):
         "{ m1 = 1.0 }",
         min_length=1,
     )
+    force_rpm: Optional[Positive] = key(
+        "speed at which `force` is as given: it grows with the square of [model] speed_rpm",
+        "rev/min",
+        "3000.0",
+        default=None,
+    )
     engine_order: Optional[Whole] = key(
         "order of the excitation of a wheel, in place of nodal_diameter; negative where the rotor turns with the "
         "sectors' numbers",
@@ -120,6 +126,9 @@ class ForcedAnalysis(HarmonicSection):
         check_observed(report, "observe", self.observe, self, facts)
         for dof in self.force:
             report.dof(("force", dof), dof, facts.named)
+        if self.force_rpm is not None and "speed_rpm" not in facts.source.data.get("model", {}):
+            fix = f"add `speed_rpm = {self.force_rpm:g}` to [model]"
+            report.wrong(("force_rpm",), "is of a speed that is not given", "[model] speed_rpm", fix)
         if not any(self.force.values()):
             report.wrong(
                 ("force",), "is zero", "a force amplitude other than 0", "write for example `force = { m1 = 1.0 }`"

@@ -1,8 +1,11 @@
-"""``[model] at_speed``: K + Omega^2 K2 through the stiffness of a model at rest and at one or two speeds."""
+"""``[model] at_speed``: K + Omega^2 K2 through the stiffness of a model at rest and at one or two speeds.
+
+With ``[model] speed_rpm`` the model turns: K is that at this speed.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -23,6 +26,7 @@ Found = list[FretwaveError]
 #: Mass matrices of one model at two speeds differ by less.
 SAME_MASS = 1e-9
 MODEL_FILE = ".h5"
+EXAMPLE = 'at_speed = { 3000 = "K3000.mtx" }'
 
 
 def with_speeds(
@@ -39,22 +43,35 @@ def with_speeds(
     """
     at_rest, known = structure.own("K"), dict(identity)
     if section.at_speed is None or at_rest is None:  # told where K is read
-        return structure, identity
+        return _turning(section, structure), identity
     squares, changes = [], []
     for text, given in section.at_speed.items():
         key = ("model", "at_speed", text)
-        square, read = _square(text, key, source, found), _stiffness(given, key, structure, source, found)
+        square, read = square_of(text, key, source, found, EXAMPLE), _stiffness(given, key, structure, source, found)
         if square is not None and read is not None:
             squares.append(square)
             changes.append(read[0] - at_rest)
             known[f"model.at_speed.{text}"] = read[1]
     if not changes:
         return structure, identity
-    K2 = sum(w * A for w, A in zip(squares, changes)) / sum(w * w for w in squares)
-    left = max(_size(A - w * K2) / (_size(A) or 1.0) for w, A in zip(squares, changes))
+    K2, left = least_squares(squares, changes, _size)
     if len(changes) > 1:
         notes.append(f"stiffness at speed: K + Omega^2 K2 leaves {100 * left:.2g} % of its change")
-    return replace(structure, parts={**structure.parts, SPIN: sp.csr_matrix(K2)}), known
+    return _turning(section, replace(structure, parts={**structure.parts, SPIN: sp.csr_matrix(K2)})), known
+
+
+def _turning(section: ModelSection, structure: Structure) -> Structure:
+    """The structure at the speed of the case."""
+    if not section.speed_rpm or SPIN not in structure.parts:
+        return structure
+    return structure.stiffened(SPIN, (2 * np.pi * section.speed_rpm / 60) ** 2)
+
+
+def least_squares(squares: Sequence[float], given: Sequence[Any], size: Callable[[Any], float]) -> tuple[Any, float]:
+    """A2 of Omega^2 A2 through what is given at speeds of these Omega^2, and the largest share that it leaves."""
+    A2 = sum(w * A for w, A in zip(squares, given)) / sum(w * w for w in squares)
+    left = max(size(A - w * A2) / (size(A) or 1.0) for w, A in zip(squares, given))
+    return A2, float(left)
 
 
 def known_parts(section: ModelSection, structure: Structure) -> list[str] | None:
@@ -67,16 +84,16 @@ def _size(A: Sparse) -> float:
     return float(np.sqrt(A.multiply(A).sum()))
 
 
-def _square(text: str, key: KeyPath, source: Source, found: Found) -> float | None:
-    """Omega^2 [rad^2/s^2]."""
+def square_of(text: str, key: KeyPath, source: Source, found: Found, example: str) -> float | None:
+    """Omega^2 [rad^2/s^2]; None of what is no speed."""
     try:
         speed = float(text)
     except ValueError:
         speed = np.nan
     if np.isfinite(speed) and speed > 0:
         return float((2 * np.pi * speed / 60) ** 2)
-    what, fix = f"'{text}' is no speed of a turning model", 'write for example `at_speed = { 3000 = "K3000.mtx" }`'
-    found.append(InputError(what, source.where(key), text, "rev/min, above 0; K is that at rest", fix))
+    what, fix = f"'{text}' is no speed of a turning model", f"write for example `{example}`"
+    found.append(InputError(what, source.where(key), text, "rev/min, above 0", fix))
     return None
 
 

@@ -161,6 +161,11 @@ class Case:
         return self.structure if self.structure.whole else None
 
     @property
+    def speed_rpm(self) -> float:
+        """Speed at which the model turns [rev/min]."""
+        return float(self.resolved.get("model.speed_rpm", 0.0))
+
+    @property
     def reduction(self) -> ReductionSection | None:
         """How to reduce; None for not at all."""
         return self.tables.reduction

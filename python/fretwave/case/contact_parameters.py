@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from ..arrays import Array
 from ..errors import FretwaveError, InputError
-from ..model.laws import LawInfo, ParameterInfo
+from ..model.laws import LawInfo, ParameterInfo, Role
 from ..model.pairs import Pairs
 from ..texts import nearest, toml
 from ..units import quantity
@@ -99,6 +99,7 @@ def parameters_of(
         else:
             values[name] = _value(source, (*path, name), parameter, n_pairs, found)
     _multiply(source, path, values, found)
+    _turn(source, path, section, law, values, found)
     return values if len(found) == before else None
 
 
@@ -115,6 +116,34 @@ def _multiply(
             what, expected = f"a factor is drawn on no parameter of {source.name(path)}", f"one of {', '.join(values)}"
             fix = nearest(name, list(values)) or "name a parameter of the law"
             found.append(InputError(what, where, name, expected, fix))
+
+
+def _turn(
+    source: Source,
+    path: KeyPath,
+    section: ContactSection,
+    law: LawInfo,
+    values: dict[str, float | Array | None],
+    found: list[FretwaveError],
+) -> None:
+    """Loads that are given at one speed, at that of the model."""
+    if section.load_rpm is None:
+        return
+    speed, where = at(source.data, ("model", "speed_rpm")), source.where((*path, "load_rpm"))
+    names = [name for role in (Role.LOAD, Role.FRICTION_LIMIT) if (name := law.named(role)) is not None]
+    if not names:
+        what = f"contact '{section.name}' has no load that could grow with the speed"
+        found.append(InputError(what, where, f"law = {toml(law.name)}", "a law with a load", "remove load_rpm"))
+    elif not isinstance(speed, (int, float)):
+        what, fix = (
+            "the load grows with a speed that is not given",
+            f"add `speed_rpm = {section.load_rpm:g}` to [model]",
+        )
+        found.append(InputError(what, where, f"load_rpm = {section.load_rpm:g}", "[model] speed_rpm", fix))
+    else:
+        for name in names:
+            value = values.get(name)
+            values[name] = None if value is None else value * (speed / section.load_rpm) ** 2
 
 
 def _plain(value: npt.ArrayLike) -> float | Array:

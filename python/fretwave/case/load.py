@@ -22,6 +22,7 @@ from .damping import check_damping
 from .facts import Facts
 from .flow import check_aerodynamics
 from .gauges import read_gauges
+from .loads_at_speed import check_speed, with_loads
 from .origin import check_physics, load_origin
 from .plugins import Plugin, read_plugins
 from .reduce import kept_dofs
@@ -127,6 +128,8 @@ def _build(
     if section and structure:
         structure, identity = in_units(section, source, structure, identity, notes, found)
         structure, identity = with_speeds(section, source, structure, identity, notes, found)
+        structure, identity = with_loads(section, source, structure, identity, notes, found)
+        identity = {**identity, **check_speed(section, source, structure, notes, found)}
         for analysis in analyses.values():
             analysis.read_in(structure.unit_system)
     dofs = structure.dof_names if structure else None

@@ -41,6 +41,7 @@ UnitName = Annotated[str, WithJsonSchema({"type": "string", "enum": list(SYSTEMS
 Name = Annotated[str, Field(max_length=LONGEST_NAME)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Matrix = Union[str, list[list[float]]]
+LoadVector = Union[str, list[float]]
 Numbers = Union[float, list[float]]
 Ratio = Annotated[float, Field(ge=0, lt=1, allow_inf_nan=False)]
 ByMode = Union[Ratio, Annotated[list[Ratio], Field(min_length=1)], Annotated[dict[str, Ratio], Field(min_length=1)]]
@@ -86,6 +87,23 @@ class ModelSection(Section):
         default=None,
         min_length=1,
         max_length=2,
+    )
+    loads_at_speed: Optional[dict[str, Annotated[dict[str, LoadVector], Field(min_length=1, max_length=3)]]] = key(
+        "static loads that grow with the square of the speed, each by what it is at one to three speeds [rev/min]: "
+        "numbers, a .csv file with the columns `dof` and `force`, or a load that the model brings; Omega^2 f is put "
+        "through them",
+        "force",
+        '{ centrifugal = { 3000 = "f3000.csv" } }',
+        default=None,
+        min_length=1,
+    )
+    speed_rpm: Optional[float] = key(
+        "speed at which the model turns: stiffness K + Omega^2 K2, and loads as they are then",
+        "rev/min",
+        "4500.0",
+        default=None,
+        ge=0,
+        allow_inf_nan=False,
     )
     builder: Optional[str] = key(
         "Python file whose build(**options) gives the model, in place of matrices", example='"model.py"', default=None
@@ -229,6 +247,13 @@ class ContactSection(BaseModel):
         example='["m2"] or [["m1", "m2"]]',
         default=None,
         min_length=1,
+    )
+    load_rpm: Optional[Positive] = key(
+        "speed at which its normal loads, or friction limits, are as given: they grow with the square of "
+        "[model] speed_rpm",
+        "rev/min",
+        "3000.0",
+        default=None,
     )
     tangents: Optional[list[Union[Dof, list[Dof]]]] = key(
         "of a law in a plane: the tangent of each pair, given as `pairs`, which are then its normals (> 0 closes)",

@@ -33,6 +33,13 @@ if TYPE_CHECKING:
     from ..forced import ForcedAnalysis
 
 
+def forces(context: AnalysisContext[ForcedAnalysis]) -> dict[str, float]:
+    """Amplitude [force] at level 1 of each excited dof at the speed of the model."""
+    given, given_at = context.analysis.force, context.analysis.force_rpm
+    grown = 1.0 if given_at is None else (context.case.speed_rpm / given_at) ** 2
+    return {dof: grown * amplitude for dof, amplitude in given.items()}
+
+
 @dataclass
 class Excitation:
     """What the responses of all levels share.
@@ -61,7 +68,7 @@ class Excitation:
         case = self.context.case
         force = np.zeros(len(case.dofs), dtype=complex)
         turn = 2j * np.pi * (self.analysis.nodal_diameter or 0) / (case.wheel.sectors if case.wheel else 1)
-        for dof, amplitude in self.analysis.force.items():
+        for dof, amplitude in forces(self.context).items():
             for j, place in enumerate(case.places(dof)):
                 force[place] = amplitude * np.exp(-j * turn)
         return force

@@ -12,6 +12,7 @@ from ...case.observed import unit_of
 from ...post.response_peaks import points_around_peak
 from ...solve.steady import SteadyState, steady_motion
 from .context import AnalysisContext
+from .excitation import forces
 from .observed import dense
 from .whole import integrated_model
 
@@ -94,7 +95,7 @@ def _steady(
     from ...solve.transient import Transient
 
     force = {1: np.zeros(model.n_dof, dtype=complex)}
-    for name, value in context.analysis.force.items():
+    for name, value in forces(context).items():
         force[1][context.case.dof(name)] = value
     integrator = Transient(model, force=force, level=level, omega=omega, prefix=f"{context.prefix}time_")
     return steady_motion(integrator, state, seen, omega, SAMPLES, TOLERANCE)

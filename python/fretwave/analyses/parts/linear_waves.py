@@ -11,6 +11,7 @@ import numpy as np
 from ...columns import MODAL_UNIT, Column
 from ...errors import InputError
 from ...model.sectors import Term, in_wave
+from ...model.structure import SPIN
 from ...post.engine_orders import exciting, margins
 from .asymptotes import MORE_MODES, limit_model, most_like
 from .context import AnalysisContext
@@ -80,8 +81,10 @@ def modes_of_wave(
 def _spinning(context: AnalysisContext[LinearAnalysis], speed_rpm: float) -> Case:
     if context.analysis.speeds_rpm is None:
         return context.case
-    added = context.case.structure.stiffened(context.analysis.spin_stiffness, (TO_OMEGA * speed_rpm) ** 2)
-    return replace(context.case, structure=added)
+    case, part = context.case, context.analysis.spin_stiffness
+    own = case.speed_rpm if part == SPIN else 0.0  # what K has of it already
+    added = case.structure.stiffened(part, TO_OMEGA**2 * (speed_rpm**2 - own**2))
+    return replace(case, structure=added)
 
 
 def _limits(context: AnalysisContext[LinearAnalysis]) -> list[str]:
