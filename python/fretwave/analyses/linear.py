@@ -1,5 +1,7 @@
 """``type = "linear"``: frequencies and shapes with the contact stuck, sliding and free, and what engine orders meet.
 
+With ``wheel = true`` those of all sectors, tuned or mistuned, and how far mistuning amplifies a forced response.
+
 The three limits are those that the backbone of a nonlinear mode runs between: every pair closed and stuck, closed and
 sliding without friction, and no contact at all. Pairs count as closed whatever the loads at rest are.
 """
@@ -15,17 +17,20 @@ from pydantic import Field
 
 from ..case.analysis import AnalysisSection, register_analysis
 from ..case.checks_common import about
-from ..case.schema import Positive, Whole, key
+from ..case.checks_wheel import check_mistuning, check_needs_wheel
+from ..case.schema import Dof, MistuningSection, Positive, Whole, key
 from ..model.contact import LIMITS
 from ..model.structure import SPIN
 from ..post.engine_orders import excited_by, usual_orders
 from ..texts import counted, nearest, toml
 from .parts.context import AnalysisContext, Outcome
 from .parts.linear_waves import columns_of, crossings_of, modes_of_wave
+from .parts.linear_wheel import AMPLIFICATION, AROUND, amplification_lines, amplifications, around_wheel
 
 if TYPE_CHECKING:
     from ..case.facts import Facts
     from ..case.reporter import Reporter
+    from ..model.modes import LinearMode
 
 #: Time samples of a period in views.
 SAMPLES = 96
@@ -69,9 +74,28 @@ class LinearAnalysis(AnalysisSection):
         default=None,
         min_length=2,
     )
+    wheel: bool = key("modes of all sectors of the wheel in place of waves on one", example="true", default=False)
+    mistuning: Optional[MistuningSection] = key(
+        "deviations of the wheel's sectors", example='{ of = "blade", standard_deviation = 0.02 }', default=None
+    )
+    observe: Optional[Dof] = key(
+        "dof of a sector whose amplitudes around the wheel are told of every mode", example='"tip"', default=None
+    )
+    engine_order: Optional[Whole] = key(
+        "of a force at `observe` in every sector: largest response of the mistuned wheel over that of the tuned one",
+        example="4",
+        default=None,
+        ge=1,
+    )
     spin_stiffness: str = key(
         "part K2 of the model's stiffness [mass] with speeds_rpm: K + Omega^2 K2", example='"spin"', default=SPIN
     )
+
+    def whole_wheel(self) -> tuple[bool, Optional[MistuningSection]]:
+        return self.wheel, self.mistuning
+
+    def kept_dofs(self) -> list[str]:
+        return [*super().kept_dofs(), *([] if self.observe is None else [self.observe])]
 
     def limits(self, normal: bool, any_contact: bool) -> list[str]:
         """Linear limits of the contact that it looks at: those it names, or all that differ."""
@@ -101,6 +125,7 @@ class LinearAnalysis(AnalysisSection):
         self._check_waves(report, facts)
         if facts.complete and not facts.contacts and set(self.contact or ()) - {"free"}:
             report.wrong(("contact",), "is of a model without contact", '["free"]', "remove the key")
+        self._check_wheel(report, facts)
         self._check_operating_speed(report)
         self._check_spin(report, facts)
 
@@ -120,6 +145,26 @@ class LinearAnalysis(AnalysisSection):
                 fix = f"take it out, or add {excited} to nodal_diameters"
                 expected = f"an order of its waves; {order} excites {counted(excited, 'nodal diameter')}"
                 report.wrong(("engine_orders", index), "excites none of the waves", expected, fix)
+
+    def _check_wheel(self, report: Reporter, facts: Facts) -> None:
+        if self.wheel and facts.model_known and facts.neighbours is None:
+            fix = "remove the key, or add sectors"
+            report.wrong(("wheel",), "is of no sector of a wheel", "a model with sectors", fix)
+        for name in ("mistuning", "observe", "engine_order"):
+            if getattr(self, name) is not None:
+                check_needs_wheel(report, self, name)
+        if self.wheel and self.nodal_diameters is not None:
+            report.wrong(("nodal_diameters",), "are waves on one sector", "modes of the whole wheel", "remove the key")
+        if self.observe is not None:
+            report.dof(("observe",), self.observe, facts.named)
+        elif self.engine_order is not None:
+            fix = 'add for example `observe = "tip"`'
+            report.wrong(("engine_order",), "drives no dof", "`observe` beside it", fix)
+        if self.engine_order is not None and self.speeds_rpm is not None:
+            fix = "remove one of the keys, or take [model] speed_rpm"
+            report.wrong(("engine_order",), "is given beside speeds_rpm", "one speed", fix)
+        if self.mistuning is not None and facts.neighbours is not None:
+            check_mistuning(report, self.mistuning, facts.neighbours)
 
     def _check_operating_speed(self, report: Reporter) -> None:
         if self.speed_rpm is None:
@@ -159,6 +204,7 @@ class LinearAnalysis(AnalysisSection):
         named = "" if self.nodal_diameters is None else f", nodal diameters {', '.join(map(str, self.nodal_diameters))}"
         contact = "each contact that differs" if self.contact is None else f"contact {', '.join(self.contact)}"
         about_speed = "" if self.speed_rpm is None else f", crossings about {self.speed_rpm:g} rev/min"
+        named += "" if not self.wheel else ", of the whole wheel" + (", mistuned" if self.mistuning else "")
         over = "" if self.speeds_rpm is None else f", at {counted(len(self.speeds_rpm), 'speed')}"
         return f"{counted(self.modes, 'linear mode')} of {contact}{named}{over}{about_speed}"
 
@@ -166,16 +212,31 @@ class LinearAnalysis(AnalysisSection):
         """Solve every wave in every limit of the contact, at every speed. Collective."""
         neighbours = context.case.neighbours
         sectors = neighbours.sectors if neighbours else 0
-        columns, orders = columns_of(sectors, self.speeds_rpm is not None), json.dumps(self.orders(sectors))
+        columns = columns_of(sectors, self.speeds_rpm is not None)
+        columns += AROUND if self.observe is not None else ()
+        orders = json.dumps(self.orders(sectors))
         writer = context.writer(columns, ["1c", "1s"], samples=SAMPLES, sectors=sectors, engine_orders=orders)
         rows: list[dict[str, Any]] = []
+        found: dict[str, list[LinearMode]] = {}
         for diameters in self.waves(sectors):
             for speed in self.speeds():
                 for row, mode in modes_of_wave(context, diameters, speed):
-                    rows.append({"point": writer.rows, **row})
+                    rows.append({"point": writer.rows, **row, **around_wheel(context, mode)})
+                    if speed == self.speeds()[-1]:
+                        found.setdefault(row["contact"], []).append(mode)
                     writer.append(rows[-1], np.column_stack([mode.shape, -mode.imaginary]))
+        summary = [*_summary(context, rows), *_meet(context, rows, sectors), *_amplify(context, found)]
         writer.close("done", "all modes")
-        return Outcome(writer.rows, "all modes", True, [*_summary(context, rows), *_meet(context, rows, sectors)])
+        return Outcome(writer.rows, "all modes", True, summary)
+
+
+def _amplify(context: AnalysisContext[LinearAnalysis], found: Mapping[str, Sequence[LinearMode]]) -> list[str]:
+    """Write ``<name>_amplification.csv``; a line for each family. Collective."""
+    if context.analysis.engine_order is None:
+        return []
+    rows = amplifications(context, found)
+    context.write_table("amplification", {name: [row[name] for row in rows] for name in AMPLIFICATION})
+    return amplification_lines(context.name, rows, context.wheel.sectors)
 
 
 def _summary(context: AnalysisContext[LinearAnalysis], rows: Sequence[Mapping[str, Any]]) -> list[str]:

@@ -19,7 +19,7 @@ from ..errors import InputError
 from ..results.sweep_summary import COUNTS, Summary
 from ..units import SI, UnitSystem
 from .checks_common import check_common
-from .schema import Damper, Name, PreloadSection, Section, key
+from .schema import Damper, MistuningSection, Name, PreloadSection, Section, key
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -113,6 +113,11 @@ class AnalysisSection(Section):
     def harmonic(self) -> Optional[HarmonicSection]:
         """Its keys in the frequency domain: harmonics, wave, wheel, flow; None where it has none."""
         return None
+
+    def whole_wheel(self) -> tuple[bool, Optional[MistuningSection]]:
+        """Whether it looks at all sectors of the wheel, and how these are mistuned."""
+        section = self.harmonic()
+        return (False, None) if section is None else (section.wheel, section.mistuning)
 
     def integrates(self) -> str:
         """The key by which it integrates in time, empty where it does not: that needs a law of the present motion."""

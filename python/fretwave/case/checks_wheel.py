@@ -37,8 +37,7 @@ def check_wave(report: Reporter, analysis: HarmonicSection, facts: Facts) -> Non
 
 def with_measured(report: Reporter, analysis: AnalysisSection, facts: Facts) -> AnalysisSection:
     """The analysis with the deviations of its sectors that a table gives."""
-    section = analysis.harmonic()
-    mistuning = section.mistuning if section is not None else None
+    mistuning = analysis.whole_wheel()[1]
     if mistuning is None or not isinstance(mistuning.deviations, str) or not facts.sectors:
         return analysis
     source, path = report.source, (*report.path, "mistuning", "deviations")
@@ -63,9 +62,9 @@ def check_wheel(report: Reporter, analysis: HarmonicSection, facts: Facts) -> No
         _check_on_wheel(report, analysis, neighbours, len(facts.dofs or ()))
 
 
-def check_needs_wheel(report: Reporter, analysis: HarmonicSection, key: str) -> None:
+def check_needs_wheel(report: Reporter, analysis: AnalysisSection, key: str) -> None:
     """A key that means something on a whole wheel alone."""
-    if not analysis.wheel:
+    if not analysis.whole_wheel()[0]:
         report.wrong((key,), "needs the whole wheel", "beside `wheel = true`", "add `wheel = true`, or remove the key")
 
 
@@ -74,15 +73,15 @@ def _check_on_wheel(report: Reporter, analysis: HarmonicSection, neighbours: Str
     if analysis.sector is not None and analysis.sector >= n:
         report.wrong(("sector",), "does not exist", f"0 to {n - 1}", "write `sector = 0`, or leave the key out")
     if analysis.mistuning is not None:
-        _check_mistuning(
-            Reporter(report.source, (*report.path, "mistuning"), report.found), analysis.mistuning, neighbours
-        )
+        check_mistuning(report, analysis.mistuning, neighbours)
         if analysis.nodal_diameter is None and n_dof and analysis.linear_mode > n * n_dof:
             expected = f"1 to {n * n_dof}, the number of the wheel's dofs"
             report.wrong(("linear_mode",), "does not exist", expected, "write `linear_mode = 1`")
 
 
-def _check_mistuning(report: Reporter, mistuning: MistuningSection, neighbours: Structure) -> None:
+def check_mistuning(given_to: Reporter, mistuning: MistuningSection, neighbours: Structure) -> None:
+    """All that is wrong with the deviations of an analysis."""
+    report = Reporter(given_to.source, (*given_to.path, "mistuning"), given_to.found)
     if mistuning.of not in neighbours.parts:
         known = list(neighbours.parts)
         fix = nearest(mistuning.of, known) or "name a part that the builder gives (Structure.parts)"

@@ -29,10 +29,10 @@ def on_wheel(case: Case, analysis: AnalysisSection) -> Case:
 
     Dofs are numbered sector by sector and named `tip@0`, `tip@1`, ...; names in the case file are those of a sector.
     """
-    sector, section = case.neighbours, analysis.harmonic()
-    if sector is None or section is None or not section.wheel:
+    sector, (wheel, mistuning) = case.neighbours, analysis.whole_wheel()
+    if sector is None or not wheel:
         return case
-    n, mistuning = sector.sectors, section.mistuning
+    n = sector.sectors
     deviations, of = (None, WHOLE) if mistuning is None else (deviations_of(mistuning, n), mistuning.of)
     contacts = [contact.around(n) for contact in case.contacts]
     return replace(case, structure=sector.around(deviations, of), contacts=contacts, sector=case)

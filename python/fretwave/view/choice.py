@@ -197,7 +197,7 @@ def read_choice(file: h5py.File, folder: Path, case: Case, options: ViewOptions)
     chosen = points_asked(group, offered, options, f"analysis '{name}' in {display(folder)}")
     count = int(group.attrs["samples"])
     samples = np.unique(np.arange(options.phases) * count // options.phases)
-    rows, section = [row for row, _ in chosen], case.analyses[name].harmonic()
+    rows = [row for row, _ in chosen]
     without = [row for row in rows if row not in held]
     return Choice(
         name=name,
@@ -213,7 +213,7 @@ def read_choice(file: h5py.File, folder: Path, case: Case, options: ViewOptions)
         without=without,
         highest_component_hz=json.loads(group.attrs.get("reduction", "{}")).get("highest_component_hz", 0.0),
         diameters=_diameters(group, case, name, rows),
-        wheel=case.neighbours is not None and section is not None and section.wheel,
+        wheel=case.neighbours is not None and case.analyses[name].whole_wheel()[0],
         sample_count=count,
         unit=unit_of_amplitudes(group),
         units=units_of(group.attrs),

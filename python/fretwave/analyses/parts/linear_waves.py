@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Optional
 
 import numpy as np
 
+from ...case.wheel import on_wheel
 from ...columns import MODAL_UNIT, Column
 from ...errors import InputError
 from ...model.sectors import Term, in_wave
@@ -61,7 +62,7 @@ def modes_of_wave(
     found = {limit: _modes(context, case, limit, diameters) for limit in _limits(context)}
     loose = next((found[limit] for limit in ("sliding", "free") if limit in found), [])
     for limit, modes in found.items():
-        for number, mode in enumerate(modes[: context.analysis.modes], 1):
+        for number, mode in enumerate(modes[: _count(context)], 1):
             yield (
                 {
                     "contact": limit,
@@ -78,13 +79,18 @@ def modes_of_wave(
             )
 
 
+def _count(context: AnalysisContext[LinearAnalysis]) -> int:
+    """Modes that are told: of a wheel as many for each of its sectors."""
+    return context.analysis.modes * (context.case.wheel.sectors if context.case.wheel else 1)
+
+
 def _spinning(context: AnalysisContext[LinearAnalysis], speed_rpm: float) -> Case:
     if context.analysis.speeds_rpm is None:
         return context.case
-    case, part = context.case, context.analysis.spin_stiffness
+    case, part = context.case.sector or context.case, context.analysis.spin_stiffness
     own = case.speed_rpm if part == SPIN else 0.0  # what K has of it already
     added = case.structure.stiffened(part, TO_OMEGA**2 * (speed_rpm**2 - own**2))
-    return replace(case, structure=added)
+    return on_wheel(replace(case, structure=added), context.analysis)
 
 
 def _limits(context: AnalysisContext[LinearAnalysis]) -> list[str]:
@@ -97,7 +103,7 @@ def _modes(context: AnalysisContext[LinearAnalysis], case: Case, limit: str, dia
     from ...model.modes import linear_modes
 
     with limit_model(case, context.comm, limit, diameters) as model:
-        count = min(model.n_dof, context.analysis.modes + (MORE_MODES if limit != "stuck" else 0))
+        count = min(model.n_dof, _count(context) + (MORE_MODES if limit != "stuck" else 0))
         try:
             return linear_modes(model, count)
         except InputError:

@@ -1,0 +1,148 @@
+"""Linear modes of a whole wheel: what they look like around it, and how far mistuning amplifies a forced response."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...arrays import Array, Complex
+from ...columns import Column
+from ...cyclic.engine_order import folded
+from ...errors import InputError
+from ...model.sectors import in_wave
+from ...post.amplification import WIDTHS, Family, largest_response
+from ...post.blade_peaks import whitehead
+from ...post.wave_content import participation, wave_content
+from .asymptotes import limit_model
+from .context import AnalysisContext
+
+if TYPE_CHECKING:
+    from ...model.model import Model
+    from ...model.modes import LinearMode
+    from ..linear import LinearAnalysis
+
+#: Of a mode around the wheel, from the amplitudes of one dof in all sectors.
+AROUND = (
+    Column("participation", "1", "participation ratio of the sectors"),
+    Column("largest_sector", "1", "sector that moves most", "i"),
+    Column("diameters", "1", "nodal diameters of the largest wave", "i"),
+    Column("diameters_share", "1", "share of this wave, forward and backward, in the sum of squares"),
+)
+#: Of the table of amplifications.
+AMPLIFICATION = (
+    "contact",
+    "mode",
+    "tuned_frequency_hz",
+    "tuned_amplitude",
+    "frequency_hz",
+    "amplitude",
+    "sector",
+    "amplification",
+)
+
+
+def around_wheel(context: AnalysisContext[LinearAnalysis], mode: LinearMode) -> dict[str, Any]:
+    """Values of :data:`AROUND` for a mode; none where no dof is observed."""
+    if context.analysis.observe is None:
+        return {}
+    a = _observed(context, mode)
+    content = np.abs(wave_content(a)) ** 2
+    n = len(a)
+    share = np.array([content[d] + (content[n - d] if 0 < 2 * d < n else 0.0) for d in range(n // 2 + 1)])
+    most = int(np.argmax(np.round(share / share.sum(), 9)))
+    return {
+        "participation": participation(a),
+        "largest_sector": int(np.argmax(np.round(np.abs(a) / np.abs(a).max(), 9))),
+        "diameters": most,
+        "diameters_share": float(share[most] / share.sum()),
+    }
+
+
+def amplifications(
+    context: AnalysisContext[LinearAnalysis], found: Mapping[str, Sequence[LinearMode]]
+) -> list[dict[str, Any]]:
+    """Of a unit force of the engine order at the observed dof, by limit of the contact and mode of its wave.
+
+    The largest response of any sector over that of the tuned wheel, both at frequencies about that of the mode: as far
+    off as the largest deviation, where its peaks are after mistuning. Modes at the end of those found have no row.
+    Collective.
+    """
+    rows, sectors = [], context.wheel.sectors
+    wave = folded(context.analysis.engine_order or 0, sectors)
+    force = np.exp(-2j * np.pi * wave * np.arange(sectors) / sectors)
+    for limit, modes in found.items():
+        with limit_model(context.tuned, context.comm, limit, wave) as model:
+            tuned = _tuned(context, model, wave)
+        every = _damped(modes, np.array([_observed(context, mode) for mode in modes]), _damping(context, modes))
+        last = min(tuned.omega.max(), every.omega.max()) if len(modes) < context.case.structure.n_dof else np.inf
+        for number, window in enumerate(_windows(context, tuned), 1):
+            if (
+                window[1] <= last
+                or number == len(tuned.omega) == len(modes) // sectors == context.tuned.structure.n_dof
+            ):
+                before = largest_response(tuned, np.ones(1, dtype=complex), window)
+                after = largest_response(every, force, window)
+                values = (limit, number, before.hz, before.amplitude, after.hz, after.amplitude, after.place)
+                rows.append(dict(zip(AMPLIFICATION, (*values, after.amplitude / before.amplitude))))
+    return rows
+
+
+def _windows(context: AnalysisContext[LinearAnalysis], tuned: Family) -> Array:
+    """Frequencies (R, 2) [rad/s] about the modes of a wave among which its peaks are after mistuning."""
+    deviations = context.wheel.deviations
+    spread = 0.0 if deviations is None else float(np.abs(deviations).max())
+    room = spread * tuned.omega + WIDTHS * np.real(np.diagonal(tuned.damping))
+    return np.column_stack([np.maximum(tuned.omega - room, 0.0), tuned.omega + room])
+
+
+def _tuned(context: AnalysisContext[LinearAnalysis], model: Model, wave: int) -> Family:
+    """Modes of the tuned sector in the wave that the engine order drives, at the observed dof. Collective."""
+    from ...model.modes import linear_modes
+
+    case, analysis = context.tuned, context.analysis
+    modes = linear_modes(model, min(model.n_dof, analysis.modes))
+    shapes = np.array([mode.shape + 1j * mode.imaginary for mode in modes])
+    C, theta = case.damped(analysis.dampers).C, 2 * np.pi * wave / context.wheel.sectors
+    damping = np.zeros((len(modes), len(modes))) if C is None else shapes.conj() @ in_wave(C, shapes.T, theta)
+    dof = case.dof(str(analysis.observe))
+    return _damped(modes, shapes[:, dof : dof + 1], np.asarray(damping, dtype=complex))
+
+
+def _damping(context: AnalysisContext[LinearAnalysis], modes: Sequence[LinearMode]) -> Complex:
+    """phi_r^H C phi_s of modes of the wheel."""
+    C = context.case.damped(context.analysis.dampers).own("C")
+    shapes = np.array([mode.shape + 1j * mode.imaginary for mode in modes])
+    none = np.zeros((len(modes), len(modes)), dtype=complex)
+    return none if C is None else np.asarray(shapes.conj() @ (C @ shapes.T))
+
+
+def _damped(modes: Sequence[LinearMode], places: Complex, damping: Complex) -> Family:
+    """Modes whose response is bounded: all that are not rigid are damped."""
+    found = Family(np.array([mode.omega for mode in modes]), places, damping)
+    own = np.where(found.omega > 0, np.real(np.diagonal(damping)), np.inf)
+    if (own <= 0).any():
+        measured, fix = (
+            f"mode {int(np.argmin(own)) + 1} is not damped",
+            "add for example `[damping]` with `zeta = 0.001`",
+        )
+        what = "the response of a mode without damping has no peak"
+        raise InputError(what, "engine_order", measured, "damping of every mode", fix)
+    return found
+
+
+def _observed(context: AnalysisContext[LinearAnalysis], mode: LinearMode) -> Complex:
+    """Amplitudes (N,) of the observed dof in all sectors."""
+    places = context.case.places(str(context.analysis.observe))
+    return np.asarray(mode.shape[places] + 1j * mode.imaginary[places])
+
+
+def amplification_lines(name: str, rows: Sequence[Mapping[str, Any]], sectors: int) -> list[str]:
+    """A line for each mode and limit."""
+    return [
+        f"{name}: {row['contact']}: about mode {row['mode']} of the wave: largest peak in sector {row['sector']} at"
+        f" {row['frequency_hz']:.6g} Hz, {row['amplification']:.4f} times that of the tuned wheel at"
+        f" {row['tuned_frequency_hz']:.6g} Hz (Whitehead's bound {whitehead(sectors):.3f})"
+        for row in rows
+    ]

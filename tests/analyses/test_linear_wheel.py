@@ -1,0 +1,162 @@
+"""`type = "linear"` of whole wheels: frequencies of the mistuned wheel, its modes around it, and its amplification."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.linalg
+from models.linear_cases import CONTACT, GROUND, MASS, NEXT, ring
+from tolerances import REPEATED, TIGHT
+
+from fretwave.case.load import load_case
+from fretwave.errors import CaseErrors, InputError
+from fretwave.post.amplification import Family, largest_response
+from fretwave.post.blade_peaks import whitehead
+from fretwave.run.order import RunOptions
+from fretwave.run.runner import run_case
+
+ZETA, N = 0.004, 6
+WHEEL = "wheel = true\n"
+MISTUNED = WHEEL + "mistuning = { standard_deviation = 0.03, seed = 4 }\n"
+FORCED = 'observe = "mass"\nengine_order = 2\n'
+DAMPED = f'[damping]\nzeta = {ZETA}\ncontact = "stuck"\n'
+
+
+def text(keys: str, tables: str = "", sectors: int = N) -> str:
+    plain = ring(sectors).replace("speed_rpm = 6.0\n", "").replace("C = [[0.01, 0.0], [0.0, 0.0]]\n", "")
+    return plain + keys + tables
+
+
+@pytest.fixture
+def solve(shared_tmp, comm):
+    """Tables of a run of a case."""
+
+    def run(case: str, *names: str) -> list[dict[str, np.ndarray]]:
+        path, out = shared_tmp / "case.toml", shared_tmp / "run"
+        if comm.rank == 0:
+            path.write_text(case, encoding="utf-8")
+        comm.barrier()
+        assert run_case(path, RunOptions(out=out, plots=False, force=True), comm) == 0
+        comm.barrier()
+        return [columns(out / f"{name}.csv") for name in names]
+
+    return run
+
+
+def columns(path: Path) -> dict[str, np.ndarray]:
+    with path.open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    return {key: np.array([row[key] if key == "contact" else float(row[key]) for row in rows]) for key in rows[0]}
+
+
+def wheel(deviations: np.ndarray, contact: float = CONTACT) -> np.ndarray:
+    """Stiffness of the ring, each sector's own (ground and the spring to the next mass) by its deviation larger."""
+    n, K = len(deviations), np.zeros((len(deviations), len(deviations)))
+    for j, own in enumerate(1 + deviations):
+        k = (j + 1) % n
+        K[j, j] += GROUND * own
+        K[np.ix_([j, k], [j, k])] += (NEXT * own + contact) * np.array([[1, -1], [-1, 1]])
+    return K
+
+
+def drawn(path: Path) -> np.ndarray:
+    from fretwave.case.wheel import deviations_of
+
+    return deviations_of(load_case(path).analyses["linear"].mistuning, N)
+
+
+def test_frequencies_are_those_of_the_whole_wheel(solve, shared_tmp):
+    (table,) = solve(text(MISTUNED + "modes = 1\n"), "linear")
+    for limit, spring in (("stuck", CONTACT), ("free", 0.0)):
+        own, K = table["contact"] == limit, wheel(drawn(shared_tmp / "case.toml"), spring)
+        expected = np.sqrt(scipy.linalg.eigvalsh(K) / MASS)
+        assert table["omega"][own] == pytest.approx(expected, rel=TIGHT)
+        assert table["mode"][own].tolist() == [1, 2, 3, 4, 5, 6]
+
+
+def test_a_tuned_wheel_has_the_modes_of_its_waves_around_it(solve):
+    """Double modes of 1 and 2 nodal diameters, single ones of 0 and 3; what they look like is theirs."""
+    (table,) = solve(text(WHEEL + 'modes = 1\nobserve = "mass"\ncontact = ["stuck"]\n'), "linear")
+    diameters = np.array([0, 1, 1, 2, 2, 3])
+    omega = np.sqrt((GROUND + 2 * (NEXT + CONTACT) * (1 - np.cos(2 * np.pi * diameters / N))) / MASS)
+    assert table["omega"] == pytest.approx(omega, rel=TIGHT)
+    assert table["diameters"].tolist() == diameters.tolist()
+    assert table["diameters_share"] == pytest.approx(1.0, abs=REPEATED)
+    assert table["participation"][[0, 5]] == pytest.approx(1.0, abs=REPEATED)
+
+
+def response(deviations: np.ndarray, omega: np.ndarray) -> np.ndarray:
+    """|x_j| (n_omega, N) under a unit force of engine order 2, all modes of the tuned wheel damped by ZETA."""
+    tuned = wheel(np.zeros(N))
+    C = 2 * ZETA * np.sqrt(MASS) * np.real(scipy.linalg.sqrtm(tuned))
+    F = np.exp(-2j * np.pi * 2 * np.arange(N) / N)
+    Z = wheel(deviations)[None] - omega[:, None, None] ** 2 * MASS * np.eye(N) + 1j * omega[:, None, None] * C
+    return np.abs(np.linalg.solve(Z, np.broadcast_to(F, (len(omega), N))[..., None])[..., 0])
+
+
+def test_amplification_is_that_of_the_response_solved_directly(solve, shared_tmp):
+    """Over a fine grid of frequencies: the largest of all sectors, and the tuned F / (2 zeta k sqrt(1 - zeta^2))."""
+    (table,) = solve(text(MISTUNED + "modes = 1\n" + FORCED + 'contact = ["stuck"]\n', DAMPED), "linear_amplification")
+    deviations = drawn(shared_tmp / "case.toml")
+    k = GROUND + 2 * (NEXT + CONTACT) * (1 - np.cos(2 * np.pi * 2 / N))
+    tuned = 1 / (2 * ZETA * k * np.sqrt(1 - ZETA**2))
+    assert table["tuned_amplitude"] == pytest.approx([tuned], rel=1e-8)
+    assert table["tuned_frequency_hz"] == pytest.approx([np.sqrt(k / MASS * (1 - 2 * ZETA**2)) / (2 * np.pi)], rel=1e-5)
+    grid = np.sqrt(k / MASS) * np.linspace(0.9, 1.1, 200_001)
+    largest = np.concatenate([response(deviations, part) for part in np.array_split(grid, 40)])
+    assert table["amplitude"] == pytest.approx([largest.max()], rel=1e-6)
+    assert table["sector"].tolist() == [largest.max(axis=0).argmax()]
+    assert table["amplification"] == pytest.approx(table["amplitude"] / tuned, rel=1e-8)
+
+
+def test_a_tuned_wheel_is_not_amplified(solve):
+    (table,) = solve(text(WHEEL + "modes = 1\n" + FORCED, DAMPED), "linear_amplification")
+    assert table["contact"].tolist() == ["stuck", "free"]
+    assert table["amplification"] == pytest.approx(1.0, rel=1e-8)
+
+
+@pytest.mark.ranks(1)
+def test_no_pattern_passes_whiteheads_bound_and_some_come_near():
+    """One degree of freedom a blade, one family, light damping: A of 200 patterns is between 1 and (1 + sqrt N) / 2."""
+    rng, n, coupling = np.random.default_rng(1), 8, 0.01
+    found = []
+    for _ in range(200):
+        deviations = 0.01 * rng.standard_normal(n)
+        K = np.diag(1 + deviations) + coupling * (2 * np.eye(n) - np.roll(np.eye(n), 1, 0) - np.roll(np.eye(n), -1, 0))
+        square, shapes = scipy.linalg.eigh(K)
+        family = Family(np.sqrt(square), shapes.T.astype(complex), 2e-3 * np.eye(n, dtype=complex))
+        force = np.exp(-2j * np.pi * 3 * np.arange(n) / n)
+        tuned = 1 / (2e-3 * np.sqrt(1 + 2 * coupling * (1 - np.cos(2 * np.pi * 3 / n)) - 1e-6))
+        found.append(largest_response(family, force, np.array([0.9, 1.2])).amplitude / tuned)
+    assert min(found) > 1.0 and 0.75 * whitehead(n) < max(found) < whitehead(n)
+
+
+WRONG = {
+    "mistuned waves": ("mistuning = { standard_deviation = 0.02 }\n", "mistuning", "beside `wheel = true`"),
+    "observed waves": ('observe = "mass"\n', "observe", "beside `wheel = true`"),
+    "no deviations": (WHEEL + 'mistuning = { of = "sector" }\n', "mistuning", "standard_deviation"),
+    "no such part": (WHEEL + 'mistuning = { of = "blade", standard_deviation = 0.02 }\n', "of", "one of sector"),
+    "waves of a wheel": (WHEEL + "nodal_diameters = [1]\n", "nodal_diameters", "modes of the whole wheel"),
+    "no place of the force": (WHEEL + "engine_order = 2\n", "engine_order", "`observe` beside it"),
+    "no such dof": (WHEEL + 'observe = "tip"\n', "observe", "one of mass"),
+    "order nought": (WHEEL + 'observe = "mass"\nengine_order = 0\n', "engine_order", "a value >= 1"),
+}
+
+
+@pytest.mark.ranks(1)
+@pytest.mark.parametrize("name", WRONG)
+def test_what_is_of_no_wheel_is_refused(name, tmp_path):
+    keys, place, expected = WRONG[name]
+    path = tmp_path / "case.toml"
+    path.write_text(text(keys), encoding="utf-8")
+    with pytest.raises(CaseErrors, match=place) as caught:
+        load_case(path)
+    assert expected in str(caught.value) and str(caught.value).count("fix:") == 1
+
+
+def test_a_response_without_damping_is_refused(solve):
+    with pytest.raises(InputError, match="without damping has no peak"):
+        solve(text(WHEEL + "modes = 1\n" + FORCED))
