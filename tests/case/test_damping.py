@@ -38,6 +38,7 @@ friction_limit = 1e6
 name = "linear"
 type = "linear"
 """
+STUCK = 'contact = "stuck"\n'
 REDUCED = "[reduction]\nmodes = 1\ncompare = 0\n"
 #: A mass on the rim, tied to the next one, that carries a blade of two.
 SECTOR = """
@@ -133,7 +134,7 @@ def test_a_wave_responds_with_the_peak_and_the_width_of_its_ratio(solve, keys):
     omega = np.sqrt((GROUND + 2 * (NEXT + CONTACT) * (1 - np.cos(2 * np.pi * 2 / 6))) / MASS)
     ratios = np.array([half_power(ZETA)[0], 1.0, half_power(ZETA)[1]])
     text = ring(6).replace("speed_rpm = 6.0\n", "").replace("C = [[0.01, 0.0], [0.0, 0.0]]\n", "")
-    text += f"[damping]\nQ = {0.5 / ZETA}\n" + forced("mass", omega * ratios / (2 * np.pi), keys)
+    text += f"[damping]\nQ = {0.5 / ZETA}\n{STUCK}" + forced("mass", omega * ratios / (2 * np.pi), keys)
     response, linear = solve(text, "forced", "linear")
     peak = FORCE / (2 * ZETA * MASS * omega**2)
     assert reported(response) == pytest.approx(peak * np.array([0.5**0.5, 1.0, 0.5**0.5]), rel=SOLVED)
@@ -155,7 +156,7 @@ def test_a_structure_responds_as_its_modes_one_by_one(solve, reduction, form, ze
     square, shapes = scipy.linalg.eigh(K + np.diag([SLIDER, 0.0, 0.0]), M)
     omega = np.sqrt(square)
     at = omega[1] * np.array([0.97, 1.0, 1.02])
-    text = CHAIN + f"[damping]\n{form}\n" + reduction + forced("c", at / (2 * np.pi))
+    text = CHAIN + f"[damping]\n{form}\n{STUCK}" + reduction + forced("c", at / (2 * np.pi))
     response, linear = solve(text, "forced", "linear")
     parts = shapes[2] ** 2 / (square - at[:, None] ** 2 + 2j * np.array(zeta) * omega * at[:, None])
     assert reported(response) == pytest.approx(FORCE * np.abs(parts.sum(axis=1)), rel=SOLVED)
@@ -172,9 +173,19 @@ def test_it_is_added_to_what_else_is_in_C_and_of_the_limit_that_is_named(solve):
 def test_at_every_speed_the_modes_there_have_it(solve):
     stiff = (K + np.diag([3.0, 2.0, 5.0])).tolist()
     text = CHAIN.replace("[[contact]]", f"at_speed = {{ 600 = {stiff} }}\n\n[[contact]]", 1)
-    (linear,) = solve(text + "speeds_rpm = [0.0, 300.0, 600.0]\n[damping]\nzeta = 0.004\n", "linear")
+    (linear,) = solve(text + "speeds_rpm = [0.0, 300.0, 600.0]\n[damping]\nzeta = 0.004\n" + STUCK, "linear")
     assert linear["zeta"][linear["contact"] == "stuck"] == pytest.approx(0.004, rel=TIGHT)
     assert len(set(linear["speed_rpm"])) == 3
+
+
+def test_unless_told_the_modes_are_the_sliding_ones_and_all_stuck_ones_are_noted(solve, shared_tmp, comm):
+    """A slider is no part of them: a sliding mode, without its spring, has the ratio that all modes have."""
+    (linear,) = solve(CHAIN + "[damping]\nzeta = 0.01\n", "linear")
+    assert linear["zeta"][linear["contact"] == "free"] == pytest.approx(0.01, rel=TIGHT)
+    if comm.rank == 0:
+        path = shared_tmp / "case.toml"
+        assert not any("slip too" in note for note in load_case(path).notes)
+        assert any("slip too" in note for note in load_case(path, ['damping.contact="stuck"']).notes)
 
 
 WRONG = {
@@ -231,18 +242,18 @@ def test_check_says_it_and_another_value_is_another_case(tmp_path, capsys):
     path = tmp_path / "case.toml"
     path.write_text(CHAIN + "[damping]\nQ = 250.0\n", encoding="utf-8")
     assert call("check", path) == 0
-    assert "damping of all modes with contact stuck: Q = 250.0 (zeta 0.002)" in capsys.readouterr().out
+    assert "damping of all modes with contact sliding: Q = 250.0 (zeta 0.002)" in capsys.readouterr().out
     assert load_case(path).digest != load_case(path, ["damping.Q=200"]).digest
     assert load_case(path, ["damping.Q=200"]).resolved["damping.Q"] == 200
 
 
 def test_a_reduced_sector_and_its_wheel_have_it(solve):
     """Kept faces and one component mode: a reduction that leaves nothing out."""
-    reduced = SECTOR + REDUCED + "[damping]\nzeta = [0.01, 0.02, 0.03]\n" + LINEAR
+    reduced = SECTOR + REDUCED + "[damping]\nzeta = [0.01, 0.02, 0.03]\n" + STUCK + LINEAR
     (linear,) = solve(reduced, "linear")
     for number, zeta in ((1, 0.01), (2, 0.02), (3, 0.03)):
         assert linear["zeta"][linear["mode"] == number] == pytest.approx(zeta, rel=TIGHT)
-    (plain,) = solve(SECTOR + "[damping]\nzeta = [0.01, 0.02, 0.03]\n" + LINEAR, "linear")
+    (plain,) = solve(SECTOR + "[damping]\nzeta = [0.01, 0.02, 0.03]\n" + STUCK + LINEAR, "linear")
     assert linear["omega"] == pytest.approx(plain["omega"], rel=SOLVED) and len(plain["omega"]) == 12
 
 

@@ -99,11 +99,17 @@ def check_damping(
     section: DampingSection | None,
     structure: Structure | None,
     reduction: ReductionSection | None,
+    notes: list[str],
     found: Found,
 ) -> None:
     """One form, numbers of modes, and a model that its full matrices are made of."""
     if section is None:
         return
+    if section.contact == "stuck" and any(isinstance(getattr(section, name), float) for name in FORMS):
+        notes.append(
+            "[damping] of all modes with contact stuck damps slip too, for some of them are the contact's own springs;"
+            " the linear modes' zeta with contact sliding says how much"
+        )
     report = Reporter(source, ("damping",), found)
     _check_forms(report, section)
     for name in FORMS:

@@ -169,7 +169,7 @@ def _build(
     checks.check_analyses(source, analyses, facts, found)
     check_reduction(source, reduction, analyses, facts.sectors, found)
     check_preload(source, preload, facts.loads, found)
-    check_damping(source, damping, structure, reduction, found)
+    check_damping(source, damping, structure, reduction, notes, found)
     gauges = read_gauges(source, (structure.cut or structure) if structure else None, found)
     if structure is not None:
         rows = [contact.pairs.own for contact in contacts] if facts.complete else None

@@ -202,11 +202,11 @@ class DampingSection(Section):
     loss_factor: Optional[ByMode] = key(
         "instead, structural loss factor 2 zeta, which a viscous damper equals at resonance", "-", "0.004", default=None
     )
-    contact: Literal["stuck", "sliding", "free"] = key(
-        "linear limit of the contact whose modes these are: every pair closed and stuck, closed and sliding without "
-        "friction, or no contact",
-        example='"sliding"',
-        default="stuck",
+    contact: Literal["sliding", "stuck", "free"] = key(
+        "linear limit of the contact whose modes these are: every pair closed and sliding without friction, closed and "
+        "stuck (all stuck modes together damp slip too), or no contact",
+        example='"stuck"',
+        default="sliding",
     )
 
 
