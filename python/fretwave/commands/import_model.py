@@ -30,6 +30,7 @@ from ..mpi.guard import on_first_rank
 from ..results.model_file import SourceFile, write_model
 from ..texts import display, nearest
 from ..units import SYSTEMS, unknown
+from .import_at_rest import tables_at_rest, write_tables
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -40,12 +41,14 @@ ROLES = {"M": "mass", "K": "stiffness", "C": "damping"}
 def import_model(options: argparse.Namespace, comm: MPI.Comm) -> int:
     """Read, check, write, report. Collective; rank 0 reads and writes."""
     model, found, materials = on_first_rank(comm, lambda: read_parts(options))
+    loaded = on_first_rank(comm, lambda: tables_at_rest(options, model, found.notes))
     evidence = on_first_rank(comm, lambda: _checked_units(model, materials))
     report = check(model, found.symmetry, found.notes, evidence, options.modes, comm)
     on_first_rank(comm, lambda: write_model(options.out, model, sources=_sources(options)))
+    on_first_rank(comm, lambda: write_tables(loaded, model))
     if comm.rank == 0:
         print(report.text())
-        print(f"wrote {display(options.out)}")
+        print(f"wrote {', '.join(display(path) for path in [options.out, *(path for path, _ in loaded)])}")
     return EXIT_DONE
 
 
@@ -122,7 +125,7 @@ def _take_deck(options: argparse.Namespace) -> None:
 def _sources(options: argparse.Namespace) -> list[SourceFile]:
     """Every file that was read, with its size and checksum."""
     files = [(role, split(getattr(options, role))[0]) for role in ROLES.values() if getattr(options, role)]
-    tables = [("coordinates", options.coordinates), ("dofs", options.dofs)]
+    tables = [("coordinates", options.coordinates), ("dofs", options.dofs), ("at rest", options.at_rest)]
     files += [(role, path) for role, path in tables if path]
     files += [("plugin", path) for path in options.plugin]
     files += [("pairs", Path(words[0].rpartition("=")[2])) for words in options.pairs if len(words) == 1]

@@ -200,6 +200,13 @@ def _add_import(commands: _SubParsers) -> None:
         help="from the first set to the second, --normal=-1,0,0 with a minus first (default: out of the first one's"
         " faces; without elements, and with @next, along the circumference)",
     )
+    add.add_argument(
+        "--at-rest",
+        type=Path,
+        metavar="FILE",
+        help="CalculiX' results of a static step with *CONTACT FILE (.frd): loads and gaps of the pairs, into"
+        " MODEL_CONTACT.csv",
+    )
     add.add_argument("--tangent", metavar="X,Y,Z", help="first tangent (default: the axis most across the normals)")
     add.add_argument(
         "--tolerance",

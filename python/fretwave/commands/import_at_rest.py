@@ -1,0 +1,51 @@
+"""``fretwave import --at-rest``: loads and gaps of contact pairs from a static step, as tables that a case reads."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Union
+
+from ..arrays import Array, IntArray
+from ..errors import InputError
+from ..files.csv_table import write_columns
+from ..importers.contact_results import at_rest, read_step
+from ..importers.formats import readable
+from ..model.structure import Structure
+
+#: A file and its columns.
+Table = tuple[Path, Mapping[str, Union[Array, IntArray]]]
+UNITS = {"normal_load": "force", "tangential_force": "force", "gap": "length"}
+
+
+def tables_at_rest(options: argparse.Namespace, model: Structure, notes: list[str]) -> list[Table]:
+    """A table for each contact; what was found is added to the notes. One rank.
+
+    Raises
+    ------
+    InputError
+        There are no pairs, or the results are not of them.
+    """
+    if options.at_rest is None:
+        return []
+    if not model.pairs or model.labels is None:
+        fix = "add --pairs SET_A SET_B"
+        raise InputError("a state at rest is of contact pairs", "--at-rest", "no pairs", "--pairs", fix)
+    with readable(options.at_rest, "file of the results"):
+        step = read_step(options.at_rest)
+    given = [[words[0].rpartition("=")[2], *words[1:]] for words in options.pairs]
+    tables: list[Table] = []
+    for (name, pairs), sides in zip(model.pairs.items(), given):
+        found = at_rest(name, pairs, step, model.labels, sides, len(model.pairs) == 1)
+        notes.append(found.said(name, pairs))
+        tables.append((options.out.with_name(f"{options.out.stem}_{name}.csv"), found.columns(pairs)))
+    return tables
+
+
+def write_tables(tables: Sequence[Table], model: Structure) -> None:
+    """With units where the model declares them."""
+    units = UNITS if model.units else {}
+    headings = {name: f"{name} [{model.unit_system(unit)}]" for name, unit in units.items()}
+    for path, columns in tables:
+        write_columns(path, columns, headings)

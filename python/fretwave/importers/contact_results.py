@@ -1,0 +1,224 @@
+"""Contact at the end of a static step of CalculiX, brought to the contact pairs of a model.
+
+``*CONTACT FILE`` with CDIS, CSTR writes the block CONTACT of a .frd file: at the nodes of the dependent (slave) side
+COPEN [length] (> 0 open), CSLIP1, CSLIP2 [length], CPRESS, CSHEAR1, CSHEAR2 [pressure]. A pair's forces are its area
+times those. Of contact from node to surface nodes that are far open may be left out: the block DISP tells their gaps.
+Of that from surface to surface pressures are extrapolated to the nodes, also to those that DISP shows apart, which are
+open; ``*CONTACT PRINT, SLAVE=.., MASTER=..`` with CF then writes the exact force of the whole contact into the .dat
+file beside, to which the pairs' forces are scaled. The last step of a file counts.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import scipy.sparse as sp
+
+from ..arrays import Array, IntArray
+from ..errors import InputError
+from ..model.pairs import Pairs
+from ..model.sectors import by_sector
+from ..texts import counted, display
+
+#: Components of the two blocks, 12 characters each behind the node's number.
+BLOCKS, WIDTH = {"CONTACT": 6, "DISP": 3}, 12
+OPENING, PRESSURE, SHEAR = 0, 3, slice(4, 6)
+#: Forces of pairs are not scaled by more than this: another contact would be meant.
+MOST_SCALED = 0.1
+_STATISTICS = re.compile(
+    r"statistics for slave set (\S+), master set (\S+) and time.*?normal force[^\n]*\n\s*(\S+)\s+(\S+)\s+\S+", re.DOTALL
+)
+
+
+@dataclass(frozen=True)
+class Nodal:
+    """Values (n, m) at nodes (n,), ascending."""
+
+    numbers: IntArray
+    values: Array
+
+    def at(self, nodes: IntArray) -> Array:
+        """Values (n_nodes, m), nan at nodes that have none."""
+        place = np.clip(np.searchsorted(self.numbers, nodes), 0, len(self.numbers) - 1)
+        return np.where((self.numbers[place] == nodes)[:, None], self.values[place], np.nan)
+
+
+@dataclass(frozen=True)
+class StaticStep:
+    """What is read of a static step.
+
+    Attributes
+    ----------
+    contact : (n, 6) values in the order of the block CONTACT
+    displacement : (n, 3), or None
+    forces : compressive normal force [force] of a contact by its dependent and independent surface, capital letters
+    where : the file
+    """
+
+    contact: Nodal
+    displacement: Nodal | None
+    forces: Mapping[tuple[str, str], float]
+    where: str
+
+    def force(self, sides: Sequence[str], alone: bool) -> float | None:
+        """Of the contact between two sides, or where there is but one in model and file (`alone`) of that."""
+        names = tuple(side.partition("@")[0].upper() for side in sides)
+        found = next((force for known, force in self.forces.items() if set(known) == set(names)), None)
+        only = next(iter(self.forces.values())) if alone and len(self.forces) == 1 else None
+        return only if found is None else found
+
+
+def read_step(path: Path) -> StaticStep:
+    """Contact, displacements and forces of a .frd file and the .dat file beside it.
+
+    Raises
+    ------
+    InputError
+        There is no contact, or a line of it is no line of values.
+    """
+    blocks = _blocks(path)
+    if "CONTACT" not in blocks:
+        fix = "add `*CONTACT FILE` with a line `CDIS, CSTR` to the static step and run ccx again"
+        expected = "a block CONTACT of a .frd file written as text"
+        raise InputError("there is no contact in the results", display(path), "none", expected, fix)
+    beside = path.with_suffix(".dat")
+    text = beside.read_text(encoding="utf-8", errors="replace") if beside.is_file() else ""
+    forces = {(one[1].upper(), one[2].upper()): -float(one[4]) for one in _STATISTICS.finditer(text)}
+    return StaticStep(blocks["CONTACT"], blocks.get("DISP"), forces, display(path))
+
+
+def _blocks(path: Path) -> dict[str, Nodal]:
+    """The last block of each name."""
+    found: dict[str, list[tuple[int, list[float]]]] = {}
+    name = ""
+    with path.open(encoding="utf-8", errors="replace") as file:
+        for number, line in enumerate(file, 1):
+            if line.startswith(" -4"):
+                name = (line[3:].split() or [""])[0]
+                found[name] = []
+            elif line.startswith(" -3"):
+                name = ""
+            elif name in BLOCKS and line.startswith(" -1"):
+                found[name].append(_values(line, BLOCKS[name], f"{display(path)}:{number}"))
+    rows = {name: sorted(found[name]) for name in BLOCKS if found.get(name)}
+    return {name: Nodal(np.array([n for n, _ in r]), np.array([v for _, v in r])) for name, r in rows.items()}
+
+
+def _values(line: str, count: int, where: str) -> tuple[int, list[float]]:
+    try:
+        return int(line[3:13]), [float(line[13 + WIDTH * k : 13 + WIDTH * (k + 1)]) for k in range(count)]
+    except ValueError:
+        fix = "is the file complete, and written as text?"
+        raise InputError("a line of results is wrong", where, line.strip(), f"a node and {count} values", fix) from None
+
+
+@dataclass(frozen=True)
+class PairsAtRest:
+    """Contact pairs at rest.
+
+    Attributes
+    ----------
+    normal, shear : (n_pairs,) [force]
+        Compressive normal force, and magnitude of that along the face.
+    gap : (n_pairs,) [length]
+        Of open pairs, 0 of closed ones.
+    scaled : float
+        By which the forces were multiplied to be in all what the file says.
+    """
+
+    normal: Array
+    shear: Array
+    gap: Array
+    scaled: float = 1.0
+
+    def said(self, name: str, pairs: Pairs) -> str:
+        """What came of it, for the report of an import."""
+        closed = self.normal > 0
+        text = f"contact '{name}' at rest: {closed.sum()} of {counted(len(closed), 'pair')} pressed, "
+        text += f"{self.normal[closed].min():.5g} to {self.normal.max():.5g}, in all {self.normal.sum():.7g}"
+        text += f" (scaled by {self.scaled:.5f} to the force printed)" if self.scaled != 1.0 else ""
+        text += f"; along the face up to {(self.shear[closed] / self.normal[closed]).max():.3g} of it"
+        if pairs.frames is not None:
+            total = np.einsum("k,kx->x", self.normal, np.asarray(pairs.frames)[:, 0])
+            text += f"; the first side presses with ({', '.join(f'{value:.6g}' for value in total)})"
+        return text
+
+    def columns(self, pairs: Pairs) -> dict[str, Array | IntArray]:
+        """Of a table that a case takes its loads and gaps from."""
+        nodes = {} if pairs.nodes is None else {"node_a": pairs.nodes[:, 0], "node_b": pairs.nodes[:, 1]}
+        numbers = np.arange(len(self.normal))
+        return {"pair": numbers, **nodes, "normal_load": self.normal, "gap": self.gap, "tangential_force": self.shear}
+
+
+def at_rest(
+    name: str, pairs: Pairs, step: StaticStep, labels: IntArray, sides: Sequence[str] = (), alone: bool = True
+) -> PairsAtRest:
+    """Forces and gaps of the pairs, from the side that has results.
+
+    Parameters
+    ----------
+    labels : (n_dof, 2) node and direction of each dof
+    sides : names of both sides, as the model was given them
+    alone : the model has no other contact
+
+    Raises
+    ------
+    InputError
+        No pair is pressed, areas or gaps are not known, or the forces are far from what the file says in all.
+    """
+    where = f"{step.where}, contact '{name}'"
+    if pairs.nodes is None or pairs.areas is None:
+        fix = "give sets on faces of the mesh to --pairs, or a CSV with areas"
+        raise InputError("forces need the areas of the pairs", where, None, "areas and nodes of the pairs", fix)
+    found = [step.contact.at(np.asarray(side)) for side in np.transpose(pairs.nodes)]
+    values = max(found, key=lambda side: np.count_nonzero(side[:, PRESSURE] > 0))
+    pressed, areas = values[:, PRESSURE] > 0, np.asarray(pairs.areas)
+    if not pressed.any():
+        known = int(np.count_nonzero(~np.isnan([side[:, PRESSURE] for side in found]).all(axis=0)))
+        measured = f"results at the nodes of {known} of {counted(len(areas), 'pair')}, none with a pressure"
+        fix = "check the sets of --pairs, and that the step presses them together"
+        raise InputError("no pair of the contact is pressed", where, measured, "a pressure above 0 at some node", fix)
+    apart = _apart(pairs, step, labels)
+    pressed &= ~(apart > 0)  # a pressure there is extrapolated from beside
+    normal = np.where(pressed, areas * np.nan_to_num(values[:, PRESSURE]), 0.0)
+    shear = np.where(pressed, areas * np.hypot(*np.nan_to_num(values[:, SHEAR]).T), 0.0)
+    scale = _scale(normal.sum(), step.force(sides, alone), where)
+    gap = np.where(pressed, 0.0, _gaps(values[:, OPENING], apart, where, ~pressed))
+    return PairsAtRest(scale * normal, scale * shear, gap, scale)
+
+
+def _scale(total: float, printed: float | None, where: str) -> float:
+    """What makes the sum of the pairs' forces the one that is printed."""
+    if printed is None:
+        return 1.0
+    if abs(printed / total - 1) > MOST_SCALED:
+        measured, expected = f"{total:.6g} in all by the nodes' pressures", f"{printed:.6g} of CF in the .dat file"
+        fix = "name in --pairs the surfaces of *CONTACT PAIR, and all of their nodes"
+        raise InputError("the forces of the pairs are not those of the contact", where, measured, expected, fix)
+    return float(printed / total)
+
+
+def _apart(pairs: Pairs, step: StaticStep, labels: IntArray) -> Array:
+    """How far the sides of each pair moved apart along the normal, nan where it is not known; held dofs do not move."""
+    if step.displacement is None:
+        return np.full(pairs.n_pairs, np.nan)
+    u, moved = step.displacement.at(labels[:, 0]), labels[:, 1] <= 3
+    x = np.where(moved, u[np.arange(len(u)), np.where(moved, labels[:, 1], 1) - 1], 0.0)
+    rows = sum(sp.csr_matrix(B) @ np.nan_to_num(x) for B in by_sector(pairs.B).values())
+    return np.asarray(-rows[:: pairs.components])
+
+
+def _gaps(opening: Array, apart: Array, where: str, wanted: npt.NDArray[np.bool_]) -> Array:
+    """Of the open pairs: as they moved apart, else as printed."""
+    gap = np.where(np.isnan(apart), opening, np.maximum(apart, 0.0))
+    lacking = int(np.count_nonzero(wanted & ~(gap >= 0)))
+    if lacking:
+        measured, expected = f"{lacking} open pairs without one", "displacements, or COPEN at every node"
+        fix = "add `*NODE FILE` with a line `U` to the step"
+        raise InputError("gaps are not known", where, measured, expected, fix)
+    return gap
