@@ -13,8 +13,10 @@ from tolerances import REPEATED, TIGHT
 
 from fretwave.case.load import load_case
 from fretwave.errors import CaseErrors, InputError
+from fretwave.plots import campbell
 from fretwave.post.amplification import Family, largest_response
 from fretwave.post.blade_peaks import whitehead
+from fretwave.results.reader import Run
 from fretwave.run.order import RunOptions
 from fretwave.run.runner import run_case
 
@@ -110,6 +112,12 @@ def test_amplification_is_that_of_the_response_solved_directly(solve, shared_tmp
     assert table["amplitude"] == pytest.approx([largest.max()], rel=1e-6)
     assert table["sector"].tolist() == [largest.max(axis=0).argmax()]
     assert table["amplification"] == pytest.approx(table["amplitude"] / tuned, rel=1e-8)
+
+
+def test_engine_orders_meet_every_mode_of_a_wheel_but_draw_no_diagram(solve, shared_tmp):
+    (crossings,) = solve(text(MISTUNED + "modes = 1\nspeed_rpm = 6.0\n"), "linear_crossings")
+    assert len(crossings["mode"]) == 2 * N * 6
+    assert not list(campbell.figures(Run(shared_tmp / "run")))
 
 
 def test_a_tuned_wheel_is_not_amplified(solve):

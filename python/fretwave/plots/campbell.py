@@ -26,9 +26,9 @@ APART = 0.09
 
 
 def figures(run: Run) -> Iterator[tuple[str, Figure]]:
-    """One picture per linear analysis with an operating speed."""
+    """One picture per linear analysis with an operating speed, not of all modes of a whole wheel."""
     for linear in run.of_kind("linear"):
-        if linear.attributes.get("engine_orders"):
+        if linear.attributes.get("engine_orders") and not linear.attributes.get("wheel"):
             yield f"{linear.name}_campbell", draw(run, linear)
 
 
