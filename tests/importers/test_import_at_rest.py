@@ -225,6 +225,7 @@ def test_results_of_another_kind_are_refused(tmp_path, capsys):
     bare = ccx(tmp_path, "bare", static_step("node", files="")).with_suffix(".frd")
     assert "there is no contact in the results" in wrong(tmp_path, capsys, bare)
     results = ccx(tmp_path, "static", static_step("surface")).with_suffix(".frd")
+    assert "there is no contact" in wrong(tmp_path, capsys, results.with_suffix(".dat"))  # of faces, not of nodes
     text = results.read_text()
     begin = text.index(" -4  CONTACT")
     block = text[begin:].replace("E+01", "E-80")
@@ -238,6 +239,17 @@ def test_results_of_another_kind_are_refused(tmp_path, capsys):
     (tmp_path / "other.dat").write_text(re.sub(r"(normal force[^\n]*\n\s*\S+\s+)\S+", r"\g<1>-9.0E+03", printed))
     said = wrong(tmp_path, capsys, tmp_path / "other.frd")
     assert "are not those of the contact" in said and "9000 of CF" in said
+
+
+def test_printed_slave_nodes_say_the_same(tmp_path):
+    text = static_step("node", lifted=True, files="*CONTACT FILE\nCDIS, CSTR\n*CONTACT PRINT\nCDIS, CSTR\n")
+    results, tables = ccx(tmp_path, "static", text), []
+    for suffix in (".frd", ".dat"):
+        assert imported(tmp_path, results.with_suffix(suffix)) == 0
+        tables.append(table(tmp_path / "blocks_face.csv"))
+    for name in ("normal_load", "tangential_force"):
+        assert tables[1][name] == pytest.approx(tables[0][name], rel=1e-5)
+    assert tables[1]["gap"] == pytest.approx(tables[0]["gap"], rel=1e-2)  # ccx: displacements less DRY's small offset
 
 
 def test_gaps_of_nodes_that_are_left_out_need_displacements(tmp_path, capsys):

@@ -204,7 +204,7 @@ def _add_import(commands: _SubParsers) -> None:
         "--at-rest",
         type=Path,
         metavar="FILE",
-        help="CalculiX' results of a static step with *CONTACT FILE (.frd): loads and gaps of the pairs, into"
+        help="CalculiX' results of a static step with *CONTACT FILE (.frd, or .dat): loads and gaps of the pairs, into"
         " MODEL_CONTACT.csv",
     )
     add.add_argument("--tangent", metavar="X,Y,Z", help="first tangent (default: the axis most across the normals)")

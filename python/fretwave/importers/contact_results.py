@@ -5,7 +5,8 @@ COPEN [length] (> 0 open), CSLIP1, CSLIP2 [length], CPRESS, CSHEAR1, CSHEAR2 [pr
 times those. Of contact from node to surface nodes that are far open may be left out: the block DISP tells their gaps.
 Of that from surface to surface pressures are extrapolated to the nodes, also to those that DISP shows apart, which are
 open; ``*CONTACT PRINT, SLAVE=.., MASTER=..`` with CF then writes the exact force of the whole contact into the .dat
-file beside, to which the pairs' forces are scaled. The last step of a file counts.
+file beside, to which the pairs' forces are scaled. A .dat file alone will do where ``*CONTACT PRINT`` with CDIS, CSTR
+wrote the slave nodes into it (node to surface). The last step of a file counts.
 """
 
 from __future__ import annotations
@@ -32,6 +33,10 @@ OPENING, PRESSURE, SHEAR = 0, 3, slice(4, 6)
 MOST_SCALED = 0.1
 _STATISTICS = re.compile(
     r"statistics for slave set (\S+), master set (\S+) and time.*?normal force[^\n]*\n\s*(\S+)\s+(\S+)\s+\S+", re.DOTALL
+)
+
+_SLAVE_NODES = re.compile(
+    r"(relative contact displacement|contact stress) \(slave node[^\n]*\n\s*\n((?: +\d+(?: +-?\d\.\d+E[+-]\d+){3}\n)+)"
 )
 
 
@@ -81,13 +86,13 @@ def read_step(path: Path) -> StaticStep:
     InputError
         There is no contact, or a line of it is no line of values.
     """
-    blocks = _blocks(path)
-    if "CONTACT" not in blocks:
-        fix = "add `*CONTACT FILE` with a line `CDIS, CSTR` to the static step and run ccx again"
-        expected = "a block CONTACT of a .frd file written as text"
-        raise InputError("there is no contact in the results", display(path), "none", expected, fix)
     beside = path.with_suffix(".dat")
     text = beside.read_text(encoding="utf-8", errors="replace") if beside.is_file() else ""
+    blocks = _blocks(path) if path != beside else _printed(text)
+    if "CONTACT" not in blocks:
+        fix = "add `*CONTACT FILE` with a line `CDIS, CSTR` to the static step, run ccx again and give its .frd file"
+        expected = "a block CONTACT of a .frd file written as text, or slave nodes in a .dat file"
+        raise InputError("there is no contact in the results", display(path), "none", expected, fix)
     forces = {(one[1].upper(), one[2].upper()): -float(one[4]) for one in _STATISTICS.finditer(text)}
     return StaticStep(blocks["CONTACT"], blocks.get("DISP"), forces, display(path))
 
@@ -107,6 +112,19 @@ def _blocks(path: Path) -> dict[str, Nodal]:
                 found[name].append(_values(line, BLOCKS[name], f"{display(path)}:{number}"))
     rows = {name: sorted(found[name]) for name in BLOCKS if found.get(name)}
     return {name: Nodal(np.array([n for n, _ in r]), np.array([v for _, v in r])) for name, r in rows.items()}
+
+
+def _printed(text: str) -> dict[str, Nodal]:
+    """The last tables of slave nodes in a .dat file, as the block CONTACT."""
+    tables = {}
+    for name, rows in _SLAVE_NODES.findall(text):
+        lines = [row.split() for row in rows.splitlines()]
+        tables[name] = {int(row[0]): [float(value) for value in row[1:]] for row in lines}
+    opening, stress = (tables.get(name, {}) for name in ("relative contact displacement", "contact stress"))
+    numbers = sorted(opening.keys() & stress.keys())
+    if not numbers:
+        return {}
+    return {"CONTACT": Nodal(np.array(numbers), np.array([opening[n] + stress[n] for n in numbers]))}
 
 
 def _values(line: str, count: int, where: str) -> tuple[int, list[float]]:
