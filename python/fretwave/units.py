@@ -9,6 +9,7 @@ A further system is one more entry of `SYSTEMS`.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -21,6 +22,14 @@ ATTRIBUTE = "unit_system"
 #: SI's symbols stand for their quantities too, in a plug-in's columns and parameters.
 _OF_SI = {"m": "length", "kg": "mass", "N": "force", "J": "energy", "Pa": "pressure"}
 _WORD = re.compile("[A-Za-z]+")
+#: Numbers of this size are shown as they are.
+READABLE = (0.1, 1000.0)
+#: With another prefix they are this at least.
+SMALLEST = 0.3
+_PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
+_POWERS = {prefix: power for power, prefix in _PREFIXES.items()}
+#: A unit that takes SI's prefixes, or that over seconds.
+_PREFIXED = re.compile("([nµmkMG]?)(" + "|".join([*(sorted(set(_OF_SI) - {"kg"})), "s"]) + ")(/s)?")
 
 
 @dataclass(frozen=True)
@@ -84,6 +93,30 @@ class UnitSystem:
         """Factor and symbol of worn volumes."""
         factor, symbol = self.of_faces
         return factor**3, f"{symbol}^3"
+
+    def shown(self, symbol: str, size: float) -> tuple[float, str]:
+        """Factor and symbol in which a picture shows numbers that are given in `symbol` and typically of this size.
+
+        Those of SI take its prefixes, so that the size is 0.3 to 300; inches have their finer ones. What reads well as
+        it is, and a unit of several, stays.
+
+        Examples
+        --------
+        >>> SI.shown("m", 2e-5), SI.shown("N", 4200.0), MM_T_S.shown("mm", 0.03), MM_T_S.shown("mm/s", 2e4)
+        ((1000000.0, 'µm'), (0.001, 'kN'), (1000.0, 'µm'), (0.001, 'm/s'))
+        >>> IN_LBF_S.shown("in", 0.004), IN_LBF_S.shown("lbf", 4200.0), SI.shown("m", 0.3)
+        ((1000.0, 'mil'), (1.0, 'lbf'), (1.0, 'm'))
+        """
+        if not (0.0 < size < math.inf) or READABLE[0] <= size < READABLE[1]:
+            return 1.0, symbol
+        found = _PREFIXED.fullmatch(symbol)
+        if found is None:
+            finer = self.lengths if symbol == self.length else [(1.0, symbol)]
+            return next((one for one in finer if one[0] * size >= 1.0), finer[-1])
+        prefix, unit, rest = found.groups(default="")
+        wanted = _POWERS[prefix] + 3 * math.floor(math.log10(size / SMALLEST) / 3 + 1e-9)
+        power = min(max(wanted, min(_PREFIXES)), max(_PREFIXES))
+        return 10.0 ** (_POWERS[prefix] - power), f"{_PREFIXES[power]}{unit}{rest}"
 
     @property
     def cubic_millimetres(self) -> float:

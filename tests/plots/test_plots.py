@@ -124,6 +124,15 @@ def test_only_names_analyses_or_kinds_of_picture(folder):
     assert {path.name for path in plot_run(folder, ["backbone"])} == {"mode_backbone.png", "flutter_backbone.png"}
 
 
+def test_pictures_are_vectors_on_request(folder):
+    """The same twice, with their texts; no date makes them differ."""
+    first = plot_run(folder, ["forced"], formats=["svg", "pdf"])
+    assert [path.name for path in first] == ["forced_response.svg", "forced_response.pdf"]
+    content = [path.read_bytes() for path in first]
+    assert b"<svg" in content[0][:500] and content[1].startswith(b"%PDF-")
+    assert [path.read_bytes() for path in plot_run(folder, ["forced"], formats=["svg", "pdf"])] == content
+
+
 def test_an_empty_folder_has_no_pictures(tmp_path):
     assert plot_run(tmp_path) == []
 
@@ -179,14 +188,16 @@ def test_hysteresis_loops_are_closed(run):
 def test_response_has_a_curve_per_level_backbones_and_time_points(run):
     modes = [run.analyses["mode"], run.analyses["mode_epmc"]]
     figure = forced.draw(run.analyses["forced"], modes, run.table("forced_time"))
-    assert texts(figure) == ["level 1", "level 2", "backbone, CNM", "backbone, EPMC", "time integration"]
+    names = ["level 1", "level 2", "backbone, CNM", "backbone, EPMC", "time integration"]
+    assert texts(figure) == [*names, "computed points", "estimated error, at most 0.1 mm"]
     assert dashes(figure.axes[0]).count("--") == 1
 
 
 def test_free_decay_has_the_mode_and_a_set_of_circles_per_start(run):
     (figure,) = [figure for _, figure in free_decay.figures(run)]
-    assert texts(figure) == ["mode, CNM", "cycles of the decay from 1 m", "cycles of the decay from 0.3 m"]
-    assert len(figure.axes[0].get_lines()[1].get_xdata()) == 5
+    names = ["mode, CNM", "cycles of the decay from 1 m", "cycles of the decay from 0.3 m"]
+    assert texts(figure) == [*names, "computed points"]
+    assert len(figure.axes[0].get_lines()[2].get_xdata()) == 5
 
 
 def test_limit_cycles_show_every_start_and_both_predictions(run):

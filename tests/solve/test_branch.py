@@ -253,7 +253,8 @@ def test_branch_of_no_point_or_one_is_kept_drawn_and_read(shared_tmp, comm, poin
     branch.save(shared_tmp / "branch.h5")
     loaded = fw.Branch.load(shared_tmp / "branch.h5")
     assert len(loaded) == points == len(loaded.curve()) and loaded.reason == "why" and "why" in repr(loaded)
-    branch.plot()
+    (legend,) = branch.plot().legends
+    assert "stopped short: why" in [text.get_text() for text in legend.get_texts()]
     if points:
         assert len(loaded.at(float(values["amplitude"][0]))) == 1 and len(loaded.at(0.3)) == 0
     else:

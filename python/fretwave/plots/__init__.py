@@ -34,7 +34,12 @@ def families() -> list[tuple[str, Family]]:
     return [*((name, _family(name)) for name in modules), *((name, kind.figures) for name, kind in known.items())]
 
 
-def plot_run(run_folder: str | Path, only: Sequence[str] | None = None, failed: list[str] | None = None) -> list[Path]:
+def plot_run(
+    run_folder: str | Path,
+    only: Sequence[str] | None = None,
+    failed: list[str] | None = None,
+    formats: Sequence[str] = ("png",),
+) -> list[Path]:
     """Make every picture that the results allow; nothing is solved.
 
     Parameters
@@ -42,16 +47,21 @@ def plot_run(run_folder: str | Path, only: Sequence[str] | None = None, failed: 
     run_folder : folder with results.h5 and the analyses' tables
     only : names of analyses or of picture families; None for all
     failed : gets a line for each family that the results are too few or too extreme for; without it they raise
+    formats : of the files, of those in `fretwave.plots.style.FORMATS`
 
     Returns
     -------
-    The PNG files written, `<analysis>_<picture>.png` in the run folder.
+    The files written, `<analysis>_<picture>.png` in the run folder.
     """
     from ..results.reader import Run
     from . import style
 
     run = Run(run_folder)
-    return list(drawn(run, lambda name, figure: style.save(figure, run.folder / f"{name}.png"), only, failed))
+
+    def save(name: str, figure: Figure) -> list[Path]:
+        return [style.save(figure, run.folder / f"{name}.{ending}") for ending in formats]
+
+    return [path for paths in drawn(run, save, only, failed) for path in paths]
 
 
 def drawn(

@@ -12,7 +12,8 @@ from ..arrays import AnyArray
 from ..post.mode_curve import NO_DAMPING
 from ..results.reader import Analysis, Run, Table
 from ..solve.table import Table as Reading
-from . import style
+from . import labels, marks, scales, style
+from .scales import Scale
 
 #: analyses belong in one picture when their stuck asymptotes agree to this relative difference
 SAME_MODE = 1e-6
@@ -21,6 +22,8 @@ FAR = 1.0
 #: half width of the close-up of the folds, in widths of the interval between them
 CLOSE_UP = 2.5
 LINES = ("-", (0, (5, 1.5)), (0, (1, 1)))
+#: Lines of damping that was added afterwards: over the mode's own, and unlike each other.
+SHIFTED = (("--", style.ORANGE), ((0, (1, 1.5)), style.RED))
 
 
 def figures(run: Run) -> Iterator[tuple[str, Figure]]:
@@ -36,36 +39,50 @@ def figures(run: Run) -> Iterator[tuple[str, Figure]]:
 def draw(modes: Sequence[Analysis], shifted: Mapping[str, Table] | None = None) -> Figure:
     """Frequency above damping, over a common logarithmic amplitude axis."""
     figure, (upper, lower) = style.new_figure(6.6, rows=2, sharex=True)
-    _curves(upper, modes, "frequency_hz")
-    _curves(lower, modes, "zeta")
-    named = _asymptotes(upper, modes[0])
-    for (method, table), line in zip((shifted or {}).items(), ("--", ":")):
-        look = {"linestyle": line, "color": style.ORANGE, "linewidth": 1.4, "zorder": 1.5}
+    scale = scales.amplitudes(*modes)
+    _curves(upper, modes, "frequency_hz", scale)
+    _curves(lower, modes, "zeta", scale)
+    named, above = _asymptotes(upper, modes[0])
+    for (method, table), (line, colour) in zip((shifted or {}).items(), SHIFTED):
+        look = {"linestyle": line, "color": colour, "linewidth": 2.0, "zorder": 3.2}
         name = f"{method} without dampers, damping added afterwards"
-        lower.plot(table["amplitude"], 100.0 * table["zeta_shifted"], label=name, **look)
+        lower.plot(scale(table["amplitude"]), 100.0 * table["zeta_shifted"], label=name, **look)
     if any(_unstable(mode) for mode in modes):
-        _limit_cycles(upper, lower, modes[0])
+        _limit_cycles(upper, lower, modes[0], scale)
     for mode, colour in zip(modes, style.PALETTE):
-        _peak(lower, mode, colour)
-    _close_up(upper, modes, "frequency_hz", (0.60, 0.26, 0.34, _clear_of(upper, named) - 0.26))
-    _close_up(lower, modes, "zeta", (0.72, 0.44, 0.26, 0.50))
-    _finish(figure, upper, lower, modes)
+        _peak(lower, mode, colour, scale)
+        _stop(upper, lower, mode, scale, str(mode.name) if len(modes) > 1 else "")
+    _close_up(upper, modes, "frequency_hz", (0.60, 0.26, 0.34, _clear_of(upper, above) - 0.26), scale)
+    _close_up(lower, modes, "zeta", (0.72, 0.44, 0.26, 0.50), scale)
+    _finish(figure, upper, lower, modes, scale)
+    labels.along(upper, named, fontsize=10)
     return figure
 
 
-def _curves(axes: Axes, modes: Sequence[Analysis], column: str) -> None:
-    """Every mode's curve, and the folds of the first."""
+def _curves(axes: Axes, modes: Sequence[Analysis], column: str, scale: Scale) -> None:
+    """Every mode's curve with its points and error, and the folds of the first."""
     factor = 100.0 if column == "zeta" else 1.0
     for mode, colour, line in zip(modes, style.PALETTE, LINES):
         curve = mode.curve()
-        axes.plot(curve["amplitude"], factor * curve[column], color=colour, linestyle=line, label=_name(mode))
+        x = scale(curve["amplitude"])
+        axes.plot(x, factor * curve[column], color=colour, linestyle=line, label=_name(mode, scale))
         error = error_of(curve, column)
         if error is not None:
-            style.error_band(axes, curve["amplitude"], factor * curve[column], factor * error, colour)
+            style.error_band(axes, x, factor * curve[column], factor * error, colour)
+    for mode, colour in zip(modes, style.PALETTE):
+        marks.points(axes, scale(mode.columns["amplitude"]), factor * mode.columns[column], colour)
     points = modes[0].met("fold")
     if points:
-        amplitude, values = modes[0].columns["amplitude"][points], factor * modes[0].columns[column][points]
+        amplitude, values = scale(modes[0].columns["amplitude"][points]), factor * modes[0].columns[column][points]
         axes.plot(amplitude, values, "D", color=style.INK, markersize=4.5, label="fold in amplitude", zorder=5)
+
+
+def _stop(upper: Axes, lower: Axes, mode: Analysis, scale: Scale, name: str) -> None:
+    """Where a branch stopped short, and why."""
+    last = {column: float(values[-1]) for column, values in mode.columns.items()}
+    reason = marks.why_stopped(mode).get("")
+    for axes, value in ((upper, last["frequency_hz"]), (lower, 100.0 * last["zeta"])):
+        marks.stops(axes, {name: (scale(last["amplitude"]), value)}, {} if reason is None else {name: reason})
 
 
 def error_of(table: Reading | Table, column: str) -> AnyArray | None:
@@ -75,23 +92,24 @@ def error_of(table: Reading | Table, column: str) -> AnyArray | None:
     return table["omega_error"] / (2 * np.pi) if "omega_error" in table else None
 
 
-def tells_error(table: Reading | Table) -> bool:
-    """Whether the error of frequency and damping is known at any point."""
-    error = error_of(table, "zeta")
-    return error is not None and bool(np.isfinite(error).any())
+def error_entry(axes: Axes, tables: Sequence[Reading | Table]) -> None:
+    """What the legend says of the errors of frequency and damping."""
+    of_zeta = [error_of(table, "zeta") for table in tables]
+    percent = [None if error is None else 100.0 * error for error in of_zeta]
+    marks.error_entry(axes, {"Hz": [error_of(table, "frequency_hz") for table in tables], "%": percent})
 
 
-def _close_up(axes: Axes, modes: Sequence[Analysis], column: str, place: tuple[float, ...]) -> None:
+def _close_up(axes: Axes, modes: Sequence[Analysis], column: str, place: tuple[float, ...], scale: Scale) -> None:
     """Inset around the folds, which are too narrow to be seen on the whole axis."""
     folds = modes[0].columns["amplitude"][modes[0].met("fold")]
     if len(folds) < 2:
         return
-    low, high = folds.min(), folds.max()
+    low, high = scale(folds.min()), scale(folds.max())
     width = CLOSE_UP * (high - low)
     inset = axes.inset_axes(place)
-    _curves(inset, modes, column)
+    _curves(inset, modes, column, scale)
     curve = modes[0].curve()
-    near = (curve["amplitude"] > low - width) & (curve["amplitude"] < high + width)
+    near = (scale(curve["amplitude"]) > low - width) & (scale(curve["amplitude"]) < high + width)
     values = curve[column][near] * (100.0 if column == "zeta" else 1.0)
     inset.set_xlim(low - width, high + width)
     inset.set_ylim(values.min() - 0.1 * np.ptp(values), values.max() + 0.15 * np.ptp(values))
@@ -108,11 +126,17 @@ def _clear_of(axes: Axes, above: Sequence[float]) -> float:
     return float(min([0.80, *(share - 0.18 for share in shares if share > 0.66)]))
 
 
-def _asymptotes(axes: Axes, mode: Analysis) -> list[float]:
-    """Linear frequencies with the contact stuck (dashed), and free or sliding (dash-dotted); those above the curve."""
+def _asymptotes(axes: Axes, mode: Analysis) -> tuple[list[tuple[str, float]], list[float]]:
+    """Linear frequencies with the contact stuck (dashed), and free or sliding (dash-dotted).
+
+    Returns
+    -------
+    Name and frequency of each line, and the frequencies of those above the curve.
+    """
     kinds = (("stuck", "stuck", "--"), ("free", "free", "-."), ("sliding", "closed and sliding", "-."))
     known = {key: omega / (2.0 * np.pi) for key, *_ in kinds if (omega := mode.asymptote(key)) is not None}
-    text, named = style.apart(list(known.values())), []
+    text = style.apart(list(known.values()))
+    drawn: dict[str, float] = {}
     for key, name, line in kinds:
         if key not in known:
             continue
@@ -122,20 +146,9 @@ def _asymptotes(axes: Axes, mode: Analysis) -> list[float]:
             _below(axes, f"{name} {text(frequency)} Hz")
             continue
         axes.axhline(frequency, color=style.GREY, linestyle=line, linewidth=1.2, zorder=1)
-        above = frequency >= np.mean(mode.columns["frequency_hz"])
-        named += [frequency] if above else []
-        axes.annotate(
-            f"{name} {text(frequency)} Hz",
-            (1.0 if above else 0.0, frequency),
-            (-4 if above else 4, -4 if above else 4),
-            xycoords=("axes fraction", "data"),
-            textcoords="offset points",
-            ha="right" if above else "left",
-            va="top" if above else "bottom",
-            color=style.GREY,
-            fontsize=10,
-        )
-    return named
+        drawn[f"{name} {text(frequency)} Hz"] = frequency
+    middle = np.mean(mode.columns["frequency_hz"])
+    return list(drawn.items()), [frequency for frequency in drawn.values() if frequency >= middle]
 
 
 def _below(axes: Axes, text: str) -> None:
@@ -146,11 +159,11 @@ def _below(axes: Axes, text: str) -> None:
     axes.annotate(f"to {text}", (0.04, 0.06), (0, 0), **box)
 
 
-def _peak(axes: Axes, mode: Analysis, colour: str) -> None:
+def _peak(axes: Axes, mode: Analysis, colour: str, scale: Scale) -> None:
     point = peak_point(mode)
     if not is_peak(mode, point):
         return
-    peak = [mode.columns["amplitude"][point]], [100.0 * mode.columns["zeta"][point]]
+    peak = [scale(mode.columns["amplitude"][point])], [100.0 * mode.columns["zeta"][point]]
     axes.plot(*peak, **{**style.PEAK, "color": colour})
 
 
@@ -165,15 +178,15 @@ def is_peak(mode: Analysis, point: int) -> bool:
     return 0 < point < len(mode) - 1
 
 
-def _name(mode: Analysis) -> str:
+def _name(mode: Analysis, scale: Scale) -> str:
     """Method, harmonics and the peak's numbers."""
     point = peak_point(mode)
     zeta, amplitude = 100.0 * mode.columns["zeta"][point], mode.columns["amplitude"][point]
     word = "peak" if is_peak(mode, point) else "up to"
-    return f"{mode.method()}, {_harmonics(mode)}: {word} ζ {zeta:.3g} % at {amplitude:.3g} {mode.unit('amplitude')}"
+    return f"{mode.method()}, {_harmonics(mode)}: {word} ζ {zeta:.3g} % at {scale.text(amplitude)}"
 
 
-def _limit_cycles(upper: Axes, lower: Axes, mode: Analysis) -> None:
+def _limit_cycles(upper: Axes, lower: Axes, mode: Analysis, scale: Scale) -> None:
     """Zeros of the damping: filled where damping grows with amplitude (stable), open where it falls."""
     lower.axhline(0.0, color=style.INK, linewidth=1.0, zorder=2)
     low, high = lower.get_ylim()
@@ -183,24 +196,25 @@ def _limit_cycles(upper: Axes, lower: Axes, mode: Analysis) -> None:
         face = style.GREEN if crossing.stable else "white"
         look = {"marker": "o", "markersize": 8, "markerfacecolor": face, "markeredgecolor": style.INK, "zorder": 6}
         kind = "stable limit cycle (attractor)" if crossing.stable else "unstable limit cycle"
-        upper.plot([crossing.amplitude], [crossing.omega / (2.0 * np.pi)], linestyle="", label=kind, **look)
-        lower.plot([crossing.amplitude], [0.0], linestyle="", label=kind, **look)
-        text = f"a = {style.number(crossing.amplitude)} {mode.unit('amplitude')}"
+        a = scale(crossing.amplitude)
+        upper.plot([a], [crossing.omega / (2.0 * np.pi)], linestyle="", label=kind, **look)
+        lower.plot([a], [0.0], linestyle="", label=kind, **look)
         # beside a falling curve there is room above the zero line, beside a rising one below it
         place = (9, -14) if crossing.stable else (9, 7)
-        lower.annotate(text, (crossing.amplitude, 0.0), place, textcoords="offset points", fontsize=10)
+        text = f"a = {scale.text(crossing.amplitude)}"
+        lower.annotate(text, (a, 0.0), place, textcoords="offset points", fontsize=10)
 
 
-def _finish(figure: Figure, upper: Axes, lower: Axes, modes: Sequence[Analysis]) -> None:
+def _finish(figure: Figure, upper: Axes, lower: Axes, modes: Sequence[Analysis], scale: Scale) -> None:
     mode = modes[0]
     amplitude = np.concatenate([m.columns["amplitude"] for m in modes])
     dof = mode.observed()
-    style.log_amplitude(lower, amplitude)
+    style.log_amplitude(lower, scale(amplitude))
     upper.set_ylabel(style.label("Frequency ω/2π", "Hz"))
     lower.set_ylabel(style.label("Damping ratio ζ", "%"))
-    lower.set_xlabel(style.label(f"Modal amplitude of {dof}".rstrip(" of"), mode.unit("amplitude")))
-    if any(tells_error(m.columns) for m in modes):
-        style.band_entry(lower)
+    lower.set_xlabel(scale.label(f"Modal amplitude of {dof}".rstrip(" of")))
+    marks.point_entry(lower)
+    error_entry(lower, [m.columns for m in modes])
     style.legend_outside(figure, lower, columns=2)
 
 

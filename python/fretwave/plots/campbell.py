@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from ..post.engine_orders import crossing_speeds, exciting
 from ..results.reader import Analysis, Run
-from . import style
+from . import labels, style
 from .linear_bands import PEAK_NAME, Band, Peak, bands, highest, other_entry, peaks
 
 #: Waves in a picture: those whose crossings are nearest to the operating speed.
@@ -52,6 +52,8 @@ def draw(run: Run, linear: Analysis) -> Figure:
     left = len({band.diameter for band in drawn}) - len(waves)
     title = f"The {len(waves)} of {len(waves) + left} waves with crossings nearest to the operating speed"
     style.legend_outside(figure, axes.flat[0], columns=3, title=title if left else None)
+    for place, panel in zip(axes.flat, panels.values()):
+        panel.name(place)
     return figure
 
 
@@ -107,7 +109,7 @@ class _Panel:
         other_entry(axes, self.shown)
         for band in self.shown:
             for order in self.orders:
-                _crossings(axes, band, order, self.speed, self.last)
+                _crossings(axes, band, order)
         _engine_orders(axes, self.orders, self.last, self.top)
         name = f"operating speed, {self.speed:g} rev/min"
         axes.axvline(self.speed, color=style.INK, linewidth=1.0, linestyle=":", label=name)
@@ -115,7 +117,25 @@ class _Panel:
             axes.plot([self.speed if peak.speed is None else peak.speed], [peak.hz], **style.PEAK, clip_on=False)
         axes.set_xlim(0.0, self.last)
         axes.set_ylim(0.0, self.top)
-        axes.set_title(self.title)
+        axes.set_title(self.title, pad=14.0 if self.above else None)
+
+    @property
+    def above(self) -> bool:
+        """Whether an engine order is named above the panel."""
+        return max(self.orders) * self.last / 60.0 > self.top
+
+    def name(self, axes: Axes) -> None:
+        """By how much crossings near the operating speed lie above it, once all is drawn and laid out."""
+        met = [(met, order) for band in self.shown for order in self.orders for met in _met(band, order)]
+        near = [(s, order * s / 60.0) for s, order in met if abs(s / self.speed - 1.0) < NEAR and s < self.last]
+        box = {"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 0.8}
+        look = {"fontsize": 9, "bbox": box}
+        labels.beside(axes, [_margin(s / self.speed - 1.0) for s, _ in near], near, [look for _ in near])
+
+
+def _met(band: Band, order: int) -> list[float]:
+    """Speeds at which an engine order excites a band in its own limit of the contact."""
+    return list(crossing_speeds(band.speeds, band.hz, order))
 
 
 def _band(axes: Axes, band: Band, last: float) -> None:
@@ -138,11 +158,11 @@ def _engine_orders(axes: Axes, orders: Sequence[int], last: float, top: float) -
             axes.annotate(f"EO {order}", (end, top), (0, 2), ha="center", va="bottom", **text)
             continue
         lowest = max(order * last / 60.0, lowest + APART * top)
-        axes.annotate(f"EO {order}", (last, lowest), (3, 0), ha="left", va="center", **text)
+        axes.annotate(f"EO {order}", (last, lowest), (7, 0), ha="left", va="center", **text)
 
 
-def _crossings(axes: Axes, band: Band, order: int, speed: float, last: float) -> None:
-    """Where an engine order meets a band; by how much that lies above the operating speed, where it is near."""
+def _crossings(axes: Axes, band: Band, order: int) -> None:
+    """Where an engine order meets a band."""
     look = {"marker": "o", "markeredgecolor": style.INK, "linestyle": ""}
     kinds = (
         (band.hz, band.contact, {"markerfacecolor": style.INK, "markersize": 3.0, "zorder": 5}),
@@ -151,14 +171,8 @@ def _crossings(axes: Axes, band: Band, order: int, speed: float, last: float) ->
     for hz, limit, face in kinds:
         for met in crossing_speeds(band.speeds, hz, order):
             axes.plot([met], [order * met / 60.0], label=f"crossing, {limit}", **look, **face)
-    for met in crossing_speeds(band.speeds, band.hz, order):
-        if abs(met / speed - 1.0) < NEAR and met < last:
-            _margin(axes, met, order * met / 60.0, met / speed - 1.0)
 
 
-def _margin(axes: Axes, speed: float, hz: float, margin: float) -> None:
-    """Its text beside a crossing, away from the operating speed and from the engine order's line."""
-    text = f"{100 * margin:+.2g} %".replace("-", "\N{MINUS SIGN}")
-    box = {"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 0.8}
-    place, side, end = ((-5, 5), "right", "bottom") if margin < 0 else ((5, -5), "left", "top")
-    axes.annotate(text, (speed, hz), place, textcoords="offset points", ha=side, va=end, fontsize=9, bbox=box, zorder=4)
+def _margin(share: float) -> str:
+    """Of a crossing's speed above the operating one."""
+    return f"{100 * share:+.2g} %".replace("-", "\N{MINUS SIGN}")

@@ -13,7 +13,8 @@ from ..arrays import Array
 from ..model.laws import OPEN, SLIP, STICK
 from ..results.reader import Analysis, Run, Table
 from ..units import UnitSystem
-from . import style
+from . import scales, style
+from .scales import Scale
 
 #: amplitudes of a map
 MAPS = 4
@@ -40,8 +41,10 @@ def figures(run: Run) -> Iterator[tuple[str, Figure]]:
 def draw_load(static: Analysis, contact: str, table: dict[str, Array]) -> Figure:
     """Normal force of every pair at the largest load factor; the shape of the mark tells its status."""
     rows = (table["contact"] == contact) & (table["factor"] == table["factor"].max())
-    force, status = table["normal_force"][rows], table["status"][rows]
-    (pairs, unit), newton = placed(static.pairs(contact), static.unit_system), static.unit_system("force")
+    status = table["status"][rows]
+    scale = scales.linear(static.unit_system, static.unit_system("force"), table["normal_force"][rows])
+    force, (pairs, unit) = scale(table["normal_force"][rows]), placed(static.pairs(contact), static.unit_system)
+    digits = max(0, 1 - int(np.floor(np.log10(force.max() or 1.0))))
     names = list(dict.fromkeys(pairs["face"]))
     figure, panels = style.new_figure(1.2 + 1.9 * len(names), rows=len(names), sharex=True, squeeze=False)
     marks = {"stick": "s", "slip": "o", "open": "x"}
@@ -52,13 +55,13 @@ def draw_load(static: Analysis, contact: str, table: dict[str, Array]) -> Figure
             look = {"vmin": 0.0, "vmax": force.max(), "cmap": "viridis", "marker": mark, "s": 130}
             dots = axes.scatter(*pairs["position"][here].T, c=force[here], **look)
         for place, value in zip(pairs["position"][mine], force[mine]):
-            axes.annotate(f"{value:.0f}", place, (0, 8), textcoords="offset points", fontsize=8, ha="center")
+            axes.annotate(f"{value:.{digits}f}", place, (0, 8), textcoords="offset points", fontsize=8, ha="center")
         place_face(axes, name, pairs["position"])
         axes.set_ylabel(style.label("Up the face", unit))
     panels[-1, 0].set_xlabel(style.label("Along the face", unit))
-    figure.colorbar(dots, ax=panels, label=style.label("Normal force", newton), shrink=0.8)
+    figure.colorbar(dots, ax=panels, label=scale.label("Normal force"), shrink=0.8)
     counts = ", ".join(f"{int((status == word).sum())} {word}" for word in marks)
-    total = f"normal forces {force.sum():.4g} {newton}"
+    total = f"normal forces {force.sum():.4g} {scale.unit}"
     text = f"Contact {contact} at rest, load factor {table['factor'].max():g}: {total}; {counts}"
     figure.suptitle(text, fontsize=11.5)
     return figure
@@ -67,12 +70,12 @@ def draw_load(static: Analysis, contact: str, table: dict[str, Array]) -> Figure
 def draw_map(mode: Analysis, contact: str) -> Figure:
     """Shares of the period that each pair sticks, slips and is open, at several amplitudes, below the shares of all."""
     points = chosen_points(mode)
-    (pairs, of_face), (scale, unit) = placed(mode.pairs(contact), mode.unit_system), amplitude_scale(mode)
+    (pairs, of_face), scale = placed(mode.pairs(contact), mode.unit_system), scales.linear_amplitudes(mode)
     names = list(dict.fromkeys(pairs["face"]))
     figure, _ = style.new_figure(3.6 + 1.25 * len(points))
     figure.clear()
     grid = figure.add_gridspec(1 + len(points), len(names), height_ratios=[1.9, *(1.0 for _ in points)])
-    _shares(figure.add_subplot(grid[0, :]), mode, points)
+    _shares(figure.add_subplot(grid[0, :]), mode, points, scale)
     for row, point in enumerate(points):
         kept = mode.loop(contact, point)
         shares = kept["shares"] if "shares" in kept else status_shares(kept["status"])
@@ -80,18 +83,12 @@ def draw_map(mode: Analysis, contact: str) -> Figure:
             axes = figure.add_subplot(grid[1 + row, column])
             mine = pairs["face"] == name
             _pies(axes, pairs["position"][mine], shares[:, mine])
-            place_face(axes, f"{name}, {scale * mode.columns['amplitude'][point]:.3g} {unit}", pairs["position"])
+            place_face(axes, f"{name}, {scale.text(mode.columns['amplitude'][point])}", pairs["position"])
             axes.tick_params(labelbottom=row == len(points) - 1, labelleft=column == 0)
     along = style.label("Along the face", of_face)
     figure.supxlabel(f"{along}; each disc is one contact pair, cut by its shares of a period", fontsize=10)
     figure.supylabel(style.label("Up the face", of_face), fontsize=10, y=0.36)
     return figure
-
-
-def amplitude_scale(mode: Analysis) -> tuple[float, str]:
-    """Factor and unit in which an amplitude is shown: as places on a face, but for a modal coordinate."""
-    unit = mode.unit("amplitude")
-    return mode.unit_system.of_faces if unit in ("", mode.unit_system("length")) else (1.0, unit)
 
 
 def placed(pairs: Table, units: UnitSystem) -> tuple[Table, str]:
@@ -112,17 +109,17 @@ def status_shares(status: Array) -> Array:
     return np.array([np.mean(status == state, axis=0) for state in (STICK, SLIP, OPEN)])
 
 
-def _shares(axes: Axes, mode: Analysis, points: Sequence[int]) -> None:
+def _shares(axes: Axes, mode: Analysis, points: Sequence[int], scale: Scale) -> None:
     """Stick, slip and open of all pairs over the amplitude."""
-    scale, unit = amplitude_scale(mode)
-    amplitude = scale * mode.columns["amplitude"]
+    amplitude = scale(mode.columns["amplitude"])
     order = np.argsort(amplitude)
     values = [100 * mode.columns[word][order] for word in STATUS]
     axes.stackplot(amplitude[order], *values, colors=STATUS.values(), alpha=0.85)
     for point in points:
         axes.axvline(amplitude[point], color=style.INK, linewidth=0.8, linestyle=":")
     axes.set(xlim=(amplitude.min(), amplitude.max()), ylim=(0, 100), ylabel="Share of time [%]")
-    axes.set_xlabel(f"Modal amplitude of {mode.observed()} [{unit}], {mode.method()}; dotted: the maps below")
+    text = scale.label(f"Modal amplitude of {mode.observed()}")
+    axes.set_xlabel(f"{text}, {mode.method()}; dotted: the maps below")
     axes.grid(False)
     handles = [Line2D([], [], marker="o", linestyle="", color=colour, label=word) for word, colour in STATUS.items()]
     axes.legend(handles=handles, loc="lower left", ncols=3)

@@ -12,7 +12,8 @@ from ..arrays import AnyArray
 from ..post.flutter_waves import with_sign
 from ..post.mode_curve import NO_DAMPING
 from ..results.reader import Analysis, Run
-from . import style
+from . import marks, scales, style
+from .scales import Scale
 
 #: half width of a wave's bar, in distances of neighbouring ones
 HALF = 0.32
@@ -40,21 +41,31 @@ def wave(flutter: Analysis, diameter: int) -> tuple[AnyArray, AnyArray]:
 def damping(flutter: Analysis) -> Figure:
     """Total damping of every wave over its amplitude; forward waves solid, backward ones dashed."""
     figure, axes = style.new_figure(5.2)
-    found = diameters(flutter)
+    found, scale = diameters(flutter), scales.amplitudes(flutter)
+    ends: dict[str, tuple[float, float] | None] = {}
     for diameter, colour in zip(found, style.shades(len(found))):
         amplitude, zeta = wave(flutter, diameter)
-        axes.plot(
-            amplitude, zeta, color=colour, linestyle="-" if diameter >= 0 else "--", label=f"ND {with_sign(diameter)}"
-        )
+        look = {"color": colour, "linestyle": "-" if diameter >= 0 else "--"}
+        axes.plot(scale(amplitude), zeta, label=f"ND {with_sign(diameter)}", **look)
+        rows = flutter.columns["nodal_diameter"] == diameter
+        computed = scale(flutter.columns["amplitude"][rows]), 100.0 * flutter.columns["zeta"][rows]
+        if "zeta_error" in flutter.columns:
+            style.error_band(axes, *computed, 100.0 * flutter.columns["zeta_error"][rows], colour)
+        marks.points(axes, *computed, colour, len(flutter) > marks.MANY)
+        ends[_called(diameter)] = float(computed[0][-1]), float(computed[1][-1])
     axes.axhline(0.0, color=style.INK, linewidth=1.0)
-    _cycles(axes, flutter, lambda cycle: (cycle["amplitude"], 0.0))
+    _cycles(axes, flutter, lambda cycle: (scale(cycle["amplitude"]), 0.0))
+    marks.stops(axes, ends, marks.why_stopped(flutter, list(ends)))
     low, high = axes.get_ylim()
     if low < 0.0:
         axes.axhspan(low, 0.0, color=style.RED, alpha=0.07, zorder=0)
         axes.set_ylim(low, high)
-    style.log_amplitude(axes, flutter.columns["amplitude"])
-    axes.set_xlabel(_amplitude(flutter))
+    style.log_amplitude(axes, scale(flutter.columns["amplitude"]))
+    axes.set_xlabel(_amplitude(flutter, scale))
     axes.set_ylabel(style.label("Damping ratio ζ, friction and flow", "%"))
+    marks.point_entry(axes, len(flutter) > marks.MANY)
+    error = flutter.columns.get("zeta_error")
+    marks.error_entry(axes, {"%": [None if error is None else 100.0 * error]})
     style.legend_outside(figure, axes, columns=5)
     return figure
 
@@ -62,10 +73,10 @@ def damping(flutter: Analysis) -> Figure:
 def limits(flutter: Analysis) -> Figure:
     """Amplitudes at which each wave grows (red) and decays (blue), and the limit cycles between them."""
     figure, axes = style.new_figure(4.8)
-    found = diameters(flutter)
+    found, scale = diameters(flutter), scales.amplitudes(flutter)
     for place, diameter in enumerate(found):
         amplitude, zeta = wave(flutter, diameter)
-        for low, high, sign in spans(amplitude, zeta):
+        for low, high, sign in spans(scale(amplitude), zeta):
             axes.fill_between(
                 [place - HALF, place + HALF],
                 low,
@@ -75,12 +86,14 @@ def limits(flutter: Analysis) -> Figure:
                 linewidth=0,
                 label="decays" if sign > 0 else "grows",
             )
-    _cycles(axes, flutter, lambda cycle: (found.index(cycle["nodal_diameter"]), cycle["amplitude"]))
+    _cycles(axes, flutter, lambda cycle: (found.index(cycle["nodal_diameter"]), scale(cycle["amplitude"])))
+    ends = {_called(d): (float(k), float(scale(wave(flutter, d)[0][-1]))) for k, d in enumerate(found)}
+    marks.stops(axes, ends, marks.why_stopped(flutter, list(ends)))
     axes.set_yscale("log")
-    axes.set_ylim(flutter.columns["amplitude"].min(), flutter.columns["amplitude"].max())
+    axes.set_ylim(*scale(np.array([flutter.columns["amplitude"].min(), flutter.columns["amplitude"].max()])))
     axes.set_xticks(range(len(found)), [with_sign(diameter) for diameter in found])
     axes.set_xlabel("Nodal diameters, negative for backward waves")
-    axes.set_ylabel(_amplitude(flutter))
+    axes.set_ylabel(_amplitude(flutter, scale))
     style.plain_numbers(axes.yaxis)
     style.legend_outside(figure, axes, columns=5)
     return figure
@@ -109,6 +122,10 @@ def _cycles(axes: Axes, flutter: Analysis, place: object) -> None:
         axes.plot([x], [y], label=kind, **look, **kinds[kind])
 
 
-def _amplitude(flutter: Analysis) -> str:
-    dof = flutter.observed()
-    return style.label(f"Modal amplitude of {dof}".rstrip(" of"), flutter.unit("amplitude"))
+def _called(diameter: int) -> str:
+    """As the results name the branch of a wave."""
+    return f"nodal diameter {diameter}"
+
+
+def _amplitude(flutter: Analysis, scale: Scale) -> str:
+    return scale.label(f"Modal amplitude of {flutter.observed()}".rstrip(" of"))

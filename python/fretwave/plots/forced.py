@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,7 +13,8 @@ from scipy.interpolate import PchipInterpolator
 from ..arrays import AnyArray
 from ..post.response_peaks import curve_length
 from ..results.reader import Analysis, Run, Table
-from . import style
+from . import marks, scales, style
+from .scales import Scale
 
 BACKBONES = (("--", style.INK), (":", style.RED))
 
@@ -29,29 +31,52 @@ def draw(forced: Analysis, modes: Sequence[Analysis], times: Table | None, peaks
     """Amplitude as it is (left) and divided by the level (right)."""
     figure, (left, right) = style.new_figure(5.0, columns=2)
     levels = np.unique(forced.columns["level"])
+    shown, divided = (scales.linear(forced.unit_system, forced.unit("amplitude"), a) for a in _amplitudes(forced))
     for level, colour in zip(levels, style.shades(len(levels))):
-        _level(left, forced, times, level, colour, 1.0)
-        _level(right, forced, times, level, colour, level)
+        _level(left, forced, times, level, colour, shown)
+        _level(right, forced, times, level, colour, Scale(divided.factor / level, divided.unit))
     for mode, (line, colour) in zip(modes, BACKBONES):
         curve = mode.curve()
-        name = f"backbone, {mode.method()}"
-        left.plot(curve["frequency_hz"], curve["amplitude"], color=colour, linestyle=line, label=name, zorder=5)
+        look = {"color": colour, "linestyle": line, "label": f"backbone, {mode.method()}", "zorder": 5}
+        left.plot(curve["frequency_hz"], shown(curve["amplitude"]), **look)
     if peaks is not None:
-        left.plot(peaks["frequency_hz"], peaks["amplitude"], "+", color=style.INK, label="peak", zorder=6)
+        left.plot(peaks["frequency_hz"], shown(peaks["amplitude"]), "+", color=style.INK, label="peak", zorder=6)
     if times is not None:
         left.plot([], [], "o", markerfacecolor="white", markeredgecolor=style.INK, label="time integration")
-    _finish(figure, left, right, forced)
+    _stops(left, forced, levels, shown)
+    _finish(figure, left, right, forced, shown, divided)
     return figure
 
 
-def _level(axes: Axes, forced: Analysis, times: Table | None, level: float, colour: object, scale: float) -> None:
+def _level(axes: Axes, forced: Analysis, times: Table | None, level: float, colour: Any, scale: Scale) -> None:
+    """Curve, points, error and integrated motions of a level."""
     frequency, amplitude = response(forced, level)
-    axes.plot(frequency, amplitude / scale, color=colour, label=f"level {level:g}")
+    axes.plot(frequency, scale(amplitude), color=colour, label=_called(level))
+    rows = forced.columns["level"] == level
+    frequency, amplitude = forced.columns["frequency_hz"][rows], scale(_amplitude(forced)[rows])
+    if "amplitude_error" in forced.columns:
+        style.error_band(axes, frequency, amplitude, scale(forced.columns["amplitude_error"][rows]), colour)
+    marks.points(axes, frequency, amplitude, colour, len(forced) > marks.MANY)
     if times is not None:
         rows = times["level"] == level
-        frequency, amplitude = times["frequency_hz"][rows], times["amplitude"][rows]
         look = {"markerfacecolor": "white", "markeredgecolor": colour, "markersize": 6}
-        axes.plot(frequency, amplitude / scale, "o", zorder=4, **look)
+        axes.plot(times["frequency_hz"][rows], scale(times["amplitude"][rows]), "o", zorder=4, **look)
+
+
+def _called(level: float) -> str:
+    """As the legend and the results name it."""
+    return f"level {level:g}"
+
+
+def _stops(axes: Axes, forced: Analysis, levels: AnyArray, scale: Scale) -> None:
+    """Levels that stopped short, among them those that were asked for and have no point."""
+    ends: dict[str, tuple[float, float] | None] = {}
+    for level in levels:
+        last = np.flatnonzero(forced.columns["level"] == level)[-1]
+        ends[_called(level)] = forced.columns["frequency_hz"][last], scale(_amplitude(forced)[last])
+    asked = forced.attributes.get("levels", [])
+    names = dict.fromkeys([*(_called(level) for level in asked if isinstance(level, (int, float))), *ends])
+    marks.stops(axes, ends, marks.why_stopped(forced, list(names)))
 
 
 def response(forced: Analysis, level: float) -> tuple[AnyArray, AnyArray]:
@@ -79,6 +104,11 @@ def smooth(frequency: AnyArray, amplitude: AnyArray) -> tuple[AnyArray, AnyArray
     return tuple(PchipInterpolator(length[keep], points)(fine).T)
 
 
+def _amplitudes(forced: Analysis) -> tuple[AnyArray, AnyArray]:
+    """As they are, and divided by the level."""
+    return _amplitude(forced), _amplitude(forced) / forced.columns["level"]
+
+
 def _amplitude(forced: Analysis) -> AnyArray:
     """Of the observed dof; of a wheel in the sector where it is largest."""
     return forced.columns.get("largest_amplitude", forced.columns["amplitude"])
@@ -89,9 +119,8 @@ def _dof(forced: Analysis) -> str:
     return f"{name.split('@')[0]}, largest of all sectors" if "largest_amplitude" in forced.columns else name
 
 
-def _finish(figure: Figure, left: Axes, right: Axes, forced: Analysis) -> None:
-    frequency, amplitude = forced.columns["frequency_hz"], _amplitude(forced)
-    unit, dof = forced.unit("amplitude"), _dof(forced)
+def _finish(figure: Figure, left: Axes, right: Axes, forced: Analysis, shown: Scale, divided: Scale) -> None:
+    frequency, amplitude = forced.columns["frequency_hz"], shown(_amplitude(forced))
     for axes in (left, right):
         if np.ptp(frequency) > 0:  # a response of one point has no range
             axes.set_xlim(frequency.min(), frequency.max())
@@ -103,6 +132,9 @@ def _finish(figure: Figure, left: Axes, right: Axes, forced: Analysis) -> None:
     else:
         left.set_ylim(0.0, 1.05 * amplitude.max())
         right.set_ylim(bottom=0.0)
-    left.set_ylabel(style.label(f"Amplitude of {dof}", unit))
-    right.set_ylabel(style.label("Amplitude / level", unit))
+    left.set_ylabel(shown.label(f"Amplitude of {_dof(forced)}"))
+    right.set_ylabel(divided.label("Amplitude / level"))
+    marks.point_entry(left, len(forced) > marks.MANY)
+    errors = forced.columns.get("amplitude_error")
+    marks.error_entry(left, {shown.unit: [None if errors is None else shown(errors)]})
     style.legend_outside(figure, left, columns=4)

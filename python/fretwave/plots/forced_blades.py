@@ -11,7 +11,7 @@ from matplotlib.ticker import MaxNLocator
 
 from ..post.blade_peaks import whitehead
 from ..results.reader import Analysis, Run, Table
-from . import style
+from . import marks, scales, style
 from .forced import smooth
 
 
@@ -40,7 +40,7 @@ def draw(forced: Analysis, blades: Table, tuned: Table) -> Figure:
     lower.xaxis.set_major_locator(MaxNLocator(integer=True, nbins=13))
     lower.set_xlabel("Sector")
     lower.set_ylabel("Peak of the blade / tuned peak")
-    lower.legend(loc="upper right", ncols=len(levels))
+    style.legend(lower, loc="upper right", ncols=len(levels))
     return figure
 
 
@@ -53,18 +53,23 @@ def _curves(axes: Axes, forced: Analysis, tuned: Table) -> None:
     q = forced.coefficients(list(points))[:, forced.normalised_dof() % unit :: unit]
     amplitude, frequency = np.hypot(q[:, :, c], q[:, :, s]), forced.columns["frequency_hz"][points]
     most = int(np.argmax(amplitude.max(axis=0)))
-    for j, blade in enumerate(amplitude.T):
+    scale = scales.linear(forced.unit_system, forced.unit("amplitude"), amplitude)
+    for j, blade in enumerate(scale(amplitude).T):
         look = {"color": style.BLUE, "linewidth": 1.8, "zorder": 5} if j == most else {"color": "#bbbbbb"}
         name = f"sector {j}, which moves most" if j == most else "other sectors"
         axes.plot(*smooth(frequency, blade), **{"linewidth": 0.8, **look}, label=name)
     rows = tuned["level"] == level
-    line = smooth(tuned["frequency_hz"][rows], tuned["amplitude"][rows])
+    marks.points(axes, frequency, scale(amplitude[:, most]), style.BLUE)
+    line = smooth(tuned["frequency_hz"][rows], scale(tuned["amplitude"][rows]))
     axes.plot(*line, "--", color=style.INK, label="tuned wheel")
     axes.set_xlim(frequency.min(), frequency.max())
     axes.set_ylim(0.0, None)
     axes.set_xlabel(style.label("Excitation frequency", "Hz"))
     dof = forced.dofs[forced.normalised_dof()].split("@")[0] if forced.dofs else ""
-    axes.set_ylabel(style.label(f"Amplitude of {dof}, level {level:g}", forced.unit("amplitude")))
-    handles, names = axes.get_legend_handles_labels()
-    entries = dict(zip(names, handles))
-    axes.legend(list(entries.values()), list(entries), loc="upper right")
+    axes.set_ylabel(scale.label(f"Amplitude of {dof}, level {level:g}"))
+    marks.point_entry(axes)
+    last = float(frequency[-1]), float(scale(amplitude[-1, most]))
+    name = f"level {level:g}"
+    stopped = marks.why_stopped(forced, [f"level {one:g}" for one in np.unique(forced.columns["level"])])
+    marks.stops(axes, {name: last}, {one: reason for one, reason in stopped.items() if one == name})
+    style.legend(axes, loc="upper right")

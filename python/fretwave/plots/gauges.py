@@ -11,8 +11,11 @@ from matplotlib.figure import Figure
 from ..post.fatigue import first_reaching
 from ..results.parts import PARTS, rows_of_branches
 from ..results.reader import Analysis, Run, Table
-from . import style
+from . import scales, style
+from .scales import Scale
 
+#: Columns that are stresses.
+STRESSES = ("stress_amplitude", "mean_stress")
 #: Microstrain of a strain.
 MICRO = 1e6
 
@@ -30,6 +33,10 @@ def draw(analysis: Analysis, table: Table) -> Figure:
     gauges = [name for name in table if name.endswith("_strain")]
     panels = [*(["strain"] if gauges else []), *(name for name in ("stress_amplitude", "goodman") if name in table)]
     over = "frequency_hz" if analysis.kind == "forced" else "amplitude"
+    scale = scales.logarithmic(analysis.unit_system, analysis.unit("amplitude"), table["amplitude"])
+    table = {**table, "amplitude": scale(table["amplitude"])}
+    stress = _stresses(analysis, table)
+    table = {name: stress(values) if name in STRESSES else values for name, values in table.items()}
     figure, axes = style.new_figure(1.2 + 2.6 * len(panels), rows=len(panels), sharex=True, squeeze=False)
     branches = list(rows_of_branches(table))
     for place, panel in zip(axes[:, 0], panels):
@@ -37,18 +44,23 @@ def draw(analysis: Analysis, table: Table) -> Figure:
             branch = {name: values[rows] for name, values in table.items()}
             _draw(place, panel, gauges, branch, over, number)
             if panel == "goodman":
-                _limit(place, branch, over, number, analysis.unit("amplitude"))
+                _limit(place, branch, over, number, scale.unit)
         place.set_ylim(bottom=0.0)
     for place, panel in zip(axes[:, 0], panels):
-        place.set_ylabel(_label(analysis, panel))
+        place.set_ylabel(_label(panel, stress))
     if over == "amplitude":
         style.log_amplitude(axes[-1, 0], table[over])
     what = "Frequency" if over == "frequency_hz" else f"Amplitude of {analysis.observed()}"
-    axes[-1, 0].set_xlabel(style.label(what, analysis.unit(over)))
+    axes[-1, 0].set_xlabel(scale.label(what) if over == "amplitude" else style.label(what, analysis.unit(over)))
     for place in axes[:, 0]:
-        if place.get_legend_handles_labels()[1]:
-            place.legend(loc="best")
+        style.legend(place, loc="best")
     return figure
+
+
+def _stresses(analysis: Analysis, table: Table) -> Scale:
+    """The unit of the axis of stresses."""
+    symbol = analysis.unit_system("pressure")
+    return scales.linear(analysis.unit_system, symbol, *(table[name] for name in STRESSES if name in table))
 
 
 def _draw(place: Axes, panel: str, gauges: list[str], table: Table, over: str, number: int) -> None:
@@ -73,13 +85,13 @@ def _limit(place: Axes, table: Table, over: str, number: int, unit: str) -> None
         place.axhline(1.0, color=style.RED, lw=1.2, ls="--", label="limit")
     passed = first_reaching(table["goodman"], 1.0, table[over], table["amplitude"])
     if passed is not None:
-        words = f"reached at an amplitude of {style.number(passed[1])} {unit}".rstrip()
+        words = f"reached at an amplitude of {style.with_unit(style.number(passed[1]), unit)}"
         place.plot(passed[0], 1.0, marker="*", ms=11, ls="", color=style.ORANGE, mec=style.INK, label=words)
 
 
-def _label(analysis: Analysis, panel: str) -> str:
+def _label(panel: str, stress: Scale) -> str:
     if panel == "strain":
         return style.label("Strain amplitude", "10⁻⁶")
     if panel == "goodman":
         return "Goodman's factor"
-    return style.label("Worst stress amplitude", analysis.unit_system("pressure"))
+    return stress.label("Worst stress amplitude")

@@ -11,7 +11,8 @@ from matplotlib.figure import Figure
 from ..arrays import AnyArray
 from ..post.motion import motion
 from ..results.reader import Analysis, Run, Table
-from . import style
+from . import scales, style
+from .scales import Scale
 
 #: top of the axes, in largest starts or predictions; what goes beyond has left the picture
 HEIGHT = 4.0
@@ -29,20 +30,21 @@ def figures(run: Run) -> Iterator[tuple[str, Figure]]:
 def envelopes(mode: Analysis, motions: Analysis) -> Figure:
     """Fundamental amplitude of every cycle against time, all starts on one axes."""
     figure, axes = style.new_figure(4.6)
-    table, starts, unit = motions.columns, motions.starts(), mode.unit("amplitude")
+    table, starts, scale = motions.columns, motions.starts(), scales.amplitudes(mode)
+    seconds = scales.linear(mode.unit_system, "s", _settled(table))
     for (number, start), colour, name in zip(starts, style.PALETTE, _names(len(starts))):
         rows = table["start"] == number
-        time, amplitude = table["time"][rows], table["amplitude"][rows]
-        axes.plot(time, amplitude, color=colour, label=f"{name}, a = {start:g} {unit}")
-        if time[-1] < 0.9 * table["time"].max():
+        time, amplitude = seconds(table["time"][rows]), scale(table["amplitude"][rows])
+        axes.plot(time, amplitude, color=colour, label=f"{name}, a = {scale.text(start, 4)}")
+        if time[-1] < 0.9 * seconds(table["time"].max()):
             axes.plot(time[-1:], amplitude[-1:], "^", color=colour)
             end = time[-1], amplitude[-1]
             axes.annotate("diverges, stopped", end, (8, 0), textcoords="offset points", va="center")
-    _predicted(axes, mode)
-    axes.set(yscale="log", xlim=(0.0, _settled(table)), ylim=_visible(mode, motions))
-    axes.set_xlabel(style.label("Time", "s"))
-    dof = mode.observed()
-    axes.set_ylabel(style.label(f"Amplitude of {dof} per cycle", mode.unit("amplitude")))
+    _predicted(axes, mode, scale)
+    shown = scale(np.array(_visible(mode, motions)))
+    axes.set(yscale="log", xlim=(0.0, seconds(_settled(table))), ylim=shown)
+    axes.set_xlabel(seconds.label("Time"))
+    axes.set_ylabel(scale.label(f"Amplitude of {mode.observed()} per cycle"))
     style.plain_numbers(axes.yaxis)
     style.legend_outside(figure, axes, columns=3)
     return figure
@@ -68,27 +70,28 @@ def _settled(table: Table) -> float:
     return min(1.5 * last, float(table["time"].max())) or float(table["time"].max())
 
 
-def _predicted(axes: Axes, mode: Analysis) -> None:
+def _predicted(axes: Axes, mode: Analysis, scale: Scale) -> None:
     for crossing in mode.mode_curve().crossings():
         kind = "stable" if crossing.stable else "unstable"
-        name = f"predicted, {kind}, a = {style.number(crossing.amplitude)} {mode.unit('amplitude')}"
-        axes.axhline(crossing.amplitude, color=style.INK, linestyle="--" if crossing.stable else ":", label=name)
+        name = f"predicted, {kind}, a = {scale.text(crossing.amplitude)}"
+        axes.axhline(scale(crossing.amplitude), color=style.INK, linestyle="--" if crossing.stable else ":", label=name)
 
 
 def phase_planes(mode: Analysis, motions: Analysis) -> Figure:
     """Velocity against displacement of the normalised dof, one axes per start, with the predicted limit cycle."""
     starts = motions.starts()
     figure, axes = style.new_figure(3.6, columns=len(starts), squeeze=False)
-    orbits = predicted_orbits(mode)
+    orbits, scale = predicted_orbits(mode), scales.amplitudes(mode)
+    speed = Scale(scale.factor, f"{scale.unit}/s" if scale.unit else "")
     for (number, start), plane, colour, name in zip(starts, axes[0], style.PALETTE, _names(len(starts))):
         _, x, v = motions.history(number)
-        plane.plot(x, v, color=colour, linewidth=0.5)
+        plane.plot(scale(x), speed(v), color=colour, linewidth=0.5)
         for kind, x, v in orbits:
             line = "--" if kind == "stable" else ":"
-            plane.plot(x, v, color=style.INK, linestyle=line, label=f"predicted {kind} limit cycle")
-        plane.set_title(f"{name}, a = {start:g} {mode.unit('amplitude')}")
-        plane.set_xlabel(style.label("Displacement", mode.unit("amplitude")))
-    axes[0, 0].set_ylabel(style.label("Velocity", f"{mode.unit('amplitude')}/s"))
+            plane.plot(scale(x), speed(v), color=style.INK, linestyle=line, label=f"predicted {kind} limit cycle")
+        plane.set_title(f"{name},\na = {scale.text(start, 4)}")
+        plane.set_xlabel(scale.label("Displacement"))
+    axes[0, 0].set_ylabel(speed.label("Velocity"))
     axes[0, 0].plot([], [], color=style.GREY, linewidth=0.8, label="time integration")
     style.legend_outside(figure, axes[0, 0], columns=3)
     return figure

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,8 +11,9 @@ from matplotlib.figure import Figure
 from ..arrays import AnyArray
 from ..model.laws import Role
 from ..results.reader import Analysis, Run
-from . import style
+from . import scales, style
 from .phase_planes import kept_points
+from .scales import Scale
 from .trajectories import amplitude_name
 
 LEGEND_COLUMNS = 4
@@ -28,24 +29,34 @@ def figures(run: Run) -> Iterator[tuple[str, Figure]]:
 
 def draw(mode: Analysis, contact: str) -> Figure:
     """Above friction force against tangential displacement, below against normal force; a column per face."""
-    points, (scale, unit), force = kept_points(mode), mode.unit_system.of_depths, mode.unit_system("force")
+    points = kept_points(mode)
     chosen = busiest(mode, contact, points[-1])
+    length, force = _scales(mode, contact, points, list(chosen.values()))
     figure, axes = style.new_figure(7.0, rows=2, columns=len(chosen), sharey=True, squeeze=False)
     for (name, pair), (upper, lower) in zip(chosen.items(), axes.T):
         tangent = _direction(mode, contact, points[-1], pair)
         for point, colour in zip(points, style.shades(len(points))):
             motion = mode.loop(contact, point)
             u, f = (np.append(motion[key][:, :, pair], motion[key][:1, :, pair], axis=0) for key in "uf")
-            upper.plot(scale * u[:, 1:] @ tangent, f[:, 1:] @ tangent, color=colour, label=amplitude_name(mode, point))
-            lower.plot(f[:, 0], f[:, 1:] @ tangent, color=colour)
+            normal, friction = force(f[:, 0]), force(f[:, 1:] @ tangent)
+            upper.plot(length(u[:, 1:] @ tangent), friction, color=colour, label=amplitude_name(mode, point))
+            lower.plot(normal, friction, color=colour)
         upper.set_title(f"{name}, pair {pair}", fontsize=10.5)
-        upper.set_xlabel(style.label("Tangential displacement", unit))
-        lower.set_xlabel(style.label("Normal force", force))
+        upper.set_xlabel(length.label("Tangential displacement"))
+        lower.set_xlabel(force.label("Normal force"))
         _limits(lower, mode, contact, pair)
     for first in axes[:, 0]:
-        first.set_ylabel(style.label("Friction force", force))
+        first.set_ylabel(force.label("Friction force"))
     style.legend_outside(figure, axes[0, 0], columns=LEGEND_COLUMNS, title=f"Modal amplitude, {mode.method()}")
     return figure
+
+
+def _scales(mode: Analysis, contact: str, points: Sequence[int], pairs: Sequence[int]) -> tuple[Scale, Scale]:
+    """Of the tangential displacements and of the forces of some pairs, the same on all axes."""
+    motions, units = [mode.loop(contact, point) for point in points], mode.unit_system
+    u, f = ([motion[key][:, :, list(pairs)] for motion in motions] for key in "uf")
+    length = scales.linear(units, units("length"), *(one[:, 1:] for one in u))
+    return length, scales.linear(units, units("force"), *f)
 
 
 def _limits(axes: Axes, mode: Analysis, contact: str, pair: int) -> None:

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from ..arrays import AnyArray
 from ..results.reader import Analysis, Run, motion_of
-from . import style
+from . import scales, style
 from .trajectories import CURVES, FEW_DOFS, amplitude_name, other_dof, spread
 
 
@@ -38,14 +38,17 @@ def planes(mode: Analysis) -> Figure:
 
 
 def _plane(upper: Axes, lower: Axes, mode: Analysis, points: Sequence[int], dof: int) -> None:
-    for point, colour in zip(points, style.shades(len(points))):
-        x, v = motion_of(mode, point)
-        a, omega = mode.columns["amplitude"][point], mode.columns["omega"][point]
-        upper.plot(x[:, dof], v[:, dof], color=colour, label=amplitude_name(mode, point))
-        lower.plot(x[:, dof] / a, v[:, dof] / (a * omega), color=colour)
+    motions = {point: [values[:, dof] for values in motion_of(mode, point)] for point in points}
     unit, name = mode.length_unit(), mode.dofs[dof]
-    upper.set_xlabel(style.label(f"Displacement of {name}", unit))
-    upper.set_ylabel(style.label(f"Velocity of {name}", f"{unit}/s" if unit else ""))
+    length = scales.linear(mode.unit_system, unit, *(x for x, _ in motions.values()))
+    speed = scales.linear(mode.unit_system, f"{unit}/s" if unit else "", *(v for _, v in motions.values()))
+    for point, colour in zip(points, style.shades(len(points))):
+        x, v = motions[point]
+        a, omega = mode.columns["amplitude"][point], mode.columns["omega"][point]
+        upper.plot(length(x), speed(v), color=colour, label=amplitude_name(mode, point))
+        lower.plot(x / a, v / (a * omega), color=colour)
+    upper.set_xlabel(length.label(f"Displacement of {name}"))
+    upper.set_ylabel(speed.label(f"Velocity of {name}"))
     lower.set(xlabel=f"Displacement of {name} / a", ylabel=f"Velocity of {name} / (a ω)")
 
 
@@ -53,13 +56,15 @@ def loops(mode: Analysis, contact: str) -> Figure:
     """Force against relative displacement of the pair that dissipates most: as it is, and both scaled to one."""
     points = kept_points(mode)
     pair = _busiest(mode, contact, points[-1])
+    closed = [_closed(mode, contact, point, pair) for point in points]
+    length = scales.linear(mode.unit_system, mode.length_unit(), *(u for u, _ in closed))
+    force = scales.linear(mode.unit_system, mode.unit_system("force"), *(f for _, f in closed))
     figure, (left, right) = style.new_figure(4.3, columns=2)
-    for point, colour in zip(points, style.shades(len(points))):
-        u, f = _closed(mode, contact, point, pair)
-        left.plot(u, f, color=colour, label=amplitude_name(mode, point))
+    for point, (u, f), colour in zip(points, closed, style.shades(len(points))):
+        left.plot(length(u), force(f), color=colour, label=amplitude_name(mode, point))
         right.plot(u / np.abs(u).max(), f / max(np.abs(f).max(), 1e-300), color=colour)
-    left.set_xlabel(style.label("Relative displacement", mode.length_unit()))
-    left.set_ylabel(style.label("Contact force", mode.unit_system("force")))
+    left.set_xlabel(length.label("Relative displacement"))
+    left.set_ylabel(force.label("Contact force"))
     right.set(xlabel="Relative displacement / its maximum", ylabel="Contact force / its maximum")
     title = f"Contact {contact}{'' if pair[1] == 0 else f', pair {pair[1]}'}: modal amplitude, {mode.method()}"
     style.legend_outside(figure, left, columns=CURVES, title=title)

@@ -21,7 +21,7 @@ from . import style
 from .linear_bands import PEAK_NAME, Band, bands, highest, other_entry, peaks
 
 #: Height of the picture over the highest mode, and room beside the first and last wave over half the sectors.
-ABOVE, BESIDE = 1.06, 0.08
+ABOVE, BESIDE = 1.06, 0.11
 
 
 def figures(run: Run) -> Iterator[tuple[str, Figure]]:
@@ -45,6 +45,7 @@ def draw(run: Run, linear: Analysis) -> Figure:
     for peak in (peak for peak in peaks(run, drawn) if peak.speed in (None, speed)):
         axes.plot([peak.diameter], [peak.hz], **style.PEAK, label=PEAK_NAME)
     axes.set_xlim(-BESIDE * sectors / 2, (1 + BESIDE) * sectors / 2)
+    axes.spines["left"].set_visible(False)  # engine orders are named there
     axes.set_ylim(0.0, top)
     axes.locator_params("x", integer=True)
     axes.set_xlabel("Nodal diameters")

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..results.reader import Run, Table
-from . import style
+from . import labels, style
 
 SWEEPS = {
     "harmonics": ("H", "o-"),
@@ -52,6 +52,8 @@ def draw(table: Table) -> Figure:
     if not of_wear:
         axes[0].plot([], [], "o-", color=style.GREY, alpha=0.35, label="as the run estimates it")
     style.legend_outside(figure, axes[0], columns=4)
+    for plane, column in zip(axes, errors):
+        _name(plane, table, column)
     return figure
 
 
@@ -63,8 +65,17 @@ def _sweep(axes: Axes, table: Table, sweep: str, symbol: str, column: str, line:
     axes.plot(time, error, line, color=colour, label=f"{sweep.replace('_', ' ')} ({symbol})")
     if f"{column}_estimate" in table:
         axes.plot(time, np.maximum(table[f"{column}_estimate"][rows], FLOOR), line, color=colour, alpha=0.35)
-    for row, x, y in zip(rows, time, error):
-        value = table[sweep][row]
-        text = f"{value:.0e}".replace("e-0", "e-") if sweep in ("tolerance", "accuracy") else f"{value:g}"
-        place = (-4, -12) if sweep == "pressure_change" else (4, 4)
-        axes.annotate(text, (x, y), place, textcoords="offset points", fontsize=9, color=colour)
+
+
+def _name(axes: Axes, table: Table, column: str) -> None:
+    """The swept setting beside every mark, of all sweeps together so that none covers another."""
+    colours = dict(zip(SWEEPS, style.PALETTE))
+    rows = np.flatnonzero((table["reference"] == 0.0) & np.isin(table["sweep"], list(SWEEPS)))
+    sweeps = [str(sweep) for sweep in table["sweep"][rows]]
+    points = [(table["wall_s"][row], max(table[column][row], FLOOR)) for row in rows]
+    texts = [_text(sweep, table[sweep][row]) for sweep, row in zip(sweeps, rows)]
+    labels.beside(axes, texts, points, [{"fontsize": 9, "color": colours[sweep]} for sweep in sweeps])
+
+
+def _text(sweep: str, value: float) -> str:
+    return f"{value:.0e}".replace("e-0", "e-") if sweep in ("tolerance", "accuracy") else f"{value:g}"

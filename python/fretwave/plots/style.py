@@ -35,6 +35,8 @@ PEAK: dict[str, Any] = {
     "zorder": 6,
 }
 
+#: Formats of pictures, and what they are not to say: when they were drawn.
+FORMATS: dict[str, dict[str, None]] = {"png": {}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}
 WIDTH = 8.0  # [inch]; with DPI 130 about 1040 pixels, a README shows 800 to 900
 DPI = 130
 
@@ -58,6 +60,8 @@ RULES: dict[str, Any] = {
     "legend.framealpha": 0.9,
     "legend.edgecolor": "none",
     "axes.formatter.useoffset": False,
+    "svg.hashsalt": "fretwave",
+    "pdf.fonttype": 42,
 }
 
 
@@ -75,9 +79,9 @@ def new_figure(height: float, rows: int = 1, columns: int = 1, **options: Any) -
 
 
 def save(figure: Figure, path: Path) -> Path:
-    """Write a PNG."""
+    """Write it in the format of the file's ending, one of `FORMATS`; the same figure gives the same file."""
     with replaced(path, own=True, keep_suffix=True) as fresh:
-        figure.savefig(fresh, dpi=DPI)
+        figure.savefig(fresh, dpi=DPI, metadata=FORMATS[path.suffix[1:]])
     return path
 
 
@@ -97,9 +101,15 @@ def shades(count: int) -> list[Any]:
     return [tuple(colour) for colour in colours]
 
 
+def with_unit(text: str, unit: str) -> str:
+    """A number and its unit: "3 mm"; no unit for a pure number."""
+    return f"{text} {symbol(unit)}" if unit not in PURE else text
+
+
 def number(value: float, digits: int = 3) -> str:
-    """Short plain number: 0.134, 25.3, 1.2e-05."""
-    return f"{value:.{digits}g}"
+    """Short plain number: 0.134, 25.3, 4200, 1.2e-05."""
+    text = f"{value:.{digits}g}"
+    return f"{float(text):g}" if 1.0 <= abs(value) < 1e5 else text
 
 
 def apart(values: Sequence[float]) -> Callable[[float], str]:
@@ -144,11 +154,6 @@ def error_band(axes: Axes, x: AnyArray, y: AnyArray, error: AnyArray, colour: st
     axes.fill_between(x, *around, where=known.tolist(), color=colour, alpha=0.22, lw=0, zorder=1)
 
 
-def band_entry(axes: Axes) -> None:
-    """The legend's word on error bands."""
-    axes.plot([], [], color=GREY, alpha=0.3, linewidth=9, label="estimated error")
-
-
 def plain_numbers(axis: Axis, values: AnyArray | Sequence[float] = (1.0, 10.0)) -> None:
     """Ticks of a logarithmic axis at 1, 2, 5 of each decade (closer within one), as 0.05 and not as a power."""
     short = np.max(values) < 8.0 * np.min(values)
@@ -157,11 +162,28 @@ def plain_numbers(axis: Axis, values: AnyArray | Sequence[float] = (1.0, 10.0)) 
     axis.set_minor_formatter(NullFormatter())
 
 
-def legend_outside(figure: Figure, axes: Axes, columns: int = 4, title: str | None = None) -> None:
-    """One legend above the axes, where it cannot cover a curve; every name once."""
+def legend(axes: Axes, **options: Any) -> None:
+    """A legend inside the axes, every name once."""
+    entries = _entries(axes)
+    if entries:
+        axes.legend(list(entries.values()), list(entries), **options)
+
+
+def _entries(axes: Axes) -> dict[str, Any]:
+    """First handle of each name, in order."""
     handles, names = axes.get_legend_handles_labels()
-    entries = dict(zip(reversed(names), reversed(handles)))
-    names = list(dict.fromkeys(names))
-    legend = figure.legend([entries[n] for n in names], names, loc="upper center", ncols=columns, title=title)
-    height = legend.get_window_extent(figure.canvas.get_renderer()).height / figure.bbox.height
-    figure.get_layout_engine().set(rect=(0.0, 0.0, 1.0, 0.99 - height))
+    first = dict(zip(reversed(names), reversed(handles)))
+    return {name: first[name] for name in names}
+
+
+def legend_outside(figure: Figure, axes: Axes, columns: int = 4, title: str | None = None) -> None:
+    """One legend above the axes, where it cannot cover a curve; every name once, in at most so many columns."""
+    entries = _entries(axes)
+    for number in range(columns, 0, -1):
+        look = {"loc": "upper center", "ncols": number, "title": title}
+        drawn = figure.legend(list(entries.values()), list(entries), **look)
+        size = drawn.get_window_extent(figure.canvas.get_renderer())
+        if size.width <= figure.bbox.width or number == 1:
+            break
+        drawn.remove()
+    figure.get_layout_engine().set(rect=(0.0, 0.0, 1.0, 0.99 - size.height / figure.bbox.height))

@@ -21,8 +21,9 @@ from ..results.file import open_results
 from ..results.reader import Analysis, Run, Table
 from ..results.sweep_quantiles import is_seed
 from ..results.sweep_summary import split_of
-from . import style
-from .backbone import error_of, tells_error
+from . import labels, marks, scales, style
+from .backbone import error_entry, error_of
+from .scales import Scale
 
 #: more branches than these are told apart by a colour bar
 NAMED = 10
@@ -68,6 +69,10 @@ class Swept:
     def unit(self, unit: str) -> str:
         """Of a panel; that of an amplitude where it is a length."""
         return self.analysis.unit("amplitude") or self.analysis.unit_system(unit) if unit == "length" else unit
+
+    def amplitudes(self) -> Scale:
+        """Of an axis with the amplitudes of all branches."""
+        return scales.logarithmic(self.analysis.unit_system, self.unit("length"), self.analysis.columns["amplitude"])
 
     @property
     def main(self) -> int:
@@ -123,62 +128,71 @@ def figures(run: Run) -> Iterator[tuple[str, Figure]]:
 def backbones(swept: Swept) -> Figure:
     """Frequency above damping, over a common logarithmic amplitude axis."""
     figure, (upper, lower) = style.new_figure(6.6, rows=2, sharex=True)
+    scale = swept.amplitudes()
     for number, part, table in swept.branches:
         look = swept.look(number, part)
         for axes, column, factor in ((upper, "frequency_hz", 1.0), (lower, "zeta", 100.0)):
-            axes.plot(table["amplitude"], factor * table[column], **look)
+            axes.plot(scale(table["amplitude"]), factor * table[column], **look)
             error = error_of(table, column)
             if error is not None:
-                style.error_band(axes, table["amplitude"], factor * table[column], factor * error, look["color"])
+                drawn = scale(table["amplitude"]), factor * table[column], factor * error
+                style.error_band(axes, *drawn, look["color"])
     if (swept.analysis.columns["zeta"] < -TINY).any():
         lower.axhline(0.0, color=style.INK, linewidth=1.0, zorder=1)
-    _asymptotes(upper, swept)
-    style.log_amplitude(lower, swept.analysis.columns["amplitude"])
+    _points(upper, swept, lambda table: (scale(table["amplitude"]), table["frequency_hz"]))
+    _points(lower, swept, lambda table: (scale(table["amplitude"]), 100.0 * table["zeta"]))
+    named = _asymptotes(upper, swept)
+    style.log_amplitude(lower, scale(swept.analysis.columns["amplitude"]))
     upper.set_ylabel(style.label("Frequency ω/2π", "Hz"))
     lower.set_ylabel(style.label("Damping ratio ζ", "%"))
     dof = swept.analysis.attributes.get("normalise", "")
-    lower.set_xlabel(style.label(f"Modal amplitude of {dof}".rstrip(" of"), swept.unit("length")))
+    lower.set_xlabel(scale.label(f"Modal amplitude of {dof}".rstrip(" of")))
     _name(figure, [upper, lower], swept)
+    labels.along(upper, named, fontsize=10)
     return figure
 
 
 def responses(swept: Swept) -> Figure:
     """Amplitude over frequency, a line style for each level."""
     figure, axes = style.new_figure(5.0)
+    scale = scales.linear(swept.analysis.unit_system, swept.unit("length"), swept.analysis.columns["amplitude"])
     for number, part, table in swept.branches:
-        axes.plot(table["frequency_hz"], table["amplitude"], **swept.look(number, part))
+        axes.plot(table["frequency_hz"], scale(table["amplitude"]), **swept.look(number, part))
+    _points(axes, swept, lambda table: (table["frequency_hz"], scale(table["amplitude"])))
     peaks = swept.summary["largest_amplitude"]
     if np.nanmax(peaks) > style.LINEAR_UP_TO * np.nanmin(peaks):
         axes.set_yscale("log")
     axes.set_xlabel(style.label("Excitation frequency", "Hz"))
     dof = swept.analysis.attributes.get("observe", "")
-    axes.set_ylabel(style.label(f"Amplitude of {dof}".rstrip(" of"), swept.unit("length")))
+    axes.set_ylabel(scale.label(f"Amplitude of {dof}".rstrip(" of")))
     _name(figure, [axes], swept)
     return figure
 
 
-def _asymptotes(axes: Axes, swept: Swept) -> None:
-    """Linear frequencies, where all branches have the same."""
-    amplitude = swept.analysis.columns["amplitude"]
+def _points(axes: Axes, swept: Swept, drawn: Callable[[Table], tuple[Array, Array]]) -> None:
+    """Computed points of all branches, and those at which one stopped short."""
+    ends: dict[str, tuple[float, float] | None] = {}
+    many, parts = len(swept.analysis) > marks.MANY, max(len(swept.parts), 1)
+    done = np.reshape(swept.summary.get("done", np.ones((len(swept.plan), parts))), (len(swept.plan), parts))
+    for number, part, table in swept.branches:
+        x, y = drawn({name: values[table["place"] % 1 == 0] for name, values in table.items()})
+        marks.points(axes, x, y, swept.look(number, part)["color"], many)
+        if not done[number, part]:
+            ends[swept.plan.labels()[number]] = float(x[-1]), float(y[-1])
+    marks.stops(axes, ends, marks.why_stopped(swept.analysis, swept.plan.labels()))
+
+
+def _asymptotes(axes: Axes, swept: Swept) -> list[tuple[str, float]]:
+    """Lines at linear frequencies, where all branches have the same; their names and heights."""
     ends = {word: swept.summary[f"{word}_hz"] for word in ("stuck", "free")}
     known = {word: values[np.isfinite(values)] for word, values in ends.items()}
     common = {word: float(v.flat[0]) for word, v in known.items() if v.size and np.ptp(v) <= SAME * abs(v.flat[0])}
     for word, frequency in common.items():
-        stuck, above = word == "stuck", frequency >= max(common.values())
-        axes.axhline(frequency, color=style.GREY, linestyle="--" if stuck else "-.", linewidth=1.2, zorder=1)
-        axes.annotate(
-            f"{'stuck' if stuck else 'without friction'} {frequency:.6g} Hz",  # free, or closed and sliding
-            # curves meet the stuck line at small amplitudes and the free one at large: each is named at its other end
-            (amplitude.max() if stuck else amplitude.min(), frequency),
-            (-4 if stuck else 4, 4 if above else -4),
-            textcoords="offset points",
-            ha="right" if stuck else "left",
-            va="bottom" if above else "top",
-            color=style.GREY,
-            fontsize=10,
-        )
+        axes.axhline(frequency, color=style.GREY, linestyle="--" if word == "stuck" else "-.", linewidth=1.2, zorder=1)
     low, high = axes.get_ylim()
     axes.set_ylim(low - 0.08 * (high - low), high + 0.08 * (high - low))
+    words = {"stuck": "stuck", "free": "without friction"}  # free, or closed and sliding
+    return [(f"{words[word]} {frequency:.6g} Hz", frequency) for word, frequency in common.items()]
 
 
 def _name(figure: Figure, axes: list[Axes], swept: Swept) -> None:
@@ -187,8 +201,9 @@ def _name(figure: Figure, axes: list[Axes], swept: Swept) -> None:
     if len(swept.plan) <= NAMED or swept.crossed():
         for label, look in names:
             axes[0].plot([], [], label=label, **look)
-    if any(tells_error(table) for _, _, table in swept.branches):
-        style.band_entry(axes[0])
+    marks.point_entry(axes[0], len(swept.analysis) > marks.MANY)
+    if len(axes) > 1:
+        error_entry(axes[0], [table for _, _, table in swept.branches])
     _legend(figure, axes[0])
     if len(swept.plan) <= NAMED or swept.crossed():
         return
@@ -202,10 +217,10 @@ def _name(figure: Figure, axes: list[Axes], swept: Swept) -> None:
 
 
 def _legend(figure: Figure, axes: Axes) -> None:
-    """Above the axes, in as many columns as its longest name allows."""
+    """Above the axes, if there is anything to name."""
     names = axes.get_legend_handles_labels()[1]
     if names:
-        style.legend_outside(figure, axes, columns=max(1, min(5, len(names), 125 // (max(map(len, names)) + 9))))
+        style.legend_outside(figure, axes, columns=min(5, len(names)))
 
 
 def _amplitudes(axes: Axes, x: Array, table: Table, number: int) -> None:
@@ -259,7 +274,8 @@ def overview(swept: Swept, panels: Sequence[Panel]) -> Figure:
     for plane, (text, unit, from_zero, draw) in zip(axes, panels):
         for number in range(len(others)):
             draw(plane, x[order], {name: data[:, number] for name, data in lines.items()}, number)
-        plane.set_ylabel(style.label(text, swept.unit(unit)))
+        scale = _rescaled(plane, swept, unit) if unit == "length" else Scale(1.0, unit)
+        plane.set_ylabel(scale.label(text))
         plane.set_xlabel(short_names(swept.plan.keys)[key].replace("_", " "))
         _scales(plane, x[order], [] if numeric else [str(values[k]) for k in order], from_zero)
     for number, name in enumerate(others if len(others) > 1 else ()):
@@ -267,6 +283,16 @@ def overview(swept: Swept, panels: Sequence[Panel]) -> Figure:
         axes[0].plot([], [], color=colour, linestyle=LINES[number % len(LINES)], label=name)
     _legend(figure, axes[0])
     return figure
+
+
+def _rescaled(axes: Axes, swept: Swept, unit: str) -> Scale:
+    """The unit of an axis by what is drawn there, and its lines in it."""
+    drawn = [np.asarray(line.get_ydata(), dtype=float) for line in axes.get_lines()]
+    scale = scales.logarithmic(swept.analysis.unit_system, swept.unit(unit), *drawn)
+    for line, values in zip(axes.get_lines(), drawn):
+        line.set_ydata(scale(values))
+    axes.relim()
+    return scale
 
 
 def _others(swept: Swept) -> list[str]:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
 
+from ..arrays import AnyArray
 from ..results.reader import Analysis, Run, motion_of
-from . import style
+from . import scales, style
+from .scales import Scale
 
 #: amplitudes in one picture
 CURVES = 7
@@ -27,23 +29,29 @@ def draw(mode: Analysis) -> Figure:
     """Left as they are, right divided by the amplitude, which shows curvature and opening at every level."""
     points = spread(mode, CURVES)
     across, up = mode.normalised_dof(), other_dof(mode)
+    motions, scale = displacements(mode, points)
     figure, (left, right) = style.new_figure(4.3, columns=2)
     for point, colour in zip(points, style.shades(len(points))):
         amplitude = mode.columns["amplitude"][point]
-        x, _ = motion_of(mode, point)
-        left.plot(x[:, across], x[:, up], color=colour, label=amplitude_name(mode, point))
+        x = motions[point]
+        left.plot(scale(x[:, across]), scale(x[:, up]), color=colour, label=amplitude_name(mode, point))
         right.plot(x[:, across] / amplitude, x[:, up] / amplitude, color=colour)
-    unit = mode.length_unit()
-    left.set(xlabel=style.label(f"Displacement of {mode.dofs[across]}", unit))
-    left.set(ylabel=style.label(f"Displacement of {mode.dofs[up]}", unit))
+    left.set(xlabel=scale.label(f"Displacement of {mode.dofs[across]}"))
+    left.set(ylabel=scale.label(f"Displacement of {mode.dofs[up]}"))
     right.set(xlabel=f"{mode.dofs[across]} / modal amplitude", ylabel=f"{mode.dofs[up]} / modal amplitude")
     style.legend_outside(figure, left, columns=CURVES, title=f"Modal amplitude, {mode.method()}")
     return figure
 
 
+def displacements(mode: Analysis, points: Sequence[int]) -> tuple[dict[int, AnyArray], Scale]:
+    """Of all dofs over a closed period (n, n_dof), by point, and the unit of an axis for them."""
+    found = {point: motion_of(mode, point)[0] for point in points}
+    return found, scales.linear(mode.unit_system, mode.length_unit(), *found.values())
+
+
 def amplitude_name(mode: Analysis, point: int) -> str:
     """The point's amplitude with its unit."""
-    return f"{style.number(mode.columns['amplitude'][point])} {mode.unit('amplitude')}".strip()
+    return scales.amplitudes(mode).text(mode.columns["amplitude"][point])
 
 
 def other_dof(mode: Analysis) -> int:

@@ -15,7 +15,7 @@ from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from ..arrays import Array
 from ..results.reader import Analysis, Run
-from . import style
+from . import marks, style
 from .faces import STATUS
 from .wear_lines import WearLine, amplitude_label, amplitude_text, amplitudes, cycle_label, power, wears
 
@@ -64,19 +64,21 @@ def draw_modal(wear: Analysis, lines: Sequence[WearLine]) -> Figure:
         for line, colour in zip(lines, style.PALETTE):
             values = factor * line.columns[column]
             plane.plot(line.cycles, values, color=colour, label=amplitude_text(line))
+            marks.points(plane, line.cycles, values, colour)
             top = int(np.argmax(values))
             if column == "zeta" and 0 < top < len(values) - 1:
                 plane.plot(line.cycles[top], values[top], "o", color=colour)
                 text = f"largest: {values[top]:.3g} % after {line.cycles[top]:.3g}"
                 plane.annotate(text, (line.cycles[top], values[top]), (0, 8), textcoords="offset points", fontsize=10)
                 plane.margins(y=0.18)
+        ends: dict[str, tuple[float, float] | None] = {line.called: _last_of(line, column, factor) for line in lines}
+        marks.stops(plane, ends, marks.why_stopped(wear, list(ends)))
         for cycle in lines[0].jumps if shares else ():
             plane.axvline(cycle, color=style.RED, linewidth=1.0, linestyle=":", label=JUMP)
         plane.set_ylabel(style.label(name, unit))
     if shares:
         _shares(axes[2], lines[0])
-    handles, names = axes[0].get_legend_handles_labels()
-    axes[0].legend(*zip(*dict(zip(names, zip(handles, names))).values()), loc="best")
+    style.legend(axes[0], loc="best")
     axes[-1].set_xlabel(cycle_label(wear))
     axes[-1].set_xlim(0.0, _last(lines))
     _heading(figure, wear, lines)
@@ -128,7 +130,7 @@ def draw_volume(wear: Analysis, lines: Sequence[WearLine]) -> Figure:
     lower.set_xlabel(cycle_label(wear))
     lower.set(xlim=(0.0, _last(lines)))
     lower.set_ylim(bottom=0.0)
-    upper.legend(loc="best")
+    style.legend(upper, loc="best")
     _heading(figure, wear, lines)
     return figure
 
@@ -188,6 +190,10 @@ def _last(lines: Sequence[WearLine]) -> float:
     return max(float(line.cycles[-1]) for line in lines)
 
 
+def _last_of(line: WearLine, column: str, factor: float) -> tuple[float, float]:
+    return float(line.cycles[-1]), factor * float(line.columns[column][-1])
+
+
 def _faces(wear: Analysis) -> dict[str, str]:
     """Column of the worn volume of each face, and the face's name."""
     columns = [name for name in wear.columns if name.startswith("worn_")]
@@ -196,7 +202,10 @@ def _faces(wear: Analysis) -> dict[str, str]:
 
 def _heading(figure: Figure, wear: Analysis, lines: Sequence[WearLine]) -> None:
     coefficient = float(wear.attributes.get("wear_coefficient", np.nan))
-    note = f"; red marks: {JUMP}" if len(lines) >= GRID and any(len(line.jumps) for line in lines) else ""
+    many = len(lines) >= GRID
+    note = f"; red marks: {JUMP}" if many and any(len(line.jumps) for line in lines) else ""
+    stopped = marks.why_stopped(wear, [line.called for line in lines]) if many else {}
+    note += "".join(f"\n{marks.words(name, reason)}" for name, reason in stopped.items())
     figure.suptitle(
         f"Fretting wear ({wear.name}), $k_w$ = {power(coefficient)} {wear.unit_system('1/pressure')}{note}",
         fontsize=11.5,

@@ -11,10 +11,8 @@ from ..arrays import Array
 from ..model.laws import Role
 from ..results.reader import Analysis, Run, Table
 from ..units import SI, UnitSystem
-from . import style
+from . import scales, style
 
-#: an amplitude is shown in the first unit from which it is at least this
-SHOWN = 0.1
 #: slack of the rule by which wear has stopped: each amplitude has its own scale of the normal load, the first is kept
 SLACK = 2.0
 #: shares of the deepest depth, and of a pair's own largest rate, that count as nothing
@@ -54,6 +52,11 @@ class WearLine:
     load: Table
     jumps: Array = field(default_factory=lambda: np.empty(0))
     units: UnitSystem = SI
+
+    @property
+    def called(self) -> str:
+        """As the results name it in front of a reason."""
+        return f"a = {self.amplitude:g} {self.units('length')}"
 
     @property
     def cycles(self) -> Array:
@@ -165,10 +168,9 @@ def telling_line(lines: Sequence[WearLine], contact: str) -> WearLine:
 
 def amplitudes(lines: Sequence[WearLine]) -> tuple[Array, str]:
     """Of all lines in a unit that suits the largest, and the unit."""
-    values = np.array([line.amplitude for line in lines])
-    shown = lines[0].units.lengths
-    scale, unit = next(((scale, unit) for scale, unit in shown if values.max() * scale >= SHOWN), shown[-1])
-    return scale * values, unit
+    values, units = np.array([line.amplitude for line in lines]), lines[0].units
+    scale = scales.linear(units, units("length"), values)
+    return scale(values), scale.unit
 
 
 def amplitude_text(line: WearLine) -> str:

@@ -14,7 +14,7 @@ from ..post.mode_curve import NO_DAMPING
 from ..post.motion import complex_amplitudes
 from ..post.wave_content import wave_content
 from ..results.reader import Analysis, Run
-from . import style
+from . import scales, style
 
 #: points of a branch that are drawn
 SHOWN = 4
@@ -83,7 +83,7 @@ def _sectors(axes: Axes, mode: Analysis, point: int, a: Complex) -> None:
     axes.grid(axis="x", visible=False)
     size, zeta = mode.columns["amplitude"][point], mode.columns["zeta"][point]
     zeta = 100.0 * zeta if abs(zeta) > NO_DAMPING else 0.0
-    text = f"a = {style.number(size)} {mode.unit('amplitude')}, ζ = {style.number(zeta)} %"
+    text = f"a = {scales.amplitudes(mode).text(size)}, ζ = {style.number(zeta)} %"
     text = f"{text}, participation {mode.columns['participation'][point]:.2f}"
     axes.annotate(text, (0.99, 0.97), xycoords="axes fraction", ha="right", va="top", fontsize=9.5)
 
@@ -98,7 +98,8 @@ def _waves(axes: Axes, a: Complex) -> None:
 def draw_change(mode: Analysis) -> Figure:
     """Participation ratio and amplification along the branch."""
     figure, (upper, lower) = style.new_figure(5.2, rows=2, sharex=True)
-    amplitude = mode.columns["amplitude"]
+    scale = scales.amplitudes(mode)
+    amplitude = scale(mode.columns["amplitude"])
     for axes, column in ((upper, "participation"), (lower, "amplification")):
         axes.plot(amplitude, mode.columns[column], ".-", color=style.BLUE, markersize=4)  # no scalars of the branch
     upper.set_ylim(0.0, 1.05)
@@ -122,7 +123,7 @@ def draw_change(mode: Analysis) -> Figure:
         )
     style.log_amplitude(lower, amplitude)
     dof = mode.attributes.get("normalise", "")
-    lower.set_xlabel(style.label(f"Modal amplitude of {dof}", mode.unit("amplitude")))
+    lower.set_xlabel(scale.label(f"Modal amplitude of {dof}"))
     return figure
 
 
