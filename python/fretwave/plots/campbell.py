@@ -44,8 +44,10 @@ def draw(run: Run, linear: Analysis) -> Figure:
     for number in sorted({band.number for panel in panels.values() for band in panel.shown}):
         band = next(band for band in drawn if band.number == number)
         axes.flat[0].plot([], [], color=band.colour, linewidth=1.4, label=f"mode {number}, {band.contact}")
+    raised = any(panel.above for panel in panels.values())
     for place, panel in zip(axes.flat, panels.values()):
         panel.draw(place)
+        place.set_title(panel.title, pad=14.0 if raised else None)
     if found:
         axes.flat[0].plot([], [], **style.PEAK, label=PEAK_NAME)
     _labels(list(axes.flat), columns, len(waves))
@@ -117,7 +119,6 @@ class _Panel:
             axes.plot([self.speed if peak.speed is None else peak.speed], [peak.hz], **style.PEAK, clip_on=False)
         axes.set_xlim(0.0, self.last)
         axes.set_ylim(0.0, self.top)
-        axes.set_title(self.title, pad=14.0 if self.above else None)
 
     @property
     def above(self) -> bool:

@@ -20,8 +20,9 @@ from . import style
 DISTANCES = (3.0, 9.0, 18.0, 30.0)
 #: Sides of a name's point, the one preferred first.
 SIDES = ((1, 1), (1, -1), (-1, 1), (-1, -1), (0, 1), (0, -1), (1, 0), (-1, 0))
-#: Cost of what a name covers: another name, the outside of the axes, a mark, a piece of a line; of the next place.
-NAME, OUTSIDE, MARK, LINE, LATER = 100.0, 60.0, 8.0, 1.0, 0.02
+#: Cost of what a name covers: another name, the outside of the axes, a mark, a piece of a line; of the next place, and
+#: of each further distance to which a line has to lead.
+NAME, OUTSIDE, MARK, LINE, LATER, LED = 100.0, 60.0, 8.0, 1.0, 0.02, 6.0
 #: Length of a piece of a line [px], and room about a name [px].
 PIECE, ROOM = 5.0, 1.5
 #: Shares of a horizontal line at which its name may stand.
@@ -50,9 +51,10 @@ class Cover:
         marks, lines = (np.count_nonzero(_inside(points, box)) for points in (self.marks, self.lines))
         return float(NAME * covered + OUTSIDE * outside + MARK * marks + LINE * lines)
 
-    def cheapest(self, places: Sequence[Bbox]) -> int:
-        """Number of the best of some places, which is taken from then on."""
-        best = int(np.argmin([self.cost(box) + LATER * k for k, box in enumerate(places)]))
+    def cheapest(self, places: Sequence[Bbox], more: Sequence[float] = ()) -> int:
+        """Number of the best of some places, which is taken from then on; `more` is what each costs beside."""
+        extra = np.array(more or len(places) * [0.0]) + LATER * np.arange(len(places))
+        best = int(np.argmin([self.cost(box) for box in places] + extra))
         self.names.append(places[best])
         return best
 
@@ -88,22 +90,22 @@ def beside(
         note = axes.annotate(text, point, (0.0, 0.0), **options)
         own = note.get_window_extent(cover.renderer)
         shifts = list(_shifts(own, 1.0 / points_per_pixel))
-        best = cover.cheapest([own.translated(*shift[:2]) for shift in shifts])
-        x, y, far = shifts[best]
+        best = cover.cheapest([own.translated(x, y) for x, y, _ in shifts], [LED * led for *_, led in shifts])
+        x, y, led = shifts[best]
         note.xyann = (x * points_per_pixel, y * points_per_pixel)
         note.set_in_layout(False)
-        if far:
+        if led:
             _leader(axes, point, note)
         found.append(note)
     return found
 
 
-def _shifts(own: Bbox, pixels_per_point: float) -> Iterator[tuple[float, float, bool]]:
-    """To the places about a point [px], the nearest first, and whether a line has to lead there."""
+def _shifts(own: Bbox, pixels_per_point: float) -> Iterator[tuple[float, float, int]]:
+    """To the places about a point [px], the nearest first, and how far a line has to lead, 0 without one."""
     for number, distance in enumerate(DISTANCES):
         for x, y in SIDES:
             away = distance * pixels_per_point
-            yield x * (own.width / 2 + away), y * (own.height / 2 + away), number > 1
+            yield x * (own.width / 2 + away), y * (own.height / 2 + away), max(0, number - 1)
 
 
 def _leader(axes: Axes, point: tuple[float, float], note: Annotation) -> None:
