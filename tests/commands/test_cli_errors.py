@@ -188,6 +188,7 @@ def test_not_converged_keeps_what_was_found(tmp_path: Path, capfd) -> None:
         (["resume", "nowhere"], "not a run folder"),
         (["show", "nowhere"], "no results here"),
         (["plot", "nowhere"], "no results here"),
+        (["plot", "nowhere", "--format", "pgn"], "did you mean `png`?"),
         (["check", str(CASE), "--set", "mode.harmonics=0"], "mode.harmonics"),
     ],
 )

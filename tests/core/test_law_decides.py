@@ -272,7 +272,7 @@ KNOWN = {"model/laws.py", "case/schema.py", "commands/main.py"}
 RESULTS = {
     ("gap", name)
     for name in (
-        *("analyses/static.py", "view/run.py", "post/contact_history.py", "solve/preload.py"),
+        *("analyses/static.py", "view/contact.py", "post/contact_history.py", "solve/preload.py"),
         "report/findings.py",
     )
 }

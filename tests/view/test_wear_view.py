@@ -10,13 +10,14 @@ import pytest
 import scipy.sparse as sp
 from command_line import call
 from models.wear_case import write_case
+from test_series import SINGLE, read_vtu
 from test_view import read_step
 from tolerances import LAST_BIT, LAST_DIGITS, SOLVED
 
 import fretwave as fw
 from fretwave.post.contact_history import OPEN, SLIP
+from fretwave.view.contact_faces import surface
 from fretwave.view.vtkhdf import TRIANGLE, VERTEX
-from fretwave.view.wear import surface
 
 pytestmark = pytest.mark.ranks(1)
 
@@ -76,6 +77,19 @@ def test_amplitudes_asked_for_are_files_of_their_own(run, tmp_path, capfd):
     assert call("view", run, "--analysis", "wear", "--amplitude", "9e-6") == 2
     error = capfd.readouterr().err
     assert "no wear at this amplitude" in error and "fix:      --amplitude 3e-06" in error
+
+
+def test_cycles_as_a_series_for_paraview_before_5_12(run, tmp_path, capfd):
+    table, fields = line_of(run, 2)
+    assert call("view", run, "--analysis", "wear", "--pvd", "--out", tmp_path / "worn.pvd") == 0
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["worn.pvd", "worn_steps"]
+    steps = sorted((tmp_path / "worn_steps").iterdir())
+    assert len(steps) == len(table["cycles"])
+    found, _, _ = read_vtu(steps[-1])
+    assert found["depth"] == pytest.approx(fields["depth"][-1], rel=SINGLE)
+    assert found["cycles"] == table["cycles"][-1]
+    assert call("view", run, "--analysis", "wear", "--png", "--out", tmp_path / "worn.png") == 2
+    assert "fix:      --point N" in capfd.readouterr().err
 
 
 def test_the_motion_of_a_worn_point_is_shown_with_the_law_s_word_on_it(run, tmp_path):

@@ -7,9 +7,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..errors import EXIT_DONE
+from ..errors import EXIT_DONE, InputError
 from ..mpi.guard import launched_rank
-from ..texts import display
+from ..texts import display, nearest
 from .parser import Parser, add_folder, file_to_write, names, run_folder
 from .world import world_if_any
 
@@ -47,6 +47,9 @@ def add_reading(commands: _SubParsers) -> None:
     plot = commands.add_parser("plot", help="make the pictures of a run again")
     add_folder(plot)
     plot.add_argument("--only", type=names, default=[], metavar="NAME,...", help="analyses or kinds of picture")
+    plot.add_argument(
+        "--format", type=names, default=["png"], metavar="NAME,...", help="png, svg, pdf, or several (default: png)"
+    )
     plot.set_defaults(command=_plot)
     _add_probe(commands)
     _add_stress(commands)
@@ -100,9 +103,11 @@ def _add_stress(commands: _SubParsers) -> None:
 def _add_view(commands: _SubParsers) -> None:
     view = commands.add_parser(
         "view",
-        help="write the motion over a period and the contact pairs for ParaView",
+        help="the motion over a period and the contact for ParaView, or as a picture or animation",
         description="Writes <analysis>.vtkhdf, the mesh with its displacement at phases of the period, and"
-        " <analysis>_contact.vtkhdf, the contact pairs with forces, status and work. Several points follow each other."
+        " <analysis>_contact.vtkhdf, the faces of the contact with pressure, traction, status and work (ParaView 5.12)."
+        " --pvd: a series of files of the outer faces for any ParaView; --png, --gif: without it."
+        " Several points follow each other."
         " Of a sector the whole wheel is written, sector by sector."
         " Of wear without --point: <analysis>_wear.vtkhdf, the pairs with worn depth and pressure over wear cycles.",
     )
@@ -117,7 +122,13 @@ def _add_view(commands: _SubParsers) -> None:
     view.add_argument("--phases", type=int, default=32, metavar="N", help="steps of a period (default 32)")
     view.add_argument("--scale", default="auto", metavar="X", help="enlargement in the field warp (default auto)")
     view.add_argument("--linear", action="store_true", help="eight linear hexahedra for each triquadratic one")
-    view.add_argument("--out", type=Path, metavar="FILE.vtkhdf", help="file to write (default: in the run folder)")
+    view.add_argument("--pvd", action="store_true", help="<analysis>.pvd with a .vtu per step: ParaView 5.11 plays it")
+    view.add_argument("--png", action="store_true", help="a picture at the largest displacement of the first point")
+    view.add_argument("--gif", action="store_true", help="an animation of its period")
+    view.add_argument(
+        "--eye", type=float, nargs=2, metavar=("AZ", "EL"), help="of pictures: azimuth and elevation [degrees]"
+    )
+    view.add_argument("--out", type=Path, metavar="FILE", help="file to write (default: in the run folder)")
     view.set_defaults(command=_view)
 
 
@@ -145,6 +156,7 @@ def _report(options: argparse.Namespace) -> int:
 
 
 def _plot(options: argparse.Namespace) -> int:
+    formats = _formats(options.format)
     run_folder(options.folder)
     from ..console import Console
     from ..results.results import open_results
@@ -152,8 +164,20 @@ def _plot(options: argparse.Namespace) -> int:
 
     if not (options.folder / "study.csv").exists():
         open_results(options.folder / "results.h5").close()
-    plot(options.folder, Console(True), options.only or None)
+    plot(options.folder, Console(True), options.only or None, formats)
     return EXIT_DONE
+
+
+def _formats(asked: list[str]) -> list[str]:
+    """Endings of pictures, in small letters."""
+    from ..plots.style import FORMATS
+
+    given = [name.lower().lstrip(".") for name in asked]
+    for name in given:
+        if name not in FORMATS:
+            fix = nearest(name, list(FORMATS)) or "--format svg"
+            raise InputError("there is no such format of pictures", "--format", name, ", ".join(FORMATS), fix)
+    return given or ["png"]
 
 
 def _probe(options: argparse.Namespace) -> int:
@@ -191,6 +215,10 @@ def _view(options: argparse.Namespace) -> int:
         linear=options.linear,
         sectors=options.sectors,
         out=options.out,
+        png=options.png,
+        gif=options.gif,
+        pvd=options.pvd,
+        eye=tuple(options.eye) if options.eye else None,
     )
     _on_first_rank(comm, lambda: view_run(options.folder, chosen))
     return EXIT_DONE

@@ -329,12 +329,12 @@ def check_sweeps(case: Case, names: Sequence[str], options: RunOptions, comm: MP
     return sweeps
 
 
-def plot(folder: Path, console: Console, only: Sequence[str] | None = None) -> int:
+def plot(folder: Path, console: Console, only: Sequence[str] | None = None, formats: Sequence[str] = ("png",)) -> int:
     """Make the pictures of a run folder; returns how many."""
     from ..plots import plot_run
 
     failed = load_recorded(read_record(folder)) if (folder / RECORD).exists() else []
-    files = plot_run(folder, only, failed)
+    files = plot_run(folder, only, failed, formats)
     for line in failed:
         console.line(line)
     console.line(f"{counted(len(files), 'picture')} in {display(folder)}")

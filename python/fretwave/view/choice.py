@@ -48,6 +48,9 @@ class ViewOptions:
     linear : eight linear hexahedra in place of a triquadratic one
     sectors : those shown of a wheel; empty for all
     how : a point is asked for, in messages
+    png, gif : a picture, and an animation
+    pvd : a series of files of the outer faces, in place of VTKHDF
+    eye : azimuth and elevation of it in pictures [degrees]
     """
 
     analysis: str | None = None
@@ -59,6 +62,15 @@ class ViewOptions:
     sectors: Sequence[int] = ()
     out: Path | None = None
     how: str = "--point {}"
+    png: bool = False
+    gif: bool = False
+    pvd: bool = False
+    eye: tuple[float, float] | None = None
+
+    @property
+    def skin(self) -> bool:
+        """Nothing but the outer faces is needed."""
+        return self.pvd or self.png or self.gif
 
     @classmethod
     def checked(cls, scale: str, phases: int, **others: Any) -> ViewOptions:

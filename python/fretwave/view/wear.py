@@ -11,7 +11,6 @@ from pathlib import Path
 
 import h5py
 import numpy as np
-from scipy.spatial import Delaunay, QhullError
 
 from ..arrays import Array, Indices
 from ..case.contacts import wear_areas
@@ -22,7 +21,8 @@ from ..results.results import open_results
 from ..texts import display
 from ..units import UnitSystem, units_of
 from .choice import ViewOptions, natural_scale
-from .vtkhdf import TRIANGLE, VERTEX, GridFile
+from .contact_faces import face_numbers, surface
+from .vtkhdf import GridFile
 
 #: Columns of the table that go with each step.
 SHOWN = ("cycles", "vibrations", "amplitude", "frequency_hz", "zeta", "stick", "slip", "open", "work")
@@ -34,8 +34,6 @@ FIELDS = {
     "slip": "slip_share",
     "open": "open_share",
 }
-#: A triangle with a side longer than the median of the longest sides by this bridges a gap between pairs.
-BRIDGE = 3.0
 
 
 def view_wear(folder: Path, case: Case, name: str, options: ViewOptions, say: Callable[[str], None]) -> list[Path]:
@@ -115,7 +113,7 @@ def _write(
             grid.point_field("normal", [normals])
             # what is worn away is gap: the surface recedes against the normal, which closes the contact
             grid.point_field("warp", (-scale * depth[:, None] * normals for depth in arrays["depth"]), steps, "f4")
-        grid.point_field("face", [_faces(contact)[1].astype(float) for contact in placed.values()])
+        grid.point_field("face", [face_numbers(contact)[1].astype(float) for contact in placed.values()])
         grid.point_field("pair", [np.arange(float(contact.n_pairs)) for contact in placed.values()])
         for name in SHOWN:
             grid.field_data(name, table[name][()][rows])
@@ -126,36 +124,6 @@ def _over_steps(group: h5py.Group, key: str, rows: Indices, placed: Mapping[str,
     """(n_steps, n_pairs of all contacts)."""
     parts = [np.asarray(group[f"{key}_{name}"][rows[0] : rows[-1] + 1])[rows - rows[0]] for name in placed]
     return np.concatenate(parts, axis=1)
-
-
-def surface(contact: Pairs) -> tuple[Indices, int]:
-    """Cells on the pairs with VTK's number of their kind: triangles on each face, single points where that fails."""
-    vertices = np.arange(contact.n_pairs)[:, None], VERTEX
-    if contact.positions is None:
-        return vertices
-    names, number = _faces(contact)
-    try:
-        cells = [_triangles(contact.positions, np.flatnonzero(number == k)) for k in range(len(names))]
-    except QhullError:  # fewer than three pairs, or all in a line
-        return vertices
-    return np.concatenate(cells), TRIANGLE
-
-
-def _faces(contact: Pairs) -> tuple[list[str], Indices]:
-    """Names of the faces, and the number of each pair's."""
-    given = list(contact.faces) if contact.faces is not None else [""] * contact.n_pairs
-    names = list(dict.fromkeys(str(face) for face in given))
-    return names, np.array([names.index(str(face)) for face in given])
-
-
-def _triangles(positions: Array, pairs: Indices) -> Indices:
-    """Of a face's pairs (n, 3), without those that bridge gaps."""
-    places = np.asarray(positions, dtype=float)[pairs]
-    if len(pairs) < 3:
-        raise QhullError("fewer than three pairs")
-    corners = Delaunay(places).simplices
-    sides = np.linalg.norm(places[corners] - places[np.roll(corners, 1, axis=1)], axis=2).max(axis=1)
-    return np.asarray(pairs[corners[sides <= BRIDGE * np.median(sides)]])
 
 
 def _natural_scale(points: Array, depth: Array) -> float:
