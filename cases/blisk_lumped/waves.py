@@ -21,6 +21,8 @@ import model as case
 FRICTION = (0.06, 0.13, 0.3, 0.67, 1.5)
 #: Time samples of a period: a multiple of the sectors, so that all see the slider's kinks between the same samples.
 SAMPLES = 20 * case.SECTORS
+#: Lines of curves that lie on each other.
+LINES = ("-", "--", "-.", ":", (0, (4, 1, 1, 1, 1, 1)))
 COLUMNS = (
     "friction",
     "amplitude",
@@ -66,57 +68,50 @@ def summary(table: list[dict[str, Any]]) -> str:
 
 def draw(tables: list[list[dict[str, Any]]], stuck: fw.LinearMode, free_hz: float, path: Path) -> None:
     """Frequency and damping over amplitude, and over amplitude per friction coefficient where all curves are one."""
-    import matplotlib
+    from fretwave.plots import labels, style
 
-    matplotlib.use("Agg")
-    from matplotlib import pyplot as plt
-
-    figure, axes = plt.subplots(2, 2, sharey="row", figsize=(10, 6.5), constrained_layout=True)
-    styles = ("-", "--", "-.", ":", (0, (4, 1, 1, 1, 1, 1)))
-    for number, table in enumerate(tables):
-        mu = table[0]["friction"]
-        for column, scale in enumerate((1e3, 1e3 / mu)):
-            x = scale * np.array([row["amplitude"] for row in table])
-            look = {"color": plt.cm.viridis(number / len(tables)), "linestyle": styles[number] if column else "-"}
-            axes[0, column].plot(x, [row["frequency_hz"] for row in table], label=f"$\\mu$ = {mu:g}", **look)
-            axes[1, column].plot(x, [100 * row["zeta"] for row in table], **look)
-    for column, label in enumerate(("amplitude of the disk [mm]", "amplitude of the disk / $\\mu$ [mm]")):
-        axes[1, column].set(xscale="log", xlabel=label)
-        axes[0, column].set(xscale="log")
-        axes[0, column].axhline(stuck.frequency_hz, color="0.5", lw=0.8, ls=":")
-        axes[0, column].axhline(free_hz, color="0.5", lw=0.8, ls=":")
-    left = axes[0, 0].get_xlim()[0]
-    axes[0, 0].annotate("stuck", (left, stuck.frequency_hz), xytext=(6, 4), textcoords="offset points", color="0.4")
-    axes[0, 0].annotate("free", (left, free_hz), xytext=(6, -12), textcoords="offset points", color="0.4")
-    axes[0, 0].set_ylabel("frequency [Hz]")
-    axes[1, 0].set_ylabel("damping ratio [%]")
-    axes[0, 0].legend(loc="center left", frameon=False)
-    figure.savefig(path, dpi=130)
+    with style.rules():
+        figure, axes = style.new_figure(6.0, rows=2, columns=2, sharex="col", sharey="row")
+        for table, colour, line in zip(tables, style.shades(len(tables)), LINES):
+            amplitude, mu = np.array([row["amplitude"] for row in table]), table[0]["friction"]
+            for (upper, lower), x, dash in zip(axes.T, (1e3 * amplitude, 1e3 * amplitude / mu), ("-", line)):
+                look = {"color": colour, "linestyle": dash, "label": f"µ = {mu:g}"}
+                upper.plot(x, [row["frequency_hz"] for row in table], **look)
+                lower.plot(x, [100 * row["zeta"] for row in table], **look)
+        for upper, lower, text in zip(*axes, ("Amplitude of the disk", "Amplitude of the disk / µ")):
+            for frequency, dash in ((stuck.frequency_hz, "--"), (free_hz, "-.")):
+                upper.axhline(frequency, color=style.GREY, linewidth=1.0, linestyle=dash, zorder=1)
+            lower.set_xscale("log")
+            style.plain_numbers(lower.xaxis)
+            lower.set_xlabel(style.label(text, "mm"))
+        axes[0, 0].set_ylabel(style.label("Frequency", "Hz"))
+        axes[1, 0].set_ylabel(style.label("Damping ratio ζ", "%"))
+        style.legend_outside(figure, axes[0, 0], columns=5)
+        labels.along(axes[0, 0], [("stuck", stuck.frequency_hz), ("free", free_hz)], fontsize=10)
+        figure.savefig(path, dpi=style.DPI)
 
 
 def draw_wheel(table: list[dict[str, Any]], nodal_diameter: int, path: Path) -> None:
     """Disk and ring around the wheel at one instant: stuck, at the largest damping, and sliding."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot as plt
+    from fretwave.plots import style
 
     peak = int(np.argmax([row["zeta"] for row in table]))
     angle = 2 * np.pi * np.arange(case.SECTORS + 1) / case.SECTORS
-    figure, axes = plt.subplots(1, 3, figsize=(11, 4.2), subplot_kw={"projection": "polar"}, constrained_layout=True)
-    for axis, number, title in zip(axes, (0, peak, -1), ("stuck", "largest damping", "sliding")):
-        row = table[number]
-        around = case.sector().wave(row["q"], nodal_diameter).real / row["amplitude"]
-        for name, look in (("disk", "-o"), ("ring", "--s")):
-            motion = np.append(around[:, case.DOFS.index(name)], around[0, case.DOFS.index(name)])
-            axis.plot(angle, 3 + motion, look, ms=3.5, lw=1.2, label=name)
-        axis.plot(np.linspace(0, 2 * np.pi, 200), np.full(200, 3.0), color="0.6", lw=0.8)
-        axis.set(ylim=(0, 4.4), yticks=[], xticks=angle[:-1:6], title=f"{title}, {row['frequency_hz']:.2f} Hz")
-        axis.set_xticklabels([f"sector {j}" for j in range(0, case.SECTORS, 6)], fontsize=8)
-        axis.tick_params(pad=8)
-        axis.grid(False)
-    axes[0].legend(loc="center", frameon=False)
-    figure.savefig(path, dpi=130)
+    with style.rules():
+        figure, axes = style.new_figure(3.5, columns=3, subplot_kw={"projection": "polar"})
+        for axis, number, title in zip(axes, (0, peak, -1), ("Stuck", "Largest damping", "Sliding")):
+            row = table[number]
+            around = case.sector().wave(row["q"], nodal_diameter).real / row["amplitude"]
+            for name, look, colour in (("disk", "-o", style.BLUE), ("ring", "--s", style.ORANGE)):
+                motion = np.append(around[:, case.DOFS.index(name)], around[0, case.DOFS.index(name)])
+                axis.plot(angle, 3 + motion, look, ms=3.0, lw=1.2, color=colour, label=name)
+            axis.plot(np.linspace(0, 2 * np.pi, 200), np.full(200, 3.0), color=style.GREY, lw=0.8)
+            axis.set(ylim=(0, 4.4), yticks=[], xticks=angle[:-1:6])
+            axis.set_title(f"{title},\n{row['frequency_hz']:.2f} Hz", loc="center")
+            axis.set_xticklabels([f"sector {j}" for j in range(0, case.SECTORS, 6)], fontsize=8)
+            axis.grid(False)
+        style.legend_outside(figure, axes[0])
+        figure.savefig(path, dpi=style.DPI)
 
 
 def main() -> None:

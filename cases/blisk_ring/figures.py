@@ -5,52 +5,55 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import matplotlib
-
-matplotlib.use("Agg")
 import numpy as np
 import numpy.typing as npt
-from matplotlib import pyplot as plt
-from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from fretwave import rotation
+from fretwave.plots import solid, style
+from fretwave.units import SI
 
 Array = npt.NDArray[np.float64]
-DISK, RING = "#8fb3cf", "#d1495b"
+#: The sector as the groove shows, its ring alone from outside, and the wheel.
+SECTOR, RING, WHEEL = solid.Camera(215.0, 15.0), solid.Camera(35.0, 55.0), solid.Camera(-70.0, 38.0)
+#: Share of the picture by which the moved observed tip leaves its place.
+DRAWN = 0.03
 
 
-def quads(model: dict[str, Any]) -> Array:
-    """Corners (n, 4) of the boundary faces' nodes."""
+def quads(model: dict[str, Any]) -> npt.NDArray[np.int64]:
+    """Corners (n, 4) of the boundary faces' nodes, counter-clockwise from outside."""
     faces = model["boundary_faces"]
     return np.stack([faces[:, 0, 0], faces[:, -1, 0], faces[:, -1, -1], faces[:, 0, -1]], axis=1)
 
 
-def show(axes: Any, points: Array, elevation: float, azimuth: float, zoom: float = 1.3) -> None:
-    """Equal scales around the points, no frame."""
-    middle, half = (points.max(axis=0) + points.min(axis=0)) / 2, np.ptp(points, axis=0) / 2
-    axes.set(**{f"{name}lim": (c - h, c + h) for name, c, h in zip("xyz", middle, half)})
-    axes.set_box_aspect(half, zoom=zoom)
-    axes.view_init(elevation, azimuth)
-    axes.set_axis_off()
+def outward(points: Array, faces: npt.NDArray[np.int64]) -> npt.NDArray[np.int64]:
+    """The faces of a closed solid the way round that its volume is positive."""
+    corners = points[faces]
+    areas = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]) / 2
+    volume = np.einsum("nx,nx->", areas, corners.mean(axis=1)) / 3
+    return faces if volume > 0 else faces[:, ::-1]
 
 
 def mesh(model: dict[str, Any], path: Path) -> None:
-    """The sector, and its section at the groove with ring and contact pairs."""
-    figure = plt.figure(figsize=(10, 5.2), constrained_layout=True)
-    nodes, faces = upright(model["coordinates"]), quads(model)
-    colours = np.where((faces >= model["disk_nodes"]).all(axis=1), RING, DISK)
-    axes = figure.add_subplot(1, 2, 1, projection="3d")
-    axes.add_collection3d(Poly3DCollection(nodes[faces], facecolors=colours, edgecolors="0.25", linewidths=0.25))
-    show(axes, nodes, 15, 215, 1.15)
-    axes.set_title(f"sector, {model['M'].shape[0]:,} dofs", fontsize=10)
-    ring, points = faces[colours == RING], upright(model["points"])
-    axes = figure.add_subplot(1, 2, 2, projection="3d")
-    axes.add_collection3d(Poly3DCollection(nodes[ring], facecolors=RING, edgecolors="0.25", linewidths=0.4, alpha=0.35))
-    axes.scatter(*points.T, color="k", s=14, depthshade=False)
-    show(axes, nodes[np.unique(ring)], 35, 35, 1.0)
-    axes.set_title(f"ring with {len(points)} contact pairs on its outer side", fontsize=10)
-    figure.savefig(path, dpi=130)
-    plt.close(figure)
+    """The sector, and its ring with the contact pairs, which the disk hides."""
+    nodes = upright(model["coordinates"])
+    faces = outward(nodes, quads(model))
+    ring = (faces >= model["disk_nodes"]).all(axis=1)
+    scale, unit = SI.of_faces
+    with style.rules():
+        figure, (left, right) = style.new_figure(5.4, columns=2, width_ratios=(1.0, 1.1))
+        colours = np.where(ring, solid.RED, solid.STEEL)
+        solid.draw(left, nodes, faces, SECTOR, colours)
+        left.set_title(f"Sector, {model['M'].shape[0]:,} dofs; red: the ring")
+        solid.draw(right, nodes, faces[ring], RING, solid.RED)
+        places = RING.project(upright(model["points"]))
+        look = {"color": style.INK, "markersize": 6.5, "markeredgecolor": "white", "linestyle": "", "zorder": 5}
+        right.plot(*places.T, marker="o", **look)
+        right.set_title(f"Ring, {len(places)} contact pairs on its outer side")
+        for axes, camera, place in ((left, SECTOR, (0.88, 0.06)), (right, RING, (0.5, 0.0))):
+            solid.ruler(axes, scale, unit)
+            solid.compass(axes, camera, place, ("axial", "", "radial"))
+        figure.get_layout_engine().set(h_pad=0.1)
+        figure.savefig(path, dpi=style.DPI)
 
 
 def upright(points: Array) -> Array:
@@ -62,37 +65,37 @@ def shape(o: Any, model: dict[str, Any], wave: Array, frequency: float, path: Pa
     """The whole wheel at one instant, coloured by the axial displacement."""
     moved = np.zeros((len(model["coordinates"]), 3), dtype=complex)
     moved[model["free"]] = wave.reshape(-1, 3) / abs(wave[model["tip"]])
-    faces, theta = quads(model), 2 * np.pi / o.blades
-    polygons, values = [], []
-    for j in range(o.blades):
-        turn = rotation(j * theta, "z")
-        motion = (moved * np.exp(-4j * j * theta)).real  # 4 nodal diameters
-        polygons.append(((model["coordinates"] + 0.012 * motion) @ turn.T)[faces])
-        values.append(motion[faces][:, :, 2].mean(axis=1))
-    figure = plt.figure(figsize=(7.6, 6.6), constrained_layout=True)
-    axes = figure.add_subplot(projection="3d")
-    shade = np.concatenate(values)
-    collection = Poly3DCollection(np.concatenate(polygons), cmap="RdBu_r", linewidths=0)
-    collection.set_array(shade)
-    collection.set_clim(-1, 1)
-    axes.add_collection3d(collection)
-    show(axes, np.concatenate(polygons).reshape(-1, 3), 55, -70, 1.25)
-    axes.set_title(f"second bending at 4 nodal diameters, stuck ring, {frequency:.1f} Hz", fontsize=10)
-    figure.colorbar(collection, ax=axes, shrink=0.6, label="axial displacement, 1 at the blade's observed tip")
-    figure.savefig(path, dpi=130)
-    plt.close(figure)
+    faces, theta = outward(model["coordinates"], quads(model)), 2 * np.pi / o.blades
+    turns = [rotation(j * theta, "z") for j in range(o.blades)]
+    still = np.concatenate([model["coordinates"] @ turn.T for turn in turns])
+    motion = [(moved * np.exp(-4j * j * theta)).real for j in range(o.blades)]  # 4 nodal diameters
+    around = np.concatenate([faces + j * len(moved) for j in range(o.blades)])
+    around = around[solid.unshared(still[around])]
+    reach = DRAWN * float(np.ptp(still[:, 0]))
+    points = still + reach * np.concatenate([u @ turn.T for u, turn in zip(motion, turns)])
+    values = np.concatenate([u[:, 2] for u in motion])
+    scale, unit = SI.of_faces
+    with style.rules():
+        figure, axes = style.new_figure(6.0)
+        look = {"cmap": "RdBu_r", "edgecolor": "face", "linewidth": 0.2}
+        faces = solid.draw(axes, points, around, WHEEL, values=values, limits=(-1.0, 1.0), **look)
+        solid.ruler(axes, scale, unit)
+        axes.set_title(f"Second bending, 4 nodal diameters, stuck ring, {frequency:.1f} Hz")
+        text = f"Axial displacement, 1 at the observed tip, drawn as {scale * reach:.2g} {unit}"
+        figure.colorbar(faces, ax=axes, shrink=0.8, label=text, pad=0.02)
+        figure.savefig(path, dpi=style.DPI)
 
 
 def families(table: Array, exact: dict[int, Array], path: Path) -> None:
     """Frequencies over nodal diameters; crosses: unreduced."""
-    figure, axes = plt.subplots(figsize=(7.5, 4.8), constrained_layout=True)
-    for number, family in enumerate(table.T):
-        label = "reduced, contact stuck" if number == 0 else None
-        axes.plot(range(len(table)), family / 1e3, "-o", ms=3, lw=1, color="#00798c", label=label)
-    for number, (diameters, values) in enumerate(exact.items()):
-        label = "unreduced" if number == 0 else None
-        axes.plot([diameters] * len(values), values / 1e3, "x", ms=8, color="#d1495b", label=label)
-    axes.set(xlabel="nodal diameters", ylabel="frequency [kHz]", ylim=(0, None), xticks=range(0, len(table), 2))
-    axes.legend(frameon=False, loc="upper left")
-    figure.savefig(path, dpi=130)
-    plt.close(figure)
+    with style.rules():
+        figure, axes = style.new_figure(4.8)
+        for family in table.T / 1e3:
+            axes.plot(range(len(table)), family, "-o", ms=3, lw=1.2, color=style.BLUE, label="reduced, contact stuck")
+        for diameters, values in exact.items():
+            places = np.full(len(values), diameters)
+            axes.plot(places, values / 1e3, "x", ms=8, mew=1.8, color=style.RED, label="unreduced")
+        axes.set(xlabel="Nodal diameters", ylim=(0, None), xticks=range(0, len(table), 2))
+        axes.set_ylabel(style.label("Frequency", "kHz"))
+        style.legend_outside(figure, axes)
+        figure.savefig(path, dpi=style.DPI)

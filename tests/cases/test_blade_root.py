@@ -193,7 +193,6 @@ def test_options_that_cannot_be_built_are_refused(options, words):
 
 def test_pictures_are_drawn(blade, elastic, tmp_path):
     figures = load("figures")
-    figures.plt.switch_backend("Agg")
     frequencies, shapes = model.stuck_modes(blade, 1)
     figures.plot_mesh(elastic).savefig(tmp_path / "mesh.png", dpi=50)
     figures.plot_bending(blade, frequencies[0], shapes[:, 0]).savefig(tmp_path / "bending.png", dpi=50)
