@@ -27,8 +27,12 @@ def check_reduction(
     if section is None:
         return
     report = Reporter(source, ("reduction",), found)
-    if section.modes is not None and section.up_to_hz is not None:
-        report.wrong(("up_to_hz",), "is given beside modes", "a number of modes, or a frequency", "remove one of them")
+    given = [name for name in ("modes", "up_to_hz", "accuracy") if getattr(section, name) is not None]
+    for name in given[1:]:
+        expected = "one of modes, up_to_hz and accuracy"
+        report.wrong((name,), f"is given beside {given[0]}", expected, "remove one of them")
+    if section.accuracy is not None and section.compare == 0:
+        report.wrong(("accuracy",), "is of no frequency", "frequencies to compare", "give `compare` 1 or more")
     if sectors is None:
         for key in ("interface", "interface_diameters", "compare_diameters"):
             if key in section.model_fields_set:

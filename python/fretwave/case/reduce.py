@@ -11,6 +11,7 @@ import numpy as np
 
 from ..model.sectors import by_sector
 from ..model.structure import Structure
+from .component_modes import Choice, choice_of
 from .contacts import on
 from .reduction_report import report_of
 
@@ -48,18 +49,37 @@ def reduce_case(
     look : callable, optional
         Gets the reduction while it lives. Collective.
     """
-    section = case.reduction
-    if section is None:
+    if case.reduction is None:
         return case
+    choice = None if modes is not None else choice_of(case)
+    reduced = None
+    while reduced is None:
+        reduced, modes = _reduced(case, comm, modes, look, choice)
+    return replace(reduced, unreduced=case.structure if case.reduction.error_at is not None else None)
+
+
+def _reduced(
+    case: Case,
+    comm: MPI.Comm,
+    modes: int | None,
+    look: Callable[[Reduction | SectorReduction], None] | None,
+    choice: Choice | None,
+) -> tuple[Case | None, int | None]:
+    """With this many component modes; or, where they are not enough, none and how many to take. Collective."""
     began = time.perf_counter()
     with reduction_of(case, comm, modes) as reduction:
         full = case.structure
         small = full.reduced(reduction) if full.cut is None else full.cut.reduced(reduction).tied()
         reduced = replace(case, structure=small, contacts=on(case.contacts, small))
         report = report_of(case, reduced, reduction, time.perf_counter() - began, comm)
+        if choice is not None:
+            more = choice.next(report)
+            if more is not None:
+                return None, more
+            report = replace(report, chosen=choice.line())
         if look is not None:
             look(reduction)
-    return replace(reduced, reduced=report, unreduced=full if section.error_at is not None else None)
+    return replace(reduced, reduced=report), modes
 
 
 def nonlinear_error_at(case: Case, analysis: AnalysisSection, problem: NonlinearMode, y: PETSc.Vec) -> NonlinearError:

@@ -46,6 +46,8 @@ class ReductionReport:
         the first stands above.
     wave_lines : list of str
         The same for the log.
+    chosen : str
+        How its component modes were, for the log; empty where they were told.
     """
 
     unreduced: int
@@ -60,10 +62,15 @@ class ReductionReport:
     interface: int = 0
     waves: list[dict[str, Any]] = field(default_factory=list)
     wave_lines: list[str] = field(default_factory=list)
+    chosen: str = ""
+
+    def every_relative(self) -> list[list[float | None]]:
+        """Of all frequencies that are compared, wave by wave."""
+        return [list(self.relative), *(wave["relative"] for wave in self.waves)]
 
     def plain(self) -> dict[str, Any]:
         """For run.json and results.h5."""
-        return {key: value for key, value in asdict(self).items() if key != "wave_lines"}
+        return {key: value for key, value in asdict(self).items() if key not in ("wave_lines", "chosen")}
 
     def lines(self) -> list[str]:
         """For the log: one line, and one for each wave of a sector that was compared."""
@@ -73,8 +80,11 @@ class ReductionReport:
                 f" {self.component_modes} component modes (up to {self.highest_component_hz:.4g} Hz),"
                 f" {self.wall_s:.1f} s"
             )
-            return [text, *(f"reduction: {line}" for line in self.wave_lines)]
-        return [self._line()]
+            return [*self._chosen(), text, *(f"reduction: {line}" for line in self.wave_lines)]
+        return [*self._chosen(), self._line()]
+
+    def _chosen(self) -> list[str]:
+        return [self.chosen] if self.chosen else []
 
     def _line(self) -> str:
         text = (

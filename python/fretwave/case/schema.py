@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal, Optional, Union
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema
 from pydantic_core import PydanticKnownError
 
+from ..hb.states import ZETA_FLOOR
 from ..model.sizes import COMPARED_MODES, COMPONENT_MODES, INTERFACE_TOLERANCE, INTERFACE_WAVES
 from ..solve.steps import StepControl
 from ..units import MM_T_S, SI, SYSTEMS
@@ -143,6 +144,13 @@ class ReductionSection(Section):
         f"number of component modes ({COMPONENT_MODES} unless told)", example="10", default=None, ge=0
     )
     up_to_hz: Optional[Positive] = key("instead of modes: all component modes up to here", "Hz", "5000.0", default=None)
+    accuracy: Optional[Annotated[float, Field(gt=0, lt=1)]] = key(
+        "instead of modes: as many as keep the frequencies that are compared this accurate, relative; unless told, "
+        f"that of an analysis with `accuracy` to {ZETA_FLOOR:g} of it",
+        "-",
+        "1e-6",
+        default=None,
+    )
     compare: Whole = key(
         "linear modes compared with the unreduced model, 0 for none", example="5", default=COMPARED_MODES, ge=0
     )

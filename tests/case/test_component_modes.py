@@ -1,0 +1,98 @@
+"""Component modes for an accuracy: how many are taken, what is said of it, and that the accuracy is kept."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from command_line import call
+from models.chain_case import BUILDER, CHAIN
+
+from fretwave.case.component_modes import Choice, choice_of
+from fretwave.case.load import load_case
+from fretwave.case.reduction_report import ReductionReport
+from fretwave.errors import CaseErrors
+from fretwave.hb.states import ZETA_FLOOR
+
+pytestmark = pytest.mark.ranks(1)
+
+
+@pytest.fixture
+def write(tmp_path: Path):
+    """The chain of 18 dofs, 12 of them inner ones, with another [reduction] and further keys of its mode."""
+
+    def make(reduction: str, mode: str = "harmonics = 3\nsamples = 64") -> Path:
+        (tmp_path / "model.py").write_text(BUILDER.read_text())
+        assert "modes = 12" in CHAIN
+        text = CHAIN.replace("modes = 12", reduction)
+        analysis = (
+            f'\n[[analysis]]\nname = "mode"\ntype = "mode"\nnormalise = "tip"\namplitude = [2e-7, 1e-6]\n{mode}\n'
+        )
+        (tmp_path / "case.toml").write_text(text + analysis)
+        return tmp_path / "case.toml"
+
+    return make
+
+
+def report(modes: int, error: float, unreduced: int = 10_000, interface: int = 0) -> ReductionReport:
+    waves = [{"relative": [None, -error]}] if interface else []
+    relative = [0.0 if interface else error]
+    return ReductionReport(unreduced, 100, modes, 1.0, [1.0], [1.0], relative, 0.0, 0.0, interface, waves)
+
+
+@pytest.mark.parametrize("interface", [0, 8])
+def test_numbers_double_until_the_accuracy_is_kept(interface: int) -> None:
+    choice = Choice(1e-4, 5)
+    assert choice.next(report(10, 1e-2, interface=interface)) == 20
+    assert choice.next(report(20, 1e-3, interface=interface)) == 40
+    assert choice.next(report(40, 9e-5, interface=interface)) is None
+    assert "10 leave 1.0e-02, 20 leave 1.0e-03, 40 leave 9.0e-05" in choice.line()
+    assert "not kept" not in choice.line()
+
+
+def test_modes_that_change_little_or_are_all_there_are_end_it() -> None:
+    choice = Choice(1e-6, 5)
+    assert choice.next(report(10, 1e-3)) == 20
+    assert choice.next(report(20, 0.9e-3)) is None and "change little: this is not kept" in choice.line()
+    choice = Choice(1e-6, 5)
+    assert choice.next(report(10, 1e-3, unreduced=115)) == 15
+    assert choice.next(report(15, 1e-4, unreduced=115)) is None and "15 are the most" in choice.line()
+
+
+def test_frequencies_beyond_those_that_count_do_not(write) -> None:
+    found = ReductionReport(10_000, 100, 10, 1.0, [1.0] * 3, [1.0] * 3, [1e-7, 1e-5, 1e-2], 0.0, 0.0)
+    assert Choice(1e-4, 2).next(found) is None
+    assert Choice(1e-4, 3).next(found) == 20
+
+
+def test_an_analysis_accuracy_asks_for_one_of_its_frequency(write) -> None:
+    choice = choice_of(load_case(write("compare = 3", "accuracy = 1e-2\nlinear_mode = 2")))
+    assert choice is not None and (choice.asked, choice.frequencies) == (pytest.approx(1e-2 * ZETA_FLOOR), 2)
+    assert choice_of(load_case(write("compare = 3"))) is None
+    assert choice_of(load_case(write("modes = 6", "accuracy = 1e-2"))) is None
+    told = choice_of(load_case(write("accuracy = 1e-3", "accuracy = 1e-2")))
+    assert told is not None and (told.asked, told.frequencies) == (1e-3, 5)
+
+
+@pytest.mark.parametrize(
+    "reduction, said",
+    [
+        ("accuracy = 1e-5\nmodes = 6", "is given beside modes"),
+        ("accuracy = 1e-5\nup_to_hz = 100.0", "is given beside up_to_hz"),
+        ("accuracy = 1e-5\ncompare = 0", "is of no frequency"),
+    ],
+)
+def test_what_contradicts_it_is_refused(write, reduction: str, said: str) -> None:
+    with pytest.raises(CaseErrors) as caught:
+        load_case(write(reduction))
+    assert said in str(caught.value)
+
+
+def test_a_run_keeps_it_and_says_so(write, tmp_path: Path) -> None:
+    out = tmp_path / "run"
+    assert call("run", str(write("accuracy = 1e-9\ncompare = 3")), "--no-plots", "--out", str(out)) == 0
+    found = json.loads((out / "run.json").read_text())["reduction"]
+    assert found["component_modes"] == 12  # ten are not enough, twelve are all
+    assert max(abs(error) for error in found["relative"]) <= 1e-9
+    assert "component modes for 1.0e-09 of the lowest frequencies: 10 leave" in (out / "run.log").read_text()
