@@ -54,4 +54,16 @@ int invert(std::vector<T>& A, int n) {
   return info;
 }
 
+/// A x, A rows x columns, column-major. Where rows are two more than a multiple of four, cgemv of OpenBLAS
+/// 0.3.21 (Debian 12's) reads the entry behind the last of x: there is one.
+inline std::vector<std::complex<float>> product(int rows, int columns, std::complex<float> const* A,
+                                                std::vector<std::complex<float>> x) {
+  const int step = 1;
+  const std::complex<float> one = 1, zero = 0;
+  std::vector<std::complex<float>> out(rows);
+  x.emplace_back();
+  cgemv_("N", &rows, &columns, &one, A, &rows, x.data(), &step, &zero, out.data(), &step);
+  return out;
+}
+
 }  // namespace fretwave::lapack

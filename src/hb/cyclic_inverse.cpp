@@ -36,14 +36,12 @@ void CyclicInverse::invert(size_t wave, CirculantBlocks<complex> const& blocks) 
 }
 
 std::vector<scomplex> CyclicInverse::multiply(size_t wave, int columns, complex const* x) const {
+  const std::vector<scomplex> in(x, x + columns);
+  if (!transposed(wave)) return lapack::product(n_, columns, place(wave), in);
   const int step = 1;
   const scomplex one = 1, zero = 0;
-  const std::vector<scomplex> in(x, x + columns);
-  std::vector<scomplex> out(n_);
-  if (transposed(wave))  // rows of the mirror's inverse
-    cgemv_("T", &columns, &n_, &one, place(wave), &n_, in.data(), &step, &zero, out.data(), &step);
-  else
-    cgemv_("N", &n_, &columns, &one, place(wave), &n_, in.data(), &step, &zero, out.data(), &step);
+  std::vector<scomplex> out(n_);  // rows of the mirror's inverse
+  cgemv_("T", &columns, &n_, &one, place(wave), &n_, in.data(), &step, &zero, out.data(), &step);
   return out;
 }
 

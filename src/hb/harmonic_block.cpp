@@ -31,12 +31,7 @@ class ComplexBlock : public HarmonicBlock {
   ComplexBlock(Place place, std::vector<scomplex> A) : at_(place), A_(std::move(A)) {}
 
   void apply(double const* x, double* z) const override {
-    const int n = at_.dofs, step = 1;
-    const scomplex one = 1, zero = 0;
-    const auto in = at_.gather<float>(x);
-    std::vector<scomplex> out(n);
-    cgemv_("N", &n, &n, &one, A_.data(), &n, in.data(), &step, &zero, out.data(), &step);
-    at_.scatter(out, z);
+    at_.scatter(lapack::product(at_.dofs, at_.dofs, A_.data(), at_.gather<float>(x)), z);
   }
 
   Rotation entry(int i, int j) const override {
