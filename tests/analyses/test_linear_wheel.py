@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 
 import numpy as np
 import pytest
 import scipy.linalg
 from models.linear_cases import CONTACT, GROUND, MASS, NEXT, ring
+from models.solved_case import tables_of
 from tolerances import REPEATED, TIGHT
 
 from fretwave.case.load import load_case
@@ -17,8 +17,6 @@ from fretwave.plots import campbell
 from fretwave.post.amplification import Family, largest_response
 from fretwave.post.blade_peaks import whitehead
 from fretwave.results.reader import Run
-from fretwave.run.order import RunOptions
-from fretwave.run.runner import run_case
 
 ZETA, N = 0.004, 6
 WHEEL = "wheel = true\n"
@@ -35,23 +33,7 @@ def text(keys: str, tables: str = "", sectors: int = N) -> str:
 @pytest.fixture
 def solve(shared_tmp, comm):
     """Tables of a run of a case."""
-
-    def run(case: str, *names: str) -> list[dict[str, np.ndarray]]:
-        path, out = shared_tmp / "case.toml", shared_tmp / "run"
-        if comm.rank == 0:
-            path.write_text(case, encoding="utf-8")
-        comm.barrier()
-        assert run_case(path, RunOptions(out=out, plots=False, force=True), comm) == 0
-        comm.barrier()
-        return [columns(out / f"{name}.csv") for name in names]
-
-    return run
-
-
-def columns(path: Path) -> dict[str, np.ndarray]:
-    with path.open(newline="") as file:
-        rows = list(csv.DictReader(file))
-    return {key: np.array([row[key] if key == "contact" else float(row[key]) for row in rows]) for key in rows[0]}
+    return lambda text, *names: tables_of(text, shared_tmp, comm, *names)
 
 
 def wheel(deviations: np.ndarray, contact: float = CONTACT) -> np.ndarray:

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import csv
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
 import scipy.linalg
 from command_line import call
 from models.linear_cases import CONTACT, GROUND, MASS, NEXT, ring
+from models.solved_case import tables_of
 from tolerances import SOLVED, TIGHT
 
 from fretwave.case.load import load_case
 from fretwave.errors import CaseErrors
-from fretwave.run.order import RunOptions
-from fretwave.run.runner import run_case
 
 ZETA, FORCE, SLIDER = 0.01, 1e-4, 7.0
 M = np.diag([2.0, 1.0, 0.5])
@@ -95,27 +92,7 @@ def forced(dof: str, hz: np.ndarray, *keys: str) -> str:
 @pytest.fixture
 def solve(shared_tmp, comm):
     """Tables of a run of a case."""
-
-    def run(text: str, *names: str) -> list[dict[str, np.ndarray]]:
-        path, out = shared_tmp / "case.toml", shared_tmp / "run"
-        if comm.rank == 0:
-            path.write_text(text, encoding="utf-8")
-        comm.barrier()
-        assert run_case(path, RunOptions(out=out, plots=False), comm) == 0
-        comm.barrier()
-        return [columns(out / f"{name}.csv") for name in names]
-
-    return run
-
-
-def columns(path: Path) -> dict[str, np.ndarray]:
-    """Columns that are numbers."""
-    with path.open(newline="") as file:
-        rows = list(csv.DictReader(file))
-    return {
-        key: np.array([row[key] for row in rows] if key in ("event", "contact") else [float(row[key]) for row in rows])
-        for key in rows[0]
-    }
+    return lambda text, *names: tables_of(text, shared_tmp, comm, *names)
 
 
 def reported(forced: dict[str, np.ndarray]) -> np.ndarray:
