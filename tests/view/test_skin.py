@@ -46,8 +46,11 @@ def cells_of(kind):
 @pytest.mark.parametrize(
     "kind", ["hexahedron", "quadratic_hexahedron", "triquadratic_hexahedron", "cut_hexahedron", "wedge", "tetrahedron"]
 )
-def test_faces_close_the_body_and_look_outwards(kind):
+@pytest.mark.parametrize("side", [1.0, -1.0], ids=["", "mirrored"])
+def test_faces_close_the_body_and_look_outwards(kind, side):
+    """Also of cells that were read inside out."""
     nodes, cells = cells_of(kind)
+    nodes = nodes * [side, 1.0, 1.0]
     size = np.ptp(nodes[np.unique(cells[0])], axis=0)
     faces = skin(nodes, [cells])
     area, volume = 0.0, 0.0

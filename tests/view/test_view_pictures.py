@@ -16,6 +16,8 @@ from models.vtkhdf_files import read_step
 from test_series import SINGLE, read_vtu
 from tolerances import ROUNDING
 
+from fretwave.cyclic.faces import rotation
+
 pytestmark = pytest.mark.ranks(1)
 pytest.importorskip("skfem")
 Image = pytest.importorskip("PIL.Image")
@@ -67,6 +69,8 @@ def test_faces_of_a_wheel_enclose_its_volume(run: Path) -> None:
     vectors = np.cross(corners, np.roll(corners, -1, axis=1)).sum(axis=1) / 2
     volume = np.einsum("nx,nx->", vectors, corners.mean(axis=1)) / 3
     assert np.abs(vectors.sum(axis=0)).max() < ROUNDING * np.abs(vectors).sum()
+    middles = np.round(corners.mean(axis=1), 9)
+    assert len(np.unique(middles, axis=0)) == len(middles)  # no face lies on another
     angles = np.pi / SECTORS * np.array([0.5, 0.5, 0.5, 0.5])  # chords between the nodes of the annulus
     ring = HEIGHT * SECTORS * 0.5 * np.sin(angles).sum() * (RIM**2 - 0.1**2)
     blades = HEIGHT * SECTORS * 0.5 * np.sin(angles[:2]).sum() * (TIP**2 - RIM**2)
@@ -122,6 +126,18 @@ def test_traction_is_the_pairs_force_over_their_area(run: Path) -> None:
         across = found["traction"] - along[:, None] * found["normal"]
         np.testing.assert_allclose(np.linalg.norm(across, axis=1), found["tangential_force"] / area, rtol=1e-9)
         assert found["tangential_force"].max() > 0
+
+
+def test_traction_turns_with_its_sector_and_comes_later(run: Path) -> None:
+    """From one sector to the next by a sixth of a turn, and by 2 / 6 of a period: 4 of 12 steps."""
+    assert call("view", run, "--phases", PHASES) == 0
+    first, second = (
+        read_step(run / "mode_contact.vtkhdf", step)["traction"].reshape(SECTORS, -1, 3) for step in (3, 3 + 4)
+    )
+    np.testing.assert_allclose(
+        second[1], first[0] @ rotation(2 * np.pi / SECTORS, "z").T, atol=1e-6 * np.abs(first).max()
+    )
+    assert np.abs(first[0, :, :2]).max() > 1e-3 * np.abs(first).max()
 
 
 def test_nodes_without_cells_are_no_picture(tmp_path: Path, capfd) -> None:
