@@ -68,7 +68,7 @@ def summary(table: list[dict[str, Any]]) -> str:
 
 def draw(tables: list[list[dict[str, Any]]], stuck: fw.LinearMode, free_hz: float, path: Path) -> None:
     """Frequency and damping over amplitude, and over amplitude per friction coefficient where all curves are one."""
-    from fretwave.plots import labels, style
+    from fretwave.plots import labels, marks, style
 
     with style.rules():
         figure, axes = style.new_figure(6.0, rows=2, columns=2, sharex="col", sharey="row")
@@ -76,17 +76,20 @@ def draw(tables: list[list[dict[str, Any]]], stuck: fw.LinearMode, free_hz: floa
             amplitude, mu = np.array([row["amplitude"] for row in table]), table[0]["friction"]
             for (upper, lower), x, dash in zip(axes.T, (1e3 * amplitude, 1e3 * amplitude / mu), ("-", line)):
                 look = {"color": colour, "linestyle": dash, "label": f"µ = {mu:g}"}
-                upper.plot(x, [row["frequency_hz"] for row in table], **look)
-                lower.plot(x, [100 * row["zeta"] for row in table], **look)
+                for axis, name, factor in ((upper, "frequency_hz", 1.0), (lower, "zeta", 100.0)):
+                    values = factor * np.array([row[name] for row in table])
+                    axis.plot(x, values, **look)
+                    marks.points(axis, x, values, colour, many=True)
+        marks.point_entry(axes[0, 0], many=True)
         for upper, lower, text in zip(*axes, ("Amplitude of the disk", "Amplitude of the disk / µ")):
             for frequency, dash in ((stuck.frequency_hz, "--"), (free_hz, "-.")):
                 upper.axhline(frequency, color=style.GREY, linewidth=1.0, linestyle=dash, zorder=1)
             lower.set_xscale("log")
-            style.plain_numbers(lower.xaxis)
+            style.plain_numbers(lower.xaxis, np.concatenate([line.get_xdata() for line in lower.get_lines()]))
             lower.set_xlabel(style.label(text, "mm"))
         axes[0, 0].set_ylabel(style.label("Frequency", "Hz"))
         axes[1, 0].set_ylabel(style.label("Damping ratio ζ", "%"))
-        style.legend_outside(figure, axes[0, 0], columns=5)
+        style.legend_outside(figure, axes[0, 0], columns=6)
         labels.along(axes[0, 0], [("stuck", stuck.frequency_hz), ("free", free_hz)], fontsize=10)
         figure.savefig(path, dpi=style.DPI)
 
@@ -108,7 +111,8 @@ def draw_wheel(table: list[dict[str, Any]], nodal_diameter: int, path: Path) -> 
             axis.plot(np.linspace(0, 2 * np.pi, 200), np.full(200, 3.0), color=style.GREY, lw=0.8)
             axis.set(ylim=(0, 4.4), yticks=[], xticks=angle[:-1:6])
             axis.set_title(f"{title},\n{row['frequency_hz']:.2f} Hz", loc="center")
-            axis.set_xticklabels([f"sector {j}" for j in range(0, case.SECTORS, 6)], fontsize=8)
+            axis.set_xticklabels([f"sector {j}" if j == 0 else f"{j}" for j in range(0, case.SECTORS, 6)], fontsize=9)
+            axis.tick_params(pad=3)
             axis.grid(False)
         style.legend_outside(figure, axes[0])
         figure.savefig(path, dpi=style.DPI)

@@ -10,9 +10,11 @@ from models.table_rows import SHARED
 from tolerances import ROUNDING
 
 from fretwave.columns import FLUTTER, FORCED, MODE
-from fretwave.plots import backbone, flutter, forced, gauges, marks, style
+from fretwave.plots import backbone, flutter, forced, gauges, marks, style, sweeps
+from fretwave.post.grid import Plan
 from fretwave.results.reader import Run
 from fretwave.results.results import AnalysisWriter
+from fretwave.results.sweeps import read_branch, write_sweep
 
 pytestmark = pytest.mark.ranks(1)
 
@@ -153,3 +155,27 @@ def test_a_legend_is_never_wider_than_its_picture():
         axes.plot([0, 1], [0, 1], label=f"{number} is the number of a curve with a name of many words")
     style.legend_outside(figure, axes, columns=5)
     assert figure.legends[0].get_window_extent(figure.canvas.get_renderer()).width <= figure.bbox.width
+
+
+def test_a_sweep_marks_the_value_that_stopped_and_names_it(tmp_path, comm):
+    """Of two responses the second came to half of its range; both have errors and points."""
+    parts = []
+    for number, (status, count) in enumerate((("done", 9), ("stopped", 5))):
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        told = {"type": "forced", "observe": "tip", "run_id": "one"}
+        writer = AnalysisWriter(folder, "forced", FORCED, told, ["tip"], ["1c"])
+        for point, hertz in enumerate(np.linspace(1.0, 2.0, 9)[:count]):
+            row = {"point": point, "level": 1.0, "omega": 2 * np.pi * hertz, "frequency_hz": hertz, "phase": 0.0}
+            row |= {**SHARED, "amplitude": 1.0 + number, "amplitude_error": 0.25, "wall_s": 0.0, "event": ""}
+            writer.append(row, np.zeros((1, 1)))
+        writer.close(status, "level 1: folds without end")
+        parts.append(read_branch(folder, "forced", number, "one"))
+    plan = Plan({"load.scale": (3, 4)})
+    ending = {"status": "stopped", "reason": "scale = 4: level 1: folds without end", "run_id": "one"}
+    write_sweep(tmp_path, "sweep", "forced", plan, parts, ending)
+    figure = dict(sweeps.figures(Run(tmp_path)))["sweep_responses"]
+    np.testing.assert_allclose(marked(figure.axes[0], "X"), [[1.5, 2.0]])
+    assert len(marked(figure.axes[0], "o")) == 14 and len(figure.axes[0].collections) == 2
+    assert "scale = 4 stopped short: level 1: folds without end" in entries(figure)
+    assert "estimated error, at most 0.25 m" in entries(figure)

@@ -119,6 +119,8 @@ def apart(values: Sequence[float]) -> Callable[[float], str]:
     return lambda value: number(value, digits)
 
 
+#: An axis over more than this factor has no room for numbers between its decades.
+MANY_DECADES = 1e4
 #: values that differ by more than this factor stand on a logarithmic axis
 LINEAR_UP_TO = 8.0
 
@@ -155,9 +157,10 @@ def error_band(axes: Axes, x: AnyArray, y: AnyArray, error: AnyArray, colour: st
 
 
 def plain_numbers(axis: Axis, values: AnyArray | Sequence[float] = (1.0, 10.0)) -> None:
-    """Ticks of a logarithmic axis at 1, 2, 5 of each decade (closer within one), as 0.05 and not as a power."""
-    short = np.max(values) < 8.0 * np.min(values)
-    axis.set_major_locator(LogLocator(base=10.0, subs=(1.0, 1.5, 2.0, 3.0, 4.0, 6.0) if short else (1.0, 2.0, 5.0)))
+    """Ticks of a logarithmic axis at 1, 2, 5 of each decade (closer within one, at 1 of many), as 0.05 and no power."""
+    ratio = np.max(values) / np.min(values)
+    subs = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0) if ratio < 8.0 else (1.0, 2.0, 5.0) if ratio < MANY_DECADES else (1.0,)
+    axis.set_major_locator(LogLocator(base=10.0, subs=subs))
     axis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
     axis.set_minor_formatter(NullFormatter())
 

@@ -147,7 +147,7 @@ def backbones(swept: Swept) -> Figure:
     lower.set_ylabel(style.label("Damping ratio ζ", "%"))
     dof = swept.analysis.attributes.get("normalise", "")
     lower.set_xlabel(scale.label(f"Modal amplitude of {dof}".rstrip(" of")))
-    _name(figure, [upper, lower], swept)
+    _name(figure, [upper, lower], swept, lambda axes: error_entry(axes, [table for *_, table in swept.branches]))
     labels.along(upper, named, fontsize=10)
     return figure
 
@@ -156,8 +156,12 @@ def responses(swept: Swept) -> Figure:
     """Amplitude over frequency, a line style for each level."""
     figure, axes = style.new_figure(5.0)
     scale = scales.linear(swept.analysis.unit_system, swept.unit("length"), swept.analysis.columns["amplitude"])
-    for number, part, table in swept.branches:
-        axes.plot(table["frequency_hz"], scale(table["amplitude"]), **swept.look(number, part))
+    errors = [scale(t["amplitude_error"]) if "amplitude_error" in t else None for _, _, t in swept.branches]
+    for (number, part, table), error in zip(swept.branches, errors):
+        look = swept.look(number, part)
+        axes.plot(table["frequency_hz"], scale(table["amplitude"]), **look)
+        if error is not None:
+            style.error_band(axes, table["frequency_hz"], scale(table["amplitude"]), error, look["color"])
     _points(axes, swept, lambda table: (table["frequency_hz"], scale(table["amplitude"])))
     peaks = swept.summary["largest_amplitude"]
     if np.nanmax(peaks) > style.LINEAR_UP_TO * np.nanmin(peaks):
@@ -165,7 +169,7 @@ def responses(swept: Swept) -> Figure:
     axes.set_xlabel(style.label("Excitation frequency", "Hz"))
     dof = swept.analysis.attributes.get("observe", "")
     axes.set_ylabel(scale.label(f"Amplitude of {dof}".rstrip(" of")))
-    _name(figure, [axes], swept)
+    _name(figure, [axes], swept, lambda axes: marks.error_entry(axes, {scale.unit: errors}))
     return figure
 
 
@@ -195,15 +199,14 @@ def _asymptotes(axes: Axes, swept: Swept) -> list[tuple[str, float]]:
     return [(f"{words[word]} {frequency:.6g} Hz", frequency) for word, frequency in common.items()]
 
 
-def _name(figure: Figure, axes: list[Axes], swept: Swept) -> None:
+def _name(figure: Figure, axes: list[Axes], swept: Swept, name_error: Callable[[Axes], None]) -> None:
     """A legend of the values; of many, a colour bar."""
     names = swept.names()
     if len(swept.plan) <= NAMED or swept.crossed():
         for label, look in names:
             axes[0].plot([], [], label=label, **look)
     marks.point_entry(axes[0], len(swept.analysis) > marks.MANY)
-    if len(axes) > 1:
-        error_entry(axes[0], [table for _, _, table in swept.branches])
+    name_error(axes[0])
     _legend(figure, axes[0])
     if len(swept.plan) <= NAMED or swept.crossed():
         return

@@ -64,7 +64,8 @@ def draw_modal(wear: Analysis, lines: Sequence[WearLine]) -> Figure:
         for line, colour in zip(lines, style.PALETTE):
             values = factor * line.columns[column]
             plane.plot(line.cycles, values, color=colour, label=amplitude_text(line))
-            marks.points(plane, line.cycles, values, colour)
+            computed = slice(len(values) - line.held)
+            marks.points(plane, line.cycles[computed], values[computed], colour)
             top = int(np.argmax(values))
             if column == "zeta" and 0 < top < len(values) - 1:
                 plane.plot(line.cycles[top], values[top], "o", color=colour)

@@ -40,6 +40,7 @@ class WearLine:
     columns : of its table, (n,) each
     depth, rate, load : contact -> (n, n_pairs)
         Worn depth [length], its growth in a vibration cycle [length], mean normal force [force].
+    held : wear has stopped before, the last row is that before it
     jumps : (n_jumps,)
         Cycles at which the mode went over to another sheet.
     units : that all numbers are in
@@ -51,6 +52,7 @@ class WearLine:
     rate: Table
     load: Table
     jumps: Array = field(default_factory=lambda: np.empty(0))
+    held: bool = False
     units: UnitSystem = SI
 
     @property
@@ -86,7 +88,9 @@ def lines_of(wear: Analysis) -> list[WearLine]:
             columns["cycles"][-1] = last
         jumps = np.array([wear.columns["cycles"][row] for row in rows if wear.events[row] == "jump"])
         parts = {key: {name: values[rows] for name, values in table.items()} for key, table in fields.items()}
-        found.append(WearLine(float(columns["amplitude"][0]), columns, **parts, units=wear.unit_system, jumps=jumps))
+        found.append(
+            WearLine(float(columns["amplitude"][0]), columns, **parts, units=wear.unit_system, jumps=jumps, held=held)
+        )
     return sorted(found, key=lambda line: line.amplitude)
 
 
