@@ -18,7 +18,7 @@ from ..results.runfolder import read_copy
 from ..results.study_report import LEGEND, LEGEND_OF_RESPONSE, PRINTED, PRINTED_OF_RESPONSE, markdown
 from .study_folder import StudyFolder, publish
 from .study_plan import Plan, Settings, Study
-from .study_solver import ModeSolver, ResponseSolver, Studied
+from .study_solver import ModeSolver, ResponseSolver, Solver, Studied
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -41,7 +41,7 @@ def run_study(
     with StudyFolder(case, options, arguments, comm, record) as folder:
         console = Console(comm.rank == 0, folder.log, shown=options.shown)
         if chosen is not None:
-            return _study_branch(case, chosen, options, comm, console, folder)
+            return _study_branch(case, *chosen, options, comm, console, folder)
         from .wear_study import study_wear
 
         return study_wear(case, options, comm, console, folder)
@@ -56,6 +56,7 @@ def _load(options: argparse.Namespace, record: dict[str, Any] | None) -> Case:
 
 def _study_branch(
     case: Case,
+    kind: type[Solver],
     analysis: Studied,
     options: argparse.Namespace,
     comm: MPI.Comm,
@@ -63,9 +64,7 @@ def _study_branch(
     folder: StudyFolder,
 ) -> int:
     plan = _plan(case, options)
-    solver = (ModeSolver if isinstance(analysis, ModeAnalysis) else ResponseSolver)(
-        case, analysis, comm, console, options.repeats
-    )
+    solver = kind(case, analysis, comm, console, options.repeats)
     study = Study(plan, solver.places, solver.over)
     console.line(f"study of '{analysis.name}': {len(plan.sweeps())} runs, the finest is {_text(plan.reference)}")
     numbers = {settings: k for k, settings in enumerate(dict.fromkeys(settings for _, settings in plan.sweeps()))}
@@ -115,8 +114,10 @@ def _no_reference(study: Study) -> NotConverged:
     )
 
 
-def _analysis(case: Case, name: str | None) -> Studied:
-    found: dict[str, Studied] = {**case.analyses.of(ModeAnalysis), **case.analyses.of(ForcedAnalysis)}
+def _analysis(case: Case, name: str | None) -> tuple[type[Solver], Studied]:
+    found: dict[str, tuple[type[Solver], Studied]] = {}
+    found |= {one: (ModeSolver, mode) for one, mode in case.analyses.of(ModeAnalysis).items()}
+    found |= {one: (ResponseSolver, response) for one, response in case.analyses.of(ForcedAnalysis).items()}
     chosen = name or next(iter(found), None)
     if chosen not in found:
         fix = f"--analysis {next(iter(found))}" if found else "add an [[analysis]] of type mode to the case"
