@@ -22,9 +22,9 @@ ATTRIBUTE = "unit_system"
 #: SI's symbols stand for their quantities too, in a plug-in's columns and parameters.
 _OF_SI = {"m": "length", "kg": "mass", "N": "force", "J": "energy", "Pa": "pressure"}
 _WORD = re.compile("[A-Za-z]+")
-#: Numbers of this size are shown as they are.
-READABLE = (0.1, 1000.0)
-#: With another prefix they are this at least.
+#: Numbers of this size are shown without a prefix.
+READABLE = (0.2, 1000.0)
+#: With one they are this at least, and less than 1000 times as much.
 SMALLEST = 0.3
 _PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 _POWERS = {prefix: power for power, prefix in _PREFIXES.items()}
@@ -97,8 +97,8 @@ class UnitSystem:
     def shown(self, symbol: str, size: float) -> tuple[float, str]:
         """Factor and symbol in which a picture shows numbers that are given in `symbol` and typically of this size.
 
-        Those of SI take its prefixes, so that the size is 0.3 to 300; inches have their finer ones. What reads well as
-        it is, and a unit of several, stays.
+        Those of SI take its prefixes by the size alone, so that the same model in two systems has the same pictures;
+        inches have their finer ones, and a unit of several stays.
 
         Examples
         --------
@@ -107,14 +107,15 @@ class UnitSystem:
         >>> IN_LBF_S.shown("in", 0.004), IN_LBF_S.shown("lbf", 4200.0), SI.shown("m", 0.3)
         ((1000.0, 'mil'), (1.0, 'lbf'), (1.0, 'm'))
         """
-        if not (0.0 < size < math.inf) or READABLE[0] <= size < READABLE[1]:
+        if not 0.0 < size < math.inf:
             return 1.0, symbol
         found = _PREFIXED.fullmatch(symbol)
         if found is None:
-            finer = self.lengths if symbol == self.length else [(1.0, symbol)]
+            finer = self.lengths if symbol == self.length and size < READABLE[0] else [(1.0, symbol)]
             return next((one for one in finer if one[0] * size >= 1.0), finer[-1])
         prefix, unit, rest = found.groups(default="")
-        wanted = _POWERS[prefix] + 3 * math.floor(math.log10(size / SMALLEST) / 3 + 1e-9)
+        plain = size * 10.0 ** _POWERS[prefix]
+        wanted = 0 if READABLE[0] <= plain < READABLE[1] else 3 * math.floor(math.log10(plain / SMALLEST) / 3 + 1e-9)
         power = min(max(wanted, min(_PREFIXES)), max(_PREFIXES))
         return 10.0 ** (_POWERS[prefix] - power), f"{_PREFIXES[power]}{unit}{rest}"
 

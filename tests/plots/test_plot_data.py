@@ -118,7 +118,9 @@ def test_responses_solve_their_equation_and_are_divided_by_their_level(kept):
     assert relative(f, frequency(a)) < CUBIC
     assert left.get_xlabel() == "Excitation frequency [Hz]" and left.get_ylabel() == "Amplitude of x [m]"
     assert left.get_xlim() == pytest.approx((1.8 / 2 / np.pi, 2.3 / 2 / np.pi))
-    assert left.get_ylim() == pytest.approx((0.0, 1.05 * kept["forced"]["amplitude"].max()))
+    amplitude, error = kept["forced"]["amplitude"], kept["forced"]["amplitude_error"]
+    assert amplitude.max() < (amplitude + error).max() < 1.3 * amplitude.max()
+    assert left.get_ylim() == pytest.approx((0.0, 1.05 * (amplitude + error).max()))  # with room for the bands
 
 
 def test_every_wave_has_its_own_damping(kept):
@@ -265,7 +267,8 @@ def test_sectors_of_a_wheel_are_bars_of_their_amplitude_over_the_tuned_waves(tmp
     assert shares[2] == pytest.approx(1.0) and sum(shares.values()) == pytest.approx(1.0)
     assert [axes.texts[0].get_text().split(", ")[1] for axes in (first, last)] == ["ζ = 0 %", "ζ = 1 %"]
     upper, lower = found["mode_localisation"].axes
-    np.testing.assert_allclose(upper.lines[0].get_xydata(), [[0.1, 1.0], [0.2, 0.2]])
+    np.testing.assert_allclose(upper.lines[0].get_xydata(), [[100.0, 1.0], [200.0, 0.2]])
+    assert lower.get_xlabel().endswith("[mm]")
     np.testing.assert_allclose(lower.lines[0].get_ydata(), [1.0, 2.0])
 
 

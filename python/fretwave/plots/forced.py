@@ -130,7 +130,8 @@ def _finish(figure: Figure, left: Axes, right: Axes, forced: Analysis, shown: Sc
         left.set(yscale="log", ylim=(0.7 * amplitude.min(), 1.5 * amplitude.max()))
         right.set(yscale="log")
     else:
-        left.set_ylim(0.0, 1.05 * amplitude.max())
+        errors = np.nan_to_num(shown(forced.columns.get("amplitude_error", np.zeros(1))))
+        left.set_ylim(0.0, 1.05 * min(np.max(amplitude + errors), (1.0 + style.BEYOND) * amplitude.max()))
         right.set_ylim(bottom=0.0)
     left.set_ylabel(shown.label(f"Amplitude of {_dof(forced)}"))
     right.set_ylabel(divided.label("Amplitude / level"))
