@@ -101,7 +101,7 @@ def draw_wheel(table: list[dict[str, Any]], nodal_diameter: int, path: Path) -> 
     peak = int(np.argmax([row["zeta"] for row in table]))
     angle = 2 * np.pi * np.arange(case.SECTORS + 1) / case.SECTORS
     with style.rules():
-        figure, axes = style.new_figure(3.5, columns=3, subplot_kw={"projection": "polar"})
+        figure, axes = style.new_figure(4.4, columns=3, subplot_kw={"projection": "polar"})
         for axis, number, title in zip(axes, (0, peak, -1), ("Stuck", "Largest damping", "Sliding")):
             row = table[number]
             around = case.sector().wave(row["q"], nodal_diameter).real / row["amplitude"]
@@ -111,10 +111,10 @@ def draw_wheel(table: list[dict[str, Any]], nodal_diameter: int, path: Path) -> 
             axis.plot(np.linspace(0, 2 * np.pi, 200), np.full(200, 3.0), color=style.GREY, lw=0.8)
             axis.set(ylim=(0, 4.4), yticks=[], xticks=angle[:-1:6])
             axis.set_title(f"{title},\n{row['frequency_hz']:.2f} Hz", loc="center")
-            axis.set_xticklabels([f"sector {j}" if j == 0 else f"{j}" for j in range(0, case.SECTORS, 6)], fontsize=9)
-            axis.tick_params(pad=3)
+            axis.set_xticklabels([f"{j}" for j in range(0, case.SECTORS, 6)], fontsize=9)
+            axis.tick_params(pad=1)
             axis.grid(False)
-        style.legend_outside(figure, axes[0])
+        style.legend_outside(figure, axes[0], title="Displacement around the wheel, by sector")
         figure.savefig(path, dpi=style.DPI)
 
 
