@@ -205,7 +205,7 @@ def events_folder(ranks: int) -> Path:
 
 
 def main(arguments: list[str]) -> int:
-    timeout = float(os.environ.get("FRETWAVE_TEST_TIMEOUT", "900"))
+    timeout = float(os.environ.get("FRETWAVE_TEST_TIMEOUT", "1100"))
     only = os.environ.get("FRETWAVE_TEST_RANKS")
     EVENTS.mkdir(parents=True, exist_ok=True)
     asked = collect(arguments)
