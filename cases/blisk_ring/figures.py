@@ -78,7 +78,7 @@ def shape(o: Any, model: dict[str, Any], wave: Array, frequency: float, path: Pa
     with style.rules():
         figure, axes = style.new_figure(6.0)
         look = {"cmap": "RdBu_r", "edgecolor": "face", "linewidth": 0.2}
-        faces = solid.draw(axes, points, around, WHEEL, values=values, limits=(-1.0, 1.0), **look)
+        faces = solid.draw(axes, points, around, WHEEL, values=values, limits=(-1.0, 1.0), look=look)
         solid.ruler(axes, scale, unit)
         axes.set_title(f"Second bending, 4 nodal diameters, stuck ring, {frequency:.1f} Hz")
         text = f"Axial displacement, 1 at the observed tip, drawn as {scale * reach:.2g} {unit}"

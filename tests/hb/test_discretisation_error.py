@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import resource
 
 import numpy as np
@@ -14,7 +15,7 @@ from petsc4py import PETSc
 from tolerances import ROUNDING
 
 import fretwave as fw
-from fretwave.hb.states import ModalState
+from fretwave.hb.states import Estimate, ModalState
 
 M, K = np.diag([1.0, 0.02]), np.array([[640.0, -40.0], [-40.0, 40.0]])
 KT, LIMIT = 400.0, 5.0
@@ -214,3 +215,13 @@ def test_an_estimate_that_goes_far_beyond_any_amplitude_still_has_its_errors(met
     errors = state.errors(np.array([0.3, 1.0, 0.0]), [step, 0 * step, 0 * step, step])
     near = state.errors(np.array([0.3, 1.0, 0.0]), [step * [1, 1, 0], 0 * step, 0 * step, step * [1, 1, 0]])
     assert errors == near and 0.03 < errors["omega_error"] < 0.06
+
+
+@SERIAL
+def test_errors_that_nobody_knows_are_nan_whatever_came_before():
+    """Python 3.11's abs of a complex nan overflows where errno was left set, as by a number read that is too large."""
+    libc = ctypes.CDLL(None)
+    libc.strtod.restype = ctypes.c_double
+    unknown = Estimate.none(ModalState("CNM", 1.0))
+    libc.strtod(b"1e999", None)
+    assert all(np.isnan(value) for value in unknown.columns.values())

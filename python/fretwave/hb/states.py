@@ -69,8 +69,9 @@ class ModalState:
         |d zeta| <= |d lambda| / omega0, for an error of zeta by itself changes its sign along a branch.
         """
         here = self.eigenvalue(z)
-        error, *parts = (abs(self.eigenvalue(z + change) - here) for change in changes)
-        omega0 = abs(here)
+        # NumPy's: Python 3.11's own abs of nan overflows where something before it has set errno
+        error, *parts = (float(np.abs(self.eigenvalue(z + change) - here)) for change in changes)
+        omega0 = float(np.abs(here))
         own = {self.error_by.format(source): part for source, part in zip(SOURCES, parts)}
         return {"omega_error": error, "zeta_error": error / omega0 if omega0 else math.nan, **own}
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -48,7 +47,7 @@ def draw(forced: Analysis, modes: Sequence[Analysis], times: Table | None, peaks
     return figure
 
 
-def _level(axes: Axes, forced: Analysis, times: Table | None, level: float, colour: Any, scale: Scale) -> None:
+def _level(axes: Axes, forced: Analysis, times: Table | None, level: float, colour: style.Colour, scale: Scale) -> None:
     """Curve, points, error and integrated motions of a level."""
     frequency, amplitude = response(forced, level)
     axes.plot(frequency, scale(amplitude), color=colour, label=_called(level))
@@ -136,6 +135,6 @@ def _finish(figure: Figure, left: Axes, right: Axes, forced: Analysis, shown: Sc
     left.set_ylabel(shown.label(f"Amplitude of {_dof(forced)}"))
     right.set_ylabel(divided.label("Amplitude / level"))
     marks.point_entry(left, len(forced) > marks.MANY)
-    errors = forced.columns.get("amplitude_error")
-    marks.error_entry(left, {shown.unit: [None if errors is None else shown(errors)]})
+    known = forced.columns.get("amplitude_error")
+    marks.error_entry(left, {shown.unit: [None if known is None else shown(known)]})
     style.legend_outside(figure, left, columns=4)

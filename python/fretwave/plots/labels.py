@@ -115,12 +115,17 @@ def _leader(axes: Axes, point: tuple[float, float], note: Annotation) -> None:
     line.set_in_layout(False)
 
 
-def along(axes: Axes, names: Sequence[tuple[str, float]], **look: Any) -> list[Annotation]:
+def along(axes: Axes, names: Sequence[tuple[str, float]], fontsize: float) -> list[Annotation]:
     """Name horizontal lines, each at its height: where the curves leave room, above or below."""
     cover, found = Cover(axes), []
     places = [(share, side) for share in ALONG for side in (-1, 1)]
     for text, height in names:
-        options = {"xycoords": ("axes fraction", "data"), "textcoords": "offset points", "color": style.GREY, **look}
+        options: dict[str, Any] = {
+            "xycoords": ("axes fraction", "data"),
+            "textcoords": "offset points",
+            "color": style.GREY,
+        }
+        options["fontsize"] = fontsize
         tried = [axes.annotate(text, (share, height), **_at(share, side), **options) for share, side in places]
         best = cover.cheapest([note.get_window_extent(cover.renderer) for note in tried])
         for number, note in enumerate(tried):

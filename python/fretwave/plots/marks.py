@@ -42,7 +42,7 @@ MANY = 100
 SMALL: dict[str, Any] = {"markersize": 2.2, "markeredgewidth": 0.0, "color": style.INK}
 
 
-def points(axes: Axes, x: AnyArray, y: AnyArray, colour: Any, many: bool = False) -> None:
+def points(axes: Axes, x: AnyArray, y: AnyArray, colour: style.Colour, many: bool = False) -> None:
     """Marks where a curve was computed; between them it is the cubic through them."""
     axes.plot(x, y, **{**POINT, "color": colour, **(SMALL if many else {})})
 

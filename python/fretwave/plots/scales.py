@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TypeVar
 
 import numpy as np
 
@@ -11,6 +12,8 @@ from ..arrays import AnyArray
 from ..results.reader import Analysis
 from ..units import UnitSystem
 from . import style
+
+Values = TypeVar("Values", float, AnyArray)
 
 
 @dataclass(frozen=True)
@@ -20,7 +23,7 @@ class Scale:
     factor: float
     unit: str
 
-    def __call__(self, values: Any) -> Any:
+    def __call__(self, values: Values) -> Values:
         return self.factor * values
 
     def label(self, text: str) -> str:
@@ -45,7 +48,7 @@ def logarithmic(units: UnitSystem, symbol: str, *values: AnyArray | float) -> Sc
     return Scale(*units.shown(symbol, float(middle)))
 
 
-def _known(values: Any) -> AnyArray:
+def _known(values: Sequence[AnyArray | float]) -> AnyArray:
     """Sizes of all that are finite and not zero."""
     sizes = np.abs(np.concatenate([np.ravel(np.asarray(value, dtype=float)) for value in values]))
     return np.asarray(sizes[np.isfinite(sizes) & (sizes > 0.0)])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -72,7 +72,7 @@ def draw(
     colour: str | Sequence[str] = STEEL,
     values: npt.ArrayLike | None = None,
     limits: tuple[float, float] = (0.0, 1.0),
-    **look: Any,
+    look: Mapping[str, Any] | None = None,
 ) -> PolyCollection:
     """Draw the outer faces of a solid; one that looks away from the eye is behind others.
 
@@ -90,8 +90,8 @@ def draw(
     outward = normals(corners)
     seen = np.flatnonzero(outward @ camera.axes[2] > 0)
     seen = seen[np.argsort(camera.depth(corners[seen]).mean(axis=1))]
-    look = {"edgecolor": EDGE, "linewidth": 0.25, **look}
-    drawn = PolyCollection(camera.project(corners[seen]), clim=limits, **look)
+    options = {"edgecolor": EDGE, "linewidth": 0.25, **(look or {})}
+    drawn = PolyCollection(camera.project(corners[seen]), clim=limits, **options)
     if values is None:
         names = [colour] * len(faces) if isinstance(colour, str) else list(colour)
         colours, dark = np.array([to_rgb(name) for name in names]).reshape(-1, 3), DARK
@@ -99,7 +99,7 @@ def draw(
         means = np.asarray(values, dtype=float)[faces].mean(axis=1)
         colours, dark = drawn.to_rgba(means)[:, :3], DARK_VALUES
     lit = (colours * _light(outward, camera, dark)[:, None])[seen]
-    drawn.set(facecolor=lit, **({"edgecolor": lit} if look["edgecolor"] == "face" else {}))
+    drawn.set(facecolor=lit, **({"edgecolor": lit} if options["edgecolor"] == "face" else {}))
     axes.add_collection(drawn)
     axes.set_aspect("equal")
     axes.autoscale_view()

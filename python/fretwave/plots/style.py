@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import Any
+from typing import Any, Union
 
 import matplotlib
 import numpy as np
@@ -19,6 +19,7 @@ from ..arrays import AnyArray
 from ..columns import PURE
 from ..files.whole import replaced
 
+Colour = Union[str, tuple[float, ...]]
 #: Okabe and Ito's palette: distinguishable under every common colour-vision deficiency
 BLUE, ORANGE, GREEN, RED, SKY, PURPLE = "#0072B2", "#E69F00", "#009E73", "#D55E00", "#56B4E9", "#CC79A7"
 PALETTE = (BLUE, ORANGE, GREEN, RED, PURPLE, SKY)
@@ -146,7 +147,7 @@ def fit_values(axes: Axes, x: AnyArray, y: AnyArray, shown: Sequence[float], oth
 BEYOND = 0.3
 
 
-def error_band(axes: Axes, x: AnyArray, y: AnyArray, error: AnyArray, colour: str | tuple[float, ...]) -> None:
+def error_band(axes: Axes, x: AnyArray, y: AnyArray, error: AnyArray, colour: Colour) -> None:
     """The estimated error about a curve; nothing where it is not known."""
     known = np.isfinite(error)
     if not known.any():
@@ -165,11 +166,11 @@ def plain_numbers(axis: Axis, values: AnyArray | Sequence[float] = (1.0, 10.0)) 
     axis.set_minor_formatter(NullFormatter())
 
 
-def legend(axes: Axes, **options: Any) -> None:
+def legend(axes: Axes, loc: str, ncols: int = 1) -> None:
     """A legend inside the axes, every name once."""
     entries = _entries(axes)
     if entries:
-        axes.legend(list(entries.values()), list(entries), **options)
+        axes.legend(list(entries.values()), list(entries), loc=loc, ncols=ncols)
 
 
 def _entries(axes: Axes) -> dict[str, Any]:

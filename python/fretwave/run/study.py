@@ -56,7 +56,7 @@ def _load(options: argparse.Namespace, record: dict[str, Any] | None) -> Case:
 
 def _study_branch(
     case: Case,
-    kind: type[Solver],
+    kind: type[Solver[Any]],
     analysis: Studied,
     options: argparse.Namespace,
     comm: MPI.Comm,
@@ -114,8 +114,8 @@ def _no_reference(study: Study) -> NotConverged:
     )
 
 
-def _analysis(case: Case, name: str | None) -> tuple[type[Solver], Studied]:
-    found: dict[str, tuple[type[Solver], Studied]] = {}
+def _analysis(case: Case, name: str | None) -> tuple[type[Solver[Any]], Studied]:
+    found: dict[str, tuple[type[Solver[Any]], Studied]] = {}
     found |= {one: (ModeSolver, mode) for one, mode in case.analyses.of(ModeAnalysis).items()}
     found |= {one: (ResponseSolver, response) for one, response in case.analyses.of(ForcedAnalysis).items()}
     chosen = name or next(iter(found), None)

@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Union
+from typing import TYPE_CHECKING, Any, Generic, TypeVar, Union
 
 import numpy as np
 
@@ -41,7 +41,11 @@ Studied = Union[ModeAnalysis, ForcedAnalysis]
 COUNT = 24
 
 
-class Solver(ABC):
+#: What all runs on a model begin with
+Begun = TypeVar("Begun")
+
+
+class Solver(ABC, Generic[Begun]):
     """Solves the whole branch of one analysis at any settings."""
 
     #: What runs are compared over
@@ -53,25 +57,25 @@ class Solver(ABC):
         self.case, self.analysis, self.comm, self.console, self.repeats = case, analysis, comm, console, repeats
         self.prefix = f"{analysis.name}_"
         self.places = self._places()
-        self._parts: tuple[int | None, AnalysisContext[Any], Any] | None = None
+        self._parts: tuple[int | None, AnalysisContext[Any], Begun] | None = None
 
     @abstractmethod
     def _places(self) -> Array:
         """At which runs are compared, ascending."""
 
     @abstractmethod
-    def _started(self, context: AnalysisContext[Any]) -> Any:
+    def _started(self, context: AnalysisContext[Any]) -> Begun:
         """What all runs on a model begin with. Collective."""
 
     @abstractmethod
-    def _problem(self, context: AnalysisContext[Any], started: Any, harmonics: Harmonics) -> HarmonicProblem:
+    def _problem(self, context: AnalysisContext[Any], started: Begun, harmonics: Harmonics) -> HarmonicProblem:
         """Collective."""
 
     @abstractmethod
     def _outcome(self, rows: Sequence[Mapping[str, Any]], newton: int, wall: float) -> AnyOutcome:
         """Of the points' states (`row_of`)."""
 
-    def _model(self, component_modes: int | None) -> tuple[AnalysisContext[Any], Any]:
+    def _model(self, component_modes: int | None) -> tuple[AnalysisContext[Any], Begun]:
         """Context and start with this many component modes; the last one is kept. Collective."""
         if self._parts is None or self._parts[0] != component_modes:
             if self._parts is not None:
@@ -138,7 +142,7 @@ class Solver(ABC):
         """First and last value of what the branch is over."""
 
 
-class ModeSolver(Solver):
+class ModeSolver(Solver[Start]):
     """Of a nonlinear mode, over its amplitude."""
 
     analysis: ModeAnalysis
@@ -175,7 +179,7 @@ class ModeSolver(Solver):
         return Outcome(amplitude, omega, zeta, estimate, peak, at, len(rows), newton, wall, *sizes)
 
 
-class ResponseSolver(Solver):
+class ResponseSolver(Solver[Excitation]):
     """Of a forced response at its largest level, over the frequency."""
 
     analysis: ForcedAnalysis

@@ -98,14 +98,15 @@ class Still:
         shown = scales.linear(unit, unit("length"), sizes)
         largest = float(shown(sizes.max())) or 1.0
         ends = self.camera.project(self.points + self.scale * self.moved).reshape(-1, 2)
-        look: dict[str, Any] = {"cmap": "viridis", "linewidth": 0.2, "edgecolor": "face", "limits": (0.0, largest)}
+        look = {"cmap": "viridis", "linewidth": 0.2, "edgecolor": "face"}
         drawn: list[Any] = []
 
         def show(phase: int) -> None:
             for collection in drawn:
                 collection.remove()
             points = self.points + self.scale * self.moved[phase]
-            drawn[:] = [solid.draw(axes, points, self.faces, self.camera, values=shown(sizes[phase]), **look)]
+            colours = {"values": shown(sizes[phase]), "limits": (0.0, largest)}
+            drawn[:] = [solid.draw(axes, points, self.faces, self.camera, **colours, look=look)]
             axes.set(xlim=_wide(ends[:, 0]), ylim=_wide(ends[:, 1]))
 
         show(0)
