@@ -115,7 +115,7 @@ def _leader(axes: Axes, point: tuple[float, float], note: Annotation) -> None:
     line.set_in_layout(False)
 
 
-def along(axes: Axes, names: Sequence[tuple[str, float]], fontsize: float) -> list[Annotation]:
+def along(axes: Axes, names: Sequence[tuple[str, float]], fontsize: float | None = None) -> list[Annotation]:
     """Name horizontal lines, each at its height: where the curves leave room, above or below."""
     cover, found = Cover(axes), []
     places = [(share, side) for share in ALONG for side in (-1, 1)]
