@@ -36,8 +36,8 @@ void CyclicInverse::invert(size_t wave, CirculantBlocks<complex> const& blocks) 
 }
 
 std::vector<scomplex> CyclicInverse::multiply(size_t wave, int columns, complex const* x) const {
-  const std::vector<scomplex> in(x, x + columns);
-  if (!transposed(wave)) return lapack::product(n_, columns, place(wave), in);
+  std::vector<scomplex> in(x, x + columns);
+  if (!transposed(wave)) return lapack::product(n_, columns, place(wave), std::move(in));
   const int step = 1;
   const scomplex one = 1, zero = 0;
   std::vector<scomplex> out(n_);  // rows of the mirror's inverse

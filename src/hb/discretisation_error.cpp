@@ -11,8 +11,7 @@ namespace fretwave::hb {
 
 namespace {
 
-constexpr double tolerance =
-    1e-3;  // of the linear systems: it moved errors by 1 % at most, and two digits do
+constexpr double tolerance = 1e-3;    // of the linear systems: errors move by 1 % at most
 constexpr double memory_share = 0.5;  // of what is free, for the factors of J'
 constexpr double negligible = 1e-6;   // share of the residual, up to which a source is not solved for
 constexpr double reach = 0.3;  // arclength along the branch, in the unit of a step: the default longest one

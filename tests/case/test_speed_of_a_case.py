@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import call
+from models.linear_cases import KN, KT, K, M
 from tolerances import ROUNDING, SOLVED, TIGHT
 
 import fretwave as fw
@@ -15,10 +16,7 @@ from fretwave.errors import CaseErrors
 
 pytestmark = pytest.mark.ranks(1)
 
-M = np.diag([2.0, 2.0, 1.0])
-K = np.array([[50.0, 4.0, -10.0], [4.0, 40.0, -8.0], [-10.0, -8.0, 25.0]])
 K2 = np.diag([0.2, 0.1, 0.3])
-KN, KT = 30.0, 7.0
 #: Presses the pair and pulls along it, not beyond friction.
 F = np.array([3.0, 0.1, 0.2])
 AT = 60.0

@@ -12,17 +12,17 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from ..errors import FretwaveError, InputError
+from ..errors import InputError
 from ..model.checks import check_symmetric
 from ..model.sectors import Sparse
 from ..model.structure import SPIN, Structure
 from . import matrices
 from .origin import read_file
+from .reporter import Found
 from .schema import Matrix, ModelSection
 from .toml.locate import Path as KeyPath
 from .toml.source import Source
 
-Found = list[FretwaveError]
 #: Mass matrices of one model at two speeds differ by less.
 SAME_MASS = 1e-9
 MODEL_FILE = ".h5"
@@ -64,7 +64,12 @@ def _turning(section: ModelSection, structure: Structure) -> Structure:
     """The structure at the speed of the case."""
     if not section.speed_rpm or SPIN not in structure.parts:
         return structure
-    return structure.stiffened(SPIN, (2 * np.pi * section.speed_rpm / 60) ** 2)
+    return structure.stiffened(SPIN, omega_squared(section.speed_rpm))
+
+
+def omega_squared(speed_rpm: float) -> float:
+    """Of the angular velocity [rad^2/s^2]."""
+    return float((2 * np.pi * speed_rpm / 60) ** 2)
 
 
 def least_squares(squares: Sequence[float], given: Sequence[Any], size: Callable[[Any], float]) -> tuple[Any, float]:
@@ -91,7 +96,7 @@ def square_of(text: str, key: KeyPath, source: Source, found: Found, example: st
     except ValueError:
         speed = np.nan
     if np.isfinite(speed) and speed > 0:
-        return float((2 * np.pi * speed / 60) ** 2)
+        return omega_squared(speed)
     what, fix = f"'{text}' is no speed of a turning model", f"write for example `{example}`"
     found.append(InputError(what, source.where(key), text, "rev/min, above 0", fix))
     return None

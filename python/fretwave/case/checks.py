@@ -4,18 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from ..errors import FretwaveError, InputError
+from ..errors import InputError
 from ..registry import kinds
 from ..texts import nearest, toml
 from .analysis import AnalysisSection
 from .checks_wheel import with_measured
 from .facts import Facts
-from .reporter import Reporter
+from .reporter import Found, Reporter
 from .schema import TOP_LEVEL
 from .toml.source import Source
 from .toml.validation import unknown_key, validate
-
-Found = list[FretwaveError]
 
 
 def read_analyses(source: Source, found: Found) -> dict[int, AnalysisSection]:

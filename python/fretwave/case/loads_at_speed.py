@@ -11,16 +11,15 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Array
-from ..errors import FretwaveError, InputError
+from ..errors import InputError
 from ..model.structure import SPIN, Structure
 from ..texts import nearest, toml
-from .at_speed import least_squares, square_of
+from .at_speed import least_squares, omega_squared, square_of
 from .pair_values import TABLE, ValueTable
+from .reporter import Found
 from .schema import LoadVector, ModelSection
 from .toml.locate import Path as KeyPath
 from .toml.source import Source
-
-Found = list[FretwaveError]
 
 
 def with_loads(
@@ -48,7 +47,7 @@ def with_loads(
                 known[".".join(key)] = "sha256:" + hashlib.sha256(read.tobytes()).hexdigest()[:16]
         if vectors:
             f2, left = least_squares(squares, vectors, np.linalg.norm)
-            loads[name] = (2 * np.pi * (section.speed_rpm or 0.0) / 60) ** 2 * f2
+            loads[name] = omega_squared(section.speed_rpm or 0.0) * f2
             if len(vectors) > 1:
                 notes.append(f"load '{name}': Omega^2 f2 leaves {100 * left:.2g} % of it")
     return replace(structure, loads=loads), known

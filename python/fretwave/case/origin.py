@@ -7,7 +7,7 @@ from typing import Any, Tuple
 
 import scipy.sparse
 
-from ..errors import FretwaveError, InputError
+from ..errors import InputError
 from ..model import checks
 from ..model.sectors import Sparse
 from ..model.structure import Structure
@@ -15,12 +15,12 @@ from ..results import model_file
 from ..texts import display, toml
 from . import matrices
 from .builder import builder_digest, run_builder
+from .reporter import Found
 from .schema import ModelSection
 from .toml.locate import Path as KeyPath
 from .toml.source import Source
 from .toml.validation import missing_key
 
-Found = list[FretwaveError]
 #: A structure as it is given, where each of its matrices stands, and what identifies it, by address.
 Given = Tuple[Structure, Mapping[str, str], Mapping[str, Any]]
 

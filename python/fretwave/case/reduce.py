@@ -71,7 +71,8 @@ def _reduced(
         full = case.structure
         small = full.reduced(reduction) if full.cut is None else full.cut.reduced(reduction).tied()
         reduced = replace(case, structure=small, contacts=on(case.contacts, small))
-        report = report_of(case, reduced, reduction, time.perf_counter() - began, comm)
+        wall, full_hz = time.perf_counter() - began, [] if choice is None else choice.full_hz
+        report = report_of(case, reduced, reduction, wall, comm, full_hz)
         if choice is not None:
             more = choice.next(report)
             if more is not None:

@@ -101,9 +101,19 @@ class ReductionReport:
 
 
 def report_of(
-    case: Case, reduced: Case, reduction: Reduction | SectorReduction, wall: float, comm: MPI.Comm
+    case: Case,
+    reduced: Case,
+    reduction: Reduction | SectorReduction,
+    wall: float,
+    comm: MPI.Comm,
+    full_hz: list[float],
 ) -> ReductionReport:
-    """What was reduced, with the lowest frequencies before and after. Collective."""
+    """What was reduced, with the lowest frequencies before and after. Collective.
+
+    Parameters
+    ----------
+    full_hz : those before, of a structure, where they are known; else empty
+    """
     began = time.perf_counter()
     common: dict[str, Any] = {
         "component_modes": len(reduction.component_hz),
@@ -113,14 +123,15 @@ def report_of(
     if case.structure.cut is not None:
         found = _of_sector(case, cast("SectorReduction", reduction))
     else:
-        found = _of_structure(case, reduced, comm)
+        found = _of_structure(case, reduced, comm, full_hz)
     return ReductionReport(**common, **found, compare_wall_s=round(time.perf_counter() - began, 3))
 
 
-def _of_structure(case: Case, reduced: Case, comm: MPI.Comm) -> dict[str, Any]:
+def _of_structure(case: Case, reduced: Case, comm: MPI.Comm, full_hz: list[float]) -> dict[str, Any]:
     assert case.reduction is not None
     count = min(case.reduction.compare, reduced.structure.n_dof)
-    full, small = ([], []) if not count else (_stuck_hz(which, count, comm) for which in (case, reduced))
+    small = _stuck_hz(reduced, count, comm) if count else []
+    full = full_hz if len(full_hz) == count else _stuck_hz(case, count, comm)
     return {
         "unreduced": case.structure.n_dof,
         "kept": len(case.keep),

@@ -8,16 +8,15 @@ import numpy as np
 
 from ..arrays import Indices
 from ..cyclic.frames import framed
-from ..errors import FretwaveError, InputError
+from ..errors import InputError
 from ..model.contact import Contact
 from ..model.structure import Structure
 from ..texts import nearest, toml
 from .contacts import on
+from .reporter import Found
 from .schema import ModelSection
 from .toml.source import Source
 from .toml.validation import at
-
-Found = list[FretwaveError]
 
 
 def tie(

@@ -17,12 +17,12 @@ import numpy as np
 
 from ..errors import FretwaveError, InputError
 from ..texts import toml
+from .reporter import Found
 from .schema import DistributionSection, UncertaintySection
 from .toml.locate import Path as KeyPath
 from .toml.source import Source
 from .toml.validation import at, validate
 
-Found = list[FretwaveError]
 #: Between the place of a distribution and the seed, in the places of errors about a value that was drawn.
 SEEDED = ", drawn with seed "
 _NARROWER = 'take `distribution = "lognormal"`, or a smaller standard_deviation'

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from ..arrays import Indices
+import numpy as np
+
+from ..arrays import Array, Indices
 
 
 class Kind(NamedTuple):
@@ -28,6 +30,13 @@ KINDS = {
 }
 #: VTK's number of hexahedra by their nodes.
 HEXAHEDRA = {kind.nodes: kind.vtk for name, kind in KINDS.items() if name.endswith("hexahedron")}
+
+
+def normals(corners: Array) -> Array:
+    """Unit normals (n, 3) of polygons (n, k, 3), out of the side on which they run counter-clockwise."""
+    middle = corners - corners.mean(axis=1, keepdims=True)
+    found = np.cross(middle, np.roll(middle, -1, axis=1)).sum(axis=1)
+    return np.asarray(found / np.maximum(np.linalg.norm(found, axis=1, keepdims=True), np.finfo(float).tiny))
 
 
 def wrong_cells(cells: Mapping[str, Indices], n_nodes: int) -> str | None:

@@ -13,6 +13,7 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_rgb
 
 from ..arrays import Array, IntArray
+from ..model.cells import normals
 
 #: Where the light comes from: shares to the right, up and towards the eye; what of its colour a face away from it
 #: keeps, and where that is a value.
@@ -47,13 +48,6 @@ class Camera:
     def depth(self, points: npt.ArrayLike) -> Array:
         """How near to the eye points (.., 3) are (..)."""
         return np.asarray(np.asarray(points) @ self.axes[2])
-
-
-def normals(corners: Array) -> Array:
-    """Unit normals (n, 3) of polygons (n, k, 3), out of the side on which they run counter-clockwise."""
-    middle = corners - corners.mean(axis=1, keepdims=True)
-    found = np.cross(middle, np.roll(middle, -1, axis=1)).sum(axis=1)
-    return np.asarray(found / np.maximum(np.linalg.norm(found, axis=1, keepdims=True), np.finfo(float).tiny))
 
 
 def unshared(corners: Array) -> npt.NDArray[np.bool_]:

@@ -11,6 +11,7 @@ from ..post.calibration import FACTORS, LEAST_ERROR
 Row = Mapping[str, "float | int | str"]
 
 WITHIN = {f"within {factor}": f"{{within_{factor}:.0%}}" for factor in FACTORS}
+#: what the tables of modes and of responses begin with
 RUN = {
     "sweep": "{sweep}",
     "H": "{harmonics}",

@@ -60,6 +60,10 @@ class Solver(ABC, Generic[Begun]):
         self._parts: tuple[int | None, AnalysisContext[Any], Begun] | None = None
 
     @abstractmethod
+    def _ends(self) -> tuple[float, float]:
+        """First and last value of what the branch is over."""
+
+    @abstractmethod
     def _places(self) -> Array:
         """At which runs are compared, ascending."""
 
@@ -73,7 +77,7 @@ class Solver(ABC, Generic[Begun]):
 
     @abstractmethod
     def _outcome(self, rows: Sequence[Mapping[str, Any]], newton: int, wall: float) -> AnyOutcome:
-        """Of the points' states (`row_of`)."""
+        """Of the points' rows (`_row`)."""
 
     def _model(self, component_modes: int | None) -> tuple[AnalysisContext[Any], Begun]:
         """Context and start with this many component modes; the last one is kept. Collective."""
@@ -137,10 +141,6 @@ class Solver(ABC, Generic[Begun]):
         branch.destroy()
         return self._outcome(rows, newton, wall) if converged else str(reason)
 
-    @abstractmethod
-    def _ends(self) -> tuple[float, float]:
-        """First and last value of what the branch is over."""
-
 
 class ModeSolver(Solver[Start]):
     """Of a nonlinear mode, over its amplitude."""
@@ -174,8 +174,8 @@ class ModeSolver(Solver[Start]):
 
     def _outcome(self, rows: Sequence[Mapping[str, Any]], newton: int, wall: float) -> Outcome:
         top = max(rows, key=lambda row: float(row["zeta"]))
-        amplitude, omega, zeta, estimate = columns(rows, "amplitude", "omega", "zeta", "estimate")
-        peak, at, sizes = top["zeta"], top["amplitude"], (most(rows, "harmonics"), most(rows, "samples"))
+        amplitude, omega, zeta, estimate = _columns(rows, "amplitude", "omega", "zeta", "estimate")
+        peak, at, sizes = top["zeta"], top["amplitude"], (_most(rows, "harmonics"), _most(rows, "samples"))
         return Outcome(amplitude, omega, zeta, estimate, peak, at, len(rows), newton, wall, *sizes)
 
 
@@ -202,9 +202,9 @@ class ResponseSolver(Solver[Excitation]):
 
     def _outcome(self, rows: Sequence[Mapping[str, Any]], newton: int, wall: float) -> ResponseOutcome:
         top = max(rows, key=lambda row: float(row["amplitude"]))
-        omega, amplitude, phase, estimate = columns(rows, "omega", "amplitude", "phase", "estimate")
+        omega, amplitude, phase, estimate = _columns(rows, "omega", "amplitude", "phase", "estimate")
         cosine, sine = amplitude * np.cos(phase), -amplitude * np.sin(phase)
-        peak, at, sizes = top["amplitude"], top["omega"], (most(rows, "harmonics"), most(rows, "samples"))
+        peak, at, sizes = top["amplitude"], top["omega"], (_most(rows, "harmonics"), _most(rows, "samples"))
         return ResponseOutcome(omega, cosine, sine, estimate, peak, at, len(rows), newton, wall, *sizes)
 
 
@@ -217,11 +217,11 @@ def _row(problem: HarmonicProblem, point: Point) -> dict[str, Any]:
     return {**problem.state(point.y), **sizes, "estimate": estimate, "reported": reported}
 
 
-def columns(rows: Sequence[Mapping[str, Any]], *names: str) -> list[Array]:
+def _columns(rows: Sequence[Mapping[str, Any]], *names: str) -> list[Array]:
     """Of the points that are compared."""
     return [np.array([row[name] for row in rows if row["reported"]]) for name in names]
 
 
-def most(rows: Sequence[Mapping[str, Any]], name: str) -> int:
+def _most(rows: Sequence[Mapping[str, Any]], name: str) -> int:
     """Of the largest set."""
     return max(int(row[name]) for row in rows)

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..arrays import Array, IntArray
 from ..importers.cells import FACES
-from ..model.cells import KINDS
+from ..model.cells import KINDS, normals
 from .vtkhdf import Cells
 
 #: VTK's polygon: any number of points around.
@@ -57,10 +57,7 @@ def _around(face: Sequence[int]) -> list[int]:
 def _outwards(nodes: Array, face: IntArray, middle: Array) -> IntArray:
     """The way round that a cell of any order of nodes, a wedge or one read mirrored, is inside."""
     corners = nodes[face]
-    centre = corners.mean(axis=1)
-    ahead = np.roll(corners, -1, axis=1) - centre[:, None]
-    normal = np.cross(corners - centre[:, None], ahead).sum(axis=1)
-    inwards = np.einsum("nx,nx->n", normal, centre - middle) < 0
+    inwards = np.einsum("nx,nx->n", normals(corners), corners.mean(axis=1) - middle) < 0
     return np.asarray(np.where(inwards[:, None], face[:, ::-1], face))
 
 

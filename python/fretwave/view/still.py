@@ -43,7 +43,7 @@ class Still:
             fix = "give Structure its cells; without --png and --gif the nodes are written for ParaView"
             raise InputError("the model has no faces to draw", f"analysis '{scene.choice.name}'", None, "cells", fix)
         used, faces = numbered(outer)
-        order = UPRIGHT[scene.axis if scene.around > 1 else "z"]
+        order = self._order()
         shapes = [scene.shape(sector) for sector in scene.sectors]
         count = len(scene.choice.phases)
         still = [shape.nodes[used][:, order] for shape in shapes]
@@ -105,8 +105,8 @@ class Still:
             for collection in drawn:
                 collection.remove()
             points = self.points + self.scale * self.moved[phase]
-            colours = {"values": shown(sizes[phase]), "limits": (0.0, largest)}
-            drawn[:] = [solid.draw(axes, points, self.faces, self.camera, **colours, look=look)]
+            values, limits = shown(sizes[phase]), (0.0, largest)
+            drawn[:] = [solid.draw(axes, points, self.faces, self.camera, values=values, limits=limits, look=look)]
             axes.set(xlim=_wide(ends[:, 0]), ylim=_wide(ends[:, 1]))
 
         show(0)
