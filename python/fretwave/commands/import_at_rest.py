@@ -12,11 +12,11 @@ from ..errors import InputError
 from ..files.csv_table import write_columns
 from ..importers.contact_results import at_rest, read_step
 from ..importers.formats import readable
+from ..model.laws import Role, usual_name
 from ..model.structure import Structure
 
 #: A file and its columns.
 Table = tuple[Path, Mapping[str, Union[Array, IntArray]]]
-UNITS = {"normal_load": "force", "tangential_force": "force", "gap": "length"}
 
 
 def tables_at_rest(options: argparse.Namespace, model: Structure, notes: list[str]) -> list[Table]:
@@ -45,7 +45,8 @@ def tables_at_rest(options: argparse.Namespace, model: Structure, notes: list[st
 
 def write_tables(tables: Sequence[Table], model: Structure) -> None:
     """With units where the model declares them."""
-    units = UNITS if model.units else {}
+    kinds = {usual_name(Role.LOAD): "force", "tangential_force": "force", usual_name(Role.GAP): "length"}
+    units = kinds if model.units else {}
     headings = {name: f"{name} [{model.unit_system(unit)}]" for name, unit in units.items()}
     for path, columns in tables:
         write_columns(path, columns, headings)

@@ -22,6 +22,7 @@ import scipy.sparse as sp
 
 from ..arrays import Array, IntArray
 from ..errors import InputError
+from ..model.laws import Role, usual_name
 from ..model.pairs import Pairs
 from ..model.sectors import by_sector
 from ..texts import counted, display
@@ -170,7 +171,8 @@ class PairsAtRest:
         """Of a table that a case takes its loads and gaps from."""
         nodes = {} if pairs.nodes is None else {"node_a": pairs.nodes[:, 0], "node_b": pairs.nodes[:, 1]}
         numbers = np.arange(len(self.normal))
-        return {"pair": numbers, **nodes, "normal_load": self.normal, "gap": self.gap, "tangential_force": self.shear}
+        loads = {usual_name(Role.LOAD): self.normal, usual_name(Role.GAP): self.gap}
+        return {"pair": numbers, **nodes, **loads, "tangential_force": self.shear}
 
 
 def at_rest(

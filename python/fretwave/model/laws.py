@@ -161,6 +161,11 @@ def laws() -> dict[str, LawInfo]:
     return {**(_learnt or _compiled()), **{name: law.info() for name, law in _registered.items()}}
 
 
+def usual_name(role: Role) -> str:
+    """What laws call the parameter with a role; of a table of pairs, whatever law will take it."""
+    return next(name for law in laws().values() if (name := law.named(role)) is not None)
+
+
 def learn_laws(kept: Sequence[Mapping[str, Any]]) -> bool:
     """Where the core is missing, know the laws that results keep (`LawInfo.plain`); False if they are too old."""
     with suppress(ImportError):
