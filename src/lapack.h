@@ -1,4 +1,5 @@
 #pragma once
+#include <array>
 #include <complex>
 #include <vector>
 
@@ -6,6 +7,8 @@
 extern "C" {
 void dgemm_(char const*, char const*, int const*, int const*, int const*, double const*, double const*,
             int const*, double const*, int const*, double const*, double*, int const*);
+void sgemm_(char const*, char const*, int const*, int const*, int const*, float const*, float const*,
+            int const*, float const*, int const*, float const*, float*, int const*);
 void dgemv_(char const*, int const*, int const*, double const*, double const*, int const*, double const*,
             int const*, double const*, double*, int const*);
 void sgemv_(char const*, int const*, int const*, float const*, float const*, int const*, float const*,
@@ -14,6 +17,7 @@ void cgemv_(char const*, int const*, int const*, std::complex<float> const*, std
             int const*, std::complex<float> const*, int const*, std::complex<float> const*,
             std::complex<float>*, int const*);
 void dgesv_(int const*, int const*, double*, int const*, int*, double*, int const*, int*);
+void sgesv_(int const*, int const*, float*, int const*, int*, float*, int const*, int*);
 void zgesv_(int const*, int const*, std::complex<double>*, int const*, int*, std::complex<double>*,
             int const*, int*);
 void zgemv_(char const*, int const*, int const*, std::complex<double> const*, std::complex<double> const*,
@@ -23,6 +27,8 @@ void dgetrf_(int const*, int const*, double*, int const*, int*, int*);
 void dgetrs_(char const*, int const*, int const*, double const*, int const*, int const*, double*, int const*,
              int*);
 void dgetri_(int const*, double*, int const*, int const*, double*, int const*, int*);
+void dsygvd_(int const*, char const*, char const*, int const*, double*, int const*, double*, int const*,
+             double*, double*, int const*, int*, int const*, int*);
 void zgetrf_(int const*, int const*, std::complex<double>*, int const*, int*, int*);
 void zgetri_(int const*, std::complex<double>*, int const*, int const*, std::complex<double>*, int const*,
              int*);
@@ -52,6 +58,35 @@ int invert(std::vector<T>& A, int n) {
   factorise(&n, A.data(), pivots.data(), &info);
   if (info == 0) invert(&n, A.data(), pivots.data(), work.data(), &work_size, &info);
   return info;
+}
+
+/// B := A^-1 B, columns of it, both column-major; A is overwritten. Returns LAPACK's info, 0 if A is regular.
+inline int solve(std::vector<double>& A, int n, std::vector<double>& B, int columns) {
+  std::vector<int> pivots(n);
+  int info;
+  dgesv_(&n, &columns, A.data(), &n, pivots.data(), B.data(), &n, &info);
+  return info;
+}
+
+/// A dense matrix, column-major.
+template <class T>
+struct Dense {
+  T const* data;
+  int lead;
+};
+
+/// C (m x n) = beta C + alpha op(A) op(B), over k; size = {m, n, k}.
+inline void multiply(char const* ops, std::array<int, 3> size, float alpha, Dense<float> A, Dense<float> B,
+                     float beta, float* C, int lead) {
+  if (size[0] == 0 || size[1] == 0) return;
+  sgemm_(ops, ops + 1, &size[0], &size[1], &size[2], &alpha, A.data, &A.lead, B.data, &B.lead, &beta, C,
+         &lead);
+}
+inline void multiply(char const* ops, std::array<int, 3> size, double alpha, Dense<double> A, Dense<double> B,
+                     double beta, double* C, int lead) {
+  if (size[0] == 0 || size[1] == 0) return;
+  dgemm_(ops, ops + 1, &size[0], &size[1], &size[2], &alpha, A.data, &A.lead, B.data, &B.lead, &beta, C,
+         &lead);
 }
 
 /// A x, A rows x columns, column-major. Where rows are two more than a multiple of four, cgemv of OpenBLAS

@@ -192,6 +192,19 @@ inline void sum_over_ranks(std::span<std::complex<double>> x, MPI_Comm comm) {
   sum_over_ranks(std::span(reinterpret_cast<double*>(x.data()), 2 * x.size()), comm);
 }
 
+/// A distributed matrix whole and dense (column-major) on every rank. Collective.
+inline std::vector<double> whole(Mat A) {
+  MPI_Comm comm;
+  PetscInt n;
+  check(PetscObjectGetComm(reinterpret_cast<PetscObject>(A), &comm));
+  check(MatGetSize(A, &n, nullptr));
+  as_int(PetscInt64(n) * n, "entries of a dense block");
+  std::vector<double> dense(size_t(n) * n, 0.0);
+  for_entries(A, [&](PetscInt row, PetscInt col, double value) { dense[size_t(col) * n + row] = value; });
+  sum_over_ranks(dense, comm);
+  return dense;
+}
+
 /// A vector whole on every rank. Collective.
 inline std::vector<double> gathered(Vec x) {
   MPI_Comm comm;

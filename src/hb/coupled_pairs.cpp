@@ -11,9 +11,8 @@ constexpr int most = 400;           // iterations, none forgotten: they creep un
 
 }  // namespace
 
-CoupledPairs::CoupledPairs(MPI_Comm comm, std::vector<PairCorrection const*> own,
-                           std::vector<std::unique_ptr<HarmonicBlock>> const& between)
-    : comm_(comm), own_(std::move(own)), between_(between) {
+CoupledPairs::CoupledPairs(MPI_Comm comm, std::vector<PairCorrection const*> own, Between between)
+    : comm_(comm), own_(std::move(own)), between_(std::move(between)) {
   PC pc;
   PetscInt local = 0;
   for (auto const* E : own_) local += E->size();
@@ -51,7 +50,7 @@ PetscErrorCode CoupledPairs::shell_product(Mat A, Vec f, Vec out) {
 void CoupledPairs::product(Vec f, Vec out) const {
   const auto in = gathered(f);
   std::vector<double> u(in.size(), 0.0);
-  for (auto const& G : between_) G->apply(in.data(), u.data());
+  between_(in.data(), u.data());
   sum_over_ranks(u, comm_);
   multiply_pairs(u, WriteArray(out).data());
   check(VecAXPY(out, 1, f));

@@ -1,8 +1,7 @@
 #pragma once
-#include <memory>
+#include <functional>
 #include <vector>
 
-#include "hb/harmonic_block.h"
 #include "hb/pair_correction.h"
 #include "petsc.h"
 #include "solve/guard.h"
@@ -19,10 +18,10 @@ namespace fretwave::hb {
 /// iteration reads those, in single precision, and nothing of the size of the structure.
 class CoupledPairs {
  public:
-  /// `own`: of this rank's pairs, in the order of their coefficients; `between`: G - G_pp at its harmonics,
-  /// kept elsewhere. Collective.
-  CoupledPairs(MPI_Comm, std::vector<PairCorrection const*> own,
-               std::vector<std::unique_ptr<HarmonicBlock>> const& between);
+  /// Adds (G - G_pp) f at this rank's harmonics to u; both of all pairs.
+  using Between = std::function<void(double const* f, double* u)>;
+  /// `own`: of this rank's pairs, in the order of their coefficients. Collective.
+  CoupledPairs(MPI_Comm, std::vector<PairCorrection const*> own, Between);
   CoupledPairs(CoupledPairs const&) = delete;
   /// Coefficients of all ranks' pairs.
   size_t size() const { return size_; }
@@ -37,7 +36,7 @@ class CoupledPairs {
   MPI_Comm comm_;
   PetscInt begin_ = 0, size_ = 0;
   std::vector<PairCorrection const*> own_;
-  std::vector<std::unique_ptr<HarmonicBlock>> const& between_;
+  Between between_;
   MatHandle A_;
   KspHandle ksp_;
   VecHandle right_, f_;

@@ -2,23 +2,6 @@
 
 namespace fretwave::hb {
 
-namespace {
-
-/// A distributed matrix whole and dense (column-major) on every rank.
-std::vector<double> whole(Mat A) {
-  MPI_Comm comm;
-  PetscInt n;
-  check(PetscObjectGetComm(reinterpret_cast<PetscObject>(A), &comm));
-  check(MatGetSize(A, &n, nullptr));
-  as_int(PetscInt64(n) * n, "entries of a dense block");
-  std::vector<double> dense(size_t(n) * n, 0.0);
-  for_entries(A, [&](PetscInt row, PetscInt col, double value) { dense[size_t(col) * n + row] = value; });
-  sum_over_ranks(dense, comm);
-  return dense;
-}
-
-}  // namespace
-
 HarmonicPreconditioner::HarmonicPreconditioner(HarmonicProblem& problem) : PairwisePreconditioner(problem) {
   for (auto const& term : problem.model().terms()) terms_.push_back(whole(term.A));
 }

@@ -3,6 +3,7 @@
 #include <type_traits>
 
 #include "error.h"
+#include "hb/basis_pc.h"
 #include "hb/checked_pc.h"
 #include "hb/condensed_pc.h"
 #include "hb/harmonic_pc.h"
@@ -56,6 +57,7 @@ std::unique_ptr<solve::Preconditioner> HarmonicProblem::preconditioner(std::stri
   const std::string note = model().unit() && !waves ? " (contact not the same in all sectors: no waves)" : "";
   condensed_ = !phased && (blocks == "sparse" || (free && !suits_dense(model())));
   if (condensed_) return make(std::type_identity<CondensedPreconditioner>(), note);
+  if (free && BasisPreconditioner::suits(model())) return make(std::type_identity<BasisPreconditioner>());
   return make(std::type_identity<HarmonicPreconditioner>(), note);
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "lapack.h"
 
@@ -58,15 +59,15 @@ PairCorrection::PairCorrection(Harmonics const& h, int d, std::vector<double> D,
   for_entries(h, d, tangents, [&](int row, int col, double t) { D[row * n + col] -= t; });
   if (!(largest(D) > negligible * all)) return;
   // Column-major sight of the row-major dD is dD^T: (I + dD^T G^T) E^T = dD^T.
-  std::vector<double> T(n * n, 0.0);
+  std::vector<float> T(n * n, 0.0f), E(D.begin(), D.end());
   for (size_t k = 0; k < n; ++k) T[k * n + k] = 1;
   for_entries(h, d, G, [&](int row, int col, double g) {
-    for (size_t i = 0; i < n; ++i) T[row * n + i] += g * D[col * n + i];
+    for (size_t i = 0; i < n; ++i) T[row * n + i] += float(g) * float(D[col * n + i]);
   });
   std::vector<int> pivots(n);
   int info;
-  dgesv_(&size_, &size_, T.data(), &size_, pivots.data(), D.data(), &size_, &info);
-  if (info == 0) E_.assign(D.begin(), D.end());  // else the harmonic blocks alone serve this pair
+  sgesv_(&size_, &size_, T.data(), &size_, pivots.data(), E.data(), &size_, &info);
+  if (info == 0) E_ = std::move(E);  // else the harmonic blocks alone serve this pair
 }
 
 void PairCorrection::apply(double const* u, double* f) const {

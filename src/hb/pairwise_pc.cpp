@@ -131,7 +131,10 @@ void PairwisePreconditioner::couple(std::vector<PairTangents>&& contacts) {
       if (mine(i)) between_.push_back(inverses_[i]->between_pairs(entries(i), pair_of));
     pair_of_ = pair_of;
   }
-  coupled_ = std::make_unique<CoupledPairs>(problem_.comm(), std::move(own), between_);
+  coupled_ =
+      std::make_unique<CoupledPairs>(problem_.comm(), std::move(own), [this](double const* f, double* u) {
+        for (auto const& G : between_) G->apply(f, u);
+      });
 }
 
 std::vector<PairTangents> PairwisePreconditioner::contacts(Vec y) {

@@ -5,6 +5,7 @@
 
 #include "error.h"
 #include "fault.h"
+#include "model/stuck_basis.h"
 #include "together.h"
 
 namespace fretwave::model {
@@ -65,6 +66,12 @@ MatHandle Model::sum(int order) const {
       check(MatAXPY(total, 1.0, term.A, DIFFERENT_NONZERO_PATTERN));
   }
   return total;
+}
+
+StuckBasis const* Model::stuck_basis() const {
+  if (!sought_basis_) stuck_basis_ = StuckBasis::of(*this);
+  sought_basis_ = true;
+  return stuck_basis_.get();
 }
 
 double Model::largest_term() const {

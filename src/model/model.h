@@ -9,6 +9,8 @@
 /// Structures: linear terms, contact, linear modes.
 namespace fretwave::model {
 
+class StuckBasis;
+
 /// One linear term: sparse A (n_dof x n_dof) on the p-th time derivative, with spatial phase k (DESIGN
 /// section 3): Z_n = sum s_n^p e^{-i k n theta} A.
 struct Term {
@@ -60,12 +62,16 @@ class Model {
   VecHandle displacement() const;
   /// A phase makes the fundamental's equations complex: a travelling wave, whose mode shapes are complex.
   bool travelling() const;
+  /// The modes with all pairs stuck, made when first asked for; null if there are none. Collective.
+  StuckBasis const* stuck_basis() const;
   /// All laws are odd: without preload the motion may keep odd harmonics only. Collective.
   bool odd() const;
 
  private:
   std::vector<Term> terms_;
   std::vector<Contact> contacts_;
+  mutable std::shared_ptr<StuckBasis const> stuck_basis_;
+  mutable bool sought_basis_ = false;
   MPI_Comm comm_ = MPI_COMM_NULL;
   PetscInt local_ = 0, global_ = 0, first_ = 0, unit_ = 0;
   double theta_ = 0;

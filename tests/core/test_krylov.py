@@ -87,8 +87,13 @@ def preloaded(model):
     return first, static_preload(model, np.tile([100.0, 1.0, 0, 0, 0, 0], ELEMENTS + 1), first)
 
 
+#: Routes by name: the basis of stuck pairs, and dense blocks as without it.
+KRYLOV = ("krylov", "dense")
+
+
 def mode(model, first, rest, route, method="CNM", highest=5):
-    PETSc.Options()[f"{route}_route"] = route
+    PETSc.Options()[f"{route}_route"] = "krylov" if route in KRYLOV else route
+    PETSc.Options()["dense_blocks"] = "dense"
     problem = fw.NonlinearMode(model, fw.Harmonics(range(highest + 1), 128), method, TIP, first, f"{route}_")
     problem.preload(rest.displacement, rest.load)
     return problem
@@ -112,15 +117,19 @@ def case(comm):
     return (model, *preloaded(model))
 
 
-@pytest.fixture(scope="module")
-def krylov(case):
-    return branch(mode(*case, "krylov"))
+@pytest.fixture(scope="module", params=KRYLOV)
+def krylov(case, request):
+    return branch(mode(*case, request.param))
 
 
-def test_the_option_chooses_the_route(case):
-    for route in ("direct", "krylov"):
-        newton = fw._core.Newton(mode(*case, route).core, f"{route}_")
-        assert newton.route.startswith(f"{route} (asked for)")
+@pytest.mark.parametrize(
+    "route, words",
+    [("direct", "direct (asked"), ("krylov", "6 blocks of 30 modes of stuck pairs"), ("dense", "6 dense blocks of 30")],
+)
+def test_the_option_chooses_the_route(case, route, words):
+    newton = fw._core.Newton(mode(*case, route).core, f"{route}_")
+    assert newton.route.startswith("direct" if route == "direct" else "krylov (asked for)")
+    assert words in newton.route
 
 
 @pytest.mark.ranks(1)
@@ -137,24 +146,25 @@ def test_both_routes_find_the_same_branch(case, method):
     """Issue 3: to 1e-9 in omega and beta, from stick to slip and lift-off."""
     found = {
         route: [p for p in branch(mode(*case, route, method)) if p["event"] == "report"]
-        for route in ("direct", "krylov")
+        for route in ("direct", *KRYLOV)
     }
-    assert len(found["direct"]) == len(found["krylov"]) == len(AMPLITUDES)
+    assert {len(points) for points in found.values()} == {len(AMPLITUDES)}
     assert found["direct"][0]["slip"] == 0 and found["direct"][-1]["slip"] > 0.3 and found["direct"][-1]["open"] > 0
-    for direct, krylov in zip(found["direct"], found["krylov"]):
+    for direct, krylov in zip(2 * found["direct"], found["krylov"] + found["dense"]):
         assert krylov["omega"] == pytest.approx(direct["omega"], rel=SOLVED)
         assert krylov["beta"] == pytest.approx(direct["beta"], rel=SOLVED, abs=SOLVED * direct["omega"])
 
 
-def test_stuck_regime_needs_at_most_three_iterations(case):
+@pytest.mark.parametrize("route", KRYLOV)
+def test_stuck_regime_needs_at_most_three_iterations(case, route):
     """DESIGN fact 5: 2 iterations when stuck. From a perturbed point, as the linear mode itself needs none."""
-    problem = mode(*case, "krylov")
+    problem = mode(*case, route)
     y = problem.initial(1e-3)
     begin, end = y.getOwnershipRange()
     size = y.getSize() - 3
     rough = 1e-4 * np.random.default_rng(0).standard_normal(size) * (np.arange(size) % problem.harmonics.block_size < 3)
     y.setArray(y.getArray() + np.concatenate([rough, np.zeros(3)])[begin:end])
-    newton, row = fw._core.Newton(problem.core, "krylov_"), problem.core.unknowns()
+    newton, row = fw._core.Newton(problem.core, f"{route}_"), problem.core.unknowns()
     row.set(0)
     row.setValue(row.getSize() - 1, 1.0)
     row.assemble()
@@ -176,11 +186,12 @@ def test_iterations_do_not_grow_with_slip(krylov, comm):
     assert max(p["linear"] / p["newton"] for p in moving) <= 7
 
 
-def test_a_contact_far_stiffer_than_the_structure(comm):
+@pytest.mark.parametrize("route", KRYLOV)
+def test_a_contact_far_stiffer_than_the_structure(comm, route):
     """30 times the contact stiffness, all pairs on one rigid root, slip to 60 %: averaged tangents stagnate."""
     stiff = {key: 30 * ROOT[key] for key in ("normal_stiffness", "tangential_stiffness")}
     model = blade(comm, **stiff)
-    points = branch(mode(model, *preloaded(model), "krylov", highest=7), (1.5e-3, 2.6e-3), ())
+    points = branch(mode(model, *preloaded(model), route, highest=7), (1.5e-3, 2.6e-3), ())
     partial = [p["linear"] / p["newton"] for p in points if p["newton"] and p["slip"] > 0.1]
     assert partial and max(partial) <= 15, max(partial)  # 31 with pairs that do not know of each other
 

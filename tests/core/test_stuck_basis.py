@@ -1,0 +1,116 @@
+"""The real basis of stuck pairs: which models have it, and that one is as good as another to the result."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from petsc4py import PETSc
+from tolerances import REPEATED, SOLVED
+
+import fretwave as fw
+from fretwave import _core, balanced
+
+pytestmark = pytest.mark.ranks(1, 2, 3)
+
+N, PAIRS = 18, 4
+SLIDER = {"tangential_stiffness": 2.0, "friction_limit": 0.05}
+PADS = {"normal_stiffness": 3.0, "tangential_stiffness": 2.0, "friction_coefficient": 0.4, "normal_load": 0.3}
+
+
+def chain(free=0.0):
+    """M, K of masses on springs, each joined to the next three, the first held but for `free`."""
+    generator = np.random.default_rng(4)
+    K = np.diag([3.0 - free] + [0.4] * (N - 1))
+    for i in range(N):
+        for j in range(i + 1, min(i + 4, N)):
+            stiffness = generator.uniform(2, 5)
+            K[np.ix_([i, j], [i, j])] += stiffness * np.array([[1, -1], [-1, 1]])
+    return np.diag(generator.uniform(1, 2, N)), K
+
+
+def sliders(law="jenkins", parameters=SLIDER, components=1):
+    """Contact between dofs and their neighbours but one."""
+    B = np.zeros((PAIRS * components, N))
+    for row in range(PAIRS * components):
+        B[row, row], B[row, row + 2] = 1.0, -1.0
+    return fw.Contact(law, B, parameters)
+
+
+def problem_of(model, prefix="basis_", highest=7, method="CNM"):
+    options = PETSc.Options(prefix)
+    options["route"] = "krylov"
+    first = fw.linear_modes(model, 1, "stuck")[0]
+    problem = fw.NonlinearMode(model, fw.Harmonics(range(highest + 1), 64), method, N - 1, first, prefix)
+    if model.contacts[0].info.normal is not None:
+        rest = balanced(model, first)
+        problem.preload(rest.displacement, rest.load)
+    return problem
+
+
+def branch(problem, levels):
+    followed = fw.Continuation(problem, problem.initial(levels[0] / 2), (levels[0] / 2, levels[-1]), report_at=levels)
+    points = [(p.event, p.newton, p.linear, problem.state(p.y), problem.diagnostics(p.y)) for p in followed]
+    assert followed.converged, followed.reason
+    return points
+
+
+def unsymmetric(K):
+    K = K.copy()
+    K[0, 1] += 0.5
+    return K
+
+
+@pytest.mark.parametrize(
+    "why, change",
+    [
+        (
+            "a law without a stuck stiffness",
+            ("regularised_coulomb", {"friction_limit": 1.0, "regularisation_velocity": 1e-2}),
+        ),
+        ("pairs that leave the structure nothing to slip by", ("jenkins", {**SLIDER, "tangential_stiffness": 1e9})),
+        ("K without symmetry", None),
+    ],
+)
+def test_other_models_have_dense_blocks(comm, why, change) -> None:
+    M, K = chain()
+    with fw.Model(M, K if change else unsymmetric(K), 0.01 * K, [sliders(*change or ())], comm) as model:
+        start = fw.LinearMode(0.5, 0.0, np.ones(N), np.zeros(N))
+        PETSc.Options("basis_")["route"] = "krylov"
+        problem = fw.NonlinearMode(model, fw.Harmonics(range(8), 64), "CNM", N - 1, start, "basis_")
+        assert f"8 dense blocks of {N} dofs" in _core.Newton(problem.core, "basis_").route, why
+
+
+@pytest.mark.parametrize("method", ["CNM", "EPMC"])
+@pytest.mark.parametrize("contact", [sliders(), sliders("coulomb_3d", PADS, 3)], ids=["jenkins", "coulomb_3d"])
+@pytest.mark.parametrize("damping", ["none", "of K", "a damper"])
+def test_branches_are_those_of_the_direct_route(comm, method, contact, damping) -> None:
+    """Through slip, with motions without mass, and damping that the basis makes diagonal or does not."""
+    M, K = chain()
+    M[3, 3] = M[7, 7] = 0.0
+    C = {"none": None, "of K": 0.002 * K, "a damper": np.diag([0.1] + [0.0] * (N - 1))}[damping]
+    levels = [0.1, 1.0, 4.0]
+    with fw.Model(M, K, C, [contact], comm) as model:
+        problem = problem_of(model, "basis_", method=method)
+        assert "modes of stuck pairs" in _core.Newton(problem.core, "basis_").route
+        ours = branch(problem, levels)
+        other = problem_of(model, "basis_direct_", method=method)
+        PETSc.Options("basis_direct_")["route"] = "direct"
+        theirs = branch(other, levels)
+    assert max(state["slip"] for *_, state in ours) > 0.2
+    mine, others = ([state for event, *_, state, _ in points if event == "report"] for points in (ours, theirs))
+    assert len(mine) == len(others) == len(levels)
+    for one, same in zip(mine, others):
+        assert one["omega"] == pytest.approx(same["omega"], rel=SOLVED)
+        assert one["beta"] == pytest.approx(same["beta"], rel=SOLVED, abs=SOLVED * same["omega"])
+    moving = [(newton, linear) for _, newton, linear, *_ in ours if newton]
+    assert max(linear / newton for newton, linear in moving) <= (12 if damping == "a damper" else 8)
+
+
+def test_stuck_pairs_are_solved_by_one_iteration(comm) -> None:
+    """Blocks are exact there, with damping by K; the columns of the scalars reach the fundamental alone."""
+    M, K = chain()
+    with fw.Model(M, K, 0.002 * K, [sliders()], comm) as model:
+        points = branch(problem_of(model), [1e-4, 1e-3])
+    assert all(found["stick"] == 1 for *_, found in points)
+    assert sum(linear for _, _, linear, *_ in points) <= sum(newton for _, newton, *_ in points)
+    assert points[0][3]["omega"] == pytest.approx(points[-1][3]["omega"], rel=REPEATED)
