@@ -31,8 +31,9 @@ ITERATED = {
     "lap_joint": ["forced", "mode"],
     "shrouded_sector": ["forced"],
 }
-#: What a column is a share of, where that is not its own largest: an error of wear is one of the mean normal load.
-SHARE = {"step_error": 1.0}
+#: Columns that are shares already, not of their own largest: an error of wear of the mean normal load, distances of a
+#: peak from the mode of its frequency and amplitude.
+SHARE = {"step_error": 1.0, "distance_mode": 1.0, "quadrature_distance_mode": 1.0}
 #: Of what a column is the error, by how it begins: held against that. What the solver left, which is part of it, is
 #: rounding, and another on other ranks.
 ERROR_OF = {"omega_error": "omega", "zeta_error": "zeta", "lambda_error": "omega", "amplitude_error": "amplitude"}

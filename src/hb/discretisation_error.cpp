@@ -63,6 +63,7 @@ DiscretisationError::DiscretisationError(HarmonicProblem& problem, std::string c
     return;
   }
   finer_ = refined(problem, orders, std::max(4 * problem.harmonics().samples(), 16 * orders.back()));
+  finer_->multiply_exactly();  // an error is a small difference
   newton_ = std::make_unique<solve::Newton>(*finer_, prefix);
   newton_->solve_beside(tolerance);
 }

@@ -36,6 +36,8 @@ DynamicStiffness::DynamicStiffness(model::Model const& model, Harmonics const& h
     blocked_.back().dense.assign(size_t(model.local_dofs()) * model.dofs(), 0.0);
     for (auto const& entry : entries(term.A))
       blocked_.back().dense[size_t(entry.row - model.first_dof()) * model.dofs() + entry.col] = entry.value;
+    if (term.order == 0 && term.phase == 0)
+      blocked_.back().split = SplitMatrix(blocked_.back().dense, int(model.local_dofs()), int(model.dofs()));
   }
   work_ = make_vector(model.comm(), model.local_dofs() * h.block_size());
 }
@@ -72,7 +74,8 @@ std::vector<complex> DynamicStiffness::coefficient_derivatives(model::Term const
 }
 
 /// y += A (c x): with blocks innermost, Y^T (m x local) += X^T (m x all) A^T.
-void DynamicStiffness::accumulate(std::vector<complex> const& c, Blocked const& A, Vec x, Vec y) {
+void DynamicStiffness::accumulate(std::vector<complex> const& c, Blocked const& A, Vec x, Vec y,
+                                  bool exactly) {
   static const log::Event structure("FwStructure");
   const log::Span span(structure);
   {
@@ -88,6 +91,7 @@ void DynamicStiffness::accumulate(std::vector<complex> const& c, Blocked const& 
   const auto X = gathered(work_);
   if (local == 0) return;
   WriteArray Y(y);
+  if (exactly && A.split) return A.split.multiply_add(X.data(), Y.data(), m);
   const double one = 1;
   dgemm_("N", "N", &m, &local, &all, &one, X.data(), &m, A.dense.data(), &all, &one, Y.data(), &m);
 }
@@ -96,6 +100,11 @@ void DynamicStiffness::multiply_add(Exponents const& e, Vec x, Vec y, int order)
   for (size_t j = 0; j < blocked_.size(); ++j)
     if (order < 0 || model_.terms()[j].order == order)
       accumulate(coefficients(model_.terms()[j], e), blocked_[j], x, y);
+}
+
+void DynamicStiffness::multiply_add_exactly(Exponents const& e, Vec x, Vec y) {
+  for (size_t j = 0; j < blocked_.size(); ++j)
+    accumulate(coefficients(model_.terms()[j], e), blocked_[j], x, y, true);
 }
 
 void DynamicStiffness::derivative_multiply_add(Exponents const& e, Exponents const& change, Vec x, Vec y) {

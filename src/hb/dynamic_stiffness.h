@@ -1,5 +1,6 @@
 #pragma once
 #include "hb/harmonics.h"
+#include "hb/split_matrix.h"
 #include "model/model.h"
 
 namespace fretwave::hb {
@@ -11,6 +12,8 @@ class DynamicStiffness {
   DynamicStiffness(model::Model const&, Harmonics const&);
   /// y += Z x on harmonic-block vectors, of all terms or of those of one order. Collective.
   void multiply_add(Exponents const&, Vec x, Vec y, int order = -1);
+  /// y += Z x, dense stiffness without its rounding (`SplitMatrix`): for residuals. Collective.
+  void multiply_add_exactly(Exponents const&, Vec x, Vec y);
   /// y += dZ x for a change (ds, dg) of the exponents. Collective.
   void derivative_multiply_add(Exponents const&, Exponents const& change, Vec x, Vec y);
   /// Rounding error to expect in Z x: eps sum |A| |c_n| |x|, with each dof's neighbours moving as itself;
@@ -36,9 +39,10 @@ class DynamicStiffness {
   struct Blocked {
     MatHandle sparse;
     std::vector<double> dense;  ///< local rows x all dofs, row-major
+    SplitMatrix split;          ///< of a stiffness
   };
   complex phase(model::Term const&, int n) const;
-  void accumulate(std::vector<complex> const& c, Blocked const&, Vec x, Vec y);
+  void accumulate(std::vector<complex> const& c, Blocked const&, Vec x, Vec y, bool exactly = false);
   std::vector<Entry> entries(Mat A) const;
 
   model::Model const& model_;

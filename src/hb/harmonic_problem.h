@@ -71,6 +71,8 @@ class HarmonicProblem : public solve::Problem {
   ContactSummary summarise(Vec y);
   int scalar_count() const { return scalars_; }
   double stiffness_scale() const { return stiffness_; }
+  /// Residual::multiply_exactly
+  void multiply_exactly() { residual_.multiply_exactly(); }
   DynamicStiffness const& stiffness() const { return residual_.stiffness(); }
   /// Column dr/dz_j at y, on the harmonic rows; until the next point of linearisation. Collective.
   Vec scalar_column(Vec y, int j);

@@ -89,7 +89,7 @@ void Residual::evaluate(Vec Q, Exponents const& e, Vec R) {
   if (Q != Q_) check(VecCopy(Q, Q_));
   e_ = e;
   check(VecSet(R, 0));
-  stiffness_.multiply_add(e, Q_, R);
+  stiffness_.multiply_add_exactly(e, Q_, R);
   for (Group& group : groups_) relative_motion(group, Q_, group.U);
   together(model_.comm(), "contact forces", [&] {
     const log::Span span(forces);
@@ -105,7 +105,8 @@ void Residual::evaluate(Vec Q, Exponents const& e, Vec R) {
 
 void Residual::product(Vec dQ, Exponents const* de, Vec dR) {
   check(VecSet(dR, 0));
-  if (dQ) stiffness_.multiply_add(e_, dQ, dR);
+  if (dQ && exactly_) stiffness_.multiply_add_exactly(e_, dQ, dR);
+  if (dQ && !exactly_) stiffness_.multiply_add(e_, dQ, dR);
   if (de) stiffness_.derivative_multiply_add(e_, *de, Q_, dR);
   for (Group& group : groups_) contact_product(group, dQ, de, dR);
 }

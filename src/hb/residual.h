@@ -44,6 +44,8 @@ class Residual {
 
   /// R at (Q, e), which becomes the point of linearisation. Collective.
   void evaluate(Vec Q, Exponents const& e, Vec R);
+  /// Products take dense stiffness without its rounding from now on, as residuals do.
+  void multiply_exactly() { exactly_ = true; }
   /// dR for (dQ, de) at the last evaluated point; dQ or de may be null. Collective.
   void product(Vec dQ, Exponents const* de, Vec dR);
 
@@ -134,6 +136,7 @@ class Residual {
   std::vector<Group> groups_;
   VecHandle Q_;  ///< copy of the last evaluated point (the callers' vectors are not ours to keep)
   Exponents e_;
+  bool exactly_ = false;
 };
 
 }  // namespace fretwave::hb

@@ -27,6 +27,11 @@ if TYPE_CHECKING:
     from .load import Case
 
 
+#: Dofs of a structure up to which every rank reduces it alone: many are not quicker, and each number of them rounds
+#: K_r otherwise, of which a first bending may be 1e-8 (frequency of a lap joint: 1e-10 apart, its phase 6e-7).
+ALONE = 5000
+
+
 def kept_dofs(structure: Structure, analyses: Mapping[int, AnalysisSection]) -> list[int]:
     """Numbers of the dofs that a reduction keeps: of contacts, and those named by the model or an analysis."""
     asked = {name for analysis in analyses.values() for name in analysis.kept_dofs()}
@@ -114,6 +119,8 @@ def reduction_of(case: Case, comm: MPI.Comm, modes: int | None = None) -> Reduct
     modes : int, optional
         Component modes, in place of the case's.
     """
+    from mpi4py import MPI
+
     from ..cyclic.reduction import reduce_sector
     from ..model.reduction import reduce
 
@@ -124,7 +131,8 @@ def reduction_of(case: Case, comm: MPI.Comm, modes: int | None = None) -> Reduct
     )
     if cut is None or cut.low is None or cut.high is None:
         full = case.structure
-        return reduce(full.M, full.K, full.C, keep=np.array(case.keep), comm=comm, **chosen)
+        ranks = MPI.COMM_SELF if full.n_dof <= ALONE else comm
+        return reduce(full.M, full.K, full.C, keep=np.array(case.keep), comm=ranks, **chosen)
     return reduce_sector(
         cut.M,
         cut.K,

@@ -79,8 +79,8 @@ def nonlinear_error(
             f"{reduction.size}",
             "build the problem's model from the reduction's M, K, C",
         )
-    comm, full = problem.model.comm, reduction._model
-    Q = comm.bcast(problem.coefficients(y))
+    full = reduction._model
+    comm, Q = full.comm, problem.model.comm.bcast(problem.coefficients(y))
     X = full.distribute(reduction.expand(Q))
     P = np.zeros(full.n_dof) if load is None else np.asarray(load, dtype=float)
     interior = _Interior(reduction)
