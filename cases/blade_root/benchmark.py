@@ -47,7 +47,7 @@ def reduced_model(options: dict[str, Any]) -> tuple[Any, Any, int]:
 
 def branch(model: Any, dof: int, route: str, highest: int, options: argparse.Namespace) -> list[dict[str, Any]]:
     """Points of the first bending from stick to `options.stop` with the processor time of each."""
-    PETSc.Options()["benchmark_route"] = route
+    PETSc.Options()["benchmark_route"], PETSc.Options()["benchmark_blocks"] = route, options.blocks
     first = fw.linear_modes(model, 1, "stuck")[0]
     rest = balanced(model, first)
     harmonics = fw.choose_harmonics(model, highest, options.samples)
@@ -163,6 +163,7 @@ def main() -> None:
     parser.add_argument("--samples", type=int, default=256)
     parser.add_argument("--start", type=float, default=6e-4, help="[m]")
     parser.add_argument("--stop", type=float, default=1.25e-3, help="[m]")
+    parser.add_argument("--blocks", default="auto", help="preconditioner: auto, or dense blocks of all harmonics")
     parser.add_argument("--only", type=int, default=0, help=argparse.SUPPRESS)
     options = parser.parse_args()
     {"routes": routes, "pairs": pairs, "ranks": ranks}[options.what](options)

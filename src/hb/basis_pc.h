@@ -34,7 +34,6 @@ class BasisPreconditioner : public solve::Preconditioner {
     int components, first_row;
     size_t first_block;
   };
-  std::vector<PairTangents> contacts(Vec y);
   std::vector<std::vector<complex>> structure(Exponents const&) const;
   ModalBorder border(Vec y, Vec row);
   std::vector<double> mean_tangents(std::vector<PairTangents> const&) const;

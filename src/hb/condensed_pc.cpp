@@ -207,8 +207,6 @@ void CondensedPreconditioner::condense() {
 void CondensedPreconditioner::build(Vec y, Vec row) {
   const Exponents e = problem_.exponents(y);
   auto contacts = problem_.pair_tangents(y);
-  for (auto& contact : contacts)
-    for (double& d : contact.D) d /= problem_.stiffness_scale();
   if (rows_.pairs.empty()) rows_ = ContactRows::of(contacts, problem_.comm());
   if (moved(e)) factorise(e, contacts);
   gather_tangents(contacts);

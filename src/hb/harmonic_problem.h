@@ -76,7 +76,7 @@ class HarmonicProblem : public solve::Problem {
   DynamicStiffness const& stiffness() const { return residual_.stiffness(); }
   /// Column dr/dz_j at y, on the harmonic rows; until the next point of linearisation. Collective.
   Vec scalar_column(Vec y, int j);
-  /// Linearised contact of this rank's pairs at y. Collective.
+  /// Linearised contact of this rank's pairs at y, in the unit of the rows, `stiffness_scale`. Collective.
   std::vector<PairTangents> pair_tangents(Vec y);
   std::unique_ptr<solve::Preconditioner> preconditioner(std::string const& blocks) override;
   std::unique_ptr<solve::Preconditioner> fallback(double& bytes) override;

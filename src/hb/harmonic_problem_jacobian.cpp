@@ -88,7 +88,10 @@ Vec HarmonicProblem::scalar_column(Vec y, int j) {
 
 std::vector<PairTangents> HarmonicProblem::pair_tangents(Vec y) {
   linearise(y);
-  return residual_.pair_tangents();
+  auto contacts = residual_.pair_tangents();
+  for (auto& contact : contacts)
+    for (double& d : contact.D) d /= stiffness_;
+  return contacts;
 }
 
 VecHandle HarmonicProblem::gap_product(Vec y, PerContact const& dgap) {

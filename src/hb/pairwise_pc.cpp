@@ -137,17 +137,10 @@ void PairwisePreconditioner::couple(std::vector<PairTangents>&& contacts) {
       });
 }
 
-std::vector<PairTangents> PairwisePreconditioner::contacts(Vec y) {
-  auto contacts = problem_.pair_tangents(y);
-  for (auto& contact : contacts)
-    for (double& d : contact.D) d /= problem_.stiffness_scale();
-  return contacts;
-}
-
 void PairwisePreconditioner::build(Vec y, Vec row) {
   Harmonics const& h = problem_.harmonics();
   const Exponents e = problem_.exponents(y);
-  auto contacts = this->contacts(y);
+  auto contacts = problem_.pair_tangents(y);
   tangents_ = gather_contact(contacts);
   inverses_.clear(), inverses_.resize(h.count());
   pair_of_.clear();
@@ -160,7 +153,7 @@ void PairwisePreconditioner::build(Vec y, Vec row) {
   couple(std::move(contacts));
 }
 
-void PairwisePreconditioner::follow(Vec y) { couple(contacts(y)); }
+void PairwisePreconditioner::follow(Vec y) { couple(problem_.pair_tangents(y)); }
 
 /// P^-1 x
 std::vector<double> PairwisePreconditioner::solve(std::vector<double> const& x) const {

@@ -48,7 +48,6 @@ class PairwisePreconditioner : public solve::Preconditioner {
     size_t first_weight, end_weight, first_block;
     int first_row = -1;
   };
-  std::vector<PairTangents> contacts(Vec y);
   std::vector<Rotation> gather_contact(std::vector<PairTangents> const&);
   complex phase(Weight const&, int harmonic) const;
   /// visit(row's weight, column's weight, index of their component's per-harmonic block) for all entries of

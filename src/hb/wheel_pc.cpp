@@ -334,8 +334,6 @@ void WheelPreconditioner::make_border(Vec y, Vec row) {
 void WheelPreconditioner::build(Vec y, Vec row) {
   const Exponents e = problem_.exponents(y);
   auto contacts = problem_.pair_tangents(y);
-  for (auto& contact : contacts)
-    for (double& d : contact.D) d /= problem_.stiffness_scale();
   contact_.take(contacts);
   const auto shares = spectrum(y);
   factorise(e, shares);
