@@ -1,4 +1,5 @@
 #pragma once
+#include <algorithm>
 #include <array>
 #include <complex>
 #include <vector>
@@ -75,16 +76,18 @@ struct Dense {
   int lead;
 };
 
-/// C (m x n) = beta C + alpha op(A) op(B), over k; size = {m, n, k}.
+/// C (m x n) = beta C + alpha op(A) op(B), over k; size = {m, n, k}, each may be zero.
 inline void multiply(char const* ops, std::array<int, 3> size, float alpha, Dense<float> A, Dense<float> B,
                      float beta, float* C, int lead) {
   if (size[0] == 0 || size[1] == 0) return;
+  A.lead = std::max(A.lead, 1), B.lead = std::max(B.lead, 1);
   sgemm_(ops, ops + 1, &size[0], &size[1], &size[2], &alpha, A.data, &A.lead, B.data, &B.lead, &beta, C,
          &lead);
 }
 inline void multiply(char const* ops, std::array<int, 3> size, double alpha, Dense<double> A, Dense<double> B,
                      double beta, double* C, int lead) {
   if (size[0] == 0 || size[1] == 0) return;
+  A.lead = std::max(A.lead, 1), B.lead = std::max(B.lead, 1);
   dgemm_(ops, ops + 1, &size[0], &size[1], &size[2], &alpha, A.data, &A.lead, B.data, &B.lead, &beta, C,
          &lead);
 }

@@ -173,7 +173,8 @@ ModalBlocks::Solution ModalBlocks::solve(std::vector<float> const& forces,
   };
   relax(forces);
   std::vector<float> b(size_t(c) * r), t, low(forces.begin(), forces.begin() + size_t(c) * k);
-  multiply("NT", {c, r, n - k}, 1.0f, {&eta[size_t(c) * k], c}, {&U_[size_t(r) * k], r}, 0.0f, b.data(), c);
+  multiply("NT", {c, r, n - k}, 1.0f, {eta.data() + size_t(c) * k, c}, {U_.data() + size_t(r) * k, r}, 0.0f,
+           b.data(), c);
   t = pull(b);
   multiply("NN", {c, k, r}, -1.0f, {t.data(), c}, {U_.data(), r}, 1.0f, low.data(), c);
   for (Small const& small : small_) {
@@ -204,7 +205,8 @@ ModalBlocks::Solution ModalBlocks::solve(std::vector<float> const& forces,
   add_T(v, t);
   if (r) {
     std::vector<float> g(forces.begin(), forces.end());
-    multiply("NN", {c, n - k, r}, -1.0f, {t.data(), c}, {&U_[size_t(r) * k], r}, 1.0f, &g[size_t(c) * k], c);
+    multiply("NN", {c, n - k, r}, -1.0f, {t.data(), c}, {U_.data() + size_t(r) * k, r}, 1.0f,
+             g.data() + size_t(c) * k, c);
     relax(g);
   }
   for (size_t j = 0; j < out.scalars.size(); ++j)
@@ -266,14 +268,14 @@ std::vector<Rotation> ModalBlocks::compliance(int harmonic, std::vector<Group> c
   std::vector<double> right(size_t(small.size) * columns), x(right.size());
   for (int row = 0; row < r; ++row)
     for (int part = 0; part < of_row; ++part) {
-      double* to = &right[(size_t(row) * of_row + part) * small.size];
-      std::copy_n(&right_[size_t(row) * k], k, to + part * k);
+      double* to = right.data() + (size_t(row) * of_row + part) * small.size;
+      std::copy_n(right_.data() + size_t(row) * k, k, to + part * k);
       for (int j = 0; j < small.scalars; ++j) to[2 * k + j] = -right_rows_[(size_t(2) * j + part) * r + row];
     }
   multiply("NN", {small.size, columns, small.size}, 1.0, {small.inverse.data(), small.size},
            {right.data(), small.size}, 0.0, x.data(), small.size);
   const auto entry = [&](int a, int b, int to, int part) {
-    double const* of_b = &x[(size_t(b) * of_row + part) * small.size];
+    double const* of_b = x.data() + (size_t(b) * of_row + part) * small.size;
     double u = to == part ? G_[size_t(a) * r + b] : 0;
     for (int l = 0; l < k; ++l) u += left_[size_t(l) * r + a] * of_b[to * k + l];
     for (int j = 0; j < small.scalars; ++j)

@@ -17,9 +17,9 @@ void ModalBlocks::set_border(std::vector<double> const& U) {
   schur_ = border_.corner;
   std::vector<double> pulled(moved_.size());
   for (int j = 0; j < s; ++j) {
-    double const* C = &border_.columns[size_t(2) * j * n];
-    double const* R = &border_.rows[size_t(2) * j * n];
-    double *to = &moved_[size_t(2) * j * n], *from = &pulled[size_t(2) * j * n];
+    double const* C = border_.columns.data() + size_t(2) * j * n;
+    double const* R = border_.rows.data() + size_t(2) * j * n;
+    double *to = moved_.data() + size_t(2) * j * n, *from = pulled.data() + size_t(2) * j * n;
     for (int l = k; l < n; ++l) {
       const Rotation a = Rotation::of(flexible[l]);
       to[l] = a.cc * C[l] + a.cs * C[n + l], to[n + l] = a.sc * C[l] + a.ss * C[n + l];
@@ -32,7 +32,7 @@ void ModalBlocks::set_border(std::vector<double> const& U) {
         schur_[size_t(j) * s + i] -= border_.rows[size_t(2) * i * n + l] * moved_[size_t(2) * j * n + l];
   for (int v = 0; v < 2 * s; ++v)
     for (int l = k; l < n; ++l) {
-      double const* u = &U[size_t(l) * r];
+      double const* u = U.data() + size_t(l) * r;
       for (int i = 0; i < r; ++i) {
         columns_[size_t(v) * r + i] += u[i] * moved_[size_t(v) * n + l];
         rows_of_forces_[size_t(v) * r + i] += u[i] * pulled[size_t(v) * n + l];
@@ -66,15 +66,16 @@ void ModalBlocks::add_border(Small const& small, std::vector<double>& N) const {
     for (int part = 0; part < 2; ++part) {
       const size_t v = size_t(2) * j + part;
       for (int l = 0; l < k; ++l) {
-        double const* u = &U_low_[size_t(l) * r];
-        at(part * k + l, 2 * k + j) = border_.columns[v * n + l] - dot(u, &X_columns_[v * r]);
-        at(2 * k + j, part * k + l) = border_.rows[v * n + l] - dot(&rows_X_[v * r], u);
+        double const* u = U_low_.data() + size_t(l) * r;
+        at(part * k + l, 2 * k + j) = border_.columns[v * n + l] - dot(u, X_columns_.data() + v * r);
+        at(2 * k + j, part * k + l) = border_.rows[v * n + l] - dot(rows_X_.data() + v * r, u);
       }
     }
     for (int i = 0; i < s; ++i) {
       double& corner = at(2 * k + i, 2 * k + j) = schur_[size_t(j) * s + i];
       for (int part = 0; part < 2; ++part)
-        corner += dot(&rows_X_[(size_t(2) * i + part) * r], &columns_[(size_t(2) * j + part) * r]);
+        corner +=
+            dot(rows_X_.data() + (size_t(2) * i + part) * r, columns_.data() + (size_t(2) * j + part) * r);
     }
   }
 }
