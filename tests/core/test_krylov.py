@@ -186,20 +186,17 @@ def test_iterations_do_not_grow_with_slip(krylov, comm):
     assert max(p["linear"] / p["newton"] for p in moving) <= 7
 
 
-@pytest.mark.parametrize("route, most", [("krylov", 40), ("dense", 15)])
-def test_a_contact_far_stiffer_than_the_structure(comm, route, most):
+@pytest.mark.parametrize("route", KRYLOV)
+def test_a_contact_far_stiffer_than_the_structure(comm, route):
     """30 times the contact stiffness, all pairs on one rigid root, slip to 60 %: averaged tangents stagnate.
 
-    In the basis of stuck pairs all harmonics have one mean stiffness, which is not enough here: 33 iterations, or the
-    condensed system instead.
+    Pairs are coupled to 1e-3: to 3e-2 the basis of stuck pairs took up to 33 iterations.
     """
     stiff = {key: 30 * ROOT[key] for key in ("normal_stiffness", "tangential_stiffness")}
     model = blade(comm, **stiff)
     points = branch(mode(model, *preloaded(model), route, highest=7), (1.5e-3, 2.6e-3), ())
     partial = [p["linear"] / p["newton"] for p in points if p["newton"] and p["slip"] > 0.1]
-    assert partial and max(partial) <= most, max(
-        partial
-    )  # 31 with dense blocks of pairs that do not know of each other
+    assert partial and max(partial) <= 15, max(partial)  # 31 with dense blocks of pairs that do not know of each other
 
 
 def test_stuck_asymptote_is_the_linear_mode(krylov, case):
