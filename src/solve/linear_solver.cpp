@@ -19,6 +19,7 @@ constexpr double tangent_tolerance = 1e-10;  // relative; of the tangent's direc
 constexpr double memory_share = 0.7;         // of what is free, for a fallback to take
 constexpr int longest_stay = 256;            // points between two tries at the foot of the ladder
 constexpr double tangent_accepted = 1e-6;    // where rounding lets GMRES go no further
+constexpr double renewal = 1.0 / 16;  // of the iterations, spent on building anew whether it is needed or not
 
 /// What the option says: one of two, or auto.
 std::string choice(std::string const& prefix, char const* option, char const* meaning, std::string const& one,
@@ -129,7 +130,8 @@ PetscErrorCode LinearSolver::shell_precondition(PC pc, Vec x, Vec y) {
 }
 
 /// The preconditioner is stale once the iterations of Newton's solves beyond those just after it was built
-/// have cost as much as building; at once, if even its first reuse cost more the last time.
+/// have cost as much as building; at once, if even its first reuse cost more the last time. Built at a hard
+/// point it would never be: a share of all iterations counts.
 void LinearSolver::count_iterations() {
   PetscInt iterations = 0;
   check(KSPGetIterationNumber(beside_ ? KSP(tangent_) : ksp_of(snes_), &iterations));
@@ -140,8 +142,9 @@ void LinearSolver::count_iterations() {
     first_reuse_ /= 2;
     return;
   }
-  if (excess_ == 0) first_reuse_ = std::max(0, int(iterations) - fresh_);
-  excess_ += std::max(0, int(iterations) - fresh_);
+  const double beyond = std::max(0, int(iterations) - fresh_);
+  if (excess_ == 0) first_reuse_ = beyond;
+  excess_ += beyond + renewal * iterations;
   stale_ = excess_ > cost;
 }
 

@@ -75,7 +75,7 @@ class LinearSolver {
   std::unique_ptr<Preconditioner> own_, fallback_;
   bool stale_ = true, uncounted_ = false, beside_ = false;
   int fresh_ = -1;          ///< Krylov iterations of the first solve after a build; -1: none yet
-  int excess_ = 0;          ///< iterations beyond that, of all solves since
+  double excess_ = 0;       ///< iterations beyond that and a share of them, of all solves since
   double first_reuse_ = 0;  ///< iterations beyond it that the first reuse cost when it was last tried, halved
                             ///< at every build since
   bool built_here_ = false;     ///< at the last linearisation
