@@ -90,4 +90,46 @@ double trace_ratio(Mat K, Mat M) {
   return k / m;
 }
 
+VecHandle balance(Mat K, Mat M) {
+  VecHandle k, m, d;
+  check(MatCreateVecs(K, k.out(), nullptr));
+  m = like(k), d = like(k);
+  check(MatGetDiagonal(K, k)), check(MatGetDiagonal(M, m));
+  double most = 0;
+  const ReadArray stiffness(k), mass(m);
+  for (PetscInt i = 0; i < local_size(k); ++i)
+    if (mass[i] > 0) most = std::max(most, std::abs(stiffness[i]) / mass[i]);
+  MPI_Comm comm;
+  check(PetscObjectGetComm(reinterpret_cast<PetscObject>(K), &comm));
+  MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPI_DOUBLE, MPI_MAX, comm);
+  const WriteArray out(d);
+  for (PetscInt i = 0; i < local_size(k); ++i) {
+    const double size = std::abs(stiffness[i]) + most * std::max(mass[i], 0.0);
+    out[i] = size > 0 ? 1 / std::sqrt(size) : 1;
+  }
+  return d;
+}
+
+MatHandle scaled(Mat A, Vec left, Vec right) {
+  MatHandle out;
+  check(MatDuplicate(A, MAT_COPY_VALUES, out.out()));
+  check(MatDiagonalScale(out, left, right));
+  if (left) return out;
+  VecHandle largest;
+  check(MatCreateVecs(out, nullptr, largest.out()));
+  check(MatGetRowMaxAbs(out, largest, nullptr));
+  check(VecReciprocal(largest));
+  check(MatDiagonalScale(out, largest, nullptr));
+  return out;
+}
+
+VecHandle scaled_back(Vec x, Vec scales, PetscInt offset) {
+  VecHandle out = like(x);
+  check(VecCopy(x, out));
+  const ReadArray scale(scales);
+  const WriteArray values(out);
+  for (PetscInt i = 0; i < local_size(scales); ++i) values[offset + i] *= scale[i];
+  return out;
+}
+
 }  // namespace fretwave::model

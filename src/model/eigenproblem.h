@@ -36,4 +36,13 @@ void take_shape(Model const&, Operators const&, Vec re, Vec im, LinearMode&);
 /// A square of frequency [1/s^2] of the stiffest dofs: trace K / trace M. Collective.
 double trace_ratio(Mat K, Mat M);
 
+/// Scales of the dofs by which no mass outweighs the others: what rigid contact holds it holds but for
+/// rounding, which a mass 1e12 times the others' lets them feel. Collective.
+VecHandle balance(Mat K, Mat M);
+/// diag(left) A diag(right); each row by its largest entry where there is no `left`.
+MatHandle scaled(Mat A, Vec left, Vec right);
+/// This rank's dofs of x, which begin at the offset of `Operators`, by their scales; behind them stand
+/// constraints.
+VecHandle scaled_back(Vec x, Vec scales, PetscInt offset);
+
 }  // namespace fretwave::model

@@ -152,9 +152,14 @@ std::vector<LinearMode> undamped(Model const& model, int count, bool stuck, std:
     G = rigid_constraints(model);
   }
   MatHandle K = real_form(stiffness, model.theta(), travelling);
+  VecHandle scales;
+  if (G) {
+    scales = balance(K, M);
+    K = scaled(K, scales, scales), M = scaled(M, scales, scales), G = scaled(G, nullptr, scales);
+  }
   const double scale = trace_ratio(K, M);
   std::vector<MatHandle> pair;
-  pair.push_back(saddle(K, G, scale));
+  pair.push_back(saddle(K, G, 1));
   pair.push_back(saddle(M, G, 0));
   const Operators AB = operators(model.comm(), std::move(pair));
   const PetscInt wanted = std::min<PetscInt>(count, model.dofs() - rows_of(G) / copies);
@@ -178,7 +183,8 @@ std::vector<LinearMode> undamped(Model const& model, int count, bool stuck, std:
     if (!orthonormalise(AB[1], found, travelling, x)) continue;
     const bool rigid = value < 1e-9 * scale && value < uncertainty(AB[0], x);
     modes.push_back({rigid ? 0 : std::sqrt(value), 0, {}, {}});
-    take_shape(model, AB, x, nullptr, modes.back());
+    const VecHandle shape = scales ? scaled_back(x, scales, AB.offset) : VecHandle::share(x);
+    take_shape(model, AB, shape, nullptr, modes.back());
     found.push_back(std::move(x));
   }
   return modes;

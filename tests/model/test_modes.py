@@ -49,6 +49,20 @@ def test_stuck_shape_keeps_the_contact_closed(two_dof, comm):
     assert np.abs(shape) == pytest.approx([1.0, 0.0], abs=ROUNDING)
 
 
+@pytest.mark.parametrize("mass", [1e3, 1e9, 1e12, 1e15, 1e18, 1e22])
+def test_a_mass_however_large_that_rigid_contact_holds_does_not_move(comm, mass):
+    """The others' modes as without it (at 1e12 times their mass omega was 1e-7 off, at 1e15 39 %); two sliders."""
+    others = [0, 2, 4]
+    M, K = np.diag([1.0, mass, 2.0, 0.5 * mass, 3.0]), chain(5, 40.0, 2.0)
+    model = fw.Model(M, K, None, [friction(np.eye(5)[[1, 3]])], comm)
+    expected = scipy.linalg.eigh(K[np.ix_(others, others)], M[np.ix_(others, others)])
+    modes = fw.linear_modes(model, 3, "stuck")
+    assert [mode.omega for mode in modes] == pytest.approx(np.sqrt(expected[0]), rel=ROUNDING)
+    found = np.abs([mode.shape for mode in modes])
+    np.testing.assert_allclose(found[:, others], np.abs(expected[1].T), atol=SOLVED)
+    assert found[:, [1, 3]].max() <= ROUNDING
+
+
 def test_elastic_contact_adds_its_stiffness_when_stuck(comm):
     """A closed contact of stiffness kt on each mass: eigenvalues of K + kt."""
     law = LinearLaw(0.0, 0.0)
