@@ -209,3 +209,21 @@ def test_on_two_ranks_as_on_one(launch) -> None:
     one, two = ([re.sub(r"\(solved in .*\)", "", line) for line in lines] for lines in told)
     assert one == two
     assert any("25 stick, 0 slip, 0 open; normal forces sum to 500 N" in line for line in one)
+
+
+RIGID = """law = "regularised_coulomb"
+pairs = ["y"]
+friction_limit = 5.0
+regularisation_velocity = 0.05
+
+[[analysis]]"""
+
+
+def test_a_mode_that_rigid_contact_does_not_leave_is_refused(tmp_path: Path, capfd) -> None:
+    """Two dofs, one held, and the second mode asked for: in `run` as here."""
+    text = re.sub(r'law = "coulomb_2d".*?\[\[analysis\]\]', RIGID, CASE, flags=re.S).replace("pair_loads = true", "")
+    case = put(tmp_path, text.replace('normalise = "x"', 'normalise = "x"\nlinear_mode = 2'))
+    for command in (["check", case], ["run", case, "--no-plots", "--out", tmp_path / "run"]):
+        assert call(*command) == 2
+        said = capfd.readouterr().err
+        assert "there is no linear mode 2" in said and "fix:" in said

@@ -264,6 +264,18 @@ class AnalysisContext(Generic[Section]):
         with build_model(self.case, (), self.comm, preload, diameters) as structure:
             return linear_modes(structure, count, contact, near)
 
+    def numbered(self, modes: list[LinearMode], number: int) -> LinearMode:
+        """The one of this number, from 1, of linear modes."""
+        if len(modes) >= number:
+            return modes[number - 1]
+        raise InputError(
+            f"there is no linear mode {number}",
+            where=f"analysis '{self.name}'",
+            measured=f"{len(modes)} that the contact leaves",
+            expected=f"at least {number}",
+            fix=f"linear_mode = {len(modes)} or less",
+        )
+
 
 def _columns(group: h5py.Group) -> dict[str, Any]:
     table = {name: data[()] for name, data in group["points"].items()}

@@ -103,13 +103,11 @@ def start_mode(
             f" {100 * rest.open:.3g} % are open"
         )
         context.arrays["rest_displacement"] = rest.displacement
-    try:
-        start = context.linear_mode("stuck", linear_mode)[linear_mode - 1]
-    except InputError:
-        if not or_free:
-            raise
+    modes = _stuck_modes(context, linear_mode) if or_free else context.linear_mode("stuck", linear_mode)
+    if not modes:
         context.console.line(f"{context.name}: contact that sticks leaves nothing to move: the mode without contact")
-        return context.linear_mode("free", linear_mode)[linear_mode - 1], rest
+        return context.numbered(context.linear_mode("free", linear_mode), linear_mode), rest
+    start = context.numbered(modes, linear_mode)
     if start.omega <= RIGID * closed_mode(context).omega:
         is_open = 1.0 if rest is None else rest.open
         load_name = own_load(context.case.contacts)
@@ -130,12 +128,18 @@ def _leader(context: AnalysisContext[AnalysisSection], mode: LinearMode) -> str:
     return context.case.dofs[int(np.argmax(np.hypot(mode.shape, mode.imaginary)))]
 
 
+def _stuck_modes(context: AnalysisContext[AnalysisSection], count: int) -> list[LinearMode]:
+    """None where contact that sticks leaves nothing to move. Collective."""
+    try:
+        return context.linear_mode("stuck", count)
+    except InputError:
+        return []
+
+
 def stuck_or_free(context: AnalysisContext[AnalysisSection], number: int) -> LinearMode:
     """A linear mode as `start_mode` has it, of a contact that is at rest already. Collective."""
-    try:
-        return context.linear_mode("stuck", number)[number - 1]
-    except InputError:
-        return context.linear_mode("free", number)[number - 1]
+    modes = _stuck_modes(context, number) or context.linear_mode("free", number)
+    return context.numbered(modes, number)
 
 
 def retained(

@@ -79,7 +79,7 @@ def _on_wheel(context: AnalysisContext[ModeAnalysis]) -> Start:
     rest = rest_state(context)
     mode = None
     if mistuned and analysis.nodal_diameter is None:
-        mode = context.linear_mode("stuck", analysis.linear_mode)[-1]
+        mode = context.numbered(context.linear_mode("stuck", analysis.linear_mode), analysis.linear_mode)
         context = context.of(_family(context, mode))
     tuned, asymptotes = _tuned(context)
     analysis = context.analysis
