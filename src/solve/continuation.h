@@ -84,6 +84,8 @@ class Continuation {
   struct Place {
     double at, value;
   };
+  /// Zero of the straight line between two places.
+  static double secant(Place a, Place b) { return (a.at * b.value - b.at * a.value) / (b.value - a.value); }
 
   // The corrector (continuation.cpp)
   Trial at(VecHandle y) const {
@@ -128,8 +130,12 @@ class Continuation {
   void locate_events(Trial const& end, double length);
   std::string events_of_corner(Trial const& end);
   void locate(size_t which, std::vector<Place> const& scan, Hermite const&, double length);
-  std::optional<Trial> root(size_t which, Place a, Place b, double guess, Hermite const&, double length,
-                            double& found);
+  std::optional<Trial> root(size_t which, Place a, Place b, Hermite const&, double length, double& found);
+  class Bracket;
+  static constexpr double least_along = 0.2;  ///< of a tangent along the step, to be taken by arclength
+  double zero_on(Hermite const&, size_t which, Place a, Place b);
+  double foretold_zero(Hermite const&, size_t which, Bracket const&);
+  Hermite with(Hermite const&, Vec y, Vec tangent) const;
   void reach(double value, std::string const& event, Place a, Place b, Hermite const&, double length);
   void polish(Trial&, double target);
   std::optional<Trial> reach_along(double target, Place a, Place b, Hermite const&);

@@ -11,12 +11,8 @@ namespace {
 
 constexpr int nodes = 8;               // parts of a step in which its cubic is looked at
 constexpr double near_zero = 0.3;      // of the smaller end value: so low a minimum may hide two zeros
-constexpr double jump = 0.1;           // of the end values: what is left where a test function jumps
 constexpr double value_error = 1e-9;   // relative, of a reported value reached along the branch
 constexpr double off_the_curve = 0.5;  // of the step: a solution farther from the cubic is another branch
-
-/// Zero of the straight line between two places.
-double secant(double a, double fa, double b, double fb) { return (a * fb - b * fa) / (fb - fa); }
 
 }  // namespace
 
@@ -38,7 +34,7 @@ bool Continuation::correct_inside(Trial& trial, double at, double length) {
 void Continuation::locate_events(Trial const& end, double length) {
   const double along = dot(row_, end.tangent);
   const Hermite curve(anchor_.y, anchor_.tangent, end.y, end.tangent, length,
-                      along > 0.2 ? 1 / along : 1);  // dy/ds = t / (row . t), row . (y - anchor) = s
+                      along > least_along ? 1 / along : 1);  // dy/ds = t / (row . t), row . (y - anchor) = s
   folds_.clear();
   std::vector<std::vector<Place>> scans(end.tests.size());
   for (int node = 0; node <= nodes; ++node) {
@@ -86,15 +82,15 @@ std::string Continuation::events_of_corner(Trial const& end) {
 /// All zeros of one test function in the step.
 void Continuation::locate(size_t which, std::vector<Place> const& scan, Hermite const& curve, double length) {
   TestFunction const& test = anchor_tests_[which];
-  const auto locate_between = [&](Place a, Place b, double guess, int before) {
+  const auto locate_between = [&](Place a, Place b, int before) {
     if (test.falling_only && before < 0) return;
     double found;
-    if (auto trial = root(which, a, b, guess, curve, length, found)) {
+    if (auto trial = root(which, a, b, curve, length, found)) {
       if (test.name == "fold") folds_.push_back(found);
       emit(std::move(*trial), found, test.name);
     } else {
       miss(test.name, "the corrector fails at it or leaves for another branch, near " +
-                          problem_.parameter_text(parameter_of(curve.value(guess))));
+                          problem_.parameter_text(parameter_of(curve.value(secant(a, b)))));
     }
   };
   const auto actual = [&](double at) {
@@ -111,7 +107,7 @@ void Continuation::locate(size_t which, std::vector<Place> const& scan, Hermite 
   std::vector<double> changes;  // of sign on the cubic
   for (size_t i = 0; i + 1 < scan.size(); ++i)
     if (test_sign(scan[i].value) * test_sign(scan[i + 1].value) < 0)
-      changes.push_back(secant(scan[i].at, scan[i].value, scan[i + 1].at, scan[i + 1].value));
+      changes.push_back(secant(scan[i], scan[i + 1]));
   if (changes.size() > 1)
     for (size_t i = 0; i + 1 < changes.size(); ++i) visit((changes[i] + changes[i + 1]) / 2);
   if (changes.empty() && !ends_differ) {
@@ -127,53 +123,10 @@ void Continuation::locate(size_t which, std::vector<Place> const& scan, Hermite 
   for (size_t i = 0; i + 1 < places.size(); ++i) {
     const int now = test_sign(places[i + 1].value);
     if (now == 0) continue;
-    if (before * now < 0) {
-      double guess = secant(places[i].at, places[i].value, places[i + 1].at, places[i + 1].value);
-      for (double change : changes)
-        if (change > places[i].at && change < places[i + 1].at) guess = change;
-      if (!(guess >= places[i].at && guess <= places[i + 1].at)) guess = places[i].at;
-      locate_between(places[i], places[i + 1], guess, before);
-    }
+    if (before * now < 0) locate_between(places[i], places[i + 1], before);
     before = now;
   }
   signs_[which] = before;
-}
-
-/// Root of a test function between two places by the Illinois form of regula falsi in arclength, from a first
-/// guess off the cubic. Where flags of sampled contact make the function jump it can only bisect: eight
-/// trials are enough then for an extremum, and the last one, nearest to the jump, is taken; else the best.
-std::optional<Continuation::Trial> Continuation::root(size_t which, Place a, Place b, double guess,
-                                                      Hermite const& curve, double length, double& found) {
-  TestFunction const& test = anchor_tests_[which];
-  const double precision = (test.extremum ? 1e-6 : 1e-9) * length,
-               size = std::max(std::abs(a.value), std::abs(b.value));
-  const int trials = test.extremum ? 8 : 12;
-  std::optional<Trial> best, latest;
-  double best_value = INFINITY, best_at = 0, last = INFINITY;
-  int side = 0;
-  for (int k = 0; k < trials && b.at - a.at > precision; ++k) {
-    const double at = k == 0 ? guess : secant(a.at, a.value, b.at, b.value);
-    Trial trial = this->at(curve.value(at));
-    if (!correct_inside(trial, at, length)) break;
-    const double value = trial.tests[which].value;
-    if (std::abs(value) <= best_value) {
-      best_value = std::abs(value), best_at = at;
-      best = this->at(copy(trial.y));
-      best->tangent = copy(trial.tangent), best->outcome = trial.outcome, best->tests = trial.tests;
-    }
-    found = at;
-    latest = std::move(trial);
-    if (best_value < (test.extremum ? 1e-9 * size : 1e-12) || std::abs(at - last) < precision) break;
-    last = at;
-    const int now = (value > 0) == (b.value > 0) ? +1 : -1;
-    double& kept = now > 0 ? a.value : b.value;  // the end kept twice in a row is given half its value
-    if (now == side) kept /= 2;
-    (now > 0 ? b : a) = {at, value};
-    side = now;
-  }
-  if (best_value > jump * size) return latest;
-  found = best_at;
-  return best;
 }
 
 /// Reported values and the ends of the range. Between the folds of the step the parameter is monotone.
@@ -251,7 +204,7 @@ std::optional<Continuation::Trial> Continuation::reach_along(double target, Plac
                                                              Hermite const& curve) {
   a.value -= target, b.value -= target;
   for (int k = 0; k < 60; ++k) {
-    double at = secant(a.at, a.value, b.at, b.value);
+    double at = secant(a, b);
     if (k % 3 == 2) at = (a.at + b.at) / 2;
     Trial trial = this->at(curve.value(at));
     if (!correct(trial, row_, row_value_ + at, row_)) return {};

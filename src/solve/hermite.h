@@ -1,37 +1,90 @@
 #pragma once
+#include <utility>
+#include <vector>
+
 #include "solve/vectors.h"
 
 namespace fretwave::solve {
 
-/// The cubic through two points of a branch with their derivatives, over s in [0, length].
+/// The polynomial through points of a branch with their derivatives, of degree 2 n - 1 through n points: the
+/// cubic through the ends of a step over s in [0, length], to which points inside it can be added (Hermite's
+/// form of Lagrange's polynomials: l_i^2 (1 - 2 l_i'(s_i) (s - s_i)) and l_i^2 (s - s_i)).
 class Hermite {
  public:
   /// Derivatives by s: the first is `t0`, the second `scale1 t1`. The vectors must outlive the polynomial.
   Hermite(Vec y0, Vec t0, Vec y1, Vec t1, double length, double scale1 = 1)
-      : parts_{y0, t0, y1, t1}, length_(length), scale1_(scale1) {}
+      : knots_{{0, y0, t0, 1}, {length, y1, t1, scale1}} {}
+  /// A point, whose derivative is `scale` times `t`.
+  struct Knot {
+    double at;
+    Vec y, t;
+    double scale;
+  };
+  Hermite with(Knot knot) const {
+    Hermite out = *this;
+    out.knots_.push_back(knot);
+    return out;
+  }
+  /// The cubic through the last point up to `a` and the first one from `b` on.
+  Hermite between(double a, double b) const {
+    Knot low = knots_[0], high = knots_[1];
+    for (Knot const& knot : knots_) {
+      if (knot.at <= a && knot.at > low.at) low = knot;
+      if (knot.at >= b && knot.at < high.at) high = knot;
+    }
+    return Hermite({low, high});
+  }
   VecHandle value(double s) const {
-    const double x = s / length_, h = length_;
-    return combine({(1 + 2 * x) * (1 - x) * (1 - x), h * x * (1 - x) * (1 - x), x * x * (3 - 2 * x),
-                    h * x * x * (x - 1) * scale1_});
+    return combine(
+        [&](Knot const& knot, Lagrange const& l) {
+          const double square = l.value * l.value;
+          return Share{square * (1 - 2 * l.own_slope * (s - knot.at)), square * (s - knot.at)};
+        },
+        s);
   }
   VecHandle derivative(double s) const {
-    const double x = s / length_, h = length_;
     return combine(
-        {6 * x * (x - 1) / h, (1 - x) * (1 - 3 * x), 6 * x * (1 - x) / h, x * (3 * x - 2) * scale1_});
+        [&](Knot const& knot, Lagrange const& l) {
+          const double square = l.value * l.value, twice = 2 * l.value * l.slope, off = s - knot.at;
+          return Share{twice * (1 - 2 * l.own_slope * off) - 2 * l.own_slope * square, twice * off + square};
+        },
+        s);
   }
 
  private:
-  struct Factors {
-    double f[4];
+  explicit Hermite(std::vector<Knot> knots) : knots_(std::move(knots)) {}
+  /// l_i and its derivative at s, and the latter at its own knot.
+  struct Lagrange {
+    double value = 1, slope = 0, own_slope = 0;
   };
-  VecHandle combine(Factors factors) const {
-    VecHandle y = zero_like(parts_[0]);
-    check(VecMAXPY(y, 4, factors.f, const_cast<Vec*>(parts_)));
-    return y;
+  /// Of a knot's point and of its derivative.
+  struct Share {
+    double y, t;
+  };
+  Lagrange lagrange(Knot const& own, double s) const {
+    Lagrange l;
+    for (Knot const& other : knots_) {
+      if (other.at == own.at) continue;
+      const double between = own.at - other.at;
+      l.slope = (l.slope * (s - other.at) + l.value) / between;
+      l.value *= (s - other.at) / between;
+      l.own_slope += 1 / between;
+    }
+    return l;
+  }
+  template <class Of>
+  VecHandle combine(Of share, double s) const {
+    VecHandle out = zero_like(knots_[0].y);
+    for (Knot const& knot : knots_) {
+      const Share of = share(knot, lagrange(knot, s));
+      const double factors[] = {of.y, of.t * knot.scale};
+      Vec parts[] = {knot.y, knot.t};
+      check(VecMAXPY(out, 2, factors, parts));
+    }
+    return out;
   }
 
-  Vec parts_[4];
-  double length_, scale1_;
+  std::vector<Knot> knots_;
 };
 
 }  // namespace fretwave::solve

@@ -273,3 +273,15 @@ class SmallCubic(fw.PythonLaw):
 
     def tangent(self, u, v):
         return (3e-3 * u**2)[:, None], np.zeros_like(v)[:, None]
+
+
+@pytest.mark.ranks(1)
+def test_an_event_takes_two_and_a_half_correctors(two_dof, comm):
+    """Newton's solves over points, in steps so short that none is tried twice; the stop is solved again once."""
+    PETSc.Log.begin()
+    solves, problem = PETSc.Log.Event("SNESSolve"), problem_of(two_dof, comm)
+    before = solves.getPerfInfo()["count"]
+    _, points = follow(problem, maximum=0.025)
+    beyond = solves.getPerfInfo()["count"] - before - len(points) - 1
+    assert len(named(points, "fold")) == 2 and len(named(points, "peak_damping")) == 1
+    assert 3 <= beyond + 3 <= 2.5 * 3  # a corrector each is a point's own

@@ -1,0 +1,108 @@
+/// A zero of a test function inside a step.
+#include <cmath>
+#include <utility>
+
+#include "solve/continuation.h"
+
+namespace fretwave::solve {
+
+namespace {
+
+constexpr double jump = 0.1;       // of the end values: what is left where a test function jumps
+constexpr double on_curve = 1e-9;  // of a bracket: so precisely a curve's zero is found
+constexpr int looks = 30;          // at a curve
+constexpr int smooth = 3;          // trials on cubics: beyond those the branch has a corner there
+
+}  // namespace
+
+/// The Illinois form of regula falsi: the end kept twice in a row is given half its value.
+class Continuation::Bracket {
+ public:
+  Bracket(Place a, Place b) : a_(a), b_(b) {}
+  double width() const { return b_.at - a_.at; }
+  double first() const { return a_.at; }
+  double last() const { return b_.at; }
+  double next() const {
+    const double at = secant(a_, b_);
+    return at >= a_.at && at <= b_.at ? at : a_.at;  // else both ends are of one sign
+  }
+  void narrow(Place place) {
+    const bool behind = (place.value > 0) == (b_.value > 0);
+    double& kept = (behind ? a_ : b_).value;
+    const int side = behind ? +1 : -1;
+    if (side == side_) kept /= 2;
+    (behind ? b_ : a_) = place;
+    side_ = side;
+  }
+
+ private:
+  Place a_, b_;
+  int side_ = 0;
+};
+
+/// Between two places, where the values of a test function on a curve differ in sign.
+double Continuation::zero_on(Hermite const& curve, size_t which, Place a, Place b) {
+  const double precision = on_curve * (b.at - a.at);
+  Bracket bracket(a, b);
+  double at = bracket.next(), last = INFINITY;
+  for (int k = 0; k < looks && std::abs(at - last) > precision; ++k) {
+    bracket.narrow({at, tests(curve.value(at), curve.derivative(at))[which].value});
+    last = at, at = bracket.next();
+  }
+  return at;
+}
+
+/// First off the curve through the step's ends and, where the branch is smooth, the point before; then off
+/// that through the first trial too, from there on off the cubic between the trials on both sides. Where it
+/// foretells no other place, or Newton finds nothing to correct, the zero is found. Where the test function
+/// jumps, Illinois' form of regula falsi goes on, and can only bisect: eight trials are enough then for an
+/// extremum, and the last one, nearest to the jump, is taken; else the best.
+std::optional<Continuation::Trial> Continuation::root(size_t which, Place a, Place b, Hermite const& curve,
+                                                      double length, double& found) {
+  TestFunction const& test = anchor_tests_[which];
+  const double precision = (test.extremum ? 1e-7 : 1e-9) * length,
+               size = std::max(std::abs(a.value), std::abs(b.value));
+  const int trials = test.extremum ? 8 : 12;
+  std::vector<std::pair<double, Trial>> tried;
+  Hermite known = anchor_.smooth ? with(curve, before_.y, before_.tangent) : curve, through = known;
+  Bracket bracket(a, b);
+  double best_value = INFINITY, at = foretold_zero(known, which, bracket);
+  size_t best = 0;
+  for (int k = 0; k < trials && bracket.width() > precision; ++k) {
+    Trial trial = this->at(through.value(at));
+    if (!correct_inside(trial, at, length)) break;
+    const double value = trial.tests[which].value;
+    tried.emplace_back(at, std::move(trial));
+    if (std::abs(value) <= best_value) best_value = std::abs(value), best = tried.size() - 1;
+    Trial const& last = tried.back().second;
+    if (best_value < (test.extremum ? 1e-9 * size : 1e-12)) break;
+    if (k <= smooth && last.outcome.newton == 0) break;  // the curve is the branch
+    bracket.narrow({at, value});
+    known = with(known, last.y, last.tangent);
+    through = k == 0 ? known : known.between(bracket.first(), bracket.last());
+    const double from =
+        std::exchange(at, k < smooth ? foretold_zero(through, which, bracket) : bracket.next());
+    if (std::abs(at - from) < precision) break;
+  }
+  if (tried.empty()) return {};
+  auto& [place, trial] = best_value > jump * size ? tried.back() : tried[best];
+  found = place;
+  return std::move(trial);
+}
+
+/// A curve through another point of the branch, too.
+Hermite Continuation::with(Hermite const& curve, Vec y, Vec tangent) const {
+  const double along = dot(row_, tangent);
+  return along > least_along ? curve.with({dot(row_, y) - row_value_, y, tangent, 1 / along}) : curve;
+}
+
+/// Where a curve has its zero in the bracket, else the bracket's next guess.
+double Continuation::foretold_zero(Hermite const& curve, size_t which, Bracket const& bracket) {
+  const auto look = [&](double at) {
+    return Place{at, tests(curve.value(at), curve.derivative(at))[which].value};
+  };
+  const Place a = look(bracket.first()), b = look(bracket.last());
+  return test_sign(a.value) * test_sign(b.value) < 0 ? zero_on(curve, which, a, b) : bracket.next();
+}
+
+}  // namespace fretwave::solve
