@@ -22,7 +22,7 @@ from .shapes import corners_of
 _SOLID = re.compile(r"C3D(4|6|8|10|15|20)[A-Z]*", re.IGNORECASE)
 _SHELL = re.compile(r"S([34])([A-Z][A-Z0-9]*)?", re.IGNORECASE)
 #: Kinds of cells (`fretwave.model.cells`) by the nodes of solids and of shells.
-_SOLIDS = {
+SOLIDS = {
     4: "tetrahedron",
     6: "wedge",
     8: "hexahedron",
@@ -194,7 +194,7 @@ class Elements:
 def _kind(name: str) -> tuple[str, int]:
     solid, shell = _SOLID.fullmatch(name), _SHELL.fullmatch(name)
     count = int((solid or shell).group(1)) if solid or shell else 0  # type: ignore[union-attr]
-    return (_SOLIDS[count] if solid else _SHELLS[count] if shell else ""), count
+    return (SOLIDS[count] if solid else _SHELLS[count] if shell else ""), count
 
 
 def _face_of(kind: str, face: str, where: str) -> list[int]:

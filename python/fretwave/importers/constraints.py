@@ -55,7 +55,7 @@ class Constraints:
         loose = [(node, axis) for node in numbers for axis in (1, 2, 3) if (node, axis) not in rows]
         if loose:
             measured = f"n{loose[0][0]}{'xyz'[loose[0][1] - 1]}, {len(loose)} such dofs; the deck has {self.joins}"
-            expected = "each direction a row of the matrices, or held by *BOUNDARY"
+            expected = "each direction a row of the matrices, or held in the deck"
             fix = f"take {self.joins} off these nodes and export the matrices again"
             raise InputError(f"nodes of contact '{name}' depend on others", where, measured, expected, fix)
 

@@ -5,7 +5,7 @@ Layout: scipy.sparse.save_npz (SciPy reference), numpy.savez (NumPy reference, "
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -45,18 +45,24 @@ def _matrix(values: npt.NDArray[Any], where: str) -> npt.NDArray[Any]:
     return values
 
 
-def choose(names: Sequence[str], letter: str, variable: str | None, where: str) -> str:
+def choose(
+    names: Sequence[str],
+    letter: str,
+    variable: str | None,
+    where: str,
+    usual: Mapping[str, Sequence[str]] = USUAL,
+) -> str:
     """The variable asked for, else one of the usual name, else the only one."""
     if variable is not None and variable in names:
         return variable
-    usual = [name for name in USUAL[letter] if name in names]
-    if variable is None and (usual or len(names) == 1):
-        return usual[0] if usual else names[0]
+    found = [name for name in usual[letter] if name in names]
+    if variable is None and (found or len(names) == 1):
+        return found[0] if found else names[0]
     asked = f"variable {variable}" if variable is not None else f"matrix {letter}"
     raise InputError(
         f"there is no {asked} in this file",
         where,
         f"it holds {', '.join(names) or 'nothing'}",
-        f"one of {', '.join(USUAL[letter])}" if variable is None else variable,
+        f"one of {', '.join(usual[letter])}" if variable is None else variable,
         f"name it: {where}:{names[0] if names else 'NAME'}",
     )
