@@ -17,7 +17,8 @@ from ..importers.directions import check_directions
 from ..importers.entries import Assembled, assemble
 from ..importers.exchanged import check_one_model
 from ..importers.formats import read_matrix, readable, split
-from ..importers.nodes import Material, Nodes, cells_of, read_nodes
+from ..importers.node_files import read_node_file
+from ..importers.nodes import Material, Nodes, cells_of
 from ..importers.pairs import NEXT, match, read_pairs
 from ..importers.report import check
 from ..importers.sector import SectorFaces, make_sector, said_of, wheel_of
@@ -84,7 +85,7 @@ def read_parts(options: argparse.Namespace) -> tuple[Structure, Assembled, list[
     nodes = None
     if options.coordinates:
         with readable(options.coordinates, "file of the nodes"):
-            nodes = read_nodes(options.coordinates)
+            nodes = read_node_file(options.coordinates)
         nodes.coordinates = nodes.coordinates - (0.0 if options.origin is None else _three("--origin", options.origin))
     labels = _labels(options, found, nodes)
     found.labels = labels

@@ -167,7 +167,8 @@ def _add_import(commands: _SubParsers) -> None:
         "import",
         help="bring matrices of a finite-element code into one model file",
         description="Matrices: NumPy .npz, Matrix Market, MATLAB .mat (5 to 7.3), PETSc binary, CalculiX .sti/.mas,"
-        ' Abaqus .mtx; FILE:NAME picks a variable. In a case: [model] file = "OUT.h5".',
+        " Abaqus .mtx, with extras Ansys .full and Nastran .op4; FILE:NAME picks a variable."
+        ' In a case: [model] file = "OUT.h5".',
     )
     add.add_argument(
         "out",
@@ -183,7 +184,10 @@ def _add_import(commands: _SubParsers) -> None:
     add.add_argument("--symmetric", choices=("auto", "lower", "upper", "full"), default="auto", help="what files hold")
     add.add_argument("--dofs", type=Path, metavar="FILE", help="node and direction of each row (.dof, or CSV)")
     add.add_argument(
-        "--coordinates", type=Path, metavar="FILE", help="nodes, sets, elements, surfaces: CSV, .npz or input deck"
+        "--coordinates",
+        type=Path,
+        metavar="FILE",
+        help="nodes, sets, elements, surfaces: CSV, .npz, input deck, Ansys .cdb or .rst; a Nastran deck's nodes",
     )
     add.add_argument(
         "--pairs",

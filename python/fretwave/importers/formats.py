@@ -12,7 +12,7 @@ from .. import registry
 from ..errors import InputError
 from ..files.isolated import call_isolated
 from ..texts import display, names_beside, nearest
-from . import abaqus, calculix, matlab, matrix_market, npz, petsc_binary
+from . import abaqus, ansys_full, calculix, matlab, matrix_market, nastran, npz, petsc_binary
 from .entries import Entries
 
 HDF5 = b"\x89HDF\r\n\x1a\n"
@@ -51,6 +51,16 @@ def _is_matlab(head: bytes, path: Path) -> bool:
     return head.startswith((b"MATLAB 7.3", b"MATLAB 5.0")) or HDF5 in (head[:8], head[512:520])
 
 
+def _ansys(path: Path, letter: str, variable: str | None) -> Entries:
+    found: Entries = call_isolated(ansys_full.__name__, "read", path, letter, size=path.stat().st_size)
+    return found
+
+
+def _nastran(path: Path, letter: str, variable: str | None) -> Entries:
+    found: Entries = call_isolated(nastran.__name__, "read", path, letter, variable, size=path.stat().st_size)
+    return found
+
+
 #: Asked in this order, after the registered ones.
 FORMATS = (
     Format("NumPy (.npz, .npy)", lambda head, path: head.startswith((b"PK\x03\x04", b"\x93NUMPY")), npz.read),
@@ -70,6 +80,8 @@ FORMATS = (
         lambda head, path: path.suffix.lower() in calculix.SUFFIXES,
         lambda path, letter, variable: calculix.read(path),
     ),
+    Format("Ansys (.full)", lambda head, path: head.startswith(ansys_full.head_of(4)), _ansys),
+    Format("Nastran (.op4)", lambda head, path: path.suffix.lower() == ".op4", _nastran),
     Format(
         "Abaqus (.mtx)",
         lambda head, path: abaqus.looks_like(head),

@@ -58,11 +58,12 @@ def choose(
     found = [name for name in usual[letter] if name in names]
     if variable is None and (found or len(names) == 1):
         return found[0] if found else names[0]
+    likely = [name for name in names if name.startswith(tuple(usual[letter]))] or [*names, "NAME"]
     asked = f"variable {variable}" if variable is not None else f"matrix {letter}"
     raise InputError(
         f"there is no {asked} in this file",
         where,
         f"it holds {', '.join(names) or 'nothing'}",
         f"one of {', '.join(usual[letter])}" if variable is None else variable,
-        f"name it: {where}:{names[0] if names else 'NAME'}",
+        f"name it: {where}:{likely[0]}",
     )

@@ -1,0 +1,97 @@
+"""Nodes, components and solid elements of Ansys: an archive (``CDWRITE,DB``), or a result file (``job.rst``).
+
+Read by the packages mapdl-archive and ansys-mapdl-reader (both MIT). Layout (Ansys, Mechanical APDL Programmer's
+Reference, "Coded Database File Commands"; Command Reference): NBLOCK of the nodes with the angles of their directions
+(NROTAT), EBLOCK of elements, CMBLOCK of components, of which those of nodes are node sets. MPDATA of materials, D of
+held dofs, CE and CP of constraint equations, which the package does not read, are read here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..arrays import Array, IntArray
+from ..errors import InputError
+from ..texts import display
+from .ansys_elements import blocks_of
+from .cells import Elements
+from .constraints import Constraints
+from .extras import reader_of
+from .keywords import number
+from .nodes import Material, Nodes
+
+DIRECTIONS = ("UX", "UY", "UZ", "ROTX", "ROTY", "ROTZ")
+QUANTITIES = {"EX": "modulus", "DENS": "density"}
+
+
+def read_archive(path: Path) -> Nodes:
+    """Nodes with their sets, elements, materials and what is held.
+
+    Raises
+    ------
+    InputError
+        There are no nodes, directions of nodes are turned, or an element is of no known shape.
+    """
+    where = display(path)
+    package = reader_of("mapdl_archive", "mapdl-archive", "ansys", where)
+    nodes = _nodes(package.Archive(str(path), parse_vtk=False), where)
+    nodes.materials, nodes.constraints = _lines(path, where)
+    return nodes
+
+
+def read_result(path: Path) -> Nodes:
+    """Nodes with their sets and elements, as `read_archive`."""
+    where = display(path)
+    package = reader_of("ansys.mapdl.reader", "ansys-mapdl-reader", "ansys", where)
+    return _nodes(package.read_binary(str(path)).mesh, where)
+
+
+def _nodes(mesh: Any, where: str) -> Nodes:
+    """Of the mesh that either package gives."""
+    numbers, coordinates = mesh.nnum.astype(np.int64), np.array(mesh.nodes, dtype=float)
+    _check_angles(numbers, mesh.node_angles, where)
+    elements = Elements(blocks_of(mesh.elem, np.asarray(mesh.etype), where))
+    elements.check_numbers(where)
+    sets = {name.upper(): np.unique(members).astype(np.int64) for name, members in mesh.node_components.items()}
+    return Nodes(numbers, coordinates, where, sets, elements)
+
+
+def _check_angles(numbers: IntArray, angles: Array, where: str) -> None:
+    turned = angles.any(axis=1)
+    if turned.any():
+        measured = f"node {numbers[turned][0]} by {angles[turned][0]} degrees, {turned.sum()} such"
+        expected, fix = "directions x, y, z at every node", "take NROTAT out and write both files again"
+        raise InputError("directions of nodes are turned", where, measured, expected, fix)
+
+
+def _lines(path: Path, where: str) -> tuple[list[Material], Constraints]:
+    """What is said line by line: materials, what is held, and what is joined."""
+    materials, constraints = dict[str, Material](), Constraints()
+    with path.open(encoding="utf-8", errors="replace") as file:
+        for count, line in enumerate(file, 1):
+            keyword, *words = [word.strip().upper() for word in line.split(",")]
+            if keyword == "MPDATA":
+                _add_material(materials, words, f"{where}:{count}")
+            elif keyword == "D" and len(words) > 1 and words[0].isdigit():
+                _hold(constraints, *words[:2])
+            elif keyword in ("CE", "CP"):
+                constraints.joins = constraints.joins or keyword
+    return list(materials.values()), constraints
+
+
+def _add_material(materials: dict[str, Material], words: Sequence[str], place: str) -> None:
+    """``MPDATA,R5.0, 1,EX, 2, 1, 7.0E+10,``: the first value of a quantity of a material."""
+    label, name, _, value = (*words[2:], *4 * [""])[:4]
+    if label in QUANTITIES and value:
+        material = materials.setdefault(name, Material(f"material {name}", place))
+        setattr(material, QUANTITIES[label], number(value))
+
+
+def _hold(constraints: Constraints, node: str, label: str) -> None:
+    direction = DIRECTIONS.index(label) + 1 if label in DIRECTIONS else 0
+    if direction or label == "ALL":
+        constraints.held.append((node, direction or 1, direction or 6))

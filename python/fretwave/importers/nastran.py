@@ -1,0 +1,68 @@
+"""Nastran: matrices of OUTPUT4 files (``.op4``) and grid points of a bulk data deck, through the package pyyeti (BSD).
+
+Layout (MSC Nastran, DMAP Programmer's Guide, OUTPUT4; Quick Reference Guide, GRID): named matrices, text or binary of
+either byte order, single or double precision, full or sparse. Which rows are which dofs an .op4 file does not say.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError
+from ..texts import display
+from .constraints import Constraints
+from .entries import Entries
+from .extras import reader_of
+from .nodes import Nodes
+from .npz import choose
+
+#: What matrices are called: of the analysis set, of an external superelement (EXTSEOUT), of all grid points.
+USUAL = {"K": ("KAA", "KXX", "KGG"), "M": ("MAA", "MXX", "MGG"), "C": ("BAA", "BXX", "BGG")}
+#: Cards that make dofs depend on others.
+JOINS = r"(MPC|RBE[123]|RBAR1?|RROD|RTRPLT1?|RSSCON)[ *,]"
+
+
+def read(path: Path, letter: str, variable: str | None = None) -> Entries:
+    """A matrix of an .op4 file; where a name stands several times, its matrices are NAME_1, NAME_2, ..."""
+    where = display(path)
+    op4 = reader_of("pyyeti.nastran.op4", "pyyeti", "nastran", where)
+    given = op4.dir(str(path), verbose=False)[0]
+    names = _numbered([name.upper() for name in given])
+    place = names.index(choose(names, letter, variable and variable.upper(), where, USUAL))
+    alike = op4.load(str(path), namelist=[given[place]], into="list", sparse=True)[1]
+    return Entries.of(alike[given[:place].count(given[place])], where, "Nastran .op4")
+
+
+def _numbered(names: list[str]) -> list[str]:
+    total, seen = Counter(names), Counter[str]()
+    found = []
+    for name in names:
+        seen[name] += 1
+        found.append(name if total[name] == 1 else f"{name}_{seen[name]}")
+    return found
+
+
+def read_grid(path: Path) -> Nodes:
+    """Grid points of a deck, INCLUDE files too, in basic coordinates and the order of their numbers.
+
+    Raises
+    ------
+    InputError
+        Displacements are in another coordinate system than the basic one.
+    """
+    where = display(path)
+    bulk = reader_of("pyyeti.nastran.bulk", "pyyeti", "nastran", where)
+    table = bulk.bulk2uset(str(path))[0]
+    places = table[["x", "y", "z"]].to_numpy(dtype=float).reshape(-1, 6, 3)  # behind x, y, z: system, origin, turn
+    numbers = table.index.get_level_values(0).to_numpy(dtype=np.int64)[::6]
+    turned = numbers[places[:, 1, 0] != 0]
+    if len(turned) or bulk.rdcards(str(path), "GRDSET") is not None:
+        measured = f"CD of GRID {turned[0]}, {len(turned)} such" if len(turned) else "GRDSET"
+        fix = "leave CD and GRDSET out and write the matrices again"
+        raise InputError("directions of nodes are turned", where, measured, "directions x, y, z at every node", fix)
+    cards = bulk.rdcards(str(path), JOINS, regex=True, return_var="list", keep_name=True, no_data_return=[])
+    joins = Constraints(joins=str(cards[0][0]) if cards else "")
+    return Nodes(numbers, places[:, 0], where, constraints=joins)
