@@ -190,13 +190,14 @@ def test_iterations_do_not_grow_with_slip(krylov, comm):
 def test_a_contact_far_stiffer_than_the_structure(comm, route):
     """30 times the contact stiffness, all pairs on one rigid root, slip to 60 %: averaged tangents stagnate.
 
-    Pairs are coupled to 1e-3: to 3e-2 the basis of stuck pairs took up to 33 iterations.
+    Pairs are coupled to 1e-3: to 3e-2 the basis of stuck pairs took 13 iterations in the mean, up to 33.
     """
     stiff = {key: 30 * ROOT[key] for key in ("normal_stiffness", "tangential_stiffness")}
     model = blade(comm, **stiff)
     points = branch(mode(model, *preloaded(model), route, highest=7), (1.5e-3, 2.6e-3), ())
     partial = [p["linear"] / p["newton"] for p in points if p["newton"] and p["slip"] > 0.1]
-    assert partial and max(partial) <= 15, max(partial)  # 31 with dense blocks of pairs that do not know of each other
+    # 31 at one point with dense blocks of pairs that do not know of each other; one point alone is up to rounding
+    assert partial and np.mean(partial) <= 9 and max(partial) <= 20, (np.mean(partial), max(partial))
 
 
 def test_stuck_asymptote_is_the_linear_mode(krylov, case):
