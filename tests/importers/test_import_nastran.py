@@ -19,7 +19,7 @@ from fretwave.importers.node_files import read_node_file
 from fretwave.results import model_file
 
 pytestmark = pytest.mark.ranks(1)
-pyyeti = pytest.importorskip("pyyeti.nastran.op4", reason="the extra [nastran] is not installed")
+pyyeti = pytest.importorskip("pyyeti.nastran.op4", reason="pyyeti is not installed")
 
 DATA = Path(pyyeti.__file__).parents[1] / "tests"
 #: A superelement of NX Nastran 9 (EXTSEOUT): 24 boundary dofs, 8 modes of the held boundary.

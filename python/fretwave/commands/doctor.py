@@ -102,9 +102,12 @@ def check_numpy(version: str, broken: Mapping[str, str]) -> Check:
     return Check("numpy", not broken, found, "a numpy that petsc4py and h5py were built for (1.x on Debian 12)", fix)
 
 
-def check_h5py(version: str, parallel: bool) -> Check:
-    found = f"{version}, {'parallel' if parallel else 'serial'} (rank 0 alone writes: both serve)"
-    return Check("h5py", True, found, "any", "")
+def check_h5py(version: str, hdf5: str, parallel: bool) -> Check:
+    """HDF5 2.0 (in pip's h5py 3.16), beside PETSc's own, crashes the process when the disk is full."""
+    found = f"{version} with HDF5 {hdf5}, {'parallel' if parallel else 'serial'} (rank 0 alone writes: both serve)"
+    fix = "pip uninstall h5py in the environment, so that Debian's python3-h5py-mpi shows through"
+    sound = int(hdf5.split(".")[0]) < 2
+    return Check("h5py", sound, found, "one with HDF5 1: with 2.0 a full disk crashes the process", fix)
 
 
 def check_extension(error: str, fftw: Sequence[str]) -> Check:
@@ -272,7 +275,7 @@ def find_mpi() -> list[Check]:
 def find_h5py() -> list[Check]:
     import h5py
 
-    return [check_h5py(h5py.version.version, bool(h5py.get_config().mpi))]
+    return [check_h5py(h5py.version.version, h5py.version.hdf5_version, bool(h5py.get_config().mpi))]
 
 
 def find_core() -> list[Check]:

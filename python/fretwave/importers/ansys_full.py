@@ -10,7 +10,7 @@ it is held. Held dofs have rows without entries, which are left out here. Entrie
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Protocol
 
 import numpy as np
 import scipy.sparse as sp
@@ -30,6 +30,13 @@ SYMBOLIC, LUMPED, UNSYMMETRIC, CONSTRAINTS, DOFS = 0, 10, 13, 20, 35
 FRAME = 3
 
 
+class Records(Protocol):
+    """A file of the package."""
+
+    def read_record(self, pointer: int) -> IntArray:
+        """The content of the record that begins at this word."""
+
+
 def head_of(kind: int) -> bytes:
     """First bytes of a binary file of Ansys: length and mark of a record of integers, number of the kind of file."""
     return np.array([100, -(2**31), kind], dtype="<i4").tobytes()
@@ -41,7 +48,7 @@ def read(path: Path, letter: str) -> Entries:
     if letter == "C":
         fix = "give C in another format, or damping as zeta in the case"
         raise InputError("damping is not read from a .full file", where, None, "--mass or --stiffness", fix)
-    package = reader_of("ansys.mapdl.reader.full", "ansys-mapdl-reader", "ansys", where)
+    package = reader_of("ansys.mapdl.reader.full", "ansys-mapdl-reader", where)
     header = _header(path)
     _check_header(header, where)
     file = package.FullFile(str(path))
@@ -81,7 +88,7 @@ def _check_header(header: IntArray, where: str) -> None:
             raise InputError("a .full file of this kind is not read", where, measured, expected, fix)
 
 
-def _dofs(file: Any, header: IntArray, where: str) -> IntArray:
+def _dofs(file: Records, header: IntArray, where: str) -> IntArray:
     """(n_equations,) direction 1 to 6 of each dof, negative where it is held.
 
     Displacements alone, or with all rotations: whether the numbers count these kinds or all is then the same.

@@ -8,9 +8,9 @@ held dofs, CE and CP of constraint equations, which the package does not read, a
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Protocol
 
 import numpy as np
 
@@ -28,6 +28,18 @@ DIRECTIONS = ("UX", "UY", "UZ", "ROTX", "ROTY", "ROTZ")
 QUANTITIES = {"EX": "modulus", "DENS": "density"}
 
 
+class Mesh(Protocol):
+    """What both packages give: (n,) numbers of nodes, (n, 3) coordinates, (n, 3) angles of their directions [degree], a
+    row of integers an element, element types, members of node components."""
+
+    nnum: IntArray
+    nodes: Array
+    node_angles: Array
+    elem: Sequence[IntArray]
+    etype: IntArray
+    node_components: Mapping[str, IntArray]
+
+
 def read_archive(path: Path) -> Nodes:
     """Nodes with their sets, elements, materials and what is held.
 
@@ -37,7 +49,7 @@ def read_archive(path: Path) -> Nodes:
         There are no nodes, directions of nodes are turned, or an element is of no known shape.
     """
     where = display(path)
-    package = reader_of("mapdl_archive", "mapdl-archive", "ansys", where)
+    package = reader_of("mapdl_archive", "mapdl-archive", where)
     nodes = _nodes(package.Archive(str(path), parse_vtk=False), where)
     nodes.materials, nodes.constraints = _lines(path, where)
     return nodes
@@ -46,11 +58,11 @@ def read_archive(path: Path) -> Nodes:
 def read_result(path: Path) -> Nodes:
     """Nodes with their sets and elements, as `read_archive`."""
     where = display(path)
-    package = reader_of("ansys.mapdl.reader", "ansys-mapdl-reader", "ansys", where)
+    package = reader_of("ansys.mapdl.reader", "ansys-mapdl-reader", where)
     return _nodes(package.read_binary(str(path)).mesh, where)
 
 
-def _nodes(mesh: Any, where: str) -> Nodes:
+def _nodes(mesh: Mesh, where: str) -> Nodes:
     """Of the mesh that either package gives."""
     numbers, coordinates = mesh.nnum.astype(np.int64), np.array(mesh.nodes, dtype=float)
     _check_angles(numbers, mesh.node_angles, where)

@@ -7,16 +7,22 @@ from types import ModuleType
 
 from ..errors import InputError
 
+#: How pip gets them into an environment whose h5py is the system's: what pyyeti asks for beside pandas is not needed
+#: here, and an h5py of pip's with an HDF5 of its own beside PETSc's crashes on a full disk.
+INSTALLED_BY = {
+    "ansys-mapdl-reader": "pip install ansys-mapdl-reader",
+    "mapdl-archive": "pip install mapdl-archive",
+    "pyyeti": "pip install pandas && pip install --no-deps pyyeti",
+}
 
-def reader_of(module: str, package: str, extra: str, where: str) -> ModuleType:
+
+def reader_of(module: str, package: str, where: str) -> ModuleType:
     """An optional module.
 
     Parameters
     ----------
     module, package : str
-        What is imported, and what pip calls it.
-    extra : str
-        Of fretwave, that brings it.
+        What is imported, and what pip calls it, one of `INSTALLED_BY`.
     where : str
         The file to be read, as a user would name it.
 
@@ -28,5 +34,5 @@ def reader_of(module: str, package: str, extra: str, where: str) -> ModuleType:
     try:
         return importlib.import_module(module)
     except ImportError as error:
-        what, fix = f"this file is read by the package {package}", f"pip install 'fretwave[{extra}]'"
-        raise InputError(what, where, str(error), f"the optional package {package}", fix) from None
+        what, expected = f"this file is read by the package {package}", f"the optional package {package}"
+        raise InputError(what, where, str(error), expected, INSTALLED_BY[package]) from None

@@ -28,7 +28,7 @@ JOINS = r"(MPC|RBE[123]|RBAR1?|RROD|RTRPLT1?|RSSCON)[ *,]"
 def read(path: Path, letter: str, variable: str | None = None) -> Entries:
     """A matrix of an .op4 file; where a name stands several times, its matrices are NAME_1, NAME_2, ..."""
     where = display(path)
-    op4 = reader_of("pyyeti.nastran.op4", "pyyeti", "nastran", where)
+    op4 = reader_of("pyyeti.nastran.op4", "pyyeti", where)
     given = op4.dir(str(path), verbose=False)[0]
     names = _numbered([name.upper() for name in given])
     place = names.index(choose(names, letter, variable and variable.upper(), where, USUAL))
@@ -54,7 +54,7 @@ def read_grid(path: Path) -> Nodes:
         Displacements are in another coordinate system than the basic one.
     """
     where = display(path)
-    bulk = reader_of("pyyeti.nastran.bulk", "pyyeti", "nastran", where)
+    bulk = reader_of("pyyeti.nastran.bulk", "pyyeti", where)
     table = bulk.bulk2uset(str(path))[0]
     places = table[["x", "y", "z"]].to_numpy(dtype=float).reshape(-1, 6, 3)  # behind x, y, z: system, origin, turn
     numbers = table.index.get_level_values(0).to_numpy(dtype=np.int64)[::6]
