@@ -135,6 +135,7 @@ class Continuation {
   static constexpr double least_along = 0.2;  ///< of a tangent along the step, to be taken by arclength
   double zero_on(Hermite const&, size_t which, Place a, Place b);
   double foretold_zero(Hermite const&, size_t which, Bracket const&);
+  double beyond(Hermite const& known, size_t which, Place before, Place last, double apart);
   Hermite with(Hermite const&, Vec y, Vec tangent) const;
   void reach(double value, std::string const& event, Place a, Place b, Hermite const&, double length);
   void polish(Trial&, double target);

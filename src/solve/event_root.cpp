@@ -10,8 +10,9 @@ namespace {
 
 constexpr double jump = 0.1;       // of the end values: what is left where a test function jumps
 constexpr double on_curve = 1e-9;  // of a bracket: so precisely a curve's zero is found
-constexpr int looks = 30;          // at a curve
-constexpr int smooth = 3;          // trials on cubics: beyond those the branch has a corner there
+constexpr double near = 3e-3;  // of a step: what Newton leaves of trials so near to each other bends a curve
+constexpr int looks = 30;      // at a curve
+constexpr int smooth = 3;      // trials on cubics: beyond those the branch has a corner there
 
 }  // namespace
 
@@ -22,9 +23,10 @@ class Continuation::Bracket {
   double width() const { return b_.at - a_.at; }
   double first() const { return a_.at; }
   double last() const { return b_.at; }
+  bool holds(double at) const { return at >= a_.at && at <= b_.at; }
   double next() const {
     const double at = secant(a_, b_);
-    return at >= a_.at && at <= b_.at ? at : a_.at;  // else both ends are of one sign
+    return holds(at) ? at : a_.at;  // else both ends are of one sign
   }
   void narrow(Place place) {
     const bool behind = (place.value > 0) == (b_.value > 0);
@@ -53,36 +55,37 @@ double Continuation::zero_on(Hermite const& curve, size_t which, Place a, Place 
 }
 
 /// First off the curve through the step's ends and, where the branch is smooth, the point before; then off
-/// that through the first trial too, from there on off the cubic between the trials on both sides. Where it
-/// foretells no other place, or Newton finds nothing to correct, the zero is found. Where the test function
-/// jumps, Illinois' form of regula falsi goes on, and can only bisect: eight trials are enough then for an
-/// extremum, and the last one, nearest to the jump, is taken; else the best.
+/// that through the first trial too, from there on off the cubic through the last two. Where it foretells no
+/// other place the zero is found. Where the test function jumps, Illinois' form of regula falsi goes on, and
+/// can only bisect: eight trials are enough then for an extremum, and the last one, nearest to the jump, is
+/// taken; else the best.
 std::optional<Continuation::Trial> Continuation::root(size_t which, Place a, Place b, Hermite const& curve,
                                                       double length, double& found) {
   TestFunction const& test = anchor_tests_[which];
-  const double precision = (test.extremum ? 1e-7 : 1e-9) * length,
-               size = std::max(std::abs(a.value), std::abs(b.value));
+  const double precision = 1e-9 * length, size = std::max(std::abs(a.value), std::abs(b.value));
   const int trials = test.extremum ? 8 : 12;
   std::vector<std::pair<double, Trial>> tried;
   Hermite known = anchor_.smooth ? with(curve, before_.y, before_.tangent) : curve, through = known;
   Bracket bracket(a, b);
   double best_value = INFINITY, at = foretold_zero(known, which, bracket);
   size_t best = 0;
+  Place before = a;
   for (int k = 0; k < trials && bracket.width() > precision; ++k) {
     Trial trial = this->at(through.value(at));
     if (!correct_inside(trial, at, length)) break;
-    const double value = trial.tests[which].value;
+    const Place here{at, trial.tests[which].value};
     tried.emplace_back(at, std::move(trial));
-    if (std::abs(value) <= best_value) best_value = std::abs(value), best = tried.size() - 1;
-    Trial const& last = tried.back().second;
+    if (std::abs(here.value) <= best_value) best_value = std::abs(here.value), best = tried.size() - 1;
     if (best_value < (test.extremum ? 1e-9 * size : 1e-12)) break;
-    if (k <= smooth && last.outcome.newton == 0) break;  // the curve is the branch
-    bracket.narrow({at, value});
-    known = with(known, last.y, last.tangent);
+    bracket.narrow(here);
+    known = with(known, tried.back().second.y, tried.back().second.tangent);
     through = k == 0 ? known : known.between(bracket.first(), bracket.last());
-    const double from =
-        std::exchange(at, k < smooth ? foretold_zero(through, which, bracket) : bracket.next());
-    if (std::abs(at - from) < precision) break;
+    at = k == 0       ? foretold_zero(known, which, bracket)
+         : k < smooth ? beyond(known, which, before, here, near * length)
+                      : bracket.next();
+    if (!bracket.holds(at)) at = bracket.next();
+    if (std::abs(at - here.at) < precision) break;
+    before = here;
   }
   if (tried.empty()) return {};
   auto& [place, trial] = best_value > jump * size ? tried.back() : tried[best];
@@ -103,6 +106,20 @@ double Continuation::foretold_zero(Hermite const& curve, size_t which, Bracket c
   };
   const Place a = look(bracket.first()), b = look(bracket.last());
   return test_sign(a.value) * test_sign(b.value) < 0 ? zero_on(curve, which, a, b) : bracket.next();
+}
+
+/// Zero near two trials: on the cubic through them, by its secants; of their values where they are so near to
+/// each other that those tell more.
+double Continuation::beyond(Hermite const& known, size_t which, Place before, Place last, double apart) {
+  if (std::abs(last.at - before.at) < apart) return secant(before, last);
+  const Hermite curve = known.between(std::min(before.at, last.at), std::max(before.at, last.at));
+  const double precision = on_curve * std::abs(last.at - before.at);
+  for (int k = 0; k < looks && last.value != before.value; ++k) {
+    const double at = secant(before, last);
+    if (!std::isfinite(at) || std::abs(at - last.at) <= precision) return at;
+    before = std::exchange(last, {at, tests(curve.value(at), curve.derivative(at))[which].value});
+  }
+  return last.at;
 }
 
 }  // namespace fretwave::solve

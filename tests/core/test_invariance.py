@@ -33,7 +33,7 @@ def scaled(two_dof, comm, L=1.0, m=1.0, T=1.0):
 
 
 def dimensionless(model, method="CNM", L=1.0, T=1.0, highest=21, samples=512, reports=REPORTS):
-    """Rows (amplitude, omega, beta, zeta) in SI at the reported amplitudes, and Newton iterations of all points."""
+    """Rows (amplitude, omega, beta, zeta) in SI at the reported amplitudes, and (event, newton) of all points."""
     h = fw.Harmonics(range(1, highest + 1, 2), samples)
     problem = fw.NonlinearMode(model, h, method, 0, fw.linear_modes(model, 1, "stuck")[0])
     branch = fw.Continuation(problem, problem.initial(0.02 * L), (0.02 * L, 2.0 * L), report_at=list(reports * L))
@@ -41,7 +41,14 @@ def dimensionless(model, method="CNM", L=1.0, T=1.0, highest=21, samples=512, re
     assert branch.converged, branch.reason
     found = [problem.state(p.y) for p in points if p.event == "report"]
     rows = [(s["amplitude"] / L, s["omega"] * T, s["beta"] * T, s["zeta"]) for s in found]
-    return np.array(rows), [p.newton for p in points]
+    return np.array(rows), [(p.event, p.newton) for p in points]
+
+
+def assert_same_iterations(found, expected):
+    """A fold or peak is found to half the digits: whether the last guess is exact there, rounding decides."""
+    assert [event for event, _ in found] == [event for event, _ in expected]
+    for (event, newton), (_, newton_expected) in zip(found, expected):
+        assert abs(newton - newton_expected) <= (event in ("fold", "peak_damping"))
 
 
 @pytest.mark.parametrize("method", ["CNM", "EPMC"])
@@ -52,7 +59,7 @@ def test_same_branch_in_all_units(two_dof, comm, units, method):
     expected, newton = dimensionless(scaled(two_dof, comm), method)
     found, newton_found = dimensionless(scaled(two_dof, comm, L, m, T), method, L, T)
     assert np.allclose(found, expected, rtol=SAME, atol=0)
-    assert newton_found == newton
+    assert_same_iterations(newton_found, newton)
 
 
 @pytest.mark.ranks(2, 3)

@@ -73,7 +73,10 @@ def test_tables_are_the_same_after_conversion_and_say_their_units(runs: dict[str
         elif key not in CHANCE and (name, key) != ("coordinate", "newton"):  # its residual is per sqrt(mass)
             factor = SCALES["mm-t-s"].of(there)
             found = factor * np.array(column, dtype=float)
-            np.testing.assert_allclose(found, numbers[key], rtol=0, atol=tolerance(key, numbers) or 0.0, err_msg=key)
+            allowed = tolerance(key, numbers) or 0.0
+            if key == "newton" and "event" in si:  # whether the last guess of an extremum is exact, rounding decides
+                allowed = np.isin(si["event"], ("peak", "fold", "peak_damping")).astype(float)
+            assert (np.abs(found - numbers[key]) <= allowed).all(), key
     lengths = {key for key, unit in units.items() if unit in ("mm", "sqrt(t) mm")}
     assert lengths
     assert units.get("amplitude", "mm") == ("sqrt(t) mm" if name == "coordinate" else "mm")
