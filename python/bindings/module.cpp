@@ -5,6 +5,8 @@
 #include "casters.h"
 #include "error.h"
 #include "fault.h"
+#include "precondition/kinds.h"
+#include "wheel/wheel_pc.h"
 
 namespace fretwave::python {
 
@@ -50,6 +52,8 @@ std::vector<std::string> unused_options() {
 NB_MODULE(_core, m) {
   import_petsc4py_module();  // initialises PETSc
   check(SlepcInitializeNoArguments());
+  wheel::register_kinds();
+  precondition::register_kinds();
   fault::arm_from(std::getenv("FRETWAVE_FAULT"), comm_rank(PETSC_COMM_WORLD));
   nb::register_exception_translator(translate);
   m.doc() = "C++ core of fretwave; use the package's own classes";

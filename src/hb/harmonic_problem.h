@@ -78,8 +78,6 @@ class HarmonicProblem : public solve::Problem {
   Vec scalar_column(Vec y, int j);
   /// Linearised contact of this rank's pairs at y, in the unit of the rows, `stiffness_scale`. Collective.
   std::vector<PairTangents> pair_tangents(Vec y);
-  std::unique_ptr<solve::Preconditioner> preconditioner(std::string const& blocks) override;
-  std::unique_ptr<solve::Preconditioner> fallback(double& bytes) override;
   double jacobian_entries() const override;
   std::string explain(Vec y, Vec dy) override;
   /// The fixed loads of another problem, excitation included; its static state is the rest. Collective.
@@ -119,7 +117,6 @@ class HarmonicProblem : public solve::Problem {
   void border(std::vector<double> const& z, std::vector<double> const& along, double* r) const;
   /// The row's entries on this rank.
   std::span<std::pair<PetscInt, double> const> mine() const;
-  bool condensable() const;
   void linearise(Vec y);
   void put_residual(Vec r);
   void unpack(Vec y);
@@ -138,7 +135,7 @@ class HarmonicProblem : public solve::Problem {
   std::vector<VecHandle> unfold_;
   std::optional<PerContact> sliders_;
   unsigned owner_ = 0;  ///< of the sliders, as the laws know it
-  bool linearised_ = false, condensed_ = false;
+  bool linearised_ = false;
   unsigned contact_version_ = 0;  ///< of the laws at the point of linearisation
   std::vector<double> z_;
   ScaledMotion motion_;

@@ -106,4 +106,40 @@ VecHandle HarmonicProblem::gap_product(Vec y, PerContact const& dgap) {
   return out;
 }
 
+/// A step in the mean alone: friction held it, and what held it slips now.
+std::string HarmonicProblem::explain(Vec, Vec dy) {
+  const PetscInt m = harmonics().block_size();
+  double sums[2] = {};  // of the mean, of all
+  {
+    ReadArray in(dy);
+    for (PetscInt i = 0; i < local_block_; ++i) {
+      sums[1] += in[i] * in[i];
+      if (i % m == 0 && harmonics().orders()[0] == 0) sums[0] += in[i] * in[i];
+    }
+  }
+  MPI_Allreduce(MPI_IN_PLACE, sums, 2, MPI_DOUBLE, MPI_SUM, comm());
+  if (sums[0] < 0.9 * sums[1]) return {};
+  return "the mean position is free: every pair that held it slips or opens within a period";
+}
+
+double HarmonicProblem::jacobian_entries() const {
+  const double m = harmonics().block_size();
+  double entries = 0, contact = 0;
+  for (auto const& term : model().terms()) {
+    MatInfo info;
+    check(MatGetInfo(term.A, MAT_GLOBAL_SUM, &info));
+    entries += info.nz_used * 2 * m;
+  }
+  for (auto const& group : model().contacts()) {
+    MatInfo info;
+    PetscInt rows;
+    check(MatGetSize(group.B, &rows, nullptr));
+    check(MatGetInfo(group.B, MAT_GLOBAL_SUM, &info));
+    if (!rows) continue;
+    const double of_a_pair = info.nz_used / double(rows) * group.law->components();
+    contact += double(rows) / group.law->components() * of_a_pair * of_a_pair * m * m;
+  }
+  return entries + contact;
+}
+
 }  // namespace fretwave::hb

@@ -2,6 +2,7 @@
 #include <string>
 
 #include "solve/bordered.h"
+#include "solve/preconditioner.h"
 
 namespace fretwave::solve {
 

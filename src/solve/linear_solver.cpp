@@ -56,7 +56,7 @@ bool is_gmres(KSP ksp) {
 LinearSolver::LinearSolver(Bordered& bordered, std::string const& prefix, SNES snes)
     : bordered_(bordered), prefix_(prefix), snes_(snes), point_(bordered.problem().unknowns()) {
   choose_route();
-  if (own_) {
+  if (krylov_) {
     use_krylov();
     return;
   }
@@ -70,16 +70,21 @@ void LinearSolver::choose_route() {
   const std::string wish = choice(prefix_, "-route", "route of the corrector", "direct", "krylov");
   const std::string blocks = choice(prefix_, "-blocks", "kind of preconditioner", "dense", "sparse");
   if (wish == "krylov" || (wish == "auto" && unknowns > krylov_limit))
-    own_ = bordered_.problem().preconditioner(blocks);
-  const bool refused = wish == "krylov" && !own_;
-  route_ = std::string(own_ ? "krylov" : "direct") + " (" +
+    kind_ = choose_kind(bordered_.problem(), blocks);
+  krylov_ = kind_.kind;
+  const bool refused = wish == "krylov" && !krylov_;
+  route_ = std::string(krylov_ ? "krylov" : "direct") + " (" +
            (refused          ? "krylov asked for, but this problem has no preconditioner"
             : wish == "auto" ? std::to_string(unknowns) + " unknowns"
                              : "asked for") +
            ")";
 }
 
-std::string LinearSolver::route() const { return route_ + (own_ ? ", " + own_->describe() : ""); }
+std::string LinearSolver::route() const { return route_ + (own_ ? ", " + own_->describe() + note_ : ""); }
+
+std::string LinearSolver::description() const {
+  return fallback_ ? fallback_->describe() : own_ ? own_->describe() + note_ : "not made yet";
+}
 
 void LinearSolver::use_krylov() {
   KSP ksp = ksp_of(snes_);
@@ -92,9 +97,29 @@ void LinearSolver::use_krylov() {
   check(KSPGMRESSetRestart(ksp, 100));
   check(KSPSetTolerances(ksp, 1e-6, 1e-13, PETSC_DEFAULT, 200));
   check(KSPGetPC(ksp, &pc));
-  check(PCSetType(pc, PCSHELL));
-  check(PCShellSetContext(pc, this));
-  check(PCShellSetApply(pc, shell_precondition));
+  check(PCSetType(pc, kind_.kind->type.c_str()));
+}
+
+void LinearSolver::take_options() {
+  if (krylov_) make_preconditioner();
+  make_tangent();
+}
+
+/// Of the kind that -<prefix>pc_type asks for, or of the one that was chosen.
+void LinearSolver::make_preconditioner() {
+  PC pc;
+  PCType type;
+  check(KSPGetPC(ksp_of(snes_), &pc));
+  check(PCGetType(pc, &type));
+  auto const* kind = kind_of(type);
+  if (!kind) return;
+  if (kind == kind_.kind)
+    note_ = kind_.note;
+  else if (const auto why = kind->refuses(bordered_.problem()); !why.empty())
+    throw InputError("option pc_type: there is no " + kind->type + " for " + why, kind->type,
+                     kind_.kind->type, "leave out the option -<analysis>_pc_type");
+  kind_.kind = kind;
+  own_ = kind->make(bordered_.problem());
 }
 
 void LinearSolver::make_tangent() {
@@ -122,11 +147,8 @@ PetscErrorCode LinearSolver::shell_product(Mat J, Vec x, Vec y) {
   return solver->guard_.run([&] { solver->bordered_.product(solver->point_, x, y); });
 }
 
-PetscErrorCode LinearSolver::shell_precondition(PC pc, Vec x, Vec y) {
-  LinearSolver* solver;
-  PetscErrorCode code = PCShellGetContext(pc, &solver);
-  if (code) return code;
-  return solver->guard_.run([&] { solver->preconditioner().apply(x, y); });
+PetscErrorCode LinearSolver::apply(Vec x, Vec z) {
+  return guard_.run([&] { preconditioner().apply(x, z); });
 }
 
 /// The preconditioner is stale once the iterations of Newton's solves beyond those just after it was built
@@ -149,7 +171,7 @@ void LinearSolver::count_iterations() {
 }
 
 bool LinearSolver::linearise(Vec y, bool newton) {
-  if (!own_) {
+  if (!krylov_) {
     bordered_.assemble(y, J_);
     if (factorise(ksp_of(snes_), J_)) return true;
     check(KSPReset(tangent_));
@@ -158,13 +180,32 @@ bool LinearSolver::linearise(Vec y, bool newton) {
   check(VecCopy(y, point_));
   if (uncounted_ && !stale_) count_iterations();
   uncounted_ = false;
-  built_here_ = stale_;
-  if (stale_ && !build()) return false;
-  if (!built_here_) follow();
-  uncounted_ = newton || beside_;
-  check(MatAssemblyBegin(J_, MAT_FINAL_ASSEMBLY));
+  check(MatAssemblyBegin(J_, MAT_FINAL_ASSEMBLY));  // another state, for which PCSetUp looks
   check(MatAssemblyEnd(J_, MAT_FINAL_ASSEMBLY));
+  if (own_ && !set_up()) return false;
+  uncounted_ = own_ && (newton || beside_);
   return true;
+}
+
+/// Here and not inside a solve, so that a singular block is a singular Jacobian.
+bool LinearSolver::set_up() {
+  PC pc;
+  PCFailedReason reason;
+  check(KSPGetPC(ksp_of(snes_), &pc));
+  check(PCSetOperators(pc, J_, J_));
+  const PetscErrorCode code = PCSetUp(pc);
+  guard_.rethrow();
+  check(code);
+  check(PCGetFailedReason(pc, &reason));
+  return reason == PC_NOERROR;
+}
+
+PetscErrorCode LinearSolver::set_up(PC pc) {
+  return guard_.run([&] {
+    built_here_ = stale_;
+    if (!stale_) follow();
+    check(PCSetFailedReason(pc, stale_ && !build() ? PC_FACTOR_NUMERIC_ZEROPIVOT : PC_NOERROR));
+  });
 }
 
 void LinearSolver::follow() {
@@ -181,7 +222,6 @@ bool LinearSolver::build() {
   } catch (SingularBlock const&) {
     return false;
   }
-  if (!preconditioner().failure().empty()) return false;
   stale_ = false;
   fresh_ = -1, excess_ = 0;
   return true;
@@ -194,7 +234,7 @@ void LinearSolver::serve_beside(double tolerance) {
 }
 
 bool LinearSolver::climb() {
-  if (!own_) return false;
+  if (!own_) return false;  // PETSc's ways are the user's own
   stale_ = true, solved_ = 0;
   if (!built_here_) {
     ++fallbacks_.rebuilt;
@@ -205,10 +245,14 @@ bool LinearSolver::climb() {
 }
 
 bool LinearSolver::take_fallback() {
-  double bytes = 0;
-  auto fallback = bordered_.problem().fallback(bytes);
-  if (!fallback || !fits(bytes, "the condensed contact system")) return false;
-  fallback_ = std::move(fallback);
+  Problem& problem = bordered_.problem();
+  const auto helps = [&](PreconditionerKind const& kind) {
+    return &kind != kind_.kind && kind.fallback_bytes && kind.refuses(problem).empty();
+  };
+  const auto found = std::ranges::find_if(kinds(), helps);
+  const double bytes = found == kinds().end() ? 0 : found->fallback_bytes(problem);
+  if (bytes == 0 || !fits(bytes, "the condensed contact system")) return false;
+  fallback_ = found->make(problem);
   rung_ = 1, ++fallbacks_.condensed;
   fallbacks_.said = "GMRES stalls: the condensed contact system is factorised (" + gigabytes(bytes) + ")";
   return true;
@@ -244,7 +288,7 @@ void LinearSolver::descend() {
 /// Behind a kink of the branch the last tangent can be a guess so bad that GMRES takes it for divergence.
 bool LinearSolver::solve(Vec b, Vec x) {
   if (solve_once(b, x)) return true;
-  if (!own_) return false;
+  if (!krylov_) return false;
   check(VecSet(x, 0));
   return solve_once(b, x);
 }

@@ -3,6 +3,7 @@
 
 #include "solve/bordered.h"
 #include "solve/guard.h"
+#include "solve/preconditioner.h"
 
 namespace fretwave::solve {
 
@@ -16,10 +17,10 @@ struct Fallbacks {
 
 /// The bordered system linearised at a point, for Newton's steps and for solves beside them (tangents). Two
 /// routes (DESIGN section 4), chosen by size or by -<prefix>route: direct (assembled, LU) and krylov
-/// (matrix-free product, the problem's own preconditioner, rebuilt when iterations rise). PETSc options apply
-/// under the prefix; ours are only its defaults. Solves beside Newton's have a KSP of their own, prefix
-/// <prefix>tangent_, with the same operator and preconditioner: how roughly Newton's steps are solved for is
-/// a matter of cost, a tangent's error is one of the branch.
+/// (matrix-free product, a kind of preconditioner for such problems, rebuilt when iterations rise). PETSc
+/// options apply under the prefix; ours are only its defaults. Solves beside Newton's have a KSP of their
+/// own, prefix <prefix>tangent_, with the same operator and preconditioner: how roughly Newton's steps are
+/// solved for is a matter of cost, a tangent's error is one of the branch.
 ///
 /// Where GMRES fails, `climb` goes up a ladder: the preconditioner built anew, the problem's fallback,
 /// factors of the whole system, each if it fits the memory. After a while that grows with each climb the
@@ -29,12 +30,12 @@ class LinearSolver {
   /// Configures the KSP of the SNES, which must outlive this.
   LinearSolver(Bordered&, std::string const& prefix, SNES);
   LinearSolver(LinearSolver const&) = delete;
-  /// After SNESSetFromOptions.
-  void make_tangent();
+  /// After SNESSetFromOptions: what the options made of it is set up.
+  void take_options();
   Mat jacobian() const { return J_; }
   /// "direct" or "krylov", with the reason of the choice.
   std::string route() const;
-  bool krylov() const { return bool(own_); }
+  bool krylov() const { return krylov_; }
   /// Point and factors of the solves that follow; false where it is singular. `newton`: one of Newton's
   /// follows. Collective.
   bool linearise(Vec y, bool newton);
@@ -52,11 +53,18 @@ class LinearSolver {
   Fallbacks const& fallbacks() const { return fallbacks_; }
   Guard& guard() { return guard_; }
 
+  /// Of a PC whose type is a kind of ours: PCSetUp, PCApply and PCView.
+  PetscErrorCode set_up(PC);
+  PetscErrorCode apply(Vec x, Vec z);
+  std::string description() const;
+
  private:
   static PetscErrorCode shell_product(Mat, Vec, Vec);
-  static PetscErrorCode shell_precondition(PC, Vec, Vec);
   void choose_route();
   void use_krylov();
+  void make_preconditioner();
+  void make_tangent();
+  bool set_up();
   bool build();
   void follow();
   bool solve_once(Vec b, Vec x);
@@ -72,8 +80,9 @@ class LinearSolver {
   MatHandle J_;
   KspHandle tangent_;
   VecHandle point_;
-  std::unique_ptr<Preconditioner> own_, fallback_;
-  bool stale_ = true, uncounted_ = false, beside_ = false;
+  ChosenKind kind_;
+  std::unique_ptr<Preconditioner> own_, fallback_;  ///< none where options ask for a PC of PETSc's
+  bool krylov_ = false, stale_ = true, uncounted_ = false, beside_ = false;
   int fresh_ = -1;          ///< Krylov iterations of the first solve after a build; -1: none yet
   double excess_ = 0;       ///< iterations beyond that and a share of them, of all solves since
   double first_reuse_ = 0;  ///< iterations beyond it that the first reuse cost when it was last tried, halved
@@ -82,7 +91,7 @@ class LinearSolver {
   int rung_ = 0;                ///< of the ladder; 0: the problem's own preconditioner
   int stay_ = 32, solved_ = 0;  ///< points to stay up there, and points since
   Fallbacks fallbacks_;
-  std::string route_;
+  std::string route_, note_;
   Guard guard_;
 };
 

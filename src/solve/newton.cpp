@@ -34,7 +34,7 @@ Newton::Newton(Problem& problem, std::string const& prefix, bool past_kinks)
   check(SNESSetJacobian(snes_, linear_->jacobian(), linear_->jacobian(), form_jacobian, this));
   check(SNESSetSolution(snes_, y));
   check(SNESSetFromOptions(snes_));
-  linear_->make_tangent();
+  linear_->take_options();
 }
 
 /// PETSc's test, but for a guess that passes it: a step's cost buys the digits that a small damping needs.

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "solve/preconditioner.h"
+#include "petsc.h"
 
 /// Newton and continuation; knows neither harmonics nor contact.
 namespace fretwave::solve {
@@ -56,13 +56,6 @@ class Problem {
   virtual void pattern(std::vector<PetscInt>& rows, std::vector<PetscInt>& cols) = 0;
   virtual void values(Vec y, std::span<double> v) = 0;
 
-  /// For the Krylov route; none: the direct route only. `blocks`: dense, sparse or auto, for problems that
-  /// have both.
-  virtual std::unique_ptr<Preconditioner> preconditioner(std::string const& /*blocks*/) { return nullptr; }
-
-  /// A dearer preconditioner for where that one fails, and what building it takes beside its factors [bytes];
-  /// none if there is none or it is in use already.
-  virtual std::unique_ptr<Preconditioner> fallback(double& /*bytes*/) { return nullptr; }
   /// About how many entries J has; 0 if it is dense.
   virtual double jacobian_entries() const { return 0; }
 

@@ -69,7 +69,7 @@ def test_a_wheel_whose_contact_does_not_repeat_falls_back(comm, rubbing, dof_of)
             problem = mode_of(wheel(comm, rubbing, dof_of))
             newton = newton_of(problem)
             if route == "krylov":
-                assert "contact not the same in all sectors: no waves" in newton.route
+                assert "contact not the same in all sectors: no fwwheel" in newton.route
             y = problem.initial(0.4)
             row = unknowns(problem, np.eye(1, len(whole(y)), len(whole(y)) - 1)[0])
             newton.system.close(row, np.log(0.4))
@@ -102,6 +102,42 @@ def test_sparse_blocks_of_a_contact_that_reaches_the_next_sector_are_refused(com
     problem = mode_of(rich_sector().model(2, comm))
     with asked(route="krylov", blocks="sparse"), pytest.raises(fw.InputError, match="reaches the next sector"):
         newton_of(problem)
+
+
+def solved(problem):
+    """At amplitude 0.4, and Newton's solver."""
+    newton, y = newton_of(problem), problem.initial(0.4)
+    newton.system.close(unknowns(problem, np.eye(1, len(whole(y)), len(whole(y)) - 1)[0]), np.log(0.4))
+    assert newton.solve(y)[0]
+    return whole(y), newton
+
+
+@pytest.mark.parametrize("kind", ["fwwheel", "fwcondensed", "fwblocks", "none"])
+def test_a_preconditioner_is_a_type_of_petscs(comm, kind, tmp_path):
+    """Chosen by -pc_type, said by PCView; the solution is that of the direct route."""
+    with asked(route="direct"):
+        expected, _ = solved(mode_of(wheel(comm)))
+    with asked(route="krylov", pc_type=kind):
+        found, newton = solved(mode_of(wheel(comm)))
+    assert np.allclose(found, expected, rtol=0, atol=REPEATED)
+    pc = newton.snes.getKSP().getPC()
+    assert pc.getType() == kind
+    viewer = PETSc.Viewer().createASCII(str(tmp_path / "pc.txt"), comm=comm)
+    pc.view(viewer)
+    viewer.destroy()
+    if comm.rank == 0 and kind != "none":
+        said = newton.route.partition("), ")[2]
+        assert said and said in (tmp_path / "pc.txt").read_text()
+
+
+def test_a_type_that_is_not_for_the_problem_is_refused(comm):
+    for kind, model, why in (
+        ("fwwheel", rich_sector().model(2, comm), "no whole wheel"),
+        ("fwcondensed", rich_sector().model(2, comm), "reaches the next sector"),
+        ("fwbasis", wheel(comm), "without a basis of stuck pairs"),
+    ):
+        with asked(route="krylov", pc_type=kind), pytest.raises(fw.InputError, match=f"option pc_type.*{why}"):
+            newton_of(mode_of(model))
 
 
 def test_a_mode_to_avoid_without_inertia_is_refused(comm):

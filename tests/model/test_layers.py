@@ -1,11 +1,26 @@
-"""The physics stands without the case files: scripts load neither TOML's layer nor pydantic."""
+"""The physics stands without the case files: scripts load neither TOML's layer nor pydantic. Rooms of the core include
+in one direction."""
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
+
+SOURCES = Path(__file__).parents[2] / "src"
+#: What each room of the core includes of others: equations (hb) know no preconditioner, and those no wheel.
+ROOMS = {
+    "contact": set(),
+    "solve": set(),
+    "model": {"contact"},
+    "transient": {"model"},
+    "hb": {"contact", "model", "solve"},
+    "precondition": {"hb", "model", "solve"},
+    "wheel": {"hb", "precondition", "solve"},
+}
 
 IMPORT = """
 import pkgutil, importlib, sys
@@ -36,3 +51,32 @@ def test_structures_pairs_and_files_need_no_parallel_library() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
     assert (done.returncode, done.stdout.strip()) == (0, "[]"), done.stderr
+
+
+def included(file: Path) -> set[str]:
+    """Headers of the core, as they stand in its quotes."""
+    return {name for name in re.findall(r'#include "([^"]+)"', file.read_text(encoding="utf-8"))}
+
+
+@pytest.mark.ranks(1)
+@pytest.mark.parametrize("room", sorted(ROOMS))
+def test_rooms_of_the_core_include_in_one_direction(room: str) -> None:
+    others = {name.split("/")[0] for file in (SOURCES / room).iterdir() for name in included(file) if "/" in name}
+    assert others - {room} == ROOMS[room]
+
+
+@pytest.mark.ranks(1)
+def test_no_header_of_the_core_includes_itself() -> None:
+    assert {folder.name for folder in SOURCES.iterdir() if folder.is_dir()} == set(ROOMS)
+    known: dict[str, set[str]] = {}
+
+    def reached(name: str, way: tuple[str, ...] = ()) -> set[str]:
+        assert name not in way, " -> ".join([*way, name])
+        if name not in known:
+            direct = included(SOURCES / name)
+            known[name] = direct.union(*(reached(one, (*way, name)) for one in direct))
+        return known[name]
+
+    for header in SOURCES.rglob("*.h"):
+        reached(str(header.relative_to(SOURCES)))
+    assert "hb/residual.h" in known["wheel/wheel_pc.h"]

@@ -1,0 +1,65 @@
+#pragma once
+#include <memory>
+
+#include "hb/harmonic_problem.h"
+#include "precondition/coupled_pairs.h"
+#include "precondition/modal_blocks.h"
+#include "solve/preconditioner.h"
+
+namespace fretwave::precondition {
+
+using namespace hb;
+
+/// For reduced models whose pairs can stick: harmonic blocks with all pairs stuck are diagonal in one real
+/// basis, made once for a model (`model::StuckBasis`); pairs that slip or open within a period come in with
+/// their mean stiffness
+/// (`ModalBlocks`), and with what they couple of different harmonics (`CoupledPairs`). Nothing of the
+/// structure's size is inverted, and pairs that stick cost nothing. Every rank has its range of harmonics and
+/// the forces of its pairs.
+class BasisPreconditioner : public solve::Preconditioner {
+ public:
+  explicit BasisPreconditioner(HarmonicProblem&);
+  static bool suits(model::Model const& model) { return model.stuck_basis() != nullptr; }
+  void build(Vec y, Vec row) override;
+  void follow(Vec y) override;
+  void apply(Vec x, Vec z) override;
+  double build_cost() const override;
+  std::string describe() const override;
+
+ private:
+  struct Pair {
+    int components, first_row;
+  };
+  /// A pair that couples harmonics: its first row among those of such pairs, and where its own compliance
+  /// begins.
+  struct Busy {
+    int components, first_row;
+    size_t first_block;
+  };
+  std::vector<std::vector<complex>> structure(Exponents const&) const;
+  ModalBorder border(Vec y, Vec row);
+  std::vector<double> mean_tangents(std::vector<PairTangents> const&) const;
+  bool moves(int pair, std::vector<double> const& means, size_t at) const;
+  void take_contact();
+  void couple(std::vector<PairTangents> const&);
+  std::vector<int> correct(std::vector<PairTangents> const&, std::vector<size_t> const& first_block);
+  std::vector<float> own(double const* blocks, std::vector<int> const& places, int columns) const;
+  void add_coupling(double const* f, double* u) const;
+
+  HarmonicProblem& problem_;
+  model::StuckBasis const& basis_;
+  int n_, m_, scalars_, rank_, size_, first_, last_;
+  ModalBlocks blocks_;
+  std::vector<double> damping_;              ///< diagonal of C in the basis
+  std::vector<Pair> pairs_;                  ///< of all ranks
+  int first_pair_ = 0;                       ///< of this rank
+  std::vector<double> means_;                ///< T of all pairs
+  std::vector<int> place_;                   ///< of each row of B among those of `blocks_`, -1 for none
+  std::vector<PairCorrection> corrections_;  ///< of this rank's pairs that are not stuck
+  std::vector<Busy> busy_pairs_;             ///< of all ranks
+  std::vector<int> busy_rows_;               ///< their places among the rows of `blocks_`
+  std::vector<Rotation> G_;                  ///< of pairs that are not stuck, each alone
+  std::unique_ptr<CoupledPairs> coupled_;    ///< none where none couples harmonics
+};
+
+}  // namespace fretwave::precondition

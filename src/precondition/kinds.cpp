@@ -1,0 +1,64 @@
+/// Which preconditioner suits a harmonic problem.
+#include "precondition/kinds.h"
+
+#include <algorithm>
+
+#include "precondition/basis_pc.h"
+#include "precondition/condensed_pc.h"
+#include "precondition/harmonic_pc.h"
+
+namespace fretwave::precondition {
+
+namespace {
+
+/// Dense blocks are for reduced models. They are inverted in single precision, which the element stiffness of
+/// a fine mesh, 1e8 times that of its first mode, outdoes; and 3000 dofs take 144 MB a harmonic.
+bool suits_dense(HarmonicProblem const& problem) {
+  constexpr double always = 200, largest = 3000, share = 0.25;  // dofs, dofs, of nonzero entries
+  model::Model const& model = problem.model();
+  const double n = double(model.dofs());
+  return n <= always || (n <= largest && model.largest_term() > share * n * n);
+}
+
+std::string unfolded(HarmonicProblem const& problem) {
+  return problem.unfolding_vectors().empty() ? "" : "a wheel whose double mode is unfolded";
+}
+
+/// A pair that reaches into another sector couples harmonics with phases, which the condensed form leaves
+/// out.
+std::string not_condensed(HarmonicProblem const& problem) {
+  const bool phased = std::ranges::any_of(problem.model().contacts(),
+                                          [](auto const& contact) { return !contact.ahead.empty(); });
+  return phased ? "a contact that reaches the next sector" : unfolded(problem);
+}
+
+std::string without_basis(HarmonicProblem const& problem) {
+  if (const auto why = unfolded(problem); !why.empty()) return why;
+  return problem.model().stuck_basis() ? "" : "a model without a basis of stuck pairs";
+}
+
+double condensed_bytes(solve::Problem& problem) {
+  auto const& harmonic = dynamic_cast<HarmonicProblem const&>(problem);
+  if (harmonic.model().unit()) return 0;
+  double rows = 0;
+  for (auto const& contact : harmonic.model().contacts())
+    rows += contact.law->components() * contact.law->pairs();
+  MPI_Allreduce(MPI_IN_PLACE, &rows, 1, MPI_DOUBLE, MPI_SUM, harmonic.comm());
+  const double size = rows * harmonic.harmonics().block_size() + harmonic.scalar_count();
+  return sizeof(double) * size * size;
+}
+
+}  // namespace
+
+void register_kinds() {
+  const auto always = [](HarmonicProblem const&) { return true; };
+  const auto large = [](HarmonicProblem const& problem) { return !suits_dense(problem); };
+  const auto has_basis = [](HarmonicProblem const& problem) { return without_basis(problem).empty(); };
+  auto condensed = harmonic_kind<CondensedPreconditioner>("fwcondensed", "sparse", large, not_condensed);
+  condensed.fallback_bytes = condensed_bytes;
+  solve::register_kind(std::move(condensed));
+  solve::register_kind(harmonic_kind<BasisPreconditioner>("fwbasis", "", has_basis, without_basis));
+  solve::register_kind(harmonic_kind<HarmonicPreconditioner>("fwblocks", "dense", always, unfolded));
+}
+
+}  // namespace fretwave::precondition

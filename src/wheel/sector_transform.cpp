@@ -1,0 +1,140 @@
+#include "wheel/sector_transform.h"
+
+#include <algorithm>
+#include <numeric>
+
+namespace fretwave::wheel {
+
+SectorTransform::SectorTransform(int local_sectors, int harmonics, int items, MPI_Comm comm)
+    : harmonics_(harmonics), items_(items), rank_(comm_rank(comm)), size_(comm_size(comm)), comm_(comm) {
+  first_sector_ = gathered(std::span<int const>(&local_sectors, 1), comm);
+  first_sector_.insert(first_sector_.begin(), 0);
+  std::partial_sum(first_sector_.begin(), first_sector_.end(), first_sector_.begin());
+
+  // a rank never sends more than it holds
+  for (int r = 0; r < size_; ++r)
+    as_int(PetscInt64(first_sector_[r + 1] - first_sector_[r]) * harmonics * items,
+           "coefficients of a rank's sectors");
+  as_int(PetscInt64(sectors()) * (share(harmonics * items, 1, size_) + 1), "coefficients of a rank's waves");
+  const int n = sectors(), half = n / 2 + 1;
+  for (int r = 0; r < size_; ++r) {
+    waves_.emplace_back();
+    for (int b = r; b < harmonics * half; b += size_) {
+      const int harmonic = b / half, d = b % half;
+      waves_.back().push_back({harmonic, d});
+      if (d != (n - d) % n) waves_.back().push_back({harmonic, n - d});
+    }
+  }
+  const int columns = width(rank_);
+  columns_.resize(size_t(n) * columns);
+  auto* data = reinterpret_cast<fftw_complex*>(columns_.data());
+  const auto plan = [&](int sign) {
+    return fftw_plan_many_dft(1, &n, columns, data, nullptr, columns, 1, data, nullptr, columns, 1, sign,
+                              FFTW_ESTIMATE);
+  };
+  if (columns) forward_.reset(plan(FFTW_FORWARD)), backward_.reset(plan(FFTW_BACKWARD));
+}
+
+/// Columns of a harmonic that a rank transforms, from and to.
+std::pair<int, int> SectorTransform::common(int columns_of, int harmonic) const {
+  const int begin = std::max(first_column(columns_of), harmonic * items_);
+  return {begin, std::max(begin, std::min(first_column(columns_of + 1), (harmonic + 1) * items_))};
+}
+
+/// visit(number of the wave on its rank, wave, first column, columns) for what two ranks exchange.
+template <class Visit>
+void SectorTransform::for_runs(int columns_of, int waves_of, Visit visit) const {
+  for (size_t w = 0; w < waves_[waves_of].size(); ++w) {
+    const auto [begin, end] = common(columns_of, waves_[waves_of][w].harmonic);
+    if (end > begin) visit(w, waves_[waves_of][w], begin, end - begin);
+  }
+}
+
+std::vector<complex> SectorTransform::exchange(std::vector<complex> const& out, Counts const& sent,
+                                               Counts const& received) const {
+  if (size_ == 1) return out;
+  Counts from(size_, 0), to(size_, 0);
+  std::exclusive_scan(sent.begin(), sent.end(), from.begin(), 0);
+  std::exclusive_scan(received.begin(), received.end(), to.begin(), 0);
+  std::vector<complex> in(size_t(to.back()) + received.back());
+  MPI_Alltoallv(out.data(), sent.data(), from.data(), MPI_C_DOUBLE_COMPLEX, in.data(), received.data(),
+                to.data(), MPI_C_DOUBLE_COMPLEX, comm_);
+  return in;
+}
+
+/// Entries of this rank's waves by the rank of their columns, or of its columns by the rank of their waves.
+SectorTransform::Counts SectorTransform::by_rank(bool waves) const {
+  Counts counts(size_, 0);
+  for (int r = 0; r < size_; ++r)
+    for_runs(waves ? r : rank_, waves ? rank_ : r,
+             [&](size_t, Wave const&, int, int columns) { counts[r] += columns; });
+  return counts;
+}
+
+std::vector<complex> SectorTransform::to_waves(std::span<complex const> in) const {
+  Counts sent(size_), received(size_);
+  std::vector<complex> out;
+  out.reserve(in.size());
+  for (int r = 0; r < size_; ++r) {
+    for (int j = 0; j < local_sectors(rank_); ++j) {
+      const auto* from = in.data() + size_t(j) * harmonics_ * items_ + first_column(r);
+      out.insert(out.end(), from, from + width(r));
+    }
+    sent[r] = local_sectors(rank_) * width(r), received[r] = local_sectors(r) * width(rank_);
+  }
+  std::ranges::copy(exchange(out, sent, received), columns_.begin());
+  auto* data = reinterpret_cast<fftw_complex*>(columns_.data());
+  if (forward_) fftw_execute_dft(forward_.get(), data, data);
+
+  out.clear();
+  for (int r = 0; r < size_; ++r)
+    for_runs(rank_, r, [&](size_t, Wave const& wave, int begin, int columns) {
+      const auto* from = &columns_[size_t(wave.diameter) * width(rank_) + begin - first_column(rank_)];
+      out.insert(out.end(), from, from + columns);
+    });
+  const auto mine = exchange(out, by_rank(false), by_rank(true));
+  std::vector<complex> all(waves().size() * items_);
+  auto next = mine.begin();
+  for (int r = 0; r < size_; ++r)
+    for_runs(r, rank_, [&](size_t w, Wave const& wave, int begin, int columns) {
+      std::copy_n(next, columns, &all[w * items_ + begin - wave.harmonic * items_]);
+      next += columns;
+    });
+  return all;
+}
+
+std::vector<complex> SectorTransform::to_sectors(std::span<complex const> in) const {
+  std::vector<complex> out;
+  out.reserve(in.size());
+  for (int r = 0; r < size_; ++r)
+    for_runs(r, rank_, [&](size_t w, Wave const& wave, int begin, int columns) {
+      const auto* from = in.data() + w * items_ + begin - wave.harmonic * items_;
+      out.insert(out.end(), from, from + columns);
+    });
+  const auto mine = exchange(out, by_rank(true), by_rank(false));
+  auto next = mine.begin();
+  for (int r = 0; r < size_; ++r)
+    for_runs(rank_, r, [&](size_t, Wave const& wave, int begin, int columns) {
+      std::copy_n(next, columns,
+                  &columns_[size_t(wave.diameter) * width(rank_) + begin - first_column(rank_)]);
+      next += columns;
+    });
+  auto* data = reinterpret_cast<fftw_complex*>(columns_.data());
+  if (backward_) fftw_execute_dft(backward_.get(), data, data);
+
+  Counts sent(size_), received(size_);
+  out.clear();
+  const double scale = 1.0 / sectors();
+  for (complex const& c : columns_) out.emplace_back(scale * c);
+  for (int r = 0; r < size_; ++r)
+    sent[r] = local_sectors(r) * width(rank_), received[r] = local_sectors(rank_) * width(r);
+  const auto got = exchange(out, sent, received);
+  std::vector<complex> all(size_t(local_sectors(rank_)) * harmonics_ * items_);
+  next = got.begin();
+  for (int r = 0; r < size_; ++r)
+    for (int j = 0; j < local_sectors(rank_); ++j, next += width(r))
+      std::copy_n(next, width(r), &all[size_t(j) * harmonics_ * items_ + first_column(r)]);
+  return all;
+}
+
+}  // namespace fretwave::wheel

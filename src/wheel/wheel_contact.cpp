@@ -1,0 +1,236 @@
+#include "wheel/wheel_contact.h"
+
+#include <algorithm>
+#include <map>
+#include <numeric>
+
+#include "lapack.h"
+
+namespace fretwave::wheel {
+
+namespace {
+
+constexpr int most_together = 1500;  // coefficients: 9 MB a sector, LAPACK's elimination in 0.2 s
+
+/// Each rank's numbers for each rank; what the others have for this one, one after the other. Collective.
+std::vector<double> exchanged(std::vector<std::vector<double>> const& out, MPI_Comm comm) {
+  const size_t size = out.size();
+  std::vector<int> sent(size), received(size), from(size, 0), to(size, 0);
+  std::vector<double> all;
+  PetscInt64 most = 0;
+  for (size_t r = 0; r < size; ++r) most += PetscInt64(out[r].size());
+  MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPIU_INT64, MPI_MAX, comm);
+  as_int(most, "numbers of a rank's contact pairs");
+  for (size_t r = 0; r < size; ++r) {
+    sent[r] = int(out[r].size());
+    all.insert(all.end(), out[r].begin(), out[r].end());
+  }
+  MPI_Alltoall(sent.data(), 1, MPI_INT, received.data(), 1, MPI_INT, comm);
+  most = std::accumulate(received.begin(), received.end(), PetscInt64(0));
+  MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPIU_INT64, MPI_MAX, comm);
+  as_int(most, "numbers of a rank's contact pairs");
+  std::exclusive_scan(sent.begin(), sent.end(), from.begin(), 0);
+  std::exclusive_scan(received.begin(), received.end(), to.begin(), 0);
+  std::vector<double> in(size_t(to.back()) + received.back());
+  MPI_Alltoallv(all.data(), sent.data(), from.data(), MPI_DOUBLE, in.data(), received.data(), to.data(),
+                MPI_DOUBLE, comm);
+  return in;
+}
+
+}  // namespace
+
+WheelContact::WheelContact(HarmonicProblem const& problem, SectorTransform const& sectors)
+    : harmonics_(problem.harmonics()), sectors_(sectors), comm_(problem.comm()) {
+  const int rank = comm_rank(comm_);
+  own_sectors_ = sectors.first_sector(rank + 1) - sectors.first_sector(rank);
+  for (auto const& contact : problem.model().contacts()) {
+    int pairs = contact.law->pairs();
+    MPI_Allreduce(MPI_IN_PLACE, &pairs, 1, MPI_INT, MPI_SUM, comm_);
+    first_pair_.push_back(pairs_.size());
+    numbers_.push_back(contact.numbers);
+    const int d = contact.law->components();
+    for (int k = 0; k < pairs / sectors.sectors(); ++k, rows_ += d) pairs_.push_back({rows_, d, 0});
+  }
+  first_pair_.push_back(pairs_.size());
+  size_t next = 0;
+  for (Pair& pair : pairs_) {
+    pair.first_tangent = next;
+    next += size_t(harmonics_.count()) * pair.components * pair.components;
+  }
+  tangents_.resize(next);
+  find_entries(problem);
+  find_groups();
+}
+
+void WheelContact::find_entries(HarmonicProblem const& problem) {
+  const int unit = int(problem.model().unit()), N = sectors_.sectors();
+  std::vector<Entry> mine;
+  for (size_t g = 0; g < numbers_.size(); ++g) {
+    auto const& contact = problem.model().contacts()[g];
+    const int d = contact.law->components(), in_sector = int(first_pair_[g + 1] - first_pair_[g]);
+    PetscInt begin;
+    check(MatGetOwnershipRange(contact.B, &begin, nullptr));
+    for_entries(contact.B, [&](PetscInt row, PetscInt dof, double value) {
+      const int number = numbers_[g][(row - begin) / d];
+      mine.push_back({pairs_[first_pair_[g] + number % in_sector].first_row + int(row - begin) % d,
+                      int(dof / unit - number / in_sector + N) % N, int(dof % unit), value / N});
+    });
+  }
+  std::map<std::array<int, 3>, double> sum;
+  for (Entry const& b : gathered(std::span<Entry const>(mine), comm_))
+    sum[{b.row, b.ahead, b.dof}] += b.value;
+  for (auto const& [at, value] : sum) entries_.push_back({at[0], at[1], at[2], value});
+}
+
+void WheelContact::find_groups() {
+  const int m = harmonics_.block_size();
+  for (size_t p = 0; p < pairs_.size(); ++p) {
+    if (groups_.empty() || (groups_.back().rows + pairs_[p].components) * m > most_together)
+      groups_.push_back({p, p, pairs_[p].first_row, 0});
+    ++groups_.back().end_pair;
+    groups_.back().rows += pairs_[p].components;
+  }
+}
+
+int WheelContact::largest_group() const {
+  int rows = 0;
+  for (Group const& group : groups_) rows = std::max(rows, group.rows);
+  return rows * harmonics_.block_size();
+}
+
+void WheelContact::take(std::vector<PairTangents> const& contacts) {
+  const int size = comm_size(comm_), rank = comm_rank(comm_);
+  std::vector<std::vector<double>> out(size);
+  for (size_t g = 0; g < contacts.size(); ++g) {
+    const size_t ld = size_t(contacts[g].components) * harmonics_.block_size();
+    const int in_sector = int(first_pair_[g + 1] - first_pair_[g]);
+    for (int p = 0; p < contacts[g].pairs; ++p) {
+      const int sector = numbers_[g][p] / in_sector, pair = int(first_pair_[g]) + numbers_[g][p] % in_sector;
+      int owner = 0;
+      while (sectors_.first_sector(owner + 1) <= sector) ++owner;
+      out[owner].insert(out[owner].end(), {double(sector), double(pair)});
+      double const* D = &contacts[g].D[p * ld * ld];
+      out[owner].insert(out[owner].end(), D, D + ld * ld);
+    }
+  }
+  const auto in = exchanged(out, comm_);
+  D_.resize(own_sectors_ * pairs_.size());
+  for (size_t at = 0; at < in.size();) {
+    const int sector = int(in[at]) - sectors_.first_sector(rank), pair = int(in[at + 1]);
+    const size_t ld = size_t(pairs_[pair].components) * harmonics_.block_size();
+    auto const from = in.begin() + at + 2;
+    D_[sector * pairs_.size() + pair].assign(from, from + ld * ld);
+    at += 2 + ld * ld;
+  }
+}
+
+void WheelContact::average(bool symmetric) {
+  std::ranges::fill(tangents_, 0);
+  for (size_t k = 0; k < D_.size(); ++k) {
+    Pair const& pair = pairs_[k % pairs_.size()];
+    const int d = pair.components;
+    const auto blocks = harmonic_tangents(harmonics_, d, D_[k].data(), false);
+    for (int i = 0; i < harmonics_.count(); ++i)
+      for (int r = 0; r < d; ++r)
+        for (int c = 0; c < d; ++c) {
+          const auto t = [&](int row, int col) {
+            Rotation const& block = blocks[(i * d + row) * d + col];
+            return harmonics_.orders()[i] == 0 ? complex(block.cc) : block.nearest();
+          };
+          tangents_[pair.first_tangent + (size_t(i) * d + r) * d + c] +=
+              (symmetric ? (t(r, c) + t(c, r)) / 2.0 : t(r, c)) / double(sectors_.sectors());
+        }
+  }
+  sum_over_ranks(tangents_, comm_);
+}
+
+/// dD of a group's pairs.
+std::vector<double> WheelContact::rest(int sector, Group const& group) const {
+  const size_t m = harmonics_.block_size(), size = group.rows * m;
+  std::vector<double> dD(size * size, 0.0);
+  for (size_t p = group.first_pair; p < group.end_pair; ++p) {
+    const int d = pairs_[p].components;
+    const size_t ld = d * m, at = (pairs_[p].first_row - group.first_row) * m;
+    auto D = D_[sector * pairs_.size() + p];
+    for (int i = 0; i < harmonics_.count(); ++i)
+      for (int r = 0; r < d; ++r)
+        for (int c = 0; c < d; ++c) {
+          double* block = &D[(r * m + harmonics_.offset(i)) * ld + c * m + harmonics_.offset(i)];
+          const Rotation t = Rotation::of(tangent(pairs_[p], i, r, c));
+          block[0] -= t.cc;
+          if (harmonics_.orders()[i]) block[1] -= t.cs, block[ld] -= t.sc, block[ld + 1] -= t.ss;
+        }
+    for (size_t r = 0; r < ld; ++r) std::copy_n(&D[r * ld], ld, &dD[(at + r) * size + at]);
+  }
+  return dD;
+}
+
+/// T += G dD
+void WheelContact::add_compliance(std::vector<complex> const& G, Group const& group,
+                                  std::vector<double> const& dD, std::vector<double>& T) const {
+  const size_t m = harmonics_.block_size(), size = group.rows * m;
+  for (size_t p = group.first_pair; p < group.end_pair; ++p) {
+    const size_t first = pairs_[p].first_row - group.first_row, at = first * m, ld = pairs_[p].components * m;
+    for (int r = 0; r < group.rows; ++r)
+      for (int i = 0; i < harmonics_.count(); ++i)
+        for (int k = 0; k < pairs_[p].components; ++k) {
+          const complex g = G[(size_t(i) * rows_ + group.first_row + r) * rows_ + pairs_[p].first_row + k];
+          double const* cosine = &dD[((first + k) * m + harmonics_.offset(i)) * size + at];
+          double* out = &T[(r * m + harmonics_.offset(i)) * size + at];
+          const bool mean = harmonics_.orders()[i] == 0;
+          for (size_t c = 0; c < ld; ++c) out[c] += g.real() * cosine[c];
+          for (size_t c = 0; c < ld && !mean; ++c) {
+            out[c] += g.imag() * cosine[size + c];
+            out[size + c] += g.real() * cosine[size + c] - g.imag() * cosine[c];
+          }
+        }
+  }
+}
+
+void WheelContact::eliminate(std::vector<complex> const& G) {
+  E_.clear();
+  for (int j = 0; j < own_sectors_; ++j)
+    for (Group const& group : groups_) {
+      const int size = group.rows * harmonics_.block_size();
+      auto E = rest(j, group);
+      std::vector<double> T(E.size(), 0.0);
+      for (int k = 0; k < size; ++k) T[size_t(k) * size + k] = 1;
+      add_compliance(G, group, E, T);
+      std::vector<int> pivots(size);
+      int info;
+      // column-major sight of row-major E T = dD is T^T E^T = dD^T
+      dgesv_(&size, &size, T.data(), &size, pivots.data(), E.data(), &size, &info);
+      if (info != 0) std::ranges::fill(E, 0.0);  // the waves' blocks alone serve this sector
+      E_.push_back(std::move(E));
+    }
+}
+
+std::vector<complex> WheelContact::apply(std::vector<complex> const& u) const {
+  const int m = harmonics_.block_size(), step = 1;
+  const double one = 1, zero = 0;
+  std::vector<complex> f(u.size());
+  std::vector<double> in, out;
+  for (size_t k = 0; k < E_.size(); ++k) {
+    Group const& group = groups_[k % groups_.size()];
+    const int size = group.rows * m;
+    in.assign(size, 0.0), out.resize(size);
+    const auto at = [&](int r, int i) {
+      return ((k / groups_.size()) * harmonics_.count() + i) * rows_ + group.first_row + r;
+    };
+    for (int r = 0; r < group.rows; ++r)
+      for (int i = 0; i < harmonics_.count(); ++i) {
+        double* q = &in[r * m + harmonics_.offset(i)];
+        q[0] = u[at(r, i)].real();
+        if (harmonics_.orders()[i]) q[1] = -u[at(r, i)].imag();
+      }
+    dgemv_("T", &size, &size, &one, E_[k].data(), &size, in.data(), &step, &zero, out.data(), &step);
+    for (int r = 0; r < group.rows; ++r)
+      for (int i = 0; i < harmonics_.count(); ++i) {
+        double const* q = &out[r * m + harmonics_.offset(i)];
+        f[at(r, i)] = {q[0], harmonics_.orders()[i] ? -q[1] : 0.0};
+      }
+  }
+  return f;
+}
+
+}  // namespace fretwave::wheel
