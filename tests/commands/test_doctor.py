@@ -31,7 +31,10 @@ MAPS = """\
         (doctor.check_slepc((3, 18, 2), (3, 18, 5)), doctor.check_slepc((3, 17, 2), (3, 18, 5))),
         (doctor.check_mumps(""), doctor.check_mumps("PETSc error 92")),
         (doctor.check_one_mpi(["libmpi.so.40"], "Open MPI"), doctor.check_one_mpi(["a", "b"], "Open MPI")),
-        (doctor.check_h5py("3.7.0", "1.10.8", True), doctor.check_h5py("3.16.0", "2.0.0", False)),
+        (
+            doctor.check_h5py("3.7.0", True, ["/usr/lib/x86_64-linux-gnu/libhdf5_openmpi.so.103.3.0"]),
+            doctor.check_h5py("3.16.0", False, ["site-packages/h5py.libs/libhdf5-9e18f0c6.so.320.0.0"]),
+        ),
         (doctor.check_numpy("1.24.2", {}), doctor.check_numpy("2.1.0", {"h5py": "numpy.dtype size changed"})),
         (doctor.check_extension("", ["libfftw3.so.3"]), doctor.check_extension("No module", [])),
         (doctor.check_launch("2\n"), doctor.check_launch("1\n1\n")),

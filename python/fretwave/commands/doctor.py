@@ -102,12 +102,14 @@ def check_numpy(version: str, broken: Mapping[str, str]) -> Check:
     return Check("numpy", not broken, found, "a numpy that petsc4py and h5py were built for (1.x on Debian 12)", fix)
 
 
-def check_h5py(version: str, hdf5: str, parallel: bool) -> Check:
-    """HDF5 2.0 (in pip's h5py 3.16), beside PETSc's own, crashes the process when the disk is full."""
-    found = f"{version} with HDF5 {hdf5}, {'parallel' if parallel else 'serial'} (rank 0 alone writes: both serve)"
+def check_h5py(version: str, parallel: bool, libraries: Sequence[str]) -> Check:
+    """`libraries`: HDF5 in this process. A wheel of h5py brings its own, which crashes at writes beside PETSc's."""
+    own = [path for path in libraries if "h5py.libs" in path]
+    found = f"{version}, {'parallel' if parallel else 'serial'} (rank 0 alone writes: both serve){''.join(own)}"
     fix = "pip uninstall h5py in the environment, so that Debian's python3-h5py-mpi shows through"
-    sound = int(hdf5.split(".")[0]) < 2
-    return Check("h5py", sound, found, "one with HDF5 1: with 2.0 a full disk crashes the process", fix)
+    return Check(
+        "h5py", not own, found, "one of the system's HDF5: pip's own, beside PETSc's, crashes the process", fix
+    )
 
 
 def check_extension(error: str, fftw: Sequence[str]) -> Check:
@@ -275,7 +277,7 @@ def find_mpi() -> list[Check]:
 def find_h5py() -> list[Check]:
     import h5py
 
-    return [check_h5py(h5py.version.version, h5py.version.hdf5_version, bool(h5py.get_config().mpi))]
+    return [check_h5py(h5py.version.version, bool(h5py.get_config().mpi), mapped_libraries(r"libhdf5[^/]*\.so"))]
 
 
 def find_core() -> list[Check]:

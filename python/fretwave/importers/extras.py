@@ -8,7 +8,7 @@ from types import ModuleType
 from ..errors import InputError
 
 #: How pip gets them into an environment whose h5py is the system's: what pyyeti asks for beside pandas is not needed
-#: here, and an h5py of pip's with an HDF5 of its own beside PETSc's crashes on a full disk.
+#: here, and an h5py of pip's, with an HDF5 of its own beside PETSc's, crashes.
 INSTALLED_BY = {
     "ansys-mapdl-reader": "pip install ansys-mapdl-reader",
     "mapdl-archive": "pip install mapdl-archive",
