@@ -1,11 +1,14 @@
 #include <slepcsys.h>
 
+#include <algorithm>
 #include <cstdlib>
+#include <tuple>
 
 #include "casters.h"
 #include "error.h"
 #include "fault.h"
 #include "precondition/kinds.h"
+#include "tuned.h"
 #include "wheel/wheel_pc.h"
 
 namespace fretwave::python {
@@ -62,6 +65,16 @@ NB_MODULE(_core, m) {
   m.def(
       "fault_point", [](std::string const& place) { fault::point(place.c_str()); },
       "A place in Python at which a fault may be armed.");
+  m.def(
+      "tuned_constants",
+      [] {
+        std::vector<std::tuple<std::string, double, std::string>> out;
+        for (auto const* one : Tuned::all())
+          out.emplace_back("fw_" + one->name(), one->value(), one->meaning());
+        std::ranges::sort(out);
+        return out;
+      },
+      "Option, value without it and meaning of each tuned constant of the core.");
   m.def("unused_options", unused_options, "PETSc options that were set and that nothing has read.");
   bind_contact(m);
   bind_model(m);

@@ -6,15 +6,18 @@
 #include "log.h"
 #include "solve/memory.h"
 #include "solve/vectors.h"
+#include "tuned.h"
 
 namespace fretwave::hb {
 
 namespace {
 
-constexpr double tolerance = 1e-3;    // of the linear systems: errors move by 1 % at most
-constexpr double memory_share = 0.5;  // of what is free, for the factors of J'
-constexpr double negligible = 1e-6;   // share of the residual, up to which a source is not solved for
-constexpr double reach = 0.3;  // arclength along the branch, in the unit of a step: the default longest one
+const Tuned tolerance("error_tolerance", 1e-3,
+                      "relative residual of the linear systems: errors move by 1 % at most");
+const Tuned memory_share("error_memory_share", 0.5, "share of the free memory that the factors may take");
+const Tuned negligible("error_negligible", 1e-6,
+                       "share of the residual, up to which a source is not solved for");
+const Tuned reach("error_reach", 0.3, "arclength by which the branch is followed to the same parameter");
 
 /// Whether it is so for the contacts of all ranks.
 template <class Predicate>
@@ -91,8 +94,8 @@ namespace {
 
 /// Scalars of dy' + s t without a change of the last of `count`, the parameter.
 std::vector<double> at_parameter(std::vector<double> change, std::vector<double> const& tangent, int count) {
-  const double s = -change[count - 1] / tangent[count - 1];
-  for (size_t j = 0; j < change.size(); ++j) change[j] += std::clamp(s, -reach, reach) * tangent[j];
+  const double farthest = reach, s = std::clamp(-change[count - 1] / tangent[count - 1], -farthest, farthest);
+  for (size_t j = 0; j < change.size(); ++j) change[j] += s * tangent[j];
   return change;
 }
 

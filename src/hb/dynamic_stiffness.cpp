@@ -5,12 +5,14 @@
 
 #include "lapack.h"
 #include "log.h"
+#include "tuned.h"
 
 namespace fretwave::hb {
 
 namespace {
 
-constexpr double dense_share = 0.25;  // of nonzero entries from which a dense product is the faster one
+const Tuned dense_share("stiffness_dense_share", 0.25,
+                        "share of nonzero entries from which a dense product is the faster one");
 
 bool is_dense(Mat A) {
   MatInfo info;

@@ -8,12 +8,13 @@
 #include "lapack.h"
 #include "log.h"
 #include "together.h"
+#include "tuned.h"
 
 namespace fretwave::precondition {
 
 namespace {
 
-constexpr int cheap = 600;  // rows, up to which their inverse costs less than a few iterations
+const Tuned cheap("basis_cheap", 600, "rows up to which the mean stiffness follows at every step");
 
 /// The range of harmonics of a rank: as many coefficients for each.
 std::pair<int, int> range_of(Harmonics const& h, int rank, int size) {

@@ -7,13 +7,16 @@
 #include "fault.h"
 #include "lapack.h"
 #include "together.h"
+#include "tuned.h"
 
 namespace fretwave::precondition {
 
 namespace {
 
-constexpr double shift = 1e-3;  // of the fundamental's exponent, away from the eigenvalue
-constexpr double far = 1e-2;    // change of the exponents that makes the sparse factors stale, relative
+const Tuned shift("condensed_shift", 1e-3,
+                  "relative shift of the fundamental's exponent from the eigenvalue");
+const Tuned far("condensed_far", 1e-2,
+                "relative change of the exponents that makes the sparse factors stale");
 
 }  // namespace
 

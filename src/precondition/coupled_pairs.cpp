@@ -1,14 +1,15 @@
 #include "precondition/coupled_pairs.h"
 
 #include "log.h"
+#include "tuned.h"
 
 namespace fretwave::precondition {
 
 namespace {
 
-constexpr double tolerance =
-    1e-3;                  // near a soft motion the blocks enlarge what is left: 3e-2 took twice as many
-constexpr int most = 400;  // iterations, none forgotten: they creep until modes enough are found
+// Near a soft motion the blocks enlarge what is left: 3e-2 took twice as many iterations outside.
+const Tuned tolerance("pairs_tolerance", 1e-3, "relative residual of the pairs' coupling");
+const Tuned most("pairs_most", 400, "iterations on the pairs' coupling, of which none is forgotten");
 
 }  // namespace
 

@@ -6,6 +6,7 @@
 #include "precondition/basis_pc.h"
 #include "precondition/condensed_pc.h"
 #include "precondition/harmonic_pc.h"
+#include "tuned.h"
 
 namespace fretwave::precondition {
 
@@ -13,8 +14,10 @@ namespace {
 
 /// Dense blocks are for reduced models. They are inverted in single precision, which the element stiffness of
 /// a fine mesh, 1e8 times that of its first mode, outdoes; and 3000 dofs take 144 MB a harmonic.
+const Tuned always("blocks_always", 200, "dofs up to which blocks are dense");
+const Tuned largest("blocks_largest", 3000, "dofs up to which blocks of dense models are dense");
+const Tuned share("blocks_share", 0.25, "share of nonzero entries from which a model is dense");
 bool suits_dense(HarmonicProblem const& problem) {
-  constexpr double always = 200, largest = 3000, share = 0.25;  // dofs, dofs, of nonzero entries
   model::Model const& model = problem.model();
   const double n = double(model.dofs());
   return n <= always || (n <= largest && model.largest_term() > share * n * n);

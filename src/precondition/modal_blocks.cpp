@@ -7,14 +7,16 @@
 #include "fault.h"
 #include "lapack.h"
 #include "log.h"
+#include "tuned.h"
 
 namespace fretwave::precondition {
 
 namespace {
 
-constexpr double follows = 0.05;  // inertia of a mode over its stiffness, up to which it moves statically
-constexpr double resonant = 0.3;  // the same, from which a mode beyond the limit is taken at rest
-constexpr int fewest = 8, most = 128;  // lower modes
+const Tuned follows("modes_follows", 0.05, "inertia over stiffness up to which a mode moves statically");
+const Tuned resonant("modes_resonant", 0.3, "inertia over stiffness from which a mode beyond the most is taken at rest");
+const Tuned fewest("modes_fewest", 8, "modes that move with inertia, at the least");
+const Tuned most("modes_most", 128, "modes that move with inertia, at the most");
 
 using lapack::Dense;
 using lapack::multiply;
@@ -36,15 +38,17 @@ ModalBlocks::ModalBlocks(model::StuckBasis const& basis, Harmonics const& h, int
 
 void ModalBlocks::set_structure(std::vector<std::vector<complex>> z, double at_rest, ModalBorder border) {
   z_ = std::move(z), at_rest_ = at_rest, border_ = std::move(border);
-  low_ = std::min(fewest, modes_);
+  const double nearly_static = follows, far_from_resonance = resonant;
+  low_ = std::min(int(fewest), modes_);
   for (auto const& of_modes : z_)
     for (int j = low_; j < modes_; ++j)
-      if (std::abs(of_modes[j] / at_rest - 1.0) > follows) low_ = j + 1;
-  low_ = std::min(low_, most);
+      if (std::abs(of_modes[j] / at_rest - 1.0) > nearly_static) low_ = j + 1;
+  low_ = std::min(low_, int(most));
   flexible_ = z_;
   for (auto& of_modes : flexible_)
     for (int j = low_; j < modes_; ++j)
-      of_modes[j] = 1.0 / (std::abs(of_modes[j] / at_rest - 1.0) < resonant ? of_modes[j] : complex(at_rest));
+      of_modes[j] =
+          1.0 / (std::abs(of_modes[j] / at_rest - 1.0) < far_from_resonance ? of_modes[j] : complex(at_rest));
 }
 
 /// G of all rows of B.

@@ -3,27 +3,34 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tuned.h"
+
 namespace fretwave::solve {
 
 namespace {
 
-// A turn that is left in so short a step is a kink (a sample changes state), not curvature.
-constexpr double kink_length = 1e-4;
-constexpr double nearer = 0.5;        // distance of the cubic's guess over the tangent's, for it to be taken
-constexpr int crawl = 300;            // steps below the smallest in a row, over pieces that thin
-constexpr double often = 0.3;         // of a step: a shorter one has failed twice
-constexpr double sparse = 1.0 / 32;   // of a step: corners farther than that apart are walked to one by one
-constexpr double before_end = 0.999;  // of the way to the end of a piece
-constexpr double kink_angle = 0.02;   // [rad] in so short a step
-constexpr double seen_angle = 0.05;   // [rad] in a longer one: it may hide a corner
-constexpr double unturned = 0.01;     // of a step: the way aside that its ends' tangents need not tell of
-constexpr int easy = 5;               // iterations: after more the corrector may have come to another branch
-constexpr int walk = 8;               // steps to a place where the branch seems to have been
-constexpr int certain = 3;            // meetings with earlier points of the branch in a row
-constexpr double grid = 16;           // lengths of steps in every factor of two
-constexpr double at_the_end = 1e-9;   // relative: a branch that starts here starts at the end of its range
-constexpr double leash = 1.0 / 3;     // of the range, by which a branch may leave it where it began
-constexpr double farthest = 4;        // times its end, or its end over it, at the most
+const Tuned kink_length("branch_kink_length", 1e-4,
+                        "step in which a turn is a kink (a sample changes state), not curvature");
+const Tuned nearer("branch_nearer", 0.5,
+                   "distance of the cubic's guess over the tangent's, for it to be taken");
+const Tuned crawl("branch_crawl", 300, "steps below the smallest in a row, over pieces that thin");
+const Tuned often("branch_often", 0.3, "share of a step: a shorter one has failed twice");
+const Tuned sparse("branch_sparse", 1.0 / 32,
+                   "share of a step: corners farther apart are walked to one by one");
+const Tuned before_end("branch_before_end", 0.999, "share of the way to the end of a piece");
+const Tuned kink_angle("branch_kink_angle", 0.02, "turn [rad] that is a kink in so short a step");
+const Tuned seen_angle("branch_seen_angle", 0.05, "turn [rad] that may hide a corner in a longer step");
+const Tuned unturned("branch_unturned", 0.01,
+                     "share of a step: the way aside that the tangents need not tell of");
+const Tuned easy("branch_easy", 5, "Newton iterations; after more the corrector may be on another branch");
+const Tuned walk("branch_walk", 8, "steps to a place where the branch seems to have been");
+const Tuned certain("branch_certain", 3, "meetings with earlier points of the branch in a row");
+const Tuned grid("branch_grid", 16, "lengths of steps in every factor of two");
+const Tuned at_the_end("branch_at_the_end", 1e-9,
+                       "relative distance at which a branch starts at the end of its range");
+const Tuned leash("branch_leash", 1.0 / 3,
+                  "share of the range by which a branch may leave it where it began");
+const Tuned farthest("branch_farthest", 4, "factor by which it may leave the range there at most");
 
 /// On a coarse grid: what a solution's last digits (of which no two numbers of ranks have the same) do to a
 /// length would be handed on from step to step and grow with the steps.
@@ -237,7 +244,7 @@ std::optional<Continuation::Trial> Continuation::turn_next_corner(double& length
     length = before_end * *end;
     return {};
   }
-  return turned(turn_corner(*end, std::min(length, kink_length)), length);
+  return turned(turn_corner(*end, std::min<double>(length, kink_length)), length);
 }
 
 std::optional<Continuation::Trial> Continuation::turned(std::optional<Trial> behind, double& length) {
@@ -269,7 +276,7 @@ bool Continuation::foretold(Vec y, double length) {
 /// A trial at `length` from the anchor, or why there is none. Where corners lie about, pieces are walked one
 /// by one; else a corner is looked for where no shorter step leads on.
 std::optional<Continuation::Trial> Continuation::attempt(double& length, bool wary, Failure& failure) {
-  const bool may_shorten = length > std::max(kink_length, 16 * steps_.minimum);
+  const bool may_shorten = length > std::max<double>(kink_length, 16 * steps_.minimum);
   turned_ = false;
   if (wary)
     if (auto behind = turn_next_corner(length)) return behind;

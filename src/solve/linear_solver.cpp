@@ -6,6 +6,7 @@
 #include "log.h"
 #include "solve/direct.h"
 #include "solve/memory.h"
+#include "tuned.h"
 
 namespace fretwave::solve {
 
@@ -14,12 +15,14 @@ namespace {
 // Unknowns above which the Krylov route is the quicker one where the problem has a preconditioner: on reduced
 // blades of 30 to 155 dofs it took half the time of a direct Newton step at 213 unknowns, a third at 708, a
 // twelfth at 2328.
-constexpr PetscInt krylov_limit = 300;
+const Tuned krylov_limit("linear_krylov_limit", 300, "unknowns above which the Krylov route is taken");
 constexpr double tangent_tolerance = 1e-10;  // relative; of the tangent's direction
-constexpr double memory_share = 0.7;         // of what is free, for a fallback to take
-constexpr int longest_stay = 256;            // points between two tries at the foot of the ladder
-constexpr double tangent_accepted = 1e-6;    // where rounding lets GMRES go no further
-constexpr double renewal = 1.0 / 16;  // of the iterations, spent on building anew whether it is needed or not
+const Tuned memory_share("linear_memory_share", 0.7, "share of the free memory that a fallback may take");
+const Tuned longest_stay("linear_longest_stay", 256, "points between two tries at the foot of the ladder");
+const Tuned tangent_accepted("linear_tangent_accepted", 1e-6,
+                             "residual of a tangent, relative, where rounding lets GMRES go no further");
+const Tuned renewal("linear_renewal", 1.0 / 16,
+                    "share of all iterations that is spent on building preconditioners anew");
 
 /// What the option says: one of two, or auto.
 std::string choice(std::string const& prefix, char const* option, char const* meaning, std::string const& one,
@@ -281,7 +284,7 @@ bool LinearSolver::fits(double bytes, std::string const& what) {
 void LinearSolver::descend() {
   if (!rung_ || ++solved_ < stay_) return;
   rung_ = 0, solved_ = 0, stale_ = true;
-  stay_ = std::min(longest_stay, 2 * stay_);
+  stay_ = std::min(int(longest_stay), 2 * stay_);
   fallback_.reset();
 }
 

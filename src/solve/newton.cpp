@@ -3,20 +3,28 @@
 #include <algorithm>
 #include <cmath>
 
+#include "tuned.h"
+
 namespace fretwave::solve {
 
 namespace {
 
-constexpr double smallest_step = 1e-13;  // of a Newton step, relative to the unknowns: rounding
-constexpr double stagnant_step = 1e-8;   // the same, of a step that the residual does not follow any more
-constexpr double near = 100;             // times the expected rounding of the residual
-constexpr double unstepped = 1e-3;       // times the tolerance, for a guess to pass without a step
-constexpr double small_effect = 1e-8;    // on what is read (Problem::effect) of what a step leaves
-constexpr double largest_effect = 1e-6;  // the same, where rounding lets the residual fall no further
-constexpr double far = 1e5;              // length of a step over the residual, where J is nearly singular
-constexpr int patience = 10;             // iterations after which a residual below the tolerance is enough
-constexpr double creeping = 0.6;         // of the residual left by as many iterations as are remembered
-constexpr int rescalings = 4;            // of the rows, as the motion that is solved for becomes known
+const Tuned smallest_step("newton_smallest_step", 1e-13,
+                          "Newton step that is rounding, relative to the unknowns");
+const Tuned stagnant_step("newton_stagnant_step", 1e-8,
+                          "Newton step that the residual does not follow any more, relative to the unknowns");
+const Tuned near("newton_near", 100, "residual next to its rounding, in multiples of that");
+const Tuned unstepped("newton_unstepped", 1e-3, "residual over the tolerance at which a guess needs no step");
+const Tuned small_effect("newton_small_effect", 1e-8,
+                         "relative change of frequency and damping that a step may leave");
+const Tuned largest_effect("newton_largest_effect", 1e-6,
+                           "the change it may leave where rounding lets the residual fall no further");
+const Tuned far("newton_far", 1e5, "step over residual from which the Jacobian is nearly singular");
+const Tuned patience("newton_patience", 10,
+                     "iterations after which a residual below the tolerance is enough");
+const Tuned creeping("newton_creeping", 0.6,
+                     "share of the residual that four iterations leave when they creep");
+const Tuned rescalings("newton_rescalings", 4, "rescalings of the rows as the motion becomes known");
 
 }  // namespace
 

@@ -9,15 +9,17 @@
 #include "error.h"
 #include "precondition/kinds.h"
 #include "together.h"
+#include "tuned.h"
 
 namespace fretwave::wheel {
 
 namespace {
 
-constexpr double beside = 1e-3;  // shift of the fundamental's exponent from where its block is singular
-constexpr double far = 1e-2;     // change of the exponents that makes the blocks stale, relative
-constexpr double pure = 0.999;   // share of the largest wave in a travelling one
-constexpr double faint = 1e-6;   // share of a wave in the motion that counts as none
+const Tuned beside("wheel_beside", 1e-3,
+                   "relative shift of the fundamental's exponent from where its block is singular");
+const Tuned far("wheel_far", 1e-2, "relative change of the exponents that makes the blocks stale");
+const Tuned pure("wheel_pure", 0.999, "share of the largest wave in a travelling one");
+const Tuned faint("wheel_faint", 1e-6, "share of a wave in the motion that counts as none");
 
 }  // namespace
 
@@ -209,7 +211,8 @@ std::vector<double> WheelPreconditioner::spectrum(Vec y) const {
   MPI_Allreduce(MPI_IN_PLACE, shares.data(), sectors_, MPI_DOUBLE, MPI_SUM, problem_.comm());
   double sum = 0, left = 0;
   for (double s : shares) sum += s;
-  for (double& s : shares) left += s = sum == 0 ? 1.0 / sectors_ : s > faint * sum ? s : 0;
+  const double none = faint * sum;
+  for (double& s : shares) left += s = sum == 0 ? 1.0 / sectors_ : s > none ? s : 0;
   for (double& s : shares) s /= left;
   return shares;
 }

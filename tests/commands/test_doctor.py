@@ -107,7 +107,7 @@ def test_exit_code_counts_only_what_is_needed(monkeypatch: pytest.MonkeyPatch) -
 def test_arguments_are_refused() -> None:
     lines: list[str] = []
     assert doctor.main(["--verbose"], lines.append) == 2
-    assert lines == ["error: `fretwave doctor` takes no arguments\nfix: fretwave doctor"]
+    assert lines == ["error: `fretwave doctor` takes --constants alone\nfix: fretwave doctor"]
 
 
 def test_help_says_what_it_does() -> None:

@@ -21,10 +21,10 @@ OLDEST_PETSC = (3, 18)
 #: Reference BLAS gives 2.4 GFlop/s on one core of 2020s hardware, an optimised one more than 20.
 SLOW_BLAS = 5.0
 SET_UP_AGAIN = "rm -rf .venv && .ci/setup"
-HELP = """usage: fretwave doctor [-h]
+HELP = """usage: fretwave doctor [-h] [--constants]
 
 Says what is installed (Python, PETSc, SLEPc, MUMPS, MPI, HDF5, BLAS, the core), whether it fits together,
-and of each PROBLEM what to do about it. Takes no arguments.
+and of each PROBLEM what to do about it. --constants: tuned constants of the core, which --petsc takes in their place.
 
 exit codes: 0 fretwave can run, 1 it cannot"""
 
@@ -326,13 +326,25 @@ def check_runtime(scalar: object = None) -> None:
         raise InputError(what, where="petsc4py", measured=check.found, expected=check.expected, fix=check.fix)
 
 
+def tuned_constants() -> str:
+    """A line each: option of PETSc, value without it, meaning."""
+    from fretwave import _core
+
+    rows = [(f"-{option}", f"{value:g}", meaning) for option, value, meaning in _core.tuned_constants()]
+    widths = [max(map(len, column)) for column in zip(*rows)]
+    return "\n".join(f"{a:<{widths[0]}}  {b:>{widths[1]}}  {c}" for a, b, c in rows)
+
+
 def main(argv: Sequence[str] | None = None, write: Callable[[str], object] = print) -> int:
     """Print the report; 0 when fretwave can run, 1 otherwise."""
     if argv and argv[0] in ("-h", "--help"):
         write(HELP)
         return 0
+    if argv == ["--constants"]:
+        write(tuned_constants())
+        return 0
     if argv:
-        write("error: `fretwave doctor` takes no arguments\nfix: fretwave doctor")
+        write("error: `fretwave doctor` takes --constants alone\nfix: fretwave doctor")
         return 2
     problems = 0
     for check in examine():

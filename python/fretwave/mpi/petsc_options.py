@@ -21,6 +21,8 @@ COMMON = (
 
 #: Options of PETSc itself, which it reads at its end: the same for all analyses.
 WHOLE = ("log_view", "log_view_memory")
+#: What tuned constants of the core begin with: no analysis' own (`fretwave doctor --constants`).
+TUNED = "fw_"
 
 #: What a complaint of PETSc says of the value it wants.
 WANTED = (
@@ -47,7 +49,10 @@ def complaint(name: str, value: str | None) -> str | None:
     """What was expected of an option's value; None when it may be right."""
     if name.endswith("_type") and value is None:
         return "the name of a type"
-    for ending, right, expected in RULES:
+    rules = (
+        ((name, lambda value: 0 < value < math.inf, "a finite number above 0"),) if name.startswith(TUNED) else RULES
+    )
+    for ending, right, expected in rules:
         if name.endswith(ending):
             try:
                 return None if value is not None and right(float(value)) else expected
@@ -101,7 +106,7 @@ class AnalysisOptions:
         self.pairs = {}
         for text in texts:
             for name, value in parse(text):
-                own = name if name in WHOLE or name.startswith(prefix) else prefix + name
+                own = name if name in WHOLE or name.startswith((prefix, TUNED)) else prefix + name
                 self.pairs[own] = value
 
     @contextmanager

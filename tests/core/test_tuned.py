@@ -1,0 +1,55 @@
+"""Tuned constants: each an option of PETSc with its meaning, refused where it is no number above zero."""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+
+import numpy as np
+import pytest
+from petsc4py import PETSc
+
+import fretwave as fw
+from fretwave import _core
+from fretwave.commands import doctor
+
+
+@contextmanager
+def option(name, value):
+    PETSc.Options()[name] = value
+    try:
+        yield
+    finally:
+        PETSc.Options().delValue(name)
+
+
+def newton(comm):
+    model = fw.Model(np.eye(2), np.array([[2.0, -1.0], [-1.0, 2.0]]), comm=comm)
+    problem = fw.NonlinearMode(model, fw.Harmonics([1, 3], 16), "CNM", 0)
+    return _core.Newton(problem.core, "tuned_")
+
+
+def test_each_has_a_value_and_a_meaning_of_its_own():
+    options, values, meanings = zip(*_core.tuned_constants())
+    assert len(options) > 40 and len(set(options)) == len(options) and min(values) > 0
+    assert len(set(meanings)) > len(meanings) - 3 and all(len(meaning) > 15 for meaning in meanings)
+
+
+def test_an_option_takes_its_place(comm):
+    assert newton(comm).route == "direct (11 unknowns)"
+    with option("fw_linear_krylov_limit", 5):
+        assert newton(comm).route.startswith("krylov (11 unknowns)")
+
+
+@pytest.mark.parametrize("value", [0, -1, "inf"])
+def test_no_number_above_zero_is_refused(comm, value):
+    with option("fw_linear_krylov_limit", value), pytest.raises(fw.InputError, match="fw_linear_krylov_limit"):
+        newton(comm)
+
+
+@pytest.mark.ranks(1)
+def test_doctor_lists_them():
+    said: list[str] = []
+    assert doctor.main(["--constants"], said.append) == 0
+    lines = "\n".join(said).splitlines()
+    assert len(lines) == len(_core.tuned_constants())
+    assert any(line.split()[:2] == ["-fw_linear_krylov_limit", "300"] for line in lines)
