@@ -136,7 +136,7 @@ class Continuation {
   double zero_on(Hermite const&, size_t which, Place a, Place b);
   double foretold_zero(Hermite const&, size_t which, Bracket const&);
   double beyond(Hermite const& known, size_t which, Place before, Place last, double apart);
-  Hermite with(Hermite const&, Vec y, Vec tangent) const;
+  Hermite with(Hermite const&, double at, Vec y, Vec tangent) const;
   void reach(double value, std::string const& event, Place a, Place b, Hermite const&, double length);
   void polish(Trial&, double target);
   std::optional<Trial> reach_along(double target, Place a, Place b, Hermite const&);

@@ -65,20 +65,26 @@ std::optional<Continuation::Trial> Continuation::root(size_t which, Place a, Pla
   const double precision = 1e-9 * length, size = std::max(std::abs(a.value), std::abs(b.value));
   const int trials = test.extremum ? 8 : 12;
   std::vector<std::pair<double, Trial>> tried;
-  Hermite known = anchor_.smooth ? with(curve, before_.y, before_.tangent) : curve, through = known;
+  const double last_length = anchor_.smooth ? row_value_ - dot(row_, before_.y) : 0;
+  const bool far_enough = last_length > length / 8;  // what Newton left there counts (length / last length)^3
+  Hermite known = far_enough ? with(curve, -last_length, before_.y, before_.tangent) : curve, through = known;
   Bracket bracket(a, b);
   double best_value = INFINITY, at = foretold_zero(known, which, bracket);
   size_t best = 0;
   Place before = a;
   for (int k = 0; k < trials && bracket.width() > precision; ++k) {
     Trial trial = this->at(through.value(at));
-    if (!correct_inside(trial, at, length)) break;
+    if (!correct_inside(trial, at, length)) {
+      if (k > 0 || !far_enough) break;
+      trial = this->at(curve.value(at));
+      if (!correct_inside(trial, at, length)) break;
+    }
     const Place here{at, trial.tests[which].value};
     tried.emplace_back(at, std::move(trial));
     if (std::abs(here.value) <= best_value) best_value = std::abs(here.value), best = tried.size() - 1;
     if (best_value < (test.extremum ? 1e-9 * size : 1e-12)) break;
     bracket.narrow(here);
-    known = with(known, tried.back().second.y, tried.back().second.tangent);
+    known = with(known, here.at, tried.back().second.y, tried.back().second.tangent);
     through = k == 0 ? known : known.between(bracket.first(), bracket.last());
     at = k == 0       ? foretold_zero(known, which, bracket)
          : k < smooth ? beyond(known, which, before, here, near * length)
@@ -94,9 +100,9 @@ std::optional<Continuation::Trial> Continuation::root(size_t which, Place a, Pla
 }
 
 /// A curve through another point of the branch, too.
-Hermite Continuation::with(Hermite const& curve, Vec y, Vec tangent) const {
+Hermite Continuation::with(Hermite const& curve, double at, Vec y, Vec tangent) const {
   const double along = dot(row_, tangent);
-  return along > least_along ? curve.with({dot(row_, y) - row_value_, y, tangent, 1 / along}) : curve;
+  return along > least_along ? curve.with({at, y, tangent, 1 / along}) : curve;
 }
 
 /// Where a curve has its zero in the bracket, else the bracket's next guess.

@@ -1,4 +1,5 @@
 #pragma once
+#include <cmath>
 #include <utility>
 #include <vector>
 
@@ -20,8 +21,15 @@ class Hermite {
     Vec y, t;
     double scale;
   };
+  /// In place of another as good as at the same place: two would be one counted twice.
   Hermite with(Knot knot) const {
     Hermite out = *this;
+    const double same = 1e-9 * std::abs(knots_[1].at - knots_[0].at);
+    for (Knot& other : out.knots_)
+      if (std::abs(other.at - knot.at) <= same) {
+        other = knot;
+        return out;
+      }
     out.knots_.push_back(knot);
     return out;
   }

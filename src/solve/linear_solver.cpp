@@ -67,6 +67,11 @@ LinearSolver::LinearSolver(Bordered& bordered, std::string const& prefix, SNES s
   use_lu(ksp_of(snes_), J_);
 }
 
+/// Others may hold the SNES, and view it.
+LinearSolver::~LinearSolver() {
+  if (krylov_ && J_) (void)MatShellSetContext(J_, nullptr);
+}
+
 void LinearSolver::choose_route() {
   PetscInt unknowns;
   check(VecGetSize(point_, &unknowns));
@@ -104,7 +109,7 @@ void LinearSolver::use_krylov() {
 }
 
 void LinearSolver::take_options() {
-  if (krylov_) make_preconditioner();
+  make_preconditioner();
   make_tangent();
 }
 
@@ -114,8 +119,11 @@ void LinearSolver::make_preconditioner() {
   PCType type;
   check(KSPGetPC(ksp_of(snes_), &pc));
   check(PCGetType(pc, &type));
-  auto const* kind = kind_of(type);
+  auto const* kind = type ? kind_of(type) : nullptr;
   if (!kind) return;
+  if (!krylov_)
+    throw InputError("option pc_type: the direct route takes no " + kind->type, kind->type,
+                     "the Krylov route", "ask for it: -<analysis>_route krylov");
   if (kind == kind_.kind)
     note_ = kind_.note;
   else if (const auto why = kind->refuses(bordered_.problem()); !why.empty())
@@ -151,6 +159,7 @@ PetscErrorCode LinearSolver::shell_product(Mat J, Vec x, Vec y) {
 }
 
 PetscErrorCode LinearSolver::apply(Vec x, Vec z) {
+  if (!own_) return PETSC_ERR_ARG_WRONGSTATE;
   return guard_.run([&] { preconditioner().apply(x, z); });
 }
 
@@ -196,6 +205,7 @@ bool LinearSolver::set_up() {
   PCFailedReason reason;
   check(KSPGetPC(ksp_of(snes_), &pc));
   check(PCSetOperators(pc, J_, J_));
+  check(PCSetReusePreconditioner(pc, PETSC_FALSE));  // what is kept is said here, not by SNES' lag
   const PetscErrorCode code = PCSetUp(pc);
   guard_.rethrow();
   check(code);
@@ -204,6 +214,7 @@ bool LinearSolver::set_up() {
 }
 
 PetscErrorCode LinearSolver::set_up(PC pc) {
+  if (!own_) return PETSC_ERR_ARG_WRONGSTATE;  // inside a PC of PETSc's
   return guard_.run([&] {
     built_here_ = stale_;
     if (!stale_) follow();

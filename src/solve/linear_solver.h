@@ -30,6 +30,7 @@ class LinearSolver {
   /// Configures the KSP of the SNES, which must outlive this.
   LinearSolver(Bordered&, std::string const& prefix, SNES);
   LinearSolver(LinearSolver const&) = delete;
+  ~LinearSolver();
   /// After SNESSetFromOptions: what the options made of it is set up.
   void take_options();
   Mat jacobian() const { return J_; }

@@ -13,6 +13,7 @@ from tolerances import REPEATED
 
 import fretwave as fw
 from fretwave import _core
+from fretwave.errors import PetscError
 
 SECTORS, UNIT = 6, 2
 SLIDER = {"tangential_stiffness": 3.0, "friction_limit": 0.4}
@@ -128,6 +129,36 @@ def test_a_preconditioner_is_a_type_of_petscs(comm, kind, tmp_path):
     if comm.rank == 0 and kind != "none":
         said = newton.route.partition("), ")[2]
         assert said and said in (tmp_path / "pc.txt").read_text()
+
+
+def test_a_lag_of_newtons_does_not_keep_what_is_stale(comm):
+    """Before: PCSetUp did nothing under SNES' lag, and a fallback was applied that was never made."""
+    with asked(route="direct"):
+        expected, _ = solved(mode_of(wheel(comm)))
+    for lag in (2, -2):
+        with asked(route="krylov", snes_lag_preconditioner=lag):
+            assert np.allclose(solved(mode_of(wheel(comm)))[0], expected, rtol=0, atol=REPEATED)
+
+
+def test_a_solver_may_outlive_what_made_it(comm, tmp_path):
+    with asked(route="krylov"):
+        problem = mode_of(wheel(comm))
+        newton = newton_of(problem)
+    snes = newton.snes
+    del newton, problem
+    viewer = PETSc.Viewer().createASCII(str(tmp_path / "snes.txt"), comm=comm)
+    snes.view(viewer)
+    viewer.destroy()
+
+
+def test_our_types_stand_alone_on_the_krylov_route(comm):
+    with (
+        asked(route="direct", pc_type="fwblocks"),
+        pytest.raises(fw.InputError, match="the direct route takes no fwblocks"),
+    ):
+        newton_of(mode_of(wheel(comm)))
+    with asked(route="krylov", pc_type="composite", pc_composite_pcs="fwblocks,none"), pytest.raises(PetscError):
+        solved(mode_of(wheel(comm)))
 
 
 def test_a_type_that_is_not_for_the_problem_is_refused(comm):

@@ -126,6 +126,33 @@ def test_defaults_of_grid_points_are_refused(tmp_path: Path) -> None:
         read_node_file(deck(tmp_path, "GRDSET                                                          6"))
 
 
+@pytest.mark.parametrize(
+    "card, end, said",
+    [
+        ("GRID,5,,1.0,2.O,3.0", "ENDDATA", "2.O in GRID 5"),
+        ("GRID    5               1.0     2..0    3.0", "ENDDATA", "2..0 in GRID 5"),
+        ("GRID,5,,1.0", "", "ends behind 3 fields, no ENDDATA"),
+    ],
+)
+def test_a_damaged_grid_point_is_no_zero(tmp_path: Path, card: str, end: str, said: str) -> None:
+    (tmp_path / "model.bdf").write_text(f"BEGIN BULK\nGRID,1,,0.0,0.0,0.0\n{card}\n{end}\n")
+    with pytest.raises(InputError, match="(?s)(no number|is cut)") as refused:
+        read_node_file(tmp_path / "model.bdf")
+    assert said in str(refused.value.measured) and refused.value.fix
+
+
+def test_blank_fields_are_zero(tmp_path: Path) -> None:
+    """Quick Reference Guide: the defaults of GRID."""
+    (tmp_path / "model.bdf").write_text("BEGIN BULK\nGRID,1,,,2.0\nGRID,2,,1.0,,3.0\nENDDATA\n")
+    np.testing.assert_array_equal(read_node_file(tmp_path / "model.bdf").coordinates, [[0, 2, 0], [1, 0, 3]])
+
+
+def test_a_table_of_nodes_is_no_deck(tmp_path: Path) -> None:
+    (tmp_path / "nodes.csv").write_text("grid,x,y,z\n7,1.0,2.0,3.0\n")
+    nodes = read_node_file(tmp_path / "nodes.csv")
+    assert (nodes.numbers.tolist(), nodes.coordinates.tolist()) == ([7], [[1.0, 2.0, 3.0]])
+
+
 def test_matrices_and_deck_make_a_model(tmp_path: Path) -> None:
     """All dofs of the grid points, six each or three, in the order of their numbers."""
     held = Held()

@@ -34,7 +34,7 @@ class Mesh(Protocol):
 
     nnum: IntArray
     nodes: Array
-    node_angles: Array
+    node_angles: Array | None
     elem: Sequence[IntArray]
     etype: IntArray
     node_components: Mapping[str, IntArray]
@@ -65,8 +65,12 @@ def read_result(path: Path) -> Nodes:
 def _nodes(mesh: Mesh, where: str) -> Nodes:
     """Of the mesh that either package gives."""
     numbers, coordinates = mesh.nnum.astype(np.int64), np.array(mesh.nodes, dtype=float)
-    _check_angles(numbers, mesh.node_angles, where)
-    elements = Elements(blocks_of(mesh.elem, np.asarray(mesh.etype), where))
+    if not len(numbers):
+        raise InputError("the file has no nodes", where, "0", "a mesh", "write it with nodes: CDWRITE,DB")
+    if mesh.node_angles is not None:
+        _check_angles(numbers, mesh.node_angles, where)
+    types = np.asarray(mesh.etype) if len(mesh.elem) else np.zeros(0, dtype=np.int64)  # of none the package has none
+    elements = Elements(blocks_of(mesh.elem, types, where))
     elements.check_numbers(where)
     sets = {name.upper(): np.unique(members).astype(np.int64) for name, members in mesh.node_components.items()}
     return Nodes(numbers, coordinates, where, sets, elements)
@@ -100,7 +104,8 @@ def _add_material(materials: dict[str, Material], words: Sequence[str], place: s
     label, name, _, value = (*words[2:], *4 * [""])[:4]
     if label in QUANTITIES and value:
         material = materials.setdefault(name, Material(f"material {name}", place))
-        setattr(material, QUANTITIES[label], number(value))
+        if getattr(material, QUANTITIES[label]) is None:
+            setattr(material, QUANTITIES[label], number(value))
 
 
 def _hold(constraints: Constraints, node: str, label: str) -> None:

@@ -7,6 +7,7 @@ either byte order, single or double precision, full or sparse. Which rows are wh
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +23,8 @@ from .npz import choose
 #: What matrices are called: of the analysis set, of an external superelement (EXTSEOUT), of all grid points.
 USUAL = {"K": ("KAA", "KXX", "KGG"), "M": ("MAA", "MXX", "MGG"), "C": ("BAA", "BXX", "BGG")}
 #: Cards that make dofs depend on others.
-JOINS = r"(MPC|RBE[123]|RBAR1?|RROD|RTRPLT1?|RSSCON)[ *,]"
+JOINS = r"(MPC|RBE[123]|RBAR1?|RROD|RJOINT|RSPLINE|RTRPLT1?|RSSCON)[ *,]"
+GRID = r"GRID[ *,]"
 
 
 def read(path: Path, letter: str, variable: str | None = None) -> Entries:
@@ -51,10 +53,11 @@ def read_grid(path: Path) -> Nodes:
     Raises
     ------
     InputError
-        Displacements are in another coordinate system than the basic one.
+        Displacements are in another coordinate system than the basic one, or a coordinate is no number.
     """
     where = display(path)
     bulk = reader_of("pyyeti.nastran.bulk", "pyyeti", where)
+    _check_cards(bulk.rdcards(str(path), GRID, regex=True, return_var="list", no_data_return=[]), path)
     table = bulk.bulk2uset(str(path))[0]
     places = table[["x", "y", "z"]].to_numpy(dtype=float).reshape(-1, 6, 3)  # behind x, y, z: system, origin, turn
     numbers = table.index.get_level_values(0).to_numpy(dtype=np.int64)[::6]
@@ -66,3 +69,19 @@ def read_grid(path: Path) -> Nodes:
     cards = bulk.rdcards(str(path), JOINS, regex=True, return_var="list", keep_name=True, no_data_return=[])
     joins = Constraints(joins=str(cards[0][0]) if cards else "")
     return Nodes(numbers, places[:, 0], where, constraints=joins)
+
+
+def _check_cards(cards: Sequence[Sequence[object]], path: Path) -> None:
+    """Fields that are no numbers would be read as zero; what is blank is (Quick Reference Guide, GRID)."""
+    where, expected = display(path), "GRID, number, system, x, y, z"
+    for card in cards:
+        wrong = [field for field in card[:5] if isinstance(field, str) and field]
+        if wrong:
+            measured = f"{wrong[0]} in GRID {card[0]}"
+            raise InputError(
+                "a grid point has a field that is no number", where, measured, expected, "correct the field"
+            )
+    ends = "ENDDATA" in path.read_text(encoding="utf-8", errors="replace").upper()
+    if cards and len(cards[-1]) < 5 and not ends:
+        measured, fix = f"GRID {cards[-1][0]} ends behind {len(cards[-1])} fields, no ENDDATA", "write the deck again"
+        raise InputError("the deck is cut within a grid point", where, measured, expected, fix)

@@ -14,7 +14,11 @@ from .nodes import Nodes, read_nodes
 KINDS = (
     (re.compile(b"\\A" + re.escape(head_of(12))), ansys_mesh.__name__, "read_result"),
     (re.compile(rb"^NBLOCK,", re.MULTILINE | re.IGNORECASE), ansys_mesh.__name__, "read_archive"),
-    (re.compile(rb"^(GRID[ *,]|INCLUDE ')", re.MULTILINE | re.IGNORECASE), nastran.__name__, "read_grid"),
+    (
+        re.compile(rb"^(GRID(\*?[ \t]+|\*?[ \t]*,[ \t]*)\d|INCLUDE ')", re.MULTILINE | re.IGNORECASE),
+        nastran.__name__,
+        "read_grid",
+    ),
 )
 #: NPZ, and input decks.
 OTHERS = (b"PK\x03\x04", b"*")

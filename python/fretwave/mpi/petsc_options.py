@@ -159,10 +159,13 @@ class AnalysisOptions:
         InputError
             An option is misspelt, or belongs to a solver that is not in use.
         """
+        from .. import _core
+
         if not self.pairs:
             return
         names = {re.split(r"[ =]", text.lstrip("-"))[0] for text in unused()}
-        wrong = [name for name in self.pairs if name in names and name not in WHOLE]
+        tuned = {option for option, _, _ in _core.tuned_constants()}  # read where they come in, or never
+        wrong = [name for name in self.pairs if name in names and name not in WHOLE and name not in tuned]
         if not wrong:
             return
         plain = wrong[0].removeprefix(self.prefix)
@@ -173,6 +176,6 @@ class AnalysisOptions:
             expected="options of the solvers in use (a prefix is added by fretwave)",
             fix="remove it: this solver is not in use here (`-snes_view` shows those that are)"
             if plain in COMMON
-            else nearest(plain, COMMON, "did you mean `-{}`?".format)
+            else nearest(plain, (*COMMON, *tuned), "did you mean `-{}`?".format)
             or "remove it; `-snes_view` shows the solvers in use",
         )
