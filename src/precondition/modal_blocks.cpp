@@ -14,7 +14,8 @@ namespace fretwave::precondition {
 namespace {
 
 const Tuned follows("modes_follows", 0.05, "inertia over stiffness up to which a mode moves statically");
-const Tuned resonant("modes_resonant", 0.3, "inertia over stiffness from which a mode beyond the most is taken at rest");
+const Tuned resonant("modes_resonant", 0.3,
+                     "inertia over stiffness from which a mode beyond the most is taken at rest");
 const Tuned fewest("modes_fewest", 8, "modes that move with inertia, at the least");
 const Tuned most("modes_most", 128, "modes that move with inertia, at the most");
 

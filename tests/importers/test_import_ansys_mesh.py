@@ -13,6 +13,7 @@ from fretwave.commands.main import main
 from fretwave.errors import InputError
 from fretwave.fe.solids import EDGES
 from fretwave.importers.ansys_elements import HEAD, NUMBER, blocks_of
+from fretwave.importers.ansys_mesh import Block
 from fretwave.importers.cells import FACES
 from fretwave.importers.node_files import read_node_file
 from fretwave.importers.nodes import Nodes, cells_of
@@ -149,3 +150,25 @@ def test_what_is_held_and_joined(tmp_path: Path) -> None:
     )
     constraints = read_node_file(tmp_path / "n.cdb").constraints
     assert constraints.held == [("1", 1, 1), ("3", 1, 6)] and constraints.joins == "CP"
+
+
+@pytest.mark.parametrize("block, share", [("NBLOCK", 0.5), ("EBLOCK", 0.3), ("EBLOCK", 0.97)])
+def test_a_cut_archive_is_no_smaller_mesh(tmp_path: Path, block: str, share: float) -> None:
+    """Before: 6 of 40 elements without a word, a tetrahedron that was half a brick."""
+    text = (EXAMPLES / "HexBeam.cdb").read_text()
+    begin = text.rindex(block)
+    lines = text[begin:].split("\n")
+    end = next(k for k, line in enumerate(lines) if line.strip().startswith(("-1", "N,")))
+    (tmp_path / "mesh.cdb").write_text(text[:begin] + "\n".join(lines[: max(3, int(share * end))]) + "\n")
+    with pytest.raises(InputError, match="(?s)cut|complete|no nodes"):
+        read_node_file(tmp_path / "mesh.cdb")
+
+
+def test_a_cut_component_is_an_open_block() -> None:
+    """Twelve nodes, eight a line, behind the line of the format."""
+    block = Block()
+    for keyword, words in (("CMBLOCK", ["TIP", "NODE", "12"]), ("(8I10)", []), ("1 2 3 4 5 6 7 8", [])):
+        block.take(keyword, words)
+        assert block.open == "CMBLOCK"
+    block.take("9 10 11 12", [])
+    assert not block.open

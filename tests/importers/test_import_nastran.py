@@ -147,6 +147,12 @@ def test_blank_fields_are_zero(tmp_path: Path) -> None:
     np.testing.assert_array_equal(read_node_file(tmp_path / "model.bdf").coordinates, [[0, 2, 0], [1, 0, 3]])
 
 
+def test_the_only_matrix_is_not_taken_for_another(tmp_path: Path) -> None:
+    pyyeti.write(str(tmp_path / "m.op4"), {"maa": np.eye(3)})
+    with pytest.raises(InputError, match="there is no matrix K"):
+        read_matrix(str(tmp_path / "m.op4"), "K")
+
+
 def test_a_table_of_nodes_is_no_deck(tmp_path: Path) -> None:
     (tmp_path / "nodes.csv").write_text("grid,x,y,z\n7,1.0,2.0,3.0\n")
     nodes = read_node_file(tmp_path / "nodes.csv")

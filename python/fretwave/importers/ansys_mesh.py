@@ -84,18 +84,41 @@ def _check_angles(numbers: IntArray, angles: Array, where: str) -> None:
         raise InputError("directions of nodes are turned", where, measured, expected, fix)
 
 
+class Block:
+    """Whether a block of nodes, elements or a component has been read to its end: ``-1``, or as many as are said."""
+
+    PER_LINE = 8
+
+    def __init__(self) -> None:
+        self.open, self.lines = "", 0
+
+    def take(self, keyword: str, words: Sequence[str]) -> None:
+        """The next line."""
+        if keyword in ("NBLOCK", "EBLOCK", "CMBLOCK"):
+            count = int(words[2].split("!")[0]) if keyword == "CMBLOCK" else 0
+            self.open, self.lines = keyword, 1 - count // -self.PER_LINE  # the format, and the members
+        elif self.open == "CMBLOCK":
+            self.lines -= 1
+            self.open = self.open if self.lines else ""
+        elif self.open and (keyword in ("-1", "N") or keyword.startswith("-1")):
+            self.open = ""
+
+
 def _lines(path: Path, where: str) -> tuple[list[Material], Constraints]:
     """What is said line by line: materials, what is held, and what is joined."""
-    materials, constraints = dict[str, Material](), Constraints()
+    materials, constraints, block = dict[str, Material](), Constraints(), Block()
     with path.open(encoding="utf-8", errors="replace") as file:
         for count, line in enumerate(file, 1):
             keyword, *words = [word.strip().upper() for word in line.split(",")]
+            block.take(keyword, words)
             if keyword == "MPDATA":
                 _add_material(materials, words, f"{where}:{count}")
             elif keyword == "D" and len(words) > 1 and words[0].isdigit():
                 _hold(constraints, *words[:2])
             elif keyword in ("CE", "CP"):
                 constraints.joins = constraints.joins or keyword
+    if block.open:
+        raise InputError("the file is cut", where, f"it ends within {block.open}", "whole blocks", "write it again")
     return list(materials.values()), constraints
 
 

@@ -52,11 +52,12 @@ def choose(
     where: str,
     usual: Mapping[str, Sequence[str]] = USUAL,
 ) -> str:
-    """The variable asked for, else one of the usual name, else the only one."""
+    """The variable asked for, else one of the usual name, else the only one, unless that is another matrix's name."""
     if variable is not None and variable in names:
         return variable
     found = [name for name in usual[letter] if name in names]
-    if variable is None and (found or len(names) == 1):
+    others = {name for key, given in usual.items() if key != letter for name in given}
+    if variable is None and (found or (len(names) == 1 and names[0] not in others)):
         return found[0] if found else names[0]
     likely = [name for name in names if name.startswith(tuple(usual[letter]))] or [*names, "NAME"]
     asked = f"variable {variable}" if variable is not None else f"matrix {letter}"
