@@ -215,8 +215,10 @@ std::string Continuation::complaint(Trial& trial, double length, bool may_shorte
   const VecHandle along = moved(anchor_.y, length, anchor_.tangent);
   const double aside = weighted_norm(weights_, moved(trial.y, -1, along)), angle = turn_of(trial);
   const bool hard = trial.outcome.newton > easy;
-  if (!(aside <= length) || (may_shorten && hard && aside > (angle + unturned) * length))
-    return "the corrector lands on another branch";
+  if (!(aside <= length) || (may_shorten && hard && aside > (angle + unturned) * length)) {
+    const std::string why = problem_.explain(trial.y, moved(trial.y, -1, along));
+    return "the corrector lands on another branch" + (why.empty() ? "" : " (" + why + ")");
+  }
   if (may_shorten && angle > steps_.max_angle) return "the branch turns too sharply";
   if (may_shorten && (trial.error = interpolation_error(trial, length)) > steps_.max_error)
     return "the branch bends more than a step resolves";

@@ -5,6 +5,8 @@ from __future__ import annotations
 import importlib
 from types import ModuleType
 
+import numpy as np
+
 from ..errors import InputError
 
 #: How pip gets them into an environment whose h5py is the system's: what pyyeti asks for beside pandas is not needed
@@ -32,7 +34,8 @@ def reader_of(module: str, package: str, where: str) -> ModuleType:
         It cannot be imported.
     """
     try:
-        return importlib.import_module(module)
+        with np.printoptions():  # pyyeti changes how NumPy prints, for all
+            return importlib.import_module(module)
     except ImportError as error:
         what, expected = f"this file is read by the package {package}", f"the optional package {package}"
         raise InputError(what, where, str(error), expected, INSTALLED_BY[package]) from None
