@@ -37,6 +37,17 @@ RESULTS = [["show", "{folder}/run"], ["resume", "{folder}/run", "--no-plots"], [
 RESULTS += [["report", "{folder}/run", "--out", "{folder}/page.html"], ["probe", "{folder}/run", "--pairs"]]
 
 
+#: Of the imported chain.
+CASE = """
+[model]
+file = "model.h5"
+
+[[analysis]]
+name = "linear"
+type = "linear"
+"""
+
+
 def targets() -> list[Target]:
     """Every kind of file that fretwave reads."""
     found = [Target(f"results.h5, {c[0]}", "run/results.h5", c) for c in RESULTS]
@@ -84,7 +95,8 @@ def write_files(folder: Path) -> None:
     if not (folder / "model.h5").exists():
         ended = call([*made, "--modes", "2"], folder)
         assert ended.code == 0, ended.err
-    (folder / "case.toml").write_text('[model]\nfile = "model.h5"\n')
+    (folder / "case.toml").write_text(CASE)
+    assert call(["check", str(folder / "case.toml")], folder).code == 0
 
 
 def _write_v73(path: Path, name: str, matrix: sp.csc_matrix) -> None:

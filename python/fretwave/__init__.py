@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import os
 from importlib import import_module
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 from .errors import FretwaveError, InputError, NotConverged
+from .mpi import alone as _alone
 
-# Without mpirun Open MPI starts a daemon for a process that might spawn others, which fretwave never does. Where
-# several begin and end at once that daemon may get lost, and MPI_Init waits for it for ever.
-os.environ.setdefault("OMPI_MCA_ess_singleton_isolated", "1")
+_alone.prepare()
 
 if TYPE_CHECKING:
     from .analyses.parts.context import AnalysisContext, Outcome

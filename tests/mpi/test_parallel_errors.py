@@ -109,10 +109,42 @@ def test_on_one_rank_nothing_is_aborted(launch) -> None:
     assert done.stderr == "error: bad\n  fix:      mend it\n"
 
 
+def alone(code: str) -> subprocess.CompletedProcess[str]:
+    """Python without mpirun, whatever this process was started by."""
+    plain = {key: value for key, value in os.environ.items() if not key.startswith(("OMPI_", "PMIX_", "PRTE_"))}
+    plain |= {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1"}
+    return subprocess.run([sys.executable, "-c", code], env=plain, capture_output=True, text=True, timeout=60)
+
+
 def test_a_start_without_mpirun_needs_no_daemon() -> None:
     """Open MPI's own may get lost where several runs begin and end at once; MPI_Init then waits for it for ever."""
     children = "open(f'/proc/self/task/{os.getpid()}/children').read().split()"
-    code = f"import os, fretwave; from mpi4py import MPI; print(MPI.COMM_WORLD.size, len({children}))"
-    plain = {key: value for key, value in os.environ.items() if not key.startswith(("OMPI_", "PMIX_", "PRTE_"))}
-    done = subprocess.run([sys.executable, "-c", code], env=plain, capture_output=True, text=True, timeout=60)
+    done = alone(f"import os, fretwave; from mpi4py import MPI; print(MPI.COMM_WORLD.size, len({children}))")
     assert done.stdout.split() == ["1", "0"], done.stderr
+
+
+SESSION = """
+import os, subprocess, sys
+import fretwave
+from fretwave.mpi.alone import FOLDER, session_folder
+inside = "import fretwave, os; from fretwave.mpi.alone import *; print(session_folder() == os.environ[FOLDER])"
+subprocess.run([sys.executable, "-c", inside])
+ranks = "from mpi4py import MPI; import fretwave; n = MPI.COMM_WORLD.allreduce(1); MPI.COMM_WORLD.rank or print(n)"
+subprocess.run(["mpirun", "-n", "2", sys.executable, "-c", ranks])
+pid = os.fork()
+if not pid:
+    print(session_folder() == os.environ[FOLDER], flush=True)
+    os._exit(0)
+os.waitpid(pid, 0)
+from mpi4py import MPI
+print(os.path.isdir(session_folder() + f"/ompi.{os.uname().nodename}.{os.getuid()}/jf.0/1/0"), session_folder())
+"""
+
+
+def test_no_two_processes_share_the_folder_of_their_session() -> None:
+    """Each removes it when it ends; one that began at that moment ended in `orte_session_dir failed`: 8 of 40 starts
+    beside a process that did nothing but remove it. mpirun may be started from such a process all the same."""
+    done = alone(SESSION)
+    *said, folder = done.stdout.split()
+    assert said == ["True", "2", "True", "True"], done
+    assert not os.path.exists(folder)

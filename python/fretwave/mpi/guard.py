@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from ..errors import EXIT_OTHER, FretwaveError, exit_code_of
 from ..files.whole import file_error
 from ..texts import display
+from .alone import RANKS
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -45,8 +46,7 @@ def world() -> MPI.Comm | None:
 
 def launched_rank() -> int:
     """This process's rank as its launcher says, 0 without one: known before MPI is started."""
-    names = ("OMPI_COMM_WORLD_RANK", "PMI_RANK", "PMIX_RANK", "SLURM_PROCID")
-    return int(next((os.environ[name] for name in names if name in os.environ), "0"))
+    return int(next((os.environ[name] for name in RANKS if name in os.environ), "0"))
 
 
 def all_ranks_failed(comm: MPI.Comm) -> bool:
