@@ -20,7 +20,7 @@ from typing import Any
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from scenes import list_contact, list_forced, list_friction  # noqa: E402
+from scenes import list_contact, list_forced, list_friction, list_random  # noqa: E402
 from scenes.judge import Verdict, judge, read  # noqa: E402
 from scenes.scene import Scene, run  # noqa: E402
 
@@ -98,6 +98,8 @@ def main() -> int:
     parser.add_argument("--only", default="", help="names, or parts of names or axes, separated by commas")
     parser.add_argument("--quick", action="store_true", help="the short list of the tests")
     parser.add_argument("--list", action="store_true", help="names and axes")
+    parser.add_argument("--random", type=int, metavar="COUNT", help="as many scenes drawn at random in place of the list")
+    parser.add_argument("--seed", type=int, default=1, help="of --random")
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument(
         "--keep", type=Path, help="folder for cases and results; repeat one by `fretwave run KEEP/NAME/case.toml`"
@@ -106,7 +108,8 @@ def main() -> int:
     parser.add_argument("--go-on", action="store_true", help="take over what stands in the file of --json")
     args = parser.parse_args()
     wanted = [word for word in args.only.split(",") if word]
-    scenes = [s for s in all_scenes() if not args.quick or s.quick]
+    scenes = list(list_random.scenes(args.random, args.seed)) if args.random else all_scenes()
+    scenes = [s for s in scenes if not args.quick or s.quick]
     scenes = [s for s in scenes if not wanted or any(w == s.name or w in s.name or w in s.axis for w in wanted)]
     if args.list:
         print("\n".join(f"{s.name:40s} {s.axis}" for s in scenes), f"\n{len(scenes)} scenes")

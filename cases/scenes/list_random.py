@@ -1,0 +1,112 @@
+"""Scenes that nobody chose: structures, contacts and settings drawn at random between the ends of the axes of the others."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import scipy.linalg as la
+
+from .closed import limits
+from .equations import Contact
+from .scene import Scene
+from .structures import coulomb, forced, jenkins, mode, pad
+
+Random = np.random.Generator
+
+
+def scenes(count: int, seed: int) -> Iterator[Scene]:
+    """Scene n of a seed is the same whatever the count."""
+    for n in range(count):
+        random = np.random.default_rng([seed, n])
+        kind = random.choice(["tanh", "jenkins", "pad", "stop"])
+        yield (response if random.random() < 0.35 else free)(random, str(kind), f"{seed}_{n}_{kind}")
+
+
+def log_uniform(random: Random, low: float, high: float) -> float:
+    return float(np.exp(random.uniform(np.log(low), np.log(high))))
+
+
+def structure(random: Random) -> tuple[Any, Any]:
+    """Two to six dofs: masses over a factor of ten (one in four: up to 1e6), a stiffness whose eigenvalues spread
+    from 1 to 1e2 or 1e4, in axes at random."""
+    n = int(random.integers(2, 7))
+    spread = 1e6 if random.random() < 0.25 else 10.0
+    mass = np.array([log_uniform(random, 1 / spread, 1.0) for _ in range(n)])
+    Q = np.linalg.qr(random.normal(size=(n, n)))[0]
+    values = [log_uniform(random, 1.0, random.choice([1e2, 1e4])) for _ in range(n)]
+    M = np.diag(mass)
+    root = np.sqrt(np.diag(mass))
+    return M, root @ (Q * values) @ Q.T @ root
+
+
+def contact(random: Random, kind: str, M: Any, K: Any) -> tuple[Contact, float]:
+    """A contact on the last dofs, and the displacement there at which its state first changes."""
+    n = len(M)
+    stiff = float(K[-1, -1])
+    if kind == "tanh":
+        limit = stiff * log_uniform(random, 1e-3, 1e3)
+        eps = log_uniform(random, 1e-6, 1.0) * limit / stiff * np.sqrt(stiff / M[-1, -1])
+        return coulomb(limit, eps, np.eye(n)[-1]), limit / stiff
+    kt = stiff * log_uniform(random, 1e-3, 1e6)
+    limit = stiff * log_uniform(random, 1e-3, 1e3)
+    if kind == "jenkins":
+        rows = np.eye(n)[-int(random.integers(1, min(n, 4))) :]
+        return jenkins(kt, limit, rows), limit / kt
+    B = np.zeros((3, n))
+    if kind == "stop":
+        B[0, -1] = 1.0
+        gap = log_uniform(random, 1e-3, 1e3)
+        return pad(kt, 1.0, 0.0, 0.0, gap, B), gap
+    B = np.hstack([np.zeros((3, n)), np.eye(3)])[:, -n:] if n >= 3 else B + np.vstack([np.eye(2), np.zeros(2)])
+    mu = log_uniform(random, 1e-2, 10.0)
+    return pad(kt, kt * log_uniform(random, 0.1, 1.0), mu, limit, 0.0, B), min(1.0, mu) * limit / kt
+
+
+def settings(random: Random) -> dict[str, Any]:
+    """Harmonics, samples from the least on, steps."""
+    H = int(random.choice([1, 3, 5, 7, 9, 15]))
+    samples = int(random.choice([2 * H + 2, 64, 256, 1024]))
+    longest = log_uniform(random, 0.02, 0.5)
+    step = {"initial": min(0.05, longest), "maximum": longest, "max_angle": random.uniform(0.2, 0.8)}
+    return {"H": H, "samples": max(samples, 2 * H + 2), "step": step}
+
+
+def needs_mean(kind: str) -> dict[str, Any]:
+    return {"retain": "all"} if kind == "stop" else {}
+
+
+def lowest(M: Any, K: Any) -> tuple[float, Any]:
+    """Angular frequency and shape of the lowest mode without contact."""
+    values, shapes = la.eigh(K, M)
+    return float(np.sqrt(values[0])), shapes[:, 0]
+
+
+def free(random: Random, kind: str, name: str) -> Scene:
+    """A mode from below the first change of state to far above it, observed where it moves most without contact."""
+    M, K = structure(random)
+    pair, onset = contact(random, kind, M, K)
+    w, shape = lowest(M, K)
+    most = int(np.argmax(abs(shape)))
+    first = onset * min(1e3, abs(shape[most] / shape[-1]))
+    span = first * np.array([log_uniform(random, 1e-3, 0.3), log_uniform(random, 3.0, 300.0)])
+    more = {**needs_mean(kind), "normalise": f"x{most}"}
+    analysis = mode(str(random.choice(["CNM", "EPMC"])), amplitude=span, **settings(random), **more)
+    scene = Scene("at random", name, M, K, [pair], analysis, preload=True if kind in ("pad", "stop") else None)
+    if kind == "stop" and first < 1e3 * onset:  # nothing touches yet
+        scene.closed = [limits(w, None, 1e-9)]
+    return scene
+
+
+def response(random: Random, kind: str, name: str) -> Scene:
+    """A response about the lowest mode without contact, 1 to 3 % damped, to a force on the last dof."""
+    M, K = structure(random)
+    pair, onset = contact(random, kind, M, K)
+    w = lowest(M, K)[0]
+    C = 2 * log_uniform(random, 0.01, 0.03) / w * K
+    last = f"x{len(M) - 1}"
+    level = onset * float(K[-1, -1]) * log_uniform(random, 1e-2, 3.0)
+    more = {**needs_mean(kind), "force": {last: 1.0}, "observe": last, **settings(random)}
+    analysis = forced(w * np.array([0.6, 1.5]), [level], **more)
+    return Scene("at random", name, M, K, [pair], analysis, C=C, preload=True if kind in ("pad", "stop") else None)
