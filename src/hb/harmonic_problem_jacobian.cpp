@@ -5,16 +5,6 @@
 
 namespace fretwave::hb {
 
-/// Line searches evaluate elsewhere: the point of linearisation is y, whatever was evaluated last, and the
-/// laws are as they are now, whichever problem of the model has changed them.
-void HarmonicProblem::linearise(Vec y) {
-  PetscBool same = PETSC_FALSE;
-  if (linearised_ && contact_version_ == residual_.contact_version()) check(VecEqual(y, last_, &same));
-  if (same) return;
-  VecHandle unused = equations();
-  residual(y, unused);
-}
-
 // Q = Q_static + a q: dQ = a (dq + q dlog a); r = R / (k a): dr = dR / (k a) - r dlog a
 void HarmonicProblem::product(Vec y, Vec dy, Vec dr) {
   linearise(y);
@@ -23,7 +13,7 @@ void HarmonicProblem::product(Vec y, Vec dy, Vec dr) {
     ReadArray in(dy);
     std::copy_n(in.data(), local_block_, WriteArray(dQ_).data());
   }
-  const auto along = components(dQ_);
+  const auto along = unfolding_.components(dQ_);
   residual_.product(dQ_, nullptr, dR_);
   check(VecScale(dR_, 1 / stiffness_));
   for (int j = 0; j < scalars_; ++j) check(VecAXPY(dR_, dz[j], column(j)));
@@ -37,9 +27,9 @@ void HarmonicProblem::pattern(std::vector<PetscInt>& rows, std::vector<PetscInt>
   residual_.pattern(rows, cols);
   const PetscInt first = model().first_dof() * harmonics().block_size(),
                  all = model().dofs() * harmonics().block_size();
-  for (int j = 0; j < unfoldings() + scalars_; ++j)
+  for (int j = 0; j < unfolding_.count() + scalars_; ++j)
     for (PetscInt i = 0; i < local_block_; ++i) rows.push_back(first + i), cols.push_back(all + j);
-  for (int j = 0; j < unfoldings(); ++j)
+  for (int j = 0; j < unfolding_.count(); ++j)
     for (PetscInt i = 0; i < local_block_; ++i) rows.push_back(all + 2 + j), cols.push_back(first + i);
   if (!normalised()) return;
   for (int j = 0; j < 2; ++j)
@@ -74,9 +64,9 @@ void HarmonicProblem::values(Vec y, std::span<double> v) {
   linearise(y);
   double* next = residual_.values(1 / stiffness_, v.data());
   const auto add = [&](Vec x) { next = std::copy_n(ReadArray(x).data(), local_block_, next); };
-  for (auto const& g : unfold_) add(g);
+  for (auto const& g : unfolding_.vectors()) add(g);
   for (int j = 0; j < scalars_; ++j) add(column(j));
-  for (auto const& g : unfold_) add(g);
+  for (auto const& g : unfolding_.vectors()) add(g);
   for (int j = 0; normalised() && j < 2; ++j)
     for (auto const& [dof, weight] : mine()) *next++ = weight;
 }
@@ -92,18 +82,6 @@ std::vector<PairTangents> HarmonicProblem::pair_tangents(Vec y) {
   for (auto& contact : contacts)
     for (double& d : contact.D) d /= stiffness_;
   return contacts;
-}
-
-VecHandle HarmonicProblem::gap_product(Vec y, PerContact const& dgap) {
-  linearise(y);
-  residual_.gap_product(dgap, dR_);
-  VecHandle out = equations();
-  check(VecSet(out, 0));
-  ReadArray in(dR_);
-  const double scale = 1 / (stiffness_ * motion_.amplitude);
-  std::transform(in.data(), in.data() + local_block_, WriteArray(out).data(),
-                 [&](double r) { return scale * r; });
-  return out;
 }
 
 /// A step in the mean alone: friction held it, and what held it slips now.
