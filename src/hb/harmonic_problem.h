@@ -42,6 +42,7 @@ class HarmonicProblem : public solve::Problem {
   double rounding(Vec y) override;
   std::uint64_t piece(Vec y) override;
   void product(Vec y, Vec dy, Vec dr) override;
+  void transposed_product(Vec y, Vec dr, Vec dy) override;
   void pattern(std::vector<PetscInt>& rows, std::vector<PetscInt>& cols) override;
   void values(Vec y, std::span<double> v) override;
   void metric(Vec y, Vec weights) override;

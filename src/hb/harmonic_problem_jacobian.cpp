@@ -23,6 +23,37 @@ void HarmonicProblem::product(Vec y, Vec dy, Vec dr) {
   border(dz, along, out.data());
 }
 
+// J = [[dR/dQ / k, G, C], [W, 0, 0], [G^T, 0, 0]], G the unfolding's vectors, C the scalars' columns, W the
+// row on the fundamental; rows below the first are on the last rank.
+void HarmonicProblem::transposed_product(Vec y, Vec dr, Vec dy) {
+  linearise(y);
+  const int beside = normalised() ? unfolding_.count() + scalars_ - 1 : 0;
+  std::vector<double> below(beside, 0.0);
+  VecHandle p = like(q_);
+  {
+    const ReadArray in(dr);
+    std::copy_n(in.data(), local_block_, WriteArray(p).data());
+    if (last_rank()) std::copy_n(in.data() + local_block_, beside, below.begin());
+  }
+  MPI_Bcast(below.data(), beside, MPI_DOUBLE, comm_size(comm()) - 1, comm());
+  std::vector<double> z = unfolding_.components(p);
+  for (int j = 0; j < scalars_; ++j) {
+    z.push_back(0);
+    check(VecDot(column(j), p, &z.back()));
+  }
+  residual_.transposed_product(p, dR_);
+  check(VecScale(dR_, 1 / stiffness_));
+  const ReadArray in(dR_);
+  WriteArray out(dy);
+  std::copy_n(in.data(), local_block_, out.data());
+  for (int j = 0; normalised() && j < 2; ++j)
+    for (auto const& [dof, weight] : mine())
+      out[(dof - model().first_dof()) * harmonics().block_size() +
+          harmonics().offset(harmonics().fundamental()) + j] += weight * below[j];
+  if (beside > 2) unfolding_.add(below.data() + 2, out.data());
+  if (last_rank()) std::ranges::copy(z, out.data() + local_block_);
+}
+
 void HarmonicProblem::pattern(std::vector<PetscInt>& rows, std::vector<PetscInt>& cols) {
   residual_.pattern(rows, cols);
   const PetscInt first = model().first_dof() * harmonics().block_size(),

@@ -101,6 +101,8 @@ void LinearSolver::use_krylov() {
   check(MatCreateShell(bordered_.problem().comm(), local, local, PETSC_DETERMINE, PETSC_DETERMINE, this,
                        J_.out()));
   check(MatShellSetOperation(J_, MATOP_MULT, reinterpret_cast<void (*)(void)>(shell_product)));
+  check(MatShellSetOperation(J_, MATOP_MULT_TRANSPOSE,
+                             reinterpret_cast<void (*)(void)>(shell_transposed_product)));
   check(KSPSetType(ksp, KSPFGMRES));
   check(KSPGMRESSetRestart(ksp, 100));
   check(KSPSetTolerances(ksp, 1e-6, 1e-13, PETSC_DEFAULT, 200));
@@ -156,6 +158,21 @@ PetscErrorCode LinearSolver::shell_product(Mat J, Vec x, Vec y) {
   PetscErrorCode code = MatShellGetContext(J, &solver);
   if (code) return code;
   return solver->guard_.run([&] { solver->bordered_.product(solver->point_, x, y); });
+}
+
+PetscErrorCode LinearSolver::shell_transposed_product(Mat J, Vec x, Vec y) {
+  LinearSolver* solver;
+  PetscErrorCode code = MatShellGetContext(J, &solver);
+  if (code) return code;
+  return solver->guard_.run([&] { solver->bordered_.transposed_product(solver->point_, x, y); });
+}
+
+PetscErrorCode LinearSolver::refuse_transpose() {
+  return guard_.run([&] {
+    throw InputError("the preconditioner " + kind_.kind->type + " has no transpose", kind_.kind->type,
+                     "a PC with a transpose, as none, or a KSP that needs none, as fgmres",
+                     "give -<analysis>_pc_type none, or leave out -<analysis>_ksp_type");
+  });
 }
 
 PetscErrorCode LinearSolver::apply(Vec x, Vec z) {
