@@ -24,6 +24,20 @@ const Tuned tangent_accepted("linear_tangent_accepted", 1e-6,
 const Tuned renewal("linear_renewal", 1.0 / 16,
                     "share of all iterations that is spent on building preconditioners anew");
 
+/// Our options under the prefix, where PETSc's -help is given; its macros return its error codes.
+PetscErrorCode offered(MPI_Comm comm, std::string const& prefix) {
+  char wish[32] = "auto", blocks[32] = "auto";
+  PetscOptionsBegin(comm, prefix.c_str(), "fretwave: linear systems", "fretwave");
+  PetscErrorCode code = PetscOptionsString("-route", "route of the corrector: auto, direct or krylov",
+                                           "fretwave", wish, wish, sizeof wish, nullptr);
+  if (!code)
+    code = PetscOptionsString("-blocks", "kind of preconditioner: auto, dense or sparse", "fretwave", blocks,
+                              blocks, sizeof blocks, nullptr);
+  if (code) return code;
+  PetscOptionsEnd();
+  return PetscErrorCode(0);
+}
+
 /// What the option says: one of two, or auto.
 std::string choice(std::string const& prefix, char const* option, char const* meaning, std::string const& one,
                    std::string const& other) {
@@ -111,6 +125,8 @@ void LinearSolver::use_krylov() {
 }
 
 void LinearSolver::take_options() {
+  check(offered(bordered_.problem().comm(), prefix_));
+  Tuned::help(bordered_.problem().comm());
   make_preconditioner();
   make_tangent();
 }
