@@ -129,6 +129,8 @@ def test_where_the_time_goes_is_told_by_petsc(tmp_path: Path) -> None:
     parts = ("FwContactForce", "FwContactJacob", "FwContactBlocks", "FwStructure", "FwPCBuild", "FwPCFollow")
     assert all(counts[name] > 0 for name in (*parts, "FwPairs", "FwErrorEstimate", "FwSummary"))
     assert counts["FwSummary"] < counts["FwContactForce"] < counts["FwStructure"]
+    rows = len((tmp_path / "run" / "mode.csv").read_text().splitlines()) - 1
+    assert counts["FwRecord"] == rows == counts["FwPoint"] - 1 and counts["FwTable"] > 0  # the last finds no point
 
 
 def test_petsc_s_help_lists_our_own_options_with_what_they_mean(tmp_path: Path) -> None:
