@@ -27,6 +27,25 @@ Tuned::operator double() const {
   return value;
 }
 
+namespace {
+
+/// PETSc's macros return its error codes.
+PetscErrorCode offered(MPI_Comm comm) {
+  PetscOptionsBegin(comm, nullptr, "fretwave: constants that were tuned", "fretwave");
+  for (Tuned const* constant : registered()) {
+    PetscReal value = constant->value();
+    const PetscErrorCode code = PetscOptionsReal(
+        ("-fw_" + constant->name()).c_str(), constant->meaning().c_str(), "fretwave", value, &value, nullptr);
+    if (code) return code;
+  }
+  PetscOptionsEnd();
+  return PetscErrorCode(0);
+}
+
+}  // namespace
+
+void Tuned::help(MPI_Comm comm) { check(offered(comm)); }
+
 std::vector<Tuned const*> const& Tuned::all() { return registered(); }
 
 }  // namespace fretwave

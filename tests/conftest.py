@@ -32,6 +32,8 @@ WORLD = MPI.COMM_WORLD
 EVENTS = os.environ.get("FRETWAVE_TEST_EVENTS")
 COLLECT = os.environ.get("FRETWAVE_TEST_COLLECT")
 CLAIMS = os.environ.get("FRETWAVE_TEST_CLAIMS")
+#: Lists the files that have tests for this number of ranks; others need not be imported.
+FILES = os.environ.get("FRETWAVE_TEST_FILES")
 
 
 def rank_counts(item: pytest.Item) -> tuple[int, ...]:
@@ -62,6 +64,14 @@ def pytest_configure(config: pytest.Config) -> None:
         config.option.basetemp = str(Path(EVENTS) / f"tmp_{WORLD.rank}")
 
 
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """Leave out files without a test for this number of ranks; the runner knows which have one."""
+    if not FILES or collection_path.suffix != ".py":
+        return None
+    wanted = Path(FILES).read_text(encoding="utf-8").splitlines()
+    return True if os.path.relpath(collection_path, config.rootpath) not in wanted else None
+
+
 def pytest_sessionstart(session: pytest.Session) -> None:
     reporter = session.config.pluginmanager.getplugin("terminalreporter")
     if WORLD.rank > 0 and reporter is not None:
@@ -85,6 +95,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:
+    # What tests import was written by them, and may be written anew within the second by which Python tells.
+    sys.dont_write_bytecode, sys.pycache_prefix = True, None
     if COLLECT:
         asked = {item.nodeid: rank_counts(item) for item in session.items}
         Path(COLLECT).write_text(json.dumps(asked), encoding="utf-8")
@@ -252,10 +264,10 @@ def shared_tmp(comm: MPI.Comm, tmp_path: Path) -> Path:
 
 def own_environment(**changes: str) -> dict[str, str]:
     """Environment for an mpirun started by a test: the marks of the MPI that runs the tests would mislead it."""
-    allowed = ("OMPI_ALLOW", "OMPI_MCA_rmaps")
-    marks = ("OMPI_", "PMIX_", "PMI_", "FRETWAVE_TEST_")
+    allowed = ("OMPI_ALLOW", "OMPI_MCA_rmaps", "OMPI_MCA_pml")
+    marks = ("OMPI_", "PMIX_", "PMI_", "FRETWAVE_TEST_", "PYTHONPYCACHEPREFIX")
     kept = {k: v for k, v in os.environ.items() if k.startswith(allowed) or not k.startswith(marks)}
-    return {**kept, **changes}
+    return {**kept, "PYTHONDONTWRITEBYTECODE": "1", **changes}
 
 
 @pytest.fixture

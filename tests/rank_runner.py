@@ -19,6 +19,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 EVENTS = ROOT / ".build" / "tests"
+#: Test modules as pytest compiles them, from one process to the next: a dozen read the same.
+COMPILED = ROOT / ".build" / "compiled_tests"
 #: At most so many pytests side by side: tests start programs of their own.
 MOST_SHARES = 4
 #: An outcome hides those before it: the worst rank speaks for the test.
@@ -113,7 +115,7 @@ def absolute_paths(arguments: list[str]) -> list[str]:
 def collect(arguments: list[str]) -> dict[str, list[int]]:
     """Ask every test for its numbers of ranks, without running any."""
     listing = EVENTS / "collected.json"
-    environment = {**os.environ, "FRETWAVE_TEST_COLLECT": str(listing)}
+    environment = {**compiling(), "FRETWAVE_TEST_COLLECT": str(listing)}
     done = subprocess.run(
         [*pytest_command(arguments), "--collect-only", "-q"],
         cwd=ROOT,
@@ -130,15 +132,23 @@ def collect(arguments: list[str]) -> dict[str, list[int]]:
     sys.exit(1)
 
 
+def compiling() -> dict[str, str]:
+    """The environment, with what is compiled kept beside the sources, also where they are not to be written to."""
+    kept = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+    return {**kept, "PYTHONPYCACHEPREFIX": str(COMPILED)}
+
+
 def shares_for(ranks: int) -> int:
     """How many pytests of so many ranks run side by side: one a core."""
     return max(1, min(MOST_SHARES, len(os.sched_getaffinity(0)) // ranks))
 
 
-def run_ranks(ranks: int, arguments: list[str], timeout: float) -> str:
+def run_ranks(ranks: int, expected: set[str], arguments: list[str], timeout: float) -> str:
     """Run pytest on `ranks` processes, side by side on what cores there are; returns how they ended, "" when well."""
     folder = events_folder(ranks)
     shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    (folder / "files").write_text("\n".join(sorted({test.partition("::")[0] for test in expected})), encoding="utf-8")
     shares = shares_for(ranks)
     running = [start(ranks, share, folder, arguments, timeout) for share in range(shares)]
     deadline = time.monotonic() + timeout
@@ -166,7 +176,8 @@ def start(ranks: int, share: int, folder: Path, arguments: list[str], timeout: f
         command = ["mpirun", "-n", str(ranks), *command]
     claims = folder / "claims"
     claims.mkdir(exist_ok=True)
-    environment = {**os.environ, "FRETWAVE_TEST_EVENTS": str(events), "FRETWAVE_TEST_CLAIMS": str(claims)}
+    environment = {**compiling(), "FRETWAVE_TEST_EVENTS": str(events), "FRETWAVE_TEST_CLAIMS": str(claims)}
+    environment["FRETWAVE_TEST_FILES"] = str(folder / "files")
     with open(folder / f"share_{share}.log", "wb") as log:
         # Its own session, so that a hanging tree of processes can be ended as a whole.
         return subprocess.Popen(
@@ -216,7 +227,7 @@ def main(arguments: list[str]) -> int:
     for ranks in sizes:
         expected = {test for test, sizes_of_test in asked.items() if ranks in sizes_of_test}
         print(f"== {len(expected)} tests on {ranks} rank{'s' if ranks > 1 else ''}", flush=True)
-        ending = run_ranks(ranks, arguments, timeout)
+        ending = run_ranks(ranks, expected, arguments, timeout)
         counts.append(count_outcomes(ranks, expected, read_outcomes(events_folder(ranks), ranks), ending))
     return report(counts, only)
 

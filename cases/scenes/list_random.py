@@ -1,4 +1,4 @@
-"""Scenes that nobody chose: structures, contacts and settings drawn at random between the ends of the axes of the others."""
+"""Scenes that nobody chose: structures, contacts and settings at random between the ends of the axes of the others."""
 
 from __future__ import annotations
 

@@ -13,6 +13,7 @@ import os
 import sys
 import tempfile
 from collections import Counter
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -22,8 +23,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from scenes import list_contact, list_forced, list_friction, list_random  # noqa: E402
 from scenes.judge import Verdict, judge, read  # noqa: E402
-from scenes.scene import Scene, run  # noqa: E402
+from scenes.scene import Finished, Scene, run  # noqa: E402
 
+Runner = Callable[[Scene, Path], Finished]
 WORDS = ["right", "wrong", "kept", "gave up", "refused", "crashed", "hung"]
 
 
@@ -35,22 +37,22 @@ def all_scenes() -> list[Scene]:
     return scenes
 
 
-def one(scene: Scene, folder: Path) -> Verdict:
+def one(scene: Scene, folder: Path, run: Runner = run) -> Verdict:
     """Run and judge a scene, and its twin beside it."""
-    verdict = judge(scene, run(scene, folder / scene.name))
+    done = run(scene, folder / scene.name)
+    verdict = judge(scene, done)
     if scene.twin is not None and verdict.word == "right":
-        verdict.reasons = compare(scene, folder)
+        verdict.reasons = compare(scene, done, run(scene.twin[0], folder / f"{scene.name}.twin"))
         verdict.word = "wrong" if verdict.reasons else "right"
     return verdict
 
 
-def compare(scene: Scene, folder: Path, tolerance: float = 1e-9) -> list[str]:
+def compare(scene: Scene, done: Finished, twin: Finished, tolerance: float = 1e-9) -> list[str]:
     """What differs between a scene and its twin in other units, at the reported amplitudes."""
     base, length, time = scene.twin
-    done = run(base, folder / f"{scene.name}.twin")
-    runs = [read(base, done), read(scene, run(scene, folder / scene.name))]
+    runs = [read(base, twin), read(scene, done)]
     if not all(runs):
-        return [f"the twin in other units has no table (exit {done.code})"]
+        return [f"the twin in other units has no table (exit {twin.code})"]
     out = []
     for a in base.analysis["report_at"]:
         rows = []
@@ -98,7 +100,7 @@ def main() -> int:
     parser.add_argument("--only", default="", help="names, or parts of names or axes, separated by commas")
     parser.add_argument("--quick", action="store_true", help="the short list of the tests")
     parser.add_argument("--list", action="store_true", help="names and axes")
-    parser.add_argument("--random", type=int, metavar="COUNT", help="as many scenes drawn at random in place of the list")
+    parser.add_argument("--random", type=int, metavar="COUNT", help="as many scenes at random, not the list")
     parser.add_argument("--seed", type=int, default=1, help="of --random")
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument(

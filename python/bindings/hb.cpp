@@ -1,4 +1,5 @@
 #include "casters.h"
+#include "hb/diagnostics.h"
 #include "hb/discretisation_error.h"
 #include "hb/forced_response.h"
 #include "hb/nonlinear_mode.h"
@@ -22,7 +23,7 @@ nb::dict contact_summary(hb::ContactSummary const& s) {
 /// components x pairs, the next two samples x pairs; of the period work per pair, shares 3 x pairs.
 nb::list contact_periods(hb::HarmonicProblem& problem, Petsc<Vec> y) {
   nb::list out;
-  const auto periods = problem.contact_periods(y.object);
+  const auto periods = hb::contact_periods(problem, y.object);
   for (size_t k = 0; k < periods.size(); ++k) {
     auto const& law = *problem.model().contacts()[k].law;
     const std::vector<size_t> shape = {size_t(problem.harmonics().samples()), size_t(law.components()),
@@ -42,13 +43,13 @@ nb::list contact_periods(hb::HarmonicProblem& problem, Petsc<Vec> y) {
 nb::list wearing(hb::HarmonicProblem& problem, Petsc<Vec> y) {
   nb::list out;
   const auto copy = [](std::vector<double> const& v) { return numpy_copy(v.data(), {v.size()}); };
-  for (auto const& w : problem.wearing(y.object))
+  for (auto const& w : hb::wearing(problem, y.object))
     out.append(nb::make_tuple(copy(w.archard), copy(w.load), copy(w.slip), copy(w.open)));
   return out;
 }
 
 nb::dict energy(hb::HarmonicProblem& problem, Petsc<Vec> y) {
-  const auto e = problem.energy(y.object);
+  const auto e = hb::energy(problem, y.object);
   nb::dict out;
   out["contact"] = e.contact, out["damping"] = e.damping, out["modal"] = e.modal, out["stored"] = e.stored;
   return out;
@@ -70,36 +71,41 @@ void bind_hb(nb::module_& m) {
              VecHandle Q = p.coefficients(y.object);
              return handed(Q);
            })
-      .def("summary", [](HarmonicProblem& p, Petsc<Vec> y) { return contact_summary(p.summarise(y.object)); })
+      .def("summary",
+           [](HarmonicProblem& p, Petsc<Vec> y) { return contact_summary(summarise(p, y.object)); })
       .def("contact_periods", contact_periods)
-      .def("wear", &HarmonicProblem::wear)
+      .def("wear", [](HarmonicProblem& p, PerContact const& depth) { p.terms().wear(depth); })
       .def("wearing", wearing)
       .def("gap_product",
            [](HarmonicProblem& p, Petsc<Vec> y, PerContact const& dgap) {
-             VecHandle r = p.gap_product(y.object, dgap);
+             VecHandle r = gap_product(p, y.object, dgap);
              return handed(r);
            })
       .def("energy", energy)
-      .def("preload", [](HarmonicProblem& p, Petsc<Vec> x, Petsc<Vec> P) { p.preload(x.object, P.object); })
-      .def("unfold", [](HarmonicProblem& p, Petsc<Vec> re, Petsc<Vec> im) { p.unfold(re.object, im.object); })
-      .def("unfolding", [](HarmonicProblem& p, Petsc<Vec> y) { return p.unfolding(y.object); })
+      .def("preload",
+           [](HarmonicProblem& p, Petsc<Vec> x, Petsc<Vec> P) { p.at_rest().preload(x.object, P.object); })
+      .def("unfold",
+           [](HarmonicProblem& p, Petsc<Vec> re, Petsc<Vec> im) {
+             p.unfolding() = Unfolding(p.model(), p.harmonics(), re.object, im.object);
+           })
+      .def("unfolding", [](HarmonicProblem& p, Petsc<Vec> y) { return unfolding_amplitudes(p, y.object); })
       .def_prop_ro("stiffness_scale", &HarmonicProblem::stiffness_scale)
       .def("rounding", [](HarmonicProblem& p, Petsc<Vec> y) { return p.rounding(y.object); })
       .def("scalars", [](HarmonicProblem& p, Petsc<Vec> y) { return p.scalars(y.object); })
       .def(
           "settle",
-          [](HarmonicProblem& p, Petsc<Vec> y, PerContact const& from) { p.settle(y.object, from); },
+          [](HarmonicProblem& p, Petsc<Vec> y, PerContact const& from) { settle(p, y.object, from); },
           nb::arg(), nb::arg("sliders") = PerContact{})
-      .def("stand", &HarmonicProblem::stand)
+      .def("stand", [](HarmonicProblem& p, PerContact const& sliders) { stand(p, sliders); })
       .def(  // the model is kept, not the problem: a branch may go through many
           "on", [](HarmonicProblem const& p, model::Model const&, Harmonics const& h) { return p.on(h); },
           nb::arg("model"), nb::arg("harmonics"), nb::keep_alive<0, 2>())
       .def("embedded",
            [](HarmonicProblem const& p, HarmonicProblem const& other, Petsc<Vec> x) {
-             VecHandle out = p.on(other, x.object);
+             VecHandle out = embedded(p, other, x.object);
              return handed(out);
            })
-      .def("exponents", [](HarmonicProblem& p, Petsc<Vec> y) { return p.exponents(y.object).s; });
+      .def("exponents", [](HarmonicProblem& p, Petsc<Vec> y) { return p.scaled(y.object).exponents.s; });
   nb::enum_<Method>(m, "Method").value("CNM", Method::CNM).value("EPMC", Method::EPMC);
   nb::class_<NonlinearMode, HarmonicProblem>(m, "NonlinearMode")
       .def(

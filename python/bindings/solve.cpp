@@ -31,6 +31,8 @@ void bind_solve(nb::module_& m) {
       .def("residual", [](Problem& p, Petsc<Vec> y, Petsc<Vec> r) { p.residual(y.object, r.object); })
       .def("product", [](Problem& p, Petsc<Vec> y, Petsc<Vec> dy,
                          Petsc<Vec> dr) { p.product(y.object, dy.object, dr.object); })
+      .def("transposed_product", [](Problem& p, Petsc<Vec> y, Petsc<Vec> dr,
+                                    Petsc<Vec> dy) { p.transposed_product(y.object, dr.object, dy.object); })
       .def("jacobian", [](Problem& p, Petsc<Vec> y) { return handed(assemble(p, y.object)); })
       .def("fill_jacobian", [](Problem& p, Petsc<Vec> y, Petsc<Mat> J) { assemble(p, y.object, J.object); })
       .def("metric", [](Problem& p, Petsc<Vec> y, Petsc<Vec> weights) { p.metric(y.object, weights.object); })
@@ -50,6 +52,8 @@ void bind_solve(nb::module_& m) {
       .def("residual", [](Bordered& b, Petsc<Vec> y, Petsc<Vec> g) { b.residual(y.object, g.object); })
       .def("product", [](Bordered& b, Petsc<Vec> y, Petsc<Vec> dy,
                          Petsc<Vec> dg) { b.product(y.object, dy.object, dg.object); })
+      .def("transposed_product", [](Bordered& b, Petsc<Vec> y, Petsc<Vec> dg,
+                                    Petsc<Vec> dy) { b.transposed_product(y.object, dg.object, dy.object); })
       .def("jacobian", [](Bordered& b, Petsc<Vec> y) {
         MatHandle J = b.matrix();
         b.assemble(y.object, J);

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "error.h"
+#include "hb/diagnostics.h"
 #include "log.h"
 #include "solve/memory.h"
 #include "solve/vectors.h"
@@ -66,13 +67,15 @@ DiscretisationError::DiscretisationError(HarmonicProblem& problem, std::string c
     return;
   }
   finer_ = refined(problem, orders, std::max(4 * problem.harmonics().samples(), 16 * orders.back()));
-  finer_->multiply_exactly();  // an error is a small difference
+  finer_->terms().multiply_exactly();  // an error is a small difference
   newton_ = std::make_unique<solve::Newton>(*finer_, prefix);
   newton_->solve_beside(tolerance);
 }
 
 /// The rows of the finer equations that the problem itself has, the others zero.
-VecHandle DiscretisationError::retained(Vec r) const { return problem_.on(*finer_, finer_->on(problem_, r)); }
+VecHandle DiscretisationError::retained(Vec r) const {
+  return embedded(problem_, *finer_, embedded(*finer_, problem_, r));
+}
 
 /// -r, and zero in the closing row.
 VecHandle DiscretisationError::right_side(Vec r) const {
@@ -87,7 +90,7 @@ VecHandle DiscretisationError::right_side(Vec r) const {
 void DiscretisationError::close(Vec y, Vec tangent) {
   VecHandle weights = problem_.unknowns();
   problem_.metric(y, weights);
-  newton_->system().close(problem_.on(*finer_, solve::weighted(weights, tangent)), 0);
+  newton_->system().close(embedded(problem_, *finer_, solve::weighted(weights, tangent)), 0);
 }
 
 namespace {
@@ -105,8 +108,9 @@ std::optional<LeftOut> DiscretisationError::at(Vec y, Vec tangent) {
   if (!finer_) return {};
   static const log::Event estimate("FwErrorEstimate");
   const log::Span span(estimate);
-  VecHandle r = problem_.residual_at(y), finer = finer_->equations();
-  VecHandle point = problem_.on(*finer_, y), left = problem_.on(*finer_, r);
+  VecHandle r = problem_.equations(), finer = finer_->equations();
+  problem_.residual(y, r);
+  VecHandle point = embedded(problem_, *finer_, y), left = embedded(problem_, *finer_, r);
   check(VecScale(left, problem_.stiffness_scale() / finer_->stiffness_scale()));
   finer_->residual(point, finer);
   VecHandle same = retained(finer);

@@ -104,6 +104,31 @@ void DynamicStiffness::multiply_add(Exponents const& e, Vec x, Vec y, int order)
       accumulate(coefficients(model_.terms()[j], e), blocked_[j], x, y);
 }
 
+/// (A (x) c)^T = A^T (x) conj(c): as a block on (cos, sin), c = a + i b is [[a, b], [-b, a]].
+void DynamicStiffness::transposed_multiply_add(Exponents const& e, Vec x, Vec y) {
+  for (size_t j = 0; j < blocked_.size(); ++j) {
+    multiply(harmonics_, conjugate(coefficients(model_.terms()[j], e)), ReadArray(x).data(),
+             WriteArray(work_).data(), int(model_.local_dofs()));
+    accumulate_transposed(blocked_[j], work_, y);
+  }
+}
+
+/// y += A^T x: of dense rows every rank has a part of all entries.
+void DynamicStiffness::accumulate_transposed(Blocked const& A, Vec x, Vec y) const {
+  if (A.sparse) return check(MatMultTransposeAdd(A.sparse, x, y, y));
+  const int m = harmonics_.block_size(), local = int(model_.local_dofs()), all = int(model_.dofs());
+  std::vector<double> parts(size_t(all) * m, 0.0);
+  const double one = 1;
+  if (local)
+    dgemm_("N", "T", &m, &all, &local, &one, ReadArray(x).data(), &m, A.dense.data(), &all, &one,
+           parts.data(), &m);
+  MPI_Allreduce(MPI_IN_PLACE, parts.data(), as_int(PetscInt64(parts.size()), "a dense product's entries"),
+                MPI_DOUBLE, MPI_SUM, model_.comm());
+  WriteArray Y(y);
+  double const* mine = parts.data() + size_t(model_.first_dof()) * m;
+  for (size_t k = 0; k < size_t(local) * m; ++k) Y[PetscInt(k)] += mine[k];
+}
+
 void DynamicStiffness::multiply_add_exactly(Exponents const& e, Vec x, Vec y) {
   for (size_t j = 0; j < blocked_.size(); ++j)
     accumulate(coefficients(model_.terms()[j], e), blocked_[j], x, y, true);

@@ -12,6 +12,8 @@ class DynamicStiffness {
   DynamicStiffness(model::Model const&, Harmonics const&);
   /// y += Z x on harmonic-block vectors, of all terms or of those of one order. Collective.
   void multiply_add(Exponents const&, Vec x, Vec y, int order = -1);
+  /// y += Z^T x. Collective.
+  void transposed_multiply_add(Exponents const&, Vec x, Vec y);
   /// y += Z x, dense stiffness without its rounding (`SplitMatrix`): for residuals. Collective.
   void multiply_add_exactly(Exponents const&, Vec x, Vec y);
   /// y += dZ x for a change (ds, dg) of the exponents. Collective.
@@ -43,6 +45,7 @@ class DynamicStiffness {
   };
   complex phase(model::Term const&, int n) const;
   void accumulate(std::vector<complex> const& c, Blocked const&, Vec x, Vec y, bool exactly = false);
+  void accumulate_transposed(Blocked const&, Vec x, Vec y) const;
   std::vector<Entry> entries(Mat A) const;
 
   model::Model const& model_;

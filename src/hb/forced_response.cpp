@@ -84,7 +84,7 @@ ForcedStart::ForcedStart(ForcedResponse& to, Vec y, Way way)
       way_(way),
       amplitude_(to.reference_amplitude()),
       frequency_(last_entry(y)),
-      exponents_(to.exponents(y)) {
+      exponents_(to.scaled(y).exponents) {
   VecHandle left = to.equations();
   to.residual(y, left);
   guess_ = like(excitation());

@@ -1,6 +1,8 @@
 #include "hb/harmonic_problem.h"
 
 #include <algorithm>
+#include <cmath>
+#include <utility>
 
 #include "error.h"
 #include "text.h"
@@ -26,6 +28,7 @@ std::string gap_text(double distance) { return "gaps " + short_text(distance) + 
 HarmonicProblem::HarmonicProblem(model::Model const& model, Harmonics const& h, int scalars, Row row,
                                  double reference_stiffness)
     : residual_(countable(model, h), h),
+      at_rest_(residual_),
       scalars_(scalars),
       row_(std::move(row)),
       local_block_(model.local_dofs() * h.block_size()),
@@ -38,29 +41,26 @@ HarmonicProblem::HarmonicProblem(model::Model const& model, Harmonics const& h, 
       throw InputError("the chosen dof does not exist", std::to_string(dof),
                        "0 to " + std::to_string(model.dofs() - 1), "choose a dof of the model");
   q_ = residual_.vector();
-  for (auto* v : {&Q_, &dQ_, &R_, &dR_, &excitation_, &static_, &static_load_}) *v = like(q_);
+  for (auto* v : {&Q_, &dQ_, &R_, &dR_, &excitation_}) *v = like(q_);
   check(VecSet(excitation_, 0));
-  check(VecSet(static_, 0));
-  check(VecSet(static_load_, 0));
-  last_ = unknowns();
 }
 
 HarmonicProblem::HarmonicProblem(HarmonicProblem const& same, Harmonics const& h)
     : HarmonicProblem(same.model(), h, same.scalars_, same.row_, same.stiffness_) {
-  excitation_ = same.on(*this, same.excitation_);
-  static_ = same.on(*this, same.static_), static_load_ = same.on(*this, same.static_load_);
-  for (auto const& g : same.unfold_) unfold_.push_back(same.on(*this, g));
-  sliders_ = same.sliders_, owner_ = same.owner_;
-  last_ = unknowns();
+  const auto here = [&](Vec x) { return embedded(model(), same.harmonics(), h, x); };
+  excitation_ = here(same.excitation_);
+  at_rest_.embed_from(same.at_rest_, here);
+  unfolding_ = same.unfolding_.embedded(here);
 }
 
-VecHandle HarmonicProblem::on(HarmonicProblem const& other, Vec x) const {
-  const PetscInt tail = local_size(x) - local_block_;
-  VecHandle out = make_vector(comm(), other.local_block_ + tail);
-  const ReadArray from(x);
-  const WriteArray to(out);
-  embed(harmonics(), from.data(), other.harmonics(), to.data(), int(model().local_dofs()));
-  std::copy_n(from.data() + local_block_, tail, to.data() + other.local_block_);
+VecHandle embedded(model::Model const& model, Harmonics const& from, Harmonics const& to, Vec x) {
+  const PetscInt n = model.local_dofs(), before = n * from.block_size(), after = n * to.block_size(),
+                 tail = local_size(x) - before;
+  VecHandle out = make_vector(model.comm(), after + tail);
+  const ReadArray in(x);
+  const WriteArray written(out);
+  embed(from, in.data(), to, written.data(), int(n));
+  std::copy_n(in.data() + before, tail, written.data() + after);
   return out;
 }
 
@@ -72,11 +72,11 @@ std::span<std::pair<PetscInt, double> const> HarmonicProblem::mine() const {
 }
 
 std::vector<double> HarmonicProblem::scalars(Vec y) {
-  std::vector<double> z(scalars_ + 2 + unfoldings(), 0.0);
+  std::vector<double> z(scalars_ + 2 + unfolding_.count(), 0.0);
   ReadArray in(y);
   if (last_rank()) {
-    std::copy_n(in.data() + local_block_, unfoldings(), z.begin() + scalars_ + 2);
-    std::copy_n(in.data() + local_block_ + unfoldings(), scalars_, z.begin());
+    std::copy_n(in.data() + local_block_, unfolding_.count(), z.begin() + scalars_ + 2);
+    std::copy_n(in.data() + local_block_ + unfolding_.count(), scalars_, z.begin());
   }
   if (harmonics().fundamental() >= 0 && !mine().empty()) {
     double* along = z.data() + scalars_;
@@ -95,64 +95,48 @@ void HarmonicProblem::unpack(Vec y) {
   z_ = scalars(y);
   motion_ = motion(z_);
   residual_.stand_off(motion_.stand_off);
-  if (sliders_) residual_.place(*sliders_, owner_);
+  at_rest_.place(residual_);
   {
     ReadArray in(y);
     std::copy_n(in.data(), local_block_, WriteArray(q_).data());
   }
-  check(VecWAXPY(Q_, motion_.amplitude, q_, static_));
+  check(VecWAXPY(Q_, motion_.amplitude, q_, at_rest_.state()));
 }
 
-void HarmonicProblem::set_mean(Vec per_dof, Vec blocks) {
-  ReadArray in(per_dof);
-  WriteArray out(blocks);
-  for (PetscInt i = 0; i < model().local_dofs(); ++i) out[i * harmonics().block_size()] = in[i];
+/// One word of all ranks: where one failed in changing the laws, their versions differ.
+bool HarmonicProblem::linearised_at(Vec y) const {
+  int same = linearised_in_ == stiffness_ && contact_version_ == residual_.contact_version() &&
+             rest_version_ == at_rest_.version() && unfolded_ == unfolding_.count();
+  if (same) {
+    const ReadArray now(y), last(last_);
+    same = std::ranges::equal(now.span(), last.span());
+  }
+  MPI_Allreduce(MPI_IN_PLACE, &same, 1, MPI_INT, MPI_LAND, comm());
+  return same;
 }
 
-void HarmonicProblem::preload(Vec x, Vec P) {
-  if (harmonics().orders()[0] != 0)
-    throw InputError("a preloaded structure moves about a mean that is not retained",
-                     "lowest harmonic " + std::to_string(harmonics().orders()[0]), "harmonic 0 retained",
-                     "retain all harmonics");
-  set_mean(x, static_);
-  set_mean(P, static_load_);
-  linearised_ = false;
-}
-
-void HarmonicProblem::stand(PerContact sliders) {
-  static unsigned owners = 0;
-  sliders_ = std::move(sliders), owner_ = ++owners;
-  residual_.place(*sliders_, owner_);
-  linearised_ = false;
-}
-
-void HarmonicProblem::keep_loads(HarmonicProblem const& other) {
-  sliders_ = other.sliders_, owner_ = other.owner_;
-  check(VecCopy(other.static_, static_));
-  check(VecWAXPY(static_load_, 1, other.excitation_, other.static_load_));
-  linearised_ = false;
+/// Line searches evaluate elsewhere: the point of linearisation is y, whatever was evaluated last, and the
+/// laws are as they are now, whichever problem of the model has changed them.
+void HarmonicProblem::linearise(Vec y) {
+  if (linearised_at(y)) return;
+  linearised_in_ = 0;  // until all of it is done
+  unpack(y);
+  residual_.evaluate(Q_, motion_.exponents, R_);
+  check(VecAXPBYPCZ(R_, -motion_.load, -1, 1, excitation_, at_rest_.load()));
+  check(VecScale(R_, 1 / (stiffness_ * motion_.amplitude)));
+  if (!last_ || unfolded_ != unfolding_.count()) last_ = unknowns();
+  check(VecCopy(y, last_));
+  columns_ = std::vector<VecHandle>(scalars_);
+  double size;
+  check(VecNorm(R_, NORM_2, &size));
+  if (std::isfinite(size)) linearised_in_ = stiffness_;  // what came out wrong is tried again
+  contact_version_ = residual_.contact_version(), rest_version_ = at_rest_.version();
+  unfolded_ = unfolding_.count();
 }
 
 void HarmonicProblem::residual(Vec y, Vec r) {
-  unpack(y);
-  residual_.evaluate(Q_, motion_.exponents, R_);
-  check(VecAXPBYPCZ(R_, -motion_.load, -1, 1, excitation_, static_load_));
-  check(VecScale(R_, 1 / (stiffness_ * motion_.amplitude)));
-  check(VecCopy(y, last_));
-  columns_ = std::vector<VecHandle>(scalars_);
-  linearised_ = true, contact_version_ = residual_.contact_version();
-  put_residual(r);
-}
-
-VecHandle HarmonicProblem::residual_at(Vec y) {
   linearise(y);
-  VecHandle r = equations();
-  put_residual(r);
-  return r;
-}
-
-void HarmonicProblem::put_residual(Vec r) {
-  const auto along = components(q_);
+  const auto along = unfolding_.components(q_);
   WriteArray out(r);
   ReadArray in(R_);
   std::copy_n(in.data(), local_block_, out.data());
@@ -160,58 +144,10 @@ void HarmonicProblem::put_residual(Vec r) {
   if (last_rank() && normalised()) out[local_block_] -= 1;
 }
 
-void HarmonicProblem::unfold(Vec re, Vec im) {
-  const MatHandle M = model().sum(2);
-  const PetscInt m = harmonics().block_size(), cosine = harmonics().offset(harmonics().fundamental());
-  VecHandle Mre = like(re), Mim = like(im);
-  check(MatMult(M, re, Mre));
-  check(MatMult(M, im, Mim));
-  // (tau_c - i tau_s) M phi as (cos, sin); with the same vectors, Re and -Im of phi^H M q_1, which is (cos,
-  // sin)
-  const ReadArray a(Mre), b(Mim);
-  unfold_.clear();
-  for (int part = 0; part < 2; ++part) {
-    VecHandle g = like(q_);
-    {
-      WriteArray out(g);
-      for (PetscInt i = 0; i < model().local_dofs(); ++i) {
-        out[i * m + cosine] = part ? b[i] : a[i];
-        out[i * m + cosine + 1] = part ? a[i] : -b[i];
-      }
-    }
-    double length;
-    check(VecNormalize(g, &length));
-    if (!(length > 0))
-      throw InputError("the mode to be avoided has no inertia", std::to_string(length), "> 0",
-                       "give the other mode of the pair");
-    unfold_.push_back(std::move(g));
-  }
-  last_ = unknowns();
-  linearised_ = false;
-}
-
-std::vector<double> HarmonicProblem::unfolding(Vec y) {
-  const auto z = scalars(y);
-  return {z.begin() + scalars_ + 2, z.end()};
-}
-
-/// Of q along the unfolding's vectors.
-std::vector<double> HarmonicProblem::components(Vec q) const {
-  std::vector<double> along;
-  for (auto const& g : unfold_) {
-    along.push_back(0);
-    check(VecDot(g, q, &along.back()));
-  }
-  return along;
-}
-
 /// Adds the unfolding's force and sets the rows beside the harmonic ones, all of them linear: (w . q, along).
 void HarmonicProblem::border(std::vector<double> const& z, std::vector<double> const& along,
                              double* r) const {
-  for (int j = 0; j < unfoldings(); ++j) {
-    const ReadArray g(unfold_[j]);
-    for (PetscInt i = 0; i < local_block_; ++i) r[i] += z[scalars_ + 2 + j] * g[i];
-  }
+  unfolding_.add(z.data() + scalars_ + 2, r);
   if (!last_rank() || !normalised()) return;
   std::copy_n(z.begin() + scalars_, 2, r + local_block_);
   std::copy(along.begin(), along.end(), r + local_block_ + 2);
@@ -227,22 +163,7 @@ std::uint64_t HarmonicProblem::piece(Vec y) {
   return residual_.piece();
 }
 
-bool HarmonicProblem::measure_in(double k) {
-  const bool changes = k != stiffness_;
-  stiffness_ = k;
-  if (changes) linearised_ = false;
-  return changes;
-}
-
-void HarmonicProblem::wear(PerContact const& depth) {
-  residual_.wear(depth);
-  linearised_ = false;
-}
-
-EnergyBalance HarmonicProblem::energy(Vec y) {
-  linearise(y);
-  return residual_.energy();
-}
+bool HarmonicProblem::measure_in(double k) { return std::exchange(stiffness_, k) != k; }
 
 /// Motion counts relative to its own size, so that a step is a share of it whatever the mesh. The mean of a
 /// vibration does not count: what little holds a part in place by friction (a ring in its groove) lets it
@@ -259,8 +180,8 @@ void HarmonicProblem::metric(Vec y, Vec weights) {
   const double weight = square > 0 ? 1 / square : 1;  // no motion at all: the scalars alone measure
   for (PetscInt i = 0; i < local_block_; ++i) out[i] = i % m < mean ? 0 : weight;
   if (!last_rank()) return;
-  std::fill_n(out.data() + local_block_, unfoldings(), 1.0);
-  for (int j = 0; j < scalars_; ++j) out[local_block_ + unfoldings() + j] = metric_weight(j);
+  std::fill_n(out.data() + local_block_, unfolding_.count(), 1.0);
+  for (int j = 0; j < scalars_; ++j) out[local_block_ + unfolding_.count() + j] = metric_weight(j);
 }
 
 VecHandle HarmonicProblem::pack(Vec q, std::vector<double> const& z) const {
@@ -269,27 +190,19 @@ VecHandle HarmonicProblem::pack(Vec q, std::vector<double> const& z) const {
   ReadArray in(q);
   std::copy_n(in.data(), local_block_, out.data());
   if (!last_rank()) return y;
-  std::fill_n(out.data() + local_block_, unfoldings(), 0.0);
-  std::copy_n(z.begin(), scalars_, out.data() + local_block_ + unfoldings());
+  std::fill_n(out.data() + local_block_, unfolding_.count(), 0.0);
+  std::copy_n(z.begin(), scalars_, out.data() + local_block_ + unfolding_.count());
   return y;
 }
 
 VecHandle HarmonicProblem::coefficients(Vec y) {
-  if (sliders_) residual_.place(*sliders_, owner_);  // whoever asks for the motion asks the laws next
+  at_rest_.place(residual_);  // whoever asks for the motion asks the laws next
   VecHandle Q = residual_.vector();
   const auto m = motion(scalars(y));
-  ReadArray in(y), rest(static_);
+  ReadArray in(y), rest(at_rest_.state());
   WriteArray out(Q);
   for (PetscInt i = 0; i < local_block_; ++i) out[i] = rest[i] + m.amplitude * in[i];
   return Q;
-}
-
-ContactSummary HarmonicProblem::summarise(Vec y) {
-  return residual_.summarise(coefficients(y), exponents(y));
-}
-
-std::vector<ContactPeriod> HarmonicProblem::contact_periods(Vec y) {
-  return residual_.periods(coefficients(y), exponents(y));
 }
 
 }  // namespace fretwave::hb

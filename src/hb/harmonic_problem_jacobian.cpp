@@ -5,16 +5,6 @@
 
 namespace fretwave::hb {
 
-/// Line searches evaluate elsewhere: the point of linearisation is y, whatever was evaluated last, and the
-/// laws are as they are now, whichever problem of the model has changed them.
-void HarmonicProblem::linearise(Vec y) {
-  PetscBool same = PETSC_FALSE;
-  if (linearised_ && contact_version_ == residual_.contact_version()) check(VecEqual(y, last_, &same));
-  if (same) return;
-  VecHandle unused = equations();
-  residual(y, unused);
-}
-
 // Q = Q_static + a q: dQ = a (dq + q dlog a); r = R / (k a): dr = dR / (k a) - r dlog a
 void HarmonicProblem::product(Vec y, Vec dy, Vec dr) {
   linearise(y);
@@ -23,7 +13,7 @@ void HarmonicProblem::product(Vec y, Vec dy, Vec dr) {
     ReadArray in(dy);
     std::copy_n(in.data(), local_block_, WriteArray(dQ_).data());
   }
-  const auto along = components(dQ_);
+  const auto along = unfolding_.components(dQ_);
   residual_.product(dQ_, nullptr, dR_);
   check(VecScale(dR_, 1 / stiffness_));
   for (int j = 0; j < scalars_; ++j) check(VecAXPY(dR_, dz[j], column(j)));
@@ -33,13 +23,44 @@ void HarmonicProblem::product(Vec y, Vec dy, Vec dr) {
   border(dz, along, out.data());
 }
 
+// J = [[dR/dQ / k, G, C], [W, 0, 0], [G^T, 0, 0]], G the unfolding's vectors, C the scalars' columns, W the
+// row on the fundamental; rows below the first are on the last rank.
+void HarmonicProblem::transposed_product(Vec y, Vec dr, Vec dy) {
+  linearise(y);
+  const int beside = normalised() ? unfolding_.count() + scalars_ - 1 : 0;
+  std::vector<double> below(beside, 0.0);
+  VecHandle p = like(q_);
+  {
+    const ReadArray in(dr);
+    std::copy_n(in.data(), local_block_, WriteArray(p).data());
+    if (last_rank()) std::copy_n(in.data() + local_block_, beside, below.begin());
+  }
+  MPI_Bcast(below.data(), beside, MPI_DOUBLE, comm_size(comm()) - 1, comm());
+  std::vector<double> z = unfolding_.components(p);
+  for (int j = 0; j < scalars_; ++j) {
+    z.push_back(0);
+    check(VecDot(column(j), p, &z.back()));
+  }
+  residual_.transposed_product(p, dR_);
+  check(VecScale(dR_, 1 / stiffness_));
+  const ReadArray in(dR_);
+  WriteArray out(dy);
+  std::copy_n(in.data(), local_block_, out.data());
+  for (int j = 0; normalised() && j < 2; ++j)
+    for (auto const& [dof, weight] : mine())
+      out[(dof - model().first_dof()) * harmonics().block_size() +
+          harmonics().offset(harmonics().fundamental()) + j] += weight * below[j];
+  if (beside > 2) unfolding_.add(below.data() + 2, out.data());
+  if (last_rank()) std::ranges::copy(z, out.data() + local_block_);
+}
+
 void HarmonicProblem::pattern(std::vector<PetscInt>& rows, std::vector<PetscInt>& cols) {
   residual_.pattern(rows, cols);
   const PetscInt first = model().first_dof() * harmonics().block_size(),
                  all = model().dofs() * harmonics().block_size();
-  for (int j = 0; j < unfoldings() + scalars_; ++j)
+  for (int j = 0; j < unfolding_.count() + scalars_; ++j)
     for (PetscInt i = 0; i < local_block_; ++i) rows.push_back(first + i), cols.push_back(all + j);
-  for (int j = 0; j < unfoldings(); ++j)
+  for (int j = 0; j < unfolding_.count(); ++j)
     for (PetscInt i = 0; i < local_block_; ++i) rows.push_back(all + 2 + j), cols.push_back(first + i);
   if (!normalised()) return;
   for (int j = 0; j < 2; ++j)
@@ -74,9 +95,9 @@ void HarmonicProblem::values(Vec y, std::span<double> v) {
   linearise(y);
   double* next = residual_.values(1 / stiffness_, v.data());
   const auto add = [&](Vec x) { next = std::copy_n(ReadArray(x).data(), local_block_, next); };
-  for (auto const& g : unfold_) add(g);
+  for (auto const& g : unfolding_.vectors()) add(g);
   for (int j = 0; j < scalars_; ++j) add(column(j));
-  for (auto const& g : unfold_) add(g);
+  for (auto const& g : unfolding_.vectors()) add(g);
   for (int j = 0; normalised() && j < 2; ++j)
     for (auto const& [dof, weight] : mine()) *next++ = weight;
 }
@@ -92,18 +113,6 @@ std::vector<PairTangents> HarmonicProblem::pair_tangents(Vec y) {
   for (auto& contact : contacts)
     for (double& d : contact.D) d /= stiffness_;
   return contacts;
-}
-
-VecHandle HarmonicProblem::gap_product(Vec y, PerContact const& dgap) {
-  linearise(y);
-  residual_.gap_product(dgap, dR_);
-  VecHandle out = equations();
-  check(VecSet(out, 0));
-  ReadArray in(dR_);
-  const double scale = 1 / (stiffness_ * motion_.amplitude);
-  std::transform(in.data(), in.data() + local_block_, WriteArray(out).data(),
-                 [&](double r) { return scale * r; });
-  return out;
 }
 
 /// A step in the mean alone: friction held it, and what held it slips now.

@@ -54,6 +54,7 @@ class ModeStart : public NonlinearMode {
  public:
   ModeStart(model::Model const&, Harmonics const&, Method, Row row, double omega, Vec shape, Vec imaginary,
             double amplitude);
+  using HarmonicProblem::keep_loads;
   VecHandle initial();
   /// Unknowns of the mode at the end of the way.
   VecHandle mode(Vec y) const;

@@ -88,6 +88,7 @@ void Residual::evaluate(Vec Q, Exponents const& e, Vec R) {
   static const log::Event forces("FwContactForce");
   if (Q != Q_) check(VecCopy(Q, Q_));
   e_ = e;
+  tangents_.clear();
   check(VecSet(R, 0));
   stiffness_.multiply_add_exactly(e, Q_, R);
   for (Group& group : groups_) relative_motion(group, Q_, group.U);
@@ -109,6 +110,29 @@ void Residual::product(Vec dQ, Exponents const* de, Vec dR) {
   if (dQ && !exactly_) stiffness_.multiply_add(e_, dQ, dR);
   if (de) stiffness_.derivative_multiply_add(e_, *de, Q_, dR);
   for (Group& group : groups_) contact_product(group, dQ, de, dR);
+}
+
+void Residual::transposed_product(Vec dR, Vec dQ) {
+  check(VecSet(dQ, 0));
+  stiffness_.transposed_multiply_add(e_, dR, dQ);
+  if (tangents_.empty()) tangents_ = pair_tangents();
+  for (size_t g = 0; g < groups_.size(); ++g) transposed_contact_product(groups_[g], tangents_[g], dR, dQ);
+}
+
+/// dF/dQ = S^T D S with S = sum_k B_k e^{-i k n theta} and D the pairs' dF/dU: its transpose is S^T D^T S.
+void Residual::transposed_contact_product(Group& group, PairTangents const& tangents, Vec dR, Vec dQ) {
+  VecHandle U = relative_motion(group, dR), F = like(group.F);
+  const size_t ld = size_t(tangents.components) * harmonics_.block_size();
+  {
+    const ReadArray u(U);
+    const WriteArray f(F);
+    std::fill_n(f.data(), tangents.pairs * ld, 0.0);
+    double const* D = tangents.D.data();
+    for (size_t first = 0; first < tangents.pairs * ld; first += ld)
+      for (size_t row = 0; row < ld; ++row)
+        for (size_t col = 0; col < ld; ++col) f.data()[first + col] += *D++ * u.data()[first + row];
+  }
+  add_force(group, F, dQ);
 }
 
 // dV = s dU + ds U: the velocity's coefficients are s U (Laxalde et al. 2008, step 1 of the AFT)

@@ -49,6 +49,9 @@ class Residual {
   /// dR for (dQ, de) at the last evaluated point; dQ or de may be null. Collective.
   void product(Vec dQ, Exponents const* de, Vec dR);
 
+  /// dQ = (dR/dQ)^T dR at the last evaluated point. Collective.
+  void transposed_product(Vec dR, Vec dQ);
+
   /// Entries of dR/dQ: global places on this rank, and values in the same order times `scale` at the last
   /// evaluated point.
   void pattern(std::vector<PetscInt>& rows, std::vector<PetscInt>& cols);
@@ -125,6 +128,7 @@ class Residual {
   std::vector<VecHandle> relative_motions(Vec Q) const;  ///< of all contacts. Collective.
   void add_force(Group const&, Vec F, Vec R) const;
   void contact_product(Group&, Vec dQ, Exponents const* de, Vec dR);
+  void transposed_contact_product(Group&, PairTangents const&, Vec dR, Vec dQ);
   void find_weights(Group&);
   void turn(int row_phase, int col_phase, double* block) const;
   std::vector<complex> factors(int phase) const;
@@ -137,6 +141,7 @@ class Residual {
   VecHandle Q_;  ///< copy of the last evaluated point (the callers' vectors are not ours to keep)
   Exponents e_;
   bool exactly_ = false;
+  std::vector<PairTangents> tangents_;  ///< of transposed products, at the last evaluated point
 };
 
 }  // namespace fretwave::hb

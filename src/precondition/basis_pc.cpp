@@ -90,7 +90,7 @@ std::vector<std::vector<complex>> BasisPreconditioner::structure(Exponents const
   bool taken[3] = {};
   for (auto const& term : problem_.model().terms()) {
     if (term.order == 0 || std::exchange(taken[term.order], true)) continue;
-    const auto c = problem_.stiffness().coefficients(term, e);
+    const auto c = problem_.terms().stiffness().coefficients(term, e);
     auto const& diagonal = term.order == 1 ? damping_ : basis_.theta();
     for (int i = first_; i < last_; ++i)
       for (int j = 0; j < n_; ++j) z[i - first_][j] += c[i] / scale * diagonal[j];
@@ -100,7 +100,7 @@ std::vector<std::vector<complex>> BasisPreconditioner::structure(Exponents const
 
 void BasisPreconditioner::build(Vec y, Vec row) {
   const auto contacts = problem_.pair_tangents(y);
-  auto z = structure(problem_.exponents(y));
+  auto z = structure(problem_.scaled(y).exponents);
   auto border = this->border(y, row);
   means_ = mean_tangents(contacts);
   together(problem_.comm(), "inverting harmonic blocks", [&] {

@@ -208,7 +208,7 @@ void CondensedPreconditioner::condense() {
 }
 
 void CondensedPreconditioner::build(Vec y, Vec row) {
-  const Exponents e = problem_.exponents(y);
+  const Exponents e = problem_.scaled(y).exponents;
   auto contacts = problem_.pair_tangents(y);
   if (rows_.pairs.empty()) rows_ = ContactRows::of(contacts, problem_.comm());
   if (moved(e)) factorise(e, contacts);

@@ -108,7 +108,7 @@ void HarmonicFactors::average(std::vector<PairTangents> const& contacts) {
 std::vector<complex> HarmonicFactors::values(int harmonic, Exponents const& e) const {
   std::vector<complex> v(pattern_.rows.size());
   for (size_t j = 0; j < terms_.size(); ++j) {
-    const complex c = problem_.stiffness().coefficients(problem_.model().terms()[j], e)[harmonic] /
+    const complex c = problem_.terms().stiffness().coefficients(problem_.model().terms()[j], e)[harmonic] /
                       problem_.stiffness_scale();
     for (auto const& entry : terms_[j]) v[entry.slot] += c * entry.value;
   }

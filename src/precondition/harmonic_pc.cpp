@@ -10,7 +10,7 @@ HarmonicPreconditioner::HarmonicPreconditioner(HarmonicProblem& problem) : Pairw
 std::vector<complex> HarmonicPreconditioner::structure(int harmonic, Exponents const& e) const {
   std::vector<complex> A(size_t(n_) * n_);
   for (size_t j = 0; j < terms_.size(); ++j) {
-    const complex c = problem_.stiffness().coefficients(problem_.model().terms()[j], e)[harmonic] /
+    const complex c = problem_.terms().stiffness().coefficients(problem_.model().terms()[j], e)[harmonic] /
                       problem_.stiffness_scale();
     for (size_t k = 0; k < A.size(); ++k) A[k] += c * terms_[j][k];
   }

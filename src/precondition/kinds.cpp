@@ -24,7 +24,7 @@ bool suits_dense(HarmonicProblem const& problem) {
 }
 
 std::string unfolded(HarmonicProblem const& problem) {
-  return problem.unfolding_vectors().empty() ? "" : "a wheel whose double mode is unfolded";
+  return problem.unfolding().vectors().empty() ? "" : "a wheel whose double mode is unfolded";
 }
 
 /// A pair that reaches into another sector couples harmonics with phases, which the condensed form leaves

@@ -139,7 +139,7 @@ void PairwisePreconditioner::couple(std::vector<PairTangents>&& contacts) {
 
 void PairwisePreconditioner::build(Vec y, Vec row) {
   Harmonics const& h = problem_.harmonics();
-  const Exponents e = problem_.exponents(y);
+  const Exponents e = problem_.scaled(y).exponents;
   auto contacts = problem_.pair_tangents(y);
   tangents_ = gather_contact(contacts);
   inverses_.clear(), inverses_.resize(h.count());

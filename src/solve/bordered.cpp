@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "error.h"
+
 namespace fretwave::solve {
 
 namespace {
@@ -65,6 +67,23 @@ void Bordered::product(Vec y, Vec dy, Vec dg) {
   ReadArray in(equations_);
   std::copy_n(in.data(), problem_.local_equations(), out.data());
   if (problem_.last_rank()) out[problem_.local_equations()] = along;
+}
+
+void Problem::transposed_product(Vec, Vec, Vec) {
+  throw InputError("the Jacobian of this problem has no transpose", "a transposed product",
+                   "a harmonic balance, or the direct route", "take a KSP that needs none, as fgmres");
+}
+
+/// [J; row^T]^T (dr, d) = J^T dr + d row.
+void Bordered::transposed_product(Vec y, Vec dg, Vec dy) {
+  double last = 0;
+  {
+    const ReadArray in(dg);
+    std::copy_n(in.data(), problem_.local_equations(), WriteArray(equations_).data());
+    last = last_entry(dg);
+  }
+  problem_.transposed_product(y, equations_, dy);
+  check(VecAXPY(dy, last, row_));
 }
 
 MatHandle Bordered::matrix() {

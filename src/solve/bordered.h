@@ -15,6 +15,7 @@ class Bordered {
   Vec row() const { return row_; }
   void residual(Vec y, Vec g);
   void product(Vec y, Vec dy, Vec dg);
+  void transposed_product(Vec y, Vec dg, Vec dy);
   /// Matrix for the direct route: dense on one rank when small (LAPACK pivots, no symbolic cost), AIJ
   /// otherwise.
   MatHandle matrix();

@@ -24,6 +24,20 @@ const Tuned tangent_accepted("linear_tangent_accepted", 1e-6,
 const Tuned renewal("linear_renewal", 1.0 / 16,
                     "share of all iterations that is spent on building preconditioners anew");
 
+/// Our options under the prefix, where PETSc's -help is given; its macros return its error codes.
+PetscErrorCode offered(MPI_Comm comm, std::string const& prefix) {
+  char wish[32] = "auto", blocks[32] = "auto";
+  PetscOptionsBegin(comm, prefix.c_str(), "fretwave: linear systems", "fretwave");
+  PetscErrorCode code = PetscOptionsString("-route", "route of the corrector: auto, direct or krylov",
+                                           "fretwave", wish, wish, sizeof wish, nullptr);
+  if (!code)
+    code = PetscOptionsString("-blocks", "kind of preconditioner: auto, dense or sparse", "fretwave", blocks,
+                              blocks, sizeof blocks, nullptr);
+  if (code) return code;
+  PetscOptionsEnd();
+  return PetscErrorCode(0);
+}
+
 /// What the option says: one of two, or auto.
 std::string choice(std::string const& prefix, char const* option, char const* meaning, std::string const& one,
                    std::string const& other) {
@@ -101,6 +115,8 @@ void LinearSolver::use_krylov() {
   check(MatCreateShell(bordered_.problem().comm(), local, local, PETSC_DETERMINE, PETSC_DETERMINE, this,
                        J_.out()));
   check(MatShellSetOperation(J_, MATOP_MULT, reinterpret_cast<void (*)(void)>(shell_product)));
+  check(MatShellSetOperation(J_, MATOP_MULT_TRANSPOSE,
+                             reinterpret_cast<void (*)(void)>(shell_transposed_product)));
   check(KSPSetType(ksp, KSPFGMRES));
   check(KSPGMRESSetRestart(ksp, 100));
   check(KSPSetTolerances(ksp, 1e-6, 1e-13, PETSC_DEFAULT, 200));
@@ -109,6 +125,8 @@ void LinearSolver::use_krylov() {
 }
 
 void LinearSolver::take_options() {
+  check(offered(bordered_.problem().comm(), prefix_));
+  Tuned::help(bordered_.problem().comm());
   make_preconditioner();
   make_tangent();
 }
@@ -156,6 +174,21 @@ PetscErrorCode LinearSolver::shell_product(Mat J, Vec x, Vec y) {
   PetscErrorCode code = MatShellGetContext(J, &solver);
   if (code) return code;
   return solver->guard_.run([&] { solver->bordered_.product(solver->point_, x, y); });
+}
+
+PetscErrorCode LinearSolver::shell_transposed_product(Mat J, Vec x, Vec y) {
+  LinearSolver* solver;
+  PetscErrorCode code = MatShellGetContext(J, &solver);
+  if (code) return code;
+  return solver->guard_.run([&] { solver->bordered_.transposed_product(solver->point_, x, y); });
+}
+
+PetscErrorCode LinearSolver::refuse_transpose() {
+  return guard_.run([&] {
+    throw InputError("the preconditioner " + kind_.kind->type + " has no transpose", kind_.kind->type,
+                     "a PC with a transpose, as none, or a KSP that needs none, as fgmres",
+                     "give -<analysis>_pc_type none, or leave out -<analysis>_ksp_type");
+  });
 }
 
 PetscErrorCode LinearSolver::apply(Vec x, Vec z) {

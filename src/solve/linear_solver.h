@@ -57,10 +57,13 @@ class LinearSolver {
   /// Of a PC whose type is a kind of ours: PCSetUp, PCApply and PCView.
   PetscErrorCode set_up(PC);
   PetscErrorCode apply(Vec x, Vec z);
+  /// None of our kinds has a transpose: says so.
+  PetscErrorCode refuse_transpose();
   std::string description() const;
 
  private:
   static PetscErrorCode shell_product(Mat, Vec, Vec);
+  static PetscErrorCode shell_transposed_product(Mat, Vec, Vec);
   void choose_route();
   void use_krylov();
   void make_preconditioner();

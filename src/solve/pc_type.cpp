@@ -39,6 +39,13 @@ PetscErrorCode apply(PC pc, Vec x, Vec z) {
   return solver ? solver->apply(x, z) : PETSC_ERR_ARG_WRONGSTATE;
 }
 
+PetscErrorCode apply_transpose(PC pc, Vec, Vec) {
+  LinearSolver* solver;
+  const PetscErrorCode code = solver_of(pc, &solver);
+  if (code) return code;
+  return solver ? solver->refuse_transpose() : PETSC_ERR_ARG_WRONGSTATE;
+}
+
 PetscErrorCode view(PC pc, PetscViewer viewer) {
   LinearSolver* solver;
   PetscBool text;
@@ -53,6 +60,7 @@ PetscErrorCode create(PC pc) {
   pc->data = nullptr;
   pc->ops->setup = set_up;
   pc->ops->apply = apply;
+  pc->ops->applytranspose = apply_transpose;
   pc->ops->view = view;
   return PetscErrorCode(0);
 }

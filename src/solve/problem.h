@@ -51,6 +51,8 @@ class Problem {
   virtual double largest_residual() const { return std::numeric_limits<double>::infinity(); }
   /// dr = J(y) dy, J is N x (N + 1). Collective.
   virtual void product(Vec y, Vec dy, Vec dr) = 0;
+  /// dy = J(y)^T dr, the adjoint; `InputError` for a problem that has none. Collective.
+  virtual void transposed_product(Vec y, Vec dr, Vec dy);
   /// Global places of J's entries contributed by this rank, and their values in the same order (places may
   /// repeat: values add).
   virtual void pattern(std::vector<PetscInt>& rows, std::vector<PetscInt>& cols) = 0;

@@ -46,6 +46,13 @@ Transient::Transient(model::Model const& model, std::vector<Excitation> excitati
                        "a law of the present motion, such as regularised_coulomb",
                        "leave the time integration out, or take such a law");
   for (auto* v : {&x_, &v_, &force_, &acceleration_}) *v = model.displacement();
+  for (size_t i = 0; i < tangents_.size(); ++i) {
+    Tangents& at = tangents_[i];
+    check(MatCreateVecs(model.contacts()[i].B, nullptr, at.u.out()));
+    at.v = like(at.u), at.f = like(at.u);
+    for (auto* samples : {&at.displacement, &at.velocity, &at.force})
+      samples->resize(size_t(local_size(at.u)));
+  }
   PC pc;
   check(KSPCreate(model.comm(), mass_.out()));
   check(KSPSetOptionsPrefix(mass_, (prefix + "mass_").c_str()));
@@ -58,30 +65,35 @@ Transient::Transient(model::Model const& model, std::vector<Excitation> excitati
   check(KSPSetUp(mass_));
 }
 
-void Transient::contact_force(model::Contact const& contact, Vec force, contact::Record& record) {
-  VecHandle u, v, f;
-  check(MatCreateVecs(contact.B, nullptr, u.out()));
-  v = like(u), f = like(u);
-  check(MatMult(contact.B, x_, u));
-  check(MatMult(contact.B, v_, v));
+namespace {
+
+/// Components of pairs from innermost to outermost.
+void pairs_innermost(double const* rows, int d, int n, std::vector<double>& out) {
+  for (int c = 0; c < d; ++c)
+    for (int i = 0; i < n; ++i) out[size_t(c) * n + i] = rows[size_t(i) * d + c];
+}
+
+}  // namespace
+
+void Transient::contact_force(model::Contact const& contact, Tangents& at, Vec force) {
+  check(MatMult(contact.B, x_, at.u));
+  check(MatMult(contact.B, v_, at.v));
   const int d = contact.law->components(), n = contact.law->pairs();
-  const auto transpose = [d, n](double const* in, std::vector<double>& out, bool pairs_innermost) {
-    for (int c = 0; c < d; ++c)
-      for (int i = 0; i < n; ++i)
-        pairs_innermost ? out[size_t(c) * n + i] = in[size_t(i) * d + c]
-                        : out[size_t(i) * d + c] = in[size_t(c) * n + i];
-  };
-  std::vector<double> uu(size_t(d) * n), vv(uu.size()), ff(uu.size()), rows(uu.size());
-  transpose(ReadArray(u).data(), uu, true);
-  transpose(ReadArray(v).data(), vv, true);
-  contact.law->force({.samples = 1, .components = d, .pairs = n, .u = uu.data(), .v = vv.data(), .step = 0},
-                     ff.data(), record);
-  transpose(ff.data(), rows, false);
+  pairs_innermost(ReadArray(at.u).data(), d, n, at.displacement);
+  pairs_innermost(ReadArray(at.v).data(), d, n, at.velocity);
+  contact.law->force({.samples = 1,
+                      .components = d,
+                      .pairs = n,
+                      .u = at.displacement.data(),
+                      .v = at.velocity.data(),
+                      .step = 0},
+                     at.force.data(), at.record);
   {
-    WriteArray out(f);
-    std::copy(rows.begin(), rows.end(), out.data());
+    WriteArray rows(at.f);
+    for (int c = 0; c < d; ++c)
+      for (int i = 0; i < n; ++i) rows[size_t(i) * d + c] = at.force[size_t(c) * n + i];
   }
-  check(MatMultTransposeAdd(contact.B, f, force, force));
+  check(MatMultTransposeAdd(contact.B, at.f, force, force));
 }
 
 /// force_ = C v + K x + B^T f - p, with x_, v_ and the contacts' tangents at the state.
@@ -95,12 +107,21 @@ void Transient::forces(double t, Vec state) {
   }
   check(MatMult(K_, x_, force_));
   if (C_) check(MatMultAdd(C_, v_, force_, force_));
-  for (size_t i = 0; i < tangents_.size(); ++i)
-    contact_force(model_.contacts()[i], force_, tangents_[i].record);
+  for (size_t i = 0; i < tangents_.size(); ++i) contact_force(model_.contacts()[i], tangents_[i], force_);
   for (auto const& part : excitation_) {
     check(VecAXPY(force_, -std::cos(part.order * omega_ * t), part.cosine));
     check(VecAXPY(force_, -std::sin(part.order * omega_ * t), part.sine));
   }
+}
+
+/// The factors alone, unless options ask for iterations: a KSP looks through all options at every solve.
+void Transient::solve_mass(Vec force, Vec acceleration) {
+  PC pc;
+  PetscBool direct;
+  check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(KSP(mass_)), KSPPREONLY, &direct));
+  if (!direct) return check(KSPSolve(mass_, force, acceleration));
+  check(KSPGetPC(mass_, &pc));
+  check(PCApply(pc, force, acceleration));
 }
 
 /// (x, v)' = (v, -M^-1 force)
@@ -108,7 +129,7 @@ PetscErrorCode Transient::right_side(TS, PetscReal t, Vec state, Vec rate, void*
   auto& self = *static_cast<Transient*>(context);
   return guarded(self.exception_, [&] {
     self.forces(t, state);
-    check(KSPSolve(self.mass_, self.force_, self.acceleration_));
+    self.solve_mass(self.force_, self.acceleration_);
     const PetscInt n = self.model_.local_dofs();
     ReadArray v(self.v_), a(self.acceleration_);
     WriteArray out(rate);
@@ -174,7 +195,8 @@ void Transient::assemble(double shift, Mat A) {
 
 void Transient::assemble_contact(size_t number, Mat A) {
   auto const& law = *model_.contacts()[number].law;
-  auto const& [rows, record] = tangents_[number];
+  auto const& rows = tangents_[number].rows;
+  auto const& record = tangents_[number].record;
   const int d = law.components(), n = law.pairs();
   for (int which = 0; which < 2; ++which) {
     auto const& tangent = which ? record.df_dv : record.df_du;
@@ -343,7 +365,7 @@ History Transient::integrate(Vec x0, Vec v0, double tolerance, bool implicit) {
   // step.
   double size, start;
   check(VecNorm(state, NORM_INFINITY, &size));
-  check(KSPSolve(mass_, force_, acceleration_));
+  solve_mass(force_, acceleration_);
   check(VecNorm(acceleration_, NORM_INFINITY, &start));
   if (size == 0) size = start > 0 ? start * std::min(interval_, interval_ * interval_) : 1;
   TsHandle ts;

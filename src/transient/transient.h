@@ -39,10 +39,13 @@ class Transient {
   History run(Vec x0, Vec v0, double t_end, double dt_out, double tolerance, double limit, double most_steps);
 
  private:
-  /// A contact's rows of B on this rank, and its law's tangents at the present state.
+  /// A contact's rows of B on this rank, its law's tangents at the present state, and room for that: a step
+  /// of a small model takes no longer than allocations.
   struct Tangents {
     std::vector<std::vector<std::pair<PetscInt, double>>> rows;
     contact::Record record;
+    VecHandle u, v, f;                                  ///< as rows of B: pair by pair
+    std::vector<double> displacement, velocity, force;  ///< as laws have it: pairs innermost
   };
   static PetscErrorCode right_side(TS, PetscReal, Vec, Vec, void*);
   static PetscErrorCode residual(TS, PetscReal, Vec, Vec, Vec, void*);
@@ -53,7 +56,8 @@ class Transient {
   void use_implicit(TS);
   void resolve_sticking(double tolerance, double size, Vec allowed);
   void forces(double t, Vec state);
-  void contact_force(model::Contact const&, Vec force, contact::Record&);
+  void contact_force(model::Contact const&, Tangents&, Vec force);
+  void solve_mass(Vec force, Vec acceleration);
   void assemble(double shift, Mat A);
   void assemble_contact(size_t number, Mat A);
   void record(TS);

@@ -142,7 +142,7 @@ CirculantBlocks<complex> WheelPreconditioner::blocks(int harmonic, Exponents con
     return A;
   };
   for (size_t j = 0; j < terms_.size(); ++j) {
-    const complex c = problem_.stiffness().coefficients(problem_.model().terms()[j], e)[harmonic] /
+    const complex c = problem_.terms().stiffness().coefficients(problem_.model().terms()[j], e)[harmonic] /
                       problem_.stiffness_scale();
     for (auto const& [k, A] : terms_[j]) {
       auto& sum = block(k);
@@ -312,7 +312,7 @@ void WheelPreconditioner::make_border(Vec y, Vec row) {
     const ReadArray in(v);
     return Border::Local(in.data(), in.data() + local);
   };
-  for (auto const& g : problem_.unfolding_vectors()) columns.push_back(copy(g));
+  for (auto const& g : problem_.unfolding().vectors()) columns.push_back(copy(g));
   for (int part = 0; part < problem_.scalar_count() - 1; ++part) {
     rows.emplace_back(local, 0.0);
     for (auto const& [dof, weight] : problem_.row()) {
@@ -336,7 +336,7 @@ void WheelPreconditioner::make_border(Vec y, Vec row) {
 }
 
 void WheelPreconditioner::build(Vec y, Vec row) {
-  const Exponents e = problem_.exponents(y);
+  const Exponents e = problem_.scaled(y).exponents;
   auto contacts = problem_.pair_tangents(y);
   contact_.take(contacts);
   const auto shares = spectrum(y);

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
+import io
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
 import pytest
+from command_line import call
 from tolerances import ROUNDING
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "cases"))
@@ -21,7 +25,7 @@ from scenes.distance import Distance, distance  # noqa: E402
 from scenes.equations import Contact, Equations  # noqa: E402
 from scenes.judge import Run, errors  # noqa: E402
 from scenes.run import all_scenes, one  # noqa: E402
-from scenes.scene import Scene  # noqa: E402
+from scenes.scene import Finished, Scene, write  # noqa: E402
 from scenes.structures import mode  # noqa: E402
 
 pytestmark = pytest.mark.ranks(1)
@@ -312,9 +316,23 @@ def test_a_table_with_values_that_cannot_be_is_wrong():
         assert path.values(broken)
 
 
+def run_here(scene: Scene, folder: Path) -> Finished:
+    """`fretwave run` on a scene in this process; what it prints is told by its files."""
+    begin, said = time.perf_counter(), io.StringIO()
+    with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+        code = call("run", write(scene, folder), "--no-plots", "--out", folder / "out")
+    return Finished(code, time.perf_counter() - begin, said.getvalue(), folder / "out")
+
+
 @pytest.mark.parametrize("name", [s.name for s in all_scenes() if s.quick])
 def test_scene(name, tmp_path):
-    verdict = one(next(s for s in all_scenes() if s.name == name), tmp_path)
+    verdict = one(next(s for s in all_scenes() if s.name == name), tmp_path, run_here)
+    assert verdict.word == "right", verdict.reasons
+
+
+def test_a_scene_in_a_process_of_its_own(tmp_path):
+    """As the list is run: with a limit on its processor time."""
+    verdict = one(next(s for s in all_scenes() if s.quick and s.twin is None), tmp_path)
     assert verdict.word == "right", verdict.reasons
 
 

@@ -167,9 +167,11 @@ def test_the_wheel_that_stands_still_and_the_amplitude_of_its_size(capfd) -> Non
     assert "'mode' goes to amplitudes of the model's own size" in warning and "400 mm" in warning
 
 
-@pytest.mark.parametrize("name", ["two_dof", "blisk_lumped", "blisk_ring", "lap_joint"])
+@pytest.mark.parametrize("name", ["two_dof", "blisk_lumped", "blisk_ring --quick", "lap_joint"])
 def test_cases_that_are_shipped_look_right(capfd, name: str) -> None:
-    assert call("check", LAP_JOINT.parents[1] / name / "case.toml") == 0
+    """That of blisk_ring on its coarse mesh: the reduction of the fine one takes a minute."""
+    name, *short = name.split()
+    assert call("check", LAP_JOINT.parents[1] / name / "case.toml", *short) == 0
     assert "warning" not in capfd.readouterr().out
 
 

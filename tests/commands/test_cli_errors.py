@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from fretwave._core import tuned_constants
 from fretwave.commands.main import main
 
 pytestmark = pytest.mark.ranks(1)
@@ -128,6 +129,19 @@ def test_where_the_time_goes_is_told_by_petsc(tmp_path: Path) -> None:
     parts = ("FwContactForce", "FwContactJacob", "FwContactBlocks", "FwStructure", "FwPCBuild", "FwPCFollow")
     assert all(counts[name] > 0 for name in (*parts, "FwPairs", "FwErrorEstimate", "FwSummary"))
     assert counts["FwSummary"] < counts["FwContactForce"] < counts["FwStructure"]
+    rows = len((tmp_path / "run" / "mode.csv").read_text().splitlines()) - 1
+    assert counts["FwRecord"] == rows == counts["FwPoint"] - 1 and counts["FwTable"] > 0  # the last finds no point
+
+
+def test_petsc_s_help_lists_our_own_options_with_what_they_mean(tmp_path: Path) -> None:
+    run = ["run", str(CASE), "--out", str(tmp_path / "run"), *SHORT, *RANGE, "--petsc", "-help"]
+    done = subprocess.run([sys.executable, "-m", "fretwave", *run], check=True, capture_output=True, text=True)
+    lines = [line.strip() for line in done.stdout.splitlines()]
+    listed = {name: text for name, _, text in (line.partition(" <") for line in lines if line.startswith("-"))}
+    for name, value, meaning in tuned_constants():
+        assert meaning in listed[f"-{name}"] and float(listed[f"-{name}"].split(" : ")[0]) == pytest.approx(value, 1e-5)
+    assert "direct or krylov" in listed["-mode_route"] and "dense or sparse" in listed["-mode_blocks"]
+    assert "-mode_snes_rtol" in listed
 
 
 def test_failure_before_the_first_point_makes_no_folder(tmp_path: Path, capfd) -> None:

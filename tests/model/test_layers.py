@@ -80,3 +80,24 @@ def test_no_header_of_the_core_includes_itself() -> None:
     for header in SOURCES.rglob("*.h"):
         reached(str(header.relative_to(SOURCES)))
     assert "hb/residual.h" in known["wheel/wheel_pc.h"]
+
+
+def public_members(header: str, name: str) -> set[str]:
+    """Names that a class makes public itself, its constructor among them; what overrides its base's is not its own."""
+    text = re.sub(r"//.*", "", (SOURCES / header).read_text(encoding="utf-8"))
+    body = re.search(rf"class {name} : .*?\{{(.*?)\n\}};", text, re.S)
+    assert body
+    sections = re.split(r"^ (public|protected|private):$", body[1], flags=re.M)
+    public = "".join(text for word, text in zip(sections[1::2], sections[2::2]) if word == "public")
+    while "{" in public:  # bodies of functions, from the innermost out
+        public = re.sub(r"\{[^{}]*\}", ";", public)
+    declared = [one for one in public.split(";") if one.strip() and " override" not in one]
+    return {re.search(r"(\w+)(?=\(|\s*$|\s*=)", one)[1] for one in declared}
+
+
+@pytest.mark.ranks(1)
+def test_a_harmonic_problem_stays_small() -> None:
+    """Diagnostics are functions of their own, the unfolding and what stands at rest classes of their own."""
+    found = public_members("hb/harmonic_problem.h", "HarmonicProblem")
+    assert {"HarmonicProblem", "row", "terms", "unfolding", "on"} <= found and "residual" not in found
+    assert len(found) <= 15, sorted(found)

@@ -146,6 +146,12 @@ class HarmonicProblem(Destroyable):
         self.core.product(y, dy, r)
         return r
 
+    def transposed_product(self, y: PETSc.Vec, dr: PETSc.Vec, dy: PETSc.Vec | None = None) -> PETSc.Vec:
+        """(dr/dy)^T dr, matrix-free and exact, in `dy` where one is given. Collective."""
+        out = self.core.unknowns() if dy is None else dy
+        self.core.transposed_product(y, dr, out)
+        return out
+
     def scalars(self, y: PETSc.Vec) -> Array:
         """Scalar unknowns, then the scaled fundamental (c, s) of `dof` and the unfolding, linear in y. Collective."""
         return np.array(self.core.scalars(y))

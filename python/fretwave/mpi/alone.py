@@ -22,9 +22,14 @@ def session_folder() -> str:
     return os.path.join(os.environ.get("TMPDIR", "/tmp"), f"{NAME}{os.getuid()}-{os.getpid()}")
 
 
+def launched() -> bool:
+    """Whether a launcher has started this process: known before MPI is started."""
+    return any(name in os.environ for name in RANKS)
+
+
 def prepare() -> None:
     """Tell Open MPI so by its variables, unless the user has set them."""
-    if any(name in os.environ for name in RANKS):
+    if launched():
         return
     os.environ.setdefault("OMPI_MCA_ess_singleton_isolated", "1")
     if NAME in os.environ.get(FOLDER, NAME):  # one of ours there is of the process that started this one

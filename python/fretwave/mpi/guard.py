@@ -29,6 +29,8 @@ Result = TypeVar("Result")
 AGREEMENT_WAIT = 1.0
 #: Head start of the lower rank, so that one message is printed when several but not all fail [s].
 RANK_DELAY = 0.25
+#: Of a rank that waits for the first one's work [s].
+LONGEST_SLEEP = 5e-3
 #: Environment variable that adds the traceback to the message of an unexpected error.
 TRACEBACK = "FRETWAVE_TRACEBACK"
 #: How Python knows files that a case brings, and what to do about an exception of theirs.
@@ -216,6 +218,18 @@ def caught_by_all(comm: MPI.Comm, error: FretwaveError) -> None:
     comm.Abort(exit_code_of(error))
 
 
+def _meet_quietly(comm: MPI.Comm) -> None:
+    """A barrier in which who is early sleeps, an eighth of its wait at a time: MPI's own takes a core. Collective.
+
+    Rank 0 draws pictures for seconds; the others' cores may have other work.
+    """
+    if comm.size == 1:
+        return
+    request, begin = comm.Ibarrier(), time.monotonic()
+    while not request.Test():
+        time.sleep(min(max((time.monotonic() - begin) / 8, 2e-5), LONGEST_SLEEP))
+
+
 def on_first_rank(comm: MPI.Comm, work: Callable[[], Result]) -> Result:
     """Do `work` on rank 0 and give its result, or its FretwaveError, to every rank. Collective.
 
@@ -229,6 +243,7 @@ def on_first_rank(comm: MPI.Comm, work: Callable[[], Result]) -> Result:
             outcome = (error, None)
         except (OSError, MemoryError) as error:
             outcome = (in_words(error), None)
+    _meet_quietly(comm)
     problem, result = comm.bcast(outcome, root=0)
     if problem is not None:
         raise problem

@@ -20,7 +20,9 @@ COMMON = (
 
 
 #: Options of PETSc itself, which it reads at its end: the same for all analyses.
-WHOLE = ("log_view", "log_view_memory")
+LOGS = ("log_view", "log_view_memory")
+#: With that by which every solver lists its options as it is made, ours among them.
+WHOLE = (*LOGS, "help")
 #: What tuned constants of the core begin with: no analysis' own (`fretwave doctor --constants`).
 TUNED = "fw_"
 
@@ -117,7 +119,7 @@ class AnalysisOptions:
         database: Any = PETSc.Options()
         for name, value in self.pairs.items():
             database.setValue(name, value)
-        if not set(WHOLE).isdisjoint(self.pairs):
+        if not set(LOGS).isdisjoint(self.pairs):
             PETSc.Log.begin()
         stage = PETSc.Log.Stage(self.prefix.rstrip("_"))
         stage.push()
@@ -130,7 +132,7 @@ class AnalysisOptions:
         finally:
             stage.pop()
             for name in self.pairs:
-                if name not in WHOLE:
+                if name not in LOGS:
                     database.delValue(name)
 
     def _blamed(self, complaint: str) -> InputError:

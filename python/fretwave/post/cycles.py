@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline
 
 from ..arrays import Array
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicHermiteSpline
 
 #: samples of a cycle in the projection on its fundamental; the trapezoidal rule is spectrally accurate there
 PROJECTION_SAMPLES = 128
@@ -45,7 +48,7 @@ def extract(t: Array, x: Array, v: Array) -> Cycles:
     none = Cycles(*(np.empty(0) for _ in range(4)))
     if len(t) < 2 or not np.all(np.isfinite([x, v])):
         return none
-    signal = CubicHermiteSpline(t, x, v)
+    signal = interpolated(t, x, v)
     bounds = upward_crossings(signal)
     if len(bounds) < 5:
         return none
@@ -58,6 +61,13 @@ def extract(t: Array, x: Array, v: Array) -> Cycles:
     return Cycles(middle, amplitude, omega, beta / np.hypot(beta, omega))
 
 
+def interpolated(t: Array, x: Array, v: Array) -> CubicHermiteSpline:
+    """The signal between its samples."""
+    from scipy.interpolate import CubicHermiteSpline
+
+    return CubicHermiteSpline(t, x, v)
+
+
 def upward_crossings(signal: CubicHermiteSpline) -> Array:
     """Times at which the signal passes zero upwards [s]."""
     roots = np.unique(signal.roots(discontinuity=False, extrapolate=False))
@@ -67,7 +77,7 @@ def upward_crossings(signal: CubicHermiteSpline) -> Array:
 
 def peaks(t: Array, x: Array, v: Array) -> tuple[Array, Array]:
     """Times and values of all extrema (v = 0) of the signal, by its cubic Hermite interpolant."""
-    signal = CubicHermiteSpline(t, x, v)
+    signal = interpolated(t, x, v)
     times = np.unique(signal.derivative().roots(discontinuity=False, extrapolate=False))
     times = times[np.isfinite(times)]
     return times, np.asarray(signal(times), dtype=float)

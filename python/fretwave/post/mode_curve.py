@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
 
 from ..arrays import Array
 from ..errors import InputError
@@ -49,6 +48,8 @@ class ModeCurve:
     """
 
     def __init__(self, amplitude: Array, omega: Array, omega0: Array, zeta: Array) -> None:
+        from scipy.interpolate import PchipInterpolator  # 0.1 s, for who looks at curves
+
         with np.errstate(divide="ignore", invalid="ignore"):
             level = np.log(amplitude)
         values = np.column_stack([level, omega, omega0, np.where(np.abs(zeta) > NO_DAMPING, zeta, 0.0)])

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.interpolate import PchipInterpolator
 
 from ..arrays import Array
 from .mode_curve import ModeCurve
@@ -62,6 +61,8 @@ def amplitude_peak(omega: Array, amplitude: Array, event: npt.NDArray[np.str_] |
 
 def quadrature(omega: Array, amplitude: Array, phase: Array) -> Peak:
     """Where the response stands at a right angle to the force; the place nearest to the largest amplitude."""
+    from scipy.interpolate import PchipInterpolator
+
     length = curve_length(omega, amplitude)
     moves = np.concatenate([[True], np.diff(length) > 0])  # a point so far out may equal the last one to rounding
     length, omega, amplitude, phase = length[moves], omega[moves], amplitude[moves], phase[moves]

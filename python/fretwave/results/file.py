@@ -98,20 +98,31 @@ def rewritten(path: Path, name: str) -> Iterator[h5py.File]:
 
 
 class Results(Mapping[str, Any]):
-    """The groups of results.h5 and those that are still in journals, to be read; close it or use ``with``."""
+    """The groups of results.h5 and those that are still in journals, to be read; close it or use ``with``.
 
-    def __init__(self, file: h5py.File | None, journals: Mapping[str, h5py.File]) -> None:
-        self.file, self.journals = file, dict(journals)
+    A journal's group is made when it is first asked for.
+    """
+
+    def __init__(self, path: Path, file: h5py.File | None, journals: Mapping[str, Rows]) -> None:
+        self.path, self.file, self.journals = path, file, dict(journals)
+        self._made: dict[str, h5py.File] = {}
 
     @property
     def attrs(self) -> Any:
         """Of results.h5, else of a journal."""
-        return self.file.attrs if self.file is not None else next(iter(self.journals.values())).attrs
+        if self.file is not None:
+            return self.file.attrs
+        return next(iter(self.journals.values())).layout.values["file_attributes"]
 
     def __getitem__(self, name: str) -> Any:
         first = name.strip("/").split("/")[0]
         if first in self.journals:
-            return self.journals[first][name]
+            with suppress(FileNotFoundError):  # completed just now: it is in results.h5
+                return self._of_journal(first)[name]
+            if self.file is not None:
+                self.file.close()
+            self.file = _open_file(self.path)
+            del self.journals[first]
         if self.file is None:
             raise KeyError(name)
         return self.file[name]
@@ -132,9 +143,14 @@ class Results(Mapping[str, Any]):
     def __exit__(self, *_: object) -> None:
         self.close()
 
+    def _of_journal(self, name: str) -> h5py.File:
+        if name not in self._made:
+            self._made[name] = _in_memory(name, self.journals[name])
+        return self._made[name]
+
     def close(self) -> None:
         """Close all files."""
-        for file in (self.file, *self.journals.values()):
+        for file in (self.file, *self._made.values()):
             if file is not None:
                 file.close()
 
@@ -166,15 +182,8 @@ def open_results(path: Path) -> Results:
 
 def _open_all(path: Path) -> Results:
     journals = {name: Rows.of(place) for name, place in unfinished(path.parent).items()}
-    found = Results(_open_file(path) if path.exists() or not journals else None, {})
-    try:
-        for name, rows in journals.items():
-            if not _superseded(rows, found.file, name):
-                found.journals[name] = _in_memory(name, rows)
-    except BaseException:
-        found.close()
-        raise
-    return found
+    file = _open_file(path) if path.exists() or not journals else None
+    return Results(path, file, {name: rows for name, rows in journals.items() if not _superseded(rows, file, name)})
 
 
 def _superseded(rows: Rows, file: h5py.File | None, name: str) -> bool:

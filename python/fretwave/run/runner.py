@@ -21,6 +21,7 @@ from ..console import Console, Estimate, Shown, duration
 from ..errors import EXIT_DONE, InputError, NotConverged
 from ..mpi.guard import on_first_rank
 from ..mpi.interrupt import say_how_to_go_on
+from ..mpi.log import event
 from ..mpi.petsc_options import AnalysisOptions
 from ..results.basis_file import LARGEST, NAME, basis_of
 from ..results.file import OVERRIDES
@@ -268,7 +269,8 @@ class Runner:
         entry = {"left_out": context.left_out, **context.entry}
         self._note(analysis.name, outcome, time.perf_counter() - began, entry)
         if not self.part:
-            on_first_rank(self.comm, lambda: write_curve(self.folder.path, analysis.name))
+            with event("FwCurve"):
+                on_first_rank(self.comm, lambda: write_curve(self.folder.path, analysis.name))
         context.publish()  # last of all: from here on a resumed run leaves the analysis as it is
 
     def _sweep(self, name: str, sweep: Sweep) -> None:

@@ -14,6 +14,7 @@ from ..arrays import Array
 from ..errors import InputError
 from ..hb.problems import HarmonicProblem
 from ..mpi.gather import on_rank_0
+from ..mpi.log import event
 from .starting import far_from_start, starts
 from .steps import StepControl
 from .trace import Knot
@@ -147,7 +148,8 @@ class Continuation:
     def __next__(self) -> Point:
         if self._over:
             raise StopIteration
-        point = self._core.next() if self._begun else self._first()
+        with event("FwPoint"):
+            point = self._core.next() if self._begun else self._first()
         last, self._begun = self._last, True
         self._last = None if point is None else point["y"]
         if point is None:

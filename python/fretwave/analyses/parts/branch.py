@@ -13,6 +13,7 @@ from ...case.harmonic import HarmonicSection
 from ...case.observed import label_of
 from ...case.schema import StepSection
 from ...errors import InputError
+from ...mpi.log import event
 from ...post.contact_history import MEASURED
 from ...results.results import AnalysisWriter
 from ...results.slopes import slope_fields, slopes_of
@@ -105,6 +106,19 @@ def record(
     dict
         The row as written.
     """
+    with event("FwRecord"):
+        return _recorded(writer, problem, point, snapshot, extra, describe, errors)
+
+
+def _recorded(
+    writer: AnalysisWriter,
+    problem: HarmonicProblem,
+    point: Point,
+    snapshot: Mapping[str, Any] | None,
+    extra: Mapping[str, Any],
+    describe: Describe | None,
+    errors: bool,
+) -> dict[str, Any]:
     from ... import _core
     from ...solve.follow import row_of
 
@@ -280,7 +294,8 @@ def finished_table(writer: AnalysisWriter) -> dict[str, Any]:
     """Columns written so far (writing rank; empty elsewhere or without rows)."""
     if not writer.active or not writer.rows:
         return {}
-    points = writer.group["points"]
-    table = {column.name: points[column.name][()] for column in writer.columns}
+    with event("FwTable"):
+        points = writer.group["points"]
+        table = {column.name: points[column.name][()] for column in writer.columns}
     table["event"] = np.array([text.decode() for text in table["event"]])
     return table
