@@ -1,5 +1,7 @@
 #pragma once
+#include <array>
 #include <optional>
+#include <span>
 
 #include "hb/harmonic_problem.h"
 #include "solve/newton.h"
@@ -24,6 +26,15 @@ struct LeftOut {
 /// samples (rounding in continuous time), and the solver for -r, what it left; a source next to nothing is
 /// not solved for and has its share of r'. Error estimation by a hierarchical basis (Bank & Smith 1993): what
 /// the estimate misses is as much smaller as the finer set is better, and the square of the error.
+///
+/// That square is looked at. Along the step, for equations of the second order,
+///
+///   r'(y + s dy') = (1 - s) r' + s^2 q,   c = q . r' / r' . r',
+///
+/// of which one more residual tells q. Its part along r' vanishes at s = 2 / (1 + sqrt(1 - 4 c)), and is the
+/// least at s = 1 / (2 c) where c > 1/4: so far the step goes. Where c is not small (`bent`) it is
+/// taken anew with the Jacobian halfway there, for r' + J'(y + dy' / 2) dy' = 0 holds for such equations
+/// without any error (the implicit midpoint rule).
 class DiscretisationError {
  public:
   /// `prefix`: of the PETSc options of J' dy' = b. Collective.
@@ -36,12 +47,18 @@ class DiscretisationError {
  private:
   VecHandle retained(Vec r) const;
   VecHandle right_side(Vec r) const;
-  void close(Vec y, Vec tangent);
+  VecHandle left_side(Vec b) const;
+  VecHandle closing_row(Vec y, Vec tangent);
+  std::array<VecHandle, 3> residuals(Vec y, Vec point);
+  bool step(Vec point, Vec row, std::span<Vec const> b, std::span<Vec const> x);
+  double bend(Vec point, Vec r, Vec step);
+  bool along_the_chord(Vec middle, Vec row, std::span<Vec const> b, std::span<Vec const> x);
 
   HarmonicProblem& problem_;
-  std::string left_out_;
-  std::unique_ptr<HarmonicProblem> finer_;
-  std::unique_ptr<solve::Newton> newton_;
+  std::string prefix_, left_out_;
+  std::unique_ptr<HarmonicProblem> finer_;  ///< of the point, which moves in H harmonics alone
+  std::unique_ptr<HarmonicProblem> moved_;  ///< of where the step leads, which moves in all
+  std::unique_ptr<solve::Newton> newton_, again_;
 };
 
 }  // namespace fretwave::hb
