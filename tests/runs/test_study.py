@@ -62,6 +62,22 @@ def test_errors_are_measured_against_the_finest_run():
     assert samples["omega_error"] == pytest.approx((1.0 + 1.0 / 64.0) / (1.0 + 1.0 / 256.0) - 1.0)
 
 
+def test_a_finest_run_judges_no_error_that_is_as_small_as_its_own():
+    """zeta is off by 1/H^2, as every run says itself: 1 - 1/49 is 48 times 1/49, 1/25 - 1/49 about as large."""
+
+    def exactly(settings):
+        found = solve(settings)
+        return replace(found, estimate=np.outer(found.amplitude / settings.harmonics**2, [1.0, 0.0, 0.0]))
+
+    study = Study(replace(PLAN, harmonics=(1, 5, 7)), common_amplitudes(0.1, 1.0, 5))
+    study.run(exactly, lambda sweep, settings: None)
+    far, near = study.table()[:2]
+    assert far["judged"] == 5 and far["within_3"] == 1.0
+    assert near["judged"] == 0 and np.isnan(near["within_3"]) and near["zeta_error"] > 0
+    rows = [row for row in study.calibration() if row["harmonics"] == 5 and row["sweep"] == "harmonics"]
+    assert [row["judge"] for row in rows] == pytest.approx(study.places / 49)
+
+
 def test_amplitudes_that_a_run_meets_several_times_are_left_out():
     inside = common_amplitudes(0.1, 1.0, 5)[2]
     study, _ = run_study(lambda settings: solve(settings, [inside] if settings.harmonics == 3 else []))

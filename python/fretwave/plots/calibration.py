@@ -24,7 +24,9 @@ def figures(run: Run) -> Iterator[tuple[str, Figure]]:
 
 
 def _told(table: Table) -> Indices:
-    return np.flatnonzero(can_be_told(table["error"]) & (table["estimate"] > 0))
+    error = table["error"]
+    judge = table["judge"] if "judge" in table else np.zeros_like(error)  # a folder of before has none
+    return np.flatnonzero(can_be_told(error, judge) & (table["estimate"] > 0))
 
 
 def draw(table: Table) -> Figure:
