@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "error.h"
 #include "log.h"
@@ -106,13 +107,13 @@ VecHandle DiscretisationError::closing_row(Vec y, Vec tangent) {
 }
 
 /// c, from no farther away than the branch is taken to be straight.
-double DiscretisationError::bend(Vec point, Vec r, Vec step) {
+double DiscretisationError::bend(Vec point, Vec r, Vec reduction, Vec step) {
   VecHandle weights = finer_->unknowns(), there = moved_->equations();
   finer_->metric(point, weights);
   const double t = std::min(1.0, reach / solve::weighted_norm(weights, step));
   moved_->residual(solve::moved(point, t, step), there);
   const double scale = moved_->stiffness_scale() / finer_->stiffness_scale();
-  const double along = scale * solve::dot(there, r) / solve::dot(r, r);
+  const double along = (scale * solve::dot(there, r) + solve::dot(reduction, r)) / solve::dot(r, r);
   return (along - (1 - t)) / (t * t);
 }
 
@@ -147,25 +148,28 @@ VecHandle sum(std::span<Vec const> parts) {
 
 }  // namespace
 
-/// r' of the point, by what is left out: harmonics, samples, solver.
-std::array<VecHandle, 3> DiscretisationError::residuals(Vec y, Vec point) {
+/// r' of the point, by what is left out.
+std::array<VecHandle, 4> DiscretisationError::residuals(Vec y, Vec point, Vec reduction) {
   VecHandle r = problem_.residual_at(y), finer = finer_->equations();
   VecHandle left = problem_.on(*finer_, r);
-  check(VecScale(left, problem_.stiffness_scale() / finer_->stiffness_scale()));
+  VecHandle reduced = reduction ? problem_.on(*finer_, reduction) : solve::zero_like(finer);
+  for (Vec coarse : {Vec(left), Vec(reduced)})
+    check(VecScale(coarse, problem_.stiffness_scale() / finer_->stiffness_scale()));
   finer_->residual(point, finer);
   VecHandle same = retained(finer);
   check(VecAXPY(finer, -1, same));  // harmonics: r'_new
   check(VecAXPY(same, -1, left));   // samples: r'_old - r
-  return {std::move(finer), std::move(same), std::move(left)};
+  return {std::move(finer), std::move(same), std::move(left), std::move(reduced)};
 }
 
 /// dy' of these right sides; false where J' is singular.
-bool DiscretisationError::step(Vec point, Vec row, std::span<Vec const> b, std::span<Vec const> x) {
+bool DiscretisationError::step(Vec point, Vec row, Vec reduction, std::span<Vec const> b,
+                               std::span<Vec const> x) {
   newton_->system().close(row, 0);
   if (!newton_->linear(point, b, x)) return false;
   if (b.empty()) return true;
   VecHandle whole = sum(x);
-  const double c = bend(point, left_side(sum(b)), whole);
+  const double c = bend(point, left_side(sum(b)), reduction, whole);
   if (!std::isfinite(c)) return true;
   const double length = step_length(c);
   for (Vec part : x) check(VecScale(part, length));
@@ -173,33 +177,38 @@ bool DiscretisationError::step(Vec point, Vec row, std::span<Vec const> b, std::
   return true;
 }
 
-std::optional<LeftOut> DiscretisationError::at(Vec y, Vec tangent) {
+namespace {
+constexpr size_t reduced = 3;  // among the sources
+}
+
+std::optional<LeftOut> DiscretisationError::at(Vec y, Vec tangent, Vec reduction) {
   if (!finer_) return {};
   static const log::Event estimate("FwErrorEstimate");
   const log::Span span(estimate);
   VecHandle point = problem_.on(*finer_, y);
-  const auto left = residuals(y, point);
-  double sizes[3], total = 0;
-  for (size_t k = 0; k < 3; ++k) total += sizes[k] = solve::norm(left[k]);
+  const auto left = residuals(y, point, reduction);
+  std::array<double, 4> sizes;
+  std::transform(left.begin(), left.end(), sizes.begin(), [](Vec r) { return solve::norm(r); });
+  const double total = std::accumulate(sizes.begin(), sizes.end(), 0.0);
   std::vector<VecHandle> rights, changes;
   std::vector<Vec> b, x;
   std::vector<size_t> sources;
-  for (size_t k = 0; k < 3; ++k) {
-    if (sizes[k] <= negligible * total) continue;
+  for (size_t k = 0; k < left.size(); ++k) {
+    // a reduction's residual is small for its effect: it lies in the fundamental
+    if (sizes[k] <= (k == reduced ? 0 : negligible * total)) continue;
     rights.push_back(right_side(left[k])), changes.push_back(solve::zero_like(rights.back()));
     b.push_back(rights.back()), x.push_back(changes.back()), sources.push_back(k);
   }
-  if (!step(point, closing_row(y, tangent), b, x)) return {};
+  if (!step(point, closing_row(y, tangent), left[reduced], b, x)) return {};
   LeftOut out;
   const auto along = problem_.scalars(tangent);
   const auto change = [&](Vec v) { return at_parameter(finer_->scalars(v), along, problem_.scalar_count()); };
-  std::vector<double>* const by_source[] = {&out.harmonics, &out.samples, &out.solver};
-  for (size_t k = 0; k < x.size(); ++k) *by_source[sources[k]] = change(x[k]);
+  for (size_t k = 0; k < x.size(); ++k) out.by_source[sources[k]] = change(x[k]);
   out.all = x.empty() ? std::vector<double>(along.size(), 0.0) : change(sum(x));
-  for (size_t k = 0; k < 3; ++k)  // by the size of its residual
-    if (by_source[k]->empty()) {
-      *by_source[k] = out.all;
-      for (double& v : *by_source[k]) v *= total > 0 ? sizes[k] / total : 0;
+  for (size_t k = 0; k < left.size(); ++k)  // by the size of its residual
+    if (out.by_source[k].empty()) {
+      out.by_source[k] = out.all;
+      for (double& v : out.by_source[k]) v *= total > 0 ? sizes[k] / total : 0;
     }
   return out;
 }

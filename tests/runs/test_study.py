@@ -23,7 +23,7 @@ def solve(settings: Settings, extra=()) -> Outcome:
     amplitude = np.concatenate([common_amplitudes(0.1, 1.0, 5), extra])
     zeta = 0.04 * amplitude * (1.0 + 1.0 / settings.harmonics**2)
     omega = np.full_like(amplitude, 25.0 * (1.0 + 1.0 / settings.samples))
-    estimate = np.outer(np.full_like(amplitude, 25.0 * 0.008 / settings.harmonics**2), [1.0, 0.0, 0.0])
+    estimate = np.outer(np.full_like(amplitude, 25.0 * 0.008 / settings.harmonics**2), [1.0, 0.0, 0.0, 0.0])
     return Outcome(amplitude, omega, zeta, estimate, float(zeta.max()), 1.0, 50, 150, 0.01 * settings.harmonics)
 
 
@@ -67,7 +67,7 @@ def test_a_finest_run_judges_no_error_that_is_as_small_as_its_own():
 
     def exactly(settings):
         found = solve(settings)
-        return replace(found, estimate=np.outer(found.amplitude / settings.harmonics**2, [1.0, 0.0, 0.0]))
+        return replace(found, estimate=np.outer(found.amplitude / settings.harmonics**2, [1.0, 0.0, 0.0, 0.0]))
 
     study = Study(replace(PLAN, harmonics=(1, 5, 7)), common_amplitudes(0.1, 1.0, 5))
     study.run(exactly, lambda sweep, settings: None)
@@ -180,7 +180,7 @@ def respond(settings: Settings) -> ResponseOutcome:
     """A response of 2 m at its peak that is off by 0.2 / H m everywhere, which it says twofold."""
     omega = np.linspace(20.0, 30.0, 7)[1:-1]
     value = 2.0 / (1.0 + (omega - 25.0) ** 2) + 0.2j / settings.harmonics
-    estimate = np.outer(np.full_like(omega, 0.4 / settings.harmonics), [1.0, 0.0, 0.0])
+    estimate = np.outer(np.full_like(omega, 0.4 / settings.harmonics), [1.0, 0.0, 0.0, 0.0])
     peak = float(np.abs(value).max())
     return ResponseOutcome(omega, value.real, -value.imag, estimate, peak, 25.0, 40, 90, 0.01 * settings.harmonics)
 

@@ -12,7 +12,7 @@ from ..post.calibration import FACTORS, can_be_told, share_within
 from ..results.reader import Run, Table
 from . import style
 
-MARKS = {"harmonics": "o", "samples": "s", "tolerance": "^"}
+MARKS = {"harmonics": "o", "samples": "s", "tolerance": "^", "component_modes": "D"}
 FACTOR = FACTORS[0]
 
 

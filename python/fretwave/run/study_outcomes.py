@@ -19,7 +19,7 @@ class Outcome:
     Attributes
     ----------
     amplitude, omega, zeta : (n,) at the reported points, in the order of the branch
-    estimate : (n, 3) estimated errors of lambda there [1/s], by `SOURCES`
+    estimate : (n, 4) estimated errors of lambda there [1/s], by `SOURCES`
     peak_zeta, peak_amplitude : largest damping ratio and where it is
     wall_s : time of the whole branch [s]
     harmonics, samples : the most that it took, where it has chosen them
@@ -82,7 +82,7 @@ class ResponseOutcome:
     ----------
     omega : (n,) frequencies [rad/s] of the reported points, in the order of the branch
     cosine, sine : (n,) parts of the observed fundamental there [length]
-    estimate : (n, 3) estimated errors of the complex amplitude there [length], by `SOURCES`
+    estimate : (n, 4) estimated errors of the complex amplitude there [length], by `SOURCES`
     peak, peak_omega : largest amplitude [length] and where it is
     wall_s, harmonics, samples : as of a mode
     """

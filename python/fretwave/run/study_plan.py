@@ -20,7 +20,7 @@ from .study_outcomes import AnyOutcome
 #: Relative, of a place; a loose Newton tolerance lets an amplitude miss by about itself.
 MATCH = 1e-2
 #: What a sweep's runs differ by from the finest
-SOURCE_OF = {"harmonics": "harmonics", "samples": "samples", "tolerance": "solver"}
+SOURCE_OF = {"harmonics": "harmonics", "samples": "samples", "tolerance": "solver", "component_modes": "reduction"}
 
 
 @dataclass(frozen=True)
@@ -129,7 +129,7 @@ class Study:
         rows, its = self._rows(run), self._rows(reference)
         source = self._source(sweep, settings)
         estimate = run.estimate[rows]
-        guessed = estimate.sum(axis=1) if source is None else estimate[:, source]
+        guessed = np.nansum(estimate, axis=1) if source is None else estimate[:, source]
         ratios = self._ratios(sweep, settings, reference)
         known, true, judge = (np.array([row[name] for row in ratios]) for name in ("estimate", "error", "judge"))
         told = can_be_told(true, judge)
