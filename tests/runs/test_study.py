@@ -24,7 +24,8 @@ def solve(settings: Settings, extra=()) -> Outcome:
     zeta = 0.04 * amplitude * (1.0 + 1.0 / settings.harmonics**2)
     omega = np.full_like(amplitude, 25.0 * (1.0 + 1.0 / settings.samples))
     estimate = np.outer(np.full_like(amplitude, 25.0 * 0.008 / settings.harmonics**2), [1.0, 0.0, 0.0, 0.0])
-    return Outcome(amplitude, omega, zeta, estimate, float(zeta.max()), 1.0, 50, 150, 0.01 * settings.harmonics)
+    cost = 0.01 * settings.harmonics
+    return Outcome(amplitude, omega, zeta, estimate, float(zeta.max()), 1.0, 50, 150, 2 * cost, cpu_s=cost)
 
 
 def run_study(solver=solve):
@@ -182,7 +183,8 @@ def respond(settings: Settings) -> ResponseOutcome:
     value = 2.0 / (1.0 + (omega - 25.0) ** 2) + 0.2j / settings.harmonics
     estimate = np.outer(np.full_like(omega, 0.4 / settings.harmonics), [1.0, 0.0, 0.0, 0.0])
     peak = float(np.abs(value).max())
-    return ResponseOutcome(omega, value.real, -value.imag, estimate, peak, 25.0, 40, 90, 0.01 * settings.harmonics)
+    cost = 0.01 * settings.harmonics
+    return ResponseOutcome(omega, value.real, -value.imag, estimate, peak, 25.0, 40, 90, 2 * cost, cpu_s=cost)
 
 
 def test_errors_of_a_response_are_those_of_its_complex_amplitude_over_the_peak():

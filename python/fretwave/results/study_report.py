@@ -23,7 +23,7 @@ RUN = {
     "best fixed [s]": "{best_fixed_s:.3f}",
     "points": "{points}",
     "Newton": "{newton}",
-    "time [s]": "{wall_s:.3f}",
+    "time [s]": "{cpu_s:.3f}",
 }
 #: heading of the printed table -> how a row fills it
 PRINTED = {
@@ -66,9 +66,10 @@ LEGEND_OF_RESPONSE = (
     "own there."
 )
 LEGEND_OF_ACCURACY = (
-    "Of a run that chooses its harmonics and samples, the most it took; its time is with that of the estimates. Kept: "
-    "the share of these places at which lambda, over zeta omega0, or the complex amplitude is that accurate; best "
-    "fixed: the time of the quickest run with one set that keeps it at 95 % of them (its estimates not counted)."
+    "Times are the processor's. Of a run that chooses its harmonics and samples, the most it took; its time is with "
+    "that of the estimates. Kept: the share of these places at which lambda, over zeta omega0, or the complex "
+    "amplitude is that accurate; best fixed: the time of the quickest run with one set that keeps it at 95 % of them "
+    "(its estimates not counted)."
 )
 
 
