@@ -117,15 +117,20 @@ double DiscretisationError::bend(Vec point, Vec r, Vec reduction, Vec step) {
   return (along - (1 - t)) / (t * t);
 }
 
-/// The step with the Jacobian halfway to where it leads.
-bool DiscretisationError::along_the_chord(Vec middle, Vec row, std::span<Vec const> b,
-                                          std::span<Vec const> x) {
+/// The step with the Jacobian halfway to where it leads; as it was where that is singular, or its factors do
+/// not fit the memory beside the others.
+void DiscretisationError::from_halfway(Vec middle, Vec row, std::span<Vec const> b, std::span<Vec const> x) {
   if (!again_) {
+    const double bytes = factor_bytes(problem_.model(), size_t(moved_->harmonics().count()));
+    if (bytes > memory_share * solve::available_bytes(problem_.comm())) return;
     again_ = std::make_unique<solve::Newton>(*moved_, prefix_);
     again_->solve_beside(tolerance);
   }
+  std::vector<VecHandle> before;
+  for (Vec part : x) before.push_back(solve::copy(part));
   again_->system().close(row, 0);
-  return again_->linear(middle, b, x);
+  if (again_->linear(middle, b, x)) return;
+  for (size_t k = 0; k < x.size(); ++k) check(VecCopy(before[k], x[k]));
 }
 
 namespace {
@@ -173,7 +178,7 @@ bool DiscretisationError::step(Vec point, Vec row, Vec reduction, std::span<Vec 
   if (!std::isfinite(c)) return true;
   const double length = step_length(c);
   for (Vec part : x) check(VecScale(part, length));
-  if (std::abs(c) > bent) along_the_chord(solve::moved(point, length / 2, whole), row, b, x);
+  if (std::abs(c) > bent) from_halfway(solve::moved(point, length / 2, whole), row, b, x);
   return true;
 }
 

@@ -55,7 +55,7 @@ class DiscretisationError {
   std::array<VecHandle, 4> residuals(Vec y, Vec point, Vec reduction);
   bool step(Vec point, Vec row, Vec reduction, std::span<Vec const> b, std::span<Vec const> x);
   double bend(Vec point, Vec r, Vec reduction, Vec step);
-  bool along_the_chord(Vec middle, Vec row, std::span<Vec const> b, std::span<Vec const> x);
+  void from_halfway(Vec middle, Vec row, std::span<Vec const> b, std::span<Vec const> x);
 
   HarmonicProblem& problem_;
   std::string prefix_, left_out_;
