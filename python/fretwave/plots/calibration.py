@@ -41,7 +41,8 @@ def draw(table: Table) -> Figure:
     for (sweep, mark), colour in zip(MARKS.items(), style.PALETTE):
         own = table["sweep"][rows] == sweep
         if own.any():
-            plane.plot(error[own], estimate[own], mark, ms=4, alpha=0.7, color=colour, label=f"by {sweep}")
+            words_of = f"by {sweep.replace('_', ' ')}"
+            plane.plot(error[own], estimate[own], mark, ms=4, alpha=0.7, color=colour, label=words_of)
     within = share_within(estimate, error, FACTOR)
     plane.set(xscale="log", yscale="log", title=f"{100 * within:.0f} % of {len(rows)} points {words}")
     of, unit = ("λ", "1/s") if "amplitude" in table else ("the amplitude / peak", "")
