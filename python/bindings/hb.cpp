@@ -157,11 +157,16 @@ void bind_hb(nb::module_& m) {
   nb::class_<DiscretisationError>(m, "DiscretisationError")
       .def(nb::init<HarmonicProblem&, std::string const&>(), nb::keep_alive<1, 2>())
       .def_prop_ro("left_out", &DiscretisationError::left_out)
-      .def("at", [](DiscretisationError& e, Petsc<Vec> y, Petsc<Vec> tangent) -> std::optional<nb::tuple> {
-        const auto out = e.at(y.object, tangent.object);
-        if (!out) return {};
-        return nb::make_tuple(out->all, out->harmonics, out->samples, out->solver);
-      });
+      .def(
+          "at",
+          [](DiscretisationError& e, Petsc<Vec> y, Petsc<Vec> tangent,
+             std::optional<Petsc<Vec>> reduction) -> std::optional<nb::tuple> {
+            const auto out = e.at(y.object, tangent.object, reduction ? reduction->object : nullptr);
+            if (!out) return {};
+            auto const& [harmonics, samples, solver, reduced] = out->by_source;
+            return nb::make_tuple(out->all, harmonics, samples, solver, reduced);
+          },
+          nb::arg("y"), nb::arg("tangent"), nb::arg("reduction").none());
 }
 
 }  // namespace fretwave::python

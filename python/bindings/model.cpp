@@ -34,6 +34,17 @@ void bind_reduction(nb::module_& m) {
       .def_prop_ro("M", [](Reduction const& r) { return square(r.M(), size_t(r.size())); })
       .def_prop_ro("C", [](Reduction const& r) { return square(r.C(), size_t(r.size())); })
       .def_prop_ro("component_omega", &Reduction::component_omega)
+      .def_prop_ro("omitted",
+                   [](Reduction const& r) {
+                     auto const& o = r.omitted();
+                     const auto rows = [&](std::vector<double> const& A) {
+                       return numpy_copy(A.data(), {A.empty() ? 0 : o.omega.size(), size_t(r.size())});
+                     };
+                     nb::dict out;
+                     out["omega"] = o.omega, out["C"] = o.C;
+                     out["M"] = rows(o.M), out["C_from"] = rows(o.from), out["C_onto"] = rows(o.onto);
+                     return out;
+                   })
       .def_prop_ro("times",
                    [](Reduction const& r) {
                      nb::dict out;

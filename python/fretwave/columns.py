@@ -93,6 +93,7 @@ _WHY = {
     "harmonics": "the harmonics that are not retained",
     "samples": "the number of samples",
     "solver": "what the solver left",
+    "reduction": "component modes that the reduction has left out",
 }
 #: Of a point's error.
 SOURCES = tuple(_WHY)

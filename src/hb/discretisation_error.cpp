@@ -1,6 +1,8 @@
 #include "hb/discretisation_error.h"
 
 #include <algorithm>
+#include <cmath>
+#include <numeric>
 
 #include "error.h"
 #include "hb/diagnostics.h"
@@ -19,6 +21,8 @@ const Tuned memory_share("error_memory_share", 0.5, "share of the free memory th
 const Tuned negligible("error_negligible", 1e-6,
                        "share of the residual, up to which a source is not solved for");
 const Tuned reach("error_reach", 0.3, "arclength by which the branch is followed to the same parameter");
+const Tuned bent("error_bent", 0.2,
+                 "residual that a step leaves along that which it is made for, from which it is taken anew");
 
 /// Whether it is so for the contacts of all ranks.
 template <class Predicate>
@@ -39,11 +43,12 @@ std::vector<int> enlarged(Harmonics const& h, model::Model const& model) {
 }
 
 std::unique_ptr<HarmonicProblem> refined(HarmonicProblem const& problem, std::vector<int> const& orders,
-                                         int samples) {
-  auto out = problem.on(Harmonics(orders, samples, problem.harmonics().highest()));
+                                         int samples, int moving) {
+  auto out = problem.on(Harmonics(orders, samples, moving));
   if (!out)
     throw InputError("the problem has no discretisation to be refined", "a way to another problem",
                      "a nonlinear mode or a forced response", "estimate the error of its goal");
+  out->terms().multiply_exactly();  // an error is a small difference
   return out;
 }
 
@@ -57,7 +62,7 @@ double factor_bytes(model::Model const& model, size_t orders) {
 }  // namespace
 
 DiscretisationError::DiscretisationError(HarmonicProblem& problem, std::string const& prefix)
-    : problem_(problem) {
+    : problem_(problem), prefix_(prefix) {
   const std::vector<int> orders = enlarged(problem.harmonics(), problem.model());
   const double bytes = factor_bytes(problem.model(), orders.size()),
                free = solve::available_bytes(problem.comm());
@@ -66,8 +71,9 @@ DiscretisationError::DiscretisationError(HarmonicProblem& problem, std::string c
                 solve::gigabytes(bytes) + ", of " + solve::gigabytes(free) + " free";
     return;
   }
-  finer_ = refined(problem, orders, std::max(4 * problem.harmonics().samples(), 16 * orders.back()));
-  finer_->terms().multiply_exactly();  // an error is a small difference
+  const int samples = std::max(4 * problem.harmonics().samples(), 16 * orders.back());
+  finer_ = refined(problem, orders, samples, problem.harmonics().highest());
+  moved_ = refined(problem, orders, samples, orders.back());
   newton_ = std::make_unique<solve::Newton>(*finer_, prefix);
   newton_->solve_beside(tolerance);
 }
@@ -87,10 +93,47 @@ VecHandle DiscretisationError::right_side(Vec r) const {
   return b;
 }
 
-void DiscretisationError::close(Vec y, Vec tangent) {
+/// The inverse: r of -r.
+VecHandle DiscretisationError::left_side(Vec b) const {
+  VecHandle r = finer_->equations();
+  const PetscInt n = local_size(r);
+  const ReadArray in(b);
+  const WriteArray out(r);
+  std::transform(in.data(), in.data() + n, out.data(), [](double v) { return -v; });
+  return r;
+}
+
+VecHandle DiscretisationError::closing_row(Vec y, Vec tangent) {
   VecHandle weights = problem_.unknowns();
   problem_.metric(y, weights);
-  newton_->system().close(embedded(problem_, *finer_, solve::weighted(weights, tangent)), 0);
+  return embedded(problem_, *finer_, solve::weighted(weights, tangent));
+}
+
+/// c, from no farther away than the branch is taken to be straight.
+double DiscretisationError::bend(Vec point, Vec r, Vec reduction, Vec step) {
+  VecHandle weights = finer_->unknowns(), there = moved_->equations();
+  finer_->metric(point, weights);
+  const double t = std::min(1.0, reach / solve::weighted_norm(weights, step));
+  moved_->residual(solve::moved(point, t, step), there);
+  const double scale = moved_->stiffness_scale() / finer_->stiffness_scale();
+  const double along = (scale * solve::dot(there, r) + solve::dot(reduction, r)) / solve::dot(r, r);
+  return (along - (1 - t)) / (t * t);
+}
+
+/// The step with the Jacobian halfway to where it leads; as it was where that is singular, or its factors do
+/// not fit the memory beside the others.
+void DiscretisationError::from_halfway(Vec middle, Vec row, std::span<Vec const> b, std::span<Vec const> x) {
+  if (!again_) {
+    const double bytes = factor_bytes(problem_.model(), size_t(moved_->harmonics().count()));
+    if (bytes > memory_share * solve::available_bytes(problem_.comm())) return;
+    again_ = std::make_unique<solve::Newton>(*moved_, prefix_);
+    again_->solve_beside(tolerance);
+  }
+  std::vector<VecHandle> before;
+  for (Vec part : x) before.push_back(solve::copy(part));
+  again_->system().close(row, 0);
+  if (again_->linear(middle, b, x)) return;
+  for (size_t k = 0; k < x.size(); ++k) check(VecCopy(before[k], x[k]));
 }
 
 namespace {
@@ -102,44 +145,79 @@ std::vector<double> at_parameter(std::vector<double> change, std::vector<double>
   return change;
 }
 
+/// Of a step: where 1 - s + c s^2 first vanishes, or else is the least.
+double step_length(double c) { return c > 0.25 ? 1 / (2 * c) : 2 / (1 + std::sqrt(1 - 4 * c)); }
+
+VecHandle sum(std::span<Vec const> parts) {
+  VecHandle all = solve::copy(parts[0]);
+  for (Vec part : parts.subspan(1)) check(VecAXPY(all, 1, part));
+  return all;
+}
+
 }  // namespace
 
-std::optional<LeftOut> DiscretisationError::at(Vec y, Vec tangent) {
-  if (!finer_) return {};
-  static const log::Event estimate("FwErrorEstimate");
-  const log::Span span(estimate);
+/// r' of the point, by what is left out.
+std::array<VecHandle, 4> DiscretisationError::residuals(Vec y, Vec point, Vec reduction) {
   VecHandle r = problem_.equations(), finer = finer_->equations();
   problem_.residual(y, r);
-  VecHandle point = embedded(problem_, *finer_, y), left = embedded(problem_, *finer_, r);
-  check(VecScale(left, problem_.stiffness_scale() / finer_->stiffness_scale()));
+  VecHandle left = embedded(problem_, *finer_, r);
+  VecHandle reduced = reduction ? embedded(problem_, *finer_, reduction) : solve::zero_like(finer);
+  for (Vec coarse : {Vec(left), Vec(reduced)})
+    check(VecScale(coarse, problem_.stiffness_scale() / finer_->stiffness_scale()));
   finer_->residual(point, finer);
   VecHandle same = retained(finer);
   check(VecAXPY(finer, -1, same));  // harmonics: r'_new
   check(VecAXPY(same, -1, left));   // samples: r'_old - r
-  Vec const residuals[] = {finer, same, left};
-  double sizes[3], sum = 0;
-  for (size_t k = 0; k < 3; ++k) sum += sizes[k] = solve::norm(residuals[k]);
+  return {std::move(finer), std::move(same), std::move(left), std::move(reduced)};
+}
+
+/// dy' of these right sides; false where J' is singular.
+bool DiscretisationError::step(Vec point, Vec row, Vec reduction, std::span<Vec const> b,
+                               std::span<Vec const> x) {
+  newton_->system().close(row, 0);
+  if (!newton_->linear(point, b, x)) return false;
+  if (b.empty()) return true;
+  VecHandle whole = sum(x);
+  const double c = bend(point, left_side(sum(b)), reduction, whole);
+  if (!std::isfinite(c)) return true;
+  const double length = step_length(c);
+  for (Vec part : x) check(VecScale(part, length));
+  if (std::abs(c) > bent) from_halfway(solve::moved(point, length / 2, whole), row, b, x);
+  return true;
+}
+
+namespace {
+constexpr size_t reduced = 3;  // among the sources
+}
+
+std::optional<LeftOut> DiscretisationError::at(Vec y, Vec tangent, Vec reduction) {
+  if (!finer_) return {};
+  static const log::Event estimate("FwErrorEstimate");
+  const log::Span span(estimate);
+  VecHandle point = embedded(problem_, *finer_, y);
+  const auto left = residuals(y, point, reduction);
+  std::array<double, 4> sizes;
+  std::transform(left.begin(), left.end(), sizes.begin(), [](Vec r) { return solve::norm(r); });
+  const double total = std::accumulate(sizes.begin(), sizes.end(), 0.0);
   std::vector<VecHandle> rights, changes;
   std::vector<Vec> b, x;
   std::vector<size_t> sources;
-  for (size_t k = 0; k < 3; ++k) {
-    if (sizes[k] <= negligible * sum) continue;
-    rights.push_back(right_side(residuals[k])), changes.push_back(solve::zero_like(rights.back()));
+  for (size_t k = 0; k < left.size(); ++k) {
+    // a reduction's residual is small for its effect: it lies in the fundamental
+    if (sizes[k] <= (k == reduced ? 0 : negligible * total)) continue;
+    rights.push_back(right_side(left[k])), changes.push_back(solve::zero_like(rights.back()));
     b.push_back(rights.back()), x.push_back(changes.back()), sources.push_back(k);
   }
+  if (!step(point, closing_row(y, tangent), left[reduced], b, x)) return {};
   LeftOut out;
-  close(y, tangent);
-  if (!newton_->linear(point, b, x)) return {};
   const auto along = problem_.scalars(tangent);
   const auto change = [&](Vec v) { return at_parameter(finer_->scalars(v), along, problem_.scalar_count()); };
-  std::vector<double>* const by_source[] = {&out.harmonics, &out.samples, &out.solver};
-  for (size_t k = 0; k < x.size(); ++k) *by_source[sources[k]] = change(x[k]);
-  for (size_t k = 1; k < x.size(); ++k) check(VecAXPY(x[0], 1, x[k]));
-  out.all = x.empty() ? std::vector<double>(along.size(), 0.0) : change(x[0]);
-  for (size_t k = 0; k < 3; ++k)  // by the size of its residual
-    if (by_source[k]->empty()) {
-      *by_source[k] = out.all;
-      for (double& v : *by_source[k]) v *= sum > 0 ? sizes[k] / sum : 0;
+  for (size_t k = 0; k < x.size(); ++k) out.by_source[sources[k]] = change(x[k]);
+  out.all = x.empty() ? std::vector<double>(along.size(), 0.0) : change(sum(x));
+  for (size_t k = 0; k < left.size(); ++k)  // by the size of its residual
+    if (out.by_source[k].empty()) {
+      out.by_source[k] = out.all;
+      for (double& v : out.by_source[k]) v *= total > 0 ? sizes[k] / total : 0;
     }
   return out;
 }

@@ -1,5 +1,7 @@
 #pragma once
+#include <array>
 #include <optional>
+#include <span>
 
 #include "hb/harmonic_problem.h"
 #include "solve/newton.h"
@@ -9,7 +11,8 @@ namespace fretwave::hb {
 /// Changes of a point's scalars (HarmonicProblem::scalars) at the same parameter, by what is left out, and by
 /// all of it.
 struct LeftOut {
-  std::vector<double> harmonics, samples, solver, all;
+  std::vector<double> all;
+  std::array<std::vector<double>, 4> by_source;  ///< harmonics, samples, solver, reduction
 };
 
 /// What a point's discretisation leaves out of it. With ' for the same problem on the orders up to 2 H + 1
@@ -21,9 +24,20 @@ struct LeftOut {
 /// nothing at the same parameter. From there the branch leads to it: dy = dy' + s t with no change of the
 /// last entry, as far as a straight line goes (|s| <= `reach`). Harmonics left out answer for -r'_new, the
 /// contact force outside the retained orders, samples for r - r'_old, the change of the retained rows on more
-/// samples (rounding in continuous time), and the solver for -r, what it left; a source next to nothing is
-/// not solved for and has its share of r'. Error estimation by a hierarchical basis (Bank & Smith 1993): what
-/// the estimate misses is as much smaller as the finer set is better, and the square of the error.
+/// samples (rounding in continuous time), and the solver for -r, what it left; what a
+/// reduction has left out of the model is given as a residual of the point's equations. A source next to
+/// nothing is not solved for and has its share of r'. Error estimation by a hierarchical basis (Bank & Smith
+/// 1993): what the estimate misses is as much smaller as the finer set is better, and the square of the
+/// error.
+///
+/// That square is looked at. Along the step, for equations of the second order,
+///
+///   r'(y + s dy') = (1 - s) r' + s^2 q,   c = q . r' / r' . r',
+///
+/// of which one more residual tells q. Its part along r' vanishes at s = 2 / (1 + sqrt(1 - 4 c)), and is the
+/// least at s = 1 / (2 c) where c > 1/4: so far the step goes. Where c is not small (`bent`) it is
+/// taken anew with the Jacobian halfway there, for r' + J'(y + dy' / 2) dy' = 0 holds for such equations
+/// without any error (the implicit midpoint rule).
 class DiscretisationError {
  public:
   /// `prefix`: of the PETSc options of J' dy' = b. Collective.
@@ -31,17 +45,23 @@ class DiscretisationError {
   /// Why nothing is estimated: its factors would not fit the memory; empty if they do.
   std::string const& left_out() const { return left_out_; }
   /// At a converged point with its tangent; none where J' is singular. Collective.
-  std::optional<LeftOut> at(Vec y, Vec tangent);
+  std::optional<LeftOut> at(Vec y, Vec tangent, Vec reduction = nullptr);
 
  private:
   VecHandle retained(Vec r) const;
   VecHandle right_side(Vec r) const;
-  void close(Vec y, Vec tangent);
+  VecHandle left_side(Vec b) const;
+  VecHandle closing_row(Vec y, Vec tangent);
+  std::array<VecHandle, 4> residuals(Vec y, Vec point, Vec reduction);
+  bool step(Vec point, Vec row, Vec reduction, std::span<Vec const> b, std::span<Vec const> x);
+  double bend(Vec point, Vec r, Vec reduction, Vec step);
+  void from_halfway(Vec middle, Vec row, std::span<Vec const> b, std::span<Vec const> x);
 
   HarmonicProblem& problem_;
-  std::string left_out_;
-  std::unique_ptr<HarmonicProblem> finer_;
-  std::unique_ptr<solve::Newton> newton_;
+  std::string prefix_, left_out_;
+  std::unique_ptr<HarmonicProblem> finer_;  ///< of the point, which moves in H harmonics alone
+  std::unique_ptr<HarmonicProblem> moved_;  ///< of where the step leads, which moves in all
+  std::unique_ptr<solve::Newton> newton_, again_;
 };
 
 }  // namespace fretwave::hb

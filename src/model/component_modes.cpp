@@ -134,19 +134,21 @@ Modes FixedInterface::all_modes() const {
   return modes;
 }
 
-Modes FixedInterface::modes(ComponentModes wanted) {
+Modes FixedInterface::modes(ComponentModes& wanted) {
+  if (dofs() == 0) return {};
   const bool by_frequency = wanted.highest_omega > 0;
   const bool dense = dofs() <= std::max(small, by_frequency ? 0 : 2 * wanted.count);
   if (by_frequency && !dense)
     wanted.count = count_below(K_, M_, wanted.highest_omega * wanted.highest_omega, "component_");
-  if (wanted.count == 0 && !(by_frequency && dense)) return {};
+  const auto asked = [&] { return wanted.count + ComponentModes::beyond(wanted.count); };
   // two more, so that a double mode is not cut before it is oriented
-  Modes modes = dense ? all_modes() : krylov_modes(std::min(wanted.count + 2, dofs()));
+  Modes modes = dense ? all_modes() : krylov_modes(std::min(asked() + 2, dofs()));
   sort_and_orient(modes, rounding(K_, M_));
   if (by_frequency && dense)
-    std::erase_if(modes, [&](auto const& mode) { return mode.omega > wanted.highest_omega; });
-  else if (modes.size() > size_t(wanted.count))
-    modes.resize(size_t(wanted.count));
+    wanted.count = std::count_if(modes.begin(), modes.end(),
+                                 [&](auto const& m) { return m.omega <= wanted.highest_omega; });
+  if (modes.size() > size_t(asked())) modes.resize(size_t(asked()));
+  wanted.count = std::min(wanted.count, PetscInt(modes.size()));
   for (auto const& mode : modes) normalise(M_, mode.shape);
   return modes;
 }

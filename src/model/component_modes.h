@@ -10,6 +10,8 @@ namespace fretwave::model {
 struct ComponentModes {
   PetscInt count = 10;
   double highest_omega = 0;
+  /// The next ones, of so many that are kept, which tell what is left out.
+  static PetscInt beyond(PetscInt kept) { return kept < 10 ? 10 : kept; }
 };
 
 /// A mode with the kept dofs held: K_ii phi = omega^2 M_ii phi, unit modal mass.
@@ -27,9 +29,10 @@ class FixedInterface {
   PetscInt local_dofs() const;
   /// X = K_ii^-1 B for dense B. Collective.
   void solve(Mat B, Mat X) const;
-  /// Lowest modes, ascending; the same on every number of ranks, double modes included. Takes the
-  /// factorisation: no solve after this. Collective.
-  std::vector<ComponentMode> modes(ComponentModes);
+  /// Lowest modes, ascending, and behind those to keep the ones beyond, as far as there are any; the same on
+  /// every number of ranks, double modes included. Sets the number to keep. Takes the factorisation: no solve
+  /// after this. Collective.
+  std::vector<ComponentMode> modes(ComponentModes&);
 
  private:
   std::vector<ComponentMode> krylov_modes(PetscInt count);

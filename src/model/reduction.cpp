@@ -107,13 +107,51 @@ Reduction::Reduction(Mat K, Mat M, Mat C, std::vector<PetscInt> kept, ComponentM
   T_.reserve(size_t(local_) * (kept_.size() + (wanted.highest_omega > 0 ? 0 : size_t(wanted.count))));
   place_constraint_modes(K, component, internal);
   times_.constraint_modes = lap();
-  place_component_modes(component.modes(wanted), internal);
+  const auto modes = component.modes(wanted);
+  place_component_modes(modes, internal);
   times_.component_modes = lap();
   K_ = congruence(K, PetscInt(kept_.size()), true);
   M_ = congruence(M, size(), true);
   if (C) C_ = congruence(C, size(), false);
   impose_modal_block(K_, M_, kept_.size(), component_omega_);
+  omit(PetscInt(modes.size()) - wanted.count);
   times_.projection = lap();
+}
+
+namespace {
+
+/// Rows `begin` .. `end` of the first `columns` of a matrix, row by row, or its columns of the first rows.
+std::vector<double> strip(std::vector<double> const& A, size_t n, size_t begin, size_t end, size_t columns,
+                          bool transposed) {
+  std::vector<double> out;
+  for (size_t i = begin; i < end; ++i)
+    for (size_t j = 0; j < columns; ++j) out.push_back(transposed ? A[j + i * n] : A[i + j * n]);
+  return out;
+}
+
+/// The first rows and columns.
+void crop(std::vector<double>& A, size_t n, size_t size) {
+  if (A.empty()) return;
+  for (size_t j = 0; j < size; ++j)
+    std::copy_n(A.begin() + ptrdiff_t(j * n), size, A.begin() + ptrdiff_t(j * size));
+  A.resize(size * size);
+}
+
+}  // namespace
+
+/// The last modes are no coordinates; what couples them to these stays.
+void Reduction::omit(PetscInt modes) {
+  const size_t n = size_t(size()), kept = n - size_t(modes);
+  omitted_.omega.assign(component_omega_.end() - modes, component_omega_.end());
+  omitted_.M = strip(M_, n, kept, n, kept, false);
+  if (!C_.empty()) {
+    omitted_.from = strip(C_, n, kept, n, kept, false), omitted_.onto = strip(C_, n, kept, n, kept, true);
+    for (size_t i = kept; i < n; ++i) omitted_.C.push_back(C_[i + i * n]);
+  }
+  for (auto* A : {&K_, &M_, &C_}) crop(*A, n, kept);
+  component_omega_.resize(component_omega_.size() - size_t(modes));
+  T_.resize(size_t(local_) * kept);
+  T_.shrink_to_fit();
 }
 
 /// Columns of T as a dense matrix, without copy.

@@ -11,6 +11,14 @@ struct ReductionTimes {
   double factorisation = 0, constraint_modes = 0, component_modes = 0, projection = 0;
 };
 
+/// The component modes next to those of a reduction: with unit modal mass and diag(omega^2) as the others.
+struct OmittedModes {
+  std::vector<double> omega;  ///< [rad/s]
+  std::vector<double> M, from,
+      onto;               ///< what couples them: M, C by mode and coordinate, C the other way round
+  std::vector<double> C;  ///< of each by itself; with `from` and `onto` empty where there is none
+};
+
 /// Craig-Bampton reduction (Craig & Bampton, AIAA J. 6(7), 1968): x = T x_r with T = [I 0; Psi Phi] over
 /// (kept, internal) dofs, constraint modes Psi = -K_ii^-1 K_ib and component modes Phi. Kept dofs come first,
 /// in the order given, then the component modes. The reduced matrices stand whole on every rank, T by rows on
@@ -30,6 +38,7 @@ class Reduction {
   std::vector<double> const& C() const { return C_; }
   /// Frequencies of the component modes [rad/s], ascending.
   std::vector<double> const& component_omega() const { return component_omega_; }
+  OmittedModes const& omitted() const { return omitted_; }
   ReductionTimes const& times() const { return times_; }
   /// This rank's rows of T x_r for several x_r: (size x count) in and (local_dofs x count) out, row by row.
   std::vector<double> expand(std::span<double const> reduced, PetscInt count) const;
@@ -43,11 +52,13 @@ class Reduction {
   void place_constraint_modes(Mat K, FixedInterface const&, std::vector<PetscInt> const& internal);
   void place_component_modes(std::vector<ComponentMode> const&, std::vector<PetscInt> const& internal);
   std::vector<double> congruence(Mat A, PetscInt n, bool symmetric);
+  void omit(PetscInt modes);
 
   MPI_Comm comm_ = MPI_COMM_NULL;
   PetscInt local_ = 0, global_ = 0, first_ = 0;
   std::vector<PetscInt> kept_;
   std::vector<double> component_omega_, K_, M_, C_, T_;
+  OmittedModes omitted_;
   ReductionTimes times_;
 };
 

@@ -12,6 +12,7 @@ import fretwave as fw
 from fretwave.cyclic.faces import rotation
 from fretwave.cyclic.reduction import reduce_sector
 from fretwave.errors import InputError
+from fretwave.model.sectors import ties
 
 pytest.importorskip("skfem")
 
@@ -169,3 +170,31 @@ def test_damping_is_reduced_alike(built, comm):
     with reduced(built, comm, C=C, modes=4) as reduction:
         wanted = 1e-6 * reduction.K + 2.0 * reduction.M
         assert pytest.approx(wanted, rel=0, abs=SOLVED * np.abs(wanted).max()) == reduction.C
+
+
+@pytest.mark.ranks(1)
+@pytest.mark.parametrize("nodal_diameter", [0, 1, -2])
+def test_what_is_omitted_of_a_sector_in_a_wave_is_what_its_frequencies_miss(built, nodal_diameter):
+    """With all other component modes the dynamic stiffness is singular at the unreduced wave's frequencies."""
+    with unreduced(built).model(nodal_diameter) as full:
+        omega = fw.linear_modes(full, 4, "free")[3].omega
+    turn, half = 2 * np.pi * nodal_diameter / built.sectors, (inner_dofs(built) + 1) // 2
+    for modes, far in ((2, 1e-3), (half, 1e-5)):
+        with reduced(built, None, modes=modes) as r:
+            T = ties(r.low, r.high, r.size, r.sectors, None)
+            omitted, K, M = r.omitted.tied(T), r.K, r.M
+        wave = sum(np.exp(-1j * k * turn) * part.toarray() for k, part in T.items())
+        Z = wave.conj().T @ (K - omega**2 * M) @ wave
+        s, unit = 1j * omega, np.eye(len(Z), dtype=complex)
+        forces = np.column_stack([omitted.forces(s, s * s, x, turn) for x in unit])
+        lost, left = (
+            np.abs(np.linalg.eigvals(np.linalg.solve(wave.conj().T @ M @ wave, A))).min() for A in (Z, Z + forces)
+        )
+        assert lost > far * omega**2
+        assert left < ROUNDED * omega**2 if modes == half else left < 0.2 * lost
+
+
+@pytest.mark.ranks(1)
+def test_nothing_is_known_of_faces_that_are_reduced(built):
+    with reduced(built, None, modes=2, interface_diameters=[0, 2]) as r:
+        assert not r.omitted.known

@@ -34,8 +34,8 @@ def block():
     return made.M, sp.csr_matrix(K), 1e-6 * sp.csr_matrix(K), B, tip
 
 
-def mode(M, K, C, B, dof, comm, method, prefix):
-    model = fw.Model(M, K, C, [fw.Contact("coulomb_3d", B, {**STIFFNESS, **LOADS}, "root")], comm)
+def mode(M, K, C, B, dof, comm, method, prefix, omitted=None):
+    model = fw.Model(M, K, C, [fw.Contact("coulomb_3d", B, {**STIFFNESS, **LOADS}, "root")], comm, omitted=omitted)
     first = fw.linear_modes(model, 1, "stuck")[0]
     rest = balanced(model, first)
     problem = fw.NonlinearMode(model, fw.Harmonics(range(4), 64), method, dof, first, prefix)
@@ -61,6 +61,24 @@ def test_estimate_is_the_true_difference(block, comm, method):
         for key in ("omega", "beta", "zeta"):
             difference = true[key] - found[key]
             assert 0.5 * abs(difference) <= abs(getattr(estimate, key)) <= 2 * abs(difference), key
+
+
+@pytest.mark.parametrize("method, modes", [("CNM", 1), ("EPMC", 3)])
+def test_every_point_has_its_own(block, comm, method, modes):
+    """By the modes next to those that are kept, within the 7 % that all others add; of the full model it is none."""
+    M, K, C, B, tip = block
+    keep = np.union1d(np.flatnonzero(np.abs(B).sum(axis=0)), [tip])
+    full = mode(M, K, C, B, tip, comm, method, "full_")
+    true = full.meaning.eigenvalue(full.scalars(solve_at(full, AMPLITUDE)))
+    with fw.reduce(M, K, C, keep=keep, modes=modes, comm=comm) as r:
+        Br, at = np.hstack([B[:, keep], np.zeros((len(B), modes))]), int(np.searchsorted(keep, tip))
+        small = mode(r.M, r.K, r.C, Br, at, comm, method, "small_", r.omitted)
+        assert len(r.omitted.omega) == 10
+    point = next(iter(fw.Continuation(small, small.initial(AMPLITUDE), (0.5 * AMPLITUDE, 2 * AMPLITUDE))))
+    errors = small.errors(point.y, point.tangent)
+    difference = abs(small.meaning.eigenvalue(small.scalars(point.y)) - true)
+    assert errors["lambda_error_reduction"] == pytest.approx(difference, rel=0.1)
+    assert errors["omega_error"] > 0.5 * difference
 
 
 def test_a_problem_on_other_dofs_is_refused(block, comm):

@@ -70,6 +70,36 @@ def test_all_component_modes_give_the_exact_frequencies(block: Bar) -> None:
     np.testing.assert_allclose(found, exact, rtol=TIGHT)
 
 
+def test_what_is_omitted_is_what_the_structure_has_and_the_reduction_has_not(block: Bar) -> None:
+    """Where all other modes are among them, the dynamic stiffness of the kept dofs is exact, damped too."""
+    keep, s = root_and_tip(block), 300.0 + 1.5e6j  # among them
+    K, M = block.K.toarray(), block.M.toarray()
+    share, mass = 1e-7, 50.0
+    C = share * K + mass * M
+    inside = np.setdiff1d(np.arange(len(K)), keep)
+    exact = condensed(K + s * C + s * s * M, keep, inside)
+    count = (len(inside) + 1) // 2
+    with reduced(block, modes=count) as without, reduce(block.M, block.K, C, keep=keep, modes=count) as damped:
+        assert len(without.omitted.omega) == len(inside) - count and without.omitted.omega[0] < abs(s)
+        C_r = share * without.K + mass * without.M
+        for r, damping, omitted in (
+            (damped, damped.C, damped.omitted),
+            (without, C_r, without.omitted.damped(share, mass)),
+        ):
+            Z = r.K + s * damping + s * s * r.M
+            forces = np.column_stack([omitted.forces(s, s * s, x) for x in np.eye(r.size, dtype=complex)])
+            kept, modes = np.arange(len(keep)), np.arange(len(keep), r.size)
+            scale = np.abs(exact).max()
+            assert np.abs(condensed(Z + forces, kept, modes) - exact).max() < TIGHT * scale
+            assert np.abs(condensed(Z, kept, modes) - exact).max() > 1e-4 * scale
+
+
+def condensed(Z: np.ndarray, kept: np.ndarray, inside: np.ndarray) -> np.ndarray:
+    """Dynamic stiffness of the kept dofs, no force on the others."""
+    one, other = Z[np.ix_(kept, kept)], Z[np.ix_(inside, kept)]
+    return one - Z[np.ix_(kept, inside)] @ np.linalg.solve(Z[np.ix_(inside, inside)], other)
+
+
 def test_frequencies_fall_to_the_exact_ones_as_modes_are_added(block: Bar) -> None:
     errors = []
     for modes in (0, 2, 5, 10, 20, 40, 80):

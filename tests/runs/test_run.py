@@ -52,7 +52,7 @@ def test_columns_are_those_of_the_contract(run: Path) -> None:
     header = (run / "mode.csv").read_text().splitlines()[0]
     assert header == (
         "point,amplitude,omega,omega0,frequency_hz,beta,zeta,omega_error,zeta_error,"
-        "lambda_error_harmonics,lambda_error_samples,lambda_error_solver,stick,slip,open,"
+        "lambda_error_harmonics,lambda_error_samples,lambda_error_solver,lambda_error_reduction,stick,slip,open,"
         "force_outside,residual,newton,linear,wall_s,rounding,accepted,unclosed,energy,event"
     )
     header = (run / "forced.csv").read_text().splitlines()[0]

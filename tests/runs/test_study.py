@@ -23,8 +23,9 @@ def solve(settings: Settings, extra=()) -> Outcome:
     amplitude = np.concatenate([common_amplitudes(0.1, 1.0, 5), extra])
     zeta = 0.04 * amplitude * (1.0 + 1.0 / settings.harmonics**2)
     omega = np.full_like(amplitude, 25.0 * (1.0 + 1.0 / settings.samples))
-    estimate = np.outer(np.full_like(amplitude, 25.0 * 0.008 / settings.harmonics**2), [1.0, 0.0, 0.0])
-    return Outcome(amplitude, omega, zeta, estimate, float(zeta.max()), 1.0, 50, 150, 0.01 * settings.harmonics)
+    estimate = np.outer(np.full_like(amplitude, 25.0 * 0.008 / settings.harmonics**2), [1.0, 0.0, 0.0, 0.0])
+    cost = 0.01 * settings.harmonics
+    return Outcome(amplitude, omega, zeta, estimate, float(zeta.max()), 1.0, 50, 150, 2 * cost, cpu_s=cost)
 
 
 def run_study(solver=solve):
@@ -60,6 +61,22 @@ def test_errors_are_measured_against_the_finest_run():
     assert [row["estimate"] / row["error"] for row in rows] == pytest.approx(ratios, rel=1e-2)  # zeta is small
     samples = next(row for row in study.table() if row["sweep"] == "samples")
     assert samples["omega_error"] == pytest.approx((1.0 + 1.0 / 64.0) / (1.0 + 1.0 / 256.0) - 1.0)
+
+
+def test_a_finest_run_judges_no_error_that_is_as_small_as_its_own():
+    """zeta is off by 1/H^2, as every run says itself: 1 - 1/49 is 48 times 1/49, 1/25 - 1/49 about as large."""
+
+    def exactly(settings):
+        found = solve(settings)
+        return replace(found, estimate=np.outer(found.amplitude / settings.harmonics**2, [1.0, 0.0, 0.0, 0.0]))
+
+    study = Study(replace(PLAN, harmonics=(1, 5, 7)), common_amplitudes(0.1, 1.0, 5))
+    study.run(exactly, lambda sweep, settings: None)
+    far, near = study.table()[:2]
+    assert far["judged"] == 5 and far["within_3"] == 1.0
+    assert near["judged"] == 0 and np.isnan(near["within_3"]) and near["zeta_error"] > 0
+    rows = [row for row in study.calibration() if row["harmonics"] == 5 and row["sweep"] == "harmonics"]
+    assert [row["judge"] for row in rows] == pytest.approx(study.places / 49)
 
 
 def test_amplitudes_that_a_run_meets_several_times_are_left_out():
@@ -164,9 +181,10 @@ def respond(settings: Settings) -> ResponseOutcome:
     """A response of 2 m at its peak that is off by 0.2 / H m everywhere, which it says twofold."""
     omega = np.linspace(20.0, 30.0, 7)[1:-1]
     value = 2.0 / (1.0 + (omega - 25.0) ** 2) + 0.2j / settings.harmonics
-    estimate = np.outer(np.full_like(omega, 0.4 / settings.harmonics), [1.0, 0.0, 0.0])
+    estimate = np.outer(np.full_like(omega, 0.4 / settings.harmonics), [1.0, 0.0, 0.0, 0.0])
     peak = float(np.abs(value).max())
-    return ResponseOutcome(omega, value.real, -value.imag, estimate, peak, 25.0, 40, 90, 0.01 * settings.harmonics)
+    cost = 0.01 * settings.harmonics
+    return ResponseOutcome(omega, value.real, -value.imag, estimate, peak, 25.0, 40, 90, 2 * cost, cpu_s=cost)
 
 
 def test_errors_of_a_response_are_those_of_its_complex_amplitude_over_the_peak():

@@ -26,6 +26,7 @@ from mpi4py import MPI
 from ..arrays import Array, Indices
 from ..errors import InputError
 from ..model.contact import Contact
+from ..model.omitted import UNKNOWN
 from ..model.reduction import RIGID_SHARE, Reduction, reduce
 from ..model.sectors import Given, by_sector
 from ..model.sizes import COMPARED_MODES, INTERFACE_TOLERANCE, INTERFACE_WAVES
@@ -55,6 +56,8 @@ class SectorReduction(Destroyable):
     sectors : int
     diameters : tuple of int
         Nodal diameters that gave interface modes; empty when the faces are whole.
+    omitted : OmittedModes
+        Nothing is known of it where the faces are reduced too.
     component_hz : (n_modes,) [Hz]
         With kept dofs and faces held.
     wall_s : dict
@@ -64,6 +67,7 @@ class SectorReduction(Destroyable):
     def __init__(self, full: Sector, P: sp.csc_matrix, faces: Interface, inner: Reduction, waves: SectorWaves) -> None:
         self._P, self._inner, self._waves = P, inner, waves
         self.unreduced, self.sectors, self.diameters = full, full.sectors, waves.diameters
+        self.omitted = UNKNOWN if waves.diameters else inner.omitted
         self.M, self.K, self.C, self.component_hz = inner.M, inner.K, inner.C, inner.component_hz
         self.low: Indices = len(faces.kept) + np.arange(faces.n_interface)
         self.high: Indices = self.low + faces.n_interface

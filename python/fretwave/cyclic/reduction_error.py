@@ -17,8 +17,9 @@ import scipy.sparse as sp
 from petsc4py import PETSc
 
 from ..arrays import Array, Complex
+from ..hb.omitted import harmonic_factors
 from ..hb.problems import NonlinearMode
-from ..hb.reduction_error import NonlinearError, _harmonics, _reduced_step
+from ..hb.reduction_error import NonlinearError, _reduced_step
 from .reduction import SectorReduction
 
 Terms = Mapping[int, Any]
@@ -46,7 +47,7 @@ def sector_nonlinear_error(
     began, comm = time.perf_counter(), problem.model.comm
     wave = _Wave(reduction, problem.model.nodal_diameter)
     Q = comm.bcast(problem.coefficients(y))
-    harmonics = list(_harmonics(problem, y))
+    harmonics = list(harmonic_factors(problem, y))
     X = wave.expand(Q, harmonics)
     forces, sizes = np.zeros((len(X), len(harmonics)), dtype=complex), np.zeros(2)
     for place, (_, order, factors) in list(enumerate(harmonics))[comm.rank :: comm.size]:

@@ -22,6 +22,7 @@ from ..mpi.gather import on_rank_0
 from ..post.contact_history import MOTION
 from ..post.motion import complex_amplitudes
 from .observed import Observed, named, row_of
+from .omitted import omitted_residual
 from .states import Estimate, ForcedState, ModalState, State, default_samples
 
 
@@ -127,6 +128,14 @@ class HarmonicProblem(Destroyable):
         """
         return self.core.embedded(other.core, v)
 
+    def amplitude_scale(self, y: PETSc.Vec) -> float:
+        """a of Q = a q [length]. Collective."""
+        raise NotImplementedError
+
+    def inertia_damping(self, y: PETSc.Vec) -> float:
+        """g of M (s^2 - g s) [1/s]. Collective."""
+        return 0.0
+
     def residual(self, y: PETSc.Vec, r: PETSc.Vec | None = None) -> PETSc.Vec:
         """r(y), dimensionless, N entries, in `r` where one is given. Collective."""
         r = self.core.equations() if r is None else r
@@ -196,17 +205,17 @@ class HarmonicProblem(Destroyable):
     def errors(self, y: PETSc.Vec, tangent: PETSc.Vec | None) -> dict[str, float]:
         """Estimated errors at a converged point, in the units of what they are errors of. Collective.
 
-        One Newton step on the harmonics up to 2 H + 1 and four times the samples, read at the same amplitude or
-        frequency: see `src/hb/discretisation_error.h`. Of the reduction of a model nothing is known here. Without the
-        branch's tangent none is estimated, all are nan.
+        One Newton step on the harmonics up to 2 H + 1 and four times the samples, and with the component modes that a
+        reduction has left out (`OmittedModes`), read at the same amplitude or frequency: see
+        `src/hb/discretisation_error.h`. Without the branch's tangent none is estimated, all are nan.
 
         Returns
         -------
         dict
-            Modes: omega_error [rad/s], zeta_error, and lambda_error_harmonics, _samples, _solver [1/s], the changes of
-            lambda = -beta + i omega by each source. Responses: amplitude_error and the same by source [length]. nan
-            where the refined system is singular or does not fit the memory (`errors_left_out`); empty for a problem
-            that has no table.
+            Modes: omega_error [rad/s], zeta_error, and lambda_error_harmonics, _samples, _solver, _reduction [1/s],
+            the changes of lambda = -beta + i omega by each source. Responses: amplitude_error and the same by source
+            [length]. nan where nothing is known of a source (the reduction of a wheel), and where the refined system is
+            singular or does not fit the memory (`errors_left_out`); empty for a problem that has no table.
         """
         if self.meaning is None:
             return {}
@@ -219,11 +228,16 @@ class HarmonicProblem(Destroyable):
         began = time.perf_counter()
         if self._error is None:
             self._error = _core.DiscretisationError(self.core, f"{self.prefix}error_")
-        changes = self._error.at(y, tangent)
+        left_out = omitted_residual(self, y)
+        changes = self._error.at(y, tangent, left_out)
         found = None
         if changes is not None:
             z, along = self.scalars(y), self.scalars(tangent)
             found = Estimate(self.meaning, z, along, [np.array(change) for change in changes])
+            if self.model.omitted is not None and not self.model.omitted.known:
+                found.changes[-1].fill(np.nan)
+        if left_out is not None:
+            left_out.destroy()
         self.errors_wall_s += time.perf_counter() - began
         return found
 
@@ -355,6 +369,12 @@ class NonlinearMode(HarmonicProblem):
         super().__init__(model, harmonics, prefix, core, rest)
         self.meaning = ModalState(method, start.omega)
 
+    def amplitude_scale(self, y: PETSc.Vec) -> float:
+        return self.state(y)["amplitude"]
+
+    def inertia_damping(self, y: PETSc.Vec) -> float:
+        return 2 * self.state(y)["beta"] if self.method == "EPMC" else 0.0  # C - 2 zeta w0 M
+
     def _what(self) -> str:
         return f"{self.method} from {self.start.frequency_hz:.6g} Hz, amplitude of {named(self.dof)}, "
 
@@ -426,6 +446,9 @@ class ForcedResponse(HarmonicProblem):
                 blocks[:, column + 1] = -values.imag
         local = model.distribute(blocks).ravel().copy()
         return PETSc.Vec().createWithArray(local, comm=model.comm)
+
+    def amplitude_scale(self, y: PETSc.Vec) -> float:
+        return self.core.reference_amplitude
 
     def _what(self) -> str:
         return f"level {self.level:g}, {named(self.dof)}, "

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -15,6 +14,7 @@ from .. import _core
 from ..arrays import Array, Complex
 from ..errors import InputError, NotConverged
 from ..model.reduction import Reduction
+from .omitted import harmonic_factors
 from .problems import NonlinearMode
 
 if TYPE_CHECKING:
@@ -85,7 +85,7 @@ def nonlinear_error(
     P = np.zeros(full.n_dof) if load is None else np.asarray(load, dtype=float)
     interior = _Interior(reduction)
     step, residual, forces = np.zeros_like(Q), 0.0, 0.0
-    for column, order, factors in _harmonics(problem, y):
+    for column, order, factors in harmonic_factors(problem, y):
         x: Complex = X[:, column] - 1j * (X[:, column + 1] if order else np.zeros(len(X)))
         r = interior.restrict(interior.product(factors, x) - (0 if order else full.distribute(P)))
         z = interior.product(factors, interior.correction(factors, r, order))
@@ -96,15 +96,6 @@ def nonlinear_error(
     interior.destroy()
     change = _reduced_step(problem, y, step)
     return NonlinearError(**change, residual=float(np.sqrt(residual / forces)), wall_s=time.perf_counter() - began)
-
-
-def _harmonics(problem: NonlinearMode, y: PETSc.Vec) -> Iterator[tuple[int, int, tuple[complex, complex, complex]]]:
-    """First column, order and factors of K, C, M in Z_n."""
-    damping = 2 * problem.state(y)["beta"] if problem.method == "EPMC" else 0.0  # C - 2 zeta w0 M
-    column = 0
-    for order, s in zip(problem.harmonics.orders, problem.core.exponents(y)):
-        yield column, order, (1.0, s, s * s - damping * s)
-        column += 2 if order else 1
 
 
 def _square(comm: MPI.Comm, v: Complex) -> float:

@@ -20,6 +20,7 @@ from ..mpi.destroyable import Destroyable
 from ..mpi.gather import on_all_ranks
 from ..units import SI, UnitSystem, unit_system
 from .contact import Contact
+from .omitted import OmittedModes
 from .rest import Rest
 from .sectors import Given, Term, by_sector
 
@@ -53,6 +54,8 @@ class Model(Destroyable):
         Ranks take whole groups of this many dofs of matrices given whole: a wheel is cut between its sectors.
     units : str or UnitSystem
         The system that all numbers are in, which labels follow (`fretwave.units`).
+    omitted : OmittedModes, optional
+        Of matrices that a reduction has made (`Reduction.omitted`): what it has left out, for estimates of errors.
     """
 
     def __init__(
@@ -66,8 +69,10 @@ class Model(Destroyable):
         nodal_diameter: int = 0,
         unit: int = 1,
         units: str | UnitSystem = SI,
+        omitted: OmittedModes | None = None,
     ) -> None:
         self.units = unit_system(units) if isinstance(units, str) else units
+        self.omitted = omitted
         terms = [(A, order, k) for order, given in enumerate((K, C, M)) for k, A in by_sector(given).items()]
         first = terms[0][0]
         if comm is None:

@@ -19,6 +19,7 @@ from ..errors import InputError
 from ..mpi.destroyable import Destroyable
 from ..mpi.gather import on_all_ranks
 from .model import Model
+from .omitted import OmittedModes
 from .sectors import Given, Sparse
 from .sizes import COMPARED_MODES, COMPONENT_MODES
 
@@ -69,6 +70,8 @@ class Reduction(Destroyable):
         On every rank, symmetric. K is block diagonal: the statically condensed stiffness and omega_j^2 [1/s^2].
     C : (n_r, n_r) or None
     keep : (n_kept,)
+    omitted : OmittedModes
+        As many component modes again, 10 at least, which are no coordinates.
     component_hz : (n_modes,)
         Frequencies with the kept dofs held [Hz], ascending.
     wall_s : dict
@@ -82,8 +85,10 @@ class Reduction(Destroyable):
         self.keep = keep
         self.M: Array = np.asarray(core.M)
         self.K: Array = np.asarray(core.K)
-        damping = core.C
+        damping, left = core.C, core.omitted
         self.C: Array | None = None if damping is None else np.asarray(damping)
+        C_from, C_onto, own = (None if damping is None else np.asarray(left[n]) for n in ("C_from", "C_onto", "C"))
+        self.omitted = OmittedModes(np.asarray(left["omega"]), np.asarray(left["M"]), C_from, C_onto, own)
         self.component_hz: Array = np.asarray(core.component_omega) / (2 * np.pi)
         self.wall_s: dict[str, float] = {**core.times, "total": wall}
 

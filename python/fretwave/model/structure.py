@@ -18,6 +18,7 @@ from ..arrays import Array, Indices
 from ..errors import InputError
 from ..units import SI, UnitSystem, unit_system
 from .consistency import complaint_of
+from .omitted import UNKNOWN, OmittedModes
 from .pairs import Pairs
 from .sectors import Parts, Sparse, Term, around, by_sector, check_balanced, check_number, combine, ties
 
@@ -92,6 +93,8 @@ class Structure:
         Relative stiffness deviations of a whole wheel's sectors; None for a tuned one.
     units : str, optional
         Name of the system of units that all numbers are in (`fretwave.units`); without it SI.
+    omitted : OmittedModes, optional
+        Of a reduced structure: what the reduction has left out.
     """
 
     M: Term
@@ -121,6 +124,7 @@ class Structure:
     whole: bool = False
     deviations: Optional[Array] = None
     units: Optional[str] = None
+    omitted: Optional[OmittedModes] = None
 
     def __repr__(self) -> str:
         kind = "all" if self.whole else "one"
@@ -208,7 +212,9 @@ class Structure:
             places, values = zip(*dampers)
             added = sp.csr_matrix((values, (places, places)), shape=(self.n_dof, self.n_dof))
             total[0] = total[0] + added if 0 in total else added
-        return replace(self, C=_plain(total) if total else None, stiffness_damping=0.0, mass_damping=0.0)
+        omitted = None if self.omitted is None else self.omitted.damped(self.stiffness_damping, self.mass_damping)
+        C = _plain(total) if total else None
+        return replace(self, C=C, stiffness_damping=0.0, mass_damping=0.0, omitted=omitted)
 
     def tied(self) -> Structure:
         """A sector with its high face tied to the low face of the next one, and left out.
@@ -242,6 +248,7 @@ class Structure:
             high=None,
             ties=T,
             cut=self,
+            omitted=None if self.omitted is None else self.omitted.tied(T),
         )
 
     def around(
@@ -279,6 +286,7 @@ class Structure:
             stiffness_damping=self.stiffness_damping,
             mass_damping=self.mass_damping,
             whole=True,
+            omitted=None if self.omitted is None else UNKNOWN,
             deviations=deviations,
             units=self.units,
         )
@@ -327,6 +335,7 @@ class Structure:
             resultants=self._totals(),
             parts=parts,
             names=reduction.names(self.dof_names),
+            omitted=reduction.omitted,
             **_NO_NODES,
             **reduction.faces(),
             axis=None,  # reduced faces correspond as they are
@@ -352,11 +361,11 @@ class Structure:
         if self.low is not None and not self.whole:
             fix = "take the model of `structure.tied()`, or of `structure.tied().around()`"
             raise InputError("the sector is not tied to its neighbours", repr(self), None, "a tied sector", fix)
+        damped = self.damped()
+        given, units, omitted = (self.M, self.K, damped.C, contacts, comm), self.unit_system, damped.omitted
         if self.whole or not self.sectors:
-            C = self.damped().C
-            return Model(self.M, self.K, C, contacts, comm, unit=self.unit if self.whole else 1, units=self.unit_system)
-        C = self.damped().C
-        return Model(self.M, self.K, C, contacts, comm, self.sectors, nodal_diameter, units=self.unit_system)
+            return Model(*given, unit=self.unit if self.whole else 1, units=units, omitted=omitted)
+        return Model(*given, self.sectors, nodal_diameter, units=units, omitted=omitted)
 
     def complaint(self) -> str | None:
         """What is inconsistent in a structure as a builder gives it, None when nothing is."""

@@ -12,7 +12,7 @@ from ..post.calibration import FACTORS, can_be_told, share_within
 from ..results.reader import Run, Table
 from . import style
 
-MARKS = {"harmonics": "o", "samples": "s", "tolerance": "^"}
+MARKS = {"harmonics": "o", "samples": "s", "tolerance": "^", "component_modes": "D"}
 FACTOR = FACTORS[0]
 
 
@@ -24,7 +24,9 @@ def figures(run: Run) -> Iterator[tuple[str, Figure]]:
 
 
 def _told(table: Table) -> Indices:
-    return np.flatnonzero(can_be_told(table["error"]) & (table["estimate"] > 0))
+    error = table["error"]
+    judge = table["judge"] if "judge" in table else np.zeros_like(error)  # a folder of before has none
+    return np.flatnonzero(can_be_told(error, judge) & (table["estimate"] > 0))
 
 
 def draw(table: Table) -> Figure:
@@ -39,7 +41,8 @@ def draw(table: Table) -> Figure:
     for (sweep, mark), colour in zip(MARKS.items(), style.PALETTE):
         own = table["sweep"][rows] == sweep
         if own.any():
-            plane.plot(error[own], estimate[own], mark, ms=4, alpha=0.7, color=colour, label=f"by {sweep}")
+            words_of = f"by {sweep.replace('_', ' ')}"
+            plane.plot(error[own], estimate[own], mark, ms=4, alpha=0.7, color=colour, label=words_of)
     within = share_within(estimate, error, FACTOR)
     plane.set(xscale="log", yscale="log", title=f"{100 * within:.0f} % of {len(rows)} points {words}")
     of, unit = ("λ", "1/s") if "amplitude" in table else ("the amplitude / peak", "")

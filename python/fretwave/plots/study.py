@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ..arrays import AnyArray
 from ..results.reader import Run, Table
 from . import labels, style
 
@@ -47,7 +48,7 @@ def draw(table: Table) -> Figure:
             _sweep(plane, table, sweep, symbol, column, line, colour)
         plane.set(xscale="log", yscale="log", title=title)
         plane.set_xlabel(style.label("Run time" if of_wear else "Run time of the branch", "s"))
-        style.plain_numbers(plane.xaxis, table["wall_s"])
+        style.plain_numbers(plane.xaxis, _times(table))
     axes[0].set_ylabel("Relative error of the last cycle" if of_wear else "Error against the finest run")
     if not of_wear:
         axes[0].plot([], [], "o-", color=style.GREY, alpha=0.35, label="as the run estimates it")
@@ -57,11 +58,16 @@ def draw(table: Table) -> Figure:
     return figure
 
 
+def _times(table: Table) -> AnyArray:
+    """Of the processor; a study of wear has those of the wall."""
+    return table["cpu_s" if "cpu_s" in table else "wall_s"]
+
+
 def _sweep(axes: Axes, table: Table, sweep: str, symbol: str, column: str, line: str, colour: str) -> None:
     rows = np.flatnonzero((table["sweep"] == sweep) & (table["reference"] == 0.0))
     if not len(rows):
         return
-    time, error = table["wall_s"][rows], np.maximum(table[column][rows], FLOOR)
+    time, error = _times(table)[rows], np.maximum(table[column][rows], FLOOR)
     axes.plot(time, error, line, color=colour, label=f"{sweep.replace('_', ' ')} ({symbol})")
     if f"{column}_estimate" in table:
         axes.plot(time, np.maximum(table[f"{column}_estimate"][rows], FLOOR), line, color=colour, alpha=0.35)
@@ -72,7 +78,7 @@ def _name(axes: Axes, table: Table, column: str) -> None:
     colours = dict(zip(SWEEPS, style.PALETTE))
     rows = np.flatnonzero((table["reference"] == 0.0) & np.isin(table["sweep"], list(SWEEPS)))
     sweeps = [str(sweep) for sweep in table["sweep"][rows]]
-    points = [(table["wall_s"][row], max(table[column][row], FLOOR)) for row in rows]
+    points = [(_times(table)[row], max(table[column][row], FLOOR)) for row in rows]
     texts = [_text(sweep, table[sweep][row]) for sweep, row in zip(sweeps, rows)]
     labels.beside(axes, texts, points, [{"fontsize": 9, "color": colours[sweep]} for sweep in sweeps])
 

@@ -6,11 +6,11 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 
-from ..post.calibration import FACTORS, LEAST_ERROR
+from ..post.calibration import FACTORS, JUDGED, LEAST_ERROR
 
 Row = Mapping[str, "float | int | str"]
 
-WITHIN = {f"within {factor}": f"{{within_{factor}:.0%}}" for factor in FACTORS}
+WITHIN = {"judged": "{judged}", **{f"within {factor}": f"{{within_{factor}:.0%}}" for factor in FACTORS}}
 #: what the tables of modes and of responses begin with
 RUN = {
     "sweep": "{sweep}",
@@ -23,7 +23,7 @@ RUN = {
     "best fixed [s]": "{best_fixed_s:.3f}",
     "points": "{points}",
     "Newton": "{newton}",
-    "time [s]": "{wall_s:.3f}",
+    "time [s]": "{cpu_s:.3f}",
 }
 #: heading of the printed table -> how a row fills it
 PRINTED = {
@@ -47,24 +47,29 @@ PRINTED_OF_RESPONSE = {
 
 NOT_A_NUMBER = re.compile("^nan%?$")
 
+_LEAST = f"{LEAST_ERROR:.0e}".replace("e-0", "e-")
+
 LEGEND = (
     "Errors are against the finest run (marked): of peak zeta relative; of zeta the largest over the amplitudes that "
     "all runs meet exactly once, divided by the peak; of omega the largest relative one over the same. Estimated is "
     "the error of zeta by what the sweep changes, of the finest run by all, as the run itself says; within "
     f"{' and '.join(map(str, FACTORS))}: the share of the amplitudes at which the estimated error of lambda is within "
-    f"that factor of the error, where this is above {f'{LEAST_ERROR:.0e}'.replace('e-0', 'e-')} 1/s."
+    f"that factor of the error, of those judged: where this is above {_LEAST} 1/s and {JUDGED:g} times what the finest "
+    "run states of its own there."
 )
 LEGEND_OF_RESPONSE = (
     "Errors are against the finest run (marked): of the peak relative; of the complex amplitude the largest over the "
     "frequencies that all runs meet exactly once, divided by the peak. Estimated is that error by what the sweep "
     "changes, of the finest run by all, as the run itself says; within "
     f"{' and '.join(map(str, FACTORS))}: the share of the frequencies at which it is within that factor of the error, "
-    f"where this is above {f'{LEAST_ERROR:.0e}'.replace('e-0', 'e-')} of the peak."
+    f"of those judged: where this is above {_LEAST} of the peak and {JUDGED:g} times what the finest run states of its "
+    "own there."
 )
 LEGEND_OF_ACCURACY = (
-    "Of a run that chooses its harmonics and samples, the most it took; its time is with that of the estimates. Kept: "
-    "the share of these places at which lambda, over zeta omega0, or the complex amplitude is that accurate; best "
-    "fixed: the time of the quickest run with one set that keeps it at 95 % of them (its estimates not counted)."
+    "Times are the processor's. Of a run that chooses its harmonics and samples, the most it took; its time is with "
+    "that of the estimates. Kept: the share of these places at which lambda, over zeta omega0, or the complex "
+    "amplitude is that accurate; best fixed: the time of the quickest run with one set that keeps it at 95 % of them "
+    "(its estimates not counted)."
 )
 
 

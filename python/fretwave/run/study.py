@@ -93,7 +93,7 @@ def _progress(study: Study, sweep: str, settings: Settings) -> str:
     run = study.outcomes.get(settings)
     if run is None:
         return f"{sweep}: {_text(settings)}: {study.failures[settings]}"
-    cost = f"{run.points} points, {run.newton} Newton iterations, {run.wall_s:.3f} s"
+    cost = f"{run.points} points, {run.newton} Newton iterations, {run.cpu_s:.3f} s"
     return f"{sweep}: {_text(settings)}: {cost}, {run.summary}"
 
 

@@ -19,10 +19,11 @@ class Outcome:
     Attributes
     ----------
     amplitude, omega, zeta : (n,) at the reported points, in the order of the branch
-    estimate : (n, 3) estimated errors of lambda there [1/s], by `SOURCES`
+    estimate : (n, 4) estimated errors of lambda there [1/s], by `SOURCES`
     peak_zeta, peak_amplitude : largest damping ratio and where it is
     wall_s : time of the whole branch [s]
     harmonics, samples : the most that it took, where it has chosen them
+    cpu_s : time of the processor [s], which other work on the machine disturbs least
     """
 
     amplitude: Array
@@ -36,6 +37,7 @@ class Outcome:
     wall_s: float
     harmonics: int = 0
     samples: int = 0
+    cpu_s: float = float("nan")
 
     @property
     def parameter(self) -> Array:
@@ -82,9 +84,9 @@ class ResponseOutcome:
     ----------
     omega : (n,) frequencies [rad/s] of the reported points, in the order of the branch
     cosine, sine : (n,) parts of the observed fundamental there [length]
-    estimate : (n, 3) estimated errors of the complex amplitude there [length], by `SOURCES`
+    estimate : (n, 4) estimated errors of the complex amplitude there [length], by `SOURCES`
     peak, peak_omega : largest amplitude [length] and where it is
-    wall_s, harmonics, samples : as of a mode
+    wall_s, harmonics, samples, cpu_s : as of a mode
     """
 
     omega: Array
@@ -98,6 +100,7 @@ class ResponseOutcome:
     wall_s: float
     harmonics: int = 0
     samples: int = 0
+    cpu_s: float = float("nan")
 
     @property
     def parameter(self) -> Array:

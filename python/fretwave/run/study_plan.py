@@ -13,14 +13,14 @@ import numpy as np
 from ..arrays import Array, Indices
 from ..columns import SOURCES
 from ..hb.states import default_samples
-from ..post.calibration import FACTORS, share_within
+from ..post.calibration import FACTORS, can_be_told, share_within
 from ..solve.accuracy import TOLERATED
 from .study_outcomes import AnyOutcome
 
 #: Relative, of a place; a loose Newton tolerance lets an amplitude miss by about itself.
 MATCH = 1e-2
 #: What a sweep's runs differ by from the finest
-SOURCE_OF = {"harmonics": "harmonics", "samples": "samples", "tolerance": "solver"}
+SOURCE_OF = {"harmonics": "harmonics", "samples": "samples", "tolerance": "solver", "component_modes": "reduction"}
 
 
 @dataclass(frozen=True)
@@ -129,9 +129,10 @@ class Study:
         rows, its = self._rows(run), self._rows(reference)
         source = self._source(sweep, settings)
         estimate = run.estimate[rows]
-        guessed = estimate.sum(axis=1) if source is None else estimate[:, source]
+        guessed = np.nansum(estimate, axis=1) if source is None else estimate[:, source]
         ratios = self._ratios(sweep, settings, reference)
-        known, true = (np.array([row[name] for row in ratios]) for name in ("estimate", "error"))
+        known, true, judge = (np.array([row[name] for row in ratios]) for name in ("estimate", "error", "judge"))
+        told = can_be_told(true, judge)
         return {
             "sweep": sweep,
             "harmonics": run.harmonics or settings.harmonics,
@@ -141,12 +142,14 @@ class Study:
             "newton": run.newton,
             "wall_s": run.wall_s,
             **run.errors(reference, rows, its, guessed),  # type: ignore[arg-type]
-            **{f"within_{factor}": share_within(known, true, factor) for factor in FACTORS},
+            **{f"within_{factor}": share_within(known[told], true[told], factor) for factor in FACTORS},
+            "judged": int(told.sum()) if len(told) else math.nan,
             "component_modes": -1 if settings.component_modes is None else settings.component_modes,
             "accuracy": math.nan if settings.accuracy is None else settings.accuracy,
             "kept": math.nan if settings.accuracy is None else self._kept(settings, settings.accuracy),
             "best_fixed_s": math.nan if settings.accuracy is None else self._best_fixed(settings.accuracy),
             "reference": int(settings == self.plan.reference),
+            "cpu_s": run.cpu_s,
         }
 
     def _rows(self, run: AnyOutcome) -> Indices:
@@ -174,16 +177,17 @@ class Study:
         return float(np.mean(self._errors(settings) <= allowed)) if len(allowed) else math.nan
 
     def _best_fixed(self, accuracy: float) -> float:
-        """Time [s] of the quickest run of one set that keeps an accuracy at 95 % of the places; nan without any."""
+        """Processor time [s] of the quickest run of one set that keeps an accuracy at 95 % of the places, or nan."""
         fixed = [settings for settings in self.outcomes if settings.accuracy is None]
-        times = [self.outcomes[s].wall_s for s in fixed if self._kept(s, accuracy) >= 1 - TOLERATED]
+        times = [self.outcomes[s].cpu_s for s in fixed if self._kept(s, accuracy) >= 1 - TOLERATED]
         return min(times, default=math.nan)
 
     def calibration(self) -> list[dict[str, Any]]:
         """Estimated and true error by run and place, of the source that the sweep is over: of lambda [1/s], or of the
         complex amplitude over the largest.
 
-        What the others add is the same in a run and in the finest, to which it is compared.
+        What the others add is the same in a run and in the finest, to which it is compared; `judge` is what that one
+        states of the same source of its own.
         """
         reference = self.outcomes.get(self.plan.reference)
         known = [(sweep, settings) for sweep, settings in self.plan.sweeps() if settings in self.outcomes]
@@ -198,8 +202,9 @@ class Study:
         run, unit = self.outcomes[settings], reference.unit
         own = {"sweep": sweep, "harmonics": settings.harmonics, "samples": settings.samples}
         own["tolerance"] = settings.tolerance
-        found = zip(self.compared, self._errors(settings) / unit, run.estimate[self._rows(run), source] / unit)
-        return [{**own, self.over: a, "error": e, "estimate": guessed} for a, e, guessed in found]
+        estimates = (of.estimate[self._rows(of), source] / unit for of in (run, reference))
+        found = zip(self.compared, self._errors(settings) / unit, *estimates)
+        return [{**own, self.over: a, "error": e, "estimate": guessed, "judge": j} for a, e, guessed, j in found]
 
     def _source(self, sweep: str, settings: Settings) -> int | None:
         """Column of `Outcome.estimate` that is of what a run differs by from the finest; None where none is."""

@@ -100,7 +100,8 @@ class Solver(ABC, Generic[Begun]):
         first = tried[0]
         if isinstance(first, str):
             return first
-        return replace(first, wall_s=min(run.wall_s for run in tried if not isinstance(run, str)))
+        runs = [run for run in tried if not isinstance(run, str)]
+        return replace(first, wall_s=min(run.wall_s for run in runs), cpu_s=min(run.cpu_s for run in runs))
 
     def _once(self, settings: Settings) -> AnyOutcome | str:
         context, started = self._model(settings.component_modes)
@@ -124,8 +125,8 @@ class Solver(ABC, Generic[Begun]):
         from ..solve.refining import RefiningContinuation
 
         low, high = self._ends()
-        rows, newton, wall = [], 0, 0.0
-        began = time.perf_counter()
+        rows, newton, spent = [], 0, np.zeros(2)
+        began = _clocks()
         settings: dict[str, Any] = {"stop": (low, high), "steps": step_control(self.analysis.step)}
         settings["report_at"] = [float(a) for a in self.places]
         if accuracy is None:
@@ -133,13 +134,14 @@ class Solver(ABC, Generic[Begun]):
         else:
             branch = RefiningContinuation(problem, problem.initial(low), **settings, accuracy=accuracy)
         for point in branch:
-            wall += time.perf_counter() - began
+            spent += _clocks() - began
             newton += point.newton
             rows.append(_row(branch.problem, point))
-            began = time.perf_counter()
+            began = _clocks()
         converged, reason = branch.converged, branch.reason
         branch.destroy()
-        return self._outcome(rows, newton, wall) if converged else str(reason)
+        wall, cpu = spent.tolist()
+        return replace(self._outcome(rows, newton, wall), cpu_s=cpu) if converged else str(reason)
 
 
 class ModeSolver(Solver[Start]):
@@ -206,6 +208,11 @@ class ResponseSolver(Solver[Excitation]):
         cosine, sine = amplitude * np.cos(phase), -amplitude * np.sin(phase)
         peak, at, sizes = top["amplitude"], top["omega"], (_most(rows, "harmonics"), _most(rows, "samples"))
         return ResponseOutcome(omega, cosine, sine, estimate, peak, at, len(rows), newton, wall, *sizes)
+
+
+def _clocks() -> Array:
+    """Of the wall and of the processor [s]."""
+    return np.array([time.perf_counter(), time.process_time()])
 
 
 def _row(problem: HarmonicProblem, point: Point) -> dict[str, Any]:

@@ -125,5 +125,7 @@ def _other(one: Harmonics, other: Harmonics) -> Harmonics | None:
 
 
 def limiting(shares: Mapping[str, float]) -> str:
-    """The largest source of error; unknown where there is no estimate."""
-    return max(SOURCES, key=lambda source: shares[source]) if isfinite(shares["all"]) else "unknown"
+    """The largest source of error that is known; unknown where there is no estimate."""
+    if not isfinite(shares["all"]):
+        return "unknown"
+    return max(SOURCES, key=lambda source: shares[source] if isfinite(shares[source]) else 0.0)

@@ -26,6 +26,7 @@ LIMITS = {
     "samples": f"samples ({MOST_SAMPLES} at most)",
     "solver": "the solver (tighter tolerance: -snes_rtol)",
     "unknown": "errors that cannot be estimated",
+    "reduction": "the reduction (more component modes: [reduction] modes)",
 }
 
 
