@@ -62,6 +62,7 @@ class LinearSolver {
  private:
   static PetscErrorCode shell_product(Mat, Vec, Vec);
   void choose_route();
+  PreconditionerKind const* asked_kind();
   void use_krylov();
   void make_preconditioner();
   void make_tangent();

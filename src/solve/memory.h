@@ -8,8 +8,12 @@
 #include <string>
 
 #include "petsc.h"
+#include "tuned.h"
 
 namespace fretwave::solve {
+
+inline const Tuned memory_share("linear_memory_share", 0.7,
+                                "share of the free memory that a preconditioner may take");
 
 /// Memory that all ranks may still take together [bytes], were they on one node; infinite where it is not
 /// known. The same on every rank. Collective.
