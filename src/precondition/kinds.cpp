@@ -2,6 +2,7 @@
 #include "precondition/kinds.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "precondition/basis_pc.h"
 #include "precondition/condensed_pc.h"
@@ -36,8 +37,23 @@ std::string not_condensed(HarmonicProblem const& problem) {
   return phased ? "a contact that reaches the next sector" : unfolded(problem);
 }
 
+/// Every rank has all terms and the fundamental with its border, each block one.
+std::string without_blocks(HarmonicProblem const& problem) {
+  if (const auto why = unfolded(problem); !why.empty()) return why;
+  const double entries = std::pow(double(problem.model().dofs()), 2),
+               terms = double(problem.model().terms().size());
+  const double bytes =
+      entries * (8 * problem.harmonics().count() + comm_size(problem.comm()) * (8 * terms + 32));
+  return solve::beyond_memory("a model whose dense blocks", bytes, problem.comm());
+}
+
+/// K, M and the work of their eigenproblem are whole on every rank.
 std::string without_basis(HarmonicProblem const& problem) {
   if (const auto why = unfolded(problem); !why.empty()) return why;
+  const double bytes = 40 * comm_size(problem.comm()) * std::pow(double(problem.model().dofs()), 2);
+  if (const auto why = solve::beyond_memory("a model whose basis of all modes", bytes, problem.comm());
+      !why.empty())
+    return why;
   return problem.model().stuck_basis() ? "" : "a model without a basis of stuck pairs";
 }
 
@@ -58,10 +74,9 @@ double static_bytes(HarmonicProblem const& problem) {
 
 std::string without_static(HarmonicProblem const& problem) {
   if (const auto why = unfolded(problem); !why.empty()) return why;
-  const double needed = static_bytes(problem), free = solve::available_bytes(problem.comm());
-  if (needed > solve::memory_share * free)
-    return "contact whose static compliance takes " + solve::gigabytes(needed) + ", of " +
-           solve::gigabytes(free) + " free";
+  const auto why =
+      solve::beyond_memory("contact whose static compliance", static_bytes(problem), problem.comm());
+  if (!why.empty()) return why;
   return problem.model().static_basis() ? "" : "a model without a basis of stuck pairs";
 }
 
@@ -83,7 +98,7 @@ void register_kinds() {
   condensed.fallback_bytes = condensed_bytes;
   solve::register_kind(std::move(condensed));
   solve::register_kind(harmonic_kind<BasisPreconditioner>("fwbasis", "", has_basis, without_basis));
-  solve::register_kind(harmonic_kind<HarmonicPreconditioner>("fwblocks", "dense", always, unfolded));
+  solve::register_kind(harmonic_kind<HarmonicPreconditioner>("fwblocks", "dense", always, without_blocks));
 }
 
 }  // namespace fretwave::precondition

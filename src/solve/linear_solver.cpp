@@ -86,7 +86,7 @@ void LinearSolver::choose_route() {
            (refused          ? "krylov asked for, but this problem has no preconditioner"
             : wish == "auto" ? std::to_string(unknowns) + " unknowns"
                              : "asked for") +
-           ")";
+           ")" + (krylov_ ? "" : kind_.note);
 }
 
 /// The kind that -<prefix>pc_type asks for, so that no other is looked for; null if the problem cannot have
@@ -95,7 +95,7 @@ PreconditionerKind const* LinearSolver::asked_kind() {
   char given[32] = "";
   check(PetscOptionsGetString(nullptr, prefix_.c_str(), "-pc_type", given, sizeof given, nullptr));
   auto const* kind = kind_of(given);
-  return kind && kind->refuses(bordered_.problem()).empty() ? kind : nullptr;
+  return kind && refusal(*kind, bordered_.problem()).empty() ? kind : nullptr;
 }
 
 std::string LinearSolver::route() const { return route_ + (own_ ? ", " + own_->describe() + note_ : ""); }
@@ -132,11 +132,11 @@ void LinearSolver::make_preconditioner() {
   auto const* kind = type ? kind_of(type) : nullptr;
   if (!kind) return;
   if (!krylov_)
-    throw InputError("option pc_type: the direct route takes no " + kind->type, kind->type,
+    throw InputError("option pc_type: the direct route takes no " + kind->type + kind_.note, kind->type,
                      "the Krylov route", "ask for it: -<analysis>_route krylov");
   if (kind == kind_.kind)
     note_ = kind_.note;
-  else if (const auto why = kind->refuses(bordered_.problem()); !why.empty())
+  else if (const auto why = refusal(*kind, bordered_.problem()); !why.empty())
     throw InputError("option pc_type: there is no " + kind->type + " for " + why, kind->type,
                      kind_.kind->type, "leave out the option -<analysis>_pc_type");
   kind_.kind = kind;

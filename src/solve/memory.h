@@ -35,4 +35,11 @@ inline std::string gigabytes(double bytes) {
   return text;
 }
 
+/// What takes more memory than it may, in words; empty if it does not. Collective.
+inline std::string beyond_memory(std::string const& what, double bytes, MPI_Comm comm) {
+  const double available = available_bytes(comm);
+  if (bytes <= memory_share * available) return "";
+  return what + " takes " + gigabytes(bytes) + ", of " + gigabytes(available) + " free";
+}
+
 }  // namespace fretwave::solve

@@ -114,17 +114,23 @@ def test_other_models_are_refused(comm, why):
         _core.Newton(problem_with(K, contact, comm).core, "refused_")
 
 
-def test_compliance_beyond_memory_is_refused_in_words(comm):
-    """Before it is allocated: another kind is taken, and the note says why; asked for, it is an error."""
+def test_what_is_beyond_memory_is_refused_in_words(comm):
+    """Before it is allocated: the route says why it takes none; asked for, it is an error."""
     model, tip = solid.solid(comm, solid.SMALL)
-    words = r"static compliance takes \S+ GB, of \S+ GB free"
-    PETSc.Options()["fw_linear_memory_share"] = 1e-9
+    words = r"takes \S+ GB, of \S+ GB free"
+    options = PETSc.Options()
+    options["fw_linear_memory_share"] = 1e-9
     try:
         problem = solid.mode(model, tip, "static_large_", route="krylov")
         route = _core.Newton(problem.core, "static_large_").route
-        assert re.search(f"sparse factors.*{words}: no fwstatic", route), route
+        for what, kind in (
+            ("static compliance", "fwstatic"),
+            ("condensed system", "fwcondensed"),
+            ("dense blocks", "fwblocks"),
+        ):
+            assert re.search(f"{what} {words}: no {kind}", route), route
         asked = solid.mode(model, tip, "static_asked_", route="krylov", pc_type="fwstatic")
-        with pytest.raises(fw.InputError, match=f"no fwstatic for .*{words}"):
+        with pytest.raises(fw.InputError, match=f"takes no fwstatic.*static compliance {words}"):
             _core.Newton(asked.core, "static_asked_")
     finally:
-        PETSc.Options().delValue("fw_linear_memory_share")
+        options.delValue("fw_linear_memory_share")
