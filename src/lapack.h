@@ -30,6 +30,9 @@ void dgetrs_(char const*, int const*, int const*, double const*, int const*, int
 void dgetri_(int const*, double*, int const*, int const*, double*, int const*, int*);
 void dsygvd_(int const*, char const*, char const*, int const*, double*, int const*, double*, int const*,
              double*, double*, int const*, int*, int const*, int*);
+void dpstrf_(char const*, int const*, double*, int const*, int*, int*, double const*, double*, int*);
+void dtrsm_(char const*, char const*, char const*, char const*, int const*, int const*, double const*,
+            double const*, int const*, double*, int const*);
 void zgetrf_(int const*, int const*, std::complex<double>*, int const*, int*, int*);
 void zgetri_(int const*, std::complex<double>*, int const*, int const*, std::complex<double>*, int const*,
              int*);

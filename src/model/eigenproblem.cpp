@@ -49,6 +49,16 @@ std::vector<PhasedMap> required(Model const& model, int order, char const* name)
   return parts;
 }
 
+bool symmetric(Mat A) {
+  MatHandle difference;
+  double size, change;
+  check(MatTranspose(A, MAT_INITIAL_MATRIX, difference.out()));
+  check(MatAXPY(difference, -1, A, DIFFERENT_NONZERO_PATTERN));
+  check(MatNorm(A, NORM_INFINITY, &size));
+  check(MatNorm(difference, NORM_INFINITY, &change));
+  return change <= 1e-12 * size;
+}
+
 Operators operators(MPI_Comm comm, std::vector<MatHandle> matrices) {
   PetscInt rows, first;
   check(MatGetSize(matrices[0], &rows, nullptr));

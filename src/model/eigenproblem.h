@@ -13,6 +13,10 @@ void add_contact(std::vector<PhasedMap>& sum, Contact const&, std::function<doub
 /// The model's terms of an order in s; `InputError` names what is missing.
 std::vector<PhasedMap> required(Model const&, int order, char const* name);
 
+/// Whether a matrix is its transpose, but for rounding. (PETSc's own test compares patterns, which assembly
+/// leaves unsymmetric where entries cancel.) Collective.
+bool symmetric(Mat);
+
 /// Matrices of an eigenproblem; a small one is held whole by each rank, which all solve the same: cheaper
 /// than to share it, and the Krylov space of a tiny problem, once exhausted, would end at another step on
 /// another rank.

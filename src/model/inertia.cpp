@@ -59,6 +59,13 @@ KspHandle symmetric_factor(Mat A, std::string const& prefix) {
 
 PetscInt negative_pivots(KSP ksp) { return information(ksp, 12); }
 PetscInt null_pivots(KSP ksp) { return information(ksp, 28); }
+double factor_megabytes(KSP ksp) { return information(ksp, 22); }
+
+/// MUMPS gives large counts in millions, with a minus sign.
+double factor_entries(KSP ksp) {
+  const double count = information(ksp, 29);
+  return count < 0 ? -1e6 * count : count;
+}
 
 PetscInt count_below(Mat K, Mat M, double lambda, std::string const& prefix) {
   MatHandle A;

@@ -12,6 +12,9 @@ KspHandle symmetric_factor(Mat A, std::string const& prefix);
 void expect_factorised(KSP);
 PetscInt negative_pivots(KSP);
 PetscInt null_pivots(KSP);
+/// Of all ranks: what the factors took [MB], and their entries.
+double factor_megabytes(KSP);
+double factor_entries(KSP);
 
 /// Number of eigenvalues of K x = lambda M x below lambda, for M without negative ones: negative pivots of
 /// K - lambda M (Sylvester's law of inertia), which misses no multiple one. Collective.

@@ -74,6 +74,12 @@ StuckBasis const* Model::stuck_basis() const {
   return stuck_basis_.get();
 }
 
+StuckBasis const* Model::static_basis() const {
+  if (!sought_static_) static_basis_ = StuckBasis::with_factor(*this);
+  sought_static_ = true;
+  return static_basis_.get();
+}
+
 double Model::largest_term() const {
   double entries = 0;
   for (auto const& term : terms_) {

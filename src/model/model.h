@@ -64,14 +64,16 @@ class Model {
   bool travelling() const;
   /// The modes with all pairs stuck, made when first asked for; null if there are none. Collective.
   StuckBasis const* stuck_basis() const;
+  /// The lowest of them and a factor for the rest (`StuckBasis::with_factor`), likewise. Collective.
+  StuckBasis const* static_basis() const;
   /// All laws are odd: without preload the motion may keep odd harmonics only. Collective.
   bool odd() const;
 
  private:
   std::vector<Term> terms_;
   std::vector<Contact> contacts_;
-  mutable std::shared_ptr<StuckBasis const> stuck_basis_;
-  mutable bool sought_basis_ = false;
+  mutable std::shared_ptr<StuckBasis const> stuck_basis_, static_basis_;
+  mutable bool sought_basis_ = false, sought_static_ = false;
   MPI_Comm comm_ = MPI_COMM_NULL;
   PetscInt local_ = 0, global_ = 0, first_ = 0, unit_ = 0;
   double theta_ = 0;

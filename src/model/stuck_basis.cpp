@@ -13,38 +13,6 @@ namespace {
 constexpr double asymmetry = 1e-9;  // of the largest entry
 constexpr double stiffest = 1e-5;   // share of its motion that the structure leaves a stuck pair's spring
 
-struct Entry {
-  int row, dof;
-  double value;
-};
-
-/// Rows of B of all ranks' contacts, rank by rank, contact by contact.
-std::vector<Entry> contact_rows(Model const& model) {
-  int mine = 0, first = 0;
-  for (auto const& contact : model.contacts()) mine += contact.law->components() * contact.law->pairs();
-  MPI_Exscan(&mine, &first, 1, MPI_INT, MPI_SUM, model.comm());
-  if (comm_rank(model.comm()) == 0) first = 0;
-  std::vector<Entry> entries;
-  for (auto const& contact : model.contacts()) {
-    PetscInt begin;
-    check(MatGetOwnershipRange(contact.B, &begin, nullptr));
-    for_entries(contact.B, [&](PetscInt row, PetscInt dof, double value) {
-      entries.push_back({first + int(row - begin), int(dof), value});
-    });
-    first += contact.law->components() * contact.law->pairs();
-  }
-  return gathered(std::span<Entry const>(entries), model.comm());
-}
-
-std::vector<double> stuck_stiffness(Model const& model) {
-  std::vector<double> k;
-  for (auto const& contact : model.contacts())
-    for (int pair = 0; pair < contact.law->pairs(); ++pair)
-      for (int component = 0; component < contact.law->components(); ++component)
-        k.push_back(contact.law->stuck_stiffness(component, pair));
-  return gathered(std::span<double const>(k), model.comm());
-}
-
 bool symmetric(std::vector<double> const& A, size_t n) {
   double largest = 0, apart = 0;
   for (size_t j = 0; j < n; ++j)
@@ -64,42 +32,75 @@ bool plain(Model const& model) {
 
 }  // namespace
 
+std::vector<ContactEntry> contact_entries(Model const& model) {
+  int mine = 0, first = 0;
+  for (auto const& contact : model.contacts()) mine += contact.law->components() * contact.law->pairs();
+  MPI_Exscan(&mine, &first, 1, MPI_INT, MPI_SUM, model.comm());
+  if (comm_rank(model.comm()) == 0) first = 0;
+  std::vector<ContactEntry> entries;
+  for (auto const& contact : model.contacts()) {
+    PetscInt begin;
+    check(MatGetOwnershipRange(contact.B, &begin, nullptr));
+    for_entries(contact.B, [&](PetscInt row, PetscInt dof, double value) {
+      entries.push_back({first + int(row - begin), int(dof), value});
+    });
+    first += contact.law->components() * contact.law->pairs();
+  }
+  return gathered(std::span<ContactEntry const>(entries), model.comm());
+}
+
+std::vector<double> stuck_stiffness(Model const& model) {
+  std::vector<double> k;
+  for (auto const& contact : model.contacts())
+    for (int pair = 0; pair < contact.law->pairs(); ++pair)
+      for (int component = 0; component < contact.law->components(); ++component)
+        k.push_back(contact.law->stuck_stiffness(component, pair));
+  return gathered(std::span<double const>(k), model.comm());
+}
+
+bool has_stuck_stiffness(Model const& model, std::vector<double> const& stiffness) {
+  return plain(model) && !stiffness.empty() &&
+         std::ranges::all_of(stiffness, [](double k) { return std::isfinite(k); });
+}
+
+bool too_stiff(std::vector<double> const& motions, std::vector<double> const& stiffness) {
+  const size_t rows = stiffness.size();
+  std::vector<double> compliance(rows, 0.0);
+  for (size_t k = 0; k < motions.size(); ++k) compliance[k % rows] += motions[k] * motions[k];
+  for (size_t row = 0; row < rows; ++row)
+    if (1 - stiffness[row] * compliance[row] < stiffest) return true;
+  return false;
+}
+
 std::unique_ptr<StuckBasis> StuckBasis::of(Model const& model) {
   static const log::Event making("FwStuckBasis");
   const log::Span span(making);
   auto out = std::make_unique<StuckBasis>();
   out->stiffness_ = stuck_stiffness(model);
   const MatHandle K = model.sum(0), M = model.sum(2);
-  if (!plain(model) || !K || !M || out->stiffness_.empty() ||
-      !std::ranges::all_of(out->stiffness_, [](double k) { return std::isfinite(k); }))
-    return nullptr;
-  const auto entries = contact_rows(model);
+  if (!has_stuck_stiffness(model, out->stiffness_) || !K || !M) return nullptr;
+  const auto entries = contact_entries(model);
   const size_t n = model.dofs(), rows = out->stiffness_.size();
-  out->dofs_ = int(n);
   auto stiffness = whole(K), mass = whole(M);
   if (!symmetric(stiffness, n) || !symmetric(mass, n)) return nullptr;
-  std::vector<std::vector<Entry>> of_row(rows);
-  for (Entry const& e : entries) of_row[e.row].push_back(e);
+  std::vector<std::vector<ContactEntry>> of_row(rows);
+  for (ContactEntry const& e : entries) of_row[e.row].push_back(e);
   for (size_t row = 0; row < rows; ++row)
-    for (Entry const& a : of_row[row])
-      for (Entry const& b : of_row[row])
+    for (ContactEntry const& a : of_row[row])
+      for (ContactEntry const& b : of_row[row])
         stiffness[size_t(b.dof) * n + a.dof] += out->stiffness_[row] * a.value * b.value;
-  if (!out->solve(std::move(stiffness), mass)) return nullptr;
+  if (!out->solve(std::move(stiffness), mass, model.first_dof(), model.local_dofs())) return nullptr;
   out->motions_.assign(rows * n, 0.0);
   for (size_t j = 0; j < n; ++j)
-    for (Entry const& e : entries) out->motions_[j * rows + e.row] += e.value * mass[(n - 1 - j) * n + e.dof];
-  for (size_t row = 0; row < rows; ++row) {
-    double compliance = 0;
-    for (size_t j = 0; j < n; ++j)
-      compliance += out->motions_[j * rows + row] * out->motions_[j * rows + row];
-    if (1 - out->stiffness_[row] * compliance < stiffest) return nullptr;
-  }
-  return out;
+    for (ContactEntry const& e : entries)
+      out->motions_[j * rows + e.row] += e.value * mass[(n - 1 - j) * n + e.dof];
+  return too_stiff(out->motions_, out->stiffness_) ? nullptr : std::move(out);
 }
 
-/// False if K is not positive definite; the shapes are left in M, the highest frequency first.
-bool StuckBasis::solve(std::vector<double> K, std::vector<double>& M) {
-  const int n = dofs_, type = 1;
+/// False if K is not positive definite; the shapes are left in M, the highest frequency first. Of so many
+/// dofs from the first on this rank has them.
+bool StuckBasis::solve(std::vector<double> K, std::vector<double>& M, size_t first, size_t local) {
+  const int n = int(std::lround(std::sqrt(double(M.size())))), type = 1;
   std::vector<double> theta(n);
   double size = 0;
   int ints = 0, info = 0, ask = -1;
@@ -112,24 +113,59 @@ bool StuckBasis::solve(std::vector<double> K, std::vector<double>& M) {
   if (info) return false;
   theta_.assign(theta.rbegin(), theta.rend());
   for (double& value : theta_) value = std::max(value, 0.0);  // motions without mass
-  shapes_.resize(M.size());
-  for (int j = 0; j < n; ++j) std::copy_n(&M[size_t(n - 1 - j) * n], n, &shapes_[size_t(j) * n]);
+  modes_ = n, local_ = int(local), dofs_ = n;
+  shapes_.resize(local * n);
+  for (int j = 0; j < n; ++j)
+    std::copy_n(&M[size_t(n - 1 - j) * n + first], local, &shapes_[size_t(j) * local]);
   return true;
 }
 
 std::vector<double> StuckBasis::diagonal(Mat A) const {
-  const size_t n = dofs_;
-  std::vector<double> out(n, 0.0);
-  const auto dense = whole(A);
-  for (size_t j = 0; j < n; ++j) {
-    float const* phi = &shapes_[j * n];
-    for (size_t col = 0; col < n; ++col) {
-      double along = 0;
-      for (size_t row = 0; row < n; ++row) along += phi[row] * dense[col * n + row];
-      out[j] += along * phi[col];
+  std::vector<double> out(size(), 0.0);
+  VecHandle phi, moved;
+  check(MatCreateVecs(A, phi.out(), moved.out()));
+  for (int j = 0; j < modes_; ++j) {
+    const size_t at = size_t(j) * local_;
+    {
+      const WriteArray to(phi);
+      for (int i = 0; i < local_; ++i) to[i] = factor_ ? exactly_[at + i] : double(shapes_[at + i]);
     }
+    check(MatMult(A, phi, moved));
+    const ReadArray a(phi), b(moved);
+    out[j] = std::inner_product(a.data(), a.data() + local_, b.data(), 0.0);
   }
+  MPI_Comm comm;
+  check(PetscObjectGetComm(reinterpret_cast<PetscObject>(A), &comm));
+  sum_over_ranks(out, comm);
   return out;
 }
+
+void StuckBasis::forces(double const* x, int coefficients, double* g) const {
+  const int c = coefficients;
+  if (factor_) {
+    lapack::multiply("NN", {c, size(), local_}, 1.0, {x, c}, {exactly_.data(), local_}, 0.0, g, c);
+    return;
+  }
+  const std::vector<float> in(x, x + size_t(c) * local_);
+  std::vector<float> out(size_t(c) * size());
+  lapack::multiply("NN", {c, size(), local_}, 1.0f, {in.data(), c}, {shapes_.data(), local_}, 0.0f,
+                   out.data(), c);
+  std::ranges::copy(out, g);
+}
+
+void StuckBasis::motion(double const* g, int coefficients, double* q) const {
+  const int c = coefficients;
+  if (factor_) {
+    lapack::multiply("NT", {c, local_, size()}, 1.0, {g, c}, {exactly_.data(), local_}, 0.0, q, c);
+    return;
+  }
+  const std::vector<float> in(g, g + size_t(c) * size());
+  std::vector<float> out(size_t(c) * local_);
+  lapack::multiply("NT", {c, local_, size()}, 1.0f, {in.data(), c}, {shapes_.data(), local_}, 0.0f,
+                   out.data(), c);
+  std::ranges::copy(out, q);
+}
+
+double StuckBasis::flops() const { return 4 * dofs_ * size() + (factor_ ? 4 * factor_->entries() : 0); }
 
 }  // namespace fretwave::model

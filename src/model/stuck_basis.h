@@ -3,38 +3,77 @@
 #include <vector>
 
 #include "model/model.h"
+#include "model/static_factor.h"
 
 namespace fretwave::model {
 
-/// Modes of K + B^T k B with all pairs stuck, of unit stiffness: Phi^T (K + B^T k B) Phi = 1 and Phi^T M Phi
-/// = diag(theta), theta = 1 / omega^2 descending. In this one real basis the dynamic stiffness is diagonal at
-/// every harmonic and every point while all pairs stick. Sought as M phi = theta (K + B^T k B) phi, the
-/// lowest frequencies keep their digits beside stiff contact, and M may be singular. Whole on every rank.
+/// An entry of the rows of B.
+struct ContactEntry {
+  int row, dof;
+  double value;
+};
+
+/// Motions Psi of unit stiffness with all pairs stuck, K_s = K + B^T k B: Psi^T K_s Psi = 1 and Psi^T M Psi =
+/// diag(theta), theta = 1 / omega^2 descending. In this one real basis the dynamic stiffness is diagonal at
+/// every harmonic and every point while all pairs stick. Its modes are sought as M phi = theta K_s phi: the
+/// lowest frequencies keep their digits beside stiff contact, and M may be singular.
+///
+/// Either it is all modes, or (`with_factor`) the lowest ones, and behind them what forces on the contact
+/// move beside these, K_s^-1 B^T made K_s-orthogonal to all before, whose inertia is left out (theta = 0):
+/// static corrections (MacNeal 1971; attachment modes, Craig 1977). What any other force moves beside those
+/// is static too, (K_s^-1 - Psi Psi^T) f by a factor of K_s, and moves no contact.
 class StuckBasis {
  public:
-  /// None if there is none: K or M without symmetry, with phases or of a wheel, a law without a stuck
-  /// stiffness, a motion that stuck pairs leave free, or pairs so much stiffer than the structure that their
-  /// slip would be lost to rounding. Collective.
+  /// All modes. None if there are none: K or M without symmetry, with phases or of a wheel, a law without a
+  /// stuck stiffness, a motion that stuck pairs leave free, or pairs so much stiffer than the structure that
+  /// their slip would be lost to rounding. Collective.
   static std::unique_ptr<StuckBasis> of(Model const&);
-  int dofs() const { return dofs_; }
+  /// The lowest modes, and a factor of K_s for the rest; none likewise. Collective.
+  static std::unique_ptr<StuckBasis> with_factor(Model const&);
+  /// Doubles that `with_factor` takes: whole on every rank, and over all of them, for so many rows of B.
+  static std::pair<double, double> size_with_factor(double dofs, double rows);
+
+  int size() const { return int(theta_.size()); }
+  int modes() const { return modes_; }  ///< those of `size` that have inertia
   int rows() const { return int(stiffness_.size()); }
   /// Of each row of B when stuck [force/length]; rows rank by rank, contact by contact, pair by pair.
   std::vector<double> const& stiffness() const { return stiffness_; }
   /// 1 / omega^2 [s^2], descending.
   std::vector<double> const& theta() const { return theta_; }
-  /// Diagonal of Phi^T A Phi of a term that is neither K nor M.
-  std::vector<double> diagonal(Mat A) const;
-  /// Phi, dofs x dofs.
-  std::vector<float> const& shapes() const { return shapes_; }
-  /// B Phi, rows x dofs.
+  /// B Psi, rows x size.
   std::vector<double> const& motions() const { return motions_; }
+  /// Diagonal of Psi^T A Psi of a term that is neither K nor M, over the modes. Collective.
+  std::vector<double> diagonal(Mat A) const;
+  /// g = Psi^T x of coefficients, innermost, of this rank's dofs: its share.
+  void forces(double const* x, int coefficients, double* g) const;
+  /// q = Psi g.
+  void motion(double const* g, int coefficients, double* q) const;
+  /// Of K_s where the basis is not all there is.
+  StaticFactor const* factor() const { return factor_.get(); }
+  /// Of `forces`, `motion` and the factor, a coefficient.
+  double flops() const;
 
  private:
-  bool solve(std::vector<double> K, std::vector<double>& M);
+  bool solve(std::vector<double> K, std::vector<double>& M, size_t first, size_t local);
+  void add_static(std::vector<ContactEntry> const&, Model const&);
 
-  int dofs_ = 0;
+  int modes_ = 0, local_ = 0;
+  double dofs_ = 0;
   std::vector<double> stiffness_, theta_, motions_;
-  std::vector<float> shapes_;
+  std::vector<float> shapes_;  ///< Psi of this rank's dofs, column-major, where it is whole
+  std::vector<double>
+      exactly_;  ///< with a factor: stiff elements, 1e8 times the first mode, outdo single ones
+  std::unique_ptr<StaticFactor> factor_;
 };
+
+/// Of all ranks' contacts, rank by rank, contact by contact.
+std::vector<ContactEntry> contact_entries(Model const&);
+/// Stiffness of those rows when stuck.
+std::vector<double> stuck_stiffness(Model const&);
+/// No phases, no wheel, and a stuck stiffness of every pair.
+bool has_stuck_stiffness(Model const&, std::vector<double> const& stiffness);
+/// Pairs are so much stiffer than the structure that their slip would be lost to rounding: `motions` of unit
+/// stiffness, rows x size.
+bool too_stiff(std::vector<double> const& motions, std::vector<double> const& stiffness);
 
 }  // namespace fretwave::model

@@ -28,14 +28,15 @@ std::pair<int, int> range_of(Harmonics const& h, int rank, int size) {
 
 }  // namespace
 
-BasisPreconditioner::BasisPreconditioner(HarmonicProblem& problem)
+BasisPreconditioner::BasisPreconditioner(HarmonicProblem& problem, model::StuckBasis const& basis)
     : problem_(problem),
-      basis_(*problem.model().stuck_basis()),
-      n_(as_int(problem.model().dofs(), "dofs in dense blocks")),
+      basis_(basis),
+      n_(basis.size()),
       m_(problem.harmonics().block_size()),
       scalars_(problem.scalar_count()),
       rank_(comm_rank(problem.comm())),
       size_(comm_size(problem.comm())),
+      local_(int(problem.model().local_dofs())),
       first_(range_of(problem.harmonics(), rank_, size_).first),
       last_(range_of(problem.harmonics(), rank_, size_).second),
       blocks_(basis_, problem.harmonics(), first_, last_) {
@@ -54,33 +55,70 @@ BasisPreconditioner::BasisPreconditioner(HarmonicProblem& problem)
   }
 }
 
+/// The border of the fundamental on this rank's dofs.
+void BasisPreconditioner::set_border_vectors(Vec y, Vec row) {
+  const int offset = problem_.harmonics().offset(problem_.harmonics().fundamental()), v = 2 * scalars_;
+  columns_.assign(size_t(v) * local_, 0.0), rows_ = columns_;
+  const auto take = [&](Vec from, std::vector<double>& to, int scalar) {
+    const ReadArray in(from);
+    for (int i = 0; i < local_; ++i)
+      for (int part = 0; part < 2; ++part)
+        to[size_t(i) * v + 2 * scalar + part] = in[size_t(i) * m_ + offset + part];
+  };
+  for (int j = 0; j < scalars_; ++j) take(problem_.scalar_column(y, j), columns_, j);
+  take(row, rows_, scalars_ - 1);
+  const PetscInt first = problem_.model().first_dof();
+  for (auto const& [dof, weight] : problem_.row())
+    for (int i = 0; i < scalars_ - 1 && dof >= first && dof < first + local_; ++i)
+      rows_[size_t(dof - first) * v + 2 * i + i] += weight;
+}
+
+/// Psi^T x of some vectors, by vector. Collective.
+std::vector<double> BasisPreconditioner::in_basis(std::vector<double> const& x, int vectors) const {
+  std::vector<double> g(size_t(vectors) * n_), out(g.size());
+  basis_.forces(x.data(), vectors, g.data());
+  sum_over_ranks(g, problem_.comm());
+  for (int v = 0; v < vectors; ++v)
+    for (int l = 0; l < n_; ++l) out[size_t(v) * n_ + l] = g[size_t(l) * vectors + v];
+  return out;
+}
+
 /// Border of the fundamental in the basis.
 ModalBorder BasisPreconditioner::border(Vec y, Vec row) {
-  ModalBorder out{scalars_, {}, {}, std::vector<double>(size_t(scalars_) * scalars_, 0.0)};
-  const int offset = problem_.harmonics().offset(problem_.harmonics().fundamental());
-  const auto part_of = [&](std::vector<double> const& blocks, int part) {
-    std::vector<double> q(n_);
-    for (int i = 0; i < n_; ++i) q[i] = blocks[size_t(i) * m_ + offset + part];
-    return q;
-  };
-  const auto add = [&](std::vector<double> const& q, std::vector<double>& to) {
-    for (int j = 0; j < n_; ++j) {
-      float const* phi = &basis_.shapes()[size_t(j) * n_];
-      to.push_back(std::inner_product(q.begin(), q.end(), phi, 0.0));
-    }
-  };
-  const auto closing = gathered(row);
-  for (int j = 0; j < scalars_; ++j) {
-    const auto column = gathered(problem_.scalar_column(y, j));
-    for (int part = 0; part < 2; ++part) add(part_of(column, part), out.columns);
-    out.corner[size_t(j) * scalars_ + scalars_ - 1] = closing[size_t(n_) * m_ + j];
-  }
-  std::vector<double> observed(n_, 0.0);
-  for (auto const& [dof, weight] : problem_.row()) observed[dof] += weight;
-  for (int i = 0; i < scalars_ - 1; ++i)
-    for (int part = 0; part < 2; ++part) add(part == i ? observed : std::vector<double>(n_, 0.0), out.rows);
-  for (int part = 0; part < 2; ++part) add(part_of(closing, part), out.rows);
+  set_border_vectors(y, row);
+  ModalBorder out{scalars_, in_basis(columns_, 2 * scalars_), in_basis(rows_, 2 * scalars_),
+                  std::vector<double>(size_t(scalars_) * scalars_, 0.0)};
+  std::vector<double> closing(scalars_, 0.0);
+  if (rank_ == size_ - 1) std::copy_n(ReadArray(row).data() + size_t(local_) * m_, scalars_, closing.begin());
+  sum_over_ranks(closing, problem_.comm());
+  for (int j = 0; j < scalars_; ++j) out.corner[size_t(j) * scalars_ + scalars_ - 1] = closing[j];
+  if (basis_.factor()) leave_static(out);
   return out;
+}
+
+/// D C and R Psi of the border, and its corner less R D C.
+void BasisPreconditioner::leave_static(ModalBorder& border) {
+  const int v = 2 * scalars_;
+  const double scale = problem_.stiffness_scale();
+  std::vector<double> modal(size_t(v) * n_);
+  for (int k = 0; k < v; ++k)
+    for (int l = 0; l < n_; ++l) modal[size_t(l) * v + k] = border.columns[size_t(k) * n_ + l];
+  static_columns_.resize(size_t(v) * local_);
+  std::vector<double> by_factor(static_columns_.size());
+  basis_.motion(modal.data(), v, static_columns_.data());
+  basis_.factor()->solve(columns_.data(), v, by_factor.data());
+  for (size_t k = 0; k < by_factor.size(); ++k)
+    static_columns_[k] = scale * (by_factor[k] - static_columns_[k]);
+  modal_rows_ = border.rows;
+  std::vector<double> RDC(border.corner.size(), 0.0);
+  for (int j = 0; j < scalars_; ++j)
+    for (int i = 0; i < scalars_; ++i)
+      for (int part = 0; part < 2; ++part)
+        for (int dof = 0; dof < local_; ++dof)
+          RDC[size_t(j) * scalars_ + i] +=
+              rows_[size_t(dof) * v + 2 * i + part] * static_columns_[size_t(dof) * v + 2 * j + part];
+  sum_over_ranks(RDC, problem_.comm());
+  for (size_t k = 0; k < RDC.size(); ++k) border.corner[k] -= RDC[k];
 }
 
 /// z of this rank's harmonics.
@@ -137,15 +175,48 @@ std::vector<float> BasisPreconditioner::own(double const* blocks, std::vector<in
   return out;
 }
 
+/// Psi^T x, coefficients innermost, and behind it what is left of x on the border's rows. Collective.
+std::vector<double> BasisPreconditioner::forces(Vec x) {
+  const ReadArray in(x);
+  std::vector<double> g(size_t(m_) * n_ + scalars_, 0.0);
+  basis_.forces(in.data(), m_, g.data());
+  if (rank_ == size_ - 1) std::copy_n(in.data() + size_t(local_) * m_, scalars_, g.end() - scalars_);
+  if (basis_.factor()) {
+    static_motion_.resize(size_t(m_) * local_);
+    basis_.factor()->solve(in.data(), m_, static_motion_.data());
+    const int offset = problem_.harmonics().offset(problem_.harmonics().fundamental());
+    for (int dof = 0; dof < local_; ++dof)
+      for (int v = 0; v < 2 * scalars_; ++v)
+        *(g.end() - scalars_ + v / 2) -= problem_.stiffness_scale() * rows_[size_t(dof) * 2 * scalars_ + v] *
+                                         static_motion_[size_t(dof) * m_ + offset + v % 2];
+  }
+  sum_over_ranks(g, problem_.comm());
+  for (int v = 0; basis_.factor() && v < 2 * scalars_; ++v)
+    for (int l = 0; l < n_; ++l) {
+      const int offset = problem_.harmonics().offset(problem_.harmonics().fundamental());
+      *(g.end() - scalars_ + v / 2) +=
+          problem_.stiffness_scale() * modal_rows_[size_t(v) * n_ + l] * g[size_t(l) * m_ + offset + v % 2];
+    }
+  return g;
+}
+
+/// q += D (x - C zeta), its part in the basis apart.
+void BasisPreconditioner::add_static(std::vector<double> const& scalars, double* q) const {
+  const int offset = problem_.harmonics().offset(problem_.harmonics().fundamental()), v = 2 * scalars_;
+  const double scale = problem_.stiffness_scale();
+  for (size_t k = 0; k < static_motion_.size(); ++k) q[k] += scale * static_motion_[k];
+  for (int dof = 0; dof < local_; ++dof)
+    for (int k = 0; k < v; ++k)
+      q[size_t(dof) * m_ + offset + k % 2] -= scalars[k / 2] * static_columns_[size_t(dof) * v + k];
+}
+
 void BasisPreconditioner::apply(Vec x, Vec z) {
-  const auto all = gathered(x);
+  const auto all = forces(x);
   const int c = blocks_.coefficients(), begin = blocks_.begin();
-  std::vector<int> dofs(n_);
-  std::iota(dofs.begin(), dofs.end(), 0);
-  const std::vector<double> closing(all.begin() + size_t(n_) * m_, all.begin() + size_t(n_) * m_ + scalars_);
-  std::vector<float> forces(size_t(c) * n_);
-  lapack::multiply("NN", {c, n_, n_}, 1.0f, {own(all.data(), dofs, n_).data(), c},
-                   {basis_.shapes().data(), n_}, 0.0f, forces.data(), c);
+  std::vector<int> places(n_);
+  std::iota(places.begin(), places.end(), 0);
+  const std::vector<double> closing(all.end() - scalars_, all.end());
+  auto forces = own(all.data(), places, n_);
   auto found = blocks_.solve(forces, closing);
   if (coupled_) {
     std::vector<double> u(coupled_->size(), 0.0);
@@ -157,29 +228,34 @@ void BasisPreconditioner::apply(Vec x, Vec z) {
     blocks_.subtract(own(f.data(), busy_rows_, blocks_.rows()), forces);
     found = blocks_.solve(forces, closing);
   }
-  std::vector<float> q(size_t(c) * n_);
-  lapack::multiply("NT", {c, n_, n_}, 1.0f, {found.modes.data(), c}, {basis_.shapes().data(), n_}, 0.0f,
-                   q.data(), c);
-  std::vector<double> out(all.size(), 0.0);
-  for (int i = 0; i < n_; ++i)
-    for (int k = 0; k < c; ++k) out[size_t(i) * m_ + begin + k] = q[size_t(i) * c + k];
-  std::copy(found.scalars.begin(), found.scalars.end(), out.begin() + size_t(n_) * m_);
-  sum_over_ranks(out, problem_.comm());
-  PetscInt first;
-  check(VecGetOwnershipRange(z, &first, nullptr));
-  std::copy_n(out.begin() + first, local_size(z), WriteArray(z).data());
+  std::vector<double> eta(size_t(m_) * n_ + scalars_, 0.0);
+  for (int l = 0; l < n_; ++l)
+    for (int k = 0; k < c; ++k) eta[size_t(l) * m_ + begin + k] = found.modes[size_t(l) * c + k];
+  std::ranges::copy(found.scalars, eta.end() - scalars_);
+  sum_over_ranks(eta, problem_.comm());
+  const std::vector<double> scalars(eta.end() - scalars_, eta.end());
+  if (basis_.factor())
+    for (size_t k = 0; k < size_t(m_) * n_; ++k) eta[k] -= problem_.stiffness_scale() * all[k];
+  const WriteArray out(z);
+  basis_.motion(eta.data(), m_, out.data());
+  if (basis_.factor()) add_static(scalars, out.data());
+  if (rank_ == size_ - 1) std::ranges::copy(scalars, out.data() + size_t(local_) * m_);
 }
 
 /// Flops of the rows' inverse over those of an application, in which pairs are coupled by some fifteen
-/// iterations.
+/// iterations; the border is a share of one.
 double BasisPreconditioner::build_cost() const {
   const double n = n_, r = blocks_.rows();
-  return 1 + 2.7 * r * r * r / (m_ * (4 * n * n + 12 * r * n + 30 * r * r));
+  return 1 + 2.7 * r * r * r / (m_ * (basis_.flops() + 12 * r * n + 30 * r * r));
 }
 
 std::string BasisPreconditioner::describe() const {
-  return std::to_string(problem_.harmonics().count()) + " blocks of " + std::to_string(n_) +
-         " modes of stuck pairs";
+  const std::string modes = std::to_string(basis_.modes()) + " modes of stuck pairs",
+                    blocks = std::to_string(problem_.harmonics().count()) + " blocks of " + modes;
+  if (!basis_.factor()) return blocks;
+  return blocks + " and " + std::to_string(basis_.size() - basis_.modes()) +
+         " static motions, one real factor (" + std::to_string(int(std::ceil(basis_.factor()->megabytes()))) +
+         " MB)";
 }
 
 }  // namespace fretwave::precondition

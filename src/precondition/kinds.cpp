@@ -2,10 +2,12 @@
 #include "precondition/kinds.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "precondition/basis_pc.h"
 #include "precondition/condensed_pc.h"
 #include "precondition/harmonic_pc.h"
+#include "solve/memory.h"
 #include "tuned.h"
 
 namespace fretwave::precondition {
@@ -35,19 +37,53 @@ std::string not_condensed(HarmonicProblem const& problem) {
   return phased ? "a contact that reaches the next sector" : unfolded(problem);
 }
 
+/// Every rank has all terms and the fundamental with its border, each block one.
+std::string without_blocks(HarmonicProblem const& problem) {
+  if (const auto why = unfolded(problem); !why.empty()) return why;
+  const double entries = std::pow(double(problem.model().dofs()), 2),
+               terms = double(problem.model().terms().size());
+  const double bytes =
+      entries * (8 * problem.harmonics().count() + comm_size(problem.comm()) * (8 * terms + 32));
+  return solve::beyond_memory("a model whose dense blocks", bytes, problem.comm());
+}
+
+/// K, M and the work of their eigenproblem are whole on every rank.
 std::string without_basis(HarmonicProblem const& problem) {
   if (const auto why = unfolded(problem); !why.empty()) return why;
+  const double bytes = 40 * comm_size(problem.comm()) * std::pow(double(problem.model().dofs()), 2);
+  if (const auto why = solve::beyond_memory("a model whose basis of all modes", bytes, problem.comm());
+      !why.empty())
+    return why;
   return problem.model().stuck_basis() ? "" : "a model without a basis of stuck pairs";
+}
+
+double contact_rows(HarmonicProblem const& problem) {
+  double rows = 0;
+  for (auto const& contact : problem.model().contacts())
+    rows += contact.law->components() * contact.law->pairs();
+  MPI_Allreduce(MPI_IN_PLACE, &rows, 1, MPI_DOUBLE, MPI_SUM, problem.comm());
+  return rows;
+}
+
+/// The contact's static compliance, its inverse for slipping pairs (whole on every rank), and the basis.
+double static_bytes(HarmonicProblem const& problem) {
+  const double rows = contact_rows(problem);
+  const auto [whole, spread] = model::StuckBasis::size_with_factor(double(problem.model().dofs()), rows);
+  return sizeof(double) * (comm_size(problem.comm()) * (whole + 5 * rows * rows) + spread);
+}
+
+std::string without_static(HarmonicProblem const& problem) {
+  if (const auto why = unfolded(problem); !why.empty()) return why;
+  const auto why =
+      solve::beyond_memory("contact whose static compliance", static_bytes(problem), problem.comm());
+  if (!why.empty()) return why;
+  return problem.model().static_basis() ? "" : "a model without a basis of stuck pairs";
 }
 
 double condensed_bytes(solve::Problem& problem) {
   auto const& harmonic = dynamic_cast<HarmonicProblem const&>(problem);
   if (harmonic.model().unit()) return 0;
-  double rows = 0;
-  for (auto const& contact : harmonic.model().contacts())
-    rows += contact.law->components() * contact.law->pairs();
-  MPI_Allreduce(MPI_IN_PLACE, &rows, 1, MPI_DOUBLE, MPI_SUM, harmonic.comm());
-  const double size = rows * harmonic.harmonics().block_size() + harmonic.scalar_count();
+  const double size = contact_rows(harmonic) * harmonic.harmonics().block_size() + harmonic.scalar_count();
   return sizeof(double) * size * size;
 }
 
@@ -57,11 +93,12 @@ void register_kinds() {
   const auto always = [](HarmonicProblem const&) { return true; };
   const auto large = [](HarmonicProblem const& problem) { return !suits_dense(problem); };
   const auto has_basis = [](HarmonicProblem const& problem) { return without_basis(problem).empty(); };
+  solve::register_kind(harmonic_kind<StaticPreconditioner>("fwstatic", "", large, without_static));
   auto condensed = harmonic_kind<CondensedPreconditioner>("fwcondensed", "sparse", large, not_condensed);
   condensed.fallback_bytes = condensed_bytes;
   solve::register_kind(std::move(condensed));
   solve::register_kind(harmonic_kind<BasisPreconditioner>("fwbasis", "", has_basis, without_basis));
-  solve::register_kind(harmonic_kind<HarmonicPreconditioner>("fwblocks", "dense", always, unfolded));
+  solve::register_kind(harmonic_kind<HarmonicPreconditioner>("fwblocks", "dense", always, without_blocks));
 }
 
 }  // namespace fretwave::precondition

@@ -27,7 +27,7 @@ std::vector<float> rounded(std::vector<double> const& x) { return {x.begin(), x.
 }  // namespace
 
 ModalBlocks::ModalBlocks(model::StuckBasis const& basis, Harmonics const& h, int first, int last)
-    : basis_(basis), first_(first), modes_(basis.dofs()) {
+    : basis_(basis), first_(first), modes_(basis.size()) {
   if (first < last) begin_ = h.offset(first);
   for (int i = first; i < last; ++i) {
     offsets_.push_back(h.offset(i) - begin_);

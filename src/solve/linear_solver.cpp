@@ -17,7 +17,6 @@ namespace {
 // twelfth at 2328.
 const Tuned krylov_limit("linear_krylov_limit", 300, "unknowns above which the Krylov route is taken");
 constexpr double tangent_tolerance = 1e-10;  // relative; of the tangent's direction
-const Tuned memory_share("linear_memory_share", 0.7, "share of the free memory that a fallback may take");
 const Tuned longest_stay("linear_longest_stay", 256, "points between two tries at the foot of the ladder");
 const Tuned tangent_accepted("linear_tangent_accepted", 1e-6,
                              "residual of a tangent, relative, where rounding lets GMRES go no further");
@@ -91,15 +90,26 @@ void LinearSolver::choose_route() {
   check(VecGetSize(point_, &unknowns));
   const std::string wish = choice(prefix_, "-route", "route of the corrector", "direct", "krylov");
   const std::string blocks = choice(prefix_, "-blocks", "kind of preconditioner", "dense", "sparse");
-  if (wish == "krylov" || (wish == "auto" && unknowns > krylov_limit))
-    kind_ = choose_kind(bordered_.problem(), blocks);
+  if (wish == "krylov" || (wish == "auto" && unknowns > krylov_limit)) {
+    kind_.kind = blocks == "auto" ? asked_kind() : nullptr;
+    if (!kind_.kind) kind_ = choose_kind(bordered_.problem(), blocks);
+  }
   krylov_ = kind_.kind;
   const bool refused = wish == "krylov" && !krylov_;
   route_ = std::string(krylov_ ? "krylov" : "direct") + " (" +
            (refused          ? "krylov asked for, but this problem has no preconditioner"
             : wish == "auto" ? std::to_string(unknowns) + " unknowns"
                              : "asked for") +
-           ")";
+           ")" + (krylov_ ? "" : kind_.note);
+}
+
+/// The kind that -<prefix>pc_type asks for, so that no other is looked for; null if the problem cannot have
+/// it.
+PreconditionerKind const* LinearSolver::asked_kind() {
+  char given[32] = "";
+  check(PetscOptionsGetString(nullptr, prefix_.c_str(), "-pc_type", given, sizeof given, nullptr));
+  auto const* kind = kind_of(given);
+  return kind && refusal(*kind, bordered_.problem()).empty() ? kind : nullptr;
 }
 
 std::string LinearSolver::route() const { return route_ + (own_ ? ", " + own_->describe() + note_ : ""); }
@@ -140,11 +150,11 @@ void LinearSolver::make_preconditioner() {
   auto const* kind = type ? kind_of(type) : nullptr;
   if (!kind) return;
   if (!krylov_)
-    throw InputError("option pc_type: the direct route takes no " + kind->type, kind->type,
+    throw InputError("option pc_type: the direct route takes no " + kind->type + kind_.note, kind->type,
                      "the Krylov route", "ask for it: -<analysis>_route krylov");
   if (kind == kind_.kind)
     note_ = kind_.note;
-  else if (const auto why = kind->refuses(bordered_.problem()); !why.empty())
+  else if (const auto why = refusal(*kind, bordered_.problem()); !why.empty())
     throw InputError("option pc_type: there is no " + kind->type + " for " + why, kind->type,
                      kind_.kind->type, "leave out the option -<analysis>_pc_type");
   kind_.kind = kind;

@@ -65,6 +65,7 @@ class LinearSolver {
   static PetscErrorCode shell_product(Mat, Vec, Vec);
   static PetscErrorCode shell_transposed_product(Mat, Vec, Vec);
   void choose_route();
+  PreconditionerKind const* asked_kind();
   void use_krylov();
   void make_preconditioner();
   void make_tangent();

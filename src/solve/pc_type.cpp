@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "solve/linear_solver.h"
+#include "solve/memory.h"
 
 namespace fretwave::solve {
 
@@ -80,12 +81,18 @@ PreconditionerKind const* kind_of(std::string const& pc_type) {
   return found == kinds().end() ? nullptr : &*found;
 }
 
+std::string refusal(PreconditionerKind const& kind, Problem& problem) {
+  const std::string why = kind.refuses(problem);
+  if (!why.empty() || !kind.fallback_bytes) return why;
+  return beyond_memory("contact whose condensed system", kind.fallback_bytes(problem), problem.comm());
+}
+
 ChosenKind choose_kind(Problem& problem, std::string const& blocks) {
   ChosenKind chosen;
   for (auto const& kind : kinds()) {
     const bool asked = kind.blocks == blocks;
     if (!asked && (blocks != "auto" || !kind.suits(problem))) continue;
-    const std::string why = kind.refuses(problem);
+    const std::string why = refusal(kind, problem);
     if (why.empty()) {
       chosen.kind = &kind;
       return chosen;

@@ -42,6 +42,9 @@ struct PreconditionerKind {
   std::function<double(Problem&)> fallback_bytes = {};
 };
 
+/// Why a problem cannot have a kind, memory included. Collective.
+std::string refusal(PreconditionerKind const&, Problem&);
+
 /// Also to PETSc (PCRegister); those registered first are asked first.
 void register_kind(PreconditionerKind);
 std::deque<PreconditionerKind> const& kinds();

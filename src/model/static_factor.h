@@ -1,0 +1,35 @@
+#pragma once
+#include "petsc.h"
+
+namespace fretwave::model {
+
+/// L D L^T of a real symmetric stiffness by MUMPS, over all ranks, and solves with many columns at once, each
+/// rank with its dofs of them.
+class StaticFactor {
+ public:
+  /// Factorises. Collective.
+  explicit StaticFactor(Mat K);
+  bool definite() const { return definite_; }
+  /// y = K^-1 x: coefficients, innermost, of this rank's dofs. Collective.
+  void solve(double const* x, int coefficients, double* y) const;
+  /// X = K^-1 B of dense matrices. Collective.
+  void solve(Mat B, Mat X) const;
+  KSP ksp() const { return ksp_; }
+  Mat stiffness() const { return K_; }
+  PetscInt local_dofs() const { return local_; }
+  /// Of all ranks: what MUMPS took for the factors [MB], and their entries.
+  double megabytes() const { return megabytes_; }
+  double entries() const { return entries_; }
+
+ private:
+  MatHandle K_;
+  KspHandle ksp_;
+  PetscInt local_ = 0;
+  bool definite_ = false;
+  double megabytes_ = 0, entries_ = 0;
+};
+
+/// Dense, of so many columns, with rows where a square matrix has them. Collective.
+MatHandle dense_columns(Mat like, PetscInt columns);
+
+}  // namespace fretwave::model

@@ -1,0 +1,136 @@
+"""Finite elements by one real factor, the lowest modes of stuck pairs and static corrections."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+import test_sparse_route as solid
+import test_stuck_basis as chains
+from petsc4py import PETSc
+
+import fretwave as fw
+from fretwave import _core
+
+pytestmark = pytest.mark.ranks(1, 2)
+
+ONE_RANK = pytest.mark.ranks(1)
+STEPS = 8  #: GMRES iterations a Newton step, at the most
+
+
+def lifting(comm, turning):
+    """The bar of solid elements on pairs whose planes lie askew to its bending, so that they slip and open."""
+    M, K, C, B, tip = solid.structure(solid.SMALL, turning)
+    askew = np.kron(np.eye(3), [[0.6, 0.8, 0], [-0.8, 0.6, 0], [0, 0, 1]])
+    contact = fw.Contact("coulomb_3d", askew @ B, {**solid.STIFFNESS, **solid.LOADS}, "root")
+    return fw.Model(M, K, C, [contact], comm), tip
+
+
+@pytest.mark.parametrize(
+    "method, turning",
+    [("CNM", 0.0), pytest.param("EPMC", 0.0, marks=ONE_RANK), pytest.param("CNM", 50.0, marks=ONE_RANK)],
+)
+def test_motions_are_those_of_the_direct_route(comm, method, turning):
+    """From stick into slip and lift-off; damping by K, and with gyroscopic terms that the modes leave out."""
+    model, tip = lifting(comm, turning)
+    amplitudes = [solid.STICK, solid.SLIP, 2.5e-4]
+    one = solid.mode(model, tip, "static_one_", route="krylov", pc_type="fwstatic", method=method)
+    found, route = solid.solve(one, amplitudes)
+    direct, _ = solid.solve(solid.mode(model, tip, "static_direct_", route="direct", method=method), amplitudes)
+    assert "4 blocks of 30 modes of stuck pairs and 9 static motions, one real factor" in route
+    assert found[0]["slip"] == 0 and found[1]["slip"] > 0.05 and found[2]["open"] > 0.05
+    assert max(state["iterations"] / state["steps"] for state in found) <= STEPS
+    solid.assert_same(found, direct)
+
+
+@ONE_RANK
+def test_solid_model_takes_it_for_its_memory(comm):
+    """3660 dofs: chosen, with less than a quarter of the memory of four complex factors, and as PCView says it."""
+    model, tip = solid.solid(comm, solid.LARGE)
+    auto = solid.mode(model, tip, "static_auto_")
+    found, route = solid.solve(auto, [solid.STICK, solid.SLIP])
+    sparse = solid.mode(model, tip, "static_sparse_", pc_type="fwcondensed")
+    other, condensed = solid.solve(sparse, [solid.STICK, solid.SLIP])
+    one, four = (float(re.search(r"\((\d+) MB\)", text)[1]) for text in (route, condensed))
+    assert re.match(r"krylov \(\d+ unknowns\), 4 blocks of 30 modes of stuck pairs", route), route
+    assert one < four / 4
+    assert max(state["iterations"] / state["steps"] for state in found) <= STEPS
+    solid.assert_same(found, other)
+
+
+@ONE_RANK
+def test_few_dofs_some_without_mass(comm, tmp_path):
+    """Fewer modes than asked for, through slip, and what PCView says."""
+    M, K = chains.chain()
+    M[3, 3] = M[7, 7] = 0.0
+    levels = [0.1, 1.0, 4.0]
+    found = {}
+    for kind in ("fwstatic", "direct"):
+        options = PETSc.Options(f"few_{kind}_")
+        if kind == "fwstatic":
+            options["pc_type"] = kind
+        with fw.Model(M, K, 0.002 * K, [chains.sliders()], comm) as model:
+            problem = chains.problem_of(model, f"few_{kind}_")
+            options["route"] = "direct" if kind == "direct" else "krylov"
+            points = chains.branch(problem, levels)
+            found[kind] = chains.reported(points)
+            if kind == "fwstatic":
+                said = viewed(problem, tmp_path, comm)
+    assert "type: fwstatic" in said and re.search(r"6 modes .* and 4 static motions, one real factor \(\d+ MB\)", said)
+    assert max(contact["slip"] for *_, contact in points) > 0.2
+    for level in levels:
+        one, same = (found[kind][level] for kind in ("fwstatic", "direct"))
+        solid.assert_same([one], [same])
+
+
+def viewed(problem, folder, comm):
+    """What PCView says, on every rank. Collective."""
+    newton, path = _core.Newton(problem.core, problem.prefix), comm.bcast(str(folder / "pc.txt"))
+    viewer = PETSc.Viewer().createASCII(path, comm=comm)
+    newton.snes.getKSP().getPC().view(viewer)
+    viewer.destroy()
+    return comm.bcast(Path(path).read_text() if comm.rank == 0 else None)
+
+
+def problem_with(K, contact, comm):
+    model = fw.Model(chains.chain()[0], K, 0.01 * K, [contact], comm)
+    start = fw.LinearMode(0.5, 0.0, np.ones(chains.N), np.zeros(chains.N))
+    return fw.NonlinearMode(model, fw.Harmonics(range(4), 64), "CNM", chains.N - 1, start, "refused_")
+
+
+@pytest.mark.parametrize("why", ["a law without a stuck stiffness", "K without symmetry", "K not definite"])
+def test_other_models_are_refused(comm, why):
+    K = chains.chain()[1] - (5.0 * np.eye(chains.N) if why == "K not definite" else 0.0)
+    contact = chains.sliders()
+    if why == "K without symmetry":
+        K = chains.unsymmetric(K)
+    if why == "a law without a stuck stiffness":
+        contact = chains.sliders("regularised_coulomb", {"friction_limit": 1.0, "regularisation_velocity": 1e-2})
+    options = PETSc.Options("refused_")
+    options["route"], options["pc_type"] = "krylov", "fwstatic"
+    with pytest.raises(fw.InputError, match="no fwstatic for a model without a basis of stuck pairs"):
+        _core.Newton(problem_with(K, contact, comm).core, "refused_")
+
+
+def test_what_is_beyond_memory_is_refused_in_words(comm):
+    """Before it is allocated: the route says why it takes none; asked for, it is an error."""
+    model, tip = solid.solid(comm, solid.SMALL)
+    words = r"takes \S+ GB, of \S+ GB free"
+    options = PETSc.Options()
+    options["fw_linear_memory_share"] = 1e-9
+    try:
+        problem = solid.mode(model, tip, "static_large_", route="krylov")
+        route = _core.Newton(problem.core, "static_large_").route
+        for what, kind in (
+            ("static compliance", "fwstatic"),
+            ("condensed system", "fwcondensed"),
+            ("dense blocks", "fwblocks"),
+        ):
+            assert re.search(f"{what} {words}: no {kind}", route), route
+        asked = solid.mode(model, tip, "static_asked_", route="krylov", pc_type="fwstatic")
+        with pytest.raises(fw.InputError, match=f"takes no fwstatic.*static compliance {words}"):
+            _core.Newton(asked.core, "static_asked_")
+    finally:
+        options.delValue("fw_linear_memory_share")
