@@ -138,11 +138,26 @@ void DiscretisationError::from_halfway(Vec middle, Vec row, std::span<Vec const>
 
 namespace {
 
-/// Scalars of dy' + s t without a change of the last of `count`, the parameter.
-std::vector<double> at_parameter(std::vector<double> change, std::vector<double> const& tangent, int count) {
-  const double farthest = reach, s = std::clamp(-change[count - 1] / tangent[count - 1], -farthest, farthest);
-  for (size_t j = 0; j < change.size(); ++j) change[j] += s * tangent[j];
-  return change;
+/// Sum of squares of all but the parameter, the last of `count`.
+double size_beside(std::vector<double> v, int count) {
+  v[count - 1] = 0;
+  return std::inner_product(v.begin(), v.end(), v.begin(), 0.0);
+}
+
+/// Scalars of dy' + s t without a change of the last of `count`, the parameter. Beside a fold neither way
+/// along the branch leads there (at the fold the sign of t is rounding's): of both ends the one that is off
+/// the most.
+std::vector<double> at_parameter(std::vector<double> const& change, std::vector<double> const& tangent,
+                                 int count) {
+  const auto moved = [&](double s) {
+    std::vector<double> there = change;
+    for (size_t j = 0; j < there.size(); ++j) there[j] += s * tangent[j];
+    return there;
+  };
+  const double off = change[count - 1], t = tangent[count - 1];
+  if (std::abs(off) <= reach * std::abs(t)) return off == 0 ? change : moved(-off / t);
+  auto one = moved(reach), other = moved(-reach);
+  return size_beside(one, count) > size_beside(other, count) ? one : other;
 }
 
 /// Of a step: where 1 - s + c s^2 first vanishes, or else is the least.

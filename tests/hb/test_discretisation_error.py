@@ -166,6 +166,23 @@ def test_static_loads_do_not_enter():
 
 
 @SERIAL
+def test_at_a_fold_rounding_decides_nothing():
+    """How the tangent leaves it, to larger or to smaller amplitudes, is rounding there, and another on other ranks."""
+    problem = fw.NonlinearMode(model(), fw.choose_harmonics(model(), 7), "CNM", 0)
+    branch = fw.Continuation(problem, problem.initial(0.1), (0.1, 3.0))
+    found = []
+    for point in branch:
+        if point.event == "fold":
+            for leaving in (1e-12, -1e-12):
+                point.tangent.setValue(point.tangent.size - 1, leaving)
+                point.tangent.assemble()
+                found.append(problem.errors(point.y, point.tangent))
+    assert len(found) >= 4
+    for one, other in zip(found[::2], found[1::2]):
+        assert one == pytest.approx(other, rel=ROUNDING) and one["zeta_error"] > 0
+
+
+@SERIAL
 def test_a_fold_has_a_finite_error():
     """At the same amplitude there is nothing beyond it; what is read is as far as the branch runs straight."""
     sharp = fw.Model(M, K, None, [friction([[0.0, 1.0]], LIMIT, 0.05)])
