@@ -21,7 +21,18 @@ import numpy.typing as npt
 
 ROOT = Path(__file__).resolve().parents[2]
 #: How a point was solved, not what it is; quantities at rounding level.
-WORK = {"wall_s", "newton", "linear", "residual", "rounding", "accepted", "unfolding", "energy_error", "unclosed"}
+WORK = {
+    "wall_s",
+    "cpu_s",
+    "newton",
+    "linear",
+    "residual",
+    "rounding",
+    "accepted",
+    "unfolding",
+    "energy_error",
+    "unclosed",
+}
 SAME = 1e-8
 #: Four digits are enough of an estimate, and where it is solved by iteration they are other ones on other ranks.
 EXACT = "petsc=-error_tangent_ksp_rtol 1e-12"

@@ -165,7 +165,7 @@ def begin(text: str, **counts: int) -> argparse.Namespace:
 # Comparison with the uninterrupted run
 
 #: Columns and values that differ from run to run.
-TIMES = ("wall_s",)
+TIMES = ("wall_s", "cpu_s")
 
 
 def tables(folder: Path) -> dict[str, list[dict[str, str]]]:

@@ -20,7 +20,7 @@ from fretwave.units import SI, SYSTEMS
 pytestmark = pytest.mark.ranks(1)
 
 #: What rounding leaves, and time: numbers that no two runs share.
-CHANCE = ("wall_s", "residual", "rounding", "unclosed", "energy_error", "force_outside", "linear")
+CHANCE = ("wall_s", "cpu_s", "residual", "rounding", "unclosed", "energy_error", "force_outside", "linear")
 #: Newton's steps where the residual is per sqrt(mass), or of all points together.
 COUNTS = (("coordinate", "newton"), ("over_friction_summary", "newton"))
 #: Errors, which are differences of two solutions, by what they are errors of.
