@@ -67,8 +67,9 @@ def test_the_curve_is_that_of_a_branch_with_many_harmonics(run, tmp_path):
     assert call("run", CASE, "--no-plots", "--only", "mode", *words, "--out", tmp_path / "fine") == 0
     a = [0.05, 0.1, 0.15, 0.2, 0.5, 2.0]
     here, there = (fw.open_run(folder)["mode"].at(a) for folder in (run, tmp_path / "fine"))
+    error = np.hypot(here["beta"] - there["beta"], here["omega"] - there["omega"])
+    np.testing.assert_array_less(error, 1e-2 * there["zeta"] * there["omega0"])  # what was asked for
     np.testing.assert_allclose(here["zeta"], there["zeta"], rtol=1.2e-2)
-    np.testing.assert_allclose(here["omega"], there["omega"], rtol=1e-4)
 
 
 def test_a_run_that_broke_off_goes_on_with_the_set_it_had(run, tmp_path, monkeypatch):
