@@ -22,10 +22,12 @@ from ..case.harmonic import HarmonicSection, check_range
 from ..case.observed import Observed, check_observed, dofs_of, label_of
 from ..case.schema import Positive, Whole, key
 from ..columns import FLUTTER
+from ..errors import InputError
 from ..post.flutter_waves import STABLE, describe_waves, with_sign, words
 from ..results.results import AnalysisWriter
 from ..results.sweep_summary import FLUTTER_WAVES
 from .mode import point_line
+from .parts.at_rest import flutter_at_rest
 from .parts.branch import continuation, finished_table, mode_problem, notable, open_branch, points_of, record, tell
 from .parts.context import AnalysisContext, Outcome
 from .parts.observed import named
@@ -117,6 +119,10 @@ class FlutterAnalysis(HarmonicSection):
         named = ", ".join(map(str, self.nodal_diameters or [])) or "all"
         start = f"flutter ({self.method}), nodal diameters {named}, linear mode {self.linear_mode}"
         return f"{start}, a = {low:g} to {high:g} {self.units('length')} of {label_of(self.normalise)}"
+
+    def at_rest(self, context: AnalysisContext[FlutterAnalysis]) -> tuple[list[str], list[InputError]]:
+        assert context.case.neighbours is not None
+        return flutter_at_rest(context, self.waves(context.case.neighbours.sectors))
 
     def run(self, context: AnalysisContext[FlutterAnalysis]) -> Outcome:
         """Follow the mode of every nodal diameter over its amplitude. Collective."""

@@ -19,13 +19,13 @@ from ..post.motion import complex_amplitudes
 from ..results.results import AnalysisWriter
 from ..results.sweep_summary import FORCED_LEVELS
 from ..texts import toml
-from .parts.at_rest import harmonic_at_rest
 from .parts.branch import closure_note, error_text, finished_table, notable, open_branch, points_of, record, tell
 from .parts.context import AnalysisContext, Outcome
-from .parts.excitation import Excitation, excitation_of
+from .parts.excitation import Excitation, excitation_of, wave_of_forces
 from .parts.forced_peaks import curves_of, write_peaks
 from .parts.forced_time import time_points
 from .parts.observed import keep_row, named
+from .parts.response_at_rest import response_at_rest
 from .parts.rest import retained
 from .parts.wheel_peaks import blade_amplitudes, blade_by_blade
 
@@ -150,7 +150,7 @@ class ForcedAnalysis(HarmonicSection):
         return f"forced response of {label_of(self.observe)}{order}, {low:g} to {high:g} Hz, levels {levels}"
 
     def at_rest(self, context: AnalysisContext[ForcedAnalysis]) -> tuple[list[str], list[InputError]]:
-        return harmonic_at_rest(context)
+        return response_at_rest(context)
 
     def run(self, context: AnalysisContext[ForcedAnalysis]) -> Outcome:
         """Follow the response of every level over the frequency range. Collective."""
@@ -265,7 +265,7 @@ def _bounded(excitation: Excitation, problem: HarmonicProblem, y: PETSc.Vec) -> 
     work = None
     if coefficients is not None:
         q = complex_amplitudes(problem.harmonics.labels, coefficients)[1]
-        work = math.pi * abs(np.vdot(q, excitation.force()))
+        work = math.pi * abs(np.vdot(q, wave_of_forces(excitation.context)))
     return float((taken["contact"] + taken["damping"]) / excitation.context.comm.bcast(work))
 
 

@@ -11,13 +11,17 @@ from ..analyses.parts.context import AnalysisContext
 from ..case.analysis import AnalysisSection
 from ..case.build import model_of
 from ..case.load import Case
-from ..case.wheel import on_wheel
+from ..case.wheel import on_wheel, solver_room
 from ..console import Console
 from ..errors import FretwaveError, InputError, NotConverged
 from ..mpi.petsc_options import AnalysisOptions
 
 if TYPE_CHECKING:
     from mpi4py import MPI
+
+
+#: Of a whole wheel that is looked at before it runs.
+MOST_DOFS = 20_000
 
 
 @dataclass
@@ -34,8 +38,6 @@ def at_rest(case: Case, names: Sequence[str], comm: MPI.Comm) -> AtRest:
     found = AtRest()
     for name in names:
         analysis = case.analyses[name]
-        if on_wheel(case, analysis) is not case:
-            continue
         try:
             found.lines[name], warnings = _look(case, analysis, comm)
         except (InputError, NotConverged) as error:
@@ -47,6 +49,16 @@ def at_rest(case: Case, names: Sequence[str], comm: MPI.Comm) -> AtRest:
 
 
 def _look(case: Case, analysis: AnalysisSection, comm: MPI.Comm) -> tuple[list[str], list[InputError]]:
+    wheel, _ = analysis.whole_wheel()
+    sectors = case.neighbours.sectors if case.neighbours is not None and wheel else 1
+    if sectors > 1 and sectors * len(case.dofs) > MOST_DOFS:
+        size = f"{sectors * len(case.dofs):,} dofs, more than {MOST_DOFS:,}"
+        return [f"at rest: left to the run: the wheel has {size}"], []
     prefix = analysis.name.replace("-", "_") + "_"
-    with model_of(case, analysis, comm) as model, AnalysisOptions(prefix, [analysis.petsc]).inserted():
+    case = on_wheel(case, analysis)
+    with (
+        model_of(case, analysis, comm) as model,
+        AnalysisOptions(prefix, [analysis.petsc]).inserted(),
+        solver_room(case, analysis, prefix),
+    ):
         return analysis.at_rest(AnalysisContext(model, case, analysis, comm, Path(), Console(False)))

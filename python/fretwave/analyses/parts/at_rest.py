@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Optional
 
 import numpy as np
 
 from ...arrays import Array
-from ...case.harmonic import HarmonicSection, nodal_diameter
+from ...case.harmonic import nodal_diameter
 from ...case.observed import label_of, unit_of
 from ...errors import InputError
 from ...model.contact import Contact
@@ -20,14 +21,19 @@ from ...post.slip_threshold import lasting_factors, slip_factors
 from .context import AnalysisContext
 from .observed import observed_by
 from .rest import loaded_state, start_mode
+from .wheel_start import Start, start_of
 
 if TYPE_CHECKING:
-    from ...case.observed import ObservedTable
+    from ...hb.observed import Observed
     from ...model.modes import LinearMode
+    from ...model.rest import Rest
+    from ..flutter import FlutterAnalysis
     from ..mode import ModeAnalysis
 
 #: Of a period: they miss the extremes of a harmonic motion by (pi / SAMPLES)^2 / 2 of its amplitude.
 SAMPLES = 256
+
+NO_LIMIT = "first slip: no pair sticks at rest with a sharp friction limit"
 
 States = list[dict[str, Array]]
 Told = tuple[list[str], list[InputError]]
@@ -56,30 +62,58 @@ def static_at_rest(context: AnalysisContext[Any], factor: float) -> Told:
     return [rest_line(context, states, time.perf_counter() - began)], []
 
 
-def harmonic_at_rest(context: AnalysisContext[HarmonicSection]) -> Told:
-    """State at rest and stuck frequency of an analysis of a structure or one sector. Collective."""
-    if not context.case.contacts or context.case.wheel is not None:
-        return [], []
-    states, mode, seconds = _solved(context)
-    return [rest_line(context, states, seconds), _stuck_line(context, mode)], []
-
-
 def mode_at_rest(context: AnalysisContext[ModeAnalysis]) -> Told:
-    """The same, and the amplitude of first slip that the linear mode expects against those of the analysis."""
-    if not context.case.contacts or context.case.wheel is not None:
+    """State at rest, stuck frequency, and amplitude of first slip against those of the analysis. Collective."""
+    if not context.case.contacts:
         return [], []
-    states, mode, seconds = _solved(context)
-    unit = unit_amplitude(context, context.analysis.normalise, mode)
-    slip = first_slip(context, states, mode, unit)
-    lines = [rest_line(context, states, seconds), _stuck_line(context, mode)]
-    return lines + _slip_lines(context, slip), _never_slips(context, slip)
+    states, start, seconds = _solved(context)
+    slip = first_slip(context, states, start.mode, observed_amplitude(context, start.dof, start.mode))
+    seen = start.attributes.get("normalise", label_of(context.analysis.normalise))
+    lines = [rest_line(context, states, seconds), stuck_line(context, start.mode)]
+    return lines + _slip_lines(context, slip, seen), _never_slips(context, slip)
 
 
-def _solved(context: AnalysisContext[Any]) -> tuple[States, LinearMode, float]:
+def flutter_at_rest(context: AnalysisContext[FlutterAnalysis], diameters: Sequence[int]) -> Told:
+    """The same of every wave of a flutter analysis, the state at rest once. Collective."""
+    from ...case.build import build_model
+
+    if not context.case.contacts:
+        return [], []
+    lines: list[str] = []
+    slips = []
+    for diameter in diameters:
+        analysis = context.analysis.model_copy(update={"nodal_diameter": diameter, "aerodynamics": True})
+        preload = context.case.preload_of(analysis)
+        with build_model(context.case, analysis.dampers, context.comm, preload, diameter, aerodynamics=True) as model:
+            wave = context.of(analysis, model=model)
+            states, mode, rest, seconds = rest_and_mode(wave)
+            seen = observed_by(wave, analysis.normalise, mode)
+            slip = first_slip(wave, states, mode, observed_amplitude(wave, seen, mode))
+        lines = lines or [rest_line(context, states, seconds)]
+        lines.append(f"nodal diameter {diameter}: {mode.frequency_hz:.6g} Hz, {_slip_lines(wave, slip)[0]}")
+        slips.append(slip)
+    known = [slip for slip in slips if slip is not None]
+    least = min(known, key=lambda slip: slip.lasting) if len(known) == len(slips) and known else None
+    return lines, _never_slips(context, least)
+
+
+def rest_and_mode(context: AnalysisContext[Any]) -> tuple[States, LinearMode, Optional[Rest], float]:
+    """Contacts at rest, the linear mode about it of a structure or one sector, and the seconds it took. Collective."""
     began = time.perf_counter()
     mode, rest = start_mode(context, context.analysis.linear_mode, or_free=True)
     states = context.comm.bcast((rest or loaded_state(context)).contacts)
-    return states, mode, time.perf_counter() - began
+    return states, mode, rest, time.perf_counter() - began
+
+
+def _solved(context: AnalysisContext[ModeAnalysis]) -> tuple[States, Start, float]:
+    """The same with what a mode starts from, also that of all sectors of a wheel."""
+    if context.case.wheel is None:
+        states, mode, rest, seconds = rest_and_mode(context)
+        return states, Start(mode, rest, {}, observed_by(context, context.analysis.normalise, mode)), seconds
+    began = time.perf_counter()
+    start = start_of(context)
+    states = context.comm.bcast((start.rest or loaded_state(context)).contacts)
+    return states, start, time.perf_counter() - began
 
 
 def rest_line(context: AnalysisContext[Any], states: States, seconds: float) -> str:
@@ -93,17 +127,20 @@ def rest_line(context: AnalysisContext[Any], states: States, seconds: float) -> 
     return f"{text} (solved in {seconds:.2g} s)"
 
 
-def _stuck_line(context: AnalysisContext[Any], mode: LinearMode) -> str:
-    return f"linear mode {context.analysis.linear_mode} with contact as at rest: {mode.frequency_hz:.6g} Hz"
+def stuck_line(context: AnalysisContext[Any], mode: LinearMode) -> str:
+    """Of a whole wheel it is the wave's or, mistuned, the mode most like it."""
+    which = f"linear mode {context.analysis.linear_mode}"
+    if context.case.wheel is not None:
+        which += " of the whole wheel" if context.analysis.nodal_diameter is None else " of this wave on the wheel"
+    return f"{which} with contact as at rest: {mode.frequency_hz:.6g} Hz"
 
 
-def unit_amplitude(context: AnalysisContext[Any], given: str | ObservedTable, mode: LinearMode) -> float:
-    """What an analysis sees of a linear mode as it is scaled. Collective."""
+def observed_amplitude(context: AnalysisContext[Any], seen: Observed, mode: LinearMode) -> float:
+    """What an analysis sees of a linear motion as it is scaled. Collective."""
     from ...hb.observed import row_of
 
     phi = mode.shape + 1j * mode.imaginary
-    row = row_of(context.model, observed_by(context, given, mode))
-    return float(abs(sum(weight * phi[dof] for dof, weight in row)))
+    return float(abs(sum(weight * phi[dof] for dof, weight in row_of(context.model, seen))))
 
 
 def first_slip(context: AnalysisContext[Any], states: States, mode: LinearMode, unit: float) -> Optional[FirstSlip]:
@@ -155,21 +192,29 @@ def _swing(context: AnalysisContext[Any], contact: Contact, mode: LinearMode) ->
     return np.asarray(np.real(np.exp(1j * tau)[:, None, None] * u))
 
 
-def _slip_lines(context: AnalysisContext[ModeAnalysis], slip: Optional[FirstSlip]) -> list[str]:
+def place_of(context: AnalysisContext[Any], slip: FirstSlip) -> str:
+    """The pair by its number; on a wheel, whose pairs stand sector by sector, that in its sector."""
+    if context.case.wheel is None:
+        return f"pair {slip.pair} of '{slip.contact}'"
+    each = next(c.n_pairs for c in context.tuned.contacts if c.name == slip.contact)
+    return f"pair {slip.pair % each} of '{slip.contact}' in sector {slip.pair // each}"
+
+
+def _slip_lines(context: AnalysisContext[Any], slip: Optional[FirstSlip], seen: str = "") -> list[str]:
     if slip is None:
-        return ["first slip: no pair sticks at rest with a sharp friction limit"]
+        return [NO_LIMIT]
     if not np.isfinite(slip.amplitude):
         return ["first slip: the linear mode makes no pair slip"]
-    unit, seen = context.units(unit_of(context.analysis.normalise)), label_of(context.analysis.normalise)
+    unit, seen = context.units(unit_of(context.analysis.normalise)), seen or label_of(context.analysis.normalise)
     low, high = context.analysis.amplitude
     side = "below" if slip.lasting < low else "above" if slip.lasting > high else "within"
     return [
-        f"first slip expected at a = {slip.amplitude:.3g} {unit} of {seen} (pair {slip.pair} of '{slip.contact}'), in"
+        f"first slip expected at a = {slip.amplitude:.3g} {unit} of {seen} ({place_of(context, slip)}), in"
         f" every period from about {slip.lasting:.3g} {unit}: {side} the amplitudes asked for"
     ]
 
 
-def _never_slips(context: AnalysisContext[ModeAnalysis], slip: Optional[FirstSlip]) -> list[InputError]:
+def _never_slips(context: AnalysisContext[Any], slip: Optional[FirstSlip]) -> list[InputError]:
     """A branch that ends before pairs slip in every period has the linear mode's frequency and damping."""
     low, high = context.analysis.amplitude
     if slip is None or not slip.lasting > high:

@@ -40,6 +40,17 @@ def forces(context: AnalysisContext[ForcedAnalysis]) -> dict[str, float]:
     return {dof: grown * amplitude for dof, amplitude in given.items()}
 
 
+def wave_of_forces(context: AnalysisContext[ForcedAnalysis]) -> Complex:
+    """Amplitudes (n_dof,) [force] at level 1; on sector j of a wheel with the delay of the wave, e^{-i j theta}."""
+    case = context.case
+    force = np.zeros(len(case.dofs), dtype=complex)
+    turn = 2j * np.pi * (context.analysis.nodal_diameter or 0) / (case.wheel.sectors if case.wheel else 1)
+    for dof, amplitude in forces(context).items():
+        for j, place in enumerate(case.places(dof)):
+            force[place] = amplitude * np.exp(-j * turn)
+    return force
+
+
 @dataclass
 class Excitation:
     """What the responses of all levels share.
@@ -63,16 +74,6 @@ class Excitation:
     def analysis(self) -> ForcedAnalysis:
         return self.context.analysis
 
-    def force(self) -> Complex:
-        """Amplitudes (n_dof,) [force] at level 1; on sector j of a wheel with the delay of the wave, e^{-i j theta}."""
-        case = self.context.case
-        force = np.zeros(len(case.dofs), dtype=complex)
-        turn = 2j * np.pi * (self.analysis.nodal_diameter or 0) / (case.wheel.sectors if case.wheel else 1)
-        for dof, amplitude in forces(self.context).items():
-            for j, place in enumerate(case.places(dof)):
-                force[place] = amplitude * np.exp(-j * turn)
-        return force
-
     @cached_property
     def observed(self) -> Observed:
         """As the problems take it. Collective the first time."""
@@ -86,7 +87,7 @@ class Excitation:
         return ForcedResponse(
             self.context.model,
             self.harmonics,
-            force={1: self.force()},
+            force={1: wave_of_forces(self.context)},
             level=level,
             dof=self.observed,
             reference=self.reference,
