@@ -110,7 +110,7 @@ def test_engine_orders_fold_into_forward_and_backward_waves():
 def test_force_on_a_sector_is_what_it_meets_in_the_flow(order, comm, tmp_path):
     """cos(r phi) at phi = j alpha - Omega t, or + Omega t where the rotor turns with the sectors' numbers."""
     from fretwave.analyses.parts.context import AnalysisContext
-    from fretwave.analyses.parts.excitation import Excitation
+    from fretwave.analyses.parts.excitation import wave_of_forces
     from fretwave.case.wheel import on_wheel
 
     path = tmp_path / "case.toml"
@@ -118,7 +118,7 @@ def test_force_on_a_sector_is_what_it_meets_in_the_flow(order, comm, tmp_path):
     case = load_case(path)
     analysis = case.analyses["forced"]
     context = AnalysisContext(None, on_wheel(case, analysis), analysis, comm, tmp_path, None)
-    force = Excitation(context, None, None, None).force().reshape(SECTORS, 2)
+    force = wave_of_forces(context).reshape(SECTORS, 2)
     assert not force[:, 0].any()
     t, speed = np.linspace(0, 1, 17)[:, None], 2.3
     place = 2 * np.pi * np.arange(SECTORS) / SECTORS - np.sign(order) * speed * t
