@@ -121,6 +121,16 @@ def test_grid_points_of_real_decks() -> None:
     assert nodes.coordinates.shape == (49, 3) and nodes.constraints.joins == "RBE2"
 
 
+@pytest.mark.parametrize("cards", ["CORD1R,9,1,2,3\nGRID,4,9,0.,0.,1.", "CORD1C,8,1,2,3,9,1,2,3\nGRID,4,9,0.,0.,1."])
+def test_a_system_that_points_define_is_refused_where_one_is_placed_by_it(tmp_path: Path, cards: str) -> None:
+    with pytest.raises(InputError, match=r"(?s)defined by grid points.*GRID 4 is given in system 9.*CORD2"):
+        read_node_file(deck(tmp_path, cards))
+
+
+def test_a_system_that_places_no_point_is_let_be(tmp_path: Path) -> None:
+    assert len(read_node_file(deck(tmp_path, "CORD1R,9,1,2,3")).numbers) == 3
+
+
 def test_defaults_of_grid_points_are_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="GRDSET"):
         read_node_file(deck(tmp_path, "GRDSET                                                          6"))

@@ -25,6 +25,8 @@ USUAL = {"K": ("KAA", "KXX", "KGG"), "M": ("MAA", "MXX", "MGG"), "C": ("BAA", "B
 #: Cards that make dofs depend on others.
 JOINS = r"(MPC|RBE[123]|RBAR1?|RROD|RJOINT|RSPLINE|RTRPLT1?|RSSCON)[ *,]"
 GRID = r"GRID[ *,]"
+#: Cards that tell up to two coordinate systems by the numbers of three grid points each.
+BY_POINTS = r"CORD1[RCS][ *,]"
 
 
 def read(path: Path, letter: str, variable: str | None = None) -> Entries:
@@ -57,7 +59,9 @@ def read_grid(path: Path) -> Nodes:
     """
     where = display(path)
     bulk = reader_of("pyyeti.nastran.bulk", "pyyeti", where)
-    _check_cards(bulk.rdcards(str(path), GRID, regex=True, return_var="list", no_data_return=[]), path)
+    grid = bulk.rdcards(str(path), GRID, regex=True, return_var="list", no_data_return=[])
+    _check_cards(grid, path)
+    _check_systems(grid, bulk.rdcards(str(path), BY_POINTS, regex=True, return_var="list", no_data_return=[]), where)
     table = bulk.bulk2uset(str(path))[0]
     places = table[["x", "y", "z"]].to_numpy(dtype=float).reshape(-1, 6, 3)  # behind x, y, z: system, origin, turn
     numbers = table.index.get_level_values(0).to_numpy(dtype=np.int64)[::6]
@@ -85,3 +89,13 @@ def _check_cards(cards: Sequence[Sequence[object]], path: Path) -> None:
     if cards and len(cards[-1]) < 5 and not ends:
         measured, fix = f"GRID {cards[-1][0]} ends behind {len(cards[-1])} fields, no ENDDATA", "write the deck again"
         raise InputError("the deck is cut within a grid point", where, measured, expected, fix)
+
+
+def _check_systems(grid: Sequence[Sequence[object]], cards: Sequence[Sequence[object]], where: str) -> None:
+    """A system that grid points define is not read: where another is placed by it, it is nowhere."""
+    systems = {number for card in cards for number in (card[0], *card[4:5]) if number}
+    for point in grid:
+        if len(point) > 1 and point[1] in systems:
+            measured = f"GRID {point[0]} is given in system {point[1]}, a CORD1 card"
+            expected, fix = "basic coordinates, or a CORD2R, CORD2C or CORD2S card", "write that system as a CORD2 card"
+            raise InputError("a coordinate system is defined by grid points", where, measured, expected, fix)
