@@ -9,32 +9,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import call
+from models.pad_beside_ground import KN, KT, MODEL, MU, N0, PAD, K
 from tolerances import SOLVED
 
 pytestmark = pytest.mark.ranks(1)
 LAP_JOINT = Path(__file__).parents[2] / "cases" / "lap_joint" / "case.toml"
 
-KN, KT, MU, N0 = 5.0, 4.0, 0.5, 2.0
-K = np.array([[3.0, 1.0], [1.0, 2.0]])
-CASE = f"""
-[model]
-dofs = ["x", "y"]
-M = [[1.0, 0.0], [0.0, 1.0]]
-K = {K.tolist()}
-
+CASE = f"""{MODEL}
 [preload]
 pair_loads = true
-
-[[contact]]
-name = "pad"
-law = "coulomb_2d"
-pairs = ["y"]
-tangents = ["x"]
-normal_stiffness = {KN}
-tangential_stiffness = {KT}
-friction_coefficient = {MU}
-normal_load = {N0}
-
+{PAD}
 [[analysis]]
 name = "mode"
 type = "mode"

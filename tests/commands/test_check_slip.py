@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import call
+from models.pad_beside_ground import KN, KT, MODEL, MU, N0, PAD, K
 
 pytestmark = pytest.mark.ranks(1, 2)
 CASES = Path(__file__).parents[2] / "cases"
@@ -15,25 +16,8 @@ LUMPED = CASES / "blisk_lumped" / "case.toml"
 NUMBER = r"([-+.e0-9]+)"
 PRINTED = 5e-3  #: three digits
 
-KT, KN, MU, N0 = 4.0, 5.0, 0.5, 2.0
-K, ZETA = np.array([[3.0, 1.0], [1.0, 2.0]]), 0.01
-FORCED = f"""
-[model]
-dofs = ["x", "y"]
-M = [[1.0, 0.0], [0.0, 1.0]]
-K = {K.tolist()}
-C = [[0.05, 0.0], [0.0, 0.08]]
-
-[[contact]]
-name = "pad"
-law = "coulomb_2d"
-pairs = ["y"]
-tangents = ["x"]
-normal_stiffness = {KN}
-tangential_stiffness = {KT}
-friction_coefficient = {MU}
-normal_load = {N0}
-
+FORCED = f"""{MODEL}C = [[0.05, 0.0], [0.0, 0.08]]
+{PAD}
 [[analysis]]
 name = "forced"
 type = "forced"

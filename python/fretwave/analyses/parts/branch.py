@@ -84,6 +84,7 @@ def step_control(step: StepSection) -> StepControl:
     return StepControl(**step.model_dump())
 
 
+@event("FwRecord")
 def record(
     writer: AnalysisWriter,
     problem: HarmonicProblem,
@@ -106,19 +107,6 @@ def record(
     dict
         The row as written.
     """
-    with event("FwRecord"):
-        return _recorded(writer, problem, point, snapshot, extra, describe, errors)
-
-
-def _recorded(
-    writer: AnalysisWriter,
-    problem: HarmonicProblem,
-    point: Point,
-    snapshot: Mapping[str, Any] | None,
-    extra: Mapping[str, Any],
-    describe: Describe | None,
-    errors: bool,
-) -> dict[str, Any]:
     from ... import _core
     from ...solve.follow import row_of
 
