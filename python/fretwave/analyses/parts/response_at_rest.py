@@ -16,7 +16,6 @@ from ...case.harmonic import nodal_diameter
 from ...case.observed import label_of, unit_of
 from ...errors import InputError
 from ...model.laws import OPEN
-from ...model.modes import LinearMode
 from ...model.sectors import by_sector
 from .at_rest import (
     NO_LIMIT,
@@ -36,6 +35,7 @@ from .rest import loaded_state
 from .wheel_start import nearest_modes, tuned_sector
 
 if TYPE_CHECKING:
+    from ...model.modes import LinearMode
     from ...model.sectors import Term
     from ..forced import ForcedAnalysis
     from .context import AnalysisContext
@@ -62,6 +62,8 @@ class Linear:
 
     def response(self, omega: float) -> LinearMode:
         """At a frequency, level 1, as a motion."""
+        from ...model.modes import LinearMode
+
         Z = sp.csc_matrix(self.K + 1j * omega * self.C - omega**2 * self.M)
         X = scipy.sparse.linalg.spsolve(Z, self.P)
         return LinearMode(omega, 0.0, X.real.copy(), X.imag.copy())
