@@ -24,6 +24,9 @@ const Tuned reach("error_reach", 0.3, "arclength by which the branch is followed
 const Tuned bent("error_bent", 0.2,
                  "residual that a step leaves along that which it is made for, from which it is taken anew");
 
+const Tuned held("error_held_means", 1e-4,
+                 "share of the stuck stiffness in which estimates hold the mean of the motion");
+
 /// Whether it is so for the contacts of all ranks.
 template <class Predicate>
 bool all_laws(model::Model const& model, Predicate is) {
@@ -49,6 +52,7 @@ std::unique_ptr<HarmonicProblem> refined(HarmonicProblem const& problem, std::ve
     throw InputError("the problem has no discretisation to be refined", "a way to another problem",
                      "a nonlinear mode or a forced response", "estimate the error of its goal");
   out->terms().multiply_exactly();  // an error is a small difference
+  out->hold_means(held);
   return out;
 }
 

@@ -135,6 +135,12 @@ void Residual::transposed_contact_product(Group& group, PairTangents const& tang
   add_force(group, F, dQ);
 }
 
+/// What `hold_means` adds to a pair's stiffness.
+double Residual::holding(Group const& group, int pair, int component) const {
+  if (harmonics_.orders()[0] != 0 || harmonics_.count() == 1) return 0;
+  return held_ * std::min(group.contact->law->stuck_stiffness(component, pair), most_held_);
+}
+
 // dV = s dU + ds U: the velocity's coefficients are s U (Laxalde et al. 2008, step 1 of the AFT)
 void Residual::contact_product(Group& group, Vec dQ, Exponents const* de, Vec dR) {
   static const log::Event products("FwContactJacob");
@@ -153,7 +159,11 @@ void Residual::contact_product(Group& group, Vec dQ, Exponents const* de, Vec dR
       multiply(harmonics_, de->s, U.data(), share.data(), columns);
       for (size_t k = 0; k < share.size(); ++k) group.dV[k] += share[k];
     }
-    group.aft.product(dU_array.data(), group.dV.data(), WriteArray(dF).data());
+    const WriteArray F(dF);
+    group.aft.product(dU_array.data(), group.dV.data(), F.data());
+    const int d = group.contact->law->components(), m = harmonics_.block_size();
+    for (int k = 0; k < columns; ++k)
+      F[size_t(k) * m] += holding(group, k / d, k % d) * dU_array[size_t(k) * m];
   }
   add_force(group, dF, dR);
 }

@@ -46,6 +46,10 @@ class Residual {
   void evaluate(Vec Q, Exponents const& e, Vec R);
   /// Products take dense stiffness without its rounding from now on, as residuals do.
   void multiply_exactly() { exactly_ = true; }
+  /// Linearised contacts have this share of their stuck stiffness, or of `most` [force/length] where that is
+  /// less, more in the mean of the motion from now on: friction that slips all through the period holds no
+  /// mean, and a body that nothing else holds makes the system singular. Not in statics, where means are all.
+  void hold_means(double share, double most) { held_ = share, most_held_ = most; }
   /// dR for (dQ, de) at the last evaluated point; dQ or de may be null. Collective.
   void product(Vec dQ, Exponents const* de, Vec dR);
 
@@ -128,6 +132,7 @@ class Residual {
   std::vector<VecHandle> relative_motions(Vec Q) const;  ///< of all contacts. Collective.
   void add_force(Group const&, Vec F, Vec R) const;
   void contact_product(Group&, Vec dQ, Exponents const* de, Vec dR);
+  double holding(Group const&, int pair, int component) const;
   void transposed_contact_product(Group&, PairTangents const&, Vec dR, Vec dQ);
   void find_weights(Group&);
   void turn(int row_phase, int col_phase, double* block) const;
@@ -141,6 +146,7 @@ class Residual {
   VecHandle Q_;  ///< copy of the last evaluated point (the callers' vectors are not ours to keep)
   Exponents e_;
   bool exactly_ = false;
+  double held_ = 0, most_held_ = 0;     ///< of `hold_means`
   std::vector<PairTangents> tangents_;  ///< of transposed products, at the last evaluated point
 };
 

@@ -52,6 +52,9 @@ std::vector<PairTangents> Residual::pair_tangents() {
       const size_t ld = size_t(d) * harmonics_.block_size();
       out.push_back({pairs, d, group.weights, std::vector<double>(pairs * ld * ld)});
       group.aft.blocks(e_, out.back().D.data());
+      for (size_t row = 0; row < size_t(d) * pairs; ++row)
+        out.back().D[row * harmonics_.block_size() * ld + row % d * harmonics_.block_size()] +=
+            holding(group, int(row) / d, int(row) % d);
       if (fault::value("contact tangents") && !out.back().D.empty()) out.back().D[0] = std::nan("");
     }
   });
