@@ -6,14 +6,10 @@
 
 #include "error.h"
 #include "text.h"
-#include "tuned.h"
 
 namespace fretwave::hb {
 
 namespace {
-
-const Tuned held_means("held_means", 1e-8,
-                       "share of the stuck stiffness in which Newton's systems hold the mean of the motion");
 
 /// PETSc counts unknowns in PetscInt.
 model::Model const& countable(model::Model const& model, Harmonics const& h) {
@@ -36,8 +32,7 @@ HarmonicProblem::HarmonicProblem(model::Model const& model, Harmonics const& h, 
       scalars_(scalars),
       row_(std::move(row)),
       local_block_(model.local_dofs() * h.block_size()),
-      stiffness_(reference_stiffness),
-      held_(held_means) {
+      stiffness_(reference_stiffness) {
   if (row_.empty())
     throw InputError("the row to be normalised or observed is zero", "no entry", "one at least",
                      "give a row");
@@ -126,7 +121,7 @@ void HarmonicProblem::linearise(Vec y) {
   if (linearised_at(y)) return;
   linearised_in_ = 0;  // until all of it is done
   unpack(y);
-  residual_.hold_means(held_, stiffness_);
+  residual_.hold_means_up_to(stiffness_);
   residual_.evaluate(Q_, motion_.exponents, R_);
   check(VecAXPBYPCZ(R_, -motion_.load, -1, 1, excitation_, at_rest_.load()));
   check(VecScale(R_, 1 / (stiffness_ * motion_.amplitude)));

@@ -58,9 +58,6 @@ class HarmonicProblem : public solve::Problem {
   /// Structure and contact, whose laws all problems of the model share. What is read from them beside r is in
   /// diagnostics.h.
   Residual& terms() { return residual_; }
-  /// Linear systems hold the mean of the motion at contacts by this share of their stuck stiffness, or of
-  /// `stiffness_scale` where that is less (Residual::hold_means).
-  void hold_means(double share) { held_ = share; }
   AtRest& at_rest() { return at_rest_; }
   /// To be set before a solver is made.
   Unfolding& unfolding() { return unfolding_; }
@@ -109,7 +106,7 @@ class HarmonicProblem : public solve::Problem {
   int scalars_;
   Row row_;
   PetscInt local_block_;
-  double stiffness_, held_;
+  double stiffness_;
   VecHandle q_, Q_, dQ_, R_, dR_, excitation_, last_;
   std::vector<VecHandle> columns_;  ///< of the scalars at `last_`, each once it has been asked for
   /// At the point of linearisation: the unit of the rows (0: there is none), the states of laws and of what
