@@ -186,6 +186,14 @@ def test_analyses_without_a_state_at_rest_end_as_their_run_does(tmp_path: Path, 
     assert "no static equilibrium" in said and "dof y most" in said
 
 
+def test_a_frequency_that_rounding_hides_is_no_rigid_motion(capfd) -> None:
+    """Contact 3e9 times as stiff as the mesh: what is said of a structure that nothing holds is not all."""
+    assert call("check", LAP_JOINT, "--only", "rest", "--set", "contact.joint.normal_stiffness=1e15") == 2
+    out, err = capfd.readouterr()
+    assert "far stiffer than the structure" in out and "rounding of stiff contact hides" in out
+    assert "rounding of the stiff contact hides what does" in err and "normal_stiffness 1e+15 N/mm" in err
+
+
 def test_on_two_ranks_as_on_one(launch) -> None:
     told = []
     for ranks in (1, 2):

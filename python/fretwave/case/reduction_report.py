@@ -97,6 +97,8 @@ class ReductionReport:
                 f"; the lowest {len(self.relative)} frequencies with stuck contact, {self.full_hz[0]:.6g} to"
                 f" {self.full_hz[-1]:.6g} Hz, are off by {self.relative[0]:.1e} (first) to {worst:.1e} (worst)"
             )
+            if not all(self.full_hz):
+                text += "; 0 Hz is a rigid motion, or one that the rounding of stiff contact hides"
         return text
 
 
