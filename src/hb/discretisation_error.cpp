@@ -52,7 +52,7 @@ std::unique_ptr<HarmonicProblem> refined(HarmonicProblem const& problem, std::ve
     throw InputError("the problem has no discretisation to be refined", "a way to another problem",
                      "a nonlinear mode or a forced response", "estimate the error of its goal");
   out->terms().multiply_exactly();  // an error is a small difference
-  out->terms().hold_means(held);
+  out->terms().hold_means(held, out->stiffness_scale());
   return out;
 }
 

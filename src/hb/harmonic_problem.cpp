@@ -121,7 +121,6 @@ void HarmonicProblem::linearise(Vec y) {
   if (linearised_at(y)) return;
   linearised_in_ = 0;  // until all of it is done
   unpack(y);
-  residual_.hold_means_up_to(stiffness_);
   residual_.evaluate(Q_, motion_.exponents, R_);
   check(VecAXPBYPCZ(R_, -motion_.load, -1, 1, excitation_, at_rest_.load()));
   check(VecScale(R_, 1 / (stiffness_ * motion_.amplitude)));

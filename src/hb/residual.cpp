@@ -7,19 +7,11 @@
 #include "fault.h"
 #include "log.h"
 #include "together.h"
-#include "tuned.h"
 
 namespace fretwave::hb {
 
-namespace {
-
-const Tuned held_means("held_means", 1e-10,
-                       "share of the stuck stiffness in which linear systems hold the mean of the motion");
-
-}  // namespace
-
 Residual::Residual(model::Model const& model, Harmonics const& h)
-    : model_(model), harmonics_(h), stiffness_(model, h), Q_(vector()), held_share_(held_means) {
+    : model_(model), harmonics_(h), stiffness_(model, h), Q_(vector()) {
   for (auto const& contact : model.contacts()) {
     groups_.push_back({.contact = &contact,
                        .maps = {},
@@ -143,10 +135,14 @@ void Residual::transposed_contact_product(Group& group, PairTangents const& tang
   add_force(group, F, dQ);
 }
 
-/// What `hold_means` adds to a pair's stiffness.
+/// What `hold_means` adds to a pair's stiffness: where there is friction, along it.
 double Residual::holding(Group const& group, int pair, int component) const {
-  if (harmonics_.orders()[0] != 0 || harmonics_.count() == 1) return 0;
-  return held_share_ * std::min(group.contact->law->stuck_stiffness(component, pair), stiffness_held_to_);
+  contact::Law const& law = *group.contact->law;
+  if (held_share_ == 0 || harmonics_.orders()[0] != 0 || harmonics_.count() == 1 || component == law.normal())
+    return 0;
+  const contact::LinearPair friction = law.linear_pair(pair);
+  if (!(friction.friction_coefficient > 0 || friction.friction_limit > 0)) return 0;
+  return held_share_ * std::min(law.stuck_stiffness(component, pair), stiffness_held_to_);
 }
 
 // dV = s dU + ds U: the velocity's coefficients are s U (Laxalde et al. 2008, step 1 of the AFT)

@@ -46,11 +46,10 @@ class Residual {
   void evaluate(Vec Q, Exponents const& e, Vec R);
   /// Products take dense stiffness without its rounding from now on, as residuals do.
   void multiply_exactly() { exactly_ = true; }
-  /// Linearised contacts have a share of their stuck stiffness, or of `stiffness` [force/length] where that
-  /// is less, more in the mean of the motion: friction that slips all through the period holds no mean, and a
-  /// body that nothing else holds makes the system singular. Not in statics, where means are all.
-  void hold_means(double share) { held_share_ = share; }
-  void hold_means_up_to(double stiffness) { stiffness_held_to_ = stiffness; }
+  /// Linearised friction has this share of its stuck stiffness, or of `most` [force/length] where that is
+  /// less, more in the mean of the motion from now on: what slips all through the period holds no mean, and a
+  /// body that nothing else holds makes the linear system singular.
+  void hold_means(double share, double most) { held_share_ = share, stiffness_held_to_ = most; }
   /// dR for (dQ, de) at the last evaluated point; dQ or de may be null. Collective.
   void product(Vec dQ, Exponents const* de, Vec dR);
 
@@ -147,7 +146,7 @@ class Residual {
   VecHandle Q_;  ///< copy of the last evaluated point (the callers' vectors are not ours to keep)
   Exponents e_;
   bool exactly_ = false;
-  double held_share_, stiffness_held_to_ = 0;
+  double held_share_ = 0, stiffness_held_to_ = 0;
   std::vector<PairTangents> tangents_;  ///< of transposed products, at the last evaluated point
 };
 
