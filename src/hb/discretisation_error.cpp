@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numeric>
 
 #include "error.h"
@@ -87,25 +88,26 @@ VecHandle DiscretisationError::retained(Vec r) const {
   return embedded(problem_, *finer_, embedded(*finer_, problem_, r));
 }
 
+namespace {
+
+/// -v where v and `out` have entries both: one of them has the closing row.
+VecHandle negated(Vec v, VecHandle out) {
+  const PetscInt n = std::min(local_size(v), local_size(out));
+  const ReadArray in(v);
+  const WriteArray written(out);
+  std::transform(in.data(), in.data() + n, written.data(), std::negate());
+  return out;
+}
+
+}  // namespace
+
 /// -r, and zero in the closing row.
 VecHandle DiscretisationError::right_side(Vec r) const {
-  VecHandle b = solve::zero_like(finer_->unknowns());
-  const PetscInt n = local_size(r);
-  const ReadArray in(r);
-  const WriteArray out(b);
-  std::transform(in.data(), in.data() + n, out.data(), [](double v) { return -v; });
-  return b;
+  return negated(r, solve::zero_like(finer_->unknowns()));
 }
 
 /// The inverse: r of -r.
-VecHandle DiscretisationError::left_side(Vec b) const {
-  VecHandle r = finer_->equations();
-  const PetscInt n = local_size(r);
-  const ReadArray in(b);
-  const WriteArray out(r);
-  std::transform(in.data(), in.data() + n, out.data(), [](double v) { return -v; });
-  return r;
-}
+VecHandle DiscretisationError::left_side(Vec b) const { return negated(b, finer_->equations()); }
 
 VecHandle DiscretisationError::closing_row(Vec y, Vec tangent) {
   VecHandle weights = problem_.unknowns();
