@@ -79,10 +79,17 @@ std::vector<ContactEntry> own_entries(std::vector<ContactEntry> const& all, Mode
   return own;
 }
 
-/// K_s^-1 B^T, into columns of this rank's dofs. Collective.
-void contact_motions(StaticFactor const& factor, std::vector<ContactEntry> const& own, PetscInt rows,
-                     double* to) {
-  const size_t local = size_t(factor.local_dofs());
+/// u += B x of columns of this rank's dofs.
+void add_relative_motion(std::vector<ContactEntry> const& own, double const* x, size_t lead, size_t columns,
+                         double* u, size_t rows) {
+  for (size_t j = 0; j < columns; ++j)
+    for (ContactEntry const& e : own) u[j * rows + e.row] += e.value * x[j * lead + e.dof];
+}
+
+/// B K_s^-1 B^T. Collective.
+std::vector<double> contact_compliance(StaticFactor const& factor, std::vector<ContactEntry> const& own,
+                                       PetscInt rows, MPI_Comm comm) {
+  std::vector<double> G(size_t(rows) * rows, 0.0);
   for (PetscInt first = 0; first < rows; first += columns_at_once) {
     const PetscInt columns = std::min(rows - first, columns_at_once);
     const MatHandle B = dense_columns(factor.stiffness(), columns),
@@ -98,37 +105,13 @@ void contact_motions(StaticFactor const& factor, std::vector<ContactEntry> const
     factor.solve(B, X);
     check(MatDenseGetLDA(X, &lead));
     check(MatDenseGetArrayRead(X, &found));
-    for (PetscInt j = 0; j < columns; ++j)
-      std::copy_n(found + size_t(j) * lead, local, to + size_t(first + j) * local);
+    add_relative_motion(own, found, size_t(lead), size_t(columns), G.data() + size_t(first) * rows,
+                        size_t(rows));
     check(MatDenseRestoreArrayRead(X, &found));
   }
+  sum_over_ranks(G, comm);
+  return G;
 }
-
-/// B x of columns of this rank's dofs, rows of all ranks' pairs. Collective.
-std::vector<double> relative_motions(std::vector<ContactEntry> const& own, size_t rows, double const* x,
-                                     size_t local, size_t columns, MPI_Comm comm) {
-  std::vector<double> u(rows * columns, 0.0);
-  for (size_t j = 0; j < columns; ++j)
-    for (ContactEntry const& e : own) u[j * rows + e.row] += e.value * x[j * local + e.dof];
-  sum_over_ranks(u, comm);
-  return u;
-}
-
-/// Columns by their new order, in place: `order[j]` goes to j.
-void permute(double* columns, size_t local, std::vector<int> order) {
-  for (size_t j = 0; j < order.size(); ++j) {
-    size_t from = size_t(order[j]);
-    while (from < j) from = size_t(order[from]);  // where an earlier exchange has put it
-    std::swap_ranges(columns + j * local, columns + (j + 1) * local, columns + from * local);
-  }
-}
-
-/// P^T D G D P = L L^T by pivots down to a small one, D = k^(1/2): the columns found.
-struct PivotedCholesky {
-  std::vector<int> order;
-  int rank = 0;
-  std::vector<double> scale, L;
-};
 
 PivotedCholesky pivoted(std::vector<double> G, std::vector<double> const& stiffness) {
   const int n = int(stiffness.size());
@@ -149,7 +132,7 @@ PivotedCholesky pivoted(std::vector<double> G, std::vector<double> const& stiffn
 
 std::pair<double, double> StuckBasis::size_with_factor(double dofs, double rows) {
   const double modes = std::min(double(lowest), dofs);
-  return {rows * (2 * rows + modes), dofs * (rows + modes)};
+  return {rows * (2 * rows + modes), dofs * (modes + 2 * columns_at_once)};
 }
 
 std::unique_ptr<StuckBasis> StuckBasis::with_factor(Model const& model) {
@@ -167,43 +150,61 @@ std::unique_ptr<StuckBasis> StuckBasis::with_factor(Model const& model) {
   out->theta_ = lowest_modes(*factor, M, count, out->exactly_);
   if (out->theta_.empty()) return nullptr;
   out->modes_ = int(out->theta_.size()), out->local_ = int(model.local_dofs()), out->dofs_ = model.dofs();
-  out->factor_ = std::move(factor);
-  out->add_static(contact_entries(model), model);
+  out->factor_ = std::move(factor), out->own_ = own_entries(contact_entries(model), model);
+  out->add_static(model.comm());
   return too_stiff(out->motions_, out->stiffness_) ? nullptr : std::move(out);
 }
 
 // With W = K_s^-1 B^T and U = B Phi: of what W moves beside the modes, W - Phi U^T, the contact sees G = B W
-// - U U^T = L L^T, so that (W - Phi U^T) L^-T are of unit stiffness and move it by L.
-void StuckBasis::add_static(std::vector<ContactEntry> const& all, Model const& model) {
-  const auto own = own_entries(all, model);
-  const size_t local = size_t(local_), r = stiffness_.size();
-  const int rows = int(r), k = modes_, lead = std::max(1, local_);
-  exactly_.resize(local * (size_t(k) + r));
-  double* W = exactly_.data() + local * size_t(k);
-  contact_motions(*factor_, own, rows, W);
-  motions_ = relative_motions(own, r, exactly_.data(), local, size_t(k), model.comm());
-  auto G = relative_motions(own, r, W, local, r, model.comm());
+// - U U^T, P^T D G D P = L L^T, so that (W - Phi U^T) P D L_1^-T are of unit stiffness and move it by D^-1 P
+// L, with L_1 the triangle that L begins with.
+void StuckBasis::add_static(MPI_Comm comm) {
+  const size_t r = stiffness_.size();
+  const int rows = int(r), k = modes_;
+  motions_.assign(r * size_t(k), 0.0);
+  add_relative_motion(own_, exactly_.data(), size_t(local_), size_t(k), motions_.data(), r);
+  sum_over_ranks(motions_, comm);
+  auto G = contact_compliance(*factor_, own_, rows, comm);
   lapack::multiply("NT", {rows, rows, k}, -1.0, {motions_.data(), rows}, {motions_.data(), rows}, 1.0,
                    G.data(), rows);
-  const auto found = pivoted(std::move(G), stiffness_);
-  permute(W, local, found.order);
-  exactly_.resize(local * size_t(k + found.rank));
-  W = exactly_.data() + local * size_t(k);
-  std::vector<double> taken(size_t(found.rank) * size_t(k));  // U of those rows
-  for (int l = 0; l < k; ++l)
-    for (int j = 0; j < found.rank; ++j) taken[size_t(l) * found.rank + j] = motions_[l * r + found.order[j]];
-  lapack::multiply("NT", {local_, found.rank, k}, -1.0, {exactly_.data(), local_}, {taken.data(), found.rank},
-                   1.0, W, lead);
-  for (int j = 0; j < found.rank; ++j)
-    for (size_t i = 0; i < local; ++i) W[j * local + i] *= found.scale[found.order[j]];
-  const double one = 1;
-  if (local_ && found.rank)
-    dtrsm_("R", "L", "T", "N", &local_, &found.rank, &one, found.L.data(), &rows, W, &local_);
-  motions_.resize(r * size_t(k + found.rank));
-  for (int j = 0; j < found.rank; ++j)
+  triangle_ = pivoted(std::move(G), stiffness_);
+  auto const& [order, rank, scale, L] = triangle_;
+  motions_.resize(r * size_t(k + rank));
+  for (int j = 0; j < rank; ++j)
     for (int i = j; i < rows; ++i)
-      motions_[size_t(k + j) * r + found.order[i]] = found.L[size_t(j) * r + i] / found.scale[found.order[i]];
-  theta_.resize(size_t(k + found.rank), 0.0);
+      motions_[size_t(k + j) * r + order[i]] = L[size_t(j) * r + i] / scale[order[i]];
+  theta_.resize(size_t(k + rank), 0.0);
+}
+
+/// Behind the modes' Phi^T x: L_1^-1 D P^T (B K_s^-1 x - U Phi^T x).
+void StuckBasis::static_forces(double const* moved, int coefficients, double* g) const {
+  const int c = coefficients, k = modes_, r = rows();
+  auto const& [order, rank, scale, L] = triangle_;
+  std::vector<double> u(size_t(c) * r, 0.0);
+  for (ContactEntry const& e : own_)
+    for (int i = 0; i < c; ++i) u[size_t(e.row) * c + i] += e.value * moved[size_t(e.dof) * c + i];
+  lapack::multiply("NT", {c, r, k}, -1.0, {g, c}, {motions_.data(), r}, 1.0, u.data(), c);
+  double* out = g + size_t(c) * k;
+  for (int j = 0; j < rank; ++j)
+    for (int i = 0; i < c; ++i) out[size_t(j) * c + i] = scale[order[j]] * u[size_t(order[j]) * c + i];
+  const double one = 1;
+  dtrsm_("R", "L", "T", "N", &c, &rank, &one, L.data(), &r, out, &c);
+}
+
+/// q = K_s^-1 B^T f of static motions g, f = P D L_1^-T g, and what they are short of along the modes: modal
+/// -= U^T f. Collective.
+void StuckBasis::static_motion(double const* g, int coefficients, double* modal, double* q) const {
+  const int c = coefficients, k = modes_, r = rows();
+  auto const& [order, rank, scale, L] = triangle_;
+  std::vector<double> v(g, g + size_t(c) * rank), f(size_t(c) * r, 0.0), b(size_t(c) * local_, 0.0);
+  const double one = 1;
+  dtrsm_("R", "L", "N", "N", &c, &rank, &one, L.data(), &r, v.data(), &c);
+  for (int j = 0; j < rank; ++j)
+    for (int i = 0; i < c; ++i) f[size_t(order[j]) * c + i] = scale[order[j]] * v[size_t(j) * c + i];
+  lapack::multiply("NN", {c, k, r}, -1.0, {f.data(), c}, {motions_.data(), r}, 1.0, modal, c);
+  for (ContactEntry const& e : own_)
+    for (int i = 0; i < c; ++i) b[size_t(e.dof) * c + i] += e.value * f[size_t(e.row) * c + i];
+  factor_->solve(b.data(), c, q);
 }
 
 }  // namespace fretwave::model

@@ -140,10 +140,14 @@ std::vector<double> StuckBasis::diagonal(Mat A) const {
   return out;
 }
 
-void StuckBasis::forces(double const* x, int coefficients, double* g) const {
+void StuckBasis::forces(double const* x, int coefficients, double* g, double* moved) const {
   const int c = coefficients;
   if (factor_) {
-    lapack::multiply("NN", {c, size(), local_}, 1.0, {x, c}, {exactly_.data(), local_}, 0.0, g, c);
+    std::vector<double> other(moved ? 0 : size_t(c) * local_);
+    if (!moved) moved = other.data();
+    factor_->solve(x, c, moved);
+    lapack::multiply("NN", {c, modes_, local_}, 1.0, {x, c}, {exactly_.data(), local_}, 0.0, g, c);
+    static_forces(moved, c, g);
     return;
   }
   const std::vector<float> in(x, x + size_t(c) * local_);
@@ -156,7 +160,9 @@ void StuckBasis::forces(double const* x, int coefficients, double* g) const {
 void StuckBasis::motion(double const* g, int coefficients, double* q) const {
   const int c = coefficients;
   if (factor_) {
-    lapack::multiply("NT", {c, local_, size()}, 1.0, {g, c}, {exactly_.data(), local_}, 0.0, q, c);
+    std::vector<double> modal(g, g + size_t(c) * modes_);
+    static_motion(g + modal.size(), c, modal.data(), q);
+    lapack::multiply("NT", {c, local_, modes_}, 1.0, {modal.data(), c}, {exactly_.data(), local_}, 1.0, q, c);
     return;
   }
   const std::vector<float> in(g, g + size_t(c) * size());
@@ -166,6 +172,9 @@ void StuckBasis::motion(double const* g, int coefficients, double* q) const {
   std::ranges::copy(out, q);
 }
 
-double StuckBasis::flops() const { return 4 * dofs_ * size() + (factor_ ? 4 * factor_->entries() : 0); }
+double StuckBasis::flops() const {
+  if (!factor_) return 4 * dofs_ * size();
+  return 4 * dofs_ * modes_ + 2 * double(rows()) * rows() + 8 * factor_->entries();
+}
 
 }  // namespace fretwave::model

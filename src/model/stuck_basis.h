@@ -13,6 +13,13 @@ struct ContactEntry {
   double value;
 };
 
+/// P^T D G D P = L L^T of a Gram matrix by pivots down to a small one: of `rank` columns L, as long as G.
+struct PivotedCholesky {
+  std::vector<int> order;
+  int rank = 0;
+  std::vector<double> scale, L;  ///< D
+};
+
 /// Motions Psi of unit stiffness with all pairs stuck, K_s = K + B^T k B: Psi^T K_s Psi = 1 and Psi^T M Psi =
 /// diag(theta), theta = 1 / omega^2 descending. In this one real basis the dynamic stiffness is diagonal at
 /// every harmonic and every point while all pairs stick. Its modes are sought as M phi = theta K_s phi: the
@@ -20,8 +27,9 @@ struct ContactEntry {
 ///
 /// Either it is all modes, or (`with_factor`) the lowest ones, and behind them what forces on the contact
 /// move beside these, K_s^-1 B^T made K_s-orthogonal to all before, whose inertia is left out (theta = 0):
-/// static corrections (MacNeal 1971; attachment modes, Craig 1977). What any other force moves beside those
-/// is static too, (K_s^-1 - Psi Psi^T) f by a factor of K_s, and moves no contact.
+/// static corrections (MacNeal 1971; attachment modes, Craig 1977). Of those the factor of K_s and a triangle
+/// are held, and no motion. What any other force moves beside them is static too, (K_s^-1 - Psi Psi^T) f by
+/// that factor, and moves no contact.
 class StuckBasis {
  public:
   /// All modes. None if there are none: K or M without symmetry, with phases or of a wheel, a law without a
@@ -44,9 +52,10 @@ class StuckBasis {
   std::vector<double> const& motions() const { return motions_; }
   /// Diagonal of Psi^T A Psi of a term that is neither K nor M, over the modes. Collective.
   std::vector<double> diagonal(Mat A) const;
-  /// g = Psi^T x of coefficients, innermost, of this rank's dofs: its share.
-  void forces(double const* x, int coefficients, double* g) const;
-  /// q = Psi g.
+  /// g = Psi^T x of coefficients, innermost, of this rank's dofs: its share. With a factor K_s^-1 x as well,
+  /// if it is asked for; then collective.
+  void forces(double const* x, int coefficients, double* g, double* moved = nullptr) const;
+  /// q = Psi g, by the factor where there is one: then collective.
   void motion(double const* g, int coefficients, double* q) const;
   /// Of K_s where the basis is not all there is.
   StaticFactor const* factor() const { return factor_.get(); }
@@ -55,15 +64,20 @@ class StuckBasis {
 
  private:
   bool solve(std::vector<double> K, std::vector<double>& M, size_t first, size_t local);
-  void add_static(std::vector<ContactEntry> const&, Model const&);
+  void add_static(MPI_Comm);
+  void static_forces(double const* moved, int coefficients, double* g) const;
+  void static_motion(double const* g, int coefficients, double* modal, double* q) const;
 
   int modes_ = 0, local_ = 0;
   double dofs_ = 0;
   std::vector<double> stiffness_, theta_, motions_;
   std::vector<float> shapes_;  ///< Psi of this rank's dofs, column-major, where it is whole
-  std::vector<double>
-      exactly_;  ///< with a factor: stiff elements, 1e8 times the first mode, outdo single ones
+  /// With a factor: the modes (stiff elements, 1e8 times the first mode, outdo single ones) and static
+  /// motions.
+  std::vector<double> exactly_;
   std::unique_ptr<StaticFactor> factor_;
+  std::vector<ContactEntry> own_;  ///< of B, by this rank's dofs
+  PivotedCholesky triangle_;
 };
 
 /// Of all ranks' contacts, rank by rank, contact by contact.

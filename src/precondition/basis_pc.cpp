@@ -179,11 +179,10 @@ std::vector<float> BasisPreconditioner::own(double const* blocks, std::vector<in
 std::vector<double> BasisPreconditioner::forces(Vec x) {
   const ReadArray in(x);
   std::vector<double> g(size_t(m_) * n_ + scalars_, 0.0);
-  basis_.forces(in.data(), m_, g.data());
+  if (basis_.factor()) static_motion_.resize(size_t(m_) * local_);
+  basis_.forces(in.data(), m_, g.data(), static_motion_.data());
   if (rank_ == size_ - 1) std::copy_n(in.data() + size_t(local_) * m_, scalars_, g.end() - scalars_);
   if (basis_.factor()) {
-    static_motion_.resize(size_t(m_) * local_);
-    basis_.factor()->solve(in.data(), m_, static_motion_.data());
     const int offset = problem_.harmonics().offset(problem_.harmonics().fundamental());
     for (int dof = 0; dof < local_; ++dof)
       for (int v = 0; v < 2 * scalars_; ++v)
