@@ -22,7 +22,7 @@ struct Point {
   VecHandle y, tangent;
   double parameter = 0, step = 0;
   Outcome outcome;
-  std::string event;  ///< "", start, stop, report, fold or the name of a test function
+  std::string event;  ///< "", start, stop, report, report stop, fold or the name of a test function
   double wall = 0;    ///< seconds since the point before
 };
 
@@ -140,6 +140,7 @@ class Continuation {
   void reach(double value, std::string const& event, Place a, Place b, Hermite const&, double length);
   void polish(Trial&, double target);
   std::optional<Trial> reach_along(double target, Place a, Place b, Hermite const&);
+  std::string stop_event(double end) const;
   void locate_values(Trial const& end, Hermite const&, double length);
   void emit(Trial&&, double at, std::string event);
   void miss(std::string const& what, std::string const& why);

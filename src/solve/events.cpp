@@ -66,7 +66,7 @@ std::string Continuation::events_of_corner(Trial const& end) {
   const double from = last_entry(anchor_.y), to = last_entry(end.y);
   const auto pass = [&](double value, std::string const& event) {
     const double target = problem_.parameter_entry(value);
-    if ((from < target) == (to < target) || (event == "stop" && from == target)) return;
+    if ((from < target) == (to < target) || (event != "report" && from == target)) return;
     Trial trial = at(copy(std::abs(to - target) < std::abs(from - target) ? Vec(end.y) : Vec(anchor_.y)));
     set_last_entry(trial.y, target);
     if (correct(trial, parameter_row_, target, row_))
@@ -74,8 +74,9 @@ std::string Continuation::events_of_corner(Trial const& end) {
     else
       miss(event + " at " + problem_.parameter_text(value), trial.outcome.reason);
   };
-  for (double value : report_at_) pass(value, "report");
-  pass(low_, "stop"), pass(high_, "stop");
+  for (double value : report_at_)
+    if (value != low_ && value != high_) pass(value, "report");
+  pass(low_, stop_event(low_)), pass(high_, stop_event(high_));
   return found;
 }
 
@@ -137,20 +138,29 @@ void Continuation::locate_values(Trial const& end, Hermite const& curve, double 
     for (auto const& [where, point] : batch_)
       if (where == at && point.event == "fold") places.push_back({at, last_entry(point.y)});
   places.push_back({length, last_entry(end.y)});
+  const bool begins = taken_over_ || anchor_.index == 1;
   const auto each = [&](double value, std::string const& event, bool outside) {
     const double target = problem_.parameter_entry(value);
     for (size_t i = 0; i + 1 < places.size(); ++i) {
       const double from = places[i].value, to = places[i + 1].value;
       if ((from < target) == (to < target) || from == to) continue;
       if (outside && i == 0 && from == target) continue;  // the branch starts here
-      if (taken_over_ && i == 0 && std::abs(from - target) <= value_error * std::max(1.0, std::abs(target)))
+      if (begins && i == 0 && std::abs(from - target) <= value_error * std::max(1.0, std::abs(target)))
         continue;  // met already
       reach(value, event, places[i], places[i + 1], curve, length);
     }
   };
-  for (double value : report_at_) each(value, "report", false);
-  if (places.back().value <= problem_.parameter_entry(low_) || folds_.size()) each(low_, "stop", true);
-  if (places.back().value >= problem_.parameter_entry(high_) || folds_.size()) each(high_, "stop", true);
+  for (double value : report_at_)
+    if (value != low_ && value != high_) each(value, "report", false);
+  if (places.back().value <= problem_.parameter_entry(low_) || folds_.size())
+    each(low_, stop_event(low_), true);
+  if (places.back().value >= problem_.parameter_entry(high_) || folds_.size())
+    each(high_, stop_event(high_), true);
+}
+
+/// An end of the range that is reported as well is one point.
+std::string Continuation::stop_event(double end) const {
+  return std::ranges::find(report_at_, end) == report_at_.end() ? "stop" : "report stop";
 }
 
 /// The branch at a given parameter between two places of the step.

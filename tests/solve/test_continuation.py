@@ -131,6 +131,16 @@ def test_reported_and_stop_values_are_met_exactly(two_dof, comm):
     assert points[-1].parameter == pytest.approx(HIGH, rel=LAST_BIT)
 
 
+@pytest.mark.parametrize("upwards", [True, False])
+def test_ends_that_are_reported_as_well_are_one_point_each(two_dof, comm, upwards):
+    """The branch starts at one of them, and stops at the other."""
+    given = {"start": LOW if upwards else 0.1, "stop": (LOW, 0.1), "upwards": upwards}
+    _, plain = follow(problem_of(two_dof, comm), **given)
+    _, points = follow(problem_of(two_dof, comm), report_at=[LOW, 0.1], **given)
+    assert [p.parameter for p in points] == [p.parameter for p in plain]
+    assert [p.event for p in points] == [*(p.event for p in plain[:-1]), "report stop"]
+
+
 @pytest.mark.parametrize("maximum", [0.3, pytest.param(0.02, marks=pytest.mark.ranks(1))])
 def test_amplitude_between_the_folds_is_reported_on_each_of_the_three_sheets(two_dof, comm, maximum):
     """a = 0.1343 is passed upwards, back, and upwards again; zeta grows all along."""

@@ -199,7 +199,7 @@ class WornMode(Destroyable):
         found = None
         for point in branch:
             point.tangent.destroy()
-            if point.event == "report":
+            if "report" in point.event.split():
                 found = point.y
                 break
         branch.destroy()
