@@ -11,6 +11,7 @@
 #include "fault.h"
 #include "model/eigenproblem.h"
 #include "model/lowest_pairs.h"
+#include "model/mode_orientation.h"
 #include "together.h"
 
 namespace fretwave::model {
@@ -70,9 +71,42 @@ bool is_new(LinearMode& mode, std::vector<LinearMode> const& found) {
   return square(mode) > 1e-4;
 }
 
+/// Motions that K leaves free, and the frequency of the first that it does not [rad/s].
+struct Free {
+  PetscInt motions = 0;
+  double first = 0;
+};
+
+Free free_motions(Operators const& terms) {
+  if (!symmetric(terms[0])) return {};
+  PetscInt size;
+  check(MatGetSize(terms[0], &size, nullptr));
+  const double scale = trace_ratio(terms[0], terms[2]);
+  const Pencil pencil = {.K = terms[0],
+                         .M = terms[2],
+                         .size = size,
+                         .constraints = 0,
+                         .shift = -1e-8 * scale,
+                         .rounding = rounding(terms[0], terms[2])};
+  Free out;
+  for (PetscInt count = 1; count <= size; count = std::max(count + 1, std::min(2 * count, size))) {
+    const auto pairs = lowest_beside_zero(pencil, count);
+    const auto is_free = [&](EigenPair const& pair) {
+      return pair.value < 1e-9 * scale && pair.value < uncertainty(terms[0], pair.vector);
+    };
+    const auto first = std::find_if_not(pairs.begin(), pairs.end(), is_free);
+    out.motions = PetscInt(first - pairs.begin());
+    if (first != pairs.end()) out.first = std::sqrt(std::max(first->value, 0.0));
+    if (first != pairs.end() || PetscInt(pairs.size()) < count) break;
+  }
+  return out;
+}
+
 /// The oscillating modes next to zero of (K + s C + s^2 M) phi = 0, known to a share of `scale` [rad/s]
-/// (zero: SLEPc's choice, by the norms of the matrices).
-std::vector<LinearMode> oscillating(Model const& model, Operators const& terms, int count, double scale) {
+/// (zero: SLEPc's choice, by the norms of the matrices). Where K leaves motions free they are sought from the
+/// right of zero, where the matrix is regular.
+std::vector<LinearMode> oscillating(Model const& model, Operators const& terms, int count, double scale,
+                                    Free const& free) {
   const bool travelling = model.travelling();
   const int copies = travelling ? 2 : 1;
   PepHandle pep;
@@ -84,11 +118,12 @@ std::vector<LinearMode> oscillating(Model const& model, Operators const& terms, 
   check(PEPSetType(pep, PEPTOAR));
   check(PEPSetScale(pep, PEP_SCALE_SCALAR, scale > 0 ? scale : PETSC_DECIDE, nullptr, nullptr, PETSC_DECIDE,
                     PETSC_DECIDE));
-  check(PEPSetDimensions(pep, copies * std::min<PetscInt>(2 * count + 4, 2 * model.dofs()), PETSC_DEFAULT,
-                         PETSC_DEFAULT));
+  check(PEPSetDimensions(
+      pep, std::min<PetscInt>(copies * (2 * count + 4) + 2 * free.motions, 2 * copies * model.dofs()),
+      PETSC_DEFAULT, PETSC_DEFAULT));
   check(PEPSetTolerances(pep, tolerance, 1000));
   check(PEPSetWhichEigenpairs(pep, PEP_TARGET_MAGNITUDE));
-  check(PEPSetTarget(pep, 0));
+  check(PEPSetTarget(pep, free.motions ? free.first : 0));
   ST st;
   check(PEPGetST(pep, &st));
   shift_invert(st);
@@ -105,11 +140,13 @@ std::vector<LinearMode> oscillating(Model const& model, Operators const& terms, 
     double re, im;
     check(PEPGetEigenpair(pep, k, &re, &im, x, y));
     if (!(im > 1e-9 * std::hypot(re, im))) continue;  // the conjugate, or an overdamped motion
+    if (free.motions && std::hypot(re, im) < 1e-5 * free.first) continue;  // a double zero, but for rounding
     LinearMode mode{im, -re, {}, {}};
     take_shape(model, terms, x, y, mode);
     if (!travelling || is_new(mode, modes)) modes.push_back(std::move(mode));
   }
-  if (reason < 0 && PetscInt(modes.size()) < std::min<PetscInt>(count, model.dofs()))
+  const PetscInt all = model.dofs() - free.motions / copies;
+  if (reason < 0 && PetscInt(modes.size()) < std::min<PetscInt>(count, all))
     throw PetscFailure("damped linear modes: " + std::to_string(modes.size()) + " of " +
                        std::to_string(count) + " converged; raise -modes_pep_max_it or -modes_pep_ncv");
   return modes;
@@ -136,7 +173,8 @@ std::vector<LinearMode> damped_modes(Model const& model, int count) {
     check(MatZeroEntries(matrices[1]));
   }
   const Operators terms = operators(model.comm(), std::move(matrices));
-  auto modes = oscillating(model, terms, count, 0);
+  const Free free = free_motions(terms);
+  auto modes = oscillating(model, terms, count, 0, free);
   const size_t last = std::min(modes.size(), size_t(count));
   double highest = 0;
   for (size_t k = 0; k < last; ++k) highest = std::max(highest, std::hypot(modes[k].omega, modes[k].beta));
@@ -144,7 +182,7 @@ std::vector<LinearMode> damped_modes(Model const& model, int count) {
   for (double scale : {highest, 2 * highest, highest / 2}) {
     if (!(scale > 0) || highest > norms / far) break;
     try {
-      return oscillating(model, terms, count, scale);
+      return oscillating(model, terms, count, scale, free);
     } catch (PetscFailure const&) {
       // LAPACK may fail on the last directions of a small problem; by another scale it does not
     }

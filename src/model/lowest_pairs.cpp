@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "model/inertia.h"
+#include "model/mode_orientation.h"
 
 namespace fretwave::model {
 
@@ -180,6 +181,28 @@ std::vector<EigenPair> lowest_pairs(Pencil const& pencil, PetscInt count) {
     wanted = std::min(missing + beyond, pencil.size - PetscInt(found.size()));
   }
   if (missing > 0) name_missing(missing, lambda);
+  return found;
+}
+
+std::vector<EigenPair> lowest_beside_zero(Pencil pencil, PetscInt count) {
+  const double far = 100 * std::abs(pencil.shift);
+  auto found = lowest_pairs(pencil, count);
+  const auto wanted = found.begin() + std::min<std::ptrdiff_t>(count, std::ssize(found));
+  const auto elastic =
+      std::find_if(found.begin(), wanted, [&](auto const& pair) { return pair.value > far; });
+  const PetscInt soft = PetscInt(elastic - found.begin());
+  if (soft == 0) return found;
+  EigenPair const& last = *(elastic - 1);
+  const double stiffest = last.value < uncertainty(pencil.K, last.vector) ? 0 : last.value;
+  if (elastic != wanted) {
+    pencil.shift = -elastic->value;
+    found = lowest_pairs(pencil, count);
+  }
+  if (stiffest > 0) {
+    pencil.shift = -stiffest;
+    auto again = lowest_pairs(pencil, soft);
+    std::move(again.begin(), again.begin() + soft, found.begin());
+  }
   return found;
 }
 

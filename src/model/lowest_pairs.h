@@ -28,6 +28,12 @@ struct Pencil {
 /// `PetscFailure` names what is still missing then. Collective.
 std::vector<EigenPair> lowest_pairs(Pencil const&, PetscInt count);
 
+/// The lowest pairs of a pencil, whose shift lies just below zero in the scale of the stiffest dof. Rigid
+/// motions next to it make the inverse so large that its rounding spoils the shapes far above them, and of
+/// motions all softer than it no more is known than a share of it: both kinds are found again from as far
+/// below zero as the first of their kind, or the last, lies above. Collective.
+std::vector<EigenPair> lowest_beside_zero(Pencil, PetscInt count);
+
 /// The `count` eigenvalues nearest to a shift amid the spectrum, ascending; likewise counted, within their
 /// distance of the shift. Collective.
 std::vector<EigenPair> nearest_pairs(Pencil const&, PetscInt count);

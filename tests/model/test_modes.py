@@ -159,6 +159,18 @@ def test_soft_motions_beside_stiff_contact_are_exact(comm, stiffness, count):
     np.testing.assert_allclose([mode.zeta for mode in damped], 0.005 * exact, rtol=1 / stiffness + SOLVED)
 
 
+@pytest.mark.parametrize("contact", [1e2, 1e5, 1e9, 1e13, 1e18, np.inf])
+@pytest.mark.parametrize("unit", [1.0, 1e9])
+def test_stuck_contact_however_stiff_keeps_all_digits(comm, contact, unit):
+    """1 on a spring of 1, and 2 behind contact: w^2 = 2 / (b + (b^2 - 8 / k)^(1/2)), b = 3 + 2 / k."""
+    stiffness = {"tangential_stiffness": unit * contact, "friction_limit": 1.0}
+    pair = friction([[1.0, -1.0]]) if np.isinf(contact) else fw.Contact("jenkins", [[1.0, -1.0]], stiffness)
+    model = fw.Model(unit * np.diag([1.0, 2.0]), unit * np.diag([1.0, 0.0]), None, [pair], comm)
+    b = 3 + 2 / contact
+    exact = np.sqrt(2 / (b + np.sqrt(b**2 - 8 / contact)))
+    assert fw.linear_modes(model, 1, "stuck")[0].omega == pytest.approx(exact, rel=ROUNDING)
+
+
 def test_double_mode_is_found_twice(comm):
     """Ring of masses: nodal diameters 1 and 2 come as pairs, 2 sqrt(k/m) sin(pi ND / n) above the ground spring."""
     n = 6
@@ -181,6 +193,18 @@ def check_quadratic_modes(modes, M, C, K):
 def test_damped_modes_are_those_of_the_state_matrix(comm):
     """(K + s C + s^2 M) phi = 0 against the eigenvalues of the first-order form."""
     check_quadratic_modes(fw.linear_modes(fw.Model(M3, K3, C3, comm=comm), 3, "linearised"), M3, C3, K3)
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.01])
+@pytest.mark.parametrize("count", [1, 2])
+def test_damped_modes_beside_a_free_motion(comm, damping, count):
+    """Three masses that nothing holds: s^2 + damping w^2 s + w^2 = 0 with w = 1 and 3^(1/2), and no third."""
+    K = np.array([[1.0, -1.0, 0.0], [-1.0, 2.0, -1.0], [0.0, -1.0, 1.0]])
+    for asked in (count, 3):
+        modes = fw.linear_modes(fw.Model(np.eye(3), K, damping * K, comm=comm), asked, "linearised")
+        w = np.sqrt([1.0, 3.0])[: min(asked, 2)]
+        np.testing.assert_allclose([m.beta for m in modes], damping / 2 * w**2, atol=SOLVED)
+        np.testing.assert_allclose([m.omega for m in modes], w * np.sqrt(1 - (damping / 2 * w) ** 2), rtol=SOLVED)
 
 
 def test_friction_at_rest_is_a_viscous_damper(comm):
