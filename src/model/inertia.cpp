@@ -33,7 +33,7 @@ void expect_factorised(KSP ksp) {
     throw PetscFailure("the stiffness could not be factorised: MUMPS INFOG(1) = " + std::to_string(code));
 }
 
-KspHandle symmetric_factor(Mat A, std::string const& prefix) {
+KspHandle symmetric_factor(Mat A, std::string const& prefix, PetscInt room) {
   KspHandle ksp;
   PC pc;
   MPI_Comm comm;
@@ -49,6 +49,7 @@ KspHandle symmetric_factor(Mat A, std::string const& prefix) {
   check(PCFactorSetUpMatSolverType(pc));
   const Mat factor = factor_of(ksp);
   check(MatMumpsSetIcntl(factor, 13, 1));  // no ScaLAPACK root, or its pivots are not counted
+  check(MatMumpsSetIcntl(factor, 14, room));
   check(MatMumpsSetIcntl(factor, 24, 1));
   check(MatMumpsSetCntl(factor, 3, null_pivot));
   check(KSPSetFromOptions(ksp));
@@ -71,7 +72,7 @@ PetscInt count_below(Mat K, Mat M, double lambda, std::string const& prefix) {
   MatHandle A;
   check(MatDuplicate(K, MAT_COPY_VALUES, A.out()));
   check(MatAXPY(A, -lambda, M, DIFFERENT_NONZERO_PATTERN));
-  return negative_pivots(symmetric_factor(A, prefix));
+  return negative_pivots(symmetric_factor(A, prefix, delayed_pivots));
 }
 
 }  // namespace fretwave::model

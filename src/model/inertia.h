@@ -5,9 +5,12 @@
 
 namespace fretwave::model {
 
+/// Workspace beyond MUMPS' own estimate [%] for the pivots that an indefinite matrix delays.
+constexpr PetscInt delayed_pivots = 200;
+
 /// L D L^T of a symmetric matrix by MUMPS, which also counts negative and null pivots. `PetscFailure` where
-/// there is none. Collective.
-KspHandle symmetric_factor(Mat A, std::string const& prefix);
+/// there is none. `room`: workspace beyond the estimate [%]. Collective.
+KspHandle symmetric_factor(Mat A, std::string const& prefix, PetscInt room = 35);
 /// `PetscFailure` if the factorisation, or the solve just made with it, failed. Collective.
 void expect_factorised(KSP);
 PetscInt negative_pivots(KSP);

@@ -26,6 +26,19 @@ MPI_Comm comm_of(Mat A) {
   return comm;
 }
 
+/// For the pivots that an indefinite matrix delays.
+void make_room(ST st) {
+  KSP ksp;
+  PC pc;
+  Mat factor;
+  check(STGetOperator(st, nullptr));  // hands the operator to the KSP
+  check(STGetKSP(st, &ksp));
+  check(KSPGetPC(ksp, &pc));
+  check(PCFactorSetUpMatSolverType(pc));
+  check(PCFactorGetMatrix(pc, &factor));
+  check(MatMumpsSetIcntl(factor, 14, delayed_pivots));
+}
+
 struct Search {
   bool more, diverged;
 };
@@ -44,6 +57,7 @@ Search search(Pencil const& pencil, PetscInt count, Pairs& found) {
   check(EPSSetTarget(eps, pencil.shift));
   check(EPSGetST(eps, &st));
   shift_invert(st);
+  make_room(st);
   std::vector<Vec> known;
   for (auto const& pair : found) known.push_back(pair.vector);
   if (!known.empty()) check(EPSSetDeflationSpace(eps, PetscInt(known.size()), known.data()));

@@ -57,8 +57,7 @@ std::vector<LinearMode> undamped(Model const& model, int count, bool stuck, std:
     stiff.emplace(model, real_form(stiffness, model.theta(), travelling));
     for (auto const& contact : model.contacts())
       add_contact(stiffness, contact, [&](int component, int pair) {
-        const double k = contact.law->stuck_stiffness(component, pair);
-        return stiff->takes(k) ? 0 : k;
+        return stiff->takes(contact, component, pair) ? 0 : contact.law->stuck_stiffness(component, pair);
       });
   }
   const bool constrained = stiff && stiff->rows() > 0;

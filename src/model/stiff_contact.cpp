@@ -12,37 +12,68 @@ namespace {
 
 const Tuned far_stiffer(
     "modes_far_stiffer", 1e3,
-    "times the structure's largest stiffness, from which linear modes take contact by its "
-    "forces");
+    "times the structure's own stiffness, from which linear modes take contact by its forces");
 
-double largest_diagonal(Mat K) {
-  VecHandle d;
-  double largest;
-  check(MatCreateVecs(K, d.out(), nullptr));
-  check(MatGetDiagonal(K, d));
-  check(VecNorm(d, NORM_INFINITY, &largest));
-  return largest;
+MatHandle rows_of(Mat B, std::vector<PetscInt> const& rows) {
+  IsHandle rows_set, cols_set;
+  MatHandle out;
+  MPI_Comm comm;
+  PetscInt begin, end;
+  check(PetscObjectGetComm(reinterpret_cast<PetscObject>(B), &comm));
+  check(MatGetOwnershipRangeColumn(B, &begin, &end));
+  check(ISCreateGeneral(comm, PetscInt(rows.size()), rows.data(), PETSC_COPY_VALUES, rows_set.out()));
+  check(ISCreateStride(comm, end - begin, begin, 1, cols_set.out()));
+  check(MatCreateSubMatrix(B, rows_set, cols_set, MAT_INITIAL_MATRIX, out.out()));
+  return out;
+}
+
+/// The structure's own stiffness [force/length] at this rank's rows: k adds k b_j^2 to its K_jj. Collective.
+std::vector<double> stiffness_at(Mat B, Mat K) {
+  VecHandle diagonal;
+  MatHandle weighted;
+  check(MatCreateVecs(K, diagonal.out(), nullptr));
+  check(MatGetDiagonal(K, diagonal));
+  check(VecAbs(diagonal));
+  check(MatDuplicate(B, MAT_COPY_VALUES, weighted.out()));
+  check(MatDiagonalScale(weighted, nullptr, diagonal));
+  std::vector<double> bK;
+  for_entries(weighted, [&](PetscInt, PetscInt, double value) { bK.push_back(value); });
+  PetscInt rows, first;
+  check(MatGetLocalSize(B, &rows, nullptr));
+  check(MatGetOwnershipRange(B, &first, nullptr));
+  std::vector<double> own(static_cast<size_t>(rows)), size(own.size());
+  auto next = bK.begin();
+  for_entries(B, [&](PetscInt row, PetscInt, double b) {
+    own[size_t(row - first)] += b * *next++, size[size_t(row - first)] += b * b;
+  });
+  for (size_t row = 0; row < own.size(); ++row)  // one that touches no dof is none
+    own[row] = size[row] > 0 ? own[row] / (size[row] * size[row]) : INFINITY;
+  return own;
 }
 
 }  // namespace
 
-StiffContact::StiffContact(Model const& model, Mat K) : limit_(far_stiffer * largest_diagonal(K)) {
+StiffContact::StiffContact(Model const& model, Mat K) {
   std::vector<MatHandle> parts;
-  const int copies = model.travelling() ? 2 : 1;
+  const PetscInt copies = model.travelling() ? 2 : 1;
   for (auto const& contact : model.contacts()) {
+    const MatHandle B = real_form(maps_of(contact), model.theta(), model.travelling());
+    const auto own = stiffness_at(B, K);
     PetscInt begin, counts[2] = {};
-    check(MatGetOwnershipRange(contact.B, &begin, nullptr));
+    check(MatGetOwnershipRange(B, &begin, nullptr));
     std::vector<PetscInt> rows;
+    auto& taken = taken_[&contact];
     const int d = contact.law->components();
     for (int row = 0; row < d * contact.law->pairs(); ++row) {
       const double k = contact.law->stuck_stiffness(row % d, row / d);
-      if (!takes(k)) continue;
-      rows.push_back(begin + row);
-      compliance_.insert(compliance_.end(), copies, 1 / k);
-      counts[0] += copies, counts[1] += std::isinf(k) ? copies : 0;
+      taken.push_back(k > far_stiffer * own[size_t(row * copies)]);
+      for (PetscInt copy = 0; taken.back() && copy < copies; ++copy) {
+        rows.push_back(begin + row * copies + copy), compliance_.push_back(1 / k);
+        ++counts[0], counts[1] += std::isinf(k) ? 1 : 0;
+      }
     }
     MPI_Allreduce(MPI_IN_PLACE, counts, 2, MPIU_INT, MPI_SUM, model.comm());
-    if (counts[0] > 0) parts.push_back(map(model, contact, rows));
+    if (counts[0] > 0) parts.push_back(rows_of(B, rows));
     rows_ += counts[0], rigid_ += counts[1];
   }
   if (parts.size() == 1) B_ = std::move(parts[0]);
@@ -53,18 +84,8 @@ StiffContact::StiffContact(Model const& model, Mat K) : limit_(far_stiffer * lar
   check(MatConvert(nest, MATAIJ, MAT_INITIAL_MATRIX, B_.out()));
 }
 
-/// Those rows of B in real form.
-MatHandle StiffContact::map(Model const& model, Contact const& contact,
-                            std::vector<PetscInt> const& rows) const {
-  IsHandle rows_set, cols_set;
-  check(ISCreateGeneral(model.comm(), PetscInt(rows.size()), rows.data(), PETSC_COPY_VALUES, rows_set.out()));
-  check(ISCreateStride(model.comm(), model.local_dofs(), model.first_dof(), 1, cols_set.out()));
-  std::vector<PhasedMap> parts;
-  for (auto const& [B, phase] : maps_of(contact)) {
-    parts.push_back({{}, phase});
-    check(MatCreateSubMatrix(B, rows_set, cols_set, MAT_INITIAL_MATRIX, parts.back().B.out()));
-  }
-  return real_form(parts, model.theta(), model.travelling());
+bool StiffContact::takes(Contact const& contact, int component, int pair) const {
+  return taken_.at(&contact)[size_t(pair) * contact.law->components() + component];
 }
 
 void StiffContact::scale(Vec dofs) {

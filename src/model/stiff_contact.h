@@ -1,4 +1,5 @@
 #pragma once
+#include <map>
 #include <vector>
 
 #include "model/model.h"
@@ -16,8 +17,8 @@ class StiffContact {
  public:
   /// `K`: of the structure alone, in real form. Collective.
   StiffContact(Model const&, Mat K);
-  /// Whether a contact of that stiffness is among them.
-  bool takes(double stiffness) const { return stiffness > limit_; }
+  /// Whether that row of this rank's pairs is among them.
+  bool takes(Contact const&, int component, int pair) const;
   /// Of all ranks, in real form; and those of them that are rigid.
   PetscInt rows() const { return rows_; }
   PetscInt rigid() const { return rigid_; }
@@ -29,9 +30,8 @@ class StiffContact {
 
  private:
   MatHandle saddle(Mat A, double scale) const;
-  MatHandle map(Model const&, Contact const&, std::vector<PetscInt> const& rows) const;
 
-  double limit_ = 0;
+  std::map<Contact const*, std::vector<bool>> taken_;  ///< of this rank's rows
   PetscInt rows_ = 0, rigid_ = 0;
   MatHandle B_;
   std::vector<double> compliance_;  ///< 1/k of this rank's rows

@@ -98,7 +98,7 @@ class ReductionReport:
                 f" {self.full_hz[-1]:.6g} Hz, are off by {self.relative[0]:.1e} (first) to {worst:.1e} (worst)"
             )
             if not all(self.full_hz):
-                text += "; 0 Hz is a rigid motion, or one that the rounding of stiff contact hides"
+                text += "; 0 Hz is a rigid motion"
         return text
 
 

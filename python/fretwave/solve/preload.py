@@ -50,7 +50,15 @@ class StaticPreload(HarmonicProblem):
         self, model: Model, load: Array, reference: LinearMode, constant: Array | None = None, prefix: str = "static_"
     ) -> None:
         if not reference.omega > 0:
-            raise _unmeasured(model, reference)
+            load_name = own_load(model.contacts)
+            by = f" ({load_name})" if load_name else ""
+            raise InputError(
+                "the mode that forces are measured by is a rigid motion: nothing holds the structure at rest",
+                None,
+                f"{reference.omega:g} rad/s{suspects(model.contacts, None, model.units)}",
+                "an elastic mode",
+                f"load the contact{by}, hold the structure, or take a mode with closed contact",
+            )
         self.stiffness = stiffness = reference.omega**2 / float(np.sum(reference.shape**2))
         size = (float(np.linalg.norm(load)) or stiffness) / stiffness
         self.force_scale, self.size = stiffness * size, size
@@ -156,23 +164,6 @@ def static_preload(
         + suspects(model.contacts, problem.stiffness, model.units),
         "1",
         "hold the structure where contact alone cannot (an axial stop), or lower the load",
-    )
-
-
-def _unmeasured(model: Model, reference: LinearMode) -> InputError:
-    """No frequency: a rigid motion, or one that the rounding of stiff contact hides. Collective."""
-    diagonal = model._matrices[0].getDiagonal()
-    extreme = suspects(model.contacts, float(diagonal.max()[1]) or None, model.units)
-    diagonal.destroy()
-    load_name = own_load(model.contacts)
-    by = f" ({load_name})" if load_name else ""
-    return InputError(
-        "the mode that forces are measured by is a rigid motion: nothing holds the structure at rest"
-        + (", or rounding of the stiff contact hides what does" if "softer contact" in extreme else ""),
-        None,
-        f"{reference.omega:g} rad/s{extreme}",
-        "an elastic mode",
-        f"load the contact{by}, hold the structure, or take a mode with closed contact",
     )
 
 
