@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -28,7 +29,7 @@ from ..importers.units import Evidence, check_declared, evidence_of
 from ..model.pairs import Pairs
 from ..model.structure import Structure
 from ..mpi.guard import on_first_rank
-from ..results.model_file import SourceFile, write_model
+from ..results.model_file import DIRECTIONS, SourceFile, write_model
 from ..texts import display, nearest
 from ..units import SYSTEMS, unknown
 from .import_at_rest import tables_at_rest, write_tables
@@ -44,7 +45,7 @@ def import_model(options: argparse.Namespace, comm: MPI.Comm) -> int:
     model, found, materials = on_first_rank(comm, lambda: read_parts(options))
     loaded = on_first_rank(comm, lambda: tables_at_rest(options, model, found.notes))
     evidence = on_first_rank(comm, lambda: _checked_units(model, materials))
-    report = check(model, found.symmetry, found.notes, evidence, options.modes, comm)
+    report = check(model, found.symmetry, found.notes, evidence, options.modes, comm, found.warnings)
     on_first_rank(comm, lambda: write_model(options.out, model, sources=_sources(options)))
     on_first_rank(comm, lambda: write_tables(loaded, model))
     if comm.rank == 0:
@@ -184,12 +185,17 @@ def _node_by_node(found: Assembled, nodes: Nodes) -> IntArray:
 
 
 def _read_table(path: Path) -> IntArray:
-    """CalculiX' ``node.direction``, or a CSV of ``node,direction``."""
+    """CalculiX' ``node.direction``, or a CSV of ``node,direction``, the direction a number or x, y, z."""
     if not path.is_file():
         raise InputError("the table of dofs does not exist", display(path), fix="check the path")
-    if "," not in path.read_text(encoding="utf-8"):
+    if not re.search("[,;]", path.read_text(encoding="utf-8", errors="replace")):
         return read_dofs(path)
-    return whole(columns_of(path, 2), display(path))
+    return whole(columns_of(path, 2, {1: _direction}), display(path))
+
+
+def _direction(word: str) -> float:
+    name = word.strip().strip('"').lower()
+    return DIRECTIONS.index(name) + 1 if name in DIRECTIONS else float(word)
 
 
 def _names(known: Sequence[str], given: list[str]) -> tuple[list[str], dict[str, int]]:

@@ -17,7 +17,7 @@ from ..arrays import IntArray
 from ..errors import InputError
 from ..texts import display
 from .entries import Entries
-from .text import columns_of, triplets
+from .text import columns_of, doubt_of_end, triplets
 
 SUFFIXES = (".sti", ".mas")
 
@@ -25,6 +25,7 @@ SUFFIXES = (".sti", ".mas")
 def read(path: Path) -> Entries:
     """A matrix with the node and direction of its rows, when ``job.dof`` stands beside it."""
     entries = triplets(columns_of(path, 3), display(path), "CalculiX")
+    entries.doubt = doubt_of_end(path)
     beside = path.with_suffix(".dof")
     if beside.is_file():
         entries.labels = read_dofs(beside)
@@ -34,7 +35,7 @@ def read(path: Path) -> Entries:
 
 def read_dofs(path: Path) -> IntArray:
     """``job.dof``: (n_dof, 2) node and direction. As text: 12.10 is not 12.1."""
-    words = path.read_text(encoding="utf-8").split()
+    words = path.read_text(encoding="utf-8-sig").split()
     parts = [word.partition(".") for word in words]
     if not all(node.lstrip("-").isdigit() and direction.isdigit() for node, _, direction in parts):
         wrong = next(w for w, (node, _, d) in zip(words, parts) if not (node.lstrip("-").isdigit() and d.isdigit()))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from codecs import BOM_UTF8
 from pathlib import Path
 
 from ..files.isolated import call_isolated
@@ -26,7 +27,7 @@ OTHERS = (b"PK\x03\x04", b"*")
 
 def read_node_file(path: Path) -> Nodes:
     """Coordinates and sets from a file of any of the forms; other packages read theirs in a process of its own."""
-    content = path.read_bytes() if path.is_file() else b""
+    content = path.read_bytes().removeprefix(BOM_UTF8) if path.is_file() else b""
     for known, module, function in KINDS if not content.startswith(OTHERS) else ():
         if known.search(content):
             found: Nodes = call_isolated(module, function, path, size=len(content))

@@ -229,7 +229,7 @@ def read_pairs(
     if not path.is_file():
         raise InputError("the file of pairs does not exist", where, fix="check the path; two names are two node sets")
     rows = []
-    for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
+    for number, line in enumerate(path.read_text(encoding="utf-8-sig").splitlines(), 1):
         if not first_data_line(line.encode()) or line.lower().lstrip().startswith("node"):
             continue  # blank, comment or heading
         words = [word.strip() for word in line.split(",")]

@@ -83,6 +83,7 @@ def check(
     evidence: Sequence[Evidence],
     modes: int,
     comm: MPI.Comm,
+    warnings: Sequence[str] = (),
 ) -> Report:
     """Everything that can be said without a law of contact. Collective.
 
@@ -96,8 +97,10 @@ def check(
         Of its units.
     modes : int
         Frequencies to show beside the rigid modes.
+    warnings : sequence of str
+        Of the import.
     """
-    report = Report()
+    report = Report(warnings=list(warnings))
     nodes = "" if model.labels is None else f" at {len(np.unique(model.labels[:, 0]))} nodes"
     inside = len(internal_nodes(model))
     more = f", {inside} of them inside elements (numbered beyond the mesh's)" if inside else ""
