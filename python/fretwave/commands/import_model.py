@@ -13,7 +13,7 @@ import numpy as np
 from ..arrays import Array, IntArray
 from ..case.plugins import load_file
 from ..errors import EXIT_DONE, InputError
-from ..importers.calculix import SUFFIXES, check_once, read_dofs
+from ..importers.calculix import SUFFIXES, beside, check_once, read_dofs
 from ..importers.directions import check_directions
 from ..importers.entries import Assembled, assemble
 from ..importers.exchanged import check_one_model
@@ -82,7 +82,6 @@ def read_parts(options: argparse.Namespace) -> tuple[Structure, Assembled, list[
     paths = {letter: getattr(options, role) for letter, role in ROLES.items() if getattr(options, role)}
     given = {letter: read_matrix(path, letter) for letter, path in paths.items()}
     found = assemble(given, options.symmetric)
-    check_one_model(found, " and ".join(display(paths[letter]) for letter in "MK"))
     nodes = None
     if options.coordinates:
         with readable(options.coordinates, "file of the nodes"):
@@ -90,6 +89,7 @@ def read_parts(options: argparse.Namespace) -> tuple[Structure, Assembled, list[
         nodes.coordinates = nodes.coordinates - (0.0 if options.origin is None else _three("--origin", options.origin))
     labels = _labels(options, found, nodes)
     found.labels = labels
+    check_one_model(found, " and ".join(display(paths[letter]) for letter in "MK"))
     names, dofs = _names(found.names, options.name)
     model = Structure(
         found.matrices["M"], found.matrices["K"], found.matrices.get("C"), dofs=dofs, names=names, labels=labels
@@ -114,10 +114,11 @@ def _take_deck(options: argparse.Namespace) -> None:
         options.out = deck.with_suffix(".h5")
         options.coordinates = options.coordinates or deck
         for role, suffix in (("mass", ".mas"), ("stiffness", ".sti")):
-            if getattr(options, role) is None and not (beside := deck.with_suffix(suffix)).is_file():
+            matrix = beside(deck, suffix)
+            if getattr(options, role) is None and not matrix.is_file():
                 fix = f"put *FREQUENCY, SOLVER=MATRIXSTORAGE into its step and run `ccx {deck.stem}` there"
-                raise InputError(f"the {role} matrix of the deck is missing", display(deck), display(beside), None, fix)
-            setattr(options, role, getattr(options, role) or str(deck.with_suffix(suffix)))
+                raise InputError(f"the {role} matrix of the deck is missing", display(deck), display(matrix), None, fix)
+            setattr(options, role, getattr(options, role) or str(matrix))
     for role in ("mass", "stiffness"):
         if getattr(options, role) is None:
             expected = "a file of the matrix, or CalculiX' deck in place of the model file"
@@ -131,8 +132,8 @@ def _sources(options: argparse.Namespace) -> list[SourceFile]:
     files += [(role, path) for role, path in tables if path]
     files += [("plugin", path) for path in options.plugin]
     files += [("pairs", Path(words[0].rpartition("=")[2])) for words in options.pairs if len(words) == 1]
-    beside = {path.with_suffix(".dof") for _, path in files if path.suffix.lower() in SUFFIXES}
-    files += [("dofs", path) for path in sorted(beside) if path.is_file()]
+    tables_beside = {beside(path, ".dof") for _, path in files if path.suffix.lower() in SUFFIXES}
+    files += [("dofs", path) for path in sorted(tables_beside) if path.is_file()]
     return [SourceFile.of(role, path) for role, path in files]
 
 

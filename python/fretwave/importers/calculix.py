@@ -22,14 +22,20 @@ from .text import columns_of, doubt_of_end, triplets
 SUFFIXES = (".sti", ".mas")
 
 
+def beside(path: Path, suffix: str) -> Path:
+    """The file of another suffix, which may stand in capitals."""
+    small, large = path.with_suffix(suffix), path.with_suffix(suffix.upper())
+    return large if large.is_file() and not small.is_file() else small
+
+
 def read(path: Path) -> Entries:
     """A matrix with the node and direction of its rows, when ``job.dof`` stands beside it."""
     entries = triplets(columns_of(path, 3), display(path), "CalculiX")
     entries.doubt = doubt_of_end(path)
-    beside = path.with_suffix(".dof")
-    if beside.is_file():
-        entries.labels = read_dofs(beside)
-        _check_size(entries, beside)
+    table = beside(path, ".dof")
+    if table.is_file():
+        entries.labels = read_dofs(table)
+        _check_size(entries, table)
     return entries
 
 
@@ -66,7 +72,7 @@ def check_once(labels: IntArray, where: str, fix: str) -> None:
         raise InputError("a dof stands twice in the table", where, measured, "each dof once", fix)
 
 
-def _check_size(entries: Entries, beside: Path) -> None:
+def _check_size(entries: Entries, table: Path) -> None:
     rows, named = entries.shape[0], len(entries.labels) if entries.labels is not None else 0
     if rows == named:
         return
@@ -74,7 +80,7 @@ def _check_size(entries: Entries, beside: Path) -> None:
     raise InputError(
         "the matrix is that of a nodal diameter" if cyclic else "the table of dofs does not fit the matrix",
         entries.where,
-        f"{rows} rows, {named} dofs in {display(beside)}",
+        f"{rows} rows, {named} dofs in {display(table)}",
         f"{named} rows",
         "export without *CYCLIC SYMMETRY MODEL"
         if cyclic

@@ -28,6 +28,7 @@ from ..model.laws import Role, usual_name
 from ..model.pairs import Pairs
 from ..model.sectors import by_sector
 from ..texts import counted, display, shortened
+from .calculix import beside
 from .keywords import blocks
 
 #: Components of the two blocks, 12 characters each behind the node's number.
@@ -92,21 +93,21 @@ def read_step(path: Path) -> StaticStep:
     InputError
         There is no contact, or a line of it is no line of values.
     """
-    beside = path.with_suffix(".dat")
-    text = beside.read_text(encoding="utf-8", errors="replace") if beside.is_file() else ""
-    found = _blocks(path) if path != beside else _printed(text)
+    printed = beside(path, ".dat")
+    text = printed.read_text(encoding="utf-8", errors="replace") if printed.is_file() else ""
+    found = _blocks(path) if path != printed else _printed(text)
     if "CONTACT" not in found:
         fix = "add `*CONTACT FILE` with a line `CDIS, CSTR` to the static step, run ccx again and give its .frd file"
         expected = "a block CONTACT of a .frd file written as text, or slave nodes in a .dat file"
         raise InputError("there is no contact in the results", display(path), "none", expected, fix)
     forces = {(one[1].upper(), one[2].upper()): -float(one[4]) for one in _STATISTICS.finditer(text)}
-    at_nodes = path == beside or (not forces and _at_nodes(path, found["CONTACT"].values))
+    at_nodes = path == printed or (not forces and _at_nodes(path, found["CONTACT"].values))
     return StaticStep(found["CONTACT"], found.get("DISP"), forces, display(path), at_nodes)
 
 
 def _at_nodes(path: Path, contact: Array) -> bool:
     """By the deck beside where all of its contact is of one kind, else by a node that is listed as open."""
-    deck = path.with_suffix(".inp")
+    deck = beside(path, ".inp")
     pairs = [options for keyword, options, _ in blocks(deck) if keyword == "CONTACT PAIR"] if deck.is_file() else []
     kinds = {options.get("TYPE", "").upper().startswith("NODE") for options in pairs}
     listed = bool(((contact[:, OPENING] > 0) & (contact[:, PRESSURE] <= 0)).any())
