@@ -220,3 +220,26 @@ def test_nodes_of_a_set_are_taken_once(tmp_path: Path) -> None:
     (tmp_path / "n.csv").write_text("1, 0, 0, 0\n1.5, 1, 0, 0\n")
     with pytest.raises(InputError, match="no whole number"):
         read_nodes(tmp_path / "n.csv")
+
+
+@pytest.mark.parametrize("cells", [(3, 2, 1), (12, 8, 4)], ids=["dense", "large"])
+@pytest.mark.parametrize("wrong", ["lumped", "motion", "stiffness", "sign"])
+def test_negative_mass_and_stiffness(
+    wrong: str, cells: tuple[int, int, int], tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """A lumped mass below zero, a mass that a motion has below zero, and stiffness of one dof or of all."""
+    bar = hexahedra.bar(cells, (0.06, 0.02, 0.01))
+    M, K = sp.csr_matrix(bar.M), sp.csr_matrix(bar.K)
+    one = sp.diags((np.arange(M.shape[0]) == 4).astype(float))
+    if wrong == "lumped":
+        lumped = sp.diags(np.asarray(M.sum(axis=1)).ravel())
+        M, said = lumped - 2 * lumped @ one, "the mass matrix has a negative diagonal entry"
+    elif wrong == "motion":  # two dofs that move against each other: m - 1.5 m
+        joined = sp.coo_matrix(([1.5 * M[4, 4]] * 2, ([4, 7], [7, 4])), shape=M.shape)
+        M, said = M + joined, "the mass matrix is negative for a motion"
+    else:
+        K = -K if wrong == "sign" else K - 2 * K[4, 4] * one
+        said = "the stiffness matrix has a negative diagonal entry"
+    parts = [write_npz(tmp_path, sp.csr_matrix(A), letter, np.zeros(0)) for letter, A in (("M", M), ("K", K))]
+    text = refused(["import", str(tmp_path / "m.h5"), "--mass", parts[0], "--stiffness", parts[1]], tmp_path, capfd)
+    assert said in text and "PETSc" not in text

@@ -14,6 +14,7 @@ from ..arrays import Array, IntArray
 from ..case.plugins import load_file
 from ..errors import EXIT_DONE, InputError
 from ..importers.calculix import SUFFIXES, beside, check_once, read_dofs
+from ..importers.definite import check_definite
 from ..importers.directions import check_directions
 from ..importers.entries import Assembled, assemble
 from ..importers.exchanged import check_one_model
@@ -89,11 +90,13 @@ def read_parts(options: argparse.Namespace) -> tuple[Structure, Assembled, list[
         nodes.coordinates = nodes.coordinates - (0.0 if options.origin is None else _three("--origin", options.origin))
     labels = _labels(options, found, nodes)
     found.labels = labels
-    check_one_model(found, " and ".join(display(paths[letter]) for letter in "MK"))
+    where = " and ".join(display(paths[letter]) for letter in "MK")
+    check_one_model(found, where)
     names, dofs = _names(found.names, options.name)
     model = Structure(
         found.matrices["M"], found.matrices["K"], found.matrices.get("C"), dofs=dofs, names=names, labels=labels
     )
+    check_definite(model, where)
     model.units = options.units
     if nodes is not None:
         model.node_numbers, model.coordinates = nodes.numbers, nodes.coordinates

@@ -18,8 +18,8 @@ from .entries import Assembled
 LEAST_RATIO = 1e-4
 #: Share of the pairs of nodes that M joins and K does not, and the other way, from which these are two models.
 STRANGE = 0.05
-#: The same of single dofs, where nodes are not known: a warning. Meshes along the axes have zeros in K where M has none,
-#: tetrahedra in nearly half of the places.
+#: The same of single dofs, where nodes are not known, from which it is a warning: meshes along the axes have zeros in K
+#: where M has none, tetrahedra in nearly half of the places.
 STRANGE_DOFS = 0.2
 
 
