@@ -77,16 +77,9 @@ def test_sides_far_apart(deck: bool, tmp_path: Path, capfd: pytest.CaptureFixtur
     pairs = ["--pairs", table(tmp_path, "1,0,0", ends[:6], ends[6:])]
     text = refused([*command, *pairs], tmp_path, capfd)
     assert "nodes of a pair are far apart" in text and "6 such" in text
+    assert "which is 1000 tolerances of" in text and "a pair may be 1000 of it apart" in text
     (fix,) = [line.split() for line in text.splitlines() if "fix:" in line]
     assert main([*command, *pairs, "--tolerance", fix[fix.index("--tolerance") + 1]]) == 0
-
-
-def test_nodes_beside_the_faces(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    """The second bar moved by half its width: one row of nodes hangs over."""
-    two = Two()
-    two.nodes[len(two.first.nodes) :, 1] += 0.005
-    text = refused([*two.write(tmp_path, True), *LEFT_RIGHT], tmp_path, capfd)
-    assert "do not lie on the second's faces" in text and "2 of 6 nodes" in text and "beside all faces" in text
 
 
 @pytest.mark.parametrize("labelled", [True, False])

@@ -21,7 +21,8 @@ from ..importers.exchanged import check_one_model
 from ..importers.formats import read_matrix, readable, split
 from ..importers.node_files import read_node_file
 from ..importers.nodes import Material, Nodes, cells_of
-from ..importers.pairs import NEXT, match, read_pairs
+from ..importers.pair_tables import read_pairs
+from ..importers.pairs import NEXT, match
 from ..importers.report import check
 from ..importers.sector import SectorFaces, make_sector, said_of, wheel_of
 from ..importers.surfaces import has_faces
