@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import gzip
+import subprocess
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 import scipy.io
 import scipy.sparse as sp
@@ -16,6 +19,7 @@ import fretwave as fw
 from fretwave.commands.main import main
 from fretwave.importers import assemble, read_matrix
 from fretwave.importers.node_files import read_node_file
+from fretwave.importers.pair_tables import read_pairs
 from fretwave.importers.text import doubt_of_end
 
 pytestmark = pytest.mark.ranks(1)
@@ -23,6 +27,17 @@ pytestmark = pytest.mark.ranks(1)
 K = sp.diags([[2.0] * 4 + [1.0], [-1.0] * 4, [-1.0] * 4], [0, 1, -1], format="csr") * 1e6
 BOM = b"\xef\xbb\xbf"
 BANNER = "%%MatrixMarket matrix coordinate real general\n"
+
+
+CASE = """
+[model]
+dofs = ["a", "b", "c", "d", "e"]
+M = "M.npz"
+K = "K.mtx"
+[[analysis]]
+name = "linear"
+type = "linear"
+"""
 
 
 def text_of(A: sp.spmatrix, form: str = "{} {} {:.6e}\n") -> str:
@@ -132,11 +147,37 @@ def test_marks_of_editors_in_columns(form: str, tmp_path: Path) -> None:
         assert (read(path) != K).nnz == 0
 
 
+@pytest.mark.parametrize("name", ["deck.bdf", "beam.cdb", "K.op4"])
+def test_marks_before_files_of_other_readers(name: str, tmp_path: Path) -> None:
+    """Which would not see their first line: a grid point of a deck was gone."""
+    text = {"deck.bdf": "GRID,1,,0.,0.,0.\nGRID,2,,1.,0.,0.\n", "beam.cdb": "NBLOCK,6,SOLID\n", "K.op4": "1 1\n"}[name]
+    (tmp_path / name).write_bytes(BOM + text.encode())
+    with pytest.raises(fw.InputError, match="begins with the mark of UTF-8") as caught:
+        read_matrix(str(tmp_path / name), "K") if name == "K.op4" else read_node_file(tmp_path / name)
+    subprocess.run((caught.value.fix or "").partition(": ")[2], shell=True, check=True)
+    assert (tmp_path / name).read_text() == text
+
+
+@pytest.mark.parametrize("form", ["nodes", "pairs"])
+def test_tables_that_are_cut(form: str, tmp_path: Path) -> None:
+    path = tmp_path / "table.csv"
+    if form == "nodes":
+        path.write_text("1, 1.25e-01, 0, 1.50e-02\n2, 1.25e-01, 0, 1.50")
+    else:
+        path.write_text("1,0,1.0,0,0,1.50e-06\n2,0,1.0,0,0,1.50e-0")
+    with pytest.raises(fw.InputError, match="the last line is cut"):
+        read_node_file(path) if form == "nodes" else read_pairs("contact", path, np.array([[1, 1], [2, 1]]))
+
+
 @pytest.mark.parametrize("option", ["--mass", "--stiffness", "--coordinates", "--dofs", "--pairs"])
 def test_files_that_are_no_plain_text(option: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     command, files = files_of_two(tmp_path)
     content = files[option].read_bytes()
-    for packed, fix in ((gzip.compress(content), "gunzip"), (content.decode().encode("utf-16"), "iconv")):
+    with zipfile.ZipFile(tmp_path / "packed.zip", "w") as archive:
+        archive.writestr(files[option].name, content)
+    zipped = (tmp_path / "packed.zip").read_bytes()
+    utf_16 = content.decode().encode("utf-16")
+    for packed, fix in ((gzip.compress(content), "gunzip"), (zipped, "unzip"), (utf_16, "iconv")):
         files[option].write_bytes(packed)
         assert main(command) == 2
         said = capfd.readouterr().err
@@ -174,3 +215,15 @@ def test_archives_of_ansys_by_another_name(name: str, tmp_path: Path) -> None:
     with pytest.raises(fw.InputError, match="another name") as caught:
         read_node_file(tmp_path / name)
     assert f"rename it to {Path(name).stem}.cdb" in (caught.value.fix or "")
+
+
+@pytest.mark.parametrize("banner", [BANNER.lower(), "\n" + BANNER])
+def test_a_case_reads_them_alike(banner: str, tmp_path: Path) -> None:
+    whole = f"{banner}5 5 {K.nnz}\n{text_of(K)}"
+    (tmp_path / "K.mtx").write_text(whole)
+    np.savez(tmp_path / "M.npz", M=np.eye(5))
+    (tmp_path / "case.toml").write_text(CASE)
+    assert (fw.load_case(tmp_path / "case.toml").structure.K != K).nnz == 0
+    (tmp_path / "K.mtx").write_text(whole[:-2])
+    with pytest.raises(fw.InputError, match="the last line is cut"):
+        fw.load_case(tmp_path / "case.toml")

@@ -14,7 +14,7 @@ from ..files.isolated import call_isolated
 from ..texts import display, names_beside, nearest
 from . import abaqus, ansys_full, calculix, matlab, matrix_market, nastran, npz, petsc_binary
 from .entries import Entries
-from .text import check_plain, head_of
+from .text import check_plain, check_unmarked, head_of
 
 HDF5 = b"\x89HDF\r\n\x1a\n"
 #: A function of path, letter and variable that gives `Entries`; a registered one may give a matrix.
@@ -58,6 +58,7 @@ def _ansys(path: Path, letter: str, variable: str | None) -> Entries:
 
 
 def _nastran(path: Path, letter: str, variable: str | None) -> Entries:
+    check_unmarked(path)
     found: Entries = call_isolated(nastran.__name__, "read", path, letter, variable, size=path.stat().st_size)
     return found
 

@@ -10,6 +10,7 @@ from ..files.isolated import call_isolated
 from . import ansys_mesh, nastran
 from .ansys_full import head_of
 from .nodes import Nodes, read_nodes
+from .text import check_unmarked
 
 #: How a file begins, or a line of it, that only this kind has; and its reader.
 KINDS = (
@@ -30,6 +31,7 @@ def read_node_file(path: Path) -> Nodes:
     content = path.read_bytes().removeprefix(BOM_UTF8) if path.is_file() else b""
     for known, module, function in KINDS if not content.startswith(OTHERS) else ():
         if known.search(content):
+            check_unmarked(path)
             found: Nodes = call_isolated(module, function, path, size=len(content))
             return found
     return read_nodes(path)

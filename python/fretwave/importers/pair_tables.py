@@ -13,7 +13,7 @@ from ..model.pairs import Pairs
 from ..texts import display
 from .nodes import Nodes
 from .pairs import FAR, Found, joined, reach_of
-from .text import first_data_line, whole
+from .text import doubt_of_end, first_data_line, whole
 
 
 def read_pairs(
@@ -41,6 +41,7 @@ def read_pairs(
     where = display(path)
     if not path.is_file():
         raise InputError("the file of pairs does not exist", where, fix="check the path; two names are two node sets")
+    doubt_of_end(path)  # a last number that was cut is refused
     rows = []
     for number, line in enumerate(path.read_text(encoding="utf-8-sig").splitlines(), 1):
         if not first_data_line(line.encode()) or line.lower().lstrip().startswith("node"):

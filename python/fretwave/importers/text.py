@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import codecs
 import re
+import zipfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -19,8 +20,10 @@ COMMENTS = ("*", "#", "%")
 SPARSEST = 10
 #: Bytes at a file's end, and lines there before the last, by which its last number is judged.
 TAIL, JUDGES = 4096, 8
+ZIP = b"PK\x03\x04"
 #: How files begin that are no plain text: what they are, and what to do.
 PACKED = {
+    ZIP: ("compressed (zip)", "unpack it: unzip {}"),
     b"\x1f\x8b": ("compressed (gzip)", "unpack it: gunzip {}"),
     b"BZh": ("compressed (bzip2)", "unpack it: bunzip2 {}"),
     b"\xfd7zXZ\x00": ("compressed (xz)", "unpack it: unxz {}"),
@@ -37,7 +40,7 @@ def head_of(path: Path, size: int = 65536) -> bytes:
 
 
 def check_plain(path: Path, what: str) -> None:
-    """A file is neither compressed nor in UTF-16.
+    """A file is neither compressed nor in UTF-16; a .npz, which is a zip archive of arrays, counts as plain.
 
     Raises
     ------
@@ -45,8 +48,31 @@ def check_plain(path: Path, what: str) -> None:
     """
     head = head_of(path, 8) if path.is_file() else b""
     for begin, (kind, fix) in PACKED.items():
-        if head.startswith(begin):
+        if head.startswith(begin) and not (begin == ZIP and _has_arrays(path)):
             raise InputError(f"the {what} cannot be read", display(path), kind, "plain", fix.format(display(path)))
+
+
+def _has_arrays(path: Path) -> bool:
+    """A zip archive has them, or is damaged, which its reader tells."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return any(name.endswith(".npy") for name in archive.namelist())
+    except (zipfile.BadZipFile, OSError, ValueError, NotImplementedError):
+        return True
+
+
+def check_unmarked(path: Path) -> None:
+    """A file that another package reads begins without the mark of UTF-8, which would hide its first line.
+
+    Raises
+    ------
+    InputError
+    """
+    with path.open("rb") as file:
+        if file.read(3) != codecs.BOM_UTF8:
+            return
+    fix = f"save it without: sed -i '1s/^\\xEF\\xBB\\xBF//' {display(path)}"
+    raise InputError("the file begins with the mark of UTF-8", display(path), "EF BB BF", "its first line", fix)
 
 
 def first_data_line(head: bytes) -> str:
@@ -67,6 +93,7 @@ def columns_of(path: Path, width: int, converters: Mapping[int | str, Callable[[
     ----------
     converters : what makes numbers of the words of a column
     """
+    doubt_of_end(path)  # a last number that was cut is refused
     head = head_of(path)
     above, first = _first_data(head)
     if ";" in first:
