@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import call
-from tolerances import SOLVED
+from tolerances import LAST_DIGITS, SOLVED
 
 import fretwave as fw
 
@@ -247,12 +247,18 @@ def test_printed_slave_nodes_say_the_same(tmp_path):
     for suffix in (".frd", ".dat"):
         assert imported(tmp_path, results.with_suffix(suffix)) == 0
         tables.append(table(tmp_path / "blocks_face.csv"))
-    for name in ("normal_load", "tangential_force"):
+    for name in ("normal_load", "tangential_force", "gap"):
         assert tables[1][name] == pytest.approx(tables[0][name], rel=1e-5)
-    assert tables[1]["gap"] == pytest.approx(tables[0]["gap"], rel=1e-2)  # ccx: displacements less DRY's small offset
+
+
+def heights(text: str) -> dict[int, float]:
+    """Displacement along z of each node, of the block DISP."""
+    block = text[text.index(" -4  DISP") :].partition(" -3\n")[0]
+    return {int(line[3:13]): float(line[37:49]) for line in block.splitlines() if line.startswith(" -1")}
 
 
 def test_gaps_of_nodes_that_are_left_out_need_displacements(tmp_path, capsys):
+    """They are as far open as both nodes moved apart."""
     results = ccx(tmp_path, "static", static_step("node", lifted=True)).with_suffix(".frd")
     assert imported(tmp_path, results) == 0
     known = table(tmp_path / "blocks_face.csv")
@@ -262,7 +268,72 @@ def test_gaps_of_nodes_that_are_left_out_need_displacements(tmp_path, capsys):
     few = text[:begin] + re.sub(rf" -1 +({opened})[ -].*\n", "", text[begin:])
     (tmp_path / "few.frd").write_text(few)
     assert imported(tmp_path, tmp_path / "few.frd") == 0
-    assert table(tmp_path / "blocks_face.csv")["gap"].tolist() == known["gap"].tolist()
+    u, found = heights(text), table(tmp_path / "blocks_face.csv")
+    apart = [u[b] - u[a] for a, b in zip(found["node_a"], found["node_b"])]
+    opening = known["gap"] > 0
+    assert found["gap"] == pytest.approx(np.where(opening, apart, 0.0), rel=LAST_DIGITS)
+    assert known["gap"] == pytest.approx(found["gap"], rel=1e-2)  # ccx: displacements less DRY's small offset
     (tmp_path / "bare.frd").write_text(few.replace(" -4  DISP", " -4  NONE"))
     said = wrong(tmp_path, capsys, tmp_path / "bare.frd")
     assert "5 open pairs without one" in said and "*NODE FILE" in said
+
+
+#: Closed results that moved across the normal of the undeformed mesh by more than they are pressed together.
+SHIFT = 1e-3
+
+
+def shifted(text: str, by: float = SHIFT) -> str:
+    """As if the upper block's nodes had moved up together, with the lower one's surface turned under them."""
+    begin = text.index(" -4  DISP")
+    block, end, rest = text[begin:].partition(" -3\n")
+    upper = set(UPPER.number.values())
+    lines = [
+        f"{line[:37]}{float(line[37:49]) + by:12.5E}" if line.startswith(" -1") and int(line[3:13]) in upper else line
+        for line in block.splitlines()
+    ]
+    return text[:begin] + "\n".join(lines) + "\n" + end + rest
+
+
+@pytest.mark.parametrize("lifted", [False, True])
+def test_contact_at_nodes_is_taken_at_its_word(lifted, tmp_path):
+    """Displacements along the undeformed normal do not open it: the deck tells, or a node that is listed as open."""
+    results = ccx(tmp_path, "static", static_step("node", lifted)).with_suffix(".frd")
+    results.write_text(shifted(results.read_text()))
+    assert imported(tmp_path, results) == 0
+    found, load = table(tmp_path / "blocks_face.csv"), pressures(lifted).sum() * (LENGTH / N) ** 2
+    assert found["normal_load"].sum() == pytest.approx(load, rel=1e-3)
+    assert (found["gap"] < SHIFT / 2).all() and ((found["gap"] > 0) == (found["normal_load"] == 0)).all()
+    if lifted:
+        results.with_suffix(".inp").unlink()
+        assert imported(tmp_path, results) == 0
+        assert table(tmp_path / "blocks_face.csv")["normal_load"].tolist() == found["normal_load"].tolist()
+
+
+def test_pressed_pairs_that_are_apart(tmp_path, capsys):
+    """All of them, or more than a tenth of the force where the whole is not known; a few are said."""
+    results = ccx(tmp_path, "static", static_step("surface", lifted=True)).with_suffix(".frd")
+    text, deck_of = results.read_text(), results.with_suffix(".inp")
+    assert imported(tmp_path, results) == 0
+    said = capsys.readouterr().out
+    assert re.search(r"5 pairs with 3\d\.\d+ of 38\d\d\.\d+ apart by the displacements: taken as open", said)
+    results.write_text(shifted(text))
+    assert "25 pairs with" in wrong(tmp_path, capsys, results)
+    results.write_text(shifted(text, 4e-5))
+    results.with_suffix(".dat").unlink()
+    assert "pressed pairs are apart" in wrong(tmp_path, capsys, results)
+    deck_of.write_text(deck_of.read_text().replace(KINDS["surface"], KINDS["node"]))
+    assert imported(tmp_path, results) == 0
+
+
+@pytest.mark.parametrize("block", ["DISP", "CONTACT"])
+def test_results_that_end_within_a_block(block, tmp_path, capsys):
+    """At the end of a line, wherever; or between blocks."""
+    results = ccx(tmp_path, "static", static_step("node")).with_suffix(".frd")
+    text = results.read_text()
+    begin = text.index(f" -4  {block}")
+    lines = text[begin:].partition(" -3\n")[0].splitlines(keepends=True)
+    for count in (1, 8, len(lines) // 2, len(lines)):
+        (tmp_path / "cut.frd").write_text(text[:begin] + "".join(lines[:count]))
+        assert f"it ends within the block {block}" in wrong(tmp_path, capsys, tmp_path / "cut.frd")
+    (tmp_path / "cut.frd").write_text(text[:begin] + "".join(lines) + " -3\n")
+    assert "the file of results is cut" in wrong(tmp_path, capsys, tmp_path / "cut.frd")

@@ -86,14 +86,23 @@ def test_report_warns_of_what_cannot_be(held: Held, tmp_path: Path, capfd) -> No
     cut[-1] = 0
     text = report_of(tmp_path, bar.M, sp.diags(cut) @ bar.K @ sp.diags(cut), bar.nodes, capfd)
     assert "warning: 1 dof with no stiffness, the first is n24z" in text
-    text = report_of(tmp_path, sp.diags(1 - 2 * (cut == 0)) @ bar.M.multiply(sp.eye(len(cut))), bar.K, bar.nodes, capfd)
-    assert "warning: 1 dof with negative mass, the first is n24z" in text
-    assert "the mass differs along x, y and z" in text
+    heavier = sp.diags(1 + 0.5 * (cut == 0)) @ bar.M.multiply(sp.eye(len(cut)))
+    assert "the mass differs along x, y and z" in report_of(tmp_path, heavier, bar.K, bar.nodes, capfd)
     loose = report_of(tmp_path, *(sp.diags(cut) @ A @ sp.diags(cut) for A in (bar.M, bar.K)), bar.nodes, capfd)
-    assert "warning: 1 dof with no mass" in loose and "warning: the frequencies cannot be computed" in loose
+    assert "warning: 1 dof with no mass" in loose and "warning: the frequencies cannot be computed: is a dof" in loose
     assert model_file.read_model(tmp_path / "m.h5").n_dof == len(cut)
     K = bar.K - sp.diags(1e-3 * bar.K.diagonal().max() * (cut == 0))
-    assert "warning: K is negative for a motion" in report_of(tmp_path, bar.M, K, bar.nodes, capfd)
+    text = report_of(tmp_path, bar.M, K, bar.nodes, capfd)
+    assert "warning: K is negative for a motion" in text and "is unstable so" in text and "PETSc" not in text
+
+
+def test_buckled_and_spinning_structures_are_told(held: Held, tmp_path: Path, capfd) -> None:
+    """K - Omega^2 M beyond the lowest frequency: indefinite with a positive diagonal, and taken."""
+    squares = scipy.linalg.eigh(held.K.toarray(), held.M.toarray(), eigvals_only=True)
+    K = sp.csr_matrix(held.K - 1.5 * squares[0] * held.M)
+    parts = [write_npz(tmp_path, A, letter, held.labels) for letter, A in (("M", held.M), ("K", K))]
+    assert main(["import", str(tmp_path / "m.h5"), "--mass", parts[0], "--stiffness", parts[1]]) == 0
+    assert f"omega^2 = {-0.5 * squares[0]:.4g}. A buckled structure" in capfd.readouterr().out
 
 
 def test_damping_names_and_tables(held: Held, tmp_path: Path, capfd) -> None:

@@ -198,6 +198,8 @@ WRONG = {
     "part": (sector_of(high=""), "add --high\n"),
     "one": (sector_of(sectors="1"), "two sectors or more"),
     "pairs": ([*sector_of(), "--pairs", "s=SHROUDLOW", "SHROUDHIGH@next"], "write SHROUDHIGH SHROUDLOW@next"),
+    "here": ([*sector_of(), "--pairs", "s=SHROUDHIGH", "SHROUDLOW"], "write SHROUDHIGH SHROUDLOW@next"),
+    "back": ([*sector_of(), "--pairs", "s=SHROUDLOW", "SHROUDHIGH"], "write SHROUDHIGH SHROUDLOW@next"),
     "tied": ([*sector_of(low="WHOLELOW", high="WHOLEHIGH"), *PAIRS], "leave them out of WHOLELOW and WHOLEHIGH"),
     "alone": (PAIRS, "there is no next sector"),
     "origin": ([*sector_of(), "--origin", "1,0"], "no three numbers"),

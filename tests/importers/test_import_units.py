@@ -13,7 +13,7 @@ from models.matrix_files import write_npz
 
 import fretwave as fw
 from fretwave.importers.nodes import Material, read_nodes
-from fretwave.importers.units import evidence_of
+from fretwave.importers.units import DENSITY_OF_BOX, SPEED, Evidence, Number, check_declared, evidence_of
 from fretwave.results import model_file
 from fretwave.units import SYSTEMS
 
@@ -43,6 +43,7 @@ def matrices(folder: Path, system: str, materials: str = "") -> list[object]:
 
 
 TITANIUM_MM = "*MATERIAL, NAME=TI\n*ELASTIC\n114000., 0.32\n*DENSITY\n4.43e-9,\n"
+IN_SI = TITANIUM_MM.replace("114000.", "1.14e11").replace("4.43e-9", "4430.")
 
 
 @pytest.mark.parametrize("system", SYSTEMS)
@@ -114,12 +115,60 @@ def test_solids_fit_one_system(modulus: float | None, density: float | None, fit
     assert evidence.fits == ((fits,) if fits else ())
 
 
-def test_what_is_not_clear_is_not_refused(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    """Evidence for what is declared stands against other evidence: a warning. Without evidence nothing is said."""
-    in_si = TITANIUM_MM.replace("114000.", "1.14e11").replace("4.43e-9", "4430.")
-    assert call(*matrices(tmp_path, "mm-t-s", in_si), "--units", "m-kg-s") == 0
+def test_the_matrices_are_the_model(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """A deck's materials in other units are no reason to read the matrices in theirs: refused, or a warning."""
+    command = matrices(tmp_path, "mm-t-s", IN_SI)
+    assert call(*command, "--units", "m-kg-s") == 2
+    said = capfd.readouterr().err
+    assert "measured: speed of sound about" in said and "which in m-kg-s are" in said
+    assert "fix:      --units mm-t-s, or export deck and matrices from one model: Young's modulus 1.14e+11" in said
+    assert not (tmp_path / "bar.h5").exists()
+    for units in (["--units", "mm-t-s"], []):
+        assert call(*command, *units) == 0
+        said = capfd.readouterr().out
+        assert "of TI is like m-kg-s, the matrices like mm-t-s: are deck and matrices of one model?" in said
+        assert ("give --units mm-t-s" in said) == (not units) and "give --units m-kg-s" not in said
+
+
+@pytest.mark.parametrize("declared", ["mm-t-s", "m-kg-s"])
+def test_a_deck_in_millimetres_beside_matrices_in_si(
+    tmp_path: Path, declared: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """K in N/m and M in kg are kg/s^2 and kg: with millimetres those of mm-kg-s, which is taken."""
+    command, mm = matrices(tmp_path, "m-kg-s"), BAR.nodes * 1e3
+    lines = "\n".join(f"{k}, {x:.9g}, {y:.9g}, {z:.9g}" for k, (x, y, z) in enumerate(mm, 1))
+    (tmp_path / "bar.inp").write_text(f"*NODE\n{lines}\n{TITANIUM_MM}")
+    assert call(*command, "--units", declared) == 2
+    said = capfd.readouterr().err
+    assert "fix:      --units mm-kg-s, or export deck and matrices from one model" in said and "like mm-t-s" in said
+    assert call(*command, "--units", "mm-kg-s") == 0
+
+
+@pytest.mark.parametrize("materials", [TITANIUM_MM, ""])
+def test_coordinates_in_other_units_than_the_matrices(
+    tmp_path: Path, materials: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    command = matrices(tmp_path, "mm-t-s")
+    lines = "\n".join(f"{k}, {x:.9g}, {y:.9g}, {z:.9g}" for k, (x, y, z) in enumerate(BAR.nodes, 1))
+    (tmp_path / "bar.inp").write_text(f"*NODE\n{lines}\n{materials}")
+    assert call(*command, "--units", "mm-t-s") == 0
     said = capfd.readouterr().out
-    assert "warning: units: read as m-kg-s, but like mm-t-s: give --units mm-t-s" in said
+    assert "the coordinates seem not to be the model's, but in m beside matrices like mm-t-s" in said
+    assert "is M in the units of K" not in said
+
+
+def test_a_frame_that_hardly_fills_its_box() -> None:
+    """10 kg/m^3 of its box in mm-kg-s is 1e4 in mm-t-s: with its material it is not refused."""
+    numbers = [Number("speed", 5e6, "m/s", SPEED), Number("density", 1e-8, "kg/m^3", DENSITY_OF_BOX, at_least=True)]
+    frame = Evidence(numbers, "by mass, stiffness and size", of_model=True)
+    (steel,) = evidence_of(fw.Structure([[1.0]], [[1.0]]), [Material("STEEL", "", 2.1e8, 7.85e-6)])
+    assert frame.fits == ("mm-t-s",) and steel.fits == ("mm-kg-s",)
+    check_declared("mm-kg-s", [steel, frame], "", str)
+    with pytest.raises(fw.InputError, match="contradict"):
+        check_declared("m-kg-s", [steel, frame], "", str)
+
+
+def test_without_evidence_nothing_is_said(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     command = matrices(tmp_path, "mm-t-s")
     assert call(*command[:6], "--units", "m-kg-s") == 0
     assert "warning" not in capfd.readouterr().out

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shutil
+import subprocess
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +13,7 @@ from models import hexahedra
 from models.matrix_files import Held, write_calculix, write_npz
 from models.two_bars import Two
 
+import fretwave as fw
 from fretwave.commands.main import main
 from fretwave.errors import InputError
 from fretwave.importers.calculix import read_dofs
@@ -74,16 +77,9 @@ def test_sides_far_apart(deck: bool, tmp_path: Path, capfd: pytest.CaptureFixtur
     pairs = ["--pairs", table(tmp_path, "1,0,0", ends[:6], ends[6:])]
     text = refused([*command, *pairs], tmp_path, capfd)
     assert "nodes of a pair are far apart" in text and "6 such" in text
+    assert "which is 1000 tolerances of" in text and "a pair may be 1000 of it apart" in text
     (fix,) = [line.split() for line in text.splitlines() if "fix:" in line]
     assert main([*command, *pairs, "--tolerance", fix[fix.index("--tolerance") + 1]]) == 0
-
-
-def test_nodes_beside_the_faces(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    """The second bar moved by half its width: one row of nodes hangs over."""
-    two = Two()
-    two.nodes[len(two.first.nodes) :, 1] += 0.005
-    text = refused([*two.write(tmp_path, True), *LEFT_RIGHT], tmp_path, capfd)
-    assert "do not lie on the second's faces" in text and "2 of 6 nodes" in text and "beside all faces" in text
 
 
 @pytest.mark.parametrize("labelled", [True, False])
@@ -99,17 +95,46 @@ def test_mass_and_stiffness_exchanged(labelled: bool, tmp_path: Path, capfd: pyt
 
 @pytest.mark.parametrize("labelled", [True, False])
 def test_mass_and_stiffness_of_two_models(labelled: bool, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    """As many dofs, other elements; one of fewer dofs is refused by its size."""
+    """As many dofs, other elements: refused where nodes are known, by a table too; one of fewer dofs by its size."""
     bars = [hexahedra.bar(cells, (0.06, 0.02, 0.01)) for cells in ((3, 2, 1), (2, 3, 1), (3, 1, 1))]
     n = len(bars[0].nodes)
     labels = np.column_stack([np.repeat(np.arange(1, n + 1), 3), np.tile([1, 2, 3], n)])
     write = write_calculix if labelled else write_npz
     parts = [write(tmp_path, A, letter, labels) for A, letter in ((bars[1].M, "M"), (bars[0].K, "K"))]
     command = ["import", str(tmp_path / "m.h5"), "--stiffness", parts[1], "--mass"]
-    assert "are of two models" in refused([*command, parts[0]], tmp_path, capfd)
+    np.savetxt(tmp_path / "d.csv", labels, fmt="%d", delimiter=",")
+    told = [] if labelled else ["--dofs", str(tmp_path / "d.csv")]
+    assert "are of two models" in refused([*command, parts[0], *told], tmp_path, capfd)
     (tmp_path / "small").mkdir()
     small = write_npz(tmp_path / "small", sp.csr_matrix(bars[2].M), "M", labels)
     assert "differ in size" in refused([*command, small], tmp_path, capfd)
+    if not labelled:
+        assert main([*command, parts[0]]) == 0
+        assert "may be of two models" in capfd.readouterr().out
+
+
+JOINT = Path(__file__).parents[2] / "cases" / "lap_joint" / "joint.inp"
+
+
+@pytest.mark.skipif(shutil.which("ccx") is None, reason="CalculiX is not installed")
+def test_files_of_one_model_however_they_are_named(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """Bricks along the axes, whose K has zeros where M has none: by their table, in capitals, and without one."""
+    shutil.copy(JOINT, tmp_path / "joint.inp")
+    subprocess.run(["ccx", "joint"], cwd=tmp_path, capture_output=True, check=True)
+    out, table = str(tmp_path / "m.h5"), ["--dofs", str(tmp_path / "table.dof")]
+    assert main(["import", str(tmp_path / "joint.inp")]) == 0
+    for suffix in (".inp", ".sti", ".mas", ".dof"):
+        (tmp_path / f"joint{suffix}").rename(tmp_path / f"J{suffix.upper()}")
+    assert main(["import", str(tmp_path / "J.INP")]) == 0
+    assert "warning: units" in (said := capfd.readouterr().out) and "two models" not in said
+    (tmp_path / "J.DOF").rename(tmp_path / "table.dof")
+    command = ["import", out, "--mass", str(tmp_path / "J.MAS"), "--stiffness", str(tmp_path / "J.STI")]
+    assert main([*command, *table, "--coordinates", str(tmp_path / "J.INP")]) == 0
+    assert "two models" not in capfd.readouterr().out
+    assert main(command) == 0 and "may be of two models" in capfd.readouterr().out
+    models = [fw.read_model(tmp_path / name) for name in ("joint.h5", "J.h5", "m.h5")]
+    assert models[0].labels.tolist() == models[1].labels.tolist() and models[2].labels is None
+    assert all((model.K != models[0].K).nnz == 0 for model in models)
 
 
 @pytest.mark.parametrize("given", ["nan", "-1", "0", "inf"])
@@ -188,3 +213,26 @@ def test_nodes_of_a_set_are_taken_once(tmp_path: Path) -> None:
     (tmp_path / "n.csv").write_text("1, 0, 0, 0\n1.5, 1, 0, 0\n")
     with pytest.raises(InputError, match="no whole number"):
         read_nodes(tmp_path / "n.csv")
+
+
+@pytest.mark.parametrize("cells", [(3, 2, 1), (12, 8, 4)], ids=["dense", "large"])
+@pytest.mark.parametrize("wrong", ["lumped", "motion", "stiffness", "sign"])
+def test_negative_mass_and_stiffness(
+    wrong: str, cells: tuple[int, int, int], tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """A lumped mass below zero, a mass that a motion has below zero, and stiffness of one dof or of all."""
+    bar = hexahedra.bar(cells, (0.06, 0.02, 0.01))
+    M, K = sp.csr_matrix(bar.M), sp.csr_matrix(bar.K)
+    one = sp.diags((np.arange(M.shape[0]) == 4).astype(float))
+    if wrong == "lumped":
+        lumped = sp.diags(np.asarray(M.sum(axis=1)).ravel())
+        M, said = lumped - 2 * lumped @ one, "the mass matrix has a negative diagonal entry"
+    elif wrong == "motion":  # two dofs that move against each other: m - 1.5 m
+        joined = sp.coo_matrix(([1.5 * M[4, 4]] * 2, ([4, 7], [7, 4])), shape=M.shape)
+        M, said = M + joined, "the mass matrix is negative for a motion"
+    else:
+        K = -K if wrong == "sign" else K - 2 * K[4, 4] * one
+        said = "the stiffness matrix has a negative diagonal entry"
+    parts = [write_npz(tmp_path, sp.csr_matrix(A), letter, np.zeros(0)) for letter, A in (("M", M), ("K", K))]
+    text = refused(["import", str(tmp_path / "m.h5"), "--mass", parts[0], "--stiffness", parts[1]], tmp_path, capfd)
+    assert said in text and "PETSc" not in text

@@ -7,13 +7,12 @@ from pathlib import Path
 from typing import Any, Union
 
 import numpy as np
-import scipy.io
 import scipy.sparse
 import scipy.sparse.linalg
 
 from ..errors import FretwaveError, InputError
 from ..files.compressed import check_compressed
-from ..importers import Entries, formats
+from ..importers import Entries, formats, matrix_market
 from ..model.checks import NAMES
 from ..model.sectors import Sparse
 from ..texts import display, is_there, nearest, shortened
@@ -103,8 +102,8 @@ def _read(path: Path, letter: str, where: str) -> Sparse:
 def _read_known(path: Path, letter: str) -> Any:
     if (format := formats.registered(path)) is not None:
         return _as_given(format.read(path, letter, None))
-    if path.suffix == ".mtx":
-        return scipy.io.mmread(str(path))
+    if path.suffix.lower() == ".mtx":
+        return _as_given(matrix_market.read(path))
     if path.suffix != ".npz":
         raise ValueError(f"unknown file type '{path.suffix}'")
     with np.load(path) as archive:

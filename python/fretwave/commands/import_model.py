@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,14 +13,16 @@ import numpy as np
 from ..arrays import Array, IntArray
 from ..case.plugins import load_file
 from ..errors import EXIT_DONE, InputError
-from ..importers.calculix import SUFFIXES, check_once, read_dofs
+from ..importers.calculix import SUFFIXES, beside, check_once, read_dofs
+from ..importers.definite import check_definite
 from ..importers.directions import check_directions
 from ..importers.entries import Assembled, assemble
 from ..importers.exchanged import check_one_model
 from ..importers.formats import read_matrix, readable, split
 from ..importers.node_files import read_node_file
 from ..importers.nodes import Material, Nodes, cells_of
-from ..importers.pairs import NEXT, match, read_pairs
+from ..importers.pair_tables import read_pairs
+from ..importers.pairs import NEXT, match
 from ..importers.report import check
 from ..importers.sector import SectorFaces, make_sector, said_of, wheel_of
 from ..importers.surfaces import has_faces
@@ -28,7 +31,7 @@ from ..importers.units import Evidence, check_declared, evidence_of
 from ..model.pairs import Pairs
 from ..model.structure import Structure
 from ..mpi.guard import on_first_rank
-from ..results.model_file import SourceFile, write_model
+from ..results.model_file import DIRECTIONS, SourceFile, write_model
 from ..texts import display, nearest
 from ..units import SYSTEMS, unknown
 from .import_at_rest import tables_at_rest, write_tables
@@ -44,7 +47,7 @@ def import_model(options: argparse.Namespace, comm: MPI.Comm) -> int:
     model, found, materials = on_first_rank(comm, lambda: read_parts(options))
     loaded = on_first_rank(comm, lambda: tables_at_rest(options, model, found.notes))
     evidence = on_first_rank(comm, lambda: _checked_units(model, materials))
-    report = check(model, found.symmetry, found.notes, evidence, options.modes, comm)
+    report = check(model, found.symmetry, found.notes, evidence, options.modes, comm, found.warnings)
     on_first_rank(comm, lambda: write_model(options.out, model, sources=_sources(options)))
     on_first_rank(comm, lambda: write_tables(loaded, model))
     if comm.rank == 0:
@@ -81,7 +84,6 @@ def read_parts(options: argparse.Namespace) -> tuple[Structure, Assembled, list[
     paths = {letter: getattr(options, role) for letter, role in ROLES.items() if getattr(options, role)}
     given = {letter: read_matrix(path, letter) for letter, path in paths.items()}
     found = assemble(given, options.symmetric)
-    check_one_model(found, " and ".join(display(paths[letter]) for letter in "MK"))
     nodes = None
     if options.coordinates:
         with readable(options.coordinates, "file of the nodes"):
@@ -89,10 +91,13 @@ def read_parts(options: argparse.Namespace) -> tuple[Structure, Assembled, list[
         nodes.coordinates = nodes.coordinates - (0.0 if options.origin is None else _three("--origin", options.origin))
     labels = _labels(options, found, nodes)
     found.labels = labels
+    where = " and ".join(display(paths[letter]) for letter in "MK")
+    check_one_model(found, where)
     names, dofs = _names(found.names, options.name)
     model = Structure(
         found.matrices["M"], found.matrices["K"], found.matrices.get("C"), dofs=dofs, names=names, labels=labels
     )
+    check_definite(model, where)
     model.units = options.units
     if nodes is not None:
         model.node_numbers, model.coordinates = nodes.numbers, nodes.coordinates
@@ -113,10 +118,11 @@ def _take_deck(options: argparse.Namespace) -> None:
         options.out = deck.with_suffix(".h5")
         options.coordinates = options.coordinates or deck
         for role, suffix in (("mass", ".mas"), ("stiffness", ".sti")):
-            if getattr(options, role) is None and not (beside := deck.with_suffix(suffix)).is_file():
+            matrix = beside(deck, suffix)
+            if getattr(options, role) is None and not matrix.is_file():
                 fix = f"put *FREQUENCY, SOLVER=MATRIXSTORAGE into its step and run `ccx {deck.stem}` there"
-                raise InputError(f"the {role} matrix of the deck is missing", display(deck), display(beside), None, fix)
-            setattr(options, role, getattr(options, role) or str(deck.with_suffix(suffix)))
+                raise InputError(f"the {role} matrix of the deck is missing", display(deck), display(matrix), None, fix)
+            setattr(options, role, getattr(options, role) or str(matrix))
     for role in ("mass", "stiffness"):
         if getattr(options, role) is None:
             expected = "a file of the matrix, or CalculiX' deck in place of the model file"
@@ -130,8 +136,8 @@ def _sources(options: argparse.Namespace) -> list[SourceFile]:
     files += [(role, path) for role, path in tables if path]
     files += [("plugin", path) for path in options.plugin]
     files += [("pairs", Path(words[0].rpartition("=")[2])) for words in options.pairs if len(words) == 1]
-    beside = {path.with_suffix(".dof") for _, path in files if path.suffix.lower() in SUFFIXES}
-    files += [("dofs", path) for path in sorted(beside) if path.is_file()]
+    tables_beside = {beside(path, ".dof") for _, path in files if path.suffix.lower() in SUFFIXES}
+    files += [("dofs", path) for path in sorted(tables_beside) if path.is_file()]
     return [SourceFile.of(role, path) for role, path in files]
 
 
@@ -184,12 +190,17 @@ def _node_by_node(found: Assembled, nodes: Nodes) -> IntArray:
 
 
 def _read_table(path: Path) -> IntArray:
-    """CalculiX' ``node.direction``, or a CSV of ``node,direction``."""
+    """CalculiX' ``node.direction``, or a CSV of ``node,direction``, the direction a number or x, y, z."""
     if not path.is_file():
         raise InputError("the table of dofs does not exist", display(path), fix="check the path")
-    if "," not in path.read_text(encoding="utf-8"):
+    if not re.search("[,;]", path.read_text(encoding="utf-8", errors="replace")):
         return read_dofs(path)
-    return whole(columns_of(path, 2), display(path))
+    return whole(columns_of(path, 2, {1: _direction}), display(path))
+
+
+def _direction(word: str) -> float:
+    name = word.strip().strip('"').lower()
+    return DIRECTIONS.index(name) + 1 if name in DIRECTIONS else float(word)
 
 
 def _names(known: Sequence[str], given: list[str]) -> tuple[list[str], dict[str, int]]:

@@ -8,6 +8,7 @@ Held dofs stay in the matrix with 1e36 on the diagonal of K (as files show); the
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,7 @@ from ..arrays import Array, IntArray
 from ..errors import InputError
 from ..texts import display
 from .entries import Entries, order_of
-from .text import columns_of, first_data_line, triplets
+from .text import columns_of, doubt_of_end, first_data_line, head_of, triplets
 
 #: A diagonal entry from here on is Abaqus' penalty 1e36 on a held dof.
 PENALTY = 1e35
@@ -29,7 +30,7 @@ def looks_like(head: bytes) -> bool:
 
 
 def _width(head: bytes) -> int:
-    words = first_data_line(head).replace(",", " ").split()
+    words = re.split(r"[,;\s]+", first_data_line(head).strip())
     try:
         return len([float(word) for word in words])
     except ValueError:
@@ -38,14 +39,14 @@ def _width(head: bytes) -> int:
 
 def read(path: Path) -> Entries:
     """A matrix in either format; MATRIX INPUT gives node and direction of each row."""
-    with path.open("rb") as file:
-        width = _width(file.read(4096))
+    width = _width(head_of(path, 4096))
     table = columns_of(path, width)
     if width == 3:
         entries = triplets(table, display(path), "Abaqus, coordinate")
     else:
         entries = _labelled(table, display(path))
     diagonal = entries.rows == entries.columns
+    entries.doubt = doubt_of_end(path)
     held = entries.rows[diagonal & (entries.values >= PENALTY)]
     entries.held = np.isin(np.arange(entries.shape[0]), held)
     return entries

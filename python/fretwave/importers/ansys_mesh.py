@@ -25,6 +25,8 @@ from .keywords import number
 from .nodes import Material, Nodes
 
 DIRECTIONS = ("UX", "UY", "UZ", "ROTX", "ROTY", "ROTZ")
+#: Of archives, without which their package reads none.
+SUFFIXES = (".cdb", ".dat", ".inp")
 QUANTITIES = {"EX": "modulus", "DENS": "density"}
 
 
@@ -46,9 +48,12 @@ def read_archive(path: Path) -> Nodes:
     Raises
     ------
     InputError
-        There are no nodes, directions of nodes are turned, or an element is of no known shape.
+        There are no nodes, directions of nodes are turned, an element is of no known shape, or the name no archive's.
     """
     where = display(path)
+    if path.suffix.lower() not in SUFFIXES:
+        measured, fix = path.suffix or "no suffix", f"rename it to {path.stem}.cdb"
+        raise InputError("an archive of Ansys has another name", where, measured, ", ".join(SUFFIXES), fix)
     package = reader_of("mapdl_archive", "mapdl-archive", where)
     nodes = _nodes(package.Archive(str(path), parse_vtk=False), where)
     nodes.materials, nodes.constraints = _lines(path, where)

@@ -17,24 +17,31 @@ from ..arrays import IntArray
 from ..errors import InputError
 from ..texts import display
 from .entries import Entries
-from .text import columns_of, triplets
+from .text import columns_of, doubt_of_end, triplets
 
 SUFFIXES = (".sti", ".mas")
+
+
+def beside(path: Path, suffix: str) -> Path:
+    """The file of another suffix, which may stand in capitals."""
+    small, large = path.with_suffix(suffix), path.with_suffix(suffix.upper())
+    return large if large.is_file() and not small.is_file() else small
 
 
 def read(path: Path) -> Entries:
     """A matrix with the node and direction of its rows, when ``job.dof`` stands beside it."""
     entries = triplets(columns_of(path, 3), display(path), "CalculiX")
-    beside = path.with_suffix(".dof")
-    if beside.is_file():
-        entries.labels = read_dofs(beside)
-        _check_size(entries, beside)
+    entries.doubt = doubt_of_end(path)
+    table = beside(path, ".dof")
+    if table.is_file():
+        entries.labels = read_dofs(table)
+        _check_size(entries, table)
     return entries
 
 
 def read_dofs(path: Path) -> IntArray:
     """``job.dof``: (n_dof, 2) node and direction. As text: 12.10 is not 12.1."""
-    words = path.read_text(encoding="utf-8").split()
+    words = path.read_text(encoding="utf-8-sig").split()
     parts = [word.partition(".") for word in words]
     if not all(node.lstrip("-").isdigit() and direction.isdigit() for node, _, direction in parts):
         wrong = next(w for w, (node, _, d) in zip(words, parts) if not (node.lstrip("-").isdigit() and d.isdigit()))
@@ -65,7 +72,7 @@ def check_once(labels: IntArray, where: str, fix: str) -> None:
         raise InputError("a dof stands twice in the table", where, measured, "each dof once", fix)
 
 
-def _check_size(entries: Entries, beside: Path) -> None:
+def _check_size(entries: Entries, table: Path) -> None:
     rows, named = entries.shape[0], len(entries.labels) if entries.labels is not None else 0
     if rows == named:
         return
@@ -73,7 +80,7 @@ def _check_size(entries: Entries, beside: Path) -> None:
     raise InputError(
         "the matrix is that of a nodal diameter" if cyclic else "the table of dofs does not fit the matrix",
         entries.where,
-        f"{rows} rows, {named} dofs in {display(beside)}",
+        f"{rows} rows, {named} dofs in {display(table)}",
         f"{named} rows",
         "export without *CYCLIC SYMMETRY MODEL"
         if cyclic

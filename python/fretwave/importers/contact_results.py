@@ -2,11 +2,13 @@
 
 ``*CONTACT FILE`` with CDIS, CSTR writes the block CONTACT of a .frd file: at the nodes of the dependent (slave) side
 COPEN [length] (> 0 open), CSLIP1, CSLIP2 [length], CPRESS, CSHEAR1, CSHEAR2 [pressure]. A pair's forces are its area
-times those. Of contact from node to surface nodes that are far open may be left out: the block DISP tells their gaps.
-Of that from surface to surface pressures are extrapolated to the nodes, also to those that DISP shows apart, which are
-open; ``*CONTACT PRINT, SLAVE=.., MASTER=..`` with CF then writes the exact force of the whole contact into the .dat
-file beside, to which the pairs' forces are scaled. A .dat file alone will do where ``*CONTACT PRINT`` with CDIS, CSTR
-wrote the slave nodes into it (node to surface). The last step of a file counts.
+times those. Of contact from node to surface they are the nodes' own; nodes that are far open may be left out: the block
+DISP tells their gaps. Of that from surface to surface they are extrapolated from inside of the faces, and to nodes that
+DISP shows apart as well, which are open; ``*CONTACT PRINT, SLAVE=.., MASTER=..`` with CF then writes the exact force of
+the whole contact into the .dat file beside, to which the pairs' forces are scaled. Which it is the step's deck tells
+when it stands beside; without it a node that is listed as open, which only contact from node to surface does. A .dat
+file alone will do where ``*CONTACT PRINT`` with CDIS, CSTR wrote the slave nodes into it (node to surface). The last
+step of a file counts.
 """
 
 from __future__ import annotations
@@ -25,12 +27,14 @@ from ..errors import InputError
 from ..model.laws import Role, usual_name
 from ..model.pairs import Pairs
 from ..model.sectors import by_sector
-from ..texts import counted, display
+from ..texts import counted, display, shortened
+from .calculix import beside
+from .keywords import blocks
 
 #: Components of the two blocks, 12 characters each behind the node's number.
 BLOCKS, WIDTH = {"CONTACT": 6, "DISP": 3}, 12
 OPENING, PRESSURE, SHEAR = 0, 3, slice(4, 6)
-#: Forces of pairs are not scaled by more than this: another contact would be meant.
+#: Forces of pairs are not scaled by more than this: another contact would be meant. Nor is more of them taken as open.
 MOST_SCALED = 0.1
 _STATISTICS = re.compile(
     r"statistics for slave set (\S+), master set (\S+) and time.*?normal force[^\n]*\n\s*(\S+)\s+(\S+)\s+\S+", re.DOTALL
@@ -64,12 +68,14 @@ class StaticStep:
     displacement : (n, 3), or None
     forces : compressive normal force [force] of a contact by its dependent and independent surface, capital letters
     where : the file
+    at_nodes : the contact is the nodes' own (node to surface), not extrapolated to them
     """
 
     contact: Nodal
     displacement: Nodal | None
     forces: Mapping[tuple[str, str], float]
     where: str
+    at_nodes: bool
 
     def force(self, sides: Sequence[str], alone: bool) -> float | None:
         """Of the contact between two sides, or where there is but one in model and file (`alone`) of that."""
@@ -87,23 +93,40 @@ def read_step(path: Path) -> StaticStep:
     InputError
         There is no contact, or a line of it is no line of values.
     """
-    beside = path.with_suffix(".dat")
-    text = beside.read_text(encoding="utf-8", errors="replace") if beside.is_file() else ""
-    blocks = _blocks(path) if path != beside else _printed(text)
-    if "CONTACT" not in blocks:
+    printed = beside(path, ".dat")
+    text = printed.read_text(encoding="utf-8", errors="replace") if printed.is_file() else ""
+    found = _blocks(path) if path != printed else _printed(text)
+    if "CONTACT" not in found:
         fix = "add `*CONTACT FILE` with a line `CDIS, CSTR` to the static step, run ccx again and give its .frd file"
         expected = "a block CONTACT of a .frd file written as text, or slave nodes in a .dat file"
         raise InputError("there is no contact in the results", display(path), "none", expected, fix)
     forces = {(one[1].upper(), one[2].upper()): -float(one[4]) for one in _STATISTICS.finditer(text)}
-    return StaticStep(blocks["CONTACT"], blocks.get("DISP"), forces, display(path))
+    at_nodes = path == printed or (not forces and _at_nodes(path, found["CONTACT"].values))
+    return StaticStep(found["CONTACT"], found.get("DISP"), forces, display(path), at_nodes)
+
+
+def _at_nodes(path: Path, contact: Array) -> bool:
+    """By the deck beside where all of its contact is of one kind, else by a node that is listed as open."""
+    deck = beside(path, ".inp")
+    pairs = [options for keyword, options, _ in blocks(deck) if keyword == "CONTACT PAIR"] if deck.is_file() else []
+    kinds = {options.get("TYPE", "").upper().startswith("NODE") for options in pairs}
+    listed = bool(((contact[:, OPENING] > 0) & (contact[:, PRESSURE] <= 0)).any())
+    return kinds.pop() if len(kinds) == 1 else listed
 
 
 def _blocks(path: Path) -> dict[str, Nodal]:
-    """The last block of each name."""
+    """The last block of each name.
+
+    Raises
+    ------
+    InputError
+        A line of them is no line of values, or the file has no end.
+    """
     found: dict[str, list[tuple[int, list[float]]]] = {}
-    name = ""
+    name = end = ""
     with path.open(encoding="utf-8", errors="replace") as file:
         for number, line in enumerate(file, 1):
+            end = line if line.strip() else end
             if line.startswith(" -4"):
                 name = (line[3:].split() or [""])[0]
                 found[name] = []
@@ -111,6 +134,10 @@ def _blocks(path: Path) -> dict[str, Nodal]:
                 name = ""
             elif name in BLOCKS and line.startswith(" -1"):
                 found[name].append(_values(line, BLOCKS[name], f"{display(path)}:{number}"))
+    if not end.startswith(" 9999"):
+        measured = f"it ends within the block {name}" if name else f"its last line is `{shortened(end.strip(), 40)}`"
+        fix = "run the step to its end, or copy the whole file"
+        raise InputError("the file of results is cut", display(path), measured, "a last line ` 9999`", fix)
     rows = {name: sorted(found[name]) for name in BLOCKS if found.get(name)}
     return {name: Nodal(np.array([n for n, _ in r]), np.array([v for _, v in r])) for name, r in rows.items()}
 
@@ -148,12 +175,15 @@ class PairsAtRest:
         Of open pairs, 0 of closed ones.
     scaled : float
         By which the forces were multiplied to be in all what the file says.
+    opened : str
+        What is said of pairs with a pressure that were taken as open.
     """
 
     normal: Array
     shear: Array
     gap: Array
     scaled: float = 1.0
+    opened: str = ""
 
     def said(self, name: str, pairs: Pairs) -> str:
         """What came of it, for the report of an import."""
@@ -165,7 +195,7 @@ class PairsAtRest:
         if pairs.frames is not None:
             total = np.einsum("k,kx->x", self.normal, np.asarray(pairs.frames)[:, 0])
             text += f"; the first side presses with ({', '.join(f'{value:.6g}' for value in total)})"
-        return text
+        return text + self.opened
 
     def columns(self, pairs: Pairs) -> dict[str, Array | IntArray]:
         """Of a table that a case takes its loads and gaps from."""
@@ -189,7 +219,8 @@ def at_rest(
     Raises
     ------
     InputError
-        No pair is pressed, areas or gaps are not known, or the forces are far from what the file says in all.
+        No pair is pressed, areas or gaps are not known, the forces are far from what the file says in all, or too much
+        of them is of pairs that are apart.
     """
     where = f"{step.where}, contact '{name}'"
     if pairs.nodes is None or pairs.areas is None:
@@ -203,13 +234,36 @@ def at_rest(
         measured = f"results at the nodes of {known} of {counted(len(areas), 'pair')}, none with a pressure"
         fix = "check the sets of --pairs, and that the step presses them together"
         raise InputError("no pair of the contact is pressed", where, measured, "a pressure above 0 at some node", fix)
-    apart = _apart(pairs, step, labels)
-    pressed &= ~(apart > 0)  # a pressure there is extrapolated from beside
+    apart, printed, opened = _apart(pairs, step, labels), step.force(sides, alone), ""
+    if not step.at_nodes:
+        open_ = pressed & (apart > 0)  # a pressure there is extrapolated from beside
+        opened = _opened(open_, np.where(pressed, areas * values[:, PRESSURE], 0.0), printed, where)
+        pressed &= ~open_
     normal = np.where(pressed, areas * np.nan_to_num(values[:, PRESSURE]), 0.0)
     shear = np.where(pressed, areas * np.hypot(*np.nan_to_num(values[:, SHEAR]).T), 0.0)
-    scale = _scale(normal.sum(), step.force(sides, alone), where)
-    gap = np.where(pressed, 0.0, _gaps(values[:, OPENING], apart, where, ~pressed))
-    return PairsAtRest(scale * normal, scale * shear, gap, scale)
+    scale = _scale(normal.sum(), printed, where)
+    first, other = (values[:, OPENING], apart) if step.at_nodes else (apart, values[:, OPENING])
+    gap = np.where(pressed, 0.0, _gaps(np.where(np.isnan(first), other, first), where, ~pressed))
+    return PairsAtRest(scale * normal, scale * shear, gap, scale, opened)
+
+
+def _opened(open_: npt.NDArray[np.bool_], forces: Array, printed: float | None, where: str) -> str:
+    """What is said of pairs that are pressed by their pressures and apart by their displacements.
+
+    Raises
+    ------
+    InputError
+        They are all that press, or have too much of the force, and the contact's whole force is not known.
+    """
+    if not open_.any():
+        return ""
+    lost = float(forces[open_].sum())
+    said = f"{counted(int(open_.sum()), 'pair')} with {lost:.6g} of {forces.sum():.6g} apart by the displacements"
+    if open_[forces > 0].all() or (printed is None and lost > MOST_SCALED * forces.sum()):
+        expected = f"at most {MOST_SCALED:.0%}, as pressures from surface to surface are extrapolated"
+        fix = "put the step's deck beside (node to surface), or add `*CONTACT PRINT, SLAVE=.., MASTER=..` with CF to it"
+        raise InputError("pressed pairs are apart", where, said, expected, fix)
+    return f"; {said}: taken as open"
 
 
 def _scale(total: float, printed: float | None, where: str) -> float:
@@ -233,9 +287,9 @@ def _apart(pairs: Pairs, step: StaticStep, labels: IntArray) -> Array:
     return np.asarray(-rows[:: pairs.components])
 
 
-def _gaps(opening: Array, apart: Array, where: str, wanted: npt.NDArray[np.bool_]) -> Array:
-    """Of the open pairs: as they moved apart, else as printed."""
-    gap = np.where(np.isnan(apart), opening, np.maximum(apart, 0.0))
+def _gaps(found: Array, where: str, wanted: npt.NDArray[np.bool_]) -> Array:
+    """Of the open pairs, which are not below zero."""
+    gap = np.maximum(found, 0.0)
     lacking = int(np.count_nonzero(wanted & ~(gap >= 0)))
     if lacking:
         measured, expected = f"{lacking} open pairs without one", "displacements, or COPEN at every node"

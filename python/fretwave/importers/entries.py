@@ -43,6 +43,8 @@ class Entries:
         Dofs that the code held by a penalty, to be left out.
     half : bool
         One triangle in the code's own order of the dofs, moved to the lower one of ours.
+    doubt : str
+        A warning of its reader, "" for none.
     """
 
     rows: IntArray
@@ -55,6 +57,7 @@ class Entries:
     mirrored: str = ""
     held: npt.NDArray[np.bool_] | None = None
     half: bool = False
+    doubt: str = ""
 
     def __repr__(self) -> str:
         return f"Entries({self.shape[0]} x {self.shape[1]}, {len(self.values)} entries, {self.kind}, {self.where!r})"
@@ -85,6 +88,8 @@ class Assembled:
         Rows of the files that are left, when dofs held by a penalty are not.
     given_size : int
         Rows of the files.
+    warnings : list of str
+        What is likely to be wrong.
     """
 
     matrices: dict[str, sp.csr_matrix]
@@ -93,6 +98,7 @@ class Assembled:
     notes: list[str] = field(default_factory=list)
     rows: IntArray | None = None
     given_size: int = 0
+    warnings: list[str] = field(default_factory=list)
 
     @property
     def size(self) -> int:
@@ -124,7 +130,7 @@ def assemble(given: dict[str, Entries], symmetric: str = "auto") -> Assembled:
         _check_entries(letter, entries)
     notes: list[str] = []
     labels = _one_numbering(given, notes)
-    found = Assembled({}, labels, {}, notes)
+    found = Assembled({}, labels, {}, notes, warnings=[entries.doubt for entries in given.values() if entries.doubt])
     for letter, entries in given.items():
         matrix = sp.csr_matrix((entries.values.astype(float), (entries.rows, entries.columns)), shape=entries.shape)
         matrix.eliminate_zeros()

@@ -14,6 +14,7 @@ from ..files.isolated import call_isolated
 from ..texts import display, names_beside, nearest
 from . import abaqus, ansys_full, calculix, matlab, matrix_market, nastran, npz, petsc_binary
 from .entries import Entries
+from .text import check_plain, check_unmarked, head_of
 
 HDF5 = b"\x89HDF\r\n\x1a\n"
 #: A function of path, letter and variable that gives `Entries`; a registered one may give a matrix.
@@ -57,6 +58,7 @@ def _ansys(path: Path, letter: str, variable: str | None) -> Entries:
 
 
 def _nastran(path: Path, letter: str, variable: str | None) -> Entries:
+    check_unmarked(path)
     found: Entries = call_isolated(nastran.__name__, "read", path, letter, variable, size=path.stat().st_size)
     return found
 
@@ -66,7 +68,7 @@ FORMATS = (
     Format("NumPy (.npz, .npy)", lambda head, path: head.startswith((b"PK\x03\x04", b"\x93NUMPY")), npz.read),
     Format(
         "Matrix Market (.mtx)",
-        lambda head, path: head.startswith(b"%%MatrixMarket"),
+        lambda head, path: matrix_market.looks_like(head),
         lambda path, letter, variable: matrix_market.read(path),
     ),
     Format("MATLAB 5 to 7.3 (.mat)", _is_matlab, _matlab),
@@ -151,9 +153,7 @@ def read_matrix(given: str, letter: str) -> Entries:
         fix = nearest(path.name, names_beside(path)) or "check the path"
         raise InputError(f"the file of {letter} does not exist", display(path), None, "a matrix file", fix)
     with readable(path, f"file of {letter}"):
-        with path.open("rb") as file:
-            head = file.read(520)
-        return _read(path, head, variable, letter)
+        return _read(path, head_of(path, 520), variable, letter)
 
 
 @contextmanager
@@ -164,6 +164,7 @@ def readable(path: Path, what: str) -> Iterator[None]:
     ------
     InputError
     """
+    check_plain(path, what)
     try:
         yield
     except InputError as error:

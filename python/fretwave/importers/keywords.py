@@ -48,7 +48,7 @@ def number(word: str) -> float:
 
 def _lines(path: Path, above: tuple[Path, ...]) -> Iterator[tuple[str, str]]:
     """File and line, and text of each line that is no comment, keywords in one line."""
-    lines = iter(enumerate(path.read_text(encoding="utf-8", errors="replace").splitlines(), 1))
+    lines = iter(enumerate(path.read_text(encoding="utf-8-sig", errors="replace").splitlines(), 1))
     for count, line in lines:
         text, place = line.strip(), f"{display(path)}:{count}"
         if not text or text.startswith("**"):

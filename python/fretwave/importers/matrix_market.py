@@ -6,19 +6,40 @@ A symmetric file holds the lower triangle; SciPy gives both.
 
 from __future__ import annotations
 
+import codecs
+from io import BytesIO
 from pathlib import Path
 
 import scipy.io
 
 from ..texts import display
 from .entries import Entries
+from .text import doubt_of_end
+
+BANNER = b"%%MatrixMarket"
+
+
+def looks_like(head: bytes) -> bool:
+    """It begins with the banner in letters of any case, after blank lines too."""
+    return head.lstrip()[: len(BANNER)].lower() == BANNER.lower()
 
 
 def read(path: Path) -> Entries:
     """A matrix, both triangles when its header says symmetric."""
-    rows, columns, entries, layout, _, symmetry = scipy.io.mminfo(str(path))
+    rows, columns, entries, layout, _, symmetry = scipy.io.mminfo(_source(path))
     least = 2 * (rows * columns // 2 if layout == "array" else entries)  # a digit and a blank each
     if min(rows, columns) < 0 or least > path.stat().st_size:
         raise ValueError(f"{rows} x {columns} with {entries} entries by its header, in {path.stat().st_size} bytes")
     mirrored = "lower triangle (symmetric by its header), mirrored" if symmetry == "symmetric" else ""
-    return Entries.of(scipy.io.mmread(str(path)), display(path), "Matrix Market", mirrored)
+    found = Entries.of(scipy.io.mmread(_source(path)), display(path), "Matrix Market", mirrored)
+    found.doubt = doubt_of_end(path)
+    return found
+
+
+def _source(path: Path) -> str | BytesIO:
+    """The file itself where SciPy knows its banner, else its content under the banner that SciPy knows."""
+    with path.open("rb") as file:
+        if file.read(len(BANNER)) == BANNER:
+            return str(path)
+    content = path.read_bytes().removeprefix(codecs.BOM_UTF8).lstrip()
+    return BytesIO(BANNER + content[len(BANNER) :])

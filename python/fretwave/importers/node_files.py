@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import re
+from codecs import BOM_UTF8
 from pathlib import Path
 
 from ..files.isolated import call_isolated
 from . import ansys_mesh, nastran
 from .ansys_full import head_of
 from .nodes import Nodes, read_nodes
+from .text import check_unmarked
 
 #: How a file begins, or a line of it, that only this kind has; and its reader.
 KINDS = (
@@ -26,9 +28,10 @@ OTHERS = (b"PK\x03\x04", b"*")
 
 def read_node_file(path: Path) -> Nodes:
     """Coordinates and sets from a file of any of the forms; other packages read theirs in a process of its own."""
-    content = path.read_bytes() if path.is_file() else b""
+    content = path.read_bytes().removeprefix(BOM_UTF8) if path.is_file() else b""
     for known, module, function in KINDS if not content.startswith(OTHERS) else ():
         if known.search(content):
+            check_unmarked(path)
             found: Nodes = call_isolated(module, function, path, size=len(content))
             return found
     return read_nodes(path)

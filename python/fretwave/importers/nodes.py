@@ -20,7 +20,7 @@ from ..texts import display, nearest
 from .cells import Elements
 from .constraints import Constraints
 from .keywords import Lines, blocks, number
-from .text import columns_of, whole
+from .text import columns_of, head_of, whole
 
 
 @dataclass
@@ -112,8 +112,7 @@ def read_nodes(path: Path) -> Nodes:
     """Coordinates and sets from a file of any of the forms."""
     if not path.is_file():
         raise InputError("the file of coordinates does not exist", display(path), fix="check the path")
-    with path.open("rb") as file:
-        head = file.read(4096)
+    head = head_of(path, 4096)
     if head.startswith(b"PK\x03\x04"):
         return _from_npz(path)
     if head.lstrip().startswith(b"*"):

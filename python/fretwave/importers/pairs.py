@@ -8,7 +8,6 @@ of the next sector moves by T x_b in the frame of this one, T the turn by 2 pi /
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 import scipy.sparse as sp
@@ -19,11 +18,11 @@ from ..errors import InputError
 from ..fe.interface import tangent_frames
 from ..model.pairs import Pairs
 from ..model.sectors import Term
-from ..texts import display
+from ..texts import counted
 from .nodes import Nodes
+from .overlap import overlap
 from .projection import project
 from .surfaces import Side, check_facing, normals_of, side_of
-from .text import first_data_line, whole
 
 #: Nodes of a pair are this close, over the diagonal of the mesh, unless told.
 TOLERANCE = 1e-6
@@ -33,6 +32,8 @@ FAR = 1e3
 GROUND = "GROUND"
 #: What follows the second set when it is the next sector's.
 NEXT = "@next"
+#: Share of the first side's nodes that lie on the second's faces at least: else it is another side that was meant.
+LEAST = 0.05
 #: Unmatched nodes that a message names.
 SHOWN = 8
 
@@ -46,12 +47,16 @@ class Found:
     others : (n_others,)
         Nodes of the second side.
     weights : (n_pairs, n_others)
+    kept : of the first side's nodes, None for all
+    areas : (n_pairs,), where they are not those of the first side's nodes
     """
 
     both: IntArray
     others: IntArray
     weights: sp.csr_matrix
     note: str = ""
+    kept: IntArray | None = None
+    areas: Array | None = None
 
 
 def reach_of(nodes: Nodes, tolerance: float | None) -> float:
@@ -95,24 +100,24 @@ def match(
     Raises
     ------
     InputError
-        A node has no partner, or two nodes share one; sides are far apart or do not look at each other.
+        A node has no partner, two nodes share one, or hardly any lies on the other side; sides are far apart or do not
+        look at each other.
     """
     where = f"{nodes.where}, sets {first} and {second}"
     second, ahead = _without_next(second, turn, where)
-    a = side_of(nodes, first)
-    normals = normals_of(a, normal)
+    a, reach = side_of(nodes, first), reach_of(nodes, tolerance)
     if second.upper() == GROUND and GROUND not in nodes.sets:
-        both = np.column_stack([a.numbers, np.zeros_like(a.numbers)])
+        normals, both = normals_of(a, normal), np.column_stack([a.numbers, np.zeros_like(a.numbers)])
         found = Found(both, a.numbers[:0], sp.csr_matrix((len(both), 0)))
     else:
-        b, reach = side_of(nodes, second), reach_of(nodes, tolerance)
-        if ahead is not None:
-            _check_ahead(a, b, ahead, reach, where)
-            b = replace(b, points=b.points @ ahead.T)
+        b = _placed(a, side_of(nodes, second), turn, ahead, reach, where)
+        normals = normals_of(a, normal)
         found = _pair(a, b, normals, where, nodes, reach)
     if notes is not None and found.note:
         notes.append(f"contact '{name}': {found.note}")
-    return _joined(name, found, normals, a.areas, where, labels, nodes, tangent, ahead)
+    areas = a.areas if found.areas is None else found.areas
+    normals = normals if found.kept is None else normals[found.kept]
+    return joined(name, found, normals, areas, where, labels, nodes, tangent, ahead)
 
 
 def _without_next(second: str, turn: Array | None, where: str) -> tuple[str, Array | None]:
@@ -125,14 +130,40 @@ def _without_next(second: str, turn: Array | None, where: str) -> tuple[str, Arr
     return second[: -len(NEXT)], turn
 
 
+def _placed(a: Side, b: Side, turn: Array | None, ahead: Array | None, reach: float, where: str) -> Side:
+    """The second side where it is, or as the next sector's."""
+    if ahead is not None:
+        _check_ahead(a, b, ahead, reach, where)
+        return replace(b, points=b.points @ ahead.T)
+    if turn is not None:
+        _check_here(a, b, turn, reach, where)
+    return b
+
+
 def _check_ahead(a: Side, b: Side, turn: Array, reach: float, where: str) -> None:
     """The first side does not lie where the second one is of the sector before (of two sectors also the next)."""
     if np.allclose(turn, turn.T) or cKDTree(b.points @ turn).query(a.points)[0].max() > reach:
         return
     measured = f"{len(a.numbers)} nodes at the second side of the sector before"
-    first, second = (side.where.rpartition(" ")[2] for side in (a, b))
-    fix = f"write {second} {first}{NEXT}"
+    fix = f"write {b.name} {a.name}{NEXT}"
     raise InputError("the sides are of the wrong sectors", where, measured, "the high end, then the next low end", fix)
+
+
+def _check_here(a: Side, b: Side, turn: Array, reach: float, where: str) -> None:
+    """Two sides of one sector that are far apart are not those that meet where one is turned to the next sector."""
+    apart = _apart(a, b)
+    for first, second in ((a, b), (b, a)) if apart > FAR * reach else ():
+        moved = _apart(first, replace(second, points=second.points @ turn.T))
+        if moved <= reach:
+            measured = f"{apart:.3g} apart, and {moved:.2g} with {second.name} turned to the next sector"
+            fix = f"write {first.name} {second.name}{NEXT}"
+            raise InputError("the sides meet across the boundary", where, measured, f"{NEXT} for the next one's", fix)
+
+
+def _apart(a: Side, b: Side) -> float:
+    """Distance of the nearest nodes, or of the nearest node and face."""
+    nodes = float(cKDTree(b.points).query(a.points)[0].min())
+    return min(nodes, float(project(a.points, b)[1].min())) if b.faces else nodes
 
 
 def _pair(a: Side, b: Side, normals: Array, where: str, nodes: Nodes, reach: float) -> Found:
@@ -144,15 +175,15 @@ def _pair(a: Side, b: Side, normals: Array, where: str, nodes: Nodes, reach: flo
     distance, partner = cKDTree(b.points).query(a.points)
     _check_near(a, b, distance, partner, where, reach)
     both = np.column_stack([a.numbers, b.numbers[partner]])
-    check_facing(normals, b, partner)
     alone = [f"{n} ({d:.3g} away)" for n, d in zip(a.numbers[distance > reach], distance[distance > reach])]
     left = np.setdiff1d(np.arange(len(b.numbers)), partner[distance <= reach])
     if not alone and not len(left) and len(both) == len(b.numbers):
         weights = sp.csr_matrix((np.ones(len(both)), (np.arange(len(both)), partner)), shape=(len(both),) * 2)
+        check_facing(normals, b, partner)
         wide = distance.max() > reach_of(nodes, None)
         return Found(both, b.numbers, weights, f"its nodes are up to {distance.max():.2g} apart" if wide else "")
     if b.faces:
-        return _projected(a, b, both, where, reach)
+        return _projected(a, b, both, (normals, partner), where, reach)
     distance_b = cKDTree(a.points).query(b.points[left])[0] if len(left) else []
     alone += [f"{n} ({d:.3g} away)" for n, d in zip(b.numbers[left], distance_b)]
     raise InputError(
@@ -166,22 +197,44 @@ def _pair(a: Side, b: Side, normals: Array, where: str, nodes: Nodes, reach: flo
     )
 
 
-def _projected(a: Side, b: Side, both: IntArray, where: str, reach: float) -> Found:
+def _projected(a: Side, b: Side, both: IntArray, looks: tuple[Array, IntArray], where: str, reach: float) -> Found:
+    """The first side's nodes on the second's faces; where the sides overlap in part those that lie on them.
+
+    Parameters
+    ----------
+    looks : normals (n, 3) of the first side, and the nearest node of the second
+    """
     weights, distance = project(a.points, b)
-    beside = distance > reach
-    if beside.any():
-        named = [f"{n} ({d:.3g} away)" for n, d in zip(a.numbers[beside], distance[beside])]
+    near = np.isfinite(distance)
+    chosen = near if near.any() else slice(None)
+    check_facing(looks[0][chosen], b, looks[1][chosen])
+    _check_on(a, b, distance, where, reach)
+    faces = sum(len(table) for table in b.faces)
+    note = f"meshes do not match: {near.sum()} nodes on {faces} faces, at most {distance[near].max():.2g} away"
+    if near.all():
+        return Found(both, b.numbers, weights, note)
+    areas = None if not a.faces else overlap(a, b, near, where)[near]
+    note += f"; {(~near).sum()} of {counted(len(near), 'node')} lie beside them and are left out"
+    note += "" if areas is None else f", the overlap is {areas.sum():.6g}"
+    return Found(both[near], b.numbers, weights[near], note, np.flatnonzero(near), areas)
+
+
+def _check_on(a: Side, b: Side, distance: Array, where: str, reach: float) -> None:
+    """No node is off the faces that it lies over, and more than a few lie over some."""
+    off, beside = np.isfinite(distance) & (distance > reach), np.isinf(distance)
+    few = np.isfinite(distance).sum() < LEAST * len(distance)
+    if off.any() or few:
+        wrong = off | beside if few else off
+        named = [f"{n} ({d:.3g} away)" for n, d in zip(a.numbers[wrong], distance[wrong])]
         named = [text.replace("inf away", "beside all faces") for text in named]
         raise InputError(
             "nodes of the first side do not lie on the second's faces",
             where,
             f"{len(named)} of {len(a.numbers)} nodes: {_shown(named)}",
-            f"each within {reach:.3g} of a face of {b.where}",
-            "name first the side that lies on the other all over, or widen --tolerance",
+            f"each within {reach:.3g} of a face of {b.where}"
+            + (f", or beside them; {LEAST:.0%} on them" if few else ""),
+            "name first the side that lies on the other all over" if few else "widen --tolerance, or check the sets",
         )
-    faces = sum(len(table) for table in b.faces)
-    note = f"meshes do not match: {len(both)} nodes on {faces} faces, at most {distance.max():.2g} away"
-    return Found(both, b.numbers, weights, note)
 
 
 def _shown(named: list[str]) -> str:
@@ -200,85 +253,12 @@ def _check_near(a: Side, b: Side, distance: Array, partner: IntArray, where: str
     if closest > FAR * reach:
         measured = f"{nearest}, {closest:.3g} apart"
         fix = "check the names of the sets, or that both bodies are in one unit and place; else widen --tolerance"
+        if a.faces and project(b.points, a)[1].min() <= reach:
+            fix = f"write {b.name} first: its nodes lie on the faces of {a.name}, between the nodes"
         raise InputError("the two sides are far apart", where, measured, f"at most {reach:.3g}", fix)
 
 
-def read_pairs(
-    name: str,
-    path: Path,
-    labels: IntArray,
-    nodes: Nodes | None = None,
-    tangent: Array | None = None,
-    tolerance: float | None = None,
-) -> Pairs:
-    """A CSV of ``node_a, node_b, nx, ny, nz, area``; node_b empty or 0 is ground, the area may be left out.
-
-    Parameters
-    ----------
-    name, labels, tangent
-        As `match`, the default tangent being the axis most across all normals.
-    tolerance
-        As `match`: nodes of a pair may be a thousand of it apart, for what a CSV pairs need not coincide.
-
-    Raises
-    ------
-    InputError
-        A line is no pair, or its nodes are far apart.
-    """
-    where = display(path)
-    if not path.is_file():
-        raise InputError("the file of pairs does not exist", where, fix="check the path; two names are two node sets")
-    rows = []
-    for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
-        if not first_data_line(line.encode()) or line.lower().lstrip().startswith("node"):
-            continue  # blank, comment or heading
-        words = [word.strip() for word in line.split(",")]
-        try:
-            rows.append([float(word or 0) for word in words] + [np.nan] * (6 - len(words)))
-            if len(words) not in (5, 6) or not words[0]:
-                raise ValueError
-        except ValueError:
-            expected = "node_a, node_b, nx, ny, nz, area"
-            raise InputError("this is no pair", f"{where}:{number}", line, expected, "correct the line") from None
-    table = np.array(rows, dtype=float).reshape(-1, 6)
-    areas = None if np.isnan(table[:, 5]).any() else table[:, 5]
-    both = whole(table[:, :2], where)
-    _check_table(table, where)
-    if nodes is not None:
-        _check_apart(both, nodes, where, reach_of(nodes, tolerance))
-    second = both[:, 1]
-    weights = sp.diags((second != 0).astype(float)).tocsr()
-    return _joined(name, Found(both, second, weights), table[:, 2:5], areas, where, labels, nodes, tangent)
-
-
-def _check_table(table: Array, where: str) -> None:
-    """Each pair (n, 6) stands once, is of two nodes, and has no area below zero."""
-    repeated = np.ones(len(table), dtype=bool)
-    repeated[np.unique(table[:, :5], axis=0, return_index=True)[1]] = False
-    for wrong, what, expected in (
-        (repeated, "a pair stands twice", "each pair once"),
-        (table[:, 0] == table[:, 1], "a pair is of one node with itself", "two nodes, or 0 for ground"),
-        (table[:, 5] < 0, "a pair has an area below zero", "zero or more"),
-    ):
-        if wrong.any():
-            measured = f"pair {np.argmax(wrong) + 1} ({', '.join(f'{x:g}' for x in table[np.argmax(wrong)])})"
-            raise InputError(what, where, f"{measured}, {wrong.sum()} such", expected, "correct the table")
-
-
-def _check_apart(both: IntArray, nodes: Nodes, where: str, reach: float) -> None:
-    """No pair of nodes is a thousand tolerances apart."""
-    rows = np.flatnonzero(both[:, 1])
-    xa, xb = (nodes.coordinates[nodes.places(both[rows, k])] for k in (0, 1))
-    apart = np.linalg.norm(xa - xb, axis=1)
-    if (apart > FAR * reach).any():
-        worst = int(np.argmax(apart))
-        a, b = both[rows[worst]]
-        measured = f"nodes {a} and {b} are {apart[worst]:.3g} apart; {int((apart > FAR * reach).sum())} such"
-        fix = f"check the node numbers, or give --tolerance {1.1 * apart[worst] / FAR:.2g} where they are meant"
-        raise InputError("nodes of a pair are far apart", where, measured, f"at most {FAR * reach:.3g}", fix)
-
-
-def _joined(
+def joined(
     name: str,
     found: Found,
     normals: Array,

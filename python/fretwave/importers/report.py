@@ -10,7 +10,7 @@ import numpy as np
 from scipy.sparse.csgraph import connected_components
 
 from ..arrays import Array
-from ..errors import FretwaveError
+from ..errors import FretwaveError, PetscError
 from ..model.sectors import Sparse
 from ..model.structure import Structure
 from ..texts import counted
@@ -83,6 +83,7 @@ def check(
     evidence: Sequence[Evidence],
     modes: int,
     comm: MPI.Comm,
+    warnings: Sequence[str] = (),
 ) -> Report:
     """Everything that can be said without a law of contact. Collective.
 
@@ -96,8 +97,10 @@ def check(
         Of its units.
     modes : int
         Frequencies to show beside the rigid modes.
+    warnings : sequence of str
+        Of the import.
     """
-    report = Report()
+    report = Report(warnings=list(warnings))
     nodes = "" if model.labels is None else f" at {len(np.unique(model.labels[:, 0]))} nodes"
     inside = len(internal_nodes(model))
     more = f", {inside} of them inside elements (numbered beyond the mesh's)" if inside else ""
@@ -145,11 +148,11 @@ def masses(M: Sparse, motions: Array) -> Array:
 
 
 def _diagonal(model: Structure, diagonal: Array, quantity: str, report: Report) -> None:
-    """Mass and stiffness of every dof are above zero."""
-    for wrong, kind in ((diagonal < 0, "negative"), (diagonal == 0, "no")):
-        if wrong.any():
-            first = model.dof_names[int(np.argmax(wrong))]
-            report.warnings.append(f"{counted(int(wrong.sum()), 'dof')} with {kind} {quantity}, the first is {first}")
+    """Every dof has mass and stiffness."""
+    wrong = diagonal == 0
+    if wrong.any():
+        first = model.dof_names[int(np.argmax(wrong))]
+        report.warnings.append(f"{counted(int(wrong.sum()), 'dof')} with no {quantity}, the first is {first}")
 
 
 def _frequencies(model: Structure, motions: Array | None, modes: int, comm: MPI.Comm, report: Report) -> None:
@@ -161,9 +164,9 @@ def _frequencies(model: Structure, motions: Array | None, modes: int, comm: MPI.
         with Model(model.M, model.K, comm=comm) as whole:
             found = linear_modes(whole, expected + modes, "free")
     except FretwaveError as error:
-        report.warnings.append(
-            f"the frequencies cannot be computed ({error.what}): is M positive, and is no dof loose?"
-        )
+        reason = "" if isinstance(error, PetscError) else f" ({error.what})"
+        said = "is a dof without mass and stiffness, or K singular where there is no mass?"
+        report.warnings.append(f"the frequencies cannot be computed{reason}: {said}")
         return
     scale = model.K.diagonal().sum() / model.M.diagonal().sum()
     squares = np.array([mode.shape @ (model.K @ mode.shape) / (mode.shape @ (model.M @ mode.shape)) for mode in found])
@@ -179,11 +182,15 @@ def _frequencies(model: Structure, motions: Array | None, modes: int, comm: MPI.
             + ("a mechanism or a loose part" if rigid > expected else "K does not leave a rigid motion free of force")
         )
     if (squares < -RIGID * scale).any():
-        report.warnings.append(f"K is negative for a motion: omega^2 = {squares.min():.4g}")
+        report.warnings.append(
+            f"K is negative for a motion: omega^2 = {squares.min():.4g}. A buckled structure, or one that spins too"
+            " fast for its stiffness, is unstable so; else a sign or an entry of K is wrong"
+        )
     elastic = np.sqrt(squares[squares >= RIGID * scale])[:modes] / (2 * np.pi)
     unit = "Hz" if model.units else "1/time"
     faces = ", both faces free" if model.sectors else ""
-    report.lines.append(f"first frequencies{faces} [{unit}]: " + ", ".join(f"{value:.6g}" for value in elastic))
+    values = ", ".join(f"{value:.6g}" for value in elastic) or "none among the modes that were looked for"
+    report.lines.append(f"first frequencies{faces} [{unit}]: {values}")
     if model.sectors and modes:
         _waves(model, modes, unit, comm, report)
 

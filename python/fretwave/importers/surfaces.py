@@ -37,6 +37,11 @@ class Side:
     points: Array
     faces: list[IntArray]
 
+    @property
+    def name(self) -> str:
+        """Of the set."""
+        return self.where.rpartition(" ")[2]
+
     @cached_property
     def _integrals(self) -> tuple[Array, Array]:
         """Area (n,) and outward normal times area (n, 3) of each node."""

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import codecs
+import re
+import zipfile
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -14,25 +18,95 @@ from .entries import Entries
 COMMENTS = ("*", "#", "%")
 #: Rows for each entry from which on an index is wrong: mass and stiffness have an entry in every row.
 SPARSEST = 10
+#: Bytes at a file's end, and lines there before the last, by which its last number is judged.
+TAIL, JUDGES = 4096, 8
+ZIP = b"PK\x03\x04"
+#: How files begin that are no plain text: what they are, and what to do.
+PACKED = {
+    ZIP: ("compressed (zip)", "unpack it: unzip {}"),
+    b"\x1f\x8b": ("compressed (gzip)", "unpack it: gunzip {}"),
+    b"BZh": ("compressed (bzip2)", "unpack it: bunzip2 {}"),
+    b"\xfd7zXZ\x00": ("compressed (xz)", "unpack it: unxz {}"),
+    codecs.BOM_UTF16_LE: ("text in UTF-16", "write it in UTF-8: iconv -f UTF-16 -t UTF-8 {}"),
+    codecs.BOM_UTF16_BE: ("text in UTF-16", "write it in UTF-8: iconv -f UTF-16 -t UTF-8 {}"),
+}
+_EXPONENT = re.compile(r"[eEdD][+-]?\d+$")
+
+
+def head_of(path: Path, size: int = 65536) -> bytes:
+    """How a file begins, without the mark that editors put before UTF-8."""
+    with path.open("rb") as file:
+        return file.read(size).removeprefix(codecs.BOM_UTF8)
+
+
+def check_plain(path: Path, what: str) -> None:
+    """A file is neither compressed nor in UTF-16; a .npz, which is a zip archive of arrays, counts as plain.
+
+    Raises
+    ------
+    InputError
+    """
+    head = head_of(path, 8) if path.is_file() else b""
+    for begin, (kind, fix) in PACKED.items():
+        if head.startswith(begin) and not (begin == ZIP and _has_arrays(path)):
+            raise InputError(f"the {what} cannot be read", display(path), kind, "plain", fix.format(display(path)))
+
+
+def _has_arrays(path: Path) -> bool:
+    """A zip archive has them, or is damaged, which its reader tells."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return any(name.endswith(".npy") for name in archive.namelist())
+    except (zipfile.BadZipFile, OSError, ValueError, NotImplementedError):
+        return True
+
+
+def check_unmarked(path: Path) -> None:
+    """A file that another package reads begins without the mark of UTF-8, which would hide its first line.
+
+    Raises
+    ------
+    InputError
+    """
+    with path.open("rb") as file:
+        if file.read(3) != codecs.BOM_UTF8:
+            return
+    fix = f"save it without: sed -i '1s/^\\xEF\\xBB\\xBF//' {display(path)}"
+    raise InputError("the file begins with the mark of UTF-8", display(path), "EF BB BF", "its first line", fix)
 
 
 def first_data_line(head: bytes) -> str:
     """The first line that is no comment and no keyword."""
-    lines = head.decode("utf-8", errors="replace").splitlines()
-    return next((line for line in lines if line.strip() and not line.lstrip().startswith(COMMENTS)), "")
+    return _first_data(head)[1]
 
 
-def columns_of(path: Path, width: int) -> Array:
-    """(n_lines, width) numbers, separated by blanks or commas, after comments and one heading at most."""
-    with path.open("rb") as file:
-        head = file.read(65536)
-    first = first_data_line(head)
-    skip = int(first.strip()[:1].isalpha())  # a heading stands in the first line
+def _first_data(head: bytes) -> tuple[int, str]:
+    """How many lines stand above the first that is no comment and no keyword, and that one."""
+    lines = enumerate(head.decode("utf-8", errors="replace").splitlines())
+    return next(((n, line) for n, line in lines if line.strip() and not line.lstrip().startswith(COMMENTS)), (0, ""))
+
+
+def columns_of(path: Path, width: int, converters: Mapping[int | str, Callable[[str], float]] | None = None) -> Array:
+    """(n_lines, width) numbers, separated by blanks or commas, after comments and one heading at most.
+
+    Parameters
+    ----------
+    converters : what makes numbers of the words of a column
+    """
+    doubt_of_end(path)  # a last number that was cut is refused
+    head = head_of(path)
+    above, first = _first_data(head)
+    if ";" in first:
+        expected, fix = "columns separated by commas or blanks", "write commas between columns, points in decimals"
+        raise InputError("columns are separated by semicolons", display(path), first.strip(), expected, fix)
+    skip = above + 1 if first.strip().strip('"')[:1].isalpha() else 0  # with its heading
     mark = head.lstrip()[:1].decode("utf-8", "replace")
     # One mark of comments is looked for in C, several line by line in Python: five times slower.
     comments, delimiter = mark if mark in COMMENTS else "*", "," if "," in first else None
+    with path.open("rb") as file:
+        encoding = "utf-8-sig" if file.read(3) == codecs.BOM_UTF8 else "latin1"
     try:
-        table = np.loadtxt(path, ndmin=2, skiprows=skip, comments=comments, delimiter=delimiter)
+        table = np.loadtxt(path, float, comments, delimiter, converters, skip, ndmin=2, encoding=encoding)
     except ValueError as error:
         fix = "is the file complete, and of one matrix?"
         raise InputError(f"the file is no table of {width} columns", display(path), error, None, fix) from None
@@ -63,6 +137,7 @@ def whole(values: Array | IntArray, where: str) -> IntArray:
 
 def triplets(table: Array, where: str, kind: str) -> Entries:
     """Entries of lines "row column value", indices from 1; the largest index is the size."""
+    _check_no_size(table, where)
     places = table[:, :2].astype(np.int64) - 1
     wrong = (places + 1 != table[:, :2]).any(axis=1) | (places < 0).any(axis=1)
     if wrong.any():
@@ -75,3 +150,36 @@ def triplets(table: Array, where: str, kind: str) -> Entries:
         measured, fix = f"{size} rows, {len(table)} entries", "correct the number of the row or column"
         raise InputError("most rows of a matrix are empty", where, measured, "an entry in each row", fix)
     return Entries(places[:, 0], places[:, 1], table[:, 2], (size, size), where, kind)
+
+
+def _check_no_size(table: Array, where: str) -> None:
+    """The first line is no "rows columns entries": that of the last row's diagonal, which stands again further down."""
+    (rows, columns, count), rest = table[0], table[1:]
+    is_size = rows == columns == table[:, :2].max() and count == np.floor(count) and count >= len(rest)
+    if is_size and (rest[:, :2] == rows).all(axis=1).any():
+        measured = f"{rows:g} {columns:g} {count:g}, then {len(rest)} lines"
+        fix = "remove that line, or begin with `%%MatrixMarket matrix coordinate real general` (or `symmetric`)"
+        raise InputError("the first line is the size of a matrix", where, measured, "row column value", fix)
+
+
+def doubt_of_end(path: Path) -> str:
+    """A warning where the last line does not end, so that its number may have been cut; "" where it is whole.
+
+    Raises
+    ------
+    InputError
+        It was cut: the lines before end with exponents of one length, the last does not.
+    """
+    with path.open("rb") as file:
+        file.seek(max(0, path.stat().st_size - TAIL))
+        tail = file.read().decode("utf-8", "replace")
+    lines = [line for line in tail.splitlines() if line.strip() and not line.lstrip().startswith(COMMENTS)]
+    if not lines or tail.endswith(("\n", "\r")):
+        return ""
+    *before, last = [len(found[0]) if (found := _EXPONENT.search(line.rstrip())) else 0 for line in lines[-JUDGES:]]
+    if set(before) not in ({0}, set()) and set(before) == {last}:
+        return ""
+    if len(set(before)) == 1 and before[0]:
+        fix = "export it again; is the file complete?"
+        raise InputError("the last line is cut", display(path), lines[-1], "a value as in the lines before", fix)
+    return f"{display(path)} does not end with the end of a line: is its last one whole, `{lines[-1].strip()}`?"

@@ -1,13 +1,14 @@
 """Which unit systems an imported model can be in: told by its materials, and by its mass, stiffness and size.
 
 A system is out of the question where a material would be no solid in it. Bounds are wide, from polymers to tungsten,
-and known systems are 1e3 apart at least in density or stiffness: what is refused is a slip, not an odd material.
+and known systems are 1e3 apart at least in density or stiffness: what is refused is a slip, not an odd material. The
+matrices are the model: where they tell their units, materials of a deck beside say no more than whether it is theirs.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -26,12 +27,16 @@ SPEED, DENSITY_OF_BOX = (500.0, 5e4), (40.0, 2e4)
 
 @dataclass(frozen=True)
 class Number:
-    """A number that tells units: what it is, in which unit of SI, and between which bounds it is a solid's there."""
+    """A number that tells units: what it is, in which unit of SI, and between which bounds it is a solid's there.
+
+    At least so much: a value below the bounds excludes nothing.
+    """
 
     name: str
     value: float
     unit: str
     bounds: tuple[float, float]
+    at_least: bool = False
 
     def in_si(self, units: UnitSystem) -> float:
         """As a number of this system."""
@@ -46,6 +51,10 @@ class Number:
         """It is a solid's as a number of this system."""
         return self.bounds[0] < self.in_si(units) < self.bounds[1]
 
+    def excludes(self, units: UnitSystem) -> bool:
+        """It is no solid's there, however sparse."""
+        return not (self.fits(units) or (self.at_least and self.in_si(units) < self.bounds[1]))
+
 
 @dataclass(frozen=True)
 class Evidence:
@@ -55,11 +64,13 @@ class Evidence:
     ----------
     of : what they are numbers of
     where : file and line, or empty
+    of_model : they are of the matrices and coordinates, not of a material that is named beside
     """
 
     numbers: Sequence[Number]
     of: str
     where: str = ""
+    of_model: bool = False
 
     @property
     def text(self) -> str:
@@ -76,9 +87,28 @@ class Evidence:
         """Names of the systems that they can be in."""
         return tuple(name for name, units in SYSTEMS.items() if all(one.fits(units) for one in self.numbers))
 
+    @property
+    def mixed(self) -> str:
+        """Units of coordinates, and systems of matrices, in which together they are a solid's; "" for none."""
+        found = []
+        for own in SYSTEMS.values():
+            others = [name for name, units in SYSTEMS.items() if units.metres != own.metres]
+            alike = [
+                name
+                for name in others
+                if all(one.fits(replace(SYSTEMS[name], metres=own.metres)) for one in self.numbers)
+            ]
+            found += [f"in {own.length} beside matrices like {' or '.join(alike)}"] if alike else []
+        return ", or ".join(dict.fromkeys(found)) if self.of_model else ""
+
     def contradicts(self, system: str) -> bool:
         """They can be in a known system, but not in this one."""
         return bool(self.fits) and system not in self.fits
+
+    def decides(self, system: str) -> bool:
+        """They are of the model, and in this system or excluded there."""
+        excluded = any(one.excludes(SYSTEMS[system]) for one in self.numbers)
+        return self.of_model and (system in self.fits or excluded)
 
     def read_in(self, system: str) -> str:
         """What they are as numbers of a system."""
@@ -92,7 +122,7 @@ def evidence_of(model: Structure, materials: Sequence[Material] = ()) -> list[Ev
 
 
 def check_declared(declared: str, evidence: Sequence[Evidence], where: str, fix: Callable[[str], str]) -> None:
-    """Declared units that nothing speaks for are refused.
+    """Declared units that the matrices contradict are refused; where these do not tell, those that nothing speaks for.
 
     Parameters
     ----------
@@ -101,27 +131,42 @@ def check_declared(declared: str, evidence: Sequence[Evidence], where: str, fix:
     Raises
     ------
     InputError
-        All evidence contradicts them, and fits another known system.
+        They are another known system's.
     """
     telling = [one for one in evidence if one.fits]
-    if not telling or any(declared in one.fits for one in telling):
+    deciding = [one for one in telling if one.decides(declared)] or telling
+    if not deciding or any(declared in one.fits for one in deciding):
         return
-    first = telling[0]
-    place = ", ".join(filter(None, (where, first.where)))
-    what, read = "the numbers contradict the declared units", first.read_in(declared)
-    raise InputError(what, place, read, first.expected, fix(first.fits[0]))
+    system = deciding[0].fits[0]
+    shown = next(one for one in telling if system in one.fits)
+    place = ", ".join(filter(None, (where, shown.where)))
+    apart = [one for one in telling if system not in one.fits]
+    more = f", or export deck and matrices from one model: {_apart(apart[0])}" if apart else ""
+    what, read = "the numbers contradict the declared units", shown.read_in(declared)
+    raise InputError(what, place, read, shown.expected, fix(system) + more)
+
+
+def _apart(material: Evidence) -> str:
+    """Of a material that is not in the units of the matrices."""
+    return f"{material.text} is like {' or '.join(material.fits)}"
 
 
 def words(declared: str | None, evidence: Sequence[Evidence]) -> tuple[list[str], list[str]]:
     """Lines of a report and warnings."""
     lines = [f"units: {declared}" if declared else f"units: not declared, read as {SI.name}"]
     warnings = []
+    of_model = [name for one in evidence if one.of_model for name in one.fits]
     for one in evidence:
         if one.fits:
             lines.append(f"units: like {' or '.join(one.fits)} for a solid ({one.text})")
+        elif one.mixed:
+            warnings.append(f"units: the coordinates seem not to be the model's, but {one.mixed} ({one.text})")
         else:
             warnings.append(f"units: no known system in which this is a solid ({one.text}): is M in the units of K?")
-        if one.contradicts(declared or SI.name):
+        if of_model and not one.of_model and one.fits and not set(one.fits) & set(of_model):
+            likely = " or ".join(of_model)
+            warnings.append(f"units: {_apart(one)}, the matrices like {likely}: are deck and matrices of one model?")
+        elif one.contradicts(declared or SI.name):
             system = declared or f"{SI.name}, for none is declared"
             warnings.append(f"units: read as {system}, but like {' or '.join(one.fits)}: give --units {one.fits[0]}")
     return lines, warnings
@@ -150,6 +195,6 @@ def _of_matrices(model: Structure) -> Iterator[Evidence]:
     density = float(np.einsum("ik,ik->k", moves, M @ moves).max() / size.prod())
     numbers = [
         Number("speed of sound about", speed, "m/s", SPEED),
-        Number("density at least", density, "kg/m^3", DENSITY_OF_BOX),
+        Number("density at least", density, "kg/m^3", DENSITY_OF_BOX, at_least=True),
     ]
-    yield Evidence(numbers, "by mass, stiffness and size")
+    yield Evidence(numbers, "by mass, stiffness and size", of_model=True)
