@@ -20,6 +20,7 @@ MEASURED = "sector,deviation\n" + "\n".join(f"{k},{0.01 * (k - 2)}" for k in ran
     [
         (MEASURED.replace("5,0.03\n", ""), ("lacks sectors", "none for sector 5", "6 lines, one for each sector")),
         (MEASURED + "6,0.0\n", ("is of no sector", "blades.csv:8", "sector 6", "0 to 5")),
+        (MEASURED.replace(".", ","), ("of more columns", "blades.csv:2", "0,-0,02", "decimal points")),
         (MEASURED.replace("0.03", "-1.0"), ("has no such value", "a number > -1")),
         (MEASURED.replace("sector", "blade"), ("has other headings", "sector,deviation")),
     ],
