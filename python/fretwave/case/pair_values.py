@@ -97,8 +97,9 @@ class ValueTable:
         """A decimal comma makes two columns of a number."""
         if len(row) == len(headings):
             return
-        longer = len(row) > len(headings)
-        what, fix = ("has a line of more columns than headings", "write decimal points, not commas") if longer else ("ends early", "complete the line")
+        what, fix = "ends early", "complete the line"
+        if len(row) > len(headings):
+            what, fix = "has a line of more columns than headings", "write decimal points, not commas"
         measured, expected = f"{len(row)} columns: {shortened(','.join(row))}", f"{len(headings)}, as its headings"
         self._wrong(what, line, measured, expected, fix)
 

@@ -14,6 +14,7 @@ from ..hb.suspects import STIFF
 from ..model.contact import span
 from ..model.laws import Role
 from ..model.sectors import by_sector
+from .odd_material import odd_material
 
 if TYPE_CHECKING:
     from ..model.contact import Contact
@@ -33,7 +34,7 @@ def odd_ratios(case: Case) -> list[InputError]:
     found = [warning for contact in case.contacts for warning in _of_contact(case, contact)]
     for analysis in case.analyses.values():
         found += _of_amplitude(case, analysis)
-    return found
+    return found + list(odd_material(case.tables.gauges.material, case.source, case.structure))
 
 
 def own_stiffness(case: Case, contact: Contact) -> Array:
