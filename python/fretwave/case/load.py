@@ -143,7 +143,7 @@ def _build(
             stiffness_damping=section.stiffness_damping,
             mass_damping=section.mass_damping,
         )
-        structure, contacts = tie(section, source, structure, contacts, found)
+        structure, contacts = tie(section, source, structure, contacts, notes, found)
         dofs = structure.dof_names
         neighbours = structure if structure.cut else None
         check_aerodynamics(source, flow, neighbours.sectors if neighbours else None, dofs or [], found)
