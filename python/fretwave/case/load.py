@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -12,6 +13,7 @@ from ..errors import CaseErrors, FretwaveError
 from ..model.contact import Contact
 from ..model.pairs import Pairs
 from ..model.structure import Structure
+from ..results.missing_dof import missing_dof
 from . import checks
 from .analysis import Analyses, AnalysisSection
 from .at_speed import known_parts, with_speeds
@@ -126,6 +128,7 @@ def _build(
     structure, places, identity = given or (None, {}, {})
     notes: list[str] = []
     if section and structure:
+        source.dof_fix = partial(missing_dof, structure)
         structure, identity = in_units(section, source, structure, identity, notes, found)
         structure, identity = with_speeds(section, source, structure, identity, notes, found)
         structure, identity = with_loads(section, source, structure, identity, notes, found)
@@ -144,6 +147,7 @@ def _build(
             mass_damping=section.mass_damping,
         )
         structure, contacts = tie(section, source, structure, contacts, notes, found)
+        source.dof_fix = partial(missing_dof, structure.cut or structure)
         dofs = structure.dof_names
         neighbours = structure if structure.cut else None
         check_aerodynamics(source, flow, neighbours.sectors if neighbours else None, dofs or [], found)

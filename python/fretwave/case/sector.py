@@ -11,7 +11,7 @@ from ..cyclic.frames import framed
 from ..errors import InputError
 from ..model.contact import Contact
 from ..model.structure import Structure
-from ..texts import nearest, toml
+from ..texts import toml
 from .contacts import on
 from .face_moves import labels_by_name, said_of_faces
 from .reporter import Found
@@ -91,6 +91,6 @@ def _face(name: str, section: ModelSection, source: Source, structure: Structure
     known = {dof: number for number, dof in enumerate(dofs)}
     for index, dof in enumerate(names):
         if dof not in known:
-            where, fix = source.where(("model", name, index)), nearest(dof, dofs) or "name a dof of the model"
+            where, fix = source.where(("model", name, index)), source.dof_fix(dof, dofs) or "name a dof of the model"
             found.append(InputError(f"unknown dof '{dof}' of the {name} face", where, expected="a dof", fix=fix))
     return np.array([known[dof] for dof in names if dof in known], dtype=np.intp)

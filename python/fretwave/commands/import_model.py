@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -28,8 +29,9 @@ from ..importers.units import Evidence, check_declared, evidence_of
 from ..model.pairs import Pairs
 from ..model.structure import Structure
 from ..mpi.guard import on_first_rank
+from ..results.missing_dof import missing_dof
 from ..results.model_file import SourceFile, write_model
-from ..texts import display, nearest
+from ..texts import display
 from ..units import SYSTEMS, unknown
 from .import_at_rest import tables_at_rest, write_tables
 
@@ -89,14 +91,14 @@ def read_parts(options: argparse.Namespace) -> tuple[Structure, Assembled, list[
         nodes.coordinates = nodes.coordinates - (0.0 if options.origin is None else _three("--origin", options.origin))
     labels = _labels(options, found, nodes)
     found.labels = labels
-    names, dofs = _names(found.names, options.name)
     model = Structure(
-        found.matrices["M"], found.matrices["K"], found.matrices.get("C"), dofs=dofs, names=names, labels=labels
+        found.matrices["M"], found.matrices["K"], found.matrices.get("C"), names=found.names, labels=labels
     )
     model.units = options.units
     if nodes is not None:
         model.node_numbers, model.coordinates = nodes.numbers, nodes.coordinates
         model.hexahedra, model.cells = cells_of(nodes)
+    model.names, model.dofs = _names(model, options.name)
     wheel = wheel_of(options)
     if wheel is not None:
         make_sector(model, wheel, nodes, options.tolerance)
@@ -192,9 +194,9 @@ def _read_table(path: Path) -> IntArray:
     return whole(columns_of(path, 2), display(path))
 
 
-def _names(known: Sequence[str], given: list[str]) -> tuple[list[str], dict[str, int]]:
+def _names(model: Structure, given: list[str]) -> tuple[list[str], dict[str, int]]:
     """``--name tip=17y``: a dof's own name, and it is kept by a reduction. All names, and those given by number."""
-    names, kept = list(known), []
+    names, kept = model.dof_names, []
     for text in given:
         name, _, old = text.partition("=")
         old = old if old in names or f"n{old}" not in names else f"n{old}"
@@ -204,7 +206,7 @@ def _names(known: Sequence[str], given: list[str]) -> tuple[list[str], dict[str,
                 f"--name {text}",
                 None,
                 "NAME=DOF, a new name of letters and digits and a dof such as " + names[0],
-                nearest(old, names) or "check the node and its direction",
+                missing_dof(replace(model, names=names), old, names) or "check the node and its direction",
             )
         kept.append(names.index(old))
         names[kept[-1]] = name
