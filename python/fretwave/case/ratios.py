@@ -63,6 +63,14 @@ def _of_contact(case: Case, contact: Contact) -> Iterator[InputError]:
             f"at most {LARGEST_FRICTION:g}; of dry metals 0.1 to 1.5",
             "look whether it is in percent, or an angle in degrees",
         )
+    if friction is not None and not np.any(friction):
+        yield InputError(
+            f"no pair of contact '{contact.name}' has friction: none sticks, and nothing damps",
+            _key(contact, Role.FRICTION_COEFFICIENT),
+            "0 in every pair",
+            "> 0 in some pair",
+            'give it a value; `type = "linear"` has the modes that slide without friction',
+        )
     yield from _of_loads(case, contact)
 
 
