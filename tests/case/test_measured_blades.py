@@ -32,6 +32,14 @@ def test_measured_deviations_that_do_not_fit(tmp_path: Path, table: str, words: 
     assert all(word in said for word in (*words, "case.toml", "forced.mistuning.deviations", "fix:")), said
 
 
+def test_deviations_that_look_like_ratios_are_warned_of(tmp_path: Path, capsys) -> None:
+    ratios = "sector,deviation\n" + "\n".join(f"{k},{1 + 0.01 * (k - 2)}" for k in range(SECTORS)) + "\n"
+    for table, odd in ((ratios, True), (MEASURED, False)):
+        assert call("check", measured_case(tmp_path, table), "--no-solve") == 0
+        said = capsys.readouterr().out
+        assert ("'forced' look like ratios" in said and "0.98 to 1.03" in said and "take 1 off each" in said) == odd
+
+
 def measured_case(folder: Path, table: str) -> Path:
     own = 'engine_order = 8\nwheel = true\nmistuning = { deviations = "blades.csv" }'
     (folder / "case.toml").write_text(TEXT.replace("engine_order = 8", own))

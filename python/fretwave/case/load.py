@@ -92,7 +92,7 @@ def load_case(
         raise CaseErrors(_in_file_order(found), source.label)
     case = _build(source, _core_laws() if laws is None else laws, loaded, found)
     if found or case is None:
-        advise(found)
+        advise(found, uncertainty)
         raise CaseErrors(_in_file_order(found), source.label)
     if uncertainty is None:
         return case
