@@ -210,3 +210,15 @@ def test_long_analyses_say_how_far_they_are_more_and_more_seldom(monkeypatch, ca
 )
 def test_durations(seconds: float, said: str) -> None:
     assert duration(seconds) == said
+
+
+def test_what_was_done_once_is_said_so() -> None:
+    from types import SimpleNamespace
+
+    from fretwave.analyses.parts.branch import tell_fallbacks
+
+    said: list[str] = []
+    context = SimpleNamespace(name="mode", entry={}, console=SimpleNamespace(line=said.append))
+    tell_fallbacks(context, SimpleNamespace(fallbacks={"rebuilt": 1, "condensed": 2, "whole": 0, "said": ""}))
+    (line,) = said
+    assert line.endswith("preconditioner rebuilt once, condensed contact system factorised 2 times")
