@@ -171,7 +171,7 @@ def _build(
     )
     checks.complete_analyses(source, analyses, facts, found)
     checks.check_analyses(source, analyses, facts, found)
-    check_reduction(source, reduction, analyses, facts.sectors, found)
+    check_reduction(source, reduction, analyses, facts.sectors, notes, found)
     check_preload(source, preload, facts.loads, found)
     check_damping(source, damping, structure, reduction, notes, found)
     gauges = read_gauges(source, (structure.cut or structure) if structure else None, found)
