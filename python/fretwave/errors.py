@@ -10,6 +10,8 @@ EXIT_BAD_INPUT = 2
 EXIT_NOT_CONVERGED = 3
 #: Told to end, by Ctrl-C or otherwise: as shells count SIGINT. Open MPI's mpirun answers 1 to its own Ctrl-C.
 EXIT_INTERRUPTED = 130
+#: Nobody reads the output any more: as shells count SIGPIPE.
+EXIT_UNREAD = 141
 #: Of a message: longer values are cut.
 LONGEST_LINE = 1000
 
@@ -124,4 +126,6 @@ def exit_code_of(error: BaseException) -> int:
     """The process exit code that belongs to an exception."""
     if isinstance(error, KeyboardInterrupt):
         return EXIT_INTERRUPTED
+    if isinstance(error, BrokenPipeError):
+        return EXIT_UNREAD
     return error.exit_code if isinstance(error, FretwaveError) else EXIT_OTHER

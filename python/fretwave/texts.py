@@ -36,6 +36,11 @@ def counted(number: int, word: str) -> str:
     return f"{number} {word}{'s' * (number != 1)}"
 
 
+def times(number: int) -> str:
+    """``once``, ``2 times``."""
+    return "once" if number == 1 else f"{number} times"
+
+
 def nearest(word: str, known: Sequence[str], say: Callable[[str], str] = "did you mean `{}`?".format) -> str | None:
     """A fix line with the nearest known word (its symbol, its begin, like letters), None when nothing is near."""
     symbol = word.lower().replace("_", "")

@@ -17,7 +17,8 @@ Coulomb::Coulomb(CoulombParameters p, int tangents)
 }
 
 double Coulomb::stuck_stiffness(int component, int pair) const {
-  return closed_[pair] * (component ? p_.tangential_stiffness[pair] : p_.normal_stiffness[pair]);
+  if (component == 0) return closed_[pair] * p_.normal_stiffness[pair];
+  return (closed_[pair] && p_.friction_coefficient[pair] > 0) * p_.tangential_stiffness[pair];
 }
 
 LinearPair Coulomb::linear_pair(int i) const {

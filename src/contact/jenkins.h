@@ -15,7 +15,7 @@ class Jenkins : public Law {
   Limit limit() const override { return Limit::each; }
   bool odd() const override;
   std::vector<double> sliders() const override { return slider_; }
-  double stuck_stiffness(int, int pair) const override { return stiffness_[pair]; }
+  double stuck_stiffness(int, int pair) const override { return (limit_[pair] > 0) * stiffness_[pair]; }
   Integration integration() const override { return Integration::pieces; }
   LinearPair linear_pair(int pair) const override;
   void diagnose(Motion const&, double const* f, Diagnosis&) const override;

@@ -132,8 +132,9 @@ class Law {
   unsigned version() const { return version_; }
   /// f(-u, -v) = -f(u, v): the motion may keep odd harmonics only.
   virtual bool odd() const { return false; }
-  /// Stiffness of the contact when stuck in its rest state [force/length] (0 for a pair that is open there);
-  /// infinite means no relative motion at all.
+  /// Stiffness of the contact when stuck in its rest state [force/length]: 0 for a pair that is open there,
+  /// and along the tangents of one without friction, which never sticks; infinite means no relative motion at
+  /// all.
   virtual double stuck_stiffness(int /*component*/, int /*pair*/) const {
     return std::numeric_limits<double>::infinity();
   }

@@ -12,6 +12,9 @@ class RegularisedCoulomb : public Law {
   int pairs() const override { return int(limit_.size()); }
   bool uses_displacement() const override { return false; }
   bool odd() const override { return true; }
+  double stuck_stiffness(int component, int pair) const override {
+    return limit_[pair] > 0 ? Law::stuck_stiffness(component, pair) : 0;
+  }
   Integration integration() const override { return Integration::panels; }
   VelocityLayer velocity_layer(int pair) const override;
   void at_velocities(int pair, int count, double const* v, double* f, double* df_dv) const override;

@@ -305,3 +305,4 @@ def test_a_report_names_every_stuck_mode(solve):
         assert f">stuck, mode {linear['mode'][row]:.0f}<" in text
         assert f'data-from="linear/frequency_hz/{row}"' in text and f'data-from="linear/other_hz/{row}"' in text
     assert ">free, mode" not in text
+    assert "other hz" not in text and ">frequency of the mode most like it, sliding or free [Hz]<" in text

@@ -20,6 +20,7 @@ MEASURED = "sector,deviation\n" + "\n".join(f"{k},{0.01 * (k - 2)}" for k in ran
     [
         (MEASURED.replace("5,0.03\n", ""), ("lacks sectors", "none for sector 5", "6 lines, one for each sector")),
         (MEASURED + "6,0.0\n", ("is of no sector", "blades.csv:8", "sector 6", "0 to 5")),
+        (MEASURED.replace(".", ","), ("of more columns", "blades.csv:2", "0,-0,02", "decimal points")),
         (MEASURED.replace("0.03", "-1.0"), ("has no such value", "a number > -1")),
         (MEASURED.replace("sector", "blade"), ("has other headings", "sector,deviation")),
     ],
@@ -29,6 +30,14 @@ def test_measured_deviations_that_do_not_fit(tmp_path: Path, table: str, words: 
     assert call("check", path) == 2
     said = capsys.readouterr().err
     assert all(word in said for word in (*words, "case.toml", "forced.mistuning.deviations", "fix:")), said
+
+
+def test_deviations_that_look_like_ratios_are_warned_of(tmp_path: Path, capsys) -> None:
+    ratios = "sector,deviation\n" + "\n".join(f"{k},{1 + 0.01 * (k - 2)}" for k in range(SECTORS)) + "\n"
+    for table, odd in ((ratios, True), (MEASURED, False)):
+        assert call("check", measured_case(tmp_path, table), "--no-solve") == 0
+        said = capsys.readouterr().out
+        assert ("'forced' look like ratios" in said and "0.98 to 1.03" in said and "take 1 off each" in said) == odd
 
 
 def measured_case(folder: Path, table: str) -> Path:

@@ -226,6 +226,7 @@ def test_what_is_no_load_at_a_speed_is_refused(name, tmp_path):
         ("dof,force\nn,1.0\nn,2.0\n", ":3", "has a dof again"),
         ("dof,force\nn,much\n", ":2", "has no such value"),
         ("node,force\nn,1.0\n", ":1", "has other headings"),
+        ("dof,force\nn,1,5\n", ":2", "has a line of more columns"),
     ],
 )
 def test_a_wrong_line_of_a_table_is_named(table, line, what, tmp_path):

@@ -197,6 +197,26 @@ def test_values_drawn_beyond_their_bounds_are_refused(tmp_path: Path, line: str,
     assert not (tmp_path / "run").exists()
 
 
+@pytest.mark.parametrize(
+    ("line", "fix"),
+    [
+        ('{ distribution = "uniform", low = -3.0, high = -1.0 }', "take low and high within its bounds"),
+        ('{ distribution = "normal", mean = -9.0, standard_deviation = 1.0 }', 'take `distribution = "lognormal"`'),
+    ],
+)
+def test_what_to_do_about_a_draw_fits_its_distribution(tmp_path: Path, line: str, fix: str) -> None:
+    with pytest.raises(fw.FretwaveError) as error:
+        load_case(case_file(tmp_path, f"values.contact.slider.friction_limit = {line}"), ["uncertainty.seed=1"])
+    assert f"fix:      {fix}" in str(error.value)
+
+
+def test_whole_numbers_are_swept_not_drawn(tmp_path: Path) -> None:
+    line = 'values.mode.harmonics = { distribution = "lognormal", mean = 5.0, standard_deviation = 1.0 }'
+    with pytest.raises(fw.FretwaveError) as error:
+        load_case(case_file(tmp_path, line), ["uncertainty.seed=1"])
+    assert "an integer" in str(error.value) and "--over mode.harmonics=3,5` goes through" in str(error.value)
+
+
 def test_check_looks_whether_the_draws_fit(tmp_path: Path, capfd) -> None:
     path = case_file(tmp_path, LIMIT.replace("friction_limit", "friktion_limit"))
     assert load_case(path).uncertainty is not None

@@ -62,6 +62,37 @@ def test_state_at_rest_and_first_slip_in_closed_form(tmp_path: Path, capfd) -> N
     assert first < 0.9 * lasting and "within the amplitudes asked for" in said and "warning" not in said
 
 
+@pytest.mark.parametrize("friction", [0.0, 1e-6])
+def test_without_friction_the_mode_at_rest_slides(tmp_path: Path, capfd, friction: float) -> None:
+    """Its spring along the tangent holds as soon as there is any friction; the run says the same frequency."""
+    path = put(tmp_path, CASE.replace(f"friction_coefficient = {MU}", f"friction_coefficient = {friction}"))
+    assert call("check", path) == 0
+    said = capfd.readouterr().out
+    squares, shapes = np.linalg.eigh(K + np.diag([KT if friction else 0.0, KN]))
+    assert f"linear mode 1 with contact as at rest: {np.sqrt(squares[0]) / 2 / np.pi:.6g} Hz" in said
+    assert ("warning: no pair of contact 'pad' has friction" in said) == (friction == 0.0)
+    if friction == 0.0:
+        assert "at rest: 0 stick, 1 slip" in said
+        assert call("run", path, "--no-plots", "-q", "--out", tmp_path / "run") == 0
+        with open(tmp_path / "run" / "mode.csv", newline="") as file:
+            rows = [(float(row["amplitude"]), float(row["omega"])) for row in csv.DictReader(file)]
+        lift_off = N0 / KN * abs(shapes[0, 0] / shapes[1, 0])
+        closed = [omega for amplitude, omega in rows if amplitude < lift_off]
+        assert len(closed) > 5
+        np.testing.assert_allclose(closed, np.sqrt(squares[0]), rtol=SOLVED)
+
+
+def test_a_body_that_friction_alone_would_hold_keeps_its_number(tmp_path: Path, capfd) -> None:
+    """A block of 10 kg slides without friction, 1 kg swings on it: not mode 1, the rigid motion, but the swing."""
+    matrices = "M = [[10.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]\n"
+    matrices += "K = [[0.1, 0.0, -0.1], [0.0, 2.0, 0.0], [-0.1, 0.0, 0.1]]\n"
+    text = CASE.replace('dofs = ["x", "y"]', 'dofs = ["x", "y", "z"]').replace('= "x"', '= "z"')
+    text = re.sub("M = .*\nK = .*\n", matrices, text).replace(f"coefficient = {MU}", "coefficient = 0.0")
+    assert call("check", put(tmp_path, text)) == 0
+    swing = np.sqrt(0.1 * (1 + 1 / 10)) / 2 / np.pi
+    assert f"linear mode 1 with contact as at rest: {swing:.6g} Hz" in capfd.readouterr().out
+
+
 def settled() -> float:
     """Where the branch is damped: mu N = kt |x|, N less by what the settled slider's mean force c = mu kn |y| takes.
 

@@ -72,6 +72,13 @@ def test_level_of_first_slip_of_a_forced_response(tmp_path: Path, capfd) -> None
 
 
 @pytest.mark.ranks(1)
+def test_a_response_without_friction_is_that_which_slides(tmp_path: Path, capfd) -> None:
+    assert call("check", forced_case(tmp_path, f"friction_coefficient = {MU}", "friction_coefficient = 0.0")) == 0
+    hertz = np.sqrt(np.linalg.eigvalsh(K + np.diag([0.0, KN]))[0]) / 2 / np.pi
+    assert f"linear mode 1 with contact as at rest: {hertz:.6g} Hz" in capfd.readouterr().out
+
+
+@pytest.mark.ranks(1)
 def test_levels_that_never_slip_and_a_resonance_that_nothing_damps(tmp_path: Path, capfd) -> None:
     assert call("check", forced_case(tmp_path, "levels = [0.01, 3.0]", "levels = [0.01]")) == 0
     said = capfd.readouterr().out

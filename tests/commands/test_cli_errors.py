@@ -252,3 +252,11 @@ def test_one_message_on_two_ranks(launch, tmp_path: Path) -> None:
     assert done.returncode == 2
     assert done.stderr.count("error: no solver reads") == 1
     assert not folder.exists()
+
+
+@pytest.mark.parametrize("command", ["view", "run", "check", "import", "show", "plot", "study"])
+def test_an_unknown_option_is_told_of_its_command(command: str, capfd) -> None:
+    assert main([command, "x", "--wrong"]) == 2
+    said = capfd.readouterr().err
+    assert "unrecognized arguments: --wrong" in said
+    assert f"where:    fretwave {command}\n" in said and f"`fretwave {command} --help`" in said

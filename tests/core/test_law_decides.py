@@ -249,6 +249,20 @@ def test_stiffnesses_by_role_are_what_a_stuck_pair_has(comm, law: str) -> None:
     assert sorted(found) == pytest.approx(sorted(expected), rel=SOLVED)
 
 
+@pytest.mark.parametrize("law", [name for name in ROLES if name.startswith(("jenkins", "coulomb", "regularised"))])
+def test_a_pair_without_friction_does_not_stick_along_its_tangents(law: str) -> None:
+    """Of two pairs the first has none."""
+    info = fw.laws()[law]
+    friction = info.with_roles({Role.FRICTION_COEFFICIENT: [0.0, 0.5], Role.FRICTION_LIMIT: [0.0, 0.5]})
+    others = {p.name: 1.0 for p in info.parameters if p.default is None}
+    rows = np.eye(2 * info.components)
+    contact = fw.Contact(law, rows, {**others, **info.with_roles({Role.LOAD: 1.0}), **friction})
+    without, with_friction = contact.stuck_stiffness()
+    assert all(with_friction > 0)
+    assert [row for row in range(info.components) if without[row] > 0] == [r for r in [info.normal] if r is not None]
+    assert (contact.closed().stuck_stiffness() == with_friction).all()
+
+
 def test_a_law_may_not_give_two_parameters_one_role() -> None:
     class Twice(Foreign):
         name = "twice"

@@ -104,7 +104,6 @@ def test_a_file_in_the_place_of_the_folder_is_named(tmp_path: Path, capfd) -> No
         (OSError(errno.ENOSPC, "No space left on device"), "the disk takes no more"),
         (MemoryError("Unable to allocate 7 TiB"), "not enough memory"),
         (RuntimeError("std::bad_alloc"), "not enough memory"),
-        (BrokenPipeError(errno.EPIPE, "Broken pipe"), "nobody reads"),
         (PermissionError(errno.EACCES, "Permission denied", "runs"), "runs"),
     ],
 )

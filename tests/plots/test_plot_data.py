@@ -291,6 +291,13 @@ def test_responses_of_blades_pass_through_their_points(tmp_path):
             assert a[np.argmin(np.abs(f - point))] == pytest.approx(value, rel=SOLVED)
         assert a.max() <= expected.max() * (1 + 1e-12)
     np.testing.assert_allclose(lower.lines[0].get_xydata(), [[0, 0.7], [1, 1.3]])
+    lower = figure.axes[1]
+    legend = lower.get_legend()
+    assert "tuned wheel" in [text.get_text() for text in legend.get_texts()] and not lower.texts
+    figure.draw_without_rendering()
+    box = legend.get_window_extent()
+    curves = [lower.transData.transform(line.get_xydata()) for line in lower.get_lines() if len(line.get_xdata())]
+    assert all(y < box.y0 for curve in curves for _, y in curve), "names lie on no curve"
     bound = forced_blades.whitehead(2)
     assert [line.get_ydata()[0] for line in lower.lines[1:]] == pytest.approx([1.0, bound])
     assert upper.get_ylabel() == "Amplitude of tip, level 1 [m]"

@@ -171,6 +171,15 @@ def test_it_says_what_the_run_is(run: Path, chain: Path) -> None:
         assert said in text, said
 
 
+def test_times_are_told_apart(run: Path) -> None:
+    """The summary's is the sum over the points; that of the section has the start and the end of the analysis too."""
+    text, whole = page_of(run).text, read_record(run)["analyses"]["mode"]["wall_s"]
+    points = fw.open_run(run)["mode"]["wall_s"].sum()
+    assert points < whole
+    assert "time of points" in text and f"{points:.2f} s" in text
+    assert f"{whole:g} s, with what is before and after its points" in text
+
+
 def test_pictures_of_the_folder_are_used_and_missing_ones_drawn(run: Path, tmp_path: Path) -> None:
     folder = tmp_path / "run"
     shutil.copytree(run, folder)

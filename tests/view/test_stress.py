@@ -211,6 +211,31 @@ def test_what_is_wrong_is_told_beforehand(text: str, said: str, tmp_path: Path, 
     assert said in told and "fix:" in told, told
 
 
+SLIPS = [
+    ("youngs_modulus = 210e3", "youngs_modulus = 210e9", ("youngs_modulus = 2.1e+11 MPa", "100 to 2e+06 MPa")),
+    ("endurance_limit = 250.0", "endurance_limit = 250e6", ("endurance_limit = 2.5e+08 MPa", "2.1 to 4.2e+04 MPa")),
+    ("ultimate_strength = 600.0", "ultimate_strength = 0.6", ("ultimate_strength = 0.6 MPa",)),
+]
+
+
+@pytest.mark.parametrize("right, slip, words", SLIPS)
+def test_a_material_in_other_units_is_warned_of_and_makes_no_stress(
+    right: str, slip: str, words: tuple[str, ...], run: Path, capfd
+) -> None:
+    """210 GPa in Pa in a model in mm, t, s; strengths in Pa, or in GPa."""
+    path = run.parent / "case.toml"
+    kept = path.read_text()
+    path.write_text(kept.replace(right, slip))
+    try:
+        assert (call("check", path, "--no-solve"), call("stress", run)) == (0, 2)
+    finally:
+        path.write_text(kept)
+    said = capfd.readouterr()
+    warned = said.out.partition("warning: ")[2]
+    for word in (*words, "case.toml:", "in which steel has a modulus of 210000"):
+        assert word in warned and word in said.err
+
+
 def test_a_model_without_cells_has_no_stress(tmp_path: Path, capfd) -> None:
     text = CASE.replace('"cantilever.py"', '"cantilever.py"\noptions = { cells_known = false, cells = 4 }')
     run = solved(tmp_path, text + MATERIAL + MODE)

@@ -96,6 +96,9 @@ class ModeAnalysis(HarmonicSection):
     def largest_amplitude(self) -> Optional[float]:
         return self.amplitude[1] if unit_of(self.normalise) == "length" else None
 
+    def passes(self, amplitude: float) -> bool:
+        return not self.wheel and self.amplitude[0] <= amplitude <= self.amplitude[1]
+
     def check(self, report: Reporter, facts: Facts) -> None:
         super().check(report, facts)
         check_observed(report, "normalise", self.normalise, self, facts)

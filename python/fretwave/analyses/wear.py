@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Literal, Optional
 import numpy as np
 
 from ..case.analysis import AnalysisSection, register_analysis
+from ..case.checks_common import check_once
 from ..case.checks_size import harmonic_memory
 from ..case.contacts import wear_areas as areas_of
 from ..case.observed import check_displaced, label_of
@@ -97,6 +98,7 @@ class WearAnalysis(AnalysisSection):
     def check(self, report: Reporter, facts: Facts) -> None:
         super().check(report, facts)
         report.mode(("mode",), self.mode, facts.analyses_of("mode"))
+        check_once(report, "amplitude", self.amplitude)
         check_displaced(report, "mode", self.mode, facts)
         by_accuracy = {str(entry.get("name")) for entry in facts.source.entries("analysis") if "accuracy" in entry}
         if self.harmonics is None and self.mode in by_accuracy:

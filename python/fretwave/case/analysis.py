@@ -127,6 +127,10 @@ class AnalysisSection(Section):
         """Largest displacement [length] that it asks for; None where it names none."""
         return None
 
+    def passes(self, amplitude: float) -> bool:
+        """Its branch passes an amplitude at which it estimates the error of the reduction."""
+        return False
+
     # Is it right, and what would it do?
 
     def completed(self, report: Reporter, facts: Facts) -> AnalysisSection:

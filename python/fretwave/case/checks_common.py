@@ -19,11 +19,24 @@ if TYPE_CHECKING:
     from .facts import Facts
 
 
+#: Keys whose numbers name branches, states or points: one that stands twice makes two of one name.
+EACH_ONCE = ("levels", "factors", "nodal_diameters", "speeds_rpm", "engine_orders", "report_at")
+
+
+def check_once(report: Reporter, key: str, values: Sequence[float]) -> None:
+    """Each value of a key stands there once."""
+    for index, value in enumerate(values):
+        if value in values[:index]:
+            report.wrong((key, index), f"is {value:g} again", "each value once", "remove it")
+
+
 def check_common(report: Reporter, analysis: AnalysisSection, facts: Facts) -> None:
     """All that is wrong whatever the kind."""
     for index, damper in enumerate(analysis.dampers):
         report.dof(("dampers", index, "dof"), damper.dof, facts.named)
     _check_petsc(report, analysis)
+    for key in EACH_ONCE:
+        check_once(report, key, getattr(analysis, key, None) or ())
     if facts.loads is not None:
         own = Reporter(report.source, (*report.path, "preload"), report.found)
         check_loads(own, analysis.own_preload(), facts.loads)

@@ -17,11 +17,18 @@ if TYPE_CHECKING:
     from ..model.contact import Contact
     from .analysis import AnalysisSection
 
+#: Keys of [reduction] that say which interface modes there are.
+_OF_MODES = ("interface_diameters", "interface_waves", "interface_tolerance")
 Analyses = Mapping[int, "AnalysisSection"]
 
 
 def check_reduction(
-    source: Source, section: ReductionSection | None, analyses: Analyses, sectors: int | None, found: Found
+    source: Source,
+    section: ReductionSection | None,
+    analyses: Analyses,
+    sectors: int | None,
+    notes: list[str],
+    found: Found,
 ) -> None:
     """Component modes are chosen in one way; faces are those of a sector, and their waves exist."""
     if section is None:
@@ -33,8 +40,10 @@ def check_reduction(
         report.wrong((name,), f"is given beside {given[0]}", expected, "remove one of them")
     if section.accuracy is not None and section.compare == 0:
         report.wrong(("accuracy",), "is of no frequency", "frequencies to compare", "give `compare` 1 or more")
+    if section.error_at is not None and not any(analysis.passes(section.error_at) for analysis in analyses.values()):
+        notes.append(f"reduction.error_at = {section.error_at:g} is on no mode's branch: no error is estimated there")
     if sectors is None:
-        for key in ("interface", "interface_diameters", "compare_diameters"):
+        for key in ("interface", *_OF_MODES, "compare_diameters"):
             if key in section.model_fields_set:
                 report.wrong((key,), "is of no sector of a wheel", "a model with sectors", "remove the key")
         return
@@ -46,8 +55,11 @@ def check_reduction(
         shown = sorted(_spatial_indices(analyses, sectors)) or [1]
         fix = f"interface_diameters = {shown}, those of the first and third harmonic of the analyses"
         report.wrong(("interface",), "has no waves to come from", "their nodal diameters", fix)
-    if section.interface == "whole" and section.interface_diameters is not None:
-        report.wrong(("interface_diameters",), "has no effect", "interface modes", 'add `interface = "modes"`')
+    for key in _OF_MODES if section.interface == "whole" else ():
+        if key in section.model_fields_set:
+            report.wrong((key,), "has no effect", "interface modes", 'add `interface = "modes"`')
+    if section.compare == 0 and section.compare_diameters is not None:
+        report.wrong(("compare_diameters",), "has no effect", "frequencies to compare", "give `compare` 1 or more")
 
 
 def _spatial_indices(analyses: Analyses, sectors: int) -> set[int]:

@@ -183,7 +183,7 @@ def check_dof(
             where=source.where(path),
             measured=toml(at(source.data, path)),
             expected=f"one of {shown}",
-            fix=nearest(dof, dofs) or "model.dofs names the dofs in the order of the matrices",
+            fix=source.dof_fix(dof, dofs) or "model.dofs names the dofs in the order of the matrices",
         )
     )
     return False

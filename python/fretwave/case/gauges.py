@@ -13,6 +13,7 @@ from ..errors import CaseErrors, FretwaveError
 from ..fe.solids import MODES, PLACES
 from ..fe.strain import Solids, cells_around, interpolation
 from ..model.structure import Structure
+from .odd_material import odd_material
 from .reporter import Reporter
 from .schema import GaugeSection, MaterialSection
 from .toml.source import Source
@@ -73,10 +74,11 @@ def gauges_now(source: Source, structure: Structure) -> Gauges:
     Raises
     ------
     CaseErrors
-        The tables are wrong.
+        The tables are wrong, or the material is no solid's.
     """
     found: list[FretwaveError] = []
     gauges = read_gauges(source, structure, found)
+    found += odd_material(gauges.material, source, structure)
     if found:
         raise CaseErrors(found, source.label)
     return gauges

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -12,6 +13,7 @@ from ..errors import CaseErrors, FretwaveError
 from ..model.contact import Contact
 from ..model.pairs import Pairs
 from ..model.structure import Structure
+from ..results.missing_dof import missing_dof
 from . import checks
 from .analysis import Analyses, AnalysisSection
 from .at_speed import known_parts, with_speeds
@@ -90,7 +92,7 @@ def load_case(
         raise CaseErrors(_in_file_order(found), source.label)
     case = _build(source, _core_laws() if laws is None else laws, loaded, found)
     if found or case is None:
-        advise(found)
+        advise(found, uncertainty)
         raise CaseErrors(_in_file_order(found), source.label)
     if uncertainty is None:
         return case
@@ -126,6 +128,7 @@ def _build(
     structure, places, identity = given or (None, {}, {})
     notes: list[str] = []
     if section and structure:
+        source.dof_fix = partial(missing_dof, structure)
         structure, identity = in_units(section, source, structure, identity, notes, found)
         structure, identity = with_speeds(section, source, structure, identity, notes, found)
         structure, identity = with_loads(section, source, structure, identity, notes, found)
@@ -143,7 +146,8 @@ def _build(
             stiffness_damping=section.stiffness_damping,
             mass_damping=section.mass_damping,
         )
-        structure, contacts = tie(section, source, structure, contacts, found)
+        structure, contacts = tie(section, source, structure, contacts, notes, found)
+        source.dof_fix = partial(missing_dof, structure.cut or structure)
         dofs = structure.dof_names
         neighbours = structure if structure.cut else None
         check_aerodynamics(source, flow, neighbours.sectors if neighbours else None, dofs or [], found)
@@ -167,7 +171,7 @@ def _build(
     )
     checks.complete_analyses(source, analyses, facts, found)
     checks.check_analyses(source, analyses, facts, found)
-    check_reduction(source, reduction, analyses, facts.sectors, found)
+    check_reduction(source, reduction, analyses, facts.sectors, notes, found)
     check_preload(source, preload, facts.loads, found)
     check_damping(source, damping, structure, reduction, notes, found)
     gauges = read_gauges(source, (structure.cut or structure) if structure else None, found)

@@ -13,6 +13,7 @@ import numpy as np
 from ..arrays import Array
 from ..errors import InputError
 from ..model.structure import SPIN, Structure
+from ..results.missing_dof import missing_dof
 from ..texts import nearest, toml
 from .at_speed import least_squares, omega_squared, square_of
 from .pair_values import TABLE, ValueTable
@@ -95,7 +96,7 @@ def _vector(given: LoadVector, key: KeyPath, structure: Structure, source: Sourc
         source.path.parent / given, "force", source.units("force"), source.where(key), -np.inf, False, "dof"
     )
     with suppress(_Told):
-        return table.vector(structure.dof_names, found)
+        return table.vector(structure, found)
     return None
 
 
@@ -106,14 +107,15 @@ class _Told(Exception):
 class DofTable(ValueTable):
     """One column of a CSV file, a row for each dof by its name; dofs without one have 0."""
 
-    def vector(self, names: list[str], found: Found) -> Array:
+    def vector(self, structure: Structure, found: Found) -> Array:
         """Values (n_dof,)."""
-        places, out, seen = {name: k for k, name in enumerate(names)}, np.zeros(len(names)), set[str]()
+        names, seen = structure.dof_names, set[str]()
+        places, out = {name: k for k, name in enumerate(names)}, np.zeros(len(names))
         try:
             for line, name, value in self._rows():
                 name = name.strip()
                 if name not in places:
-                    fix = nearest(name, names) or "take a name of the model's dofs"
+                    fix = missing_dof(structure, name, names) or "take a name of the model's dofs"
                     self._wrong("is of no dof", line, name, f"one of {len(names)} dofs, as {names[0]}", fix)
                 if name in seen:
                     self._wrong("has a dof again", line, name, "each dof once", "remove one of the lines")

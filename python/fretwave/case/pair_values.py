@@ -75,12 +75,12 @@ class ValueTable:
             lines = list(csv.reader(self.path.read_text(encoding="utf-8-sig").splitlines()))
         except (OSError, ValueError, csv.Error) as error:
             self._wrong("cannot be read", None, shortened(str(error)), "a CSV file", "write it anew")
-        places = self._places([text.strip() for text in lines[0]] if lines else [])
+        headings = [text.strip() for text in lines[0]] if lines else []
+        places = self._places(headings)
         for line, row in enumerate(lines[1:], 2):
             if not any(text.strip() for text in row):
                 continue
-            if len(row) <= max(places):
-                self._wrong("ends early", line, f"{len(row)} columns", "as many as headings", "complete the line")
+            self._check_length(line, row, headings)
             yield line, row[places[0]], row[places[1]]
 
     def _places(self, headings: Sequence[str]) -> tuple[int, int]:
@@ -88,8 +88,20 @@ class ValueTable:
         place = next((k for k, text in enumerate(headings) if text in known), None)
         if place is None or self.row not in headings:
             measured, expected = shortened(",".join(headings)) or "nothing", f"{self.row},{known[1]}"
-            self._wrong("has other headings", 1, measured, expected, "write that as its first line")
+            commas = "write commas between columns, and decimal points"
+            fix = commas if ";" in measured else "write that as its first line"
+            self._wrong("has other headings", 1, measured, expected, fix)
         return headings.index(self.row), place
+
+    def _check_length(self, line: int, row: Sequence[str], headings: Sequence[str]) -> None:
+        """A decimal comma makes two columns of a number."""
+        if len(row) == len(headings):
+            return
+        what, fix = "ends early", "complete the line"
+        if len(row) > len(headings):
+            what, fix = "has a line of more columns than headings", "write decimal points, not commas"
+        measured, expected = f"{len(row)} columns: {shortened(','.join(row))}", f"{len(headings)}, as its headings"
+        self._wrong(what, line, measured, expected, fix)
 
     def _number(self, line: int, text: str) -> float:
         value, low, strict = np.nan, self.lower, self.strict

@@ -14,6 +14,7 @@ from ..hb.suspects import STIFF
 from ..model.contact import span
 from ..model.laws import Role
 from ..model.sectors import by_sector
+from .odd_material import odd_material
 
 if TYPE_CHECKING:
     from ..model.contact import Contact
@@ -32,8 +33,8 @@ def odd_ratios(case: Case) -> list[InputError]:
     """Warnings about a case without errors, before it is reduced."""
     found = [warning for contact in case.contacts for warning in _of_contact(case, contact)]
     for analysis in case.analyses.values():
-        found += _of_amplitude(case, analysis)
-    return found
+        found += [*_of_amplitude(case, analysis), *_of_deviations(analysis)]
+    return found + list(odd_material(case.tables.gauges.material, case.source, case.structure))
 
 
 def own_stiffness(case: Case, contact: Contact) -> Array:
@@ -61,6 +62,14 @@ def _of_contact(case: Case, contact: Contact) -> Iterator[InputError]:
             span(friction),
             f"at most {LARGEST_FRICTION:g}; of dry metals 0.1 to 1.5",
             "look whether it is in percent, or an angle in degrees",
+        )
+    if friction is not None and not np.any(friction):
+        yield InputError(
+            f"no pair of contact '{contact.name}' has friction: none sticks, and nothing damps",
+            _key(contact, Role.FRICTION_COEFFICIENT),
+            "0 in every pair",
+            "> 0 in some pair",
+            'give it a value; `type = "linear"` has the modes that slide without friction',
         )
     yield from _of_loads(case, contact)
 
@@ -118,6 +127,20 @@ def _of_amplitude(case: Case, analysis: AnalysisSection) -> Iterator[InputError]
             f"{largest:g} {unit}, {largest / size:.2g} of the model's {size:.3g} {unit}",
             f"at most {LARGE:g} of it",
             "look at the units of both; else end the branch before",
+        )
+
+
+def _of_deviations(analysis: AnalysisSection) -> Iterator[InputError]:
+    """Ratios of stiffness in place of what they are above 1: all of them lie about 1."""
+    mistuning = analysis.whole_wheel()[1]
+    given = mistuning.deviations if mistuning is not None else None
+    if isinstance(given, list) and min(given) > 0.5:
+        yield InputError(
+            f"the stiffness deviations of '{analysis.name}' look like ratios",
+            f"{analysis.name}.mistuning.deviations",
+            f"{min(given):g} to {max(given):g}: each sector's stiffness is multiplied by {1 + min(given):g} or more",
+            "numbers about 0: 0.02 for 2 % more than the tuned sector",
+            "take 1 off each",
         )
 
 

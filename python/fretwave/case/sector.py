@@ -11,8 +11,9 @@ from ..cyclic.frames import framed
 from ..errors import InputError
 from ..model.contact import Contact
 from ..model.structure import Structure
-from ..texts import nearest, toml
+from ..texts import toml
 from .contacts import on
+from .face_moves import labels_by_name, said_of_faces
 from .reporter import Found
 from .schema import ModelSection
 from .toml.source import Source
@@ -20,7 +21,12 @@ from .toml.validation import at
 
 
 def tie(
-    section: ModelSection, source: Source, structure: Structure, contacts: list[Contact], found: Found
+    section: ModelSection,
+    source: Source,
+    structure: Structure,
+    contacts: list[Contact],
+    notes: list[str],
+    found: Found,
 ) -> tuple[Structure, list[Contact]]:
     """The model with its high face left out, when the case says that it is a sector; what is wrong goes to `found`."""
     number = section.sectors or structure.sectors
@@ -39,7 +45,7 @@ def tie(
         return structure, contacts
     try:
         if any(getattr(section, key) is not None for key in ("sectors", "low", "high", "axis")):
-            low, high, axis = _framed(section, structure, low, high, number, axis)
+            low, high, axis = _framed(section, structure, low, high, number, axis, notes)
         tied = replace(structure, sectors=number, low=low, high=high, axis=axis).tied()
         return tied, on(contacts, tied)
     except InputError as error:
@@ -51,11 +57,20 @@ def tie(
 
 
 def _framed(
-    section: ModelSection, structure: Structure, low: Indices, high: Indices, sectors: int, axis: str | None
+    section: ModelSection,
+    structure: Structure,
+    low: Indices,
+    high: Indices,
+    sectors: int,
+    axis: str | None,
+    notes: list[str],
 ) -> tuple[Indices, Indices, str | None]:
     """Faces of a case that says something of them; a builder's own that correspond as they are stay so."""
     if axis is None and section.low is None and section.high is None:
         return low, high, None
+    if structure.coordinates is None and structure.labels is None:
+        structure = replace(structure, labels=labels_by_name(structure, low, high, axis))
+    notes += [note] if (note := said_of_faces(structure, axis)) else []
     return framed(structure, low, high, sectors, axis)
 
 
@@ -76,6 +91,6 @@ def _face(name: str, section: ModelSection, source: Source, structure: Structure
     known = {dof: number for number, dof in enumerate(dofs)}
     for index, dof in enumerate(names):
         if dof not in known:
-            where, fix = source.where(("model", name, index)), nearest(dof, dofs) or "name a dof of the model"
+            where, fix = source.where(("model", name, index)), source.dof_fix(dof, dofs) or "name a dof of the model"
             found.append(InputError(f"unknown dof '{dof}' of the {name} face", where, expected="a dof", fix=fix))
     return np.array([known[dof] for dof in names if dof in known], dtype=np.intp)

@@ -25,7 +25,12 @@ from .toml.validation import at, validate
 
 #: Between the place of a distribution and the seed, in the places of errors about a value that was drawn.
 SEEDED = ", drawn with seed "
-_NARROWER = 'take `distribution = "lognormal"`, or a smaller standard_deviation'
+#: What to do about a draw beyond the bounds of its key.
+_WITHIN = {
+    "normal": 'take `distribution = "lognormal"`, or a smaller standard_deviation',
+    "lognormal": "take a smaller standard_deviation, or another mean",
+    "uniform": "take low and high within its bounds",
+}
 
 
 @dataclass(frozen=True)
@@ -210,9 +215,7 @@ def _set(source: Source, path: KeyPath, key: str, value: float, where: str) -> N
 def _multiply(source: Source, path: KeyPath, key: str, factor: float, where: str) -> None:
     """What the case says; of a contact once its parameters are read."""
     if factor <= 0.0:
-        source.problems.append(
-            InputError(f"the factor on {key} is not positive", where, f"{factor:g}", "> 0", _NARROWER)
-        )
+        source.problems.append(InputError(f"the factor on {key} is not positive", where, f"{factor:g}", "> 0"))
     elif path[0] == "contact":
         source.factors[path] = (factor, where)
     else:
@@ -235,9 +238,13 @@ def _seeded_wheels(source: Source) -> list[str]:
     return found
 
 
-def advise(problems: list[FretwaveError]) -> None:
+def advise(problems: list[FretwaveError], uncertainty: Uncertainty | None) -> None:
     """Say of values that were drawn out of their bounds what to do about it."""
-    for problem in problems:
-        out = any(word in problem.what for word in ("is out of range", "has a wrong value"))
-        if out and SEEDED in (problem.where or ""):
-            problem.fix = _NARROWER
+    for draw in uncertainty.draws if uncertainty else ():
+        table = "factors" if draw.factor else "values"
+        for problem in problems:
+            out = any(word in problem.what for word in ("is out of range", "has a wrong value", "is not positive"))
+            if out and f"(uncertainty.{table}.{draw.key}){SEEDED}" in (problem.where or ""):
+                whole = str(problem.expected).startswith("an integer")
+                over = f"do not draw it: `fretwave sweep CASE --over {draw.key}=3,5` goes through whole numbers"
+                problem.fix = over if whole else _WITHIN[draw.given.distribution]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -31,8 +32,9 @@ from ..importers.units import Evidence, check_declared, evidence_of
 from ..model.pairs import Pairs
 from ..model.structure import Structure
 from ..mpi.guard import on_first_rank
+from ..results.missing_dof import missing_dof
 from ..results.model_file import DIRECTIONS, SourceFile, write_model
-from ..texts import display, nearest
+from ..texts import display
 from ..units import SYSTEMS, unknown
 from .import_at_rest import tables_at_rest, write_tables
 
@@ -93,15 +95,15 @@ def read_parts(options: argparse.Namespace) -> tuple[Structure, Assembled, list[
     found.labels = labels
     where = " and ".join(display(paths[letter]) for letter in "MK")
     check_one_model(found, where)
-    names, dofs = _names(found.names, options.name)
     model = Structure(
-        found.matrices["M"], found.matrices["K"], found.matrices.get("C"), dofs=dofs, names=names, labels=labels
+        found.matrices["M"], found.matrices["K"], found.matrices.get("C"), names=found.names, labels=labels
     )
     check_definite(model, where)
     model.units = options.units
     if nodes is not None:
         model.node_numbers, model.coordinates = nodes.numbers, nodes.coordinates
         model.hexahedra, model.cells = cells_of(nodes)
+    model.names, model.dofs = _names(model, options.name)
     wheel = wheel_of(options)
     if wheel is not None:
         make_sector(model, wheel, nodes, options.tolerance)
@@ -203,9 +205,9 @@ def _direction(word: str) -> float:
     return DIRECTIONS.index(name) + 1 if name in DIRECTIONS else float(word)
 
 
-def _names(known: Sequence[str], given: list[str]) -> tuple[list[str], dict[str, int]]:
+def _names(model: Structure, given: list[str]) -> tuple[list[str], dict[str, int]]:
     """``--name tip=17y``: a dof's own name, and it is kept by a reduction. All names, and those given by number."""
-    names, kept = list(known), []
+    names, kept = model.dof_names, []
     for text in given:
         name, _, old = text.partition("=")
         old = old if old in names or f"n{old}" not in names else f"n{old}"
@@ -215,7 +217,7 @@ def _names(known: Sequence[str], given: list[str]) -> tuple[list[str], dict[str,
                 f"--name {text}",
                 None,
                 "NAME=DOF, a new name of letters and digits and a dof such as " + names[0],
-                nearest(old, names) or "check the node and its direction",
+                missing_dof(replace(model, names=names), old, names) or "check the node and its direction",
             )
         kept.append(names.index(old))
         names[kept[-1]] = name

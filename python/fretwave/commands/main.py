@@ -26,7 +26,9 @@ if TYPE_CHECKING:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Entry point; returns the exit code: 0 done, 2 bad input, 3 did not converge, 130 interrupted, 1 anything else."""
+    """Entry point; returns the exit code: 0 done, 2 bad input, 3 did not converge, 130 interrupted, 141 output
+    that nobody reads, 1 anything else.
+    """
     install()
     _leave_networks_alone()
     return guarded(lambda: _dispatch(sys.argv[1:] if arguments is None else list(arguments)))
@@ -81,7 +83,7 @@ def parser() -> argparse.ArgumentParser:
         prog="fretwave",
         description="Nonlinear modes, forced response and limit cycles of structures with friction contact.",
         epilog="exit codes: 0 done, 2 bad input, 3 did not converge, 130 interrupted (what was found is kept),"
-        " 1 anything else",
+        " 141 nobody reads the output any more, 1 anything else",
     )
     top.add_argument("--version", action="version", version=f"fretwave {own_version()}", help="print the version")
     commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True, parser_class=Parser)

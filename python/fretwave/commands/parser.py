@@ -18,6 +18,13 @@ if TYPE_CHECKING:
 class Parser(argparse.ArgumentParser):
     """Errors in the form of all others; under mpirun only the first rank prints."""
 
+    def parse_known_args(self, args=None, namespace=None):  # type: ignore[no-untyped-def]
+        """Of a sub-command too: what it does not know is told by itself."""
+        found, unknown = super().parse_known_args(args, namespace)
+        if unknown:
+            self.error(f"unrecognized arguments: {' '.join(unknown)}")
+        return found, unknown
+
     def error(self, message: str) -> NoReturn:
         raise InputError(
             f"the command line is wrong: {message}", where=self.prog, fix=f"`{self.prog} --help` lists what there is"

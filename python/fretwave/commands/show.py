@@ -6,7 +6,7 @@
     units                                     name, length, mass, force, energy, pressure of the case
     analyses                                  a list, in the order of the case, each with
         name, type, method, status, reason, points, folds, wall_s, overrides
-        unit                                  of amplitudes
+        unit                                  of amplitudes; wall_s of all points, without start and end of the analysis
         range                                 column, unit, low, high (and cycles of wear)
         peak                                  point (row of <name>.csv) and columns of this row; worn, worn_unit of wear
         error                                 of, value, unit: the largest estimated error
@@ -129,7 +129,7 @@ def _print_rich(rows: Sequence[Sequence[str]]) -> None:
     table = Table(box=SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 0))
     kept = columns_with_text(rows)
     for column in kept:
-        right = HEADINGS[column] in ("points", "folds", "error", "wall")
+        right = HEADINGS[column] in ("points", "folds", "error", "time of points")
         table.add_column(HEADINGS[column], justify="right" if right else "left", no_wrap=right)
     for row in rows:
         table.add_row(*(row[column] for column in kept))

@@ -42,7 +42,12 @@ def framed(
             None,
             f"{structure.dof_names[int(low[0])]} and {structure.dof_names[int(high[0])]}",
             "an axis about which their directions turn from sector to sector",
-            f'add `axis = "{_axis_of(structure, labels, low, high, sectors)}"`',
+            f'add `axis = "{_axis_of(structure, labels, low, high, sectors)}"`'
+            + (
+                ""
+                if structure.coordinates is not None
+                else ", or whichever it is; dofs that turn along need other names"
+            ),
         )
     if set(labels[np.append(low, high), 1]) <= {along := "xyz".index(axis) + 1, along + 3}:
         return low, high, None

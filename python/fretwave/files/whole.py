@@ -49,6 +49,8 @@ def told(path: Path) -> Iterator[None]:
     """Errors of the system get the name of the file they are about."""
     try:
         yield
+    except BrokenPipeError:  # of what is printed
+        raise
     except OSError as error:
         raise file_error(error, path) from None
 

@@ -84,13 +84,19 @@ class Contact:
         return self.pairs.n_pairs
 
     def closed(self) -> Contact:
-        """Every pair closed at rest, whatever its load and gap."""
+        """Every pair closed at rest and with friction, whatever its load, gap and friction."""
         return replace(self, parameters={**self.parameters, **self.info.closing()})
 
     def stuck_stiffness(self) -> Array:
         """Of a stuck pair along each row of B [force/length], (n_pairs, components); infinite where nothing gives."""
         law, n_pairs = self.core_law(np.arange(self.n_pairs), self.n_pairs), self.n_pairs
         return np.array([[law.stuck_stiffness(row, pair) for row in range(self.components)] for pair in range(n_pairs)])
+
+    @property
+    def never_sticks(self) -> bool:
+        """Of a law with friction: some pair has none."""
+        bounds = [self.value(role) for role in (Role.FRICTION_COEFFICIENT, Role.FRICTION_LIMIT)]
+        return any(bound is not None and bool(np.min(bound) == 0) for bound in bounds)
 
     def sliding(self) -> Contact | None:
         """What is left of it closed and without friction: springs along the normals; None of a law without any."""

@@ -98,9 +98,12 @@ class LawInfo:
         return {str(self.named(role)): value for role, value in values.items() if self.named(role) is not None}
 
     def closing(self) -> dict[str, float]:
-        """Parameters with which every pair is closed at rest, whatever its load and gap."""
+        """Parameters with which every pair is closed at rest and sticks, whatever its load, gap and friction."""
         # by a load, or where the law has none by an interference
-        return self.with_roles({Role.LOAD: 1.0, Role.GAP: 0.0 if self.named(Role.LOAD) else -1.0})
+        gap = 0.0 if self.named(Role.LOAD) else -1.0
+        return self.with_roles(
+            {Role.LOAD: 1.0, Role.GAP: gap, Role.FRICTION_COEFFICIENT: 1.0, Role.FRICTION_LIMIT: 1.0}
+        )
 
     def stiffness_along(self, component: int) -> Role:
         """Role of the stiffness of a stuck pair along a component."""

@@ -13,7 +13,7 @@ import traceback
 from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TextIO, TypeVar
 
 from ..errors import EXIT_OTHER, FretwaveError, exit_code_of
 from ..files.whole import file_error
@@ -85,8 +85,6 @@ def describe(error: BaseException, rank: int | None = None, traced: bool = False
     if isinstance(error, FretwaveError):
         text = error.render()
         return text if rank is None else f"{text}\n  {'rank:':<10}{rank}"
-    if isinstance(error, BrokenPipeError):
-        return "error: nobody reads the output any more\n  fix:      `fretwave resume RUNDIR > FILE` goes on with a run"
     plain = in_words(error)
     if plain is not None:
         return describe(plain, rank)
@@ -149,8 +147,17 @@ def end_all_ranks(error: BaseException, traced: bool = False) -> int:
 
 
 def _print(text: str) -> None:
-    sys.stdout.flush()
-    print(text, file=sys.stderr, flush=True)
+    for stream, said in ((sys.stdout, ""), (sys.stderr, f"{text}\n")):
+        try:
+            stream.write(said)
+            stream.flush()
+        except BrokenPipeError:
+            _drop(stream)
+
+
+def _drop(stream: TextIO) -> None:
+    """Send what is left unread nowhere, else it is an error again at Python's end."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 def _lone_exit(exit_: SystemExit) -> int:
@@ -180,7 +187,8 @@ def guarded(main: Callable[[], int]) -> int:
     except SystemExit as exit_:
         return _lone_exit(exit_)
     except BrokenPipeError as error:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # else what is left unread is an error again
+        _drop(sys.stdout)
+        _drop(sys.stderr)  # `... | head` ends without a word, as other commands do
         return end_all_ranks(error)
     except BaseException as error:
         return end_all_ranks(error)
@@ -231,15 +239,17 @@ def _meet_quietly(comm: MPI.Comm) -> None:
 
 
 def on_first_rank(comm: MPI.Comm, work: Callable[[], Result]) -> Result:
-    """Do `work` on rank 0 and give its result, or its FretwaveError, to every rank. Collective.
+    """Do `work` on rank 0 and give its result, or its error in words, to every rank. Collective.
 
     What only one rank reads (case file, matrices, earlier results) cannot differ between ranks then.
     """
-    outcome: tuple[FretwaveError | None, Any] = (None, None)
+    outcome: tuple[Exception | None, Any] = (None, None)
     if comm.rank == 0:
         try:
             outcome = (None, work())
         except FretwaveError as error:
+            outcome = (error, None)
+        except BrokenPipeError as error:
             outcome = (error, None)
         except (OSError, MemoryError) as error:
             outcome = (in_words(error), None)

@@ -31,16 +31,14 @@ def draw(forced: Analysis, blades: Table, tuned: Table) -> Figure:
     for level, colour in zip(levels, style.shades(len(levels))):
         rows = blades["level"] == level
         lower.plot(sectors, blades["amplification"][rows], "o-", color=colour, linewidth=1.0, label=f"level {level:g}")
-    lower.axhline(1.0, color=style.GREY, linestyle="--", linewidth=1.2)
-    lower.axhline(whitehead(len(sectors)), color=style.GREY, linestyle=":", linewidth=1.2)
-    for value, text in ((1.0, "tuned wheel"), (whitehead(len(sectors)), "Whitehead's bound (linear, one family)")):
-        place = {"xycoords": ("axes fraction", "data"), "textcoords": "offset points", "color": style.GREY}
-        lower.annotate(text, (0.005, value), (0, 3), fontsize=9.5, **place)
-    lower.set_ylim(bottom=0.0, top=1.12 * max(whitehead(len(sectors)), float(np.nanmax(blades["amplification"]))))
+    bound = whitehead(len(sectors))
+    lower.axhline(1.0, color=style.GREY, linestyle="--", linewidth=1.2, label="tuned wheel")
+    lower.axhline(bound, color=style.GREY, linestyle=":", linewidth=1.2, label="Whitehead's bound (linear, one family)")
+    lower.set_ylim(bottom=0.0, top=1.25 * max(bound, float(np.nanmax(blades["amplification"]))))  # room for the legend
     lower.xaxis.set_major_locator(MaxNLocator(integer=True, nbins=13))
     lower.set_xlabel("Sector")
     lower.set_ylabel("Peak of the blade / tuned peak")
-    style.legend(lower, loc="upper right", ncols=len(levels))
+    style.legend(lower, loc="upper right", ncols=3)
     return figure
 
 

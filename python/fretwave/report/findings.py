@@ -33,6 +33,8 @@ SHOWN = (
     ),
     *("normal_force", "tangential_force", "gap", "work", "force_outside"),
 )
+#: Of columns whose names say too little, or their unit again.
+HEADINGS = {"frequency_hz": "frequency", "other_hz": "frequency of the mode most like it, sliding or free"}
 #: Shares, shown in percent.
 PERCENT = ("zeta", "zeta_error", "stick", "slip", "open", "force_outside", "zeta_mode")
 #: Digits of columns of which fewer than all say enough.
@@ -86,7 +88,7 @@ def _tells(analysis: Analysis, name: str, marks: Marks) -> bool:
 
 def _heading(analysis: Analysis, name: str) -> str:
     unit = "%" if name in PERCENT else analysis.unit(name)
-    words = name.rpartition(".")[2].replace("frequency_hz", "frequency").replace("_", " ")
+    words = HEADINGS.get(name, name.rpartition(".")[2].replace("_", " "))
     return f"{words} [{unit}]" if unit else words
 
 

@@ -179,7 +179,8 @@ def _ending(record: Mapping[str, Any], one: Overview) -> Iterator[tuple[str, obj
     yield "status", {"running": "not finished"}.get(one.status, one.status)
     yield "why it ended", one.reason
     yield "points", one.points
-    yield "wall time", f"{entry['wall_s']:g} s" if "wall_s" in entry else ""
+    took = "{:g} s, with what is before and after its points"
+    yield "wall time", took.format(entry["wall_s"]) if "wall_s" in entry else ""
 
 
 def _others(run: Run, images: Sequence[Picture]) -> str:

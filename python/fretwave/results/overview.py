@@ -19,7 +19,7 @@ from .record import RECORD, read_record
 if TYPE_CHECKING:
     import h5py
 
-HEADINGS = ("analysis", "type", "status", "points", "range", "peak", "folds", "error", "wall")
+HEADINGS = ("analysis", "type", "status", "points", "range", "peak", "folds", "error", "time of points")
 #: Of a limit cycle, by what is known of it.
 STABILITY = {True: "stable", False: "unstable", None: "stability unknown"}
 Values = Mapping[str, Any]

@@ -17,9 +17,10 @@ from ..arrays import Array, Complex
 from ..case.gauges import node_numbers, row_of_node
 from ..case.kept import reload_case
 from ..columns import Column
-from ..errors import InputError
+from ..errors import FretwaveError, InputError
 from ..model.structure import Structure
 from ..post.motion import complex_amplitudes, motion
+from ..results.missing_dof import missing_dof
 from ..results.results import open_results
 from ..texts import display, nearest
 from ..units import UnitSystem, units_of
@@ -94,12 +95,22 @@ def of_dof(group: h5py.Group, folder: Path, name: str, point: int) -> NodeMotion
     dofs = [text.decode() for text in group["dof"][()]]
     if name not in dofs:
         listed = ", ".join(dofs[:NAMED]) + (f", ... ({len(dofs)} in all)" if len(dofs) > NAMED else "")
-        near = nearest(name, dofs, "--dof {}".format) or f"--dof {dofs[0]}, or --node for a node of the mesh"
+        near = _meant(folder, name, dofs) or f"--dof {dofs[0]}, or --node for a node of the mesh"
         raise InputError("the results keep no such dof", display(folder), name, listed, near)
     rows = np.asarray(group["coefficients"][point])[[dofs.index(name)]]
     hz = float(group["points/frequency_hz"][point])
     labels = [text.decode() for text in group["harmonic"][()]]
     return NodeMotion(f"dof {name}", [name], labels, rows, hz, units_of(group.attrs))
+
+
+def _meant(folder: Path, name: str, dofs: Sequence[str]) -> str | None:
+    """A fix line for a dof that is not kept, by the model where that can still be read."""
+    try:
+        learn_kept_laws(folder)
+        given = reload_case(folder, kept=True)[0].structure
+    except FretwaveError:
+        return nearest(name, dofs, "--dof {}".format)
+    return missing_dof(given.cut or given, name, dofs, "--dof {}".format)
 
 
 def of_node(folder: Path, analysis: str, number: int, point: int, sector: int = 0) -> NodeMotion:
@@ -119,13 +130,14 @@ def of_node(folder: Path, analysis: str, number: int, point: int, sector: int = 
     case, _ = reload_case(folder, kept=True)
     given, (nodes, _) = geometry(case), mesh_of(case)
     row = _row_of(given, len(nodes), number, folder)
+    held = _held_along(given, row)
     with open_results(folder / "results.h5") as file:
         choice = read_choice(file, folder, case, ViewOptions(analysis=analysis, points=[point]))
     with scene_of(case, choice, nodes, folder, [sector]) as scene:
         shape = scene.shape(sector)
     place = ", ".join(f"{x:.6g}" for x in shape.nodes[row])
     of = f" of sector {sector}" if scene.around > 1 else ""
-    what = f"node {number}{of} at ({place}) {choice.units('length')}"
+    what = f"node {number}{of} at ({place}) {choice.units('length')}{held}"
     hz = float(choice.states["frequency_hz"][0])
     return NodeMotion(what, "xyz", choice.labels, shape.coefficients[0, row], hz, choice.units)
 
@@ -139,3 +151,11 @@ def _row_of(given: Structure, count: int, number: int, folder: Path) -> int:
     kind = "counted from 0" if given.node_numbers is None else "in the mesh's own numbers"
     expected = f"one of {count} nodes, {numbers.min()} to {numbers.max()}, {kind}"
     raise InputError("there is no such node", display(folder), number, expected, f"--node {near}")
+
+
+def _held_along(given: Structure, row: int) -> str:
+    """In words, along which directions the model holds a node; empty where it is free."""
+    if given.displacements is None:
+        return ""
+    ways = [way for way, dof in zip("xyz", given.displacements[row]) if dof < 0]
+    return f", held along {', '.join(ways)} (no dof of the model)" if ways else ""

@@ -141,7 +141,7 @@ def stress_tables(folder: Path, asked: str | None = None) -> Iterator[StressTabl
 def _gauges(case: Case) -> Gauges:
     """Of the case file as it is now, of a model that has stress."""
     given = case.structure.cut or case.structure
-    gauges = gauges_now(Source(case.path), given) if case.path.is_file() else case.tables.gauges
+    gauges = gauges_now(Source(case.path) if case.path.is_file() else case.source, given)
     if not gauges.gauges and gauges.elastic is None:
         expected = "[material] with youngs_modulus and poisson_ratio, [[gauge]], or both"
         fix = "add them to the case file; the run stays as it is (`fretwave check --keys` lists the keys)"

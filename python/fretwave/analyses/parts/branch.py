@@ -17,6 +17,7 @@ from ...mpi.log import event
 from ...post.contact_history import MEASURED
 from ...results.results import AnalysisWriter
 from ...results.slopes import slope_fields, slopes_of
+from ...texts import times
 from .observed import observed_by
 
 if TYPE_CHECKING:
@@ -238,7 +239,7 @@ def tell_fallbacks(context: AnalysisContext[AnalysisSection], branch: Continuati
     kept = context.entry.setdefault("linear_fallbacks", dict.fromkeys(counts, 0))
     for key, count in counts.items():
         kept[key] += count
-    text = ", ".join(f"{what} {counts[key]} times" for key, what in FALLBACKS.items() if counts[key])
+    text = ", ".join(f"{what} {times(counts[key])}" for key, what in FALLBACKS.items() if counts[key])
     context.console.line(f"{context.name}: GMRES failed and was helped: {text}")
     if found["said"]:
         context.console.line(f"{context.name}: {found['said']}")

@@ -14,7 +14,7 @@ from ...case.schema import PreloadSection
 from ...errors import InputError
 from ...model.contact import Contact
 from ...model.laws import Role, own_load
-from .asymptotes import closed_stiffness, limit_model
+from .asymptotes import MORE_MODES, closed_stiffness, limit_model, most_like
 from .context import AnalysisContext
 
 if TYPE_CHECKING:
@@ -103,7 +103,7 @@ def start_mode(
             f" {100 * rest.open:.3g} % are open"
         )
         context.arrays["rest_displacement"] = rest.displacement
-    modes = _stuck_modes(context, linear_mode) if or_free else context.linear_mode("stuck", linear_mode)
+    modes = _stuck_modes(context, linear_mode) if or_free else modes_at_rest(context, linear_mode)
     if not modes:
         context.console.line(f"{context.name}: contact that sticks leaves nothing to move: the mode without contact")
         return context.numbered(context.linear_mode("free", linear_mode), linear_mode), rest
@@ -128,10 +128,25 @@ def _leader(context: AnalysisContext[AnalysisSection], mode: LinearMode) -> str:
     return context.case.dofs[int(np.argmax(np.hypot(mode.shape, mode.imaginary)))]
 
 
+def modes_at_rest(context: AnalysisContext[AnalysisSection], count: int) -> list[LinearMode]:
+    """Linear modes with the contact as it is at rest, by the numbers of stuck ones. Collective.
+
+    Pairs without friction slide, and may leave rigid motions: then those most like the modes with all pairs stuck.
+    """
+    if not any(contact.never_sticks for contact in context.case.contacts):
+        return context.linear_mode("stuck", count)
+    from ...model.modes import linear_modes
+
+    with limit_model(context.case, context.comm, "stuck", nodal_diameter(context.analysis)) as model:
+        stuck = linear_modes(model, count)
+    found = context.linear_mode("stuck", min(context.model.n_dof, count + MORE_MODES))
+    return [most_like(context, found, mode) for mode in stuck]
+
+
 def _stuck_modes(context: AnalysisContext[AnalysisSection], count: int) -> list[LinearMode]:
     """None where contact that sticks leaves nothing to move. Collective."""
     try:
-        return context.linear_mode("stuck", count)
+        return modes_at_rest(context, count)
     except InputError:
         return []
 

@@ -18,7 +18,7 @@ from ...case.observed import dof_of
 from .asymptotes import most_like, other_asymptote
 from .context import AnalysisContext
 from .observed import observed_by
-from .rest import rest_state, start_mode
+from .rest import modes_at_rest, rest_state, start_mode
 
 if TYPE_CHECKING:
     from ...hb.observed import Observed
@@ -79,7 +79,7 @@ def _on_wheel(context: AnalysisContext[ModeAnalysis]) -> Start:
     rest = rest_state(context)
     mode = None
     if mistuned and analysis.nodal_diameter is None:
-        mode = context.numbered(context.linear_mode("stuck", analysis.linear_mode), analysis.linear_mode)
+        mode = context.numbered(modes_at_rest(context, analysis.linear_mode), analysis.linear_mode)
         context = context.of(_family(context, mode))
     tuned, asymptotes = _tuned(context)
     analysis = context.analysis
@@ -145,7 +145,7 @@ def _family(context: AnalysisContext[ModeAnalysis], mode: LinearMode) -> ModeAna
     named = analysis.model_copy(update={"nodal_diameter": diameters})
     count = min(wheel.unit, analysis.linear_mode // wheel.sectors + MORE_FAMILIES)
     with tuned_sector(context.of(named)) as sector:
-        modes = sector.linear_mode("stuck", count)
+        modes = modes_at_rest(sector, count)
     shares = [abs((m.shape - 1j * m.imaginary) @ (M @ waves[diameters])) for m in modes]
     return named.model_copy(update={"linear_mode": 1 + int(np.argmax(shares))})
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -45,6 +45,8 @@ class Source:
         Overrides that could not be applied.
     units_of_model : UnitSystem
         As the builder or the model file says, once it is read.
+    dof_fix : callable
+        What to do about a dof that is not among some names, once the model is read also by node and direction.
     factors : dict
         Of contacts' parameters, and where they were given.
 
@@ -62,6 +64,7 @@ class Source:
         check_plain(self.data, self.label)
         self.problems: list[FretwaveError] = []
         self.units_of_model = SI
+        self.dof_fix: Callable[[str, Sequence[str]], str | None] = nearest
         self._locator = Locator(self.text)
         self._origin: dict[KeyPath, str] = {}
         self.factors: dict[KeyPath, tuple[float, str]] = {}
