@@ -147,7 +147,7 @@ std::optional<Point> Continuation::take_over(Anchor from, std::string const& eve
   open_the_range();
   prepare_row();
   Trial trial = at(copy(anchor_.y));
-  const bool given = event == "start" || event.starts_with("report") || event == "stop";
+  const bool given = event == "start" || event == "report" || event == "stop";
   const double value = given ? last_entry(trial.y) : row_value_;
   if (!correct(trial, given ? parameter_row_ : row_, value, row_)) return {};
   anchor_.y = copy(trial.y), anchor_.tangent = copy(trial.tangent);
@@ -420,10 +420,12 @@ void Continuation::make_batch() {
   if (!outside) emit(std::move(*end), length, std::move(events));
   std::stable_sort(batch_.begin(), batch_.end(),
                    [](auto const& x, auto const& y) { return x.first < y.first; });
-  const auto stop = std::find_if(batch_.begin(), batch_.end(),
-                                 [](auto const& x) { return x.second.event.ends_with("stop"); });
+  const auto stop = std::find_if(batch_.begin(), batch_.end(), [](auto const& x) {
+    return x.second.event == "stop" || x.second.event == reported_stop;
+  });
   if (stop != batch_.end()) {
     const double value = stop->second.parameter;
+    if (stop->second.event == reported_stop) stop->second.event = "report";
     batch_.erase(stop + 1, batch_.end());
     arrive(std::abs(value - low_) < std::abs(value - high_) ? low_ : high_);
   } else if (outside) {

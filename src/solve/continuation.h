@@ -22,7 +22,7 @@ struct Point {
   VecHandle y, tangent;
   double parameter = 0, step = 0;
   Outcome outcome;
-  std::string event;  ///< "", start, stop, report, report stop, fold or the name of a test function
+  std::string event;  ///< "", start, stop, report, fold or the name of a test function
   double wall = 0;    ///< seconds since the point before
 };
 
@@ -64,6 +64,8 @@ class Continuation {
   Anchor const& anchor() const { return anchor_; }
   Anchor const& before() const { return before_; }
   int emitted() const { return emitted_; }
+  /// The point that was handed out is the last.
+  bool ends() const { return emitted_ == int(batch_.size()) && !ending_.empty(); }
   /// Length of the step after the present one.
   double next_step() const { return after_.y ? after_.step : anchor_.step; }
   bool upwards() const { return upwards_; }
@@ -140,6 +142,7 @@ class Continuation {
   void reach(double value, std::string const& event, Place a, Place b, Hermite const&, double length);
   void polish(Trial&, double target);
   std::optional<Trial> reach_along(double target, Place a, Place b, Hermite const&);
+  static constexpr char reported_stop[] = "report stop";  ///< while a step is looked at
   std::string stop_event(double end) const;
   void locate_values(Trial const& end, Hermite const&, double length);
   void emit(Trial&&, double at, std::string event);

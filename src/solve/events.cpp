@@ -158,9 +158,9 @@ void Continuation::locate_values(Trial const& end, Hermite const& curve, double 
     each(high_, stop_event(high_), true);
 }
 
-/// An end of the range that is reported as well is one point.
+/// An end of the range that is reported as well is one point, a report.
 std::string Continuation::stop_event(double end) const {
-  return std::ranges::find(report_at_, end) == report_at_.end() ? "stop" : "report stop";
+  return std::ranges::find(report_at_, end) == report_at_.end() ? "stop" : reported_stop;
 }
 
 /// The branch at a given parameter between two places of the step.

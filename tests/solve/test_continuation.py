@@ -136,9 +136,10 @@ def test_ends_that_are_reported_as_well_are_one_point_each(two_dof, comm, upward
     """The branch starts at one of them, and stops at the other."""
     given = {"start": LOW if upwards else 0.1, "stop": (LOW, 0.1), "upwards": upwards}
     _, plain = follow(problem_of(two_dof, comm), **given)
-    _, points = follow(problem_of(two_dof, comm), report_at=[LOW, 0.1], **given)
+    branch, points = follow(problem_of(two_dof, comm), report_at=[LOW, 0.1], **given)
     assert [p.parameter for p in points] == [p.parameter for p in plain]
-    assert [p.event for p in points] == [*(p.event for p in plain[:-1]), "report stop"]
+    assert branch.converged and branch.reason == "stop value reached"
+    assert [p.event for p in points] == [*(p.event for p in plain[:-1]), "report"]
 
 
 @pytest.mark.parametrize("maximum", [0.3, pytest.param(0.02, marks=pytest.mark.ranks(1))])

@@ -74,7 +74,7 @@ class RefiningContinuation(Continuation):
         self.points, self.missed_by = 0, dict[str, int]()
 
     def __next__(self) -> Point:
-        if self._present is not None and "stop" not in self._present.event.split():
+        if self._present is not None and not self._core.ends:
             wanted = self._aim.next(self.problem.harmonics, self.least)
             if wanted is not None:
                 self._move(wanted, self._present, "next_step")

@@ -199,7 +199,7 @@ class WornMode(Destroyable):
         found = None
         for point in branch:
             point.tangent.destroy()
-            if "report" in point.event.split():
+            if point.event == "report":
                 found = point.y
                 break
         branch.destroy()

@@ -127,7 +127,7 @@ def _sector_amplitudes(
 
 def _lines(name: str, points: dict[str, Any], start: Start, unit: str) -> list[str]:
     lines = []
-    shown = [0, *[k for k, event in enumerate(points["event"]) if b"report" in event.split()], len(points["point"]) - 1]
+    shown = [0, *np.flatnonzero(points["event"] == b"report").tolist(), len(points["point"]) - 1]
     for k in dict.fromkeys(shown):
         lines.append(
             f"{name}: at a = {points['amplitude'][k]:.4g} {unit} amplification {points['amplification'][k]:.4g},"
