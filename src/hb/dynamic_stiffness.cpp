@@ -1,5 +1,6 @@
 #include "hb/dynamic_stiffness.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -22,6 +23,30 @@ bool is_dense(Mat A) {
   return n > 16 && info.nz_used > dense_share * double(n) * double(n);
 }
 
+/// r where A = r B entry by entry, but for the last digits; 0 where it is not. Collective.
+double multiple_of(Mat A, Mat B) {
+  std::vector<double> a, b;
+  std::vector<PetscInt> a_cols, b_cols;
+  for_entries(A, [&](PetscInt, PetscInt col, double v) { a.push_back(v), a_cols.push_back(col); });
+  for_entries(B, [&](PetscInt, PetscInt col, double v) { b.push_back(v), b_cols.push_back(col); });
+  size_t largest = 0;
+  for (size_t k = 0; k < b.size(); ++k)
+    if (std::abs(b[k]) > std::abs(b[largest])) largest = k;
+  int alike = a_cols == b_cols;
+  const double mine[2] = {b.empty() ? 0 : std::abs(b[largest]),
+                          alike && !b.empty() ? a[largest] / b[largest] : 0};
+  MPI_Comm comm;
+  check(PetscObjectGetComm(reinterpret_cast<PetscObject>(A), &comm));
+  double most = 0, times = 0;
+  const auto all = gathered(std::span(mine, 2), comm);
+  for (size_t rank = 0; rank < all.size(); rank += 2)
+    if (all[rank] > most) most = all[rank], times = all[rank + 1];
+  for (size_t k = 0; alike && k < a.size(); ++k)
+    alike = std::abs(a[k] - times * b[k]) <= 4 * std::numeric_limits<double>::epsilon() * std::abs(a[k]);
+  MPI_Allreduce(MPI_IN_PLACE, &alike, 1, MPI_INT, MPI_LAND, comm);
+  return alike && std::isfinite(times) ? times : 0;
+}
+
 }  // namespace
 
 DynamicStiffness::DynamicStiffness(model::Model const& model, Harmonics const& h)
@@ -42,6 +67,35 @@ DynamicStiffness::DynamicStiffness(model::Model const& model, Harmonics const& h
       blocked_.back().split = SplitMatrix(blocked_.back().dense, int(model.local_dofs()), int(model.dofs()));
   }
   work_ = make_vector(model.comm(), model.local_dofs() * h.block_size());
+  find_parts();
+}
+
+/// Damping in proportion to stiffness, or to mass, goes with its product.
+void DynamicStiffness::find_parts() {
+  auto const& terms = model_.terms();
+  parts_.resize(terms.size());
+  for (size_t j = 0; j < terms.size(); ++j) parts_[j].push_back({j, 1});
+  for (size_t j = 0; j < terms.size(); ++j)
+    for (size_t i = 0; terms[j].order == 1 && i < terms.size() && !parts_[j].empty(); ++i) {
+      if (terms[i].order == 1 || terms[i].phase != terms[j].phase) continue;
+      const double times = multiple_of(terms[j].A, terms[i].A);
+      if (times == 0) continue;
+      parts_[i].push_back({j, times});
+      parts_[j].clear();
+    }
+}
+
+/// Of a product, of all terms or of those of one order; none where there are none.
+DynamicStiffness::Coefficients DynamicStiffness::coefficients(std::vector<Part> const& parts,
+                                                              Exponents const& e, int order) const {
+  Coefficients sum;
+  for (auto const& [term, times] : parts) {
+    if (order >= 0 && model_.terms()[term].order != order) continue;
+    sum.resize(size_t(harmonics_.count()));
+    const auto c = coefficients(model_.terms()[term], e);
+    for (size_t i = 0; i < c.size(); ++i) sum[i] += times * c[i];
+  }
+  return sum;
 }
 
 complex DynamicStiffness::phase(model::Term const& term, int n) const {
@@ -98,17 +152,50 @@ void DynamicStiffness::accumulate(std::vector<complex> const& c, Blocked const& 
   dgemm_("N", "N", &m, &local, &all, &one, X.data(), &m, A.dense.data(), &all, &one, Y.data(), &m);
 }
 
-void DynamicStiffness::multiply_add(Exponents const& e, Vec x, Vec y, int order) {
+void DynamicStiffness::multiply_add(Exponents const& e, Vec x, Vec y, int order, bool exactly) {
   for (size_t j = 0; j < blocked_.size(); ++j)
-    if (order < 0 || model_.terms()[j].order == order)
-      accumulate(coefficients(model_.terms()[j], e), blocked_[j], x, y);
+    if (const auto c = coefficients(parts_[j], e, order); !c.empty())
+      accumulate(c, blocked_[j], x, y, exactly);
+}
+
+void DynamicStiffness::multiply_add(Exponents const& e, Vec x, Vec y, int order) {
+  multiply_add(e, x, y, order, false);
+}
+
+void DynamicStiffness::multiply_add_exactly(Exponents const& e, Vec x, Vec y) {
+  multiply_add(e, x, y, -1, true);
+}
+
+/// Z of a change acts on the coefficients of a dof, A on its dofs: A x is made once for all changes.
+void DynamicStiffness::derivative_multiply_add(Exponents const& e, Exponents const& change, Vec x, Vec y) {
+  products_.resize(blocked_.size());
+  for (size_t j = 0; j < blocked_.size(); ++j) {
+    Coefficients sum;
+    for (auto const& [term, times] : parts_[j]) {
+      if (model_.terms()[term].order == 0) continue;
+      sum.resize(size_t(harmonics_.count()));
+      const auto c = coefficient_derivatives(model_.terms()[term], e, change);
+      for (size_t i = 0; i < c.size(); ++i) sum[i] += times * c[i];
+    }
+    if (sum.empty()) continue;
+    if (!products_[j]) {
+      products_[j] = like(y);
+      check(VecSet(products_[j], 0));
+      accumulate(Coefficients(size_t(harmonics_.count()), 1.0), blocked_[j], x, products_[j]);
+    }
+    multiply(harmonics_, sum, ReadArray(products_[j]).data(), WriteArray(work_).data(),
+             int(model_.local_dofs()));
+    check(VecAXPY(y, 1, work_));
+  }
 }
 
 /// (A (x) c)^T = A^T (x) conj(c): as a block on (cos, sin), c = a + i b is [[a, b], [-b, a]].
 void DynamicStiffness::transposed_multiply_add(Exponents const& e, Vec x, Vec y) {
   for (size_t j = 0; j < blocked_.size(); ++j) {
-    multiply(harmonics_, conjugate(coefficients(model_.terms()[j], e)), ReadArray(x).data(),
-             WriteArray(work_).data(), int(model_.local_dofs()));
+    const auto c = coefficients(parts_[j], e, -1);
+    if (c.empty()) continue;
+    multiply(harmonics_, conjugate(c), ReadArray(x).data(), WriteArray(work_).data(),
+             int(model_.local_dofs()));
     accumulate_transposed(blocked_[j], work_, y);
   }
 }
@@ -127,17 +214,6 @@ void DynamicStiffness::accumulate_transposed(Blocked const& A, Vec x, Vec y) con
   WriteArray Y(y);
   double const* mine = parts.data() + size_t(model_.first_dof()) * m;
   for (size_t k = 0; k < size_t(local) * m; ++k) Y[PetscInt(k)] += mine[k];
-}
-
-void DynamicStiffness::multiply_add_exactly(Exponents const& e, Vec x, Vec y) {
-  for (size_t j = 0; j < blocked_.size(); ++j)
-    accumulate(coefficients(model_.terms()[j], e), blocked_[j], x, y, true);
-}
-
-void DynamicStiffness::derivative_multiply_add(Exponents const& e, Exponents const& change, Vec x, Vec y) {
-  for (size_t j = 0; j < blocked_.size(); ++j)
-    if (model_.terms()[j].order > 0)
-      accumulate(coefficient_derivatives(model_.terms()[j], e, change), blocked_[j], x, y);
 }
 
 double DynamicStiffness::rounding(Exponents const& e, Vec x) const {

@@ -16,8 +16,9 @@ class DynamicStiffness {
   void transposed_multiply_add(Exponents const&, Vec x, Vec y);
   /// y += Z x, dense stiffness without its rounding (`SplitMatrix`): for residuals. Collective.
   void multiply_add_exactly(Exponents const&, Vec x, Vec y);
-  /// y += dZ x for a change (ds, dg) of the exponents. Collective.
+  /// y += dZ x for a change (ds, dg) of the exponents, always of the same x until it `has_moved`. Collective.
   void derivative_multiply_add(Exponents const&, Exponents const& change, Vec x, Vec y);
+  void has_moved() { products_.clear(); }
   /// Rounding error to expect in Z x: eps sum |A| |c_n| |x|, with each dof's neighbours moving as itself;
   /// norm over all rows. Collective.
   double rounding(Exponents const&, Vec x) const;
@@ -43,7 +44,16 @@ class DynamicStiffness {
     std::vector<double> dense;  ///< local rows x all dofs, row-major
     SplitMatrix split;          ///< of a stiffness
   };
+  /// A term whose matrix is so many times that of the product.
+  struct Part {
+    size_t term;
+    double times;
+  };
+  using Coefficients = std::vector<complex>;
   complex phase(model::Term const&, int n) const;
+  void find_parts();
+  Coefficients coefficients(std::vector<Part> const&, Exponents const&, int order) const;
+  void multiply_add(Exponents const&, Vec x, Vec y, int order, bool exactly);
   void accumulate(std::vector<complex> const& c, Blocked const&, Vec x, Vec y, bool exactly = false);
   void accumulate_transposed(Blocked const&, Vec x, Vec y) const;
   std::vector<Entry> entries(Mat A) const;
@@ -51,6 +61,8 @@ class DynamicStiffness {
   model::Model const& model_;
   Harmonics harmonics_;
   std::vector<Blocked> blocked_;
+  std::vector<std::vector<Part>> parts_;       ///< of each of them: damping c K needs no product of its own
+  std::vector<VecHandle> products_;            ///< A x of derivatives, by matrix; made when asked for
   std::vector<std::vector<double>> row_sums_;  ///< of |A|, one per term
   mutable std::vector<std::vector<Entry>> entries_;
   VecHandle work_;

@@ -88,7 +88,7 @@ void Residual::evaluate(Vec Q, Exponents const& e, Vec R) {
   static const log::Event forces("FwContactForce");
   if (Q != Q_) check(VecCopy(Q, Q_));
   e_ = e;
-  tangents_.clear();
+  tangents_.clear(), stiffness_.has_moved();
   check(VecSet(R, 0));
   stiffness_.multiply_add_exactly(e, Q_, R);
   for (Group& group : groups_) relative_motion(group, Q_, group.U);
