@@ -41,7 +41,7 @@ def reduced_model(options: dict[str, Any]) -> tuple[Any, Any, int]:
     """The case's model with other options of its builder; its rest state and the observed dof."""
     chosen = [f"model.options.{name}={list(v) if isinstance(v, tuple) else v}" for name, v in options.items()]
     case = reduce_case(load_case(CASE, chosen), COMM)
-    model = build_model(case, (), COMM, case.preload)
+    model = build_model(case, (), COMM, case.tables.preload)
     return model, case, case.dof("tip")
 
 

@@ -25,8 +25,6 @@ NO_EFFECT = {
     ("blisk_lumped", "reduction={modes=1, interface_tolerance=1e-3}"): "reduction.interface_tolerance has no effect",
     ("blisk_lumped", "reduction={modes=1, compare=0, compare_diameters=[3]}"): "compare_diameters has no effect",
     ("two_dof", "reduction={modes=1, interface_waves=3}"): "reduction.interface_waves is of no sector of a wheel",
-    ("two_dof", "free_decay.amplitude=[0.5, 99.0]"): "free_decay.amplitude[1] is outside the mode's branch",
-    ("two_dof", "limit_cycle.amplitude=[1e-3]"): "limit_cycle.amplitude[0] is outside the mode's branch",
     ("two_dof", "mode.report_at=[99.0]"): "mode.report_at[0] is outside the branch",
     ("two_dof", "mode.step={maximun=0.1}"): "unknown key 'maximun' in mode.step",
 }

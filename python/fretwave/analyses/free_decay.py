@@ -9,14 +9,13 @@ import numpy as np
 
 from ..case.analysis import AnalysisSection, register_analysis
 from ..case.checks_common import check_once
-from ..case.observed import check_displaced, given_to
+from ..case.observed import check_displaced
 from ..case.schema import Damper, Positive, Whole, key
 from ..columns import Column
 from ..post.cycles import extract
 from ..post.decays import decay_rows, largest_differences
 from ..post.mode_curve import ModeCurve
 from ..solve.steps import TIME_TOLERANCE
-from ..texts import toml
 from .mode import ModeAnalysis
 from .parts.context import AnalysisContext, Outcome
 from .parts.starts import Starts
@@ -60,11 +59,6 @@ class TransientSection(AnalysisSection):
         report.mode(("mode",), self.mode, facts.analyses_of("mode"))
         check_displaced(report, "mode", self.mode, facts)
         check_once(report, "amplitude", self.amplitude)
-        ends = given_to(facts, self.mode, "amplitude")
-        for index, value in enumerate(self.amplitude) if isinstance(ends, list) and len(ends) == 2 else ():
-            if not ends[0] <= value <= ends[1]:
-                expected = f"{toml(ends)}, the amplitudes of '{self.mode}'"
-                report.wrong(("amplitude", index), "is outside the mode's branch", expected, "move it, or widen these")
 
     def least_memory(self, facts: Facts) -> Mapping[str, float]:
         count = self.periods * self.samples_per_period
