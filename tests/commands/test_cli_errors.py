@@ -144,6 +144,15 @@ def test_petsc_s_help_lists_our_own_options_with_what_they_mean(tmp_path: Path) 
     assert "-mode_snes_rtol" in listed
 
 
+@pytest.mark.parametrize("command", [["view"], ["report"], ["probe", "--dof", "m1"], ["stress"]])
+@pytest.mark.parametrize("out", [".", "results.h5/out", "case.toml/a/b"])
+def test_a_file_to_write_is_no_folder_and_lies_in_one(earlier: Path, monkeypatch, capfd, command, out) -> None:
+    monkeypatch.chdir(earlier)
+    assert main([command[0], ".", *command[1:], "--out", out]) == 2
+    said = capfd.readouterr().err
+    assert "--out" in said and said.count("fix:") == 1
+
+
 def test_failure_before_the_first_point_makes_no_folder(tmp_path: Path, capfd) -> None:
     folder = tmp_path / "run"
     for wrong in ("mode.harmonics=0", "mode.petsc=-snes_rtoll 1"):

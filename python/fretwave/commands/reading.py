@@ -214,7 +214,7 @@ def _view(options: argparse.Namespace) -> int:
         amplitudes=options.amplitude,
         linear=options.linear,
         sectors=options.sectors,
-        out=options.out,
+        out=file_to_write(options.out, "motion.vtkhdf"),
         png=options.png,
         gif=options.gif,
         pvd=options.pvd,
