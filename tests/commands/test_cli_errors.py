@@ -153,6 +153,18 @@ def test_a_file_to_write_is_no_folder_and_lies_in_one(earlier: Path, monkeypatch
     assert "--out" in said and said.count("fix:") == 1
 
 
+@pytest.mark.parametrize("command", [["run"], ["sweep", "--over", "mode.harmonics=3,5"], ["study"]])
+def test_results_go_into_no_file(tmp_path: Path, capfd, command: list[str]) -> None:
+    """Told before the first point, not behind it."""
+    (tmp_path / "taken").write_text("mine")
+    for out in (tmp_path / "taken", tmp_path / "taken" / "below"):
+        only = ["--only", "mode"] if command[0] != "study" else []
+        assert main([command[0], str(CASE), "--quick", *only, *command[1:], "--out", str(out)]) == 2
+        said = capfd.readouterr().err
+        assert "not a folder for results" in said and said.count("fix:") == 1
+    assert (tmp_path / "taken").read_text() == "mine"
+
+
 def test_failure_before_the_first_point_makes_no_folder(tmp_path: Path, capfd) -> None:
     folder = tmp_path / "run"
     for wrong in ("mode.harmonics=0", "mode.petsc=-snes_rtoll 1"):

@@ -16,7 +16,7 @@ from ..mpi.guard import on_first_rank
 from ..mpi.interrupt import say_how_to_go_on
 from ..post.grid import Plan
 from ..results.file import OVERRIDES
-from ..results.runfolder import CASE_COPY, RunFolder, new_record, peak_memory_mb, read_copy
+from ..results.runfolder import CASE_COPY, RunFolder, new_record, peak_memory_mb, read_copy, results_folder
 from ..results.sweeps import summary_columns, summary_lines, write_sweep
 from ..run.order import RunOptions
 from ..run.runner import Runner, plot
@@ -40,7 +40,7 @@ def sweep_case(path: Path, options: RunOptions, plan: Plan, n_groups: int | None
     sweep = Sweep(Runner, path, plan, options, Path(), n_groups)
     checked = sweep.check(comm)
     first = checked[0]
-    folder = options.out or Path("runs") / f"{first.name}_sweep"
+    folder = results_folder(options.out, f"{first.name}_sweep", comm)
     sweep.folder = folder / "values"
     told = {key: getattr(options, key) for key in ("overrides", "quick", "only", "petsc")}
     given = {"path": str(path.resolve()), **told, "digest": first.digest, "resolved": first.resolved}

@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING, Any
 from ..errors import InputError
 from ..files.lock import FolderLock, check_free
 from ..files.whole import replace_text, told, write_all
-from ..texts import display, own_version
+from ..mpi.guard import on_first_rank
+from ..texts import display, is_there, own_version
 from .journal import Journal, unfinished
 from .record import RECORD, read_record, write_record
 
@@ -24,6 +25,25 @@ if TYPE_CHECKING:
     from mpi4py import MPI
 
 CASE_COPY = "case.toml"
+
+
+def results_folder(given: Path | None, name: str, comm: MPI.Comm) -> Path:
+    """Where results go: as ``--out`` says, or ``runs/<name>``. Collective.
+
+    Raises
+    ------
+    InputError
+        It is a file, or lies in one.
+    """
+    folder = given or Path("runs") / name
+    on_first_rank(comm, lambda: _expect_folder(folder))
+    return folder
+
+
+def _expect_folder(folder: Path) -> None:
+    for path in (folder, *folder.parents):
+        if is_there(path) and not path.is_dir():
+            raise InputError("this is a file, not a folder for results", "--out", display(path), fix="name a folder")
 
 
 class RunFolder:

@@ -28,7 +28,7 @@ from ..results.file import OVERRIDES
 from ..results.journal import Journal
 from ..results.reader import write_curve
 from ..results.results import has_results, open_results
-from ..results.runfolder import RECORD, RunFolder, new_record, peak_memory_mb, read_record
+from ..results.runfolder import RECORD, RunFolder, new_record, peak_memory_mb, read_record, results_folder
 from ..texts import counted, display
 from .left_out import left_out_lines
 from .order import RunOptions, in_order
@@ -51,7 +51,7 @@ def run_case(path: Path, options: RunOptions, comm: MPI.Comm) -> int:
     from .. import _core  # noqa: F401  # PETSc starts on all ranks at once, not with what one of them does alone
 
     case = on_first_rank(comm, lambda: load_case(path, options.overrides, options.quick))
-    folder = options.out or Path("runs") / case.name
+    folder = results_folder(options.out, case.name, comm)
     record = comm.bcast(new_record(options.given(path, case), comm.size) if comm.rank == 0 else None)
     return Runner(case, options, folder, record, comm).run()
 

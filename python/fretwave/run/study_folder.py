@@ -16,7 +16,7 @@ from ..files.whole import replace_text
 from ..mpi.groups import Kept
 from ..mpi.guard import on_first_rank
 from ..mpi.interrupt import say_how_to_go_on
-from ..results.runfolder import CASE_COPY, RunFolder, new_record
+from ..results.runfolder import CASE_COPY, RunFolder, new_record, results_folder
 from ..texts import display
 
 if TYPE_CHECKING:
@@ -50,7 +50,7 @@ class StudyFolder:
         comm: MPI.Comm,
         record: dict[str, Any] | None = None,
     ) -> None:
-        self.path, self.comm = options.out or Path("runs") / f"{case.name}_study", comm
+        self.path, self.comm = results_folder(options.out, f"{case.name}_study", comm), comm
         resumed = record is not None
         if record is None:
             told = {"overrides": options.overrides, "quick": options.quick, "only": [], "petsc": ""}
