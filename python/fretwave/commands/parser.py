@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NoReturn
 
 from ..console import Shown
 from ..errors import InputError
+from ..files.place import expect_place
 from ..mpi.guard import launched_rank
 from ..texts import display, is_there
 
@@ -72,7 +73,6 @@ def file_to_write(path: Path | None, example: str) -> Path | None:
     """Where a file goes that the command line names; a folder is refused, and what lies in a file."""
     if path is not None and is_there(path) and path.is_dir():
         raise InputError("this is a folder", "--out", display(path), "a file to write", f"--out {path / example}")
-    for parent in () if path is None else path.parents:
-        if is_there(parent) and not parent.is_dir():
-            raise InputError("this is no folder", "--out", display(parent), "a folder to write in", f"--out {example}")
+    if path is not None:
+        expect_place(path, f"--out {example}")
     return path

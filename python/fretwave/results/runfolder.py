@@ -15,9 +15,10 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
 from ..files.lock import FolderLock, check_free
+from ..files.place import expect_place
 from ..files.whole import replace_text, told, write_all
 from ..mpi.guard import on_first_rank
-from ..texts import display, is_there, own_version
+from ..texts import display, own_version
 from .journal import Journal, unfinished
 from .record import RECORD, read_record, write_record
 
@@ -33,7 +34,7 @@ def results_folder(given: Path | None, name: str, comm: MPI.Comm) -> Path:
     Raises
     ------
     InputError
-        It is a file, or lies in one.
+        It is a file, lies in one, or has a name that none can have.
     """
     folder = given or Path("runs") / name
     on_first_rank(comm, lambda: _expect_folder(folder))
@@ -41,9 +42,7 @@ def results_folder(given: Path | None, name: str, comm: MPI.Comm) -> Path:
 
 
 def _expect_folder(folder: Path) -> None:
-    for path in (folder, *folder.parents):
-        if is_there(path) and not path.is_dir():
-            raise InputError("this is a file, not a folder for results", "--out", display(path), fix="name a folder")
+    expect_place(folder / RECORD, "name a folder")
 
 
 class RunFolder:

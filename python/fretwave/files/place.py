@@ -1,0 +1,27 @@
+"""Whether a place that the command line names for results can be one."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from ..errors import InputError
+from ..texts import display, is_there
+
+LONGEST = 255  #: bytes of a name, in the file systems of Linux
+
+
+def expect_place(path: Path, fix: str) -> None:
+    """
+    Raises
+    ------
+    InputError
+        It lies in a file, or a name is longer than any file's can be.
+    """
+    for parent in path.parents:
+        if is_there(parent) and not parent.is_dir():
+            raise InputError("this is a file, not a folder for results", "--out", display(parent), fix=fix)
+    for name in path.parts:
+        if len(os.fsencode(name)) > LONGEST:
+            measured = f"{len(os.fsencode(name))} bytes: {name[:20]}..."
+            raise InputError("this name is too long", "--out", measured, f"at most {LONGEST} bytes", fix)
