@@ -93,7 +93,7 @@ def test_a_file_in_the_place_of_the_folder_is_named(tmp_path: Path, capfd) -> No
     import small_runs
 
     (tmp_path / "run").write_text("")
-    assert call(*small_runs.scenes(tmp_path)[0].start(tmp_path / "run")) == 1
+    assert call(*small_runs.scenes(tmp_path)[0].start(tmp_path / "run")) == 2
     said = capfd.readouterr().err
     assert said.count("error:") == 1 and display(tmp_path / "run") in said and "Traceback" not in said
 
