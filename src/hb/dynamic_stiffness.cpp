@@ -85,17 +85,24 @@ void DynamicStiffness::find_parts() {
     }
 }
 
-/// Of a product, of all terms or of those of one order; none where there are none.
+/// Coefficients of a product, of those that its terms have; none where none has any.
+template <class Of>
+DynamicStiffness::Coefficients DynamicStiffness::sum(std::vector<Part> const& parts, Of of) const {
+  Coefficients out;
+  for (auto const& [term, times] : parts) {
+    const Coefficients c = of(model_.terms()[term]);
+    if (out.empty()) out.resize(c.size());
+    for (size_t i = 0; i < c.size(); ++i) out[i] += times * c[i];
+  }
+  return out;
+}
+
+/// Of all terms or of those of one order.
 DynamicStiffness::Coefficients DynamicStiffness::coefficients(std::vector<Part> const& parts,
                                                               Exponents const& e, int order) const {
-  Coefficients sum;
-  for (auto const& [term, times] : parts) {
-    if (order >= 0 && model_.terms()[term].order != order) continue;
-    sum.resize(size_t(harmonics_.count()));
-    const auto c = coefficients(model_.terms()[term], e);
-    for (size_t i = 0; i < c.size(); ++i) sum[i] += times * c[i];
-  }
-  return sum;
+  return sum(parts, [&](model::Term const& term) {
+    return order < 0 || term.order == order ? coefficients(term, e) : Coefficients();
+  });
 }
 
 complex DynamicStiffness::phase(model::Term const& term, int n) const {
@@ -170,20 +177,16 @@ void DynamicStiffness::multiply_add_exactly(Exponents const& e, Vec x, Vec y) {
 void DynamicStiffness::derivative_multiply_add(Exponents const& e, Exponents const& change, Vec x, Vec y) {
   products_.resize(blocked_.size());
   for (size_t j = 0; j < blocked_.size(); ++j) {
-    Coefficients sum;
-    for (auto const& [term, times] : parts_[j]) {
-      if (model_.terms()[term].order == 0) continue;
-      sum.resize(size_t(harmonics_.count()));
-      const auto c = coefficient_derivatives(model_.terms()[term], e, change);
-      for (size_t i = 0; i < c.size(); ++i) sum[i] += times * c[i];
-    }
-    if (sum.empty()) continue;
+    const auto c = sum(parts_[j], [&](model::Term const& term) {
+      return term.order > 0 ? coefficient_derivatives(term, e, change) : Coefficients();
+    });
+    if (c.empty()) continue;
     if (!products_[j]) {
       products_[j] = like(y);
       check(VecSet(products_[j], 0));
       accumulate(Coefficients(size_t(harmonics_.count()), 1.0), blocked_[j], x, products_[j]);
     }
-    multiply(harmonics_, sum, ReadArray(products_[j]).data(), WriteArray(work_).data(),
+    multiply(harmonics_, c, ReadArray(products_[j]).data(), WriteArray(work_).data(),
              int(model_.local_dofs()));
     check(VecAXPY(y, 1, work_));
   }

@@ -52,6 +52,8 @@ class DynamicStiffness {
   using Coefficients = std::vector<complex>;
   complex phase(model::Term const&, int n) const;
   void find_parts();
+  template <class Of>
+  Coefficients sum(std::vector<Part> const&, Of of) const;
   Coefficients coefficients(std::vector<Part> const&, Exponents const&, int order) const;
   void multiply_add(Exponents const&, Vec x, Vec y, int order, bool exactly);
   void accumulate(std::vector<complex> const& c, Blocked const&, Vec x, Vec y, bool exactly = false);

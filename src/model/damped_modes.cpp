@@ -92,7 +92,7 @@ Free free_motions(Operators const& terms) {
   for (PetscInt count = 1; count <= size; count = std::max(count + 1, std::min(2 * count, size))) {
     const auto pairs = lowest_beside_zero(pencil, count);
     const auto is_free = [&](EigenPair const& pair) {
-      return pair.value < 1e-9 * scale && pair.value < uncertainty(terms[0], pair.vector);
+      return is_rigid(terms[0], scale, pair.value, pair.vector);
     };
     const auto first = std::find_if_not(pairs.begin(), pairs.end(), is_free);
     out.motions = PetscInt(first - pairs.begin());

@@ -198,6 +198,10 @@ std::vector<EigenPair> lowest_pairs(Pencil const& pencil, PetscInt count) {
   return found;
 }
 
+bool is_rigid(Mat K, double scale, double value, Vec vector) {
+  return value < 1e-9 * scale && value < uncertainty(K, vector);
+}
+
 std::vector<EigenPair> lowest_beside_zero(Pencil pencil, PetscInt count) {
   const double far = 100 * std::abs(pencil.shift);
   auto found = lowest_pairs(pencil, count);

@@ -34,6 +34,10 @@ std::vector<EigenPair> lowest_pairs(Pencil const&, PetscInt count);
 /// below zero as the first of their kind, or the last, lies above. Collective.
 std::vector<EigenPair> lowest_beside_zero(Pencil, PetscInt count);
 
+/// Whether an eigenvalue is that of a motion that nothing holds, but for rounding; `scale`: of the stiffest
+/// dofs. Collective.
+bool is_rigid(Mat K, double scale, double value, Vec vector);
+
 /// The `count` eigenvalues nearest to a shift amid the spectrum, ascending; likewise counted, within their
 /// distance of the shift. Collective.
 std::vector<EigenPair> nearest_pairs(Pencil const&, PetscInt count);

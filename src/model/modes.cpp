@@ -93,8 +93,7 @@ std::vector<LinearMode> undamped(Model const& model, int count, bool stuck, std:
     VecHandle x = like(vector);
     check(VecCopy(vector, x));
     if (!orthonormalise(AB[1], found, travelling, x)) continue;
-    const bool free = value < 1e-9 * scale && value < uncertainty(AB[0], x);
-    modes.push_back({free ? 0 : std::sqrt(value), 0, {}, {}});
+    modes.push_back({is_rigid(AB[0], scale, value, x) ? 0 : std::sqrt(value), 0, {}, {}});
     const VecHandle shape = scales ? scaled_back(x, scales, AB.offset) : VecHandle::share(x);
     take_shape(model, AB, shape, nullptr, modes.back());
     found.push_back(std::move(x));

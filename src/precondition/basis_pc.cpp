@@ -73,10 +73,11 @@ void BasisPreconditioner::set_border_vectors(Vec y, Vec row) {
       rows_[size_t(dof - first) * v + 2 * i + i] += weight;
 }
 
-/// Psi^T x of some vectors, by vector. Collective.
-std::vector<double> BasisPreconditioner::in_basis(std::vector<double> const& x, int vectors) const {
+/// Psi^T x of some vectors, by vector, and K_s^-1 x if it is asked for. Collective.
+std::vector<double> BasisPreconditioner::in_basis(std::vector<double> const& x, int vectors,
+                                                  double* moved) const {
   std::vector<double> g(size_t(vectors) * n_), out(g.size());
-  basis_.forces(x.data(), vectors, g.data());
+  basis_.forces(x.data(), vectors, g.data(), moved);
   sum_over_ranks(g, problem_.comm());
   for (int v = 0; v < vectors; ++v)
     for (int l = 0; l < n_; ++l) out[size_t(v) * n_ + l] = g[size_t(l) * vectors + v];
@@ -86,8 +87,9 @@ std::vector<double> BasisPreconditioner::in_basis(std::vector<double> const& x, 
 /// Border of the fundamental in the basis.
 ModalBorder BasisPreconditioner::border(Vec y, Vec row) {
   set_border_vectors(y, row);
-  ModalBorder out{scalars_, in_basis(columns_, 2 * scalars_), in_basis(rows_, 2 * scalars_),
-                  std::vector<double>(size_t(scalars_) * scalars_, 0.0)};
+  static_columns_.resize(basis_.factor() ? columns_.size() : 0);
+  ModalBorder out{scalars_, in_basis(columns_, 2 * scalars_, static_columns_.data()),
+                  in_basis(rows_, 2 * scalars_), std::vector<double>(size_t(scalars_) * scalars_, 0.0)};
   std::vector<double> closing(scalars_, 0.0);
   if (rank_ == size_ - 1) std::copy_n(ReadArray(row).data() + size_t(local_) * m_, scalars_, closing.begin());
   sum_over_ranks(closing, problem_.comm());
@@ -96,19 +98,17 @@ ModalBorder BasisPreconditioner::border(Vec y, Vec row) {
   return out;
 }
 
-/// D C and R Psi of the border, and its corner less R D C.
+/// D C, of K_s^-1 C, and R Psi of the border, and its corner less R D C.
 void BasisPreconditioner::leave_static(ModalBorder& border) {
   const int v = 2 * scalars_;
   const double scale = problem_.stiffness_scale();
   std::vector<double> modal(size_t(v) * n_);
   for (int k = 0; k < v; ++k)
     for (int l = 0; l < n_; ++l) modal[size_t(l) * v + k] = border.columns[size_t(k) * n_ + l];
-  static_columns_.resize(size_t(v) * local_);
-  std::vector<double> by_factor(static_columns_.size());
-  basis_.motion(modal.data(), v, static_columns_.data());
-  basis_.factor()->solve(columns_.data(), v, by_factor.data());
-  for (size_t k = 0; k < by_factor.size(); ++k)
-    static_columns_[k] = scale * (by_factor[k] - static_columns_[k]);
+  std::vector<double> in_basis(static_columns_.size());
+  basis_.motion(modal.data(), v, in_basis.data());
+  for (size_t k = 0; k < in_basis.size(); ++k)
+    static_columns_[k] = scale * (static_columns_[k] - in_basis[k]);
   modal_rows_ = border.rows;
   std::vector<double> RDC(border.corner.size(), 0.0);
   for (int j = 0; j < scalars_; ++j)

@@ -46,7 +46,7 @@ class BasisPreconditioner : public solve::Preconditioner {
   ModalBorder border(Vec y, Vec row);
   void set_border_vectors(Vec y, Vec row);
   void leave_static(ModalBorder&);
-  std::vector<double> in_basis(std::vector<double> const& x, int vectors) const;
+  std::vector<double> in_basis(std::vector<double> const& x, int vectors, double* moved = nullptr) const;
   std::vector<double> forces(Vec x);
   void add_static(std::vector<double> const& scalars, double* q) const;
   std::vector<double> mean_tangents(std::vector<PairTangents> const&) const;
