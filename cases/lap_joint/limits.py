@@ -39,6 +39,8 @@ def fretwave(kind: str, limit: str) -> np.ndarray:
 
 def main() -> None:
     comm = MPI.COMM_WORLD
+    if not (HERE / "model").exists():
+        sys.exit("error: the model is not made yet\nfix: cases/run lap_joint --quick" if comm.rank == 0 else 1)
     for kind in STIFFNESS:
         for limit in ("stuck", "sliding"):
             expected = comm.bcast(calculix(kind, limit) if comm.rank == 0 else None)

@@ -97,6 +97,8 @@ def with_shrouds_on_the_faces(sector: fw.Structure) -> fw.Structure:
 
 def main() -> None:
     comm = MPI.COMM_WORLD
+    if not (HERE / "model").exists():
+        sys.exit("error: the model is not made yet\nfix: cases/run shrouded_sector --quick" if comm.rank == 0 else 1)
     for limit in sys.argv[1:] or LIMITS:
         expected = comm.bcast(calculix(limit) if comm.rank == 0 else None)
         for diameter in DIAMETERS:

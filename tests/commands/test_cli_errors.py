@@ -282,3 +282,10 @@ def test_an_unknown_option_is_told_of_its_command(command: str, capfd) -> None:
     said = capfd.readouterr().err
     assert "unrecognized arguments: --wrong" in said
     assert f"where:    fretwave {command}\n" in said and f"`fretwave {command} --help`" in said
+
+
+def test_only_given_again_adds_to_what_was_given(tmp_path: Path) -> None:
+    """free_decay begins with mode's result, and is refused alone."""
+    again = ["--only", "mode", "--only", "free_decay"]
+    assert main(["run", str(CASE), "--quick", "--no-plots", *again, "--out", str(tmp_path / "out")]) == 0
+    assert {path.name for path in (tmp_path / "out").glob("*.csv")} >= {"mode.csv", "free_decay.csv"}

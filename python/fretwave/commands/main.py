@@ -127,7 +127,9 @@ def _add_case(command: argparse.ArgumentParser, optional: bool = False) -> None:
         dest="overrides",
         help="override a value: mode.harmonics=7, contact.damper.friction_limit=3, 'model.M=[[1.0]]'",
     )
-    command.add_argument("--only", type=names, default=[], metavar="NAME,...", help="only these analyses")
+    command.add_argument(
+        "--only", type=names, action="extend", default=[], metavar="NAME,...", help="only these analyses"
+    )
     command.add_argument("--quick", action="store_true", help="the short form: overrides of the table [quick]")
 
 

@@ -46,7 +46,9 @@ def add_reading(commands: _SubParsers) -> None:
     report.set_defaults(command=_report)
     plot = commands.add_parser("plot", help="make the pictures of a run again")
     add_folder(plot)
-    plot.add_argument("--only", type=names, default=[], metavar="NAME,...", help="analyses or kinds of picture")
+    plot.add_argument(
+        "--only", type=names, action="extend", default=[], metavar="NAME,...", help="analyses or kinds of picture"
+    )
     plot.add_argument(
         "--format", type=names, default=["png"], metavar="NAME,...", help="png, svg, pdf, or several (default: png)"
     )

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from ..post.engine_orders import crossing_speeds, exciting
 from ..results.reader import Analysis, Run
 from . import labels, style
-from .linear_bands import PEAK_NAME, Band, Peak, bands, highest, other_entry, peaks
+from .linear_bands import PEAK, PEAK_NAME, Band, Peak, bands, highest, other_entry, peaks
 
 #: Waves in a picture: those whose crossings are nearest to the operating speed.
 WAVES = 6
@@ -49,7 +49,7 @@ def draw(run: Run, linear: Analysis) -> Figure:
         panel.draw(place)
         place.set_title(panel.title, pad=14.0 if raised else None)
     if found:
-        axes.flat[0].plot([], [], **style.PEAK, label=PEAK_NAME)
+        axes.flat[0].plot([], [], **PEAK, label=PEAK_NAME)
     _labels(list(axes.flat), columns, len(waves))
     left = len({band.diameter for band in drawn}) - len(waves)
     title = f"The {len(waves)} of {len(waves) + left} waves with crossings nearest to the operating speed"
@@ -116,7 +116,7 @@ class _Panel:
         name = f"operating speed, {self.speed:g} rev/min"
         axes.axvline(self.speed, color=style.INK, linewidth=1.0, linestyle=":", label=name)
         for peak in self.peaks:
-            axes.plot([self.speed if peak.speed is None else peak.speed], [peak.hz], **style.PEAK, clip_on=False)
+            axes.plot([self.speed if peak.speed is None else peak.speed], [peak.hz], **PEAK, clip_on=False)
         axes.set_xlim(0.0, self.last)
         axes.set_ylim(0.0, self.top)
 

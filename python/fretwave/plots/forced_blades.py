@@ -37,7 +37,7 @@ def draw(forced: Analysis, blades: Table, tuned: Table) -> Figure:
     lower.set_ylim(bottom=0.0, top=1.25 * max(bound, float(np.nanmax(blades["amplification"]))))  # room for the legend
     lower.xaxis.set_major_locator(MaxNLocator(integer=True, nbins=13))
     lower.set_xlabel("Sector")
-    lower.set_ylabel("Peak of the blade / tuned peak")
+    lower.set_ylabel("Peak of the sector / tuned peak")
     style.legend(lower, loc="upper right", ncols=3)
     return figure
 

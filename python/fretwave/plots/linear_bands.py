@@ -17,6 +17,8 @@ from .backbone import is_peak, peak_point
 #: A nonlinear mode belongs to a linear one when their stuck frequencies agree to this relative difference.
 SAME = 1e-3
 PEAK_NAME = "largest damping of a nonlinear mode"
+#: In none of the modes' colours, and beneath the crossings.
+PEAK = {**style.PEAK, "color": "white", "markersize": 9, "zorder": 2.5}
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from ..post.engine_orders import excited_by
 from ..results.reader import Analysis, Run
 from . import style
-from .linear_bands import PEAK_NAME, Band, bands, highest, other_entry, peaks
+from .linear_bands import PEAK, PEAK_NAME, Band, bands, highest, other_entry, peaks
 
 #: Height of the picture over the highest mode, and room beside the first and last wave over half the sectors.
 ABOVE, BESIDE = 1.06, 0.11
@@ -43,7 +43,7 @@ def draw(run: Run, linear: Analysis) -> Figure:
     if speed:
         _engine_orders(axes, sectors, speed, top)
     for peak in (peak for peak in peaks(run, drawn) if peak.speed in (None, speed)):
-        axes.plot([peak.diameter], [peak.hz], **style.PEAK, label=PEAK_NAME)
+        axes.plot([peak.diameter], [peak.hz], **PEAK, label=PEAK_NAME)
     axes.set_xlim(-BESIDE * sectors / 2, (1 + BESIDE) * sectors / 2)
     axes.spines["left"].set_visible(False)  # engine orders are named there
     axes.set_ylim(0.0, top)
