@@ -147,17 +147,14 @@ Modes FixedInterface::all_modes() const {
 }
 
 /// Those of the Krylov space, and where inertia counts more of them, these searched for as well: whether a
-/// space misses one hangs on the rounding of its factors, which is another each time on several ranks.
-Modes FixedInterface::counted_modes(PetscInt count) {
-  const double resolution = rounding(K_, M_);
+/// space misses one hangs on the rounding of its factors. Ascending but for those closer than `resolution`.
+Modes FixedInterface::counted_modes(PetscInt count, double resolution) {
   Modes modes = krylov_modes(count);
-  sort_and_orient(modes, resolution);
   const auto [lambda, below] = last_gap(modes, resolution);
   if (below == 0 || count_below(K_, M_, lambda, "component_count_") <= below) return modes;
   modes.clear();
   for (auto& pair : lowest_pairs({K_, M_, dofs(), 0, 0, resolution}, count))
     modes.push_back({std::sqrt(pair.value), std::move(pair.vector)});
-  sort_and_orient(modes, resolution);
   return modes;
 }
 
@@ -169,8 +166,9 @@ Modes FixedInterface::modes(ComponentModes& wanted) {
     wanted.count = count_below(K_, M_, wanted.highest_omega * wanted.highest_omega, "component_");
   const auto asked = [&] { return wanted.count + ComponentModes::beyond(wanted.count); };
   // two more, so that a double mode is not cut before it is oriented
-  Modes modes = dense ? all_modes() : counted_modes(std::min(asked() + 2, dofs()));
-  if (dense) sort_and_orient(modes, rounding(K_, M_));
+  const double resolution = rounding(K_, M_);
+  Modes modes = dense ? all_modes() : counted_modes(std::min(asked() + 2, dofs()), resolution);
+  sort_and_orient(modes, resolution);
   if (by_frequency && dense)
     wanted.count = std::count_if(modes.begin(), modes.end(),
                                  [&](auto const& m) { return m.omega <= wanted.highest_omega; });

@@ -36,7 +36,7 @@ class FixedInterface {
 
  private:
   std::vector<ComponentMode> krylov_modes(PetscInt count);
-  std::vector<ComponentMode> counted_modes(PetscInt count);
+  std::vector<ComponentMode> counted_modes(PetscInt count, double resolution);
   std::vector<ComponentMode> all_modes() const;
 
   MPI_Comm comm_ = MPI_COMM_NULL;

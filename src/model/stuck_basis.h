@@ -72,8 +72,8 @@ class StuckBasis {
   double dofs_ = 0;
   std::vector<double> stiffness_, theta_, motions_;
   std::vector<float> shapes_;  ///< Psi of this rank's dofs, column-major, where it is whole
-  std::vector<double>
-      exactly_;  ///< the modes beside a factor: stiff elements, 1e8 times the first, outdo single ones
+  /// The modes beside a factor: stiff elements, 1e8 times the first mode, outdo single ones.
+  std::vector<double> exactly_;
   std::unique_ptr<StaticFactor> factor_;
   std::vector<ContactEntry> own_;  ///< of B, by this rank's dofs
   PivotedCholesky triangle_;

@@ -105,10 +105,10 @@ void BasisPreconditioner::leave_static(ModalBorder& border) {
   std::vector<double> modal(size_t(v) * n_);
   for (int k = 0; k < v; ++k)
     for (int l = 0; l < n_; ++l) modal[size_t(l) * v + k] = border.columns[size_t(k) * n_ + l];
-  std::vector<double> in_basis(static_columns_.size());
-  basis_.motion(modal.data(), v, in_basis.data());
-  for (size_t k = 0; k < in_basis.size(); ++k)
-    static_columns_[k] = scale * (static_columns_[k] - in_basis[k]);
+  std::vector<double> by_modes(static_columns_.size());
+  basis_.motion(modal.data(), v, by_modes.data());
+  for (size_t k = 0; k < by_modes.size(); ++k)
+    static_columns_[k] = scale * (static_columns_[k] - by_modes[k]);
   modal_rows_ = border.rows;
   std::vector<double> RDC(border.corner.size(), 0.0);
   for (int j = 0; j < scalars_; ++j)
