@@ -80,7 +80,7 @@ namespace {
 struct Exit {
   MovingDisc const& disc;
   double const* w;
-  double bend_u, bend_R;
+  double bend_u = std::hypot(disc.u[0].bound(2), disc.u[1].bound(2)), bend_R = disc.radius.bound(2);
   struct Probe {
     MovingDisc::Excess excess;
     double arm, R, dR;
@@ -88,6 +88,20 @@ struct Exit {
   Probe probe(double tau, MovingDisc::Instant const& at) const {
     return {MovingDisc::excess(tau, at, w), std::hypot(at.u[0] - w[0], at.u[1] - w[1]), at.R,
             std::abs(at.dR)};
+  }
+
+  /// Time over which a slider at the edge, E = 0 and E' <= 0, is surely not dragged: there E, of the size of
+  /// its own rounding, says nothing. While |d| <= R,
+  ///   E <= s (E' + s (E'' / 2 + s E3 / 6)), |E'''| <= E3 = 2 (3 |u'| |u''| + R |u'''| + 3 |R'| |R''| + R
+  ///   |R'''|).
+  double rests_for(MovingDisc::Excess const& edge) const {
+    Series const& r = disc.radius;
+    const auto u = [&](int order) { return std::hypot(disc.u[0].bound(order), disc.u[1].bound(order)); };
+    const double a =
+        u(1) * bend_u + r.bound(1) * bend_R + (std::abs(r.q[0].real()) + r.bound()) * (u(3) + r.bound(3)) / 3;
+    const double b = edge.bend / 2, c = std::min(edge.rate, 0.0), root = std::sqrt(b * b - 4 * a * c);
+    if (!(a > 0 && root > 0)) return 0;
+    return b < 0 ? (root - b) / (2 * a) : -2 * c / (b + root);
   }
 
   /// NaN if there is none.
@@ -119,7 +133,9 @@ struct Exit {
 
 double MovingDisc::exit(double begin, double end, double const* w, bool at_edge) const {
   constexpr int most = 10;
-  const Exit search{*this, w, std::hypot(u[0].bound(2), u[1].bound(2)), radius.bound(2)};
+  const Exit search{*this, w};
+  if (at_edge) begin += search.rests_for(excess(begin, w)) / 2;
+  if (begin >= end) return end;
   Exit::Probe before = search.probe(begin, at(begin));
   // what says otherwise is rounding
   before.excess.value = std::min(before.excess.value, 0.0);

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from models.core_models import dense, unknowns, whole
-from models.coulomb_pair import DRAWN, KT, MU, SAMPLES, STEADY, imposed, loads, motion, motions, pair, period
+from models.coulomb_pair import DRAWN, KT, LAWS, MU, SAMPLES, STEADY, imposed, loads, motion, motions, pair, period
 from tolerances import ROUNDING
 
 REACH = MU / KT  #: the slider's disc at N0 = 1
@@ -54,6 +54,25 @@ def test_coupled_law_does_not_depend_on_the_first_sample(q, load):
     """Its sliders close the period, after lift-off, in slip on curved paths and in shakedown alike. Just before it
     opens a force that goes to nothing turns the fastest, and counts by what it is worth in the harmonics."""
     independent_of_the_first_sample(pair(normal_load=load), q, 1e-11, at_samples=2e-8)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_a_slider_that_stops_stays_wherever_its_law_looks_next(law):
+    """Cosines alone stop at 0 and pi, at the edge: there whether the slider is dragged is smaller than its own rounding
+    for some 1e-8 of the period, and a node of the law in that time told it to go on (0.4 % of the force)."""
+    q = motion((0, 0.05, 0, 0.1), (0, 10.0, 0, 2.0, 0, 1.0), (0, 3.0, 0, 2.0))
+    rng, panels = np.random.default_rng(1), 12
+    problem, _ = imposed(pair(law), q)
+
+    def turned_back(angle):
+        samples = angle * SAMPLES / (2 * np.pi)
+        later = unknowns(problem, np.concatenate([shifted(q, samples).ravel(), [0.0, 1.0, 0.0]]))
+        return shifted(whole(problem.residual(later))[:21].reshape(3, 7), -samples)
+
+    expected = turned_back(0.3)
+    before = 2 * np.pi / panels * rng.integers(panels, size=600) + 10.0 ** rng.uniform(-11, -8, 600)
+    furthest = max(np.abs(turned_back(angle) - expected).max() for angle in before)
+    assert furthest < 1e-11 * np.abs(expected).max()
 
 
 @given(q=motions, angle=st.floats(-3.2, 3.2))
