@@ -122,7 +122,8 @@ def _shares(axes: Axes, mode: Analysis, points: Sequence[int], scale: Scale) -> 
     axes.set_xlabel(f"{text}, {mode.method()}; dotted: the maps below")
     axes.grid(False)
     handles = [Line2D([], [], marker="o", linestyle="", color=colour, label=word) for word, colour in STATUS.items()]
-    axes.legend(handles=handles, loc="lower left", ncols=3)
+    above = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "borderaxespad": 0.2, "frameon": False}
+    axes.legend(handles=handles, ncols=3, **above)
 
 
 def _pies(axes: Axes, places: Array, shares: Array) -> None:

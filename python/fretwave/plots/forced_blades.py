@@ -9,10 +9,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from ..arrays import AnyArray
 from ..post.blade_peaks import whitehead
 from ..results.reader import Analysis, Run, Table
 from . import marks, scales, style
 from .forced import smooth
+
+#: share of the largest amplitude below which a curve lies on its axis
+SEEN = 0.03
 
 
 def figures(run: Run) -> Iterator[tuple[str, Figure]]:
@@ -42,6 +46,12 @@ def draw(forced: Analysis, blades: Table, tuned: Table) -> Figure:
     return figure
 
 
+def _shown(frequency: AnyArray, largest: AnyArray) -> tuple[float, float]:
+    """Where any blade has a share of its peak that can be told from none."""
+    high = frequency[largest > SEEN * largest.max()]
+    return float(high.min()), float(high.max())
+
+
 def _curves(axes: Axes, forced: Analysis, tuned: Table) -> None:
     """Responses of all blades, of the one that moves most, and of the tuned wheel, at the smallest level."""
     level = forced.columns["level"].min()
@@ -60,7 +70,7 @@ def _curves(axes: Axes, forced: Analysis, tuned: Table) -> None:
     marks.points(axes, frequency, scale(amplitude[:, most]), style.BLUE)
     line = smooth(tuned["frequency_hz"][rows], scale(tuned["amplitude"][rows]))
     axes.plot(*line, "--", color=style.INK, label="tuned wheel")
-    axes.set_xlim(frequency.min(), frequency.max())
+    axes.set_xlim(*_shown(frequency, amplitude.max(axis=1)))
     axes.set_ylim(0.0, None)
     axes.set_xlabel(style.label("Excitation frequency", "Hz"))
     dof = forced.dofs[forced.normalised_dof()].split("@")[0] if forced.dofs else ""

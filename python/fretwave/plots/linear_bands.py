@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 
 from ..arrays import AnyArray
 from ..post.engine_orders import frequency_at
-from ..results.reader import Analysis, Run
+from ..results.reader import Analysis, Run, Table
 from . import style
 from .backbone import is_peak, peak_point
 
@@ -33,6 +33,8 @@ class Band:
     speeds : (S,) ascending [rev/min]; one where the frequencies do not depend on it
     hz, other_hz : (S,) [Hz]
         `other_hz` of the mode most like it in the other limit, or nan.
+    like : (S,)
+        Number of that mode, or nan.
     """
 
     number: int
@@ -42,6 +44,7 @@ class Band:
     speeds: AnyArray
     hz: AnyArray
     other_hz: AnyArray
+    like: AnyArray
 
     @property
     def colour(self) -> str:
@@ -78,9 +81,18 @@ def bands(linear: Analysis) -> list[Band]:
     for number in np.unique(table["mode"][own]):
         for diameter in np.unique(waves[own & (table["mode"] == number)]):
             rows = own & (table["mode"] == number) & (waves == diameter)
-            values = (speeds[rows], table["frequency_hz"][rows], table["other_hz"][rows])
+            there = (limits == other) & (waves == diameter)
+            like = np.array([_like(table, there & (speeds == speeds[row]), row) for row in np.flatnonzero(rows)])
+            values = (speeds[rows], table["frequency_hz"][rows], table["other_hz"][rows], like)
             found.append(Band(int(number), contact, other, int(diameter), *values))
     return found
+
+
+def _like(table: Table, there: AnyArray, row: int) -> float:
+    """Number of the mode, among those in the other limit, that the `other_hz` of a row is of."""
+    if not (there.any() and np.isfinite(table["other_hz"][row])):
+        return np.nan
+    return float(table["mode"][there][np.argmin(np.abs(table["frequency_hz"][there] - table["other_hz"][row]))])
 
 
 def other_entry(axes: Axes, drawn: Sequence[Band]) -> None:

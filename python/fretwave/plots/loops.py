@@ -61,12 +61,16 @@ def _scales(mode: Analysis, contact: str, points: Sequence[int], pairs: Sequence
 
 def _limits(axes: Axes, mode: Analysis, contact: str, pair: int) -> None:
     """Coulomb's limits, where the friction coefficient is known."""
-    if contact in mode.placed():
-        normal = np.array([0.0, axes.get_xlim()[1]])
-        limit = mode.pairs(contact)[Role.FRICTION_COEFFICIENT.value][pair] * normal
-        for sign in (1.0, -1.0):
-            axes.plot(normal, sign * limit, color=style.GREY, linestyle="--", linewidth=1.0, zorder=1)
-        axes.annotate("dashed: friction limit", (0.03, 0.05), xycoords="axes fraction", fontsize=9.5)
+    coefficient = mode.parameter(contact, Role.FRICTION_COEFFICIENT)
+    if coefficient is None and contact in mode.placed():
+        coefficient = mode.pairs(contact)[Role.FRICTION_COEFFICIENT.value]
+    if coefficient is None:
+        return
+    normal = np.array([0.0, axes.get_xlim()[1]])
+    limit = np.resize(coefficient, pair + 1)[pair] * normal  # one for all pairs, or the same in each sector
+    for sign in (1.0, -1.0):
+        axes.plot(normal, sign * limit, color=style.GREY, linestyle="--", linewidth=1.0, zorder=1)
+    axes.annotate("dashed: friction limit", (0.03, 0.05), xycoords="axes fraction", fontsize=9.5)
 
 
 def busiest(mode: Analysis, contact: str, point: int) -> dict[str, int]:

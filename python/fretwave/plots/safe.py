@@ -55,13 +55,15 @@ def draw(run: Run, linear: Analysis) -> Figure:
 
 
 def _family(axes: Axes, family: Sequence[Band], speed: float) -> None:
-    """A mode over the waves, at a speed."""
-    band, diameters = family[0], [one.diameter for one in family]
+    """A mode over the waves, at a speed; its band is broken where the mode most like it is another one."""
+    band, diameters = family[0], np.array([one.diameter for one in family])
     hz, other = np.transpose([one.at(speed) for one in family])
     axes.plot(diameters, hz, "o-", color=band.colour, markersize=4, label=f"mode {band.number}, {band.contact}")
-    if np.isfinite(other).any():
-        axes.fill_between(diameters, hz, other, color=band.colour, alpha=0.2, linewidth=0, zorder=0.5)
-        axes.plot(diameters, other, "--", color=band.colour, linewidth=1.0)
+    like = np.array([one.like[np.argmin(np.abs(one.speeds - speed))] for one in family])
+    for piece in np.split(np.arange(len(family)), np.flatnonzero(np.diff(like) != 0) + 1):
+        of_piece = diameters[piece], hz[piece], other[piece]
+        axes.fill_between(*of_piece, color=band.colour, alpha=0.2, linewidth=0, zorder=0.5)
+        axes.plot(diameters[piece], other[piece], ".--", color=band.colour, linewidth=1.0, markersize=3)
 
 
 def _engine_orders(axes: Axes, sectors: int, speed_rpm: float, top: float) -> None:

@@ -27,8 +27,8 @@ ERRORS_OF_RESPONSE = {
 }
 #: of wear, after the last cycle
 ERRORS_OF_WEAR = {"zeta_error": "Damping", "omega_error": "Frequency", "worn_error": "Worn volume"}
-#: an error of exactly zero cannot stand on a logarithmic axis
-FLOOR = 1e-16
+#: an error of exactly zero, for which a logarithmic axis has no place: of the least other one
+BELOW = 0.1
 
 
 def figures(run: Run) -> Iterator[tuple[str, Figure]]:
@@ -63,14 +63,21 @@ def _times(table: Table) -> AnyArray:
     return table["cpu_s" if "cpu_s" in table else "wall_s"]
 
 
+def _shown(table: Table, column: str) -> AnyArray:
+    """A column that can stand on a logarithmic axis."""
+    errors = np.asarray(table[column], dtype=float)
+    least = errors[errors > 0].min(initial=1.0)
+    return np.where(errors > 0, errors, BELOW * least)
+
+
 def _sweep(axes: Axes, table: Table, sweep: str, symbol: str, column: str, line: str, colour: str) -> None:
     rows = np.flatnonzero((table["sweep"] == sweep) & (table["reference"] == 0.0))
     if not len(rows):
         return
-    time, error = _times(table)[rows], np.maximum(table[column][rows], FLOOR)
+    time, error = _times(table)[rows], _shown(table, column)[rows]
     axes.plot(time, error, line, color=colour, label=f"{sweep.replace('_', ' ')} ({symbol})")
     if f"{column}_estimate" in table:
-        axes.plot(time, np.maximum(table[f"{column}_estimate"][rows], FLOOR), line, color=colour, alpha=0.35)
+        axes.plot(time, _shown(table, f"{column}_estimate")[rows], line, color=colour, alpha=0.35)
 
 
 def _name(axes: Axes, table: Table, column: str) -> None:
@@ -78,8 +85,10 @@ def _name(axes: Axes, table: Table, column: str) -> None:
     colours = dict(zip(SWEEPS, style.PALETTE))
     rows = np.flatnonzero((table["reference"] == 0.0) & np.isin(table["sweep"], list(SWEEPS)))
     sweeps = [str(sweep) for sweep in table["sweep"][rows]]
-    points = [(_times(table)[row], max(table[column][row], FLOOR)) for row in rows]
-    texts = [_text(sweep, table[sweep][row]) for sweep, row in zip(sweeps, rows)]
+    points = list(zip(_times(table)[rows], _shown(table, column)[rows]))
+    texts = [
+        _text(sweep, table[sweep][row]) + ("" if table[column][row] else ": 0") for sweep, row in zip(sweeps, rows)
+    ]
     labels.beside(axes, texts, points, [{"fontsize": 9, "color": colours[sweep]} for sweep in sweeps])
 
 
