@@ -89,12 +89,13 @@ HEAD = """# How far results are from the truth
 
 Every point of a branch says how wrong it may be: `omega_error`, `zeta_error`, `amplitude_error`, and by source what
 harmonics, samples, solver and component modes left out add (`lambda_error_*`, `amplitude_error_*`). The estimate is
-one step of Newton's on the harmonics up to 2 H + 1 and four times the samples, as far as the equations go along it and
-taken anew where they bend, at the same amplitude ([`discretisation_error.h`](../src/hb/discretisation_error.h)); of a
-reduction it is what the next component modes, as many again, add to the motion that there is
-([`omitted.py`](../python/fretwave/model/omitted.py)). Here it is held against the error itself: each run of
-a sweep against the finest one of the study (whose own error is in the column `estimated`), at 24 amplitudes from
-stick to full slip. Against *exact* motions, with no finer run in between, see [accuracy](accuracy/README.md).
+one step of Newton's on the harmonics up to 7 H / 4 (at least H + 4) and four times the samples, as far as the equations
+go along it and taken anew where they bend, at the same amplitude
+([`discretisation_error.h`](../src/hb/discretisation_error.h)); of a reduction it is what the next component modes, as
+many again, add to the motion that there is ([`omitted.py`](../python/fretwave/model/omitted.py)). Here it is held
+against the error itself: each run of a sweep against the finest one of the study (whose own error is in the column
+`estimated`), at 24 amplitudes from stick to full slip. Against *exact* motions, with no finer run in between, see
+[accuracy](accuracy/README.md).
 
 `within 3` is the share of the amplitudes `judged` at which the estimated error of lambda is within a factor of 3 of the
 error, source by source; judged is where the error is three times what the finest run states of its own. Errors of zeta

@@ -37,13 +37,19 @@ bool all_laws(model::Model const& model, Predicate is) {
   return every;
 }
 
-/// Up to 2 H + 1, odd orders alone where no others arise.
+/// Up to H + max(4, 3 H / 4), odd orders alone where no others arise.
 std::vector<int> enlarged(Harmonics const& h, model::Model const& model) {
   const bool odd = h.odd_only() && all_laws(model, [](auto const& law) { return law.odd(); });
-  const int step = odd ? 2 : 1;
+  const int step = odd ? 2 : 1, highest = h.highest() + std::max(4, (3 * h.highest() + 3) / 4);
   std::vector<int> orders;
-  for (int n = step - 1; n <= 2 * h.highest() + 1; n += step) orders.push_back(n);
+  for (int n = step - 1; n <= highest; n += step) orders.push_back(n);
   return orders;
+}
+
+/// All that lies above H over what the finer set has of it: a kink of friction leaves n^-2 in a force and
+/// n^-4 in the motion, so that (H / H')^3 of it lies above H' as well.
+double all_above(Harmonics const& h, Harmonics const& finer) {
+  return 1 / (1 - std::pow(double(h.highest()) / finer.highest(), 3));
 }
 
 std::unique_ptr<HarmonicProblem> refined(HarmonicProblem const& problem, std::vector<int> const& orders,
@@ -208,7 +214,7 @@ bool DiscretisationError::step(Vec point, Vec row, Vec reduction, std::span<Vec 
 }
 
 namespace {
-constexpr size_t reduced = 3;  // among the sources
+constexpr size_t above = 0, reduced = 3;  // among the sources
 }
 
 std::optional<LeftOut> DiscretisationError::at(Vec y, Vec tangent, Vec reduction) {
@@ -230,6 +236,8 @@ std::optional<LeftOut> DiscretisationError::at(Vec y, Vec tangent, Vec reduction
     b.push_back(rights.back()), x.push_back(changes.back()), sources.push_back(k);
   }
   if (!step(point, closing_row(y, tangent), left[reduced], b, x)) return {};
+  if (!sources.empty() && sources[0] == above)
+    check(VecScale(x[0], all_above(problem_.harmonics(), finer_->harmonics())));
   LeftOut out;
   const auto along = problem_.scalars(tangent);
   const auto change = [&](Vec v) { return at_parameter(finer_->scalars(v), along, problem_.scalar_count()); };

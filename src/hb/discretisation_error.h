@@ -15,20 +15,21 @@ struct LeftOut {
   std::array<std::vector<double>, 4> by_source;  ///< harmonics, samples, solver, reduction
 };
 
-/// What a point's discretisation leaves out of it. With ' for the same problem on the orders up to 2 H + 1
-/// and four times the samples, and the point embedded there with zeros, one Newton step of its equations is
+/// What a point's discretisation leaves out of it. With ' for the same problem on the orders up to
+/// H' = H + 3 H / 4 (H + 4 at least) and four times the samples, and the point embedded there with zeros, one
+/// Newton step of its equations is
 ///
 ///   J' dy' = -r',   r' = (r'_old, r'_new),
 ///
 /// closed as the continuation's: at a right angle to the branch's tangent t, for at a fold there may be
 /// nothing at the same parameter. From there the branch leads to it: dy = dy' + s t with no change of the
 /// last entry, as far as a straight line goes (|s| <= `reach`). Harmonics left out answer for -r'_new, the
-/// contact force outside the retained orders, samples for r - r'_old, the change of the retained rows on more
-/// samples (rounding in continuous time), and the solver for -r, what it left; what a
-/// reduction has left out of the model is given as a residual of the point's equations. A source next to
-/// nothing is not solved for and has its share of r'. Error estimation by a hierarchical basis (Bank & Smith
-/// 1993): what the estimate misses is as much smaller as the finer set is better, and the square of the
-/// error.
+/// contact force outside the retained orders, and as much more as lies above H', samples for r - r'_old, the
+/// change of the retained rows on more samples (rounding in continuous time), and the solver for -r, what it
+/// left; what a reduction has left out of the model is given as a residual of the point's equations. A source
+/// next to nothing is not solved for and has its share of r'. Error estimation by a hierarchical basis (Bank
+/// & Smith 1993): what the estimate misses is as much smaller as the finer set is better, and the square of
+/// the error.
 ///
 /// That square is looked at. Along the step, for equations of the second order,
 ///

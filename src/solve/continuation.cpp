@@ -146,10 +146,15 @@ std::optional<Point> Continuation::take_over(Anchor from, std::string const& eve
   upwards_ = upwards, began_ = began, taken_over_ = true;
   open_the_range();
   prepare_row();
-  Trial trial = at(copy(anchor_.y));
+  // at the same parameter, so that no report is passed twice or not at all; beside a fold there may be none
   const bool given = event == "start" || event == "report" || event == "stop";
-  const double value = given ? last_entry(trial.y) : row_value_;
-  if (!correct(trial, given ? parameter_row_ : row_, value, row_)) return {};
+  Trial trial = at(copy(anchor_.y));
+  bool there = correct(trial, parameter_row_, last_entry(trial.y), row_);
+  if (!given && !(there && turn_of(trial) <= steps_.max_angle)) {
+    trial = at(copy(anchor_.y));
+    there = correct(trial, row_, row_value_, row_);
+  }
+  if (!there) return {};
   anchor_.y = copy(trial.y), anchor_.tangent = copy(trial.tangent);
   prepare_row();
   signs_.clear();

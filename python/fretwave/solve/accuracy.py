@@ -114,7 +114,7 @@ class Aim:
             highest = max(round(highest * max(factor, 1 / FACTOR)), least.orders[-1])
         while samples * 2 ** (self.order_samples + 1) < LOW and count > least.samples:
             count, samples = count // 2, samples * 2 ** (self.order_samples + 1)
-        if highest > 0.75 * at.orders[-1]:
+        if highest > 0.85 * at.orders[-1]:
             highest = at.orders[-1]
         return _other(at, at.up_to(highest, count))
 
