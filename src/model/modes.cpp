@@ -46,6 +46,13 @@ bool orthonormalise(Mat M, std::vector<VecHandle> const& found, bool travelling,
   return true;
 }
 
+/// Where modes near a frequency are looked for: not so far beyond all of them that K is lost beside its M.
+double shift_near(double omega, double rounding) {
+  constexpr double far = 1e6 / PETSC_MACHINE_EPSILON;  // 3e7 times the highest K_ii / M_ii
+  const double square = (1 - 1e-9) * omega * omega;    // nor on a frequency given: K - shift M is regular
+  return rounding > 0 ? std::min(square, far * rounding) : square;
+}
+
 /// (K + B^H kt B) phi = w^2 M phi, far stiffer contact by its forces (`StiffContact`).
 std::vector<LinearMode> undamped(Model const& model, int count, bool stuck, std::optional<double> near) {
   const bool travelling = model.travelling();
@@ -77,13 +84,14 @@ std::vector<LinearMode> undamped(Model const& model, int count, bool stuck, std:
   const PetscInt wanted = std::min<PetscInt>(count, model.dofs() - rigid / copies);
   if (wanted < 1)
     throw InputError("the stuck contact leaves no degree of freedom", "0", ">= 1", "use contact = \"free\"");
-  // a little below zero: K may be singular (rigid motions), K - shift M is not; nor on a frequency given
+  const double noise = rounding(K, M);
+  // a little below zero: K may be singular (rigid motions), K - shift M is not
   const Pencil pencil = {.K = AB[0],
                          .M = AB[1],
                          .size = copies * model.dofs() - rigid,
                          .constraints = rows,
-                         .shift = near ? (1 - 1e-9) * *near * *near : -1e-8 * scale,
-                         .rounding = rounding(K, M)};
+                         .shift = near ? shift_near(*near, noise) : -1e-8 * scale,
+                         .rounding = noise};
   const auto pairs =
       near ? nearest_pairs(pencil, copies * wanted) : lowest_beside_zero(pencil, copies * wanted);
   std::vector<LinearMode> modes;

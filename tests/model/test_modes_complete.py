@@ -114,3 +114,13 @@ def test_an_unstable_direction_does_not_count_as_missed(comm):
 
 def test_a_single_dof_has_one_mode(comm):
     assert [m.omega for m in fw.linear_modes(single_dof(comm, 4.0, 1.0), 5, "free")] == pytest.approx([0.5])
+
+
+@pytest.mark.parametrize("beyond", [1.01, 1e3, 1e9, 1e40, 1e90])
+def test_modes_near_a_frequency_beyond_all_are_the_highest(beyond, comm):
+    """K is lost beside its shift times M otherwise: 5e51 Hz, or PETSc's own words."""
+    n = 6
+    K = 2 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)
+    exact = 2 * np.sin(np.pi * np.arange(1, n + 1) / (2 * (n + 1)))  # of a chain between two walls
+    found = fw.linear_modes(fw.Model(np.eye(n), K, comm=comm), 3, "free", near=beyond * exact[-1])
+    assert [mode.omega for mode in found] == pytest.approx(exact[-3:], rel=1e-6)

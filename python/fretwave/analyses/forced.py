@@ -10,7 +10,7 @@ import numpy as np
 from ..case.analysis import register_analysis
 from ..case.harmonic import HarmonicSection, check_range
 from ..case.observed import Observed, check_observed, dofs_of, given_to, label_of, unit_of
-from ..case.schema import Dof, Positive, Whole, key
+from ..case.schema import Dof, Frequency, Positive, Whole, key
 from ..columns import FORCED
 from ..cyclic.engine_order import folded
 from ..errors import InputError
@@ -70,7 +70,7 @@ class ForcedAnalysis(HarmonicSection):
         default=None,
     )
     levels: list[Positive] = key("factors on the force", "-", "[1.0, 2.0]", min_length=1)
-    frequency: list[Positive] = key(
+    frequency: list[Frequency] = key(
         "first and last excitation frequency", "Hz", "[3.0, 5.0]", min_length=2, max_length=2
     )
     observe: Observed = key(

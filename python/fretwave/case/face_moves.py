@@ -20,7 +20,8 @@ def labels_by_name(structure: Structure, low: Indices, high: Indices, axis: str 
     None where a dof of the faces has no such name or, without an axis, a node lacks one of x, y and z: nothing else
     speaks for the frame of space then.
     """
-    names = {int(dof): _NAME.fullmatch(structure.dof_names[dof]) for dof in (*low, *high)}
+    all_names = structure.dof_names
+    names = {int(dof): _NAME.fullmatch(all_names[dof]) for dof in (*low, *high)}
     moves = {dof: (name["node"] or name["other"], name["way"] or name["along"]) for dof, name in names.items() if name}
     nodes = sorted({node for node, _ in moves.values()})
     whole = {(node, way) for node in nodes for way in "xyz"} <= set(moves.values())

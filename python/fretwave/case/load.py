@@ -148,8 +148,8 @@ def _build(
         )
         structure, contacts = tie(section, source, structure, contacts, notes, found)
         source.dof_fix = partial(missing_dof, structure.cut or structure)
-        dofs = structure.dof_names
         neighbours = structure if structure.cut else None
+        dofs = structure.dof_names if neighbours else dofs
         check_aerodynamics(source, flow, neighbours.sectors if neighbours else None, dofs or [], found)
     blade = flow.dof if flow else None
     keep = _kept(structure, analyses, blade) if structure and reduction else {}

@@ -41,6 +41,8 @@ Dof = Annotated[
 UnitName = Annotated[str, WithJsonSchema({"type": "string", "enum": list(SYSTEMS)})]
 Name = Annotated[str, Field(max_length=LONGEST_NAME)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+#: In Hz: equations have its square, times that of an order.
+Frequency = Annotated[float, Field(gt=0, le=1e100)]
 Matrix = Union[str, list[list[float]]]
 LoadVector = Union[str, list[float]]
 Numbers = Union[float, list[float]]
@@ -143,7 +145,9 @@ class ReductionSection(Section):
     modes: Optional[Whole] = key(
         f"number of component modes ({COMPONENT_MODES} unless told)", example="10", default=None, ge=0
     )
-    up_to_hz: Optional[Positive] = key("instead of modes: all component modes up to here", "Hz", "5000.0", default=None)
+    up_to_hz: Optional[Frequency] = key(
+        "instead of modes: all component modes up to here", "Hz", "5000.0", default=None
+    )
     accuracy: Optional[Annotated[float, Field(gt=0, lt=1)]] = key(
         "instead of modes: as many as keep the frequencies that are compared this accurate, relative; unless told, "
         f"that of an analysis with `accuracy` to {ZETA_FLOOR:g} of it",
@@ -221,7 +225,7 @@ class DampingSection(Section):
 class AerodynamicsSection(Section):
     """``[aerodynamics]``: forces of the flow on the vibrating blades, where `aerodynamics = true` and in flutter."""
 
-    frequency: Positive = key("vibration frequency at which they hold", "Hz", "194.3")
+    frequency: Frequency = key("vibration frequency at which they hold", "Hz", "194.3")
     influence: Optional[dict[str, list[float]]] = key(
         "complex force on a blade by the unit motion of the blade k places ahead: k = [real, imaginary]",
         "force/length at a dof, 1/s^2 modal",

@@ -149,7 +149,7 @@ class Structure:
     @property
     def dof_names(self) -> list[str]:
         """Names of all dofs."""
-        names = [str(number) for number in range(self.n_dof)] if self.names is None else list(self.names)
+        names = list(map(str, range(self.n_dof))) if self.names is None else list(self.names)
         for name, number in self.dofs.items():
             names[number] = name
         return names
