@@ -89,7 +89,7 @@ HEAD = """# How far results are from the truth
 
 Every point of a branch says how wrong it may be: `omega_error`, `zeta_error`, `amplitude_error`, and by source what
 harmonics, samples, solver and component modes left out add (`lambda_error_*`, `amplitude_error_*`). The estimate is
-one step of Newton's on the harmonics up to 7 H / 4 (at least H + 4) and four times the samples, as far as the equations
+one step of Newton's on the harmonics up to 7 H / 4 (2 H + 1 below 4) and four times the samples, as far as equations
 go along it and taken anew where they bend, at the same amplitude
 ([`discretisation_error.h`](../src/hb/discretisation_error.h)); of a reduction it is what the next component modes, as
 many again, add to the motion that there is ([`omitted.py`](../python/fretwave/model/omitted.py)). Here it is held

@@ -37,10 +37,10 @@ bool all_laws(model::Model const& model, Predicate is) {
   return every;
 }
 
-/// Up to H + max(4, 3 H / 4), odd orders alone where no others arise.
+/// Up to H + max(4, 3 H / 4), at most 2 H + 1, odd orders alone where no others arise.
 std::vector<int> enlarged(Harmonics const& h, model::Model const& model) {
   const bool odd = h.odd_only() && all_laws(model, [](auto const& law) { return law.odd(); });
-  const int step = odd ? 2 : 1, highest = h.highest() + std::max(4, (3 * h.highest() + 3) / 4);
+  const int H = h.highest(), step = odd ? 2 : 1, highest = H + std::min(H + 1, std::max(4, (3 * H + 3) / 4));
   std::vector<int> orders;
   for (int n = step - 1; n <= highest; n += step) orders.push_back(n);
   return orders;

@@ -205,7 +205,7 @@ class HarmonicProblem(Destroyable):
     def errors(self, y: PETSc.Vec, tangent: PETSc.Vec | None) -> dict[str, float]:
         """Estimated errors at a converged point, in the units of what they are errors of. Collective.
 
-        One Newton step on the harmonics up to 7 H / 4 (at least H + 4) and four times the samples, and with the
+        One Newton step on the harmonics up to 7 H / 4 (2 H + 1 below 4) and four times the samples, and with the
         component modes that a reduction has left out (`OmittedModes`), read at the same amplitude or frequency: see
         `src/hb/discretisation_error.h`. Without the branch's tangent none is estimated, all are nan.
 
