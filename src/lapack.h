@@ -71,6 +71,12 @@ inline int solve(std::vector<double>& A, int n, std::vector<double>& B, int colu
   dgesv_(&n, &columns, A.data(), &n, pivots.data(), B.data(), &n, &info);
   return info;
 }
+inline int solve(std::vector<float>& A, int n, std::vector<float>& B, int columns) {
+  std::vector<int> pivots(n);
+  int info;
+  sgesv_(&n, &columns, A.data(), &n, pivots.data(), B.data(), &n, &info);
+  return info;
+}
 
 /// A dense matrix, column-major.
 template <class T>

@@ -143,6 +143,10 @@ void Continuation::locate_values(Trial const& end, Hermite const& curve, double 
     const double target = problem_.parameter_entry(value);
     for (size_t i = 0; i + 1 < places.size(); ++i) {
       const double from = places[i].value, to = places[i + 1].value;
+      if (outside && i + 2 == places.size() && to == target && from != to) {
+        emit_end(end, target, length, event);
+        continue;
+      }
       if ((from < target) == (to < target) || from == to) continue;
       if (outside && i == 0 && from == target) continue;  // the branch starts here
       if (begins && i == 0 && std::abs(from - target) <= value_error * std::max(1.0, std::abs(target)))
@@ -161,6 +165,14 @@ void Continuation::locate_values(Trial const& end, Hermite const& curve, double 
 /// An end of the range that is reported as well is one point, a report.
 std::string Continuation::stop_event(double end) const {
   return std::ranges::find(report_at_, end) == report_at_.end() ? "stop" : reported_stop;
+}
+
+/// The step's end, which lies at an asked parameter.
+void Continuation::emit_end(Trial const& end, double target, double length, std::string const& event) {
+  Trial trial = at(copy(end.y));
+  trial.tangent = copy(end.tangent), trial.outcome = end.outcome, trial.tests = end.tests;
+  polish(trial, target);
+  emit(std::move(trial), length, event);
 }
 
 /// The branch at a given parameter between two places of the step.
@@ -198,6 +210,7 @@ void Continuation::reach(double value, std::string const& event, Place a, Place 
 /// One Newton step more: what is reported is as good as the corrector can make it, not just good enough.
 void Continuation::polish(Trial& trial, double target) {
   Trial better = at(copy(trial.y));
+  better.tangent = copy(trial.tangent);
   check(SNESSetForceIteration(newton_.snes(), PETSC_TRUE));
   const bool good = correct(better, parameter_row_, target, row_);
   check(SNESSetForceIteration(newton_.snes(), PETSC_FALSE));

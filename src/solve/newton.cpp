@@ -139,7 +139,7 @@ PetscErrorCode Newton::form_function(SNES, Vec y, Vec g, void* context) {
 PetscErrorCode Newton::form_jacobian(SNES snes, Vec y, Mat, Mat, void* context) {
   auto& newton = *static_cast<Newton*>(context);
   return newton.linear_->guard().run([&] {
-    const bool regular = newton.linear_->linearise(y, true);
+    const bool regular = newton.linear_->linearise(y, true, newton.rounding(y));
     check(
         SNESSetCheckJacobianDomainError(snes, regular ? PETSC_FALSE : PETSC_TRUE));  // it is never taken back
     if (!regular) check(SNESSetJacobianDomainError(snes));
@@ -240,18 +240,26 @@ Outcome Newton::solve_once(Vec y) {
           singular || reason == SNES_DIVERGED_LINEAR_SOLVE};
 }
 
+/// Of the residual at y; 0 where it is not known.
+double Newton::rounding(Vec y) {
+  const double residual = bordered_.problem().rounding(y);
+  return std::isfinite(residual) ? residual : 0;
+}
+
 bool Newton::tangent(Vec y, Vec t) {
   check(VecSet(right_side_, 0));
   set_last_entry(right_side_, 1);
-  return linear(y, right_side_, t);
+  // about as long as y: its product with the Jacobian is rounded as the residual is
+  const Vec b = right_side_;
+  return linear(y, {&b, 1}, {&t, 1}, rounding(y));
 }
 
 bool Newton::linear(Vec y, Vec b, Vec x) { return linear(y, {&b, 1}, {&x, 1}); }
 
-bool Newton::linear(Vec y, std::span<Vec const> b, std::span<Vec const> x) {
+bool Newton::linear(Vec y, std::span<Vec const> b, std::span<Vec const> x, double rounding) {
   const auto all = [&] {
     for (size_t k = 0; k < b.size(); ++k)
-      if (!linear_->solve(b[k], x[k])) return false;
+      if (!linear_->solve(b[k], x[k], rounding)) return false;
     return true;
   };
   do {

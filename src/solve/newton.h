@@ -41,7 +41,7 @@ class Newton {
   bool tangent(Vec y, Vec t);
   /// J x = b at y with the closing row, from x where the Krylov route is taken. Collective.
   bool linear(Vec y, Vec b, Vec x);
-  bool linear(Vec y, std::span<Vec const> b, std::span<Vec const> x);
+  bool linear(Vec y, std::span<Vec const> b, std::span<Vec const> x, double rounding = 0);
   /// For one that `linear` alone is asked of: how exactly, relative to b.
   void solve_beside(double tolerance) { linear_->serve_beside(tolerance); }
 
@@ -59,6 +59,7 @@ class Newton {
   bool matters(Vec y, double residual, double before);
   bool stuck_at_rounding(Vec y);
   bool creeps(int iteration, double residual);
+  double rounding(Vec y);
   double last_effect(Vec y);
 
   Bordered bordered_;

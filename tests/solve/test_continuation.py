@@ -225,6 +225,24 @@ def test_step_too_small_tells_why(comm):
     assert 0.9 < points[-1].parameter <= 1.0
 
 
+def test_nothing_is_asked_for_beyond_the_end(comm):
+    """Where the next step would pass the end of the range, it ends there: what lies behind may be far harder."""
+    asked = []
+
+    class Listens(TanhLaw):
+        def force(self, u, v):
+            asked.append(np.abs(u).max(initial=0.0))
+            return super().force(u, v)
+
+    for start, upwards in ((0.1, True), (1.0, False)):
+        asked.clear()
+        problem = mode_problem(single_dof(comm, law=Listens(0.1, 1.0)), [1], 16)
+        branch, points = follow(problem, start=start, stop=(0.1, 1.0), upwards=upwards, initial=0.3)
+        assert branch.converged and points[-1].parameter == pytest.approx(1.0 if upwards else 0.1, rel=LAST_DIGITS)
+        assert points[-1].event == "stop" and points[-1].newton > 1
+        assert max(asked, default=1.0) < 1.05 and min((u for u in asked if u > 0), default=0.1) > 0.095
+
+
 def test_linear_problem_takes_one_newton_iteration(two_dof, comm):
     """At a fixed frequency a linear response is one linear solve."""
     model = fw.Model(two_dof.M, two_dof.K, np.diag([0.5, 0.01]), comm=comm)

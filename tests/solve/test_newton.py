@@ -114,6 +114,32 @@ def test_how_roughly_newton_steps_are_solved_for_does_not_shape_the_branch(comm)
         found = counts(comm, case, **options)
         assert abs(found[0] - usual[0]) < 0.2 * usual[0], f"{options}: {found} against {usual}"
         assert found[2] < 1.5 * usual[2], f"{options}: {found} against {usual}"
+    exact = counts(comm, case, ksp_rtol=1e-6)
+    assert usual[1] < 1.2 * exact[1] and usual[2] < 0.8 * exact[2], f"{usual} against {exact}"
+
+
+@pytest.mark.ranks(1)
+def test_linear_solves_end_at_the_rounding_of_the_residual(comm, tmp_path):
+    """Stiff elements round it to 1e-6. Digits below that are none, and took up to a hundred iterations a tangent."""
+    masses, reasons = 100, tmp_path / "reasons"
+    springs = chain(masses, 1e12, 1e3) - np.diag([1e12, *np.zeros(masses - 2), 1e12])
+    contact = fw.Contact("jenkins", np.eye(1, masses), {"tangential_stiffness": 1e4, "friction_limit": LIMIT})
+    model = fw.Model(np.eye(masses), springs, None, [contact], comm)
+    database = PETSc.Options("rounded_")
+    given = {"route": "krylov", "tangent_ksp_converged_reason": f":{reasons}::append"}
+    for name, value in given.items():
+        database.setValue(name, value)
+    problem = fw.NonlinearMode(
+        model, fw.Harmonics([1, 3, 5, 7], 64), "CNM", 0, fw.linear_modes(model, 1)[0], "rounded_"
+    )
+    branch = fw.Continuation(problem, problem.initial(1e-5), (1e-5, 1e-3))
+    residuals = [p.residual for p in branch]
+    for name in given:
+        database.delValue(name)
+    assert branch.converged and 1e-7 < max(residuals) < 1e-5
+    branch.destroy()
+    lines = reasons.read_text().splitlines()
+    assert len(lines) > 10 and all("CONVERGED_ATOL" in line for line in lines)
 
 
 def newton_at(problem, amplitude, prefix):
