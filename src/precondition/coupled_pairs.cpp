@@ -7,14 +7,12 @@ namespace fretwave::precondition {
 
 namespace {
 
-// Near a soft motion the blocks enlarge what is left: 3e-2 took twice as many iterations outside. Where they
-// creep (100 for 1e-3 on the lap joint's 48 pairs), 30 leave outside as many, in an eighth of the time.
+// Near a soft motion the blocks enlarge what is left: 3e-2 took twice as many iterations outside.
 const Tuned tolerance("pairs_tolerance", 1e-3, "relative residual of the pairs' coupling");
-const Tuned most("pairs_most", 30, "iterations on the pairs' coupling, at the most");
 
 }  // namespace
 
-CoupledPairs::CoupledPairs(MPI_Comm comm, std::vector<PairCorrection const*> own, Between between)
+CoupledPairs::CoupledPairs(MPI_Comm comm, std::vector<PairCorrection const*> own, Between between, int most)
     : comm_(comm), own_(std::move(own)), between_(std::move(between)) {
   PC pc;
   PetscInt local = 0;

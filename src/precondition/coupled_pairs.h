@@ -20,8 +20,8 @@ class CoupledPairs {
  public:
   /// Adds (G - G_pp) f at this rank's harmonics to u; both of all pairs.
   using Between = std::function<void(double const* f, double* u)>;
-  /// `own`: of this rank's pairs, in the order of their coefficients. Collective.
-  CoupledPairs(MPI_Comm, std::vector<PairCorrection const*> own, Between);
+  /// `own`: of this rank's pairs, in the order of their coefficients; `most`: iterations. Collective.
+  CoupledPairs(MPI_Comm, std::vector<PairCorrection const*> own, Between, int most);
   CoupledPairs(CoupledPairs const&) = delete;
   /// Coefficients of all ranks' pairs.
   size_t size() const { return size_; }

@@ -5,8 +5,15 @@
 
 #include "fault.h"
 #include "together.h"
+#include "tuned.h"
 
 namespace fretwave::precondition {
+
+namespace {
+
+const Tuned most("pairs_most", 120, "iterations on the pairs' coupling, at the most");
+
+}  // namespace
 
 PairwisePreconditioner::PairwisePreconditioner(HarmonicProblem& problem)
     : problem_(problem),
@@ -131,10 +138,10 @@ void PairwisePreconditioner::couple(std::vector<PairTangents>&& contacts) {
       if (mine(i)) between_.push_back(inverses_[i]->between_pairs(entries(i), pair_of));
     pair_of_ = pair_of;
   }
-  coupled_ =
-      std::make_unique<CoupledPairs>(problem_.comm(), std::move(own), [this](double const* f, double* u) {
-        for (auto const& G : between_) G->apply(f, u);
-      });
+  const auto between = [this](double const* f, double* u) {
+    for (auto const& G : between_) G->apply(f, u);
+  };
+  coupled_ = std::make_unique<CoupledPairs>(problem_.comm(), std::move(own), between, most);
 }
 
 void PairwisePreconditioner::build(Vec y, Vec row) {
