@@ -101,6 +101,13 @@ inline void multiply(char const* ops, std::array<int, 3> size, double alpha, Den
          &lead);
 }
 
+/// Rows to which a flat matrix is filled up for a product: of 1200 x 1200 floats one with 15 rows takes
+/// OpenBLAS 0.92 ms, with 16 0.57.
+inline int filled_up(int rows) {
+  const int multiple = rows <= 2 ? 1 : rows <= 4 ? 4 : 8;
+  return (rows + multiple - 1) / multiple * multiple;
+}
+
 /// A x, A rows x columns, column-major. Where rows are two more than a multiple of four, cgemv of OpenBLAS
 /// 0.3.21 (Debian 12's) reads the entry behind the last of x: there is one.
 inline std::vector<std::complex<float>> product(int rows, int columns, std::complex<float> const* A,

@@ -140,6 +140,25 @@ std::vector<double> StuckBasis::diagonal(Mat A) const {
   return out;
 }
 
+namespace {
+
+/// Columns of c entries in single precision, each filled up with zeros.
+std::vector<float> filled_up(double const* x, int c, int columns) {
+  const int lead = lapack::filled_up(c);
+  std::vector<float> out(size_t(lead) * columns);
+  for (int j = 0; j < columns; ++j)
+    for (int k = 0; k < c; ++k) out[size_t(j) * lead + k] = float(x[size_t(j) * c + k]);
+  return out;
+}
+
+void take(std::vector<float> const& x, int c, int columns, double* to) {
+  const int lead = lapack::filled_up(c);
+  for (int j = 0; j < columns; ++j)
+    for (int k = 0; k < c; ++k) to[size_t(j) * c + k] = x[size_t(j) * lead + k];
+}
+
+}  // namespace
+
 void StuckBasis::forces(double const* x, int coefficients, double* g, double* moved) const {
   const int c = coefficients;
   if (factor_) {
@@ -150,11 +169,12 @@ void StuckBasis::forces(double const* x, int coefficients, double* g, double* mo
     static_forces(moved, c, g);
     return;
   }
-  const std::vector<float> in(x, x + size_t(c) * local_);
-  std::vector<float> out(size_t(c) * size());
-  lapack::multiply("NN", {c, size(), local_}, 1.0f, {in.data(), c}, {shapes_.data(), local_}, 0.0f,
-                   out.data(), c);
-  std::ranges::copy(out, g);
+  const int lead = lapack::filled_up(c);
+  const auto in = filled_up(x, c, local_);
+  std::vector<float> out(size_t(lead) * size());
+  lapack::multiply("NN", {lead, size(), local_}, 1.0f, {in.data(), lead}, {shapes_.data(), local_}, 0.0f,
+                   out.data(), lead);
+  take(out, c, size(), g);
 }
 
 void StuckBasis::motion(double const* g, int coefficients, double* q) const {
@@ -165,11 +185,12 @@ void StuckBasis::motion(double const* g, int coefficients, double* q) const {
     lapack::multiply("NT", {c, local_, modes_}, 1.0, {modal.data(), c}, {exactly_.data(), local_}, 1.0, q, c);
     return;
   }
-  const std::vector<float> in(g, g + size_t(c) * size());
-  std::vector<float> out(size_t(c) * local_);
-  lapack::multiply("NT", {c, local_, size()}, 1.0f, {in.data(), c}, {shapes_.data(), local_}, 0.0f,
-                   out.data(), c);
-  std::ranges::copy(out, q);
+  const int lead = lapack::filled_up(c);
+  const auto in = filled_up(g, c, size());
+  std::vector<float> out(size_t(lead) * local_);
+  lapack::multiply("NT", {lead, local_, size()}, 1.0f, {in.data(), lead}, {shapes_.data(), local_}, 0.0f,
+                   out.data(), lead);
+  take(out, c, local_, q);
 }
 
 double StuckBasis::flops() const {

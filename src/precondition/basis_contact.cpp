@@ -151,10 +151,10 @@ std::vector<int> BasisPreconditioner::correct(std::vector<PairTangents> const& c
 /// u += what forces of busy pairs move of the others, at this rank's harmonics.
 void BasisPreconditioner::add_coupling(double const* f, double* u) const {
   Harmonics const& h = problem_.harmonics();
-  const int c = blocks_.coefficients(), begin = blocks_.begin();
+  const int c = blocks_.coefficients(), lead = blocks_.lead(), begin = blocks_.begin();
   const auto moved = blocks_.compliance(own(f, busy_rows_, blocks_.rows()));
   for (size_t row = 0; row < busy_rows_.size(); ++row)
-    for (int k = 0; k < c; ++k) u[row * m_ + begin + k] += moved[size_t(busy_rows_[row]) * c + k];
+    for (int k = 0; k < c; ++k) u[row * m_ + begin + k] += moved[size_t(busy_rows_[row]) * lead + k];
   for (Busy const& pair : busy_pairs_)
     for (int i = first_; i < last_; ++i)
       for (int row = 0; row < pair.components; ++row)

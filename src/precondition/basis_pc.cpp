@@ -168,10 +168,10 @@ void BasisPreconditioner::follow(Vec y) {
 /// This rank's coefficients of harmonic blocks, at some places of all: coefficients x columns.
 std::vector<float> BasisPreconditioner::own(double const* blocks, std::vector<int> const& places,
                                             int columns) const {
-  const int c = blocks_.coefficients(), begin = blocks_.begin();
-  std::vector<float> out(size_t(c) * columns);
+  const int c = blocks_.coefficients(), lead = blocks_.lead(), begin = blocks_.begin();
+  std::vector<float> out(size_t(lead) * columns);
   for (size_t j = 0; j < places.size(); ++j)
-    for (int k = 0; k < c; ++k) out[size_t(places[j]) * c + k] = float(blocks[j * m_ + begin + k]);
+    for (int k = 0; k < c; ++k) out[size_t(places[j]) * lead + k] = float(blocks[j * m_ + begin + k]);
   return out;
 }
 
@@ -211,7 +211,7 @@ void BasisPreconditioner::add_static(std::vector<double> const& scalars, double*
 
 void BasisPreconditioner::apply(Vec x, Vec z) {
   const auto all = forces(x);
-  const int c = blocks_.coefficients(), begin = blocks_.begin();
+  const int c = blocks_.coefficients(), lead = blocks_.lead(), begin = blocks_.begin();
   std::vector<int> places(n_);
   std::iota(places.begin(), places.end(), 0);
   const std::vector<double> closing(all.end() - scalars_, all.end());
@@ -221,7 +221,7 @@ void BasisPreconditioner::apply(Vec x, Vec z) {
     std::vector<double> u(coupled_->size(), 0.0);
     const auto motion = blocks_.motion(found.modes);
     for (size_t row = 0; row < busy_rows_.size(); ++row)
-      for (int k = 0; k < c; ++k) u[row * m_ + begin + k] = motion[size_t(busy_rows_[row]) * c + k];
+      for (int k = 0; k < c; ++k) u[row * m_ + begin + k] = motion[size_t(busy_rows_[row]) * lead + k];
     sum_over_ranks(u, problem_.comm());
     const auto f = coupled_->forces(u);
     blocks_.subtract(own(f.data(), busy_rows_, blocks_.rows()), forces);
@@ -229,7 +229,7 @@ void BasisPreconditioner::apply(Vec x, Vec z) {
   }
   std::vector<double> eta(size_t(m_) * n_ + scalars_, 0.0);
   for (int l = 0; l < n_; ++l)
-    for (int k = 0; k < c; ++k) eta[size_t(l) * m_ + begin + k] = found.modes[size_t(l) * c + k];
+    for (int k = 0; k < c; ++k) eta[size_t(l) * m_ + begin + k] = found.modes[size_t(l) * lead + k];
   std::ranges::copy(found.scalars, eta.end() - scalars_);
   sum_over_ranks(eta, problem_.comm());
   const std::vector<double> scalars(eta.end() - scalars_, eta.end());

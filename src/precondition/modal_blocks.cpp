@@ -51,6 +51,7 @@ ModalBlocks::ModalBlocks(model::StuckBasis const& basis, Harmonics const& h, int
     count_ += parts_.back();
     if (i == h.fundamental()) border_harmonic_ = i - first;
   }
+  lead_ = lapack::filled_up(count_);
 }
 
 void ModalBlocks::set_structure(std::vector<std::vector<complex>> z, double at_rest, ModalBorder border) {
@@ -164,13 +165,13 @@ std::vector<double> ModalBlocks::small_solution(Small const& small, std::vector<
 /// to += T u
 void ModalBlocks::add_T(std::vector<float> const& u, std::vector<float>& to) const {
   for (Entry const& t : T_)
-    for (int i = 0; i < count_; ++i)
-      to[size_t(t.row) * count_ + i] += float(t.value) * u[size_t(t.col) * count_ + i];
+    for (int i = 0; i < lead_; ++i)
+      to[size_t(t.row) * lead_ + i] += float(t.value) * u[size_t(t.col) * lead_ + i];
 }
 
 /// X u
 std::vector<float> ModalBlocks::pull(std::vector<float> u) const {
-  const int r = rows(), c = count_;
+  const int r = rows(), c = lead_;
   std::vector<float> Tu(u.size(), 0.0f), f(u.size(), 0.0f);
   add_T(u, Tu);
   multiply("NN", {c, r, r}, -1.0f, {Tu.data(), c}, {G_.data(), r}, 1.0f, u.data(), c);
@@ -181,7 +182,7 @@ std::vector<float> ModalBlocks::pull(std::vector<float> u) const {
 // eta_h = z^-1 (g_h - U_h^T f - C_h zeta), f = X (U_h z^-1 g_h + U_l eta_l - c zeta)
 ModalBlocks::Solution ModalBlocks::solve(std::vector<float> const& forces,
                                          std::vector<double> const& closing) const {
-  const int n = modes_, k = low_, r = rows(), c = count_;
+  const int n = modes_, k = low_, r = rows(), c = lead_;
   Solution out{std::vector<float>(size_t(c) * n), {}};
   auto& eta = out.modes;
   const auto relax = [&](std::vector<float> const& g) {
@@ -240,20 +241,20 @@ ModalBlocks::Solution ModalBlocks::solve(std::vector<float> const& forces,
 }
 
 std::vector<float> ModalBlocks::motion(std::vector<float> const& modes) const {
-  const int r = rows(), c = count_;
+  const int r = rows(), c = lead_;
   std::vector<float> u(size_t(c) * r);
   multiply("NT", {c, r, modes_}, 1.0f, {modes.data(), c}, {U_.data(), r}, 0.0f, u.data(), c);
   return u;
 }
 
 void ModalBlocks::subtract(std::vector<float> const& f, std::vector<float>& forces) const {
-  const int r = rows(), c = count_;
+  const int r = rows(), c = lead_;
   multiply("NN", {c, modes_, r}, -1.0f, {f.data(), c}, {U_.data(), r}, 1.0f, forces.data(), c);
 }
 
 // G (1 + T G)^-1 f + (U_l - G X U_l) eta_l - (c - G X c) zeta, N (eta_l, zeta) = (U_l^T, -rho) (1 + T G)^-1 f
 std::vector<float> ModalBlocks::compliance(std::vector<float> const& f) const {
-  const int k = low_, r = rows(), c = count_;
+  const int k = low_, r = rows(), c = lead_;
   std::vector<float> u(size_t(c) * r), low(size_t(c) * k);
   multiply("NN", {c, r, r}, 1.0f, {f.data(), c}, {G_.data(), r}, 0.0f, u.data(), c);
   multiply("NT", {c, k, r}, 1.0f, {f.data(), c}, {right_.data(), k}, 0.0f, low.data(), c);

@@ -20,12 +20,13 @@ struct ModalBorder {
 ///     N_n = z_n + U_l^T X U_l
 ///
 /// of the lower modes, that of the fundamental with its border, without which it is singular at an eigenvalue
-/// (DESIGN fact 5). Arrays hold the range's coefficients innermost.
+/// (DESIGN fact 5). Arrays hold the range's coefficients innermost, filled up with zeros to `lead`.
 class ModalBlocks {
  public:
   /// Harmonics first to last - 1.
   ModalBlocks(model::StuckBasis const&, Harmonics const&, int first, int last);
   int coefficients() const { return count_; }
+  int lead() const { return lead_; }
   /// Where they begin in a harmonic block.
   int begin() const { return begin_; }
   bool has_fundamental() const { return border_harmonic_ >= 0; }
@@ -78,7 +79,7 @@ class ModalBlocks {
   std::vector<double> small_solution(Small const&, std::vector<double> const& right) const;
 
   model::StuckBasis const& basis_;
-  int first_, begin_ = 0, count_ = 0, modes_, low_ = 0, border_harmonic_ = -1;
+  int first_, begin_ = 0, count_ = 0, lead_ = 0, modes_, low_ = 0, border_harmonic_ = -1;
   std::vector<int> offsets_, parts_;            ///< of the range's harmonics among its coefficients
   std::vector<std::vector<complex>> flexible_;  ///< 1 / z; of higher modes near resonance 1 / at_rest
   std::vector<std::vector<complex>> z_;
