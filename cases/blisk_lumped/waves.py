@@ -108,7 +108,7 @@ def draw_wheel(table: list[dict[str, Any]], nodal_diameter: int, path: Path) -> 
             for name, look, colour in (("disk", "-o", style.BLUE), ("ring", "--s", style.ORANGE)):
                 motion = np.append(around[:, case.DOFS.index(name)], around[0, case.DOFS.index(name)])
                 axis.plot(angle, 3 + motion, look, ms=3.0, lw=1.2, color=colour, label=name)
-            axis.plot(np.linspace(0, 2 * np.pi, 200), np.full(200, 3.0), color=style.GREY, lw=0.8)
+            axis.plot(np.linspace(0, 2 * np.pi, 200), np.full(200, 3.0), color=style.GREY, lw=0.8, label="at rest")
             axis.set(ylim=(0, 4.4), yticks=[], xticks=angle[:-1:6])
             axis.set_title(f"{title},\n{row['frequency_hz']:.2f} Hz", loc="center")
             axis.set_xticklabels([f"{j}" for j in range(0, case.SECTORS, 6)], fontsize=9)

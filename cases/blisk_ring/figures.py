@@ -51,7 +51,7 @@ def mesh(model: dict[str, Any], path: Path) -> None:
         right.set_title(f"Ring, {len(places)} contact pairs on its outer side")
         for axes, camera, place in ((left, SECTOR, (0.88, 0.06)), (right, RING, (0.5, 0.0))):
             solid.ruler(axes, scale, unit)
-            solid.compass(axes, camera, place, ("axial", "", "radial"))
+            solid.compass(axes, camera, place, ("axial", "tangential", "radial"))
         figure.get_layout_engine().set(h_pad=0.1)
         figure.savefig(path, dpi=style.DPI)
 

@@ -59,14 +59,14 @@ def draw(modes: Sequence[Analysis], shifted: Mapping[str, Table] | None = None) 
     return figure
 
 
-def _curves(axes: Axes, modes: Sequence[Analysis], column: str, scale: Scale) -> None:
+def _curves(axes: Axes, modes: Sequence[Analysis], column: str, scale: Scale, errors: bool = True) -> None:
     """Every mode's curve with its points and error, and the folds of the first."""
     factor = 100.0 if column == "zeta" else 1.0
     for mode, colour, line in zip(modes, style.PALETTE, LINES):
         curve = mode.curve()
         x = scale(curve["amplitude"])
         axes.plot(x, factor * curve[column], color=colour, linestyle=line, label=_name(mode, scale))
-        error = error_of(curve, column)
+        error = error_of(curve, column) if errors else None
         if error is not None:
             style.error_band(axes, x, factor * curve[column], factor * error, colour)
     for mode, colour in zip(modes, style.PALETTE):
@@ -107,7 +107,7 @@ def _close_up(axes: Axes, modes: Sequence[Analysis], column: str, place: tuple[f
     low, high = scale(folds.min()), scale(folds.max())
     width = CLOSE_UP * (high - low)
     inset = axes.inset_axes(place)
-    _curves(inset, modes, column, scale)
+    _curves(inset, modes, column, scale, errors=False)  # upright bands lie over each other where a curve folds
     curve = modes[0].curve()
     near = (scale(curve["amplitude"]) > low - width) & (scale(curve["amplitude"]) < high + width)
     values = curve[column][near] * (100.0 if column == "zeta" else 1.0)

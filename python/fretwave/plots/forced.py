@@ -30,10 +30,10 @@ def draw(forced: Analysis, modes: Sequence[Analysis], times: Table | None, peaks
     """Amplitude as it is (left) and divided by the level (right)."""
     figure, (left, right) = style.new_figure(5.0, columns=2)
     levels = np.unique(forced.columns["level"])
-    shown, divided = (scales.linear(forced.unit_system, forced.unit("amplitude"), a) for a in _amplitudes(forced))
+    shown = scales.linear(forced.unit_system, forced.unit("amplitude"), *_amplitudes(forced))
     for level, colour in zip(levels, style.shades(len(levels))):
         _level(left, forced, times, level, colour, shown)
-        _level(right, forced, times, level, colour, Scale(divided.factor / level, divided.unit))
+        _level(right, forced, times, level, colour, Scale(shown.factor / level, shown.unit))
     for mode, (line, colour) in zip(modes, BACKBONES):
         curve = mode.curve()
         look = {"color": colour, "linestyle": line, "label": f"backbone, {mode.method()}", "zorder": 5}
@@ -43,7 +43,7 @@ def draw(forced: Analysis, modes: Sequence[Analysis], times: Table | None, peaks
     if times is not None:
         left.plot([], [], "o", markerfacecolor="white", markeredgecolor=style.INK, label="time integration")
     _stops(left, forced, levels, shown)
-    _finish(figure, left, right, forced, shown, divided)
+    _finish(figure, left, right, forced, shown)
     return figure
 
 
@@ -118,7 +118,7 @@ def _dof(forced: Analysis) -> str:
     return f"{name.split('@')[0]}, largest of all sectors" if "largest_amplitude" in forced.columns else name
 
 
-def _finish(figure: Figure, left: Axes, right: Axes, forced: Analysis, shown: Scale, divided: Scale) -> None:
+def _finish(figure: Figure, left: Axes, right: Axes, forced: Analysis, shown: Scale) -> None:
     frequency, amplitude = forced.columns["frequency_hz"], shown(_amplitude(forced))
     for axes in (left, right):
         if np.ptp(frequency) > 0:  # a response of one point has no range
@@ -133,8 +133,8 @@ def _finish(figure: Figure, left: Axes, right: Axes, forced: Analysis, shown: Sc
         left.set_ylim(0.0, 1.05 * min(np.max(amplitude + errors), (1.0 + style.BEYOND) * amplitude.max()))
         right.set_ylim(bottom=0.0)
     left.set_ylabel(shown.label(f"Amplitude of {_dof(forced)}"))
-    right.set_ylabel(divided.label("Amplitude / level"))
+    right.set_ylabel(shown.label("Amplitude / level"))
     marks.point_entry(left, len(forced) > marks.MANY)
     known = forced.columns.get("amplitude_error")
     marks.error_entry(left, {shown.unit: [None if known is None else shown(known)]})
-    style.legend_outside(figure, left, columns=4)
+    style.legend_outside(figure, left, columns=4, title="Level: factor on the force")

@@ -29,6 +29,8 @@ ERRORS_OF_RESPONSE = {
 ERRORS_OF_WEAR = {"zeta_error": "Damping", "omega_error": "Frequency", "worn_error": "Worn volume"}
 #: an error of exactly zero, for which a logarithmic axis has no place: of the least other one
 BELOW = 0.1
+#: Ends of the time axis at the least over each other.
+LEAST_TIMES = 4.0
 
 
 def figures(run: Run) -> Iterator[tuple[str, Figure]]:
@@ -36,6 +38,12 @@ def figures(run: Run) -> Iterator[tuple[str, Figure]]:
     table = run.table("study")
     if table is not None:
         yield "study", draw(table)
+
+
+def _time_range(times: AnyArray, given: tuple[float, float]) -> tuple[float, float]:
+    """Ends of the time axis [s]: not so near to each other that what a busy machine does looks like a cost."""
+    middle = float(np.sqrt(times.min() * times.max()))
+    return min(given[0], middle / np.sqrt(LEAST_TIMES)), max(given[1], middle * np.sqrt(LEAST_TIMES))
 
 
 def draw(table: Table) -> Figure:
@@ -48,7 +56,8 @@ def draw(table: Table) -> Figure:
             _sweep(plane, table, sweep, symbol, column, line, colour)
         plane.set(xscale="log", yscale="log", title=title)
         plane.set_xlabel(style.label("Run time" if of_wear else "Run time of the branch", "s"))
-        style.plain_numbers(plane.xaxis, _times(table))
+        plane.set_xlim(_time_range(_times(table), plane.get_xlim()))
+        style.plain_numbers(plane.xaxis, np.array(plane.get_xlim()))
     axes[0].set_ylabel("Relative error of the last cycle" if of_wear else "Error against the finest run")
     if not of_wear:
         axes[0].plot([], [], "o-", color=style.GREY, alpha=0.35, label="as the run estimates it")

@@ -64,7 +64,10 @@ def draw_histories(wear: Analysis, line: WearLine, contact: str, pairs: Table | 
     lower.set_xlabel(cycle_label(wear))
     lower.set(xlim=(0.0, line.cycles[-1]))
     for column, face in enumerate(faces):
-        _places(figure.add_subplot(grid[2, column]), pairs or {}, line.units, face, words, chosen)
+        places = figure.add_subplot(grid[2, column])
+        unit = _places(places, pairs or {}, line.units, face, words, chosen)
+        places.set_xlabel(style.label("Along the face", unit))
+        places.set_ylabel("" if column else style.label("Up the face", unit))
     figure.supxlabel(RULE, fontsize=9, color=style.GREY)
     style.legend_outside(figure, upper, columns=2)
     return figure
@@ -126,11 +129,12 @@ def _histories(axes: Axes, cycles: Array, values: Array, words: list[str], chose
     axes.set_ylim(bottom=0.0)
 
 
-def _places(axes: Axes, pairs: Table, units: UnitSystem, face: str, words: list[str], chosen: dict[str, int]) -> None:
-    """Kind of each pair of a face; the pairs drawn in front have a ring."""
+def _places(axes: Axes, pairs: Table, units: UnitSystem, face: str, words: list[str], chosen: dict[str, int]) -> str:
+    """Kind of each pair of a face; the pairs drawn in front have a ring. The unit of the places."""
     pairs, unit = placed(pairs, units)
     for pair in np.flatnonzero(pairs["face"] == face):
         ring = pair in chosen.values()
         look = {"markeredgecolor": style.INK if ring else style.GREY, "markeredgewidth": 2.0 if ring else 0.4}
         axes.plot(*pairs["position"][pair], "o", color=KINDS[words[pair]], markersize=10, **look)
-    place_face(axes, style.label(face, unit), pairs["position"])
+    place_face(axes, face, pairs["position"])
+    return unit
