@@ -21,6 +21,8 @@ LIGHT, DARK, DARK_VALUES = (0.45, 0.5, 0.74), 0.5, 0.7
 #: Colours of bodies.
 STEEL, RED = "#dee6f2", "#d1495b"
 EDGE = "#444444"
+#: Share of an axis to the side from which its name stands beside its end.
+ASIDE = 0.3
 #: Faces that two parts share have their middles within this share of the size.
 SAME = 1e-6
 
@@ -113,8 +115,10 @@ def compass(axes: Axes, camera: Camera, place: tuple[float, float] = (0.1, 0.1),
         start = np.array(place)
         stroke = {"arrowstyle": "-", "color": EDGE, "linewidth": 1.0, "shrinkA": 0, "shrinkB": 0}
         axes.annotate("", start + 0.07 * end, start, xycoords="axes fraction", arrowprops=stroke)
-        where = start + 0.1 * end
-        axes.text(*where, letter, transform=axes.transAxes, fontsize=9, ha="center", va="center")
+        where = start + (0.08 if len(letter) > 1 else 0.1) * end
+        side = "left" if end[0] > ASIDE else "right" if end[0] < -ASIDE else "center"
+        look = {"fontsize": 9, "ha": side if len(letter) > 1 else "center", "va": "center"}
+        axes.text(*where, letter, transform=axes.transAxes, **look)
 
 
 def ruler(axes: Axes, factor: float, unit: str, place: float = 0.0) -> None:

@@ -204,7 +204,7 @@ def _faces(wear: Analysis) -> dict[str, str]:
 def _heading(figure: Figure, wear: Analysis, lines: Sequence[WearLine]) -> None:
     coefficient = float(wear.attributes.get("wear_coefficient", np.nan))
     many = len(lines) >= GRID
-    note = "; white lines: the amplitudes computed" if many else ""
+    note = "\nwhite lines: the amplitudes computed" if many else ""
     note += f"; red marks: {JUMP}" if many and any(len(line.jumps) for line in lines) else ""
     stopped = marks.why_stopped(wear, [line.called for line in lines]) if many else {}
     note += "".join(f"\n{marks.words(name, reason)}" for name, reason in stopped.items())
