@@ -1,7 +1,6 @@
 #include "solve/linear_solver.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "error.h"
 #include "log.h"
@@ -23,13 +22,6 @@ const Tuned tangent_accepted("linear_tangent_accepted", 1e-6,
                              "residual of a tangent, relative, where rounding lets GMRES go no further");
 const Tuned renewal("linear_renewal", 1.0 / 16,
                     "share of all iterations that is spent on building preconditioners anew");
-// Of Newton's systems, by Eisenstat & Walker (1996), choice 2, (|g_k| / |g_k-1|)^2: far from the solution
-// most digits of a step are lost to its curvature.
-constexpr int forcing = 2;
-constexpr double first_forcing = 1e-3, largest_forcing = 1e-2;
-constexpr double below_rounding = 0.1;  // of the residual: digits of a Newton step beyond that are none
-constexpr int residuals = 1000;         // of a solve that are kept
-constexpr double counted_digits = 6;    // of the solves in which the cost of a preconditioner is counted
 
 /// Our options under the prefix, where PETSc's -help is given; its macros return its error codes.
 PetscErrorCode offered(MPI_Comm comm, std::string const& prefix) {
@@ -73,20 +65,6 @@ bool is_gmres(KSP ksp) {
   check(PetscObjectTypeCompareAny(reinterpret_cast<PetscObject>(ksp), &gmres, KSPGMRES, KSPFGMRES, KSPLGMRES,
                                   ""));
   return gmres;
-}
-
-void end_at(KSP ksp, double residual) {
-  check(KSPSetTolerances(ksp, PETSC_DEFAULT, residual, PETSC_DEFAULT, PETSC_DEFAULT));
-}
-
-/// Of the last solve, had it been asked for as many digits as every other.
-double iterations_of(KSP ksp) {
-  PetscInt taken = 0, norms = 0;
-  PetscReal const* norm = nullptr;
-  check(KSPGetIterationNumber(ksp, &taken));
-  check(KSPGetResidualHistory(ksp, &norm, &norms));
-  const double digits = norms > 1 && norm[norms - 1] > 0 ? std::log10(norm[0] / norm[norms - 1]) : 0;
-  return digits > 1 ? taken * counted_digits / digits : double(taken);
 }
 
 }  // namespace
@@ -151,19 +129,15 @@ void LinearSolver::use_krylov() {
                              reinterpret_cast<void (*)(void)>(shell_transposed_product)));
   check(KSPSetType(ksp, KSPFGMRES));
   check(KSPGMRESSetRestart(ksp, 100));
+  // Six digits: with Eisenstat and Walker's 1e-2 and (|g_k| / |g_k-1|)^2 a count of GMRES that rounding turns
+  // changes the step, and a hard branch has other points on other numbers of ranks (-snes_ksp_ew: for large
+  // ones)
   check(KSPSetTolerances(ksp, 1e-6, 1e-13, PETSC_DEFAULT, 200));
-  check(KSPSetResidualHistory(ksp, nullptr, residuals, PETSC_TRUE));
-  check(SNESKSPSetUseEW(snes_, PETSC_TRUE));
-  check(SNESKSPSetParametersEW(snes_, forcing, first_forcing, largest_forcing, 0.9, 2, PETSC_DEFAULT, 0.1));
   check(KSPGetPC(ksp, &pc));
   check(PCSetType(pc, kind_.kind->type.c_str()));
 }
 
 void LinearSolver::take_options() {
-  PetscBool fixed;
-  check(PetscOptionsHasName(nullptr, prefix_.c_str(), "-ksp_rtol", &fixed));
-  if (fixed) check(SNESKSPSetUseEW(snes_, PETSC_FALSE));
-  check(KSPGetTolerances(ksp_of(snes_), nullptr, &newton_floor_, nullptr, nullptr));
   check(offered(bordered_.problem().comm(), prefix_));
   Tuned::help(bordered_.problem().comm());
   make_preconditioner();
@@ -205,7 +179,6 @@ void LinearSolver::make_tangent() {
     check(KSPGMRESSetRestart(tangent_, restart));
   }
   check(KSPSetTolerances(tangent_, tangent_tolerance, PETSC_DEFAULT, PETSC_DEFAULT, iterations));
-  check(KSPSetResidualHistory(tangent_, nullptr, residuals, PETSC_TRUE));
   check(KSPSetFromOptions(tangent_));
   check(KSPGetTolerances(tangent_, nullptr, &tangent_floor_, nullptr, nullptr));
 }
@@ -241,21 +214,22 @@ PetscErrorCode LinearSolver::apply(Vec x, Vec z) {
 /// have cost as much as building; at once, if even its first reuse cost more the last time. Built at a hard
 /// point it would never be: a share of all iterations counts.
 void LinearSolver::count_iterations() {
-  const double iterations = iterations_of(beside_ ? KSP(tangent_) : ksp_of(snes_)),
-               cost = preconditioner().build_cost();
+  PetscInt iterations = 0;
+  check(KSPGetIterationNumber(beside_ ? KSP(tangent_) : ksp_of(snes_), &iterations));
+  const double cost = preconditioner().build_cost();
   if (fresh_ < 0) {
-    fresh_ = iterations;
+    fresh_ = int(iterations);
     stale_ = first_reuse_ > cost;
     first_reuse_ /= 2;
     return;
   }
-  const double beyond = std::max(0.0, iterations - fresh_);
+  const double beyond = std::max(0, int(iterations) - fresh_);
   if (excess_ == 0) first_reuse_ = beyond;
   excess_ += beyond + renewal * iterations;
   stale_ = excess_ > cost;
 }
 
-bool LinearSolver::linearise(Vec y, bool newton, double rounding) {
+bool LinearSolver::linearise(Vec y, bool newton) {
   if (!krylov_) {
     bordered_.assemble(y, J_);
     if (factorise(ksp_of(snes_), J_)) return true;
@@ -269,7 +243,6 @@ bool LinearSolver::linearise(Vec y, bool newton, double rounding) {
   check(MatAssemblyEnd(J_, MAT_FINAL_ASSEMBLY));
   if (own_ && !set_up()) return false;
   uncounted_ = own_ && (newton || beside_);
-  if (newton) end_at(ksp_of(snes_), std::max(below_rounding * rounding, newton_floor_));
   return true;
 }
 
@@ -375,7 +348,8 @@ void LinearSolver::descend() {
 
 /// Behind a kink of the branch the last tangent can be a guess so bad that GMRES takes it for divergence.
 bool LinearSolver::solve(Vec b, Vec x, double rounding) {
-  end_at(tangent_, std::max(rounding, tangent_floor_));
+  check(KSPSetTolerances(tangent_, PETSC_DEFAULT, std::max(rounding, tangent_floor_), PETSC_DEFAULT,
+                         PETSC_DEFAULT));
   if (solve_once(b, x)) return true;
   if (!krylov_) return false;
   check(VecSet(x, 0));

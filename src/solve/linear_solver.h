@@ -39,8 +39,9 @@ class LinearSolver {
   bool krylov() const { return krylov_; }
   /// Point and factors of the solves that follow; false where it is singular. `newton`: one of Newton's
   /// follows. Collective.
-  bool linearise(Vec y, bool newton, double rounding = 0);
-  /// J x = b from x where the Krylov route is taken, to the tangent's tolerance. Collective.
+  bool linearise(Vec y, bool newton);
+  /// J x = b from x where the Krylov route is taken, to the tangent's tolerance, or to this residual.
+  /// Collective.
   bool solve(Vec b, Vec x, double rounding = 0);
   /// No Newton steps are asked for, but solves beside them alone, to this relative tolerance.
   void serve_beside(double tolerance);
@@ -88,14 +89,14 @@ class LinearSolver {
   ChosenKind kind_;
   std::unique_ptr<Preconditioner> own_, fallback_;  ///< none where options ask for a PC of PETSc's
   bool krylov_ = false, stale_ = true, uncounted_ = false, beside_ = false;
-  double fresh_ = -1;       ///< Krylov iterations of the first solve after a build; -1: none yet
+  int fresh_ = -1;          ///< Krylov iterations of the first solve after a build; -1: none yet
   double excess_ = 0;       ///< iterations beyond that and a share of them, of all solves since
   double first_reuse_ = 0;  ///< iterations beyond it that the first reuse cost when it was last tried, halved
                             ///< at every build since
-  bool built_here_ = false;                      ///< at the last linearisation
-  double newton_floor_ = 0, tangent_floor_ = 0;  ///< of their residuals, by the options
-  int rung_ = 0;                                 ///< of the ladder; 0: the problem's own preconditioner
-  int stay_ = 32, solved_ = 0;                   ///< points to stay up there, and points since
+  bool built_here_ = false;     ///< at the last linearisation
+  double tangent_floor_ = 0;    ///< of its residuals, by the options
+  int rung_ = 0;                ///< of the ladder; 0: the problem's own preconditioner
+  int stay_ = 32, solved_ = 0;  ///< points to stay up there, and points since
   Fallbacks fallbacks_;
   std::string route_, note_;
   Guard guard_;

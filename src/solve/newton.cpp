@@ -19,7 +19,7 @@ const Tuned small_effect("newton_small_effect", 1e-8,
                          "relative change of frequency and damping that a step may leave");
 const Tuned largest_effect("newton_largest_effect", 1e-6,
                            "the change it may leave where rounding lets the residual fall no further");
-const Tuned roughest("newton_roughest", 1e-4, "residual to which linear systems are solved at the least");
+const Tuned roughest("newton_roughest", 1e-4, "residual to which a tangent is solved at the least");
 const Tuned far("newton_far", 1e5, "step over residual from which the Jacobian is nearly singular");
 const Tuned patience("newton_patience", 10,
                      "iterations after which a residual below the tolerance is enough");
@@ -140,7 +140,7 @@ PetscErrorCode Newton::form_function(SNES, Vec y, Vec g, void* context) {
 PetscErrorCode Newton::form_jacobian(SNES snes, Vec y, Mat, Mat, void* context) {
   auto& newton = *static_cast<Newton*>(context);
   return newton.linear_->guard().run([&] {
-    const bool regular = newton.linear_->linearise(y, true, newton.rounding(y));
+    const bool regular = newton.linear_->linearise(y, true);
     check(
         SNESSetCheckJacobianDomainError(snes, regular ? PETSC_FALSE : PETSC_TRUE));  // it is never taken back
     if (!regular) check(SNESSetJacobianDomainError(snes));
@@ -241,8 +241,8 @@ Outcome Newton::solve_once(Vec y) {
           singular || reason == SNES_DIVERGED_LINEAR_SOLVE};
 }
 
-/// Of the residual at y, to which linear systems are solved; 0 where it is not known. A tangent needs four
-/// digits even where the residual has fewer.
+/// Of the residual at y; 0 where it is not known. A tangent needs four digits even where the residual has
+/// fewer. (Newton's steps go below it: what rounds are stiff directions, and soft ones have digits left.)
 double Newton::rounding(Vec y) {
   const double residual = bordered_.problem().rounding(y);
   return std::isfinite(residual) ? std::min<double>(residual, roughest) : 0;

@@ -114,8 +114,6 @@ def test_how_roughly_newton_steps_are_solved_for_does_not_shape_the_branch(comm)
         found = counts(comm, case, **options)
         assert abs(found[0] - usual[0]) < 0.2 * usual[0], f"{options}: {found} against {usual}"
         assert found[2] < 1.5 * usual[2], f"{options}: {found} against {usual}"
-    exact = counts(comm, case, ksp_rtol=1e-6)
-    assert usual[1] < 1.2 * exact[1] and usual[2] < 0.8 * exact[2], f"{usual} against {exact}"
 
 
 @pytest.mark.ranks(1)
