@@ -64,17 +64,23 @@ int invert(std::vector<T>& A, int n) {
   return info;
 }
 
-/// B := A^-1 B, columns of it, both column-major; A is overwritten. Returns LAPACK's info, 0 if A is regular.
-inline int solve(std::vector<double>& A, int n, std::vector<double>& B, int columns) {
-  std::vector<int> pivots(n);
-  int info;
-  dgesv_(&n, &columns, A.data(), &n, pivots.data(), B.data(), &n, &info);
-  return info;
+inline void solve(int n, int columns, float* A, int* pivots, float* B, int* info) {
+  sgesv_(&n, &columns, A, &n, pivots, B, &n, info);
 }
-inline int solve(std::vector<float>& A, int n, std::vector<float>& B, int columns) {
+inline void solve(int n, int columns, double* A, int* pivots, double* B, int* info) {
+  dgesv_(&n, &columns, A, &n, pivots, B, &n, info);
+}
+inline void solve(int n, int columns, std::complex<double>* A, int* pivots, std::complex<double>* B,
+                  int* info) {
+  zgesv_(&n, &columns, A, &n, pivots, B, &n, info);
+}
+
+/// B := A^-1 B, columns of it, both column-major; A is overwritten. Returns LAPACK's info, 0 if A is regular.
+template <class T>
+int solve(std::vector<T>& A, int n, std::vector<T>& B, int columns) {
   std::vector<int> pivots(n);
   int info;
-  sgesv_(&n, &columns, A.data(), &n, pivots.data(), B.data(), &n, &info);
+  solve(n, columns, A.data(), pivots.data(), B.data(), &info);
   return info;
 }
 

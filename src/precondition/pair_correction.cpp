@@ -64,10 +64,8 @@ PairCorrection::PairCorrection(Harmonics const& h, int d, std::vector<double> D,
   for_entries(h, d, G, [&](int row, int col, double g) {
     for (size_t i = 0; i < n; ++i) T[row * n + i] += float(g) * float(D[col * n + i]);
   });
-  std::vector<int> pivots(n);
-  int info;
-  sgesv_(&size_, &size_, T.data(), &size_, pivots.data(), E.data(), &size_, &info);
-  if (info == 0) E_ = std::move(E);  // else the harmonic blocks alone serve this pair
+  if (lapack::solve(T, size_, E, size_) == 0)
+    E_ = std::move(E);  // else the harmonic blocks alone serve this pair
 }
 
 void PairCorrection::apply(double const* u, double* f) const {

@@ -32,8 +32,6 @@ const Tuned leash("branch_leash", 1.0 / 3,
                   "share of the range by which a branch may leave it where it began");
 const Tuned farthest("branch_farthest", 4, "factor by which it may leave the range there at most");
 
-constexpr int looks = 40;  // for where a guess passes the end of the range
-
 /// On a coarse grid: what a solution's last digits (of which no two numbers of ranks have the same) do to a
 /// length would be handed on from step to step and grow with the steps.
 double on_grid(double length) { return std::exp2(std::round(grid * std::log2(length)) / grid); }
@@ -282,38 +280,6 @@ bool Continuation::foretold(Vec y, double length) {
   return off(by_cubic(length)) < nearer * off(moved(anchor_.y, length, anchor_.tangent));
 }
 
-/// The end of the range, if the branch is foretold to pass it within `length`; what lies behind is not asked
-/// for, and may be harder.
-std::optional<double> Continuation::end_within(double& length) {
-  const double low = problem_.parameter_entry(low_), high = problem_.parameter_entry(high_),
-               beyond = last_entry(predicted(length)), from = last_entry(anchor_.y);
-  if (!(beyond > high || beyond < low)) return {};
-  const double goal = beyond > high ? high : low;
-  double inside = 0, outside = length;
-  for (int k = 0; k < looks && from != goal; ++k) {
-    const double middle = (inside + outside) / 2;
-    ((last_entry(predicted(middle)) < goal) == (from < goal) ? inside : outside) = middle;
-  }
-  if (!(inside > kink_length)) return {};
-  length = inside;
-  return goal;
-}
-
-/// A trial at the end of the range; none where there is no solution, as beside a fold.
-std::optional<Continuation::Trial> Continuation::attempt_end(double& length) {
-  double inside = length;
-  const auto goal = end_within(inside);
-  if (!goal) return {};
-  Trial trial = at(predicted(inside));
-  set_last_entry(trial.y, *goal);
-  if (!correct(trial, parameter_row_, *goal, row_, Effort::plain)) return {};
-  set_last_entry(trial.y, *goal);
-  const double reached = dot(row_, trial.y) - row_value_;
-  if (!(reached > kink_length && reached <= length)) return {};
-  length = reached;
-  return trial;
-}
-
 /// A trial at `length` from the anchor, or why there is none. Where corners lie about, pieces are walked one
 /// by one; else a corner is looked for where no shorter step leads on.
 std::optional<Continuation::Trial> Continuation::attempt(double& length, bool wary, Failure& failure) {
@@ -321,12 +287,13 @@ std::optional<Continuation::Trial> Continuation::attempt(double& length, bool wa
   turned_ = false;
   if (wary)
     if (auto behind = turn_next_corner(length)) return behind;
+  VecHandle guess = predicted(length);
   if (may_shorten && !wary)
-    if (auto end = attempt_end(length)) {
+    if (auto end = attempt_end(guess, kink_length, length)) {
       failure.last = complaint(*end, length, true);
       return failure.last.empty() ? std::move(end) : std::nullopt;
     }
-  Trial trial = at(predicted(length));
+  Trial trial = at(std::move(guess));
   const bool shortened = length < often * anchor_.step;
   const Effort effort = may_shorten && !shortened && newton_.dear() ? Effort::brief
                         : wary && may_shorten                       ? Effort::plain

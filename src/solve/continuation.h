@@ -1,4 +1,5 @@
 #pragma once
+#include <functional>
 #include <optional>
 
 #include "solve/hermite.h"
@@ -106,8 +107,6 @@ class Continuation {
   VecHandle by_cubic(double length);
   VecHandle predicted(double length);
   bool foretold(Vec y, double length);
-  std::optional<double> end_within(double& length);
-  std::optional<Trial> attempt_end(double& length);
   std::optional<Trial> attempt(double& length, bool wary, Failure&);
   double next_step(Trial const&, double length, double intended);
   std::optional<Trial> step(double& length, double& next_length);
@@ -142,6 +141,8 @@ class Continuation {
   double beyond(Hermite const& known, size_t which, Place before, Place last, double apart);
   Hermite with(Hermite const&, double at, Vec y, Vec tangent) const;
   void reach(double value, std::string const& event, Place a, Place b, Hermite const&, double length);
+  double passing(std::function<VecHandle(double)> const& guess, double target, Place from, double to);
+  std::optional<Trial> attempt_end(Vec guess, double shortest, double& length);
   void emit_end(Trial const& end, double target, double length, std::string const& event);
   void polish(Trial&, double target);
   std::optional<Trial> reach_along(double target, Place a, Place b, Hermite const&);

@@ -9,6 +9,7 @@ namespace fretwave::solve {
 
 namespace {
 
+constexpr int looks = 40;              // for where a guess passes a parameter
 constexpr int nodes = 8;               // parts of a step in which its cubic is looked at
 constexpr double near_zero = 0.3;      // of the smaller end value: so low a minimum may hide two zeros
 constexpr double value_error = 1e-9;   // relative, of a reported value reached along the branch
@@ -175,16 +176,43 @@ void Continuation::emit_end(Trial const& end, double target, double length, std:
   emit(std::move(trial), length, event);
 }
 
+/// Where guesses along the step pass a value of the parameter's entry, by bisection: just before it.
+double Continuation::passing(std::function<VecHandle(double)> const& guess, double target, Place from,
+                             double to) {
+  double inside = from.at;
+  for (int k = 0; k < looks; ++k) {
+    const double middle = (inside + to) / 2;
+    ((last_entry(guess(middle)) < target) == (from.value < target) ? inside : to) = middle;
+  }
+  return inside;
+}
+
+/// A trial where the branch leaves its range, if the guess at `length` lies beyond: what is there is not
+/// asked for, and may be harder. None where there is no solution, as beside a fold, or no way to speak of.
+std::optional<Continuation::Trial> Continuation::attempt_end(Vec guess, double shortest, double& length) {
+  const double low = problem_.parameter_entry(low_), high = problem_.parameter_entry(high_),
+               beyond = last_entry(guess), goal = beyond > high ? high : low, from = last_entry(anchor_.y);
+  if (!(beyond > high || beyond < low) || from == goal) return {};
+  const auto predict = [&](double at) { return predicted(at); };
+  const double inside = passing(predict, goal, {0, from}, length);
+  if (!(inside > shortest)) return {};
+  Trial trial = at(predicted(inside));
+  set_last_entry(trial.y, goal);
+  if (!correct(trial, parameter_row_, goal, row_, Effort::plain)) return {};
+  set_last_entry(trial.y, goal);  // to the last digit, by which it is known as the end
+  const double reached = dot(row_, trial.y) - row_value_;
+  if (!(reached > shortest && reached <= length)) return {};
+  length = reached;
+  return trial;
+}
+
 /// The branch at a given parameter between two places of the step.
 void Continuation::reach(double value, std::string const& event, Place a, Place b, Hermite const& curve,
                          double length) {
   const double target = problem_.parameter_entry(value);
-  double low = a.at, high = b.at;  // on the cubic, which is as monotone as the branch but for rounding
-  for (int k = 0; k < 40; ++k) {
-    const double middle = (low + high) / 2;
-    ((last_entry(curve.value(middle)) < target) == (a.value < target) ? low : high) = middle;
-  }
-  Trial trial = at(curve.value(low));
+  // on the cubic, which is as monotone as the branch but for rounding
+  const auto on_curve = [&](double at) { return curve.value(at); };
+  Trial trial = at(curve.value(passing(on_curve, target, a, b.at)));
   set_last_entry(trial.y, target);  // to the last digit, not to that of a linear solve
   const VecHandle expected = copy(trial.y);
   bool good = correct(trial, parameter_row_, target, row_);

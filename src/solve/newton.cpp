@@ -241,10 +241,11 @@ Outcome Newton::solve_once(Vec y) {
           singular || reason == SNES_DIVERGED_LINEAR_SOLVE};
 }
 
-/// Of the residual at y; 0 where it is not known. A tangent needs four digits even where the residual has
-/// fewer. (Newton's steps go below it: what rounds are stiff directions, and soft ones have digits left.)
+/// Of the residual at y; 0 where it is not known, or no iteration asks for it. A tangent needs four digits
+/// even where the residual has fewer. (Newton's steps go below it: what rounds are stiff directions, and soft
+/// ones have digits left.)
 double Newton::rounding(Vec y) {
-  const double residual = bordered_.problem().rounding(y);
+  const double residual = linear_->krylov() ? bordered_.problem().rounding(y) : 0;
   return std::isfinite(residual) ? std::min<double>(residual, roughest) : 0;
 }
 

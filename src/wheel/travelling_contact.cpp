@@ -92,11 +92,8 @@ std::vector<complex> TravellingContact::eliminated(WheelContact::Group const& gr
           for (int c = 0; c < size; ++c) out[c] += factor * row[c];
         }
       }
-  std::vector<int> pivots(size);
-  int info;
   // column-major sight of row-major E T = Delta is T^T E^T = Delta^T
-  zgesv_(&size, &size, T.data(), &size, pivots.data(), E.data(), &size, &info);
-  if (info != 0) std::ranges::fill(E, 0);  // the waves' blocks alone serve this one
+  if (lapack::solve(T, size, E, size)) std::ranges::fill(E, 0);  // the waves' blocks alone serve this one
   return E;
 }
 

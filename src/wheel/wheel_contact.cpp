@@ -196,11 +196,9 @@ void WheelContact::eliminate(std::vector<complex> const& G) {
       std::vector<double> T(E.size(), 0.0);
       for (int k = 0; k < size; ++k) T[size_t(k) * size + k] = 1;
       add_compliance(G, group, E, T);
-      std::vector<int> pivots(size);
-      int info;
       // column-major sight of row-major E T = dD is T^T E^T = dD^T
-      dgesv_(&size, &size, T.data(), &size, pivots.data(), E.data(), &size, &info);
-      if (info != 0) std::ranges::fill(E, 0.0);  // the waves' blocks alone serve this sector
+      if (lapack::solve(T, size, E, size))
+        std::ranges::fill(E, 0.0);  // the waves' blocks alone serve this sector
       E_.push_back(std::move(E));
     }
 }

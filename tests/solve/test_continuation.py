@@ -240,7 +240,8 @@ def test_nothing_is_asked_for_beyond_the_end(comm):
         branch, points = follow(problem, start=start, stop=(0.1, 1.0), upwards=upwards, initial=0.3)
         assert branch.converged and points[-1].parameter == pytest.approx(1.0 if upwards else 0.1, rel=LAST_DIGITS)
         assert points[-1].event == "stop" and points[-1].newton > 1
-        assert max(asked, default=1.0) < 1.05 and min((u for u in asked if u > 0), default=0.1) > 0.095
+        if comm.rank == 0:  # the only dof's
+            assert max(asked) < 1.05 and min(u for u in asked if u > 0) > 0.095
 
 
 def test_linear_problem_takes_one_newton_iteration(two_dof, comm):

@@ -117,8 +117,8 @@ def test_how_roughly_newton_steps_are_solved_for_does_not_shape_the_branch(comm)
 
 
 @pytest.mark.ranks(1)
-def test_linear_solves_end_at_the_rounding_of_the_residual(comm, tmp_path):
-    """Stiff elements round it to 1e-6. Digits below that are none, and took up to a hundred iterations a tangent."""
+def test_tangents_end_at_the_rounding_of_the_residual(comm, tmp_path):
+    """Stiff elements round it to 1e-6, here; solved for below that, a tangent took up to a hundred iterations."""
     masses, reasons = 100, tmp_path / "reasons"
     springs = chain(masses, 1e12, 1e3) - np.diag([1e12, *np.zeros(masses - 2), 1e12])
     contact = fw.Contact("jenkins", np.eye(1, masses), {"tangential_stiffness": 1e4, "friction_limit": LIMIT})

@@ -115,10 +115,10 @@ def compass(axes: Axes, camera: Camera, place: tuple[float, float] = (0.1, 0.1),
         start = np.array(place)
         stroke = {"arrowstyle": "-", "color": EDGE, "linewidth": 1.0, "shrinkA": 0, "shrinkB": 0}
         axes.annotate("", start + 0.07 * end, start, xycoords="axes fraction", arrowprops=stroke)
-        where = start + (0.08 if len(letter) > 1 else 0.1) * end
-        side = "left" if end[0] > ASIDE else "right" if end[0] < -ASIDE else "center"
-        look = {"fontsize": 9, "ha": side if len(letter) > 1 else "center", "va": "center"}
-        axes.text(*where, letter, transform=axes.transAxes, **look)
+        long = len(letter) > 1  # a word stands beside the end, a letter about its extension
+        side = "left" if long and end[0] > ASIDE else "right" if long and end[0] < -ASIDE else "center"
+        where = start + (0.08 if long else 0.1) * end
+        axes.text(*where, letter, transform=axes.transAxes, fontsize=9, ha=side, va="center")
 
 
 def ruler(axes: Axes, factor: float, unit: str, place: float = 0.0) -> None:
