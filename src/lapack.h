@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <array>
 #include <complex>
+#include <type_traits>
 #include <vector>
 
 /// The BLAS and LAPACK routines in use, and the inverse made of two of them.
@@ -17,6 +18,12 @@ void sgemv_(char const*, int const*, int const*, float const*, float const*, int
 void cgemv_(char const*, int const*, int const*, std::complex<float> const*, std::complex<float> const*,
             int const*, std::complex<float> const*, int const*, std::complex<float> const*,
             std::complex<float>*, int const*);
+void cgemm_(char const*, char const*, int const*, int const*, int const*, std::complex<float> const*,
+            std::complex<float> const*, int const*, std::complex<float> const*, int const*,
+            std::complex<float> const*, std::complex<float>*, int const*);
+void zgemm_(char const*, char const*, int const*, int const*, int const*, std::complex<double> const*,
+            std::complex<double> const*, int const*, std::complex<double> const*, int const*,
+            std::complex<double> const*, std::complex<double>*, int const*);
 void dgesv_(int const*, int const*, double*, int const*, int*, double*, int const*, int*);
 void sgesv_(int const*, int const*, float*, int const*, int*, float*, int const*, int*);
 void zgesv_(int const*, int const*, std::complex<double>*, int const*, int*, std::complex<double>*,
@@ -30,6 +37,9 @@ void dgetrs_(char const*, int const*, int const*, double const*, int const*, int
 void dgetri_(int const*, double*, int const*, int const*, double*, int const*, int*);
 void dsygvd_(int const*, char const*, char const*, int const*, double*, int const*, double*, int const*,
              double*, double*, int const*, int*, int const*, int*);
+void zhegvd_(int const*, char const*, char const*, int const*, std::complex<double>*, int const*,
+             std::complex<double>*, int const*, double*, std::complex<double>*, int const*, double*,
+             int const*, int*, int const*, int*);
 void dpstrf_(char const*, int const*, double*, int const*, int*, int*, double const*, double*, int*);
 void dtrsm_(char const*, char const*, char const*, char const*, int const*, int const*, double const*,
             double const*, int const*, double*, int const*);
@@ -91,20 +101,37 @@ struct Dense {
   int lead;
 };
 
-/// C (m x n) = beta C + alpha op(A) op(B), over k; size = {m, n, k}, each may be zero.
-inline void multiply(char const* ops, std::array<int, 3> size, float alpha, Dense<float> A, Dense<float> B,
-                     float beta, float* C, int lead) {
-  if (size[0] == 0 || size[1] == 0) return;
-  A.lead = std::max(A.lead, 1), B.lead = std::max(B.lead, 1);
+inline void gemm(char const* ops, std::array<int, 3> const& size, float alpha, Dense<float> A, Dense<float> B,
+                 float beta, float* C, int lead) {
   sgemm_(ops, ops + 1, &size[0], &size[1], &size[2], &alpha, A.data, &A.lead, B.data, &B.lead, &beta, C,
          &lead);
 }
-inline void multiply(char const* ops, std::array<int, 3> size, double alpha, Dense<double> A, Dense<double> B,
-                     double beta, double* C, int lead) {
-  if (size[0] == 0 || size[1] == 0) return;
-  A.lead = std::max(A.lead, 1), B.lead = std::max(B.lead, 1);
+inline void gemm(char const* ops, std::array<int, 3> const& size, double alpha, Dense<double> A,
+                 Dense<double> B, double beta, double* C, int lead) {
   dgemm_(ops, ops + 1, &size[0], &size[1], &size[2], &alpha, A.data, &A.lead, B.data, &B.lead, &beta, C,
          &lead);
+}
+inline void gemm(char const* ops, std::array<int, 3> const& size, std::complex<float> alpha,
+                 Dense<std::complex<float>> A, Dense<std::complex<float>> B, std::complex<float> beta,
+                 std::complex<float>* C, int lead) {
+  cgemm_(ops, ops + 1, &size[0], &size[1], &size[2], &alpha, A.data, &A.lead, B.data, &B.lead, &beta, C,
+         &lead);
+}
+inline void gemm(char const* ops, std::array<int, 3> const& size, std::complex<double> alpha,
+                 Dense<std::complex<double>> A, Dense<std::complex<double>> B, std::complex<double> beta,
+                 std::complex<double>* C, int lead) {
+  zgemm_(ops, ops + 1, &size[0], &size[1], &size[2], &alpha, A.data, &A.lead, B.data, &B.lead, &beta, C,
+         &lead);
+}
+
+/// C (m x n) = beta C + alpha op(A) op(B), over k; size = {m, n, k}, each may be zero.
+template <class T>
+void multiply(char const* ops, std::array<int, 3> size, std::type_identity_t<T> alpha,
+              std::type_identity_t<Dense<T>> A, std::type_identity_t<Dense<T>> B,
+              std::type_identity_t<T> beta, T* C, int lead) {
+  if (size[0] == 0 || size[1] == 0) return;
+  A.lead = std::max(A.lead, 1), B.lead = std::max(B.lead, 1);
+  gemm(ops, size, alpha, A, B, beta, C, lead);
 }
 
 /// Rows to which a flat matrix is filled up for a product: of 1200 x 1200 floats one with 15 rows takes

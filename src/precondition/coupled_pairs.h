@@ -1,10 +1,10 @@
 #pragma once
 #include <functional>
+#include <optional>
 #include <vector>
 
-#include "petsc.h"
+#include "precondition/contact_gmres.h"
 #include "precondition/pair_correction.h"
-#include "solve/guard.h"
 
 namespace fretwave::precondition {
 
@@ -29,7 +29,6 @@ class CoupledPairs {
   std::vector<double> forces(std::vector<double> const& b);
 
  private:
-  static PetscErrorCode shell_product(Mat, Vec f, Vec out);
   void product(Vec f, Vec out) const;
   void multiply_pairs(std::vector<double> const& b, double* f) const;
 
@@ -37,10 +36,7 @@ class CoupledPairs {
   PetscInt begin_ = 0, size_ = 0;
   std::vector<PairCorrection const*> own_;
   Between between_;
-  MatHandle A_;
-  KspHandle ksp_;
-  VecHandle right_, f_;
-  solve::Guard guard_;
+  std::optional<ContactGmres> gmres_;
 };
 
 }  // namespace fretwave::precondition

@@ -19,8 +19,8 @@ SectorTransform::SectorTransform(int local_sectors, int harmonics, int items, MP
   const int n = sectors(), half = n / 2 + 1;
   for (int r = 0; r < size_; ++r) {
     waves_.emplace_back();
-    for (int b = r; b < harmonics * half; b += size_) {
-      const int harmonic = b / half, d = b % half;
+    for (int b = share(harmonics * half, r, size_); b < share(harmonics * half, r + 1, size_); ++b) {
+      const int harmonic = b % harmonics, d = b / harmonics;
       waves_.back().push_back({harmonic, d});
       if (d != (n - d) % n) waves_.back().push_back({harmonic, n - d});
     }

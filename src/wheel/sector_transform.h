@@ -19,7 +19,7 @@ struct Wave {
 inline int share(int total, int part, int parts) { return int(PetscInt64(total) * part / parts); }
 
 /// Discrete Fourier transform over the sectors of a wheel whose ranks hold whole sectors, into waves of which
-/// each rank holds its share, d beside N - d, of every harmonic (the fundamental's cost more). Two exchanges,
+/// each rank holds its share, all harmonics of a diameter side by side and d beside N - d. Two exchanges,
 /// between any number of ranks: sectors to columns (harmonic and item), whose transforms are local, and
 /// columns to waves.
 class SectorTransform {

@@ -82,6 +82,21 @@ void WheelContact::find_entries(HarmonicProblem const& problem) {
   for (auto const& [at, value] : sum) entries_.push_back({at[0], at[1], at[2], value});
 }
 
+std::vector<double> WheelContact::stuck_stiffness(model::Model const& model) const {
+  std::vector<double> k(rows_, 0.0);
+  for (size_t g = 0; g < numbers_.size(); ++g) {
+    const int in_sector = int(first_pair_[g + 1] - first_pair_[g]);
+    for (size_t p = 0; p < numbers_[g].size(); ++p) {
+      Pair const& pair = pairs_[first_pair_[g] + numbers_[g][p] % in_sector];
+      for (int c = 0; c < pair.components; ++c)
+        k[pair.first_row + c] +=
+            model.contacts()[g].law->stuck_stiffness(c, int(p)) / double(sectors_.sectors());
+    }
+  }
+  sum_over_ranks(k, comm_);
+  return k;
+}
+
 void WheelContact::find_groups() {
   const int m = harmonics_.block_size();
   for (size_t p = 0; p < pairs_.size(); ++p) {
@@ -199,34 +214,37 @@ void WheelContact::eliminate(std::vector<complex> const& G) {
       // column-major sight of row-major E T = dD is T^T E^T = dD^T
       if (lapack::solve(T, size, E, size))
         std::ranges::fill(E, 0.0);  // the waves' blocks alone serve this sector
-      E_.push_back(std::move(E));
+      E_.emplace_back(E.begin(), E.end());
     }
 }
 
-std::vector<complex> WheelContact::apply(std::vector<complex> const& u) const {
-  const int m = harmonics_.block_size(), step = 1;
-  const double one = 1, zero = 0;
+std::vector<complex> WheelContact::apply(std::vector<complex> const& u, int columns) const {
+  const int m = harmonics_.block_size(), H = harmonics_.count(), step = 1;
+  const float one = 1, zero = 0;
+  const size_t stride = size_t(own_sectors_) * H * rows_;
   std::vector<complex> f(u.size());
-  std::vector<double> in, out;
+  std::vector<float> in, out;
   for (size_t k = 0; k < E_.size(); ++k) {
     Group const& group = groups_[k % groups_.size()];
     const int size = group.rows * m;
-    in.assign(size, 0.0), out.resize(size);
-    const auto at = [&](int r, int i) {
-      return ((k / groups_.size()) * harmonics_.count() + i) * rows_ + group.first_row + r;
+    in.assign(size_t(columns) * size, 0.0), out.resize(in.size());
+    const auto for_entries = [&](auto visit) {
+      for (int column = 0; column < columns; ++column)
+        for (int r = 0; r < group.rows; ++r)
+          for (int i = 0; i < H; ++i)
+            visit(column * stride + ((k / groups_.size()) * H + i) * rows_ + group.first_row + r,
+                  size_t(column) * size + r * m + harmonics_.offset(i), harmonics_.orders()[i] != 0);
     };
-    for (int r = 0; r < group.rows; ++r)
-      for (int i = 0; i < harmonics_.count(); ++i) {
-        double* q = &in[r * m + harmonics_.offset(i)];
-        q[0] = u[at(r, i)].real();
-        if (harmonics_.orders()[i]) q[1] = -u[at(r, i)].imag();
-      }
-    dgemv_("T", &size, &size, &one, E_[k].data(), &size, in.data(), &step, &zero, out.data(), &step);
-    for (int r = 0; r < group.rows; ++r)
-      for (int i = 0; i < harmonics_.count(); ++i) {
-        double const* q = &out[r * m + harmonics_.offset(i)];
-        f[at(r, i)] = {q[0], harmonics_.orders()[i] ? -q[1] : 0.0};
-      }
+    for_entries([&](size_t at, size_t q, bool moves) {
+      in[q] = float(u[at].real());
+      if (moves) in[q + 1] = -float(u[at].imag());
+    });
+    if (columns == 1)
+      sgemv_("T", &size, &size, &one, E_[k].data(), &size, in.data(), &step, &zero, out.data(), &step);
+    else
+      lapack::multiply("TN", {size, columns, size}, one, {E_[k].data(), size}, {in.data(), size}, zero,
+                       out.data(), size);
+    for_entries([&](size_t at, size_t q, bool moves) { f[at] = {out[q], moves ? -out[q + 1] : 0.0}; });
   }
   return f;
 }

@@ -26,6 +26,8 @@ class WheelContact {
   int rows() const { return rows_; }
   /// B, mean over the sectors.
   std::vector<Entry> const& entries() const { return entries_; }
+  /// Stiffness of the rows where all pairs stick, mean over the sectors. Collective.
+  std::vector<double> stuck_stiffness(model::Model const&) const;
   /// The tangents of this rank's pairs over k_ref, each to the rank of its sector. Collective.
   void take(std::vector<PairTangents> const&);
   /// t: mean over the sectors of each pair's couplings of a harmonic with itself, as complex factors; made
@@ -41,8 +43,8 @@ class WheelContact {
   }
   /// E = dD (I + G dD)^-1 for the compliance G of a sector's rows, harmonics x rows x rows, row-major.
   void eliminate(std::vector<complex> const& G);
-  /// f = E u; own sectors x harmonics x rows.
-  std::vector<complex> apply(std::vector<complex> const& u) const;
+  /// f = E u; columns x own sectors x harmonics x rows.
+  std::vector<complex> apply(std::vector<complex> const& u, int columns = 1) const;
   /// Pairs that are eliminated together.
   std::vector<Group> const& groups() const { return groups_; }
   /// dD of a group in one of this rank's sectors, row-major.
@@ -74,7 +76,7 @@ class WheelContact {
   std::vector<Entry> entries_;
   std::vector<complex> tangents_;
   std::vector<std::vector<double>> D_;  ///< own sectors x pairs, row-major
-  std::vector<std::vector<double>> E_;  ///< own sectors x groups, row-major
+  std::vector<std::vector<float>> E_;   ///< own sectors x groups, row-major; reading them is an application
 };
 
 }  // namespace fretwave::wheel

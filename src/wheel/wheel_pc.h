@@ -3,8 +3,8 @@
 
 #include "precondition/border.h"
 #include "solve/preconditioner.h"
-#include "wheel/cyclic_inverse.h"
 #include "wheel/travelling_contact.h"
+#include "wheel/wave_blocks.h"
 
 namespace fretwave::wheel {
 
@@ -34,36 +34,22 @@ class WheelPreconditioner : public solve::Preconditioner {
   std::string describe() const override;
 
  private:
-  using Blocks = CirculantBlocks<double>;
-  Blocks average(Mat A) const;
-  bool symmetric() const;
-  void find_order();
-  bool moved(Exponents const&) const;
-  void factorise(Exponents const&, std::vector<double> const& shares);
-  CirculantBlocks<complex> blocks(int harmonic, Exponents const&) const;
+  void choose_blocks(Exponents const&);
   std::vector<double> spectrum(Vec y) const;
-  std::vector<complex> compliances() const;
-  std::vector<complex> met(std::vector<double> const& shares) const;
-  void eliminate(std::vector<double> const& shares);
+  std::vector<complex> of_one_sector() const;
+  void eliminate_in_waves(int wave);
+  void eliminate_by_sector();
   void make_border(Vec y, Vec row);
   std::vector<double> solve(double const* x) const;
   std::vector<complex> gather(double const* x) const;
-  /// B of a wave, contact rows x contact dofs, row-major.
-  std::vector<complex> rows_of(int diameter) const;
 
   HarmonicProblem& problem_;
-  int unit_, sectors_, m_, harmonics_, local_sectors_, contact_dofs_ = 0;
+  int unit_, sectors_, m_, harmonics_, local_sectors_;
   SectorTransform dofs_;
   WheelContact contact_;
-  std::optional<SectorTransform> rows_;
-  std::vector<int> order_;     ///< a sector's dof by its place in the blocks, those in contact first
-  std::vector<int> position_;  ///< its inverse
-  std::vector<Blocks> terms_;
-  std::vector<std::vector<complex>> B_;  ///< of own waves
-  std::optional<CyclicInverse> inverse_;
-  std::optional<Exponents> made_at_;
-  double made_in_ = 0;      ///< stiffness that force rows were measured in
-  std::vector<complex> G_;  ///< B A^-1 B^H, own waves x contact rows x contact rows
+  MeanSector mean_;
+  SectorTransform rows_;
+  std::unique_ptr<WaveBlocks> blocks_;  ///< from the first point on
   std::optional<TravellingContact> travelling_;
   Border border_;
 };

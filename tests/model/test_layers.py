@@ -19,7 +19,7 @@ ROOMS = {
     "transient": {"model"},
     "hb": {"contact", "model", "solve"},
     "precondition": {"hb", "model", "solve"},
-    "wheel": {"hb", "precondition", "solve"},
+    "wheel": {"hb", "model", "precondition", "solve"},
 }
 
 IMPORT = """

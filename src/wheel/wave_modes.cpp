@@ -1,0 +1,208 @@
+#include "wheel/wave_modes.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "error.h"
+#include "fault.h"
+#include "lapack.h"
+#include "log.h"
+#include "model/stuck_basis.h"
+#include "together.h"
+#include "tuned.h"
+
+namespace fretwave::wheel {
+
+namespace {
+
+using lapack::multiply;
+
+const Tuned damped_together(
+    "wheel_damped_together", 0.1,
+    "damping between a wave's modes over their stiffness, up to which they serve as a basis");
+
+/// M := U of M x = theta K x, U^H K U = 1; false if K is not positive definite.
+bool solve_pencil(std::vector<complex> K, std::vector<complex>& M, std::vector<double>& theta) {
+  const int n = int(theta.size()), type = 1, ask = -1;
+  complex size;
+  double reals;
+  int ints, info;
+  zhegvd_(&type, "V", "U", &n, M.data(), &n, K.data(), &n, theta.data(), &size, &ask, &reals, &ask, &ints,
+          &ask, &info);
+  std::vector<complex> work(static_cast<size_t>(size.real()));
+  std::vector<double> real_work(static_cast<size_t>(reals));
+  std::vector<int> places(ints);
+  const int room = int(work.size()), real_room = int(real_work.size());
+  zhegvd_(&type, "V", "U", &n, M.data(), &n, K.data(), &n, theta.data(), work.data(), &room, real_work.data(),
+          &real_room, places.data(), &ints, &info);
+  for (double& value : theta) value = std::max(value, 0.0);  // motions without mass
+  return info == 0;
+}
+
+}  // namespace
+
+WaveModes::WaveModes(HarmonicProblem& problem, MeanSector const& mean, WheelContact& contact,
+                     std::vector<Wave> const& waves)
+    : problem_(problem),
+      mean_(mean),
+      contact_(contact),
+      waves_(waves),
+      n_(mean.dofs()),
+      rows_(contact.rows()),
+      stuck_(contact.stuck_stiffness(problem.model())),
+      of_wave_(waves.size()) {
+  for (size_t w = 0; w < waves_.size(); ++w) {
+    const int d = std::min(waves_[w].diameter, mean_.sectors() - waves_[w].diameter);
+    auto at = std::ranges::find(diameters_, d, &Diameter::d);
+    if (at == diameters_.end()) at = diameters_.insert(at, Diameter{d, {}, {}, {}, {}, {}});
+    at->waves.push_back(w);
+    diameter_of_.push_back(size_t(at - diameters_.begin()));
+  }
+}
+
+std::unique_ptr<WaveModes> WaveModes::of(HarmonicProblem& problem, MeanSector const& mean,
+                                         std::vector<CirculantBlocks<double>> const& terms,
+                                         WheelContact& contact, std::vector<Wave> const& waves,
+                                         double highest) {
+  static const log::Event making("FwWaveModes");
+  const log::Span span(making);
+  std::unique_ptr<WaveModes> out(new WaveModes(problem, mean, contact, waves));
+  int fit = std::ranges::all_of(terms, [&](auto const& term) { return mean.symmetric(term); }) &&
+            std::ranges::all_of(out->stuck_, [](double k) { return std::isfinite(k); });
+  for (const int order : {0, 2})
+    fit = fit && std::ranges::any_of(problem.model().terms(), [&](auto& t) { return t.order == order; });
+  together(problem.comm(), "finding the waves' modes", [&] {
+    for (Diameter& of_d : out->diameters_) {
+      std::vector<std::vector<complex>> sums(3);
+      for (size_t j = 0; fit && j < terms.size(); ++j) {
+        const auto P = mean.of_wave(terms[j], of_d.d);
+        auto& sum = sums[problem.model().terms()[j].order];
+        sum.resize(P.size());
+        for (size_t i = 0; i < P.size(); ++i) sum[i] += P[i];
+      }
+      fit = fit && out->find(of_d, std::move(sums), highest);
+    }
+  });
+  MPI_Allreduce(MPI_IN_PLACE, &fit, 1, MPI_INT, MPI_LAND, problem.comm());
+  return fit ? std::move(out) : nullptr;
+}
+
+/// Modes of a diameter from the sums of its terms by order; false if they are no basis.
+bool WaveModes::find(Diameter& of_d, std::vector<std::vector<complex>> sums, double highest) const {
+  const int n = n_, k = mean_.contact_dofs(), R = rows_;
+  const auto B = mean_.rows_of(of_d.d, contact_);
+  auto &K = sums[0], &U = sums[2];
+  for (int j = 0; j < k; ++j)
+    for (int i = 0; i < k; ++i)
+      for (int r = 0; r < R; ++r)
+        K[size_t(j) * n + i] += std::conj(B[size_t(r) * k + i]) * stuck_[r] * B[size_t(r) * k + j];
+  of_d.theta.resize(n);
+  if (!solve_pencil(std::move(K), U, of_d.theta)) return false;
+  of_d.Phi.resize(size_t(R) * n);  // B is k x R, column-major
+  multiply("TN", {R, n, k}, 1.0, {B.data(), k}, {U.data(), n}, 0.0, of_d.Phi.data(), R);
+  std::vector<double> motions;
+  for (complex const& a : of_d.Phi) motions.push_back(std::abs(a));
+  if (R > 0 && model::too_stiff(motions, stuck_)) return false;
+  of_d.U.assign(U.begin(), U.end());
+  return set_damping(of_d, U, sums[1], highest);
+}
+
+/// False where modes damp each other.
+bool WaveModes::set_damping(Diameter& of_d, std::vector<complex> const& U, std::vector<complex> const& C,
+                            double highest) const {
+  const int n = n_;
+  of_d.damping.assign(n, 0.0);
+  if (C.empty()) return true;
+  std::vector<complex> CU(C.size()), UCU(C.size());
+  multiply("NN", {n, n, n}, 1.0, {C.data(), n}, {U.data(), n}, 0.0, CU.data(), n);
+  multiply("CN", {n, n, n}, 1.0, {U.data(), n}, {CU.data(), n}, 0.0, UCU.data(), n);
+  double most = 0;
+  for (int j = 0; j < n; ++j) {
+    double apart = 0;
+    for (int i = 0; i < n; ++i) apart += i == j ? 0 : std::norm(UCU[size_t(j) * n + i]);
+    most = std::max(most, std::sqrt(apart));
+    of_d.damping[j] = UCU[size_t(j) * n + j].real();
+  }
+  return highest * most <= damped_together;
+}
+
+/// Of stiffness, damping and inertia, over the stiffness that force rows are measured in.
+std::vector<complex> WaveModes::coefficients(Exponents const& e, int harmonic) const {
+  std::vector<complex> c(3);
+  for (auto const& term : problem_.model().terms())
+    c[term.order] = problem_.terms().stiffness().coefficients(term, e)[harmonic] / problem_.stiffness_scale();
+  return c;
+}
+
+/// z, Z, G and X of a wave.
+void WaveModes::set(Diameter const& of_d, size_t wave, Exponents const& e) {
+  const int n = n_, R = rows_;
+  OfWave& of_wave = of_wave_[wave];
+  auto &z = of_wave.z, &Z = of_wave.Z;
+  const auto c = coefficients(e, waves_[wave].harmonic);
+  z.resize(n), Z.resize(n);
+  for (int l = 0; l < n; ++l) {
+    z[l] = turned(wave, c[0]) + turned(wave, c[1]) * of_d.damping[l] + turned(wave, c[2]) * of_d.theta[l];
+    Z[l] = 1.0 / z[l];
+  }
+  if (apart_)
+    for (const int l : of_wave.family) Z[l] = 0;
+  std::vector<complex> PhiZ(of_d.Phi), G(size_t(R) * R), X(G), A(G), GX(G), XG(G);
+  for (int l = 0; l < n; ++l)
+    for (int r = 0; r < R; ++r) PhiZ[size_t(l) * R + r] *= Z[l];
+  multiply("NC", {R, R, n}, 1.0, {PhiZ.data(), R}, {of_d.Phi.data(), R}, 0.0, G.data(), R);
+  contact_.for_tangents(waves_[wave].harmonic, [&](int r, int c, complex t) {
+    X[size_t(c) * R + r] += turned(wave, t) - (r == c ? stuck_[r] / problem_.stiffness_scale() : 0.0);
+  });
+  multiply("NN", {R, R, R}, 1.0, {X.data(), R}, {G.data(), R}, 0.0, A.data(), R);
+  for (int r = 0; r < R; ++r) A[size_t(r) * R + r] += 1;
+  fault::point("wave block");
+  const bool regular = std::ranges::all_of(Z, [](complex a) { return std::isfinite(std::abs(a)); });
+  if (!regular || (R > 0 && lapack::solve(A, R, X, R)) || fault::value("wave block"))
+    throw SingularBlock("the block of nodal diameter " + std::to_string(waves_[wave].diameter) +
+                        " of the wheel's preconditioner is singular: a free motion at this harmonic");
+  multiply("NN", {R, R, R}, -1.0, {G.data(), R}, {X.data(), R}, 0.0, GX.data(), R);
+  multiply("NN", {R, R, R}, -1.0, {X.data(), R}, {G.data(), R}, 0.0, XG.data(), R);
+  A = G;
+  multiply("NN", {R, R, R}, 1.0, {GX.data(), R}, {G.data(), R}, 1.0, A.data(), R);
+  for (int r = 0; r < R; ++r) GX[size_t(r) * R + r] += 1, XG[size_t(r) * R + r] += 1;
+  of_wave.X.assign(X.begin(), X.end());
+  of_wave.motion.assign(GX.begin(), GX.end()), of_wave.force.assign(XG.begin(), XG.end());
+  complex* out = &compliances_[wave * R * R];
+  for (int r = 0; r < R; ++r)
+    for (int c = 0; c < R; ++c) out[size_t(r) * R + c] = turned(wave, A[size_t(c) * R + r]);
+}
+
+void WaveModes::make(Point const& point) {
+  static const log::Event making("FwWaveBlocks");
+  const log::Span span(making);
+  const int first = problem_.harmonics().fundamental(), N = mean_.sectors();
+  beside_ = beside(point.exponents, first);
+  contact_.average(true);
+  compliances_.resize(waves_.size() * rows_ * rows_);
+  apart_ = !point.travelling;
+  if (apart_) find_family(point.exponents);
+  together(problem_.comm(), "making the waves' blocks", [&] {
+    for (Diameter const& of_d : diameters_)
+      for (const size_t w : of_d.waves) {
+        const bool moves =
+            waves_[w].harmonic == first && (point.moving[of_d.d] || point.moving[(N - of_d.d) % N]);
+        set(of_d, w, moves ? beside_ : point.exponents);
+      }
+  });
+}
+
+/// 8 n R^2 for G of a wave, 8 R^3 each for three products and 8/3 more and 8 for X.
+double WaveModes::flops() const {
+  const double n = n_, R = rows_;
+  return double(waves_.size()) * (8 * n * R * R + 35 * R * R * R);
+}
+
+double WaveModes::megabytes() const {
+  const double n = n_, R = rows_;
+  return (double(diameters_.size()) * n * (n * sizeof(scomplex) + R * sizeof(complex)) +
+          double(waves_.size()) * (n + 3 * R * R) * sizeof(complex)) /
+         1e6;
+}
+
+}  // namespace fretwave::wheel
