@@ -75,6 +75,23 @@ NB_MODULE(_core, m) {
         return out;
       },
       "Option, value without it and meaning of each tuned constant of the core.");
+  m.def(
+      "exchange",
+      [](MPI_Fint comm, std::vector<std::vector<double>> const& to, size_t arriving) {
+        std::vector<double> out, in(arriving);
+        std::vector<int> sent;
+        for (auto const& numbers : to) {
+          out.insert(out.end(), numbers.begin(), numbers.end());
+          sent.push_back(int(numbers.size()));
+        }
+        wheel::TwoStageExchange{MPI_Comm_f2c(comm)}(out, sent, in);
+        return in;
+      },
+      nb::arg("comm"), nb::arg("to"), nb::arg("arriving"),
+      "What each rank has for each, as the parts of a wheel exchange it: numbers for each rank of a "
+      "communicator (mpi4py's `py2f`); returns the "
+      "`arriving` "
+      "numbers for this one, by rank. Collective.");
   m.def("unused_options", unused_options, "PETSc options that were set and that nothing has read.");
   bind_contact(m);
   bind_model(m);

@@ -6,16 +6,17 @@
 namespace fretwave::wheel {
 
 SectorTransform::SectorTransform(int local_sectors, int harmonics, int items, MPI_Comm comm)
-    : harmonics_(harmonics), items_(items), rank_(comm_rank(comm)), size_(comm_size(comm)), comm_(comm) {
+    : harmonics_(harmonics), items_(items), rank_(comm_rank(comm)), size_(comm_size(comm)), exchange_(comm) {
   first_sector_ = gathered(std::span<int const>(&local_sectors, 1), comm);
   first_sector_.insert(first_sector_.begin(), 0);
   std::partial_sum(first_sector_.begin(), first_sector_.end(), first_sector_.begin());
 
-  // a rank never sends more than it holds
+  // a rank never sends more than it holds, as pairs of numbers, with two a rank to say whose they are
   for (int r = 0; r < size_; ++r)
-    as_int(PetscInt64(first_sector_[r + 1] - first_sector_[r]) * harmonics * items,
+    as_int(2 * (PetscInt64(first_sector_[r + 1] - first_sector_[r]) * harmonics * items + size_),
            "coefficients of a rank's sectors");
-  as_int(PetscInt64(sectors()) * (share(harmonics * items, 1, size_) + 1), "coefficients of a rank's waves");
+  as_int(2 * (PetscInt64(sectors()) * (share(harmonics * items, 1, size_) + 1) + size_),
+         "coefficients of a rank's waves");
   const int n = sectors(), half = n / 2 + 1;
   for (int r = 0; r < size_; ++r) {
     waves_.emplace_back();
@@ -50,16 +51,12 @@ void SectorTransform::for_runs(int columns_of, int waves_of, Visit visit) const 
   }
 }
 
-std::vector<complex> SectorTransform::exchange(std::vector<complex> const& out, Counts const& sent,
-                                               Counts const& received) const {
-  if (size_ == 1) return out;
-  Counts from(size_, 0), to(size_, 0);
-  std::exclusive_scan(sent.begin(), sent.end(), from.begin(), 0);
-  std::exclusive_scan(received.begin(), received.end(), to.begin(), 0);
-  std::vector<complex> in(size_t(to.back()) + received.back());
-  MPI_Alltoallv(out.data(), sent.data(), from.data(), MPI_C_DOUBLE_COMPLEX, in.data(), received.data(),
-                to.data(), MPI_C_DOUBLE_COMPLEX, comm_);
-  return in;
+void SectorTransform::exchange(std::span<complex const> out, Counts const& sent,
+                               std::span<complex> in) const {
+  Counts numbers(sent);
+  for (int& count : numbers) count *= 2;
+  exchange_({reinterpret_cast<double const*>(out.data()), 2 * out.size()}, numbers,
+            {reinterpret_cast<double*>(in.data()), 2 * in.size()});
 }
 
 /// Entries of this rank's waves by the rank of their columns, or of its columns by the rank of their waves.
@@ -72,7 +69,7 @@ SectorTransform::Counts SectorTransform::by_rank(bool waves) const {
 }
 
 std::vector<complex> SectorTransform::to_waves(std::span<complex const> in) const {
-  Counts sent(size_), received(size_);
+  Counts sent(size_);
   std::vector<complex> out;
   out.reserve(in.size());
   for (int r = 0; r < size_; ++r) {
@@ -80,9 +77,9 @@ std::vector<complex> SectorTransform::to_waves(std::span<complex const> in) cons
       const auto* from = in.data() + size_t(j) * harmonics_ * items_ + first_column(r);
       out.insert(out.end(), from, from + width(r));
     }
-    sent[r] = local_sectors(rank_) * width(r), received[r] = local_sectors(r) * width(rank_);
+    sent[r] = local_sectors(rank_) * width(r);
   }
-  std::ranges::copy(exchange(out, sent, received), columns_.begin());
+  exchange(out, sent, columns_);
   auto* data = reinterpret_cast<fftw_complex*>(columns_.data());
   if (forward_) fftw_execute_dft(forward_.get(), data, data);
 
@@ -92,8 +89,8 @@ std::vector<complex> SectorTransform::to_waves(std::span<complex const> in) cons
       const auto* from = &columns_[size_t(wave.diameter) * width(rank_) + begin - first_column(rank_)];
       out.insert(out.end(), from, from + columns);
     });
-  const auto mine = exchange(out, by_rank(false), by_rank(true));
-  std::vector<complex> all(waves().size() * items_);
+  std::vector<complex> all(waves().size() * items_), mine(all.size());
+  exchange(out, by_rank(false), mine);
   auto next = mine.begin();
   for (int r = 0; r < size_; ++r)
     for_runs(r, rank_, [&](size_t w, Wave const& wave, int begin, int columns) {
@@ -111,7 +108,8 @@ std::vector<complex> SectorTransform::to_sectors(std::span<complex const> in) co
       const auto* from = in.data() + w * items_ + begin - wave.harmonic * items_;
       out.insert(out.end(), from, from + columns);
     });
-  const auto mine = exchange(out, by_rank(true), by_rank(false));
+  std::vector<complex> mine(columns_.size());
+  exchange(out, by_rank(true), mine);
   auto next = mine.begin();
   for (int r = 0; r < size_; ++r)
     for_runs(rank_, r, [&](size_t, Wave const& wave, int begin, int columns) {
@@ -122,14 +120,13 @@ std::vector<complex> SectorTransform::to_sectors(std::span<complex const> in) co
   auto* data = reinterpret_cast<fftw_complex*>(columns_.data());
   if (backward_) fftw_execute_dft(backward_.get(), data, data);
 
-  Counts sent(size_), received(size_);
+  Counts sent(size_);
   out.clear();
   const double scale = 1.0 / sectors();
   for (complex const& c : columns_) out.emplace_back(scale * c);
-  for (int r = 0; r < size_; ++r)
-    sent[r] = local_sectors(r) * width(rank_), received[r] = local_sectors(rank_) * width(r);
-  const auto got = exchange(out, sent, received);
-  std::vector<complex> all(size_t(local_sectors(rank_)) * harmonics_ * items_);
+  for (int r = 0; r < size_; ++r) sent[r] = local_sectors(r) * width(rank_);
+  std::vector<complex> all(size_t(local_sectors(rank_)) * harmonics_ * items_), got(all.size());
+  exchange(out, sent, got);
   next = got.begin();
   for (int r = 0; r < size_; ++r)
     for (int j = 0; j < local_sectors(rank_); ++j, next += width(r))

@@ -5,6 +5,7 @@
 
 #include "hb/harmonics.h"
 #include "petsc.h"
+#include "wheel/two_stage_exchange.h"
 
 namespace fretwave::wheel {
 
@@ -41,20 +42,19 @@ class SectorTransform {
     void operator()(fftw_plan p) const { fftw_destroy_plan(p); }
   };
   using Plan = std::unique_ptr<std::remove_pointer_t<fftw_plan>, FreePlan>;
-  /// Numbers of entries that go to or come from each rank.
+  /// Numbers of entries that go to each rank.
   using Counts = std::vector<int>;
   int first_column(int rank) const { return share(harmonics_ * items_, rank, size_); }
   int width(int rank) const { return first_column(rank + 1) - first_column(rank); }
   int local_sectors(int rank) const { return first_sector_[rank + 1] - first_sector_[rank]; }
   std::pair<int, int> common(int columns_of, int harmonic) const;
-  std::vector<complex> exchange(std::vector<complex> const& out, Counts const& sent,
-                                Counts const& received) const;
+  void exchange(std::span<complex const> out, Counts const& sent, std::span<complex> in) const;
   template <class Visit>
   void for_runs(int columns_of, int waves_of, Visit visit) const;
   Counts by_rank(bool waves) const;
 
   int harmonics_, items_, rank_, size_;
-  MPI_Comm comm_;
+  TwoStageExchange exchange_;
   std::vector<int> first_sector_;         ///< by rank, and the total
   std::vector<std::vector<Wave>> waves_;  ///< by rank
   mutable std::vector<complex> columns_;  ///< sectors x own columns

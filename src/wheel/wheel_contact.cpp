@@ -12,35 +12,10 @@ namespace {
 
 constexpr int most_together = 1500;  // coefficients: 9 MB a sector, LAPACK's elimination in 0.2 s
 
-/// Each rank's numbers for each rank; what the others have for this one, one after the other. Collective.
-std::vector<double> exchanged(std::vector<std::vector<double>> const& out, MPI_Comm comm) {
-  const size_t size = out.size();
-  std::vector<int> sent(size), received(size), from(size, 0), to(size, 0);
-  std::vector<double> all;
-  PetscInt64 most = 0;
-  for (size_t r = 0; r < size; ++r) most += PetscInt64(out[r].size());
-  MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPIU_INT64, MPI_MAX, comm);
-  as_int(most, "numbers of a rank's contact pairs");
-  for (size_t r = 0; r < size; ++r) {
-    sent[r] = int(out[r].size());
-    all.insert(all.end(), out[r].begin(), out[r].end());
-  }
-  MPI_Alltoall(sent.data(), 1, MPI_INT, received.data(), 1, MPI_INT, comm);
-  most = std::accumulate(received.begin(), received.end(), PetscInt64(0));
-  MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPIU_INT64, MPI_MAX, comm);
-  as_int(most, "numbers of a rank's contact pairs");
-  std::exclusive_scan(sent.begin(), sent.end(), from.begin(), 0);
-  std::exclusive_scan(received.begin(), received.end(), to.begin(), 0);
-  std::vector<double> in(size_t(to.back()) + received.back());
-  MPI_Alltoallv(all.data(), sent.data(), from.data(), MPI_DOUBLE, in.data(), received.data(), to.data(),
-                MPI_DOUBLE, comm);
-  return in;
-}
-
 }  // namespace
 
 WheelContact::WheelContact(HarmonicProblem const& problem, SectorTransform const& sectors)
-    : harmonics_(problem.harmonics()), sectors_(sectors), comm_(problem.comm()) {
+    : harmonics_(problem.harmonics()), sectors_(sectors), comm_(problem.comm()), exchange_(comm_) {
   const int rank = comm_rank(comm_);
   own_sectors_ = sectors.first_sector(rank + 1) - sectors.first_sector(rank);
   for (auto const& contact : problem.model().contacts()) {
@@ -60,6 +35,7 @@ WheelContact::WheelContact(HarmonicProblem const& problem, SectorTransform const
   tangents_.resize(next);
   find_entries(problem);
   find_groups();
+  find_owners();
 }
 
 void WheelContact::find_entries(HarmonicProblem const& problem) {
@@ -113,25 +89,41 @@ int WheelContact::largest_group() const {
   return rows * harmonics_.block_size();
 }
 
-void WheelContact::take(std::vector<PairTangents> const& contacts) {
-  const int size = comm_size(comm_), rank = comm_rank(comm_);
-  std::vector<std::vector<double>> out(size);
-  for (size_t g = 0; g < contacts.size(); ++g) {
-    const size_t ld = size_t(contacts[g].components) * harmonics_.block_size();
-    const int in_sector = int(first_pair_[g + 1] - first_pair_[g]);
-    for (int p = 0; p < contacts[g].pairs; ++p) {
-      const int sector = numbers_[g][p] / in_sector, pair = int(first_pair_[g]) + numbers_[g][p] % in_sector;
+void WheelContact::find_owners() {
+  std::vector<PetscInt64> numbers(comm_size(comm_), 0);
+  const auto size = [&](size_t pair) {
+    const size_t ld = size_t(pairs_[pair].components) * harmonics_.block_size();
+    return 2 + ld * ld;
+  };
+  for (size_t g = 0; g < numbers_.size(); ++g)
+    for (size_t p = 0; p < numbers_[g].size(); ++p) {
+      const int in_sector = int(first_pair_[g + 1] - first_pair_[g]), sector = numbers_[g][p] / in_sector;
       int owner = 0;
       while (sectors_.first_sector(owner + 1) <= sector) ++owner;
-      out[owner].insert(out[owner].end(), {double(sector), double(pair)});
-      double const* D = &contacts[g].D[p * ld * ld];
-      out[owner].insert(out[owner].end(), D, D + ld * ld);
+      outgoing_.push_back({owner, sector, first_pair_[g] + numbers_[g][p] % in_sector, g, p});
+      numbers[owner] += PetscInt64(size(outgoing_.back().pair));
     }
+  std::ranges::stable_sort(outgoing_, {}, &Outgoing::owner);
+  for (size_t pair = 0; pair < pairs_.size(); ++pair) arriving_ += own_sectors_ * size(pair);
+
+  PetscInt64 most = std::max(PetscInt64(arriving_), std::reduce(numbers.begin(), numbers.end()));
+  MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPIU_INT64, MPI_MAX, comm_);
+  as_int(most + 2 * PetscInt64(numbers.size()), "numbers of a rank's contact pairs");
+  sent_.assign(numbers.begin(), numbers.end());
+}
+
+void WheelContact::take(std::vector<PairTangents> const& contacts) {
+  std::vector<double> out, in(arriving_);
+  for (Outgoing const& pair : outgoing_) {
+    const size_t ld = size_t(contacts[pair.contact].components) * harmonics_.block_size();
+    double const* D = &contacts[pair.contact].D[pair.place * ld * ld];
+    out.insert(out.end(), {double(pair.sector), double(pair.pair)});
+    out.insert(out.end(), D, D + ld * ld);
   }
-  const auto in = exchanged(out, comm_);
+  exchange_(out, sent_, in);
   D_.resize(own_sectors_ * pairs_.size());
   for (size_t at = 0; at < in.size();) {
-    const int sector = int(in[at]) - sectors_.first_sector(rank), pair = int(in[at + 1]);
+    const int sector = int(in[at]) - sectors_.first_sector(comm_rank(comm_)), pair = int(in[at + 1]);
     const size_t ld = size_t(pairs_[pair].components) * harmonics_.block_size();
     auto const from = in.begin() + at + 2;
     D_[sector * pairs_.size() + pair].assign(from, from + ld * ld);

@@ -57,8 +57,14 @@ class WheelContact {
     int first_row, components;
     size_t first_tangent;
   };
+  /// A pair of this rank whose tangent goes to the rank of its sector.
+  struct Outgoing {
+    int owner, sector;
+    size_t pair, contact, place;  ///< its number in a sector; its place in its contact on this rank
+  };
   void find_entries(HarmonicProblem const&);
   void find_groups();
+  void find_owners();
   complex tangent(Pair const& p, int harmonic, int r, int c) const {
     return tangents_[p.first_tangent + (size_t(harmonic) * p.components + r) * p.components + c];
   }
@@ -68,6 +74,7 @@ class WheelContact {
   Harmonics harmonics_;
   SectorTransform const& sectors_;
   MPI_Comm comm_;
+  TwoStageExchange exchange_;
   int own_sectors_, rows_ = 0;
   std::vector<size_t> first_pair_;         ///< of each contact, in one sector
   std::vector<std::vector<int>> numbers_;  ///< this rank's pairs of each contact, as the wheel counts them
@@ -75,6 +82,9 @@ class WheelContact {
   std::vector<Group> groups_;
   std::vector<Entry> entries_;
   std::vector<complex> tangents_;
+  std::vector<Outgoing> outgoing_;      ///< by owner
+  std::vector<int> sent_;               ///< numbers of them, by owner
+  size_t arriving_ = 0;                 ///< numbers of those of this rank's sectors
   std::vector<std::vector<double>> D_;  ///< own sectors x pairs, row-major
   std::vector<std::vector<float>> E_;   ///< own sectors x groups, row-major; reading them is an application
 };
