@@ -20,10 +20,13 @@ if TYPE_CHECKING:
 
 #: Amplitudes below the first one, each a hundredth of the one before, at which a mode is tried.
 SMALLER = 5
-#: Longest steps of a mode that grows: where long ones lose their way, those of any branch.
-GROWTH = (1.0, 0.3)
 #: Points of a way at the most: it turns a corner wherever a pair opens or closes.
 WAY_POINTS = 20000
+#: Steps of a mode that grows, of which only the end counts: where they lose their way, those of any branch.
+GROWTH = (
+    StepControl(initial=0.3, maximum=1.0, max_error=1e-2, max_points=WAY_POINTS),
+    StepControl(max_points=WAY_POINTS),
+)
 #: Relative distance in frequency from the linear mode beyond which a first point may be of another mode.
 FAR = 0.02
 CLOSING = "closing the gaps from where nothing touches"
@@ -126,8 +129,8 @@ def _grown(
     amplitude = problem.parameter(y0)
     for power in range(1, SMALLER + 1):
         small = amplitude / 100**power
-        for maximum in GROWTH:
-            control, span = StepControl(maximum=maximum, max_points=WAY_POINTS), (0.5 * small, amplitude)
+        span = (0.5 * small, amplitude)
+        for control in GROWTH:
             branch = follow(problem, problem.initial(small), span, control, upwards=True, helped=False)
             last, count = _last(branch, nearby=True)
             converged, reason = branch.converged, branch.reason
