@@ -66,6 +66,8 @@ class Model {
   StuckBasis const* stuck_basis() const;
   /// The lowest of them and a factor for the rest (`StuckBasis::with_factor`), likewise. Collective.
   StuckBasis const* static_basis() const;
+  /// Modes of the waves of a wheel, which know their type (`wheel::WaveBases`).
+  std::shared_ptr<void>& kept_of_waves() const { return kept_of_waves_; }
   /// All laws are odd: without preload the motion may keep odd harmonics only. Collective.
   bool odd() const;
 
@@ -73,6 +75,7 @@ class Model {
   std::vector<Term> terms_;
   std::vector<Contact> contacts_;
   mutable std::shared_ptr<StuckBasis const> stuck_basis_, static_basis_;
+  mutable std::shared_ptr<void> kept_of_waves_;
   mutable bool sought_basis_ = false, sought_static_ = false;
   MPI_Comm comm_ = MPI_COMM_NULL;
   PetscInt local_ = 0, global_ = 0, first_ = 0, unit_ = 0;

@@ -7,7 +7,6 @@
 #include "fault.h"
 #include "lapack.h"
 #include "log.h"
-#include "model/stuck_basis.h"
 #include "together.h"
 #include "tuned.h"
 
@@ -20,24 +19,6 @@ using lapack::multiply;
 const Tuned damped_together(
     "wheel_damped_together", 0.1,
     "damping between a wave's modes over their stiffness, up to which they serve as a basis");
-
-/// M := U of M x = theta K x, U^H K U = 1; false if K is not positive definite.
-bool solve_pencil(std::vector<complex> K, std::vector<complex>& M, std::vector<double>& theta) {
-  const int n = int(theta.size()), type = 1, ask = -1;
-  complex size;
-  double reals;
-  int ints, info;
-  zhegvd_(&type, "V", "U", &n, M.data(), &n, K.data(), &n, theta.data(), &size, &ask, &reals, &ask, &ints,
-          &ask, &info);
-  std::vector<complex> work(static_cast<size_t>(size.real()));
-  std::vector<double> real_work(static_cast<size_t>(reals));
-  std::vector<int> places(ints);
-  const int room = int(work.size()), real_room = int(real_work.size());
-  zhegvd_(&type, "V", "U", &n, M.data(), &n, K.data(), &n, theta.data(), work.data(), &room, real_work.data(),
-          &real_room, places.data(), &ints, &info);
-  for (double& value : theta) value = std::max(value, 0.0);  // motions without mass
-  return info == 0;
-}
 
 }  // namespace
 
@@ -54,7 +35,7 @@ WaveModes::WaveModes(HarmonicProblem& problem, MeanSector const& mean, WheelCont
   for (size_t w = 0; w < waves_.size(); ++w) {
     const int d = std::min(waves_[w].diameter, mean_.sectors() - waves_[w].diameter);
     auto at = std::ranges::find(diameters_, d, &Diameter::d);
-    if (at == diameters_.end()) at = diameters_.insert(at, Diameter{d, {}, {}, {}, {}, {}});
+    if (at == diameters_.end()) at = diameters_.insert(at, Diameter{d, {}, {}});
     at->waves.push_back(w);
     diameter_of_.push_back(size_t(at - diameters_.begin()));
   }
@@ -71,59 +52,15 @@ std::unique_ptr<WaveModes> WaveModes::of(HarmonicProblem& problem, MeanSector co
             std::ranges::all_of(out->stuck_, [](double k) { return std::isfinite(k); });
   for (const int order : {0, 2})
     fit = fit && std::ranges::any_of(problem.model().terms(), [&](auto& t) { return t.order == order; });
+  WaveBases bases(problem.model(), mean, terms, contact, out->stuck_);
   together(problem.comm(), "finding the waves' modes", [&] {
     for (Diameter& of_d : out->diameters_) {
-      std::vector<std::vector<complex>> sums(3);
-      for (size_t j = 0; fit && j < terms.size(); ++j) {
-        const auto P = mean.of_wave(terms[j], of_d.d);
-        auto& sum = sums[problem.model().terms()[j].order];
-        sum.resize(P.size());
-        for (size_t i = 0; i < P.size(); ++i) sum[i] += P[i];
-      }
-      fit = fit && out->find(of_d, std::move(sums), highest);
+      if (fit) of_d.basis = bases.of_diameter(of_d.d);
+      fit = of_d.basis && highest * of_d.basis->damped_together <= damped_together;
     }
   });
   MPI_Allreduce(MPI_IN_PLACE, &fit, 1, MPI_INT, MPI_LAND, problem.comm());
   return fit ? std::move(out) : nullptr;
-}
-
-/// Modes of a diameter from the sums of its terms by order; false if they are no basis.
-bool WaveModes::find(Diameter& of_d, std::vector<std::vector<complex>> sums, double highest) const {
-  const int n = n_, k = mean_.contact_dofs(), R = rows_;
-  const auto B = mean_.rows_of(of_d.d, contact_);
-  auto &K = sums[0], &U = sums[2];
-  for (int j = 0; j < k; ++j)
-    for (int i = 0; i < k; ++i)
-      for (int r = 0; r < R; ++r)
-        K[size_t(j) * n + i] += std::conj(B[size_t(r) * k + i]) * stuck_[r] * B[size_t(r) * k + j];
-  of_d.theta.resize(n);
-  if (!solve_pencil(std::move(K), U, of_d.theta)) return false;
-  of_d.Phi.resize(size_t(R) * n);  // B is k x R, column-major
-  multiply("TN", {R, n, k}, 1.0, {B.data(), k}, {U.data(), n}, 0.0, of_d.Phi.data(), R);
-  std::vector<double> motions;
-  for (complex const& a : of_d.Phi) motions.push_back(std::abs(a));
-  if (R > 0 && model::too_stiff(motions, stuck_)) return false;
-  of_d.U.assign(U.begin(), U.end());
-  return set_damping(of_d, U, sums[1], highest);
-}
-
-/// False where modes damp each other.
-bool WaveModes::set_damping(Diameter& of_d, std::vector<complex> const& U, std::vector<complex> const& C,
-                            double highest) const {
-  const int n = n_;
-  of_d.damping.assign(n, 0.0);
-  if (C.empty()) return true;
-  std::vector<complex> CU(C.size()), UCU(C.size());
-  multiply("NN", {n, n, n}, 1.0, {C.data(), n}, {U.data(), n}, 0.0, CU.data(), n);
-  multiply("CN", {n, n, n}, 1.0, {U.data(), n}, {CU.data(), n}, 0.0, UCU.data(), n);
-  double most = 0;
-  for (int j = 0; j < n; ++j) {
-    double apart = 0;
-    for (int i = 0; i < n; ++i) apart += i == j ? 0 : std::norm(UCU[size_t(j) * n + i]);
-    most = std::max(most, std::sqrt(apart));
-    of_d.damping[j] = UCU[size_t(j) * n + j].real();
-  }
-  return highest * most <= damped_together;
 }
 
 /// Of stiffness, damping and inertia, over the stiffness that force rows are measured in.
@@ -142,15 +79,16 @@ void WaveModes::set(Diameter const& of_d, size_t wave, Exponents const& e) {
   const auto c = coefficients(e, waves_[wave].harmonic);
   z.resize(n), Z.resize(n);
   for (int l = 0; l < n; ++l) {
-    z[l] = turned(wave, c[0]) + turned(wave, c[1]) * of_d.damping[l] + turned(wave, c[2]) * of_d.theta[l];
+    z[l] = turned(wave, c[0]) + turned(wave, c[1]) * of_d.basis->damping[l] +
+           turned(wave, c[2]) * of_d.basis->theta[l];
     Z[l] = 1.0 / z[l];
   }
   if (apart_)
     for (const int l : of_wave.family) Z[l] = 0;
-  std::vector<complex> PhiZ(of_d.Phi), G(size_t(R) * R), X(G), A(G), GX(G), XG(G);
+  std::vector<complex> PhiZ(of_d.basis->Phi), G(size_t(R) * R), X(G), A(G), GX(G), XG(G);
   for (int l = 0; l < n; ++l)
     for (int r = 0; r < R; ++r) PhiZ[size_t(l) * R + r] *= Z[l];
-  multiply("NC", {R, R, n}, 1.0, {PhiZ.data(), R}, {of_d.Phi.data(), R}, 0.0, G.data(), R);
+  multiply("NC", {R, R, n}, 1.0, {PhiZ.data(), R}, {of_d.basis->Phi.data(), R}, 0.0, G.data(), R);
   contact_.for_tangents(waves_[wave].harmonic, [&](int r, int c, complex t) {
     X[size_t(c) * R + r] += turned(wave, t) - (r == c ? stuck_[r] / problem_.stiffness_scale() : 0.0);
   });

@@ -4,6 +4,7 @@
 
 #include "precondition/contact_gmres.h"
 #include "wheel/families.h"
+#include "wheel/wave_basis.h"
 #include "wheel/wave_blocks.h"
 
 namespace fretwave::wheel {
@@ -39,9 +40,7 @@ class WaveModes : public WaveBlocks {
   struct Diameter {
     int d;
     std::vector<size_t> waves;  ///< that move in d or N - d, whose numbers are taken conjugate
-    std::vector<scomplex> U;
-    std::vector<complex> Phi;  ///< contact rows x modes
-    std::vector<double> theta, damping;
+    std::shared_ptr<WaveBasis const> basis;
   };
   /// In single precision what an application reads.
   struct OfWave {
@@ -52,9 +51,6 @@ class WaveModes : public WaveBlocks {
     std::vector<complex> Psi, Lambda;        ///< of these, rows innermost
   };
   WaveModes(HarmonicProblem&, MeanSector const&, WheelContact&, std::vector<Wave> const&);
-  bool find(Diameter&, std::vector<std::vector<complex>> sums, double highest) const;
-  bool set_damping(Diameter&, std::vector<complex> const& U, std::vector<complex> const& C,
-                   double highest) const;
   std::vector<complex> coefficients(Exponents const&, int harmonic) const;
   void set(Diameter const&, size_t wave, Exponents const&);
   void find_family(Exponents const&);

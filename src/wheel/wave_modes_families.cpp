@@ -37,7 +37,8 @@ void WaveModes::find_family(Exponents const& e) {
     of_wave_[w].family.clear();
     Diameter const& of_d = of_diameter(w);
     for (int l = 0; l < n_ && waves_[w].harmonic == first; ++l) {
-      const double size = std::abs((c[0] + c[1] * of_d.damping[l] + c[2] * of_d.theta[l]) / c[0]);
+      const double size =
+          std::abs((c[0] + c[1] * of_d.basis->damping[l] + c[2] * of_d.basis->theta[l]) / c[0]);
       if (size < near) found.push_back({w, l, size}), sizes.push_back(size);
     }
   }
@@ -50,7 +51,8 @@ void WaveModes::find_family(Exponents const& e) {
     if (!(size < limit)) continue;
     of_wave_[w].family.push_back(l);
     members.push_back({waves_[w].harmonic, waves_[w].diameter, l});
-    for (int i = 0; i < n_; ++i) shapes.push_back(turned(w, complex(of_diameter(w).U[size_t(l) * n_ + i])));
+    for (int i = 0; i < n_; ++i)
+      shapes.push_back(turned(w, complex(of_diameter(w).basis->U[size_t(l) * n_ + i])));
   }
   const int mine = int(members.size());
   const auto counts = gathered(std::span(&mine, 1), problem_.comm());
@@ -85,7 +87,7 @@ void WaveModes::make_families() {
     of_wave.Psi.clear(), of_wave.Lambda.clear();
     const size_t k = of_wave.family.size();
     for (size_t i = 0; i < k; ++i) {
-      complex const* Phi = &of_diameter(w).Phi[size_t(of_wave.family[i]) * R];
+      complex const* Phi = &of_diameter(w).basis->Phi[size_t(of_wave.family[i]) * R];
       const auto motion = times(of_wave.motion, Phi), XPhi = times(of_wave.X, Phi);
       for (int r = 0; r < R; ++r) {
         complex force = 0;
@@ -93,7 +95,7 @@ void WaveModes::make_families() {
         of_wave.Psi.push_back(turned(w, complex(motion[r]))), of_wave.Lambda.push_back(turned(w, force));
       }
       for (size_t j = 0; j < k; ++j) {
-        complex const* of_row = &of_diameter(w).Phi[size_t(of_wave.family[j]) * R];
+        complex const* of_row = &of_diameter(w).basis->Phi[size_t(of_wave.family[j]) * R];
         complex sum = i == j ? of_wave.z[of_wave.family[i]] : 0.0;
         for (int r = 0; r < R; ++r) sum += std::conj(of_row[r]) * complex(XPhi[r]);
         S[(at + i) * K + at + j] = turned(w, sum);
@@ -188,7 +190,7 @@ std::vector<complex> WaveModes::forces_on_families(State const& state) const {
     for (const int l : of_wave_[w].family) {
       complex sum = state.g[w * n_ + l];
       for (int i = 0; i < rows_; ++i)
-        sum -= std::conj(of_diameter(w).Phi[size_t(l) * rows_ + i]) * complex(Xb[i]);
+        sum -= std::conj(of_diameter(w).basis->Phi[size_t(l) * rows_ + i]) * complex(Xb[i]);
       r[at++] = turned(w, sum);
     }
   }

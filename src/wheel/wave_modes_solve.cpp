@@ -23,7 +23,7 @@ WaveModes::State WaveModes::relaxed(std::vector<complex> const& x) const {
     in.clear(), g.resize(size_t(columns) * n);
     for (const size_t w : of_d.waves)
       for (int i = 0; i < n; ++i) in.emplace_back(turned(w, x[w * n + i]));
-    multiply("CN", {n, columns, n}, 1.0f, {of_d.U.data(), n}, {in.data(), n}, 0.0f, g.data(), n);
+    multiply("CN", {n, columns, n}, 1.0f, {of_d.basis->U.data(), n}, {in.data(), n}, 0.0f, g.data(), n);
     for (int k = 0; k < columns; ++k) {
       const size_t w = of_d.waves[k];
       for (int l = 0; l < n; ++l) {
@@ -31,7 +31,7 @@ WaveModes::State WaveModes::relaxed(std::vector<complex> const& x) const {
         eta[l] = of_wave_[w].Z[l] * out.g[w * n + l];
       }
       if (R > 0)
-        zgemv_("N", &R, &n, &one, of_d.Phi.data(), &R, eta.data(), &step, &zero, &out.b[w * R], &step);
+        zgemv_("N", &R, &n, &one, of_d.basis->Phi.data(), &R, eta.data(), &step, &zero, &out.b[w * R], &step);
     }
   }
   return out;
@@ -65,7 +65,7 @@ void WaveModes::move_families(State& state, std::vector<complex> const& eta) con
       const complex own = turned(w, eta[at++]);
       state.families.push_back(own);
       for (int i = 0; i < rows_; ++i)
-        state.b[w * rows_ + i] += of_diameter(w).Phi[size_t(l) * rows_ + i] * own;
+        state.b[w * rows_ + i] += of_diameter(w).basis->Phi[size_t(l) * rows_ + i] * own;
     }
 }
 
@@ -79,7 +79,7 @@ std::vector<complex> WaveModes::dofs(State const& state, std::vector<complex> co
     complex* of_w = &eta[w * n];
     if (R > 0) {
       const auto h = held(w, state, f);
-      zgemv_("C", &R, &n, &minus, of_diameter(w).Phi.data(), &R, h.data(), &step, &one, of_w, &step);
+      zgemv_("C", &R, &n, &minus, of_diameter(w).basis->Phi.data(), &R, h.data(), &step, &one, of_w, &step);
     }
     for (int l = 0; l < n; ++l) of_w[l] *= of_wave_[w].Z[l];
     for (size_t k = 0; k < of_wave_[w].family.size() && own != state.families.end(); ++k)
@@ -90,7 +90,7 @@ std::vector<complex> WaveModes::dofs(State const& state, std::vector<complex> co
     const int columns = int(of_d.waves.size());
     in.clear(), out.resize(size_t(columns) * n);
     for (const size_t w : of_d.waves) in.insert(in.end(), &eta[w * n], &eta[w * n] + n);
-    multiply("NN", {n, columns, n}, 1.0f, {of_d.U.data(), n}, {in.data(), n}, 0.0f, out.data(), n);
+    multiply("NN", {n, columns, n}, 1.0f, {of_d.basis->U.data(), n}, {in.data(), n}, 0.0f, out.data(), n);
     for (int k = 0; k < columns; ++k)
       for (int i = 0; i < n; ++i) q[of_d.waves[k] * n + i] = turned(of_d.waves[k], out[size_t(k) * n + i]);
   }
