@@ -57,7 +57,7 @@ DynamicStiffness::DynamicStiffness(model::Model const& model, Harmonics const& h
       row_sums_.back()[entry.row - model.first_dof()] += std::abs(entry.value);
     blocked_.emplace_back();
     if (!is_dense(term.A)) {
-      check(MatCreateMAIJ(term.A, h.block_size(), blocked_.back().sparse.out()));
+      blocked_.back().sparse.emplace(term.A, h.block_size());
       continue;
     }
     blocked_.back().dense.assign(size_t(model.local_dofs()) * model.dofs(), 0.0);
@@ -137,20 +137,15 @@ std::vector<complex> DynamicStiffness::coefficient_derivatives(model::Term const
 }
 
 /// y += A (c x): with blocks innermost, Y^T (m x local) += X^T (m x all) A^T.
-void DynamicStiffness::accumulate(std::vector<complex> const& c, Blocked const& A, Vec x, Vec y,
-                                  bool exactly) {
+void DynamicStiffness::accumulate(std::vector<complex> const& c, Blocked& A, Vec x, Vec y, bool exactly) {
   static const log::Event structure("FwStructure");
   const log::Span span(structure);
-  {
-    ReadArray in(x);
-    WriteArray out(work_);
-    multiply(harmonics_, c, in.data(), out.data(), int(model_.local_dofs()));
-  }
-  if (A.sparse) {
-    check(MatMultAdd(A.sparse, work_, y, y));
-    return;
-  }
   const int m = harmonics_.block_size(), local = int(model_.local_dofs()), all = int(model_.dofs());
+  if (A.sparse) {
+    multiply(harmonics_, c, ReadArray(x).data(), A.sparse->columns(), local);
+    return A.sparse->multiply_add(y);
+  }
+  multiply(harmonics_, c, ReadArray(x).data(), WriteArray(work_).data(), local);
   const auto X = gathered(work_);
   if (local == 0) return;
   WriteArray Y(y);
@@ -197,20 +192,20 @@ void DynamicStiffness::transposed_multiply_add(Exponents const& e, Vec x, Vec y)
   for (size_t j = 0; j < blocked_.size(); ++j) {
     const auto c = coefficients(parts_[j], e, -1);
     if (c.empty()) continue;
-    multiply(harmonics_, conjugate(c), ReadArray(x).data(), WriteArray(work_).data(),
-             int(model_.local_dofs()));
-    accumulate_transposed(blocked_[j], work_, y);
+    accumulate_transposed(conjugate(c), blocked_[j], x, y);
   }
 }
 
-/// y += A^T x: of dense rows every rank has a part of all entries.
-void DynamicStiffness::accumulate_transposed(Blocked const& A, Vec x, Vec y) const {
-  if (A.sparse) return check(MatMultTransposeAdd(A.sparse, x, y, y));
+/// y += A^T (c x): of dense rows every rank has a part of all entries.
+void DynamicStiffness::accumulate_transposed(std::vector<complex> const& c, Blocked& A, Vec x, Vec y) {
   const int m = harmonics_.block_size(), local = int(model_.local_dofs()), all = int(model_.dofs());
+  multiply(harmonics_, c, ReadArray(x).data(), A.sparse ? A.sparse->columns() : WriteArray(work_).data(),
+           local);
+  if (A.sparse) return A.sparse->transposed_multiply_add(y);
   std::vector<double> parts(size_t(all) * m, 0.0);
   const double one = 1;
   if (local)
-    dgemm_("N", "T", &m, &all, &local, &one, ReadArray(x).data(), &m, A.dense.data(), &all, &one,
+    dgemm_("N", "T", &m, &all, &local, &one, ReadArray(work_).data(), &m, A.dense.data(), &all, &one,
            parts.data(), &m);
   MPI_Allreduce(MPI_IN_PLACE, parts.data(), as_int(PetscInt64(parts.size()), "a dense product's entries"),
                 MPI_DOUBLE, MPI_SUM, model_.comm());

@@ -1,4 +1,7 @@
 #pragma once
+#include <optional>
+
+#include "hb/blocked_product.h"
 #include "hb/harmonics.h"
 #include "hb/split_matrix.h"
 #include "model/model.h"
@@ -37,10 +40,9 @@ class DynamicStiffness {
     PetscInt row, col;
     double value;
   };
-  /// A (x) I_m: PETSc's blocked product of a sparse matrix, or this rank's dense rows for a product of
-  /// LAPACK's.
+  /// A (x) I_m, of a sparse matrix, or this rank's dense rows for a product of LAPACK's.
   struct Blocked {
-    MatHandle sparse;
+    std::optional<BlockedProduct> sparse;
     std::vector<double> dense;  ///< local rows x all dofs, row-major
     SplitMatrix split;          ///< of a stiffness
   };
@@ -56,8 +58,8 @@ class DynamicStiffness {
   Coefficients sum(std::vector<Part> const&, Of of) const;
   Coefficients coefficients(std::vector<Part> const&, Exponents const&, int order) const;
   void multiply_add(Exponents const&, Vec x, Vec y, int order, bool exactly);
-  void accumulate(std::vector<complex> const& c, Blocked const&, Vec x, Vec y, bool exactly = false);
-  void accumulate_transposed(Blocked const&, Vec x, Vec y) const;
+  void accumulate(std::vector<complex> const& c, Blocked&, Vec x, Vec y, bool exactly = false);
+  void accumulate_transposed(Coefficients const&, Blocked&, Vec x, Vec y);
   std::vector<Entry> entries(Mat A) const;
 
   model::Model const& model_;

@@ -1,0 +1,54 @@
+"""Sparse matrices times all coefficients of a dof at once, for numbers of them that fill registers or do not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from models.core_models import unknowns, whole
+from test_transpose import assert_adjoint
+from tolerances import ROUNDING
+
+import fretwave as fw
+
+N = 60  #: masses: sparse enough not to be held dense
+OMEGA = 0.7  #: [rad/s]
+
+
+def matrices() -> tuple[sp.csr_matrix, sp.csr_matrix, sp.csr_matrix]:
+    """Mass, damping and stiffness of long-reaching springs, each with entries of its own."""
+    rng = np.random.default_rng(5)
+    far = sp.random(N, N, 0.05, random_state=3)
+    K = sp.diags([rng.uniform(4, 5, N)], [0]) + far + far.T
+    C = sp.diags([rng.uniform(0.1, 0.2, N - 3)], [3])
+    return sp.diags([rng.uniform(1, 2, N)], [0]).tocsr(), C.tocsr(), K.tocsr()
+
+
+@pytest.mark.ranks(1, 2, 3)
+@pytest.mark.parametrize(
+    "orders", [[1], [1, 3], range(4), range(5), range(8), range(9), range(17), range(18), range(35)]
+)
+def test_dynamic_stiffness_of_every_harmonic(comm, orders):
+    """K + i n w C - (n w)^2 M of each harmonic's q = qc - i qs, and its transpose."""
+    M, C, K = matrices()
+    model = fw.Model(M, K, C, [], comm)
+    harmonics = fw.Harmonics(orders, 128)
+    problem = fw.ForcedResponse(model, harmonics, {1: np.eye(N)[0]}, 1.0, 0, fw.linear_modes(model, 1)[0])
+    m = harmonics.block_size
+    q = np.random.default_rng(1).standard_normal((N, m))
+    y = problem.initial(OMEGA)
+    assert y.getSize() == N * m + 1
+    found = whole(problem.jacobian_product(y, unknowns(problem, np.append(q.ravel(), 0.0)))).reshape(N, m)
+    expected, at = np.zeros_like(q), 0
+    for n in orders:
+        Z = K + 1j * n * OMEGA * C - (n * OMEGA) ** 2 * M
+        if n == 0:
+            expected[:, 0] = (Z @ q[:, 0]).real
+            at = 1
+            continue
+        z = Z @ (q[:, at] - 1j * q[:, at + 1])
+        expected[:, at], expected[:, at + 1] = z.real, -z.imag
+        at += 2
+    scale = np.vdot(found, expected) / np.vdot(found, found)
+    np.testing.assert_allclose(scale * found, expected, rtol=0, atol=ROUNDING * np.abs(expected).max())
+    assert_adjoint(problem, np.append(q.ravel(), OMEGA))
