@@ -9,6 +9,12 @@ namespace fretwave::solve {
 
 namespace {
 
+#if PETSC_VERSION_GE(3, 24, 0)
+constexpr char const* by_secant = SNESLINESEARCHSECANT;
+#else
+constexpr char const* by_secant = SNESLINESEARCHL2;
+#endif
+
 const Tuned smallest_step("newton_smallest_step", 1e-13,
                           "Newton step that is rounding, relative to the unknowns");
 const Tuned stagnant_step("newton_stagnant_step", 1e-8,
@@ -176,7 +182,7 @@ Outcome Newton::solve_past_kinks(Vec y) {
       !std::isfinite(out.residual))
     return out;
   check(VecCopy(guess, y));
-  check(SNESLineSearchSetType(search, SNESLINESEARCHL2));
+  check(SNESLineSearchSetType(search, by_secant));
   const Outcome before = std::exchange(out, solve_persistently(y));
   check(SNESLineSearchSetType(search, SNESLINESEARCHBT));
   out.newton += before.newton, out.linear += before.linear;

@@ -37,6 +37,10 @@ MAPS = """\
         ),
         (doctor.check_numpy("1.24.2", {}), doctor.check_numpy("2.1.0", {"h5py": "numpy.dtype size changed"})),
         (doctor.check_extension("", ["libfftw3.so.3"]), doctor.check_extension("No module", [])),
+        (
+            doctor.check_extension("", [], ["libpetsc.so.3.26"]),
+            doctor.check_extension("", [], ["libpetsc.so.3.26", "libpetsc_real.so.3.18"]),
+        ),
         (doctor.check_launch("2\n"), doctor.check_launch("1\n1\n")),
     ],
 )

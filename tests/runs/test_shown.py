@@ -86,7 +86,9 @@ def unread(*words: object) -> tuple[int, str]:
     return done.returncode, done.stderr
 
 
-@pytest.mark.parametrize("words", ("--version", "check CASE", "check --keys", "run CASE --quick --only mode --out OUT"))
+@pytest.mark.parametrize(
+    "words", ("--version", "doctor", "check CASE", "check --keys", "run CASE --quick --only mode --out OUT")
+)
 def test_output_that_nobody_reads_ends_without_a_word(tmp_path: Path, words: str) -> None:
     """What Python had kept to print at its end made exit code 120 and "Exception ignored"."""
     given = words.replace("CASE", str(CASE)).replace("OUT", str(tmp_path / "run"))

@@ -10,6 +10,7 @@ import importlib
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import time
@@ -56,10 +57,12 @@ def check_python(version: Sequence[int], executable: str) -> Check:
     return Check("Python", ok, f"{dotted(version[:3])} ({executable})", f">= {dotted(OLDEST_PYTHON)}", fix)
 
 
-def check_petsc_version(version: Sequence[int]) -> Check:
+def check_petsc_version(version: Sequence[int], folder: str = "") -> Check:
+    """`folder`: where petsc4py has it from."""
     fix = "apt-get install petsc-dev python3-petsc4py (Debian 12 has 3.18.5)"
     ok = tuple(version[:2]) >= OLDEST_PETSC
-    return Check("PETSc", ok, dotted(version), f">= {dotted(OLDEST_PETSC)}", fix)
+    found = dotted(version) + (f" ({folder})" if folder else "")
+    return Check("PETSc", ok, found, f">= {dotted(OLDEST_PETSC)}", fix)
 
 
 def check_scalar_type(scalar: object) -> Check:
@@ -112,8 +115,12 @@ def check_h5py(version: str, parallel: bool, libraries: Sequence[str]) -> Check:
     )
 
 
-def check_extension(error: str, fftw: Sequence[str]) -> Check:
+def check_extension(error: str, fftw: Sequence[str], petsc: Sequence[str] = ()) -> Check:
+    """`petsc`: what is loaded with the core and petsc4py; two of them are two memories of what is initialised."""
     fix = "build it: .ci/setup (log in .build/build.log)"
+    if not error and len(petsc) > 1:
+        fix = "build it again with the PKG_CONFIG_PATH of petsc4py's own PETSc (src/CONTRIBUTING.md)"
+        return Check("fretwave core", False, f"built for another PETSc: {', '.join(petsc)}", "petsc4py's own", fix)
     return Check("fretwave core", not error, error or f"built, with {', '.join(fftw) or 'FFTW'}", "fretwave._core", fix)
 
 
@@ -234,6 +241,8 @@ def guarded(name: str, find: Callable[[], list[Check]]) -> list[Check]:
     except Exception as error:
         first = (str(error).strip().splitlines() or [""])[0]
         return [Check(name, False, f"{type(error).__name__}: {first}", "installed and importable", ".ci/setup")]
+    finally:
+        signal.signal(signal.SIGPIPE, signal.SIG_IGN)  # PETSc, once imported, takes it for a fault (`doctor | head`)
 
 
 def find_numpy() -> list[Check]:
@@ -244,12 +253,13 @@ def find_numpy() -> list[Check]:
 
 def find_petsc() -> list[Check]:
     import numpy
+    import petsc4py
     from petsc4py import PETSc
 
     version = PETSc.Sys.getVersion()
     integer = numpy.dtype(PETSc.IntType).itemsize
     return [
-        check_petsc_version(version),
+        check_petsc_version(version, petsc4py.get_config().get("PETSC_DIR", "")),
         check_scalar_type(PETSc.ScalarType),
         check_int_size(integer),
         check_mumps(mumps_error()),
@@ -282,7 +292,8 @@ def find_h5py() -> list[Check]:
 
 def find_core() -> list[Check]:
     error = import_errors(["fretwave._core"]).get("fretwave._core", "")
-    return [check_extension(error, mapped_libraries(r"libfftw3\.so"))]
+    libraries = [mapped_libraries(pattern) for pattern in (r"libfftw3\.so", r"libpetsc[^/]*\.so")]
+    return [check_extension(error, *libraries)]
 
 
 def find_blas() -> list[Check]:
