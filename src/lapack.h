@@ -141,6 +141,22 @@ inline int filled_up(int rows) {
   return (rows + multiple - 1) / multiple * multiple;
 }
 
+/// Columns of c entries in single precision, each filled up with zeros.
+inline std::vector<float> filled_up(double const* x, int c, int columns) {
+  const int lead = filled_up(c);
+  std::vector<float> out(size_t(lead) * columns);
+  for (int j = 0; j < columns; ++j)
+    for (int k = 0; k < c; ++k) out[size_t(j) * lead + k] = float(x[size_t(j) * c + k]);
+  return out;
+}
+
+/// Those columns without what they were filled up with.
+inline void take(std::vector<float> const& x, int c, int columns, double* to) {
+  const int lead = filled_up(c);
+  for (int j = 0; j < columns; ++j)
+    for (int k = 0; k < c; ++k) to[size_t(j) * c + k] = x[size_t(j) * lead + k];
+}
+
 /// A x, A rows x columns, column-major. Where rows are two more than a multiple of four, cgemv of OpenBLAS
 /// 0.3.21 (Debian 12's) reads the entry behind the last of x: there is one.
 inline std::vector<std::complex<float>> product(int rows, int columns, std::complex<float> const* A,

@@ -86,9 +86,9 @@ void add_relative_motion(std::vector<ContactEntry> const& own, double const* x, 
     for (ContactEntry const& e : own) u[j * rows + e.row] += e.value * x[j * lead + e.dof];
 }
 
-/// B K_s^-1 B^T. Collective.
+/// B K_s^-1 B^T, and K_s^-1 B^T by this rank's dofs if it is kept. Collective.
 std::vector<double> contact_compliance(StaticFactor const& factor, std::vector<ContactEntry> const& own,
-                                       PetscInt rows, MPI_Comm comm) {
+                                       PetscInt rows, MPI_Comm comm, std::vector<float>& kept) {
   std::vector<double> G(size_t(rows) * rows, 0.0);
   for (PetscInt first = 0; first < rows; first += columns_at_once) {
     const PetscInt columns = std::min(rows - first, columns_at_once);
@@ -107,6 +107,9 @@ std::vector<double> contact_compliance(StaticFactor const& factor, std::vector<C
     check(MatDenseGetArrayRead(X, &found));
     add_relative_motion(own, found, size_t(lead), size_t(columns), G.data() + size_t(first) * rows,
                         size_t(rows));
+    for (PetscInt j = 0; j < columns && !kept.empty(); ++j)
+      for (PetscInt dof = 0; dof < factor.local_dofs(); ++dof)
+        kept[size_t(dof) * rows + first + j] = float(found[size_t(j) * lead + dof]);
     check(MatDenseRestoreArrayRead(X, &found));
   }
   sum_over_ranks(G, comm);
@@ -164,7 +167,8 @@ void StuckBasis::add_static(MPI_Comm comm) {
   motions_.assign(r * size_t(k), 0.0);
   add_relative_motion(own_, exactly_.data(), size_t(local_), size_t(k), motions_.data(), r);
   sum_over_ranks(motions_, comm);
-  auto G = contact_compliance(*factor_, own_, rows, comm);
+  if (dofs_ * rows <= factor_->entries()) static_shapes_.resize(r * size_t(local_));
+  auto G = contact_compliance(*factor_, own_, rows, comm, static_shapes_);
   lapack::multiply("NT", {rows, rows, k}, -1.0, {motions_.data(), rows}, {motions_.data(), rows}, 1.0,
                    G.data(), rows);
   triangle_ = pivoted(std::move(G), stiffness_);
@@ -196,12 +200,20 @@ void StuckBasis::static_forces(double const* moved, int coefficients, double* g)
 void StuckBasis::static_motion(double const* g, int coefficients, double* modal, double* q) const {
   const int c = coefficients, k = modes_, r = rows();
   auto const& [order, rank, scale, L] = triangle_;
-  std::vector<double> v(g, g + size_t(c) * rank), f(size_t(c) * r, 0.0), b(size_t(c) * local_, 0.0);
+  std::vector<double> v(g, g + size_t(c) * rank), f(size_t(c) * r, 0.0);
   const double one = 1;
   dtrsm_("R", "L", "N", "N", &c, &rank, &one, L.data(), &r, v.data(), &c);
   for (int j = 0; j < rank; ++j)
     for (int i = 0; i < c; ++i) f[size_t(order[j]) * c + i] = scale[order[j]] * v[size_t(j) * c + i];
   lapack::multiply("NN", {c, k, r}, -1.0, {f.data(), c}, {motions_.data(), r}, 1.0, modal, c);
+  if (!static_shapes_.empty()) {
+    const int lead = lapack::filled_up(c);
+    std::vector<float> out(size_t(lead) * local_);
+    lapack::multiply("NN", {lead, local_, r}, 1.0f, {lapack::filled_up(f.data(), c, r).data(), lead},
+                     {static_shapes_.data(), r}, 0.0f, out.data(), lead);
+    return lapack::take(out, c, local_, q);
+  }
+  std::vector<double> b(size_t(c) * local_, 0.0);
   for (ContactEntry const& e : own_)
     for (int i = 0; i < c; ++i) b[size_t(e.dof) * c + i] += e.value * f[size_t(e.row) * c + i];
   factor_->solve(b.data(), c, q);

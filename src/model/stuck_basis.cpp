@@ -140,25 +140,6 @@ std::vector<double> StuckBasis::diagonal(Mat A) const {
   return out;
 }
 
-namespace {
-
-/// Columns of c entries in single precision, each filled up with zeros.
-std::vector<float> filled_up(double const* x, int c, int columns) {
-  const int lead = lapack::filled_up(c);
-  std::vector<float> out(size_t(lead) * columns);
-  for (int j = 0; j < columns; ++j)
-    for (int k = 0; k < c; ++k) out[size_t(j) * lead + k] = float(x[size_t(j) * c + k]);
-  return out;
-}
-
-void take(std::vector<float> const& x, int c, int columns, double* to) {
-  const int lead = lapack::filled_up(c);
-  for (int j = 0; j < columns; ++j)
-    for (int k = 0; k < c; ++k) to[size_t(j) * c + k] = x[size_t(j) * lead + k];
-}
-
-}  // namespace
-
 void StuckBasis::forces(double const* x, int coefficients, double* g, double* moved) const {
   const int c = coefficients;
   if (factor_) {
@@ -170,11 +151,11 @@ void StuckBasis::forces(double const* x, int coefficients, double* g, double* mo
     return;
   }
   const int lead = lapack::filled_up(c);
-  const auto in = filled_up(x, c, local_);
+  const auto in = lapack::filled_up(x, c, local_);
   std::vector<float> out(size_t(lead) * size());
   lapack::multiply("NN", {lead, size(), local_}, 1.0f, {in.data(), lead}, {shapes_.data(), local_}, 0.0f,
                    out.data(), lead);
-  take(out, c, size(), g);
+  lapack::take(out, c, size(), g);
 }
 
 void StuckBasis::motion(double const* g, int coefficients, double* q) const {
@@ -186,16 +167,17 @@ void StuckBasis::motion(double const* g, int coefficients, double* q) const {
     return;
   }
   const int lead = lapack::filled_up(c);
-  const auto in = filled_up(g, c, size());
+  const auto in = lapack::filled_up(g, c, size());
   std::vector<float> out(size_t(lead) * local_);
   lapack::multiply("NT", {lead, local_, size()}, 1.0f, {in.data(), lead}, {shapes_.data(), local_}, 0.0f,
                    out.data(), lead);
-  take(out, c, local_, q);
+  lapack::take(out, c, local_, q);
 }
 
 double StuckBasis::flops() const {
   if (!factor_) return 4 * dofs_ * size();
-  return 4 * dofs_ * modes_ + 2 * double(rows()) * rows() + 8 * factor_->entries();
+  const double forces = 4 * factor_->entries(), motion = static_shapes_.empty() ? forces : 2 * dofs_ * rows();
+  return 4 * dofs_ * modes_ + 2 * double(rows()) * rows() + forces + motion;
 }
 
 }  // namespace fretwave::model

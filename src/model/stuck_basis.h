@@ -28,8 +28,8 @@ struct PivotedCholesky {
 /// Either it is all modes, or (`with_factor`) the lowest ones, and behind them what forces on the contact
 /// move beside these, K_s^-1 B^T made K_s-orthogonal to all before, whose inertia is left out (theta = 0):
 /// static corrections (MacNeal 1971; attachment modes, Craig 1977). Of those the factor of K_s and a triangle
-/// are held, and no motion. What any other force moves beside them is static too, (K_s^-1 - Psi Psi^T) f by
-/// that factor, and moves no contact.
+/// are held, and the motions themselves where they are few. What any other force moves beside them is static
+/// too, (K_s^-1 - Psi Psi^T) f by that factor, and moves no contact.
 class StuckBasis {
  public:
   /// All modes. None if there are none: K or M without symmetry, with phases or of a wheel, a law without a
@@ -76,6 +76,9 @@ class StuckBasis {
   std::vector<double> exactly_;
   std::unique_ptr<StaticFactor> factor_;
   std::vector<ContactEntry> own_;  ///< of B, by this rank's dofs
+  /// K_s^-1 B^T where its product takes less than a solve: rows by this rank's dofs; half the factor's memory
+  /// at most.
+  std::vector<float> static_shapes_;
   PivotedCholesky triangle_;
 };
 
