@@ -22,14 +22,20 @@ struct PetscFailure : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// What an error number means, and what was said where it arose: of `PetscErrorMessage`, whose third argument
+/// became one to constants.
+template <class Char>
+std::string words_of(PetscErrorCode (*message)(PetscErrorCode, char const**, Char**), PetscErrorCode code) {
+  char const* meaning = nullptr;
+  Char* said = nullptr;
+  (void)message(code, &meaning, &said);
+  return (meaning ? std::string(": ") + meaning : "") + (said && *said ? std::string(": ") + said : "");
+}
+
 inline void check(PetscErrorCode code, std::source_location where = std::source_location::current()) {
-  if (code) [[unlikely]] {
-    const char* text = nullptr;
-    (void)PetscErrorMessage(code, &text, nullptr);
-    throw PetscFailure(std::string("PETSc error ") + std::to_string(int(code)) +
-                       (text ? std::string(": ") + text : "") + " (called from " + where.file_name() + ":" +
-                       std::to_string(where.line()) + ")");
-  }
+  if (code) [[unlikely]]
+    throw PetscFailure("PETSc error " + std::to_string(int(code)) + " (called from " + where.file_name() +
+                       ":" + std::to_string(where.line()) + ")" + words_of(PetscErrorMessage, code));
 }
 
 /// Move-only owner of one PETSc reference; converts to the raw handle, mirrors nothing of PETSc.

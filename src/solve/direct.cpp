@@ -42,6 +42,16 @@ void give_room(KSP ksp, Mat J) {
   check(MatMumpsSetIcntl(factor, 14, 200));
 }
 
+/// Each rank's factor of the whole matrix, which newer PETSc (3.26) makes in the first solve only.
+PetscErrorCode set_up_redundant(PC pc) {
+  PetscBool redundant;
+  KSP inner;
+  check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(pc), PCREDUNDANT, &redundant));
+  if (!redundant) return PetscErrorCode(0);
+  check(PCRedundantGetKSP(pc, &inner));
+  return KSPSetUp(inner);
+}
+
 }  // namespace
 
 void use_lu(KSP ksp, Mat J) {
@@ -70,9 +80,10 @@ bool factorise(KSP ksp, Mat J) {
   PC pc;
   PCFailedReason failed = PC_NOERROR;
   check(KSPSetOperators(ksp, J, J));
-  const PetscErrorCode code = KSPSetUp(ksp);
-  const bool singular = code == PETSC_ERR_MAT_LU_ZRPVT || code == PETSC_ERR_LIB;
   check(KSPGetPC(ksp, &pc));
+  PetscErrorCode code = KSPSetUp(ksp);
+  if (!code) code = set_up_redundant(pc);
+  const bool singular = code == PETSC_ERR_MAT_LU_ZRPVT || code == PETSC_ERR_LIB;
   if (!singular) {
     check(code);
     check(PCGetFailedReason(pc, &failed));

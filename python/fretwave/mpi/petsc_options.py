@@ -128,7 +128,7 @@ class AnalysisOptions:
         except (PetscError, PETSc.Error) as error:
             if not self.pairs:
                 raise
-            raise self._blamed(" ".join(PETSc.Error._traceback_[-1:])) from error
+            raise self._blamed(str(error).rstrip().splitlines()[-1]) from error
         finally:
             stage.pop()
             for name in self.pairs:
