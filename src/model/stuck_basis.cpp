@@ -141,6 +141,8 @@ std::vector<double> StuckBasis::diagonal(Mat A) const {
 }
 
 void StuckBasis::forces(double const* x, int coefficients, double* g, double* moved) const {
+  static const log::Event projection("FwBasis");
+  const log::Span span(projection);
   const int c = coefficients;
   if (factor_) {
     std::vector<double> other(moved ? 0 : size_t(c) * local_);
@@ -159,6 +161,8 @@ void StuckBasis::forces(double const* x, int coefficients, double* g, double* mo
 }
 
 void StuckBasis::motion(double const* g, int coefficients, double* q) const {
+  static const log::Event projection("FwBasis");
+  const log::Span span(projection);
   const int c = coefficients;
   if (factor_) {
     std::vector<double> modal(g, g + size_t(c) * modes_);

@@ -182,6 +182,8 @@ std::vector<float> ModalBlocks::pull(std::vector<float> u) const {
 // eta_h = z^-1 (g_h - U_h^T f - C_h zeta), f = X (U_h z^-1 g_h + U_l eta_l - c zeta)
 ModalBlocks::Solution ModalBlocks::solve(std::vector<float> const& forces,
                                          std::vector<double> const& closing) const {
+  static const log::Event inverse("FwBlocks");
+  const log::Span span(inverse);
   const int n = modes_, k = low_, r = rows(), c = lead_;
   Solution out{std::vector<float>(size_t(c) * n), {}};
   auto& eta = out.modes;
@@ -254,6 +256,8 @@ void ModalBlocks::subtract(std::vector<float> const& f, std::vector<float>& forc
 
 // G (1 + T G)^-1 f + (U_l - G X U_l) eta_l - (c - G X c) zeta, N (eta_l, zeta) = (U_l^T, -rho) (1 + T G)^-1 f
 std::vector<float> ModalBlocks::compliance(std::vector<float> const& f) const {
+  static const log::Event compliances("FwCompliance");
+  const log::Span span(compliances);
   const int k = low_, r = rows(), c = lead_;
   std::vector<float> u(size_t(c) * r), low(size_t(c) * k);
   multiply("NN", {c, r, r}, 1.0f, {f.data(), c}, {G_.data(), r}, 0.0f, u.data(), c);
