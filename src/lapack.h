@@ -7,6 +7,7 @@
 
 /// The BLAS and LAPACK routines in use, and the inverse made of two of them.
 extern "C" {
+double ddot_(int const*, double const*, int const*, double const*, int const*);
 void dgemm_(char const*, char const*, int const*, int const*, int const*, double const*, double const*,
             int const*, double const*, int const*, double const*, double*, int const*);
 void sgemm_(char const*, char const*, int const*, int const*, int const*, float const*, float const*,

@@ -1,17 +1,18 @@
 #include "precondition/border.h"
 
 #include <algorithm>
-#include <numeric>
 
 #include "error.h"
 #include "lapack.h"
+#include "log.h"
 
 namespace fretwave::precondition {
 
 /// This rank's share of R q.
 std::vector<double> Border::along_rows(Local const& q) const {
   std::vector<double> out;
-  for (auto const& row : rows_) out.push_back(std::inner_product(q.begin(), q.end(), row.begin(), 0.0));
+  const int n = int(q.size()), step = 1;
+  for (auto const& row : rows_) out.push_back(ddot_(&n, q.data(), &step, row.data(), &step));
   return out;
 }
 
@@ -34,6 +35,8 @@ void Border::make(Solve solve, std::vector<Local> const& columns, std::vector<Lo
 
 void Border::apply(double const* x, double* z) const {
   auto q = solve_(x);
+  static const log::Event border("FwBorder");
+  const log::Span span(border);
   const size_t size = rows_.size();
   auto rest = along_rows(q);
   for (double& r : rest) r = -r;

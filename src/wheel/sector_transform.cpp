@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <numeric>
 
+#include "log.h"
+
 namespace fretwave::wheel {
 
 SectorTransform::SectorTransform(int local_sectors, int harmonics, int items, MPI_Comm comm)
@@ -69,6 +71,8 @@ SectorTransform::Counts SectorTransform::by_rank(bool waves) const {
 }
 
 std::vector<complex> SectorTransform::to_waves(std::span<complex const> in) const {
+  static const log::Event transform("FwTransform");
+  const log::Span span(transform);
   Counts sent(size_);
   std::vector<complex> out;
   out.reserve(in.size());
@@ -101,6 +105,8 @@ std::vector<complex> SectorTransform::to_waves(std::span<complex const> in) cons
 }
 
 std::vector<complex> SectorTransform::to_sectors(std::span<complex const> in) const {
+  static const log::Event transform("FwTransform");
+  const log::Span span(transform);
   std::vector<complex> out;
   out.reserve(in.size());
   for (int r = 0; r < size_; ++r)

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <map>
 
+#include "log.h"
 #include "precondition/kinds.h"
 #include "tuned.h"
 #include "wheel/wave_inverses.h"
@@ -111,6 +112,16 @@ std::vector<complex> WheelPreconditioner::of_one_sector() const {
   return G;
 }
 
+/// What the waves' blocks leave of the contact. Collective.
+void WheelPreconditioner::eliminate(bool travelling, int wave) {
+  static const log::Event elimination("FwElimination");
+  const log::Span span(elimination);
+  if (!travelling)
+    eliminate_by_sector();
+  else if (contact_.rows() > 0)
+    eliminate_in_waves(wave);
+}
+
 /// The contact about a travelling wave. Collective.
 void WheelPreconditioner::eliminate_in_waves(int wave) {
   if (!travelling_ || travelling_->wave() != wave)
@@ -129,9 +140,13 @@ void WheelPreconditioner::eliminate_by_sector() {
 
 /// A^-1 (x - B^T E B A^-1 x) of this rank's harmonic blocks. Collective.
 std::vector<double> WheelPreconditioner::solve(double const* x) const {
+  static const log::Event waves("FwWaves");
+  const log::Span span(waves);
   Harmonics const& h = problem_.harmonics();
   const auto q = blocks_->solve(dofs_.to_waves(gather(x)), [this](std::vector<complex> const& u) {
     const auto sectors = rows_.to_sectors(u);
+    static const log::Event eliminated("FwEliminated");
+    const log::Span of_contact(eliminated);
     return rows_.to_waves(travelling_ ? travelling_->apply(sectors) : contact_.apply(sectors));
   });
   const auto out = dofs_.to_sectors(q);
@@ -190,10 +205,7 @@ void WheelPreconditioner::build(Vec y, Vec row) {
   WaveBlocks::Point point{e, {}, *main >= pure};
   for (const double share : shares) point.moving.push_back(problem_.scalar_count() > 1 && share > 0);
   blocks_->make(point);
-  if (!point.travelling)
-    eliminate_by_sector();
-  else if (contact_.rows() > 0)
-    eliminate_in_waves(int(main - shares.begin()));
+  eliminate(point.travelling, int(main - shares.begin()));
   make_border(y, row);
 }
 

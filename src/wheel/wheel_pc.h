@@ -37,6 +37,7 @@ class WheelPreconditioner : public solve::Preconditioner {
   void choose_blocks(Exponents const&);
   std::vector<double> spectrum(Vec y) const;
   std::vector<complex> of_one_sector() const;
+  void eliminate(bool travelling, int wave);
   void eliminate_in_waves(int wave);
   void eliminate_by_sector();
   void make_border(Vec y, Vec row);
