@@ -10,6 +10,7 @@ import pytest
 import test_sparse_route as solid
 import test_stuck_basis as chains
 from petsc4py import PETSc
+from test_tuned import option
 
 import fretwave as fw
 from fretwave import _core
@@ -42,6 +43,19 @@ def test_motions_are_those_of_the_direct_route(comm, method, turning):
     assert "4 blocks of 30 modes of stuck pairs and 9 static motions, one real factor" in route
     assert found[0]["slip"] == 0 and found[1]["slip"] > 0.05 and found[2]["open"] > 0.05
     assert max(state["iterations"] / state["steps"] for state in found) <= STEPS
+    solid.assert_same(found, direct)
+
+
+@pytest.mark.ranks(2, 3)
+@pytest.mark.parametrize("held", [1e-3, 1000.0])
+def test_ranks_hold_the_factor_in_parts_or_whole(comm, held):
+    """In parts MUMPS solves over all ranks; whole, each rank for its share of the columns. `held` [MB] on all."""
+    with option("fw_static_held", held):
+        model, tip = lifting(comm, 0.0)
+        one = solid.mode(model, tip, f"held_{held:g}_", route="krylov", pc_type="fwstatic")
+        found, route = solid.solve(one, [solid.STICK, solid.SLIP])
+    direct, _ = solid.solve(solid.mode(model, tip, f"direct_{held:g}_", route="direct"), [solid.STICK, solid.SLIP])
+    assert "one real factor" in route and found[1]["slip"] > 0.05
     solid.assert_same(found, direct)
 
 
