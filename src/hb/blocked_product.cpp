@@ -9,7 +9,10 @@ namespace fretwave::hb {
 
 namespace {
 
-constexpr int width = 8;  // coefficients in a register of the widest machines
+// Coefficients in a register of AVX2. GCC 12 keeps wider ones of machines without AVX-512 in memory: 142
+// nonzeros in each of 168,000 rows times 7 coefficients take 0.32 s instead of 0.047.
+constexpr int width = 4;
+constexpr int most = 8;  // registers that stay in the machine's 16
 using Register = double __attribute__((vector_size(width * sizeof(double))));
 
 struct Rows {
@@ -36,24 +39,20 @@ FRETWAVE_INLINE void multiply(Rows const& A, double const* x, double* y, size_t 
   }
 }
 
+/// By as few registers as hold the coefficients.
+template <int registers = 1>
+FRETWAVE_INLINE void multiply_by_fewest(Rows const& A, double const* x, double* y, size_t m,
+                                        int coefficients) {
+  if constexpr (registers < most)
+    if (coefficients > registers * width)
+      return multiply_by_fewest<registers + 1>(A, x, y, m, coefficients);
+  multiply<registers>(A, x, y, m, coefficients);
+}
+
 FRETWAVE_VECTORISE
 void multiply(Rows const& A, double const* x, double* y, int m) {
-  for (int first = 0; first < m; first += 4 * width) {
-    const int rest = std::min(4 * width, m - first);
-    switch ((rest + width - 1) / width) {
-      case 1:
-        multiply<1>(A, x + first, y + first, size_t(m), rest);
-        break;
-      case 2:
-        multiply<2>(A, x + first, y + first, size_t(m), rest);
-        break;
-      case 3:
-        multiply<3>(A, x + first, y + first, size_t(m), rest);
-        break;
-      default:
-        multiply<4>(A, x + first, y + first, size_t(m), rest);
-    }
-  }
+  for (int first = 0; first < m; first += most * width)
+    multiply_by_fewest(A, x + first, y + first, size_t(m), std::min(most * width, m - first));
 }
 
 FRETWAVE_VECTORISE
