@@ -41,6 +41,9 @@ void dsygvd_(int const*, char const*, char const*, int const*, double*, int cons
 void zhegvd_(int const*, char const*, char const*, int const*, std::complex<double>*, int const*,
              std::complex<double>*, int const*, double*, std::complex<double>*, int const*, double*,
              int const*, int*, int const*, int*);
+void zpotrf_(char const*, int const*, std::complex<double>*, int const*, int*);
+void zpotrs_(char const*, int const*, int const*, std::complex<double> const*, int const*,
+             std::complex<double>*, int const*, int*);
 void dpstrf_(char const*, int const*, double*, int const*, int*, int*, double const*, double*, int*);
 void dtrsm_(char const*, char const*, char const*, char const*, int const*, int const*, double const*,
             double const*, int const*, double*, int const*);

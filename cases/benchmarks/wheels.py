@@ -41,6 +41,11 @@ def say(text: str) -> None:
         print(text, flush=True)
 
 
+def memory_gb() -> float:
+    """Of all ranks at most. Collective."""
+    return COMM.allreduce(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20)
+
+
 def blisk(sectors: int, cells: int) -> tuple[fw.Sector, int]:
     """A sector with its faces tied, and its dof at the blade's tip."""
     rim, angle = sectors * WIDTH / (2 * np.pi), 2 * np.pi / sectors
@@ -120,7 +125,7 @@ def one(options: argparse.Namespace) -> None:
     problem.preload(np.tile(rest.displacement, options.sectors), np.tile(rest.load, options.sectors))
     whole = follow(problem, options)
     unknowns = wheel.n_dof * harmonics.block_size
-    memory = COMM.allreduce(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20)
+    memory = memory_gb()
     apart = [abs(whole["state"][key] / alone["state"][key] - 1) for key in ("omega", "beta")]
     say(
         f"{options.sectors} sectors of {sector.n_dof} dofs, {unknowns} unknowns, {COMM.size} ranks:"

@@ -23,26 +23,46 @@ bool is_dense(Mat A) {
   return n > 16 && info.nz_used > dense_share * double(n) * double(n);
 }
 
+/// visit(entries, values of A, of B) of this rank's rows, while both have them in the same
+/// places; false where they have not.
+template <class Visit>
+bool with_both(Mat A, Mat B, Visit visit) {
+  PetscInt begin, end;
+  check(MatGetOwnershipRange(A, &begin, &end));
+  bool alike = true;
+  for (PetscInt row = begin; row < end && alike; ++row) {
+    PetscInt a_count, b_count;
+    PetscInt const *a_cols, *b_cols;
+    PetscScalar const *a, *b;
+    check(MatGetRow(A, row, &a_count, &a_cols, &a));
+    check(MatGetRow(B, row, &b_count, &b_cols, &b));
+    alike = a_count == b_count && std::equal(a_cols, a_cols + a_count, b_cols) && visit(a_count, a, b);
+    check(MatRestoreRow(B, row, &b_count, &b_cols, &b));
+    check(MatRestoreRow(A, row, &a_count, &a_cols, &a));
+  }
+  return alike;
+}
+
 /// r where A = r B entry by entry, but for the last digits; 0 where it is not. Collective.
 double multiple_of(Mat A, Mat B) {
-  std::vector<double> a, b;
-  std::vector<PetscInt> a_cols, b_cols;
-  for_entries(A, [&](PetscInt, PetscInt col, double v) { a.push_back(v), a_cols.push_back(col); });
-  for_entries(B, [&](PetscInt, PetscInt col, double v) { b.push_back(v), b_cols.push_back(col); });
-  size_t largest = 0;
-  for (size_t k = 0; k < b.size(); ++k)
-    if (std::abs(b[k]) > std::abs(b[largest])) largest = k;
-  int alike = a_cols == b_cols;
-  const double mine[2] = {b.empty() ? 0 : std::abs(b[largest]),
-                          alike && !b.empty() ? a[largest] / b[largest] : 0};
+  double mine[2] = {0, 0};  // the largest entry of B, and what A is there over it
+  int alike = with_both(A, B, [&](PetscInt count, double const* a, double const* b) {
+    for (PetscInt k = 0; k < count; ++k)
+      if (std::abs(b[k]) > mine[0]) mine[0] = std::abs(b[k]), mine[1] = a[k] / b[k];
+    return true;
+  });
   MPI_Comm comm;
   check(PetscObjectGetComm(reinterpret_cast<PetscObject>(A), &comm));
   double most = 0, times = 0;
-  const auto all = gathered(std::span(mine, 2), comm);
+  const auto all = gathered(std::span<double const>(mine, 2), comm);
   for (size_t rank = 0; rank < all.size(); rank += 2)
     if (all[rank] > most) most = all[rank], times = all[rank + 1];
-  for (size_t k = 0; alike && k < a.size(); ++k)
-    alike = std::abs(a[k] - times * b[k]) <= 4 * std::numeric_limits<double>::epsilon() * std::abs(a[k]);
+  alike = alike && with_both(A, B, [&](PetscInt count, double const* a, double const* b) {
+            for (PetscInt k = 0; k < count; ++k)
+              if (std::abs(a[k] - times * b[k]) > 4 * std::numeric_limits<double>::epsilon() * std::abs(a[k]))
+                return false;
+            return true;
+          });
   MPI_Allreduce(MPI_IN_PLACE, &alike, 1, MPI_INT, MPI_LAND, comm);
   return alike && std::isfinite(times) ? times : 0;
 }
@@ -53,8 +73,9 @@ DynamicStiffness::DynamicStiffness(model::Model const& model, Harmonics const& h
     : model_(model), harmonics_(h) {
   for (auto const& term : model.terms()) {
     row_sums_.emplace_back(model.local_dofs(), 0.0);
-    for (auto const& entry : entries(term.A))
-      row_sums_.back()[entry.row - model.first_dof()] += std::abs(entry.value);
+    for_entries(term.A, [&](PetscInt row, PetscInt, double value) {
+      row_sums_.back()[row - model.first_dof()] += std::abs(value);
+    });
     blocked_.emplace_back();
     if (!is_dense(term.A)) {
       blocked_.back().sparse.emplace(term.A, h.block_size());

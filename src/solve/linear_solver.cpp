@@ -212,17 +212,19 @@ PetscErrorCode LinearSolver::apply(Vec x, Vec z) {
 
 /// The preconditioner is stale once the iterations of Newton's solves beyond those just after it was built
 /// have cost as much as building; at once, if even its first reuse cost more the last time. Built at a hard
-/// point it would never be: a share of all iterations counts.
+/// point it would never be: a share of all iterations counts. Built for a tangent, it is no longer fresh when
+/// Newton first solves with it: what the last one took when it was counts.
 void LinearSolver::count_iterations() {
   PetscInt iterations = 0;
   check(KSPGetIterationNumber(beside_ ? KSP(tangent_) : ksp_of(snes_), &iterations));
   const double cost = preconditioner().build_cost();
-  if (fresh_ < 0) {
-    fresh_ = int(iterations);
+  if (fresh_ < 0 && built_here_) {
+    fresh_ = last_fresh_ = int(iterations);
     stale_ = first_reuse_ > cost;
     first_reuse_ /= 2;
     return;
   }
+  if (fresh_ < 0) fresh_ = last_fresh_ < 0 ? int(iterations) : std::min(int(iterations), last_fresh_);
   const double beyond = std::max(0, int(iterations) - fresh_);
   if (excess_ == 0) first_reuse_ = beyond;
   excess_ += beyond + renewal * iterations;

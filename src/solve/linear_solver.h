@@ -89,8 +89,9 @@ class LinearSolver {
   ChosenKind kind_;
   std::unique_ptr<Preconditioner> own_, fallback_;  ///< none where options ask for a PC of PETSc's
   bool krylov_ = false, stale_ = true, uncounted_ = false, beside_ = false;
-  int fresh_ = -1;          ///< Krylov iterations of the first solve after a build; -1: none yet
-  double excess_ = 0;       ///< iterations beyond that and a share of them, of all solves since
+  int fresh_ = -1, last_fresh_ = -1;  ///< Krylov iterations of the first solve after a build, or that before;
+                                      ///< -1: none yet
+  double excess_ = 0;                 ///< iterations beyond that and a share of them, of all solves since
   double first_reuse_ = 0;  ///< iterations beyond it that the first reuse cost when it was last tried, halved
                             ///< at every build since
   bool built_here_ = false;     ///< at the last linearisation

@@ -1,5 +1,7 @@
 #include "wheel/families.h"
 
+#include <map>
+
 #include "error.h"
 #include "lapack.h"
 #include "log.h"
@@ -21,40 +23,65 @@ complex Families::turn(int sector, size_t member) const {
   return mean_.turn(sector, members_[member].diameter);
 }
 
-/// N^-1 W^H (A - mean) W, W the members' motions of the whole wheel. Members of one wave keep what they share
-/// out: the mean is theirs already.
+/// N^-1 W^H (A - mean) W, W the members' motions of the whole wheel, one after the other. Members of one wave
+/// keep what they share out: the mean is theirs already.
 void Families::set_deviation(int order, std::vector<complex> const& shapes) {
   const MatHandle A = problem_.model().sum(order);
   if (!A) return;
-  const int n = mean_.dofs(), K = size();
-  const size_t local = size_t(own_sectors_) * n;
-  std::vector<complex> W(local * K), AW(W.size());
-  for (int k = 0; k < K; ++k)
-    for (int j = 0; j < own_sectors_; ++j)
-      for (int p = 0; p < n; ++p)
-        W[k * local + size_t(j) * n + mean_.dof(p)] = turn(first_sector_ + j, k) * shapes[size_t(k) * n + p];
-  const VecHandle x = problem_.model().displacement(), y = like(x);
-  for (int k = 0; k < K; ++k)
-    for (const bool imaginary : {false, true}) {
-      {
-        WriteArray to(x);
-        for (size_t i = 0; i < local; ++i)
-          to[PetscInt(i)] = imaginary ? W[k * local + i].imag() : W[k * local + i].real();
-      }
-      check(MatMult(A, x, y));
-      const ReadArray from(y);
-      for (size_t i = 0; i < local; ++i)
-        AW[k * local + i] += imaginary ? complex(0, from[PetscInt(i)]) : complex(from[PetscInt(i)]);
-    }
+  const size_t n = size_t(mean_.dofs());
+  const int K = size();
   auto& P = deviation_[order];
   P.assign(size_t(K) * K, 0.0);
-  const int rows = int(local);
-  lapack::multiply("CN", {K, K, rows}, 1.0 / mean_.sectors(), {W.data(), rows}, {AW.data(), rows}, 0.0,
-                   P.data(), K);
+  for (int k = 0; k < K; ++k) {
+    const auto forces = multiplied(A, k, &shapes[size_t(k) * n]);
+    std::map<int, std::vector<complex>> in_waves;
+    for (int l = 0; l < K; ++l) {
+      if (members_[k].diameter == members_[l].diameter) continue;
+      auto& wave = in_waves[members_[l].diameter];
+      if (wave.empty()) wave = in_wave(forces, size_t(l));
+      complex sum = 0;
+      for (size_t i = 0; i < n; ++i) sum += std::conj(shapes[size_t(l) * n + i]) * wave[i];
+      P[size_t(k) * K + l] = sum / double(mean_.sectors());
+    }
+  }
   sum_over_ranks(P, problem_.comm());
-  for (int k = 0; k < K; ++k)
-    for (int l = 0; l < K; ++l)
-      if (members_[k].diameter == members_[l].diameter) P[size_t(k) * K + l] = 0;
+}
+
+/// A x of a member's motion, by this rank's sectors and places. Collective.
+std::vector<complex> Families::multiplied(Mat A, int member, complex const* shape) const {
+  const size_t n = size_t(mean_.dofs());
+  std::vector<complex> out(size_t(own_sectors_) * n);
+  const VecHandle x = problem_.model().displacement(), y = like(x);
+  const auto at = [&](int sector, size_t place) {
+    return PetscInt(size_t(sector) * n + size_t(mean_.dof(int(place))));
+  };
+  for (const bool imaginary : {false, true}) {
+    {
+      WriteArray to(x);
+      for (int j = 0; j < own_sectors_; ++j)
+        for (size_t p = 0; p < n; ++p) {
+          const complex a = turn(first_sector_ + j, size_t(member)) * shape[p];
+          to[at(j, p)] = imaginary ? a.imag() : a.real();
+        }
+    }
+    check(MatMult(A, x, y));
+    const ReadArray from(y);
+    for (int j = 0; j < own_sectors_; ++j)
+      for (size_t p = 0; p < n; ++p)
+        out[size_t(j) * n + p] += imaginary ? complex(0, from[at(j, p)]) : complex(from[at(j, p)]);
+  }
+  return out;
+}
+
+/// sum_j x_j e^{-2 pi i j d / N} over this rank's sectors, d of a member.
+std::vector<complex> Families::in_wave(std::vector<complex> const& x, size_t member) const {
+  const size_t n = size_t(mean_.dofs());
+  std::vector<complex> out(n);
+  for (int j = 0; j < own_sectors_; ++j) {
+    const complex t = std::conj(turn(first_sector_ + j, member));
+    for (size_t p = 0; p < n; ++p) out[p] += t * x[size_t(j) * n + p];
+  }
+  return out;
 }
 
 void Families::make(std::vector<complex> const& waves, std::vector<std::vector<complex>> const& coefficients,

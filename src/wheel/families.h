@@ -31,6 +31,8 @@ class Families {
  private:
   complex turn(int sector, size_t member) const;
   void set_deviation(int order, std::vector<complex> const& shapes);
+  std::vector<complex> multiplied(Mat A, int member, complex const* shape) const;
+  std::vector<complex> in_wave(std::vector<complex> const& x, size_t member) const;
   void add_contact(std::vector<complex> const& Psi, std::vector<complex> const& Lambda, WheelContact const&,
                    std::vector<double>& S) const;
 

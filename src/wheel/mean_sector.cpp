@@ -1,8 +1,6 @@
 #include "wheel/mean_sector.h"
 
 #include <algorithm>
-#include <cmath>
-#include <numbers>
 
 namespace fretwave::wheel {
 
@@ -18,47 +16,28 @@ MeanSector::MeanSector(model::Model const& model, WheelContact const& contact)
   for (int k = 0; k < unit_; ++k) position_[order_[k]] = k;
 }
 
-std::vector<CirculantBlocks<double>> MeanSector::terms(model::Model const& model) const {
-  std::vector<CirculantBlocks<double>> out;
-  for (auto const& term : model.terms()) out.push_back(average(term.A, model.comm()));
+std::vector<Circulant<SparseBlock>> MeanSector::terms(model::Model const& model) const {
+  std::vector<Circulant<SparseBlock>> out;
+  for (auto const& term : model.terms()) out.push_back(mean_blocks(term.A, unit_, sectors_, position_));
   return out;
 }
 
-CirculantBlocks<double> MeanSector::average(Mat A, MPI_Comm comm) const {
-  CirculantBlocks<double> mine, all;
-  for_entries(A, [&](PetscInt row, PetscInt col, double value) {
-    auto& block = mine[int(col / unit_ - row / unit_ + sectors_) % sectors_];
-    block.resize(size_t(unit_) * unit_);
-    block[size_t(position_[col % unit_]) * unit_ + position_[row % unit_]] += value / sectors_;
-  });
-  std::vector<int> ahead;
-  for (auto const& [k, block] : mine) ahead.push_back(k);
-  for (int k : gathered(std::span<int const>(ahead), comm)) all.try_emplace(k);
-  for (auto& [k, block] : all) {
-    if (mine.contains(k)) block = std::move(mine[k]);
-    block.resize(size_t(unit_) * unit_);
-    sum_over_ranks(block, comm);
-  }
-  return all;
-}
-
-bool MeanSector::symmetric(CirculantBlocks<double> const& blocks) const {
-  double size = 0, change = 0;
+std::vector<complex> MeanSector::of_wave(Circulant<SparseBlock> const& blocks, int diameter) const {
+  std::vector<complex> P(size_t(unit_) * unit_);
   for (auto const& [k, A] : blocks) {
-    const auto other = blocks.find((sectors_ - k) % sectors_);
-    if (other == blocks.end()) return false;
-    for (int j = 0; j < unit_; ++j)
-      for (int i = 0; i < unit_; ++i) {
-        const double a = A[size_t(j) * unit_ + i];
-        size = std::max(size, std::abs(a));
-        change = std::max(change, std::abs(a - other->second[size_t(i) * unit_ + j]));
-      }
+    const complex t = turn(k, diameter);
+    for_entries(A, [&](int row, int column, double a) { P[size_t(column) * unit_ + row] += t * a; });
   }
-  return change <= 1e-9 * size;
+  return P;
 }
 
-complex MeanSector::turn(int ahead, int diameter) const {
-  return std::polar(1.0, 2 * std::numbers::pi * double(size_t(ahead) * diameter % sectors_) / sectors_);
+std::vector<complex> MeanSector::of_wave(Circulant<std::vector<complex>> const& blocks, int diameter) const {
+  std::vector<complex> P(size_t(unit_) * unit_);
+  for (auto const& [k, A] : blocks) {
+    const complex t = turn(k, diameter);
+    for (size_t i = 0; i < P.size(); ++i) P[i] += t * A[i];
+  }
+  return P;
 }
 
 std::vector<complex> MeanSector::rows_of(int diameter, WheelContact const& contact) const {

@@ -5,12 +5,18 @@
 
 #include "lapack.h"
 #include "model/stuck_basis.h"
+#include "tuned.h"
+#include "wheel/lowest_waves.h"
 
 namespace fretwave::wheel {
 
 namespace {
 
 using lapack::multiply;
+
+const Tuned whole("wheel_whole", 1000, "dofs of a sparse sector up to which its waves have all modes");
+const Tuned dense("wheel_dense", 0.25, "share of nonzero entries from which a sector is dense");
+const Tuned lowest("wheel_modes", 40, "modes of a wave beside the factor of a large sector");
 
 /// M := U of M x = theta K x, U^H K U = 1; false if K is not positive definite.
 bool solve_pencil(std::vector<complex> K, std::vector<complex>& M, std::vector<double>& theta) {
@@ -30,53 +36,65 @@ bool solve_pencil(std::vector<complex> K, std::vector<complex>& M, std::vector<d
   return info == 0;
 }
 
-/// Of modes with the damping C between them: that of each, and the largest of one by all others.
-void set_damping(WaveBasis& basis, std::vector<complex> const& U, std::vector<complex> const& C) {
-  const int n = int(basis.theta.size());
-  basis.damping.assign(n, 0.0);
-  if (C.empty()) return;
-  std::vector<complex> CU(C.size()), UCU(C.size());
-  multiply("NN", {n, n, n}, 1.0, {C.data(), n}, {U.data(), n}, 0.0, CU.data(), n);
-  multiply("CN", {n, n, n}, 1.0, {U.data(), n}, {CU.data(), n}, 0.0, UCU.data(), n);
-  for (int j = 0; j < n; ++j) {
-    double apart = 0;
-    for (int i = 0; i < n; ++i) apart += i == j ? 0 : std::norm(UCU[size_t(j) * n + i]);
-    basis.damped_together = std::max(basis.damped_together, std::sqrt(apart));
-    basis.damping[j] = UCU[size_t(j) * n + j].real();
-  }
-}
-
 }  // namespace
 
 WaveBases::WaveBases(model::Model const& model, MeanSector const& mean,
-                     std::vector<CirculantBlocks<double>> const& terms, WheelContact const& contact,
+                     std::vector<Circulant<SparseBlock>> const& terms, WheelContact const& contact,
                      std::vector<double> const& stuck)
-    : model_(model), mean_(mean), terms_(terms), contact_(contact), stuck_(stuck) {
+    : mean_(mean), contact_(contact), stuck_(stuck) {
+  for (size_t j = 0; j < terms.size(); ++j) {
+    auto& to = of_order_[model.terms()[j].order];
+    to = to.empty() ? terms[j] : sum(to, 1, terms[j]);
+  }
+  of_order_[0] = sum(of_order_[0], 1, of_springs());
   auto& kept = model.kept_of_waves();
   if (!kept) kept = std::make_shared<Kept>();
   kept_ = std::static_pointer_cast<Kept>(kept);
 }
 
-std::shared_ptr<WaveBasis const> WaveBases::of_diameter(int d) {
-  if (const auto found = kept_->find(d); found != kept_->end()) return found->second;
-  return (*kept_)[d] = found_for(d);
+/// B^T k B
+Circulant<SparseBlock> WaveBases::of_springs() const {
+  std::map<int, std::map<std::pair<int, int>, double>> sums;
+  std::vector<std::vector<WheelContact::Entry>> by_row(contact_.rows());
+  for (auto const& b : contact_.entries()) by_row[b.row].push_back(b);
+  for (int r = 0; r < contact_.rows(); ++r)
+    for (auto const& a : by_row[r])
+      for (auto const& b : by_row[r])
+        sums[(b.ahead - a.ahead + mean_.sectors()) % mean_.sectors()]
+            [{mean_.place(a.dof), mean_.place(b.dof)}] += a.value * stuck_[r] * b.value;
+  Circulant<SparseBlock> out;
+  for (auto const& [k, entries] : sums) {
+    SparseBlock& block = out[k];
+    for (auto const& [at, value] : entries) {
+      block.first.resize(size_t(at.first) + 1, int(block.columns.size()));
+      block.columns.push_back(at.second), block.values.push_back(value);
+    }
+    block.first.resize(size_t(mean_.dofs()) + 1, int(block.columns.size()));
+  }
+  return out;
 }
 
-std::shared_ptr<WaveBasis const> WaveBases::found_for(int d) const {
+bool WaveBases::large() const {
+  double entries = 0;
+  for (auto const& [k, A] : of_order_[0]) entries += double(A.values.size());
+  const double n = mean_.dofs();
+  return n > whole && entries < dense * n * n;
+}
+
+void WaveBases::prepare(MPI_Comm comm) {
+  if (!large() || kept_->factor) return;
+  kept_->factor = std::make_shared<SectorFactor>(of_order_[0], mean_.sectors(), comm);
+}
+
+std::shared_ptr<WaveBasis const> WaveBases::of_diameter(int d) {
+  if (const auto found = kept_->bases.find(d); found != kept_->bases.end()) return found->second;
+  return kept_->bases[d] = large() ? lowest_of(d) : all_of(d);
+}
+
+std::shared_ptr<WaveBasis> WaveBases::all_of(int d) const {
   const int n = mean_.dofs(), k = mean_.contact_dofs(), R = contact_.rows();
-  std::vector<std::vector<complex>> sums(3);
-  for (size_t j = 0; j < terms_.size(); ++j) {
-    const auto P = mean_.of_wave(terms_[j], d);
-    auto& sum = sums[model_.terms()[j].order];
-    sum.resize(P.size());
-    for (size_t i = 0; i < P.size(); ++i) sum[i] += P[i];
-  }
-  auto &K = sums[0], &U = sums[2];
+  auto K = mean_.of_wave(of_order_[0], d), U = mean_.of_wave(of_order_[2], d);
   const auto B = mean_.rows_of(d, contact_);
-  for (int j = 0; j < k; ++j)
-    for (int i = 0; i < k; ++i)
-      for (int r = 0; r < R; ++r)
-        K[size_t(j) * n + i] += std::conj(B[size_t(r) * k + i]) * stuck_[r] * B[size_t(r) * k + j];
   auto basis = std::make_shared<WaveBasis>();
   basis->theta.resize(n);
   if (!solve_pencil(std::move(K), U, basis->theta)) return nullptr;
@@ -86,8 +104,61 @@ std::shared_ptr<WaveBasis const> WaveBases::found_for(int d) const {
   for (complex const& a : basis->Phi) motions.push_back(std::abs(a));
   if (R > 0 && model::too_stiff(motions, stuck_)) return nullptr;
   basis->U.assign(U.begin(), U.end());
-  set_damping(*basis, U, sums[1]);
+  set_damping(*basis, U, d);
   return basis;
+}
+
+std::shared_ptr<WaveBasis> WaveBases::lowest_of(int d) const {
+  if (!kept_->factor->take(d)) return nullptr;
+  auto found = lowest_waves(*kept_->factor, of_order_[0], of_order_[2], d, int(lowest));
+  auto basis = std::make_shared<WaveBasis>();
+  const int m = int(found.theta.size()), n = mean_.dofs(), R = contact_.rows();
+  basis->factor = kept_->factor;
+  basis->theta = std::move(found.theta);
+  basis->Phi.resize(size_t(R) * m);
+  for (auto const& b : contact_.entries())
+    for (int l = 0; l < m; ++l)
+      basis->Phi[size_t(l) * R + b.row] +=
+          b.value * mean_.turn(b.ahead, d) * found.U[size_t(l) * n + mean_.place(b.dof)];
+  if (!set_static(*basis, d)) return nullptr;
+  set_damping(*basis, found.U, d);
+  basis->U.assign(found.U.begin(), found.U.end());
+  return basis;
+}
+
+/// K_s^-1 B^H and B K_s^-1 B^H; false where springs are far stiffer than the structure.
+bool WaveBases::set_static(WaveBasis& basis, int d) const {
+  const size_t n = size_t(mean_.dofs()), R = size_t(contact_.rows());
+  std::vector<complex> W(n * R);
+  for (auto const& b : contact_.entries())
+    W[size_t(b.row) * n + size_t(mean_.place(b.dof))] += std::conj(b.value * mean_.turn(b.ahead, d));
+  if (R > 0) basis.factor->solve(std::vector<int>(R, d), W.data());
+  basis.static_compliance.assign(R * R, 0.0);
+  for (auto const& b : contact_.entries())
+    for (size_t r = 0; r < R; ++r)
+      basis.static_compliance[r * R + size_t(b.row)] +=
+          b.value * mean_.turn(b.ahead, d) * W[r * n + size_t(mean_.place(b.dof))];
+  std::vector<double> motions;
+  for (size_t r = 0; r < R; ++r) motions.push_back(std::sqrt(basis.static_compliance[r * R + r].real()));
+  basis.static_shapes.assign(W.begin(), W.end());
+  return R == 0 || !model::too_stiff(motions, stuck_);
+}
+
+/// Of modes with the damping C between them: that of each, and the largest of one by all others.
+void WaveBases::set_damping(WaveBasis& basis, std::vector<complex> const& U, int d) const {
+  const int n = mean_.dofs(), m = int(basis.theta.size());
+  basis.damping.assign(m, 0.0);
+  if (of_order_[1].empty()) return;
+  std::vector<complex> CU(U.size()), UCU(size_t(m) * m);
+  for (int j = 0; j < m; ++j)
+    std::ranges::copy(multiply(of_order_[1], d, mean_.sectors(), &U[size_t(j) * n]), &CU[size_t(j) * n]);
+  multiply("CN", {m, m, n}, 1.0, {U.data(), n}, {CU.data(), n}, 0.0, UCU.data(), m);
+  for (int j = 0; j < m; ++j) {
+    double apart = 0;
+    for (int i = 0; i < m; ++i) apart += i == j ? 0 : std::norm(UCU[size_t(j) * m + i]);
+    basis.damped_together = std::max(basis.damped_together, std::sqrt(apart));
+    basis.damping[j] = UCU[size_t(j) * m + j].real();
+  }
 }
 
 }  // namespace fretwave::wheel

@@ -31,6 +31,8 @@ class WaveBlocks {
   virtual std::vector<complex> solve(std::vector<complex> const& x, Forces const&) const = 0;
   /// Floating-point operations of `make` at a point beside the last.
   virtual double flops() const = 0;
+  /// Of `solve`.
+  virtual double applied_flops() const = 0;
   virtual double megabytes() const = 0;
   virtual std::string describe() const = 0;
 

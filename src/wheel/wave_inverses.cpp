@@ -17,7 +17,7 @@ const Tuned far("wheel_far", 1e-2, "relative change of the exponents that makes 
 }  // namespace
 
 WaveInverses::WaveInverses(HarmonicProblem& problem, MeanSector const& mean,
-                           std::vector<CirculantBlocks<double>> terms, WheelContact& contact,
+                           std::vector<Circulant<SparseBlock>> terms, WheelContact& contact,
                            std::vector<Wave> const& waves)
     : problem_(problem),
       mean_(mean),
@@ -25,7 +25,8 @@ WaveInverses::WaveInverses(HarmonicProblem& problem, MeanSector const& mean,
       contact_(contact),
       waves_(waves),
       n_(mean.dofs()),
-      symmetric_(std::ranges::all_of(terms_, [&](auto const& term) { return mean.symmetric(term); })) {
+      symmetric_(
+          std::ranges::all_of(terms_, [&](auto const& term) { return symmetric(term, mean.sectors()); })) {
   size_t next = 0;  // a wave's mirror follows it
   for (size_t w = 0; w < waves_.size(); ++w) {
     at_.push_back(transposed(w) ? at_.back() : next);
@@ -46,8 +47,8 @@ bool WaveInverses::moved(Exponents const& e) const {
 }
 
 /// Structure and contact of a harmonic, by sectors ahead.
-CirculantBlocks<complex> WaveInverses::blocks(int harmonic, Exponents const& e) const {
-  CirculantBlocks<complex> out;
+Circulant<std::vector<complex>> WaveInverses::blocks(int harmonic, Exponents const& e) const {
+  Circulant<std::vector<complex>> out;
   const int N = mean_.sectors();
   const auto block = [&](int k) -> std::vector<complex>& {
     auto& A = out[k];
@@ -59,7 +60,7 @@ CirculantBlocks<complex> WaveInverses::blocks(int harmonic, Exponents const& e) 
                       problem_.stiffness_scale();
     for (auto const& [k, A] : terms_[j]) {
       auto& sum = block(k);
-      for (size_t i = 0; i < A.size(); ++i) sum[i] += c * A[i];
+      for_entries(A, [&](int row, int column, double a) { sum[size_t(column) * n_ + row] += c * a; });
     }
   }
   std::vector<std::vector<WheelContact::Entry>> by_row(contact_.rows());
@@ -73,7 +74,7 @@ CirculantBlocks<complex> WaveInverses::blocks(int harmonic, Exponents const& e) 
   return out;
 }
 
-void WaveInverses::invert(size_t wave, CirculantBlocks<complex> const& blocks) {
+void WaveInverses::invert(size_t wave, Circulant<std::vector<complex>> const& blocks) {
   auto P = mean_.of_wave(blocks, waves_[wave].diameter);
   fault::point("wave block");
   const int info = lapack::invert(P, n_);
@@ -88,7 +89,7 @@ void WaveInverses::invert(size_t wave, CirculantBlocks<complex> const& blocks) {
 template <class Select>
 void WaveInverses::invert(Select select, Exponents const& e) {
   for (int harmonic = 0; harmonic < problem_.harmonics().count(); ++harmonic) {
-    CirculantBlocks<complex> A;
+    Circulant<std::vector<complex>> A;
     for (size_t w = 0; w < waves_.size(); ++w) {
       if (waves_[w].harmonic != harmonic || transposed(w) || !select(waves_[w])) continue;
       if (A.empty()) A = blocks(harmonic, e);

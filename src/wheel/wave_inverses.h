@@ -11,11 +11,12 @@ namespace fretwave::wheel {
 /// change matters.
 class WaveInverses : public WaveBlocks {
  public:
-  WaveInverses(HarmonicProblem&, MeanSector const&, std::vector<CirculantBlocks<double>> terms, WheelContact&,
+  WaveInverses(HarmonicProblem&, MeanSector const&, std::vector<Circulant<SparseBlock>> terms, WheelContact&,
                std::vector<Wave> const&);
   void make(Point const&) override;
   std::vector<complex> solve(std::vector<complex> const& x, Forces const&) const override;
   double flops() const override;
+  double applied_flops() const override { return 8.0 * n_ * n_ * double(waves_.size()); }
   double megabytes() const override { return sizeof(scomplex) * double(inverses_.size()) / 1e6; }
   std::string describe() const override { return "inverses"; }
 
@@ -23,8 +24,8 @@ class WaveInverses : public WaveBlocks {
   bool moved(Exponents const&) const;
   template <class Select>
   void invert(Select, Exponents const&);
-  CirculantBlocks<complex> blocks(int harmonic, Exponents const&) const;
-  void invert(size_t wave, CirculantBlocks<complex> const&);
+  Circulant<std::vector<complex>> blocks(int harmonic, Exponents const&) const;
+  void invert(size_t wave, Circulant<std::vector<complex>> const&);
   void set_compliances();
   bool mirrored(size_t wave) const { return waves_[wave].diameter > mean_.sectors() / 2; }
   bool transposed(size_t wave) const { return symmetric_ && mirrored(wave); }
@@ -37,7 +38,7 @@ class WaveInverses : public WaveBlocks {
 
   HarmonicProblem& problem_;
   MeanSector const& mean_;
-  std::vector<CirculantBlocks<double>> terms_;
+  std::vector<Circulant<SparseBlock>> terms_;
   WheelContact& contact_;
   std::vector<Wave> waves_;
   int n_;

@@ -42,21 +42,23 @@ WaveModes::WaveModes(HarmonicProblem& problem, MeanSector const& mean, WheelCont
 }
 
 std::unique_ptr<WaveModes> WaveModes::of(HarmonicProblem& problem, MeanSector const& mean,
-                                         std::vector<CirculantBlocks<double>> const& terms,
+                                         std::vector<Circulant<SparseBlock>> const& terms,
                                          WheelContact& contact, std::vector<Wave> const& waves,
                                          double highest) {
   static const log::Event making("FwWaveModes");
   const log::Span span(making);
   std::unique_ptr<WaveModes> out(new WaveModes(problem, mean, contact, waves));
-  int fit = std::ranges::all_of(terms, [&](auto const& term) { return mean.symmetric(term); }) &&
+  int fit = std::ranges::all_of(terms, [&](auto const& term) { return symmetric(term, mean.sectors()); }) &&
             std::ranges::all_of(out->stuck_, [](double k) { return std::isfinite(k); });
   for (const int order : {0, 2})
     fit = fit && std::ranges::any_of(problem.model().terms(), [&](auto& t) { return t.order == order; });
+  if (!fit) return nullptr;
   WaveBases bases(problem.model(), mean, terms, contact, out->stuck_);
+  bases.prepare(problem.comm());
   together(problem.comm(), "finding the waves' modes", [&] {
     for (Diameter& of_d : out->diameters_) {
       if (fit) of_d.basis = bases.of_diameter(of_d.d);
-      fit = of_d.basis && highest * of_d.basis->damped_together <= damped_together;
+      fit = fit && of_d.basis && highest * of_d.basis->damped_together <= damped_together;
     }
   });
   MPI_Allreduce(MPI_IN_PLACE, &fit, 1, MPI_INT, MPI_LAND, problem.comm());
@@ -73,22 +75,24 @@ std::vector<complex> WaveModes::coefficients(Exponents const& e, int harmonic) c
 
 /// z, Z, G and X of a wave.
 void WaveModes::set(Diameter const& of_d, size_t wave, Exponents const& e) {
-  const int n = n_, R = rows_;
+  const int n = modes(of_d), R = rows_;
+  WaveBasis const& basis = *of_d.basis;
   OfWave& of_wave = of_wave_[wave];
   auto &z = of_wave.z, &Z = of_wave.Z;
   const auto c = coefficients(e, waves_[wave].harmonic);
+  of_wave.softness = basis.factor ? 1.0 / turned(wave, c[0]) : 0.0;
   z.resize(n), Z.resize(n);
   for (int l = 0; l < n; ++l) {
-    z[l] = turned(wave, c[0]) + turned(wave, c[1]) * of_d.basis->damping[l] +
-           turned(wave, c[2]) * of_d.basis->theta[l];
-    Z[l] = 1.0 / z[l];
+    z[l] = turned(wave, c[0]) + turned(wave, c[1]) * basis.damping[l] + turned(wave, c[2]) * basis.theta[l];
+    Z[l] = 1.0 / z[l] - of_wave.softness;
   }
   if (apart_)
-    for (const int l : of_wave.family) Z[l] = 0;
-  std::vector<complex> PhiZ(of_d.basis->Phi), G(size_t(R) * R), X(G), A(G), GX(G), XG(G);
+    for (const int l : of_wave.family) Z[l] = -of_wave.softness;
+  std::vector<complex> PhiZ(basis.Phi), G(basis.static_compliance), X(size_t(R) * R), A(X), GX(X), XG(X);
   for (int l = 0; l < n; ++l)
     for (int r = 0; r < R; ++r) PhiZ[size_t(l) * R + r] *= Z[l];
-  multiply("NC", {R, R, n}, 1.0, {PhiZ.data(), R}, {of_d.basis->Phi.data(), R}, 0.0, G.data(), R);
+  G.resize(size_t(R) * R);
+  multiply("NC", {R, R, n}, 1.0, {PhiZ.data(), R}, {basis.Phi.data(), R}, of_wave.softness, G.data(), R);
   contact_.for_tangents(waves_[wave].harmonic, [&](int r, int c, complex t) {
     X[size_t(c) * R + r] += turned(wave, t) - (r == c ? stuck_[r] / problem_.stiffness_scale() : 0.0);
   });
@@ -130,17 +134,42 @@ void WaveModes::make(Point const& point) {
   });
 }
 
-/// 8 n R^2 for G of a wave, 8 R^3 each for three products and 8/3 more and 8 for X.
+/// 8 m R^2 for G of a wave of m modes, 8 R^3 each for three products and 8/3 more and 8 for X.
 double WaveModes::flops() const {
+  const double R = rows_;
+  double sum = 0;
+  for (Diameter const& of_d : diameters_)
+    sum += double(of_d.waves.size()) * (8 * modes(of_d) * R * R + 35 * R * R * R);
+  return sum;
+}
+
+/// 16 n m of a wave for U, and where it has a factor 8 n R for static shapes and two solves.
+double WaveModes::applied_flops() const {
   const double n = n_, R = rows_;
-  return double(waves_.size()) * (8 * n * R * R + 35 * R * R * R);
+  double sum = 0;
+  for (Diameter const& of_d : diameters_) {
+    const double still = of_d.basis->factor ? 8 * n * R + 16 * of_d.basis->factor->entries() : 0;
+    sum += double(of_d.waves.size()) * (16 * n * modes(of_d) + still);
+  }
+  return sum;
 }
 
 double WaveModes::megabytes() const {
   const double n = n_, R = rows_;
-  return (double(diameters_.size()) * n * (n * sizeof(scomplex) + R * sizeof(complex)) +
-          double(waves_.size()) * (n + 3 * R * R) * sizeof(complex)) /
-         1e6;
+  double sum =
+      diameters_.empty() || !diameters_[0].basis->factor ? 0 : diameters_[0].basis->factor->megabytes();
+  for (Diameter const& of_d : diameters_) {
+    const double m = modes(of_d), still = of_d.basis->factor ? n * R : 0;
+    sum += ((m + still / n) * n * sizeof(scomplex) + m * R * sizeof(complex) +
+            double(of_d.waves.size()) * (m + 3 * R * R) * sizeof(complex)) /
+           1e6;
+  }
+  return sum;
+}
+
+std::string WaveModes::describe() const {
+  const bool all = diameters_.empty() || !diameters_[0].basis->factor;
+  return all ? "modes" : "lowest modes and a sector's factor";
 }
 
 }  // namespace fretwave::wheel

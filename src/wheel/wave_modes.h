@@ -19,6 +19,10 @@ namespace fretwave::wheel {
 ///
 ///     A^-1 = U (Z - Z Phi^H X Phi Z) U^H,  Z = z^-1,  Phi = B U,  X = (1 + T G)^-1 T,  G = Phi Z Phi^H.
 ///
+/// Of large sectors the lowest modes serve, beside what is static (`WaveBasis`): for all modes
+///
+///     U Z U^H  stands  U (Z - 1/c) U^H + K_s^-1 / c,  c the coefficient of the stiffness.
+///
 /// About motions that are no travelling wave the modes near the fundamental are kept out of Z and solved for
 /// together (`Families`).
 class WaveModes : public WaveBlocks {
@@ -27,14 +31,15 @@ class WaveModes : public WaveBlocks {
   /// without an end or far stiffer than the structure, damping between modes at the exponent `highest`.
   /// Collective.
   static std::unique_ptr<WaveModes> of(HarmonicProblem&, MeanSector const&,
-                                       std::vector<CirculantBlocks<double>> const& terms, WheelContact&,
+                                       std::vector<Circulant<SparseBlock>> const& terms, WheelContact&,
                                        std::vector<Wave> const&, double highest);
   void make(Point const&) override;
   void couple(std::vector<complex> const& local) override;
   std::vector<complex> solve(std::vector<complex> const& x, Forces const&) const override;
   double flops() const override;
+  double applied_flops() const override;
   double megabytes() const override;
-  std::string describe() const override { return "modes"; }
+  std::string describe() const override;
 
  private:
   struct Diameter {
@@ -44,7 +49,8 @@ class WaveModes : public WaveBlocks {
   };
   /// In single precision what an application reads.
   struct OfWave {
-    std::vector<complex> z, Z;
+    std::vector<complex> z, Z;               ///< Z less what is static
+    complex softness;                        ///< 1 / c of what is static
     std::vector<scomplex> X, motion, force;  ///< X, 1 - G X, 1 - X G
     std::vector<scomplex> between;           ///< compliance less that of a single sector
     std::vector<int> family;                 ///< its modes near the fundamental
@@ -55,15 +61,21 @@ class WaveModes : public WaveBlocks {
   void set(Diameter const&, size_t wave, Exponents const&);
   void find_family(Exponents const&);
   void make_families();
-  /// Forces on modes g and motion of the rows b by wave, and of the families' modes where they have moved.
+  /// Forces on modes g by wave and motion of the rows b; of the families' modes where they have moved; and
+  /// K_s^-1 x by wave, none where no force is worth it.
   struct State {
-    std::vector<complex> g, b, families;
+    std::vector<std::vector<complex>> g;
+    std::vector<complex> b, families;
+    std::vector<std::vector<complex>> moved;
   };
   /// Forces on rows, and the families' motion.
   struct Reply {
     std::vector<complex> f, eta;
   };
   State relaxed(std::vector<complex> const& x) const;
+  void move_statically(State&, std::vector<complex> const& x) const;
+  std::vector<complex> modal(size_t wave, State const&, std::vector<complex> const& h,
+                             std::vector<complex>::const_iterator& families) const;
   std::vector<complex> motions(State const&) const;
   std::vector<complex> held(size_t wave, State const&, std::vector<complex> const& f) const;
   std::vector<complex> dofs(State const&, std::vector<complex> const& f) const;
@@ -78,6 +90,7 @@ class WaveModes : public WaveBlocks {
   Diameter const& of_diameter(size_t wave) const { return diameters_[diameter_of_[wave]]; }
   /// An iteration of the sectors' coupling reads less than one outside.
   bool inside_pays() const { return rows_ > 0 && 4 * rows_ * rows_ < n_ * n_; }
+  int modes(Diameter const& of_d) const { return int(of_d.basis->theta.size()); }
   bool mirrored(size_t wave) const { return waves_[wave].diameter > mean_.sectors() / 2; }
   complex turned(size_t wave, complex a) const { return mirrored(wave) ? std::conj(a) : a; }
 

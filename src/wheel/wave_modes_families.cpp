@@ -36,7 +36,7 @@ void WaveModes::find_family(Exponents const& e) {
   for (size_t w = 0; w < waves_.size(); ++w) {
     of_wave_[w].family.clear();
     Diameter const& of_d = of_diameter(w);
-    for (int l = 0; l < n_ && waves_[w].harmonic == first; ++l) {
+    for (int l = 0; l < modes(of_d) && waves_[w].harmonic == first; ++l) {
       const double size =
           std::abs((c[0] + c[1] * of_d.basis->damping[l] + c[2] * of_d.basis->theta[l]) / c[0]);
       if (size < near) found.push_back({w, l, size}), sizes.push_back(size);
@@ -188,7 +188,7 @@ std::vector<complex> WaveModes::forces_on_families(State const& state) const {
   for (size_t w = 0; w < waves_.size(); ++w) {
     const auto Xb = times(of_wave_[w].X, state.b.data() + w * rows_);
     for (const int l : of_wave_[w].family) {
-      complex sum = state.g[w * n_ + l];
+      complex sum = state.g[w][l];
       for (int i = 0; i < rows_; ++i)
         sum -= std::conj(of_diameter(w).basis->Phi[size_t(l) * rows_ + i]) * complex(Xb[i]);
       r[at++] = turned(w, sum);

@@ -7,6 +7,7 @@
 
 #include "log.h"
 #include "precondition/kinds.h"
+#include "solve/memory.h"
 #include "tuned.h"
 #include "wheel/wave_inverses.h"
 #include "wheel/wave_modes.h"
@@ -65,8 +66,17 @@ void WheelPreconditioner::choose_blocks(Exponents const& e) {
   for (complex const& s : e.s) highest = std::max(highest, std::abs(s));
   auto terms = mean_.terms(problem_.model());
   blocks_ = WaveModes::of(problem_, mean_, terms, contact_, dofs_.waves(), highest);
-  if (!blocks_)
-    blocks_ = std::make_unique<WaveInverses>(problem_, mean_, std::move(terms), contact_, dofs_.waves());
+  if (blocks_) return;
+  const double bytes = sizeof(scomplex) * double(unit_) * unit_ * sectors_ * harmonics_;
+  const auto why = solve::beyond_memory("the inverses of the waves' blocks", bytes, problem_.comm());
+  if (!why.empty())
+    throw InputError(
+        "the waves of a wheel have no modes that serve (unsymmetric terms, a free motion with all "
+        "pairs stuck, springs without an end, or damping between modes), and " +
+            why,
+        std::to_string(unit_) + " dofs a sector", "sectors whose blocks fit",
+        "reduce the sector, or hold what is free");
+  blocks_ = std::make_unique<WaveInverses>(problem_, mean_, std::move(terms), contact_, dofs_.waves());
 }
 
 /// This rank's harmonic blocks as sectors x harmonics x places, q = qc - i qs.
@@ -212,13 +222,13 @@ void WheelPreconditioner::build(Vec y, Vec row) {
 void WheelPreconditioner::apply(Vec x, Vec z) { border_.apply(ReadArray(x).data(), WriteArray(z).data()); }
 
 /// Five applications for the border; the waves' blocks and the contact's elimination, 16/3 n^3 flops a
-/// sector, at the speed of matrix products, against 8 n^2 of an application that are read from memory.
+/// sector, at the speed of matrix products, against an application's matrices that are read from memory.
 double WheelPreconditioner::build_cost() const {
   const double size = 2.0 * contact_.largest_group() * harmonics_ / m_, n = unit_;
   const double waves = double(std::max<size_t>(dofs_.waves().size(), 1));
   return 6 + ((blocks_ ? blocks_->flops() : 4 * n * n * n * sectors_) / waves * harmonics_ +
               16.0 / 3 * size * size * size) /
-                 10 / (8.0 * n * n * harmonics_);
+                 10 / ((blocks_ ? blocks_->applied_flops() : 8 * n * n * waves) / waves * harmonics_);
 }
 
 std::string WheelPreconditioner::describe() const {

@@ -43,12 +43,28 @@ def in_wave(given: Term | None, q: npt.ArrayLike, theta: float) -> npt.NDArray[n
     return np.asarray(sum(np.exp(-1j * k * theta) * (A @ np.asarray(q)) for k, A in parts))
 
 
-def around(given: Term, sectors: int) -> Sparse:
-    """Block-circulant matrix of the wheel, from the own part of a sector and those on the sectors k places ahead."""
-    ahead = sp.csr_matrix(np.roll(np.eye(sectors), 1, axis=1))  # row j has its 1 in column j + 1
-    behind = sp.csr_matrix(ahead.T)
-    parts = by_sector(given).items()
-    return sp.csr_matrix(sum(sp.kron((ahead if k > 0 else behind) ** abs(k), sp.csr_matrix(A)) for k, A in parts))
+def around(given: Term, sectors: int, first: int = 0, end: int | None = None) -> Sparse:
+    """Block-circulant matrix of the wheel, from the own part of a sector and those on the sectors k places ahead.
+
+    Parameters
+    ----------
+    first, end : int
+        The rows of these sectors alone; all without them.
+    """
+    parts = {k: sp.csr_matrix(A) for k, A in by_sector(given).items()}
+    side_by_side = sp.hstack(list(parts.values()), format="csr")
+    n, own = parts[0].shape[1], range(first, sectors if end is None else end)
+    block, column = np.divmod(side_by_side.indices, n)
+    ahead, nnz = np.array(list(parts))[block], side_by_side.nnz
+    kind = np.int32 if max(sectors * n, len(own) * nnz) < 2**31 else np.int64
+    columns = np.empty((len(own), nnz), kind)
+    for row, j in enumerate(own):
+        columns[row] = (j + ahead) % sectors * n + column
+    starts = np.append(np.add.outer(np.arange(len(own)) * nnz, side_by_side.indptr[:-1]), len(own) * nnz).astype(kind)
+    shape = (len(own) * parts[0].shape[0], sectors * n)
+    out = sp.csr_matrix((np.tile(side_by_side.data, len(own)), columns.ravel(), starts), shape)
+    out.sum_duplicates()
+    return out
 
 
 def combine(left: Parts, middle: Parts, right: Parts, sign: int) -> dict[int, Sparse]:
