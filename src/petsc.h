@@ -115,6 +115,24 @@ class WriteArray {
   double* data_ = nullptr;
 };
 
+/// This rank's rows of a dense matrix, column by column, for the guard's lifetime.
+class DenseArray {
+ public:
+  explicit DenseArray(Mat A) : A_(A) {
+    check(MatDenseGetLDA(A, &lead_));
+    check(MatDenseGetArray(A, &data_));
+  }
+  ~DenseArray() { (void)MatDenseRestoreArray(A_, &data_); }
+  DenseArray(DenseArray const&) = delete;
+  double* column(PetscInt j) const { return data_ + size_t(j) * size_t(lead_); }
+  PetscInt lead() const { return lead_; }
+
+ private:
+  Mat A_;
+  double* data_ = nullptr;
+  PetscInt lead_ = 0;
+};
+
 inline VecHandle make_vector(MPI_Comm comm, PetscInt local) {
   VecHandle v;
   check(VecCreateMPI(comm, local, PETSC_DECIDE, v.out()));

@@ -54,6 +54,7 @@ class Options:
     radial_cells: tuple[int, int, int] = (9, 2, 2)  #: web, lip, rim
     span_cells: int = 12
     ring_cells: int = 2
+    reduced: bool = True  #: onto contact, tip, interface and component modes; if not, all finite elements
     interface_diameters: tuple[int, ...] = (0, 4, 18)  #: whose waves give the interface modes
     interface_waves: int = 7  #: of each, stuck and sliding
     interface_tolerance: float = 1e-5  #: singular values kept, over the largest

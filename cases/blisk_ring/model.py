@@ -29,8 +29,9 @@ COLUMNS = ("left", "middle", "right")
 
 
 def build(**options: Any) -> fw.Structure:
-    """The reduced sector for a case file; options are the fields of `geometry.Options`."""
-    o, r = checked_options(options), reduced(**options)
+    """The sector for a case file, reduced or not; options are the fields of `geometry.Options`."""
+    o = checked_options(options)
+    r = reduced(**options) if o.reduced else {**full(**options), "expand": None}
     K, groove = groove_contact(o, r)
     return fw.Structure(
         M=r["M"],
@@ -235,7 +236,8 @@ def reduced(cache: Union[Path, str, None] = "default", **options: Any) -> dict[s
         return compute(o)
     folder = default_folder() if cache == "default" else Path(cache)
     here = Path(__file__)
-    key = model_key(asdict(replace(o, speed_rpm=0.0, friction=0.0, normal="")), [here, here.with_name("geometry.py")])
+    same = replace(o, speed_rpm=0.0, friction=0.0, normal="", reduced=True)
+    key = model_key(asdict(same), [here, here.with_name("geometry.py")])
     return cached(folder / f"blisk_ring_{key}.npz", lambda: compute(o))
 
 

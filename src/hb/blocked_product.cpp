@@ -44,8 +44,7 @@ template <int registers = 1>
 FRETWAVE_INLINE void multiply_by_fewest(Rows const& A, double const* x, double* y, size_t m,
                                         int coefficients) {
   if constexpr (registers < most)
-    if (coefficients > registers * width)
-      return multiply_by_fewest<registers + 1>(A, x, y, m, coefficients);
+    if (coefficients > registers * width) return multiply_by_fewest<registers + 1>(A, x, y, m, coefficients);
   multiply<registers>(A, x, y, m, coefficients);
 }
 

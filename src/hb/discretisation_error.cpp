@@ -9,6 +9,7 @@
 #include "hb/diagnostics.h"
 #include "log.h"
 #include "solve/memory.h"
+#include "solve/preconditioner.h"
 #include "solve/vectors.h"
 #include "tuned.h"
 
@@ -18,7 +19,8 @@ namespace {
 
 const Tuned tolerance("error_tolerance", 1e-3,
                       "relative residual of the linear systems: errors move by 1 % at most");
-const Tuned memory_share("error_memory_share", 0.5, "share of the free memory that the factors may take");
+const Tuned memory_share("error_memory_share", 0.5, "share of the free memory that estimates may take");
+constexpr double vectors = 70;  // of a problem: its own, and for each GMRES iteration two
 const Tuned negligible("error_negligible", 1e-6,
                        "share of the residual, up to which a source is not solved for");
 const Tuned reach("error_reach", 0.3, "arclength by which the branch is followed to the same parameter");
@@ -63,11 +65,15 @@ std::unique_ptr<HarmonicProblem> refined(HarmonicProblem const& problem, std::ve
   return out;
 }
 
-/// A complex factor for each order: of reduced models dense, else filled twelvefold, as of three-dimensional
-/// meshes.
-double factor_bytes(model::Model const& model, size_t orders) {
-  const double dense = double(model.dofs()) * double(model.dofs());
-  return sizeof(complex) * double(orders) * std::min(12 * model.largest_term(), dense);
+/// Of vectors of so many problems, where all harmonics have one factor; else of a complex factor for each
+/// order: of reduced models dense, else filled twelvefold, as of three-dimensional meshes. Collective.
+double bytes_of(HarmonicProblem& problem, int problems) {
+  model::Model const& model = problem.model();
+  const double n = double(model.dofs());
+  const double of_vectors = sizeof(double) * problems * vectors * n * problem.harmonics().block_size();
+  if (auto const* kind = solve::choose_kind(problem, "auto").kind; kind && kind->one_factor)
+    return of_vectors;
+  return sizeof(complex) * double(problem.harmonics().count()) * std::min(12 * model.largest_term(), n * n);
 }
 
 }  // namespace
@@ -75,15 +81,15 @@ double factor_bytes(model::Model const& model, size_t orders) {
 DiscretisationError::DiscretisationError(HarmonicProblem& problem, std::string const& prefix)
     : problem_(problem), prefix_(prefix) {
   const std::vector<int> orders = enlarged(problem.harmonics(), problem.model());
-  const double bytes = factor_bytes(problem.model(), orders.size()),
-               free = solve::available_bytes(problem.comm());
+  const int samples = std::max(4 * problem.harmonics().samples(), 16 * orders.back());
+  finer_ = refined(problem, orders, samples, problem.harmonics().highest());
+  const double bytes = bytes_of(*finer_, 2), free = solve::available_bytes(problem.comm());
   if (bytes > memory_share * free) {
-    left_out_ = "factors of " + std::to_string(orders.size()) + " harmonics would take about " +
+    finer_.reset();
+    left_out_ = "systems of " + std::to_string(orders.size()) + " harmonics would take about " +
                 solve::gigabytes(bytes) + ", of " + solve::gigabytes(free) + " free";
     return;
   }
-  const int samples = std::max(4 * problem.harmonics().samples(), 16 * orders.back());
-  finer_ = refined(problem, orders, samples, problem.harmonics().highest());
   moved_ = refined(problem, orders, samples, orders.back());
   newton_ = std::make_unique<solve::Newton>(*finer_, prefix);
   newton_->solve_beside(tolerance);
@@ -136,8 +142,7 @@ double DiscretisationError::bend(Vec point, Vec r, Vec reduction, Vec step) {
 /// not fit the memory beside the others.
 void DiscretisationError::from_halfway(Vec middle, Vec row, std::span<Vec const> b, std::span<Vec const> x) {
   if (!again_) {
-    const double bytes = factor_bytes(problem_.model(), size_t(moved_->harmonics().count()));
-    if (bytes > memory_share * solve::available_bytes(problem_.comm())) return;
+    if (bytes_of(*moved_, 1) > memory_share * solve::available_bytes(problem_.comm())) return;
     again_ = std::make_unique<solve::Newton>(*moved_, prefix_);
     again_->solve_beside(tolerance);
   }

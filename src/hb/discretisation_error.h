@@ -43,7 +43,7 @@ class DiscretisationError {
  public:
   /// `prefix`: of the PETSc options of J' dy' = b. Collective.
   DiscretisationError(HarmonicProblem&, std::string const& prefix);
-  /// Why nothing is estimated: its factors would not fit the memory; empty if they do.
+  /// Why nothing is estimated: its systems would not fit the memory; empty if they do.
   std::string const& left_out() const { return left_out_; }
   /// At a converged point with its tangent; none where J' is singular. Collective.
   std::optional<LeftOut> at(Vec y, Vec tangent, Vec reduction = nullptr);

@@ -31,24 +31,6 @@ void multiply(char const* op_a, char const* op_b, std::array<PetscInt, 3> size, 
 
 void add_over_ranks(MPI_Comm comm, std::vector<double>& values) { sum_over_ranks(values, comm); }
 
-/// This rank's rows of a dense matrix, column by column, for the guard's lifetime.
-class DenseArray {
- public:
-  explicit DenseArray(Mat A) : A_(A) {
-    check(MatDenseGetLDA(A, &lead_));
-    check(MatDenseGetArray(A, &data_));
-  }
-  ~DenseArray() { (void)MatDenseRestoreArray(A_, &data_); }
-  DenseArray(DenseArray const&) = delete;
-  double* column(PetscInt j) const { return data_ + size_t(j) * size_t(lead_); }
-  PetscInt lead() const { return lead_; }
-
- private:
-  Mat A_;
-  double* data_ = nullptr;
-  PetscInt lead_ = 0;
-};
-
 /// Rows of the internal dofs of a panel.
 void take_rows(Mat from, Mat to, std::vector<PetscInt> const& internal, PetscInt first) {
   PetscInt columns;

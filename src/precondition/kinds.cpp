@@ -93,7 +93,9 @@ void register_kinds() {
   const auto always = [](HarmonicProblem const&) { return true; };
   const auto large = [](HarmonicProblem const& problem) { return !suits_dense(problem); };
   const auto has_basis = [](HarmonicProblem const& problem) { return without_basis(problem).empty(); };
-  solve::register_kind(harmonic_kind<StaticPreconditioner>("fwstatic", "", large, without_static));
+  auto statics = harmonic_kind<StaticPreconditioner>("fwstatic", "", large, without_static);
+  statics.one_factor = true;
+  solve::register_kind(std::move(statics));
   auto condensed = harmonic_kind<CondensedPreconditioner>("fwcondensed", "sparse", large, not_condensed);
   condensed.fallback_bytes = condensed_bytes;
   solve::register_kind(std::move(condensed));

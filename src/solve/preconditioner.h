@@ -40,6 +40,7 @@ struct PreconditionerKind {
   /// For where another kind fails: what building it takes beside its factors [bytes]; none: it is no help.
   /// Collective.
   std::function<double(Problem&)> fallback_bytes = {};
+  bool one_factor = false;  ///< of the model, for all its problems: none of a harmonic's own
 };
 
 /// Why a problem cannot have a kind, memory included. Collective.

@@ -12,22 +12,6 @@ namespace {
 
 constexpr int together_at_most = 64;  // columns of a solve: matrix products inside MUMPS
 
-class DenseArray {
- public:
-  explicit DenseArray(Mat A) : A_(A) {
-    check(MatDenseGetLDA(A_, &lead));
-    check(MatDenseGetArray(A_, &data));
-  }
-  ~DenseArray() { (void)MatDenseRestoreArray(A_, &data); }
-  DenseArray(DenseArray const&) = delete;
-  double* column(size_t j) const { return data + j * size_t(lead); }
-
- private:
-  Mat A_;
-  PetscInt lead = 0;
-  double* data = nullptr;
-};
-
 MatHandle inner_matrix(std::vector<int> const& dofs, std::vector<int> const& number, SparseBlock const& K,
                        std::vector<char> const& is_shared) {
   std::vector<PetscInt> counts;
@@ -98,7 +82,7 @@ MatHandle SectorFactor::columns_of(int first, int count) const {
   for (size_t i = 0; i < ahead_.size(); ++i)
     for (Entry const& e : P_.at(ahead_[i])) {
       const int column = int(i) * interface() + e.column - first;
-      if (column >= 0 && column < count) to.column(size_t(column))[e.row] += e.value;
+      if (column >= 0 && column < count) to.column(column)[e.row] += e.value;
     }
   return out;
 }
@@ -120,7 +104,7 @@ void SectorFactor::condense(MPI_Comm comm) {
       for (int j = 0; j < count; ++j)
         for (size_t i = 0; i < ahead_.size(); ++i)
           for (Entry const& e : P_.at(ahead_[i]))
-            G_[size_t(first + j) * size + i * b + e.column] += e.value * x.column(size_t(j))[e.row];
+            G_[size_t(first + j) * size + i * b + e.column] += e.value * x.column(j)[e.row];
     }
   });
   sum_over_ranks(G_, comm);
@@ -160,12 +144,14 @@ void SectorFactor::solve_inner(std::vector<complex>& x) const {
       const DenseArray to(right);
       for (size_t j = 0; j < count; ++j)
         for (size_t i = 0; i < n; ++i)
-          to.column(2 * j)[i] = at[j * n + i].real(), to.column(2 * j + 1)[i] = at[j * n + i].imag();
+          to.column(PetscInt(2 * j))[i] = at[j * n + i].real(),
+                                 to.column(PetscInt(2 * j + 1))[i] = at[j * n + i].imag();
     }
     inner_->solve(right, found);
     const DenseArray from(found);
     for (size_t j = 0; j < count; ++j)
-      for (size_t i = 0; i < n; ++i) at[j * n + i] = {from.column(2 * j)[i], from.column(2 * j + 1)[i]};
+      for (size_t i = 0; i < n; ++i)
+        at[j * n + i] = {from.column(PetscInt(2 * j))[i], from.column(PetscInt(2 * j + 1))[i]};
   }
 }
 

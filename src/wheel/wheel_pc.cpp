@@ -245,7 +245,9 @@ void register_kinds() {
     if (!whole_wheel(problem)) return "a model that is no whole wheel";
     return WheelPreconditioner::suits(problem) ? "" : "contact not the same in all sectors";
   };
-  solve::register_kind(harmonic_kind<WheelPreconditioner>("fwwheel", "", whole_wheel, not_waves));
+  auto wheels = harmonic_kind<WheelPreconditioner>("fwwheel", "", whole_wheel, not_waves);
+  wheels.one_factor = true;
+  solve::register_kind(std::move(wheels));
 }
 
 }  // namespace fretwave::wheel

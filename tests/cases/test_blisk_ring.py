@@ -182,6 +182,34 @@ def test_a_slipping_wave_of_the_sector_solves_the_wheel(small, sector):
             assert np.abs(r).max() < REPEATED
 
 
+def test_the_unreduced_wheel_moves_like_its_sector():
+    """All finite elements of all sectors, by one sector's factor, from stick to slip."""
+    structure = case.build(reduced=False, **SMALL)
+    groove = structure.pairs["groove"]
+    pairs = fw.Contact("jenkins", groove, name="groove")
+    sector = fw.Sector.from_faces(
+        structure.M, structure.K, structure.low, structure.high, 6, contacts=[pairs], axis="z"
+    )
+    assert sector.n_dof > 1000
+    tip = int(np.searchsorted(np.setdiff1d(np.arange(structure.n_dof), structure.high), structure.dofs["tip"]))
+    harmonics, found, routes = fw.Harmonics([1, 3], 120), [], []
+    with sector.model(DIAMETERS) as model, sector.wheel() as wheel:
+        stuck = fw.linear_modes(model, 1)[0]
+        around = sector.around(stuck, DIAMETERS)
+        counter = around.shape - 1j * around.imaginary
+        one = fw.NonlinearMode(model, harmonics, "CNM", tip, stuck)
+        for mode in (one, fw.NonlinearMode(wheel, harmonics, "CNM", tip, around, "", counter)):
+            branch = fw.Continuation(mode, mode.initial(1e-5), (1e-5, 1e-4), report_at=[3e-5])
+            found.append([mode.state(point.y) for point in branch if point.event or point.newton])
+            routes.append(branch.route)
+            assert branch.converged, branch.reason
+    assert "lowest modes and a sector's factor" in routes[1]
+    for a, b in ((found[1][0], found[0][0]), (found[1][-1], found[0][-1])):
+        assert a["omega"] == pytest.approx(b["omega"], rel=TIGHT)
+        assert a["beta"] == pytest.approx(b["beta"], abs=TIGHT * b["omega"])
+    assert found[1][-1]["zeta"] > 1e-5
+
+
 def test_friction_scales_amplitude(small):
     """With constant normal load the motion at amplitude a and mu is that at 2 a and 2 mu, twice as large."""
     found = []

@@ -222,7 +222,7 @@ def test_errors_can_be_left_out():
 
 @SERIAL
 def test_what_does_not_fit_the_memory_is_left_out():
-    """178 factors of a chain of 40,000 masses would take 4.1 GB, more than half of a limit of 6 GB."""
+    """140 vectors of 178 harmonics of 40,000 masses would take 16 GB, more than half of a limit of 6 GB."""
     n = 40_000
     ones = np.ones(n)
     K = sp.diags([-ones[1:], 2.001 * ones, -ones[1:]], [-1, 0, 1], format="csr")
@@ -237,7 +237,7 @@ def test_what_does_not_fit_the_memory_is_left_out():
         found = mode.errors(y, y)
     finally:
         resource.setrlimit(resource.RLIMIT_AS, before)
-    assert np.isnan(found["zeta_error"]) and "factors of 178 harmonics" in mode.errors_left_out
+    assert np.isnan(found["zeta_error"]) and "systems of 178 harmonics" in mode.errors_left_out
 
 
 @pytest.mark.ranks(1)

@@ -80,11 +80,18 @@ def just_touching(contacts: Sequence[Contact], section: PreloadSection) -> bool:
 
 
 def closed_mode(context: AnalysisContext[AnalysisSection]) -> LinearMode:
-    """Lowest linear mode with every pair stuck, also those that do not touch before the load: a scale. Collective."""
+    """Lowest linear mode with every pair stuck, also those that do not touch before the load: a scale. Collective.
+
+    Of a wheel it is that in which the sectors of the tuned one move alike.
+    """
+    from ...cyclic.sector import wave_mode
     from ...model.modes import linear_modes
 
-    with limit_model(context.case, context.comm, "stuck", nodal_diameter(context.analysis)) as model:
-        return linear_modes(model, 1)[0]
+    wheel = context.case.wheel
+    case, diameters = (context.case, nodal_diameter(context.analysis)) if wheel is None else (context.tuned, 0)
+    with limit_model(case, context.comm, "stuck", diameters) as model:
+        mode = linear_modes(model, 1)[0]
+    return mode if wheel is None else wave_mode(mode, 0, wheel.sectors)
 
 
 def start_mode(
