@@ -65,15 +65,24 @@ std::unique_ptr<HarmonicProblem> refined(HarmonicProblem const& problem, std::ve
   return out;
 }
 
-/// Of vectors of so many problems, where all harmonics have one factor; else of a complex factor for each
-/// order: of reduced models dense, else filled twelvefold, as of three-dimensional meshes. Collective.
-double bytes_of(HarmonicProblem& problem, int problems) {
-  model::Model const& model = problem.model();
-  const double n = double(model.dofs());
-  const double of_vectors = sizeof(double) * problems * vectors * n * problem.harmonics().block_size();
+/// Of a complex factor for each order: of reduced models dense, else filled twelvefold, as of
+/// three-dimensional meshes.
+double factor_bytes(HarmonicProblem const& problem) {
+  const double n = double(problem.model().dofs());
+  return sizeof(complex) * double(problem.harmonics().count()) *
+         std::min(12 * problem.model().largest_term(), n * n);
+}
+
+/// What is beyond the memory that `problems` like this may take; 0 if nothing is. Where all harmonics have
+/// one factor their vectors count. Collective.
+double bytes_beyond(HarmonicProblem& problem, int problems) {
+  const double most = memory_share * solve::available_bytes(problem.comm());
+  double bytes = factor_bytes(problem);
+  if (bytes <= most) return 0;
   if (auto const* kind = solve::choose_kind(problem, "auto").kind; kind && kind->one_factor)
-    return of_vectors;
-  return sizeof(complex) * double(problem.harmonics().count()) * std::min(12 * model.largest_term(), n * n);
+    bytes = sizeof(double) * problems * vectors * double(problem.model().dofs()) *
+            problem.harmonics().block_size();
+  return bytes > most ? bytes : 0;
 }
 
 }  // namespace
@@ -83,11 +92,11 @@ DiscretisationError::DiscretisationError(HarmonicProblem& problem, std::string c
   const std::vector<int> orders = enlarged(problem.harmonics(), problem.model());
   const int samples = std::max(4 * problem.harmonics().samples(), 16 * orders.back());
   finer_ = refined(problem, orders, samples, problem.harmonics().highest());
-  const double bytes = bytes_of(*finer_, 2), free = solve::available_bytes(problem.comm());
-  if (bytes > memory_share * free) {
+  if (const double bytes = bytes_beyond(*finer_, 2); bytes > 0) {
     finer_.reset();
     left_out_ = "systems of " + std::to_string(orders.size()) + " harmonics would take about " +
-                solve::gigabytes(bytes) + ", of " + solve::gigabytes(free) + " free";
+                solve::gigabytes(bytes) + ", of " + solve::gigabytes(solve::available_bytes(problem.comm())) +
+                " free";
     return;
   }
   moved_ = refined(problem, orders, samples, orders.back());
@@ -142,7 +151,7 @@ double DiscretisationError::bend(Vec point, Vec r, Vec reduction, Vec step) {
 /// not fit the memory beside the others.
 void DiscretisationError::from_halfway(Vec middle, Vec row, std::span<Vec const> b, std::span<Vec const> x) {
   if (!again_) {
-    if (bytes_of(*moved_, 1) > memory_share * solve::available_bytes(problem_.comm())) return;
+    if (bytes_beyond(*moved_, 1) > 0) return;
     again_ = std::make_unique<solve::Newton>(*moved_, prefix_);
     again_->solve_beside(tolerance);
   }

@@ -116,7 +116,7 @@ bool StuckBasis::solve(std::vector<double> K, std::vector<double>& M, size_t fir
   modes_ = n, local_ = int(local), dofs_ = n;
   shapes_.resize(local * n);
   for (int j = 0; j < n; ++j)
-    std::copy_n(&M[size_t(n - 1 - j) * n + first], local, &shapes_[size_t(j) * local]);
+    std::copy_n(M.data() + size_t(n - 1 - j) * n + first, local, shapes_.data() + size_t(j) * local);
   return true;
 }
 

@@ -237,3 +237,19 @@ def test_unusable_requests_are_refused(comm):
         fw.linear_modes(single_dof(comm), 1, "sticking")
     with pytest.raises(fw.InputError, match="no degree of freedom"):
         fw.linear_modes(single_dof(comm, law=friction([[1.0]])), 1, "stuck")
+
+
+def test_a_factor_larger_than_the_machine_is_refused_in_words(comm, monkeypatch):
+    """200 entries in each of 1,000 rows, as of solid elements: their factors take 16 MB, twice the whole matrix."""
+    n = 1000
+    far = sp.diags([np.full(n - k, -1.0) for k in range(1, 101)], range(1, 101))
+    K = sp.csr_matrix(far + far.T + 201.0 * sp.identity(n))
+    with fw.Model(sp.identity(n, format="csr"), K, comm=comm) as model:
+        assert model.entries == K.nnz
+        assert len(fw.linear_modes(model, 1)) == 1
+        monkeypatch.setattr("fretwave.model.modes.machine_memory", lambda: 15.9e6)
+        with pytest.raises(fw.InputError, match="factor larger than this machine") as refused:
+            fw.linear_modes(model, 1)
+        assert refused.value.measured == "about 16 MB for 1,000 dofs"
+        monkeypatch.setattr("fretwave.model.modes.machine_memory", lambda: 16.1e6)
+        assert len(fw.linear_modes(model, 1)) == 1

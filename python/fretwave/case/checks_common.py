@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Optional
 
 from ..errors import InputError
+from ..files.memory import machine_memory, size
 from ..model.laws import law_like
 from ..mpi.petsc_options import parse
 from ..texts import nearest, toml
-from .checks_size import machine_memory, size
 from .reporter import Reporter
 from .schema import PreloadSection
 from .toml.validation import at

@@ -1,12 +1,8 @@
-"""What an analysis takes of memory at the least, and what the machine has: known before anything is allocated."""
+"""What an analysis takes of memory at the least: known before anything is allocated."""
 
 from __future__ import annotations
 
-import contextlib
-import os
-import resource
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..hb.states import default_samples
@@ -20,18 +16,6 @@ NUMBER = 8  #: bytes
 VECTORS = 8
 #: Time samples of a pair: displacement, velocity and force.
 SERIES = 3
-CGROUP = Path("/sys/fs/cgroup/memory.max")
-
-
-def machine_memory() -> float:
-    """What a process can have at most [bytes]: of the machine, of its container, of its limits."""
-    found = [float(os.sysconf("SC_PHYS_PAGES")) * os.sysconf("SC_PAGE_SIZE")]
-    limit = resource.getrlimit(resource.RLIMIT_AS)[0]
-    if limit != resource.RLIM_INFINITY:
-        found.append(float(limit))
-    with contextlib.suppress(OSError, ValueError):  # "max", or no such container
-        found.append(float(CGROUP.read_text(encoding="ascii")))
-    return min(found)
 
 
 def harmonic_memory(harmonics: int, samples: int | None, copies: int, facts: Facts) -> dict[str, float]:
@@ -54,12 +38,3 @@ def harmonic_memory(harmonics: int, samples: int | None, copies: int, facts: Fac
 def contact_columns(contacts: Sequence[Contact]) -> int:
     """Relative motions of all pairs."""
     return sum(contact.n_pairs * contact.components for contact in contacts)
-
-
-def size(count: float) -> str:
-    """Bytes in the unit that suits them."""
-    units = ("B", "kB", "MB", "GB", "TB", "PB", "EB", "ZB", "YB")
-    power = 0
-    while count >= 1000 and power < len(units) - 1:
-        count, power = count / 1000, power + 1
-    return f"{count:.3g} {units[power]}"

@@ -3,7 +3,11 @@ for its first buffer."""
 
 from __future__ import annotations
 
+import contextlib
 import mmap
+import os
+import resource
+from pathlib import Path
 
 from ..errors import FretwaveError
 
@@ -11,6 +15,7 @@ from ..errors import FretwaveError
 ROOM = 192 << 20
 #: What MPI, PETSc and their libraries map when they are loaded (Debian 12's: 216 MB, measured) [bytes].
 LIBRARIES = 224 << 20
+CGROUP = Path("/sys/fs/cgroup/memory.max")
 
 
 def check_room(libraries: int = 0) -> None:
@@ -33,3 +38,23 @@ def check_room(libraries: int = 0) -> None:
 
     small = np.ones((64, 64))
     _ = small @ small
+
+
+def machine_memory() -> float:
+    """What a process can have at most [bytes]: of the machine, of its container, of its limits."""
+    found = [float(os.sysconf("SC_PHYS_PAGES")) * os.sysconf("SC_PAGE_SIZE")]
+    limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+    if limit != resource.RLIM_INFINITY:
+        found.append(float(limit))
+    with contextlib.suppress(OSError, ValueError):  # "max", or no such container
+        found.append(float(CGROUP.read_text(encoding="ascii")))
+    return min(found)
+
+
+def size(count: float) -> str:
+    """Bytes in the unit that suits them."""
+    units = ("B", "kB", "MB", "GB", "TB", "PB", "EB", "ZB", "YB")
+    power = 0
+    while count >= 1000 and power < len(units) - 1:
+        count, power = count / 1000, power + 1
+    return f"{count:.3g} {units[power]}"

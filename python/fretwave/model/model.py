@@ -151,6 +151,11 @@ class Model(Destroyable):
         return mat
 
     @property
+    def entries(self) -> float:
+        """Entries of the fullest matrix. Collective."""
+        return max(float(A.getInfo(PETSc.Mat.InfoType.GLOBAL_SUM)["nz_used"]) for A in self._matrices)
+
+    @property
     def odd(self) -> bool:
         """All laws are odd: without preload, even harmonics may be left out. Collective."""
         return bool(self.core.odd)

@@ -10,8 +10,13 @@ import numpy.typing as npt
 from .. import _core
 from ..arrays import Array
 from ..errors import InputError
+from ..files.memory import machine_memory, size
 from ..mpi.gather import on_all_ranks
 from .model import Model
+
+#: Entries of a row from which a model counts as solid elements, and how many times their factors have as many (twelve
+#: of L and of U each; a wheel of 36 x 20,646 dofs took more than 23 GB).
+SOLID, FILLED = 60, 24
 
 
 @dataclass(frozen=True)
@@ -58,7 +63,8 @@ def linear_modes(model: Model, count: int = 6, contact: str = "stuck", near: flo
     Raises
     ------
     FretwaveError
-        Fewer converge than there are: how many, and the option that helps.
+        Fewer converge than there are: how many, and the option that helps; or the model's factor is larger than the
+        machine.
 
     Notes
     -----
@@ -72,6 +78,7 @@ def linear_modes(model: Model, count: int = 6, contact: str = "stuck", near: flo
     if near is not None and (contact == "linearised" or not near > 0):
         given, fix = f"near={near}, contact={contact}", "give a frequency above 0, and stuck or free contact"
         raise InputError("modes near a frequency are those without damping", None, given, "near > 0 [rad/s]", fix)
+    _check_factor(model)
     found = _core.linear_modes(model.core, count, getattr(_core.ContactState, contact), near)
     shapes = [on_all_ranks(model.comm, re) + 1j * on_all_ranks(model.comm, im) for _, _, re, im in found]
     for _, _, *parts in found:
@@ -80,6 +87,19 @@ def linear_modes(model: Model, count: int = 6, contact: str = "stuck", near: flo
     if model.core.travelling:
         shapes = [_aligned(phi) for phi in shapes]
     return [LinearMode(mode[0], mode[1], phi.real.copy(), phi.imag.copy()) for mode, phi in zip(found, shapes)]
+
+
+def _check_factor(model: Model) -> None:
+    """Refuse a factor of solid elements that no process here can hold, before it is begun."""
+    entries, available = model.entries, machine_memory()
+    needed = 8 * min(FILLED * entries, 2.0 * model.n_dof**2)
+    if entries > SOLID * model.n_dof and needed > available:
+        raise InputError(
+            "linear modes would take a factor larger than this machine",
+            measured=f"about {size(needed)} for {model.n_dof:,} dofs",
+            expected=f"at most {size(available)}",
+            fix="take one sector, a coarser mesh or a reduction",
+        )
 
 
 def _aligned(phi: npt.NDArray[np.complex128]) -> npt.NDArray[np.complex128]:
