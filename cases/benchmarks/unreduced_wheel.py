@@ -22,7 +22,7 @@ import fretwave as fw
 sys.path[:0] = [str(Path(__file__).parents[1] / "blisk_ring"), str(Path(__file__).parent)]
 from wheels import COMM, follow, memory_gb, say  # noqa: E402
 
-from model import checked_options, contact_parameters, full  # noqa: E402
+from model import build  # noqa: E402
 
 DIAMETERS, LINEAR_MODE = 4, 5
 #: The mesh of the case's `[quick]` form.
@@ -37,13 +37,10 @@ QUICK = {
 
 def blisk(mesh: dict[str, tuple[int, ...]]) -> tuple[fw.Sector, int]:
     """The sector with its faces tied, and its dof at the blade's tip."""
-    o, model = checked_options(mesh), full(**mesh)
-    given = {**contact_parameters(o, model), "friction_coefficient": o.friction}
-    contact = fw.Contact("coulomb_3d", model["B"], given, "groove")
-    faces = model["low"], model["high"]
-    sector = fw.Sector.from_faces(model["M"], model["K"], *faces, o.blades, contacts=[contact], axis="z")
-    kept = np.setdiff1d(np.arange(model["M"].shape[0]), model["high"])
-    return sector, int(np.searchsorted(kept, model["tip"]))
+    one = build(reduced=False, **mesh)
+    contact = fw.Contact("coulomb_3d", one.pairs["groove"], name="groove")
+    sector = fw.Sector.from_faces(one.M, one.K, one.low, one.high, one.sectors, contacts=[contact], axis=one.axis)
+    return sector, int(np.searchsorted(np.setdiff1d(np.arange(one.n_dof), one.high), one.dofs["tip"]))
 
 
 def main() -> None:
@@ -51,8 +48,8 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="the coarse mesh")
     parser.add_argument("--harmonics", type=int, default=3)
     parser.add_argument("--samples", type=int, default=360)
-    parser.add_argument("--start", type=float, default=6e-5, help="[m]")
-    parser.add_argument("--stop", type=float, default=1e-4, help="[m]")
+    parser.add_argument("--start", type=float, default=2e-5, help="[m]")
+    parser.add_argument("--stop", type=float, default=4e-5, help="[m]")
     parser.add_argument("--verbose", action="store_true")
     options = parser.parse_args()
     began = time.process_time()
