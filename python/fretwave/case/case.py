@@ -15,6 +15,7 @@ from ..cyclic.aerodynamics import with_terms
 from ..model.contact import Contact
 from ..model.sectors import Sparse
 from ..model.structure import Structure
+from ..model.wheel_matrix import Matrix
 from ..texts import toml
 from ..units import UnitSystem
 from .analysis import Analyses, AnalysisSection
@@ -126,9 +127,9 @@ class Case:
         return self.structure.dof_names
 
     @property
-    def M(self) -> Sparse:
+    def M(self) -> Matrix:
         """(n_dof, n_dof) [mass], of a sector its own part."""
-        return self.structure.own("M")
+        return self.structure.matrix("M")
 
     @property
     def K(self) -> Sparse:
@@ -199,7 +200,7 @@ class Case:
         return self.structure.places(name)
 
     @cached_property
-    def modal_damping(self) -> Mapping[int, Sparse]:
+    def modal_damping(self) -> Mapping[int, Matrix]:
         """What ``[damping]`` adds to C, of a wheel from its tuned sector; computed once."""
         if self.tables.damping is None:
             return {}

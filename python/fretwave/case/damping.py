@@ -10,7 +10,8 @@ import scipy.sparse as sp
 from ..errors import InputError
 from ..model.contact import in_limit
 from ..model.modal_damping import LARGEST, Ratios, check_size, modal_damping
-from ..model.sectors import Sparse, around
+from ..model.sectors import Sparse
+from ..model.wheel_matrix import WheelMatrix
 from ..texts import toml
 from .reporter import Found, Reporter
 from .schema import DampingSection, ReductionSection
@@ -78,7 +79,7 @@ def damping_by_mode(
         raise InputError(error.what, place, error.measured, error.expected, error.fix) from None
 
 
-def around_wheel(terms: Mapping[int, Sparse], sectors: int) -> dict[int, Sparse]:
+def around_wheel(terms: Mapping[int, Sparse], sectors: int) -> dict[int, WheelMatrix]:
     """The same of the whole wheel.
 
     Raises
@@ -91,7 +92,7 @@ def around_wheel(terms: Mapping[int, Sparse], sectors: int) -> dict[int, Sparse]
         fix = "reduce the sector further, or damp the wheel with stiffness_damping and mass_damping"
         what = "damping by mode ties all sectors of the wheel to each other"
         raise InputError(what, "[damping]", f"{entries} entries", f"at most {OF_A_WHEEL * LARGEST}", fix)
-    return {0: around(terms, sectors)}
+    return {0: WheelMatrix(terms, sectors)}
 
 
 def check_damping(

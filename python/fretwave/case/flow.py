@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 def with_flow(case: Case, K: Term, C: Term | None, nodal_diameter: int) -> tuple[Term, Term | None]:
     """K and C of a sector in a wave, or of the wheel that a case was put on, with what the flow adds to them."""
     from ..cyclic.aerodynamics import period_of, with_terms
-    from ..model.sectors import around
+    from ..model.wheel_matrix import WheelMatrix
 
     sector = case.sector or case
     assert sector.aerodynamics is not None and sector.neighbours is not None
@@ -32,7 +32,7 @@ def with_flow(case: Case, K: Term, C: Term | None, nodal_diameter: int) -> tuple
     period = period_of(nodal_diameter, number) if case.wheel is None else None
     added = _flow(sector, sector.aerodynamics, number).terms(sector.structure.M, period)
     if case.wheel is not None:
-        added = {letter: {0: around(with_terms(None, parts), number)} for letter, parts in added.items() if parts}
+        added = {letter: {0: WheelMatrix(with_terms(None, parts), number)} for letter, parts in added.items() if parts}
     return with_terms(K, added.get("K", {})), with_terms(C, added.get("C", {}))
 
 

@@ -36,10 +36,11 @@ import scipy.sparse as sp
 
 from ..errors import InputError
 from ..model.sectors import Term, by_sector
+from ..model.wheel_matrix import Matrix, as_matrix
 from .engine_order import folded
 
 #: {k: what the flow adds on the sector k places ahead}.
-Added = dict[int, sp.csr_matrix]
+Added = dict[int, Matrix]
 
 #: Coefficients below this share of the largest are rounding of the transform, not a coupling.
 NOTHING = 1e-13
@@ -129,14 +130,14 @@ def period_of(nodal_diameter: int, sectors: int) -> int:
 
 def add_to(parts: Added, k: int, matrix: sp.csr_matrix) -> None:
     """Add a matrix to the term of the sector k places ahead."""
-    parts[k] = sp.csr_matrix(parts[k] + matrix) if k in parts else matrix
+    parts[k] = as_matrix(parts[k] + matrix) if k in parts else matrix
 
 
 def with_terms(given: Term | None, added: Mapping[int, sp.csr_matrix]) -> Term | None:
     """A term as `fretwave.Model` takes it, plus further parts."""
     if not added:
         return given
-    total = {k: sp.csr_matrix(part, dtype=float) for k, part in by_sector(given).items()}
+    total = {k: as_matrix(part) for k, part in by_sector(given).items()}
     for k, part in added.items():
         add_to(total, k, part)
     total.setdefault(0, 0 * next(iter(total.values())))

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..arrays import Array, Complex
 from ..model.modes import LinearMode
-from ..model.sectors import Sparse, around
+from ..model.wheel_matrix import Matrix, WheelMatrix
 from .sector import Sector, wave_mode
 
 #: Modes of a mistuned wheel whose shares in a tuned wave differ by less are alike in it: the lower one is taken.
@@ -61,7 +61,7 @@ def standing_wave(
     return LinearMode(mode.omega, mode.beta, phi.real.copy(), np.zeros(len(phi))), phi.imag + 0j
 
 
-def most_alike(modes: Sequence[LinearMode], wave: LinearMode, M: Sparse | Sector) -> LinearMode:
+def most_alike(modes: Sequence[LinearMode], wave: LinearMode, M: Matrix | Sector) -> LinearMode:
     """Of modes of a mistuned wheel the one with the largest share in a tuned wave (`Sector.around`) and its pair.
 
     Parameters
@@ -70,7 +70,7 @@ def most_alike(modes: Sequence[LinearMode], wave: LinearMode, M: Sparse | Sector
         Mass of the wheel [mass].
     """
     if isinstance(M, Sector):
-        M = around(M.M, M.sectors)
+        M = WheelMatrix(M.M, M.sectors)
     phi = wave.shape + 1j * wave.imaginary
     shares = np.array([abs(phi.conj() @ (M @ mode.shape)) ** 2 for mode in modes])
     return modes[int(np.flatnonzero(shares > (1 - ALIKE) * shares.max())[0])]

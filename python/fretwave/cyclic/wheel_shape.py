@@ -19,7 +19,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ..arrays import Complex
-from ..model.sectors import Given, around
+from ..model.sectors import Given
+from ..model.wheel_matrix import WheelMatrix
 from ..post.wave_content import participation, wave_content
 from .engine_order import folded
 
@@ -50,14 +51,14 @@ class WheelShape:
     (0.666666666667, 1, 1.414213562373)
     """
 
-    def __init__(self, M: Given, sectors: int, dof: int, tuned_amplitude: float) -> None:
+    def __init__(self, M: Given | WheelMatrix, sectors: int, dof: int, tuned_amplitude: float) -> None:
         self.M, self.sectors, self.dof, self.tuned_amplitude = M, sectors, dof, tuned_amplitude
 
     @classmethod
     def of(cls, sector: Sector, dof: int, wave: LinearMode) -> WheelShape:
         """Against a linear wave of the tuned sector."""
         size = abs(wave.shape[dof] + 1j * wave.imaginary[dof])
-        return cls(around(sector.M, sector.sectors), sector.sectors, dof, float(size / np.sqrt(sector.sectors)))
+        return cls(WheelMatrix(sector.M, sector.sectors), sector.sectors, dof, float(size / np.sqrt(sector.sectors)))
 
     def amplitudes(self, q: npt.ArrayLike) -> Complex:
         """Of the observed dof in all sectors (N,), from the fundamental q (N n_dof,)."""

@@ -23,6 +23,7 @@ from .contact import Contact
 from .omitted import OmittedModes
 from .rest import Rest
 from .sectors import Given, Term, by_sector
+from .wheel_matrix import WheelMatrix
 
 if MPI.COMM_WORLD.size > 1:
     parallel.install()  # in scripts too: one rank's exception ends all ranks, with one message
@@ -93,14 +94,14 @@ class Model(Destroyable):
     def _matrix(self, A: Given) -> PETSc.Mat:
         if isinstance(A, PETSc.Mat):
             return A
-        rows = sp.csr_matrix(A, dtype=float)
-        if rows.shape[0] != rows.shape[1]:
+        n, columns = np.shape(A)
+        if n != columns:
             raise InputError(
-                "a matrix of the model is not square", None, f"{rows.shape}", "n x n", "give a square matrix"
+                "a matrix of the model is not square", None, f"({n}, {columns})", "n x n", "give a square matrix"
             )
-        begin, end = self._rows(rows.shape[0])
-        local = rows[begin:end]
-        size = (end - begin, rows.shape[0])
+        begin, end = self._rows(n)
+        local = A.rows(begin, end) if isinstance(A, WheelMatrix) else sp.csr_matrix(A, dtype=float)[begin:end]
+        size = (end - begin, n)
         mat = PETSc.Mat().createAIJ((size, size), csr=(local.indptr, local.indices, local.data), comm=self.comm)
         mat.assemble()
         return mat

@@ -20,7 +20,8 @@ from ..units import SI, UnitSystem, unit_system
 from .consistency import complaint_of
 from .omitted import UNKNOWN, OmittedModes
 from .pairs import Pairs
-from .sectors import Parts, Sparse, Term, around, by_sector, check_balanced, check_number, combine, ties
+from .sectors import Parts, Sparse, Term, by_sector, check_balanced, check_number, combine, ties
+from .wheel_matrix import Matrix, WheelMatrix, as_matrix, entries_of
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -45,7 +46,7 @@ class Structure:
     ----------
     M, K, C : (n_dof, n_dof) sparse or dense [mass], [force/length], [force s/length]
         Without contact; C may be None. Of a sector tied to its neighbours {k: (n_dof, n_dof)}, on the dofs of the
-        sector k places ahead.
+        sector k places ahead; of a whole wheel `WheelMatrix`, of which each rank makes its own rows.
     dofs : dict
         Dof numbers by the names that the case file may use (observation dofs); kept by a reduction.
     pairs : dict
@@ -171,8 +172,13 @@ class Structure:
 
     def own(self, letter: str) -> Sparse | None:
         """M, K or C on the own sector's dofs; None for a C that there is not."""
+        given = self.matrix(letter)
+        return None if given is None else entries_of(given)
+
+    def matrix(self, letter: str) -> Matrix | None:
+        """`own`, of a whole wheel without making its entries."""
         given = getattr(self, letter)
-        return None if given is None else sp.csr_matrix(by_sector(given)[0], dtype=float)
+        return None if given is None else as_matrix(by_sector(given)[0])
 
     def by_sector(self, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
         """Values (N unit, ...) of all dofs of a whole wheel as (N, unit, ...)."""
@@ -203,10 +209,10 @@ class Structure:
         """The same with the shares of K and M, and viscous dampers (dof, c [force s/length]) to ground, in C."""
         terms = {letter: by_sector(getattr(self, letter)) for letter in ("C", "K", "M")}
         shares = {"C": 1.0, "K": self.stiffness_damping, "M": self.mass_damping}
-        total: dict[int, Sparse] = {}
+        total: dict[int, Matrix] = {}
         for letter in (letter for letter, share in shares.items() if share):
             for k, A in terms[letter].items():
-                part = shares[letter] * sp.csr_matrix(A, dtype=float)
+                part = shares[letter] * as_matrix(A)
                 total[k] = total[k] + part if k in total else part
         if dampers:
             places, values = zip(*dampers)
@@ -269,11 +275,10 @@ class Structure:
             Added to the wheel's matrices.
         """
         n = self._sectors()
-        matrices = {letter: around(A, n) for letter in ("M", "K", "C") if (A := getattr(self, letter)) is not None}
-        changes = dict(added or {})
+        matrices = {letter: WheelMatrix(A, n) for letter in ("M", "K", "C") if (A := getattr(self, letter)) is not None}
         if deviations is not None:
-            matrices["K"] = sp.csr_matrix(matrices["K"] + self.stiffness_change(deviations, of))
-        for letter, A in changes.items():
+            matrices["K"] = matrices["K"] + self.stiffness_change(deviations, of)
+        for letter, A in (added or {}).items():
             matrices[letter] = matrices[letter] + A if letter in matrices else A
         return Structure(
             matrices["M"],
@@ -291,14 +296,18 @@ class Structure:
             units=self.units,
         )
 
-    def stiffness_change(self, deviations: Array, of: str = WHOLE) -> Sparse:
+    def stiffness_change(self, deviations: Array, of: str = WHOLE) -> WheelMatrix:
         """What deviations delta_j of a part of K add to the wheel's: sum_j delta_j T_j^T K_part T_j.
 
-        T_j gives the dofs of sector j, both faces among them, from those of the wheel: a part that reaches a face is
-        shared with the next sector.
+        T_j = sum_k T_k gives the dofs of sector j, both faces among them, from those of the sectors k places ahead: a
+        part that reaches a face is shared with the next sector, in whose rows T_k^T K_part T_l has the factor
+        delta_{j-k}.
         """
-        T = around(self.ties or {0: sp.identity(self.n_dof)}, self._sectors())
-        return sp.csr_matrix(T.T @ sp.kron(sp.diags(deviations), self._part(of)) @ T)
+        n, ties, part = self._sectors(), self.ties or {0: sp.identity(self.n_dof)}, {0: self._part(of)}
+        rows = [
+            WheelMatrix(_with_own(combine({k: T}, part, ties, -1)), n, np.roll(deviations, k)) for k, T in ties.items()
+        ]
+        return sum(rows[1:], rows[0])
 
     def stiffened(self, of: str, factor: float) -> Structure:
         """The same with K grown by a factor times a part of it, in every sector alike."""
@@ -395,6 +404,11 @@ def _sparse(given: Term | None) -> Term | None:
     return None if given is None else sp.csr_matrix(given, dtype=float)
 
 
-def _plain(terms: dict[int, Sparse]) -> Term:
+def _with_own(parts: dict[int, Sparse]) -> dict[int, Sparse]:
+    """With nothing for the own sector where there is none."""
+    return parts if 0 in parts else {0: 0 * next(iter(parts.values())), **parts}
+
+
+def _plain(terms: Mapping[int, Matrix]) -> Term:
     """A matrix alone where no other sector is reached."""
-    return terms[0].tocsr() if list(terms) == [0] else terms
+    return terms[0] if list(terms) == [0] else terms

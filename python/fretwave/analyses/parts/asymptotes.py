@@ -62,7 +62,7 @@ def limit_model(case: Case, comm: MPI.Comm, limit: str, diameters: int = 0) -> M
 
 def closed_stiffness(context: AnalysisContext[AnalysisSection]) -> sp.csr_matrix:
     """Stiffness of all pairs closed and stuck, on the dofs: sum k_b b b^T over normals and tangents."""
-    total = sp.csr_matrix(context.case.K.shape)
+    total = sp.csr_matrix(context.case.M.shape)
     for contact in context.case.contacts:
         for row in range(contact.components):
             value = contact.value(contact.info.stiffness_along(row))

@@ -17,6 +17,7 @@ from ...case.observed import label_of, unit_of
 from ...errors import InputError
 from ...model.laws import OPEN
 from ...model.sectors import by_sector
+from ...model.wheel_matrix import entries_of
 from .at_rest import (
     NO_LIMIT,
     FirstSlip,
@@ -152,7 +153,7 @@ def _in_wave(context: Forced, given: Term) -> sp.csc_matrix:
     """sum_k A_k e^{-i k theta}."""
     sectors = context.case.neighbours.sectors if context.case.neighbours is not None else 1
     theta = 2 * np.pi * nodal_diameter(context.analysis) / sectors
-    return sp.csc_matrix(sum(np.exp(-1j * k * theta) * sp.csc_matrix(A) for k, A in by_sector(given).items()))
+    return sp.csc_matrix(sum(np.exp(-1j * k * theta) * entries_of(A) for k, A in by_sector(given).items()))
 
 
 def _closed(context: Forced, states: States) -> Optional[sp.csc_matrix]:

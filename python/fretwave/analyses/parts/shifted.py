@@ -79,4 +79,4 @@ def _twins(
 
 
 def _or_zero(C: Optional[sp.spmatrix], M: sp.spmatrix) -> sp.spmatrix:
-    return 0.0 * M if C is None else C
+    return sp.csr_matrix(M.shape) if C is None else C
