@@ -1,4 +1,7 @@
 #include <slepcsys.h>
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
 
 #include <algorithm>
 #include <cstdlib>
@@ -50,10 +53,22 @@ std::vector<std::string> unused_options() {
   return out;
 }
 
+/// SuperLU_DIST, which comes with PETSc, tells glibc as it is loaded never to give memory back (M_MMAP_MAX
+/// and M_TRIM_THRESHOLD): all that was ever made at one time stayed the process'. As glibc has it by itself,
+/// but for its heap's end: blocks below 32 MB are made too often.
+void give_memory_back() {
+#ifdef __GLIBC__
+  mallopt(M_MMAP_THRESHOLD, 32 << 20);
+  mallopt(M_MMAP_MAX, 65536);
+  mallopt(M_TRIM_THRESHOLD, 256 << 20);
+#endif
+}
+
 }  // namespace
 
 NB_MODULE(_core, m) {
   import_petsc4py_module();  // initialises PETSc
+  give_memory_back();
   check(SlepcInitializeNoArguments());
   wheel::register_kinds();
   precondition::register_kinds();
