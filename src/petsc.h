@@ -216,6 +216,18 @@ inline void sum_over_ranks(std::span<std::complex<double>> x, MPI_Comm comm) {
   sum_over_ranks(std::span(reinterpret_cast<double*>(x.data()), 2 * x.size()), comm);
 }
 
+/// One rank's on all of them, in pieces that MPI's counts hold. Collective.
+template <class T>
+void broadcast(std::vector<T>& x, int from, MPI_Comm comm) {
+  constexpr size_t piece = size_t(1) << 30;
+  unsigned long long size = x.size();
+  MPI_Bcast(&size, 1, MPI_UNSIGNED_LONG_LONG, from, comm);
+  x.resize(size);
+  const auto bytes = std::as_writable_bytes(std::span(x));
+  for (size_t first = 0; first < bytes.size(); first += piece)
+    MPI_Bcast(&bytes[first], int(std::min(piece, bytes.size() - first)), MPI_BYTE, from, comm);
+}
+
 /// A distributed matrix whole and dense (column-major) on every rank. Collective.
 inline std::vector<double> whole(Mat A) {
   MPI_Comm comm;

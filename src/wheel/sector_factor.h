@@ -19,6 +19,8 @@ class SectorFactor {
   SectorFactor(Circulant<SparseBlock> const& K, int sectors, MPI_Comm);
   /// Makes S_d; false if K_d is not positive definite. d <= N / 2.
   bool take(int diameter);
+  /// That of a rank that has taken it. Collective.
+  void share(int diameter, int from, MPI_Comm comm) { broadcast(S_[diameter], from, comm); }
   /// x := K_d^-1 x of columns of a sector's dofs, for the diameter of each, of those taken.
   void solve(std::vector<int> const& diameters, complex* x) const;
   int dofs() const { return n_; }

@@ -5,6 +5,7 @@
 
 #include "lapack.h"
 #include "model/stuck_basis.h"
+#include "together.h"
 #include "tuned.h"
 #include "wheel/lowest_waves.h"
 
@@ -81,14 +82,43 @@ bool WaveBases::large() const {
   return n > whole && entries < dense * n * n;
 }
 
-void WaveBases::prepare(MPI_Comm comm) {
-  if (!large() || kept_->factor) return;
-  kept_->factor = std::make_shared<SectorFactor>(of_order_[0], mean_.sectors(), comm);
+void WaveBases::prepare(std::vector<int> const& diameters, MPI_Comm comm) {
+  if (large() && !kept_->factor)
+    kept_->factor = std::make_shared<SectorFactor>(of_order_[0], mean_.sectors(), comm);
+  const int ranks = comm_size(comm), all = mean_.sectors() / 2 + 1;
+  std::vector<int> lacking(all, 0), missing;
+  for (const int d : diameters) lacking[d] = !kept_->bases.contains(d);
+  const std::vector<int> own = lacking;
+  MPI_Allreduce(MPI_IN_PLACE, lacking.data(), all, MPI_INT, MPI_MAX, comm);
+  for (int d = 0; d < all; ++d)
+    if (lacking[d]) missing.push_back(d);
+  std::map<int, std::shared_ptr<WaveBasis const>> made;
+  together(comm, "finding the waves' modes", [&] {
+    bool fit = true;  // one that is none leaves the others without use
+    for (size_t k = size_t(comm_rank(comm)); k < missing.size() && fit; k += size_t(ranks))
+      fit = bool(made[missing[k]] = large() ? lowest_of(missing[k]) : all_of(missing[k]));
+  });
+  for (size_t k = 0; k < missing.size(); ++k) {
+    const int d = missing[k];
+    const auto basis = shared(std::move(made[d]), d, int(k) % ranks, comm);
+    if (own[d]) kept_->bases[d] = basis;
+  }
 }
 
-std::shared_ptr<WaveBasis const> WaveBases::of_diameter(int d) {
-  if (const auto found = kept_->bases.find(d); found != kept_->bases.end()) return found->second;
-  return kept_->bases[d] = large() ? lowest_of(d) : all_of(d);
+/// One rank's on all. Collective.
+std::shared_ptr<WaveBasis const> WaveBases::shared(std::shared_ptr<WaveBasis const> made, int d, int from,
+                                                   MPI_Comm comm) const {
+  int is_basis = bool(made);
+  MPI_Bcast(&is_basis, 1, MPI_INT, from, comm);
+  if (!is_basis || comm_size(comm) == 1) return made;
+  auto basis = made ? std::make_shared<WaveBasis>(*made) : std::make_shared<WaveBasis>();
+  broadcast(basis->U, from, comm), broadcast(basis->Phi, from, comm), broadcast(basis->theta, from, comm);
+  broadcast(basis->damping, from, comm);
+  MPI_Bcast(&basis->damped_together, 1, MPI_DOUBLE, from, comm);
+  broadcast(basis->static_shapes, from, comm), broadcast(basis->static_compliance, from, comm);
+  if (large()) kept_->factor->share(d, from, comm);
+  basis->factor = kept_->factor;
+  return basis;
 }
 
 std::shared_ptr<WaveBasis> WaveBases::all_of(int d) const {

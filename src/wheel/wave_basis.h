@@ -30,11 +30,12 @@ class WaveBases {
  public:
   WaveBases(model::Model const&, MeanSector const&, std::vector<Circulant<SparseBlock>> const& terms,
             WheelContact const&, std::vector<double> const& stuck);
-  /// Factorises what several diameters share, if it is not kept. Collective.
-  void prepare(MPI_Comm);
-  /// Null where the modes are no basis: a free motion with all pairs stuck, or springs far stiffer than the
-  /// structure.
-  std::shared_ptr<WaveBasis const> of_diameter(int d);
+  /// Makes those that are asked for on any rank and not kept, each on one rank, after the factor that they
+  /// share. Collective.
+  void prepare(std::vector<int> const& diameters, MPI_Comm);
+  /// One that was asked for. Null where the modes are no basis: a free motion with all pairs stuck, or
+  /// springs far stiffer than the structure.
+  std::shared_ptr<WaveBasis const> of_diameter(int d) const { return kept_->bases.at(d); }
 
  private:
   struct Kept {
@@ -43,6 +44,7 @@ class WaveBases {
   };
   Circulant<SparseBlock> of_springs() const;
   bool large() const;
+  std::shared_ptr<WaveBasis const> shared(std::shared_ptr<WaveBasis const>, int d, int from, MPI_Comm) const;
   std::shared_ptr<WaveBasis> all_of(int d) const;
   std::shared_ptr<WaveBasis> lowest_of(int d) const;
   bool set_static(WaveBasis&, int d) const;

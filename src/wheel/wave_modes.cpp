@@ -54,13 +54,13 @@ std::unique_ptr<WaveModes> WaveModes::of(HarmonicProblem& problem, MeanSector co
     fit = fit && std::ranges::any_of(problem.model().terms(), [&](auto& t) { return t.order == order; });
   if (!fit) return nullptr;
   WaveBases bases(problem.model(), mean, terms, contact, out->stuck_);
-  bases.prepare(problem.comm());
-  together(problem.comm(), "finding the waves' modes", [&] {
-    for (Diameter& of_d : out->diameters_) {
-      if (fit) of_d.basis = bases.of_diameter(of_d.d);
-      fit = fit && of_d.basis && highest * of_d.basis->damped_together <= damped_together;
-    }
-  });
+  std::vector<int> asked;
+  for (Diameter const& of_d : out->diameters_) asked.push_back(of_d.d);
+  bases.prepare(asked, problem.comm());
+  for (Diameter& of_d : out->diameters_) {
+    of_d.basis = bases.of_diameter(of_d.d);
+    fit = fit && of_d.basis && highest * of_d.basis->damped_together <= damped_together;
+  }
   MPI_Allreduce(MPI_IN_PLACE, &fit, 1, MPI_INT, MPI_LAND, problem.comm());
   return fit ? std::move(out) : nullptr;
 }

@@ -83,6 +83,21 @@ def test_a_wave_of_large_sectors_is_that_of_one(comm, damping):
 
 
 @pytest.mark.ranks(1, 2, 3)
+def test_each_basis_is_made_on_one_rank(comm):
+    """Eigenproblems of all ranks: one for each of 0 to 3 nodal diameters."""
+    PETSc.Options()["shared_route"] = "krylov"
+    PETSc.Log.begin()
+    solves = PETSc.Log.Event("EPSSolve")
+    with long_blades().wheel(comm) as wheel:
+        problem = mode(wheel, "shared_")
+        before = solves.getPerfInfo()["count"]
+        branch = fw.Continuation(problem, problem.initial(1e-5), (1e-5, 2e-5))
+        next(branch)
+        made = solves.getPerfInfo()["count"] - before
+    assert comm.allreduce(made) == SECTORS // 2 + 1
+
+
+@pytest.mark.ranks(1, 2, 3)
 def test_a_mistuned_wheel_of_large_sectors_is_that_of_the_direct_route(comm):
     sector, rng = long_blades(), np.random.default_rng(3)
     changes = {"K": [0.02 * e * sector.K[0] for e in rng.standard_normal(SECTORS)]}
