@@ -11,16 +11,14 @@ from __future__ import annotations
 
 import argparse
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
-from petsc4py import PETSc
 
 import fretwave as fw
 
 sys.path[:0] = [str(Path(__file__).parents[1] / "blisk_ring"), str(Path(__file__).parent)]
-from wheels import COMM, follow, memory_gb, say  # noqa: E402
+from wheels import compared  # noqa: E402
 
 from model import build  # noqa: E402
 
@@ -52,33 +50,8 @@ def main() -> None:
     parser.add_argument("--stop", type=float, default=4e-5, help="[m]")
     parser.add_argument("--verbose", action="store_true")
     options = parser.parse_args()
-    began = time.process_time()
     sector, tip = blisk(QUICK if options.quick else {})
-    harmonics = fw.Harmonics(range(options.harmonics + 1), options.samples)
-    with sector.model(DIAMETERS, COMM) as model:
-        stuck = fw.linear_modes(model, LINEAR_MODE)[LINEAR_MODE - 1]
-        problem = fw.NonlinearMode(model, harmonics, "CNM", tip, stuck, "sector_")
-        rest = fw.balanced(model, stuck)
-        problem.preload(rest.displacement, rest.load)
-        alone = follow(problem, options)
-        problem.destroy()
-    say(f"one sector: {alone['seconds']:.2f} s a point; {time.process_time() - began:.0f} s so far")
-    began = time.process_time()
-    wheel = sector.wheel(COMM)
-    say(f"wheel made: {time.process_time() - began:.0f} s, {memory_gb():.1f} GB")
-    start = sector.around(stuck, DIAMETERS)
-    PETSc.Options()["wheel_route"] = "krylov"
-    problem = fw.NonlinearMode(wheel, harmonics, "CNM", tip, start, "wheel_", start.shape - 1j * start.imaginary)
-    problem.preload(np.tile(rest.displacement, sector.sectors), np.tile(rest.load, sector.sectors))
-    whole = follow(problem, options)
-    apart = [abs(whole["state"][key] / alone["state"][key] - 1) for key in ("omega", "beta")]
-    say(
-        f"{sector.sectors} sectors of {sector.n_dof} dofs, {wheel.n_dof * harmonics.block_size} unknowns,"
-        f" {COMM.size} ranks:"
-        f" {whole['points']} points to {100 * whole['slip']:.0f} % slip, {whole['seconds']:.1f} s a point,"
-        f" {whole['behind']:.1f} s behind the first ({whole['newton']} Newton steps, {whole['gmres']:.1f} GMRES each),"
-        f" {memory_gb():.1f} GB; apart from the sector: omega {apart[0]:.0e}, beta {apart[1]:.0e}; {whole['reason']}"
-    )
+    compared(sector, tip, DIAMETERS, LINEAR_MODE, options)
 
 
 if __name__ == "__main__":

@@ -107,35 +107,42 @@ def follow(problem: Any, options: argparse.Namespace) -> dict[str, Any]:
     return {**cost, "gmres": linear / max(1, newton), "slip": slip, "state": state, "reason": text}
 
 
-def one(options: argparse.Namespace) -> None:
-    """A wheel and its sector."""
-    sector, tip = blisk(options.sectors, options.cells)
-    diameters = max(1, options.sectors // 6)
+def compared(sector: fw.Sector, tip: int, diameters: int, linear_mode: int, options: argparse.Namespace) -> float:
+    """A wheel's branch and its sector's, in words; seconds a point of the wheel. Collective."""
     harmonics = fw.Harmonics(range(options.harmonics + 1), options.samples)
     with sector.model(diameters, COMM) as model:
-        stuck = fw.linear_modes(model, 1)[0]
+        stuck = fw.linear_modes(model, linear_mode)[linear_mode - 1]
         problem = fw.NonlinearMode(model, harmonics, "CNM", tip, stuck, "sector_")
         rest = balanced(model, stuck)
         problem.preload(rest.displacement, rest.load)
         alone = follow(problem, options)
+        problem.destroy()
+    began = time.process_time()
     wheel = sector.wheel(COMM)
+    say(f"wheel made in {time.process_time() - began:.0f} s, {memory_gb():.1f} GB")
     start = sector.around(stuck, diameters)
     PETSc.Options()["wheel_route"] = "krylov"
     problem = fw.NonlinearMode(wheel, harmonics, "CNM", tip, start, "wheel_", start.shape - 1j * start.imaginary)
-    problem.preload(np.tile(rest.displacement, options.sectors), np.tile(rest.load, options.sectors))
+    problem.preload(np.tile(rest.displacement, sector.sectors), np.tile(rest.load, sector.sectors))
     whole = follow(problem, options)
-    unknowns = wheel.n_dof * harmonics.block_size
-    memory = memory_gb()
     apart = [abs(whole["state"][key] / alone["state"][key] - 1) for key in ("omega", "beta")]
     say(
-        f"{options.sectors} sectors of {sector.n_dof} dofs, {unknowns} unknowns, {COMM.size} ranks:"
-        f" {whole['points']} points to {100 * whole['slip']:.0f} % slip, {whole['seconds']:.3f} s a point,"
+        f"{sector.sectors} sectors of {sector.n_dof} dofs, {wheel.n_dof * harmonics.block_size} unknowns,"
+        f" {COMM.size} ranks: {whole['points']} points to {100 * whole['slip']:.0f} % slip,"
+        f" {whole['seconds']:.3f} s a point,"
         f" {whole['behind']:.3f} s behind the first ({whole['newton']} Newton steps, {whole['gmres']:.1f} GMRES each),"
         f" one sector {alone['seconds']:.4f} s,"
-        f" ratio {whole['seconds'] / alone['seconds'] / options.sectors:.2f} N, {memory:.2f} GB; apart from the sector:"
-        f" omega {apart[0]:.0e}, beta {apart[1]:.0e}; {whole['reason']}"
+        f" ratio {whole['seconds'] / alone['seconds'] / sector.sectors:.2f} N, {memory_gb():.2f} GB;"
+        f" apart from the sector: omega {apart[0]:.0e}, beta {apart[1]:.0e}; {whole['reason']}"
     )
-    say(f"{options.sectors} {whole['seconds']} {memory}")
+    return float(whole["seconds"])
+
+
+def one(options: argparse.Namespace) -> None:
+    """A wheel and its sector."""
+    sector, tip = blisk(options.sectors, options.cells)
+    seconds = compared(sector, tip, max(1, options.sectors // 6), 1, options)
+    say(f"{options.sectors} {seconds} {memory_gb()}")
 
 
 def growth(options: argparse.Namespace) -> None:

@@ -6,6 +6,7 @@
 #include <fstream>
 #include <limits>
 #include <string>
+#include <utility>
 
 #include "petsc.h"
 #include "tuned.h"
@@ -15,18 +16,30 @@ namespace fretwave::solve {
 inline const Tuned memory_share("linear_memory_share", 0.7,
                                 "share of the free memory that a preconditioner may take");
 
-/// Memory that all ranks may still take together [bytes], were they on one node; infinite where it is not
-/// known. The same on every rank. Collective.
+/// Ranks of this rank's node, and of all nodes the most. Collective.
+inline std::pair<int, int> ranks_of_node(MPI_Comm comm) {
+  MPI_Comm node;
+  MPI_Comm_split_type(comm, MPI_COMM_TYPE_SHARED, 0, MPI_INFO_NULL, &node);
+  const int own = comm_size(node);
+  MPI_Comm_free(&node);
+  int most = own;
+  MPI_Allreduce(MPI_IN_PLACE, &most, 1, MPI_INT, MPI_MAX, comm);
+  return {own, most};
+}
+
+/// Memory that all ranks may still take together [bytes]: on as many nodes as they fill at the least, that of
+/// the poorest; infinite where it is not known. The same on every rank. Collective.
 inline double available_bytes(MPI_Comm comm) {
+  const auto [ranks, most] = ranks_of_node(comm);
   double bytes = std::numeric_limits<double>::infinity(), kilobytes;
   std::ifstream file("/proc/meminfo");
   for (std::string word; file >> word;)
     if (word == "MemAvailable:" && file >> kilobytes) bytes = 1024 * kilobytes;
   rlimit limit;
   if (!getrlimit(RLIMIT_AS, &limit) && limit.rlim_cur != RLIM_INFINITY)
-    bytes = std::min(bytes, double(limit.rlim_cur));
+    bytes = std::min(bytes, ranks * double(limit.rlim_cur));
   MPI_Allreduce(MPI_IN_PLACE, &bytes, 1, MPI_DOUBLE, MPI_MIN, comm);
-  return bytes;
+  return bytes * std::max(1, comm_size(comm) / most);
 }
 
 inline std::string gigabytes(double bytes) {

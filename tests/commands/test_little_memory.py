@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from fretwave.files.memory import machine_memory, ranks_started
+
 pytestmark = pytest.mark.ranks(1)
 
 CASE = Path(__file__).parents[2] / "cases" / "two_dof" / "case.toml"
@@ -27,3 +29,14 @@ def test_too_little_memory_is_named(limit: int, command: list[str], tmp_path: Pa
     )
     assert ended.returncode == 1
     assert ended.stderr.count("error:") == 1 and "not enough memory to begin with" in ended.stderr
+
+
+def test_memory_is_that_of_all_machines(monkeypatch: pytest.MonkeyPatch) -> None:
+    """12 ranks, four of them here: three machines."""
+    for name in ("OMPI_COMM_WORLD_SIZE", "OMPI_COMM_WORLD_LOCAL_SIZE", "PMI_SIZE", "MPI_LOCALNRANKS"):
+        monkeypatch.delenv(name, raising=False)
+    alone = machine_memory()
+    assert ranks_started() == (1, 1)
+    monkeypatch.setenv("OMPI_COMM_WORLD_SIZE", "12")
+    monkeypatch.setenv("OMPI_COMM_WORLD_LOCAL_SIZE", "4")
+    assert ranks_started() == (12, 4) and machine_memory() == 3 * alone

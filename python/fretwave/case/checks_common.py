@@ -98,6 +98,6 @@ def _check_size(report: Reporter, analysis: AnalysisSection, facts: Facts) -> No
         report.wrong(
             (key,),
             f"takes at least {size(least)} of memory: {shown}",
-            f"at most the {size(available)} of this machine",
+            f"at most the {size(available)} that there is",
             "lower it, or take a machine with more memory",
         )

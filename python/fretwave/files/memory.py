@@ -41,14 +41,25 @@ def check_room(libraries: int = 0) -> None:
 
 
 def machine_memory() -> float:
-    """What a process can have at most [bytes]: of the machine, of its container, of its limits."""
+    """What all ranks can have at most [bytes]: of the machine, of its container, of their limits, on all machines."""
     found = [float(os.sysconf("SC_PHYS_PAGES")) * os.sysconf("SC_PAGE_SIZE")]
     limit = resource.getrlimit(resource.RLIMIT_AS)[0]
+    ranks, here = ranks_started()
     if limit != resource.RLIM_INFINITY:
-        found.append(float(limit))
+        found.append(float(limit) * here)
     with contextlib.suppress(OSError, ValueError):  # "max", or no such container
         found.append(float(CGROUP.read_text(encoding="ascii")))
-    return min(found)
+    return min(found) * max(1, ranks // here)
+
+
+def ranks_started() -> tuple[int, int]:
+    """Ranks that a launcher (Open MPI's, MPICH's) has started, and those of them on this machine."""
+    for names in (("OMPI_COMM_WORLD_SIZE", "OMPI_COMM_WORLD_LOCAL_SIZE"), ("PMI_SIZE", "MPI_LOCALNRANKS")):
+        with contextlib.suppress(KeyError, ValueError):
+            ranks, here = (int(os.environ[name]) for name in names)
+            if ranks >= here > 0:
+                return ranks, here
+    return 1, 1
 
 
 def size(count: float) -> str:

@@ -89,11 +89,19 @@ def linear_modes(model: Model, count: int = 6, contact: str = "stuck", near: flo
     return [LinearMode(mode[0], mode[1], phi.real.copy(), phi.imag.copy()) for mode, phi in zip(found, shapes)]
 
 
+def factor_fits(model: Model) -> bool:
+    """Whether the ranks here can hold a factor of the model, as linear modes take one. Collective."""
+    return model.entries <= SOLID * model.n_dof or _factor_bytes(model) <= machine_memory()
+
+
+def _factor_bytes(model: Model) -> float:
+    return 8 * min(FILLED * model.entries, 2.0 * model.n_dof**2)
+
+
 def _check_factor(model: Model) -> None:
-    """Refuse a factor of solid elements that no process here can hold, before it is begun."""
-    entries, available = model.entries, machine_memory()
-    needed = 8 * min(FILLED * entries, 2.0 * model.n_dof**2)
-    if entries > SOLID * model.n_dof and needed > available:
+    """Refuse a factor of solid elements that the ranks here cannot hold, before it is begun."""
+    if not factor_fits(model):
+        needed, available = _factor_bytes(model), machine_memory()
         raise InputError(
             "linear modes would take a factor larger than this machine",
             measured=f"about {size(needed)} for {model.n_dof:,} dofs",

@@ -20,7 +20,7 @@ from .branch import continuation
 from .context import AnalysisContext
 from .observed import observed_by
 from .rest import rest_state, start_mode
-from .wheel_start import tuned_sector
+from .tuned import tuned_sector
 
 if TYPE_CHECKING:
     from petsc4py import PETSc

@@ -33,7 +33,7 @@ from .at_rest import (
 from .excitation import wave_of_forces
 from .observed import observed_by
 from .rest import loaded_state
-from .wheel_start import nearest_modes, tuned_sector
+from .tuned import nearest_modes, tuned_sector
 
 if TYPE_CHECKING:
     from ...model.modes import LinearMode

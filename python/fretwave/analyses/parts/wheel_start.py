@@ -3,31 +3,26 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, Optional, TypeVar
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Optional
 
 import numpy as np
 import scipy.sparse as sp
 
 from ...arrays import Complex
-from ...case.analysis import AnalysisSection
-from ...case.harmonic import HarmonicSection, nodal_diameter
+from ...case.harmonic import nodal_diameter
 from ...case.observed import dof_of
 from .asymptotes import most_like, other_asymptote
 from .context import AnalysisContext
 from .observed import observed_by
 from .rest import modes_at_rest, rest_state, start_mode
+from .tuned import nearest_modes, tuned_sector
 
 if TYPE_CHECKING:
     from ...hb.observed import Observed
     from ...model.modes import LinearMode
     from ...model.rest import Rest
     from ..mode import ModeAnalysis
-
-Harmonic = TypeVar("Harmonic", bound=HarmonicSection)
-
 
 #: Families of the tuned sector looked through for that of a wheel's mode, beyond its number over N.
 MORE_FAMILIES = 3
@@ -102,18 +97,6 @@ def _on_wheel(context: AnalysisContext[ModeAnalysis]) -> Start:
         "deviations": wheel.deviations,
     }
     return Start(mode, rest, asymptotes, dof, avoid, tuned, attributes)
-
-
-@contextmanager
-def tuned_sector(context: AnalysisContext[Harmonic]) -> Iterator[AnalysisContext[Harmonic]]:
-    """The same analysis of the tuned sector alone. Collective."""
-    from ...case.build import build_model
-
-    analysis = context.analysis
-    case = context.tuned
-    preload, flow = case.preload_of(analysis), analysis.aerodynamics
-    with build_model(case, analysis.dampers, context.comm, preload, nodal_diameter(analysis), flow) as model:
-        yield replace(context, model=model, case=case, arrays={})
 
 
 def _tuned(context: AnalysisContext[ModeAnalysis]) -> tuple[LinearMode, dict[str, float]]:
@@ -207,10 +190,3 @@ def _free(context: AnalysisContext[ModeAnalysis], mode: LinearMode) -> dict[str,
         return {}
     free = nearest_modes(context, mode.omega, context.wheel.sectors, "free")
     return {"free_omega": most_like(context, free, mode).omega}
-
-
-def nearest_modes(
-    context: AnalysisContext[AnalysisSection], omega: float, count: int, contact: str = "stuck"
-) -> list[LinearMode]:
-    """Linear modes nearest to a frequency, in ascending order. Collective."""
-    return context.linear_mode(contact, count, omega)

@@ -1,0 +1,77 @@
+"""The tuned sector of a wheel under analysis, and linear modes of the wheel near a frequency."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+import scipy.sparse as sp
+
+from ...case.harmonic import HarmonicSection, nodal_diameter
+from ...model.structure import WHOLE
+from .context import AnalysisContext
+from .rest import rest_state
+
+if TYPE_CHECKING:
+    from ...model.modes import LinearMode
+
+Harmonic = TypeVar("Harmonic", bound=HarmonicSection)
+
+#: Modes of each wave that those of a wheel are made of, where its factor does not fit the memory.
+NOMINAL = 12
+
+
+@contextmanager
+def tuned_sector(context: AnalysisContext[Harmonic]) -> Iterator[AnalysisContext[Harmonic]]:
+    """The same analysis of the tuned sector alone. Collective."""
+    from ...case.build import build_model
+
+    analysis = context.analysis
+    case = context.tuned
+    preload, flow = case.preload_of(analysis), analysis.aerodynamics
+    with build_model(case, analysis.dampers, context.comm, preload, nodal_diameter(analysis), flow) as model:
+        yield replace(context, model=model, case=case, arrays={})
+
+
+def nearest_modes(context: AnalysisContext[Any], omega: float, count: int, contact: str = "stuck") -> list[LinearMode]:
+    """Linear modes nearest to a frequency, in ascending order. Collective."""
+    from ...model.modes import factor_fits
+
+    if context.case.wheel is not None and not factor_fits(context.model):
+        return _by_waves(context, omega, count, contact)
+    return context.linear_mode(contact, count, omega)
+
+
+def _by_waves(context: AnalysisContext[Any], omega: float, count: int, contact: str) -> list[LinearMode]:
+    """Those of a wheel whose factor does not fit, by waves of the tuned sector. Collective."""
+    from ...cyclic.nominal_modes import mistuned_modes
+
+    sector, (_, mistuning) = context.tuned.structure, context.analysis.whole_wheel()
+    waves = _waves(context, omega, contact)
+    few = {d: sorted(modes, key=lambda mode: abs(mode.omega - omega))[: NOMINAL // 2] for d, modes in waves.items()}
+    given, of = context.wheel.deviations, WHOLE if mistuning is None else mistuning.of
+    deviations = np.zeros(sector.sectors) if given is None else np.asarray(given)
+    mistuned = (deviations, sp.csr_matrix(sector.parts[of]), sector.ties or {0: sp.identity(sector.n_dof)}, omega)
+    found, before = mistuned_modes(waves, *mistuned, count), mistuned_modes(few, *mistuned, count)
+    apart = max(abs(a.omega - b.omega) for a, b in zip(found, before)) / omega
+    context.console.line(
+        f"{context.name}: a factor of the wheel does not fit the memory: its linear modes ({contact}) by the {NOMINAL}"
+        f" nearest of each wave of the tuned one; half of them give frequencies that differ by {apart:.1g}"
+    )
+    return found
+
+
+def _waves(context: AnalysisContext[Any], omega: float, contact: str) -> dict[int, list[LinearMode]]:
+    """Modes of the tuned sector nearest to a frequency, in 0 to N/2 nodal diameters. Collective."""
+    waves: dict[int, list[LinearMode]] = {}
+    rest = None
+    for d in range(context.wheel.sectors // 2 + 1):
+        with tuned_sector(context.of(context.analysis.model_copy(update={"nodal_diameter": d}))) as tuned:
+            rest = rest_state(tuned) if rest is None else rest
+            if rest is not None:
+                tuned.model.settle(rest)
+            waves[d] = tuned.linear_mode(contact, min(tuned.model.n_dof, NOMINAL), omega)
+    return waves
