@@ -54,8 +54,8 @@ std::vector<std::string> unused_options() {
 }
 
 /// SuperLU_DIST, which comes with PETSc, tells glibc as it is loaded never to give memory back (M_MMAP_MAX
-/// and M_TRIM_THRESHOLD): all that was ever made at one time stayed the process'. As glibc has it by itself,
-/// but for its heap's end: blocks below 32 MB are made too often.
+/// and M_TRIM_THRESHOLD): a process kept the most that it ever had. Blocks from 32 MB on are the system's
+/// again once they are freed, as they are without that library; smaller ones are made too often for it.
 void give_memory_back() {
 #ifdef __GLIBC__
   mallopt(M_MMAP_THRESHOLD, 32 << 20);

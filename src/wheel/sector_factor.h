@@ -12,7 +12,7 @@ namespace fretwave::wheel {
 ///
 ///     K_d = [K_ii, P_d; P_d^H, B_d],  P_d = sum_k P_k e^{2 pi i k d / N},  S_d = B_d - P_d^H K_ii^-1 P_d.
 ///
-/// Every rank has the factor, and S_d of the diameters that it asks for.
+/// Every rank has the factor, and S_d of the diameters that it takes or is given.
 class SectorFactor {
  public:
   /// Of a symmetric K. Collective.

@@ -92,7 +92,7 @@ void WaveBases::prepare(std::vector<int> const& diameters, MPI_Comm comm) {
   MPI_Allreduce(MPI_IN_PLACE, lacking.data(), all, MPI_INT, MPI_MAX, comm);
   for (int d = 0; d < all; ++d)
     if (lacking[d]) missing.push_back(d);
-  std::map<int, std::shared_ptr<WaveBasis const>> made;
+  std::map<int, std::shared_ptr<WaveBasis>> made;
   together(comm, "finding the waves' modes", [&] {
     bool fit = true;  // one that is none leaves the others without use
     for (size_t k = size_t(comm_rank(comm)); k < missing.size() && fit; k += size_t(ranks))
@@ -106,12 +106,12 @@ void WaveBases::prepare(std::vector<int> const& diameters, MPI_Comm comm) {
 }
 
 /// One rank's on all. Collective.
-std::shared_ptr<WaveBasis const> WaveBases::shared(std::shared_ptr<WaveBasis const> made, int d, int from,
-                                                   MPI_Comm comm) const {
-  int is_basis = bool(made);
+std::shared_ptr<WaveBasis> WaveBases::shared(std::shared_ptr<WaveBasis> basis, int d, int from,
+                                             MPI_Comm comm) const {
+  int is_basis = bool(basis);
   MPI_Bcast(&is_basis, 1, MPI_INT, from, comm);
-  if (!is_basis || comm_size(comm) == 1) return made;
-  auto basis = made ? std::make_shared<WaveBasis>(*made) : std::make_shared<WaveBasis>();
+  if (!is_basis || comm_size(comm) == 1) return basis;
+  if (!basis) basis = std::make_shared<WaveBasis>();
   broadcast(basis->U, from, comm), broadcast(basis->Phi, from, comm), broadcast(basis->theta, from, comm);
   broadcast(basis->damping, from, comm);
   MPI_Bcast(&basis->damped_together, 1, MPI_DOUBLE, from, comm);

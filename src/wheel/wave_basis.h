@@ -44,7 +44,7 @@ class WaveBases {
   };
   Circulant<SparseBlock> of_springs() const;
   bool large() const;
-  std::shared_ptr<WaveBasis const> shared(std::shared_ptr<WaveBasis const>, int d, int from, MPI_Comm) const;
+  std::shared_ptr<WaveBasis> shared(std::shared_ptr<WaveBasis>, int d, int from, MPI_Comm) const;
   std::shared_ptr<WaveBasis> all_of(int d) const;
   std::shared_ptr<WaveBasis> lowest_of(int d) const;
   bool set_static(WaveBasis&, int d) const;

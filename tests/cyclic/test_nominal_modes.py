@@ -9,7 +9,7 @@ import scipy.sparse as sp
 from tolerances import TIGHT
 
 import fretwave as fw
-from fretwave.cyclic.nominal_modes import mistuned_modes
+from fretwave.cyclic.nominal_modes import Mistuning, mistuned_frequencies, mistuned_modes
 
 N, CHAIN = 7, 8
 DEVIATIONS = np.array([0.05, -0.02, 0.03, -0.04, 0.01, 0.02, -0.05])
@@ -44,7 +44,10 @@ def found(comm, kept: int, near: float) -> list[fw.LinearMode]:
     for d in range(N // 2 + 1):
         with one.model((), comm, d) as model:
             waves[d] = fw.linear_modes(model, kept, "free", near)
-    return mistuned_modes(waves, DEVIATIONS, one.parts["links"], one.ties, near, N)
+    mistuning = Mistuning(DEVIATIONS, one.parts["links"], one.ties)
+    modes = mistuned_modes(waves, mistuning, near, N)
+    assert [mode.omega for mode in modes] == pytest.approx(mistuned_frequencies(waves, mistuning, near, N))
+    return modes
 
 
 def test_all_waves_give_the_modes_of_the_wheel(comm) -> None:

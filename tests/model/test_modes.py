@@ -248,7 +248,7 @@ def test_a_factor_larger_than_the_machine_is_refused_in_words(comm, monkeypatch)
         assert model.entries == K.nnz
         assert len(fw.linear_modes(model, 1)) == 1
         monkeypatch.setattr("fretwave.model.modes.machine_memory", lambda: 15.9e6)
-        with pytest.raises(fw.InputError, match="factor larger than this machine") as refused:
+        with pytest.raises(fw.InputError, match="factor larger than the memory") as refused:
             fw.linear_modes(model, 1)
         assert refused.value.measured == "about 16 MB for 1,000 dofs"
         monkeypatch.setattr("fretwave.model.modes.machine_memory", lambda: 16.1e6)

@@ -32,9 +32,11 @@ def test_rows_products_and_sums(sectors: int) -> None:
     ring = other + 2.0 * (WheelMatrix(parts, sectors) + WheelMatrix(parts, sectors, factors))
     expected = other.toarray() + 2.0 * assembled(parts, sectors, 1.0 + factors)
     np.testing.assert_allclose(ring.toarray(), expected, rtol=0, atol=LAST_BIT)
-    for begin, end in [(0, n), (4, 8), (3, 6), (n - 1, n), (2, 2)]:
+    for begin, end in [(0, n), (4, 8), (3, 6), (n - 1, n), (2, 2), (4, 4), (n, n)]:
         np.testing.assert_allclose(ring.rows(begin, end).toarray(), expected[begin:end], rtol=0, atol=LAST_BIT)
     np.testing.assert_allclose(ring.diagonal(), np.diagonal(expected), rtol=0, atol=LAST_BIT)
+    dense = rng.standard_normal((n, n))
+    np.testing.assert_allclose((ring + dense).toarray(), expected + dense, rtol=0, atol=LAST_BIT)
     x = rng.standard_normal((n, 3)) + 1j * rng.standard_normal((n, 3))
     np.testing.assert_allclose(ring @ x, expected @ x, rtol=0, atol=10 * LAST_BIT)
     np.testing.assert_allclose(ring @ x[:, 0].real, expected @ x[:, 0].real, rtol=0, atol=10 * LAST_BIT)

@@ -16,46 +16,63 @@ Turbines Power 123, 2001.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..arrays import Array, Complex
 from ..model.modes import LinearMode
 from ..model.sectors import Parts, Sparse, in_wave
-from .sector import wave
 
 #: {nodal diameter of 0 to N/2: its waves}, of unit modal mass.
 Waves = Mapping[int, Sequence[LinearMode]]
 
 
-def mistuned_modes(
-    waves: Waves, deviations: Array, part: Sparse, ties: Parts, near: float, count: int
-) -> list[LinearMode]:
-    """The modes nearest to a frequency, in ascending order.
+@dataclass(frozen=True)
+class Mistuning:
+    """Relative deviations (N,) of a part (n_full, n_full) of each sector's K, and the sector's ties to its neighbours.
 
-    Parameters
+    Attributes
     ----------
-    waves : {d: modes}
-        Undamped, of the tuned sector in 0 to N/2 nodal diameters; with all of them the modes are exact.
-    deviations : (N,)
-        Relative, of the part.
-    part : (n_full, n_full) sparse
-        Share of the sector's K that is mistuned [force/length].
     ties : {k: (n_full, n_dof)}
-        Of the sector; {0: identity} where nothing was tied.
-    near : float [rad/s]
+        {0: identity} where nothing was tied.
     """
-    sectors = len(deviations)
+
+    deviations: Array
+    part: Sparse
+    ties: Parts
+
+
+def mistuned_modes(waves: Waves, mistuning: Mistuning, near: float, count: int) -> list[LinearMode]:
+    """The modes nearest to a frequency [rad/s], in ascending order; with all waves there are they are exact."""
+    sectors = len(mistuning.deviations)
+    shapes, diameters, _ = _nominal(waves, sectors)
+    omega, weights = _in_span(waves, mistuning, near, count)
+    found = []
+    for value, row in zip(omega, weights.T):
+        content = np.zeros((sectors, len(shapes)), dtype=complex)
+        for d in set(diameters):
+            content[d] = shapes[:, diameters == d] @ row[diameters == d]
+        phi = np.real(np.fft.fft(content, axis=0)).ravel() / np.sqrt(sectors)
+        found.append(LinearMode(float(value), 0.0, phi, np.zeros(len(phi))))
+    return found
+
+
+def mistuned_frequencies(waves: Waves, mistuning: Mistuning, near: float, count: int) -> Array:
+    """Those of `mistuned_modes` [rad/s]."""
+    return _in_span(waves, mistuning, near, count)[0]
+
+
+def _in_span(waves: Waves, mistuning: Mistuning, near: float, count: int) -> tuple[Array, Complex]:
+    """Frequencies [rad/s] of the nearest modes, and the waves that each consists of (p, count)."""
+    sectors = len(mistuning.deviations)
     shapes, diameters, square = _nominal(waves, sectors)
-    coupled = _to_real(diameters, sectors)
-    H = np.diag(square) + _coupling(shapes, diameters, deviations, part, ties)
-    values, vectors = np.linalg.eigh(np.real(coupled.conj().T @ H @ coupled))
+    to_real = _to_real(diameters, sectors)
+    H = np.diag(square) + _coupling(shapes, diameters, mistuning)
+    values, vectors = np.linalg.eigh(np.real(to_real.conj().T @ H @ to_real))
     omega = np.sqrt(np.maximum(values, 0.0))
     chosen = np.sort(np.argsort(np.abs(omega - near), kind="stable")[:count])
-    weights = coupled @ vectors[:, chosen]
-    moved = [sum(c * wave(u, int(d), sectors) for c, u, d in zip(row, shapes.T, diameters)) for row in weights.T]
-    real = [np.real(phi).ravel() / np.sqrt(sectors) for phi in moved]
-    return [LinearMode(float(omega[k]), 0.0, phi, np.zeros(len(phi))) for k, phi in zip(chosen, real)]
+    return omega[chosen], to_real @ vectors[:, chosen]
 
 
 def _nominal(waves: Waves, sectors: int) -> tuple[Complex, Array, Array]:
@@ -80,11 +97,11 @@ def _to_real(diameters: Array, sectors: int) -> Complex:
     return Q
 
 
-def _coupling(shapes: Complex, diameters: Array, deviations: Array, part: Sparse, ties: Parts) -> Complex:
+def _coupling(shapes: Complex, diameters: Array, mistuning: Mistuning) -> Complex:
     """phi_a^H dK phi_b (p, p)."""
-    sectors = len(deviations)
-    full = [in_wave(ties, u, 2 * np.pi * d / sectors) for u, d in zip(shapes.T, diameters)]
+    sectors = len(mistuning.deviations)
+    full = [in_wave(mistuning.ties, u, 2 * np.pi * d / sectors) for u, d in zip(shapes.T, diameters)]
     U = np.array(full).T
-    D = np.fft.fft(deviations) / sectors
+    D = np.fft.fft(mistuning.deviations) / sectors
     turns = np.subtract.outer(-diameters, -diameters) % sectors  # d_b - d_a
-    return np.asarray(D[turns] * (U.conj().T @ (part @ U)))
+    return np.asarray(D[turns] * (U.conj().T @ (mistuning.part @ U)))

@@ -94,13 +94,14 @@ class Model(Destroyable):
     def _matrix(self, A: Given) -> PETSc.Mat:
         if isinstance(A, PETSc.Mat):
             return A
-        n, columns = np.shape(A)
+        A = A if isinstance(A, WheelMatrix) else sp.csr_matrix(A, dtype=float)
+        n, columns = A.shape
         if n != columns:
             raise InputError(
                 "a matrix of the model is not square", None, f"({n}, {columns})", "n x n", "give a square matrix"
             )
         begin, end = self._rows(n)
-        local = A.rows(begin, end) if isinstance(A, WheelMatrix) else sp.csr_matrix(A, dtype=float)[begin:end]
+        local = A.rows(begin, end) if isinstance(A, WheelMatrix) else A[begin:end]
         size = (end - begin, n)
         mat = PETSc.Mat().createAIJ((size, size), csr=(local.indptr, local.indices, local.data), comm=self.comm)
         mat.assemble()

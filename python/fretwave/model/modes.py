@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from mpi4py import MPI
 
 from .. import _core
 from ..arrays import Array
@@ -64,7 +65,7 @@ def linear_modes(model: Model, count: int = 6, contact: str = "stuck", near: flo
     ------
     FretwaveError
         Fewer converge than there are: how many, and the option that helps; or the model's factor is larger than the
-        machine.
+        memory.
 
     Notes
     -----
@@ -90,8 +91,9 @@ def linear_modes(model: Model, count: int = 6, contact: str = "stuck", near: flo
 
 
 def factor_fits(model: Model) -> bool:
-    """Whether the ranks here can hold a factor of the model, as linear modes take one. Collective."""
-    return model.entries <= SOLID * model.n_dof or _factor_bytes(model) <= machine_memory()
+    """Whether the ranks can hold a factor of the model, as linear modes take one; the same on each. Collective."""
+    available = model.comm.allreduce(machine_memory(), MPI.MIN)
+    return bool(model.entries <= SOLID * model.n_dof or _factor_bytes(model) <= available)
 
 
 def _factor_bytes(model: Model) -> float:
@@ -103,7 +105,7 @@ def _check_factor(model: Model) -> None:
     if not factor_fits(model):
         needed, available = _factor_bytes(model), machine_memory()
         raise InputError(
-            "linear modes would take a factor larger than this machine",
+            "linear modes would take a factor larger than the memory",
             measured=f"about {size(needed)} for {model.n_dof:,} dofs",
             expected=f"at most {size(available)}",
             fix="take one sector, a coarser mesh or a reduction",

@@ -46,7 +46,7 @@ class Structure:
     ----------
     M, K, C : (n_dof, n_dof) sparse or dense [mass], [force/length], [force s/length]
         Without contact; C may be None. Of a sector tied to its neighbours {k: (n_dof, n_dof)}, on the dofs of the
-        sector k places ahead; of a whole wheel `WheelMatrix`, of which each rank makes its own rows.
+        sector k places ahead; of a whole wheel `WheelMatrix`, of which each rank makes its own rows (`own` makes all).
     dofs : dict
         Dof numbers by the names that the case file may use (observation dofs); kept by a reduction.
     pairs : dict
@@ -304,9 +304,7 @@ class Structure:
         delta_{j-k}.
         """
         n, ties, part = self._sectors(), self.ties or {0: sp.identity(self.n_dof)}, {0: self._part(of)}
-        rows = [
-            WheelMatrix(_with_own(combine({k: T}, part, ties, -1)), n, np.roll(deviations, k)) for k, T in ties.items()
-        ]
+        rows = [WheelMatrix(combine({k: T}, part, ties, -1), n, np.roll(deviations, k)) for k, T in ties.items()]
         return sum(rows[1:], rows[0])
 
     def stiffened(self, of: str, factor: float) -> Structure:
@@ -401,12 +399,7 @@ def _sparse(given: Term | None) -> Term | None:
     """In CSR form of float, by sector where it was."""
     if isinstance(given, Mapping):
         return {k: sp.csr_matrix(A, dtype=float) for k, A in given.items()}
-    return None if given is None else sp.csr_matrix(given, dtype=float)
-
-
-def _with_own(parts: dict[int, Sparse]) -> dict[int, Sparse]:
-    """With nothing for the own sector where there is none."""
-    return parts if 0 in parts else {0: 0 * next(iter(parts.values())), **parts}
+    return None if given is None else as_matrix(given)
 
 
 def _plain(terms: Mapping[int, Matrix]) -> Term:

@@ -31,6 +31,8 @@ class WheelMatrix:
     ----------
     shape : (N rows, N columns of a sector)
 
+    It has sums, multiples and products with arrays, like a matrix; `tocsr` makes all of its entries for anything else.
+
     Examples
     --------
     >>> import numpy as np, scipy.sparse as sp
@@ -41,6 +43,8 @@ class WheelMatrix:
     >>> ring @ np.array([1.0, 2.0, 4.0])
     array([0., 0., 7.])
     """
+
+    __array_ufunc__ = None  # arrays leave sums and products to it
 
     def __init__(self, term: Term, sectors: int, factors: npt.ArrayLike | None = None) -> None:
         parts = {k: sp.csr_matrix(A, dtype=float) for k, A in by_sector(term).items()}
@@ -70,7 +74,7 @@ class WheelMatrix:
         parts, factors = ring
         rows = around(parts, self.sectors, first, end)
         if factors is not None:
-            entries = np.diff(rows.indptr).reshape(end - first, -1).sum(axis=1)
+            entries = np.diff(rows.indptr[:: self.height])
             rows.data *= np.repeat(factors[first:end], entries)
         return rows
 
@@ -105,7 +109,7 @@ class WheelMatrix:
     def __add__(self, other: WheelMatrix | Given) -> WheelMatrix:
         if isinstance(other, WheelMatrix):
             return self._made_of(self._rings + other._rings, self._added + other._added)
-        return self._made_of(self._rings, [*self._added, sp.csr_matrix(other, dtype=float)])
+        return self._made_of(self._rings, [*self._added, sp.csr_matrix(other)])
 
     __radd__ = __add__
 

@@ -112,7 +112,7 @@ def _tuned(context: AnalysisContext[LinearAnalysis], model: Model, wave: int) ->
 
 def _damping(context: AnalysisContext[LinearAnalysis], modes: Sequence[LinearMode]) -> Complex:
     """phi_r^H C phi_s of modes of the wheel."""
-    C = context.case.damped(context.analysis.dampers).own("C")
+    C = context.case.damped(context.analysis.dampers).matrix("C")
     shapes = np.array([mode.shape + 1j * mode.imaginary for mode in modes])
     none = np.zeros((len(modes), len(modes)), dtype=complex)
     return none if C is None else np.asarray(shapes.conj() @ (C @ shapes.T))

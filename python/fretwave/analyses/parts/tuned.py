@@ -46,17 +46,19 @@ def nearest_modes(context: AnalysisContext[Any], omega: float, count: int, conta
 
 
 def _by_waves(context: AnalysisContext[Any], omega: float, count: int, contact: str) -> list[LinearMode]:
-    """Those of a wheel whose factor does not fit, by waves of the tuned sector. Collective."""
-    from ...cyclic.nominal_modes import mistuned_modes
+    """Those of a wheel whose factor does not fit, by waves of the tuned sector with its contact at rest. Collective."""
+    from ...cyclic.nominal_modes import Mistuning, mistuned_frequencies, mistuned_modes
 
     sector, (_, mistuning) = context.tuned.structure, context.analysis.whole_wheel()
     waves = _waves(context, omega, contact)
     few = {d: sorted(modes, key=lambda mode: abs(mode.omega - omega))[: NOMINAL // 2] for d, modes in waves.items()}
     given, of = context.wheel.deviations, WHOLE if mistuning is None else mistuning.of
     deviations = np.zeros(sector.sectors) if given is None else np.asarray(given)
-    mistuned = (deviations, sp.csr_matrix(sector.parts[of]), sector.ties or {0: sp.identity(sector.n_dof)}, omega)
-    found, before = mistuned_modes(waves, *mistuned, count), mistuned_modes(few, *mistuned, count)
-    apart = max(abs(a.omega - b.omega) for a, b in zip(found, before)) / omega
+    ties = sector.ties or {0: sp.identity(sector.n_dof)}
+    mistuned = Mistuning(deviations, sp.csr_matrix(sector.parts[of]), ties)
+    found = mistuned_modes(waves, mistuned, omega, count)
+    before = mistuned_frequencies(few, mistuned, omega, count)
+    apart = max(abs(mode.omega - other) for mode, other in zip(found, before)) / omega
     context.console.line(
         f"{context.name}: a factor of the wheel does not fit the memory: its linear modes ({contact}) by the {NOMINAL}"
         f" nearest of each wave of the tuned one; half of them give frequencies that differ by {apart:.1g}"
