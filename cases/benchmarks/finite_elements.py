@@ -1,9 +1,10 @@
 """What a point of a model that is not reduced costs: kinds of preconditioners against each other, in one run.
 
-    OMP_NUM_THREADS=1 .venv/bin/python cases/benchmarks/finite_elements.py [--mesh coarse | default | fine]
+    OMP_NUM_THREADS=1 .venv/bin/python cases/benchmarks/finite_elements.py [--mesh coarse | default | fine | finest]
         [--harmonics 7] [--kinds fwstatic fwcondensed] [--start 7e-4 --stop 1.3e-3]
 
-The blade root of ``cases/blade_root``, all its dofs and 48 or (fine) 768 contact pairs, followed from stick into slip.
+The blade root of ``cases/blade_root``, all its dofs and 48, (fine) 768 or (finest) 3,072 contact pairs, followed from
+stick into slip.
 Times are processor time of the slowest rank, events of the branch with the point behind them; it runs under mpirun.
 """
 
@@ -37,6 +38,13 @@ MESHES: dict[str, dict[str, Any]] = {
         "thickness_cells": 1,
         "radial_cells": (2, 1, 1, 2, 8),
         "contact_grid": (24, 16),
+    },
+    "finest": {
+        "axial_cells": 48,
+        "flank_cells": 32,
+        "thickness_cells": 1,
+        "radial_cells": (1, 1, 1, 1, 2),
+        "contact_grid": (48, 32),
     },
 }
 
