@@ -25,6 +25,8 @@ import fretwave as fw
 from fretwave import balanced
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "blade_root"))
+from benchmark import LARGEST, PAIRS  # noqa: E402
+
 from model import build  # noqa: E402
 
 COMM = MPI.COMM_WORLD
@@ -32,20 +34,8 @@ FRICTION, STIFFNESS_DAMPING = 0.5, 2e-6  #: as in the case
 MESHES: dict[str, dict[str, Any]] = {
     "coarse": {"axial_cells": 6, "thickness_cells": 1, "radial_cells": (2, 1, 1, 2, 11)},
     "default": {},
-    "fine": {
-        "axial_cells": 24,
-        "flank_cells": 16,
-        "thickness_cells": 1,
-        "radial_cells": (2, 1, 1, 2, 8),
-        "contact_grid": (24, 16),
-    },
-    "finest": {
-        "axial_cells": 48,
-        "flank_cells": 32,
-        "thickness_cells": 1,
-        "radial_cells": (1, 1, 1, 1, 2),
-        "contact_grid": (48, 32),
-    },
+    "fine": PAIRS[768],
+    "finest": LARGEST[3072],
 }
 
 

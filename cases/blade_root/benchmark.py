@@ -26,12 +26,17 @@ from fretwave import balanced, build_model, load_case, reduce_case
 
 CASE = Path(__file__).with_name("case.toml")
 AMPLITUDES = [7e-4, 9e-4, 1e-3, 1.1e-3, 1.2e-3, 1.25e-3]  #: [m], from the first slip to 30 % of the pair-samples
-#: Pairs along the axis and up each flank; one mesh carries all of them.
-GRIDS = {48: (6, 4), 192: (12, 8), 768: (24, 16)}
 MESH = {"axial_cells": 24, "flank_cells": 16, "thickness_cells": 1, "radial_cells": (2, 1, 1, 2, 8)}
-#: The largest grid has a mesh of its own, 123,093 dofs, coarse in the aerofoil; asked for by `--only 3072`.
-LARGEST, LARGEST_GRID = 3072, (48, 32)
-LARGEST_MESH = {"axial_cells": 48, "flank_cells": 32, "thickness_cells": 1, "radial_cells": (1, 1, 1, 1, 2)}
+#: Pairs along the axis and up each flank; one mesh carries all of them.
+PAIRS: dict[int, dict[str, Any]] = {
+    48: {**MESH, "contact_grid": (6, 4)},
+    192: {**MESH, "contact_grid": (12, 8)},
+    768: {**MESH, "contact_grid": (24, 16)},
+}
+#: A mesh of its own, 123,093 dofs, coarse in the aerofoil; asked for by `--only 3072`.
+LARGEST: dict[int, dict[str, Any]] = {
+    3072: {**MESH, "axial_cells": 48, "flank_cells": 32, "radial_cells": (1, 1, 1, 1, 2), "contact_grid": (48, 32)}
+}
 COMM = MPI.COMM_WORLD
 
 
@@ -122,7 +127,7 @@ def pairs(options: argparse.Namespace) -> None:
     import subprocess
 
     found = []
-    for count in GRIDS:
+    for count in PAIRS:
         arguments = ["pairs", "--only", str(count), *sys.argv[2:]]
         text = subprocess.run([sys.executable, __file__, *arguments], check=True, stdout=subprocess.PIPE, text=True)
         say(text.stdout.rstrip())
@@ -133,9 +138,7 @@ def pairs(options: argparse.Namespace) -> None:
 
 def one_grid(options: argparse.Namespace) -> None:
     began = time.process_time()
-    largest = options.only == LARGEST
-    mesh, grid = (LARGEST_MESH, LARGEST_GRID) if largest else (MESH, GRIDS[options.only])
-    model, case, dof = reduced_model({**mesh, "contact_grid": grid})
+    model, case, dof = reduced_model({**PAIRS, **LARGEST}[options.only])
     ready = time.process_time() - began
     rows = branch(model, dof, "krylov", 7, options)
     seconds, newton, gmres = cost(rows)
@@ -169,7 +172,7 @@ def main() -> None:
     parser.add_argument("--start", type=float, default=6e-4, help="[m]")
     parser.add_argument("--stop", type=float, default=1.25e-3, help="[m]")
     parser.add_argument("--blocks", default="auto", help="preconditioner: auto, or dense blocks of all harmonics")
-    parser.add_argument("--only", type=int, default=0, choices=[0, *GRIDS, LARGEST], help="one grid of `pairs`")
+    parser.add_argument("--only", type=int, default=0, choices=[0, *PAIRS, *LARGEST], help="one grid of `pairs`")
     options = parser.parse_args()
     {"routes": routes, "pairs": pairs, "ranks": ranks}[options.what](options)
 

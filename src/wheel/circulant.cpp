@@ -54,11 +54,8 @@ bool alike(Circulant<SparseBlock>& blocks, int rows, MPI_Comm comm) {
     pattern.insert(pattern.end(), A.first.begin(), A.first.end());
     pattern.insert(pattern.end(), A.columns.begin(), A.columns.end());
   }
-  int size = as_int(PetscInt64(pattern.size()), "entries of a sector");
-  MPI_Bcast(&size, 1, MPI_INT, 0, comm);
   auto first = pattern;
-  first.resize(size);
-  MPI_Bcast(first.data(), size, MPI_INT, 0, comm);
+  broadcast(first, 0, comm);
   int same = blocks.empty() || pattern == first;
   MPI_Allreduce(MPI_IN_PLACE, &same, 1, MPI_INT, MPI_LAND, comm);
   if (!same || !blocks.empty()) return same;

@@ -46,8 +46,8 @@ class Mistuning:
 def mistuned_modes(waves: Waves, mistuning: Mistuning, near: float, count: int) -> list[LinearMode]:
     """The modes nearest to a frequency [rad/s], in ascending order; with all waves there are they are exact."""
     sectors = len(mistuning.deviations)
-    shapes, diameters, _ = _nominal(waves, sectors)
-    omega, weights = _in_span(waves, mistuning, near, count)
+    nominal = shapes, diameters, _ = _nominal(waves, sectors)
+    omega, weights = _in_span(nominal, mistuning, near, count)
     found = []
     for value, row in zip(omega, weights.T):
         content = np.zeros((sectors, len(shapes)), dtype=complex)
@@ -60,14 +60,15 @@ def mistuned_modes(waves: Waves, mistuning: Mistuning, near: float, count: int) 
 
 def mistuned_frequencies(waves: Waves, mistuning: Mistuning, near: float, count: int) -> Array:
     """Those of `mistuned_modes` [rad/s]."""
-    return _in_span(waves, mistuning, near, count)[0]
+    return _in_span(_nominal(waves, len(mistuning.deviations)), mistuning, near, count)[0]
 
 
-def _in_span(waves: Waves, mistuning: Mistuning, near: float, count: int) -> tuple[Array, Complex]:
+def _in_span(
+    nominal: tuple[Complex, Array, Array], mistuning: Mistuning, near: float, count: int
+) -> tuple[Array, Complex]:
     """Frequencies [rad/s] of the nearest modes, and the waves that each consists of (p, count)."""
-    sectors = len(mistuning.deviations)
-    shapes, diameters, square = _nominal(waves, sectors)
-    to_real = _to_real(diameters, sectors)
+    shapes, diameters, square = nominal
+    to_real = _to_real(diameters, len(mistuning.deviations))
     H = np.diag(square) + _coupling(shapes, diameters, mistuning)
     values, vectors = np.linalg.eigh(np.real(to_real.conj().T @ H @ to_real))
     omega = np.sqrt(np.maximum(values, 0.0))

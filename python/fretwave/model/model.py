@@ -23,7 +23,7 @@ from .contact import Contact
 from .omitted import OmittedModes
 from .rest import Rest
 from .sectors import Given, Term, by_sector
-from .wheel_matrix import WheelMatrix
+from .wheel_matrix import WheelMatrix, as_matrix
 
 if MPI.COMM_WORLD.size > 1:
     parallel.install()  # in scripts too: one rank's exception ends all ranks, with one message
@@ -94,7 +94,7 @@ class Model(Destroyable):
     def _matrix(self, A: Given) -> PETSc.Mat:
         if isinstance(A, PETSc.Mat):
             return A
-        A = A if isinstance(A, WheelMatrix) else sp.csr_matrix(A, dtype=float)
+        A = as_matrix(A)
         n, columns = A.shape
         if n != columns:
             raise InputError(

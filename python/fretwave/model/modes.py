@@ -16,7 +16,7 @@ from ..mpi.gather import on_all_ranks
 from .model import Model
 
 #: Entries of a row from which a model counts as solid elements, and how many times their factors have as many (twelve
-#: of L and of U each; a wheel of 36 x 20,646 dofs took more than 23 GB).
+#: of L and of U each: from above, a wheel of 36 x 20,646 dofs counts 22 GB and is solved on two ranks of 24).
 SOLID, FILLED = 60, 24
 
 
@@ -92,18 +92,21 @@ def linear_modes(model: Model, count: int = 6, contact: str = "stuck", near: flo
 
 def factor_fits(model: Model) -> bool:
     """Whether the ranks can hold a factor of the model, as linear modes take one; the same on each. Collective."""
-    available = model.comm.allreduce(machine_memory(), MPI.MIN)
-    return bool(model.entries <= SOLID * model.n_dof or _factor_bytes(model) <= available)
+    needed, available = _factor_memory(model)
+    return needed <= available
 
 
-def _factor_bytes(model: Model) -> float:
-    return 8 * min(FILLED * model.entries, 2.0 * model.n_dof**2)
+def _factor_memory(model: Model) -> tuple[float, float]:
+    """What a factor of solid elements takes, nothing of others, and what the ranks can have [bytes]. Collective."""
+    entries, available = model.entries, model.comm.allreduce(machine_memory(), MPI.MIN)
+    solid = entries > SOLID * model.n_dof
+    return 8 * min(FILLED * entries, 2.0 * model.n_dof**2) if solid else 0.0, available
 
 
 def _check_factor(model: Model) -> None:
-    """Refuse a factor of solid elements that the ranks here cannot hold, before it is begun."""
-    if not factor_fits(model):
-        needed, available = _factor_bytes(model), machine_memory()
+    """Refuse a factor of solid elements that the ranks cannot hold, before it is begun. Collective."""
+    needed, available = _factor_memory(model)
+    if needed > available:
         raise InputError(
             "linear modes would take a factor larger than the memory",
             measured=f"about {size(needed)} for {model.n_dof:,} dofs",
