@@ -52,14 +52,25 @@ def test_forced_on_leaves_the_table_of_a_run_to_the_last_digit(name, comm):
 @pytest.mark.ranks(1)
 def test_what_a_run_leaves_out_it_does_not_load(launch, tmp_path):
     """No picture, no reduction, no wear, no time integration: none of their modules."""
-    case = Path(__file__).parents[2] / "cases" / "two_dof" / "case.toml"
-    arguments = ["run", str(case), "--quick", "--no-plots", "--only", "mode", "--out", str(tmp_path)]
     modules = ["matplotlib", "fretwave.model.reduction", "fretwave.solve.wear", "fretwave.solve.transient"]
-    program = (
-        f"import sys; from fretwave.commands.main import main; code = main({arguments!r});"
-        f"print('loaded', [name for name in {modules!r} if name in sys.modules], code)"
-    )
-    assert launch(1, "-c", program).stdout.splitlines()[-1] == "loaded [] 0"
+    asked = f"'loaded', [name for name in {modules!r} if name in sys.modules]"
+    assert ended(launch, tmp_path, "import sys", asked) == "loaded [] 0"
+
+
+@pytest.mark.ranks(1)
+def test_a_run_makes_its_results_of_the_journal_once(launch, tmp_path):
+    """The curve for readers without the cubic is read from results.h5 before that takes its place."""
+    before = "from fretwave.results import file; file._in_memory = None"
+    assert ended(launch, tmp_path, before, "'made once'") == "made once 0"
+    assert (tmp_path / "mode_curve.csv").exists()
+
+
+def ended(launch, folder, before, asked):
+    """The last line of a process that runs a mode of two dofs, what is printed of it and its exit code."""
+    case = Path(__file__).parents[2] / "cases" / "two_dof" / "case.toml"
+    arguments = ["run", str(case), "--quick", "--no-plots", "--only", "mode", "--out", str(folder)]
+    program = f"{before}; from fretwave.commands.main import main; code = main({arguments!r}); print({asked}, code)"
+    return launch(1, "-c", program).stdout.splitlines()[-1]
 
 
 def test_a_difference_is_seen():

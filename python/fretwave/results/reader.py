@@ -279,11 +279,11 @@ def open_run(folder: str | Path) -> Run:
     return Run(folder)
 
 
-def write_curve(folder: Path, name: str) -> None:
+def write_curve(group: h5py.Group, folder: Path) -> None:
     """``<name>_curve.csv``: the branches of an analysis for readers without the cubic; one rank only."""
-    analysis = Run(folder).analyses.get(name)
-    if analysis is not None and analysis.slopes is not None and len(analysis):
-        analysis.straight().to_csv(folder / f"{name}_curve.csv")
+    analysis = _analysis(group, folder / "results.h5")
+    if analysis.slopes is not None and len(analysis):
+        analysis.straight().to_csv(folder / f"{analysis.name}_curve.csv")
 
 
 class Run:

@@ -26,7 +26,6 @@ from ..mpi.petsc_options import AnalysisOptions
 from ..results.basis_file import LARGEST, NAME, basis_of
 from ..results.file import OVERRIDES
 from ..results.journal import Journal
-from ..results.reader import write_curve
 from ..results.results import has_results, open_results
 from ..results.runfolder import RECORD, RunFolder, new_record, peak_memory_mb, read_record, results_folder
 from ..texts import counted, display
@@ -268,9 +267,9 @@ class Runner:
                 outcome = Outcome(0, reason, False, goal=str(error.expected), advice=error.fix or "")
         entry = {"left_out": context.left_out, **context.entry}
         self._note(analysis.name, outcome, time.perf_counter() - began, entry)
-        if not self.part:
+        if outcome.points and not self.part:
             with event("FwCurve"):
-                on_first_rank(self.comm, lambda: write_curve(self.folder.path, analysis.name))
+                context.write_curves()
         context.publish()  # last of all: from here on a resumed run leaves the analysis as it is
 
     def _sweep(self, name: str, sweep: Sweep) -> None:

@@ -21,6 +21,7 @@ from ...errors import InputError
 from ...files.csv_table import write_columns
 from ...model.structure import Structure
 from ...mpi.guard import on_first_rank
+from ...results.reader import write_curve
 from ...results.results import AnalysisWriter, Field, open_results
 from ...texts import counted, display
 from ...units import ATTRIBUTE, UnitSystem
@@ -188,6 +189,16 @@ class AnalysisContext(Generic[Section]):
         )
         self.writers.append(writer)
         return writer
+
+    def write_curves(self) -> None:
+        """The branches of its tables once more, for readers without the cubic. Collective."""
+
+        def write() -> None:
+            for writer in self.writers:
+                if writer.rows:
+                    write_curve(writer.group, self.folder)
+
+        on_first_rank(self.comm, write)
 
     def publish(self) -> None:
         """The analysis is done, with all its tables: its results take their place. Collective."""
