@@ -1,7 +1,7 @@
 """Kinds of analysis by name: those of the package, a file each in `fretwave.analyses`, and those that users add.
 
 What a case names, results keep the name of, and pictures and tables ask about: so the list lies below all of them. It
-knows no kind itself; the package's are imported when first asked for.
+knows no kind itself; the package's are imported when first asked for, each by its name.
 """
 
 from __future__ import annotations
@@ -29,19 +29,21 @@ _noting: list[list[Added]] = []
 def kinds() -> dict[str, type[AnalysisSection]]:
     """All kinds of analysis by the `type` that a case gives them: the package's, then others as they were added."""
     own = _own()
+    for name in own:
+        kind_named(name)
     return {name: _registered[name] for name in (*own, *(name for name in _registered if name not in own))}
 
 
 def kind_named(name: str) -> Optional[type[AnalysisSection]]:
     """The kind of this name; None where it is not known here (results may come from elsewhere)."""
-    return kinds().get(name)
+    if name in _own():
+        import_module(f"fretwave.analyses.{name}")
+    return _registered.get(name)
 
 
 @cache
 def _own() -> tuple[str, ...]:
     names: tuple[str, ...] = import_module("fretwave.analyses").KINDS
-    for name in names:
-        import_module(f"fretwave.analyses.{name}")
     return names
 
 
@@ -53,6 +55,7 @@ def add(name: str, kind: type[AnalysisSection]) -> None:
     InputError
         Another file has brought one of this name.
     """
+    kind_named(name)  # the package's own comes before another of its name
     admit(ANALYSIS, name, _registered, kind)
     _registered[name] = kind
 

@@ -75,7 +75,7 @@ def test_it_has_the_defaults_that_the_recipe_tells(case: Path) -> None:
     assert least.own_preload() is None and least.harmonic() is None and least.integrates() == ""
     assert least.completed(None, facts) is least and least.least_memory(facts) == {}
     assert least.headline() == "least of all" and least.details(None) == ["added dampers: 3 N s/m at m2"]
-    assert (least.pictures, least.sweeps, least.shown_where_kept) == ((), False, False)
+    assert least.pictures == () and not (least.sweeps or least.wears or least.shown_where_kept)
     assert list(least.figures(None)) == [] and least.view(None, loaded, None, print) is None
     assert least.summary.columns == () and least.summary.words({"points": 3.0}) == "3 points"
 

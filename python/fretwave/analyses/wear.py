@@ -47,6 +47,7 @@ class WearAnalysis(AnalysisSection):
     """``type = "wear"``: fretting wear of a mode at fixed amplitudes over wear cycles."""
 
     pictures = ("wear", "wear_pairs")
+    wears = True
 
     type: Literal["wear"]
     mode: str = key("mode analysis whose settings and branch this one takes", example='"mode"')

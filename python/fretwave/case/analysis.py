@@ -51,6 +51,8 @@ class AnalysisSection(Section):
         What a sweep says of each of its branches.
     sweeps : bool
         It runs other analyses in place of a model of its own.
+    wears : bool
+        It wears the contacts of a model.
     shown_where_kept : bool
         `fretwave view` shows points at which the motion of the contacts is kept, where there are any.
     """
@@ -58,6 +60,7 @@ class AnalysisSection(Section):
     pictures: ClassVar[tuple[str, ...]] = ()
     summary: ClassVar[Summary] = COUNTS
     sweeps: ClassVar[bool] = False
+    wears: ClassVar[bool] = False
     shown_where_kept: ClassVar[bool] = False
 
     name: Name = key("unique name; results go to <name>.csv", example='"mode"', pattern=r"^[A-Za-z][A-Za-z0-9_-]*$")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from ..errors import InputError
-from ..registry import kinds
+from ..registry import kind_named, kinds
 from ..texts import nearest, toml
 from .analysis import AnalysisSection
 from .checks_wheel import with_measured
@@ -19,13 +19,13 @@ from .toml.validation import unknown_key, validate
 def read_analyses(source: Source, found: Found) -> dict[int, AnalysisSection]:
     """Validated ``[[analysis]]`` entries by their number in the file."""
     analyses: dict[int, AnalysisSection] = {}
-    known = kinds()
     for number, entry in enumerate(source.entries("analysis")):
-        kind = entry.get("type")
-        if not isinstance(kind, str) or kind not in known:
-            found.append(_unknown_type(source, number, kind, list(known)))
+        name = entry.get("type")
+        kind = kind_named(name) if isinstance(name, str) else None
+        if kind is None:
+            found.append(_unknown_type(source, number, name, list(kinds())))
             continue
-        section = validate(known[kind], source, ("analysis", number), found)
+        section = validate(kind, source, ("analysis", number), found)
         if section is not None:
             analyses[number] = section
     _check_names(source, found)

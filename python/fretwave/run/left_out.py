@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ..analyses.wear import WearAnalysis
 from ..case.analysis import AnalysisSection
 from ..case.load import Case
 
@@ -56,7 +55,7 @@ def _of_the_run(case: Case, names: Sequence[str], said: Sequence[str], plots: bo
     unasked = []
     if case.reduced is None:
         unasked.append("reduction")
-    if not set(case.analyses.of(WearAnalysis)) & set(names):
+    if not any(case.analyses[name].wears for name in names):
         unasked.append("wear")
     if not any(case.analyses[name].integrates() for name in names) and not any(
         "time integration" in reason for reason in said

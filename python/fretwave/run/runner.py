@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..analyses.parts.context import AnalysisContext, Outcome
-from ..analyses.sweep import SweepAnalysis
 from ..case import checks
 from ..case.analysis import AnalysisSection
 from ..case.build import model_of
@@ -320,9 +319,12 @@ class Runner:
 
 def check_sweeps(case: Case, names: Sequence[str], options: RunOptions, comm: MPI.Comm) -> dict[str, Sweep]:
     """The sweeps among some analyses, after the case was loaded with each of their values. Collective."""
+    sweeps: dict[str, Sweep] = {}
+    if not any(case.analyses[name].sweeps for name in names):
+        return sweeps
+    from ..analyses.sweep import SweepAnalysis
     from .sweep_analysis import analysis_sweep
 
-    sweeps = {}
     for name, analysis in case.analyses.of(SweepAnalysis).items():
         if name in names:
             sweeps[name] = analysis_sweep(Runner, case, analysis, options, comm.size)
