@@ -51,10 +51,11 @@ def test_forced_on_leaves_the_table_of_a_run_to_the_last_digit(name, comm):
 
 @pytest.mark.ranks(1)
 def test_what_a_run_leaves_out_it_does_not_load(launch, tmp_path):
-    """No picture, no reduction, no wear, no sweep, no time integration, no other kind: none of their modules."""
+    """No picture, reduction, wear, sweep or time integration, no file of another code, mesh or wheel: no module."""
     own = ["analyses.static", "analyses.linear", "analyses.flutter", "analyses.sweep", "analyses.wear"]
-    own += ["solve.wear", "solve.transient", "run.sweep", "run.sweep_analysis", "model.reduction"]
-    modules = ["matplotlib", *(f"fretwave.{name}" for name in own)]
+    own += ["solve.wear", "solve.steady", "solve.transient", "run.sweep", "run.sweep_analysis", "model.reduction"]
+    own += ["importers", "fe", "cyclic.faces", "cyclic.reduction", "cyclic.sector"]
+    modules = ["matplotlib", "scipy.io", "scipy.spatial", "skfem", *(f"fretwave.{name}" for name in own)]
     asked = f"'loaded', [name for name in {modules!r} if name in sys.modules]"
     assert ended(launch, tmp_path, "import sys", asked) == "loaded [] 0"
 

@@ -15,7 +15,7 @@ from command_line import call
 from models.solid_meshes import bent, deck, mesh
 
 import fretwave as fw
-from fretwave.case.gauges import solids_of
+from fretwave.case.gauge_places import solids_of
 from fretwave.fe.solids import MODES as INNER
 from fretwave.fe.strain import COMPONENTS, gradients, stress_of
 from fretwave.view.inner_nodes import with_inner_nodes

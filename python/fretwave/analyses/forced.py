@@ -23,9 +23,7 @@ from .parts.branch import closure_note, error_text, finished_table, notable, ope
 from .parts.context import AnalysisContext, Outcome
 from .parts.excitation import Excitation, excitation_of, wave_of_forces
 from .parts.forced_peaks import curves_of, write_peaks
-from .parts.forced_time import time_points
 from .parts.observed import keep_row, named
-from .parts.response_at_rest import response_at_rest
 from .parts.rest import retained
 from .parts.wheel_peaks import blade_amplitudes, blade_by_blade
 
@@ -150,6 +148,8 @@ class ForcedAnalysis(HarmonicSection):
         return f"forced response of {label_of(self.observe)}{order}, {low:g} to {high:g} Hz, levels {levels}"
 
     def at_rest(self, context: AnalysisContext[ForcedAnalysis]) -> tuple[list[str], list[InputError]]:
+        from .parts.response_at_rest import response_at_rest
+
         return response_at_rest(context)
 
     def run(self, context: AnalysisContext[ForcedAnalysis]) -> Outcome:
@@ -207,6 +207,8 @@ def _all_levels(context: AnalysisContext[ForcedAnalysis], excitation: Excitation
         else write_peaks(context, table, curves, unit_of(analysis.observe))
     )
     if analysis.time_points and writer.rows:
+        from .parts.forced_time import time_points
+
         lines, given_up = time_points(context, table, analysis.time_points, excitation.observed)
         summary += lines
         if given_up and not stopped:

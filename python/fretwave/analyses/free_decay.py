@@ -18,7 +18,6 @@ from ..post.mode_curve import ModeCurve
 from ..solve.steps import TIME_TOLERANCE
 from .mode import ModeAnalysis
 from .parts.context import AnalysisContext, Outcome
-from .parts.starts import Starts
 
 if TYPE_CHECKING:
     from ..case.facts import Facts
@@ -80,6 +79,8 @@ class FreeDecayAnalysis(TransientSection):
 
     def run(self, context: AnalysisContext[FreeDecayAnalysis]) -> Outcome:
         """Let the motion of the mode decay from each start; every cycle is compared with the mode. Collective."""
+        from .parts.starts import Starts
+
         mode = ModeCurve.from_table(context.table(self.mode))
         rows: list[dict[str, Any]] = []
         with Starts(context, COLUMNS) as starts:

@@ -16,7 +16,6 @@ from .free_decay import TransientSection
 from .mode import ModeAnalysis
 from .parts.context import AnalysisContext, Outcome
 from .parts.shifted import shifted_damping
-from .parts.starts import Starts
 
 COLUMNS = ("start", "cycle", "time", "amplitude", "frequency_hz")
 
@@ -31,6 +30,8 @@ class LimitCycleAnalysis(TransientSection):
 
     def run(self, context: AnalysisContext[LimitCycleAnalysis]) -> Outcome:
         """Follow each start until it has settled or diverges, and compare with the zeros of the damping. Collective."""
+        from .parts.starts import Starts
+
         crossings = ModeCurve.from_table(context.table(self.mode)).crossings()
         endings: list[dict[str, Any]] = []
         lines: list[str] = []

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 from ..arrays import Array
-from ..cyclic.aerodynamics import with_terms
 from ..model.contact import Contact
 from ..model.sectors import Sparse
 from ..model.structure import Structure
@@ -213,6 +212,10 @@ class Case:
         """The structure with its shares of K and M, its damping by mode and viscous dampers to ground in C."""
         places = [(place, damper.c) for damper in dampers for place in self.places(damper.dof)]
         damped = self.structure.damped(places)
+        if not self.modal_damping:
+            return damped
+        from ..cyclic.aerodynamics import with_terms
+
         return replace(damped, C=with_terms(damped.C, self.modal_damping))
 
     def damping_with(self, dampers: Sequence[Damper]) -> Sparse | None:

@@ -8,11 +8,9 @@ from typing import Any, Union
 
 import numpy as np
 import scipy.sparse
-import scipy.sparse.linalg
 
 from ..errors import FretwaveError, InputError
 from ..files.compressed import check_compressed
-from ..importers import Entries, formats, matrix_market
 from ..model.checks import NAMES
 from ..model.sectors import Sparse
 from ..texts import display, is_there, nearest, shortened
@@ -100,6 +98,8 @@ def _read(path: Path, letter: str, where: str) -> Sparse:
 
 
 def _read_known(path: Path, letter: str) -> Any:
+    from ..importers import formats, matrix_market
+
     if (format := formats.registered(path)) is not None:
         return _as_given(format.read(path, letter, None))
     if path.suffix.lower() == ".mtx":
@@ -116,6 +116,8 @@ def _read_known(path: Path, letter: str) -> Any:
 
 def _as_given(found: object) -> Any:
     """The matrix of a registered reader; what has to be put in order is the importer's."""
+    from ..importers.entries import Entries
+
     if not isinstance(found, Entries):
         return found
     if found.labels is not None or found.held is not None or found.half:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ..errors import InputError
-from ..importers.units import MODULUS
 from ..model.structure import Structure
 from .schema import MaterialSection
 from .toml.source import Source
@@ -19,6 +18,8 @@ def odd_material(material: MaterialSection, source: Source, structure: Structure
     modulus, units = material.youngs_modulus, structure.unit_system
     if modulus is None:
         return
+    from ..importers.units import MODULUS
+
     pascal = units.metres / units.kilograms
     names, low, high = ["youngs_modulus"], MODULUS[0] * pascal, MODULUS[1] * pascal
     if low < modulus < high:

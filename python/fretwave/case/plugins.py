@@ -17,17 +17,23 @@ from typing import Any
 
 from .. import registry
 from ..errors import FretwaveError, InputError
-from ..importers.formats import forget_format
 from ..model.laws import forget_law
 from ..mpi.guard import PLUGIN
 from ..texts import display, is_there, shortened, toml
 from .python_file import check_there, line_of
 from .toml.source import Source
 
+
+def _forget_format(reader: Callable[..., Any]) -> None:
+    from ..importers.formats import forget_format
+
+    forget_format(reader)
+
+
 FORGET: dict[str, Callable[..., None]] = {
     registry.ANALYSIS: registry.forget,
     registry.LAW: forget_law,
-    registry.FORMAT: forget_format,
+    registry.FORMAT: _forget_format,
 }
 #: What each file that is loaded has added, by its place.
 _loaded: dict[str, tuple[Plugin, list[registry.Added]]] = {}

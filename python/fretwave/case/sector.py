@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 
 from ..arrays import Indices
-from ..cyclic.frames import framed
 from ..errors import InputError
 from ..model.contact import Contact
 from ..model.structure import Structure
@@ -66,6 +65,8 @@ def _framed(
     notes: list[str],
 ) -> tuple[Indices, Indices, str | None]:
     """Faces of a case that says something of them; a builder's own that correspond as they are stay so."""
+    from ..cyclic.frames import framed
+
     if axis is None and section.low is None and section.high is None:
         return low, high, None
     if structure.coordinates is None and structure.labels is None:

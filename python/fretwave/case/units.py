@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..errors import FretwaveError, InputError
-from ..importers.units import Evidence, check_declared, evidence_of
 from ..model.structure import Structure
 from ..results.model_file import read_sources
 from ..units import SI, SYSTEMS, unit_system, unknown
 from .schema import ModelSection
 from .toml.source import Source
+
+if TYPE_CHECKING:
+    from ..importers.units import Evidence
 
 #: What identifies a model, by address.
 Identity = Mapping[str, Any]
@@ -40,6 +42,8 @@ def in_units(
         what = f"the case and its {origin} declare different unit systems"
         found.append(InputError(what, where, f'units = "{declared}"', f'"{of_model}", as the {origin} says', fix))
     elif section.file:
+        from ..importers.units import check_declared, evidence_of
+
         evidence = evidence_of(structure)
         try:
             check_declared(declared or of_model or SI.name, evidence if declared else [], where, _fix)

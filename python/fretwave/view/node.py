@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..arrays import Array, Complex
-from ..case.gauges import node_numbers, row_of_node
+from ..case.gauge_places import node_numbers, row_of_node
 from ..case.kept import reload_case
 from ..columns import Column
 from ..errors import FretwaveError, InputError

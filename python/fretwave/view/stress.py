@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..arrays import Array
-from ..case.gauges import Gauges, gauges_now, node_numbers, solids_of
+from ..case.gauge_places import node_numbers, solids_of, weights_of
+from ..case.gauges import Gauges, gauges_now
 from ..case.kept import reload_case
 from ..case.load import Case
 from ..case.toml.source import Source
@@ -83,7 +84,7 @@ class Reader:
         """Of a model with solid cells."""
         structure = with_inner_nodes(meshed, where)
         strain = nodal_strain(np.asarray(structure.coordinates), solids_of(structure))
-        weights = gauges.weights(meshed)
+        weights = weights_of(gauges.gauges, meshed)
         weights.resize(len(gauges.gauges), strain.gradient.shape[1])
         return cls(gauges, structure, strain, strain.mean(weights))
 

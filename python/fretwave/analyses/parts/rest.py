@@ -84,14 +84,17 @@ def closed_mode(context: AnalysisContext[AnalysisSection]) -> LinearMode:
 
     Of a wheel it is that in which the sectors of the tuned one move alike.
     """
-    from ...cyclic.sector import wave_mode
     from ...model.modes import linear_modes
 
     wheel = context.case.wheel
     case, diameters = (context.case, nodal_diameter(context.analysis)) if wheel is None else (context.tuned, 0)
     with limit_model(case, context.comm, "stuck", diameters) as model:
         mode = linear_modes(model, 1)[0]
-    return mode if wheel is None else wave_mode(mode, 0, wheel.sectors)
+    if wheel is None:
+        return mode
+    from ...cyclic.sector import wave_mode
+
+    return wave_mode(mode, 0, wheel.sectors)
 
 
 def start_mode(
