@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from importlib import import_module
-from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 from .errors import FretwaveError, InputError, NotConverged
@@ -192,6 +191,8 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     if name == "__version__":
+        from importlib.metadata import version
+
         return version("fretwave")
     if name not in _HOME_OF:
         raise AttributeError(f"module 'fretwave' has no attribute '{name}'")

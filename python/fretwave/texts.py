@@ -7,7 +7,7 @@ import json
 import os
 import re
 from collections.abc import Callable, Mapping, Sequence
-from importlib.metadata import PackageNotFoundError, version
+from functools import cache
 from pathlib import Path
 
 #: Keys that papers write as symbols, in small letters without their underscore. Laws say theirs themselves.
@@ -18,8 +18,11 @@ SYMBOLS = {
 }
 
 
+@cache
 def own_version() -> str:
     """Of the package that is installed."""
+    from importlib.metadata import PackageNotFoundError, version
+
     try:
         return version("fretwave")
     except PackageNotFoundError:

@@ -47,7 +47,7 @@ def test_physics_loads_no_case_layer(folder: str) -> None:
 def test_structures_pairs_and_files_need_no_parallel_library() -> None:
     """What builders and readers of results use: NumPy and SciPy alone."""
     code = "import sys; from fretwave import Contact, Pairs, Structure, read_model; " + (
-        "print([name for name in ('mpi4py', 'petsc4py', 'pydantic') if name in sys.modules])"
+        "print([name for name in ('mpi4py', 'petsc4py', 'pydantic', 'importlib.metadata') if name in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
     assert (done.returncode, done.stdout.strip()) == (0, "[]"), done.stderr
