@@ -23,12 +23,13 @@ def name_dimensions(group: h5py.Group, data: h5py.Dataset, names: Sequence[str] 
     own = data.name[len(group.name) :]
     for axis, size in enumerate(data.shape):
         name = names[axis] if axis < len(names) else _axis_of(own, axis)
-        holder = group.parent if name not in group and axis < len(names) and name in group.parent else group
-        if name not in holder:
-            holder.create_dataset(name, data=np.arange(size))
-        if not h5ds.is_scale(holder[name].id):
-            holder[name].make_scale(name)
-        data.dims[axis].attach_scale(holder[name])
+        holder = group
+        if axis < len(names) and name not in group and name in (above := group.parent):
+            holder = above
+        scale = holder[name] if name in holder else holder.create_dataset(name, data=np.arange(size))
+        if not h5ds.is_scale(scale.id):
+            scale.make_scale(name)
+        h5ds.attach_scale(data.id, scale.id, axis)
 
 
 def put_array(group: h5py.Group, name: str, values: npt.ArrayLike, attributes: Mapping[str, Any]) -> None:
