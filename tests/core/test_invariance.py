@@ -99,6 +99,19 @@ def test_motion_contact_and_diagnostics_on_any_number_of_ranks(comm):
     assert np.allclose(found["serial"][2], found["parallel"][2], rtol=0, atol=SAME)
 
 
+@pytest.mark.ranks(1, 2, 3)
+def test_coefficients_of_some_dofs_are_on_every_rank(comm):
+    problem = chain_problem(comm)
+    y = problem.initial(0.5)
+    Q = comm.bcast(problem.coefficients(y))
+    last = len(Q) - 1
+    assert np.array_equal(problem.coefficients_at(y, [last, 0, 2]), Q[[last, 0, 2]])
+    model, q = problem.model, Q[:, 1] - 1j * Q[:, 2]
+    Mq = model.inertia(q.real) + 1j * model.inertia(q.imag)
+    assert np.array_equal(model.local_inertia(model.distribute(q)), model.distribute(Mq))
+    problem.destroy()
+
+
 @pytest.mark.ranks(2, 3)
 def test_branch_restored_on_other_numbers_of_ranks(comm):
     """A snapshot taken on one rank goes on here: the same branch to solver tolerance."""

@@ -47,7 +47,6 @@ from .parts.wheel_start import Start, start_of, uneven_samples
 if TYPE_CHECKING:
     from petsc4py import PETSc
 
-    from ..arrays import Array
     from ..case.facts import Facts
     from ..case.reporter import Reporter
     from ..hb.problems import NonlinearMode
@@ -197,11 +196,11 @@ def _follow(
     return outcome
 
 
-def _described(around: Optional[Describe], problem: NonlinearMode, y: PETSc.Vec, Q: Optional[Array]) -> dict[str, Any]:
+def _described(around: Optional[Describe], problem: NonlinearMode, y: PETSc.Vec) -> dict[str, Any]:
     """Further columns of a point. Collective."""
     from ..hb.observer import mechanical_energy
 
-    more = {} if around is None else around(problem, y, Q)
+    more = {} if around is None else around(problem, y)
     return {"energy": mechanical_energy(problem, y), **more}
 
 

@@ -66,13 +66,16 @@ class WheelShape:
 
     def __call__(self, q: npt.ArrayLike) -> dict[str, Any]:
         """amplification, participation, largest_sector, diameters (negative backward), diameters_share."""
-        a, given = self.amplitudes(q), np.asarray(q)
+        given = np.asarray(q)
+        return self.told(self.amplitudes(q), float(np.real(given.conj() @ (self.M @ given))))
+
+    def told(self, a: Complex, energy: float) -> dict[str, Any]:
+        """The same of the observed dof's amplitudes (N,) and q^H M q."""
         content = np.abs(wave_content(a)) ** 2
         share = content / content.sum()
         most = int(np.argmax(np.round(share, 9)))  # of a real shape forward and backward waves have equal shares
-        energy = np.sqrt(np.real(given.conj() @ (self.M @ given)))
         return {
-            "amplification": float(np.abs(a).max() / (self.tuned_amplitude * energy)),
+            "amplification": float(np.abs(a).max() / (self.tuned_amplitude * np.sqrt(energy))),
             "participation": participation(a),
             "largest_sector": int(np.argmax(np.round(np.abs(a) / np.abs(a).max(), 9))),
             "diameters": folded(most, self.sectors),

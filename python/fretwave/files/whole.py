@@ -61,13 +61,15 @@ def beside(path: Path, own: bool = False) -> Path:
 
 
 @contextmanager
-def replaced(path: Path, own: bool = False, keep_suffix: bool = False) -> Iterator[Path]:
+def replaced(path: Path, own: bool = False, keep_suffix: bool = False, sync: bool = True) -> Iterator[Path]:
     """A name to write to; at the end of the block the file is brought to the disk and takes its place.
 
     Parameters
     ----------
     own : bool
         The name is this process' own: no lock keeps others from writing the file.
+    sync : bool
+        Without it a power failure may undo or spoil the file, a kill may not.
     keep_suffix : bool
         For libraries that go by the suffix of a file's name.
 
@@ -83,9 +85,11 @@ def replaced(path: Path, own: bool = False, keep_suffix: bool = False) -> Iterat
     with told(path):
         try:
             yield fresh
-            bring_to_disk(fresh)
+            if sync:
+                bring_to_disk(fresh)
             os.replace(fresh, path)
-            bring_to_disk(path.parent)
+            if sync:
+                bring_to_disk(path.parent)
         finally:
             with suppress(OSError):
                 fresh.unlink()
@@ -100,20 +104,14 @@ def _forget_unfinished(path: Path) -> None:
 
 
 def replace_bytes(path: Path, data: bytes, sync: bool = True) -> None:
-    """Write a file in one step; without `sync` a power failure may undo or spoil it, a kill may not.
+    """Write a file in one step; `sync` as of `replaced`.
 
     Raises
     ------
     FileError
     """
-    if sync:
-        with replaced(path) as fresh, fresh.open("wb", buffering=0) as file:
-            write_all(file.fileno(), data)
-        return
-    with told(path):
-        with beside(path).open("wb", buffering=0) as file:
-            write_all(file.fileno(), data)
-        os.replace(beside(path), path)
+    with replaced(path, sync=sync) as fresh, fresh.open("wb", buffering=0) as file:
+        write_all(file.fileno(), data)
 
 
 def replace_text(path: Path, text: str) -> None:
@@ -121,11 +119,12 @@ def replace_text(path: Path, text: str) -> None:
     replace_bytes(path, text.encode("utf-8"))
 
 
-def write_all(descriptor: int, data: bytes | memoryview) -> None:
-    """Write all of it: a signal or a nearly full disk may take a part only."""
-    left = memoryview(data)
-    while len(left):
-        left = left[os.write(descriptor, left) :]
+def write_all(descriptor: int, data: bytes | memoryview, place: int | None = None) -> None:
+    """Write all of it, at a place of the file: a signal or a nearly full disk may take a part only."""
+    left, written = memoryview(data).cast("B"), 0
+    while written < len(left):
+        rest = left[written:]
+        written += os.write(descriptor, rest) if place is None else os.pwrite(descriptor, rest, place + written)
 
 
 def bring_to_disk(path: Path) -> None:

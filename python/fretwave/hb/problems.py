@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from mpi4py import MPI
 from petsc4py import PETSc
 
 from .. import _core
-from ..arrays import Array
+from ..arrays import Array, Indices
 from ..errors import InputError
 from ..model.model import Model
 from ..model.modes import LinearMode
@@ -187,6 +188,15 @@ class HarmonicProblem(Destroyable):
         local = Q.getArray(readonly=True).reshape(-1, self.harmonics.block_size).copy()
         Q.destroy()
         return np.asarray(local)
+
+    def coefficients_at(self, y: PETSc.Vec, dofs: Sequence[int] | Indices) -> Array:
+        """Rows of `coefficients` of some dofs (len(dofs), m), on every rank. Collective."""
+        local, first, places = self.local_coefficients(y), self.model.ownership[0], np.asarray(dofs)
+        mine = (first <= places) & (places < first + len(local))
+        rows = np.zeros((len(places), local.shape[1]))
+        rows[mine] = local[places[mine] - first]
+        self.model.comm.Allreduce(MPI.IN_PLACE, rows)
+        return rows
 
     def diagnostics(self, y: PETSc.Vec) -> dict[str, float]:
         """Contact of this motion. Collective.

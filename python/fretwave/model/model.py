@@ -173,9 +173,16 @@ class Model(Destroyable):
 
     def inertia(self, x: Array) -> Array:
         """M x (n_dof,) of a displacement given whole, on every rank. Collective."""
-        mass = next(A for A, order, k in self._terms if (order, k) == (2, 0))
-        whole: Array = on_all_ranks(self.comm, self._product(mass, self.distribute(x)))
+        whole: Array = on_all_ranks(self.comm, self._product(self._mass, self.distribute(x)))
         return whole
+
+    def local_inertia(self, q: npt.NDArray[Any]) -> npt.NDArray[np.complex128]:
+        """This rank's part of M q, from its part of q. Collective."""
+        return self._product(self._mass, q.real) + 1j * self._product(self._mass, q.imag)
+
+    @property
+    def _mass(self) -> PETSc.Mat:
+        return next(A for A, order, k in self._terms if (order, k) == (2, 0))
 
     def form(self, order: int, q: npt.NDArray[np.complex128], n: int = 1) -> float:
         """Re q^H A q of K (order 0), C (1) or M (2), from this rank's part of harmonic n's amplitudes q. Collective.

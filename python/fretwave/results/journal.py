@@ -1,8 +1,9 @@
 """The journal of an analysis that goes on: every row at once, in order, each with its checksum.
 
-A row is one `write` at the end of one file, so that nothing can spoil those before it: a kill, a full disk or a power
-failure leaves whole rows and perhaps a torn one, which is cut off. results.h5 is made from the journal when the
-analysis is complete (`results`); until then readers see the journal in its place.
+A row goes to the end of one file, its head last, so that nothing can spoil those before it: a kill, a full disk or a
+power failure leaves whole rows and perhaps a torn one, which is cut off. results.h5 is made from the journal when the
+analysis is complete (`results`); until then readers see the journal in its place. One rank writes; arrays that lie in
+parts on the ranks pass through it a piece at a time (`mpi.spread`), and long ones are read so.
 
 ::
 
@@ -15,6 +16,7 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import struct
 import time
 import uuid
@@ -27,8 +29,10 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
+from ..arrays import AnyArray
 from ..errors import InputError
-from ..files.whole import replace_bytes, told, write_all
+from ..files.whole import BLOCK, replaced, told, write_all
+from ..mpi.spread import Spread
 from ..texts import display
 
 #: Before each record: a mark, the length of the content and its checksum, and the checksum of these.
@@ -40,7 +44,7 @@ SAFE_EVERY = 3.0
 
 @dataclass
 class Record:
-    """One entry: its kind, plain values and arrays, and its bytes in the file."""
+    """One entry: kind, plain values, arrays (also `Spread`, and as read `Stored`), and its bytes in the file."""
 
     kind: str
     values: dict[str, Any] = field(default_factory=dict)
@@ -48,25 +52,80 @@ class Record:
     length: int = 0
 
 
-def packed(record: Record) -> bytes:
-    """The bytes of a record."""
-    arrays = {name: np.asarray(value, order="C") for name, value in record.arrays.items()}
-    layout = [[name, array.dtype.str, array.shape] for name, array in arrays.items()]
-    text = json.dumps([record.kind, record.values, layout]).encode()
-    body = b"".join([struct.pack("<Q", len(text)), text, *(array.tobytes() for array in arrays.values())])
-    numbers = struct.pack("<4sQI", _MARK, len(body), zlib.crc32(body))
-    return numbers + struct.pack("<I", zlib.crc32(numbers)) + body
+@dataclass
+class Stored:
+    """An array in a file, its rows read when they are asked for (`stored[a:b]`), all by `np.asarray`."""
+
+    path: Path
+    place: int
+    dtype: np.dtype[Any]
+    shape: tuple[int, ...]
+
+    @property
+    def ndim(self) -> int:
+        return len(self.shape)
+
+    @property
+    def nbytes(self) -> int:
+        return self.dtype.itemsize * int(np.prod(self.shape, dtype=np.int64))
+
+    def __getitem__(self, rows: slice) -> AnyArray:
+        first, last, _ = rows.indices(self.shape[0])
+        width = int(np.prod(self.shape[1:], dtype=np.int64))
+        start = self.place + first * width * self.dtype.itemsize
+        return np.fromfile(self.path, self.dtype, (last - first) * width, offset=start).reshape(-1, *self.shape[1:])
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> AnyArray:
+        return self[:].astype(dtype or self.dtype, copy=False)
 
 
-def unpacked(body: bytes) -> Record:
-    """The inverse, of a record's content."""
-    (length,) = struct.unpack_from("<Q", body)
-    kind, values, layout = json.loads(body[8 : 8 + length])
-    place, arrays = 8 + length, {}
+def _content(record: Record) -> Iterator[bytes | memoryview]:
+    """What follows the head, a piece at a time."""
+    arrays = {name: v if isinstance(v, Spread) else np.asarray(v, order="C") for name, v in record.arrays.items()}
+    arrays = dict(sorted(arrays.items(), key=lambda entry: isinstance(entry[1], Spread)))
+    text = json.dumps([record.kind, record.values, [[name, a.dtype.str, a.shape] for name, a in arrays.items()]])
+    plain = [a.tobytes() for a in arrays.values() if not isinstance(a, Spread)]
+    yield b"".join([struct.pack("<Q", len(text.encode())), text.encode(), *plain])
+    for array in arrays.values():
+        if isinstance(array, Spread):
+            yield from (piece.data for piece in array.pieces())
+
+
+def write_record(descriptor: int, place: int, record: Record) -> int:
+    """Write a record at a place of a file, its head last; gives the place behind it."""
+    length = checksum = 0
+    for piece in _content(record):
+        write_all(descriptor, piece, place + _HEAD.size + length)
+        length, checksum = length + memoryview(piece).nbytes, zlib.crc32(piece, checksum)
+    numbers = struct.pack("<4sQI", _MARK, length, checksum)
+    write_all(descriptor, numbers + struct.pack("<I", zlib.crc32(numbers)), place)
+    return place + _HEAD.size + length
+
+
+def _read_record(file: BinaryIO, path: Path, place: int, length: int) -> Record:
+    """The record of a content of so many bytes at a place; arrays longer than a block are left there."""
+    file.seek(place)
+    (text,) = struct.unpack("<Q", file.read(8))
+    kind, values, layout = json.loads(file.read(text))
+    at = place + 8 + text
+    arrays: dict[str, Any] = {}
     for name, dtype, shape in layout:
-        array = np.frombuffer(body, dtype, int(np.prod(shape)), place).reshape(shape)
-        arrays[name], place = array, place + array.nbytes
-    return Record(kind, values, arrays, _HEAD.size + len(body))
+        stored = Stored(path, at, np.dtype(dtype), tuple(shape))
+        at += stored.nbytes
+        if stored.nbytes > BLOCK:
+            arrays[name] = stored
+            file.seek(at)
+        else:
+            arrays[name] = np.frombuffer(file.read(stored.nbytes), dtype).reshape(shape)
+    return Record(kind, values, arrays, _HEAD.size + length)
+
+
+def _checksum(file: BinaryIO, length: int) -> int | None:
+    """Of the next bytes; None where there are fewer."""
+    total = 0
+    while length and (block := file.read(min(BLOCK, length))):
+        total, length = zlib.crc32(block, total), length - len(block)
+    return None if length else total
 
 
 def _read_head(data: bytes) -> tuple[int, int] | None:
@@ -91,12 +150,12 @@ def read_records(path: Path) -> Iterator[tuple[int, Record]]:
         while place < size:
             file.seek(place)
             head = _read_head(file.read(_HEAD.size))
-            body = file.read(head[0]) if head is not None and head[0] <= size - place else b""
-            if head is None or len(body) != head[0] or zlib.crc32(body) != head[1]:
+            if head is None or head[0] > size - place or _checksum(file, head[0]) != head[1]:
                 _check_torn(file, path, place)
                 return
-            yield place, unpacked(body)
-            place += _HEAD.size + len(body)
+            record = _read_record(file, path, place + _HEAD.size, head[0])
+            yield place, record
+            place += record.length
 
 
 def _check_torn(file: BinaryIO, path: Path, place: int) -> None:
@@ -140,8 +199,9 @@ class Journal:
         """Start anew with the layout and the first row; an earlier journal is replaced by both in one step."""
         self.token = uuid.uuid4().hex
         layout.values["token"] = self.token
-        replace_bytes(self.path, packed(layout) + packed(first))
-        self._open(self.path.stat().st_size)
+        with replaced(self.path) as fresh, fresh.open("wb", buffering=0) as file:
+            size = write_record(file.fileno(), write_record(file.fileno(), 0, layout), first)
+        self._open(size)
 
     def go_on(self, size: int, token: str) -> None:
         """Write on after the first `size` bytes of what is there."""
@@ -152,30 +212,29 @@ class Journal:
         with told(self.path):
             self._descriptor = os.open(self.path, os.O_WRONLY | os.O_CLOEXEC)
             os.ftruncate(self._descriptor, size)
-            os.lseek(self._descriptor, size, os.SEEK_SET)
         self._length = size
 
     def append(self, record: Record) -> None:
         """Add a record; where the disk takes only a part of it, none of it stays."""
-        data = packed(record)
         with told(self.path):
             try:
-                write_all(self._descriptor, data)
+                self._length = write_record(self._descriptor, self._length, record)
             except OSError:
                 with suppress(OSError):
                     os.ftruncate(self._descriptor, self._length)
                 raise
-        self._length += len(data)
 
     def keep_state(self, rows: int, arrays: Mapping[str, Any]) -> None:
         """Keep what the analysis goes on from after its rows so far."""
-        data = packed(Record("state", {"rows": rows, "token": self.token}, dict(arrays)))
-        replace_bytes(self._states[0], data, sync=False)
+        record = Record("state", {"rows": rows, "token": self.token}, dict(arrays))
+        with replaced(self._states[0], sync=False) as fresh, fresh.open("wb", buffering=0) as file:
+            write_record(file.fileno(), 0, record)
         now = time.monotonic()
         if now - self._safe_at > SAFE_EVERY:
             with told(self.path):
                 os.fsync(self._descriptor)
-            replace_bytes(self._states[1], data)
+            with replaced(self._states[1]) as fresh:
+                shutil.copyfile(self._states[0], fresh)
             self._safe_at = time.monotonic()
 
     def state(self, token: str, rows: int) -> tuple[int, dict[str, Any]] | None:

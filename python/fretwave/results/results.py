@@ -19,6 +19,7 @@ import numpy as np
 from ..columns import Column, Value, columns_named
 from ..files.csv_table import header_line, row_line
 from ..files.whole import replace_bytes, told, write_all
+from ..mpi.spread import Spread, send_parts
 from ..post.contact_history import MOTION
 from ..units import units_of
 from .field import Field
@@ -110,7 +111,7 @@ class AnalysisWriter:
     def append(
         self,
         row: Mapping[str, Value],
-        coefficients: npt.ArrayLike | None = None,
+        coefficients: npt.ArrayLike | Spread | None = None,
         motions: Motion | None = None,
         state: State | None = None,
         fields: Mapping[str, Any] | None = None,
@@ -123,11 +124,11 @@ class AnalysisWriter:
         row : mapping
             One value per column.
         coefficients : (n_dof, m), optional
-            Harmonic coefficients of the point.
+            Harmonic coefficients of the point, on the writing rank or spread over all.
         motions : mapping, optional
             Contact name -> u, v, f over one period, for points that are reported.
         state : mapping, optional
-            Arrays from which the analysis can go on after this row.
+            Arrays from which the analysis can go on after this row, of those that are spread each rank's part.
         fields : mapping, optional
             The arrays of the row.
         labels : sequence of str, optional
@@ -140,17 +141,20 @@ class AnalysisWriter:
         """
         if self.rows == 0:
             self._before_first()
+        spread = isinstance(coefficients, Spread) and bool(self._labels)
         if self.active:
             self._write(self._record(row, coefficients, motions, fields, labels), row_line(self.columns, row))
+        elif spread:
+            send_parts({"coefficients": coefficients})
         self.rows += 1
         self.reported += bool(motions)
-        if self.active and state is not None:
-            self._journal.keep_state(self.rows, state)
+        if state is not None:
+            self._journal.keep_state(self.rows, state) if self.active else send_parts(state)
 
     def _record(
         self,
         row: Mapping[str, Value],
-        coefficients: npt.ArrayLike | None,
+        coefficients: npt.ArrayLike | Spread | None,
         motions: Motion | None,
         fields: Mapping[str, Any] | None,
         labels: Sequence[str],
@@ -158,9 +162,12 @@ class AnalysisWriter:
         values: dict[str, Any] = {
             column.name: column.loaded(column.stored(row[column.name])[()]) for column in self.columns
         }
-        arrays = {f"field/{name}": np.asarray((fields or {})[name], dtype=float) for name in self.fields}
+        arrays: dict[str, Any] = {
+            f"field/{name}": np.asarray((fields or {})[name], dtype=float) for name in self.fields
+        }
         if coefficients is not None and self._labels:
-            arrays["coefficients"] = np.asarray(coefficients, dtype=float)
+            spread = isinstance(coefficients, Spread)
+            arrays["coefficients"] = coefficients if spread else np.asarray(coefficients, dtype=float)
             if len(labels) > len(self._labels):
                 values[LABELS] = list(labels)
         for contact, motion in (motions or {}).items():

@@ -16,7 +16,7 @@ from ..post.contact_history import AXES, MOTION
 from ..texts import display
 from ..units import UnitSystem, units_of
 from .field import Field
-from .journal import Record, read_records
+from .journal import Record, Stored, read_records
 
 if TYPE_CHECKING:
     import h5py
@@ -162,6 +162,8 @@ def _growing(
     """A dataset (rows, *shape) that other programs may add to."""
     size = 8 * int(np.prod(shape, dtype=np.int64))
     chunk = (max(1, min(most, CHUNK_BYTES // max(size, 1))), *(max(1, n) for n in shape))
+    if size > BATCH_BYTES:  # HDF5 has none of more than 4 GB
+        chunk = (1, max(1, BATCH_BYTES * shape[0] // size), *chunk[2:])
     return group.create_dataset(name, (rows, *shape), dtype, maxshape=(None, *shape), chunks=chunk, fillvalue=missing)
 
 
@@ -237,8 +239,10 @@ class _Batches:
         self._waiting: dict[str, tuple[int, list[npt.NDArray[Any]]]] = {}
         self._bytes = 0
 
-    def put(self, name: str, row: int, values: npt.NDArray[Any]) -> None:
+    def put(self, name: str, row: int, values: npt.NDArray[Any] | Stored) -> None:
         """A row of a dataset, whose values may be fewer along the last axis than others' are."""
+        if isinstance(values, Stored):
+            return self._copy(self._group[name], row, values)
         first, rows = self._waiting.get(name, (row, []))
         if rows and (row != first + len(rows) or values.shape != rows[0].shape):
             self._write(name, first, rows)
@@ -254,6 +258,14 @@ class _Batches:
         for name, (first, rows) in self._waiting.items():
             self._write(name, first, rows)
         self._waiting, self._bytes = {}, 0
+
+    @staticmethod
+    def _copy(data: h5py.Dataset, row: int, values: Stored) -> None:
+        """A long row, not as a whole."""
+        step = max(1, BATCH_BYTES * values.shape[0] // values.nbytes)
+        for start in range(0, values.shape[0], step):
+            part = values[start : start + step]
+            data[(row, slice(start, start + len(part)), *(slice(n) for n in part.shape[1:]))] = part
 
     def _write(self, name: str, first: int, rows: list[npt.NDArray[Any]]) -> None:
         own = tuple(slice(n) for n in rows[0].shape)

@@ -10,11 +10,10 @@ import numpy as np
 from petsc4py import PETSc
 
 from .. import _core
-from ..arrays import Array
 from ..errors import InputError
 from ..hb.problems import HarmonicProblem
-from ..mpi.gather import on_rank_0
 from ..mpi.log import event
+from ..mpi.spread import Spread, fill
 from .starting import far_from_start, starts
 from .steps import StepControl
 from .trace import Knot
@@ -210,15 +209,10 @@ class Continuation:
         """Reports and events that were asked for or seen and could not be had, each with its reason."""
         return list(self._core.missed)
 
-    def snapshot(self) -> dict[str, Any] | None:
-        """All that `restore` needs to go on; on rank 0. Collective."""
-        state = dict(self._core.anchor())
-        comm = self.problem.model.comm
-        vectors = [name for name in _VECTORS if name in state]
-        whole = {name: on_rank_0(comm, state[name]) for name in vectors}
-        if comm.rank:
-            return None
-        return {**state, **whole}
+    def snapshot(self) -> dict[str, Any]:
+        """All that `restore` needs to go on; of vectors each rank has its part (`Spread`). Collective."""
+        state, comm = dict(self._core.anchor()), self.problem.model.comm
+        return {name: Spread(comm, value) if name in _VECTORS else value for name, value in state.items()}
 
     @classmethod
     def restore(
@@ -229,14 +223,16 @@ class Continuation:
         steps: StepControl | None = None,
         report_at: Sequence[float] = (),
     ) -> Continuation:
-        """Goes on after the snapshot's point, on any number of ranks; rank 0 alone needs the snapshot. Collective.
+        """Goes on after the snapshot's point. Collective.
+
+        Rank 0 alone needs one that was written, or taken on a single rank; then any number of ranks goes on.
 
         On the same ranks and the direct route the branch is the same bit for bit; elsewhere (another number of ranks,
         or a preconditioner of another age) to the tolerance of the corrector. `repeated` is the last point handed out
         before, solved again, to measure that by; `resumed_at` are unknowns and tangent there.
         """
-        given = problem.model.comm.bcast(snapshot)
-        y0 = cls._scatter(problem, np.asarray(given["y"]))
+        given = cls._told(problem, snapshot)
+        y0 = cls._scatter(problem, given["y"])
         branch = cls(problem, y0, stop, steps, report_at, bool(given.get("upwards", True)))
         branch._go_on(given)
         return branch
@@ -244,7 +240,7 @@ class Continuation:
     def _go_on(self, snapshot: dict[str, Any]) -> None:
         """Stand where the snapshot was taken. Collective."""
         found = [name for name in _VECTORS if name in snapshot]
-        vectors = {name: self._scatter(self.problem, np.asarray(snapshot[name])) for name in found}
+        vectors = {name: self._scatter(self.problem, snapshot[name]) for name in found}
         before = [vectors[name] for name in _VECTORS[2:] if name in vectors]
         began = float(snapshot.get("began", np.nan))
         wary, smooth = bool(snapshot.get("wary", False)), bool(snapshot.get("smooth", False))
@@ -257,14 +253,24 @@ class Continuation:
         self._begun = True
 
     @staticmethod
-    def _scatter(problem: HarmonicProblem, whole: Array) -> PETSc.Vec:
+    def _told(problem: HarmonicProblem, snapshot: dict[str, Any] | None) -> dict[str, Any]:
+        """A snapshot on every rank, of vectors what each has of them. Collective."""
+        own = snapshot or {}
+        told = problem.model.comm.bcast({name: None if name in _VECTORS else value for name, value in own.items()})
+        return {name: own.get(name) if name in _VECTORS else value for name, value in told.items()}
+
+    @staticmethod
+    def _scatter(problem: HarmonicProblem, whole: Any) -> PETSc.Vec:
         v = problem.core.unknowns()
-        if v.getSize() != len(whole):
+        size = problem.model.comm.bcast(None if whole is None else whole.shape[0])
+        if v.getSize() != size:
             raise InputError(
-                "the saved state is of another problem", None, len(whole), v.getSize(), "resume with the same case"
+                "the saved state is of another problem", None, size, v.getSize(), "resume with the same case"
             )
-        begin, end = v.getOwnershipRange()
-        v.setArray(whole[begin:end])
+        if isinstance(whole, Spread) and whole.comm.size > 1:
+            v.setArray(whole.local)
+        else:
+            fill(v, whole.local if isinstance(whole, Spread) else whole)
         return v
 
     def destroy(self) -> None:

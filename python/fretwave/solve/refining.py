@@ -179,10 +179,8 @@ class RefiningContinuation(Continuation):
     def _too_inaccurate(self) -> bool:
         return sum(self.missed_by.values()) > TOLERATED * self.points
 
-    def snapshot(self) -> dict[str, Any] | None:
+    def snapshot(self) -> dict[str, Any]:
         found = super().snapshot()
-        if found is None:
-            return None
         harmonics, missed = self.problem.harmonics, [self.missed_by.get(source, 0) for source in LIMITS]
         sizes: dict[str, float] = {
             "harmonics": harmonics.orders[-1],
@@ -202,9 +200,9 @@ class RefiningContinuation(Continuation):
         report_at: Sequence[float] = (),
     ) -> RefiningContinuation:
         """Goes on on the snapshot's set, `problem` having the least. Collective."""
-        given = problem.model.comm.bcast(snapshot)
+        given = cls._told(problem, snapshot)
         now = problem.on(problem.harmonics.up_to(int(given["harmonics"]), int(given["samples"])))
-        y0, accuracy = cls._scatter(now, np.asarray(given["y"])), float(given["accuracy"])
+        y0, accuracy = cls._scatter(now, given["y"]), float(given["accuracy"])
         ways = bool(given["upwards"])
         branch = cls(now, y0, stop, steps, report_at, ways, accuracy=accuracy, least=problem.harmonics)
         branch._go_on(given)

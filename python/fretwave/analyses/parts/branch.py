@@ -14,6 +14,7 @@ from ...case.observed import label_of
 from ...case.schema import StepSection
 from ...errors import InputError
 from ...mpi.log import event
+from ...mpi.spread import Spread
 from ...post.contact_history import MEASURED
 from ...results.results import AnalysisWriter
 from ...results.slopes import slope_fields, slopes_of
@@ -36,8 +37,8 @@ if TYPE_CHECKING:
     from .context import AnalysisContext
 
     ModeLike = Union[ModeAnalysis, FlutterAnalysis]
-    #: Further columns of a point, from problem, y and (on the writing rank) coefficients (n_dof, m).
-    Describe = Callable[[Any, PETSc.Vec, Optional[Array]], Mapping[str, Any]]
+    #: Further columns of a point, from problem and y. Collective.
+    Describe = Callable[[Any, PETSc.Vec], Mapping[str, Any]]
 
 #: Events at which the contact's motion over a period is kept.
 PLAIN_EVENTS = ("", "step")
@@ -100,7 +101,7 @@ def record(
     Parameters
     ----------
     extra : the analysis' own part of the state to go on from
-    describe : further columns from problem, y and (on the writing rank) coefficients (n_dof, m). Collective
+    describe : further columns from problem and y
     errors : estimate them
 
     Returns
@@ -120,13 +121,13 @@ def record(
         names = [contact.name for contact in problem.model.contacts]
         motions = dict(zip(names, periods)) if writer.active else None
     kept = None if snapshot is None else {**snapshot, **{f"own_{key}": value for key, value in extra.items()}}
-    coefficients = problem.coefficients(point.y)
     if describe is not None:
-        row.update(describe(problem, point.y, coefficients))
+        row.update(describe(problem, point.y))
     slopes = {}
     if point.knot is not None and problem.meaning is not None:
         writer.keep(slope_fields(problem.meaning))
         slopes = slopes_of(problem.meaning, point.knot)
+    coefficients = Spread(problem.model.comm, problem.local_coefficients(point.y))
     writer.append(row, coefficients, motions, kept, slopes, problem.harmonics.labels)
     return row
 

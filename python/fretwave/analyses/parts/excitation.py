@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Optional
 
 import numpy as np
 
-from ...arrays import Array, Complex
+from ...arrays import Complex
 from ...case.harmonic import nodal_diameter
 from ...case.observed import dof_of
 from ...cyclic.engine_order import speed_rpm
@@ -109,8 +109,8 @@ class Excitation:
         names = ["speed_rpm"] if self.analysis.engine_order else []
         return names + (["largest_amplitude", "largest_sector"] if self.context.case.wheel else [])
 
-    def row(self, problem: HarmonicProblem, y: PETSc.Vec, coefficients: Optional[Array]) -> dict[str, Any]:
-        """Their values at a point; of the blades on the rank that has coefficients. Collective."""
+    def row(self, problem: HarmonicProblem, y: PETSc.Vec) -> dict[str, Any]:
+        """Their values at a point. Collective."""
         order = self.analysis.engine_order
         state = problem.state(y)
         # A first phase near -pi and pi, where undamped motion stands, reads as -pi.
@@ -119,8 +119,8 @@ class Excitation:
         row: dict[str, Any] = {"phase": self.phase}
         if order:
             row["speed_rpm"] = speed_rpm(state["omega"], order)
-        if self.context.case.wheel is not None and coefficients is not None:
-            observed = coefficients[self.context.case.places(dof_of(self.analysis.observe))]
+        if self.context.case.wheel is not None:
+            observed = problem.coefficients_at(y, self.context.case.places(dof_of(self.analysis.observe)))
             blades = np.abs(complex_amplitudes(problem.harmonics.labels, observed)[1])
             row = {**row, "largest_amplitude": float(blades.max()), "largest_sector": int(np.argmax(blades))}
         return row

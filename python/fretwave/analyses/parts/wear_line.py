@@ -15,7 +15,7 @@ from ...case.harmonic import nodal_diameter
 from ...case.load import Case
 from ...columns import COLUMNS, Column, Value
 from ...console import Console
-from ...mpi.gather import on_rank_0
+from ...mpi.spread import Spread, fill
 from ...results.results import AnalysisWriter, Field
 from ...texts import counted
 from ...units import ATTRIBUTE
@@ -158,14 +158,15 @@ class _Marcher:
         control = WearControl(a.stepper, a.tolerance, a.pressure_change)
         reports = [unit * value for value in a.report_at]
         state, _, found = open_branch(self.comm, self.writer, True)
-        state = self.comm.bcast(state)
         y = self.problem.core.unknowns()
-        begin, end = y.getOwnershipRange()
-        y.setArray(np.asarray(state["y"] if found else self.line.y)[begin:end])
-        newton, linear, residual = self.line.outcome
-        going: dict[str, Any] = {"outcome": (int(newton), int(linear), float(residual))}
         if found:
-            going = {key: state[key] for key in ("depth", "at", "step", "load_scale")}
+            fill(y, None if state is None else state["y"])
+            kept = None if state is None else {key: state[key] for key in ("depth", "at", "step", "load_scale")}
+            going: dict[str, Any] = self.comm.bcast(kept)
+        else:
+            y.setArray(self.line.y[slice(*y.getOwnershipRange())])
+            newton, linear, residual = self.line.outcome
+            going = {"outcome": (int(newton), int(linear), float(residual))}
         march = Wear(mode, y, unit * a.cycles, control, reports, **going)
         y.destroy()
         return march, march.go_on() if found else iter(march)
@@ -189,14 +190,10 @@ class _Marcher:
         if point.event:
             names = [contact.name for contact in self.problem.model.contacts]
             motions = dict(zip(names, self.problem.contact_history(y)))
-        whole = on_rank_0(self.comm, y)
-        kept = None
-        if whole is not None:
-            kept = {"y": whole, "depth": state.depth, "at": point.cycles, "step": march.step}
-            kept["load_scale"] = march.load_scale
-        self.writer.append(
-            row, self.problem.coefficients(y), motions if self.writer.active else None, kept, per_contact
-        )
+        kept = {"y": Spread(self.comm, y), "depth": state.depth, "at": point.cycles, "step": march.step}
+        kept["load_scale"] = march.load_scale
+        coefficients = Spread(self.comm, self.problem.local_coefficients(y))
+        self.writer.append(row, coefficients, motions if self.writer.active else None, kept, per_contact)
         return row
 
     def _per_contact(self, state: WornState) -> dict[str, Any]:

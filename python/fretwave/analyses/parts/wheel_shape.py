@@ -5,12 +5,12 @@ The numbers are those of `fretwave.cyclic.wheel_shape`.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Optional
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from ...arrays import Array, Complex
+from ...arrays import Complex
 from ...case.observed import dof_of
 from ...columns import Column
 from ...cyclic.engine_order import folded
@@ -65,20 +65,23 @@ class WheelShape:
     def __init__(
         self, context: AnalysisContext[AnalysisSection], dof: str, tuned_amplitude: float, mode: LinearMode
     ) -> None:
-        wheel, self.M = context.wheel, context.case.M
-        self.shape = Shape(self.M, wheel.sectors, context.tuned.dof(dof), tuned_amplitude)
+        M = context.case.M
+        self.shape = Shape(M, context.wheel.sectors, context.tuned.dof(dof), tuned_amplitude)
+        self.places = context.case.places(dof)
         phi = mode.shape + 1j * mode.imaginary
         # what forces are measured in, per displacement (`reference_stiffness` of the core)
-        self.stiffness = mode.omega**2 * np.real(phi.conj() @ (self.M @ phi)) / np.linalg.norm(phi) ** 2
+        self.stiffness = mode.omega**2 * np.real(phi.conj() @ (M @ phi)) / np.linalg.norm(phi) ** 2
 
-    def row(self, problem: NonlinearMode, y: PETSc.Vec, coefficients: Optional[Array]) -> dict[str, Any]:
-        """Of one point; on ranks without coefficients nothing. Collective."""
+    def row(self, problem: NonlinearMode, y: PETSc.Vec) -> dict[str, Any]:
+        """Of one point. Collective."""
         unfolding, state = problem.unfolding(y), problem.state(y)
-        if coefficients is None:
-            return {}
-        q = complex_amplitudes(problem.harmonics.labels, coefficients)[1]
-        held = self.stiffness * state["amplitude"] / (state["omega0"] ** 2 * np.linalg.norm(self.M @ q))
-        return {**self.shape(q), "unfolding": float(held * np.linalg.norm(unfolding))}
+        labels, model = problem.harmonics.labels, problem.model
+        q = complex_amplitudes(labels, problem.local_coefficients(y))[1]  # this rank's
+        a = complex_amplitudes(labels, problem.coefficients_at(y, self.places))[1]
+        inertia = np.sqrt(model.comm.allreduce(np.linalg.norm(model.local_inertia(q)) ** 2))
+        held = self.stiffness * state["amplitude"] / (state["omega0"] ** 2 * inertia)
+        told = self.shape.told(a, model.form(2, q))
+        return {**told, "unfolding": float(held * np.linalg.norm(unfolding))}
 
 
 def finish_wheel(context: AnalysisContext[ModeAnalysis], writer: AnalysisWriter, start: Start) -> list[str]:
@@ -121,7 +124,8 @@ def _sector_amplitudes(
     """Of the observed dof at some points, (points, N), from the coefficients written."""
     places = context.case.places(dof_of(context.analysis.normalise))
     labels = [text.decode() for text in writer.group["harmonic"][()]]
-    kept = [writer.group["coefficients"][int(point)][places] for point in points]
+    first, step = places[0], places[1] - places[0]  # as in every sector
+    kept = [writer.group["coefficients"][int(point), first : places[-1] + 1 : step] for point in points]
     return np.array([complex_amplitudes(labels, Q)[1] for Q in kept])
 
 
