@@ -303,17 +303,22 @@ class Structure:
         part that reaches a face is shared with the next sector, in whose rows T_k^T K_part T_l has the factor
         delta_{j-k}.
         """
-        n, ties, part = self._sectors(), self.ties or {0: sp.identity(self.n_dof)}, {0: self._part(of)}
+        n, ties, part = self._sectors(), self.onto_parts, {0: self._part(of)}
         rows = [WheelMatrix(combine({k: T}, part, ties, -1), n, np.roll(deviations, k)) for k, T in ties.items()]
         return sum(rows[1:], rows[0])
 
     def stiffened(self, of: str, factor: float) -> Structure:
         """The same with K grown by a factor times a part of it, in every sector alike."""
-        added = tie(factor * self._part(of), self.ties or {0: sp.identity(self.n_dof)}) or {}
+        added = tie(factor * self._part(of), self.onto_parts) or {}
         K = dict(by_sector(self.K))
         for k, A in added.items():
             K[k] = sp.csr_matrix(K[k] + A if k in K else A)
         return replace(self, K=_plain(K))
+
+    @property
+    def onto_parts(self) -> Parts:
+        """The dofs of `parts` from those that ties leave; the identity without any."""
+        return self.ties or {0: sp.csr_matrix(sp.identity(self.n_dof))}
 
     def _part(self, of: str) -> Sparse:
         if of not in self.parts:

@@ -54,8 +54,7 @@ def _by_waves(context: AnalysisContext[Any], omega: float, count: int, contact: 
     few = {d: sorted(modes, key=lambda mode: abs(mode.omega - omega))[: NOMINAL // 2] for d, modes in waves.items()}
     given, of = context.wheel.deviations, WHOLE if mistuning is None else mistuning.of
     deviations = np.zeros(sector.sectors) if given is None else np.asarray(given)
-    ties = sector.ties or {0: sp.identity(sector.n_dof)}
-    mistuned = Mistuning(deviations, sp.csr_matrix(sector.parts[of]), ties)
+    mistuned = Mistuning(deviations, sp.csr_matrix(sector.parts[of]), sector.onto_parts)
     found = mistuned_modes(waves, mistuned, omega, count)
     before = mistuned_frequencies(few, mistuned, omega, count)
     apart = max(abs(mode.omega - other) for mode, other in zip(found, before)) / omega
