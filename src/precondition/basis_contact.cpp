@@ -51,23 +51,44 @@ bool BasisPreconditioner::moves(int pair, std::vector<double> const& means, size
   return largest > stuck * stiffness / problem_.stiffness_scale();
 }
 
-/// Pairs that slip or open come in with their mean.
-void BasisPreconditioner::take_contact() {
-  std::vector<int> rows;
-  std::vector<ModalBlocks::Entry> T;
-  place_.assign(basis_.rows(), -1);
+/// Pairs that are taken for stuck and are not: each with the place of its mean.
+std::vector<std::pair<int, size_t>> BasisPreconditioner::beginning(std::vector<double> const& means) const {
+  std::vector<std::pair<int, size_t>> out;
   size_t at = 0;
   for (size_t p = 0; p < pairs_.size(); ++p) {
-    const int d = pairs_[p].components, first = int(rows.size());
-    if (moves(int(p), means_, at))
-      for (int row = 0; row < d; ++row) {
-        place_[pairs_[p].first_row + row] = first + row;
-        rows.push_back(pairs_[p].first_row + row);
-        for (int col = 0; col < d; ++col) T.push_back({first + row, first + col, means_[at + row * d + col]});
-      }
-    at += size_t(d) * d;
+    if (place_[pairs_[p].first_row] < 0 && moves(int(p), means, at)) out.emplace_back(int(p), at);
+    at += size_t(pairs_[p].components) * pairs_[p].components;
   }
+  return out;
+}
+
+/// Pairs that slip or open come in with their mean.
+void BasisPreconditioner::take_contact() {
+  place_.assign(basis_.rows(), -1);
+  auto [rows, T] = taken(beginning(means_), 0);
   blocks_.set_contact(std::move(rows), std::move(T));
+}
+
+/// These pairs behind those that came in before.
+void BasisPreconditioner::add_contact(std::vector<std::pair<int, size_t>> const& pairs) {
+  const auto [rows, T] = taken(pairs, blocks_.rows());
+  blocks_.add_contact(rows, T);
+}
+
+/// Rows of pairs and what their mean stiffness lacks of the stuck one; they get their places from `first` on.
+std::pair<std::vector<int>, std::vector<ModalBlocks::Entry>> BasisPreconditioner::taken(
+    std::vector<std::pair<int, size_t>> const& pairs, int first) {
+  std::vector<int> rows;
+  std::vector<ModalBlocks::Entry> T;
+  for (auto const& [pair, at] : pairs) {
+    const int d = pairs_[pair].components, begin = int(rows.size());
+    for (int row = 0; row < d; ++row) {
+      place_[pairs_[pair].first_row + row] = first + begin + row;
+      rows.push_back(pairs_[pair].first_row + row);
+      for (int col = 0; col < d; ++col) T.push_back({begin + row, begin + col, means_[at + row * d + col]});
+    }
+  }
+  return {std::move(rows), std::move(T)};
 }
 
 /// What is left of each pair's tangents, and how pairs feel each other.

@@ -15,6 +15,7 @@ namespace fretwave::precondition {
 namespace {
 
 const Tuned cheap("basis_cheap", 600, "rows up to which the mean stiffness follows at every step");
+const Tuned few("basis_few", 0.3, "share of the slipping rows up to which further ones are added to them");
 
 /// The range of harmonics of a rank: as many coefficients for each.
 std::pair<int, int> range_of(Harmonics const& h, int rank, int size) {
@@ -148,19 +149,21 @@ void BasisPreconditioner::build(Vec y, Vec row) {
   couple(contacts);
 }
 
-/// The mean stiffness follows where that is cheap, and where a pair begins to slip.
+/// The mean stiffness follows where that is cheap; else that of pairs alone that begin to slip, if they are
+/// few.
 void BasisPreconditioner::follow(Vec y) {
   const auto contacts = problem_.pair_tangents(y);
   auto means = mean_tangents(contacts);
-  bool begins = false;
-  size_t at = 0;
-  for (size_t p = 0; p < pairs_.size(); ++p) {
-    begins |= place_[pairs_[p].first_row] < 0 && moves(int(p), means, at);
-    at += size_t(pairs_[p].components) * pairs_[p].components;
-  }
-  if (begins || blocks_.rows() <= cheap) {
+  const auto began = beginning(means);
+  int rows = 0;
+  for (auto const& [pair, at] : began) rows += pairs_[pair].components;
+  if (blocks_.rows() <= cheap || rows > few * blocks_.rows()) {
     means_ = std::move(means);
     together(problem_.comm(), "inverting harmonic blocks", [&] { take_contact(); });
+  } else if (rows > 0) {
+    for (auto const& [pair, at] : began)
+      std::copy_n(&means[at], pairs_[pair].components * pairs_[pair].components, &means_[at]);
+    together(problem_.comm(), "adding slipping pairs", [&] { add_contact(began); });
   }
   couple(contacts);
 }

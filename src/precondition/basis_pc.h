@@ -51,7 +51,11 @@ class BasisPreconditioner : public solve::Preconditioner {
   void add_static(std::vector<double> const& scalars, double* q) const;
   std::vector<double> mean_tangents(std::vector<PairTangents> const&) const;
   bool moves(int pair, std::vector<double> const& means, size_t at) const;
+  std::vector<std::pair<int, size_t>> beginning(std::vector<double> const& means) const;
   void take_contact();
+  void add_contact(std::vector<std::pair<int, size_t>> const& pairs);
+  std::pair<std::vector<int>, std::vector<ModalBlocks::Entry>> taken(
+      std::vector<std::pair<int, size_t>> const& pairs, int first);
   void couple(std::vector<PairTangents> const&);
   std::vector<int> correct(std::vector<PairTangents> const&, std::vector<size_t> const& first_block);
   std::vector<float> own(double const* blocks, std::vector<int> const& places, int columns) const;

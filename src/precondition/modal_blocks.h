@@ -40,6 +40,8 @@ class ModalBlocks {
   };
   /// T between some rows of B, by their places among these. `SingularBlock` if the blocks are.
   void set_contact(std::vector<int> rows, std::vector<Entry> T);
+  /// T of further rows, by their places among these, behind those that there are.
+  void add_contact(std::vector<int> const& rows, std::vector<Entry> const& T);
   int rows() const { return int(rows_.size()); }
 
   /// Modes, and the border's scalars where it is.
@@ -71,9 +73,12 @@ class ModalBlocks {
   void make_small(int i);
   void add_border(Small const&, std::vector<double>& N) const;
   void set_static_compliance();
+  void set_inverse(std::vector<double> const& G);
+  std::vector<float> static_compliance(std::vector<int> const& to, std::vector<int> const& from) const;
   void set_border(std::vector<double> const& U);
   void couple_border(std::vector<double> const& transposed_g);
-  std::vector<double> times_T(std::vector<double> const& x, bool transposed) const;
+  template <class Real>
+  std::vector<Real> times_T(std::vector<Real> const& x, bool transposed) const;
   void add_T(std::vector<float> const& u, std::vector<float>& to) const;
   std::vector<float> pull(std::vector<float> u) const;
   std::vector<double> small_solution(Small const&, std::vector<double> const& right) const;
@@ -90,7 +95,7 @@ class ModalBlocks {
   double static_at_rest_ = 0;
   std::vector<int> rows_;
   std::vector<Entry> T_;
-  std::vector<float> U_, G_;         ///< (G (1 + T G)^-1)^T
+  std::vector<float> U_, G_;         ///< (G (1 + T G)^-1)^T, column-major
   std::vector<float> left_, right_;  ///< (1 - G X) U_l and U_l^T (1 + T G)^-1
   std::vector<double> U_low_, H_;
   /// Of the border by scalar and part: z^-1 C_h; c and rho; X c, c - G X c; rho X, rho (1 + T G)^-1; its

@@ -9,6 +9,7 @@ from tolerances import REPEATED, SOLVED
 
 import fretwave as fw
 from fretwave import _core, balanced
+from fretwave.mpi.gather import on_all_ranks
 
 pytestmark = pytest.mark.ranks(1, 2, 3)
 
@@ -110,6 +111,60 @@ def test_branches_are_those_of_the_direct_route(comm, method, contact, damping) 
         assert one["beta"] == pytest.approx(same["beta"], rel=SOLVED, abs=SOLVED * same["omega"])
     moving = [(newton, linear) for _, newton, linear, *_ in ours if newton]
     assert max(linear / newton for newton, linear in moving) <= (12 if damping == "a damper" else 8)
+
+
+def slipping(problem, still, moving, pairs):
+    """Unknowns as `still`, but for the motion of the first pairs, which is that of `moving`. Collective."""
+    contact, m = problem.model.contacts[0], problem.harmonics.block_size
+    B = contact.B.toarray() if hasattr(contact.B, "toarray") else np.asarray(contact.B)
+    one, other = (problem.model.comm.bcast(problem.coefficients(y)) for y in (still, moving))
+    goal, rows = B @ one, pairs * contact.components
+    goal[:rows] = (B @ other)[:rows]
+    entries = on_all_ranks(problem.model.comm, still)
+    scale = np.abs(one).max() / np.abs(entries[: N * m]).max()
+    entries[: N * m] = ((one + np.linalg.pinv(B) @ (goal - B @ one)) / scale).ravel()
+    y = still.copy()
+    begin, end = y.getOwnershipRange()
+    y.setArray(entries[begin:end])
+    return y
+
+
+def preconditioned(newton, problem, y):
+    """P^-1 of a random vector, P as it is for y."""
+    given, moved = problem.core.unknowns(), problem.core.unknowns()
+    begin, end = given.getOwnershipRange()
+    given.setArray(np.random.default_rng(1).standard_normal(given.getSize())[begin:end])
+    assert newton.linear(y, given, moved)
+    newton.snes.getKSP().getPC().apply(given, moved)
+    return moved
+
+
+@pytest.mark.parametrize("contact", [sliders(), sliders("coulomb_3d", PADS, 3)], ids=["jenkins", "coulomb_3d"])
+def test_pairs_that_begin_to_slip_are_added_to_the_inverse(comm, contact) -> None:
+    """Behind those that slip as before, instead of making it anew: the same preconditioner."""
+    M, K = chain()
+    options, added = PETSc.Options(), {"fw_basis_cheap": 0.5, "fw_basis_few": 100}  # however many
+    static = {"fw_modes_fewest": 2, "fw_modes_follows": 1e9}  # all but two modes are in the inverse
+    with fw.Model(M, K, 0.002 * K, [contact], comm) as model:
+        problem = problem_of(model)
+        followed = fw.Continuation(problem, problem.initial(0.1), (0.1, 4.0))
+        ys = [p.y.copy() for p in followed]
+        row = ys[0].duplicate()
+        row.set(0.0)
+        row.setValue(row.getSize() - 1, 1.0)
+        row.assemble()
+        correctors = [_core.Newton(problem.core, "basis_") for _ in range(2)]
+        for pairs in range(PAIRS + 1):
+            y, found = slipping(problem, ys[0], ys[-1], pairs), []
+            for corrector, given in zip(correctors, ({}, added)):
+                for option, value in {**static, **given}.items():
+                    options[option] = value
+                corrector.system.close(row, 0.0)
+                found.append(preconditioned(corrector, problem, y))
+                for option in {**static, **given}:
+                    options.delValue(option)
+            found[1].axpy(-1.0, found[0])
+            assert found[1].norm() < 1e-6 * found[0].norm(), f"{pairs} pairs"
 
 
 def test_stuck_pairs_are_solved_by_one_iteration(comm) -> None:
