@@ -64,6 +64,13 @@ void give_memory_back() {
 #endif
 }
 
+/// Formats of -log_view that say what was called by what need it from the beginning on.
+void begin_log(bool nested) {
+  static bool is_nested = false;
+  if (!is_nested) check(nested ? PetscLogNestedBegin() : PetscLogDefaultBegin());
+  is_nested |= nested;
+}
+
 }  // namespace
 
 NB_MODULE(_core, m) {
@@ -107,6 +114,7 @@ NB_MODULE(_core, m) {
       "communicator (mpi4py's `py2f`); returns the "
       "`arriving` "
       "numbers for this one, by rank. Collective.");
+  m.def("begin_log", begin_log, nb::arg("nested"), "PETSc counts events from here on. Collective.");
   m.def("unused_options", unused_options, "PETSc options that were set and that nothing has read.");
   bind_contact(m);
   bind_model(m);

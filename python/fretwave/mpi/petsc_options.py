@@ -21,6 +21,8 @@ COMMON = (
 
 #: Options of PETSc itself, which it reads at its end: the same for all analyses.
 LOGS = ("log_view", "log_view_memory")
+#: Formats of the former that say what was called by what.
+NESTED = ("ascii_xml", "ascii_flamegraph")
 #: With that by which every solver lists its options as it is made, ours among them.
 WHOLE = (*LOGS, "help")
 #: What tuned constants of the core begin with: no analysis' own (`fretwave doctor --constants`).
@@ -116,11 +118,13 @@ class AnalysisOptions:
         """The options are in the database inside."""
         from petsc4py import PETSc
 
+        from .._core import begin_log
+
         database: Any = PETSc.Options()
         for name, value in self.pairs.items():
             database.setValue(name, value)
         if not set(LOGS).isdisjoint(self.pairs):
-            PETSc.Log.begin()
+            begin_log((self.pairs.get("log_view") or "").split(":")[-1] in NESTED)
         stage = PETSc.Log.Stage(self.prefix.rstrip("_"))
         stage.push()
         try:
