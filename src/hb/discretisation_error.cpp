@@ -27,6 +27,8 @@ const Tuned reach("error_reach", 0.3, "arclength by which the branch is followed
 const Tuned bent("error_bent", 0.2,
                  "residual that a step leaves along that which it is made for, from which it is taken anew");
 
+constexpr double astray = 10;  // of a bent step: what lies farther away is another solution
+
 const Tuned held("error_held_means", 1e-4,
                  "share of the stuck stiffness in which estimates hold the mean of the motion");
 
@@ -212,19 +214,33 @@ std::array<VecHandle, 4> DiscretisationError::residuals(Vec y, Vec point, Vec re
   return {std::move(finer), std::move(same), std::move(left), std::move(reduced)};
 }
 
-/// dy' of these right sides; false where J' is singular.
-bool DiscretisationError::step(Vec point, Vec row, Vec reduction, std::span<Vec const> b,
-                               std::span<Vec const> x) {
+/// dy' of these right sides, and whether it was bent; none where J' is singular.
+std::optional<bool> DiscretisationError::step(Vec point, Vec row, Vec reduction, std::span<Vec const> b,
+                                              std::span<Vec const> x) {
   newton_->system().close(row, 0);
-  if (!newton_->linear(point, b, x)) return false;
-  if (b.empty()) return true;
+  if (!newton_->linear(point, b, x)) return {};
+  if (b.empty()) return false;
   VecHandle whole = sum(x);
   const double c = bend(point, left_side(sum(b)), reduction, whole);
-  if (!std::isfinite(c)) return true;
+  if (!std::isfinite(c)) return false;
   const double length = step_length(c);
   for (Vec part : x) check(VecScale(part, length));
-  if (std::abs(c) > bent) from_halfway(solve::moved(point, length / 2, whole), row, b, x);
+  if (std::abs(c) <= bent) return false;
+  from_halfway(solve::moved(point, length / 2, whole), row, b, x);
   return true;
+}
+
+/// Newton's steps from where these led, to the end: `most`, what the most is left out by, gets what they
+/// change. None where a step is dear, and where they lead to another solution or nowhere.
+void DiscretisationError::finish(Vec point, Vec row, std::span<Vec const> x, Vec most) {
+  if (!again_ || again_->dear()) return;
+  VecHandle whole = sum(x), y = solve::moved(point, 1, whole);
+  again_->system().close(row, solve::dot(row, point));
+  const bool found = again_->solve(y, solve::Effort::plain).converged;
+  check(VecAXPY(y, -1, point));
+  if (!found || solve::norm(y) > astray * solve::norm(whole)) return;
+  check(VecAXPY(y, -1, whole));
+  check(VecAXPY(most, 1, y));
 }
 
 namespace {
@@ -249,7 +265,15 @@ std::optional<LeftOut> DiscretisationError::at(Vec y, Vec tangent, Vec reduction
     rights.push_back(right_side(left[k])), changes.push_back(solve::zero_like(rights.back()));
     b.push_back(rights.back()), x.push_back(changes.back()), sources.push_back(k);
   }
-  if (!step(point, closing_row(y, tangent), left[reduced], b, x)) return {};
+  VecHandle row = closing_row(y, tangent);
+  const auto is_bent = step(point, row, left[reduced], b, x);
+  if (!is_bent) return {};
+  if (const size_t own = sources.size() - (sources.size() && sources.back() == reduced); *is_bent && own) {
+    // what a reduction leaves out is in none of these equations
+    const auto larger = [&](size_t one, size_t other) { return sizes[one] < sizes[other]; };
+    const auto most = std::max_element(sources.begin(), sources.begin() + own, larger) - sources.begin();
+    finish(point, row, std::span(x).first(own), x[most]);
+  }
   if (!sources.empty() && sources[0] == above)
     check(VecScale(x[0], all_above(problem_.harmonics(), finer_->harmonics())));
   LeftOut out;

@@ -38,7 +38,8 @@ struct LeftOut {
 /// of which one more residual tells q. Its part along r' vanishes at s = 2 / (1 + sqrt(1 - 4 c)), and is the
 /// least at s = 1 / (2 c) where c > 1/4: so far the step goes. Where c is not small (`bent`) it is
 /// taken anew with the Jacobian halfway there, for r' + J'(y + dy' / 2) dy' = 0 holds for such equations
-/// without any error (the implicit midpoint rule).
+/// without any error (the implicit midpoint rule). Others are bent still: where systems are small enough for
+/// the direct route, the finer equations are then solved (`finish`).
 class DiscretisationError {
  public:
   /// `prefix`: of the PETSc options of J' dy' = b. Collective.
@@ -54,9 +55,10 @@ class DiscretisationError {
   VecHandle left_side(Vec b) const;
   VecHandle closing_row(Vec y, Vec tangent);
   std::array<VecHandle, 4> residuals(Vec y, Vec point, Vec reduction);
-  bool step(Vec point, Vec row, Vec reduction, std::span<Vec const> b, std::span<Vec const> x);
+  std::optional<bool> step(Vec point, Vec row, Vec reduction, std::span<Vec const> b, std::span<Vec const> x);
   double bend(Vec point, Vec r, Vec reduction, Vec step);
   void from_halfway(Vec middle, Vec row, std::span<Vec const> b, std::span<Vec const> x);
+  void finish(Vec point, Vec row, std::span<Vec const> x, Vec most);
 
   HarmonicProblem& problem_;
   std::string prefix_, left_out_;

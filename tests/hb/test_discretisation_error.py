@@ -122,7 +122,7 @@ def test_the_error_of_a_response_is_estimated(level, omega):
 
 @SERIAL
 def test_a_step_along_which_the_equations_bend_is_taken_anew():
-    """Steep friction at its resonance: a straight step of Newton's was 3.5 to 5 times the error at these places."""
+    """Steep friction at its resonance: a straight step was 3.5 to 5 times the error, a bent one six, or a seventh."""
     steep = fw.Model(M, K, None, [friction([[0.0, 1.0]], LIMIT, 0.05)])
 
     def at(highest, omega):
@@ -130,7 +130,7 @@ def test_a_step_along_which_the_equations_bend_is_taken_anew():
         problem = fw.ForcedResponse(steep, h, {1: np.array([1.0, 0.0])}, 8.8, 0, fw.linear_modes(steep, 1)[0])
         return reported(problem, omega, (20.2, 28.9))
 
-    for highest, places in ((7, [26.44]), (15, [25.032, 26.088])):
+    for highest, places in ((5, [25.0, 26.408]), (7, [25.9, 26.0, 26.1, 26.44]), (15, [25.032, 26.088])):
         for row, right in zip(at(highest, places), at(61, places)):
             error = abs(row["amplitude"] * np.exp(1j * row["phase"]) - right["amplitude"] * np.exp(1j * right["phase"]))
             assert error / 3 < row["amplitude_error"] < 3 * error, (highest, row["omega"])
