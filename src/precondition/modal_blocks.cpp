@@ -116,8 +116,10 @@ std::vector<float> ModalBlocks::static_compliance(std::vector<int> const& to,
 void ModalBlocks::add_contact(std::vector<int> const& rows, std::vector<Entry> const& T) {
   static const log::Event slipping("FwSlipInverse");
   const log::Span span(slipping);
+  fault::point("harmonic block");
   const int r = this->rows(), s = int(rows.size()), all = r + s;
-  auto C_RS = static_compliance(rows_, rows), C_SS = static_compliance(rows, rows), C_SR = C_RS;  // C_SR^T
+  auto C_RS = static_compliance(rows_, rows), C_SS = static_compliance(rows, rows);
+  auto C_SR = C_RS;  // transposed: G is symmetric
   const auto TG = times_T(C_RS, false), TtG = times_T(C_RS, true);
   const auto G_RS = C_RS;
   multiply("TN", {r, s, r}, -1.0f, {G_.data(), r}, {TG.data(), r}, 1.0f, C_RS.data(), r);
@@ -130,7 +132,7 @@ void ModalBlocks::add_contact(std::vector<int> const& rows, std::vector<Entry> c
     W[size_t(t.col) * s + t.row] += t.value;
     for (int j = 0; j < s; ++j) A[size_t(j) * s + t.row] += t.value * C_SS[size_t(j) * s + t.col];
   }
-  if (lapack::solve(A, s, W, s))
+  if (lapack::solve(A, s, W, s) || fault::value("harmonic block"))
     throw SingularBlock("the slipping pairs' block of the preconditioner is singular: a free motion");
   const auto W_rounded = rounded(W);
   // [C_SR C_SS]^T and [C_RS; C_SS] W of all rows, then both into the inverse

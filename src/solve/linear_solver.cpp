@@ -265,8 +265,8 @@ bool LinearSolver::set_up() {
 PetscErrorCode LinearSolver::set_up(PC pc) {
   if (!own_) return PETSC_ERR_ARG_WRONGSTATE;  // inside a PC of PETSc's
   return guard_.run([&] {
-    built_here_ = stale_;
     if (!stale_) follow();
+    built_here_ = stale_;
     check(PCSetFailedReason(pc, stale_ && !build() ? PC_FACTOR_NUMERIC_ZEROPIVOT : PC_NOERROR));
   });
 }
@@ -274,7 +274,11 @@ PetscErrorCode LinearSolver::set_up(PC pc) {
 void LinearSolver::follow() {
   static const log::Event following("FwPCFollow");
   const log::Span span(following);
-  preconditioner().follow(point_);
+  try {
+    preconditioner().follow(point_);
+  } catch (SingularBlock const&) {
+    stale_ = true;  // what was followed in part is built anew
+  }
 }
 
 bool LinearSolver::build() {

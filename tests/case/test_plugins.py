@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import subprocess
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -254,6 +255,27 @@ class {name}(fw.AnalysisSection):
     {body}
 fw.register_analysis({name})
 """
+
+
+def test_a_plugin_that_fails_takes_no_kind_of_the_package_along(tmp_path) -> None:
+    """One that it asked for first; in a process of its own, for here all are there already."""
+    (tmp_path / "bad.py").write_text(
+        ANALYSIS.format(name="Own", body='type: Literal["forced"]\n    def run(self, c): ...')
+    )
+    code = """
+from pathlib import Path
+import fretwave as fw
+from fretwave import registry
+from fretwave.case import plugins
+try:
+    plugins.load_file(Path("bad.py"))
+except fw.InputError as error:
+    print("two files register" in str(error), "forced" in registry.kinds())
+"""
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, check=True, capture_output=True, text=True)
+    assert done.stdout.split() == ["True", "True"]
+
+
 WRONG = {
     "raises": ("x = 1\n1 / 0\n", "the plug-in failed: ZeroDivisionError", "bad.py:2"),
     "does not parse": ("x = 1\n\nclass (:\n", "the plug-in failed: SyntaxError", "bad.py:3"),

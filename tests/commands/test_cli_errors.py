@@ -134,7 +134,7 @@ def test_where_the_time_goes_is_told_by_petsc(tmp_path: Path) -> None:
     assert counts["FwRecord"] == rows == counts["FwPoint"] - 1 and counts["FwTable"] > 0  # the last finds no point
 
 
-@pytest.mark.parametrize("format", ["ascii_flamegraph", "ascii_xml"])
+@pytest.mark.parametrize("format", ["ascii_flamegraph", "ascii_xml", "ascii_xml:append"])
 def test_what_called_what_is_told_by_petsc(tmp_path: Path, format: str) -> None:
     """Of both analyses; PETSc crashed at its end where it had not counted so from the beginning."""
     told, given = tmp_path / "log.txt", ["--only", "mode,mode_epmc"]

@@ -167,6 +167,35 @@ def test_pairs_that_begin_to_slip_are_added_to_the_inverse(comm, contact) -> Non
             assert found[1].norm() < 1e-6 * found[0].norm(), f"{pairs} pairs"
 
 
+def test_an_inverse_that_cannot_be_added_to_is_made_anew(comm) -> None:
+    """A singular block there, met on one rank: the system is solved, and the next one."""
+    M, K = chain()
+    options = PETSc.Options()
+    with fw.Model(M, K, 0.002 * K, [sliders()], comm) as model:
+        problem = problem_of(model)
+        followed = fw.Continuation(problem, problem.initial(0.1), (0.1, 4.0))
+        ys = [p.y.copy() for p in followed]
+        row = ys[0].duplicate()
+        row.set(0.0)
+        row.setValue(row.getSize() - 1, 1.0)
+        row.assemble()
+        corrector, other = (_core.Newton(problem.core, "basis_") for _ in range(2))
+        corrector.system.close(row, 0.0), other.system.close(row, 0.0)
+        options["fw_basis_cheap"], options["fw_basis_few"] = 0.5, 100
+        for pairs in (0, 2):
+            preconditioned(corrector, problem, slipping(problem, ys[0], ys[-1], pairs))
+        y = slipping(problem, ys[0], ys[-1], 3)
+        if comm.rank == 0:
+            _core.arm_fault("harmonic block", "value", 1)
+        found = [preconditioned(corrector, problem, y) for _ in range(2)]
+        options.delValue("fw_basis_cheap"), options.delValue("fw_basis_few")
+        expected = preconditioned(other, problem, y)
+        for one in found:
+            one.axpy(-1.0, expected)
+            assert one.norm() < 1e-6 * expected.norm()
+    _core.arm_fault("", "error", 0)
+
+
 def test_stuck_pairs_are_solved_by_one_iteration(comm) -> None:
     """Blocks are exact there, with damping by K; the columns of the scalars reach the fundamental alone."""
     M, K = chain()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import h5py
@@ -25,18 +26,22 @@ pytestmark = pytest.mark.ranks(1)
 
 def full_after(monkeypatch, count: int) -> None:
     """The disk takes so many bytes more."""
-    real, left = os.write, [count]
+    left = [count]
 
-    def write(descriptor: int, data: bytes) -> int:
-        if descriptor <= 2:
-            return real(descriptor, data)
-        part = bytes(data)[: left[0]]
-        if len(data) and not part:
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        left[0] -= len(part)
-        return real(descriptor, part)
+    def limited(real: Callable[..., int]) -> Callable[..., int]:
+        def write(descriptor: int, data: bytes, *place: int) -> int:
+            if descriptor <= 2:
+                return real(descriptor, data, *place)
+            part = bytes(data)[: left[0]]
+            if len(data) and not part:
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+            left[0] -= len(part)
+            return real(descriptor, part, *place)
 
-    monkeypatch.setattr(os, "write", write)
+        return write
+
+    for name in ("write", "pwrite"):
+        monkeypatch.setattr(os, name, limited(getattr(os, name)))
 
 
 @pytest.mark.parametrize("room", [0, 3000, 6000, 12000, 30000, 45000])

@@ -28,6 +28,20 @@ def test_pieces_are_the_whole_in_order(comm: MPI.Comm, monkeypatch: pytest.Monke
     assert all(len(one) <= piece for one in found[1:])
 
 
+def test_what_a_failing_rank_says_is_no_piece(comm: MPI.Comm, monkeypatch: pytest.MonkeyPatch, piece: int) -> None:
+    """It was taken for the number of entries to come: none."""
+    monkeypatch.setattr(spread, "PIECE", piece)
+    given, said = Spread(comm, np.arange(3.0)), None
+    if comm.rank:
+        said = comm.isend(None, 0, tag=32001)
+        send_parts({"given": given})
+        said.wait()
+        return
+    assert np.array_equal(np.concatenate([one.copy() for one in given.pieces()]), np.tile(np.arange(3.0), comm.size))
+    for _ in range(1, comm.size):
+        assert comm.recv(tag=32001) is None
+
+
 def test_a_vector_is_filled_from_rank_0(comm: MPI.Comm, monkeypatch: pytest.MonkeyPatch, piece: int) -> None:
     monkeypatch.setattr(spread, "PIECE", piece)
     vector = PETSc.Vec().createMPI(23, comm=comm)

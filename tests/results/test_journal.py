@@ -64,6 +64,20 @@ def test_a_record_without_its_head_is_torn(comm: MPI.Comm, tmp_path: Path) -> No
 
 
 @pytest.mark.ranks(1)
+def test_what_a_writer_has_yet_to_end_is_not_damaged(comm: MPI.Comm, tmp_path: Path) -> None:
+    """A reader beside it: behind a record that it met half written another one is whole by now."""
+    written(tmp_path / "whole", comm)
+    data = (tmp_path / "whole").read_bytes()
+    second = [place for place, _ in read_records(tmp_path / "whole")][1]
+    (tmp_path / "rows").write_bytes(data[:second] + bytes(30))
+    reader = read_records(tmp_path / "rows")
+    next(reader)
+    with (tmp_path / "rows").open("ab") as file:
+        file.write(data[second:])
+    assert not list(reader)
+
+
+@pytest.mark.ranks(1)
 def test_rows_of_a_long_array_are_read_when_asked_for(
     comm: MPI.Comm, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -73,6 +87,7 @@ def test_rows_of_a_long_array_are_read_when_asked_for(
         stored = record.arrays["spread"]
         assert isinstance(stored, Stored) and stored.ndim == 2 and stored.shape == WHOLE.shape
         assert np.array_equal(stored[3:7], WHOLE[3:7]) and np.array_equal(stored[18:30], WHOLE[18:])
+        (tmp_path / "rows").unlink(missing_ok=True)
         assert np.array_equal(np.asarray(stored), WHOLE)
         assert list(record.arrays["last"]) == [0, 1, 2]
 

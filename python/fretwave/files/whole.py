@@ -68,10 +68,10 @@ def replaced(path: Path, own: bool = False, keep_suffix: bool = False, sync: boo
     ----------
     own : bool
         The name is this process' own: no lock keeps others from writing the file.
-    sync : bool
-        Without it a power failure may undo or spoil the file, a kill may not.
     keep_suffix : bool
         For libraries that go by the suffix of a file's name.
+    sync : bool
+        Without it a power failure may undo or spoil the file, a kill may not.
 
     Raises
     ------

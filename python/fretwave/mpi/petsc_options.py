@@ -124,7 +124,7 @@ class AnalysisOptions:
         for name, value in self.pairs.items():
             database.setValue(name, value)
         if not set(LOGS).isdisjoint(self.pairs):
-            begin_log((self.pairs.get("log_view") or "").split(":")[-1] in NESTED)
+            begin_log(not set((self.pairs.get("log_view") or "").split(":")).isdisjoint(NESTED))
         stage = PETSc.Log.Stage(self.prefix.rstrip("_"))
         stage.push()
         try:

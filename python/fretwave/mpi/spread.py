@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 
 #: Entries of a message, 32 MB.
 PIECE = 1 << 22
+#: Of these messages: what a rank that fails has to say is none of them (`mpi.guard`).
+TAG = 32002
 
 
 class Spread:
@@ -40,18 +42,18 @@ class Spread:
         """All entries in their order on rank 0, some at a time; the others send theirs and get none. Collective."""
         flat = self.local.reshape(-1)
         if self.comm.rank:
-            self.comm.send(len(flat), 0)
+            self.comm.send(len(flat), 0, TAG)
             for first in range(0, len(flat), PIECE):
-                self.comm.Send(flat[first : first + PIECE], 0)
+                self.comm.Send(flat[first : first + PIECE], 0, TAG)
             return
         if len(flat):
             yield flat
         buffer = np.empty(PIECE if self.comm.size > 1 else 0)
         for rank in range(1, self.comm.size):
-            left = self.comm.recv(source=rank)
+            left = self.comm.recv(source=rank, tag=TAG)
             while left:
                 piece = buffer[: min(left, PIECE)]
-                self.comm.Recv(piece, rank)
+                self.comm.Recv(piece, rank, TAG)
                 yield piece
                 left -= len(piece)
 
@@ -72,10 +74,10 @@ def fill(vector: PETSc.Vec, whole: Any) -> None:
     if comm.rank:
         local = np.empty(end - begin)
         for first in range(0, len(local), PIECE):
-            comm.Recv(local[first : first + PIECE], 0)
+            comm.Recv(local[first : first + PIECE], 0, TAG)
         vector.setArray(local)
         return
     vector.setArray(np.asarray(whole[begin:end], dtype=float))
     for rank, (begin, end) in enumerate(ranges[1:], 1):
         for first in range(begin, end, PIECE):
-            comm.Send(np.ascontiguousarray(whole[first : min(first + PIECE, end)], dtype=float), rank)
+            comm.Send(np.ascontiguousarray(whole[first : min(first + PIECE, end)], dtype=float), rank, TAG)

@@ -24,6 +24,7 @@ import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
+from io import BytesIO
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -52,11 +53,28 @@ class Record:
     length: int = 0
 
 
+class _Kept:
+    """A file that stays open as long as anything of it may be read, whatever takes its place."""
+
+    def __init__(self, file: BinaryIO) -> None:
+        self._descriptor = os.dup(file.fileno())
+
+    def read(self, count: int, place: int) -> bytes:
+        blocks = []
+        while count and (block := os.pread(self._descriptor, min(count, BLOCK), place)):
+            blocks.append(block)
+            count, place = count - len(block), place + len(block)
+        return b"".join(blocks)
+
+    def __del__(self) -> None:
+        os.close(self._descriptor)
+
+
 @dataclass
 class Stored:
     """An array in a file, its rows read when they are asked for (`stored[a:b]`), all by `np.asarray`."""
 
-    path: Path
+    file: _Kept
     place: int
     dtype: np.dtype[Any]
     shape: tuple[int, ...]
@@ -71,9 +89,9 @@ class Stored:
 
     def __getitem__(self, rows: slice) -> AnyArray:
         first, last, _ = rows.indices(self.shape[0])
-        width = int(np.prod(self.shape[1:], dtype=np.int64))
-        start = self.place + first * width * self.dtype.itemsize
-        return np.fromfile(self.path, self.dtype, (last - first) * width, offset=start).reshape(-1, *self.shape[1:])
+        row = self.nbytes // self.shape[0]
+        data = self.file.read((last - first) * row, self.place + first * row)
+        return np.frombuffer(data, self.dtype).reshape(last - first, *self.shape[1:])
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> AnyArray:
         return self[:].astype(dtype or self.dtype, copy=False)
@@ -88,7 +106,12 @@ def _content(record: Record) -> Iterator[bytes | memoryview]:
     yield b"".join([struct.pack("<Q", len(text.encode())), text.encode(), *plain])
     for array in arrays.values():
         if isinstance(array, Spread):
-            yield from (piece.data for piece in array.pieces())
+            left = int(np.prod(array.shape, dtype=np.int64))
+            for piece in array.pieces():
+                left -= len(piece)
+                yield piece.data
+            if left:
+                raise RuntimeError(f"{left} entries of an array did not arrive")
 
 
 def write_record(descriptor: int, place: int, record: Record) -> int:
@@ -102,21 +125,26 @@ def write_record(descriptor: int, place: int, record: Record) -> int:
     return place + _HEAD.size + length
 
 
-def _read_record(file: BinaryIO, path: Path, place: int, length: int) -> Record:
-    """The record of a content of so many bytes at a place; arrays longer than a block are left there."""
-    file.seek(place)
-    (text,) = struct.unpack("<Q", file.read(8))
-    kind, values, layout = json.loads(file.read(text))
-    at = place + 8 + text
+def _read_record(file: BinaryIO, length: int, checksum: int) -> Record | None:
+    """The record whose content comes next; arrays longer than a block are left there. None where it is spoilt."""
+    place = file.tell()
+    source: BinaryIO = BytesIO(file.read(length)) if length <= BLOCK else file
+    if _checksum(source, length) != checksum:
+        return None
+    at = 0 if source is not file else place
+    source.seek(at)
+    (text,) = struct.unpack("<Q", source.read(8))
+    kind, values, layout = json.loads(source.read(text))
+    kept, at = _Kept(file), at + 8 + text
     arrays: dict[str, Any] = {}
     for name, dtype, shape in layout:
-        stored = Stored(path, at, np.dtype(dtype), tuple(shape))
+        stored = Stored(kept, at, np.dtype(dtype), tuple(shape))
         at += stored.nbytes
         if stored.nbytes > BLOCK:
             arrays[name] = stored
-            file.seek(at)
+            source.seek(at)
         else:
-            arrays[name] = np.frombuffer(file.read(stored.nbytes), dtype).reshape(shape)
+            arrays[name] = np.frombuffer(source.read(stored.nbytes), dtype).reshape(shape)
     return Record(kind, values, arrays, _HEAD.size + length)
 
 
@@ -150,18 +178,21 @@ def read_records(path: Path) -> Iterator[tuple[int, Record]]:
         while place < size:
             file.seek(place)
             head = _read_head(file.read(_HEAD.size))
-            if head is None or head[0] > size - place or _checksum(file, head[0]) != head[1]:
-                _check_torn(file, path, place)
+            record = _read_record(file, *head) if head is not None and head[0] <= size - place else None
+            if record is None:
+                _check_torn(file, path, place, size)
                 return
-            record = _read_record(file, path, place + _HEAD.size, head[0])
             yield place, record
             place += record.length
 
 
-def _check_torn(file: BinaryIO, path: Path, place: int) -> None:
-    """Nothing whole follows what is spoilt at `place`: then it was the last and is torn."""
+def _check_torn(file: BinaryIO, path: Path, place: int, size: int) -> None:
+    """Nothing whole follows what is spoilt at `place`: then it was the last and is torn.
+
+    Of the file as it was when it had `size` bytes: beside a writer it may be the last no more.
+    """
     file.seek(place + 1)
-    rest = file.read()
+    rest = file.read(size - place - 1)
     at = rest.find(_MARK)
     while at >= 0:
         head = _read_head(rest[at : at + _HEAD.size])

@@ -210,9 +210,12 @@ class Continuation:
         return list(self._core.missed)
 
     def snapshot(self) -> dict[str, Any]:
-        """All that `restore` needs to go on; of vectors each rank has its part (`Spread`). Collective."""
+        """All that `restore` needs to go on, of vectors each rank's part where there are several. Collective."""
         state, comm = dict(self._core.anchor()), self.problem.model.comm
-        return {name: Spread(comm, value) if name in _VECTORS else value for name, value in state.items()}
+        for name in [name for name in _VECTORS if name in state]:
+            part = Spread(comm, state[name])
+            state[name] = part if comm.size > 1 else part.local
+        return state
 
     @classmethod
     def restore(
@@ -225,7 +228,8 @@ class Continuation:
     ) -> Continuation:
         """Goes on after the snapshot's point. Collective.
 
-        Rank 0 alone needs one that was written, or taken on a single rank; then any number of ranks goes on.
+        Rank 0 alone needs one that was taken on a single rank, or that an analysis kept; any number of ranks goes on
+        from it. One of several ranks is for these.
 
         On the same ranks and the direct route the branch is the same bit for bit; elsewhere (another number of ranks,
         or a preconditioner of another age) to the tolerance of the corrector. `repeated` is the last point handed out
@@ -262,15 +266,16 @@ class Continuation:
     @staticmethod
     def _scatter(problem: HarmonicProblem, whole: Any) -> PETSc.Vec:
         v = problem.core.unknowns()
+        whole = np.asarray(whole, dtype=float) if isinstance(whole, Sequence) else whole
         size = problem.model.comm.bcast(None if whole is None else whole.shape[0])
         if v.getSize() != size:
             raise InputError(
                 "the saved state is of another problem", None, size, v.getSize(), "resume with the same case"
             )
-        if isinstance(whole, Spread) and whole.comm.size > 1:
+        if isinstance(whole, Spread):
             v.setArray(whole.local)
         else:
-            fill(v, whole.local if isinstance(whole, Spread) else whole)
+            fill(v, whole)
         return v
 
     def destroy(self) -> None:

@@ -161,7 +161,7 @@ class _Marcher:
         y = self.problem.core.unknowns()
         if found:
             fill(y, None if state is None else state["y"])
-            kept = None if state is None else {key: state[key] for key in ("depth", "at", "step", "load_scale")}
+            kept = state and {key: np.asarray(state[key]) for key in ("depth", "at", "step", "load_scale")}
             going: dict[str, Any] = self.comm.bcast(kept)
         else:
             y.setArray(self.line.y[slice(*y.getOwnershipRange())])
