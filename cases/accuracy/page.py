@@ -81,7 +81,9 @@ SCENES = {
         "mode",
         ("--quick", "--set", "mode.amplitude=[1e-5,2e-4]", "--set", "mode.report_at=[]")
         + ("--harmonics", "3,5,9,15,21", "--samples", "128", *FEW, "--accuracy", "1e-1,3e-2"),
-        "Up to 0.2 mm, past first slip: beyond, at lift-off, lie loops (H = 21 took 286 points to 0.25 mm).",
+        "Up to 0.2 mm, past first slip: beyond, at lift-off, lie loops (H = 21 took 286 points to 0.25 mm)."
+        " The finest run is not the truth: at 42 um damping grows by 4 % from 15 to 23 harmonics (0.3 % from there to"
+        " 31). Estimates say so, and a run asked for 3e-2 takes up to 48 there: it is right and lies off the finest.",
     ),
 }
 

@@ -27,7 +27,8 @@ const Tuned reach("error_reach", 0.3, "arclength by which the branch is followed
 const Tuned bent("error_bent", 0.2,
                  "residual that a step leaves along that which it is made for, from which it is taken anew");
 
-constexpr double astray = 10;  // of a bent step: what lies farther away is another solution
+constexpr double solved = 1e-2;  // of the residual: so far Newton goes on from a bent step
+constexpr double astray = 10;    // of that step: what lies farther away is another solution
 
 const Tuned held("error_held_means", 1e-4,
                  "share of the stuck stiffness in which estimates hold the mean of the motion");
@@ -230,10 +231,13 @@ std::optional<bool> DiscretisationError::step(Vec point, Vec row, Vec reduction,
   return true;
 }
 
-/// Newton's steps from where these led, to the end: `most`, what the most is left out by, gets what they
-/// change. None where a step is dear, and where they lead to another solution or nowhere.
-void DiscretisationError::finish(Vec point, Vec row, std::span<Vec const> x, Vec most) {
+/// Newton's steps from where these led, until next to nothing is left of the residual: `most`, what the most
+/// is left out by, gets what they change. None where a step is dear, and where they lead to another solution
+/// or nowhere.
+void DiscretisationError::finish(Vec point, Vec row, double residual, std::span<Vec const> x, Vec most) {
   if (!again_ || again_->dear()) return;
+  check(SNESSetTolerances(again_->snes(), solved * residual, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT,
+                          PETSC_DEFAULT));
   VecHandle whole = sum(x), y = solve::moved(point, 1, whole);
   again_->system().close(row, solve::dot(row, point));
   const bool found = again_->solve(y, solve::Effort::plain).converged;
@@ -272,7 +276,7 @@ std::optional<LeftOut> DiscretisationError::at(Vec y, Vec tangent, Vec reduction
     // what a reduction leaves out is in none of these equations
     const auto larger = [&](size_t one, size_t other) { return sizes[one] < sizes[other]; };
     const auto most = std::max_element(sources.begin(), sources.begin() + own, larger) - sources.begin();
-    finish(point, row, std::span(x).first(own), x[most]);
+    finish(point, row, solve::norm(sum(b)), std::span(x).first(own), x[most]);
   }
   if (!sources.empty() && sources[0] == above)
     check(VecScale(x[0], all_above(problem_.harmonics(), finer_->harmonics())));

@@ -58,7 +58,7 @@ class DiscretisationError {
   std::optional<bool> step(Vec point, Vec row, Vec reduction, std::span<Vec const> b, std::span<Vec const> x);
   double bend(Vec point, Vec r, Vec reduction, Vec step);
   void from_halfway(Vec middle, Vec row, std::span<Vec const> b, std::span<Vec const> x);
-  void finish(Vec point, Vec row, std::span<Vec const> x, Vec most);
+  void finish(Vec point, Vec row, double residual, std::span<Vec const> x, Vec most);
 
   HarmonicProblem& problem_;
   std::string prefix_, left_out_;
