@@ -143,6 +143,9 @@ def test_a_killed_run_resumes_exactly(folder: Path, run: Path, tmp_path: Path) -
     assert without_time(rows(tmp_path)) == without_time(rows(run))
     walls = [row["wall_s"] for row in rows(tmp_path) if row["line"] == "0"]
     assert walls == [row["wall_s"] for row in csv.DictReader(first.splitlines())] and "resumed" in done.stdout
+    with h5py.File(tmp_path / "results.h5") as one, h5py.File(run / "results.h5") as other:
+        assert sorted(one["wear"]) == sorted(other["wear"])
+        assert np.array_equal(one["wear/rest_displacement"], other["wear/rest_displacement"])
 
 
 def test_an_amplitude_that_the_mode_does_not_reach_leaves_the_others(folder: Path, tmp_path: Path, launch) -> None:

@@ -140,7 +140,9 @@ class WearAnalysis(AnalysisSection):
             starts = unworn_starts(context.of(settings), self)
             context.before_first()
             if context.comm.rank == 0:
-                kept.save(0, starts)
+                kept.save(0, {**starts, **context.arrays})
+        elif "rest_displacement" in starts:  # of a run that is gone on with
+            context.arrays["rest_displacement"] = starts["rest_displacement"]
         lines = [
             Line(number, amplitude, starts[f"y_{number}"], starts[f"outcome_{number}"], folder / f"line_{number:03d}")
             for number, amplitude in enumerate(self.amplitude)
