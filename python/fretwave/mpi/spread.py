@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from ..arrays import Array
+from ..arrays import AnyArray, Array
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -17,6 +17,15 @@ if TYPE_CHECKING:
 PIECE = 1 << 22
 #: Of these messages: what a rank that fails has to say is none of them (`mpi.guard`).
 TAG = 32002
+
+
+class Rows(Protocol):
+    """An array, or what rows of one can be taken of."""
+
+    @property
+    def shape(self) -> tuple[int, ...]: ...
+
+    def __getitem__(self, rows: slice, /) -> AnyArray: ...
 
 
 class Spread:
@@ -66,8 +75,8 @@ def send_parts(arrays: Mapping[str, Any]) -> None:
                 pass
 
 
-def fill(vector: PETSc.Vec, whole: Any) -> None:
-    """Set a vector to what rank 0 has as a whole, an array or what can be cut like one. Collective."""
+def fill(vector: PETSc.Vec, whole: Rows | None) -> None:
+    """Set a vector to what rank 0 has as a whole. Collective."""
     comm = vector.comm.tompi4py()
     begin, end = vector.getOwnershipRange()
     ranges = comm.gather((begin, end))
@@ -77,6 +86,7 @@ def fill(vector: PETSc.Vec, whole: Any) -> None:
             comm.Recv(local[first : first + PIECE], 0, TAG)
         vector.setArray(local)
         return
+    assert whole is not None
     vector.setArray(np.asarray(whole[begin:end], dtype=float))
     for rank, (begin, end) in enumerate(ranges[1:], 1):
         for first in range(begin, end, PIECE):

@@ -29,6 +29,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
+import numpy.typing as npt
 
 from ..arrays import AnyArray
 from ..errors import InputError
@@ -93,7 +94,7 @@ class Stored:
         data = self.file.read((last - first) * row, self.place + first * row)
         return np.frombuffer(data, self.dtype).reshape(last - first, *self.shape[1:])
 
-    def __array__(self, dtype: Any = None, copy: bool | None = None) -> AnyArray:
+    def __array__(self, dtype: npt.DTypeLike = None, copy: bool | None = None) -> AnyArray:
         return self[:].astype(dtype or self.dtype, copy=False)
 
 

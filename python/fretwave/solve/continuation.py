@@ -13,7 +13,7 @@ from .. import _core
 from ..errors import InputError
 from ..hb.problems import HarmonicProblem
 from ..mpi.log import event
-from ..mpi.spread import Spread, fill
+from ..mpi.spread import Rows, Spread, fill
 from .starting import far_from_start, starts
 from .steps import StepControl
 from .trace import Knot
@@ -264,9 +264,10 @@ class Continuation:
         return {name: own.get(name) if name in _VECTORS else value for name, value in told.items()}
 
     @staticmethod
-    def _scatter(problem: HarmonicProblem, whole: Any) -> PETSc.Vec:
+    def _scatter(problem: HarmonicProblem, whole: Spread | Rows | Sequence[float] | None) -> PETSc.Vec:
         v = problem.core.unknowns()
-        whole = np.asarray(whole, dtype=float) if isinstance(whole, Sequence) else whole
+        if isinstance(whole, Sequence):
+            whole = np.asarray(whole, dtype=float)
         size = problem.model.comm.bcast(None if whole is None else whole.shape[0])
         if v.getSize() != size:
             raise InputError(
