@@ -216,7 +216,7 @@ def events_folder(ranks: int) -> Path:
 
 
 def main(arguments: list[str]) -> int:
-    timeout = float(os.environ.get("FRETWAVE_TEST_TIMEOUT", "1100"))
+    timeout = float(os.environ.get("FRETWAVE_TEST_TIMEOUT", "1500"))
     only = os.environ.get("FRETWAVE_TEST_RANKS")
     EVENTS.mkdir(parents=True, exist_ok=True)
     asked = collect(arguments)
