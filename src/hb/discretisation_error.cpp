@@ -272,11 +272,12 @@ std::optional<LeftOut> DiscretisationError::at(Vec y, Vec tangent, Vec reduction
   VecHandle row = closing_row(y, tangent);
   const auto is_bent = step(point, row, left[reduced], b, x);
   if (!is_bent) return {};
-  if (const size_t own = sources.size() - (sources.size() && sources.back() == reduced); *is_bent && own) {
-    // what a reduction leaves out is in none of these equations
+  if (*is_bent && sources[0] != reduced) {
+    // what a reduction leaves out, the last of the sources, is in none of these equations
+    const auto end = std::ranges::find(sources, reduced);
     const auto larger = [&](size_t one, size_t other) { return sizes[one] < sizes[other]; };
-    const auto most = std::max_element(sources.begin(), sources.begin() + own, larger) - sources.begin();
-    finish(point, row, solve::norm(sum(b)), std::span(x).first(own), x[most]);
+    const auto most = std::max_element(sources.begin(), end, larger) - sources.begin();
+    finish(point, row, solve::norm(sum(b)), std::span(x).first(end - sources.begin()), x[most]);
   }
   if (!sources.empty() && sources[0] == above)
     check(VecScale(x[0], all_above(problem_.harmonics(), finer_->harmonics())));

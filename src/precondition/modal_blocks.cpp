@@ -26,6 +26,15 @@ using lapack::multiply;
 
 std::vector<float> rounded(std::vector<double> const& x) { return {x.begin(), x.end()}; }
 
+log::Event const& slipping() {
+  static const log::Event event("FwSlipInverse");
+  return event;
+}
+
+SingularBlock singular() {
+  return SingularBlock("the slipping pairs' block of the preconditioner is singular: a free motion");
+}
+
 /// G := A^-1 G in single precision; false, and G as it was, where A is too near a singular one.
 bool solve_quickly(std::vector<double> const& A, int n, std::vector<double>& G) {
   auto factor = rounded(A), found = rounded(G);
@@ -78,33 +87,31 @@ void ModalBlocks::set_static_compliance() {
   static_low_ = low_, static_at_rest_ = at_rest_;
 }
 
+/// G of rows for forces on some, column-major.
+template <class Real>
+std::vector<Real> ModalBlocks::static_compliance(std::vector<int> const& to,
+                                                 std::vector<int> const& from) const {
+  std::vector<Real> out;
+  out.reserve(to.size() * from.size());
+  for (const int col : from)
+    for (const int row : to) out.push_back(Real(static_[size_t(col) * basis_.rows() + row]));
+  return out;
+}
+
 void ModalBlocks::set_contact(std::vector<int> rows, std::vector<Entry> T) {
-  static const log::Event slipping("FwSlipInverse");
-  const log::Span span(slipping);
+  const log::Span span(slipping());
   fault::point("harmonic block");
   rows_ = std::move(rows), T_ = std::move(T);
   if (!rows_.empty() && (static_low_ != low_ || static_at_rest_ != at_rest_)) set_static_compliance();
-  const int r = int(rows_.size()), all = basis_.rows();
-  std::vector<double> A(size_t(r) * r), G(size_t(r) * r);
-  for (int j = 0; j < r; ++j)
-    for (int i = 0; i < r; ++i) G[size_t(j) * r + i] = static_[size_t(rows_[j]) * all + rows_[i]];
+  const int r = int(rows_.size());
+  auto G = static_compliance<double>(rows_, rows_);
+  std::vector<double> A(G.size());
   for (int i = 0; i < r; ++i) A[size_t(i) * r + i] = 1;  // (1 + T G)^T
   for (Entry const& t : T_)
     for (int i = 0; i < r; ++i) A[size_t(t.row) * r + i] += G[size_t(t.col) * r + i] * t.value;
   const bool done = r == 0 || (r >= single && solve_quickly(A, r, G));
-  if ((!done && lapack::solve(A, r, G, r)) || fault::value("harmonic block"))
-    throw SingularBlock("the slipping pairs' block of the preconditioner is singular: a free motion");
+  if ((!done && lapack::solve(A, r, G, r)) || fault::value("harmonic block")) throw singular();
   set_inverse(G);
-}
-
-/// G of rows for forces on some, column-major.
-std::vector<float> ModalBlocks::static_compliance(std::vector<int> const& to,
-                                                  std::vector<int> const& from) const {
-  std::vector<float> out;
-  out.reserve(to.size() * from.size());
-  for (const int col : from)
-    for (const int row : to) out.push_back(float(static_[size_t(col) * basis_.rows() + row]));
-  return out;
 }
 
 /// With R the rows so far, g = G (1 + T G)^-1 there, and S the further ones, what forces move before T of S
@@ -114,11 +121,10 @@ std::vector<float> ModalBlocks::static_compliance(std::vector<int> const& to,
 ///
 /// and C_:R - C_:S (1 + T_S C_SS)^-1 T_S C_S: is g of all: 6 r^2 s operations instead of 8 / 3 (r + s)^3.
 void ModalBlocks::add_contact(std::vector<int> const& rows, std::vector<Entry> const& T) {
-  static const log::Event slipping("FwSlipInverse");
-  const log::Span span(slipping);
+  const log::Span span(slipping());
   fault::point("harmonic block");
   const int r = this->rows(), s = int(rows.size()), all = r + s;
-  auto C_RS = static_compliance(rows_, rows), C_SS = static_compliance(rows, rows);
+  auto C_RS = static_compliance<float>(rows_, rows), C_SS = static_compliance<float>(rows, rows);
   auto C_SR = C_RS;  // transposed: G is symmetric
   const auto TG = times_T(C_RS, false), TtG = times_T(C_RS, true);
   const auto G_RS = C_RS;
@@ -132,8 +138,7 @@ void ModalBlocks::add_contact(std::vector<int> const& rows, std::vector<Entry> c
     W[size_t(t.col) * s + t.row] += t.value;
     for (int j = 0; j < s; ++j) A[size_t(j) * s + t.row] += t.value * C_SS[size_t(j) * s + t.col];
   }
-  if (lapack::solve(A, s, W, s) || fault::value("harmonic block"))
-    throw SingularBlock("the slipping pairs' block of the preconditioner is singular: a free motion");
+  if (lapack::solve(A, s, W, s) || fault::value("harmonic block")) throw singular();
   const auto W_rounded = rounded(W);
   // [C_SR C_SS]^T and [C_RS; C_SS] W of all rows, then both into the inverse
   std::vector<float> from(size_t(all) * s), onto(from.size()), moved(from.size()), g(size_t(all) * all);

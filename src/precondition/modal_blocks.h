@@ -74,7 +74,8 @@ class ModalBlocks {
   void add_border(Small const&, std::vector<double>& N) const;
   void set_static_compliance();
   void set_inverse(std::vector<double> const& G);
-  std::vector<float> static_compliance(std::vector<int> const& to, std::vector<int> const& from) const;
+  template <class Real>
+  std::vector<Real> static_compliance(std::vector<int> const& to, std::vector<int> const& from) const;
   void set_border(std::vector<double> const& U);
   void couple_border(std::vector<double> const& transposed_g);
   template <class Real>

@@ -113,6 +113,20 @@ def test_branches_are_those_of_the_direct_route(comm, method, contact, damping) 
     assert max(linear / newton for newton, linear in moving) <= (12 if damping == "a damper" else 8)
 
 
+def motions_and_correctors(problem):
+    """Unknowns of a small motion and of a large one, and two correctors at a fixed amplitude. Collective."""
+    followed = fw.Continuation(problem, problem.initial(0.1), (0.1, 4.0))
+    ys = [p.y.copy() for p in followed]
+    row = ys[0].duplicate()
+    row.set(0.0)
+    row.setValue(row.getSize() - 1, 1.0)
+    row.assemble()
+    correctors = [_core.Newton(problem.core, "basis_") for _ in range(2)]
+    for corrector in correctors:
+        corrector.system.close(row, 0.0)
+    return ys[0], ys[-1], correctors
+
+
 def slipping(problem, still, moving, pairs):
     """Unknowns as `still`, but for the motion of the first pairs, which is that of `moving`. Collective."""
     contact, m = problem.model.contacts[0], problem.harmonics.block_size
@@ -147,19 +161,12 @@ def test_pairs_that_begin_to_slip_are_added_to_the_inverse(comm, contact) -> Non
     static = {"fw_modes_fewest": 2, "fw_modes_follows": 1e9}  # all but two modes are in the inverse
     with fw.Model(M, K, 0.002 * K, [contact], comm) as model:
         problem = problem_of(model)
-        followed = fw.Continuation(problem, problem.initial(0.1), (0.1, 4.0))
-        ys = [p.y.copy() for p in followed]
-        row = ys[0].duplicate()
-        row.set(0.0)
-        row.setValue(row.getSize() - 1, 1.0)
-        row.assemble()
-        correctors = [_core.Newton(problem.core, "basis_") for _ in range(2)]
+        still, moving, correctors = motions_and_correctors(problem)
         for pairs in range(PAIRS + 1):
-            y, found = slipping(problem, ys[0], ys[-1], pairs), []
+            y, found = slipping(problem, still, moving, pairs), []
             for corrector, given in zip(correctors, ({}, added)):
                 for option, value in {**static, **given}.items():
                     options[option] = value
-                corrector.system.close(row, 0.0)
                 found.append(preconditioned(corrector, problem, y))
                 for option in {**static, **given}:
                     options.delValue(option)
@@ -173,18 +180,12 @@ def test_an_inverse_that_cannot_be_added_to_is_made_anew(comm) -> None:
     options = PETSc.Options()
     with fw.Model(M, K, 0.002 * K, [sliders()], comm) as model:
         problem = problem_of(model)
-        followed = fw.Continuation(problem, problem.initial(0.1), (0.1, 4.0))
-        ys = [p.y.copy() for p in followed]
-        row = ys[0].duplicate()
-        row.set(0.0)
-        row.setValue(row.getSize() - 1, 1.0)
-        row.assemble()
-        corrector, other = (_core.Newton(problem.core, "basis_") for _ in range(2))
-        corrector.system.close(row, 0.0), other.system.close(row, 0.0)
+        still, moving, correctors = motions_and_correctors(problem)
+        corrector, other = correctors
         options["fw_basis_cheap"], options["fw_basis_few"] = 0.5, 100
         for pairs in (0, 2):
-            preconditioned(corrector, problem, slipping(problem, ys[0], ys[-1], pairs))
-        y = slipping(problem, ys[0], ys[-1], 3)
+            preconditioned(corrector, problem, slipping(problem, still, moving, pairs))
+        y = slipping(problem, still, moving, 3)
         if comm.rank == 0:
             _core.arm_fault("harmonic block", "value", 1)
         found = [preconditioned(corrector, problem, y) for _ in range(2)]

@@ -177,10 +177,7 @@ class HarmonicProblem(Destroyable):
 
     def coefficients(self, y: PETSc.Vec) -> Array | None:
         """Harmonic coefficients Q (n_dof, m) in physical units, columns `harmonics.labels`, on rank 0. Collective."""
-        Q = self.core.coefficients(y)
-        whole = on_rank_0(self.model.comm, Q)
-        Q.destroy()
-        return None if whole is None else whole.reshape(-1, self.harmonics.block_size)
+        return on_rank_0(self.model.comm, self.local_coefficients(y))
 
     def local_coefficients(self, y: PETSc.Vec) -> Array:
         """This rank's rows of `coefficients`. Collective."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from ..arrays import AnyArray, Array
+from .gather import part_of
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -19,7 +20,7 @@ PIECE = 1 << 22
 TAG = 32002
 
 
-class Rows(Protocol):
+class Cuttable(Protocol):
     """An array, or what rows of one can be taken of."""
 
     @property
@@ -42,7 +43,7 @@ class Spread:
     """
 
     def __init__(self, comm: MPI.Comm, local: Array | PETSc.Vec) -> None:
-        part = local if isinstance(local, np.ndarray) else local.getArray(readonly=True).copy()
+        part = part_of(local)
         self.comm, self.local = comm, np.ascontiguousarray(part, dtype=float)
         self.shape = (comm.allreduce(len(part)), *part.shape[1:])
         self.dtype = self.local.dtype
@@ -75,7 +76,7 @@ def send_parts(arrays: Mapping[str, Any]) -> None:
                 pass
 
 
-def fill(vector: PETSc.Vec, whole: Rows | None) -> None:
+def fill(vector: PETSc.Vec, whole: Cuttable | None) -> None:
     """Set a vector to what rank 0 has as a whole. Collective."""
     comm = vector.comm.tompi4py()
     begin, end = vector.getOwnershipRange()

@@ -102,9 +102,10 @@ def _content(record: Record) -> Iterator[bytes | memoryview]:
     """What follows the head, a piece at a time."""
     arrays = {name: v if isinstance(v, Spread) else np.asarray(v, order="C") for name, v in record.arrays.items()}
     arrays = dict(sorted(arrays.items(), key=lambda entry: isinstance(entry[1], Spread)))
-    text = json.dumps([record.kind, record.values, [[name, a.dtype.str, a.shape] for name, a in arrays.items()]])
+    layout = [[name, a.dtype.str, a.shape] for name, a in arrays.items()]
+    text = json.dumps([record.kind, record.values, layout]).encode()
     plain = [a.tobytes() for a in arrays.values() if not isinstance(a, Spread)]
-    yield b"".join([struct.pack("<Q", len(text.encode())), text.encode(), *plain])
+    yield b"".join([struct.pack("<Q", len(text)), text, *plain])
     for array in arrays.values():
         if isinstance(array, Spread):
             left = int(np.prod(array.shape, dtype=np.int64))
@@ -126,7 +127,7 @@ def write_record(descriptor: int, place: int, record: Record) -> int:
     return place + _HEAD.size + length
 
 
-def _read_record(file: BinaryIO, length: int, checksum: int) -> Record | None:
+def _read_record(file: BinaryIO, kept: _Kept, length: int, checksum: int) -> Record | None:
     """The record whose content comes next; arrays longer than a block are left there. None where it is spoilt."""
     place = file.tell()
     source: BinaryIO = BytesIO(file.read(length)) if length <= BLOCK else file
@@ -136,7 +137,7 @@ def _read_record(file: BinaryIO, length: int, checksum: int) -> Record | None:
     source.seek(at)
     (text,) = struct.unpack("<Q", source.read(8))
     kind, values, layout = json.loads(source.read(text))
-    kept, at = _Kept(file), at + 8 + text
+    at += 8 + text
     arrays: dict[str, Any] = {}
     for name, dtype, shape in layout:
         stored = Stored(kept, at, np.dtype(dtype), tuple(shape))
@@ -175,11 +176,11 @@ def read_records(path: Path) -> Iterator[tuple[int, Record]]:
     """
     size = path.stat().st_size
     with path.open("rb") as file:
-        place = 0
+        kept, place = _Kept(file), 0
         while place < size:
             file.seek(place)
             head = _read_head(file.read(_HEAD.size))
-            record = _read_record(file, *head) if head is not None and head[0] <= size - place else None
+            record = _read_record(file, kept, *head) if head is not None and head[0] <= size - place else None
             if record is None:
                 _check_torn(file, path, place, size)
                 return

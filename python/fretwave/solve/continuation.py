@@ -13,7 +13,7 @@ from .. import _core
 from ..errors import InputError
 from ..hb.problems import HarmonicProblem
 from ..mpi.log import event
-from ..mpi.spread import Rows, Spread, fill
+from ..mpi.spread import Cuttable, Spread, fill
 from .starting import far_from_start, starts
 from .steps import StepControl
 from .trace import Knot
@@ -264,7 +264,7 @@ class Continuation:
         return {name: own.get(name) if name in _VECTORS else value for name, value in told.items()}
 
     @staticmethod
-    def _scatter(problem: HarmonicProblem, whole: Spread | Rows | Sequence[float] | None) -> PETSc.Vec:
+    def _scatter(problem: HarmonicProblem, whole: Spread | Cuttable | Sequence[float] | None) -> PETSc.Vec:
         v = problem.core.unknowns()
         if isinstance(whole, Sequence):
             whole = np.asarray(whole, dtype=float)

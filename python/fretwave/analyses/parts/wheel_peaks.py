@@ -20,6 +20,7 @@ from ...post.response_peaks import Peak, distance
 from ...results.results import AnalysisWriter
 from .branch import points_of
 from .excitation import Excitation, tuned_excitation
+from .wheel_shape import in_every_sector
 
 
 def blade_by_blade(
@@ -63,8 +64,8 @@ def _line(row: Mapping[str, float], unit: str) -> str:
 def blade_amplitudes(excitation: Excitation, writer: AnalysisWriter) -> Array:
     """Fundamental amplitudes (points, N) [length] of the observed dof in all sectors (writing rank)."""
     labels = excitation.harmonics.labels
-    dofs = excitation.context.case.places(dof_of(excitation.analysis.observe))
-    stored = writer.group["coefficients"][:, dofs[0] : dofs[-1] + 1 : dofs[1] - dofs[0], :]
+    sectors = in_every_sector(excitation.context.case, dof_of(excitation.analysis.observe))
+    stored = writer.group["coefficients"][:, sectors, :]
     return np.asarray(np.hypot(stored[:, :, labels.index("1c")], stored[:, :, labels.index("1s")]))
 
 

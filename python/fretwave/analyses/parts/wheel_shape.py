@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from petsc4py import PETSc
 
     from ...case.analysis import AnalysisSection
+    from ...case.case import Case
     from ...hb.problems import NonlinearMode
     from ...model.modes import LinearMode
     from ...results.results import AnalysisWriter
@@ -118,14 +119,19 @@ def finish_wheel(context: AnalysisContext[ModeAnalysis], writer: AnalysisWriter,
     return _lines(context.name, points, start, context.units("length"))
 
 
+def in_every_sector(case: Case, dof: str) -> slice:
+    """Rows of a wheel's coefficients that are one dof's, as HDF5 reads them at once."""
+    places = case.places(dof)
+    return slice(places[0], places[-1] + 1, places[1] - places[0])
+
+
 def _sector_amplitudes(
     context: AnalysisContext[ModeAnalysis], writer: AnalysisWriter, points: npt.NDArray[np.intp]
 ) -> Complex:
     """Of the observed dof at some points, (points, N), from the coefficients written."""
-    places = context.case.places(dof_of(context.analysis.normalise))
+    sectors = in_every_sector(context.case, dof_of(context.analysis.normalise))
     labels = [text.decode() for text in writer.group["harmonic"][()]]
-    first, step = places[0], places[1] - places[0]  # as in every sector
-    kept = [writer.group["coefficients"][int(point), first : places[-1] + 1 : step] for point in points]
+    kept = [writer.group["coefficients"][int(point), sectors] for point in points]
     return np.array([complex_amplitudes(labels, Q)[1] for Q in kept])
 
 
