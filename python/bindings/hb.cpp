@@ -82,6 +82,8 @@ void bind_hb(nb::module_& m) {
              return handed(r);
            })
       .def("energy", energy)
+      .def("mechanical_energy",
+           [](HarmonicProblem& p, Petsc<Vec> y) { return mechanical_energy(p, y.object); })
       .def("preload",
            [](HarmonicProblem& p, Petsc<Vec> x, Petsc<Vec> P) { p.at_rest().preload(x.object, P.object); })
       .def("unfold",

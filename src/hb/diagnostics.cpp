@@ -29,6 +29,10 @@ std::vector<Wearing> wearing(HarmonicProblem& problem, Vec y) {
 
 EnergyBalance energy(HarmonicProblem& problem, Vec y) { return linearised(problem, y).energy(); }
 
+double mechanical_energy(HarmonicProblem& problem, Vec y) {
+  return problem.terms().mechanical_energy(problem.coefficients(y), problem.scaled(y).exponents);
+}
+
 VecHandle gap_product(HarmonicProblem& problem, Vec y, PerContact const& dgap) {
   Residual& terms = linearised(problem, y);
   VecHandle dR = terms.vector(), out = problem.equations();

@@ -11,6 +11,7 @@ ContactSummary summarise(HarmonicProblem&, Vec y);
 std::vector<ContactPeriod> contact_periods(HarmonicProblem&, Vec y);
 std::vector<Wearing> wearing(HarmonicProblem&, Vec y);
 EnergyBalance energy(HarmonicProblem&, Vec y);
+double mechanical_energy(HarmonicProblem&, Vec y);
 /// dr for gaps that grow by dgap [length], the derivative of r by worn depths.
 VecHandle gap_product(HarmonicProblem&, Vec y, PerContact const& dgap);
 /// Amplitudes tau of the unfolding, as shares of the inertia force k_ref a of a unit motion; none if not

@@ -67,6 +67,9 @@ class Residual {
 
   /// Of the last evaluated point. Collective.
   EnergyBalance energy();
+  /// Of the vibration (Q, e) [energy], mean over a period: of M moving and K strained,
+  /// sum_n>0 (|s_n|^2 q_n^H M q_n + q_n^H K q_n) / 4; what contact stores is left out. Collective.
+  double mechanical_energy(Vec Q, Exponents const& e);
 
   /// Worn depths of the pairs [length], in the laws, which all residuals of the model share; empty for a
   /// contact that does not wear.

@@ -165,6 +165,22 @@ def test_energy_of_a_linear_mode_is_half_k_a_squared(comm):
     np.testing.assert_allclose(branch["energy"], wanted, rtol=TIGHT)
 
 
+@pytest.mark.parametrize("method", ["CNM", "EPMC"])
+def test_energy_of_all_harmonics_of_a_damped_motion(comm, method):
+    """sum_n>0 (|s_n|^2 q^H M q + q^H K q) / 4, damping in proportion to M and K left out."""
+    M, K = np.diag(np.arange(1.0, N + 1)), chain(N)
+    for C in (0.02 * M, 0.03 * K, 0.05 * np.outer(ROW, ROW)):
+        with fw.Model(M, K, C, [friction(np.eye(N)[[1, 4]], 1.0, 0.5)], comm) as model:
+            branch = fw.follow(mode_of(model, 3, method=method), 0.5, 3.0, observe={"energy": "energy"}, unknowns=True)
+        row = branch[len(branch) - 1]
+        Q = comm.bcast(branch.coefficients(len(branch) - 1))
+        s = -row["beta"] + 1j * row["omega"] if method == "CNM" else 1j * row["omega0"]
+        amplitudes = {1: Q[:, 0] - 1j * Q[:, 1], 3: Q[:, 2] - 1j * Q[:, 3]}
+        assert row["zeta"] > 1e-3 and np.linalg.norm(amplitudes[3]) > 1e-3 * np.linalg.norm(amplitudes[1])
+        parts = [abs(n * s) ** 2 * np.vdot(q, M @ q) + np.vdot(q, K @ q) for n, q in amplitudes.items()]
+        assert row["energy"] == pytest.approx(sum(parts).real / 4, rel=ROUNDING)
+
+
 def test_energy_of_a_sectors_wave_is_that_of_the_wheel_over_its_sectors(comm):
     ties = {0: [[1.6]], 1: [[-0.3]], -1: [[-0.3]]}
     sector = fw.Sector([[1.0]], {k: np.array(A) for k, A in ties.items()}, 12)

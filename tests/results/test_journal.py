@@ -92,6 +92,35 @@ def test_rows_of_a_long_array_are_read_when_asked_for(
         assert list(record.arrays["last"]) == [0, 1, 2]
 
 
+@pytest.mark.ranks(1)
+@pytest.mark.parametrize("count", [4, 5])
+def test_what_is_gone_on_from_stays_while_later_states_are_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, count: int
+) -> None:
+    """States are written over in turn: not what is still read from, and never the only one that is whole."""
+    monkeypatch.setattr(journal, "BLOCK", 100)
+
+    def fill(writer: AnalysisWriter, first: int, end: int) -> None:
+        for k in range(first, end):
+            writer.append({"point": k, "event": ""}, None, None, {"y": k * WHOLE, "index": k})
+
+    writer = AnalysisWriter(tmp_path, "mode", COLUMNS, {"type": "mode"})
+    fill(writer, 0, count)
+    writer.abandon()
+    again = AnalysisWriter(tmp_path, "mode", COLUMNS, {"type": "mode"})
+    found = again.go_on()
+    assert found is not None and isinstance(found["y"], Stored)
+    fill(again, count, count + 1)
+    again.abandon()
+    for path in (tmp_path / ".mode.state", tmp_path / ".mode.state_other"):
+        assert [int(record.values["rows"]) - count in (0, 1) for _, record in read_records(path)] == [True]
+    third = AnalysisWriter(tmp_path, "mode", COLUMNS, {"type": "mode"})
+    assert int((third.go_on() or {})["index"]) == count
+    fill(third, count + 1, count + 5)
+    assert np.array_equal(np.asarray(found["y"]), (count - 1) * WHOLE)
+    third.abandon()
+
+
 @pytest.mark.ranks(1, 2)
 @pytest.mark.parametrize("size", [1 << 30, 100])
 def test_long_rows_in_the_results(comm: MPI.Comm, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, size: int) -> None:

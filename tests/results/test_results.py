@@ -12,7 +12,7 @@ import pytest
 
 from fretwave.columns import COLUMNS, MODE, Column
 from fretwave.errors import InputError
-from fretwave.results.results import AnalysisWriter, open_results
+from fretwave.results.results import AnalysisWriter, has_results, open_results
 
 pytestmark = pytest.mark.ranks(1)
 
@@ -196,17 +196,18 @@ def test_a_table_goes_on_with_the_columns_that_it_was_begun_with(tmp_path: Path)
         assert "energy" not in file["mode/points"]
 
 
-@pytest.mark.parametrize("spoilt", ["state", "rows"])
-def test_the_older_state_is_used_when_the_newer_is_spoilt(tmp_path: Path, spoilt: str, monkeypatch) -> None:
-    """A power failure: a half-written state, or a state whose row is not on the disk."""
+@pytest.mark.parametrize("spoilt", [[".state_other"], [".state", ".state_other"], [".rows"]])
+def test_the_older_state_is_used_when_the_newer_is_spoilt(tmp_path: Path, spoilt: list[str], monkeypatch) -> None:
+    """A kill or a power failure: a half-written state, both, or a state whose row is not on the disk."""
     monkeypatch.setattr("fretwave.results.journal.SAFE_EVERY", 0.0)
     table = writer(tmp_path)
     fill(table, 5)
     monkeypatch.setattr("fretwave.results.journal.SAFE_EVERY", 1e9)
     fill(table, 1)
     table.abandon()
-    path = tmp_path / (".mode.state" if spoilt == "state" else ".mode.rows")
-    path.write_bytes(path.read_bytes()[:-3])
+    for suffix in spoilt:
+        path = tmp_path / f".mode{suffix}"
+        path.write_bytes(path.read_bytes()[:-3])
     table = writer(tmp_path)
     state = table.go_on()
     assert state is not None
@@ -250,6 +251,16 @@ def test_nothing_to_go_on_from(tmp_path: Path) -> None:
     fill(table, 1)
     table.close("done", "")
     assert writer(tmp_path).go_on() is None
+
+
+def test_results_are_opened_by_their_file_or_their_folder(tmp_path: Path) -> None:
+    table = writer(tmp_path)
+    fill(table, 2)
+    table.close("done", "")
+    for place in (tmp_path, tmp_path / "results.h5", str(tmp_path), str(tmp_path / "results.h5")):
+        with open_results(place) as file:
+            assert list(file) == ["mode"]
+    assert has_results(str(tmp_path))
 
 
 def test_unreadable_results_are_named(tmp_path: Path) -> None:

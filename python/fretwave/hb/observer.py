@@ -56,13 +56,7 @@ def mechanical_energy(problem: HarmonicProblem, y: PETSc.Vec) -> float:
     sum_n>0 (|s_n|^2 q_n^H M q_n + q_n^H K q_n) / 4 on the periodic motion. What contact stores and the mean
     displacement are left out. Of one sector where the model is one.
     """
-    amplitudes = complex_amplitudes(problem.harmonics.labels, problem.local_coefficients(y))
-    total = 0.0
-    for n, s in zip(problem.harmonics.orders, problem.core.exponents(y)):
-        if n:
-            q = amplitudes[n]
-            total += abs(s) ** 2 * problem.model.form(2, q, n) / 4 + problem.model.form(0, q, n) / 4
-    return total
+    return float(problem.core.mechanical_energy(y))
 
 
 def _column(name: str, what: Union[Observed, str]) -> Column:

@@ -94,21 +94,22 @@ class ModalState:
 
     def __call__(self, z: npt.ArrayLike) -> dict[str, float]:
         """The columns of these scalars."""
-        beta, omega, omega0, zeta = self._oscillation(z)
-        values = (math.exp(float(np.asarray(z)[2])), omega, omega0, omega / (2 * math.pi), beta, zeta)
-        return dict(zip(self.columns, values))
+        return {name: float(value) for name, value in self.table(np.asarray(z, dtype=float)).items()}
 
-    def _oscillation(self, z: npt.ArrayLike) -> tuple[float, float, float, float]:
+    def table(self, z: Array) -> dict[str, Array]:
+        """The same of many states (..., 3) at once."""
+        beta, omega, omega0, zeta = self._oscillation(z)
+        return dict(zip(self.columns, (np.exp(z[..., 2]), omega, omega0, omega / (2 * math.pi), beta, zeta)))
+
+    def _oscillation(self, z: npt.ArrayLike) -> tuple[Any, Any, Any, Any]:
         """beta, omega, omega0 [1/s] and zeta, whatever the amplitude."""
-        v: list[float] = np.asarray(z, dtype=float).tolist()
-        beta, w = v[0] * self.omega_reference, v[1] * self.omega_reference
-        omega, omega0 = w, float(np.hypot(beta, w))
-        zeta = beta / omega0
+        beta, w = (np.asarray(z, dtype=float)[..., k] * self.omega_reference for k in (0, 1))
         if self.method == "EPMC":
+            zeta = beta / w
             # above 1 the free motion creeps back: its frequency is zero
-            omega0, zeta = w, beta / w
-            omega = w * math.sqrt(max(0.0, (1 - zeta) * (1 + zeta)))
-        return beta, omega, omega0, zeta
+            return beta, w * np.sqrt(np.maximum(0.0, (1 - zeta) * (1 + zeta))), w, zeta
+        omega0 = np.hypot(beta, w)
+        return beta, w, omega0, beta / omega0
 
 
 @dataclass(frozen=True)
@@ -148,11 +149,14 @@ class ForcedState:
 
     def __call__(self, z: npt.ArrayLike) -> dict[str, float]:
         """The columns of these scalars."""
-        v: list[float] = np.asarray(z, dtype=float).tolist()
-        omega = v[0] * self.omega_reference
-        cosine, sine = self.amplitude_reference * v[1], self.amplitude_reference * v[2]
-        amplitude, phase = float(np.hypot(cosine, sine)), math.atan2(-sine, cosine)
-        return dict(zip(self.columns, (self.level, omega, omega / (2 * math.pi), amplitude, phase)))
+        return {name: float(value) for name, value in self.table(np.asarray(z, dtype=float)).items()}
+
+    def table(self, z: Array) -> dict[str, Array]:
+        """The same of many states (..., 3) at once."""
+        omega = z[..., 0] * self.omega_reference
+        cosine, sine = (z[..., k] * self.amplitude_reference for k in (1, 2))
+        level, amplitude, phase = np.full_like(omega, self.level), np.hypot(cosine, sine), np.arctan2(-sine, cosine)
+        return dict(zip(self.columns, (level, omega, omega / (2 * math.pi), amplitude, phase)))
 
 
 State = Union[ModalState, ForcedState]

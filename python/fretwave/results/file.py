@@ -155,8 +155,9 @@ class Results(Mapping[str, Any]):
                 file.close()
 
 
-def has_results(folder: Path) -> bool:
+def has_results(folder: str | Path) -> bool:
     """Whether there is anything for `open_results`."""
+    folder = Path(folder)
     return (folder / "results.h5").exists() or bool(unfinished(folder))
 
 
@@ -166,14 +167,20 @@ def unit_of_amplitudes(group: h5py.Group) -> str:
     return str(group["points/amplitude"].attrs.get("units", of_lengths)) if "points/amplitude" in group else of_lengths
 
 
-def open_results(path: Path) -> Results:
+def open_results(path: str | Path) -> Results:
     """The results of a run folder, those of unfinished analyses included, to be read.
+
+    Parameters
+    ----------
+    path : the folder, or its results.h5
 
     Raises
     ------
     InputError
         There are none, or they are damaged.
     """
+    path = Path(path)
+    path = path / "results.h5" if path.is_dir() else path
     for _ in range(9):
         with suppress(FileNotFoundError):  # of a journal whose analysis was completed just now
             return _open_all(path)

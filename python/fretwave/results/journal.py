@@ -8,13 +8,15 @@ parts on the ranks pass through it a piece at a time (`mpi.spread`), and long on
 ::
 
     .<name>.rows          records: how the table is laid out; then rows, with their arrays; and further arrays
-    .<name>.state         what the analysis goes on from after its last row
+    .<name>.state         what the analysis goes on from after its last row, or the one before it
+    .<name>.state_other   the same: each is written over in turn, so that one of them is always whole
     .<name>.state_safe    the same of some seconds ago, known to be on the disk with all its rows
 """
 
 from __future__ import annotations
 
 import json
+import math
 import os
 import shutil
 import struct
@@ -86,7 +88,7 @@ class Stored:
 
     @property
     def nbytes(self) -> int:
-        return self.dtype.itemsize * int(np.prod(self.shape, dtype=np.int64))
+        return self.dtype.itemsize * math.prod(self.shape)
 
     def __getitem__(self, rows: slice) -> AnyArray:
         first, last, _ = rows.indices(self.shape[0])
@@ -108,7 +110,7 @@ def _content(record: Record) -> Iterator[bytes | memoryview]:
     yield b"".join([struct.pack("<Q", len(text)), text, *plain])
     for array in arrays.values():
         if isinstance(array, Spread):
-            left = int(np.prod(array.shape, dtype=np.int64))
+            left = math.prod(array.shape)
             for piece in array.pieces():
                 left -= len(piece)
                 yield piece.data
@@ -222,9 +224,12 @@ class Journal:
 
     def __init__(self, folder: Path, name: str) -> None:
         self.path = journal_path(folder, name)
-        self._states = [self.path.with_suffix(suffix) for suffix in (".state", ".state_safe")]
+        self._states = [self.path.with_suffix(suffix) for suffix in (".state", ".state_other")]
+        self._safe = self.path.with_suffix(".state_safe")
         self._descriptor = -1
         self._length = 0
+        self._kept_in: dict[Path, int] = {}
+        self._next = 0  # of the two states
         self._safe_at = 0.0
         self.token = ""
 
@@ -260,15 +265,24 @@ class Journal:
     def keep_state(self, rows: int, arrays: Mapping[str, Any]) -> None:
         """Keep what the analysis goes on from after its rows so far."""
         record = Record("state", {"rows": rows, "token": self.token}, dict(arrays))
-        with replaced(self._states[0], sync=False) as fresh, fresh.open("wb", buffering=0) as file:
-            write_record(file.fileno(), 0, record)
+        newest, self._next = self._states[self._next], 1 - self._next
+        with told(newest):
+            descriptor = self._state_file(newest)
+            os.ftruncate(descriptor, write_record(descriptor, 0, record))
         now = time.monotonic()
         if now - self._safe_at > SAFE_EVERY:
             with told(self.path):
                 os.fsync(self._descriptor)
-            with replaced(self._states[1]) as fresh:
-                shutil.copyfile(self._states[0], fresh)
+            with replaced(self._safe) as fresh:
+                shutil.copyfile(newest, fresh)
             self._safe_at = time.monotonic()
+
+    def _state_file(self, path: Path) -> int:
+        """To be written over; a new one at first, for what an earlier process left may still be read from."""
+        if path not in self._kept_in:
+            path.unlink(missing_ok=True)
+            self._kept_in[path] = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_CLOEXEC, 0o666)
+        return self._kept_in[path]
 
     def state(self, token: str, rows: int) -> tuple[int, dict[str, Any]] | None:
         """The newest state whose rows are all there: how many, and its arrays. None when none was kept.
@@ -279,11 +293,11 @@ class Journal:
             States are there but rows of all of them are missing.
         """
         found = []
-        for path in self._states:
+        for path in (*self._states, self._safe):
             with suppress(OSError, InputError, StopIteration):
                 record = next(read_records(path))[1]
                 if record.values["token"] == token:
-                    found.append((int(record.values["rows"]), record.arrays))
+                    found.append((int(record.values["rows"]), record.arrays, path))
         usable = [state for state in found if state[0] <= rows]
         if found and not usable:
             raise InputError(
@@ -293,18 +307,24 @@ class Journal:
                 f"{min(state[0] for state in found)} rows, as the analysis had when it was cut off",
                 "restore it from a copy, or run the case anew into another folder",
             )
-        return max(usable, key=lambda state: state[0], default=None)
+        if not usable:
+            return None
+        count, arrays, path = max(usable, key=lambda state: state[0])
+        self._next = int(path == self._states[0])
+        return count, arrays
 
     def close(self) -> None:
         """Leave the files for another process to go on."""
-        if self._descriptor >= 0:
-            os.close(self._descriptor)
-            self._descriptor = -1
+        for descriptor in (self._descriptor, *self._kept_in.values()):
+            if descriptor >= 0:
+                os.close(descriptor)
+        self._descriptor = -1
+        self._kept_in = {}
 
     def remove(self) -> None:
         """All is in results.h5."""
         self.close()
-        for path in (*self._states, self.path):
+        for path in (*self._states, self._safe, self.path):
             path.unlink(missing_ok=True)
 
 

@@ -280,7 +280,7 @@ class AnalysisWriter:
         self.fields, self.columns = kept.fields, kept.columns  # of the version that began it
         self.rows, self.reported = len(kept), len(kept.reported)
         self._journal.go_on(kept.size, kept.token)
-        lines = [row_line(self.columns, values) for values in kept.values()]
+        lines = [row_line(self.columns, values) for values in kept.values]
         self._open_table("".join([header_line(self.columns), *lines]))
         return state[1]
 

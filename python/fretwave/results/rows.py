@@ -41,6 +41,8 @@ class Rows:
     ----------
     layout : Record
     places : list of (place in the file, place behind it, number of the row or -1 for an array)
+    values : list of dict
+        Of each row, by column.
     reported : list of int
         Rows with the contacts' motion.
     """
@@ -48,6 +50,7 @@ class Rows:
     path: Path
     layout: Record
     places: list[tuple[int, int, int]]
+    values: list[dict[str, Value]]
     reported: list[int]
     size: int
 
@@ -62,23 +65,25 @@ class Rows:
         """
         layout: Record | None = None
         places: list[tuple[int, int, int]] = []
-        reported, row = [], 0
+        values: list[dict[str, Value]] = []
+        reported: list[int] = []
         for place, record in read_records(path):
             if layout is None:
                 layout = record
                 continue
             is_row = record.kind == "row"
-            places.append((place, place + record.length, row if is_row else -1))
+            places.append((place, place + record.length, len(values) if is_row else -1))
             if is_row and any(name.startswith("motion/") for name in record.arrays):
-                reported.append(row)
-            row += is_row
-        if layout is None or not row:
+                reported.append(len(values))
+            if is_row:
+                values.append(record.values)
+        if layout is None or not values:
             size, fix = f"{path.stat().st_size} bytes", "restore it from a copy, or run the case anew"
             raise InputError("the journal of an analysis is damaged", display(path), size, "a row at least", fix)
-        return cls(path, layout, places, reported, places[-1][1])
+        return cls(path, layout, places, values, reported, places[-1][1])
 
     def __len__(self) -> int:
-        return sum(row >= 0 for _, _, row in self.places)
+        return len(self.values)
 
     @property
     def token(self) -> str:
@@ -100,8 +105,8 @@ class Rows:
     def first(self, count: int) -> Rows:
         """Only so many rows, and the arrays before the next one."""
         end = next((k for k, (_, _, row) in enumerate(self.places) if row == count), len(self.places))
-        places = self.places[:end]
-        return replace(self, places=places, reported=[r for r in self.reported if r < count], size=places[-1][1])
+        places, reported = self.places[:end], [r for r in self.reported if r < count]
+        return replace(self, places=places, values=self.values[:count], reported=reported, size=places[-1][1])
 
     def records(self) -> Iterator[tuple[int, Record]]:
         """Number of the row, -1 for an array, and record of each."""
@@ -109,10 +114,6 @@ class Rows:
         for place, record in read_records(self.path):
             if place in ends:
                 yield ends[place], record
-
-    def values(self) -> Iterator[dict[str, Value]]:
-        """Of each row, by column."""
-        return (record.values for row, record in self.records() if row >= 0)
 
 
 def attributes_of(given: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -168,8 +169,7 @@ def _growing(
 
 
 def _create_points(group: h5py.Group, rows: Rows) -> None:
-    points, columns = group.create_group("points"), rows.columns
-    table = list(rows.values())
+    points, columns, table = group.create_group("points"), rows.columns, rows.values
     first = columns[0]
     scale = _growing(group, first.name, len(rows), (), CHUNK_ROWS, first.dtype)
     scale[...] = np.array([first.stored(row[first.name]) for row in table], first.dtype)
@@ -189,7 +189,7 @@ def _create_coefficients(group: h5py.Group, rows: Rows) -> None:
     dofs, labels = rows.layout.values["dofs"], rows.layout.values["labels"]
     if not labels:
         return
-    labels = max([labels, *(row[LABELS] for row in rows.values() if LABELS in row)], key=len)
+    labels = max([labels, *(row[LABELS] for row in rows.values if LABELS in row)], key=len)
     data = _growing(group, "coefficients", len(rows), (len(dofs), len(labels)), CHUNK_ROWS)
     data.attrs.update({"units": rows.units("length"), "long_name": "harmonic coefficients of the displacement"})
     _name_axes(group, {"dof": dofs, "harmonic": labels})

@@ -6,7 +6,6 @@ all other columns run straight from point to point. Neither PETSc nor MPI is nee
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Any
@@ -93,25 +92,24 @@ class Curve:
             else:
                 values[column.name] = np.interp(x, rows, data) if len(data) else data
         if self.cubic is not None:
-            states = [self._state(place) for place in x]
-            for name in self._names:
-                values[name] = [state[name] for state in states]
+            states = self._states(x)
+            values.update((name, states[name]) for name in self._names)
         return Table([PLACE, *self.columns], values)
 
     @property
     def _names(self) -> list[str]:
         return [name for name in self.meaning.columns if name in self.table]
 
-    def _state(self, place: float) -> dict[str, float]:
-        """Of one place, as far as the table has it; the phase, which the table may count on, next to its points'."""
+    def _states(self, places: Array) -> dict[str, Array]:
+        """At some places, as far as the table has it; the phase, which the table may count on, next to its points'."""
         rows = np.arange(len(self.table))
         if self.cubic is None:
-            return {name: float(np.interp(place, rows, self.table[name])) for name in self._names}
-        state = self.meaning(self.cubic(place))
-        if "phase" in state and "phase" in self.table:
-            near = float(np.interp(place, rows, self.table["phase"]))
-            state["phase"] += 2 * math.pi * round((near - state["phase"]) / (2 * math.pi))
-        return state
+            return {name: np.interp(places, rows, self.table[name]) for name in self._names}
+        states = self.meaning.table(self.cubic.at(places))
+        if "phase" in states and "phase" in self.table:
+            near = np.interp(places, rows, self.table["phase"])
+            states["phase"] = states["phase"] + 2 * np.pi * np.round((near - states["phase"]) / (2 * np.pi))
+        return states
 
     def _asked(
         self, value: float | Sequence[float] | None, where: Mapping[str, float | Sequence[float]]
@@ -131,7 +129,7 @@ class Curve:
         from scipy.optimize import brentq
 
         def off(place: float) -> float:
-            return self._state(place)[name] - value
+            return float(self._states(np.array([place]))[name][0]) - value
 
         places, left = self._parts["place"], self._parts[name] - value
         for end in (0, -1):

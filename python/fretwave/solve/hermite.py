@@ -10,7 +10,7 @@ from ..arrays import Array
 CORNER = 0.2
 
 
-def between(x: float, y0: Array, begin: Array, y1: Array, end: Array) -> Array:
+def between(x: float | Array, y0: Array, begin: Array, y1: Array, end: Array) -> Array:
     """The cubic from y0 to y1 at x in [0, 1], with its derivatives by x at both ends."""
     a, b, c, d = (1 + 2 * x) * (1 - x) ** 2, x * (1 - x) ** 2, x * x * (3 - 2 * x), x * x * (x - 1)
     return np.asarray(a * y0 + b * begin + c * y1 + d * end)
@@ -50,10 +50,17 @@ class Cubic:
 
     def __call__(self, place: float) -> Array:
         """Values (k,) at a place: 3.25 is a quarter of the step from row 3 to row 4."""
-        i, x = piece(place, len(self))
-        if x == 0:
-            return np.asarray(self.values[i])
-        return between(x, self.values[i], self.begin[i], self.values[i + 1], self.end[i])
+        return np.asarray(self.at(np.array([place]))[0])
+
+    def at(self, places: Array) -> Array:
+        """Values (m, k) at places (m,)."""
+        places = np.clip(places, 0, len(self) - 1)
+        rows = places.astype(int)
+        values = np.array(self.values[rows], dtype=float)
+        inside = np.flatnonzero(places > rows)
+        i, x = rows[inside], (places - rows)[inside, np.newaxis]
+        values[inside] = between(x, self.values[i], self.begin[i], self.values[i + 1], self.end[i])
+        return values
 
     def places(self, n: int) -> Array:
         """Places of all rows, and of n - 1 more in each step."""
