@@ -28,7 +28,8 @@ const Tuned bent("error_bent", 0.2,
                  "residual that a step leaves along that which it is made for, from which it is taken anew");
 
 constexpr double solved = 1e-2;  // of the residual: so far Newton goes on from a bent step
-constexpr double astray = 10;    // of that step: what lies farther away is another solution
+const Tuned most_steps("error_steps", 20, "Newton steps at most, by which it does");
+constexpr double astray = 10;  // of that step: what lies farther away is another solution
 
 const Tuned held("error_held_means", 1e-4,
                  "share of the stuck stiffness in which estimates hold the mean of the motion");
@@ -236,8 +237,8 @@ std::optional<bool> DiscretisationError::step(Vec point, Vec row, Vec reduction,
 /// or nowhere.
 void DiscretisationError::finish(Vec point, Vec row, double residual, std::span<Vec const> x, Vec most) {
   if (!again_ || again_->dear()) return;
-  check(SNESSetTolerances(again_->snes(), solved * residual, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT,
-                          PETSC_DEFAULT));
+  check(SNESSetTolerances(again_->snes(), solved * residual, PETSC_DEFAULT, PETSC_DEFAULT,
+                          PetscInt(most_steps), PETSC_DEFAULT));
   VecHandle whole = sum(x), y = solve::moved(point, 1, whole);
   again_->system().close(row, solve::dot(row, point));
   const bool found = again_->solve(y, solve::Effort::plain).converged;

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from models.core_models import derivative, friction, unknowns, whole
@@ -228,6 +231,32 @@ def test_a_motion_that_stands_still_or_hardly_moves(eps):
         v = velocity(q)
         F_linear = LIMIT / eps * np.concatenate([[v[0].real], np.column_stack([v[1:].real, -v[1:].imag]).ravel()])
         assert np.allclose(F, F_linear, rtol=0, atol=(10 * size**2 + LAST_BIT) * np.abs(F_linear).max())
+
+
+WILD = """
+import sys
+import numpy as np
+import fretwave as fw
+given = {"friction_limit": 1.0, "regularisation_velocity": 1e-6}
+model = fw.Model([[1.0]], [[1.0]], None, [fw.Contact("regularised_coulomb", [[1.0]], given)])
+for H in (3, 7, 15):
+    problem = fw.NonlinearMode(model, fw.Harmonics(range(H + 1), 2 * H + 2), start=fw.linear_modes(model, 1, "free")[0])
+    y, r = problem.core.unknowns(), problem.core.equations()
+    for seed in range(100):
+        values = np.random.default_rng(seed).standard_normal(y.getSize())
+        values[:-2] *= float(sys.argv[1])
+        values[-3:] = [0.01, 1.0, 0.1]
+        y.setArray(values)
+        problem.core.residual(y, r)
+        assert r.norm() >= 0
+"""
+
+
+@pytest.mark.ranks(1)
+@pytest.mark.parametrize("size", ["1e12", "1e47"])
+def test_motions_of_a_wild_step_come_to_an_end(size):
+    """Roots between samples, beside which rounding of v leaves no panel that is short enough: it went on for ever."""
+    subprocess.run([sys.executable, "-c", WILD, size], check=True, timeout=60)
 
 
 def test_pairs_with_their_own_parameters_on_any_number_of_ranks(comm):
