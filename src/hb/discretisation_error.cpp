@@ -24,6 +24,8 @@ constexpr double vectors = 70;  // of a problem: its own, and for each GMRES ite
 const Tuned negligible("error_negligible", 1e-6,
                        "share of the residual, up to which a source is not solved for");
 const Tuned reach("error_reach", 0.3, "arclength by which the branch is followed to the same parameter");
+const Tuned least("error_least", 17, "highest order that estimates take in at the least");
+const Tuned cheap("error_cheap", 1e4, "unknowns of these up to which it is so for three harmonics and less");
 const Tuned bent("error_bent", 0.2,
                  "residual that a step leaves along that which it is made for, from which it is taken anew");
 
@@ -43,12 +45,20 @@ bool all_laws(model::Model const& model, Predicate is) {
   return every;
 }
 
-/// Up to H + max(4, 3 H / 4), at most 2 H + 1, odd orders alone where no others arise.
-std::vector<int> enlarged(Harmonics const& h, model::Model const& model) {
+/// Highest orders to estimate with, the best one first: `least` at least, where a few harmonics are not dear,
+/// for high ones that resonate move each other more than those next to H tell; H + max(4, 3 H / 4), at most
+/// 2 H + 1.
+std::vector<int> reaches(Harmonics const& h, model::Model const& model) {
+  const int H = h.highest(), near = H + std::min(H + 1, std::max(4, (3 * H + 3) / 4)), far = least;
+  if (near >= far || (H <= 3 && double(model.dofs()) * (2 * far + 1) > cheap)) return {near};
+  return {far, near};
+}
+
+/// Odd orders alone where no others arise.
+std::vector<int> orders_up_to(int highest, Harmonics const& h, model::Model const& model) {
   const bool odd = h.odd_only() && all_laws(model, [](auto const& law) { return law.odd(); });
-  const int H = h.highest(), step = odd ? 2 : 1, highest = H + std::min(H + 1, std::max(4, (3 * H + 3) / 4));
   std::vector<int> orders;
-  for (int n = step - 1; n <= highest; n += step) orders.push_back(n);
+  for (int n = odd ? 1 : 0; n <= highest; n += odd ? 2 : 1) orders.push_back(n);
   return orders;
 }
 
@@ -93,11 +103,17 @@ double bytes_beyond(HarmonicProblem& problem, int problems) {
 
 DiscretisationError::DiscretisationError(HarmonicProblem& problem, std::string const& prefix)
     : problem_(problem), prefix_(prefix) {
-  const std::vector<int> orders = enlarged(problem.harmonics(), problem.model());
-  const int samples = std::max(4 * problem.harmonics().samples(), 16 * orders.back());
-  finer_ = refined(problem, orders, samples, problem.harmonics().highest());
-  if (const double bytes = bytes_beyond(*finer_, 2); bytes > 0) {
+  std::vector<int> orders;
+  int samples = 0;
+  double bytes = 0;
+  for (int highest : reaches(problem.harmonics(), problem.model())) {
+    orders = orders_up_to(highest, problem.harmonics(), problem.model());
+    samples = std::max(4 * problem.harmonics().samples(), 16 * orders.back());
+    finer_ = refined(problem, orders, samples, problem.harmonics().highest());
+    if (bytes = bytes_beyond(*finer_, 2); bytes == 0) break;
     finer_.reset();
+  }
+  if (!finer_) {
     left_out_ = "systems of " + std::to_string(orders.size()) + " harmonics would take about " +
                 solve::gigabytes(bytes) + ", of " + solve::gigabytes(solve::available_bytes(problem.comm())) +
                 " free";

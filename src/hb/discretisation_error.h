@@ -16,8 +16,8 @@ struct LeftOut {
 };
 
 /// What a point's discretisation leaves out of it. With ' for the same problem on the orders up to
-/// H' = H + 3 H / 4 (up to 2 H + 1 for H < 4) and four times the samples, and the point embedded there with
-/// zeros, one Newton step of its equations is
+/// H' = H + 3 H / 4, 17 at the least (up to 2 H + 1 for H < 4 on large models), and four times the samples,
+/// and the point embedded there with zeros, one Newton step of its equations is
 ///
 ///   J' dy' = -r',   r' = (r'_old, r'_new),
 ///

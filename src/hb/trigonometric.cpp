@@ -181,7 +181,9 @@ struct Search {
 
 }  // namespace
 
-Harmonics search_times(Harmonics const& h) { return {h.orders(), 8 * (h.moving() + 1)}; }
+Harmonics search_times(Harmonics const& h) {
+  return {h.orders(), std::max(8 * (h.moving() + 1), 2 * (h.highest() + 1))};
+}
 
 void find_roots(Series const& p, int derivative, double const* samples, int count, std::vector<Root>& out) {
   out.clear();

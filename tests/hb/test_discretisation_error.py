@@ -258,3 +258,33 @@ def test_errors_that_nobody_knows_are_nan_whatever_came_before():
     unknown = Estimate.none(ModalState("CNM", 1.0))
     libc.strtod(b"1e999", None)
     assert all(np.isnan(value) for value in unknown.columns.values())
+
+
+def rung(highest, amplitudes):
+    """Of an oscillator that a slider holds at a small mass, whose own mode has no damping and 13 times the frequency."""
+    m = 0.02
+    k = m * 13.0**2
+    slider = fw.Contact("jenkins", [[0.0, 1.0]], {"tangential_stiffness": 0.3, "friction_limit": 0.3})
+    two = fw.Model(np.diag([1.0, m]), np.array([[1.0 + k, -k], [-k, k]]), None, [slider], MPI.COMM_SELF)
+    problem = fw.NonlinearMode(two, fw.choose_harmonics(two, highest), dof=0, start=fw.linear_modes(two, 1)[0])
+    return reported(problem, amplitudes, (1.2, 3.0))
+
+
+@SERIAL
+@pytest.mark.parametrize("highest", [3, 5])
+def test_a_resonance_far_above_the_retained_harmonics_is_seen(highest):
+    """Estimates that end at 9 harmonics and less were ten to a hundred times too small beside it."""
+    amplitudes = np.linspace(1.4, 2.8, 8)
+    truth = rung(61, amplitudes)
+
+    def within_three():
+        found = rung(highest, amplitudes)
+        errors = [abs(eigenvalue(one) - eigenvalue(other)) for one, other in zip(found, truth)]
+        return sum(1 / 3 <= row["omega_error"] / error <= 3 for row, error in zip(found, errors))
+
+    assert within_three() >= 7
+    PETSc.Options()["fw_error_least"] = 1
+    try:
+        assert within_three() <= 4, "the resonance is no longer what is left out"
+    finally:
+        PETSc.Options().delValue("fw_error_least")

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..console import Shown
-from ..run.study import REPEATS, run_study
+from ..run.study import COMPARED, REPEATS, run_study
 from .parser import Parser, add_force, add_shown
 from .world import world
 
@@ -42,6 +42,12 @@ def _list(kind: type) -> Any:
     return parse
 
 
+def _several(text: str) -> int:
+    if not text.isdigit() or int(text) < 2:
+        raise argparse.ArgumentTypeError(f"a whole number from 2 up is expected, not {text}")
+    return int(text)
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = Parser(prog="fretwave study", description=__doc__)
     parser.add_argument("case", type=Path, metavar="CASE", help="case file (TOML)")
@@ -63,6 +69,13 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument(
         "--pressure-change", type=_list(float), metavar="P,...", help="of wear: largest changes of pressure in a step"
+    )
+    parser.add_argument(
+        "--places",
+        type=_several,
+        default=COMPARED,
+        metavar="N",
+        help=f"amplitudes or frequencies at which runs are compared (default {COMPARED})",
     )
     parser.add_argument("--repeats", type=int, default=REPEATS, help="times each run is repeated (default 3)")
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder (default runs/<case>_study)")

@@ -212,9 +212,10 @@ class HarmonicProblem(Destroyable):
     def errors(self, y: PETSc.Vec, tangent: PETSc.Vec | None) -> dict[str, float]:
         """Estimated errors at a converged point, in the units of what they are errors of. Collective.
 
-        One Newton step on the harmonics up to 7 H / 4 (2 H + 1 below 4) and four times the samples, and with the
-        component modes that a reduction has left out (`OmittedModes`), read at the same amplitude or frequency: see
-        `src/hb/discretisation_error.h`. Without the branch's tangent none is estimated, all are nan.
+        One Newton step on the harmonics up to 7 H / 4, 17 at the least (large models: 2 H + 1 below 4), on four times
+        the samples, and with the component modes that a reduction has left out (`OmittedModes`), read at the same
+        amplitude or frequency: see `src/hb/discretisation_error.h`. Without the branch's tangent none is estimated, all
+        are nan.
 
         Returns
         -------

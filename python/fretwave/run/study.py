@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 #: each branch is solved this often; its time is that of the fastest, which other work on the machine disturbs least
 REPEATS = 3
+#: Amplitudes or frequencies at which runs are compared, unless told otherwise.
+COMPARED = 24
 #: what runs are compared at
 PLACES = {"amplitude": "amplitudes", "omega": "frequencies"}
 PRINTED_AS = {"amplitude": (PRINTED, LEGEND), "omega": (PRINTED_OF_RESPONSE, LEGEND_OF_RESPONSE)}
@@ -64,7 +66,7 @@ def _study_branch(
     folder: StudyFolder,
 ) -> int:
     plan = _plan(case, options)
-    solver = kind(case, analysis, comm, console, options.repeats)
+    solver = kind(case, analysis, comm, console, options.repeats, options.places)
     study = Study(plan, solver.places, solver.over)
     console.line(f"study of '{analysis.name}': {len(plan.sweeps())} runs, the finest is {_text(plan.reference)}")
     numbers = {settings: k for k, settings in enumerate(dict.fromkeys(settings for _, settings in plan.sweeps()))}

@@ -37,9 +37,6 @@ if TYPE_CHECKING:
     from ..solve.continuation import Point
 
 Studied = Union[ModeAnalysis, ForcedAnalysis]
-#: places at which runs are compared
-COUNT = 24
-
 
 #: What all runs on a model begin with
 Begun = TypeVar("Begun")
@@ -53,10 +50,12 @@ class Solver(ABC, Generic[Begun]):
     outcome: type[AnyOutcome]
     analysis: Studied
 
-    def __init__(self, case: Case, analysis: Studied, comm: MPI.Comm, console: Console, repeats: int):
+    def __init__(
+        self, case: Case, analysis: Studied, comm: MPI.Comm, console: Console, repeats: int, places: int
+    ) -> None:
         self.case, self.analysis, self.comm, self.console, self.repeats = case, analysis, comm, console, repeats
         self.prefix = f"{analysis.name}_"
-        self.places = self._places()
+        self.places = self._places(places)
         self._parts: tuple[int | None, AnalysisContext[Any], Begun] | None = None
 
     @abstractmethod
@@ -64,7 +63,7 @@ class Solver(ABC, Generic[Begun]):
         """First and last value of what the branch is over."""
 
     @abstractmethod
-    def _places(self) -> Array:
+    def _places(self, count: int) -> Array:
         """At which runs are compared, ascending."""
 
     @abstractmethod
@@ -153,9 +152,9 @@ class ModeSolver(Solver[Start]):
     def _ends(self) -> tuple[float, float]:
         return self.analysis.amplitude[0], self.analysis.amplitude[1]
 
-    def _places(self) -> Array:
+    def _places(self, count: int) -> Array:
         low, high = sorted(self._ends())
-        return common_amplitudes(low, high, COUNT)
+        return common_amplitudes(low, high, count)
 
     def _started(self, context: AnalysisContext[Any]) -> Start:
         return start_of(context)
@@ -192,9 +191,9 @@ class ResponseSolver(Solver[Excitation]):
         first, last = (2 * np.pi * hertz for hertz in self.analysis.frequency)
         return first, last
 
-    def _places(self) -> Array:
+    def _places(self, count: int) -> Array:
         low, high = sorted(self._ends())
-        return np.linspace(low, high, COUNT + 2)[1:-1]
+        return np.linspace(low, high, count + 2)[1:-1]
 
     def _started(self, context: AnalysisContext[Any]) -> Excitation:
         return excitation_of(context, retained(context))
