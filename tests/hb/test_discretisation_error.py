@@ -261,7 +261,7 @@ def test_errors_that_nobody_knows_are_nan_whatever_came_before():
 
 
 def rung(highest, amplitudes):
-    """Of an oscillator that a slider holds at a small mass, whose own mode has no damping and 13 times the frequency."""
+    """Of an oscillator with a slider on a small mass, whose own mode lies at 13 times the frequency, undamped."""
     m = 0.02
     k = m * 13.0**2
     slider = fw.Contact("jenkins", [[0.0, 1.0]], {"tangential_stiffness": 0.3, "friction_limit": 0.3})
