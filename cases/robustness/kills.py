@@ -20,7 +20,7 @@ from small_runs import Scene, begins_like, call, clean, differences
 
 KINDS = ("random", "at a write", "torn write")
 #: The calls by which files change.
-CALLS = ("write", "replace", "ftruncate", "fsync", "unlink")
+CALLS = ("write", "pwrite", "replace", "ftruncate", "fsync", "unlink")
 
 
 class Counting:
@@ -43,12 +43,12 @@ class Counting:
             setattr(os, name, self._wrapped(getattr(os, name)))
 
     def _wrapped(self, real: Callable[..., Any]) -> Callable[..., Any]:
-        write = os.write
+        writes = os.write, os.pwrite
 
         def counted(*arguments: Any, **named: Any) -> Any:
             if self.count == self.at:
-                if self.torn and real is write:
-                    real(arguments[0], bytes(arguments[1])[: len(arguments[1]) // 2])
+                if self.torn and real in writes:
+                    real(arguments[0], bytes(arguments[1])[: len(arguments[1]) // 2], *arguments[2:])
                 os.kill(os.getpid(), signal.SIGKILL)
             self.count += 1
             if self.note is not None:

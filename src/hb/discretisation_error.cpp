@@ -87,11 +87,11 @@ double factor_bytes(HarmonicProblem const& problem) {
          std::min(12 * problem.model().largest_term(), n * n);
 }
 
-/// What is beyond the memory that `problems` like this may take; 0 if nothing is. Where all harmonics have
-/// one factor their vectors count. Collective.
-double bytes_beyond(HarmonicProblem& problem, int problems) {
+/// What is beyond the memory that `problems` like this may take, so many of them with factors; 0 if nothing
+/// is. Where all harmonics have one factor their vectors count. Collective.
+double bytes_beyond(HarmonicProblem& problem, int problems, int factors = 1) {
   const double most = memory_share * solve::available_bytes(problem.comm());
-  double bytes = factor_bytes(problem);
+  double bytes = factors * factor_bytes(problem);
   if (bytes <= most) return 0;
   if (auto const* kind = solve::choose_kind(problem, "auto").kind; kind && kind->one_factor)
     bytes = sizeof(double) * problems * vectors * double(problem.model().dofs()) *
@@ -106,11 +106,13 @@ DiscretisationError::DiscretisationError(HarmonicProblem& problem, std::string c
   std::vector<int> orders;
   int samples = 0;
   double bytes = 0;
-  for (int highest : reaches(problem.harmonics(), problem.model())) {
+  const std::vector<int> all = reaches(problem.harmonics(), problem.model());
+  for (int highest : all) {
     orders = orders_up_to(highest, problem.harmonics(), problem.model());
     samples = std::max(4 * problem.harmonics().samples(), 16 * orders.back());
     finer_ = refined(problem, orders, samples, problem.harmonics().highest());
-    if (bytes = bytes_beyond(*finer_, 2); bytes == 0) break;
+    // the larger set is not to take the room of what follows a bent step
+    if (bytes = bytes_beyond(*finer_, 2, highest == all.back() ? 1 : 2); bytes == 0) break;
     finer_.reset();
   }
   if (!finer_) {

@@ -269,7 +269,7 @@ void Grading::divide(SeriesFrom const& v, double length, std::vector<Panel>& out
     const double enough = std::max(flat, least);
     while (half > enough && !smooth(middle(direction * half), half)) half *= 0.9;
     while (half > enough && !smooth(v.jet(direction * (s + half)), half)) half *= 0.85;
-    half = std::max(half, least);  // beside a v of 1e47 no panel is short enough
+    half = std::min(std::max(half, least), rest);  // beside a v of 1e47 no panel is short enough
     if (!(half > 0)) half = rest;
     if (flat >= half) half = flat, panel.side = here.d[0] > 0 ? 1 : -1;
     panel.middle = direction * (s + half), panel.half = half;

@@ -206,20 +206,19 @@ EnergyBalance Residual::energy() {
 
 double Residual::mechanical_energy(Vec Q, Exponents const& e) {
   const Harmonics& h = harmonics_;
+  Exponents sizes{.s = e.s};
+  for (complex& s : sizes.s) s = std::abs(s);
   double sum = 0;
   for (int order : {0, 2}) {
     VecHandle p = like(Q);
     check(VecSet(p, 0));
-    stiffness_.multiply_add({.s = e.s}, Q, p, order);
+    stiffness_.multiply_add(sizes, Q, p, order);
     const ReadArray q(Q), force(p);
     for (PetscInt first = 0; first < local_size(Q); first += h.block_size())
       for (int i = 0; i < h.count(); ++i) {
         if (h.orders()[i] == 0) continue;
         const PetscInt k = first + h.offset(i);
-        const complex work = std::conj(complex(q[k], -q[k + 1])) * complex(force[k], -force[k + 1]);
-        // of s^2 q^H M q the size |s|^2 remains
-        const complex turn = order == 2 ? std::conj(e.s[i] * e.s[i]) / std::norm(e.s[i]) : 1.0;
-        sum += (turn * work).real() / 4;
+        sum += (q[k] * force[k] + q[k + 1] * force[k + 1]) / 4;
       }
   }
   MPI_Allreduce(MPI_IN_PLACE, &sum, 1, MPI_DOUBLE, MPI_SUM, model_.comm());

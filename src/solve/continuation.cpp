@@ -28,6 +28,9 @@ const Tuned certain("branch_certain", 3, "meetings with earlier points of the br
 const Tuned grid("branch_grid", 16, "lengths of steps in every factor of two");
 const Tuned at_the_end("branch_at_the_end", 1e-9,
                        "relative distance at which a branch starts at the end of its range");
+const Tuned aside(
+    "branch_aside", 0.5,
+    "arclength by which another set of harmonics may move a point: farther off is another branch");
 const Tuned leash("branch_leash", 1.0 / 3,
                   "share of the range by which a branch may leave it where it began");
 const Tuned farthest("branch_farthest", 4, "factor by which it may leave the range there at most");
@@ -148,11 +151,14 @@ std::optional<Point> Continuation::take_over(Anchor from, std::string const& eve
   prepare_row();
   // at the same parameter, so that no report is passed twice or not at all; beside a fold there may be none
   const bool given = event == "start" || event == "report" || event == "stop";
+  const auto near = [&](Trial const& trial) {
+    return weighted_norm(weights_, moved(trial.y, -1, anchor_.y)) <= aside;
+  };
   Trial trial = at(copy(anchor_.y));
-  bool there = correct(trial, parameter_row_, last_entry(trial.y), row_);
+  bool there = correct(trial, parameter_row_, last_entry(trial.y), row_) && near(trial);
   if (!given && !(there && turn_of(trial) <= steps_.max_angle)) {
     trial = at(copy(anchor_.y));
-    there = correct(trial, row_, row_value_, row_);
+    there = correct(trial, row_, row_value_, row_) && near(trial);
   }
   if (!there) return {};
   anchor_.y = copy(trial.y), anchor_.tangent = copy(trial.tangent);

@@ -9,10 +9,11 @@ namespace fretwave::solve {
 
 namespace {
 
-constexpr int looks = 40;              // for where a guess passes a parameter
-constexpr int nodes = 8;               // parts of a step in which its cubic is looked at
-constexpr double near_zero = 0.3;      // of the smaller end value: so low a minimum may hide two zeros
-constexpr double value_error = 1e-9;   // relative, of a reported value reached along the branch
+constexpr int looks = 40;             // for where a guess passes a parameter
+constexpr int nodes = 8;              // parts of a step in which its cubic is looked at
+constexpr double near_zero = 0.3;     // of the smaller end value: so low a minimum may hide two zeros
+constexpr double value_error = 1e-9;  // relative, of a reported value reached along the branch
+char const* const elsewhere = "Newton goes to another branch there";
 constexpr double off_the_curve = 0.5;  // of the step: a solution farther from the cubic is another branch
 
 }  // namespace
@@ -70,10 +71,14 @@ std::string Continuation::events_of_corner(Trial const& end) {
     if ((from < target) == (to < target) || (event != "report" && from == target)) return;
     Trial trial = at(copy(std::abs(to - target) < std::abs(from - target) ? Vec(end.y) : Vec(anchor_.y)));
     set_last_entry(trial.y, target);
-    if (correct(trial, parameter_row_, target, row_))
-      emit(std::move(trial), 0, event);
-    else
+    const VecHandle guess = copy(trial.y);
+    const double length = weighted_norm(weights_, moved(end.y, -1, anchor_.y));
+    if (!correct(trial, parameter_row_, target, row_))
       miss(event + " at " + problem_.parameter_text(value), trial.outcome.reason);
+    else if (weighted_norm(weights_, moved(trial.y, -1, guess)) > length)
+      miss(event + " at " + problem_.parameter_text(value), elsewhere);
+    else
+      emit(std::move(trial), 0, event);
   };
   for (double value : report_at_)
     if (value != low_ && value != high_) pass(value, "report");
@@ -226,7 +231,7 @@ void Continuation::reach(double value, std::string const& event, Place a, Place 
     if (!along) {
       if (event == "report")
         miss("report at " + problem_.parameter_text(value),
-             trial.outcome.converged ? "Newton goes to another branch there" : trial.outcome.reason);
+             trial.outcome.converged ? elsewhere : trial.outcome.reason);
       return;
     }
     trial = std::move(*along);
@@ -254,6 +259,7 @@ void Continuation::polish(Trial& trial, double target) {
 std::optional<Continuation::Trial> Continuation::reach_along(double target, Place a, Place b,
                                                              Hermite const& curve) {
   a.value -= target, b.value -= target;
+  const double most = off_the_curve * (b.at - a.at);
   for (int k = 0; k < 60; ++k) {
     double at = secant(a, b);
     if (k % 3 == 2) at = (a.at + b.at) / 2;
@@ -263,7 +269,9 @@ std::optional<Continuation::Trial> Continuation::reach_along(double target, Plac
     if (std::abs(value) <= value_error * std::max(1.0, std::abs(target))) {
       Trial exact = this->at(copy(trial.y));
       set_last_entry(exact.y, target);
-      return correct(exact, parameter_row_, target, row_) ? std::move(exact) : std::move(trial);
+      const bool good = correct(exact, parameter_row_, target, row_) &&
+                        weighted_norm(weights_, moved(exact.y, -1, trial.y)) <= most;
+      return good ? std::move(exact) : std::move(trial);
     }
     ((value < 0) == (a.value < 0) ? a : b) = {at, value};
   }

@@ -137,6 +137,16 @@ def test_unknowns_of_all_points_are_those_of_the_largest_set():
 
 
 @SERIAL
+@SERIAL
+@pytest.mark.parametrize("places", [48, 96, 128])
+def test_another_set_stays_on_the_branch(places):
+    """Beside a fold Newton at the amplitude led from a smaller set's point to the second mode, at 45 rad/s."""
+    wanted = list(np.geomspace(0.02, 3.0, places + 2)[1:-1])
+    branch = fw.follow(mode(tanh(0.05), 5, 64), 0.02, 3.0, report_at=wanted, accuracy=0.1)
+    assert branch.converged, branch.reason
+    assert branch["omega"].max() < 25.6
+
+
 def test_a_branch_that_cannot_be_had_so_accurately_says_what_limits_it(monkeypatch):
     monkeypatch.setattr(rules, "MOST_HARMONICS", 9)
     branch = fw.follow(mode(jenkins()), 0.1, 3.0, accuracy=1e-4)

@@ -43,7 +43,7 @@ def _list(kind: type) -> Any:
 
 
 def _several(text: str) -> int:
-    if not text.isdigit() or int(text) < 2:
+    if not text.isdecimal() or int(text) < 2:
         raise argparse.ArgumentTypeError(f"a whole number from 2 up is expected, not {text}")
     return int(text)
 
@@ -75,7 +75,7 @@ def _parser() -> argparse.ArgumentParser:
         type=_several,
         default=COMPARED,
         metavar="N",
-        help=f"amplitudes or frequencies at which runs are compared (default {COMPARED})",
+        help=f"amplitudes of a mode or frequencies at which runs are compared (default {COMPARED})",
     )
     parser.add_argument("--repeats", type=int, default=REPEATS, help="times each run is repeated (default 3)")
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder (default runs/<case>_study)")

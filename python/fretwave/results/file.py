@@ -180,7 +180,7 @@ def open_results(path: str | Path) -> Results:
         There are none, or they are damaged.
     """
     path = Path(path)
-    path = path / "results.h5" if path.is_dir() else path
+    path = path if path.name == "results.h5" else path / "results.h5"
     for _ in range(9):
         with suppress(FileNotFoundError):  # of a journal whose analysis was completed just now
             return _open_all(path)

@@ -168,6 +168,15 @@ def _read_head(data: bytes) -> tuple[int, int] | None:
     return (length, checksum) if mark == _MARK and own == zlib.crc32(data[: _HEAD.size - 4]) else None
 
 
+def first_record(path: Path) -> Record | None:
+    """The record that a file begins with; None where it is spoilt."""
+    size = path.stat().st_size
+    with path.open("rb") as file:
+        head = _read_head(file.read(_HEAD.size))
+        whole = head is not None and head[0] <= size - _HEAD.size
+        return _read_record(file, _Kept(file), *head) if whole and head is not None else None
+
+
 def read_records(path: Path) -> Iterator[tuple[int, Record]]:
     """Place and record of each, up to the end or to a torn one.
 
@@ -265,10 +274,11 @@ class Journal:
     def keep_state(self, rows: int, arrays: Mapping[str, Any]) -> None:
         """Keep what the analysis goes on from after its rows so far."""
         record = Record("state", {"rows": rows, "token": self.token}, dict(arrays))
-        newest, self._next = self._states[self._next], 1 - self._next
+        newest = self._states[self._next]
         with told(newest):
             descriptor = self._state_file(newest)
             os.ftruncate(descriptor, write_record(descriptor, 0, record))
+        self._next = 1 - self._next
         now = time.monotonic()
         if now - self._safe_at > SAFE_EVERY:
             with told(self.path):
@@ -294,9 +304,9 @@ class Journal:
         """
         found = []
         for path in (*self._states, self._safe):
-            with suppress(OSError, InputError, StopIteration):
-                record = next(read_records(path))[1]
-                if record.values["token"] == token:
+            with suppress(OSError):
+                record = first_record(path)
+                if record is not None and record.values["token"] == token:
                     found.append((int(record.values["rows"]), record.arrays, path))
         usable = [state for state in found if state[0] <= rows]
         if found and not usable:

@@ -91,7 +91,7 @@ class Curve:
                 values[column.name] = data[np.clip(x.astype(int), 0, None)] if len(data) else data
             else:
                 values[column.name] = np.interp(x, rows, data) if len(data) else data
-        if self.cubic is not None:
+        if self.cubic is not None and len(x):
             states = self._states(x)
             values.update((name, states[name]) for name in self._names)
         return Table([PLACE, *self.columns], values)

@@ -48,12 +48,8 @@ class Cubic:
     def __len__(self) -> int:
         return len(self.values)
 
-    def __call__(self, place: float) -> Array:
-        """Values (k,) at a place: 3.25 is a quarter of the step from row 3 to row 4."""
-        return np.asarray(self.at(np.array([place]))[0])
-
     def at(self, places: Array) -> Array:
-        """Values (m, k) at places (m,)."""
+        """Values (m, k) at places (m,): 3.25 is a quarter of the step from row 3 to row 4."""
         places = np.clip(places, 0, len(self) - 1)
         rows = places.astype(int)
         values = np.array(self.values[rows], dtype=float)
@@ -69,5 +65,6 @@ class Cubic:
 
 def piece(place: float, rows: int) -> tuple[int, float]:
     """Row before a place, and share of the step to the next one."""
-    i = min(max(int(place), 0), rows - 1)
+    place = max(place, 0.0)
+    i = min(int(place), rows - 1)
     return (i - 1, 1.0) if i == rows - 1 and rows > 1 and place > i else (i, place - i if rows > 1 else 0.0)
