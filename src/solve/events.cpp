@@ -72,10 +72,10 @@ std::string Continuation::events_of_corner(Trial const& end) {
     Trial trial = at(copy(std::abs(to - target) < std::abs(from - target) ? Vec(end.y) : Vec(anchor_.y)));
     set_last_entry(trial.y, target);
     const VecHandle guess = copy(trial.y);
-    const double length = weighted_norm(weights_, moved(end.y, -1, anchor_.y));
+    const double most = 4 * weighted_norm(weights_, moved(end.y, -1, anchor_.y));  // it may turn back
     if (!correct(trial, parameter_row_, target, row_))
       miss(event + " at " + problem_.parameter_text(value), trial.outcome.reason);
-    else if (weighted_norm(weights_, moved(trial.y, -1, guess)) > length)
+    else if (weighted_norm(weights_, moved(trial.y, -1, guess)) > most)
       miss(event + " at " + problem_.parameter_text(value), elsewhere);
     else
       emit(std::move(trial), 0, event);
