@@ -25,6 +25,8 @@ CHANCE = ("wall_s", "cpu_s", "residual", "rounding", "unclosed", "energy_error",
 COUNTS = (("coordinate", "newton"), ("over_friction_summary", "newton"))
 #: Errors, which are differences of two solutions, by what they are errors of.
 ERRORS_OF = {"lambda": "omega", "omega": "omega", "amplitude": "amplitude", "zeta": "zeta"}
+#: Whose error estimates have more unknowns than the direct route takes.
+BY_GMRES = ("coordinate", "forced")
 TABLES = ("rest", "mode", "coordinate", "forced", "forced_peaks", "wear", "over_friction", "over_friction_summary")
 
 
@@ -55,10 +57,14 @@ def table(path: Path) -> dict[str, list[str]]:
     return {name: [row[name] for row in rows] for name in rows[0]}
 
 
-def tolerance(name: str, columns: dict[str, np.ndarray]) -> float:
-    """Of a column: a share of its largest number, of an error a share of what it is the error of."""
+def tolerance(name: str, columns: dict[str, np.ndarray], table: str) -> float | np.ndarray:
+    """Of a column: a share of its largest number, of an error a share of what it is the error of.
+
+    Errors that GMRES solves for are estimated to 1 % (`-fw_error_tolerance`).
+    """
     of = next((key for part, key in ERRORS_OF.items() if name.startswith(f"{part}_error")), name)
-    return SOLVED * float(np.nanmax(np.abs(columns[of]), initial=0.0))
+    least = SOLVED * float(np.nanmax(np.abs(columns[of]), initial=0.0))
+    return least if of == name or table not in BY_GMRES else np.maximum(least, 0.01 * np.abs(columns[name]))
 
 
 @pytest.mark.parametrize("name", TABLES)
@@ -75,7 +81,7 @@ def test_tables_are_the_same_after_conversion_and_say_their_units(runs: dict[str
         elif key not in CHANCE and (name, key) not in COUNTS:
             factor = SCALES["mm-t-s"].of(there)
             found = factor * np.array(column, dtype=float)
-            allowed = tolerance(key, numbers) or 0.0
+            allowed = tolerance(key, numbers, name)
             if key == "newton":  # whether a guess needs no step at all, rounding decides
                 allowed = (np.minimum(found, numbers[key]) == 0).astype(float)
             assert np.isclose(found, numbers[key], rtol=0, atol=allowed, equal_nan=True).all(), key

@@ -7,6 +7,7 @@ The scalars of unknowns y are linear in y: the problem's own (frequency, ...), t
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, ClassVar, Union
@@ -30,8 +31,20 @@ def default_samples(highest: int) -> int:
     return max(64, 1 << (16 * highest - 1).bit_length())
 
 
+class _Columns(ABC):
+    """Columns of scalars."""
+
+    def __call__(self, z: npt.ArrayLike) -> dict[str, float]:
+        """The columns of these scalars."""
+        return {name: float(value) for name, value in self.table(np.asarray(z, dtype=float)).items()}
+
+    @abstractmethod
+    def table(self, z: Array) -> dict[str, Array]:
+        """The same of many states (..., 3) at once."""
+
+
 @dataclass(frozen=True)
-class ModalState:
+class ModalState(_Columns):
     """Scalars (beta / w_ref, w / w_ref, log a, ...) of a nonlinear mode; w = w0 for EPMC.
 
     Examples
@@ -92,12 +105,7 @@ class ModalState:
         beta, omega, _, _ = self._oscillation(z)
         return complex(-beta, omega)
 
-    def __call__(self, z: npt.ArrayLike) -> dict[str, float]:
-        """The columns of these scalars."""
-        return {name: float(value) for name, value in self.table(np.asarray(z, dtype=float)).items()}
-
     def table(self, z: Array) -> dict[str, Array]:
-        """The same of many states (..., 3) at once."""
         beta, omega, omega0, zeta = self._oscillation(z)
         return dict(zip(self.columns, (np.exp(z[..., 2]), omega, omega0, omega / (2 * math.pi), beta, zeta)))
 
@@ -113,7 +121,7 @@ class ModalState:
 
 
 @dataclass(frozen=True)
-class ForcedState:
+class ForcedState(_Columns):
     """Scalars (w / w_ref, c, s, ...) of a forced response, x = a_ref (c cos w t + s sin w t) = A cos(w t + phase)."""
 
     kind: ClassVar[str] = "forced"
@@ -147,12 +155,7 @@ class ForcedState:
         size = np.hypot(*z[1:3])
         return np.diag([1.0 / (BANDWIDTH * z[0]), 1.0 / size, 1.0 / size])
 
-    def __call__(self, z: npt.ArrayLike) -> dict[str, float]:
-        """The columns of these scalars."""
-        return {name: float(value) for name, value in self.table(np.asarray(z, dtype=float)).items()}
-
     def table(self, z: Array) -> dict[str, Array]:
-        """The same of many states (..., 3) at once."""
         omega = z[..., 0] * self.omega_reference
         cosine, sine = (z[..., k] * self.amplitude_reference for k in (1, 2))
         level, amplitude, phase = np.full_like(omega, self.level), np.hypot(cosine, sine), np.arctan2(-sine, cosine)
