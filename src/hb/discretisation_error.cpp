@@ -177,10 +177,17 @@ void DiscretisationError::from_halfway(Vec middle, Vec row, std::span<Vec const>
     again_ = std::make_unique<solve::Newton>(*moved_, prefix_);
     again_->solve_beside(tolerance);
   }
-  std::vector<VecHandle> before;
+  // what a solution has left there as the measure of forces
+  const double scale = finer_->stiffness_scale() / moved_->stiffness_scale();
+  std::vector<VecHandle> before, scaled;
+  std::vector<Vec> rights;
   for (Vec part : x) before.push_back(solve::copy(part));
+  for (Vec part : b) {
+    scaled.push_back(solve::copy(part)), rights.push_back(scaled.back());
+    check(VecScale(rights.back(), scale));
+  }
   again_->system().close(row, 0);
-  if (again_->linear(middle, b, x)) return;
+  if (again_->linear(middle, rights, x)) return;
   for (size_t k = 0; k < x.size(); ++k) check(VecCopy(before[k], x[k]));
 }
 
@@ -255,7 +262,8 @@ std::optional<bool> DiscretisationError::step(Vec point, Vec row, Vec reduction,
 /// or nowhere.
 void DiscretisationError::finish(Vec point, Vec row, double residual, std::span<Vec const> x, Vec most) {
   if (!again_ || again_->dear()) return;
-  check(SNESSetTolerances(again_->snes(), solved * residual, PETSC_DEFAULT, PETSC_DEFAULT,
+  const double scale = finer_->stiffness_scale() / moved_->stiffness_scale();
+  check(SNESSetTolerances(again_->snes(), solved * scale * residual, PETSC_DEFAULT, PETSC_DEFAULT,
                           PetscInt(most_steps), PETSC_DEFAULT));
   VecHandle whole = sum(x), y = solve::moved(point, 1, whole);
   again_->system().close(row, solve::dot(row, point));

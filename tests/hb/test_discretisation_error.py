@@ -12,10 +12,11 @@ from models.core_models import TanhLaw, friction
 from mpi4py import MPI
 from oracle import Jenkins, SeriesMotion, System, forced_orbit, series_motion
 from petsc4py import PETSc
-from tolerances import ROUNDING
+from tolerances import ROUNDING, SOLVED
 
 import fretwave as fw
 from fretwave.hb.states import Estimate, ModalState
+from fretwave.solve.preload import balanced
 
 M, K = np.diag([1.0, 0.02]), np.array([[640.0, -40.0], [-40.0, 40.0]])
 KT, LIMIT = 400.0, 5.0
@@ -288,3 +289,28 @@ def test_a_resonance_far_above_the_retained_harmonics_is_seen(highest):
         assert within_three() <= 4, "the resonance is no longer what is left out"
     finally:
         PETSc.Options().delValue("fw_error_least")
+
+
+@SERIAL
+def test_estimates_do_not_remember_those_before_them():
+    """A solution of the finer equations left its measure of forces behind: each estimate was the square of the last."""
+    near, own = np.diag([2.0, 1.5, 1.2]), np.diag([3.0, 2.0, 1.0])
+    near[[0, 1, 0, 2, 1, 2], [1, 0, 2, 0, 2, 1]] = [0.5, 0.5, 0.2, 0.2, 0.3, 0.3]
+    own[[0, 1, 0, 2, 1, 2], [1, 0, 2, 0, 2, 1]] = [0.6, 0.6, 0.3, 0.3, 0.4, 0.4]
+    given = {"normal_stiffness": 1e10, "tangential_stiffness": 8e9, "friction_coefficient": 0.5, "normal_load": 1.0}
+    pad = fw.Contact("coulomb_3d", np.eye(6)[3:], given)
+    block = fw.Model(np.eye(6), np.block([[own + near, -near], [-near, near]]), None, [pad], MPI.COMM_SELF)
+    start = fw.linear_modes(block, 1)[0]
+
+    def problem():
+        return fw.NonlinearMode(block, fw.Harmonics(range(6), 128), "CNM", 0, start, rest=balanced(block, start))
+
+    followed = problem()
+    for point in fw.Continuation(followed, followed.initial(0.01), (0.01, 20.0)):
+        found = followed.errors(point.y, point.tangent)
+        if point.index == 50:
+            break
+    assert found == pytest.approx(
+        problem().errors(point.y, point.tangent), rel=SOLVED, abs=SOLVED * found["omega_error"]
+    )
+    assert 0 < found["zeta_error"] < 1
