@@ -30,8 +30,8 @@ const Tuned bent("error_bent", 0.2,
                  "residual that a step leaves along that which it is made for, from which it is taken anew");
 
 constexpr double solved = 1e-2;  // of the residual: so far Newton goes on from a bent step
-const Tuned most_steps("error_steps", 20, "Newton steps at most, by which it does");
-constexpr double astray = 10;  // of that step: what lies farther away is another solution
+constexpr double astray = 10;    // of that step: what lies farther away is another solution
+const Tuned most_steps("error_steps", 20, "Newton steps at most that go on from a bent one");
 
 const Tuned held("error_held_means", 1e-4,
                  "share of the stuck stiffness in which estimates hold the mean of the motion");
@@ -158,14 +158,16 @@ VecHandle DiscretisationError::closing_row(Vec y, Vec tangent) {
   return embedded(problem_, *finer_, solve::weighted(weights, tangent));
 }
 
+/// A residual of `moved_` over the same of `finer_`: solutions leave there what they measure forces in.
+double DiscretisationError::to_moved() const { return finer_->stiffness_scale() / moved_->stiffness_scale(); }
+
 /// c, from no farther away than the branch is taken to be straight.
 double DiscretisationError::bend(Vec point, Vec r, Vec reduction, Vec step) {
   VecHandle weights = finer_->unknowns(), there = moved_->equations();
   finer_->metric(point, weights);
   const double t = std::min(1.0, reach / solve::weighted_norm(weights, step));
   moved_->residual(solve::moved(point, t, step), there);
-  const double scale = moved_->stiffness_scale() / finer_->stiffness_scale();
-  const double along = (scale * solve::dot(there, r) + solve::dot(reduction, r)) / solve::dot(r, r);
+  const double along = (solve::dot(there, r) / to_moved() + solve::dot(reduction, r)) / solve::dot(r, r);
   return (along - (1 - t)) / (t * t);
 }
 
@@ -177,14 +179,12 @@ void DiscretisationError::from_halfway(Vec middle, Vec row, std::span<Vec const>
     again_ = std::make_unique<solve::Newton>(*moved_, prefix_);
     again_->solve_beside(tolerance);
   }
-  // what a solution has left there as the measure of forces
-  const double scale = finer_->stiffness_scale() / moved_->stiffness_scale();
   std::vector<VecHandle> before, scaled;
   std::vector<Vec> rights;
   for (Vec part : x) before.push_back(solve::copy(part));
   for (Vec part : b) {
     scaled.push_back(solve::copy(part)), rights.push_back(scaled.back());
-    check(VecScale(rights.back(), scale));
+    check(VecScale(rights.back(), to_moved()));
   }
   again_->system().close(row, 0);
   if (again_->linear(middle, rights, x)) return;
@@ -262,8 +262,7 @@ std::optional<bool> DiscretisationError::step(Vec point, Vec row, Vec reduction,
 /// or nowhere.
 void DiscretisationError::finish(Vec point, Vec row, double residual, std::span<Vec const> x, Vec most) {
   if (!again_ || again_->dear()) return;
-  const double scale = finer_->stiffness_scale() / moved_->stiffness_scale();
-  check(SNESSetTolerances(again_->snes(), solved * scale * residual, PETSC_DEFAULT, PETSC_DEFAULT,
+  check(SNESSetTolerances(again_->snes(), solved * to_moved() * residual, PETSC_DEFAULT, PETSC_DEFAULT,
                           PetscInt(most_steps), PETSC_DEFAULT));
   VecHandle whole = sum(x), y = solve::moved(point, 1, whole);
   again_->system().close(row, solve::dot(row, point));

@@ -56,6 +56,7 @@ class DiscretisationError {
   VecHandle closing_row(Vec y, Vec tangent);
   std::array<VecHandle, 4> residuals(Vec y, Vec point, Vec reduction);
   std::optional<bool> step(Vec point, Vec row, Vec reduction, std::span<Vec const> b, std::span<Vec const> x);
+  double to_moved() const;
   double bend(Vec point, Vec r, Vec reduction, Vec step);
   void from_halfway(Vec middle, Vec row, std::span<Vec const> b, std::span<Vec const> x);
   void finish(Vec point, Vec row, double residual, std::span<Vec const> x, Vec most);

@@ -174,18 +174,23 @@ void Residual::contact_product(Group& group, Vec dQ, Exponents const* de, Vec dR
 
 namespace {
 
-/// pi sum_n n q_n^H p_n of this rank, q_n = Qc_n - i Qs_n: its imaginary part is the work of -p over a
-/// period.
-complex period_product(Harmonics const& h, Vec q, Vec p) {
+/// sum_n>0 weight(n) q_n^H p_n of this rank, q_n = Qc_n - i Qs_n.
+template <class Weight>
+complex product_of(Harmonics const& h, Vec q, Vec p, Weight weight) {
   ReadArray a(q), b(p);
   complex sum = 0;
   for (PetscInt first = 0; first < local_size(q); first += h.block_size())
     for (int i = 0; i < h.count(); ++i) {
       if (h.orders()[i] == 0) continue;
       const PetscInt k = first + h.offset(i);
-      sum += double(h.orders()[i]) * std::conj(complex(a[k], -a[k + 1])) * complex(b[k], -b[k + 1]);
+      sum += weight(h.orders()[i]) * std::conj(complex(a[k], -a[k + 1])) * complex(b[k], -b[k + 1]);
     }
-  return std::numbers::pi * sum;
+  return sum;
+}
+
+/// pi sum_n n q_n^H p_n: its imaginary part is the work of -p over a period.
+complex period_product(Harmonics const& h, Vec q, Vec p) {
+  return std::numbers::pi * product_of(h, q, p, [](int n) { return double(n); });
 }
 
 }  // namespace
@@ -205,7 +210,6 @@ EnergyBalance Residual::energy() {
 }
 
 double Residual::mechanical_energy(Vec Q, Exponents const& e) {
-  const Harmonics& h = harmonics_;
   Exponents sizes{.s = e.s};
   for (complex& s : sizes.s) s = std::abs(s);
   double sum = 0;
@@ -213,13 +217,7 @@ double Residual::mechanical_energy(Vec Q, Exponents const& e) {
     VecHandle p = like(Q);
     check(VecSet(p, 0));
     stiffness_.multiply_add(sizes, Q, p, order);
-    const ReadArray q(Q), force(p);
-    for (PetscInt first = 0; first < local_size(Q); first += h.block_size())
-      for (int i = 0; i < h.count(); ++i) {
-        if (h.orders()[i] == 0) continue;
-        const PetscInt k = first + h.offset(i);
-        sum += (q[k] * force[k] + q[k + 1] * force[k + 1]) / 4;
-      }
+    sum += product_of(harmonics_, Q, p, [](int) { return 0.25; }).real();
   }
   MPI_Allreduce(MPI_IN_PLACE, &sum, 1, MPI_DOUBLE, MPI_SUM, model_.comm());
   return sum;

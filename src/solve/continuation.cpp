@@ -28,7 +28,7 @@ const Tuned certain("branch_certain", 3, "meetings with earlier points of the br
 const Tuned grid("branch_grid", 16, "lengths of steps in every factor of two");
 const Tuned at_the_end("branch_at_the_end", 1e-9,
                        "relative distance at which a branch starts at the end of its range");
-const Tuned aside(
+const Tuned set_aside(
     "branch_aside", 0.5,
     "arclength by which another set of harmonics may move a point: farther off is another branch");
 const Tuned leash("branch_leash", 1.0 / 3,
@@ -151,9 +151,7 @@ std::optional<Point> Continuation::take_over(Anchor from, std::string const& eve
   prepare_row();
   // at the same parameter, so that no report is passed twice or not at all; beside a fold there may be none
   const bool given = event == "start" || event == "report" || event == "stop";
-  const auto near = [&](Trial const& trial) {
-    return weighted_norm(weights_, moved(trial.y, -1, anchor_.y)) <= aside;
-  };
+  const auto near = [&](Trial const& trial) { return distance(trial.y, anchor_.y) <= set_aside; };
   Trial trial = at(copy(anchor_.y));
   bool there = correct(trial, parameter_row_, last_entry(trial.y), row_) && near(trial);
   if (!given && !(there && turn_of(trial) <= steps_.max_angle)) {
@@ -190,6 +188,9 @@ void Continuation::prepare_row() {
   anchor_tests_ = tests(anchor_.y, anchor_.tangent);
 }
 
+/// Between two points, in the metric of the anchor.
+double Continuation::distance(Vec a, Vec b) const { return weighted_norm(weights_, moved(a, -1, b)); }
+
 /// Angle between the anchor's tangent and the trial's [rad].
 double Continuation::turn_of(Trial const& trial) const {
   return std::acos(std::clamp(dot(row_, trial.tangent), -1.0, 1.0));
@@ -199,16 +200,14 @@ double Continuation::turn_of(Trial const& trial) const {
 /// to the error y'''' L^4 / 384 of the cubic over the new step. Where the last step is too short to tell, it
 /// is measured in the middle, unless so small a turn leaves no room for an error that counts.
 double Continuation::interpolation_error(Trial const& trial, double length) {
-  const double last = before_.y ? weighted_norm(weights_, moved(anchor_.y, -1, before_.y)) : 0,
-               now = weighted_norm(weights_, moved(trial.y, -1, anchor_.y));
+  const double last = before_.y ? distance(anchor_.y, before_.y) : 0, now = distance(trial.y, anchor_.y);
   if (!(last > length / 8)) {
     const double most = turn_of(trial) * length / 8;
     return most > steps_.max_error / 2 ? error_in_the_middle(trial, length) : most;
   }
   const Hermite across(before_.y, before_.tangent, trial.y, trial.tangent, last + now);
   const double ratio = now / last;
-  return weighted_norm(weights_, moved(across.value(last), -1, anchor_.y)) * std::min(ratio * ratio, 4.0) /
-         16;
+  return distance(across.value(last), anchor_.y) * std::min(ratio * ratio, 4.0) / 16;
 }
 
 double Continuation::error_in_the_middle(Trial const& end, double length) {
@@ -216,7 +215,7 @@ double Continuation::error_in_the_middle(Trial const& end, double length) {
   Trial middle = at(curve.value(length / 2));
   const VecHandle expected = copy(middle.y);
   if (!correct(middle, row_, dot(row_, expected), row_)) return INFINITY;
-  return weighted_norm(weights_, moved(middle.y, -1, expected));
+  return distance(middle.y, expected);
 }
 
 /// What speaks against a corrected trial as the next point; nothing if it is one. An arc that turns by an
@@ -224,7 +223,7 @@ double Continuation::error_in_the_middle(Trial const& end, double length) {
 /// where the corrector came hard by a point farther aside, it is another branch's.
 std::string Continuation::complaint(Trial& trial, double length, bool may_shorten) {
   const VecHandle along = moved(anchor_.y, length, anchor_.tangent);
-  const double aside = weighted_norm(weights_, moved(trial.y, -1, along)), angle = turn_of(trial);
+  const double aside = distance(trial.y, along), angle = turn_of(trial);
   const bool hard = trial.outcome.newton > easy;
   if (!(aside <= length) || (may_shorten && hard && aside > (angle + unturned) * length)) {
     const std::string why = problem_.explain(trial.y, moved(trial.y, -1, along));
@@ -262,13 +261,13 @@ std::optional<Continuation::Trial> Continuation::turn_next_corner(double& length
 
 std::optional<Continuation::Trial> Continuation::turned(std::optional<Trial> behind, double& length) {
   turned_ = bool(behind);
-  if (turned_) length = weighted_norm(weights_, moved(behind->y, -1, anchor_.y));
+  if (turned_) length = distance(behind->y, anchor_.y);
   return behind;
 }
 
 /// By the cubic through the last two points, on the plane at this length.
 VecHandle Continuation::by_cubic(double length) {
-  const double last = weighted_norm(weights_, moved(anchor_.y, -1, before_.y));
+  const double last = distance(anchor_.y, before_.y);
   VecHandle y = Hermite(before_.y, before_.tangent, anchor_.y, anchor_.tangent, last).value(last + length);
   check(VecAXPY(y, row_value_ + length - dot(row_, y), anchor_.tangent));
   return y;
@@ -282,7 +281,7 @@ VecHandle Continuation::predicted(double length) {
 /// Whether the cubic foretells a point better than the tangent does, by far.
 bool Continuation::foretold(Vec y, double length) {
   if (turned_ || !before_.y) return false;
-  const auto off = [&](VecHandle guess) { return weighted_norm(weights_, moved(y, -1, guess)); };
+  const auto off = [&](VecHandle guess) { return distance(y, guess); };
   return off(by_cubic(length)) < nearer * off(moved(anchor_.y, length, anchor_.tangent));
 }
 
@@ -390,8 +389,7 @@ bool Continuation::passes(Trial const& trial, Trail::Meeting const& meeting) {
     const double value = meeting.place[meeting.functional] - (walk - k) * length * dot(row, trial.tangent);
     there.y = copy(expected);
     if (!correct(there, row, value, row_)) return false;
-    if (!(weighted_norm(weights_, moved(there.y, -1, expected)) <= 0.1 * std::abs(length) + 1e-8))
-      return false;
+    if (!(distance(there.y, expected) <= 0.1 * std::abs(length) + 1e-8)) return false;
   }
   return Trail::same(there.y, meeting.place);
 }

@@ -99,6 +99,7 @@ class Continuation {
   void open_the_range();
   void prepare_row();
   double turn_of(Trial const&) const;
+  double distance(Vec a, Vec b) const;
   double interpolation_error(Trial const&, double length);
   double error_in_the_middle(Trial const&, double length);
   std::string complaint(Trial&, double length, bool may_shorten);

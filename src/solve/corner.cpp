@@ -138,7 +138,7 @@ std::optional<Continuation::Trial> Continuation::turn_corner(double beyond, doub
   const VecHandle row = weighted(weights_, tangent), guess = moved(there, on, tangent);
   Trial trial = at(copy(guess));
   if (!correct(trial, row, dot(row, guess), row)) return {};
-  if (!(weighted_norm(weights_, moved(trial.y, -1, guess)) <= beyond + on)) return {};
+  if (!(distance(trial.y, guess) <= beyond + on)) return {};
   if (!(dot(row, trial.tangent) >= std::cos(steps_.max_angle))) return {};
   if (!straight && orientation(trial.y, trial.tangent) < 0) return {};
   return trial;

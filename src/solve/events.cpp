@@ -29,8 +29,7 @@ void Continuation::miss(std::string const& what, std::string const& why) {
 /// A guess off the step's cubic is corrected at its arclength, to a point of the same branch.
 bool Continuation::correct_inside(Trial& trial, double at, double length) {
   const VecHandle expected = copy(trial.y);
-  return correct(trial, row_, row_value_ + at, row_) &&
-         weighted_norm(weights_, moved(trial.y, -1, expected)) <= off_the_curve * length;
+  return correct(trial, row_, row_value_ + at, row_) && distance(trial.y, expected) <= off_the_curve * length;
 }
 
 void Continuation::locate_events(Trial const& end, double length) {
@@ -72,10 +71,10 @@ std::string Continuation::events_of_corner(Trial const& end) {
     Trial trial = at(copy(std::abs(to - target) < std::abs(from - target) ? Vec(end.y) : Vec(anchor_.y)));
     set_last_entry(trial.y, target);
     const VecHandle guess = copy(trial.y);
-    const double most = 4 * weighted_norm(weights_, moved(end.y, -1, anchor_.y));  // it may turn back
+    const double most = 4 * distance(end.y, anchor_.y);  // it may turn back
     if (!correct(trial, parameter_row_, target, row_))
       miss(event + " at " + problem_.parameter_text(value), trial.outcome.reason);
-    else if (weighted_norm(weights_, moved(trial.y, -1, guess)) > most)
+    else if (distance(trial.y, guess) > most)
       miss(event + " at " + problem_.parameter_text(value), elsewhere);
     else
       emit(std::move(trial), 0, event);
@@ -225,7 +224,7 @@ void Continuation::reach(double value, std::string const& event, Place a, Place 
   const double slack = 0.05 * (b.at - a.at);
   if (good)
     good = place() > a.at - slack && place() < b.at + slack &&
-           weighted_norm(weights_, moved(trial.y, -1, expected)) <= off_the_curve * length;
+           distance(trial.y, expected) <= off_the_curve * length;
   if (!good) {
     auto along = reach_along(target, a, b, curve);
     if (!along) {
@@ -269,8 +268,7 @@ std::optional<Continuation::Trial> Continuation::reach_along(double target, Plac
     if (std::abs(value) <= value_error * std::max(1.0, std::abs(target))) {
       Trial exact = this->at(copy(trial.y));
       set_last_entry(exact.y, target);
-      const bool good = correct(exact, parameter_row_, target, row_) &&
-                        weighted_norm(weights_, moved(exact.y, -1, trial.y)) <= most;
+      const bool good = correct(exact, parameter_row_, target, row_) && distance(exact.y, trial.y) <= most;
       return good ? std::move(exact) : std::move(trial);
     }
     ((value < 0) == (a.value < 0) ? a : b) = {at, value};

@@ -294,9 +294,8 @@ def test_a_resonance_far_above_the_retained_harmonics_is_seen(highest):
 @SERIAL
 def test_estimates_do_not_remember_those_before_them():
     """A solution of the finer equations left its measure of forces behind: each estimate was the square of the last."""
-    near, own = np.diag([2.0, 1.5, 1.2]), np.diag([3.0, 2.0, 1.0])
-    near[[0, 1, 0, 2, 1, 2], [1, 0, 2, 0, 2, 1]] = [0.5, 0.5, 0.2, 0.2, 0.3, 0.3]
-    own[[0, 1, 0, 2, 1, 2], [1, 0, 2, 0, 2, 1]] = [0.6, 0.6, 0.3, 0.3, 0.4, 0.4]
+    near = np.array([[2.0, 0.5, 0.2], [0.5, 1.5, 0.3], [0.2, 0.3, 1.2]])
+    own = np.array([[3.0, 0.6, 0.3], [0.6, 2.0, 0.4], [0.3, 0.4, 1.0]])
     given = {"normal_stiffness": 1e10, "tangential_stiffness": 8e9, "friction_coefficient": 0.5, "normal_load": 1.0}
     pad = fw.Contact("coulomb_3d", np.eye(6)[3:], given)
     block = fw.Model(np.eye(6), np.block([[own + near, -near], [-near, near]]), None, [pad], MPI.COMM_SELF)

@@ -137,7 +137,6 @@ def test_unknowns_of_all_points_are_those_of_the_largest_set():
 
 
 @SERIAL
-@SERIAL
 @pytest.mark.parametrize("places", [48, 96, 128])
 def test_another_set_stays_on_the_branch(places):
     """Beside a fold Newton at the amplitude led from a smaller set's point to the second mode, at 45 rad/s."""
@@ -147,6 +146,7 @@ def test_another_set_stays_on_the_branch(places):
     assert branch["omega"].max() < 25.6
 
 
+@SERIAL
 def test_a_branch_that_cannot_be_had_so_accurately_says_what_limits_it(monkeypatch):
     monkeypatch.setattr(rules, "MOST_HARMONICS", 9)
     branch = fw.follow(mode(jenkins()), 0.1, 3.0, accuracy=1e-4)

@@ -184,19 +184,6 @@ class Model(Destroyable):
     def _mass(self) -> PETSc.Mat:
         return next(A for A, order, k in self._terms if (order, k) == (2, 0))
 
-    def form(self, order: int, q: npt.NDArray[np.complex128], n: int = 1) -> float:
-        """Re q^H A q of K (order 0), C (1) or M (2), from this rank's part of harmonic n's amplitudes q. Collective.
-
-        Of a sector in a wave A is sum_k A_k e^{-i k n theta}.
-        """
-        theta = 2 * np.pi * self.nodal_diameter / self.sectors
-        total = 0.0
-        for A, own, k in self._terms:
-            if own == order:
-                Aq = self._product(A, q.real) + 1j * self._product(A, q.imag)
-                total += float(np.real(np.exp(-1j * k * n * theta) * np.vdot(q, Aq)))
-        return float(self.comm.allreduce(total))
-
     def _product(self, A: PETSc.Mat, local: Array) -> Array:
         """This rank's part of A x, from its part of x. Collective."""
         x = PETSc.Vec().createWithArray(np.ascontiguousarray(local, dtype=float), comm=self.comm)

@@ -168,13 +168,17 @@ def _read_head(data: bytes) -> tuple[int, int] | None:
     return (length, checksum) if mark == _MARK and own == zlib.crc32(data[: _HEAD.size - 4]) else None
 
 
+def _record_at(file: BinaryIO, kept: _Kept, place: int, size: int) -> Record | None:
+    """Of a file as it was when it had `size` bytes; None where no whole record begins."""
+    file.seek(place)
+    head = _read_head(file.read(_HEAD.size))
+    return _read_record(file, kept, *head) if head is not None and head[0] <= size - place else None
+
+
 def first_record(path: Path) -> Record | None:
     """The record that a file begins with; None where it is spoilt."""
-    size = path.stat().st_size
     with path.open("rb") as file:
-        head = _read_head(file.read(_HEAD.size))
-        whole = head is not None and head[0] <= size - _HEAD.size
-        return _read_record(file, _Kept(file), *head) if whole and head is not None else None
+        return _record_at(file, _Kept(file), 0, path.stat().st_size)
 
 
 def read_records(path: Path) -> Iterator[tuple[int, Record]]:
@@ -189,9 +193,7 @@ def read_records(path: Path) -> Iterator[tuple[int, Record]]:
     with path.open("rb") as file:
         kept, place = _Kept(file), 0
         while place < size:
-            file.seek(place)
-            head = _read_head(file.read(_HEAD.size))
-            record = _read_record(file, kept, *head) if head is not None and head[0] <= size - place else None
+            record = _record_at(file, kept, place, size)
             if record is None:
                 _check_torn(file, path, place, size)
                 return

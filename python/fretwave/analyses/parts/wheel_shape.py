@@ -79,9 +79,10 @@ class WheelShape:
         labels, model = problem.harmonics.labels, problem.model
         q = complex_amplitudes(labels, problem.local_coefficients(y))[1]  # this rank's
         a = complex_amplitudes(labels, problem.coefficients_at(y, self.places))[1]
-        inertia = np.sqrt(model.comm.allreduce(np.linalg.norm(model.local_inertia(q)) ** 2))
-        held = self.stiffness * state["amplitude"] / (state["omega0"] ** 2 * inertia)
-        told = self.shape.told(a, model.form(2, q))
+        Mq = model.local_inertia(q)
+        square, modal = model.comm.allreduce(np.array([np.linalg.norm(Mq) ** 2, np.vdot(q, Mq).real]))
+        held = self.stiffness * state["amplitude"] / (state["omega0"] ** 2 * np.sqrt(square))
+        told = self.shape.told(a, float(modal))
         return {**told, "unfolding": float(held * np.linalg.norm(unfolding))}
 
 
