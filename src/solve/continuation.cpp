@@ -354,9 +354,17 @@ double Continuation::next_step(Trial const& trial, double length, double intende
 
 /// Whether the branch passes places again where it has been; it ends then. Each suspicion is confirmed by
 /// Newton on the plane through such a place, and three in a row are certainty: sheets may lie side by side.
+/// Pieces so short that corners lead from one to the next and back are no sheets: there the points are the
+/// same ones.
 bool Continuation::been_here(Trial const& trial) {
   const auto meeting = trail_.meeting(trial.y, trial.tangent);
   trail_.add(trial.y, trial.tangent);
+  circles_ = trail_.circles() ? circles_ + 1 : 0;
+  if (circles_ >= certain) {
+    finish("the branch turns in circles between corners at " + problem_.parameter_text(parameter_of(trial.y)),
+           false);
+    return true;
+  }
   if (!meeting || !passes(trial, *meeting)) {
     meetings_ = 0;
     return false;

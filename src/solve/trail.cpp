@@ -1,5 +1,6 @@
 #include "solve/trail.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "scramble.h"
@@ -11,6 +12,8 @@ namespace {
 constexpr size_t recent = 3;         // steps just made are near by nature
 constexpr double parallel = 0.98;    // cosine between directions of the same piece of a branch
 constexpr double nearness = 0.1;     // of a step's length: the chord's distance from a bent branch
+constexpr size_t round_trip = 16;    // steps at most of one round
+constexpr double again = 1e-3;       // of a step's length: the same point of it
 constexpr double same_place = 1e-9;  // relative
 
 /// Uniform in (-1, 1) by the entry's global number and the functional's.
@@ -58,6 +61,16 @@ void Trail::fill(Vec row, int functional) {
 
 bool Trail::same(Vec y, Projection const& place) {
   return length(minus(project(y), place)) <= same_place * (1 + length(place));
+}
+
+bool Trail::circles() const {
+  double shortest = INFINITY;
+  for (size_t back = 1; back <= round_trip && back < steps_.size(); ++back) {
+    auto const* then = &steps_[steps_.size() - 1 - back];
+    shortest = std::min(shortest, length(minus(then[1].y, then[0].y)));
+    if (back > 1 && length(minus(steps_.back().y, then->y)) < again * shortest) return true;
+  }
+  return false;
 }
 
 std::optional<Trail::Meeting> Trail::meeting(Vec y, Vec tangent) const {

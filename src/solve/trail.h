@@ -25,6 +25,8 @@ class Trail {
   void add(Vec y, Vec tangent) { steps_.push_back({project(y), project(tangent)}); }
   /// A meeting with an earlier part of the branch, at a point with its unit tangent. Collective.
   std::optional<Meeting> meeting(Vec y, Vec tangent) const;
+  /// Whether the last point is one of those shortly before it, far nearer than the steps since are long.
+  bool circles() const;
   /// Whether y is the remembered place. Collective.
   static bool same(Vec y, Projection const& place);
   static Projection project(Vec v);

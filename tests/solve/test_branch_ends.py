@@ -203,6 +203,27 @@ def test_a_mode_at_a_stiff_stop_is_the_bilinear_oscillator(comm):
     assert np.allclose(found, 2 / (1 + 1 / np.sqrt(101.0)), rtol=5e-3, atol=0)
 
 
+@pytest.mark.ranks(1)
+def test_a_branch_that_corners_lead_round_in_circles_ends(comm):
+    """Beside the third fold of a mode at a stop 2e5 times as stiff as its structure points repeated themselves."""
+    M = np.diag([0.75266934, 0.12267505])
+    K = np.array([[4.48768243, -2.13970772], [-2.13970772, 3.19642204]])
+    [pad] = stop(comm, 432405.97870515, gap=149.50153366).contacts
+    pad = fw.Contact("coulomb_3d", [[0.0, 1.0], [0.0, 0.0], [0.0, 0.0]], pad.parameters)
+    model = fw.Model(M, K, None, [pad], comm)
+    fw.balanced(model)
+    problem = mode_problem(model, range(16), 64, "EPMC", start="stuck")
+    step, reasons = 0.020097566843837237, []
+    for low in (14.0, 20.0, 30.0):  # which of them circle is decided by last digits
+        branch, points = follow(problem, low, 3485.7, initial=step, maximum=step, max_angle=0.437)
+        assert not branch.converged and max(p.parameter for p in points) == pytest.approx(245.282, rel=1e-5)
+        assert len(points) < 500
+        reasons.append(branch.reason)
+    assert any(
+        reason.startswith("the branch turns in circles between corners at amplitude 245.28") for reason in reasons
+    )
+
+
 def ways(comm):
     """Problems on the way to a response and to a mode whose stop is in touch."""
     problem, _ = response(stop(comm, 3.0), 1.0, (0.9, 0.91), range(4), 64)
