@@ -82,6 +82,19 @@ def test_without_friction_the_mode_at_rest_slides(tmp_path: Path, capfd, frictio
         np.testing.assert_allclose(closed, np.sqrt(squares[0]), rtol=SOLVED)
 
 
+def test_a_pair_without_friction_behind_its_gap_moves_no_number(tmp_path: Path, capfd) -> None:
+    """Far stiffer than the structure, it would make the second mode the first one if it were closed."""
+    behind = {f"normal_load = {N0}": "normal_load = 0.0\ngap = 1.0", f"coefficient = {MU}": "coefficient = 0.0"}
+    behind |= {f"normal_stiffness = {KN}": "normal_stiffness = 1e4"}
+    text = CASE
+    for old, new in behind.items():
+        assert old in text
+        text = text.replace(old, new)
+    assert call("check", put(tmp_path, text)) == 0
+    lowest = np.sqrt(np.linalg.eigvalsh(K)[0]) / 2 / np.pi
+    assert f"linear mode 1 with contact as at rest: {lowest:.6g} Hz" in capfd.readouterr().out
+
+
 def test_a_body_that_friction_alone_would_hold_keeps_its_number(tmp_path: Path, capfd) -> None:
     """A block of 10 kg slides without friction, 1 kg swings on it: not mode 1, the rigid motion, but the swing."""
     matrices = "M = [[10.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]\n"

@@ -83,9 +83,14 @@ class Contact:
         """Number of pairs."""
         return self.pairs.n_pairs
 
-    def closed(self) -> Contact:
-        """Every pair closed at rest and with friction, whatever its load, gap and friction."""
-        return replace(self, parameters={**self.parameters, **self.info.closing()})
+    def closed(self, which: npt.ArrayLike = True) -> Contact:
+        """Every pair closed at rest and with friction, whatever its load, gap and friction; others, if any, open.
+
+        Parameters
+        ----------
+        which : (n_pairs,) bool, optional
+        """
+        return replace(self, parameters={**self.parameters, **self.info.closing(which)})
 
     def stuck_stiffness(self) -> Array:
         """Of a stuck pair along each row of B [force/length], (n_pairs, components); infinite where nothing gives."""

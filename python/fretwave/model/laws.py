@@ -97,12 +97,18 @@ class LawInfo:
         """Values by the names of the parameters that have these roles; roles that the law lacks are left out."""
         return {str(self.named(role)): value for role, value in values.items() if self.named(role) is not None}
 
-    def closing(self) -> dict[str, float]:
-        """Parameters with which every pair is closed at rest and sticks, whatever its load, gap and friction."""
+    def closing(self, which: npt.ArrayLike = True) -> dict[str, Any]:
+        """Parameters with which pairs are closed at rest and stick, whatever their load, gap and friction; others open.
+
+        Parameters
+        ----------
+        which : (n_pairs,) bool, optional
+            By default all.
+        """
         # by a load, or where the law has none by an interference
-        gap = 0.0 if self.named(Role.LOAD) else -1.0
+        load, gap = np.where(which, 1.0, 0.0), np.where(which, 0.0 if self.named(Role.LOAD) else -1.0, 1.0)
         return self.with_roles(
-            {Role.LOAD: 1.0, Role.GAP: gap, Role.FRICTION_COEFFICIENT: 1.0, Role.FRICTION_LIMIT: 1.0}
+            {Role.LOAD: load, Role.GAP: gap, Role.FRICTION_COEFFICIENT: 1.0, Role.FRICTION_LIMIT: 1.0}
         )
 
     def stiffness_along(self, component: int) -> Role:

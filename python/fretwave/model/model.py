@@ -245,6 +245,18 @@ class Model(Destroyable):
             if rest.sliders is not None and contact.info.memory:  # also where this rank has no pair of it
                 law.place(self.local_sliders(rest.sliders)[k])
 
+    def closed_at_rest(self) -> list[npt.NDArray[np.bool_]]:
+        """Of each contact which pairs are closed at rest, (n_pairs,) bool. Collective.
+
+        All of a law without a normal direction.
+        """
+        found = []
+        for k, (contact, law, pairs) in enumerate(zip(self.contacts, self._laws, self._pairs)):
+            normal = contact.info.normal
+            closed = [normal is None or law.stuck_stiffness(normal, pair) > 0 for pair in range(len(pairs))]
+            found.append(self.share_pairs(k, np.array(closed, dtype=float)) > 0)
+        return found
+
     def sliders(self) -> dict[str, Array]:
         """Where the sliders of each contact with a memory stand at rest [length], (n_pairs, n_tangents). Collective."""
         found = {}

@@ -12,7 +12,7 @@ import scipy.sparse as sp
 
 from ...case.analysis import AnalysisSection
 from ...case.harmonic import HarmonicSection, nodal_diameter
-from ...model.contact import in_limit
+from ...model.contact import Contact, in_limit
 from .context import AnalysisContext
 
 if TYPE_CHECKING:
@@ -53,11 +53,20 @@ def limit_model(case: Case, comm: MPI.Comm, limit: str, diameters: int = 0) -> M
 
     For undamped modes: without damping by mode, which is of the case's own contacts.
     """
+    return _with_contacts(case, in_limit(case.contacts, limit), comm, diameters)
+
+
+def with_friction(case: Case, model: Model, diameters: int = 0) -> Model:
+    """The model of a case with friction in every pair that is closed at rest; the others are open. Collective."""
+    closed = [contact.closed(which) for contact, which in zip(case.contacts, model.closed_at_rest())]
+    return _with_contacts(case, closed, model.comm, diameters)
+
+
+def _with_contacts(case: Case, contacts: list[Contact], comm: MPI.Comm, diameters: int) -> Model:
     from ...case.build import build_model
 
     undamped = replace(case.tables, damping=None)
-    changed = replace(case, contacts=in_limit(case.contacts, limit), tables=undamped)
-    return build_model(changed, (), comm, nodal_diameter=diameters)
+    return build_model(replace(case, contacts=contacts, tables=undamped), (), comm, nodal_diameter=diameters)
 
 
 def closed_stiffness(context: AnalysisContext[AnalysisSection]) -> sp.csr_matrix:

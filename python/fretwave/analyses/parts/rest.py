@@ -14,7 +14,7 @@ from ...case.schema import PreloadSection
 from ...errors import InputError
 from ...model.contact import Contact
 from ...model.laws import Role, own_load
-from .asymptotes import MORE_MODES, closed_stiffness, limit_model, most_like
+from .asymptotes import MORE_MODES, closed_stiffness, limit_model, most_like, with_friction
 from .context import AnalysisContext
 
 if TYPE_CHECKING:
@@ -141,13 +141,14 @@ def _leader(context: AnalysisContext[AnalysisSection], mode: LinearMode) -> str:
 def modes_at_rest(context: AnalysisContext[AnalysisSection], count: int) -> list[LinearMode]:
     """Linear modes with the contact as it is at rest, by the numbers of stuck ones. Collective.
 
-    Pairs without friction slide, and may leave rigid motions: then those most like the modes with all pairs stuck.
+    Pairs without friction slide, and may leave rigid motions: then those most like the modes with friction in all pairs
+    that are closed at rest.
     """
     if not any(contact.never_sticks for contact in context.case.contacts):
         return context.linear_mode("stuck", count)
     from ...model.modes import linear_modes
 
-    with limit_model(context.case, context.comm, "stuck", nodal_diameter(context.analysis)) as model:
+    with with_friction(context.case, context.model, nodal_diameter(context.analysis)) as model:
         stuck = linear_modes(model, count)
     found = context.linear_mode("stuck", min(context.model.n_dof, count + MORE_MODES))
     return [most_like(context, found, mode) for mode in stuck]
