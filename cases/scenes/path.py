@@ -195,16 +195,18 @@ def jumps(run: Any, most: int = 4) -> list[str]:
 def _gap(run: Any, row: int, halvings: int = 14) -> float | None:
     """What is left of the chord between two rows after bisection towards its larger part, if much is left.
 
-    A branch that folds over within it is lost by bisection: it is walked then from one end to the other.
+    A branch that folds over within it is lost by bisection: it is walked then from one end to the other, and from the
+    first to the last where bisection may have gone over to another piece of it beside a fold.
     """
     eq = run.equations
-    ends = [run.state(row), run.state(row + 1)]
+    rows = ends = [run.state(row), run.state(row + 1)]
     size = np.linalg.norm(ends[0][0]) or 1.0
 
     def chord(a: Any, b: Any) -> float:
         return float(np.linalg.norm(a[0] - b[0]) / size + (abs(a[1] - b[1]) + abs(a[2] - b[2])) / abs(ends[0][2]))
 
-    whole, before = chord(*ends), run.state(row - 1) if row else None
+    first = before = run.state(row - 1) if row else None
+    whole = chord(*ends)
     for _ in range(halvings):
         found = distance(eq, *between(*ends, 0.5))
         if not found.found:
@@ -215,7 +217,8 @@ def _gap(run: Any, row: int, halvings: int = 14) -> float | None:
         ends = [ends[0], found.solution] if parts[0] >= parts[1] else [found.solution, ends[1]]
         if max(parts) < 0.02 * whole:
             return None
-    return None if before is not None and _walks(eq, before, *ends, chord) else max(parts)
+    ways = [(before, *ends), (first, *rows)] if before is not None and first is not None else []
+    return None if any(_walks(eq, *way, chord) for way in ways) else max(parts)
 
 
 def _walks(eq: Any, before: Any, here: Any, goal: Any, chord: Any, share: float = 1 / 40, most: int = 60) -> bool:
