@@ -354,8 +354,8 @@ double Continuation::next_step(Trial const& trial, double length, double intende
 
 /// Whether the branch passes places again where it has been; it ends then. Each suspicion is confirmed by
 /// Newton on the plane through such a place, and three in a row are certainty: sheets may lie side by side.
-/// Pieces so short that corners lead from one to the next and back are no sheets: there the points are the
-/// same ones.
+/// Pieces so short that corners lead from one to the next and back are no sheets: there points, or where they
+/// are, repeat themselves.
 bool Continuation::been_here(Trial const& trial) {
   const auto meeting = trail_.meeting(trial.y, trial.tangent);
   trail_.add(trial.y, trial.tangent);

@@ -14,6 +14,8 @@ constexpr double parallel = 0.98;    // cosine between directions of the same pi
 constexpr double nearness = 0.1;     // of a step's length: the chord's distance from a bent branch
 constexpr size_t round_trip = 16;    // steps at most of one round
 constexpr double again = 1e-3;       // of a step's length: the same point of it
+constexpr size_t rounds = 128;       // steps that lead nowhere ...
+constexpr double wound = 32;         // ... whose length is this many times how far they have been from here
 constexpr double same_place = 1e-9;  // relative
 
 /// Uniform in (-1, 1) by the entry's global number and the functional's.
@@ -64,13 +66,14 @@ bool Trail::same(Vec y, Projection const& place) {
 }
 
 bool Trail::circles() const {
-  double shortest = INFINITY;
-  for (size_t back = 1; back <= round_trip && back < steps_.size(); ++back) {
+  double shortest = INFINITY, path = 0, farthest = 0;
+  for (size_t back = 1; back <= rounds && back < steps_.size(); ++back) {
     auto const* then = &steps_[steps_.size() - 1 - back];
-    shortest = std::min(shortest, length(minus(then[1].y, then[0].y)));
-    if (back > 1 && length(minus(steps_.back().y, then->y)) < again * shortest) return true;
+    const double step = length(minus(then[1].y, then[0].y)), away = length(minus(steps_.back().y, then->y));
+    shortest = std::min(shortest, step), path += step, farthest = std::max(farthest, away);
+    if (back > 1 && back <= round_trip && away < again * shortest) return true;
   }
-  return false;
+  return steps_.size() > rounds && path > wound * farthest;
 }
 
 std::optional<Trail::Meeting> Trail::meeting(Vec y, Vec tangent) const {

@@ -25,7 +25,8 @@ class Trail {
   void add(Vec y, Vec tangent) { steps_.push_back({project(y), project(tangent)}); }
   /// A meeting with an earlier part of the branch, at a point with its unit tangent. Collective.
   std::optional<Meeting> meeting(Vec y, Vec tangent) const;
-  /// Whether the last point is one of those shortly before it, far nearer than the steps since are long.
+  /// Whether the last point is one of those shortly before it, far nearer than the steps since are long, or
+  /// the last steps together are far longer than they lead from it.
   bool circles() const;
   /// Whether y is the remembered place. Collective.
   static bool same(Vec y, Projection const& place);
