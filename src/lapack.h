@@ -5,6 +5,8 @@
 #include <type_traits>
 #include <vector>
 
+#include "flat_product.h"
+
 /// The BLAS and LAPACK routines in use, and the inverse made of two of them.
 extern "C" {
 double ddot_(int const*, double const*, int const*, double const*, int const*);
@@ -135,6 +137,16 @@ void multiply(char const* ops, std::array<int, 3> size, std::type_identity_t<T> 
               std::type_identity_t<T> beta, T* C, int lead) {
   if (size[0] == 0 || size[1] == 0) return;
   A.lead = std::max(A.lead, 1), B.lead = std::max(B.lead, 1);
+  if constexpr (std::is_floating_point_v<T>)
+    if (ops[0] == 'N' && ops[1] == 'N' && size[0] >= least_rows && size[0] <= most_rows &&
+        size[2] >= least_terms) {
+      for (int j = 0; j < size[1]; ++j)
+        for (int i = 0; i < size[0]; ++i) {
+          T& c = C[size_t(j) * lead + i];
+          c = beta == 0 ? 0 : beta * c;
+        }
+      return multiply_flat(size[0], size[1], size[2], alpha, A.data, A.lead, B.data, B.lead, C, lead);
+    }
   gemm(ops, size, alpha, A, B, beta, C, lead);
 }
 

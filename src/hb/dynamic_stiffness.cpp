@@ -171,8 +171,7 @@ void DynamicStiffness::accumulate(std::vector<complex> const& c, Blocked& A, Vec
   if (local == 0) return;
   WriteArray Y(y);
   if (exactly && A.split) return A.split.multiply_add(X.data(), Y.data(), m);
-  const double one = 1;
-  dgemm_("N", "N", &m, &local, &all, &one, X.data(), &m, A.dense.data(), &all, &one, Y.data(), &m);
+  lapack::multiply("NN", {m, local, all}, 1.0, {X.data(), m}, {A.dense.data(), all}, 1.0, Y.data(), m);
 }
 
 void DynamicStiffness::multiply_add(Exponents const& e, Vec x, Vec y, int order, bool exactly) {

@@ -1,4 +1,4 @@
-"""Sparse matrices times all coefficients of a dof at once, for numbers of them that fill registers or do not."""
+"""Matrices times all coefficients of a dof at once, for numbers of them that fill registers or do not."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from tolerances import ROUNDING
 import fretwave as fw
 
 N = 60  #: masses: sparse enough not to be held dense
+FULL = 135  #: of a dense model: columns by four, and three more
 OMEGA = 0.7  #: [rad/s]
 
 
@@ -24,21 +25,30 @@ def matrices() -> tuple[sp.csr_matrix, sp.csr_matrix, sp.csr_matrix]:
     return sp.diags([rng.uniform(1, 2, N)], [0]).tocsr(), C.tocsr(), K.tocsr()
 
 
+def full_matrices() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Mass, damping and stiffness without zeros."""
+    rng = np.random.default_rng(6)
+    M, C, K = ((A @ A.T) / FULL for A in rng.standard_normal((3, FULL, FULL)))
+    return M + np.eye(FULL), 0.1 * C, K + 3 * np.eye(FULL)
+
+
 @pytest.mark.ranks(1, 2, 3)
 @pytest.mark.parametrize(
     "orders", [[1], [1, 3], range(4), range(5), range(8), range(9), range(17), range(18), range(35)]
 )
-def test_dynamic_stiffness_of_every_harmonic(comm, orders):
+@pytest.mark.parametrize("of", [matrices, full_matrices])
+def test_dynamic_stiffness_of_every_harmonic(comm, orders, of):
     """K + i n w C - (n w)^2 M of each harmonic's q = qc - i qs, and its transpose."""
-    M, C, K = matrices()
+    M, C, K = of()
+    n_dof = M.shape[0]
     model = fw.Model(M, K, C, [], comm)
     harmonics = fw.Harmonics(orders, 128)
-    problem = fw.ForcedResponse(model, harmonics, {1: np.eye(N)[0]}, 1.0, 0, fw.linear_modes(model, 1)[0])
+    problem = fw.ForcedResponse(model, harmonics, {1: np.eye(n_dof)[0]}, 1.0, 0, fw.linear_modes(model, 1)[0])
     m = harmonics.block_size
-    q = np.random.default_rng(1).standard_normal((N, m))
+    q = np.random.default_rng(1).standard_normal((n_dof, m))
     y = problem.initial(OMEGA)
-    assert y.getSize() == N * m + 1
-    found = whole(problem.jacobian_product(y, unknowns(problem, np.append(q.ravel(), 0.0)))).reshape(N, m)
+    assert y.getSize() == n_dof * m + 1
+    found = whole(problem.jacobian_product(y, unknowns(problem, np.append(q.ravel(), 0.0)))).reshape(n_dof, m)
     expected, at = np.zeros_like(q), 0
     for n in orders:
         Z = K + 1j * n * OMEGA * C - (n * OMEGA) ** 2 * M
