@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,15 @@ def scenes(count: int, seed: int) -> Iterator[Scene]:
         yield (response if random.random() < 0.35 else free)(random, str(kind), f"{seed}_{n}_{kind}")
 
 
+def mixed(count: int, seed: int) -> Iterator[Scene]:
+    """Two or three contacts of different laws and sizes on one structure, between dofs and to the ground."""
+    for n in range(count):
+        random = np.random.default_rng([seed, n, 1])
+        kinds = [str(kind) for kind in random.choice(["tanh", "jenkins", "pad"], size=int(random.integers(2, 4)))]
+        make = response if random.random() < 0.35 else free
+        yield make(random, kinds, f"{seed}_{n}_{'_'.join(kinds)}")
+
+
 def log_uniform(random: Random, low: float, high: float) -> float:
     return float(np.exp(random.uniform(np.log(low), np.log(high))))
 
@@ -39,6 +49,22 @@ def structure(random: Random) -> tuple[Any, Any]:
     M = np.diag(mass)
     root = np.sqrt(np.diag(mass))
     return M, root @ (Q * values) @ Q.T @ root
+
+
+def contacts(random: Random, kinds: str | list[str], M: Any, K: Any) -> tuple[list[Contact], float]:
+    """A contact on the last dofs, or several, and the displacement at which a state first changes."""
+    if isinstance(kinds, str):
+        one, onset = contact(random, kinds, M, K)
+        return [one], onset
+    found, onsets = [], []
+    for k, kind in enumerate(kinds):
+        one, onset = contact(random, kind, M, K)
+        turned = np.roll(one.B, int(random.integers(len(M))), axis=1)
+        if one.components == 1 and random.random() < 0.5:  # between two dofs
+            turned = turned - np.roll(turned, 1, axis=1)
+        found.append(replace(one, name=f"{one.name}{k}", B=turned))
+        onsets.append(onset)
+    return found, min(onsets)
 
 
 def contact(random: Random, kind: str, M: Any, K: Any) -> tuple[Contact, float]:
@@ -73,8 +99,12 @@ def settings(random: Random) -> dict[str, Any]:
     return {"H": H, "samples": max(samples, 2 * H + 2), "step": step}
 
 
-def needs_mean(kind: str) -> dict[str, Any]:
+def needs_mean(kind: str | list[str]) -> dict[str, Any]:
     return {"retain": "all"} if kind == "stop" else {}
+
+
+def preload(kind: str | list[str]) -> bool | None:
+    return True if kind == "stop" or "pad" in kind else None
 
 
 def lowest(M: Any, K: Any) -> tuple[float, Any]:
@@ -83,30 +113,30 @@ def lowest(M: Any, K: Any) -> tuple[float, Any]:
     return float(np.sqrt(values[0])), shapes[:, 0]
 
 
-def free(random: Random, kind: str, name: str) -> Scene:
+def free(random: Random, kind: str | list[str], name: str) -> Scene:
     """A mode from below the first change of state to far above it, observed where it moves most without contact."""
     M, K = structure(random)
-    pair, onset = contact(random, kind, M, K)
+    pairs, onset = contacts(random, kind, M, K)
     w, shape = lowest(M, K)
     most = int(np.argmax(abs(shape)))
     first = onset * min(1e3, abs(shape[most] / shape[-1]))
     span = first * np.array([log_uniform(random, 1e-3, 0.3), log_uniform(random, 3.0, 300.0)])
     more = {**needs_mean(kind), "normalise": f"x{most}"}
     analysis = mode(str(random.choice(["CNM", "EPMC"])), amplitude=span, **settings(random), **more)
-    scene = Scene("at random", name, M, K, [pair], analysis, preload=True if kind in ("pad", "stop") else None)
+    scene = Scene("at random", name, M, K, pairs, analysis, preload=preload(kind))
     if kind == "stop" and first < 1e3 * onset:  # nothing touches yet
         scene.closed = [limits(w, None, 1e-9)]
     return scene
 
 
-def response(random: Random, kind: str, name: str) -> Scene:
+def response(random: Random, kind: str | list[str], name: str) -> Scene:
     """A response about the lowest mode without contact, 1 to 3 % damped, to a force on the last dof."""
     M, K = structure(random)
-    pair, onset = contact(random, kind, M, K)
+    pairs, onset = contacts(random, kind, M, K)
     w = lowest(M, K)[0]
     C = 2 * log_uniform(random, 0.01, 0.03) / w * K
     last = f"x{len(M) - 1}"
     level = onset * float(K[-1, -1]) * log_uniform(random, 1e-2, 3.0)
     more = {**needs_mean(kind), "force": {last: 1.0}, "observe": last, **settings(random)}
     analysis = forced(w * np.array([0.6, 1.5]), [level], **more)
-    return Scene("at random", name, M, K, [pair], analysis, C=C, preload=True if kind in ("pad", "stop") else None)
+    return Scene("at random", name, M, K, pairs, analysis, C=C, preload=preload(kind))

@@ -102,6 +102,7 @@ def main() -> int:
     parser.add_argument("--list", action="store_true", help="names and axes")
     parser.add_argument("--random", type=int, metavar="COUNT", help="as many scenes at random, not the list")
     parser.add_argument("--seed", type=int, default=1, help="of --random")
+    parser.add_argument("--mixed", action="store_true", help="of --random: two or three contacts in each")
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument(
         "--keep", type=Path, help="folder for cases and results; repeat one by `fretwave run KEEP/NAME/case.toml`"
@@ -110,7 +111,8 @@ def main() -> int:
     parser.add_argument("--go-on", action="store_true", help="take over what stands in the file of --json")
     args = parser.parse_args()
     wanted = [word for word in args.only.split(",") if word]
-    scenes = list(list_random.scenes(args.random, args.seed)) if args.random else all_scenes()
+    at_random = list_random.mixed if args.mixed else list_random.scenes
+    scenes = list(at_random(args.random, args.seed)) if args.random else all_scenes()
     scenes = [s for s in scenes if not args.quick or s.quick]
     scenes = [s for s in scenes if not wanted or any(w == s.name or w in s.name or w in s.axis for w in wanted)]
     if args.list:

@@ -237,7 +237,7 @@ std::string Continuation::complaint(Trial& trial, double length, bool may_shorte
                ? "the corrector lands on another branch"
                : "";
   if (angle < kink_angle) return "";
-  const int sign = orientation(trial.y, trial.tangent);
+  const int placed = beyond_corner(trial), sign = placed ? placed : orientation(trial.y, trial.tangent);
   if (sign == 0) return angle > steps_.max_angle ? "the branch turns too sharply" : "";
   if (sign < 0) {
     check(VecScale(trial.tangent, -1));

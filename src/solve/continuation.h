@@ -122,11 +122,13 @@ class Continuation {
   // Corners of the branch (corner.cpp)
   int determinant(Vec y, Vec row);
   int orientation(Vec y, Vec tangent);
+  int beyond_corner(Trial const&) const;
   bool leads_back(Trial const&);
   bool on_piece(std::uint64_t here, double at);
   std::optional<double> facet(double reach);
   bool fits(Vec y);
   double within_piece(Vec y, Vec tangent, double reach);
+  int into_piece(Vec y, Vec tangent, double reach);
   std::optional<Trial> turn_corner(double beyond, double reach);
 
   // What lies inside a step (events.cpp)

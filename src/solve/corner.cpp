@@ -2,17 +2,20 @@
 
 #include "lapack.h"
 #include "solve/continuation.h"
+#include "tuned.h"
 
 /// Corners of a branch: a sample changes state (stick, slip, contact) and the Jacobian jumps, J_B = J_A + c
 /// n^T, n the normal of the facet between the pieces A and B. The branch then turns by any angle, also by
 /// more than a right one, where no plane across the old tangent meets it again.
 ///
-/// Which way it goes on: the tangent t spans the null space of J, and det [J; t^T] has one sign on all pieces
-/// (Allgower & Georg, Introduction to Numerical Continuation Methods, 2003, section 14: det [J_B; n^T] = det
-/// [J_A; n^T], so that n . t_A and n . t_B agree). A single facet, and several passed at once by symmetry,
-/// have J_B t_A = c (n . t_A) and -J_A t_B = c (n . t_B): the right t_B is the one for which these two point
-/// the same way. Where different ones lie between, the determinant itself is asked, of systems that are small
-/// enough.
+/// Which way it goes on is seen from where things are: a solution behind the corner lies on the branch, which
+/// comes to it from there; just behind a facet one way along the new piece leads into it, the other out
+/// again. Where that does not tell: the tangent t spans the null space of J, and det [J; t^T] has one sign on
+/// all pieces (Allgower & Georg, Introduction to Numerical Continuation Methods, 2003, section 14: det [J_B;
+/// n^T] = det [J_A; n^T], so that n . t_A and n . t_B agree). A single facet, and several passed at once by
+/// symmetry, have J_B t_A = c (n . t_A) and -J_A t_B = c (n . t_B): the right t_B is the one for which these
+/// two point the same way. Where different ones lie between, the determinant itself is asked, of systems that
+/// are small enough. It deceives at a branch point, and where pieces are passed that nothing shows.
 namespace fretwave::solve {
 
 namespace {
@@ -27,6 +30,10 @@ constexpr double shortest = 1e-13;       // length of a piece that can be told f
 constexpr double no_corner = 1e-6;       // 1 - cosine of the angle between the tangents
 constexpr double no_force = 1e-3;        // of a tangent on the other piece, in forces that act
 constexpr int halvings = 60;
+
+const Tuned surely_in("branch_surely_in", 100,
+                      "times as far within a piece one way as the other: it begins here");
+const Tuned meets("branch_meets", 0.1, "of the piece behind a corner: by which it may miss the one before");
 
 struct Entry {
   PetscInt row, col;
@@ -76,6 +83,21 @@ int Continuation::orientation(Vec y, Vec tangent) {
   return std::abs(cosine) >= one_facet ? by_products : 0;
 }
 
+/// +1: a trial lies along its tangent behind a corner that is ahead along the anchor's; -1: against it; 0:
+/// they do not meet so. A step so short is two straight pieces, y - y_anchor = r t_anchor + s t: the branch
+/// leads from where they meet to the trial, whatever determinants say. (These change their sign at a branch
+/// point, too, and where pieces are passed that are shorter than can be seen.)
+int Continuation::beyond_corner(Trial const& trial) const {
+  const VecHandle chord = moved(trial.y, -1, anchor_.y);
+  const double across = dot(row_, trial.tangent), along_first = dot(row_, chord),
+               along = dot(weighted(weights_, trial.tangent), chord), turned = 1 - across * across;
+  const double s = (along - across * along_first) / turned, r = (along_first - across * along) / turned;
+  check(VecAXPY(chord, -r, anchor_.tangent));
+  check(VecAXPY(chord, -s, trial.tangent));
+  const double missed = weighted_norm(weights_, chord), length = std::abs(s);
+  return missed <= meets * length && r >= -meets * length ? (s > 0 ? 1 : -1) : 0;
+}
+
 /// Whether a trial's tangent runs against the branch: an older piece of it, or another branch. Asked of small
 /// systems, where a determinant costs less than a Newton step.
 bool Continuation::leads_back(Trial const& trial) {
@@ -117,6 +139,16 @@ double Continuation::within_piece(Vec y, Vec tangent, double reach) {
   return reach / 2;
 }
 
+/// +1: `tangent` leads on into the piece that begins just before y, -1: back out of it; 0: it cannot be told,
+/// as where pieces are shorter than `reach`.
+int Continuation::into_piece(Vec y, Vec tangent, double reach) {
+  const VecHandle back = copy(tangent);
+  check(VecScale(back, -1));
+  const double ahead = within_piece(y, tangent, reach), behind = within_piece(y, back, reach);
+  if (std::max(ahead, behind) < reach || surely_in * std::min(ahead, behind) > reach) return 0;
+  return ahead > behind ? 1 : -1;
+}
+
 /// The branch behind a corner that lies just before `beyond`, at most `reach` from it. The tangent's
 /// extension beyond it is off the branch, but it lies on the piece behind: its Jacobian gives that piece's
 /// tangent, along which Newton is closed.
@@ -130,7 +162,8 @@ std::optional<Continuation::Trial> Continuation::turn_corner(double beyond, doub
   check(VecScale(tangent, 1 / size));
   const bool straight = dot(row_, tangent) > 1 - no_corner && fits(there);
   if (straight && on_piece(problem_.piece(anchor_.y), beyond)) return {};
-  const int sign = straight ? 1 : orientation(there, tangent);
+  const int placed = straight ? 1 : into_piece(there, tangent, reach);
+  const int sign = placed ? placed : orientation(there, tangent);
   if (sign == 0) return {};
   check(VecScale(tangent, sign));
   const double on = within_piece(there, tangent, reach);
@@ -140,7 +173,7 @@ std::optional<Continuation::Trial> Continuation::turn_corner(double beyond, doub
   if (!correct(trial, row, dot(row, guess), row)) return {};
   if (!(distance(trial.y, guess) <= beyond + on)) return {};
   if (!(dot(row, trial.tangent) >= std::cos(steps_.max_angle))) return {};
-  if (!straight && orientation(trial.y, trial.tangent) < 0) return {};
+  if (!placed && orientation(trial.y, trial.tangent) < 0) return {};
   return trial;
 }
 
