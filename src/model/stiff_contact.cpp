@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <map>
 
 #include "model/phases.h"
 #include "tuned.h"
@@ -51,27 +53,105 @@ std::vector<double> stiffness_at(Mat B, Mat K) {
   return own;
 }
 
+/// A row of B by its columns.
+using SparseRow = std::map<PetscInt, double>;
+
+double largest(SparseRow const& row) {
+  double most = 0;
+  for (auto const& [col, value] : row) most = std::max(most, std::abs(value));
+  return most;
+}
+
+/// Rows that say no more than those before them, as two dampers on one dof do: rigid both, they would make
+/// the saddle singular. By elimination, a pivot's row without the columns of those before.
+class Independent {
+ public:
+  /// Whether it is one more.
+  bool takes(SparseRow row) {
+    const double size = largest(row);
+    for (auto at = next_pivot(row); at != row.end(); at = next_pivot(row)) {
+      const double times = at->second;
+      for (auto const& [col, value] : pivots_[order_.at(at->first)]) row[col] -= times * value;
+      row.erase(at);
+    }
+    std::erase_if(row, [&](auto const& entry) { return !(std::abs(entry.second) > nothing * size); });
+    if (row.empty()) return false;
+    const auto pivot =
+        std::ranges::max_element(row, {}, [](auto const& entry) { return std::abs(entry.second); });
+    const auto [col, value] = *pivot;
+    for (auto& entry : row) entry.second /= value;
+    order_[col] = pivots_.size();
+    pivots_.push_back(std::move(row));
+    return true;
+  }
+
+ private:
+  static constexpr double nothing = 1e-10;  // of a row's largest entry: rounding
+
+  /// The entry in the column of the earliest pivot.
+  SparseRow::iterator next_pivot(SparseRow& row) const {
+    auto first = row.end();
+    size_t least = pivots_.size();
+    for (auto at = row.begin(); at != row.end(); ++at)
+      if (const auto found = order_.find(at->first); found != order_.end() && found->second < least)
+        least = found->second, first = at;
+    return first;
+  }
+
+  std::vector<SparseRow> pivots_;
+  std::map<PetscInt, size_t> order_;  ///< of the pivots, by column
+};
+
+struct Entry {
+  PetscInt row, col;
+  double value;
+};
+
+/// Of rigid rows, those of this rank that are independent of all before them. Collective.
+std::vector<PetscInt> independent(Mat B, std::vector<PetscInt> const& rigid, Independent& known) {
+  MPI_Comm comm;
+  PetscInt begin, end;
+  check(PetscObjectGetComm(reinterpret_cast<PetscObject>(B), &comm));
+  check(MatGetOwnershipRange(B, &begin, &end));
+  std::vector<Entry> mine;
+  for_entries(B, [&](PetscInt row, PetscInt col, double value) {
+    if (value != 0 && std::ranges::binary_search(rigid, row)) mine.push_back({row, col, value});
+  });
+  std::map<PetscInt, SparseRow> rows;
+  for (Entry const& e : gathered(std::span<Entry const>(mine), comm)) rows[e.row][e.col] = e.value;
+  std::vector<PetscInt> out;
+  for (auto& [number, row] : rows)
+    if (known.takes(std::move(row)) && number >= begin && number < end) out.push_back(number);
+  return out;
+}
+
 }  // namespace
 
 StiffContact::StiffContact(Model const& model, Mat K) {
   std::vector<MatHandle> parts;
   const PetscInt copies = model.travelling() ? 2 : 1;
+  Independent known;
   for (auto const& contact : model.contacts()) {
     const MatHandle B = real_form(maps_of(contact), model.theta(), model.travelling());
     const auto own = stiffness_at(B, K);
-    PetscInt begin, counts[2] = {};
+    PetscInt begin;
     check(MatGetOwnershipRange(B, &begin, nullptr));
-    std::vector<PetscInt> rows;
+    std::vector<PetscInt> stiff, rigid, rows;
     auto& taken = taken_[&contact];
     const int d = contact.law->components();
+    const auto stiffness = [&](PetscInt row) {
+      return contact.law->stuck_stiffness(int(row % d), int(row / d));
+    };
     for (int row = 0; row < d * contact.law->pairs(); ++row) {
-      const double k = contact.law->stuck_stiffness(row % d, row / d);
+      const double k = stiffness(row);
       taken.push_back(k > far_stiffer * own[size_t(row * copies)]);
-      for (PetscInt copy = 0; taken.back() && copy < copies; ++copy) {
-        rows.push_back(begin + row * copies + copy), compliance_.push_back(1 / k);
-        ++counts[0], counts[1] += std::isinf(k) ? 1 : 0;
-      }
+      for (PetscInt copy = 0; taken.back() && copy < copies; ++copy)
+        (std::isinf(k) ? rigid : stiff).push_back(begin + row * copies + copy);
     }
+    rigid = independent(B, rigid, known);
+    std::ranges::merge(stiff, rigid, std::back_inserter(rows));
+    for (PetscInt row : rows) compliance_.push_back(1 / stiffness((row - begin) / copies));
+    PetscInt counts[2] = {PetscInt(rows.size()), PetscInt(rigid.size())};
     MPI_Allreduce(MPI_IN_PLACE, counts, 2, MPIU_INT, MPI_SUM, model.comm());
     if (counts[0] > 0) parts.push_back(rows_of(B, rows));
     rows_ += counts[0], rigid_ += counts[1];

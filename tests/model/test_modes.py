@@ -63,6 +63,19 @@ def test_a_mass_however_large_that_rigid_contact_holds_does_not_move(comm, mass)
     assert found[:, [1, 3]].max() <= ROUNDING
 
 
+def test_rigid_contact_that_says_nothing_more_is_left_out(comm):
+    """Two dampers on one dof, the second by a factor; three round a loop of dofs, of which two hold them together."""
+    M, K = np.diag([1.0, 3.0, 2.0, 0.5, 3.0]), chain(5, 40.0, 2.0)
+    loop = np.array([[1.0, -1.0, 0.0, 0.0, 0.0], [0.0, 1.0, -1.0, 0.0, 0.0], [1.0, 0.0, -1.0, 0.0, 0.0]])
+    contacts = [friction(np.eye(5)[[3]]), friction(2.0 * np.eye(5)[[3]], name="again"), friction(loop, name="loop")]
+    free = np.array([[1.0, 1.0, 1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 0.0, 1.0]])
+    expected = scipy.linalg.eigh(free @ K @ free.T, free @ M @ free.T)
+    modes = fw.linear_modes(fw.Model(M, K, None, contacts, comm), 5, "stuck")
+    assert [mode.omega for mode in modes] == pytest.approx(np.sqrt(expected[0]), rel=SOLVED)
+    found = np.abs([mode.shape for mode in modes])
+    np.testing.assert_allclose(found, np.abs(expected[1].T @ free), atol=SOLVED)
+
+
 def test_elastic_contact_adds_its_stiffness_when_stuck(comm):
     """A closed contact of stiffness kt on each mass: eigenvalues of K + kt."""
     law = LinearLaw(0.0, 0.0)
