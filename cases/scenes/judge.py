@@ -193,7 +193,7 @@ def _points(run: Run, verdict: Verdict) -> list[str]:
         for key in ("omega", "zeta", "motion", "balance"):
             verdict.worst[key] = max(verdict.worst.get(key, 0.0), getattr(found, key))
         wrong = errors(run, row, found)
-        if wrong:
+        if wrong and run.method != "forced":
             wrong = errors(run, row, found, last_digits(run, row, found))
         if wrong and (worst is None or found.motion > worst[1].motion):
             worst = (row, found, wrong)

@@ -217,7 +217,7 @@ def _gap(run: Any, row: int, halvings: int = 14) -> float | None:
         ends = [ends[0], found.solution] if parts[0] >= parts[1] else [found.solution, ends[1]]
         if max(parts) < 0.02 * whole:
             return None
-    ways = [(before, *ends), (first, *rows)] if before is not None and first is not None else []
+    ways = [(start, *way) for start, way in ((before, ends), (first, rows)) if start is not None]
     return None if any(_walks(eq, *way, chord) for way in ways) else max(parts)
 
 

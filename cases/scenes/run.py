@@ -111,6 +111,8 @@ def main() -> int:
     parser.add_argument("--go-on", action="store_true", help="take over what stands in the file of --json")
     args = parser.parse_args()
     wanted = [word for word in args.only.split(",") if word]
+    if args.mixed and not args.random:
+        parser.error("--mixed goes with --random")
     at_random = list_random.mixed if args.mixed else list_random.scenes
     scenes = list(at_random(args.random, args.seed)) if args.random else all_scenes()
     scenes = [s for s in scenes if not args.quick or s.quick]

@@ -237,7 +237,7 @@ std::string Continuation::complaint(Trial& trial, double length, bool may_shorte
                ? "the corrector lands on another branch"
                : "";
   if (angle < kink_angle) return "";
-  const int placed = beyond_corner(trial), sign = placed ? placed : orientation(trial.y, trial.tangent);
+  const int sign = beyond_corner(trial) ? 1 : orientation(trial.y, trial.tangent);
   if (sign == 0) return angle > steps_.max_angle ? "the branch turns too sharply" : "";
   if (sign < 0) {
     check(VecScale(trial.tangent, -1));
@@ -256,7 +256,7 @@ std::optional<Continuation::Trial> Continuation::turn_next_corner(double& length
     length = before_end * *end;
     return {};
   }
-  return turned(turn_corner(*end, std::min<double>(length, kink_length)), length);
+  return turned(turn_corner(*end, std::min<double>(length, kink_length), true), length);
 }
 
 std::optional<Continuation::Trial> Continuation::turned(std::optional<Trial> behind, double& length) {
@@ -310,7 +310,7 @@ std::optional<Continuation::Trial> Continuation::attempt(double& length, bool wa
   if (may_shorten) return {};
   if (!wary)
     if (auto behind = turn_next_corner(length)) return behind;
-  return turned(turn_corner(length, length), length);  // one that no piece's number tells of
+  return turned(turn_corner(length, length, false), length);  // one that no piece's number tells of
 }
 
 /// One accepted step from the anchor; halves the length on failure or when the branch bends too much. After a

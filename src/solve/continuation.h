@@ -122,14 +122,14 @@ class Continuation {
   // Corners of the branch (corner.cpp)
   int determinant(Vec y, Vec row);
   int orientation(Vec y, Vec tangent);
-  int beyond_corner(Trial const&) const;
+  bool beyond_corner(Trial const&) const;
   bool leads_back(Trial const&);
   bool on_piece(std::uint64_t here, double at);
   std::optional<double> facet(double reach);
   bool fits(Vec y);
   double within_piece(Vec y, Vec tangent, double reach);
   int into_piece(Vec y, Vec tangent, double reach);
-  std::optional<Trial> turn_corner(double beyond, double reach);
+  std::optional<Trial> turn_corner(double beyond, double reach, bool seen);
 
   // What lies inside a step (events.cpp)
   bool correct_inside(Trial&, double at, double length);

@@ -83,19 +83,19 @@ int Continuation::orientation(Vec y, Vec tangent) {
   return std::abs(cosine) >= one_facet ? by_products : 0;
 }
 
-/// +1: a trial lies along its tangent behind a corner that is ahead along the anchor's; -1: against it; 0:
-/// they do not meet so. A step so short is two straight pieces, y - y_anchor = r t_anchor + s t: the branch
-/// leads from where they meet to the trial, whatever determinants say. (These change their sign at a branch
-/// point, too, and where pieces are passed that are shorter than can be seen.)
-int Continuation::beyond_corner(Trial const& trial) const {
-  const VecHandle chord = moved(trial.y, -1, anchor_.y);
-  const double across = dot(row_, trial.tangent), along_first = dot(row_, chord),
-               along = dot(weighted(weights_, trial.tangent), chord), turned = 1 - across * across;
-  const double s = (along - across * along_first) / turned, r = (along_first - across * along) / turned;
+/// Whether a trial lies along its tangent behind a corner that is ahead along the anchor's. A step so short
+/// is two straight pieces, y - y_anchor = r t_anchor + s t: the branch leads from where they meet to the
+/// trial, whatever determinants say. (These change their sign at a branch point, too, and where pieces are
+/// passed that are shorter than can be seen.) In the anchor's metric, which does not see the mean.
+bool Continuation::beyond_corner(Trial const& trial) const {
+  const VecHandle chord = moved(trial.y, -1, anchor_.y), row = weighted(weights_, trial.tangent);
+  const double across = dot(row_, trial.tangent), square = dot(row, trial.tangent),
+               along_first = dot(row_, chord), along = dot(row, chord), turned = square - across * across;
+  const double s = (along - across * along_first) / turned,
+               r = (square * along_first - across * along) / turned;
   check(VecAXPY(chord, -r, anchor_.tangent));
   check(VecAXPY(chord, -s, trial.tangent));
-  const double missed = weighted_norm(weights_, chord), length = std::abs(s);
-  return missed <= meets * length && r >= -meets * length ? (s > 0 ? 1 : -1) : 0;
+  return s > 0 && r >= -meets * s && weighted_norm(weights_, chord) <= meets * s * std::sqrt(turned);
 }
 
 /// Whether a trial's tangent runs against the branch: an older piece of it, or another branch. Asked of small
@@ -149,10 +149,10 @@ int Continuation::into_piece(Vec y, Vec tangent, double reach) {
   return ahead > behind ? 1 : -1;
 }
 
-/// The branch behind a corner that lies just before `beyond`, at most `reach` from it. The tangent's
-/// extension beyond it is off the branch, but it lies on the piece behind: its Jacobian gives that piece's
-/// tangent, along which Newton is closed.
-std::optional<Continuation::Trial> Continuation::turn_corner(double beyond, double reach) {
+/// The branch behind a corner that lies just before `beyond`, at most `reach` from it; `seen` where a piece
+/// ends there. The tangent's extension beyond it is off the branch, but it lies on the piece behind: its
+/// Jacobian gives that piece's tangent, along which Newton is closed.
+std::optional<Continuation::Trial> Continuation::turn_corner(double beyond, double reach, bool seen) {
   const VecHandle there = moved(anchor_.y, beyond, anchor_.tangent);
   VecHandle tangent = copy(anchor_.tangent);
   newton_.system().close(row_, 0);
@@ -162,7 +162,7 @@ std::optional<Continuation::Trial> Continuation::turn_corner(double beyond, doub
   check(VecScale(tangent, 1 / size));
   const bool straight = dot(row_, tangent) > 1 - no_corner && fits(there);
   if (straight && on_piece(problem_.piece(anchor_.y), beyond)) return {};
-  const int placed = straight ? 1 : into_piece(there, tangent, reach);
+  const int placed = straight ? 1 : seen ? into_piece(there, tangent, reach) : 0;
   const int sign = placed ? placed : orientation(there, tangent);
   if (sign == 0) return {};
   check(VecScale(tangent, sign));

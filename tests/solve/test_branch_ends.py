@@ -212,9 +212,11 @@ def options(**values):
     table = PETSc.Options()
     for name, value in values.items():
         table[name] = value
-    yield
-    for name in values:
-        table.delValue(name)
+    try:
+        yield
+    finally:
+        for name in values:
+            table.delValue(name)
 
 
 CIRCLING = "the branch turns in circles between corners at amplitude "

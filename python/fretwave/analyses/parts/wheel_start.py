@@ -128,6 +128,7 @@ def _family(context: AnalysisContext[ModeAnalysis], mode: LinearMode) -> ModeAna
     named = analysis.model_copy(update={"nodal_diameter": diameters})
     count = min(wheel.unit, analysis.linear_mode // wheel.sectors + MORE_FAMILIES)
     with tuned_sector(context.of(named)) as sector:
+        rest_state(sector)  # numbers are those of the pairs that it closes
         modes = modes_at_rest(sector, count)
     shares = [abs((m.shape - 1j * m.imaginary) @ (M @ waves[diameters])) for m in modes]
     return named.model_copy(update={"linear_mode": 1 + int(np.argmax(shares))})
