@@ -28,7 +28,8 @@ struct Point {
 };
 
 /// Pseudo-arclength continuation of a problem's branch: tangent predictor, SNES corrector on the bordered
-/// system (Keller 1977), corners passed by the orientation of Allgower & Georg (2003).
+/// system (Keller 1977), corners passed by where points lie, or by the orientation of Allgower & Georg
+/// (2003).
 class Continuation {
  public:
   /// What `restore` needs to go on: the last anchor, the one before it, and how many points of the step after
