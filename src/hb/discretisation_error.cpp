@@ -266,7 +266,7 @@ void DiscretisationError::finish(Vec point, Vec row, double residual, std::span<
                           PetscInt(most_steps), PETSC_DEFAULT));
   VecHandle whole = sum(x), y = solve::moved(point, 1, whole);
   again_->system().close(row, solve::dot(row, point));
-  const bool found = again_->solve(y, solve::Effort::plain).converged;
+  const bool found = again_->solve(y, solve::Effort::brief).converged;
   check(VecAXPY(y, -1, point));
   if (!found || solve::norm(y) > astray * solve::norm(whole)) return;
   check(VecAXPY(y, -1, whole));
