@@ -10,8 +10,8 @@ namespace fretwave::lapack {
 
 namespace {
 
-constexpr int bytes =
-    32;  // of a register of AVX2; GCC 12 keeps wider ones in memory (hb/blocked_product.cpp)
+// Of a register of AVX2; GCC 12 keeps wider ones in memory (hb/blocked_product.cpp).
+constexpr int bytes = 32;
 
 template <class Real>
 constexpr int width = bytes / int(sizeof(Real));
@@ -46,7 +46,9 @@ FRETWAVE_INLINE void dot_all(Real const* A, size_t step, int m, int k, Real cons
 
 template <class Real>
 FRETWAVE_INLINE void flat(int m, int n, int k, Real alpha, Real const* A, size_t lead_a, Real const* B,
-                          size_t lead_b, Real* C, size_t lead_c) {
+                          size_t lead_b, Real beta, Real* C, size_t lead_c) {
+  for (int j = 0; j < n; ++j)
+    for (int i = 0; i < m; ++i) C[j * lead_c + i] = beta == 0 ? 0 : beta * C[j * lead_c + i];
   const size_t step = size_t((m + width<Real> - 1) / width<Real>) * width<Real>;
   std::vector<Real> in(step * k);  // filled up with zeros
   for (int l = 0; l < k; ++l)
@@ -61,14 +63,14 @@ FRETWAVE_INLINE void flat(int m, int n, int k, Real alpha, Real const* A, size_t
 
 FRETWAVE_VECTORISE
 void multiply_flat(int m, int n, int k, double alpha, double const* A, int lead_a, double const* B,
-                   int lead_b, double* C, int lead_c) {
-  flat(m, n, k, alpha, A, size_t(lead_a), B, size_t(lead_b), C, size_t(lead_c));
+                   int lead_b, double beta, double* C, int lead_c) {
+  flat(m, n, k, alpha, A, size_t(lead_a), B, size_t(lead_b), beta, C, size_t(lead_c));
 }
 
 FRETWAVE_VECTORISE
 void multiply_flat(int m, int n, int k, float alpha, float const* A, int lead_a, float const* B, int lead_b,
-                   float* C, int lead_c) {
-  flat(m, n, k, alpha, A, size_t(lead_a), B, size_t(lead_b), C, size_t(lead_c));
+                   float beta, float* C, int lead_c) {
+  flat(m, n, k, alpha, A, size_t(lead_a), B, size_t(lead_b), beta, C, size_t(lead_c));
 }
 
 }  // namespace fretwave::lapack

@@ -5,13 +5,13 @@ namespace fretwave::lapack {
 /// Rows of a flat product, and how many terms make it worth the way around the BLAS.
 constexpr int least_rows = 3, most_rows = 16, least_terms = 128;
 
-/// C (m x n) += alpha A B, over k, column-major, of few rows: the coefficients of a dof, innermost. A BLAS
-/// packs B anew for every product, which for so few rows takes as long as the product: of 2304 x 2304 entries
-/// with 15 rows OpenBLAS takes 14.2 ms and this 9.1, of floats 8 to 12 and 4.2 (one thread, AVX2; with 32
-/// rows both are alike).
+/// C (m x n) = beta C + alpha A B, over k, column-major, of few rows: the coefficients of a dof, innermost. A
+/// BLAS packs B anew for every product, which for so few rows takes as long as the product: of 2304 x 2304
+/// entries with 15 rows OpenBLAS takes 14.2 ms and this 9.1, of floats 8 to 12 and 4.2 (one thread, AVX2;
+/// with 32 rows both are alike).
 void multiply_flat(int m, int n, int k, double alpha, double const* A, int lead_a, double const* B,
-                   int lead_b, double* C, int lead_c);
+                   int lead_b, double beta, double* C, int lead_c);
 void multiply_flat(int m, int n, int k, float alpha, float const* A, int lead_a, float const* B, int lead_b,
-                   float* C, int lead_c);
+                   float beta, float* C, int lead_c);
 
 }  // namespace fretwave::lapack

@@ -139,14 +139,8 @@ void multiply(char const* ops, std::array<int, 3> size, std::type_identity_t<T> 
   A.lead = std::max(A.lead, 1), B.lead = std::max(B.lead, 1);
   if constexpr (std::is_floating_point_v<T>)
     if (ops[0] == 'N' && ops[1] == 'N' && size[0] >= least_rows && size[0] <= most_rows &&
-        size[2] >= least_terms) {
-      for (int j = 0; j < size[1]; ++j)
-        for (int i = 0; i < size[0]; ++i) {
-          T& c = C[size_t(j) * lead + i];
-          c = beta == 0 ? 0 : beta * c;
-        }
-      return multiply_flat(size[0], size[1], size[2], alpha, A.data, A.lead, B.data, B.lead, C, lead);
-    }
+        size[2] >= least_terms)
+      return multiply_flat(size[0], size[1], size[2], alpha, A.data, A.lead, B.data, B.lead, beta, C, lead);
   gemm(ops, size, alpha, A, B, beta, C, lead);
 }
 

@@ -172,6 +172,18 @@ void for_entries(Mat A, Visit visit) {
   }
 }
 
+struct MatEntry {
+  PetscInt row, col;
+  double value;
+};
+
+/// The entries of this rank's rows.
+inline std::vector<MatEntry> entries(Mat A) {
+  std::vector<MatEntry> out;
+  for_entries(A, [&](PetscInt row, PetscInt col, double value) { out.push_back({row, col, value}); });
+  return out;
+}
+
 /// A count as MPI, BLAS and MUMPS take it; `InputError` where it is beyond them. What all ranks count alike
 /// is refused by all.
 inline int as_int(PetscInt64 count, char const* what) {

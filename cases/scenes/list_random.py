@@ -21,8 +21,7 @@ def scenes(count: int, seed: int) -> Iterator[Scene]:
     """Scene n of a seed is the same whatever the count."""
     for n in range(count):
         random = np.random.default_rng([seed, n])
-        kind = random.choice(["tanh", "jenkins", "pad", "stop"])
-        yield (response if random.random() < 0.35 else free)(random, str(kind), f"{seed}_{n}_{kind}")
+        yield scene(random, [str(random.choice(["tanh", "jenkins", "pad", "stop"]))], f"{seed}_{n}")
 
 
 def mixed(count: int, seed: int) -> Iterator[Scene]:
@@ -30,8 +29,12 @@ def mixed(count: int, seed: int) -> Iterator[Scene]:
     for n in range(count):
         random = np.random.default_rng([seed, n, 1])
         kinds = [str(kind) for kind in random.choice(["tanh", "jenkins", "pad"], size=int(random.integers(2, 4)))]
-        make = response if random.random() < 0.35 else free
-        yield make(random, kinds, f"{seed}_{n}_{'_'.join(kinds)}")
+        yield scene(random, kinds, f"{seed}_{n}")
+
+
+def scene(random: Random, kinds: list[str], name: str) -> Scene:
+    """One in three a response, the others modes."""
+    return (response if random.random() < 0.35 else free)(random, kinds, "_".join([name, *kinds]))
 
 
 def log_uniform(random: Random, low: float, high: float) -> float:
@@ -51,10 +54,10 @@ def structure(random: Random) -> tuple[Any, Any]:
     return M, root @ (Q * values) @ Q.T @ root
 
 
-def contacts(random: Random, kinds: str | list[str], M: Any, K: Any) -> tuple[list[Contact], float]:
-    """A contact on the last dofs, or several, and the displacement at which a state first changes."""
-    if isinstance(kinds, str):
-        one, onset = contact(random, kinds, M, K)
+def contacts(random: Random, kinds: list[str], M: Any, K: Any) -> tuple[list[Contact], float]:
+    """A contact on the last dofs, or several anywhere, and the displacement at which a state first changes."""
+    if len(kinds) == 1:
+        one, onset = contact(random, kinds[0], M, K)
         return [one], onset
     found, onsets = [], []
     for k, kind in enumerate(kinds):
@@ -99,12 +102,12 @@ def settings(random: Random) -> dict[str, Any]:
     return {"H": H, "samples": max(samples, 2 * H + 2), "step": step}
 
 
-def needs_mean(kind: str | list[str]) -> dict[str, Any]:
-    return {"retain": "all"} if kind == "stop" else {}
+def needs_mean(kinds: list[str]) -> dict[str, Any]:
+    return {"retain": "all"} if "stop" in kinds else {}
 
 
-def preload(kind: str | list[str]) -> bool | None:
-    return True if kind == "stop" or "pad" in kind else None
+def preload(kinds: list[str]) -> bool | None:
+    return True if {"pad", "stop"} & set(kinds) else None
 
 
 def lowest(M: Any, K: Any) -> tuple[float, Any]:
@@ -113,30 +116,30 @@ def lowest(M: Any, K: Any) -> tuple[float, Any]:
     return float(np.sqrt(values[0])), shapes[:, 0]
 
 
-def free(random: Random, kind: str | list[str], name: str) -> Scene:
+def free(random: Random, kinds: list[str], name: str) -> Scene:
     """A mode from below the first change of state to far above it, observed where it moves most without contact."""
     M, K = structure(random)
-    pairs, onset = contacts(random, kind, M, K)
+    pairs, onset = contacts(random, kinds, M, K)
     w, shape = lowest(M, K)
     most = int(np.argmax(abs(shape)))
     first = onset * min(1e3, abs(shape[most] / shape[-1]))
     span = first * np.array([log_uniform(random, 1e-3, 0.3), log_uniform(random, 3.0, 300.0)])
-    more = {**needs_mean(kind), "normalise": f"x{most}"}
+    more = {**needs_mean(kinds), "normalise": f"x{most}"}
     analysis = mode(str(random.choice(["CNM", "EPMC"])), amplitude=span, **settings(random), **more)
-    scene = Scene("at random", name, M, K, pairs, analysis, preload=preload(kind))
-    if kind == "stop" and first < 1e3 * onset:  # nothing touches yet
+    scene = Scene("at random", name, M, K, pairs, analysis, preload=preload(kinds))
+    if "stop" in kinds and first < 1e3 * onset:  # nothing touches yet
         scene.closed = [limits(w, None, 1e-9)]
     return scene
 
 
-def response(random: Random, kind: str | list[str], name: str) -> Scene:
+def response(random: Random, kinds: list[str], name: str) -> Scene:
     """A response about the lowest mode without contact, 1 to 3 % damped, to a force on the last dof."""
     M, K = structure(random)
-    pairs, onset = contacts(random, kind, M, K)
+    pairs, onset = contacts(random, kinds, M, K)
     w = lowest(M, K)[0]
     C = 2 * log_uniform(random, 0.01, 0.03) / w * K
     last = f"x{len(M) - 1}"
     level = onset * float(K[-1, -1]) * log_uniform(random, 1e-2, 3.0)
-    more = {**needs_mean(kind), "force": {last: 1.0}, "observe": last, **settings(random)}
+    more = {**needs_mean(kinds), "force": {last: 1.0}, "observe": last, **settings(random)}
     analysis = forced(w * np.array([0.6, 1.5]), [level], **more)
-    return Scene("at random", name, M, K, pairs, analysis, C=C, preload=preload(kind))
+    return Scene("at random", name, M, K, pairs, analysis, C=C, preload=preload(kinds))

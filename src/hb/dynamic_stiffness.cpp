@@ -251,12 +251,6 @@ double DynamicStiffness::rounding(Exponents const& e, Vec x) const {
   return std::numeric_limits<double>::epsilon() * std::sqrt(square);
 }
 
-std::vector<DynamicStiffness::Entry> DynamicStiffness::entries(Mat A) const {
-  std::vector<Entry> out;
-  for_entries(A, [&](PetscInt row, PetscInt col, double value) { out.push_back({row, col, value}); });
-  return out;
-}
-
 void DynamicStiffness::pattern(std::vector<PetscInt>& rows, std::vector<PetscInt>& cols) const {
   entries_.clear();
   const PetscInt m = harmonics_.block_size();

@@ -36,10 +36,6 @@ class DynamicStiffness {
   double* values(Exponents const&, double scale, double* v) const;
 
  private:
-  struct Entry {
-    PetscInt row, col;
-    double value;
-  };
   /// A (x) I_m, of a sparse matrix, or this rank's dense rows for a product of LAPACK's.
   struct Blocked {
     std::optional<BlockedProduct> sparse;
@@ -60,7 +56,6 @@ class DynamicStiffness {
   void multiply_add(Exponents const&, Vec x, Vec y, int order, bool exactly);
   void accumulate(std::vector<complex> const& c, Blocked&, Vec x, Vec y, bool exactly = false);
   void accumulate_transposed(Coefficients const&, Blocked&, Vec x, Vec y);
-  std::vector<Entry> entries(Mat A) const;
 
   model::Model const& model_;
   Harmonics harmonics_;
@@ -68,7 +63,7 @@ class DynamicStiffness {
   std::vector<std::vector<Part>> parts_;       ///< of each of them: damping c K needs no product of its own
   std::vector<VecHandle> products_;            ///< A x of derivatives, by matrix; made when asked for
   std::vector<std::vector<double>> row_sums_;  ///< of |A|, one per term
-  mutable std::vector<std::vector<Entry>> entries_;
+  mutable std::vector<std::vector<MatEntry>> entries_;
   VecHandle work_;
 };
 

@@ -102,23 +102,18 @@ class Independent {
   std::map<PetscInt, size_t> order_;  ///< of the pivots, by column
 };
 
-struct Entry {
-  PetscInt row, col;
-  double value;
-};
-
 /// Of rigid rows, those of this rank that are independent of all before them. Collective.
 std::vector<PetscInt> independent(Mat B, std::vector<PetscInt> const& rigid, Independent& known) {
   MPI_Comm comm;
   PetscInt begin, end;
   check(PetscObjectGetComm(reinterpret_cast<PetscObject>(B), &comm));
   check(MatGetOwnershipRange(B, &begin, &end));
-  std::vector<Entry> mine;
+  std::vector<MatEntry> mine;
   for_entries(B, [&](PetscInt row, PetscInt col, double value) {
     if (value != 0 && std::ranges::binary_search(rigid, row)) mine.push_back({row, col, value});
   });
   std::map<PetscInt, SparseRow> rows;
-  for (Entry const& e : gathered(std::span<Entry const>(mine), comm)) rows[e.row][e.col] = e.value;
+  for (MatEntry const& e : gathered(std::span<MatEntry const>(mine), comm)) rows[e.row][e.col] = e.value;
   std::vector<PetscInt> out;
   for (auto& [number, row] : rows)
     if (known.takes(std::move(row)) && number >= begin && number < end) out.push_back(number);

@@ -35,11 +35,6 @@ const Tuned surely_in("branch_surely_in", 100,
                       "times as far within a piece one way as the other: it begins here");
 const Tuned meets("branch_meets", 0.1, "of the piece behind a corner: by which it may miss the one before");
 
-struct Entry {
-  PetscInt row, col;
-  double value;
-};
-
 }  // namespace
 
 /// Sign of det [J(y); row], 0 if it is singular or too large to tell. Collective.
@@ -50,12 +45,8 @@ int Continuation::determinant(Vec y, Vec row) {
   newton_.system().close(row, 0);
   MatHandle J = newton_.system().matrix();
   newton_.system().assemble(y, J);
-  std::vector<Entry> mine;
-  for_entries(J, [&](PetscInt i, PetscInt j, double value) { mine.push_back({i, j, value}); });
+  std::vector<double> dense = whole(J);
   const int n = int(size);
-  std::vector<double> dense(size_t(n) * n, 0.0);
-  for (auto const& e : gathered(std::span<Entry const>(mine), problem_.comm()))
-    dense[size_t(e.col) * n + e.row] += e.value;
   std::vector<int> pivots(n);
   int info, sign = 1;
   dgetrf_(&n, &n, dense.data(), &n, pivots.data(), &info);

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 import test_krylov as beam
+from models.core_models import options
 from models.hexahedra import bar
 from petsc4py import PETSc
 from scipy.sparse.linalg import spsolve
@@ -109,9 +110,8 @@ def test_dense_and_sparse_blocks_find_the_same_mode(comm):
     case = (model, *beam.preloaded(model))
     found = {}
     for blocks in ("dense", "sparse"):
-        PETSc.Options()["krylov_blocks"] = blocks
-        found[blocks], route = solve(beam.mode(*case, "krylov"), [1e-3, 2.2e-3])
-        PETSc.Options().delValue("krylov_blocks")
+        with options(krylov_blocks=blocks):
+            found[blocks], route = solve(beam.mode(*case, "krylov"), [1e-3, 2.2e-3])
         assert blocks in route
     assert found["dense"][1]["slip"] > 0.02
     assert_same(found["sparse"], found["dense"])

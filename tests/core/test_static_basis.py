@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import test_sparse_route as solid
 import test_stuck_basis as chains
+from models.core_models import options
 from petsc4py import PETSc
-from test_tuned import option
 
 import fretwave as fw
 from fretwave import _core
@@ -50,7 +50,7 @@ def test_motions_are_those_of_the_direct_route(comm, method, turning):
 @pytest.mark.parametrize("held", [1e-3, 1000.0])
 def test_ranks_hold_the_factor_in_parts_or_whole(comm, held):
     """In parts MUMPS solves over all ranks; whole, each rank for its share of the columns. `held` [MB] on all."""
-    with option("fw_static_held", held):
+    with options(fw_static_held=held):
         model, tip = lifting(comm, 0.0)
         one = solid.mode(model, tip, f"held_{held:g}_", route="krylov", pc_type="fwstatic")
         found, route = solid.solve(one, [solid.STICK, solid.SLIP])
@@ -132,9 +132,7 @@ def test_what_is_beyond_memory_is_refused_in_words(comm):
     """Before it is allocated: the route says why it takes none; asked for, it is an error."""
     model, tip = solid.solid(comm, solid.SMALL)
     words = r"takes \S+ GB, of \S+ GB free"
-    options = PETSc.Options()
-    options["fw_linear_memory_share"] = 1e-9
-    try:
+    with options(fw_linear_memory_share=1e-9):
         problem = solid.mode(model, tip, "static_large_", route="krylov")
         route = _core.Newton(problem.core, "static_large_").route
         for what, kind in (
@@ -146,5 +144,3 @@ def test_what_is_beyond_memory_is_refused_in_words(comm):
         asked = solid.mode(model, tip, "static_asked_", route="krylov", pc_type="fwstatic")
         with pytest.raises(fw.InputError, match=f"takes no fwstatic.*static compliance {words}"):
             _core.Newton(asked.core, "static_asked_")
-    finally:
-        options.delValue("fw_linear_memory_share")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from models.core_models import options
 from petsc4py import PETSc
 from tolerances import REPEATED, SOLVED
 
@@ -157,7 +158,7 @@ def preconditioned(newton, problem, y):
 def test_pairs_that_begin_to_slip_are_added_to_the_inverse(comm, contact) -> None:
     """Behind those that slip as before, instead of making it anew: the same preconditioner."""
     M, K = chain()
-    options, added = PETSc.Options(), {"fw_basis_cheap": 0.5, "fw_basis_few": 100}  # however many
+    added = {"fw_basis_cheap": 0.5, "fw_basis_few": 100}  # however many
     static = {"fw_modes_fewest": 2, "fw_modes_follows": 1e9}  # all but two modes are in the inverse
     with fw.Model(M, K, 0.002 * K, [contact], comm) as model:
         problem = problem_of(model)
@@ -165,11 +166,8 @@ def test_pairs_that_begin_to_slip_are_added_to_the_inverse(comm, contact) -> Non
         for pairs in range(PAIRS + 1):
             y, found = slipping(problem, still, moving, pairs), []
             for corrector, given in zip(correctors, ({}, added)):
-                for option, value in {**static, **given}.items():
-                    options[option] = value
-                found.append(preconditioned(corrector, problem, y))
-                for option in {**static, **given}:
-                    options.delValue(option)
+                with options(**static, **given):
+                    found.append(preconditioned(corrector, problem, y))
             found[1].axpy(-1.0, found[0])
             assert found[1].norm() < 1e-6 * found[0].norm(), f"{pairs} pairs"
 

@@ -2,24 +2,13 @@
 
 from __future__ import annotations
 
-from contextlib import contextmanager
-
 import numpy as np
 import pytest
-from petsc4py import PETSc
+from models.core_models import options
 
 import fretwave as fw
 from fretwave import _core
 from fretwave.commands import doctor
-
-
-@contextmanager
-def option(name, value):
-    PETSc.Options()[name] = value
-    try:
-        yield
-    finally:
-        PETSc.Options().delValue(name)
 
 
 def newton(comm):
@@ -36,13 +25,13 @@ def test_each_has_a_value_and_a_meaning_of_its_own():
 
 def test_an_option_takes_its_place(comm):
     assert newton(comm).route == "direct (11 unknowns)"
-    with option("fw_linear_krylov_limit", 5):
+    with options(fw_linear_krylov_limit=5):
         assert newton(comm).route.startswith("krylov (11 unknowns)")
 
 
 @pytest.mark.parametrize("value", [0, -1, "inf"])
 def test_no_number_above_zero_is_refused(comm, value):
-    with option("fw_linear_krylov_limit", value), pytest.raises(fw.InputError, match="fw_linear_krylov_limit"):
+    with options(fw_linear_krylov_limit=value), pytest.raises(fw.InputError, match="fw_linear_krylov_limit"):
         newton(comm)
 
 

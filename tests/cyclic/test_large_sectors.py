@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from models.core_models import options
 from models.cyclic_models import GROUND, NEIGHBOUR
 from petsc4py import PETSc
 from tolerances import ROUNDING, TIGHT
@@ -34,13 +35,8 @@ def long_blades(damping: float = 0.0) -> fw.Sector:
 @pytest.fixture(autouse=True)
 def lowest_modes():
     """A sector of 41 dofs is large, and its waves have 8 modes."""
-    options = PETSc.Options()
-    given = {"fw_wheel_whole": 20, "fw_wheel_modes": 8}
-    for name, value in given.items():
-        options[name] = value
-    yield
-    for name in given:
-        options.delValue(name)
+    with options(fw_wheel_whole=20, fw_wheel_modes=8):
+        yield
 
 
 def mode(wheel, prefix, start=None):

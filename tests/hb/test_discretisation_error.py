@@ -8,10 +8,9 @@ import resource
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from models.core_models import TanhLaw, friction
+from models.core_models import TanhLaw, friction, options
 from mpi4py import MPI
 from oracle import Jenkins, SeriesMotion, System, forced_orbit, series_motion
-from petsc4py import PETSc
 from tolerances import ROUNDING, SOLVED
 
 import fretwave as fw
@@ -205,12 +204,8 @@ def test_the_same_on_any_number_of_ranks(comm):
 @SERIAL
 def test_the_krylov_route_gives_the_same():
     direct = reported(chain(MPI.COMM_SELF), [2.0], (0.1, 4.0))[0]
-    options = PETSc.Options()
-    options["mode_error_route"] = "krylov"
-    try:
+    with options(mode_error_route="krylov"):
         krylov = reported(chain(MPI.COMM_SELF), [2.0], (0.1, 4.0))[0]
-    finally:
-        options.delValue("mode_error_route")
     assert krylov["omega_error"] == pytest.approx(direct["omega_error"], rel=0.03)
 
 
@@ -284,11 +279,8 @@ def test_a_resonance_far_above_the_retained_harmonics_is_seen(highest):
         return sum(1 / 3 <= row["omega_error"] / error <= 3 for row, error in zip(found, errors))
 
     assert within_three() >= 7
-    PETSc.Options()["fw_error_least"] = 1
-    try:
+    with options(fw_error_least=1):
         assert within_three() <= 4, "the resonance is no longer what is left out"
-    finally:
-        PETSc.Options().delValue("fw_error_least")
 
 
 @SERIAL

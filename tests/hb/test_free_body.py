@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from models.core_models import options
 from petsc4py import PETSc
 from tolerances import TIGHT
 
@@ -42,18 +43,13 @@ def test_holding_the_mean_leaves_errors_as_they_are(route: str, unit: float) -> 
     What a singular system does to them otherwise, cases/robustness/ranks.py sees (lap_joint).
     """
     odd, full = mode([1, 3, 5], unit), mode(list(range(6)), unit)
-    options = PETSc.Options()
-    options["mode_error_route"], options["mode_error_tangent_ksp_rtol"] = route, 1e-10
-    try:
+    with options(mode_error_route=route, mode_error_tangent_ksp_rtol=1e-10):
         for point in fw.Continuation(odd, odd.initial(0.01), (0.01, 3.0)):
             if point.parameter > 0.3:
                 break
         y, tangent = (with_even_harmonics(full, v) for v in (point.y, point.tangent))
         assert full.residual(y).norm() < TIGHT
         found, expected = full.errors(y, tangent), odd.errors(point.y, point.tangent)
-    finally:
-        for name in ("mode_error_route", "mode_error_tangent_ksp_rtol"):
-            options.delValue(name)
     assert expected["zeta_error"] > 1e-6
     for name in ("omega_error", "zeta_error"):
         assert found[name] == pytest.approx(expected[name], rel=1e-6), name

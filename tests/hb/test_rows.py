@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from models.core_models import chain, dense, friction, unknowns, whole
+from models.core_models import chain, dense, friction, options, unknowns, whole
 from tolerances import ROUNDING, SOLVED, TIGHT
 
 import fretwave as fw
@@ -100,16 +100,10 @@ def test_derivatives_with_a_row(comm, method):
 @pytest.mark.parametrize("blocks", ["dense", "sparse"])
 def test_both_preconditioners_take_a_row(comm, blocks):
     """The same branch by GMRES as by factorisation, in few iterations."""
-    from petsc4py import PETSc
-
-    options = PETSc.Options()
     with model_of(comm) as model:
         direct = fw.follow(mode_of(model, ROW), 0.05, 3.0, report_at=[1.0])
-        options["row_route"], options["row_blocks"] = "krylov", blocks
-        try:
+        with options(row_route="krylov", row_blocks=blocks):
             krylov = fw.follow(mode_of(model, ROW, prefix="row_"), 0.05, 3.0, report_at=[1.0])
-        finally:
-            options.delValue("row_route"), options.delValue("row_blocks")
     one, other = (branch[branch.met("report")[0]] for branch in (direct, krylov))
     assert other["omega"] == pytest.approx(one["omega"], rel=SOLVED)
     assert krylov["linear"].sum() <= 12 * krylov["newton"].sum()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -87,6 +88,19 @@ class CoupledLaw(fw.PythonLaw):
     @staticmethod
     def _square(u):
         return (u**2).sum(axis=1, keepdims=True)
+
+
+@contextmanager
+def options(**values):
+    """PETSc's options, for a `with` block."""
+    table = PETSc.Options()
+    for name, value in values.items():
+        table[name] = value
+    try:
+        yield
+    finally:
+        for name in values:
+            table.delValue(name)
 
 
 def friction(B, limit: Any = 5.0, velocity: Any = 0.05, name: str = "damper") -> fw.Contact:

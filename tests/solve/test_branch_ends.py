@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from contextlib import contextmanager
-
 import numpy as np
 import pytest
-from models.core_models import friction, mode_problem, oscillator, single_dof, whole
+from models.core_models import friction, mode_problem, options, oscillator, single_dof, whole
 from oracle import Jenkins, SeriesMotion, System, series_motion
-from petsc4py import PETSc
 from tolerances import REPEATED, ROUNDING, SOLVED, TIGHT
 
 import fretwave as fw
@@ -204,19 +201,6 @@ def test_a_mode_at_a_stiff_stop_is_the_bilinear_oscillator(comm):
     assert branch.converged and branch.started.startswith("by closing the gaps")
     found = [problem.state(p.y)["omega0"] for p in points]
     assert np.allclose(found, 2 / (1 + 1 / np.sqrt(101.0)), rtol=5e-3, atol=0)
-
-
-@contextmanager
-def options(**values):
-    """PETSc's options, for a `with` block."""
-    table = PETSc.Options()
-    for name, value in values.items():
-        table[name] = value
-    try:
-        yield
-    finally:
-        for name in values:
-            table.delValue(name)
 
 
 CIRCLING = "the branch turns in circles between corners at amplitude "

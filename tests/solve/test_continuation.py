@@ -6,7 +6,7 @@ import pickle
 
 import numpy as np
 import pytest
-from models.core_models import TanhLaw, dense, mode_problem, oscillator, single_dof, whole
+from models.core_models import TanhLaw, dense, mode_problem, options, oscillator, single_dof, whole
 from petsc4py import PETSc
 from tolerances import LAST_BIT, LAST_DIGITS, REPEATED, ROUNDING, TIGHT
 
@@ -196,10 +196,8 @@ def test_largest_number_of_points_ends_the_branch(two_dof, comm):
 
 def test_failure_at_the_start_is_reported(two_dof, comm):
     """Non-convergence is a return value (STYLE): no point, a reason, no exception."""
-    options = PETSc.Options()
-    options["fails_snes_max_it"] = 1
-    branch, points = follow(problem_of(two_dof, comm, prefix="fails_"), start=0.2)
-    options.delValue("fails_snes_max_it")
+    with options(fails_snes_max_it=1):
+        branch, points = follow(problem_of(two_dof, comm, prefix="fails_"), start=0.2)
     assert points == [] and not branch.converged
     assert branch.reason.startswith("no solution at the start: ") and "MAX_IT" in branch.reason
 
