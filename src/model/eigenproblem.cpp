@@ -53,7 +53,7 @@ bool symmetric(Mat A) {
   MatHandle difference;
   double size, change;
   check(MatTranspose(A, MAT_INITIAL_MATRIX, difference.out()));
-  check(MatAXPY(difference, -1, A, DIFFERENT_NONZERO_PATTERN));
+  check(MatAXPY(difference, -1, A, UNKNOWN_NONZERO_PATTERN));
   check(MatNorm(A, NORM_INFINITY, &size));
   check(MatNorm(difference, NORM_INFINITY, &change));
   return change <= 1e-12 * size;

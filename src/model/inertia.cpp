@@ -71,7 +71,7 @@ double factor_entries(KSP ksp) {
 PetscInt count_below(Mat K, Mat M, double lambda, std::string const& prefix) {
   MatHandle A;
   check(MatDuplicate(K, MAT_COPY_VALUES, A.out()));
-  check(MatAXPY(A, -lambda, M, DIFFERENT_NONZERO_PATTERN));
+  check(MatAXPY(A, -lambda, M, UNKNOWN_NONZERO_PATTERN));
   return negative_pivots(symmetric_factor(A, prefix, delayed_pivots));
 }
 

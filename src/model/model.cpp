@@ -63,7 +63,7 @@ MatHandle Model::sum(int order) const {
     if (!total)
       check(MatDuplicate(term.A, MAT_COPY_VALUES, total.out()));
     else
-      check(MatAXPY(total, 1.0, term.A, DIFFERENT_NONZERO_PATTERN));
+      check(MatAXPY(total, 1.0, term.A, UNKNOWN_NONZERO_PATTERN));
   }
   return total;
 }

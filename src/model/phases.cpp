@@ -11,7 +11,7 @@ MatHandle real_sum(std::vector<PhasedMap> const& parts, double theta) {
   for (auto const& [A, phase] : parts) {
     const double factor = std::cos(phase * theta);
     if (total) {
-      check(MatAXPY(total, factor, A, DIFFERENT_NONZERO_PATTERN));
+      check(MatAXPY(total, factor, A, UNKNOWN_NONZERO_PATTERN));
       continue;
     }
     check(MatDuplicate(A, MAT_COPY_VALUES, total.out()));

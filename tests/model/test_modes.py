@@ -184,6 +184,20 @@ def test_stuck_contact_however_stiff_keeps_all_digits(comm, contact, unit):
     assert fw.linear_modes(model, 1, "stuck")[0].omega == pytest.approx(exact, rel=ROUNDING)
 
 
+@pytest.mark.parametrize(("stiffness", "searches"), [(1e7, 1), (1e3, 2), (1e11, 1)])
+def test_one_search_finds_a_bending_mode_far_below_the_highest(comm, stiffness, searches):
+    """Its frequency is far below the mean of a mesh, yet above the shift; softer motions are sought about again."""
+    made = bar((25, 2, 2), (0.25, 0.02, 0.02))
+    held = np.bincount(made.layer(0.0), minlength=made.K.shape[0]) * stiffness
+    K, M = made.K + sp.diags(held), made.M
+    PETSc.Log.begin()
+    before = PETSc.Log.Event("EPSSolve").getPerfInfo()["count"]
+    found = [mode.omega for mode in fw.linear_modes(fw.Model(M, K, comm=comm), 6, "free")]
+    assert PETSc.Log.Event("EPSSolve").getPerfInfo()["count"] - before == searches
+    theta = scipy.linalg.eigh(M.toarray(), K.toarray(), eigvals_only=True)[::-1]  # K is positive definite
+    np.testing.assert_allclose(found, 1 / np.sqrt(theta[:6]), rtol=1e-5 if stiffness < 1e7 else SOLVED)
+
+
 def test_double_mode_is_found_twice(comm):
     """Ring of masses: nodal diameters 1 and 2 come as pairs, 2 sqrt(k/m) sin(pi ND / n) above the ground spring."""
     n = 6
