@@ -142,7 +142,13 @@ def stop(coefficients, stiffness, load, waves):
     (m, lanes) integrals of f and the waves over the period
     """
     first, out = coefficients[:, :1].real, np.zeros_like(coefficients)
-    for begin, end in closed_spans(lambda tau: load + stiffness * (waves(tau) @ first)[:, 0], len(coefficients)):
+    spans = closed_spans(lambda tau: load + stiffness * (waves(tau) @ first)[:, 0], len(coefficients))
+    if spans == [(0.0, TURN)]:  # exactly: motions may be below the last digits of the load
+        constant = len(coefficients) % 2
+        out[:] = np.pi * stiffness * coefficients
+        out[:constant] = TURN * (load + stiffness * coefficients[:constant])
+        return out
+    for begin, end in spans:
         _, weight, wave = _gauss(begin, end, len(coefficients), waves)
         out += (wave * weight[:, None]).T @ (load + stiffness * (wave @ coefficients))
     return out

@@ -171,6 +171,13 @@ def test_a_stop_is_its_closed_form_to_rounding():
         np.testing.assert_allclose(force, [2 * load + 3.0, 3.0, 0.0] if load > 0 else 0, atol=1e-14)
 
 
+def test_a_stuck_pad_moved_by_less_than_its_load_s_last_digits_is_linear():
+    Q = 1e-17 * np.array([[3.0, 1.0, -2.0], [0.0, 2.0, 1.0], [0.0, 0.5, -1.0]])
+    force = pad(Q, PAD | {"normal_load": 2e3}).real
+    np.testing.assert_allclose(force[:, 1:], np.diag([2.0, 1.0, 1.0]) @ Q[:, 1:], rtol=ROUNDING)
+    assert force[0, 0] == 2e3
+
+
 def test_a_slider_in_shakedown_rests_on_the_point_nearest_to_its_start():
     centres = np.array([[1.0, 0.0], [0.0, 1.0], [0.5, 0.5]])
     at = pads.nearest_common(centres, np.array([0.9, 0.9, 5.0]), np.zeros(2))
