@@ -1,7 +1,7 @@
 #pragma once
 #include <optional>
 
-#include "hb/blocked_product.h"
+#include "blocked_product.h"
 #include "hb/harmonics.h"
 #include "hb/split_matrix.h"
 #include "model/model.h"

@@ -6,6 +6,7 @@
 #include <array>
 #include <utility>
 
+#include "blocked_product.h"
 #include "model/reduction_input.h"
 
 namespace fretwave::model {
@@ -13,7 +14,8 @@ namespace fretwave::model {
 namespace {
 
 /// Columns at a time: bounds the memory beside T, and few would pack T as often for a product.
-PetscInt panel_of(PetscInt columns) { return std::clamp<PetscInt>(columns / 16, 64, 512); }
+PetscInt panel_of(PetscInt columns) { return std::clamp<PetscInt>(columns / 8, 64, 512); }
+constexpr PetscInt side_by_side = 32;  // columns of a sparse product, as many as its registers hold
 
 struct Columns {
   double const* data;
@@ -36,6 +38,15 @@ MatHandle dense_matrix(MPI_Comm comm, PetscInt local_rows, PetscInt rows, PetscI
   MatHandle A;
   check(MatCreateDense(comm, local_rows, PETSC_DECIDE, rows, columns, nullptr, A.out()));
   return A;
+}
+
+/// visit(i, j) for all, in tiles that a cache holds by rows and by columns.
+template <class Visit>
+void for_tiles(PetscInt rows, PetscInt columns, Visit visit) {
+  constexpr PetscInt side = 64;
+  for (PetscInt begin = 0; begin < rows; begin += side)
+    for (PetscInt j = 0; j < columns; ++j)
+      for (PetscInt i = begin; i < std::min(begin + side, rows); ++i) visit(i, j);
 }
 
 /// This rank's entries of K in the columns of the kept dofs, by column; `col` is a place among those.
@@ -148,11 +159,23 @@ void Reduction::omit(PetscInt modes) {
   T_.shrink_to_fit();
 }
 
-/// Columns of T as a dense matrix, without copy.
-MatHandle Reduction::columns(PetscInt begin, PetscInt end) {
-  MatHandle view;
-  check(MatCreateDense(comm_, local_, PETSC_DECIDE, global_, end - begin, column(begin), view.out()));
-  return view;
+/// A T, columns `begin` .. `end`, as T has them.
+std::vector<double> Reduction::moved(BlockedProduct& A, PetscInt begin, PetscInt end) {
+  std::vector<double> out(size_t(end - begin) * local_);
+  VecHandle product = make_vector(comm_, local_ * side_by_side);
+  for (PetscInt first = begin; first < end; first += side_by_side) {
+    const PetscInt count = std::min(side_by_side, end - first);
+    double* to = out.data() + size_t(first - begin) * local_;
+    for_tiles(local_, count,
+              [&](PetscInt i, PetscInt j) { A.columns()[i * side_by_side + j] = column(first + j)[i]; });
+    check(VecSet(product, 0));
+    A.multiply_add(product);
+    const ReadArray from(product);
+    for_tiles(local_, count, [&](PetscInt i, PetscInt j) {
+      to[size_t(j) * local_ + i] = from.data()[i * side_by_side + j];
+    });
+  }
+  return out;
 }
 
 void Reduction::place_component_modes(std::vector<ComponentMode> const& modes,
@@ -201,13 +224,12 @@ void Reduction::place_constraint_modes(Mat K, FixedInterface const& component,
 std::vector<double> Reduction::congruence(Mat A, PetscInt n, bool symmetric) {
   std::vector<double> out(size_t(size()) * size_t(size()));
   const PetscInt panel = panel_of(n);
+  BlockedProduct product(A, side_by_side);
   for (PetscInt begin = 0; begin < n; begin += panel) {
     const PetscInt end = std::min(begin + panel, n);
-    MatHandle product;
-    check(MatMatMult(A, columns(begin, end), MAT_INITIAL_MATRIX, PETSC_DEFAULT, product.out()));
-    DenseArray AT(product);
-    multiply("T", "N", {symmetric ? end : n, end - begin, local_}, {T_.data(), local_},
-             {AT.column(0), AT.lead()}, out.data() + size_t(begin) * size_t(size()), size());
+    const auto AT = moved(product, begin, end);
+    multiply("T", "N", {symmetric ? end : n, end - begin, local_}, {T_.data(), local_}, {AT.data(), local_},
+             out.data() + size_t(begin) * size_t(size()), size());
   }
   add_over_ranks(comm_, out);
   if (symmetric) mirror(out, size_t(size()));

@@ -4,6 +4,10 @@
 
 #include "model/component_modes.h"
 
+namespace fretwave {
+class BlockedProduct;
+}
+
 namespace fretwave::model {
 
 /// Wall time of each stage [s].
@@ -48,7 +52,7 @@ class Reduction {
 
  private:
   double* column(PetscInt j) { return T_.data() + size_t(j) * size_t(local_); }
-  MatHandle columns(PetscInt begin, PetscInt end);
+  std::vector<double> moved(BlockedProduct& A, PetscInt begin, PetscInt end);
   void place_constraint_modes(Mat K, FixedInterface const&, std::vector<PetscInt> const& internal);
   void place_component_modes(std::vector<ComponentMode> const&, std::vector<PetscInt> const& internal);
   std::vector<double> congruence(Mat A, PetscInt n, bool symmetric);

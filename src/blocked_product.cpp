@@ -1,11 +1,11 @@
-#include "hb/blocked_product.h"
+#include "blocked_product.h"
 
 #include <algorithm>
 #include <cstring>
 
 #include "contact/vectorise.h"
 
-namespace fretwave::hb {
+namespace fretwave {
 
 namespace {
 
@@ -134,4 +134,4 @@ void BlockedProduct::transposed_multiply_add(Vec y) {
   for (size_t k = 0; k < size_t(local_) * m_; ++k) out[PetscInt(k)] += columns_[k];
 }
 
-}  // namespace fretwave::hb
+}  // namespace fretwave

@@ -3,7 +3,7 @@
 
 #include "petsc.h"
 
-namespace fretwave::hb {
+namespace fretwave {
 
 /// y += (A (x) I_m) x of a sparse matrix, m coefficients of a dof side by side: each entry of A is read once
 /// for all of them. Coefficients of other ranks' dofs stand behind this rank's.
@@ -35,4 +35,4 @@ class BlockedProduct {
   ScatterHandle exchange_;
 };
 
-}  // namespace fretwave::hb
+}  // namespace fretwave
