@@ -74,7 +74,7 @@ BlockedProduct::BlockedProduct(Mat A, int m) : m_(m) {
   PetscBool parallel;
   check(PetscObjectGetComm(reinterpret_cast<PetscObject>(A), &comm));
   check(MatGetLocalSize(A, &local_, nullptr));
-  check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(A), MATMPIAIJ, &parallel));
+  check(PetscObjectBaseTypeCompare(reinterpret_cast<PetscObject>(A), MATMPIAIJ, &parallel));
   if (parallel) {
     parts_.resize(2);
     check(MatMPIAIJGetSeqAIJ(A, &parts_[0].A, &parts_[1].A, &dofs));

@@ -21,7 +21,7 @@ struct Strides {
   size_t column, term;
 };
 
-constexpr int together = 6;  // columns: their sums of two registers each, A's two and B's fill the sixteen
+constexpr int together = 6;  // columns: sums of two registers each, and A's two, B's: fifteen of sixteen
 constexpr int terms = 16;    // of transposed B at a time: as many streams through the memory
 
 /// C += A B of some registers of A's rows and some columns: the sums stay in registers.

@@ -125,7 +125,6 @@ class DenseArray {
   ~DenseArray() { (void)MatDenseRestoreArray(A_, &data_); }
   DenseArray(DenseArray const&) = delete;
   double* column(PetscInt j) const { return data_ + size_t(j) * size_t(lead_); }
-  PetscInt lead() const { return lead_; }
 
  private:
   Mat A_;

@@ -19,7 +19,7 @@ constexpr double tolerance = 1e-13;
 constexpr double resolution = 1e-9;  // relative distance below which eigenvalues count as one
 constexpr PetscInt beyond = 2;       // more than wanted, to find a gap behind them
 constexpr int searches = 5;
-constexpr double widest = 1e6;  // highest over lowest eigenvalue that one shift serves
+constexpr double widest = 1e6;  // highest eigenvalue over the lowest's distance from a shift that serves both
 
 MPI_Comm comm_of(Mat A) {
   MPI_Comm comm;
@@ -210,9 +210,10 @@ std::vector<EigenPair> lowest_beside_zero(Pencil pencil, PetscInt count) {
   const auto elastic =
       std::find_if(found.begin(), wanted, [&](auto const& pair) { return pair.value > far; });
   const PetscInt soft = PetscInt(elastic - found.begin());
+  if (soft == 0) return found;
   // a shift below all of them costs no digits that their own spread does not
   const bool spread = (wanted - 1)->value > widest * (found.front().value - pencil.shift);
-  if (soft == 0 || (found.front().value > std::abs(pencil.shift) && !spread)) return found;
+  if (found.front().value > std::abs(pencil.shift) && !spread) return found;
   EigenPair const& last = *(elastic - 1);
   const double stiffest = last.value < uncertainty(pencil.K, last.vector) ? 0 : last.value;
   if (elastic != wanted) {

@@ -31,7 +31,8 @@ std::vector<EigenPair> lowest_pairs(Pencil const&, PetscInt count);
 /// The lowest pairs of a pencil, whose shift lies just below zero in the scale of the stiffest dof. Rigid
 /// motions next to it make the inverse so large that its rounding spoils the shapes far above them, and of
 /// motions all softer than it no more is known than a share of it: both kinds are found again from as far
-/// below zero as the first of their kind, or the last, lies above. Collective.
+/// below zero as the first of their kind, or the last, lies above. Where all lie above the shift and none is
+/// far above the others it serves them all. Collective.
 std::vector<EigenPair> lowest_beside_zero(Pencil, PetscInt count);
 
 /// Whether an eigenvalue is that of a motion that nothing holds, but for rounding; `scale`: of the stiffest

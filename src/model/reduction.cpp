@@ -13,7 +13,7 @@ namespace fretwave::model {
 
 namespace {
 
-/// Columns at a time: bounds the memory beside T, and few would pack T as often for a product.
+/// Columns at a time: bounds the memory beside T, which a product packs anew for each panel.
 PetscInt panel_of(PetscInt columns) { return std::clamp<PetscInt>(columns / 8, 64, 512); }
 constexpr PetscInt side_by_side = 32;  // columns of a sparse product, as many as its registers hold
 
@@ -109,7 +109,7 @@ Reduction::Reduction(Mat K, Mat M, Mat C, std::vector<PetscInt> kept, ComponentM
   FixedInterface component(K, M, set);
   times_.factorisation = lap();
   // the eigensolver takes over the factorisation and frees it at its end: constraint modes come first
-  T_.reserve(size_t(local_) * (kept_.size() + (wanted.highest_omega > 0 ? 0 : size_t(wanted.count))));
+  T_.reserve(size_t(local_) * (kept_.size() + size_t(wanted.count + ComponentModes::beyond(wanted.count))));
   place_constraint_modes(K, component, internal);
   times_.constraint_modes = lap();
   const auto modes = component.modes(wanted);
@@ -156,7 +156,6 @@ void Reduction::omit(PetscInt modes) {
   for (auto* A : {&K_, &M_, &C_}) crop(*A, n, kept);
   component_omega_.resize(component_omega_.size() - size_t(modes));
   T_.resize(size_t(local_) * kept);
-  T_.shrink_to_fit();
 }
 
 /// A T, columns `begin` .. `end`, as T has them.
@@ -180,6 +179,7 @@ std::vector<double> Reduction::moved(BlockedProduct& A, PetscInt begin, PetscInt
 
 void Reduction::place_component_modes(std::vector<ComponentMode> const& modes,
                                       std::vector<PetscInt> const& internal) {
+  T_.reserve(size_t(local_) * (kept_.size() + modes.size()));  // `resize` would double it
   T_.resize(size_t(local_) * (kept_.size() + modes.size()));
   for (size_t j = 0; j < modes.size(); ++j) {
     component_omega_.push_back(modes[j].omega);

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 from models.core_models import unknowns, whole
+from petsc4py import PETSc
 from test_transpose import assert_adjoint
 from tolerances import ROUNDING
 
@@ -62,3 +63,35 @@ def test_dynamic_stiffness_of_every_harmonic(comm, orders, of):
     scale = np.vdot(found, expected) / np.vdot(found, found)
     np.testing.assert_allclose(scale * found, expected, rtol=0, atol=ROUNDING * np.abs(expected).max())
     assert_adjoint(problem, np.append(q.ravel(), OMEGA))
+
+
+@pytest.mark.ranks(1, 2, 3)
+@pytest.mark.parametrize("kind", ["aijperm", "aijsell"])
+def test_types_derived_from_aij_are_taken(comm, kind):
+    """A residual and a reduction of matrices as a user of PETSc may hold them."""
+    M, _, K = matrices()
+    given = [of_kind(comm, A, kind) for A in (M, K)]
+    model = fw.Model(*given, None, [], comm)
+    problem = fw.ForcedResponse(model, fw.Harmonics([1], 8), {1: np.eye(N)[0]}, 1.0, 0, fw.linear_modes(model, 1)[0])
+    q = np.random.default_rng(1).standard_normal((N, 2))
+    found = whole(problem.jacobian_product(problem.initial(OMEGA), unknowns(problem, np.append(q.ravel(), 0.0))))
+    expected = ((K - OMEGA**2 * M) @ q).ravel()
+    scale = expected[0] / found[0]
+    np.testing.assert_allclose(scale * found[: 2 * N], expected, rtol=0, atol=ROUNDING * abs(expected).max())
+    with fw.reduce(*given, keep=[11, 0, 5], modes=2) as derived, fw.reduce(M, K, keep=[11, 0, 5], modes=2) as plain:
+        np.testing.assert_allclose(derived.K, plain.K, atol=ROUNDING * abs(plain.K).max())
+        np.testing.assert_allclose(derived.M, plain.M, atol=ROUNDING)
+
+
+def of_kind(comm, A, kind):
+    """A distributed matrix of one of PETSc's types."""
+    mat = PETSc.Mat().create(comm)
+    mat.setSizes(A.shape)
+    mat.setType(kind)
+    mat.setUp()
+    begin, end = mat.getOwnershipRange()
+    for row in range(begin, end):
+        place = slice(A.indptr[row], A.indptr[row + 1])
+        mat.setValues(row, A.indices[place], A.data[place])
+    mat.assemble()
+    return mat
