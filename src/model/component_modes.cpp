@@ -10,6 +10,7 @@
 #include "model/inertia.h"
 #include "model/lowest_pairs.h"
 #include "model/mode_orientation.h"
+#include "model/static_factor.h"
 
 namespace fretwave::model {
 
@@ -73,6 +74,8 @@ PetscInt FixedInterface::local_dofs() const {
   check(MatGetLocalSize(K_, &n, nullptr));
   return n;
 }
+
+MatHandle FixedInterface::columns(PetscInt count) const { return dense_columns(K_, count); }
 
 void FixedInterface::solve(Mat B, Mat X) const {
   check(KSPMatSolve(ksp_, B, X));

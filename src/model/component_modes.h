@@ -25,8 +25,8 @@ class FixedInterface {
  public:
   /// Factorises. K and M symmetric; K_ii must be positive definite (InputError otherwise). Collective.
   FixedInterface(Mat K, Mat M, IS internal);
-  PetscInt dofs() const;
-  PetscInt local_dofs() const;
+  /// Dense, for `solve`. Collective.
+  MatHandle columns(PetscInt count) const;
   /// X = K_ii^-1 B for dense B. Collective.
   void solve(Mat B, Mat X) const;
   /// Lowest modes, ascending, and behind those to keep the ones beyond, as far as there are any; the same on
@@ -38,6 +38,8 @@ class FixedInterface {
   std::vector<ComponentMode> krylov_modes(PetscInt count);
   std::vector<ComponentMode> counted_modes(PetscInt count, double resolution);
   std::vector<ComponentMode> all_modes() const;
+  PetscInt dofs() const;
+  PetscInt local_dofs() const;
 
   MPI_Comm comm_ = MPI_COMM_NULL;
   MatHandle K_, M_;

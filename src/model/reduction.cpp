@@ -32,14 +32,6 @@ void multiply(char const* op_a, char const* op_b, std::array<PetscInt, 3> size, 
   BLASgemm_(op_a, op_b, &n[0], &n[1], &n[2], &one, A.data, &n[3], B.data, &n[4], &zero, C, &n[5]);
 }
 
-void add_over_ranks(MPI_Comm comm, std::vector<double>& values) { sum_over_ranks(values, comm); }
-
-MatHandle dense_matrix(MPI_Comm comm, PetscInt local_rows, PetscInt rows, PetscInt columns) {
-  MatHandle A;
-  check(MatCreateDense(comm, local_rows, PETSC_DECIDE, rows, columns, nullptr, A.out()));
-  return A;
-}
-
 /// visit(i, j) for all, in tiles that a cache holds by rows and by columns.
 template <class Visit>
 void for_tiles(PetscInt rows, PetscInt columns, Visit visit) {
@@ -203,8 +195,8 @@ void Reduction::place_constraint_modes(Mat K, FixedInterface const& component,
   for (PetscInt begin = 0; begin < kept; begin += panel) {
     const PetscInt end = std::min(begin + panel, kept);
     if (begin == 0 || end - begin < panel) {
-      B = dense_matrix(comm_, component.local_dofs(), component.dofs(), end - begin);
-      X = dense_matrix(comm_, component.local_dofs(), component.dofs(), end - begin);
+      B = component.columns(end - begin);
+      X = component.columns(end - begin);
     }
     check(MatZeroEntries(B));
     for (DenseArray forces(B); entry != coupling.end() && entry->col < end; ++entry)
@@ -231,7 +223,7 @@ std::vector<double> Reduction::congruence(Mat A, PetscInt n, bool symmetric) {
     multiply("T", "N", {symmetric ? end : n, end - begin, local_}, {T_.data(), local_}, {AT.data(), local_},
              out.data() + size_t(begin) * size_t(size()), size());
   }
-  add_over_ranks(comm_, out);
+  sum_over_ranks(out, comm_);
   if (symmetric) mirror(out, size_t(size()));
   return out;
 }
@@ -247,7 +239,7 @@ std::vector<double> Reduction::project(std::span<double const> forces, PetscInt 
   std::vector<double> reduced(size_t(size()) * size_t(count));
   multiply("N", "N", {count, size(), local_}, {forces.data(), count}, {T_.data(), local_}, reduced.data(),
            count);
-  add_over_ranks(comm_, reduced);
+  sum_over_ranks(reduced, comm_);
   return reduced;
 }
 

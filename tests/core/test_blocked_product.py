@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from models.core_models import unknowns, whole
-from petsc4py import PETSc
+from models.core_models import distributed, unknowns, whole
 from test_transpose import assert_adjoint
 from tolerances import ROUNDING
 
@@ -70,7 +69,7 @@ def test_dynamic_stiffness_of_every_harmonic(comm, orders, of):
 def test_types_derived_from_aij_are_taken(comm, kind):
     """A residual and a reduction of matrices as a user of PETSc may hold them."""
     M, _, K = matrices()
-    given = [of_kind(comm, A, kind) for A in (M, K)]
+    given = [distributed(A.toarray(), comm, kind) for A in (M, K)]
     model = fw.Model(*given, None, [], comm)
     problem = fw.ForcedResponse(model, fw.Harmonics([1], 8), {1: np.eye(N)[0]}, 1.0, 0, fw.linear_modes(model, 1)[0])
     q = np.random.default_rng(1).standard_normal((N, 2))
@@ -81,17 +80,3 @@ def test_types_derived_from_aij_are_taken(comm, kind):
     with fw.reduce(*given, keep=[11, 0, 5], modes=2) as derived, fw.reduce(M, K, keep=[11, 0, 5], modes=2) as plain:
         np.testing.assert_allclose(derived.K, plain.K, atol=ROUNDING * abs(plain.K).max())
         np.testing.assert_allclose(derived.M, plain.M, atol=ROUNDING)
-
-
-def of_kind(comm, A, kind):
-    """A distributed matrix of one of PETSc's types."""
-    mat = PETSc.Mat().create(comm)
-    mat.setSizes(A.shape)
-    mat.setType(kind)
-    mat.setUp()
-    begin, end = mat.getOwnershipRange()
-    for row in range(begin, end):
-        place = slice(A.indptr[row], A.indptr[row + 1])
-        mat.setValues(row, A.indices[place], A.data[place])
-    mat.assemble()
-    return mat

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from contextlib import contextmanager
-
 import numpy as np
 import pytest
-from models.core_models import unknowns, whole
+from models.core_models import options, unknowns, whole
 from models.cyclic_models import rich_sector
 from petsc4py import PETSc
 from tolerances import REPEATED
@@ -19,17 +17,9 @@ SECTORS, UNIT = 6, 2
 SLIDER = {"tangential_stiffness": 3.0, "friction_limit": 0.4}
 
 
-@contextmanager
-def asked(**options):
+def asked(**values):
     """PETSc options of the prefix blocks_."""
-    database = PETSc.Options("blocks_")
-    for name, value in options.items():
-        database[name] = value
-    try:
-        yield
-    finally:
-        for name in options:
-            del database[name]
+    return options(**{f"blocks_{name}": value for name, value in values.items()})
 
 
 def wheel(comm, rubbing=range(SECTORS), dof_of=lambda sector: 0):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.linalg
 import scipy.sparse as sp
-from models.core_models import LinearLaw, chain, friction, oscillator, single_dof
+from models.core_models import LinearLaw, chain, distributed, friction, oscillator, single_dof
 from models.hexahedra import bar
 from petsc4py import PETSc
 from tolerances import LAST_BIT, ROUNDING, SOLVED, TIGHT
@@ -91,17 +91,6 @@ def test_chain_of_masses_has_its_closed_form(comm, k, m):
     model = fw.Model(m * np.eye(CHAIN), chain(CHAIN, k), comm=comm)
     found = [mode.omega for mode in fw.linear_modes(model, 6, "free")]
     assert found == pytest.approx(chain_frequencies(CHAIN, k, m)[:6], rel=1e-11)
-
-
-def distributed(A, comm):
-    """The same matrix built from petsc4py, each rank its own rows."""
-    mat = PETSc.Mat().createAIJ(A.shape, comm=comm)
-    mat.setUp()
-    for row in range(*mat.getOwnershipRange()):
-        for column in np.nonzero(A[row])[0]:
-            mat.setValue(row, column, A[row, column])
-    mat.assemble()
-    return mat
 
 
 def test_sparse_dense_and_petsc_matrices_give_the_same_modes(comm):

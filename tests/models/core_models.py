@@ -125,6 +125,19 @@ def chain(n: int, k: float = 1.0, ground: float = 0.0) -> np.ndarray:
     return (2 * k + ground) * np.eye(n) - k * np.eye(n, k=1) - k * np.eye(n, k=-1)
 
 
+def distributed(A: np.ndarray, comm, kind: str = "aij") -> PETSc.Mat:
+    """The same matrix built from petsc4py in one of its types, each rank its own rows."""
+    mat = PETSc.Mat().create(comm)
+    mat.setSizes(A.shape)
+    mat.setType(kind)
+    mat.setUp()
+    for row in range(*mat.getOwnershipRange()):
+        for column in np.nonzero(A[row])[0]:
+            mat.setValue(row, column, A[row, column])
+    mat.assemble()
+    return mat
+
+
 def derivative(function, y: np.ndarray, dy: np.ndarray, step: float = 3e-5, order: int = 4) -> np.ndarray:
     """Of a function along dy: central differences of two lengths, extrapolated.
 
