@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from models.core_models import options
+from models.core_models import counting, options
 from models.cyclic_models import GROUND, NEIGHBOUR
 from petsc4py import PETSc
 from tolerances import ROUNDING, TIGHT
@@ -82,14 +82,12 @@ def test_a_wave_of_large_sectors_is_that_of_one(comm, damping):
 def test_each_basis_is_made_on_one_rank(comm):
     """Eigenproblems of all ranks: one for each of 0 to 3 nodal diameters."""
     PETSc.Options()["shared_route"] = "krylov"
-    PETSc.Log.begin()
-    solves = PETSc.Log.Event("EPSSolve")
     with long_blades().wheel(comm) as wheel:
         problem = mode(wheel, "shared_")
-        before = solves.getPerfInfo()["count"]
-        branch = fw.Continuation(problem, problem.initial(1e-5), (1e-5, 2e-5))
-        next(branch)
-        made = solves.getPerfInfo()["count"] - before
+        with counting("EPSSolve") as solves:
+            branch = fw.Continuation(problem, problem.initial(1e-5), (1e-5, 2e-5))
+            next(branch)
+            made = solves()
     assert comm.allreduce(made) == SECTORS // 2 + 1
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -9,6 +11,8 @@ import numpy as np
 from petsc4py import PETSc
 
 import fretwave as fw
+
+STAGES = itertools.count()
 
 
 class LinearLaw(fw.PythonLaw):
@@ -101,6 +105,21 @@ def options(**values):
     finally:
         for name in values:
             table.delValue(name)
+
+
+@contextmanager
+def counting(event: str) -> Iterator[Callable[[], int]]:
+    """How often an event of PETSc's took place, inside and so far.
+
+    In a stage of its own: an event that an error left open is counted no more where it was opened.
+    """
+    PETSc.Log.begin()
+    stage = PETSc.Log.Stage(f"counting_{next(STAGES)}")
+    stage.push()
+    try:
+        yield lambda: PETSc.Log.Event(event).getPerfInfo()["count"]
+    finally:
+        stage.pop()
 
 
 def friction(B, limit: Any = 5.0, velocity: Any = 0.05, name: str = "damper") -> fw.Contact:

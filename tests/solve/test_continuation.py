@@ -6,8 +6,7 @@ import pickle
 
 import numpy as np
 import pytest
-from models.core_models import TanhLaw, dense, mode_problem, options, oscillator, single_dof, whole
-from petsc4py import PETSc
+from models.core_models import TanhLaw, counting, dense, mode_problem, options, oscillator, single_dof, whole
 from tolerances import LAST_BIT, LAST_DIGITS, REPEATED, ROUNDING, TIGHT
 
 import fretwave as fw
@@ -311,10 +310,8 @@ class SmallCubic(fw.PythonLaw):
 @pytest.mark.ranks(1)
 def test_an_event_takes_less_than_three_correctors(two_dof, comm):
     """Newton's solves over points, in steps so short that none is tried twice; the stop is solved for again once."""
-    PETSc.Log.begin()
-    solves, problem = PETSc.Log.Event("SNESSolve"), problem_of(two_dof, comm)
-    before = solves.getPerfInfo()["count"]
-    _, points = follow(problem, maximum=0.025)
-    beyond = solves.getPerfInfo()["count"] - before - len(points) - 1
+    with counting("SNESSolve") as solves:
+        _, points = follow(problem_of(two_dof, comm), maximum=0.025)
+        beyond = solves() - len(points) - 1
     assert len(named(points, "fold")) == 2 and len(named(points, "peak_damping")) == 1
     assert 3 <= beyond + 3 < 3 * 3  # a corrector each is a point's own
