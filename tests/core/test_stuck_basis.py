@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from models.core_models import options
+from models.core_models import counting, options
 from petsc4py import PETSc
 from tolerances import REPEATED, SOLVED
 
@@ -112,6 +112,25 @@ def test_branches_are_those_of_the_direct_route(comm, method, contact, damping) 
         assert one["beta"] == pytest.approx(same["beta"], rel=SOLVED, abs=SOLVED * same["omega"])
     moving = [(newton, linear) for _, newton, linear, *_ in ours if newton]
     assert max(linear / newton for newton, linear in moving) <= (12 if damping == "a damper" else 8)
+
+
+@pytest.mark.ranks(1, 2)
+def test_directions_of_the_pairs_coupling_serve_the_next_right_hand_side(comm) -> None:
+    """Fewer products than where only the first direction is kept, and the same motions."""
+    M, K = chain()
+    levels, products, points = [2.0, 2.5], [], []
+    with fw.Model(M, K, np.diag([0.1] + [0.0] * (N - 1)), [sliders("coulomb_3d", PADS, 3)], comm) as model:
+        for changes in ({}, {"fw_pairs_kept": 1}):
+            with options(**changes), counting("FwCompliance") as coupled:
+                points.append(branch(problem_of(model, "kept_"), levels))
+                products.append(coupled())
+    assert 0 < products[0] < 0.9 * products[1], products
+    assert max(found["slip"] for *_, found in points[0]) > 0.2
+    shared, alone = (reported(found) for found in points)
+    for level in levels:
+        for name in ("omega", "beta"):
+            expected, size = alone[level][name], SOLVED * alone[level]["omega"]
+            assert shared[level][name] == pytest.approx(expected, rel=SOLVED, abs=size)
 
 
 def motions_and_correctors(problem):
