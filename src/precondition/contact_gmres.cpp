@@ -23,24 +23,24 @@ ContactGmres::ContactGmres(MPI_Comm comm, PetscInt local, Product product, doubl
 Vec ContactGmres::solve() {
   const VecHandle left = solve::copy(right_);
   const double enough = tolerance_ * solve::norm(left);
-  given_ = taken_from(left);
+  auto given = taken_from(left);  // C^T b
   double size = solve::norm(left);
   for (int k = 0; k < most_ && size > enough; ++k) {
     if (k == 0) {
       starts_.push_back(solve::copy(left));
       check(VecScale(starts_.back(), 1 / size));
     }
-    if (!extend(k == 0 ? Vec(starts_.back()) : C_.back(), left)) break;
-    size = std::sqrt(std::max(size * size - given_.back() * given_.back(), 0.0));
+    if (!extend(k == 0 ? Vec(starts_.back()) : C_.back(), left, given)) break;
+    size = std::sqrt(std::max(size * size - given.back() * given.back(), 0.0));
   }
-  combine(given_);
+  combine(std::move(given));
   forget(size_t(kept));
   return x_;
 }
 
 /// One direction z: A z - C C^T A z is the next column of C, and what it gives is taken from `left`. False
 /// where there is nothing new in it.
-bool ContactGmres::extend(Vec z, Vec left) {
+bool ContactGmres::extend(Vec z, Vec left, std::vector<double>& given) {
   VecHandle image = like(z);
   product_(z, image);
   auto column = taken_from(image);
@@ -51,8 +51,8 @@ bool ContactGmres::extend(Vec z, Vec left) {
   const double size = std::sqrt(dots[0]);
   if (!(size > new_part * std::sqrt(known))) return false;
   check(VecScale(image, 1 / size));
-  column.push_back(size), given_.push_back(dots[1] / size);
-  check(VecAXPY(left, -given_.back(), image));
+  column.push_back(size), given.push_back(dots[1] / size);
+  check(VecAXPY(left, -given.back(), image));
   R_.push_back(std::move(column)), Z_.push_back(z), C_.push_back(image);
   images_.push_back(std::move(image));
   return true;

@@ -21,7 +21,7 @@ class ContactGmres {
   Vec solve();
 
  private:
-  bool extend(Vec along, Vec left);
+  bool extend(Vec z, Vec left, std::vector<double>& given);
   std::vector<double> taken_from(Vec v) const;
   void combine(std::vector<double> y);
   void forget(size_t from);
@@ -33,7 +33,6 @@ class ContactGmres {
   std::vector<VecHandle> images_, starts_;  // columns of C; of Z those that begin a Krylov space
   std::vector<Vec> C_, Z_;                  // Z: each is a start, or the column of C before it
   std::vector<std::vector<double>> R_;      // upper triangle by columns
-  std::vector<double> given_;               // C^T b
 };
 
 }  // namespace fretwave::precondition
