@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <tuple>
 
+#include "blas_kernels.h"
 #include "casters.h"
 #include "error.h"
 #include "fault.h"
@@ -76,6 +77,7 @@ void begin_log(bool nested) {
 NB_MODULE(_core, m) {
   import_petsc4py_module();  // initialises PETSc
   give_memory_back();
+  mend_blas_kernels();
   check(SlepcInitializeNoArguments());
   wheel::register_kinds();
   precondition::register_kinds();
@@ -87,6 +89,8 @@ NB_MODULE(_core, m) {
   m.def(
       "fault_point", [](std::string const& place) { fault::point(place.c_str()); },
       "A place in Python at which a fault may be armed.");
+  m.def("blas_kernels", blas_kernels,
+        "What OpenBLAS runs on this machine, such as 'SkylakeX'; empty with another BLAS.");
   m.def(
       "tuned_constants",
       [] {

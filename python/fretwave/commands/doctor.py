@@ -124,10 +124,11 @@ def check_extension(error: str, fftw: Sequence[str], petsc: Sequence[str] = ()) 
     return Check("fretwave core", not error, error or f"built, with {', '.join(fftw) or 'FFTW'}", "fretwave._core", fix)
 
 
-def check_blas(libraries: Sequence[str], rate: float) -> Check:
-    """BLAS that PETSc uses, by its path, and the measured rate of a dgemm [GFlop/s]."""
+def check_blas(libraries: Sequence[str], rate: float, kernels: str = "") -> Check:
+    """BLAS that PETSc uses, by its path, its kernels and the measured rate of a dgemm [GFlop/s]."""
     known = any(word in path for path in libraries for word in ("openblas", "mkl", "blis", "atlas"))
-    found = f"{', '.join(libraries) or 'not found'}, dgemm {rate:.1f} GFlop/s"
+    of_kernels = f" with kernels for {kernels}" if kernels else ""
+    found = f"{', '.join(libraries) or 'not found'}{of_kernels}, dgemm {rate:.1f} GFlop/s"
     fix = "apt-get install libopenblas0-serial (it becomes the active BLAS; factorisations are 7 times as fast)"
     return Check("BLAS", known or rate > SLOW_BLAS, found, "OpenBLAS or another optimised BLAS", fix, needed=False)
 
@@ -297,8 +298,13 @@ def find_core() -> list[Check]:
 
 
 def find_blas() -> list[Check]:
+    kernels = ""
+    if not import_errors(["fretwave._core"]):
+        from fretwave import _core
+
+        kernels = _core.blas_kernels()
     libraries = mapped_libraries(r"lib(blas|openblas|mkl_core|blis)[^/]*\.so")
-    return [check_blas(libraries, dgemm_rate()), check_threads(os.environ)]
+    return [check_blas(libraries, dgemm_rate(), kernels), check_threads(os.environ)]
 
 
 def examine() -> Iterator[Check]:
