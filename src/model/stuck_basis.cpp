@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "blocked_product.h"
 #include "lapack.h"
 #include "log.h"
 
@@ -12,6 +13,7 @@ namespace {
 
 constexpr double asymmetry = 1e-9;  // of the largest entry
 constexpr double stiffest = 1e-5;   // share of its motion that the structure leaves a stuck pair's spring
+constexpr int side_by_side = 32;    // modes that a matrix is read for at once, as many as registers hold
 
 bool symmetric(std::vector<double> const& A, size_t n) {
   double largest = 0, apart = 0;
@@ -122,20 +124,24 @@ bool StuckBasis::solve(std::vector<double> K, std::vector<double>& M, size_t fir
 
 std::vector<double> StuckBasis::diagonal(Mat A) const {
   std::vector<double> out(size(), 0.0);
-  VecHandle phi, moved;
-  check(MatCreateVecs(A, phi.out(), moved.out()));
-  for (int j = 0; j < modes_; ++j) {
-    const size_t at = size_t(j) * local_;
-    {
-      const WriteArray to(phi);
-      for (int i = 0; i < local_; ++i) to[i] = factor_ ? exactly_[at + i] : double(shapes_[at + i]);
-    }
-    check(MatMult(A, phi, moved));
-    const ReadArray a(phi), b(moved);
-    out[j] = std::inner_product(a.data(), a.data() + local_, b.data(), 0.0);
-  }
   MPI_Comm comm;
   check(PetscObjectGetComm(reinterpret_cast<PetscObject>(A), &comm));
+  const int together = std::clamp(modes_, 1, side_by_side);
+  BlockedProduct product(A, together);
+  const VecHandle moved = make_vector(comm, PetscInt(local_) * together);
+  const auto mode = [&](int i, int j) {
+    return factor_ ? exactly_[size_t(j) * local_ + i] : double(shapes_[size_t(j) * local_ + i]);
+  };
+  for (int first = 0; first < modes_; first += together) {
+    const int count = std::min(together, modes_ - first);
+    for (int i = 0; i < local_; ++i)
+      for (int j = 0; j < count; ++j) product.columns()[size_t(i) * together + j] = mode(i, first + j);
+    check(VecSet(moved, 0));
+    product.multiply_add(moved);
+    const ReadArray in(moved);
+    for (int i = 0; i < local_; ++i)
+      for (int j = 0; j < count; ++j) out[first + j] += mode(i, first + j) * in[size_t(i) * together + j];
+  }
   sum_over_ranks(out, comm);
   return out;
 }
