@@ -18,6 +18,7 @@ from tolerances import LAST_BIT, REPEATED, TIGHT
 
 from fretwave.case.load import load_case
 from fretwave.errors import CaseErrors, InputError
+from fretwave.model.reduction import reduce
 
 pytestmark = pytest.mark.ranks(1)
 
@@ -240,6 +241,23 @@ def test_error_at_an_amplitude_is_the_difference_to_the_unreduced_model(write, t
     assert abs(change) > 1e-7 * omega[0]
     assert 0.5 < estimate["omega"] / change < 2
     assert "the unreduced model would change omega" in (out[1] / "run.log").read_text()
+
+
+@pytest.mark.parametrize("kept, made", [(1e9, 1), (0, 2)])
+def test_an_error_of_the_reduction_makes_a_small_one_once(write, tmp_path: Path, monkeypatch, kept, made) -> None:
+    """Modes that are too large to keep are made again for it."""
+    times = []
+
+    def counted(*arguments, **options):
+        times.append(options)
+        return reduce(*arguments, **options)
+
+    monkeypatch.setattr("fretwave.model.reduction.reduce", counted)
+    monkeypatch.setattr("fretwave.case.reduce.KEPT", kept)
+    case = str(write(("[reduction]\nmodes = 6\n", "[reduction]\nmodes = 8\nerror_at = 2.1e-6\n")))
+    assert call("run", case, "--only", "mode", "--no-plots", "--out", str(tmp_path / "out")) == 0
+    assert len(times) == made
+    assert "reduction_error" in json.loads((tmp_path / "out" / "run.json").read_text())["analyses"]["mode"]
 
 
 def test_pictures_show_the_pairs(run: Path) -> None:

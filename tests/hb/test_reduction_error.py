@@ -63,6 +63,28 @@ def test_estimate_is_the_true_difference(block, comm, method):
             assert 0.5 * abs(difference) <= abs(getattr(estimate, key)) <= 2 * abs(difference), key
 
 
+def test_the_damping_of_another_analysis_takes_the_same_basis(block, comm):
+    """Component modes do not know C: that of an analysis with dampers of its own may come later."""
+    M, K, C, B, tip = block
+    keep, modes = np.union1d(np.flatnonzero(np.abs(B).sum(axis=0)), [tip]), 2
+    Br, at = np.hstack([B[:, keep], np.zeros((len(B), modes))]), int(np.searchsorted(keep, tip))
+    with (
+        fw.reduce(M, K, C, keep=keep, modes=modes, comm=comm) as own,
+        fw.reduce(M, K, keep=keep, modes=modes, comm=comm) as plain,
+        fw.reduce(M, K, 3 * C, keep=keep, modes=modes, comm=comm) as other,
+    ):
+        small = mode(own.M, own.K, own.C, Br, at, comm, "CNM", "damped_")
+        y = solve_at(small, AMPLITUDE)
+        expected = nonlinear_error(own, small, y)
+        found = [nonlinear_error(reduction, small, y, C=C) for reduction in (plain, other)]
+        undamped = nonlinear_error(plain, small, y)
+    for key in ("omega", "beta", "zeta"):
+        size = abs(expected.omega if key != "zeta" else expected.zeta)
+        for one in found:
+            assert getattr(one, key) == pytest.approx(getattr(expected, key), rel=1e-6, abs=1e-6 * size)
+    assert abs(undamped.beta - expected.beta) > 1e-3 * abs(expected.beta)
+
+
 @pytest.mark.parametrize("method, modes", [("CNM", 1), ("EPMC", 3)])
 def test_every_point_has_its_own(block, comm, method, modes):
     """By the modes next to those that are kept, within the 7 % that all others add; of the full model it is none."""

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..arrays import Array
 from ..model.contact import Contact
@@ -32,6 +32,10 @@ from .schema import (
 )
 from .toml.source import Source
 from .uncertainty import Uncertainty
+
+if TYPE_CHECKING:
+    from ..cyclic.reduction import SectorReduction
+    from ..model.reduction import Reduction
 
 
 @dataclass(frozen=True)
@@ -81,6 +85,8 @@ class Case:
         What a reduction did; None for the model as given.
     unreduced : Structure
         Before the reduction, where its error is asked for.
+    basis : Reduction or SectorReduction
+        Of the reduction, if it was kept (`fretwave.case.reduce.reduce_case`); to be destroyed.
     sector : Case
         Of a case put on its whole wheel (`fretwave.case.wheel.on_wheel`), that of the tuned sector.
     uncertainty : Uncertainty
@@ -97,6 +103,7 @@ class Case:
     keep: list[int] = field(default_factory=list)
     reduced: ReductionReport | None = None
     unreduced: Structure | None = None
+    basis: Reduction | SectorReduction | None = None
     sector: Case | None = None
     uncertainty: Uncertainty | None = None
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
+from contextlib import ExitStack
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, cast
 
@@ -30,6 +31,8 @@ if TYPE_CHECKING:
 #: Dofs of a structure up to which every rank reduces it alone: many are not quicker, and each number of them rounds
 #: K_r otherwise, of which a first bending may be 1e-8 (frequency of a lap joint: 1e-10 apart, its phase 6e-7).
 ALONE = 5000
+#: Modes up to which they are kept for an estimate of their error, over all ranks [bytes]; larger ones are made again.
+KEPT = 256e6
 
 
 def kept_dofs(structure: Structure, analyses: Mapping[int, AnalysisSection]) -> list[int]:
@@ -44,6 +47,7 @@ def reduce_case(
     comm: MPI.Comm,
     modes: int | None = None,
     look: Callable[[Reduction | SectorReduction], None] | None = None,
+    keep: bool = False,
 ) -> Case:
     """The case on its reduced matrices, itself when it asks for no reduction. Collective.
 
@@ -53,13 +57,15 @@ def reduce_case(
         Component modes, in place of the case's.
     look : callable, optional
         Gets the reduction while it lives. Collective.
+    keep : bool
+        Whether it lives on as the case's `basis`, where an analysis will ask for its error and it is small.
     """
     if case.reduction is None:
         return case
     choice = None if modes is not None else choice_of(case)
     reduced = None
     while reduced is None:
-        reduced, modes = _reduced(case, comm, modes, look, choice)
+        reduced, modes = _reduced(case, comm, modes, look, choice, keep and case.reduction.error_at is not None)
     return replace(reduced, unreduced=case.structure if case.reduction.error_at is not None else None)
 
 
@@ -69,10 +75,13 @@ def _reduced(
     modes: int | None,
     look: Callable[[Reduction | SectorReduction], None] | None,
     choice: Choice | None,
+    keep: bool,
 ) -> tuple[Case | None, int | None]:
     """With this many component modes; or, where they are not enough, none and how many to take. Collective."""
     began = time.perf_counter()
-    with reduction_of(case, comm, modes) as reduction:
+    with ExitStack() as stack:
+        reduction = reduction_of(case, comm, modes)
+        stack.enter_context(reduction)
         full = case.structure
         small = full.reduced(reduction) if full.cut is None else full.cut.reduced(reduction).tied()
         reduced = replace(case, structure=small, contacts=on(case.contacts, small))
@@ -85,13 +94,16 @@ def _reduced(
             report = replace(report, chosen=choice.line())
         if look is not None:
             look(reduction)
+        if keep and 8 * (full.cut or full).n_dof * reduction.size <= KEPT:
+            stack.pop_all()
+            reduced = replace(reduced, basis=reduction)
     return replace(reduced, reduced=report), modes
 
 
 def nonlinear_error_at(case: Case, analysis: AnalysisSection, problem: NonlinearMode, y: PETSc.Vec) -> NonlinearError:
-    """Estimate of what the unreduced model would change at a point of a mode; the reduction is made again. Collective.
+    """Estimate of what the unreduced model would change at a point of a mode. Collective.
 
-    Of a sector in a wave as of a structure.
+    Of a sector in a wave as of a structure; a reduction that was not kept is made again.
     """
     from ..cyclic.reduction_error import sector_nonlinear_error
     from ..hb.reduction_error import nonlinear_error
@@ -102,13 +114,14 @@ def nonlinear_error_at(case: Case, analysis: AnalysisSection, problem: Nonlinear
     given = [full.loads[name] for name in preload.loads] if preload is not None else []
     load = np.sum(given, axis=0) if given else None
     damped = full.damped(analysis.dampers)
-    comm, modes = problem.model.comm, case.reduced.component_modes
-    if full.neighbours is not None:
+    with ExitStack() as stack:
+        reduction = case.basis or reduction_of(full, problem.model.comm, case.reduced.component_modes)
+        if case.basis is None:
+            stack.enter_context(reduction)
+        if full.neighbours is None:
+            return nonlinear_error(cast("Reduction", reduction), problem, y, load, damped.own("C"))
         terms = (by_sector(damped.K), by_sector(damped.C), by_sector(damped.M))
-        with cast("SectorReduction", reduction_of(full, comm, modes)) as sector:
-            return sector_nonlinear_error(sector, terms, problem, y, load)
-    with cast("Reduction", reduction_of(replace(full, structure=damped), comm, modes)) as reduction:
-        return nonlinear_error(reduction, problem, y, load)
+        return sector_nonlinear_error(cast("SectorReduction", reduction), terms, problem, y, load)
 
 
 def reduction_of(case: Case, comm: MPI.Comm, modes: int | None = None) -> Reduction | SectorReduction:

@@ -14,6 +14,7 @@ from .. import _core
 from ..arrays import Array, Complex
 from ..errors import InputError, NotConverged
 from ..model.reduction import Reduction
+from ..model.sectors import Sparse
 from .omitted import harmonic_factors
 from .problems import NonlinearMode
 
@@ -46,7 +47,11 @@ class NonlinearError:
 
 
 def nonlinear_error(
-    reduction: Reduction, problem: NonlinearMode, y: PETSc.Vec, load: npt.ArrayLike | None = None
+    reduction: Reduction,
+    problem: NonlinearMode,
+    y: PETSc.Vec,
+    load: npt.ArrayLike | None = None,
+    C: Sparse | None = None,
 ) -> NonlinearError:
     """Estimated error of a reduced nonlinear mode at a converged point y. Collective.
 
@@ -64,6 +69,8 @@ def nonlinear_error(
         Of a model with the reduction's matrices; its dofs are the reduced coordinates.
     load : (n_dof,), optional
         Static load on the unreduced model, where it reaches internal dofs (contact loads do not).
+    C : (n_dof, n_dof), optional
+        Damping of the unreduced model, in place of the reduction's.
 
     Raises
     ------
@@ -83,7 +90,7 @@ def nonlinear_error(
     comm, Q = full.comm, problem.model.comm.bcast(problem.coefficients(y))
     X = full.distribute(reduction.expand(Q))
     P = np.zeros(full.n_dof) if load is None else np.asarray(load, dtype=float)
-    interior = _Interior(reduction)
+    interior = _Interior(reduction, C)
     step, residual, forces = np.zeros_like(Q), 0.0, 0.0
     for column, order, factors in harmonic_factors(problem, y):
         x: Complex = X[:, column] - 1j * (X[:, column + 1] if order else np.zeros(len(X)))
@@ -131,14 +138,18 @@ def _reduced_step(problem: NonlinearMode, y: PETSc.Vec, rows: Array) -> dict[str
 class _Interior:
     """The unreduced matrices, and Z_n on the internal dofs, for complex rows of this rank."""
 
-    def __init__(self, reduction: Reduction) -> None:
-        matrices = reduction._model._matrices
-        self.terms = [(0, matrices[0]), (2, matrices[-1])] + ([(1, matrices[1])] if len(matrices) == 3 else [])
-        self.begin, end = matrices[0].getOwnershipRange()
+    def __init__(self, reduction: Reduction, C: Sparse | None = None) -> None:
+        K, *damping, M = reduction._model._matrices
+        self.owned = [] if C is None else [reduction._model._matrix(C)]
+        self.terms = dict(zip((0, 2, 1), (K, M, *(self.owned or damping))))
+        self.begin, end = K.getOwnershipRange()
         self.inside = np.setdiff1d(np.arange(self.begin, end), reduction.keep).astype(PETSc.IntType)
-        self.where = PETSc.IS().createGeneral(self.inside, comm=matrices[0].getComm())
-        self.x, self.y = matrices[0].createVecs()
+        self.x, self.y = K.createVecs()
         self.comm = reduction._model.comm
+        where = PETSc.IS().createGeneral(self.inside, comm=K.getComm())
+        self.blocks = on_one_pattern({order: A.createSubMatrix(where, where) for order, A in self.terms.items()})
+        where.destroy()
+        self.solver = _Solver(self.blocks[0].duplicate())
 
     def restrict(self, v: Complex) -> Complex:
         """Internal rows alone, zero elsewhere."""
@@ -148,7 +159,7 @@ class _Interior:
 
     def product(self, factors: tuple[complex, complex, complex], v: Complex) -> Complex:
         out = np.zeros(len(v), dtype=complex)
-        for order, A in self.terms:
+        for order, A in self.terms.items():
             if factors[order] == 0:
                 continue
             for unit, part in ((1, np.real(v)), (1j, np.imag(v))):
@@ -162,15 +173,13 @@ class _Interior:
         w, left, size = np.zeros_like(r, dtype=complex), r.astype(complex), _square(self.comm, r)
         if size == 0:
             return w
-        solver = self._factor(tuple(float(np.real(c)) for c in factors))
+        self.solver.factorise({k: float(np.real(factors[k])) for k in self.blocks}, self.blocks)
         for _ in range(MOST_ROUNDS):
             for unit, part in ((1, left.real), (1j, left.imag)):
-                w[self.inside - self.begin] -= unit * solver(part[self.inside - self.begin])
+                w[self.inside - self.begin] -= unit * self.solver(part[self.inside - self.begin])
             left = r + self.restrict(self.product(factors, w))
             if _square(self.comm, left) <= TOLERANCE**2 * size:
-                solver.destroy()
                 return w
-        solver.destroy()
         raise NotConverged(
             "the reduction's error cannot be estimated",
             f"harmonic {order}",
@@ -179,37 +188,48 @@ class _Interior:
             "keep more component modes: this harmonic excites a resonance of the internal dofs",
         )
 
-    def _factor(self, factors: tuple[float, ...]) -> _Solver:
-        Z = None
-        for order, A in self.terms:
-            part = A.createSubMatrix(self.where, self.where)
-            part.scale(factors[order])
-            if Z is None:
-                Z = part
-            else:
-                Z.axpy(1.0, part)
-                part.destroy()
-        return _Solver(Z)
-
     def destroy(self) -> None:
-        for thing in (self.where, self.x, self.y):
+        self.solver.destroy()
+        for thing in (*self.blocks.values(), *self.owned, self.x, self.y):
             thing.destroy()
 
 
+def on_one_pattern(matrices: dict[int, PETSc.Mat]) -> dict[int, PETSc.Mat]:
+    """The same with the entries of all, zeros among them: PETSc adds those at once. They are taken over. Collective."""
+    union, *others = matrices.values()
+    pattern = union.copy()
+    for A in others:
+        pattern.axpy(1.0, A)
+    out = {}
+    for order, A in matrices.items():
+        out[order] = pattern.copy()
+        out[order].zeroEntries()
+        out[order].axpy(1.0, A, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+        A.destroy()
+    pattern.destroy()
+    return out
+
+
 class _Solver:
-    """L D L^T of a real symmetric matrix on the internal dofs."""
+    """L D L^T of real symmetric matrices on the internal dofs, one after the other, all of Z's pattern."""
 
     def __init__(self, Z: PETSc.Mat) -> None:
         Z.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         self.Z = Z
         self.ksp = PETSc.KSP().create(Z.getComm())
-        self.ksp.setOperators(Z)
         self.ksp.setType("preonly")
         pc = self.ksp.getPC()
         pc.setType("cholesky")
         pc.setFactorSolverType("mumps")
-        self.ksp.setUp()
         self.x, self.b = Z.createVecs()
+
+    def factorise(self, factors: dict[int, float], terms: dict[int, PETSc.Mat]) -> None:
+        """The sum of the terms. Collective."""
+        self.Z.zeroEntries()
+        for order, A in terms.items():
+            self.Z.axpy(factors[order], A, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+        self.ksp.setOperators(self.Z)
+        self.ksp.setUp()
 
     def __call__(self, rows: Array) -> Array:
         """This rank's internal rows."""

@@ -136,6 +136,8 @@ class Runner:
                 self._sweep(name, sweeps[name])
             else:
                 self._run_one(self.case.analyses[name])
+        if self.case.basis is not None:
+            self.case.basis.destroy()
         self._say_left_out(names)
         self._finish()
         if self.failures:
@@ -160,7 +162,7 @@ class Runner:
 
     def _reduce(self) -> None:
         """Solve on the reduced model from here on, when the case asks for one; its error is kept."""
-        self.case = reduce_case(self.case, self.comm, look=self._keep_basis)
+        self.case = reduce_case(self.case, self.comm, look=self._keep_basis, keep=True)
         if self.case.reduced is not None:
             for line in self.case.reduced.lines():
                 self.console.line(line)
