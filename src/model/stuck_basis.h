@@ -76,8 +76,7 @@ class StuckBasis {
   std::vector<double> exactly_;
   std::unique_ptr<StaticFactor> factor_;
   std::vector<ContactEntry> own_;  ///< of B, by this rank's dofs
-  /// K_s^-1 B^T where its product takes less than a solve: rows by this rank's dofs; half the factor's memory
-  /// at most.
+  /// K_s^-1 B^T where its product takes less time than a solve: rows by this rank's dofs.
   std::vector<float> static_shapes_;
   PivotedCholesky triangle_;
 };
