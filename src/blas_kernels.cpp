@@ -39,8 +39,9 @@ void mend_blas_kernels() {
   auto const* best = best_kernels();
   auto *forget = in_blas<void()>("gotoblas_dynamic_quit"), *choose = in_blas<void()>("gotoblas_dynamic_init");
   if (std::getenv(wish) || !best || blas_kernels() != "Prescott" || !forget || !choose) return;
-  setenv(wish, best, 0);  // for processes that this one starts, too
+  setenv(wish, best, 0);
   forget(), choose();
+  unsetenv(wish);  // a process begun from here may run on another machine
 }
 
 }  // namespace fretwave

@@ -18,7 +18,7 @@ from tolerances import LAST_BIT, REPEATED, TIGHT
 
 from fretwave.case.load import load_case
 from fretwave.errors import CaseErrors, InputError
-from fretwave.model.reduction import reduce
+from fretwave.model.reduction import Reduction, reduce
 
 pytestmark = pytest.mark.ranks(1)
 
@@ -258,6 +258,16 @@ def test_an_error_of_the_reduction_makes_a_small_one_once(write, tmp_path: Path,
     assert call("run", case, "--only", "mode", "--no-plots", "--out", str(tmp_path / "out")) == 0
     assert len(times) == made
     assert "reduction_error" in json.loads((tmp_path / "out" / "run.json").read_text())["analyses"]["mode"]
+
+
+@pytest.mark.parametrize("wrong, ended", [("", 0), ("-mode_nonsense 3", 2)])
+def test_a_kept_reduction_is_freed_however_the_run_ends(write, tmp_path: Path, monkeypatch, wrong, ended) -> None:
+    freed, destroy = [], Reduction.destroy
+    monkeypatch.setattr(Reduction, "destroy", lambda self: (freed.append(self), destroy(self)))
+    case = str(write(("[reduction]\nmodes = 6\n", "[reduction]\nmodes = 8\nerror_at = 2.1e-6\n")))
+    out = ["--no-plots", "--out", str(tmp_path / "out")]
+    assert call("run", case, "--only", "mode", "--petsc", wrong, *out) == ended
+    assert len(freed) == 1
 
 
 def test_pictures_show_the_pairs(run: Path) -> None:

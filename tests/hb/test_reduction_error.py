@@ -7,9 +7,11 @@ import pytest
 import scipy.sparse as sp
 from models.core_models import solve_at
 from models.hexahedra import bar
+from petsc4py import PETSc
 
 import fretwave as fw
-from fretwave.errors import InputError
+from fretwave.errors import InputError, NotConverged
+from fretwave.hb import reduction_error
 from fretwave.hb.reduction_error import nonlinear_error
 from fretwave.solve.preload import balanced
 
@@ -83,6 +85,45 @@ def test_the_damping_of_another_analysis_takes_the_same_basis(block, comm):
         for one in found:
             assert getattr(one, key) == pytest.approx(getattr(expected, key), rel=1e-6, abs=1e-6 * size)
     assert abs(undamped.beta - expected.beta) > 1e-3 * abs(expected.beta)
+
+
+def test_an_estimate_that_fails_frees_its_factor(block, comm, monkeypatch):
+    M, K, C, B, tip = block
+    freed, destroy = [], reduction_error._Interior.destroy
+    monkeypatch.setattr(reduction_error, "MOST_ROUNDS", 0)
+    monkeypatch.setattr(reduction_error._Interior, "destroy", lambda self: (freed.append(1), destroy(self)))
+    keep = np.union1d(np.flatnonzero(np.abs(B).sum(axis=0)), [tip])
+    with fw.reduce(M, K, C, keep=keep, modes=1, comm=comm) as reduction:
+        Br, at = np.hstack([B[:, keep], np.zeros((len(B), 1))]), int(np.searchsorted(keep, tip))
+        small = mode(reduction.M, reduction.K, reduction.C, Br, at, comm, "CNM", "failing_")
+        with pytest.raises(NotConverged, match="the reduction's error cannot be estimated"):
+            nonlinear_error(reduction, small, solve_at(small, AMPLITUDE))
+    assert freed == [1]
+
+
+@pytest.mark.parametrize("fuller", [3, 1e9])
+def test_damping_that_is_full_leaves_the_others_sparse(block, comm, monkeypatch, fuller):
+    """Blocks on the pattern of all, and as they are: the same sums."""
+    M, K, C, B, tip = block
+    monkeypatch.setattr(reduction_error, "FULLER", fuller)
+    full = sp.csr_matrix(C.toarray() + 1e-9 * np.abs(C).max())
+    keep = np.union1d(np.flatnonzero(np.abs(B).sum(axis=0)), [tip])
+    factors = {0: 1.0, 1: 0.3, 2: -2e5}
+    with fw.reduce(M, K, C, keep=keep, modes=1, comm=comm) as reduction:
+        interior = reduction_error._Interior(reduction, full)
+        Z, blocks = interior.solver.Z, interior.blocks
+        used = {order: A.getInfo(PETSc.Mat.InfoType.GLOBAL_SUM)["nz_used"] for order, (A, _) in blocks.items()}
+        interior.solver.factorise(factors, blocks)
+        right, out = Z.createVecs()
+        right.setRandom()
+        Z.mult(right, out)
+        x = np.concatenate(comm.allgather(right.getArray()))
+        found = np.concatenate(comm.allgather(out.getArray()))
+        interior.destroy()
+    inside = np.setdiff1d(np.arange(M.shape[0]), keep)
+    expected = sum(f * A[inside][:, inside] @ x for f, A in zip(factors.values(), (K, full, M)))
+    assert found == pytest.approx(expected, rel=1e-10, abs=1e-12 * np.abs(expected).max())
+    assert used[1] == len(inside) ** 2 and (used[0] < used[1] / 3) == (fuller == 3)
 
 
 @pytest.mark.parametrize("method, modes", [("CNM", 1), ("EPMC", 3)])

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 #: Dofs of a structure up to which every rank reduces it alone: many are not quicker, and each number of them rounds
 #: K_r otherwise, of which a first bending may be 1e-8 (frequency of a lap joint: 1e-10 apart, its phase 6e-7).
 ALONE = 5000
-#: Modes up to which they are kept for an estimate of their error, over all ranks [bytes]; larger ones are made again.
+#: Modes of all ranks up to which a reduction is kept, with its matrices [bytes]; a larger one is made again.
 KEPT = 256e6
 
 
@@ -58,14 +58,14 @@ def reduce_case(
     look : callable, optional
         Gets the reduction while it lives. Collective.
     keep : bool
-        Whether it lives on as the case's `basis`, where an analysis will ask for its error and it is small.
+        Whether it lives on as the case's `basis` if it is small: an analysis will ask for its error.
     """
     if case.reduction is None:
         return case
     choice = None if modes is not None else choice_of(case)
     reduced = None
     while reduced is None:
-        reduced, modes = _reduced(case, comm, modes, look, choice, keep and case.reduction.error_at is not None)
+        reduced, modes = _reduced(case, comm, modes, look, choice, keep)
     return replace(reduced, unreduced=case.structure if case.reduction.error_at is not None else None)
 
 
@@ -94,7 +94,8 @@ def _reduced(
             report = replace(report, chosen=choice.line())
         if look is not None:
             look(reduction)
-        if keep and 8 * (full.cut or full).n_dof * reduction.size <= KEPT:
+        n_dof = (full.cut or full).n_dof
+        if keep and 8 * n_dof * reduction.size * (comm.size if n_dof <= ALONE else 1) <= KEPT:
             stack.pop_all()
             reduced = replace(reduced, basis=reduction)
     return replace(reduced, reduced=report), modes

@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 #: Left of the interior residual when its correction is taken as solved, and the rounds given to it.
 TOLERANCE, MOST_ROUNDS = 1e-4, 30
+#: Times the entries of a matrix, from which it is not put on another's pattern: the memory would grow as much.
+FULLER = 3
 
 
 @dataclass(frozen=True)
@@ -92,15 +94,17 @@ def nonlinear_error(
     P = np.zeros(full.n_dof) if load is None else np.asarray(load, dtype=float)
     interior = _Interior(reduction, C)
     step, residual, forces = np.zeros_like(Q), 0.0, 0.0
-    for column, order, factors in harmonic_factors(problem, y):
-        x: Complex = X[:, column] - 1j * (X[:, column + 1] if order else np.zeros(len(X)))
-        r = interior.restrict(interior.product(factors, x) - (0 if order else full.distribute(P)))
-        z = interior.product(factors, interior.correction(factors, r, order))
-        residual += _square(comm, r)
-        forces += _square(comm, interior.product((1.0, 0.0, 0.0), x))
-        rows = reduction._core.project(np.ascontiguousarray(np.column_stack([z.real, -z.imag])))
-        step[:, column : column + (2 if order else 1)] = rows[:, : (2 if order else 1)]
-    interior.destroy()
+    try:
+        for column, order, factors in harmonic_factors(problem, y):
+            x: Complex = X[:, column] - 1j * (X[:, column + 1] if order else np.zeros(len(X)))
+            r = interior.restrict(interior.product(factors, x) - (0 if order else full.distribute(P)))
+            z = interior.product(factors, interior.correction(factors, r, order))
+            residual += _square(comm, r)
+            forces += _square(comm, interior.product((1.0, 0.0, 0.0), x))
+            rows = reduction._core.project(np.ascontiguousarray(np.column_stack([z.real, -z.imag])))
+            step[:, column : column + (2 if order else 1)] = rows[:, : (2 if order else 1)]
+    finally:
+        interior.destroy()
     change = _reduced_step(problem, y, step)
     return NonlinearError(**change, residual=float(np.sqrt(residual / forces)), wall_s=time.perf_counter() - began)
 
@@ -147,9 +151,11 @@ class _Interior:
         self.x, self.y = K.createVecs()
         self.comm = reduction._model.comm
         where = PETSc.IS().createGeneral(self.inside, comm=K.getComm())
-        self.blocks = on_one_pattern({order: A.createSubMatrix(where, where) for order, A in self.terms.items()})
+        blocks = {order: A.createSubMatrix(where, where) for order, A in self.terms.items()}
         where.destroy()
-        self.solver = _Solver(self.blocks[0].duplicate())
+        Z = _sum(blocks)
+        self.blocks = {order: _on_pattern(Z, A) for order, A in blocks.items()}
+        self.solver = _Solver(Z)
 
     def restrict(self, v: Complex) -> Complex:
         """Internal rows alone, zero elsewhere."""
@@ -190,24 +196,38 @@ class _Interior:
 
     def destroy(self) -> None:
         self.solver.destroy()
-        for thing in (*self.blocks.values(), *self.owned, self.x, self.y):
+        for thing in (*(block for block, _ in self.blocks.values()), *self.owned, self.x, self.y):
             thing.destroy()
 
 
-def on_one_pattern(matrices: dict[int, PETSc.Mat]) -> dict[int, PETSc.Mat]:
-    """The same with the entries of all, zeros among them: PETSc adds those at once. They are taken over. Collective."""
-    union, *others = matrices.values()
-    pattern = union.copy()
+#: A matrix and how its entries lie to those of another (PETSc's `Mat.Structure`), to which it is added.
+Block = tuple[PETSc.Mat, PETSc.Mat.Structure]
+
+
+def _sum(matrices: dict[int, PETSc.Mat]) -> PETSc.Mat:
+    """With the entries of all. Collective."""
+    first, *others = matrices.values()
+    total = first.copy()
     for A in others:
-        pattern.axpy(1.0, A)
-    out = {}
-    for order, A in matrices.items():
-        out[order] = pattern.copy()
-        out[order].zeroEntries()
-        out[order].axpy(1.0, A, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-        A.destroy()
-    pattern.destroy()
-    return out
+        total.axpy(1.0, A)
+    return total
+
+
+def _on_pattern(Z: PETSc.Mat, A: PETSc.Mat) -> Block:
+    """A, which is taken over, with zeros where Z has entries: PETSc adds it at once then. Collective.
+
+    Beside much fuller ones, such as damping by mode, it stays as it is.
+    """
+    if (
+        FULLER * A.getInfo(PETSc.Mat.InfoType.GLOBAL_SUM)["nz_used"]
+        < Z.getInfo(PETSc.Mat.InfoType.GLOBAL_SUM)["nz_used"]
+    ):
+        return A, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN
+    out = Z.copy()
+    out.zeroEntries()
+    out.axpy(1.0, A, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+    A.destroy()
+    return out, PETSc.Mat.Structure.SAME_NONZERO_PATTERN
 
 
 class _Solver:
@@ -223,11 +243,11 @@ class _Solver:
         pc.setFactorSolverType("mumps")
         self.x, self.b = Z.createVecs()
 
-    def factorise(self, factors: dict[int, float], terms: dict[int, PETSc.Mat]) -> None:
+    def factorise(self, factors: dict[int, float], terms: dict[int, Block]) -> None:
         """The sum of the terms. Collective."""
         self.Z.zeroEntries()
-        for order, A in terms.items():
-            self.Z.axpy(factors[order], A, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+        for order, (A, structure) in terms.items():
+            self.Z.axpy(factors[order], A, structure)
         self.ksp.setOperators(self.Z)
         self.ksp.setUp()
 

@@ -126,7 +126,19 @@ class Runner:
         sweeps = check_sweeps(self.case, names, self.options, self.comm)
         self.folder.record["selected"] = names
         self._greet(names)
-        self._reduce()
+        self._reduce([name for name in names if name not in sweeps])
+        try:
+            self._run_all(names, sweeps)
+        finally:
+            if self.case.basis is not None:
+                self.case.basis.destroy()
+        self._say_left_out(names)
+        self._finish()
+        if self.failures:
+            raise self.failures[0] if len(self.failures) == 1 else joined(self.failures)
+        return EXIT_DONE
+
+    def _run_all(self, names: Sequence[str], sweeps: Mapping[str, Sweep]) -> None:
         for number, name in enumerate(names, 1):
             if self.resuming and self._is_done(name):
                 continue
@@ -136,13 +148,6 @@ class Runner:
                 self._sweep(name, sweeps[name])
             else:
                 self._run_one(self.case.analyses[name])
-        if self.case.basis is not None:
-            self.case.basis.destroy()
-        self._say_left_out(names)
-        self._finish()
-        if self.failures:
-            raise self.failures[0] if len(self.failures) == 1 else joined(self.failures)
-        return EXIT_DONE
 
     def _greet(self, names: Sequence[str]) -> None:
         ranks = counted(self.comm.size, "rank")
@@ -160,9 +165,11 @@ class Runner:
         if others:
             self.console.line(f"left out by --only: {', '.join(others)}")
 
-    def _reduce(self) -> None:
+    def _reduce(self, names: Sequence[str]) -> None:
         """Solve on the reduced model from here on, when the case asks for one; its error is kept."""
-        self.case = reduce_case(self.case, self.comm, look=self._keep_basis, keep=True)
+        at = None if self.case.reduction is None else self.case.reduction.error_at
+        asked = at is not None and any(self.case.analyses[name].passes(at) for name in names)
+        self.case = reduce_case(self.case, self.comm, look=self._keep_basis, keep=asked)
         if self.case.reduced is not None:
             for line in self.case.reduced.lines():
                 self.console.line(line)
