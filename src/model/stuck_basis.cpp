@@ -6,6 +6,7 @@
 #include "blocked_product.h"
 #include "lapack.h"
 #include "log.h"
+#include "proportional.h"
 
 namespace fretwave::model {
 
@@ -122,6 +123,23 @@ bool StuckBasis::solve(std::vector<double> K, std::vector<double>& M, size_t fir
   return true;
 }
 
+/// In proportion to M, or to K, of which Psi^T K Psi = 1 - (B Psi)^T k B Psi, no product is needed.
+std::vector<double> StuckBasis::damping(Model const& model) const {
+  std::vector<double> out(size(), 0.0);
+  const MatHandle C = model.sum(1);
+  if (!C) return out;
+  const double to_mass = multiple_of(C, model.sum(2)), to_stiffness = multiple_of(C, model.sum(0));
+  if (to_mass == 0 && to_stiffness == 0) return diagonal(C);
+  for (int j = 0; j < modes_; ++j) {
+    double of_structure = 1;
+    for (int row = 0; row < rows(); ++row)
+      of_structure -= stiffness_[row] * std::pow(motions_[size_t(j) * rows() + row], 2);
+    out[j] = to_mass != 0 ? to_mass * theta_[j] : to_stiffness * of_structure;
+  }
+  return out;
+}
+
+/// Of Psi^T A Psi, over the modes.
 std::vector<double> StuckBasis::diagonal(Mat A) const {
   std::vector<double> out(size(), 0.0);
   MPI_Comm comm;

@@ -50,8 +50,8 @@ class StuckBasis {
   std::vector<double> const& theta() const { return theta_; }
   /// B Psi, rows x size.
   std::vector<double> const& motions() const { return motions_; }
-  /// Diagonal of Psi^T A Psi of a term that is neither K nor M, over the modes. Collective.
-  std::vector<double> diagonal(Mat A) const;
+  /// Diagonal of Psi^T C Psi over the modes, of all damping of the model. Collective.
+  std::vector<double> damping(Model const&) const;
   /// g = Psi^T x of coefficients, innermost, of this rank's dofs: its share. With a factor K_s^-1 x as well,
   /// if it is asked for; then collective.
   void forces(double const* x, int coefficients, double* g, double* moved = nullptr) const;
@@ -64,6 +64,7 @@ class StuckBasis {
 
  private:
   bool solve(std::vector<double> K, std::vector<double>& M, size_t first, size_t local);
+  std::vector<double> diagonal(Mat A) const;
   void add_static(MPI_Comm);
   void static_forces(double const* moved, int coefficients, double* g) const;
   void static_motion(double const* g, int coefficients, double* modal, double* q) const;

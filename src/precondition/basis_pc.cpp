@@ -41,8 +41,7 @@ BasisPreconditioner::BasisPreconditioner(HarmonicProblem& problem, model::StuckB
       first_(range_of(problem.harmonics(), rank_, size_).first),
       last_(range_of(problem.harmonics(), rank_, size_).second),
       blocks_(basis_, problem.harmonics(), first_, last_) {
-  const MatHandle C = problem.model().sum(1);
-  damping_ = C ? basis_.diagonal(C) : std::vector<double>(n_, 0.0);
+  damping_ = basis_.damping(problem.model());
   std::vector<int> components;
   for (auto const& contact : problem.model().contacts())
     components.insert(components.end(), contact.law->pairs(), contact.law->components());

@@ -115,6 +115,22 @@ def test_branches_are_those_of_the_direct_route(comm, method, contact, damping) 
 
 
 @pytest.mark.ranks(1, 2)
+@pytest.mark.parametrize("of", ["K", "M"])
+def test_damping_in_proportion_is_in_the_basis_as_any_other(comm, of) -> None:
+    """Known from K or M without a product, or by one, where an entry's twelfth digit is another: equal GMRES."""
+    M, K = chain()
+    alike = {"K": 0.3 * K, "M": 0.3 * M}[of]
+    other = alike.copy()
+    other[0, 0] *= 1 + 1e-12
+    counts = []
+    for C in (alike, other, None):
+        with fw.Model(M, K, C, [sliders("coulomb_3d", PADS, 3)], comm) as model:
+            points = branch(problem_of(model, "share_"), [1.0, 2.5])
+        counts.append([(newton, linear) for _, newton, linear, *_ in points])
+    assert counts[0] == counts[1] != counts[2]
+
+
+@pytest.mark.ranks(1, 2)
 def test_directions_of_the_pairs_coupling_serve_the_next_right_hand_side(comm) -> None:
     """Fewer products than where only the first direction is kept, and the same motions."""
     M, K = chain()
