@@ -46,6 +46,18 @@ def test_state_between_points_has_the_wanted_fundamental():
 
 
 @pytest.mark.ranks(1)
+@pytest.mark.parametrize("end", [0.1, 1.0])
+def test_a_branch_reaches_where_it_stops_whatever_its_last_digits(end):
+    """A branch that is to stop at 0.3 may end at 0.29999999999999993."""
+    columns, coefficients = branch()
+    wanted = end * (1 + 1e-15 if end == 1.0 else 1 - 1e-15)
+    q, *_ = mode_state(columns, coefficients, wanted, "CNM")
+    assert q == pytest.approx(wanted * coefficients[0] / 0.1, rel=ROUNDING)
+    with pytest.raises(InputError, match="outside the mode's branch"):
+        mode_state(columns, coefficients, end * (1 + 1e-6 if end == 1.0 else 1 - 1e-6), "CNM")
+
+
+@pytest.mark.ranks(1)
 def test_start_outside_the_branch_is_refused_with_its_range():
     with pytest.raises(InputError, match="outside the mode's branch") as error:
         mode_state(*branch(), 2.0, "CNM")

@@ -173,7 +173,8 @@ def test_a_motion_is_viewed_without_mpi_and_petsc(tmp_path, reduced):
             assert len(names) > 10
             for name in names:
                 expected, found = np.asarray(one[name][()]), np.asarray(other[name][()])
-                error = ROUNDING * np.abs(expected).max() if reduced and expected.dtype.kind == "f" else 0.0
+                # without the core, which mends its choice, OpenBLAS may run kernels that round otherwise
+                error = ROUNDING * np.abs(expected).max() if expected.dtype.kind == "f" else 0.0
                 np.testing.assert_allclose(found, expected, rtol=0, atol=error, err_msg=name)
 
 

@@ -19,6 +19,8 @@ SETTLED = 1e-3
 LAST_CYCLES = 10
 #: largest relative change of a damping ratio from one cycle to the next of a motion that is called slow
 SLOW = 0.2
+#: Relative distance up to which the end of a branch is the amplitude that it was to stop at.
+ROUNDED = 1e-9
 
 
 @dataclass(frozen=True)
@@ -39,7 +41,10 @@ def mode_state(
     neighbouring points of the last sheet, the one a decay from above meets; the fundamental of the normalised dof
     is exact.
     """
-    level, wanted = np.log(table["amplitude"]), np.log(amplitude)
+    level = np.log(table["amplitude"])
+    ends, wanted = (level.min(), level.max()), np.log(amplitude)
+    if np.abs(wanted - np.clip(wanted, *ends)) <= ROUNDED:
+        wanted = np.clip(wanted, *ends)
     between = np.flatnonzero((level[:-1] - wanted) * (level[1:] - wanted) <= 0.0)
     if not len(between):
         raise _outside(amplitude, table["amplitude"])
