@@ -12,7 +12,7 @@ namespace {
 // Coefficients in a register of AVX2. GCC 12 keeps wider ones of machines without AVX-512 in memory: 142
 // nonzeros in each of 168,000 rows times 7 coefficients take 0.32 s instead of 0.047.
 constexpr int width = 4;
-constexpr int most = 8;  // registers that stay in the machine's 16
+constexpr int most = BlockedProduct::most / width;  // registers, of the machine's 16
 using Register = double __attribute__((vector_size(width * sizeof(double))));
 
 struct Rows {

@@ -9,6 +9,8 @@ namespace fretwave {
 /// for all of them. Coefficients of other ranks' dofs stand behind this rank's.
 class BlockedProduct {
  public:
+  /// Coefficients for which A is read once, in as many registers as stay in the machine's.
+  static constexpr int most = 32;
   /// A of PETSc's AIJ types, which stays as it is. Collective.
   BlockedProduct(Mat A, int m);
   /// Where x is to be put before a product: coefficients of this rank's dofs.

@@ -15,7 +15,7 @@ namespace {
 
 /// Columns at a time: bounds the memory beside T, which a product packs anew for each panel.
 PetscInt panel_of(PetscInt columns) { return std::clamp<PetscInt>(columns / 8, 64, 512); }
-constexpr PetscInt side_by_side = 32;  // columns of a sparse product, as many as its registers hold
+constexpr PetscInt side_by_side = BlockedProduct::most;  // columns of a sparse product
 
 struct Columns {
   double const* data;

@@ -14,7 +14,6 @@ namespace {
 
 constexpr double asymmetry = 1e-9;  // of the largest entry
 constexpr double stiffest = 1e-5;   // share of its motion that the structure leaves a stuck pair's spring
-constexpr int side_by_side = 32;    // modes that a matrix is read for at once, as many as registers hold
 
 bool symmetric(std::vector<double> const& A, size_t n) {
   double largest = 0, apart = 0;
@@ -128,13 +127,17 @@ std::vector<double> StuckBasis::damping(Model const& model) const {
   std::vector<double> out(size(), 0.0);
   const MatHandle C = model.sum(1);
   if (!C) return out;
-  const double to_mass = multiple_of(C, model.sum(2)), to_stiffness = multiple_of(C, model.sum(0));
-  if (to_mass == 0 && to_stiffness == 0) return diagonal(C);
+  if (const double of_mass = multiple_of(C, model.sum(2)); of_mass != 0) {
+    for (int j = 0; j < modes_; ++j) out[j] = of_mass * theta_[j];
+    return out;
+  }
+  const double of_stiffness = multiple_of(C, model.sum(0));
+  if (of_stiffness == 0) return diagonal(C);
   for (int j = 0; j < modes_; ++j) {
-    double of_structure = 1;
+    double structure = 1;
     for (int row = 0; row < rows(); ++row)
-      of_structure -= stiffness_[row] * std::pow(motions_[size_t(j) * rows() + row], 2);
-    out[j] = to_mass != 0 ? to_mass * theta_[j] : to_stiffness * of_structure;
+      structure -= stiffness_[row] * std::pow(motions_[size_t(j) * rows() + row], 2);
+    out[j] = of_stiffness * structure;
   }
   return out;
 }
@@ -144,7 +147,7 @@ std::vector<double> StuckBasis::diagonal(Mat A) const {
   std::vector<double> out(size(), 0.0);
   MPI_Comm comm;
   check(PetscObjectGetComm(reinterpret_cast<PetscObject>(A), &comm));
-  const int together = std::clamp(modes_, 1, side_by_side);
+  const int together = std::clamp(modes_, 1, BlockedProduct::most);
   BlockedProduct product(A, together);
   const VecHandle moved = make_vector(comm, PetscInt(local_) * together);
   const auto mode = [&](int i, int j) {

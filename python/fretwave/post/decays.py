@@ -10,7 +10,7 @@ import numpy as np
 from ..arrays import Array
 from ..errors import InputError
 from .cycles import Cycles
-from .mode_curve import Crossing, ModeCurve
+from .mode_curve import AT_THE_END, Crossing, ModeCurve
 
 #: a start diverges when it exceeds this many times the larger of itself and the largest predicted limit cycle
 DIVERGED = 2.0
@@ -19,8 +19,6 @@ SETTLED = 1e-3
 LAST_CYCLES = 10
 #: largest relative change of a damping ratio from one cycle to the next of a motion that is called slow
 SLOW = 0.2
-#: Relative distance up to which the end of a branch is the amplitude that it was to stop at.
-ROUNDED = 1e-9
 
 
 @dataclass(frozen=True)
@@ -43,7 +41,7 @@ def mode_state(
     """
     level = np.log(table["amplitude"])
     ends, wanted = (level.min(), level.max()), np.log(amplitude)
-    if np.abs(wanted - np.clip(wanted, *ends)) <= ROUNDED:
+    if np.abs(wanted - np.clip(wanted, *ends)) <= AT_THE_END:
         wanted = np.clip(wanted, *ends)
     between = np.flatnonzero((level[:-1] - wanted) * (level[1:] - wanted) <= 0.0)
     if not len(between):

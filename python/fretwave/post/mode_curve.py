@@ -14,6 +14,8 @@ from ..errors import InputError
 LENGTH_WEIGHTS = (1.0, 10.0, 20.0)
 #: Damping ratios closer to zero than this have no sign: the rounding of a branch.
 NO_DAMPING = 1e-10
+#: A value this close to that of an end of a branch, relative, is met there.
+AT_THE_END = 1e-10
 
 
 #: Relative length of the curve of a branch of one point.

@@ -15,6 +15,7 @@ import numpy as np
 from ..arrays import Array
 from ..errors import InputError
 from ..hb.states import State
+from ..post.mode_curve import AT_THE_END
 from .hermite import Cubic
 from .table import PLACE, Table
 
@@ -24,8 +25,6 @@ APART = ("level", "nodal_diameter")
 DRAWN = ("amplitude", "frequency_hz", "zeta", "phase")
 #: Parts of a step in which a value is looked for on its cubic, and is drawn.
 PARTS = 8
-#: A value this close to that of an end, relative, is met there.
-AT_THE_END = 1e-10
 #: Of a column's change over a part of a step, what may be left at a crossing: a jump of the phase by 2 pi is none.
 LEFT_OVER = 1e-6
 #: Columns that tell of a point's solution, and nothing of what lies beside it.
@@ -92,8 +91,10 @@ class Curve:
             else:
                 values[column.name] = np.interp(x, rows, data) if len(data) else data
         if self.cubic is not None and len(x):
-            states = self._states(x)
-            values.update((name, states[name]) for name in self._names)
+            states, points = self._states(x), np.flatnonzero(np.isin(x, rows))
+            for name in self._names:
+                values[name] = states[name]
+                values[name][points] = self.table[name][x[points].astype(int)]  # to the last digit
         return Table([PLACE, *self.columns], values)
 
     @property

@@ -18,6 +18,7 @@ from ..errors import InputError
 from ..files.dimensions import names_of_data
 from ..model.laws import kept_laws
 from ..post.contact_history import ContactHistory
+from ..post.mode_curve import AT_THE_END
 from ..post.motion import waves
 from ..results.file import unit_of_amplitudes
 from ..texts import display, nearest
@@ -26,8 +27,6 @@ from ..units import SI, UnitSystem, units_of
 if TYPE_CHECKING:
     import h5py
 
-#: Relative distance up to which the end of a branch is the amplitude that it was to stop at.
-ROUNDED = 1e-9
 #: Columns of the branch that go with a picture.
 SHOWN = ("point", "amplitude", "cycles", "frequency_hz", "zeta", "level", "stick", "slip", "open")
 #: Points named in a message.
@@ -272,10 +271,6 @@ def analysis_name(file: h5py.File, folder: Path, case: Case, asked: str | None) 
     )
 
 
-#: Relative distance up to which the end of a branch is the amplitude that it was to stop at.
-ROUNDED = 1e-9
-
-
 def analyses_that_move(file: h5py.File, case: Case) -> list[str]:
     """Names of those that keep harmonic coefficients, in the order of the case."""
     found = [name for name in case.analyses if name in file and "coefficients" in file[name]]
@@ -303,7 +298,7 @@ def points_asked(group: h5py.Group, kept: Indices, options: ViewOptions, where: 
     chosen = [(int(point), "") for point in options.points]
     for asked in options.amplitudes:
         near = kept[np.argmin(np.abs(amplitude[kept] - asked))]
-        if abs(asked - np.clip(asked, amplitude.min(), amplitude.max())) > ROUNDED * abs(asked):
+        if abs(asked - np.clip(asked, amplitude.min(), amplitude.max())) > AT_THE_END * abs(asked):
             what = "the branch does not reach this amplitude"
             raise not_kept(what, where, f"{asked:g} {unit}", kept, group, near, options.how)
         chosen.append((int(near), f", the kept point nearest to {asked:g} {unit}"))
