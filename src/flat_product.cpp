@@ -10,87 +10,145 @@ namespace fretwave::lapack {
 
 namespace {
 
-// Of a register of AVX2; GCC 12 keeps wider ones in memory (blocked_product.cpp).
-constexpr int bytes = 32;
-
+// Registers of AVX2, of which there are 16, and of AVX-512, with 32. GCC 12 keeps those in memory where the
+// machine has none.
 template <class Real>
-constexpr int width = bytes / int(sizeof(Real));
+using Narrow __attribute__((vector_size(32))) = Real;
+template <class Real>
+using Wide __attribute__((vector_size(64))) = Real;
 
 /// Of B's entries: from a column of C to the next, and from a term of its sum to the next.
 struct Strides {
   size_t column, term;
 };
 
-constexpr int together = 6;  // columns: sums of two registers each, and A's two, B's: fifteen of sixteen
-constexpr int terms = 16;    // of transposed B at a time: as many streams through the memory
+constexpr int terms = 16;  // of transposed B at a time: as many streams through the memory
 
-/// C += A B of some registers of A's rows and some columns: the sums stay in registers.
-template <class Real, int registers, int columns>
-FRETWAVE_INLINE void dot(Real const* A, size_t step, int k, Real const* B, Strides strides, Real* C) {
-  using Register __attribute__((vector_size(bytes))) = Real;
+/// C += A B of some registers of A's rows, all rows `lead` apart, and some columns: the sums stay in
+/// registers.
+template <class Register, int registers, int columns, class Real>
+FRETWAVE_INLINE void dot(Real const* A, size_t lead, int k, Real const* B, Strides strides, Real* C) {
+  constexpr size_t width = sizeof(Register) / sizeof(Real);
   Register sum[columns][registers] = {};
   for (int l = 0; l < k; ++l) {
     Register a[registers];
     for (int r = 0; r < registers; ++r)  // one by one: an array that is copied whole stays in memory
-      std::memcpy(&a[r], A + size_t(l) * step + r * width<Real>, bytes);
+      std::memcpy(&a[r], A + size_t(l) * lead + r * width, sizeof(Register));
     for (int j = 0; j < columns; ++j)
       for (int r = 0; r < registers; ++r) sum[j][r] += B[j * strides.column + l * strides.term] * a[r];
   }
   for (int j = 0; j < columns; ++j)
     for (int r = 0; r < registers; ++r) {
       Register c;
-      std::memcpy(&c, C + j * step + r * width<Real>, bytes);
+      std::memcpy(&c, C + j * lead + r * width, sizeof c);
       c += sum[j][r];
-      std::memcpy(C + j * step + r * width<Real>, &c, bytes);
+      std::memcpy(C + j * lead + r * width, &c, sizeof c);
     }
 }
 
-/// All rows, registers by two.
-template <int columns, class Real>
-FRETWAVE_INLINE void dot_all(Real const* A, size_t step, int k, Real const* B, Strides strides, Real* C) {
-  constexpr size_t w = width<Real>;
+/// Of `rows` of them, so many registers at a time, then fewer: B comes from the cache again.
+template <class Register, int registers, int columns, class Real>
+FRETWAVE_INLINE void dot_rows(size_t rows, Real const* A, size_t lead, int k, Real const* B, Strides strides,
+                              Real* C) {
+  constexpr size_t block = registers * sizeof(Register) / sizeof(Real);
   size_t at = 0;
-  for (; at + w < step; at += 2 * w) dot<Real, 2, columns>(A + at, step, k, B, strides, C + at);
-  if (at < step) dot<Real, 1, columns>(A + at, step, k, B, strides, C + at);
+  for (; at + block <= rows; at += block)
+    dot<Register, registers, columns>(A + at, lead, k, B, strides, C + at);
+  if constexpr (registers > 1)
+    if (at < rows) dot_rows<Register, registers - 1, columns>(rows - at, A + at, lead, k, B, strides, C + at);
 }
 
-template <class Real>
+/// Of all columns, so many at a time, then fewer.
+template <class Register, int registers, int columns, class Real>
+FRETWAVE_INLINE void dot_columns(int n, Real const* A, size_t lead, int k, Real const* B, Strides strides,
+                                 Real* C) {
+  int j = 0;
+  for (; j + columns <= n; j += columns)
+    dot_rows<Register, registers, columns>(lead, A, lead, k, B + j * strides.column, strides, C + j * lead);
+  if constexpr (columns > 1)
+    if (j < n)
+      dot_columns<Register, registers, columns / 2>(n - j, A, lead, k, B + j * strides.column, strides,
+                                                    C + j * lead);
+}
+
+/// With sums of up to two registers of so many columns, or of `many` registers of half as many.
+template <class Register, int many, int columns, class Real>
 FRETWAVE_INLINE void flat(int m, int n, int k, Real alpha, Real const* A, size_t lead_a, Real const* B,
                           Strides strides, Real beta, Real* C, size_t lead_c) {
-  const size_t step = size_t((m + width<Real> - 1) / width<Real>) * width<Real>;
-  std::vector<Real> in(step * k), out(step * n);  // filled up with zeros
+  constexpr int width = sizeof(Register) / sizeof(Real);
+  const int registers = (m + width - 1) / width;
+  const size_t lead = size_t(registers) * width;
+  std::vector<Real> in(lead * k), out(lead * n);  // filled up with zeros
   for (int l = 0; l < k; ++l)
-    for (int i = 0; i < m; ++i) in[l * step + i] = alpha * A[l * lead_a + i];
+    for (int i = 0; i < m; ++i) in[l * lead + i] = alpha * A[l * lead_a + i];
   const int most = strides.term == 1 ? k : terms;
   for (int l = 0; l < k; l += most) {
     const int count = std::min(most, k - l);
-    Real const *a = &in[l * step], *b = B + l * strides.term;
-    int j = 0;
-    for (; j + together <= n; j += together)
-      dot_all<together>(a, step, count, b + j * strides.column, strides, &out[j * step]);
-    for (; j < n; ++j) dot_all<1>(a, step, count, b + j * strides.column, strides, &out[j * step]);
+    Real const *a = &in[l * lead], *b = B + l * strides.term;
+    if (many > 2 && registers > 2)
+      dot_columns<Register, many, columns / 2>(n, a, lead, count, b, strides, out.data());
+    else
+      dot_columns<Register, 2, columns>(n, a, lead, count, b, strides, out.data());
   }
   for (int j = 0; j < n; ++j)
     for (int i = 0; i < m; ++i)
-      C[j * lead_c + i] = (beta == 0 ? 0 : beta * C[j * lead_c + i]) + out[j * step + i];
+      C[j * lead_c + i] = (beta == 0 ? 0 : beta * C[j * lead_c + i]) + out[j * lead + i];
 }
 
 Strides strides_of(bool transposed, int lead) {
   return transposed ? Strides{1, size_t(lead)} : Strides{size_t(lead), 1};
 }
 
-}  // namespace
+template <class Real>
+struct Operands {
+  bool transposed;
+  int m, n, k;
+  Real alpha;
+  Real const* A;
+  int lead_a;
+  Real const* B;
+  int lead_b;
+  Real beta;
+  Real* C;
+  int lead_c;
+};
 
-FRETWAVE_VECTORISE
-void multiply_flat(bool transposed, int m, int n, int k, double alpha, double const* A, int lead_a,
-                   double const* B, int lead_b, double beta, double* C, int lead_c) {
-  flat(m, n, k, alpha, A, size_t(lead_a), B, strides_of(transposed, lead_b), beta, C, size_t(lead_c));
+/// Six columns: twelve sums, A's two and B's are fifteen of sixteen registers; twelve or six: twenty-four and
+/// four of thirty-two.
+template <class Register, int many, int columns, class Real>
+FRETWAVE_INLINE void flat(Operands<Real> const& x) {
+  flat<Register, many, columns>(x.m, x.n, x.k, x.alpha, x.A, size_t(x.lead_a), x.B,
+                                strides_of(x.transposed, x.lead_b), x.beta, x.C, size_t(x.lead_c));
 }
 
-FRETWAVE_VECTORISE
+FRETWAVE_VECTORISE void narrow(Operands<double> const& x) { flat<Narrow<double>, 2, 6>(x); }
+FRETWAVE_VECTORISE void narrow(Operands<float> const& x) { flat<Narrow<float>, 2, 6>(x); }
+
+#ifdef FRETWAVE_WIDE
+FRETWAVE_WIDE void wide(Operands<double> const& x) { flat<Wide<double>, 4, 12>(x); }
+FRETWAVE_WIDE void wide(Operands<float> const& x) { flat<Wide<float>, 4, 12>(x); }
+#endif
+
+/// In wide registers where the machine has them and rows fill more than half of one.
+template <class Real>
+void by_registers(Operands<Real> const& x) {
+#ifdef FRETWAVE_WIDE
+  static const bool has_wide = __builtin_cpu_supports("x86-64-v4");
+  if (has_wide && x.m > int(sizeof(Narrow<Real>) / sizeof(Real))) return wide(x);
+#endif
+  narrow(x);
+}
+
+}  // namespace
+
+void multiply_flat(bool transposed, int m, int n, int k, double alpha, double const* A, int lead_a,
+                   double const* B, int lead_b, double beta, double* C, int lead_c) {
+  by_registers<double>({transposed, m, n, k, alpha, A, lead_a, B, lead_b, beta, C, lead_c});
+}
+
 void multiply_flat(bool transposed, int m, int n, int k, float alpha, float const* A, int lead_a,
                    float const* B, int lead_b, float beta, float* C, int lead_c) {
-  flat(m, n, k, alpha, A, size_t(lead_a), B, strides_of(transposed, lead_b), beta, C, size_t(lead_c));
+  by_registers<float>({transposed, m, n, k, alpha, A, lead_a, B, lead_b, beta, C, lead_c});
 }
 
 }  // namespace fretwave::lapack

@@ -138,7 +138,8 @@ void multiply(char const* ops, std::array<int, 3> size, std::type_identity_t<T> 
   if (size[0] == 0 || size[1] == 0) return;
   A.lead = std::max(A.lead, 1), B.lead = std::max(B.lead, 1);
   if constexpr (std::is_floating_point_v<T>)
-    if (ops[0] == 'N' && size[0] >= least_rows && size[0] <= most_rows && size[2] >= least_terms)
+    if (ops[0] == 'N' && size[0] >= least_rows && size[0] <= most_rows && size[2] >= least_terms &&
+        double(size[0]) * size[1] * size[2] >= least_products)
       return multiply_flat(ops[1] != 'N', size[0], size[1], size[2], alpha, A.data, A.lead, B.data, B.lead,
                            beta, C, lead);
   gemm(ops, size, alpha, A, B, beta, C, lead);

@@ -11,6 +11,7 @@
 #include "casters.h"
 #include "error.h"
 #include "fault.h"
+#include "flat_product.h"
 #include "precondition/kinds.h"
 #include "tuned.h"
 #include "wheel/wheel_pc.h"
@@ -65,6 +66,21 @@ void give_memory_back() {
 #endif
 }
 
+template <class Real>
+using Rows = nb::ndarray<Real const, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+
+/// B A, or B^T A, of few columns, by rows.
+template <class Real>
+nb::ndarray<nb::numpy, Real> flat_product(Rows<Real> B, Rows<Real> A, bool transposed) {
+  const size_t k = A.shape(0), m = A.shape(1), n = B.shape(transposed ? 1 : 0), lead = B.shape(1);
+  if (B.shape(transposed ? 0 : 1) != k) throw std::invalid_argument("a product of matrices that do not fit");
+  Real* C = new Real[n * m];
+  const nb::capsule owner(C, [](void* p) noexcept { delete[] static_cast<Real*>(p); });
+  lapack::multiply_flat(transposed, int(m), int(n), int(k), Real(1), A.data(), int(m), B.data(), int(lead),
+                        Real(0), C, int(m));
+  return nb::ndarray<nb::numpy, Real>(C, {n, m}, owner);
+}
+
 /// Formats of -log_view that say what was called by what need it from the beginning on.
 void begin_log(bool nested) {
   static bool is_nested = false;
@@ -91,6 +107,9 @@ NB_MODULE(_core, m) {
       "A place in Python at which a fault may be armed.");
   m.def("blas_kernels", blas_kernels,
         "What OpenBLAS runs on this machine, such as 'SkylakeX'; empty with another BLAS.");
+  m.def("flat_product", flat_product<double>, nb::arg("B"), nb::arg("A"), nb::arg("transposed") = false,
+        "B A, or B^T A, as dense matrices multiply the coefficients of all dofs: A has few columns.");
+  m.def("flat_product", flat_product<float>, nb::arg("B"), nb::arg("A"), nb::arg("transposed") = false);
   m.def(
       "tuned_constants",
       [] {

@@ -4,6 +4,8 @@
 /// starts: the same machine takes the same code in every run.
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
 #define FRETWAVE_VECTORISE __attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default")))
+/// Of registers of 64 bytes: to be called where `__builtin_cpu_supports("x86-64-v4")` alone.
+#define FRETWAVE_WIDE __attribute__((target("arch=x86-64-v4,prefer-vector-width=512")))
 #else
 #define FRETWAVE_VECTORISE
 #endif

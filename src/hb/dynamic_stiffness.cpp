@@ -178,11 +178,10 @@ void DynamicStiffness::accumulate_transposed(std::vector<complex> const& c, Bloc
   multiply(harmonics_, c, ReadArray(x).data(), A.sparse ? A.sparse->columns() : WriteArray(work_).data(),
            local);
   if (A.sparse) return A.sparse->transposed_multiply_add(y);
-  std::vector<double> parts(size_t(all) * m, 0.0);
-  const double one = 1;
+  std::vector<double> parts(size_t(all) * m);
   if (local)
-    dgemm_("N", "T", &m, &all, &local, &one, ReadArray(work_).data(), &m, A.dense.data(), &all, &one,
-           parts.data(), &m);
+    lapack::multiply("NT", {m, all, local}, 1.0, {ReadArray(work_).data(), m}, {A.dense.data(), all}, 0.0,
+                     parts.data(), m);
   MPI_Allreduce(MPI_IN_PLACE, parts.data(), as_int(PetscInt64(parts.size()), "a dense product's entries"),
                 MPI_DOUBLE, MPI_SUM, model_.comm());
   WriteArray Y(y);
