@@ -174,7 +174,7 @@ def solve(branches: Branches, point: Point, motion: SeriesMotion, H: int, sample
         beta = motion.zeta * motion.omega0
         w = motion.lambda_.imag  # w0 of EPMC
         y = unknowns(problem, motion, at, [beta / reference, w / reference, np.log(at)])
-    first = next(iter(fw.Continuation(problem, y, (at / 2, at * 2), helped=False)), None)
+    first = next(iter(fw.Continuation(problem, y, (at / 2, at * 2), way=True)), None)
     if first is None:
         print(f"  {point.method} {point.where}: Newton fails with H = {H}, N_t = {samples}")
         return None

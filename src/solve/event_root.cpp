@@ -10,9 +10,10 @@ namespace {
 
 constexpr double jump = 0.1;       // of the end values: what is left where a test function jumps
 constexpr double on_curve = 1e-9;  // of a bracket: so precisely a curve's zero is found
-constexpr double near = 3e-3;  // of a step: what Newton leaves of trials so near to each other bends a curve
-constexpr int looks = 30;      // at a curve
-constexpr int smooth = 3;      // trials on cubics: beyond those the branch has a corner there
+constexpr double near = 3e-3;   // of a step: what Newton leaves of trials so near to each other bends a curve
+constexpr int looks = 30;       // at a curve
+constexpr int smooth = 3;       // trials on cubics: if those do not close in the branch has a corner there
+constexpr double closer = 0.1;  // of the trial before: what a value of one that closes in is at the most
 
 }  // namespace
 
@@ -86,9 +87,10 @@ std::optional<Continuation::Trial> Continuation::root(size_t which, Place a, Pla
     bracket.narrow(here);
     known = with(known, here.at, tried.back().second.y, tried.back().second.tangent);
     through = k == 0 ? known : known.between(bracket.first(), bracket.last());
-    at = k == 0       ? foretold_zero(known, which, bracket)
-         : k < smooth ? beyond(known, which, before, here, near * length)
-                      : bracket.next();
+    at = k == 0 ? foretold_zero(known, which, bracket)
+         : k < smooth || std::abs(here.value) < closer * std::abs(before.value)
+             ? beyond(known, which, before, here, near * length)
+             : bracket.next();
     if (!bracket.holds(at)) at = bracket.next();
     if (std::abs(at - here.at) < precision) break;
     before = here;

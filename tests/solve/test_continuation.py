@@ -315,3 +315,26 @@ def test_an_event_takes_less_than_three_correctors(two_dof, comm):
         beyond = solves() - len(points) - 1
     assert len(named(points, "fold")) == 2 and len(named(points, "peak_damping")) == 1
     assert 3 <= beyond + 3 < 3 * 3  # a corrector each is a point's own
+
+
+@pytest.mark.ranks(1)
+def test_a_way_has_the_points_of_the_branch_but_its_peaks(two_dof, comm):
+    """Nor the solves for them. Of steps of full length, correctors close in on a fold to the end: 47 solves where they
+    fell back on regula falsi.
+    """
+    found, solved = [], []
+    for way in (False, True):
+        problem = problem_of(two_dof, comm)
+        control = fw.StepControl(initial=0.3, maximum=1.0, max_error=1e-2)
+        with counting("SNESSolve") as solves:
+            branch = fw.Continuation(problem, problem.initial(0.1), (0.05, HIGH), control, way=way)
+            found.append(list(branch))
+            solved.append(solves())
+        assert branch.converged
+    branch, way = found
+    peaks = named(branch, "peak_damping")
+    kept = [p for p in branch if p not in peaks]
+    assert len(peaks) == 1 and 3 <= solved[0] - solved[1] <= 4
+    assert len(named(way, "fold")) == 2 and solved[1] <= 45
+    assert [p.event for p in kept] == [p.event for p in way]
+    np.testing.assert_allclose([p.parameter for p in kept], [p.parameter for p in way], ROUNDING)

@@ -78,7 +78,8 @@ class Continuation:
         and its points are kept.
     report_at : parameter values at which points are located
     upwards : the parameter grows at first
-    helped : a start that Newton does not find is looked for on other ways (`started` tells)
+    way : of which only the end counts: no peaks are located, and a start that Newton does not find is not looked for on
+        ways of its own, as it is otherwise (`started` tells)
     """
 
     def __init__(
@@ -89,7 +90,7 @@ class Continuation:
         steps: StepControl | None = None,
         report_at: Sequence[float] = (),
         upwards: bool | None = None,
-        helped: bool = True,
+        way: bool = False,
     ) -> None:
         low, high = stop
         if not low < high:
@@ -100,13 +101,15 @@ class Continuation:
         self._core = _core.Continuation(
             problem.core, problem.prefix, low, high, (steps or StepControl()).core(), list(report_at)
         )
+        if way:
+            self._core.leave_out_peaks()
         if upwards is None:
             start = problem.parameter(y0)
             upwards = bool(start < 0.5 * (low + high))
         self._upwards, self._begun, self._advice = upwards, False, ""
         self.repeated: Point | None = None
         self.resumed_at: tuple[PETSc.Vec, PETSc.Vec] | None = None
-        self.helped, self.started, self._first_reason = helped, "", ""
+        self.way, self.started, self._first_reason = way, "", ""
         self._last: PETSc.Vec | None = None
         self._over = False
 
@@ -122,7 +125,7 @@ class Continuation:
     def _first(self) -> dict[str, Any] | None:
         """The first point, by another way if Newton does not find it from the first guess."""
         point = self._core.start(self._y0, self._upwards)
-        if not self.helped:
+        if self.way:
             return dict(point) if point is not None else None
         far = point is not None and far_from_start(self.problem, point["y"])
         if point is not None and not far:

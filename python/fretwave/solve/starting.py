@@ -111,7 +111,7 @@ def _led(
     control = StepControl(initial=0.05, maximum=0.3, max_points=WAY_POINTS)
     closing = how == CLOSING
     stop = (0.0, 2 * way.last_entry(core.initial())) if closing else (-1.0, 1.0)
-    branch = follow(way, core.initial(), stop, control, upwards=not closing, helped=False)
+    branch = follow(way, core.initial(), stop, control, upwards=not closing, way=True)
     last, count = _last(branch)
     if branch.converged and last is not None:
         y = core.response(last) if isinstance(core, _core.ForcedStart) else core.mode(last)
@@ -131,7 +131,7 @@ def _grown(
         small = amplitude / 100**power
         span = (0.5 * small, amplitude)
         for control in GROWTH:
-            branch = follow(problem, problem.initial(small), span, control, upwards=True, helped=False)
+            branch = follow(problem, problem.initial(small), span, control, upwards=True, way=True)
             last, count = _last(branch, nearby=True)
             converged, reason = branch.converged, branch.reason
             branch.destroy()
