@@ -4,7 +4,7 @@ namespace fretwave::lapack {
 
 /// Rows of a flat product; over how many terms, and with how many products of two entries in all, it is worth
 /// the way around the BLAS.
-constexpr int least_rows = 3, most_rows = 64, least_terms = 48;
+constexpr int least_rows = 2, most_rows = 64, least_terms = 48;
 constexpr double least_products = 1e6;
 
 /// C (m x n) = beta C + alpha A B, or A B^T, over k, column-major, of few rows: the coefficients of a dof,
