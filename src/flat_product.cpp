@@ -10,7 +10,7 @@ namespace fretwave::lapack {
 
 namespace {
 
-// Registers of AVX2, of which there are 16, and of AVX-512, with 32. GCC 12 keeps those in memory where the
+// Registers of AVX2, of which there are 16, and of AVX-512, with 32. GCC 12 keeps either in memory where the
 // machine has none.
 template <class Real>
 using Narrow __attribute__((vector_size(32))) = Real;
@@ -84,11 +84,13 @@ FRETWAVE_INLINE void flat(int m, int n, int k, Real alpha, Real const* A, size_t
   const int most = strides.term == 1 ? k : terms;
   for (int l = 0; l < k; l += most) {
     const int count = std::min(most, k - l);
-    Real const *a = &in[l * lead], *b = B + l * strides.term;
-    if (many > 2 && registers > 2)
-      dot_columns<Register, many, columns / 2>(n, a, lead, count, b, strides, out.data());
-    else
-      dot_columns<Register, 2, columns>(n, a, lead, count, b, strides, out.data());
+    Real const *a = in.data() + l * lead, *b = B + l * strides.term;
+    if constexpr (many > 2)
+      if (registers > 2) {
+        dot_columns<Register, many, columns / 2>(n, a, lead, count, b, strides, out.data());
+        continue;
+      }
+    dot_columns<Register, 2, columns>(n, a, lead, count, b, strides, out.data());
   }
   for (int j = 0; j < n; ++j)
     for (int i = 0; i < m; ++i)
@@ -129,17 +131,34 @@ FRETWAVE_WIDE void wide(Operands<double> const& x) { flat<Wide<double>, 4, 12>(x
 FRETWAVE_WIDE void wide(Operands<float> const& x) { flat<Wide<float>, 4, 12>(x); }
 #endif
 
+bool& kept_narrow() {
+  static bool narrow = !has_wide_registers();
+  return narrow;
+}
+
 /// In wide registers where the machine has them and rows fill more than half of one.
 template <class Real>
 void by_registers(Operands<Real> const& x) {
 #ifdef FRETWAVE_WIDE
-  static const bool has_wide = __builtin_cpu_supports("x86-64-v4");
-  if (has_wide && x.m > int(sizeof(Narrow<Real>) / sizeof(Real))) return wide(x);
+  if (!kept_narrow() && x.m > int(sizeof(Narrow<Real>) / sizeof(Real))) return wide(x);
 #endif
   narrow(x);
 }
 
+constexpr int least_rows = 2, most_rows = 64, least_terms = 48;
+/// Products of two entries, up to which OpenBLAS has kernels for small matrices on machines with AVX-512,
+/// which are as quick; and of others, where making ready for the product takes as long.
+constexpr double few = 1e6, fewest = 1e5;
+
 }  // namespace
+
+void keep_registers_narrow(bool narrow) { kept_narrow() = narrow || !has_wide_registers(); }
+
+bool worth_flat(int m, int n, int k) {
+  static const bool any = has_registers();
+  return any && m >= least_rows && m <= most_rows && k >= least_terms &&
+         double(m) * n * k >= (kept_narrow() ? fewest : few);
+}
 
 void multiply_flat(bool transposed, int m, int n, int k, double alpha, double const* A, int lead_a,
                    double const* B, int lead_b, double beta, double* C, int lead_c) {

@@ -138,15 +138,14 @@ void multiply(char const* ops, std::array<int, 3> size, std::type_identity_t<T> 
   if (size[0] == 0 || size[1] == 0) return;
   A.lead = std::max(A.lead, 1), B.lead = std::max(B.lead, 1);
   if constexpr (std::is_floating_point_v<T>)
-    if (ops[0] == 'N' && size[0] >= least_rows && size[0] <= most_rows && size[2] >= least_terms &&
-        double(size[0]) * size[1] * size[2] >= least_products)
+    if (ops[0] == 'N' && worth_flat(size[0], size[1], size[2]))
       return multiply_flat(ops[1] != 'N', size[0], size[1], size[2], alpha, A.data, A.lead, B.data, B.lead,
                            beta, C, lead);
   gemm(ops, size, alpha, A, B, beta, C, lead);
 }
 
-/// Rows to which a flat matrix is filled up for a product: of 1200 x 1200 floats one with 15 rows takes
-/// OpenBLAS 0.92 ms, with 16 0.57.
+/// Rows to which a flat matrix is filled up for the BLAS, where it goes there: of 1200 x 1200 floats one with
+/// 15 rows takes OpenBLAS 0.92 ms, with 16 0.57.
 inline int filled_up(int rows) {
   const int multiple = rows <= 2 ? 1 : rows <= 4 ? 4 : 8;
   return (rows + multiple - 1) / multiple * multiple;

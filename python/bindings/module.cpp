@@ -69,6 +69,17 @@ void give_memory_back() {
 template <class Real>
 using Rows = nb::ndarray<Real const, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 
+/// beta C + alpha B A, or B^T A, of few columns, by rows; into C.
+template <class Real>
+void flat_product_added(Rows<Real> B, Rows<Real> A, bool transposed, Real alpha, Real beta,
+                        nb::ndarray<Real, nb::ndim<2>, nb::c_contig, nb::device::cpu> C) {
+  const size_t k = A.shape(0), m = A.shape(1), n = B.shape(transposed ? 1 : 0);
+  if (B.shape(transposed ? 0 : 1) != k || C.shape(0) != n || C.shape(1) < m)
+    throw std::invalid_argument("a product of matrices that do not fit");
+  lapack::multiply_flat(transposed, int(m), int(n), int(k), alpha, A.data(), int(m), B.data(),
+                        int(B.shape(1)), beta, C.data(), int(C.shape(1)));
+}
+
 /// B A, or B^T A, of few columns, by rows.
 template <class Real>
 nb::ndarray<nb::numpy, Real> flat_product(Rows<Real> B, Rows<Real> A, bool transposed) {
@@ -110,6 +121,11 @@ NB_MODULE(_core, m) {
   m.def("flat_product", flat_product<double>, nb::arg("B"), nb::arg("A"), nb::arg("transposed") = false,
         "B A, or B^T A, as dense matrices multiply the coefficients of all dofs: A has few columns.");
   m.def("flat_product", flat_product<float>, nb::arg("B"), nb::arg("A"), nb::arg("transposed") = false);
+  m.def("flat_product_added", flat_product_added<double>,
+        "beta C + alpha B A, or B^T A, into the first columns of C.");
+  m.def("flat_product_added", flat_product_added<float>);
+  m.def("keep_registers_narrow", lapack::keep_registers_narrow,
+        "Flat products take registers of AVX2 alone from here on, as on a machine without AVX-512.");
   m.def(
       "tuned_constants",
       [] {

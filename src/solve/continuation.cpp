@@ -77,7 +77,7 @@ Point Continuation::point(Trial&& trial, std::string event, double step) {
 
 /// Events of the problem, and the fold: the tangent's parameter entry changes sign.
 std::vector<TestFunction> Continuation::tests(Vec y, Vec tangent) {
-  auto all = peaks_ ? problem_.tests(y, tangent) : std::vector<TestFunction>();
+  auto all = events_ ? problem_.tests(y, tangent) : std::vector<TestFunction>();
   all.push_back({"fold", last_entry(tangent), false, true});
   return all;
 }

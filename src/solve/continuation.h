@@ -56,7 +56,7 @@ class Continuation {
   /// the corrector fails. Collective.
   std::optional<Point> take_over(Anchor from, std::string const& event, bool upwards, double began);
   /// Before the start, of a way whose end alone counts: the problem's own test functions are left out.
-  void leave_out_peaks() { peaks_ = false; }
+  void leave_out_events() { events_ = false; }
   /// The next point, or none with a reason. Collective.
   std::optional<Point> next();
 
@@ -174,7 +174,7 @@ class Continuation {
   std::vector<std::string> missed_;
   Trail trail_;
   int emitted_ = 0, meetings_ = 0, circles_ = 0, crawled_ = 0;
-  bool peaks_ = true, upwards_ = true, taken_over_ = false, turned_ = false, wary_ = false, finished_ = false,
+  bool events_ = true, upwards_ = true, taken_over_ = false, turned_ = false, wary_ = false, finished_ = false,
        converged_ = false;
   std::string ending_;  ///< reason to stop once the batch is handed out
   bool arrived_ = false;

@@ -13,7 +13,7 @@ constexpr double on_curve = 1e-9;  // of a bracket: so precisely a curve's zero 
 constexpr double near = 3e-3;   // of a step: what Newton leaves of trials so near to each other bends a curve
 constexpr int looks = 30;       // at a curve
 constexpr int smooth = 3;       // trials on cubics: if those do not close in the branch has a corner there
-constexpr double closer = 0.1;  // of the trial before: what a value of one that closes in is at the most
+constexpr double closer = 0.1;  // of all trials before: what a value of one that closes in is at the most
 
 }  // namespace
 
@@ -56,10 +56,10 @@ double Continuation::zero_on(Hermite const& curve, size_t which, Place a, Place 
 }
 
 /// First off the curve through the step's ends and, where the branch is smooth, the point before; then off
-/// that through the first trial too, from there on off the cubic through the last two. Where it foretells no
-/// other place the zero is found. Where the test function jumps, Illinois' form of regula falsi goes on, and
-/// can only bisect: eight trials are enough then for an extremum, and the last one, nearest to the jump, is
-/// taken; else the best.
+/// that through the first trial too, from there on off the cubic through the last two, from the fourth on as
+/// long as values fall tenfold. Where it foretells no other place the zero is found. Where the test function
+/// jumps, Illinois' form of regula falsi goes on, and can only bisect: eight trials are enough then for an
+/// extremum, and the last one, nearest to the jump, is taken; else the best.
 std::optional<Continuation::Trial> Continuation::root(size_t which, Place a, Place b, Hermite const& curve,
                                                       double length, double& found) {
   TestFunction const& test = anchor_tests_[which];
@@ -82,15 +82,15 @@ std::optional<Continuation::Trial> Continuation::root(size_t which, Place a, Pla
     }
     const Place here{at, trial.tests[which].value};
     tried.emplace_back(at, std::move(trial));
+    const bool closes_in = std::abs(here.value) < closer * best_value;
     if (std::abs(here.value) <= best_value) best_value = std::abs(here.value), best = tried.size() - 1;
     if (best_value < (test.extremum ? 1e-9 * size : 1e-12)) break;
     bracket.narrow(here);
     known = with(known, here.at, tried.back().second.y, tried.back().second.tangent);
     through = k == 0 ? known : known.between(bracket.first(), bracket.last());
-    at = k == 0 ? foretold_zero(known, which, bracket)
-         : k < smooth || std::abs(here.value) < closer * std::abs(before.value)
-             ? beyond(known, which, before, here, near * length)
-             : bracket.next();
+    at = k == 0                    ? foretold_zero(known, which, bracket)
+         : k < smooth || closes_in ? beyond(known, which, before, here, near * length)
+                                   : bracket.next();
     if (!bracket.holds(at)) at = bracket.next();
     if (std::abs(at - here.at) < precision) break;
     before = here;

@@ -12,7 +12,7 @@ from tolerances import ROUNDING
 import fretwave as fw
 
 N = 60  #: masses: sparse enough not to be held dense
-FULL = 135  #: of a dense model: columns by four, and three more
+FULL, LARGE = 135, 603  #: of a dense model: columns by four, and three more
 OMEGA = 0.7  #: [rad/s]
 
 
@@ -25,18 +25,23 @@ def matrices() -> tuple[sp.csr_matrix, sp.csr_matrix, sp.csr_matrix]:
     return sp.diags([rng.uniform(1, 2, N)], [0]).tocsr(), C.tocsr(), K.tocsr()
 
 
-def full_matrices() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def full_matrices(n: int = FULL) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Mass, damping and stiffness without zeros."""
     rng = np.random.default_rng(6)
-    M, C, K = ((A @ A.T) / FULL for A in rng.standard_normal((3, FULL, FULL)))
-    return M + np.eye(FULL), 0.1 * C, K + 3 * np.eye(FULL)
+    M, C, K = ((A @ A.T) / n for A in rng.standard_normal((3, n, n)))
+    return M + np.eye(n), 0.1 * C, K + 3 * np.eye(n)
+
+
+def large_matrices() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The same, of more than a million products with 9 coefficients on three ranks."""
+    return full_matrices(LARGE)
 
 
 @pytest.mark.ranks(1, 2, 3)
 @pytest.mark.parametrize(
     "orders", [[1], [1, 3], range(4), range(5), range(8), range(9), range(17), range(18), range(35)]
 )
-@pytest.mark.parametrize("of", [matrices, full_matrices])
+@pytest.mark.parametrize("of", [matrices, full_matrices, large_matrices])
 def test_dynamic_stiffness_of_every_harmonic(comm, orders, of):
     """K + i n w C - (n w)^2 M of each harmonic's q = qc - i qs, and its transpose."""
     M, C, K = of()

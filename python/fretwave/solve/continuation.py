@@ -78,8 +78,9 @@ class Continuation:
         and its points are kept.
     report_at : parameter values at which points are located
     upwards : the parameter grows at first
-    way : of which only the end counts: no peaks are located, and a start that Newton does not find is not looked for on
-        ways of its own, as it is otherwise (`started` tells)
+    way : of which only the end counts: none of the problem's own events (peaks, zero damping) are located, but folds
+        are; and a start that Newton does not find is not looked for on ways of its own, as it is otherwise (`started`
+        tells)
     """
 
     def __init__(
@@ -102,7 +103,7 @@ class Continuation:
             problem.core, problem.prefix, low, high, (steps or StepControl()).core(), list(report_at)
         )
         if way:
-            self._core.leave_out_peaks()
+            self._core.leave_out_events()
         if upwards is None:
             start = problem.parameter(y0)
             upwards = bool(start < 0.5 * (low + high))
