@@ -9,6 +9,8 @@ import pytest
 
 from fretwave import _core
 
+pytestmark = pytest.mark.ranks(1)
+
 #: Columns of a product, terms of its sums: about the blocks in which they are taken.
 SIZES = ((1, 1), (5, 3), (12, 16), (13, 17), (25, 48), (31, 130), (0, 5), (5, 0))
 
