@@ -71,36 +71,6 @@ FRETWAVE_INLINE void dot_columns(int n, Real const* A, size_t lead, int k, Real 
                                                     C + j * lead);
 }
 
-/// With sums of up to two registers of so many columns, or of `many` registers of half as many.
-template <class Register, int many, int columns, class Real>
-FRETWAVE_INLINE void flat(int m, int n, int k, Real alpha, Real const* A, size_t lead_a, Real const* B,
-                          Strides strides, Real beta, Real* C, size_t lead_c) {
-  constexpr int width = sizeof(Register) / sizeof(Real);
-  const int registers = (m + width - 1) / width;
-  const size_t lead = size_t(registers) * width;
-  std::vector<Real> in(lead * k), out(lead * n);  // filled up with zeros
-  for (int l = 0; l < k; ++l)
-    for (int i = 0; i < m; ++i) in[l * lead + i] = alpha * A[l * lead_a + i];
-  const int most = strides.term == 1 ? k : terms;
-  for (int l = 0; l < k; l += most) {
-    const int count = std::min(most, k - l);
-    Real const *a = in.data() + l * lead, *b = B + l * strides.term;
-    if constexpr (many > 2)
-      if (registers > 2) {
-        dot_columns<Register, many, columns / 2>(n, a, lead, count, b, strides, out.data());
-        continue;
-      }
-    dot_columns<Register, 2, columns>(n, a, lead, count, b, strides, out.data());
-  }
-  for (int j = 0; j < n; ++j)
-    for (int i = 0; i < m; ++i)
-      C[j * lead_c + i] = (beta == 0 ? 0 : beta * C[j * lead_c + i]) + out[j * lead + i];
-}
-
-Strides strides_of(bool transposed, int lead) {
-  return transposed ? Strides{1, size_t(lead)} : Strides{size_t(lead), 1};
-}
-
 template <class Real>
 struct Operands {
   bool transposed;
@@ -115,33 +85,49 @@ struct Operands {
   int lead_c;
 };
 
-/// Six columns: twelve sums, A's two and B's are fifteen of sixteen registers; twelve or six: twenty-four and
-/// four of thirty-two.
+/// With sums of up to two registers of so many columns, or of `many` registers of half as many.
 template <class Register, int many, int columns, class Real>
 FRETWAVE_INLINE void flat(Operands<Real> const& x) {
-  flat<Register, many, columns>(x.m, x.n, x.k, x.alpha, x.A, size_t(x.lead_a), x.B,
-                                strides_of(x.transposed, x.lead_b), x.beta, x.C, size_t(x.lead_c));
+  constexpr int width = sizeof(Register) / sizeof(Real);
+  const int registers = (x.m + width - 1) / width;
+  const size_t lead = size_t(registers) * width;
+  const Strides strides =
+      x.transposed ? Strides{1, size_t(x.lead_b)} : Strides{.column = size_t(x.lead_b), .term = 1};
+  std::vector<Real> in(lead * x.k), out(lead * x.n);  // filled up with zeros
+  for (int l = 0; l < x.k; ++l)
+    for (int i = 0; i < x.m; ++i) in[l * lead + i] = x.alpha * x.A[size_t(l) * x.lead_a + i];
+  const int most = x.transposed ? terms : x.k;
+  for (int l = 0; l < x.k; l += most) {
+    const int count = std::min(most, x.k - l);
+    Real const *a = in.data() + l * lead, *b = x.B + l * strides.term;
+    if constexpr (many > 2)
+      if (registers > 2) {
+        dot_columns<Register, many, columns / 2>(x.n, a, lead, count, b, strides, out.data());
+        continue;
+      }
+    dot_columns<Register, 2, columns>(x.n, a, lead, count, b, strides, out.data());
+  }
+  for (int j = 0; j < x.n; ++j)
+    for (int i = 0; i < x.m; ++i) {
+      Real& c = x.C[size_t(j) * x.lead_c + i];
+      c = (x.beta == 0 ? 0 : x.beta * c) + out[j * lead + i];
+    }
 }
 
+// Six columns: twelve sums, A's two and B's are fifteen of sixteen registers; twelve or six: twenty-four and
+// four of thirty-two.
 FRETWAVE_VECTORISE void narrow(Operands<double> const& x) { flat<Narrow<double>, 2, 6>(x); }
 FRETWAVE_VECTORISE void narrow(Operands<float> const& x) { flat<Narrow<float>, 2, 6>(x); }
-
-#ifdef FRETWAVE_WIDE
 FRETWAVE_WIDE void wide(Operands<double> const& x) { flat<Wide<double>, 4, 12>(x); }
 FRETWAVE_WIDE void wide(Operands<float> const& x) { flat<Wide<float>, 4, 12>(x); }
-#endif
 
-bool& kept_narrow() {
-  static bool narrow = !has_wide_registers();
-  return narrow;
-}
+const bool has_wide = FRETWAVE_SUPPORTS("x86-64-v4");
+bool takes_wide = has_wide;
 
 /// In wide registers where the machine has them and rows fill more than half of one.
 template <class Real>
 void by_registers(Operands<Real> const& x) {
-#ifdef FRETWAVE_WIDE
-  if (!kept_narrow() && x.m > int(sizeof(Narrow<Real>) / sizeof(Real))) return wide(x);
-#endif
+  if (takes_wide && x.m > int(sizeof(Narrow<Real>) / sizeof(Real))) return wide(x);
   narrow(x);
 }
 
@@ -152,12 +138,12 @@ constexpr double few = 1e6, fewest = 1e5;
 
 }  // namespace
 
-void keep_registers_narrow(bool narrow) { kept_narrow() = narrow || !has_wide_registers(); }
+void keep_registers_narrow(bool narrow) { takes_wide = has_wide && !narrow; }
 
 bool worth_flat(int m, int n, int k) {
-  static const bool any = has_registers();
+  static const bool any = FRETWAVE_SUPPORTS("x86-64-v3");
   return any && m >= least_rows && m <= most_rows && k >= least_terms &&
-         double(m) * n * k >= (kept_narrow() ? fewest : few);
+         double(m) * n * k >= (takes_wide ? few : fewest);
 }
 
 void multiply_flat(bool transposed, int m, int n, int k, double alpha, double const* A, int lead_a,

@@ -59,6 +59,9 @@ inline Handed<Mat> handed(Mat A) { return {nb::steal(to_petsc4py(A))}; }
 inline Handed<SNES> handed(SNES snes) { return {nb::steal(to_petsc4py(snes))}; }
 
 using Array = nb::ndarray<nb::numpy, double>;
+/// A matrix from Python, row by row.
+template <class Real>
+using Rows = nb::ndarray<Real const, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 
 /// A numpy array that owns a copy of the data.
 inline Array numpy_copy(double const* data, std::vector<size_t> const& shape) {

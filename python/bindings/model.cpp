@@ -8,15 +8,13 @@ namespace fretwave::python {
 
 namespace {
 
-using Rows = nb::ndarray<double const, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
-
 /// Column by column in C++, row by row in numpy.
 nb::object square(std::vector<double> const& A, size_t n) {
   if (A.empty()) return nb::none();
   return nb::cast(numpy_copy(A.data(), {n, n})).attr("T");
 }
 
-std::span<double const> entries(Rows const& rows, PetscInt expected) {
+std::span<double const> entries(Rows<double> const& rows, PetscInt expected) {
   if (rows.shape(0) != size_t(expected)) throw nb::value_error("an array has the wrong number of rows");
   return {rows.data(), rows.size()};
 }
@@ -55,11 +53,11 @@ void bind_reduction(nb::module_& m) {
                      return out;
                    })
       .def("expand",
-           [](Reduction const& r, Rows x) {
+           [](Reduction const& r, Rows<double> x) {
              const auto full = r.expand(entries(x, r.size()), PetscInt(x.shape(1)));
              return numpy_copy(full.data(), {size_t(r.local_dofs()), x.shape(1)});
            })
-      .def("project", [](Reduction const& r, Rows f) {
+      .def("project", [](Reduction const& r, Rows<double> f) {
         const auto reduced = r.project(entries(f, r.local_dofs()), PetscInt(f.shape(1)));
         return numpy_copy(reduced.data(), {size_t(r.size()), f.shape(1)});
       });

@@ -66,9 +66,6 @@ void give_memory_back() {
 #endif
 }
 
-template <class Real>
-using Rows = nb::ndarray<Real const, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
-
 /// beta C + alpha B A, or B^T A, of few columns, by rows; into C.
 template <class Real>
 void flat_product_added(Rows<Real> B, Rows<Real> A, bool transposed, Real alpha, Real beta,
@@ -83,12 +80,10 @@ void flat_product_added(Rows<Real> B, Rows<Real> A, bool transposed, Real alpha,
 /// B A, or B^T A, of few columns, by rows.
 template <class Real>
 nb::ndarray<nb::numpy, Real> flat_product(Rows<Real> B, Rows<Real> A, bool transposed) {
-  const size_t k = A.shape(0), m = A.shape(1), n = B.shape(transposed ? 1 : 0), lead = B.shape(1);
-  if (B.shape(transposed ? 0 : 1) != k) throw std::invalid_argument("a product of matrices that do not fit");
+  const size_t m = A.shape(1), n = B.shape(transposed ? 1 : 0);
   Real* C = new Real[n * m];
   const nb::capsule owner(C, [](void* p) noexcept { delete[] static_cast<Real*>(p); });
-  lapack::multiply_flat(transposed, int(m), int(n), int(k), Real(1), A.data(), int(m), B.data(), int(lead),
-                        Real(0), C, int(m));
+  flat_product_added<Real>(B, A, transposed, 1, 0, {C, {n, m}, owner});
   return nb::ndarray<nb::numpy, Real>(C, {n, m}, owner);
 }
 

@@ -12,7 +12,7 @@ from tolerances import ROUNDING
 import fretwave as fw
 
 N = 60  #: masses: sparse enough not to be held dense
-FULL, LARGE = 135, 603  #: of a dense model: columns by four, and three more
+FULL, LARGE = 135, 603  #: of dense models: columns by four, and three more
 OMEGA = 0.7  #: [rad/s]
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from ..arrays import Array
 from ..errors import InputError
 from .cycles import Cycles
-from .mode_curve import AT_THE_END, Crossing, ModeCurve
+from .mode_curve import Crossing, ModeCurve, at_the_end
 
 #: a start diverges when it exceeds this many times the larger of itself and the largest predicted limit cycle
 DIVERGED = 2.0
@@ -39,10 +39,7 @@ def mode_state(
     neighbouring points of the last sheet, the one a decay from above meets; the fundamental of the normalised dof
     is exact.
     """
-    level = np.log(table["amplitude"])
-    ends, wanted = (level.min(), level.max()), np.log(amplitude)
-    if np.abs(wanted - np.clip(wanted, *ends)) <= AT_THE_END:
-        wanted = np.clip(wanted, *ends)
+    level, wanted = np.log(table["amplitude"]), np.log(at_the_end(table["amplitude"], amplitude))
     between = np.flatnonzero((level[:-1] - wanted) * (level[1:] - wanted) <= 0.0)
     if not len(between):
         raise _outside(amplitude, table["amplitude"])

@@ -18,6 +18,12 @@ NO_DAMPING = 1e-10
 AT_THE_END = 1e-10
 
 
+def at_the_end(values: Array, asked: float) -> float:
+    """The end of a branch's values at which one that is asked for is met; else that value as it is."""
+    end = float(np.clip(asked, values.min(), values.max()))
+    return end if abs(asked - end) <= AT_THE_END * abs(asked) else asked
+
+
 #: Relative length of the curve of a branch of one point.
 SHORTEST = 1e-12
 

@@ -18,7 +18,7 @@ from ..errors import InputError
 from ..files.dimensions import names_of_data
 from ..model.laws import kept_laws
 from ..post.contact_history import ContactHistory
-from ..post.mode_curve import AT_THE_END
+from ..post.mode_curve import at_the_end
 from ..post.motion import waves
 from ..results.file import unit_of_amplitudes
 from ..texts import display, nearest
@@ -298,7 +298,7 @@ def points_asked(group: h5py.Group, kept: Indices, options: ViewOptions, where: 
     chosen = [(int(point), "") for point in options.points]
     for asked in options.amplitudes:
         near = kept[np.argmin(np.abs(amplitude[kept] - asked))]
-        if abs(asked - np.clip(asked, amplitude.min(), amplitude.max())) > AT_THE_END * abs(asked):
+        if not amplitude.min() <= at_the_end(amplitude, asked) <= amplitude.max():
             what = "the branch does not reach this amplitude"
             raise not_kept(what, where, f"{asked:g} {unit}", kept, group, near, options.how)
         chosen.append((int(near), f", the kept point nearest to {asked:g} {unit}"))
