@@ -43,7 +43,7 @@ class Scene:
 FEW = ("--tolerance", "1e-10", "--repeats", "1")
 SMALL = (
     "--harmonics",
-    "1,3,7,15,31,61,121,251",
+    "1,3,7,15,31,61,121,251,501",
     "--samples",
     "128,2048",
     "--tolerance",
@@ -108,7 +108,8 @@ HEAD = """# How far results are from the truth
 Every point of a branch says how wrong it may be: `omega_error`, `zeta_error`, `amplitude_error`, and by source what
 harmonics, samples, solver and component modes left out add (`lambda_error_*`, `amplitude_error_*`). The estimate is
 one step of Newton's on the harmonics up to 7 H / 4, 17 at the least (large models: 2 H + 1 below 4), and four times
-the samples, as far as equations go along it and taken anew where they bend, at the same amplitude
+the samples, as far as equations go along it and taken anew where they bend, at the same amplitude, and what lies above
+these as the force falls there, like 1 / H where friction jumps, at most like H^-3
 ([`discretisation_error.h`](../src/hb/discretisation_error.h)); of a reduction it is what the next component modes, as
 many again, add to the motion that there is ([`omitted.py`](../python/fretwave/model/omitted.py)). Here it is held
 against the error itself: each run of a sweep against the finest one of the study (whose own error is in the column

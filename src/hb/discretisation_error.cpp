@@ -33,6 +33,9 @@ constexpr double solved = 1e-2;  // of the residual: so far Newton goes on from 
 constexpr double astray = 10;    // of that step: what lies farther away is another solution
 const Tuned most_steps("error_steps", 20, "Newton steps at most that go on from a bent one");
 
+const Tuned slowest("error_slowest", 1, "exponent of H at the least by which what lies above falls");
+const Tuned fastest("error_fastest", 3, "the same at the most: resonances of high orders are slower");
+
 const Tuned held("error_held_means", 1e-4,
                  "share of the stuck stiffness in which estimates hold the mean of the motion");
 
@@ -62,10 +65,16 @@ std::vector<int> orders_up_to(int highest, Harmonics const& h, model::Model cons
   return orders;
 }
 
-/// All that lies above H over what the finer set has of it: a kink of friction leaves n^-2 in a force and
-/// n^-4 in the motion, so that (H / H')^3 of it lies above H' as well.
-double all_above(Harmonics const& h, Harmonics const& finer) {
-  return 1 / (1 - std::pow(double(h.highest()) / finer.highest(), 3));
+/// Bounds of what orders stand for: halfway to the next ones.
+double bound(Harmonics const& h, int order) { return order + (h.odd_only() ? 1.0 : 0.5); }
+
+/// Orders of the finer set up to the middle between H and H', in the ratio of these.
+Harmonics lower_half(Harmonics const& h, Harmonics const& finer) {
+  const double middle = std::sqrt(bound(h, h.highest()) * bound(finer, finer.highest()));
+  std::vector<int> orders;
+  for (int n : finer.orders())
+    if (n <= h.highest() || bound(finer, n) <= middle || orders.back() <= h.highest()) orders.push_back(n);
+  return {orders, finer.samples()};
 }
 
 std::unique_ptr<HarmonicProblem> refined(HarmonicProblem const& problem, std::vector<int> const& orders,
@@ -121,6 +130,7 @@ DiscretisationError::DiscretisationError(HarmonicProblem& problem, std::string c
                 " free";
     return;
   }
+  of_velocity_ = !all_laws(problem.model(), [](auto const& law) { return !law.uses_velocity(); });
   moved_ = refined(problem, orders, samples, orders.back());
   newton_ = std::make_unique<solve::Newton>(*finer_, prefix);
   newton_->solve_beside(tolerance);
@@ -273,6 +283,24 @@ void DiscretisationError::finish(Vec point, Vec row, double residual, std::span<
   check(VecAXPY(most, 1, y));
 }
 
+/// All that lies above H over what the finer set has of it. Coefficients n^-a of a contact force move the
+/// motion by n^-(a + 2), its velocity by n^-(a + 1). The force's derivative has n^-(a - 1): what lies above
+/// H' moves the retained force by (H / H')^2a of what lies above H where the force follows the motion (with a
+/// kink: a = 2), by (H / H')^(2 a - 1) where it follows the velocity (a jump: a = 1). a is told by the mean
+/// squares of the force in both halves of the orders.
+double DiscretisationError::all_above(Vec force) const {
+  Harmonics const &h = problem_.harmonics(), &finer = finer_->harmonics(), half = lower_half(h, finer);
+  const double low = solve::norm(embedded(finer_->model(), finer, half, force)), all = solve::norm(force),
+               from = bound(h, h.highest()), middle = bound(h, half.highest()),
+               to = bound(finer, finer.highest()), high_squared = all * all - low * low;
+  if (!(low > 0 && middle < to)) return 1;
+  const double squares = low * low / (middle - from) / (high_squared / (to - middle)),
+               apart = std::sqrt(to / from),  // of the geometric means of both halves
+      twice_a = std::log(squares) / std::log(apart),
+               exponent = std::clamp<double>(twice_a - of_velocity_, slowest, fastest);
+  return 1 / (1 - std::pow(from / to, exponent));
+}
+
 namespace {
 constexpr size_t above = 0, reduced = 3;  // among the sources
 }
@@ -305,8 +333,7 @@ std::optional<LeftOut> DiscretisationError::at(Vec y, Vec tangent, Vec reduction
     const auto most = std::max_element(sources.begin(), end, larger) - sources.begin();
     finish(point, row, solve::norm(sum(b)), std::span(x).first(end - sources.begin()), x[most]);
   }
-  if (!sources.empty() && sources[0] == above)
-    check(VecScale(x[0], all_above(problem_.harmonics(), finer_->harmonics())));
+  if (!sources.empty() && sources[0] == above) check(VecScale(x[0], all_above(left[above])));
   LeftOut out;
   const auto along = problem_.scalars(tangent);
   const auto change = [&](Vec v) { return at_parameter(finer_->scalars(v), along, problem_.scalar_count()); };

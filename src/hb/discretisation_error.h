@@ -57,12 +57,14 @@ class DiscretisationError {
   std::array<VecHandle, 4> residuals(Vec y, Vec point, Vec reduction);
   std::optional<bool> step(Vec point, Vec row, Vec reduction, std::span<Vec const> b, std::span<Vec const> x);
   double to_moved() const;
+  double all_above(Vec force) const;
   double bend(Vec point, Vec r, Vec reduction, Vec step);
   void from_halfway(Vec middle, Vec row, std::span<Vec const> b, std::span<Vec const> x);
   void finish(Vec point, Vec row, double residual, std::span<Vec const> x, Vec most);
 
   HarmonicProblem& problem_;
   std::string prefix_, left_out_;
+  bool of_velocity_ = false;                ///< a contact force follows it
   std::unique_ptr<HarmonicProblem> finer_;  ///< of the point, which moves in H harmonics alone
   std::unique_ptr<HarmonicProblem> moved_;  ///< of where the step leads, which moves in all
   std::unique_ptr<solve::Newton> newton_, again_;
