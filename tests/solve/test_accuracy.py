@@ -156,6 +156,11 @@ def test_a_branch_that_cannot_be_had_so_accurately_says_what_limits_it(monkeypat
 
 
 @SERIAL
+def test_few_dofs_may_take_more_harmonics():
+    assert [rules.most_harmonics(dofs) for dofs in (2, 20, 39, 40, 10**6)] == [1023, 500, 256, 255, 255]
+
+
+@SERIAL
 def test_a_branch_goes_on_from_a_snapshot_with_the_set_it_had():
     def points(branch, most=None):
         return [(p.parameter, branch.problem.harmonics.orders[-1], p.event) for _, p in zip(range(most or 999), branch)]

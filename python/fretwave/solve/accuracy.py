@@ -22,8 +22,9 @@ ORDERS = (2.0, 8.0)
 ROUNDS, SMALLER = 3, 20
 #: A set grows at most so many times at once.
 FACTOR = 3
-#: No more harmonics and samples than these.
-MOST_HARMONICS, MOST_SAMPLES = 255, 1 << 14
+#: No more harmonics and samples than these; harmonics above MANY as long as there are no more unknowns than these.
+MOST_HARMONICS, MOST_SAMPLES = 1023, 1 << 14
+MANY, UNKNOWNS = 255, 20_000
 #: Share of a branch's points that may miss the accuracy.
 TOLERATED = 0.05
 #: Points of a branch before a smaller set is tried.
@@ -40,6 +41,7 @@ class Aim:
     order_harmonics, order_samples : of convergence, as two sets at one point have shown it
     steps : points so far
     smaller : how often a smaller set was taken
+    most_harmonics : that may be taken
     """
 
     harmonics: float = 0.0
@@ -49,6 +51,7 @@ class Aim:
     order_samples: float = ORDER_OF["samples"]
     steps: int = 0
     smaller: int = 0
+    most_harmonics: int = MANY
 
     @classmethod
     def of(cls, state: Sequence[float]) -> Aim:
@@ -101,7 +104,7 @@ class Aim:
         highest, count = at.orders[-1], at.samples
         if harmonics > AIM:
             factor = (harmonics / AIM) ** (1 / self.order_harmonics)
-            highest = min(max(highest + 2, round(highest * min(factor, FACTOR))), MOST_HARMONICS)
+            highest = min(max(highest + 2, round(highest * min(factor, FACTOR))), self.most_harmonics)
         while samples > AIM and count < min(FACTOR * at.samples, MOST_SAMPLES):
             count, samples = 2 * count, samples / 2**self.order_samples
         return _other(at, at.up_to(highest, count))
@@ -122,6 +125,11 @@ class Aim:
 def _other(one: Harmonics, other: Harmonics) -> Harmonics | None:
     """The other one, if it is another."""
     return None if (one.orders, one.samples) == (other.orders, other.samples) else other
+
+
+def most_harmonics(dofs: int) -> int:
+    """Of a model with so many dofs: few resolve a steep law in thousands of unknowns, many would never end."""
+    return min(MOST_HARMONICS, max(MANY, UNKNOWNS // (2 * dofs)))
 
 
 def limiting(shares: Mapping[str, float]) -> str:

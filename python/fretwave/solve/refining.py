@@ -12,7 +12,7 @@ from petsc4py import PETSc
 from .. import _core
 from ..hb.problems import HarmonicProblem, Harmonics
 from ..hb.states import Estimate
-from .accuracy import MOST_HARMONICS, MOST_SAMPLES, ROUNDS, TOLERATED, Aim, limiting
+from .accuracy import MOST_SAMPLES, ROUNDS, TOLERATED, Aim, limiting, most_harmonics
 from .continuation import Continuation, Point
 from .steps import StepControl
 
@@ -22,7 +22,7 @@ NEAR = 0.02
 SUMS = ("newton", "linear", "wall_s")
 #: What limits it, by source of error.
 LIMITS = {
-    "harmonics": f"harmonics ({MOST_HARMONICS} at most)",
+    "harmonics": "harmonics ({most} at most)",
     "samples": f"samples ({MOST_SAMPLES} at most)",
     "solver": "the solver (tighter tolerance: -snes_rtol)",
     "unknown": "errors that cannot be estimated",
@@ -66,7 +66,7 @@ class RefiningContinuation(Continuation):
         self.accuracy, self.least, self.largest = accuracy, least or problem.harmonics, problem
         self._settings = (steps or StepControl()).core(), list(report_at)
         self.tell: Callable[[str], None] = lambda text: None
-        self._aim = Aim()
+        self._aim = Aim(most_harmonics=most_harmonics(problem.model.n_dof))
         self._present: Point | None = None  # the last point handed out, and what it solves
         self._of = problem
         self._missed_before: list[str] = []
@@ -173,7 +173,8 @@ class RefiningContinuation(Continuation):
         """Where the accuracy was kept, and what limited it elsewhere."""
         missed = sum(self.missed_by.values())
         text = f"accuracy {self.accuracy:g} kept at {self.points - missed} of {self.points} points"
-        return text + "".join(f", {n} limited by {LIMITS[source]}" for source, n in self.missed_by.items())
+        limits = {source: limit.format(most=self._aim.most_harmonics) for source, limit in LIMITS.items()}
+        return text + "".join(f", {n} limited by {limits[source]}" for source, n in self.missed_by.items())
 
     @property
     def _too_inaccurate(self) -> bool:
