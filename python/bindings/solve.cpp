@@ -100,7 +100,7 @@ void bind_solve(nb::module_& m) {
              return to_python(c.take_over(std::move(from), event, upwards, began));
            })
       .def("next", [](Continuation& c) { return to_python(c.next()); })
-      .def("leave_out_events", &Continuation::leave_out_events)
+      .def("follow_as_way", &Continuation::follow_as_way)
       .def_prop_ro("ends", &Continuation::ends)
       .def_prop_ro("reason", &Continuation::reason)
       .def_prop_ro("converged", &Continuation::converged)

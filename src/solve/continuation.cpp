@@ -77,7 +77,7 @@ Point Continuation::point(Trial&& trial, std::string event, double step) {
 
 /// Events of the problem, and the fold: the tangent's parameter entry changes sign.
 std::vector<TestFunction> Continuation::tests(Vec y, Vec tangent) {
-  auto all = events_ ? problem_.tests(y, tangent) : std::vector<TestFunction>();
+  auto all = way_ ? std::vector<TestFunction>() : problem_.tests(y, tangent);
   all.push_back({"fold", last_entry(tangent), false, true});
   return all;
 }

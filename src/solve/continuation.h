@@ -55,8 +55,9 @@ class Continuation {
   /// met at a right angle to that one's tangent, or at its parameter where that was asked for. No point where
   /// the corrector fails. Collective.
   std::optional<Point> take_over(Anchor from, std::string const& event, bool upwards, double began);
-  /// Before the start, of a way whose end alone counts: the problem's own test functions are left out.
-  void leave_out_events() { events_ = false; }
+  /// Before the start, of a way whose end alone counts, where it is corrected anew: the problem's own test
+  /// functions are left out, and nothing is polished.
+  void follow_as_way() { way_ = true; }
   /// The next point, or none with a reason. Collective.
   std::optional<Point> next();
 
@@ -174,8 +175,8 @@ class Continuation {
   std::vector<std::string> missed_;
   Trail trail_;
   int emitted_ = 0, meetings_ = 0, circles_ = 0, crawled_ = 0;
-  bool events_ = true, upwards_ = true, taken_over_ = false, turned_ = false, wary_ = false,
-       finished_ = false, converged_ = false;
+  bool way_ = false, upwards_ = true, taken_over_ = false, turned_ = false, wary_ = false, finished_ = false,
+       converged_ = false;
   std::string ending_;  ///< reason to stop once the batch is handed out
   bool arrived_ = false;
   std::string reason_;

@@ -239,8 +239,10 @@ void Continuation::reach(double value, std::string const& event, Place a, Place 
   emit(std::move(trial), std::clamp(place(), a.at, b.at), event);
 }
 
-/// One Newton step more: what is reported is as good as the corrector can make it, not just good enough.
+/// One Newton step more, unless only rounding is left: what is reported is as good as the corrector can make
+/// it, not just good enough.
 void Continuation::polish(Trial& trial, double target) {
+  if (way_ || trial.outcome.residual <= trial.outcome.rounding) return;
   Trial better = at(copy(trial.y));
   better.tangent = copy(trial.tangent);
   check(SNESSetForceIteration(newton_.snes(), PETSC_TRUE));

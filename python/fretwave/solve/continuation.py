@@ -103,7 +103,7 @@ class Continuation:
             problem.core, problem.prefix, low, high, (steps or StepControl()).core(), list(report_at)
         )
         if way:
-            self._core.leave_out_events()
+            self._core.follow_as_way()
         if upwards is None:
             start = problem.parameter(y0)
             upwards = bool(start < 0.5 * (low + high))

@@ -22,9 +22,9 @@ if TYPE_CHECKING:
 SMALLER = 5
 #: Points of a way at the most: it turns a corner wherever a pair opens or closes.
 WAY_POINTS = 20000
-#: Steps of a mode that grows, of which only the end counts: where they lose their way, those of any branch.
+#: Steps of a mode that grows, at first in proportion: where such long ones lose their way, those of any branch.
 GROWTH = (
-    StepControl(initial=0.3, maximum=1.0, max_error=1e-2, max_points=WAY_POINTS),
+    StepControl(initial=1.5, maximum=3.0, max_error=1e-2, max_points=WAY_POINTS),
     StepControl(max_points=WAY_POINTS),
 )
 #: Relative distance in frequency from the linear mode beyond which a first point may be of another mode.
