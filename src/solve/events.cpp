@@ -240,20 +240,19 @@ void Continuation::reach(double value, std::string const& event, Place a, Place 
 }
 
 /// One Newton step more, unless only rounding is left: what is reported is as good as the corrector can make
-/// it, not just good enough.
+/// it, not just good enough. The tangent is not felt to change.
 void Continuation::polish(Trial& trial, double target) {
   if (way_ || trial.outcome.residual <= trial.outcome.rounding) return;
-  Trial better = at(copy(trial.y));
-  better.tangent = copy(trial.tangent);
+  VecHandle better = copy(trial.y);
   check(SNESSetForceIteration(newton_.snes(), PETSC_TRUE));
-  const bool good = correct(better, parameter_row_, target, row_);
+  newton_.system().close(parameter_row_, target);
+  Outcome outcome = newton_.solve(better);
   check(SNESSetForceIteration(newton_.snes(), PETSC_FALSE));
   // counted as the one step it is: at rounding level its line search ends where it likes
-  better.outcome.newton = trial.outcome.newton + 1, better.outcome.linear += trial.outcome.linear;
-  if (good && better.outcome.residual <= trial.outcome.residual)
-    trial = std::move(better);
-  else
-    trial.outcome.newton = better.outcome.newton, trial.outcome.linear = better.outcome.linear;
+  const int newton = trial.outcome.newton + 1, linear = trial.outcome.linear + outcome.linear;
+  if (outcome.converged && outcome.residual <= trial.outcome.residual)
+    trial.y = std::move(better), trial.outcome = std::move(outcome);
+  trial.outcome.newton = newton, trial.outcome.linear = linear;
 }
 
 /// The same along the branch, where the corrector at a fixed parameter fails (beside a fold).
