@@ -27,6 +27,8 @@ void cgemm_(char const*, char const*, int const*, int const*, int const*, std::c
 void zgemm_(char const*, char const*, int const*, int const*, int const*, std::complex<double> const*,
             std::complex<double> const*, int const*, std::complex<double> const*, int const*,
             std::complex<double> const*, std::complex<double>*, int const*);
+void dsyrk_(char const*, char const*, int const*, int const*, double const*, double const*, int const*,
+            double const*, double*, int const*);
 void dgesv_(int const*, int const*, double*, int const*, int*, double*, int const*, int*);
 void sgesv_(int const*, int const*, float*, int const*, int*, float*, int const*, int*);
 void zgesv_(int const*, int const*, std::complex<double>*, int const*, int*, std::complex<double>*,
@@ -142,6 +144,18 @@ void multiply(char const* ops, std::array<int, 3> size, std::type_identity_t<T> 
       return multiply_flat(ops[1] != 'N', size[0], size[1], size[2], alpha, A.data, A.lead, B.data, B.lead,
                            beta, C, lead);
   gemm(ops, size, alpha, A, B, beta, C, lead);
+}
+
+/// C += alpha A A^T, both triangles, of n rows and k columns.
+inline void add_squares(int n, int k, double alpha, double const* A, double* C) {
+  const double one = 1;
+  dsyrk_("L", "N", &n, &k, &alpha, A, &n, &one, C, &n);
+  const int tile = 64;
+  for (int first = 0; first < n; first += tile)
+    for (int below = first; below < n; below += tile)
+      for (int j = first; j < std::min(first + tile, n); ++j)
+        for (int i = std::max(below, j + 1); i < std::min(below + tile, n); ++i)
+          C[size_t(i) * n + j] = C[size_t(j) * n + i];
 }
 
 /// Rows to which a flat matrix is filled up for the BLAS, where it goes there: of 1200 x 1200 floats one with

@@ -43,7 +43,7 @@ NonlinearMode::NonlinearMode(model::Model const& model, Harmonics const& h, Meth
       method_(method),
       omega_reference_(omega),
       starting_stiffness_(stiffness_scale()),
-      mass_(model.sum(2)),
+      masses_(like(shape)),
       shape_(like(shape)),
       imaginary_(like(shape)) {
   double at_dof[2] = {};
@@ -71,6 +71,8 @@ NonlinearMode::NonlinearMode(model::Model const& model, Harmonics const& h, Meth
   const complex scale = 1.0 / normal;
   check(VecAXPBYPCZ(shape_, scale.real(), -scale.imag(), 0, shape, imaginary));
   check(VecAXPBYPCZ(imaginary_, scale.imag(), scale.real(), 0, shape, imaginary));
+  check(MatGetDiagonal(model.sum(2), masses_));
+  starting_inertia_ = inertia(omega, shape_, imaginary_);
 }
 
 NonlinearMode::NonlinearMode(NonlinearMode const& same, Harmonics const& h)
@@ -78,9 +80,10 @@ NonlinearMode::NonlinearMode(NonlinearMode const& same, Harmonics const& h)
       method_(same.method_),
       omega_reference_(same.omega_reference_),
       starting_stiffness_(same.starting_stiffness_),
-      mass_(model().sum(2)),
+      masses_(solve::copy(same.masses_)),
       shape_(solve::copy(same.shape_)),
-      imaginary_(solve::copy(same.imaginary_)) {}
+      imaginary_(solve::copy(same.imaginary_)),
+      starting_inertia_(same.starting_inertia_) {}
 
 VecHandle NonlinearMode::initial(double amplitude) {
   if (!(amplitude > 0))
@@ -114,6 +117,17 @@ ScaledMotion NonlinearMode::motion(std::vector<double> const& z) const {
   return out;
 }
 
+/// w^2 phi^H diag(M) phi / phi^H phi: whether a mode has become another, without a product with M.
+double NonlinearMode::inertia(double omega, Vec cosine, Vec sine) const {
+  double moved = 0, square = 0;
+  for (Vec part : {cosine, sine}) {
+    VecHandle scaled = like(part);
+    check(VecPointwiseMult(scaled, masses_, part));
+    moved += solve::dot(scaled, part), square += solve::dot(part, part);
+  }
+  return omega * omega * moved / square;
+}
+
 bool NonlinearMode::scale(Vec y) {
   const PetscInt m = harmonics().block_size(), fundamental = harmonics().offset(harmonics().fundamental());
   VecHandle re = like(shape_), im = like(shape_);
@@ -124,9 +138,9 @@ bool NonlinearMode::scale(Vec y) {
       cosine[i] = in[i * m + fundamental], sine[i] = in[i * m + fundamental + 1];
   }
   const auto z = scalars(y);
-  const double now = inertia_per_displacement(mass_, std::hypot(z[0], z[1]) * omega_reference_, re, im);
+  const double now = inertia(std::hypot(z[0], z[1]) * omega_reference_, re, im) / starting_inertia_;
   if (!(now > 0) || !std::isfinite(now)) return false;
-  const double steps = std::round(std::log2(now / starting_stiffness_) / 4);
+  const double steps = std::round(std::log2(now) / 4);
   return measure_in(starting_stiffness_ * std::exp2(4 * steps));
 }
 

@@ -39,7 +39,7 @@ class ModalBlocks {
     double value;
   };
   /// T between some rows of B, by their places among these. `SingularBlock` if the blocks are.
-  void set_contact(std::vector<int> rows, std::vector<Entry> T);
+  void set_contact(std::vector<int> const& rows, std::vector<Entry> T);
   /// T of further rows, by their places among these, behind those that there are.
   void add_contact(std::vector<int> const& rows, std::vector<Entry> const& T);
   int rows() const { return int(rows_.size()); }
@@ -73,11 +73,15 @@ class ModalBlocks {
   void make_small(int i);
   void add_border(Small const&, std::vector<double>& N) const;
   void set_static_compliance();
-  void set_inverse(std::vector<double> const& G);
+  void take_rows(std::vector<int> const& rows);
+  template <class Real>
+  void set_inverse(std::vector<Real> G);
   template <class Real>
   std::vector<Real> static_compliance(std::vector<int> const& to, std::vector<int> const& from) const;
-  void set_border(std::vector<double> const& U);
-  void couple_border(std::vector<double> const& transposed_g);
+  void set_border();
+  void border_rows(std::vector<int> const& rows);
+  template <class Real>
+  void couple_border(std::vector<Real> const& transposed_g);
   template <class Real>
   std::vector<Real> times_T(std::vector<Real> const& x, bool transposed) const;
   void add_T(std::vector<float> const& u, std::vector<float>& to) const;
@@ -96,13 +100,14 @@ class ModalBlocks {
   double static_at_rest_ = 0;
   std::vector<int> rows_;
   std::vector<Entry> T_;
-  std::vector<float> U_, G_;         ///< (G (1 + T G)^-1)^T, column-major
+  std::vector<float> motions_;       ///< U^T of the rows, a column each
+  std::vector<float> G_;             ///< (G (1 + T G)^-1)^T, column-major
   std::vector<float> left_, right_;  ///< (1 - G X) U_l and U_l^T (1 + T G)^-1
-  std::vector<double> U_low_, H_;
-  /// Of the border by scalar and part: z^-1 C_h; c and rho; X c, c - G X c; rho X, rho (1 + T G)^-1; its
-  /// corner.
-  std::vector<double> moved_, columns_, rows_of_forces_, X_columns_, left_columns_, rows_X_, right_rows_,
-      schur_;
+  std::vector<double> H_;
+  /// Of the border by scalar and part: z^-1 C_h, R_h z^-1; c and rho; X c, c - G X c; rho X, rho (1 + T
+  /// G)^-1; its corner.
+  std::vector<double> moved_, pulled_, columns_, rows_of_forces_, X_columns_, left_columns_, rows_X_,
+      right_rows_, schur_;
   std::vector<Small> small_;
 };
 

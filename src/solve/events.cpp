@@ -239,10 +239,10 @@ void Continuation::reach(double value, std::string const& event, Place a, Place 
   emit(std::move(trial), std::clamp(place(), a.at, b.at), event);
 }
 
-/// One Newton step more, unless only rounding is left: what is reported is as good as the corrector can make
-/// it, not just good enough. The tangent is not felt to change.
+/// One Newton step more: what is reported is as good as the corrector can make it, not just good enough. The
+/// tangent does not feel it.
 void Continuation::polish(Trial& trial, double target) {
-  if (way_ || trial.outcome.residual <= trial.outcome.rounding) return;
+  if (way_) return;
   VecHandle better = copy(trial.y);
   check(SNESSetForceIteration(newton_.snes(), PETSC_TRUE));
   newton_.system().close(parameter_row_, target);

@@ -1,0 +1,59 @@
+"""Damping and frequency of the mode with few and with many harmonics, from folders of `fretwave run`.
+
+    fretwave run cases/blisk_ring/case.toml --only mode --no-plots --out runs/h3
+    fretwave run cases/blisk_ring/case.toml --only mode --no-plots --set mode.harmonics=15 --set mode.errors=false \\
+        --set 'mode.report_at=[]' --out runs/h15                                             # half an hour
+    .venv/bin/python cases/blisk_ring/harmonics.py runs/h15 runs/h3 [--out PICTURE]
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from fretwave.plots import style
+
+PICTURE = Path(__file__).parent / "pictures" / "harmonics.png"
+COLUMNS = ("amplitude", "frequency_hz", "zeta", "open")
+
+
+def branch(folder: Path) -> dict[str, npt.NDArray[np.float64]]:
+    """Columns of the mode's table, and how many of its rows are folds."""
+    with (folder / "mode.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    columns = {name: np.array([float(row[name]) for row in rows]) for name in COLUMNS}
+    return {**columns, "folds": np.array(sum("fold" in row["event"] for row in rows))}
+
+
+def harmonics_of(folder: Path) -> int:
+    """Highest one of the run."""
+    return int(json.loads((folder / "run.json").read_text())["case"]["resolved"]["mode.harmonics"])
+
+
+def draw(folders: list[Path], path: Path) -> None:
+    with style.rules():
+        figure, (upper, lower) = style.new_figure(6.4, rows=2, sharex=True)
+        for k, folder in enumerate(folders):
+            found = branch(folder)
+            label = f"H = {harmonics_of(folder)}, {len(found['zeta'])} points, {int(found['folds'])} folds"
+            look = {"color": (style.RED, style.BLUE, style.INK)[k % 3], "lw": 0.7 if found["folds"] > 5 else 1.8}
+            upper.plot(1e3 * found["amplitude"], 100 * found["zeta"], label=label, **look)
+            lower.plot(1e3 * found["amplitude"], found["frequency_hz"], label=label, **look)
+        upper.set_ylabel(style.label("Modal damping", "%"))
+        lower.set(xlabel=style.label("Amplitude of the tip", "mm"))
+        lower.set_ylabel(style.label("Frequency", "Hz"))
+        upper.legend()
+        figure.savefig(path, dpi=style.DPI)
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folders", nargs="+", type=Path)
+    parser.add_argument("--out", type=Path, default=PICTURE)
+    options = parser.parse_args()
+    draw(options.folders, options.out)
