@@ -19,15 +19,15 @@ import numpy.typing as npt
 from fretwave.plots import style
 
 PICTURE = Path(__file__).parent / "pictures" / "harmonics.png"
-COLUMNS = ("amplitude", "frequency_hz", "zeta", "open")
+COLUMNS = ("amplitude", "frequency_hz", "zeta")
 
 
-def branch(folder: Path) -> dict[str, npt.NDArray[np.float64]]:
+def branch(folder: Path) -> tuple[dict[str, npt.NDArray[np.float64]], int]:
     """Columns of the mode's table, and how many of its rows are folds."""
     with (folder / "mode.csv").open() as file:
         rows = list(csv.DictReader(file))
     columns = {name: np.array([float(row[name]) for row in rows]) for name in COLUMNS}
-    return {**columns, "folds": np.array(sum("fold" in row["event"] for row in rows))}
+    return columns, sum("fold" in row["event"] for row in rows)
 
 
 def harmonics_of(folder: Path) -> int:
@@ -39,9 +39,9 @@ def draw(folders: list[Path], path: Path) -> None:
     with style.rules():
         figure, (upper, lower) = style.new_figure(6.4, rows=2, sharex=True)
         for k, folder in enumerate(folders):
-            found = branch(folder)
-            label = f"H = {harmonics_of(folder)}, {len(found['zeta'])} points, {int(found['folds'])} folds"
-            look = {"color": (style.RED, style.BLUE, style.INK)[k % 3], "lw": 0.7 if found["folds"] > 5 else 1.8}
+            found, folds = branch(folder)
+            label = f"H = {harmonics_of(folder)}, {len(found['zeta'])} points, {folds} folds"
+            look = {"color": (style.RED, style.BLUE, style.INK)[k % 3], "lw": 0.7 if folds > 5 else 1.8}
             upper.plot(1e3 * found["amplitude"], 100 * found["zeta"], label=label, **look)
             lower.plot(1e3 * found["amplitude"], found["frequency_hz"], label=label, **look)
         upper.set_ylabel(style.label("Modal damping", "%"))

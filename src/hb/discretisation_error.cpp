@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <iterator>
 #include <numeric>
 
 #include "error.h"
@@ -63,18 +64,6 @@ std::vector<int> orders_up_to(int highest, Harmonics const& h, model::Model cons
   std::vector<int> orders;
   for (int n = odd ? 1 : 0; n <= highest; n += odd ? 2 : 1) orders.push_back(n);
   return orders;
-}
-
-/// Bounds of what orders stand for: halfway to the next ones.
-double bound(Harmonics const& h, int order) { return order + (h.odd_only() ? 1.0 : 0.5); }
-
-/// Orders of the finer set up to the middle between H and H', in the ratio of these.
-Harmonics lower_half(Harmonics const& h, Harmonics const& finer) {
-  const double middle = std::sqrt(bound(h, h.highest()) * bound(finer, finer.highest()));
-  std::vector<int> orders;
-  for (int n : finer.orders())
-    if (n <= h.highest() || bound(finer, n) <= middle || orders.back() <= h.highest()) orders.push_back(n);
-  return {orders, finer.samples()};
 }
 
 std::unique_ptr<HarmonicProblem> refined(HarmonicProblem const& problem, std::vector<int> const& orders,
@@ -283,22 +272,45 @@ void DiscretisationError::finish(Vec point, Vec row, double residual, std::span<
   check(VecAXPY(most, 1, y));
 }
 
+/// Of a force's coefficients of the finer orders up to one.
+double DiscretisationError::square_up_to(int highest, Vec force) const {
+  Harmonics const& finer = finer_->harmonics();
+  std::vector<int> orders;
+  std::ranges::copy_if(finer.orders(), std::back_inserter(orders), [&](int n) { return n <= highest; });
+  if (orders.empty()) return 0;
+  const Harmonics lower(orders, finer.samples());
+  return std::pow(solve::norm(embedded(finer_->model(), finer, lower, force)), 2);
+}
+
+/// 2 a of coefficients n^-a above H, by the mean squares of a lower and an upper half of the new orders, in
+/// pairs of an even and an odd one: motions are often nearly odd. None of fewer than two pairs.
+std::optional<double> DiscretisationError::fall(Vec force) const {
+  const int H = problem_.harmonics().highest(), pairs = (finer_->harmonics().highest() - H) / 2;
+  if (pairs < 2) return {};
+  const double from = bound(H), to = bound(H + 2 * pairs);
+  const int half = std::clamp(int(std::lround((std::sqrt(from * to) - from) / 2)), 1, pairs - 1);
+  const double middle = bound(H + 2 * half), below = square_up_to(H + 2 * half, force),
+               low = below - square_up_to(H, force),
+               high = std::max(square_up_to(H + 2 * pairs, force) - below, 0.0);
+  if (!(low > 0)) return {};
+  return std::log(low / (middle - from) * (to - middle) / high) / std::log(std::sqrt(to / from));
+}
+
+/// What an order stands for ends halfway to the next one.
+double DiscretisationError::bound(int order) const {
+  return order + (finer_->harmonics().odd_only() ? 1.0 : 0.5);
+}
+
 /// All that lies above H over what the finer set has of it. Coefficients n^-a of a contact force move the
 /// motion by n^-(a + 2), its velocity by n^-(a + 1). The force's derivative has n^-(a - 1): what lies above
 /// H' moves the retained force by (H / H')^2a of what lies above H where the force follows the motion (with a
-/// kink: a = 2), by (H / H')^(2 a - 1) where it follows the velocity (a jump: a = 1). a is told by the mean
-/// squares of the force in both halves of the orders.
+/// kink: a = 2), by (H / H')^(2 a - 1) where it follows the velocity (a jump: a = 1).
 double DiscretisationError::all_above(Vec force) const {
-  Harmonics const &h = problem_.harmonics(), &finer = finer_->harmonics(), half = lower_half(h, finer);
-  const double low = solve::norm(embedded(finer_->model(), finer, half, force)), all = solve::norm(force),
-               from = bound(h, h.highest()), middle = bound(h, half.highest()),
-               to = bound(finer, finer.highest()), high_squared = all * all - low * low;
-  if (!(low > 0 && middle < to)) return 1;
-  const double squares = low * low / (middle - from) / (high_squared / (to - middle)),
-               apart = std::sqrt(to / from),  // of the geometric means of both halves
-      twice_a = std::log(squares) / std::log(apart),
-               exponent = std::clamp<double>(twice_a - of_velocity_, slowest, fastest);
-  return 1 / (1 - std::pow(from / to, exponent));
+  const auto twice_a = fall(force);
+  const double least = slowest, most = fastest, unknown = of_velocity_ ? (least + most) / 2 : most,
+               told = twice_a.value_or(unknown) - (twice_a && of_velocity_ ? 1 : 0),
+               share = bound(problem_.harmonics().highest()) / bound(finer_->harmonics().highest());
+  return 1 / (1 - std::pow(share, std::clamp(told, least, most)));
 }
 
 namespace {

@@ -57,6 +57,9 @@ class DiscretisationError {
   std::array<VecHandle, 4> residuals(Vec y, Vec point, Vec reduction);
   std::optional<bool> step(Vec point, Vec row, Vec reduction, std::span<Vec const> b, std::span<Vec const> x);
   double to_moved() const;
+  double square_up_to(int highest, Vec force) const;
+  std::optional<double> fall(Vec force) const;
+  double bound(int order) const;
   double all_above(Vec force) const;
   double bend(Vec point, Vec r, Vec reduction, Vec step);
   void from_halfway(Vec middle, Vec row, std::span<Vec const> b, std::span<Vec const> x);

@@ -24,8 +24,8 @@ class NonlinearMode : public HarmonicProblem {
   std::unique_ptr<HarmonicProblem> on(Harmonics const& h) const override {
     return std::unique_ptr<HarmonicProblem>(new NonlinearMode(*this, h));
   }
-  /// k_ref of the motion at y in place of the starting mode's, by powers of 16: a contact far stiffer than
-  /// what moves once it slips would hide every other force behind its own.
+  /// k_ref of the motion at y in place of the starting mode's, by powers of 16, as the diagonal of M tells: a
+  /// contact far stiffer than what moves once it slips would hide every other force behind its own.
   bool scale(Vec y) override;
   /// Of omega, and a hundredth of the relative one of beta (of 1e-4 omega where it is smaller).
   double effect(Vec y, Vec dy) override;

@@ -66,7 +66,7 @@ std::vector<std::pair<int, size_t>> BasisPreconditioner::beginning(std::vector<d
 void BasisPreconditioner::take_contact() {
   place_.assign(basis_.rows(), -1);
   auto [rows, T] = taken(beginning(means_), 0);
-  blocks_.set_contact(std::move(rows), std::move(T));
+  blocks_.set_contact(rows, std::move(T));
 }
 
 /// These pairs behind those that came in before.

@@ -22,7 +22,6 @@ const Tuned most("modes_most", 128, "modes that move with inertia, at the most")
 const Tuned single("modes_single", 256, "slipping rows from which they are inverted in single precision");
 constexpr float regular = 1e-3f;  // least over largest pivot, down to which that is exact enough
 
-using lapack::Dense;
 using lapack::multiply;
 
 std::vector<float> rounded(std::vector<double> const& x) { return {x.begin(), x.end()}; }

@@ -52,8 +52,9 @@ ModalBlocks::Solution ModalBlocks::solve(std::vector<float> const& forces,
   };
   relax(forces);
   std::vector<float> b(size_t(c) * r), t, low(forces.begin(), forces.begin() + size_t(c) * k);
-  multiply("NN", {c, r, n - k}, 1.0f, {eta.data() + size_t(c) * k, c}, {motions_.data() + k, n}, 0.0f,
-           b.data(), c);
+  if (r)
+    multiply("NN", {c, r, n - k}, 1.0f, {eta.data() + size_t(c) * k, c}, {motions_.data() + k, n}, 0.0f,
+             b.data(), c);
   t = pull(b);
   multiply("NT", {c, k, r}, -1.0f, {t.data(), c}, {motions_.data(), n}, 1.0f, low.data(), c);
   for (Small const& small : small_) {

@@ -13,6 +13,7 @@ constexpr int looks = 40;             // for where a guess passes a parameter
 constexpr int nodes = 8;              // parts of a step in which its cubic is looked at
 constexpr double near_zero = 0.3;     // of the smaller end value: so low a minimum may hide two zeros
 constexpr double value_error = 1e-9;  // relative, of a reported value reached along the branch
+constexpr double polished = 1e-6;     // arclength: a step farther than that is no polish
 char const* const elsewhere = "Newton goes to another branch there";
 constexpr double off_the_curve = 0.5;  // of the step: a solution farther from the cubic is another branch
 
@@ -175,7 +176,7 @@ std::string Continuation::stop_event(double end) const {
 /// The step's end, which lies at an asked parameter.
 void Continuation::emit_end(Trial const& end, double target, double length, std::string const& event) {
   Trial trial = at(copy(end.y));
-  trial.tangent = copy(end.tangent), trial.outcome = end.outcome, trial.tests = end.tests;
+  trial.tangent = copy(end.tangent), trial.outcome = end.outcome;
   polish(trial, target);
   emit(std::move(trial), length, event);
 }
@@ -240,7 +241,7 @@ void Continuation::reach(double value, std::string const& event, Place a, Place 
 }
 
 /// One Newton step more: what is reported is as good as the corrector can make it, not just good enough. The
-/// tangent does not feel it.
+/// tangent does not feel so short a way.
 void Continuation::polish(Trial& trial, double target) {
   if (way_) return;
   VecHandle better = copy(trial.y);
@@ -250,7 +251,8 @@ void Continuation::polish(Trial& trial, double target) {
   check(SNESSetForceIteration(newton_.snes(), PETSC_FALSE));
   // counted as the one step it is: at rounding level its line search ends where it likes
   const int newton = trial.outcome.newton + 1, linear = trial.outcome.linear + outcome.linear;
-  if (outcome.converged && outcome.residual <= trial.outcome.residual)
+  const bool near = distance(better, trial.y) <= polished;  // not so where `reach_along` has refused it
+  if (near && outcome.converged && outcome.residual <= trial.outcome.residual)
     trial.y = std::move(better), trial.outcome = std::move(outcome);
   trial.outcome.newton = newton, trial.outcome.linear = linear;
 }

@@ -207,6 +207,23 @@ def test_pairs_that_begin_to_slip_are_added_to_the_inverse(comm, contact) -> Non
             assert found[1].norm() < 1e-6 * found[0].norm(), f"{pairs} pairs"
 
 
+@pytest.mark.parametrize("contact", [sliders(), sliders("coulomb_3d", PADS, 3)], ids=["jenkins", "coulomb_3d"])
+def test_an_inverse_in_single_precision_is_the_same(comm, contact) -> None:
+    """As of many slipping rows: what is made of it is made in that precision, too."""
+    M, K = chain()
+    static = {"fw_modes_fewest": 2, "fw_modes_follows": 1e9}
+    with fw.Model(M, K, 0.002 * K, [contact], comm) as model:
+        problem = problem_of(model)
+        still, moving, correctors = motions_and_correctors(problem)
+        for pairs in range(PAIRS + 1):
+            y, found = slipping(problem, still, moving, pairs), []
+            for corrector, given in zip(correctors, ({}, {"fw_modes_single": 1})):
+                with options(**static, **given):
+                    found.append(preconditioned(corrector, problem, y))
+            found[1].axpy(-1.0, found[0])
+            assert found[1].norm() < 1e-5 * found[0].norm(), f"{pairs} pairs"
+
+
 def test_an_inverse_that_cannot_be_added_to_is_made_anew(comm) -> None:
     """A singular block there, met on one rank: the system is solved, and the next one."""
     M, K = chain()

@@ -121,18 +121,45 @@ def test_the_error_of_a_response_is_estimated(level, omega):
 
 
 @SERIAL
-@pytest.mark.parametrize("H", [3, 9, 31])
-def test_what_no_estimate_solves_for_is_counted_in(H):
-    """Den Hartog's oscillator: of a jump the error falls like 1 / H, and half of it lies above the finer orders."""
+@pytest.mark.parametrize("retain, H", [("odd", 3), ("odd", 9), ("odd", 31), ("all", 8), ("all", 10)])
+def test_what_no_estimate_solves_for_is_counted_in(retain, H):
+    """Den Hartog's oscillator: of a jump the error falls like 1 / H, and half of it lies above the finer orders.
+
+    Even orders, of which there is nothing, tell nothing of how it falls."""
     one = np.eye(1)
     rubbing = fw.Model(one, one, None, [friction(one, 0.3, 1e-7)], MPI.COMM_SELF)
     start = fw.linear_modes(rubbing, 1, "free")[0]
-    problem = fw.ForcedResponse(rubbing, fw.choose_harmonics(rubbing, H, 1024), {1: np.ones(1)}, 1.0, 0, start)
+    h = fw.choose_harmonics(rubbing, H, 1024, retain)
+    problem = fw.ForcedResponse(rubbing, h, {1: np.ones(1)}, 1.0, 0, start)
     row = fw.follow(problem, 0.8, 0.8001, unknowns=False)[0]
     orbit = forced_orbit(System(one, 0 * one, one, [Coulomb(np.ones(1), 0.3)], np.ones(1), omega=0.8))
     exact = orbit.harmonics(orbit.system.displacement(0), 1)[1]
     error = abs(row["amplitude"] * np.exp(1j * row["phase"]) - exact)
     assert row["amplitude_error"] == pytest.approx(error, rel=0.05)
+
+
+@SERIAL
+@pytest.mark.parametrize("n, H, retain", [(12, 1, "all"), (12, 3, "auto"), (7, 1, "auto")])
+def test_a_force_that_ends_leaves_nothing_above(n, H, retain):
+    """Of a cubic spring's force rounding alone lies in the upper orders: its square came out below zero."""
+    K = 20.0 * np.eye(n) + 100.0 * (2 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1))
+    springs = fw.Contact("cubic_spring", np.eye(n), {"cubic_stiffness": np.linspace(1.0, 2.0, n)})
+    model = fw.Model(np.eye(n), K, None, [springs], MPI.COMM_SELF)
+    h = fw.choose_harmonics(model, H, None, retain)
+    branch = fw.follow(fw.NonlinearMode(model, h, "EPMC", 0, fw.linear_modes(model, 1)[0]), 0.01, 3.0, unknowns=False)
+    assert branch.converged and np.isfinite(branch["omega_error"]).all()
+
+
+@SERIAL
+def test_few_new_orders_tell_as_much_of_full_sets_as_of_odd_ones():
+    """Large models' 4 to 7 of three harmonics: the lower half of a full set was an even order, that is nothing."""
+    rows = []
+    with options(fw_error_cheap=1):
+        for retain in ("odd", "all"):
+            h = fw.choose_harmonics(model(), 3, 256, retain)
+            rows.append(reported(fw.NonlinearMode(model(), h, "CNM", 0), [0.5, 2.0]))
+    for odd, full in zip(*rows):
+        assert full["lambda_error_harmonics"] == pytest.approx(odd["lambda_error_harmonics"], rel=0.05)
 
 
 @SERIAL

@@ -161,6 +161,13 @@ def test_few_dofs_may_take_more_harmonics():
 
 
 @SERIAL
+def test_a_set_above_the_most_harmonics_is_made_no_smaller():
+    aim, missed = rules.Aim(most_harmonics=255), {"all": 5.0, "harmonics": 4.0, "samples": 1.0}
+    found = aim.finer(fw.choose_harmonics(jenkins(), 401, 1024), missed)
+    assert found is not None and found.orders[-1] == 401 and found.samples > 1024
+
+
+@SERIAL
 def test_a_branch_goes_on_from_a_snapshot_with_the_set_it_had():
     def points(branch, most=None):
         return [(p.parameter, branch.problem.harmonics.orders[-1], p.event) for _, p in zip(range(most or 999), branch)]

@@ -213,9 +213,9 @@ class HarmonicProblem(Destroyable):
         """Estimated errors at a converged point, in the units of what they are errors of. Collective.
 
         One Newton step on the harmonics up to 7 H / 4, 17 at the least (large models: 2 H + 1 below 4), on four times
-        the samples, and with the component modes that a reduction has left out (`OmittedModes`), read at the same
-        amplitude or frequency: see `src/hb/discretisation_error.h`. Without the branch's tangent none is estimated, all
-        are nan.
+        the samples, with what lies above those harmonics as the contact force falls there, and with the component modes
+        that a reduction has left out (`OmittedModes`), read at the same amplitude or frequency: see
+        `src/hb/discretisation_error.h`. Without the branch's tangent none is estimated, all are nan.
 
         Returns
         -------

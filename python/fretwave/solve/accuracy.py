@@ -15,9 +15,9 @@ if TYPE_CHECKING:
 #: Shares of the accuracy: what a new set aims at, and above which a smaller one is not tried.
 AIM, LOW = 0.6, 0.5
 #: Assumed orders of convergence in the harmonics and in the samples until two sets have been compared, and how far
-#: that is believed. Contact forces with kinks have 3 to 4 and 1 to 2.
+#: that is believed. Contact forces with kinks have 3 to 4 and 1 to 2, friction that jumps 1 in the harmonics.
 ORDER_OF = {"harmonics": 3.0, "samples": 1.5}
-ORDERS = (2.0, 8.0)
+ORDERS = (1.0, 8.0)
 #: A set is changed at most so many times for one point, and made smaller so many times on a branch.
 ROUNDS, SMALLER = 3, 20
 #: A set grows at most so many times at once.
@@ -104,7 +104,8 @@ class Aim:
         highest, count = at.orders[-1], at.samples
         if harmonics > AIM:
             factor = (harmonics / AIM) ** (1 / self.order_harmonics)
-            highest = min(max(highest + 2, round(highest * min(factor, FACTOR))), self.most_harmonics)
+            wanted = max(highest + 2, round(highest * min(factor, FACTOR)))
+            highest = max(highest, min(wanted, self.most_harmonics))
         while samples > AIM and count < min(FACTOR * at.samples, MOST_SAMPLES):
             count, samples = 2 * count, samples / 2**self.order_samples
         return _other(at, at.up_to(highest, count))

@@ -78,9 +78,9 @@ class Continuation:
         and its points are kept.
     report_at : parameter values at which points are located
     upwards : the parameter grows at first
-    way : of which only the end counts: none of the problem's own events (peaks, zero damping) are located, but folds
-        are; and a start that Newton does not find is not looked for on ways of its own, as it is otherwise (`started`
-        tells)
+    way : of which only the end counts, to be corrected anew: none of the problem's own events (peaks, zero damping) are
+        located, but folds are; no report or stop is made better than any point; and a start that Newton does not find
+        is not looked for on ways of its own, as it is otherwise (`started` tells)
     """
 
     def __init__(
