@@ -9,38 +9,21 @@
 from __future__ import annotations
 
 import argparse
-import csv
-import json
 from pathlib import Path
 
-import numpy as np
-import numpy.typing as npt
-
+from fretwave import open_run
 from fretwave.plots import style
 
 PICTURE = Path(__file__).parent / "pictures" / "harmonics.png"
-COLUMNS = ("amplitude", "frequency_hz", "zeta")
-
-
-def branch(folder: Path) -> tuple[dict[str, npt.NDArray[np.float64]], int]:
-    """Columns of the mode's table, and how many of its rows are folds."""
-    with (folder / "mode.csv").open() as file:
-        rows = list(csv.DictReader(file))
-    columns = {name: np.array([float(row[name]) for row in rows]) for name in COLUMNS}
-    return columns, sum("fold" in row["event"] for row in rows)
-
-
-def harmonics_of(folder: Path) -> int:
-    """Highest one of the run."""
-    return int(json.loads((folder / "run.json").read_text())["case"]["resolved"]["mode.harmonics"])
 
 
 def draw(folders: list[Path], path: Path) -> None:
     with style.rules():
         figure, (upper, lower) = style.new_figure(6.4, rows=2, sharex=True)
         for k, folder in enumerate(folders):
-            found, folds = branch(folder)
-            label = f"H = {harmonics_of(folder)}, {len(found['zeta'])} points, {folds} folds"
+            found = open_run(folder)["mode"]
+            highest, folds = found.labels[-1].rstrip("cs"), len(found.met("fold"))
+            label = f"H = {highest}, {len(found)} points, {folds} folds"
             look = {"color": (style.RED, style.BLUE, style.INK)[k % 3], "lw": 0.7 if folds > 5 else 1.8}
             upper.plot(1e3 * found["amplitude"], 100 * found["zeta"], label=label, **look)
             lower.plot(1e3 * found["amplitude"], found["frequency_hz"], label=label, **look)

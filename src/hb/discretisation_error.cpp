@@ -308,7 +308,7 @@ double DiscretisationError::bound(int order) const {
 double DiscretisationError::all_above(Vec force) const {
   const auto twice_a = fall(force);
   const double least = slowest, most = fastest, unknown = of_velocity_ ? (least + most) / 2 : most,
-               told = twice_a.value_or(unknown) - (twice_a && of_velocity_ ? 1 : 0),
+               told = twice_a ? *twice_a - (of_velocity_ ? 1 : 0) : unknown,
                share = bound(problem_.harmonics().highest()) / bound(finer_->harmonics().highest());
   return 1 / (1 - std::pow(share, std::clamp(told, least, most)));
 }

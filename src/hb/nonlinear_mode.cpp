@@ -11,17 +11,15 @@ namespace fretwave::hb {
 
 namespace {
 
-/// phi^H M phi w^2 / phi^H phi
-double inertia_per_displacement(Mat M, double omega, Vec shape, Vec imaginary) {
+/// phi^H M phi w^2 / phi^H phi, with multiply(x, M x).
+template <class Multiply>
+double inertia_per_displacement(Multiply multiply, double omega, Vec shape, Vec imaginary) {
   double modal_mass = 0, square = 0;
   for (Vec part : {shape, imaginary}) {
     if (!part) continue;
     VecHandle Mx = like(part);
-    double mass, length;
-    check(MatMult(M, part, Mx));
-    check(VecDot(part, Mx, &mass));
-    check(VecDot(part, part, &length));
-    modal_mass += mass, square += length;
+    multiply(part, Mx);
+    modal_mass += solve::dot(part, Mx), square += solve::dot(part, part);
   }
   return omega * omega * modal_mass / square;
 }
@@ -29,7 +27,9 @@ double inertia_per_displacement(Mat M, double omega, Vec shape, Vec imaginary) {
 }  // namespace
 
 double reference_stiffness(model::Model const& model, double omega, Vec shape, Vec imaginary) {
-  const double k = inertia_per_displacement(model.sum(2), omega, shape, imaginary);
+  const MatHandle M = model.sum(2);
+  const double k =
+      inertia_per_displacement([&](Vec x, Vec Mx) { check(MatMult(M, x, Mx)); }, omega, shape, imaginary);
   if (!(k > 0) || !(omega > 0))
     throw InputError("the starting mode has no modal mass or no frequency",
                      "stiffness " + std::to_string(k) + ", " + std::to_string(omega) + " rad/s", "both > 0",
@@ -72,7 +72,6 @@ NonlinearMode::NonlinearMode(model::Model const& model, Harmonics const& h, Meth
   check(VecAXPBYPCZ(shape_, scale.real(), -scale.imag(), 0, shape, imaginary));
   check(VecAXPBYPCZ(imaginary_, scale.imag(), scale.real(), 0, shape, imaginary));
   check(MatGetDiagonal(model.sum(2), masses_));
-  starting_inertia_ = inertia(omega, shape_, imaginary_);
 }
 
 NonlinearMode::NonlinearMode(NonlinearMode const& same, Harmonics const& h)
@@ -82,8 +81,7 @@ NonlinearMode::NonlinearMode(NonlinearMode const& same, Harmonics const& h)
       starting_stiffness_(same.starting_stiffness_),
       masses_(solve::copy(same.masses_)),
       shape_(solve::copy(same.shape_)),
-      imaginary_(solve::copy(same.imaginary_)),
-      starting_inertia_(same.starting_inertia_) {}
+      imaginary_(solve::copy(same.imaginary_)) {}
 
 VecHandle NonlinearMode::initial(double amplitude) {
   if (!(amplitude > 0))
@@ -117,17 +115,6 @@ ScaledMotion NonlinearMode::motion(std::vector<double> const& z) const {
   return out;
 }
 
-/// w^2 phi^H diag(M) phi / phi^H phi: whether a mode has become another, without a product with M.
-double NonlinearMode::inertia(double omega, Vec cosine, Vec sine) const {
-  double moved = 0, square = 0;
-  for (Vec part : {cosine, sine}) {
-    VecHandle scaled = like(part);
-    check(VecPointwiseMult(scaled, masses_, part));
-    moved += solve::dot(scaled, part), square += solve::dot(part, part);
-  }
-  return omega * omega * moved / square;
-}
-
 bool NonlinearMode::scale(Vec y) {
   const PetscInt m = harmonics().block_size(), fundamental = harmonics().offset(harmonics().fundamental());
   VecHandle re = like(shape_), im = like(shape_);
@@ -138,7 +125,10 @@ bool NonlinearMode::scale(Vec y) {
       cosine[i] = in[i * m + fundamental], sine[i] = in[i * m + fundamental + 1];
   }
   const auto z = scalars(y);
-  const double now = inertia(std::hypot(z[0], z[1]) * omega_reference_, re, im) / starting_inertia_;
+  const auto by_diagonal = [&](Vec x, Vec Mx) { check(VecPointwiseMult(Mx, masses_, x)); };
+  const double now =
+      inertia_per_displacement(by_diagonal, std::hypot(z[0], z[1]) * omega_reference_, re, im) /
+      inertia_per_displacement(by_diagonal, omega_reference_, shape_, imaginary_);
   if (!(now > 0) || !std::isfinite(now)) return false;
   const double steps = std::round(std::log2(now) / 4);
   return measure_in(starting_stiffness_ * std::exp2(4 * steps));

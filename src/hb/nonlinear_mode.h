@@ -41,13 +41,10 @@ class NonlinearMode : public HarmonicProblem {
 
  private:
   NonlinearMode(NonlinearMode const& same, Harmonics const&);
-  double inertia(double omega, Vec cosine, Vec sine) const;
-
   Method method_;
   double omega_reference_, starting_stiffness_;
   VecHandle masses_;  ///< diagonal of M
   VecHandle shape_, imaginary_;
-  double starting_inertia_;
 };
 
 /// The way to a mode with stops, at its fixed amplitude a: all gaps are wider by t a; from the mode that

@@ -90,22 +90,22 @@ void ModalBlocks::add_border(Small const& small, std::vector<double>& N) const {
     return sum;
   };
   std::vector<double> u(r);
-  for (int j = 0; j < s; ++j) {
-    for (int part = 0; part < 2; ++part) {
-      const size_t v = size_t(2) * j + part;
-      for (int l = 0; l < k; ++l) {
-        for (int i = 0; i < r; ++i) u[i] = basis_.motions()[size_t(l) * all + rows_[i]];
-        at(part * k + l, 2 * k + j) = border_.columns[v * n + l] - dot(u.data(), X_columns_.data() + v * r);
-        at(2 * k + j, part * k + l) = border_.rows[v * n + l] - dot(rows_X_.data() + v * r, u.data());
-      }
+  for (int l = 0; l < k; ++l) {
+    for (int i = 0; i < r; ++i) u[i] = basis_.motions()[size_t(l) * all + rows_[i]];
+    for (int v = 0; v < 2 * s; ++v) {
+      const int mode = v % 2 * k + l, scalar = 2 * k + v / 2;
+      at(mode, scalar) =
+          border_.columns[size_t(v) * n + l] - dot(u.data(), X_columns_.data() + size_t(v) * r);
+      at(scalar, mode) = border_.rows[size_t(v) * n + l] - dot(rows_X_.data() + size_t(v) * r, u.data());
     }
+  }
+  for (int j = 0; j < s; ++j)
     for (int i = 0; i < s; ++i) {
       double& corner = at(2 * k + i, 2 * k + j) = schur_[size_t(j) * s + i];
       for (int part = 0; part < 2; ++part)
         corner +=
             dot(rows_X_.data() + (size_t(2) * i + part) * r, columns_.data() + (size_t(2) * j + part) * r);
     }
-  }
 }
 
 }  // namespace fretwave::precondition

@@ -34,11 +34,15 @@ def tanh_model(velocity=0.2):
     return fw.Model(M, K, None, [fw.Contact(TanhLaw(LIMIT, velocity), [[0.0, 1.0]])])
 
 
+def springs(n):
+    """Stiffness of n masses in a row, each on a spring of its own."""
+    return 20.0 * np.eye(n) + 100.0 * (2 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1))
+
+
 def chain(comm):
     """The mode of five masses, the first and the last of which rub."""
-    K = 20.0 * np.eye(5) + 100.0 * (2 * np.eye(5) - np.eye(5, k=1) - np.eye(5, k=-1))
     given = {"tangential_stiffness": [50.0, 80.0], "friction_limit": [5.0, 8.0]}
-    rubbing = fw.Model(np.eye(5), K, None, [fw.Contact("jenkins", np.eye(5)[[0, 4]], given)], comm)
+    rubbing = fw.Model(np.eye(5), springs(5), None, [fw.Contact("jenkins", np.eye(5)[[0, 4]], given)], comm)
     return fw.NonlinearMode(rubbing, fw.choose_harmonics(rubbing, 5), "EPMC", 2, fw.linear_modes(rubbing, 1)[0])
 
 
@@ -142,11 +146,10 @@ def test_what_no_estimate_solves_for_is_counted_in(retain, H):
 @pytest.mark.parametrize("n, H, retain", [(12, 1, "all"), (12, 3, "auto"), (7, 1, "auto")])
 def test_a_force_that_ends_leaves_nothing_above(n, H, retain):
     """Of a cubic spring's force rounding alone lies in the upper orders: its square came out below zero."""
-    K = 20.0 * np.eye(n) + 100.0 * (2 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1))
-    springs = fw.Contact("cubic_spring", np.eye(n), {"cubic_stiffness": np.linspace(1.0, 2.0, n)})
-    model = fw.Model(np.eye(n), K, None, [springs], MPI.COMM_SELF)
-    h = fw.choose_harmonics(model, H, None, retain)
-    branch = fw.follow(fw.NonlinearMode(model, h, "EPMC", 0, fw.linear_modes(model, 1)[0]), 0.01, 3.0, unknowns=False)
+    cubic = fw.Contact("cubic_spring", np.eye(n), {"cubic_stiffness": np.linspace(1.0, 2.0, n)})
+    hardening = fw.Model(np.eye(n), springs(n), None, [cubic], MPI.COMM_SELF)
+    h, start = fw.choose_harmonics(hardening, H, None, retain), fw.linear_modes(hardening, 1)[0]
+    branch = fw.follow(fw.NonlinearMode(hardening, h, "EPMC", 0, start), 0.01, 3.0, unknowns=False)
     assert branch.converged and np.isfinite(branch["omega_error"]).all()
 
 

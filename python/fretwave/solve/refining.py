@@ -173,8 +173,9 @@ class RefiningContinuation(Continuation):
         """Where the accuracy was kept, and what limited it elsewhere."""
         missed = sum(self.missed_by.values())
         text = f"accuracy {self.accuracy:g} kept at {self.points - missed} of {self.points} points"
-        limits = {source: limit.format(most=self._aim.most_harmonics) for source, limit in LIMITS.items()}
-        return text + "".join(f", {n} limited by {limits[source]}" for source, n in self.missed_by.items())
+        most = self._aim.most_harmonics
+        limits = (f", {n} limited by {LIMITS[source].format(most=most)}" for source, n in self.missed_by.items())
+        return text + "".join(limits)
 
     @property
     def _too_inaccurate(self) -> bool:
