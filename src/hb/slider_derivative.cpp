@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "contact/vectorise.h"
+
 namespace fretwave::hb {
 
 namespace {
@@ -54,7 +56,8 @@ void SliderDerivative::begin_slip(SweptSlider::Slip const& slip, MovingDisc cons
   for (double& value : dphi_) value /= speed;
 }
 
-void SliderDerivative::slip(SweptSlider::Slip const& slip, MovingDisc const& disc, bool ends) {
+FRETWAVE_VECTORISE void SliderDerivative::slip(SweptSlider::Slip const& slip, MovingDisc const& disc,
+                                               bool ends) {
   Radau const& method = radau();
   const int n = columns();
   const double h = slip.length, across0[2] = {-slip.e[1], slip.e[0]};

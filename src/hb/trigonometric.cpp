@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
+
+#include "contact/vectorise.h"
 
 namespace fretwave::hb {
 
@@ -60,28 +63,73 @@ void rates(Harmonics const& h, double const* waves, double* out) {
   }
 }
 
-/// Odd and even orders apart: neither chain of powers waits for the other.
+namespace {
+
+// Orders in a register of AVX2. On a machine without, GCC 12 keeps them in memory.
+constexpr size_t lanes = 4, few = 8;
+using Register = double __attribute__((vector_size(lanes * sizeof(double))));
+using Places = long long __attribute__((vector_size(lanes * sizeof(long long))));
+
+template <size_t count>
+FRETWAVE_INLINE void add_one_by_one(std::array<Series const*, count> const& all, Powers& e, size_t n,
+                                    std::array<Series::Jet, count>& out) {
+  for (; n < all[0]->q.size(); ++n, e.next())
+    for (size_t j = 0; j < count; ++j) {
+      const double k = double(n), re = all[j]->q[n].real(), im = all[j]->q[n].imag();
+      const double a = re * e.x - im * e.y, b = k * (re * e.y + im * e.x);
+      out[j].d[0] += a, out[j].d[1] -= b, out[j].d[2] -= k * k * a;
+    }
+}
+
+/// Four orders at a time.
+template <size_t count>
+FRETWAVE_INLINE void add_side_by_side(std::array<Series const*, count> const& all, double tau,
+                                      std::array<Series::Jet, count>& out) {
+  const double c = std::cos(tau), s = std::sin(tau), c2 = c * c - s * s, s2 = 2 * c * s;
+  Register x = {c, c2, c * c2 - s * s2, c2 * c2 - s2 * s2}, y = {s, s2, s * c2 + c * s2, 2 * c2 * s2},
+           k = {1, 2, 3, 4}, sum[count][3] = {};
+  const double c4 = x[3], s4 = y[3];
+  size_t n = 1;
+  for (; n + lanes <= all[0]->q.size(); n += lanes, k += double(lanes)) {
+    for (size_t j = 0; j < count; ++j) {
+      Register low, high;
+      std::memcpy(&low, &all[j]->q[n], sizeof low), std::memcpy(&high, &all[j]->q[n + 2], sizeof high);
+      const Register re = __builtin_shuffle(low, high, Places{0, 2, 4, 6}),
+                     im = __builtin_shuffle(low, high, Places{1, 3, 5, 7});
+      const Register a = re * x - im * y, b = k * (re * y + im * x);
+      sum[j][0] += a, sum[j][1] -= b, sum[j][2] -= k * k * a;
+    }
+    const Register turned = x * c4 - y * s4;
+    y = x * s4 + y * c4, x = turned;
+  }
+  for (size_t j = 0; j < count; ++j)
+    for (int d = 0; d < 3; ++d) out[j].d[d] += (sum[j][d][0] + sum[j][d][1]) + (sum[j][d][2] + sum[j][d][3]);
+  Powers rest(x[0], y[0], c, s);
+  add_one_by_one(all, rest, n, out);
+}
+
+FRETWAVE_VECTORISE void add(std::array<Series const*, 3> const& all, double tau,
+                            std::array<Series::Jet, 3>& out) {
+  add_side_by_side(all, tau, out);
+}
+FRETWAVE_VECTORISE void add(std::array<Series const*, 1> const& all, double tau,
+                            std::array<Series::Jet, 1>& out) {
+  add_side_by_side(all, tau, out);
+}
+
+}  // namespace
+
 template <size_t count>
 std::array<Series::Jet, count> jets(std::array<Series const*, count> const& all, double tau) {
-  const double c = std::cos(tau), s = std::sin(tau), c2 = c * c - s * s, s2 = 2 * c * s;
-  Powers odd(c, s, c2, s2), even(c2, s2, c2, s2);
-  std::array<Series::Jet, count> out{}, other{};
+  std::array<Series::Jet, count> out{};
   for (size_t j = 0; j < count; ++j) out[j].d[0] = all[j]->q[0].real();
-  const auto add = [&all](size_t n, Powers& e, std::array<Series::Jet, count>& to) {
-    const double k = double(n);
-    for (size_t j = 0; j < count; ++j) {
-      const double re = all[j]->q[n].real(), im = all[j]->q[n].imag();
-      const double a = re * e.x - im * e.y, b = k * (re * e.y + im * e.x);
-      to[j].d[0] += a, to[j].d[1] -= b, to[j].d[2] -= k * k * a;
-    }
-    e.next();
-  };
-  const size_t size = all[0]->q.size();
-  size_t n = 1;
-  for (; n + 1 < size; n += 2) add(n, odd, out), add(n + 1, even, other);
-  if (n < size) add(n, odd, out);
-  for (size_t j = 0; j < count; ++j)
-    for (int k = 0; k < 3; ++k) out[j].d[k] += other[j].d[k];
+  if (all[0]->q.size() > few) {
+    add(all, tau, out);
+    return out;
+  }
+  const double c = std::cos(tau), s = std::sin(tau);
+  Powers e(c, s, c, s);
+  add_one_by_one(all, e, 1, out);
   return out;
 }
 
