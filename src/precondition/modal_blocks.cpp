@@ -18,7 +18,7 @@ const Tuned follows("modes_follows", 0.05, "inertia over stiffness up to which a
 const Tuned resonant("modes_resonant", 0.3,
                      "inertia over stiffness from which a mode beyond the most is taken at rest");
 const Tuned fewest("modes_fewest", 8, "modes that move with inertia, at the least");
-const Tuned most("modes_most", 128, "modes that move with inertia, at the most");
+const Tuned most("modes_most", 512, "modes that move with inertia, at the most");
 const Tuned single("modes_single", 256, "slipping rows from which they are inverted in single precision");
 constexpr float regular = 1e-3f;  // least over largest pivot, down to which that is exact enough
 
@@ -218,24 +218,50 @@ template std::vector<double> ModalBlocks::times_T(std::vector<double> const&, bo
 template std::vector<float> ModalBlocks::times_T(std::vector<float> const&, bool) const;
 
 void ModalBlocks::make_small(int i) {
-  const int k = low_, parts = parts_[i], s = i == border_harmonic_ ? border_.scalars : 0;
-  Small small{offsets_[i], parts, s, parts * k + s, {}};
+  const int parts = parts_[i], s = i == border_harmonic_ ? border_.scalars : 0;
+  Small small{offsets_[i], parts, s, parts * low_ + s, {}, {}};
+  if (parts == 2 && s == 0)
+    small.turned = turned_inverse(z_[i]);
+  else
+    small.real = real_inverse(small, z_[i]);
+  small_.push_back(std::move(small));
+}
+
+namespace {
+
+template <class T>
+void invert(std::vector<T>& N, int n) {
+  if (lapack::invert(N, n))
+    throw SingularBlock("a harmonic block of the preconditioner is singular: a free motion at this harmonic");
+}
+
+}  // namespace
+
+/// (z + H)^-1
+std::vector<std::complex<float>> ModalBlocks::turned_inverse(std::vector<complex> const& z) const {
+  const int k = low_;
+  std::vector<complex> N(H_.begin(), H_.end());
+  for (int l = 0; l < k; ++l) N[size_t(l) * k + l] += z[l];
+  invert(N, k);
+  return {N.begin(), N.end()};
+}
+
+std::vector<double> ModalBlocks::real_inverse(Small const& small, std::vector<complex> const& z) const {
+  const int k = low_, parts = small.parts;
   std::vector<double> N(size_t(small.size) * small.size, 0.0);
   const auto at = [&](int row, int col) -> double& { return N[size_t(col) * small.size + row]; };
   for (int part = 0; part < parts; ++part)
     for (int col = 0; col < k; ++col)
       for (int row = 0; row < k; ++row) at(part * k + row, part * k + col) = H_[size_t(col) * k + row];
   for (int l = 0; l < k; ++l) {
-    const Rotation z = Rotation::of(z_[i][l]);
-    at(l, l) += z.cc;
+    const Rotation turn = Rotation::of(z[l]);
+    at(l, l) += turn.cc;
     if (parts == 1) continue;
-    at(l, k + l) += z.cs, at(k + l, l) += z.sc, at(k + l, k + l) += z.ss;
+    at(l, k + l) += turn.cs, at(k + l, l) += turn.sc, at(k + l, k + l) += turn.ss;
   }
-  if (s) add_border(small, N);
-  if (lapack::invert(N, small.size))
-    throw SingularBlock("a harmonic block of the preconditioner is singular: a free motion at this harmonic");
-  small.inverse = std::move(N);
-  small_.push_back(std::move(small));
+  if (small.scalars) add_border(small, N);
+  invert(N, small.size);
+  return N;
 }
 
 }  // namespace fretwave::precondition

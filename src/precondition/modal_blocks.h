@@ -65,12 +65,16 @@ class ModalBlocks {
   std::vector<Rotation> compliance(int harmonic, std::vector<Group> const& groups) const;
 
  private:
-  /// Block N_n of the lower modes, inverted: parts (cosine, sine) x modes, then scalars.
+  /// Block N_n of the lower modes, inverted: parts (cosine, sine) x modes, then scalars; complex where no
+  /// scalars tell the parts apart.
   struct Small {
     int at, parts, scalars, size;
-    std::vector<double> inverse;
+    std::vector<double> real;
+    std::vector<std::complex<float>> turned;
   };
   void make_small(int i);
+  std::vector<std::complex<float>> turned_inverse(std::vector<complex> const& z) const;
+  std::vector<double> real_inverse(Small const&, std::vector<complex> const& z) const;
   void add_border(Small const&, std::vector<double>& N) const;
   void set_static_compliance();
   void take_rows(std::vector<int> const& rows);
@@ -86,7 +90,9 @@ class ModalBlocks {
   std::vector<Real> times_T(std::vector<Real> const& x, bool transposed) const;
   void add_T(std::vector<float> const& u, std::vector<float>& to) const;
   std::vector<float> pull(std::vector<float> u) const;
-  std::vector<double> small_solution(Small const&, std::vector<double> const& right) const;
+  std::vector<double> small_solutions(Small const&, std::vector<double> const& right) const;
+  std::vector<double> of_parts(Small const&, std::vector<float> const& low) const;
+  void put_parts(Small const&, std::vector<double> const& x, std::vector<float>& low) const;
 
   model::StuckBasis const& basis_;
   int first_, begin_ = 0, count_ = 0, lead_ = 0, modes_, low_ = 0, border_harmonic_ = -1;

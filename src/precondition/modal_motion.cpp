@@ -1,4 +1,6 @@
 /// The blocks' inverse applied: forces on modes and rows in, motions out.
+#include <algorithm>
+
 #include "lapack.h"
 #include "log.h"
 #include "precondition/modal_blocks.h"
@@ -7,13 +9,40 @@ namespace fretwave::precondition {
 
 using lapack::multiply;
 
-std::vector<double> ModalBlocks::small_solution(Small const& small, std::vector<double> const& right) const {
-  std::vector<double> x(small.size);
-  const int step = 1;
-  const double one = 1, zero = 0;
-  dgemv_("N", &small.size, &small.size, &one, small.inverse.data(), &small.size, right.data(), &step, &zero,
-         x.data(), &step);
+/// Of right sides one after the other, each by parts and scalars: qc - i qs where the block is complex.
+std::vector<double> ModalBlocks::small_solutions(Small const& small, std::vector<double> const& right) const {
+  const int k = low_, n = small.size, columns = int(right.size()) / std::max(n, 1);
+  std::vector<double> x(right.size());
+  if (!small.turned.size()) {
+    multiply("NN", {n, columns, n}, 1.0, {small.real.data(), n}, {right.data(), n}, 0.0, x.data(), n);
+    return x;
+  }
+  std::vector<std::complex<float>> q(size_t(k) * columns), p(q.size());
+  for (int col = 0; col < columns; ++col)
+    for (int l = 0; l < k; ++l) {
+      double const* part = right.data() + size_t(col) * n + l;
+      q[size_t(col) * k + l] = {float(part[0]), -float(part[k])};
+    }
+  multiply("NN", {k, columns, k}, 1.0f, {small.turned.data(), k}, {q.data(), k}, 0.0f, p.data(), k);
+  for (int col = 0; col < columns; ++col)
+    for (int l = 0; l < k; ++l) {
+      double* part = x.data() + size_t(col) * n + l;
+      part[0] = p[size_t(col) * k + l].real(), part[k] = -p[size_t(col) * k + l].imag();
+    }
   return x;
+}
+
+/// A block's coefficients of the lower modes, by parts, and room for its scalars; and back.
+std::vector<double> ModalBlocks::of_parts(Small const& small, std::vector<float> const& low) const {
+  std::vector<double> out(small.size);
+  for (int part = 0; part < small.parts; ++part)
+    for (int l = 0; l < low_; ++l) out[part * low_ + l] = low[size_t(l) * lead_ + small.at + part];
+  return out;
+}
+
+void ModalBlocks::put_parts(Small const& small, std::vector<double> const& x, std::vector<float>& low) const {
+  for (int part = 0; part < small.parts; ++part)
+    for (int l = 0; l < low_; ++l) low[size_t(l) * lead_ + small.at + part] = float(x[part * low_ + l]);
 }
 
 /// to += T u
@@ -58,9 +87,7 @@ ModalBlocks::Solution ModalBlocks::solve(std::vector<float> const& forces,
   t = pull(b);
   multiply("NT", {c, k, r}, -1.0f, {t.data(), c}, {motions_.data(), n}, 1.0f, low.data(), c);
   for (Small const& small : small_) {
-    std::vector<double> right(small.size);
-    for (int part = 0; part < small.parts; ++part)
-      for (int l = 0; l < k; ++l) right[part * k + l] = low[size_t(l) * c + small.at + part];
+    auto right = of_parts(small, low);
     for (int j = 0; j < small.scalars; ++j) {
       double& row = right[2 * k + j] = closing[j];
       for (int part = 0; part < 2; ++part) {
@@ -69,9 +96,8 @@ ModalBlocks::Solution ModalBlocks::solve(std::vector<float> const& forces,
         for (int i = 0; i < r; ++i) row += rows_X_[v * r + i] * b[size_t(i) * c + small.at + part];
       }
     }
-    const auto x = small_solution(small, right);
-    for (int part = 0; part < small.parts; ++part)
-      for (int l = 0; l < k; ++l) eta[size_t(l) * c + small.at + part] = float(x[part * k + l]);
+    const auto x = small_solutions(small, right);
+    put_parts(small, x, eta);
     if (!small.scalars) continue;
     out.scalars.assign(x.begin() + 2 * k, x.end());
     for (int j = 0; j < small.scalars; ++j)
@@ -118,17 +144,14 @@ std::vector<float> ModalBlocks::compliance(std::vector<float> const& f) const {
   multiply("NN", {c, r, r}, 1.0f, {f.data(), c}, {G_.data(), r}, 0.0f, u.data(), c);
   multiply("NT", {c, k, r}, 1.0f, {f.data(), c}, {right_.data(), k}, 0.0f, low.data(), c);
   for (Small const& small : small_) {
-    std::vector<double> right(small.size);
-    for (int part = 0; part < small.parts; ++part)
-      for (int l = 0; l < k; ++l) right[part * k + l] = low[size_t(l) * c + small.at + part];
+    auto right = of_parts(small, low);
     for (int j = 0; j < small.scalars; ++j)
       for (int part = 0; part < 2; ++part)
         for (int i = 0; i < r; ++i)
           right[2 * k + j] -=
               right_rows_[(size_t(2) * j + part) * r + i] * f[size_t(i) * c + small.at + part];
-    const auto x = small_solution(small, right);
-    for (int part = 0; part < small.parts; ++part)
-      for (int l = 0; l < k; ++l) low[size_t(l) * c + small.at + part] = float(x[part * k + l]);
+    const auto x = small_solutions(small, right);
+    put_parts(small, x, low);
     for (int j = 0; j < small.scalars; ++j)
       for (int part = 0; part < 2; ++part)
         for (int i = 0; i < r; ++i)
@@ -147,15 +170,14 @@ std::vector<Rotation> ModalBlocks::compliance(int harmonic, std::vector<Group> c
   const int k = low_, r = rows();
   Small const& small = small_[harmonic - first_];
   const int of_row = small.scalars ? 2 : 1, columns = of_row * r;
-  std::vector<double> right(size_t(small.size) * columns), x(right.size());
+  std::vector<double> right(size_t(small.size) * columns);
   for (int row = 0; row < r; ++row)
     for (int part = 0; part < of_row; ++part) {
       double* to = right.data() + (size_t(row) * of_row + part) * small.size;
       std::copy_n(right_.data() + size_t(row) * k, k, to + part * k);
       for (int j = 0; j < small.scalars; ++j) to[2 * k + j] = -right_rows_[(size_t(2) * j + part) * r + row];
     }
-  multiply("NN", {small.size, columns, small.size}, 1.0, {small.inverse.data(), small.size},
-           {right.data(), small.size}, 0.0, x.data(), small.size);
+  const auto x = small_solutions(small, right);
   const auto entry = [&](int a, int b, int to, int part) {
     double const* of_b = x.data() + (size_t(b) * of_row + part) * small.size;
     double u = to == part ? G_[size_t(a) * r + b] : 0;

@@ -115,6 +115,23 @@ def test_branches_are_those_of_the_direct_route(comm, method, contact, damping) 
 
 
 @pytest.mark.ranks(1, 2)
+def test_modes_that_all_move_with_inertia_are_all_in_the_blocks(comm) -> None:
+    """A chain of equal masses: even its highest mode is below the ninth harmonic."""
+    masses = 150
+    K = 2.4 * np.identity(masses) - np.eye(masses, k=1) - np.eye(masses, k=-1)
+    assert np.linalg.eigvalsh(K)[-1] < 9**2 * np.linalg.eigvalsh(K)[0]
+    PETSc.Options("inertial_")["route"] = "krylov"
+    with fw.Model(np.identity(masses), K, None, [fw.Contact("jenkins", np.eye(PAIRS, masses), SLIDER)], comm) as model:
+        first = fw.linear_modes(model, 1, "stuck")[0]
+        problem = fw.NonlinearMode(model, fw.Harmonics(range(1, 16, 2), 64), "CNM", 2, first, "inertial_")
+        points = branch(problem, [0.05, 0.5])
+        assert "modes of stuck pairs" in _core.Newton(problem.core, "inertial_").route
+    assert max(state["slip"] for *_, state in points) > 0.2
+    moving = [(newton, linear) for _, newton, linear, *_ in points if newton]
+    assert max(linear / newton for newton, linear in moving) <= 8
+
+
+@pytest.mark.ranks(1, 2)
 @pytest.mark.parametrize("of", ["K", "M"])
 def test_damping_in_proportion_is_in_the_basis_as_any_other(comm, of) -> None:
     """Known from K or M without a product, or by one, where an entry's twelfth digit is another: equal GMRES."""
