@@ -16,6 +16,10 @@ namespace {
 // blades of 30 to 155 dofs it took half the time of a direct Newton step at 213 unknowns, a third at 708, a
 // twelfth at 2328.
 const Tuned krylov_limit("linear_krylov_limit", 300, "unknowns above which the Krylov route is taken");
+const Tuned most_beside(
+    "linear_whole", 4,
+    "bytes of a factor of the whole system over those of the condensed contact, up to which "
+    "it is taken before that");
 constexpr double tangent_tolerance = 1e-10;  // relative; of the tangent's direction
 const Tuned longest_stay("linear_longest_stay", 256, "points between two tries at the foot of the ladder");
 const Tuned tangent_accepted("linear_tangent_accepted", 1e-6,
@@ -307,28 +311,42 @@ bool LinearSolver::climb() {
     ++fallbacks_.rebuilt;
     return true;
   }
-  if (rung_ == 0 && take_fallback()) return true;
-  return rung_ < 2 && take_whole();
+  if (rung_ > 0) return rung_ < 2 && take_whole();
+  const auto [condensed, bytes] = condensing();
+  if (bytes == 0 || whole_bytes() <= most_beside * bytes)
+    return take_whole() || (bytes > 0 && take_condensed(*condensed, bytes));
+  return take_condensed(*condensed, bytes) || take_whole();
 }
 
-bool LinearSolver::take_fallback() {
+/// What condenses the system on its contact, and the bytes it takes; none and 0 if nothing does.
+std::pair<PreconditionerKind const*, double> LinearSolver::condensing() const {
   Problem& problem = bordered_.problem();
   const auto helps = [&](PreconditionerKind const& kind) {
     return &kind != kind_.kind && kind.fallback_bytes && kind.refuses(problem).empty();
   };
   const auto found = std::ranges::find_if(kinds(), helps);
-  const double bytes = found == kinds().end() ? 0 : found->fallback_bytes(problem);
-  if (bytes == 0 || !fits(bytes, "the condensed contact system")) return false;
-  fallback_ = found->make(problem);
+  if (found == kinds().end()) return {nullptr, 0};
+  return {&*found, found->fallback_bytes(problem)};
+}
+
+bool LinearSolver::take_condensed(PreconditionerKind const& kind, double bytes) {
+  if (!fits(bytes, "the condensed contact system")) return false;
+  fallback_ = kind.make(bordered_.problem());
   rung_ = 1, ++fallbacks_.condensed;
   fallbacks_.said = "GMRES stalls: the condensed contact system is factorised (" + gigabytes(bytes) + ")";
   return true;
 }
 
+double LinearSolver::whole_bytes() const {
+  PetscInt unknowns;
+  check(VecGetSize(point_, &unknowns));
+  return WholeFactor::bytes(bordered_.problem(), double(unknowns));
+}
+
 bool LinearSolver::take_whole() {
   PetscInt unknowns;
   check(VecGetSize(point_, &unknowns));
-  const double bytes = WholeFactor::bytes(bordered_.problem(), double(unknowns));
+  const double bytes = whole_bytes();
   if (!fits(bytes, "a factor of the whole system")) return false;
   fallback_ = std::make_unique<WholeFactor>(bordered_, prefix_);
   rung_ = 2, ++fallbacks_.whole;

@@ -74,8 +74,10 @@ class LinearSolver {
   bool build();
   void follow();
   bool solve_once(Vec b, Vec x);
-  bool take_fallback();
+  std::pair<PreconditionerKind const*, double> condensing() const;
+  bool take_condensed(PreconditionerKind const&, double bytes);
   bool take_whole();
+  double whole_bytes() const;
   bool fits(double bytes, std::string const& what);
   void count_iterations();
   Preconditioner& preconditioner() { return fallback_ ? *fallback_ : *own_; }
