@@ -1,7 +1,7 @@
 #pragma once
 
-/// One loop over contact pairs, compiled for the vector widths of x86-64's levels and chosen when the program
-/// starts: the same machine takes the same code in every run.
+/// A hot loop (contact pairs, terms of a series), compiled for the vector widths of x86-64's levels and
+/// chosen when the program starts: the same machine takes the same code in every run.
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
 #define FRETWAVE_VECTORISE __attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default")))
 /// Of registers of 64 bytes: to be called only where the machine supports x86-64-v4.

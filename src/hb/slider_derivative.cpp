@@ -11,26 +11,31 @@ namespace {
 
 constexpr int stages = Radau::stages;
 
+/// row += a.du + b dR, or their rates.
+FRETWAVE_INLINE void add(double* row, std::vector<double> const& wave, double const* a, double b) {
+  const size_t m = wave.size();
+  double *normal = row, *first = row + m, *second = first + m;
+#pragma omp simd
+  for (size_t k = 0; k < m; ++k)
+    normal[k] += b * wave[k], first[k] += a[0] * wave[k], second[k] += a[1] * wave[k];
+}
+
 }  // namespace
+
+void SliderDerivative::add_value(double* row, double const* a, double b) const {
+  add(row, wave_, a, b * reach_);
+  row[3 * m_] -= b * reach_;
+}
+
+void SliderDerivative::add_rate(double* row, double const* a, double b) const {
+  add(row, rate_, a, b * reach_);
+}
 
 void SliderDerivative::set_time(double tau) {
   if (!harmonics_) return;
   waves(*harmonics_, tau, wave_.data());
   rates(*harmonics_, wave_.data(), rate_.data());
 }
-
-void SliderDerivative::add(double* row, std::vector<double> const& wave, double const* a, double b) const {
-  double *normal = row, *first = row + m_, *second = first + m_;
-  for (int k = 0; k < m_; ++k)
-    normal[k] += b * reach_ * wave[k], first[k] += a[0] * wave[k], second[k] += a[1] * wave[k];
-}
-
-void SliderDerivative::add_value(double* row, double const* a, double b) const {
-  add(row, wave_, a, b);
-  row[3 * m_] -= b * reach_;
-}
-
-void SliderDerivative::add_rate(double* row, double const* a, double b) const { add(row, rate_, a, b); }
 
 /// dphi at a slip's begin: from stick the arm's part across e; closing, where R phi' = u'.e' has one solution
 /// that is regular, R' phi' = u''.e' - |u'| phi'; behind u, of its direction alone.
@@ -81,8 +86,8 @@ FRETWAVE_VECTORISE void SliderDerivative::slip(SweptSlider::Slip const& slip, Mo
                                h * (half * across0[1] - p * slip.e[1])};
     set_time(slip.begin + method.nodes[j] * h);
     waves.insert(waves.end(), wave_.begin(), wave_.end());
-    add_value(radius, none, 1);
-    add_rate(row, by_rate, 0);
+    add(radius, wave_, none, reach_), radius[3 * m_] -= reach_;
+    add(row, rate_, by_rate, 0);
     const double by_phi = -half * along - p * across;
     for (int c = 0; c < n; ++c) row[c] += by_phi * dphi_[c] - rate * radius[c];
   }

@@ -37,7 +37,6 @@ class SliderDerivative {
  private:
   void begin_slip(SweptSlider::Slip const&, MovingDisc const&);
   void slip(SweptSlider::Slip const&, MovingDisc const&, bool ends);
-  void add(double* row, std::vector<double> const& wave, double const* a, double b) const;
 
   Harmonics const* harmonics_ = nullptr;
   int m_ = 0;

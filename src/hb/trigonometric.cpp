@@ -66,9 +66,9 @@ void rates(Harmonics const& h, double const* waves, double* out) {
 namespace {
 
 // Orders in a register of AVX2. On a machine without, GCC 12 keeps them in memory.
-constexpr size_t lanes = 4, few = 8;
+constexpr size_t lanes = 4;
+constexpr size_t few = 8;  // terms up to which it takes longer to bring these together
 using Register = double __attribute__((vector_size(lanes * sizeof(double))));
-using Places = long long __attribute__((vector_size(lanes * sizeof(long long))));
 
 template <size_t count>
 FRETWAVE_INLINE void add_one_by_one(std::array<Series const*, count> const& all, Powers& e, size_t n,
@@ -94,8 +94,8 @@ FRETWAVE_INLINE void add_side_by_side(std::array<Series const*, count> const& al
     for (size_t j = 0; j < count; ++j) {
       Register low, high;
       std::memcpy(&low, &all[j]->q[n], sizeof low), std::memcpy(&high, &all[j]->q[n + 2], sizeof high);
-      const Register re = __builtin_shuffle(low, high, Places{0, 2, 4, 6}),
-                     im = __builtin_shuffle(low, high, Places{1, 3, 5, 7});
+      const Register re = __builtin_shufflevector(low, high, 0, 2, 4, 6),
+                     im = __builtin_shufflevector(low, high, 1, 3, 5, 7);
       const Register a = re * x - im * y, b = k * (re * y + im * x);
       sum[j][0] += a, sum[j][1] -= b, sum[j][2] -= k * k * a;
     }
@@ -123,12 +123,13 @@ template <size_t count>
 std::array<Series::Jet, count> jets(std::array<Series const*, count> const& all, double tau) {
   std::array<Series::Jet, count> out{};
   for (size_t j = 0; j < count; ++j) out[j].d[0] = all[j]->q[0].real();
-  if (all[0]->q.size() > few) {
+  static const bool side_by_side = FRETWAVE_SUPPORTS("x86-64-v3");
+  if (side_by_side && all[0]->q.size() > few) {
     add(all, tau, out);
     return out;
   }
-  const double c = std::cos(tau), s = std::sin(tau);
-  Powers e(c, s, c, s);
+  Powers e(tau);
+  e.next();
   add_one_by_one(all, e, 1, out);
   return out;
 }

@@ -15,6 +15,8 @@ namespace fretwave::precondition {
 namespace {
 
 const Tuned cheap("basis_cheap", 600, "rows up to which the mean stiffness follows at every step");
+const Tuned small("basis_small", 3,
+                  "applications that the lower modes' blocks take at the most where it follows so");
 const Tuned few("basis_few", 0.3, "share of the slipping rows up to which further ones are added to them");
 
 /// The range of harmonics of a rank: as many coefficients for each.
@@ -145,6 +147,8 @@ void BasisPreconditioner::build(Vec y, Vec row) {
     blocks_.set_structure(std::move(z), 1 / problem_.stiffness_scale(), std::move(border));
     take_contact();
   });
+  small_flops_ = blocks_.small_flops();
+  MPI_Allreduce(MPI_IN_PLACE, &small_flops_, 1, MPI_DOUBLE, MPI_MAX, problem_.comm());
   couple(contacts);
 }
 
@@ -156,7 +160,8 @@ void BasisPreconditioner::follow(Vec y) {
   const auto began = beginning(means);
   int rows = 0;
   for (auto const& [pair, at] : began) rows += pairs_[pair].components;
-  if (blocks_.rows() <= cheap || rows > few * blocks_.rows()) {
+  const bool dear = blocks_.rows() > cheap || small_flops_ > small * application_flops();
+  if (!dear || rows > few * blocks_.rows()) {
     means_ = std::move(means);
     together(problem_.comm(), "inverting harmonic blocks", [&] { take_contact(); });
   } else if (rows > 0) {
@@ -243,11 +248,17 @@ void BasisPreconditioner::apply(Vec x, Vec z) {
   if (rank_ == size_ - 1) std::ranges::copy(scalars, out.data() + size_t(local_) * m_);
 }
 
-/// Flops of the rows' inverse over those of an application, in which pairs are coupled by some fifteen
-/// iterations; the border is a share of one.
-double BasisPreconditioner::build_cost() const {
+/// Pairs are coupled in it by some fifteen iterations.
+double BasisPreconditioner::application_flops() const {
   const double n = n_, r = blocks_.rows();
-  return 1 + 2.7 * r * r * r / (m_ * (basis_.flops() + 12 * r * n + 30 * r * r));
+  return m_ * (basis_.flops() + 12 * r * n + 30 * r * r);
+}
+
+/// Flops of the rows' inverse and of the lower modes' blocks over those of an application; what the border's
+/// columns and rows take is a share of one.
+double BasisPreconditioner::build_cost() const {
+  const double r = blocks_.rows();
+  return 1 + (2.7 * r * r * r + small_flops_) / application_flops();
 }
 
 std::string BasisPreconditioner::describe() const {

@@ -57,6 +57,7 @@ class BasisPreconditioner : public solve::Preconditioner {
   std::pair<std::vector<int>, std::vector<ModalBlocks::Entry>> taken(
       std::vector<std::pair<int, size_t>> const& pairs, int first);
   void couple(std::vector<PairTangents> const&);
+  double application_flops() const;
   std::vector<int> correct(std::vector<PairTangents> const&, std::vector<size_t> const& first_block);
   std::vector<float> own(double const* blocks, std::vector<int> const& places, int columns) const;
   void add_coupling(double const* f, double* u) const;
@@ -65,6 +66,7 @@ class BasisPreconditioner : public solve::Preconditioner {
   model::StuckBasis const& basis_;
   int n_, m_, scalars_, rank_, size_, local_, first_, last_;
   ModalBlocks blocks_;
+  double small_flops_ = 0;                   ///< of the lower modes' blocks, on the rank that has the most
   std::vector<double> damping_;              ///< diagonal of C in the basis
   std::vector<Pair> pairs_;                  ///< of all ranks
   int first_pair_ = 0;                       ///< of this rank

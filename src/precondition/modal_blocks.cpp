@@ -50,6 +50,12 @@ std::optional<std::vector<float>> solved_quickly(std::vector<double> const& A, i
   return found;
 }
 
+template <class T>
+void invert(std::vector<T>& N, int n) {
+  if (lapack::invert(N, n))
+    throw SingularBlock("a harmonic block of the preconditioner is singular: a free motion at this harmonic");
+}
+
 }  // namespace
 
 ModalBlocks::ModalBlocks(model::StuckBasis const& basis, Harmonics const& h, int first, int last)
@@ -221,24 +227,24 @@ void ModalBlocks::make_small(int i) {
   const int parts = parts_[i], s = i == border_harmonic_ ? border_.scalars : 0;
   Small small{offsets_[i], parts, s, parts * low_ + s, {}, {}};
   if (parts == 2 && s == 0)
-    small.turned = turned_inverse(z_[i]);
+    small.complex_inverse = inverse(z_[i]);
   else
-    small.real = real_inverse(small, z_[i]);
+    small.real_inverse = inverse(small, z_[i]);
   small_.push_back(std::move(small));
 }
 
-namespace {
-
-template <class T>
-void invert(std::vector<T>& N, int n) {
-  if (lapack::invert(N, n))
-    throw SingularBlock("a harmonic block of the preconditioner is singular: a free motion at this harmonic");
+double ModalBlocks::small_flops() const {
+  double flops = 0;
+  for (int i = 0; i < int(z_.size()); ++i) {
+    const int scalars = i == border_harmonic_ ? border_.scalars : 0;
+    const double k = low_, size = parts_[i] * k + scalars;
+    flops += parts_[i] == 2 && scalars == 0 ? 8 * k * k * k : 2 * size * size * size;
+  }
+  return flops;
 }
 
-}  // namespace
-
 /// (z + H)^-1
-std::vector<std::complex<float>> ModalBlocks::turned_inverse(std::vector<complex> const& z) const {
+std::vector<std::complex<float>> ModalBlocks::inverse(std::vector<complex> const& z) const {
   const int k = low_;
   std::vector<complex> N(H_.begin(), H_.end());
   for (int l = 0; l < k; ++l) N[size_t(l) * k + l] += z[l];
@@ -246,7 +252,7 @@ std::vector<std::complex<float>> ModalBlocks::turned_inverse(std::vector<complex
   return {N.begin(), N.end()};
 }
 
-std::vector<double> ModalBlocks::real_inverse(Small const& small, std::vector<complex> const& z) const {
+std::vector<double> ModalBlocks::inverse(Small const& small, std::vector<complex> const& z) const {
   const int k = low_, parts = small.parts;
   std::vector<double> N(size_t(small.size) * small.size, 0.0);
   const auto at = [&](int row, int col) -> double& { return N[size_t(col) * small.size + row]; };

@@ -43,6 +43,8 @@ class ModalBlocks {
   /// T of further rows, by their places among these, behind those that there are.
   void add_contact(std::vector<int> const& rows, std::vector<Entry> const& T);
   int rows() const { return int(rows_.size()); }
+  /// Flops of the blocks of the lower modes, which are made anew with every change of T.
+  double small_flops() const;
 
   /// Modes, and the border's scalars where it is.
   struct Solution {
@@ -65,16 +67,16 @@ class ModalBlocks {
   std::vector<Rotation> compliance(int harmonic, std::vector<Group> const& groups) const;
 
  private:
-  /// Block N_n of the lower modes, inverted: parts (cosine, sine) x modes, then scalars; complex where no
-  /// scalars tell the parts apart.
+  /// Block N_n of the lower modes, inverted: parts (cosine, sine) x modes, then scalars; complex where there
+  /// are two parts that no scalars tell apart.
   struct Small {
     int at, parts, scalars, size;
-    std::vector<double> real;
-    std::vector<std::complex<float>> turned;
+    std::vector<double> real_inverse;
+    std::vector<std::complex<float>> complex_inverse;
   };
   void make_small(int i);
-  std::vector<std::complex<float>> turned_inverse(std::vector<complex> const& z) const;
-  std::vector<double> real_inverse(Small const&, std::vector<complex> const& z) const;
+  std::vector<std::complex<float>> inverse(std::vector<complex> const& z) const;
+  std::vector<double> inverse(Small const&, std::vector<complex> const& z) const;
   void add_border(Small const&, std::vector<double>& N) const;
   void set_static_compliance();
   void take_rows(std::vector<int> const& rows);

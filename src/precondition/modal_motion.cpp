@@ -13,21 +13,34 @@ using lapack::multiply;
 std::vector<double> ModalBlocks::small_solutions(Small const& small, std::vector<double> const& right) const {
   const int k = low_, n = small.size, columns = int(right.size()) / std::max(n, 1);
   std::vector<double> x(right.size());
-  if (!small.turned.size()) {
-    multiply("NN", {n, columns, n}, 1.0, {small.real.data(), n}, {right.data(), n}, 0.0, x.data(), n);
+  if (small.complex_inverse.empty()) {
+    if (columns == 1) {  // a product of matrices packs the block for it
+      const int step = 1;
+      const double one = 1, zero = 0;
+      dgemv_("N", &n, &n, &one, small.real_inverse.data(), &n, right.data(), &step, &zero, x.data(), &step);
+    } else {
+      multiply("NN", {n, columns, n}, 1.0, {small.real_inverse.data(), n}, {right.data(), n}, 0.0, x.data(),
+               n);
+    }
     return x;
   }
-  std::vector<std::complex<float>> q(size_t(k) * columns), p(q.size());
+  std::vector<std::complex<float>> q(size_t(k) * columns);
   for (int col = 0; col < columns; ++col)
     for (int l = 0; l < k; ++l) {
       double const* part = right.data() + size_t(col) * n + l;
       q[size_t(col) * k + l] = {float(part[0]), -float(part[k])};
     }
-  multiply("NN", {k, columns, k}, 1.0f, {small.turned.data(), k}, {q.data(), k}, 0.0f, p.data(), k);
+  if (columns == 1) {
+    q = lapack::product(k, k, small.complex_inverse.data(), std::move(q));
+  } else {
+    const auto given = q;
+    multiply("NN", {k, columns, k}, 1.0f, {small.complex_inverse.data(), k}, {given.data(), k}, 0.0f,
+             q.data(), k);
+  }
   for (int col = 0; col < columns; ++col)
     for (int l = 0; l < k; ++l) {
       double* part = x.data() + size_t(col) * n + l;
-      part[0] = p[size_t(col) * k + l].real(), part[k] = -p[size_t(col) * k + l].imag();
+      part[0] = q[size_t(col) * k + l].real(), part[k] = -q[size_t(col) * k + l].imag();
     }
   return x;
 }
