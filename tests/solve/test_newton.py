@@ -89,17 +89,17 @@ def test_any_number_of_samples_gives_the_continuous_closed_form(comm, method):
         assert problem.state(point.y)["zeta"] == pytest.approx(zeta, rel=TIGHT)
 
 
-def counts(comm, case, **options):
+def counts(comm, case, **given):
     """Points, Newton steps and linear iterations of a branch on the Krylov route. Collective."""
     model, first, rest = case
     database = PETSc.Options("loose_")
-    for name, value in {"route": "krylov", **options}.items():
+    for name, value in {"route": "krylov", **given}.items():
         database.setValue(name, value)
     problem = fw.NonlinearMode(model, fw.Harmonics(range(8), 128), "CNM", TIP, first, "loose_")
     problem.preload(rest.displacement, rest.load)
     branch = fw.Continuation(problem, problem.initial(1e-3), (1e-3, 6e-3), fw.StepControl(max_points=50))
     found = np.array([(1, p.newton, p.linear) for p in branch]).sum(axis=0)
-    for name in options:
+    for name in given:
         database.delValue(name)
     assert branch.converged, branch.reason
     return found
@@ -110,10 +110,10 @@ def test_how_roughly_newton_steps_are_solved_for_does_not_shape_the_branch(comm)
     model = blade(comm)
     case = (model, *preloaded(model))
     usual = counts(comm, case)
-    for options in ({"ksp_rtol": 1e-3}, {"ksp_rtol": 1e-2}, {"snes_ksp_ew": None}):
-        found = counts(comm, case, **options)
-        assert abs(found[0] - usual[0]) < 0.2 * usual[0], f"{options}: {found} against {usual}"
-        assert found[2] < 1.5 * usual[2], f"{options}: {found} against {usual}"
+    for given in ({"ksp_rtol": 1e-3}, {"ksp_rtol": 1e-2}, {"snes_ksp_ew": None}):
+        found = counts(comm, case, **given)
+        assert abs(found[0] - usual[0]) < 0.2 * usual[0], f"{given}: {found} against {usual}"
+        assert found[2] < 1.5 * usual[2], f"{given}: {found} against {usual}"
 
 
 @pytest.mark.ranks(1)
