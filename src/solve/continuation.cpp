@@ -38,6 +38,7 @@ const Tuned farthest("branch_farthest", 4, "factor by which it may leave the ran
 /// On a coarse grid: what a solution's last digits (of which no two numbers of ranks have the same) do to a
 /// length would be handed on from step to step and grow with the steps.
 double on_grid(double length) { return std::exp2(std::round(grid * std::log2(length)) / grid); }
+constexpr double shorter = 0.75;  // of the step tried before, one that is tried again
 
 }  // namespace
 
@@ -418,8 +419,9 @@ void Continuation::arrive(double reached) {
               problem_.parameter_text(goal);
 }
 
-/// All points of the next step in order: events inside it, then its end (or the stop value).
-void Continuation::make_batch() {
+/// All points of the next step in order: events inside it, then its end (or the stop value), after one of
+/// this length at which that was not to be had.
+void Continuation::make_batch(double tried) {
   batch_.clear();
   emitted_ = 0;
   double length, next_length;
@@ -452,9 +454,11 @@ void Continuation::make_batch() {
     batch_.erase(stop + 1, batch_.end());
     arrive(std::abs(value - low_) < std::abs(value - high_) ? low_ : high_);
   } else if (outside) {
-    if (length / 2 >= steps_.minimum) {
-      anchor_.step = length / 2;  // a long step's interpolation is too far from the branch
-      return make_batch();
+    // a long step's interpolation is too far from the branch; one that turns a corner is as long as that
+    // wants
+    if (length / 2 >= steps_.minimum && length <= shorter * tried) {
+      anchor_.step = length / 2;
+      return make_batch(length);
     }
     finish("the stop value is not reached: the corrector fails there", false);
   }

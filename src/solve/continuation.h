@@ -1,4 +1,5 @@
 #pragma once
+#include <cmath>
 #include <functional>
 #include <optional>
 
@@ -117,7 +118,7 @@ class Continuation {
   std::optional<Trial> step(double& length, double& next_length);
   void finish(std::string reason, bool converged);
   Point point(Trial&&, std::string event, double step);
-  void make_batch();
+  void make_batch(double tried = INFINITY);
   void arrive(double reached);
   bool been_here(Trial const&);
   bool fell_back(Trial const&);

@@ -348,3 +348,35 @@ def test_a_response_may_leave_the_range_where_it_began_and_come_in_again(comm):
     omega = [p.parameter for p in branch]
     assert branch.converged and omega[-1] == pytest.approx(0.6)
     assert 0.39 < min(omega) < 0.4
+
+
+@pytest.mark.ranks(1)
+def test_a_stop_value_within_a_corner_is_an_end(comm):
+    """The pad's mean shakes down there, by 1.6 amplitudes while the amplitude grows by 2e-5 of itself. Where rounding
+    lets the corrector fail at the stop value, a step that turns the corner is as long the next time: it was tried again
+    for ever."""
+    M = np.diag([0.5353060186860404, 0.20151676673666646, 0.1989192380091729])
+    K = np.array(
+        [
+            [3233.247173327989, -362.9078630299418, 1248.1192452434084],
+            [-362.9078630299418, 98.82698582487347, -59.625855581585256],
+            [1248.1192452434084, -59.625855581585256, 617.1231145510654],
+        ]
+    )
+    stiff = {"normal_stiffness": 1377977.5851226435, "tangential_stiffness": 492149.9308281881}
+    pad = {**stiff, "friction_coefficient": 0.013638073087847874, "normal_load": 58.46723536602342, "gap": 0.0}
+    rub = {"friction_limit": 293.60260822536407, "regularisation_velocity": 0.04479277398266465}
+    contacts = [
+        fw.Contact("coulomb_3d", np.eye(3), pad),
+        fw.Contact("regularised_coulomb", np.array([[0.0, 1.0, -1.0]]), rub),
+    ]
+    with fw.Model(M, K, None, contacts, comm) as model:
+        first = fw.linear_modes(model, 1, "stuck")[0]
+        rest = fw.balanced(model, first)
+        stop = 1.145656533236825e-06
+        problem = fw.NonlinearMode(model, fw.Harmonics(range(4), 8), "CNM", 1, first)
+        problem.preload(rest.displacement, rest.load)
+        branch = fw.Continuation(problem, problem.initial(stop / 100), (stop / 200, stop), upwards=True)
+        points = list(branch)
+    assert branch.converged or "stop value" in branch.reason or "step too small" in branch.reason
+    assert points[-1].parameter == pytest.approx(stop, rel=1e-6)
