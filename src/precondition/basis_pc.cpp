@@ -16,7 +16,7 @@ namespace {
 
 const Tuned cheap("basis_cheap", 600, "rows up to which the mean stiffness follows at every step");
 const Tuned small("basis_small", 3,
-                  "applications that the lower modes' blocks take at the most where it follows so");
+                  "applications that the lower modes' blocks may take where the mean stiffness follows so");
 const Tuned few("basis_few", 0.3, "share of the slipping rows up to which further ones are added to them");
 
 /// The range of harmonics of a rank: as many coefficients for each.

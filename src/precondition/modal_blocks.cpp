@@ -235,11 +235,8 @@ void ModalBlocks::make_small(int i) {
 
 double ModalBlocks::small_flops() const {
   double flops = 0;
-  for (int i = 0; i < int(z_.size()); ++i) {
-    const int scalars = i == border_harmonic_ ? border_.scalars : 0;
-    const double k = low_, size = parts_[i] * k + scalars;
-    flops += parts_[i] == 2 && scalars == 0 ? 8 * k * k * k : 2 * size * size * size;
-  }
+  for (Small const& small : small_)
+    flops += small.complex_inverse.empty() ? 2 * std::pow(small.size, 3) : 8 * std::pow(low_, 3);
   return flops;
 }
 

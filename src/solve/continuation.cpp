@@ -454,8 +454,7 @@ void Continuation::make_batch(double tried) {
     batch_.erase(stop + 1, batch_.end());
     arrive(std::abs(value - low_) < std::abs(value - high_) ? low_ : high_);
   } else if (outside) {
-    // a long step's interpolation is too far from the branch; one that turns a corner is as long as that
-    // wants
+    // a long step's interpolation is too far from the branch; how long a corner's is does not depend on this
     if (length / 2 >= steps_.minimum && length <= shorter * tried) {
       anchor_.step = length / 2;
       return make_batch(length);

@@ -90,8 +90,7 @@ LinearSolver::~LinearSolver() {
 }
 
 void LinearSolver::choose_route() {
-  PetscInt unknowns;
-  check(VecGetSize(point_, &unknowns));
+  const PetscInt unknowns = this->unknowns();
   const std::string wish = choice(prefix_, "-route", "route of the corrector", "direct", "krylov");
   const std::string blocks = choice(prefix_, "-blocks", "kind of preconditioner", "dense", "sparse");
   if (wish == "krylov" || (wish == "auto" && unknowns > krylov_limit)) {
@@ -337,20 +336,22 @@ bool LinearSolver::take_condensed(PreconditionerKind const& kind, double bytes) 
   return true;
 }
 
+PetscInt LinearSolver::unknowns() const {
+  PetscInt all;
+  check(VecGetSize(point_, &all));
+  return all;
+}
+
 double LinearSolver::whole_bytes() const {
-  PetscInt unknowns;
-  check(VecGetSize(point_, &unknowns));
-  return WholeFactor::bytes(bordered_.problem(), double(unknowns));
+  return WholeFactor::bytes(bordered_.problem(), double(unknowns()));
 }
 
 bool LinearSolver::take_whole() {
-  PetscInt unknowns;
-  check(VecGetSize(point_, &unknowns));
   const double bytes = whole_bytes();
   if (!fits(bytes, "a factor of the whole system")) return false;
   fallback_ = std::make_unique<WholeFactor>(bordered_, prefix_);
   rung_ = 2, ++fallbacks_.whole;
-  fallbacks_.said = "GMRES stalls: all " + std::to_string(unknowns) + " unknowns are factorised (about " +
+  fallbacks_.said = "GMRES stalls: all " + std::to_string(unknowns()) + " unknowns are factorised (about " +
                     gigabytes(bytes) + ")";
   return true;
 }

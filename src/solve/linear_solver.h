@@ -78,6 +78,7 @@ class LinearSolver {
   bool take_condensed(PreconditionerKind const&, double bytes);
   bool take_whole();
   double whole_bytes() const;
+  PetscInt unknowns() const;
   bool fits(double bytes, std::string const& what);
   void count_iterations();
   Preconditioner& preconditioner() { return fallback_ ? *fallback_ : *own_; }
