@@ -43,6 +43,15 @@ def ratio(beta, omega, method):
     return beta / np.hypot(beta, omega) if method == "CNM" else beta / omega
 
 
+def at_its_amplitude(eq, Q, beta, omega):
+    """Errors of a mode's first Newton step that holds its amplitude: in corners, where a branch is steep in all else,
+    the nearest solution lies at another amplitude, and omega and zeta of the two are far apart."""
+    start, size = (Q, beta, omega), np.linalg.norm(_dynamic(eq, Q)) or 1.0
+    R, acting, J = eq.linearise(start)
+    step = least_step(eq, J, R, start, size, held=True)
+    return _errors(eq, start, _take(start, step, 1.0), size, _balance(eq, R, acting), False)
+
+
 def distance(eq, Q, beta, omega, enough=None):
     """Errors of coefficients Q (n_dof, m) with decay beta and frequency omega (EPMC: w0; forced: beta = 0).
 
@@ -125,9 +134,9 @@ def _errors(eq, start, end, size, balance, found):
     return Distance(float(domega), float(dzeta), float(motion), balance, found)
 
 
-def least_step(eq, J, R, now, size):
+def least_step(eq, J, R, now, size, held=False):
     """Least-norm solution of J d = -R in units of the motion's size and of omega. For a mode the normalised
-    coefficient's sine stays zero; its cosine, the amplitude, is free.
+    coefficient's sine stays zero; its cosine, the amplitude, is free unless held.
 
     Returns
     -------
@@ -140,20 +149,21 @@ def least_step(eq, J, R, now, size):
     if forced:
         J = sp.hstack([J[:, :n], J[:, n + 1 :]], format="csr")
     else:
-        k = eq.dof * eq.m + eq.column[1] + 1
-        row = sp.csr_matrix(([size], ([0], [k])), shape=(1, n + 2))
-        J = sp.vstack([J, row], format="csr")
-    right = -np.r_[R.ravel(), [] if forced else [-0.0]]
+        k = eq.dof * eq.m + eq.column[1]
+        for fixed in (k + 1, k) if held else (k + 1,):
+            J = sp.vstack([J, sp.csr_matrix(([size], ([0], [fixed])), shape=(1, n + 2))], format="csr")
+    right = -np.r_[R.ravel(), np.zeros(J.shape[0] - n)]
     scale = 1.0 / np.maximum(abs(J).max(axis=1).toarray().ravel(), 1e-300)
-    J, right = sp.diags(scale) @ J, scale * right
-    d = _dense(J.toarray(), right) if J.shape[0] <= DENSE else _bordered(J, right)
+    J, right = (sp.diags(scale) @ J).tocsr(), scale * right
+    solve = _dense if J.shape[0] <= DENSE else spla.spsolve if held else _bordered
+    d = solve(J, right)
     dQ = (d[:n] * size).reshape(Q.shape)
     tail = d[n:] * abs(omega)
     return (dQ, 0.0, tail[0]) if forced else (dQ, tail[0], tail[1])
 
 
 def _dense(J, right):
-    return np.linalg.lstsq(J, right, rcond=1e-15)[0]
+    return np.linalg.lstsq(J.toarray(), right, rcond=1e-15)[0]
 
 
 def _bordered(J, right):

@@ -11,7 +11,7 @@ import h5py
 import numpy as np
 
 from . import path
-from .distance import Distance, distance
+from .distance import Distance, at_its_amplitude, distance
 from .equations import Equations
 from .scene import Finished, Scene
 
@@ -194,7 +194,7 @@ def _points(run: Run, verdict: Verdict) -> list[str]:
             verdict.worst[key] = max(verdict.worst.get(key, 0.0), getattr(found, key))
         wrong = errors(run, row, found)
         if wrong and run.method != "forced":
-            wrong = errors(run, row, found, last_digits(run, row, found))
+            wrong = errors(run, row, found, last_digits(run, row, found)) and _off_at_its_amplitude(run, row) and wrong
         if wrong and (worst is None or found.motion > worst[1].motion):
             worst = (row, found, wrong)
     if worst is None:
@@ -203,6 +203,12 @@ def _points(run: Run, verdict: Verdict) -> list[str]:
     where = f"at {run.parameter[row]:.6g}, row {row} (residual column {run.columns['residual'][row]:.1e})"
     way = "from the solution" if found.found else "by the first Newton step, no solution found near it"
     return [f"{', '.join(wrong)} off {way}, force unbalanced {found.balance:.1e} of those acting, {where}"]
+
+
+def _off_at_its_amplitude(run: Run, row: int) -> bool:
+    """Whether omega, zeta or the motion is off where a step to the solution keeps the mode's amplitude."""
+    held = at_its_amplitude(run.equations, *run.state(row))
+    return bool(errors(run, row, held)) or not held.motion <= MOTION
 
 
 def rounding(run: Run) -> float:

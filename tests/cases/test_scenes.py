@@ -17,7 +17,7 @@ from tolerances import ROUNDING
 sys.path.insert(0, str(Path(__file__).parents[2] / "cases"))
 
 from oracle import forces  # noqa: E402
-from scenes import laws, pads, path  # noqa: E402
+from scenes import laws, list_random, pads, path  # noqa: E402
 from scenes.circle import Slider, rate  # noqa: E402
 from scenes.circle import waves as all_waves
 from scenes.closed import jenkins_stiffness  # noqa: E402
@@ -340,6 +340,15 @@ def test_scene(name, tmp_path):
 def test_a_scene_in_a_process_of_its_own(tmp_path):
     """As the list is run: with a limit on its processor time."""
     verdict = one(next(s for s in all_scenes() if s.quick and s.twin is None), tmp_path)
+    assert verdict.word == "right", verdict.reasons
+
+
+def test_a_window_that_ends_on_a_corner_is_right_at_its_amplitude(tmp_path):
+    """A pad slips by 1e-8 of its arm, too little to tell its mean by: the nearest solution lies at another amplitude,
+    where zeta is 5 % off."""
+    corner = next(scene for scene in list_random.mixed(60, 47) if scene.name == "47_5_pad_tanh")
+    window = {**corner.analysis, "amplitude": [1.145634e-6, 1.14565662e-6]}
+    verdict = one(dataclasses.replace(corner, analysis=window), tmp_path, run_here)
     assert verdict.word == "right", verdict.reasons
 
 
