@@ -1,11 +1,11 @@
 #include "solve/linear_solver.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "error.h"
 #include "log.h"
 #include "solve/direct.h"
-#include "solve/memory.h"
 #include "tuned.h"
 
 namespace fretwave::solve {
@@ -16,12 +16,12 @@ namespace {
 // blades of 30 to 155 dofs it took half the time of a direct Newton step at 213 unknowns, a third at 708, a
 // twelfth at 2328.
 const Tuned krylov_limit("linear_krylov_limit", 300, "unknowns above which the Krylov route is taken");
-const Tuned most_beside(
-    "linear_whole", 4,
-    "bytes of a factor of the whole system over those of the condensed contact, up to which "
-    "it is taken before that");
 constexpr double tangent_tolerance = 1e-10;  // relative; of the tangent's direction
-const Tuned longest_stay("linear_longest_stay", 256, "points between two tries at the foot of the ladder");
+const Tuned large("linear_large", 3e4,
+                  "unknowns above which steps far from a solution, and tangents, are solved to fewer digits");
+constexpr double digits = 1e-6;  // relative residual of a Newton step
+const Tuned roughly("linear_roughly", 1e-2, "relative residual of Newton steps far from a solution");
+const Tuned rough_tangent("linear_rough_tangent", 1e-6, "relative residual of tangents of large problems");
 const Tuned tangent_accepted("linear_tangent_accepted", 1e-6,
                              "residual of a tangent, relative, where rounding lets GMRES go no further");
 const Tuned renewal("linear_renewal", 1.0 / 16,
@@ -132,10 +132,9 @@ void LinearSolver::use_krylov() {
                              reinterpret_cast<void (*)(void)>(shell_transposed_product)));
   check(KSPSetType(ksp, KSPFGMRES));
   check(KSPGMRESSetRestart(ksp, 100));
-  // Six digits: with Eisenstat and Walker's 1e-2 and (|g_k| / |g_k-1|)^2 a count of GMRES that rounding turns
-  // changes the step, and a hard branch has other points on other numbers of ranks (-snes_ksp_ew: for large
-  // ones)
-  check(KSPSetTolerances(ksp, 1e-6, 1e-13, PETSC_DEFAULT, 200));
+  // Six digits: with fewer a count of GMRES that rounding turns changes the step, and a hard branch has other
+  // points on other numbers of ranks. Large problems save half of all iterations by them (`aim`).
+  check(KSPSetTolerances(ksp, digits, 1e-13, PETSC_DEFAULT, 200));
   check(KSPGetPC(ksp, &pc));
   check(PCSetType(pc, kind_.kind->type.c_str()));
 }
@@ -181,9 +180,27 @@ void LinearSolver::make_tangent() {
     check(KSPGMRESGetRestart(newton, &restart));
     check(KSPGMRESSetRestart(tangent_, restart));
   }
-  check(KSPSetTolerances(tangent_, tangent_tolerance, PETSC_DEFAULT, PETSC_DEFAULT, iterations));
+  check(KSPSetTolerances(tangent_, is_large() ? double(rough_tangent) : tangent_tolerance, PETSC_DEFAULT,
+                         PETSC_DEFAULT, iterations));
   check(KSPSetFromOptions(tangent_));
   check(KSPGetTolerances(tangent_, nullptr, &tangent_floor_, nullptr, nullptr));
+}
+
+bool LinearSolver::is_large() const { return krylov_ && unknowns() > large; }
+
+/// Far from a solution a step need not be better than its linearisation: Newton's quadratic convergence
+/// foretells that (|g_k| / |g_k-1|)^2 is left of the residual (Eisenstat & Walker, SIAM J. Sci. Comput. 17,
+/// 1996, choice 2). Where six digits may end the iteration, six it is: so it ends with as little left as
+/// ever. 768 pairs (34,725 unknowns) take half the iterations of GMRES and the same steps.
+void LinearSolver::aim(double residual, double before, double enough) {
+  if (!is_large()) return;
+  KSP ksp = ksp_of(snes_);
+  double given;
+  check(KSPGetTolerances(ksp, &given, nullptr, nullptr, nullptr));
+  if (given != aimed_at_) return;  // an option's
+  const double foretold = std::pow(residual / before, 2), least = digits, most = roughly;
+  aimed_at_ = residual * digits <= enough ? digits : std::clamp(foretold, least, std::max(least, most));
+  check(KSPSetTolerances(ksp, aimed_at_, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT));
 }
 
 PetscErrorCode LinearSolver::shell_product(Mat J, Vec x, Vec y) {
@@ -216,19 +233,21 @@ PetscErrorCode LinearSolver::apply(Vec x, Vec z) {
 /// The preconditioner is stale once the iterations of Newton's solves beyond those just after it was built
 /// have cost as much as building; at once, if even its first reuse cost more the last time. Built at a hard
 /// point it would never be: a share of all iterations counts. Built for a tangent, it is no longer fresh when
-/// Newton first solves with it: what the last one took when it was counts.
+/// Newton first solves with it: what the last one took when it was counts. Of solves to fewer digits their
+/// share of six.
 void LinearSolver::count_iterations() {
   PetscInt iterations = 0;
   check(KSPGetIterationNumber(beside_ ? KSP(tangent_) : ksp_of(snes_), &iterations));
-  const double cost = preconditioner().build_cost();
+  const double cost = preconditioner().build_cost(), share = std::log(aimed_at_) / std::log(digits),
+               whole = iterations / share;
   if (fresh_ < 0 && built_here_) {
-    fresh_ = last_fresh_ = int(iterations);
+    fresh_ = last_fresh_ = whole;
     stale_ = first_reuse_ > cost;
     first_reuse_ /= 2;
     return;
   }
-  if (fresh_ < 0) fresh_ = last_fresh_ < 0 ? int(iterations) : std::min(int(iterations), last_fresh_);
-  const double beyond = std::max(0, int(iterations) - fresh_);
+  if (fresh_ < 0) fresh_ = last_fresh_ < 0 ? whole : std::min(whole, last_fresh_);
+  const double beyond = std::max(0.0, iterations - share * fresh_);
   if (excess_ == 0) first_reuse_ = beyond;
   excess_ += beyond + renewal * iterations;
   stale_ = excess_ > cost;
@@ -303,72 +322,10 @@ void LinearSolver::serve_beside(double tolerance) {
   check(KSPSetFromOptions(tangent_));
 }
 
-bool LinearSolver::climb() {
-  if (!own_) return false;  // PETSc's ways are the user's own
-  stale_ = true, solved_ = 0;
-  if (!built_here_) {
-    ++fallbacks_.rebuilt;
-    return true;
-  }
-  if (rung_ > 0) return rung_ < 2 && take_whole();
-  const auto [condensed, bytes] = condensing();
-  if (bytes == 0 || whole_bytes() <= most_beside * bytes)
-    return take_whole() || (bytes > 0 && take_condensed(*condensed, bytes));
-  return take_condensed(*condensed, bytes) || take_whole();
-}
-
-/// What condenses the system on its contact, and the bytes it takes; none and 0 if nothing does.
-std::pair<PreconditionerKind const*, double> LinearSolver::condensing() const {
-  Problem& problem = bordered_.problem();
-  const auto helps = [&](PreconditionerKind const& kind) {
-    return &kind != kind_.kind && kind.fallback_bytes && kind.refuses(problem).empty();
-  };
-  const auto found = std::ranges::find_if(kinds(), helps);
-  if (found == kinds().end()) return {nullptr, 0};
-  return {&*found, found->fallback_bytes(problem)};
-}
-
-bool LinearSolver::take_condensed(PreconditionerKind const& kind, double bytes) {
-  if (!fits(bytes, "the condensed contact system")) return false;
-  fallback_ = kind.make(bordered_.problem());
-  rung_ = 1, ++fallbacks_.condensed;
-  fallbacks_.said = "GMRES stalls: the condensed contact system is factorised (" + gigabytes(bytes) + ")";
-  return true;
-}
-
 PetscInt LinearSolver::unknowns() const {
   PetscInt all;
   check(VecGetSize(point_, &all));
   return all;
-}
-
-double LinearSolver::whole_bytes() const {
-  return WholeFactor::bytes(bordered_.problem(), double(unknowns()));
-}
-
-bool LinearSolver::take_whole() {
-  const double bytes = whole_bytes();
-  if (!fits(bytes, "a factor of the whole system")) return false;
-  fallback_ = std::make_unique<WholeFactor>(bordered_, prefix_);
-  rung_ = 2, ++fallbacks_.whole;
-  fallbacks_.said = "GMRES stalls: all " + std::to_string(unknowns()) + " unknowns are factorised (about " +
-                    gigabytes(bytes) + ")";
-  return true;
-}
-
-bool LinearSolver::fits(double bytes, std::string const& what) {
-  const double available = available_bytes(bordered_.problem().comm());
-  if (bytes <= memory_share * available) return true;
-  fallbacks_.said =
-      what + " does not fit: about " + gigabytes(bytes) + ", of " + gigabytes(available) + " free";
-  return false;
-}
-
-void LinearSolver::descend() {
-  if (!rung_ || ++solved_ < stay_) return;
-  rung_ = 0, solved_ = 0, stale_ = true;
-  stay_ = std::min(int(longest_stay), 2 * stay_);
-  fallback_.reset();
 }
 
 /// Behind a kink of the branch the last tangent can be a guess so bad that GMRES takes it for divergence.

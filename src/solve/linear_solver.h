@@ -43,6 +43,9 @@ class LinearSolver {
   /// J x = b from x where the Krylov route is taken, to the tangent's tolerance, or to this residual.
   /// Collective.
   bool solve(Vec b, Vec x, double rounding = 0);
+  /// The digits of Newton's next step from this residual and the one before it, of large problems whose
+  /// options leave them open; a residual of `enough` ends the iteration.
+  void aim(double residual, double before, double enough);
   /// No Newton steps are asked for, but solves beside them alone, to this relative tolerance.
   void serve_beside(double tolerance);
   /// The next linearisation builds the preconditioner anew.
@@ -79,6 +82,7 @@ class LinearSolver {
   bool take_whole();
   double whole_bytes() const;
   PetscInt unknowns() const;
+  bool is_large() const;
   bool fits(double bytes, std::string const& what);
   void count_iterations();
   Preconditioner& preconditioner() { return fallback_ ? *fallback_ : *own_; }
@@ -92,13 +96,14 @@ class LinearSolver {
   ChosenKind kind_;
   std::unique_ptr<Preconditioner> own_, fallback_;  ///< none where options ask for a PC of PETSc's
   bool krylov_ = false, stale_ = true, uncounted_ = false, beside_ = false;
-  int fresh_ = -1, last_fresh_ = -1;  ///< Krylov iterations of the first solve after a build, or that before;
-                                      ///< -1: none yet
-  double excess_ = 0;                 ///< iterations beyond that and a share of them, of all solves since
+  double fresh_ = -1, last_fresh_ = -1;  ///< Krylov iterations of the first solve after a build, or that
+                                         ///< before; -1: none yet
+  double excess_ = 0;                    ///< iterations beyond that and a share of them, of all solves since
   double first_reuse_ = 0;  ///< iterations beyond it that the first reuse cost when it was last tried, halved
                             ///< at every build since
   bool built_here_ = false;     ///< at the last linearisation
   double tangent_floor_ = 0;    ///< of its residuals, by the options
+  double aimed_at_ = 1e-6;      ///< relative residual of Newton's next step
   int rung_ = 0;                ///< of the ladder; 0: the problem's own preconditioner
   int stay_ = 32, solved_ = 0;  ///< points to stay up there, and points since
   Fallbacks fallbacks_;

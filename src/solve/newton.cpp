@@ -146,7 +146,11 @@ PetscErrorCode Newton::form_function(SNES, Vec y, Vec g, void* context) {
 PetscErrorCode Newton::form_jacobian(SNES snes, Vec y, Mat, Mat, void* context) {
   auto& newton = *static_cast<Newton*>(context);
   return newton.linear_->guard().run([&] {
+    double residual, enough;
+    check(SNESGetFunctionNorm(snes, &residual));
+    check(SNESGetTolerances(snes, &enough, nullptr, nullptr, nullptr, nullptr));
     const bool regular = newton.linear_->linearise(y, true);
+    newton.linear_->aim(residual, newton.step_from_, enough);
     check(
         SNESSetCheckJacobianDomainError(snes, regular ? PETSC_FALSE : PETSC_TRUE));  // it is never taken back
     if (!regular) check(SNESSetJacobianDomainError(snes));

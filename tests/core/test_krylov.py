@@ -6,6 +6,7 @@ from itertools import groupby
 
 import numpy as np
 import pytest
+from models.core_models import options
 from petsc4py import PETSc
 from tolerances import REPEATED, ROUNDING, SOLVED
 
@@ -184,6 +185,30 @@ def test_iterations_do_not_grow_with_slip(krylov, comm):
             print(f"slip {share:.1f}: {min(counts):.1f} to {max(counts):.1f} GMRES iterations per Newton step")
     assert max(p["slip"] for p in moving) > 0.75
     assert max(p["linear"] / p["newton"] for p in moving) <= 7
+
+
+@pytest.mark.parametrize("method", ["CNM", "EPMC"])
+def test_steps_of_a_large_problem_are_solved_as_far_as_they_lead(case, method):
+    """The same points as to six digits, to all digits that those have, by fewer iterations of GMRES."""
+    usual = branch(mode(*case, "krylov", method))
+    with options(fw_linear_large=10):
+        large = branch(mode(*case, "krylov", method))
+    steps, iterations = ([sum(p[key] for p in points) for points in (large, usual)] for key in ("newton", "linear"))
+    assert steps[0] <= 1.1 * steps[1] and iterations[0] <= 0.8 * iterations[1], (steps, iterations)
+    reported = [[p for p in points if p["event"] == "report"] for points in (large, usual)]
+    for one, other in zip(*reported, strict=True):
+        assert one["omega"] == pytest.approx(other["omega"], rel=SOLVED)
+        assert one["beta"] == pytest.approx(other["beta"], rel=SOLVED, abs=SOLVED * other["omega"])
+
+
+def test_an_option_says_how_far_steps_are_solved(case):
+    """Of a large problem too."""
+    found = []
+    for least in (10, 1e9):
+        with options(fw_linear_large=least, krylov_ksp_rtol=1e-3, krylov_tangent_ksp_rtol=1e-9):
+            points = branch(mode(*case, "krylov"), (1.5e-3, 2.2e-3), ())
+        found.append([(p["newton"], p["linear"]) for p in points])
+    assert found[0] == found[1]
 
 
 @pytest.mark.parametrize("route", KRYLOV)
