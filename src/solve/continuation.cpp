@@ -94,7 +94,7 @@ bool Continuation::correct(Trial& trial, Vec row, double value, Vec tangent_row,
   }
   if (!trial.tangent) trial.tangent = zero_like(trial.y);
   if (tangent_row != row) newton_.system().close(tangent_row, 0);
-  if (!newton_.tangent(trial.y, trial.tangent)) {
+  if (!newton_.tangent(trial.y, trial.tangent, exact_tangents_)) {
     trial.outcome.reason = "the linear solve for the tangent fails";
     return false;
   }

@@ -176,6 +176,7 @@ class Continuation {
   std::vector<std::string> missed_;
   Trail trail_;
   int emitted_ = 0, meetings_ = 0, circles_ = 0, crawled_ = 0;
+  bool exact_tangents_ = false;  ///< as events need them
   bool way_ = false, upwards_ = true, taken_over_ = false, turned_ = false, wary_ = false, finished_ = false,
        converged_ = false;
   std::string ending_;  ///< reason to stop once the batch is handed out

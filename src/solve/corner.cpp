@@ -147,7 +147,7 @@ std::optional<Continuation::Trial> Continuation::turn_corner(double beyond, doub
   const VecHandle there = moved(anchor_.y, beyond, anchor_.tangent);
   VecHandle tangent = copy(anchor_.tangent);
   newton_.system().close(row_, 0);
-  if (!newton_.tangent(there, tangent)) return {};
+  if (!newton_.tangent(there, tangent, true)) return {};
   const double size = weighted_norm(weights_, tangent);
   if (!std::isfinite(size)) return {};
   check(VecScale(tangent, 1 / size));

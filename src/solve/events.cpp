@@ -27,10 +27,14 @@ void Continuation::miss(std::string const& what, std::string const& why) {
   missed_.push_back(what + ": " + why);
 }
 
-/// A guess off the step's cubic is corrected at its arclength, to a point of the same branch.
+/// A guess off the step's cubic is corrected at its arclength, to a point of the same branch. Its tangent is
+/// what test functions are made of.
 bool Continuation::correct_inside(Trial& trial, double at, double length) {
   const VecHandle expected = copy(trial.y);
-  return correct(trial, row_, row_value_ + at, row_) && distance(trial.y, expected) <= off_the_curve * length;
+  exact_tangents_ = true;
+  const bool found = correct(trial, row_, row_value_ + at, row_);
+  exact_tangents_ = false;
+  return found && distance(trial.y, expected) <= off_the_curve * length;
 }
 
 void Continuation::locate_events(Trial const& end, double length) {

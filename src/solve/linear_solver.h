@@ -40,9 +40,11 @@ class LinearSolver {
   /// Point and factors of the solves that follow; false where it is singular. `newton`: one of Newton's
   /// follows. Collective.
   bool linearise(Vec y, bool newton);
-  /// J x = b from x where the Krylov route is taken, to the tangent's tolerance, or to this residual.
-  /// Collective.
-  bool solve(Vec b, Vec x, double rounding = 0);
+  /// J x = b from x where the Krylov route is taken, to the tangent's tolerance, or to this residual, or
+  /// share of b. Collective.
+  bool solve(Vec b, Vec x, double rounding = 0, double share = 0);
+  /// Share that is left by a tangent good enough to take a step along, of large problems; else 0.
+  double rough() const;
   /// The digits of Newton's next step from this residual and the one before it, of large problems whose
   /// options leave them open; a residual of `enough` ends the iteration.
   void aim(double residual, double before, double enough);
@@ -101,11 +103,11 @@ class LinearSolver {
   double excess_ = 0;                    ///< iterations beyond that and a share of them, of all solves since
   double first_reuse_ = 0;  ///< iterations beyond it that the first reuse cost when it was last tried, halved
                             ///< at every build since
-  bool built_here_ = false;     ///< at the last linearisation
-  double tangent_floor_ = 0;    ///< of its residuals, by the options
-  double aimed_at_ = 1e-6;      ///< relative residual of Newton's next step
-  int rung_ = 0;                ///< of the ladder; 0: the problem's own preconditioner
-  int stay_ = 32, solved_ = 0;  ///< points to stay up there, and points since
+  bool built_here_ = false;                       ///< at the last linearisation
+  double tangent_least_ = 0, tangent_floor_ = 0;  ///< of its residuals, by the options
+  double aimed_at_ = 1e-6;                        ///< relative residual of Newton's next step
+  int rung_ = 0;                                  ///< of the ladder; 0: the problem's own preconditioner
+  int stay_ = 32, solved_ = 0;                    ///< points to stay up there, and points since
   Fallbacks fallbacks_;
   std::string route_, note_;
   Guard guard_;

@@ -259,20 +259,20 @@ double Newton::rounding(Vec y) {
   return std::isfinite(residual) ? std::min<double>(residual, roughest) : 0;
 }
 
-bool Newton::tangent(Vec y, Vec t) {
+bool Newton::tangent(Vec y, Vec t, bool exactly) {
   check(VecSet(right_side_, 0));
   set_last_entry(right_side_, 1);
   // about as long as y: its product with the Jacobian is rounded as the residual is
   const Vec b = right_side_;
-  return linear(y, {&b, 1}, {&t, 1}, rounding(y));
+  return linear(y, {&b, 1}, {&t, 1}, rounding(y), exactly ? 0 : linear_->rough());
 }
 
 bool Newton::linear(Vec y, Vec b, Vec x) { return linear(y, {&b, 1}, {&x, 1}); }
 
-bool Newton::linear(Vec y, std::span<Vec const> b, std::span<Vec const> x, double rounding) {
+bool Newton::linear(Vec y, std::span<Vec const> b, std::span<Vec const> x, double rounding, double share) {
   const auto all = [&] {
     for (size_t k = 0; k < b.size(); ++k)
-      if (!linear_->solve(b[k], x[k], rounding)) return false;
+      if (!linear_->solve(b[k], x[k], rounding, share)) return false;
     return true;
   };
   do {

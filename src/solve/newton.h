@@ -37,11 +37,11 @@ class Newton {
   /// Solves from y, in place; y is the last iterate when it does not converge. Collective.
   Outcome solve(Vec y, Effort = Effort::full);
   /// Tangent at y: J t = 0, row . t = 1 with the closing row. t holds a guess (zero, or the last tangent),
-  /// from which the Krylov route starts. Collective.
-  bool tangent(Vec y, Vec t);
+  /// from which the Krylov route starts. Good for a step, or `exactly` for its own values. Collective.
+  bool tangent(Vec y, Vec t, bool exactly = false);
   /// J x = b at y with the closing row, from x where the Krylov route is taken. Collective.
   bool linear(Vec y, Vec b, Vec x);
-  bool linear(Vec y, std::span<Vec const> b, std::span<Vec const> x, double rounding = 0);
+  bool linear(Vec y, std::span<Vec const> b, std::span<Vec const> x, double rounding = 0, double share = 0);
   /// For one that `linear` alone is asked of: how exactly, relative to b.
   void solve_beside(double tolerance) { linear_->serve_beside(tolerance); }
 
