@@ -45,6 +45,12 @@ void dsygvd_(int const*, char const*, char const*, int const*, double*, int cons
 void zhegvd_(int const*, char const*, char const*, int const*, std::complex<double>*, int const*,
              std::complex<double>*, int const*, double*, std::complex<double>*, int const*, double*,
              int const*, int*, int const*, int*);
+void dpotrf_(char const*, int const*, double*, int const*, int*);
+void dsygst_(int const*, char const*, int const*, double*, int const*, double const*, int const*, int*);
+void dtrtri_(char const*, char const*, int const*, double*, int const*, int*);
+void dgeqrf_(int const*, int const*, double*, int const*, double*, double*, int const*, int*);
+void dormqr_(char const*, char const*, int const*, int const*, int const*, double const*, int const*,
+             double const*, double*, int const*, double*, int const*, int*);
 void zpotrf_(char const*, int const*, std::complex<double>*, int const*, int*);
 void zpotrs_(char const*, int const*, int const*, std::complex<double> const*, int const*,
              std::complex<double>*, int const*, int*);
@@ -146,16 +152,24 @@ void multiply(char const* ops, std::array<int, 3> size, std::type_identity_t<T> 
   gemm(ops, size, alpha, A, B, beta, C, lead);
 }
 
+/// One triangle of C, n x n, "L" or "U", onto the other.
+inline void mirror(char const* triangle, int n, double* C) {
+  const int tile = 64;
+  const bool lower = *triangle == 'L';
+  for (int first = 0; first < n; first += tile)
+    for (int below = first; below < n; below += tile)
+      for (int j = first; j < std::min(first + tile, n); ++j)
+        for (int i = std::max(below, j + 1); i < std::min(below + tile, n); ++i) {
+          double &of_lower = C[size_t(j) * n + i], &of_upper = C[size_t(i) * n + j];
+          (lower ? of_upper : of_lower) = lower ? of_lower : of_upper;
+        }
+}
+
 /// C += alpha A A^T, both triangles, of n rows and k columns.
 inline void add_squares(int n, int k, double alpha, double const* A, double* C) {
   const double one = 1;
   dsyrk_("L", "N", &n, &k, &alpha, A, &n, &one, C, &n);
-  const int tile = 64;
-  for (int first = 0; first < n; first += tile)
-    for (int below = first; below < n; below += tile)
-      for (int j = first; j < std::min(first + tile, n); ++j)
-        for (int i = std::max(below, j + 1); i < std::min(below + tile, n); ++i)
-          C[size_t(i) * n + j] = C[size_t(j) * n + i];
+  mirror("L", n, C);
 }
 
 /// Rows to which a flat matrix is filled up for the BLAS, where it goes there: of 1200 x 1200 floats one with

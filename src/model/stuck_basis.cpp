@@ -6,12 +6,17 @@
 #include "blocked_product.h"
 #include "lapack.h"
 #include "log.h"
+#include "model/moving_modes.h"
 #include "proportional.h"
+#include "tuned.h"
 
 namespace fretwave::model {
 
 namespace {
 
+const Tuned all_modes("stuck_all_modes", 800, "dofs up to which all modes of stuck pairs are made");
+const Tuned moves("stuck_moves", 1e-6,
+                  "inertia, over that of the first mode, from which one is made where not all are");
 constexpr double asymmetry = 1e-9;  // of the largest entry
 constexpr double stiffest = 1e-5;   // share of its motion that the structure leaves a stuck pair's spring
 
@@ -94,15 +99,31 @@ std::unique_ptr<StuckBasis> StuckBasis::of(Model const& model) {
   if (!out->solve(std::move(stiffness), mass, model.first_dof(), model.local_dofs())) return nullptr;
   out->motions_.assign(rows * n, 0.0);
   for (size_t j = 0; j < n; ++j)
-    for (ContactEntry const& e : entries)
-      out->motions_[j * rows + e.row] += e.value * mass[(n - 1 - j) * n + e.dof];
+    for (ContactEntry const& e : entries) out->motions_[j * rows + e.row] += e.value * mass[j * n + e.dof];
   return too_stiff(out->motions_, out->stiffness_) ? nullptr : std::move(out);
 }
 
-/// False if K is not positive definite; the shapes are left in M, the highest frequency first. Of so many
-/// dofs from the first on this rank has them.
+/// False if K is not positive definite. The columns are left in M; of so many dofs from the first on this
+/// rank has them.
 bool StuckBasis::solve(std::vector<double> K, std::vector<double>& M, size_t first, size_t local) {
-  const int n = int(std::lround(std::sqrt(double(M.size())))), type = 1;
+  const int n = int(std::lround(std::sqrt(double(M.size()))));
+  auto moving = n > all_modes ? moving_modes(K, M, n, moves) : std::nullopt;
+  if (moving)
+    theta_ = std::move(moving->theta), M = std::move(moving->columns);
+  else if (!solve_whole(std::move(K), M, n))
+    return false;
+  modes_ = int(theta_.size()), local_ = int(local), dofs_ = n;
+  theta_.resize(n, 0.0);
+  for (double& value : theta_) value = std::max(value, 0.0);  // motions without mass
+  shapes_.resize(local * n);
+  for (int j = 0; j < n; ++j)
+    std::copy_n(M.data() + size_t(j) * n + first, local, shapes_.data() + size_t(j) * local);
+  return true;
+}
+
+/// All modes; false if K is not positive definite.
+bool StuckBasis::solve_whole(std::vector<double> K, std::vector<double>& M, int n) {
+  const int type = 1;
   std::vector<double> theta(n);
   double size = 0;
   int ints = 0, info = 0, ask = -1;
@@ -114,11 +135,9 @@ bool StuckBasis::solve(std::vector<double> K, std::vector<double>& M, size_t fir
           &ints, &info);
   if (info) return false;
   theta_.assign(theta.rbegin(), theta.rend());
-  for (double& value : theta_) value = std::max(value, 0.0);  // motions without mass
-  modes_ = n, local_ = int(local), dofs_ = n;
-  shapes_.resize(local * n);
-  for (int j = 0; j < n; ++j)
-    std::copy_n(M.data() + size_t(n - 1 - j) * n + first, local, shapes_.data() + size_t(j) * local);
+  for (int j = 0; j < n / 2; ++j)  // the highest frequency comes first
+    std::swap_ranges(M.begin() + std::ptrdiff_t(j) * n, M.begin() + std::ptrdiff_t(j + 1) * n,
+                     M.begin() + std::ptrdiff_t(n - 1 - j) * n);
   return true;
 }
 
@@ -133,7 +152,7 @@ std::vector<double> StuckBasis::damping(Model const& model) const {
   }
   const double of_stiffness = multiple_of(C, model.sum(0));
   if (of_stiffness == 0) return diagonal(C);
-  for (int j = 0; j < modes_; ++j) {
+  for (int j = 0; j < held(); ++j) {
     double structure = 1;
     for (int row = 0; row < rows(); ++row)
       structure -= stiffness_[row] * std::pow(motions_[size_t(j) * rows() + row], 2);
@@ -142,19 +161,19 @@ std::vector<double> StuckBasis::damping(Model const& model) const {
   return out;
 }
 
-/// Of Psi^T A Psi, over the modes.
+/// Of Psi^T A Psi, over the columns that are held.
 std::vector<double> StuckBasis::diagonal(Mat A) const {
   std::vector<double> out(size(), 0.0);
   MPI_Comm comm;
   check(PetscObjectGetComm(reinterpret_cast<PetscObject>(A), &comm));
-  const int together = std::clamp(modes_, 1, BlockedProduct::most);
+  const int together = std::clamp(held(), 1, BlockedProduct::most);
   BlockedProduct product(A, together);
   const VecHandle moved = make_vector(comm, PetscInt(local_) * together);
   const auto mode = [&](int i, int j) {
     return factor_ ? exactly_[size_t(j) * local_ + i] : double(shapes_[size_t(j) * local_ + i]);
   };
-  for (int first = 0; first < modes_; first += together) {
-    const int count = std::min(together, modes_ - first);
+  for (int first = 0; first < held(); first += together) {
+    const int count = std::min(together, held() - first);
     for (int i = 0; i < local_; ++i)
       for (int j = 0; j < count; ++j) product.columns()[size_t(i) * together + j] = mode(i, first + j);
     check(VecSet(moved, 0));

@@ -25,16 +25,17 @@ struct PivotedCholesky {
 /// every harmonic and every point while all pairs stick. Its modes are sought as M phi = theta K_s phi: the
 /// lowest frequencies keep their digits beside stiff contact, and M may be singular.
 ///
-/// Either it is all modes, or (`with_factor`) the lowest ones, and behind them what forces on the contact
-/// move beside these, K_s^-1 B^T made K_s-orthogonal to all before, whose inertia is left out (theta = 0):
-/// static corrections (MacNeal 1971; attachment modes, Craig 1977). Of those the factor of K_s and a triangle
-/// are held, and the motions themselves where they are few. What any other force moves beside them is static
-/// too, (K_s^-1 - Psi Psi^T) f by that factor, and moves no contact.
+/// Either there are as many as dofs: all modes, or of a large model those that move with inertia, and beside
+/// them static motions, theta = 0 (`moving_modes`). Or (`with_factor`) there are the lowest modes, and behind
+/// them what forces on the contact move beside these, K_s^-1 B^T made K_s-orthogonal to all before, whose
+/// inertia is left out too: static corrections (MacNeal 1971; attachment modes, Craig 1977). Of those the
+/// factor of K_s and a triangle are held, and the motions themselves where they are few. What any other force
+/// moves beside them is static too, (K_s^-1 - Psi Psi^T) f by that factor, and moves no contact.
 class StuckBasis {
  public:
-  /// All modes. None if there are none: K or M without symmetry, with phases or of a wheel, a law without a
-  /// stuck stiffness, a motion that stuck pairs leave free, or pairs so much stiffer than the structure that
-  /// their slip would be lost to rounding. Collective.
+  /// As many as dofs. None if there are none: K or M without symmetry, with phases or of a wheel, a law
+  /// without a stuck stiffness, a motion that stuck pairs leave free, or pairs so much stiffer than the
+  /// structure that their slip would be lost to rounding. Collective.
   static std::unique_ptr<StuckBasis> of(Model const&);
   /// The lowest modes, and a factor of K_s for the rest; none likewise. Collective.
   static std::unique_ptr<StuckBasis> with_factor(Model const&);
@@ -64,10 +65,13 @@ class StuckBasis {
 
  private:
   bool solve(std::vector<double> K, std::vector<double>& M, size_t first, size_t local);
+  bool solve_whole(std::vector<double> K, std::vector<double>& M, int n);
   std::vector<double> diagonal(Mat A) const;
   void add_static(MPI_Comm);
   void static_forces(double const* moved, int coefficients, double* g) const;
   void static_motion(double const* g, int coefficients, double* modal, double* q) const;
+
+  int held() const { return factor_ ? modes_ : size(); }  ///< columns
 
   int modes_ = 0, local_ = 0;
   double dofs_ = 0;

@@ -265,9 +265,11 @@ double BasisPreconditioner::build_cost() const {
 std::string BasisPreconditioner::describe() const {
   const std::string modes = std::to_string(basis_.modes()) + " modes of stuck pairs",
                     blocks = std::to_string(problem_.harmonics().count()) + " blocks of " + modes;
-  if (!basis_.factor()) return blocks;
-  return blocks + " and " + std::to_string(basis_.size() - basis_.modes()) +
-         " static motions, one real factor (" + std::to_string(int(std::ceil(basis_.factor()->megabytes()))) +
+  if (basis_.size() == basis_.modes()) return blocks;
+  const std::string whole =
+      blocks + " and " + std::to_string(basis_.size() - basis_.modes()) + " static motions";
+  if (!basis_.factor()) return whole;
+  return whole + ", one real factor (" + std::to_string(int(std::ceil(basis_.factor()->megabytes()))) +
          " MB)";
 }
 

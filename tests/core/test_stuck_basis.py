@@ -134,6 +134,38 @@ def test_modes_that_all_move_with_inertia_are_all_in_the_blocks(comm) -> None:
 
 
 @pytest.mark.ranks(1, 2)
+@pytest.mark.parametrize("damping", ["none", "of K", "a damper"])
+def test_modes_that_move_are_as_good_as_all_where_the_others_hardly_do(comm, damping) -> None:
+    """Six masses of 300 on springs: the other modes lie 1e4 times higher, one without mass at all."""
+    dofs, generator = 300, np.random.default_rng(5)
+    K = 2.1 * np.identity(dofs) - np.eye(dofs, k=1) - np.eye(dofs, k=-1)
+    masses = generator.uniform(1e-8, 2e-8, dofs)
+    masses[::50], masses[10] = 1.0, 0.0
+    B = np.zeros((PAIRS, dofs))
+    B[range(PAIRS), range(2, 2 + PAIRS)] = 1
+    C = {"none": None, "of K": 0.002 * K, "a damper": np.diag([0.1] + [0.0] * (dofs - 1))}[damping]
+    levels, found = [0.05, 0.5], {}
+    for least in (100, 1000):
+        with (
+            options(fw_stuck_all_modes=least),
+            fw.Model(np.diag(masses), K, C, [fw.Contact("jenkins", B, SLIDER)], comm) as model,
+        ):
+            PETSc.Options("moving_")["route"], PETSc.Options("moving_")["pc_type"] = "krylov", "fwbasis"
+            first = fw.linear_modes(model, 1, "stuck")[0]
+            problem = fw.NonlinearMode(model, fw.Harmonics(range(1, 8, 2), 64), "CNM", 0, first, "moving_")
+            route = _core.Newton(problem.core, "moving_").route
+            assert ("6 modes of stuck pairs and 294 static motions" in route) == (least < dofs), route
+            found[least] = branch(problem, levels)
+    assert max(state["slip"] for *_, state in found[100]) > 0.2
+    counts = [sum(linear for _, _, linear, *_ in points) for points in found.values()]
+    assert counts[0] <= 1.1 * counts[1], counts
+    one, other = (reported(points) for points in found.values())
+    for level in levels:
+        for key in ("omega", "beta"):
+            assert one[level][key] == pytest.approx(other[level][key], rel=SOLVED)
+
+
+@pytest.mark.ranks(1, 2)
 @pytest.mark.parametrize("of", ["K", "M"])
 def test_damping_in_proportion_is_in_the_basis_as_any_other(comm, of) -> None:
     """Known from K or M without a product, or by one, where an entry's twelfth digit is another: equal GMRES."""
