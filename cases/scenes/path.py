@@ -140,26 +140,25 @@ def retraced(run: Any) -> list[str]:
 def _same_piece(run: Any, rows: Any, i: int, j: int, along: float) -> bool:
     """Whether row i lies on the branch between rows j and j + 1: behind a fold pieces may be side by side.
 
-    The earlier piece is solved abreast of the row, where the chord has no part of what lies between the two.
+    The earlier piece is solved abreast of the row, where the chord has no part of what lies between the two. Where it
+    ends before (a corner), what lay beside the chord as long as it was there tells.
     """
     first = max(0, min(j - 1, i - 4))
     near = [run.state(int(k)) for k in rows[first : first + 4]]
     start, end, here = near[j - first], near[j - first + 1], run.state(int(rows[i]))
     chord = (end[0] - start[0]).ravel()
-    square = chord @ chord
+    square, beside = chord @ chord, 0.0
     for _ in range(ABREAST):
         found = distance(run.equations, *_by_cubic(near, j - first, along))
         if not found.found:
-            return True
+            return beside < BACK
         off = (here[0] - found.solution[0]).ravel()
         missed = (off @ chord) / square
-        if abs(missed) < APART:
-            break
+        beside = float(np.linalg.norm(off - chord * missed) / np.sqrt(square))
         along += missed
-        if not -1 < along < 2:  # beside the chord there is nothing to be solved
+        if abs(missed) < APART or not -1 < along < 2:  # beside the chord there is nothing to be solved
             break
-    off -= chord * missed
-    return bool(np.linalg.norm(off) < APART * np.sqrt(square))
+    return beside < APART
 
 
 def _by_cubic(states: list[Any], k: int, along: float) -> tuple[Any, ...]:
