@@ -15,6 +15,7 @@ import scipy.sparse.linalg as spla
 
 DENSE = 700  #: unknowns up to which the step comes from singular values
 ENOUGH = 12  #: Newton steps
+HELD, BALANCED = 3, 1e-8  #: Newton steps at one amplitude, and what they may leave of the largest force
 
 
 @dataclass
@@ -44,12 +45,16 @@ def ratio(beta, omega, method):
 
 
 def at_its_amplitude(eq, Q, beta, omega):
-    """Errors of a mode's first Newton step that holds its amplitude: in corners, where a branch is steep in all else,
-    the nearest solution lies at another amplitude, and omega and zeta of the two are far apart."""
+    """Errors of a mode's solution at its own amplitude: in corners, where a branch is steep in all else, the nearest
+    solution lies at another one, and omega and zeta of the two are far apart. Steps go on until they are in the last
+    digits that forces have; `found` says whether the forces balance there."""
     start, size = (Q, beta, omega), np.linalg.norm(_dynamic(eq, Q)) or 1.0
-    R, acting, J = eq.linearise(start)
-    step = least_step(eq, J, R, start, size, held=True)
-    return _errors(eq, start, _take(start, step, 1.0), size, _balance(eq, R, acting), False)
+    now, balance = start, None
+    for _ in range(HELD):
+        R, acting, J = eq.linearise(now)
+        balance = _balance(eq, R, acting) if balance is None else balance
+        now = _take(now, least_step(eq, J, R, now, size, held=True), 1.0)
+    return _errors(eq, start, now, size, balance, _norm(*eq.residual(*now)) < BALANCED)
 
 
 def distance(eq, Q, beta, omega, enough=None):

@@ -194,7 +194,8 @@ def _points(run: Run, verdict: Verdict) -> list[str]:
             verdict.worst[key] = max(verdict.worst.get(key, 0.0), getattr(found, key))
         wrong = errors(run, row, found)
         if wrong and run.method != "forced":
-            wrong = errors(run, row, found, last_digits(run, row, found)) and _off_at_its_amplitude(run, row) and wrong
+            wrong = errors(run, row, found, last_digits(run, row, found))
+            wrong = wrong if wrong and _off_at_its_amplitude(run, row) else []
         if wrong and (worst is None or found.motion > worst[1].motion):
             worst = (row, found, wrong)
     if worst is None:
@@ -206,9 +207,9 @@ def _points(run: Run, verdict: Verdict) -> list[str]:
 
 
 def _off_at_its_amplitude(run: Run, row: int) -> bool:
-    """Whether omega, zeta or the motion is off where a step to the solution keeps the mode's amplitude."""
+    """Whether omega, zeta or the motion is off the solution at the mode's own amplitude, or there is none."""
     held = at_its_amplitude(run.equations, *run.state(row))
-    return bool(errors(run, row, held)) or not held.motion <= MOTION
+    return not held.found or bool(errors(run, row, held)) or not held.motion <= MOTION
 
 
 def rounding(run: Run) -> float:

@@ -74,6 +74,12 @@ StuckBasis const* Model::stuck_basis() const {
   return stuck_basis_.get();
 }
 
+StuckBasis const* Model::whole_stuck_basis() const {
+  if (!sought_whole_) whole_basis_ = StuckBasis::of(*this, true);
+  sought_whole_ = true;
+  return whole_basis_.get();
+}
+
 StuckBasis const* Model::static_basis() const {
   if (!sought_static_) static_basis_ = StuckBasis::with_factor(*this);
   sought_static_ = true;

@@ -64,6 +64,8 @@ class Model {
   bool travelling() const;
   /// The modes with all pairs stuck, made when first asked for; null if there are none. Collective.
   StuckBasis const* stuck_basis() const;
+  /// The same, of all modes where those that hardly move are left out of it. Collective.
+  StuckBasis const* whole_stuck_basis() const;
   /// The lowest of them and a factor for the rest (`StuckBasis::with_factor`), likewise. Collective.
   StuckBasis const* static_basis() const;
   /// Modes of the waves of a wheel, which know their type (`wheel::WaveBases`).
@@ -74,9 +76,9 @@ class Model {
  private:
   std::vector<Term> terms_;
   std::vector<Contact> contacts_;
-  mutable std::shared_ptr<StuckBasis const> stuck_basis_, static_basis_;
+  mutable std::shared_ptr<StuckBasis const> stuck_basis_, whole_basis_, static_basis_;
   mutable std::shared_ptr<void> kept_of_waves_;
-  mutable bool sought_basis_ = false, sought_static_ = false;
+  mutable bool sought_basis_ = false, sought_whole_ = false, sought_static_ = false;
   MPI_Comm comm_ = MPI_COMM_NULL;
   PetscInt local_ = 0, global_ = 0, first_ = 0, unit_ = 0;
   double theta_ = 0;

@@ -60,16 +60,13 @@ Modes largest(std::vector<double>& C, int n, int count) {
   return out;
 }
 
-/// Those above `least` of the largest; none if they are too many.
+/// The largest, down to `least` of the first at least; none if they are too many.
 Modes moving(std::vector<double>& C, int n, double least) {
   const int most = n / largest_share;
-  for (int count = std::min(first_count, most); count <= most; count *= 4) {
+  for (int count = 0; count < most;) {
+    count = std::min(std::max(first_count, 4 * count), most);
     Modes out = largest(C, n, count);
-    const auto end = std::ranges::find_if(out.theta, [&](double t) { return !(t > least * out.theta[0]); });
-    if (end == out.theta.end()) continue;
-    out.theta.erase(end, out.theta.end());
-    out.vectors.resize(out.theta.size() * n);
-    return out;
+    if (!out.theta.empty() && out.theta.back() <= least * out.theta.front()) return out;
   }
   return {};
 }

@@ -16,7 +16,7 @@ namespace {
 
 const Tuned all_modes("stuck_all_modes", 800, "dofs up to which all modes of stuck pairs are made");
 const Tuned moves("stuck_moves", 1e-6,
-                  "inertia, over that of the first mode, from which one is made where not all are");
+                  "inertia, over that of the first mode, down to which modes are made where not all are");
 constexpr double asymmetry = 1e-9;  // of the largest entry
 constexpr double stiffest = 1e-5;   // share of its motion that the structure leaves a stuck pair's spring
 
@@ -79,7 +79,7 @@ bool too_stiff(std::vector<double> const& motions, std::vector<double> const& st
   return false;
 }
 
-std::unique_ptr<StuckBasis> StuckBasis::of(Model const& model) {
+std::unique_ptr<StuckBasis> StuckBasis::of(Model const& model, bool asked) {
   static const log::Event making("FwStuckBasis");
   const log::Span span(making);
   auto out = std::make_unique<StuckBasis>();
@@ -96,7 +96,7 @@ std::unique_ptr<StuckBasis> StuckBasis::of(Model const& model) {
     for (ContactEntry const& a : of_row[row])
       for (ContactEntry const& b : of_row[row])
         stiffness[size_t(b.dof) * n + a.dof] += out->stiffness_[row] * a.value * b.value;
-  if (!out->solve(std::move(stiffness), mass, model.first_dof(), model.local_dofs())) return nullptr;
+  if (!out->solve(std::move(stiffness), mass, model.first_dof(), model.local_dofs(), asked)) return nullptr;
   out->motions_.assign(rows * n, 0.0);
   for (size_t j = 0; j < n; ++j)
     for (ContactEntry const& e : entries) out->motions_[j * rows + e.row] += e.value * mass[j * n + e.dof];
@@ -105,9 +105,9 @@ std::unique_ptr<StuckBasis> StuckBasis::of(Model const& model) {
 
 /// False if K is not positive definite. The columns are left in M; of so many dofs from the first on this
 /// rank has them.
-bool StuckBasis::solve(std::vector<double> K, std::vector<double>& M, size_t first, size_t local) {
+bool StuckBasis::solve(std::vector<double> K, std::vector<double>& M, size_t first, size_t local, bool all) {
   const int n = int(std::lround(std::sqrt(double(M.size()))));
-  auto moving = n > all_modes ? moving_modes(K, M, n, moves) : std::nullopt;
+  auto moving = n > all_modes && !all ? moving_modes(K, M, n, moves) : std::nullopt;
   if (moving)
     theta_ = std::move(moving->theta), M = std::move(moving->columns);
   else if (!solve_whole(std::move(K), M, n))

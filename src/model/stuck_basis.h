@@ -33,10 +33,10 @@ struct PivotedCholesky {
 /// moves beside them is static too, (K_s^-1 - Psi Psi^T) f by that factor, and moves no contact.
 class StuckBasis {
  public:
-  /// As many as dofs. None if there are none: K or M without symmetry, with phases or of a wheel, a law
-  /// without a stuck stiffness, a motion that stuck pairs leave free, or pairs so much stiffer than the
-  /// structure that their slip would be lost to rounding. Collective.
-  static std::unique_ptr<StuckBasis> of(Model const&);
+  /// As many as dofs; all modes if they are `asked` for. None if there are none: K or M without symmetry,
+  /// with phases or of a wheel, a law without a stuck stiffness, a motion that stuck pairs leave free, or
+  /// pairs so much stiffer than the structure that their slip would be lost to rounding. Collective.
+  static std::unique_ptr<StuckBasis> of(Model const&, bool asked = false);
   /// The lowest modes, and a factor of K_s for the rest; none likewise. Collective.
   static std::unique_ptr<StuckBasis> with_factor(Model const&);
   /// Doubles that `with_factor` takes: whole on every rank, and over all of them, for so many rows of B.
@@ -49,9 +49,12 @@ class StuckBasis {
   std::vector<double> const& stiffness() const { return stiffness_; }
   /// 1 / omega^2 [s^2], descending.
   std::vector<double> const& theta() const { return theta_; }
+  /// Of none that is taken to move with stiffness alone, 1 / omega^2 is more; 0 of all modes, and of static
+  /// corrections.
+  double left_out() const { return factor_ || modes_ == 0 || modes_ == size() ? 0 : theta_[modes_ - 1]; }
   /// B Psi, rows x size.
   std::vector<double> const& motions() const { return motions_; }
-  /// Diagonal of Psi^T C Psi over the modes, of all damping of the model. Collective.
+  /// Diagonal of Psi^T C Psi over the columns that are held, of all damping of the model. Collective.
   std::vector<double> damping(Model const&) const;
   /// g = Psi^T x of coefficients, innermost, of this rank's dofs: its share. With a factor K_s^-1 x as well,
   /// if it is asked for; then collective.
@@ -64,7 +67,7 @@ class StuckBasis {
   double flops() const;
 
  private:
-  bool solve(std::vector<double> K, std::vector<double>& M, size_t first, size_t local);
+  bool solve(std::vector<double> K, std::vector<double>& M, size_t first, size_t local, bool all);
   bool solve_whole(std::vector<double> K, std::vector<double>& M, int n);
   std::vector<double> diagonal(Mat A) const;
   void add_static(MPI_Comm);

@@ -35,7 +35,7 @@ std::vector<double> BasisPreconditioner::mean_tangents(std::vector<PairTangents>
           double sum = 0;
           for (int c = 0; c < m_; ++c) sum += at[c * ld + c];
           const double k =
-              row == col ? basis_.stiffness()[pairs_[pair].first_row + row] / problem_.stiffness_scale() : 0;
+              row == col ? basis_->stiffness()[pairs_[pair].first_row + row] / problem_.stiffness_scale() : 0;
           means.push_back(sum / m_ - k);
         }
   }
@@ -47,7 +47,8 @@ bool BasisPreconditioner::moves(int pair, std::vector<double> const& means, size
   const int d = pairs_[pair].components;
   double largest = 0, stiffness = 0;
   for (int i = 0; i < d * d; ++i) largest = std::max(largest, std::abs(means[at + i]));
-  for (int i = 0; i < d; ++i) stiffness = std::max(stiffness, basis_.stiffness()[pairs_[pair].first_row + i]);
+  for (int i = 0; i < d; ++i)
+    stiffness = std::max(stiffness, basis_->stiffness()[pairs_[pair].first_row + i]);
   return largest > stuck * stiffness / problem_.stiffness_scale();
 }
 
@@ -64,15 +65,15 @@ std::vector<std::pair<int, size_t>> BasisPreconditioner::beginning(std::vector<d
 
 /// Pairs that slip or open come in with their mean.
 void BasisPreconditioner::take_contact() {
-  place_.assign(basis_.rows(), -1);
+  place_.assign(basis_->rows(), -1);
   auto [rows, T] = taken(beginning(means_), 0);
-  blocks_.set_contact(rows, std::move(T));
+  blocks_->set_contact(rows, std::move(T));
 }
 
 /// These pairs behind those that came in before.
 void BasisPreconditioner::add_contact(std::vector<std::pair<int, size_t>> const& pairs) {
-  const auto [rows, T] = taken(pairs, blocks_.rows());
-  blocks_.add_contact(rows, T);
+  const auto [rows, T] = taken(pairs, blocks_->rows());
+  blocks_->add_contact(rows, T);
 }
 
 /// Rows of pairs and what their mean stiffness lacks of the stuck one; they get their places from `first` on.
@@ -107,7 +108,7 @@ void BasisPreconditioner::couple(std::vector<PairTangents> const& contacts) {
   G_.assign(of_a_harmonic * h.count(), {});
   for (int i = first_; i < last_; ++i) {
     size_t at = 0;
-    const auto own = blocks_.compliance(i, groups);
+    const auto own = blocks_->compliance(i, groups);
     auto next = own.begin();
     for (auto const& group : groups) {
       const size_t entries = size_t(group.rows) * group.rows;
@@ -155,7 +156,7 @@ std::vector<int> BasisPreconditioner::correct(std::vector<PairTangents> const& c
       for (int i = 0; i < h.count(); ++i)
         for (int k = 0; k < d * d; ++k) {
           const double stiffness =
-              k % (d + 1) ? 0 : basis_.stiffness()[row + k / d] / problem_.stiffness_scale();
+              k % (d + 1) ? 0 : basis_->stiffness()[row + k / d] / problem_.stiffness_scale();
           const double t = stiffness + means_[at + k];
           taken.push_back({.cc = t, .ss = h.orders()[i] ? t : 0});
         }
@@ -172,8 +173,8 @@ std::vector<int> BasisPreconditioner::correct(std::vector<PairTangents> const& c
 /// u += what forces of busy pairs move of the others, at this rank's harmonics.
 void BasisPreconditioner::add_coupling(double const* f, double* u) const {
   Harmonics const& h = problem_.harmonics();
-  const int c = blocks_.coefficients(), lead = blocks_.lead(), begin = blocks_.begin();
-  const auto moved = blocks_.compliance(own(f, busy_rows_, blocks_.rows()));
+  const int c = blocks_->coefficients(), lead = blocks_->lead(), begin = blocks_->begin();
+  const auto moved = blocks_->compliance(own(f, busy_rows_, blocks_->rows()));
   for (size_t row = 0; row < busy_rows_.size(); ++row)
     for (int k = 0; k < c; ++k) u[row * m_ + begin + k] += moved[size_t(busy_rows_[row]) * lead + k];
   for (Busy const& pair : busy_pairs_)

@@ -17,6 +17,9 @@ namespace {
 const Tuned cheap("basis_cheap", 600, "rows up to which the mean stiffness follows at every step");
 const Tuned small("basis_small", 3,
                   "applications that the lower modes' blocks may take where the mean stiffness follows so");
+const Tuned inertia(
+    "basis_moves", 0.05,
+    "inertia over stiffness of a mode at any harmonic, up to which the basis need not have it");
 const Tuned few("basis_few", 0.3, "share of the slipping rows up to which further ones are added to them");
 
 /// The range of harmonics of a rank: as many coefficients for each.
@@ -33,7 +36,7 @@ std::pair<int, int> range_of(Harmonics const& h, int rank, int size) {
 
 BasisPreconditioner::BasisPreconditioner(HarmonicProblem& problem, model::StuckBasis const& basis)
     : problem_(problem),
-      basis_(basis),
+      basis_(&basis),
       n_(basis.size()),
       m_(problem.harmonics().block_size()),
       scalars_(problem.scalar_count()),
@@ -41,9 +44,8 @@ BasisPreconditioner::BasisPreconditioner(HarmonicProblem& problem, model::StuckB
       size_(comm_size(problem.comm())),
       local_(int(problem.model().local_dofs())),
       first_(range_of(problem.harmonics(), rank_, size_).first),
-      last_(range_of(problem.harmonics(), rank_, size_).second),
-      blocks_(basis_, problem.harmonics(), first_, last_) {
-  damping_ = basis_.damping(problem.model());
+      last_(range_of(problem.harmonics(), rank_, size_).second) {
+  take(basis);
   std::vector<int> components;
   for (auto const& contact : problem.model().contacts())
     components.insert(components.end(), contact.law->pairs(), contact.law->components());
@@ -55,6 +57,18 @@ BasisPreconditioner::BasisPreconditioner(HarmonicProblem& problem, model::StuckB
     pairs_.push_back({d, row});
     row += d;
   }
+}
+
+void BasisPreconditioner::take(model::StuckBasis const& basis) {
+  basis_ = &basis;
+  blocks_.emplace(basis, problem_.harmonics(), first_, last_);
+  damping_ = basis.damping(problem_.model());
+}
+
+/// Whether a mode that the basis does not have moves with inertia.
+bool BasisPreconditioner::lacks_modes(Exponents const& e) const {
+  return std::ranges::any_of(
+      e.s, [&](complex s) { return std::abs(s * s - e.inertia_damping * s) * basis_->left_out() > inertia; });
 }
 
 /// The border of the fundamental on this rank's dofs.
@@ -79,7 +93,7 @@ void BasisPreconditioner::set_border_vectors(Vec y, Vec row) {
 std::vector<double> BasisPreconditioner::in_basis(std::vector<double> const& x, int vectors,
                                                   double* moved) const {
   std::vector<double> g(size_t(vectors) * n_), out(g.size());
-  basis_.forces(x.data(), vectors, g.data(), moved);
+  basis_->forces(x.data(), vectors, g.data(), moved);
   sum_over_ranks(g, problem_.comm());
   for (int v = 0; v < vectors; ++v)
     for (int l = 0; l < n_; ++l) out[size_t(v) * n_ + l] = g[size_t(l) * vectors + v];
@@ -89,14 +103,14 @@ std::vector<double> BasisPreconditioner::in_basis(std::vector<double> const& x, 
 /// Border of the fundamental in the basis.
 ModalBorder BasisPreconditioner::border(Vec y, Vec row) {
   set_border_vectors(y, row);
-  static_columns_.resize(basis_.factor() ? columns_.size() : 0);
+  static_columns_.resize(basis_->factor() ? columns_.size() : 0);
   ModalBorder out{scalars_, in_basis(columns_, 2 * scalars_, static_columns_.data()),
                   in_basis(rows_, 2 * scalars_), std::vector<double>(size_t(scalars_) * scalars_, 0.0)};
   std::vector<double> closing(scalars_, 0.0);
   if (rank_ == size_ - 1) std::copy_n(ReadArray(row).data() + size_t(local_) * m_, scalars_, closing.begin());
   sum_over_ranks(closing, problem_.comm());
   for (int j = 0; j < scalars_; ++j) out.corner[size_t(j) * scalars_ + scalars_ - 1] = closing[j];
-  if (basis_.factor()) leave_static(out);
+  if (basis_->factor()) leave_static(out);
   return out;
 }
 
@@ -108,7 +122,7 @@ void BasisPreconditioner::leave_static(ModalBorder& border) {
   for (int k = 0; k < v; ++k)
     for (int l = 0; l < n_; ++l) modal[size_t(l) * v + k] = border.columns[size_t(k) * n_ + l];
   std::vector<double> by_modes(static_columns_.size());
-  basis_.motion(modal.data(), v, by_modes.data());
+  basis_->motion(modal.data(), v, by_modes.data());
   for (size_t k = 0; k < by_modes.size(); ++k)
     static_columns_[k] = scale * (static_columns_[k] - by_modes[k]);
   modal_rows_ = border.rows;
@@ -131,7 +145,7 @@ std::vector<std::vector<complex>> BasisPreconditioner::structure(Exponents const
   for (auto const& term : problem_.model().terms()) {
     if (term.order == 0 || std::exchange(taken[term.order], true)) continue;
     const auto c = problem_.terms().stiffness().coefficients(term, e);
-    auto const& diagonal = term.order == 1 ? damping_ : basis_.theta();
+    auto const& diagonal = term.order == 1 ? damping_ : basis_->theta();
     for (int i = first_; i < last_; ++i)
       for (int j = 0; j < n_; ++j) z[i - first_][j] += c[i] / scale * diagonal[j];
   }
@@ -140,14 +154,17 @@ std::vector<std::vector<complex>> BasisPreconditioner::structure(Exponents const
 
 void BasisPreconditioner::build(Vec y, Vec row) {
   const auto contacts = problem_.pair_tangents(y);
-  auto z = structure(problem_.scaled(y).exponents);
+  const Exponents e = problem_.scaled(y).exponents;
+  if (lacks_modes(e))
+    if (auto const* whole = problem_.model().whole_stuck_basis()) take(*whole);
+  auto z = structure(e);
   auto border = this->border(y, row);
   means_ = mean_tangents(contacts);
   together(problem_.comm(), "inverting harmonic blocks", [&] {
-    blocks_.set_structure(std::move(z), 1 / problem_.stiffness_scale(), std::move(border));
+    blocks_->set_structure(std::move(z), 1 / problem_.stiffness_scale(), std::move(border));
     take_contact();
   });
-  small_flops_ = blocks_.small_flops();
+  small_flops_ = blocks_->small_flops();
   MPI_Allreduce(MPI_IN_PLACE, &small_flops_, 1, MPI_DOUBLE, MPI_MAX, problem_.comm());
   couple(contacts);
 }
@@ -160,8 +177,8 @@ void BasisPreconditioner::follow(Vec y) {
   const auto began = beginning(means);
   int rows = 0;
   for (auto const& [pair, at] : began) rows += pairs_[pair].components;
-  const bool dear = blocks_.rows() > cheap || small_flops_ > small * application_flops();
-  if (!dear || rows > few * blocks_.rows()) {
+  const bool dear = blocks_->rows() > cheap || small_flops_ > small * application_flops();
+  if (!dear || rows > few * blocks_->rows()) {
     means_ = std::move(means);
     together(problem_.comm(), "inverting harmonic blocks", [&] { take_contact(); });
   } else if (rows > 0) {
@@ -175,7 +192,7 @@ void BasisPreconditioner::follow(Vec y) {
 /// This rank's coefficients of harmonic blocks, at some places of all: coefficients x columns.
 std::vector<float> BasisPreconditioner::own(double const* blocks, std::vector<int> const& places,
                                             int columns) const {
-  const int c = blocks_.coefficients(), lead = blocks_.lead(), begin = blocks_.begin();
+  const int c = blocks_->coefficients(), lead = blocks_->lead(), begin = blocks_->begin();
   std::vector<float> out(size_t(lead) * columns);
   for (size_t j = 0; j < places.size(); ++j)
     for (int k = 0; k < c; ++k) out[size_t(places[j]) * lead + k] = float(blocks[j * m_ + begin + k]);
@@ -186,10 +203,10 @@ std::vector<float> BasisPreconditioner::own(double const* blocks, std::vector<in
 std::vector<double> BasisPreconditioner::forces(Vec x) {
   const ReadArray in(x);
   std::vector<double> g(size_t(m_) * n_ + scalars_, 0.0);
-  if (basis_.factor()) static_motion_.resize(size_t(m_) * local_);
-  basis_.forces(in.data(), m_, g.data(), static_motion_.data());
+  if (basis_->factor()) static_motion_.resize(size_t(m_) * local_);
+  basis_->forces(in.data(), m_, g.data(), static_motion_.data());
   if (rank_ == size_ - 1) std::copy_n(in.data() + size_t(local_) * m_, scalars_, g.end() - scalars_);
-  if (basis_.factor()) {
+  if (basis_->factor()) {
     const int offset = problem_.harmonics().offset(problem_.harmonics().fundamental());
     for (int dof = 0; dof < local_; ++dof)
       for (int v = 0; v < 2 * scalars_; ++v)
@@ -197,7 +214,7 @@ std::vector<double> BasisPreconditioner::forces(Vec x) {
                                          static_motion_[size_t(dof) * m_ + offset + v % 2];
   }
   sum_over_ranks(g, problem_.comm());
-  for (int v = 0; basis_.factor() && v < 2 * scalars_; ++v)
+  for (int v = 0; basis_->factor() && v < 2 * scalars_; ++v)
     for (int l = 0; l < n_; ++l) {
       const int offset = problem_.harmonics().offset(problem_.harmonics().fundamental());
       *(g.end() - scalars_ + v / 2) +=
@@ -218,21 +235,21 @@ void BasisPreconditioner::add_static(std::vector<double> const& scalars, double*
 
 void BasisPreconditioner::apply(Vec x, Vec z) {
   const auto all = forces(x);
-  const int c = blocks_.coefficients(), lead = blocks_.lead(), begin = blocks_.begin();
+  const int c = blocks_->coefficients(), lead = blocks_->lead(), begin = blocks_->begin();
   std::vector<int> places(n_);
   std::iota(places.begin(), places.end(), 0);
   const std::vector<double> closing(all.end() - scalars_, all.end());
   auto forces = own(all.data(), places, n_);
-  auto found = blocks_.solve(forces, closing);
+  auto found = blocks_->solve(forces, closing);
   if (coupled_) {
     std::vector<double> u(coupled_->size(), 0.0);
-    const auto motion = blocks_.motion(found.modes);
+    const auto motion = blocks_->motion(found.modes);
     for (size_t row = 0; row < busy_rows_.size(); ++row)
       for (int k = 0; k < c; ++k) u[row * m_ + begin + k] = motion[size_t(busy_rows_[row]) * lead + k];
     sum_over_ranks(u, problem_.comm());
     const auto f = coupled_->forces(u);
-    blocks_.subtract(own(f.data(), busy_rows_, blocks_.rows()), forces);
-    found = blocks_.solve(forces, closing);
+    blocks_->subtract(own(f.data(), busy_rows_, blocks_->rows()), forces);
+    found = blocks_->solve(forces, closing);
   }
   std::vector<double> eta(size_t(m_) * n_ + scalars_, 0.0);
   for (int l = 0; l < n_; ++l)
@@ -240,36 +257,36 @@ void BasisPreconditioner::apply(Vec x, Vec z) {
   std::ranges::copy(found.scalars, eta.end() - scalars_);
   sum_over_ranks(eta, problem_.comm());
   const std::vector<double> scalars(eta.end() - scalars_, eta.end());
-  if (basis_.factor())
+  if (basis_->factor())
     for (size_t k = 0; k < size_t(m_) * n_; ++k) eta[k] -= problem_.stiffness_scale() * all[k];
   const WriteArray out(z);
-  basis_.motion(eta.data(), m_, out.data());
-  if (basis_.factor()) add_static(scalars, out.data());
+  basis_->motion(eta.data(), m_, out.data());
+  if (basis_->factor()) add_static(scalars, out.data());
   if (rank_ == size_ - 1) std::ranges::copy(scalars, out.data() + size_t(local_) * m_);
 }
 
 /// Pairs are coupled in it by some fifteen iterations.
 double BasisPreconditioner::application_flops() const {
-  const double n = n_, r = blocks_.rows();
-  return m_ * (basis_.flops() + 12 * r * n + 30 * r * r);
+  const double n = n_, r = blocks_->rows();
+  return m_ * (basis_->flops() + 12 * r * n + 30 * r * r);
 }
 
 /// Flops of the rows' inverse over those of an application; what the border's columns and rows take is a
 /// share of one. The lower modes' blocks are left out: with older ones, systems that are solved to few digits
 /// (of estimates) keep fewer of these.
 double BasisPreconditioner::build_cost() const {
-  const double r = blocks_.rows();
+  const double r = blocks_->rows();
   return 1 + 2.7 * r * r * r / application_flops();
 }
 
 std::string BasisPreconditioner::describe() const {
-  const std::string modes = std::to_string(basis_.modes()) + " modes of stuck pairs",
+  const std::string modes = std::to_string(basis_->modes()) + " modes of stuck pairs",
                     blocks = std::to_string(problem_.harmonics().count()) + " blocks of " + modes;
-  if (basis_.size() == basis_.modes()) return blocks;
+  if (basis_->size() == basis_->modes()) return blocks;
   const std::string whole =
-      blocks + " and " + std::to_string(basis_.size() - basis_.modes()) + " static motions";
-  if (!basis_.factor()) return whole;
-  return whole + ", one real factor (" + std::to_string(int(std::ceil(basis_.factor()->megabytes()))) +
+      blocks + " and " + std::to_string(basis_->size() - basis_->modes()) + " static motions";
+  if (!basis_->factor()) return whole;
+  return whole + ", one real factor (" + std::to_string(int(std::ceil(basis_->factor()->megabytes()))) +
          " MB)";
 }
 

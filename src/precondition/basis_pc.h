@@ -1,5 +1,6 @@
 #pragma once
 #include <memory>
+#include <optional>
 
 #include "hb/harmonic_problem.h"
 #include "precondition/coupled_pairs.h"
@@ -42,6 +43,8 @@ class BasisPreconditioner : public solve::Preconditioner {
     int components, first_row;
     size_t first_block;
   };
+  void take(model::StuckBasis const&);
+  bool lacks_modes(Exponents const&) const;
   std::vector<std::vector<complex>> structure(Exponents const&) const;
   ModalBorder border(Vec y, Vec row);
   void set_border_vectors(Vec y, Vec row);
@@ -63,9 +66,9 @@ class BasisPreconditioner : public solve::Preconditioner {
   void add_coupling(double const* f, double* u) const;
 
   HarmonicProblem& problem_;
-  model::StuckBasis const& basis_;
+  model::StuckBasis const* basis_;
   int n_, m_, scalars_, rank_, size_, local_, first_, last_;
-  ModalBlocks blocks_;
+  std::optional<ModalBlocks> blocks_;
   double small_flops_ = 0;                   ///< of the lower modes' blocks, on the rank that has the most
   std::vector<double> damping_;              ///< diagonal of C in the basis
   std::vector<Pair> pairs_;                  ///< of all ranks

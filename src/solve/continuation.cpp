@@ -84,7 +84,8 @@ std::vector<TestFunction> Continuation::tests(Vec y, Vec tangent) {
 }
 
 /// Newton on the system closed by row . y = value, then the unit tangent there, oriented along `tangent_row`.
-bool Continuation::correct(Trial& trial, Vec row, double value, Vec tangent_row, Effort effort) {
+bool Continuation::correct(Trial& trial, Vec row, double value, Vec tangent_row, Effort effort,
+                           bool exactly) {
   newton_.system().close(row, value);
   trial.outcome = newton_.solve(trial.y, effort);
   if (!trial.outcome.converged) return false;
@@ -94,7 +95,7 @@ bool Continuation::correct(Trial& trial, Vec row, double value, Vec tangent_row,
   }
   if (!trial.tangent) trial.tangent = zero_like(trial.y);
   if (tangent_row != row) newton_.system().close(tangent_row, 0);
-  if (!newton_.tangent(trial.y, trial.tangent, exact_tangents_)) {
+  if (!newton_.tangent(trial.y, trial.tangent, exactly)) {
     trial.outcome.reason = "the linear solve for the tangent fails";
     return false;
   }

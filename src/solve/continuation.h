@@ -99,7 +99,8 @@ class Continuation {
   Trial at(VecHandle y) const {
     return {.y = std::move(y), .tangent = {}, .outcome = {}, .tests = {}, .error = 0};
   }
-  bool correct(Trial&, Vec row, double value, Vec tangent_row, Effort = Effort::full);
+  /// With its tangent, good for a step along it or `exactly` what its test functions need.
+  bool correct(Trial&, Vec row, double value, Vec tangent_row, Effort = Effort::full, bool exactly = false);
   std::vector<TestFunction> tests(Vec y, Vec tangent);
   void open_the_range();
   void prepare_row();
@@ -176,7 +177,6 @@ class Continuation {
   std::vector<std::string> missed_;
   Trail trail_;
   int emitted_ = 0, meetings_ = 0, circles_ = 0, crawled_ = 0;
-  bool exact_tangents_ = false;  ///< as events need them
   bool way_ = false, upwards_ = true, taken_over_ = false, turned_ = false, wary_ = false, finished_ = false,
        converged_ = false;
   std::string ending_;  ///< reason to stop once the batch is handed out

@@ -31,10 +31,8 @@ void Continuation::miss(std::string const& what, std::string const& why) {
 /// what test functions are made of.
 bool Continuation::correct_inside(Trial& trial, double at, double length) {
   const VecHandle expected = copy(trial.y);
-  exact_tangents_ = true;
-  const bool found = correct(trial, row_, row_value_ + at, row_);
-  exact_tangents_ = false;
-  return found && distance(trial.y, expected) <= off_the_curve * length;
+  return correct(trial, row_, row_value_ + at, row_, Effort::full, true) &&
+         distance(trial.y, expected) <= off_the_curve * length;
 }
 
 void Continuation::locate_events(Trial const& end, double length) {

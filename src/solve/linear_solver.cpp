@@ -144,6 +144,9 @@ void LinearSolver::use_krylov() {
 void LinearSolver::take_options() {
   check(offered(bordered_.problem().comm(), prefix_));
   Tuned::help(bordered_.problem().comm());
+  const bool is_large = krylov_ && unknowns() > large;
+  aims_ = is_large && !given({"-ksp_rtol", "-snes_ksp_ew"});
+  rough_ = is_large && !given({"-tangent_ksp_rtol"}) ? double(rough_tangent) : 0;
   make_preconditioner();
   make_tangent();
 }
@@ -187,21 +190,24 @@ void LinearSolver::make_tangent() {
   check(KSPGetTolerances(tangent_, &tangent_least_, &tangent_floor_, nullptr, nullptr));
 }
 
-bool LinearSolver::is_large() const { return krylov_ && unknowns() > large; }
+/// Whether PETSc's options have one of these, under the prefix.
+bool LinearSolver::given(std::initializer_list<char const*> options) const {
+  return std::ranges::any_of(options, [&](char const* option) {
+    PetscBool found;
+    check(PetscOptionsHasName(nullptr, prefix_.c_str(), option, &found));
+    return found == PETSC_TRUE;
+  });
+}
 
 /// Far from a solution a step need not be better than its linearisation: Newton's quadratic convergence
 /// foretells that (|g_k| / |g_k-1|)^2 is left of the residual (Eisenstat & Walker, SIAM J. Sci. Comput. 17,
 /// 1996, choice 2). Where six digits may end the iteration, six it is: so it ends with as little left as
 /// ever. 768 pairs (34,725 unknowns) take half the iterations of GMRES and the same steps.
 void LinearSolver::aim(double residual, double before, double enough) {
-  if (!is_large()) return;
-  KSP ksp = ksp_of(snes_);
-  double given;
-  check(KSPGetTolerances(ksp, &given, nullptr, nullptr, nullptr));
-  if (given != aimed_at_) return;  // an option's
-  const double foretold = std::pow(residual / before, 2), least = digits, most = roughly;
-  aimed_at_ = residual * digits <= enough ? digits : std::clamp(foretold, least, std::max(least, most));
-  check(KSPSetTolerances(ksp, aimed_at_, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT));
+  const double foretold = std::pow(residual / before, 2), least = digits,
+               most = std::clamp(double(roughly), least, 0.5);
+  aimed_at_ = residual * digits <= enough ? least : std::clamp(foretold, least, most);
+  check(KSPSetTolerances(ksp_of(snes_), aimed_at_, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT));
 }
 
 PetscErrorCode LinearSolver::shell_product(Mat J, Vec x, Vec y) {
@@ -323,8 +329,6 @@ void LinearSolver::serve_beside(double tolerance) {
   check(KSPSetFromOptions(tangent_));
   check(KSPGetTolerances(tangent_, &tangent_least_, nullptr, nullptr, nullptr));
 }
-
-double LinearSolver::rough() const { return is_large() ? double(rough_tangent) : 0; }
 
 PetscInt LinearSolver::unknowns() const {
   PetscInt all;

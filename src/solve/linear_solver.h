@@ -1,4 +1,5 @@
 #pragma once
+#include <initializer_list>
 #include <string>
 
 #include "solve/bordered.h"
@@ -44,9 +45,11 @@ class LinearSolver {
   /// share of b. Collective.
   bool solve(Vec b, Vec x, double rounding = 0, double share = 0);
   /// Share that is left by a tangent good enough to take a step along, of large problems; else 0.
-  double rough() const;
-  /// The digits of Newton's next step from this residual and the one before it, of large problems whose
-  /// options leave them open; a residual of `enough` ends the iteration.
+  double rough() const { return rough_; }
+  /// A large problem whose options leave open how far steps are solved.
+  bool aims() const { return aims_; }
+  /// The digits of Newton's next step of such a one from this residual and the one before it; a residual of
+  /// `enough` may end the iteration.
   void aim(double residual, double before, double enough);
   /// No Newton steps are asked for, but solves beside them alone, to this relative tolerance.
   void serve_beside(double tolerance);
@@ -84,7 +87,7 @@ class LinearSolver {
   bool take_whole();
   double whole_bytes() const;
   PetscInt unknowns() const;
-  bool is_large() const;
+  bool given(std::initializer_list<char const*> options) const;
   bool fits(double bytes, std::string const& what);
   void count_iterations();
   Preconditioner& preconditioner() { return fallback_ ? *fallback_ : *own_; }
@@ -105,9 +108,11 @@ class LinearSolver {
                             ///< at every build since
   bool built_here_ = false;                       ///< at the last linearisation
   double tangent_least_ = 0, tangent_floor_ = 0;  ///< of its residuals, by the options
-  double aimed_at_ = 1e-6;                        ///< relative residual of Newton's next step
-  int rung_ = 0;                                  ///< of the ladder; 0: the problem's own preconditioner
-  int stay_ = 32, solved_ = 0;                    ///< points to stay up there, and points since
+  bool aims_ = false;
+  double aimed_at_ = 1e-6;      ///< relative residual of Newton's next step
+  double rough_ = 0;            ///< of tangents that steps are taken along
+  int rung_ = 0;                ///< of the ladder; 0: the problem's own preconditioner
+  int stay_ = 32, solved_ = 0;  ///< points to stay up there, and points since
   Fallbacks fallbacks_;
   std::string route_, note_;
   Guard guard_;

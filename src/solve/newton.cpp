@@ -143,14 +143,19 @@ PetscErrorCode Newton::form_function(SNES, Vec y, Vec g, void* context) {
   return newton.linear_->guard().run([&] { newton.bordered_.residual(y, g); });
 }
 
+/// Where six digits end in the tolerance or in rounding they may end the iteration.
+void Newton::aim(Vec y) {
+  double residual, tolerance;
+  check(SNESGetFunctionNorm(snes_, &residual));
+  check(SNESGetTolerances(snes_, &tolerance, nullptr, nullptr, nullptr, nullptr));
+  linear_->aim(residual, step_from_, std::max(tolerance, bordered_.problem().rounding(y)));
+}
+
 PetscErrorCode Newton::form_jacobian(SNES snes, Vec y, Mat, Mat, void* context) {
   auto& newton = *static_cast<Newton*>(context);
   return newton.linear_->guard().run([&] {
-    double residual, enough;
-    check(SNESGetFunctionNorm(snes, &residual));
-    check(SNESGetTolerances(snes, &enough, nullptr, nullptr, nullptr, nullptr));
     const bool regular = newton.linear_->linearise(y, true);
-    newton.linear_->aim(residual, newton.step_from_, enough);
+    if (newton.linear_->aims()) newton.aim(y);
     check(
         SNESSetCheckJacobianDomainError(snes, regular ? PETSC_FALSE : PETSC_TRUE));  // it is never taken back
     if (!regular) check(SNESSetJacobianDomainError(snes));

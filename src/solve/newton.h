@@ -60,6 +60,7 @@ class Newton {
   bool stuck_at_rounding(Vec y);
   bool creeps(int iteration, double residual);
   double rounding(Vec y);
+  void aim(Vec y);
   double last_effect(Vec y);
 
   Bordered bordered_;

@@ -6,7 +6,7 @@ from itertools import groupby
 
 import numpy as np
 import pytest
-from models.core_models import options
+from models.core_models import counting, options
 from petsc4py import PETSc
 from tolerances import REPEATED, ROUNDING, SOLVED
 
@@ -204,13 +204,15 @@ def test_steps_of_a_large_problem_are_solved_as_far_as_they_lead(case, method):
         assert one["beta"] == pytest.approx(other["beta"], rel=SOLVED, abs=SOLVED * other["omega"])
 
 
-def test_an_option_says_how_far_steps_are_solved(case):
-    """Of a large problem too."""
+@pytest.mark.parametrize("digits", [1e-3, 1e-6])
+def test_an_option_says_how_far_steps_are_solved(case, digits):
+    """Of a large problem too, and of tangents: other systems than Newton's steps take as many iterations."""
     found = []
     for least in (10, 1e9):
-        with options(fw_linear_large=least, krylov_ksp_rtol=1e-3, krylov_tangent_ksp_rtol=1e-9):
+        given = {"krylov_ksp_rtol": digits, "krylov_tangent_ksp_rtol": 1e-9}
+        with options(fw_linear_large=least, **given), counting("KSPSolve") as solves, counting("PCApply") as applied:
             points = branch(mode(*case, "krylov"), (1.5e-3, 2.2e-3), ())
-        found.append([(p["newton"], p["linear"]) for p in points])
+            found.append([solves(), applied(), *((p["newton"], p["linear"]) for p in points)])
     assert found[0] == found[1]
 
 
