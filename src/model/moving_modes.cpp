@@ -22,14 +22,6 @@ struct Modes {
   std::vector<double> theta, vectors;
 };
 
-/// A start that is the same on all ranks.
-VecHandle scrambled_start(int n) {
-  VecHandle start = make_vector(PETSC_COMM_SELF, n);
-  const WriteArray values(start);
-  for (int i = 0; i < n; ++i) values[i] = 0.5 + double(scrambled(i) >> 11) * 0x1p-53;
-  return start;
-}
-
 /// The `count` largest eigenvalues of a symmetric C, or more.
 Modes largest(std::vector<double>& C, int n, int count) {
   MatHandle A;
@@ -42,7 +34,7 @@ Modes largest(std::vector<double>& C, int n, int count) {
   check(EPSSetDimensions(eps, count, PETSC_DEFAULT, PETSC_DEFAULT));
   check(EPSSetTolerances(eps, tolerance, 1000));
   check(EPSSetWhichEigenpairs(eps, EPS_LARGEST_REAL));
-  VecHandle x = scrambled_start(n);
+  VecHandle x = scrambled_vector(n);
   Vec start = x;
   check(EPSSetInitialSpace(eps, 1, &start));
   check(EPSSetFromOptions(eps));

@@ -63,15 +63,6 @@ void invert_by_factor(ST st, WavePencil& of) {
   check(PCShellSetApply(pc, apply_inverse));
 }
 
-/// The same on any rank.
-VecHandle first_vector(PetscInt n) {
-  VecHandle v;
-  check(VecCreateSeq(PETSC_COMM_SELF, n, v.out()));
-  const WriteArray to(v);
-  for (PetscInt i = 0; i < n; ++i) to[i] = double(scrambled(std::uint64_t(i)) >> 11) * 0x1p-53 - 0.5;
-  return v;
-}
-
 /// Joins those found, unless it lies among them: each wave is its own multiple by i too.
 void take(LowestWaves& found, WavePencil const& of, double theta, std::vector<complex> u) {
   const int n = of.factor.dofs(), have = int(found.theta.size()), one = 1;
@@ -113,7 +104,7 @@ LowestWaves lowest_waves(SectorFactor const& factor, Circulant<SparseBlock> cons
   check(EPSSetPurify(eps, PETSC_FALSE));  // K has no null space
   check(EPSGetST(eps, &st));
   invert_by_factor(st, of);
-  VecHandle phi = first_vector(2 * factor.dofs());
+  VecHandle phi = scrambled_vector(2 * factor.dofs());
   Vec first = phi;
   check(EPSSetInitialSpace(eps, 1, &first));
   check(EPSSetFromOptions(eps));
