@@ -3,85 +3,117 @@
 #include <algorithm>
 #include <cmath>
 
-#include "solve/vectors.h"
+#include "lapack.h"
 #include "tuned.h"
 
 namespace fretwave::precondition {
 
 namespace {
 
-const Tuned kept("pairs_kept", 60, "directions that right-hand sides of the pairs' coupling share");
+const Tuned kept("pairs_kept", 100, "directions that right-hand sides of the pairs' coupling share");
 constexpr double new_part = 1e-6;  // of an image, outside the others: less is rounding
+
+/// to += alpha A x of `columns` columns
+void add_product(int rows, int columns, double alpha, std::vector<double> const& A,
+                 std::vector<double> const& x, double* to) {
+  const int step = 1;
+  const double one = 1;
+  if (rows > 0 && columns > 0)
+    dgemv_("N", &rows, &columns, &alpha, A.data(), &rows, x.data(), &step, &one, to, &step);
+}
 
 }  // namespace
 
-ContactGmres::ContactGmres(MPI_Comm comm, PetscInt local, Product product, double tolerance, int most)
-    : product_(std::move(product)), tolerance_(tolerance), most_(most) {
-  right_ = make_vector(comm, local), x_ = like(right_);
-}
+ContactGmres::ContactGmres(MPI_Comm comm, size_t local, Product product, double tolerance, int most)
+    : comm_(comm),
+      local_(as_int(local, "coefficients of contact on one rank")),
+      product_(std::move(product)),
+      tolerance_(tolerance),
+      most_(most) {}
 
-Vec ContactGmres::solve() {
-  const VecHandle left = solve::copy(right_);
-  const double enough = tolerance_ * solve::norm(left);
+std::vector<double> ContactGmres::solve(std::vector<double> b) {
+  std::vector<double>& left = b;
+  const double enough = tolerance_ * norm(left);
   auto given = taken_from(left);  // C^T b
-  double size = solve::norm(left);
+  double size = norm(left);
   for (int k = 0; k < most_ && size > enough; ++k) {
-    if (k == 0) {
-      starts_.push_back(solve::copy(left));
-      check(VecScale(starts_.back(), 1 / size));
-    }
-    if (!extend(k == 0 ? Vec(starts_.back()) : C_.back(), left, given)) break;
-    size = std::sqrt(std::max(size * size - given.back() * given.back(), 0.0));
+    if (k == 0)
+      for (const double v : left) starts_.push_back(v / size);
+    if (!extend(k == 0, left, given)) break;
+    size = norm(left);
   }
-  combine(std::move(given));
+  auto x = combined(std::move(given));
   forget(size_t(kept));
-  return x_;
+  return x;
 }
 
 /// One direction z: A z - C C^T A z is the next column of C, and what it gives is taken from `left`. False
 /// where there is nothing new in it.
-bool ContactGmres::extend(Vec z, Vec left, std::vector<double>& given) {
-  VecHandle image = like(z);
-  product_(z, image);
+bool ContactGmres::extend(bool start, std::vector<double>& left, std::vector<double>& given) {
+  std::vector<double> image(local_);
+  product_(std::span(start ? starts_ : C_).last(local_), image);
   auto column = taken_from(image);
-  Vec const with[] = {image, left};
-  double dots[2], known = 0;
-  check(VecMDot(image, 2, with, dots));
+  double known = 0;
   for (double part : column) known += part * part;
-  const double size = std::sqrt(dots[0]);
+  const double size = norm(image);
   if (!(size > new_part * std::sqrt(known))) return false;
-  check(VecScale(image, 1 / size));
-  column.push_back(size), given.push_back(dots[1] / size);
-  check(VecAXPY(left, -given.back(), image));
-  R_.push_back(std::move(column)), Z_.push_back(z), C_.push_back(image);
-  images_.push_back(std::move(image));
+  for (double& v : image) v /= size;
+  column.push_back(size), given.push_back(dots(1, image, left)[0]);
+  add_product(local_, 1, -1, image, {given.back()}, left.data());
+  C_.insert(C_.end(), image.begin(), image.end());
+  R_.push_back(std::move(column)), begins_.push_back(start);
   return true;
 }
 
+/// A^T v of `columns` columns.
+std::vector<double> ContactGmres::dots(int columns, std::vector<double> const& A,
+                                       std::span<double const> v) const {
+  const int step = 1;
+  const double one = 1, zero = 0;
+  std::vector<double> out(columns);
+  if (local_ > 0 && columns > 0)
+    dgemv_("T", &local_, &columns, &one, A.data(), &local_, v.data(), &step, &zero, out.data(), &step);
+  sum_over_ranks(out, comm_);
+  return out;
+}
+
+double ContactGmres::norm(std::span<double const> v) const {
+  double sum = 0;
+  for (const double x : v) sum += x * x;
+  sum_over_ranks(std::span(&sum, 1), comm_);
+  return std::sqrt(sum);
+}
+
 /// v -= C C^T v, and C^T v.
-std::vector<double> ContactGmres::taken_from(Vec v) const {
-  std::vector<double> parts(C_.size()), minus;
-  if (C_.empty()) return parts;
-  check(VecMDot(v, PetscInt(C_.size()), C_.data(), parts.data()));
-  for (double part : parts) minus.push_back(-part);
-  check(VecMAXPY(v, PetscInt(C_.size()), minus.data(), const_cast<Vec*>(C_.data())));
+std::vector<double> ContactGmres::taken_from(std::span<double> v) const {
+  const auto parts = dots(int(R_.size()), C_, v);
+  add_product(local_, int(parts.size()), -1, C_, parts, v.data());
   return parts;
 }
 
-/// x = Z R^-1 y
-void ContactGmres::combine(std::vector<double> y) {
+/// Z R^-1 y
+std::vector<double> ContactGmres::combined(std::vector<double> y) const {
+  std::vector<double> of_starts, of_columns(y.size());
   for (size_t j = y.size(); j-- > 0;) {
     y[j] /= R_[j][j];
     for (size_t i = 0; i < j; ++i) y[i] -= R_[j][i] * y[j];
   }
-  check(VecSet(x_, 0));
-  if (!y.empty()) check(VecMAXPY(x_, PetscInt(y.size()), y.data(), Z_.data()));
+  for (size_t j = 0; j < y.size(); ++j) {
+    if (begins_[j])
+      of_starts.push_back(y[j]);
+    else
+      of_columns[j - 1] = y[j];
+  }
+  std::vector<double> x(local_);
+  add_product(local_, int(of_starts.size()), 1, starts_, of_starts, x.data());
+  add_product(local_, int(of_columns.size()), 1, C_, of_columns, x.data());
+  return x;
 }
 
-/// Directions behind the first ones, and the start that none of these is.
+/// Directions behind the first ones, and the starts that none of these is.
 void ContactGmres::forget(size_t from) {
-  if (C_.size() > from) images_.resize(from), C_.resize(from), Z_.resize(from), R_.resize(from);
-  while (!starts_.empty() && std::ranges::find(Z_, Vec(starts_.back())) == Z_.end()) starts_.pop_back();
+  if (R_.size() > from) C_.resize(from * local_), R_.resize(from), begins_.resize(from);
+  starts_.resize(size_t(std::ranges::count(begins_, true)) * local_);
 }
 
 }  // namespace fretwave::precondition

@@ -1,5 +1,9 @@
 #include "precondition/coupled_pairs.h"
 
+#include <algorithm>
+#include <functional>
+#include <numeric>
+
 #include "log.h"
 #include "tuned.h"
 
@@ -14,37 +18,41 @@ const Tuned tolerance("pairs_tolerance", 1e-3, "relative residual of the pairs' 
 
 CoupledPairs::CoupledPairs(MPI_Comm comm, std::vector<PairCorrection const*> own, Between between, int most)
     : comm_(comm), own_(std::move(own)), between_(std::move(between)) {
-  PetscInt local = 0;
-  for (auto const* E : own_) local += E->size();
-  gmres_.emplace(comm, local, [this](Vec f, Vec out) { product(f, out); }, tolerance, most);
-  check(VecGetOwnershipRange(gmres_->right(), &begin_, nullptr));
-  check(VecGetSize(gmres_->right(), &size_));
+  size_t local = 0;
+  for (auto const* E : own_) local += size_t(E->size());
+  const auto all = gathered(std::span<size_t const>(&local, 1), comm);
+  begin_ = std::accumulate(all.begin(), all.begin() + comm_rank(comm), size_t(0));
+  size_ = std::accumulate(all.begin(), all.end(), size_t(0));
+  gmres_.emplace(
+      comm, local, [this](std::span<double const> f, std::span<double> out) { product(f, out); }, tolerance,
+      most);
 }
 
-/// f = E b, f of this rank's pairs, b of all.
-void CoupledPairs::multiply_pairs(std::vector<double> const& b, double* f) const {
-  double const* from = b.data() + begin_;
+/// E b of this rank's pairs, b of all.
+std::vector<double> CoupledPairs::multiply_pairs(std::vector<double> const& b) const {
+  const std::vector<float> rounded(b.begin() + begin_, b.end());
+  std::vector<float> f(rounded.size());
+  size_t at = 0;
   for (auto const* E : own_) {
-    E->apply(from, f);
-    from += E->size(), f += E->size();
+    E->apply(&rounded[at], &f[at]);
+    at += size_t(E->size());
   }
+  return {f.begin(), f.begin() + at};
 }
 
 /// out = f + E (G - G_pp) f
-void CoupledPairs::product(Vec f, Vec out) const {
-  const auto in = gathered(f);
-  std::vector<double> u(in.size(), 0.0);
-  between_(in.data(), u.data());
+void CoupledPairs::product(std::span<double const> f, std::span<double> out) const {
+  const auto all = gathered(f, comm_);
+  std::vector<double> u(all.size(), 0.0);
+  between_(all.data(), u.data());
   sum_over_ranks(u, comm_);
-  multiply_pairs(u, WriteArray(out).data());
-  check(VecAXPY(out, 1, f));
+  std::ranges::transform(multiply_pairs(u), f, out.begin(), std::plus());
 }
 
 std::vector<double> CoupledPairs::forces(std::vector<double> const& b) {
   static const log::Event coupling("FwPairs");
   const log::Span span(coupling);
-  multiply_pairs(b, WriteArray(gmres_->right()).data());
-  return gathered(gmres_->solve());
+  return gathered(std::span<double const>(gmres_->solve(multiply_pairs(b))), comm_);
 }
 
 }  // namespace fretwave::precondition

@@ -29,11 +29,11 @@ class CoupledPairs {
   std::vector<double> forces(std::vector<double> const& b);
 
  private:
-  void product(Vec f, Vec out) const;
-  void multiply_pairs(std::vector<double> const& b, double* f) const;
+  void product(std::span<double const> f, std::span<double> out) const;
+  std::vector<double> multiply_pairs(std::vector<double> const& b) const;
 
   MPI_Comm comm_;
-  PetscInt begin_ = 0, size_ = 0;
+  size_t begin_ = 0, size_ = 0;
   std::vector<PairCorrection const*> own_;
   Between between_;
   std::optional<ContactGmres> gmres_;

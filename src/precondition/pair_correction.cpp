@@ -68,13 +68,10 @@ PairCorrection::PairCorrection(Harmonics const& h, int d, std::vector<double> D,
     E_ = std::move(E);  // else the harmonic blocks alone serve this pair
 }
 
-void PairCorrection::apply(double const* u, double* f) const {
+void PairCorrection::apply(float const* u, float* f) const {
   const int step = 1;
   const float one = 1, zero = 0;
-  const std::vector<float> in(u, u + size_);
-  std::vector<float> out(size_);
-  sgemv_("T", &size_, &size_, &one, E_.data(), &size_, in.data(), &step, &zero, out.data(), &step);
-  std::copy(out.begin(), out.end(), f);
+  sgemv_("T", &size_, &size_, &one, E_.data(), &size_, u, &step, &zero, f, &step);
 }
 
 }  // namespace fretwave::precondition

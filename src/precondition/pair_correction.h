@@ -25,7 +25,7 @@ class PairCorrection {
   bool idle() const { return E_.empty(); }
   int size() const { return size_; }
   /// f = E u, blocks of one pair that is not idle.
-  void apply(double const* u, double* f) const;
+  void apply(float const* u, float* f) const;
 
  private:
   int size_;

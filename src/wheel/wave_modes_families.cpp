@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numeric>
 
 #include "log.h"
@@ -150,15 +151,16 @@ std::vector<complex> WaveModes::between(std::vector<complex> const& f) const {
 namespace {
 
 /// Real and imaginary parts side by side.
-std::vector<complex> from_parts(Vec v) {
-  const ReadArray in(v);
-  auto const* data = reinterpret_cast<complex const*>(in.data());
-  return {data, data + local_size(v) / 2};
+std::vector<complex> from_parts(std::span<double const> v) {
+  std::vector<complex> x(v.size() / 2);
+  for (size_t k = 0; k < x.size(); ++k) x[k] = {v[2 * k], v[2 * k + 1]};
+  return x;
 }
 
-void to_parts(std::vector<complex> const& x, Vec v) {
-  const WriteArray out(v);
-  std::ranges::copy(x, reinterpret_cast<complex*>(out.data()));
+std::vector<double> to_parts(std::vector<complex> const& x) {
+  std::vector<double> v;
+  for (complex a : x) v.push_back(a.real()), v.push_back(a.imag());
+  return v;
 }
 
 }  // namespace
@@ -169,16 +171,15 @@ std::vector<complex> WaveModes::coupled(std::vector<complex> u, std::vector<comp
   static const log::Event coupling("FwSectors");
   const log::Span span(coupling);
   ContactGmres gmres(
-      problem_.comm(), PetscInt(2 * u.size()),
-      [&](Vec in, Vec out) {
-        to_parts(between(reply(from_parts(in), {}, E).f), out);
-        check(VecAXPY(out, 1, in));
+      problem_.comm(), 2 * u.size(),
+      [&](std::span<double const> in, std::span<double> out) {
+        std::ranges::transform(to_parts(between(reply(from_parts(in), {}, E).f)), in, out.begin(),
+                               std::plus());
       },
       tolerance, int(most_inside));
   const auto of_none = between(reply(std::vector<complex>(u.size()), r, E).f);
   for (size_t k = 0; k < u.size(); ++k) u[k] -= of_none[k];
-  to_parts(u, gmres.right());
-  return from_parts(gmres.solve());
+  return from_parts(gmres.solve(to_parts(u)));
 }
 
 /// g - Phi^H X b of this rank's members.
