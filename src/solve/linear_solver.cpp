@@ -6,6 +6,7 @@
 #include "error.h"
 #include "log.h"
 #include "solve/direct.h"
+#include "solve/vectors.h"
 #include "tuned.h"
 
 namespace fretwave::solve {
@@ -26,6 +27,9 @@ const Tuned rough_tangent("linear_rough_tangent", 1e-7,
                           "relative residual of tangents of large problems that steps are taken along");
 const Tuned tangent_accepted("linear_tangent_accepted", 1e-6,
                              "residual of a tangent, relative, where rounding lets GMRES go no further");
+const Tuned straight("linear_straight", 0.03,
+                     "share of the residual that a step leaves, up to which the preconditioner stays");
+const Tuned farther("linear_farther", 3, "how much farther it does than that step at the most");
 const Tuned renewal("linear_renewal", 1.0 / 16,
                     "share of all iterations that is spent on building preconditioners anew");
 
@@ -76,7 +80,11 @@ bool is_gmres(KSP ksp) {
 }  // namespace
 
 LinearSolver::LinearSolver(Bordered& bordered, std::string const& prefix, SNES snes)
-    : bordered_(bordered), prefix_(prefix), snes_(snes), point_(bordered.problem().unknowns()) {
+    : bordered_(bordered),
+      prefix_(prefix),
+      snes_(snes),
+      point_(bordered.problem().unknowns()),
+      served_(like(point_)) {
   choose_route();
   if (krylov_) {
     use_krylov();
@@ -260,7 +268,7 @@ void LinearSolver::count_iterations() {
   stale_ = excess_ > cost;
 }
 
-bool LinearSolver::linearise(Vec y, bool newton) {
+bool LinearSolver::linearise(Vec y, bool newton, double left) {
   if (!krylov_) {
     bordered_.assemble(y, J_);
     if (factorise(ksp_of(snes_), J_)) return true;
@@ -269,7 +277,7 @@ bool LinearSolver::linearise(Vec y, bool newton) {
   }
   check(VecCopy(y, point_));
   if (uncounted_ && !stale_) count_iterations();
-  uncounted_ = false;
+  uncounted_ = false, left_ = left;
   check(MatAssemblyBegin(J_, MAT_FINAL_ASSEMBLY));  // another state, for which PCSetUp looks
   check(MatAssemblyEnd(J_, MAT_FINAL_ASSEMBLY));
   if (own_ && !set_up()) return false;
@@ -294,10 +302,23 @@ bool LinearSolver::set_up() {
 PetscErrorCode LinearSolver::set_up(PC pc) {
   if (!own_) return PETSC_ERR_ARG_WRONGSTATE;  // inside a PC of PETSc's
   return guard_.run([&] {
-    if (!stale_) follow();
+    if (!stale_ && !serves()) follow();
     built_here_ = stale_;
     check(PCSetFailedReason(pc, stale_ && !build() ? PC_FACTOR_NUMERIC_ZEROPIVOT : PC_NOERROR));
   });
+}
+
+/// What a step leaves of the residual is by how much the Jacobian has changed over it, and so far as that is
+/// little the preconditioner is as good as where it was made.
+bool LinearSolver::serves() {
+  const double off = norm(moved(point_, -1, served_));
+  if (left_ <= straight) reach_ = std::max(reach_, off * std::min(straight / left_, double(farther)));
+  return off <= reach_;
+}
+
+void LinearSolver::serve_from_here() {
+  check(VecCopy(point_, served_));
+  reach_ = 0;
 }
 
 void LinearSolver::follow() {
@@ -305,6 +326,7 @@ void LinearSolver::follow() {
   const log::Span span(following);
   try {
     preconditioner().follow(point_);
+    serve_from_here();
   } catch (SingularBlock const&) {
     stale_ = true;  // what was followed in part is built anew
   }
@@ -320,6 +342,7 @@ bool LinearSolver::build() {
   }
   stale_ = false;
   fresh_ = -1, excess_ = 0;
+  serve_from_here();
   return true;
 }
 

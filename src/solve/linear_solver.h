@@ -39,8 +39,8 @@ class LinearSolver {
   std::string route() const;
   bool krylov() const { return krylov_; }
   /// Point and factors of the solves that follow; false where it is singular. `newton`: one of Newton's
-  /// follows. Collective.
-  bool linearise(Vec y, bool newton);
+  /// follows; `left`: of the residual by the step that led here, 1 for none. Collective.
+  bool linearise(Vec y, bool newton, double left = 1);
   /// J x = b from x where the Krylov route is taken, to the tangent's tolerance, or to this residual, or
   /// share of b. Collective.
   bool solve(Vec b, Vec x, double rounding = 0, double share = 0);
@@ -81,6 +81,8 @@ class LinearSolver {
   bool set_up();
   bool build();
   void follow();
+  void serve_from_here();
+  bool serves();
   bool solve_once(Vec b, Vec x);
   std::pair<PreconditionerKind const*, double> condensing() const;
   bool take_condensed(PreconditionerKind const&, double bytes);
@@ -97,7 +99,7 @@ class LinearSolver {
   SNES snes_;
   MatHandle J_;
   KspHandle tangent_;
-  VecHandle point_;
+  VecHandle point_, served_;  ///< of the last linearisation, and of the preconditioner's last
   ChosenKind kind_;
   std::unique_ptr<Preconditioner> own_, fallback_;  ///< none where options ask for a PC of PETSc's
   bool krylov_ = false, stale_ = true, uncounted_ = false, beside_ = false;
@@ -106,6 +108,8 @@ class LinearSolver {
   double excess_ = 0;                    ///< iterations beyond that and a share of them, of all solves since
   double first_reuse_ = 0;  ///< iterations beyond it that the first reuse cost when it was last tried, halved
                             ///< at every build since
+  double left_ = 1;         ///< of the residual by the step that led here
+  double reach_ = 0;        ///< from `served_`: how far the preconditioner is as good as there
   bool built_here_ = false;                       ///< at the last linearisation
   double tangent_least_ = 0, tangent_floor_ = 0;  ///< of its residuals, by the options
   bool aims_ = false;

@@ -58,6 +58,7 @@ PetscErrorCode Newton::converged(SNES snes, PetscInt iteration, PetscReal unknow
   auto& newton = *static_cast<Newton*>(context);
   const double before = newton.last_[(iteration + newton.last_.size() - 1) % newton.last_.size()];
   newton.step_from_ = iteration == 0 ? residual : before;
+  newton.left_ = residual / newton.step_from_;
   const bool creeps = newton.creeps(iteration, residual);
   PetscErrorCode code = SNESConvergedDefault(snes, iteration, unknowns, step, residual, reason, nullptr);
   if (code || *reason < 0) return code;
@@ -154,7 +155,7 @@ void Newton::aim(Vec y) {
 PetscErrorCode Newton::form_jacobian(SNES snes, Vec y, Mat, Mat, void* context) {
   auto& newton = *static_cast<Newton*>(context);
   return newton.linear_->guard().run([&] {
-    const bool regular = newton.linear_->linearise(y, true);
+    const bool regular = newton.linear_->linearise(y, true, newton.left_);
     if (newton.linear_->aims()) newton.aim(y);
     check(
         SNESSetCheckJacobianDomainError(snes, regular ? PETSC_FALSE : PETSC_TRUE));  // it is never taken back

@@ -208,6 +208,25 @@ def test_directions_of_the_pairs_coupling_serve_the_next_right_hand_side(comm) -
             assert shared[level][name] == pytest.approx(expected, rel=SOLVED, abs=size)
 
 
+def test_a_preconditioner_stays_where_a_step_leaves_next_to_nothing(comm) -> None:
+    """It follows fewer points than where it follows each, with hardly more iterations, and motions are the same."""
+    M, K = chain()
+    levels, follows, points = [2.0, 2.5], [], []
+    with fw.Model(M, K, np.diag([0.1] + [0.0] * (N - 1)), [sliders("coulomb_3d", PADS, 3)], comm) as model:
+        for changes in ({}, {"fw_linear_straight": 1e-12}):
+            with options(**changes), counting("FwPCFollow") as followed:
+                points.append(branch(problem_of(model, "stays_"), levels))
+                follows.append(followed())
+    assert 0 < follows[0] < 0.9 * follows[1], follows
+    iterations = [sum(linear for _, _, linear, *_ in found) for found in points]
+    assert iterations[0] < 1.2 * iterations[1], iterations
+    stays, each = (reported(found) for found in points)
+    for level in levels:
+        for name in ("omega", "beta"):
+            expected, size = each[level][name], SOLVED * each[level]["omega"]
+            assert stays[level][name] == pytest.approx(expected, rel=SOLVED, abs=size)
+
+
 def motions_and_correctors(problem):
     """Unknowns of a small motion and of a large one, and two correctors at a fixed amplitude. Collective."""
     followed = fw.Continuation(problem, problem.initial(0.1), (0.1, 4.0))
@@ -285,6 +304,7 @@ def test_an_inverse_that_cannot_be_added_to_is_made_anew(comm) -> None:
         still, moving, correctors = motions_and_correctors(problem)
         corrector, other = correctors
         options["fw_basis_cheap"], options["fw_basis_few"] = 0.5, 100
+        options["fw_pairs_tolerance"] = 1e-8  # directions kept of one application change the next within it
         for pairs in (0, 2):
             preconditioned(corrector, problem, slipping(problem, still, moving, pairs))
         y = slipping(problem, still, moving, 3)
@@ -293,6 +313,7 @@ def test_an_inverse_that_cannot_be_added_to_is_made_anew(comm) -> None:
         found = [preconditioned(corrector, problem, y) for _ in range(2)]
         options.delValue("fw_basis_cheap"), options.delValue("fw_basis_few")
         expected = preconditioned(other, problem, y)
+        options.delValue("fw_pairs_tolerance")
         for one in found:
             one.axpy(-1.0, expected)
             assert one.norm() < 1e-6 * expected.norm()
