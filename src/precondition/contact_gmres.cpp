@@ -36,10 +36,12 @@ std::vector<double> ContactGmres::solve(std::vector<double> b) {
   const double enough = tolerance_ * norm(left);
   auto given = taken_from(left);  // C^T b
   double size = norm(left);
+  std::vector<double> start;
+  for (const double v : left) start.push_back(v / size);
   for (int k = 0; k < most_ && size > enough; ++k) {
-    if (k == 0)
-      for (const double v : left) starts_.push_back(v / size);
-    if (!extend(k == 0, left, given)) break;
+    if (!extend(k == 0 ? std::span<double const>(start) : std::span(C_).last(local_), left, given)) break;
+    if (k == 0) starts_.insert(starts_.end(), start.begin(), start.end());
+    begins_.push_back(k == 0);
     size = norm(left);
   }
   auto x = combined(std::move(given));
@@ -49,25 +51,25 @@ std::vector<double> ContactGmres::solve(std::vector<double> b) {
 
 /// One direction z: A z - C C^T A z is the next column of C, and what it gives is taken from `left`. False
 /// where there is nothing new in it.
-bool ContactGmres::extend(bool start, std::vector<double>& left, std::vector<double>& given) {
+bool ContactGmres::extend(std::span<double const> z, std::vector<double>& left, std::vector<double>& given) {
   std::vector<double> image(local_);
-  product_(std::span(start ? starts_ : C_).last(local_), image);
+  product_(z, image);
   auto column = taken_from(image);
   double known = 0;
   for (double part : column) known += part * part;
   const double size = norm(image);
   if (!(size > new_part * std::sqrt(known))) return false;
   for (double& v : image) v /= size;
-  column.push_back(size), given.push_back(dots(1, image, left)[0]);
+  column.push_back(size), given.push_back(transposed_product(1, image, left)[0]);
   add_product(local_, 1, -1, image, {given.back()}, left.data());
   C_.insert(C_.end(), image.begin(), image.end());
-  R_.push_back(std::move(column)), begins_.push_back(start);
+  R_.push_back(std::move(column));
   return true;
 }
 
 /// A^T v of `columns` columns.
-std::vector<double> ContactGmres::dots(int columns, std::vector<double> const& A,
-                                       std::span<double const> v) const {
+std::vector<double> ContactGmres::transposed_product(int columns, std::vector<double> const& A,
+                                                     std::span<double const> v) const {
   const int step = 1;
   const double one = 1, zero = 0;
   std::vector<double> out(columns);
@@ -86,7 +88,7 @@ double ContactGmres::norm(std::span<double const> v) const {
 
 /// v -= C C^T v, and C^T v.
 std::vector<double> ContactGmres::taken_from(std::span<double> v) const {
-  const auto parts = dots(int(R_.size()), C_, v);
+  const auto parts = transposed_product(int(R_.size()), C_, v);
   add_product(local_, int(parts.size()), -1, C_, parts, v.data());
   return parts;
 }
@@ -110,7 +112,7 @@ std::vector<double> ContactGmres::combined(std::vector<double> y) const {
   return x;
 }
 
-/// Directions behind the first ones, and the starts that none of these is.
+/// Directions behind the first ones.
 void ContactGmres::forget(size_t from) {
   if (R_.size() > from) C_.resize(from * local_), R_.resize(from), begins_.resize(from);
   starts_.resize(size_t(std::ranges::count(begins_, true)) * local_);

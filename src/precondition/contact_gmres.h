@@ -22,9 +22,10 @@ class ContactGmres {
   std::vector<double> solve(std::vector<double> b);
 
  private:
-  bool extend(bool start, std::vector<double>& left, std::vector<double>& given);
+  bool extend(std::span<double const> z, std::vector<double>& left, std::vector<double>& given);
   std::vector<double> taken_from(std::span<double> v) const;
-  std::vector<double> dots(int columns, std::vector<double> const& A, std::span<double const> v) const;
+  std::vector<double> transposed_product(int columns, std::vector<double> const& A,
+                                         std::span<double const> v) const;
   double norm(std::span<double const> v) const;
   std::vector<double> combined(std::vector<double> y) const;
   void forget(size_t from);

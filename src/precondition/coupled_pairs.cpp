@@ -18,26 +18,25 @@ const Tuned tolerance("pairs_tolerance", 1e-3, "relative residual of the pairs' 
 
 CoupledPairs::CoupledPairs(MPI_Comm comm, std::vector<PairCorrection const*> own, Between between, int most)
     : comm_(comm), own_(std::move(own)), between_(std::move(between)) {
-  size_t local = 0;
-  for (auto const* E : own_) local += size_t(E->size());
-  const auto all = gathered(std::span<size_t const>(&local, 1), comm);
+  for (auto const* E : own_) local_ += size_t(E->size());
+  const auto all = gathered(std::span<size_t const>(&local_, 1), comm);
   begin_ = std::accumulate(all.begin(), all.begin() + comm_rank(comm), size_t(0));
   size_ = std::accumulate(all.begin(), all.end(), size_t(0));
   gmres_.emplace(
-      comm, local, [this](std::span<double const> f, std::span<double> out) { product(f, out); }, tolerance,
+      comm, local_, [this](std::span<double const> f, std::span<double> out) { product(f, out); }, tolerance,
       most);
 }
 
 /// E b of this rank's pairs, b of all.
 std::vector<double> CoupledPairs::multiply_pairs(std::vector<double> const& b) const {
-  const std::vector<float> rounded(b.begin() + begin_, b.end());
-  std::vector<float> f(rounded.size());
+  const std::vector<float> rounded(b.begin() + begin_, b.begin() + begin_ + local_);
+  std::vector<float> f(local_);
   size_t at = 0;
   for (auto const* E : own_) {
     E->apply(&rounded[at], &f[at]);
     at += size_t(E->size());
   }
-  return {f.begin(), f.begin() + at};
+  return {f.begin(), f.end()};
 }
 
 /// out = f + E (G - G_pp) f

@@ -33,7 +33,7 @@ class CoupledPairs {
   std::vector<double> multiply_pairs(std::vector<double> const& b) const;
 
   MPI_Comm comm_;
-  size_t begin_ = 0, size_ = 0;
+  size_t local_ = 0, begin_ = 0, size_ = 0;  ///< coefficients of this rank, before it, of all
   std::vector<PairCorrection const*> own_;
   Between between_;
   std::optional<ContactGmres> gmres_;

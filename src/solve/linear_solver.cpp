@@ -29,7 +29,7 @@ const Tuned tangent_accepted("linear_tangent_accepted", 1e-6,
                              "residual of a tangent, relative, where rounding lets GMRES go no further");
 const Tuned straight("linear_straight", 0.03,
                      "share of the residual that a step leaves, up to which the preconditioner stays");
-const Tuned farther("linear_farther", 3, "how much farther it does than that step at the most");
+const Tuned farther("linear_farther", 3, "how far it stays, over the length of that step, at the most");
 const Tuned renewal("linear_renewal", 1.0 / 16,
                     "share of all iterations that is spent on building preconditioners anew");
 
@@ -268,16 +268,17 @@ void LinearSolver::count_iterations() {
   stale_ = excess_ > cost;
 }
 
-bool LinearSolver::linearise(Vec y, bool newton, double left) {
+bool LinearSolver::linearise(Vec y, bool newton, std::optional<double> left) {
   if (!krylov_) {
     bordered_.assemble(y, J_);
     if (factorise(ksp_of(snes_), J_)) return true;
     check(KSPReset(tangent_));
     return false;
   }
+  if (left) reach_ = *left <= straight ? std::max(reach_, as_straight(y, *left)) : -1;
   check(VecCopy(y, point_));
   if (uncounted_ && !stale_) count_iterations();
-  uncounted_ = false, left_ = left;
+  uncounted_ = false;
   check(MatAssemblyBegin(J_, MAT_FINAL_ASSEMBLY));  // another state, for which PCSetUp looks
   check(MatAssemblyEnd(J_, MAT_FINAL_ASSEMBLY));
   if (own_ && !set_up()) return false;
@@ -308,13 +309,14 @@ PetscErrorCode LinearSolver::set_up(PC pc) {
   });
 }
 
-/// What a step leaves of the residual is by how much the Jacobian has changed over it, and so far as that is
-/// little the preconditioner is as good as where it was made.
-bool LinearSolver::serves() {
-  const double off = norm(moved(point_, -1, served_));
-  if (left_ <= straight) reach_ = std::max(reach_, off * std::min(straight / left_, double(farther)));
-  return off <= reach_;
+/// What a step leaves of the residual is by how much the Jacobian has changed over it: it is next to the same
+/// over so long a way, in multiples of that step. (Not from one such place to the next: of small steps each
+/// would be.)
+double LinearSolver::as_straight(Vec y, double left) const {
+  return norm(moved(y, -1, point_)) * std::min(straight / left, double(farther));
 }
+
+bool LinearSolver::serves() const { return norm(moved(point_, -1, served_)) <= reach_; }
 
 void LinearSolver::serve_from_here() {
   check(VecCopy(point_, served_));
@@ -324,6 +326,7 @@ void LinearSolver::serve_from_here() {
 void LinearSolver::follow() {
   static const log::Event following("FwPCFollow");
   const log::Span span(following);
+  reach_ = -1;  // should it fail on the way
   try {
     preconditioner().follow(point_);
     serve_from_here();

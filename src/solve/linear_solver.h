@@ -1,5 +1,6 @@
 #pragma once
 #include <initializer_list>
+#include <optional>
 #include <string>
 
 #include "solve/bordered.h"
@@ -39,8 +40,9 @@ class LinearSolver {
   std::string route() const;
   bool krylov() const { return krylov_; }
   /// Point and factors of the solves that follow; false where it is singular. `newton`: one of Newton's
-  /// follows; `left`: of the residual by the step that led here, 1 for none. Collective.
-  bool linearise(Vec y, bool newton, double left = 1);
+  /// follows; `left`: what the step from the last linearisation to here left of the residual; none: it is no
+  /// step. The preconditioner stays where such steps leave next to nothing. Collective.
+  bool linearise(Vec y, bool newton, std::optional<double> left = {});
   /// J x = b from x where the Krylov route is taken, to the tangent's tolerance, or to this residual, or
   /// share of b. Collective.
   bool solve(Vec b, Vec x, double rounding = 0, double share = 0);
@@ -82,7 +84,8 @@ class LinearSolver {
   bool build();
   void follow();
   void serve_from_here();
-  bool serves();
+  bool serves() const;
+  double as_straight(Vec y, double left) const;
   bool solve_once(Vec b, Vec x);
   std::pair<PreconditionerKind const*, double> condensing() const;
   bool take_condensed(PreconditionerKind const&, double bytes);
@@ -99,7 +102,7 @@ class LinearSolver {
   SNES snes_;
   MatHandle J_;
   KspHandle tangent_;
-  VecHandle point_, served_;  ///< of the last linearisation, and of the preconditioner's last
+  VecHandle point_, served_;  ///< of the last linearisation; of which the preconditioner is
   ChosenKind kind_;
   std::unique_ptr<Preconditioner> own_, fallback_;  ///< none where options ask for a PC of PETSc's
   bool krylov_ = false, stale_ = true, uncounted_ = false, beside_ = false;
@@ -108,8 +111,7 @@ class LinearSolver {
   double excess_ = 0;                    ///< iterations beyond that and a share of them, of all solves since
   double first_reuse_ = 0;  ///< iterations beyond it that the first reuse cost when it was last tried, halved
                             ///< at every build since
-  double left_ = 1;         ///< of the residual by the step that led here
-  double reach_ = 0;        ///< from `served_`: how far the preconditioner is as good as there
+  double reach_ = 0;        ///< from `served_`: how far the preconditioner is as good; < 0: it is not
   bool built_here_ = false;                       ///< at the last linearisation
   double tangent_least_ = 0, tangent_floor_ = 0;  ///< of its residuals, by the options
   bool aims_ = false;

@@ -58,7 +58,8 @@ PetscErrorCode Newton::converged(SNES snes, PetscInt iteration, PetscReal unknow
   auto& newton = *static_cast<Newton*>(context);
   const double before = newton.last_[(iteration + newton.last_.size() - 1) % newton.last_.size()];
   newton.step_from_ = iteration == 0 ? residual : before;
-  newton.left_ = residual / newton.step_from_;
+  newton.left_.reset();
+  if (iteration > 0 && before > 0) newton.left_ = residual / before;
   const bool creeps = newton.creeps(iteration, residual);
   PetscErrorCode code = SNESConvergedDefault(snes, iteration, unknowns, step, residual, reason, nullptr);
   if (code || *reason < 0) return code;

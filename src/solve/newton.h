@@ -71,7 +71,7 @@ class Newton {
   Effort effort_ = Effort::full;
   std::array<double, 4> last_{};  ///< residuals of the last iterations, the k-th at k mod 4
   double step_from_ = 0;          ///< residual where the last step began
-  double left_ = 1;               ///< of it by that step
+  std::optional<double> left_;    ///< of it by that step; none where none was taken
 };
 
 }  // namespace fretwave::solve
