@@ -11,7 +11,7 @@ namespace fretwave::precondition {
 /// directions: with A Z = C R, the columns of C orthonormal, what those so far can give is taken at once, and
 /// the Krylov space of (1 - C C^T) A joins them (GCRO: de Sturler, J. Comput. Appl. Math. 67, 1996, 15-41).
 /// The columns lie behind each other, for the BLAS: by VecMDot and VecMAXPY they took twice as long. Single
-/// precision loses the columns' right angles: three times as many products.
+/// precision loses the columns' right angles: 730 solves for 528 on a ring at H = 15, each up to `most`.
 class ContactGmres {
  public:
   using Product = std::function<void(std::span<double const> in, std::span<double> out)>;
