@@ -134,18 +134,22 @@ void CircularContact::add_friction(Pair const& pair, double* F) const {
     stick.add_product(pair.disc.u[c], kt, F + c * m);
     stands[c].add_coefficients(kt, F + c * m);
   }
-  std::vector<double> wave(m);
-  for (SweptSlider::Slip const& piece : slider.path.slips)
+  std::vector<double> other(m);
+  const double mean = harmonics_.orders()[0] == 0 ? 0.5 : 1;
+  for (SweptSlider::Slip const& piece : slider.path.slips) {
+    const int first = grid_.first_node(piece.begin, piece.length);
     for (int j = 0; j < Radau::stages; ++j) {
       const std::array<double, 2> e = piece.direction(j);
       const double weight = piece.length * radau().weights[j] / std::numbers::pi;
-      waves(harmonics_, piece.begin + radau().nodes[j] * piece.length, wave.data());
-      if (harmonics_.orders()[0] == 0) wave[0] /= 2;
+      if (first < 0) waves(harmonics_, piece.begin + radau().nodes[j] * piece.length, other.data());
+      double const* wave = first < 0 ? other.data() : &grid_.waves()[size_t(first + j) * m];
       for (int c = 0; c < 2; ++c) {
         const double force = kt * piece.at[j].R * e[c] * weight;
-        for (int k = 0; k < m; ++k) F[c * m + k] += force * wave[k];
+        F[c * m] += force * mean * wave[0];
+        for (int k = 1; k < m; ++k) F[c * m + k] += force * wave[k];
       }
     }
+  }
 }
 
 }  // namespace fretwave::hb

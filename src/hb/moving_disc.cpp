@@ -21,6 +21,11 @@ double PanelGrid::time(int node) const {
   return (panel + radau().nodes[stage]) * length_;
 }
 
+int PanelGrid::first_node(double begin, double length) const {
+  const double panel = begin / length_;
+  return length == length_ && panel == std::round(panel) ? int(panel) % panels_ * Radau::stages : -1;
+}
+
 MovingDisc::Instant MovingDisc::at(double tau) const {
   const auto [x, y, r] = jets(tau);
   return {{x.d[0], y.d[0]}, {x.d[1], y.d[1]}, r.d[0], r.d[1]};

@@ -37,6 +37,12 @@ void SliderDerivative::set_time(double tau) {
   rates(*harmonics_, wave_.data(), rate_.data());
 }
 
+/// The same at a node of the grid, which has them.
+void SliderDerivative::set_node(PanelGrid const& grid, int node) {
+  std::copy_n(&grid.waves()[size_t(node) * m_], m_, wave_.begin());
+  std::copy_n(&grid.rates()[size_t(node) * m_], m_, rate_.begin());
+}
+
 /// dphi at a slip's begin: from stick the arm's part across e; closing, where R phi' = u'.e' has one solution
 /// that is regular, R' phi' = u''.e' - |u'| phi'; behind u, of its direction alone.
 void SliderDerivative::begin_slip(SweptSlider::Slip const& slip, MovingDisc const& disc) {
@@ -64,12 +70,11 @@ void SliderDerivative::begin_slip(SweptSlider::Slip const& slip, MovingDisc cons
 FRETWAVE_VECTORISE void SliderDerivative::slip(SweptSlider::Slip const& slip, MovingDisc const& disc,
                                                bool ends) {
   Radau const& method = radau();
-  const int n = columns();
+  const int n = columns(), first = m_ ? disc.grid->first_node(slip.begin, slip.length) : -1;
   const double h = slip.length, across0[2] = {-slip.e[1], slip.e[0]};
   begin_slip(slip, disc);
   std::array<Radau::Stages, stages> A;
-  Row dp(size_t(stages) * n, 0.0), dR(size_t(stages) * n, 0.0);
-  std::vector<double> waves;
+  dp_.assign(size_t(stages) * n, 0.0), dR_.assign(dp_.size(), 0.0);
   const double none[2] = {0, 0};
   for (int j = 0; j < stages; ++j) {
     MovingDisc::Instant const& at = slip.at[j];
@@ -80,31 +85,38 @@ FRETWAVE_VECTORISE void SliderDerivative::slip(SweptSlider::Slip const& slip, Mo
     for (int i = 0; i < stages; ++i) rate += method.derivative[j][i] * slip.p[i];
     for (int i = 0; i < stages; ++i) A[j][i] = R * method.derivative[j][i];
     A[j][j] += along + across * p;
-    double *row = &dp[size_t(j) * n], *radius = &dR[size_t(j) * n];
+    double *row = &dp_[size_t(j) * n], *radius = &dR_[size_t(j) * n];
     const double half = (1 - p * p) / 2;
     const double by_rate[2] = {h * (half * across0[0] - p * slip.e[0]),
                                h * (half * across0[1] - p * slip.e[1])};
-    set_time(slip.begin + method.nodes[j] * h);
-    waves.insert(waves.end(), wave_.begin(), wave_.end());
+    if (first < 0)
+      set_time(slip.begin + method.nodes[j] * h);
+    else
+      set_node(*disc.grid, first + j);
+    const double weight = h * method.weights[j];
+    for (int k = 0; k < m_; ++k) weights[size_t(nodes + j) * m_ + k] = weight * wave_[k];
     add(radius, wave_, none, reach_), radius[3 * m_] -= reach_;
     add(row, rate_, by_rate, 0);
     const double by_phi = -half * along - p * across;
     for (int c = 0; c < n; ++c) row[c] += by_phi * dphi_[c] - rate * radius[c];
   }
-  if (!solve_stages(A, dp.data(), n)) std::ranges::fill(dp, NAN);
+  if (!solve_stages(A, dp_.data(), n)) std::ranges::fill(dp_, NAN);
   for (int j = 0; j < stages; ++j) {
-    double *row = &dp[size_t(j) * n], *radius = &dR[size_t(j) * n];
+    double *row = &dp_[size_t(j) * n], *radius = &dR_[size_t(j) * n];
     const double p = slip.p[j], turn = 2 / (1 + p * p);
     for (int c = 0; c < n; ++c) row[c] = dphi_[c] + turn * row[c];
     if (!m_) continue;
     const std::array<double, 2> e = slip.direction(j);
-    const double R = std::max(slip.at[j].R, 0.0), weight = h * method.weights[j];
-    for (int k = 0; k < m_; ++k) weights.push_back(weight * waves[size_t(j) * m_ + k]);
-    for (int c = 0; c < n; ++c) arms.push_back(e[0] * radius[c] - R * e[1] * row[c]);
-    for (int c = 0; c < n; ++c) arms.push_back(e[1] * radius[c] + R * e[0] * row[c]);
-    ++nodes;
+    const double R = std::max(slip.at[j].R, 0.0);
+    double* arm = &arms[size_t(nodes + j) * 2 * n];
+#pragma omp simd
+    for (int c = 0; c < n; ++c) {
+      arm[c] = e[0] * radius[c] - R * e[1] * row[c];
+      arm[n + c] = e[1] * radius[c] + R * e[0] * row[c];
+    }
   }
-  std::copy_n(&dp[size_t(stages - 1) * n], n, dphi_.begin());
+  if (m_) nodes += stages;
+  std::copy_n(&dp_[size_t(stages - 1) * n], n, dphi_.begin());
   if (!ends) return;
   // w = u - R e; the panel's last node is its end
   const std::array<double, 2> e = slip.direction(stages - 1);
@@ -116,12 +128,12 @@ FRETWAVE_VECTORISE void SliderDerivative::slip(SweptSlider::Slip const& slip, Mo
 
 void SliderDerivative::go(SweptSlider const& path, MovingDisc const& disc) {
   const int n = columns();
-  sticks.clear(), weights.clear(), arms.clear(), nodes = 0;
+  sticks.clear(), nodes = 0;
   dw_.assign(2 * size_t(n), 0.0), dphi_.assign(n, 0.0);
   dw_[n - 2] = dw_[2 * n - 1] = 1;
   if (m_) {
     const size_t most = path.slips.size() * stages;
-    weights.reserve(most * m_), arms.reserve(most * 2 * n), sticks.reserve(path.sticks.size());
+    weights.resize(most * m_), arms.resize(most * 2 * n), sticks.reserve(path.sticks.size());
   }
   for (size_t k = 0; k < path.pieces.size(); ++k) {
     SweptSlider::Piece const& piece = path.pieces[k];

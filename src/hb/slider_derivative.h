@@ -37,12 +37,13 @@ class SliderDerivative {
  private:
   void begin_slip(SweptSlider::Slip const&, MovingDisc const&);
   void slip(SweptSlider::Slip const&, MovingDisc const&, bool ends);
+  void set_node(PanelGrid const&, int node);
 
   Harmonics const* harmonics_ = nullptr;
   int m_ = 0;
   double reach_ = 0;
-  std::vector<double> wave_, rate_;
-  Row dw_, dphi_;
+  std::vector<double> wave_, rate_;  ///< at the time that was set
+  Row dw_, dphi_, dp_, dR_;          ///< the last two: of a panel's nodes
 };
 
 }  // namespace fretwave::hb

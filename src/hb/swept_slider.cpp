@@ -42,11 +42,9 @@ std::array<double, 2> SweptSlider::direction(MovingDisc const& disc, Slip const&
 double SweptSlider::collocate(MovingDisc const& disc, Slip& slip) {
   constexpr int most = 12;
   Radau const& method = radau();
-  const double begin = slip.begin / disc.grid->length(), first = std::round(begin);
-  if (begin == first && slip.length == disc.grid->length())
-    for (int j = 0; j < stages; ++j) slip.at[j] = disc.node(int(first) * stages + j);
-  else
-    for (int j = 0; j < stages; ++j) slip.at[j] = disc.at(slip.begin + method.nodes[j] * slip.length);
+  const int first = disc.grid->first_node(slip.begin, slip.length);
+  for (int j = 0; j < stages; ++j)
+    slip.at[j] = first < 0 ? disc.at(slip.begin + method.nodes[j] * slip.length) : disc.node(first + j);
   Radau::Stages along, across;
   for (int j = 0; j < stages; ++j) {
     double const* v = slip.at[j].v;
