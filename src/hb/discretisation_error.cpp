@@ -178,6 +178,7 @@ void DiscretisationError::from_halfway(Vec middle, Vec row, std::span<Vec const>
     again_ = std::make_unique<solve::Newton>(*moved_, prefix_);
     again_->solve_beside(tolerance);
   }
+  again_->scale(middle);  // whatever those before were measured in
   std::vector<VecHandle> before, scaled;
   std::vector<Vec> rights;
   for (Vec part : x) before.push_back(solve::copy(part));
@@ -261,9 +262,10 @@ std::optional<bool> DiscretisationError::step(Vec point, Vec row, Vec reduction,
 /// or nowhere.
 void DiscretisationError::finish(Vec point, Vec row, double residual, std::span<Vec const> x, Vec most) {
   if (!again_ || again_->dear()) return;
+  VecHandle whole = sum(x), y = solve::moved(point, 1, whole);
+  again_->scale(y);  // before it is said how far to go
   check(SNESSetTolerances(again_->snes(), solved * to_moved() * residual, PETSC_DEFAULT, PETSC_DEFAULT,
                           PetscInt(most_steps), PETSC_DEFAULT));
-  VecHandle whole = sum(x), y = solve::moved(point, 1, whole);
   again_->system().close(row, solve::dot(row, point));
   const bool found = again_->solve(y, solve::Effort::brief).converged;
   check(VecAXPY(y, -1, point));

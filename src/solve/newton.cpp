@@ -164,17 +164,22 @@ PetscErrorCode Newton::form_jacobian(SNES snes, Vec y, Mat, Mat, void* context) 
   });
 }
 
+bool Newton::scale(Vec y) {
+  if (!bordered_.problem().scale(y)) return false;
+  linear_->renew();
+  return true;
+}
+
 /// The rows are measured in the forces that act at y: those of the guess first, those of the solution once it
 /// is known.
 Outcome Newton::solve(Vec y, Effort effort) {
   Outcome out;
   effort_ = effort;
-  if (bordered_.problem().scale(y)) linear_->renew();
+  scale(y);
   for (int k = 0; k < rescalings; ++k) {
     const Outcome before = std::exchange(out, solve_past_kinks(y));
     out.newton += before.newton, out.linear += before.linear;
-    if (!out.converged || !bordered_.problem().scale(y)) return out;
-    linear_->renew();
+    if (!out.converged || !scale(y)) return out;
   }
   return out;
 }

@@ -34,6 +34,8 @@ class Newton {
   /// An iteration costs more than what is done with a point.
   bool dear() const { return linear_->krylov(); }
   Fallbacks const& fallbacks() const { return linear_->fallbacks(); }
+  /// Measures the rows in the forces that act at y, as `solve` does first; whether they were in others.
+  bool scale(Vec y);
   /// Solves from y, in place; y is the last iterate when it does not converge. Collective.
   Outcome solve(Vec y, Effort = Effort::full);
   /// Tangent at y: J t = 0, row . t = 1 with the closing row. t holds a guess (zero, or the last tangent),
