@@ -15,8 +15,6 @@ const Tuned nearer("branch_nearer", 0.5,
                    "distance of the cubic's guess over the tangent's, for it to be taken");
 const Tuned crawl("branch_crawl", 300, "steps below the smallest in a row, over pieces that thin");
 const Tuned often("branch_often", 0.3, "share of a step: a shorter one has failed twice");
-const Tuned sparse("branch_sparse", 1.0 / 32,
-                   "share of a step: corners farther apart are walked to one by one");
 const Tuned before_end("branch_before_end", 0.999, "share of the way to the end of a piece");
 const Tuned kink_angle("branch_kink_angle", 0.02, "turn [rad] that is a kink in so short a step");
 const Tuned seen_angle("branch_seen_angle", 0.05, "turn [rad] that may hide a corner in a longer step");
@@ -333,9 +331,7 @@ std::optional<Continuation::Trial> Continuation::step(double& length, double& ne
         return trial;
       }
       intended = length / 2;
-      if (wary_) continue;
-      const auto here = problem_.piece(anchor_.y);
-      wary_ = !on_piece(here, length) && on_piece(here, sparse * length);
+      if (!wary_) wary_ = corner_within(length);
     }
   }
   if (failure.last.empty()) failure.last = "corners of the branch lie closer together than the smallest step";

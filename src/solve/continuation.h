@@ -131,7 +131,8 @@ class Continuation {
   bool beyond_corner(Trial const&) const;
   bool leads_back(Trial const&);
   bool on_piece(std::uint64_t here, double at);
-  std::optional<double> facet(double reach);
+  bool corner_within(double reach);
+  std::optional<double> facet(double reach, double precision = 1e-6);
   bool fits(Vec y);
   double within_piece(Vec y, Vec tangent, double reach);
   int into_piece(Vec y, Vec tangent, double reach);

@@ -25,7 +25,7 @@ constexpr PetscInt quick = 300;          // unknowns whose determinant is had in
 constexpr double surely_one = 1 - 1e-6;  // the same cosine, where nothing else can be: facets of two samples
                                          // side by side are alike
 constexpr double one_facet = 0.98;       // least cosine between the two vectors of a single facet
-constexpr double sharpness = 1e-6;       // relative, of the place where a piece ends
+constexpr double about = 1e-3;           // share of a place by which one looks before it and behind
 constexpr double shortest = 1e-13;       // length of a piece that can be told from a point
 constexpr double no_corner = 1e-6;       // 1 - cosine of the angle between the tangents
 constexpr double no_force = 1e-3;        // of a tangent on the other piece, in forces that act
@@ -33,6 +33,10 @@ constexpr int halvings = 60;
 
 const Tuned surely_in("branch_surely_in", 100,
                       "times as far within a piece one way as the other: it begins here");
+const Tuned sparse("branch_sparse", 1.0 / 32,
+                   "share of a step: corners farther apart are walked to one by one");
+const Tuned seen_jump("branch_seen_jump", 3e-3,
+                      "change of a tangent's forces across the end of a piece, in forces that act: a corner");
 const Tuned meets("branch_meets", 0.1, "of the piece behind a corner: by which it may miss the one before");
 
 }  // namespace
@@ -103,14 +107,27 @@ bool Continuation::on_piece(std::uint64_t here, double at) {
 }
 
 /// Just beyond the end of the present piece along the tangent, if it ends within `reach`. Collective.
-std::optional<double> Continuation::facet(double reach) {
+std::optional<double> Continuation::facet(double reach, double precision) {
   const auto here = problem_.piece(anchor_.y);
   if (on_piece(here, reach)) return {};
-  for (double inside = 0; reach - inside > sharpness * reach && reach > shortest;) {
+  for (double inside = 0; reach - inside > precision * reach && reach > shortest;) {
     const double middle = (inside + reach) / 2;
     (on_piece(here, middle) ? inside : reach) = middle;
   }
   return std::max(reach, shortest);
+}
+
+/// Whether the Jacobian jumps where the present piece ends, if that is within `reach` and not at once. (Where
+/// a soft contact first opens it hardly changes: no corner is to be walked to.) Collective.
+bool Continuation::corner_within(double reach) {
+  const auto here = problem_.piece(anchor_.y);
+  if (on_piece(here, reach) || !on_piece(here, sparse * reach)) return false;
+  const double end = *facet(reach, about / 2);
+  VecHandle before = problem_.equations(), behind = problem_.equations();
+  problem_.product(moved(anchor_.y, (1 - about) * end, anchor_.tangent), anchor_.tangent, before);
+  problem_.product(moved(anchor_.y, (1 + about) * end, anchor_.tangent), anchor_.tangent, behind);
+  check(VecAXPY(behind, -1, before));
+  return !(norm(behind) < seen_jump);
 }
 
 /// Whether the anchor's tangent is one at y too: the metric does not see a corner at which only the mean

@@ -8,7 +8,7 @@ import resource
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from models.core_models import TanhLaw, friction, options
+from models.core_models import TanhLaw, block_on_a_pad, friction, options
 from mpi4py import MPI
 from oracle import Coulomb, Jenkins, SeriesMotion, System, forced_orbit, series_motion
 from tolerances import ROUNDING, SOLVED
@@ -331,11 +331,7 @@ def test_a_resonance_far_above_the_retained_harmonics_is_seen(highest):
 @SERIAL
 def test_estimates_do_not_remember_those_before_them():
     """A solution of the finer equations left its measure of forces behind: each estimate was the square of the last."""
-    near = np.array([[2.0, 0.5, 0.2], [0.5, 1.5, 0.3], [0.2, 0.3, 1.2]])
-    own = np.array([[3.0, 0.6, 0.3], [0.6, 2.0, 0.4], [0.3, 0.4, 1.0]])
-    given = {"normal_stiffness": 1e10, "tangential_stiffness": 8e9, "friction_coefficient": 0.5, "normal_load": 1.0}
-    pad = fw.Contact("coulomb_3d", np.eye(6)[3:], given)
-    block = fw.Model(np.eye(6), np.block([[own + near, -near], [-near, near]]), None, [pad], MPI.COMM_SELF)
+    block = block_on_a_pad(1e10)
     start = fw.linear_modes(block, 1)[0]
 
     def problem():

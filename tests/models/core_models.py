@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
+from mpi4py import MPI
 from petsc4py import PETSc
 
 import fretwave as fw
@@ -218,3 +219,13 @@ def states(problem, start: float, stop, report_at, **steps) -> list[dict[str, fl
     found = [problem.state(p.y) for p in branch if p.event == "report"]
     assert branch.converged, branch.reason
     return found
+
+
+def block_on_a_pad(stiffness):
+    """Two masses in three dimensions, the second one pressed onto a pad by 1 N."""
+    near = np.array([[2.0, 0.5, 0.2], [0.5, 1.5, 0.3], [0.2, 0.3, 1.2]])
+    own = np.array([[3.0, 0.6, 0.3], [0.6, 2.0, 0.4], [0.3, 0.4, 1.0]])
+    given = {"normal_stiffness": stiffness, "tangential_stiffness": 0.8 * stiffness}
+    given |= {"friction_coefficient": 0.5, "normal_load": 1.0}
+    pad = fw.Contact("coulomb_3d", np.eye(6)[3:], given)
+    return fw.Model(np.eye(6), np.block([[own + near, -near], [-near, near]]), None, [pad], MPI.COMM_SELF)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from models.core_models import friction, mode_problem, options, oscillator, single_dof, whole
+from models.core_models import block_on_a_pad, friction, mode_problem, options, oscillator, single_dof, whole
 from oracle import Jenkins, SeriesMotion, System, series_motion
 from tolerances import REPEATED, ROUNDING, SOLVED, TIGHT
 
@@ -255,6 +255,25 @@ def test_a_branch_point_beside_a_corner_is_passed(comm, maximum):
     branch, points = zigzag(comm, maximum)
     assert branch.converged and len(points) < 200
     assert len(named(points, "fold")) == 2
+
+
+@pytest.mark.ranks(1)
+def test_what_opens_softly_is_no_corner():
+    """The Jacobian hardly changes where a soft pad first opens: walked to as a corner it took eleven more points."""
+    block = block_on_a_pad(10.0)
+    start = fw.linear_modes(block, 1)[0]
+
+    def steps(**tuned):
+        harmonics, rest = fw.Harmonics(range(14), 128), fw.balanced(block, start)
+        problem = fw.NonlinearMode(block, harmonics, "CNM", 0, start, rest=rest)
+        with options(**tuned):
+            branch, points = follow(problem, 0.01, 20.0)
+        assert branch.converged
+        return len(points), problem.state(points[-1].y)["zeta"]
+
+    points, damping = steps()
+    walked, same = steps(fw_branch_seen_jump=1e-12)
+    assert points < walked and damping == pytest.approx(same, rel=SOLVED)
 
 
 def pad_and_sliders(comm):
