@@ -22,8 +22,10 @@ double PanelGrid::time(int node) const {
 }
 
 int PanelGrid::first_node(double begin, double length) const {
-  const double panel = begin / length_;
-  return length == length_ && panel == std::round(panel) ? int(panel) % panels_ * Radau::stages : -1;
+  constexpr double rounding = 1e-12;
+  const double panel = begin / length_, number = std::round(panel);
+  const bool here = std::abs(length - length_) <= rounding * length_ && std::abs(panel - number) <= rounding;
+  return here && number >= 0 ? int(number) % panels_ * Radau::stages : -1;
 }
 
 MovingDisc::Instant MovingDisc::at(double tau) const {

@@ -13,7 +13,7 @@ class PanelGrid {
   double length() const { return length_; }
   /// Of a node, which may lie in another period.
   double time(int node) const;
-  /// First node of a slider's panel that is one of the grid's, else -1.
+  /// First node of a slider's panel that is one of the grid's but for rounding, else -1.
   int first_node(double begin, double length) const;
   /// nodes x block size: 1, cos n tau, sin n tau, and their rates.
   std::vector<double> const& waves() const { return waves_; }
