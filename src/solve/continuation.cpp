@@ -21,8 +21,6 @@ const Tuned seen_angle("branch_seen_angle", 0.05, "turn [rad] that may hide a co
 const Tuned unturned("branch_unturned", 0.01,
                      "share of a step: the way aside that the tangents need not tell of");
 const Tuned easy("branch_easy", 5, "Newton iterations; after more the corrector may be on another branch");
-const Tuned walk("branch_walk", 8, "steps to a place where the branch seems to have been");
-const Tuned certain("branch_certain", 3, "meetings with earlier points of the branch in a row");
 const Tuned grid("branch_grid", 16, "lengths of steps in every factor of two");
 const Tuned at_the_end("branch_at_the_end", 1e-9,
                        "relative distance at which a branch starts at the end of its range");
@@ -146,6 +144,7 @@ std::optional<Point> Continuation::restore(Anchor anchor, Anchor before, int emi
 std::optional<Point> Continuation::take_over(Anchor from, std::string const& event, bool upwards,
                                              double began) {
   anchor_ = std::move(from);
+  anchor_.sign = 0;  // that of other equations
   upwards_ = upwards, began_ = began, taken_over_ = true;
   open_the_range();
   prepare_row();
@@ -233,9 +232,7 @@ std::string Continuation::complaint(Trial& trial, double length, bool may_shorte
   if (may_shorten && (trial.error = interpolation_error(trial, length)) > steps_.max_error)
     return "the branch bends more than a step resolves";
   if (may_shorten)
-    return ((angle > seen_angle || hard) && leads_back(trial)) || fell_back(trial)
-               ? "the corrector lands on another branch"
-               : "";
+    return leads_back(trial) || fell_back(trial) ? "the corrector lands on another branch" : "";
   if (angle < kink_angle) return "";
   const int sign = beyond_corner(trial) ? 1 : orientation(trial.y, trial.tangent);
   if (sign == 0) return angle > steps_.max_angle ? "the branch turns too sharply" : "";
@@ -318,6 +315,7 @@ std::optional<Continuation::Trial> Continuation::attempt(double& length, bool wa
 /// without a turn. Where that ends, steps of all lengths are tried beyond the corners ahead.
 std::optional<Continuation::Trial> Continuation::step(double& length, double& next_length) {
   Failure failure;
+  double soft = INFINITY;  // an end of the present piece that is no corner
   wary_ = anchor_.wary;
   for (const bool beyond : {false, true}) {
     if (beyond && !wary_) break;
@@ -331,7 +329,7 @@ std::optional<Continuation::Trial> Continuation::step(double& length, double& ne
         return trial;
       }
       intended = length / 2;
-      if (!wary_) wary_ = corner_within(length);
+      if (!wary_ && length < soft) wary_ = corner_within(length, soft);
     }
   }
   if (failure.last.empty()) failure.last = "corners of the branch lie closer together than the smallest step";
@@ -348,56 +346,6 @@ double Continuation::next_step(Trial const& trial, double length, double intende
   const double most = intended < anchor_.step ? 1.0 : wary_ || length < kink_length ? 4.0 : 2.0;
   return std::min(steps_.maximum, on_grid(std::clamp(length * std::min(by_angle, by_error), 0.3 * intended,
                                                      most * intended)));
-}
-
-/// Whether the branch passes places again where it has been; it ends then. Each suspicion is confirmed by
-/// Newton on the plane through such a place, and three in a row are certainty: sheets may lie side by side.
-/// Pieces so short that corners lead from one to the next and back are no sheets: there points, or where they
-/// are, repeat themselves.
-bool Continuation::been_here(Trial const& trial) {
-  const auto meeting = trail_.meeting(trial.y, trial.tangent);
-  trail_.add(trial.y, trial.tangent);
-  circles_ = trail_.circles() ? circles_ + 1 : 0;
-  if (circles_ >= certain) {
-    finish("the branch turns in circles between corners at " + problem_.parameter_text(parameter_of(trial.y)),
-           false);
-    return true;
-  }
-  if (!meeting || !passes(trial, *meeting)) {
-    meetings_ = 0;
-    return false;
-  }
-  if (++meetings_ < certain) return false;
-  const std::string where = problem_.parameter_text(parameter_of(trial.y));
-  finish(meeting->forwards ? "the branch is a closed loop: it comes back to " + where + ", where it has been"
-                           : "the branch turns back onto itself: it passes " + where + " a second time",
-         false);
-  return true;
-}
-
-/// Whether a trial lies on an older piece of the branch, passed the other way: sheets that lie side by side
-/// behind a fold are nearer to each other than a step is long.
-bool Continuation::fell_back(Trial const& trial) {
-  const auto meeting = trail_.meeting(trial.y, trial.tangent);
-  return meeting && !meeting->forwards && passes(trial, *meeting);
-}
-
-/// Walks from the trial to the remembered place along the branch, in steps short enough not to fall onto a
-/// sheet beside it.
-bool Continuation::passes(Trial const& trial, Trail::Meeting const& meeting) {
-  VecHandle row = like(trial.y);
-  Trail::fill(row, meeting.functional);
-  const double length = meeting.along / walk;
-  Trial there = at(copy(trial.y));
-  there.tangent = copy(trial.tangent);
-  for (int k = 1; k <= walk; ++k) {
-    const VecHandle expected = moved(there.y, length, there.tangent);
-    const double value = meeting.place[meeting.functional] - (walk - k) * length * dot(row, trial.tangent);
-    there.y = copy(expected);
-    if (!correct(there, row, value, row_)) return false;
-    if (!(distance(there.y, expected) <= 0.1 * std::abs(length) + 1e-8)) return false;
-  }
-  return Trail::same(there.y, meeting.place);
 }
 
 /// The branch has left its range at this end.
@@ -435,7 +383,8 @@ void Continuation::make_batch(double tried) {
             .step = next_length,
             .index = 0,
             .wary = wary_,
-            .smooth = foretold(end->y, length)};
+            .smooth = foretold(end->y, length),
+            .sign = end->sign};
   const double reached = last_entry(end->y);
   const bool outside =
       reached <= problem_.parameter_entry(low_) || reached >= problem_.parameter_entry(high_);

@@ -41,6 +41,7 @@ class Continuation {
     int index = 0;
     bool wary = false;    ///< corners lie about: pieces are walked one by one
     bool smooth = false;  ///< the cubic through the points before foretold it
+    int sign = 0;         ///< of det [J; tangent], where it was asked
   };
 
   Continuation(Problem&, std::string const& prefix, double low, double high, StepControl,
@@ -83,6 +84,7 @@ class Continuation {
     Outcome outcome;
     std::vector<TestFunction> tests;
     double error = 0;  ///< of the cubic from the anchor to it
+    int sign = 0;      ///< as an anchor's
   };
   /// Why trials were none: the last one; one of a corrector that knows why.
   struct Failure {
@@ -96,9 +98,7 @@ class Continuation {
   static double secant(Place a, Place b) { return (a.at * b.value - b.at * a.value) / (b.value - a.value); }
 
   // The corrector (continuation.cpp)
-  Trial at(VecHandle y) const {
-    return {.y = std::move(y), .tangent = {}, .outcome = {}, .tests = {}, .error = 0};
-  }
+  Trial at(VecHandle y) const { return {.y = std::move(y), .tangent = {}, .outcome = {}, .tests = {}}; }
   /// With its tangent, good for a step along it or `exactly` what its test functions need.
   bool correct(Trial&, Vec row, double value, Vec tangent_row, Effort = Effort::full, bool exactly = false);
   std::vector<TestFunction> tests(Vec y, Vec tangent);
@@ -121,17 +121,22 @@ class Continuation {
   Point point(Trial&&, std::string event, double step);
   void make_batch(double tried = INFINITY);
   void arrive(double reached);
+
+  // Whether it comes back to where it has been (revisit.cpp)
   bool been_here(Trial const&);
   bool fell_back(Trial const&);
+  bool walk(Trial&, Vec row, double to);
   bool passes(Trial const&, Trail::Meeting const&);
 
   // Corners of the branch (corner.cpp)
   int determinant(Vec y, Vec row);
+  double along_facet(Vec y, Vec tangent);
+  int anchor_sign();
   int orientation(Vec y, Vec tangent);
   bool beyond_corner(Trial const&) const;
-  bool leads_back(Trial const&);
+  bool leads_back(Trial&);
   bool on_piece(std::uint64_t here, double at);
-  bool corner_within(double reach);
+  bool corner_within(double reach, double& soft);
   std::optional<double> facet(double reach, double precision = 1e-6);
   bool fits(Vec y);
   double within_piece(Vec y, Vec tangent, double reach);

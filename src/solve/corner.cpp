@@ -21,7 +21,6 @@ namespace fretwave::solve {
 namespace {
 
 constexpr PetscInt small = 1000;         // unknowns whose determinant is had in some 50 ms
-constexpr PetscInt quick = 300;          // unknowns whose determinant is had in a few ms
 constexpr double surely_one = 1 - 1e-6;  // the same cosine, where nothing else can be: facets of two samples
                                          // side by side are alike
 constexpr double one_facet = 0.98;       // least cosine between the two vectors of a single facet
@@ -31,6 +30,8 @@ constexpr double no_corner = 1e-6;       // 1 - cosine of the angle between the 
 constexpr double no_force = 1e-3;        // of a tangent on the other piece, in forces that act
 constexpr int halvings = 60;
 
+const Tuned quick("branch_quick", 300,
+                  "unknowns up to which each step asks a determinant which way it leads");
 const Tuned surely_in("branch_surely_in", 100,
                       "times as far within a piece one way as the other: it begins here");
 const Tuned sparse("branch_sparse", 1.0 / 32,
@@ -63,18 +64,28 @@ int Continuation::determinant(Vec y, Vec row) {
   return sign;
 }
 
+/// Cosine between J_y t_anchor and -J_anchor t_y, c (n . t_anchor) and c (n . t_y) behind a single facet.
+double Continuation::along_facet(Vec y, Vec tangent) {
+  VecHandle entering = problem_.equations(), leaving = problem_.equations();
+  problem_.product(y, anchor_.tangent, entering);
+  problem_.product(anchor_.y, tangent, leaving);
+  return -dot(entering, leaving) / std::sqrt(dot(entering, entering) * dot(leaving, leaving));
+}
+
+/// Of the determinant at the anchor, which is asked once. Collective.
+int Continuation::anchor_sign() {
+  if (!anchor_.sign) anchor_.sign = determinant(anchor_.y, row_);
+  return anchor_.sign;
+}
+
 /// +1: `tangent` at y, behind a corner ahead of the anchor, leads on; -1: it leads back; 0: it cannot be
 /// told. Facets that are passed at once by symmetry have the same c and n . t along it, and off it they may
 /// turn the determinant's sign: it is asked where facets differ. Collective.
 int Continuation::orientation(Vec y, Vec tangent) {
-  VecHandle entering = problem_.equations(), leaving = problem_.equations();
-  problem_.product(y, anchor_.tangent, entering);
-  problem_.product(anchor_.y, tangent, leaving);
-  const double cosine = -dot(entering, leaving) / std::sqrt(dot(entering, entering) * dot(leaving, leaving));
+  const double cosine = along_facet(y, tangent);
   const int by_products = cosine > 0 ? 1 : -1;
   if (std::abs(cosine) >= surely_one) return by_products;
-  if (const int here = determinant(anchor_.y, row_))
-    return here * determinant(y, weighted(weights_, tangent));
+  if (const int here = anchor_sign()) return here * determinant(y, weighted(weights_, tangent));
   return std::abs(cosine) >= one_facet ? by_products : 0;
 }
 
@@ -93,12 +104,16 @@ bool Continuation::beyond_corner(Trial const& trial) const {
   return s > 0 && r >= -meets * s && weighted_norm(weights_, chord) <= meets * s * std::sqrt(turned);
 }
 
-/// Whether a trial's tangent runs against the branch: an older piece of it, or another branch. Asked of small
-/// systems, where a determinant costs less than a Newton step.
-bool Continuation::leads_back(Trial const& trial) {
+/// Whether a trial's tangent runs against the branch: an older piece of it, or another branch, as a sheet
+/// that begins beside it. Asked of small systems, where a determinant costs less than a Newton step.
+bool Continuation::leads_back(Trial& trial) {
   PetscInt size;
   check(VecGetSize(trial.y, &size));
-  return size <= quick && orientation(trial.y, trial.tangent) < 0;
+  if (size > quick) return false;
+  const double cosine = fits(trial.y) ? 0 : along_facet(trial.y, trial.tangent);  // rounding's, on one piece
+  if (std::abs(cosine) >= surely_one) return cosine < 0;
+  trial.sign = determinant(trial.y, weighted(weights_, trial.tangent));
+  return anchor_sign() * trial.sign < 0;
 }
 
 /// Whether the tangent lies on this piece at a distance from the anchor. Collective.
@@ -106,7 +121,8 @@ bool Continuation::on_piece(std::uint64_t here, double at) {
   return problem_.piece(moved(anchor_.y, at, anchor_.tangent)) == here;
 }
 
-/// Just beyond the end of the present piece along the tangent, if it ends within `reach`. Collective.
+/// Just beyond the end of the present piece along the tangent, to this share of it, if it ends within
+/// `reach`. Collective.
 std::optional<double> Continuation::facet(double reach, double precision) {
   const auto here = problem_.piece(anchor_.y);
   if (on_piece(here, reach)) return {};
@@ -117,17 +133,22 @@ std::optional<double> Continuation::facet(double reach, double precision) {
   return std::max(reach, shortest);
 }
 
-/// Whether the Jacobian jumps where the present piece ends, if that is within `reach` and not at once. (Where
-/// a soft contact first opens it hardly changes: no corner is to be walked to.) Collective.
-bool Continuation::corner_within(double reach) {
+/// Whether the Jacobian changes within a thousandth of the way to where the present piece ends, if that is
+/// within `reach` and not at once: where a soft contact first opens it hardly does, and no corner is to be
+/// walked to. `soft` gets the place then. Of several ends one is judged; shorter steps come to the others.
+/// Collective.
+bool Continuation::corner_within(double reach, double& soft) {
   const auto here = problem_.piece(anchor_.y);
   if (on_piece(here, reach) || !on_piece(here, sparse * reach)) return false;
-  const double end = *facet(reach, about / 2);
+  const double end = facet(reach, about / 2).value_or(reach);
+  newton_.scale(anchor_.y);  // the attempt was measured in its own forces
   VecHandle before = problem_.equations(), behind = problem_.equations();
   problem_.product(moved(anchor_.y, (1 - about) * end, anchor_.tangent), anchor_.tangent, before);
   problem_.product(moved(anchor_.y, (1 + about) * end, anchor_.tangent), anchor_.tangent, behind);
   check(VecAXPY(behind, -1, before));
-  return !(norm(behind) < seen_jump);
+  if (!(norm(behind) < seen_jump)) return true;
+  soft = end;
+  return false;
 }
 
 /// Whether the anchor's tangent is one at y too: the metric does not see a corner at which only the mean

@@ -92,7 +92,7 @@ std::optional<Trail::Meeting> Trail::meeting(Vec y, Vec tangent) const {
     int best = 0;
     for (int k = 1; k < count; ++k)
       if (std::abs(now.t[k]) > std::abs(now.t[best])) best = k;
-    return Meeting{a, best, -offset[best] / now.t[best], cosine > 0};
+    return Meeting{a, best, cosine > 0};
   }
   return {};
 }

@@ -17,7 +17,6 @@ class Trail {
   struct Meeting {
     Projection place;
     int functional;  ///< that tells places along the branch apart best
-    double along;    ///< signed length from the new point to it
     bool forwards;   ///< passed in the same direction
   };
 

@@ -8,7 +8,7 @@ import resource
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from models.core_models import TanhLaw, block_on_a_pad, friction, options
+from models.core_models import TanhLaw, block_on_pads, friction, options
 from mpi4py import MPI
 from oracle import Coulomb, Jenkins, SeriesMotion, System, forced_orbit, series_motion
 from tolerances import ROUNDING, SOLVED
@@ -331,7 +331,7 @@ def test_a_resonance_far_above_the_retained_harmonics_is_seen(highest):
 @SERIAL
 def test_estimates_do_not_remember_those_before_them():
     """A solution of the finer equations left its measure of forces behind: each estimate was the square of the last."""
-    block = block_on_a_pad(1e10)
+    block = block_on_pads(1e10)
     start = fw.linear_modes(block, 1)[0]
 
     def problem():

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from types import MappingProxyType
+
 import numpy as np
 import pytest
-from models.core_models import block_on_a_pad, friction, mode_problem, options, oscillator, single_dof, whole
+from models.core_models import block_on_pads, friction, mode_problem, options, oscillator, single_dof, whole
 from oracle import Jenkins, SeriesMotion, System, series_motion
 from tolerances import REPEATED, ROUNDING, SOLVED, TIGHT
 
 import fretwave as fw
 from fretwave import _core
+from fretwave.run.stopped import _advice
 from fretwave.solve.starting import Way, mode_start, starts
 
 LOW, HIGH = 0.02, 3.0
@@ -257,23 +260,34 @@ def test_a_branch_point_beside_a_corner_is_passed(comm, maximum):
     assert len(named(points, "fold")) == 2
 
 
+def along_block(block, highest, high, tuned=MappingProxyType({}), **steps):
+    start = fw.linear_modes(block, 1)[0]
+    rest = fw.balanced(block, start)
+    problem = fw.NonlinearMode(block, fw.Harmonics(range(highest + 1), 128), "CNM", 0, start, rest=rest)
+    with options(**tuned):
+        branch, points = follow(problem, 0.01, high, **steps)
+    return branch, len(points), problem.state(points[-1].y)["zeta"]
+
+
 @pytest.mark.ranks(1)
 def test_what_opens_softly_is_no_corner():
-    """The Jacobian hardly changes where a soft pad first opens: walked to as a corner it took eleven more points."""
-    block = block_on_a_pad(10.0)
-    start = fw.linear_modes(block, 1)[0]
+    """The Jacobian hardly changes where one of eight pads first opens: walked to as corners, 13 more points."""
+    block = block_on_pads(100.0, np.linspace(0.2, 1.0, 8) / 8)
+    branch, points, damping = along_block(block, 7, 2.0)
+    walked, more, same = along_block(block, 7, 2.0, {"fw_branch_seen_jump": 1e-12})
+    assert branch.converged and walked.converged
+    assert points <= more - 5 and damping == pytest.approx(same, rel=SOLVED)
 
-    def steps(**tuned):
-        harmonics, rest = fw.Harmonics(range(14), 128), fw.balanced(block, start)
-        problem = fw.NonlinearMode(block, harmonics, "CNM", 0, start, rest=rest)
-        with options(**tuned):
-            branch, points = follow(problem, 0.01, 20.0)
-        assert branch.converged
-        return len(points), problem.state(points[-1].y)["zeta"]
 
-    points, damping = steps()
-    walked, same = steps(fw_branch_seen_jump=1e-12)
-    assert points < walked and damping == pytest.approx(same, rel=SOLVED)
+@pytest.mark.ranks(1)
+@pytest.mark.parametrize("highest", [13, 21])
+def test_no_step_leads_onto_a_loop_that_lies_beside(highest):
+    """At 0.0195 the branch bends sharply, and a step across leads onto a loop 1e-3 beside it: it ended there."""
+    block = block_on_pads(5.0)
+    short, most, exactly = along_block(block, highest, 5.0, maximum=0.03)
+    branch, points, damping = along_block(block, highest, 5.0)
+    assert short.converged and branch.converged and points < most / 2
+    assert damping == pytest.approx(exactly, rel=SOLVED)
 
 
 def pad_and_sliders(comm):
@@ -309,12 +323,13 @@ def test_a_branch_point_where_nothing_changes_its_state_is_passed(comm, maximum)
 @pytest.mark.ranks(1)
 def test_a_branch_that_goes_round_in_circles_ends(comm):
     """Without what shows which way it goes on, with the same points again and with others in each round."""
-    reasons = []
-    with options(fw_branch_meets=1e-300, fw_branch_surely_in=1e300):
-        for branch, points in [round_trip(comm, 20.0), *(zigzag(comm, maximum) for maximum in (0.0657, 0.0957))]:
-            assert len(points) < 500
-            reasons.append(branch.reason)
-    assert all(reason.startswith(CIRCLING) for reason in reasons)
+    with options(fw_branch_meets=1e-300, fw_branch_surely_in=1e300, fw_branch_certain=1e9):
+        branches = [zigzag(comm, maximum) for maximum in (0.0657, 0.0957)]
+        with options(fw_branch_quick=1):
+            branches.append(round_trip(comm, 20.0))
+    for branch, points in branches:
+        assert branch.reason.startswith(CIRCLING) and len(points) < 500
+        assert "shorter steps" in _advice("mode", branch.reason)
 
 
 def ways(comm):
