@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "lapack.h"
 #include "tuned.h"
@@ -37,7 +38,8 @@ std::vector<double> ContactGmres::solve(std::vector<double> b) {
   auto given = taken_from(left);  // C^T b
   double size = norm(left);
   std::vector<double> start;
-  for (const double v : left) start.push_back(v / size);
+  if (size > enough)
+    for (const double v : left) start.push_back(v / size);
   for (int k = 0; k < most_ && size > enough; ++k) {
     if (!extend(k == 0 ? std::span<double const>(start) : std::span(C_).last(local_), left, given)) break;
     if (k == 0) starts_.insert(starts_.end(), start.begin(), start.end());
@@ -57,10 +59,14 @@ bool ContactGmres::extend(std::span<double const> z, std::vector<double>& left, 
   auto column = taken_from(image);
   double known = 0;
   for (double part : column) known += part * part;
-  const double size = norm(image);
+  const double with_itself = std::inner_product(image.begin(), image.end(), image.begin(), 0.0),
+               with_left = std::inner_product(image.begin(), image.end(), left.begin(), 0.0);
+  double sums[] = {with_itself, with_left};
+  sum_over_ranks(sums, comm_);
+  const double size = std::sqrt(sums[0]);
   if (!(size > new_part * std::sqrt(known))) return false;
   for (double& v : image) v /= size;
-  column.push_back(size), given.push_back(transposed_product(1, image, left)[0]);
+  column.push_back(size), given.push_back(sums[1] / size);
   add_product(local_, 1, -1, image, {given.back()}, left.data());
   C_.insert(C_.end(), image.begin(), image.end());
   R_.push_back(std::move(column));
