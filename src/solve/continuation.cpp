@@ -17,7 +17,8 @@ const Tuned crawl("branch_crawl", 300, "steps below the smallest in a row, over 
 const Tuned often("branch_often", 0.3, "share of a step: a shorter one has failed twice");
 const Tuned before_end("branch_before_end", 0.999, "share of the way to the end of a piece");
 const Tuned kink_angle("branch_kink_angle", 0.02, "turn [rad] that is a kink in so short a step");
-const Tuned seen_angle("branch_seen_angle", 0.05, "turn [rad] that may hide a corner in a longer step");
+const Tuned seen_angle("branch_seen_angle", 0.05,
+                       "turn [rad] at a corner, below which pieces are no longer walked one by one");
 const Tuned unturned("branch_unturned", 0.01,
                      "share of a step: the way aside that the tangents need not tell of");
 const Tuned easy("branch_easy", 5, "Newton iterations; after more the corrector may be on another branch");

@@ -130,8 +130,8 @@ class Continuation {
 
   // Corners of the branch (corner.cpp)
   int determinant(Vec y, Vec row);
-  double along_facet(Vec y, Vec tangent);
   int anchor_sign();
+  double along_facet(Vec y, Vec tangent, double least = 0);
   int orientation(Vec y, Vec tangent);
   bool beyond_corner(Trial const&) const;
   bool leads_back(Trial&);

@@ -31,7 +31,7 @@ constexpr double no_force = 1e-3;        // of a tangent on the other piece, in 
 constexpr int halvings = 60;
 
 const Tuned quick("branch_quick", 300,
-                  "unknowns up to which each step asks a determinant which way it leads");
+                  "unknowns, at most 1000, up to which each step asks a determinant which way it leads");
 const Tuned surely_in("branch_surely_in", 100,
                       "times as far within a piece one way as the other: it begins here");
 const Tuned sparse("branch_sparse", 1.0 / 32,
@@ -42,16 +42,10 @@ const Tuned meets("branch_meets", 0.1, "of the piece behind a corner: by which i
 
 }  // namespace
 
-/// Sign of det [J(y); row], 0 if it is singular or too large to tell. Collective.
-int Continuation::determinant(Vec y, Vec row) {
-  PetscInt size;
-  check(VecGetSize(y, &size));
-  if (size > small) return 0;
-  newton_.system().close(row, 0);
-  MatHandle J = newton_.system().matrix();
-  newton_.system().assemble(y, J);
-  std::vector<double> dense = whole(J);
-  const int n = int(size);
+namespace {
+
+/// Of the determinant of n columns, 0 if they are singular.
+int sign_of(std::vector<double> dense, int n) {
   std::vector<int> pivots(n);
   int info, sign = 1;
   dgetrf_(&n, &n, dense.data(), &n, pivots.data(), &info);
@@ -64,18 +58,35 @@ int Continuation::determinant(Vec y, Vec row) {
   return sign;
 }
 
-/// Cosine between J_y t_anchor and -J_anchor t_y, c (n . t_anchor) and c (n . t_y) behind a single facet.
-double Continuation::along_facet(Vec y, Vec tangent) {
-  VecHandle entering = problem_.equations(), leaving = problem_.equations();
-  problem_.product(y, anchor_.tangent, entering);
-  problem_.product(anchor_.y, tangent, leaving);
-  return -dot(entering, leaving) / std::sqrt(dot(entering, entering) * dot(leaving, leaving));
+}  // namespace
+
+/// Sign of det [J(y); row], 0 if it is singular or too large to tell. Collective.
+int Continuation::determinant(Vec y, Vec row) {
+  PetscInt size;
+  check(VecGetSize(y, &size));
+  if (size > small) return 0;
+  newton_.system().close(row, 0);
+  MatHandle J = newton_.system().matrix();
+  newton_.system().assemble(y, J);
+  int sign = sign_of(whole(J), int(size));
+  MPI_Bcast(&sign, 1, MPI_INT, 0, problem_.comm());  // nearly singular it may be another one on another rank
+  return sign;
 }
 
 /// Of the determinant at the anchor, which is asked once. Collective.
 int Continuation::anchor_sign() {
   if (!anchor_.sign) anchor_.sign = determinant(anchor_.y, row_);
   return anchor_.sign;
+}
+
+/// Cosine between J_y t_anchor and -J_anchor t_y, c (n . t_anchor) and c (n . t_y) behind a single facet; 0
+/// where the first is less than `least`. Collective.
+double Continuation::along_facet(Vec y, Vec tangent, double least) {
+  VecHandle entering = problem_.equations(), leaving = problem_.equations();
+  problem_.product(y, anchor_.tangent, entering);
+  if (dot(entering, entering) < least * least) return 0;
+  problem_.product(anchor_.y, tangent, leaving);
+  return -dot(entering, leaving) / std::sqrt(dot(entering, entering) * dot(leaving, leaving));
 }
 
 /// +1: `tangent` at y, behind a corner ahead of the anchor, leads on; -1: it leads back; 0: it cannot be
@@ -105,15 +116,16 @@ bool Continuation::beyond_corner(Trial const& trial) const {
 }
 
 /// Whether a trial's tangent runs against the branch: an older piece of it, or another branch, as a sheet
-/// that begins beside it. Asked of small systems, where a determinant costs less than a Newton step.
+/// that begins beside it. Asked of small systems, where a determinant costs less than a Newton step. A branch
+/// point looks the same: it is passed in a step of `kink_length`, of which this is not asked.
 bool Continuation::leads_back(Trial& trial) {
   PetscInt size;
   check(VecGetSize(trial.y, &size));
   if (size > quick) return false;
-  const double cosine = fits(trial.y) ? 0 : along_facet(trial.y, trial.tangent);  // rounding's, on one piece
+  const double cosine = along_facet(trial.y, trial.tangent, no_force);
   if (std::abs(cosine) >= surely_one) return cosine < 0;
   trial.sign = determinant(trial.y, weighted(weights_, trial.tangent));
-  return anchor_sign() * trial.sign < 0;
+  return trial.sign ? anchor_sign() * trial.sign < 0 : cosine <= -one_facet;
 }
 
 /// Whether the tangent lies on this piece at a distance from the anchor. Collective.
@@ -140,7 +152,7 @@ std::optional<double> Continuation::facet(double reach, double precision) {
 bool Continuation::corner_within(double reach, double& soft) {
   const auto here = problem_.piece(anchor_.y);
   if (on_piece(here, reach) || !on_piece(here, sparse * reach)) return false;
-  const double end = facet(reach, about / 2).value_or(reach);
+  const double end = *facet(reach, about / 2);
   newton_.scale(anchor_.y);  // the attempt was measured in its own forces
   VecHandle before = problem_.equations(), behind = problem_.equations();
   problem_.product(moved(anchor_.y, (1 - about) * end, anchor_.tangent), anchor_.tangent, before);

@@ -1,4 +1,5 @@
 /// Whether a branch comes back to where it has been.
+#include <algorithm>
 #include <cmath>
 
 #include "solve/continuation.h"
@@ -12,6 +13,7 @@ const Tuned walked("branch_walk", 8, "steps to a place where the branch seems to
 const Tuned certain("branch_certain", 3, "meetings with earlier points of the branch in a row");
 constexpr int circles = 3;         // points in a row that repeat others, or where they are
 constexpr double aside = 0.1;      // of a step: as far as it may lead from its tangent
+constexpr double longer = 2;       // than those before: a plane that the branch comes along, not across
 constexpr double rounding = 1e-8;  // arclength: by which any step may
 
 }  // namespace
@@ -51,9 +53,12 @@ bool Continuation::fell_back(Trial const& trial) {
 /// Walks along the branch to where the row has a value, from plane to plane, in steps short enough not to
 /// fall onto a sheet beside it. False where it is lost: none is to lead far aside of its tangent.
 bool Continuation::walk(Trial& there, Vec row, double to) {
+  double longest = INFINITY;
   for (int left = walked; left > 0; --left) {
     const double from = dot(row, there.y), next = left > 1 ? from + (to - from) / left : to,
                  step = (next - from) / dot(row, there.tangent);
+    if (!(std::abs(step) <= longest)) return false;
+    longest = std::min(longest, longer * std::abs(step));
     const VecHandle expected = moved(there.y, step, there.tangent);
     there.y = copy(expected);
     if (!correct(there, row, next, row_)) return false;

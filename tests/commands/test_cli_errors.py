@@ -13,6 +13,7 @@ import pytest
 
 from fretwave._core import tuned_constants
 from fretwave.commands.main import main
+from fretwave.run.stopped import _advice
 
 pytestmark = pytest.mark.ranks(1)
 
@@ -223,6 +224,12 @@ def test_not_converged_keeps_what_was_found(tmp_path: Path, capfd) -> None:
     assert "  try: " in text
     assert len((folder / "mode.csv").read_text().splitlines()) == 5
     assert json.loads((folder / "run.json").read_text())["analyses"]["mode"]["status"] == "stopped"
+
+
+def test_what_is_advised_after_a_loop_can_be_set(capfd) -> None:
+    settings = re.findall(r"--set \S+=[\d.]+", _advice("mode", "the branch is a closed loop: it comes back to 2"))
+    assert main(["check", str(CASE), "--no-solve", *" ".join(settings).split()]) == 0
+    assert len(settings) == 2
 
 
 @pytest.mark.parametrize(

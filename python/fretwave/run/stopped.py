@@ -33,12 +33,13 @@ def _advice(name: str, reason: str) -> str:
         return (
             f"another start, or shorter steps; --petsc '-ksp_monitor -{name.replace('-', '_')}_snes_monitor' shows why"
         )
-    if "at the start" in reason:
+    if "at the start" in reason or "far from the linear mode" in reason:
         return (
             "another start (amplitude or frequency) where the motion is nearly linear; --petsc -snes_monitor shows why"
         )
     if any(ending in reason for ending in ("a closed loop", "back onto itself", "turns in circles")):
-        return f"shorter steps (--set {name}.step.maximum=0.03): one has led onto another curve"
+        shorter = f"--set {name}.step.initial=0.01 --set {name}.step.maximum=0.03"
+        return f"shorter steps ({shorter}): one may have led onto another curve"
     if "comes back to amplitude" in reason:
         return f"--set {name}.normalise=... to a dof that goes on growing with the motion, or shorter steps"
     return f"shorter steps (--set {name}.step.minimum=1e-11); --petsc -snes_monitor shows Newton's steps"
