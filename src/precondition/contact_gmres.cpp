@@ -59,9 +59,8 @@ bool ContactGmres::extend(std::span<double const> z, std::vector<double>& left, 
   auto column = taken_from(image);
   double known = 0;
   for (double part : column) known += part * part;
-  const double with_itself = std::inner_product(image.begin(), image.end(), image.begin(), 0.0),
-               with_left = std::inner_product(image.begin(), image.end(), left.begin(), 0.0);
-  double sums[] = {with_itself, with_left};
+  double sums[] = {std::inner_product(image.begin(), image.end(), image.begin(), 0.0),
+                   std::inner_product(image.begin(), image.end(), left.begin(), 0.0)};
   sum_over_ranks(sums, comm_);
   const double size = std::sqrt(sums[0]);
   if (!(size > new_part * std::sqrt(known))) return false;

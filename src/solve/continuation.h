@@ -137,7 +137,8 @@ class Continuation {
   bool leads_back(Trial&);
   bool on_piece(std::uint64_t here, double at);
   bool corner_within(double reach, double& soft);
-  std::optional<double> facet(double reach, double precision = 1e-6);
+  double piece_end(std::uint64_t here, double reach, double share);
+  std::optional<double> facet(double reach);
   bool fits(Vec y);
   double within_piece(Vec y, Vec tangent, double reach);
   int into_piece(Vec y, Vec tangent, double reach);

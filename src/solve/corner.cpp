@@ -133,16 +133,22 @@ bool Continuation::on_piece(std::uint64_t here, double at) {
   return problem_.piece(moved(anchor_.y, at, anchor_.tangent)) == here;
 }
 
-/// Just beyond the end of the present piece along the tangent, to this share of it, if it ends within
-/// `reach`. Collective.
-std::optional<double> Continuation::facet(double reach, double precision) {
-  const auto here = problem_.piece(anchor_.y);
-  if (on_piece(here, reach)) return {};
-  for (double inside = 0; reach - inside > precision * reach && reach > shortest;) {
+/// Just beyond the end of this piece along the tangent, to a share of it, where `reach` is beyond.
+/// Collective.
+double Continuation::piece_end(std::uint64_t here, double reach, double share) {
+  for (double inside = 0; reach - inside > share * reach && reach > shortest;) {
     const double middle = (inside + reach) / 2;
     (on_piece(here, middle) ? inside : reach) = middle;
   }
   return std::max(reach, shortest);
+}
+
+/// Just beyond the end of the present piece along the tangent, if it ends within `reach`. Collective.
+std::optional<double> Continuation::facet(double reach) {
+  constexpr double precise = 1e-6;
+  const auto here = problem_.piece(anchor_.y);
+  if (on_piece(here, reach)) return {};
+  return piece_end(here, reach, precise);
 }
 
 /// Whether the Jacobian changes within a thousandth of the way to where the present piece ends, if that is
@@ -152,7 +158,7 @@ std::optional<double> Continuation::facet(double reach, double precision) {
 bool Continuation::corner_within(double reach, double& soft) {
   const auto here = problem_.piece(anchor_.y);
   if (on_piece(here, reach) || !on_piece(here, sparse * reach)) return false;
-  const double end = *facet(reach, about / 2);
+  const double end = piece_end(here, reach, about / 2);
   newton_.scale(anchor_.y);  // the attempt was measured in its own forces
   VecHandle before = problem_.equations(), behind = problem_.equations();
   problem_.product(moved(anchor_.y, (1 - about) * end, anchor_.tangent), anchor_.tangent, before);
