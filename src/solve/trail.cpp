@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "scramble.h"
+#include "tuned.h"
 
 namespace fretwave::solve {
 
@@ -13,10 +14,11 @@ constexpr size_t recent = 3;         // steps just made are near by nature
 constexpr double parallel = 0.98;    // cosine between directions of the same piece of a branch
 constexpr double nearness = 0.1;     // of a step's length: the chord's distance from a bent branch
 constexpr size_t round_trip = 16;    // steps at most of one round
-constexpr double again = 1e-3;       // of a step's length: the same point of it
 constexpr size_t rounds = 128;       // steps that lead nowhere ...
 constexpr double wound = 32;         // ... whose length is this many times how far they have been from here
 constexpr double same_place = 1e-9;  // relative
+
+const Tuned again("branch_again", 1e-3, "of the shortest step of a round: the same point of it");
 
 /// Uniform in (-1, 1) by the entry's global number and the functional's.
 double weight(PetscInt entry, int functional) {
