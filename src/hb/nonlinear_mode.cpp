@@ -140,6 +140,12 @@ double NonlinearMode::effect(Vec y, Vec dy) {
   return std::max(std::abs(dz[1]) / omega, 0.01 * std::abs(dz[0]) / beta);
 }
 
+bool NonlinearMode::damped(Vec y) {
+  constexpr double rounding = 1e-7;  // what a last step may leave in beta
+  const auto z = scalars(y);
+  return std::abs(z[0]) > rounding * std::abs(z[1]);
+}
+
 double NonlinearMode::parameter_value(double entry) const { return std::exp(entry); }
 double NonlinearMode::parameter_entry(double value) const { return std::log(value); }
 

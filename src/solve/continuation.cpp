@@ -19,6 +19,10 @@ const Tuned before_end("branch_before_end", 0.999, "share of the way to the end 
 const Tuned kink_angle("branch_kink_angle", 0.02, "turn [rad] that is a kink in so short a step");
 const Tuned seen_angle("branch_seen_angle", 0.05,
                        "turn [rad] at a corner, below which pieces are no longer walked one by one");
+const Tuned other_than(
+    "branch_other", 1.5,
+    "slope that a fourth derivative does not tell of, in largest errors of a step over its "
+    "length: a step is looked into");
 const Tuned unturned("branch_unturned", 0.01,
                      "share of a step: the way aside that the tangents need not tell of");
 const Tuned easy("branch_easy", 5, "Newton iterations; after more the corrector may be on another branch");
@@ -200,7 +204,11 @@ double Continuation::turn_of(Trial const& trial) const {
 
 /// Distance of the anchor from the cubic through its neighbours, y'''' (H L)^2 / 24 for steps H and L, scaled
 /// to the error y'''' L^4 / 384 of the cubic over the new step. Where the last step is too short to tell, it
-/// is measured in the middle, unless so small a turn leaves no room for an error that counts.
+/// is measured in the middle, unless so small a turn leaves no room for an error that counts; likewise where
+/// the cubic's slope at the anchor is not off as that derivative has it, by 2 (L - H) / (H L) times as much
+/// across the branch (along it chords in place of arcs count), but by more than an error that counts would
+/// make it: the trial may lie on another sheet, with its tangent along this one. (Motions without damping
+/// have such sheets at every internal resonance: steps that pass over these reach the end of the branch.)
 double Continuation::interpolation_error(Trial const& trial, double length) {
   const double last = before_.y ? distance(anchor_.y, before_.y) : 0, now = distance(trial.y, anchor_.y);
   if (!(last > length / 8)) {
@@ -208,8 +216,15 @@ double Continuation::interpolation_error(Trial const& trial, double length) {
     return most > steps_.max_error / 2 ? error_in_the_middle(trial, length) : most;
   }
   const Hermite across(before_.y, before_.tangent, trial.y, trial.tangent, last + now);
-  const double ratio = now / last;
-  return distance(across.value(last), anchor_.y) * std::min(ratio * ratio, 4.0) / 16;
+  const VecHandle off = moved(across.value(last), -1, anchor_.y);
+  const double ratio = now / last, size = weighted_norm(weights_, off),
+               error = size * std::min(ratio * ratio, 4.0) / 16;
+  if (size <= steps_.max_error || error > steps_.max_error || !problem_.damped(trial.y)) return error;
+  const VecHandle slope = moved(across.derivative(last), -2 * (now - last) / (now * last), off);
+  check(VecAXPY(slope, -dot(row_, slope), anchor_.tangent));
+  const bool strange =
+      weighted_norm(weights_, slope) * now * last / (now + last) > other_than * steps_.max_error;
+  return strange ? std::max(error, error_in_the_middle(trial, length)) : error;
 }
 
 double Continuation::error_in_the_middle(Trial const& end, double length) {

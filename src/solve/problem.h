@@ -78,6 +78,10 @@ class Problem {
   /// Why the branch leads nowhere from here (it grows without bound); nothing while it does. Collective.
   virtual std::string beyond(Vec /*y*/) { return {}; }
 
+  /// Whether the motion at y gains or loses energy. One that does not goes over into another mode where an
+  /// internal resonance leads it there, and never comes back. Collective.
+  virtual bool damped(Vec /*y*/) { return true; }
+
   bool last_rank() const { return comm_rank(comm()) == comm_size(comm()) - 1; }
   VecHandle equations() const { return make_vector(comm(), local_equations()); }
   VecHandle unknowns() const { return make_vector(comm(), local_equations() + (last_rank() ? 1 : 0)); }

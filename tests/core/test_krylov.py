@@ -220,11 +220,13 @@ def test_an_option_says_how_far_steps_are_solved(case, digits):
 def test_a_contact_far_stiffer_than_the_structure(comm, route):
     """30 times the contact stiffness, all pairs on one rigid root, slip to 60 %: averaged tangents stagnate.
 
-    Pairs are coupled to 1e-3: to 3e-2 the basis of stuck pairs took 13 iterations in the mean, up to 33.
+    Pairs are coupled to 1e-3: to 3e-2 the basis of stuck pairs took 13 iterations in the mean, up to 33. By steps that
+    pass over loops, in which one point takes 16 to 22 by the number of ranks.
     """
     stiff = {key: 30 * ROOT[key] for key in ("normal_stiffness", "tangential_stiffness")}
     model = blade(comm, **stiff)
-    points = branch(mode(model, *preloaded(model), route, highest=7), (1.5e-3, 2.6e-3), ())
+    with options(fw_branch_other=1e300):
+        points = branch(mode(model, *preloaded(model), route, highest=7), (1.5e-3, 2.6e-3), ())
     partial = [p["linear"] / p["newton"] for p in points if p["newton"] and p["slip"] > 0.1]
     # 31 at one point with dense blocks of pairs that do not know of each other; one point alone is up to rounding
     assert partial and np.mean(partial) <= 9 and max(partial) <= 20, (np.mean(partial), max(partial))

@@ -6,6 +6,7 @@ import re
 
 import numpy as np
 import pytest
+from models.core_models import options
 from test_krylov import ROOT, TIP, beam, root_map
 
 import fretwave as fw
@@ -57,12 +58,16 @@ def test_a_reference_without_frequency_is_refused_in_words(comm):
 
 @pytest.mark.ranks(1)
 def test_a_branch_whose_mean_nothing_holds_says_so(comm):
-    """Once every pair slips in a period the blade may drift; Newton's step is then all mean."""
+    """Once every pair slips in a period the blade may drift; Newton's step is then all mean.
+
+    Not by steps that look into a loop at 1.8354e-3: the branch ends within that, for another reason.
+    """
     model = free_blade(comm)
     first = fw.linear_modes(model, 1, "stuck")[0]
     rest = static_preload(model, LOAD, first)
     problem = fw.NonlinearMode(model, fw.Harmonics(range(4), 64), "CNM", TIP, first, "drift_")
     problem.preload(rest.displacement, rest.load)
     branch = fw.Continuation(problem, problem.initial(1e-4), (1e-4, 3e-3), fw.StepControl(max_points=120))
-    assert [point.index for point in branch]
+    with options(fw_branch_other=1e300):
+        assert [point.index for point in branch]
     assert not branch.converged and "mean position is free" in branch.reason

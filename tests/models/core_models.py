@@ -221,12 +221,12 @@ def states(problem, start: float, stop, report_at, **steps) -> list[dict[str, fl
     return found
 
 
-def block_on_pads(stiffness, loads=(1.0,)):
+def block_on_pads(stiffness, loads=(1.0,), friction=0.5):
     """Two masses in three dimensions, the second one pressed onto pads that share this stiffness."""
     near = np.array([[2.0, 0.5, 0.2], [0.5, 1.5, 0.3], [0.2, 0.3, 1.2]])
     own = np.array([[3.0, 0.6, 0.3], [0.6, 2.0, 0.4], [0.3, 0.4, 1.0]])
     each = stiffness / len(loads)
     given = {"normal_stiffness": each, "tangential_stiffness": 0.8 * each}
-    given |= {"friction_coefficient": 0.5, "normal_load": np.array(loads)}
+    given |= {"friction_coefficient": friction, "normal_load": np.array(loads)}
     pads = fw.Contact("coulomb_3d", np.vstack([np.eye(6)[3:]] * len(loads)), given)
     return fw.Model(np.eye(6), np.block([[own + near, -near], [-near, near]]), None, [pads], MPI.COMM_SELF)

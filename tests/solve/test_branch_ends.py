@@ -260,10 +260,14 @@ def test_a_branch_point_beside_a_corner_is_passed(comm, maximum):
     assert len(named(points, "fold")) == 2
 
 
-def along_block(block, highest, high, tuned=MappingProxyType({}), **steps):
+def on_block(block, highest):
     start = fw.linear_modes(block, 1)[0]
     rest = fw.balanced(block, start)
-    problem = fw.NonlinearMode(block, fw.Harmonics(range(highest + 1), 128), "CNM", 0, start, rest=rest)
+    return fw.NonlinearMode(block, fw.Harmonics(range(highest + 1), 128), "CNM", 0, start, rest=rest)
+
+
+def along_block(block, highest, high, tuned=MappingProxyType({}), **steps):
+    problem = on_block(block, highest)
     with options(**tuned):
         branch, points = follow(problem, 0.01, high, **steps)
     return branch, len(points), problem.state(points[-1].y)["zeta"]
@@ -288,6 +292,20 @@ def test_no_step_leads_onto_a_loop_that_lies_beside(highest):
     branch, points, damping = along_block(block, highest, 5.0)
     assert short.converged and branch.converged and points < most / 2
     assert damping == pytest.approx(exactly, rel=SOLVED)
+
+
+@pytest.mark.ranks(1)
+@pytest.mark.parametrize(("stiffness", "friction", "folds"), [(4.0, 0.1, 2), (8.0, 0.3, 12)])
+def test_no_step_passes_over_a_loop(stiffness, friction, folds):
+    """Motions and folds are those of short steps. Steps as they come passed over two folds, at 1.3 and at 0.03."""
+    seen = []
+    for steps in ({}, {"maximum": 0.05}):
+        problem = on_block(block_on_pads(stiffness, friction=friction), 5)
+        branch, points = follow(problem, 0.01, 2.0, report_at=[0.02, 1.0], **steps)
+        assert branch.converged
+        seen.append([problem.state(p.y)["zeta"] for p in points if p.event == "report"])
+        assert len(named(points, "fold")) == folds
+    assert len(seen[0]) > 2 and seen[0] == pytest.approx(seen[1], rel=SOLVED)
 
 
 def pad_and_sliders(comm):
