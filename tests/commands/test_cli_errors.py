@@ -232,6 +232,12 @@ def test_what_is_advised_after_a_loop_can_be_set(capfd) -> None:
     assert len(settings) == 2
 
 
+@pytest.mark.parametrize("reason", ["step too small: DIVERGED_MAX_IT", "the branch comes back to amplitude 2, where"])
+def test_steps_that_pass_over_loops_can_be_asked_for(reason) -> None:
+    option = re.search(r"--petsc '-(fw_\w+) 1e300'", _advice("mode", reason))
+    assert option and option[1] in {name for name, _, _ in tuned_constants()}
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
@@ -311,3 +317,11 @@ def test_only_given_again_adds_to_what_was_given(tmp_path: Path) -> None:
     again = ["--only", "mode", "--only", "free_decay"]
     assert main(["run", str(CASE), "--quick", "--no-plots", *again, "--out", str(tmp_path / "out")]) == 0
     assert {path.name for path in (tmp_path / "out").glob("*.csv")} >= {"mode.csv", "free_decay.csv"}
+
+
+def test_options_of_the_time_integration_are_read_after_the_points(tmp_path: Path, capsys) -> None:
+    """They were refused, as nothing had read them when the first point was found."""
+    given = ["--only", "forced", "--no-plots", "--set", "forced.levels=[2.0]", "--set", "forced.time_points=1"]
+    wrong = ["--set", "forced.petsc=-time_ts_rtol 1e-6 -time_ts_rtoll 3"]
+    assert main(["run", str(CASE), "--out", str(tmp_path / "run"), *given, *wrong]) == 0
+    assert "forced: PETSc options that no solver has read: -time_ts_rtoll\n" in capsys.readouterr().out

@@ -157,21 +157,17 @@ class AnalysisOptions:
             fix="correct the value, or remove the option",
         )
 
-    def check_used(self, unused: Callable[[], Sequence[str]], where: str) -> None:
+    def check_used(self, unused: Callable[[], Sequence[str]], where: str, later: str = "") -> None:
         """Refuse options that nothing has read until the first point was solved.
+
+        Those that begin with `later`, if that is given, are of a solver that comes in after all points.
 
         Raises
         ------
         InputError
             An option is misspelt, or belongs to a solver that is not in use.
         """
-        from .. import _core
-
-        if not self.pairs:
-            return
-        names = {re.split(r"[ =]", text.lstrip("-"))[0] for text in unused()}
-        tuned = {option for option, _, _ in _core.tuned_constants()}  # read where they come in, or never
-        wrong = [name for name in self.pairs if name in names and name not in WHOLE and name not in tuned]
+        wrong = [name for name in self._unread(unused) if not (later and name.startswith(self.prefix + later))]
         if not wrong:
             return
         plain = wrong[0].removeprefix(self.prefix)
@@ -182,6 +178,25 @@ class AnalysisOptions:
             expected="options of the solvers in use (a prefix is added by fretwave)",
             fix="remove it: this solver is not in use here (`-snes_view` shows those that are)"
             if plain in COMMON
-            else nearest(plain, (*COMMON, *tuned), "did you mean `-{}`?".format)
+            else nearest(plain, (*COMMON, *_tuned()), "did you mean `-{}`?".format)
             or "remove it; `-snes_view` shows the solvers in use",
         )
+
+    def unread(self, unused: Callable[[], Sequence[str]]) -> str:
+        """Says at the end which options no solver has read; empty where all were."""
+        names = [f"-{name.removeprefix(self.prefix)}" for name in self._unread(unused)]
+        return f"PETSc options that no solver has read: {', '.join(names)}" if names else ""
+
+    def _unread(self, unused: Callable[[], Sequence[str]]) -> list[str]:
+        """Names of options that nothing has read; tuned constants are read where they come in, or never."""
+        if not self.pairs:
+            return []
+        names, tuned = {re.split(r"[ =]", text.lstrip("-"))[0] for text in unused()}, _tuned()
+        return [name for name in self.pairs if name in names and name not in WHOLE and name not in tuned]
+
+
+def _tuned() -> set[str]:
+    """Names of the core's tuned constants."""
+    from .. import _core
+
+    return {option for option, _, _ in _core.tuned_constants()}

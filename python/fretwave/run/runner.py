@@ -247,8 +247,10 @@ class Runner:
         prefix = analysis.name.replace("-", "_") + "_"
         options = AnalysisOptions(prefix, [self.options.petsc, analysis.petsc])
 
+        later = "time_" if analysis.integrates() == "time_points" else ""  # the prefix in analyses/parts/forced_time.py
+
         def before_first() -> None:
-            options.check_used(_core.unused_options, f"analysis '{analysis.name}'")
+            options.check_used(_core.unused_options, f"analysis '{analysis.name}'", later)
             self._start()
 
         case = on_wheel(self.case, analysis)
@@ -273,8 +275,11 @@ class Runner:
             except NotConverged as error:  # before its first point: there was no static state to start from
                 reason = f"{error.what}: {error.measured}"
                 outcome = Outcome(0, reason, False, goal=str(error.expected), advice=error.fix or "")
+            unread = options.unread(_core.unused_options)
         entry = {"left_out": context.left_out, **context.entry}
         self._note(analysis.name, outcome, time.perf_counter() - began, entry)
+        if unread and outcome.points:
+            self.console.line(f"{analysis.name}: {unread}")
         if outcome.points and not self.part:
             with event("FwCurve"):
                 context.write_curves()

@@ -7,6 +7,9 @@ from collections.abc import Sequence
 from ..analyses.parts.context import Outcome
 from ..errors import NotConverged
 
+#: A loop may end within itself, and an internal resonance lead to another mode.
+OVER = "steps that pass over loops (--petsc '-fw_branch_other 1e300')"
+
 
 def not_converged(name: str, outcome: Outcome) -> NotConverged:
     """What stopped an analysis, what is kept, and what to try."""
@@ -41,8 +44,8 @@ def _advice(name: str, reason: str) -> str:
         shorter = f"--set {name}.step.initial=0.01 --set {name}.step.maximum=0.03"
         return f"shorter steps ({shorter}): one may have led onto another curve"
     if "comes back to amplitude" in reason:
-        return f"--set {name}.normalise=... to a dof that goes on growing with the motion, or shorter steps"
-    return f"shorter steps (--set {name}.step.minimum=1e-11); --petsc -snes_monitor shows Newton's steps"
+        return f"--set {name}.normalise=... to a dof that goes on growing with the motion, shorter steps, or {OVER}"
+    return f"shorter steps (--set {name}.step.minimum=1e-11), or {OVER}; --petsc -snes_monitor shows Newton's steps"
 
 
 def joined(failures: Sequence[NotConverged]) -> NotConverged:
