@@ -24,6 +24,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from scenes import list_contact, list_forced, list_friction, list_random  # noqa: E402
 from scenes.judge import Verdict, judge, read  # noqa: E402
 from scenes.scene import Finished, Scene, run  # noqa: E402
+from scenes.steps import by_steps  # noqa: E402
 
 Runner = Callable[[Scene, Path], Finished]
 WORDS = ["right", "wrong", "kept", "gave up", "refused", "crashed", "hung"]
@@ -103,6 +104,7 @@ def main() -> int:
     parser.add_argument("--random", type=int, metavar="COUNT", help="as many scenes at random, not the list")
     parser.add_argument("--seed", type=int, default=1, help="of --random")
     parser.add_argument("--mixed", action="store_true", help="of --random: two or three contacts in each")
+    parser.add_argument("--steps", action="store_true", help="whether answers depend on steps; nothing else is judged")
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument(
         "--keep", type=Path, help="folder for cases and results; repeat one by `fretwave run KEEP/NAME/case.toml`"
@@ -113,6 +115,8 @@ def main() -> int:
     wanted = [word for word in args.only.split(",") if word]
     if args.mixed and not args.random:
         parser.error("--mixed goes with --random")
+    if args.steps and args.go_on:
+        parser.error("--go-on takes over verdicts of the judge alone")
     at_random = list_random.mixed if args.mixed else list_random.scenes
     scenes = list(at_random(args.random, args.seed)) if args.random else all_scenes()
     scenes = [s for s in scenes if not args.quick or s.quick]
@@ -123,8 +127,9 @@ def main() -> int:
     results: dict[str, tuple[Scene, Verdict]] = {}
     with tempfile.TemporaryDirectory() as temporary, ThreadPoolExecutor(args.jobs) as pool:
         folder = args.keep or Path(temporary)
+        verdict_on = (lambda s: by_steps(s, folder, run)) if args.steps else (lambda s: one(s, folder))
         known = json.loads(args.json.read_text()) if args.go_on and args.json.exists() else {}
-        for scene, verdict in zip(scenes, pool.map(lambda s: recall(s, known) or one(s, folder), scenes)):
+        for scene, verdict in zip(scenes, pool.map(lambda s: recall(s, known) or verdict_on(s), scenes)):
             results[scene.name] = (scene, verdict)
             if args.json:
                 keep(args.json, results)
