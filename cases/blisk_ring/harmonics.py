@@ -25,8 +25,9 @@ def draw(folders: list[Path], path: Path) -> None:
             highest, folds = found.labels[-1].rstrip("cs"), len(found.met("fold"))
             label = f"H = {highest}, {len(found)} points, {folds} folds"
             look = {"color": (style.RED, style.BLUE, style.INK)[k % 3], "lw": 0.7 if folds > 5 else 1.8}
-            upper.plot(1e3 * found["amplitude"], 100 * found["zeta"], label=label, **look)
-            lower.plot(1e3 * found["amplitude"], found["frequency_hz"], label=label, **look)
+            curve = found.curve(8)
+            upper.plot(1e3 * curve["amplitude"], 100 * curve["zeta"], label=label, **look)
+            lower.plot(1e3 * curve["amplitude"], curve["frequency_hz"], label=label, **look)
         upper.set_ylabel(style.label("Modal damping", "%"))
         lower.set(xlabel=style.label("Amplitude of the tip", "mm"))
         lower.set_ylabel(style.label("Frequency", "Hz"))
