@@ -10,7 +10,7 @@ from models.core_models import options
 from test_krylov import ROOT, TIP, beam, root_map
 
 import fretwave as fw
-from fretwave.hb.suspects import suspects
+from fretwave.hb.suspects import TOO_SMALL, suspects, vanishing
 from fretwave.solve.preload import static_preload
 from fretwave.units import MM_T_S
 
@@ -56,18 +56,36 @@ def test_a_reference_without_frequency_is_refused_in_words(comm):
         static_preload(model, LOAD, fw.linear_modes(model, 1, "stuck")[0])
 
 
+def drifting(comm):
+    """A mode of the free blade."""
+    model = free_blade(comm)
+    first = fw.linear_modes(model, 1, "stuck")[0]
+    rest = static_preload(model, LOAD, first)
+    problem = fw.NonlinearMode(model, fw.Harmonics(range(4), 64), "CNM", TIP, first, "drift_")
+    problem.preload(rest.displacement, rest.load)
+    return problem
+
+
 @pytest.mark.ranks(1)
 def test_a_branch_whose_mean_nothing_holds_says_so(comm):
     """Once every pair slips in a period the blade may drift; Newton's step is then all mean.
 
     Not by steps that look into a loop at 1.8354e-3: the branch ends within that, for another reason.
     """
-    model = free_blade(comm)
-    first = fw.linear_modes(model, 1, "stuck")[0]
-    rest = static_preload(model, LOAD, first)
-    problem = fw.NonlinearMode(model, fw.Harmonics(range(4), 64), "CNM", TIP, first, "drift_")
-    problem.preload(rest.displacement, rest.load)
+    problem = drifting(comm)
     branch = fw.Continuation(problem, problem.initial(1e-4), (1e-4, 3e-3), fw.StepControl(max_points=120))
     with options(fw_branch_other=1e300):
         assert [point.index for point in branch]
+    assert vanishing(problem, branch.anchor) == ""
     assert not branch.converged and "mean position is free" in branch.reason
+
+
+@pytest.mark.ranks(1, 2)
+def test_a_branch_that_ends_where_a_pair_stops_slipping_says_so(comm):
+    """Work of the others stays; that of one falls from 1e-7 to 1e-9 while the amplitude changes by 4e-7 of itself."""
+    problem = drifting(comm)
+    branch = fw.Continuation(problem, problem.initial(1e-4), (1e-4, 3e-3), fw.StepControl(max_points=120))
+    points = list(branch)
+    assert not branch.converged and branch.reason.startswith(TOO_SMALL)
+    assert "slip of a pair of contact 'root' vanishes here" in vanishing(problem, branch.anchor)
+    assert vanishing(problem, points[len(points) // 2].y) == ""

@@ -14,7 +14,7 @@ from ..case.schema import Dof, Frequency, Positive, Whole, key
 from ..columns import FORCED
 from ..cyclic.engine_order import folded
 from ..errors import InputError
-from ..hb.suspects import suspects
+from ..hb.suspects import TOO_SMALL, suspects, vanishing
 from ..post.motion import complex_amplitudes
 from ..results.results import AnalysisWriter
 from ..results.sweep_summary import FORCED_LEVELS
@@ -251,6 +251,8 @@ def _one_level(
         most = _bounded(excitation, branch.problem, branch.anchor)
         stopped += f": damping and friction take at most the work of level {most:.4g}"
     elif stopped:
+        if branch.reason.startswith(TOO_SMALL):
+            stopped += vanishing(branch.problem, branch.anchor)
         stopped += suspects(context.model.contacts, problem.core.stiffness_scale, units)
     branch.destroy()
     problem.destroy()

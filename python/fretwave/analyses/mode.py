@@ -17,7 +17,7 @@ from ..case.observed import Observed, check_observed, dof_of, dofs_of, label_of,
 from ..case.schema import Positive, key
 from ..columns import ENERGY, MODE
 from ..errors import InputError
-from ..hb.suspects import suspects
+from ..hb.suspects import TOO_SMALL, suspects, vanishing
 from ..model.laws import PythonLaw
 from ..post.limit_cycles import limit_cycles
 from ..results.results import AnalysisWriter
@@ -190,6 +190,8 @@ def _follow(
     tell(context, branch)
     outcome = _finish(context, writer, branch, start, problem)
     if not branch.converged:
+        if outcome.reason.startswith(TOO_SMALL):
+            outcome.reason += vanishing(branch.problem, branch.anchor)
         outcome.reason += suspects(context.model.contacts, problem.core.stiffness_scale, units)
     outcome.goal = f"amplitude {high:g} {unit}"
     branch.destroy()

@@ -12,15 +12,22 @@ from ..model.laws import Role
 from ..units import UnitSystem
 
 if TYPE_CHECKING:
+    from petsc4py import PETSc
+
     from ..model.contact import Contact
+    from .problems import HarmonicProblem
 
 
+#: What a reason begins with where no step led on.
+TOO_SMALL = "step too small"
 #: Contact stiffness over the structure's from which a pair that opens, sticks or slips changes all forces.
 STIFF = 1e4
 #: Contact stiffness over the structure's below which it holds nothing.
 SOFT = 1e-6
 #: Net force of the pairs' own loads over the largest of them, above which they are no balanced set.
 UNBALANCED = 0.1
+#: Work of a pair that slips, over the ranges of its motion and force, below which its slip is about to vanish.
+VANISHING = 1e-5
 
 
 def suspects(contacts: Sequence[Contact], stiffness: float | None, units: UnitSystem) -> str:
@@ -33,6 +40,30 @@ def suspects(contacts: Sequence[Contact], stiffness: float | None, units: UnitSy
     units : that they are in
     """
     return "".join(f"; contact '{c.name}' {words}" for c in contacts for words in _extremes(c, stiffness, units))
+
+
+def vanishing(problem: HarmonicProblem, y: PETSc.Vec) -> str:
+    """Contacts with a pair that hardly slips any more at y, where a branch stopped, or nothing. Collective.
+
+    The place about which a slider moves to and fro is told by its slip alone: by ever fewer digits as that vanishes,
+    and by where it stood at rest once nothing slips (`src/hb/slider_period.h`).
+    """
+    told, comm = problem.contact_history(y), problem.model.comm
+    names = _hardly_slipping(problem.model.contacts, told) if comm.rank == 0 else []
+    return "".join(
+        f"; the slip of a pair of contact '{name}' vanishes here, which alone tells where its slider stands"
+        for name in comm.bcast(names)
+    )
+
+
+def _hardly_slipping(contacts: Sequence[Contact], told: Sequence[dict[str, Any]]) -> list[str]:
+    """Names; `told` as of :meth:`HarmonicProblem.contact_history`."""
+    names = []
+    for contact, one in zip(contacts, told):
+        reach = (np.ptp(one["u"], axis=0) * np.ptp(one["f"], axis=0)).sum(axis=0)
+        if np.any((one["shares"][1] > 0) & (np.abs(one["work"]) < VANISHING * reach)):
+            names.append(contact.name)
+    return names
 
 
 def _extremes(contact: Contact, stiffness: float | None, units: UnitSystem) -> Iterator[str]:
