@@ -11,18 +11,12 @@ namespace {
 
 const Tuned kink_length("branch_kink_length", 1e-4,
                         "step in which a turn is a kink (a sample changes state), not curvature");
-const Tuned nearer("branch_nearer", 0.5,
-                   "distance of the cubic's guess over the tangent's, for it to be taken");
 const Tuned crawl("branch_crawl", 300, "steps below the smallest in a row, over pieces that thin");
 const Tuned often("branch_often", 0.3, "share of a step: a shorter one has failed twice");
 const Tuned before_end("branch_before_end", 0.999, "share of the way to the end of a piece");
 const Tuned kink_angle("branch_kink_angle", 0.02, "turn [rad] that is a kink in so short a step");
 const Tuned seen_angle("branch_seen_angle", 0.05,
                        "turn [rad] at a corner, below which pieces are no longer walked one by one");
-const Tuned other_than(
-    "branch_other", 1.5,
-    "slope that a fourth derivative does not tell of, in largest errors of a step over its "
-    "length: a step is looked into");
 const Tuned unturned("branch_unturned", 0.01,
                      "share of a step: the way aside that the tangents need not tell of");
 const Tuned easy("branch_easy", 5, "Newton iterations; after more the corrector may be on another branch");
@@ -202,39 +196,6 @@ double Continuation::turn_of(Trial const& trial) const {
   return std::acos(std::clamp(dot(row_, trial.tangent), -1.0, 1.0));
 }
 
-/// Distance of the anchor from the cubic through its neighbours, y'''' (H L)^2 / 24 for steps H and L, scaled
-/// to the error y'''' L^4 / 384 of the cubic over the new step. Where the last step is too short to tell, it
-/// is measured in the middle, unless so small a turn leaves no room for an error that counts; likewise where
-/// the cubic's slope at the anchor is not off as that derivative has it, by 2 (L - H) / (H L) times as much
-/// across the branch (along it chords in place of arcs count), but by more than an error that counts would
-/// make it: the trial may lie on another sheet, with its tangent along this one. (Motions without damping
-/// have such sheets at every internal resonance: steps that pass over these reach the end of the branch.)
-double Continuation::interpolation_error(Trial const& trial, double length) {
-  const double last = before_.y ? distance(anchor_.y, before_.y) : 0, now = distance(trial.y, anchor_.y);
-  if (!(last > length / 8)) {
-    const double most = turn_of(trial) * length / 8;
-    return most > steps_.max_error / 2 ? error_in_the_middle(trial, length) : most;
-  }
-  const Hermite across(before_.y, before_.tangent, trial.y, trial.tangent, last + now);
-  const VecHandle off = moved(across.value(last), -1, anchor_.y);
-  const double ratio = now / last, size = weighted_norm(weights_, off),
-               error = size * std::min(ratio * ratio, 4.0) / 16;
-  if (size <= steps_.max_error || error > steps_.max_error || !problem_.damped(trial.y)) return error;
-  const VecHandle slope = moved(across.derivative(last), -2 * (now - last) / (now * last), off);
-  check(VecAXPY(slope, -dot(row_, slope), anchor_.tangent));
-  const bool strange =
-      weighted_norm(weights_, slope) * now * last / (now + last) > other_than * steps_.max_error;
-  return strange ? std::max(error, error_in_the_middle(trial, length)) : error;
-}
-
-double Continuation::error_in_the_middle(Trial const& end, double length) {
-  const Hermite curve(anchor_.y, anchor_.tangent, end.y, end.tangent, length, 1 / dot(row_, end.tangent));
-  Trial middle = at(curve.value(length / 2));
-  const VecHandle expected = copy(middle.y);
-  if (!correct(middle, row_, dot(row_, expected), row_)) return INFINITY;
-  return distance(middle.y, expected);
-}
-
 /// What speaks against a corrected trial as the next point; nothing if it is one. An arc that turns by an
 /// angle over a length L leaves its first tangent by half of L times the angle, and by all of it at a kink:
 /// where the corrector came hard by a point farther aside, it is another branch's.
@@ -279,26 +240,6 @@ std::optional<Continuation::Trial> Continuation::turned(std::optional<Trial> beh
   turned_ = bool(behind);
   if (turned_) length = distance(behind->y, anchor_.y);
   return behind;
-}
-
-/// By the cubic through the last two points, on the plane at this length.
-VecHandle Continuation::by_cubic(double length) {
-  const double last = distance(anchor_.y, before_.y);
-  VecHandle y = Hermite(before_.y, before_.tangent, anchor_.y, anchor_.tangent, last).value(last + length);
-  check(VecAXPY(y, row_value_ + length - dot(row_, y), anchor_.tangent));
-  return y;
-}
-
-/// The next point's guess: by the tangent, or by the cubic where that has foretold the anchor better.
-VecHandle Continuation::predicted(double length) {
-  return anchor_.smooth ? by_cubic(length) : moved(anchor_.y, length, anchor_.tangent);
-}
-
-/// Whether the cubic foretells a point better than the tangent does, by far.
-bool Continuation::foretold(Vec y, double length) {
-  if (turned_ || !before_.y) return false;
-  const auto off = [&](VecHandle guess) { return distance(y, guess); };
-  return off(by_cubic(length)) < nearer * off(moved(anchor_.y, length, anchor_.tangent));
 }
 
 /// A trial at `length` from the anchor, or why there is none. Where corners lie about, pieces are walked one

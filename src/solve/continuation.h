@@ -106,14 +106,9 @@ class Continuation {
   void prepare_row();
   double turn_of(Trial const&) const;
   double distance(Vec a, Vec b) const;
-  double interpolation_error(Trial const&, double length);
-  double error_in_the_middle(Trial const&, double length);
   std::string complaint(Trial&, double length, bool may_shorten);
   std::optional<Trial> turn_next_corner(double& length);
   std::optional<Trial> turned(std::optional<Trial> behind, double& length);
-  VecHandle by_cubic(double length);
-  VecHandle predicted(double length);
-  bool foretold(Vec y, double length);
   std::optional<Trial> attempt(double& length, bool wary, Failure&);
   double next_step(Trial const&, double length, double intended);
   std::optional<Trial> step(double& length, double& next_length);
@@ -121,6 +116,13 @@ class Continuation {
   Point point(Trial&&, std::string event, double step);
   void make_batch(double tried = INFINITY);
   void arrive(double reached);
+
+  // What cubics through its points foretell (interpolation.cpp)
+  VecHandle by_cubic(double length);
+  VecHandle predicted(double length);
+  bool foretold(Vec y, double length);
+  double interpolation_error(Trial const&, double length);
+  double error_in_the_middle(Trial const&, double length);
 
   // Whether it comes back to where it has been (revisit.cpp)
   bool been_here(Trial const&);
