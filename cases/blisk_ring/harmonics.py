@@ -2,7 +2,7 @@
 
     fretwave run cases/blisk_ring/case.toml --only mode --no-plots --out runs/h3
     fretwave run cases/blisk_ring/case.toml --only mode --no-plots --set mode.harmonics=15 --set mode.errors=false \\
-        --set 'mode.report_at=[]' --out runs/h15                                             # a quarter of an hour
+        --set 'mode.report_at=[]' --out runs/h15                                             # ten minutes
     .venv/bin/python cases/blisk_ring/harmonics.py runs/h15 runs/h3 [--out PICTURE]
 """
 

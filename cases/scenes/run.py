@@ -13,7 +13,6 @@ import os
 import sys
 import tempfile
 from collections import Counter
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -23,10 +22,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from scenes import list_contact, list_forced, list_friction, list_random  # noqa: E402
 from scenes.judge import Verdict, judge, read  # noqa: E402
-from scenes.scene import Finished, Scene, run  # noqa: E402
+from scenes.scene import Finished, Runner, Scene, run  # noqa: E402
 from scenes.steps import by_steps  # noqa: E402
 
-Runner = Callable[[Scene, Path], Finished]
 WORDS = ["right", "wrong", "kept", "gave up", "refused", "crashed", "hung"]
 
 
@@ -127,9 +125,9 @@ def main() -> int:
     results: dict[str, tuple[Scene, Verdict]] = {}
     with tempfile.TemporaryDirectory() as temporary, ThreadPoolExecutor(args.jobs) as pool:
         folder = args.keep or Path(temporary)
-        verdict_on = (lambda s: by_steps(s, folder, run)) if args.steps else (lambda s: one(s, folder))
+        verdict_on = by_steps if args.steps else one
         known = json.loads(args.json.read_text()) if args.go_on and args.json.exists() else {}
-        for scene, verdict in zip(scenes, pool.map(lambda s: recall(s, known) or verdict_on(s), scenes)):
+        for scene, verdict in zip(scenes, pool.map(lambda s: recall(s, known) or verdict_on(s, folder), scenes)):
             results[scene.name] = (scene, verdict)
             if args.json:
                 keep(args.json, results)

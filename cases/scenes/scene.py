@@ -91,6 +91,10 @@ class Finished:
     last: str = field(default="")
 
 
+#: Runs a scene in a folder.
+Runner = Callable[[Scene, Path], Finished]
+
+
 def _toml(value: Any) -> str:
     if isinstance(value, dict):
         return "{ " + ", ".join(f"{k} = {_toml(v)}" for k, v in value.items()) + " }"

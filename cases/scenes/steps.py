@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from .judge import Run, Verdict, read, reason_of
-from .scene import Finished, Scene
+from .scene import Runner, Scene, run
 
 SHORT = {"initial": 0.02, "maximum": 0.04}
 VALUES = 7  #: between the ends at which all solutions are compared
@@ -18,7 +17,7 @@ SAME, FLOOR = 1e-5, 1e-9  #: relative error of what is compared, and damping rat
 NONE = ["a run without a table"]
 
 
-def by_steps(scene: Scene, folder: Path, run: Callable[[Scene, Path], Finished]) -> Verdict:
+def by_steps(scene: Scene, folder: Path, run: Runner = run) -> Verdict:
     """Right: both runs end alike, with as many folds and the same solutions; gave up: one of them did."""
     given = {k: v for k, v in scene.analysis.items() if k != "step"} | {"errors": False, "report_at": values(scene)}
     runs = [
@@ -54,7 +53,7 @@ def compare(long: list[Run], short: list[Run]) -> list[str]:
         if folds[0] != folds[1]:
             out.append(f"folds: {folds[0]}, in short steps {folds[1]}")
         reported = [solutions(run) for run in (one, other)]
-        counts = [len(solutions) for solutions in reported]
+        counts = [len(table) for table in reported]
         if counts[0] != counts[1] or min(counts) < VALUES:
             out.append(f"solutions at {VALUES} values: {counts[0]}, in short steps {counts[1]}")
             continue

@@ -33,9 +33,7 @@ const Tuned farthest("branch_farthest", 4, "factor by which it may leave the ran
 /// On a coarse grid: what a solution's last digits (of which no two numbers of ranks have the same) do to a
 /// length would be handed on from step to step and grow with the steps.
 double on_grid(double length) { return std::exp2(std::round(grid * std::log2(length)) / grid); }
-constexpr double at_once = 1e-11;  // arclength: samples that by symmetry change their states together,
-constexpr double about = 1e-3;     // and at most this share of how far one looks
-constexpr double shorter = 0.75;   // of the step tried before, one that is tried again
+constexpr double shorter = 0.75;  // of the step tried before, one that is tried again
 
 }  // namespace
 
@@ -232,8 +230,7 @@ std::optional<Continuation::Trial> Continuation::turn_next_corner(double& length
     length = before_end * *end;
     return {};
   }
-  const double reach = std::min<double>(length, kink_length);
-  return turned(turn_corner(*end + std::min(at_once, about * reach), reach, true), length);
+  return turned(turn_corner(*end, std::min<double>(length, kink_length), true), length);
 }
 
 std::optional<Continuation::Trial> Continuation::turned(std::optional<Trial> behind, double& length) {

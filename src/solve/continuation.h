@@ -121,6 +121,7 @@ class Continuation {
   VecHandle by_cubic(double length);
   VecHandle predicted(double length);
   bool foretold(Vec y, double length);
+  double untold(Hermite const& across, Vec off, double last, double now);
   double interpolation_error(Trial const&, double length);
   double error_in_the_middle(Trial const&, double length);
 

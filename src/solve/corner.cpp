@@ -25,6 +25,7 @@ constexpr double surely_one = 1 - 1e-6;  // the same cosine, where nothing else 
                                          // side by side are alike
 constexpr double one_facet = 0.98;       // least cosine between the two vectors of a single facet
 constexpr double about = 1e-3;           // share of a place by which one looks before it and behind
+constexpr double at_once = 1e-11;        // arclength: samples that by symmetry change their states together
 constexpr double shortest = 1e-13;       // length of a piece that can be told from a point
 constexpr double no_corner = 1e-6;       // 1 - cosine of the angle between the tangents
 constexpr double no_force = 1e-3;        // of a tangent on the other piece, in forces that act
@@ -200,6 +201,7 @@ int Continuation::into_piece(Vec y, Vec tangent, double reach) {
 /// ends there. The tangent's extension beyond it is off the branch, but it lies on the piece behind: its
 /// Jacobian gives that piece's tangent, along which Newton is closed.
 std::optional<Continuation::Trial> Continuation::turn_corner(double beyond, double reach, bool seen) {
+  if (seen) beyond += std::min(at_once, about * reach);
   const VecHandle there = moved(anchor_.y, beyond, anchor_.tangent);
   VecHandle tangent = copy(anchor_.tangent);
   newton_.system().close(row_, 0);

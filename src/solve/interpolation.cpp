@@ -38,13 +38,21 @@ bool Continuation::foretold(Vec y, double length) {
   return off(by_cubic(length)) < nearer * off(moved(anchor_.y, length, anchor_.tangent));
 }
 
+/// What `off`, the anchor's distance from a cubic through its neighbours, does not tell of the cubic's slope
+/// there: were both of y'''' alone, the slope would be off by 2 (L - H) / (H L) times as much across the
+/// branch (along it chords in place of arcs count). Times H L / (H + L), a distance as well.
+double Continuation::untold(Hermite const& across, Vec off, double last, double now) {
+  const VecHandle slope = moved(across.derivative(last), -2 * (now - last) / (now * last), off);
+  check(VecAXPY(slope, -dot(row_, slope), anchor_.tangent));
+  return weighted_norm(weights_, slope) * now * last / (now + last);
+}
+
 /// Distance of the anchor from the cubic through its neighbours, y'''' (H L)^2 / 24 for steps H and L, scaled
 /// to the error y'''' L^4 / 384 of the cubic over the new step. Where the last step is too short to tell, it
 /// is measured in the middle, unless so small a turn leaves no room for an error that counts; likewise where
-/// the cubic's slope at the anchor is not off as that derivative has it, by 2 (L - H) / (H L) times as much
-/// across the branch (along it chords in place of arcs count), but by more than an error that counts would
-/// make it: the trial may lie on another sheet, with its tangent along this one. (Motions without damping
-/// have such sheets at every internal resonance: steps that pass over these reach the end of the branch.)
+/// that derivative does not tell of the slope: the trial may lie on another sheet, with its tangent along
+/// this one. (Motions without damping have such sheets at every internal resonance: steps that pass over
+/// these reach the end of the branch.)
 double Continuation::interpolation_error(Trial const& trial, double length) {
   const double last = before_.y ? distance(anchor_.y, before_.y) : 0, now = distance(trial.y, anchor_.y);
   if (!(last > length / 8)) {
@@ -56,10 +64,7 @@ double Continuation::interpolation_error(Trial const& trial, double length) {
   const double ratio = now / last, size = weighted_norm(weights_, off),
                error = size * std::min(ratio * ratio, 4.0) / 16;
   if (size <= steps_.max_error || error > steps_.max_error || !problem_.damped(trial.y)) return error;
-  const VecHandle slope = moved(across.derivative(last), -2 * (now - last) / (now * last), off);
-  check(VecAXPY(slope, -dot(row_, slope), anchor_.tangent));
-  const bool strange =
-      weighted_norm(weights_, slope) * now * last / (now + last) > other_than * steps_.max_error;
+  const bool strange = untold(across, off, last, now) > other_than * steps_.max_error;
   return strange ? std::max(error, error_in_the_middle(trial, length)) : error;
 }
 

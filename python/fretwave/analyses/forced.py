@@ -14,12 +14,21 @@ from ..case.schema import Dof, Frequency, Positive, Whole, key
 from ..columns import FORCED
 from ..cyclic.engine_order import folded
 from ..errors import InputError
-from ..hb.suspects import TOO_SMALL, suspects, vanishing
 from ..post.motion import complex_amplitudes
 from ..results.results import AnalysisWriter
 from ..results.sweep_summary import FORCED_LEVELS
 from ..texts import toml
-from .parts.branch import closure_note, error_text, finished_table, notable, open_branch, points_of, record, tell
+from .parts.branch import (
+    closure_note,
+    error_text,
+    finished_table,
+    notable,
+    open_branch,
+    points_of,
+    record,
+    suspected,
+    tell,
+)
 from .parts.context import AnalysisContext, Outcome
 from .parts.excitation import Excitation, excitation_of, wave_of_forces
 from .parts.forced_peaks import curves_of, write_peaks
@@ -251,9 +260,7 @@ def _one_level(
         most = _bounded(excitation, branch.problem, branch.anchor)
         stopped += f": damping and friction take at most the work of level {most:.4g}"
     elif stopped:
-        if branch.reason.startswith(TOO_SMALL):
-            stopped += vanishing(branch.problem, branch.anchor)
-        stopped += suspects(context.model.contacts, problem.core.stiffness_scale, units)
+        stopped += suspected(branch, problem.core.stiffness_scale, units)
     branch.destroy()
     problem.destroy()
     return stopped

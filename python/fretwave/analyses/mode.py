@@ -17,7 +17,6 @@ from ..case.observed import Observed, check_observed, dof_of, dofs_of, label_of,
 from ..case.schema import Positive, key
 from ..columns import ENERGY, MODE
 from ..errors import InputError
-from ..hb.suspects import TOO_SMALL, suspects, vanishing
 from ..model.laws import PythonLaw
 from ..post.limit_cycles import limit_cycles
 from ..results.results import AnalysisWriter
@@ -36,6 +35,7 @@ from .parts.branch import (
     open_branch,
     points_of,
     record,
+    suspected,
     tell,
 )
 from .parts.context import AnalysisContext, Outcome
@@ -190,9 +190,7 @@ def _follow(
     tell(context, branch)
     outcome = _finish(context, writer, branch, start, problem)
     if not branch.converged:
-        if outcome.reason.startswith(TOO_SMALL):
-            outcome.reason += vanishing(branch.problem, branch.anchor)
-        outcome.reason += suspects(context.model.contacts, problem.core.stiffness_scale, units)
+        outcome.reason += suspected(branch, problem.core.stiffness_scale, units)
     outcome.goal = f"amplitude {high:g} {unit}"
     branch.destroy()
     return outcome

@@ -25,6 +25,8 @@ LOGS = ("log_view", "log_view_memory")
 NESTED = ("ascii_xml", "ascii_flamegraph")
 #: With that by which every solver lists its options as it is made, ours among them.
 WHOLE = (*LOGS, "help")
+#: What options of the time integration that checks a response begin with, behind its analysis' own prefix.
+TIME = "time_"
 #: What tuned constants of the core begin with: no analysis' own (`fretwave doctor --constants`).
 TUNED = "fw_"
 

@@ -21,7 +21,7 @@ from ..errors import EXIT_DONE, InputError, NotConverged
 from ..mpi.guard import on_first_rank
 from ..mpi.interrupt import say_how_to_go_on
 from ..mpi.log import event
-from ..mpi.petsc_options import AnalysisOptions
+from ..mpi.petsc_options import TIME, AnalysisOptions
 from ..results.basis_file import LARGEST, NAME, basis_of
 from ..results.file import OVERRIDES
 from ..results.journal import Journal
@@ -246,8 +246,7 @@ class Runner:
         began = time.perf_counter()
         prefix = analysis.name.replace("-", "_") + "_"
         options = AnalysisOptions(prefix, [self.options.petsc, analysis.petsc])
-
-        later = "time_" if analysis.integrates() == "time_points" else ""  # the prefix in analyses/parts/forced_time.py
+        later = TIME if analysis.integrates() == "time_points" else ""
 
         def before_first() -> None:
             options.check_used(_core.unused_options, f"analysis '{analysis.name}'", later)

@@ -13,6 +13,7 @@ from ...case.harmonic import HarmonicSection
 from ...case.observed import label_of
 from ...case.schema import StepSection
 from ...errors import InputError
+from ...hb.suspects import TOO_SMALL, suspects, vanishing
 from ...mpi.log import event
 from ...mpi.spread import Spread
 from ...post.contact_history import MEASURED
@@ -69,6 +70,17 @@ def largest_error(what: str, errors: Array, unit: str) -> str:
     """The same of a branch."""
     known = errors[np.isfinite(errors)]
     return f" error of {what} up to {known.max():.2g} {unit}," if len(known) else ""
+
+
+def suspected(branch: Continuation, stiffness: float, units: UnitSystem) -> str:
+    """What may be why a branch ended before its goal, for its reason, or nothing. Collective.
+
+    Parameters
+    ----------
+    stiffness : of the structure [force/length]
+    """
+    seen = vanishing(branch.problem, branch.anchor) if branch.reason.startswith(TOO_SMALL) else ""
+    return seen + suspects(branch.problem.model.contacts, stiffness, units)
 
 
 #: What was done when GMRES failed.

@@ -9,6 +9,7 @@ import numpy as np
 
 from ...arrays import Array
 from ...case.observed import unit_of
+from ...mpi.petsc_options import TIME
 from ...post.response_peaks import points_around_peak
 from ...solve.steady import SteadyState, steady_motion
 from .context import AnalysisContext
@@ -97,5 +98,5 @@ def _steady(
     force = {1: np.zeros(model.n_dof, dtype=complex)}
     for name, value in forces(context).items():
         force[1][context.case.dof(name)] = value
-    integrator = Transient(model, force=force, level=level, omega=omega, prefix=f"{context.prefix}time_")
+    integrator = Transient(model, force=force, level=level, omega=omega, prefix=context.prefix + TIME)
     return steady_motion(integrator, state, seen, omega, SAMPLES, TOLERANCE)
