@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "solve/vectors.h"
 #include "tuned.h"
 
 namespace fretwave::solve {
@@ -20,7 +21,8 @@ const Tuned smallest_step("newton_smallest_step", 1e-13,
 const Tuned stagnant_step("newton_stagnant_step", 1e-8,
                           "Newton step that the residual does not follow any more, relative to the unknowns");
 const Tuned near("newton_near", 100, "residual next to its rounding, in multiples of that");
-const Tuned unstepped("newton_unstepped", 1e-3, "residual over the tolerance at which a guess needs no step");
+const Tuned plain("newton_plain", 1e-3,
+                  "residual over the tolerance below which what rounding may hide does not count");
 const Tuned small_effect("newton_small_effect", 1e-8,
                          "relative change of frequency and damping that a step may leave");
 const Tuned largest_effect("newton_largest_effect", 1e-6,
@@ -29,6 +31,8 @@ const Tuned roughest("newton_roughest", 1e-4, "residual to which a tangent is so
 const Tuned far("newton_far", 1e5, "step over residual from which the Jacobian is nearly singular");
 const Tuned patience("newton_patience", 10,
                      "iterations after which a residual below the tolerance is enough");
+const Tuned falling("newton_falling", 0.1,
+                    "effect of a step over that of the one before, up to which it is not rounding's");
 const Tuned creeping("newton_creeping", 0.6,
                      "share of the residual that four iterations leave when they creep");
 const Tuned rescalings("newton_rescalings", 4, "rescalings of the rows as the motion becomes known");
@@ -64,7 +68,7 @@ PetscErrorCode Newton::converged(SNES snes, PetscInt iteration, PetscReal unknow
   PetscErrorCode code = SNESConvergedDefault(snes, iteration, unknowns, step, residual, reason, nullptr);
   if (code || *reason < 0) return code;
   if (iteration == 0) {
-    if (*reason > 0 && !newton.below_tolerance(residual, false)) *reason = SNES_CONVERGED_ITERATING;
+    if (*reason > 0 && residual > 0) *reason = SNES_CONVERGED_ITERATING;
     return code;
   }
   Vec y;
@@ -93,10 +97,10 @@ bool Newton::matters(Vec y, double residual, double before) {
          residual > bordered_.problem().rounding(y);
 }
 
-bool Newton::below_tolerance(double residual, bool started) const {
+bool Newton::below_tolerance(double residual, double share) const {
   double tolerance;
   check(SNESGetTolerances(snes_, &tolerance, nullptr, nullptr, nullptr, nullptr));
-  return residual <= (started ? 1 : unstepped) * tolerance;
+  return residual <= share * tolerance;
 }
 
 /// Above the tolerance. A residual or a full step at rounding level ends the iteration, and a small step
@@ -115,7 +119,8 @@ SNESConvergedReason Newton::judge(Vec y, double unknowns, double step, double re
     return SNES_CONVERGED_FNORM_ABS;
   const bool stagnates = !halves && residual <= near * rounding && step <= stagnant_step * unknowns;
   const bool tiny = step <= smallest_step * unknowns && fraction == 1;
-  if ((stagnates || tiny) && last_effect(y) <= largest_effect) return SNES_CONVERGED_SNORM_RELATIVE;
+  if ((stagnates || tiny) && last_effect(y) <= largest_effect * fraction)
+    return SNES_CONVERGED_SNORM_RELATIVE;
   return SNES_CONVERGED_ITERATING;
 }
 
@@ -179,9 +184,30 @@ Outcome Newton::solve(Vec y, Effort effort) {
   for (int k = 0; k < rescalings; ++k) {
     const Outcome before = std::exchange(out, solve_past_kinks(y));
     out.newton += before.newton, out.linear += before.linear;
-    if (!out.converged || !scale(y)) return out;
+    if (!out.converged || !scale(y)) break;
   }
+  if (out.converged) refine(y, out);
   return out;
+}
+
+/// Rounding is that of the largest forces, of stiff pairs and static loads: it hides what is left of the
+/// others' residual, and no line search sees it fall. Full steps are taken there as long as their effects
+/// fall; where rounding is above the tolerance, as a fine mesh's, on the direct route alone, where they are
+/// cheap.
+void Newton::refine(Vec y, Outcome& out) {
+  const double most = (out.accepted ? 1.0 : linear_->krylov() ? 0.0 : near) * out.rounding;
+  if (below_tolerance(out.residual, plain) || out.residual > most) return;
+  VecHandle g = like(right_side_), step = zero_like(y);
+  bordered_.residual(y, g);
+  for (double last = INFINITY; last > small_effect && linear(y, g, step);) {
+    const double effect = bordered_.problem().effect(y, step);
+    const VecHandle there = moved(y, -1, step);
+    bordered_.residual(there, g);
+    const double residual = norm(g);
+    if (!(effect <= falling * last && residual <= std::max(out.residual, out.rounding))) return;
+    check(VecCopy(there, y));
+    last = effect, out.residual = residual, ++out.newton;
+  }
 }
 
 /// At a kink every shortened step raises the residual until the samples behind it have changed state:
@@ -258,7 +284,7 @@ Outcome Newton::solve_once(Vec y) {
           int(linear),
           norm,
           singular ? "the Jacobian is singular" : text,
-          reason > 0 && below_tolerance(norm, true),
+          reason > 0 && below_tolerance(norm),
           std::isfinite(norm) ? bordered_.problem().rounding(y) : 0,
           singular || reason == SNES_DIVERGED_LINEAR_SOLVE};
 }

@@ -55,9 +55,10 @@ class Newton {
   Outcome solve_past_kinks(Vec y);
   Outcome solve_persistently(Vec y);
   Outcome solve_once(Vec y);
+  void refine(Vec y, Outcome&);
   std::string explain_step(Vec y);
   SNESConvergedReason judge(Vec y, double unknowns, double step, double residual, double residual_before);
-  bool below_tolerance(double residual, bool started) const;
+  bool below_tolerance(double residual, double share = 1) const;
   bool matters(Vec y, double residual, double before);
   bool stuck_at_rounding(Vec y);
   bool creeps(int iteration, double residual);

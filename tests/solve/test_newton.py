@@ -89,6 +89,26 @@ def test_any_number_of_samples_gives_the_continuous_closed_form(comm, method):
         assert problem.state(point.y)["zeta"] == pytest.approx(zeta, rel=TIGHT)
 
 
+@pytest.mark.parametrize("level", [1e-6, 1e-7])
+@pytest.mark.parametrize(("mass", "kt"), [(1e-2, 1e3), (1e-2, 1e4), (1e-4, 1e3), (1e-4, 1e4)])
+def test_a_resonance_beside_static_loads_is_solved_to_its_last_digits(comm, mass, kt, level):
+    """Stuck pads under far more than the force: their rounding hid the rest, up to 4e-6 of the motion."""
+    masses, B = np.array([mass, 1.0, 1.0, 1.0]), np.eye(4)[1:]
+    springs = np.diag([1e2 * mass, 1.0, 1.0, 1.0])
+    springs[0, 1:] = springs[1:, 0] = -10 * mass
+    pad = {"normal_stiffness": kt, "tangential_stiffness": kt, "friction_coefficient": 0.5, "normal_load": 1.0}
+    contact = fw.Contact("coulomb_3d", B, {**pad, "gap": 0.0})
+    model = fw.Model(np.diag(masses), springs, 1e-3 * springs, [contact], comm)
+    force, mode = np.array([0.0, 0.0, 0.0, 1.0]), fw.linear_modes(model, 1)[0]
+    problem = fw.ForcedResponse(model, fw.Harmonics(range(4), 16), {1: force}, level, 3, mode)
+    for point in fw.Continuation(problem, problem.initial(8.0), (8.0, 12.0)):
+        w = point.parameter
+        dynamic = springs + kt * B.T @ B + 1e-3j * w * springs - w * w * np.diag(masses)
+        exact = level * np.linalg.solve(dynamic, force)
+        q = problem.coefficients_at(point.y, range(4))
+        assert abs(q[:, 1] - 1j * q[:, 2] - exact).max() < REPEATED * abs(exact).max()
+
+
 def counts(comm, case, **given):
     """Points, Newton steps and linear iterations of a branch on the Krylov route. Collective."""
     model, first, rest = case
