@@ -10,7 +10,8 @@ from models.core_models import options
 from test_krylov import ROOT, TIP, beam, root_map
 
 import fretwave as fw
-from fretwave.hb.suspects import TOO_SMALL, suspects, vanishing
+from fretwave.hb.suspects import TOO_SMALL, lossless, suspects, vanishing
+from fretwave.run.stopped import _advice
 from fretwave.solve.preload import static_preload
 from fretwave.units import MM_T_S
 
@@ -54,6 +55,31 @@ def test_a_reference_without_frequency_is_refused_in_words(comm):
     model = free_blade(comm, normal_load=0.0)
     with pytest.raises(fw.InputError, match="(?s)rigid motion.*no normal_load"):
         static_preload(model, LOAD, fw.linear_modes(model, 1, "stuck")[0])
+
+
+def stopped(comm, zeta):
+    """A branch of two masses, one in front of a stop."""
+    K, B = np.array([[11.4, 2.3], [2.3, 16.2]]), np.array([[0.0, 1.0], [0.0, 0.0], [0.0, 0.0]])
+    frictionless = {"tangential_stiffness": 1.0, "friction_coefficient": 0.0, "normal_load": 0.0}
+    contact = fw.Contact("coulomb_3d", B, {"normal_stiffness": 1e4, "gap": 0.13, **frictionless}, "stop")
+    model = fw.Model(np.diag([0.46, 0.21]), K, 2 * zeta / 4.87 * K, [contact], comm)
+    first = fw.linear_modes(model, 1, "free")[0]
+    problem = fw.NonlinearMode(model, fw.Harmonics(range(6), 32), "EPMC", 0, first, "stopped_")
+    branch = fw.Continuation(problem, problem.initial(0.2), (0.2, 2.0))
+    assert [point.index for point in branch]
+    return branch
+
+
+@pytest.mark.ranks(1)
+def test_a_mode_that_leads_over_into_another_one_is_advised_to_be_damped(comm):
+    """Without damping it leaves along an internal resonance; with 1 % it passes that, as it is told."""
+    branch = stopped(comm, 0.0)
+    said = lossless(branch.problem, branch.anchor)
+    assert "comes back to" in branch.reason and "loses no energy" in said
+    assert "damping.zeta=1e-2" in _advice("mode", branch.reason + said)
+    damped = stopped(comm, 1e-2)
+    assert damped.converged, damped.reason
+    assert lossless(damped.problem, damped.anchor) == ""
 
 
 def drifting(comm):

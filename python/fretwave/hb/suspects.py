@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +21,12 @@ if TYPE_CHECKING:
 
 #: What a reason begins with where no step led on.
 TOO_SMALL = "step too small"
+#: Ends of a branch that has left what it was asked for, as `src/solve` words them.
+RETURNS = re.compile("comes back to|back onto itself|a closed loop")
+#: Damping beta over omega below which a mode loses no energy (`NonlinearMode::damped`).
+LOSSLESS = 1e-7
+#: What is said of such a mode.
+LEADS_OVER = "the motion loses no energy: a mode without damping leads over into another one at internal resonances"
 #: Contact stiffness over the structure's from which a pair that opens, sticks or slips changes all forces.
 STIFF = 1e4
 #: Contact stiffness over the structure's below which it holds nothing.
@@ -54,6 +61,15 @@ def vanishing(problem: HarmonicProblem, y: PETSc.Vec) -> str:
         f"; the slip of a pair of contact '{name}' vanishes here, which alone tells where its slider stands"
         for name in comm.bcast(names)
     )
+
+
+def lossless(problem: HarmonicProblem, y: PETSc.Vec) -> str:
+    """That a mode loses no energy at y, where its branch turned back, or nothing. Collective.
+
+    Its branch goes along each internal resonance that it meets to a motion of the other mode alone, and ends there.
+    """
+    state = problem.state(y)
+    return f"; {LEADS_OVER}" if abs(state.get("beta", np.inf)) < LOSSLESS * abs(state.get("omega", 0.0)) else ""
 
 
 def _hardly_slipping(contacts: Sequence[Contact], told: Sequence[dict[str, Any]]) -> list[str]:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from ..analyses.parts.context import Outcome
 from ..errors import NotConverged
+from ..hb.suspects import LEADS_OVER
 
 #: A loop may end within itself, and an internal resonance lead to another mode.
 OVER = "steps that pass over loops (--petsc '-fw_branch_other 1e300')"
@@ -39,6 +40,11 @@ def _advice(name: str, reason: str) -> str:
     if "at the start" in reason or "far from the linear mode" in reason:
         return (
             "another start (amplitude or frequency) where the motion is nearly linear; --petsc -snes_monitor shows why"
+        )
+    if LEADS_OVER in reason:
+        return (
+            "some damping of the structure (--set damping.zeta=1e-2, or what passes its internal resonances), or longer"
+            f" steps (--set {name}.step.maximum=0.5)"
         )
     if any(ending in reason for ending in ("a closed loop", "back onto itself", "turns in circles")):
         shorter = f"--set {name}.step.initial=0.01 --set {name}.step.maximum=0.03"

@@ -13,7 +13,7 @@ from ...case.harmonic import HarmonicSection
 from ...case.observed import label_of
 from ...case.schema import StepSection
 from ...errors import InputError
-from ...hb.suspects import TOO_SMALL, suspects, vanishing
+from ...hb.suspects import RETURNS, TOO_SMALL, lossless, suspects, vanishing
 from ...mpi.log import event
 from ...mpi.spread import Spread
 from ...post.contact_history import MEASURED
@@ -79,7 +79,8 @@ def suspected(branch: Continuation, stiffness: float, units: UnitSystem) -> str:
     ----------
     stiffness : of the structure [force/length]
     """
-    seen = vanishing(branch.problem, branch.anchor) if branch.reason.startswith(TOO_SMALL) else ""
+    ask = vanishing if branch.reason.startswith(TOO_SMALL) else lossless if RETURNS.search(branch.reason) else None
+    seen = ask(branch.problem, branch.anchor) if ask else ""
     return seen + suspects(branch.problem.model.contacts, stiffness, units)
 
 
