@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 from models.core_models import options
@@ -21,6 +24,16 @@ def test_each_has_a_value_and_a_meaning_of_its_own():
     options, values, meanings = zip(*_core.tuned_constants())
     assert len(options) > 40 and len(set(options)) == len(options) and min(values) > 0
     assert len(set(meanings)) > len(meanings) - 3 and all(len(meaning) > 15 for meaning in meanings)
+
+
+@pytest.mark.ranks(1)
+def test_none_is_an_integer_by_the_other_side_of_a_conditional():
+    """`first ? 1 : small` is an int in C++, and a constant of 1e-3 was zero."""
+    for file in (Path(__file__).parents[2] / "src").rglob("*.cpp"):
+        text = file.read_text()
+        for name in re.findall(r"Tuned (\w+)\(", text):
+            found = re.search(rf"\? *\d+ *: *{name}\b(?! *[*/+-])|\? *{name} *: *\d+\b(?!\.)", text)
+            assert not found, f"{file.name}: {found and found[0]}"
 
 
 def test_an_option_takes_its_place(comm):
