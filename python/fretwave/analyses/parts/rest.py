@@ -18,6 +18,7 @@ from .asymptotes import MORE_MODES, closed_stiffness, limit_model, most_like, wi
 from .context import AnalysisContext
 
 if TYPE_CHECKING:
+    from ...case.load import Case
     from ...hb.problems import Harmonics
     from ...model.modes import LinearMode
     from ...model.rest import Rest
@@ -82,19 +83,28 @@ def just_touching(contacts: Sequence[Contact], section: PreloadSection) -> bool:
 def closed_mode(context: AnalysisContext[AnalysisSection]) -> LinearMode:
     """Lowest linear mode with every pair stuck, also those that do not touch before the load: a scale. Collective.
 
-    Of a wheel it is that in which the sectors of the tuned one move alike.
+    Where contact that sticks leaves nothing to move, without it. Of a wheel it is that in which the sectors of the
+    tuned one move alike.
     """
-    from ...model.modes import linear_modes
-
     wheel = context.case.wheel
     case, diameters = (context.case, nodal_diameter(context.analysis)) if wheel is None else (context.tuned, 0)
-    with limit_model(case, context.comm, "stuck", diameters) as model:
-        mode = linear_modes(model, 1)[0]
+    try:
+        mode = _lowest(case, context, "stuck", diameters)
+    except InputError:
+        mode = _lowest(case, context, "free", diameters)
     if wheel is None:
         return mode
     from ...cyclic.sector import wave_mode
 
     return wave_mode(mode, 0, wheel.sectors)
+
+
+def _lowest(case: Case, context: AnalysisContext[AnalysisSection], limit: str, diameters: int) -> LinearMode:
+    """Mode with the contacts in a limit. Collective."""
+    from ...model.modes import linear_modes
+
+    with limit_model(case, context.comm, limit, diameters) as model:
+        return linear_modes(model, 1)[0]
 
 
 def start_mode(
@@ -164,8 +174,12 @@ def _stuck_modes(context: AnalysisContext[AnalysisSection], count: int) -> list[
 
 def stuck_or_free(context: AnalysisContext[AnalysisSection], number: int) -> LinearMode:
     """A linear mode as `start_mode` has it, of a contact that is at rest already. Collective."""
-    modes = _stuck_modes(context, number) or context.linear_mode("free", number)
-    return context.numbered(modes, number)
+    return context.numbered(modes_or_free(context, number), number)
+
+
+def modes_or_free(context: AnalysisContext[AnalysisSection], count: int) -> list[LinearMode]:
+    """The same of all up to a number. Collective."""
+    return _stuck_modes(context, count) or context.linear_mode("free", count)
 
 
 def retained(

@@ -11,6 +11,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ...case.harmonic import HarmonicSection, nodal_diameter
+from ...errors import InputError
 from ...model.structure import WHOLE
 from .context import AnalysisContext
 from .rest import rest_state
@@ -43,6 +44,14 @@ def nearest_modes(context: AnalysisContext[Any], omega: float, count: int, conta
     if context.case.wheel is not None and not factor_fits(context.model):
         return _by_waves(context, omega, count, contact)
     return context.linear_mode(contact, count, omega)
+
+
+def nearest_or_free(context: AnalysisContext[Any], omega: float, count: int) -> list[LinearMode]:
+    """The same with contact that sticks or, where that leaves nothing to move, without it. Collective."""
+    try:
+        return nearest_modes(context, omega, count)
+    except InputError:
+        return nearest_modes(context, omega, count, "free")
 
 
 def _by_waves(context: AnalysisContext[Any], omega: float, count: int, contact: str) -> list[LinearMode]:

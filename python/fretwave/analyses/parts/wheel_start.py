@@ -15,8 +15,8 @@ from ...case.observed import dof_of
 from .asymptotes import most_like, other_asymptote
 from .context import AnalysisContext
 from .observed import observed_by
-from .rest import modes_at_rest, rest_state, start_mode
-from .tuned import nearest_modes, tuned_sector
+from .rest import modes_or_free, rest_state, start_mode, stuck_or_free
+from .tuned import nearest_modes, nearest_or_free, tuned_sector
 
 if TYPE_CHECKING:
     from ...hb.observed import Observed
@@ -74,7 +74,7 @@ def _on_wheel(context: AnalysisContext[ModeAnalysis]) -> Start:
     rest = rest_state(context)
     mode = None
     if mistuned and analysis.nodal_diameter is None:
-        mode = context.numbered(modes_at_rest(context, analysis.linear_mode), analysis.linear_mode)
+        mode = stuck_or_free(context, analysis.linear_mode)
         context = context.of(_family(context, mode))
     tuned, asymptotes = _tuned(context)
     analysis = context.analysis
@@ -103,7 +103,7 @@ def _tuned(context: AnalysisContext[ModeAnalysis]) -> tuple[LinearMode, dict[str
     """Linear mode of the tuned sector in the wave that the analysis names, and its other asymptote. Collective."""
     analysis = context.analysis
     with tuned_sector(context) as sector:
-        stuck, _ = start_mode(sector, analysis.linear_mode)
+        stuck, _ = start_mode(sector, analysis.linear_mode, or_free=True)
         return stuck, other_asymptote(sector, stuck)
 
 
@@ -129,7 +129,7 @@ def _family(context: AnalysisContext[ModeAnalysis], mode: LinearMode) -> ModeAna
     count = min(wheel.unit, analysis.linear_mode // wheel.sectors + MORE_FAMILIES)
     with tuned_sector(context.of(named)) as sector:
         rest_state(sector)  # numbers are those of the pairs that it closes
-        modes = modes_at_rest(sector, count)
+        modes = modes_or_free(sector, count)
     shares = [abs((m.shape - 1j * m.imaginary) @ (M @ waves[diameters])) for m in modes]
     return named.model_copy(update={"linear_mode": 1 + int(np.argmax(shares))})
 
@@ -182,7 +182,7 @@ def _most_alike(context: AnalysisContext[ModeAnalysis], tuned: LinearMode) -> Li
     analysis = context.analysis
     wheel = context.wheel
     wave = wave_mode(tuned, nodal_diameter(analysis), wheel.sectors)
-    return most_alike(nearest_modes(context, tuned.omega, wheel.sectors), wave, context.case.M)
+    return most_alike(nearest_or_free(context, tuned.omega, wheel.sectors), wave, context.case.M)
 
 
 def _free(context: AnalysisContext[ModeAnalysis], mode: LinearMode) -> dict[str, float]:

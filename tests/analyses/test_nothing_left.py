@@ -1,0 +1,105 @@
+"""Contact that sticks leaves nothing to move: a wheel, tuned or mistuned, begins without it, as one sector does."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.linalg
+from command_line import call
+from models.solved_case import tables_of
+from tolerances import SOLVED, TIGHT
+
+N = 6
+DEVIATIONS = np.array([0.02, -0.01, 0.03, 0.0, -0.02, 0.01])
+#: A ring of masses on ground springs, each under a rubbing pair that holds it where it does not slide.
+RING = f"""
+[model]
+dofs = ["mass", "next"]
+M = [[1.0, 0.0], [0.0, 0.0]]
+K = [[2.0, -1.0], [-1.0, 1.0]]
+sectors = {N}
+low = ["mass"]
+high = ["next"]
+"""
+RUB = """
+[[contact]]
+name = "rub"
+law = "regularised_coulomb"
+pairs = ["mass"]
+friction_limit = 0.05
+regularisation_velocity = 0.5
+"""
+MISTUNED = f"wheel = true\nmistuning = {{ deviations = {DEVIATIONS.tolist()} }}\n"
+
+
+def mode(name: str, keys: str) -> str:
+    return f"""
+[[analysis]]
+name = "{name}"
+type = "mode"
+method = "EPMC"
+harmonics = 3
+normalise = "mass"
+amplitude = [0.5, 1.0]
+{keys}"""
+
+
+def wheel() -> np.ndarray:
+    """Stiffness of the ring, each sector's own by its deviation larger."""
+    K = np.zeros((N, N))
+    for j, own in enumerate(1 + DEVIATIONS):
+        k = (j + 1) % N
+        K[j, j] += own
+        K[np.ix_([j, k], [j, k])] += own * np.array([[1, -1], [-1, 1]])
+    return K
+
+
+def told(folder: Path, name: str) -> float:
+    """Frequency that a wheel's branch begins from."""
+    entries = json.loads((folder / "run" / "run.json").read_text(encoding="utf-8"))["analyses"]
+    return entries[name]["wheel"]["start_frequency_hz"]
+
+
+def test_a_wave_on_the_wheel_is_that_on_one_sector(shared_tmp, comm):
+    waves = mode("sector", "nodal_diameter = 1\n") + mode("wheel", "wheel = true\nnodal_diameter = 1\n")
+    sector, whole = tables_of(RING + RUB + waves, shared_tmp, comm, "sector", "wheel")
+    for column in ("amplitude", "omega", "zeta"):
+        assert whole[column][[0, -1]] == pytest.approx(sector[column][[0, -1]], rel=SOLVED)
+
+
+def test_a_mistuned_wheel_begins_at_its_own_frequencies(shared_tmp, comm):
+    """By number, and as a mode of the scattered pair of a wave, the lower where both have equal shares in it."""
+    modes = mode("numbered", MISTUNED + "linear_mode = 2\n") + mode("wave", MISTUNED + "nodal_diameter = 1\n")
+    tables_of(RING + RUB + modes, shared_tmp, comm, "numbered", "wave")
+    squares, shapes = scipy.linalg.eigh(wheel())
+    hertz = np.sqrt(squares) / (2 * np.pi)
+    share = np.abs(np.exp(2j * np.pi * np.arange(N) / N) @ shapes) ** 2
+    assert told(shared_tmp, "numbered") == pytest.approx(hertz[1], rel=TIGHT)
+    assert told(shared_tmp, "wave") == pytest.approx(hertz[(share > 0.999 * share.max()).argmax()], rel=TIGHT)
+
+
+PRELOAD = "[preload]\n"
+ONE = '[model]\ndofs = ["mass"]\nM = [[1.0]]\nK = [[2.0]]\n'
+CHECKED = {
+    "one mass": ONE + RUB + mode("mode", ""),
+    "one mass at rest": ONE + PRELOAD + RUB + mode("mode", ""),
+    "wheel": RING + RUB + mode("mode", "wheel = true\nnodal_diameter = 1\n"),
+    "mistuned wheel": RING + RUB + mode("mode", MISTUNED + "nodal_diameter = 1\n"),
+    "mistuned wheel at rest": RING + PRELOAD + RUB + mode("mode", MISTUNED + "linear_mode = 2\n"),
+}
+
+
+@pytest.mark.ranks(1)
+@pytest.mark.parametrize("name", CHECKED)
+def test_check_takes_what_a_run_solves(name, tmp_path, capfd):
+    path = tmp_path / "case.toml"
+    path.write_text(CHECKED[name], encoding="utf-8")
+    assert call("check", path) == 0
+    said = capfd.readouterr().out
+    squares = scipy.linalg.eigvalsh(wheel())
+    expected = np.sqrt(squares[1] if "mistuned" in name else 2.0) / (2 * np.pi)
+    assert f"with contact as at rest: {expected:.6g} Hz" in said
+    assert call("run", path, "--no-plots", "-q", "--out", tmp_path / "run") == 0
