@@ -21,7 +21,7 @@ import numpy.typing as npt
 from ..arrays import Complex
 from ..model.sectors import Given
 from ..model.wheel_matrix import WheelMatrix
-from ..post.wave_content import participation, wave_content
+from ..post.wave_content import largest, participation, wave_content
 from .engine_order import folded
 
 if TYPE_CHECKING:
@@ -73,11 +73,11 @@ class WheelShape:
         """The same of the observed dof's amplitudes (N,) and q^H M q."""
         content = np.abs(wave_content(a)) ** 2
         share = content / content.sum()
-        most = int(np.argmax(np.round(share, 9)))  # of a real shape forward and backward waves have equal shares
+        most = largest(share)  # of a real shape forward and backward waves have equal shares
         return {
             "amplification": float(np.abs(a).max() / (self.tuned_amplitude * np.sqrt(energy))),
             "participation": participation(a),
-            "largest_sector": int(np.argmax(np.round(np.abs(a) / np.abs(a).max(), 9))),
+            "largest_sector": largest(np.abs(a)),
             "diameters": folded(most, self.sectors),
             "diameters_share": float(share[most]),
         }

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..arrays import Array
 from .response_peaks import NOWHERE, Peak, amplitude_peak
+from .wave_content import largest
 
 
 def blade_tables(
@@ -26,7 +27,7 @@ def blade_tables(
     amplitude = np.array([[peak.amplitude for peak in row] for row in each])
     frequency = np.array([[peak.omega for peak in row] for row in each]) / (2 * np.pi)
     tuned_amplitude = np.array([peak.amplitude for peak in before])
-    most = np.array([int(np.argmax(np.nan_to_num(row))) for row in amplitude])
+    most = np.array([largest(np.nan_to_num(row)) for row in amplitude])
     rows = np.arange(len(levels))
     peaks = {
         "level": levels,

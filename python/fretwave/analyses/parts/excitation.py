@@ -16,6 +16,7 @@ from ...case.harmonic import nodal_diameter
 from ...case.observed import dof_of
 from ...cyclic.engine_order import speed_rpm
 from ...post.motion import complex_amplitudes
+from ...post.wave_content import largest
 from .branch import continuation
 from .context import AnalysisContext
 from .observed import observed_by
@@ -122,7 +123,7 @@ class Excitation:
         if self.context.case.wheel is not None:
             observed = problem.coefficients_at(y, self.context.case.places(dof_of(self.analysis.observe)))
             blades = np.abs(complex_amplitudes(problem.harmonics.labels, observed)[1])
-            row = {**row, "largest_amplitude": float(blades.max()), "largest_sector": int(np.argmax(blades))}
+            row = {**row, "largest_amplitude": float(blades.max()), "largest_sector": largest(blades)}
         return row
 
 

@@ -14,7 +14,7 @@ from ...errors import InputError
 from ...model.sectors import in_wave
 from ...post.amplification import WIDTHS, Family, largest_response
 from ...post.blade_peaks import whitehead
-from ...post.wave_content import participation, wave_content
+from ...post.wave_content import largest, participation, wave_content
 from .asymptotes import limit_model
 from .context import AnalysisContext
 
@@ -51,10 +51,10 @@ def around_wheel(context: AnalysisContext[LinearAnalysis], mode: LinearMode) -> 
     content = np.abs(wave_content(a)) ** 2
     n = len(a)
     share = np.array([content[d] + (content[n - d] if 0 < 2 * d < n else 0.0) for d in range(n // 2 + 1)])
-    most = int(np.argmax(np.round(share / share.sum(), 9)))
+    most = largest(share)
     return {
         "participation": participation(a),
-        "largest_sector": int(np.argmax(np.round(np.abs(a) / np.abs(a).max(), 9))),
+        "largest_sector": largest(np.abs(a)),
         "diameters": most,
         "diameters_share": float(share[most] / share.sum()),
     }

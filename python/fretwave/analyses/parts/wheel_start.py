@@ -12,6 +12,7 @@ import scipy.sparse as sp
 from ...arrays import Complex
 from ...case.harmonic import nodal_diameter
 from ...case.observed import dof_of
+from ...post.wave_content import largest
 from .asymptotes import most_like, other_asymptote
 from .context import AnalysisContext
 from .observed import observed_by
@@ -171,7 +172,7 @@ def _largest(context: AnalysisContext[ModeAnalysis], mode: LinearMode) -> int:
     """Sector in which the normalised dof moves most."""
     analysis = context.analysis
     dof = context.tuned.dof(dof_of(analysis.normalise))
-    return int(np.argmax(np.abs(context.wheel.by_sector(mode.shape)[:, dof])))
+    return largest(np.abs(context.wheel.by_sector(mode.shape)[:, dof]))
 
 
 def _most_alike(context: AnalysisContext[ModeAnalysis], tuned: LinearMode) -> LinearMode:
