@@ -72,6 +72,50 @@ def test_a_tuned_wheel_has_the_modes_of_its_waves_around_it(solve):
     assert table["participation"][[0, 5]] == pytest.approx(1.0, abs=REPEATED)
 
 
+#: A sector of disk, blade and tip at random, the disk's spring to the next one's too: no mirror image of itself.
+SEED, RUB, SECTORS = 5, 20.0, 7
+DRAWN = np.random.default_rng(SEED).standard_normal((4, 4)).round(2)
+SKEW, MASSES = DRAWN @ DRAWN.T + np.eye(4), np.diag([2.0, 0.5, 1.0])
+DISKS = f"""
+[model]
+dofs = ["disk", "blade", "tip", "next"]
+M = {np.pad(MASSES, (0, 1)).tolist()}
+K = {SKEW.tolist()}
+sectors = {SECTORS}
+low = ["disk"]
+high = ["next"]
+
+[[contact]]
+name = "rub"
+law = "jenkins"
+pairs = ["blade"]
+tangential_stiffness = {RUB}
+friction_limit = 1.0
+"""
+
+
+def disks(diameters: int, rub: float) -> tuple[np.ndarray, np.ndarray]:
+    """Frequencies [Hz] and shapes of a wave."""
+    T = np.vstack([np.eye(3), [np.exp(-2j * np.pi * diameters / SECTORS), 0, 0]])
+    squares, shapes = scipy.linalg.eigh(T.conj().T @ SKEW @ T + np.diag([0.0, rub, 0.0]), MASSES)
+    return np.sqrt(squares) / (2 * np.pi), shapes
+
+
+@pytest.mark.parametrize("keys", ["", WHEEL])
+def test_the_mode_most_like_a_double_one_is_that_of_its_wave(solve, keys):
+    """On the wheel as on one sector, however the solver turns the modes of a pair, on every number of ranks."""
+    (table,) = solve(DISKS + f'[[analysis]]\nname = "linear"\ntype = "linear"\nmodes = 3\n{keys}', "linear")
+    expected = []
+    for diameters in range(SECTORS // 2 + 1):
+        (stuck, shapes), (free, loose) = disks(diameters, RUB), disks(diameters, 0.0)
+        alike = np.abs(shapes.conj().T @ MASSES @ loose).argmax(axis=1)
+        copies = 2 if keys and 0 < 2 * diameters < SECTORS else 1
+        expected += copies * list(zip(stuck, free[alike]))
+    own = table["contact"] == "stuck"
+    found = sorted(zip(table["frequency_hz"][own], table["other_hz"][own]))
+    assert np.array(found) == pytest.approx(np.array(sorted(expected)), rel=TIGHT)
+
+
 def response(deviations: np.ndarray, omega: np.ndarray) -> np.ndarray:
     """|x_j| (n_omega, N) under a unit force of engine order 2, all modes of the tuned wheel damped by ZETA."""
     tuned = wheel(np.zeros(N))

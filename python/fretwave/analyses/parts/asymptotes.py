@@ -8,11 +8,14 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
 import scipy.sparse as sp
 
 from ...case.analysis import AnalysisSection
 from ...case.harmonic import HarmonicSection, nodal_diameter
 from ...model.contact import Contact, in_limit
+from ...model.sectors import in_wave
+from ...post.wave_content import largest
 from .context import AnalysisContext
 
 if TYPE_CHECKING:
@@ -25,6 +28,8 @@ if TYPE_CHECKING:
 #: Modes looked through for the one most like the stuck mode, beyond its own number: two, and the six rigid motions of a
 #: body that friction alone holds.
 MORE_MODES = 8
+#: Frequencies that differ by less, relative, are one: of a double mode, which the solver leaves apart by rounding.
+SAME = 1e-8
 
 
 def other_asymptote(context: AnalysisContext[HarmonicSection], stuck: LinearMode) -> dict[str, float]:
@@ -40,12 +45,13 @@ def other_asymptote(context: AnalysisContext[HarmonicSection], stuck: LinearMode
     if not context.case.contacts:
         return {}
     count = min(context.model.n_dof, context.analysis.linear_mode + MORE_MODES)
+    diameters = nodal_diameter(context.analysis)
     if all(contact.components == 1 for contact in context.case.contacts):
-        return {"free_omega": most_like(context, context.linear_mode("free", count), stuck).omega}
+        return {"free_omega": most_like(context, context.linear_mode("free", count), stuck, diameters).omega}
     from ...model.modes import linear_modes
 
-    with limit_model(context.case, context.comm, "sliding", nodal_diameter(context.analysis)) as model:
-        return {"sliding_omega": most_like(context, linear_modes(model, count), stuck).omega}
+    with limit_model(context.case, context.comm, "sliding", diameters) as model:
+        return {"sliding_omega": most_like(context, linear_modes(model, count), stuck, diameters).omega}
 
 
 def limit_model(case: Case, comm: MPI.Comm, limit: str, diameters: int = 0) -> Model:
@@ -90,9 +96,34 @@ def asymptote_line(name: str, stuck: float, other: dict[str, float]) -> str:
     return f"{name}: asymptotes: {', '.join(texts)}"
 
 
-def most_like(context: AnalysisContext[AnalysisSection], modes: Sequence[LinearMode], stuck: LinearMode) -> LinearMode:
-    """The mode most like another, by the product of their shapes with M."""
-    M, wanted = context.case.M, stuck.shape + 1j * stuck.imaginary
-    shapes = [mode.shape + 1j * mode.imaginary for mode in modes]
-    likeness = [abs(phi.conj() @ (M @ wanted)) / math.sqrt((phi.conj() @ (M @ phi)).real) for phi in shapes]
-    return modes[int(np.argmax(likeness))]
+def most_like(
+    context: AnalysisContext[AnalysisSection], modes: Sequence[LinearMode], stuck: LinearMode, diameters: int = 0
+) -> LinearMode:
+    """The mode most like another, by the product of their shapes with M in the wave.
+
+    Modes of one frequency span a plane in which the solver turns them at will: the whole of it is compared, and the
+    other mode's projection on it stands for it.
+
+    Parameters
+    ----------
+    modes : ascending, of unit modal mass
+    diameters : nodal diameters of the wave of both, on a sector
+    """
+    neighbours = context.case.neighbours
+    theta = 2 * np.pi * diameters / neighbours.sectors if neighbours else 0.0
+    wanted = in_wave(context.case.structure.M, stuck.shape + 1j * stuck.imaginary, theta)
+    shares = np.array([np.vdot(mode.shape + 1j * mode.imaginary, wanted) for mode in modes])
+    planes = planes_of(modes)
+    plane = planes[largest(np.array([np.linalg.norm(shares[plane]) for plane in planes]))]
+    first = modes[int(plane[0])]
+    if len(plane) == 1:
+        return first
+    shapes = np.array([modes[k].shape + 1j * modes[k].imaginary for k in plane])
+    phi = shares[plane] @ shapes / np.linalg.norm(shares[plane])
+    return replace(first, shape=phi.real.copy(), imaginary=phi.imag.copy())
+
+
+def planes_of(modes: Sequence[LinearMode]) -> list[npt.NDArray[np.intp]]:
+    """Places of the modes that share a frequency, of ascending ones."""
+    omega = np.array([mode.omega for mode in modes])
+    return np.split(np.arange(len(omega)), 1 + np.flatnonzero(np.diff(omega) > SAME * omega[1:]))

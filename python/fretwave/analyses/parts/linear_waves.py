@@ -14,7 +14,7 @@ from ...errors import InputError
 from ...model.sectors import Term, in_wave
 from ...model.structure import SPIN
 from ...post.engine_orders import exciting, margins
-from .asymptotes import MORE_MODES, limit_model, most_like
+from .asymptotes import MORE_MODES, limit_model, most_like, planes_of
 from .context import AnalysisContext
 
 if TYPE_CHECKING:
@@ -62,6 +62,7 @@ def modes_of_wave(
     found = {limit: _modes(context, case, limit, diameters) for limit in _limits(context)}
     loose = next((found[limit] for limit in ("sliding", "free") if limit in found), [])
     for limit, modes in found.items():
+        sought = limit == "stuck" and bool(loose)
         for number, mode in enumerate(modes[: _count(context)], 1):
             yield (
                 {
@@ -73,15 +74,15 @@ def modes_of_wave(
                     "omega": mode.omega,
                     "frequency_hz": mode.frequency_hz,
                     "zeta": damping_ratio(mode, C, theta),
-                    "other_hz": most_like(context, loose, mode).frequency_hz if limit == "stuck" and loose else np.nan,
+                    "other_hz": most_like(context, loose, mode, diameters).frequency_hz if sought else np.nan,
                 },
                 mode,
             )
 
 
-def _count(context: AnalysisContext[LinearAnalysis]) -> int:
-    """Modes that are told: of a wheel as many for each of its sectors."""
-    return context.analysis.modes * (context.case.wheel.sectors if context.case.wheel else 1)
+def _count(context: AnalysisContext[LinearAnalysis], more: int = 0) -> int:
+    """Modes that are told, or more: of a wheel as many for each of its sectors."""
+    return (context.analysis.modes + more) * (context.case.wheel.sectors if context.case.wheel else 1)
 
 
 def _spinning(context: AnalysisContext[LinearAnalysis], speed_rpm: float) -> Case:
@@ -103,14 +104,17 @@ def _modes(context: AnalysisContext[LinearAnalysis], case: Case, limit: str, dia
     from ...model.modes import linear_modes
 
     with limit_model(case, context.comm, limit, diameters) as model:
-        count = min(model.n_dof, _count(context) + (MORE_MODES if limit != "stuck" else 0))
+        count = _count(context, MORE_MODES) if limit != "stuck" else _count(context)
         try:
-            return linear_modes(model, count)
+            modes = linear_modes(model, min(model.n_dof, count + 1))
         except InputError:
             if limit != "stuck" or context.analysis.contact == ["stuck"]:
                 raise
             context.console.line(f"{context.name}: contact that sticks leaves nothing to move")
             return []
+    if len(modes) > count and limit != "stuck":  # of the last, a double one, the other may be left out
+        return modes[: max(_count(context), int(planes_of(modes)[-1][0]))]
+    return modes[:count]
 
 
 def damping_ratio(mode: LinearMode, C: Optional[Term], theta: float = 0.0) -> float:

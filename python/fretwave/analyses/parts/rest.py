@@ -158,10 +158,11 @@ def modes_at_rest(context: AnalysisContext[AnalysisSection], count: int) -> list
         return context.linear_mode("stuck", count)
     from ...model.modes import linear_modes
 
-    with with_friction(context.case, context.model, nodal_diameter(context.analysis)) as model:
+    diameters = nodal_diameter(context.analysis)
+    with with_friction(context.case, context.model, diameters) as model:
         stuck = linear_modes(model, count)
     found = context.linear_mode("stuck", min(context.model.n_dof, count + MORE_MODES))
-    return [most_like(context, found, mode) for mode in stuck]
+    return [most_like(context, found, mode, diameters) for mode in stuck]
 
 
 def _stuck_modes(context: AnalysisContext[AnalysisSection], count: int) -> list[LinearMode]:
