@@ -14,7 +14,7 @@ from tolerances import REPEATED, TIGHT
 from fretwave.case.load import load_case
 from fretwave.errors import CaseErrors, InputError
 from fretwave.plots import campbell
-from fretwave.post.amplification import Family, largest_response
+from fretwave.post.amplification import Family, largest_peak
 from fretwave.post.blade_peaks import whitehead
 from fretwave.results.reader import Run
 
@@ -140,6 +140,47 @@ def test_amplification_is_that_of_the_response_solved_directly(solve, shared_tmp
     assert table["amplification"] == pytest.approx(table["amplitude"] / tuned, rel=1e-8)
 
 
+def mistuned_disks(deviations: np.ndarray, rub: float, damping: float, omega: np.ndarray) -> np.ndarray:
+    """|tips| (n_omega, N) under a unit force of engine order 3 on the tips, each sector's own K by its deviation."""
+    n = 3 * SECTORS
+    K, M = np.kron(np.eye(SECTORS), np.diag([0.0, rub, 0.0])), np.kron(np.eye(SECTORS), MASSES)
+    for j, own in enumerate(1 + deviations):
+        place = np.array([3 * j, 3 * j + 1, 3 * j + 2, 3 * (j + 1) % n])
+        K[np.ix_(place, place)] += own * SKEW
+    F = np.zeros(n, dtype=complex)
+    F[2::3] = np.exp(-2j * np.pi * 3 * np.arange(SECTORS) / SECTORS)
+    Z = K + (1j * damping * omega - omega**2)[:, None, None] * M
+    return np.abs(np.linalg.solve(Z, np.broadcast_to(F, (len(omega), n))[..., None])[:, 2::3, 0])
+
+
+def highest_peak(size: np.ndarray) -> float:
+    """Of all columns' maxima between the ends; nan where there are none."""
+    inner = (size[1:-1] > size[:-2]) & (size[1:-1] > size[2:])
+    return size[1:-1][inner].max(initial=-np.inf) if inner.any() else np.nan
+
+
+@pytest.mark.parametrize("damping", [0.1, 0.3])
+def test_peaks_about_every_mode_are_maxima_of_the_response(solve, shared_tmp, damping):
+    """Nearer to it than to the next mode; weakly driven or much damped it has none, on the flanks of the others'."""
+    deviations = np.array([0.02, -0.01, 0.03, 0.0, -0.02, 0.01, -0.03])
+    tables = DISKS.replace("sectors", f"mass_damping = {damping}\nsectors", 1)
+    keys = f'modes = 3\nobserve = "tip"\nengine_order = 3\nmistuning = {{ deviations = {deviations.tolist()} }}\n'
+    (table,) = solve(tables + f'[[analysis]]\nname = "linear"\ntype = "linear"\n{WHEEL}{keys}', "linear_amplification")
+    found, expected = np.column_stack([table["tuned_amplitude"], table["amplitude"]]), []
+    for rub in (RUB, 0.0):
+        hz = disks(3, rub)[0]
+        ends = np.concatenate([[0.5 * hz[0]], 0.5 * (hz[1:] + hz[:-1]), [1.2 * hz[-1]]])
+        for low, high in zip(ends, ends[1:]):
+            omega = 2 * np.pi * np.linspace(low, high, 12_001)
+            both = [mistuned_disks(own, rub, damping, omega) for own in (0 * deviations, deviations)]
+            expected.append([highest_peak(both[0][:, :1]), highest_peak(both[1])])
+    assert found == pytest.approx(np.array(expected), rel=1e-5, nan_ok=True)
+    lost = np.isnan(expected).any(axis=1)
+    assert (np.isnan(table["amplification"]) == lost).all() and lost.any() == (damping == 0.3)
+    log = (shared_tmp / "run" / "run.log").read_text(encoding="utf-8")
+    assert log.count("no peak of") == lost.sum()
+
+
 def test_engine_orders_meet_every_mode_of_a_wheel_but_draw_no_diagram(solve, shared_tmp):
     (crossings,) = solve(text(MISTUNED + "modes = 1\nspeed_rpm = 6.0\n"), "linear_crossings")
     assert len(crossings["mode"]) == 2 * N * 6
@@ -164,7 +205,7 @@ def test_no_pattern_passes_whiteheads_bound_and_some_come_near():
         family = Family(np.sqrt(square), shapes.T.astype(complex), 2e-3 * np.eye(n, dtype=complex))
         force = np.exp(-2j * np.pi * 3 * np.arange(n) / n)
         tuned = 1 / (2e-3 * np.sqrt(1 + 2 * coupling * (1 - np.cos(2 * np.pi * 3 / n)) - 1e-6))
-        found.append(largest_response(family, force, np.array([0.9, 1.2])).amplitude / tuned)
+        found.append(largest_peak(family, force, np.array([0.9, 1.2])).amplitude / tuned)
     assert min(found) > 1.0 and 0.75 * whitehead(n) < max(found) < whitehead(n)
 
 

@@ -82,7 +82,7 @@ class LinearAnalysis(AnalysisSection):
         "dof of a sector whose amplitudes around the wheel are told of every mode", example='"tip"', default=None
     )
     engine_order: Optional[Whole] = key(
-        "of a force at `observe` in every sector: largest response of the mistuned wheel over that of the tuned one",
+        "of a force at `observe` in every sector: largest peak of the mistuned wheel over that of the tuned one",
         example="4",
         default=None,
         ge=1,

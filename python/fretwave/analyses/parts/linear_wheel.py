@@ -12,7 +12,7 @@ from ...columns import Column
 from ...cyclic.engine_order import folded
 from ...errors import InputError
 from ...model.sectors import in_wave
-from ...post.amplification import WIDTHS, Family, largest_response
+from ...post.amplification import WIDTHS, Family, Largest, largest_peak
 from ...post.blade_peaks import whitehead
 from ...post.wave_content import largest, participation, wave_content
 from .asymptotes import limit_model
@@ -41,6 +41,7 @@ AMPLIFICATION = (
     "sector",
     "amplification",
 )
+NO_PEAK = Largest(np.nan, np.nan, -1)
 
 
 def around_wheel(context: AnalysisContext[LinearAnalysis], mode: LinearMode) -> dict[str, Any]:
@@ -65,9 +66,9 @@ def amplifications(
 ) -> list[dict[str, Any]]:
     """Of a unit force of the engine order at the observed dof, by limit of the contact and mode of its wave.
 
-    The largest response of any sector over that of the tuned wheel, both at frequencies about that of the mode: as far
-    off as the largest deviation, where its peaks are after mistuning. Modes at the end of those found have no row.
-    Collective.
+    The largest peak of any sector over that of the tuned wheel, both at frequencies about that of the mode: as far off
+    as the largest deviation, where its peaks are after mistuning. Where one of them has no peak there, on the flank of
+    another mode's, its numbers are nan and its sector is -1. Modes at the end of those found have no row. Collective.
     """
     rows, sectors = [], context.wheel.sectors
     wave = folded(context.analysis.engine_order or 0, sectors)
@@ -82,19 +83,25 @@ def amplifications(
                 window[1] <= last
                 or number == len(tuned.omega) == len(modes) // sectors == context.tuned.structure.n_dof
             ):
-                before = largest_response(tuned, np.ones(1, dtype=complex), window)
-                after = largest_response(every, force, window)
+                before = largest_peak(tuned, np.ones(1, dtype=complex), window) or NO_PEAK
+                after = largest_peak(every, force, window) or NO_PEAK
                 values = (limit, number, before.hz, before.amplitude, after.hz, after.amplitude, after.place)
                 rows.append(dict(zip(AMPLIFICATION, (*values, after.amplitude / before.amplitude))))
     return rows
 
 
 def _windows(context: AnalysisContext[LinearAnalysis], tuned: Family) -> Array:
-    """Frequencies (R, 2) [rad/s] about the modes of a wave among which its peaks are after mistuning."""
+    """Frequencies (R, 2) [rad/s] about the modes of a wave among which their peaks are after mistuning.
+
+    Each is nearer to its own mode than to the next; modes nearer to each other than their widths have one peak.
+    """
     deviations = context.wheel.deviations
     spread = 0.0 if deviations is None else float(np.abs(deviations).max())
-    room = spread * tuned.omega + WIDTHS * np.real(np.diagonal(tuned.damping))
-    return np.column_stack([np.maximum(tuned.omega - room, 0.0), tuned.omega + room])
+    omega, width = tuned.omega, np.real(np.diagonal(tuned.damping))
+    room, middle = spread * omega + WIDTHS * width, 0.5 * (omega[1:] + omega[:-1])
+    apart = np.diff(omega) > width[1:] + width[:-1]
+    low = np.maximum(omega - room, np.concatenate([[0.0], np.where(apart, middle, 0.0)]))
+    return np.column_stack([low, np.minimum(omega + room, np.concatenate([np.where(apart, middle, np.inf), [np.inf]]))])
 
 
 def _tuned(context: AnalysisContext[LinearAnalysis], model: Model, wave: int) -> Family:
@@ -141,8 +148,17 @@ def _observed(context: AnalysisContext[LinearAnalysis], mode: LinearMode) -> Com
 def amplification_lines(name: str, rows: Sequence[Mapping[str, Any]], sectors: int) -> list[str]:
     """A line for each mode and limit."""
     return [
-        f"{name}: {row['contact']}: about mode {row['mode']} of the wave: largest peak in sector {row['sector']} at"
-        f" {row['frequency_hz']:.6g} Hz, {row['amplification']:.4f} times that of the tuned wheel at"
-        f" {row['tuned_frequency_hz']:.6g} Hz (Whitehead's bound {whitehead(sectors):.3f})"
+        f"{name}: {row['contact']}: about mode {row['mode']} of the wave: {_amplification(row, sectors)}"
         for row in rows
     ]
+
+
+def _amplification(row: Mapping[str, Any], sectors: int) -> str:
+    if np.isnan(row["amplification"]):
+        words = {"tuned_amplitude": "the tuned wheel", "amplitude": "any sector"}
+        none = [text for key, text in words.items() if np.isnan(row[key])]
+        return f"no peak of {' or of '.join(none)} on the flanks of the others'"
+    return (
+        f"largest peak in sector {row['sector']} at {row['frequency_hz']:.6g} Hz, {row['amplification']:.4f} times that"
+        f" of the tuned wheel at {row['tuned_frequency_hz']:.6g} Hz (Whitehead's bound {whitehead(sectors):.3f})"
+    )
