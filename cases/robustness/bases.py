@@ -76,7 +76,7 @@ def two_dof() -> dict[str, Any]:
         if "amplitude" in analysis and "mode" in (analysis["type"], analysis["name"]):
             analysis["amplitude"] = [0.1, 0.12]
         if analysis["type"] in ("free_decay", "limit_cycle"):
-            analysis.update(amplitude=[0.11], periods=6, tolerance=1e-6)
+            analysis.update(amplitude=[0.11], periods=12, tolerance=1e-6)
     modes = [analysis for analysis in case["analysis"] if analysis["type"] == "mode"]
     for mode in modes:
         mode.update(amplitude=[0.1, 0.12], report_at=[])

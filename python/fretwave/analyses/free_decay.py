@@ -9,13 +9,14 @@ import numpy as np
 
 from ..case.analysis import AnalysisSection, register_analysis
 from ..case.checks_common import check_once
-from ..case.observed import check_displaced
+from ..case.observed import check_displaced, given_to
 from ..case.schema import Damper, Positive, Whole, key
 from ..columns import Column
 from ..post.cycles import extract
 from ..post.decays import decay_rows, largest_differences
-from ..post.mode_curve import ModeCurve
-from ..solve.steps import TIME_TOLERANCE
+from ..post.mode_curve import ModeCurve, at_the_end
+from ..solve.steps import COARSEST_TOLERANCE, TIME_TOLERANCE
+from ..texts import toml
 from .mode import ModeAnalysis
 from .parts.context import AnalysisContext, Outcome
 
@@ -37,7 +38,9 @@ class TransientSection(AnalysisSection):
     amplitude: list[Positive] = key("start amplitudes", "length", "[0.05, 0.3, 2.5]", min_length=1)
     periods: Whole = key("vibration periods to integrate", example="30", ge=1)
     samples_per_period: Whole = key("output samples of a period", example="64", default=64, ge=8)
-    tolerance: Positive = key("relative tolerance of the time integration", "-", "1e-10", default=TIME_TOLERANCE, lt=1)
+    tolerance: Positive = key(
+        "relative tolerance of the time integration", "-", "1e-10", default=TIME_TOLERANCE, le=COARSEST_TOLERANCE
+    )
 
     def needs(self) -> list[str]:
         return [self.mode]
@@ -58,6 +61,22 @@ class TransientSection(AnalysisSection):
         report.mode(("mode",), self.mode, facts.analyses_of("mode"))
         check_displaced(report, "mode", self.mode, facts)
         check_once(report, "amplitude", self.amplitude)
+        self._check_starts(report, facts)
+
+    def _check_starts(self, report: Reporter, facts: Facts) -> None:
+        """Each lies where its mode is asked for, right or wrong as that may stand in the case."""
+        given = given_to(facts, self.mode, "amplitude") if self.mode in facts.analyses_of("mode") else None
+        if not isinstance(given, list) or len(given) != 2 or any(type(end) not in (int, float) for end in given):
+            return
+        ends = np.array(given, dtype=float)
+        for index, start in enumerate(self.amplitude):
+            if not ends.min() <= at_the_end(ends, start) <= ends.max():
+                report.wrong(
+                    ("amplitude", index),
+                    "is outside the mode's branch",
+                    f"a value within {self.mode}.amplitude = {toml(given)}",
+                    f"change it, or widen the range of '{self.mode}'",
+                )
 
     def least_memory(self, facts: Facts) -> Mapping[str, float]:
         count = self.periods * self.samples_per_period

@@ -4,19 +4,25 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from ..case.analysis import register_analysis
 from ..post.cycles import extract
-from ..post.decays import Ending, compare, cycle_rows, divergence_factor, ending
+from ..post.decays import LAST_CYCLES, Ending, compare, cycle_rows, divergence_factor, ending
 from ..post.mode_curve import Crossing, ModeCurve
 from .free_decay import TransientSection
 from .mode import ModeAnalysis
 from .parts.context import AnalysisContext, Outcome
 from .parts.shifted import shifted_damping
 
+if TYPE_CHECKING:
+    from ..case.facts import Facts
+    from ..case.reporter import Reporter
+
+#: The first and the last one are not full.
+LEAST_PERIODS = LAST_CYCLES + 2
 COLUMNS = ("start", "cycle", "time", "amplitude", "frequency_hz")
 
 
@@ -27,6 +33,12 @@ class LimitCycleAnalysis(TransientSection):
     pictures = ("trajectories", "limit_cycles")
 
     type: Literal["limit_cycle"]
+
+    def check(self, report: Reporter, facts: Facts) -> None:
+        super().check(report, facts)
+        if self.periods < LEAST_PERIODS:
+            expected = f"at least {LEAST_PERIODS}: the last {LAST_CYCLES} full cycles decide"
+            report.wrong(("periods",), "is too few for a verdict", expected, "write for example `periods = 100`")
 
     def run(self, context: AnalysisContext[LimitCycleAnalysis]) -> Outcome:
         """Follow each start until it has settled or diverges, and compare with the zeros of the damping. Collective."""

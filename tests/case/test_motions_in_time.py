@@ -1,0 +1,51 @@
+"""What analyses by time integration are refused before anything is computed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from fretwave.case.load import load_case
+from fretwave.errors import CaseErrors, InputError
+
+pytestmark = pytest.mark.ranks(1)
+CASE = Path(__file__).parents[2] / "cases" / "two_dof" / "case.toml"
+
+
+def problems(*overrides: str) -> list[InputError]:
+    with pytest.raises(CaseErrors) as caught:
+        load_case(CASE, list(overrides))
+    return list(caught.value.problems)
+
+
+@pytest.mark.parametrize("name", ["free_decay", "limit_cycle"])
+@pytest.mark.parametrize("start", [0.0199, 3.001])
+def test_a_start_outside_of_its_mode_is_refused_at_once(name: str, start: float) -> None:
+    [problem] = problems(f"{name}.amplitude=[0.3, {start}]")
+    assert problem.what == f"{name}.amplitude[1] is outside the mode's branch"
+    assert "amplitude = [0.02, 3.0]" in str(problem.expected) and "widen the range" in str(problem.fix)
+
+
+def test_a_start_at_an_end_of_its_mode_is_right() -> None:
+    load_case(CASE, ["limit_cycle.amplitude=[0.02, 3.0]", "free_decay.amplitude=[3.0000000000000004]"])
+
+
+def test_a_range_that_is_wrong_is_told_where_it_stands() -> None:
+    [problem] = problems('mode.amplitude=["a", 3.0]')
+    assert problem.what.startswith("mode.amplitude")
+
+
+@pytest.mark.parametrize("name", ["free_decay", "limit_cycle"])
+def test_a_tolerance_with_which_nothing_is_found_is_refused(name: str) -> None:
+    """At 0.1 and 0.03 starts of this case left its limit cycle at 0.137 m for infinity."""
+    load_case(CASE, [f"{name}.tolerance=1e-3"])
+    for tolerance in (0.1, 0.03, 1.1e-3):
+        [problem] = problems(f"{name}.tolerance={tolerance}")
+        assert "<= 0.001" in str(problem.expected) and problem.fix
+
+
+def test_too_few_periods_for_a_verdict_are_refused() -> None:
+    load_case(CASE, ["limit_cycle.periods=12"])
+    [problem] = problems("limit_cycle.periods=11")
+    assert problem.what == "limit_cycle.periods is too few for a verdict" and problem.fix
