@@ -9,7 +9,7 @@ from tolerances import ROUNDING
 import fretwave as fw
 from fretwave.analyses.parts.shifted import added_ratio
 from fretwave.errors import InputError
-from fretwave.post.cycles import Cycles, extract
+from fretwave.post.cycles import Cycles, above_noise, extract, noise_floor
 from fretwave.post.decays import (
     compare,
     cycle_rows,
@@ -136,6 +136,32 @@ def test_integrated_free_motion_has_the_oscillators_damping():
     assert not found.diverged
     assert np.allclose(cycles.zeta, 0.02, atol=1e-6)
     assert np.allclose(cycles.omega, 25.0 * np.sqrt(1.0 - 0.02**2), rtol=1e-6)
+
+
+@pytest.mark.ranks(1)
+@pytest.mark.parametrize("omega", [0.005, 25.0, 1e4])
+@pytest.mark.parametrize("tolerance", [1e-10, 1e-6, 1e-3])
+def test_no_cycle_is_noise_of_the_integration(omega, tolerance):
+    """Every cycle that is kept is that of a e^{-beta t} cos; of those that follow most are nothing."""
+    damping = 0.1
+    with fw.Model(np.eye(1), np.array([[omega**2]]), C=np.array([[2.0 * damping * omega]]), contacts=[]) as model:
+        state = np.array([1.0]), np.array([-damping * omega])  # of e^{-beta t} cos(omega_d t)
+        found = free_motion(fw.Transient(model), state, 0, 2.0 * np.pi / omega / 64, 64 * 80, tolerance)
+    cycles = extract(found.t, found.x, found.v)
+    kept = above_noise(cycles, noise_floor(cycles, tolerance, 1.0))
+    exact = np.exp(-damping * omega * cycles.time)
+    assert kept.amplitude == pytest.approx(exact[: len(kept)], rel=0.05)
+    assert kept.zeta == pytest.approx(np.full(len(kept), damping), abs=0.01)
+    left = -np.log(100.0 * tolerance) / (2.0 * np.pi * damping)
+    assert left - 3 <= len(kept) <= left + 1 and len(kept) < len(cycles) - 10
+
+
+@pytest.mark.ranks(1)
+def test_noise_is_that_of_the_largest_motion_so_far():
+    cycles = cycles_of([1.0, 1e-3, 1e-5, 1e-7, 1e-9])
+    assert len(above_noise(cycles, noise_floor(cycles, 1e-10, 0.0))) == 3
+    assert len(above_noise(cycles, noise_floor(cycles, 1e-10, 1e4))) == 1
+    assert len(above_noise(cycles, noise_floor(cycles, 1e-12, 0.0))) == 5
 
 
 @pytest.mark.ranks(1)

@@ -12,11 +12,10 @@ from ..case.checks_common import check_once
 from ..case.observed import check_displaced, given_to
 from ..case.schema import Damper, Positive, Whole, key
 from ..columns import Column
-from ..post.cycles import extract
 from ..post.decays import decay_rows, largest_differences
 from ..post.mode_curve import ModeCurve, at_the_end
 from ..solve.steps import COARSEST_TOLERANCE, TIME_TOLERANCE
-from ..texts import toml
+from ..texts import counted, toml
 from .mode import ModeAnalysis
 from .parts.context import AnalysisContext, Outcome
 
@@ -102,13 +101,22 @@ class FreeDecayAnalysis(TransientSection):
 
         mode = ModeCurve.from_table(context.table(self.mode))
         rows: list[dict[str, Any]] = []
+        lines: list[str] = []
         with Starts(context, COLUMNS) as starts:
             for number, amplitude in enumerate(self.amplitude):
-                motion = starts.integrate(number, amplitude, np.inf)
-                rows += starts.write(number, motion, decay_rows(number, extract(motion.t, motion.x, motion.v), mode))
+                start = starts.follow(number, amplitude, np.inf)
+                rows += starts.write(number, start.motion, decay_rows(number, start.cycles, mode))
+                lines += [f"{context.name}: start {number}: {text}" for text in start.end(context.units("length"))]
             omega, zeta = largest_differences(rows)
-            line = (
-                f"{context.name}: {len(rows)} cycles; where the damping changes slowly the frequency differs "
-                f"from the mode's by up to {omega:.1e} (relative), the damping ratio by up to {zeta:.1e}"
-            )
-            return starts.finish([line], omega_difference=omega, zeta_difference=zeta)
+            lines.insert(0, f"{context.name}: {_comparison(len(rows), omega, zeta)}")
+            return starts.finish(lines, omega_difference=omega, zeta_difference=zeta)
+
+
+def _comparison(count: int, omega: float, zeta: float) -> str:
+    """In words: how many cycles, and how far they are from the mode where it describes them."""
+    if not np.isfinite(omega):
+        return f"{counted(count, 'full cycle')}, none that changes slowly where the mode is unique: nothing to compare"
+    return (
+        f"{counted(count, 'cycle')}; where the damping changes slowly the frequency differs "
+        f"from the mode's by up to {omega:.1e} (relative), the damping ratio by up to {zeta:.1e}"
+    )

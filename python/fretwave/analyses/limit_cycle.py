@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from ..case.analysis import register_analysis
-from ..post.cycles import extract
 from ..post.decays import LAST_CYCLES, Ending, compare, cycle_rows, divergence_factor, ending
 from ..post.mode_curve import Crossing, ModeCurve
 from .free_decay import TransientSection
@@ -49,10 +48,9 @@ class LimitCycleAnalysis(TransientSection):
         lines: list[str] = []
         with Starts(context, COLUMNS) as starts:
             for number, amplitude in enumerate(self.amplitude):
-                motion = starts.integrate(number, amplitude, divergence_factor(amplitude, crossings))
-                cycles = extract(motion.t, motion.x, motion.v)
-                starts.write(number, motion, cycle_rows(number, cycles))
-                found = ending(cycles, motion.diverged)
+                start = starts.follow(number, amplitude, divergence_factor(amplitude, crossings))
+                starts.write(number, start.motion, cycle_rows(number, start.cycles))
+                found = ending(start.cycles, start.motion.diverged)
                 endings.append({"start": amplitude, **vars(found), **compare(found, crossings)})
                 lines.append(_ending_line(context.name, amplitude, found, crossings, context.units("length")))
             done = starts.finish(lines, endings=json.dumps(endings))

@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 PROJECTION_SAMPLES = 128
 #: the decay rate enters the projection it is computed from; each pass gains about two digits
 PASSES = 4
+#: Noise of an integration in times its tolerance and its largest amplitude. Steps may be off by one of these each; of
+#: decaying oscillators 6 to 22 remain for ever, and at 51 the amplitude of a cycle is 1 % off.
+NOISE = 100.0
 
 
 @dataclass(frozen=True)
@@ -59,6 +62,24 @@ def extract(t: Array, x: Array, v: Array) -> Cycles:
         amplitude = _fundamental(signal, bounds, beta)
         beta = -np.gradient(np.log(amplitude), middle, edge_order=2)
     return Cycles(middle, amplitude, omega, beta / np.hypot(beta, omega))
+
+
+def noise_floor(cycles: Cycles, tolerance: float, size: float) -> Array:
+    """Amplitude (n,) below which a cycle is noise of the integration that it comes from.
+
+    Parameters
+    ----------
+    tolerance : relative, of the integration
+    size : largest displacement of its start, or velocity over the angular frequency, unit of the signal
+    """
+    return NOISE * tolerance * np.maximum.accumulate(np.maximum(cycles.amplitude, size))
+
+
+def above_noise(cycles: Cycles, floor: Array) -> Cycles:
+    """Cycles before the first one below its floor (n,), and without the one that ends where that begins."""
+    below = np.flatnonzero(cycles.amplitude < floor)
+    last = max(int(below[0]) - 1, 0) if len(below) else len(cycles)
+    return Cycles(cycles.time[:last], cycles.amplitude[:last], cycles.omega[:last], cycles.zeta[:last])
 
 
 def interpolated(t: Array, x: Array, v: Array) -> CubicHermiteSpline:

@@ -4,21 +4,53 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import ExitStack
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...arrays import Array
 from ...case.observed import label_of
 from ...columns import Column, Value
 from ...errors import InputError, NotConverged
+from ...post.cycles import Cycles, above_noise, extract, noise_floor
 from ...post.decays import mode_state
 from ...solve.steady import STEPS_PER_PERIOD, Motion, free_motion, start_state
+from ...texts import counted
 from .context import AnalysisContext, Outcome
 from .observed import row_on
 from .whole import integrated_model
 
 if TYPE_CHECKING:
     from ..free_decay import TransientSection
+
+
+#: Periods from the middle of the last cycle to the end of a motion that no longer swings; one and a half at most else.
+QUIET = 3.0
+
+
+@dataclass(frozen=True)
+class Followed:
+    """A start's motion and its cycles, but those in the integration's noise.
+
+    Attributes
+    ----------
+    floor : amplitude below which they are noise; 0 where none is
+    """
+
+    motion: Motion
+    cycles: Cycles
+    floor: float
+
+    def end(self, unit: str) -> list[str]:
+        """In words, where its cycles end before the motion does."""
+        count = len(self.cycles)
+        if self.floor:
+            return [f"ends after {counted(count, 'cycle')}: below {self.floor:.1e} {unit} is the integration's noise"]
+        if not count:
+            return ["fewer than four full cycles"]
+        quiet = self.motion.t[-1] - self.cycles.time[-1] > QUIET * 2.0 * np.pi / self.cycles.omega[-1]
+        return [f"ends after {counted(count, 'cycle')}: it no longer swings about zero"] if quiet else []
 
 
 class Starts:
@@ -47,13 +79,27 @@ class Starts:
         self.writer.abandon()
         self._model.close()
 
-    def integrate(self, number: int, amplitude: float, factor: float) -> Motion:
+    def follow(self, number: int, amplitude: float, factor: float) -> Followed:
         """The motion of the normalised dof from the mode's own motion at an amplitude. Collective.
 
         It is stopped when any dof exceeds `factor` times the largest coefficient of the start.
         """
+        coefficients, beta, omega = self._start(number, amplitude)
+        state = start_state(self.labels, coefficients, beta, omega)
+        self.context.console.line(
+            f"{self.context.name}: start {number} from a = {amplitude:g} {self.context.units('length')}"
+        )
+        motion = self._integrate(number, state, omega, factor * float(np.abs(coefficients).max()))
+        cycles = extract(motion.t, motion.x, motion.v)
+        size = max(float(np.abs(state[0]).max()), float(np.abs(state[1]).max()) / omega)
+        floor = noise_floor(cycles, self.section.tolerance, size)
+        kept = above_noise(cycles, floor)
+        return Followed(motion, kept, float(floor[len(kept)]) if len(kept) < len(cycles) else 0.0)
+
+    def _start(self, number: int, amplitude: float) -> tuple[Array, float, float]:
+        """Harmonic coefficients (n_dof, m), beta and omega of the mode's motion."""
         try:
-            coefficients, beta, omega = mode_state(self.table, self.coefficients, amplitude, self.mode.method)
+            return mode_state(self.table, self.coefficients, amplitude, self.mode.method)
         except InputError as error:
             if not self.mode.amplitude[0] <= amplitude <= self.mode.amplitude[1]:
                 raise
@@ -65,14 +111,11 @@ class Starts:
                 error.expected,
                 f"other starts, or what lets '{self.mode.name}' go on",
             ) from None
-        state = start_state(self.labels, coefficients, beta, omega)
+
+    def _integrate(self, number: int, state: tuple[Array, Array], omega: float, limit: float) -> Motion:
         section = self.section
-        self.context.console.line(
-            f"{self.context.name}: start {number} from a = {amplitude:g} {self.context.units('length')}"
-        )
         step = 2.0 * np.pi / omega / section.samples_per_period
         count = section.periods * section.samples_per_period
-        limit = factor * float(np.abs(coefficients).max())
         most = section.periods * STEPS_PER_PERIOD
         motion = free_motion(self.integrator, state, self.seen, step, count, section.tolerance, limit, most)
         if motion.implicit:
