@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import call
+from tolerances import REPEATED
 
 pytestmark = pytest.mark.ranks(1)
 
@@ -83,3 +84,74 @@ def test_a_decay_without_a_full_cycle_is_told_in_words(tmp_path: Path, capfd) ->
     said, rows = run(tmp_path, capfd, "free_decay", reach=[0.02, 0.1], c=5.0, starts=[0.05], periods=3)
     assert not rows and "start 0: fewer than four full cycles" in said
     assert any(line.startswith("0 full cycles, none that changes slowly") for line in said)
+
+
+# Towards limit cycles
+
+FED = -1.0119288512538815  # -2 % of m1 alone
+#: Of the oscillator fed so, by time integration: cases/two_dof/README.md.
+CYCLE = 0.13671
+
+
+def verdict(said: list[str]) -> str:
+    (line,) = [line for line in said if line.startswith("from a = ")]
+    return line.split(": ", 1)[1]
+
+
+def test_slow_growth_is_no_limit_cycle(tmp_path: Path, capfd) -> None:
+    """40 periods between a start at half the predicted amplitude and that move it by 0.2 %."""
+    said, rows = run(tmp_path, capfd, "limit_cycle", c=-0.02566765529595611, starts=[0.02], periods=40)
+    assert verdict(said).startswith("not settled, grows with zeta = -0.001 %, a = 0.0200")
+    assert 0.02 < rows[-1]["amplitude"] < 0.0201
+
+
+@pytest.mark.parametrize(
+    ("c", "word"), [(0.0, "keeps its amplitude"), (5e-4, "not settled, falls with zeta = 0.001 %")]
+)
+def test_an_oscillator_that_nothing_attracts_is_on_no_limit_cycle(tmp_path: Path, capfd, c: float, word: str) -> None:
+    said, rows = run(tmp_path, capfd, "limit_cycle", c=c, eps=1e15, reach=[0.02, 0.1], starts=[0.05], periods=60)
+    assert verdict(said).startswith(word)
+    assert rows[-1]["amplitude"] == pytest.approx(0.05 * np.exp(lowest(c, 1e15).real * rows[-1]["time"]), rel=1e-5)
+
+
+def test_a_dof_that_stuck_at_the_start_may_move_further_than_all_did(tmp_path: Path, capfd) -> None:
+    """It begins at 0.03 m and ends, beating, between 0.09 and 0.26 m, where m2 moves five times as far."""
+    values = {"m2": 0.055, "reach": [0.02, 6.0], "c": -3.0, "starts": [0.03], "periods": 100}
+    said, rows = run(tmp_path, capfd, "limit_cycle", **values)
+    assert verdict(said).startswith("not settled, varies by 1")
+    assert len(rows) > 90 and max(row["amplitude"] for row in rows[50:]) < 0.3
+
+
+def test_a_limit_cycle_beyond_the_mode_is_reached(tmp_path: Path, capfd) -> None:
+    said, rows = run(tmp_path, capfd, "limit_cycle", c=FED, reach=[0.02, 0.06], starts=[0.05], periods=200)
+    assert verdict(said).startswith("limit cycle, a = ")
+    assert rows[-1]["amplitude"] == pytest.approx(CYCLE, rel=1e-4)
+
+
+def test_a_motion_that_has_left_the_mode_and_still_grows_says_so(tmp_path: Path, capfd) -> None:
+    said, _ = run(tmp_path, capfd, "limit_cycle", c=FED, reach=[0.02, 0.06], starts=[0.05], periods=12)
+    assert verdict(said).startswith("leaves the mode's range, grows with zeta = -")
+
+
+@pytest.mark.parametrize(("c", "eps"), [(FED, 0.05), (FED, 1e8)])
+def test_what_grows_for_ever_diverges(tmp_path: Path, capfd, c: float, eps: float) -> None:
+    """Above the unstable cycle, stopped at twice the mode's reach; without friction, stopped far beyond."""
+    said, rows = run(tmp_path, capfd, "limit_cycle", c=c, eps=eps, reach=[0.02, 3.0], starts=[2.5], periods=100)
+    assert verdict(said).startswith("diverges, grows with zeta = -") and "stopped after" in verdict(said)
+    if eps > 1.0:
+        s = lowest(c, eps)
+        assert rows[-1]["amplitude"] == pytest.approx(2.5 * np.exp(s.real * rows[-1]["time"]), rel=1e-3)
+        assert rows[0]["frequency_hz"] == pytest.approx(s.imag / 2 / np.pi, rel=REPEATED)
+    else:
+        assert 5.0 < rows[-1]["amplitude"] < 7.0
+
+
+def test_what_diverges_before_it_has_cycles_is_told_by_how_far_it_came(tmp_path: Path, capfd) -> None:
+    said, rows = run(tmp_path, capfd, "limit_cycle", c=-25.0, starts=[0.05], periods=20)
+    assert not rows and verdict(said).startswith("diverges; stopped before four full cycles: it grew to ")
+
+
+def test_a_decay_says_where_noise_begins(tmp_path: Path, capfd) -> None:
+    said, rows = run(tmp_path, capfd, "limit_cycle", c=5.0, eps=1e4, reach=[0.02, 0.1], starts=[0.05], periods=60)
+    assert verdict(said).startswith("falls below the tolerance, a = ") and "is the integration's noise" in said[-1]
+    assert rows[-1]["amplitude"] < 1e-8

@@ -97,14 +97,14 @@ class FreeDecayAnalysis(TransientSection):
 
     def run(self, context: AnalysisContext[FreeDecayAnalysis]) -> Outcome:
         """Let the motion of the mode decay from each start; every cycle is compared with the mode. Collective."""
-        from .parts.starts import Starts
+        from .parts.starts import FAR, Starts
 
         mode = ModeCurve.from_table(context.table(self.mode))
         rows: list[dict[str, Any]] = []
         lines: list[str] = []
         with Starts(context, COLUMNS) as starts:
             for number, amplitude in enumerate(self.amplitude):
-                start = starts.follow(number, amplitude, np.inf)
+                start = starts.follow(number, amplitude, (FAR,))
                 rows += starts.write(number, start.motion, decay_rows(number, start.cycles, mode))
                 lines += [f"{context.name}: start {number}: {text}" for text in start.end(context.units("length"))]
             omega, zeta = largest_differences(rows)

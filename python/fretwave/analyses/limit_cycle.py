@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from ..case.analysis import register_analysis
-from ..post.decays import LAST_CYCLES, Ending, compare, cycle_rows, divergence_factor, ending
+from ..post.decays import DIVERGES, LEAVES, NOT_SETTLED, Ending, compare, cycle_rows, ending
 from ..post.mode_curve import Crossing, ModeCurve
+from ..post.settling import LAST_CYCLES
 from .free_decay import TransientSection
 from .mode import ModeAnalysis
 from .parts.context import AnalysisContext, Outcome
@@ -43,16 +44,19 @@ class LimitCycleAnalysis(TransientSection):
         """Follow each start until it has settled or diverges, and compare with the zeros of the damping. Collective."""
         from .parts.starts import Starts
 
-        crossings = ModeCurve.from_table(context.table(self.mode)).crossings()
+        table = context.table(self.mode)
+        crossings, reach = ModeCurve.from_table(table).crossings(), float(np.max(table["amplitude"]))
         endings: list[dict[str, Any]] = []
         lines: list[str] = []
         with Starts(context, COLUMNS) as starts:
             for number, amplitude in enumerate(self.amplitude):
-                start = starts.follow(number, amplitude, divergence_factor(amplitude, crossings))
+                start = starts.follow(number, amplitude)
                 starts.write(number, start.motion, cycle_rows(number, start.cycles))
-                found = ending(start.cycles, start.motion.diverged)
-                endings.append({"start": amplitude, **vars(found), **compare(found, crossings)})
-                lines.append(_ending_line(context.name, amplitude, found, crossings, context.units("length")))
+                stopped, faded = start.motion.diverged, bool(start.floor)
+                found = ending(start.cycles, stopped, crossings, reach, self.tolerance, faded)
+                endings.append(_known({"start": amplitude, **vars(found), **compare(found, crossings)}))
+                line = _ending_line(amplitude, found, crossings, context.units("length"))
+                lines.append(f"{context.name}: " + "; ".join([line, *start.end(context.units("length"))]))
             done = starts.finish(lines, endings=json.dumps(endings))
         # only now: results.h5 can be read again when the writer has closed it
         done.summary += shifted_damping(
@@ -61,13 +65,29 @@ class LimitCycleAnalysis(TransientSection):
         return done
 
 
-def _ending_line(name: str, start: float, found: Ending, crossings: Sequence[Crossing], unit: str) -> str:
+def _known(values: dict[str, Any]) -> dict[str, Any]:
+    """None where there is no number, as JSON has it."""
+    return {key: None if value != value else value for key, value in values.items()}
+
+
+def _ending_line(start: float, found: Ending, crossings: Sequence[Crossing], unit: str) -> str:
+    line = f"from a = {start:g} {unit}: {found.text}"
+    if not np.isfinite(found.amplitude):
+        return line
+    if found.text in (NOT_SETTLED, LEAVES, DIVERGES):
+        line += f", {_still(found)}"
+    line += f", a = {found.amplitude:.5g} {unit}, {found.omega / (2.0 * np.pi):.5g} Hz"
     differences = compare(found, crossings)
-    line = f"{name}: from a = {start:g} {unit}: {found.text}, a = {found.amplitude:.5g} {unit}, "
-    line += f"{found.omega / (2.0 * np.pi):.5g} Hz"
     if not np.isfinite(differences["predicted"]):
         return line
     return line + (
         f"; predicted {differences['predicted']:.5g} {unit}: amplitude {differences['amplitude_difference']:+.1e}, "
         f"frequency {differences['frequency_difference']:+.1e} (relative)"
     )
+
+
+def _still(found: Ending) -> str:
+    """In words, how the amplitude of the last cycles goes on."""
+    if not np.isfinite(found.zeta):
+        return f"varies by {100.0 * found.spread:.3g} % over the last cycles"
+    return f"{'falls' if found.zeta > 0.0 else 'grows'} with zeta = {100.0 * found.zeta:.2g} %"

@@ -11,23 +11,32 @@ from ..arrays import Array
 from ..errors import InputError
 from .cycles import Cycles
 from .mode_curve import Crossing, ModeCurve, at_the_end
+from .settling import LAST_CYCLES, growth_trend, has_moved, has_settled, slope, spread
 
-#: a start diverges when it exceeds this many times the larger of itself and the largest predicted limit cycle
-DIVERGED = 2.0
-#: a motion has settled when the amplitude of its last cycles varies by less than this
-SETTLED = 1e-3
-LAST_CYCLES = 10
+#: a motion that never moved is on a predicted limit cycle when it is as near as this, relative
+NEAR = 0.05
+#: what became of a start, in a word
+LIMIT_CYCLE, KEPT, NOT_SETTLED = "limit cycle", "keeps its amplitude", "not settled"
+DIVERGES, LEAVES, FALLS = "diverges", "leaves the mode's range", "falls below the tolerance"
 #: largest relative change of a damping ratio from one cycle to the next of a motion that is called slow
 SLOW = 0.2
 
 
 @dataclass(frozen=True)
 class Ending:
-    """Where a start ended: the mean of its last cycles, or the last one of a motion that diverges."""
+    """Where a start ended: the mean of its last cycles, the last one of a motion that leaves or fades; nan without any.
+
+    Attributes
+    ----------
+    zeta : damping ratio by the decrement of the last cycles; nan where these vary by more than they go
+    spread : relative range of the last amplitudes
+    """
 
     text: str
-    amplitude: float
-    omega: float
+    amplitude: float = np.nan
+    omega: float = np.nan
+    zeta: float = np.nan
+    spread: float = np.nan
 
 
 def mode_state(
@@ -96,27 +105,52 @@ def cycle_rows(start: int, cycles: Cycles) -> list[dict[str, float | int]]:
     ]
 
 
-def divergence_factor(start: float, crossings: Sequence[Crossing]) -> float:
-    """Multiple of its start at which a motion counts as diverging."""
-    return DIVERGED * max([start, *(crossing.amplitude for crossing in crossings)]) / start
+def ending(
+    cycles: Cycles,
+    stopped: bool,
+    crossings: Sequence[Crossing] = (),
+    reach: float = np.inf,
+    tolerance: float = 0.0,
+    faded: bool = False,
+) -> Ending:
+    """What became of a start.
 
-
-def ending(cycles: Cycles, diverged: bool) -> Ending:
-    """What became of a start."""
+    Parameters
+    ----------
+    stopped : at a bound far beyond the mode's motions
+    reach : largest amplitude of the mode
+    tolerance : relative, of the integration
+    faded : its cycles end in the noise of the integration
+    """
     if not len(cycles):
-        return Ending("diverges" if diverged else "not settled", np.nan, np.nan)
-    last = slice(-LAST_CYCLES, None)
-    amplitude, omega = cycles.amplitude[last], cycles.omega[last]
-    if diverged:
-        return Ending("diverges", float(amplitude[-1]), float(omega[-1]))
-    spread = np.ptp(amplitude) / amplitude.mean()
-    return Ending("limit cycle" if spread < SETTLED else "not settled", float(amplitude.mean()), float(omega.mean()))
+        return Ending(DIVERGES if stopped else FALLS if faded else NOT_SETTLED)
+    level, last = np.log(cycles.amplitude), cycles.amplitude[-1]
+    zeta, varies = -slope(level) / (2.0 * np.pi), float(np.expm1(spread(level)))
+    if stopped:
+        text = LEAVES if growth_trend(level, tolerance) < 0 else DIVERGES
+        return Ending(text, float(last), float(cycles.omega[-1]), zeta, varies)
+    text = FALLS if faded else _verdict(level, crossings, tolerance)
+    leaves = text == NOT_SETTLED and last > reach and zeta < 0.0
+    if leaves or faded:
+        return Ending(LEAVES if leaves else text, float(last), float(cycles.omega[-1]), zeta, varies)
+    amplitude, omega = cycles.amplitude[-LAST_CYCLES:], cycles.omega[-LAST_CYCLES:]
+    return Ending(text, float(amplitude.mean()), float(omega.mean()), zeta, varies)
+
+
+def _verdict(level: Array, crossings: Sequence[Crossing], tolerance: float) -> str:
+    """Of a motion to its end: one that never moved is no limit cycle for that, but where one is predicted."""
+    if len(level) < LAST_CYCLES:
+        return NOT_SETTLED
+    if has_moved(level, tolerance):
+        return LIMIT_CYCLE if has_settled(level) else NOT_SETTLED
+    distances = [abs(np.log(crossing.amplitude) - level[-1]) for crossing in crossings]
+    return LIMIT_CYCLE if min(distances, default=np.inf) < NEAR else KEPT
 
 
 def compare(found: Ending, crossings: Sequence[Crossing]) -> dict[str, float]:
     """Relative differences from the predicted stable limit cycle that lies nearest; nan when there is none."""
     stable = [crossing for crossing in crossings if crossing.stable]
-    if not stable or found.text == "diverges" or not np.isfinite(found.amplitude):
+    if not stable or found.text not in (LIMIT_CYCLE, NOT_SETTLED) or not np.isfinite(found.amplitude):
         return {"predicted": np.nan, "amplitude_difference": np.nan, "frequency_difference": np.nan}
     nearest = min(stable, key=lambda crossing: abs(np.log(crossing.amplitude / found.amplitude)))
     return {

@@ -15,6 +15,7 @@ from ...columns import Column, Value
 from ...errors import InputError, NotConverged
 from ...post.cycles import Cycles, above_noise, extract, noise_floor
 from ...post.decays import mode_state
+from ...post.settling import growth_trend
 from ...solve.steady import STEPS_PER_PERIOD, Motion, free_motion, start_state
 from ...texts import counted
 from .context import AnalysisContext, Outcome
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
 
 #: Periods from the middle of the last cycle to the end of a motion that no longer swings; one and a half at most else.
 QUIET = 3.0
+#: Bounds of a motion, in largest coefficients of the mode's motions: of one that grows ever faster, and of any.
+BEYOND, FAR = 2.0, 1e4
 
 
 @dataclass(frozen=True)
@@ -47,6 +50,9 @@ class Followed:
         count = len(self.cycles)
         if self.floor:
             return [f"ends after {counted(count, 'cycle')}: below {self.floor:.1e} {unit} is the integration's noise"]
+        if self.motion.diverged:
+            when = f"after {counted(count, 'cycle')}" if count else "before four full cycles"
+            return [f"stopped {when}: it grew to {np.abs(self.motion.x).max():.3g} {unit}"]
         if not count:
             return ["fewer than four full cycles"]
         quiet = self.motion.t[-1] - self.cycles.time[-1] > QUIET * 2.0 * np.pi / self.cycles.omega[-1]
@@ -79,20 +85,41 @@ class Starts:
         self.writer.abandon()
         self._model.close()
 
-    def follow(self, number: int, amplitude: float, factor: float) -> Followed:
+    def follow(self, number: int, amplitude: float, bounds: Sequence[float] = (BEYOND, FAR)) -> Followed:
         """The motion of the normalised dof from the mode's own motion at an amplitude. Collective.
 
-        It is stopped when any dof exceeds `factor` times the largest coefficient of the start.
+        It is stopped when any dof exceeds the first of the bounds, in largest coefficients of the mode's motions, and
+        grows ever faster there; else it begins anew with the next one.
         """
         coefficients, beta, omega = self._start(number, amplitude)
         state = start_state(self.labels, coefficients, beta, omega)
         self.context.console.line(
             f"{self.context.name}: start {number} from a = {amplitude:g} {self.context.units('length')}"
         )
-        motion = self._integrate(number, state, omega, factor * float(np.abs(coefficients).max()))
+        largest = float(np.abs(self.coefficients).max())
+        for bound in bounds:
+            found = self._followed(state, omega, bound * largest)
+            if not found.motion.diverged or self._grows_faster(found.cycles):
+                break
+        if found.motion.implicit:
+            self.context.console.line(f"{self.context.name}: the contact is stiff: implicit steps")
+        if found.motion.stopped:
+            self.stopped.append(f"start {number}: {found.motion.stopped}")
+        return found
+
+    def _grows_faster(self, cycles: Cycles) -> bool:
+        return growth_trend(np.log(cycles.amplitude), self.section.tolerance) > 0
+
+    def _followed(self, state: tuple[Array, Array], omega: float, limit: float) -> Followed:
+        """From a state (n_dof,) of displacement and velocity, until any dof exceeds the limit."""
+        section = self.section
+        step = 2.0 * np.pi / omega / section.samples_per_period
+        count = section.periods * section.samples_per_period
+        most = section.periods * STEPS_PER_PERIOD
+        motion = free_motion(self.integrator, state, self.seen, step, count, section.tolerance, limit, most)
         cycles = extract(motion.t, motion.x, motion.v)
         size = max(float(np.abs(state[0]).max()), float(np.abs(state[1]).max()) / omega)
-        floor = noise_floor(cycles, self.section.tolerance, size)
+        floor = noise_floor(cycles, section.tolerance, size)
         kept = above_noise(cycles, floor)
         return Followed(motion, kept, float(floor[len(kept)]) if len(kept) < len(cycles) else 0.0)
 
@@ -111,18 +138,6 @@ class Starts:
                 error.expected,
                 f"other starts, or what lets '{self.mode.name}' go on",
             ) from None
-
-    def _integrate(self, number: int, state: tuple[Array, Array], omega: float, limit: float) -> Motion:
-        section = self.section
-        step = 2.0 * np.pi / omega / section.samples_per_period
-        count = section.periods * section.samples_per_period
-        most = section.periods * STEPS_PER_PERIOD
-        motion = free_motion(self.integrator, state, self.seen, step, count, section.tolerance, limit, most)
-        if motion.implicit:
-            self.context.console.line(f"{self.context.name}: the contact is stiff: implicit steps")
-        if motion.stopped:
-            self.stopped.append(f"start {number}: {motion.stopped}")
-        return motion
 
     def write(self, number: int, motion: Motion, rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
         """Keep the cycles as rows and the motion (3, n: t, x, v) as a dataset. Collective."""
