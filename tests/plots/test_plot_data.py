@@ -330,6 +330,24 @@ def test_limit_cycles_hold_the_motions_and_stand_where_damping_is_zero(tmp_path)
     np.testing.assert_allclose(plane.lines[0].get_xydata(), history[1:].T)
 
 
+def test_envelopes_that_end_early_have_the_word_of_their_summary(tmp_path):
+    writer = AnalysisWriter(tmp_path, "mode", MODE, {"type": "mode", "method": "CNM", "normalise": "m"})
+    for point, a in enumerate(np.geomspace(0.05, 2.0, 9)):
+        row = {"point": point, "amplitude": a, "omega": 3.0, "omega0": 3.0, "frequency_hz": 0.5, "beta": 0.03}
+        writer.append({**row, **SHARED, "zeta": 0.01})
+    writer.close("done", "")
+    columns = ("start", "cycle", "time", "amplitude", "frequency_hz")
+    told = {"type": "limit_cycle", "mode": "mode", "amplitude": "[0.3, 0.4, 0.5]"}
+    writer = AnalysisWriter(tmp_path, "limit_cycle", columns, told)
+    for start, growth, count in ((0, 1.0, 20), (1, 1.2, 8), (2, 0.5, 8)):
+        for cycle in range(count):
+            writer.append(dict(zip(columns, (start, cycle, 2.0 * cycle, 0.3 * growth**cycle, 0.5))))
+    words = ("limit cycle", "leaves the mode's range", "falls below the tolerance")
+    writer.close("done", "", endings=json.dumps([{"text": word} for word in words]))
+    (axes,) = dict(limit_cycles.figures(Run(tmp_path)))["limit_cycle_envelopes"].axes
+    assert [text.get_text() for text in axes.texts] == ["leaves the mode's range, stopped", "ends"]
+
+
 def test_study_holds_the_errors_of_its_table(tmp_path):
     rows = ["sweep,harmonics,samples,tolerance,wall_s,omega_error,zeta_error,zeta_error_estimate,reference"]
     rows += ["harmonics,1,256,1e-10,0.1,1e-2,0.4,0.3,0", "harmonics,3,256,1e-10,0.15,1e-3,0.04,0.2,0"]

@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..arrays import AnyArray
+from ..post.decays import DIVERGES
 from ..post.motion import motion
 from ..results.reader import Analysis, Run, Table
 from . import scales, style
@@ -37,9 +38,10 @@ def envelopes(mode: Analysis, motions: Analysis) -> Figure:
         time, amplitude = seconds(table["time"][rows]), scale(table["amplitude"][rows])
         axes.plot(time, amplitude, color=colour, label=f"{name}, a = {scale.text(start, 4)}")
         if time[-1] < 0.9 * seconds(table["time"].max()):
-            axes.plot(time[-1:], amplitude[-1:], "^", color=colour)
+            grows = bool(amplitude[-1] > amplitude[0])
+            axes.plot(time[-1:], amplitude[-1:], "^" if grows else "v", color=colour)
             end = time[-1], amplitude[-1]
-            axes.annotate("diverges, stopped", end, (8, 0), textcoords="offset points", va="center")
+            axes.annotate(_end(motions, number, grows), end, (8, 0), textcoords="offset points", va="center")
     _predicted(axes, mode, scale)
     shown = scale(np.array(_visible(mode, motions)))
     axes.set(yscale="log", xlim=(0.0, seconds(_settled(table))), ylim=shown)
@@ -48,6 +50,13 @@ def envelopes(mode: Analysis, motions: Analysis) -> Figure:
     style.plain_numbers(axes.yaxis)
     style.legend_outside(figure, axes, columns=3)
     return figure
+
+
+def _end(motions: Analysis, number: int, grows: bool) -> str:
+    """Why the cycles of a start end before those of the others."""
+    endings = motions.attributes.get("endings")
+    told = endings[number]["text"] if endings else DIVERGES
+    return f"{told}, stopped" if grows else "ends"
 
 
 def _visible(mode: Analysis, motions: Analysis) -> tuple[float, float]:
