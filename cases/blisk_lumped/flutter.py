@@ -5,6 +5,8 @@
 
 from dataclasses import replace
 
+import numpy as np
+
 import fretwave as fw
 import model as case
 
@@ -21,6 +23,6 @@ for nodal_diameter in flow:
         f"{nodal_diameter} nodal diameters: damping ratio from {branch['zeta'].min():.2g} to {branch['zeta'].max():.2g}"
     )
     for cycle in branch.at(zeta=0.0):
-        before, after = branch["zeta"][int(cycle["place"]) :][:2]
-        kind = "stable" if before < after else "unstable"
-        print(f"  {kind} limit cycle at {cycle['amplitude']:.6g} m, {cycle['frequency_hz']:.6g} Hz")
+        rises, grows = (np.diff(branch[name][int(cycle["place"]) :][:2])[0] > 0 for name in ("zeta", "amplitude"))
+        kind = ("stable" if rises else "unstable") if grows else "perhaps stable"  # or not: the branch runs back
+        print(f"  limit cycle {kind} in its own amplitude: {cycle['amplitude']:.6g} m, {cycle['frequency_hz']:.6g} Hz")

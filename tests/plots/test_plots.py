@@ -151,7 +151,7 @@ def test_backbone_shows_both_methods_both_asymptotes_folds_and_peak(run):
 
 def test_backbone_under_negative_damping_marks_stable_and_unstable_limit_cycles(run):
     figure = backbone.draw([run.analyses["flutter"]])
-    assert {"stable limit cycle (attractor)", "unstable limit cycle"} <= set(texts(figure))
+    assert {"limit cycle, stable in its own amplitude", "limit cycle, unstable"} <= set(texts(figure))
     stable, unstable = run.analyses["flutter"].mode_curve().crossings()
     width = np.sqrt(np.log(2.0))
     assert stable.amplitude == pytest.approx(0.2 * np.exp(-width), rel=1e-2) and stable.stable
@@ -204,7 +204,7 @@ def test_limit_cycles_show_every_start_and_both_predictions(run):
     figures = dict(limit_cycles.figures(run))
     names = texts(figures["limit_cycle_envelopes"])
     assert names[:3] == ["low start, a = 0.05 m", "intermediate start, a = 0.3 m", "high start, a = 1.5 m"]
-    assert [name.split(",")[1] for name in names[3:]] == [" stable", " unstable"]
+    assert [name.split(",")[1] for name in names[3:]] == [" stable in its own amplitude", " unstable"]
     assert [text.get_text() for text in figures["limit_cycle_envelopes"].axes[0].texts] == ["diverges, stopped"]
     assert len(figures["limit_cycle_phase_planes"].axes) == 3
 

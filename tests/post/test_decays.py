@@ -95,6 +95,14 @@ def test_verdicts_of_starts():
 
 
 @pytest.mark.ranks(1)
+def test_a_motion_may_end_on_a_cycle_of_unknown_stability():
+    """Where the branch runs back and at its end there are cycles that motions settle on."""
+    settled = ending(cycles_of(np.full(30, 0.141)), False, CROSSINGS)
+    crossings = [Crossing(0.14, 25.3, None), Crossing(0.141, 25.3, False), Crossing(0.5, 24.2, True)]
+    assert compare(settled, crossings)["predicted"] == 0.14
+
+
+@pytest.mark.ranks(1)
 def test_too_few_cycles_have_no_verdict():
     assert ending(cycles_of([]), False).text == "not settled"
 

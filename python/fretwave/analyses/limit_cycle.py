@@ -80,9 +80,11 @@ def _ending_line(start: float, found: Ending, crossings: Sequence[Crossing], uni
     differences = compare(found, crossings)
     if not np.isfinite(differences["predicted"]):
         return line
+    known = {crossing.amplitude: crossing.stable for crossing in crossings}
+    doubt = " (stability unknown)" if known[differences["predicted"]] is None else ""
     return line + (
-        f"; predicted {differences['predicted']:.5g} {unit}: amplitude {differences['amplitude_difference']:+.1e}, "
-        f"frequency {differences['frequency_difference']:+.1e} (relative)"
+        f"; predicted {differences['predicted']:.5g} {unit}{doubt}: amplitude"
+        f" {differences['amplitude_difference']:+.1e}, frequency {differences['frequency_difference']:+.1e} (relative)"
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, Optional, cast
 
@@ -18,7 +19,7 @@ from ..case.schema import Positive, key
 from ..columns import ENERGY, MODE
 from ..errors import InputError
 from ..model.laws import PythonLaw
-from ..post.limit_cycles import limit_cycles
+from ..post.limit_cycles import limit_cycles, stability
 from ..results.results import AnalysisWriter
 from ..results.sweep_summary import MODE_BRANCH
 from ..texts import counted
@@ -228,14 +229,15 @@ def _finish(
     problem: NonlinearMode,
 ) -> Outcome:
     table = finished_table(writer)
-    summary = summarise(context.name, table, context.units(unit_of(context.analysis.normalise))) if table else []
+    cycles = limit_cycles(table) if table else []
+    unit = context.units(unit_of(context.analysis.normalise))
+    summary = summarise(context.name, table, cycles, unit) if table else []
     summary += finish_wheel(context, writer, start) if context.case.wheel is not None else []
     context.console.detail(f"{context.name}: linear systems: {branch.route}")
-    events = json.dumps(limit_cycles(table)) if table else "[]"
     if table:
         keep_pairs(context, writer)
         keep_row(context, writer, context.analysis.normalise, problem.row)
-    writer.close("done" if branch.converged else "stopped", branch.reason, events=events)
+    writer.close("done" if branch.converged else "stopped", branch.reason, events=json.dumps(cycles))
     folded = table and context.case.wheel is not None and not branch.converged
     advice = one_by_one(table, context.units("length")) if folded else ""
     return Outcome(writer.rows, branch.reason, branch.converged, summary, advice=advice)
@@ -263,7 +265,7 @@ def _percent(value: float, digits: int) -> str:
     return f"{round(100 * value, digits) + 0.0:.{digits}f}"
 
 
-def summarise(name: str, table: dict[str, Any], unit: str) -> list[str]:
+def summarise(name: str, table: Mapping[str, Any], cycles: Sequence[Mapping[str, Any]], unit: str) -> list[str]:
     """The branch in a line, and a line for each limit cycle."""
     amplitude, zeta = table["amplitude"], table["zeta"]
     top = int(np.argmax(zeta))
@@ -274,10 +276,7 @@ def summarise(name: str, table: dict[str, Any], unit: str) -> list[str]:
         f" {counted(folds, 'fold')},"
         f"{largest_error('zeta', 100 * table['zeta_error'], '%')} {table['wall_s'].sum():.2f} s"
     ]
-    words = {True: "stable (damping rises)", False: "unstable (damping falls)", None: "stability unknown (branch end)"}
-    for cycle in limit_cycles(table):
-        lines.append(
-            f"{name}: limit cycle at a = {cycle['amplitude']:.5g} {unit}, {cycle['frequency_hz']:.5g} Hz: "
-            + words[cycle["stable"]]
-        )
+    for cycle in cycles:
+        place = f"a = {cycle['amplitude']:.5g} {unit}, {cycle['frequency_hz']:.5g} Hz"
+        lines.append(f"{name}: limit cycle at {place}: {stability(cycle)}")
     return lines

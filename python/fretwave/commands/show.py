@@ -10,7 +10,8 @@
         range                                 column, unit, low, high (and cycles of wear)
         peak                                  point (row of <name>.csv) and columns of this row; worn, worn_unit of wear
         error                                 of, value, unit: the largest estimated error
-        limit_cycles                          amplitude, frequency_hz, stable (null: not known), nodal_diameter, point
+        limit_cycles                          amplitude, frequency_hz, stable (in its own amplitude; null: not known),
+                                              runs_back, nodal_diameter, point
         notes                                 landmarks of a sweep, in lines
     notes                                     the lines below the table that `show` prints
 

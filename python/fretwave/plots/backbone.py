@@ -187,15 +187,14 @@ def _name(mode: Analysis, scale: Scale) -> str:
 
 
 def _limit_cycles(upper: Axes, lower: Axes, mode: Analysis, scale: Scale) -> None:
-    """Zeros of the damping: filled where damping grows with amplitude (stable), open where it falls."""
+    """Zeros of the damping: green where damping grows with amplitude (stable in it), open where it falls."""
     lower.axhline(0.0, color=style.INK, linewidth=1.0, zorder=2)
     low, high = lower.get_ylim()
     lower.axhspan(low, 0.0, color=style.RED, alpha=0.07, zorder=0)
     lower.set_ylim(low, high)
     for crossing in mode.mode_curve().crossings():
-        face = style.GREEN if crossing.stable else "white"
+        kind, face, _ = marks.CYCLES[crossing.stable]
         look = {"marker": "o", "markersize": 8, "markerfacecolor": face, "markeredgecolor": style.INK, "zorder": 6}
-        kind = "stable limit cycle (attractor)" if crossing.stable else "unstable limit cycle"
         a = scale(crossing.amplitude)
         upper.plot([a], [crossing.omega / (2.0 * np.pi)], linestyle="", label=kind, **look)
         lower.plot([a], [0.0], linestyle="", label=kind, **look)

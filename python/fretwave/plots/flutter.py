@@ -109,17 +109,12 @@ def spans(amplitude: AnyArray, zeta: AnyArray) -> list[tuple[float, float, float
 
 
 def _cycles(axes: Axes, flutter: Analysis, place: object) -> None:
-    """Limit cycles: filled where stable, open where not, grey where the branch runs back between two folds."""
-    kinds = {
-        "stable limit cycle": {"markerfacecolor": style.GREEN},
-        "unstable limit cycle": {"markerfacecolor": "white"},
-        "limit cycle between folds": {"markerfacecolor": style.GREY},
-    }
+    """Limit cycles: green where stable in their own amplitude, open where not, grey where that is not known."""
     for cycle in flutter.attributes.get("events", []):
-        kind = "limit cycle between folds" if cycle["folds"] else f"{'' if cycle['stable'] else 'un'}stable limit cycle"
+        kind, face, _ = marks.CYCLES[None if cycle["folds"] else cycle["stable"]]
         look = {"marker": "o", "markersize": 7, "markeredgecolor": style.INK, "linestyle": "", "zorder": 6}
         x, y = place(cycle)  # type: ignore[operator]
-        axes.plot([x], [y], label=kind, **look, **kinds[kind])
+        axes.plot([x], [y], label=kind, markerfacecolor=face, **look)
 
 
 def _called(diameter: int) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Optional
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -10,9 +11,10 @@ from matplotlib.figure import Figure
 
 from ..arrays import AnyArray
 from ..post.decays import DIVERGES
+from ..post.limit_cycles import SHORT
 from ..post.motion import motion
 from ..results.reader import Analysis, Run, Table
-from . import scales, style
+from . import marks, scales, style
 from .scales import Scale
 
 #: top of the axes, in largest starts or predictions; what goes beyond has left the picture
@@ -81,9 +83,9 @@ def _settled(table: Table) -> float:
 
 def _predicted(axes: Axes, mode: Analysis, scale: Scale) -> None:
     for crossing in mode.mode_curve().crossings():
-        kind = "stable" if crossing.stable else "unstable"
-        name = f"predicted, {kind}, a = {scale.text(crossing.amplitude)}"
-        axes.axhline(scale(crossing.amplitude), color=style.INK, linestyle="--" if crossing.stable else ":", label=name)
+        name = f"predicted, {SHORT[crossing.stable]}, a = {scale.text(crossing.amplitude)}"
+        line = marks.CYCLES[crossing.stable][-1]
+        axes.axhline(scale(crossing.amplitude), color=style.INK, linestyle=line, label=name)
 
 
 def phase_planes(mode: Analysis, motions: Analysis) -> Figure:
@@ -95,9 +97,9 @@ def phase_planes(mode: Analysis, motions: Analysis) -> Figure:
     for (number, start), plane, colour, name in zip(starts, axes[0], style.PALETTE, _names(len(starts))):
         _, x, v = motions.history(number)
         plane.plot(scale(x), speed(v), color=colour, linewidth=0.5)
-        for kind, x, v in orbits:
-            line = "--" if kind == "stable" else ":"
-            plane.plot(scale(x), speed(v), color=style.INK, linestyle=line, label=f"predicted {kind} limit cycle")
+        for stable, x, v in orbits:
+            kind, _, line = marks.CYCLES[stable]
+            plane.plot(scale(x), speed(v), color=style.INK, linestyle=line, label=f"predicted {kind}")
         plane.set_title(f"{name},\na = {scale.text(start, 4)}")
         plane.set_xlabel(scale.label("Displacement"))
     axes[0, 0].set_ylabel(speed.label("Velocity"))
@@ -106,7 +108,7 @@ def phase_planes(mode: Analysis, motions: Analysis) -> Figure:
     return figure
 
 
-def predicted_orbits(mode: Analysis) -> list[tuple[str, AnyArray, AnyArray]]:
+def predicted_orbits(mode: Analysis) -> list[tuple[Optional[bool], AnyArray, AnyArray]]:
     """Closed orbits of the normalised dof at the zeros of the damping, from the nearest point scaled to the zero."""
     orbits = []
     for crossing in mode.mode_curve().crossings() if mode.labels else []:
@@ -114,7 +116,7 @@ def predicted_orbits(mode: Analysis) -> list[tuple[str, AnyArray, AnyArray]]:
         point = int(np.argmin(away))
         coefficients = mode.coefficients([point])[0] * crossing.amplitude / mode.columns["amplitude"][point]
         x, v = motion(mode.labels, coefficients, 0.0, crossing.omega)
-        orbits.append(("stable" if crossing.stable else "unstable", mode.along(x), mode.along(v)))
+        orbits.append((crossing.stable, mode.along(x), mode.along(v)))
     return orbits
 
 

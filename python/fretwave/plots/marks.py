@@ -11,6 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from ..arrays import AnyArray
+from ..post.limit_cycles import SHORT
 from ..results.reader import Analysis
 from . import style
 
@@ -32,6 +33,12 @@ STOP: dict[str, Any] = {
     "markeredgecolor": style.INK,
     "zorder": 7,
     "clip_on": False,
+}
+#: Name of a limit cycle, the face of its mark, and the line of its orbit, by whether it is stable.
+CYCLES = {
+    True: (f"limit cycle, {SHORT[True]}", style.GREEN, "--"),
+    False: (f"limit cycle, {SHORT[False]}", "white", ":"),
+    None: (f"limit cycle, {SHORT[None]}", style.GREY, "-."),
 }
 UNFINISHED = "not finished: the run goes on, or was cut off"
 #: Reasons that a legend has room for, characters of one, and of a line of it.

@@ -17,10 +17,11 @@ from matplotlib.figure import Figure
 from ..arrays import Array
 from ..files.dimensions import names_of_data
 from ..post.grid import Plan, short_names
+from ..post.limit_cycles import SHORT
 from ..results.file import open_results
 from ..results.reader import Analysis, Run, Table
 from ..results.sweep_quantiles import is_seed
-from ..results.sweep_summary import split_of
+from ..results.sweep_summary import CYCLES, split_of
 from . import labels, marks, scales, style
 from .backbone import error_entry, error_of
 from .scales import Scale
@@ -237,10 +238,10 @@ def _amplitudes(axes: Axes, x: Array, table: Table, number: int) -> None:
     if np.isfinite(lowest).any():
         axes.plot(x, lowest, color=style.GREEN, label=name("lowest frequency"), **look)
     axes.plot(x, table["amplitude_of_largest_zeta"], color=style.RED, label=name("largest damping"), **look)
-    for word, face in (("stable", style.PURPLE), ("unstable", "white")):
-        cycle = table[f"{word}_limit_cycle"]
+    for (word, stable), face in zip(CYCLES.items(), (style.PURPLE, "white", style.GREY)):
+        cycle = table.get(f"{word}_limit_cycle", np.full(len(x), np.nan))  # not all are in older results
         if np.isfinite(cycle).any():
-            more = {"color": style.PURPLE, "markerfacecolor": face, "label": name(f"{word} limit cycle")}
+            more = {"color": style.PURPLE, "markerfacecolor": face, "label": name(f"limit cycle, {SHORT[stable]}")}
             axes.plot(x, cycle, **more, **look)
 
 

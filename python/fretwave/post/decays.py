@@ -148,11 +148,14 @@ def _verdict(level: Array, crossings: Sequence[Crossing], tolerance: float) -> s
 
 
 def compare(found: Ending, crossings: Sequence[Crossing]) -> dict[str, float]:
-    """Relative differences from the predicted stable limit cycle that lies nearest; nan when there is none."""
-    stable = [crossing for crossing in crossings if crossing.stable]
-    if not stable or found.text not in (LIMIT_CYCLE, NOT_SETTLED) or not np.isfinite(found.amplitude):
+    """Relative differences from the predicted limit cycle that lies nearest; nan when there is none.
+
+    A motion may end on every cycle that is not known to be unstable.
+    """
+    possible = [crossing for crossing in crossings if crossing.stable is not False]
+    if not possible or found.text not in (LIMIT_CYCLE, NOT_SETTLED) or not np.isfinite(found.amplitude):
         return {"predicted": np.nan, "amplitude_difference": np.nan, "frequency_difference": np.nan}
-    nearest = min(stable, key=lambda crossing: abs(np.log(crossing.amplitude / found.amplitude)))
+    nearest = min(possible, key=lambda crossing: abs(np.log(crossing.amplitude / found.amplitude)))
     return {
         "predicted": nearest.amplitude,
         "amplitude_difference": found.amplitude / nearest.amplitude - 1.0,

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from .limit_cycles import limit_cycles
+from .limit_cycles import limit_cycles, stability
 from .mode_curve import NO_DAMPING
 
 STABLE = {True: "stable", False: "unstable", None: "unknown"}
@@ -30,7 +30,8 @@ def describe_waves(table: Mapping[str, Any], diameters: Sequence[int]) -> list[d
 
 
 def _wave(table: Mapping[str, Any], diameter: int, rows: npt.NDArray[np.intp]) -> dict[str, Any]:
-    part = {key: np.asarray(table[key])[rows] for key in ("amplitude", "frequency_hz", "zeta", "event")}
+    names = ("amplitude", "frequency_hz", "zeta", "event", "stick")
+    part = {name: np.asarray(table[name])[rows] for name in names if name in table}
     amplitude, zeta = part["amplitude"], part["zeta"]
     top = int(np.argmax(zeta))
     cycles = [
@@ -103,7 +104,8 @@ def with_sign(diameters: int) -> str:
 
 def _cycle(cycle: Mapping[str, Any], unit: str) -> str:
     place = f"a = {cycle['amplitude']:.4g} {unit}, {cycle['frequency_hz']:.5g} Hz"
-    text = f"{STABLE[cycle['stable']]} limit cycle at {place}"
+    known = stability(cycle)
     if cycle["folds"]:
-        text += f" (on a branch that runs back between {cycle['folds'][0]:.5g} and {cycle['folds'][1]:.5g} {unit})"
-    return text
+        low, high = cycle["folds"]
+        known = known.replace("runs back there", f"runs back between {low:.5g} and {high:.5g} {unit}")
+    return f"limit cycle at {place}: {known}"

@@ -1,31 +1,69 @@
-"""Limit cycles of a branch: where its damping passes through zero."""
+"""Limit cycles of a branch: where its damping passes through zero, and what is known of their stability."""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, Optional
 
 import numpy as np
+import numpy.typing as npt
+
+from ..arrays import Array
+from .mode_curve import NO_DAMPING, forward
+
+#: Of a limit cycle, by what is known of it.
+SHORT = {True: "stable in its own amplitude", False: "unstable", None: "stability unknown"}
 
 
-def limit_cycles(table: dict[str, Any]) -> list[dict[str, Any]]:
-    """Zero crossings of the damping, each a limit cycle.
+def limit_cycles(table: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Zero crossings of the damping, each a limit cycle; also one exactly at an end of the branch.
 
-    Damping that rises through zero with amplitude draws motions to the cycle from both sides (stable);
-    falling, it drives them away (unstable). At the end of a branch the slope is not known (None).
+    Damping that rises through zero with amplitude draws motions of this mode to the cycle from both sides (stable);
+    falling, it drives them away (unstable). None where that is not known: at an end of the branch, and where the
+    branch runs back between two folds. There motions of one amplitude are no longer those of one mode, and time
+    integration finds cycles of either kind.
     """
-    cycles = []
-    for point in np.flatnonzero(["zero_damping" in event.split() for event in table["event"]]):
-        around = [int(point) - 1, int(point) + 1]
-        known = around[0] >= 0 and around[1] < len(table["zeta"])
-        zeta, amplitude = table["zeta"], table["amplitude"]
-        slope = np.diff(zeta[around])[0] * np.diff(amplitude[around])[0] if known else 0.0
-        cycles.append(
-            {
-                "point": int(point),
-                "event": "zero_damping",
-                "amplitude": float(amplitude[point]),
-                "frequency_hz": float(table["frequency_hz"][point]),
-                "stable": bool(slope > 0) if slope else None,
-            }
-        )
-    return cycles
+    amplitude, zeta = np.asarray(table["amplitude"]), np.asarray(table["zeta"])
+    met = np.array(["zero_damping" in event.split() for event in table["event"]], bool)
+    return [
+        {
+            "point": int(point),
+            "event": "zero_damping",
+            "amplitude": float(amplitude[point]),
+            "frequency_hz": float(table["frequency_hz"][point]),
+            "runs_back": forward(amplitude, int(point)) is False,
+            "stable": _stable(amplitude, zeta, int(point)),
+        }
+        for point in np.flatnonzero(met | _at_the_ends(zeta, table.get("stick")))
+    ]
+
+
+def _at_the_ends(zeta: Array, stick: Optional[Array]) -> npt.NDArray[np.bool_]:
+    """Whether a point is the first or last one, and the damping is zero there and not beside it.
+
+    Not where all pairs stick (share 1): without damping such motions are neither fed nor damped.
+    """
+    zero = np.abs(zeta) <= NO_DAMPING
+    ends = np.zeros(len(zeta), bool)
+    if len(zeta) > 1:
+        ends[[0, -1]] = zero[[0, -1]] & ~zero[[1, -2]]
+    return ends & (np.asarray(stick) < 1.0) if stick is not None else ends
+
+
+def _stable(amplitude: Array, zeta: Array, point: int) -> Optional[bool]:
+    damped = np.flatnonzero(np.abs(zeta) > NO_DAMPING)
+    before, behind = damped[damped < point], damped[damped > point]
+    if not len(before) or not len(behind) or not forward(amplitude, point):
+        return None
+    rises = zeta[behind[0]] - zeta[before[-1]]
+    grows = amplitude[behind[0]] - amplitude[before[-1]]
+    return bool(rises * grows > 0) if rises * grows else None
+
+
+def stability(cycle: Mapping[str, Any]) -> str:
+    """What is known of a limit cycle, in words."""
+    if cycle["stable"] is None:
+        return f"stability unknown ({'the branch runs back there' if cycle.get('runs_back') else 'branch end'})"
+    if not cycle["stable"]:
+        return "unstable (damping falls)"
+    return "stable in its own amplitude (damping rises)"

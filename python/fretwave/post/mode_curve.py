@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Optional
 
 import numpy as np
 
@@ -16,12 +17,25 @@ LENGTH_WEIGHTS = (1.0, 10.0, 20.0)
 NO_DAMPING = 1e-10
 #: A value this close to that of an end of a branch, relative, is met there.
 AT_THE_END = 1e-10
+#: Relative steps of the amplitude below this have no direction: a point that is there twice.
+NO_STEP = 1e-9
 
 
 def at_the_end(values: Array, asked: float) -> float:
     """The end of a branch's values at which one that is asked for is met; else that value as it is."""
     end = float(np.clip(asked, values.min(), values.max()))
     return end if abs(asked - end) <= AT_THE_END * abs(asked) else asked
+
+
+def forward(amplitude: Array, point: int) -> Optional[bool]:
+    """Whether a branch goes its own way at a point, the one in which it starts; False where it runs back.
+
+    None of a branch without steps. Next to a fold that was not located: False.
+    """
+    steps = np.diff(amplitude)
+    moves = np.flatnonzero(np.abs(steps) > NO_STEP * amplitude[1:])
+    around = np.concatenate([moves[moves < point][-1:], moves[moves >= point][:1]])
+    return bool((steps[around] * steps[moves[0]] > 0).all()) if len(moves) else None
 
 
 #: Relative length of the curve of a branch of one point.
@@ -41,11 +55,14 @@ class ModeValue:
 
 @dataclass(frozen=True)
 class Crossing:
-    """Zero of the damping: a limit cycle, stable where damping grows with amplitude."""
+    """Zero of the damping: a limit cycle, stable where damping grows with amplitude.
+
+    `stable` is of its own amplitude alone; None at an end of the branch and where it runs back between two folds.
+    """
 
     amplitude: float
     omega: float
-    stable: bool
+    stable: Optional[bool]
 
 
 class ModeCurve:
@@ -112,16 +129,29 @@ class ModeCurve:
 
     def _changes_sign(self, length: float) -> bool:
         """Damped on one side and fed on the other; at an end of the branch, one of both."""
+        values = self._beside(length)
+        return all(values) and (len(values) < 2 or values[0] * values[1] < 0)
+
+    def _beside(self, length: float) -> list[float]:
+        """Damping at the nearest knots before and behind a place of the curve; at an end of it, of one of both."""
         x = self._zeta.x
         near = 1e-9 * x[-1]
         sides = [x[x < length - near][-1:], x[x > length + near][:1]]
-        values = [float(self._zeta(side[0])) for side in sides if len(side)]
-        return all(values) and (len(values) < 2 or values[0] * values[1] < 0)
+        return [float(self._zeta(side[0])) for side in sides if len(side)]
 
     def _crossing(self, length: float) -> Crossing:
         log_amplitude, omega = self._curve(length)[:2]
-        slope = self._zeta(length, 1) / self._log_amplitude(length, 1)
-        return Crossing(float(np.exp(log_amplitude)), float(omega), bool(slope > 0.0))
+        stable = self._rises(length) if len(self._beside(length)) == 2 and self._goes_on(length) else None
+        return Crossing(float(np.exp(log_amplitude)), float(omega), stable)
+
+    def _rises(self, length: float) -> bool:
+        return bool(self._zeta(length, 1) / self._log_amplitude(length, 1) > 0.0)
+
+    def _goes_on(self, length: float) -> bool:
+        """Not where the curve runs back, or turns."""
+        steps = np.diff(self._log_amplitude(self._log_amplitude.x))
+        moves = steps[np.abs(steps) > NO_STEP]
+        return len(moves) > 0 and bool(self._log_amplitude(length, 1) * moves[0] > 0.0)
 
 
 def fold_interval(amplitude: Array) -> tuple[float, float] | None:

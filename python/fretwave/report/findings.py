@@ -8,7 +8,8 @@ import numpy as np
 
 from ..arrays import Indices
 from ..post.grid import Plan
-from ..results.overview import STABILITY, Overview
+from ..post.limit_cycles import SHORT
+from ..results.overview import Overview
 from ..results.parts import rows_of_branches
 from ..results.reader import Analysis
 from ..results.sweep_summary import columns_of
@@ -112,7 +113,7 @@ def marked(analysis: Analysis, overview: Overview) -> Marks:
                 found.setdefault(row, []).append("fold")
         for cycle in overview.limit_cycles:
             if cycle.get("point") in rows:
-                found.setdefault(int(cycle["point"]), []).append(f"limit cycle, {STABILITY[cycle['stable']]}")
+                found.setdefault(int(cycle["point"]), []).append(f"limit cycle, {SHORT[cycle['stable']]}")
     return dict(sorted(found.items()))
 
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..files.lock import is_taken
+from ..post.limit_cycles import stability
 from ..texts import counted
 from ..units import units_of
 from .file import OVERRIDES, open_results, unit_of_amplitudes
@@ -20,8 +21,6 @@ if TYPE_CHECKING:
     import h5py
 
 HEADINGS = ("analysis", "type", "status", "points", "range", "peak", "folds", "error", "time of points")
-#: Of a limit cycle, by what is known of it.
-STABILITY = {True: "stable", False: "unstable", None: "stability unknown"}
 Values = Mapping[str, Any]
 
 
@@ -38,7 +37,8 @@ class Overview:
     peak : what is largest and where: `point` is the row of the table, all else its columns
     folds : number of them, None of a table without events
     error : the largest estimated one: column, value, unit
-    limit_cycles : amplitude, frequency_hz, stable (None: not known), nodal_diameter where there are several waves
+    limit_cycles : amplitude, frequency_hz, stable in its own amplitude (None: not known), nodal_diameter where there
+        are several waves
     overrides : what the command line changed, as it was typed
     notes : what else is said, in lines
     """
@@ -108,7 +108,7 @@ class Overview:
     def _cycles(self) -> list[str]:
         return [
             f"{_wave(cycle)}limit cycle at a = {cycle['amplitude']:.5g} {self.unit},"
-            f" {cycle['frequency_hz']:.5g} Hz: {STABILITY[cycle['stable']]}"
+            f" {cycle['frequency_hz']:.5g} Hz: {stability(cycle)}"
             for cycle in self.limit_cycles
         ]
 

@@ -14,7 +14,7 @@ import numpy as np
 from ..columns import Column
 from ..files.dimensions import names_of_data
 from ..post.grid import Plan
-from ..post.limit_cycles import limit_cycles
+from ..post.limit_cycles import SHORT, limit_cycles
 from ..post.mode_curve import ModeCurve
 from ..post.slip_threshold import slip_threshold
 from ..registry import kind_named
@@ -24,6 +24,8 @@ from .sweep_quantiles import AMPLITUDE_AT, over_seeds, quantile_lines
 if TYPE_CHECKING:
     import h5py
 
+#: Limit cycles by what is known of their stability.
+CYCLES = {"stable": True, "unstable": False, "unknown": None}
 #: Damping has set in where this share of its rise to the maximum is reached.
 ONSET = 0.1
 
@@ -45,8 +47,9 @@ MODE = (
     Column("lowest_frequency_hz", "Hz", "lowest frequency of the branch"),
     Column("amplitude_of_lowest_frequency", "length", "amplitude of the lowest frequency, nan at an end of the branch"),
     Column("last_frequency_hz", "Hz", "frequency at the end of the branch"),
-    Column("stable_limit_cycle", "length", "smallest amplitude at which damping rises through zero"),
+    Column("stable_limit_cycle", "length", "smallest amplitude of a limit cycle stable in its own: damping rises"),
     Column("unstable_limit_cycle", "length", "smallest amplitude at which damping falls through zero"),
+    Column("unknown_limit_cycle", "length", "smallest amplitude of a limit cycle of unknown stability"),
 )
 WHEEL_MODE = (
     Column("largest_amplification", "1", "largest amplitude of a sector over that of the tuned wave, along the branch"),
@@ -212,7 +215,7 @@ def _limit_cycles(table: Table) -> dict[str, float]:
     cycles = limit_cycles({**table, "event": _events(table)})
     return {
         f"{word}_limit_cycle": min((c["amplitude"] for c in cycles if c["stable"] is stable), default=np.nan)
-        for word, stable in (("stable", True), ("unstable", False))
+        for word, stable in CYCLES.items()
     }
 
 
@@ -278,9 +281,10 @@ def _mode_words(row: Row) -> str:
     slip = "no slip" if starts is None else f"slip from {starts:.4g} {unit}"
     top = f"largest zeta {100 * row['largest_zeta']:.4g} % at {row['amplitude_of_largest_zeta']:.4g} {unit}"
     words = [slip, top, f"lowest {row['lowest_frequency_hz']:.6g} Hz"]
-    for word in ("stable", "unstable"):
-        amplitude = row[f"{word}_limit_cycle"]
-        words += [] if math.isnan(amplitude) else [f"{word} limit cycle at {amplitude:.4g} {unit}"]
+    for word, stable in CYCLES.items():
+        amplitude = row.get(f"{word}_limit_cycle", math.nan)  # not all are in older results
+        place = f"limit cycle at {amplitude:.4g} {unit}"
+        words += [] if math.isnan(amplitude) else [f"{place}, {SHORT[stable]}"]
     return ", ".join(words)
 
 

@@ -1,0 +1,110 @@
+"""What is said of a mode's limit cycles, against time integration."""
+
+from __future__ import annotations
+
+import json
+
+import h5py
+import numpy as np
+import pytest
+from models.jenkins_motion import JenkinsMotion
+from tolerances import SOLVED
+
+from fretwave.results.overview import overviews
+from fretwave.run.order import RunOptions
+from fretwave.run.runner import run_case
+
+pytestmark = pytest.mark.ranks(1)
+
+#: Two modes, the first one fed while its slider sticks; its branch runs back where damping passes through zero.
+BACK = {
+    "M": [[0.017093403349051732, 0.0], [0.0, 0.020816800983414763]],
+    "K": [[0.5175186179602942, -0.24379992114885093], [-0.24379992114885093, 0.1906209107117398]],
+    "C": [[0.0030206598787502897, -0.004576287558470432], [-0.004576287558470432, -0.0045734532484947585]],
+    "stiffness": 1.3482587303369675,
+    "limit": 0.0006505405605868649,
+}
+#: Three modes, all of them fed, the first one until its slider has slipped.
+FED = {
+    "M": [[0.16012924871925024, 0.0, 0.0], [0.0, 0.3307937265414089, 0.0], [0.0, 0.0, 0.07307943155089885]],
+    "K": [
+        [0.22318215512714454, -0.016727982502442996, 7.929549203948151e-05],
+        [-0.016727982502442996, 0.6232312247092922, -0.010630191877204914],
+        [7.929549203948151e-05, -0.010630191877204914, 0.1348972748700744],
+    ],
+    "C": [
+        [-0.0014231046049233542, -4.6079489541554616e-05, 2.1843015412002563e-07],
+        [-4.6079489541554616e-05, -0.002493082311911296, -2.9282300800998932e-05],
+        [2.1843015412002563e-07, -2.9282300800998932e-05, -0.00055845495018597],
+    ],
+    "stiffness": 0.027240331757972542,
+    "limit": 0.0225878598703668,
+}
+
+
+def text(system, dof, low, high, more=""):
+    names = [f"x{k}" for k in range(len(system["M"]))]
+    return f"""
+[model]
+dofs = {json.dumps(names)}
+M = {system["M"]}
+K = {system["K"]}
+C = {system["C"]}
+
+[[contact]]
+name = "slider"
+law = "jenkins"
+pairs = ["x0"]
+tangential_stiffness = {system["stiffness"]!r}
+friction_limit = {system["limit"]!r}
+
+[[analysis]]
+name = "mode"
+type = "mode"
+harmonics = 15
+samples = 512
+normalise = "x{dof}"
+linear_mode = 1
+amplitude = [{low!r}, {high!r}]
+{more}"""
+
+
+@pytest.fixture
+def cycles(tmp_path, comm):
+    """Run a case, the limit cycles of its mode, and the log."""
+
+    def run(case):
+        path = tmp_path / "case.toml"
+        path.write_text(case, encoding="utf-8")
+        assert run_case(path, RunOptions(out=tmp_path / "run", plots=False), comm) == 0
+        with h5py.File(tmp_path / "run/results.h5") as file:
+            found = json.loads(file["mode"].attrs["events"])
+            kept = {key: file["mode"][key][()] for key in ("harmonic", "coefficients")}
+        return found, (tmp_path / "run/run.log").read_text(encoding="utf-8"), kept
+
+    return run
+
+
+def test_nothing_is_known_of_a_cycle_where_the_branch_runs_back(cycles, tmp_path):
+    """Damping falls with amplitude there, and motions in time settle on the cycle from both sides all the same."""
+    (first, second), log, kept = cycles(text(BACK, 1, 0.0016, 0.043))
+    assert first["runs_back"] and first["stable"] is None
+    assert "0.43045 Hz: stability unknown (the branch runs back there)" in log
+    assert second["stable"] is False and "unstable (damping falls)" in log
+    assert "stability unknown (the branch runs back there)" in "".join(overviews(tmp_path / "run")[1][0].lines())
+    orders = np.array([int(label[:-1]) for label in kept["harmonic"]])
+    cosine = np.array([label.endswith(b"c") for label in kept["harmonic"]])
+    shape, omega = kept["coefficients"][first["point"]], 2 * np.pi * first["frequency_hz"]
+    for factor in (0.97, 1.03):
+        x, v = shape[:, cosine].sum(axis=1), omega * (shape * orders)[:, ~cosine].sum(axis=1)
+        swings = JenkinsMotion(**BACK).amplitudes(factor * x, factor * v, omega, 100, 1)
+        assert np.ptp(swings[-20:]) < 1e-3 * swings[-1]  # settled; periods are not quite its own
+        assert swings[-1] == pytest.approx(first["amplitude"], rel=1e-2)
+
+
+def test_a_cycle_exactly_at_an_end_of_the_range_is_named(cycles):
+    """The last damping ratio is rounding there; the other end has none."""
+    (first, _), _, _ = cycles(text(FED, 0, 0.48, 60.0))
+    (last,), log, _ = cycles(text(FED, 0, 0.48, first["amplitude"]))
+    assert last["amplitude"] == pytest.approx(first["amplitude"], rel=SOLVED) and last["stable"] is None
+    assert "stability unknown (branch end)" in log

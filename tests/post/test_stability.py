@@ -1,0 +1,74 @@
+"""Stability of limit cycles as a branch's table and its curve have it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fretwave.post.limit_cycles import limit_cycles, stability
+from fretwave.post.mode_curve import ModeCurve
+
+pytestmark = pytest.mark.ranks(1)
+
+
+def branch(roots, backwards=False):
+    """log a = s + 1.2 sin s turns round at s = 2.556 and 3.727; the damping has these roots, rising at the first."""
+    s = np.unique(np.concatenate([np.linspace(0.0, 6.0, 61), roots]))
+    zeta = 1e-3 * np.prod([s - root for root in roots], axis=0) * (-1) ** (len(roots) + 1)
+    zeta[np.isin(s, roots)] = 0.0
+    amplitude = np.exp(s + 1.2 * np.sin(s))
+    columns = {"amplitude": amplitude, "omega": 10.0 - s, "omega0": 10.0 - s, "zeta": zeta, "frequency_hz": 10.0 - s}
+    columns["event"] = np.where(np.isin(s, roots), "zero_damping", "")
+    return {name: column[::-1] if backwards else column for name, column in columns.items()}
+
+
+def both(table):
+    """Stability by the table and by the curve through its points."""
+    return (
+        [cycle["stable"] for cycle in limit_cycles(table)],
+        [crossing.stable for crossing in ModeCurve.from_table(table).crossings()],
+    )
+
+
+@pytest.mark.parametrize("backwards", (False, True))
+def test_a_branch_that_runs_back_says_nothing_of_stability_there(backwards):
+    """Upwards and downwards: rising before the folds and behind them, and a cycle between them."""
+    expected = [True, None, True]
+    table = branch([1.05, 3.05, 5.05], backwards)
+    assert both(table) == (expected, expected)
+    assert [cycle["runs_back"] for cycle in limit_cycles(table)] == [False, True, False]
+    falling = {**table, "zeta": -table["zeta"]}
+    expected = [False, None, False]
+    assert both(falling) == (expected, expected)
+
+
+@pytest.mark.parametrize("folds", ([2.55590711], [3.72727819]))
+def test_a_cycle_at_a_fold_is_of_unknown_stability(folds):
+    assert both(branch(folds))[0] == [None]
+
+
+@pytest.mark.parametrize("backwards", (False, True))
+def test_a_cycle_at_an_end_of_a_branch_is_one(backwards):
+    table = branch([6.0], backwards)
+    table["zeta"] = table["zeta"] + 2.7e-17
+    table["event"] = np.full(len(table["zeta"]), "stop")
+    assert both(table) == ([None], [None])
+    (cycle,) = limit_cycles(table)
+    assert cycle["amplitude"] == pytest.approx(np.exp(6.0 + 1.2 * np.sin(6.0)), rel=1e-14)
+    assert stability(cycle) == "stability unknown (branch end)"
+
+
+def test_a_start_that_sticks_undamped_is_no_cycle():
+    table = branch([0.0])
+    table |= {"event": np.full(len(table["zeta"]), ""), "stick": np.minimum(1.0, 1.1 - table["amplitude"] / 10.0)}
+    assert table["zeta"][0] == 0.0 and limit_cycles(table) == []
+
+
+def test_a_point_that_is_there_twice_has_no_direction():
+    """A located zero at which a motion is reported too, a rounding below."""
+    table = branch([1.05])
+    place = int(np.flatnonzero(table["zeta"] == 0.0)[0])
+    table = {name: np.insert(column, place, column[place]) for name, column in table.items()}
+    table["amplitude"][place + 1] *= 1 - 1e-14
+    table["event"][place + 1] = "report"
+    assert [cycle["stable"] for cycle in limit_cycles(table)] == [True]
