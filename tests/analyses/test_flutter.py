@@ -204,6 +204,35 @@ def test_a_limit_cycle_on_a_branch_that_runs_back_names_its_folds():
     assert "runs back between 1 and 1.2 mm" in words(wave, "mm")
 
 
+def test_other_families_of_a_wave_that_the_flow_feeds_are_named(write, shared_tmp, comm):
+    """A second mass on a spring k to ground, which the flow feeds too: one complex equation in a wave."""
+    k, other = 9.0, ", 0.0], [0.0, {k}, 0.0], [0.0, 0.0, 0.0]]"
+    path = write(
+        ('["mass", "next"]\nM', '["mass", "other", "next"]\nM'),
+        ("M = [[1.0, 0.0], [0.0, 0.0]]", "M = [[1.0, 0.0" + other.format(k=1.0)),
+        ("K = [[1.0, 0.0], [0.0, 0.0]]", "K = [[1.0, 0.0" + other.format(k=k)),
+        ('dof = "mass"\n', ""),
+        ("samples = 960", "samples = 960\nnodal_diameters = [1, 2]"),
+    )
+    out = shared_tmp / "families"
+    assert run_case(path, RunOptions(out=out, plots=False), comm) == 0
+    record = json.loads((out / "run.json").read_text())["analyses"]["flutter"]
+    cycles = {wave["nodal_diameter"]: wave["limit_cycles"] for wave in record["waves"]}
+    (stable, unstable), (alone,) = cycles[1], cycles[2]
+    ahead = {j: np.exp(-2j * np.pi * j / SECTORS) for j in INFLUENCE}
+    damping = -sum(value.imag / OMEGA * ahead[j] for j, value in INFLUENCE.items())
+    stiffness = k - sum(value.real * ahead[j] for j, value in INFLUENCE.items())
+    value = max(np.roots([1.0, damping, stiffness]), key=lambda one: one.imag)
+    assert value.real > 0 and "fed" not in unstable and "fed" not in alone
+    assert [(mode["mode"], mode["contact"]) for mode in stable["fed"]] == [(2, "stuck"), (2, "contact free")]
+    for mode in stable["fed"]:
+        assert mode["zeta"] == pytest.approx(-value.real / abs(value), rel=SOLVED)
+        assert mode["frequency_hz"] == pytest.approx(value.imag / (2 * np.pi), rel=SOLVED)
+    said = f"but linear mode 2, {value.imag / (2 * np.pi):.4g} Hz, gains energy by itself"
+    assert said in (out / "run.log").read_text()
+    assert any("of other families" in text for text in record["left_out"])
+
+
 @pytest.mark.ranks(1)
 def test_check_and_the_list_of_keys_know_flutter(write, capsys, comm):
     assert check_case(write(("harmonics = 1", "harmonics = 1\nnodal_diameters = [-1, 2]")), (), (), False, comm) == 0

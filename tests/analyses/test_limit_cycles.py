@@ -1,4 +1,4 @@
-"""What is said of a mode's limit cycles, against time integration."""
+"""What is said of a mode's limit cycles, against time integration and eigenvalues of the linear states."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 import pytest
 from models.jenkins_motion import JenkinsMotion
-from tolerances import SOLVED
+from tolerances import REPEATED, SOLVED
 
 from fretwave.results.overview import overviews
 from fretwave.run.order import RunOptions
@@ -100,6 +100,40 @@ def test_nothing_is_known_of_a_cycle_where_the_branch_runs_back(cycles, tmp_path
         swings = JenkinsMotion(**BACK).amplitudes(factor * x, factor * v, omega, 100, 1)
         assert np.ptp(swings[-20:]) < 1e-3 * swings[-1]  # settled; periods are not quite its own
         assert swings[-1] == pytest.approx(first["amplitude"], rel=1e-2)
+
+
+def test_other_modes_that_gain_energy_are_named(cycles):
+    """Those of both linear states of the contact, as the eigenvalues of the whole equations have them."""
+    (first, second), log, _ = cycles(text(FED, 0, 0.48, 60.0))
+    assert (first["stable"], second["stable"]) == (True, False) and "fed" not in second
+    expected = []
+    for contact, stiffness in (("stuck", FED["stiffness"]), ("contact free", 0.0)):
+        values = eigenvalues(FED, stiffness)
+        expected += [(k + 1, contact, value) for k, value in enumerate(values) if k]
+    assert [(mode["mode"], mode["contact"]) for mode in first["fed"]] == [given[:2] for given in expected]
+    for mode, (_, _, value) in zip(first["fed"], expected):
+        assert mode["zeta"] == pytest.approx(-value.real / abs(value), rel=REPEATED) and mode["zeta"] < 0
+        assert mode["frequency_hz"] == pytest.approx(value.imag / (2 * np.pi), rel=SOLVED)
+    said = (
+        "0.19775 Hz: stable in its own amplitude (damping rises), but linear mode 2, 0.2136 Hz, gains energy by itself"
+    )
+    assert f"{said}: zeta -0.29 % (stuck, as does 1 other)" in log
+
+
+def test_a_cycle_beside_damped_modes_is_stable_in_its_own_amplitude_and_nothing_else_is_said(cycles):
+    damped = {**FED, "C": np.diag([-0.0014, 0.002, 0.001]).tolist()}
+    (first, _), log, _ = cycles(text(damped, 0, 0.48, 60.0))
+    assert first["stable"] is True and first["fed"] == []
+    assert "stable in its own amplitude (damping rises)\n" in log
+
+
+def eigenvalues(system, stiffness):
+    """lambda of a linear state of the contact, of positive imaginary part, in ascending order."""
+    M, C, K = (np.array(system[letter]) for letter in "MCK")
+    K[0, 0] += stiffness
+    zero, one = np.zeros_like(M), np.eye(len(M))
+    values = np.linalg.eigvals(np.block([[zero, one], [-np.linalg.solve(M, K), -np.linalg.solve(M, C)]]))
+    return sorted(values[values.imag > 0], key=lambda value: value.imag)
 
 
 def test_a_cycle_exactly_at_an_end_of_the_range_is_named(cycles):

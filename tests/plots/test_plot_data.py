@@ -325,7 +325,10 @@ def test_limit_cycles_hold_the_motions_and_stand_where_damping_is_zero(tmp_path)
     np.testing.assert_allclose(time, 2.0 * np.arange(5))
     np.testing.assert_allclose(envelope, 0.3 - 0.04 * np.arange(5))
     predicted = {line.get_label().split(",")[1]: line.get_ydata()[0] for line in axes.lines[1:]}
-    assert predicted == {" stable": pytest.approx(0.1, rel=1e-3), " unstable": pytest.approx(1.0, rel=1e-3)}
+    assert predicted == {
+        " stable in its own amplitude": pytest.approx(0.1, rel=1e-3),
+        " unstable": pytest.approx(1.0, rel=1e-3),
+    }
     plane = found["limit_cycle_phase_planes"].axes[0]
     np.testing.assert_allclose(plane.lines[0].get_xydata(), history[1:].T)
 

@@ -72,3 +72,18 @@ def test_a_point_that_is_there_twice_has_no_direction():
     table["amplitude"][place + 1] *= 1 - 1e-14
     table["event"][place + 1] = "report"
     assert [cycle["stable"] for cycle in limit_cycles(table)] == [True]
+
+
+def test_words_name_other_modes_by_the_state_of_the_contact():
+    one = {"mode": 2, "contact": "stuck", "frequency_hz": 0.591, "zeta": -0.022}
+    cycle = {"stable": True, "fed": [one]}
+    said = (
+        "stable in its own amplitude (damping rises), but linear mode 2, 0.591 Hz, gains energy by itself: zeta -2.2 %"
+    )
+    assert stability(cycle) == f"{said} (stuck)"
+    more = [one, {**one, "mode": 3, "zeta": -0.001}, {**one, "contact": "contact free"}]
+    assert stability({"stable": True, "fed": more}) == f"{said} (stuck, as does 1 other; contact free)"
+    loose = {"stable": True, "fed": [{**one, "contact": "contact free"}]}
+    assert stability(loose) == f"{said} (contact free)".replace("but", "though")
+    assert stability({"stable": True, "not_looked_at": "why"}).endswith(", other modes not looked at (why)")
+    assert stability({"stable": False}) == "unstable (damping falls)"

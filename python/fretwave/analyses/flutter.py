@@ -4,15 +4,17 @@ The forces of the flow are terms of the equations, not a damping added to a fini
 couple neighbours unlike in both directions, and act on the shape that the motion has while the contact slips. On one
 sector that costs nothing.
 
-A branch says how a motion of its own nodal diameter grows or decays. Whether its limit cycle withstands waves of other
-nodal diameters on the same wheel is another question, which is not answered here.
+A branch says how a motion of its own family and nodal diameter grows or decays. Other families of the same wave that
+the flow feeds are named; whether a limit cycle withstands them, and waves of other nodal diameters on the same wheel,
+is another question, which is not answered here.
 """
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, Literal, Optional
 
 from ..case.analysis import register_analysis
@@ -30,13 +32,16 @@ from .mode import point_line
 from .parts.at_rest import flutter_at_rest
 from .parts.branch import continuation, finished_table, mode_problem, notable, open_branch, points_of, record, tell
 from .parts.context import AnalysisContext, Outcome
+from .parts.fed_modes import with_others
 from .parts.observed import named
-from .parts.rest import retained, start_mode
+from .parts.rest import rest_state, retained, start_mode, stuck_or_free
 
 if TYPE_CHECKING:
     from ..case.facts import Facts
     from ..case.reporter import Reporter
     from ..hb.problems import Harmonics, NonlinearMode
+
+NOT_ANSWERED = "stability of the limit cycles against waves of other nodal diameters and of other families"
 
 
 @register_analysis
@@ -128,7 +133,7 @@ class FlutterAnalysis(HarmonicSection):
         """Follow the mode of every nodal diameter over its amplitude. Collective."""
         assert context.case.neighbours is not None
         harmonics = retained(context)
-        context.leave_out([*harmonics.left_out, "stability of the limit cycles against waves of other nodal diameters"])
+        context.leave_out([*harmonics.left_out, NOT_ANSWERED])
         columns = self.columns_of(named(FLUTTER, self.normalise))
         writer = context.writer(columns, labels=harmonics.labels, samples=harmonics.samples)
         try:
@@ -151,6 +156,8 @@ def _all_waves(
     reason = "; ".join(stopped) or "stop value reached"
     table = finished_table(writer)
     waves = context.comm.bcast(describe_waves(table, diameters) if table else [])
+    for wave in waves:
+        wave["limit_cycles"] = _beside_other_families(context, wave["nodal_diameter"], wave["limit_cycles"])
     cycles = [cycle for wave in waves for cycle in wave["limit_cycles"]]
     _write(context, waves, cycles)
     writer.close("stopped" if stopped else "done", reason, events=json.dumps(cycles), waves=json.dumps(waves))
@@ -159,6 +166,29 @@ def _all_waves(
     summary = [f"{context.name}: {words(wave, unit)}" for wave in waves]
     goal = f"amplitude {context.analysis.amplitude[1]:g} {unit} in every wave"
     return Outcome(writer.rows, reason, not stopped, summary, goal)
+
+
+def _beside_other_families(
+    context: AnalysisContext[FlutterAnalysis], diameter: int, cycles: Sequence[dict[str, Any]]
+) -> list[dict[str, Any]]:
+    """A wave's limit cycles with the families that grow beside a stable one. Collective."""
+    if not any(cycle["stable"] for cycle in cycles):
+        return list(cycles)
+    with _in_wave(context, diameter) as own_context:
+        rest_state(own_context)
+        return with_others(own_context, stuck_or_free(own_context, context.analysis.linear_mode), cycles)
+
+
+@contextmanager
+def _in_wave(context: AnalysisContext[FlutterAnalysis], diameter: int) -> Iterator[AnalysisContext[FlutterAnalysis]]:
+    """The context of one nodal diameter, with its model under the flow. Collective."""
+    from ..case.build import build_model
+
+    case, wave = context.case, {"nodal_diameter": diameter, "aerodynamics": True}
+    analysis = context.analysis.model_copy(update=wave)
+    preload = case.preload_of(analysis)
+    with build_model(case, analysis.dampers, context.comm, preload, diameter, aerodynamics=True) as model:
+        yield context.of(analysis, model=model)
 
 
 class _Wave:
@@ -173,16 +203,12 @@ class _Wave:
     ) -> None:
         self.context, self.number, self.count, self.harmonics = context, number, len(diameters), harmonics
         self.diameter = diameters[number]
-        self.analysis = context.analysis.model_copy(update={"nodal_diameter": self.diameter, "aerodynamics": True})
+        self.analysis = context.analysis
 
     def follow(self, writer: AnalysisWriter, snapshot: Optional[dict[str, Any]], go_on: bool) -> str:
         """Write its points; returns why it stopped early, or nothing. Collective."""
-        from ..case.build import build_model
-
-        case, analysis = self.context.case, self.analysis
-        preload, comm = case.preload_of(analysis), self.context.comm
-        with build_model(case, analysis.dampers, comm, preload, self.diameter, aerodynamics=True) as model:
-            own_context = self.context.of(analysis, model=model)
+        analysis = self.analysis
+        with _in_wave(self.context, self.diameter) as own_context:
             problem = self._problem(own_context)
             name = f"{self.context.name}: nodal diameter {self.diameter}"
             low, high = analysis.amplitude

@@ -40,6 +40,7 @@ from .parts.branch import (
     tell,
 )
 from .parts.context import AnalysisContext, Outcome
+from .parts.fed_modes import with_others
 from .parts.observed import keep_row, named
 from .parts.rest import keep_pairs, retained
 from .parts.wheel_shape import WHEEL, WheelShape, finish_wheel, one_by_one
@@ -229,7 +230,7 @@ def _finish(
     problem: NonlinearMode,
 ) -> Outcome:
     table = finished_table(writer)
-    cycles = limit_cycles(table) if table else []
+    cycles = with_others(context, start.mode, context.comm.bcast(limit_cycles(table) if table else []))
     unit = context.units(unit_of(context.analysis.normalise))
     summary = summarise(context.name, table, cycles, unit) if table else []
     summary += finish_wheel(context, writer, start) if context.case.wheel is not None else []

@@ -11,7 +11,8 @@
         peak                                  point (row of <name>.csv) and columns of this row; worn, worn_unit of wear
         error                                 of, value, unit: the largest estimated error
         limit_cycles                          amplitude, frequency_hz, stable (in its own amplitude; null: not known),
-                                              runs_back, nodal_diameter, point
+                                              runs_back, nodal_diameter, point; of a stable one fed, other linear modes
+                                              that gain energy: mode, contact, frequency_hz, zeta
         notes                                 landmarks of a sweep, in lines
     notes                                     the lines below the table that `show` prints
 

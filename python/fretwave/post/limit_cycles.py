@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Optional
 
 import numpy as np
 import numpy.typing as npt
 
 from ..arrays import Array
+from ..texts import counted
 from .mode_curve import NO_DAMPING, forward
 
+#: The state of the contact in which motions begin to grow.
+STUCK = "stuck"
 #: Of a limit cycle, by what is known of it.
 SHORT = {True: "stable in its own amplitude", False: "unstable", None: "stability unknown"}
 
@@ -66,4 +69,26 @@ def stability(cycle: Mapping[str, Any]) -> str:
         return f"stability unknown ({'the branch runs back there' if cycle.get('runs_back') else 'branch end'})"
     if not cycle["stable"]:
         return "unstable (damping falls)"
-    return "stable in its own amplitude (damping rises)"
+    return "stable in its own amplitude (damping rises)" + others(cycle.get("fed", []), cycle.get("not_looked_at", ""))
+
+
+def others(fed: Sequence[Mapping[str, Any]], not_looked_at: str = "") -> str:
+    """What other linear modes have to say of a cycle that is stable in its own amplitude; empty when all are damped.
+
+    Parameters
+    ----------
+    fed : modes that gain energy: mode (number from 1), contact, frequency_hz, zeta
+    not_looked_at : why they are not known
+    """
+    if not_looked_at:
+        return f", other modes not looked at ({not_looked_at})"
+    states: dict[str, list[str]] = {}
+    for contact in dict.fromkeys(mode["contact"] for mode in fed):
+        own = sorted((mode for mode in fed if mode["contact"] == contact), key=lambda mode: mode["zeta"])
+        first, more = own[0], len(own) - 1
+        text = f"linear mode {first['mode']}, {first['frequency_hz']:.4g} Hz, gains energy by itself:"
+        text += f" zeta {100 * first['zeta']:.3g} %"
+        also = f", as {'does' if more == 1 else 'do'} {counted(more, 'other')}" if more else ""
+        states.setdefault(text, []).append(contact + also)
+    word = "but" if any(mode["contact"] == STUCK for mode in fed) else "though"
+    return "".join(f", {word} {text} ({'; '.join(where)})" for text, where in states.items())

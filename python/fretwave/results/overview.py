@@ -38,7 +38,7 @@ class Overview:
     folds : number of them, None of a table without events
     error : the largest estimated one: column, value, unit
     limit_cycles : amplitude, frequency_hz, stable in its own amplitude (None: not known), nodal_diameter where there
-        are several waves
+        are several waves, fed (other linear modes that gain energy by themselves) of a stable one
     overrides : what the command line changed, as it was typed
     notes : what else is said, in lines
     """

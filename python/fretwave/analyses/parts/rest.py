@@ -123,7 +123,7 @@ def start_mode(
             f" {100 * rest.open:.3g} % are open"
         )
         context.arrays["rest_displacement"] = rest.displacement
-    modes = _stuck_modes(context, linear_mode) if or_free else modes_at_rest(context, linear_mode)
+    modes = stuck_or_no_modes(context, linear_mode) if or_free else modes_at_rest(context, linear_mode)
     if not modes:
         context.console.line(f"{context.name}: contact that sticks leaves nothing to move: the mode without contact")
         return context.numbered(context.linear_mode("free", linear_mode), linear_mode), rest
@@ -165,7 +165,7 @@ def modes_at_rest(context: AnalysisContext[AnalysisSection], count: int) -> list
     return [most_like(context, found, mode, diameters) for mode in stuck]
 
 
-def _stuck_modes(context: AnalysisContext[AnalysisSection], count: int) -> list[LinearMode]:
+def stuck_or_no_modes(context: AnalysisContext[AnalysisSection], count: int) -> list[LinearMode]:
     """None where contact that sticks leaves nothing to move. Collective."""
     try:
         return modes_at_rest(context, count)
@@ -180,7 +180,7 @@ def stuck_or_free(context: AnalysisContext[AnalysisSection], number: int) -> Lin
 
 def modes_or_free(context: AnalysisContext[AnalysisSection], count: int) -> list[LinearMode]:
     """The same of all up to a number. Collective."""
-    return _stuck_modes(context, count) or context.linear_mode("free", count)
+    return stuck_or_no_modes(context, count) or context.linear_mode("free", count)
 
 
 def retained(

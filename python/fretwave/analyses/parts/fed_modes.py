@@ -1,0 +1,114 @@
+"""Linear modes beside the followed one that gain energy by themselves, which its limit cycles may not withstand.
+
+A limit cycle whose damping rises with amplitude is stable in its own amplitude; any other motion that is fed may still
+grow out of it. The lowest modes of each linear state of the contact, stuck and without friction, tell of such motions:
+the damping and the flow act on the space that they span. Of 34 cycles of random structures with one to three sliders,
+integrated in time, those beside a mode that is fed while the contact sticks were left in 9 cases of 22; none of the 12
+others was, 4 of them beside modes that are fed without contact alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...arrays import Complex
+from ...case.flow import with_flow
+from ...case.harmonic import HarmonicSection, nodal_diameter, with_flow_forces
+from ...errors import InputError
+from ...model.sectors import in_wave
+from ...post.limit_cycles import STUCK
+from .asymptotes import MORE_MODES, limit_model, most_like
+from .context import AnalysisContext
+from .rest import RIGID, stuck_or_no_modes
+
+if TYPE_CHECKING:
+    from ...model.modes import LinearMode
+
+#: Damping ratios above this, its sign apart, are more than rounding.
+FED = 1e-8
+
+
+def with_others(
+    context: AnalysisContext[HarmonicSection], followed: LinearMode, cycles: Sequence[dict[str, Any]]
+) -> list[dict[str, Any]]:
+    """Limit cycles, to stable ones added `fed`, the modes beside theirs that gain energy. Collective.
+
+    Where modes are not to be had, `not_looked_at` says why.
+    """
+    if not any(cycle["stable"] for cycle in cycles):
+        return list(cycles)
+    if context.case.wheel is not None:
+        added: dict[str, Any] = {"not_looked_at": "a whole wheel has many; those of a wave are on one sector"}
+    else:
+        try:
+            added = {"fed": fed_modes(context, followed)}
+        except InputError as error:  # on all ranks
+            added = {"not_looked_at": error.what}
+    return [{**cycle, **(added if cycle["stable"] else {})} for cycle in cycles]
+
+
+def fed_modes(context: AnalysisContext[HarmonicSection], followed: LinearMode) -> list[dict[str, Any]]:
+    """Modes of negative damping other than the followed one, in each state of the contact. Collective.
+
+    Returns
+    -------
+    list of dict
+        mode, its number from 1 in this state and wave; contact: ``stuck``, ``contact free`` or ``sliding``;
+        frequency_hz; zeta.
+    """
+    count = min(context.model.n_dof, context.analysis.linear_mode + MORE_MODES)
+    found = []
+    for contact, given in {STUCK: stuck_or_no_modes(context, count), **_loose(context, count)}.items():
+        modes = list({id(mode): mode for mode in given}.values())  # each once
+        own = most_like(context, modes, followed, nodal_diameter(context.analysis)).omega if modes else 0.0
+        first = next((number for number, mode in enumerate(modes) if mode.omega == own), None)  # of a double one
+        for number, value in _growing(context, modes).items():
+            if number != first:
+                zeta, frequency = -value.real / abs(value), abs(value.imag) / (2 * np.pi)
+                found.append({"mode": number + 1, "contact": contact, "frequency_hz": frequency, "zeta": zeta})
+    return found
+
+
+def _loose(context: AnalysisContext[HarmonicSection], count: int) -> dict[str, list[LinearMode]]:
+    """Modes without friction, as `other_asymptote` takes them. Collective."""
+    from ...model.modes import linear_modes
+
+    if not context.case.contacts:
+        return {}
+    if all(contact.components == 1 for contact in context.case.contacts):
+        return {"contact free": context.linear_mode("free", count)}
+    with limit_model(context.case, context.comm, "sliding", nodal_diameter(context.analysis)) as model:
+        return {"sliding": linear_modes(model, count)}
+
+
+def _growing(context: AnalysisContext[HarmonicSection], modes: Sequence[LinearMode]) -> dict[int, complex]:
+    """lambda of what grows by number of the undamped mode, from 0, that has the largest share in it."""
+    if not modes:
+        return {}
+    values, shapes = np.linalg.eig(_companion(context, modes))
+    grows = (values.real > FED * np.abs(values)) & (np.abs(values) > RIGID * np.abs(values).max())
+    found: dict[int, complex] = {}
+    for value, shape in zip(values[grows], shapes[: len(modes), grows].T):
+        number = int(np.argmax(np.abs(shape)))
+        found[number] = max(found.get(number, value), value, key=lambda one: float(one.real))
+    return dict(sorted(found.items()))
+
+
+def _companion(context: AnalysisContext[HarmonicSection], modes: Sequence[LinearMode]) -> Complex:
+    """First-order matrix of damping and flow on the space of undamped modes, each of unit modal mass there."""
+    case, analysis = context.case, context.analysis
+    theta = 2 * np.pi * nodal_diameter(analysis) / case.neighbours.sectors if case.neighbours else 0.0
+    structure = case.damped(analysis.dampers)
+    K, C = structure.K, structure.C
+    phi = np.column_stack([mode.shape + 1j * mode.imaginary for mode in modes])
+    phi /= np.sqrt(np.einsum("ij,ij->j", phi.conj(), in_wave(structure.M, phi, theta)).real)
+    stiffness = np.diag([mode.omega**2 for mode in modes]).astype(complex)
+    if with_flow_forces(analysis):
+        fed, C = with_flow(case, K, C, nodal_diameter(analysis))
+        stiffness += phi.conj().T @ (in_wave(fed, phi, theta) - in_wave(K, phi, theta))
+    damping = np.zeros_like(stiffness) if C is None else phi.conj().T @ in_wave(C, phi, theta)
+    zero = np.zeros_like(stiffness)
+    return np.block([[zero, np.eye(len(modes))], [-stiffness, -damping]])
