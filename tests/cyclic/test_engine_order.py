@@ -227,5 +227,47 @@ def test_what_is_wrong_with_an_excitation_is_said(tmp_path, change):
     old, new, message = change
     assert old in TEXT
     (tmp_path / "case.toml").write_text(TEXT.replace(old, new, 1))
-    with pytest.raises(CaseErrors, match=message):
+    with pytest.raises(CaseErrors, match=message) as caught:
         load_case(tmp_path / "case.toml")
+    assert str(caught.value).count("fix:") == 1 or "no sector" in message  # whose faces are wrong then, too
+
+
+def beside_mode(diameters: int, order: int, flow: bool, amplitude: float = 2.0) -> str:
+    """A response whose peaks are compared with a mode of a wave."""
+    mode = f'[[analysis]]\nname = "mode"\ntype = "mode"\nnormalise = "blade"\nnodal_diameter = {diameters}\n'
+    mode += f"harmonics = 3\nsamples = 480\namplitude = [0.2, {amplitude}]\n\n[[analysis]]"
+    text = TEXT.replace("[[analysis]]", mode, 1).replace(
+        "engine_order = 8", f'engine_order = {order}\nbackbone = "mode"'
+    )
+    return text if flow else text.replace("aerodynamics = true\n", "")
+
+
+#: Order, nodal diameters of the mode and those of the order's wave on six sectors; with forces of the flow or without.
+ANOTHER = [(8, 1, 2, False), (3, 1, 3, False), (6, 1, 0, False), (4, -1, -2, False), (8, -2, 2, True)]
+SAME = [(8, 2, True), (8, 2, False), (4, 2, False), (8, -2, False), (3, -3, True), (-2, -2, True)]
+
+
+@pytest.mark.ranks(1)
+@pytest.mark.parametrize(("order", "diameters", "wave", "flow"), ANOTHER)
+def test_peaks_against_a_backbone_of_another_wave_are_refused(tmp_path, order, diameters, wave, flow):
+    (tmp_path / "case.toml").write_text(beside_mode(diameters, order, flow))
+    with pytest.raises(CaseErrors, match=f"forced.backbone is of a wave of {diameters} nodal diameters") as caught:
+        load_case(tmp_path / "case.toml")
+    said = f"nodal_diameter = {wave}, which engine order {order} drives on 6 sectors"
+    assert said in str(caught.value) and str(caught.value).count("fix:") == 1
+
+
+@pytest.mark.ranks(1)
+@pytest.mark.parametrize(("order", "diameters", "flow"), SAME)
+def test_a_backbone_of_the_order_s_wave_is_taken(tmp_path, order, diameters, flow):
+    """Without forces of the flow waves that run the other way have the same frequencies."""
+    (tmp_path / "case.toml").write_text(beside_mode(diameters, order, flow))
+    assert load_case(tmp_path / "case.toml").analyses["forced"].nodal_diameter == folded(order, SECTORS)
+
+
+@pytest.mark.ranks(1)
+def test_a_peak_beyond_a_backbone_is_told_in_words(comm, tmp_path):
+    (tmp_path / "case.toml").write_text(beside_mode(2, 8, False, amplitude=0.25))
+    assert run_case(tmp_path / "case.toml", RunOptions(out=tmp_path / "run", plots=False), comm) == 0
+    said = (tmp_path / "run" / "run.log").read_text(encoding="utf-8")
+    assert "Hz, beyond the amplitudes of mode\n" in said and "nan" not in said

@@ -125,7 +125,8 @@ class ForcedAnalysis(HarmonicSection):
             report.wrong(("nodal_diameter",), "is not that of the engine order", expected, "remove nodal_diameter")
         else:
             return self.model_copy(update={"nodal_diameter": folded(order, sectors)})
-        return self
+        # what is wrong with the order is said: nothing of its wave beside that
+        return self if sectors is None or given is not None else self.model_copy(update={"nodal_diameter": 0})
 
     def check(self, report: Reporter, facts: Facts) -> None:
         super().check(report, facts)
@@ -149,6 +150,21 @@ class ForcedAnalysis(HarmonicSection):
             if name in modes and known and over != own:
                 what = "is over another amplitude than the peaks"
                 report.wrong(place, what, f"a mode with `normalise = {toml(own)}`", f"`observe = {toml(over)}`")
+            if name in modes and facts.sectors is not None and self.engine_order != 0:
+                self._check_wave_of(report, place, name, facts, facts.sectors)
+
+    def _check_wave_of(self, report: Reporter, place: tuple[Any, ...], name: str, facts: Facts, sectors: int) -> None:
+        """A backbone is of the wave that the force drives; without forces of the flow it may run the other way."""
+        given, mistuning, flow = (given_to(facts, name, key) for key in ("nodal_diameter", "mistuning", "aerodynamics"))
+        own = self.nodal_diameter
+        if own is None or mistuning or self.mistuning or not isinstance(given, str) or not given.lstrip("-").isdigit():
+            return
+        wave, driven = folded(int(given), sectors), folded(own, sectors)
+        if wave == driven or (wave == -driven and not flow and not self.aerodynamics):
+            return
+        by = f", which engine order {self.engine_order} drives on {sectors} sectors" if self.engine_order else ""
+        what, expected = f"is of a wave of {wave} nodal diameters", f"a mode with nodal_diameter = {driven}{by}"
+        report.wrong(place, what, expected, f"write `nodal_diameter = {driven}` in '{name}', or name another mode")
 
     def headline(self) -> str:
         low, high = self.frequency

@@ -49,5 +49,11 @@ def _peak_line(name: str, peak: dict[str, float], curves: list[str], unit: str) 
     if not math.isfinite(peak["amplitude"]):
         return text + "no peak within the frequency range"
     text += f"peak a = {peak['amplitude']:.4g} {unit} at {peak['frequency_hz']:.5g} Hz"
-    distances = [f"{100 * peak[f'distance_{curve}']:+.3f} % from {curve}" for curve in curves]
-    return text + (", frequency " + ", ".join(distances) if distances else "")
+    return "".join([text, *(_distance(peak[f"distance_{curve}"], curve) for curve in curves)])
+
+
+def _distance(share: float, curve: str) -> str:
+    """How far a peak's frequency is from a backbone's, which may have no point of its amplitude."""
+    if not math.isfinite(share):
+        return f", beyond the amplitudes of {curve}"
+    return f", frequency {100 * share:+.3f} % from {curve}"
