@@ -5,7 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from command_line import call
 
+from fretwave.case.checks import check_chosen
 from fretwave.case.load import load_case
 from fretwave.errors import CaseErrors, InputError
 
@@ -21,14 +23,25 @@ def problems(*overrides: str) -> list[InputError]:
 
 @pytest.mark.parametrize("name", ["free_decay", "limit_cycle"])
 @pytest.mark.parametrize("start", [0.0199, 3.001])
-def test_a_start_outside_of_its_mode_is_refused_at_once(name: str, start: float) -> None:
-    [problem] = problems(f"{name}.amplitude=[0.3, {start}]")
-    assert problem.what == f"{name}.amplitude[1] is outside the mode's branch"
-    assert "amplitude = [0.02, 3.0]" in str(problem.expected) and "widen the range" in str(problem.fix)
+@pytest.mark.parametrize("command", ["check", "run"])
+def test_a_start_outside_of_its_mode_is_refused_at_once(tmp_path, capfd, command: str, name: str, start: float) -> None:
+    out = ["--out", tmp_path / "run"] if command == "run" else []
+    assert call(command, CASE, "--set", f"{name}.amplitude=[0.3, {start}]", *out) == 2
+    said = capfd.readouterr()
+    assert f"error: {name}.amplitude[1] is outside the mode's branch" in said.err and "0 points" not in said.out
+    assert "amplitude = [0.02, 3.0]" in said.err and "fix:" in said.err
+    assert not (tmp_path / "run").exists()
 
 
 def test_a_start_at_an_end_of_its_mode_is_right() -> None:
-    load_case(CASE, ["limit_cycle.amplitude=[0.02, 3.0]", "free_decay.amplitude=[3.0000000000000004]"])
+    case = load_case(CASE, ["limit_cycle.amplitude=[0.02, 3.0]", "free_decay.amplitude=[3.0000000000000004]"])
+    check_chosen(case.analyses.values(), case)
+
+
+def test_starts_that_are_left_out_bind_no_mode() -> None:
+    assert (
+        call("check", CASE, "--only", "mode", "--set", "mode.amplitude=[0.02,0.3]", "--set", "mode.report_at=[]") == 0
+    )
 
 
 def test_a_range_that_is_wrong_is_told_where_it_stands() -> None:

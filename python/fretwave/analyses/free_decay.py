@@ -9,9 +9,10 @@ import numpy as np
 
 from ..case.analysis import AnalysisSection, register_analysis
 from ..case.checks_common import check_once
-from ..case.observed import check_displaced, given_to
+from ..case.observed import check_displaced
 from ..case.schema import Damper, Positive, Whole, key
 from ..columns import Column
+from ..errors import InputError
 from ..post.decays import decay_rows, largest_differences
 from ..post.mode_curve import ModeCurve, at_the_end
 from ..solve.steps import COARSEST_TOLERANCE, TIME_TOLERANCE
@@ -60,22 +61,22 @@ class TransientSection(AnalysisSection):
         report.mode(("mode",), self.mode, facts.analyses_of("mode"))
         check_displaced(report, "mode", self.mode, facts)
         check_once(report, "amplitude", self.amplitude)
-        self._check_starts(report, facts)
 
-    def _check_starts(self, report: Reporter, facts: Facts) -> None:
-        """Each lies where its mode is asked for, right or wrong as that may stand in the case."""
-        given = given_to(facts, self.mode, "amplitude") if self.mode in facts.analyses_of("mode") else None
-        if not isinstance(given, list) or len(given) != 2 or any(type(end) not in (int, float) for end in given):
-            return
-        ends = np.array(given, dtype=float)
-        for index, start in enumerate(self.amplitude):
-            if not ends.min() <= at_the_end(ends, start) <= ends.max():
-                report.wrong(
-                    ("amplitude", index),
-                    "is outside the mode's branch",
-                    f"a value within {self.mode}.amplitude = {toml(given)}",
-                    f"change it, or widen the range of '{self.mode}'",
-                )
+    def check_chosen(self, case: Case) -> list[InputError]:
+        """Each start lies where its mode is asked for."""
+        given = self.mode_of(case).amplitude
+        ends = np.array(given)
+        return [
+            InputError(
+                f"{self.name}.amplitude[{index}] is outside the mode's branch",
+                f"analysis '{self.name}'",
+                toml(start),
+                f"a value within {self.mode}.amplitude = {toml(given)}",
+                f"change it, or widen the range of '{self.mode}'",
+            )
+            for index, start in enumerate(self.amplitude)
+            if not ends.min() <= at_the_end(ends, start) <= ends.max()
+        ]
 
     def least_memory(self, facts: Facts) -> Mapping[str, float]:
         count = self.periods * self.samples_per_period

@@ -150,6 +150,10 @@ class AnalysisSection(Section):
         """
         check_common(report, self, facts)
 
+    def check_chosen(self, case: Case) -> list[InputError]:
+        """What is wrong beside analyses that it reads, which is of no account where `--only` leaves it out."""
+        return []
+
     def least_memory(self, facts: Facts) -> Mapping[str, float]:
         """Least memory [bytes] by `<key that asks for it>: <what it is for>`."""
         return {}

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from typing import TYPE_CHECKING
 
-from ..errors import InputError
+from ..errors import CaseErrors, InputError
 from ..registry import kind_named, kinds
-from ..texts import nearest, toml
+from ..texts import display, nearest, toml
 from .analysis import AnalysisSection
 from .checks_wheel import with_measured
 from .facts import Facts
@@ -14,6 +15,9 @@ from .reporter import Found, Reporter
 from .schema import TOP_LEVEL
 from .toml.source import Source
 from .toml.validation import unknown_key, validate
+
+if TYPE_CHECKING:
+    from .load import Case
 
 
 def read_analyses(source: Source, found: Found) -> dict[int, AnalysisSection]:
@@ -135,3 +139,16 @@ def choose(names: Sequence[str], only: Sequence[str], origin: str = "--only") ->
             )
     selected: Callable[[str], bool] = lambda name: not only or name in only  # noqa: E731
     return [name for name in names if selected(name)]
+
+
+def check_chosen(analyses: Iterable[AnalysisSection], case: Case) -> None:
+    """Of analyses that are to run, what is wrong beside those that they read.
+
+    Raises
+    ------
+    CaseErrors
+        All of it.
+    """
+    found = [error for analysis in analyses for error in analysis.check_chosen(case)]
+    if found:
+        raise CaseErrors(found, display(case.path))

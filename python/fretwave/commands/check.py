@@ -39,6 +39,7 @@ def check_case(
     """
     case = on_first_rank(comm, lambda: _load(path, overrides, quick))
     names = in_order(case, checks.choose(list(case.analyses), only))
+    on_first_rank(comm, lambda: checks.check_chosen([case.analyses[name] for name in names], case))
     check_sweeps(case, names, RunOptions(overrides=list(overrides), quick=quick), comm)
     warnings = odd_ratios(case)
     case = reduce_case(case, comm)

@@ -123,6 +123,7 @@ class Runner:
             on_first_rank(self.comm, self.folder.check_free)
         names = in_order(self.case, checks.choose(list(self.case.analyses), self.options.only))
         on_first_rank(self.comm, lambda: self._check_needs(names))
+        on_first_rank(self.comm, lambda: checks.check_chosen([self.case.analyses[name] for name in names], self.case))
         sweeps = check_sweeps(self.case, names, self.options, self.comm)
         self.folder.record["selected"] = names
         self._greet(names)
