@@ -127,7 +127,11 @@ _ALL = (
     Column("step", "1", "length of the step in normalised wear cycles"),
     Column("work", "energy", "energy that contact dissipates in a period"),
     Column("energy_error", "1", "imbalance of the period's energy, relative to that released by the decay"),
-    Column("step_error", "1", "estimated error of the step, as normal load relative to the mean"),
+    Column(
+        "step_error",
+        "1",
+        "estimated error of the step's depths, relative to own depth and the one that takes the mean load away",
+    ),
     Column("stick", "1", "share of the period that contact pairs stick"),
     Column("slip", "1", "share of the period that contact pairs slip"),
     Column("open", "1", "share of the period that contact pairs are open"),

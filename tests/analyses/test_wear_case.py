@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 import subprocess
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from test_built import BUILDER, TEXT
 from test_resume import command, kill_at, without_time
 from tolerances import LAST_DIGITS, REPEATED, ROUNDING
 
+from fretwave.analyses.wear import _advice
 from fretwave.case.load import load_case
 from fretwave.commands.main import main
 from fretwave.errors import CaseErrors
@@ -186,3 +188,26 @@ def test_pairs_without_area_cannot_wear(tmp_path: Path) -> None:
     (tmp_path / "case.toml").write_text(text + WEAR)
     with pytest.raises(CaseErrors, match="areas of the pairs are not known"):
         load_case(tmp_path / "case.toml")
+
+
+@pytest.mark.parametrize("area", ["-1e-4", "0.0", "np.nan"])
+def test_pairs_whose_area_is_none_cannot_wear(tmp_path: Path, area: str) -> None:
+    """As consistent weights of quadratic faces are at corners: such a pair wore backwards, its load grew."""
+    code, areas = BUILDER.read_text(), "areas=np.full(2, AREA),"
+    text = TEXT.replace("tangential_stiffness_per_area = 2e10", "tangential_stiffness = 4e6")
+    assert areas in code and text != TEXT
+    (tmp_path / "model.py").write_text(code.replace(areas, f"areas=np.array([AREA, {area}]),"))
+    (tmp_path / "case.toml").write_text(text + WEAR)
+    with pytest.raises(CaseErrors, match=r"(?s)areas of some pairs are no areas.*pair 1.*fix"):
+        load_case(tmp_path / "case.toml")
+
+
+@pytest.mark.parametrize("reason", ["step too small: the contact changes too fast", "the mode ends here"])
+def test_what_is_advised_after_a_march_can_be_set(tmp_path: Path, reason: str) -> None:
+    """It was `wear.step.minimum`, a key of modes."""
+    (tmp_path / "model.py").write_text(BUILDER.read_text())
+    (tmp_path / "case.toml").write_text(TEXT + WEAR)
+    settings = re.findall(r"--set '?([\w.]+)=(\S+?)[,)' ]", _advice("wear", reason))
+    assert settings
+    for name, value in settings:
+        load_case(tmp_path / "case.toml", [f"{name}={value if value[0] != '[' else '[1e-6]'}"])

@@ -18,11 +18,11 @@ pytestmark = pytest.mark.ranks(1)
 A, B, C, P0 = 1.0, 0.5, 4e-3, 1.5
 
 
-def worn_load(eta):
-    return 1 / (B / A + (1 / P0 - B / A) * np.exp(C * A * eta))
+def worn_load(eta, amplitude=A):
+    return 1 / (B / amplitude + (1 / P0 - B / amplitude) * np.exp(C * amplitude * eta))
 
 
-def node(comm, samples=64):
+def node(comm, samples=64, amplitude=A):
     """A mass whose only motion is tangential: P = P0 - kn depth, and one harmonic keeps the motion a cosine."""
     contact = fw.Contact(
         "coulomb_3d",
@@ -31,7 +31,7 @@ def node(comm, samples=64):
     )
     model = fw.Model([[1.0]], [[1.0]], None, [contact], comm)
     problem = fw.NonlinearMode(model, fw.Harmonics([0, 1], samples), "CNM", 0, fw.linear_modes(model, 1, "stuck")[0])
-    y = solve_at(problem, A)
+    y = solve_at(problem, amplitude)
     return fw.WornMode(problem, C / 4, {"contact": np.ones(1)}), y
 
 
@@ -122,6 +122,30 @@ def test_stop_rules(comm):
     small = solve_at(mode.problem, 0.5)  # 0.5 < b P0: stuck
     march = fw.Wear(mode, small, 1e9)
     assert len(list(march)) == 1 and march.eta == 0 and "stopped" in march.reason
+
+
+@pytest.mark.parametrize("cycles", [1e9, 1e18])
+def test_a_march_is_as_long_as_it_is_wanted(comm, cycles):
+    """Steps are short beside what wears, not beside all cycles: these ended before the first one."""
+    mode, y = node(comm)
+    march = fw.Wear(mode, y, cycles, fw.WearControl(tolerance=1e-2))
+    assert [point.event for point in march][-1] == "stop"
+    assert march.converged and "contact lost" in march.reason and march.eta < 1e5
+
+
+@pytest.mark.parametrize("stepper", list(STEPPERS))
+@pytest.mark.parametrize("above", [1e-4, 1e-6])
+def test_wear_that_accelerates_from_nothing_has_not_stopped(comm, stepper, above):
+    """Just above the onset of slip less than the tolerance is lost at first, and all of it in the end."""
+    amplitude = B * P0 * (1 + above)
+    mode, y = node(comm, amplitude=amplitude)
+    cycles = 40 / (C * amplitude)
+    off = []
+    for tolerance in (1e-3, 1e-4):
+        found = marched(mode, y, cycles, fw.WearControl(stepper, tolerance))
+        assert found[-1][1][0] < 1e-2 * P0
+        off.append(max(abs(load[0] - worn_load(eta, amplitude)) for eta, load, *_ in found) / P0)
+    assert off[0] < 0.1 and off[1] < 0.4 * off[0] + 1e-4
 
 
 # ---- Archard's integral

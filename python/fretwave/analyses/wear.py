@@ -25,7 +25,7 @@ from ..files.dimensions import names_of_data
 from ..mpi import groups
 from ..mpi.guard import on_first_rank
 from ..results.results import AnalysisWriter, has_results, open_results
-from ..solve.steps import WearControl
+from ..solve.steps import TOO_FAST, WearControl
 from .mode import ModeAnalysis
 from .parts.context import AnalysisContext, Outcome
 from .parts.rest import keep_pairs
@@ -66,7 +66,7 @@ class WearAnalysis(AnalysisSection):
         default=WearControl.stepper,
     )
     tolerance: Positive = key(
-        "estimated error of a step, as normal load lost relative to the mean",
+        "estimated error of a step's depths, relative to a pair's own and the one that takes the mean load away",
         "-",
         "1e-4",
         default=WearControl.tolerance,
@@ -118,7 +118,7 @@ class WearAnalysis(AnalysisSection):
             areas_of(facts.contacts)
         except InputError as error:
             where = report.source.where((*report.path, "type"))
-            measured = error.where or error.measured
+            measured = ": ".join(str(part) for part in (error.where, error.measured) if part)
             report.found.append(InputError(error.what, where, measured, error.expected, error.fix))
 
     def least_memory(self, facts: Facts) -> Mapping[str, float]:
@@ -193,7 +193,15 @@ def _collect(
     if writer.rows:
         context.afterwards.append(lambda: shutil.rmtree(folder, ignore_errors=True))
     goal = f"{analysis.cycles:g} normalised cycles at every amplitude, or wear that stops"
-    return Outcome(writer.rows, reason, not failures, [result["summary"] for result in marched], goal)
+    advice = _advice(context.name, reason) if failures else ""
+    return Outcome(writer.rows, reason, not failures, [result["summary"] for result in marched], goal, advice)
+
+
+def _advice(name: str, reason: str) -> str:
+    """What helps a march that stopped before its goal."""
+    if TOO_FAST in reason or "stage" in reason:
+        return f"--set {name}.pressure_change=0.05, another stepper (--set {name}.stepper=tr_bdf2), or fewer cycles"
+    return f"fewer cycles (what wore until then is kept), or other amplitudes (--set '{name}.amplitude=[...]')"
 
 
 def _failures(analysis: WearAnalysis, lines: list[Line], results: list[Any]) -> list[str]:

@@ -43,7 +43,13 @@ def wear_areas(contacts: Sequence[Contact]) -> dict[str, Array]:
         if contact.pairs.areas is None:
             fix = "give the contact its areas (Pairs(areas=...))"
             raise InputError("the areas of the pairs are not known", f"contact '{contact.name}'", None, "areas", fix)
-        found[contact.name] = np.asarray(contact.pairs.areas, dtype=float)
+        areas = np.asarray(contact.pairs.areas, dtype=float)
+        if bad := [f"{areas[pair]:g} (pair {pair})" for pair in np.flatnonzero(~(np.isfinite(areas) & (areas > 0)))]:
+            more = f" and {len(bad) - 3} more" if len(bad) > 3 else ""
+            fix = "give each pair its share of the face (of quadratic faces not the consistent weights of corners)"
+            where, measured = f"contact '{contact.name}'", ", ".join(bad[:3]) + more
+            raise InputError("the areas of some pairs are no areas", where, measured, "finite and > 0", fix)
+        found[contact.name] = areas
     if not found:
         given_laws = ", ".join(str(contact.law) for contact in contacts) or "no contact"
         fix = f'use law = "{law_like(lambda law: law.wears)}"'

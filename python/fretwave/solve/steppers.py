@@ -85,6 +85,10 @@ class StageFailed(ArithmeticError):
     """A stage has no rate: the step must be shorter."""
 
 
+class StageDiverged(StageFailed):
+    """An implicit stage is not found, though the rate is known wherever it was looked for."""
+
+
 @dataclass(frozen=True)
 class Step:
     """One step: state and rate at its end, and the estimate of its error."""
@@ -141,4 +145,4 @@ def _implicit(
         steps = np.diff(defects, axis=0).T / tolerance[:, None]
         weights = np.linalg.lstsq(steps, defect / tolerance, rcond=1e-10)[0]
         x = np.maximum(image - np.diff(points, axis=0).T @ weights, known)
-    raise StageFailed("an implicit stage does not converge")
+    raise StageDiverged("an implicit stage does not converge")

@@ -60,6 +60,10 @@ class StepControl:
         return steps
 
 
+#: Why a step over wear cycles becomes too short.
+TOO_FAST = "the contact changes too fast"
+
+
 @dataclass(frozen=True)
 class WearControl:
     """How long the steps over wear cycles are.
@@ -67,8 +71,9 @@ class WearControl:
     Attributes
     ----------
     stepper : name in `fretwave.solve.steppers.STEPPERS`
-    tolerance : largest estimated error of a step's depths, as loss of normal load relative to the mean at the start
-    pressure_change : largest change of a pair's mean normal force in a step, relative to the same
+    tolerance : largest estimated error of a step's depths, relative to a pair's own and the one that takes the mean
+        normal load at the start away
+    pressure_change : largest change of a pair's mean normal force in a step, relative to that load
     first, fixed : length of the first step [cycles]; `fixed` for all steps, without control
 
     Raises

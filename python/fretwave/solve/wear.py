@@ -12,12 +12,17 @@ from petsc4py import PETSc
 
 from ..arrays import Array
 from ..errors import InputError
-from .steppers import STEPPERS, StageFailed, take
-from .steps import WearControl
+from .steppers import STEPPERS, StageDiverged, StageFailed, take
+from .steps import TOO_FAST, WearControl
 from .worn_mode import WornMode, WornState
 
-#: Shortest step as a share of all cycles.
-SHORTEST = 1e-10
+#: Shortest step as a share of a first step at the present rates, and of the cycles done.
+SHORTEST, LAST_DIGITS = 1e-10, 1e-14
+#: Where the fastest rate grows, a step's error counts against so many times its own depths, too: less load slips more,
+#: and what lies below any tolerance grows like e^t.
+GROWING = 30.0
+#: Depths that Newton leaves of such small ones, in those that take the mean load away.
+LEFT = 1e-10
 #: A step without a solution is cut to this share of a first step before the mode is taken to end there and to jump.
 LAST_TRY = 1e-2
 #: A step grows and shrinks by no more than this, and aims at this share of what is allowed.
@@ -89,13 +94,14 @@ class Wear:
         self.depth_scale = self.load_scale / mode.stiffness
         self.step = step or self.control.first or self._first_step()
         self._spent = [0, 0]
+        self._grows = True
 
     def __repr__(self) -> str:
         return f"Wear({self.eta:g} of {self.cycles:g} cycles: {self.reason or 'under way'}, of {self.mode})"
 
     def _first_step(self) -> float:
         """A tenth of the allowed change at the present rates."""
-        fastest = float((self.state.rate / self.depth_scale).max(initial=0.0))
+        fastest = self._fastest(self.state)
         return self._on_grid(0.1 * self.control.pressure_change / fastest) if fastest else self.cycles
 
     def _on_grid(self, step: float) -> float:
@@ -117,13 +123,17 @@ class Wear:
             yield point
 
     def _finished(self) -> bool:
-        """Stop rules: cycles done, contact lost, wear stopped."""
+        """Stop rules: cycles done, contact lost, wear stopped.
+
+        Rates that grow say nothing of what is to come.
+        """
         remaining = self.cycles - self.eta
+        left = 0.0 if self._grows else self.control.tolerance * self.depth_scale
         if remaining <= 0:
             self.reason = "cycles done"
         elif (self.state.load <= 0).all():
             self.reason = "contact lost: all pairs are open"
-        elif (self.state.rate * remaining <= self.control.tolerance * self.depth_scale).all():
+        elif (self.state.rate * remaining <= left).all():
             self.reason = "wear has stopped: to the last cycle it changes nothing beyond the tolerance"
         self.converged = bool(self.reason)
         return self.converged
@@ -133,33 +143,52 @@ class Wear:
         self._spent = [0, 0]
         target = next(value for value in self.reports if value > self.eta)
         tangent = self.mode.tangent(self.state, self.state.rate)
-        why, least = "", LAST_TRY * self._first_step()
-        while self.step >= SHORTEST * self.cycles:
+        why, first = TOO_FAST, self._first_step()
+        least, shortest = LAST_TRY * min(first, self.cycles), max(SHORTEST * first, LAST_DIGITS * self.eta)
+        while self.step >= shortest:
             meets = self.eta + self.step * (1 + 1e-12) >= target
             h = target - self.eta if meets else self.step
             try:
                 found, state = self._try(h, tangent)
             except StageFailed as failure:
-                if h < least:
+                if h < least and not isinstance(failure, StageDiverged):
                     tangent.destroy()
                     return self._jump(h)
                 why, self.step = str(failure), h / 4
                 continue
-            error = float((np.abs(found) / (self.depth_scale + state.depth)).max(initial=0.0))
+            error = self._error(np.abs(found), state)
             change = float(np.abs(state.load - self.state.load).max(initial=0.0)) / self.load_scale
             by_error = (error / self.control.tolerance) ** (1 / self.tableau.error_order)
             share = max(by_error, change / self.control.pressure_change)
             if self.control.fixed or share <= 1:
                 tangent.destroy()
                 return self._accept(h, target if meets else self.eta + h, state, error, share)
-            why = "the contact changes too fast"
+            why = TOO_FAST
             state.y.destroy()
             self.step = self._on_grid(h * max(SHRINKING, SAFETY / share))
         tangent.destroy()
         self.reason = f"step too small: {why}"
         return None
 
+    def _error(self, found: Array, state: WornState) -> float:
+        """Of a step to a state, by the errors (n_pairs,) found of its depths."""
+        error = float((found / (self.depth_scale + state.depth)).max(initial=0.0))
+        if not self._faster(state):
+            return error
+        seen = max(float((found / self.depth_scale).max()) - LEFT, 0.0)
+        own = float(((state.depth - self.state.depth) / self.depth_scale).max())
+        return max(error, seen / (GROWING * own))
+
+    def _fastest(self, state: WornState) -> float:
+        """In depths that take the mean load away, over a cycle."""
+        return float((state.rate / self.depth_scale).max(initial=0.0))
+
+    def _faster(self, state: WornState) -> bool:
+        """Whether wear is faster there."""
+        return self._fastest(state) > self._fastest(self.state) > 0.0
+
     def _accept(self, h: float, eta: float, state: WornState, error: float, share: float) -> WearPoint:
+        self._grows = self._faster(state)
         self.state.y.destroy()
         self.state, self.eta = state, eta
         if not self.control.fixed:
@@ -177,7 +206,7 @@ class Wear:
             self.reason = str(failure)
             return None
         self.state.y.destroy()
-        self.state, self.eta = state, self.eta + h
+        self.state, self.eta, self._grows = state, self.eta + h, True
         self.step = self._first_step()
         return WearPoint(self.eta, h, state, 0.0, "jump", state.newton, state.linear)
 
@@ -200,7 +229,8 @@ class Wear:
             self._spent[1] += now.linear
             return now.rate
 
-        stage_tolerance = 1e-2 * self.control.tolerance * self.depth_scale
+        moved = min(1.0, GROWING * h * self._fastest(self.state)) or 1.0
+        stage_tolerance = max(1e-2 * self.control.tolerance * moved, LEFT) * self.depth_scale
         try:
             step = take(self.tableau, rate, self.state.depth, self.state.rate, h, stage_tolerance)
         except StageFailed:

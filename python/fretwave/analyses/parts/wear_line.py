@@ -236,7 +236,7 @@ def _told(table: dict[str, Any]) -> str:
     """The damping over wear, in words."""
     if not table:
         return ""
-    zeta, top = 100 * table["zeta"], int(np.argmax(table["zeta"]))
+    zeta, top = np.round(100 * table["zeta"], 4) + 0.0, int(np.argmax(table["zeta"]))
     jumps = sum("jump" in event.split() for event in table["event"])
     return (
         f"; zeta {zeta[0]:.4f} % when new, largest {zeta[top]:.4f} % at {table['cycles'][top]:.3g}, {zeta[-1]:.4f} %"
