@@ -200,7 +200,7 @@ double Continuation::turn_of(Trial const& trial) const {
 std::string Continuation::complaint(Trial& trial, double length, bool may_shorten) {
   const VecHandle along = moved(anchor_.y, length, anchor_.tangent);
   const double aside = distance(trial.y, along), angle = turn_of(trial);
-  const bool hard = trial.outcome.newton > easy;
+  const bool hard = trial.outcome.newton - trial.outcome.refined > easy;
   if (!(aside <= length) || (may_shorten && hard && aside > (angle + unturned) * length)) {
     const std::string why = problem_.explain(trial.y, moved(trial.y, -1, along));
     return "the corrector lands on another branch" + (why.empty() ? "" : " (" + why + ")");

@@ -33,6 +33,9 @@ const Tuned patience("newton_patience", 10,
                      "iterations after which a residual below the tolerance is enough");
 const Tuned falling("newton_falling", 0.1,
                     "effect of a step over that of the one before, up to which it is not rounding's");
+const Tuned unrefined(
+    "newton_unrefined", 0.1,
+    "effect by which the first of these is measured: what moves a point far is no refinement");
 const Tuned creeping("newton_creeping", 0.6,
                      "share of the residual that four iterations leave when they creep");
 const Tuned rescalings("newton_rescalings", 4, "rescalings of the rows as the motion becomes known");
@@ -199,14 +202,14 @@ void Newton::refine(Vec y, Outcome& out) {
   if (below_tolerance(out.residual, plain) || out.residual > most) return;
   VecHandle g = like(right_side_), step = zero_like(y);
   bordered_.residual(y, g);
-  for (double last = INFINITY; last > small_effect && linear(y, g, step);) {
+  for (double last = unrefined; last > small_effect && linear(y, g, step);) {
     const double effect = bordered_.problem().effect(y, step);
     const VecHandle there = moved(y, -1, step);
     bordered_.residual(there, g);
     const double residual = norm(g);
     if (!(effect <= falling * last && residual <= std::max(out.residual, out.rounding))) return;
     check(VecCopy(there, y));
-    last = effect, out.residual = residual, ++out.newton;
+    last = effect, out.residual = residual, ++out.newton, ++out.refined;
   }
 }
 

@@ -14,6 +14,7 @@ struct Outcome {
   bool accepted = false;        ///< by the tolerance; a converged solve that is not ended at rounding
   double rounding = 0;          ///< expected in the residual
   bool linear_failure = false;  ///< the last linear system was not solved, or was singular
+  int refined = 0;              ///< of the Newton steps, those taken where rounding hides the residual
 };
 
 /// What a guess is worth. `brief`: given up once the residual creeps; `plain`: PETSc's iterations; `full`:

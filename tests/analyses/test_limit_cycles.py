@@ -10,6 +10,7 @@ import pytest
 from models.jenkins_motion import JenkinsMotion
 from tolerances import REPEATED, SOLVED
 
+from fretwave.analyses.parts import fed_modes
 from fretwave.results.overview import overviews
 from fretwave.run.order import RunOptions
 from fretwave.run.runner import run_case
@@ -142,3 +143,11 @@ def test_a_cycle_exactly_at_an_end_of_the_range_is_named(cycles):
     (last,), log, _ = cycles(text(FED, 0, 0.48, first["amplitude"]))
     assert last["amplitude"] == pytest.approx(first["amplitude"], rel=SOLVED) and last["stable"] is None
     assert "stability unknown (branch end)" in log
+
+
+@pytest.mark.parametrize("g, fed", [(0.1, []), (-0.1, [0])])
+def test_what_grows_in_the_opposite_wave_is_not_of_this_one(monkeypatch, g, fed):
+    """x'' + (1 + i g) x = 0 of a wave: for g > 0 the forward motion is damped and the backward one fed."""
+    monkeypatch.setattr(fed_modes, "_companion", lambda context, modes: np.array([[0.0, 1.0], [-(1 + 1j * g), 0.0]]))
+    found = fed_modes._growing(None, [None])
+    assert list(found) == fed and all(value.imag > 0 for value in found.values())

@@ -345,7 +345,7 @@ def test_envelopes_that_end_early_have_the_word_of_their_summary(tmp_path):
     for start, growth, count in ((0, 1.0, 20), (1, 1.2, 8), (2, 0.5, 8)):
         for cycle in range(count):
             writer.append(dict(zip(columns, (start, cycle, 2.0 * cycle, 0.3 * growth**cycle, 0.5))))
-    words = ("limit cycle", "leaves the mode's range", "falls below the tolerance")
+    words = ("limit cycle", "leaves the mode's range", "ends in the noise of the integration")
     writer.close("done", "", endings=json.dumps([{"text": word} for word in words]))
     (axes,) = dict(limit_cycles.figures(Run(tmp_path)))["limit_cycle_envelopes"].axes
     assert [text.get_text() for text in axes.texts] == ["leaves the mode's range, stopped", "ends"]

@@ -92,6 +92,7 @@ def test_a_motion_that_never_moved_is_a_limit_cycle_only_where_one_is_predicted(
     assert end_of(amplitude).text == KEPT
     assert end_of(amplitude, crossings=[Crossing(2.0, OMEGA, True)]).text == KEPT
     assert end_of(amplitude, crossings=[Crossing(1.01, OMEGA, True)]).text == LIMIT_CYCLE
+    assert end_of(amplitude, crossings=[Crossing(1.0, OMEGA, False), Crossing(0.2, OMEGA, True)]).text == KEPT
 
 
 def test_growth_diverges_unless_it_slows_down():

@@ -62,6 +62,8 @@ def test_a_start_that_sticks_undamped_is_no_cycle():
     table = branch([0.0])
     table |= {"event": np.full(len(table["zeta"]), ""), "stick": np.minimum(1.0, 1.1 - table["amplitude"] / 10.0)}
     assert table["zeta"][0] == 0.0 and limit_cycles(table) == []
+    values = {**table, "omega": np.full(len(table["zeta"]), 1.0), "omega0": np.full(len(table["zeta"]), 1.0)}
+    assert ModeCurve.from_table(values).crossings() == []
 
 
 def test_a_point_that_is_there_twice_has_no_direction():

@@ -124,6 +124,26 @@ def test_stop_rules(comm):
     assert len(list(march)) == 1 and march.eta == 0 and "stopped" in march.reason
 
 
+def test_a_march_that_has_stopped_goes_no_further_when_it_is_gone_on_with(comm):
+    mode, y = node(comm)
+    march = fw.Wear(mode, y, 2.1e3, fw.WearControl(tolerance=1e-3))
+    points = [(point.state.y.copy(), point.state.depth, point.cycles, march.step, march.growth) for point in march]
+    assert "wear has stopped" in march.reason
+    again = {"load_scale": march.load_scale, "step": points[-1][3], "growth": points[-1][4]}
+    more = fw.Wear(mode, points[-1][0], 2.1e3, march.control, (), points[-1][1], points[-1][2], **again)
+    assert list(more.go_on()) == [] and more.reason == march.reason
+
+
+def test_a_slow_pair_that_grows_stops_no_march(comm):
+    """A rate's growth over the last step goes on: e^40 of what is far below the tolerance."""
+    mode, y = node(comm)
+    march = fw.Wear(mode, y, 100.0)
+    march.growth, march.state.rate = np.array([-1.0]), np.array([1e-12])
+    assert march._finished() and "stopped" in march.reason
+    march.reason, march.growth = "", np.array([0.4])
+    assert not march._finished()
+
+
 @pytest.mark.parametrize("cycles", [1e9, 1e18])
 def test_a_march_is_as_long_as_it_is_wanted(comm, cycles):
     """Steps are short beside what wears, not beside all cycles: these ended before the first one."""

@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from ..case.facts import Facts
     from ..case.reporter import Reporter
     from ..hb.problems import Harmonics, NonlinearMode
+    from ..model.modes import LinearMode
 
 NOT_ANSWERED = "stability of the limit cycles against waves of other nodal diameters and of other families"
 
@@ -175,8 +176,12 @@ def _beside_other_families(
     if not any(cycle["stable"] for cycle in cycles):
         return list(cycles)
     with _in_wave(context, diameter) as own_context:
-        rest_state(own_context)
-        return with_others(own_context, stuck_or_free(own_context, context.analysis.linear_mode), cycles)
+
+        def followed() -> LinearMode:
+            rest_state(own_context)
+            return stuck_or_free(own_context, context.analysis.linear_mode)
+
+        return with_others(own_context, followed, cycles)
 
 
 @contextmanager

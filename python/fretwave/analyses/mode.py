@@ -230,7 +230,7 @@ def _finish(
     problem: NonlinearMode,
 ) -> Outcome:
     table = finished_table(writer)
-    cycles = with_others(context, start.mode, context.comm.bcast(limit_cycles(table) if table else []))
+    cycles = with_others(context, lambda: start.mode, context.comm.bcast(limit_cycles(table) if table else []))
     unit = context.units(unit_of(context.analysis.normalise))
     summary = summarise(context.name, table, cycles, unit) if table else []
     summary += finish_wheel(context, writer, start) if context.case.wheel is not None else []

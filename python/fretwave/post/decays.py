@@ -17,7 +17,7 @@ from .settling import LAST_CYCLES, growth_trend, has_moved, has_settled, slope, 
 NEAR = 0.05
 #: what became of a start, in a word
 LIMIT_CYCLE, KEPT, NOT_SETTLED = "limit cycle", "keeps its amplitude", "not settled"
-DIVERGES, LEAVES, FALLS = "diverges", "leaves the mode's range", "falls below the tolerance"
+DIVERGES, LEAVES, FALLS = "diverges", "leaves the mode's range", "ends in the noise of the integration"
 #: largest relative change of a damping ratio from one cycle to the next of a motion that is called slow
 SLOW = 0.2
 
@@ -143,7 +143,8 @@ def _verdict(level: Array, crossings: Sequence[Crossing], tolerance: float) -> s
         return NOT_SETTLED
     if has_moved(level, tolerance):
         return LIMIT_CYCLE if has_settled(level) else NOT_SETTLED
-    distances = [abs(np.log(crossing.amplitude) - level[-1]) for crossing in crossings]
+    possible = [crossing for crossing in crossings if crossing.stable is not False]
+    distances = [abs(np.log(crossing.amplitude) - level[-1]) for crossing in possible]
     return LIMIT_CYCLE if min(distances, default=np.inf) < NEAR else KEPT
 
 

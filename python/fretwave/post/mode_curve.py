@@ -72,7 +72,9 @@ class ModeCurve:
     monotonicity of the points: a smooth spline rings at the abrupt onset of slip and invents solutions there.
     """
 
-    def __init__(self, amplitude: Array, omega: Array, omega0: Array, zeta: Array) -> None:
+    def __init__(
+        self, amplitude: Array, omega: Array, omega0: Array, zeta: Array, stick: Optional[Array] = None
+    ) -> None:
         from scipy.interpolate import PchipInterpolator  # 0.1 s, for who looks at curves
 
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -86,6 +88,8 @@ class ModeCurve:
         if keep.sum() < 2:  # one point is a curve too short to see
             values = values[[0, 0]] * [[1.0], [1.0 + SHORTEST]]
             length, keep = np.array([0.0, 1.0]), np.array([True, True])
+        #: Where the branch begins and ends all pairs stick: motions without damping are neither fed nor damped there.
+        self._still = (False, False) if stick is None else (bool(stick[0] >= 1.0), bool(stick[-1] >= 1.0))
         self._curve = PchipInterpolator(length[keep], values[keep], axis=0)
         self._log_amplitude = PchipInterpolator(length[keep], values[keep, 0])
         self._zeta = PchipInterpolator(length[keep], values[keep, 3])
@@ -93,7 +97,9 @@ class ModeCurve:
     @classmethod
     def from_table(cls, table: Mapping[str, Array]) -> ModeCurve:
         """From the columns of a mode's branch table."""
-        return cls(*(np.asarray(table[name], dtype=float) for name in ("amplitude", "omega", "omega0", "zeta")))
+        names = ("amplitude", "omega", "omega0", "zeta")
+        amplitude, omega, omega0, zeta = (np.asarray(table[name], dtype=float) for name in names)
+        return cls(amplitude, omega, omega0, zeta, np.asarray(table["stick"], float) if "stick" in table else None)
 
     def sampled(self, count: int = 2000) -> dict[str, Array]:
         """Columns amplitude, omega, omega0, zeta, frequency_hz at even lengths along the curve, for drawing."""
@@ -130,6 +136,8 @@ class ModeCurve:
     def _changes_sign(self, length: float) -> bool:
         """Damped on one side and fed on the other; at an end of the branch, one of both."""
         values = self._beside(length)
+        if len(values) < 2 and self._still[0 if length < 0.5 * float(self._zeta.x[-1]) else 1]:
+            return False
         return all(values) and (len(values) < 2 or values[0] * values[1] < 0)
 
     def _beside(self, length: float) -> list[float]:

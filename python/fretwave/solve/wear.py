@@ -62,7 +62,7 @@ class Wear:
     cycles : float
         Where to stop.
     report_at : cycles that are met exactly
-    depth, at, step, load_scale : (n_pairs,), cycles, length, [force]
+    depth, at, step, load_scale, growth : (n_pairs,), cycles, length, [force], (n_pairs,) per cycle
         To go on from an earlier march's point; by default the surfaces are new.
     outcome : Newton and linear iterations and residual that y was found with
     """
@@ -79,6 +79,7 @@ class Wear:
         step: float | None = None,
         load_scale: float | None = None,
         outcome: tuple[int, int, float] = (0, 0, 0.0),
+        growth: Array | None = None,
     ) -> None:
         self.mode, self.control, self.cycles = mode, control or WearControl(), cycles
         if self.control.stepper not in STEPPERS:
@@ -94,7 +95,8 @@ class Wear:
         self.depth_scale = self.load_scale / mode.stiffness
         self.step = step or self.control.first or self._first_step()
         self._spent = [0, 0]
-        self._grows = True
+        #: Of each pair's rate over the last step, as exponents by cycle; not known before one.
+        self.growth = np.full(len(mode.areas), np.inf) if growth is None else np.asarray(growth, dtype=float)
 
     def __repr__(self) -> str:
         return f"Wear({self.eta:g} of {self.cycles:g} cycles: {self.reason or 'under way'}, of {self.mode})"
@@ -125,15 +127,18 @@ class Wear:
     def _finished(self) -> bool:
         """Stop rules: cycles done, contact lost, wear stopped.
 
-        Rates that grow say nothing of what is to come.
+        Rates that grow are taken to go on growing as they did.
         """
         remaining = self.cycles - self.eta
-        left = 0.0 if self._grows else self.control.tolerance * self.depth_scale
+        with np.errstate(over="ignore", invalid="ignore"):
+            to_come = np.maximum(self.growth, 0.0) * remaining
+            times = np.where(to_come > LEFT, np.expm1(to_come) / to_come, 1.0)
+            left = np.where(self.state.rate > 0, self.state.rate * remaining * np.nan_to_num(times, nan=np.inf), 0.0)
         if remaining <= 0:
             self.reason = "cycles done"
         elif (self.state.load <= 0).all():
             self.reason = "contact lost: all pairs are open"
-        elif (self.state.rate * remaining <= left).all():
+        elif (left <= self.control.tolerance * self.depth_scale).all():
             self.reason = "wear has stopped: to the last cycle it changes nothing beyond the tolerance"
         self.converged = bool(self.reason)
         return self.converged
@@ -144,7 +149,10 @@ class Wear:
         target = next(value for value in self.reports if value > self.eta)
         tangent = self.mode.tangent(self.state, self.state.rate)
         why, first = TOO_FAST, self._first_step()
-        least, shortest = LAST_TRY * min(first, self.cycles), max(SHORTEST * first, LAST_DIGITS * self.eta)
+        least, shortest = (
+            LAST_TRY * min(first, self.cycles),
+            max(SHORTEST * min(first, self.cycles, self.step), LAST_DIGITS * self.eta),
+        )
         while self.step >= shortest:
             meets = self.eta + self.step * (1 + 1e-12) >= target
             h = target - self.eta if meets else self.step
@@ -173,10 +181,10 @@ class Wear:
     def _error(self, found: Array, state: WornState) -> float:
         """Of a step to a state, by the errors (n_pairs,) found of its depths."""
         error = float((found / (self.depth_scale + state.depth)).max(initial=0.0))
-        if not self._faster(state):
+        own = float(((state.depth - self.state.depth) / self.depth_scale).max(initial=0.0))
+        if not own or not self._faster(state):
             return error
         seen = max(float((found / self.depth_scale).max()) - LEFT, 0.0)
-        own = float(((state.depth - self.state.depth) / self.depth_scale).max())
         return max(error, seen / (GROWING * own))
 
     def _fastest(self, state: WornState) -> float:
@@ -188,7 +196,10 @@ class Wear:
         return self._fastest(state) > self._fastest(self.state) > 0.0
 
     def _accept(self, h: float, eta: float, state: WornState, error: float, share: float) -> WearPoint:
-        self._grows = self._faster(state)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            self.growth = np.nan_to_num(
+                np.log(state.rate / self.state.rate) / h, nan=0.0, posinf=np.inf, neginf=-np.inf
+            )
         self.state.y.destroy()
         self.state, self.eta = state, eta
         if not self.control.fixed:
@@ -206,7 +217,7 @@ class Wear:
             self.reason = str(failure)
             return None
         self.state.y.destroy()
-        self.state, self.eta, self._grows = state, self.eta + h, True
+        self.state, self.eta, self.growth = state, self.eta + h, np.full_like(self.growth, np.inf)
         self.step = self._first_step()
         return WearPoint(self.eta, h, state, 0.0, "jump", state.newton, state.linear)
 

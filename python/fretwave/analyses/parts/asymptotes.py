@@ -116,14 +116,15 @@ def most_like(
     planes = planes_of(modes)
     plane = planes[largest(np.array([np.linalg.norm(shares[plane]) for plane in planes]))]
     first = modes[int(plane[0])]
-    if len(plane) == 1:
+    size = float(np.linalg.norm(shares[plane]))
+    if len(plane) == 1 or size == 0.0:
         return first
     shapes = np.array([modes[k].shape + 1j * modes[k].imaginary for k in plane])
-    phi = shares[plane] @ shapes / np.linalg.norm(shares[plane])
+    phi = shares[plane] @ shapes / size
     return replace(first, shape=phi.real.copy(), imaginary=phi.imag.copy())
 
 
 def planes_of(modes: Sequence[LinearMode]) -> list[npt.NDArray[np.intp]]:
     """Places of the modes that share a frequency, of ascending ones."""
     omega = np.array([mode.omega for mode in modes])
-    return np.split(np.arange(len(omega)), 1 + np.flatnonzero(np.diff(omega) > SAME * omega[1:]))
+    return np.split(np.arange(len(omega)), 1 + np.flatnonzero(np.abs(np.diff(omega)) > SAME * omega[1:]))

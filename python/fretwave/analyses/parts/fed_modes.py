@@ -9,7 +9,7 @@ others was, 4 of them beside modes that are fed without contact alone.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,7 +17,7 @@ import numpy as np
 from ...arrays import Complex
 from ...case.flow import with_flow
 from ...case.harmonic import HarmonicSection, nodal_diameter, with_flow_forces
-from ...errors import InputError
+from ...errors import FretwaveError
 from ...model.sectors import in_wave
 from ...post.limit_cycles import STUCK
 from .asymptotes import MORE_MODES, limit_model, most_like
@@ -32,11 +32,11 @@ FED = 1e-8
 
 
 def with_others(
-    context: AnalysisContext[HarmonicSection], followed: LinearMode, cycles: Sequence[dict[str, Any]]
+    context: AnalysisContext[HarmonicSection], followed: Callable[[], LinearMode], cycles: Sequence[dict[str, Any]]
 ) -> list[dict[str, Any]]:
     """Limit cycles, to stable ones added `fed`, the modes beside theirs that gain energy. Collective.
 
-    Where modes are not to be had, `not_looked_at` says why.
+    `followed` gives the linear mode of theirs. Where modes are not to be had, `not_looked_at` says why.
     """
     if not any(cycle["stable"] for cycle in cycles):
         return list(cycles)
@@ -44,8 +44,8 @@ def with_others(
         added: dict[str, Any] = {"not_looked_at": "a whole wheel has many; those of a wave are on one sector"}
     else:
         try:
-            added = {"fed": fed_modes(context, followed)}
-        except InputError as error:  # on all ranks
+            added = {"fed": fed_modes(context, followed())}
+        except FretwaveError as error:  # on all ranks
             added = {"not_looked_at": error.what}
     return [{**cycle, **(added if cycle["stable"] else {})} for cycle in cycles]
 
@@ -62,7 +62,7 @@ def fed_modes(context: AnalysisContext[HarmonicSection], followed: LinearMode) -
     count = min(context.model.n_dof, context.analysis.linear_mode + MORE_MODES)
     found = []
     for contact, given in {STUCK: stuck_or_no_modes(context, count), **_loose(context, count)}.items():
-        modes = list({id(mode): mode for mode in given}.values())  # each once
+        modes = sorted({id(mode): mode for mode in given}.values(), key=lambda mode: mode.omega)  # each once
         own = most_like(context, modes, followed, nodal_diameter(context.analysis)).omega if modes else 0.0
         first = next((number for number, mode in enumerate(modes) if mode.omega == own), None)  # of a double one
         for number, value in _growing(context, modes).items():
@@ -89,7 +89,9 @@ def _growing(context: AnalysisContext[HarmonicSection], modes: Sequence[LinearMo
     if not modes:
         return {}
     values, shapes = np.linalg.eig(_companion(context, modes))
-    grows = (values.real > FED * np.abs(values)) & (np.abs(values) > RIGID * np.abs(values).max())
+    size = np.abs(values)
+    own = values.imag >= -FED * size  # the others move in the opposite wave, on one sector
+    grows = own & (values.real > FED * size) & (size > RIGID * size.max())
     found: dict[int, complex] = {}
     for value, shape in zip(values[grows], shapes[: len(modes), grows].T):
         number = int(np.argmax(np.abs(shape)))

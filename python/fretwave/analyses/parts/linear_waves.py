@@ -104,15 +104,17 @@ def _modes(context: AnalysisContext[LinearAnalysis], case: Case, limit: str, dia
     from ...model.modes import linear_modes
 
     with limit_model(case, context.comm, limit, diameters) as model:
-        count = _count(context, MORE_MODES) if limit != "stuck" else _count(context)
+        limits = _limits(context)
+        sought = "stuck" in limits and limit == next((one for one in ("sliding", "free") if one in limits), "")
+        count = _count(context, MORE_MODES if sought else 0)
         try:
-            modes = linear_modes(model, min(model.n_dof, count + 1))
+            modes = linear_modes(model, min(model.n_dof, count + sought))
         except InputError:
             if limit != "stuck" or context.analysis.contact == ["stuck"]:
                 raise
             context.console.line(f"{context.name}: contact that sticks leaves nothing to move")
             return []
-    if len(modes) > count and limit != "stuck":  # of the last, a double one, the other may be left out
+    if len(modes) > count:  # of the last, a double one, the other may be left out
         return modes[: max(_count(context), int(planes_of(modes)[-1][0]))]
     return modes[:count]
 

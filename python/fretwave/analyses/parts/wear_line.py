@@ -161,7 +161,8 @@ class _Marcher:
         y = self.problem.core.unknowns()
         if found:
             fill(y, None if state is None else state["y"])
-            kept = state and {key: np.asarray(state[key]) for key in ("depth", "at", "step", "load_scale")}
+            names = ("depth", "at", "step", "load_scale", "growth")
+            kept = state and {key: np.asarray(state[key]) for key in names if key in state}
             going: dict[str, Any] = self.comm.bcast(kept)
         else:
             y.setArray(self.line.y[slice(*y.getOwnershipRange())])
@@ -191,7 +192,7 @@ class _Marcher:
             names = [contact.name for contact in self.problem.model.contacts]
             motions = dict(zip(names, self.problem.contact_history(y)))
         kept = {"y": Spread(self.comm, y), "depth": state.depth, "at": point.cycles, "step": march.step}
-        kept["load_scale"] = march.load_scale
+        kept |= {"load_scale": march.load_scale, "growth": march.growth}
         coefficients = Spread(self.comm, self.problem.local_coefficients(y))
         self.writer.append(row, coefficients, motions if self.writer.active else None, kept, per_contact)
         return row
