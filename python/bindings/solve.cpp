@@ -29,6 +29,7 @@ void bind_solve(nb::module_& m) {
       .def("unknowns", [](Problem& p) { return handed(p.unknowns()); })
       .def("equations", [](Problem& p) { return handed(p.equations()); })
       .def("residual", [](Problem& p, Petsc<Vec> y, Petsc<Vec> r) { p.residual(y.object, r.object); })
+      .def("damped", [](Problem& p, Petsc<Vec> y) { return p.damped(y.object); })
       .def("product", [](Problem& p, Petsc<Vec> y, Petsc<Vec> dy,
                          Petsc<Vec> dr) { p.product(y.object, dy.object, dr.object); })
       .def("transposed_product", [](Problem& p, Petsc<Vec> y, Petsc<Vec> dr,

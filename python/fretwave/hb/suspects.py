@@ -23,9 +23,7 @@ if TYPE_CHECKING:
 TOO_SMALL = "step too small"
 #: Ends of a branch that has left what it was asked for, as `src/solve` words them.
 RETURNS = re.compile("comes back to|back onto itself|a closed loop")
-#: Damping beta over omega below which a mode loses no energy (`NonlinearMode::damped`).
-LOSSLESS = 1e-7
-#: What is said of such a mode.
+#: What is said of a mode that loses no energy.
 LEADS_OVER = "the motion loses no energy: a mode without damping leads over into another one at internal resonances"
 #: Contact stiffness over the structure's from which a pair that opens, sticks or slips changes all forces.
 STIFF = 1e4
@@ -68,8 +66,7 @@ def lossless(problem: HarmonicProblem, y: PETSc.Vec) -> str:
 
     Its branch goes along each internal resonance that it meets to a motion of the other mode alone, and ends there.
     """
-    state = problem.state(y)
-    return f"; {LEADS_OVER}" if abs(state.get("beta", np.inf)) < LOSSLESS * abs(state.get("omega", 0.0)) else ""
+    return "" if problem.core.damped(y) else f"; {LEADS_OVER}"
 
 
 def _hardly_slipping(contacts: Sequence[Contact], told: Sequence[dict[str, Any]]) -> list[str]:

@@ -149,10 +149,8 @@ class Wear:
         target = next(value for value in self.reports if value > self.eta)
         tangent = self.mode.tangent(self.state, self.state.rate)
         why, first = TOO_FAST, self._first_step()
-        least, shortest = (
-            LAST_TRY * min(first, self.cycles),
-            max(SHORTEST * min(first, self.cycles, self.step), LAST_DIGITS * self.eta),
-        )
+        least = LAST_TRY * min(first, self.cycles)
+        shortest = max(SHORTEST * min(first, self.cycles, self.step), LAST_DIGITS * self.eta)
         while self.step >= shortest:
             meets = self.eta + self.step * (1 + 1e-12) >= target
             h = target - self.eta if meets else self.step

@@ -44,14 +44,23 @@ def other_asymptote(context: AnalysisContext[HarmonicSection], stuck: LinearMode
     """
     if not context.case.contacts:
         return {}
-    count = min(context.model.n_dof, context.analysis.linear_mode + MORE_MODES)
-    diameters = nodal_diameter(context.analysis)
+    limit, modes = loose_modes(context, min(context.model.n_dof, context.analysis.linear_mode + MORE_MODES))
+    return {f"{limit}_omega": most_like(context, modes, stuck, nodal_diameter(context.analysis)).omega}
+
+
+def loose_modes(context: AnalysisContext[HarmonicSection], count: int) -> tuple[str, list[LinearMode]]:
+    """The limit of the contact without friction, ``free`` or ``sliding``, and its lowest modes. Collective."""
     if all(contact.components == 1 for contact in context.case.contacts):
-        return {"free_omega": most_like(context, context.linear_mode("free", count), stuck, diameters).omega}
+        return "free", context.linear_mode("free", count)
     from ...model.modes import linear_modes
 
-    with limit_model(context.case, context.comm, "sliding", diameters) as model:
-        return {"sliding_omega": most_like(context, linear_modes(model, count), stuck, diameters).omega}
+    with limit_model(context.case, context.comm, "sliding", nodal_diameter(context.analysis)) as model:
+        return "sliding", linear_modes(model, count)
+
+
+def sector_phase(case: Case, diameters: int) -> float:
+    """Phase from a sector to the next of a wave of so many nodal diameters [rad]; 0 without sectors."""
+    return 2 * np.pi * diameters / case.neighbours.sectors if case.neighbours else 0.0
 
 
 def limit_model(case: Case, comm: MPI.Comm, limit: str, diameters: int = 0) -> Model:
@@ -109,8 +118,7 @@ def most_like(
     modes : ascending, of unit modal mass
     diameters : nodal diameters of the wave of both, on a sector
     """
-    neighbours = context.case.neighbours
-    theta = 2 * np.pi * diameters / neighbours.sectors if neighbours else 0.0
+    theta = sector_phase(context.case, diameters)
     wanted = in_wave(context.case.structure.M, stuck.shape + 1j * stuck.imaginary, theta)
     shares = np.array([np.vdot(mode.shape + 1j * mode.imaginary, wanted) for mode in modes])
     planes = planes_of(modes)

@@ -20,7 +20,7 @@ from ...case.harmonic import HarmonicSection, nodal_diameter, with_flow_forces
 from ...errors import FretwaveError
 from ...model.sectors import in_wave
 from ...post.limit_cycles import STUCK
-from .asymptotes import MORE_MODES, limit_model, most_like
+from .asymptotes import MORE_MODES, loose_modes, most_like, sector_phase
 from .context import AnalysisContext
 from .rest import RIGID, stuck_or_no_modes
 
@@ -61,7 +61,11 @@ def fed_modes(context: AnalysisContext[HarmonicSection], followed: LinearMode) -
     """
     count = min(context.model.n_dof, context.analysis.linear_mode + MORE_MODES)
     found = []
-    for contact, given in {STUCK: stuck_or_no_modes(context, count), **_loose(context, count)}.items():
+    states = [(STUCK, stuck_or_no_modes(context, count))]
+    if context.case.contacts:
+        limit, loose = loose_modes(context, count)
+        states.append(("contact free" if limit == "free" else limit, loose))
+    for contact, given in states:
         modes = sorted({id(mode): mode for mode in given}.values(), key=lambda mode: mode.omega)  # each once
         own = most_like(context, modes, followed, nodal_diameter(context.analysis)).omega if modes else 0.0
         first = next((number for number, mode in enumerate(modes) if mode.omega == own), None)  # of a double one
@@ -70,18 +74,6 @@ def fed_modes(context: AnalysisContext[HarmonicSection], followed: LinearMode) -
                 zeta, frequency = -value.real / abs(value), abs(value.imag) / (2 * np.pi)
                 found.append({"mode": number + 1, "contact": contact, "frequency_hz": frequency, "zeta": zeta})
     return found
-
-
-def _loose(context: AnalysisContext[HarmonicSection], count: int) -> dict[str, list[LinearMode]]:
-    """Modes without friction, as `other_asymptote` takes them. Collective."""
-    from ...model.modes import linear_modes
-
-    if not context.case.contacts:
-        return {}
-    if all(contact.components == 1 for contact in context.case.contacts):
-        return {"contact free": context.linear_mode("free", count)}
-    with limit_model(context.case, context.comm, "sliding", nodal_diameter(context.analysis)) as model:
-        return {"sliding": linear_modes(model, count)}
 
 
 def _growing(context: AnalysisContext[HarmonicSection], modes: Sequence[LinearMode]) -> dict[int, complex]:
@@ -102,7 +94,7 @@ def _growing(context: AnalysisContext[HarmonicSection], modes: Sequence[LinearMo
 def _companion(context: AnalysisContext[HarmonicSection], modes: Sequence[LinearMode]) -> Complex:
     """First-order matrix of damping and flow on the space of undamped modes, each of unit modal mass there."""
     case, analysis = context.case, context.analysis
-    theta = 2 * np.pi * nodal_diameter(analysis) / case.neighbours.sectors if case.neighbours else 0.0
+    theta = sector_phase(case, nodal_diameter(analysis))
     structure = case.damped(analysis.dampers)
     K, C = structure.K, structure.C
     phi = np.column_stack([mode.shape + 1j * mode.imaginary for mode in modes])

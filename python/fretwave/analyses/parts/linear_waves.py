@@ -14,7 +14,7 @@ from ...errors import InputError
 from ...model.sectors import Term, in_wave
 from ...model.structure import SPIN
 from ...post.engine_orders import exciting, margins
-from .asymptotes import MORE_MODES, limit_model, most_like, planes_of
+from .asymptotes import MORE_MODES, limit_model, most_like, planes_of, sector_phase
 from .context import AnalysisContext
 
 if TYPE_CHECKING:
@@ -56,8 +56,7 @@ def modes_of_wave(
     context: AnalysisContext[LinearAnalysis], diameters: int, speed_rpm: float
 ) -> Iterator[tuple[dict[str, Any], LinearMode]]:
     """Rows of a wave at a speed and their modes, limit by limit. Collective."""
-    case, neighbours = _spinning(context, speed_rpm), context.case.neighbours
-    theta = 2 * np.pi * diameters / neighbours.sectors if neighbours else 0.0
+    case, theta = _spinning(context, speed_rpm), sector_phase(context.case, diameters)
     C = case.damped(context.analysis.dampers).C
     found = {limit: _modes(context, case, limit, diameters) for limit in _limits(context)}
     loose = next((found[limit] for limit in ("sliding", "free") if limit in found), [])
