@@ -155,7 +155,10 @@ std::string NonlinearMode::impossible(Vec y) {
   const auto z = scalars(y);
   if (!std::isfinite(z[0]) || !std::isfinite(z[1]) || !std::isfinite(std::exp(z[2])))
     return "frequency, damping or amplitude is not finite";
-  return z[1] > 0 ? "" : "the frequency falls below zero";
+  if (z[1] <= 0) return "the frequency falls below zero";
+  const bool still =
+      method_ == Method::CNM && z[1] <= 1e-6 * std::abs(z[0]);  // exp(-beta t) alone solves it too
+  return still ? "overdamped: the motion does not oscillate any more" : "";
 }
 
 std::vector<solve::TestFunction> NonlinearMode::tests(Vec y, Vec tangent) {

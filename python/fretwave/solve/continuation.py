@@ -204,9 +204,9 @@ class Continuation:
         return self._core.snes
 
     @property
-    def anchor(self) -> PETSc.Vec:
-        """Unknowns of the regular point that the branch last started a step from."""
-        return self._core.anchor()["y"]
+    def anchor(self) -> PETSc.Vec | None:
+        """Unknowns of the regular point that the branch last started a step from; None where it found no first one."""
+        return self._core.anchor()["y"] or None
 
     @property
     def missed(self) -> list[str]:

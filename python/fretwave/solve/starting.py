@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     #: A homotopy of the core.
     Start = Union[_core.ForcedStart, _core.ModeStart]
 
-#: Amplitudes below the first one, each a hundredth of the one before, at which a mode is tried.
-SMALLER = 5
+#: Amplitudes below the first one, each a hundredth of the one before, at which a mode is tried; and above it.
+AFAR = 5
 #: Points of a way at the most: it turns a corner wherever a pair opens or closes.
 WAY_POINTS = 20000
 #: Steps of a mode that grows, at first in proportion: where such long ones lose their way, those of any branch.
@@ -56,7 +56,8 @@ def starts(
     """Guesses for the solution at the parameter of y0, each with how it was found. Collective.
 
     A forced response is led there by its excitation, raised from zero at the first frequency; a mode is followed from
-    a smaller amplitude, where its contacts stick. Either is led there by gaps that close from where nothing touches.
+    a smaller amplitude, where its contacts stick. Either is led there by gaps that close from where nothing touches,
+    a mode with regularised friction from a larger amplitude, beside which that is small.
 
     Parameters
     ----------
@@ -67,7 +68,7 @@ def starts(
         Newton found a mode, but far from the linear one: only the mode that grows out of the linear one is looked for.
         Without a reason in the end there is none at smaller amplitudes either (a stop without gap has no linear limit).
     """
-    gaps = any(contact.info.named(Role.GAP) in contact.parameters for contact in problem.model.contacts)
+    gaps = _has(problem, Role.GAP)
     if isinstance(problem, ForcedResponse):
         yield from _raised(follow, problem, y0, reasons)
         yield from _closed(follow, problem, _core.ForcedStart(problem.core, y0, True), reasons) if gaps else ()
@@ -76,6 +77,12 @@ def starts(
         if far:
             return
         yield from _closed(follow, problem, mode_start(problem, y0), reasons) if gaps else ()
+        yield from _shrunk(follow, problem, y0, reasons) if _has(problem, Role.REGULARISATION) else ()
+
+
+def _has(problem: HarmonicProblem, role: Role) -> bool:
+    """Whether a contact has a parameter of this role."""
+    return any(contact.info.named(role) in contact.parameters for contact in problem.model.contacts)
 
 
 def _raised(
@@ -126,25 +133,44 @@ def _grown(
     follow: Follow, problem: NonlinearMode, y0: PETSc.Vec, reasons: list[str], far: bool
 ) -> Iterator[tuple[str, PETSc.Vec]]:
     """The mode grows from an amplitude at which the linear one solves it."""
-    amplitude = problem.parameter(y0)
-    for power in range(1, SMALLER + 1):
-        small = amplitude / 100**power
-        span = (0.5 * small, amplitude)
+    yield from _from_afar(follow, problem, y0, reasons, far, 0.01)
+
+
+def _shrunk(
+    follow: Follow, problem: NonlinearMode, y0: PETSc.Vec, reasons: list[str]
+) -> Iterator[tuple[str, PETSc.Vec]]:
+    """The mode comes down from an amplitude beside which friction, a bounded force, is small.
+
+    Regularised friction is viscous at small amplitudes, and may leave none of them that oscillates.
+    """
+    yield from _from_afar(follow, problem, y0, reasons, False, 100.0)
+
+
+def _from_afar(
+    follow: Follow, problem: NonlinearMode, y0: PETSc.Vec, reasons: list[str], far: bool, ratio: float
+) -> Iterator[tuple[str, PETSc.Vec]]:
+    """The mode followed to the amplitude of y0 from the nearest one, of those a ratio apart, that has a mode."""
+    amplitude, upwards = problem.parameter(y0), ratio < 1
+    for power in range(1, AFAR + 1):
+        begin = amplitude * ratio**power
+        span = (0.5 * begin, amplitude) if upwards else (amplitude, 2 * begin)
         for control in GROWTH:
-            branch = follow(problem, problem.initial(small), span, control, upwards=True, way=True)
+            branch = follow(problem, problem.initial(begin), span, control, upwards=upwards, way=True)
             last, count = _last(branch, nearby=True)
             converged, reason = branch.converged, branch.reason
             branch.destroy()
             if converged and last is not None:
-                yield f"the mode was followed from amplitude {small:.3g} in {count} steps", last
+                yield f"the mode was followed from amplitude {begin:.3g} in {count} steps", last
                 return
             if not count:
                 break
         if count:
-            reasons.append(f"following the mode from amplitude {small:.3g}: {reason}")
+            end = "" if last is None else f" to {problem.parameter(last):.3g}"
+            reasons.append(f"following the mode from amplitude {begin:.3g}{end}: {reason}")
             return
     if not far:
-        reasons.append(f"no mode was found at {SMALLER} smaller amplitudes down to {small:.3g}")
+        which = "smaller" if upwards else "larger"
+        reasons.append(f"no mode was found at {AFAR} {which} amplitudes, to {begin:.3g}")
 
 
 def _last(branch: Continuation, nearby: bool = False) -> tuple[PETSc.Vec | None, int]:

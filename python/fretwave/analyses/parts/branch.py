@@ -80,7 +80,8 @@ def suspected(branch: Continuation, stiffness: float, units: UnitSystem) -> str:
     stiffness : of the structure [force/length]
     """
     ask = vanishing if branch.reason.startswith(TOO_SMALL) else lossless if RETURNS.search(branch.reason) else None
-    seen = ask(branch.problem, branch.anchor) if ask else ""
+    anchor = branch.anchor
+    seen = ask(branch.problem, anchor) if ask and anchor is not None else ""
     return seen + suspects(branch.problem.model.contacts, stiffness, units)
 
 
