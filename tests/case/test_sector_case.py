@@ -124,10 +124,11 @@ WRONG = {
 
 @pytest.mark.ranks(1)
 @pytest.mark.parametrize("change", WRONG.values(), ids=WRONG)
-def test_what_is_wrong_with_a_sector_is_said(write, change):
+def test_what_is_wrong_with_a_sector_is_said_once(write, change):
     old, new, message = change
-    with pytest.raises(CaseErrors, match=message):
+    with pytest.raises(CaseErrors, match=message) as caught:
         load_case(write((old, new)))
+    assert len(caught.value.problems) == 1
 
 
 @pytest.mark.ranks(1)

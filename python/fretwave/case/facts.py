@@ -23,7 +23,7 @@ class Facts:
     source : Source
         The case file, for the places of its keys.
     model_known : bool
-        The model could be read.
+        The model could be read, and one of a sector tied to its neighbours.
     dofs : sequence of str, optional
         Of the model that is solved, of a wheel those of a sector; None where it could not be read.
     named : sequence of str, optional

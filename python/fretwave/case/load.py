@@ -138,7 +138,7 @@ def _build(
     dofs = structure.dof_names if structure else None
     built = structure.pairs if structure else {}
     contacts = read_contacts(source, dofs, laws, found, built)
-    neighbours = None
+    neighbours, tied = None, True
     if section and structure:
         structure = replace(
             structure,
@@ -146,17 +146,20 @@ def _build(
             stiffness_damping=section.stiffness_damping,
             mass_damping=section.mass_damping,
         )
+        wrong = len(found)
         structure, contacts = tie(section, source, structure, contacts, notes, found)
+        tied = len(found) == wrong
         source.dof_fix = partial(missing_dof, structure.cut or structure)
         neighbours = structure if structure.cut else None
         dofs = structure.dof_names if neighbours else dofs
-        check_aerodynamics(source, flow, neighbours.sectors if neighbours else None, dofs or [], found)
+        if tied:
+            check_aerodynamics(source, flow, neighbours.sectors if neighbours else None, dofs or [], found)
     blade = flow.dof if flow else None
     keep = _kept(structure, analyses, blade) if structure and reduction else {}
     known = set(dofs or ())  # of a sector, dofs of the high face are kept, and left out
     facts = Facts(
         source=source,
-        model_known=section is not None and structure is not None,
+        model_known=section is not None and structure is not None and tied,
         dofs=dofs,
         named=[name for name in keep.values() if name in known] if keep else dofs,
         least_dofs=len(keep) if reduction else len(dofs or ()),
@@ -175,7 +178,7 @@ def _build(
     check_preload(source, preload, facts.loads, found)
     check_damping(source, damping, structure, reduction, notes, found)
     gauges = read_gauges(source, (structure.cut or structure) if structure else None, found)
-    if structure is not None:
+    if structure is not None and tied:
         rows = [contact.pairs.own for contact in contacts] if facts.complete else None
         check_physics(structure, places, rows, notes, found)
     if found or section is None or structure is None:

@@ -29,12 +29,14 @@ def tie(
 ) -> tuple[Structure, list[Contact]]:
     """The model with its high face left out, when the case says that it is a sector; what is wrong goes to `found`."""
     number = section.sectors or structure.sectors
-    axis = section.axis or structure.axis
+    axis, wrong = section.axis or structure.axis, len(found)
     faces = [_face(name, section, source, structure, found) for name in ("low", "high")]
     if not number:
         if section.axis or any(face is not None for face in faces):
             key = "low" if section.low else "high" if section.high else "axis"
             _wrong(source, key, "without a number of sectors", "add `sectors = ...`", found)
+        return structure, contacts
+    if len(found) > wrong:
         return structure, contacts
     low, high = faces
     if low is None or high is None:
