@@ -115,3 +115,12 @@ def test_a_branch_that_ends_where_a_pair_stops_slipping_says_so(comm):
     assert not branch.converged and branch.reason.startswith(TOO_SMALL)
     assert "slip of a pair of contact 'root' vanishes here" in vanishing(problem, branch.anchor)
     assert vanishing(problem, points[len(points) // 2].y) == ""
+
+
+def test_pairs_without_friction_have_no_slip_that_tells(comm):
+    """They slide all the time, and dissipate nothing."""
+    mode = fw.linear_modes(free_blade(comm), 1, "stuck")[0]
+    for friction, said in ((0.0, False), (1e-15, True)):
+        model = free_blade(comm, friction_coefficient=friction)
+        problem = fw.NonlinearMode(model, fw.Harmonics(range(4), 64), "CNM", TIP, mode, "slides_")
+        assert ("slip of a pair" in vanishing(problem, problem.initial(1e-4))) == said

@@ -74,15 +74,21 @@ def _hardly_slipping(contacts: Sequence[Contact], told: Sequence[dict[str, Any]]
     names = []
     for contact, one in zip(contacts, told):
         reach = (np.ptp(one["u"], axis=0) * np.ptp(one["f"], axis=0)).sum(axis=0)
-        if np.any((one["shares"][1] > 0) & (np.abs(one["work"]) < VANISHING * reach)):
+        slips = (one["shares"][1] > 0) & (_friction(contact) > 0)
+        if np.any(slips & (np.abs(one["work"]) < VANISHING * reach)):
             names.append(contact.name)
     return names
 
 
+def _friction(contact: Contact) -> Array:
+    """What bounds the tangential force of each pair, or of all: a coefficient or a limit; inf where nothing does."""
+    values = [contact.value(role) for role in (Role.FRICTION_COEFFICIENT, Role.FRICTION_LIMIT)]
+    return np.atleast_1d(next((value for value in values if value is not None), np.inf))
+
+
 def _extremes(contact: Contact, stiffness: float | None, units: UnitSystem) -> Iterator[str]:
     given = {role: np.atleast_1d(np.asarray(value, dtype=float)) for role, value in _values(contact)}
-    limit = given.get(Role.FRICTION_COEFFICIENT, given.get(Role.FRICTION_LIMIT))
-    if limit is not None and not np.any(limit):
+    if not np.any(_friction(contact)):
         yield "has no friction: nothing holds the structure along it"
     if Role.LOAD in given:
         name, gap = str(contact.info.named(Role.LOAD)), given.get(Role.GAP, np.zeros(1))
