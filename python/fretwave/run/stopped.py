@@ -37,6 +37,8 @@ def _advice(name: str, reason: str) -> str:
         return (
             f"another start, or shorter steps; --petsc '-ksp_monitor -{name.replace('-', '_')}_snes_monitor' shows why"
         )
+    if "overdamped" in reason:
+        return f"larger amplitudes (--set {name}.amplitude=...), beside which regularised friction is small"
     if "at the start" in reason or "far from the linear mode" in reason:
         return (
             "another start (amplitude or frequency) where the motion is nearly linear; --petsc -snes_monitor shows why"
