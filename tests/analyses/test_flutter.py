@@ -118,6 +118,25 @@ def test_wave_on_the_whole_wheel_from_the_case_file(write, shared_tmp, comm):
     for one, other in zip(whole, alone):
         for key in ("amplitude", "frequency_hz"):
             assert float(one[key]) == pytest.approx(float(other[key]), rel=REPEATED)
+    with h5py.File(out / "results.h5") as file:
+        stable, unstable = json.loads(file["wheel"].attrs["events"])
+    assert stable["stable"] is True and "fed" not in unstable
+    found = {mode["diameters"]: mode for mode in stable["fed"]}
+    growing = {d: value for d, value in ((d, stuck_wave(d)) for d in (-2, -1, 0, 2)) if value.real > 0}
+    assert growing and set(found) == set(growing) and len(stable["fed"]) == len(growing)
+    for d, value in growing.items():
+        assert found[d]["zeta"] == pytest.approx(-value.real / abs(value), rel=SOLVED)
+        assert found[d]["frequency_hz"] == pytest.approx(value.imag / (2 * np.pi), rel=SOLVED)
+    assert "but the wave of 0 nodal diameters" in (out / "run.log").read_text()
+
+
+def stuck_wave(diameters):
+    """lambda of a wave while all pairs stick: lambda^2 + c lambda + k = 0 of one mass, springs k_t to both others."""
+    theta = 2 * np.pi * diameters / SECTORS
+    ahead = {j: np.exp(-1j * j * theta) for j in INFLUENCE}
+    damping = -sum(value.imag / OMEGA * ahead[j] for j, value in INFLUENCE.items())
+    stiffness = 1.0 + 2.0 * (1 - np.cos(theta)) - sum(value.real * ahead[j] for j, value in INFLUENCE.items())
+    return max(np.roots([1.0, damping, stiffness]), key=lambda one: one.imag)
 
 
 @pytest.mark.ranks(1)

@@ -77,7 +77,7 @@ def others(fed: Sequence[Mapping[str, Any]], not_looked_at: str = "") -> str:
 
     Parameters
     ----------
-    fed : modes that gain energy: mode (number from 1), contact, frequency_hz, zeta
+    fed : modes that gain energy: mode (number from 1; of a wheel, diameters), contact, frequency_hz, zeta
     not_looked_at : why they are not known
     """
     if not_looked_at:
@@ -86,9 +86,16 @@ def others(fed: Sequence[Mapping[str, Any]], not_looked_at: str = "") -> str:
     for contact in dict.fromkeys(mode["contact"] for mode in fed):
         own = sorted((mode for mode in fed if mode["contact"] == contact), key=lambda mode: mode["zeta"])
         first, more = own[0], len(own) - 1
-        text = f"linear mode {first['mode']}, {first['frequency_hz']:.4g} Hz, gains energy by itself:"
+        text = f"{_which(first)}, {first['frequency_hz']:.4g} Hz, gains energy by itself:"
         text += f" zeta {100 * first['zeta']:.3g} %"
         also = f", as {'does' if more == 1 else 'do'} {counted(more, 'other')}" if more else ""
         states.setdefault(text, []).append(contact + also)
     word = "but" if any(mode["contact"] == STUCK for mode in fed) else "though"
     return "".join(f", {word} {text} ({'; '.join(where)})" for text, where in states.items())
+
+
+def _which(mode: Mapping[str, Any]) -> str:
+    if "mode" in mode:
+        return f"linear mode {mode['mode']}"
+    diameters = int(mode["diameters"])
+    return f"a wave of {diameters:+d} nodal diameters" if diameters else "the wave of 0 nodal diameters"
