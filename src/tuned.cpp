@@ -1,6 +1,7 @@
 #include "tuned.h"
 
 #include "petsc.h"
+#include "text.h"
 
 namespace fretwave {
 
@@ -22,7 +23,7 @@ Tuned::operator double() const {
   double value = value_;
   check(PetscOptionsGetReal(nullptr, nullptr, ("-fw_" + name()).c_str(), &value, nullptr));
   if (!(value > 0 && std::isfinite(value)))
-    throw InputError("option fw_" + name() + ": " + meaning_, std::to_string(value), "a number above zero",
+    throw InputError("option fw_" + name() + ": " + meaning_, short_text(value), "a number above zero",
                      "leave it out");
   return value;
 }

@@ -9,6 +9,7 @@
 #include "contact/regularised_coulomb.h"
 #include "contact/springs.h"
 #include "error.h"
+#include "text.h"
 
 namespace fretwave::contact {
 
@@ -30,7 +31,7 @@ void check_values(Entry const& entry, Parameters const& values) {
       if (!std::isfinite(given[i]) || given[i] < p.lower || (p.strict && given[i] == p.lower))
         throw InputError(
             "law '" + entry.name + "', pair " + std::to_string(i) + ": '" + p.name + "' is out of bounds",
-            std::to_string(given[i]), (p.strict ? "> " : ">= ") + std::to_string(p.lower),
+            short_text(given[i]), (p.strict ? "> " : ">= ") + short_text(p.lower),
             "give a value within the bound");
   }
 }

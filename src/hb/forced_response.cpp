@@ -36,7 +36,7 @@ ForcedResponse::ForcedResponse(model::Model const& model, Harmonics const& h, Ro
 
 VecHandle ForcedResponse::initial(double omega) {
   if (!(omega > 0))
-    throw InputError("excitation frequency is not positive", std::to_string(omega) + " rad/s", "> 0",
+    throw InputError("excitation frequency is not positive", short_text(omega) + " rad/s", "> 0",
                      "give a frequency range above 0");
   VecHandle q = make_vector(comm(), model().local_dofs() * harmonics().block_size());
   check(VecSet(q, 0));

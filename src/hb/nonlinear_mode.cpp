@@ -32,7 +32,7 @@ double reference_stiffness(model::Model const& model, double omega, Vec shape, V
       inertia_per_displacement([&](Vec x, Vec Mx) { check(MatMult(M, x, Mx)); }, omega, shape, imaginary);
   if (!(k > 0) || !(omega > 0))
     throw InputError("the starting mode has no modal mass or no frequency",
-                     "stiffness " + std::to_string(k) + ", " + std::to_string(omega) + " rad/s", "both > 0",
+                     "stiffness " + short_text(k) + ", " + short_text(omega) + " rad/s", "both > 0",
                      "start from an elastic mode of the model");
   return k;
 }
@@ -66,7 +66,7 @@ NonlinearMode::NonlinearMode(model::Model const& model, Harmonics const& h, Meth
   const complex normal(at_dof[0], at_dof[1]);
   if (std::abs(normal) < 1e-10 * largest)
     throw InputError("what is normalised does not move in the starting mode",
-                     std::to_string(std::abs(normal) / largest) + " of the largest displacement", "> 1e-10",
+                     short_text(std::abs(normal) / largest) + " of the largest displacement", "> 1e-10",
                      "normalise on a dof or row that takes part in the mode");
   const complex scale = 1.0 / normal;
   check(VecAXPBYPCZ(shape_, scale.real(), -scale.imag(), 0, shape, imaginary));
@@ -85,7 +85,7 @@ NonlinearMode::NonlinearMode(NonlinearMode const& same, Harmonics const& h)
 
 VecHandle NonlinearMode::initial(double amplitude) {
   if (!(amplitude > 0))
-    throw InputError("modal amplitude is not positive", std::to_string(amplitude), "> 0",
+    throw InputError("modal amplitude is not positive", short_text(amplitude), "> 0",
                      "start at a small positive amplitude");
   const PetscInt m = harmonics().block_size(), fundamental = harmonics().offset(harmonics().fundamental());
   VecHandle q = make_vector(comm(), model().local_dofs() * m);

@@ -1,6 +1,7 @@
 #include "hb/unfolding.h"
 
 #include "error.h"
+#include "text.h"
 
 namespace fretwave::hb {
 
@@ -26,7 +27,7 @@ Unfolding::Unfolding(model::Model const& model, Harmonics const& h, Vec re, Vec 
     double length;
     check(VecNormalize(g, &length));
     if (!(length > 0))
-      throw InputError("the mode to be avoided has no inertia", std::to_string(length), "> 0",
+      throw InputError("the mode to be avoided has no inertia", short_text(length), "> 0",
                        "give the other mode of the pair");
     vectors_.push_back(std::move(g));
   }

@@ -7,6 +7,7 @@
 
 #include "model/inertia.h"
 #include "model/mode_orientation.h"
+#include "text.h"
 
 namespace fretwave::model {
 
@@ -136,7 +137,7 @@ Pairs nearest(Pencil const& pencil, PetscInt count, Pairs found) {
 
 [[noreturn]] void name_missing(PetscInt missing, double lambda) {
   throw PetscFailure("linear modes: " + std::to_string(missing) + " of those below " +
-                     std::to_string(std::sqrt(std::max(lambda, 0.0))) +
+                     short_text(std::sqrt(std::max(lambda, 0.0))) +
                      " rad/s do not converge, by the number of negative pivots; raise -modes_eps_max_it or "
                      "-modes_eps_ncv");
 }

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "error.h"
+#include "text.h"
 
 namespace fretwave::model {
 
@@ -45,7 +46,7 @@ void check_kept(std::vector<PetscInt> const& kept, PetscInt dofs) {
 void check_wanted(ComponentModes wanted, PetscInt internal) {
   if (wanted.highest_omega < 0 || !std::isfinite(wanted.highest_omega))
     throw InputError("the highest frequency of the component modes is no frequency",
-                     std::to_string(wanted.highest_omega) + " rad/s", "> 0",
+                     short_text(wanted.highest_omega) + " rad/s", "> 0",
                      "give a frequency, or a number of modes");
   if (wanted.highest_omega == 0 && (wanted.count < 0 || wanted.count > internal))
     throw InputError("the number of component modes does not fit the internal dofs",
@@ -89,7 +90,7 @@ void check_symmetric(Mat A, char const* name) {
   check(VecNorm(x, NORM_2, &length));
   if (std::abs(xAy - yAx) > 1e-9 * size * length)
     throw InputError(std::string(name) + " is not symmetric",
-                     std::to_string(std::abs(xAy - yAx) / (size * length)) + " relative", "<= 1e-9",
+                     short_text(std::abs(xAy - yAx) / (size * length)) + " relative", "<= 1e-9",
                      "give both triangles; put gyroscopic terms into C");
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "petsc.h"
+#include "text.h"
 
 /// Newton and continuation; knows neither harmonics nor contact.
 namespace fretwave::solve {
@@ -72,7 +73,7 @@ class Problem {
   virtual double parameter_value(double entry) const = 0;
   virtual double parameter_entry(double value) const = 0;
   /// A value of the parameter in words.
-  virtual std::string parameter_text(double value) const { return std::to_string(value); }
+  virtual std::string parameter_text(double value) const { return short_text(value); }
   /// Why a solution cannot be a point of the branch (a frequency below zero); nothing if it can. Collective.
   virtual std::string impossible(Vec /*y*/) { return {}; }
   /// Why the branch leads nowhere from here (it grows without bound); nothing while it does. Collective.

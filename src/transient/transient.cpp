@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "error.h"
+#include "text.h"
 
 namespace fretwave::transient {
 
@@ -303,8 +304,7 @@ History Transient::run(Vec x0, Vec v0, double t_end, double dt_out, double toler
                        double most_steps) {
   if (!(dt_out > 0) || !(t_end > 0))
     throw InputError("time integration needs a positive duration and sampling interval",
-                     std::to_string(t_end) + ", " + std::to_string(dt_out), "> 0",
-                     "give t_end and dt_out above 0");
+                     short_text(t_end) + ", " + short_text(dt_out), "> 0", "give t_end and dt_out above 0");
   interval_ = dt_out, end_ = t_end, limit_ = limit, most_steps_ = explicit_share * most_steps;
   if (!stiff_) {
     History history = integrate(x0, v0, tolerance, false);

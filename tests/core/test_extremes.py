@@ -260,3 +260,16 @@ def test_each_analysis_gives_its_reason_and_keeps_its_points(chain_case, tmp_pat
         with h5py.File(out / "results.h5", "r") as file:
             assert file[name].attrs["status"] == "stopped" and len(file[name]["points"]["omega"]) == len(rows)
     assert main(["show", str(out)]) == 0
+
+
+@pytest.mark.ranks(1)
+@pytest.mark.parametrize("value", [-1e-9, -1e12])
+def test_numbers_of_any_size_are_said_in_their_digits(comm, value):
+    """None of them reads 0.000000 or has a dozen digits that say nothing."""
+    model = fw.Model([[1.0]], [[1.0]], comm=comm)
+    mode = fw.linear_modes(model, 1)[0]
+    problem = fw.NonlinearMode(model, fw.Harmonics([1], 8), "CNM", 0, mode)
+    forced = fw.ForcedResponse(model, fw.Harmonics([1], 8), {1: np.ones(1)}, 1.0, 0, mode)
+    for wrong in (lambda: problem.initial(value), lambda: forced.initial(value)):
+        with pytest.raises(fw.InputError, match=f"(?s)is not positive.*{value:g}".replace("+", ".")):
+            wrong()

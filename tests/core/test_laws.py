@@ -137,6 +137,7 @@ GOOD = {"friction_limit": 1.0, "regularisation_velocity": 0.1}
         ("regularised_coulomb", {"friction_limit": 1.0}, "regularisation_velocity"),
         ("regularised_coulomb", {**GOOD, "mu": 0.5}, "mu"),
         ("regularised_coulomb", {**GOOD, "friction_limit": -1.0}, "friction_limit.*out of bounds"),
+        ("regularised_coulomb", {**GOOD, "friction_limit": -1e-9}, "friction_limit.*out of bounds.*-1e-09"),
         ("regularised_coulomb", {**GOOD, "regularisation_velocity": 0.0}, "regularisation_velocity.*out of bounds"),
         ("regularised_coulomb", {**GOOD, "friction_limit": np.nan}, "friction_limit.*out of bounds"),
         ("regularised_coulomb", {**GOOD, "friction_limit": [1.0, 2.0]}, "wrong length"),
