@@ -134,7 +134,8 @@ double Newton::last_effect(Vec y) {
   return bordered_.problem().effect(y, step);
 }
 
-/// The line search found nothing lower along a step this small: rounding, as in `judge`.
+/// The line search found nothing lower along a step this small: rounding, as in `judge`, or a guess that
+/// GMRES finds nothing to do at.
 bool Newton::stuck_at_rounding(Vec y) {
   Vec step;
   double length, unknowns, residual;
@@ -144,7 +145,8 @@ bool Newton::stuck_at_rounding(Vec y) {
   check(VecNorm(step, NORM_2, &length));
   check(VecNorm(y, NORM_2, &unknowns));
   return std::max(residual, rounding) <= bordered_.problem().largest_residual() &&
-         length <= stagnant_step * std::max(unknowns, 1.0) && residual <= near * rounding &&
+         length <= stagnant_step * std::max(unknowns, 1.0) &&
+         (residual <= near * rounding || below_tolerance(residual, plain)) &&
          last_effect(y) <= largest_effect;
 }
 
