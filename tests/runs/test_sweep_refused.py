@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from pathlib import Path
 
+import numpy as np
 import pytest
 from models.swept_case import CASE, OVER_LINE, fretwave
 
@@ -91,7 +93,13 @@ def test_plans() -> None:
         ("1:3,9,-5:-4", [1, 2, 3, 9, -5, -4]),
         ("0.1:0.5:n=5", [0.1, 0.2, 0.3, 0.4, 0.5]),
         ("1e-3:.1:log=3", [0.001, 0.01, 0.1]),
-        ("100:1:log=3", [100.0, 10.0, 1.0]),
+        ("100.0:1:log=3", [100.0, 10.0, 1.0]),
+        ("1:9:n=5", [1, 3, 5, 7, 9]),
+        ("512:64:log=4", [512, 256, 128, 64]),
+        ("1:6:n=3", [1.0, 3.5, 6.0]),
+        ("-0.3:0.5:n=9", [-0.3, -0.2, -0.1, 0.0, 0.1, 0.2, 0.3, 0.4, 0.5]),
+        ("-1e308:1e308:n=3", [-1e308, 0.0, 1e308]),
+        ("1e-200:1e200:log=3", [1e-200, 1.0, 1e200]),
         ("a.npz:K,2:3", ["a.npz:K", 2, 3]),
     ],
 )
@@ -110,12 +118,26 @@ def test_ranges(text: str, values: list) -> None:
         ("0:10:log=3", "not positive"),
         ("1:999999", "999999 values"),
         ("1:3,2", "has the value 2 twice"),
+        ("1,1.0", "has the value 1.0 twice"),
+        ("[0.0],[-0.0]", "has the value [-0.0] twice"),
+        ("10:20:30", "ends in ':30'"),
+        ("1:1e400:n=3", "infinity"),
     ],
 )
 def test_wrong_ranges(text: str, said: str) -> None:
     with pytest.raises(InputError) as found:
         plan_of([f"key={text}"])
     assert said in str(found.value) and f"--over key={text}" in str(found.value)
+
+
+def test_equal_steps_between_decimal_numbers_are_decimal_numbers() -> None:
+    """Exact, of 2000 ranges up and down, also through zero: k steps of a fraction, once rounded to a float."""
+    random = np.random.default_rng(3)
+    for _ in range(2000):
+        first, step = (Fraction(int(n), 1000) for n in (random.integers(-500, 500), random.integers(1, 200)))
+        count, down = int(random.integers(2, 40)), int(random.choice([1, -1]))
+        exact = [float(first + down * step * k) for k in range(count)]
+        assert plan_of([f"key={exact[0]!r}:{exact[-1]!r}:n={count}"]).over["key"] == exact
 
 
 def test_problems_of_values_can_be_sent_between_ranks(case: Path) -> None:

@@ -12,8 +12,16 @@ def complaint(values: object) -> tuple[str, str] | None:
     expected = "at least one value, each once: numbers, texts or arrays"
     if not isinstance(values, list) or not values:
         return "gives no array of values", expected
-    texts = [value_text(value) for value in values]
     if any(isinstance(value, dict) for value in values):
         return "has a table among the values", expected
-    twice = [text for text, count in Counter(texts).items() if count > 1]
-    return (f"has the value {twice[0]} twice", expected) if twice else None
+    counts = Counter(map(_compared, values))
+    twice = [value for value in values if counts[_compared(value)] > 1]
+    return (f"has the value {value_text(twice[-1])} twice", expected) if twice else None
+
+
+def _compared(value: object) -> object:
+    """What is the same of the same values: 1 is 1.0, but neither is true."""
+    if isinstance(value, list):
+        return tuple(_compared(one) for one in value)
+    number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    return value if number else value_text(value)

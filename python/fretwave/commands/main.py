@@ -168,7 +168,8 @@ def _add_sweep(commands: _SubParsers) -> None:
         default=[],
         metavar="KEY=V,V,...",
         help="values of a key, addressed as --set does: model.options.friction=0.1,0.2,0.5; once for each key;"
-        " ranges with both ends: 1:200 (whole numbers), 0.1:0.5:n=5 (equal steps), 1:100:log=3 (equal ratios)",
+        " ranges with both ends: 1:200 (whole numbers), 0.1:0.5:n=5 (equal steps), 1:100:log=3 (equal ratios);"
+        " whole where all are whole: 1:9:n=5",
     )
     sweep.add_argument("--groups", type=int, metavar="G", help="groups of ranks (default: as many as ranks and values)")
     _add_doing(sweep, "folder (default runs/<case>_sweep)")

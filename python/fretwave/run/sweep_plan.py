@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from datetime import time
 from typing import Any
 
 from ..case.checks_sweep import complaint
@@ -16,7 +19,8 @@ def plan_of(texts: Sequence[str]) -> Plan:
     """The plan of ``--over KEY=v1,v2,...``; a value may be a range.
 
     ``1:200`` are the whole numbers from 1 to 200, ``0.1:0.5:n=5`` five numbers with equal steps between them,
-    ``1:100:log=3`` three with equal ratios; first and last are among them.
+    ``1:100:log=3`` three with equal ratios; first and last are among them. Where all are whole, as in ``1:9:n=5``,
+    they are whole numbers.
 
     Raises
     ------
@@ -47,22 +51,28 @@ def table_overrides(table: Mapping[str, Any]) -> list[str]:
 _EXAMPLE = "write for example `--over model.options.friction=0.1,0.2,0.5`"
 
 
+_EXAMPLE_OF_RANGE = "write for example `--over model.options.friction=0.1:0.5:n=5`, which are 0.1, 0.2, 0.3, 0.4, 0.5"
+
+
 def _wrong(text: str, what: str, expected: str) -> InputError:
-    return InputError(f"--over {what}", f"--over {text}", None, expected, _EXAMPLE)
+    fix = _EXAMPLE_OF_RANGE if "has a range" in what else _EXAMPLE
+    return InputError(f"--over {what}", f"--over {text}", None, expected, fix)
 
 
 def _listed(text: str, whole: str) -> list[Any]:
     """Values between commas: TOML, or plain words and ranges."""
+    with suppress(*TomlError):
+        values = list(parse_value(f"[{text}]"))
+        if not any(isinstance(value, time) for value in values):  # 10:20:30 is meant as a range
+            return values
     try:
-        return list(parse_value(f"[{text}]"))
-    except TomlError:
-        try:
-            return [value for part in text.split(",") for value in _one_or_range(part.strip(), whole)]
-        except TomlError as error:
-            raise _wrong(whole, f"has a value that is not TOML ({error})", "numbers, words or arrays") from None
+        return [value for part in text.split(",") for value in _one_or_range(part.strip(), whole)]
+    except TomlError as error:
+        raise _wrong(whole, f"has a value that is not TOML ({error})", "numbers, words or arrays") from None
 
 
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+_WHOLE = re.compile(r"[+-]?\d{1,15}")
 _RANGE = re.compile(rf"({_NUMBER}):({_NUMBER})(?::(.*))?")
 _RANGES = "FIRST:LAST of whole numbers, FIRST:LAST:n=COUNT (equal steps) or FIRST:LAST:log=COUNT (equal ratios)"
 #: More values are a slip of the pen.
@@ -79,14 +89,18 @@ def _one_or_range(text: str, whole: str) -> list[Any]:
     kind, _, count = how.partition("=")
     if kind not in ("n", "log") or not re.fullmatch(r"\d{1,9}", count) or not 2 <= int(count) <= MOST:
         raise _wrong(whole, f"has a range that ends in ':{how}'", f"{_RANGES}, 2 to {MOST} values")
+    if math.isinf(float(first)) or math.isinf(float(last)):
+        raise _wrong(whole, "has a range to infinity", "numbers below 1.8e308")
     if kind == "log" and min(float(first), float(last)) <= 0.0:
         raise _wrong(whole, "has equal ratios between numbers that are not positive", "FIRST and LAST above zero")
-    return _between(float(first), float(last), int(count), kind == "log")
+    values = _between(float(first), float(last), int(count), kind == "log")
+    written = all(_WHOLE.fullmatch(text) for text in (first, last))
+    return [int(value) for value in values] if written and all(value.is_integer() for value in values) else [*values]
 
 
 def _whole_numbers(first: str, last: str, whole: str) -> list[Any]:
     """One by one, up or down."""
-    if not all(re.fullmatch(r"[+-]?\d{1,15}", text) for text in (first, last)):
+    if not all(_WHOLE.fullmatch(text) for text in (first, last)):
         raise _wrong(whole, "has a range between numbers that are not whole, without their count", _RANGES)
     low, high = int(first), int(last)
     if abs(high - low) >= MOST:
@@ -96,7 +110,11 @@ def _whole_numbers(first: str, last: str, whole: str) -> list[Any]:
 
 
 def _between(first: float, last: float, count: int, ratios: bool) -> list[float]:
-    """Rounded where only the last bits say more: 0.1 + 2 * 0.1 is 0.3."""
+    """Rounded where only the last bits say more: 0.1 + 2 * 0.1 is 0.3, and -0.3 + 3 * 0.1 is 0."""
     shares = [k / (count - 1) for k in range(1, count - 1)]
-    steps = [first * (last / first) ** share if ratios else first + (last - first) * share for share in shares]
-    return [first, *(float(f"{value:.14g}") for value in steps), last]
+    if ratios:
+        steps = [float(f"{first ** (1 - share) * last**share:.14g}") for share in shares]
+    else:
+        digits = 13 - math.floor(math.log10(max(abs(first), abs(last)) or 1.0))  # of the larger end, for all
+        steps = [round(first * (1 - share) + last * share, digits) + 0.0 for share in shares]
+    return [first, *steps, last]
