@@ -219,7 +219,9 @@ def test_errors_in_references(write) -> None:
         ("mode.harmonics", "not key=value"),
         ("mode.harmonics=[", "not TOML"),
         ("mode.harmonics=7.5", "an integer"),
-        ("contact.dampr.friction_limit=3", "did you mean `damper.friction_limit`?"),
+        ("contact.dampr.friction_limit=3", "did you mean `contact.damper.friction_limit`?"),
+        ("dampr.friction_limit=3", "did you mean `contact.damper.friction_limit`?"),
+        ("mode=3", "did you mean `mode.<key>`?"),
         ("mode.step.maximun=0.1", "did you mean `maximum`?"),
     ],
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -17,9 +18,11 @@ from fretwave.case.uncertainty import draw, draws_of
 
 pytestmark = pytest.mark.ranks(1)
 
+CASES = Path(__file__).parents[2] / "cases"
 #: Without the sweep over what is drawn here.
 CASE = SWEPT[: SWEPT.index('[[analysis]]\nname = "limits"')]
 SEEDS = 4000
+EVEN = '{ distribution = "uniform", low = 0.1, high = 0.2 }'
 LIMIT = 'values.contact.slider.friction_limit = { distribution = "lognormal", mean = 2.0, standard_deviation = 0.5 }'
 STIFFNESS = 'factors.contact.slider.tangential_stiffness = { distribution = "uniform", low = 0.8, high = 1.2 }'
 
@@ -57,6 +60,14 @@ def test_normal_and_uniform_values() -> None:
     assert kstest(even, uniform(-2.0, 5.0).cdf).pvalue > 1e-3
 
 
+@pytest.mark.parametrize(("mean", "deviation"), [(2.0, 1e-9), (1.0, 1e9), (1e-200, 1e-195)])
+def test_lognormal_values_of_any_width(mean: float, deviation: float) -> None:
+    """Logarithms are normal: of next to no width, and of a median a thousand millionth of the mean."""
+    sigma = math.sqrt(math.log1p((deviation / mean) ** 2))
+    values = np.log(drawn(400, distribution="lognormal", mean=mean, standard_deviation=deviation) / mean)
+    assert kstest(values, norm(-(sigma**2) / 2, sigma).cdf).pvalue > 1e-3
+
+
 def test_keys_have_streams_of_their_own() -> None:
     one, other = (drawn(key=key, distribution="normal", mean=0.0, standard_deviation=1.0) for key in ("a.x", "a.y"))
     assert abs(np.corrcoef(one, other)[0, 1]) < 4 / np.sqrt(SEEDS)
@@ -75,6 +86,17 @@ def test_another_key_changes_no_draw_and_the_seed_decides(tmp_path: Path) -> Non
     factor = draws["factors.contact.slider.tangential_stiffness"]
     assert 0.8 < factor < 1.2 and both.contacts[0].parameters["tangential_stiffness"] == factor
     assert both.digest != alone.digest != other.digest
+
+
+def test_keys_named_like_those_of_a_distribution_are_drawn(tmp_path: Path) -> None:
+    """A mistuning's own standard deviation, and options of a builder by these names."""
+    text = (CASES / "blisk_lumped" / "case.toml").read_text() + "\n[uncertainty]\nseed = 1\n"
+    text += f"factors.mode_mistuned.mistuning.standard_deviation = {EVEN}\nvalues.model.options.friction = {EVEN}\n"
+    (tmp_path / "case.toml").write_text(text)
+    (tmp_path / "model.py").write_text((CASES / "blisk_lumped" / "model.py").read_text())
+    found = load_case(tmp_path / "case.toml")
+    share = draws_of(found.resolved)["factors.mode_mistuned.mistuning.standard_deviation"]
+    assert found.analyses["mode_mistuned"].mistuning.standard_deviation == 0.02 * share and 0.1 < share < 0.2
 
 
 def test_without_a_seed_the_case_is_as_it_is_written(tmp_path: Path) -> None:
@@ -135,8 +157,21 @@ def test_check_says_what_is_drawn(tmp_path: Path, capfd) -> None:
             ("is no range", "low < high"),
         ),
         (
+            ['values.contact.slider.friction_limit = { distribution = "uniform", low = -1e308, high = 1e308 }'],
+            ("is no range", "by a finite number"),
+        ),
+        ([LIMIT, LIMIT.replace("values", "factors")], ("is drawn twice", "case.toml:3", "also", "case.toml:2")),
+        (
+            [f"values.{name}.step.maximum = {EVEN}" for name in ("mode", "analysis.mode")],
+            ("'analysis.mode.step.maximum' is drawn twice", "case.toml:3", "case.toml:2"),
+        ),
+        (
             ['values.contact.slider.friction_limit = { distribution = "lognormal", mean = 0, standard_deviation = 1 }'],
             ("has mean 0", "> 0"),
+        ),
+        (
+            ['values.model.mass_damping = { distribution = "lognormal", mean = 1e-200, standard_deviation = 1.0 }'],
+            ("has standard_deviation 1 at a mean of 1e-200", "at most 1e+09 times the mean"),
         ),
         (
             ['factors.contact.slider.friction_limit = { distribution = "uniform", low = -0.1, high = 2.0 }'],
@@ -148,7 +183,7 @@ def test_check_says_what_is_drawn(tmp_path: Path, capfd) -> None:
         ),
         (
             ['values.contact.slidr.friction_limit = { distribution = "uniform", low = 0.1, high = 2.0 }'],
-            ("addresses nothing", "did you mean `slider.friction_limit`?"),
+            ("addresses nothing", "did you mean `contact.slider.friction_limit`?"),
         ),
         (
             ['factors.model.mass_damping = { distribution = "uniform", low = 0.1, high = 2.0 }'],
@@ -202,6 +237,10 @@ def test_values_drawn_beyond_their_bounds_are_refused(tmp_path: Path, line: str,
     [
         ('{ distribution = "uniform", low = -3.0, high = -1.0 }', "take low and high within its bounds"),
         ('{ distribution = "normal", mean = -9.0, standard_deviation = 1.0 }', 'take `distribution = "lognormal"`'),
+        (
+            '{ distribution = "lognormal", mean = 1e308, standard_deviation = 1e308 }',
+            "take a smaller standard_deviation",
+        ),
     ],
 )
 def test_what_to_do_about_a_draw_fits_its_distribution(tmp_path: Path, line: str, fix: str) -> None:

@@ -32,6 +32,7 @@ def case(tmp_path_factory) -> Path:
         (["--over", "contact.slider.friction_limit=1,-2"], "--over contact.slider.friction_limit=-2"),
         (["--over", "mode.samples=5,64"], "write `samples = 6`"),
         (["--over", "mod.samples=64"], "did you mean `mode.samples`?"),
+        (["--over", "model.K.0=1,2,3"], "measured: with 2 more values"),
         (["--over", "mode.samples=64,64"], "has the value 64 twice"),
         (["--over", "mode.samples="], "gives no array of values"),
         (["--over", "mode.samples"], "is not KEY=value"),

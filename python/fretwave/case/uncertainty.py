@@ -25,6 +25,8 @@ from .toml.validation import at, validate
 
 #: Between the place of a distribution and the seed, in the places of errors about a value that was drawn.
 SEEDED = ", drawn with seed "
+#: Of a lognormal value, standard deviation over mean: with more the half of all values is below 1e-9 of the mean.
+WIDEST = 1e9
 #: What to do about a draw beyond the bounds of its key.
 _WITHIN = {
     "normal": 'take `distribution = "lognormal"`, or a smaller standard_deviation',
@@ -115,7 +117,8 @@ def draw_values(source: Source) -> Uncertainty | None:
     section = validate(UncertaintySection, source, ("uncertainty",), found)
     if section is None:
         return None
-    draws = [_drawn(source, section.seed, *one) for one in _distributions(source, found)]
+    taken: dict[KeyPath, KeyPath] = {}
+    draws = [_drawn(source, section.seed, taken, *one) for one in _distributions(source, found)]
     wheels = _seeded_wheels(source)
     for name in wheels if section.seed is not None else ():
         source.override(f"{name}.mistuning.seed", section.seed, f"{source.where(('uncertainty', 'seed'))}")
@@ -162,10 +165,17 @@ def _distributions(source: Source, found: Found) -> Iterator[tuple[KeyPath, str,
 def _leaves(table: Mapping[str, Any], path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:
     """Distributions, and what stands in place of one."""
     for name, value in table.items():
-        if isinstance(value, dict) and value and not {*value} & {*DistributionSection.model_fields}:
+        if isinstance(value, dict) and value and not _is_distribution(value):
             yield from _leaves(value, (*path, name))
         else:
             yield (*path, name), value
+
+
+def _is_distribution(table: Mapping[str, Any]) -> bool:
+    """It says what one does; a table by such a name is a key that is drawn (``mistuning.standard_deviation``)."""
+    return any(
+        name in DistributionSection.model_fields and not isinstance(value, dict) for name, value in table.items()
+    )
 
 
 def _fits(source: Source, path: KeyPath, given: DistributionSection, factor: bool, found: Found) -> bool:
@@ -176,10 +186,13 @@ def _fits(source: Source, path: KeyPath, given: DistributionSection, factor: boo
     first = getattr(given, own[0])
     if set(have) != set(own):
         wrong = (f"is {given.distribution} and has {' and '.join(have) or 'no numbers'}", " and ".join(own))
-    elif given.low is not None and given.high is not None and not given.low < given.high:
-        wrong = ("is no range", "low < high")
+    elif given.low is not None and given.high is not None and not 0.0 < given.high - given.low < math.inf:
+        wrong = ("is no range", "low < high, by a finite number")
     elif first <= least:
         wrong = (f"has {own[0]} {first:g}", "a number > 0, of a lognormal value and of a factor")
+    elif given.distribution == "lognormal" and (given.standard_deviation or 0.0) > WIDEST * (given.mean or 0.0):
+        share = f"{given.standard_deviation:g} at a mean of {given.mean:g}"
+        wrong = (f"has standard_deviation {share}", f"at most {WIDEST:g} times the mean")
     else:
         return True
     fix = "write for example `low = 0.2, high = 0.4`" if own[0] == "low" else "write for example `mean = 0.3`"
@@ -189,17 +202,32 @@ def _fits(source: Source, path: KeyPath, given: DistributionSection, factor: boo
 
 
 def _drawn(
-    source: Source, seed: int | None, place: KeyPath, key: str, factor: bool, given: DistributionSection
+    source: Source,
+    seed: int | None,
+    taken: dict[KeyPath, KeyPath],
+    place: KeyPath,
+    key: str,
+    factor: bool,
+    given: DistributionSection,
 ) -> Draw:
-    """Draw, and put it into the case."""
+    """Draw, and put it into the case; `taken` are the places of the distributions of other keys."""
     where = source.where(place) + ("" if seed is None else f"{SEEDED}{seed}")
     path = source.path_of(key.split("."), where)
+    if path is not None and taken.setdefault(path, place) != place:
+        _drawn_twice(source, key, place, taken[path])
     value = None if seed is None else draw(given, key, seed)
     if path is not None and factor:
         _multiply(source, path, key, 1.0 if value is None else value, where)
     elif path is not None and value is not None:
         _set(source, path, key, value, where)
     return Draw(key, factor, given, value)
+
+
+def _drawn_twice(source: Source, key: str, place: KeyPath, other: KeyPath) -> None:
+    """A value and a factor on it, or a value by two names."""
+    what, expected = f"'{key}' is drawn twice", "one distribution of a key"
+    fix = "leave one of them out, and let the other be as wide as both"
+    source.problems.append(InputError(what, source.where(place), f"also {source.where(other)}", expected, fix))
 
 
 def _set(source: Source, path: KeyPath, key: str, value: float, where: str) -> None:
@@ -243,7 +271,10 @@ def advise(problems: list[FretwaveError], uncertainty: Uncertainty | None) -> No
     for draw in uncertainty.draws if uncertainty else ():
         table = "factors" if draw.factor else "values"
         for problem in problems:
-            out = any(word in problem.what for word in ("is out of range", "has a wrong value", "is not positive"))
+            out = any(
+                word in problem.what
+                for word in ("is out of range", "has a wrong value", "is not positive", "is not finite")
+            )
             if out and f"(uncertainty.{table}.{draw.key}){SEEDED}" in (problem.where or ""):
                 whole = str(problem.expected).startswith("an integer")
                 over = f"do not draw it: `fretwave sweep CASE --over {draw.key}=3,5` goes through whole numbers"

@@ -179,7 +179,8 @@ class Sweep:
         for same, problem in kept.items():
             count = len(numbers[same])
             if same[2] is None and count > 1:
-                problem.measured = f"{problem.measured}, and with {counted(count - 1, 'more value')}"
+                seen = "" if problem.measured is None else f"{problem.measured}, and "
+                problem.measured = f"{seen}with {counted(count - 1, 'more value')}"
             elif same[2] is not None and count < len(self.plan):
                 problem.what = f"with {labels[numbers[same][0]]}: {problem.what}"
         return list(kept.values())

@@ -193,16 +193,26 @@ class Source:
         if rest[0] in names and len(rest) > 1:
             return (kind, names.index(rest[0]), *map(_part, rest[1:]))
         known = [name for name in names if name]
-        address = ".".join(parts)
+        address, key = ".".join(parts), ".".join(rest[1:]) or "<key>"
+        head = "<analysis>" if kind == "analysis" else f"{kind}.<name>"
         problem = InputError(
             f"an override addresses nothing: '{address}'",
             where=origin,
             measured=f"'{rest[0]}'" if rest[0] not in names else f"'{address}' without a key",
-            expected=f"<{kind}>.<key> with one of the names {', '.join(known) or '(none)'}; or model.<key>",
-            fix=nearest(rest[0], known, lambda near: f"did you mean `{near}.{'.'.join(rest[1:])}`?"),
+            expected=f"{head}.<key> with one of the names {', '.join(known) or '(none)'}; or model.<key>",
+            fix=self._meant(kind, rest[0], key),
         )
         self.problems.append(problem)
         return None
+
+    def _meant(self, kind: str, name: str, key: str) -> str | None:
+        """The address of a near name: of a contact or a gauge with what it is, of an analysis without."""
+        addresses = {
+            str(self.entry_name(one, number)): f"{one}.{self.entry_name(one, number)}".removeprefix("analysis.")
+            for one in ([kind] if kind != "analysis" else ["gauge", "contact", "analysis"])
+            for number in range(len(self.entries(one)))
+        }
+        return nearest(name, list(addresses), lambda near: f"did you mean `{addresses[near]}.{key}`?")
 
 
 def _part(text: str) -> str | int:
