@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, Literal, Optional
 
 from ..case.analysis import AnalysisSection, register_analysis
-from ..case.checks_sweep import complaint
+from ..case.checks_sweep import complaint, given_before
 from ..case.schema import Whole, key
 from ..case.toml.source import nested_leaves
 from ..errors import FretwaveError
@@ -59,7 +59,9 @@ class SweepAnalysis(AnalysisSection):
         if self.of not in swept:
             expected = f"one of {', '.join(swept) or '(there is none)'}"
             report.wrong(("of",), "is no analysis to sweep", expected, nearest(self.of, swept) or "choose another")
-        for path, values in nested_leaves(self.over):
+        for number, (path, values) in enumerate(leaves := [*nested_leaves(self.over)]):
+            if given_before(".".join(path), [".".join(other) for other, _ in leaves[:number]]) is not None:
+                report.wrong(("over", *path), "gives values a second time", "every key once", "leave one of both out")
             problem = complaint(values)
             if problem is not None:
                 report.wrong(("over", *path), *problem, "write for example `over = { mode.harmonics = [3, 5, 7] }`")

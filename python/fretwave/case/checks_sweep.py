@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterable
 
 from ..post.grid import value_text
+
+_ANALYSIS = "analysis."
 
 
 def complaint(values: object) -> tuple[str, str] | None:
@@ -17,6 +20,11 @@ def complaint(values: object) -> tuple[str, str] | None:
     counts = Counter(map(_compared, values))
     twice = [value for value in values if counts[_compared(value)] > 1]
     return (f"has the value {value_text(twice[-1])} twice", expected) if twice else None
+
+
+def given_before(key: str, keys: Iterable[str]) -> str | None:
+    """The one of some keys that addresses the same, with ``analysis.`` before it or without."""
+    return next((other for other in keys if other.removeprefix(_ANALYSIS) == key.removeprefix(_ANALYSIS)), None)
 
 
 def _compared(value: object) -> object:

@@ -9,7 +9,7 @@ from contextlib import suppress
 from datetime import time
 from typing import Any
 
-from ..case.checks_sweep import complaint
+from ..case.checks_sweep import complaint, given_before
 from ..case.toml.source import TomlError, nested_leaves, parse_value
 from ..errors import InputError
 from ..post.grid import Plan, value_text
@@ -32,7 +32,7 @@ def plan_of(texts: Sequence[str]) -> Plan:
         key, equals, values = (part.strip() for part in text.partition("="))
         if not key or not equals:
             raise _wrong(text, "is not KEY=value,value,...", "a key of the case and its values")
-        if key in over:
+        if given_before(key, over) is not None:
             raise _wrong(text, f"gives values of '{key}' a second time", "every key once")
         over[key] = _listed(values, text)
         problem = complaint(over[key])
