@@ -7,7 +7,8 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from fretwave.plots import campbell, labels, safe, study, style
+from fretwave.plots import campbell, labels, safe, study, style, sweeps
+from fretwave.post.grid import Plan
 from fretwave.results.reader import Run
 from fretwave.results.results import AnalysisWriter
 
@@ -111,3 +112,45 @@ def test_engine_orders_of_a_safe_diagram_stand_clear_of_its_frame(tmp_path):
     (axes,) = safe.draw(run, run["linear"]).axes
     left = axes.get_window_extent().x0
     assert covering(axes) == 0 and min(box.x0 for box in boxes(axes)) > left
+
+
+class Sweep:
+    """A sweep of one key as its pictures see it, with one number for each value."""
+
+    def __init__(self, values: list) -> None:
+        self.plan, self.main, self.parts, self.split = Plan({"model.key": values}), 0, [], ""
+        self.summary = {"frequency_of_largest_amplitude": np.linspace(10.0, 11.0, len(values))}
+
+
+@pytest.mark.parametrize(
+    ("values", "shown"),
+    [
+        (["CNM", "EPMC"], ["CNM", "EPMC"]),
+        (["", "-snes_max_it 1"], ['""', "-snes_max_it 1"]),
+        (
+            [[[640.0 + k, -40.0], [-40.0, 40.0]] for k in range(5)],
+            [f"[[{640 + k}.0, -40.0], [-40..." for k in range(5)],
+        ),
+        ([True, False], ["true", "false"]),
+    ],
+)
+def test_values_that_are_no_numbers_stand_side_by_side_below_a_sweep(values: list, shown: list[str]) -> None:
+    figure = sweeps.overview(Sweep(values), 2 * sweeps.FORCED_PANELS[1:])
+    figure.draw_without_rendering()
+    found = figure.axes[0].get_xticklabels()
+    assert [label.get_text() for label in found] == shown
+    bottoms = [label.get_window_extent().get_points()[0] for label in found]
+    assert all(np.diff([x for x, _ in bottoms]) > found[0].get_fontsize())
+    if found[0].get_rotation() == 0.0:
+        ends = [label.get_window_extent().get_points()[:, 0] for label in found]
+        assert all(right < left for (_, right), (left, _) in zip(ends, ends[1:]))
+
+
+def test_whole_numbers_have_whole_ticks_below_a_sweep() -> None:
+    figure = sweeps.overview(Sweep([3, 4, 5]), 2 * sweeps.FORCED_PANELS[1:])
+    ticks = figure.axes[0].get_xticks()
+    assert {3, 4, 5} <= {*ticks} and (ticks == np.rint(ticks)).all()
+
+
+def test_values_beside_a_colour_bar_have_six_digits() -> None:
+    assert [sweeps._tick(value) for value in (28.480358684358, 3, 1e-9)] == ["28.4804", "3", "1e-09"]

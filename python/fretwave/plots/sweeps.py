@@ -13,15 +13,17 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from ..arrays import Array
 from ..files.dimensions import names_of_data
-from ..post.grid import Plan, short_names
+from ..post.grid import SHOWN, Plan, short_names
 from ..post.limit_cycles import SHORT
 from ..results.file import open_results
 from ..results.reader import Analysis, Run, Table
 from ..results.sweep_quantiles import is_seed
 from ..results.sweep_summary import CYCLES, split_of
+from ..texts import shortened, toml
 from . import labels, marks, scales, style
 from .backbone import error_entry, error_of
 from .scales import Scale
@@ -32,6 +34,8 @@ NAMED = 10
 TINY = 1e-9
 #: asymptotes are common to all branches when they agree to this relative difference
 SAME = 1e-6
+#: characters that fit side by side below a panel
+WIDTH = 40
 LINES = ("-", (0, (5, 1.5)), (0, (1, 1)), "-.")
 
 
@@ -215,9 +219,16 @@ def _name(figure: Figure, axes: list[Axes], swept: Swept, name_error: Callable[[
     colours = ListedColormap(style.shades(len(swept.plan)))
     bar = figure.colorbar(ScalarMappable(norm, colours), ax=axes)
     shown = np.unique(np.linspace(0, len(swept.plan) - 1, NAMED).astype(int))
-    values = [", ".join(f"{value}" for value in combination.values()) for combination in swept.plan.values()]
+    values = [", ".join(map(_tick, combination.values())) for combination in swept.plan.values()]
     bar.set_ticks(shown, labels=[values[number] for number in shown])
     bar.set_label(", ".join(short_names(swept.plan.keys).values()).replace("_", " "))
+
+
+def _tick(value: object) -> str:
+    """A value in a few characters."""
+    if isinstance(value, str) and value:
+        return shortened(value, SHOWN)
+    return f"{value:.6g}" if isinstance(value, float) else toml(value, SHOWN)
 
 
 def _legend(figure: Figure, axes: Axes) -> None:
@@ -281,7 +292,7 @@ def overview(swept: Swept, panels: Sequence[Panel]) -> Figure:
         scale = _rescaled(plane, swept, unit) if unit == "length" else Scale(1.0, unit)
         plane.set_ylabel(scale.label(text))
         plane.set_xlabel(short_names(swept.plan.keys)[key].replace("_", " "))
-        _scales(plane, x[order], [] if numeric else [str(values[k]) for k in order], from_zero)
+        _scales(plane, x[order], [] if numeric else [_tick(values[k]) for k in order], from_zero)
     for number, name in enumerate(others if len(others) > 1 else ()):
         colour = style.GREY if panels is MODE_PANELS else style.PALETTE[number % len(style.PALETTE)]
         axes[0].plot([], [], color=colour, linestyle=LINES[number % len(LINES)], label=name)
@@ -309,10 +320,13 @@ def _others(swept: Swept) -> list[str]:
 
 def _scales(axes: Axes, x: Array, texts: list[str], from_zero: bool) -> None:
     if texts:
-        axes.set_xticks(x, texts)
+        long = sum(map(len, texts)) > WIDTH
+        axes.set_xticks(x, texts, rotation=20.0 if long else 0.0, ha="right" if long else "center")
     elif x.min() > 0 and x.max() > style.LINEAR_UP_TO * x.min():
         axes.set_xscale("log")
         style.plain_numbers(axes.xaxis, x)
+    elif (x == np.rint(x)).all():
+        axes.xaxis.set_major_locator(MaxNLocator("auto", integer=True))
     shown = np.concatenate([line.get_ydata() for line in axes.get_lines()])
     shown = shown[np.isfinite(shown)]
     if from_zero:
