@@ -125,6 +125,19 @@ def test_failed_values_are_left_out_and_named_and_other_keys_stay_apart(tmp_path
     assert said in capsys.readouterr().out
 
 
+def test_draws_at_other_amplitudes_say_theirs(tmp_path: Path, capsys) -> None:
+    """Of two values of report_at each has its own; the picture, which has both, says from where to where."""
+    (tmp_path / "case.toml").write_text(UNCERTAIN + CASE.replace("60.0", "0.4"))
+    over = ["--over", "uncertainty.seed=1:6", "--over", "mode.report_at=[0.1],[0.3]"]
+    words = [*over, "--only", "mode", "--set", "mode.amplitude=[0.05, 0.4]", "--no-plots"]
+    assert call("sweep", tmp_path / "case.toml", *words, "--out", tmp_path / "run") == 0
+    said = capsys.readouterr().out
+    for at in ("0.1", "0.3"):
+        assert f"report at = [{at}], at amplitude {at}: zeta_at_1" in said
+    (figure,) = dict(figures(Run(tmp_path / "run"))).values()
+    assert any("at 0.1 to 0.3 m" in axes.get_xlabel() for axes in figure.axes)
+
+
 # A wheel
 
 

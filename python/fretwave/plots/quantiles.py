@@ -16,7 +16,7 @@ from ..columns import PURE, Column
 from ..post.grid import Plan
 from ..post.quantiles import CONFIDENCE, distribution, quantiles
 from ..results.reader import Run
-from ..results.sweep_quantiles import AMPLITUDE_AT, groups_of, over_seeds
+from ..results.sweep_quantiles import AMPLITUDE_AT, groups_of, over_seeds, range_text
 from ..results.sweep_summary import columns_in, spread_of, summary_of
 from . import style
 from .sweeps import Swept
@@ -78,8 +78,8 @@ def _label(swept: Swept, column: Column) -> str:
     """Long names take several lines."""
     text, number = column.long_name, column.name.partition("_at_")[2]
     if number:
-        at = np.nanmax(swept.summary[AMPLITUDE_AT + number])
-        text = text.replace("this amplitude", f"{at:.6g} {swept.unit('length')}")
+        at = range_text(swept.summary[AMPLITUDE_AT + number].ravel())
+        text = text.replace("this amplitude", f"{at} {swept.unit('length')}")
     unit = "%" if _in_percent(column) else swept.unit(column.unit)
     return fill(style.label(text[:1].upper() + text[1:], unit), 48)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -81,8 +81,8 @@ def quantile_lines(name: str, plan: Plan, rows: Sequence[Row], columns: Sequence
     for row in heads.values():
         mine = [r for r in table if all(r[key] == row[key] for key in (*keys, "quantity"))]
         place = "".join(f", {key.rpartition('.')[2].replace('_', ' ')} = {row[key]}" for key in keys)
-        at = reported_at(row["quantity"], rows)
-        place += f", at amplitude {at:.6g}" if math.isfinite(at) else ""
+        at = reported_at(row["quantity"], _of_group(plan, row, rows))
+        place += f", at amplitude {at}" if at else ""
         lines.append(f"{name}{place}: {row['quantity']}: {'; '.join(map(_word, mine))} ({_count(row)})")
     if lines:
         lines.append(f"{name}: in brackets the {100 * CONFIDENCE:g} % confidence intervals of the quantiles")
@@ -99,11 +99,23 @@ def quantile_lines(name: str, plan: Plan, rows: Sequence[Row], columns: Sequence
     return lines
 
 
-def reported_at(name: str, rows: Sequence[Row]) -> float:
-    """The amplitude that a column ``<quantity>_at_<number>`` is at; NaN of another."""
+def _of_group(plan: Plan, of: Row, rows: Sequence[Row]) -> list[Row]:
+    """Rows of a summary that are draws with the other keys' values of a row of quantiles."""
+    same = [mine for others, mine in groups_of(plan) if all(of[key] == value for key, value in others.items())]
+    return [row for row in rows if any(row["value"] in mine for mine in same)]
+
+
+def reported_at(name: str, rows: Sequence[Row]) -> str:
+    """The amplitudes that a column ``<quantity>_at_<number>`` is at, mostly one; nothing of another column."""
     number = name.partition("_at_")[2]
     known = [row[AMPLITUDE_AT + number] for row in rows if row.get(AMPLITUDE_AT + number) is not None]
-    return float(known[0]) if number and known else math.nan
+    return range_text(known) if number else ""
+
+
+def range_text(values: Iterable[float]) -> str:
+    """``0.1``, or ``0.1 to 0.3``; nothing where none is known."""
+    known = [value for value in values if math.isfinite(value)]
+    return " to ".join(dict.fromkeys(f"{end(known):.6g}" for end in (min, max))) if known else ""
 
 
 def _word(row: Row) -> str:
