@@ -20,7 +20,7 @@ from ..results.runfolder import CASE_COPY, RunFolder, new_record, peak_memory_mb
 from ..results.sweeps import summary_columns, summary_lines, write_sweep
 from ..run.order import RunOptions
 from ..run.runner import Runner, plot
-from ..run.sweep import Checked, Sweep
+from ..run.sweep import NAMED, Checked, Sweep, reasons_of
 from ..texts import counted, display
 
 if TYPE_CHECKING:
@@ -99,7 +99,7 @@ def _do_sweep(sweep: Sweep, first: Checked, folder: RunFolder, console: Console,
     began = time.perf_counter()
     count = groups.group_count(comm.size, len(sweep.plan), sweep.n_groups)
     ranks = f"{counted(comm.size, 'rank')} in {counted(count, 'group')}"
-    over = f"{len(sweep.plan)} values of {' x '.join(sweep.plan.keys)}"
+    over = f"{counted(len(sweep.plan), 'value')} of {' x '.join(sweep.plan.keys)}"
     console.line(f"sweep of {', '.join(first.analyses)}, {over}, {ranks}, results in {display(folder.path)}")
     on_first_rank(comm, folder.start)
     say_how_to_go_on(comm, folder.path)
@@ -108,7 +108,7 @@ def _do_sweep(sweep: Sweep, first: Checked, folder: RunFolder, console: Console,
     outcomes, lines = on_first_rank(comm, lambda: _write(sweep, first, folder, errors))
     for line in lines:
         console.line(line)
-    bad = [number for number, outcome in enumerate(outcomes) if outcome["status"] != "done"]
+    bad = _stopped(outcomes)
     status = {"status": "stopped" if bad else "done", "wall_s": round(time.perf_counter() - began, 3)}
     folder.record.update({**status, "peak_memory_mb": memory, "values": outcomes})
     if sweep.options.plots:
@@ -124,36 +124,47 @@ def _write(
 ) -> tuple[list[dict[str, Any]], list[str]]:
     """One group, one table for each analysis, one summary of all; lines to print. One rank only."""
     run_id = folder.record["run_id"]
-    outcomes, summary, lines, headings = sweep.outcomes(run_id, errors), [], [], dict[str, str]()
+    outcomes, summary, lines = sweep.outcomes(run_id, errors), [], list[str]()
+    reason = reasons_of(sweep.plan, outcomes, _stopped(outcomes))
     for name in first.analyses:
         branches = sweep.branches(name, run_id)
         if branches:
             complete = len(branches) == len(sweep.plan) and all(b.attributes["status"] == "done" for b in branches)
-            attributes = {"run_id": run_id, "status": "done" if complete else "stopped", "reason": ""}
+            attributes = {
+                "run_id": run_id,
+                "status": "done" if complete else "stopped",
+                "reason": "" if complete else reason,
+            }
             attributes[OVERRIDES] = sweep.options.changing(name, first.analyses)
             rows = write_sweep(folder.path, name, name, sweep.plan, branches, attributes, first.title)
-            summary += [{"analysis": name, **row} for row in rows]
-            kind = str(branches[0].attributes["type"])
-            headings.update({column.name: column.heading for column in summary_columns(kind, branches, rows)})
+            columns = summary_columns(str(branches[0].attributes["type"]), branches, rows)
+            headings = {
+                column.name: column.heading for column in columns
+            }  # amplitudes of analyses differ in their unit
+            summary += [{"analysis": name, **{headings.get(key, key): row[key] for key in row}} for row in rows]
             lines += summary_lines(name, sweep.plan, branches, rows)
     if summary:
         lead = [*sweep.plan.keys, "value", "analysis"]
         ordered = [{key: row[key] for key in (*lead, *(k for k in row if k not in lead))} for row in summary]
-        write_rows(folder.path / "summary.csv", ordered, headings)
+        write_rows(folder.path / "summary.csv", ordered)
     sweep.forget_others()
     return outcomes, lines
+
+
+def _stopped(outcomes: Sequence[dict[str, Any]]) -> list[int]:
+    """Numbers of the values that did not come to their end."""
+    return [number for number, outcome in enumerate(outcomes) if outcome["status"] != "done"]
 
 
 def _incomplete(
     sweep: Sweep, outcomes: Sequence[dict[str, Any]], bad: Sequence[int], errors: Sequence[FretwaveError | None]
 ) -> FretwaveError:
     """Which values did not come to their end; bad input when that is what stopped all of them."""
-    labels = sweep.plan.labels()
-    reasons = "; ".join(f"{labels[number]}: {outcomes[number]['reason']}" for number in bad)
+    reasons = reasons_of(sweep.plan, outcomes, bad)
     given = [errors[number] for number in bad if errors[number] is not None]
     fix = next((error.fix for error in given if error is not None and error.fix), None)
     kind = InputError if given and all(isinstance(error, InputError) for error in given) else NotConverged
-    where = ", ".join(outcomes[number]["folder"] for number in bad)
+    where = ", ".join([*(outcomes[number]["folder"] for number in bad[:NAMED]), *(["..."] if bad[NAMED:] else [])])
     return kind(
         f"{len(bad)} of {len(outcomes)} values did not come to their end; what was found is kept",
         where,

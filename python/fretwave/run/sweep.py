@@ -123,7 +123,8 @@ class Sweep:
         """Status, reason and time of each value, for run.json. One rank only."""
         found = []
         for number, (values, error) in enumerate(zip(self.plan.values(), errors)):
-            entries = (self._record(number, run_id) or {}).get("analyses", {})
+            record = self._record(number, run_id) or {"selected": (), "analyses": {}}
+            entries = {name: entry for name, entry in record["analyses"].items() if name in record["selected"]}
             stopped = [entry["reason"] for entry in entries.values() if entry["status"] != "done"]
             reason = "; ".join(stopped) if error is None or stopped else f"{error.what}: {error.measured}"
             status = "done" if not reason and entries else "stopped" if entries else "failed"
@@ -228,6 +229,17 @@ class Sweep:
         """A line from a group, from its first rank."""
         if group.rank == 0 and self.options.shown > Shown.NOTHING:
             print(text, flush=True)
+
+
+#: Values that stopped are named up to so many.
+NAMED = 10
+
+
+def reasons_of(plan: Plan, outcomes: Sequence[dict[str, Any]], bad: Sequence[int]) -> str:
+    """Why values did not come to their end, the first of them."""
+    labels = plan.labels()
+    more = [f"and {counted(len(bad) - NAMED, 'more value')}"] if bad[NAMED:] else []
+    return "; ".join([*(f"{labels[k]}: {outcomes[k]['reason']}" for k in bad[:NAMED]), *more])
 
 
 def swept_names(case: Case) -> list[str]:

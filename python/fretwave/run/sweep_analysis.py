@@ -16,8 +16,9 @@ from ..mpi.guard import on_first_rank
 from ..results.file import OVERRIDES
 from ..results.runfolder import RunFolder
 from ..results.sweeps import summary_lines, write_sweep
+from ..texts import counted
 from .order import RunOptions, reads
-from .sweep import Sweep
+from .sweep import Sweep, reasons_of
 from .sweep_plan import table_overrides
 
 if TYPE_CHECKING:
@@ -57,14 +58,13 @@ def run_sweep(sweep: Sweep, name: str, comm: MPI.Comm, console: Console, folder:
     """Run every value and write the results of all in one group and two tables. Collective."""
     run_id, of = folder.record["run_id"], sweep.options.only[-1]
     sweep.folder = folder.path / name
-    console.line(f"{name}: '{of}' with {len(sweep.plan)} values of {', '.join(sweep.plan.keys)}")
+    console.line(f"{name}: '{of}' with {counted(len(sweep.plan), 'value')} of {', '.join(sweep.plan.keys)}")
     errors = sweep.run(comm, run_id)
 
     def finish() -> Outcome:
         outcomes, branches = sweep.outcomes(run_id, errors), sweep.branches(of, run_id)
         bad = [k for k, outcome in enumerate(outcomes) if outcome["status"] != "done"]
-        labels = sweep.plan.labels()
-        reason = "; ".join(f"{labels[k]}: {outcomes[k]['reason']}" for k in bad) or "all values done"
+        reason = reasons_of(sweep.plan, outcomes, bad) or "all values done"
         if branches:
             attributes = {"run_id": run_id, "status": "stopped" if bad else "done", "reason": reason}
             typed = replace(sweep.options, overrides=[o for o in sweep.options.overrides if o not in sweep.places])

@@ -1,0 +1,78 @@
+"""What is said of the values of a sweep: which of them stopped and why, and numbers in the unit of their analysis."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_line import call
+from models.swept_case import CASE
+
+from fretwave.run.sweep import NAMED
+
+pytestmark = pytest.mark.ranks(1)
+
+LIMITS = "contact.slider.friction_limit="
+#: A second mode of the same oscillator, of mass 4, over its own coordinate: sqrt(mass) times the displacement.
+MODAL = CASE[CASE.index("[[analysis]]") : CASE.index('[[analysis]]\nname = "limits"')]
+MODAL = MODAL.replace('"mode"', '"modal"', 1).replace('normalise = "x"', "normalise = { mode = 1 }")
+HEAVY = CASE.replace("[[1.0]]", "[[4.0]]", 1)
+
+
+def rows(path: Path) -> list[dict[str, str]]:
+    with path.open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+@pytest.fixture
+def case(tmp_path: Path) -> Path:
+    path = tmp_path / "case.toml"
+    path.write_text(HEAVY.replace("60.0", "3.0") + MODAL.replace("60.0", "6.0"))
+    return path
+
+
+def test_amplitudes_of_other_units_stand_in_columns_of_their_own(case: Path, tmp_path: Path) -> None:
+    """Slip begins where the displacement is the limit over kt, in the coordinate of the mode at twice that."""
+    case.write_text(case.read_text().replace("[model]", '[model]\nunits = "mm-t-s"'))
+    words = ["--over", f"{LIMITS}0.5,1.0", "--only", "mode,modal", "--no-plots", "--out", tmp_path / "run"]
+    assert call("sweep", case, *words) == 0
+    columns = {"mode": ("slip_threshold [mm]", 1.0), "modal": ("slip_threshold [sqrt(t) mm]", 2.0)}
+    for row in rows(tmp_path / "run" / "summary.csv"):
+        own, factor = columns.pop(row["analysis"]) if row["value"] == "1" else columns[row["analysis"]]
+        limit = float(row["contact.slider.friction_limit"])
+        assert float(row[own]) == pytest.approx(factor * limit, rel=0.5 * (np.pi / 512) ** 2)
+        assert [row[name] for name in row if "slip_threshold" in name and name != own] == [""]
+    assert not columns
+
+
+def test_a_sweep_is_not_blamed_for_an_earlier_one_in_its_folder(case: Path, tmp_path: Path, capsys) -> None:
+    """The first stops early in another analysis, whose results stay there."""
+    words = ["--no-plots", "--out", tmp_path / "run"]
+    assert call("sweep", case, "--only", "modal", "--over", "modal.step.max_points=3,900", *words) == 3
+    assert call("sweep", case, "--only", "mode", "--over", f"{LIMITS}0.5,1.0", *words) == 0
+    assert call("resume", tmp_path / "run", "--no-plots") == 0
+    assert "number of points" in capsys.readouterr().err
+
+
+def test_show_says_why_a_sweep_stopped(case: Path, tmp_path: Path, capsys) -> None:
+    words = ["--only", "mode", "--over", "mode.step.max_points=3,900", "--no-plots", "--out", tmp_path / "run"]
+    assert call("sweep", case, *words) == 3
+    assert call("show", tmp_path / "run") == 0
+    assert "mode: stopped early: max_points = 3: largest number of points" in capsys.readouterr().out
+
+
+def test_of_many_values_that_stopped_the_first_are_named(case: Path, tmp_path: Path, capsys) -> None:
+    count = NAMED + 2
+    words = ["--set", "mode.step.max_points=2", "--over", f"{LIMITS}1:{count}", "--only", "mode", "--no-plots"]
+    assert call("sweep", case, *words, "--out", tmp_path / "run") == 3
+    said = capsys.readouterr().err
+    assert f"{count} of {count} values did not come to their end" in said
+    assert said.count("largest number of points") == NAMED and "; and 2 more values" in said and ", ..." in said
+
+
+def test_one_value_is_one_value(case: Path, tmp_path: Path, capsys) -> None:
+    words = ["--over", f"{LIMITS}1.0", "--only", "mode", "--no-plots", "--out", tmp_path / "run"]
+    assert call("sweep", case, *words) == 0
+    assert "sweep of mode, 1 value of contact.slider.friction_limit" in capsys.readouterr().out
