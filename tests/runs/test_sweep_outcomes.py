@@ -9,11 +9,15 @@ import numpy as np
 import pytest
 from command_line import call
 from models.swept_case import CASE
+from tolerances import SOLVED
 
+from fretwave.results.sweep_summary import summarise
 from fretwave.run.sweep import NAMED
 
 pytestmark = pytest.mark.ranks(1)
 
+#: What rounding alone has no amplitude of.
+OF_AMPLITUDE = ("onset_amplitude", "amplitude_of_largest_zeta", "amplitude_of_lowest_frequency")
 LIMITS = "contact.slider.friction_limit="
 #: A second mode of the same oscillator, of mass 4, over its own coordinate: sqrt(mass) times the displacement.
 MODAL = CASE[CASE.index("[[analysis]]") : CASE.index('[[analysis]]\nname = "limits"')]
@@ -76,3 +80,24 @@ def test_one_value_is_one_value(case: Path, tmp_path: Path, capsys) -> None:
     words = ["--over", f"{LIMITS}1.0", "--only", "mode", "--no-plots", "--out", tmp_path / "run"]
     assert call("sweep", case, *words) == 0
     assert "sweep of mode, 1 value of contact.slider.friction_limit" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("damping", [0.0, 1e-6, 0.05, -0.02])
+def test_a_branch_without_slip_has_no_amplitude_of_its_damping(damping: float) -> None:
+    """Rounding has a largest value too: it is no onset of damping, no peak and no lowest frequency."""
+    random, n = np.random.default_rng(0), 200
+    table = {"amplitude": np.geomspace(1.0, 10.0, n), "slip": np.zeros(n), "event": [""] * n, "newton": np.ones(n)}
+    noise = [1 + 4e-16 * random.standard_normal(n) for _ in range(3)]
+    table |= {"omega": noise[0], "omega0": noise[0], "frequency_hz": 100.0 * noise[1]}
+    found = summarise("mode", {**table, "zeta": damping * noise[2] + 1e-17 * random.standard_normal(n)}, {})
+    assert np.isnan([found[name] for name in OF_AMPLITUDE]).all()
+    assert found["largest_zeta"] == pytest.approx(damping, rel=SOLVED, abs=1e-15)
+
+
+def test_a_sweep_from_slip_to_stick(case: Path, tmp_path: Path, capsys) -> None:
+    words = ["--over", f"{LIMITS}0.5,100.0", "--only", "mode", "--no-plots", "--out", tmp_path / "run"]
+    assert call("sweep", case, *words) == 0
+    slips, sticks = rows(tmp_path / "run" / "summary.csv")
+    assert 0.5 < float(slips["onset_amplitude"]) < float(slips["amplitude_of_largest_zeta"]) < 3.0
+    assert [sticks[name] for name in OF_AMPLITUDE] == ["nan"] * len(OF_AMPLITUDE)
+    assert "friction_limit = 100.0: slip from 100 m, zeta 0 % throughout" in capsys.readouterr().out

@@ -9,8 +9,6 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, Optional, cast
 
-import numpy as np
-
 from ..case.analysis import register_analysis
 from ..case.checks_wheel import check_needs_wheel
 from ..case.harmonic import HarmonicSection, check_range
@@ -20,6 +18,7 @@ from ..columns import ENERGY, MODE
 from ..errors import InputError
 from ..model.laws import PythonLaw
 from ..post.limit_cycles import limit_cycles, stability
+from ..post.mode_curve import most_damped
 from ..results.results import AnalysisWriter
 from ..results.sweep_summary import MODE_BRANCH
 from ..texts import counted
@@ -269,7 +268,7 @@ def _percent(value: float, digits: int) -> str:
 def summarise(name: str, table: Mapping[str, Any], cycles: Sequence[Mapping[str, Any]], unit: str) -> list[str]:
     """The branch in a line, and a line for each limit cycle."""
     amplitude, zeta = table["amplitude"], table["zeta"]
-    top = int(np.argmax(zeta))
+    top = most_damped(zeta)
     folds = sum("fold" in event.split() for event in table["event"])
     lines = [
         f"{name}: {len(zeta)} points, a {amplitude[0]:.4g} to {amplitude[-1]:.4g} {unit},"

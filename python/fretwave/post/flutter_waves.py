@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .limit_cycles import limit_cycles, stability
-from .mode_curve import NO_DAMPING
+from .mode_curve import NO_DAMPING, most_damped
 
 STABLE = {True: "stable", False: "unstable", None: "unknown"}
 
@@ -33,7 +33,7 @@ def _wave(table: Mapping[str, Any], diameter: int, rows: npt.NDArray[np.intp]) -
     names = ("amplitude", "frequency_hz", "zeta", "event", "stick")
     part = {name: np.asarray(table[name])[rows] for name in names if name in table}
     amplitude, zeta = part["amplitude"], part["zeta"]
-    top = int(np.argmax(zeta))
+    top = most_damped(zeta)
     cycles = [
         {**cycle, "point": int(rows[cycle["point"]]), "nodal_diameter": diameter, "folds": _folds(part, cycle["point"])}
         for cycle in limit_cycles(part)

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..files.lock import is_taken
 from ..post.limit_cycles import stability
+from ..post.mode_curve import most_damped
 from ..texts import counted
 from ..units import units_of
 from .file import OVERRIDES, open_results, unit_of_amplitudes
@@ -170,7 +171,8 @@ def peak_row(table: Mapping[str, Any]) -> int | None:
     of = "zeta" if "zeta" in table and "omega0" in table else "amplitude" if "level" in table else None
     values = np.empty(0) if of is None else np.asarray(table[of], dtype=float)
     known = np.isfinite(values)
-    return int(np.argmax(np.where(known, values, -np.inf))) if known.any() else None
+    largest = most_damped if of == "zeta" else np.argmax
+    return int(largest(np.where(known, values, -np.inf))) if known.any() else None
 
 
 def _peak(table: Mapping[str, Any], group: h5py.Group) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from ..columns import Column
 from ..files.dimensions import names_of_data
 from ..post.grid import Plan
 from ..post.limit_cycles import SHORT, limit_cycles
-from ..post.mode_curve import ModeCurve
+from ..post.mode_curve import ModeCurve, lowest, most_damped
 from ..post.slip_threshold import slip_threshold
 from ..registry import kind_named
 from .file import unit_of_amplitudes
@@ -43,7 +43,7 @@ MODE = (
     Column("slip_from", "length", "first amplitude of the branch with slip"),
     Column("onset_amplitude", "length", "amplitude at which a tenth of the damping's rise is reached"),
     Column("largest_zeta", "1", "largest modal damping ratio"),
-    Column("amplitude_of_largest_zeta", "length", "amplitude of the largest damping"),
+    Column("amplitude_of_largest_zeta", "length", "amplitude of the largest damping, nan where all is the same"),
     Column("lowest_frequency_hz", "Hz", "lowest frequency of the branch"),
     Column("amplitude_of_lowest_frequency", "length", "amplitude of the lowest frequency, nan at an end of the branch"),
     Column("last_frequency_hz", "Hz", "frequency at the end of the branch"),
@@ -164,7 +164,8 @@ def summarise(
 
 def _mode(table: Table, attributes: Mapping[str, Any], forces: Mapping[str, Any]) -> dict[str, float]:
     amplitude, frequency, zeta = (np.asarray(table[name]) for name in ("amplitude", "frequency_hz", "zeta"))
-    top, low = int(np.argmax(zeta)), int(np.argmin(frequency))
+    top, low = most_damped(zeta), lowest(frequency)
+    rises, varies = top > 0, top > 0 or most_damped(-zeta) > 0
     slips = np.flatnonzero(table["slip"] > 0)
     first = int(slips[0]) if len(slips) else len(zeta)
     other = attributes.get("free_omega", attributes.get("sliding_omega", np.nan))
@@ -174,9 +175,9 @@ def _mode(table: Table, attributes: Mapping[str, Any], forces: Mapping[str, Any]
         "slip_threshold": slip_threshold(float(amplitude[0]), forces, attributes) if first and forces else np.nan,
         "stick_until": float(amplitude[first - 1]) if first else np.nan,
         "slip_from": float(amplitude[first]) if len(slips) else np.nan,
-        "onset_amplitude": _onset(table, float(zeta[0]), float(zeta[top])) if first else np.nan,
+        "onset_amplitude": _onset(table, float(zeta[0]), float(zeta[top])) if first and rises else np.nan,
         "largest_zeta": float(zeta[top]),
-        "amplitude_of_largest_zeta": float(amplitude[top]),
+        "amplitude_of_largest_zeta": float(amplitude[top]) if varies else np.nan,
         "lowest_frequency_hz": float(frequency[low]),
         "amplitude_of_lowest_frequency": float(amplitude[low]) if 0 < low < len(zeta) - 1 else np.nan,
         "last_frequency_hz": float(frequency[-1]),
@@ -220,9 +221,7 @@ def _limit_cycles(table: Table) -> dict[str, float]:
 
 
 def _onset(table: Table, start: float, largest: float) -> float:
-    """Amplitude at which damping has risen by a share of its whole rise; nan when it does not rise."""
-    if len(table["zeta"]) < 2 or not largest > start:
-        return float("nan")
+    """Amplitude at which damping has risen by a share of its whole rise."""
     found = ModeCurve.from_table(table).amplitudes_at(start + ONSET * (largest - start))
     return found[0] if found else float("nan")
 
@@ -279,7 +278,9 @@ def _mode_words(row: Row) -> str:
     unit = row["unit"]
     starts = next((row[key] for key in ("slip_threshold", "slip_from") if math.isfinite(row[key])), None)
     slip = "no slip" if starts is None else f"slip from {starts:.4g} {unit}"
-    top = f"largest zeta {100 * row['largest_zeta']:.4g} % at {row['amplitude_of_largest_zeta']:.4g} {unit}"
+    at = row["amplitude_of_largest_zeta"]
+    place = f"at {at:.4g} {unit}" if math.isfinite(at) else "throughout"
+    top = f"{'largest ' * math.isfinite(at)}zeta {100 * row['largest_zeta']:.4g} % {place}"
     words = [slip, top, f"lowest {row['lowest_frequency_hz']:.6g} Hz"]
     for word, stable in CYCLES.items():
         amplitude = row.get(f"{word}_limit_cycle", math.nan)  # not all are in older results
