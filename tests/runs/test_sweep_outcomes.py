@@ -67,6 +67,12 @@ def test_show_says_why_a_sweep_stopped(case: Path, tmp_path: Path, capsys) -> No
     assert "mode: stopped early: max_points = 3: largest number of points" in capsys.readouterr().out
 
 
+def test_a_value_that_fails_has_its_line_too(case: Path, tmp_path: Path, capsys) -> None:
+    words = ["--only", "mode", "--over", "mode.petsc='','-nonsense 1'", "--no-plots", "--out", tmp_path / "run"]
+    assert call("sweep", case, *words) == 2
+    assert 'petsc = "-nonsense 1": failed: no solver reads the PETSc option -nonsense' in capsys.readouterr().out
+
+
 def test_of_many_values_that_stopped_the_first_are_named(case: Path, tmp_path: Path, capsys) -> None:
     count = NAMED + 2
     words = ["--set", "mode.step.max_points=2", "--over", f"{LIMITS}1:{count}", "--only", "mode", "--no-plots"]

@@ -219,6 +219,9 @@ class Sweep:
             error: NotConverged | None = None
         except NotConverged as stopped:
             error = stopped
+        except FretwaveError as failed:
+            self._say(group, f"{label}: failed: {failed.what}")
+            raise
         word = "done" if error is None else f"stopped: {error.measured}"
         seconds, ranks = time.perf_counter() - began, counted(group.size, "rank")
         left = self._time.left((number + 1) / len(self.plan)) if number + 1 < len(self.plan) else ""
