@@ -107,3 +107,19 @@ def test_a_sweep_from_slip_to_stick(case: Path, tmp_path: Path, capsys) -> None:
     assert 0.5 < float(slips["onset_amplitude"]) < float(slips["amplitude_of_largest_zeta"]) < 3.0
     assert [sticks[name] for name in OF_AMPLITUDE] == ["nan"] * len(OF_AMPLITUDE)
     assert "friction_limit = 100.0: slip from 100 m, zeta 0 % throughout" in capsys.readouterr().out
+
+
+def test_a_sweep_of_branches_that_have_no_such_amplitude_has_its_picture(case: Path, tmp_path: Path, capsys) -> None:
+    words = [
+        "--over",
+        "model.mass_damping=0.0,0.1",
+        "--set",
+        f"{LIMITS}0.0",
+        "--only",
+        "mode",
+        "--out",
+        tmp_path / "run",
+    ]
+    assert call("sweep", case, *words) == 0
+    assert "no picture" not in capsys.readouterr().out
+    assert (tmp_path / "run" / "mode_summary.png").exists()

@@ -126,7 +126,7 @@ def figures(run: Run) -> Iterator[tuple[str, Figure]]:
         else:
             yield f"{analysis.name}_responses", responses(swept)
         if not is_seed(swept.plan.keys[swept.main]):  # nothing depends on the number of a draw
-            panels = MODE_PANELS if kind != "forced" else FORCED_PANELS
+            panels = FORCED_PANELS if kind == "forced" else MODE_PANELS[0 if _has_amplitudes(swept.summary) else 1 :]
             yield f"{analysis.name}_summary", overview(swept, panels)
 
 
@@ -238,22 +238,34 @@ def _legend(figure: Figure, axes: Axes) -> None:
         style.legend_outside(figure, axes, columns=min(5, len(names)))
 
 
+#: of a branch, in this order: colour and name of their line
+AMPLITUDES = {
+    "slip_threshold": (style.INK, "first slip"),
+    "onset_amplitude": (style.BLUE, "damping sets in"),
+    "amplitude_of_lowest_frequency": (style.GREEN, "lowest frequency"),
+    "amplitude_of_largest_zeta": (style.RED, "largest damping"),
+}
+
+
 def _amplitudes(axes: Axes, x: Array, table: Table, number: int) -> None:
     """Where slip begins, where damping sets in and where it is largest."""
     line = LINES[number % len(LINES)]
     name = (lambda text: None) if number else (lambda text: text)
     look = {"linestyle": line, "marker": "o", "markersize": 5}
-    axes.plot(x, table["slip_threshold"], color=style.INK, label=name("first slip"), **look)
-    axes.plot(x, table["onset_amplitude"], color=style.BLUE, label=name("damping sets in"), **look)
-    lowest = table["amplitude_of_lowest_frequency"]
-    if np.isfinite(lowest).any():
-        axes.plot(x, lowest, color=style.GREEN, label=name("lowest frequency"), **look)
-    axes.plot(x, table["amplitude_of_largest_zeta"], color=style.RED, label=name("largest damping"), **look)
+    for column, (colour, text) in AMPLITUDES.items():
+        if np.isfinite(table[column]).any():
+            axes.plot(x, table[column], color=colour, label=name(text), **look)
     for (word, stable), face in zip(CYCLES.items(), (style.PURPLE, "white", style.GREY)):
         cycle = table.get(f"{word}_limit_cycle", np.full(len(x), np.nan))  # not all are in older results
         if np.isfinite(cycle).any():
             more = {"color": style.PURPLE, "markerfacecolor": face, "label": name(f"limit cycle, {SHORT[stable]}")}
             axes.plot(x, cycle, **more, **look)
+
+
+def _has_amplitudes(summary: Table) -> bool:
+    """Any branch has any: none of branches that neither slip nor end in slip, nor cross zero damping."""
+    columns = [*AMPLITUDES, *(f"{word}_limit_cycle" for word in CYCLES)]
+    return any(np.isfinite(summary[column]).any() for column in columns if column in summary)
 
 
 def _one(axes: Axes, x: Array, table: Table, number: int, column: str, coloured: bool = False) -> None:
@@ -277,7 +289,8 @@ FORCED_PANELS = (
 
 def overview(swept: Swept, panels: Sequence[Panel]) -> Figure:
     """Quantities over the key with most values, a line for each combination of the others (and each level)."""
-    figure, axes = style.new_figure(4.4, columns=len(panels))
+    figure, planes = style.new_figure(4.4, columns=len(panels), squeeze=False)
+    axes = planes[0]
     key = swept.plan.keys[swept.main]
     values, others = swept.plan.over[key], _others(swept)
     numeric = all(type(value) in (int, float) for value in values)
@@ -294,7 +307,7 @@ def overview(swept: Swept, panels: Sequence[Panel]) -> Figure:
         plane.set_xlabel(short_names(swept.plan.keys)[key].replace("_", " "))
         _scales(plane, x[order], [] if numeric else [_tick(values[k]) for k in order], from_zero)
     for number, name in enumerate(others if len(others) > 1 else ()):
-        colour = style.GREY if panels is MODE_PANELS else style.PALETTE[number % len(style.PALETTE)]
+        colour = style.GREY if panels[-1] is MODE_PANELS[-1] else style.PALETTE[number % len(style.PALETTE)]
         axes[0].plot([], [], color=colour, linestyle=LINES[number % len(LINES)], label=name)
     _legend(figure, axes[0])
     return figure
@@ -325,7 +338,7 @@ def _scales(axes: Axes, x: Array, texts: list[str], from_zero: bool) -> None:
     elif x.min() > 0 and x.max() > style.LINEAR_UP_TO * x.min():
         axes.set_xscale("log")
         style.plain_numbers(axes.xaxis, x)
-    elif (x == np.rint(x)).all():
+    elif (x == np.rint(x)).all() and np.ptp(x) > 1.0:
         axes.xaxis.set_major_locator(MaxNLocator("auto", integer=True))
     shown = np.concatenate([line.get_ydata() for line in axes.get_lines()])
     shown = shown[np.isfinite(shown)]
