@@ -83,6 +83,9 @@ def test_plans() -> None:
     assert list(plan.values())[3] == {"a.b": 1, "c": [1.0, 2.0], "d": True}
     assert plan.overrides()[4] == ["a.b=2", 'c="x"', 'd="y"']
     assert plan.labels()[4] == 'b = 2, c = "x", d = "y"'
+    assert plan.labels() is plan.labels() and plan.overrides() is plan.overrides(), (
+        "each of many values asks for its own"
+    )
     assert Plan({"a.b": [1], "c.b": [2]}).labels() == ["a.b = 1, c.b = 2"]
     assert SweepAnalysis(name="s", type="sweep", of="m", over={"a.b": [1], "c": {"d": [2]}}).plan().keys == [
         "a.b",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
 from math import prod
 from typing import Any
@@ -45,10 +46,19 @@ class Plan:
 
     def overrides(self) -> list[list[str]]:
         """``key=value`` of each combination, as ``--set`` takes it."""
-        return [[f"{key}={value_text(value)}" for key, value in values.items()] for values in self.values()]
+        return self._overrides
 
     def labels(self) -> list[str]:
         """Each combination in a few words, by the last parts of the keys."""
+        return self._labels
+
+    @cached_property
+    def _overrides(self) -> list[list[str]]:
+        """Written once: every value of a sweep asks for its own."""
+        return [[f"{key}={value_text(value)}" for key, value in values.items()] for values in self.values()]
+
+    @cached_property
+    def _labels(self) -> list[str]:
         short = short_names(self.keys)
         return [
             ", ".join(f"{short[key]} = {toml(value, SHOWN)}" for key, value in values.items())

@@ -38,7 +38,8 @@ def groups_of(plan: Plan) -> list[tuple[dict[str, Any], list[int]]]:
 
 def samples(numbers: Sequence[int], rows: Sequence[Row], name: str) -> dict[int, float]:
     """A quantity by the number of the value, of the values whose branch came to its end and has it."""
-    mine = {int(row["value"]): row for row in rows if row["value"] in numbers and row.get("done", 1) == 1}
+    asked = {*numbers}
+    mine = {int(row["value"]): row for row in rows if row["value"] in asked and row.get("done", 1) == 1}
     known = {number: float(row.get(name, math.nan)) for number, row in mine.items()}
     return {number: value for number, value in known.items() if math.isfinite(value)}
 
@@ -101,8 +102,9 @@ def quantile_lines(name: str, plan: Plan, rows: Sequence[Row], columns: Sequence
 
 def _of_group(plan: Plan, of: Row, rows: Sequence[Row]) -> list[Row]:
     """Rows of a summary that are draws with the other keys' values of a row of quantiles."""
-    same = [mine for others, mine in groups_of(plan) if all(of[key] == value for key, value in others.items())]
-    return [row for row in rows if any(row["value"] in mine for mine in same)]
+    groups = [mine for others, mine in groups_of(plan) if all(of[key] == value for key, value in others.items())]
+    numbers = {number for mine in groups for number in mine}
+    return [row for row in rows if row["value"] in numbers]
 
 
 def reported_at(name: str, rows: Sequence[Row]) -> str:

@@ -230,9 +230,9 @@ def _points(plan: Plan, branches: Sequence[Branch]) -> list[tuple[Column, Any]]:
 
 def _summary(kind: str, plan: Plan, branches: Sequence[Branch]) -> list[dict[str, Any]]:
     """A row for each branch; a table of a value has one, or one for each level or nodal diameter."""
-    rows = []
+    rows, columns = [], {key: _key_column(plan, key) for key in plan.keys}
     for branch in branches:
-        keys = {key: plain(_key_column(plan, key)[branch.number]) for key in plan.keys}
+        keys = {key: plain(column[branch.number]) for key, column in columns.items()}
         lead = {**keys, "value": branch.number, **branch.draws}
         rows += [{**lead, **part, **values} for part, values in parts_of(kind, branch)]
     return rows
