@@ -75,6 +75,8 @@ def test_on_the_command_line(tmp_path: Path, capfd) -> None:
         ("pair,friction_limit\n0,0.5\n", ("lacks pairs", "none for pair 1 and 1 more", "3 lines")),
         ("pair,friction_limit [kN]\n0,0.5\n", ("has other headings", "limits.csv:1", "pair,friction_limit [N]")),
         ("0,0.5\n1,1\n", ("has other headings", "limits.csv:1")),
+        ("pair,friction_limit,friction_limit [N]\n0,0.5,2\n", ("has a column twice", "limits.csv:1", "friction_limit")),
+        ("pair,friction_limit,pair\n0,0.5,2\n", ("has a column twice", "limits.csv:1", "one column pair")),
         ("", ("has other headings", "nothing")),
     ],
 )

@@ -111,6 +111,38 @@ def test_pairs_from_a_table(tmp_path: Path) -> None:
     assert model.dofs == {"tip": 22} and model.dof("tip") == 22
 
 
+WRONG_TABLES = {
+    "order": ("node_b,node_a,nx,ny,nz,area\n3,2,0,1,1,4e-6\n", "another order", "node_a,node_b,nx,ny,nz,area"),
+    "area first": ("node_a,node_b,area,nx,ny,nz\n2,3,4e-6,0,1,1\n", "another order", "pairs.csv:1"),
+    "one area": ("1,,0,0,-2,3e-6\n2,3,0,1,1\n", "uneven", "some have none"),
+    "no number": ("1,,0,0,-2,3e-6\n2,3,0,1,1,nan\n", "no pair", "pairs.csv:2"),
+    "endless area": ("1,,0,0,-2,inf\n", "no pair", "pairs.csv:1"),
+    "endless normal": ("1,,0,0,-inf,3e-6\n", "no pair", "pairs.csv:1"),
+    "turned round": ("2,3,0,1,1,4e-6\n3,2,0,-1,-1,4e-6\n", "stands twice", "pair 2"),
+    "longer normal": ("2,3,0,1,1,4e-6\n2,3,0,2,2,4e-6\n", "stands twice", "pair 2"),
+    "nothing": ("node_a,node_b,nx,ny,nz,area\n", "no pairs", "no pair"),
+}
+
+
+@pytest.mark.parametrize("wrong", WRONG_TABLES)
+def test_wrong_tables_of_pairs(wrong: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """None is read as another contact: a normal of no number was left out, areas of some pairs dropped those of all."""
+    text, *said = WRONG_TABLES[wrong]
+    (tmp_path / "pairs.csv").write_text(text)
+    command = [*Two().write(tmp_path), "--pairs", str(tmp_path / "pairs.csv"), "--tolerance", "1e-4"]
+    assert main(command) == 2
+    error = capfd.readouterr().err
+    assert all(word in error for word in (*said, "pairs.csv", "fix:")), error
+
+
+@pytest.mark.parametrize("line", ["2,3,0,1,1", "2,3,0,1,1,", '"node_a","node_b","nx","ny","nz"\n2,3,0,1,1'])
+def test_areas_that_are_left_out(line: str, tmp_path: Path) -> None:
+    (tmp_path / "pairs.csv").write_text(line + "\n")
+    command = [*Two().write(tmp_path), "--pairs", str(tmp_path / "pairs.csv"), "--tolerance", "1e-4"]
+    assert main(command) == 0
+    assert model_file.read_model(tmp_path / "m.h5").pairs["contact"].areas is None
+
+
 def test_pairs_with_ground(tmp_path: Path) -> None:
     two = Two()
     assert main([*two.write(tmp_path), "--pairs", "wall=LEFT", "ground", "--normal", "1,0,0"]) == 0

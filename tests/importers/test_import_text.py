@@ -193,6 +193,29 @@ def test_comments_and_a_heading(head: str, tmp_path: Path) -> None:
     assert found.numbers.tolist() == [1, 7] and found.coordinates[1].tolist() == [1, 0.5, 0]
 
 
+@pytest.mark.parametrize("head", ["node,z,y,x", '"x","y","z","node"', "node, x [mm], z [mm], y [mm]", "node x z y"])
+def test_columns_in_another_order(head: str, tmp_path: Path) -> None:
+    """A heading that names the columns is not passed over: x was read where it says z."""
+    (tmp_path / "n.csv").write_text(f"# mm\n{head}\n1,0,0,0\n7,1,0.5,0\n")
+    with pytest.raises(fw.InputError, match="another order") as caught:
+        read_node_file(tmp_path / "n.csv")
+    assert "n.csv:2" in (caught.value.where or "") and caught.value.expected == "node,x,y,z"
+
+
+@pytest.mark.parametrize("head", ["Node Number,X Location (m),Y,Z", "Node Number X Y Z", "id,x [m],y [m],z [m]"])
+def test_headings_of_other_words(head: str, tmp_path: Path) -> None:
+    text = "1,0,0,0\n7,1,0.5,0\n"
+    (tmp_path / "n.csv").write_text(f"{head}\n{text if ',' in head else text.replace(',', ' ')}")
+    assert read_node_file(tmp_path / "n.csv").coordinates[1].tolist() == [1, 0.5, 0]
+
+
+def test_dofs_in_another_order(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    command, files = files_of_two(tmp_path)
+    text = files["--dofs"].read_text()
+    files["--dofs"].write_text("direction,node\n" + text)
+    assert main(command) == 2 and "another order" in capfd.readouterr().err
+
+
 def test_directions_as_letters(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     """The same dofs; what is no direction, and columns between semicolons, are told."""
     command, files = files_of_two(tmp_path)

@@ -91,6 +91,10 @@ class ValueTable:
             commas = "write commas between columns, and decimal points"
             fix = commas if ";" in measured else "write that as its first line"
             self._wrong("has other headings", 1, measured, expected, fix)
+        for names in (known, (self.row,)):
+            if sum(text in names for text in headings) > 1:
+                measured, expected = shortened(",".join(headings)), f"one column {names[-1]}"
+                self._wrong("has a column twice", 1, measured, expected, "remove one of them")
         return headings.index(self.row), place
 
     def _check_length(self, line: int, row: Sequence[str], headings: Sequence[str]) -> None:

@@ -197,7 +197,7 @@ def _read_table(path: Path) -> IntArray:
         raise InputError("the table of dofs does not exist", display(path), fix="check the path")
     if not re.search("[,;]", path.read_text(encoding="utf-8", errors="replace")):
         return read_dofs(path)
-    return whole(columns_of(path, 2, {1: _direction}), display(path))
+    return whole(columns_of(path, 2, {1: _direction}, ("node", "direction")), display(path))
 
 
 def _direction(word: str) -> float:

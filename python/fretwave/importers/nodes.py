@@ -117,7 +117,7 @@ def read_nodes(path: Path) -> Nodes:
         return _from_npz(path)
     if head.lstrip().startswith(b"*"):
         return Deck(path).nodes()
-    table = columns_of(path, 4)
+    table = columns_of(path, 4, names=("node", "x", "y", "z"))
     return Nodes(whole(table[:, 0], display(path)), table[:, 1:], display(path))
 
 

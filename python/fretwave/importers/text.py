@@ -5,7 +5,7 @@ from __future__ import annotations
 import codecs
 import re
 import zipfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -86,12 +86,34 @@ def _first_data(head: bytes) -> tuple[int, str]:
     return next(((n, line) for n, line in lines if line.strip() and not line.lstrip().startswith(COMMENTS)), (0, ""))
 
 
-def columns_of(path: Path, width: int, converters: Mapping[int | str, Callable[[str], float]] | None = None) -> Array:
+def check_heading(line: str, columns: Sequence[str], where: str) -> None:
+    """Columns that a heading names stand where they are read; other words, and units in brackets, are passed over.
+
+    Raises
+    ------
+    InputError
+        A column stands at another's place.
+    """
+    parts = line.split("," if "," in line else None)
+    words = [re.split(r"[\[(]", part.strip('" '))[0].strip().lower() for part in parts]
+    moved = any(word in columns and columns.index(word) != place for place, word in enumerate(words))
+    if moved and len(words) <= len(columns):  # else blanks part a name of several words
+        expected, fix = ",".join(columns), "write the columns in this order"
+        raise InputError("the columns stand in another order", where, line.strip(), expected, fix)
+
+
+def columns_of(
+    path: Path,
+    width: int,
+    converters: Mapping[int | str, Callable[[str], float]] | None = None,
+    names: Sequence[str] = (),
+) -> Array:
     """(n_lines, width) numbers, separated by blanks or commas, after comments and one heading at most.
 
     Parameters
     ----------
     converters : what makes numbers of the words of a column
+    names : of the columns, which a heading may not name in another order
     """
     doubt_of_end(path)  # a last number that was cut is refused
     head = head_of(path)
@@ -100,6 +122,8 @@ def columns_of(path: Path, width: int, converters: Mapping[int | str, Callable[[
         expected, fix = "columns separated by commas or blanks", "write commas between columns, points in decimals"
         raise InputError("columns are separated by semicolons", display(path), first.strip(), expected, fix)
     skip = above + 1 if first.strip().strip('"')[:1].isalpha() else 0  # with its heading
+    if skip:
+        check_heading(first, names, f"{display(path)}:{skip}")
     mark = head.lstrip()[:1].decode("utf-8", "replace")
     # One mark of comments is looked for in C, several line by line in Python: five times slower.
     comments, delimiter = mark if mark in COMMENTS else "*", "," if "," in first else None
