@@ -61,6 +61,22 @@ def on_kept(extra: sp.csr_matrix, reduction: Reduction) -> np.ndarray:
 
 
 @pytest.mark.ranks(1, 2, 3)
+@pytest.mark.parametrize("modes", [0, 5])
+def test_static_displacement_under_loads_on_internal_dofs(block: Bar, modes: int) -> None:
+    """With what lies beyond the component modes it is the unreduced one, which they alone miss."""
+    extra, f = held(block), np.random.default_rng(3).normal(size=(block.K.shape[0], 2))
+    exact = scipy.sparse.linalg.spsolve((block.K + extra).tocsc(), f)
+    with reduced(block, modes=modes) as reduction:
+        coordinates = np.linalg.solve(reduction.K + on_kept(extra, reduction), reduction.project(f))
+        alone, beyond = reduction.expand(coordinates), reduction.beyond(f)
+        assert reduction.beyond(f[:, 0]) == pytest.approx(beyond[:, 0])
+    assert not beyond[root_and_tip(block)].any()
+    size = abs(exact).max()
+    assert abs(alone - exact).max() > 1e-3 * size
+    np.testing.assert_allclose(alone + beyond, exact, rtol=0, atol=SOLVED * size)
+
+
+@pytest.mark.ranks(1, 2, 3)
 def test_all_component_modes_give_the_exact_frequencies(block: Bar) -> None:
     extra, n = held(block), block.K.shape[0]
     exact = np.sqrt(squares((block.K + extra).toarray(), block.M.toarray()))

@@ -141,6 +141,26 @@ def test_a_node_of_a_reduced_model_moves_as_without_reduction(runs, capsys) -> N
                 assert abs(q - p) <= SOLVED * 4e-6
 
 
+def test_nodes_under_static_loads_rest_as_without_reduction(runs, tmp_path: Path, capsys) -> None:
+    """Of two component modes and of none, from the basis that the run keeps, and made again."""
+    for modes in (0, 2):
+        shutil.copy(BUILDER, tmp_path / "model.py")
+        text = CHAIN.replace("modes = 12", f"modes = {modes}")
+        (tmp_path / "case.toml").write_text(text + ANALYSES[: ANALYSES.index('[[analysis]]\nname = "wear"')])
+        folder = tmp_path / f"run_{modes}"
+        assert call("run", tmp_path / "case.toml", "--no-plots", "-q", "--out", folder) == 0
+        for again in (False, True):
+            if again:
+                (folder / "reduction.h5").unlink()
+            for node in range(6):
+                rest, whole = (
+                    rows_of(capsys, run, "--node", node, "--csv", "--at", "start") for run in (folder, runs["whole"])
+                )
+                for name in "xyz":
+                    mean = whole[0][f"{name}_amplitude"]
+                    assert rest[0][f"{name}_amplitude"] == pytest.approx(mean, rel=SOLVED, abs=SOLVED * 1e-6)
+
+
 def test_a_dof_of_a_model_without_reduction_is_its_node(runs, capsys) -> None:
     dof, node = (rows_of(capsys, runs["whole"], *words, "--csv") for words in (("--dof", "tip"), ("--node", 5)))
     for one, other in zip(dof, node):

@@ -167,6 +167,21 @@ def test_all_variants_show_the_same_motion(viewed: Path, plain: Path, tmp_path: 
         assert np.abs(pairs[0][name] - pairs[1][name]).max() <= 2 * limit * size
 
 
+@pytest.mark.parametrize("wheel", ["", "wheel = true"])
+def test_a_reduced_sector_rests_as_the_unreduced_one(wheel: str, plain: Path, tmp_path: Path) -> None:
+    """Its weight bends it between the dofs that are kept, which two component modes know little of."""
+    shutil.copy(BUILDER, tmp_path / "model.py")
+    text = SECTOR.replace("[[contact]]", "[reduction]\nmodes = 2\n\n[[contact]]")
+    (tmp_path / "case.toml").write_text(text.replace("nodal_diameter = 2", f"nodal_diameter = 2\n{wheel}"))
+    assert call("run", str(tmp_path / "case.toml"), "--out", str(tmp_path / "run"), "--no-plots") == 0
+    shown = []
+    for folder in (plain, tmp_path / "run"):
+        out = tmp_path / f"{folder.parent.name}.vtkhdf"
+        assert call("view", str(folder), "--phases", "2", "--out", str(out)) == 0
+        shown.append(read_step(out, 0)["rest_displacement"])
+    assert np.abs(shown[1] - shown[0]).max() < 1e-7 * np.abs(shown[0]).max()
+
+
 def test_a_reduction_that_is_made_again_shows_the_same(viewed: Path, tmp_path: Path) -> None:
     """A run whose basis was too large to be kept."""
     kept = viewed.parent / "reduction.h5"

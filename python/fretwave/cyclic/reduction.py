@@ -131,6 +131,10 @@ class SectorReduction(Destroyable):
         """Reduced load (n_r,) or (n_r, n) of forces on all dofs. Collective."""
         return self._inner.project(self._P.T @ np.asarray(f, dtype=float))
 
+    def beyond(self, f: npt.ArrayLike) -> Array:
+        """Static displacement of the inner dofs that no reduced coordinate has, as `Reduction.beyond`. Collective."""
+        return np.asarray(self._P @ self._inner.beyond(self._P.T @ np.asarray(f, dtype=float)))
+
     def error(self, diameters: Iterable[int] | None = None, count: int = COMPARED_MODES) -> list[WaveError]:
         """Error of the lowest waves, stuck and sliding. Collective.
 

@@ -20,6 +20,7 @@ from ..mpi.destroyable import Destroyable
 from ..mpi.gather import on_all_ranks
 from .model import Model
 from .omitted import OmittedModes
+from .residual_statics import held_displacement
 from .sectors import Given, Sparse
 from .sizes import COMPARED_MODES, COMPONENT_MODES
 
@@ -163,6 +164,30 @@ class Reduction(Destroyable):
         rows = self._rows(f, self._model.n_dof)
         reduced: Array = self._core.project(np.ascontiguousarray(self._model.distribute(rows)))
         return reduced if np.ndim(f) == 2 else reduced[:, 0]
+
+    def beyond(self, f: npt.ArrayLike) -> Array:
+        """Static displacement under forces that no reduced coordinate has, on every rank. Collective.
+
+        With it `expand` of the reduced static displacement is that of the unreduced model: it moves internal dofs
+        alone, and no coordinate feels it.
+
+        Parameters
+        ----------
+        f : (n_dof,) or (n_dof, n)
+            The same on every rank.
+
+        Returns
+        -------
+        (n_dof,) or (n_dof, n)
+        """
+        forces = self._rows(f, self._model.n_dof)
+        n, local = len(self.keep), np.ascontiguousarray(self._model.distribute(forces))
+        modes = self.project(forces)
+        modes[:n] = 0.0
+        modes[n:] /= np.square(2 * np.pi * self.component_hz)[:, None]
+        held = on_all_ranks(self._model.comm, held_displacement(self._model._matrices[0], self.keep, local))
+        left: Array = held - self.expand(modes)
+        return left if np.ndim(f) == 2 else left[:, 0]
 
     def error(self, count: int = COMPARED_MODES, K_contact: Given | None = None) -> FrequencyError:
         """Relative error of the lowest elastic frequencies. Collective.

@@ -5,13 +5,15 @@
     basis                      (n_dof, n_r) x = T x_r; float64, since strain is a small difference of displacements
     model                      (4,) what tells the model that was reduced from another
     ties/<k>/row, dof, value   of a sector, on its reduced coordinates: dofs with both faces from those k places ahead
+    load                       names of the model's loads
+    beyond                     (n_dof, n_loads) static displacement under each that x_r has not [length]
 
 Kept once a run, beside results.h5: it belongs to all analyses.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Union
@@ -53,6 +55,8 @@ class Basis:
     n_interface : coordinates of one face of a sector, 0 for a structure
     ties : {k: (n_r, n)}
         Of a sector: coordinates with both faces from those of the sector k places ahead.
+    loads : {name: (n_dof,)}
+        Static displacement under each load of the model that no coordinate has [length].
     """
 
     T: Array
@@ -60,6 +64,7 @@ class Basis:
     highest_component_hz: float
     n_interface: int = 0
     ties: Mapping[int, Sparse] = field(default_factory=dict)
+    loads: Mapping[str, Array] = field(default_factory=dict)
 
     @property
     def size(self) -> int:
@@ -69,6 +74,10 @@ class Basis:
     def expand(self, x_r: npt.ArrayLike, /) -> Array:
         """Motion of all dofs, (n_dof,) or (n_dof, n), from coordinates (n_r,) or (n_r, n)."""
         return np.asarray(self.T @ np.asarray(x_r, dtype=float))
+
+    def beyond(self, names: Sequence[str]) -> Array:
+        """Static displacement (n_dof,) under these loads together that no coordinate has."""
+        return np.asarray(sum((self.loads[name] for name in names), np.zeros(len(self.T))))
 
     def write(self, path: Path) -> None:
         """Write it as a whole.
@@ -86,6 +95,10 @@ class Basis:
                 data.attrs.update({"units": "1", "long_name": "dofs by reduced coordinates"})
                 file.create_dataset("model", data=self.model)
                 file.attrs.update(highest_component_hz=self.highest_component_hz, n_interface=self.n_interface)
+                if self.loads:
+                    file["load"] = [name.encode() for name in self.loads]
+                    data = file.create_dataset("beyond", data=np.column_stack(list(self.loads.values())))
+                    data.attrs["long_name"] = "static displacement under each load that the basis has not"
                 for k, T in self.ties.items():
                     entries = sp.coo_matrix(T)
                     group = file.create_group(f"ties/{k}")
@@ -114,13 +127,14 @@ def basis_of(reduction: Union[Reduction, SectorReduction], full: Structure, comm
         block = reduction.expand(np.ascontiguousarray(unit))
         if comm.rank == 0:
             blocks.append(block)
+    loads = {name: reduction.beyond(load) for name, load in full.loads.items()}
     if comm.rank:
         return None
     hz = reduction.highest_component_hz
     if not isinstance(reduction, SectorReduction):
-        return Basis(np.hstack(blocks), marks_of(full), hz)
+        return Basis(np.hstack(blocks), marks_of(full), hz, loads=loads)
     ties = {k: sp.csr_matrix(T) for k, T in by_sector(reduction.sector().ties).items()}
-    return Basis(np.hstack(blocks), marks_of(full), hz, reduction.n_interface, ties)
+    return Basis(np.hstack(blocks), marks_of(full), hz, reduction.n_interface, ties, loads)
 
 
 def read_basis(path: Path) -> Basis | None:
@@ -140,7 +154,9 @@ def read_basis(path: Path) -> Basis | None:
         with h5py.File(path, "r") as file:
             ties = {int(k): _matrix(group) for k, group in file.get("ties", {}).items()}
             hz, faces = float(file.attrs["highest_component_hz"]), int(file.attrs["n_interface"])
-            return Basis(file["basis"][()], file["model"][()], hz, faces, ties)
+            names = [name.decode() for name in file["load"][()]] if "load" in file else []
+            loads = dict(zip(names, file["beyond"][()].T)) if names else {}
+            return Basis(file["basis"][()], file["model"][()], hz, faces, ties, loads)
     except (OSError, KeyError) as error:
         fix = "remove it: the reduction is then made again, with MPI and PETSc"
         raise InputError(f"{NAME} cannot be read", display(path), str(error), None, fix) from None

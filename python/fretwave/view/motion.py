@@ -8,7 +8,7 @@ case, and is the same.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import cached_property
@@ -30,8 +30,9 @@ from ..texts import display
 from .choice import Choice, natural_scale
 from .vtkhdf import HEXAHEDRON, VERTEX, Cells, linear_cells
 
-#: Displacements (n_nodes, 3, n) of all nodes from columns (n_dof, n) on the model's dofs, both faces of a sector free.
-ToNodes = Callable[[Array], Array]
+#: Displacements (n_nodes, 3, n) of all nodes from columns (n_dof, n) on the model's dofs, both faces of a sector free,
+#: and the share (n,) of the static loads in each.
+ToNodes = Callable[[Array, Array], Array]
 Expand = Callable[[npt.ArrayLike], Array]
 
 #: Relative difference of a frequency that rounding explains.
@@ -119,14 +120,19 @@ class Scene:
     def _expanded(self, sector: int) -> Array:
         """Nodal columns (n_nodes, 3, 1 + n_points m): at rest, then the coefficients of every point."""
         if self.ties is None:
-            return self.to_nodes(self._columns(0))
+            return self.to_nodes(self._columns(0), self._loaded())
         total: Any = 0
         for k, T in self.ties.items():
             if self.choice.wheel:
                 total = total + T @ self._columns((sector + k) % self.around)
             else:
                 total = total + T @ self._delayed(self._columns(0), k)
-        return self.to_nodes(total)
+        return self.to_nodes(total, self._loaded())
+
+    def _loaded(self) -> Array:
+        """(1 + n_points m,) 1 where the static loads act: at rest, and in harmonic 0 of every point."""
+        still = [float(label == "0") for label in self.choice.labels]
+        return np.array([1.0, *still * len(self.choice.points)])
 
     def _columns(self, sector: int) -> Array:
         """(n, 1 + n_points m) of one sector as solved."""
@@ -171,16 +177,20 @@ def scene_of(
     around = neighbours.sectors if neighbours else 1
     ties = neighbours.ties if neighbours else None
     expand: Expand = _unchanged
+    beyond: Array | float = 0.0
     with ExitStack() as stack:
         if case.reduction is not None:
-            kept = read_basis(folder / NAME)
+            kept, preload = read_basis(folder / NAME), case.preload_of(case.analyses[choice.name])
             if kept is not None:
                 _check_model(case, kept.model)
-            basis = made_again(case, stack) if kept is None else kept
+            loads = preload.loads if preload is not None else []
+            basis = kept if kept is not None and set(loads) <= kept.loads.keys() else made_again(case, stack)
             expand, ties = basis.expand, basis.ties or ties
+            beyond = basis.beyond(loads) if loads else 0.0
             _check_same(case, choice, basis, around)
         given, shown = moving or geometry(case), _shown(case, around, sectors)
-        yield Scene(nodes, choice, _to_nodes(given, len(nodes), expand), shown, ties, around, given.axis or "z")
+        to_nodes = _to_nodes(given, len(nodes), expand, beyond)
+        yield Scene(nodes, choice, to_nodes, shown, ties, around, given.axis or "z")
 
 
 class Expansion(Protocol):
@@ -200,12 +210,15 @@ class Expansion(Protocol):
 
     def expand(self, x_r: npt.ArrayLike, /) -> Array: ...
 
+    def beyond(self, names: Sequence[str]) -> Array: ...
+
 
 @dataclass(frozen=True)
 class MadeAgain:
-    """The reduction of a run, from its case."""
+    """The reduction of a run, from its case, with the model's loads."""
 
     reduction: Any
+    loads: Mapping[str, Array]
     size: int
     n_interface: int
     highest_component_hz: float
@@ -214,6 +227,10 @@ class MadeAgain:
     def expand(self, x_r: npt.ArrayLike, /) -> Array:
         """Motion of all dofs."""
         return np.asarray(self.reduction.expand(x_r))
+
+    def beyond(self, names: Sequence[str]) -> Array:
+        """Static displacement under these loads together that no coordinate has."""
+        return np.asarray(self.reduction.beyond(np.sum([self.loads[name] for name in names], axis=0)))
 
 
 def made_again(case: Case, stack: ExitStack) -> Expansion:
@@ -239,10 +256,10 @@ def made_again(case: Case, stack: ExitStack) -> Expansion:
         ) from None
     reduction = reduction_of(case, MPI.COMM_SELF)
     stack.callback(reduction.destroy)
-    hz = reduction.highest_component_hz
+    hz, loads = reduction.highest_component_hz, (case.structure.cut or case.structure).loads
     if isinstance(reduction, SectorReduction):
-        return MadeAgain(reduction, reduction.size, reduction.n_interface, hz, reduction.sector().ties)
-    return MadeAgain(reduction, reduction.size, 0, hz, {})
+        return MadeAgain(reduction, loads, reduction.size, reduction.n_interface, hz, reduction.sector().ties)
+    return MadeAgain(reduction, loads, reduction.size, 0, hz, {})
 
 
 def geometry(case: Case) -> Structure:
@@ -281,11 +298,16 @@ def _unchanged(columns: npt.ArrayLike) -> Array:
     return np.asarray(columns)
 
 
-def _to_nodes(given: Structure, n_nodes: int, expand: Expand) -> ToNodes:
-    """Through the case's reduction and the builder's own."""
+def _to_nodes(given: Structure, n_nodes: int, expand: Expand, beyond: Array | float) -> ToNodes:
+    """Through the case's reduction and the builder's own.
 
-    def displacements(columns: Array) -> Array:
-        columns = expand(np.ascontiguousarray(columns))
+    Parameters
+    ----------
+    beyond : (n_dof,) static displacement under the loads that no reduced coordinate has [length]
+    """
+
+    def displacements(columns: Array, loaded: Array) -> Array:
+        columns = expand(np.ascontiguousarray(columns)) + np.multiply.outer(beyond, loaded)
         if given.expansion is not None:
             columns = given.expansion @ columns
         if given.displacements is not None:  # held dofs, -1, read the row of zeros
