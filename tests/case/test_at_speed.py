@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from tolerances import ROUNDING, SOLVED, TIGHT
 import fretwave as fw
 from fretwave.case.load import load_case
 from fretwave.errors import CaseErrors
+from fretwave.report.report import report_text
 from fretwave.results.model_file import write_model
 
 pytestmark = pytest.mark.ranks(1)
@@ -140,3 +142,24 @@ def test_a_reduction_with_all_component_modes_keeps_the_turning_model(sector, mo
         found.append([float(row["omega"]) for row in rows_of(out)])
     assert found[1] == pytest.approx(found[0], rel=SOLVED)
     assert np.ptp(found[0]) > 5.0 and len(found[0]) == (24 if sector else 8)
+
+
+@pytest.mark.parametrize("sector", [True, False])
+def test_a_reduction_states_its_error_at_the_speeds_that_are_asked_for(sector, tmp_path):
+    """As the tables of the unreduced and of the reduced model differ: it was made with the stiffness at rest."""
+    text, tables = RIM, []
+    if not sector:
+        text = RIM[: RIM.index("sectors")].replace("[0, 0, 0, 0]", "[0, 0, 0, 1.0]")
+    damper = 'modes = 2\ndampers = [{ dof = "root", c = 0.0 }]\n'  # keeps the root
+    for number, reduction in enumerate(("", f"[reduction]\nmodes = {0 if sector else 1}\ncompare = 2\n")):
+        path, out = written(tmp_path, text + reduction), tmp_path / f"run{number}"
+        path.write_text(path.read_text(encoding="utf-8") + damper, encoding="utf-8")
+        assert call("run", path, "--no-plots", "--out", out) == 0
+        rows = [row for row in rows_of(out) if row["speed_rpm"] == "45.0" and row.get("nodal_diameter", "0") == "0"]
+        tables.append(np.array([float(row["frequency_hz"]) for row in rows]))
+    (found,) = json.loads((out / "run.json").read_text())["reduction"]["speeds"]
+    assert found["speed_rpm"] == 45.0 and found.get("nodal_diameter") == (0 if sector else None)
+    assert found["relative"] == pytest.approx(tables[1] / tables[0] - 1, rel=SOLVED) and max(found["relative"]) > 1e-3
+    worst, log = max(found["relative"]), (out / "run.log").read_text()
+    assert "reduction: at 45 rev/min, " in log and f"to {worst:.1e} (worst)" in log
+    assert "45 rev/min, " in report_text(out)

@@ -110,6 +110,9 @@ class LinearAnalysis(AnalysisSection):
             return [0]
         return sorted(set(self.nodal_diameters or range(sectors // 2 + 1)))
 
+    def spins(self) -> tuple[str, list[float]]:
+        return self.spin_stiffness, list(self.speeds_rpm or [])
+
     def speeds(self) -> list[float]:
         """Speeds [rev/min] at which it finds modes: 0 where they are the same at all."""
         return [0.0] if self.speeds_rpm is None else list(self.speeds_rpm)

@@ -16,6 +16,7 @@ from pydantic import PrivateAttr
 
 from .. import registry
 from ..errors import InputError
+from ..model.structure import SPIN
 from ..results.sweep_summary import COUNTS, Summary
 from ..units import SI, UnitSystem
 from .checks_common import check_common
@@ -116,6 +117,10 @@ class AnalysisSection(Section):
     def harmonic(self) -> Optional[HarmonicSection]:
         """Its keys in the frequency domain: harmonics, wave, wheel, flow; None where it has none."""
         return None
+
+    def spins(self) -> tuple[str, list[float]]:
+        """Part of the stiffness that grows with the speed squared, and speeds [rev/min] that are not the case's."""
+        return SPIN, []
 
     def whole_wheel(self) -> tuple[bool, Optional[MistuningSection]]:
         """Whether it looks at all sectors of the wheel, and how these are mistuned."""

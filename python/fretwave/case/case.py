@@ -13,11 +13,12 @@ from typing import TYPE_CHECKING, Any
 from ..arrays import Array
 from ..model.contact import Contact
 from ..model.sectors import Sparse
-from ..model.structure import Structure
+from ..model.structure import SPIN, Structure
 from ..model.wheel_matrix import Matrix
 from ..texts import toml
 from ..units import UnitSystem
 from .analysis import Analyses, AnalysisSection
+from .at_speed import omega_squared
 from .damping import around_wheel, damping_by_mode
 from .gauges import Gauges
 from .reduction_report import ReductionReport
@@ -224,6 +225,11 @@ class Case:
         from ..cyclic.aerodynamics import with_terms
 
         return replace(damped, C=with_terms(damped.C, self.modal_damping))
+
+    def turning(self, part: str, speed_rpm: float) -> Case:
+        """The same at another speed [rev/min], where a part of the stiffness grows with its square."""
+        own = self.speed_rpm if part == SPIN else 0.0  # what K has of it already
+        return replace(self, structure=self.structure.stiffened(part, omega_squared(speed_rpm) - omega_squared(own)))
 
     def damping_with(self, dampers: Sequence[Damper]) -> Sparse | None:
         """C of `damped`, of a sector its own part; None when there is no damping at all."""

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from ..model.contact import in_limit
+from ..model.structure import SPIN
 from .checks_tables import waves_of
 from .schema import ReductionSection
 
@@ -46,6 +47,8 @@ class ReductionReport:
         the first stands above.
     wave_lines : list of str
         The same for the log.
+    speeds : list of dict
+        The comparison at the lowest and the highest speed of analyses, contact stuck, for each nodal diameter.
     chosen : str
         How its component modes were, for the log; empty where they were told.
     """
@@ -62,26 +65,28 @@ class ReductionReport:
     interface: int = 0
     waves: list[dict[str, Any]] = field(default_factory=list)
     wave_lines: list[str] = field(default_factory=list)
+    speeds: list[dict[str, Any]] = field(default_factory=list)
     chosen: str = ""
 
     def every_relative(self) -> list[list[float | None]]:
-        """Of all frequencies that are compared, wave by wave."""
-        return [list(self.relative), *(wave["relative"] for wave in self.waves)]
+        """Of all frequencies that are compared, wave by wave and speed by speed."""
+        return [list(self.relative), *(found["relative"] for found in (*self.waves, *self.speeds))]
 
     def plain(self) -> dict[str, Any]:
         """For run.json and results.h5."""
         return {key: value for key, value in asdict(self).items() if key not in ("wave_lines", "chosen")}
 
     def lines(self) -> list[str]:
-        """For the log: one line, and one for each wave of a sector that was compared."""
+        """For the log: one line, and one for each wave of a sector and each speed that was compared."""
+        speeds = [f"reduction: {_line_at_speed(found)}" for found in self.speeds]
         if self.interface:
             text = (
                 f"reduction: {self.unreduced} dofs to {self.kept} kept, {self.interface} of each face and"
                 f" {self.component_modes} component modes (up to {self.highest_component_hz:.4g} Hz),"
                 f" {self.wall_s:.1f} s"
             )
-            return [*self._chosen(), text, *(f"reduction: {line}" for line in self.wave_lines)]
-        return [*self._chosen(), self._line()]
+            return [*self._chosen(), text, *(f"reduction: {line}" for line in self.wave_lines), *speeds]
+        return [*self._chosen(), self._line(), *speeds]
 
     def _chosen(self) -> list[str]:
         return [self.chosen] if self.chosen else []
@@ -126,6 +131,7 @@ def report_of(
         found = _of_sector(case, cast("SectorReduction", reduction))
     else:
         found = _of_structure(case, reduced, comm, full_hz)
+    found["speeds"] = _at_speeds(case, reduced, comm)
     return ReductionReport(**common, **found, compare_wall_s=round(time.perf_counter() - began, 3))
 
 
@@ -139,16 +145,50 @@ def _of_structure(case: Case, reduced: Case, comm: MPI.Comm, full_hz: list[float
         "kept": len(case.keep),
         "full_hz": full,
         "reduced_hz": small,
-        "relative": [r / f - 1 if f else 0.0 for f, r in zip(full, small)],
+        "relative": _relative(full, small),
     }
 
 
-def _stuck_hz(case: Case, count: int, comm: MPI.Comm) -> list[float]:
+def _relative(full: list[float], small: list[float]) -> list[float]:
+    return [r / f - 1 if f else 0.0 for f, r in zip(full, small)]
+
+
+def _at_speeds(case: Case, reduced: Case, comm: MPI.Comm) -> list[dict[str, Any]]:
+    """The comparison where another share of the stiffness acts than that which was reduced. Collective."""
+    section = case.reduction
+    assert section is not None
+    asked = [analysis.spins() for analysis in case.analyses.values()]
+    ends = dict.fromkeys((part, speed) for part, speeds in asked for speed in (*speeds[:1], *speeds[-1:]))
+    count = min(section.compare, reduced.structure.n_dof)
+    sector, found = case.structure.cut is not None, []
+    for part, speed in ends if count else ():
+        if part == SPIN and speed == case.speed_rpm:
+            continue  # as it was reduced
+        both = [one.turning(part, speed) for one in (case, reduced)]
+        for diameter in _compared(section, case.analyses) if sector else [0]:
+            full, small = (_stuck_hz(one, count, comm, diameter) for one in both)
+            values = {"full_hz": full, "reduced_hz": small, "relative": _relative(full, small)}
+            wave = {"nodal_diameter": diameter} if sector else {}
+            found.append({"speed_rpm": speed, **wave, "contact": "stuck", **values})
+    return found
+
+
+def _line_at_speed(found: Mapping[str, Any]) -> str:
+    """For the log."""
+    wave = f"{found['nodal_diameter']} nodal diameters, " if "nodal_diameter" in found else ""
+    full, relative = found["full_hz"], found["relative"]
+    return (
+        f"at {found['speed_rpm']:g} rev/min, {wave}stuck: {full[0]:.6g} to {full[-1]:.6g} Hz are off by"
+        f" {relative[0]:.1e} (first) to {max(relative, key=abs):.1e} (worst)"
+    )
+
+
+def _stuck_hz(case: Case, count: int, comm: MPI.Comm, nodal_diameter: int = 0) -> list[float]:
     """Lowest frequencies [Hz] without damping, every pair closed and stuck."""
     from ..model.modes import linear_modes
 
     plain = replace(case.structure, C=None, stiffness_damping=0.0, mass_damping=0.0)
-    with plain.model(in_limit(case.contacts, "stuck"), comm) as model:
+    with plain.model(in_limit(case.contacts, "stuck"), comm, nodal_diameter) as model:
         return [float(mode.frequency_hz) for mode in linear_modes(model, count, "stuck")]
 
 

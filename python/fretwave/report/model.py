@@ -169,7 +169,7 @@ def _reduction(found: Mapping[str, Any] | None) -> str:
         f" component modes, up to {highest:.6g} Hz"
     )
     waves = found.get("waves") or [{"full_hz": found["full_hz"], "reduced_hz": found["reduced_hz"]}]
-    rows = [row for wave in waves for row in _compared(wave)]
+    rows = [row for wave in (*waves, *found.get("speeds", ())) for row in _compared(wave)]
     head = ["", "linear frequency [Hz]", "reduced [Hz]", "relative difference"]
     return page.facts([("Craig-Bampton", said)]) + (page.table(head, rows) if rows else "")
 
@@ -177,6 +177,7 @@ def _reduction(found: Mapping[str, Any] | None) -> str:
 def _compared(wave: Mapping[str, Any]) -> Iterator[list[object]]:
     """Frequencies without and with reduction."""
     where = f"nodal diameter {wave['nodal_diameter']}, {wave['contact']}" if "nodal_diameter" in wave else "stuck"
+    where = f"{wave['speed_rpm']:g} rev/min, {where}" if "speed_rpm" in wave else where
     for number, (full, small) in enumerate(zip(wave["full_hz"], wave["reduced_hz"]), 1):
         relative = f"{small / full - 1:.1e}" if full else "–"
         yield [f"{where}, {number}", f"{full:.6g}", f"{small:.6g}", relative]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Optional
 
 import numpy as np
@@ -12,7 +11,6 @@ from ...case.wheel import on_wheel
 from ...columns import MODAL_UNIT, Column
 from ...errors import InputError
 from ...model.sectors import Term, in_wave
-from ...model.structure import SPIN
 from ...post.engine_orders import exciting, margins
 from .asymptotes import MORE_MODES, limit_model, most_like, planes_of, sector_phase
 from .context import AnalysisContext
@@ -26,7 +24,6 @@ if TYPE_CHECKING:
 RIGID = 1e-6
 #: Of a crossing, after what tells its mode.
 CROSSING = ("engine_order", "speed_rpm", "frequency_hz", "margin")
-TO_OMEGA = 2 * np.pi / 60
 
 COLUMNS = (
     Column("mode", "1", "number of the mode of this contact and wave, 1 is the lowest", "i"),
@@ -87,10 +84,8 @@ def _count(context: AnalysisContext[LinearAnalysis], more: int = 0) -> int:
 def _spinning(context: AnalysisContext[LinearAnalysis], speed_rpm: float) -> Case:
     if context.analysis.speeds_rpm is None:
         return context.case
-    case, part = context.case.sector or context.case, context.analysis.spin_stiffness
-    own = case.speed_rpm if part == SPIN else 0.0  # what K has of it already
-    added = case.structure.stiffened(part, TO_OMEGA**2 * (speed_rpm**2 - own**2))
-    return on_wheel(replace(case, structure=added), context.analysis)
+    case = (context.case.sector or context.case).turning(context.analysis.spin_stiffness, speed_rpm)
+    return on_wheel(case, context.analysis)
 
 
 def _limits(context: AnalysisContext[LinearAnalysis]) -> list[str]:
