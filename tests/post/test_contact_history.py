@@ -10,7 +10,7 @@ from tolerances import LAST_BIT, LAST_DIGITS, ROUNDING, TIGHT
 
 import fretwave as fw
 from fretwave.model.laws import Role
-from fretwave.post.contact_history import OPEN, SLIP, STICK, ContactHistory
+from fretwave.post.contact_history import OPEN, SLIP, STICK, ContactHistory, tangential_force
 
 pytestmark = pytest.mark.ranks(1)
 
@@ -131,6 +131,12 @@ def test_a_history_without_its_law_s_word_has_no_status() -> None:
     partly = np.array([[STICK, -1]] * 4, dtype=np.int8)
     assert ContactHistory(u, u, u, partly, normal=0).status is None
     assert ContactHistory(u, u, u, partly, normal=0).of_pairs(slice(0, 1)).status.tolist() == [[STICK]] * 4
+
+
+def test_a_law_without_tangents_has_no_tangential_force() -> None:
+    """A stop: a static state of it ended in a TypeError."""
+    f = np.array([[[2.0, 0.0]], [[3.0, 1.0]]])
+    assert tangential_force(f, 0).tolist() == [[0.0, 0.0], [0.0, 0.0]]
 
 
 def test_normal_and_tangential_forces_follow_the_law_s_direction() -> None:

@@ -144,9 +144,9 @@ def normal_force(f: Array, normal: int | None) -> Array:
 
 
 def tangential_force(f: Array, normal: int | None) -> Array:
-    """(..., n_pairs) of forces (..., components, n_pairs): its magnitude."""
-    parts = [np.abs(f[..., row, :]) for row in range(f.shape[-2]) if row != normal]
-    return np.asarray(reduce(np.hypot, parts))
+    """(..., n_pairs) of forces (..., components, n_pairs): its magnitude, zero of a law without tangents."""
+    parts = [f[..., row, :] for row in range(f.shape[-2]) if row != normal]
+    return np.asarray(reduce(np.hypot, parts, np.zeros_like(f[..., 0, :])))
 
 
 __all__ = ["AXES", "MEASURED", "MOTION", "OPEN", "SLIP", "STICK", "ContactHistory", "normal_force", "tangential_force"]
