@@ -340,6 +340,39 @@ def test_nothing_holds_a_lifted_chain(write, tmp_path: Path, capsys) -> None:
     assert "'static' stopped early" in said and "hold the structure where contact alone cannot" in said
 
 
+@pytest.mark.parametrize("gaps", [(0.0, 1e-6), (1e-6, 0.0), (0.0, 1e-4), (0.0, -1e-7)])
+def test_pairs_that_only_touch_hold_a_chain_beside_gaps(gaps: tuple[float, float], write, tmp_path: Path) -> None:
+    """One pad touches without load, the other is apart or presses: K x + kn max(0, x - gap) = P along the chain."""
+    arguments = ("run", str(write()), "--only", "static", "--no-plots", "--out", str(tmp_path / "run"))
+    apart = ("--set", f"contact.pads.gap={list(gaps)}", "--set", "static.preload.balanced=false")
+    assert call(*arguments, *apart) == 0
+    K = 4e6 * (2 * np.eye(6) - np.eye(6, k=1) - np.eye(6, k=-1))
+    K[0, 0] = K[5, 5] = 4e6
+    stiffness, places, x = np.array([1e7, 2e7]), [0, 5], np.ones(6)
+    for _ in range(4):  # the pads that are closed
+        closed = np.where(x[places] > gaps, stiffness, 0.0)
+        added, f = np.zeros((6, 6)), np.full(6, 5.0)
+        added[places, places], f[places] = closed, f[places] + closed * gaps
+        x = np.linalg.solve(K + added, f)
+    found = column(tmp_path / "run", "static", "normal_force")[-2:]
+    assert found == pytest.approx(np.maximum(0.0, stiffness * (x[places] - gaps)), rel=TIGHT)
+
+
+@pytest.mark.parametrize("law", ["unilateral_spring", "coulomb_2d"])
+def test_an_interference_alone_moves_the_structure(law: str, tmp_path: Path) -> None:
+    """Neither loads nor pair loads, not balanced: k x + kn (x - gap) = 0, with k kn / (k + kn) |gap| in the pair."""
+    friction = 'friction_coefficient = 0.3\ntangential_stiffness = 1e3\ntangents = ["b"]\n'
+    (tmp_path / "case.toml").write_text(
+        '[model]\ndofs = ["a", "b"]\nM = [[1.0, 0.0], [0.0, 1.0]]\nK = [[1e3, 0.0], [0.0, 1e3]]\n\n'
+        f'[[contact]]\nlaw = "{law}"\npairs = ["a"]\nnormal_stiffness = 3e3\ngap = -1e-3\n'
+        + (friction if law == "coulomb_2d" else "")
+        + '\n[preload]\npair_loads = false\nbalanced = false\n\n[[analysis]]\nname = "static"\ntype = "static"\n'
+    )
+    assert call("run", str(tmp_path / "case.toml"), "--no-plots", "--out", str(tmp_path / "run")) == 0
+    assert column(tmp_path / "run", "static", "normal_force") == pytest.approx([0.75], rel=TIGHT)
+    assert column(tmp_path / "run", "static", "tangential_force").tolist() == [0.0]
+
+
 def test_a_mode_needs_a_held_structure(write, tmp_path: Path, capsys) -> None:
     arguments = ("run", str(write()), "--only", "mode", "--no-plots", "--out", str(tmp_path / "run"))
     assert call(*arguments, "--set", "preload.pair_loads=false") == 2

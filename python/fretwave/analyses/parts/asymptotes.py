@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -84,15 +84,22 @@ def _with_contacts(case: Case, contacts: list[Contact], comm: MPI.Comm, diameter
     return build_model(replace(case, contacts=contacts, tables=undamped), (), comm, nodal_diameter=diameters)
 
 
-def closed_stiffness(context: AnalysisContext[AnalysisSection]) -> sp.csr_matrix:
-    """Stiffness of all pairs closed and stuck, on the dofs: sum k_b b b^T over normals and tangents."""
+def closed_stiffness(
+    context: AnalysisContext[AnalysisSection], closed: Mapping[str, npt.NDArray[np.bool_]]
+) -> sp.csr_matrix:
+    """Stiffness of closed pairs that stick, on the dofs: sum k_b b b^T over normals and tangents.
+
+    Parameters
+    ----------
+    closed : (n_pairs,) of contacts with a normal direction, by name; all pairs of others are
+    """
     total = sp.csr_matrix(context.case.M.shape)
     for contact in context.case.contacts:
         for row in range(contact.components):
             value = contact.value(contact.info.stiffness_along(row))
             if value is not None:
                 rows = contact.pairs.own[row :: contact.components]
-                stiffness = np.broadcast_to(value, (contact.n_pairs,))
+                stiffness = np.broadcast_to(value, (contact.n_pairs,)) * closed.get(contact.name, 1.0)
                 total = total + rows.T @ sp.diags(stiffness) @ rows
     return total
 

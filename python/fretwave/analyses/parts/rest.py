@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Optional
 
 import numpy as np
 import scipy.sparse.linalg
 
+from ...arrays import Array
 from ...case.analysis import AnalysisSection
 from ...case.harmonic import LEAST_HARMONICS, LEAST_SAMPLES, HarmonicSection, nodal_diameter
 from ...case.schema import PreloadSection
@@ -56,28 +58,46 @@ def loaded_state(context: AnalysisContext[AnalysisSection], factor: float = 1.0)
 
     section = context.case.preload_of(context.analysis)
     reference = closed_mode(context)
-    if section is None or (not section.loads and (section.balanced or not section.pair_loads)):
+    if section is None or (not section.loads and (section.balanced or not pressed(context.case.contacts, section))):
         return balanced(context.model, reference)
     given = [context.case.loads[name] for name in section.loads]
     load = factor * np.sum([np.zeros(context.model.n_dof), *given], axis=0)
-    closed = None
-    if context.case.neighbours is None and just_touching(context.case.contacts, section):
-        stuck = context.case.K + closed_stiffness(context)
-        closed = scipy.sparse.linalg.spsolve(stuck.tocsc(), load)
+    closed = None if context.case.neighbours is not None else just_touching(context, section, load)
     names = context.case.dofs
     return static_preload(context.model, load, reference, closed=closed, balance=section.balanced, names=names)
 
 
-def just_touching(contacts: Sequence[Contact], section: PreloadSection) -> bool:
-    """Pairs with a normal direction, none with a gap or with a load of its own."""
+def pressed(contacts: Sequence[Contact], section: PreloadSection) -> bool:
+    """Some pair presses without displacement: by its own load, or an interference."""
+    return any((pressing(contact, section) > 0).any() for contact in contacts if contact.info.normal is not None)
 
-    def has(contact: Contact, role: Role) -> bool:
-        value = contact.value(role)
-        return value is not None and bool(np.any(value))
 
-    return any(contact.info.normal is not None for contact in contacts) and all(
-        (not section.pair_loads or not has(contact, Role.LOAD)) and not has(contact, Role.GAP) for contact in contacts
-    )
+def just_touching(context: AnalysisContext[AnalysisSection], section: PreloadSection, load: Array) -> Optional[Array]:
+    """Displacement (n_dof,) under the load with the pairs that are not apart before it closed, where some only touch.
+
+    These have no stiffness without load, and a structure that they hold has none.
+    """
+    contacts = [contact for contact in context.case.contacts if contact.info.normal is not None]
+    presses = {contact.name: pressing(contact, section) for contact in contacts}
+    if not any((force == 0).any() for force in presses.values()):
+        return None
+    K = context.case.K + closed_stiffness(context, {name: force >= 0 for name, force in presses.items()})
+    if not section.balanced:
+        for contact in contacts:
+            rows = contact.pairs.own[contact.info.normal :: contact.components]
+            load = load - rows.T @ np.maximum(presses[contact.name], 0.0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", scipy.sparse.linalg.MatrixRankWarning)  # they do not hold it
+        found = np.asarray(scipy.sparse.linalg.spsolve(K.tocsc(), load))
+    return found if np.isfinite(found).all() else None
+
+
+def pressing(contact: Contact, section: PreloadSection) -> Array:
+    """Normal force (n_pairs,) without displacement, N0 - kn gap; below zero where a gap is open."""
+    load = contact.value(Role.LOAD) if section.pair_loads else None
+    gap, stiffness = contact.value(Role.GAP), contact.value(Role.NORMAL_STIFFNESS)
+    apart = 0.0 if gap is None or stiffness is None else np.multiply(stiffness, gap)
+    return np.asarray(np.subtract(0.0 if load is None else load, apart) + np.zeros(contact.n_pairs))
 
 
 def closed_mode(context: AnalysisContext[AnalysisSection]) -> LinearMode:
