@@ -50,6 +50,13 @@ def read(path: Path) -> sp.csr_matrix:
     return assemble({"K": read_matrix(str(path), "K")}).matrices["K"]
 
 
+def test_places_without_values_are_no_matrix(tmp_path: Path) -> None:
+    """A pattern was read as ones."""
+    scipy.io.mmwrite(tmp_path / "K.mtx", K, field="pattern")
+    with pytest.raises(fw.InputError, match="places without values"):
+        read(tmp_path / "K.mtx")
+
+
 @pytest.mark.parametrize("part", [sp.csr_matrix, sp.tril, sp.triu])
 @pytest.mark.parametrize("form", ["{} {} {:.6e}\n", "{},{},{}\n"])
 def test_a_line_of_sizes_is_no_entry(part: Callable, form: str, tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import scipy.io
 
+from ..errors import InputError
 from ..texts import display
 from .entries import Entries
 from .text import doubt_of_end
@@ -26,7 +27,10 @@ def looks_like(head: bytes) -> bool:
 
 def read(path: Path) -> Entries:
     """A matrix, both triangles when its header says symmetric."""
-    rows, columns, entries, layout, _, symmetry = scipy.io.mminfo(_source(path))
+    rows, columns, entries, layout, field, symmetry = scipy.io.mminfo(_source(path))
+    if field == "pattern":
+        what, measured, expected = "the matrix has places without values", "pattern in its header", "real"
+        raise InputError(what, display(path), measured, expected, "write it with its values: scipy.io.mmwrite")
     least = 2 * (rows * columns // 2 if layout == "array" else entries)  # a digit and a blank each
     if min(rows, columns) < 0 or least > path.stat().st_size:
         raise ValueError(f"{rows} x {columns} with {entries} entries by its header, in {path.stat().st_size} bytes")
