@@ -163,6 +163,9 @@ WRONG_PAIRS = {
     "twice": (["--pairs", "a=LEFT", "RIGHT", "--pairs", "a=LEFT", "RIGHT", "--normal", "1,0,0"], "own name"),
     "parallel": (["--pairs", "LEFT", "RIGHT", "--normal", "1,0,0", "--tangent", "1,0,0"], "parallel"),
     "dof": (["--name", "tip=n99x"], "cannot be named"),
+    "name of two words": (["--name", "blade tip=n8y"], "write blade_tip=n8y"),
+    "number for a name": (["--name", "7=n8y"], "write tip=n8y"),
+    "name of two dofs": (["--name", "tip=n8y", "--name", "tip=n8x"], "another dof is called tip: choose another name"),
 }
 
 

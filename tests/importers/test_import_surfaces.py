@@ -52,6 +52,17 @@ def test_areas_are_positive_and_add_up(kind: str, tmp_path: Path) -> None:
     np.testing.assert_allclose(side.normals, np.broadcast_to(stack.turn[:, 2], side.normals.shape), atol=ROUNDING)
 
 
+def test_a_node_on_no_face_is_named(tmp_path: Path) -> None:
+    """One inside the body beside all of the top: it takes areas and normals from the whole side."""
+    stack = Stack(tmp_path, "C3D8", "C3D8")
+    top, z = stack.nodes.sets["A"], (stack.nodes.coordinates - [3.0, -2.0, 7.0]) @ stack.turn[:, 2]
+    below = int(stack.nodes.numbers[np.argmin(z)])
+    stack.nodes.sets["A"] = np.append(top, below)
+    with pytest.raises(InputError, match="no normal") as caught:
+        stack.pairs()
+    assert caught.value.measured == f"node {below} is on no face, 1 of {len(top) + 1} such"
+
+
 @pytest.mark.parametrize("other", KINDS)
 @pytest.mark.parametrize("kind", KINDS)
 def test_patch_of_meshes_that_do_not_match(kind: str, other: str, tmp_path: Path) -> None:

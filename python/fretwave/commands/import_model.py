@@ -212,12 +212,18 @@ def _names(model: Structure, given: list[str]) -> tuple[list[str], dict[str, int
         name, _, old = text.partition("=")
         old = old if old in names or f"n{old}" not in names else f"n{old}"
         if not name.isidentifier() or old not in names or (name in names and name != old):
+            fix = missing_dof(replace(model, names=names), old, names) or "check the node and its direction"
+            if not name.isidentifier():
+                usable = re.sub(r"\W", "_", name)
+                fix = f"write {usable if usable.isidentifier() else 'tip'}={old}"
+            elif old in names:
+                fix = f"another dof is called {name}: choose another name"
             raise InputError(
                 "a dof cannot be named so",
                 f"--name {text}",
                 None,
                 "NAME=DOF, a new name of letters and digits and a dof such as " + names[0],
-                missing_dof(replace(model, names=names), old, names) or "check the node and its direction",
+                fix,
             )
         kept.append(names.index(old))
         names[kept[-1]] = name

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -30,12 +30,15 @@ class Side:
     points : (n, 3) [length]
     faces : list of (n_faces, m)
         Places of their nodes among those of the side, seen from outside; empty unless every node is on one.
+    bare : (n_bare,)
+        Nodes on no face, beside others that are.
     """
 
     where: str
     numbers: IntArray
     points: Array
     faces: list[IntArray]
+    bare: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
     @property
     def name(self) -> str:
@@ -94,10 +97,10 @@ def side_of(nodes: Nodes, name: str) -> Side:
     if not len(numbers):
         expected, fix = "faces of C3D or S elements, or nodes", "check the set in the deck"
         raise InputError("a side of the contact is empty", where, "no nodes", expected, fix)
-    covered = np.isin(numbers, np.concatenate([table.ravel() for table in tables])) if tables else np.array(False)
+    bare = np.setdiff1d(numbers, np.concatenate([table.ravel() for table in tables])) if tables else numbers
     order = np.argsort(numbers)
-    places = [order[np.searchsorted(numbers, table, sorter=order)] for table in tables] if covered.all() else []
-    return Side(where, numbers, nodes.coordinates[nodes.places(numbers)], places)
+    places = [order[np.searchsorted(numbers, table, sorter=order)] for table in tables] if not len(bare) else []
+    return Side(where, numbers, nodes.coordinates[nodes.places(numbers)], places, bare if tables else bare[:0])
 
 
 def has_faces(nodes: Nodes, name: str) -> bool:
@@ -159,7 +162,9 @@ def normals_of(side: Side, given: Array | None) -> Array:
     if given is None and own is None:
         expected = "a direction, or faces of C3D or S elements under every node of the set"
         fix = "give --normal X,Y,Z from the first body to the second, a *SURFACE, or a CSV of pairs with normals"
-        raise InputError("the pairs have no normal", side.where, None, expected, fix)
+        bare = len(side.bare)
+        measured = f"node {side.bare[0]} is on no face, {bare} of {len(side.numbers)} such" if bare else None
+        raise InputError("the pairs have no normal", side.where, measured, expected, fix)
     if given is None or own is None:
         return np.broadcast_to(given, (len(side.numbers), 3)) if own is None else own  # type: ignore[arg-type]
     check_outwards(given / np.linalg.norm(given), own, side.where)
