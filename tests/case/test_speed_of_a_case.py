@@ -193,6 +193,8 @@ WRONG = {
     "no dependence": (model("speed_rpm = 60.0"), "nothing of the model depends on its speed", "remove speed_rpm"),
     "not a speed": (model(INLINE.replace("60 =", "fast ="), "speed_rpm = 60.0"), "'fast' is no speed", "centrifugal"),
     "another size": (model(INLINE.replace("3.0, ", ""), "speed_rpm = 60.0"), "2 numbers", "one number for each dof"),
+    "no number": (model(INLINE.replace("3.0, ", "nan, "), "speed_rpm = 60.0"), "a wrong value", "a finite number"),
+    "endless": (model(INLINE.replace("3.0, ", "inf, "), "speed_rpm = 60.0"), "a wrong value", "a finite number"),
     "no file": (model(INLINE.replace(str(F.tolist()), '"f9.csv"'), "speed_rpm = 60.0"), "does not exist", "f9.csv"),
     "no load": (model(INLINE.replace(str(F.tolist()), '"pull"'), "speed_rpm = 60.0"), "no such load", "brings none"),
     "backwards": (model(INLINE, "speed_rpm = -60.0"), "model.speed_rpm", "a value >= 0"),
@@ -217,6 +219,14 @@ def test_what_is_no_load_at_a_speed_is_refused(name, tmp_path):
         load_case(path)
     said = str(caught.value)
     assert what in said and expected in said and said.count("fix:") == 1
+
+
+def test_a_preload_of_a_load_that_cannot_be_read_is_no_second_error(tmp_path):
+    text = model(INLINE.replace("3.0, ", ""), "speed_rpm = 60.0") + STATIC
+    assert 'loads = ["centrifugal"]' in text
+    with pytest.raises(CaseErrors) as caught:
+        load_case(put(tmp_path, text))
+    assert str(caught.value).count("fix:") == 1
 
 
 @pytest.mark.parametrize(

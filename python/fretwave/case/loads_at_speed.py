@@ -38,6 +38,7 @@ def with_loads(
     loads, known = dict(structure.loads), dict(identity)
     for name, given in (section.loads_at_speed or {}).items():
         squares, vectors = [], []
+        loads[name] = np.zeros(structure.n_dof)  # of one that cannot be read: it is named, and its error told
         for text, vector in given.items():
             key = ("model", "loads_at_speed", name, text)
             square = square_of(text, key, source, found, f'{name} = {{ 3000 = "f3000{TABLE}" }}')

@@ -43,8 +43,9 @@ Name = Annotated[str, Field(max_length=LONGEST_NAME)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 #: In Hz: equations have its square, times that of an order.
 Frequency = Annotated[float, Field(gt=0, le=1e100)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
 Matrix = Union[str, list[list[float]]]
-LoadVector = Union[str, list[float]]
+LoadVector = Union[str, list[Finite]]
 Numbers = Union[float, list[float]]
 Ratio = Annotated[float, Field(ge=0, lt=1, allow_inf_nan=False)]
 ByMode = Union[Ratio, Annotated[list[Ratio], Field(min_length=1)], Annotated[dict[str, Ratio], Field(min_length=1)]]
@@ -226,7 +227,7 @@ class AerodynamicsSection(Section):
     """``[aerodynamics]``: forces of the flow on the vibrating blades, where `aerodynamics = true` and in flutter."""
 
     frequency: Frequency = key("vibration frequency at which they hold", "Hz", "194.3")
-    influence: Optional[dict[str, list[float]]] = key(
+    influence: Optional[dict[str, list[Finite]]] = key(
         "complex force on a blade by the unit motion of the blade k places ahead: k = [real, imaginary]",
         "force/length at a dof, 1/s^2 modal",
         "{ 0 = [0.0, -20.0], 1 = [-8.0, 3.0], -1 = [8.0, 3.0] }",
@@ -236,7 +237,7 @@ class AerodynamicsSection(Section):
     dof: Optional[Dof] = key(
         "dof of `influence`; without it modal: the force on a mode of unit modal mass", example='"tip"', default=None
     )
-    damping: Optional[dict[str, float]] = key(
+    damping: Optional[dict[str, Finite]] = key(
         "in place of influence: modal damping ratio by nodal diameter, negative for backward waves",
         example="{ 4 = -0.002, -4 = 0.003 }",
         default=None,
