@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 from command_line import call
 from models.chain_case import BUILDER, CHAIN, FORCED
+from models.rubbing_sector import BUILDER as SECTOR_BUILDER
+from models.rubbing_sector import SECTOR
 from tolerances import LAST_DIGITS, ROUNDING, SOLVED, TIGHT
 
 import fretwave as fw
@@ -41,6 +43,21 @@ amplitude = [2e-6, 3e-6]
 cycles = 4.0
 coefficient = 1e-13
 report_at = [2.0]
+"""
+#: Of the meshed sector.
+FLUTTER = """
+[aerodynamics]
+frequency = 1000.0
+damping = { 1 = 0.001, 2 = -0.001 }
+
+[[analysis]]
+name = "flutter"
+type = "flutter"
+nodal_diameters = [1, 2]
+normalise = "tip"
+harmonics = 1
+samples = 96
+amplitude = [5e-6, 1e-5]
 """
 #: No pictures, no check in time.
 SHORT = ("--set", "forced.time_points=0", "--no-plots", "-q")
@@ -207,6 +224,28 @@ def test_values_of_the_pairs_are_those_of_the_kept_period(runs, capsys) -> None:
     assert stuck["slip_range"] <= ROUNDING * slides["slip_range"] and stuck["work"] == 0.0 < slides["work"]
     # one tangent moves: the work is that of friction mu N over the slip path, twice the range
     assert slides["work"] == pytest.approx(0.4 * slides["normal_mean"] * 2 * slides["slip_range"], rel=2e-3)
+
+
+@pytest.mark.parametrize("name", ["mode", "forced", "wear"])
+def test_pairs_have_their_places_and_pressures_in_every_analysis(runs, capsys, name: str) -> None:
+    """The two pads of the chain: 0.1 m apart, of 2e-4 m^2 each."""
+    pairs = rows_of(capsys, runs["reduced"], "--analysis", name, "--pairs", "--at", "end")
+    assert [(pair["face"], pair["along"]) for pair in pairs] == [("pads", 0.0), ("pads", 0.1)]
+    for pair in pairs:
+        assert pair["pressure_mean"] == pytest.approx(pair["normal_mean"] / 2e-4, rel=LAST_DIGITS)
+
+
+def test_pairs_of_flutter_have_their_places_and_pressures(tmp_path: Path, capsys) -> None:
+    """Of each wave of a meshed sector in a flow."""
+    shutil.copy(SECTOR_BUILDER, tmp_path / "model.py")
+    (tmp_path / "case.toml").write_text(SECTOR[: SECTOR.index("[[analysis]]")] + FLUTTER)
+    assert call("run", tmp_path / "case.toml", "--no-plots", "-q", "--out", tmp_path / "run") == 0
+    areas = fw.open_run(tmp_path / "run")["flutter"].pairs("pads")["area"]
+    for at in ("start", "end"):
+        pairs = rows_of(capsys, tmp_path / "run", "--pairs", "--at", at)
+        assert len(pairs) == len(areas)
+        for pair, area in zip(pairs, areas):
+            assert pair["pressure_mean"] == pytest.approx(pair["normal_mean"] / area, rel=LAST_DIGITS)
 
 
 def jenkins(amplitude: float, n: int = 4096) -> tuple[np.ndarray, np.ndarray]:

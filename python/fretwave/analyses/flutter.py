@@ -34,7 +34,7 @@ from .parts.branch import continuation, finished_table, mode_problem, notable, o
 from .parts.context import AnalysisContext, Outcome
 from .parts.fed_modes import with_others
 from .parts.observed import named
-from .parts.rest import rest_state, retained, start_mode, stuck_or_free
+from .parts.rest import keep_pairs, rest_state, retained, start_mode, stuck_or_free
 
 if TYPE_CHECKING:
     from ..case.facts import Facts
@@ -161,6 +161,8 @@ def _all_waves(
         wave["limit_cycles"] = _beside_other_families(context, wave["nodal_diameter"], wave["limit_cycles"])
     cycles = [cycle for wave in waves for cycle in wave["limit_cycles"]]
     _write(context, waves, cycles)
+    if table:
+        keep_pairs(context, writer)
     writer.close("stopped" if stopped else "done", reason, events=json.dumps(cycles), waves=json.dumps(waves))
     context.entry["waves"] = waves
     unit = context.units("length")

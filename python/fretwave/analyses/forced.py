@@ -33,7 +33,7 @@ from .parts.context import AnalysisContext, Outcome
 from .parts.excitation import Excitation, excitation_of, wave_of_forces
 from .parts.forced_peaks import curves_of, write_peaks
 from .parts.observed import keep_row, named
-from .parts.rest import retained
+from .parts.rest import keep_pairs, retained
 from .parts.wheel_peaks import blade_amplitudes, blade_by_blade
 
 if TYPE_CHECKING:
@@ -223,6 +223,7 @@ def _all_levels(context: AnalysisContext[ForcedAnalysis], excitation: Excitation
     blades = blade_amplitudes(excitation, writer) if wheel and writer.active else None
     row = row_of(context.model, excitation.observed)
     if table:
+        keep_pairs(context, writer)
         keep_row(context, writer, analysis.observe, row)
     writer.close("stopped" if stopped else "done", reason, events="[]")
     curves = curves_of(context, analysis.backbones())

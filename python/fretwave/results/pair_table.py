@@ -49,9 +49,8 @@ def _rows(contact: str, values: Mapping[str, Array]) -> list[dict[str, Any]]:
 def _pairs_of(analysis: Analysis, contact: str, point: int) -> dict[str, Any]:
     """Places and values of a contact's pairs."""
     history = history_of(analysis, contact, point)
-    placed = analysis.pairs(contact) if contact in analysis.placed() else {}
     stiffness = analysis.parameter(contact, Role.TANGENTIAL_STIFFNESS)
-    spread = {name: _spread(values, history.n_pairs) for name, values in placed.items()}
+    spread = {name: _spread(values, history.n_pairs) for name, values in analysis.pairs(contact).items()}
     places = {}
     if "position" in spread:
         along, across = spread["position"].T

@@ -121,14 +121,19 @@ class Analysis:
     def placed(self) -> list[str]:
         """Contacts whose pairs have known places."""
         with open_results(self.path) as file:
-            return [key[len("pairs_") :] for key in file[self.name] if key.startswith("pairs_")]
+            group = file[self.name]
+            kept = [key for key in group if key.startswith("pairs_")]
+            return [key[len("pairs_") :] for key in kept if "position" in group[key]]
 
     def pairs(self, contact: str) -> Table:
-        """Of each pair of a contact: position (n_pairs, 2) on its face [length], face, friction coefficient."""
+        """Of each pair of a contact: face, friction coefficient, and where they are known its position and area.
+
+        The position (n_pairs, 2) on its face [length], the area [length^2]; empty where neither is known.
+        """
         with open_results(self.path) as file:
-            group = file[self.name]["pairs_" + contact]
+            group = file[self.name].get("pairs_" + contact, {})
             table = {key: group[key][()] for key in group}
-        return {**table, "face": np.array(_texts(table["face"]))}
+        return {**table, "face": np.array(_texts(table["face"]))} if table else {}
 
     def worn_contacts(self) -> list[str]:
         """Contacts whose worn depth is kept."""

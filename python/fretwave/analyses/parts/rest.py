@@ -223,17 +223,18 @@ def retained(
 
 
 def keep_pairs(context: AnalysisContext[AnalysisSection], writer: AnalysisWriter) -> None:
-    """Keep with the results where the contact pairs are, for the pictures."""
+    """Keep with the results where the contact pairs are and their areas, for pictures and `fretwave probe`."""
     for contact in context.case.contacts:
         given = contact.pairs
-        if given.positions is None:
+        if given.positions is None and given.areas is None:
             continue
         faces = list(given.faces) if given.faces is not None else [contact.name] * given.n_pairs
         friction = contact.value(Role.FRICTION_COEFFICIENT)
         friction = np.broadcast_to(np.nan if friction is None else friction, (given.n_pairs,))
         place = f"pairs_{contact.name}"
-        writer.dataset(f"{place}/position", given.positions, units="length", long_name="place on the face")
         writer.dataset(f"{place}/face", np.array([str(face).encode() for face in faces]))
         writer.dataset(f"{place}/{Role.FRICTION_COEFFICIENT.value}", friction, units="1")
+        if given.positions is not None:
+            writer.dataset(f"{place}/position", given.positions, units="length", long_name="place on the face")
         if given.areas is not None:
             writer.dataset(f"{place}/area", given.areas, units="length^2", long_name="nodal area")
