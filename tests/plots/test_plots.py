@@ -6,6 +6,7 @@ import json
 
 import numpy as np
 import pytest
+from command_line import call
 from models.table_rows import SHARED
 from tolerances import ROUNDING
 
@@ -122,6 +123,18 @@ def test_only_names_analyses_or_kinds_of_picture(folder):
         *("mode_trajectories.png", "mode_phase_planes.png", "mode_hysteresis_damper.png", "mode_backbone.png"),
     }
     assert {path.name for path in plot_run(folder, ["backbone"])} == {"mode_backbone.png", "flutter_backbone.png"}
+
+
+@pytest.mark.parametrize(("name", "fix"), [("mode_epmcc", "--only mode_epmc"), ("nonsense", "--only flutter")])
+def test_a_name_of_no_pictures_is_refused(folder, capsys, name, fix):
+    assert call("plot", folder, "--only", name) == 2
+    told = capsys.readouterr()
+    assert told.out == "" and f"fix:      {fix}" in told.err and "an analysis (" in told.err
+
+
+@pytest.mark.parametrize("name", ["mode", "backbone", "gauges", "linear"])
+def test_what_might_have_pictures_is_no_error(folder, name):
+    assert call("plot", folder, "--only", name) == 0
 
 
 def test_pictures_are_vectors_on_request(folder):

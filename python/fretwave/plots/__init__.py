@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING, TypeVar, cast
 import numpy as np
 from numpy.linalg import LinAlgError
 
+from ..errors import InputError
 from ..registry import kinds
+from ..texts import nearest
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -32,6 +34,26 @@ def families() -> list[tuple[str, Family]]:
     known = kinds()
     modules = dict.fromkeys([*(name for kind in known.values() for name in kind.pictures), *OTHERS])
     return [*((name, _family(name)) for name in modules), *((name, kind.figures) for name, kind in known.items())]
+
+
+def check_names(run_folder: str | Path, only: Sequence[str]) -> None:
+    """Refuse what is neither an analysis nor a table of the folder nor a family of pictures.
+
+    Raises
+    ------
+    InputError
+        The first such name.
+    """
+    from ..results.reader import Run
+
+    run = Run(run_folder)
+    of_run, drawing = list(run.analyses), dict.fromkeys(name for name, _ in families())
+    known = [*of_run, *(name for name in drawing if name not in of_run)]
+    for name in only:
+        if name not in (*known, *run.tables()):
+            expected = f"an analysis ({', '.join(of_run) or 'none yet'}), or one of {', '.join(known[len(of_run) :])}"
+            fix = nearest(name, known, "--only {}".format) or f"--only {known[0]}"
+            raise InputError("there are no such pictures", "--only", name, expected, fix)
 
 
 def plot_run(

@@ -348,9 +348,10 @@ def check_sweeps(case: Case, names: Sequence[str], options: RunOptions, comm: MP
 
 def plot(folder: Path, console: Console, only: Sequence[str] | None = None, formats: Sequence[str] = ("png",)) -> int:
     """Make the pictures of a run folder; returns how many."""
-    from ..plots import plot_run
+    from ..plots import check_names, plot_run
 
     failed = load_recorded(read_record(folder)) if (folder / RECORD).exists() else []
+    check_names(folder, only or ())
     files = plot_run(folder, only, failed, formats)
     for line in failed:
         console.line(line)
