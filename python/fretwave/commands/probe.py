@@ -77,8 +77,11 @@ def _point_line(group: h5py.Group, name: str, point: int, said: str) -> str:
     """Which point it is."""
     table = group["points"]
     values = [f"{name}: point {point}"]
+    if "contact" in table:  # of a linear analysis
+        values.append(f"contact {table['contact'][point].decode()}")
     for column, text, scale in (
         ("nodal_diameter", "nodal diameter {:g}", 1.0),
+        ("mode", "mode {:g}", 1.0),
         ("level", "level {:g}", 1.0),
         ("cycles", "{:.4g} cycles", 1.0),
         ("amplitude", f"amplitude {{:.6g}} {table['amplitude'].attrs.get('units', '')}", 1.0),

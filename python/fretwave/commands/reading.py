@@ -78,7 +78,8 @@ def _add_probe(commands: _SubParsers) -> None:
         nargs="+",
         default=["peak"],
         metavar="POINT",
-        help="peak (largest damping, or response; default), start, end, an amplitude (the nearest point), or row N",
+        help="peak (largest damping, or response; default), start, end, an amplitude (the nearest point around"
+        " the places where it is passed), or row N",
     )
     probe.add_argument("--sector", type=int, default=0, metavar="J", help="of a wheel, of --node (default 0)")
     probe.add_argument("--csv", action="store_true", help="the harmonics of --node or --dof as CSV")
@@ -118,7 +119,12 @@ def _add_view(commands: _SubParsers) -> None:
     which = view.add_mutually_exclusive_group()
     which.add_argument("--point", type=int, nargs="+", default=[], metavar="N", help="points of the branch")
     which.add_argument(
-        "--amplitude", type=float, nargs="+", default=[], metavar="A", help="nearest kept points, in the case's units"
+        "--amplitude",
+        type=float,
+        nargs="+",
+        default=[],
+        metavar="A",
+        help="nearest kept points around the places where they are passed, in the case's units",
     )
     view.add_argument("--sectors", type=int, nargs="+", default=[], metavar="J", help="of a wheel (default: all)")
     view.add_argument("--phases", type=int, default=32, metavar="N", help="steps of a period (default 32)")

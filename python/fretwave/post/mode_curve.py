@@ -45,7 +45,7 @@ def lowest(frequency: Array) -> int:
 def at_the_end(values: Array, asked: float) -> float:
     """The end of a branch's values at which one that is asked for is met; else that value as it is."""
     end = float(np.clip(asked, values.min(), values.max()))
-    return end if abs(asked - end) <= AT_THE_END * abs(asked) else asked
+    return end if np.isfinite(asked) and abs(asked - end) <= AT_THE_END * abs(asked) else asked
 
 
 def forward(amplitude: Array, point: int) -> Optional[bool]:

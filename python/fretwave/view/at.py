@@ -85,7 +85,9 @@ class At:
     def _named(self, group: h5py.Group, count: int, offered: Indices) -> tuple[int, str]:
         """The kept point nearest to the one that a word means."""
         peak = peak_row(group["points"])
-        meant = {"start": 0, "end": count - 1, "peak": count - 1 if peak is None else peak}[self.word]
+        if self.word == "peak" and peak is None:
+            return int(offered[0]), ", the first (there is no peak of damping or response)"
+        meant = {"start": 0, "end": count - 1, "peak": peak or 0}[self.word]
         point = int(offered[np.argmin(np.abs(offered - meant))])
         of = "damping" if "zeta" in group["points"] else "amplitude"
         said = {"start": ", the first", "end": ", the last", "peak": f", that of the largest {of}"}[self.word]

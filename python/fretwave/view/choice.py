@@ -18,11 +18,11 @@ from ..errors import InputError
 from ..files.dimensions import names_of_data
 from ..model.laws import kept_laws
 from ..post.contact_history import ContactHistory
-from ..post.mode_curve import at_the_end
 from ..post.motion import waves
 from ..results.file import unit_of_amplitudes
 from ..texts import display, nearest
 from ..units import SI, UnitSystem, units_of
+from .places import around_places, branches_of
 
 if TYPE_CHECKING:
     import h5py
@@ -297,11 +297,14 @@ def points_asked(group: h5py.Group, kept: Indices, options: ViewOptions, where: 
             raise not_kept("there is no such point", where, f"point {point}", kept, group, near, options.how)
     chosen = [(int(point), "") for point in options.points]
     for asked in options.amplitudes:
-        near = kept[np.argmin(np.abs(amplitude[kept] - asked))]
-        if not amplitude.min() <= at_the_end(amplitude, asked) <= amplitude.max():
+        around = around_places(branches_of(group), kept, asked)
+        if not around:
+            near = kept[np.argmin(np.abs(amplitude[kept] - asked))]
             what = "the branch does not reach this amplitude"
             raise not_kept(what, where, f"{asked:g} {unit}", kept, group, near, options.how)
-        chosen.append((int(near), f", the kept point nearest to {asked:g} {unit}"))
+        near = min(around, key=lambda point: abs(amplitude[point] - asked))
+        places = f", which is passed at {len(around)} places" if len(around) > 1 else ""
+        chosen.append((near, f", the kept point nearest to {asked:g} {unit}{places}"))
     return chosen or [(int(kept[np.argmax(amplitude[kept])]), ", the kept point of the largest amplitude")]
 
 
