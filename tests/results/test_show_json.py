@@ -11,6 +11,7 @@ from command_line import call
 from tolerances import ROUNDING
 
 import fretwave as fw
+from fretwave.columns import Column
 from fretwave.results.results import AnalysisWriter
 
 pytestmark = pytest.mark.ranks(1)
@@ -92,3 +93,26 @@ def test_a_folder_without_results_is_refused(tmp_path: Path, capsys) -> None:
     assert call("show", tmp_path, "--json") == 2
     said = capsys.readouterr()
     assert said.out == "" and said.err.count("fix:") == 1
+
+
+def test_the_peak_of_a_driven_wheel_is_that_of_any_sector(tmp_path: Path, capsys) -> None:
+    """Not the largest amplitude of the sector that is observed, which is elsewhere."""
+    columns = ["point", "level", "frequency_hz", "amplitude", "largest_amplitude", "largest_sector"]
+    writer = AnalysisWriter(tmp_path, "wheel", columns, {"type": "forced"})
+    for point, (own, largest, sector) in enumerate([(0.1, 0.2, 3), (0.2, 0.9, 14), (0.8, 0.81, 5)]):
+        values = (point, 1.0, 10.0 + point, own, largest, sector)
+        writer.append(dict(zip(columns, values)))
+    writer.close("done", "stop value reached")
+    (one,) = told(tmp_path, capsys)["analyses"]
+    assert one["peak"]["point"] == 1 and one["peak"]["largest_sector"] == 14 and one["peak"]["amplitude"] == 0.2
+    assert any("a 0.9 m of sector 14, 11 Hz" in line for line in printed(tmp_path, capsys))
+
+
+def test_rounding_is_no_frequency(tmp_path: Path, capsys) -> None:
+    """A rigid motion in the table of linear modes."""
+    other = Column("other_hz", "Hz", "frequency of the mode most like it")
+    writer = AnalysisWriter(tmp_path, "linear", ["point", "frequency_hz", other], {"type": "linear"})
+    for point, hertz in enumerate((6.2e-18, 100.0)):
+        writer.append({"point": point, "frequency_hz": hertz, "other_hz": hertz})
+    writer.close("done", "stop value reached")
+    assert any("0 - 100 Hz" in line for line in printed(tmp_path, capsys))

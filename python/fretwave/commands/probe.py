@@ -76,6 +76,7 @@ def _pairs(folder: Path, asked: str | None, at: At, out: Path | None) -> None:
 def _point_line(group: h5py.Group, name: str, point: int, said: str) -> str:
     """Which point it is."""
     table = group["points"]
+    unit = table["amplitude"].attrs.get("units", "")
     values = [f"{name}: point {point}"]
     if "contact" in table:  # of a linear analysis
         values.append(f"contact {table['contact'][point].decode()}")
@@ -84,7 +85,9 @@ def _point_line(group: h5py.Group, name: str, point: int, said: str) -> str:
         ("mode", "mode {:g}", 1.0),
         ("level", "level {:g}", 1.0),
         ("cycles", "{:.4g} cycles", 1.0),
-        ("amplitude", f"amplitude {{:.6g}} {table['amplitude'].attrs.get('units', '')}", 1.0),
+        ("amplitude", f"amplitude {{:.6g}} {unit}", 1.0),
+        ("largest_amplitude", f"largest of all sectors {{:.6g}} {unit}", 1.0),
+        ("largest_sector", "in sector {:g}", 1.0),
         ("frequency_hz", "{:.6g} Hz", 1.0),
         ("zeta", "zeta {:.4g} %", 100.0),
     ):

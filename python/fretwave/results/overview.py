@@ -98,7 +98,11 @@ class Overview:
             return f"{damping}; worn {top['worn']:.3g} {top['worn_unit']}"
         if "zeta" in top:
             return f"zeta {100 * top['zeta']:.3g} %, {top['amplitude']:.4g} {self.unit}"
-        return f"a {top['amplitude']:.4g} {self.unit}, {top['frequency_hz']:.4g} Hz" if top else ""
+        if not top:
+            return ""
+        sector = f" of sector {top['largest_sector']:.0f}" if "largest_sector" in top else ""
+        amplitude = top.get("largest_amplitude", top["amplitude"])
+        return f"a {amplitude:.4g} {self.unit}{sector}, {top['frequency_hz']:.4g} Hz"
 
     def _error(self) -> str:
         if not self.error:
@@ -167,8 +171,12 @@ def _range(table: Mapping[str, Any], unit: str) -> dict[str, Any]:
 
 
 def peak_row(table: Mapping[str, Any]) -> int | None:
-    """Row of the largest damping of a mode, of the largest amplitude of a response; None where there is neither."""
-    of = "zeta" if "zeta" in table and "omega0" in table else "amplitude" if "level" in table else None
+    """Row of the largest damping of a mode, of the largest amplitude of a response; None where there is neither.
+
+    Of a whole wheel's response that of the sector that moves most.
+    """
+    amplitude = "largest_amplitude" if "largest_amplitude" in table else "amplitude"
+    of = "zeta" if "zeta" in table and "omega0" in table else amplitude if "level" in table else None
     values = np.empty(0) if of is None else np.asarray(table[of], dtype=float)
     known = np.isfinite(values)
     largest = most_damped if of == "zeta" else np.argmax
@@ -179,7 +187,10 @@ def _peak(table: Mapping[str, Any], group: h5py.Group) -> dict[str, Any]:
     top = peak_row(table)
     if top is None:
         return {}
-    wanted = ("zeta", "zeta_error", "level", "cycles", "amplitude", "amplitude_error", "frequency_hz", "omega_error")
+    wanted = (
+        *("zeta", "zeta_error", "level", "cycles", "amplitude", "amplitude_error"),
+        *("largest_amplitude", "largest_sector", "frequency_hz", "omega_error"),
+    )
     found: dict[str, Any] = {"point": top, **{key: float(table[key][top]) for key in wanted if key in table}}
     if "cycles" in table:
         factor, found["worn_unit"] = units_of(group.attrs).of_volumes

@@ -90,6 +90,7 @@ class At:
         meant = {"start": 0, "end": count - 1, "peak": peak or 0}[self.word]
         point = int(offered[np.argmin(np.abs(offered - meant))])
         of = "damping" if "zeta" in group["points"] else "amplitude"
+        of += " of any sector" if "largest_amplitude" in group["points"] else ""
         said = {"start": ", the first", "end": ", the last", "peak": f", that of the largest {of}"}[self.word]
         return point, said if point == meant else f", the kept point nearest to point {meant}{said}"
 
