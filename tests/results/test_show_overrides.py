@@ -42,6 +42,14 @@ def test_the_same_of_all_is_said_once(tmp_path: Path, capsys) -> None:
     assert notes(tmp_path, capsys) == ["all: with --quick"]
 
 
+def test_the_same_of_some_is_said_once(tmp_path: Path, capsys) -> None:
+    for words in (["--quick", "--only", "mode,mode_epmc"], short("flutter")):
+        plots = [] if "--no-plots" in words else ["--no-plots", "-q"]
+        assert call("run", CASE, *words, *plots, "--out", tmp_path) == 0
+    one, two = notes(tmp_path, capsys)
+    assert one == "mode, mode_epmc: with --quick" and two.startswith("flutter: with --set")
+
+
 def test_of_a_sweep(tmp_path: Path, capsys) -> None:
     arguments = [*short("mode"), "--set", "mode.report_at=[]", "--over", "contact.damper.friction_limit=4,5"]
     assert call("sweep", CASE, *arguments, "--out", tmp_path) == 0

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 HEADINGS = ("analysis", "type", "status", "points", "range", "peak", "folds", "error", "time of points")
 Values = Mapping[str, Any]
+#: What is below this share of the largest of a range is rounding.
+ZERO = 1e-12
 
 
 @dataclass(frozen=True)
@@ -88,6 +90,7 @@ class Overview:
             return ""
         low, high, unit = (self.range[key] for key in ("low", "high", "unit"))
         one = "cycles" in self.range and high - low <= 1e-9 * high
+        low = 0.0 if abs(low) < ZERO * abs(high) else low  # rigid motions
         text = f"{high:.4g} {unit}" if one else f"{low:.4g} - {high:.4g} {unit}"
         return f"{text}, {self.range['cycles']:.4g} cycles" if "cycles" in self.range else text
 
@@ -258,8 +261,9 @@ def heading(folder: Path, title: str) -> list[str]:
 
 
 def overridden(found: list[Overview]) -> list[str]:
-    """What was not as in the case file; said once where it is the same for all analyses."""
-    changed = {one.name: one.overrides for one in found}
-    if len(changed) > 1 and len(set(changed.values())) == 1:
-        changed = {"all": next(iter(changed.values()))}
-    return [f"{name}: with {text}" for name, text in changed.items() if text]
+    """What was not as in the case file; said once where it is the same for several analyses."""
+    changed: dict[str, list[str]] = {}
+    for one in found:
+        changed.setdefault(one.overrides, []).append(one.name)
+    every = len(changed) == 1 and len(found) > 1
+    return [f"{'all' if every else ', '.join(names)}: with {text}" for text, names in changed.items() if text]
