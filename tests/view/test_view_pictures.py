@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import h5py
@@ -16,13 +18,22 @@ from models.vtkhdf_files import read_step
 from test_series import SINGLE, read_vtu
 from tolerances import ROUNDING
 
+from fretwave.case.load import load_case
 from fretwave.cyclic.faces import rotation
+from fretwave.results.results import open_results
+from fretwave.view.choice import ViewOptions, read_choice
+from fretwave.view.motion import Scene, mesh_of, scene_of
 
 pytestmark = pytest.mark.ranks(1)
 pytest.importorskip("skfem")
 Image = pytest.importorskip("PIL.Image")
 
+from matplotlib.figure import Figure  # noqa: E402
 from models.built_sector import HEIGHT, RIM, TIP, build  # noqa: E402
+
+from fretwave.plots import style  # noqa: E402
+from fretwave.plots.solid import COMPASS, Camera, compass  # noqa: E402
+from fretwave.view.still import Still  # noqa: E402
 
 SECTORS, PHASES = 6, 12
 
@@ -50,20 +61,20 @@ def test_a_picture_shows_the_whole_wheel_and_writes_nothing_else(run: Path, capf
     assert len(colours(Image.open(run / "mode.png"))) > 100
 
 
-def test_faces_of_a_wheel_enclose_its_volume(run: Path) -> None:
-    """Those between the sectors are inside: what is left is closed, and as large as six sectors."""
-    from fretwave.case.load import load_case
-    from fretwave.results.results import open_results
-    from fretwave.view.choice import ViewOptions, read_choice
-    from fretwave.view.motion import mesh_of, scene_of
-    from fretwave.view.still import Still
-
+@contextmanager
+def still_of(run: Path) -> Iterator[tuple[Still, Scene]]:
+    """The wheel, drawn as it moves."""
     case = load_case(run.parent / "case.toml")
     nodes, cells = mesh_of(case, True)
     with open_results(run / "results.h5") as file:
         choice = read_choice(file, run, case, ViewOptions(phases=PHASES))
     with scene_of(case, choice, nodes, run, ()) as scene:
-        still = Still(scene, cells, 1.0, None)
+        yield Still(scene, cells, 1.0, None), scene
+
+
+def test_faces_of_a_wheel_enclose_its_volume(run: Path) -> None:
+    """Those between the sectors are inside: what is left is closed, and as large as six sectors."""
+    with still_of(run) as (still, scene):
         first, second = (scene.shape(sector) for sector in (0, 1))
     corners = still.points[still.faces]
     vectors = np.cross(corners, np.roll(corners, -1, axis=1)).sum(axis=1) / 2
@@ -76,6 +87,37 @@ def test_faces_of_a_wheel_enclose_its_volume(run: Path) -> None:
     blades = HEIGHT * SECTORS * 0.5 * np.sin(angles[:2]).sum() * (TIP**2 - RIM**2)
     assert volume == pytest.approx(ring + blades, rel=1e-2)  # the blocks are skewed along the axis
     assert still.sizes.max() == pytest.approx(max(first.largest(), second.largest()), rel=0.05)
+
+
+@pytest.mark.parametrize("tall", [1.0, 100.0])
+def test_title_and_solid_are_in_the_middle_of_the_picture(run: Path, tall: float) -> None:
+    """Also of what is tall: the title is wider than it, and the colour bar stays beside it."""
+    with still_of(run) as (still, _), style.rules():
+        still.points[:, 2] *= tall
+        figure, _ = still._figure()
+        figure.canvas.draw()
+        title = figure._suptitle.get_window_extent()
+        solid, bar = (axes.get_window_extent() for axes in figure.axes)
+    width = figure.bbox.width
+    assert title.x0 > 0 and title.x1 < width and abs(title.x0 + title.x1 - width) < 0.02 * width
+    assert abs(solid.x0 + bar.x1 - width) < 0.15 * width and 0 < bar.x0 - solid.x1 < 0.05 * width
+
+
+@pytest.mark.parametrize("size", [(8.0, 2.0), (2.0, 8.0)])
+def test_the_axes_of_a_picture_point_as_the_camera_sees_them(size: tuple[float, float]) -> None:
+    """In inches on the paper, whatever the picture's shape."""
+    figure = Figure(figsize=size)
+    axes, camera = figure.add_subplot(), Camera(-60.0, 25.0)
+    compass(axes, camera, (0.3, 0.3))
+    drawn = [np.diff(line.get_transform().transform(line.get_xydata()), axis=0)[0] for line in axes.lines]
+    assert np.array(drawn) == pytest.approx(COMPASS * figure.dpi * camera.project(np.eye(3)), rel=1e-9)
+
+
+@pytest.mark.parametrize("eye", [("nan", "0"), ("0", "inf")])
+def test_an_eye_that_is_nowhere_is_refused(run: Path, capfd, eye: tuple[str, str]) -> None:
+    assert call("view", run, "--png", "--eye", *eye) == 2
+    told = capfd.readouterr().err
+    assert "--eye" in told and told.count("fix:") == 1
 
 
 def test_an_animation_has_a_frame_for_each_phase(run: Path) -> None:

@@ -11,6 +11,8 @@ import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import to_rgb
+from matplotlib.lines import Line2D
+from matplotlib.transforms import ScaledTranslation, Transform
 
 from ..arrays import Array, IntArray
 from ..model.cells import normals
@@ -21,6 +23,8 @@ LIGHT, DARK, DARK_VALUES = (0.45, 0.5, 0.74), 0.5, 0.7
 #: Colours of bodies.
 STEEL, RED = "#dee6f2", "#d1495b"
 EDGE = "#444444"
+#: Length of an axis of a compass [inch].
+COMPASS = 0.35
 #: Share of an axis to the side from which its name stands beside its end.
 ASIDE = 0.3
 #: Faces that two parts share have their middles within this share of the size.
@@ -109,16 +113,27 @@ def _light(outward: Array, camera: Camera, dark: float) -> Array:
     return np.asarray(dark + (1.0 - dark) * np.clip(outward @ towards, 0.0, 1.0))
 
 
-def compass(axes: Axes, camera: Camera, place: tuple[float, float] = (0.1, 0.1), names: Sequence[str] = "xyz") -> None:
-    """The three axes, foreshortened as seen, at a place given in shares of the picture."""
+def compass(
+    axes: Axes,
+    camera: Camera,
+    place: tuple[float, float] = (0.1, 0.1),
+    names: Sequence[str] = "xyz",
+    of: Transform | None = None,
+) -> None:
+    """The three axes, foreshortened as seen, at a place given in shares of the picture, or of what `of` says.
+
+    They are drawn in inches: in shares of a picture that is not square they would point elsewhere.
+    """
+    inches = axes.figure.dpi_scale_trans + ScaledTranslation(*place, of or axes.transAxes)
     for letter, end in zip(names, camera.project(np.eye(3))):
-        start = np.array(place)
-        stroke = {"arrowstyle": "-", "color": EDGE, "linewidth": 1.0, "shrinkA": 0, "shrinkB": 0}
-        axes.annotate("", start + 0.07 * end, start, xycoords="axes fraction", arrowprops=stroke)
+        stroke = Line2D(*zip((0.0, 0.0), COMPASS * end), color=EDGE, linewidth=1.0, transform=inches, clip_on=False)
         long = len(letter) > 1  # a word stands beside the end, a letter about its extension
         side = "left" if long and end[0] > ASIDE else "right" if long and end[0] < -ASIDE else "center"
-        where = start + (0.08 if long else 0.1) * end
-        axes.text(*where, letter, transform=axes.transAxes, fontsize=9, ha=side, va="center")
+        where = (1.15 if long else 1.4) * COMPASS * end
+        text = axes.text(*where, letter, transform=inches, fontsize=9, ha=side, va="center")
+        axes.add_artist(stroke)
+        for artist in (stroke, text):
+            artist.set_in_layout(False)
 
 
 def ruler(axes: Axes, factor: float, unit: str, place: float = 0.0) -> None:

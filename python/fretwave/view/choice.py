@@ -79,7 +79,7 @@ class ViewOptions:
         Raises
         ------
         InputError
-            The scale is neither ``auto`` nor a number, or there are no phases.
+            The scale is neither ``auto`` nor a number, the eye is nowhere, or there are no phases.
         """
         if phases < 1:
             raise InputError("a period has no phases", "--phases", phases, ">= 1", "--phases 32")
@@ -89,6 +89,10 @@ class ViewOptions:
             factor = np.nan
         if factor is not None and not np.isfinite(factor):
             raise InputError("the scale is no number", "--scale", scale, "auto or a number", "--scale auto")
+        eye = others.get("eye")
+        if eye is not None and not np.isfinite(eye).all():
+            measured, fix = f"{eye[0]:g} {eye[1]:g}", "--eye -60 25"
+            raise InputError("the eye is nowhere", "--eye", measured, "two angles in degrees", fix)
         return cls(scale=factor, phases=phases, **others)
 
 

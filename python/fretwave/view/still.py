@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 #: Eye beside a structure and above a wheel: azimuth and elevation [degrees].
 BESIDE, ABOVE = (-60.0, 25.0), (-70.0, 38.0)
+#: Where the three axes are drawn, in shares of the picture.
+CORNER = (0.06, 0.09)
 #: Duration of a period in an animation [s].
 PERIOD = 1.6
 #: Directions in space that become x, y and z of the picture, so that a wheel's axis is upright.
@@ -94,6 +96,7 @@ class Still:
     def _figure(self) -> tuple[Figure, Any]:
         """A picture with room for all phases, and what draws one of them."""
         figure, axes = style.new_figure(6.0)
+        figure.set_layout_engine("compressed")  # the colour bar beside what is drawn, both in the middle
         unit, sizes = self.scene.choice.units, self.sizes
         shown = scales.linear(unit, unit("length"), sizes)
         largest = float(shown(sizes.max())) or 1.0
@@ -110,10 +113,11 @@ class Still:
             axes.set(xlim=_wide(ends[:, 0]), ylim=_wide(ends[:, 1]))
 
         show(0)
-        axes.set_title(self._title())
+        figure.suptitle(self._title())
         bar = figure.colorbar(drawn[0], ax=axes, shrink=0.8, pad=0.02)
         bar.set_label(shown.label("Displacement from rest"))
-        solid.compass(axes, self.camera, (0.06, 0.06), "".join("xyz"[k] for k in self._order()))
+        names = "".join("xyz"[k] for k in self._order())
+        solid.compass(axes, self.camera, CORNER, names, figure.transFigure)
         return figure, show
 
     def _order(self) -> list[int]:
@@ -123,7 +127,7 @@ class Still:
         choice = self.scene.choice
         amplitude, hertz = choice.states["amplitude"][0], choice.states["frequency_hz"][0]
         shown = scales.linear(choice.units, choice.unit, amplitude).text(float(amplitude))
-        return f"{choice.name}: amplitude {shown}, {hertz:.6g} Hz, drawn × {self.scale:.3g}"
+        return f"{choice.name}: amplitude {shown}, {hertz:.6g} Hz, drawn × {self.scale:g}"
 
 
 def _wide(values: Array) -> tuple[float, float]:
