@@ -6,6 +6,7 @@ import json
 
 import numpy as np
 import pytest
+from matplotlib.colors import to_rgba
 from models.duffing import C, mode, response, stiffness
 from models.kept_branches import relative, write_branches
 from models.table_rows import SHARED as COMMON
@@ -263,6 +264,8 @@ def test_sectors_of_a_wheel_are_bars_of_their_amplitude_over_the_tuned_waves(tmp
     first, waves, last, _ = found["mode_sectors"].axes
     assert [bar.get_height() for bar in first.patches] == pytest.approx(6 * [1.0])
     assert [bar.get_height() for bar in last.patches] == pytest.approx([0.1, 0.1, 0.1, 2.0, 0.1, 0.1])
+    marked = [[bar.get_facecolor() == to_rgba(style.RED) for bar in axes.patches] for axes in (first, last)]
+    assert marked == [6 * [False], [sector == 3 for sector in range(6)]]  # rounding makes no sector the largest
     shares = {round(bar.get_x() + bar.get_width() / 2): bar.get_height() for bar in waves.patches}
     assert shares[2] == pytest.approx(1.0) and sum(shares.values()) == pytest.approx(1.0)
     assert [axes.texts[0].get_text().split(", ")[1] for axes in (first, last)] == ["ζ = 0 %", "ζ = 1 %"]

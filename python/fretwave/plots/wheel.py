@@ -22,6 +22,8 @@ SHOWN = 4
 APART = 0.3
 #: a participation ratio that changes by less on a branch is not drawn over amplitude
 CHANGES = 0.02
+#: sectors whose amplitudes differ by less, relative, move alike: none of them moves most
+ALIKE = 1e-3
 
 
 def figures(run: Run) -> Iterator[tuple[str, Figure]]:
@@ -75,9 +77,9 @@ def _points(mode: Analysis) -> list[int]:
 
 def _sectors(axes: Axes, mode: Analysis, point: int, a: Complex) -> None:
     tuned = np.abs(a).max() / mode.columns["amplification"][point]
-    places = np.arange(len(a))
-    largest = np.where(places == np.argmax(np.abs(a)), style.RED, style.BLUE)
-    axes.bar(places, np.abs(a) / tuned, color=largest, width=0.8)
+    places, size = np.arange(len(a)), np.abs(a)
+    alone = (size == size.max()) & (np.count_nonzero(size >= (1 - ALIKE) * size.max()) == 1)  # not of a tuned wave
+    axes.bar(places, size / tuned, color=np.where(alone, style.RED, style.BLUE), width=0.8)
     axes.axhline(1.0, color=style.GREY, linestyle="--", linewidth=1.0)
     axes.set_xlim(-0.7, len(a) - 0.3)
     axes.grid(axis="x", visible=False)
