@@ -39,9 +39,10 @@ def probe(options: argparse.Namespace) -> None:
     Raises
     ------
     InputError
-        There is no such analysis, point, node or dof.
+        There is no such analysis, point, node or dof, or an option that does nothing to what is asked for.
     """
     folder: Path = options.folder
+    _check_effect(options)
     at = At.read(options.at)
     if options.pairs:
         _pairs(folder, options.analysis, at, options.out)
@@ -51,8 +52,18 @@ def probe(options: argparse.Namespace) -> None:
         point, said = at.point(file[name], None, _where(name, folder))
         line = _point_line(file[name], name, point, said)
         found = None if options.dof is None else of_dof(file[name], folder, options.dof, point)
-    moved = of_node(folder, name, options.node, point, options.sector) if found is None else found
+    moved = of_node(folder, name, options.node, point, options.sector or 0) if found is None else found
     _show_motion(moved, line, options)
+
+
+def _check_effect(options: argparse.Namespace) -> None:
+    """What is of a node or a dof alone is not of pairs: their table would look as if it were."""
+    if options.sector is not None and options.node is None:
+        measured = "--pairs has all sectors" if options.pairs else "a dof is of the sector in its name"
+        raise InputError("the sector is that of a node", "--sector", measured, "--node beside it", "leave it out")
+    if options.steps is not None and options.pairs:
+        what, fix = "the table of the pairs is of a whole period", "leave it out"
+        raise InputError(what, "--steps", options.steps, "--node or --dof beside it", fix)
 
 
 def _where(name: str, folder: Path) -> str:

@@ -81,7 +81,7 @@ def _add_probe(commands: _SubParsers) -> None:
         help="peak (largest damping, or response; default), start, end, an amplitude (the nearest point around"
         " the places where it is passed), or row N",
     )
-    probe.add_argument("--sector", type=int, default=0, metavar="J", help="of a wheel, of --node (default 0)")
+    probe.add_argument("--sector", type=int, metavar="J", help="of a wheel, of --node (default 0)")
     probe.add_argument("--csv", action="store_true", help="the harmonics of --node or --dof as CSV")
     probe.add_argument("--steps", type=int, metavar="N", help="in their place the motion at N instants of the period")
     probe.add_argument("--out", type=Path, metavar="FILE", help="write the CSV here")

@@ -16,6 +16,7 @@ import numpy as np
 from ..arrays import Array, Complex
 from ..case.gauge_places import node_numbers, row_of_node
 from ..case.kept import reload_case
+from ..case.load import Case
 from ..columns import Column
 from ..errors import FretwaveError, InputError
 from ..model.structure import Structure
@@ -129,6 +130,7 @@ def of_node(folder: Path, analysis: str, number: int, point: int, sector: int = 
     learn_kept_laws(folder)
     case, _ = reload_case(folder, kept=True)
     given, (nodes, _) = geometry(case), mesh_of(case)
+    _check_sector(case, sector)
     row = _row_of(given, len(nodes), number, folder)
     held = _held_along(given, row)
     with open_results(folder / "results.h5") as file:
@@ -140,6 +142,13 @@ def of_node(folder: Path, analysis: str, number: int, point: int, sector: int = 
     what = f"node {number}{of} at ({place}) {choice.units('length')}{held}"
     hz = float(choice.states["frequency_hz"][0])
     return NodeMotion(what, "xyz", choice.labels, shape.coefficients[0, row], hz, choice.units)
+
+
+def _check_sector(case: Case, sector: int) -> None:
+    around = case.neighbours.sectors if case.neighbours else 1
+    if not 0 <= sector < around:
+        expected = f"0 to {around - 1}" if around > 1 else "a model with sectors"
+        raise InputError("there is no such sector", "--sector", sector, expected, "--sector 0")
 
 
 def _row_of(given: Structure, count: int, number: int, folder: Path) -> int:
