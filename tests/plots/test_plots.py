@@ -162,6 +162,32 @@ def test_backbone_shows_both_methods_both_asymptotes_folds_and_peak(run):
     assert len(upper.child_axes) == len(lower.child_axes) == 1  # close-up of the folds
 
 
+@pytest.mark.parametrize("late", [False, True])
+def test_the_close_up_of_the_folds_covers_no_point(tmp_path, late):
+    """Of a branch whose folds are early, and of one that slips, and is damped, at its end."""
+    described = {"type": "mode", "method": "CNM", "normalise": "m1", "stuck_omega": 25.3}
+    writer = AnalysisWriter(tmp_path, "mode", MODE, described, ["m1"], ["1c", "1s"])
+    a = np.geomspace(0.02, 2.0, 61)
+    begin = 50 if late else 8
+    a[begin : begin + 3] = a[begin + 1] * np.array([1.01, 1.0, 0.99])  # a narrow fold and back
+    slips = np.clip(np.arange(61) - begin, 0, None) / 61.0
+    for i, amplitude in enumerate(a):
+        omega, zeta = 25.3 - 4.0 * slips[i], 0.1 * slips[i]
+        row = {"point": i, "amplitude": amplitude, "omega": omega, "omega0": omega, "frequency_hz": omega / 2 / np.pi}
+        row |= {"beta": zeta * omega, "zeta": zeta, "wall_s": 0.01, **SHARED}
+        row["event"] = "fold" if i in (begin, begin + 2) else ""
+        writer.append(row, amplitude * np.array([[1.0, 0.0]]))
+    writer.close("done", "")
+    figure = backbone.draw([Run(tmp_path)["mode"]])
+    figure.canvas.draw()
+    for axes, values in zip(figure.axes[:2], (25.3 - 4.0 * slips, 10.0 * slips)):
+        (inset,) = axes.child_axes
+        values = values / (2 * np.pi) if axes is figure.axes[0] else values
+        points = axes.transData.transform(np.column_stack([a, values]))
+        box = inset.get_tightbbox()
+        assert not any(box.contains(x, y) for x, y in points)
+
+
 def test_backbone_under_negative_damping_marks_stable_and_unstable_limit_cycles(run):
     figure = backbone.draw([run.analyses["flutter"]])
     assert {"limit cycle, stable in its own amplitude", "limit cycle, unstable"} <= set(texts(figure))

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.transforms import Bbox
 
 from ..arrays import AnyArray
 from ..post.mode_curve import NO_DAMPING
@@ -21,6 +22,8 @@ SAME_MODE = 1e-6
 FAR = 1.0
 #: half width of the close-up of the folds, in widths of the interval between them
 CLOSE_UP = 2.5
+#: Of a close-up, in shares of the axes: room for its numbers and its title, its other places, and how much smaller.
+BESIDE, BELOW, ABOVE, LEFT, LOW, SMALLER = 0.07, 0.10, 0.09, 0.09, 0.16, 0.75
 LINES = ("-", (0, (5, 1.5)), (0, (1, 1)))
 #: Lines of damping that was added afterwards: over the mode's own, and unlike each other.
 SHIFTED = (("--", style.ORANGE), ((0, (1, 1.5)), style.RED))
@@ -52,9 +55,9 @@ def draw(modes: Sequence[Analysis], shifted: Mapping[str, Table] | None = None) 
     for mode, colour in zip(modes, style.PALETTE):
         _peak(lower, mode, colour, scale)
         _stop(upper, lower, mode, scale, str(mode.name) if len(modes) > 1 else "")
+    _finish(figure, upper, lower, modes, scale)
     _close_up(upper, modes, "frequency_hz", (0.60, 0.26, 0.34, _clear_of(upper, above) - 0.26), scale)
     _close_up(lower, modes, "zeta", (0.72, 0.44, 0.26, 0.50), scale)
-    _finish(figure, upper, lower, modes, scale)
     labels.along(upper, named, fontsize=10)
     return figure
 
@@ -106,7 +109,7 @@ def _close_up(axes: Axes, modes: Sequence[Analysis], column: str, place: tuple[f
         return
     low, high = scale(folds.min()), scale(folds.max())
     width = CLOSE_UP * (high - low)
-    inset = axes.inset_axes(place)
+    inset = axes.inset_axes(_where_free(axes, place))
     _curves(inset, modes, column, scale, errors=False)  # upright bands lie over each other where a curve folds
     curve = modes[0].curve()
     near = (scale(curve["amplitude"]) > low - width) & (scale(curve["amplitude"]) < high + width)
@@ -117,6 +120,17 @@ def _close_up(axes: Axes, modes: Sequence[Analysis], column: str, place: tuple[f
     inset.locator_params("x", nbins=2)  # amplitudes that differ little have long numbers
     inset.locator_params("y", nbins=4)
     inset.set_title("around the folds", fontsize=9.5)
+
+
+def _where_free(axes: Axes, place: tuple[float, ...]) -> tuple[float, ...]:
+    """Place of a close-up as preferred, or another below its top that covers fewer points and less of the lines."""
+    x, y, width, height = place
+    sizes = [(height, y), (SMALLER * height, y + (1 - SMALLER) * height)]
+    lefts = (x, 0.5 - width / 2, LEFT)
+    places = [(left, low, width, tall) for tall, high in sizes for left in lefts for low in (high, LOW)]
+    boxes = [Bbox.from_bounds(*one) for one in places]
+    around = [Bbox.from_extents(box.x0 - BESIDE, box.y0 - BELOW, box.x1, box.y1 + ABOVE) for box in boxes]
+    return places[labels.Cover(axes).cheapest([box.transformed(axes.transAxes) for box in around])]
 
 
 def _clear_of(axes: Axes, above: Sequence[float]) -> float:
