@@ -289,6 +289,7 @@ def test_open_pairs_do_not_slip() -> None:
         (["--pairs", "--at", "1.0"], "does not reach this amplitude"),
         (["--pairs", "--at", "pek"], "--at peak"),
         (["--pairs", "--analysis", "mod"], "did you mean `mode`?"),
+        (["--dof", "tip", "--analysis", "zzz"], "there is no analysis 'zzz'"),
         (["--node", "1", "--sector", "2"], "--sector 0"),
         (["--pairs", "--sector", "0"], "--pairs has all sectors"),
         (["--dof", "tip", "--sector", "0"], "sector in its name"),
@@ -302,6 +303,17 @@ def test_wrong_words_are_told_with_one_fix(runs, capsys, words: list[str], said:
     assert call("probe", runs["reduced"], *words) == 2
     told = capsys.readouterr()
     assert told.out == "" and told.err.count("fix:") == 1 and said in told.err
+
+
+def test_of_a_sweep_the_folder_of_a_value_is_asked_for(tmp_path: Path, capsys) -> None:
+    short = ("--only", "mode", "--set", "mode.amplitude=[0.02, 0.03]", "--set", "mode.report_at=[]", "--no-plots", "-q")
+    over = ("--over", "contact.damper.friction_limit=4,5")
+    assert call("sweep", TWO_DOF, *over, *short, "--out", tmp_path / "swept") == 0
+    for words in (["--pairs"], ["--dof", "m1"], ["--node", "1"]):
+        assert call("probe", tmp_path / "swept", *words) == 2
+        told = capsys.readouterr().err
+        assert "folder of a sweep" in told and "values/0000" in told.rpartition("fix:")[2]
+    assert call("probe", tmp_path / "swept" / "values" / "0000", "--pairs") == 0
 
 
 def test_a_fix_works(runs, capsys) -> None:

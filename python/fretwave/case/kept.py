@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -35,10 +36,7 @@ def reload_case(folder: Path, kept: bool = False) -> tuple[Case, dict[str, Any]]
         The folder holds no run, or its case has changed since.
     """
     record = read_record(folder)
-    if "sweep" in record:
-        one = folder / record.get("values", [{}])[0].get("folder", "values/0000")
-        problem = "this is the folder of a sweep, not of one run"
-        raise InputError(problem, display(folder), expected="the folder of a value", fix=f"give {display(one)}")
+    refuse_sweep(folder, record)
     given = record["case"]
     path = Path(given["path"])
     text = None if path.exists() and not kept else read_copy(folder, record)
@@ -53,6 +51,20 @@ def reload_case(folder: Path, kept: bool = False) -> tuple[Case, dict[str, Any]]
             fix=f"change it back, or start anew with `fretwave run {display(path)}`",
         )
     return case, record
+
+
+def refuse_sweep(folder: Path, record: Mapping[str, Any]) -> None:
+    """A sweep from the command line keeps the motion in the folders of its values.
+
+    Raises
+    ------
+    InputError
+        The folder is that of a sweep.
+    """
+    if "sweep" in record:
+        one = folder / record.get("values", [{}])[0].get("folder", "values/0000")
+        problem = "this is the folder of a sweep, not of one run"
+        raise InputError(problem, display(folder), expected="the folder of a value", fix=f"give {display(one)}")
 
 
 def described(analysis: AnalysisSection, case: Case, run_id: str) -> dict[str, Any]:

@@ -12,11 +12,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..case.kept import refuse_sweep
 from ..columns import Column
 from ..errors import InputError
 from ..files.csv_table import table_text
 from ..files.whole import replace_text
 from ..results.file import open_results
+from ..results.overview import recorded
 from ..results.pair_table import pair_table
 from ..results.reader import Run
 from ..texts import counted, display
@@ -43,12 +45,13 @@ def probe(options: argparse.Namespace) -> None:
     """
     folder: Path = options.folder
     _check_effect(options)
+    refuse_sweep(folder, recorded(folder))
     at = At.read(options.at)
     if options.pairs:
         _pairs(folder, options.analysis, at, options.out)
         return
     with open_results(folder / "results.h5") as file:
-        name = analysis_with(file, folder, options.analysis, lambda group: "coefficients" in group, "motion")
+        name = analysis_with(file, folder, options.analysis, lambda group: "coefficients" in group, "harmonics")
         point, said = at.point(file[name], None, _where(name, folder))
         line = _point_line(file[name], name, point, said)
         found = None if options.dof is None else of_dof(file[name], folder, options.dof, point)

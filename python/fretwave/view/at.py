@@ -116,5 +116,6 @@ def analysis_with(
     fix = (nearest(asked, found) if asked else None) or (
         f"--analysis {found[0]}" if found else "run a mode or forced response"
     )
-    told = f"'{asked}' has no {what}" if asked else f"no analysis has {what}"
+    missing = f"'{asked}' has no {what}" if asked in file else f"there is no analysis '{asked}'"
+    told = missing if asked else f"no analysis has {what}"
     raise InputError(told, display(folder), f"analyses with {what}: {listed}", None, fix)
