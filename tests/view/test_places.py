@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from command_line import call
 
+from fretwave.view.choice import ViewOptions, points_asked
 from fretwave.view.places import around_places, branches_of
 
 pytestmark = pytest.mark.ranks(1)
@@ -84,6 +85,15 @@ def test_levels_are_branches_of_their_own(run: Path) -> None:
     for rows, amplitude in parts:
         asked = 0.5 * amplitude.max()
         assert len(around_places([(rows, amplitude)], rows, asked)) == 2
+
+
+def test_without_a_wish_a_driven_wheel_shows_the_sector_that_moves_most() -> None:
+    """Its amplitude is that of the observed sector, which moves most elsewhere."""
+    with h5py.File("wheel", "w", driver="core", backing_store=False) as file:
+        points = file.create_group("points")
+        points["amplitude"], points["largest_amplitude"] = [0.1, 0.2, 0.8], [0.2, 0.9, 0.81]
+        ((point, told),) = points_asked(file, np.arange(3), ViewOptions(), "here")
+    assert point == 1 and told.endswith("of any sector")
 
 
 @pytest.mark.parametrize("asked", ["inf", "nan"])

@@ -89,6 +89,13 @@ def test_faces_of_a_wheel_enclose_its_volume(run: Path) -> None:
     assert still.sizes.max() == pytest.approx(max(first.largest(), second.largest()), rel=0.05)
 
 
+def test_a_picture_does_not_miss_contacts(run: Path, capfd) -> None:
+    """It shows none; the file for ParaView would."""
+    for words, missed in ((["--png"], False), ([], True)):
+        assert call("view", run, *words, "--point", 1, "--out", run / "first") == 0
+        assert ("no contact pairs are shown" in capfd.readouterr().out) is missed
+
+
 @pytest.mark.parametrize("tall", [1.0, 100.0])
 def test_title_and_solid_are_in_the_middle_of_the_picture(run: Path, tall: float) -> None:
     """Also of what is tall: the title is wider than it, and the colour bar stays beside it."""

@@ -187,12 +187,12 @@ class Choice:
         shifts = [self.sample_count * n * sector // sectors for n in self.diameters]
         return [history.delayed(shift) if shift else history for history, shift in zip(self.contacts[name], shifts)]
 
-    def lines(self) -> Iterator[str]:
-        """Which points are shown, each in a line."""
+    def lines(self, with_contacts: bool = True) -> Iterator[str]:
+        """Which points are shown, each in a line, and those whose contacts would be, but are not."""
         for row, (point, asked) in enumerate(zip(self.points, self.asked)):
             amplitude, frequency = self.states["amplitude"][row], self.states["frequency_hz"][row]
             yield f"{self.name}: point {point}, amplitude {amplitude:.6g} {self.unit}, {frequency:.6g} Hz{asked}"
-        if self.without:
+        if self.without and with_contacts:
             numbers = ", ".join(str(point) for point in self.without)
             yield f"{self.name}: no contact pairs are shown: their motion is not kept at point {numbers}"
 
@@ -309,7 +309,10 @@ def points_asked(group: h5py.Group, kept: Indices, options: ViewOptions, where: 
         near = min(around, key=lambda point: abs(amplitude[point] - asked))
         places = f", which is passed at {len(around)} places" if len(around) > 1 else ""
         chosen.append((near, f", the kept point nearest to {asked:g} {unit}{places}"))
-    return chosen or [(int(kept[np.argmax(amplitude[kept])]), ", the kept point of the largest amplitude")]
+    size, of = amplitude, ""
+    if "largest_amplitude" in group["points"]:  # of a driven wheel
+        size, of = group["points/largest_amplitude"][()], " of any sector"
+    return chosen or [(int(kept[np.argmax(size[kept])]), f", the kept point of the largest amplitude{of}")]
 
 
 def not_kept(what: str, where: str, measured: str, kept: Indices, group: h5py.Group, near: int, how: str) -> InputError:

@@ -58,7 +58,7 @@ def view_run(folder: Path, options: ViewOptions, say: Callable[[str], None] = pr
     nodes, cells = mesh_of(case, options.linear or (options.skin and not options.pvd))
     with open_results(folder / "results.h5") as file:
         choice = read_choice(file, folder, case, options)
-    for line in choice.lines():
+    for line in choice.lines(options.pvd or not options.skin):  # pictures never show contacts
         say(line)
     with scene_of(case, choice, nodes, folder, options.sectors) as scene:
         scale = options.scale if options.scale is not None else scene.natural_scale()
