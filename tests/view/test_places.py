@@ -113,4 +113,5 @@ def test_linear_modes_have_no_peak(tmp_path: Path, capsys) -> None:
     (tmp_path / "case.toml").write_text(text[:begin] + text[quick:])
     assert call("run", tmp_path / "case.toml", "--only", "linear", "--no-plots", "-q", "--out", tmp_path / "run") == 0
     line = said(capsys, tmp_path / "run")
+    assert call("probe", tmp_path / "run", "--dof", "m1", "--at", "1e9") == 2
     assert "point 0, contact stuck, mode 1" in line and "no peak" in line and "largest" not in line

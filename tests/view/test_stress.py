@@ -64,6 +64,12 @@ samples = 64
 normalise = "tip"
 amplitude = [0.1, 40.0]
 """
+LINEAR = """
+[[analysis]]
+name = "linear"
+type = "linear"
+modes = 2
+"""
 FORCED = """
 [[analysis]]
 name = "forced"
@@ -114,6 +120,21 @@ def test_a_gauge_reads_the_strain_of_a_beam(run: Path) -> None:
     assert forced["root_strain"][top] / forced["amplitude"][top] == pytest.approx(
         wanted[0] / found["amplitude"][0], rel=5e-3
     )
+
+
+def test_shapes_of_linear_modes_are_no_motion_to_look_at_first(tmp_path: Path, capfd) -> None:
+    """They come first in the case, at the amplitude of a unit modal mass: no stress of the structure, no default."""
+    folder = solved(tmp_path, CASE + MATERIAL + GAUGES + LINEAR + MODE.replace("40.0", "0.2"))
+    assert call("stress", folder) == 0
+    assert (folder / "mode_gauges.csv").exists() and not (folder / "linear_gauges.csv").exists()
+    capfd.readouterr()
+    assert call("stress", folder, "--analysis", "linear") == 2
+    assert "--analysis mode" in capfd.readouterr().err.rpartition("fix:")[2]
+    for words in (["probe", folder, "--dof", "tip"], ["view", folder, "--png"]):
+        assert call(*words) == 0
+        assert capfd.readouterr().out.startswith("mode: point ")
+    assert call("view", folder, "--analysis", "linear", "--png") == 0
+    assert "linear: point 0, " in capfd.readouterr().out
 
 
 def test_the_limit_of_a_linear_mode_is_in_closed_form(run: Path, capfd) -> None:

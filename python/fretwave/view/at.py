@@ -14,6 +14,7 @@ from ..errors import InputError
 from ..results.overview import in_order, peak_row
 from ..texts import display, nearest
 from .choice import ViewOptions, not_kept, points_asked
+from .places import linear_last
 
 if TYPE_CHECKING:
     import h5py
@@ -109,7 +110,8 @@ def analysis_with(
     InputError
         There is no such analysis.
     """
-    found = [name for name in in_order(folder, list(file)) if "type" in file[name].attrs and has(file[name])]
+    there = [name for name in in_order(folder, list(file)) if "type" in file[name].attrs and has(file[name])]
+    found = linear_last(file, there)
     if found and asked in (None, *found):
         return asked or found[0]
     listed = ", ".join(found) or "none"

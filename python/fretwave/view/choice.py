@@ -22,7 +22,7 @@ from ..post.motion import waves
 from ..results.file import unit_of_amplitudes
 from ..texts import display, nearest
 from ..units import SI, UnitSystem, units_of
-from .places import around_places, branches_of
+from .places import around_places, branches_of, linear_last, of_linear_modes
 
 if TYPE_CHECKING:
     import h5py
@@ -261,7 +261,7 @@ def _diameters(group: h5py.Group, case: Case, name: str, rows: Sequence[int]) ->
 
 
 def analysis_name(file: h5py.File, folder: Path, case: Case, asked: str | None) -> str:
-    """Name of the analysis asked for, or of the first that has a motion: in the order of the case."""
+    """Name of the analysis asked for, or of the first that has a motion: in the order of the case, linear ones last."""
     found = analyses_that_move(file, case)
     if found and asked in (None, *found):
         return asked or found[0]
@@ -276,9 +276,9 @@ def analysis_name(file: h5py.File, folder: Path, case: Case, asked: str | None) 
 
 
 def analyses_that_move(file: h5py.File, case: Case) -> list[str]:
-    """Names of those that keep harmonic coefficients, in the order of the case."""
+    """Names of those that keep harmonic coefficients, in the order of the case, linear ones last."""
     found = [name for name in case.analyses if name in file and "coefficients" in file[name]]
-    return [name for name in found if belongs(file[name], case, name)]
+    return linear_last(file, [name for name in found if belongs(file[name], case, name)])
 
 
 def kept_points(group: h5py.Group) -> Indices:
@@ -303,16 +303,25 @@ def points_asked(group: h5py.Group, kept: Indices, options: ViewOptions, where: 
     for asked in options.amplitudes:
         around = around_places(branches_of(group), kept, asked)
         if not around:
-            near = kept[np.argmin(np.abs(amplitude[kept] - asked))]
+            off = np.abs(amplitude[kept] - asked)
+            near = kept[np.argmin(np.where(np.isfinite(off), off, np.inf))]
             what = "the branch does not reach this amplitude"
             raise not_kept(what, where, f"{asked:g} {unit}", kept, group, near, options.how)
         near = min(around, key=lambda point: abs(amplitude[point] - asked))
         places = f", which is passed at {len(around)} places" if len(around) > 1 else ""
         chosen.append((near, f", the kept point nearest to {asked:g} {unit}{places}"))
-    size, of = amplitude, ""
+    return chosen or [_largest(group, kept)]
+
+
+def _largest(group: h5py.Group, kept: Indices) -> tuple[int, str]:
+    """The point shown without a wish; a linear mode's amplitude is none that could be largest."""
+    if of_linear_modes(group):
+        return int(kept[0]), ", the first mode"
+    name, of = "amplitude", ""
     if "largest_amplitude" in group["points"]:  # of a driven wheel
-        size, of = group["points/largest_amplitude"][()], " of any sector"
-    return chosen or [(int(kept[np.argmax(size[kept])]), f", the kept point of the largest amplitude{of}")]
+        name, of = "largest_amplitude", " of any sector"
+    size = group["points"][name][()][kept]
+    return int(kept[np.argmax(size)]), f", the kept point of the largest amplitude{of}"
 
 
 def not_kept(what: str, where: str, measured: str, kept: Indices, group: h5py.Group, near: int, how: str) -> InputError:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,12 +18,22 @@ if TYPE_CHECKING:
 Part = tuple[Indices, Array]
 
 
+def of_linear_modes(group: h5py.Group) -> bool:
+    """Whether an analysis has shapes alone, whose amplitudes are those of a unit modal mass."""
+    return "mode" in group["points"]
+
+
+def linear_last(file: Mapping[str, Any], names: Iterable[str]) -> list[str]:
+    """Names of analyses, those with motions of some amplitude first."""
+    return sorted(names, key=lambda name: of_linear_modes(file[name]))
+
+
 def branches_of(group: h5py.Group) -> list[Part]:
     """Of an analysis; linear modes are on no branch, each stands alone."""
     points = group["points"]
     columns = {name: points[name][()] for name in ("amplitude", *PARTS) if name in points}
     count = len(columns["amplitude"])
-    rows = np.arange(count)[:, None] if "mode" in points else rows_of_branches(columns)
+    rows = np.arange(count)[:, None] if of_linear_modes(group) else rows_of_branches(columns)
     return [(chosen, columns["amplitude"][chosen]) for chosen in rows]
 
 

@@ -7,7 +7,7 @@ stress; stress that the case's loads do not make (of assembly, of heat) is in ne
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -31,6 +31,7 @@ from ..texts import display
 from .choice import Choice, ViewOptions, analyses_that_move, analysis_name, at_point, read_choice
 from .inner_nodes import with_inner_nodes
 from .motion import Scene, geometry, scene_of
+from .places import of_linear_modes
 from .run import learn_kept_laws
 
 if TYPE_CHECKING:
@@ -135,8 +136,23 @@ def stress_tables(folder: Path, asked: str | None = None) -> Iterator[StressTabl
     reader = Reader.of(_gauges(case), geometry(case), display(case.path))
     with open_results(folder / "results.h5") as file:
         found = [analysis_name(file, folder, case, asked)]
-        for name in found if asked else analyses_that_move(file, case):
+        for name in found if asked else _with_amplitudes(file, analyses_that_move(file, case)):
+            _check_amplitudes(file, name, case)
             yield _table(file, folder, case, name, reader)
+
+
+def _with_amplitudes(file: Mapping[str, Any], names: Sequence[str]) -> Sequence[str]:
+    """Without linear modes, unless there is nothing else."""
+    return [name for name in names if not of_linear_modes(file[name])] or names[:1]
+
+
+def _check_amplitudes(file: Mapping[str, Any], name: str, case: Case) -> None:
+    """The stress of a shape at a unit modal mass is no stress of the structure."""
+    if of_linear_modes(file[name]):
+        others = [one for one in _with_amplitudes(file, analyses_that_move(file, case)) if one != name]
+        what, expected = "linear modes have no amplitude, and so no stress", "a mode or forced response of this run"
+        fix = f"--analysis {others[0]}" if others else "run such an analysis"
+        raise InputError(what, f"analysis '{name}'", None, expected, fix)
 
 
 def _gauges(case: Case) -> Gauges:
