@@ -19,6 +19,9 @@ from .motion import waves
 #: Instants of a period for each harmonic. A maximum between them is read off a parabola, which errs by about 1e-5 of
 #: it; the largest sample alone would be short by (pi / 64)^2 at most, as trigonometric polynomials are.
 INSTANTS = 64
+#: Largest values that differ by less than this share, which the parabola may err by, are equal: those of the sectors
+#: of a tuned wheel.
+EQUAL = 2e-5
 #: Numbers of one block of places over the period.
 BLOCK = 4_000_000
 
@@ -80,6 +83,11 @@ def highest(over: Array) -> Array:
 def goodman(amplitude: Array, mean: Array, endurance_limit: float, ultimate_strength: float) -> Array:
     """Goodman's factor, 1 at the limit; compression counts as no mean stress."""
     return np.asarray(amplitude / endurance_limit + np.maximum(mean, 0.0) / ultimate_strength)
+
+
+def first_largest(values: Array) -> int:
+    """Place of the largest of (n,); of those that cannot be told apart the first."""
+    return int(np.argmax(values >= (1 - EQUAL) * values.max()))
 
 
 def first_reaching(values: Array, limit: float, *columns: Array) -> tuple[float, ...] | None:

@@ -24,7 +24,7 @@ from ..columns import COLUMNS, Column
 from ..errors import InputError
 from ..fe.strain import StrainRows, along, nodal_strain, stress_of
 from ..model.structure import Structure
-from ..post.fatigue import goodman, mean_stress, stress_amplitude, swing
+from ..post.fatigue import first_largest, goodman, mean_stress, stress_amplitude, swing
 from ..results.parts import PARTS
 from ..results.results import open_results
 from ..texts import display
@@ -103,7 +103,7 @@ class Reader:
         stress = stress_of(self.strain(motion), *self.gauges.elastic)
         amplitude, mean = stress_amplitude(labels, stress), mean_stress(labels, stress)
         factor = None if self.gauges.limits is None else goodman(amplitude, mean, *self.gauges.limits)
-        k = int(np.argmax(amplitude if factor is None else factor))
+        k = first_largest(amplitude if factor is None else factor)
         found = {
             "worst_node": int(node_numbers(self.structure)[k]),
             "stress_amplitude": amplitude[k],
@@ -204,7 +204,7 @@ def _row(reader: Reader, scene: Scene, choice: Choice) -> dict[str, Any]:
         for gauge, read in zip(reader.gauges.gauges, reader.strains(labels, motion)):
             strains.update(read if not choice.wheel or gauge.sector == sector else {})
     sizes = [float(one.get("goodman", one.get("stress_amplitude", 0.0))) for one in worst]
-    return {**strains, **worst[int(np.argmax(sizes))]}
+    return {**strains, **worst[first_largest(np.array(sizes))]}
 
 
 def _motion(scene: Scene, sector: int) -> tuple[list[str], Array]:
