@@ -61,6 +61,12 @@ def test_a_picture_shows_the_whole_wheel_and_writes_nothing_else(run: Path, capf
     assert len(colours(Image.open(run / "mode.png"))) > 100
 
 
+@pytest.mark.parametrize("ending", [".png", ".gif", ".pvd"])
+def test_the_ending_of_a_file_says_what_it_is(run: Path, tmp_path: Path, ending: str) -> None:
+    assert call("view", run, "--phases", 4, "--out", tmp_path / f"shape{ending}") == 0
+    assert (tmp_path / f"shape{ending}").exists() and not list(tmp_path.glob("*.vtkhdf"))
+
+
 @contextmanager
 def still_of(run: Path) -> Iterator[tuple[Still, Scene]]:
     """The wheel, drawn as it moves."""

@@ -136,7 +136,12 @@ def _add_view(commands: _SubParsers) -> None:
     view.add_argument(
         "--eye", type=float, nargs=2, metavar=("AZ", "EL"), help="of pictures: azimuth and elevation [degrees]"
     )
-    view.add_argument("--out", type=Path, metavar="FILE", help="file to write (default: in the run folder)")
+    view.add_argument(
+        "--out",
+        type=Path,
+        metavar="FILE",
+        help="file to write (default: in the run folder); .png, .gif and .pvd are as --png, --gif and --pvd",
+    )
     view.set_defaults(command=_view)
 
 
@@ -214,6 +219,7 @@ def _view(options: argparse.Namespace) -> int:
     from ..view.choice import ViewOptions
     from ..view.run import view_run
 
+    ending = options.out.suffix.lower() if options.out else ""
     chosen = ViewOptions.checked(
         options.scale,
         options.phases,
@@ -223,9 +229,9 @@ def _view(options: argparse.Namespace) -> int:
         linear=options.linear,
         sectors=options.sectors,
         out=file_to_write(options.out, "motion.vtkhdf"),
-        png=options.png,
-        gif=options.gif,
-        pvd=options.pvd,
+        png=options.png or ending == ".png",
+        gif=options.gif or ending == ".gif",
+        pvd=options.pvd or ending == ".pvd",
         eye=tuple(options.eye) if options.eye else None,
     )
     _on_first_rank(comm, lambda: view_run(options.folder, chosen))
