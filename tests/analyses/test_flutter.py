@@ -118,25 +118,114 @@ def test_wave_on_the_whole_wheel_from_the_case_file(write, shared_tmp, comm):
     for one, other in zip(whole, alone):
         for key in ("amplitude", "frequency_hz"):
             assert float(one[key]) == pytest.approx(float(other[key]), rel=REPEATED)
+
+
+WHEEL = """[[analysis]]
+name = "wheel"
+type = "mode"
+wheel = true
+aerodynamics = true
+nodal_diameter = 1
+normalise = "mass"
+harmonics = 1
+samples = 960
+amplitude = [0.5, 20.0]
+"""
+#: A second mass on a spring to ground and to that of the next sector, which no contact touches.
+SIDE = (
+    ('["mass", "next"]\nM', '["mass", "side", "next", "nside"]\nM'),
+    ("M = [[1.0, 0.0], [0.0, 0.0]]", f"M = {np.diag([1.0, 1.0, 0, 0]).tolist()}"),
+    ("K = [[1.0, 0.0], [0.0, 0.0]]", "K = [[1, 0, 0, 0], [0, 6, 0, -1], [0, 0, 0, 0], [0, -1, 0, 1.0]]"),
+    ('low = ["mass"]\nhigh = ["next"]', 'low = ["mass", "side"]\nhigh = ["next", "nside"]'),
+)
+#: Of the mass and of the side mass alike, and not by the flow: both waves of so many diameters are one.
+DAMPER = (("K = [[1.0, 0.0], [0.0, 0.0]]", "K = [[1.0, 0.0], [0.0, 0.0]]\nC = [[-0.05, 0.0], [0.0, 0.0]]"),)
+WHEELS = {
+    "of the flow on one dof": ((), True),
+    "of another family": ((*SIDE, ('dof = "mass"\n', "")), True),
+    "of a damper": ((*DAMPER, ("aerodynamics = true\n", "")), False),
+    "of a mistuned wheel": (
+        (("normalise", 'mistuning = { of = "sector", standard_deviation = 1e-9 }\nnormalise'),),
+        True,
+    ),
+}
+
+
+@pytest.mark.parametrize("changes, flow", WHEELS.values(), ids=WHEELS)
+def test_waves_that_grow_beside_a_cycle_of_the_wheel_are_those_of_the_closed_form(
+    write, shared_tmp, comm, changes, flow
+):
+    flutter_analysis = TEXT[TEXT.index("[[analysis]]") :]
+    out = shared_tmp / "wheel"
+    assert run_case(write((flutter_analysis, WHEEL), *changes), RunOptions(out=out, plots=False), comm) == 0
     with h5py.File(out / "results.h5") as file:
-        stable, unstable = json.loads(file["wheel"].attrs["events"])
-    assert stable["stable"] is True and "fed" not in unstable
-    found = {mode["diameters"]: mode for mode in stable["fed"]}
-    growing = {d: value for d, value in ((d, stuck_wave(d)) for d in (-2, -1, 0, 2)) if value.real > 0}
-    assert growing and set(found) == set(growing) and len(stable["fed"]) == len(growing)
-    for d, value in growing.items():
-        assert found[d]["zeta"] == pytest.approx(-value.real / abs(value), rel=SOLVED)
-        assert found[d]["frequency_hz"] == pytest.approx(value.imag / (2 * np.pi), rel=SOLVED)
-    assert "but the wave of 0 nodal diameters" in (out / "run.log").read_text()
+        stable, *others = json.loads(file["wheel"].attrs["events"])
+    assert stable["stable"] is True and not any("fed" in cycle for cycle in others)
+    springs = [1.0, 2.0], [5.0, 2.0]
+    growing = sorted(
+        (diameters, value.imag / (2 * np.pi), -value.real / abs(value))
+        for family, (ground, next_one) in enumerate(springs[: 2 if "side" in str(changes) else 1])
+        for diameters in range(-2, 3)
+        if (value := stuck_wave(diameters, ground, next_one, flow)).real > 0 and (family, diameters) != (0, 1)
+    )
+    found = sorted(
+        (mode["diameters"], mode["frequency_hz"], mode["zeta"]) for mode in stable["fed"] if mode["contact"] == "stuck"
+    )
+    assert growing and np.allclose(found, growing, rtol=1e-6)
+    assert "nodal diameters" in (out / "run.log").read_text()
 
 
-def stuck_wave(diameters):
-    """lambda of a wave while all pairs stick: lambda^2 + c lambda + k = 0 of one mass, springs k_t to both others."""
+def stuck_wave(diameters, ground, next_one, flow):
+    """lambda of a mass while all pairs stick, lambda^2 + c lambda + k = 0: springs to the ground and to both others."""
     theta = 2 * np.pi * diameters / SECTORS
     ahead = {j: np.exp(-1j * j * theta) for j in INFLUENCE}
-    damping = -sum(value.imag / OMEGA * ahead[j] for j, value in INFLUENCE.items())
-    stiffness = 1.0 + 2.0 * (1 - np.cos(theta)) - sum(value.real * ahead[j] for j, value in INFLUENCE.items())
+    damping = -sum(value.imag / OMEGA * ahead[j] for j, value in INFLUENCE.items()) if flow else -0.05
+    stiffness = ground + next_one * (1 - np.cos(theta))
+    stiffness -= sum(value.real * ahead[j] for j, value in INFLUENCE.items()) if flow else 0.0
     return max(np.roots([1.0, damping, stiffness]), key=lambda one: one.imag)
+
+
+@pytest.mark.parametrize("flow", [False, True])
+def test_pairs_that_the_load_closes_stick_in_the_linear_mode_with_and_without_flow(shared_tmp, comm, flow):
+    """A mass pressed on its pad by a load alone: omega^2 = 1 + 0.4 (1 - cos theta) + kt in the wave."""
+    zero = [0.0] * 4
+    text = f"""
+[model]
+dofs = ["x", "y", "nx", "ny"]
+M = {[[1.0, 0, 0, 0], [0, 1.0, 0, 0], zero, zero]}
+K = {[[1.2, 0, -0.2, 0], [0, 1.0, 0, 0], [-0.2, 0, 0.2, 0], zero]}
+sectors = {SECTORS}
+low = ["x", "y"]
+high = ["nx", "ny"]
+speed_rpm = 60.0
+loads_at_speed = {{ f = {{ 60 = [0.0, 11.0, 0.0, 0.0] }} }}
+
+[preload]
+loads = ["f"]
+pair_loads = false
+
+[[contact]]
+name = "pad"
+law = "coulomb_2d"
+pairs = ["y"]
+tangents = ["x"]
+normal_stiffness = 10.0
+tangential_stiffness = 3.0
+friction_coefficient = 0.05
+
+[aerodynamics]
+frequency = 0.3
+dof = "x"
+influence = {{ 0 = [0.0, 0.06] }}
+""" + WHEEL.replace('"mass"', '"x"').replace("aerodynamics = true", f"aerodynamics = {str(flow).lower()}")
+    path, out = shared_tmp / "pad.toml", shared_tmp / "pad"
+    if comm.rank == 0:
+        path.write_text(text.replace("[0.5, 20.0]", "[0.1, 0.12]").replace("wheel = true\n", ""))
+    comm.barrier()
+    assert run_case(path, RunOptions(out=out, plots=False), comm) == 0
+    with h5py.File(out / "results.h5") as file:
+        stuck = file["wheel"].attrs["stuck_omega"]
+    assert stuck == pytest.approx(np.sqrt(1.0 + 0.4 * (1 - np.cos(2 * np.pi / SECTORS)) + 3.0), rel=SOLVED)
 
 
 @pytest.mark.ranks(1)

@@ -32,15 +32,15 @@ from .mode import point_line
 from .parts.at_rest import flutter_at_rest
 from .parts.branch import continuation, finished_table, mode_problem, notable, open_branch, points_of, record, tell
 from .parts.context import AnalysisContext, Outcome
-from .parts.fed_modes import with_others
+from .parts.fed_modes import fed_modes
 from .parts.observed import named
+from .parts.others import with_others
 from .parts.rest import keep_pairs, rest_state, retained, start_mode, stuck_or_free
 
 if TYPE_CHECKING:
     from ..case.facts import Facts
     from ..case.reporter import Reporter
     from ..hb.problems import Harmonics, NonlinearMode
-    from ..model.modes import LinearMode
 
 NOT_ANSWERED = "stability of the limit cycles against waves of other nodal diameters and of other families"
 
@@ -179,11 +179,11 @@ def _beside_other_families(
         return list(cycles)
     with _in_wave(context, diameter) as own_context:
 
-        def followed() -> LinearMode:
+        def fed() -> list[dict[str, Any]]:
             rest_state(own_context)
-            return stuck_or_free(own_context, context.analysis.linear_mode)
+            return fed_modes(own_context, stuck_or_free(own_context, context.analysis.linear_mode))
 
-        return with_others(own_context, followed, cycles)
+        return with_others(own_context, fed, cycles)
 
 
 @contextmanager

@@ -85,6 +85,8 @@ class Model(Destroyable):
         self.n_dof: int = self._matrices[0].getSize()[1]
         self._pairs: list[npt.NDArray[np.intp]] = []
         self._laws: list[Any] = []
+        #: The static state that the laws have taken as theirs last.
+        self.at_rest: Rest | None = None
         groups = [self._group(contact) for contact in self.contacts]
         theta = 2 * np.pi * nodal_diameter / sectors
         self.core = _core.Model(
@@ -244,6 +246,7 @@ class Model(Destroyable):
             law.rest(mine.T.ravel().tolist())
             if rest.sliders is not None and contact.info.memory:  # also where this rank has no pair of it
                 law.place(self.local_sliders(rest.sliders)[k])
+        self.at_rest = rest
 
     def closed_at_rest(self) -> list[npt.NDArray[np.bool_]]:
         """Of each contact which pairs are closed at rest, (n_pairs,) bool. Collective.

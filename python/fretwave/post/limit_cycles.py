@@ -77,7 +77,7 @@ def others(fed: Sequence[Mapping[str, Any]], not_looked_at: str = "") -> str:
 
     Parameters
     ----------
-    fed : modes that gain energy: mode (number from 1; of a wheel, diameters), contact, frequency_hz, zeta
+    fed : modes that gain energy: mode (number from 1), on a wheel diameters, contact, frequency_hz, zeta
     not_looked_at : why they are not known
     """
     if not_looked_at:
@@ -95,7 +95,8 @@ def others(fed: Sequence[Mapping[str, Any]], not_looked_at: str = "") -> str:
 
 
 def _which(mode: Mapping[str, Any]) -> str:
-    if "mode" in mode:
-        return f"linear mode {mode['mode']}"
+    words = f"linear mode {mode['mode']}" if "mode" in mode else "a motion"
+    if "diameters" not in mode:
+        return words
     diameters = int(mode["diameters"])
-    return f"a wave of {diameters:+d} nodal diameters" if diameters else "the wave of 0 nodal diameters"
+    return f"{words} of {f'{diameters:+d}' if diameters else '0'} nodal diameters"

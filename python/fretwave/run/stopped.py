@@ -38,7 +38,10 @@ def _advice(name: str, reason: str) -> str:
             f"another start, or shorter steps; --petsc '-ksp_monitor -{name.replace('-', '_')}_snes_monitor' shows why"
         )
     if "overdamped" in reason:
-        return f"larger amplitudes (--set {name}.amplitude=...), beside which regularised friction is small"
+        return (
+            f"amplitudes at which the mode is damped less (--set {name}.amplitude=...): regularised friction is viscous"
+            " at small ones, and bounded at large ones"
+        )
     if "at the start" in reason or "far from the linear mode" in reason:
         return (
             "another start (amplitude or frequency) where the motion is nearly linear; --petsc -snes_monitor shows why"

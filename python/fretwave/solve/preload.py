@@ -220,7 +220,9 @@ def _settled(problem: StaticPreload, y: PETSc.Vec, load: Array, history: list[li
     problem.core.settle(y, history or [])
     imbalance = float(np.linalg.norm(rest)) / size
     sliders = problem.model.sliders()
-    return Rest(blocks, load, sliders, contact["stick"], contact["slip"], contact["open"], imbalance, contacts)
+    found = Rest(blocks, load, sliders, contact["stick"], contact["slip"], contact["open"], imbalance, contacts)
+    problem.model.at_rest = found
+    return found
 
 
 def _of_dofs(model: Model, v: PETSc.Vec) -> Array:

@@ -273,6 +273,8 @@ class AnalysisContext(Generic[Section]):
 
         preload, diameters = self.case.preload_of(self.analysis), nodal_diameter(self.analysis)
         with build_model(self.case, (), self.comm, preload, diameters) as structure:
+            if self.model.at_rest is not None:
+                structure.settle(self.model.at_rest)
             return linear_modes(structure, count, contact, near)
 
     def numbered(self, modes: list[LinearMode], number: int) -> LinearMode:
