@@ -11,7 +11,7 @@ import h5py
 import numpy as np
 import pytest
 from h5py import h5ds
-from models.chain_case import CHAIN
+from models.chain_case import BUILDER, CHAIN, FORCED
 from models.wear_case import write_case
 from tolerances import ROUNDING
 
@@ -120,6 +120,25 @@ def test_a_run_is_shown_without_mpi_and_petsc(run, command):
         assert (run / "mode_backbone.png").exists()
     else:
         assert "regularisation_velocity 0.05 m/s" in (run / "report.html").read_text()  # the case could be read
+
+
+def test_a_reduced_run_of_before_is_shown_without_mpi_and_petsc(tmp_path):
+    """Its basis does not tell what the loads do beyond the component modes: a note says so, harmonics stay."""
+    (tmp_path / "model.py").write_bytes(BUILDER.read_bytes())
+    (tmp_path / "case.toml").write_text(CHAIN.replace("modes = 12", "modes = 2") + FORCED + "time_points = 0\n")
+    assert fw.main(["run", str(tmp_path / "case.toml"), "--no-plots", "--out", str(tmp_path / "run")]) == 0
+    words, said = ("probe", tmp_path / "run", "--node", 2, "--csv", "--at", "start"), []
+    for old in (False, True):
+        if old:
+            with h5py.File(tmp_path / "run" / "reduction.h5", "a") as file:
+                del file["load"], file["beyond"]
+        said.append(blocked(*words))
+        assert said[-1].returncode == 0, said[-1].stderr
+        assert ("is that of the component modes alone" in said[-1].stderr) == old
+    now, before = (one.stdout.splitlines()[1:] for one in said)
+    assert now[0] != before[0] and now[1:] == before[1:]  # the mean alone
+    shown = blocked("view", tmp_path / "run")
+    assert shown.returncode == 0 and "the component modes alone" in shown.stdout
 
 
 def blocked(*words) -> subprocess.CompletedProcess[str]:

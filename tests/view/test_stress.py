@@ -7,6 +7,7 @@ import re
 import shutil
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 from command_line import call
@@ -162,8 +163,11 @@ def test_the_level_of_a_response_is_between_those_solved(run: Path) -> None:
     assert limit["reached"].tolist() == ["no", "no", "before its first point"]
 
 
-def test_a_static_load_is_the_mean_stress(tmp_path: Path) -> None:
-    """The tip's weight of 0.2 N: mean strain of the formula, and Goodman's amplitude less by the mean's share."""
+def test_a_static_load_is_the_mean_stress(tmp_path: Path, capfd) -> None:
+    """The tip's weight of 0.2 N: mean strain of the formula, and Goodman's amplitude less by the mean's share.
+
+    A run of before, whose basis does not tell what loads do beyond the component modes, is read with a note.
+    """
     text = CASE + '[preload]\nloads = ["weight"]\npair_loads = false\n' + MATERIAL + GAUGES + MODE
     shutil.copy(cantilever.__file__, tmp_path / "cantilever.py")
     builder = tmp_path / "cantilever.py"
@@ -180,6 +184,11 @@ def test_a_static_load_is_the_mean_stress(tmp_path: Path) -> None:
     assert found["mean_stress"].max() > 5.0
     share, mean = found["stress_amplitude"][-1] / found["amplitude"][-1], found["mean_stress"][-1]
     assert limit["limit_amplitude"][0] == pytest.approx(250.0 * (1 - mean / 600.0) / share, rel=1e-6)
+    assert "the component modes alone" not in capfd.readouterr().out
+    with h5py.File(tmp_path / "run" / "reduction.h5", "a") as file:
+        del file["load"], file["beyond"]
+    assert call("stress", tmp_path / "run") == 0
+    assert "note: the displacement at rest under weight is that of the component modes" in capfd.readouterr().out
 
 
 def test_tables_may_be_added_after_the_run(tmp_path: Path, capfd) -> None:

@@ -111,12 +111,13 @@ def _point_line(group: h5py.Group, name: str, point: int, said: str) -> str:
 
 
 def _show_motion(moved: NodeMotion, line: str, options: argparse.Namespace) -> None:
+    said = [line, moved.note] if moved.note else [line]
     if options.steps is not None:
-        _write(_period_csv(moved, options.steps), [line, moved.what], options.out)
+        _write(_period_csv(moved, options.steps), [*said, moved.what], options.out)
     elif options.csv or options.out is not None:
-        _write(_csv(moved.columns(), moved.rows()), [line, moved.what], options.out)
+        _write(_csv(moved.columns(), moved.rows()), [*said, moved.what], options.out)
     else:
-        print("\n".join([line, *_screen(moved)]))
+        print("\n".join([*said, *_screen(moved)]))
 
 
 def _csv(columns: Sequence[Column], rows: Sequence[Mapping[str, Any]]) -> str:

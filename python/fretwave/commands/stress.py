@@ -47,6 +47,8 @@ def stress(folder: Path, asked: str | None = None, out: Path | None = None) -> N
 def lines(table: StressTable) -> Iterator[str]:
     """What a reader asks for first."""
     known = {column.name: column for column in table.columns}
+    if table.note:
+        yield table.note
     for name in known:
         if name.endswith("_strain") and len(table.rows):
             yield _of_gauge(table, name, known["amplitude"])

@@ -79,6 +79,7 @@ class Scene:
     around : int
         Sectors of the wheel, 1 for a structure.
     axis : of the wheel
+    note : what its nodes lack, in words; empty for nothing
     """
 
     nodes: Array
@@ -88,6 +89,7 @@ class Scene:
     ties: Parts | None = None
     around: int = 1
     axis: str = "z"
+    note: str = ""
 
     def shape(self, sector: int) -> Shape:
         """Of one sector, in space."""
@@ -177,20 +179,36 @@ def scene_of(
     around = neighbours.sectors if neighbours else 1
     ties = neighbours.ties if neighbours else None
     expand: Expand = _unchanged
-    beyond: Array | float = 0.0
+    beyond, note = np.zeros(1), ""
     with ExitStack() as stack:
         if case.reduction is not None:
-            kept, preload = read_basis(folder / NAME), case.preload_of(case.analyses[choice.name])
+            kept = read_basis(folder / NAME)
             if kept is not None:
                 _check_model(case, kept.model)
-            loads = preload.loads if preload is not None else []
-            basis = kept if kept is not None and set(loads) <= kept.loads.keys() else made_again(case, stack)
+            basis = made_again(case, stack) if kept is None else kept
             expand, ties = basis.expand, basis.ties or ties
-            beyond = basis.beyond(loads) if loads else 0.0
+            beyond, note = _beyond(basis, _loads(case, choice))
             _check_same(case, choice, basis, around)
         given, shown = moving or geometry(case), _shown(case, around, sectors)
         to_nodes = _to_nodes(given, len(nodes), expand, beyond)
-        yield Scene(nodes, choice, to_nodes, shown, ties, around, given.axis or "z")
+        yield Scene(nodes, choice, to_nodes, shown, ties, around, given.axis or "z", note)
+
+
+def _loads(case: Case, choice: Choice) -> list[str]:
+    """Names of the static loads about whose displacement an analysis moves."""
+    preload = case.preload_of(case.analyses[choice.name])
+    return preload.loads if preload is not None else []
+
+
+def _beyond(basis: Expansion, loads: Sequence[str]) -> tuple[Array, str]:
+    """Static displacement that no coordinate has, and a note on what is not known of it: of an older run all."""
+    known = [name for name in loads if name in basis.loads]
+    left = [name for name in loads if name not in basis.loads]
+    note = (
+        f"note: the displacement at rest under {', '.join(left)} is that of the component modes alone: an earlier"
+        " version made the run; run it again for the exact one"
+    )
+    return basis.beyond(known) if known else np.zeros(1), note if left else ""
 
 
 class Expansion(Protocol):
@@ -207,6 +225,9 @@ class Expansion(Protocol):
 
     @property
     def ties(self) -> Parts: ...
+
+    @property
+    def loads(self) -> Mapping[str, Array]: ...
 
     def expand(self, x_r: npt.ArrayLike, /) -> Array: ...
 
@@ -298,12 +319,12 @@ def _unchanged(columns: npt.ArrayLike) -> Array:
     return np.asarray(columns)
 
 
-def _to_nodes(given: Structure, n_nodes: int, expand: Expand, beyond: Array | float) -> ToNodes:
+def _to_nodes(given: Structure, n_nodes: int, expand: Expand, beyond: Array) -> ToNodes:
     """Through the case's reduction and the builder's own.
 
     Parameters
     ----------
-    beyond : (n_dof,) static displacement under the loads that no reduced coordinate has [length]
+    beyond : (n_dof,) static displacement under the loads that no reduced coordinate has, or (1,) zero [length]
     """
 
     def displacements(columns: Array, loaded: Array) -> Array:

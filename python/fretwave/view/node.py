@@ -47,6 +47,7 @@ class NodeMotion:
     labels : of the m coefficients
     coefficients : (n_directions, m) [length]
     frequency_hz : of the fundamental
+    note : what it lacks, in words; empty for nothing
     """
 
     what: str
@@ -55,6 +56,7 @@ class NodeMotion:
     coefficients: Array
     frequency_hz: float
     units: UnitSystem
+    note: str = ""
 
     @property
     def amplitudes(self) -> dict[int, Complex]:
@@ -141,7 +143,7 @@ def of_node(folder: Path, analysis: str, number: int, point: int, sector: int = 
     of = f" of sector {sector}" if scene.around > 1 else ""
     what = f"node {number}{of} at ({place}) {choice.units('length')}{held}"
     hz = float(choice.states["frequency_hz"][0])
-    return NodeMotion(what, "xyz", choice.labels, shape.coefficients[0, row], hz, choice.units)
+    return NodeMotion(what, "xyz", choice.labels, shape.coefficients[0, row], hz, choice.units, scene.note)
 
 
 def _check_sector(case: Case, sector: int) -> None:

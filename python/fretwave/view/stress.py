@@ -50,11 +50,12 @@ GOODMAN = Column("goodman", "1", "Goodman's factor there: amplitude / endurance 
 
 @dataclass(frozen=True)
 class StressTable:
-    """Of one analysis: a row for each point."""
+    """Of one analysis: a row for each point, and a note on what they lack; empty for nothing."""
 
     name: str
     columns: list[Column]
     rows: list[dict[str, Any]]
+    note: str = ""
 
     def __getitem__(self, column: str) -> Array:
         """(n_points,)"""
@@ -182,7 +183,7 @@ def _table(file: h5py.File, folder: Path, case: Case, name: str, reader: Reader)
             for k in range(len(group["coefficients"]))
         ]
     columns = [*_lead_columns(group, lead), *reader.columns(choice.wheel)]
-    return StressTable(name, [column.in_units(choice.units) for column in columns], rows)
+    return StressTable(name, [column.in_units(choice.units) for column in columns], rows, scene.note)
 
 
 def _lead_columns(group: h5py.Group, names: Sequence[str]) -> Iterator[Column]:
