@@ -182,6 +182,18 @@ def test_a_reduced_sector_rests_as_the_unreduced_one(wheel: str, plain: Path, tm
     assert np.abs(shown[1] - shown[0]).max() < 1e-7 * np.abs(shown[0]).max()
 
 
+def test_linear_modes_do_not_stand_under_the_loads(tmp_path: Path) -> None:
+    """They are of the model without its loads: nothing moves it from rest, whatever other analyses rest about."""
+    shutil.copy(BUILDER, tmp_path / "model.py")
+    text = SECTOR.replace("[[contact]]", "[reduction]\nmodes = 2\n\n[[contact]]")
+    text += '\n[[analysis]]\nname = "linear"\ntype = "linear"\nmodes = 1\nnodal_diameters = [2]\n'
+    (tmp_path / "case.toml").write_text(text)
+    folder = tmp_path / "run"
+    assert call("run", str(tmp_path / "case.toml"), "--only", "linear", "--out", str(folder), "--no-plots") == 0
+    assert call("view", str(folder), "--phases", "2") == 0
+    assert not read_step(folder / "linear.vtkhdf", 0)["rest_displacement"].any()
+
+
 def test_a_reduction_that_is_made_again_shows_the_same(viewed: Path, tmp_path: Path) -> None:
     """A run whose basis was too large to be kept."""
     kept = viewed.parent / "reduction.h5"

@@ -113,6 +113,7 @@ class Choice:
     coefficients : (n_points, n_coordinates, m) [length], as solved
     labels : of the m columns
     rest : (n_coordinates,) displacement at rest [length]
+    loaded : it moves about a state at rest, in which static loads act; linear modes do not
     samples : (n_phases,)
         Numbers of the contacts' samples at which the motion is shown.
     phases : (n_phases,) [rad]
@@ -137,6 +138,7 @@ class Choice:
     phases: Array
     contacts: dict[str, list[ContactHistory]]
     without: list[int]
+    loaded: bool = False
     highest_component_hz: float = 0.0
     diameters: Sequence[int] = ()
     wheel: bool = False
@@ -211,7 +213,7 @@ def read_choice(file: h5py.File, folder: Path, case: Case, options: ViewOptions)
     # A mode is shown where its contacts are kept; a response is sought at its peaks, where they are not.
     offered = held if case.analyses[name].shown_where_kept and len(held) else np.arange(len(group["coefficients"]))
     chosen = points_asked(group, offered, options, f"analysis '{name}' in {display(folder)}")
-    count = int(group.attrs["samples"])
+    count, loaded = int(group.attrs["samples"]), "rest_displacement" in group
     samples = np.unique(np.arange(options.phases) * count // options.phases)
     rows = [row for row, _ in chosen]
     without = [row for row in rows if row not in held]
@@ -222,7 +224,8 @@ def read_choice(file: h5py.File, folder: Path, case: Case, options: ViewOptions)
         states={key: group["points"][key][()][rows].astype(float) for key in SHOWN if key in group["points"]},
         coefficients=np.stack([group["coefficients"][row] for row in rows]),
         labels=[text.decode() for text in group["harmonic"][()]],
-        rest=group["rest_displacement"][()] if "rest_displacement" in group else np.zeros(len(group["dof"])),
+        rest=group["rest_displacement"][()] if loaded else np.zeros(len(group["dof"])),
+        loaded=loaded,
         samples=samples,
         phases=2 * np.pi * samples / count,
         contacts={} if without else _contacts(group, case, rows),

@@ -196,7 +196,7 @@ def scene_of(
 
 def _loads(case: Case, choice: Choice) -> list[str]:
     """Names of the static loads about whose displacement an analysis moves."""
-    preload = case.preload_of(case.analyses[choice.name])
+    preload = case.preload_of(case.analyses[choice.name]) if choice.loaded else None
     return preload.loads if preload is not None else []
 
 
