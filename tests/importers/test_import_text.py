@@ -209,7 +209,25 @@ def test_columns_in_another_order(head: str, tmp_path: Path) -> None:
     assert "n.csv:2" in (caught.value.where or "") and caught.value.expected == "node,x,y,z"
 
 
-@pytest.mark.parametrize("head", ["Node Number,X Location (m),Y,Z", "Node Number X Y Z", "id,x [m],y [m],z [m]"])
+@pytest.mark.parametrize("mark", [",", ", ", "\t", "\t\t", " \t", " ", "   "])
+@pytest.mark.parametrize("unit", ["{}", "{} (mm)", "{} [mm]", "{}(mm)", '"{} (mm)"', "{}/mm", "{} [1e-3 m]"])
+@pytest.mark.parametrize("names", ["node x y z", "node z y x", "x y z node", "node number z y x"])
+def test_columns_with_units(names: str, unit: str, mark: str, tmp_path: Path) -> None:
+    """Whatever parts the columns, with units or without: another order is refused, the right one is read."""
+    head, rows = mark.join(unit.format(name) for name in names.split()), (("1", "0", "0", "0"), ("7", "1", "0.5", "0"))
+    between = "," if "," in mark else "\t" if "\t" in mark else " "
+    (tmp_path / "n.csv").write_text("\n".join([head, *(between.join(row) for row in rows), ""]))
+    if names == "node x y z":
+        assert read_node_file(tmp_path / "n.csv").coordinates[1].tolist() == [1, 0.5, 0]
+        return
+    with pytest.raises(fw.InputError, match="another order"):
+        read_node_file(tmp_path / "n.csv")
+
+
+@pytest.mark.parametrize(
+    "head",
+    ["Node Number,X Location (m),Y,Z", "Node Number X Y Z", "id,x [m],y [m],z [m]", "Node\tX Location (m)\tY\tZ"],
+)
 def test_headings_of_other_words(head: str, tmp_path: Path) -> None:
     text = "1,0,0,0\n7,1,0.5,0\n"
     (tmp_path / "n.csv").write_text(f"{head}\n{text if ',' in head else text.replace(',', ' ')}")

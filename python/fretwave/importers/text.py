@@ -30,6 +30,7 @@ PACKED = {
     codecs.BOM_UTF16_LE: ("text in UTF-16", "write it in UTF-8: iconv -f UTF-16 -t UTF-8 {}"),
     codecs.BOM_UTF16_BE: ("text in UTF-16", "write it in UTF-8: iconv -f UTF-16 -t UTF-8 {}"),
 }
+_UNIT = re.compile(r"[\[(][^\[\](),\t]*[\])]")
 _EXPONENT = re.compile(r"[eEdD][+-]?\d+$")
 
 
@@ -87,19 +88,27 @@ def _first_data(head: bytes) -> tuple[int, str]:
 
 
 def check_heading(line: str, columns: Sequence[str], where: str) -> None:
-    """Columns that a heading names stand where they are read; other words, and units in brackets, are passed over.
+    """Columns that a heading names stand where they are read; other words, and units, are passed over.
 
     Raises
     ------
     InputError
-        A column stands at another's place.
+        A column stands at another's place, or before another that it follows.
     """
-    parts = line.split("," if "," in line else None)
-    words = [re.split(r"[\[(]", part.strip('" '))[0].strip().lower() for part in parts]
-    moved = any(word in columns and columns.index(word) != place for place, word in enumerate(words))
-    if moved and len(words) <= len(columns):  # else blanks part a name of several words
+    words = _heading_words(line)
+    named = [(place, columns.index(word)) for place, word in enumerate(words) if word in columns]
+    found = [column for _, column in named]
+    moved = len(words) <= len(columns) and any(place != column for place, column in named)
+    if moved or found != sorted(found):  # more words than columns: blanks part a name of several words
         expected, fix = ",".join(columns), "write the columns in this order"
         raise InputError("the columns stand in another order", where, line.strip(), expected, fix)
+
+
+def _heading_words(line: str) -> list[str]:
+    """How the name of each column begins, without its unit: z of ``z (mm)``, ``z/mm``, or ``Z position [mm]``."""
+    plain = _UNIT.sub(" ", line).strip()
+    names = plain.split(",") if "," in plain else re.split(r"\t+" if "\t" in plain else r"\s+", plain)
+    return [re.split(r"[\s/\[(]", name.strip('" '))[0].lower() for name in names]
 
 
 def columns_of(
