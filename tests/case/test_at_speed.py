@@ -144,6 +144,28 @@ def test_a_reduction_with_all_component_modes_keeps_the_turning_model(sector, mo
     assert np.ptp(found[0]) > 5.0 and len(found[0]) == (24 if sector else 8)
 
 
+#: Free of what holds it at rest from 30 rev/min on.
+LOOSE = """
+[model]
+dofs = ["a", "b", "c"]
+M = [[2.0, 0, 0], [0, 1.0, 0], [0, 0, 0.5]]
+K = [[60.0, -40.0, 0], [-40.0, 60.0, -20.0], [0, -20.0, 20.0]]
+at_speed = { 30 = [[40.0, -40.0, 0], [-40.0, 40.0, -20.0], [0, -20.0, 0.0]] }
+"""
+
+
+@pytest.mark.parametrize("count, left, told", [(2, 2, "no frequency is compared, 2 at 0 Hz"), (3, 2, ", 2 at 0 Hz")])
+def test_what_is_unstable_at_a_speed_has_no_error(count, left, told, tmp_path):
+    """K(Omega) is indefinite: 0 Hz was counted as exact, whatever the reduced model has there."""
+    text = f'{LOOSE}[reduction]\nmodes = 2\ncompare = {count}\n{ANALYSIS}dampers = [{{ dof = "b", c = 0.0 }}]\n'
+    (tmp_path / "case.toml").write_text(text, encoding="utf-8")
+    assert call("run", tmp_path / "case.toml", "--no-plots", "--out", tmp_path / "run") == 0
+    (found,) = json.loads((tmp_path / "run" / "run.json").read_text())["reduction"]["speeds"]
+    assert found["full_hz"].count(0.0) == found["relative"].count(None) == left
+    assert all(abs(error) < SOLVED for error in found["relative"] if error is not None)
+    assert told in (tmp_path / "run" / "run.log").read_text() and "–" in report_text(tmp_path / "run")
+
+
 @pytest.mark.parametrize("sector", [True, False])
 def test_a_reduction_states_its_error_at_the_speeds_that_are_asked_for(sector, tmp_path):
     """As the tables of the unreduced and of the reduced model differ: it was made with the stiffness at rest."""

@@ -236,7 +236,7 @@ def test_contact_however_stiff_hides_no_frequency(capfd, stiffness: float) -> No
     both = [f"--set=contact.joint.{name}_stiffness={stiffness:g}" for name in ("normal", "tangential")]
     assert call("check", LAP_JOINT, "--only", "rest", *both) == 0
     out = capfd.readouterr().out
-    assert "stuck contact, 42.5672 to 1080.94 Hz, are off by 1.9e-06 (first)" in out
+    assert "stuck contact: 42.5672 to 1080.94 Hz are off by 1.9e-06 (first)" in out
     assert "25 stick, 0 slip, 0 open; normal forces sum to 500 N" in out
 
 

@@ -11,6 +11,7 @@ from tolerances import ROUNDING, SOLVED, TIGHT
 import fretwave as fw
 from fretwave.cyclic.faces import rotation
 from fretwave.cyclic.reduction import reduce_sector
+from fretwave.cyclic.waves import WaveError
 from fretwave.errors import InputError
 from fretwave.model.sectors import ties
 
@@ -67,6 +68,17 @@ def test_waves_that_gave_interface_modes_are_kept(built, comm):
         assert used.gave_interface_modes and not other.gave_interface_modes
         assert np.abs(used.relative).max() < ROUNDED
         assert other.relative.min() > -ROUNDED and 1e-6 < other.largest < 0.1
+
+
+def test_rigid_waves_have_no_error():
+    """A line of these alone said that they are exact."""
+    hz, errors = np.array([0.0, 0.0, 50.0]), np.array([np.nan, np.nan, 1e-3])
+    assert WaveError(0, "free", None, hz, hz, errors).line() == (
+        "0 nodal diameters, free: 50 to 50 Hz are off by 1.0e-03 (first) to 1.0e-03 (worst),"
+        " 2 at 0 Hz, rigid or unstable, left out"
+    )
+    line = WaveError(0, "free", None, hz[:2], hz[:2], errors[:2]).line()
+    assert line.endswith(": no frequency is compared, 2 at 0 Hz, rigid or unstable, left out")
 
 
 def test_errors_fall_with_component_modes_and_are_not_negative(built, comm):

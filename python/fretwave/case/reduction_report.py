@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
+from ..model.compared import off_by
 from ..model.contact import in_limit
 from ..model.structure import SPIN
 from .checks_tables import waves_of
@@ -36,8 +37,8 @@ class ReductionReport:
         Frequency of the last component mode.
     full_hz, reduced_hz : list of float
         Lowest linear frequencies with stuck contact, without and with reduction.
-    relative : list of float
-        reduced / full - 1.
+    relative : list of float or None
+        reduced / full - 1, None at 0 Hz: of a rigid or unstable motion.
     wall_s : float
         Of the reduction; `compare_wall_s` that of the comparison.
     interface : int
@@ -59,7 +60,7 @@ class ReductionReport:
     highest_component_hz: float
     full_hz: list[float]
     reduced_hz: list[float]
-    relative: list[float]
+    relative: list[float | None]
     wall_s: float
     compare_wall_s: float
     interface: int = 0
@@ -97,13 +98,8 @@ class ReductionReport:
             f" (up to {self.highest_component_hz:.4g} Hz), {self.wall_s:.1f} s"
         )
         if self.relative:
-            worst = max(self.relative, key=abs)
-            text += (
-                f"; the lowest {len(self.relative)} frequencies with stuck contact, {self.full_hz[0]:.6g} to"
-                f" {self.full_hz[-1]:.6g} Hz, are off by {self.relative[0]:.1e} (first) to {worst:.1e} (worst)"
-            )
-            if not all(self.full_hz):
-                text += "; 0 Hz is a rigid motion"
+            off = off_by(self.full_hz, self.relative)
+            text += f"; the lowest {len(self.relative)} frequencies with stuck contact: {off}"
         return text
 
 
@@ -149,8 +145,9 @@ def _of_structure(case: Case, reduced: Case, comm: MPI.Comm, full_hz: list[float
     }
 
 
-def _relative(full: list[float], small: list[float]) -> list[float]:
-    return [r / f - 1 if f else 0.0 for f, r in zip(full, small)]
+def _relative(full: list[float], small: list[float]) -> list[float | None]:
+    """None at 0 Hz, which is no exact frequency but a motion that no stiffness holds."""
+    return [r / f - 1 if f else None for f, r in zip(full, small)]
 
 
 def _at_speeds(case: Case, reduced: Case, comm: MPI.Comm) -> list[dict[str, Any]]:
@@ -176,11 +173,7 @@ def _at_speeds(case: Case, reduced: Case, comm: MPI.Comm) -> list[dict[str, Any]
 def _line_at_speed(found: Mapping[str, Any]) -> str:
     """For the log."""
     wave = f"{found['nodal_diameter']} nodal diameters, " if "nodal_diameter" in found else ""
-    full, relative = found["full_hz"], found["relative"]
-    return (
-        f"at {found['speed_rpm']:g} rev/min, {wave}stuck: {full[0]:.6g} to {full[-1]:.6g} Hz are off by"
-        f" {relative[0]:.1e} (first) to {max(relative, key=abs):.1e} (worst)"
-    )
+    return f"at {found['speed_rpm']:g} rev/min, {wave}stuck: {off_by(found['full_hz'], found['relative'])}"
 
 
 def _stuck_hz(case: Case, count: int, comm: MPI.Comm, nodal_diameter: int = 0) -> list[float]:

@@ -10,6 +10,7 @@ import numpy as np
 from mpi4py import MPI
 
 from ..arrays import Array, Complex, Indices
+from ..model.compared import off_by
 from ..model.contact import Contact, in_limit
 from ..model.modes import linear_modes
 from .sector import Sector
@@ -54,12 +55,8 @@ class WaveError:
     def line(self) -> str:
         """For a log."""
         source = {None: "", True: " (gave interface modes)", False: " (gave no interface modes)"}
-        first = next((e for e in self.relative if np.isfinite(e)), 0.0)
-        return (
-            f"{self.nodal_diameter} nodal diameters, {self.state}{source[self.gave_interface_modes]}:"
-            f" {self.full_hz[0]:.6g} to {self.full_hz[-1]:.6g} Hz are off by {first:.1e} (first) to"
-            f" {self.largest:.1e} (worst)"
-        )
+        off = off_by(self.full_hz.tolist(), self.relative.tolist())
+        return f"{self.nodal_diameter} nodal diameters, {self.state}{source[self.gave_interface_modes]}: {off}"
 
 
 class SectorWaves:
