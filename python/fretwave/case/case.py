@@ -226,9 +226,13 @@ class Case:
 
         return replace(damped, C=with_terms(damped.C, self.modal_damping))
 
+    def turns_at(self, part: str) -> float:
+        """Speed [rev/min] whose share of a part of the stiffness K has already."""
+        return self.speed_rpm if part == SPIN else 0.0
+
     def turning(self, part: str, speed_rpm: float) -> Case:
         """The same at another speed [rev/min], where a part of the stiffness grows with its square."""
-        own = self.speed_rpm if part == SPIN else 0.0  # what K has of it already
+        own = self.turns_at(part)
         return replace(self, structure=self.structure.stiffened(part, omega_squared(speed_rpm) - omega_squared(own)))
 
     def damping_with(self, dampers: Sequence[Damper]) -> Sparse | None:

@@ -9,7 +9,7 @@ from ..hb.states import ZETA_FLOOR
 
 if TYPE_CHECKING:
     from .load import Case
-    from .reduction_report import ReductionReport
+    from .reduction_report import FullHz, ReductionReport
 
 #: A number is doubled as long as the error falls below this share: what is left is not of the component modes.
 GAIN = 0.7
@@ -46,21 +46,20 @@ class Choice:
     frequencies : how many of the lowest ones count, of those that are compared
     tried : (number, largest relative error of these) of each
     end : why no more were tried; empty where the accuracy is kept
-    full_hz : frequencies of the unreduced structure, the same whatever is tried; empty until they are known
+    full_hz : frequencies of the unreduced model, the same whatever is tried, as far as they are known
     """
 
     asked: float
     frequencies: int
     tried: list[tuple[int, float]] = field(default_factory=list)
     end: str = ""
-    full_hz: list[float] = field(default_factory=list)
+    full_hz: FullHz = field(default_factory=dict)
 
     def next(self, found: ReductionReport) -> int | None:
         """The number to try after this one; None if it is enough, or no more modes help."""
         errors = [abs(e) for waves in found.every_relative() for e in waves[: self.frequencies] if e is not None]
         error, before = max(errors, default=0.0), self.tried[-1][1] if self.tried else float("inf")
         self.tried.append((found.component_modes, error))
-        self.full_hz = found.full_hz
         inner = (found.unreduced - found.kept) // (2 if found.interface else 1)  # a sector's faces are none of it
         most = min(MOST, inner)
         if error <= self.asked:

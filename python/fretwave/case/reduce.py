@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, cast
@@ -48,6 +48,7 @@ def reduce_case(
     modes: int | None = None,
     look: Callable[[Reduction | SectorReduction], None] | None = None,
     keep: bool = False,
+    only: Sequence[str] | None = None,
 ) -> Case:
     """The case on its reduced matrices, itself when it asks for no reduction. Collective.
 
@@ -59,13 +60,17 @@ def reduce_case(
         Gets the reduction while it lives. Collective.
     keep : bool
         Whether it lives on as the case's `basis` if it is small: an analysis will ask for its error.
+    only : sequence of str, optional
+        Analyses that run, where not all do: at the speeds of others no error is stated. A number of component modes
+        that is to be chosen takes all into account, so that it is the same whichever run.
     """
     if case.reduction is None:
         return case
     choice = None if modes is not None else choice_of(case)
+    names = case.analyses if only is None or choice is not None else only
     reduced = None
     while reduced is None:
-        reduced, modes = _reduced(case, comm, modes, look, choice, keep)
+        reduced, modes = _reduced(case, comm, modes, look, choice, keep, list(names))
     return replace(reduced, unreduced=case.structure if case.reduction.error_at is not None else None)
 
 
@@ -76,6 +81,7 @@ def _reduced(
     look: Callable[[Reduction | SectorReduction], None] | None,
     choice: Choice | None,
     keep: bool,
+    names: Sequence[str],
 ) -> tuple[Case | None, int | None]:
     """With this many component modes; or, where they are not enough, none and how many to take. Collective."""
     began = time.perf_counter()
@@ -85,8 +91,8 @@ def _reduced(
         full = case.structure
         small = full.reduced(reduction) if full.cut is None else full.cut.reduced(reduction).tied()
         reduced = replace(case, structure=small, contacts=on(case.contacts, small))
-        wall, full_hz = time.perf_counter() - began, [] if choice is None else choice.full_hz
-        report = report_of(case, reduced, reduction, wall, comm, full_hz)
+        wall, full_hz = time.perf_counter() - began, {} if choice is None else choice.full_hz
+        report = report_of(case, reduced, reduction, wall, comm, full_hz, names)
         if choice is not None:
             more = choice.next(report)
             if more is not None:

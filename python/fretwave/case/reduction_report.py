@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, Dict, List, Tuple, cast
 
 import numpy as np
 
@@ -23,6 +23,10 @@ if TYPE_CHECKING:
     from ..model.reduction import Reduction
     from .analysis import AnalysisSection
     from .load import Case
+
+#: Lowest frequencies [Hz] of an unreduced model by the part of its stiffness that grows with the speed squared, the
+#: speed [rev/min] and the nodal diameter.
+FullHz = Dict[Tuple[str, float, int], List[float]]
 
 
 @dataclass(frozen=True)
@@ -109,13 +113,15 @@ def report_of(
     reduction: Reduction | SectorReduction,
     wall: float,
     comm: MPI.Comm,
-    full_hz: list[float],
+    full_hz: FullHz,
+    names: Sequence[str],
 ) -> ReductionReport:
     """What was reduced, with the lowest frequencies before and after. Collective.
 
     Parameters
     ----------
-    full_hz : those before, of a structure, where they are known; else empty
+    full_hz : those before as far as they are known; others are added
+    names : analyses at whose speeds they are compared
     """
     began = time.perf_counter()
     common: dict[str, Any] = {
@@ -127,15 +133,15 @@ def report_of(
         found = _of_sector(case, cast("SectorReduction", reduction))
     else:
         found = _of_structure(case, reduced, comm, full_hz)
-    found["speeds"] = _at_speeds(case, reduced, comm)
+    found["speeds"] = _at_speeds(case, reduced, comm, full_hz, names)
     return ReductionReport(**common, **found, compare_wall_s=round(time.perf_counter() - began, 3))
 
 
-def _of_structure(case: Case, reduced: Case, comm: MPI.Comm, full_hz: list[float]) -> dict[str, Any]:
+def _of_structure(case: Case, reduced: Case, comm: MPI.Comm, full_hz: FullHz) -> dict[str, Any]:
     assert case.reduction is not None
     count = min(case.reduction.compare, reduced.structure.n_dof)
     small = _stuck_hz(reduced, count, comm) if count else []
-    full = full_hz if len(full_hz) == count else _stuck_hz(case, count, comm)
+    full = _known_hz(full_hz, (SPIN, case.speed_rpm, 0), case, count, comm) if count else []
     return {
         "unreduced": case.structure.n_dof,
         "kept": len(case.keep),
@@ -150,20 +156,32 @@ def _relative(full: list[float], small: list[float]) -> list[float | None]:
     return [r / f - 1 if f else None for f, r in zip(full, small)]
 
 
-def _at_speeds(case: Case, reduced: Case, comm: MPI.Comm) -> list[dict[str, Any]]:
+def _known_hz(known: FullHz, key: tuple[str, float, int], case: Case, count: int, comm: MPI.Comm) -> list[float]:
+    """Lowest frequencies of the unreduced model, solved for once. Collective."""
+    if len(known.get(key, ())) < count:
+        part, speed, diameter = key
+        at_speed = case if speed == case.turns_at(part) else case.turning(part, speed)
+        known[key] = _stuck_hz(at_speed, count, comm, diameter)
+    return known[key][:count]
+
+
+def _at_speeds(
+    case: Case, reduced: Case, comm: MPI.Comm, full_hz: FullHz, names: Sequence[str]
+) -> list[dict[str, Any]]:
     """The comparison where another share of the stiffness acts than that which was reduced. Collective."""
     section = case.reduction
     assert section is not None
-    asked = [analysis.spins() for analysis in case.analyses.values()]
+    asked = [case.analyses[name].spins() for name in names]
     ends = dict.fromkeys((part, speed) for part, speeds in asked for speed in (*speeds[:1], *speeds[-1:]))
     count = min(section.compare, reduced.structure.n_dof)
     sector, found = case.structure.cut is not None, []
     for part, speed in ends if count else ():
-        if part == SPIN and speed == case.speed_rpm:
+        if speed == case.turns_at(part):
             continue  # as it was reduced
-        both = [one.turning(part, speed) for one in (case, reduced)]
+        there = reduced.turning(part, speed)
         for diameter in _compared(section, case.analyses) if sector else [0]:
-            full, small = (_stuck_hz(one, count, comm, diameter) for one in both)
+            full = _known_hz(full_hz, (part, speed, diameter), case, count, comm)
+            small = _stuck_hz(there, count, comm, diameter)
             values = {"full_hz": full, "reduced_hz": small, "relative": _relative(full, small)}
             wave = {"nodal_diameter": diameter} if sector else {}
             found.append({"speed_rpm": speed, **wave, "contact": "stuck", **values})

@@ -42,7 +42,7 @@ def check_case(
     on_first_rank(comm, lambda: checks.check_chosen([case.analyses[name] for name in names], case))
     check_sweeps(case, names, RunOptions(overrides=list(overrides), quick=quick), comm)
     warnings = odd_ratios(case)
-    case = reduce_case(case, comm)
+    case = reduce_case(case, comm, only=names)
     with build_model(case, (), comm) as model:
         described = {name: [case.analyses[name].headline(), *case.analyses[name].details(model)] for name in names}
     found = at_rest(case, names if solve else [], comm)

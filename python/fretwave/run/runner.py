@@ -170,7 +170,7 @@ class Runner:
         """Solve on the reduced model from here on, when the case asks for one; its error is kept."""
         at = None if self.case.reduction is None else self.case.reduction.error_at
         asked = at is not None and any(self.case.analyses[name].passes(at) for name in names)
-        self.case = reduce_case(self.case, self.comm, look=self._keep_basis, keep=asked)
+        self.case = reduce_case(self.case, self.comm, look=self._keep_basis, keep=asked, only=names)
         if self.case.reduced is not None:
             for line in self.case.reduced.lines():
                 self.console.line(line)

@@ -84,7 +84,8 @@ class Solver(ABC, Generic[Begun]):
             if self._parts is not None:
                 self._parts[1].model.destroy()
             analysis = self.analysis
-            case = on_wheel(reduce_case(self.case, self.comm, component_modes), analysis)
+            reduced = reduce_case(self.case, self.comm, component_modes, only=[analysis.name])
+            case = on_wheel(reduced, analysis)
             preload, diameters = case.preload_of(analysis), nodal_diameter(analysis)
             model = build_model(case, analysis.dampers, self.comm, preload, diameters, analysis.aerodynamics)
             context = AnalysisContext(model, case, analysis, self.comm, Path(), self.console)

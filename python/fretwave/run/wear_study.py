@@ -176,7 +176,7 @@ class _Solver:
     """Marches wear at the largest amplitude of an analysis with any settings. Collective, as all methods."""
 
     def __init__(self, case: Case, analysis: WearAnalysis, comm: MPI.Comm, console: Console, repeats: int) -> None:
-        self.case = reduce_case(case, comm)
+        self.case = reduce_case(case, comm, only=[analysis.name])
         self.analysis = analysis.model_copy(update={"amplitude": [max(analysis.amplitude)]})
         self.comm, self.console, self.repeats = comm, console, repeats
         mode = self._mode(None)
