@@ -7,7 +7,6 @@ import pytest
 from tolerances import LAST_DIGITS, ROUNDING
 
 from fretwave.post.fatigue import (
-    first_largest,
     first_reaching,
     goodman,
     mean_stress,
@@ -87,10 +86,3 @@ def test_the_limit_is_read_between_points() -> None:
     assert first_reaching(2.0 * amplitude, 1.0, amplitude) is None
     folded = np.array([0.5, 1.5, 0.7, 1.3])
     assert first_reaching(folded, 1.0, amplitude) == pytest.approx((1.5,), rel=LAST_DIGITS)
-
-
-def test_of_equal_values_the_first_is_the_largest() -> None:
-    rng = np.random.default_rng(1)
-    for _ in range(20):
-        assert first_largest(3.0 * (1 + 1e-6 * rng.uniform(-1, 1, 24))) == 0
-    assert first_largest(np.array([1.0, 2.0, 2.001])) == 2 and first_largest(np.zeros(3)) == 0

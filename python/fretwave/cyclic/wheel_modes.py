@@ -15,6 +15,7 @@ import numpy as np
 from ..arrays import Array, Complex
 from ..model.modes import LinearMode
 from ..model.wheel_matrix import Matrix, WheelMatrix
+from ..post.largest import largest
 from .sector import Sector, wave_mode
 
 #: Modes of a mistuned wheel whose shares in a tuned wave differ by less are alike in it: the lower one is taken.
@@ -73,7 +74,7 @@ def most_alike(modes: Sequence[LinearMode], wave: LinearMode, M: Matrix | Sector
         M = WheelMatrix(M.M, M.sectors)
     phi = wave.shape + 1j * wave.imaginary
     shares = np.array([abs(phi.conj() @ (M @ mode.shape)) ** 2 for mode in modes])
-    return modes[int(np.flatnonzero(shares > (1 - ALIKE) * shares.max())[0])]
+    return modes[largest(shares, ALIKE)]
 
 
 def deviations(sectors: int, standard_deviation: float, seed: int = 1) -> Array:

@@ -21,7 +21,8 @@ import numpy.typing as npt
 from ..arrays import Complex
 from ..model.sectors import Given
 from ..model.wheel_matrix import WheelMatrix
-from ..post.wave_content import largest, participation, wave_content
+from ..post.largest import largest
+from ..post.wave_content import participation, wave_content
 from .engine_order import folded
 
 if TYPE_CHECKING:

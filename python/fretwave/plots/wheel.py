@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from ..arrays import Complex
 from ..cyclic.engine_order import folded
+from ..post.largest import as_large
 from ..post.mode_curve import NO_DAMPING
 from ..post.motion import complex_amplitudes
 from ..post.wave_content import wave_content
@@ -78,7 +79,8 @@ def _points(mode: Analysis) -> list[int]:
 def _sectors(axes: Axes, mode: Analysis, point: int, a: Complex) -> None:
     tuned = np.abs(a).max() / mode.columns["amplification"][point]
     places, size = np.arange(len(a)), np.abs(a)
-    alone = (size == size.max()) & (np.count_nonzero(size >= (1 - ALIKE) * size.max()) == 1)  # not of a tuned wave
+    most = as_large(size, ALIKE)
+    alone = most & (most.sum() == 1)  # not of a tuned wave
     axes.bar(places, size / tuned, color=np.where(alone, style.RED, style.BLUE), width=0.8)
     axes.axhline(1.0, color=style.GREY, linestyle="--", linewidth=1.0)
     axes.set_xlim(-0.7, len(a) - 0.3)

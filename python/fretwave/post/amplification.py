@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..arrays import Array, Complex
-from .wave_content import largest
+from .largest import largest
 
 #: Points about each natural frequency, out to so many half-power widths; rounds of a finer search about the largest.
 POINTS, WIDTHS, ROUNDS, FINE = 33, 3.0, 6, 11

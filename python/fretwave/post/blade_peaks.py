@@ -7,8 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from ..arrays import Array
+from .largest import largest
 from .response_peaks import NOWHERE, Peak, amplitude_peak
-from .wave_content import largest
 
 
 def blade_tables(

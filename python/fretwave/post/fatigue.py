@@ -85,11 +85,6 @@ def goodman(amplitude: Array, mean: Array, endurance_limit: float, ultimate_stre
     return np.asarray(amplitude / endurance_limit + np.maximum(mean, 0.0) / ultimate_strength)
 
 
-def first_largest(values: Array) -> int:
-    """Place of the largest of (n,); of those that cannot be told apart the first."""
-    return int(np.argmax(values >= (1 - EQUAL) * values.max()))
-
-
 def first_reaching(values: Array, limit: float, *columns: Array) -> tuple[float, ...] | None:
     """Columns where values along a branch first pass a limit from below, off straight lines; None where they do not."""
     rises = np.flatnonzero((values[:-1] < limit) & (values[1:] >= limit))

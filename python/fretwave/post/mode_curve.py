@@ -10,6 +10,7 @@ import numpy as np
 
 from ..arrays import Array
 from ..errors import InputError
+from .largest import largest
 
 #: weights of (log amplitude, relative frequency, damping ratio) in the length along the curve: all of order one
 LENGTH_WEIGHTS = (1.0, 10.0, 20.0)
@@ -19,27 +20,18 @@ NO_DAMPING = 1e-10
 AT_THE_END = 1e-10
 #: Relative steps of the amplitude below this have no direction: a point that is there twice.
 NO_STEP = 1e-9
-
-
-#: Values whose difference is a smaller share of the largest are alike to rounding, of damping ratios and frequencies,
-SAME_DAMPING, SAME_FREQUENCY = 1e-9, 1e-12
-#: and damping ratios that differ by less.
+#: Damping ratios that differ by less are alike to rounding.
 LEAST_DAMPING = 1e-13
-
-
-def first_largest(values: Array, rounding: float) -> int:
-    """Point of the largest value; of those that are alike to rounding the first."""
-    return int(np.argmax(values >= np.max(values) - rounding))
 
 
 def most_damped(zeta: Array) -> int:
     """Point of the largest damping; the first of a branch that does not slip, where all differ by rounding alone."""
-    return first_largest(zeta, max(SAME_DAMPING * float(np.abs(zeta[np.isfinite(zeta)]).max()), LEAST_DAMPING))
+    return largest(zeta, least=LEAST_DAMPING)
 
 
 def lowest(frequency: Array) -> int:
     """Point of the lowest frequency; of those that are alike to rounding the first."""
-    return first_largest(-frequency, SAME_FREQUENCY * float(np.max(frequency)))
+    return largest(-frequency)
 
 
 def at_the_end(values: Array, asked: float) -> float:

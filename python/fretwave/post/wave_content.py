@@ -8,18 +8,11 @@ from ..arrays import Array, Complex
 
 #: How far the cut of a phase lies beside pi [rad], where sectors that move against each other stand to rounding.
 CUT = 1e-6
-#: Sectors or waves whose share of the largest differs by less are alike to rounding.
-ALIKE = 1e-9
 
 
 def wave_content(a: Complex) -> Complex:
     """c_n of n = 0 .. N - 1, of sectors' amplitudes along the last axis."""
     return np.asarray(np.fft.ifft(a))
-
-
-def largest(values: Array) -> int:
-    """Index of the largest of sectors or waves; of those that are alike to rounding the first."""
-    return int(np.argmax(values >= (1 - ALIKE) * np.max(values)))
 
 
 def participation(a: Complex) -> float:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..files.lock import is_taken
+from ..post.largest import largest
 from ..post.limit_cycles import stability
 from ..post.mode_curve import most_damped
 from ..texts import counted
@@ -181,9 +182,8 @@ def peak_row(table: Mapping[str, Any]) -> int | None:
     amplitude = "largest_amplitude" if "largest_amplitude" in table else "amplitude"
     of = "zeta" if "zeta" in table and "omega0" in table else amplitude if "level" in table else None
     values = np.empty(0) if of is None else np.asarray(table[of], dtype=float)
-    known = np.isfinite(values)
-    largest = most_damped if of == "zeta" else np.argmax
-    return int(largest(np.where(known, values, -np.inf))) if known.any() else None
+    top = most_damped if of == "zeta" else largest
+    return top(values) if np.isfinite(values).any() else None
 
 
 def _peak(table: Mapping[str, Any], group: h5py.Group) -> dict[str, Any]:

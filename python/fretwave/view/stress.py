@@ -24,7 +24,8 @@ from ..columns import COLUMNS, Column
 from ..errors import InputError
 from ..fe.strain import StrainRows, along, nodal_strain, stress_of
 from ..model.structure import Structure
-from ..post.fatigue import first_largest, goodman, mean_stress, stress_amplitude, swing
+from ..post.fatigue import EQUAL, goodman, mean_stress, stress_amplitude, swing
+from ..post.largest import largest
 from ..results.parts import PARTS
 from ..results.results import open_results
 from ..texts import display
@@ -104,7 +105,7 @@ class Reader:
         stress = stress_of(self.strain(motion), *self.gauges.elastic)
         amplitude, mean = stress_amplitude(labels, stress), mean_stress(labels, stress)
         factor = None if self.gauges.limits is None else goodman(amplitude, mean, *self.gauges.limits)
-        k = first_largest(amplitude if factor is None else factor)
+        k = largest(amplitude if factor is None else factor, EQUAL)
         found = {
             "worst_node": int(node_numbers(self.structure)[k]),
             "stress_amplitude": amplitude[k],
@@ -205,7 +206,7 @@ def _row(reader: Reader, scene: Scene, choice: Choice) -> dict[str, Any]:
         for gauge, read in zip(reader.gauges.gauges, reader.strains(labels, motion)):
             strains.update(read if not choice.wheel or gauge.sector == sector else {})
     sizes = [float(one.get("goodman", one.get("stress_amplitude", 0.0))) for one in worst]
-    return {**strains, **worst[first_largest(np.array(sizes))]}
+    return {**strains, **worst[largest(np.array(sizes), EQUAL)]}
 
 
 def _motion(scene: Scene, sector: int) -> tuple[list[str], Array]:

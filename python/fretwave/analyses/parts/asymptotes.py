@@ -15,7 +15,7 @@ from ...case.analysis import AnalysisSection
 from ...case.harmonic import HarmonicSection, nodal_diameter
 from ...model.contact import Contact, in_limit
 from ...model.sectors import in_wave
-from ...post.wave_content import largest
+from ...post.largest import largest
 from .context import AnalysisContext
 
 if TYPE_CHECKING:

@@ -15,8 +15,8 @@ from ...arrays import Complex
 from ...case.harmonic import nodal_diameter
 from ...case.observed import dof_of
 from ...cyclic.engine_order import speed_rpm
+from ...post.largest import largest
 from ...post.motion import complex_amplitudes
-from ...post.wave_content import largest
 from .branch import continuation
 from .context import AnalysisContext
 from .observed import observed_by

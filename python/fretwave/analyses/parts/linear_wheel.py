@@ -14,7 +14,8 @@ from ...errors import InputError
 from ...model.sectors import in_wave
 from ...post.amplification import WIDTHS, Family, Largest, largest_peak
 from ...post.blade_peaks import whitehead
-from ...post.wave_content import largest, participation, wave_content
+from ...post.largest import largest
+from ...post.wave_content import participation, wave_content
 from .asymptotes import limit_model
 from .context import AnalysisContext
 

@@ -12,8 +12,8 @@ from ...arrays import Complex
 from ...case.harmonic import HarmonicSection
 from ...cyclic.engine_order import folded
 from ...errors import FretwaveError
+from ...post.largest import largest
 from ...post.limit_cycles import STUCK
-from ...post.wave_content import largest
 from .context import AnalysisContext
 from .fed_modes import FED, fed_modes, motions, shapes_of
 from .rest import rest_state

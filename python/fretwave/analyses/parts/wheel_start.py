@@ -12,7 +12,7 @@ import scipy.sparse as sp
 from ...arrays import Complex
 from ...case.harmonic import nodal_diameter
 from ...case.observed import dof_of
-from ...post.wave_content import largest
+from ...post.largest import largest
 from .asymptotes import most_like, other_asymptote
 from .context import AnalysisContext
 from .observed import observed_by
