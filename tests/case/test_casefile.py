@@ -231,6 +231,13 @@ def test_wrong_overrides(override: str, said: str) -> None:
     assert str(problem.where).startswith(f"--set {override}")
 
 
+@pytest.mark.parametrize("asked", ["Non", "None", "non"])
+def test_an_entry_without_a_name_is_not_meant(write, asked: str) -> None:
+    told = problems(write(('name = "mode"\n', "")), f"{asked}.harmonics=3")
+    assert any("addresses nothing" in one.what for one in told)
+    assert not any("None" in text for one in told for text in (one.expected or "", one.fix or ""))
+
+
 def test_overrides_address_by_name() -> None:
     case = load_case(
         CASE,

@@ -71,4 +71,4 @@ class Facts:
     def analyses_of(self, kind: str) -> list[str]:
         """Names of the analyses of a type, also of those that are wrong."""
         entries = self.source.entries("analysis")
-        return [str(entry.get("name")) for entry in entries if entry.get("type") == kind]
+        return [str(entry["name"]) for entry in entries if entry.get("type") == kind and "name" in entry]

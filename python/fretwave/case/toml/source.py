@@ -208,9 +208,10 @@ class Source:
     def _meant(self, kind: str, name: str, key: str) -> str | None:
         """The address of a near name: of a contact or a gauge with what it is, of an analysis without."""
         addresses = {
-            str(self.entry_name(one, number)): f"{one}.{self.entry_name(one, number)}".removeprefix("analysis.")
+            own: f"{one}.{own}".removeprefix("analysis.")
             for one in ([kind] if kind != "analysis" else ["gauge", "contact", "analysis"])
             for number in range(len(self.entries(one)))
+            if (own := self.entry_name(one, number)) is not None
         }
         return nearest(name, list(addresses), lambda near: f"did you mean `{addresses[near]}.{key}`?")
 
