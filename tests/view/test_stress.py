@@ -138,6 +138,13 @@ def test_shapes_of_linear_modes_are_no_motion_to_look_at_first(tmp_path: Path, c
     assert "linear: point 0, " in capfd.readouterr().out
 
 
+def test_beside_linear_modes_alone_no_analysis_is_advised(tmp_path: Path, capfd) -> None:
+    folder = solved(tmp_path, CASE + MATERIAL + GAUGES + LINEAR + LINEAR.replace('"linear"', '"linear2"', 1))
+    for asked in ([], ["--analysis", "linear"], ["--analysis", "linear2"]):
+        assert call("stress", folder, *asked) == 2
+        assert capfd.readouterr().err.rpartition("fix:")[2].strip() == "run such an analysis"
+
+
 def test_the_limit_of_a_linear_mode_is_in_closed_form(run: Path, capfd) -> None:
     """Stress is linear in the amplitude: the limit is the amplitude over its factor."""
     found, limit = table(run / "mode_gauges.csv"), table(run / "mode_goodman.csv")

@@ -151,7 +151,7 @@ def _with_amplitudes(file: Mapping[str, Any], names: Sequence[str]) -> Sequence[
 def _check_amplitudes(file: Mapping[str, Any], name: str, case: Case) -> None:
     """The stress of a shape at a unit modal mass is no stress of the structure."""
     if of_linear_modes(file[name]):
-        others = [one for one in _with_amplitudes(file, analyses_that_move(file, case)) if one != name]
+        others = [one for one in analyses_that_move(file, case) if not of_linear_modes(file[one])]
         what, expected = "linear modes have no amplitude, and so no stress", "a mode or forced response of this run"
         fix = f"--analysis {others[0]}" if others else "run such an analysis"
         raise InputError(what, f"analysis '{name}'", None, expected, fix)
