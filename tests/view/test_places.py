@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from command_line import call
 
+from fretwave.commands.probe import _point_line
 from fretwave.view.choice import ViewOptions, points_asked
 from fretwave.view.places import around_places, branches_of
 
@@ -103,8 +104,10 @@ def test_an_amplitude_that_is_no_number_is_refused(run: Path, capsys, asked: str
     assert told.out == "" and "does not reach" in told.err
 
 
-def test_linear_modes_have_no_peak(tmp_path: Path, capsys) -> None:
-    """Their table has a damping ratio, but no branch on which it could be largest."""
+@pytest.fixture(scope="module")
+def linear(tmp_path_factory) -> Path:
+    """A run of linear modes alone."""
+    tmp_path = tmp_path_factory.mktemp("linear")
     shutil.copy(CASE, tmp_path / "case.toml")
     with (tmp_path / "case.toml").open("a") as file:
         file.write('\n[[analysis]]\nname = "linear"\ntype = "linear"\nmodes = 2\n')
@@ -112,6 +115,43 @@ def test_linear_modes_have_no_peak(tmp_path: Path, capsys) -> None:
     begin, quick = text.index("[quick]"), text.rindex("[[analysis]]")
     (tmp_path / "case.toml").write_text(text[:begin] + text[quick:])
     assert call("run", tmp_path / "case.toml", "--only", "linear", "--no-plots", "-q", "--out", tmp_path / "run") == 0
-    line = said(capsys, tmp_path / "run")
-    assert call("probe", tmp_path / "run", "--dof", "m1", "--at", "1e9") == 2
+    return tmp_path / "run"
+
+
+def test_linear_modes_have_no_peak(linear: Path, capsys) -> None:
+    """Their table has a damping ratio, but no branch on which it could be largest."""
+    line = said(capsys, linear)
+    assert call("probe", linear, "--dof", "m1", "--at", "1e9") == 2
     assert "point 0, contact stuck, mode 1" in line and "no peak" in line and "largest" not in line
+
+
+@pytest.mark.parametrize(
+    ("asked", "what"),
+    [
+        ([], "no analysis has motion of contact pairs"),
+        (["--analysis", "linear"], "'linear' has no motion of contact pairs"),
+        (["--analysis", "liner"], "there is no analysis 'liner'"),
+    ],
+)
+def test_what_no_analysis_has_is_told(linear: Path, capsys, asked: list[str], what: str) -> None:
+    assert call("probe", linear, "--pairs", *asked) == 2
+    told = capsys.readouterr()
+    assert told.out == "" and told.err.startswith(f"error: {what}\n")
+    assert told.err.rpartition("fix:")[2].strip() == "run a mode or forced response"
+
+
+@pytest.mark.parametrize(
+    ("own", "words"),
+    [
+        ({}, "amplitude 0.2 m, sector 3 moves most, "),
+        ({"largest_amplitude": 0.9}, "amplitude 0.2 m, largest of all sectors 0.9 m, in sector 3, "),
+    ],
+)
+def test_a_sector_stands_beside_its_own_amplitude(own: dict[str, float], words: str) -> None:
+    """A mode's amplitude is of the dof that is observed, in whatever sector; of a response there are both."""
+    with h5py.File("points", "w", driver="core", backing_store=False) as file:
+        points = file.create_group("points")
+        for name, value in {"amplitude": 0.2, "largest_sector": 3, "frequency_hz": 10.0, **own}.items():
+            points[name] = [value]
+        points["amplitude"].attrs["units"] = "m"
+        assert words in _point_line(file, "wheel", 0, "")

@@ -90,7 +90,7 @@ def _pairs(folder: Path, asked: str | None, at: At, out: Path | None) -> None:
 def _point_line(group: h5py.Group, name: str, point: int, said: str) -> str:
     """Which point it is."""
     table = group["points"]
-    unit = table["amplitude"].attrs.get("units", "")
+    unit, of_any = table["amplitude"].attrs.get("units", ""), "largest_amplitude" in table
     values = [f"{name}: point {point}"]
     if "contact" in table:  # of a linear analysis
         values.append(f"contact {table['contact'][point].decode()}")
@@ -101,7 +101,7 @@ def _point_line(group: h5py.Group, name: str, point: int, said: str) -> str:
         ("cycles", "{:.4g} cycles", 1.0),
         ("amplitude", f"amplitude {{:.6g}} {unit}", 1.0),
         ("largest_amplitude", f"largest of all sectors {{:.6g}} {unit}", 1.0),
-        ("largest_sector", "in sector {:g}", 1.0),
+        ("largest_sector", f"{'in ' * of_any}sector {{:g}}{' moves most' * (not of_any)}", 1.0),
         ("frequency_hz", "{:.6g} Hz", 1.0),
         ("zeta", "zeta {:.4g} %", 100.0),
     ):
@@ -176,4 +176,4 @@ def _cell(value: float, phase: float, largest: float, harmonic: float) -> str:
     """Amplitude and phase; what is rounding is zero."""
     if abs(value) < ZERO * largest:
         return f"{'0':>12}{'':>9}"
-    return f"{value:12.4g}" + (f"{phase:9.2f}" if harmonic else f"{'':>9}")
+    return f"{value:12.4g}" + (f"{round(phase, 2) + 0.0:9.2f}" if harmonic else f"{'':>9}")

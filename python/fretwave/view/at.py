@@ -118,6 +118,11 @@ def analysis_with(
     fix = (nearest(asked, found) if asked else None) or (
         f"--analysis {found[0]}" if found else "run a mode or forced response"
     )
-    missing = f"'{asked}' has no {what}" if asked in file else f"there is no analysis '{asked}'"
-    told = missing if asked else f"no analysis has {what}"
-    raise InputError(told, display(folder), f"analyses with {what}: {listed}", None, fix)
+    raise InputError(_missing(file, asked, what), display(folder), f"analyses with {what}: {listed}", None, fix)
+
+
+def _missing(file: h5py.File, asked: str | None, what: str) -> str:
+    """What there is not."""
+    if asked is None:
+        return f"no analysis has {what}"
+    return f"'{asked}' has no {what}" if asked in file else f"there is no analysis '{asked}'"
