@@ -17,9 +17,12 @@ from tolerances import ROUNDING
 
 import fretwave as fw
 from fretwave.report import page
+from fretwave.report.findings import marked
 from fretwave.report.log import log_lines, warnings_of
 from fretwave.report.model import translations
 from fretwave.results.file import rewritten
+from fretwave.results.overview import overviews
+from fretwave.results.reader import Run
 from fretwave.results.record import read_record, write_record
 from fretwave.results.results import AnalysisWriter
 
@@ -139,6 +142,21 @@ def test_the_rows_are_those_that_are_asked_for(run: Path) -> None:
         mine = np.flatnonzero(forced["level"] == level)
         assert int(mine[np.argmax(forced["amplitude"][mine])]) in rows["forced"]
     assert "limit cycle, stable" in found.text and "limit cycle, unstable" in found.text
+
+
+def test_the_rows_of_a_driven_wheel_are_those_of_its_overview(tmp_path: Path) -> None:
+    """Of each level the peak of any sector, not of the one that is observed, whose amplitude is largest elsewhere."""
+    columns = ["point", "level", "frequency_hz", "amplitude", "largest_amplitude", "largest_sector"]
+    writer = AnalysisWriter(tmp_path, "wheel", columns, {"type": "forced"})
+    found = [(1.0, 0.1, 0.2, 3), (1.0, 0.2, 0.9, 14), (1.0, 0.8, 0.81, 5), (1.0, 0.1, 0.1, 0)]
+    found += [(2 * level, 2 * own, 2 * largest, sector) for level, own, largest, sector in found]
+    for point, (level, own, largest, sector) in enumerate(found):
+        writer.append(dict(zip(columns, (point, level, 10.0 + point, own, largest, sector))))
+    writer.close("done", "stop value reached")
+    (told,), analysis = overviews(tmp_path)[1], Run(tmp_path).analyses["wheel"]
+    marks = marked(analysis, told)
+    assert [row for row, words in marks.items() if "largest amplitude of any sector" in words] == [1, 5]
+    assert told.peak["point"] in marks and not {2, 6} & {*marks}
 
 
 def test_it_says_what_the_run_is(run: Path, chain: Path) -> None:

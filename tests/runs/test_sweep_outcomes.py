@@ -11,7 +11,7 @@ from command_line import call
 from models.swept_case import CASE
 from tolerances import SOLVED
 
-from fretwave.results.sweep_summary import summarise
+from fretwave.results.sweep_summary import FORCED_LEVELS, summarise
 from fretwave.run.sweep import NAMED
 
 pytestmark = pytest.mark.ranks(1)
@@ -99,6 +99,14 @@ def test_a_branch_without_slip_has_no_amplitude_of_its_damping(damping: float) -
     found = summarise("mode", {**table, "zeta": damping * noise[2] + 1e-17 * random.standard_normal(n)}, {})
     assert np.isnan([found[name] for name in OF_AMPLITUDE]).all()
     assert found["largest_zeta"] == pytest.approx(damping, rel=SOLVED, abs=1e-15)
+
+
+def test_of_a_driven_wheel_the_line_is_of_the_sector_that_moves_most() -> None:
+    row = {"unit": "m", "largest_amplitude": 0.2, "frequency_of_largest_amplitude": 10.0}
+    blade = {"largest_blade_amplitude": 0.9, "largest_blade_frequency_hz": 11.0}
+    assert FORCED_LEVELS.words(row) == "largest 0.2 m at 10 Hz"
+    assert FORCED_LEVELS.words({**row, **blade, "largest_blade": 14.0}) == "largest 0.9 m of sector 14 at 11 Hz"
+    assert FORCED_LEVELS.words({**row, **blade, "largest_blade": np.nan}) == "largest 0.2 m at 10 Hz"
 
 
 def test_a_sweep_from_slip_to_stick(case: Path, tmp_path: Path, capsys) -> None:

@@ -11,6 +11,7 @@ from scipy.interpolate import PchipInterpolator
 
 from ..arrays import AnyArray
 from ..post.response_peaks import curve_length
+from ..results.overview import amplitude_column
 from ..results.reader import Analysis, Run, Table
 from . import marks, scales, style
 from .scales import Scale
@@ -110,7 +111,7 @@ def _amplitudes(forced: Analysis) -> tuple[AnyArray, AnyArray]:
 
 def _amplitude(forced: Analysis) -> AnyArray:
     """Of the observed dof; of a wheel in the sector where it is largest."""
-    return forced.columns.get("largest_amplitude", forced.columns["amplitude"])
+    return forced.columns[amplitude_column(forced.columns)]
 
 
 def _dof(forced: Analysis) -> str:

@@ -126,8 +126,7 @@ def figures(run: Run) -> Iterator[tuple[str, Figure]]:
         else:
             yield f"{analysis.name}_responses", responses(swept)
         if not is_seed(swept.plan.keys[swept.main]):  # nothing depends on the number of a draw
-            panels = FORCED_PANELS if kind == "forced" else MODE_PANELS[0 if _has_amplitudes(swept.summary) else 1 :]
-            yield f"{analysis.name}_summary", overview(swept, panels)
+            yield f"{analysis.name}_summary", overview(swept, _panels(kind, swept.summary))
 
 
 def backbones(swept: Swept) -> Figure:
@@ -285,6 +284,23 @@ FORCED_PANELS = (
     ("Largest amplitude", "length", True, partial(_one, column="largest_amplitude", coloured=True)),
     ("Frequency there", "Hz", False, partial(_one, column="frequency_of_largest_amplitude", coloured=True)),
 )
+#: Of a wheel, whatever the sector.
+BLADE_PANELS = (
+    (
+        "Largest of all sectors",
+        "length",
+        True,
+        partial(_one, column="largest_blade_amplitude", coloured=True),
+    ),
+    ("Frequency there", "Hz", False, partial(_one, column="largest_blade_frequency_hz", coloured=True)),
+)
+
+
+def _panels(kind: str, summary: Table) -> Sequence[Panel]:
+    """What is drawn over the values of a sweep."""
+    if kind == "forced":
+        return BLADE_PANELS if "largest_blade" in summary else FORCED_PANELS
+    return MODE_PANELS[0 if _has_amplitudes(summary) else 1 :]
 
 
 def overview(swept: Swept, panels: Sequence[Panel]) -> Figure:

@@ -8,8 +8,9 @@ import numpy as np
 
 from ..arrays import Indices
 from ..post.grid import Plan
+from ..post.largest import largest
 from ..post.limit_cycles import SHORT
-from ..results.overview import Overview
+from ..results.overview import Overview, amplitude_column, peak_row
 from ..results.parts import rows_of_branches
 from ..results.reader import Analysis
 from ..results.sweep_summary import columns_of
@@ -131,11 +132,12 @@ def _of_branch(analysis: Analysis, rows: Indices) -> Iterator[tuple[int, str]]:
         if len(slips) and slips[0] > 0:
             yield int(rows[slips[0] - 1]), "last before any slip"
             yield int(rows[slips[0]]), "first with slip"
-    wanted = {"level": "amplitude"} if "level" in columns else {"omega0": "zeta", "normal_force": "normal_force"}
-    words = {"amplitude": "largest amplitude", "zeta": "largest damping", "normal_force": "largest normal force"}
-    for beside, name in wanted.items():
-        if beside in columns and name in columns:
-            yield int(rows[np.argmax(columns[name][rows])]), words[name]
+    top = peak_row(columns, rows)
+    if top is not None:
+        of_any = " of any sector" if amplitude_column(columns) != "amplitude" else ""
+        yield top, "largest damping" if "zeta" in columns else f"largest amplitude{of_any}"
+    if "level" not in columns and "normal_force" in columns:
+        yield int(rows[largest(columns["normal_force"][rows])]), "largest normal force"
     for name in ("zeta_error", "amplitude_error"):
         errors = columns.get(name, np.empty(0))
         if len(errors) and np.isfinite(errors[rows]).any():

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..arrays import Indices
 from ..files.lock import is_taken
 from ..post.largest import largest
 from ..post.limit_cycles import stability
@@ -105,8 +106,7 @@ class Overview:
         if not top:
             return ""
         sector = f" of sector {top['largest_sector']:.0f}" if "largest_sector" in top else ""
-        amplitude = top.get("largest_amplitude", top["amplitude"])
-        return f"a {amplitude:.4g} {self.unit}{sector}, {top['frequency_hz']:.4g} Hz"
+        return f"a {top[amplitude_column(top)]:.4g} {self.unit}{sector}, {top['frequency_hz']:.4g} Hz"
 
     def _error(self) -> str:
         if not self.error:
@@ -174,16 +174,25 @@ def _range(table: Mapping[str, Any], unit: str) -> dict[str, Any]:
     return {"column": column, "unit": unit, "low": float(values.min()), "high": float(values.max()), **cycles}
 
 
-def peak_row(table: Mapping[str, Any]) -> int | None:
+def amplitude_column(table: Container[str]) -> str:
+    """Of a whole wheel's response that of the sector that moves most."""
+    return "largest_amplitude" if "largest_amplitude" in table else "amplitude"
+
+
+def peak_row(table: Mapping[str, Any], rows: Indices | None = None) -> int | None:
     """Row of the largest damping of a mode, of the largest amplitude of a response; None where there is neither.
 
-    Of a whole wheel's response that of the sector that moves most.
+    Parameters
+    ----------
+    rows : those looked at; None for all
     """
-    amplitude = "largest_amplitude" if "largest_amplitude" in table else "amplitude"
-    of = "zeta" if "zeta" in table and "omega0" in table else amplitude if "level" in table else None
-    values = np.empty(0) if of is None else np.asarray(table[of], dtype=float)
+    of = "zeta" if "zeta" in table and "omega0" in table else amplitude_column(table) if "level" in table else None
+    if of is None:
+        return None
+    values = np.asarray(table[of], dtype=float)
+    rows = np.arange(len(values)) if rows is None else rows
     top = most_damped if of == "zeta" else largest
-    return top(values) if np.isfinite(values).any() else None
+    return int(rows[top(values[rows])]) if np.isfinite(values[rows]).any() else None
 
 
 def _peak(table: Mapping[str, Any], group: h5py.Group) -> dict[str, Any]:

@@ -14,6 +14,7 @@ import numpy as np
 from ..columns import Column
 from ..files.dimensions import names_of_data
 from ..post.grid import Plan
+from ..post.largest import largest
 from ..post.limit_cycles import SHORT, limit_cycles
 from ..post.mode_curve import ModeCurve, lowest, most_damped
 from ..post.slip_threshold import slip_threshold
@@ -227,7 +228,7 @@ def _onset(table: Table, start: float, largest: float) -> float:
 
 
 def _forced(table: Table, attributes: Table, forces: Table) -> dict[str, float]:
-    top = int(np.argmax(table["amplitude"]))
+    top = largest(np.asarray(table["amplitude"]))
     return {
         "largest_amplitude": float(table["amplitude"][top]),
         "frequency_of_largest_amplitude": float(table["frequency_hz"][top]),
@@ -290,7 +291,11 @@ def _mode_words(row: Row) -> str:
 
 
 def _forced_words(row: Row) -> str:
-    return f"largest {row['largest_amplitude']:.4g} {row['unit']} at {row['frequency_of_largest_amplitude']:.6g} Hz"
+    amplitude, frequency, place = row["largest_amplitude"], row["frequency_of_largest_amplitude"], ""
+    if math.isfinite(row.get("largest_blade", math.nan)):  # of a wheel
+        amplitude, frequency = row["largest_blade_amplitude"], row["largest_blade_frequency_hz"]
+        place = f" of sector {row['largest_blade']:.0f}"
+    return f"largest {amplitude:.4g} {row['unit']}{place} at {frequency:.6g} Hz"
 
 
 #: Of one dof, where a wheel has the blade that moves most.

@@ -20,6 +20,7 @@ from ..model.laws import kept_laws
 from ..post.contact_history import ContactHistory
 from ..post.motion import waves
 from ..results.file import unit_of_amplitudes
+from ..results.overview import amplitude_column
 from ..texts import display, nearest
 from ..units import SI, UnitSystem, units_of
 from .places import around_places, branches_of, linear_last, of_linear_modes
@@ -320,9 +321,8 @@ def _largest(group: h5py.Group, kept: Indices) -> tuple[int, str]:
     """The point shown without a wish; a linear mode's amplitude is none that could be largest."""
     if of_linear_modes(group):
         return int(kept[0]), ", the first mode"
-    name, of = "amplitude", ""
-    if "largest_amplitude" in group["points"]:  # of a driven wheel
-        name, of = "largest_amplitude", " of any sector"
+    name = amplitude_column(group["points"])
+    of = "" if name == "amplitude" else " of any sector"
     size = group["points"][name][()][kept]
     return int(kept[np.argmax(size)]), f", the kept point of the largest amplitude{of}"
 
