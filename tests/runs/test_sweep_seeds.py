@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+from itertools import product
 from pathlib import Path
 
 import h5py
@@ -15,9 +16,12 @@ from scipy.stats import kstest, lognorm
 from test_engine_order import SECTORS, TEXT
 from tolerances import SOLVED
 
+from fretwave.columns import Column
 from fretwave.plots.quantiles import figures
+from fretwave.post.grid import Plan
 from fretwave.post.quantiles import interval_ranks
 from fretwave.results.reader import Run
+from fretwave.results.sweep_quantiles import quantile_lines
 
 pytestmark = pytest.mark.ranks(1)
 
@@ -136,6 +140,26 @@ def test_draws_at_other_amplitudes_say_theirs(tmp_path: Path, capsys) -> None:
         assert f"report at = [{at}], at amplitude {at}: zeta_at_1" in said
     (figure,) = dict(figures(Run(tmp_path / "run"))).values()
     assert any("at 0.1 to 0.3 m" in axes.get_xlabel() for axes in figure.axes)
+
+
+@pytest.mark.parametrize("groups", [2, 12])
+def test_a_sweep_s_values_are_gone_through_as_often_whatever_their_number(groups: int, monkeypatch) -> None:
+    """And each line is of its own draws: the medians and amplitudes are those of each group and wave by hand."""
+    plan, gone, values = Plan({"model.friction": [*range(groups)], "model.seed": [*range(5)]}), [], Plan.values
+    monkeypatch.setattr(Plan, "values", lambda self: gone.append(1) or values(self))
+    random, waves = np.random.default_rng(0), (1, 2)
+    rows = [
+        {"value": n, "nodal_diameter": wave, "zeta_at_1": random.random(), "amplitude_at_1": n // 5 + wave / 10}
+        for n in range(len(plan))
+        for wave in waves
+    ]
+    lines = quantile_lines("flutter", plan, rows, [Column("zeta_at_1", "1", "damping")], "nodal_diameter")
+    assert len(gone) < 6
+    for group, wave in product(range(groups), waves):
+        zeta = [row["zeta_at_1"] for row in rows if row["value"] // 5 == group and row["nodal_diameter"] == wave]
+        place = f"flutter, friction = {group}, nodal diameter = {wave}, at amplitude {group + wave / 10:g}: zeta_at_1: "
+        (line,) = [line for line in lines if line.startswith(place)]
+        assert f"50 % {np.median(zeta):.5g} [" in line and line.endswith("(n = 5)")
 
 
 # A wheel

@@ -55,13 +55,26 @@ def quantile_rows(plan: Plan, rows: Sequence[Row], columns: Sequence[Column], sp
     Left out are the values that failed, stopped, or do not have the quantity, by their numbers in the sweep.
     """
     found = []
-    for others, numbers in groups_of(plan):
-        for part in parts_in(rows, split):
-            mine = [row for row in rows if part is None or row[split] == part]
-            lead = {**others, **({} if part is None else {split: part})}
-            for column in columns:
-                found += [{**lead, **row} for row in _of_quantity(column, numbers, mine)]
+    parts = [{} if part is None else {split: part} for part in parts_in(rows, split)]
+    leads = [({**others, **part}, numbers) for others, numbers in groups_of(plan) for part in parts]
+    by_lead = _by_lead(plan, rows, [*leads[0][0]])
+    for lead, numbers in leads:
+        mine = by_lead.get(_text(lead, lead), [])
+        for column in columns:
+            found += [{**lead, **row} for row in _of_quantity(column, numbers, mine)]
     return found
+
+
+def _by_lead(plan: Plan, rows: Sequence[Row], keys: Sequence[str]) -> dict[str, list[Row]]:
+    """Rows of a summary by the values of some keys, of the sweep or of their own."""
+    values, found = list(plan.values()), dict[str, list[Row]]()
+    for row in rows:
+        found.setdefault(_text({**row, **values[int(row["value"])]}, keys), []).append(row)
+    return found
+
+
+def _text(row: Row, keys: Iterable[str]) -> str:
+    return value_text([row[key] for key in keys])
 
 
 def _of_quantity(column: Column, numbers: Sequence[int], rows: Sequence[Row]) -> Iterator[dict[str, Any]]:
@@ -78,11 +91,13 @@ def quantile_lines(name: str, plan: Plan, rows: Sequence[Row], columns: Sequence
     """The same in words, for the terminal."""
     table, lines = quantile_rows(plan, rows, columns, split), []
     keys = [key for key in (*plan.keys, split) if table and key in table[0]]
-    heads = {value_text([row[key] for key in (*keys, "quantity")]): row for row in table}
-    for row in heads.values():
-        mine = [r for r in table if all(r[key] == row[key] for key in (*keys, "quantity"))]
+    by_lead, heads = _by_lead(plan, rows, keys), dict[str, list[dict[str, Any]]]()
+    for row in table:
+        heads.setdefault(_text(row, (*keys, "quantity")), []).append(row)
+    for mine in heads.values():
+        row = mine[0]
         place = "".join(f", {key.rpartition('.')[2].replace('_', ' ')} = {row[key]}" for key in keys)
-        at = reported_at(row["quantity"], _of_group(plan, row, rows))
+        at = reported_at(row["quantity"], by_lead.get(_text(row, keys), []))
         place += f", at amplitude {at}" if at else ""
         lines.append(f"{name}{place}: {row['quantity']}: {'; '.join(map(_word, mine))} ({_count(row)})")
     if lines:
@@ -98,13 +113,6 @@ def quantile_lines(name: str, plan: Plan, rows: Sequence[Row], columns: Sequence
         for q, n in short.items()
     ]
     return lines
-
-
-def _of_group(plan: Plan, of: Row, rows: Sequence[Row]) -> list[Row]:
-    """Rows of a summary that are draws with the other keys' values of a row of quantiles."""
-    groups = [mine for others, mine in groups_of(plan) if all(of[key] == value for key, value in others.items())]
-    numbers = {number for mine in groups for number in mine}
-    return [row for row in rows if row["value"] in numbers]
 
 
 def reported_at(name: str, rows: Sequence[Row]) -> str:
