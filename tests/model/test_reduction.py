@@ -14,10 +14,14 @@ import scipy.sparse.linalg
 from models.core_models import counting
 from models.hexahedra import Bar, bar
 from mpi4py import MPI
+from petsc4py import PETSc
 from tolerances import REPEATED, ROUNDING, SOLVED, TIGHT
 
-from fretwave.errors import InputError
+import fretwave as fw
+from fretwave.errors import InputError, PetscError
+from fretwave.model import residual_statics
 from fretwave.model.reduction import Reduction, reduce
+from fretwave.model.residual_statics import held_displacement
 
 
 @pytest.fixture(scope="module")
@@ -74,6 +78,42 @@ def test_static_displacement_under_loads_on_internal_dofs(block: Bar, modes: int
     size = abs(exact).max()
     assert abs(alone - exact).max() > 1e-3 * size
     np.testing.assert_allclose(alone + beyond, exact, rtol=0, atol=SOLVED * size)
+
+
+@pytest.fixture
+def factors(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Numbers of the columns that each factorisation for static displacements serves."""
+    made, original = [], residual_statics._solved
+
+    def noted(A: PETSc.Mat, b: np.ndarray) -> np.ndarray:
+        made.append(b.shape[1])
+        return original(A, b)
+
+    monkeypatch.setattr(residual_statics, "_solved", noted)
+    return made
+
+
+@pytest.mark.ranks(1, 2, 3)
+def test_one_factorisation_serves_all_loads(block: Bar, factors: list[int]) -> None:
+    """None of loads on kept dofs alone, which leave the internal dofs where these put them."""
+    f = np.random.default_rng(4).normal(size=(block.K.shape[0], 4))
+    keep = root_and_tip(block)
+    f[np.setdiff1d(np.arange(len(f)), keep), 1:3] = 0.0
+    with reduced(block, modes=2) as reduction:
+        together, alone = reduction.beyond(f), reduction.beyond(f[:, 1:3])
+        assert factors == [2] and not alone.any() and not together[:, 1:3].any()
+        np.testing.assert_allclose(together[:, 3], reduction.beyond(f[:, 3]), rtol=0, atol=ROUNDING * abs(f).max())
+    assert np.abs(together[:, [0, 3]]).max(axis=0).min() > 0
+
+
+@pytest.mark.ranks(1, 2)
+def test_internal_dofs_that_nothing_holds_are_told(comm: MPI.Comm) -> None:
+    """The last dof has no stiffness: PETSc goes on with numbers that are none."""
+    K = sp.diags([2.0, 2.0, 2.0, 0.0]).tocsr()
+    with fw.Model(sp.identity(4), K, comm=comm) as model:
+        f = model.distribute(np.ones((4, 1)))
+        with pytest.raises(PetscError, match="cannot be solved for"):
+            held_displacement(model._matrices[0], np.array([0]), f)
 
 
 @pytest.mark.ranks(1, 2, 3)

@@ -243,6 +243,12 @@ class Case:
         """The preload of an analysis: its own, or that of the case."""
         return analysis.settings(self).own_preload() or self.tables.preload
 
+    @property
+    def acting_loads(self) -> list[str]:
+        """Names of the static loads that act in some analysis."""
+        preloads = [self.preload_of(analysis) for analysis in self.analyses.values()]
+        return list(dict.fromkeys(name for preload in preloads if preload is not None for name in preload.loads))
+
 
 def changed_keys(then: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
     """``key: then -> now`` for every value that differs between two resolved cases."""

@@ -5,7 +5,7 @@
     basis                      (n_dof, n_r) x = T x_r; float64, since strain is a small difference of displacements
     model                      (4,) what tells the model that was reduced from another
     ties/<k>/row, dof, value   of a sector, on its reduced coordinates: dofs with both faces from those k places ahead
-    load                       names of the model's loads
+    load                       names of the static loads that act in some analysis
     beyond                     (n_dof, n_loads) static displacement under each that x_r has not [length]
 
 Kept once a run, beside results.h5: it belongs to all analyses.
@@ -56,7 +56,7 @@ class Basis:
     ties : {k: (n_r, n)}
         Of a sector: coordinates with both faces from those of the sector k places ahead.
     loads : {name: (n_dof,)}
-        Static displacement under each load of the model that no coordinate has [length].
+        Of each load that acts in some analysis the static displacement that no coordinate has [length].
     """
 
     T: Array
@@ -117,8 +117,15 @@ def marks_of(full: Structure) -> Array:
     return np.array([full.n_dof, *sums, float(np.abs(full.coordinates).sum()) if full.coordinates is not None else 0.0])
 
 
-def basis_of(reduction: Union[Reduction, SectorReduction], full: Structure, comm: MPI.Comm) -> Basis | None:
-    """Of a reduction of a model; on the first rank, None elsewhere. Collective."""
+def basis_of(
+    reduction: Union[Reduction, SectorReduction], full: Structure, comm: MPI.Comm, names: Sequence[str] = ()
+) -> Basis | None:
+    """Of a reduction of a model; on the first rank, None elsewhere. Collective.
+
+    Parameters
+    ----------
+    names : static loads that act in some analysis
+    """
     from ..cyclic.reduction import SectorReduction
 
     n, blocks = reduction.size, []
@@ -127,7 +134,7 @@ def basis_of(reduction: Union[Reduction, SectorReduction], full: Structure, comm
         block = reduction.expand(np.ascontiguousarray(unit))
         if comm.rank == 0:
             blocks.append(block)
-    loads = {name: reduction.beyond(load) for name, load in full.loads.items()}
+    loads = dict(zip(names, reduction.beyond(np.column_stack([full.loads[name] for name in names])).T)) if names else {}
     if comm.rank:
         return None
     hz = reduction.highest_component_hz

@@ -187,7 +187,7 @@ class Runner:
             self.console.line(f"the basis of the reduction is not kept ({text}): `fretwave view` will make it again")
             self._basis = lambda: path.unlink(missing_ok=True)  # of another run
             return
-        basis = basis_of(reduction, full, self.comm)
+        basis = basis_of(reduction, full, self.comm, self.case.acting_loads)
         self._basis = lambda: None if basis is None else basis.write(path)
         self.console.line(f"the basis of the reduction is kept for `fretwave view` ({size / 1e6:.1f} MB)")
         if self.folder.started:
