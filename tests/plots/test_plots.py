@@ -10,6 +10,7 @@ from command_line import call
 from models.table_rows import SHARED
 from tolerances import ROUNDING
 
+from fretwave.analyses.mode import summarise
 from fretwave.columns import FORCED, MODE
 from fretwave.plots import (
     backbone,
@@ -23,6 +24,8 @@ from fretwave.plots import (
     trajectories,
 )
 from fretwave.plots import study as study_picture
+from fretwave.report.findings import marked
+from fretwave.results.overview import overviews
 from fretwave.results.reader import Run
 from fretwave.results.results import AnalysisWriter
 
@@ -160,6 +163,30 @@ def test_backbone_shows_both_methods_both_asymptotes_folds_and_peak(run):
     assert lower.get_xscale() == "log"
     assert lower.get_xlabel() == "Modal amplitude of m1 [m]"
     assert len(upper.child_axes) == len(lower.child_axes) == 1  # close-up of the folds
+
+
+@pytest.mark.parametrize("damping", [0.0, 0.00544, -0.02])
+def test_damping_that_is_the_same_throughout_has_no_peak(tmp_path, damping):
+    """Of a branch that sticks only rounding has a largest value, here one that was located too."""
+    random = np.random.default_rng(3)
+    described = {"type": "mode", "method": "CNM", "normalise": "m1", "stuck_omega": 25.3}
+    writer = AnalysisWriter(tmp_path, "mode", MODE, described, ["m1", "m2"], ["1c", "1s"])
+    for i, a in enumerate(np.geomspace(0.02, 2.0, 31)):
+        zeta = damping * (1 + 1e-12 * random.standard_normal()) + 1e-15 * random.standard_normal()
+        row = {"point": i, "amplitude": a, "omega": 25.3, "omega0": 25.3, "frequency_hz": 25.3 / (2 * np.pi)}
+        row |= {"beta": 0.0, "zeta": zeta, "wall_s": 0.01, **SHARED, "slip": 0.0}
+        writer.append(row | {"event": "peak_damping" if i in (15, 16, 17) else ""}, a * np.ones((2, 2)))
+    writer.close("done", "stop value reached")
+    run = Run(tmp_path)
+    figure = backbone.draw([run.analyses["mode"]])
+    (name,) = [text for text in texts(figure) if text.startswith("CNM")]
+    assert name == f"CNM, H = 1: ζ {100 * damping:.3g} % throughout"
+    assert not any(line.get_marker() == style.PEAK["marker"] for axes in figure.axes for line in axes.get_lines())
+    (told,) = overviews(tmp_path)[1]
+    assert not any("largest damping" in words for words in marked(run.analyses["mode"], told).values())
+    table = {key: run.analyses["mode"].columns[key] for key in ("amplitude", "zeta", "wall_s")}
+    (line,) = summarise("mode", {**table, "event": [""] * 31, "zeta_error": np.zeros(31)}, [], "m")
+    assert "largest" not in line.partition("fold")[0] and f"damping {100 * damping:.4g} % throughout" in line
 
 
 @pytest.mark.parametrize("late", [False, True])

@@ -18,7 +18,7 @@ from ..columns import ENERGY, MODE
 from ..errors import InputError
 from ..model.laws import PythonLaw
 from ..post.limit_cycles import limit_cycles, stability
-from ..post.mode_curve import most_damped
+from ..post.mode_curve import most_damped, varies, without_rounding
 from ..results.results import AnalysisWriter
 from ..results.sweep_summary import MODE_BRANCH
 from ..texts import counted
@@ -275,11 +275,12 @@ def _percent(value: float, digits: int) -> str:
 def summarise(name: str, table: Mapping[str, Any], cycles: Sequence[Mapping[str, Any]], unit: str) -> list[str]:
     """The branch in a line, and a line for each limit cycle."""
     amplitude, zeta = table["amplitude"], table["zeta"]
-    top = most_damped(zeta)
+    top, changes = most_damped(zeta), varies(zeta)
     folds = sum("fold" in event.split() for event in table["event"])
     lines = [
         f"{name}: {len(zeta)} points, a {amplitude[0]:.4g} to {amplitude[-1]:.4g} {unit},"
-        f" largest damping {100 * zeta[top]:.4g} % at a = {amplitude[top]:.4g} {unit},"
+        f" {'largest ' * changes}damping {100 * without_rounding(zeta[top]):.4g} %"
+        f" {f'at a = {amplitude[top]:.4g} {unit}' if changes else 'throughout'},"
         f" {counted(folds, 'fold')},"
         f"{largest_error('zeta', 100 * table['zeta_error'], '%')} {table['wall_s'].sum():.2f} s"
     ]

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.transforms import Bbox
 
 from ..arrays import AnyArray
-from ..post.mode_curve import NO_DAMPING
+from ..post.mode_curve import NO_DAMPING, most_damped, varies, without_rounding
 from ..results.reader import Analysis, Run, Table
 from ..solve.table import Table as Reading
 from . import labels, marks, scales, style
@@ -184,20 +184,24 @@ def _peak(axes: Axes, mode: Analysis, colour: str, scale: Scale) -> None:
 def peak_point(mode: Analysis) -> int:
     """Point of largest damping: the located one when there is one."""
     zeta = mode.columns["zeta"]
-    return max(mode.met("peak_damping") or range(len(zeta)), key=lambda i: float(zeta[i]))
+    points = np.array(mode.met("peak_damping") or range(len(zeta)))
+    return int(points[most_damped(zeta[points])])
 
 
 def is_peak(mode: Analysis, point: int) -> bool:
-    """Not where the branch ends with damping still growing."""
-    return 0 < point < len(mode) - 1
+    """Not where the branch ends with damping still growing, or where damping does not change."""
+    return varies(mode.columns["zeta"]) and 0 < point < len(mode) - 1
 
 
 def _name(mode: Analysis, scale: Scale) -> str:
     """Method, harmonics and the peak's numbers."""
     point = peak_point(mode)
-    zeta, amplitude = 100.0 * mode.columns["zeta"][point], mode.columns["amplitude"][point]
-    word = "peak" if is_peak(mode, point) else "up to"
-    return f"{mode.method()}, {_harmonics(mode)}: {word} ζ {zeta:.3g} % at {scale.text(amplitude)}"
+    zeta, amplitude = mode.columns["zeta"][point], mode.columns["amplitude"][point]
+    zeta = 100.0 * without_rounding(zeta)
+    name = f"{mode.method()}, {_harmonics(mode)}:"
+    if not varies(mode.columns["zeta"]):
+        return f"{name} ζ {zeta:.3g} % throughout"
+    return f"{name} {'peak' if is_peak(mode, point) else 'up to'} ζ {zeta:.3g} % at {scale.text(amplitude)}"
 
 
 def _limit_cycles(upper: Axes, lower: Axes, mode: Analysis, scale: Scale) -> None:

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from ..arrays import Complex
 from ..cyclic.engine_order import folded
 from ..post.largest import as_large
-from ..post.mode_curve import NO_DAMPING
+from ..post.mode_curve import without_rounding
 from ..post.motion import complex_amplitudes
 from ..post.wave_content import wave_content
 from ..results.reader import Analysis, Run
@@ -86,8 +86,7 @@ def _sectors(axes: Axes, mode: Analysis, point: int, a: Complex) -> None:
     axes.set_xlim(-0.7, len(a) - 0.3)
     axes.grid(axis="x", visible=False)
     size, zeta = mode.columns["amplitude"][point], mode.columns["zeta"][point]
-    zeta = 100.0 * zeta if abs(zeta) > NO_DAMPING else 0.0
-    text = f"a = {scales.amplitudes(mode).text(size)}, ζ = {style.number(zeta)} %"
+    text = f"a = {scales.amplitudes(mode).text(size)}, ζ = {style.number(100.0 * without_rounding(zeta))} %"
     text = f"{text}, participation {mode.columns['participation'][point]:.2f}"
     axes.annotate(text, (0.99, 0.97), xycoords="axes fraction", ha="right", va="top", fontsize=9.5)
 

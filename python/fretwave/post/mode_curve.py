@@ -29,6 +29,16 @@ def most_damped(zeta: Array) -> int:
     return largest(zeta, least=LEAST_DAMPING)
 
 
+def varies(zeta: Array) -> bool:
+    """Damping changes along a branch by more than rounding."""
+    return most_damped(zeta) != most_damped(-zeta)
+
+
+def without_rounding(zeta: float) -> float:
+    """A damping ratio as it is told: zero where it has no sign."""
+    return zeta if abs(zeta) > NO_DAMPING else 0.0
+
+
 def lowest(frequency: Array) -> int:
     """Point of the lowest frequency; of those that are alike to rounding the first."""
     return largest(-frequency)

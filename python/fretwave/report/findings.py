@@ -10,6 +10,7 @@ from ..arrays import Indices
 from ..post.grid import Plan
 from ..post.largest import largest
 from ..post.limit_cycles import SHORT
+from ..post.mode_curve import varies
 from ..results.overview import Overview, amplitude_column, peak_row
 from ..results.parts import rows_of_branches
 from ..results.reader import Analysis
@@ -133,7 +134,7 @@ def _of_branch(analysis: Analysis, rows: Indices) -> Iterator[tuple[int, str]]:
             yield int(rows[slips[0] - 1]), "last before any slip"
             yield int(rows[slips[0]]), "first with slip"
     top = peak_row(columns, rows)
-    if top is not None:
+    if top is not None and ("level" in columns or varies(columns["zeta"][rows])):
         of_any = " of any sector" if amplitude_column(columns) != "amplitude" else ""
         yield top, "largest damping" if "zeta" in columns else f"largest amplitude{of_any}"
     if "level" not in columns and "normal_force" in columns:

@@ -16,7 +16,7 @@ from ..files.dimensions import names_of_data
 from ..post.grid import Plan
 from ..post.largest import largest
 from ..post.limit_cycles import SHORT, limit_cycles
-from ..post.mode_curve import ModeCurve, lowest, most_damped
+from ..post.mode_curve import ModeCurve, lowest, most_damped, varies, without_rounding
 from ..post.slip_threshold import slip_threshold
 from ..registry import kind_named
 from .file import unit_of_amplitudes
@@ -166,7 +166,7 @@ def summarise(
 def _mode(table: Table, attributes: Mapping[str, Any], forces: Mapping[str, Any]) -> dict[str, float]:
     amplitude, frequency, zeta = (np.asarray(table[name]) for name in ("amplitude", "frequency_hz", "zeta"))
     top, low = most_damped(zeta), lowest(frequency)
-    rises, varies = top > 0, top > 0 or most_damped(-zeta) > 0
+    rises = top > 0
     slips = np.flatnonzero(table["slip"] > 0)
     first = int(slips[0]) if len(slips) else len(zeta)
     other = attributes.get("free_omega", attributes.get("sliding_omega", np.nan))
@@ -178,7 +178,7 @@ def _mode(table: Table, attributes: Mapping[str, Any], forces: Mapping[str, Any]
         "slip_from": float(amplitude[first]) if len(slips) else np.nan,
         "onset_amplitude": _onset(table, float(zeta[0]), float(zeta[top])) if first and rises else np.nan,
         "largest_zeta": float(zeta[top]),
-        "amplitude_of_largest_zeta": float(amplitude[top]) if varies else np.nan,
+        "amplitude_of_largest_zeta": float(amplitude[top]) if varies(zeta) else np.nan,
         "lowest_frequency_hz": float(frequency[low]),
         "amplitude_of_lowest_frequency": float(amplitude[low]) if 0 < low < len(zeta) - 1 else np.nan,
         "last_frequency_hz": float(frequency[-1]),
@@ -281,7 +281,7 @@ def _mode_words(row: Row) -> str:
     slip = "no slip" if starts is None else f"slip from {starts:.4g} {unit}"
     at = row["amplitude_of_largest_zeta"]
     place = f"at {at:.4g} {unit}" if math.isfinite(at) else "throughout"
-    top = f"{'largest ' * math.isfinite(at)}zeta {100 * row['largest_zeta']:.4g} % {place}"
+    top = f"{'largest ' * math.isfinite(at)}zeta {100 * without_rounding(row['largest_zeta']):.4g} % {place}"
     words = [slip, top, f"lowest {row['lowest_frequency_hz']:.6g} Hz"]
     for word, stable in CYCLES.items():
         amplitude = row.get(f"{word}_limit_cycle", math.nan)  # not all are in older results
