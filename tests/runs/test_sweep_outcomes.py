@@ -11,13 +11,18 @@ from command_line import call
 from models.swept_case import CASE
 from tolerances import SOLVED
 
+from fretwave.results.file import open_results
 from fretwave.results.sweep_summary import FORCED_LEVELS, summarise
-from fretwave.run.sweep import NAMED
+from fretwave.results.sweeps import Branch
+from fretwave.run.sweep import NAMED, why_branches_stopped, why_stopped
 
 pytestmark = pytest.mark.ranks(1)
 
 #: What rounding alone has no amplitude of.
 OF_AMPLITUDE = ("onset_amplitude", "amplitude_of_largest_zeta", "amplitude_of_lowest_frequency")
+#: Of four values what is said of each, and of the branches that one analysis has at the first three of them.
+WHY = (("done", ""), ("stopped", "of its own; of another"), ("stopped", "of another"), ("failed", "no start"))
+OWN = ((0, "done", ""), (1, "stopped", "of its own"), (2, "done", "stop value reached"))
 LIMITS = "contact.slider.friction_limit="
 #: A second mode of the same oscillator, of mass 4, over its own coordinate: sqrt(mass) times the displacement.
 MODAL = CASE[CASE.index("[[analysis]]") : CASE.index('[[analysis]]\nname = "limits"')]
@@ -65,6 +70,35 @@ def test_show_says_why_a_sweep_stopped(case: Path, tmp_path: Path, capsys) -> No
     assert call("sweep", case, *words) == 3
     assert call("show", tmp_path / "run") == 0
     assert "mode: stopped early: max_points = 3: largest number of points" in capsys.readouterr().out
+
+
+def test_each_analysis_of_a_sweep_has_its_own_reasons(case: Path, tmp_path: Path) -> None:
+    """Of two keys each stops the branches of one analysis; both are done at the last value."""
+    over = [word for name in ("mode", "modal") for word in ("--over", f"{name}.step.max_points=3,900")]
+    words = ["--only", "mode,modal", *over, "--no-plots", "--out", tmp_path / "run"]
+    assert call("sweep", case, *words) == 3
+    with open_results(tmp_path / "run" / "results.h5") as file:
+        said = {name: str(file[name].attrs["reason"]).split("; ") for name in ("mode", "modal")}
+        assert [file[name].attrs["status"] for name in said] == ["stopped"] * 2
+    for name, other in (("mode", "modal"), ("modal", "mode")):
+        assert len(said[name]) == 2 and all("largest number of points" in one for one in said[name])
+        assert all(f"{name}.step.max_points = 3" in one for one in said[name])
+        assert any(f"{other}.step.max_points = 900" in one for one in said[name])
+
+
+def test_an_analysis_that_is_done_has_no_reason(case: Path, tmp_path: Path, capsys) -> None:
+    words = ["--only", "mode,modal", "--over", "mode.step.max_points=3,900", "--no-plots", "--out", tmp_path / "run"]
+    assert call("sweep", case, *words) == 3
+    assert call("show", tmp_path / "run") == 0
+    shown = capsys.readouterr().out
+    assert "mode: stopped early: max_points = 3" in shown and "modal: stopped early" not in shown
+
+
+def test_a_value_that_comes_to_no_point_of_an_analysis_gives_its_reason() -> None:
+    outcomes = [{"status": status, "reason": reason} for status, reason in WHY]
+    found = [Branch(k, Path(), {}, {}, {"status": status, "reason": reason}, {}) for k, status, reason in OWN]
+    assert why_branches_stopped(outcomes, found) == {1: "of its own", 3: "no start"}
+    assert why_stopped(outcomes) == {1: "of its own; of another", 2: "of another", 3: "no start"}
 
 
 def test_a_value_that_fails_has_its_line_too(case: Path, tmp_path: Path, capsys) -> None:

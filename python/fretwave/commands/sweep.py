@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +20,7 @@ from ..results.runfolder import CASE_COPY, RunFolder, new_record, peak_memory_mb
 from ..results.sweeps import summary_columns, summary_lines, write_sweep
 from ..run.order import RunOptions
 from ..run.runner import Runner, plot
-from ..run.sweep import NAMED, Checked, Sweep, reasons_of
+from ..run.sweep import NAMED, Checked, Sweep, reasons_text, why_branches_stopped, why_stopped
 from ..texts import counted, display
 
 if TYPE_CHECKING:
@@ -108,7 +108,7 @@ def _do_sweep(sweep: Sweep, first: Checked, folder: RunFolder, console: Console,
     outcomes, lines = on_first_rank(comm, lambda: _write(sweep, first, folder, errors))
     for line in lines:
         console.line(line)
-    bad = _stopped(outcomes)
+    bad = why_stopped(outcomes)
     status = {"status": "stopped" if bad else "done", "wall_s": round(time.perf_counter() - began, 3)}
     folder.record.update({**status, "peak_memory_mb": memory, "values": outcomes})
     if sweep.options.plots:
@@ -125,16 +125,11 @@ def _write(
     """One group, one table for each analysis, one summary of all; lines to print. One rank only."""
     run_id = folder.record["run_id"]
     outcomes, summary, lines = sweep.outcomes(run_id, errors), [], list[str]()
-    reason = reasons_of(sweep.plan, outcomes, _stopped(outcomes))
     for name in first.analyses:
         branches = sweep.branches(name, run_id)
         if branches:
-            complete = len(branches) == len(sweep.plan) and all(b.attributes["status"] == "done" for b in branches)
-            attributes = {
-                "run_id": run_id,
-                "status": "done" if complete else "stopped",
-                "reason": "" if complete else reason,
-            }
+            reason = reasons_text(sweep.plan, why_branches_stopped(outcomes, branches))
+            attributes = {"run_id": run_id, "status": "stopped" if reason else "done", "reason": reason}
             attributes[OVERRIDES] = sweep.options.changing(name, first.analyses)
             rows = write_sweep(folder.path, name, name, sweep.plan, branches, attributes, first.title)
             columns = summary_columns(str(branches[0].attributes["type"]), branches, rows)
@@ -151,16 +146,11 @@ def _write(
     return outcomes, lines
 
 
-def _stopped(outcomes: Sequence[dict[str, Any]]) -> list[int]:
-    """Numbers of the values that did not come to their end."""
-    return [number for number, outcome in enumerate(outcomes) if outcome["status"] != "done"]
-
-
 def _incomplete(
-    sweep: Sweep, outcomes: Sequence[dict[str, Any]], bad: Sequence[int], errors: Sequence[FretwaveError | None]
+    sweep: Sweep, outcomes: Sequence[dict[str, Any]], why: Mapping[int, str], errors: Sequence[FretwaveError | None]
 ) -> FretwaveError:
     """Which values did not come to their end; bad input when that is what stopped all of them."""
-    reasons = reasons_of(sweep.plan, outcomes, bad)
+    reasons, bad = reasons_text(sweep.plan, why), [*why]
     given = [errors[number] for number in bad if errors[number] is not None]
     fix = next((error.fix for error in given if error is not None and error.fix), None)
     kind = InputError if given and all(isinstance(error, InputError) for error in given) else NotConverged

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 import shutil
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -238,11 +238,24 @@ class Sweep:
 NAMED = 10
 
 
-def reasons_of(plan: Plan, outcomes: Sequence[dict[str, Any]], bad: Sequence[int]) -> str:
+def why_stopped(outcomes: Sequence[dict[str, Any]]) -> dict[int, str]:
+    """Reason of each value that did not come to its end, by its number."""
+    return {number: outcome["reason"] for number, outcome in enumerate(outcomes) if outcome["status"] != "done"}
+
+
+def why_branches_stopped(outcomes: Sequence[dict[str, Any]], branches: Sequence[Branch]) -> dict[int, str]:
+    """The same of one analysis: its own reasons, and those of values that did not come to it."""
+    own = {branch.number: branch.attributes for branch in branches}
+    missing = {number: outcome["reason"] for number, outcome in enumerate(outcomes) if number not in own}
+    stopped = {number: str(one["reason"]) for number, one in own.items() if one["status"] != "done"}
+    return dict(sorted({**missing, **stopped}.items()))
+
+
+def reasons_text(plan: Plan, reasons: Mapping[int, str]) -> str:
     """Why values did not come to their end, the first of them."""
     labels = plan.labels()
-    more = [f"and {counted(len(bad) - NAMED, 'more value')}"] if bad[NAMED:] else []
-    return "; ".join([*(f"{labels[k]}: {outcomes[k]['reason']}" for k in bad[:NAMED]), *more])
+    more = [f"and {counted(len(reasons) - NAMED, 'more value')}"] if len(reasons) > NAMED else []
+    return "; ".join([*(f"{labels[k]}: {reasons[k]}" for k in [*reasons][:NAMED]), *more])
 
 
 def swept_names(case: Case) -> list[str]:

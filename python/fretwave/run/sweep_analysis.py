@@ -18,7 +18,7 @@ from ..results.runfolder import RunFolder
 from ..results.sweeps import summary_lines, write_sweep
 from ..texts import counted
 from .order import RunOptions, reads
-from .sweep import Sweep, reasons_of
+from .sweep import Sweep, reasons_text, why_stopped
 from .sweep_plan import table_overrides
 
 if TYPE_CHECKING:
@@ -63,8 +63,8 @@ def run_sweep(sweep: Sweep, name: str, comm: MPI.Comm, console: Console, folder:
 
     def finish() -> Outcome:
         outcomes, branches = sweep.outcomes(run_id, errors), sweep.branches(of, run_id)
-        bad = [k for k, outcome in enumerate(outcomes) if outcome["status"] != "done"]
-        reason = reasons_of(sweep.plan, outcomes, bad) or "all values done"
+        bad = why_stopped(outcomes)
+        reason = reasons_text(sweep.plan, bad) or "all values done"
         if branches:
             attributes = {"run_id": run_id, "status": "stopped" if bad else "done", "reason": reason}
             typed = replace(sweep.options, overrides=[o for o in sweep.options.overrides if o not in sweep.places])
