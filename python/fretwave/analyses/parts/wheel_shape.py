@@ -44,6 +44,8 @@ WHEEL = (
 )
 
 
+#: Participation ratio above which all sectors move alike, to rounding: amplitudes differ by 1e-6 of themselves.
+ALIKE = 1 - 1e-12
 #: A force on the avoided mode above this share of the inertia force is no rounding.
 HELD = 1e-8
 
@@ -142,7 +144,7 @@ def _lines(name: str, points: dict[str, Any], start: Start, unit: str) -> list[s
     for k in dict.fromkeys(shown):
         lines.append(
             f"{name}: at a = {points['amplitude'][k]:.4g} {unit} amplification {points['amplification'][k]:.4g},"
-            f" participation ratio {points['participation'][k]:.4g}, sector {points['largest_sector'][k]} moves most,"
+            f" participation ratio {points['participation'][k]:.4g}, {_largest(points, k)},"
             f" {100 * points['diameters_share'][k]:.3g} % is the wave of {points['diameters'][k]} nodal diameters"
         )
     if start.avoid is not None:
@@ -151,6 +153,14 @@ def _lines(name: str, points: dict[str, Any], start: Start, unit: str) -> list[s
         held = ": not quite a free motion, it holds the wave in its place (the sector is no mirror image of itself)"
         lines.append(text + (held if force > HELD else ""))
     return lines
+
+
+def _largest(points: dict[str, Any], k: int) -> str:
+    return (
+        "all sectors alike"
+        if points["participation"][k] > ALIKE
+        else f"sector {points['largest_sector'][k]} moves most"
+    )
 
 
 def one_by_one(table: dict[str, Any], unit: str) -> str:
