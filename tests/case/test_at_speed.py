@@ -129,17 +129,24 @@ high = ["next"]
 """
 
 
-@pytest.mark.parametrize("sector, modes", [(True, 1), (False, 3)])
-def test_a_reduction_with_all_component_modes_keeps_the_turning_model(sector, modes, tmp_path):
+def whole_and_reduced(tmp_path, sector, reduction, analysis):
+    """Folders of two runs of the rim, as a sector or its matrices as a structure, with more keys of the analysis."""
     text, found = RIM, []
     if not sector:
         text = RIM[: RIM.index("sectors")].replace("[0, 0, 0, 0]", "[0, 0, 0, 1.0]")
-    damper = 'dampers = [{ dof = "tip", c = 0.0 }]\n'  # keeps the tip
-    for number, reduction in enumerate(("", f"[reduction]\nmodes = {modes}\ncompare = 0\n")):
-        path, out = written(tmp_path, text + reduction), tmp_path / f"run{number}"
-        path.write_text(path.read_text(encoding="utf-8") + damper, encoding="utf-8")
+    for number, table in enumerate(("", f"[reduction]\n{reduction}")):
+        path, out = written(tmp_path, text + table), tmp_path / f"run{number}"
+        path.write_text(path.read_text(encoding="utf-8") + analysis, encoding="utf-8")
         assert call("run", path, "--no-plots", "--out", out) == 0
-        found.append([float(row["omega"]) for row in rows_of(out)])
+        found.append(out)
+    return found
+
+
+@pytest.mark.parametrize("sector, modes", [(True, 1), (False, 3)])
+def test_a_reduction_with_all_component_modes_keeps_the_turning_model(sector, modes, tmp_path):
+    damper = 'dampers = [{ dof = "tip", c = 0.0 }]\n'  # keeps the tip
+    runs = whole_and_reduced(tmp_path, sector, f"modes = {modes}\ncompare = 0\n", damper)
+    found = [[float(row["omega"]) for row in rows_of(out)] for out in runs]
     assert found[1] == pytest.approx(found[0], rel=SOLVED)
     assert np.ptp(found[0]) > 5.0 and len(found[0]) == (24 if sector else 8)
 
@@ -169,14 +176,9 @@ def test_what_is_unstable_at_a_speed_has_no_error(count, left, told, tmp_path):
 @pytest.mark.parametrize("sector", [True, False])
 def test_a_reduction_states_its_error_at_the_speeds_that_are_asked_for(sector, tmp_path):
     """As the tables of the unreduced and of the reduced model differ: it was made with the stiffness at rest."""
-    text, tables = RIM, []
-    if not sector:
-        text = RIM[: RIM.index("sectors")].replace("[0, 0, 0, 0]", "[0, 0, 0, 1.0]")
+    tables = []
     damper = 'modes = 2\ndampers = [{ dof = "root", c = 0.0 }]\n'  # keeps the root
-    for number, reduction in enumerate(("", f"[reduction]\nmodes = {0 if sector else 1}\ncompare = 2\n")):
-        path, out = written(tmp_path, text + reduction), tmp_path / f"run{number}"
-        path.write_text(path.read_text(encoding="utf-8") + damper, encoding="utf-8")
-        assert call("run", path, "--no-plots", "--out", out) == 0
+    for out in whole_and_reduced(tmp_path, sector, f"modes = {0 if sector else 1}\ncompare = 2\n", damper):
         rows = [row for row in rows_of(out) if row["speed_rpm"] == "45.0" and row.get("nodal_diameter", "0") == "0"]
         tables.append(np.array([float(row["frequency_hz"]) for row in rows]))
     (found,) = json.loads((out / "run.json").read_text())["reduction"]["speeds"]
