@@ -229,7 +229,8 @@ def _finish(
     problem: NonlinearMode,
 ) -> Outcome:
     table = finished_table(writer)
-    cycles, first = context.comm.bcast((limit_cycles(table), _first(table)) if table else ([], 0j))
+    first = complex(-table["beta"][0], table["omega"][0]) if table else 0j
+    cycles, first = context.comm.bcast((limit_cycles(table) if table else [], first))
     cycles = with_others(context, lambda: fed_beside(context, start, first), cycles)
     unit = context.units(unit_of(context.analysis.normalise))
     summary = summarise(context.name, table, cycles, unit) if table else []
@@ -242,12 +243,6 @@ def _finish(
     folded = table and context.case.wheel is not None and not branch.converged
     advice = one_by_one(table, context.units("length")) if folded else ""
     return Outcome(writer.rows, branch.reason, branch.converged, summary, advice=advice)
-
-
-def _first(table: Mapping[str, Any]) -> complex:
-    """lambda at the first point [rad/s]."""
-    omega0, zeta = float(table["omega0"][0]), float(table["zeta"][0])
-    return omega0 * complex(-zeta, math.sqrt(max(0.0, 1.0 - zeta**2)))
 
 
 def point_line(name: str, row: dict[str, Any], units: UnitSystem, unit: str) -> str:

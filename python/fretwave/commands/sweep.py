@@ -133,9 +133,7 @@ def _write(
             attributes[OVERRIDES] = sweep.options.changing(name, first.analyses)
             rows = write_sweep(folder.path, name, name, sweep.plan, branches, attributes, first.title)
             columns = summary_columns(str(branches[0].attributes["type"]), branches, rows)
-            headings = {
-                column.name: column.heading for column in columns
-            }  # amplitudes of analyses differ in their unit
+            headings = {column.name: column.heading for column in columns}  # their units may differ by analysis
             summary += [{"analysis": name, **{headings.get(key, key): row[key] for key in row}} for row in rows]
             lines += summary_lines(name, sweep.plan, branches, rows)
     if summary:

@@ -11,7 +11,7 @@ from ..post.grid import Plan
 from ..post.largest import largest
 from ..post.limit_cycles import SHORT
 from ..post.mode_curve import varies
-from ..results.overview import Overview, amplitude_column, peak_row
+from ..results.overview import Overview, peak_row, whose_amplitude
 from ..results.parts import rows_of_branches
 from ..results.reader import Analysis
 from ..results.sweep_summary import columns_of
@@ -135,8 +135,7 @@ def _of_branch(analysis: Analysis, rows: Indices) -> Iterator[tuple[int, str]]:
             yield int(rows[slips[0]]), "first with slip"
     top = peak_row(columns, rows)
     if top is not None and ("level" in columns or varies(columns["zeta"][rows])):
-        of_any = " of any sector" if amplitude_column(columns) != "amplitude" else ""
-        yield top, "largest damping" if "zeta" in columns else f"largest amplitude{of_any}"
+        yield top, "largest damping" if "zeta" in columns else f"largest amplitude{whose_amplitude(columns)}"
     if "level" not in columns and "normal_force" in columns:
         yield int(rows[largest(columns["normal_force"][rows])]), "largest normal force"
     for name in ("zeta_error", "amplitude_error"):

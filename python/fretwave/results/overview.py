@@ -179,6 +179,11 @@ def amplitude_column(table: Container[str]) -> str:
     return "largest_amplitude" if "largest_amplitude" in table else "amplitude"
 
 
+def whose_amplitude(table: Container[str]) -> str:
+    """Behind the word amplitude: nothing of the observed dof."""
+    return "" if amplitude_column(table) == "amplitude" else " of any sector"
+
+
 def peak_row(table: Mapping[str, Any], rows: Indices | None = None) -> int | None:
     """Row of the largest damping of a mode, of the largest amplitude of a response; None where there is neither.
 

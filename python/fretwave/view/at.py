@@ -11,7 +11,7 @@ import numpy as np
 
 from ..arrays import Indices
 from ..errors import InputError
-from ..results.overview import in_order, peak_row
+from ..results.overview import in_order, peak_row, whose_amplitude
 from ..texts import display, nearest
 from .choice import ViewOptions, not_kept, points_asked
 from .places import linear_last
@@ -90,8 +90,7 @@ class At:
             return int(offered[0]), ", the first (there is no peak of damping or response)"
         meant = {"start": 0, "end": count - 1, "peak": peak or 0}[self.word]
         point = int(offered[np.argmin(np.abs(offered - meant))])
-        of = "damping" if "zeta" in group["points"] else "amplitude"
-        of += " of any sector" if "largest_amplitude" in group["points"] else ""
+        of = "damping" if "zeta" in group["points"] else f"amplitude{whose_amplitude(group['points'])}"
         said = {"start": ", the first", "end": ", the last", "peak": f", that of the largest {of}"}[self.word]
         return point, said if point == meant else f", the kept point nearest to point {meant}{said}"
 

@@ -20,7 +20,7 @@ from ..model.laws import kept_laws
 from ..post.contact_history import ContactHistory
 from ..post.motion import waves
 from ..results.file import unit_of_amplitudes
-from ..results.overview import amplitude_column
+from ..results.overview import amplitude_column, whose_amplitude
 from ..texts import display, nearest
 from ..units import SI, UnitSystem, units_of
 from .places import around_places, branches_of, linear_last, of_linear_modes
@@ -321,10 +321,9 @@ def _largest(group: h5py.Group, kept: Indices) -> tuple[int, str]:
     """The point shown without a wish; a linear mode's amplitude is none that could be largest."""
     if of_linear_modes(group):
         return int(kept[0]), ", the first mode"
-    name = amplitude_column(group["points"])
-    of = "" if name == "amplitude" else " of any sector"
-    size = group["points"][name][()][kept]
-    return int(kept[np.argmax(size)]), f", the kept point of the largest amplitude{of}"
+    points = group["points"]
+    size = points[amplitude_column(points)][()][kept]
+    return int(kept[np.argmax(size)]), f", the kept point of the largest amplitude{whose_amplitude(points)}"
 
 
 def not_kept(what: str, where: str, measured: str, kept: Indices, group: h5py.Group, near: int, how: str) -> InputError:

@@ -56,9 +56,13 @@ def fed_modes(context: AnalysisContext[HarmonicSection], followed: LinearMode | 
             first = next((number for number, mode in enumerate(modes) if mode.omega == own), None)  # of a double one
         for number, value in _growing(context, modes).items():
             if number != first:
-                zeta, frequency = -value.real / abs(value), abs(value.imag) / (2 * np.pi)
-                found.append({"mode": number + 1, "contact": contact, "frequency_hz": frequency, "zeta": zeta})
+                found.append({"mode": number + 1, "contact": contact, **told(value)})
     return found
+
+
+def told(value: complex) -> dict[str, float]:
+    """What is said of lambda [rad/s]."""
+    return {"frequency_hz": abs(value.imag) / (2 * np.pi), "zeta": -value.real / abs(value)}
 
 
 def _growing(context: AnalysisContext[HarmonicSection], modes: Sequence[LinearMode]) -> dict[int, complex]:

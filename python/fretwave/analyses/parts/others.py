@@ -9,15 +9,14 @@ import numpy as np
 import scipy.sparse as sp
 
 from ...arrays import Complex
-from ...case.harmonic import HarmonicSection
+from ...case.harmonic import HarmonicSection, nodal_diameter
 from ...cyclic.engine_order import folded
 from ...errors import FretwaveError
 from ...post.largest import largest
 from ...post.limit_cycles import STUCK
 from .context import AnalysisContext
-from .fed_modes import FED, fed_modes, motions, shapes_of
-from .rest import rest_state
-from .tuned import tuned_sector
+from .fed_modes import FED, fed_modes, motions, shapes_of, told
+from .tuned import in_waves
 
 if TYPE_CHECKING:
     from ...model.modes import LinearMode
@@ -56,15 +55,11 @@ def fed_beside(context: AnalysisContext[HarmonicSection], start: Start, first: c
 
 def _on_tuned(context: AnalysisContext[HarmonicSection], start: Start) -> list[dict[str, Any]]:
     """Wave by wave, each on one sector. Collective."""
-    found, sectors, analysis = [], context.wheel.sectors, context.analysis
-    rest = None
-    for wave in sorted(folded(k, sectors) for k in range(sectors)):
-        with tuned_sector(context.of(analysis.model_copy(update={"nodal_diameter": wave}))) as sector:
-            rest = rest_state(sector) if rest is None else rest
-            if rest is not None:
-                sector.model.settle(rest)
-            own = start.tuned if wave == folded(analysis.nodal_diameter or 0, sectors) else None
-            found += [{**mode, "diameters": wave} for mode in fed_modes(sector, own)]
+    found, sectors = [], context.wheel.sectors
+    own = folded(nodal_diameter(context.analysis), sectors)
+    for wave, sector in in_waves(context, sorted(folded(k, sectors) for k in range(sectors))):
+        followed = start.tuned if wave == own else None
+        found += [{**mode, "diameters": wave} for mode in fed_modes(sector, followed)]
     return found
 
 
@@ -90,12 +85,7 @@ def _on_mistuned(
     like = own & (alike > 0.5 * alike[own].max())
     grows[np.argmin(np.where(like, np.abs(values - first), np.inf))] = False
     return [
-        {
-            "diameters": _largest_wave(context, motion),
-            "contact": STUCK,
-            "frequency_hz": abs(value.imag) / (2 * np.pi),
-            "zeta": -value.real / abs(value),
-        }
+        {"diameters": _largest_wave(context, motion), "contact": STUCK, **told(value)}
         for value, motion in zip(values[grows], (phi @ shares[:, grows]).T)
     ]
 

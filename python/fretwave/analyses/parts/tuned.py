@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -35,6 +35,19 @@ def tuned_sector(context: AnalysisContext[Harmonic]) -> Iterator[AnalysisContext
     preload, flow = case.preload_of(analysis), analysis.aerodynamics
     with build_model(case, analysis.dampers, context.comm, preload, nodal_diameter(analysis), flow) as model:
         yield replace(context, model=model, case=case, arrays={})
+
+
+def in_waves(
+    context: AnalysisContext[Harmonic], diameters: Iterable[int]
+) -> Iterator[tuple[int, AnalysisContext[Harmonic]]]:
+    """The tuned sector at rest in each wave, as long as the next is not asked for. Collective."""
+    rest = None
+    for d in diameters:
+        with tuned_sector(context.of(context.analysis.model_copy(update={"nodal_diameter": d}))) as tuned:
+            rest = rest_state(tuned) if rest is None else rest
+            if rest is not None:
+                tuned.model.settle(rest)
+            yield d, tuned
 
 
 def nearest_modes(context: AnalysisContext[Any], omega: float, count: int, contact: str = "stuck") -> list[LinearMode]:
@@ -76,12 +89,7 @@ def _by_waves(context: AnalysisContext[Any], omega: float, count: int, contact: 
 
 def _waves(context: AnalysisContext[Any], omega: float, contact: str) -> dict[int, list[LinearMode]]:
     """Modes of the tuned sector nearest to a frequency, in 0 to N/2 nodal diameters. Collective."""
-    waves: dict[int, list[LinearMode]] = {}
-    rest = None
-    for d in range(context.wheel.sectors // 2 + 1):
-        with tuned_sector(context.of(context.analysis.model_copy(update={"nodal_diameter": d}))) as tuned:
-            rest = rest_state(tuned) if rest is None else rest
-            if rest is not None:
-                tuned.model.settle(rest)
-            waves[d] = tuned.linear_mode(contact, min(tuned.model.n_dof, NOMINAL), omega)
-    return waves
+    return {
+        d: tuned.linear_mode(contact, min(tuned.model.n_dof, NOMINAL), omega)
+        for d, tuned in in_waves(context, range(context.wheel.sectors // 2 + 1))
+    }
