@@ -20,19 +20,11 @@ const Tuned krylov_limit("linear_krylov_limit", 300, "unknowns above which the K
 constexpr double tangent_tolerance = 1e-10;  // relative; of the tangent's direction
 const Tuned large("linear_large", 3e4,
                   "unknowns above which steps far from a solution, and tangents, are solved to fewer digits");
-constexpr double digits = 1e-6;  // relative residual of a Newton step
-const Tuned roughly("linear_roughly", 1e-2, "relative residual of Newton steps far from a solution");
 // Predictors through near points enlarge it: with 1e-4 of 768 pairs a branch of 11 points took 28.
 const Tuned rough_tangent("linear_rough_tangent", 1e-7,
                           "relative residual of tangents of large problems that steps are taken along");
 const Tuned tangent_accepted("linear_tangent_accepted", 1e-6,
                              "residual of a tangent, relative, where rounding lets GMRES go no further");
-const Tuned straight("linear_straight", 0.03,
-                     "share of the residual that a step leaves, up to which the preconditioner stays");
-const Tuned farther("linear_farther", 3, "how far it stays, over the length of that step, at the most");
-const Tuned renewal("linear_renewal", 1.0 / 16,
-                    "share of all iterations that is spent on building preconditioners anew");
-
 /// Our options under the prefix, where PETSc's -help is given; its macros return its error codes.
 PetscErrorCode offered(MPI_Comm comm, std::string const& prefix) {
   char wish[32] = "auto", blocks[32] = "auto";
@@ -56,12 +48,6 @@ std::string choice(std::string const& prefix, char const* option, char const* me
     throw InputError(std::string("unknown ") + meaning, given, "auto, " + one + " or " + other,
                      std::string("give ") + option + " " + other + ", or leave it out");
   return given;
-}
-
-KSP ksp_of(SNES snes) {
-  KSP ksp;
-  check(SNESGetKSP(snes, &ksp));
-  return ksp;
 }
 
 bool is_direct(KSP ksp) {
@@ -91,7 +77,13 @@ LinearSolver::LinearSolver(Bordered& bordered, std::string const& prefix, SNES s
     return;
   }
   J_ = bordered_.matrix();
-  use_lu(ksp_of(snes_), J_);
+  use_lu(newton_ksp(), J_);
+}
+
+KSP LinearSolver::newton_ksp() const {
+  KSP ksp;
+  check(SNESGetKSP(snes_, &ksp));
+  return ksp;
 }
 
 /// Others may hold the SNES, and view it.
@@ -132,7 +124,7 @@ std::string LinearSolver::description() const {
 }
 
 void LinearSolver::use_krylov() {
-  KSP ksp = ksp_of(snes_);
+  KSP ksp = newton_ksp();
   PC pc;
   const PetscInt local = local_size(point_);
   check(MatCreateShell(bordered_.problem().comm(), local, local, PETSC_DETERMINE, PETSC_DETERMINE, this,
@@ -163,7 +155,7 @@ void LinearSolver::take_options() {
 void LinearSolver::make_preconditioner() {
   PC pc;
   PCType type;
-  check(KSPGetPC(ksp_of(snes_), &pc));
+  check(KSPGetPC(newton_ksp(), &pc));
   check(PCGetType(pc, &type));
   auto const* kind = type ? kind_of(type) : nullptr;
   if (!kind) return;
@@ -180,7 +172,7 @@ void LinearSolver::make_preconditioner() {
 }
 
 void LinearSolver::make_tangent() {
-  KSP newton = ksp_of(snes_);
+  KSP newton = newton_ksp();
   PC pc;
   PetscInt iterations, restart;
   check(KSPGetPC(newton, &pc));
@@ -205,17 +197,6 @@ bool LinearSolver::given(std::initializer_list<char const*> options) const {
     check(PetscOptionsHasName(nullptr, prefix_.c_str(), option, &found));
     return found == PETSC_TRUE;
   });
-}
-
-/// Far from a solution a step need not be better than its linearisation: Newton's quadratic convergence
-/// foretells that (|g_k| / |g_k-1|)^2 is left of the residual (Eisenstat & Walker, SIAM J. Sci. Comput. 17,
-/// 1996, choice 2). Where six digits may end the iteration, six it is: so it ends with as little left as
-/// ever. 768 pairs (34,725 unknowns) take half the iterations of GMRES and the same steps.
-void LinearSolver::aim(double residual, double before, double enough) {
-  const double foretold = std::pow(residual / before, 2), least = digits,
-               most = std::clamp(double(roughly), least, 0.5);
-  aimed_at_ = residual * digits <= enough ? least : std::clamp(foretold, least, most);
-  check(KSPSetTolerances(ksp_of(snes_), aimed_at_, PETSC_DEFAULT, PETSC_DEFAULT, PETSC_DEFAULT));
 }
 
 PetscErrorCode LinearSolver::shell_product(Mat J, Vec x, Vec y) {
@@ -245,37 +226,14 @@ PetscErrorCode LinearSolver::apply(Vec x, Vec z) {
   return guard_.run([&] { preconditioner().apply(x, z); });
 }
 
-/// The preconditioner is stale once the iterations of Newton's solves beyond those just after it was built
-/// have cost as much as building; at once, if even its first reuse cost more the last time. Built at a hard
-/// point it would never be: a share of all iterations counts. Built for a tangent, it is no longer fresh when
-/// Newton first solves with it: what the last one took when it was counts. Of solves to fewer digits their
-/// share of six.
-void LinearSolver::count_iterations() {
-  PetscInt iterations = 0;
-  check(KSPGetIterationNumber(beside_ ? KSP(tangent_) : ksp_of(snes_), &iterations));
-  const double cost = preconditioner().build_cost(), share = std::log(aimed_at_) / std::log(digits),
-               whole = iterations / share;
-  if (fresh_ < 0 && built_here_) {
-    fresh_ = last_fresh_ = whole;
-    stale_ = first_reuse_ > cost;
-    first_reuse_ /= 2;
-    return;
-  }
-  if (fresh_ < 0) fresh_ = last_fresh_ < 0 ? whole : std::min(whole, last_fresh_);
-  const double beyond = std::max(0.0, iterations - share * fresh_);
-  if (excess_ == 0) first_reuse_ = beyond;
-  excess_ += beyond + renewal * iterations;
-  stale_ = excess_ > cost;
-}
-
 bool LinearSolver::linearise(Vec y, bool newton, std::optional<double> left) {
   if (!krylov_) {
     bordered_.assemble(y, J_);
-    if (factorise(ksp_of(snes_), J_)) return true;
+    if (factorise(newton_ksp(), J_)) return true;
     check(KSPReset(tangent_));
     return false;
   }
-  if (left) reach_ = *left <= straight ? std::max(reach_, as_straight(y, *left)) : -1;
+  if (left) set_reach(y, *left);
   check(VecCopy(y, point_));
   if (uncounted_ && !stale_) count_iterations();
   uncounted_ = false;
@@ -283,69 +241,6 @@ bool LinearSolver::linearise(Vec y, bool newton, std::optional<double> left) {
   check(MatAssemblyEnd(J_, MAT_FINAL_ASSEMBLY));
   if (own_ && !set_up()) return false;
   uncounted_ = own_ && (newton || beside_);
-  return true;
-}
-
-/// Here and not inside a solve, so that a singular block is a singular Jacobian.
-bool LinearSolver::set_up() {
-  PC pc;
-  PCFailedReason reason;
-  check(KSPGetPC(ksp_of(snes_), &pc));
-  check(PCSetOperators(pc, J_, J_));
-  check(PCSetReusePreconditioner(pc, PETSC_FALSE));  // what is kept is said here, not by SNES' lag
-  const PetscErrorCode code = PCSetUp(pc);
-  guard_.rethrow();
-  check(code);
-  check(PCGetFailedReason(pc, &reason));
-  return reason == PC_NOERROR;
-}
-
-PetscErrorCode LinearSolver::set_up(PC pc) {
-  if (!own_) return PETSC_ERR_ARG_WRONGSTATE;  // inside a PC of PETSc's
-  return guard_.run([&] {
-    if (!stale_ && !serves()) follow();
-    built_here_ = stale_;
-    check(PCSetFailedReason(pc, stale_ && !build() ? PC_FACTOR_NUMERIC_ZEROPIVOT : PC_NOERROR));
-  });
-}
-
-/// What a step leaves of the residual is by how much the Jacobian has changed over it: it is next to the same
-/// over so long a way, in multiples of that step. (Not from one such place to the next: of small steps each
-/// would be.)
-double LinearSolver::as_straight(Vec y, double left) const {
-  return norm(moved(y, -1, point_)) * std::min(straight / left, double(farther));
-}
-
-bool LinearSolver::serves() const { return norm(moved(point_, -1, served_)) <= reach_; }
-
-void LinearSolver::serve_from_here() {
-  check(VecCopy(point_, served_));
-  reach_ = 0;
-}
-
-void LinearSolver::follow() {
-  static const log::Event following("FwPCFollow");
-  const log::Span span(following);
-  reach_ = -1;  // should it fail on the way
-  try {
-    preconditioner().follow(point_);
-    serve_from_here();
-  } catch (SingularBlock const&) {
-    stale_ = true;  // what was followed in part is built anew
-  }
-}
-
-bool LinearSolver::build() {
-  static const log::Event building("FwPCBuild");
-  const log::Span span(building);
-  try {
-    preconditioner().build(point_, bordered_.row());
-  } catch (SingularBlock const&) {
-    return false;
-  }
-  stale_ = false;
-  fresh_ = -1, excess_ = 0;
-  serve_from_here();
   return true;
 }
 

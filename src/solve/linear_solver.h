@@ -3,8 +3,8 @@
 #include <optional>
 #include <string>
 
+#include "guard.h"
 #include "solve/bordered.h"
-#include "solve/guard.h"
 #include "solve/preconditioner.h"
 
 namespace fretwave::solve {
@@ -85,7 +85,7 @@ class LinearSolver {
   void follow();
   void serve_from_here();
   bool serves() const;
-  double as_straight(Vec y, double left) const;
+  void set_reach(Vec y, double left);
   bool solve_once(Vec b, Vec x);
   std::pair<PreconditionerKind const*, double> condensing() const;
   bool take_condensed(PreconditionerKind const&, double bytes);
@@ -97,6 +97,9 @@ class LinearSolver {
   void count_iterations();
   Preconditioner& preconditioner() { return fallback_ ? *fallback_ : *own_; }
 
+  KSP newton_ksp() const;
+
+  static constexpr double digits = 1e-6;  ///< relative residual of a Newton step
   Bordered& bordered_;
   std::string prefix_;
   SNES snes_;
@@ -115,7 +118,7 @@ class LinearSolver {
   bool built_here_ = false;                       ///< at the last linearisation
   double tangent_least_ = 0, tangent_floor_ = 0;  ///< of its residuals, by the options
   bool aims_ = false;
-  double aimed_at_ = 1e-6;      ///< relative residual of Newton's next step
+  double aimed_at_ = digits;    ///< relative residual of Newton's next step
   double rough_ = 0;            ///< of tangents that steps are taken along
   int rung_ = 0;                ///< of the ladder; 0: the problem's own preconditioner
   int stay_ = 32, solved_ = 0;  ///< points to stay up there, and points since

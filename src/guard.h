@@ -1,9 +1,10 @@
 #pragma once
 #include <exception>
+#include <utility>
 
 #include "petsc.h"
 
-namespace fretwave::solve {
+namespace fretwave {
 
 /// Carries an exception across PETSc, which must not see one: kept in the callback, thrown again behind it.
 class Guard {
@@ -27,4 +28,4 @@ class Guard {
   std::exception_ptr exception_;
 };
 
-}  // namespace fretwave::solve
+}  // namespace fretwave
