@@ -27,7 +27,9 @@ if TYPE_CHECKING:
     from .cyclic.waves import WaveError
     from .cyclic.wheel_modes import deviations, most_alike, standing_wave, travelling_wave
     from .cyclic.wheel_shape import WheelShape
-    from .hb.problems import ForcedResponse, Harmonics, NonlinearMode, choose_harmonics
+    from .hb.forced_response import ForcedResponse
+    from .hb.harmonics import Harmonics, choose_harmonics
+    from .hb.nonlinear_mode import NonlinearMode
     from .hb.reduction_error import NonlinearError, nonlinear_error
     from .importers.entries import Entries
     from .importers.formats import register_format
@@ -97,7 +99,9 @@ _HOMES = {
     "model.modal_damping": ("modal_damping",),
     "model.model": ("Model",),
     "model.modes": ("LinearMode", "linear_modes"),
-    "hb.problems": ("ForcedResponse", "Harmonics", "NonlinearMode", "choose_harmonics"),
+    "hb.forced_response": ("ForcedResponse",),
+    "hb.harmonics": ("Harmonics", "choose_harmonics"),
+    "hb.nonlinear_mode": ("NonlinearMode",),
     "model.reduction": ("FrequencyError", "Reduction", "reduce"),
     "hb.reduction_error": ("NonlinearError", "nonlinear_error"),
     "solve.transient": ("Transient",),

@@ -40,7 +40,8 @@ from .parts.rest import keep_pairs, rest_state, retained, start_mode, stuck_or_f
 if TYPE_CHECKING:
     from ..case.facts import Facts
     from ..case.reporter import Reporter
-    from ..hb.problems import Harmonics, NonlinearMode
+    from ..hb.harmonics import Harmonics
+    from ..hb.nonlinear_mode import NonlinearMode
 
 NOT_ANSWERED = "stability of the limit cycles against waves of other nodal diameters and of other families"
 

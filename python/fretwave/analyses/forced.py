@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
     from ..case.facts import Facts
     from ..case.reporter import Reporter
-    from ..hb.problems import HarmonicProblem
+    from ..hb.harmonic_problem import HarmonicProblem
     from ..units import UnitSystem
 
 

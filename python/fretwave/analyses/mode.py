@@ -50,7 +50,7 @@ if TYPE_CHECKING:
 
     from ..case.facts import Facts
     from ..case.reporter import Reporter
-    from ..hb.problems import NonlinearMode
+    from ..hb.nonlinear_mode import NonlinearMode
     from ..solve.continuation import Continuation, Point
     from ..units import UnitSystem
     from .parts.branch import Describe

@@ -114,7 +114,7 @@ class HarmonicSection(AnalysisSection):
         return harmonic_memory(self.harmonics, self.samples, (facts.sectors or 1) if self.wheel else 1, facts)
 
     def details(self, model: Model) -> list[str]:
-        from ..hb.problems import choose_harmonics
+        from ..hb.harmonics import choose_harmonics
 
         lines = super().details(model)
         sizes = (self.harmonics, self.samples) if self.accuracy is None else (LEAST_HARMONICS, LEAST_SAMPLES)

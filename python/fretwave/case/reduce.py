@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from petsc4py import PETSc
 
     from ..cyclic.reduction import SectorReduction
-    from ..hb.problems import NonlinearMode
+    from ..hb.nonlinear_mode import NonlinearMode
     from ..hb.reduction_error import NonlinearError
     from ..model.reduction import Reduction
     from .analysis import AnalysisSection

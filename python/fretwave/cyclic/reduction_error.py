@@ -17,8 +17,8 @@ import scipy.sparse as sp
 from petsc4py import PETSc
 
 from ..arrays import Array, Complex
+from ..hb.nonlinear_mode import NonlinearMode
 from ..hb.omitted import harmonic_factors
-from ..hb.problems import NonlinearMode
 from ..hb.reduction_error import NonlinearError, _reduced_step
 from .reduction import SectorReduction
 

@@ -12,8 +12,8 @@ from petsc4py import PETSc
 from ..columns import COLUMNS, ENERGY, Column
 from ..errors import InputError
 from ..post.motion import complex_amplitudes
+from .harmonic_problem import HarmonicProblem
 from .observed import Observed, row_of, unit_of
-from .problems import HarmonicProblem
 
 
 class Observer:

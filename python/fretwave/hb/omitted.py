@@ -11,7 +11,7 @@ from petsc4py import PETSc
 from ..arrays import Complex
 
 if TYPE_CHECKING:
-    from .problems import HarmonicProblem
+    from .harmonic_problem import HarmonicProblem
 
 
 def harmonic_factors(

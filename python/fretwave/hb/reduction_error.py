@@ -15,8 +15,8 @@ from ..arrays import Array, Complex
 from ..errors import InputError, NotConverged
 from ..model.reduction import Reduction
 from ..model.sectors import Sparse
+from .nonlinear_mode import NonlinearMode
 from .omitted import harmonic_factors
-from .problems import NonlinearMode
 
 if TYPE_CHECKING:
     from mpi4py import MPI

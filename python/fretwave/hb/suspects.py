@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from petsc4py import PETSc
 
     from ..model.contact import Contact
-    from .problems import HarmonicProblem
+    from .harmonic_problem import HarmonicProblem
 
 
 #: What a reason begins with where no step led on.

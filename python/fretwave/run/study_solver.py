@@ -33,7 +33,8 @@ from .study_plan import Settings, common_amplitudes
 if TYPE_CHECKING:
     from mpi4py import MPI
 
-    from ..hb.problems import HarmonicProblem, Harmonics
+    from ..hb.harmonic_problem import HarmonicProblem
+    from ..hb.harmonics import Harmonics
     from ..solve.continuation import Point
 
 Studied = Union[ModeAnalysis, ForcedAnalysis]
@@ -161,7 +162,7 @@ class ModeSolver(Solver[Start]):
         return start_of(context)
 
     def _problem(self, context: AnalysisContext[Any], started: Start, harmonics: Harmonics) -> HarmonicProblem:
-        from ..hb.problems import NonlinearMode
+        from ..hb.nonlinear_mode import NonlinearMode
 
         return NonlinearMode(
             context.model,

@@ -34,7 +34,7 @@ from .study_folder import StudyFolder, publish
 if TYPE_CHECKING:
     from mpi4py import MPI
 
-    from ..hb.problems import NonlinearMode
+    from ..hb.nonlinear_mode import NonlinearMode
     from ..solve.wear import Wear
 
 #: Swept where neither the command line nor the case says anything.

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from ..columns import SOURCES
 
 if TYPE_CHECKING:
-    from ..hb.problems import Harmonics
+    from ..hb.harmonics import Harmonics
 
 #: Shares of the accuracy: what a new set aims at, and above which a smaller one is not tried.
 AIM, LOW = 0.6, 0.5

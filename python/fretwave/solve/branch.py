@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from mpi4py import MPI
     from petsc4py import PETSc
 
-    from ..hb.problems import HarmonicProblem
+    from ..hb.harmonic_problem import HarmonicProblem
     from .unknowns import Unknowns
 
 

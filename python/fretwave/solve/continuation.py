@@ -11,7 +11,7 @@ from petsc4py import PETSc
 
 from .. import _core
 from ..errors import InputError
-from ..hb.problems import HarmonicProblem
+from ..hb.harmonic_problem import HarmonicProblem
 from ..mpi.log import event
 from ..mpi.spread import Cuttable, Spread, fill
 from .starting import far_from_start, starts

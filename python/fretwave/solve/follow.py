@@ -10,9 +10,9 @@ from petsc4py import PETSc
 
 from ..columns import FORCED, MODE, columns_named, over, with_discretisation
 from ..errors import InputError
+from ..hb.harmonic_problem import HarmonicProblem
 from ..hb.observed import Observed, unit_of
 from ..hb.observer import Observer
-from ..hb.problems import HarmonicProblem
 from .branch import Branch
 from .continuation import Continuation, Point
 from .refining import RefiningContinuation

@@ -10,7 +10,8 @@ from petsc4py import PETSc
 from .. import _core
 from ..arrays import Array
 from ..errors import InputError, NotConverged
-from ..hb.problems import HarmonicProblem, Harmonics
+from ..hb.harmonic_problem import HarmonicProblem
+from ..hb.harmonics import Harmonics
 from ..hb.suspects import suspects
 from ..model.laws import own_load
 from ..model.model import Model

@@ -10,7 +10,8 @@ import numpy as np
 from petsc4py import PETSc
 
 from .. import _core
-from ..hb.problems import HarmonicProblem, Harmonics
+from ..hb.harmonic_problem import HarmonicProblem
+from ..hb.harmonics import Harmonics
 from ..hb.states import Estimate
 from .accuracy import MOST_SAMPLES, ROUNDS, TOLERATED, Aim, limiting, most_harmonics
 from .continuation import Continuation, Point

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Any, Union
 from petsc4py import PETSc
 
 from .. import _core
-from ..hb.problems import ForcedResponse, HarmonicProblem, NonlinearMode
+from ..hb.forced_response import ForcedResponse
+from ..hb.harmonic_problem import HarmonicProblem
+from ..hb.nonlinear_mode import NonlinearMode
 from ..model.laws import Role
 from .steps import StepControl
 

@@ -14,7 +14,7 @@ from .unknowns import Unknowns
 if TYPE_CHECKING:
     from petsc4py import PETSc
 
-    from ..hb.problems import HarmonicProblem
+    from ..hb.harmonic_problem import HarmonicProblem
 
 
 class Knot(NamedTuple):

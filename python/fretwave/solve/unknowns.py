@@ -12,7 +12,7 @@ from .hermite import between, derivatives, piece, slopes
 if TYPE_CHECKING:
     from petsc4py import PETSc
 
-    from ..hb.problems import HarmonicProblem
+    from ..hb.harmonic_problem import HarmonicProblem
 
 
 class Unknowns:

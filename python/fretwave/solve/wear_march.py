@@ -10,7 +10,7 @@ import numpy as np
 from ..arrays import Array
 from ..columns import Column, columns_named
 from ..errors import InputError
-from ..hb.problems import HarmonicProblem
+from ..hb.harmonic_problem import HarmonicProblem
 from .branch import Branch
 from .steps import WearControl
 from .table import Table

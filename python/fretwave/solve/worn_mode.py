@@ -11,7 +11,7 @@ from petsc4py import PETSc
 from .. import _core
 from ..arrays import Array
 from ..errors import InputError
-from ..hb.problems import HarmonicProblem
+from ..hb.harmonic_problem import HarmonicProblem
 from ..model.laws import Role, law_like
 from ..mpi.destroyable import Destroyable
 from .continuation import Continuation

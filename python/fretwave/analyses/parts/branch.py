@@ -26,8 +26,10 @@ if TYPE_CHECKING:
     from mpi4py import MPI
     from petsc4py import PETSc
 
+    from ...hb.harmonic_problem import HarmonicProblem
+    from ...hb.harmonics import Harmonics
+    from ...hb.nonlinear_mode import NonlinearMode
     from ...hb.observed import Observed
-    from ...hb.problems import HarmonicProblem, Harmonics, NonlinearMode
     from ...model.modes import LinearMode
     from ...model.rest import Rest
     from ...solve.continuation import Continuation, Point
@@ -203,7 +205,7 @@ def mode_problem(
     dof : normalised; by default what the analysis names
     avoid : as in `fretwave.NonlinearMode`
     """
-    from ...hb.problems import NonlinearMode
+    from ...hb.nonlinear_mode import NonlinearMode
 
     analysis = context.analysis
     observed = observed_by(context, analysis.normalise, mode) if dof is None else dof

@@ -26,8 +26,10 @@ from .tuned import tuned_sector
 if TYPE_CHECKING:
     from petsc4py import PETSc
 
+    from ...hb.forced_response import ForcedResponse
+    from ...hb.harmonic_problem import HarmonicProblem
+    from ...hb.harmonics import Harmonics
     from ...hb.observed import Observed
-    from ...hb.problems import ForcedResponse, HarmonicProblem, Harmonics
     from ...model.modes import LinearMode
     from ...model.rest import Rest
     from ...solve.continuation import Continuation
@@ -83,7 +85,7 @@ class Excitation:
 
     def problem(self, level: float) -> ForcedResponse:
         """Steady response at a level. Collective."""
-        from ...hb.problems import ForcedResponse
+        from ...hb.forced_response import ForcedResponse
 
         return ForcedResponse(
             self.context.model,

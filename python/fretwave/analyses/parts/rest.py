@@ -21,7 +21,7 @@ from .context import AnalysisContext
 
 if TYPE_CHECKING:
     from ...case.load import Case
-    from ...hb.problems import Harmonics
+    from ...hb.harmonics import Harmonics
     from ...model.modes import LinearMode
     from ...model.rest import Rest
     from ...results.results import AnalysisWriter
@@ -212,7 +212,7 @@ def retained(
     ----------
     highest, samples : in place of the analysis' own
     """
-    from ...hb.problems import choose_harmonics
+    from ...hb.harmonics import choose_harmonics
 
     analysis, retain = context.analysis, context.analysis.retain
     if retain == "auto" and context.case.preload_of(analysis) is not None:

@@ -26,7 +26,7 @@ from .rest import retained, start_mode
 if TYPE_CHECKING:
     from mpi4py import MPI
 
-    from ...hb.problems import NonlinearMode
+    from ...hb.nonlinear_mode import NonlinearMode
     from ...solve.wear import Wear, WearPoint
     from ...solve.worn_mode import WornMode, WornState
     from ..mode import ModeAnalysis

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from ...case.analysis import AnalysisSection
     from ...case.case import Case
-    from ...hb.problems import NonlinearMode
+    from ...hb.nonlinear_mode import NonlinearMode
     from ...model.modes import LinearMode
     from ...results.results import AnalysisWriter
     from ..mode import ModeAnalysis

@@ -1,86 +1,27 @@
-"""Nonlinear modes and forced response by harmonic balance: the problems that continuation follows."""
+"""Harmonic balance as a problem that continuation follows: what nonlinear modes and forced responses share."""
 
 from __future__ import annotations
 
 import copy
 import time
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 from mpi4py import MPI
 from petsc4py import PETSc
 
 from .. import _core
 from ..arrays import Array, Indices
-from ..errors import InputError
 from ..model.model import Model
-from ..model.modes import LinearMode
 from ..model.rest import Rest
 from ..mpi.destroyable import Destroyable
 from ..mpi.gather import on_rank_0
 from ..post.contact_history import MOTION
 from ..post.motion import complex_amplitudes
-from .observed import Observed, named, row_of
+from .harmonics import Harmonics
+from .observed import Observed
 from .omitted import omitted_residual
-from .states import Estimate, ForcedState, ModalState, State, default_samples
-
-
-class Harmonics:
-    """The retained harmonics and the number of time samples of a period.
-
-    Parameters
-    ----------
-    orders : ascending, with 1 among them (0 is the mean)
-    samples : even, at least 2 max(orders) + 2. What a period is shown by; of the forces cubic springs and laws in
-        Python alone are sampled, all others are integrated in continuous time.
-    """
-
-    def __init__(self, orders: Sequence[int], samples: int) -> None:
-        self.core = _core.Harmonics(list(orders), samples)
-        self.orders: tuple[int, ...] = tuple(self.core.orders)
-        self.samples: int = samples
-        self.block_size: int = self.core.block_size
-        self.labels = [label for n in self.orders for label in (["0"] if n == 0 else [f"{n}c", f"{n}s"])]
-        self.left_out: list[str] = []
-
-    def up_to(self, highest: int, samples: int) -> Harmonics:
-        """A set of the same kind (odd, with the mean) up to another order; samples double until they suffice."""
-        step = 2 if all(n % 2 for n in self.orders) else 1
-        highest += step == 2 and highest % 2 == 0
-        while samples < 2 * highest + 2:
-            samples *= 2
-        other = Harmonics(range(self.orders[0], highest + 1, step), samples)
-        other.left_out = list(self.left_out)
-        return other
-
-    def __repr__(self) -> str:
-        step = self.orders[1] - self.orders[0] if len(self.orders) > 1 else 1
-        regular = self.orders == tuple(range(self.orders[0], self.orders[-1] + 1, step))
-        last = f"{self.orders[1]}, ..., {self.orders[-1]}" if len(self.orders) > 3 else ""
-        orders = f"{self.orders[0]}, {last}" if last and regular else ", ".join(map(str, self.orders))
-        return f"Harmonics({orders}; {self.samples} samples)"
-
-
-def choose_harmonics(model: Model, highest: int, samples: int | None = None, retain: str = "auto") -> Harmonics:
-    """Retained set up to `highest`: only what the model needs, unless told otherwise.
-
-    Parameters
-    ----------
-    samples : default: `default_samples`.
-    retain : {"auto", "odd", "all"}
-        auto keeps odd harmonics only when every law is odd and nothing preloads the contact.
-    """
-    if highest < 1:
-        raise InputError("the highest harmonic is below 1", None, highest, ">= 1", "give H = 1 or more")
-    if retain not in ("auto", "odd", "all"):
-        raise InputError("unknown choice of harmonics", None, retain, "auto, odd or all", 'use retain="auto"')
-    odd = retain == "odd" or (retain == "auto" and model.odd)
-    harmonics = Harmonics([n for n in range(highest + 1) if n % 2 or not odd], samples or default_samples(highest))
-    if odd:
-        harmonics.left_out.append("even harmonics and the mean (the contact laws are odd, there is no preload)")
-    return harmonics
+from .states import Estimate, State
 
 
 class HarmonicProblem(Destroyable):
@@ -322,145 +263,3 @@ class HarmonicProblem(Destroyable):
         """Free the solver's vectors. Collective."""
         self._error = None
         self.core = None  # type: ignore[assignment]
-
-
-class NonlinearMode(HarmonicProblem):
-    """A nonlinear mode, frequency and damping over the modal amplitude. Collective.
-
-    Parameters
-    ----------
-    method : {"CNM", "EPMC"}
-        Complex nonlinear mode (Laxalde et al. 2008), or extended periodic motion concept (Krack 2015).
-    dof : int, (n_dof,), or LinearMode
-        The fundamental coefficient of this dof is (a, 0); or that of a row w . x of displacements, or of a linear
-        mode's coordinate phi^T M x (of unit modal mass).
-    start : LinearMode
-        Where the branch begins; scales the unknowns.
-    prefix : str
-        Of the PETSc options.
-    avoid : (n_dof,) complex, optional
-        On a tuned wheel, where modes come in pairs and the equations lose rank at small amplitude: the other mode of
-        the pair, for a travelling wave the conjugate of the start's shape. The fundamental's component on it is kept
-        at zero by a force that comes out as zero (`unfolding`).
-    rest : Rest, optional
-        The static state that the motion is about (`fretwave.static_preload`), its own whatever other problems of the
-        model are about; without it that of the model (`Model.settle`), and no static load.
-    """
-
-    core: _core.NonlinearMode
-
-    def __init__(
-        self,
-        model: Model,
-        harmonics: Harmonics,
-        method: str = "CNM",
-        dof: Observed = 0,
-        start: LinearMode | None = None,
-        prefix: str = "mode_",
-        avoid: npt.NDArray[np.complex128] | None = None,
-        rest: Rest | None = None,
-    ) -> None:
-        if method not in ("CNM", "EPMC"):
-            raise InputError("unknown method", None, method, "CNM or EPMC", 'use method="CNM"')
-        if start is None:
-            from ..model.modes import linear_modes
-
-            start = linear_modes(model, 1)[0]
-        self.method, self.dof, self.start = method, dof, start
-        self.row = row_of(model, dof)
-        known = model.core, harmonics.core, getattr(_core.Method, method), self.row, start.omega
-        with model.vectors(start.shape, start.imaginary) as shape:
-            core = _core.NonlinearMode(*known, *shape)
-        if avoid is not None:
-            with model.vectors(np.real(avoid), np.imag(avoid)) as other:
-                core.unfold(*other)
-        super().__init__(model, harmonics, prefix, core, rest)
-        self.meaning = ModalState(method, start.omega)
-
-    def amplitude_scale(self, y: PETSc.Vec) -> float:
-        return self.state(y)["amplitude"]
-
-    def inertia_damping(self, y: PETSc.Vec) -> float:
-        return 2 * self.state(y)["beta"] if self.method == "EPMC" else 0.0  # C - 2 zeta w0 M
-
-    def _what(self) -> str:
-        return f"{self.method} from {self.start.frequency_hz:.6g} Hz, amplitude of {named(self.dof)}, "
-
-    def initial(self, amplitude: float) -> PETSc.Vec:
-        """The linear mode at this amplitude. Collective."""
-        return self.core.initial(amplitude)
-
-    def unfolding(self, y: PETSc.Vec) -> Array:
-        """The force along the avoided mode (2,), dimensionless; empty without `avoid`. Collective."""
-        return np.asarray(self.core.unfolding(y))
-
-
-class ForcedResponse(HarmonicProblem):
-    """Steady response to a periodic force over its frequency. Collective.
-
-    Parameters
-    ----------
-    force : dict
-        Order n -> complex (n_dof,), p(t) = level Re sum P_n e^{i n w t}.
-    dof : int, (n_dof,), or LinearMode
-        Observed: a dof, a row w . x of displacements, or a linear mode's coordinate phi^T M x (of unit modal mass).
-    reference : LinearMode
-        Scales the unknowns.
-    prefix : str
-        Of the PETSc options.
-    rest : Rest, optional
-        The static state that the motion is about (`fretwave.static_preload`), its own whatever other problems of the
-        model are about; without it that of the model (`Model.settle`), and no static load.
-    """
-
-    core: _core.ForcedResponse
-
-    def __init__(
-        self,
-        model: Model,
-        harmonics: Harmonics,
-        force: Mapping[int, npt.NDArray[Any]],
-        level: float,
-        dof: Observed,
-        reference: LinearMode,
-        prefix: str = "forced_",
-        rest: Rest | None = None,
-    ) -> None:
-        self.dof, self.level, self.reference = dof, level, reference
-        P = self._blocks(model, harmonics, force)
-        with model.vectors(reference.shape) as (shape,):
-            row = row_of(model, dof)
-            core = _core.ForcedResponse(model.core, harmonics.core, row, P, level, reference.omega, shape)
-        P.destroy()
-        super().__init__(model, harmonics, prefix, core, rest)
-        self.meaning = ForcedState(level, reference.omega, core.reference_amplitude)
-
-    @staticmethod
-    def _blocks(model: Model, harmonics: Harmonics, force: Mapping[int, npt.NDArray[Any]]) -> PETSc.Vec:
-        blocks = np.zeros((model.n_dof, harmonics.block_size))
-        for order, P in force.items():
-            if order not in harmonics.orders:
-                raise InputError(
-                    "the force has a harmonic that is not retained",
-                    None,
-                    order,
-                    str(harmonics.orders),
-                    'retain it: retain = "all"',
-                )
-            values = np.asarray(P, dtype=complex)
-            column = harmonics.labels.index(f"{order}c" if order else "0")
-            blocks[:, column] = values.real
-            if order:
-                blocks[:, column + 1] = -values.imag
-        local = model.distribute(blocks).ravel().copy()
-        return PETSc.Vec().createWithArray(local, comm=model.comm)
-
-    def amplitude_scale(self, y: PETSc.Vec) -> float:
-        return self.core.reference_amplitude
-
-    def _what(self) -> str:
-        return f"level {self.level:g}, {named(self.dof)}, "
-
-    def initial(self, omega: float) -> PETSc.Vec:
-        """Zero motion at this angular frequency: Newton's first step is the linear response. Collective."""
-        return self.core.initial(omega)
