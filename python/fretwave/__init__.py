@@ -34,12 +34,14 @@ if TYPE_CHECKING:
     from .importers.entries import Entries
     from .importers.formats import register_format
     from .model.contact import Contact
-    from .model.laws import LawInfo, Limit, ParameterInfo, PythonLaw, Role, laws, register_law
+    from .model.law_info import LawInfo, Limit, ParameterInfo, Role
+    from .model.laws import laws, register_law
     from .model.modal_damping import modal_damping
     from .model.model import Model
     from .model.modes import LinearMode, linear_modes
     from .model.pair_coordinates import on_pair_coordinates
     from .model.pairs import Pairs
+    from .model.python_law import PythonLaw
     from .model.reduction import FrequencyError, Reduction, reduce
     from .model.rest import Rest
     from .model.sectors import by_sector, rotation
@@ -94,7 +96,9 @@ _HOMES = {
     "cyclic.faces": ("match_faces",),
     "importers.entries": ("Entries",),
     "importers.formats": ("register_format",),
-    "model.laws": ("LawInfo", "Limit", "ParameterInfo", "PythonLaw", "Role", "laws", "register_law"),
+    "model.law_info": ("LawInfo", "Limit", "ParameterInfo", "Role"),
+    "model.python_law": ("PythonLaw",),
+    "model.laws": ("laws", "register_law"),
     "model.contact": ("Contact",),
     "model.modal_damping": ("modal_damping",),
     "model.model": ("Model",),

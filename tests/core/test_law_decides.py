@@ -17,7 +17,9 @@ from models.vtkhdf_files import read_step
 from tolerances import LAST_DIGITS, SOLVED
 
 import fretwave as fw
-from fretwave.model.laws import Limit, ParameterInfo, PythonLaw, Role, forget_law
+from fretwave.model.law_info import Limit, ParameterInfo, Role
+from fretwave.model.laws import forget_law
+from fretwave.model.python_law import PythonLaw
 from fretwave.plots import faces, style
 from fretwave.post.contact_history import OPEN, SLIP, STICK
 from fretwave.results.reader import Run
@@ -280,8 +282,8 @@ def test_a_law_may_not_take_the_name_of_a_compiled_one() -> None:
         fw.register_law(Own)
 
 
-#: Where a name may stand: the laws' module, and where the keys that users write are shown to them.
-KNOWN = {"model/laws.py", "case/schema.py", "commands/main.py"}
+#: Where a name may stand: the laws' modules, and where the keys that users write are shown to them.
+KNOWN = {"model/laws.py", "model/law_info.py", "case/schema.py", "commands/main.py"}
 #: The distance of an open pair is a result too, a column and a field of that name.
 RESULTS = {
     ("gap", name)

@@ -9,7 +9,7 @@ import pytest
 from tolerances import LAST_BIT, LAST_DIGITS, ROUNDING, TIGHT
 
 import fretwave as fw
-from fretwave.model.laws import Role
+from fretwave.model.law_info import Role
 from fretwave.post.contact_history import OPEN, SLIP, STICK, ContactHistory, tangential_force
 
 pytestmark = pytest.mark.ranks(1)

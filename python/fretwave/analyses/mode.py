@@ -16,7 +16,7 @@ from ..case.observed import Observed, check_observed, dof_of, dofs_of, label_of,
 from ..case.schema import Positive, key
 from ..columns import ENERGY, MODE
 from ..errors import InputError
-from ..model.laws import PythonLaw
+from ..model.python_law import PythonLaw
 from ..post.limit_cycles import limit_cycles, stability
 from ..post.mode_curve import most_damped, varies, without_rounding
 from ..results.results import AnalysisWriter

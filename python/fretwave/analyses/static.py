@@ -13,7 +13,7 @@ from ..case.schema import Positive, PreloadSection, key
 from ..columns import Column
 from ..errors import InputError, NotConverged
 from ..model.contact import Contact
-from ..model.laws import STATUS
+from ..model.law_info import STATUS
 from ..post.contact_history import normal_force, tangential_force
 from .parts.at_rest import static_at_rest
 from .parts.context import AnalysisContext, Outcome

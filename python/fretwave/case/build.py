@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from ..model.contact import Contact
-from ..model.laws import Role
+from ..model.law_info import Role
 from .flow import with_flow
 from .harmonic import nodal_diameter, with_flow_forces
 from .schema import Damper, PreloadSection

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..model.laws import Role
+from ..model.law_info import Role
 from .checks_common import check_loads
 from .reporter import Found, Reporter
 from .schema import PreloadSection, ReductionSection

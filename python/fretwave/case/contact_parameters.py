@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from ..arrays import Array
 from ..errors import FretwaveError, InputError
-from ..model.laws import LawInfo, ParameterInfo, Role
+from ..model.law_info import LawInfo, ParameterInfo, Role
 from ..model.pairs import Pairs
 from ..texts import nearest, toml
 from ..units import quantity

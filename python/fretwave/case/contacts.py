@@ -12,7 +12,8 @@ import scipy.sparse
 from ..arrays import Array
 from ..errors import FretwaveError, InputError
 from ..model.contact import Contact
-from ..model.laws import LawInfo, law_like
+from ..model.law_info import LawInfo
+from ..model.laws import law_like
 from ..model.pairs import Pairs
 from ..model.sectors import Sparse
 from ..model.structure import Structure

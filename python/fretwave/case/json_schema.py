@@ -32,7 +32,7 @@ from .schema import (
 )
 
 if TYPE_CHECKING:
-    from ..model.laws import LawInfo, ParameterInfo
+    from ..model.law_info import LawInfo, ParameterInfo
 
 #: The schema that is shipped: of the package's own analyses and laws.
 SHIPPED = Path(__file__).with_name("case.schema.json")

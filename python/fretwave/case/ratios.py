@@ -12,7 +12,7 @@ from ..arrays import Array
 from ..errors import InputError
 from ..hb.suspects import STIFF
 from ..model.contact import span
-from ..model.laws import Role
+from ..model.law_info import Role
 from ..model.sectors import by_sector
 from .odd_material import odd_material
 

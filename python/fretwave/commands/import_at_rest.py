@@ -12,7 +12,8 @@ from ..errors import InputError
 from ..files.csv_table import write_columns
 from ..importers.contact_results import at_rest, read_step
 from ..importers.formats import readable
-from ..model.laws import Role, usual_name
+from ..model.law_info import Role
+from ..model.laws import usual_name
 from ..model.structure import Structure
 
 #: A file and its columns.

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..arrays import Array
-from ..model.laws import Role
+from ..model.law_info import Role
 from ..units import UnitSystem
 
 if TYPE_CHECKING:

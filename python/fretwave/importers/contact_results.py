@@ -24,7 +24,8 @@ import scipy.sparse as sp
 
 from ..arrays import Array, IntArray
 from ..errors import InputError
-from ..model.laws import Role, usual_name
+from ..model.law_info import Role
+from ..model.laws import usual_name
 from ..model.pairs import Pairs
 from ..model.sectors import by_sector
 from ..texts import counted, display, shortened

@@ -13,8 +13,10 @@ import scipy.sparse as sp
 
 from ..arrays import Array
 from ..errors import InputError
-from .laws import LawInfo, ParameterInfo, PythonLaw, Role, core_law, laws, python_law, springs
+from .law_info import LawInfo, ParameterInfo, Role
+from .laws import core_law, laws, springs
 from .pairs import Pairs, Values, repeated
+from .python_law import PythonLaw, python_law
 from .sectors import Term, by_sector
 
 

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from ..arrays import Array
-from ..model.laws import OPEN, SLIP, STICK
+from ..model.law_info import OPEN, SLIP, STICK
 from ..results.reader import Analysis, Run, Table
 from ..units import UnitSystem
 from . import scales, style

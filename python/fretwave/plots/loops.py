@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..arrays import AnyArray
-from ..model.laws import Role
+from ..model.law_info import Role
 from ..results.reader import Analysis, Run
 from . import scales, style
 from .phase_planes import kept_points

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..arrays import Array
-from ..model.laws import Role
+from ..model.law_info import Role
 from ..results.reader import Analysis, Run, Table
 from ..units import SI, UnitSystem
 from . import scales, style

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..arrays import Array
-from ..model.laws import OPEN, SLIP, STICK, UNKNOWN
+from ..model.law_info import OPEN, SLIP, STICK, UNKNOWN
 
 States = npt.NDArray[np.int8]
 Change = Callable[[npt.NDArray[Any]], npt.NDArray[Any]]

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..arrays import Array
 from ..columns import Column
-from ..model.laws import OPEN, STATUS
+from ..model.law_info import OPEN, STATUS
 from .contact_history import ContactHistory
 
 #: Directions in which the extent of a path in the plane is looked at; the largest of them is short by 2e-4 at most.

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ..arrays import Array
-from ..model.laws import Limit, Role, kept_laws
+from ..model.law_info import Limit, Role, kept_laws
 
 #: Of two tangents, in which slip that lasts is looked for.
 DIRECTIONS = 64

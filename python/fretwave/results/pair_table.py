@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from ..arrays import AnyArray, Array
 from ..columns import Column
-from ..model.laws import Role, kept_laws
+from ..model.law_info import Role, kept_laws
 from ..post.contact_history import ContactHistory
 from ..post.pair_values import COLUMNS, pair_values
 from .reader import Analysis

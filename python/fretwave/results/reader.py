@@ -17,7 +17,7 @@ from ..columns import PURE, name_of, table_order
 from ..errors import InputError
 from ..files.dimensions import names_of_data
 from ..hb.states import State
-from ..model.laws import UNKNOWN, Role, kept_laws
+from ..model.law_info import UNKNOWN, Role, kept_laws
 from ..post.mode_curve import ModeCurve
 from ..post.motion import motion
 from ..solve.curve import PARTS, Curve

@@ -11,7 +11,7 @@ from .. import _core
 from ..hb.forced_response import ForcedResponse
 from ..hb.harmonic_problem import HarmonicProblem
 from ..hb.nonlinear_mode import NonlinearMode
-from ..model.laws import Role
+from ..model.law_info import Role
 from .steps import StepControl
 
 if TYPE_CHECKING:

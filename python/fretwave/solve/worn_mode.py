@@ -12,7 +12,8 @@ from .. import _core
 from ..arrays import Array
 from ..errors import InputError
 from ..hb.harmonic_problem import HarmonicProblem
-from ..model.laws import Role, law_like
+from ..model.law_info import Role
+from ..model.laws import law_like
 from ..mpi.destroyable import Destroyable
 from .continuation import Continuation
 from .steppers import StageFailed

@@ -16,7 +16,7 @@ from ..case.kept import belongs
 from ..case.load import Case
 from ..errors import InputError
 from ..files.dimensions import names_of_data
-from ..model.laws import kept_laws
+from ..model.law_info import kept_laws
 from ..post.contact_history import ContactHistory
 from ..post.motion import waves
 from ..results.file import unit_of_amplitudes

@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 
 from ..arrays import Array
 from ..case.load import Case
-from ..model.laws import STATUS
+from ..model.law_info import STATUS
 from ..model.pairs import Pairs
 from ..post.contact_history import ContactHistory
 from .choice import Choice

@@ -14,7 +14,7 @@ from ...case.harmonic import nodal_diameter
 from ...case.observed import label_of, unit_of
 from ...errors import InputError
 from ...model.contact import Contact
-from ...model.laws import STATUS, STICK, Limit, Role
+from ...model.law_info import STATUS, STICK, Limit, Role
 from ...model.sectors import in_wave
 from ...post.contact_history import normal_force
 from ...post.slip_threshold import lasting_factors, slip_factors

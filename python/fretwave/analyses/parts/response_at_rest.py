@@ -15,7 +15,7 @@ from ...case.flow import with_flow
 from ...case.harmonic import nodal_diameter
 from ...case.observed import label_of, unit_of
 from ...errors import InputError
-from ...model.laws import OPEN
+from ...model.law_info import OPEN
 from ...model.sectors import by_sector
 from ...model.wheel_matrix import entries_of
 from .at_rest import (

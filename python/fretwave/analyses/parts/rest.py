@@ -15,7 +15,8 @@ from ...case.harmonic import LEAST_HARMONICS, LEAST_SAMPLES, HarmonicSection, no
 from ...case.schema import PreloadSection
 from ...errors import InputError
 from ...model.contact import Contact
-from ...model.laws import Role, own_load
+from ...model.law_info import Role
+from ...model.laws import own_load
 from .asymptotes import MORE_MODES, closed_stiffness, limit_model, most_like, with_friction
 from .context import AnalysisContext
 

@@ -1,0 +1,123 @@
+"""A base class for contact laws written in Python."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from ..arrays import Array
+from .law_info import OPEN, SLIP, LawInfo, Limit, ParameterInfo
+
+
+class PythonLaw:
+    """A contact law for prototypes: the force depends on the present relative displacement and velocity only.
+
+    Subclasses give ``force(u, v)``, and ``tangent(u, v)`` when they can: without it the tangent is a central difference
+    and Newton is accurate to about 1e-9. Arrays are (n_samples, components, n_pairs). ``status`` and ``gap`` say which
+    pairs stick, slip and are open in tables, pictures and views.
+
+    With `register_law` a case names it as any other; it is then made with its parameters as keywords, each (n_pairs,).
+
+    Attributes
+    ----------
+    name : str
+        Under which a case finds it; by default that of the class.
+    parameters : sequence of ParameterInfo
+        Of a registered law, with their roles.
+    components : int
+        1 (tangent), 2 (normal, tangent) or 3 (normal, two tangents).
+    normal : int or None
+        Component along the normal, > 0 closing; by default the first of several, none of one.
+    limit : Limit
+        What the tangential force stays within, where that is sharp.
+    odd : bool
+        f(-u, -v) = -f(u, v): even harmonics may be left out.
+    stuck_stiffness : float
+        Stiffness of the closed contact [force/length] in stuck linear modes; infinite means no relative motion.
+    pairs : array of int
+        Which pairs (rows of B) the arrays hold, on this rank; set by the model.
+    """
+
+    name: str = ""
+    parameters: Sequence[ParameterInfo] = ()
+    components: int = 1
+    normal: int | None = None
+    limit: Limit = Limit.NONE
+    odd: bool = False
+    stuck_stiffness: float = float("inf")
+    pairs: npt.NDArray[np.intp]
+
+    def __init__(self, **values: Array) -> None:
+        self.__dict__.update(values)
+
+    def __init_subclass__(cls, **given: object) -> None:
+        super().__init_subclass__(**given)
+        if cls.components > 1 and "normal" not in vars(cls) and cls.normal is None:
+            cls.normal = 0
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.components} components{', odd' if self.odd else ''})"
+
+    def force(self, u: Array, v: Array) -> Array:
+        """Contact force, shape of `u`, in the direction of +u (it resists the motion)."""
+        raise NotImplementedError
+
+    def tangent(self, u: Array, v: Array) -> tuple[Array, Array]:
+        """(df/du, df/dv), each (n_samples, components, components, n_pairs): [.., row, column, ..]."""
+        return self._difference(u, v, 0), self._difference(u, v, 1)
+
+    def status(self, u: Array, v: Array, f: Array) -> npt.NDArray[Any]:
+        """`STICK`, `SLIP` or `OPEN` (n_samples, n_pairs); by default open without a normal force, and slip else."""
+        shut = np.ones_like(f[:, 0], dtype=bool) if self.normal is None else f[:, self.normal] > 0
+        return np.where(shut, SLIP, OPEN)
+
+    def gap(self, u: Array, v: Array, f: Array) -> Array:
+        """Distance to contact [length] (n_samples, n_pairs), 0 where closed; by default not known (nan) where open."""
+        return np.where(self.status(u, v, f) == OPEN, np.nan, 0.0 if self.normal is not None else np.nan)
+
+    @staticmethod
+    def at_limit(force: Array, limit: Array) -> npt.NDArray[np.bool_]:
+        """Whether tangential forces are at their limit, by the one tolerance that all laws share."""
+        from .. import _core
+
+        return force >= limit * (1 - _core.limit_tolerance)
+
+    @classmethod
+    def info(cls) -> LawInfo:
+        """As in the table of laws."""
+        name, text = cls.name or cls.__name__, (cls.__doc__ or "").strip().split("\n")[0]
+        return LawInfo(name, text, cls.components, cls.parameters, normal=cls.normal, limit=cls.limit)
+
+    def _difference(self, u: Array, v: Array, which: int) -> Array:
+        columns = []
+        for column in range(self.components):
+            moved = (u, v)[which]
+            step = np.zeros_like(moved)
+            step[:, column] = 6e-6 * max(float(np.abs(moved).max(initial=0.0)), 1e-12)
+            plus, minus = ((u + step, v), (u - step, v)) if which == 0 else ((u, v + step), (u, v - step))
+            columns.append((self.force(*plus) - self.force(*minus)) / (2 * step[:, column : column + 1]))
+        return np.stack(columns, axis=2)
+
+    def _evaluate(self, u: Array, v: Array) -> tuple[Array, Array, Array]:
+        """What the compiled core calls for the force."""
+        f, (df_du, df_dv) = self.force(u, v), self.tangent(u, v)
+        return _contiguous(f), _contiguous(df_du), _contiguous(df_dv)
+
+    def _states(self, u: Array, v: Array, f: Array) -> tuple[Array, Array]:
+        """What it calls for status and gap."""
+        return _contiguous(self.status(u, v, f)), _contiguous(self.gap(u, v, f))
+
+
+def _contiguous(values: npt.ArrayLike) -> Array:
+    return np.ascontiguousarray(values, dtype=float)
+
+
+def python_law(law: PythonLaw, pairs: npt.NDArray[np.intp]) -> Any:
+    """A law in Python as the core takes it."""
+    from .. import _core
+
+    law.pairs = pairs
+    return _core.python_law(law, len(pairs))
