@@ -11,8 +11,8 @@ import pytest
 from mpi4py import MPI
 
 from fretwave.mpi.spread import Spread, send_parts
-from fretwave.results import journal, rows
-from fretwave.results.journal import Record, Stored, read_records, write_record
+from fretwave.results import journal_records, rows
+from fretwave.results.journal_records import Record, Stored, read_records, write_record
 from fretwave.results.results import AnalysisWriter, open_results
 
 WHOLE = np.linspace(-1.0, 1.0, 60).reshape(20, 3)
@@ -81,7 +81,7 @@ def test_what_a_writer_has_yet_to_end_is_not_damaged(comm: MPI.Comm, tmp_path: P
 def test_rows_of_a_long_array_are_read_when_asked_for(
     comm: MPI.Comm, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(journal, "BLOCK", 100)
+    monkeypatch.setattr(journal_records, "BLOCK", 100)
     written(tmp_path / "rows", comm)
     for _, record in read_records(tmp_path / "rows"):
         stored = record.arrays["spread"]
@@ -98,7 +98,7 @@ def test_what_is_gone_on_from_stays_while_later_states_are_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, count: int
 ) -> None:
     """States are written over in turn: not what is still read from, and never the only one that is whole."""
-    monkeypatch.setattr(journal, "BLOCK", 100)
+    monkeypatch.setattr(journal_records, "BLOCK", 100)
 
     def fill(writer: AnalysisWriter, first: int, end: int) -> None:
         for k in range(first, end):
@@ -125,7 +125,7 @@ def test_what_is_gone_on_from_stays_while_later_states_are_kept(
 @pytest.mark.parametrize("size", [1 << 30, 100])
 def test_long_rows_in_the_results(comm: MPI.Comm, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, size: int) -> None:
     """Coefficients and state of points come back, whether as a whole or by pieces."""
-    monkeypatch.setattr(journal, "BLOCK", size)
+    monkeypatch.setattr(journal_records, "BLOCK", size)
     monkeypatch.setattr(rows, "BATCH_BYTES", size)
     folder = Path(comm.bcast(str(tmp_path)))
     dofs, labels = [str(k) for k in range(20)], ["0", "1c", "1s"]

@@ -24,7 +24,8 @@ from ..post.contact_history import MOTION
 from ..units import units_of
 from .field import Field
 from .file import NewResults, has_results, open_results, rewritten
-from .journal import Journal, Record, journal_path
+from .journal import Journal, journal_path
+from .journal_records import Record
 from .rows import LABELS, Rows, attributes_of, build_group, in_units
 
 if TYPE_CHECKING:

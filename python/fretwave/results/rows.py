@@ -16,7 +16,7 @@ from ..post.contact_history import AXES, MOTION
 from ..texts import display
 from ..units import UnitSystem, units_of
 from .field import Field
-from .journal import Record, Stored, read_records
+from .journal_records import Record, Stored, read_records
 
 if TYPE_CHECKING:
     import h5py
