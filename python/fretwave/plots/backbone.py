@@ -11,7 +11,8 @@ from matplotlib.transforms import Bbox
 
 from ..arrays import AnyArray
 from ..post.mode_curve import NO_DAMPING, most_damped, varies, without_rounding
-from ..results.reader import Analysis, Run, Table
+from ..results.analysis import Analysis, Table
+from ..results.reader import Run
 from ..solve.table import Table as Reading
 from . import labels, marks, scales, style
 from .scales import Scale

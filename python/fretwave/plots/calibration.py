@@ -9,7 +9,8 @@ from matplotlib.figure import Figure
 
 from ..arrays import Indices
 from ..post.calibration import FACTORS, can_be_told, share_within
-from ..results.reader import Run, Table
+from ..results.analysis import Table
+from ..results.reader import Run
 from . import style
 
 MARKS = {"harmonics": "o", "samples": "s", "tolerance": "^", "component_modes": "D"}

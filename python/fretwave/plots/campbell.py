@@ -9,7 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..post.engine_orders import crossing_speeds, exciting
-from ..results.reader import Analysis, Run
+from ..results.analysis import Analysis
+from ..results.reader import Run
 from . import labels, style
 from .linear_bands import PEAK, PEAK_NAME, Band, Peak, bands, highest, other_entry, peaks
 

@@ -11,7 +11,8 @@ from matplotlib.lines import Line2D
 
 from ..arrays import Array
 from ..model.law_info import OPEN, SLIP, STICK
-from ..results.reader import Analysis, Run, Table
+from ..results.analysis import Analysis, Table
+from ..results.reader import Run
 from ..units import UnitSystem
 from . import scales, style
 from .scales import Scale

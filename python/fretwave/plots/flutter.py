@@ -11,7 +11,8 @@ from matplotlib.figure import Figure
 from ..arrays import AnyArray
 from ..post.flutter_waves import with_sign
 from ..post.mode_curve import NO_DAMPING
-from ..results.reader import Analysis, Run
+from ..results.analysis import Analysis
+from ..results.reader import Run
 from . import marks, scales, style
 from .scales import Scale
 

@@ -11,8 +11,9 @@ from scipy.interpolate import PchipInterpolator
 
 from ..arrays import AnyArray
 from ..post.response_peaks import curve_length
+from ..results.analysis import Analysis, Table
 from ..results.overview import amplitude_column
-from ..results.reader import Analysis, Run, Table
+from ..results.reader import Run
 from . import marks, scales, style
 from .scales import Scale
 

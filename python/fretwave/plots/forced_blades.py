@@ -11,7 +11,8 @@ from matplotlib.ticker import MaxNLocator
 
 from ..arrays import AnyArray
 from ..post.blade_peaks import whitehead
-from ..results.reader import Analysis, Run, Table
+from ..results.analysis import Analysis, Table
+from ..results.reader import Run
 from . import marks, scales, style
 from .forced import smooth
 

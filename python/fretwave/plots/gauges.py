@@ -9,8 +9,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..post.fatigue import first_reaching
+from ..results.analysis import Analysis, Table
 from ..results.parts import PARTS, rows_of_branches
-from ..results.reader import Analysis, Run, Table
+from ..results.reader import Run
 from . import scales, style
 from .scales import Scale
 

@@ -13,7 +13,8 @@ from ..arrays import AnyArray
 from ..post.decays import DIVERGES
 from ..post.limit_cycles import SHORT
 from ..post.motion import motion
-from ..results.reader import Analysis, Run, Table
+from ..results.analysis import Analysis, Table
+from ..results.reader import Run
 from . import marks, scales, style
 from .scales import Scale
 

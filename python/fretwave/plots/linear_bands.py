@@ -10,7 +10,8 @@ from matplotlib.axes import Axes
 
 from ..arrays import AnyArray
 from ..post.engine_orders import frequency_at
-from ..results.reader import Analysis, Run, Table
+from ..results.analysis import Analysis, Table
+from ..results.reader import Run
 from . import style
 from .backbone import is_peak, peak_point
 

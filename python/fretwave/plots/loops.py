@@ -10,7 +10,8 @@ from matplotlib.figure import Figure
 
 from ..arrays import AnyArray
 from ..model.law_info import Role
-from ..results.reader import Analysis, Run
+from ..results.analysis import Analysis
+from ..results.reader import Run
 from . import scales, style
 from .phase_planes import kept_points
 from .scales import Scale

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 
 from ..arrays import AnyArray
 from ..post.limit_cycles import SHORT
-from ..results.reader import Analysis
+from ..results.analysis import Analysis
 from . import style
 
 #: Look of a computed point on its curve.

@@ -9,7 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..arrays import AnyArray
-from ..results.reader import Analysis, Run, motion_of
+from ..results.analysis import Analysis, motion_of
+from ..results.reader import Run
 from . import scales, style
 from .trajectories import CURVES, FEW_DOFS, amplitude_name, other_dof, spread
 

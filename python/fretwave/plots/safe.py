@@ -16,7 +16,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..post.engine_orders import excited_by
-from ..results.reader import Analysis, Run
+from ..results.analysis import Analysis
+from ..results.reader import Run
 from . import style
 from .linear_bands import PEAK, PEAK_NAME, Band, bands, highest, other_entry, peaks
 

@@ -9,7 +9,7 @@ from typing import TypeVar
 import numpy as np
 
 from ..arrays import AnyArray
-from ..results.reader import Analysis
+from ..results.analysis import Analysis
 from ..units import UnitSystem
 from . import style
 

@@ -9,7 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..arrays import AnyArray
-from ..results.reader import Run, Table
+from ..results.analysis import Table
+from ..results.reader import Run
 from . import labels, style
 
 SWEEPS = {

@@ -19,8 +19,9 @@ from ..arrays import Array
 from ..files.dimensions import names_of_data
 from ..post.grid import SHOWN, Plan, short_names
 from ..post.limit_cycles import SHORT
+from ..results.analysis import Analysis, Table
 from ..results.file import open_results
-from ..results.reader import Analysis, Run, Table
+from ..results.reader import Run
 from ..results.sweep_quantiles import is_seed
 from ..results.sweep_summary import CYCLES, split_of
 from ..texts import shortened, toml

@@ -8,7 +8,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from ..arrays import AnyArray
-from ..results.reader import Analysis, Run, motion_of
+from ..results.analysis import Analysis, motion_of
+from ..results.reader import Run
 from . import scales, style
 from .scales import Scale
 

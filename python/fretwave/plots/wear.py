@@ -14,7 +14,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from ..arrays import Array
-from ..results.reader import Analysis, Run
+from ..results.analysis import Analysis
+from ..results.reader import Run
 from . import marks, style
 from .faces import STATUS
 from .wear_lines import WearLine, amplitude_label, amplitude_text, amplitudes, cycle_label, power, wears

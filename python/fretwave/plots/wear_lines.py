@@ -9,7 +9,8 @@ import numpy as np
 
 from ..arrays import Array
 from ..model.law_info import Role
-from ..results.reader import Analysis, Run, Table
+from ..results.analysis import Analysis, Table
+from ..results.reader import Run
 from ..units import SI, UnitSystem
 from . import scales, style
 

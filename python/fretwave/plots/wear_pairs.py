@@ -10,7 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..arrays import Array
-from ..results.reader import Analysis, Run, Table
+from ..results.analysis import Analysis, Table
+from ..results.reader import Run
 from ..units import UnitSystem
 from . import style
 from .faces import place_face, placed

@@ -14,7 +14,8 @@ from ..post.largest import as_large
 from ..post.mode_curve import without_rounding
 from ..post.motion import complex_amplitudes
 from ..post.wave_content import wave_content
-from ..results.reader import Analysis, Run
+from ..results.analysis import Analysis
+from ..results.reader import Run
 from . import scales, style
 
 #: points of a branch that are drawn

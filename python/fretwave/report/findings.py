@@ -11,9 +11,9 @@ from ..post.grid import Plan
 from ..post.largest import largest
 from ..post.limit_cycles import SHORT
 from ..post.mode_curve import varies
+from ..results.analysis import Analysis
 from ..results.overview import Overview, peak_row, whose_amplitude
 from ..results.parts import rows_of_branches
-from ..results.reader import Analysis
 from ..results.sweep_summary import columns_of
 from ..results.sweeps import parts_of, read_branch
 from . import page

@@ -6,7 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..results.reader import Analysis, Run, Table
+from ..results.analysis import Analysis, Table
+from ..results.reader import Run
 from . import page
 
 #: Columns that tell which node or branch, without a unit and whole.

@@ -13,7 +13,7 @@ from ..columns import Column
 from ..model.law_info import Role, kept_laws
 from ..post.contact_history import ContactHistory
 from ..post.pair_values import COLUMNS, pair_values
-from .reader import Analysis
+from .analysis import Analysis
 
 #: What each row begins with.
 LEAD = (

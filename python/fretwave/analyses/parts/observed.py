@@ -12,7 +12,7 @@ from ...case.analysis import AnalysisSection
 from ...case.harmonic import HarmonicSection
 from ...case.observed import ObservedTable, label_of, unit_of
 from ...columns import Column, columns_named, over
-from ...results.reader import ROW
+from ...results.analysis import ROW
 from ...results.results import AnalysisWriter
 from .context import AnalysisContext
 from .rest import stuck_or_free
