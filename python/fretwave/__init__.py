@@ -14,10 +14,10 @@ if TYPE_CHECKING:
     from .analyses.parts.context import AnalysisContext, Outcome
     from .case.analysis import AnalysisSection, register_analysis
     from .case.build import build_model
+    from .case.fields import key
     from .case.harmonic import HarmonicSection
     from .case.load import load_case
     from .case.reduce import reduce_case
-    from .case.schema import key
     from .columns import Column
     from .commands.main import main
     from .cyclic.aerodynamics import Aerodynamics
@@ -70,7 +70,7 @@ _HOMES = {
     "case.harmonic": ("HarmonicSection",),
     "case.load": ("load_case",),
     "case.reduce": ("reduce_case",),
-    "case.schema": ("key",),
+    "case.fields": ("key",),
     "columns": ("Column",),
     "commands.main": ("main",),
     "results.reader": ("Run", "open_run"),

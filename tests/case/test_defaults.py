@@ -13,8 +13,10 @@ from fretwave import _core
 from fretwave.analyses.free_decay import FreeDecayAnalysis
 from fretwave.analyses.mode import ModeAnalysis
 from fretwave.analyses.wear import WearAnalysis
+from fretwave.case.analysis_tables import MistuningSection, StepSection
+from fretwave.case.fields import Section
 from fretwave.case.harmonic import HarmonicSection
-from fretwave.case.schema import MistuningSection, ReductionSection, Section, StepSection
+from fretwave.case.schema import ReductionSection
 from fretwave.errors import InputError
 from fretwave.model.sizes import COMPONENT_MODES
 

@@ -14,8 +14,9 @@ from models.hexahedra import bar
 from models.matrix_files import write_npz
 
 import fretwave as fw
+from fretwave.case.analysis_tables import Damper
 from fretwave.case.load import load_case
-from fretwave.case.schema import AerodynamicsSection, Damper, ModelSection, ReductionSection
+from fretwave.case.schema import AerodynamicsSection, ModelSection, ReductionSection
 from fretwave.columns import COLUMNS, ENERGY, MODAL_UNIT, columns_named, headings, name_of
 from fretwave.errors import CaseErrors
 from fretwave.post.contact_history import MOTION

@@ -20,9 +20,9 @@ import fretwave as fw
 from fretwave.analyses.parts.context import AnalysisContext
 from fretwave.analyses.parts.wheel_shape import one_by_one
 from fretwave.analyses.parts.wheel_start import start_of, uneven_samples
+from fretwave.case.analysis_tables import MistuningSection
 from fretwave.case.build import build_model
 from fretwave.case.load import load_case
-from fretwave.case.schema import MistuningSection
 from fretwave.case.wheel import deviations_of, on_wheel
 from fretwave.console import Console
 from fretwave.cyclic.engine_order import folded

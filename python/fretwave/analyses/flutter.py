@@ -19,10 +19,10 @@ from typing import TYPE_CHECKING, Any, Literal, Optional
 
 from ..case.analysis import register_analysis
 from ..case.checks_common import about
+from ..case.fields import Positive, Whole, key
 from ..case.flow import WHOLE
 from ..case.harmonic import HarmonicSection, check_range
 from ..case.observed import Observed, check_observed, dofs_of, label_of
-from ..case.schema import Positive, Whole, key
 from ..columns import FLUTTER
 from ..errors import InputError
 from ..post.flutter_waves import STABLE, describe_waves, with_sign, words

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any, Literal, Optional, Union
 import numpy as np
 
 from ..case.analysis import register_analysis
+from ..case.fields import Dof, Frequency, Positive, Whole, key
 from ..case.harmonic import HarmonicSection, check_range
 from ..case.observed import Observed, check_observed, dofs_of, given_to, label_of, unit_of
-from ..case.schema import Dof, Frequency, Positive, Whole, key
 from ..columns import FORCED
 from ..cyclic.engine_order import folded
 from ..errors import InputError

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from ..case.analysis import AnalysisSection, register_analysis
+from ..case.analysis_tables import Damper
 from ..case.checks_common import check_once
+from ..case.fields import Positive, Whole, key
 from ..case.observed import check_displaced
-from ..case.schema import Damper, Positive, Whole, key
 from ..columns import Column
 from ..errors import InputError
 from ..post.decays import decay_rows, largest_differences

@@ -16,9 +16,10 @@ import numpy as np
 from pydantic import Field
 
 from ..case.analysis import AnalysisSection, register_analysis
+from ..case.analysis_tables import MistuningSection
 from ..case.checks_common import about
 from ..case.checks_wheel import check_mistuning, check_needs_wheel
-from ..case.schema import Dof, MistuningSection, Positive, Whole, key
+from ..case.fields import Dof, Positive, Whole, key
 from ..model.contact import LIMITS
 from ..model.structure import SPIN
 from ..post.engine_orders import excited_by, usual_orders

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any, Literal, Optional, cast
 
 from ..case.analysis import register_analysis
 from ..case.checks_wheel import check_needs_wheel
+from ..case.fields import Positive, key
 from ..case.harmonic import HarmonicSection, check_range
 from ..case.observed import Observed, check_observed, dof_of, dofs_of, label_of, unit_of
-from ..case.schema import Positive, key
 from ..columns import ENERGY, MODE
 from ..errors import InputError
 from ..model.python_law import PythonLaw

@@ -9,7 +9,8 @@ import numpy as np
 
 from ..arrays import Array
 from ..case.analysis import AnalysisSection, register_analysis
-from ..case.schema import Positive, PreloadSection, key
+from ..case.fields import Positive, key
+from ..case.schema import PreloadSection
 from ..columns import Column
 from ..errors import InputError, NotConverged
 from ..model.contact import Contact

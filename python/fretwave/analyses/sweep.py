@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, Optional
 
 from ..case.analysis import AnalysisSection, register_analysis
 from ..case.checks_sweep import complaint, given_before
-from ..case.schema import Whole, key
+from ..case.fields import Whole, key
 from ..case.toml.source import nested_leaves
 from ..errors import FretwaveError
 from ..post.grid import Plan

@@ -18,8 +18,8 @@ from ..case.analysis import AnalysisSection, register_analysis
 from ..case.checks_common import check_once
 from ..case.checks_size import harmonic_memory
 from ..case.contacts import wear_areas as areas_of
+from ..case.fields import Positive, Whole, key
 from ..case.observed import check_displaced, label_of
-from ..case.schema import Positive, Whole, key
 from ..errors import FretwaveError, InputError
 from ..files.dimensions import names_of_data
 from ..mpi import groups

@@ -19,8 +19,10 @@ from ..errors import InputError
 from ..model.structure import SPIN
 from ..results.sweep_summary import COUNTS, Summary
 from ..units import SI, UnitSystem
+from .analysis_tables import Damper, MistuningSection
 from .checks_common import check_common
-from .schema import Damper, MistuningSection, Name, PreloadSection, Section, key
+from .fields import Name, Section, key
+from .schema import PreloadSection
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -17,9 +17,10 @@ from ..model.checks import check_symmetric
 from ..model.sectors import Sparse
 from ..model.structure import SPIN, Structure
 from . import matrices
+from .fields import Matrix
 from .origin import read_file
 from .reporter import Found
-from .schema import Matrix, ModelSection
+from .schema import ModelSection
 from .toml.locate import Path as KeyPath
 from .toml.source import Source
 

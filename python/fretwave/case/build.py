@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 from ..model.contact import Contact
 from ..model.law_info import Role
+from .analysis_tables import Damper
 from .flow import with_flow
 from .harmonic import nodal_diameter, with_flow_forces
-from .schema import Damper, PreloadSection
+from .schema import PreloadSection
 
 if TYPE_CHECKING:
     from mpi4py import MPI

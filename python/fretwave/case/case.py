@@ -18,19 +18,12 @@ from ..model.wheel_matrix import Matrix
 from ..texts import toml
 from ..units import UnitSystem
 from .analysis import Analyses, AnalysisSection
+from .analysis_tables import Damper
 from .at_speed import omega_squared
 from .damping import around_wheel, damping_by_mode
 from .gauges import Gauges
 from .reduction_report import ReductionReport
-from .schema import (
-    AerodynamicsSection,
-    Damper,
-    DampingSection,
-    MaterialSection,
-    PreloadSection,
-    ReductionSection,
-    StudySection,
-)
+from .schema import AerodynamicsSection, DampingSection, MaterialSection, PreloadSection, ReductionSection, StudySection
 from .toml.source import Source
 from .uncertainty import Uncertainty
 

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 from ..errors import InputError
 from ..model.structure import Structure
 from ..texts import nearest
+from .analysis_tables import MistuningSection
 from .checks_common import about
 from .pair_values import ValueTable
 from .reporter import Reporter
-from .schema import MistuningSection
 from .wheel import deviations_of
 
 if TYPE_CHECKING:

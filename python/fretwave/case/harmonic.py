@@ -10,9 +10,11 @@ from pydantic import ConfigDict, model_validator
 from ..columns import with_discretisation
 from ..texts import toml
 from .analysis import AnalysisSection
+from .analysis_tables import MistuningSection, StepSection
 from .checks_size import harmonic_memory
 from .checks_wheel import check_wave, check_wheel
-from .schema import MistuningSection, Positive, PreloadSection, StepSection, Whole, key
+from .fields import Positive, Whole, key
+from .schema import PreloadSection
 
 if TYPE_CHECKING:
     from ..model.model import Model

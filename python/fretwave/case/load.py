@@ -22,21 +22,14 @@ from .checks_tables import check_preload, check_reduction, implied_preload
 from .contacts import read_contacts
 from .damping import check_damping
 from .facts import Facts
+from .fields import Section
 from .flow import check_aerodynamics
 from .gauges import read_gauges
 from .loads_at_speed import check_speed, with_loads
 from .origin import check_physics, load_origin
 from .plugins import Plugin, read_plugins
 from .reduce import kept_dofs
-from .schema import (
-    AerodynamicsSection,
-    DampingSection,
-    ModelSection,
-    PreloadSection,
-    ReductionSection,
-    Section,
-    StudySection,
-)
+from .schema import AerodynamicsSection, DampingSection, ModelSection, PreloadSection, ReductionSection, StudySection
 from .sector import tie
 from .toml.source import Source
 from .toml.validation import validate

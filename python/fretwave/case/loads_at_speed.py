@@ -16,9 +16,10 @@ from ..model.structure import SPIN, Structure
 from ..results.missing_dof import missing_dof
 from ..texts import nearest, toml
 from .at_speed import least_squares, omega_squared, square_of
+from .fields import LoadVector
 from .pair_values import TABLE, ValueTable
 from .reporter import Found
-from .schema import LoadVector, ModelSection
+from .schema import ModelSection
 from .toml.locate import Path as KeyPath
 from .toml.source import Source
 

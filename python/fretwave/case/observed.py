@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Optional, Union
 from pydantic import Discriminator, Field, Tag
 
 from ..columns import MODAL_UNIT
-from .schema import Dof, Section, Whole, key
+from .fields import Dof, Section, Whole, key
 
 if TYPE_CHECKING:
     from .facts import Facts

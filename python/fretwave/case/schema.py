@@ -1,71 +1,34 @@
 """What may stand in a case file: every key with its one-line doc, unit (of a quantity) and default.
 
 The models below are the only place where keys, defaults and plain bounds are written, but for those of an analysis,
-which stand in its own file (:mod:`fretwave.analyses`). Checks that need matrices or other entries are in
-:mod:`fretwave.case.checks`.
+which stand in its own file (:mod:`fretwave.analyses`) and in :mod:`fretwave.case.analysis_tables`. Checks that need
+matrices or other entries are in :mod:`fretwave.case.checks`.
 """
 
 from __future__ import annotations
 
 from typing import Annotated, Any, Literal, Optional, Union
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema
-from pydantic_core import PydanticKnownError
+from pydantic import BaseModel, ConfigDict, Field
 
 from ..hb.states import ZETA_FLOOR
 from ..model.sizes import COMPARED_MODES, COMPONENT_MODES, INTERFACE_TOLERANCE, INTERFACE_WAVES
-from ..solve.steps import StepControl
 from ..units import MM_T_S, SI, SYSTEMS
-
-#: Longest name: results are files of that name, whose systems allow 255 characters with all that is added.
-LONGEST_NAME = 100
-LARGEST_WHOLE = 2**31 - 1
-
-
-def _of_the_core(value: int) -> int:
-    """Whole numbers have 32 bits in the core; harmonics, sectors and points beyond are a slip."""
-    if value > LARGEST_WHOLE:
-        raise PydanticKnownError("less_than_equal", {"le": LARGEST_WHOLE})
-    if value < -LARGEST_WHOLE:
-        raise PydanticKnownError("greater_than_equal", {"ge": -LARGEST_WHOLE})
-    return value
-
-
-Whole = Annotated[int, AfterValidator(_of_the_core)]
-Dof = Annotated[
-    str,
-    BeforeValidator(lambda value: str(value) if type(value) is int else value),
-    WithJsonSchema({"type": ["string", "integer"]}),
-    Field(pattern=r"^[^\x00-\x1f\x7f]{1,100}$"),
-]
-UnitName = Annotated[str, WithJsonSchema({"type": "string", "enum": list(SYSTEMS)})]
-Name = Annotated[str, Field(max_length=LONGEST_NAME)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-#: In Hz: equations have its square, times that of an order.
-Frequency = Annotated[float, Field(gt=0, le=1e100)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-Matrix = Union[str, list[list[float]]]
-LoadVector = Union[str, list[Finite]]
-Numbers = Union[float, list[float]]
-Ratio = Annotated[float, Field(ge=0, lt=1, allow_inf_nan=False)]
-ByMode = Union[Ratio, Annotated[list[Ratio], Field(min_length=1)], Annotated[dict[str, Ratio], Field(min_length=1)]]
-Quality = Annotated[float, Field(gt=0.5, allow_inf_nan=False)]
-QByMode = Union[
-    Quality, Annotated[list[Quality], Field(min_length=1)], Annotated[dict[str, Quality], Field(min_length=1)]
-]
-Deviations = Annotated[list[Annotated[float, Field(gt=-1, allow_inf_nan=False)]], Field(min_length=2)]
-
-
-def key(doc: str, unit: str | None = None, example: str | None = None, **rules: Any) -> Any:
-    """A field with its doc, unit and a line of TOML that shows it."""
-    extra: dict[str, Any] = {"unit": unit, "example": example}
-    return Field(description=doc, json_schema_extra=extra, **rules)
-
-
-class Section(BaseModel):
-    """A table of the case file: no unknown keys, no silent conversion of types."""
-
-    model_config = ConfigDict(extra="forbid", strict=True)
+from .fields import (
+    ByMode,
+    Dof,
+    Finite,
+    Frequency,
+    LoadVector,
+    Matrix,
+    Name,
+    Positive,
+    QByMode,
+    Section,
+    UnitName,
+    Whole,
+    key,
+)
 
 
 class ModelSection(Section):
@@ -273,55 +236,6 @@ class ContactSection(BaseModel):
         example='["m2_x"] or [["m1_x", "m2_x"]]',
         default=None,
         min_length=1,
-    )
-
-
-class StepSection(Section):
-    """Step control of the continuation."""
-
-    initial: Positive = key("length of the first arclength step", "-", "0.05", default=StepControl.initial)
-    minimum: Positive = key("shortest step, but over a corner", "-", "1e-9", default=StepControl.minimum)
-    maximum: Positive = key("longest step", "-", "0.3", default=StepControl.maximum)
-    max_angle: Positive = key(
-        "largest turn of the branch in one step", "rad", "0.6", default=StepControl.max_angle, le=3.2
-    )
-    max_error: Positive = key(
-        "largest distance of the branch from the curve through its points", "-", "5e-4", default=StepControl.max_error
-    )
-    max_points: Whole = key(
-        "largest number of points of the branch", example="5000", default=StepControl.max_points, ge=2
-    )
-
-
-class Damper(Section):
-    """A viscous damper from one dof to ground, added in one analysis."""
-
-    dof: Dof = key("dof the damper acts on", example='"m1"')
-    c: float = key("damper constant, negative to destabilise", "force s/length", "-1.0", allow_inf_nan=False)
-
-
-class MistuningSection(Section):
-    """Relative deviations of a stiffness from sector to sector: drawn, or given one by one."""
-
-    of: str = key(
-        "part of the stiffness that varies: one of the builder's, or `sector`, all of it",
-        example='"blade"',
-        default="sector",
-    )
-    standard_deviation: Optional[Positive] = key(
-        "of normally distributed deviations, less their mean", "-", "0.02", default=None, lt=0.3
-    )
-    seed: Whole = key(
-        "of the deviations that are drawn; unless given that of [uncertainty], if there is one",
-        example="1",
-        default=1,
-        ge=0,
-    )
-    deviations: Optional[Union[str, Deviations]] = key(
-        "instead, one for each sector, or a .csv file with the columns `sector` (from 0) and `deviation`",
-        "-",
-        "[0.01, -0.02, 0.005]",
-        default=None,
     )
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..arrays import Array
 from ..model.structure import WHOLE
-from .schema import MistuningSection
+from .analysis_tables import MistuningSection
 
 if TYPE_CHECKING:
     from .analysis import AnalysisSection

@@ -9,6 +9,7 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from ..case.analysis import AnalysisSection
+from ..case.analysis_tables import Damper, MistuningSection, StepSection
 from ..case.json_schema import json_text
 from ..case.observed import ObservedTable
 from ..case.plugins import read_plugins
@@ -16,16 +17,13 @@ from ..case.schema import (
     TOP_LEVEL,
     AerodynamicsSection,
     ContactSection,
-    Damper,
     DampingSection,
     DistributionSection,
     GaugeSection,
     MaterialSection,
-    MistuningSection,
     ModelSection,
     PreloadSection,
     ReductionSection,
-    StepSection,
     StudySection,
     UncertaintySection,
 )

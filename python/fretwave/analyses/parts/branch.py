@@ -9,9 +9,9 @@ import numpy as np
 
 from ...arrays import Array, Complex
 from ...case.analysis import AnalysisSection
+from ...case.analysis_tables import StepSection
 from ...case.harmonic import HarmonicSection
 from ...case.observed import label_of
-from ...case.schema import StepSection
 from ...errors import InputError
 from ...hb.suspects import RETURNS, TOO_SMALL, lossless, suspects, vanishing
 from ...mpi.log import event
