@@ -20,7 +20,8 @@ from tolerances import ROUNDING, SOLVED
 import fretwave as fw
 from fretwave.cyclic.faces import rotation
 from fretwave.model.cells import KINDS
-from fretwave.view.motion import Scene, mesh_of
+from fretwave.view.geometry import mesh_of
+from fretwave.view.motion import Scene
 from fretwave.view.vtkhdf import HEXAHEDRON, VERTEX
 
 TRIQUADRATIC_HEXAHEDRON = KINDS["triquadratic_hexahedron"].vtk

@@ -22,7 +22,8 @@ from fretwave.case.load import load_case
 from fretwave.cyclic.faces import rotation
 from fretwave.results.results import open_results
 from fretwave.view.choice import ViewOptions, read_choice
-from fretwave.view.motion import Scene, mesh_of, scene_of
+from fretwave.view.geometry import mesh_of
+from fretwave.view.motion import Scene, scene_of
 
 pytestmark = pytest.mark.ranks(1)
 pytest.importorskip("skfem")

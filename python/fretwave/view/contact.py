@@ -16,7 +16,8 @@ from ..post.contact_history import ContactHistory
 from .choice import Choice
 from .contact_faces import surface
 from .fields import motion_field, write_states
-from .motion import Scene, geometry
+from .geometry import geometry
+from .motion import Scene
 from .vtkhdf import GridFile
 
 Write = Callable[[int, int, Sequence[ContactHistory], Array, int], None]

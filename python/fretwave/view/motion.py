@@ -2,18 +2,17 @@
 
 A wave on one sector is that of sector 0 in sector j, turned by 2 pi j / N about the axis and delayed by j theta
 (`fretwave.cyclic.sector`). A whole wheel's results have each sector's own motion, in the frame that is turned with it.
-A reduced motion reaches the nodes by the basis that the run keeps; a basis too large for that is made again from the
-case, and is the same.
+A reduced motion reaches the nodes by `expansion`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -21,22 +20,16 @@ import numpy.typing as npt
 from ..arrays import Array
 from ..case.load import Case
 from ..errors import InputError
-from ..fe.mesh import VTK_LATTICE
-from ..model.cells import HEXAHEDRA, KINDS
 from ..model.sectors import Parts, rotation
 from ..model.structure import Structure
-from ..results.basis_file import NAME, marks_of, read_basis
 from ..texts import display
 from .choice import Choice, natural_scale
-from .vtkhdf import HEXAHEDRON, VERTEX, Cells, linear_cells
+from .expansion import Expand, beyond_basis, expansion_of
+from .geometry import geometry
 
 #: Displacements (n_nodes, 3, n) of all nodes from columns (n_dof, n) on the model's dofs, both faces of a sector free,
 #: and the share (n,) of the static loads in each.
 ToNodes = Callable[[Array, Array], Array]
-Expand = Callable[[npt.ArrayLike], Array]
-
-#: Relative difference of a frequency that rounding explains.
-SAME = 1e-6
 
 
 @dataclass(frozen=True)
@@ -182,13 +175,9 @@ def scene_of(
     beyond, note = np.zeros(1), ""
     with ExitStack() as stack:
         if case.reduction is not None:
-            kept = read_basis(folder / NAME)
-            if kept is not None:
-                _check_model(case, kept.model)
-            basis = made_again(case, stack) if kept is None else kept
+            basis = expansion_of(case, choice, folder, around, stack)
             expand, ties = basis.expand, basis.ties or ties
-            beyond, note = _beyond(basis, _loads(case, choice))
-            _check_same(case, choice, basis, around)
+            beyond, note = beyond_basis(basis, _loads(case, choice))
         given, shown = moving or geometry(case), _shown(case, around, sectors)
         to_nodes = _to_nodes(given, len(nodes), expand, beyond)
         yield Scene(nodes, choice, to_nodes, shown, ties, around, given.axis or "z", note)
@@ -198,121 +187,6 @@ def _loads(case: Case, choice: Choice) -> list[str]:
     """Names of the static loads about whose displacement an analysis moves."""
     preload = case.preload_of(case.analyses[choice.name]) if choice.loaded else None
     return preload.loads if preload is not None else []
-
-
-def _beyond(basis: Expansion, loads: Sequence[str]) -> tuple[Array, str]:
-    """Static displacement that no coordinate has, and a note on what is not known of it: of an older run all."""
-    known = [name for name in loads if name in basis.loads]
-    left = [name for name in loads if name not in basis.loads]
-    note = (
-        f"note: the displacement at rest under {', '.join(left)} is that of the component modes alone: an earlier"
-        " version made the run; run it again for the exact one"
-    )
-    return basis.beyond(known) if known else np.zeros(1), note if left else ""
-
-
-class Expansion(Protocol):
-    """What is used of a reduction, made again or kept."""
-
-    @property
-    def size(self) -> int: ...
-
-    @property
-    def n_interface(self) -> int: ...
-
-    @property
-    def highest_component_hz(self) -> float: ...
-
-    @property
-    def ties(self) -> Parts: ...
-
-    @property
-    def loads(self) -> Mapping[str, Array]: ...
-
-    def expand(self, x_r: npt.ArrayLike, /) -> Array: ...
-
-    def beyond(self, names: Sequence[str]) -> Array: ...
-
-
-@dataclass(frozen=True)
-class MadeAgain:
-    """The reduction of a run, from its case, with the model's loads."""
-
-    reduction: Any
-    loads: Mapping[str, Array]
-    size: int
-    n_interface: int
-    highest_component_hz: float
-    ties: Parts
-
-    def expand(self, x_r: npt.ArrayLike, /) -> Array:
-        """Motion of all dofs."""
-        return np.asarray(self.reduction.expand(x_r))
-
-    def beyond(self, names: Sequence[str]) -> Array:
-        """Static displacement under these loads together that no coordinate has."""
-        return np.asarray(self.reduction.beyond(np.sum([self.loads[name] for name in names], axis=0)))
-
-
-def made_again(case: Case, stack: ExitStack) -> Expansion:
-    """Of a run that does not keep the basis of its reduction; it lives as long as the stack.
-
-    Raises
-    ------
-    InputError
-        There is neither MPI nor PETSc.
-    """
-    try:
-        from mpi4py import MPI
-
-        from ..case.reduce import reduction_of
-        from ..cyclic.reduction import SectorReduction
-    except ImportError as error:
-        raise InputError(
-            "the motion of a reduced model cannot be shown here",
-            display(case.path),
-            f"no {error.name or 'solver'}, and no {NAME} in the folder of the run",
-            "mpi4py and PETSc: the reduction is made again to reach the nodes that the run does not keep",
-            "view it where the case was run; `fretwave show` and `fretwave plot` need neither",
-        ) from None
-    reduction = reduction_of(case, MPI.COMM_SELF)
-    stack.callback(reduction.destroy)
-    hz, loads = reduction.highest_component_hz, (case.structure.cut or case.structure).loads
-    if isinstance(reduction, SectorReduction):
-        return MadeAgain(reduction, loads, reduction.size, reduction.n_interface, hz, reduction.sector().ties)
-    return MadeAgain(reduction, loads, reduction.size, 0, hz, {})
-
-
-def geometry(case: Case) -> Structure:
-    """Nodes, cells and pairs of the model as it was given: of a sector, with both its faces.
-
-    Raises
-    ------
-    InputError
-        There are no nodes.
-    """
-    given = case.structure.cut or case.structure
-    if given.coordinates is None:
-        raise InputError(
-            "the model cannot be drawn: it has no nodes",
-            display(case.path),
-            "no coordinates of nodes with three displacements each",
-            "a builder that gives coordinates (and hexahedra), or a model file with coordinates",
-            "give Structure its coordinates, or import with --coordinates; `fretwave plot` needs neither",
-        )
-    return given
-
-
-def mesh_of(case: Case, linear: bool = False) -> tuple[Array, list[Cells]]:
-    """Nodes (n_nodes, 3), and cells (n_cells, m) with VTK's number of their kind; points where there are no cells."""
-    given = geometry(case)
-    nodes, cells = np.asarray(given.coordinates), given.hexahedra
-    found: list[Cells] = [(table, KINDS[kind].vtk) for kind, table in given.cells.items() if len(table)]
-    if cells is not None:
-        cut = linear and cells.shape[1] == 27
-        first = (linear_cells(cells, VTK_LATTICE), HEXAHEDRON) if cut else (cells, HEXAHEDRA[cells.shape[1]])
-        found.insert(0, first)
-    return nodes, found or [(np.arange(len(nodes))[:, None], VERTEX)]
 
 
 def _unchanged(columns: npt.ArrayLike) -> Array:
@@ -348,28 +222,3 @@ def _shown(case: Case, around: int, asked: Sequence[int]) -> list[int]:
         fix = "give Structure its axis, or show one sector with --sectors 0"
         raise InputError("the wheel cannot be drawn: it has no axis", display(case.path), fix=fix)
     return chosen
-
-
-def _check_model(case: Case, then: Array) -> None:
-    """The model is that which was reduced: its motion is the run's own, its nodes are the case's."""
-    now = marks_of(geometry(case))
-    if not np.allclose(now, then, rtol=SAME, atol=0):
-        unit = case.units("force/length")
-        found, expected = (f"{m[0]:.0f} dofs, sum of |K| {m[1]:.9g} {unit}" for m in (now, then))
-        raise InputError(
-            "the model is no longer that of the run",
-            display(case.path),
-            found,
-            f"{expected}, as in the run",
-            "run it again",
-        )
-
-
-def _check_same(case: Case, choice: Choice, basis: Expansion, around: int) -> None:
-    """The last component mode tells whether this is the run's model: a builder may read what a case cannot tell."""
-    size = (basis.size - basis.n_interface) * (around if choice.wheel else 1)
-    then, now = choice.highest_component_hz, basis.highest_component_hz
-    if size != len(choice.rest) or abs(now - then) > SAME * then:
-        found = f"{size} coordinates, highest component mode {now:.9g} Hz"
-        expected = f"{len(choice.rest)} coordinates, {then:.9g} Hz, as in the run"
-        raise InputError("the model is no longer that of the run", display(case.path), found, expected, "run it again")

@@ -26,7 +26,8 @@ from ..results.results import open_results
 from ..texts import display, nearest
 from ..units import UnitSystem, units_of
 from .choice import ViewOptions, read_choice
-from .motion import geometry, mesh_of, scene_of
+from .geometry import geometry, mesh_of
+from .motion import scene_of
 from .run import learn_kept_laws
 
 if TYPE_CHECKING:

@@ -27,7 +27,8 @@ from ..texts import display
 from .choice import Choice, ViewOptions, analysis_name, read_choice
 from .contact import placed_contacts, write_pairs
 from .fields import motion_alone, motion_field, write_states
-from .motion import Scene, Shape, mesh_of, scene_of
+from .geometry import mesh_of
+from .motion import Scene, Shape, scene_of
 from .series import write_series
 from .skin import POLYGON, numbered, skin
 from .vtkhdf import Cells, GridFile

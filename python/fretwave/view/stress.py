@@ -30,8 +30,9 @@ from ..results.parts import PARTS
 from ..results.results import open_results
 from ..texts import display
 from .choice import Choice, ViewOptions, analyses_that_move, analysis_name, at_point, read_choice
+from .geometry import geometry
 from .inner_nodes import with_inner_nodes
-from .motion import Scene, geometry, scene_of
+from .motion import Scene, scene_of
 from .places import of_linear_modes
 from .run import learn_kept_laws
 
