@@ -11,8 +11,9 @@ import pytest
 from command_line import call
 
 from fretwave.commands.probe import _point_line
-from fretwave.view.choice import ViewOptions, points_asked
+from fretwave.view.options import ViewOptions
 from fretwave.view.places import around_places, branches_of
+from fretwave.view.points import points_asked
 
 pytestmark = pytest.mark.ranks(1)
 

@@ -21,9 +21,10 @@ from tolerances import ROUNDING
 from fretwave.case.load import load_case
 from fretwave.cyclic.faces import rotation
 from fretwave.results.results import open_results
-from fretwave.view.choice import ViewOptions, read_choice
+from fretwave.view.choice import read_choice
 from fretwave.view.geometry import mesh_of
 from fretwave.view.motion import Scene, scene_of
+from fretwave.view.options import ViewOptions
 
 pytestmark = pytest.mark.ranks(1)
 pytest.importorskip("skfem")

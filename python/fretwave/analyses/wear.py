@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from ..case.facts import Facts
     from ..case.load import Case
     from ..case.reporter import Reporter
-    from ..view.choice import ViewOptions
+    from ..view.options import ViewOptions
 
 
 @register_analysis

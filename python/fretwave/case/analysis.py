@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from ..analyses.parts.context import AnalysisContext, Outcome
     from ..model.model import Model
     from ..results.reader import Run
-    from ..view.choice import ViewOptions
+    from ..view.options import ViewOptions
     from .facts import Facts
     from .harmonic import HarmonicSection
     from .load import Case

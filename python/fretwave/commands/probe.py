@@ -23,8 +23,8 @@ from ..results.pair_table import pair_table
 from ..results.reader import Run
 from ..texts import counted, display
 from ..view.at import At, analysis_with
-from ..view.choice import kept_points
 from ..view.node import NodeMotion, of_dof, of_node
+from ..view.points import kept_points
 
 if TYPE_CHECKING:
     import h5py

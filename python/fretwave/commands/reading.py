@@ -216,7 +216,7 @@ def _stress(options: argparse.Namespace) -> int:
 def _view(options: argparse.Namespace) -> int:
     run_folder(options.folder)
     comm = world_if_any()
-    from ..view.choice import ViewOptions
+    from ..view.options import ViewOptions
     from ..view.run import view_run
 
     ending = options.out.suffix.lower() if options.out else ""

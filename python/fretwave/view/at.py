@@ -13,8 +13,9 @@ from ..arrays import Indices
 from ..errors import InputError
 from ..results.overview import in_order, peak_row, whose_amplitude
 from ..texts import display, nearest
-from .choice import ViewOptions, not_kept, points_asked
+from .options import ViewOptions
 from .places import linear_last
+from .points import not_kept, points_asked
 
 if TYPE_CHECKING:
     import h5py

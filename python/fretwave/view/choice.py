@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,86 +20,17 @@ from ..model.law_info import kept_laws
 from ..post.contact_history import ContactHistory
 from ..post.motion import waves
 from ..results.file import unit_of_amplitudes
-from ..results.overview import amplitude_column, whose_amplitude
 from ..texts import display, nearest
 from ..units import SI, UnitSystem, units_of
-from .places import around_places, branches_of, linear_last, of_linear_modes
+from .options import ViewOptions
+from .places import linear_last
+from .points import kept_points, points_asked
 
 if TYPE_CHECKING:
     import h5py
 
 #: Columns of the branch that go with a picture.
 SHOWN = ("point", "amplitude", "cycles", "frequency_hz", "zeta", "level", "stick", "slip", "open")
-#: Points named in a message.
-NAMED = 12
-#: The largest displacement or depth as drawn, as a share of what is shown, where no scale is given.
-DRAWN = 0.1
-
-
-@dataclass(frozen=True)
-class ViewOptions:
-    """What the command line says besides the run folder.
-
-    Attributes
-    ----------
-    points : numbers of points of the branch
-    amplitudes : modal amplitudes [length]; the nearest kept points are shown
-    phases : number of steps of a period
-    scale : factor on the displacement in the field ``warp``; None chooses one
-    linear : eight linear hexahedra in place of a triquadratic one
-    sectors : those shown of a wheel; empty for all
-    how : a point is asked for, in messages
-    png, gif : a picture, and an animation
-    pvd : a series of files of the outer faces, in place of VTKHDF
-    eye : azimuth and elevation of it in pictures [degrees]
-    """
-
-    analysis: str | None = None
-    points: Sequence[int] = ()
-    amplitudes: Sequence[float] = ()
-    phases: int = 32
-    scale: float | None = None
-    linear: bool = False
-    sectors: Sequence[int] = ()
-    out: Path | None = None
-    how: str = "--point {}"
-    png: bool = False
-    gif: bool = False
-    pvd: bool = False
-    eye: tuple[float, float] | None = None
-
-    @property
-    def skin(self) -> bool:
-        """Nothing but the outer faces is needed."""
-        return self.pvd or self.png or self.gif
-
-    @classmethod
-    def checked(cls, scale: str, phases: int, **others: Any) -> ViewOptions:
-        """From the words of the command line.
-
-        Raises
-        ------
-        InputError
-            The scale is neither ``auto`` nor a number, the eye is nowhere, or there are no phases.
-        """
-        if phases < 1:
-            raise InputError("a period has no phases", "--phases", phases, ">= 1", "--phases 32")
-        try:
-            factor = None if scale == "auto" else float(scale)
-        except ValueError:
-            factor = np.nan
-        if factor is not None and not np.isfinite(factor):
-            raise InputError("the scale is no number", "--scale", scale, "auto or a number", "--scale auto")
-        eye = others.get("eye")
-        if eye is not None and not np.isfinite(eye).all():
-            measured, fix = f"{eye[0]:g} {eye[1]:g}", "--eye -60 25"
-            raise InputError("the eye is nowhere", "--eye", measured, "two angles in degrees", fix)
-        return cls(scale=factor, phases=phases, **others)
-
-
-def natural_scale(size: float, largest: float) -> float:
-    """Factor that draws the largest displacement as a share of the size of what is shown [length]."""
-    return float(f"{DRAWN * size / largest:.2g}") if largest > 0 and size > 0 else 1.0
 
 
 @dataclass(frozen=True)
@@ -283,58 +214,6 @@ def analyses_that_move(file: h5py.File, case: Case) -> list[str]:
     """Names of those that keep harmonic coefficients, in the order of the case, linear ones last."""
     found = [name for name in case.analyses if name in file and "coefficients" in file[name]]
     return linear_last(file, [name for name in found if belongs(file[name], case, name)])
-
-
-def kept_points(group: h5py.Group) -> Indices:
-    """Points of which all is kept: where there are contacts, those at which their motion is."""
-    with_contacts = any(name.startswith("contact_") for name in group)
-    return np.asarray(group["reported"][()] if with_contacts else np.arange(len(group["coefficients"])), dtype=np.intp)
-
-
-def points_asked(group: h5py.Group, kept: Indices, options: ViewOptions, where: str) -> list[tuple[int, str]]:
-    """Numbers of points, each with a word on what was asked for; without a wish that of the largest amplitude.
-
-    Parameters
-    ----------
-    kept : points that an amplitude may choose
-    """
-    amplitude, unit = group["points/amplitude"][()], unit_of_amplitudes(group)
-    for point in options.points:
-        if not 0 <= point < len(amplitude):
-            near = kept[np.argmin(np.abs(kept - point))]
-            raise not_kept("there is no such point", where, f"point {point}", kept, group, near, options.how)
-    chosen = [(int(point), "") for point in options.points]
-    for asked in options.amplitudes:
-        around = around_places(branches_of(group), kept, asked)
-        if not around:
-            off = np.abs(amplitude[kept] - asked)
-            near = kept[np.argmin(np.where(np.isfinite(off), off, np.inf))]
-            what = "the branch does not reach this amplitude"
-            raise not_kept(what, where, f"{asked:g} {unit}", kept, group, near, options.how)
-        near = min(around, key=lambda point: abs(amplitude[point] - asked))
-        places = f", which is passed at {len(around)} places" if len(around) > 1 else ""
-        chosen.append((near, f", the kept point nearest to {asked:g} {unit}{places}"))
-    return chosen or [_largest(group, kept)]
-
-
-def _largest(group: h5py.Group, kept: Indices) -> tuple[int, str]:
-    """The point shown without a wish; a linear mode's amplitude is none that could be largest."""
-    if of_linear_modes(group):
-        return int(kept[0]), ", the first mode"
-    points = group["points"]
-    size = points[amplitude_column(points)][()][kept]
-    return int(kept[np.argmax(size)]), f", the kept point of the largest amplitude{whose_amplitude(points)}"
-
-
-def not_kept(what: str, where: str, measured: str, kept: Indices, group: h5py.Group, near: int, how: str) -> InputError:
-    """Names the kept points around the nearest one, and how to ask for that."""
-    amplitude, unit = group["points/amplitude"][()], unit_of_amplitudes(group)
-    place = int(np.flatnonzero(kept == near)[0])
-    begin = max(0, min(place - NAMED // 2, len(kept) - NAMED))
-    named = ", ".join(f"{point} ({amplitude[point]:.4g} {unit})" for point in kept[begin : begin + NAMED])
-    more = f" ({len(kept)} in all)" if len(kept) > NAMED else ""
-    expected = f"a point from 0 to {len(amplitude) - 1}, best one of {named}{more}"
-    return InputError(what, where, measured, expected, how.format(near))
 
 
 def _contacts(group: h5py.Group, case: Case, rows: Sequence[int]) -> dict[str, list[ContactHistory]]:

@@ -23,9 +23,10 @@ from ..errors import InputError
 from ..model.sectors import Parts, rotation
 from ..model.structure import Structure
 from ..texts import display
-from .choice import Choice, natural_scale
+from .choice import Choice
 from .expansion import Expand, beyond_basis, expansion_of
 from .geometry import geometry
+from .options import natural_scale
 
 #: Displacements (n_nodes, 3, n) of all nodes from columns (n_dof, n) on the model's dofs, both faces of a sector free,
 #: and the share (n,) of the static loads in each.

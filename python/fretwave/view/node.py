@@ -25,9 +25,10 @@ from ..results.missing_dof import missing_dof
 from ..results.results import open_results
 from ..texts import display, nearest
 from ..units import UnitSystem, units_of
-from .choice import ViewOptions, read_choice
+from .choice import read_choice
 from .geometry import geometry, mesh_of
 from .motion import scene_of
+from .options import ViewOptions
 from .run import learn_kept_laws
 
 if TYPE_CHECKING:

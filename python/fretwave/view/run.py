@@ -24,11 +24,12 @@ from ..model.pairs import Pairs
 from ..post.motion import complex_amplitudes
 from ..results.results import has_results, open_results
 from ..texts import display
-from .choice import Choice, ViewOptions, analysis_name, read_choice
+from .choice import Choice, analysis_name, read_choice
 from .contact import placed_contacts, write_pairs
 from .fields import motion_alone, motion_field, write_states
 from .geometry import mesh_of
 from .motion import Scene, Shape, scene_of
+from .options import ViewOptions
 from .series import write_series
 from .skin import POLYGON, numbered, skin
 from .vtkhdf import Cells, GridFile

@@ -29,10 +29,11 @@ from ..post.largest import largest
 from ..results.parts import PARTS
 from ..results.results import open_results
 from ..texts import display
-from .choice import Choice, ViewOptions, analyses_that_move, analysis_name, at_point, read_choice
+from .choice import Choice, analyses_that_move, analysis_name, at_point, read_choice
 from .geometry import geometry
 from .inner_nodes import with_inner_nodes
 from .motion import Scene, scene_of
+from .options import ViewOptions
 from .places import of_linear_modes
 from .run import learn_kept_laws
 

@@ -20,8 +20,8 @@ from ..model.pairs import Pairs
 from ..results.results import open_results
 from ..texts import display
 from ..units import UnitSystem, units_of
-from .choice import ViewOptions, natural_scale
 from .contact_faces import face_numbers, surface
+from .options import ViewOptions, natural_scale
 from .vtkhdf import GridFile
 
 #: Columns of the table that go with each step.
