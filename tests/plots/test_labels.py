@@ -7,7 +7,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from fretwave.plots import campbell, labels, safe, study, style, sweeps
+from fretwave.plots import campbell, labels, safe, study, style, sweep_overview, swept
 from fretwave.post.grid import Plan
 from fretwave.results.reader import Run
 from fretwave.results.results import AnalysisWriter
@@ -135,7 +135,7 @@ class Sweep:
     ],
 )
 def test_values_that_are_no_numbers_stand_side_by_side_below_a_sweep(values: list, shown: list[str]) -> None:
-    figure = sweeps.overview(Sweep(values), sweeps.FORCED_PANELS[1:])
+    figure = sweep_overview.overview(Sweep(values), sweep_overview.FORCED_PANELS[1:])
     figure.draw_without_rendering()
     found = figure.axes[0].get_xticklabels()
     assert [label.get_text() for label in found] == shown
@@ -147,13 +147,13 @@ def test_values_that_are_no_numbers_stand_side_by_side_below_a_sweep(values: lis
 
 
 def test_whole_numbers_have_whole_ticks_below_a_sweep() -> None:
-    figure = sweeps.overview(Sweep([3, 4, 5]), sweeps.FORCED_PANELS[1:])
+    figure = sweep_overview.overview(Sweep([3, 4, 5]), sweep_overview.FORCED_PANELS[1:])
     ticks = figure.axes[0].get_xticks()
     assert {3, 4, 5} <= {*ticks} and (ticks == np.rint(ticks)).all()
 
 
 def test_values_beside_a_colour_bar_have_six_digits() -> None:
-    assert [sweeps._tick(value) for value in (28.480358684358, 3, 1e-9)] == ["28.4804", "3", "1e-09"]
+    assert [swept.tick(value) for value in (28.480358684358, 3, 1e-9)] == ["28.4804", "3", "1e-09"]
 
 
 def test_what_no_branch_of_a_sweep_has_is_not_named() -> None:
@@ -161,7 +161,9 @@ def test_what_no_branch_of_a_sweep_has_is_not_named() -> None:
     _, axes = style.new_figure(4.0)
     summary = {name: np.full(3, np.nan) for name in ("slip_threshold", "amplitude_of_lowest_frequency")}
     summary |= {name: np.ones(3) for name in ("onset_amplitude", "amplitude_of_largest_zeta")}
-    sweeps._amplitudes(axes, np.arange(3.0), summary, 0)
+    sweep_overview._amplitudes(axes, np.arange(3.0), summary, 0)
     assert axes.get_legend_handles_labels()[1] == ["damping sets in", "largest damping"]
-    assert sweeps._has_amplitudes(summary)
-    assert not sweeps._has_amplitudes({name: np.full(3, np.nan) for name in (*sweeps.AMPLITUDES, "stable_limit_cycle")})
+    assert sweep_overview._has_amplitudes(summary)
+    assert not sweep_overview._has_amplitudes(
+        {name: np.full(3, np.nan) for name in (*sweep_overview.AMPLITUDES, "stable_limit_cycle")}
+    )

@@ -19,7 +19,7 @@ from ..results.reader import Run
 from ..results.sweep_quantiles import AMPLITUDE_AT, groups_of, over_seeds, range_text
 from ..results.sweep_summary import columns_in, spread_of, summary_of
 from . import style
-from .sweeps import Swept
+from .swept import Swept
 
 #: Panels of a picture.
 MOST = 6
