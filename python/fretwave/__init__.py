@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from .importers.entries import Entries
     from .importers.formats import register_format
     from .model.contact import Contact
+    from .model.frequency_error import FrequencyError
     from .model.law_info import LawInfo, Limit, ParameterInfo, Role
     from .model.laws import laws, register_law
     from .model.modal_damping import modal_damping
@@ -42,7 +43,7 @@ if TYPE_CHECKING:
     from .model.pair_coordinates import on_pair_coordinates
     from .model.pairs import Pairs
     from .model.python_law import PythonLaw
-    from .model.reduction import FrequencyError, Reduction, reduce
+    from .model.reduction import Reduction, reduce
     from .model.rest import Rest
     from .model.sectors import by_sector, rotation
     from .model.structure import Structure
@@ -106,7 +107,8 @@ _HOMES = {
     "hb.forced_response": ("ForcedResponse",),
     "hb.harmonics": ("Harmonics", "choose_harmonics"),
     "hb.nonlinear_mode": ("NonlinearMode",),
-    "model.reduction": ("FrequencyError", "Reduction", "reduce"),
+    "model.frequency_error": ("FrequencyError",),
+    "model.reduction": ("Reduction", "reduce"),
     "hb.reduction_error": ("NonlinearError", "nonlinear_error"),
     "solve.transient": ("Transient",),
     "solve.wear": ("Wear", "WearPoint"),

@@ -26,8 +26,9 @@ from mpi4py import MPI
 from ..arrays import Array, Indices
 from ..errors import InputError
 from ..model.contact import Contact
+from ..model.frequency_error import RIGID_SHARE
 from ..model.omitted import UNKNOWN
-from ..model.reduction import RIGID_SHARE, Reduction, reduce
+from ..model.reduction import Reduction, reduce
 from ..model.sectors import Given, by_sector
 from ..model.sizes import COMPARED_MODES, INTERFACE_TOLERANCE, INTERFACE_WAVES
 from ..mpi.destroyable import Destroyable

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
-import scipy.linalg
 import scipy.sparse as sp
 from petsc4py import PETSc
 
@@ -18,6 +16,7 @@ from ..arrays import Array
 from ..errors import InputError
 from ..mpi.destroyable import Destroyable
 from ..mpi.gather import on_all_ranks
+from .frequency_error import FrequencyError, frequency_error
 from .model import Model
 from .omitted import OmittedModes
 from .residual_statics import held_displacement
@@ -26,37 +25,6 @@ from .sizes import COMPARED_MODES, COMPONENT_MODES
 
 if TYPE_CHECKING:
     from mpi4py import MPI
-
-
-#: Frequencies below this share of the lowest component frequency are rigid motions, without a relative error.
-RIGID_SHARE = 1e-3
-
-
-@dataclass(frozen=True)
-class FrequencyError:
-    """Lowest elastic frequencies of a reduced model against the unreduced one.
-
-    Attributes
-    ----------
-    full_hz, reduced_hz : (count,) [Hz]
-    relative : (count,)
-        reduced / full - 1; not negative beyond rounding, as the reduction is a Rayleigh-Ritz method.
-    wall_s : float [s]
-        Time spent, nearly all on the unreduced modes.
-    """
-
-    full_hz: Array
-    reduced_hz: Array
-    relative: Array
-    wall_s: float
-
-    def __repr__(self) -> str:
-        return f"FrequencyError({len(self.relative)} modes, largest {self.largest:.2g})"
-
-    @property
-    def largest(self) -> float:
-        """Largest relative error in magnitude."""
-        return float(np.abs(self.relative).max())
 
 
 class Reduction(Destroyable):
@@ -203,22 +171,7 @@ class Reduction(Destroyable):
         InputError
             K_contact reaches a dof that is not kept; count exceeds what the reduced model has.
         """
-        start = time.perf_counter()
-        extra = self._contact_stiffness(K_contact)
-        square = scipy.linalg.eigh(self.K + self._on_kept(extra), self.M, eigvals_only=True)
-        reduced = np.sqrt(np.maximum(square, 0.0)) / (2 * np.pi)
-        rigid = int(np.count_nonzero(reduced < RIGID_SHARE * self._reference_hz()))
-        if not 1 <= count <= self.size - rigid:
-            raise InputError(
-                "the reduced model has not as many elastic modes",
-                None,
-                count,
-                f"1 .. {self.size - rigid}",
-                "ask for fewer",
-            )
-        full = self._full_hz(extra, rigid + count)[rigid:]
-        reduced = reduced[rigid : rigid + count]
-        return FrequencyError(full, reduced, reduced / full - 1, time.perf_counter() - start)
+        return frequency_error(self, self._model, count, K_contact)
 
     def destroy(self) -> None:
         """Free matrices and modes; the reduced matrices stay. Collective."""
@@ -234,48 +187,6 @@ class Reduction(Destroyable):
                 "an array does not fit the reduction", None, rows.shape, f"({expected},)", "give one row per coordinate"
             )
         return np.ascontiguousarray(rows.reshape(expected, -1))
-
-    def _reference_hz(self) -> float:
-        """A frequency of elastic motion: of the internal dofs, or of the kept ones."""
-        if len(self.component_hz):
-            return float(self.component_hz[0])
-        n = len(self.keep)
-        return float(np.sqrt(np.trace(self.K[:n, :n]) / np.trace(self.M[:n, :n])) / (2 * np.pi))
-
-    def _contact_stiffness(self, K_contact: Given | None) -> sp.csr_matrix:
-        n = self._model.n_dof
-        extra = sp.csr_matrix((n, n)) if K_contact is None else sp.csr_matrix(K_contact, dtype=float)
-        if extra.shape != (n, n):
-            raise InputError("K_contact does not fit the model", None, extra.shape, (n, n), "give it on all dofs")
-        entries = extra.tocoo()
-        reached = np.union1d(entries.row[entries.data != 0], entries.col[entries.data != 0])
-        outside = np.setdiff1d(reached, self.keep)
-        if len(outside):
-            raise InputError(
-                "K_contact reaches dofs that are not kept",
-                None,
-                f"{len(outside)}, the first {outside[0]}",
-                "kept dofs only",
-                "keep them",
-            )
-        return extra
-
-    def _on_kept(self, extra: sp.csr_matrix) -> Array:
-        out = np.zeros((self.size, self.size))
-        n = len(self.keep)
-        out[:n, :n] = extra[self.keep][:, self.keep].toarray()
-        return out
-
-    def _full_hz(self, extra: sp.csr_matrix, count: int) -> Array:
-        K, M = self._model._matrices[0], self._model._matrices[-1]
-        stiff = self._model._matrix(extra)
-        stiffness = K.copy()
-        stiffness.axpy(1.0, stiff)
-        core = _core.Model([(stiffness, 0, 0), (M, 2, 0)], [], 0.0)
-        modes = _core.linear_modes(core, count, _core.ContactState.free, None)
-        for mat in (stiff, stiffness):
-            mat.destroy()
-        return np.array([omega for omega, *_ in modes]) / (2 * np.pi)
 
 
 def reduce(
