@@ -19,7 +19,8 @@ from fretwave.case.load import load_case
 from fretwave.commands.main import main
 from fretwave.mpi.guard import on_first_rank
 from fretwave.results import model_file
-from fretwave.results.model_file import SourceFile, dof_name
+from fretwave.results.model_file import dof_name
+from fretwave.results.source_file import SourceFile
 
 BAR = hexahedra.bar((3, 1, 1), (0.06, 0.02, 0.01))
 

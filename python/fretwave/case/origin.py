@@ -12,6 +12,7 @@ from ..model import checks
 from ..model.sectors import Sparse
 from ..model.structure import Structure
 from ..results import model_file
+from ..results.source_file import digest
 from ..texts import display, toml
 from . import matrices
 from .builder import builder_digest, run_builder
@@ -73,7 +74,7 @@ def read_file(file: str, key: KeyPath, source: Source, found: Found) -> tuple[St
     """The structure of a model file that a key names, and what identifies it; None when something is wrong."""
     where, path = source.where(key), source.path.parent / file
     try:
-        return model_file.read_model(path), f"{file} {model_file.digest(path)[:16]}"
+        return model_file.read_model(path), f"{file} {digest(path)[:16]}"
     except InputError as error:
         place = f"{where}, {error.where}"
         found.append(InputError(error.what, place, error.measured, error.expected, error.fix))

@@ -33,7 +33,8 @@ from ..model.pairs import Pairs
 from ..model.structure import Structure
 from ..mpi.guard import on_first_rank
 from ..results.missing_dof import missing_dof
-from ..results.model_file import DIRECTIONS, SourceFile, write_model
+from ..results.model_file import DIRECTIONS, write_model
+from ..results.source_file import SourceFile
 from ..texts import display
 from ..units import SYSTEMS, unknown
 from .import_at_rest import tables_at_rest, write_tables

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from ..results.journal import unfinished
-from ..results.model_file import digest
 from ..results.runfolder import CASE_COPY
+from ..results.source_file import digest
 from ..texts import counted, own_version
 from . import page
 

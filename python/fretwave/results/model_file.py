@@ -35,10 +35,9 @@ place                      content
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -56,6 +55,7 @@ from ..model.structure import Structure
 from ..texts import display, names_beside, nearest
 from ..units import SYSTEMS, unit_system
 from .model_checks import PAIR_ARRAYS, PARTS, Table, check_parts
+from .source_file import SourceFile
 
 if TYPE_CHECKING:
     import h5py
@@ -67,33 +67,10 @@ _TABLES = ("dofs/node", "dofs/direction", "dofs/kept", "nodes/number", "nodes/co
 DIRECTIONS = ("x", "y", "z", "rx", "ry", "rz")
 
 
-@dataclass(frozen=True)
-class SourceFile:
-    """A file the model was made from."""
-
-    role: str
-    path: str
-    bytes: int
-    sha256: str
-
-    @classmethod
-    def of(cls, role: str, path: Path) -> SourceFile:
-        return cls(role, path.name, path.stat().st_size, digest(path))
-
-
 def dof_name(node: int, direction: int) -> str:
     """``n17y``: a name TOML takes as a key without quotes, and ``--set`` does not mistake for a number."""
     known = 1 <= direction <= len(DIRECTIONS)
     return f"n{node}" + (DIRECTIONS[direction - 1] if known else f"d{direction}")
-
-
-def digest(path: Path) -> str:
-    """SHA-256 of a file's content."""
-    found = hashlib.sha256()
-    with path.open("rb") as file:
-        for block in iter(lambda: file.read(1 << 22), b""):
-            found.update(block)
-    return found.hexdigest()
 
 
 def write_model(
