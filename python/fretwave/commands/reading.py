@@ -173,7 +173,7 @@ def _plot(options: argparse.Namespace) -> int:
     run_folder(options.folder)
     from ..console import Console
     from ..results.results import open_results
-    from ..run.runner import plot
+    from ..run.pictures import plot
 
     if not (options.folder / "study.csv").exists():
         open_results(options.folder / "results.h5").close()

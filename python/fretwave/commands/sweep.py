@@ -19,7 +19,8 @@ from ..results.file import OVERRIDES
 from ..results.runfolder import CASE_COPY, RunFolder, new_record, peak_memory_mb, read_copy, results_folder
 from ..results.sweeps import summary_columns, summary_lines, write_sweep
 from ..run.order import RunOptions
-from ..run.runner import Runner, plot
+from ..run.pictures import plot
+from ..run.runner import Runner
 from ..run.sweep import NAMED, Checked, Sweep, reasons_text, why_branches_stopped, why_stopped
 from ..texts import counted, display
 

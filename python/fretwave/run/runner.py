@@ -13,7 +13,6 @@ from ..case.analysis import AnalysisSection
 from ..case.build import model_of
 from ..case.kept import described, has_analysis, reload_case
 from ..case.load import Case, load_case
-from ..case.plugins import load_recorded
 from ..case.reduce import reduce_case
 from ..case.wheel import on_wheel, solver_room
 from ..console import Console, Estimate, Shown, duration
@@ -26,10 +25,11 @@ from ..results.basis_file import LARGEST, NAME, basis_of
 from ..results.file import OVERRIDES
 from ..results.journal import Journal
 from ..results.results import has_results, open_results
-from ..results.runfolder import RECORD, RunFolder, new_record, peak_memory_mb, read_record, results_folder
+from ..results.runfolder import RunFolder, new_record, peak_memory_mb, results_folder
 from ..texts import counted, display
 from .left_out import left_out_lines
 from .order import RunOptions, in_order
+from .pictures import plot
 from .stopped import joined, not_converged
 
 if TYPE_CHECKING:
@@ -213,13 +213,17 @@ class Runner:
     def _kept(self, name: str) -> bool:
         return has_analysis(self.folder.path, self.case, name)
 
+    def _status(self, name: str) -> str | None:
+        """Of what this run has of an analysis in its results, None for nothing. One rank only."""
+        if not has_results(self.folder.path):
+            return None
+        with open_results(self.folder.path / "results.h5") as file:
+            mine = name in file and file[name].attrs.get("run_id") == self.folder.record["run_id"]
+            return str(file[name].attrs.get("status")) if mine else None
+
     def _is_done(self, name: str) -> bool:
         def look() -> str | None:
-            if not has_results(self.folder.path):
-                return None
-            with open_results(self.folder.path / "results.h5") as file:
-                mine = name in file and file[name].attrs.get("run_id") == self.folder.record["run_id"]
-                status = str(file[name].attrs.get("status")) if mine else None
+            status = self._status(name)
             if status in ENDED:
                 Journal(self.folder.path, name).remove()  # killed when all was in results.h5 but this was left
             return status
@@ -233,13 +237,7 @@ class Runner:
         return True
 
     def _is_begun(self, name: str) -> bool:
-        def look() -> bool:
-            if not has_results(self.folder.path):
-                return False
-            with open_results(self.folder.path / "results.h5") as file:
-                return name in file and file[name].attrs.get("run_id") == self.folder.record["run_id"]
-
-        return self.resuming and on_first_rank(self.comm, look)
+        return self.resuming and on_first_rank(self.comm, lambda: self._status(name) is not None)
 
     def _run_one(self, analysis: AnalysisSection) -> None:
         from .. import _core
@@ -344,16 +342,3 @@ def check_sweeps(case: Case, names: Sequence[str], options: RunOptions, comm: MP
             sweeps[name] = analysis_sweep(Runner, case, analysis, options, comm.size)
             sweeps[name].check(comm)
     return sweeps
-
-
-def plot(folder: Path, console: Console, only: Sequence[str] | None = None, formats: Sequence[str] = ("png",)) -> int:
-    """Make the pictures of a run folder; returns how many."""
-    from ..plots import check_names, plot_run
-
-    failed = load_recorded(read_record(folder)) if (folder / RECORD).exists() else []
-    check_names(folder, only or ())
-    files = plot_run(folder, only, failed, formats)
-    for line in failed:
-        console.line(line)
-    console.line(f"{counted(len(files), 'picture')} in {display(folder)}")
-    return len(files)
