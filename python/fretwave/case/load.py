@@ -29,6 +29,7 @@ from .loads_at_speed import check_speed, with_loads
 from .origin import check_physics, load_origin
 from .plugins import Plugin, read_plugins
 from .reduce import kept_dofs
+from .resolved import faces_by_address, resolved_values
 from .schema import AerodynamicsSection, DampingSection, ModelSection, PreloadSection, ReductionSection, StudySection
 from .sector import tie
 from .toml.source import Source
@@ -111,15 +112,63 @@ def _build(
 ) -> Case | None:
     checks.check_top_level(source, found)
     analyses = checks.read_analyses(source, found)
-    section = _table(ModelSection, "model", source, found)
-    reduction = _table(ReductionSection, "reduction", source, found)
-    preload = _table(PreloadSection, "preload", source, found)
-    damping = _table(DampingSection, "damping", source, found)
-    flow = _table(AerodynamicsSection, "aerodynamics", source, found)
-    study = _table(StudySection, "study", source, found)
+    section, tables = _table(ModelSection, "model", source, found), _tables(source, found)
+    notes: list[str] = []
+    structure, places, identity = _structure(section, source, analyses, notes, found)
+    built = structure.pairs if structure else {}
+    contacts = read_contacts(source, structure.dof_names if structure else None, laws, found, built)
+    tied = structure is not None
+    if section and structure:
+        wrong = len(found)
+        structure, contacts = _tied(section, source, structure, contacts, notes, found)
+        tied = len(found) == wrong
+    keep = _kept(structure, analyses, tables) if structure else {}
+    facts = _facts(source, section, structure, tied, contacts, laws, keep, tables)
+    if tied:
+        check_aerodynamics(source, tables.aerodynamics, facts.sectors, facts.dofs or [], found)
+    _check(source, structure, facts, analyses, tables, notes, found)
+    tables = replace(tables, gauges=read_gauges(source, (structure.cut or structure) if structure else None, found))
+    if structure is not None and tied:
+        rows = [contact.pairs.own for contact in contacts] if facts.complete else None
+        check_physics(structure, places, rows, notes, found)
+    if found or section is None or structure is None:
+        return None
+    tables = replace(tables, preload=tables.preload or implied_preload(source, contacts, notes))
+    identity = {**identity, **faces_by_address(section, structure)}
+    resolved = resolved_values(identity, source, section, contacts, analyses, tables)
+    return Case(
+        source=source,
+        structure=structure,
+        contacts=contacts,
+        analyses=Analyses({analysis.name: analysis for analysis in analyses.values()}, plugins),
+        resolved={**resolved, **{f"plugins.{plugin.name}": plugin.digest for plugin in plugins}},
+        tables=tables,
+        notes=[*notes, *_unused_contacts(built, contacts)],
+        keep=list(keep),
+    )
+
+
+def _tables(source: Source, found: list[FretwaveError]) -> Tables:
+    """All that need nothing of the model to be read."""
+    return Tables(
+        _table(ReductionSection, "reduction", source, found),
+        _table(PreloadSection, "preload", source, found),
+        _table(DampingSection, "damping", source, found),
+        _table(AerodynamicsSection, "aerodynamics", source, found),
+        _table(StudySection, "study", source, found) or StudySection(),
+    )
+
+
+def _structure(
+    section: ModelSection | None,
+    source: Source,
+    analyses: Mapping[int, AnalysisSection],
+    notes: list[str],
+    found: list[FretwaveError],
+) -> tuple[Structure | None, Mapping[str, str], Mapping[str, Any]]:
+    """The model in the case's units and at its speed, the places of its parts, and what tells it by address."""
     given = load_origin(section, source, found) if section else None
     structure, places, identity = given or (None, {}, {})
-    notes: list[str] = []
     if section and structure:
         source.dof_fix = partial(missing_dof, structure)
         structure, identity = in_units(section, source, structure, identity, notes, found)
@@ -128,92 +177,83 @@ def _build(
         identity = {**identity, **check_speed(section, source, structure, notes, found)}
         for analysis in analyses.values():
             analysis.read_in(structure.unit_system)
+    return structure, places, identity
+
+
+def _tied(
+    section: ModelSection,
+    source: Source,
+    structure: Structure,
+    contacts: list[Contact],
+    notes: list[str],
+    found: list[FretwaveError],
+) -> tuple[Structure, list[Contact]]:
+    """The model with the pairs of its contacts; a sector tied to its neighbours, if nothing is wrong with its faces."""
+    with_pairs = replace(
+        structure,
+        pairs={contact.name: contact.pairs for contact in contacts},
+        stiffness_damping=section.stiffness_damping,
+        mass_damping=section.mass_damping,
+    )
+    structure, contacts = tie(section, source, with_pairs, contacts, notes, found)
+    source.dof_fix = partial(missing_dof, structure.cut or structure)
+    return structure, contacts
+
+
+def _facts(
+    source: Source,
+    section: ModelSection | None,
+    structure: Structure | None,
+    tied: bool,
+    contacts: Sequence[Contact],
+    laws: Mapping[str, Any],
+    keep: Mapping[int, str],
+    tables: Tables,
+) -> Facts:
     dofs = structure.dof_names if structure else None
-    built = structure.pairs if structure else {}
-    contacts = read_contacts(source, dofs, laws, found, built)
-    neighbours, tied = None, True
-    if section and structure:
-        structure = replace(
-            structure,
-            pairs={contact.name: contact.pairs for contact in contacts},
-            stiffness_damping=section.stiffness_damping,
-            mass_damping=section.mass_damping,
-        )
-        wrong = len(found)
-        structure, contacts = tie(section, source, structure, contacts, notes, found)
-        tied = len(found) == wrong
-        source.dof_fix = partial(missing_dof, structure.cut or structure)
-        neighbours = structure if structure.cut else None
-        dofs = structure.dof_names if neighbours else dofs
-        if tied:
-            check_aerodynamics(source, flow, neighbours.sectors if neighbours else None, dofs or [], found)
-    blade = flow.dof if flow else None
-    keep = _kept(structure, analyses, blade) if structure and reduction else {}
     known = set(dofs or ())  # of a sector, dofs of the high face are kept, and left out
-    facts = Facts(
+    return Facts(
         source=source,
-        model_known=section is not None and structure is not None and tied,
+        model_known=tied,
         dofs=dofs,
         named=[name for name in keep.values() if name in known] if keep else dofs,
-        least_dofs=len(keep) if reduction else len(dofs or ()),
-        neighbours=neighbours,
+        least_dofs=len(keep) if tables.reduction else len(dofs or ()),
+        neighbours=structure if structure and structure.cut else None,
         contacts=contacts,
         complete=len(contacts) == len(source.entries("contact")),
         laws=laws,
         loads=list(structure.loads) if structure else None,
         parts=known_parts(section, structure) if section and structure else None,
-        preload=preload,
-        flow=flow,
+        preload=tables.preload,
+        flow=tables.aerodynamics,
     )
+
+
+def _check(
+    source: Source,
+    structure: Structure | None,
+    facts: Facts,
+    analyses: dict[int, AnalysisSection],
+    tables: Tables,
+    notes: list[str],
+    found: list[FretwaveError],
+) -> None:
+    """Analyses and tables against the rest of the case."""
     checks.complete_analyses(source, analyses, facts, found)
     checks.check_analyses(source, analyses, facts, found)
-    check_reduction(source, reduction, analyses, facts.sectors, notes, found)
-    check_preload(source, preload, facts.loads, found)
-    check_damping(source, damping, structure, reduction, notes, found)
-    gauges = read_gauges(source, (structure.cut or structure) if structure else None, found)
-    if structure is not None and tied:
-        rows = [contact.pairs.own for contact in contacts] if facts.complete else None
-        check_physics(structure, places, rows, notes, found)
-    if found or section is None or structure is None:
-        return None
-    preload = preload or implied_preload(source, contacts, notes)
-    tables = {"reduction": reduction, "preload": preload, "damping": damping, "aerodynamics": flow}
-    return Case(
-        source=source,
-        structure=structure,
-        contacts=contacts,
-        analyses=Analyses({analysis.name: analysis for analysis in analyses.values()}, plugins),
-        resolved={
-            **_resolve({**identity, **_faces(section, structure)}, source, section, contacts, analyses, tables),
-            **{f"plugins.{plugin.name}": plugin.digest for plugin in plugins},
-        },
-        tables=Tables(reduction, preload, damping, flow, study or StudySection(), gauges),
-        notes=[*notes, *_unused_contacts(built, contacts)],
-        keep=list(keep),
-    )
+    check_reduction(source, tables.reduction, analyses, facts.sectors, notes, found)
+    check_preload(source, tables.preload, facts.loads, found)
+    check_damping(source, tables.damping, structure, tables.reduction, notes, found)
 
 
-def _kept(structure: Structure, analyses: Mapping[int, AnalysisSection], blade: str | None) -> dict[int, str]:
-    """Dofs that a reduction keeps, of a sector before its faces were tied, with their names.
-
-    Parameters
-    ----------
-    blade : dof that the flow acts on
-    """
-    given = structure.cut or structure
+def _kept(structure: Structure, analyses: Mapping[int, AnalysisSection], tables: Tables) -> dict[int, str]:
+    """Dofs that a reduction keeps, of a sector before its faces were tied, with their names; none without one."""
+    if tables.reduction is None:
+        return {}
+    given, blade = structure.cut or structure, tables.aerodynamics and tables.aerodynamics.dof
     names = given.dof_names
     named = {names.index(blade)} if blade in names else set()
     return {k: names[k] for k in sorted(named.union(kept_dofs(given, analyses)))}
-
-
-def _faces(section: ModelSection, structure: Structure) -> dict[str, Any]:
-    """What says that the model is a sector, by address."""
-    cut = structure.cut
-    if cut is None or cut.low is None or cut.high is None:
-        return {}
-    names = cut.dof_names
-    faces = {f"model.{name}": [names[k] for k in face] for name, face in (("low", cut.low), ("high", cut.high))}
-    return {"model.sectors": cut.sectors, **faces, **({"model.axis": cut.axis} if section.axis else {})}
 
 
 def _table(kind: type[Table], name: str, source: Source, found: list[FretwaveError]) -> Table | None:
@@ -225,35 +265,3 @@ def _unused_contacts(built: Mapping[str, Pairs], contacts: Sequence[Contact]) ->
     used = [contact.name for contact in contacts]
     unused = [name for name in built if name not in used]
     return [f"the builder's contact '{name}' is not used: no [[contact]] has this name" for name in unused]
-
-
-def _resolve(
-    identity: Mapping[str, Any],
-    source: Source,
-    section: ModelSection,
-    contacts: Sequence[Contact],
-    analyses: Mapping[int, AnalysisSection],
-    tables: Mapping[str, Section | None],
-) -> dict[str, Any]:
-    """All values that decide the results, flat, under the addresses that ``--set`` uses."""
-    resolved = dict(identity)
-    damping = {key: getattr(section, key) for key in ("stiffness_damping", "mass_damping")}
-    resolved.update({f"model.{key}": value for key, value in damping.items() if value})
-    for name, table in tables.items():
-        given = table.model_dump(mode="json") if table else {}
-        resolved.update({f"{name}.{key}": value for key, value in given.items()})
-    for entry, contact in zip(source.entries("contact"), contacts):
-        pairs = [[pair] if isinstance(pair, str) else pair for pair in entry.get("pairs", [])]
-        values: dict[str, Any] = {"law": contact.law, "pairs": pairs}
-        if entry.get("tangents") is not None:
-            values["tangents"] = [[end] if isinstance(end, str) else end for end in entry["tangents"]]
-        values.update({key: _plain(value) for key, value in contact.parameters.items()})
-        resolved.update({f"contact.{contact.name}.{key}": value for key, value in values.items()})
-    for analysis in analyses.values():
-        dumped = analysis.model_dump(mode="json", exclude={"name"})
-        resolved.update({f"{analysis.name}.{key}": value for key, value in dumped.items()})
-    return resolved
-
-
-def _plain(value: object) -> object:
-    return value.tolist() if hasattr(value, "tolist") else value

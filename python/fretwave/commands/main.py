@@ -191,6 +191,16 @@ def _add_import(commands: _SubParsers) -> None:
         help="model file to write, or CalculiX' deck: sector.inp takes sector.mas and sector.sti beside it and writes"
         " sector.h5",
     )
+    _add_matrices(add)
+    _add_pairs(add)
+    _add_sector(add)
+    add.add_argument("--name", action="append", default=[], metavar="NAME=DOF", help="name a dof: tip=n17y; it is kept")
+    add.add_argument("--units", metavar="SYSTEM", help=f"unit system of all numbers: {', '.join(SYSTEMS)}")
+    add.add_argument("--modes", type=int, default=6, metavar="N", help="frequencies to report (default 6)")
+    add.set_defaults(command=_import)
+
+
+def _add_matrices(add: argparse.ArgumentParser) -> None:
     add.add_argument("--mass", metavar="FILE", help="mass matrix")
     add.add_argument("--stiffness", metavar="FILE", help="stiffness matrix")
     add.add_argument("--damping", metavar="FILE", help="viscous damping matrix")
@@ -203,6 +213,9 @@ def _add_import(commands: _SubParsers) -> None:
         metavar="FILE",
         help="nodes, sets, elements, surfaces: CSV, .npz, input deck, Ansys .cdb or .rst; a Nastran deck's nodes",
     )
+
+
+def _add_pairs(add: argparse.ArgumentParser) -> None:
     add.add_argument(
         "--pairs",
         nargs="+",
@@ -233,11 +246,6 @@ def _add_import(commands: _SubParsers) -> None:
         help="largest distance of two nodes of a pair, of a node and a face, or of a sector's faces (default: 1e-6 of"
         " the mesh's diagonal)",
     )
-    _add_sector(add)
-    add.add_argument("--name", action="append", default=[], metavar="NAME=DOF", help="name a dof: tip=n17y; it is kept")
-    add.add_argument("--units", metavar="SYSTEM", help=f"unit system of all numbers: {', '.join(SYSTEMS)}")
-    add.add_argument("--modes", type=int, default=6, metavar="N", help="frequencies to report (default 6)")
-    add.set_defaults(command=_import)
 
 
 def _add_sector(add: argparse.ArgumentParser) -> None:
