@@ -7,7 +7,7 @@ import pytest
 from tolerances import ROUNDING
 
 from fretwave.post.cycles import extract, harmonic_amplitude, peaks
-from fretwave.post.mode_curve import ModeCurve, fold_interval
+from fretwave.post.mode_curve import ModeCurve
 from fretwave.post.response_peaks import (
     amplitude_peak,
     distance,
@@ -102,7 +102,8 @@ def folded(count=400):
 
 def test_a_folded_branch_has_three_values_between_its_folds_and_one_elsewhere():
     curve, amplitude = folded()
-    low, high = fold_interval(amplitude)
+    turn = np.arccos(-1.0 / 1.2)
+    low, high = (np.exp(s + 1.2 * np.sin(s)) for s in (2.0 * np.pi - turn, turn))
     inside, outside = curve.all_at(float(np.sqrt(low * high))), curve.all_at(float(amplitude[0]) * 2.0)
     assert [len(inside), len(outside)] == [3, 1]
     assert curve.at(float(np.sqrt(low * high)), falling=True).omega == inside[-1].omega < inside[0].omega

@@ -184,7 +184,7 @@ def _beside_other_families(
             rest_state(own_context)
             return fed_modes(own_context, stuck_or_free(own_context, context.analysis.linear_mode))
 
-        return with_others(own_context, fed, cycles)
+        return with_others(fed, cycles)
 
 
 @contextmanager

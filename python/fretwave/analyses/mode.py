@@ -231,7 +231,7 @@ def _finish(
     table = finished_table(writer)
     first = complex(-table["beta"][0], table["omega"][0]) if table else 0j
     cycles, first = context.comm.bcast((limit_cycles(table) if table else [], first))
-    cycles = with_others(context, lambda: fed_beside(context, start, first), cycles)
+    cycles = with_others(lambda: fed_beside(context, start, first), cycles)
     unit = context.units(unit_of(context.analysis.normalise))
     summary = summarise(context.name, table, cycles, unit) if table else []
     summary += finish_wheel(context, writer, start) if context.case.wheel is not None else []

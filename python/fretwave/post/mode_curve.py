@@ -185,15 +185,6 @@ class ModeCurve:
         return len(moves) > 0 and bool(self._log_amplitude(length, 1) * moves[0] > 0.0)
 
 
-def fold_interval(amplitude: Array) -> tuple[float, float] | None:
-    """Smallest and largest amplitude at which the branch turns round; None when it never does."""
-    steps = np.diff(amplitude)
-    turns = np.flatnonzero(np.sign(steps[1:]) * np.sign(steps[:-1]) < 0) + 1
-    if not len(turns):
-        return None
-    return float(amplitude[turns].min()), float(amplitude[turns].max())
-
-
 def _length(values: Array) -> Array:
     scaled = np.column_stack([values[:, 0], values[:, 1] / np.abs(values[:, 1]).max(), values[:, 3]])
     steps = np.linalg.norm(np.diff(scaled, axis=0) * LENGTH_WEIGHTS, axis=1)

@@ -48,7 +48,7 @@ def model_part(run: Run, record: Mapping[str, Any], case: Case | None, problem: 
     resolved = record["case"]["resolved"]
     units = case.units if case else _units(run)
     parts = [page.box([problem] if problem else []), page.facts(_facts(run, record, case, units))]
-    parts.append(page.titled("Contact", _contacts(case, resolved, run, units)))
+    parts.append(page.titled("Contact", _contacts(case, resolved, units)))
     parts.append(page.titled("Reduction", _reduction(record.get("reduction"))))
     return "\n".join(part for part in parts if part)
 
@@ -128,7 +128,7 @@ def translations(given: Structure) -> Array | None:
     return moved[:-1]
 
 
-def _contacts(case: Case | None, resolved: Mapping[str, Any], run: Run, units: UnitSystem) -> str:
+def _contacts(case: Case | None, resolved: Mapping[str, Any], units: UnitSystem) -> str:
     rows = [_contact(contact, units) for contact in case.contacts] if case else list(_kept_contacts(resolved))
     return page.table(["name", "law", "pairs", "parameters"], rows) if rows else ""
 

@@ -59,7 +59,7 @@ def report_text(folder: Path) -> str:
     title = title or str(record["case"]["resolved"].get("title", "")) or Path(record["case"]["path"]).parent.name
     parts = [
         _top(folder, title, record, found),
-        _summary(folder, record, found),
+        _summary(folder, found),
         _warnings([*warnings_of(log), *failed], record, found),
         _model(run, record),
         _checks([line for line in log if not line.startswith(tuple(f"{one.name}: " for one in found))]),
@@ -90,7 +90,7 @@ def _top(folder: Path, title: str, record: Mapping[str, Any], found: Sequence[Ov
     )
 
 
-def _summary(folder: Path, record: Mapping[str, Any], found: Sequence[Overview]) -> str:
+def _summary(folder: Path, found: Sequence[Overview]) -> str:
     rows = [one.cells() for one in found]
     there = [k for k in range(len(HEADINGS)) if any(row[k] for row in rows)]
     table = page.table([HEADINGS[k] for k in there], [[row[k] for k in there] for row in rows]) if rows else ""

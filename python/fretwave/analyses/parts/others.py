@@ -23,9 +23,7 @@ if TYPE_CHECKING:
     from .wheel_start import Start
 
 
-def with_others(
-    context: AnalysisContext[HarmonicSection], fed: Callable[[], list[dict[str, Any]]], cycles: Sequence[dict[str, Any]]
-) -> list[dict[str, Any]]:
+def with_others(fed: Callable[[], list[dict[str, Any]]], cycles: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
     """Limit cycles, to stable ones added `fed`, the modes beside theirs that gain energy. Collective.
 
     Where modes are not to be had, `not_looked_at` says why.
