@@ -12,6 +12,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 import fretwave as fw
+from fretwave.hb.harmonic_problem import HarmonicProblem
 
 STAGES = itertools.count()
 
@@ -179,7 +180,7 @@ def filled(vec: PETSc.Vec, values: np.ndarray) -> PETSc.Vec:
     return vec
 
 
-def unknowns(problem: fw.problems.HarmonicProblem, values: np.ndarray) -> PETSc.Vec:
+def unknowns(problem: HarmonicProblem, values: np.ndarray) -> PETSc.Vec:
     """y of a problem from an array that every rank has whole. Collective."""
     return filled(problem.core.unknowns(), values)
 
@@ -194,7 +195,7 @@ def dense(A: PETSc.Mat) -> np.ndarray:
     return np.concatenate(A.getComm().tompi4py().allgather(local))
 
 
-def everywhere(problem: fw.problems.HarmonicProblem, value: Any) -> Any:
+def everywhere(problem: HarmonicProblem, value: Any) -> Any:
     """What a problem gives on rank 0 only, on every rank. Collective."""
     return problem.model.comm.bcast(value)
 
