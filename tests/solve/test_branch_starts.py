@@ -1,0 +1,94 @@
+"""How a branch begins where Newton alone does not: more excitation, closing gaps, exact derivatives on the way."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from models.core_models import friction, mode_problem, single_dof, whole
+from models.followed import follow, response, stop
+from tolerances import REPEATED, ROUNDING, SOLVED, TIGHT
+
+import fretwave as fw
+from fretwave import _core
+from fretwave.solve.starting import Way, mode_start, starts
+
+# Den Hartog's oscillator with a limit of 0.3: most frequencies start in a motion that Newton does not find from zero.
+SLIDERS = [("jenkins", 1e2), ("jenkins", 1e3), ("jenkins", 1e4), ("regularised_coulomb", 1e-3)]
+
+
+@pytest.mark.ranks(1)
+@pytest.mark.parametrize("omega", [0.3, 0.5, 0.7, 0.8])
+@pytest.mark.parametrize("law, stiffness", SLIDERS)
+def test_a_textbook_response_starts(comm, law, stiffness, omega):
+    keys = {"jenkins": "tangential_stiffness", "regularised_coulomb": "regularisation_velocity"}
+    model = single_dof(comm, law=fw.Contact(law, [[1.0]], {"friction_limit": 0.3, keys[law]: stiffness}))
+    problem, branch = response(model, 1.0, (omega, 1.001 * omega), (1, 3, 5, 7), 256)
+    first = next(iter(branch))
+    assert problem.state(first.y)["amplitude"] > 0.9  # it slides: 1 / (1 - omega^2) less what friction takes
+    assert first.residual < TIGHT
+
+
+def test_raising_the_excitation_leads_to_the_response(comm):
+    """The way's end solves the equations of the response, in slip, and is the point that Newton finds from there."""
+    model = single_dof(comm, law=friction([[1.0]], 0.3, 1e-3))
+    problem, branch = response(model, 1.0, (0.7, 0.71), (1, 3, 5, 7), 256)
+    reasons: list[str] = []
+    ((how, y),) = starts(fw.Continuation, problem, problem.initial(0.7), reasons)
+    assert how.startswith("by raising the excitation from zero in ") and reasons == []
+    assert np.linalg.norm(whole(problem.residual(y))) < SOLVED
+    first = next(iter(branch))
+    assert problem.state(first.y)["amplitude"] == pytest.approx(problem.state(y)["amplitude"], rel=REPEATED)
+
+
+@pytest.mark.ranks(1)
+def test_a_response_at_a_stiff_stop_starts_by_closing_its_gap(comm):
+    """Its equations are the same at every level: raising the excitation leads nowhere."""
+    problem, branch = response(stop(comm, 1e4), 1.0, (0.9, 0.91), range(8), 128)
+    first = next(iter(branch))
+    assert branch.started.startswith("by closing the gaps from where nothing touches in ")
+    assert np.linalg.norm(whole(problem.residual(first.y))) < REPEATED
+
+
+@pytest.mark.ranks(1)
+def test_a_mode_at_a_stiff_stop_is_the_bilinear_oscillator(comm):
+    """Half a period on each spring, w = 2 / (1 + 1/sqrt(1 + kn)), at every amplitude; 5e-3 for harmonics left out."""
+    model = fw.Model(np.eye(1), np.eye(1), None, stop(comm, 100.0).contacts, comm)
+    problem = mode_problem(model, range(16), 512, "EPMC", start="free")
+    branch, points = follow(problem, 0.1, 0.2)
+    assert branch.converged and branch.started.startswith("by closing the gaps")
+    found = [problem.state(p.y)["omega0"] for p in points]
+    assert np.allclose(found, 2 / (1 + 1 / np.sqrt(101.0)), rtol=5e-3, atol=0)
+
+
+def ways(comm):
+    """Problems on the way to a response and to a mode whose stop is in touch."""
+    problem, _ = response(stop(comm, 3.0), 1.0, (0.9, 0.91), range(4), 64)
+    yield Way(problem, _core.ForcedStart(problem.core, problem.initial(0.9), True)), problem
+    yield Way(problem, _core.ForcedStart(problem.core, problem.initial(0.9), False)), problem
+    mode = mode_problem(stop(comm, 3.0), range(4), 64, "EPMC", start="free")
+    yield Way(mode, mode_start(mode, mode.initial(0.7))), mode
+
+
+@pytest.mark.ranks(1)
+def test_ways_to_a_start_have_exact_derivatives(comm):
+    for way, problem in ways(comm):
+        y = way.core.initial()
+        values, rng = y.getArray().copy(), np.random.default_rng(3)
+        values[: 2 * 4 - 1] = 0.4 * rng.standard_normal(7)
+        values[-1] = 0.1
+
+        def residual(x, way=way, y=y):
+            at = y.copy()
+            at.setArray(x)
+            return whole(way.residual(at)).copy()
+
+        step = rng.standard_normal(len(values))
+        there, direction = y.copy(), y.copy()
+        there.setArray(values), direction.setArray(step)
+        exact = whole(way.jacobian_product(there, direction))
+        assembled = way.jacobian(there).convert("dense").getDenseArray() @ step
+        differences = (residual(values + 1e-7 * step) - residual(values - 1e-7 * step)) / 2e-7
+        assert np.allclose(exact, differences, rtol=0, atol=1e-5 * abs(exact).max())
+        assert np.allclose(exact, assembled, rtol=0, atol=ROUNDING * abs(exact).max())
+        # the law they share stands where it stood once the problem itself is evaluated
+        problem.residual(y)
