@@ -19,7 +19,6 @@ from fretwave.commands.check import check_case
 from fretwave.commands.keys import key_lines
 from fretwave.errors import CaseErrors
 from fretwave.plots import flutter as pictures
-from fretwave.post.flutter_waves import describe_waves, verdict, words
 from fretwave.results.reader import Run
 from fretwave.run.order import RunOptions
 from fretwave.run.runner import resume_run, run_case
@@ -279,38 +278,6 @@ def test_spans_end_where_a_limit_cycle_was_located():
     zeta = 100.0 * np.array([-0.03, -1.7e-12, 0.08, 6e-13, -0.02])
     found = pictures.spans(np.arange(1.0, 6.0), zeta)
     assert found == [(1.0, 2.0, -1.0), (2.0, 4.0, 1.0), (4.0, 5.0, -1.0)]
-
-
-@pytest.mark.ranks(1)
-def test_verdicts_follow_the_signs_of_the_damping():
-    cases = {
-        "stable": [0.1, 0.3, 0.1],
-        "unbounded": [-0.1, -0.01, -0.1],
-        "bounded": [-0.1, 0.2, 0.1],
-        "bounded below": [-0.1, 0.2, -0.1],
-        "stable below": [0.1, 0.2, -0.1],
-        "neutral": [0.0, 1e-13, 0.0],
-    }
-    for expected, zeta in cases.items():
-        assert verdict(np.array(zeta)) == expected
-
-
-@pytest.mark.ranks(1)
-def test_a_limit_cycle_on_a_branch_that_runs_back_names_its_folds():
-    """Damping rises along the branch while the amplitude falls: that says nothing of its stability."""
-    rows = [
-        (1.0, -0.02, ""),
-        (1.2, -0.01, "fold"),
-        (1.1, 0.0, "zero_damping"),
-        (1.0, 0.01, "fold"),
-        (1.5, 0.02, ""),
-    ]
-    amplitude, zeta, events = (np.array(column) for column in zip(*rows))
-    columns = {"nodal_diameter": np.full(5, 3), "amplitude": amplitude, "zeta": zeta, "frequency_hz": 10 + 0 * zeta}
-    (wave,) = describe_waves({**columns, "event": events}, [3, 4])
-    (cycle,) = wave["limit_cycles"]
-    assert cycle["folds"] == [1.0, 1.2] and cycle["stable"] is None and wave["verdict"] == "bounded"
-    assert "runs back between 1 and 1.2 mm" in words(wave, "mm")
 
 
 def test_other_families_of_a_wave_that_the_flow_feeds_are_named(write, shared_tmp, comm):

@@ -1,0 +1,40 @@
+"""What is said of a wave from its table: verdicts by the signs of the damping, cycles where the branch runs back."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fretwave.post.flutter_waves import describe_waves, verdict, words
+
+
+@pytest.mark.ranks(1)
+def test_verdicts_follow_the_signs_of_the_damping():
+    cases = {
+        "stable": [0.1, 0.3, 0.1],
+        "unbounded": [-0.1, -0.01, -0.1],
+        "bounded": [-0.1, 0.2, 0.1],
+        "bounded below": [-0.1, 0.2, -0.1],
+        "stable below": [0.1, 0.2, -0.1],
+        "neutral": [0.0, 1e-13, 0.0],
+    }
+    for expected, zeta in cases.items():
+        assert verdict(np.array(zeta)) == expected
+
+
+@pytest.mark.ranks(1)
+def test_a_limit_cycle_on_a_branch_that_runs_back_names_its_folds():
+    """Damping rises along the branch while the amplitude falls: that says nothing of its stability."""
+    rows = [
+        (1.0, -0.02, ""),
+        (1.2, -0.01, "fold"),
+        (1.1, 0.0, "zero_damping"),
+        (1.0, 0.01, "fold"),
+        (1.5, 0.02, ""),
+    ]
+    amplitude, zeta, events = (np.array(column) for column in zip(*rows))
+    columns = {"nodal_diameter": np.full(5, 3), "amplitude": amplitude, "zeta": zeta, "frequency_hz": 10 + 0 * zeta}
+    (wave,) = describe_waves({**columns, "event": events}, [3, 4])
+    (cycle,) = wave["limit_cycles"]
+    assert cycle["folds"] == [1.0, 1.2] and cycle["stable"] is None and wave["verdict"] == "bounded"
+    assert "runs back between 1 and 1.2 mm" in words(wave, "mm")
