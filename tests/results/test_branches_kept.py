@@ -74,6 +74,17 @@ def test_results_without_slopes_are_read_by_chords(shared_tmp, comm):
 
 
 @pytest.mark.ranks(1)
+def test_straight_lines_do_not_follow_rounding(tmp_path, comm):
+    """An undamped mode's damping of 1e-17 has no shape: its lines are those of one without."""
+    straight = write_branches(tmp_path, comm, "mode", [mode(damping=0.0)], (0.1, 4.0), 0.2).straight()
+    with h5py.File(tmp_path / "results.h5", "r+") as file:
+        slopes = file["mode/slopes"]
+        slopes[:, :, 0] += 1e-17 * np.random.default_rng(1).standard_normal(slopes.shape[:2])
+    rounded = fw.open_run(tmp_path)["mode"].straight()
+    assert rounded["place"].tolist() == straight["place"].tolist()
+
+
+@pytest.mark.ranks(1)
 def test_an_unfinished_branch_is_read_from_its_journal(tmp_path, comm):
     problem = mode()
     writer = AnalysisWriter(tmp_path, "mode", MODE, {"type": "mode", "method": "CNM"})

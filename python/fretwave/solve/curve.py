@@ -15,7 +15,8 @@ import numpy as np
 from ..arrays import Array
 from ..errors import InputError
 from ..hb.states import State
-from ..post.mode_curve import AT_THE_END
+from ..post.largest import ALIKE
+from ..post.mode_curve import AT_THE_END, LEAST_DAMPING
 from .hermite import Cubic
 from .table import PLACE, Table
 
@@ -152,11 +153,13 @@ class Curve:
 
 
 def _scaled(table: Table, name: str) -> Array:
-    """A column over its range."""
+    """A column over its range; zeros where it varies by rounding alone, which nobody draws."""
     values = np.asarray(table[name], dtype=float)
+    least = LEAST_DAMPING if name == "zeta" else 0.0
     if name == "amplitude" and "zeta" in table and (values > 0).all():
-        values = np.log(values)
-    return np.asarray(values / (np.ptp(values) or 1.0))
+        values, least = np.log(values), ALIKE
+    span, size = np.ptp(values), float(np.abs(values).max(initial=0.0))
+    return np.asarray(values / span if span > max(least, ALIKE * size) else np.zeros_like(values))
 
 
 def _parts_of(step: Array, error: float) -> int:
