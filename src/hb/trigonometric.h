@@ -102,15 +102,17 @@ void find_roots(Series const&, int derivative, double const* samples, int count,
 /// When a series with these roots is positive: from each that rises to the next.
 std::vector<Span> positive_spans(std::vector<Root> const&);
 
-/// Runs body(t, tau) for the samples in a piece of the period: t of 0 .. samples - 1, tau perhaps in another
-/// period.
+/// Runs body(t, tau) for the samples in a piece of the period, its ends counted in: t of 0 .. samples - 1,
+/// tau in the piece, perhaps in another period. A sample where one piece ends and the next begins is in both,
+/// however their ends are rounded: what is continuous there is the same in either.
 template <class Body>
 void for_samples(int samples, double begin, double length, Body body) {
-  const double first = std::ceil(begin * samples / period),
-               end = std::ceil((begin + length) * samples / period);
-  for (double t = first; t < end; ++t) {
+  constexpr double rounding = 1e-13;  // of a period
+  const double end = begin + length, slack = rounding * samples;
+  const double last = std::floor(end * samples / period + slack);
+  for (double t = std::ceil(begin * samples / period - slack); t <= last; ++t) {
     const int place = int(t) % samples;
-    body(size_t(place < 0 ? place + samples : place), t * period / samples);
+    body(size_t(place < 0 ? place + samples : place), std::clamp(t * period / samples, begin, end));
   }
 }
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from models.core_models import chain, derivative, unknowns, whole
+from models.core_models import chain, derivative, everywhere, unknowns, whole
 from tolerances import LAST_BIT, LAST_DIGITS, REPEATED, ROUNDING, SOLVED
 
 import fretwave as fw
@@ -148,6 +148,23 @@ def test_sliders_close_their_period(comm, law):
     found = problem.diagnostics(y)
     assert found["slip_path"] > 0.5
     assert 0 <= found["unclosed"] < ROUNDING * found["slip_path"]
+
+
+@pytest.mark.parametrize("law", ["jenkins", "coulomb_2d", "coulomb_3d", "coulomb_3d_uncoupled"])
+def test_samples_at_which_a_slip_ends_have_their_force(comm, law):
+    """Each sample in turn is the first, a turning point of the motion, where slip ends: the loop is the same."""
+    n, samples = fw.laws()[law].components, 64
+    slider = {"tangential_stiffness": 1.5, "friction_limit": 1.0}
+    contact = fw.Contact(law, np.eye(3)[3 - n :], slider if n == 1 else {**STIFFNESS, "normal_load": 2.5})
+    problem = one_pair(comm, contact, samples)
+    loops = []
+    for first in range(samples):
+        c, s = np.cos(2 * np.pi * first / samples), -np.sin(2 * np.pi * first / samples)
+        y = unknowns(problem, point(problem, *((2, k, 2.3 * a) for k, a in ((1, c), (2, s)))))
+        for told in everywhere(problem, problem.contact_period(y)):
+            loops.append(np.roll(told["f"], first, axis=0))
+    assert np.abs(loops[0]).max() >= 1 - ROUNDING
+    assert np.allclose(loops, np.median(loops, axis=0), rtol=0, atol=ROUNDING)
 
 
 @pytest.mark.ranks(1)
