@@ -28,6 +28,20 @@ PetscErrorCode guarded(std::exception_ptr& exception, Body body) {
   return PetscErrorCode(0);
 }
 
+/// M is positive definite: no pivots needed, and none is zero, however small masses are in the units of the
+/// model. PETSc's own LU takes 2.2e-14 for zero unless told.
+void use_lu_without_pivots(KSP ksp, bool redundant) {
+  PC pc;
+  check(KSPGetPC(ksp, &pc));
+  if (redundant) {
+    check(PCSetType(pc, PCREDUNDANT));
+    check(PCRedundantGetKSP(pc, &ksp));
+    check(KSPGetPC(ksp, &pc));
+  }
+  check(PCSetType(pc, PCLU));
+  check(PCFactorSetZeroPivot(pc, 0));
+}
+
 }  // namespace
 
 Transient::Transient(model::Model const& model, std::vector<Excitation> excitation, double omega,
@@ -54,14 +68,11 @@ Transient::Transient(model::Model const& model, std::vector<Excitation> excitati
     for (auto* samples : {&at.displacement, &at.velocity, &at.force})
       samples->resize(size_t(local_size(at.u)));
   }
-  PC pc;
   check(KSPCreate(model.comm(), mass_.out()));
   check(KSPSetOptionsPrefix(mass_, (prefix + "mass_").c_str()));
   check(KSPSetOperators(mass_, M_, M_));
   check(KSPSetType(mass_, KSPPREONLY));
-  check(KSPGetPC(mass_, &pc));
-  check(PCSetType(
-      pc, comm_size(model.comm()) > 1 ? PCREDUNDANT : PCLU));  // M is positive definite: no pivots needed
+  use_lu_without_pivots(mass_, comm_size(model.comm()) > 1);
   check(KSPSetFromOptions(mass_));
   check(KSPSetUp(mass_));
 }
@@ -347,6 +358,24 @@ void Transient::resolve_sticking(double tolerance, double size, Vec allowed) {
   std::fill_n(out.data() + n, n, std::min(tolerance * size, band / 10));
 }
 
+/// The step control weighs displacements and velocities each by their own size, or by what the other makes of
+/// them in a sampling interval, of which a radian has ten; from rest by that of the first interval. One size
+/// for both would weigh them by the unit of time. With the contacts' forces at the state.
+Transient::Sizes Transient::sizes(Vec state) {
+  const PetscInt n = model_.local_dofs();
+  double largest[2] = {}, start;
+  {
+    ReadArray in(state);
+    for (PetscInt i = 0; i < 2 * n; ++i) largest[i / n] = std::max(largest[i / n], std::abs(in.data()[i]));
+  }
+  MPI_Allreduce(MPI_IN_PLACE, largest, 2, MPI_DOUBLE, MPI_MAX, model_.comm());
+  solve_mass(force_, acceleration_);
+  check(VecNorm(acceleration_, NORM_INFINITY, &start));
+  const auto [x, v] = largest;
+  if (x > 0 || v > 0) return {std::max(x, v * interval_), std::max(v, x / (10 * interval_))};
+  return start > 0 ? Sizes{start * interval_ * interval_, start * interval_} : Sizes{1, 1};
+}
+
 History Transient::integrate(Vec x0, Vec v0, double tolerance, bool implicit) {
   history_ = {};
   history_.implicit = implicit;
@@ -361,13 +390,7 @@ History Transient::integrate(Vec x0, Vec v0, double tolerance, bool implicit) {
     std::copy_n(ReadArray(v0).data(), n, out.data() + n);
   }
   forces(0, state);  // the contacts' tangents say which entries the Jacobian has
-  // The step control weighs displacements and velocities by their own size; from rest, by that of the first
-  // step.
-  double size, start;
-  check(VecNorm(state, NORM_INFINITY, &size));
-  solve_mass(force_, acceleration_);
-  check(VecNorm(acceleration_, NORM_INFINITY, &start));
-  if (size == 0) size = start > 0 ? start * std::min(interval_, interval_ * interval_) : 1;
+  const Sizes size = sizes(state);
   TsHandle ts;
   TSAdapt adapt;
   check(TSCreate(model_.comm(), ts.out()));
@@ -381,9 +404,13 @@ History Transient::integrate(Vec x0, Vec v0, double tolerance, bool implicit) {
   check(TSSetExactFinalTime(ts, TS_EXACTFINALTIME_STEPOVER));
   check(TSSetTimeStep(ts, interval_ / 10));
   VecHandle allowed = like(state);
-  check(VecSet(allowed, tolerance * size));
-  if (implicit) resolve_sticking(tolerance, size, allowed);
-  check(TSSetTolerances(ts, tolerance * size, allowed, tolerance, nullptr));
+  {
+    WriteArray out(allowed);
+    std::fill_n(out.data(), n, tolerance * size.x);
+    std::fill_n(out.data() + n, n, tolerance * size.v);
+  }
+  if (implicit) resolve_sticking(tolerance, size.v, allowed);
+  check(TSSetTolerances(ts, PETSC_DECIDE, allowed, tolerance, nullptr));
   check(TSGetAdapt(ts, &adapt));
   check(TSAdaptSetType(adapt, TSADAPTBASIC));
   check(TSSetMaxSNESFailures(ts, -1));

@@ -47,11 +47,16 @@ class Transient {
     VecHandle u, v, f;                                  ///< as rows of B: pair by pair
     std::vector<double> displacement, velocity, force;  ///< as laws have it: pairs innermost
   };
+  /// Displacement and velocity by which errors are weighed.
+  struct Sizes {
+    double x, v;
+  };
   static PetscErrorCode right_side(TS, PetscReal, Vec, Vec, void*);
   static PetscErrorCode residual(TS, PetscReal, Vec, Vec, Vec, void*);
   static PetscErrorCode jacobian(TS, PetscReal, Vec, Vec, PetscReal, Mat, Mat, void*);
   static PetscErrorCode after_step(TS);
   History integrate(Vec x0, Vec v0, double tolerance, bool implicit);
+  Sizes sizes(Vec state);
   void use_explicit(TS);
   void use_implicit(TS);
   void resolve_sticking(double tolerance, double size, Vec allowed);
