@@ -72,6 +72,42 @@ def test_a_tuned_wheel_has_the_modes_of_its_waves_around_it(solve):
     assert table["participation"][[0, 5]] == pytest.approx(1.0, abs=REPEATED)
 
 
+#: A mistuned ring of disks, and one that contact alone holds to them, each with springs to its own in the next sector.
+TWO_RINGS = """
+[model]
+dofs = ["disk", "ring", "next", "ring_next"]
+M = [[2.0, 0, 0, 0], [0, 0.3, 0, 0], [0, 0, 0, 0], [0, 0, 0, 0]]
+K = [[5.0, 0, -2.0, 0], [0, 1.1, 0, -0.7], [-2.0, 0, 2.0, 0], [0, -0.7, 0, 0.7]]
+sectors = 6
+low = ["disk", "ring"]
+high = ["next", "ring_next"]
+
+[[contact]]
+name = "rub"
+law = "jenkins"
+pairs = [["ring", "disk"]]
+tangential_stiffness = 3.0
+friction_limit = 1.0
+
+[[analysis]]
+name = "linear"
+type = "linear"
+modes = 2
+observe = "disk"
+wheel = true
+mistuning = { standard_deviation = 0.03, seed = 4 }
+"""
+
+
+def test_nothing_is_told_around_the_wheel_of_a_dof_that_stands_still(solve):
+    """Without contact half of the modes are the ring's, in which disks move by rounding."""
+    (table,) = solve(TWO_RINGS, "linear")
+    still = table["largest_sector"] < 0
+    assert sorted(table["contact"][still]) == N * ["free"]
+    assert np.isnan(table["participation"][still]).all() and (table["diameters"][still] == -1).all()
+    assert (table["participation"][~still] > 1 / N).all() and (table["diameters_share"][~still] > 0).all()
+
+
 #: A sector of disk, blade and tip at random, the disk's spring to the next one's too: no mirror image of itself.
 SEED, RUB, SECTORS = 5, 20.0, 7
 DRAWN = np.random.default_rng(SEED).standard_normal((4, 4)).round(2)

@@ -31,6 +31,9 @@ AROUND = (
     Column("diameters", "1", "nodal diameters of the largest wave", "i"),
     Column("diameters_share", "1", "share of this wave, forward and backward, in the sum of squares"),
 )
+#: Of the largest amplitude of a mode, what is left of a dof that does not move in it: digits that mean nothing.
+STILL = 1e-9
+NOT_AROUND = {"participation": np.nan, "largest_sector": -1, "diameters": -1, "diameters_share": np.nan}
 #: Of the table of amplifications.
 AMPLIFICATION = (
     "contact",
@@ -46,10 +49,12 @@ NO_PEAK = Largest(np.nan, np.nan, -1)
 
 
 def around_wheel(context: AnalysisContext[LinearAnalysis], mode: LinearMode) -> dict[str, Any]:
-    """Values of :data:`AROUND` for a mode; none where no dof is observed."""
+    """Values of :data:`AROUND` for a mode; none where no dof is observed, nan and -1 where it stands still."""
     if context.analysis.observe is None:
         return {}
     a = _observed(context, mode)
+    if np.abs(a).max() <= STILL * np.hypot(mode.shape, mode.imaginary).max():
+        return NOT_AROUND
     content = np.abs(wave_content(a)) ** 2
     n = len(a)
     share = np.array([content[d] + (content[n - d] if 0 < 2 * d < n else 0.0) for d in range(n // 2 + 1)])
