@@ -25,6 +25,8 @@ from fretwave.results.source_file import SourceFile
 BAR = hexahedra.bar((3, 1, 1), (0.06, 0.02, 0.01))
 
 
+#: Dofs of its nodes along x, y, z.
+TRIPLES = np.arange(BAR.K.shape[0]).reshape(-1, 3)
 SOURCES = [SourceFile("mass", "m.mtx", 12, "ab"), SourceFile("stiffness", "k.mtx", 34, "cd")]
 
 
@@ -104,10 +106,15 @@ def test_what_a_file_has_no_place_for_is_not_left_behind(tmp_path: Path) -> None
         ),
         (replace(was, pairs={"far": fw.Pairs({0: np.ones((3, was.n_dof)), -1: np.ones((3, was.n_dof))})}), "beyond"),
         (replace(was, pairs={"one": fw.Pairs(np.ones((1, was.n_dof)), 1)}), "'one' of one component"),
+        (replace(was, node_numbers=None, labels=None), "no node_numbers"),
+        (replace(was, labels=None, displacements=TRIPLES), "no labels"),
+        (replace(was, displacements=TRIPLES[::-1]), "displacements that labels do not give"),
     ):
         with pytest.raises(fw.InputError, match=said):
             fw.write_model(tmp_path / "m.h5", lost)
     assert not (tmp_path / "m.h5").exists()
+    fw.write_model(tmp_path / "m.h5", replace(was, displacements=TRIPLES))
+    np.testing.assert_array_equal(fw.read_model(tmp_path / "m.h5").displacements, TRIPLES)
 
 
 @pytest.mark.ranks(1)

@@ -98,6 +98,7 @@ def write_model(
         unit_system(told)
     tables = _tables_of(structure)
     _check_held(structure, str(path))
+    _check_nodes(structure, str(path))
     check_parts(structure, tables, str(path))
     path = Path(path)
     if path.is_dir() or not path.parent.is_dir():
@@ -131,6 +132,22 @@ def _check_held(structure: Structure, where: str) -> None:
     if lost:
         fix = "leave them out, or give them by a builder"
         raise InputError("a model file has no place for these", where, ", ".join(lost), None, fix)
+
+
+def _check_nodes(structure: Structure, where: str) -> None:
+    """Nodes have numbers, by which each dof names its own: `displacements` follow from them, and are not written."""
+    placed, labels = structure.displacements, structure.labels
+    needed = {"node_numbers": structure.node_numbers, **({} if placed is None else {"labels": labels})}
+    missing = [name for name, value in needed.items() if value is None]
+    if structure.coordinates is None or (placed is None and not missing):
+        return
+    known = labels is not None and labels.shape == (structure.n_dof, 2)  # what is wrong with a shape is told elsewhere
+    if placed is not None and not missing and (not known or np.array_equal(placed, _displacements(structure))):
+        return
+    what = "a model file tells of each dof which node it moves along what, and the structure does not"
+    measured = f"no {' and no '.join(missing)}" if missing else "displacements that labels do not give"
+    fix = "give node_numbers (n_nodes,) and labels (n_dof, 2), node and 1 to 3 along x, y, z; or leave out coordinates"
+    raise InputError(what, where, measured, "nodes that dofs name", fix)
 
 
 def _tables_of(structure: Structure) -> dict[str, Table]:
