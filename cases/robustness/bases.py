@@ -10,7 +10,8 @@ from typing import Any
 import tomllib
 
 ROOT = Path(__file__).parents[2]
-sys.path.insert(0, str(ROOT / "tests"))
+sys.path[:0] = [str(Path(__file__).parent), str(ROOT / "tests")]
+import further_bases  # noqa: E402
 from models.chain_case import BUILDER, CHAIN  # noqa: E402
 
 TWO_DOF, BLISK = ROOT / "cases/two_dof", ROOT / "cases/blisk_lumped"
@@ -76,7 +77,7 @@ def two_dof() -> dict[str, Any]:
         if "amplitude" in analysis and "mode" in (analysis["type"], analysis["name"]):
             analysis["amplitude"] = [0.1, 0.12]
         if analysis["type"] in ("free_decay", "limit_cycle"):
-            analysis.update(amplitude=[0.11], periods=12, tolerance=1e-6)
+            analysis.update(amplitude=[0.11], periods=12, samples_per_period=32, tolerance=1e-6)
     modes = [analysis for analysis in case["analysis"] if analysis["type"] == "mode"]
     for mode in modes:
         mode.update(amplitude=[0.1, 0.12], report_at=[])
@@ -106,12 +107,15 @@ def chain() -> dict[str, Any]:
     return case
 
 
+#: Builders beside the cases.
+BUILDERS = {"blisk": BLISK / "model.py", "chain": BUILDER}
+SHORT = {"two_dof": two_dof, "blisk": blisk, "chain": chain, **further_bases.SHORT}
+
+
 def prepare(folder: Path) -> None:
     """Put the builders beside the cases that are written into `folder`."""
-    for name, builder in (("two_dof", None), ("blisk", BLISK / "model.py"), ("chain", BUILDER)):
+    for name in SHORT:
         (folder / name).mkdir(parents=True, exist_ok=True)
-        if builder is not None:
-            shutil.copy(builder, folder / name / "model.py")
-
-
-SHORT = {"two_dof": two_dof, "blisk": blisk, "chain": chain}
+        if name in BUILDERS:
+            shutil.copy(BUILDERS[name], folder / name / "model.py")
+    further_bases.prepare(folder)

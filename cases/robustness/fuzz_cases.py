@@ -23,6 +23,8 @@ from mutations import as_toml, garbled, mutated  # noqa: E402
 
 #: Processor time that a command may use [s].
 LIMITS = {"check": 30.0, "run": 120.0}
+#: The quickest ones more often.
+BASES = ("two_dof", "two_dof", "blisk", "chain", "speed", "speed", "sector", "sector", "solid", "filed", "spinning")
 #: Wrong ends of --set.
 SETS = (
     *(
@@ -76,7 +78,7 @@ class Example:
 def example(seed: int, number: int) -> Example:
     """The case of a number, and what is done with it."""
     random = Random(f"{seed}/{number}")
-    base = random.choice(("two_dof", "two_dof", "two_dof", "blisk", "chain", "chain"))
+    base = random.choice(BASES)
     case = SHORT[base]()
     text = as_toml(mutated(random, case))
     if random.random() < 0.1:

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any, Literal, Optional, Union
 import numpy as np
 
 from ..case.analysis import register_analysis
-from ..case.fields import Dof, Frequency, Positive, Whole, key
+from ..case.fields import Dof, Frequency, Positive, Speed, Whole, key
 from ..case.harmonic import HarmonicSection, check_range
 from ..case.observed import Observed, check_observed, dofs_of, given_to, label_of, unit_of
+from ..case.toml.validation import at
 from ..columns import FORCED
 from ..cyclic.engine_order import folded
 from ..errors import InputError
@@ -64,7 +65,7 @@ class ForcedAnalysis(HarmonicSection):
         "{ m1 = 1.0 }",
         min_length=1,
     )
-    force_rpm: Optional[Positive] = key(
+    force_rpm: Optional[Speed] = key(
         "speed at which `force` is as given: it grows with the square of [model] speed_rpm",
         "rev/min",
         "3000.0",
@@ -134,7 +135,7 @@ class ForcedAnalysis(HarmonicSection):
         check_observed(report, "observe", self.observe, self, facts)
         for dof in self.force:
             report.dof(("force", dof), dof, facts.named)
-        if self.force_rpm is not None and "speed_rpm" not in facts.source.data.get("model", {}):
+        if self.force_rpm is not None and at(facts.source.data, ("model", "speed_rpm")) is None:
             fix = f"add `speed_rpm = {self.force_rpm:g}` to [model]"
             report.wrong(("force_rpm",), "is of a speed that is not given", "[model] speed_rpm", fix)
         if not any(self.force.values()):

@@ -19,7 +19,7 @@ from ..case.analysis import AnalysisSection, register_analysis
 from ..case.analysis_tables import MistuningSection
 from ..case.checks_common import about
 from ..case.checks_wheel import check_mistuning, check_needs_wheel
-from ..case.fields import Dof, Positive, Whole, key
+from ..case.fields import FASTEST, Dof, Speed, Whole, key
 from ..model.contact import LIMITS
 from ..model.structure import SPIN
 from ..post.engine_orders import excited_by, usual_orders
@@ -38,7 +38,7 @@ SAMPLES = 96
 #: Crossings told on the terminal.
 TOLD = 3
 
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, le=FASTEST)]
 
 
 @register_analysis
@@ -58,8 +58,8 @@ class LinearAnalysis(AnalysisSection):
     nodal_diameters: Optional[list[Annotated[Whole, Field(ge=0)]]] = key(
         "waves of a sector, all unless told", example="[0, 1, 2, 3]", default=None, min_length=1
     )
-    speed_rpm: Optional[Positive] = key("operating speed of the crossings' margins", "rev/min", "3000.0", default=None)
-    up_to_rpm: Optional[Positive] = key(
+    speed_rpm: Optional[Speed] = key("operating speed of the crossings' margins", "rev/min", "3000.0", default=None)
+    up_to_rpm: Optional[Speed] = key(
         "highest speed of the Campbell diagram (1.25 times speed_rpm unless told)", "rev/min", "4000.0", default=None
     )
     engine_orders: Optional[list[Annotated[Whole, Field(ge=1)]]] = key(

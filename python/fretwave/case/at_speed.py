@@ -17,7 +17,7 @@ from ..model.checks import check_symmetric
 from ..model.sectors import Sparse
 from ..model.structure import SPIN, Structure
 from . import matrices
-from .fields import Matrix
+from .fields import FASTEST, SLOWEST, Matrix
 from .origin import read_file
 from .reporter import Found
 from .schema import ModelSection
@@ -96,10 +96,10 @@ def square_of(text: str, key: KeyPath, source: Source, found: Found, example: st
         speed = float(text)
     except ValueError:
         speed = np.nan
-    if np.isfinite(speed) and speed > 0:
+    if SLOWEST <= speed <= FASTEST:
         return omega_squared(speed)
     what, fix = f"'{text}' is no speed of a turning model", f"write for example `{example}`"
-    found.append(InputError(what, source.where(key), text, "rev/min, above 0", fix))
+    found.append(InputError(what, source.where(key), text, f"rev/min, {SLOWEST:g} to {FASTEST:g}", fix))
     return None
 
 

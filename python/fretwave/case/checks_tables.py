@@ -16,6 +16,7 @@ from .toml.source import Source
 if TYPE_CHECKING:
     from ..model.contact import Contact
     from .analysis import AnalysisSection
+    from .facts import Facts
 
 #: Keys of [reduction] that say which interface modes there are.
 _OF_MODES = ("interface_diameters", "interface_waves", "interface_tolerance")
@@ -26,7 +27,7 @@ def check_reduction(
     source: Source,
     section: ReductionSection | None,
     analyses: Analyses,
-    sectors: int | None,
+    facts: Facts,
     notes: list[str],
     found: Found,
 ) -> None:
@@ -42,8 +43,9 @@ def check_reduction(
         report.wrong(("accuracy",), "is of no frequency", "frequencies to compare", "give `compare` 1 or more")
     if section.error_at is not None and not any(analysis.passes(section.error_at) for analysis in analyses.values()):
         notes.append(f"reduction.error_at = {section.error_at:g} is on no mode's branch: no error is estimated there")
+    sectors = facts.sectors
     if sectors is None:
-        for key in ("interface", *_OF_MODES, "compare_diameters"):
+        for key in ("interface", *_OF_MODES, "compare_diameters") if facts.model_known else ():
             if key in section.model_fields_set:
                 report.wrong((key,), "is of no sector of a wheel", "a model with sectors", "remove the key")
         return

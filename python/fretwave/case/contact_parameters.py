@@ -15,6 +15,7 @@ from ..model.law_info import LawInfo, ParameterInfo, Role
 from ..model.pairs import Pairs
 from ..texts import nearest, toml
 from ..units import quantity
+from .fields import FASTEST
 from .pair_values import TABLE, ValueTable
 from .schema import ContactSection
 from .toml.locate import Path as KeyPath
@@ -140,7 +141,7 @@ def _turn(
             f"add `speed_rpm = {section.load_rpm:g}` to [model]",
         )
         found.append(InputError(what, where, f"load_rpm = {section.load_rpm:g}", "[model] speed_rpm", fix))
-    else:
+    elif abs(speed) <= FASTEST:  # beyond it is told at its place
         for name in names:
             value = values.get(name)
             values[name] = None if value is None else value * (speed / section.load_rpm) ** 2

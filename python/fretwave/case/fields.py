@@ -35,6 +35,9 @@ Name = Annotated[str, Field(max_length=LONGEST_NAME)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 #: In Hz: equations have its square, times that of an order.
 Frequency = Annotated[float, Field(gt=0, le=1e100)]
+#: In rev/min: stiffness and loads have the square of two such in proportion.
+SLOWEST, FASTEST = 1e-30, 1e30
+Speed = Annotated[float, Field(ge=SLOWEST, le=FASTEST)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Matrix = Union[str, list[list[float]]]
 LoadVector = Union[str, list[Finite]]

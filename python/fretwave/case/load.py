@@ -121,7 +121,7 @@ def _build(
     if section and structure:
         wrong = len(found)
         structure, contacts = _tied(section, source, structure, contacts, notes, found)
-        tied = len(found) == wrong
+        tied = len(found) == wrong and (structure.cut is not None or not (section.sectors or structure.sectors))
     keep = _kept(structure, analyses, tables) if structure else {}
     facts = _facts(source, section, structure, tied, contacts, laws, keep, tables)
     if tied:
@@ -241,7 +241,7 @@ def _check(
     """Analyses and tables against the rest of the case."""
     checks.complete_analyses(source, analyses, facts, found)
     checks.check_analyses(source, analyses, facts, found)
-    check_reduction(source, tables.reduction, analyses, facts.sectors, notes, found)
+    check_reduction(source, tables.reduction, analyses, facts, notes, found)
     check_preload(source, tables.preload, facts.loads, found)
     check_damping(source, tables.damping, structure, tables.reduction, notes, found)
 

@@ -58,7 +58,7 @@ def _from_rows(letter: str, rows: list[list[float]], source: Source, key: KeyPat
             where=source.where((*key, odd)),
             measured=f"row {odd} has {lengths[odd] if lengths else 0} entries",
             expected=f"{len(rows)} entries in each of the {len(rows)} rows",
-            fix="complete the row",
+            fix="give every row as many entries as there are rows",
         )
     return scipy.sparse.csr_matrix(np.array(rows, dtype=float))
 

@@ -15,6 +15,7 @@ from ..hb.states import ZETA_FLOOR
 from ..model.sizes import COMPARED_MODES, COMPONENT_MODES, INTERFACE_TOLERANCE, INTERFACE_WAVES
 from ..units import MM_T_S, SI, SYSTEMS
 from .fields import (
+    FASTEST,
     ByMode,
     Dof,
     Finite,
@@ -25,6 +26,7 @@ from .fields import (
     Positive,
     QByMode,
     Section,
+    Speed,
     UnitName,
     Whole,
     key,
@@ -70,7 +72,7 @@ class ModelSection(Section):
         "4500.0",
         default=None,
         ge=0,
-        allow_inf_nan=False,
+        le=FASTEST,
     )
     builder: Optional[str] = key(
         "Python file whose build(**options) gives the model, in place of matrices", example='"model.py"', default=None
@@ -224,7 +226,7 @@ class ContactSection(BaseModel):
         default=None,
         min_length=1,
     )
-    load_rpm: Optional[Positive] = key(
+    load_rpm: Optional[Speed] = key(
         "speed at which its normal loads, or friction limits, are as given: they grow with the square of "
         "[model] speed_rpm",
         "rev/min",

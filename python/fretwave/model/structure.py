@@ -134,8 +134,8 @@ class Structure:
 
     @property
     def n_dof(self) -> int:
-        """Number of dofs."""
-        return int(np.shape(by_sector(self.M)[0])[0])
+        """Number of dofs; where a case's mass matrix could not be read, of their names."""
+        return len(self.names or ()) if self.M is None else int(np.shape(by_sector(self.M)[0])[0])
 
     @property
     def unit(self) -> int:
