@@ -69,10 +69,8 @@ SPEEDS = (
 )
 
 
-#: Of a model and its modes, which may stand still.
-STILL = (SPEEDS[0], SPEEDS[-1])
 WRONG_SPEEDS = [(place, speed) for place in SPEEDS for speed in (1e200, 10**399, float("inf"), -1.0)]
-WRONG_SPEEDS += [(place, 1e-200) for place in SPEEDS if place not in STILL]
+WRONG_SPEEDS += [(place, 1e-200) for place in SPEEDS[1:3]]  # that loads are given at
 
 
 @pytest.mark.parametrize(("place", "speed"), WRONG_SPEEDS, ids=str)

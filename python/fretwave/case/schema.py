@@ -26,7 +26,7 @@ from .fields import (
     Positive,
     QByMode,
     Section,
-    Speed,
+    SpeedOfLoads,
     UnitName,
     Whole,
     key,
@@ -226,7 +226,7 @@ class ContactSection(BaseModel):
         default=None,
         min_length=1,
     )
-    load_rpm: Optional[Speed] = key(
+    load_rpm: Optional[SpeedOfLoads] = key(
         "speed at which its normal loads, or friction limits, are as given: they grow with the square of "
         "[model] speed_rpm",
         "rev/min",
