@@ -35,7 +35,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..errors import InputError
-from ..model.sectors import Term, by_sector
+from ..model.sectors import Term, by_sector, real_csr
 from ..model.wheel_matrix import Matrix, as_matrix
 from .engine_order import folded
 
@@ -114,7 +114,7 @@ class Aerodynamics:
 
     def _shape(self, M: Term) -> Added:
         """What the force is distributed like."""
-        mass = {k: sp.csr_matrix(part, dtype=float) for k, part in by_sector(M).items()}
+        mass = {k: real_csr(part) for k, part in by_sector(M).items()}
         if self.dof is None:
             return mass
         n = mass[0].shape[0]

@@ -11,7 +11,7 @@ import scipy.sparse as sp
 
 from ..arrays import Array, Indices
 from ..model.contact import Contact
-from ..model.sectors import by_sector, rotation
+from ..model.sectors import by_sector, real_csr, rotation
 
 
 @dataclass
@@ -38,7 +38,7 @@ class Interface:
     def of(
         cls, n: int, low: Indices, high: Indices, contacts: Sequence[Contact], keep: npt.ArrayLike, axis: str | None
     ) -> Interface:
-        touched = [sp.csr_matrix(B).indices for contact in contacts for B in by_sector(contact.B).values()]
+        touched = [real_csr(B).indices for contact in contacts for B in by_sector(contact.B).values()]
         wanted = np.unique(np.concatenate([np.asarray(keep, dtype=np.intp).ravel(), *touched]))
         own = np.nonzero(np.isin(low, wanted) | np.isin(high, wanted))[0]
         if axis is not None:  # a turn mixes the three components of a node

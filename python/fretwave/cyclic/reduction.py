@@ -29,7 +29,7 @@ from ..model.contact import Contact
 from ..model.frequency_error import RIGID_SHARE
 from ..model.omitted import UNKNOWN
 from ..model.reduction import Reduction, reduce
-from ..model.sectors import Given, by_sector
+from ..model.sectors import Given, by_sector, real_csr
 from ..model.sizes import COMPARED_MODES, INTERFACE_TOLERANCE, INTERFACE_WAVES
 from ..mpi.destroyable import Destroyable
 from .interface import Interface
@@ -102,7 +102,7 @@ class SectorReduction(Destroyable):
         InputError
             They reach another dof.
         """
-        return self._inner.rows((sp.csr_matrix(B, dtype=float) @ self._P).tocsc())
+        return self._inner.rows((real_csr(B) @ self._P).tocsc())
 
     def names(self, dofs: Sequence[str]) -> list[str]:
         """Names of the reduced coordinates: kept dofs keep theirs."""
@@ -236,7 +236,7 @@ def reduce_sector(
         V = comm.bcast(faces.basis(motions, interface_tolerance) if comm.rank == 0 else None)
     P, kept = faces.coordinates(V, sectors, axis)
     before = time.perf_counter() - start
-    M_P, K_P, C_P = (None if A is None else sp.csr_matrix(P.T @ sp.csr_matrix(A, dtype=float) @ P) for A in (M, K, C))
+    M_P, K_P, C_P = (None if A is None else sp.csr_matrix(P.T @ real_csr(A) @ P) for A in (M, K, C))
     inner = reduce(M_P, K_P, C_P, kept, modes, highest_hz, comm)
     found = SectorReduction(full, P, faces, inner, waves)
     found.wall_s = {"interface": before, "total": time.perf_counter() - start}

@@ -30,7 +30,7 @@ from ..errors import InputError
 from ..model.contact import Contact
 from ..model.model import Model
 from ..model.modes import LinearMode
-from ..model.sectors import Given, Parts, Term, by_sector, check_balanced, check_number, in_wave
+from ..model.sectors import Given, Parts, Term, by_sector, check_balanced, check_number, in_wave, real_csr
 from ..model.structure import Structure
 from .aerodynamics import Aerodynamics, period_of, with_terms
 
@@ -148,8 +148,7 @@ class Sector:
         for letter, own in (changes or {}).items():
             _check_changes(letter, own, self.sectors, self.n_dof)
         added = {
-            letter: sp.csr_matrix(sp.block_diag([sp.csr_matrix(A) for A in own]))
-            for letter, own in (changes or {}).items()
+            letter: sp.csr_matrix(sp.block_diag([real_csr(A) for A in own])) for letter, own in (changes or {}).items()
         }
         around = [contact.around(self.sectors) for contact in self.contacts]
         return self.structure.around(added=added).model(around, comm)

@@ -144,7 +144,7 @@ class _Interior:
 
     def __init__(self, reduction: Reduction, C: Sparse | None = None) -> None:
         K, *damping, M = reduction._model._matrices
-        self.owned = [] if C is None else [reduction._model._matrix(C)]
+        self.owned = [] if C is None else [reduction._model._matrix(C, "C")]
         self.terms = dict(zip((0, 2, 1), (K, M, *(self.owned or damping))))
         self.begin, end = K.getOwnershipRange()
         self.inside = np.setdiff1d(np.arange(self.begin, end), reduction.keep).astype(PETSc.IntType)

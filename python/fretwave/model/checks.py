@@ -26,7 +26,7 @@ LARGEST_ENTRY = 1e150
 DENSE_LIMIT = 600
 
 
-NAMES = {"M": "mass matrix", "K": "stiffness matrix", "C": "damping matrix"}
+NAMES = {"M": "mass matrix", "K": "stiffness matrix", "C": "damping matrix", "B": "contact map"}
 
 
 def check_entries(letter: str, A: Sparse, where: str) -> InputError | None:

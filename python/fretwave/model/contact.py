@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from copy import copy
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import scipy.sparse as sp
 
 from ..arrays import Array
 from ..errors import InputError
+from ..texts import shortened
 from .law_info import LawInfo, ParameterInfo, Role
 from .laws import core_law, laws, springs
 from .pairs import Pairs, Values, repeated
 from .python_law import PythonLaw, python_law
-from .sectors import Term, by_sector
+from .sectors import Term, by_sector, real_csr
 
 
 @dataclass(init=False)
@@ -56,6 +57,9 @@ class Contact:
         pairs: Pairs | None = None,
     ) -> None:
         self.law, self.name = law, name
+        if not isinstance(parameters or {}, Mapping):
+            fix, where = 'write `{"friction_limit": 1.0}`', f"contact '{name}'"
+            raise InputError("parameters have no names", where, type(parameters).__name__, "a dict", fix)
         known = isinstance(law, PythonLaw) or law in laws()  # another is refused when a model is made
         if isinstance(B, Pairs):
             pairs, B = B, None
@@ -110,7 +114,7 @@ class Contact:
         stiffness, normal = self.value(Role.NORMAL_STIFFNESS), self.info.normal
         if normal is None or stiffness is None:
             return None
-        normals = {k: sp.csr_matrix(B)[normal :: self.components] for k, B in by_sector(self.B).items()}
+        normals = {k: real_csr(B)[normal :: self.components] for k, B in by_sector(self.B).items()}
         law, parameters = springs(stiffness)
         return Contact(law, normals, parameters, self.name)
 
@@ -191,9 +195,17 @@ class Contact:
                     f"1 or {n_pairs} values",
                     "give one number, or one per pair",
                 )
-            values[name] = np.broadcast_to(np.asarray(value, dtype=float).ravel(), (n_pairs,))
+            values[name] = np.broadcast_to(self._numbers(name, value).ravel(), (n_pairs,))
             self._check_bound(parameter, values[name])
         return values
+
+    def _numbers(self, name: str, value: npt.ArrayLike) -> Array:
+        given = np.asarray(value)
+        if given.dtype.kind in "biuf" or given.dtype.kind == "O":
+            with suppress(TypeError, ValueError):
+                return given.astype(float)
+        what, where = f"law parameter '{name}' is no number", f"contact '{self.name}'"
+        raise InputError(what, where, shortened(repr(value)), "real numbers", "give one number, or one per pair")
 
     def _check_bound(self, parameter: ParameterInfo, values: Array) -> None:
         """Here and not in the core, which knows a rank's own numbers of the pairs."""
@@ -208,6 +220,22 @@ class Contact:
                 f"a number{f' {sign} {low:g}' if low > -1e300 else ''} [{parameter.unit}]",
                 "give a value within the bound; leave out pairs that stand for no area",
             )
+
+
+def contact_list(given: Iterable[Contact]) -> list[Contact]:
+    """Contacts of a model, as they were given.
+
+    Raises
+    ------
+    InputError
+        Something else stands among them, or a contact without a list.
+    """
+    members: list[object] = list(given) if isinstance(given, Iterable) else [given]
+    contacts = [one for one in members if isinstance(one, Contact)]
+    if isinstance(given, Contact) or len(contacts) < len(members):
+        expected, fix = "a list of fretwave.Contact", "write `contacts=[contact]`, or leave it out"
+        raise InputError("contacts of a model are no list of contacts", "contacts", repr(given), expected, fix)
+    return contacts
 
 
 #: Linear limits of a contact: every pair closed and stuck, closed and sliding without friction, no contact at all.

@@ -14,7 +14,7 @@ from .. import _core
 from ..arrays import Array
 from ..errors import InputError
 from .model import Model
-from .sectors import Given
+from .sectors import Given, real_csr
 
 if TYPE_CHECKING:
     from .reduction import Reduction
@@ -75,7 +75,7 @@ def _reference_hz(reduction: Reduction) -> float:
 
 
 def _contact_stiffness(reduction: Reduction, n: int, K_contact: Given | None) -> sp.csr_matrix:
-    extra = sp.csr_matrix((n, n)) if K_contact is None else sp.csr_matrix(K_contact, dtype=float)
+    extra = sp.csr_matrix((n, n)) if K_contact is None else real_csr(K_contact, "K_contact")
     if extra.shape != (n, n):
         raise InputError("K_contact does not fit the model", None, extra.shape, (n, n), "give it on all dofs")
     entries = extra.tocoo()
@@ -101,7 +101,7 @@ def _on_kept(reduction: Reduction, extra: sp.csr_matrix) -> Array:
 
 def _full_hz(model: Model, extra: sp.csr_matrix, count: int) -> Array:
     K, M = model._matrices[0], model._matrices[-1]
-    stiff = model._matrix(extra)
+    stiff = model._matrix(extra, "K")
     stiffness = K.copy()
     stiffness.axpy(1.0, stiff)
     core = _core.Model([(stiffness, 0, 0), (M, 2, 0)], [], 0.0)

@@ -24,7 +24,7 @@ from ..arrays import Array, Complex
 from ..errors import InputError
 from ..texts import counted
 from .contact import Contact
-from .sectors import Term, by_sector
+from .sectors import Term, by_sector, real_csr
 
 #: A damping ratio of all modes, of the lowest, or by the number of the mode (1 is the lowest).
 Ratios = Union[float, Sequence[float], Mapping[int, float]]
@@ -92,7 +92,7 @@ def _of_wave(M: Term, K: Term, ratios: Ratios, contacts: Sequence[Contact], thet
 
 def _dense(given: Term, theta: float) -> Complex:
     """sum_k e^{-i k theta} A_k, real where it is."""
-    total = sum(np.exp(-1j * k * theta) * sp.csr_matrix(A).toarray() for k, A in by_sector(given).items())
+    total = sum(np.exp(-1j * k * theta) * real_csr(A).toarray() for k, A in by_sector(given).items())
     standing = np.isclose(np.sin(theta), 0.0, atol=1e-12)
     return np.asarray(np.real(total) if standing else total)
 

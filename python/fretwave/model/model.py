@@ -19,11 +19,12 @@ from ..mpi import guard as parallel
 from ..mpi.destroyable import Destroyable
 from ..mpi.gather import on_all_ranks
 from ..units import SI, UnitSystem, unit_system
-from .contact import Contact
+from .checks import check_entries
+from .contact import Contact, contact_list
 from .omitted import OmittedModes
 from .rest import Rest
-from .sectors import Given, Term, by_sector
-from .wheel_matrix import WheelMatrix, as_matrix
+from .sectors import Given, Term, by_sector, real_csr
+from .wheel_matrix import WheelMatrix
 
 if MPI.COMM_WORLD.size > 1:
     parallel.install()  # in scripts too: one rank's exception ends all ranks, with one message
@@ -32,6 +33,16 @@ if MPI.COMM_WORLD.size > 1:
 def _tangents(contact: Contact) -> int:
     """Components beside the normal one."""
     return contact.components - (contact.info.normal is not None)
+
+
+def _entries(given: Given, letter: str, where: str | None = None) -> sp.csr_matrix:
+    """In CSR form, all of it numbers."""
+    where = where or letter
+    matrix = real_csr(given, where)
+    wrong = check_entries(letter, matrix, where)
+    if wrong:
+        raise wrong
+    return matrix
 
 
 class Model(Destroyable):
@@ -79,9 +90,9 @@ class Model(Destroyable):
         if comm is None:
             comm = first.getComm().tompi4py() if isinstance(first, PETSc.Mat) else MPI.COMM_WORLD
         self.comm, self.sectors, self.nodal_diameter, self._unit = comm, sectors, nodal_diameter, unit
-        self._matrices = [self._matrix(matrix) for matrix, *_ in terms]
+        self._matrices = [self._matrix(matrix, "KCM"[order]) for matrix, order, _ in terms]
         self._terms = [(A, order, k) for A, (_, order, k) in zip(self._matrices, terms)]
-        self.contacts = list(contacts)
+        self.contacts = contact_list(contacts)
         self.n_dof: int = self._matrices[0].getSize()[1]
         self._pairs: list[npt.NDArray[np.intp]] = []
         self._laws: list[Any] = []
@@ -93,10 +104,10 @@ class Model(Destroyable):
             [(A, *term[1:]) for A, term in zip(self._matrices, terms)], groups, theta, unit if unit > 1 else 0
         )
 
-    def _matrix(self, A: Given) -> PETSc.Mat:
+    def _matrix(self, A: Given, letter: str) -> PETSc.Mat:
         if isinstance(A, PETSc.Mat):
             return A
-        A = as_matrix(A)
+        A = A if isinstance(A, WheelMatrix) else _entries(A, letter)
         n, columns = A.shape
         if n != columns:
             raise InputError(
@@ -117,7 +128,7 @@ class Model(Destroyable):
 
     def _group(self, contact: Contact) -> tuple[str, list[tuple[PETSc.Mat, int]], Any, list[int]]:
         """The contact's pairs on the rank that owns the pair's first dof."""
-        maps, d = {k: sp.csr_matrix(B, dtype=float) for k, B in by_sector(contact.B).items()}, contact.components
+        maps, d = self._maps(contact), contact.components
         n_rows = maps[0].shape[0]
         for B in maps.values():
             if B.shape != (n_rows, self.n_dof) or n_rows % d:
@@ -136,6 +147,11 @@ class Model(Destroyable):
         parts = [(self._rows_of(B, rows), k) for k, B in maps.items()]
         self._laws.append(contact.core_law(pairs, n_pairs))
         return contact.name, parts, self._laws[-1], pairs.tolist()
+
+    @staticmethod
+    def _maps(contact: Contact) -> dict[int, sp.csr_matrix]:
+        where = f"B of contact '{contact.name}'"
+        return {k: _entries(B, "B", where) for k, B in by_sector(contact.B).items()}
 
     @staticmethod
     def _first_dofs(maps: Mapping[int, sp.csr_matrix], d: int) -> npt.NDArray[np.intp]:
@@ -158,6 +174,11 @@ class Model(Destroyable):
     def entries(self) -> float:
         """Entries of the fullest matrix. Collective."""
         return max(float(A.getInfo(PETSc.Mat.InfoType.GLOBAL_SUM)["nz_used"]) for A in self._matrices)
+
+    @property
+    def has_stiffness(self) -> bool:
+        """The own stiffness has an entry other than 0. Collective."""
+        return any(A.norm(PETSc.NormType.INFINITY) > 0 for A, order, _ in self._terms if order == 0)
 
     @property
     def odd(self) -> bool:
@@ -241,7 +262,7 @@ class Model(Destroyable):
             The sliders are not those of this model's contacts.
         """
         for k, (contact, law) in enumerate(zip(self.contacts, self._laws)):
-            u = np.sum([sp.csr_matrix(B) @ rest.displacement for B in by_sector(contact.B).values()], axis=0)
+            u = np.sum([real_csr(B) @ rest.displacement for B in by_sector(contact.B).values()], axis=0)
             mine = u.reshape(-1, contact.components)[self._pairs[k]]
             law.rest(mine.T.ravel().tolist())
             if rest.sliders is not None and contact.info.memory:  # also where this rank has no pair of it

@@ -6,13 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+import scipy.sparse as sp
 from mpi4py import MPI
 
 from .. import _core
 from ..arrays import Array
-from ..errors import InputError
+from ..errors import InputError, PetscError
 from ..files.memory import machine_memory, size
 from ..mpi.gather import on_all_ranks
+from .checks import DENSE_LIMIT, check_mass
 from .model import Model
 
 #: Entries of a row from which a model counts as solid elements, and how many times their factors have as many (twelve
@@ -80,7 +82,10 @@ def linear_modes(model: Model, count: int = 6, contact: str = "stuck", near: flo
         given, fix = f"near={near}, contact={contact}", "give a frequency above 0, and stuck or free contact"
         raise InputError("modes near a frequency are those without damping", None, given, "near > 0 [rad/s]", fix)
     _check_factor(model)
-    found = _core.linear_modes(model.core, count, getattr(_core.ContactState, contact), near)
+    try:
+        found = _core.linear_modes(model.core, count, getattr(_core.ContactState, contact), near)
+    except PetscError as error:
+        raise _wrong_terms(model) or error from None
     shapes = [on_all_ranks(model.comm, re) + 1j * on_all_ranks(model.comm, im) for _, _, re, im in found]
     for _, _, *parts in found:
         for part in parts:
@@ -88,6 +93,16 @@ def linear_modes(model: Model, count: int = 6, contact: str = "stuck", near: flo
     if model.core.travelling:
         shapes = [_aligned(phi) for phi in shapes]
     return [LinearMode(mode[0], mode[1], phi.real.copy(), phi.imag.copy()) for mode, phi in zip(found, shapes)]
+
+
+def _wrong_terms(model: Model) -> InputError | None:
+    """What is wrong with mass or stiffness of which PETSc could make nothing; None if that is not seen. Collective."""
+    if not model.has_stiffness:
+        return InputError("the stiffness matrix is zero", "K", None, "a stiffness", "give the structure's stiffness")
+    if model.n_dof > DENSE_LIMIT:
+        return None
+    M = sp.csr_matrix(np.column_stack([model.inertia(unit) for unit in np.eye(model.n_dof)]))
+    return check_mass(M, "M", list(map(str, range(model.n_dof))))
 
 
 def factor_fits(model: Model) -> bool:

@@ -19,6 +19,7 @@ import scipy.sparse as sp
 
 from ..arrays import Array, IntArray
 from ..errors import InputError
+from .sectors import real_csr
 from .structure import Structure
 
 #: Smallest pivot of a pair's rows over the largest.
@@ -39,7 +40,7 @@ def on_pair_coordinates(structure: Structure) -> Structure:
     T = _transformation(structure, places)
 
     def congruent(A: object) -> sp.csr_matrix:
-        product = sp.csr_matrix(T.T @ sp.csr_matrix(A, dtype=float) @ T)
+        product = sp.csr_matrix(T.T @ real_csr(A) @ T)
         return sp.csr_matrix((product + product.T) / 2)
 
     totals = {name: structure.resultant([name]) for name in structure.loads}
@@ -73,7 +74,7 @@ def _places(structure: Structure) -> Iterator[tuple[str, IntArray]]:
 def _pairs(structure: Structure) -> Iterator[tuple[str, sp.csr_matrix]]:
     """Rows of B, pair by pair."""
     for name, pairs in structure.pairs.items():
-        B = sp.csr_matrix(pairs.B, dtype=float)
+        B = real_csr(pairs.B)
         B.eliminate_zeros()
         for first in range(0, B.shape[0], pairs.components):
             yield name, B[first : first + pairs.components]

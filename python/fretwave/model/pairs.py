@@ -11,7 +11,7 @@ import numpy.typing as npt
 import scipy.sparse as sp
 
 from ..arrays import Array
-from .sectors import Parts, Term, around, by_sector, combine
+from .sectors import Parts, Term, around, by_sector, combine, real_csr
 
 #: A law's parameters: a number, or one per pair.
 Values = Mapping[str, Union[float, npt.ArrayLike]]
@@ -61,7 +61,7 @@ class Pairs:
     @property
     def own(self) -> sp.csr_matrix:
         """B on the dofs of the own sector."""
-        return sp.csr_matrix(by_sector(self.B)[0], dtype=float)
+        return real_csr(by_sector(self.B)[0])
 
     @property
     def n_pairs(self) -> int:
@@ -71,7 +71,7 @@ class Pairs:
     @property
     def touched(self) -> npt.NDArray[np.intp]:
         """Dofs that B reaches, of any sector."""
-        reached = [sp.csr_matrix(B).indices for B in by_sector(self.B).values()]
+        reached = [real_csr(B).indices for B in by_sector(self.B).values()]
         return np.asarray(np.unique(np.concatenate(reached)), dtype=np.intp)
 
     def tied(self, ties: Parts) -> Pairs:
@@ -81,7 +81,7 @@ class Pairs:
 
     def mapped(self, rows: Callable[[sp.csr_matrix], sp.csr_matrix]) -> Pairs:
         """With every part of B on other coordinates."""
-        parts = {k: rows(sp.csr_matrix(B, dtype=float)) for k, B in by_sector(self.B).items()}
+        parts = {k: rows(real_csr(B)) for k, B in by_sector(self.B).items()}
         return replace(self, B=parts[0] if list(parts) == [0] else parts)
 
     def around(self, sectors: int) -> Pairs:
@@ -92,7 +92,7 @@ class Pairs:
 
     def complaint(self, name: str, n_dof: int) -> str | None:
         """What is inconsistent, None when nothing is."""
-        for B in map(sp.csr_matrix, by_sector(self.B).values()):
+        for B in map(real_csr, by_sector(self.B).values()):
             rows, columns = B.shape
             if columns != n_dof or rows % self.components or not rows or rows != self.own.shape[0]:
                 return f"B of contact '{name}' is {rows} x {columns}, not {self.components} n_pairs x {n_dof}"

@@ -20,7 +20,7 @@ from .frequency_error import FrequencyError, frequency_error
 from .model import Model
 from .omitted import OmittedModes
 from .residual_statics import held_displacement
-from .sectors import Given, Sparse
+from .sectors import Given, Sparse, real_csr
 from .sizes import COMPARED_MODES, COMPONENT_MODES
 
 if TYPE_CHECKING:
@@ -87,7 +87,7 @@ class Reduction(Destroyable):
         InputError
             They reach another dof.
         """
-        full = sp.csr_matrix(B)
+        full = real_csr(B)
         kept = sp.csr_matrix(full[:, self.keep])
         _check_all_kept(full, kept)
         return sp.csr_matrix(sp.hstack([kept, sp.csr_matrix((kept.shape[0], len(self.component_hz)))]))

@@ -6,7 +6,7 @@ Scipy alone; `fretwave.cyclic.sector` says what a wave on such terms is.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -26,11 +26,49 @@ Term: TypeAlias = sp.spmatrix
 Parts = Mapping[int, Given]
 
 
+def real_csr(given: Given, where: str | None = None) -> Sparse:
+    """A matrix in CSR form of float, its entries of one place added up; what was given stays as it is.
+
+    Raises
+    ------
+    InputError
+        It is complex (of which SciPy would keep the real part), masked, or no matrix of numbers.
+    """
+    if not sp.issparse(given):
+        given = _dense(given, where)
+    if np.iscomplexobj(given):
+        if abs(given.imag).max() > 0:
+            fix = "put the imaginary part of a loss factor into C, or take fw.modal_damping"
+            raise InputError("a matrix is complex", where, f"entries of type {given.dtype}", "real entries", fix)
+        given = given.real
+    matrix = sp.csr_matrix(given, dtype=float)
+    if not matrix.has_canonical_format:  # PETSc would keep one of several entries of a place
+        matrix = matrix.copy()
+        matrix.sum_duplicates()
+    return matrix
+
+
+def _dense(given: npt.ArrayLike, where: str | None) -> npt.NDArray[Any]:
+    """Rows of numbers as an array."""
+    try:
+        array = np.asarray(given)
+        array = array.astype(float) if array.dtype.kind == "O" else array
+    except (TypeError, ValueError):  # rows of different lengths, None among them
+        array = np.asarray(type(given).__name__)
+    masked = isinstance(given, np.ma.MaskedArray) and bool(np.any(given.mask))
+    if array.dtype.kind not in "biufc" or array.ndim > 2 or masked:
+        kind = "entries are masked" if masked else f"{array.ndim} dimensions of {array.dtype}"
+        measured = f"{type(given).__name__}: {kind}" if array.dtype.kind != "U" or array.ndim else str(array)
+        expected, fix = "rows of real numbers, all as long, or a sparse matrix", "give a NumPy array (n, m)"
+        raise InputError("this is no matrix", where, measured, expected, fix)
+    return array
+
+
 def by_sector(given: Term | None) -> Parts:
     """{k: matrix on the sector k places ahead}, the own sector first; a plain matrix stands for {0: matrix}."""
     if given is None:
         return {}
-    if not isinstance(given, Mapping):
+    if not isinstance(given, Mapping) or sp.issparse(given):  # SciPy's DOK is a dict as well
         return {0: given}
     if 0 not in given:
         raise InputError("the own sector's matrix is missing", None, sorted(given), "0 among them", "give {0: ...}")
@@ -51,7 +89,7 @@ def around(given: Term, sectors: int, first: int = 0, end: int | None = None) ->
     first, end : int
         The rows of these sectors alone; all without them.
     """
-    parts = {k: sp.csr_matrix(A) for k, A in by_sector(given).items()}
+    parts = {k: real_csr(A) for k, A in by_sector(given).items()}
     side_by_side = sp.hstack(list(parts.values()), format="csr")
     n, own = parts[0].shape[1], range(first, sectors if end is None else end)
     block, column = np.divmod(side_by_side.indices, n)
@@ -73,7 +111,7 @@ def combine(left: Parts, middle: Parts, right: Parts, sign: int) -> dict[int, Sp
     for a, L in left.items():
         for b, A in middle.items():
             for c, R in right.items():
-                part = sp.csr_matrix(L.T @ sp.csr_matrix(A) @ R)
+                part = sp.csr_matrix(L.T @ real_csr(A) @ R)
                 k = c + b + sign * a
                 if part.nnz or k == 0:
                     out[k] = out[k] + part if k in out else part
@@ -91,7 +129,7 @@ def check_balanced(given: Term | None, name: str) -> None:
 
     C may have an unsymmetric (gyroscopic) part, but no one-sided coupling.
     """
-    parts = {k: sp.csr_matrix(A) for k, A in by_sector(given).items()}
+    parts = {k: real_csr(A, f"{name}[{k}]") for k, A in by_sector(given).items()}
     for k, A in parts.items():
         other = parts.get(-k)
         wrong = other is None or (name != "C" and abs(A - other.T).max() > 1e-9 * max(abs(A).max(), abs(other).max()))

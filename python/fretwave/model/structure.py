@@ -20,7 +20,7 @@ from ..units import SI, UnitSystem, unit_system
 from .consistency import complaint_of
 from .omitted import UNKNOWN, OmittedModes
 from .pairs import Pairs
-from .sectors import Parts, Sparse, Term, by_sector, check_balanced, check_number, combine, ties
+from .sectors import Parts, Sparse, Term, by_sector, check_balanced, check_number, combine, real_csr, ties
 from .wheel_matrix import Matrix, WheelMatrix, as_matrix, entries_of
 
 if TYPE_CHECKING:
@@ -201,7 +201,7 @@ class Structure:
     def sparse(self) -> Structure:
         """The same with all matrices in CSR form of float."""
         matrices: dict[str, Any] = {letter: _sparse(getattr(self, letter)) for letter in ("M", "K", "C")}
-        parts = {name: sp.csr_matrix(part, dtype=float) for name, part in self.parts.items()}
+        parts = {name: real_csr(part, f"part '{name}'") for name, part in self.parts.items()}
         pairs = {name: replace(one, B=_sparse(one.B)) for name, one in self.pairs.items()}
         return replace(self, **matrices, parts=parts, pairs=pairs)
 
@@ -323,7 +323,7 @@ class Structure:
     def _part(self, of: str) -> Sparse:
         if of not in self.parts:
             raise InputError("there is no such part of the stiffness", None, of, ", ".join(self.parts), "name a part")
-        return sp.csr_matrix(self.parts[of])
+        return real_csr(self.parts[of])
 
     def reduced(self, reduction: Reduction | SectorReduction) -> Structure:
         """On the coordinates of a reduction of it, whose faces (of a sector) are free again. Collective.
@@ -397,13 +397,13 @@ _NO_NODES: dict[str, Any] = dict.fromkeys(
 
 def tie(A: Term | None, T: Parts) -> dict[int, Sparse] | None:
     """A matrix of a sector on the dofs that its ties leave."""
-    return None if A is None else combine(T, {0: sp.csr_matrix(A, dtype=float)}, T, -1)
+    return None if A is None else combine(T, {0: real_csr(A)}, T, -1)
 
 
 def _sparse(given: Term | None) -> Term | None:
     """In CSR form of float, by sector where it was."""
     if isinstance(given, Mapping):
-        return {k: sp.csr_matrix(A, dtype=float) for k, A in given.items()}
+        return {k: real_csr(A) for k, A in given.items()}
     return None if given is None else as_matrix(given)
 
 

@@ -9,7 +9,7 @@ import numpy.typing as npt
 import scipy.sparse as sp
 
 from ..arrays import Array
-from .sectors import Given, Parts, Sparse, Term, around, by_sector
+from .sectors import Given, Parts, Sparse, Term, around, by_sector, real_csr
 
 #: Terms of a sector and, where the sectors are not alike, the factors (N,) of their rows in each.
 Ring = tuple[Parts, Optional[Array]]
@@ -47,7 +47,7 @@ class WheelMatrix:
     __array_ufunc__ = None  # arrays leave sums and products to it
 
     def __init__(self, term: Term, sectors: int, factors: npt.ArrayLike | None = None) -> None:
-        parts = {k: sp.csr_matrix(A, dtype=float) for k, A in by_sector(term).items()}
+        parts = {k: real_csr(A) for k, A in by_sector(term).items()}
         self.sectors, (rows, columns) = sectors, parts[0].shape
         self.shape = (sectors * rows, sectors * columns)
         self._rings: list[Ring] = [(parts, None if factors is None else np.asarray(factors, dtype=float))]
@@ -109,7 +109,7 @@ class WheelMatrix:
     def __add__(self, other: WheelMatrix | Given) -> WheelMatrix:
         if isinstance(other, WheelMatrix):
             return self._made_of(self._rings + other._rings, self._added + other._added)
-        return self._made_of(self._rings, [*self._added, sp.csr_matrix(other)])
+        return self._made_of(self._rings, [*self._added, real_csr(other)])
 
     __radd__ = __add__
 
@@ -125,9 +125,9 @@ Matrix = Union[Sparse, WheelMatrix]
 
 def as_matrix(given: Given | WheelMatrix) -> Matrix:
     """In CSR form of float, but for that of a wheel, which stays as it is."""
-    return given if isinstance(given, WheelMatrix) else sp.csr_matrix(given, dtype=float)
+    return given if isinstance(given, WheelMatrix) else real_csr(given)
 
 
 def entries_of(given: Given | WheelMatrix) -> Sparse:
     """In CSR form of float, all of it."""
-    return cast(Sparse, given.tocsr() if isinstance(given, WheelMatrix) else sp.csr_matrix(given, dtype=float))
+    return cast(Sparse, given.tocsr() if isinstance(given, WheelMatrix) else real_csr(given))
