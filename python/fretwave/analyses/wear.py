@@ -151,7 +151,8 @@ class WearAnalysis(AnalysisSection):
         unit = float(starts["cycle_unit"])
         context.console.line(f"{context.name}: a normalised cycle is {unit:.6g} vibration cycles")
         march = LineRunner(context, settings, unit)
-        results = groups.run(context.comm, lines, march)
+        apart = None if groups.seen_by_all(context.comm, kept.file(0)) else 1  # their files are to meet in one folder
+        results = groups.run(context.comm, lines, march, apart)
         return _collect(context, lines, results, unit, folder)
 
     def view(

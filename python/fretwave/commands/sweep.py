@@ -66,7 +66,7 @@ def resume_sweep(
     given, asked = record["case"], record["sweep"]
     options = RunOptions.of_record(folder, record, plots, shown)
     path = Path(given["path"])
-    text = None if path.exists() else on_first_rank(comm, lambda: read_copy(folder, record))
+    text = on_first_rank(comm, lambda: None if path.exists() else read_copy(folder, record))
     sweep = Sweep(Runner, path, Plan(asked["over"]), options, folder / "values", asked["groups"], text)
     if asked["groups"] is not None:
         sweep.n_groups = min(asked["groups"], comm.size)

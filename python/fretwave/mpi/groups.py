@@ -48,7 +48,7 @@ class Kept:
 
     def load(self, number: int) -> dict[str, Any] | None:
         """The result of a task, None when it is not there."""
-        with suppress(OSError, ValueError, KeyError, BadZipFile), np.load(self._file(number)) as archive:
+        with suppress(OSError, ValueError, KeyError, BadZipFile), np.load(self.file(number)) as archive:
             values = {name: archive[name] for name in archive.files}
             if str(values.pop("_digest")) == self.digest:
                 return {name: value if value.ndim else value.item() for name, value in values.items()}
@@ -58,10 +58,11 @@ class Kept:
         """Keep the result of a task. One rank only."""
         with told(self.folder):
             self.folder.mkdir(parents=True, exist_ok=True)
-        with replaced(self._file(number), keep_suffix=True) as fresh:
+        with replaced(self.file(number), keep_suffix=True) as fresh:
             np.savez(fresh, _digest=self.digest, **result)
 
-    def _file(self, number: int) -> Path:
+    def file(self, number: int) -> Path:
+        """Where the result of a task is."""
         return self.folder / f"task_{number:04d}.npz"
 
 
@@ -129,6 +130,24 @@ def group_count(ranks: int, tasks: int, asked: int | None = None) -> int:
         fix = f"mpirun -n {asked}, or fewer groups" if asked > 0 else "at least 1"
         raise InputError("there cannot be so many groups of ranks", "--groups", asked, f"1 to {ranks}, the ranks", fix)
     return max(1, min(ranks if asked is None else asked, tasks))
+
+
+def seen_by_all(comm: MPI.Comm, path: Path) -> bool:
+    """Whether every rank sees what the first one has at a path, of the same size and age. Collective.
+
+    Where not, groups that read there or write beside it would work on other files: there is to be one group then, of
+    which the first rank alone does so.
+    """
+    mine = _size_and_age(path)
+    first = comm.bcast(mine)
+    return all(comm.allgather(mine == first))
+
+
+def _size_and_age(path: Path) -> tuple[int, int] | None:
+    with suppress(OSError):
+        found = path.stat()
+        return found.st_size, found.st_mtime_ns
+    return None
 
 
 def _loaded(kept: Kept | None, count: int) -> dict[int, Any]:

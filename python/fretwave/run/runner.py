@@ -180,7 +180,7 @@ class Runner:
         """For `fretwave view`: of a model with nodes, and not of the runs of a sweep. Collective."""
         full = self.case.structure.cut or self.case.structure
         path, size = self.folder.path / NAME, 8 * full.n_dof * reduction.size
-        if self.part or full.coordinates is None or (self.resuming and path.exists()):
+        if self.part or full.coordinates is None or (self.resuming and on_first_rank(self.comm, path.exists)):
             return
         if size > LARGEST:
             text = f"{size / 1e6:.0f} MB, more than {LARGEST / 1e6:.0f}"

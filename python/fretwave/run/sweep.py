@@ -96,7 +96,8 @@ class Sweep:
         except FretwaveError as error:
             found = [error]
         others = range(1, len(self.plan))
-        found += groups.run(comm, others, lambda k, group: on_first_rank(group, partial(self._checked, k)))
+        apart = None if groups.seen_by_all(comm, self.path) else 1
+        found += groups.run(comm, others, lambda k, group: on_first_rank(group, partial(self._checked, k)), apart)
         problems = self._problems(found) or self._of_units(found)
         if problems:
             raise CaseErrors(problems, f"the sweep of {display(self.path)}")
@@ -105,7 +106,15 @@ class Sweep:
     def run(self, comm: MPI.Comm, run_id: str) -> list[FretwaveError | None]:
         """Run every value that is not done; gives what went wrong with each. Collective."""
         numbers = range(len(self.plan))
-        return groups.run(comm, numbers, lambda k, group: self._run_value(k, group, run_id), self.n_groups)
+        return groups.run(comm, numbers, lambda k, group: self._run_value(k, group, run_id), self._apart(comm))
+
+    def _apart(self, comm: MPI.Comm) -> int | None:
+        """Groups of ranks: one where not all of them see the case and the folder. Collective."""
+        places = (self.path, self.folder.parent / RECORD)
+        if all([groups.seen_by_all(comm, place) for place in places]):
+            return self.n_groups
+        self._say(comm, "not all ranks see the files of the first one: the values are run one after the other")
+        return 1
 
     def branches(self, analysis: str, run_id: str) -> list[Branch]:
         """What was found for an analysis, in the order of the values. One rank only."""
