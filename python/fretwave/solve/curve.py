@@ -15,8 +15,7 @@ import numpy as np
 from ..arrays import Array
 from ..errors import InputError
 from ..hb.states import State
-from ..post.largest import ALIKE
-from ..post.mode_curve import AT_THE_END, LEAST_DAMPING
+from ..post.mode_curve import AT_THE_END, NO_DAMPING
 from .hermite import Cubic
 from .table import PLACE, Table
 
@@ -28,6 +27,10 @@ DRAWN = ("amplitude", "frequency_hz", "zeta", "phase")
 PARTS = 8
 #: Of a column's change over a part of a step, what may be left at a crossing: a jump of the phase by 2 pi is none.
 LEFT_OVER = 1e-6
+#: Range below which a column runs straight, of its largest number: rounding bends it, on other ranks otherwise.
+FLAT = 1e-8
+#: Of columns that are shares or angles, as they are.
+FLAT_AT_ALL = {"zeta": NO_DAMPING, "phase": FLAT}
 #: Columns that tell of a point's solution, and nothing of what lies beside it.
 OF_POINTS = ("point", "residual", "newton", "linear", "wall_s", "rounding", "accepted", "unclosed")
 
@@ -153,13 +156,12 @@ class Curve:
 
 
 def _scaled(table: Table, name: str) -> Array:
-    """A column over its range; zeros where it varies by rounding alone, which nobody draws."""
+    """A column over its range, or over one that rounding does not reach."""
     values = np.asarray(table[name], dtype=float)
-    least = LEAST_DAMPING if name == "zeta" else 0.0
     if name == "amplitude" and "zeta" in table and (values > 0).all():
-        values, least = np.log(values), ALIKE
-    span, size = np.ptp(values), float(np.abs(values).max(initial=0.0))
-    return np.asarray(values / span if span > max(least, ALIKE * size) else np.zeros_like(values))
+        values = np.log(values)
+    flat = FLAT_AT_ALL.get(name, FLAT * float(np.abs(values).max(initial=0.0)))
+    return np.asarray(values / (max(float(np.ptp(values)), flat) or 1.0))
 
 
 def _parts_of(step: Array, error: float) -> int:
