@@ -2,9 +2,9 @@
 #include <petscts.h>
 
 #include <complex>
-#include <exception>
 #include <string>
 
+#include "guard.h"
 #include "model/model.h"
 
 /// Direct time integration of the unreduced equations, for verification.
@@ -57,12 +57,15 @@ class Transient {
   static PetscErrorCode after_step(TS);
   History integrate(Vec x0, Vec v0, double tolerance, bool implicit);
   Sizes sizes(Vec state);
+  void set_up(TS, Vec state, double tolerance, bool implicit);
+  void conclude(TS);
   void use_explicit(TS);
   void use_implicit(TS);
   void resolve_sticking(double tolerance, double size, Vec allowed);
   void forces(double t, Vec state);
   void contact_force(model::Contact const&, Tangents&, Vec force);
   void solve_mass(Vec force, Vec acceleration);
+  void prepare_jacobian();
   void assemble(double shift, Mat A);
   void assemble_contact(size_t number, Mat A);
   void record(TS);
@@ -80,7 +83,7 @@ class Transient {
   std::vector<Tangents> tangents_;
   bool stiff_ = false, exhausted_ = false;
   VecHandle x_, v_, force_, acceleration_, interpolated_;
-  std::exception_ptr exception_;
+  Guard guard_;
   History history_;
   double interval_ = 0, end_ = 0, limit_ = 0, most_steps_ = 0;
 };
