@@ -14,7 +14,7 @@ from ..errors import InputError
 from ..model.model import Model
 from ..model.modes import LinearMode
 from ..model.rest import Rest
-from .harmonic_problem import HarmonicProblem
+from .harmonic_problem import HarmonicProblem, check_mode
 from .harmonics import Harmonics
 from .observed import Observed, named, row_of
 from .states import ForcedState
@@ -51,6 +51,7 @@ class ForcedResponse(HarmonicProblem):
         prefix: str = "forced_",
         rest: Rest | None = None,
     ) -> None:
+        check_mode(model, "reference", reference)
         self.dof, self.level, self.reference = dof, level, reference
         P = self._blocks(model, harmonics, force)
         with model.vectors(reference.shape) as (shape,):
@@ -73,6 +74,11 @@ class ForcedResponse(HarmonicProblem):
                     'retain it: retain = "all"',
                 )
             values = np.asarray(P, dtype=complex)
+            if values.shape != (model.n_dof,) or not np.isfinite(values).all():
+                where, fix = f"force, order {order}", "give one number a dof, 0 where no force acts"
+                raise InputError(
+                    "the force does not fit the model", where, values.shape, f"({model.n_dof},), finite", fix
+                )
             column = harmonics.labels.index(f"{order}c" if order else "0")
             blocks[:, column] = values.real
             if order:

@@ -12,9 +12,11 @@ from petsc4py import PETSc
 
 from .. import _core
 from ..arrays import Array, Indices
+from ..errors import InputError
 from ..model.model import Model
+from ..model.modes import LinearMode
 from ..model.rest import Rest
-from ..mpi.destroyable import Destroyable
+from ..mpi.destroyable import Destroyable, Destroyed
 from ..mpi.gather import on_rank_0
 from ..post.contact_history import MOTION
 from ..post.motion import complex_amplitudes
@@ -22,6 +24,14 @@ from .harmonics import Harmonics
 from .observed import Observed
 from .omitted import omitted_residual
 from .states import Estimate, State
+
+
+def check_mode(model: Model, name: str, mode: LinearMode) -> None:
+    """It is one of this model."""
+    if not isinstance(mode, LinearMode) or mode.shape.shape != (model.n_dof,):
+        measured = f"{len(mode.shape)} dofs" if isinstance(mode, LinearMode) else type(mode).__name__
+        expected, fix = f"a LinearMode of {model.n_dof} dofs", "take one of fw.linear_modes(model)"
+        raise InputError("this is no linear mode of the model", name, measured, expected, fix)
 
 
 class HarmonicProblem(Destroyable):
@@ -262,4 +272,4 @@ class HarmonicProblem(Destroyable):
     def destroy(self) -> None:
         """Free the solver's vectors. Collective."""
         self._error = None
-        self.core = None  # type: ignore[assignment]
+        self.core = Destroyed("the problem")  # type: ignore[assignment]

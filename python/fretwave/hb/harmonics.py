@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Sequence
+from typing import SupportsIndex
 
 from .. import _core
 from ..errors import InputError
@@ -46,6 +48,10 @@ class Harmonics:
         return f"Harmonics({orders}; {self.samples} samples)"
 
 
+#: More than any model has samples for.
+MOST_HARMONICS = 1_000_000
+
+
 def choose_harmonics(model: Model, highest: int, samples: int | None = None, retain: str = "auto") -> Harmonics:
     """Retained set up to `highest`: only what the model needs, unless told otherwise.
 
@@ -55,8 +61,12 @@ def choose_harmonics(model: Model, highest: int, samples: int | None = None, ret
     retain : {"auto", "odd", "all"}
         auto keeps odd harmonics only when every law is odd and nothing preloads the contact.
     """
+    highest, samples = _whole("highest", highest), None if samples is None else _whole("samples", samples)
     if highest < 1:
         raise InputError("the highest harmonic is below 1", None, highest, ">= 1", "give H = 1 or more")
+    if highest > MOST_HARMONICS:
+        most = f"at most {MOST_HARMONICS}"
+        raise InputError("the highest harmonic is beyond all memory", None, highest, most, "give a lower one")
     if retain not in ("auto", "odd", "all"):
         raise InputError("unknown choice of harmonics", None, retain, "auto, odd or all", 'use retain="auto"')
     odd = retain == "odd" or (retain == "auto" and model.odd)
@@ -64,3 +74,11 @@ def choose_harmonics(model: Model, highest: int, samples: int | None = None, ret
     if odd:
         harmonics.left_out.append("even harmonics and the mean (the contact laws are odd, there is no preload)")
     return harmonics
+
+
+def _whole(name: str, value: SupportsIndex) -> int:
+    try:
+        return operator.index(value)
+    except TypeError:
+        fix = "give one number, as in choose_harmonics(model, 7, samples=128)"
+        raise InputError("harmonics and samples are whole numbers", name, repr(value), "an int", fix) from None

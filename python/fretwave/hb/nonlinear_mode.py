@@ -12,7 +12,7 @@ from ..errors import InputError
 from ..model.model import Model
 from ..model.modes import LinearMode
 from ..model.rest import Rest
-from .harmonic_problem import HarmonicProblem
+from .harmonic_problem import HarmonicProblem, check_mode
 from .harmonics import Harmonics
 from .observed import Observed, named, row_of
 from .states import ModalState
@@ -60,6 +60,7 @@ class NonlinearMode(HarmonicProblem):
             from ..model.modes import linear_modes
 
             start = linear_modes(model, 1)[0]
+        check_mode(model, "start", start)
         self.method, self.dof, self.start = method, dof, start
         self.row = row_of(model, dof)
         known = model.core, harmonics.core, getattr(_core.Method, method), self.row, start.omega

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Sequence
-from typing import Union, cast
+from typing import SupportsIndex, Union, cast
 
 import numpy as np
 
@@ -32,12 +32,26 @@ def row_of(model: Model, observed: Observed) -> list[tuple[int, float]]:
             raise InputError("a complex mode has no one coordinate", None, repr(observed), "a standing wave", fix)
         return row_of(model, model.inertia(observed.shape))
     if np.ndim(observed) == 0:
-        return [(operator.index(cast(int, observed)), 1.0)]
-    row = np.asarray(observed, dtype=float)
+        return [(_dof(model, cast(int, observed)), 1.0)]
+    row = np.asarray(observed)
+    if row.dtype.kind not in "biuf":
+        raise InputError("a row of displacements is real", None, f"entries of type {row.dtype}", "weights", "give one")
+    row = row.astype(float)
     if row.shape != (model.n_dof,) or not np.isfinite(row).all():
         fix = "give one weight a dof"
         raise InputError("the row does not fit the model", None, row.shape, f"({model.n_dof},), finite", fix)
     return [(int(k), float(row[k])) for k in np.flatnonzero(row)]
+
+
+def _dof(model: Model, given: SupportsIndex) -> int:
+    try:
+        dof = operator.index(given)
+    except TypeError:
+        dof = -1
+    if not 0 <= dof < model.n_dof:
+        measured, expected = repr(given), f"0 to {model.n_dof - 1}"
+        raise InputError("the chosen dof does not exist", None, measured, expected, "choose a dof of the model")
+    return dof
 
 
 def unit_of(observed: Observed) -> str:

@@ -16,7 +16,7 @@ from .. import _core
 from ..arrays import Array
 from ..errors import InputError
 from ..mpi import guard as parallel
-from ..mpi.destroyable import Destroyable
+from ..mpi.destroyable import Destroyable, destroyed
 from ..mpi.gather import on_all_ranks
 from ..units import SI, UnitSystem, unit_system
 from .checks import check_entries
@@ -90,8 +90,8 @@ class Model(Destroyable):
         if comm is None:
             comm = first.getComm().tompi4py() if isinstance(first, PETSc.Mat) else MPI.COMM_WORLD
         self.comm, self.sectors, self.nodal_diameter, self._unit = comm, sectors, nodal_diameter, unit
-        self._matrices = [self._matrix(matrix, "KCM"[order]) for matrix, order, _ in terms]
-        self._terms = [(A, order, k) for A, (_, order, k) in zip(self._matrices, terms)]
+        self._own: list[PETSc.Mat] = [self._matrix(matrix, "KCM"[order]) for matrix, order, _ in terms]
+        self._places = [(order, k) for _, order, k in terms]
         self.contacts = contact_list(contacts)
         self.n_dof: int = self._matrices[0].getSize()[1]
         self._pairs: list[npt.NDArray[np.intp]] = []
@@ -100,9 +100,26 @@ class Model(Destroyable):
         self.at_rest: Rest | None = None
         groups = [self._group(contact) for contact in self.contacts]
         theta = 2 * np.pi * nodal_diameter / sectors
-        self.core = _core.Model(
+        self._core: _core.Model | None = _core.Model(
             [(A, *term[1:]) for A, term in zip(self._matrices, terms)], groups, theta, unit if unit > 1 else 0
         )
+
+    @property
+    def core(self) -> _core.Model:
+        """The compiled model."""
+        if self._core is None:
+            raise destroyed("the model")
+        return self._core
+
+    @property
+    def _matrices(self) -> list[PETSc.Mat]:
+        if not self._own:  # PETSc would end the process
+            raise destroyed("the model")
+        return self._own
+
+    @property
+    def _terms(self) -> list[tuple[PETSc.Mat, int, int]]:
+        return [(A, order, k) for A, (order, k) in zip(self._matrices, self._places)]
 
     def _matrix(self, A: Given, letter: str) -> PETSc.Mat:
         if isinstance(A, PETSc.Mat):
@@ -318,6 +335,7 @@ class Model(Destroyable):
 
     def destroy(self) -> None:
         """Free the matrices. Collective."""
-        self.core = None  # type: ignore[assignment]
-        for mat in self._matrices:
+        self._core = None
+        for mat in self._own:
             mat.destroy()
+        self._own = []

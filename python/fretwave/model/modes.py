@@ -81,6 +81,8 @@ def linear_modes(model: Model, count: int = 6, contact: str = "stuck", near: flo
     if near is not None and (contact == "linearised" or not near > 0):
         given, fix = f"near={near}, contact={contact}", "give a frequency above 0, and stuck or free contact"
         raise InputError("modes near a frequency are those without damping", None, given, "near > 0 [rad/s]", fix)
+    if not isinstance(count, (int, np.integer)) or count < 1:
+        raise InputError("modes are asked for by their number", "count", repr(count), ">= 1", "give count=1 or more")
     _check_factor(model)
     try:
         found = _core.linear_modes(model.core, count, getattr(_core.ContactState, contact), near)

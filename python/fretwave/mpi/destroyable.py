@@ -2,9 +2,26 @@
 
 from __future__ import annotations
 
-from typing import TypeVar
+from typing import NoReturn, TypeVar
+
+from ..errors import InputError
 
 Own = TypeVar("Own", bound="Destroyable")
+
+
+def destroyed(what: str) -> InputError:
+    """Something is asked of what was freed."""
+    return InputError(f"{what} has been destroyed", fix="do this before its destroy(), or within its `with` block")
+
+
+class Destroyed:
+    """Stands in place of what was freed: whoever asks it for anything is told."""
+
+    def __init__(self, what: str) -> None:
+        self._what = what
+
+    def __getattr__(self, name: str) -> NoReturn:
+        raise AttributeError(name) if name.startswith("_") else destroyed(self._what)
 
 
 class Destroyable:

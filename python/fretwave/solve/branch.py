@@ -17,6 +17,7 @@ from ..arrays import Array
 from ..columns import Column
 from ..errors import FretwaveError, InputError
 from ..hb.states import State
+from ..mpi.destroyable import Destroyed
 from .curve import PARTS, Curve
 from .hermite import Cubic
 from .table import Table
@@ -225,7 +226,7 @@ class Branch(Table):
         if self._unknowns is None:
             fix = "follow it with unknowns=True (the default) in this script"
             raise InputError("the branch has no unknowns", None, "its table and its curve alone", None, fix)
-        if self._unknowns.problem.core is None:
+        if isinstance(self._unknowns.problem.core, Destroyed):
             raise InputError("the branch's problem has been destroyed", fix="read the branch before problem.destroy()")
         return self._unknowns
 

@@ -94,6 +94,9 @@ def follow(
     if problem.meaning is None:
         given, fix = type(problem).__name__, "follow it with fw.Continuation"
         raise InputError("the problem has no branch with a table", None, given, "NonlinearMode or ForcedResponse", fix)
+    if accuracy is not None and not 0 < accuracy < 1:
+        fix = "give for example accuracy=1e-3"
+        raise InputError("accuracy is a share of what is computed", None, accuracy, "above 0, below 1", fix)
     own = isinstance(start, PETSc.Vec)
     y0: PETSc.Vec = start if own else problem.initial(float(start))
     first = problem.parameter(y0) if own else float(start)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..arrays import Array
+from ..errors import InputError
 from .hermite import between, derivatives, piece, slopes
 
 if TYPE_CHECKING:
@@ -72,6 +73,9 @@ class Unknowns:
 
     def vector(self, place: float) -> PETSc.Vec:
         """Unknowns at a place. Collective."""
+        if not 0 <= place <= len(self.y) - 1:
+            expected, fix = f"0 to {len(self.y) - 1}", "take a row's number, or a place that `at` gives"
+            raise InputError("the branch has no such place", None, place, expected, fix)
         i, x = piece(place, len(self.y))
         values = self.y[i]
         if x > 0:

@@ -1,0 +1,122 @@
+"""What a script gives that does not fit, or uses after its end: one sentence; no other numbers, and no crash."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fretwave as fw
+
+pytestmark = pytest.mark.ranks(1, 2)
+
+M = np.diag([1.0, 0.02])
+K = np.array([[640.0, -40.0], [-40.0, 40.0]])
+FEW = fw.StepControl(max_points=4)
+
+
+def model_of() -> fw.Model:
+    slider = fw.Contact("jenkins", [[0.0, 1.0]], {"tangential_stiffness": 40.0, "friction_limit": 1.0})
+    return fw.Model(M, K, contacts=[slider])
+
+
+@pytest.fixture
+def mode() -> fw.NonlinearMode:
+    model = model_of()
+    return fw.NonlinearMode(model, fw.choose_harmonics(model, 3))
+
+
+@pytest.fixture
+def other() -> fw.LinearMode:
+    """Of a model of three dofs."""
+    return fw.linear_modes(fw.Model(np.eye(3), np.diag([1.0, 2.0, 3.0])), 1)[0]
+
+
+@pytest.mark.parametrize("force", [[1.0], [[1.0, 0.0]], [1.0, 0.0, 0.0], 1.0, [np.nan, 0.0], [1.0, np.inf]], ids=str)
+def test_a_force_has_a_number_for_every_dof(force: Any, mode: fw.NonlinearMode) -> None:
+    """[1.0] stood for 1 N on every dof."""
+    with pytest.raises(fw.InputError, match=r"force does not fit the model[\s\S]*order 1[\s\S]*\(2,\), finite"):
+        fw.ForcedResponse(mode.model, mode.harmonics, {1: force}, 1.0, 0, mode.start)
+
+
+@pytest.mark.parametrize("dof", [2, -1, 7, 1.0, "tip", None, [1j, 0.0], np.array([1j, 0.0])], ids=str)
+def test_what_is_observed_is_of_the_model(dof: Any, mode: fw.NonlinearMode) -> None:
+    """A column of a dof that is not there was zero."""
+    said = "does not exist|is real"
+    if not isinstance(dof, str):
+        with pytest.raises(fw.InputError, match=said):
+            fw.follow(mode, 0.01, 0.1, observe={"x": dof}, steps=FEW)
+    with pytest.raises(fw.InputError, match=said):
+        fw.NonlinearMode(mode.model, mode.harmonics, dof=dof)
+
+
+def test_a_mode_of_another_model_begins_nothing(mode: fw.NonlinearMode, other: fw.LinearMode) -> None:
+    for given, said in ((other, "3 dofs"), (3, "int")):
+        with pytest.raises(fw.InputError, match=said):
+            fw.NonlinearMode(mode.model, mode.harmonics, start=given)  # type: ignore[arg-type]
+        with pytest.raises(fw.InputError, match=said):
+            fw.ForcedResponse(mode.model, mode.harmonics, {1: [1.0, 0.0]}, 1.0, 0, given)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("accuracy", [0, 0.0, -1e-3, 1.0, 2.0, float("nan")])
+def test_accuracy_is_a_share(accuracy: float, mode: fw.NonlinearMode) -> None:
+    with pytest.raises(fw.InputError, match="accuracy is a share"):
+        fw.follow(mode, 0.01, 0.1, accuracy=accuracy)
+
+
+@pytest.mark.parametrize("kind", [np.int64, np.int32, np.uint8, np.array])
+def test_numbers_of_numpy_are_numbers(kind: Any, mode: fw.NonlinearMode) -> None:
+    chosen = fw.choose_harmonics(mode.model, kind(3), samples=kind(64))
+    assert (chosen.orders, chosen.samples) == ((1, 3), 64) and repr(chosen) == "Harmonics(1, 3; 64 samples)"
+    assert len(fw.linear_modes(mode.model, np.int64(1))) == 1
+
+
+@pytest.mark.parametrize("highest", [1.5, "3", None, [1, 3], 10**10, 0], ids=str)
+def test_the_highest_harmonic_is_one_number(highest: Any, mode: fw.NonlinearMode) -> None:
+    """10^10 filled the memory."""
+    with pytest.raises(fw.InputError, match="harmonic"):
+        fw.choose_harmonics(mode.model, highest)
+
+
+@pytest.mark.parametrize("count", [0, -1, 1.5, None, "2"], ids=str)
+def test_the_number_of_modes_is_one(count: Any, mode: fw.NonlinearMode) -> None:
+    with pytest.raises(fw.InputError, match="by their number"):
+        fw.linear_modes(mode.model, count)
+
+
+def test_a_branch_has_no_places_beyond_its_ends(mode: fw.NonlinearMode) -> None:
+    """They were those of its ends."""
+    branch = fw.follow(mode, 0.01, 0.1, steps=FEW)
+    last = len(branch) - 1
+    branch.unknowns(last).destroy()
+    for place in (-1, last + 0.5, last + 1, float("nan")):
+        with pytest.raises(fw.InputError, match="no such place"):
+            branch.unknowns(place)
+
+
+def test_what_was_destroyed_says_so(mode: fw.NonlinearMode) -> None:
+    """PETSc ended the process."""
+    model, branch = mode.model, fw.follow(mode, 0.01, 0.1, steps=FEW)
+    y = branch.unknowns(0)
+    model.destroy()
+    model.destroy()
+    for asked in (
+        lambda: fw.linear_modes(model, 1),
+        lambda: fw.follow(mode, 0.01, 0.1),
+        lambda: fw.choose_harmonics(model, 3),
+        lambda: fw.NonlinearMode(model, mode.harmonics, start=mode.start),
+        lambda: fw.static_preload(model, np.zeros(2)),
+        lambda: fw.Transient(model),
+        lambda: model.inertia(np.ones(2)),
+        lambda: model.entries,
+    ):
+        with pytest.raises(fw.InputError, match="the model has been destroyed"):
+            asked()
+    mode.destroy()
+    mode.destroy()
+    for ask in (lambda: mode.residual(y), lambda: mode.jacobian(y), lambda: branch.coefficients(0)):
+        with pytest.raises(fw.InputError, match="problem has been destroyed"):
+            ask()
+    assert "NonlinearMode" in repr(mode) and "2 dofs" in repr(model) and len(branch["zeta"]) == len(branch)
+    y.destroy()
