@@ -79,6 +79,28 @@ def test_the_highest_harmonic_is_one_number(highest: Any, mode: fw.NonlinearMode
         fw.choose_harmonics(mode.model, highest)
 
 
+@pytest.mark.parametrize("samples", [10**20, 2**31, 2.5, "64", 7], ids=str)
+def test_the_number_of_samples_is_one(samples: Any, mode: fw.NonlinearMode) -> None:
+    with pytest.raises(fw.InputError, match="samples"):
+        fw.choose_harmonics(mode.model, 3, samples=samples)
+
+
+class Lossy(fw.PythonLaw):
+    """A loss factor in a force of the displacement."""
+
+    stuck_stiffness = 1.0
+
+    def force(self, u: Any, v: Any) -> Any:
+        return (1 + 0.1j) * u
+
+
+def test_a_complex_force_of_a_law_is_refused() -> None:
+    """Its real part alone acted, without damping."""
+    model = fw.Model(M, K, contacts=[fw.Contact(Lossy(), [[0.0, 1.0]])])
+    with pytest.raises(fw.InputError, match="returned complex values"):
+        fw.follow(fw.NonlinearMode(model, fw.choose_harmonics(model, 1)), 0.01, 0.1, steps=FEW)
+
+
 @pytest.mark.parametrize("count", [0, -1, 1.5, None, "2"], ids=str)
 def test_the_number_of_modes_is_one(count: Any, mode: fw.NonlinearMode) -> None:
     with pytest.raises(fw.InputError, match="by their number"):

@@ -48,8 +48,8 @@ class Harmonics:
         return f"Harmonics({orders}; {self.samples} samples)"
 
 
-#: More than any model has samples for.
-MOST_HARMONICS = 1_000_000
+#: More than any model has samples for, and more samples than the core counts.
+MOST_HARMONICS, MOST_SAMPLES = 1_000_000, 2**31 - 1
 
 
 def choose_harmonics(model: Model, highest: int, samples: int | None = None, retain: str = "auto") -> Harmonics:
@@ -67,6 +67,9 @@ def choose_harmonics(model: Model, highest: int, samples: int | None = None, ret
     if highest > MOST_HARMONICS:
         most = f"at most {MOST_HARMONICS}"
         raise InputError("the highest harmonic is beyond all memory", None, highest, most, "give a lower one")
+    if samples is not None and samples > MOST_SAMPLES:
+        most = f"at most {MOST_SAMPLES}"
+        raise InputError("samples of a period are beyond all memory", None, samples, most, "give fewer")
     if retain not in ("auto", "odd", "all"):
         raise InputError("unknown choice of harmonics", None, retain, "auto, odd or all", 'use retain="auto"')
     odd = retain == "odd" or (retain == "auto" and model.odd)

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..arrays import Array
+from ..errors import InputError
 from .law_info import OPEN, SLIP, LawInfo, Limit, ParameterInfo
 
 
@@ -112,6 +113,9 @@ class PythonLaw:
 
 
 def _contiguous(values: npt.ArrayLike) -> Array:
+    if np.iscomplexobj(values):  # NumPy would keep the real part
+        what, fix = "a law in Python returned complex values", "return real forces; damping is a force of v"
+        raise InputError(what, None, "complex", "real arrays of the shape of u", fix)
     return np.ascontiguousarray(values, dtype=float)
 
 
