@@ -13,8 +13,10 @@ import tempfile
 from pathlib import Path
 from random import Random
 
+import scipy.sparse as sp
+
 sys.path.insert(0, str(Path(__file__).parent))
-from bases import prepare, two_dof  # noqa: E402
+from bases import SHORT, prepare, two_dof  # noqa: E402
 from campaign import campaign, options  # noqa: E402
 from commands import Ended, Worker  # noqa: E402
 from mutations import as_toml  # noqa: E402
@@ -30,6 +32,9 @@ FILES = (
     "binary.toml",
     "run",
     "run/results.h5",
+    "meshed",
+    "mass.npz",
+    "stiffness.npz",
     "locked",
     "",
     "-",
@@ -71,29 +76,36 @@ OPTIONS = (
     "-snes_monitor",
 )
 OUTS = ("out", "locked/out", "case.toml", "case.toml/out", "/proc/out", "/dev/null", "x" * 300, "a\nb", ".", "")
-CASE = {"--set": KEYS, "--only": NAMES, "--quick": None, "--keys": None, "--nonsense": NAMES, "-n": NUMBERS, "-h": None}
-RUN = {**CASE, "--out": OUTS, "--no-plots": None, "--petsc": OPTIONS}
+CASE = {"--set": KEYS, "--only": NAMES, "--quick": None, "--nonsense": NAMES, "-n": NUMBERS, "-h": None}
+LOUD = {"-q": None, "-v": None, "--quiet": None, "--verbose": None}
+RUN = {**CASE, **LOUD, "--out": OUTS, "--no-plots": None, "--force": None, "--petsc": OPTIONS}
+LISTS = ("1", "1,3", "0", "-1,2", "", ",", "x", "3,3", "1e-3,1e-2", "nan", "99999999999999999999", "1:3")
+VECTORS = ("1,0,0", "0,0,0", "x", "1,2", "", "nan,0,0", "1e300,1e300,0")
 #: Sub-commands with what they take: first words, and flags with their values (None: without).
 COMMANDS: dict[str, tuple[tuple[str, ...], dict[str, tuple[str, ...] | None]]] = {
-    "check": (FILES, CASE),
+    "init": (("new", "folder", "case.toml", "locked", "", ".", "x" * 300, "/proc/x"), {"-h": None, "--nonsense": None}),
+    "check": (FILES, {**CASE, "--keys": None, "--schema": None, "--no-solve": None}),
     "run": (FILES, RUN),
     "sweep": (FILES, {**RUN, "--over": SWEPT, "--groups": NUMBERS}),
-    "resume": (FILES, {"--no-plots": None, "--quick": None}),
+    "resume": (FILES, {**LOUD, "--no-plots": None, "--quick": None}),
     "show": (FILES, {"--all": None, "--json": None}),
-    "plot": (FILES, {"--only": NAMES}),
+    "plot": (FILES, {"--only": NAMES, "--format": ("png", "svg", "pdf,png", "x", "", ",", "png,png")}),
     "report": (FILES, {"--out": OUTS}),
     "probe": (
         FILES,
         {
             **{"--pairs": None, "--node": NUMBERS, "--dof": NAMES, "--analysis": NAMES, "--csv": None, "--out": OUTS},
             **{"--at": ("peak", "start", "pea", "1e9", "0.02", "row", "row 3", "nan", ""), "--steps": NUMBERS},
+            "--sector": NUMBERS,
         },
     ),
+    "stress": (FILES, {"--analysis": NAMES, "--out": OUTS}),
     "view": (
         FILES,
         {
             **{"--analysis": NAMES, "--point": NUMBERS, "--amplitude": NUMBERS, "--sectors": NUMBERS, "--linear": None},
             **{"--phases": NUMBERS, "--scale": NUMBERS, "--out": OUTS},
+            **{"--pvd": None, "--png": None, "--gif": None, "--eye": NUMBERS},
         },
     ),
     "import": (
@@ -109,14 +121,30 @@ COMMANDS: dict[str, tuple[tuple[str, ...], dict[str, tuple[str, ...] | None]]] =
             **{
                 "--coordinates": FILES,
                 "--pairs": NAMES,
-                "--normal": ("1,0,0", "0,0,0", "x", "1,2"),
+                "--normal": VECTORS,
                 "--modes": NUMBERS,
             },
-            **{"--tolerance": NUMBERS, "--name": ("tip=0", "tip", "=", "tip=x"), "--tangent": ("1,0,0", "", "nan,0,0")},
+            **{"--tolerance": NUMBERS, "--name": ("tip=0", "tip", "=", "tip=x"), "--tangent": VECTORS},
+            **{"--plugin": FILES, "--at-rest": FILES, "--sectors": NUMBERS, "--low": NAMES, "--high": NAMES},
+            **{"--axis": ("x", "z", "w", ""), "--origin": VECTORS, "--units": ("mm-t-s", "mm", "")},
         },
     ),
-    "study": (FILES, {**CASE, "--out": OUTS, "--of": NAMES, "--sweep": NAMES}),
-    "doctor": (("", "--json", "x", "--help"), {"--nonsense": None, "-h": None}),
+    "study": (
+        FILES,
+        {
+            **{
+                "--analysis": NAMES,
+                "--set": KEYS,
+                "--quick": None,
+                "--out": OUTS,
+                "--force": None,
+                "--nonsense": NAMES,
+            },
+            **{"--harmonics": LISTS, "--samples": LISTS, "--tolerance": LISTS, "--accuracy": LISTS, **LOUD},
+            **{"--component-modes": LISTS, "--pressure-change": LISTS, "--places": NUMBERS, "--repeats": NUMBERS},
+        },
+    ),
+    "doctor": (("", "--json", "x", "--help"), {"--nonsense": None, "--constants": None, "-h": None}),
     "nonsense": (FILES, {}),
     "": (("", "--version", "--help", "-h", "-n"), {}),
 }
@@ -137,8 +165,10 @@ def command(seed: int, number: int) -> list[str]:
         if values is not None and random.random() < 0.95:
             value = random.choice(values)
             line[-1:] = [f"{flag}={value}"] if random.random() < 0.3 else [flag, value]
-    if name in ("resume", "show", "plot", "report", "probe", "view") and random.random() < 0.5:
-        line[1:2] = ["run"]
+    if name in ("resume", "show", "plot", "report", "probe", "stress", "view") and random.random() < 0.5:
+        line[1:2] = [random.choice(("run", "meshed"))]
+    if name == "import" and random.random() < 0.5:
+        line[1:1] = ["--mass", "mass.npz", "--stiffness", "stiffness.npz"]
     if name == "run" and "--only" not in line and random.random() < 0.8:
         line += ["--only", "mode"]
     return line
@@ -154,6 +184,12 @@ def prepared(folder: Path, worker: Worker) -> None:
     (folder / "locked").mkdir(mode=0o500)
     ended = worker.run(["run", "case.toml", "--only", "mode,free_decay", "--out", "run"], folder, LIMIT)
     assert ended.outcome == "done", ended.text
+    (folder / "solid" / "case.toml").write_text(as_toml(SHORT["solid"]()), encoding="utf-8")
+    meshed = ["run", "case.toml", "--only", "mode", "--set", "mode.amplitude=[1e-6, 1.1e-6]", "--out", "../meshed"]
+    ended = worker.run(meshed, folder / "solid", LIMIT)
+    assert ended.outcome == "done", ended.text
+    for name, entries in (("mass", [1.0, 2.0, 3.0]), ("stiffness", [10.0, 20.0, 30.0])):
+        sp.save_npz(folder / f"{name}.npz", sp.diags(entries, format="csr"))
 
 
 def main() -> int:
