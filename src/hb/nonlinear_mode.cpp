@@ -11,6 +11,8 @@ namespace fretwave::hb {
 
 namespace {
 
+constexpr double no_damping = 1e-10;  // a ratio that is rounding (as in post/mode_curve.py)
+
 /// phi^H M phi w^2 / phi^H phi, with multiply(x, M x).
 template <class Multiply>
 double inertia_per_displacement(Multiply multiply, double omega, Vec shape, Vec imaginary) {
@@ -164,8 +166,9 @@ std::string NonlinearMode::impossible(Vec y) {
 std::vector<solve::TestFunction> NonlinearMode::tests(Vec y, Vec tangent) {
   const auto z = scalars(y), dz = scalars(tangent);
   // zeta = beta/w0 grows with beta/w in both variants: its change along the branch has the sign of w dbeta -
-  // beta dw
-  return {{"zero_damping", z[0]}, {"peak_damping", z[1] * dz[0] - z[0] * dz[1], true, true}};
+  // beta dw; a damping that is rounding has none
+  const bool damped = std::abs(z[0]) > no_damping * std::abs(z[1]);
+  return {{"zero_damping", z[0]}, {"peak_damping", damped ? z[1] * dz[0] - z[0] * dz[1] : 0, true, true}};
 }
 
 ModeStart::ModeStart(model::Model const& model, Harmonics const& h, Method method, Row row, double omega,

@@ -11,6 +11,7 @@ from models.core_models import (
     everywhere,
     friction,
     mode_problem,
+    options,
     oscillator,
     single_dof,
     solve_at,
@@ -53,6 +54,21 @@ def test_paper_s_branch_is_most_damped_between_0_15_and_0_2(two_dof, comm, metho
     peaks = at_event(points, "peak_damping")
     assert len(peaks) == 1 and 0.15 < peaks[0]["amplitude"] < 0.2
     assert peaks[0]["zeta"] >= max(state["zeta"] for state, _ in points)
+
+
+@pytest.mark.ranks(1)
+def test_damping_that_is_rounding_has_no_peak(comm):
+    """A stop on four masses without damping, as a large problem, whose tangents have few digits: zeta is 1e-14."""
+    M = np.diag([0.17, 0.96, 0.22, 0.68])
+    K = [[28.4, 34.4, 1.73, -24.2], [34.4, 96.5, 8.16, -36.5], [1.73, 8.16, 2.35, -1.05], [-24.2, -36.5, -1.05, 25.3]]
+    stop = fw.Contact("unilateral_spring", np.eye(4)[3:], {"normal_stiffness": 1.03, "gap": 1.0})
+    model = fw.Model(M, np.array(K), contacts=[stop], comm=comm)
+    start = fw.linear_modes(model, 1, contact="free")[0]
+    with options(fw_linear_large=1, fw_linear_krylov_limit=1):
+        problem = fw.NonlinearMode(model, fw.Harmonics(range(6), 128), "EPMC", 2, start)
+        branch = fw.follow(problem, 1.0, 18.0, steps=fw.StepControl(maximum=0.08))
+    assert np.abs(branch["zeta"]).max() < ROUNDING
+    assert [event.name for event in branch.events] == ["start", "fold", "stop"]
 
 
 @pytest.mark.ranks(1)
