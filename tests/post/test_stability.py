@@ -89,3 +89,14 @@ def test_words_name_other_modes_by_the_state_of_the_contact():
     assert stability(loose) == f"{said} (contact free)".replace("but", "though")
     assert stability({"stable": True, "not_looked_at": "why"}).endswith(", other modes not looked at (why)")
     assert stability({"stable": False}) == "unstable (damping falls)"
+
+
+@pytest.mark.parametrize("unit", [1.0, 2.0**-13, 1e3])
+def test_states_of_the_contact_share_their_words_in_any_unit_of_time(unit):
+    """196.34 and 196.28 Hz are 196.3 Hz both, and in another unit 0.02397 and 0.02396."""
+    stuck = {"mode": 1, "contact": "stuck", "frequency_hz": 196.34 * unit, "zeta": -0.131}
+    free = {**stuck, "contact": "contact free", "frequency_hz": 196.28 * unit}
+    said = stability({"stable": True, "fed": [stuck, free]})
+    assert said.count("gains energy") == 1 and said.endswith("(stuck; contact free)")
+    other = stability({"stable": True, "fed": [stuck, {**free, "frequency_hz": 197.0 * unit}]})
+    assert other.count("gains energy") == 2

@@ -16,6 +16,8 @@ from .mode_curve import NO_DAMPING, forward
 STUCK = "stuck"
 #: Of a limit cycle, by what is known of it.
 SHORT = {True: "stable in its own amplitude", False: "unstable", None: "stability unknown"}
+#: Of another mode's values, about half of the last digit that they are told with.
+TOLD = {"frequency_hz": 5e-4, "zeta": 5e-3}
 
 
 def limit_cycles(table: Mapping[str, Any]) -> list[dict[str, Any]]:
@@ -82,16 +84,28 @@ def others(fed: Sequence[Mapping[str, Any]], not_looked_at: str = "") -> str:
     """
     if not_looked_at:
         return f", other modes not looked at ({not_looked_at})"
-    states: dict[str, list[str]] = {}
+    states: list[tuple[Mapping[str, Any], list[str]]] = []
     for contact in dict.fromkeys(mode["contact"] for mode in fed):
         own = sorted((mode for mode in fed if mode["contact"] == contact), key=lambda mode: mode["zeta"])
         first, more = own[0], len(own) - 1
-        text = f"{_which(first)}, {first['frequency_hz']:.4g} Hz, gains energy by itself:"
-        text += f" zeta {100 * first['zeta']:.3g} %"
         also = f", as {'does' if more == 1 else 'do'} {counted(more, 'other')}" if more else ""
-        states.setdefault(text, []).append(contact + also)
+        known = next((where for other, where in states if _alike(first, other)), None)
+        if known is None:
+            states.append((first, known := []))
+        known.append(contact + also)
     word = "but" if any(mode["contact"] == STUCK for mode in fed) else "though"
-    return "".join(f", {word} {text} ({'; '.join(where)})" for text, where in states.items())
+    return "".join(f", {word} {_gains(mode)} ({'; '.join(where)})" for mode, where in states)
+
+
+def _alike(mode: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
+    """One mode in two states of the contact: what is told of both differs by about its last digit, in any unit."""
+    near = (abs(mode[key] - other[key]) < share * abs(other[key]) for key, share in TOLD.items())
+    return _which(mode) == _which(other) and all(near)
+
+
+def _gains(mode: Mapping[str, Any]) -> str:
+    text = f"{_which(mode)}, {mode['frequency_hz']:.4g} Hz, gains energy by itself:"
+    return f"{text} zeta {100 * mode['zeta']:.3g} %"
 
 
 def _which(mode: Mapping[str, Any]) -> str:
