@@ -158,3 +158,13 @@ sys.exit(guarded(main))
     done = launch(4, "-c", program, timeout=30)
     assert done.returncode == (3 if kind == "NotConverged" else 1)
     assert "boom" in done.stderr
+
+
+def test_what_the_first_rank_writes_late_is_seen_by_all(shared_tmp: Path, comm: MPI.Comm) -> None:
+    """Ranks that look for a file before it is there would take one disk for several, and march one after the other."""
+    file = shared_tmp / "late"
+    if comm.rank == 0:
+        time.sleep(0.3)
+        file.write_text("there")
+    assert groups.seen_by_all(comm, file)
+    assert groups.seen_by_all(comm, shared_tmp / "nowhere")

@@ -139,8 +139,8 @@ class WearAnalysis(AnalysisSection):
         if starts is None:
             starts = unworn_starts(context.of(settings), self)
             context.before_first()
-            if context.comm.rank == 0:
-                kept.save(0, {**starts, **context.arrays})
+            found = {**starts, **context.arrays}
+            on_first_rank(context.comm, lambda: kept.save(0, found))
         elif "rest_displacement" in starts:  # of a run that is gone on with
             context.arrays["rest_displacement"] = starts["rest_displacement"]
         lines = [

@@ -138,9 +138,8 @@ def seen_by_all(comm: MPI.Comm, path: Path) -> bool:
     Where not, groups that read there or write beside it would work on other files: there is to be one group then, of
     which the first rank alone does so.
     """
-    mine = _size_and_age(path)
-    first = comm.bcast(mine)
-    return all(comm.allgather(mine == first))
+    first = comm.bcast(_size_and_age(path) if comm.rank == 0 else None)  # the others look when it has written
+    return all(comm.allgather(_size_and_age(path) == first))
 
 
 def _size_and_age(path: Path) -> tuple[int, int] | None:
