@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import stat
+import subprocess
+import sys
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -11,7 +13,8 @@ from pathlib import Path
 import pytest
 
 from fretwave.errors import InputError
-from fretwave.files.whole import is_stream, replace_text, replaced
+from fretwave.files.streams import is_stream
+from fretwave.files.whole import replace_text, replaced
 from fretwave.view.vtkhdf import GridFile
 
 pytestmark = pytest.mark.ranks(1)
@@ -44,15 +47,30 @@ def test_devices_and_pipes_are_told_from_files(tmp_path: Path) -> None:
 @pytest.mark.parametrize("own", [False, True])
 def test_a_link_stays_one(tmp_path: Path, own: bool) -> None:
     """The file behind it, on another disk perhaps, is replaced; nothing is left beside either."""
-    disk, link = tmp_path / "disk", tmp_path / "link.csv"
+    disk, link = tmp_path / "disk", tmp_path / "link.png"
     disk.mkdir()
-    (disk / "table.csv").write_text("old")
-    link.symlink_to(disk / "table.csv")
-    with replaced(link, own=own) as fresh:
+    (disk / "3fa9c1").write_text("old")
+    link.symlink_to(disk / "3fa9c1")
+    with replaced(link, own=own, keep_suffix=own) as fresh:
         fresh.write_text("new")
-        assert fresh.parent == disk
-    assert link.is_symlink() and (disk / "table.csv").read_text() == "new" == link.read_text()
-    assert sorted(tmp_path.rglob("*")) == sorted([disk, link, disk / "table.csv"])
+        assert fresh.parent == disk and (fresh.suffix == ".png") == own
+    assert link.is_symlink() and (disk / "3fa9c1").read_text() == "new" == link.read_text()
+    assert sorted(tmp_path.rglob("*")) == sorted([disk, link, disk / "3fa9c1"])
+
+
+WRITER = "from pathlib import Path; from fretwave.files.whole import replace_text as r; r(Path({}), 'told\\n')"
+
+
+@pytest.mark.parametrize("place", ["/dev/stdout", "/dev/fd/1", "/proc/self/fd/1"])
+def test_what_a_shell_has_opened_keeps_what_it_had(tmp_path: Path, place: str) -> None:
+    """`(echo first; fretwave report --out /dev/stdout; echo last) >> log`"""
+    log = tmp_path / "log"
+    log.write_text("before\n")
+    code = WRITER.format(repr(place))
+    subprocess.run(
+        ["sh", "-c", f"(echo first; '{sys.executable}' -c \"{code}\"; echo last) >> '{log}'"], check=True, timeout=60
+    )
+    assert log.read_text().split() == ["before", "first", "told", "last"]
 
 
 def test_a_file_written_in_any_order_is_no_pipe(tmp_path: Path) -> None:

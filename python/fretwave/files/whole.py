@@ -9,7 +9,6 @@ from __future__ import annotations
 import errno
 import os
 import shutil
-import stat
 import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -18,6 +17,7 @@ from typing import Any
 
 from ..errors import FretwaveError, InputError
 from ..texts import display
+from .streams import behind, is_stream, streamed
 
 #: Errors of a disk that takes no more.
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
@@ -61,32 +61,11 @@ def beside(path: Path, own: bool = False) -> Path:
     return path.with_name(f".{path.name}.{os.getpid()}.new" if own else f".{path.name}.new")
 
 
-def is_stream(path: Path) -> bool:
-    """A device or a pipe, which takes what is written and is there for others: no file takes its place."""
-    with suppress(OSError):
-        mode = path.stat().st_mode
-        return not (stat.S_ISREG(mode) or stat.S_ISDIR(mode))
-    return False
-
-
-def refuse_stream(path: Path) -> None:
-    """Of files whose parts are written in any order.
-
-    Raises
-    ------
-    InputError
-        The path is a device or a pipe.
-    """
-    if is_stream(path):
-        expected, fix = "a file, whose parts are written in any order", "choose another place"
-        raise InputError("the file cannot be written", display(path), "a device or a pipe", expected, fix)
-
-
 @contextmanager
 def replaced(path: Path, own: bool = False, keep_suffix: bool = False, sync: bool = True) -> Iterator[Path]:
     """A name to write to; at the end of the block the file is brought to the disk and takes its place.
 
-    That of the file behind it where the path is a link; a device or a pipe (`/dev/stdout`) is written to itself.
+    That of the file behind it where the path is a link; a device, a pipe or `/dev/stdout` gets all of it in one go.
 
     Parameters
     ----------
@@ -103,12 +82,12 @@ def replaced(path: Path, own: bool = False, keep_suffix: bool = False, sync: boo
         The file cannot be written; the old one is untouched.
     """
     if is_stream(path):
-        with told(path):
-            yield path
+        with told(path), streamed(path) as fresh:
+            yield fresh
         return
-    path = Path(os.path.realpath(path)) if path.is_symlink() else path
+    suffix, path = path.suffix, behind(path)
     fresh = beside(path, own)
-    fresh = fresh.with_name(fresh.name + path.suffix) if keep_suffix else fresh
+    fresh = fresh.with_name(fresh.name + suffix) if keep_suffix else fresh
     if own:
         _forget_unfinished(path)
     with told(path):

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
 from ..files.dimensions import put_array
+from ..files.streams import behind
 from ..files.whole import Unfailing, beside, bring_to_disk, check_whole, seal, sealed_size, told
 from ..texts import display
 from ..units import units_of
@@ -38,6 +39,7 @@ class NewResults:
     def __init__(self, path: Path, name: str) -> None:
         import h5py
 
+        path = behind(path)
         self._path, self._fresh = path, beside(path)
         if path.exists():
             check_whole(path, "results.h5")

@@ -47,7 +47,7 @@ import scipy.sparse as sp
 from ..arrays import IntArray
 from ..errors import InputError
 from ..files.compressed import check_compressed
-from ..files.whole import Unfailing, check_whole, refuse_stream, replaced, seal
+from ..files.whole import Unfailing, check_whole, replaced, seal
 from ..model.cells import KINDS
 from ..model.pairs import Pairs
 from ..model.sectors import by_sector
@@ -105,7 +105,6 @@ def write_model(
         measured = "a folder of this name" if path.is_dir() else "no such folder"
         fix, expected = "choose another place", "a file in a folder that exists"
         raise InputError("the model file cannot be written", display(path), measured, expected, fix)
-    refuse_stream(path)
     with replaced(path, own=True) as fresh:
         raw = Unfailing(fresh)
         with h5py.File(raw, "w") as file:

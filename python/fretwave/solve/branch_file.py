@@ -13,7 +13,7 @@ import numpy.typing as npt
 from ..columns import COLUMNS, Column, columns_named, over
 from ..errors import InputError
 from ..files.dimensions import name_dimensions
-from ..files.whole import refuse_stream, replaced
+from ..files.whole import replaced
 from ..hb.states import described, state_of
 from ..units import ATTRIBUTE, units_of
 from .hermite import Cubic
@@ -33,7 +33,6 @@ def write(branch: Branch, path: Path) -> None:
     """Table over `point`, curve over `point`, `piece` and `scalar`; the rest as attributes."""
     import h5py
 
-    refuse_stream(path)
     curves = branch.curves
     with replaced(path) as fresh, h5py.File(fresh, "w", track_order=True) as file:
         for column in [column for column in branch.columns if column.name != "point"]:

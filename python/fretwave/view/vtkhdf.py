@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from ..arrays import AnyArray, Array, Indices, IntArray
 from ..errors import InputError
-from ..files.whole import refuse_stream
+from ..files.streams import behind, refuse_stream
 from ..model.cells import KINDS
 from ..texts import display
 from ..units import ATTRIBUTE, SI, UnitSystem
@@ -55,8 +55,9 @@ class GridFile:
     """
 
     def __init__(self, path: Path, values: Sequence[float] | Array, units: UnitSystem = SI) -> None:
-        self.path, self.steps = path, len(values)
         refuse_stream(path)
+        path = behind(path)
+        self.path, self.steps = path, len(values)
         self._unfinished = path.with_name(f".{path.name}.new")
         self._file = _create(self._unfinished)
         self._file.attrs[ATTRIBUTE] = units.name
