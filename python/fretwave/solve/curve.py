@@ -27,8 +27,8 @@ DRAWN = ("amplitude", "frequency_hz", "zeta", "phase")
 PARTS = 8
 #: Of a column's change over a part of a step, what may be left at a crossing: a jump of the phase by 2 pi is none.
 LEFT_OVER = 1e-6
-#: Range below which a column runs straight, of its largest number: rounding bends it, on other ranks otherwise.
-FLAT = 1e-8
+#: What a line may be off at any rate, of a column's largest number: rounding bends it so far, on other ranks otherwise.
+FLAT = 1e-9
 #: Of columns that are shares or angles, as they are.
 FLAT_AT_ALL = {"zeta": NO_DAMPING, "phase": FLAT}
 #: Columns that tell of a point's solution, and nothing of what lies beside it.
@@ -72,7 +72,7 @@ class Curve:
         fine = self.drawn(2 * PARTS)
         if self.cubic is None or not len(fine):
             return self._of_state(fine)
-        shown = np.array([_scaled(fine, name) for name in DRAWN if name in self._names])
+        shown = np.array([_scaled(fine, name, error) for name in DRAWN if name in self._names])
         steps = [shown[:, k : k + 2 * PARTS + 1] for k in range(0, shown.shape[1] - 1, 2 * PARTS)]
         shares = [np.arange(parts) / parts for parts in (_parts_of(step, error) for step in steps)]
         places = np.concatenate([*(k + share for k, share in enumerate(shares)), [len(self.table) - 1.0]])
@@ -155,13 +155,13 @@ class Curve:
         return self.drawn(PARTS)
 
 
-def _scaled(table: Table, name: str) -> Array:
-    """A column over its range, or over one that rounding does not reach."""
+def _scaled(table: Table, name: str, error: float) -> Array:
+    """A column over its range, or over one of which an error is rounding."""
     values = np.asarray(table[name], dtype=float)
     if name == "amplitude" and "zeta" in table and (values > 0).all():
         values = np.log(values)
     flat = FLAT_AT_ALL.get(name, FLAT * float(np.abs(values).max(initial=0.0)))
-    return np.asarray(values / (max(float(np.ptp(values)), flat) or 1.0))
+    return np.asarray(values / (max(float(np.ptp(values)), flat / error) or 1.0))
 
 
 def _parts_of(step: Array, error: float) -> int:
