@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal, Optional, Union
 import numpy as np
 
 from ..case.analysis import register_analysis
-from ..case.fields import Dof, Frequency, Positive, SpeedOfLoads, Whole, key
+from ..case.fields import Dof, Frequency, Positive, Speed, Whole, key
 from ..case.harmonic import HarmonicSection, check_range
 from ..case.observed import Observed, check_observed, dofs_of, given_to, label_of, unit_of
 from ..case.toml.validation import at
@@ -65,7 +65,7 @@ class ForcedAnalysis(HarmonicSection):
         "{ m1 = 1.0 }",
         min_length=1,
     )
-    force_rpm: Optional[SpeedOfLoads] = key(
+    force_rpm: Optional[Speed] = key(
         "speed at which `force` is as given: it grows with the square of [model] speed_rpm",
         "rev/min",
         "3000.0",

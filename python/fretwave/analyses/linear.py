@@ -19,7 +19,7 @@ from ..case.analysis import AnalysisSection, register_analysis
 from ..case.analysis_tables import MistuningSection
 from ..case.checks_common import about
 from ..case.checks_wheel import check_mistuning, check_needs_wheel
-from ..case.fields import FASTEST, Dof, Speed, Whole, key
+from ..case.fields import Dof, Speed, SpeedOrRest, Whole, key
 from ..model.contact import LIMITS
 from ..model.structure import SPIN
 from ..post.engine_orders import excited_by, usual_orders
@@ -37,8 +37,6 @@ if TYPE_CHECKING:
 SAMPLES = 96
 #: Crossings told on the terminal.
 TOLD = 3
-
-NotNegative = Annotated[float, Field(ge=0, le=FASTEST)]
 
 
 @register_analysis
@@ -68,7 +66,7 @@ class LinearAnalysis(AnalysisSection):
         default=None,
         min_length=1,
     )
-    speeds_rpm: Optional[list[NotNegative]] = key(
+    speeds_rpm: Optional[list[SpeedOrRest]] = key(
         "speeds at which modes are found, of a model whose stiffness depends on it ([model] at_speed)",
         "rev/min",
         "[0.0, 1500.0, 3000.0]",

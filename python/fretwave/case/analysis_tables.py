@@ -5,14 +5,7 @@ from __future__ import annotations
 from typing import Optional, Union
 
 from ..solve.steps import StepControl
-from .fields import (
-    Deviations,
-    Dof,
-    Positive,
-    Section,
-    Whole,
-    key,
-)
+from .fields import Deviations, Dof, Positive, Section, Whole, key
 
 
 class StepSection(Section):

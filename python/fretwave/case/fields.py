@@ -37,8 +37,16 @@ Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Frequency = Annotated[float, Field(gt=0, le=1e100)]
 #: In rev/min: stiffness and loads have the square of two such in proportion.
 SLOWEST, FASTEST = 1e-30, 1e30
-Speed = Annotated[float, Field(gt=0, le=FASTEST)]
-SpeedOfLoads = Annotated[float, Field(ge=SLOWEST, le=FASTEST)]
+
+
+def _with_a_square(speed: float) -> float:
+    if 0 < speed < SLOWEST:
+        raise PydanticKnownError("greater_than_equal", {"ge": SLOWEST})
+    return speed
+
+
+Speed = Annotated[float, Field(gt=0, le=FASTEST), AfterValidator(_with_a_square)]
+SpeedOrRest = Annotated[float, Field(ge=0, le=FASTEST), AfterValidator(_with_a_square)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Matrix = Union[str, list[list[float]]]
 LoadVector = Union[str, list[Finite]]

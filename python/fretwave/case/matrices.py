@@ -52,7 +52,7 @@ def load(
 def _from_rows(letter: str, rows: list[list[float]], source: Source, key: KeyPath) -> Sparse:
     lengths = [len(row) for row in rows]
     if len(set(lengths)) != 1 or not lengths[0]:
-        odd = next((i for i, length in enumerate(lengths) if length != lengths[0]), 0)
+        odd = next((i for i, length in enumerate(lengths) if length != len(rows)), 0)
         raise InputError(
             f"the rows of the {NAMES[letter]} differ in length",
             where=source.where((*key, odd)),

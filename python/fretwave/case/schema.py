@@ -15,7 +15,6 @@ from ..hb.states import ZETA_FLOOR
 from ..model.sizes import COMPARED_MODES, COMPONENT_MODES, INTERFACE_TOLERANCE, INTERFACE_WAVES
 from ..units import MM_T_S, SI, SYSTEMS
 from .fields import (
-    FASTEST,
     ByMode,
     Dof,
     Finite,
@@ -26,7 +25,8 @@ from .fields import (
     Positive,
     QByMode,
     Section,
-    SpeedOfLoads,
+    Speed,
+    SpeedOrRest,
     UnitName,
     Whole,
     key,
@@ -66,13 +66,11 @@ class ModelSection(Section):
         default=None,
         min_length=1,
     )
-    speed_rpm: Optional[float] = key(
+    speed_rpm: Optional[SpeedOrRest] = key(
         "speed at which the model turns: stiffness K + Omega^2 K2, and loads as they are then",
         "rev/min",
         "4500.0",
         default=None,
-        ge=0,
-        le=FASTEST,
     )
     builder: Optional[str] = key(
         "Python file whose build(**options) gives the model, in place of matrices", example='"model.py"', default=None
@@ -226,7 +224,7 @@ class ContactSection(BaseModel):
         default=None,
         min_length=1,
     )
-    load_rpm: Optional[SpeedOfLoads] = key(
+    load_rpm: Optional[Speed] = key(
         "speed at which its normal loads, or friction limits, are as given: they grow with the square of "
         "[model] speed_rpm",
         "rev/min",

@@ -171,7 +171,7 @@ def _example(name: str, field: Optional[FieldInfo], verb: str = "write") -> str 
 
 
 def _extra(field: FieldInfo, name: str) -> Optional[str]:
-    """What :func:`fretwave.case.schema.key` keeps with a field."""
+    """What :func:`fretwave.case.fields.key` keeps with a field."""
     given = field.json_schema_extra
     return cast("Optional[str]", given.get(name)) if isinstance(given, dict) else None
 
