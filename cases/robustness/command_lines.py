@@ -87,8 +87,8 @@ COMMANDS: dict[str, tuple[tuple[str, ...], dict[str, tuple[str, ...] | None]]] =
     "check": (FILES, {**CASE, "--keys": None, "--schema": None, "--no-solve": None}),
     "run": (FILES, RUN),
     "sweep": (FILES, {**RUN, "--over": SWEPT, "--groups": NUMBERS}),
-    "resume": (FILES, {**LOUD, "--no-plots": None, "--quick": None}),
-    "show": (FILES, {"--all": None, "--json": None}),
+    "resume": (FILES, {**LOUD, "--no-plots": None}),
+    "show": (FILES, {"--json": None}),
     "plot": (FILES, {"--only": NAMES, "--format": ("png", "svg", "pdf,png", "x", "", ",", "png,png")}),
     "report": (FILES, {"--out": OUTS}),
     "probe": (

@@ -58,7 +58,7 @@ class Contact:
     ) -> None:
         self.law, self.name = law, name
         if not isinstance(parameters or {}, Mapping):
-            fix, where = 'write `{"friction_limit": 1.0}`', f"contact '{name}'"
+            fix, where = "give each value with its name; fw.laws() tells those of a law", f"contact '{name}'"
             raise InputError("parameters have no names", where, type(parameters).__name__, "a dict", fix)
         known = isinstance(law, PythonLaw) or law in laws()  # another is refused when a model is made
         if isinstance(B, Pairs):
