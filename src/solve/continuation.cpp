@@ -21,6 +21,7 @@ const Tuned unturned("branch_unturned", 0.01,
                      "share of a step: the way aside that the tangents need not tell of");
 const Tuned easy("branch_easy", 5, "Newton iterations; after more the corrector may be on another branch");
 const Tuned grid("branch_grid", 16, "lengths of steps in every factor of two");
+
 /// On a coarse grid: what a solution's last digits (of which no two numbers of ranks have the same) do to a
 /// length would be handed on from step to step and grow with the steps.
 double on_grid(double length) { return std::exp2(std::round(grid * std::log2(length)) / grid); }

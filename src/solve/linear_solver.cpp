@@ -1,10 +1,8 @@
 #include "solve/linear_solver.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "error.h"
-#include "log.h"
 #include "solve/direct.h"
 #include "solve/vectors.h"
 #include "tuned.h"
@@ -25,6 +23,7 @@ const Tuned rough_tangent("linear_rough_tangent", 1e-7,
                           "relative residual of tangents of large problems that steps are taken along");
 const Tuned tangent_accepted("linear_tangent_accepted", 1e-6,
                              "residual of a tangent, relative, where rounding lets GMRES go no further");
+
 /// Our options under the prefix, where PETSc's -help is given; its macros return its error codes.
 PetscErrorCode offered(MPI_Comm comm, std::string const& prefix) {
   char wish[32] = "auto", blocks[32] = "auto";

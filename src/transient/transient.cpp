@@ -16,18 +16,27 @@ constexpr int most_rejections = 100;  // of one step: at the onset of sticking i
 
 namespace {
 
-/// M is positive definite: no pivots needed, and none is zero, however small masses are in the units of the
-/// model. PETSc's own LU takes 2.2e-14 for zero unless told.
-void use_lu_without_pivots(KSP ksp, bool redundant) {
+/// M is positive definite: no pivots needed. What is zero of them goes by its smallest entry, for PETSc's own
+/// 2.2e-14 would be a mass in some units. The PC that has the factor.
+PC use_lu_without_pivots(KSP ksp, Mat M) {
+  constexpr double singular = 1e-13;
   PC pc;
+  MPI_Comm comm;
+  double smallest;
+  VecHandle diagonal;
+  check(MatCreateVecs(M, diagonal.out(), nullptr));
+  check(MatGetDiagonal(M, diagonal));
+  check(VecMin(diagonal, nullptr, &smallest));
+  check(PetscObjectGetComm(reinterpret_cast<PetscObject>(M), &comm));
   check(KSPGetPC(ksp, &pc));
-  if (redundant) {
+  if (comm_size(comm) > 1) {
     check(PCSetType(pc, PCREDUNDANT));
     check(PCRedundantGetKSP(pc, &ksp));
     check(KSPGetPC(ksp, &pc));
   }
   check(PCSetType(pc, PCLU));
-  check(PCFactorSetZeroPivot(pc, 0));
+  check(PCFactorSetZeroPivot(pc, singular * std::max(smallest, 0.0)));
+  return pc;
 }
 
 }  // namespace
@@ -60,9 +69,14 @@ Transient::Transient(model::Model const& model, std::vector<Excitation> excitati
   check(KSPSetOptionsPrefix(mass_, (prefix + "mass_").c_str()));
   check(KSPSetOperators(mass_, M_, M_));
   check(KSPSetType(mass_, KSPPREONLY));
-  use_lu_without_pivots(mass_, comm_size(model.comm()) > 1);
+  const PC factor = use_lu_without_pivots(mass_, M_);
   check(KSPSetFromOptions(mass_));
   check(KSPSetUp(mass_));
+  PCFailedReason reason;
+  check(PCGetFailedReason(factor, &reason));
+  if (reason != PC_NOERROR)
+    throw InputError("the mass matrix is singular", "a pivot that is zero beside its smallest diagonal entry",
+                     "a mass for every motion", "give every dof a mass, or reduce the model");
 }
 
 PetscErrorCode Transient::after_step(TS ts) {
@@ -179,22 +193,47 @@ void Transient::resolve_sticking(double tolerance, double size, Vec allowed) {
   std::fill_n(out.data() + n, n, std::min(tolerance * size, band / 10));
 }
 
-/// The step control weighs displacements and velocities each by their own size, or by what the other makes of
-/// them in a sampling interval, of which a radian has ten; from rest by that of the first interval. One size
-/// for both would weigh them by the unit of time. With the contacts' forces at the state.
+/// w of a motion of this shape, by Rayleigh's quotient with the contacts' tangents; a sample's tenth of a
+/// radian where nothing holds it.
+double Transient::rate(Vec shape) {
+  VecHandle product = like(shape);
+  double stiffness, mass;
+  check(MatMult(K_, shape, product));
+  for (size_t i = 0; i < tangents_.size(); ++i) add_tangent(i, shape, product);
+  check(VecDot(shape, product, &stiffness));
+  check(MatMult(M_, shape, product));
+  check(VecDot(shape, product, &mass));
+  const double least = 0.1 / interval_;
+  return stiffness > 0 && mass > 0 ? std::max(std::sqrt(stiffness / mass), least) : least;
+}
+
+/// The step control weighs displacements and velocities each by their own size: what the state has, and what
+/// the forces there, and those that vary, make of it at the rate of such a motion. A static displacement
+/// makes no velocity, and no unit of time weighs one against the other. With the contacts' forces at the
+/// state.
 Transient::Sizes Transient::sizes(Vec state) {
   const PetscInt n = model_.local_dofs();
-  double largest[2] = {}, start;
+  double largest[2] = {};
   {
     ReadArray in(state);
-    for (PetscInt i = 0; i < 2 * n; ++i) largest[i / n] = std::max(largest[i / n], std::abs(in.data()[i]));
+    for (PetscInt i = 0; i < 2 * n; ++i) largest[i / n] = std::max(largest[i / n], std::abs(in[i]));
   }
   MPI_Allreduce(MPI_IN_PLACE, largest, 2, MPI_DOUBLE, MPI_MAX, model_.comm());
-  solve_mass(force_, acceleration_);
-  check(VecNorm(acceleration_, NORM_INFINITY, &start));
-  const auto [x, v] = largest;
-  if (x > 0 || v > 0) return {std::max(x, v * interval_), std::max(v, x / (10 * interval_))};
-  return start > 0 ? Sizes{start * interval_ * interval_, start * interval_} : Sizes{1, 1};
+  Sizes size = {largest[0], largest[1]};
+  if (size.v > 0) size.x = std::max(size.x, size.v / rate(v_));
+  const auto take = [&](Vec force) {
+    double a;
+    solve_mass(force, acceleration_);
+    check(VecNorm(acceleration_, NORM_INFINITY, &a));
+    if (!(a > 0)) return;
+    const double w = rate(acceleration_);
+    size.v = std::max(size.v, a / w), size.x = std::max(size.x, a / (w * w));
+  };
+  take(force_);
+  for (auto const& part : excitation_)
+    if (part.order > 0) take(part.cosine), take(part.sine);
+  if (size.x == 0) return {1, 1};
+  return {size.x, size.v > 0 ? size.v : size.x * rate(x_)};
 }
 
 void Transient::set_up(TS ts, Vec state, double tolerance, bool implicit) {
@@ -216,7 +255,7 @@ void Transient::set_up(TS ts, Vec state, double tolerance, bool implicit) {
     std::fill_n(out.data(), n, tolerance * size.x);
     std::fill_n(out.data() + n, n, tolerance * size.v);
   }
-  if (implicit) resolve_sticking(tolerance, size.v, allowed);
+  resolve_sticking(tolerance, size.v, allowed);
   check(TSSetTolerances(ts, PETSC_DECIDE, allowed, tolerance, nullptr));
   check(TSGetAdapt(ts, &adapt));
   check(TSAdaptSetType(adapt, TSADAPTBASIC));

@@ -57,6 +57,7 @@ class Transient {
   static PetscErrorCode after_step(TS);
   History integrate(Vec x0, Vec v0, double tolerance, bool implicit);
   Sizes sizes(Vec state);
+  double rate(Vec shape);
   void set_up(TS, Vec state, double tolerance, bool implicit);
   void conclude(TS);
   void use_explicit(TS);
@@ -68,6 +69,7 @@ class Transient {
   void prepare_jacobian();
   void assemble(double shift, Mat A);
   void assemble_contact(size_t number, Mat A);
+  void add_tangent(size_t number, Vec x, Vec out);
   void record(TS);
   void watch(TS);
   void sample(double t, Vec state);
