@@ -34,12 +34,15 @@ RIGHT: dict[str, Any] = {
     "tuples": tuple(map(tuple, K.tolist())),
     "nothing masked": np.ma.masked_array(K),
     "entries of one place": TWICE,
+    **{f"complex {name}": getattr(sp, f"{name}_matrix")(K.astype(complex)) for name in ("csr", "dia", "dok", "lil")},
     **{f"matrix {name}": getattr(sp, f"{name}_matrix")(K) for name in FORMATS},
     **{f"array {name}": getattr(sp, f"{name}_array")(K) for name in FORMATS if hasattr(sp, f"{name}_array")},
 }
 WRONG: dict[str, tuple[Any, str]] = {
     "complex": (K * (1 + 0.01j), "is complex"),
     "sparse complex": (sp.csr_matrix(K * (1 + 0.01j)), "is complex"),
+    "diagonals complex": (sp.dia_matrix(K * (1 + 0.01j)), "is complex"),
+    "not a number in its imaginary part": (K + np.array([[complex(0, np.nan), 0], [0, 0]]), "is complex"),
     "text": (K.astype(str), "no matrix"),
     "three dimensions": (K[None], "no matrix"),
     "ragged": ([[640.0, -40.0], [-40.0]], "no matrix"),
@@ -139,3 +142,34 @@ def test_a_parameter_is_a_number(value: Any) -> None:
 def test_parameters_have_names() -> None:
     with pytest.raises(fw.InputError, match="have no names"):
         fw.Contact("jenkins", [[0.0, 1.0]], [40.0, 1.0])
+
+
+def test_a_structure_of_dictionaries_of_keys_is_a_plain_one() -> None:
+    """SciPy's DOK is a dict, as are the matrices of a sector by place."""
+    structure = fw.Structure(sp.dok_matrix(M), sp.dok_matrix(K)).sparse()
+    assert (structure.n_dof, abs(structure.K - K).max()) == (2, 0.0)
+
+
+@pytest.mark.parametrize("values", [[1.0], [1.0, 2.0, 3.0], 1.0, [1.0, 1j]], ids=str)
+def test_a_vector_has_a_real_number_for_every_dof(values: Any) -> None:
+    """Rows beyond were dropped, an imaginary part as well."""
+    with fw.Model(M, K) as model:
+        for take in (model.vector, model.inertia):
+            with pytest.raises(fw.InputError, match="does not fit the model"):
+                take(values)
+
+
+@pytest.mark.ranks(2)
+def test_what_one_rank_alone_meets_is_no_matter_of_all(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The others wait in the solver: nothing may be asked of all ranks then."""
+    from fretwave import _core
+    from fretwave.model import modes
+
+    def fails(*_: object) -> None:
+        raise fw.errors.PetscError("of this rank alone")
+
+    monkeypatch.setattr(_core, "linear_modes", fails)
+    monkeypatch.setattr(modes, "all_ranks_failed", lambda comm: False)
+    monkeypatch.setattr(modes, "_wrong_terms", lambda model: pytest.fail("asked of all ranks"))
+    with fw.Model(M, K) as model, pytest.raises(fw.errors.PetscError, match="alone"):
+        fw.linear_modes(model, 1)

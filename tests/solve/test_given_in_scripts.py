@@ -40,6 +40,12 @@ def test_a_force_has_a_number_for_every_dof(force: Any, mode: fw.NonlinearMode) 
         fw.ForcedResponse(mode.model, mode.harmonics, {1: force}, 1.0, 0, mode.start)
 
 
+@pytest.mark.parametrize("kind", [complex, object])
+def test_a_row_without_imaginary_part_is_real(kind: type, mode: fw.NonlinearMode) -> None:
+    row = np.array([0.0, 2.0], dtype=kind)
+    assert fw.NonlinearMode(mode.model, mode.harmonics, dof=row).row == [(1, 2.0)]
+
+
 @pytest.mark.parametrize("dof", [2, -1, 7, 1.0, "tip", None, [1j, 0.0], np.array([1j, 0.0])], ids=str)
 def test_what_is_observed_is_of_the_model(dof: Any, mode: fw.NonlinearMode) -> None:
     """A column of a dof that is not there was zero."""
@@ -94,6 +100,21 @@ class Lossy(fw.PythonLaw):
         return (1 + 0.1j) * u
 
 
+class Transformed(Lossy):
+    """A force by way of a transform, which leaves an imaginary part of rounding."""
+
+    def force(self, u: Any, v: Any) -> Any:
+        return np.fft.ifft(np.fft.fft(u, axis=0), axis=0)
+
+
+def test_rounding_makes_no_force_complex() -> None:
+    model = fw.Model(M, K, contacts=[fw.Contact(Transformed(), [[0.0, 1.0]])])
+    branch = fw.follow(fw.NonlinearMode(model, fw.choose_harmonics(model, 1)), 0.01, 0.1, steps=FEW)
+    stiffer = np.sqrt(np.linalg.eigvals(np.linalg.solve(M, K + np.diag([0.0, 1.0]))).real.min())
+    assert np.allclose(branch["omega"], stiffer, rtol=1e-9)
+
+
+@pytest.mark.ranks(1)
 def test_a_complex_force_of_a_law_is_refused() -> None:
     """Its real part alone acted, without damping."""
     model = fw.Model(M, K, contacts=[fw.Contact(Lossy(), [[0.0, 1.0]])])
@@ -142,3 +163,16 @@ def test_what_was_destroyed_says_so(mode: fw.NonlinearMode) -> None:
             ask()
     assert "NonlinearMode" in repr(mode) and "2 dofs" in repr(model) and len(branch["zeta"]) == len(branch)
     y.destroy()
+
+
+def test_a_destroyed_reduction_says_so() -> None:
+    """`error` ended the process, others in words about None."""
+    reduction = fw.reduce(M, K, keep=[0], modes=1)
+    reduction.destroy()
+    for use in (
+        lambda: reduction.error(1),
+        lambda: reduction.expand(np.ones(2)),
+        lambda: reduction.project(np.ones(2)),
+    ):
+        with pytest.raises(fw.InputError, match="the reduction has been destroyed"):
+            use()

@@ -23,7 +23,11 @@ class Harmonics:
     """
 
     def __init__(self, orders: Sequence[int], samples: int) -> None:
-        self.core = _core.Harmonics(list(orders), samples)
+        orders, samples = [_whole("orders", n) for n in orders], _whole("samples", samples)
+        if samples > MOST_SAMPLES or max(map(abs, orders), default=0) > MOST_HARMONICS:
+            measured, expected = f"{orders}, {samples} samples", f"up to {MOST_HARMONICS}, {MOST_SAMPLES} samples"
+            raise InputError("harmonics are beyond all memory", None, measured, expected, "give fewer")
+        self.core = _core.Harmonics(orders, samples)
         self.orders: tuple[int, ...] = tuple(self.core.orders)
         self.samples: int = samples
         self.block_size: int = self.core.block_size
@@ -67,9 +71,6 @@ def choose_harmonics(model: Model, highest: int, samples: int | None = None, ret
     if highest > MOST_HARMONICS:
         most = f"at most {MOST_HARMONICS}"
         raise InputError("the highest harmonic is beyond all memory", None, highest, most, "give a lower one")
-    if samples is not None and samples > MOST_SAMPLES:
-        most = f"at most {MOST_SAMPLES}"
-        raise InputError("samples of a period are beyond all memory", None, samples, most, "give fewer")
     if retain not in ("auto", "odd", "all"):
         raise InputError("unknown choice of harmonics", None, retain, "auto, odd or all", 'use retain="auto"')
     odd = retain == "odd" or (retain == "auto" and model.odd)

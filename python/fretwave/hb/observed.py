@@ -34,9 +34,9 @@ def row_of(model: Model, observed: Observed) -> list[tuple[int, float]]:
     if np.ndim(observed) == 0:
         return [(_dof(model, cast(int, observed)), 1.0)]
     row = np.asarray(observed)
-    if row.dtype.kind not in "biuf":
+    if row.dtype.kind not in "biufcO" or np.any(np.imag(row) != 0):
         raise InputError("a row of displacements is real", None, f"entries of type {row.dtype}", "weights", "give one")
-    row = row.astype(float)
+    row = np.real(row).astype(float)
     if row.shape != (model.n_dof,) or not np.isfinite(row).all():
         fix = "give one weight a dof"
         raise InputError("the row does not fit the model", None, row.shape, f"({model.n_dof},), finite", fix)

@@ -57,7 +57,7 @@ class Contact:
         pairs: Pairs | None = None,
     ) -> None:
         self.law, self.name = law, name
-        if not isinstance(parameters or {}, Mapping):
+        if parameters is not None and not isinstance(parameters, Mapping):
             fix, where = "give each value with its name; fw.laws() tells those of a law", f"contact '{name}'"
             raise InputError("parameters have no names", where, type(parameters).__name__, "a dict", fix)
         known = isinstance(law, PythonLaw) or law in laws()  # another is refused when a model is made
@@ -200,9 +200,9 @@ class Contact:
         return values
 
     def _numbers(self, name: str, value: npt.ArrayLike) -> Array:
-        given = np.asarray(value)
-        if given.dtype.kind in "biuf" or given.dtype.kind == "O":
-            with suppress(TypeError, ValueError):
+        with suppress(TypeError, ValueError):  # rows of different lengths, None among them
+            given = np.asarray(value)
+            if given.dtype.kind in "biufO":
                 return given.astype(float)
         what, where = f"law parameter '{name}' is no number", f"contact '{self.name}'"
         raise InputError(what, where, shortened(repr(value)), "real numbers", "give one number, or one per pair")

@@ -207,14 +207,33 @@ class Model(Destroyable):
         begin, end = self._matrices[0].getOwnershipRange()
         return values[begin:end]
 
-    def vector(self, values: Array) -> PETSc.Vec:
-        """A distributed vector from an array (n_dof,) given whole on every rank. Collective."""
-        return PETSc.Vec().createWithArray(np.array(self.distribute(np.asarray(values, dtype=float))), comm=self.comm)
+    def vector(self, values: npt.ArrayLike) -> PETSc.Vec:
+        """A distributed vector from an array (n_dof,) given whole on every rank. Collective.
 
-    def inertia(self, x: Array) -> Array:
-        """M x (n_dof,) of a displacement given whole, on every rank. Collective."""
-        whole: Array = on_all_ranks(self.comm, self._product(self._mass, self.distribute(x)))
+        Raises
+        ------
+        InputError
+            They are no real numbers, or not one a dof.
+        """
+        return PETSc.Vec().createWithArray(np.array(self.distribute(self._of_dofs(values))), comm=self.comm)
+
+    def inertia(self, x: npt.ArrayLike) -> Array:
+        """M x (n_dof,) of a displacement given whole, on every rank. Collective.
+
+        Raises
+        ------
+        InputError
+            As of `vector`.
+        """
+        whole: Array = on_all_ranks(self.comm, self._product(self._mass, self.distribute(self._of_dofs(x))))
         return whole
+
+    def _of_dofs(self, values: npt.ArrayLike) -> Array:
+        given = np.asarray(values)
+        if given.shape == (self.n_dof,) and given.dtype.kind in "biuf":
+            return given.astype(float, copy=False)
+        measured, expected = f"{given.shape} of {given.dtype}", f"({self.n_dof},) real numbers"
+        raise InputError("an array does not fit the model", None, measured, expected, "give one real number a dof")
 
     def local_inertia(self, q: npt.NDArray[Any]) -> npt.NDArray[np.complex128]:
         """This rank's part of M q, from its part of q. Collective."""

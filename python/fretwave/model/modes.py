@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import operator
 from dataclasses import dataclass
+from typing import SupportsIndex
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +16,7 @@ from ..arrays import Array
 from ..errors import InputError, PetscError
 from ..files.memory import machine_memory, size
 from ..mpi.gather import on_all_ranks
+from ..mpi.guard import all_ranks_failed
 from .checks import DENSE_LIMIT, check_mass
 from .model import Model
 
@@ -81,12 +84,13 @@ def linear_modes(model: Model, count: int = 6, contact: str = "stuck", near: flo
     if near is not None and (contact == "linearised" or not near > 0):
         given, fix = f"near={near}, contact={contact}", "give a frequency above 0, and stuck or free contact"
         raise InputError("modes near a frequency are those without damping", None, given, "near > 0 [rad/s]", fix)
-    if not isinstance(count, (int, np.integer)) or count < 1:
-        raise InputError("modes are asked for by their number", "count", repr(count), ">= 1", "give count=1 or more")
+    count = _number(count)
     _check_factor(model)
     try:
         found = _core.linear_modes(model.core, count, getattr(_core.ContactState, contact), near)
     except PetscError as error:
+        if model.comm.size > 1 and not all_ranks_failed(model.comm):
+            raise  # of some ranks alone: the others wait in the solver
         raise _wrong_terms(model) or error from None
     shapes = [on_all_ranks(model.comm, re) + 1j * on_all_ranks(model.comm, im) for _, _, re, im in found]
     for _, _, *parts in found:
@@ -95,6 +99,21 @@ def linear_modes(model: Model, count: int = 6, contact: str = "stuck", near: flo
     if model.core.travelling:
         shapes = [_aligned(phi) for phi in shapes]
     return [LinearMode(mode[0], mode[1], phi.real.copy(), phi.imag.copy()) for mode, phi in zip(found, shapes)]
+
+
+#: More than the core counts.
+MOST_MODES = 2**31 - 1
+
+
+def _number(count: SupportsIndex) -> int:
+    try:
+        number = operator.index(count)
+    except TypeError:
+        number = 0
+    if not 1 <= number <= MOST_MODES:
+        expected = f"1 to {MOST_MODES}"
+        raise InputError("modes are asked for by their number", "count", repr(count), expected, "give a number")
+    return number
 
 
 def _wrong_terms(model: Model) -> InputError | None:

@@ -14,7 +14,7 @@ from petsc4py import PETSc
 from .. import _core
 from ..arrays import Array
 from ..errors import InputError
-from ..mpi.destroyable import Destroyable
+from ..mpi.destroyable import Destroyable, Destroyed
 from ..mpi.gather import on_all_ranks
 from .frequency_error import FrequencyError, frequency_error
 from .model import Model
@@ -175,7 +175,8 @@ class Reduction(Destroyable):
 
     def destroy(self) -> None:
         """Free matrices and modes; the reduced matrices stay. Collective."""
-        self._core = None  # type: ignore[assignment]
+        self._core = Destroyed("the reduction")  # type: ignore[assignment]
+        self._model = Destroyed("the reduction")  # type: ignore[assignment]
         for mat in self._owned:
             mat.destroy()
         self._owned = []

@@ -34,10 +34,10 @@ def real_csr(given: Given, where: str | None = None) -> Sparse:
     InputError
         It is complex (of which SciPy would keep the real part), masked, or no matrix of numbers.
     """
-    if not sp.issparse(given):
-        given = _dense(given, where)
+    given = given.tocsr() if sp.issparse(given) else _dense(given, where)
     if np.iscomplexobj(given):
-        if abs(given.imag).max() > 0:
+        imaginary = given.data.imag if sp.issparse(given) else given.imag
+        if np.any(imaginary != 0):  # nan too
             fix = "put the imaginary part of a loss factor into C, or take fw.modal_damping"
             raise InputError("a matrix is complex", where, f"entries of type {given.dtype}", "real entries", fix)
         given = given.real

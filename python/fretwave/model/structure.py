@@ -402,7 +402,7 @@ def tie(A: Term | None, T: Parts) -> dict[int, Sparse] | None:
 
 def _sparse(given: Term | None) -> Term | None:
     """In CSR form of float, by sector where it was."""
-    if isinstance(given, Mapping):
+    if isinstance(given, Mapping) and not sp.issparse(given):  # SciPy's DOK is a dict as well
         return {k: real_csr(A) for k, A in given.items()}
     return None if given is None else as_matrix(given)
 

@@ -99,8 +99,8 @@ def others(fed: Sequence[Mapping[str, Any]], not_looked_at: str = "") -> str:
 
 def _alike(mode: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
     """One mode in two states of the contact: what is told of both differs by about its last digit, in any unit."""
-    near = (abs(mode[key] - other[key]) < share * abs(other[key]) for key, share in TOLD.items())
-    return _which(mode) == _which(other) and all(near)
+    near = (abs(mode[key] - other[key]) <= share * abs(other[key]) for key, share in TOLD.items())
+    return _gains(mode) == _gains(other) or (_which(mode) == _which(other) and all(near))
 
 
 def _gains(mode: Mapping[str, Any]) -> str:

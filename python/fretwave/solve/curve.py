@@ -158,9 +158,9 @@ class Curve:
 def _scaled(table: Table, name: str, error: float) -> Array:
     """A column over its range, or over one of which an error is rounding."""
     values = np.asarray(table[name], dtype=float)
-    if name == "amplitude" and "zeta" in table and (values > 0).all():
-        values = np.log(values)
     flat = FLAT_AT_ALL.get(name, FLAT * float(np.abs(values).max(initial=0.0)))
+    if name == "amplitude" and "zeta" in table and (values > 0).all():
+        values, flat = np.log(values), FLAT
     return np.asarray(values / (max(float(np.ptp(values)), flat / error) or 1.0))
 
 

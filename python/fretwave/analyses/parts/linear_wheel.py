@@ -26,9 +26,9 @@ if TYPE_CHECKING:
 
 #: Of a mode around the wheel, from the amplitudes of one dof in all sectors.
 AROUND = (
-    Column("participation", "1", "participation ratio of the sectors"),
-    Column("largest_sector", "1", "sector that moves most", "i"),
-    Column("diameters", "1", "nodal diameters of the largest wave", "i"),
+    Column("participation", "1", "participation ratio of the sectors; nan where the dof stands still"),
+    Column("largest_sector", "1", "sector that moves most; -1 where the dof stands still", "i"),
+    Column("diameters", "1", "nodal diameters of the largest wave; -1 where the dof stands still", "i"),
     Column("diameters_share", "1", "share of this wave, forward and backward, in the sum of squares"),
 )
 #: Of the largest amplitude of a mode, what is left of a dof that does not move in it: digits that mean nothing.
