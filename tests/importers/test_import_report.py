@@ -89,7 +89,8 @@ def test_report_warns_of_what_cannot_be(held: Held, tmp_path: Path, capfd) -> No
     heavier = sp.diags(1 + 0.5 * (cut == 0)) @ bar.M.multiply(sp.eye(len(cut)))
     assert "the mass differs along x, y and z" in report_of(tmp_path, heavier, bar.K, bar.nodes, capfd)
     loose = report_of(tmp_path, *(sp.diags(cut) @ A @ sp.diags(cut) for A in (bar.M, bar.K)), bar.nodes, capfd)
-    assert "warning: 1 dof with no mass" in loose and "warning: the frequencies cannot be computed: is a dof" in loose
+    assert "warning: 1 dof with no mass" in loose
+    assert "the frequencies cannot be computed (the mass matrix has a zero diagonal entry): is a dof" in loose
     assert model_file.read_model(tmp_path / "m.h5").n_dof == len(cut)
     K = bar.K - sp.diags(1e-3 * bar.K.diagonal().max() * (cut == 0))
     text = report_of(tmp_path, bar.M, K, bar.nodes, capfd)
