@@ -152,21 +152,22 @@ void Transient::assemble_contact(size_t number, Mat A) {
   }
 }
 
-/// out += B^T f_u B x
+/// out += B^T f_u B x. Collective: a rank without pairs has no tangents.
 void Transient::add_tangent(size_t number, Vec x, Vec out) {
   auto const& contact = model_.contacts()[number];
   Tangents& at = tangents_[number];
   const int d = contact.law->components(), n = contact.law->pairs();
-  if (at.record.df_du.empty()) return;
   check(MatMult(contact.B, x, at.u));
   {
     const ReadArray u(at.u);
     WriteArray f(at.f);
     for (PetscInt i = 0; i < PetscInt(d) * n; ++i) f[i] = 0;
-    for (int row = 0; row < d; ++row)
-      for (int column = 0; column < d; ++column)
-        for (int pair = 0; pair < n; ++pair)
-          f[pair * d + row] += at.record.df_du[(size_t(row) * d + column) * n + pair] * u[pair * d + column];
+    if (!at.record.df_du.empty())
+      for (int row = 0; row < d; ++row)
+        for (int column = 0; column < d; ++column)
+          for (int pair = 0; pair < n; ++pair)
+            f[pair * d + row] +=
+                at.record.df_du[(size_t(row) * d + column) * n + pair] * u[pair * d + column];
   }
   check(MatMultTransposeAdd(contact.B, at.f, out, out));
 }
