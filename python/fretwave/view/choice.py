@@ -146,7 +146,8 @@ def read_choice(file: h5py.File, folder: Path, case: Case, options: ViewOptions)
     offered = held if case.analyses[name].shown_where_kept and len(held) else np.arange(len(group["coefficients"]))
     chosen = points_asked(group, offered, options, f"analysis '{name}' in {display(folder)}")
     count, loaded = int(group.attrs["samples"]), "rest_displacement" in group
-    samples = np.unique(np.arange(options.phases) * count // options.phases)
+    steps = min(options.phases, count)  # there are no more than samples
+    samples = np.arange(steps) * count // steps
     rows = [row for row, _ in chosen]
     without = [row for row in rows if row not in held]
     return Choice(
