@@ -16,9 +16,21 @@ constexpr int most_rejections = 100;  // of one step: at the onset of sticking i
 
 namespace {
 
+/// The PC that has the factor: of each rank's own copy, if there are copies.
+PC factor_of(KSP ksp) {
+  PC pc;
+  PetscBool copies;
+  check(KSPGetPC(ksp, &pc));
+  check(PetscObjectTypeCompare(reinterpret_cast<PetscObject>(pc), PCREDUNDANT, &copies));
+  if (!copies) return pc;
+  check(PCRedundantGetKSP(pc, &ksp));
+  check(KSPGetPC(ksp, &pc));
+  return pc;
+}
+
 /// M is positive definite: no pivots needed. What is zero of them goes by its smallest entry, for PETSc's own
-/// 2.2e-14 would be a mass in some units. The PC that has the factor.
-PC use_lu_without_pivots(KSP ksp, Mat M) {
+/// 2.2e-14 would be a mass in some units.
+void use_lu_without_pivots(KSP ksp, Mat M) {
   constexpr double singular = 1e-13;
   PC pc;
   MPI_Comm comm;
@@ -29,14 +41,10 @@ PC use_lu_without_pivots(KSP ksp, Mat M) {
   check(VecMin(diagonal, nullptr, &smallest));
   check(PetscObjectGetComm(reinterpret_cast<PetscObject>(M), &comm));
   check(KSPGetPC(ksp, &pc));
-  if (comm_size(comm) > 1) {
-    check(PCSetType(pc, PCREDUNDANT));
-    check(PCRedundantGetKSP(pc, &ksp));
-    check(KSPGetPC(ksp, &pc));
-  }
+  if (comm_size(comm) > 1) check(PCSetType(pc, PCREDUNDANT));
+  pc = factor_of(ksp);
   check(PCSetType(pc, PCLU));
   check(PCFactorSetZeroPivot(pc, singular * std::max(smallest, 0.0)));
-  return pc;
 }
 
 }  // namespace
@@ -69,11 +77,11 @@ Transient::Transient(model::Model const& model, std::vector<Excitation> excitati
   check(KSPSetOptionsPrefix(mass_, (prefix + "mass_").c_str()));
   check(KSPSetOperators(mass_, M_, M_));
   check(KSPSetType(mass_, KSPPREONLY));
-  const PC factor = use_lu_without_pivots(mass_, M_);
+  use_lu_without_pivots(mass_, M_);
   check(KSPSetFromOptions(mass_));
   check(KSPSetUp(mass_));
   PCFailedReason reason;
-  check(PCGetFailedReason(factor, &reason));
+  check(PCGetFailedReason(factor_of(mass_), &reason));  // options may have chosen another PC
   if (reason != PC_NOERROR)
     throw InputError("the mass matrix is singular", "a pivot that is zero beside its smallest diagonal entry",
                      "a mass for every motion", "give every dof a mass, or reduce the model");
