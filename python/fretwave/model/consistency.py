@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
-import scipy.sparse as sp
 
 from ..units import SYSTEMS
 from .cells import wrong_cells
+from .sectors import is_by_sector
 
 if TYPE_CHECKING:
     from .structure import Structure
@@ -21,7 +20,7 @@ def complaint_of(structure: Structure) -> str | None:
     if not structure.sectors:  # pairs of a sector may reach the next one
         terms.update({f"B of '{name}'": pairs.B for name, pairs in structure.pairs.items()})
     for name, term in terms.items():
-        if isinstance(term, Mapping) and not sp.issparse(term):
+        if is_by_sector(term):
             return f"{name} has parts on other sectors: give the sector with both its faces, low and high"
     if structure.units is not None and structure.units not in SYSTEMS:
         return f"its unit system '{structure.units}' is none of {', '.join(SYSTEMS)}"

@@ -64,11 +64,16 @@ def _dense(given: npt.ArrayLike, where: str | None) -> npt.NDArray[Any]:
     return array
 
 
+def is_by_sector(given: Term | None) -> bool:
+    """Whether a matrix is given as {k: matrix on the sector k places ahead}; SciPy's DOK is a dict as well."""
+    return isinstance(given, Mapping) and not sp.issparse(given)
+
+
 def by_sector(given: Term | None) -> Parts:
     """{k: matrix on the sector k places ahead}, the own sector first; a plain matrix stands for {0: matrix}."""
     if given is None:
         return {}
-    if not isinstance(given, Mapping) or sp.issparse(given):  # SciPy's DOK is a dict as well
+    if not is_by_sector(given):
         return {0: given}
     if 0 not in given:
         raise InputError("the own sector's matrix is missing", None, sorted(given), "0 among them", "give {0: ...}")

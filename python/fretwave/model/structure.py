@@ -20,7 +20,7 @@ from ..units import SI, UnitSystem, unit_system
 from .consistency import complaint_of
 from .omitted import UNKNOWN, OmittedModes
 from .pairs import Pairs
-from .sectors import Parts, Sparse, Term, by_sector, check_balanced, check_number, combine, real_csr, ties
+from .sectors import Parts, Sparse, Term, by_sector, check_balanced, check_number, combine, is_by_sector, real_csr, ties
 from .wheel_matrix import Matrix, WheelMatrix, as_matrix, entries_of
 
 if TYPE_CHECKING:
@@ -402,9 +402,9 @@ def tie(A: Term | None, T: Parts) -> dict[int, Sparse] | None:
 
 def _sparse(given: Term | None) -> Term | None:
     """In CSR form of float, by sector where it was."""
-    if isinstance(given, Mapping) and not sp.issparse(given):  # SciPy's DOK is a dict as well
-        return {k: real_csr(A) for k, A in given.items()}
-    return None if given is None else as_matrix(given)
+    if given is None:
+        return None
+    return {k: real_csr(A) for k, A in given.items()} if is_by_sector(given) else as_matrix(given)
 
 
 def _plain(terms: Mapping[int, Matrix]) -> Term:
