@@ -152,18 +152,18 @@ std::vector<LinearMode> oscillating(Model const& model, Operators const& terms, 
   return modes;
 }
 
-}  // namespace
+void refuse_rigid(contact::Law const& law) {
+  for (int row = 0; row < law.components() * law.pairs(); ++row)
+    if (std::isinf(law.stuck_stiffness(row % law.components(), row / law.components())))
+      throw InputError("rigid contact holds a structure whose stiffness is not symmetric",
+                       "infinite stiffness", "a finite one", "give one, or leave the contact free");
+}
 
-std::vector<LinearMode> damped_modes(Model const& model, int count) {
+/// Of (K + s C + s^2 M) phi = 0, C none where it is empty.
+std::vector<LinearMode> modes_of(Model const& model, int count, std::vector<PhasedMap> const& stiffness,
+                                 std::vector<PhasedMap> const& damping) {
   constexpr double far = 1e3;  // contact that much above the modes spoils their digits
   const bool travelling = model.travelling();
-  auto stiffness = required(model, 0, "stiffness"), damping = terms_of(model, 1);
-  for (auto const& contact : model.contacts()) {
-    const RestTangent rest = rest_tangent(*contact.law, model.comm());
-    const int d = contact.law->components();
-    add_contact(stiffness, contact, [&](int c, int i) { return rest.stiffness[size_t(i) * d + c]; });
-    add_contact(damping, contact, [&](int c, int i) { return rest.damping[size_t(i) * d + c]; });
-  }
   std::vector<MatHandle> matrices;
   for (auto const& parts : {std::cref(stiffness), std::cref(damping)})
     matrices.push_back(real_form(parts.get(), model.theta(), travelling));
@@ -188,6 +188,33 @@ std::vector<LinearMode> damped_modes(Model const& model, int count) {
     }
   }
   return modes;
+}
+
+}  // namespace
+
+std::vector<LinearMode> damped_modes(Model const& model, int count) {
+  auto stiffness = required(model, 0, "stiffness"), damping = terms_of(model, 1);
+  for (auto const& contact : model.contacts()) {
+    const RestTangent rest = rest_tangent(*contact.law, model.comm());
+    const int d = contact.law->components();
+    add_contact(stiffness, contact, [&](int c, int i) { return rest.stiffness[size_t(i) * d + c]; });
+    add_contact(damping, contact, [&](int c, int i) { return rest.damping[size_t(i) * d + c]; });
+  }
+  return modes_of(model, count, stiffness, damping);
+}
+
+std::vector<LinearMode> circulatory_modes(Model const& model, int count, bool stuck,
+                                          std::optional<double> near) {
+  if (near)
+    throw InputError("modes near a frequency of a structure whose stiffness is not symmetric", "near",
+                     "the lowest modes", "leave near out");
+  auto stiffness = required(model, 0, "stiffness");
+  for (auto const& contact : model.contacts()) {
+    if (!stuck) break;
+    together(model.comm(), "stuck contact", [&] { refuse_rigid(*contact.law); });
+    add_contact(stiffness, contact, [&](int c, int i) { return contact.law->stuck_stiffness(c, i); });
+  }
+  return modes_of(model, count, stiffness, {});
 }
 
 }  // namespace fretwave::model

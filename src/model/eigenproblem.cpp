@@ -4,6 +4,7 @@
 #include <complex>
 
 #include "error.h"
+#include "scramble.h"
 
 namespace fretwave::model {
 
@@ -21,6 +22,24 @@ MatHandle congruence(Mat A, Vec diagonal, Mat B) {
 }
 
 constexpr PetscInt small = 500;
+
+/// Entries of any sign and size, the same on any ranks, over the root of the matrix' diagonal.
+VecHandle scrambled_rows(Mat A, int stream) {
+  VecHandle rows;
+  PetscInt first;
+  double largest;
+  check(MatCreateVecs(A, rows.out(), nullptr));
+  check(MatGetDiagonal(A, rows));
+  check(VecGetOwnershipRange(rows, &first, nullptr));
+  check(VecNorm(rows, NORM_INFINITY, &largest));
+  WriteArray entries(rows);
+  for (PetscInt i = 0; i < local_size(rows); ++i) {
+    const auto bits = scrambled(2 * std::uint64_t(first + i) + std::uint64_t(stream));
+    const double stiffness = entries[i] != 0 ? std::abs(entries[i]) : largest;
+    entries[i] = (double(bits >> 11) * 0x1p-53 - 0.5) / std::sqrt(stiffness > 0 ? stiffness : 1);
+  }
+  return rows;
+}
 
 }  // namespace
 
@@ -57,6 +76,27 @@ bool symmetric(Mat A) {
   check(MatNorm(A, NORM_INFINITY, &size));
   check(MatNorm(difference, NORM_INFINITY, &change));
   return change <= 1e-12 * size;
+}
+
+bool hermitian(std::vector<PhasedMap> const& terms, double theta) {
+  constexpr double rounding = 1e-10;
+  const VecHandle x = scrambled_rows(terms[0].B, 0), y = scrambled_rows(terms[0].B, 1), product = like(x);
+  double size = 0;
+  const auto form = [&](Vec a, Mat A, Vec b) {
+    double absolute, sum;
+    check(MatMult(A, b, product));
+    check(VecPointwiseMult(product, a, product));
+    check(VecNorm(product, NORM_1, &absolute));
+    check(VecSum(product, &sum));
+    size += absolute;
+    return sum;
+  };
+  std::complex<double> difference = 0;
+  for (auto const& [A, phase] : terms) {
+    const auto turn = std::exp(-1i * (phase * theta));
+    difference += turn * form(x, A, y) - std::conj(turn) * form(y, A, x);
+  }
+  return std::abs(difference) <= rounding * size;
 }
 
 Operators operators(MPI_Comm comm, std::vector<MatHandle> matrices) {

@@ -17,6 +17,11 @@ std::vector<PhasedMap> required(Model const&, int order, char const* name);
 /// leaves unsymmetric where entries cancel.) Collective.
 bool symmetric(Mat);
 
+/// Whether sum_k A_k e^{-i k theta} is Hermitian, but for rounding, told from x^H A y = (y^H A x)* of two
+/// vectors of scrambled entries that weigh all dofs alike: two products a term, no copy of a large matrix.
+/// Collective.
+bool hermitian(std::vector<PhasedMap> const& terms, double theta);
+
 /// Matrices of an eigenproblem; a small one is held whole by each rank, which all solve the same: cheaper
 /// than to share it, and the Krylov space of a tiny problem, once exhausted, would end at another step on
 /// another rank.

@@ -113,8 +113,11 @@ std::vector<LinearMode> undamped(Model const& model, int count, bool stuck, std:
 
 std::vector<LinearMode> linear_modes(Model const& model, int count, ContactState state,
                                      std::optional<double> near) {
+  const bool stuck = state == ContactState::stuck;
   auto modes = state == ContactState::linearised ? damped_modes(model, count)
-                                                 : undamped(model, count, state == ContactState::stuck, near);
+               : hermitian(required(model, 0, "stiffness"), model.theta())
+                   ? undamped(model, count, stuck, near)
+                   : circulatory_modes(model, count, stuck, near);
   std::sort(modes.begin(), modes.end(), [](auto const& a, auto const& b) { return a.omega < b.omega; });
   if (modes.size() > size_t(count)) modes.resize(size_t(count));
   return modes;

@@ -242,6 +242,34 @@ def test_negative_damping_is_reported_as_such(comm):
     assert mode.zeta == pytest.approx(-0.02, rel=ROUNDING)
 
 
+@pytest.mark.parametrize("circulation", [0.0, 6.0, 60.0])
+@pytest.mark.parametrize("state", ["free", "stuck"])
+def test_circulatory_forces_make_undamped_modes_flutter(comm, circulation, state):
+    """K with +c above and -c below its diagonal, C left out: two frequencies meet, then beta is of both signs."""
+    K = K3 + circulation * (np.eye(3, k=1) - np.eye(3, k=-1)) * [[1.0, 1.0, 1.0], [1.0, 1.0, 0.3], [1.0, 0.3, 1.0]]
+    B = np.array([[0.0, 1.0, -1.0]])
+    slider = fw.Contact("jenkins", B, {"tangential_stiffness": 7.0, "friction_limit": 1.0})
+    model = fw.Model(M3, K, C3, [slider], comm)
+    modes = fw.linear_modes(model, 3, state)
+    K = K + (7.0 * B.T @ B if state == "stuck" else 0.0)
+    values = -np.array([m.beta for m in modes]) + 1j * np.array([m.omega for m in modes])
+    exact = state_eigenvalues(M3, 0.0 * C3, K)
+    assert (max(v.real for v in exact) > 0.1) == (circulation > 10)
+    np.testing.assert_allclose(sorted(values, key=ascending), sorted(exact, key=ascending), rtol=1e-8)
+
+
+def ascending(value):
+    return round(value.imag, 6), value.real
+
+
+def test_circulatory_forces_leave_some_requests_unanswered(comm):
+    K = K3 + np.array([[0.0, 5.0, 0.0], [-5.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    with pytest.raises(fw.InputError, match="near a frequency"):
+        fw.linear_modes(fw.Model(M3, K, comm=comm), 1, "free", near=3.0)
+    with pytest.raises(fw.InputError, match="rigid contact"):
+        fw.linear_modes(fw.Model(M3, K, None, [friction([[0.0, 1.0, -1.0]])], comm), 1, "stuck")
+
+
 def test_no_more_modes_than_degrees_of_freedom(comm):
     assert len(fw.linear_modes(fw.Model(M3, K3, comm=comm), 10, "free")) == 3
 

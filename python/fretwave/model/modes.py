@@ -71,11 +71,16 @@ def linear_modes(model: Model, count: int = 6, contact: str = "stuck", near: flo
     FretwaveError
         Fewer converge than there are: how many, and the option that helps; or the model's factor is larger than the
         memory.
+    InputError
+        `near`, or stuck contact that is rigid, where K is not symmetric.
 
     Notes
     -----
     Stuck and free modes below the last (nearer than the farthest) are counted by the negative pivots of K - omega^2 M
     (Sylvester), so that no copy of a double mode and no member of a family is left out.
+
+    A stiffness that is not symmetric (circulatory forces) has modes without damping that may flutter, beta != 0;
+    their shapes are of unit length.
 
     Of one sector: the waves of the model's nodal diameter (`fretwave.cyclic.sector` says which way they run).
     """
