@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Optional
 import numpy as np
 
 from ...arrays import Array
-from ...case.harmonic import nodal_diameter
+from ...case.harmonic import nodal_diameter, with_flow_forces
 from ...case.observed import label_of, unit_of
 from ...errors import InputError
 from ...model.contact import Contact
@@ -32,6 +32,9 @@ if TYPE_CHECKING:
 
 #: Of a period: they miss the extremes of a harmonic motion by (pi / SAMPLES)^2 / 2 of its amplitude.
 SAMPLES = 256
+
+#: Share of its frequency by which a wave may be beside the flow's without a word.
+FAR = 0.1
 
 NO_LIMIT = "first slip: no pair sticks at rest with a sharp friction limit"
 
@@ -70,6 +73,8 @@ def mode_at_rest(context: AnalysisContext[ModeAnalysis]) -> Told:
     slip = first_slip(context, states, start.mode, observed_amplitude(context, start.dof, start.mode))
     seen = start.attributes.get("normalise", label_of(context.analysis.normalise))
     lines = [rest_line(context, states, seconds), stuck_line(context, start.mode)]
+    if with_flow_forces(context.analysis):
+        lines[-1] += _beside_flow(context, start.mode)
     return lines + _slip_lines(context, slip, seen), _never_slips(context, slip)
 
 
@@ -90,7 +95,8 @@ def flutter_at_rest(context: AnalysisContext[FlutterAnalysis], diameters: Sequen
             seen = observed_by(wave, analysis.normalise, mode)
             slip = first_slip(wave, states, mode, observed_amplitude(wave, seen, mode))
         lines = lines or [rest_line(context, states, seconds)]
-        lines.append(f"nodal diameter {diameter}: {mode.frequency_hz:.6g} Hz, {_slip_lines(wave, slip)[0]}")
+        found = f"{mode.frequency_hz:.6g} Hz{_beside_flow(context, mode)}"
+        lines.append(f"nodal diameter {diameter}: {found}, {_slip_lines(wave, slip)[0]}")
         slips.append(slip)
     known = [slip for slip in slips if slip is not None]
     least = min(known, key=lambda slip: slip.lasting) if len(known) == len(slips) and known else None
@@ -133,6 +139,18 @@ def stuck_line(context: AnalysisContext[Any], mode: LinearMode) -> str:
     if context.case.wheel is not None:
         which += " of the whole wheel" if context.analysis.nodal_diameter is None else " of this wave on the wheel"
     return f"{which} with contact as at rest: {mode.frequency_hz:.6g} Hz"
+
+
+def _beside_flow(context: AnalysisContext[Any], mode: LinearMode) -> str:
+    """Said where the flow's coefficients hold elsewhere.
+
+    They act as springs and dampers c = 2 zeta omega_flow per modal mass: of a mode zeta omega_flow / omega.
+    """
+    section = (context.case.sector or context.case).aerodynamics
+    if section is None or abs(mode.frequency_hz / section.frequency - 1) <= FAR:
+        return ""
+    times = section.frequency / mode.frequency_hz
+    return f" (the flow's forces hold at {section.frequency:g} Hz: {times:.3g} times their damping)"
 
 
 def observed_amplitude(context: AnalysisContext[Any], seen: Observed, mode: LinearMode) -> float:
