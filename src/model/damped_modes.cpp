@@ -77,11 +77,10 @@ struct Free {
   double first = 0;
 };
 
-Free free_motions(Operators const& terms) {
+Free free_motions(Operators const& terms, double scale) {
   if (!symmetric(terms[0])) return {};
   PetscInt size;
   check(MatGetSize(terms[0], &size, nullptr));
-  const double scale = trace_ratio(terms[0], terms[2]);
   const Pencil pencil = {.K = terms[0],
                          .M = terms[2],
                          .size = size,
@@ -99,6 +98,7 @@ Free free_motions(Operators const& terms) {
     if (first != pairs.end()) out.first = std::sqrt(std::max(first->value, 0.0));
     if (first != pairs.end() || PetscInt(pairs.size()) < count) break;
   }
+  if (out.motions == size) out.first = std::sqrt(scale);
   return out;
 }
 
@@ -173,12 +173,13 @@ std::vector<LinearMode> modes_of(Model const& model, int count, std::vector<Phas
     check(MatZeroEntries(matrices[1]));
   }
   const Operators terms = operators(model.comm(), std::move(matrices));
-  const Free free = free_motions(terms);
+  const double stiffest = scale_of(terms[0], terms[2], stiffness);
+  const Free free = free_motions(terms, stiffest);
   auto modes = oscillating(model, terms, count, 0, free);
   const size_t last = std::min(modes.size(), size_t(count));
   double highest = 0;
   for (size_t k = 0; k < last; ++k) highest = std::max(highest, std::hypot(modes[k].omega, modes[k].beta));
-  const double norms = std::sqrt(trace_ratio(terms[0], terms[2]));
+  const double norms = std::sqrt(stiffest);
   for (double scale : {highest, 2 * highest, highest / 2}) {
     if (!(scale > 0) || highest > norms / far) break;
     try {

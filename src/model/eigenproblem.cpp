@@ -130,14 +130,20 @@ void take_shape(Model const& model, Operators const& operators, Vec re, Vec im, 
 }
 
 double trace_ratio(Mat K, Mat M) {
-  VecHandle d;
   double k, m;
-  check(MatCreateVecs(K, d.out(), nullptr));
-  check(MatGetDiagonal(K, d));
-  check(VecSum(d, &k));
-  check(MatGetDiagonal(M, d));
-  check(VecSum(d, &m));
+  const auto trace = [](Mat A, double* sum) {
+    VecHandle d;
+    check(MatCreateVecs(A, d.out(), nullptr));
+    check(MatGetDiagonal(A, d));
+    check(VecSum(d, sum));
+  };
+  trace(K, &k), trace(M, &m);
   return k / m;
+}
+
+double scale_of(Mat K, Mat M, std::vector<PhasedMap> const& terms) {
+  const double scale = trace_ratio(K, M);
+  return scale != 0 ? scale : trace_ratio(terms.front().B, M);
 }
 
 VecHandle balance(Mat K, Mat M) {

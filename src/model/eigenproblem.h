@@ -44,6 +44,8 @@ void take_shape(Model const&, Operators const&, Vec re, Vec im, LinearMode&);
 
 /// A square of frequency [1/s^2] of the stiffest dofs: trace K / trace M. Collective.
 double trace_ratio(Mat K, Mat M);
+/// The same; of the sector's own term where the terms cancel in a wave. Collective.
+double scale_of(Mat K, Mat M, std::vector<PhasedMap> const& terms);
 
 /// Scales of the dofs by which no mass outweighs the others: what rigid contact holds it holds but for
 /// rounding, which a mass 1e12 times the others' lets them feel. Collective.

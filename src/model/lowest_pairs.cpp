@@ -201,7 +201,7 @@ std::vector<EigenPair> lowest_pairs(Pencil const& pencil, PetscInt count) {
 }
 
 bool is_rigid(Mat K, double scale, double value, Vec vector) {
-  return value < 1e-9 * scale && value < uncertainty(K, vector);
+  return value < 1e-9 * scale && value <= uncertainty(K, vector);
 }
 
 std::vector<EigenPair> lowest_beside_zero(Pencil pencil, PetscInt count) {

@@ -75,7 +75,7 @@ std::vector<LinearMode> undamped(Model const& model, int count, bool stuck, std:
     K = scaled(K, scales, scales), M = scaled(M, scales, scales);
     stiff->scale(scales);
   }
-  const double scale = trace_ratio(K, M);
+  const double scale = scale_of(K, M, stiffness);
   std::vector<MatHandle> pair;
   pair.push_back(constrained ? stiff->beside(K) : MatHandle::share(K));
   pair.push_back(constrained ? stiff->beside_mass(M) : MatHandle::share(M));

@@ -124,3 +124,17 @@ def test_modes_near_a_frequency_beyond_all_are_the_highest(beyond, comm):
     exact = 2 * np.sin(np.pi * np.arange(1, n + 1) / (2 * (n + 1)))  # of a chain between two walls
     found = fw.linear_modes(fw.Model(np.eye(n), K, comm=comm), 3, "free", near=beyond * exact[-1])
     assert [mode.omega for mode in found] == pytest.approx(exact[-3:], rel=1e-6)
+
+
+@pytest.mark.parametrize("state", ["free", "stuck", "linearised"])
+def test_a_ring_of_masses_turns_freely(comm, state):
+    """m x'' = k (x_next + x_last - 2 x): omega = 2 (k/m)^(1/2) sin(pi d / N), whose terms cancel in the wave d = 0."""
+    m, k, sectors = 2.0, 7.3e9, 7
+    K = {0: np.array([[2 * k]]), 1: np.array([[-k]]), -1: np.array([[-k]])}
+    for d in range(4):
+        model = fw.Model(m * np.eye(1), K, comm=comm, sectors=sectors, nodal_diameter=d)
+        found = [mode.omega for mode in fw.linear_modes(model, 1, state)]
+        if state == "linearised" and d == 0:
+            assert not found, "a motion that does not oscillate"
+        else:
+            assert found == pytest.approx([2 * np.sqrt(k / m) * np.sin(np.pi * d / sectors)], rel=SOLVED)
