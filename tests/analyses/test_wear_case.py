@@ -160,6 +160,7 @@ def test_an_amplitude_that_the_mode_does_not_reach_leaves_the_others(folder: Pat
         1, "-m", "fretwave", *arguments(folder, tmp_path / "none", *words, "--set", "wear.amplitude=[2.1e-6]")
     )
     assert done.returncode == 3 and "reaches none of the amplitudes" in done.stderr
+    assert re.search(r"of wear: the mode ends early: \w", done.stderr) and "--set mode.step" in done.stderr
     assert not (tmp_path / "none").exists()
 
 
@@ -178,6 +179,35 @@ def test_bad_input_is_refused(folder: Path, tmp_path: Path, old: str, new: str, 
     (tmp_path / "case.toml").write_text(TEXT + WEAR.replace(old, new))
     with pytest.raises(CaseErrors, match=message):
         load_case(tmp_path / "case.toml")
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"coefficient": 1e300},
+        {"coefficient": 5e-324},
+        {"coefficient": 1e300, "cycle_unit": 1.0},
+        {"cycle_unit": 1e300, "cycles": 1e300},
+        {"cycle_unit": 1e-300, "cycles": 1e-300},
+    ],
+)
+def test_cycles_that_are_no_number_are_refused(
+    folder: Path, tmp_path: Path, capsys, settings: dict[str, float]
+) -> None:
+    """They divided by zero, stood still at steps of no length, or did not end: the unit was 0 or infinite, or its
+    product with the cycles was, or a step at the present rates was none of so many cycles."""
+    words = [word for key, value in settings.items() for word in ("--set", f"wear.{key}={value}")]
+    assert main(arguments(folder, tmp_path, *words, "--set", "wear.report_at=[]")) == 2
+    found = capsys.readouterr().err
+    assert "cannot be marched over" in found and "analysis 'wear'" in found and "fix:" in found
+
+
+@pytest.mark.parametrize("coefficient, unit", [(1e-300, None), (1e100, None), (0.0, 1e300)])
+def test_far_coefficients_and_units_that_are_numbers_are_marched(
+    folder: Path, tmp_path: Path, coefficient: float, unit: float | None
+) -> None:
+    words = ["--set", f"wear.coefficient={coefficient}", *(["--set", f"wear.cycle_unit={unit}"] if unit else [])]
+    assert main(arguments(folder, tmp_path, *words, "--set", "wear.report_at=[]")) == 0
 
 
 def test_pairs_without_area_cannot_wear(tmp_path: Path) -> None:

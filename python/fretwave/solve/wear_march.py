@@ -110,7 +110,7 @@ def wear(
     Raises
     ------
     InputError
-        The branch does not pass the amplitude, or a contact cannot wear.
+        The branch does not pass the amplitude, a contact cannot wear, or the cycles are no number of vibrations.
     StageFailed
         Newton does not find the start.
     """
@@ -124,7 +124,7 @@ def wear(
     problem, rows, states = branch.problem, [], []
     with WornMode(problem, coefficient, areas) as mode:
         unworn = np.zeros(len(mode.areas))
-        unit = cycle_unit or mode.normal_cycle(mode.measure(first, unworn).load)
+        unit = mode.cycle_unit(mode.measure(first, unworn).load, cycles, cycle_unit)
         new = mode.solve(unworn, guess)
         for vector in (first, guess):
             vector.destroy()

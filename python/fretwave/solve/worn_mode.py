@@ -21,6 +21,8 @@ from .steps import StepControl
 
 #: Changes of log amplitude from which a solution on another sheet is looked for, and points to reach it by.
 DETOURS, DETOUR_POINTS = (1e-3, -1e-3, 1e-2, -1e-2, 3e-2, -3e-2), 40
+#: Of `normal_cycle`s that a march may have: of more the lengths of steps are no numbers.
+LONGEST = 1e200
 #: The corrector's tolerance over that of the branch: depths add up its errors.
 SHARPER = 1e-2
 
@@ -134,8 +136,28 @@ class WornMode(Destroyable):
             self._values(role)[loaded] for role in (Role.FRICTION_COEFFICIENT, Role.TANGENTIAL_STIFFNESS)
         )
         slip = 4 * np.mean(friction * load[loaded] / stiffness)
-        rate = self.coefficient * np.mean(self.stiffness[loaded] / self.areas[loaded]) * slip
-        return float(1 / rate) if rate > 0 else 1.0
+        with np.errstate(over="ignore"):
+            rate = self.coefficient * np.mean(self.stiffness[loaded] / self.areas[loaded]) * slip
+            return float(1 / rate) if rate > 0 else 1.0
+
+    def cycle_unit(self, load: Array, cycles: float, given: float | None = None, where: str | None = None) -> float:
+        """Vibration cycles in a normalised one: as given, else `normal_cycle` of these loads.
+
+        Raises
+        ------
+        InputError
+            That many `cycles` of it are no number of vibrations, or too many to be marched over.
+        """
+        own = self.normal_cycle(load)
+        unit = given or own
+        vibrations = unit * cycles
+        if 0 < vibrations < np.inf and (not self.coefficient or vibrations / LONGEST < own):
+            return unit
+        unit_of = self.problem.model.units("1/pressure")
+        measured = f"k_w = {self.coefficient:g} {unit_of}, {cycles:g} cycles of {unit:g} vibrations"
+        expected = f"a number of vibrations, in which the load can fall to 1/e less than {LONGEST:g} times"
+        fix = "correct the wear coefficient, the cycles or cycle_unit"
+        raise InputError("the wear cycles cannot be marched over", where, measured, expected, fix)
 
     def _values(self, role: Role) -> Array:
         """Of all wearing pairs."""

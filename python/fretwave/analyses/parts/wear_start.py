@@ -39,19 +39,24 @@ def unworn_starts(context: AnalysisContext[ModeAnalysis], analysis: WearAnalysis
     with WornMode(problem, analysis.coefficient, areas) as mode, context.console.progress(context.name):
         for point in points_of(branch):
             if "cycle_unit" not in found:
-                found["cycle_unit"] = analysis.cycle_unit or mode.normal_cycle(
-                    mode.measure(point.y, np.zeros(len(mode.areas))).load
-                )
+                load = mode.measure(point.y, np.zeros(len(mode.areas))).load
+                where = f"analysis '{analysis.name}'"
+                found["cycle_unit"] = mode.cycle_unit(load, analysis.cycles, analysis.cycle_unit, where)
             _take(context, analysis, point, found)
             if len(found) == 1 + 2 * len(analysis.amplitude):
                 break
+    why = branch.reason
     if len(found) < 1 + 2 * len(analysis.amplitude):
-        context.console.line(f"{context.name}: the mode ends early: {branch.reason}")
+        context.console.line(f"{context.name}: the mode ends early: {why}")
     branch.destroy()
     problem.destroy()
     if len(found) < 2:
         raise NotConverged(
-            "the mode reaches none of the amplitudes of wear", None, "no start", analysis.amplitude, "lower amplitudes"
+            "the mode reaches none of the amplitudes of wear",
+            None,
+            f"the mode ends early: {why}",
+            f"amplitudes {analysis.amplitude}",
+            f"lower amplitudes, or shorter steps of the mode (--set {analysis.mode}.step.maximum=0.03)",
         )
     return found
 
