@@ -158,3 +158,17 @@ def test_a_decay_says_where_noise_begins(tmp_path: Path, capfd) -> None:
         and "is the integration's noise" in said[-1]
     )
     assert rows[-1]["amplitude"] < 1e-8
+
+
+def test_a_mode_without_a_point_leaves_out_what_starts_from_it_alone(tmp_path: Path, capfd) -> None:
+    """The other analyses are done, the mode's own reason is told, exit 3: the run ended with exit 2, "there are no
+    results here", and said nothing of the mode."""
+    case = CASE.format(kind="limit_cycle", m2=0.02, eps=0.05, reach=[0.02, 3.0], c=300.0, starts=[0.05], periods=20)
+    path, out = tmp_path / "case.toml", tmp_path / "run"
+    path.write_text(case + '[[analysis]]\nname = "first"\ntype = "linear"\n')
+    for _ in range(2):
+        assert call("run", path, "--no-plots", "--force", "--out", out) == 3
+        told = capfd.readouterr()
+        assert "'mode' stopped early" in told.err and "analysis 'mode', first point: no solution" in told.err
+        assert "motion: 'mode', which it starts from, has no point" in told.out
+        assert (out / "first.csv").exists() and not (out / "motion.csv").exists()

@@ -30,7 +30,7 @@ from ..texts import counted, display
 from .left_out import left_out_lines
 from .order import RunOptions, in_order
 from .pictures import plot
-from .stopped import joined, not_converged
+from .stopped import joined, not_converged, without
 
 if TYPE_CHECKING:
     from mpi4py import MPI
@@ -147,8 +147,15 @@ class Runner:
                 self.console.line(f"{name}: {number} of {len(names)} analyses")
             if name in sweeps:
                 self._sweep(name, sweeps[name])
+            elif (needed := self._found_nothing(self.case.analyses[name].needs())) is not None:
+                self._note(name, without(name, needed), 0.0)
             else:
                 self._run_one(self.case.analyses[name])
+
+    def _found_nothing(self, names: Sequence[str]) -> str | None:
+        """The first of these that this run has done and that stopped before its first point."""
+        done = self.folder.record["analyses"]
+        return next((name for name in names if name in done and not done[name]["points"]), None)
 
     def _greet(self, names: Sequence[str]) -> None:
         ranks = counted(self.comm.size, "rank")

@@ -25,6 +25,12 @@ def not_converged(name: str, outcome: Outcome) -> NotConverged:
     )
 
 
+def without(name: str, needed: str) -> Outcome:
+    """Of an analysis whose start another one was to give, which stopped before its first point."""
+    reason, goal = f"'{needed}', which it starts from, has no point", f"results of '{needed}'"
+    return Outcome(0, reason, False, [f"{name}: {reason}"], goal, advice=f"what lets '{needed}' begin")
+
+
 def _advice(name: str, reason: str) -> str:
     """What most often helps against a reason to stop."""
     if "number of points" in reason:
