@@ -102,4 +102,23 @@ def test_a_sharper_tolerance_pays_in_a_cheap_case(tmp_path):
 
 def test_an_analysis_that_cannot_be_studied_is_answered(tmp_path, capfd):
     assert call("study", write_case(tmp_path), "--analysis", "worn") == 2
-    assert "--analysis mode" in capfd.readouterr().err
+    told = capfd.readouterr().err
+    assert "--analysis mode" in told and "mode, wear" in told
+
+
+def test_bad_input_is_told_once_and_is_no_run_that_failed(tmp_path, capfd):
+    """It was told once for each run, all of it in one `measured`, and ended as not converged."""
+    path = write_case(tmp_path)
+    arguments = ["--analysis", "wear", "--set", "wear.coefficient=1e300", "--repeats", "1", "--out", tmp_path / "study"]
+    assert call("study", path, *arguments) == 2
+    told = capfd.readouterr()
+    assert told.err.count("cannot be marched over") == 1 and "cannot be marched over" not in told.out
+
+
+def test_a_run_without_a_start_is_told_in_one_line(tmp_path, capfd):
+    path = write_case(tmp_path)
+    arguments = ["--analysis", "wear", "--set", "mode.step.max_points=2", "--repeats", "1", "--out", tmp_path / "study"]
+    assert call("study", path, *arguments, "--tolerance", "1e-2") == 3
+    told = capfd.readouterr()
+    assert "reaches none of the amplitudes of wear: the mode ends early" in told.out
+    assert "milder finest settings" in told.err and told.err.count("try:") == 1

@@ -122,8 +122,10 @@ def _analysis(case: Case, name: str | None) -> tuple[type[Solver[Any]], Studied]
     found |= {one: (ResponseSolver, response) for one, response in case.analyses.of(ForcedAnalysis).items()}
     chosen = name or next(iter(found), None)
     if chosen not in found:
-        fix = f"--analysis {next(iter(found))}" if found else "add an [[analysis]] of type mode to the case"
-        raise InputError("a study needs a mode or a forced response", "--analysis", name, ", ".join(found) or None, fix)
+        names = [*found, *case.analyses.of(WearAnalysis)]
+        fix = f"--analysis {names[0]}" if names else "add an [[analysis]] of type mode to the case"
+        what, expected = "a study needs a mode, a forced response or wear", ", ".join(names) or None
+        raise InputError(what, "--analysis", name, expected, fix)
     return found[str(chosen)]
 
 

@@ -24,7 +24,7 @@ from ..case.harmonic import nodal_diameter
 from ..case.load import Case
 from ..case.reduce import reduce_case
 from ..console import Console
-from ..errors import EXIT_DONE, FretwaveError, NotConverged
+from ..errors import EXIT_DONE, FretwaveError, NotConverged, PetscError
 from ..mpi.guard import caught_by_all
 from ..mpi.petsc_options import AnalysisOptions
 from ..results.study_report import LEGEND_OF_WEAR, PRINTED_OF_WEAR, markdown
@@ -205,8 +205,8 @@ class _Solver:
         with AnalysisOptions(context.prefix, [mode.petsc]).inserted():
             try:
                 self._starts[settings.harmonics] = unworn_starts(context, self.analysis)
-            except FretwaveError as error:
-                return str(error)
+            except (NotConverged, PetscError) as error:
+                return _reason(error)
         return CycleUnit(float(self._starts[settings.harmonics]["cycle_unit"]))
 
     def solve(self, settings: WearSettings) -> WearOutcome | str:
@@ -219,9 +219,9 @@ class _Solver:
                     self._starts[settings.harmonics] = unworn_starts(context, self.analysis)
                     self.unit = self.unit or float(self._starts[settings.harmonics]["cycle_unit"])
                 tried = [self._march(context, settings) for _ in range(self.repeats)]
-            except FretwaveError as error:
+            except (NotConverged, PetscError) as error:
                 caught_by_all(self.comm, error)
-                return str(error)
+                return _reason(error)
         runs = [run for run in tried if isinstance(run, WearOutcome)]
         return replace(runs[0], wall_s=min(run.wall_s for run in runs)) if runs else str(tried[0])
 
@@ -272,6 +272,11 @@ def _progress(settings: WearSettings, found: WearOutcome | str, units: UnitSyste
         return f"{_text(settings)}: {found}"
     cost = f"{found.steps} steps, {found.newton} Newton iterations, {found.wall_s:.3f} s"
     return f"{_text(settings)}: {cost}, worn {units.cubic_millimetres * found.worn:.5g} mm^3"
+
+
+def _reason(error: FretwaveError) -> str:
+    """In one line; bad input is no reason why one run of a study fails, but why all do."""
+    return error.what if error.measured is None else f"{error.what}: {error.measured}"
 
 
 def _text(settings: WearSettings) -> str:
