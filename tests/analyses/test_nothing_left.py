@@ -1,4 +1,4 @@
-"""Contact that sticks leaves nothing to move: a wheel, tuned or mistuned, begins without it, as one sector does."""
+"""Contact that sticks leaves nothing to move: a wheel, flutter and wear begin without it, as one sector does."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import pytest
 import scipy.linalg
 from command_line import call
 from models.solved_case import tables_of
+from mpi4py import MPI
 from tolerances import SOLVED, TIGHT
 
 N = 6
@@ -79,6 +80,76 @@ def test_a_mistuned_wheel_begins_at_its_own_frequencies(shared_tmp, comm):
     share = np.abs(np.exp(2j * np.pi * np.arange(N) / N) @ shapes) ** 2
     assert told(shared_tmp, "numbered") == pytest.approx(hertz[1], rel=TIGHT)
     assert told(shared_tmp, "wave") == pytest.approx(hertz[(share > 0.999 * share.max()).argmax()], rel=TIGHT)
+
+
+FLOW = """
+[aerodynamics]
+frequency = 0.3
+damping = { 0 = -0.01, 1 = -0.02, -1 = -0.02, 2 = 0.01, -2 = 0.01 }
+[[analysis]]
+name = "flutter"
+type = "flutter"
+method = "EPMC"
+harmonics = 3
+normalise = "mass"
+amplitude = [1e-4, 1e-3]
+nodal_diameters = [0, 1, -2]
+"""
+
+
+def test_flutter_begins_there_too(shared_tmp, comm):
+    """It was refused, with a key that it has not. Where v << eps, tanh friction is the damper 0.05 / 0.5: with the
+    flow's 2 zeta omega_f on it, each wave has (0.1 + 2 zeta omega_f) / (2 omega0), omega0^2 = 1 + 4 sin^2(pi ND / N).
+    """
+    (table,) = tables_of(RING + RUB + FLOW, shared_tmp, comm, "flutter")
+    for diameters, ratio in ((0, -0.01), (1, -0.02), (-2, 0.01)):
+        row = int(np.flatnonzero(table["nodal_diameter"] == diameters)[0])
+        omega0 = np.sqrt(1 + 4 * np.sin(np.pi * diameters / N) ** 2)
+        assert table["omega0"][row] == pytest.approx(omega0, rel=1e-6)
+        assert table["zeta"][row] == pytest.approx((0.1 + 2 * ratio * 2 * np.pi * 0.3) / (2 * omega0), rel=1e-6)
+
+
+PLATE = """
+import numpy as np
+from fretwave import Pairs, Structure
+
+def build():
+    dofs, pairs = {"normal": 0, "mass": 1}, {"flank": Pairs(np.eye(2), 2, areas=np.ones(1))}
+    return Structure(np.eye(2), np.array([[2.0, -0.5], [-0.5, 1.0]]), dofs=dofs, pairs=pairs)
+"""
+WORN = """
+[model]
+builder = "model.py"
+[[contact]]
+name = "flank"
+law = "coulomb_2d"
+normal_stiffness = 1.0
+tangential_stiffness = 0.5
+friction_coefficient = 0.5
+normal_load = 0.4
+[[contact]]
+name = "held"
+law = "regularised_coulomb"
+pairs = ["normal"]
+friction_limit = 1e-3
+regularisation_velocity = 1.0
+[[analysis]]
+name = "wear"
+type = "wear"
+mode = "mode"
+amplitude = [1.0]
+cycles = 2.0
+coefficient = 1e-3
+"""
+
+
+@pytest.mark.ranks(1)
+def test_wear_begins_there_too(tmp_path):
+    """At its first row it is the mode, which begins there."""
+    (tmp_path / "model.py").write_text(PLATE)
+    text = WORN + RUB.replace("0.05", "1e-3") + mode("mode", "report_at = [1.0]\n")
+    wear, own = tables_of(text, tmp_path, MPI.COMM_SELF, "wear", "mode")
+    assert wear["zeta"][0] == pytest.approx(own["zeta"][-1], rel=SOLVED) and wear["worn_1"][-1] > 0
 
 
 PRELOAD = "[preload]\n"

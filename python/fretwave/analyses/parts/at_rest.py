@@ -106,7 +106,7 @@ def flutter_at_rest(context: AnalysisContext[FlutterAnalysis], diameters: Sequen
 def rest_and_mode(context: AnalysisContext[Any]) -> tuple[States, LinearMode, Optional[Rest], float]:
     """Contacts at rest, the linear mode about it of a structure or one sector, and the seconds it took. Collective."""
     began = time.perf_counter()
-    mode, rest = start_mode(context, context.analysis.linear_mode, or_free=True)
+    mode, rest = start_mode(context, context.analysis.linear_mode)
     states = context.comm.bcast((rest or loaded_state(context)).contacts)
     return states, mode, rest, time.perf_counter() - began
 

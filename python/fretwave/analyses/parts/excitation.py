@@ -133,11 +133,11 @@ def excitation_of(context: AnalysisContext[ForcedAnalysis], harmonics: Harmonics
     """Of a forced analysis; a wheel's unknowns are scaled by the tuned wave that its force drives. Collective."""
     analysis = context.analysis
     if context.case.wheel is None:
-        return Excitation(context, harmonics, *start_mode(context, analysis.linear_mode, or_free=True))
+        return Excitation(context, harmonics, *start_mode(context, analysis.linear_mode))
     from ...cyclic.sector import wave_mode
 
     with tuned_sector(context) as sector:
-        tuned, _ = start_mode(sector, analysis.linear_mode, or_free=True)
+        tuned, _ = start_mode(sector, analysis.linear_mode)
     rest = rest_state(context)
     return Excitation(context, harmonics, wave_mode(tuned, nodal_diameter(analysis), context.case.wheel.sectors), rest)
 

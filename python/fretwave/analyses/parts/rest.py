@@ -128,14 +128,10 @@ def _lowest(case: Case, context: AnalysisContext[AnalysisSection], limit: str, d
         return linear_modes(model, 1)[0]
 
 
-def start_mode(
-    context: AnalysisContext[AnalysisSection], linear_mode: int, or_free: bool = False
-) -> tuple[LinearMode, Optional[Rest]]:
+def start_mode(context: AnalysisContext[AnalysisSection], linear_mode: int) -> tuple[LinearMode, Optional[Rest]]:
     """The linear mode with the contact as it is at rest, stuck, and the rest state (or None). Collective.
 
-    Parameters
-    ----------
-    or_free : where contact that sticks leaves nothing to move, the mode without it
+    Where contact that sticks leaves nothing to move, the mode without it.
     """
     rest = rest_state(context)
     if rest is not None:
@@ -144,7 +140,7 @@ def start_mode(
             f" {100 * rest.open:.3g} % are open"
         )
         context.arrays["rest_displacement"] = rest.displacement
-    modes = stuck_or_no_modes(context, linear_mode) if or_free else modes_at_rest(context, linear_mode)
+    modes = stuck_or_no_modes(context, linear_mode)
     if not modes:
         context.console.line(f"{context.name}: contact that sticks leaves nothing to move: the mode without contact")
         return context.numbered(context.linear_mode("free", linear_mode), linear_mode), rest

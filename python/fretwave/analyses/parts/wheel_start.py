@@ -64,7 +64,7 @@ def start_of(context: AnalysisContext[ModeAnalysis]) -> Start:
     if context.case.wheel is not None:
         return _on_wheel(context)
     analysis = context.analysis
-    stuck, rest = start_mode(context, analysis.linear_mode, or_free=True)
+    stuck, rest = start_mode(context, analysis.linear_mode)
     observed = observed_by(context, analysis.normalise, stuck)
     return Start(stuck, rest, other_asymptote(context, stuck), observed)
 
@@ -104,7 +104,7 @@ def _tuned(context: AnalysisContext[ModeAnalysis]) -> tuple[LinearMode, dict[str
     """Linear mode of the tuned sector in the wave that the analysis names, and its other asymptote. Collective."""
     analysis = context.analysis
     with tuned_sector(context) as sector:
-        stuck, _ = start_mode(sector, analysis.linear_mode, or_free=True)
+        stuck, _ = start_mode(sector, analysis.linear_mode)
         return stuck, other_asymptote(sector, stuck)
 
 
