@@ -23,6 +23,15 @@ def test_verdicts_follow_the_signs_of_the_damping():
 
 
 @pytest.mark.ranks(1)
+@pytest.mark.parametrize("rounding", [-2e-18, 6e-18])
+def test_no_damping_is_told_as_none(rounding):
+    """Of a flow that does nothing "-2.15e-16 %" was said."""
+    columns = {"nodal_diameter": np.zeros(2), "amplitude": np.array([1.0, 2.0]), "zeta": np.full(2, rounding)}
+    (wave,) = describe_waves({**columns, "frequency_hz": np.full(2, 10.0), "event": np.array(["", ""])}, [0])
+    assert words(wave, "m") == "ND 0, 10 Hz, +0 % at the smallest amplitude: neither damped nor fed"
+
+
+@pytest.mark.ranks(1)
 def test_a_limit_cycle_on_a_branch_that_runs_back_names_its_folds():
     """Damping rises along the branch while the amplitude falls: that says nothing of its stability."""
     rows = [

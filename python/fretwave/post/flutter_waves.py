@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .limit_cycles import limit_cycles, stability
-from .mode_curve import NO_DAMPING, most_damped
+from .mode_curve import NO_DAMPING, most_damped, without_rounding
 
 STABLE = {True: "stable", False: "unstable", None: "unknown"}
 
@@ -93,7 +93,8 @@ def words(wave: Mapping[str, Any], unit: str) -> str:
         "bounded below": f"{cycles}, growth without bound beyond; {peak}",
         "stable below": f"decays below, {cycles}; {peak}",
     }[wave["verdict"]]
-    stuck = f"{wave['frequency_hz']:.5g} Hz, {100 * wave['zeta']:+.3g} % at the smallest amplitude"
+    first = 100 * without_rounding(wave["zeta"])
+    stuck = f"{wave['frequency_hz']:.5g} Hz, {first:+.3g} % at the smallest amplitude"
     return f"ND {with_sign(wave['nodal_diameter'])}, {stuck}: {fate}"
 
 
