@@ -209,7 +209,12 @@ def test_errors_in_references(write) -> None:
     assert "2 H + 2 = 44" in str(found["mode.samples is too small"].expected)
     assert found["mode.report_at[1] is outside the branch"].measured == "17.0"
     assert "unknown dof 'm9'" in found
-    assert "forced.frequency is not a range" in found
+    assert found["forced.frequency is not a range"].fix == "write `frequency = [3.2, 4.6]`"
+
+
+def test_a_range_of_one_value_is_given_a_second_one(write) -> None:
+    (problem,) = problems(write(("frequency = [3.2, 4.6]", "frequency = [3.2, 3.2]")))
+    assert problem.fix == "write `frequency = [3.2, 6.4]`"
 
 
 @pytest.mark.parametrize(

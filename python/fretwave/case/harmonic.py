@@ -196,9 +196,8 @@ def _samples(harmonics: int) -> int:
 def check_range(report: Reporter, key: str, ends: list[float], inside: list[float]) -> None:
     """First value below last, and the points to report at between them."""
     if not ends[0] < ends[1]:
-        report.wrong(
-            (key,), "is not a range", "first value < last value", f"write `{key} = [{min(ends)}, {2 * max(ends)}]`"
-        )
+        last = ends[0] if ends[1] < ends[0] else 2 * ends[0]
+        report.wrong((key,), "is not a range", "first value < last value", f"write `{key} = [{ends[1]}, {last}]`")
         return
     for index, value in enumerate(inside):
         if not ends[0] <= value <= ends[1]:
