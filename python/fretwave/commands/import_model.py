@@ -25,10 +25,12 @@ from ..importers.nodes import Material, Nodes, cells_of
 from ..importers.pair_tables import read_pairs
 from ..importers.pairs import NEXT, match
 from ..importers.report import check
+from ..importers.rows import check_rows
 from ..importers.sector import SectorFaces, make_sector, said_of, wheel_of
 from ..importers.surfaces import has_faces
 from ..importers.text import columns_of, whole
 from ..importers.units import Evidence, check_declared, evidence_of
+from ..importers.unjoined import check_unjoined
 from ..model.pairs import Pairs
 from ..model.structure import Structure
 from ..mpi.guard import on_first_rank
@@ -104,6 +106,7 @@ def read_parts(options: argparse.Namespace) -> tuple[Structure, Assembled, list[
     if nodes is not None:
         model.node_numbers, model.coordinates = nodes.numbers, nodes.coordinates
         model.hexahedra, model.cells = cells_of(nodes)
+        found.warnings += check_rows(model, nodes, where)
     model.names, model.dofs = _names(model, options.name)
     wheel = wheel_of(options)
     if wheel is not None:
@@ -111,6 +114,7 @@ def read_parts(options: argparse.Namespace) -> tuple[Structure, Assembled, list[
         found.notes.append(said_of(wheel, model))
     model.pairs = dict(_pairs(options, labels, nodes, wheel, found.notes))
     check_directions(model)
+    check_unjoined(model, where)
     return model, found, [] if nodes is None else nodes.materials
 
 

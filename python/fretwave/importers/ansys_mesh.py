@@ -17,7 +17,7 @@ import numpy as np
 from ..arrays import Array, IntArray
 from ..errors import InputError
 from ..texts import display
-from .ansys_elements import blocks_of
+from .ansys_elements import KINDS, blocks_of
 from .cells import Elements
 from .constraints import Constraints
 from .extras import reader_of
@@ -75,7 +75,8 @@ def _nodes(mesh: Mesh, where: str) -> Nodes:
     if mesh.node_angles is not None:
         _check_angles(numbers, mesh.node_angles, where)
     types = np.asarray(mesh.etype) if len(mesh.elem) else np.zeros(0, dtype=np.int64)  # of none the package has none
-    elements = Elements(blocks_of(mesh.elem, types, where))
+    left_out = {str(kind) for kind in set(types.tolist()) - KINDS.keys()}
+    elements = Elements(blocks_of(mesh.elem, types, where), left_out=left_out)
     elements.check_numbers(where)
     sets = {name.upper(): np.unique(members).astype(np.int64) for name, members in mesh.node_components.items()}
     return Nodes(numbers, coordinates, where, sets, elements)

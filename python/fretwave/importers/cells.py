@@ -91,16 +91,20 @@ class Elements:
         Element numbers and names of sets by the set's name in capitals.
     surfaces : dict
         Lines (element number or set, face) by the surface's name in capitals.
+    left_out : set
+        Types of elements that are not read.
     """
 
     blocks: dict[str, Block] = field(default_factory=dict)
     sets: dict[str, list[int | str]] = field(default_factory=dict)
     surfaces: dict[str, list[tuple[str, str]]] = field(default_factory=dict)
+    left_out: set[str] = field(default_factory=set)
 
     def add(self, options: dict[str, str], data: Lines) -> None:
         """The lines of an ``*ELEMENT``: number and nodes; an element may go over several lines. Others are left out."""
         kind, count = _kind(options.get("TYPE", ""))
         if not kind:
+            self.left_out.add(options.get("TYPE", "").upper())
             return
         words = [(place, word.strip()) for place, text in data for word in text.split(",") if word.strip()]
         wrong = next((place for place, word in words if not word.isdigit()), None)
