@@ -23,6 +23,9 @@ GOOD = {
     "a face twice": "*SURFACE, NAME=TOP\nE, S2\n1, S2\n",
     "a surface twice": "*SURFACE, NAME=TOP\nE, S2\n*SURFACE, NAME=TOP\nE, S2\n",
     "lines of a set included": '*NSET, NSET=TOP\n5\n*INCLUDE, INPUT="more.txt"\n8\n',
+    "lines of a set in a file": "*NSET, NSET=TOP, INPUT=more.txt\n*NSET, NSET=TOP\n5,8\n",
+    "an element in a file": TOP + "*NODE, INPUT=nodes.txt\n*ELEMENT, TYPE=C3D8, INPUT=cell.txt\n",
+    "a system that ends": TOP + "*SYSTEM\n",
     "a skin of shells": TOP + "*ELEMENT, TYPE=S4\n2,8,7,6,5\n",
     "a part that stands once": TOP + "*INSTANCE, NAME=P-1, PART=P\n*END INSTANCE\n",
 }
@@ -35,6 +38,9 @@ WRONG = {
     "this is no node set": "*NSET, NSET=TOP, GENERATE\n8,5\n",
     "5,8,1,7": "*NSET, NSET=TOP, GENERATE\n5,8,1,7\n",
     "directions of nodes are turned": TOP + "*TRANSFORM, NSET=TOP, TYPE=C\n0,0,0,0,0,1\n",
+    "turned or moved": TOP + "*SYSTEM\n0,0,0,0,1,0\n",
+    "\\*NGEN": TOP + "*NGEN, NSET=TOP\n5,8,1\n",
+    "\\*ELGEN": TOP + "*ELGEN, ELSET=E\n1,3,4,1\n",
     "a part has two instances": TOP + 2 * "*INSTANCE, NAME=P-1, PART=P\n*END INSTANCE\n",
 }
 #: Corners, then the middles of its edges.
@@ -44,6 +50,8 @@ TETRAHEDRON += [(0.5, 0, 0), (0.5, 0.5, 0), (0, 0.5, 0), (0, 0, 0.5), (0.5, 0, 0
 
 def read(folder: Path, text: str) -> Nodes:
     (folder / "more.txt").write_text("6\n7\n")
+    (folder / "nodes.txt").write_text("9,0,0,-1\n10,1,0,-1\n11,1,1,-1\n12,0,1,-1\n")
+    (folder / "cell.txt").write_text("2,9,10,11,12,1,2,3,4\n")
     (folder / "loop.txt").write_text("*INCLUDE, INPUT=loop.txt\n")
     (folder / "deck.inp").write_text(CUBE + text)
     return read_nodes(folder / "deck.inp")

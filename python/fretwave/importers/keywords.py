@@ -2,7 +2,7 @@
 
 Layout (SIMULIA, Abaqus Keywords Reference, "Input syntax rules"; G. Dhondt, CalculiX CrunchiX User's Manual): a keyword
 line that ends in a comma goes on; ``**`` is a comment; the lines of an ``*INCLUDE`` stand in its place, within a set or
-table too; a blank field is zero; exponents are E or D.
+table too, and those of the file that ``*NODE, INPUT=`` and the like name; a blank field is zero; exponents are E or D.
 """
 
 from __future__ import annotations
@@ -13,6 +13,8 @@ from pathlib import Path
 from ..errors import InputError
 from ..texts import display
 
+#: Keywords whose data lines may stand in a file of their own, which the option INPUT names (Abaqus).
+ELSEWHERE = ("NODE", "ELEMENT", "NSET", "ELSET", "SURFACE", "BOUNDARY")
 #: Data lines: file and line, text.
 Lines = list[tuple[str, str]]
 
@@ -60,6 +62,8 @@ def _lines(path: Path, above: tuple[Path, ...]) -> Iterator[tuple[str, str]]:
             yield from _included(path.parent / options.get("INPUT", ""), (*above, path.resolve()), place, text)
         else:
             yield place, text
+        if keyword in ELSEWHERE and "INPUT" in options:
+            yield from _included(path.parent / options["INPUT"], (*above, path.resolve()), place, text)
 
 
 def _included(path: Path, above: tuple[Path, ...], place: str, text: str) -> Iterator[tuple[str, str]]:

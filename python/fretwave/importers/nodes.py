@@ -22,6 +22,20 @@ from .constraints import Constraints
 from .keywords import Lines, blocks, number
 from .text import columns_of, head_of, whole
 
+_FLAT = "write the deck flat, with every node and element in it where it is"
+_MADE = ("nodes or elements are made of others", "each in a *NODE or *ELEMENT", _FLAT)
+#: Keywords that are not followed, and without which the mesh would be another: what they do, expected, what to do.
+REFUSED = {
+    "TRANSFORM": (
+        "directions of nodes are turned",
+        "directions x, y, z at every node",
+        "take *TRANSFORM out and export the matrices again",
+    ),
+    "SYSTEM": ("coordinates of nodes are turned or moved", "those of the whole model", _FLAT),
+    "NMAP": ("coordinates of nodes are turned or moved", "those of the whole model", _FLAT),
+    **dict.fromkeys(("NGEN", "NFILL", "NCOPY", "ELGEN", "ELCOPY", "SYMMETRIC MODEL GENERATION"), _MADE),
+}
+
 
 @dataclass
 class Material:
@@ -179,10 +193,9 @@ class Deck:
                 self._add_material(keyword, options, data)
             elif keyword == "INSTANCE":
                 self._add_instance(options, data)
-            elif keyword == "TRANSFORM":
-                fix = "take *TRANSFORM out and export the matrices again"
-                expected = "directions x, y, z at every node"
-                raise InputError("directions of nodes are turned", self.where, "*TRANSFORM", expected, fix)
+            elif keyword in REFUSED and (data or keyword != "SYSTEM"):  # without data it ends
+                what, expected, fix = REFUSED[keyword]
+                raise InputError(what, self.where, f"*{keyword}", expected, fix)
 
     def _add_instance(self, options: dict[str, str], data: Lines) -> None:
         part = options.get("PART", "").upper()
