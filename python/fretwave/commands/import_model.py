@@ -31,6 +31,7 @@ from ..importers.surfaces import has_faces
 from ..importers.text import columns_of, whole
 from ..importers.units import Evidence, check_declared, evidence_of
 from ..importers.unjoined import check_unjoined
+from ..importers.untied import check_untied
 from ..model.pairs import Pairs
 from ..model.structure import Structure
 from ..mpi.guard import on_first_rank
@@ -115,6 +116,8 @@ def read_parts(options: argparse.Namespace) -> tuple[Structure, Assembled, list[
     model.pairs = dict(_pairs(options, labels, nodes, wheel, found.notes))
     check_directions(model)
     check_unjoined(model, where)
+    if wheel is not None and nodes is not None:
+        found.warnings += check_untied(model, wheel, nodes, options.tolerance)
     return model, found, [] if nodes is None else nodes.materials
 
 
