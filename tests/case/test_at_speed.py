@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 from command_line import call
+from models import hexahedra
 from tolerances import ROUNDING, SOLVED, TIGHT
 
 import fretwave as fw
@@ -114,6 +115,36 @@ def test_what_is_no_stiffness_at_a_speed_is_refused(name, tmp_path):
     with pytest.raises(CaseErrors) as caught:
         load_case(written(tmp_path, text))
     assert said in str(caught.value) and str(caught.value).count("fix:") == 1
+
+
+#: What is given in place of K at a speed, K_G = 1e-3 of K: whether a mesh is refused, and a model of few dofs noted.
+SLIPS = {
+    "all of it": (lambda K: 1.001 * K, False, False),
+    "stress stiffness alone": (lambda K: 1e-3 * K, True, True),
+    "in other units": (lambda K: 1.001e3 * K, True, True),
+    "its dofs backwards": (lambda K: K[::-1, ::-1], True, False),
+}
+
+
+@pytest.mark.parametrize("slip", SLIPS)
+@pytest.mark.parametrize("meshed", [True, False])
+def test_another_stiffness_than_at_speed(slip, meshed, tmp_path):
+    """Of a mesh stress changes K by thousandths; 0 Hz came of the others beyond the speed, without a word."""
+    bar = hexahedra.bar((4, 1, 2), (0.1, 0.02, 0.01))
+    free = np.setdiff1d(np.arange(bar.K.shape[0]), bar.layer(0.0))
+    M, K = (A[free][:, free] for A in (bar.M, bar.K))
+    labels = np.column_stack([free // 3 + 1, free % 3 + 1]) if meshed else None
+    write_model(tmp_path / "rest.h5", fw.Structure(M, K, labels=labels))
+    given, refused, noted = SLIPS[slip]
+    sp.save_npz(tmp_path / "turning.npz", sp.csr_matrix(given(K)))
+    path = written(tmp_path, '[model]\nfile = "rest.h5"\nat_speed = { 30 = "turning.npz" }\n')
+    if meshed and refused:
+        with pytest.raises(CaseErrors, match="is not that of this mesh") as caught:
+            load_case(path)
+        assert str(caught.value).count("fix:") == 1
+        return
+    notes = [note for note in load_case(path).notes if "is it all of K at this speed" in note]
+    assert len(notes) == (noted and not meshed)
 
 
 #: A sector of a ring: a mass on the rim, tied to the next one, that carries a blade of two.

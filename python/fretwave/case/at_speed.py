@@ -26,6 +26,10 @@ from .toml.source import Source
 
 #: Mass matrices of one model at two speeds differ by less.
 SAME_MASS = 1e-9
+#: Share of a mesh's stiffness that rotation does not change: stresses are some thousandths of the modulus.
+MOST_CHANGED = 0.3
+#: Sizes of another model's stiffness over that at rest beyond which its stress stiffness, or other units, are meant.
+LEAST_LEFT, MOST_GROWN = 0.5, 100.0
 MODEL_FILE = ".h5"
 EXAMPLE = 'at_speed = { 3000 = "K3000.mtx" }'
 
@@ -52,6 +56,7 @@ def with_speeds(
         if square is not None and read is not None:
             squares.append(square)
             changes.append(read[0] - at_rest)
+            notes += _much(changes[-1], at_rest, structure, source.where(key), found)
             known[f"model.at_speed.{text}"] = read[1]
     if not changes:
         return structure, identity
@@ -59,6 +64,22 @@ def with_speeds(
     if len(changes) > 1:
         notes.append(f"stiffness at speed: K + Omega^2 K2 leaves {100 * left:.2g} % of its change")
     return _turning(section, replace(structure, parts={**structure.parts, SPIN: sp.csr_matrix(K2)})), known
+
+
+def _much(change: Sparse, at_rest: Sparse, structure: Structure, where: str, found: Found) -> list[str]:
+    """An error where a mesh changes by more than any stress does; a note where another model is hardly that at rest."""
+    size = _size(at_rest) or 1.0
+    share, ratio = _size(change) / size, _size(at_rest + change) / size
+    if structure.labels is None:
+        asked = "is it all of K at this speed, and in the same units?"
+        odd = not LEAST_LEFT < ratio < MOST_GROWN
+        return [f"stiffness at speed: its entries are {ratio:.2g} of those at rest: {asked}"] if odd else []
+    if share > MOST_CHANGED:
+        what, measured = "the stiffness at speed is not that of this mesh", f"K changes by {share:.2g} of that at rest"
+        fix = "give elastic and stress stiffness in one K, in the units and the order of dofs of that at rest"
+        expected = f"at most {MOST_CHANGED:g}, as stresses are some thousandths of the modulus"
+        found.append(InputError(what, where, measured, expected, fix))
+    return []
 
 
 def _turning(section: ModelSection, structure: Structure) -> Structure:
