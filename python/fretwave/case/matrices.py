@@ -101,9 +101,9 @@ def _read_known(path: Path, letter: str) -> Any:
     from ..importers import formats, matrix_market
 
     if (format := formats.registered(path)) is not None:
-        return _as_given(format.read(path, letter, None))
+        return _as_given(format.read(path, letter, None), letter)
     if path.suffix.lower() == ".mtx":
-        return _as_given(matrix_market.read(path))
+        return _as_given(matrix_market.read(path), letter)
     if path.suffix != ".npz":
         raise ValueError(f"unknown file type '{path.suffix}'")
     with np.load(path) as archive:
@@ -114,15 +114,19 @@ def _read_known(path: Path, letter: str) -> Any:
     return matrix
 
 
-def _as_given(found: object) -> Any:
+def _as_given(found: object, letter: str) -> Any:
     """The matrix of a registered reader; what has to be put in order is the importer's."""
     from ..importers.entries import Entries
+    from ..importers.repeated import check_once
 
     if not isinstance(found, Entries):
         return found
     if found.labels is not None or found.held is not None or found.half:
         raise ValueError("it numbers its dofs by nodes; bring it into a model file with `fretwave import`")
-    return scipy.sparse.csr_matrix((found.values, (found.rows, found.columns)), shape=found.shape)
+    matrix = scipy.sparse.csr_matrix((found.values, (found.rows, found.columns)), shape=found.shape)
+    if matrix.nnz < len(found.values):
+        check_once(letter, found)
+    return matrix
 
 
 def _check_square(letter: str, values: Sparse, where: str) -> None:

@@ -24,6 +24,7 @@ from ..importers.node_files import read_node_file
 from ..importers.nodes import Material, Nodes, cells_of
 from ..importers.pair_tables import read_pairs
 from ..importers.pairs import NEXT, match
+from ..importers.repeated import check_diagonal
 from ..importers.report import check
 from ..importers.rows import check_rows
 from ..importers.sector import SectorFaces, make_sector, said_of, wheel_of
@@ -103,6 +104,7 @@ def read_parts(options: argparse.Namespace) -> tuple[Structure, Assembled, list[
         found.matrices["M"], found.matrices["K"], found.matrices.get("C"), names=found.names, labels=labels
     )
     check_definite(model, where)
+    check_diagonal(model, where)
     model.units = options.units
     if nodes is not None:
         model.node_numbers, model.coordinates = nodes.numbers, nodes.coordinates

@@ -17,6 +17,7 @@ from ..model.checks import check_symmetric
 from ..model.sectors import Given
 from ..results.model_file import dof_name
 from ..texts import counted
+from .repeated import check_once
 
 #: Share of entries of the rarer triangle below which they count as strays beside the other triangle.
 STRAY_SHARE = 0.5
@@ -133,6 +134,8 @@ def assemble(given: dict[str, Entries], symmetric: str = "auto") -> Assembled:
     found = Assembled({}, labels, {}, notes, warnings=[entries.doubt for entries in given.values() if entries.doubt])
     for letter, entries in given.items():
         matrix = sp.csr_matrix((entries.values.astype(float), (entries.rows, entries.columns)), shape=entries.shape)
+        if matrix.nnz < len(entries.values):
+            check_once(letter, entries)
         matrix.eliminate_zeros()
         found.matrices[letter] = matrix
     found.given_size = found.size
