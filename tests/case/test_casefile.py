@@ -228,6 +228,8 @@ def test_a_range_of_one_value_is_given_a_second_one(write) -> None:
         ("dampr.friction_limit=3", "did you mean `contact.damper.friction_limit`?"),
         ("mode=3", "did you mean `mode.<key>`?"),
         ("mode.step.maximun=0.1", "did you mean `maximum`?"),
+        ("mode.harmonics=3#5", "what follows # is a comment"),
+        ("mode.amplitude=[0.02, 3.0] # x", "what follows # is a comment"),
     ],
 )
 def test_wrong_overrides(override: str, said: str) -> None:

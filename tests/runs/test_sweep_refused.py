@@ -132,6 +132,9 @@ def test_ranges(text: str, values: list) -> None:
         ("[0.0],[-0.0]", "has the value [-0.0] twice"),
         ("10:20:30", "ends in ':30'"),
         ("1:1e400:n=3", "infinity"),
+        ("2#,3", "what follows # is a comment"),
+        ("2,3 # 5", "what follows # is a comment"),
+        ("2,3] #", "TOML"),
     ],
 )
 def test_wrong_ranges(text: str, said: str) -> None:

@@ -245,11 +245,22 @@ def parse_value(text: str) -> Any:
         parsed = tomllib.loads(f"value = {text}")
         if len(parsed) > 1:
             raise ValueError("more than one value")
+        if _ends_in_comment(text):
+            raise ValueError("what follows # is a comment")
         return parsed["value"]
     except TomlError:
         if _PLAIN_TEXT.fullmatch(text.strip()):
             return text.strip()
         raise
+
+
+def _ends_in_comment(text: str) -> bool:
+    """Whether TOML leaves out the end of a value: a bracket behind it closes nothing then."""
+    try:
+        tomllib.loads(f"value = [{text.strip()}]")
+    except TomlError:
+        return True
+    return False
 
 
 def _read(path: Path) -> str:
