@@ -135,9 +135,29 @@ def test_a_name_of_no_pictures_is_refused(folder, capsys, name, fix):
     assert told.out == "" and f"fix:      {fix}" in told.err and "an analysis (" in told.err
 
 
-@pytest.mark.parametrize("name", ["mode", "backbone", "gauges", "linear"])
-def test_what_might_have_pictures_is_no_error(folder, name):
+@pytest.mark.parametrize("name", ["mode", "backbone", "mode,forced"])
+def test_what_has_pictures_is_no_error(folder, name):
     assert call("plot", folder, "--only", name) == 0
+
+
+@pytest.mark.parametrize(
+    ("names", "none", "made"), [("gauges", "gauges", 0), ("linear", "linear", 0), ("safe,forced,wear", "safe, wear", 1)]
+)
+def test_a_name_without_a_picture_of_these_results_is_said_and_the_others_are_drawn(folder, capsys, names, none, made):
+    for path in folder.glob("*.png"):
+        path.unlink()
+    assert call("plot", folder, "--only", names) == 2
+    told = capsys.readouterr()
+    assert len(list(folder.glob("*.png"))) == made and told.out.startswith(f"{made} picture")
+    assert f"measured: {none}\n" in told.err and "expected: one of backbone, " in told.err
+    for kind in ("mode", "forced", "free_decay", "limit_cycle", "phase_planes"):
+        assert kind in told.err
+    assert "gauges," not in told.err and "fix:      --only backbone" in told.err
+
+
+def test_a_format_twice_is_one(folder, capsys):
+    assert call("plot", folder, "--only", "forced", "--format", "png,PNG,.png") == 0
+    assert capsys.readouterr().out.startswith("1 picture in ")
 
 
 def test_pictures_are_vectors_on_request(folder):

@@ -61,6 +61,7 @@ def plot_run(
     only: Sequence[str] | None = None,
     failed: list[str] | None = None,
     formats: Sequence[str] = ("png",),
+    drawable: set[str] | None = None,
 ) -> list[Path]:
     """Make every picture that the results allow; nothing is solved.
 
@@ -70,6 +71,7 @@ def plot_run(
     only : names of analyses or of picture families; None for all
     failed : gets a line for each family that the results are too few or too extreme for; without it they raise
     formats : of the files, of those in `fretwave.plots.style.FORMATS`
+    drawable : gets the names of `only` under which these results have pictures
 
     Returns
     -------
@@ -83,7 +85,7 @@ def plot_run(
     def save(name: str, figure: Figure) -> list[Path]:
         return [style.save(figure, run.folder / f"{name}.{ending}") for ending in formats]
 
-    return [path for paths in drawn(run, save, only, failed) for path in paths]
+    return [path for paths in drawn(run, save, only, failed, drawable) for path in paths]
 
 
 def drawn(
@@ -91,6 +93,7 @@ def drawn(
     save: Callable[[str, Figure], Saved],
     only: Sequence[str] | None = None,
     failed: list[str] | None = None,
+    drawable: set[str] | None = None,
 ) -> Iterator[Saved]:
     """What `save` makes of the name and the figure of each picture; see `plot_run`."""
     from . import style
@@ -100,7 +103,10 @@ def drawn(
         for family, figures in families():
             try:
                 for name, figure in figures(run):
-                    if only is None or family in only or picture_of(name, run) in only:
+                    named = {family, picture_of(name, run)}
+                    if drawable is not None:
+                        drawable |= named
+                    if only is None or not named.isdisjoint(only):
                         yield save(name, figure)
             except Exception as error:
                 own = (
