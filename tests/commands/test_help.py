@@ -37,3 +37,10 @@ def test_two_ranks_say_it_once(launch) -> None:
         done = launch(2, "-m", "fretwave", *words)
         assert done.returncode == 0, done.stderr
         assert done.stdout.count(said) == 1
+
+
+@pytest.mark.parametrize("what", ["--keys", "--schema"])
+def test_two_ranks_list_the_keys_once(launch, what: str) -> None:
+    one, two = (launch(ranks, "-m", "fretwave", "check", what) for ranks in (1, 2))
+    assert two.returncode == 0, two.stderr
+    assert two.stdout == one.stdout and len(one.stdout) > 1000

@@ -84,7 +84,11 @@ def test_two_ranks_say_it_once(run: Path, launch) -> None:
     done = launch(2, "-m", "fretwave", "show", str(run), "--json")
     assert done.returncode == 0, done.stderr
     assert [one["name"] for one in json.loads(done.stdout)["analyses"]] == ["mode", "flutter", "forced"]
-    for words, said in (["report"], "report.html"), (["probe", "--dof", "m1"], "dof m1, amplitude"):
+    for words, said in (
+        (["report"], "report.html"),
+        (["probe", "--dof", "m1"], "dof m1, amplitude"),
+        (["plot", "--only", "forced"], "1 picture in"),
+    ):
         done = launch(2, "-m", "fretwave", words[0], str(run), *words[1:])
         assert done.returncode == 0 and done.stdout.count(said) == 1, done.stderr
 

@@ -317,12 +317,12 @@ def _check(options: argparse.Namespace) -> int:
     if options.keys:
         from .keys import key_lines
 
-        print("\n".join(key_lines(options.case)))
+        _said_once("\n".join(key_lines(options.case)))
         return EXIT_DONE
     if options.schema:
         from .keys import schema_text
 
-        print(schema_text(options.case), end="")
+        _said_once(schema_text(options.case).removesuffix("\n"))
         return EXIT_DONE
     if options.case is None:
         raise InputError("no case is given", "fretwave check", fix="`fretwave check cases/two_dof/case.toml`")

@@ -171,13 +171,17 @@ def _report(options: argparse.Namespace) -> int:
 def _plot(options: argparse.Namespace) -> int:
     formats = _formats(options.format)
     run_folder(options.folder)
+    comm = world_if_any()  # a file of plug-ins may load MPI
     from ..console import Console
     from ..results.results import open_results
     from ..run.pictures import plot
 
-    if not (options.folder / "study.csv").exists():
-        open_results(options.folder / "results.h5").close()
-    plot(options.folder, Console(True), options.only or None, formats)
+    def draw() -> None:
+        if not (options.folder / "study.csv").exists():
+            open_results(options.folder / "results.h5").close()
+        plot(options.folder, Console(True), options.only or None, formats)
+
+    _on_first_rank(comm, draw)
     return EXIT_DONE
 
 
