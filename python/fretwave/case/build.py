@@ -46,7 +46,8 @@ def build_model(
 
 def model_of(case: Case, analysis: AnalysisSection, comm: MPI.Comm) -> Model:
     """``fretwave.Model`` of a case as an analysis takes it: its dampers, preload, wave and flow. Collective."""
-    wave, flow = nodal_diameter(analysis.settings(case)), with_flow_forces(analysis)
+    settings = analysis.settings(case)
+    wave, flow = nodal_diameter(settings), with_flow_forces(settings)
     return build_model(case, analysis.acting_dampers(case), comm, case.preload_of(analysis), wave, flow)
 
 

@@ -19,8 +19,7 @@ from ..analyses.parts.wear_line import wear_areas
 from ..analyses.parts.wear_start import unworn_starts
 from ..analyses.wear import WearAnalysis
 from ..arrays import Array
-from ..case.build import build_model
-from ..case.harmonic import nodal_diameter
+from ..case.build import model_of
 from ..case.load import Case
 from ..case.reduce import reduce_case
 from ..console import Console
@@ -179,9 +178,7 @@ class _Solver:
         self.case = reduce_case(case, comm, only=[analysis.name])
         self.analysis = analysis.model_copy(update={"amplitude": [max(analysis.amplitude)]})
         self.comm, self.console, self.repeats = comm, console, repeats
-        mode = self._mode(None)
-        preload = self.case.preload_of(analysis)
-        self.model = build_model(self.case, mode.dampers, comm, preload, nodal_diameter(mode))
+        self.model = model_of(self.case, self.analysis, comm)
         self._starts: dict[int, dict[str, Any]] = {}
         self.unit = 0.0  # of the first run, so that all compare at the same cycles
 

@@ -188,12 +188,12 @@ def at_point(choice: Choice, group: h5py.Group, case: Case, point: int) -> Choic
 
 
 def _diameters(group: h5py.Group, case: Case, name: str, rows: Sequence[int]) -> list[int]:
-    """Nodal diameters of the points: those of their rows, where an analysis has several, or of the analysis."""
+    """Nodal diameters of the points: of their rows, where an analysis has several, or of that whose wave it takes."""
     if case.neighbours is None:
         return [0] * len(rows)
     if "nodal_diameter" in group["points"]:
         return [int(group["points/nodal_diameter"][row]) for row in rows]
-    return [nodal_diameter(case.analyses[name])] * len(rows)
+    return [nodal_diameter(case.analyses[name].settings(case))] * len(rows)
 
 
 def analysis_name(file: h5py.File, folder: Path, case: Case, asked: str | None) -> str:

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...case import contacts
-from ...case.harmonic import nodal_diameter
 from ...case.load import Case
 from ...columns import COLUMNS, Column, Value
 from ...console import Console
@@ -98,11 +97,9 @@ def march_line(
     dict
         status, reason, summary and what else the common table needs.
     """
-    from ...case.build import build_model
+    from ...case.build import model_of
 
-    case, analysis = context.case, context.analysis
-    preload = case.preload_of(analysis)
-    with build_model(case, settings.dampers, group, preload, nodal_diameter(settings)) as model:
+    with model_of(context.case, context.analysis, group) as model:
         quiet = Console(False)
         own = context.of(settings, model=model, comm=group, console=quiet, arrays={}, left_out=[])
         stuck, rest = start_mode(own, settings.linear_mode)
