@@ -24,7 +24,9 @@ from ..model.contact import LIMITS
 from ..model.structure import SPIN
 from ..post.engine_orders import excited_by, usual_orders
 from ..texts import counted, nearest, toml
+from .parts.asymptotes import sector_phase
 from .parts.context import AnalysisContext, Outcome
+from .parts.gyroscopic import gyroscopic_lines, gyroscopic_shift
 from .parts.linear_waves import columns_of, crossings_of, modes_of_wave
 from .parts.linear_wheel import AMPLIFICATION, AROUND, amplification_lines, amplifications, around_wheel
 
@@ -220,14 +222,17 @@ class LinearAnalysis(AnalysisSection):
         writer = context.writer(columns, ["1c", "1s"], samples=SAMPLES, sectors=sectors, engine_orders=orders)
         rows: list[dict[str, Any]] = []
         found: dict[str, list[LinearMode]] = {}
+        waves: dict[tuple[Any, ...], list[LinearMode]] = {}
         for diameters in self.waves(sectors):
             for speed in self.speeds():
                 for row, mode in modes_of_wave(context, diameters, speed):
+                    waves.setdefault((diameters, speed, row["contact"]), []).append(mode)
                     rows.append({"point": writer.rows, **row, **around_wheel(context, mode)})
                     if speed == self.speeds()[-1]:
                         found.setdefault(row["contact"], []).append(mode)
                     writer.append(rows[-1], np.column_stack([mode.shape, -mode.imaginary]))
         summary = [*_summary(context, rows), *_meet(context, rows, sectors), *_amplify(context, found)]
+        summary += gyroscopic_lines(self.name, _gyroscopic(context, waves))
         writer.close("done", "all modes")
         return Outcome(writer.rows, "all modes", True, summary)
 
@@ -239,6 +244,13 @@ def _amplify(context: AnalysisContext[LinearAnalysis], found: Mapping[str, Seque
     rows = amplifications(context, found)
     context.write_table("amplification", {name: [row[name] for row in rows] for name in AMPLIFICATION})
     return amplification_lines(context.name, rows, context.wheel.sectors)
+
+
+def _gyroscopic(context: AnalysisContext[LinearAnalysis], waves: Mapping[tuple[Any, ...], list[LinearMode]]) -> float:
+    """Largest share of a frequency that the skew part of C moves, of all waves, speeds and limits."""
+    C = context.case.damped(context.analysis.dampers).C
+    shifts = (gyroscopic_shift(modes, C, sector_phase(context.case, key[0])) for key, modes in waves.items())
+    return max(shifts, default=0.0)
 
 
 def _summary(context: AnalysisContext[LinearAnalysis], rows: Sequence[Mapping[str, Any]]) -> list[str]:
